@@ -1,0 +1,169 @@
+#include <dashpot/analysis/certificate.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Frobenius norms of the blocks of |F| + F_error (squares, off the diagonal), and separations.
+template <int N>
+struct BlockTable {
+  State<N> norm2;       ///< square of the block's norm; on the diagonal the norm of F_error alone
+  State<N> separation;  ///< lower bounds
+};
+
+template <int N>
+void fill_table(const Defect<N>& defect, const ModalBasis<N>& basis, BlockTable<N>& table) {
+  const auto& blocks = basis.blocks;
+  const int count = blocks.size();
+  table.norm2.setZero(count, count);
+  table.separation.setConstant(count, count, kInfinity);
+  for (int j = 0; j < count; ++j) {
+    const Block& bj = blocks[j];
+    const auto w_j = basis.weight.block(bj.first, bj.first, bj.size, bj.size);
+    for (int i = 0; i < count; ++i) {
+      const Block& bi = blocks[i];
+      const auto F = defect.F.block(bi.first, bj.first, bi.size, bj.size);
+      const auto error = defect.F_error.block(bi.first, bj.first, bi.size, bj.size);
+      if (i == j) {
+        // F itself is added to Lambda, except for zero modes, whose form is kept.
+        table.norm2(i, i) = bi.zero_mode ? (F.cwiseAbs() + error).norm() : error.norm();
+        continue;
+      }
+      const auto w_i = basis.weight.block(bi.first, bi.first, bi.size, bi.size);
+      const double scale = std::sqrt(w_j.norm() / w_i.norm());
+      table.norm2(i, j) = scale * scale * (F.cwiseAbs() + error).squaredNorm();
+      if (i < j) {
+        const double separation = block_separation<N>(basis.Lambda, bi, bj);
+        table.separation(i, j) = table.separation(j, i) = separation;
+      }
+    }
+  }
+}
+
+/// Bound for one group, or a negative number if it has to grow by `merge`.
+template <int N>
+double group_radius(const BlockTable<N>& table, const Certificate<N>& certificate, int group,
+                    double total_diagonal, int& merge) {
+  const auto count = static_cast<int>(certificate.group.size());
+  double inner = 0, inner_diagonal = 0, right = 0, left = 0, separation = kInfinity;
+  merge = -1;
+  for (int i = 0; i < count; ++i) {
+    if (certificate.group[i] != group) continue;
+    inner_diagonal = std::max(inner_diagonal, table.norm2(i, i));
+    for (int j = 0; j < count; ++j) {
+      if (i == j) continue;
+      if (certificate.group[j] == group) {
+        inner += table.norm2(i, j);
+        continue;
+      }
+      right += table.norm2(i, j);
+      left += table.norm2(j, i);
+      if (table.separation(i, j) < separation) {
+        separation = table.separation(i, j);
+        merge = j;
+      }
+    }
+  }
+  inner = std::sqrt(inner) + inner_diagonal;
+  right = std::sqrt(right);
+  left = std::sqrt(left);
+  if (merge < 0) return inner;
+  // |E22|: everything outside, bounded by everything there is.
+  const double delta = separation - inner - total_diagonal;
+  if (!(delta > 0) || !(4 * right * left < delta * delta)) return -1;
+  return inner + 2 * right * left / delta;
+}
+
+}  // namespace
+
+template <int N>
+void certify(const Defect<N>& defect, ModalBasis<N>& basis, Certificate<N>& certificate) noexcept {
+  const int count = basis.blocks.size();
+  certificate.radius.setConstant(count, kInfinity);
+  certificate.group.resize(count);
+  for (int i = 0; i < count; ++i) certificate.group[i] = i;
+  if (!defect.F.allFinite()) return;
+  const bool provable = defect.F_error.allFinite();
+  BlockTable<N> table;
+  if (provable) fill_table(defect, basis, table);
+  for (const Block& b : basis.blocks) {
+    if (b.zero_mode) continue;
+    auto block = basis.Lambda.block(b.first, b.first, b.size, b.size);
+    block += defect.F.block(b.first, b.first, b.size, b.size);
+  }
+  if (!provable) return;
+  // Separations were taken before that addition: it moves them by at most the sum of the norms.
+  for (int i = 0; i < count; ++i) {
+    const Block& b = basis.blocks[i];
+    const auto block = basis.Lambda.block(b.first, b.first, b.size, b.size);
+    const double moved = b.zero_mode ? 0 : defect.F.block(b.first, b.first, b.size, b.size).norm();
+    table.norm2(i, i) = (1 + 1e-10) * table.norm2(i, i) + kUnit * block.norm();
+    for (int j = 0; j < count; ++j) {
+      if (j == i) continue;
+      table.separation(i, j) = (1 - 1e-10) * table.separation(i, j) - moved;
+      table.separation(j, i) -= moved;
+    }
+  }
+  double everything = 0, largest_diagonal = 0;
+  for (int i = 0; i < count; ++i) {
+    largest_diagonal = std::max(largest_diagonal, table.norm2(i, i));
+    for (int j = 0; j < count; ++j) everything += i == j ? 0 : table.norm2(i, j);
+  }
+  everything = (1 + 1e-10) * (std::sqrt(everything) + largest_diagonal);
+  for (int i = 0; i < count; ++i) {
+    if (certificate.group[i] != i) continue;
+    for (;;) {
+      int merge = -1;
+      const double radius = group_radius(table, certificate, i, everything, merge);
+      if (radius >= 0) {
+        for (int k = 0; k < count; ++k) {
+          if (certificate.group[k] == i) certificate.radius[k] = (1 + 1e-10) * radius;
+        }
+        break;
+      }
+      const int absorbed = certificate.group[merge];
+      for (int k = 0; k < count; ++k) {
+        if (certificate.group[k] == absorbed) certificate.group[k] = i;
+      }
+    }
+  }
+}
+
+double disc_radius(const Complex* eigenvalues, int count, int which, double block_norm,
+                   double radius) noexcept {
+  if (count == 1 || radius == 0 || !std::isfinite(radius)) return radius;
+  // An eigenvalue z of the perturbed block has  prod |z - mu_j| = |det| <= radius |block -
+  // z|^(k-1). At distance d from mu_i, the nearest, |z - mu_j| >= max(d, |mu_i - mu_j| / 2): find
+  // the d from which on the product is too large for that.
+  const Complex mu = eigenvalues[which];
+  const double norm = block_norm + modulus(mu) * std::sqrt(static_cast<double>(count));
+  if (count == 2) {
+    // d max(d, g/2) > radius (norm + d), solved for d.
+    const double gap = 0.5 * modulus(eigenvalues[0] - eigenvalues[1]);
+    const double simple = radius * norm / (gap - radius);
+    if (gap > radius && simple <= gap) return (1 + 1e-10) * simple;
+    return (1 + 1e-10) * 0.5 * (radius + std::sqrt(radius * (radius + 4 * norm)));
+  }
+  double d = radius;
+  for (int doubling = 0; doubling < 2000; ++doubling) {
+    double product = 1;
+    for (int j = 0; j < count; ++j) {
+      product *= std::max(d, 0.5 * modulus(mu - eigenvalues[j])) / (norm + d);
+    }
+    if (product * (norm + d) > radius) return d;
+    d *= 1.1;
+  }
+  return kInfinity;
+}
+
+template void certify(const Defect<kDynamic>&, ModalBasis<kDynamic>&,
+                      Certificate<kDynamic>&) noexcept;
+template void certify(const Defect<kMaxDof>&, ModalBasis<kMaxDof>&, Certificate<kMaxDof>&) noexcept;
+
+}  // namespace dashpot::analysis

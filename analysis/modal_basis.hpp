@@ -1,0 +1,84 @@
+#pragma once
+#include <dashpot/analysis/types.hpp>
+
+#include <array>
+#include <type_traits>
+#include <vector>
+
+namespace dashpot::analysis {
+
+/// One invariant subspace of the system: columns [first, first + size) of the basis.
+struct Block {
+  int first = 0;
+  int size = 0;
+  /// A zero-mode block has two columns and Lambda = [0 1; 0 -a]: position and velocity of a zero
+  /// mode, whose velocity decays with rate a; or one column and Lambda = 0, a position only, if the
+  /// velocity belongs to another block. Other blocks have nonzero eigenvalues: 1 column for a real
+  /// one, 2 for a complex pair or for a pair of real ones that (nearly) coincide, more where
+  /// eigenvalues of different modes coincide so closely that no well-conditioned basis parts them.
+  bool zero_mode = false;
+};
+
+/// A list of at most 2 N blocks that allocates only when N is kDynamic.
+template <int N>
+class BlockList {
+ public:
+  void clear() { size_ = 0; }
+  void push_back(const Block& block) {
+    const auto next = static_cast<std::size_t>(size_++);
+    if constexpr (N == kDynamic) {
+      if (items_.size() <= next) items_.resize(next + 1);
+    }
+    items_[next] = block;
+  }
+  int size() const { return size_; }
+  const Block& operator[](int i) const { return items_[static_cast<std::size_t>(i)]; }
+  Block& operator[](int i) { return items_[static_cast<std::size_t>(i)]; }
+  const Block* begin() const { return items_.data(); }
+  const Block* end() const { return items_.data() + size_; }
+
+ private:
+  std::conditional_t<N == kDynamic, std::vector<Block>,
+                     std::array<Block, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
+      items_;
+  int size_ = 0;
+};
+
+/// A real basis of the 2n-dimensional state space (q, q') in which the system falls apart into
+/// small blocks: with U (n x 2n) and the block-diagonal Lambda (2n x 2n),
+///
+///     M U Lambda^2 + C U Lambda + K U = 0,
+///
+/// so that q(t) = U exp(Lambda t) xi and q'(t) = U Lambda exp(Lambda t) xi solve the free system
+/// for every xi (2n). It stays well conditioned where eigenvectors do not exist (critical damping).
+///
+/// The left basis (Y, Gamma) does the same for the transposed system. With Z = [U; U Lambda],
+/// Z_left = [Y; Y Gamma] and B = [C M; M 0], Z_left' B Z is block diagonal with inverse `weight`.
+/// The coordinates of the state (q, v), and the drive of a generalized force f, are
+///
+///     xi = weight (Y' (C q + M v) + Gamma' Y' M q),      xi' = Lambda xi + weight Y' f.
+///
+/// For a symmetric system Y = U and Gamma = Lambda.
+template <int N = kDynamic>
+struct ModalBasis {
+  Wide<N> U;        ///< n x 2n, right (position) part; the velocity part is U Lambda
+  State<N> Lambda;  ///< 2n x 2n, block diagonal, 1/s
+  Wide<N> Y;        ///< n x 2n, left part
+  State<N> Gamma;   ///< 2n x 2n, block diagonal, 1/s
+  State<N> weight;  ///< 2n x 2n, block diagonal
+  BlockList<N> blocks;
+};
+
+/// Coordinates xi (2n) of the state (position, velocity), refined once so that
+/// U xi = position and U Lambda xi = velocity to rounding.
+template <int N>
+StateVector<N> coordinates(const ModalBasis<N>& basis, const Square<N>& mass,
+                           const Square<N>& damping, const Vector<N>& position,
+                           const Vector<N>& velocity);
+
+/// weight Y' f: what a generalized force f (N m) adds to xi', and the jump of xi that a generalized
+/// impulse f (N m s) gives.
+template <int N>
+StateVector<N> drive(const ModalBasis<N>& basis, const Vector<N>& f);
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,503 @@
+#include <dashpot/analysis/double_double.hpp>
+#include <dashpot/analysis/refinement.hpp>
+#include <dashpot/analysis/small_dense.hpp>
+
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
+/// Distance of the Gram matrix from its diagonal blocks up to which these serve for all of it, and
+/// up to which it is looked at as a perturbation of them.
+constexpr double kOrthogonal = 1e-8;
+constexpr double kNearlyOrthogonal = 0.1;
+
+/// X Lambda for a block-diagonal Lambda.
+template <int N, typename Left, typename Out>
+void times_blocks(const Left& X, const State<N>& Lambda, const BlockList<N>& blocks, Out& out) {
+  out.resize(X.rows(), X.cols());
+  const Eigen::Index n = X.rows();
+  for (const Block& b : blocks) {
+    const double* const x = X.data() + b.first * n;
+    double* const y = out.data() + b.first * n;
+    if (b.size == 1) {
+      const double factor = Lambda(b.first, b.first);
+      for (Eigen::Index i = 0; i < n; ++i) y[i] = factor * x[i];
+    } else if (b.size == 2) {
+      const Eigen::Index k = b.first;
+      const double l00 = Lambda(k, k), l10 = Lambda(k + 1, k), l01 = Lambda(k, k + 1),
+                   l11 = Lambda(k + 1, k + 1);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        y[i] = x[i] * l00 + x[i + n] * l10;
+        y[i + n] = x[i] * l01 + x[i + n] * l11;
+      }
+    } else {
+      out.middleCols(b.first, b.size) =
+          X.middleCols(b.first, b.size).lazyProduct(Lambda.block(b.first, b.first, b.size, b.size));
+    }
+  }
+}
+
+/// weight X for a block-diagonal weight.
+template <int N>
+void weigh(const State<N>& weight, const BlockList<N>& blocks, State<N>& X) {
+  const Eigen::Index states = X.rows();
+  for (const Block& b : blocks) {
+    const Eigen::Index k = b.first;
+    double* x = X.data() + k;
+    if (b.size == 1) {
+      const double factor = weight(k, k);
+      for (Eigen::Index j = 0; j < states; ++j, x += states) x[0] *= factor;
+    } else if (b.size == 2) {
+      const double w00 = weight(k, k), w10 = weight(k + 1, k), w01 = weight(k, k + 1),
+                   w11 = weight(k + 1, k + 1);
+      for (Eigen::Index j = 0; j < states; ++j, x += states) {
+        const double x0 = x[0], x1 = x[1];
+        x[0] = w00 * x0 + w01 * x1;
+        x[1] = w10 * x0 + w11 * x1;
+      }
+    } else {
+      const State<N> rows = weight.block(k, k, b.size, b.size) * X.middleRows(k, b.size);
+      X.middleRows(k, b.size) = rows;
+    }
+  }
+}
+
+/// A table of double-doubles, n x 2n, that allocates only when N is kDynamic.
+template <int N>
+class WideDoubleDouble {
+ public:
+  explicit WideDoubleDouble(Eigen::Index n) : rows_(n) {
+    if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(2 * n * n));
+  }
+  DoubleDouble& operator()(Eigen::Index i, Eigen::Index j) {
+    return items_[static_cast<std::size_t>(j * rows_ + i)];
+  }
+
+ private:
+  Eigen::Index rows_;
+  std::conditional_t<
+      N == kDynamic, std::vector<DoubleDouble>,
+      std::array<DoubleDouble, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N * N)>>
+      items_;
+};
+
+/// X Lambda in double-double arithmetic, X(i, j) giving doubles or double-doubles.
+template <int N, typename Left>
+WideDoubleDouble<N> times_blocks_extended(Left&& X, const ModalBasis<N>& basis) {
+  const Eigen::Index n = basis.U.rows();
+  WideDoubleDouble<N> out(n);
+  for (const Block& b : basis.blocks) {
+    for (Eigen::Index j = b.first; j < b.first + b.size; ++j) {
+      for (Eigen::Index i = 0; i < n; ++i) {
+        DotAccumulator sum;
+        for (Eigen::Index k = b.first; k < b.first + b.size; ++k)
+          sum.add(X(i, k), basis.Lambda(k, j));
+        out(i, j) = sum.value();
+      }
+    }
+  }
+  return out;
+}
+
+/// In double-double arithmetic, rounded once at the end: the residual
+/// R = K U + C U Lambda + M U Lambda^2, and the Gram matrix Y' (C U + M U Lambda) + (Y Gamma)' M U.
+template <int N>
+void evaluate_extended(const System<N>& system, const ModalBasis<N>& basis, Defect<N>& defect) {
+  const Eigen::Index n = system.dof();
+  WideDoubleDouble<N> V = times_blocks_extended<N>(basis.U, basis);
+  WideDoubleDouble<N> A = times_blocks_extended<N>(V, basis);
+  WideDoubleDouble<N> momentum(n), tested(n);
+  for (Eigen::Index j = 0; j < 2 * n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) {
+      DotAccumulator residual, p, t;
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const double u = basis.U(k, j);
+        residual.add(u, system.stiffness(i, k));
+        residual.add(V(k, j), system.damping(i, k));
+        residual.add(A(k, j), system.mass(i, k));
+        p.add(u, system.mass(i, k));
+        t.add(u, system.damping(i, k));
+        t.add(V(k, j), system.mass(i, k));
+        if (system.has_tails) {
+          residual.add(u, system.stiffness_tail(i, k));
+          residual.add(V(k, j), system.damping_tail(i, k));
+          t.add(u, system.damping_tail(i, k));
+        }
+      }
+      defect.R(i, j) = residual.value().high;
+      momentum(i, j) = p.value();
+      tested(i, j) = t.value();
+    }
+  }
+  for (Eigen::Index j = 0; j < 2 * n; ++j) {
+    for (Eigen::Index i = 0; i < 2 * n; ++i) {
+      DotAccumulator sum;
+      for (Eigen::Index k = 0; k < n; ++k) {
+        sum.add(tested(k, j), basis.Y(k, i));
+        sum.add(momentum(k, j), defect.YG(k, i));
+      }
+      defect.gram(i, j) = sum.value().high;
+    }
+  }
+}
+
+/// Left basis dual to the right one: the inverse of [C U + M U Lambda; M U].
+template <int N>
+void dual_basis(const Defect<N>& defect, ModalBasis<N>& basis) {
+  const Eigen::Index n = basis.U.rows();
+  State<N> B(2 * n, 2 * n), inverse = State<N>::Identity(2 * n, 2 * n);
+  B.topRows(n) = defect.CU + defect.MV;
+  B.bottomRows(n) = defect.MU;
+  solve_in_place(B, inverse, std::numeric_limits<double>::min());
+  basis.Y = inverse.leftCols(n).transpose();
+  basis.Gamma = basis.Lambda.transpose();
+}
+
+/// The same for a symmetric system whose blocks are not orthogonal to each other, because some have
+/// eigenvalues in common: Y = U G^-1 with the Gram matrix G, scaled before it is inverted.
+template <int N>
+void orthogonalize_left(const State<N>& gram, ModalBasis<N>& basis) {
+  StateVector<N> scale(gram.rows());
+  for (const Block& b : basis.blocks) {
+    const auto own = gram.block(b.first, b.first, b.size, b.size);
+    scale.segment(b.first, b.size).setConstant(1 / std::sqrt(own.norm()));
+  }
+  State<N> factor = scale.asDiagonal() * gram * scale.asDiagonal();
+  State<N> inverse = State<N>::Identity(gram.rows(), gram.rows());
+  solve_in_place(factor, inverse, std::numeric_limits<double>::min());
+  inverse = (scale.asDiagonal() * inverse * scale.asDiagonal()).eval();
+  basis.Y.noalias() = basis.U * inverse.transpose();
+  basis.Gamma = basis.Lambda.transpose();
+}
+
+/// Inverses of the diagonal blocks of the Gram matrix.
+template <int N>
+void invert_blocks(const State<N>& gram, ModalBasis<N>& basis) {
+  basis.weight.setZero(gram.rows(), gram.cols());
+  for (const Block& b : basis.blocks) {
+    const Eigen::Index k = b.first;
+    if (b.size == 1) {
+      basis.weight(k, k) = 1 / gram(k, k);
+      continue;
+    }
+    if (b.size == 2) {
+      const double inverse =
+          1 / (gram(k, k) * gram(k + 1, k + 1) - gram(k, k + 1) * gram(k + 1, k));
+      basis.weight(k, k) = gram(k + 1, k + 1) * inverse;
+      basis.weight(k + 1, k + 1) = gram(k, k) * inverse;
+      basis.weight(k, k + 1) = -gram(k, k + 1) * inverse;
+      basis.weight(k + 1, k) = -gram(k + 1, k) * inverse;
+      continue;
+    }
+    State<N> factor = gram.block(b.first, b.first, b.size, b.size);
+    State<N> inverse = State<N>::Identity(b.size, b.size);
+    solve_in_place(factor, inverse, std::numeric_limits<double>::min());
+    basis.weight.block(b.first, b.first, b.size, b.size) = inverse;
+  }
+}
+
+/// Entrywise bound on |weight G* - I|, where G* is the exact Gram matrix and `gram` the computed
+/// one. Uses |M_kl| <= s_k s_l with s_k = sqrt(M_kk), so that graded masses stay graded.
+template <int N>
+void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& basis,
+                 Defect<N>& defect) {
+  const Eigen::Index n = system.dof(), states = 2 * n;
+  const Vector<N> s = system.mass.diagonal().cwiseSqrt();
+  double c = 0;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) {
+      c = std::max(c, std::abs(system.damping(i, j)) / (s[i] * s[j]));
+    }
+  }
+  StateVector<N> u(states), v(states), y(states), yg(states);
+  for (Eigen::Index j = 0; j < states; ++j) {
+    u[j] = s.cwiseProduct(basis.U.col(j)).norm();
+    v[j] = s.cwiseProduct(defect.V.col(j)).norm();
+    y[j] = s.cwiseProduct(basis.Y.col(j)).norm();
+    yg[j] = s.cwiseProduct(defect.YG.col(j)).norm();
+  }
+  const auto dn = static_cast<double>(n);
+  const double terms = (2 * dn + 16) * dn * kUnit;
+  const double gamma = extended ? 8 * terms * kUnit : terms;
+  State<N>& E = defect.E;
+  State<N>& error = defect.F_error;  // used as workspace here
+  E = defect.gram;
+  error.resize(states, states);
+  for (Eigen::Index j = 0; j < states; ++j) {
+    for (Eigen::Index i = 0; i < states; ++i) {
+      error(i, j) =
+          gamma * (y[i] * (c * u[j] + v[j]) + yg[i] * u[j]) + 8 * kUnit * std::abs(E(i, j));
+    }
+  }
+  const State<N> size = basis.weight.cwiseAbs();
+  weigh<N>(size, basis.blocks, error);
+  weigh<N>(basis.weight, basis.blocks, E);
+  E.diagonal().array() -= 1;
+  E = E.cwiseAbs() + error;
+}
+
+/// Gram matrix and residual for the left basis (Y, Gamma), the blocks' weights, and the bound E.
+/// Returns the largest column sum of E.
+template <int N>
+double evaluate_products(const System<N>& system, bool extended, ModalBasis<N>& basis,
+                         Defect<N>& defect) {
+  times_blocks<N>(basis.Y, basis.Gamma, basis.blocks, defect.YG);
+  defect.YT = basis.Y.transpose();
+  defect.R.resize(basis.U.rows(), basis.U.cols());
+  defect.gram.resize(basis.U.cols(), basis.U.cols());
+  if (extended) {
+    evaluate_extended<N>(system, basis, defect);
+  } else {
+    const Wide<N> tested = defect.CU + defect.MV;
+    multiply(defect.YT, tested, defect.gram);
+    const State<N> YGT = defect.YG.transpose();
+    multiply(YGT, defect.MU, defect.E);
+    defect.gram += defect.E;
+    times_blocks<N>(tested, basis.Lambda, basis.blocks, defect.R);
+    defect.R += defect.KU;
+  }
+  invert_blocks<N>(defect.gram, basis);
+  gram_defect<N>(system, extended, basis, defect);
+  return defect.E.colwise().sum().maxCoeff();
+}
+
+/// Entrywise bound on the error of the computed residual R.
+template <int N>
+void bound_residual(const System<N>& system, bool extended, const ModalBasis<N>& basis,
+                    Defect<N>& defect) {
+  int widest = 1;
+  for (const Block& b : basis.blocks) widest = std::max(widest, b.size);
+  const State<N> Lambda_size = basis.Lambda.cwiseAbs();
+  const Wide<N> size_U = basis.U.cwiseAbs();
+  Wide<N> size_V, size_A;
+  times_blocks<N>(size_U, Lambda_size, basis.blocks, size_V);
+  times_blocks<N>(size_V, Lambda_size, basis.blocks, size_A);
+  Wide<N> part;
+  Square<N> size = system.stiffness.cwiseAbs();
+  multiply(size, size_U, defect.R_size);
+  size = system.damping.cwiseAbs();
+  multiply(size, size_V, part);
+  defect.R_size += part;
+  size = system.mass.cwiseAbs();
+  multiply(size, size_A, part);
+  defect.R_size += part;
+  const auto dn = static_cast<double>(system.dof());
+  const double terms = 3 * dn + 2 * widest + (system.has_tails ? 6 : 4);
+  const double gamma = extended ? 8 * terms * kUnit * kUnit : terms * kUnit;
+  // The second term is the rounding of R itself, and of the product Y' R.
+  defect.R_size = gamma * defect.R_size + (dn + 2 * widest + 4) * kUnit * defect.R.cwiseAbs();
+}
+
+}  // namespace
+
+template <int N>
+void evaluate_defect(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
+                     Defect<N>& defect) noexcept {
+  if (system.dof() == 0) {
+    defect = Defect<N>{};
+    basis.Y = basis.U;
+    basis.Gamma = basis.weight = basis.Lambda;
+    return;
+  }
+  times_blocks<N>(basis.U, basis.Lambda, basis.blocks, defect.V);
+  multiply(system.mass, basis.U, defect.MU);
+  multiply(system.damping, basis.U, defect.CU);
+  multiply(system.stiffness, basis.U, defect.KU);
+  times_blocks<N>(defect.MU, basis.Lambda, basis.blocks, defect.MV);
+  if (symmetric) {
+    basis.Y = basis.U;
+    basis.Gamma = basis.Lambda;
+  } else {
+    dual_basis<N>(defect, basis);
+  }
+  double contraction = evaluate_products<N>(system, extended, basis, defect);
+  if (symmetric && !(contraction < kOrthogonal)) {
+    orthogonalize_left<N>(defect.gram, basis);
+    const double dual_contraction = evaluate_products<N>(system, extended, basis, defect);
+    if (dual_contraction < contraction) {
+      contraction = dual_contraction;
+    } else {
+      basis.Y = basis.U;
+      basis.Gamma = basis.Lambda;
+      contraction = evaluate_products<N>(system, extended, basis, defect);
+    }
+  }
+  multiply(defect.YT, defect.R, defect.W);
+  defect.F = -defect.W;
+  if (!(contraction < kNearlyOrthogonal)) {
+    // Far from orthogonal, the basis needs all of the Gram matrix, and proves nothing.
+    State<N> gram = defect.gram;
+    solve_in_place(gram, defect.F, std::numeric_limits<double>::min());
+    defect.F_error.setConstant(std::numeric_limits<double>::infinity());
+    return;
+  }
+  // |F* - F| <= |weight| |error of Y'R|, then the Gram matrix's distance from block form.
+  weigh<N>(basis.weight, basis.blocks, defect.F);
+  bound_residual<N>(system, extended, basis, defect);
+  defect.YT = defect.YT.cwiseAbs();
+  multiply(defect.YT, defect.R_size, defect.F_error);
+  const State<N> weight_size = basis.weight.cwiseAbs();
+  weigh<N>(weight_size, basis.blocks, defect.F_error);
+  const StateVector<N> E_rows = defect.E.rowwise().maxCoeff();
+  for (Eigen::Index j = 0; j < defect.F.cols(); ++j) {
+    const double column =
+        (defect.F.col(j).cwiseAbs() + defect.F_error.col(j)).sum() / (1 - contraction);
+    defect.F_error.col(j) = (1 + 1e-10) * (defect.F_error.col(j) + E_rows * column);
+  }
+}
+
+template <int N>
+double solve_sylvester(const Eigen::Ref<const State<N>>& A, const Eigen::Ref<const State<N>>& B,
+                       const State<N>& C, State<N>& X) noexcept {
+  const Eigen::Index k = A.rows(), l = B.rows();
+  if (k <= 2 && l == 2) {
+    // By Cayley-Hamilton, p(A) X = A C + C B - tr(B) C with p the characteristic polynomial of B.
+    const double trace = B(0, 0) + B(1, 1);
+    const double determinant = B(0, 0) * B(1, 1) - B(0, 1) * B(1, 0);
+    State<N> p = A * A - trace * A;
+    p.diagonal().array() += determinant;
+    State<N> right = A * C + C * B - trace * C;
+    const double p_norm = p.norm();
+    const double half_A = (A - 0.5 * trace * State<N>::Identity(k, k)).norm();
+    const double half_B = (B - 0.5 * trace * State<N>::Identity(l, l)).norm();
+    const double p_det = k == 1 ? p(0, 0) : p(0, 0) * p(1, 1) - p(0, 1) * p(1, 0);
+    // Smallest singular value of p, from below: |det| / |p|_F for 2 x 2, less p's rounding errors.
+    const double rounding =
+        16 * kUnit * (A.squaredNorm() + std::abs(trace) * A.norm() + B.squaredNorm());
+    const double least = (k == 1 ? std::abs(p_det) : std::abs(p_det) / p_norm) - rounding;
+    const double separation = least / (half_A + half_B);
+    if (!(separation > 0)) {
+      X.setZero(k, l);
+      return 0;
+    }
+    solve_in_place(p, right, std::numeric_limits<double>::min());
+    X = right;
+    return separation;
+  }
+  if (k == 1 && l == 1) {
+    const double gap = A(0, 0) - B(0, 0);
+    X.setZero(1, 1);
+    if (gap != 0) X(0, 0) = C(0, 0) / gap;
+    return std::abs(gap);
+  }
+  if (l == 1) {
+    State<N> shifted = A;
+    shifted.diagonal().array() -= B(0, 0);
+    State<N> inverse = State<N>::Identity(k, k);
+    solve_in_place(shifted, inverse, std::numeric_limits<double>::min());
+    X = inverse * C;
+    const double separation = 1 / inverse.norm();
+    if (!(separation > 0) || !X.allFinite()) X.setZero(k, l);
+    return separation > 0 ? separation : 0;
+  }
+  // Larger blocks are rare: the Kronecker matrix of the map, where it fits the capacity.
+  X.setZero(k, l);
+  if (N != kDynamic && k * l > kTwice<N>) return 0;
+  State<N> map = State<N>::Zero(k * l, k * l), inverse = State<N>::Identity(k * l, k * l);
+  for (Eigen::Index j = 0; j < l; ++j) {
+    map.block(j * k, j * k, k, k) = A;
+    for (Eigen::Index i = 0; i < l; ++i) {
+      map.block(j * k, i * k, k, k).diagonal().array() -= B(i, j);
+    }
+  }
+  solve_in_place(map, inverse, std::numeric_limits<double>::min());
+  const double separation = 1 / inverse.norm();
+  if (!(separation > 0)) return 0;
+  const StateVector<N> c = Eigen::Map<const StateVector<N>>(C.data(), k * l);
+  const StateVector<N> x = inverse * c;
+  X = Eigen::Map<const State<N>>(x.data(), k, l);
+  return separation;
+}
+
+template <int N>
+double block_separation(const State<N>& Lambda, const Block& a, const Block& b) noexcept {
+  if (a.size > 2 || b.size > 2) {
+    State<N> unused;
+    const State<N> zero = State<N>::Zero(a.size, b.size);
+    return solve_sylvester<N>(Lambda.block(a.first, a.first, a.size, a.size),
+                              Lambda.block(b.first, b.first, b.size, b.size), zero, unused);
+  }
+  if (a.size == 1 && b.size == 1)
+    return std::abs(Lambda(a.first, a.first) - Lambda(b.first, b.first));
+  // sep(A, B) = sep(B', A'): let B be 2 x 2, and see solve_sylvester.
+  const Block& two = b.size == 2 ? b : a;
+  const Block& other = b.size == 2 ? a : b;
+  const Eigen::Index t = two.first, o = other.first;
+  const double b00 = Lambda(t, t), b01 = Lambda(t, t + 1), b10 = Lambda(t + 1, t),
+               b11 = Lambda(t + 1, t + 1);
+  const double trace = b00 + b11, determinant = b00 * b11 - b01 * b10;
+  const double half = 0.5 * trace;
+  const double B2 = b00 * b00 + b01 * b01 + b10 * b10 + b11 * b11;
+  const double half_B =
+      std::sqrt((b00 - half) * (b00 - half) + b01 * b01 + b10 * b10 + (b11 - half) * (b11 - half));
+  double least = 0, half_A = 0, A2 = 0;
+  if (other.size == 1) {
+    const double x = Lambda(o, o);
+    least = std::abs(x * x - trace * x + determinant);
+    half_A = std::abs(x - half);
+    A2 = x * x;
+  } else {
+    const double a00 = Lambda(o, o), a01 = Lambda(o, o + 1), a10 = Lambda(o + 1, o),
+                 a11 = Lambda(o + 1, o + 1);
+    A2 = a00 * a00 + a01 * a01 + a10 * a10 + a11 * a11;
+    half_A = std::sqrt((a00 - half) * (a00 - half) + a01 * a01 + a10 * a10 +
+                       (a11 - half) * (a11 - half));
+    const double p00 = a00 * a00 + a01 * a10 - trace * a00 + determinant;
+    const double p11 = a11 * a11 + a01 * a10 - trace * a11 + determinant;
+    const double p01 = (a00 + a11 - trace) * a01, p10 = (a00 + a11 - trace) * a10;
+    const double norm = std::sqrt(p00 * p00 + p01 * p01 + p10 * p10 + p11 * p11);
+    least = norm > 0 ? std::abs(p00 * p11 - p01 * p10) / norm : 0;
+  }
+  least -= 16 * kUnit * (A2 + std::abs(trace) * std::sqrt(A2) + B2);
+  return least > 0 ? least / (half_A + half_B) : 0;
+}
+
+template <int N>
+void newton_step(const Defect<N>& defect, ModalBasis<N>& basis) noexcept {
+  const Eigen::Index states = basis.U.cols();
+  State<N> X = State<N>::Zero(states, states), right, x;
+  // F from the whole Gram matrix: then U F = 0 holds to rounding, which keeps U (I + X) and its
+  // velocities consistent even where blocks are nearly parallel.
+  State<N> F = -defect.W, gram = defect.gram;
+  solve_in_place(gram, F, std::numeric_limits<double>::min());
+  for (const Block& bi : basis.blocks) {
+    const auto A = basis.Lambda.block(bi.first, bi.first, bi.size, bi.size);
+    for (const Block& bj : basis.blocks) {
+      if (bi.first == bj.first) continue;
+      const auto B = basis.Lambda.block(bj.first, bj.first, bj.size, bj.size);
+      right = -F.block(bi.first, bj.first, bi.size, bj.size);
+      const double separation = solve_sylvester<N>(A, B, right, x);
+      // Common eigenvalues, as far as F can tell: no direction to part them by.
+      if (separation > 0 && right.norm() < 0.3 * separation) {
+        X.block(bi.first, bj.first, bi.size, bj.size) = x;
+      }
+    }
+  }
+  basis.U += (basis.U * X).eval();
+  for (const Block& b : basis.blocks) {
+    if (b.zero_mode && b.size == 2 && basis.Lambda(b.first + 1, b.first + 1) != 0) {
+      basis.Lambda(b.first + 1, b.first + 1) += defect.F(b.first + 1, b.first + 1);
+    }
+  }
+}
+
+template void evaluate_defect(const System<kDynamic>&, bool, bool, ModalBasis<kDynamic>&,
+                              Defect<kDynamic>&) noexcept;
+template void evaluate_defect(const System<kMaxDof>&, bool, bool, ModalBasis<kMaxDof>&,
+                              Defect<kMaxDof>&) noexcept;
+template double block_separation<kDynamic>(const State<kDynamic>&, const Block&,
+                                           const Block&) noexcept;
+template double block_separation<kMaxDof>(const State<kMaxDof>&, const Block&,
+                                          const Block&) noexcept;
+template void newton_step(const Defect<kDynamic>&, ModalBasis<kDynamic>&) noexcept;
+template void newton_step(const Defect<kMaxDof>&, ModalBasis<kMaxDof>&) noexcept;
+template double solve_sylvester<kDynamic>(const Eigen::Ref<const State<kDynamic>>&,
+                                          const Eigen::Ref<const State<kDynamic>>&,
+                                          const State<kDynamic>&, State<kDynamic>&) noexcept;
+template double solve_sylvester<kMaxDof>(const Eigen::Ref<const State<kMaxDof>>&,
+                                         const Eigen::Ref<const State<kMaxDof>>&,
+                                         const State<kMaxDof>&, State<kMaxDof>&) noexcept;
+
+}  // namespace dashpot::analysis

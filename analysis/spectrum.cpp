@@ -1,0 +1,164 @@
+#include <dashpot/analysis/energy_form.hpp>
+#include <dashpot/analysis/modes.hpp>
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/starting_basis.hpp>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace dashpot::analysis {
+namespace {
+
+/// Refinement steps tried with one kind of residual before the better result is taken as it is.
+constexpr int kMaxSteps = 4;
+/// Refinement goes on until every mode's backward error is below this.
+constexpr double kTargetBackwardError = 2e-14;
+/// With a relative bound above this, residuals of working precision are not worth a step.
+constexpr double kHopeless = 1e-6;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+template <int N>
+Status check(const System<N>& system) {
+  if (!system.mass.allFinite() || !system.damping.allFinite() || !system.stiffness.allFinite()) {
+    return Status::kNotFinite;
+  }
+  return system.mass == system.mass.transpose() ? Status::kOk : Status::kNotSymmetric;
+}
+
+}  // namespace
+
+const char* to_text(ModeKind kind) noexcept {
+  switch (kind) {
+    case ModeKind::kUnderdamped:
+      return "underdamped";
+    case ModeKind::kCritical:
+      return "critical";
+    case ModeKind::kOverdamped:
+      return "overdamped";
+    case ModeKind::kUndamped:
+      return "undamped";
+    case ModeKind::kUnstable:
+      return "unstable";
+    case ModeKind::kSoft:
+      return "soft";
+  }
+  return "unknown";
+}
+
+template <int N>
+Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexcept {
+  out.modes.resize(0);
+  out.extended = false;
+  out.status = check(system);
+  if (out.status != Status::kOk) return out.status;
+  const Eigen::LLT<Square<N>> cholesky(system.mass);
+  if (system.dof() > 0 && cholesky.info() != Eigen::Success) {
+    return out.status = Status::kMassNotPositiveDefinite;
+  }
+  const Square<N> L = system.dof() > 0 ? Square<N>(cholesky.matrixL()) : Square<N>(0, 0);
+  out.zero_modes = find_zero_modes<N>(system, L);
+  const EnergyForm<N> form = to_energy_form<N>(system, out.zero_modes);
+  damped_ = !system.damping.isZero(0);
+  out.symmetric = form.symmetric;
+  out.proportional = form.proportional;
+  out.coupling = form.coupling;
+  out.coupled = form.coupled_zeros > 0;
+  out.status = build_starting_basis<N>(form, out.zero_modes, out.basis);
+  if (out.status != Status::kOk) return out.status;
+
+  out.extended = options_.residual == SpectrumOptions::Residual::kExtended;
+  refine(system, out);
+  if (!good(out) && options_.residual == SpectrumOptions::Residual::kAutomatic) {
+    out.extended = true;
+    refine(system, out);
+  }
+  for (const Mode<N>& mode : out.modes) {
+    if (!std::isfinite(modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]))) {
+      out.modes.resize(0);
+      return out.status = Status::kOverflow;
+    }
+  }
+  const bool proved = std::isfinite(worst_quality(out).bound);
+  return out.status = proved ? Status::kOk : Status::kUncertified;
+}
+
+template <int N>
+bool SpectrumSolver<N>::good(const Spectrum<N>& spectrum) const noexcept {
+  const Quality quality = worst_quality(spectrum);
+  if (quality.bound > options_.target_bound || quality.backward_error > kTargetBackwardError) {
+    return false;
+  }
+  // A kind that only the error bound decides is worth a better bound, once.
+  for (const Mode<N>& mode : spectrum.modes) {
+    const bool undecided =
+        mode.kind == ModeKind::kCritical || (mode.kind == ModeKind::kUndamped && damped_);
+    if (undecided && !spectrum.extended) return false;
+  }
+  return true;
+}
+
+template <int N>
+void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out) noexcept {
+  Quality previous{kInfinity, kInfinity};
+  for (int step = 0; step < kMaxSteps; ++step) {
+    evaluate_defect<N>(system, out.symmetric, out.extended, out.basis, defect_);
+    certify<N>(defect_, out.basis, certificate_);
+    read_modes<N>(system, defect_, certificate_, options_.soft_frequency, out);
+    const Quality quality = worst_quality(out);
+    const bool better = quality.bound < 0.5 * previous.bound ||
+                        quality.backward_error < 0.5 * previous.backward_error ||
+                        quality.bound == kInfinity;
+    // Where rounding errors of the residual are all there is to see, a step would only add to them.
+    const bool noise = !out.extended && (quality.bound > kHopeless ||
+                                         (quality.backward_error <= kTargetBackwardError &&
+                                          defect_.F.norm() <= defect_.F_error.norm()));
+    if (good(out) || !better || noise || step + 1 == kMaxSteps) return;
+    previous = quality;
+    newton_step<N>(defect_, out.basis);
+  }
+}
+
+Spectrum<> analyze(const System<>& system, const SpectrumOptions& options) {
+  validate(system);
+  System<> symmetrized = system;  // the mass is symmetric to rounding by now
+  symmetrized.mass = 0.5 * (system.mass + system.mass.transpose());
+  SpectrumSolver<> solver(options);
+  Spectrum<> spectrum;
+  const Status status = solver.solve(symmetrized, spectrum);
+  if (status != Status::kOk && status != Status::kUncertified) {
+    throw std::runtime_error(to_text(status));
+  }
+  return spectrum;
+}
+
+DualEigenvectors dual_eigenvectors(const System<>& system, const Spectrum<>& spectrum) {
+  const Eigen::Index n = system.dof(), m = spectrum.modes.size();
+  DualEigenvectors dual;
+  dual.eigenvalues.resize(2 * m);
+  dual.right.resize(2 * n, 2 * m);
+  dual.left.resize(2 * n, 2 * m);
+  for (int i = 0; i < m; ++i) {
+    const Mode<>& mode = spectrum.modes[i];
+    for (Eigen::Index k = 0; k < 2; ++k) {
+      const auto which = static_cast<std::size_t>(k);
+      const Complex lambda = mode.eigenvalues[which];
+      const Eigen::VectorXcd& u = mode.shapes[which];
+      const Eigen::VectorXcd& y = mode.left_shapes[which];
+      const Eigen::VectorXcd My = system.mass.transpose() * y;
+      const Eigen::VectorXcd Cy = system.damping.transpose() * y;
+      const Complex slope = ((2.0 * lambda * My + Cy).transpose() * u).value();
+      const double norm = u.norm() * std::sqrt(1 + std::norm(lambda));
+      dual.eigenvalues[2 * i + k] = lambda;
+      dual.right.col(2 * i + k) << u / norm, lambda * u / norm;
+      dual.left.col(2 * i + k) << (lambda * My + Cy) * (norm / slope), My * (norm / slope);
+    }
+  }
+  return dual;
+}
+
+template class SpectrumSolver<kDynamic>;
+template class SpectrumSolver<kMaxDof>;
+
+}  // namespace dashpot::analysis

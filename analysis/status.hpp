@@ -1,0 +1,19 @@
+#pragma once
+
+namespace dashpot::analysis {
+
+/// Outcome of a computation on the real-time path: nothing there throws.
+enum class Status {
+  kOk,
+  kNotFinite,                ///< an entry of the input is NaN or infinite
+  kNotSymmetric,             ///< the mass matrix is not symmetric to rounding
+  kMassNotPositiveDefinite,  ///< the Cholesky factorisation of the mass matrix broke down
+  kNotConverged,             ///< the eigenvalue iteration reached its cap
+  kOverflow,                 ///< the entries are too large or too small to compute with
+  kUncertified,  ///< modes are given, but no finite error bound could be proved for some
+};
+
+/// A short English text, without a full stop.
+const char* to_text(Status status) noexcept;
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,67 @@
+#pragma once
+#include <dashpot/analysis/types.hpp>
+
+#include <stdexcept>
+#include <string>
+
+namespace dashpot::analysis {
+
+/// W (rows x n) with K = W' W; at most N + 6 rows: six task directions and the joints.
+template <int N>
+using StiffnessFactor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor,
+                                      N == kDynamic ? kDynamic : N + 6, N>;
+
+/// A linear second-order system  M q'' + C q' + K q = f  (paper, Eq. 1) with n coordinates q.
+///
+/// M is symmetric positive definite, C and K are square. SI units: for joint coordinates in rad,
+/// M in kg m^2, C in N m s/rad, K in N m/rad. C and K are symmetric for an ordinary mechanical
+/// system; where they are not (`symmetric()` is false) the general problem is solved.
+template <int N = kDynamic>
+struct System {
+  Square<N> mass;
+  Square<N> damping;
+  Square<N> stiffness;
+
+  /// Optional factor W (rows x n) with stiffness = W'W. With it, the zero modes and small
+  /// frequencies are found from the singular values of W L^-T (M = L L'), where nothing is squared
+  /// and no digit is lost. No rows: not given.
+  StiffnessFactor<N> stiffness_factor;
+
+  /// Optional low-order parts: the exact coefficients are damping + damping_tail and
+  /// stiffness + stiffness_tail. They carry what rounding took when the coefficients were formed
+  /// from others, such as K = J' K_C J. Read only if `has_tails`.
+  Square<N> damping_tail;
+  Square<N> stiffness_tail;
+  bool has_tails = false;
+
+  System() : System(0) {}
+  explicit System(Eigen::Index n)
+      : mass(Square<N>::Identity(n, n)),
+        damping(Square<N>::Zero(n, n)),
+        stiffness(Square<N>::Zero(n, n)),
+        stiffness_factor(0, n) {}
+
+  /// n
+  Eigen::Index dof() const { return mass.rows(); }
+  /// Whether damping and stiffness equal their transposes exactly.
+  bool symmetric() const {
+    return damping == damping.transpose() && stiffness == stiffness.transpose();
+  }
+};
+
+/// Thrown at set-up for a system that is not a proper one; `key` names the part ("mass", ...).
+class InvalidSystem : public std::invalid_argument {
+ public:
+  InvalidSystem(std::string key, const std::string& reason)
+      : std::invalid_argument(key + ": " + reason), key_(std::move(key)) {}
+  const std::string& key() const noexcept { return key_; }
+
+ private:
+  std::string key_;
+};
+
+/// Throws InvalidSystem unless the coefficients are square, of one size and finite, and the mass is
+/// symmetric positive definite. n = 0 is a proper system without modes.
+void validate(const System<>& system);
+
+}  // namespace dashpot::analysis

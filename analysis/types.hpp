@@ -1,0 +1,47 @@
+#pragma once
+// Matrix types of the analysis. The template parameter N of every type and class is a capacity: the
+// largest number of degrees of freedom it can hold, in fixed storage and without any allocation, or
+// kDynamic for storage that is sized at set-up. Actual sizes are set at run time.
+
+#include <Eigen/Core>
+#include <cmath>
+#include <complex>
+
+namespace dashpot::analysis {
+
+inline constexpr int kDynamic = Eigen::Dynamic;
+
+/// 2 N, or kDynamic.
+template <int N>
+inline constexpr int kTwice = N == kDynamic ? kDynamic : 2 * N;
+
+using Complex = std::complex<double>;
+
+/// |z| without the care for overflow that makes std::abs slow; eigenvalues are nowhere near it.
+inline double modulus(const Complex& z) noexcept {
+  return std::sqrt(z.real() * z.real() + z.imag() * z.imag());
+}
+
+/// Capacity for arms: enough for every robot the controller takes.
+inline constexpr int kMaxDof = 16;
+
+/// k x k, k <= n
+template <int N>
+using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, N, N>;
+/// n
+template <int N>
+using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, N, 1>;
+template <int N>
+using ComplexVector = Eigen::Matrix<Complex, Eigen::Dynamic, 1, Eigen::ColMajor, N, 1>;
+/// n x 2n: one column for each coordinate of the state space
+template <int N>
+using Wide = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, N, kTwice<N>>;
+/// k x l, k and l <= 2n
+template <int N>
+using State =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kTwice<N>, kTwice<N>>;
+/// k, k <= 2n
+template <int N>
+using StateVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1>;
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,303 @@
+// Systems at the edges: empty ones, bad ones, ones that are not symmetric, coupled zero modes.
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using testing::near;
+using testing::Random;
+using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+using LongComplex = std::complex<long double>;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+MatrixXd symmetrized(const MatrixXd& A) {
+  return 0.5 * (A + A.transpose());
+}
+
+System<> make(const MatrixXd& mass, const MatrixXd& damping, const MatrixXd& stiffness) {
+  System<> system(mass.rows());
+  system.mass = mass;
+  system.damping = damping;
+  system.stiffness = stiffness;
+  return system;
+}
+
+/// Eigenvalues of [0 I; -M^-1 K  -M^-1 C] in long double, by Eigen.
+std::vector<LongComplex> true_eigenvalues(const System<>& system) {
+  const Eigen::Index n = system.dof();
+  const auto lu = system.mass.cast<long double>().fullPivLu();
+  LongMatrix A(2 * n, 2 * n);
+  A << LongMatrix::Zero(n, n), LongMatrix::Identity(n, n),
+      -lu.solve(system.stiffness.cast<long double>()),
+      -lu.solve(system.damping.cast<long double>());
+  const auto values = Eigen::EigenSolver<LongMatrix>(A, false).eigenvalues().eval();
+  return {values.begin(), values.end()};
+}
+
+/// All 2n: of the modes, then of the zero modes.
+std::vector<Complex> all_eigenvalues(const Spectrum<>& spectrum) {
+  std::vector<Complex> all;
+  for (const Mode<>& mode : spectrum.modes) {
+    all.insert(all.end(), mode.eigenvalues.begin(), mode.eigenvalues.end());
+  }
+  all.resize(all.size() + static_cast<std::size_t>(spectrum.zero_modes.count), 0.0);
+  for (const double rate : spectrum.zero_mode_rates) all.emplace_back(rate);
+  return all;
+}
+
+/// Largest distance when each computed eigenvalue takes the nearest true one that is left.
+double worst_distance(const std::vector<Complex>& computed, std::vector<LongComplex> truth) {
+  if (computed.size() != truth.size()) return kInfinity;
+  long double worst = 0;
+  for (const Complex& value : computed) {
+    const auto away = [&](const LongComplex& z) { return std::abs(z - LongComplex(value)); };
+    const auto nearest =
+        std::min_element(truth.begin(), truth.end(),
+                         [&](const auto& a, const auto& b) { return away(a) < away(b); });
+    worst = std::max(worst, away(*nearest));
+    truth.erase(nearest);
+  }
+  return static_cast<double>(worst);
+}
+
+/// Every eigenvalue within the bound of its mode, and both eigenvectors solve their equations.
+void expect_proper_modes(const System<>& system, const Spectrum<>& spectrum) {
+  const std::vector<LongComplex> truth = true_eigenvalues(system);
+  for (const Mode<>& mode : spectrum.modes) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Complex lambda = mode.eigenvalues[k];
+      long double error = std::numeric_limits<long double>::infinity();
+      for (const LongComplex& z : truth) error = std::min(error, std::abs(z - LongComplex(lambda)));
+      EXPECT_LE(error, mode.error_bound) << lambda;
+      EXPECT_LE(mode.error_bound, 1e-9 * std::abs(lambda)) << lambda;
+      const MatrixXcd Q =
+          lambda * lambda * system.mass + lambda * system.damping + system.stiffness;
+      const double size = std::norm(lambda) * system.mass.norm() +
+                          std::abs(lambda) * system.damping.norm() + system.stiffness.norm();
+      const auto& u = mode.shapes[k];
+      const auto& y = mode.left_shapes[k];
+      EXPECT_LE((Q * u).norm(), 1e-13 * size * u.norm()) << lambda;
+      EXPECT_LE((y.transpose() * Q).norm(), 1e-13 * size * y.norm()) << lambda;
+      EXPECT_NEAR((u.adjoint() * system.mass * u).value().real(), 1, 1e-13);
+    }
+  }
+}
+
+Status status_of(const System<>& system) {
+  Spectrum<> spectrum;
+  const Status status = SpectrumSolver<>().solve(system, spectrum);
+  EXPECT_EQ(status, spectrum.status);
+  EXPECT_TRUE(spectrum.modes.empty() || status == Status::kOk);
+  return status;
+}
+
+TEST(SpectrumOfNothing, HasNoModes) {
+  const Spectrum<> spectrum = analyze(System<>(0));
+  EXPECT_EQ(spectrum.status, Status::kOk);
+  EXPECT_TRUE(spectrum.modes.empty());
+  EXPECT_EQ(spectrum.zero_modes.count, 0);
+  EXPECT_EQ(spectrum.zero_mode_rates.size(), 0);
+}
+
+TEST(SpectrumOfOneCoordinate, IsTheTextbookOscillator) {
+  System<> system(1);
+  system.mass << 2;
+  system.damping << 4;
+  system.stiffness << 50;
+  const Spectrum<> spectrum = analyze(system);
+  ASSERT_EQ(spectrum.modes.size(), 1);
+  const Mode<>& mode = spectrum.modes[0];
+  EXPECT_NEAR(mode.natural_frequency, 5, 1e-15);
+  EXPECT_NEAR(mode.damping_ratio, 0.2, 1e-16);
+  EXPECT_NEAR(mode.damped_frequency, std::sqrt(24.0), 1e-15);
+  EXPECT_NEAR(std::abs(mode.shapes[0][0]), std::sqrt(0.5), 1e-15);
+  EXPECT_TRUE(spectrum.proportional);
+}
+
+TEST(SpectrumWithoutStiffness, HasOnlyZeroModes) {
+  Random random(301);
+  const MatrixXd M = random.spd(4), Z = MatrixXd::Zero(4, 4);
+  const Spectrum<> still = analyze(make(M, Z, Z));
+  EXPECT_EQ(still.zero_modes.count, 4);
+  EXPECT_TRUE(still.modes.empty());
+  EXPECT_TRUE(near(still.zero_mode_rates, MatrixXd::Zero(4, 1), 0));
+
+  const System<> damped = make(M, random.spd(4), Z);
+  const Spectrum<> spectrum = analyze(damped);
+  EXPECT_EQ(spectrum.zero_modes.count, 4);
+  EXPECT_TRUE(spectrum.modes.empty());
+  EXPECT_LE(worst_distance(all_eigenvalues(spectrum), true_eigenvalues(damped)), 1e-13);
+  EXPECT_LT(spectrum.zero_mode_rates.maxCoeff(), 0);
+}
+
+TEST(SpectrumOfBadInput, HasAStatusAndNoModes) {
+  Random random(302);
+  for (const double bad : {kNan, kInfinity, -kInfinity}) {
+    for (const auto part : {&System<>::mass, &System<>::damping, &System<>::stiffness}) {
+      System<> system = make(random.spd(3), random.spd(3), random.spd(3));
+      (system.*part)(1, 1) = bad;
+      EXPECT_EQ(status_of(system), Status::kNotFinite) << bad;
+      EXPECT_THROW(analyze(system), InvalidSystem);
+    }
+  }
+  System<> system = make(random.spd(3), random.spd(3), random.spd(3));
+  system.mass(0, 1) += 0.1;
+  EXPECT_EQ(status_of(system), Status::kNotSymmetric);
+  system.mass = Eigen::Vector3d(1, 0, 1).asDiagonal();
+  EXPECT_EQ(status_of(system), Status::kMassNotPositiveDefinite);
+  system.mass = Eigen::Vector3d(1, 2, -1).asDiagonal();
+  EXPECT_EQ(status_of(system), Status::kMassNotPositiveDefinite);
+  EXPECT_THROW(analyze(system), InvalidSystem);
+}
+
+TEST(SpectrumSolver, RecoversAfterBadInput) {
+  Random random(303);
+  const System<> good = make(random.spd(4), random.spd(4), random.spd(4));
+  System<> bad = good;
+  bad.mass.setZero();
+  SpectrumSolver<> solver;
+  Spectrum<> spectrum;
+  EXPECT_EQ(solver.solve(bad, spectrum), Status::kMassNotPositiveDefinite);
+  EXPECT_EQ(solver.solve(good, spectrum), Status::kOk);
+  EXPECT_EQ(spectrum.modes.size(), 4);
+  expect_proper_modes(good, spectrum);
+}
+
+TEST(SpectrumOfNonsymmetricSystems, AgreesWithTheStateMatrix) {
+  Random random(304);
+  for (int trial = 0; trial < 40; ++trial) {
+    const int n = random.integer(2, 8);
+    const MatrixXd skew = random.matrix(n, n);
+    const double gyroscopic = trial % 3 == 0 ? 0 : random.log_uniform(1e-6, 1);
+    const double circulatory = trial % 3 == 1 ? 0 : random.log_uniform(1e-6, 1);
+    const System<> system =
+        make(random.spd(n), random.spd(n) + gyroscopic * (skew - skew.transpose()),
+             50 * random.spd(n) + circulatory * (skew - skew.transpose()));
+    const Spectrum<> spectrum = analyze(system);
+    ASSERT_EQ(spectrum.status, Status::kOk);
+    EXPECT_FALSE(spectrum.symmetric);
+    EXPECT_FALSE(spectrum.proportional);
+    ASSERT_EQ(spectrum.modes.size(), n);
+    const std::vector<Complex> computed = all_eigenvalues(spectrum);
+    EXPECT_LE(worst_distance(computed, true_eigenvalues(system)), 1e-10 * std::abs(computed[0]));
+    expect_proper_modes(system, spectrum);
+  }
+}
+
+TEST(SpectrumOfNonsymmetricSystems, MayHaveZeroModes) {
+  Random random(305);
+  for (int trial = 0; trial < 20; ++trial) {
+    const MatrixXd J = random.matrix(3, 5), skew = random.matrix(3, 3);
+    const MatrixXd core = 20 * random.spd(3) + (skew - skew.transpose());
+    const System<> system = make(random.spd(5), 0.5 * random.spd(5), J.transpose() * core * J);
+    const Spectrum<> spectrum = analyze(system);
+    ASSERT_EQ(spectrum.status, Status::kOk);
+    ASSERT_EQ(spectrum.zero_modes.count, 2);
+    ASSERT_EQ(spectrum.modes.size(), 3);
+    const std::vector<Complex> computed = all_eigenvalues(spectrum);
+    EXPECT_LE(worst_distance(computed, true_eigenvalues(system)), 1e-10 * std::abs(computed[0]));
+    expect_proper_modes(system, spectrum);
+  }
+}
+
+/// n = 5, two zero modes, task damping and joint friction.
+System<> redundant_with_friction(Random& random, double friction) {
+  const MatrixXd J = random.matrix(3, 5);
+  const MatrixXd joint = random.vector(5).cwiseAbs().asDiagonal();
+  return make(random.spd(5), symmetrized(J.transpose() * random.spd(3) * J + friction * joint),
+              symmetrized(J.transpose() * (40 * random.spd(3)) * J));
+}
+
+TEST(CoupledZeroModes, AreSolvedExactly) {
+  Random random(306);
+  double uncoupled_error = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    const System<> system = redundant_with_friction(random, random.log_uniform(1e-3, 30));
+    const Spectrum<> spectrum = analyze(system);
+    ASSERT_EQ(spectrum.status, Status::kOk);
+    ASSERT_EQ(spectrum.zero_modes.count, 2);
+    EXPECT_TRUE(spectrum.coupled);
+    EXPECT_FALSE(spectrum.proportional);
+    const std::vector<Complex> computed = all_eigenvalues(spectrum);
+    const std::vector<LongComplex> truth = true_eigenvalues(system);
+    EXPECT_LE(worst_distance(computed, truth), 1e-10 * std::abs(computed[0]));
+    expect_proper_modes(system, spectrum);
+
+    // Without the coupling: nonzero and zero modes each by themselves.
+    const MatrixXd T = spectrum.zero_modes.coordinates;
+    MatrixXd D = T.transpose() * system.damping * T;
+    const MatrixXd cross = D.topRightCorner(3, 2);
+    EXPECT_NEAR(spectrum.coupling, cross.norm() / D.norm(), 1e-12);
+    D.topRightCorner(3, 2).setZero();
+    D.bottomLeftCorner(2, 3).setZero();
+    const MatrixXd K = spectrum.zero_modes.stiffness_values.asDiagonal();
+    const Spectrum<> uncoupled = analyze(make(MatrixXd::Identity(5, 5), symmetrized(D), K));
+    EXPECT_FALSE(uncoupled.coupled);
+    uncoupled_error = std::max(
+        uncoupled_error, worst_distance(all_eigenvalues(uncoupled), truth) / std::abs(computed[0]));
+  }
+  EXPECT_GT(uncoupled_error, 0.05);
+}
+
+TEST(CoupledZeroModes, AreNotReportedForTaskDamping) {
+  Random random(307);
+  const Spectrum<> spectrum = analyze(redundant_with_friction(random, 0));
+  EXPECT_FALSE(spectrum.coupled);
+  EXPECT_LE(spectrum.coupling, 1e-14);
+  EXPECT_TRUE(near(spectrum.zero_mode_rates, MatrixXd::Zero(2, 1), 0));
+}
+
+std::vector<LongComplex> widened(const std::vector<Complex>& values) {
+  return {values.begin(), values.end()};
+}
+
+TEST(SpectrumLaws, ScalingTimeScalesEigenvalues) {
+  Random random(308);
+  for (const double s : {1e-8, 1e-3, 3.7, 1e5}) {
+    const System<> system = redundant_with_friction(random, 0.5);
+    const System<> faster = make(system.mass, s * system.damping, s * s * system.stiffness);
+    std::vector<Complex> expected = all_eigenvalues(analyze(system));
+    for (Complex& value : expected) value *= s;
+    SpectrumOptions options;
+    options.soft_frequency = 0;
+    const std::vector<Complex> computed = all_eigenvalues(analyze(faster, options));
+    EXPECT_LE(worst_distance(computed, widened(expected)), 1e-12 * std::abs(expected[0])) << s;
+  }
+}
+
+TEST(SpectrumLaws, CongruencesLeaveEigenvaluesAlone) {
+  Random random(309);
+  for (int trial = 0; trial < 20; ++trial) {
+    const System<> system = make(random.spd(5), random.spd(5), 30 * random.spd(5));
+    const std::vector<Complex> expected = all_eigenvalues(analyze(system));
+    MatrixXd T = random.matrix(5, 5) + 3 * MatrixXd::Identity(5, 5);
+    const auto transformed = [&] {
+      return make(symmetrized(T.transpose() * system.mass * T),
+                  symmetrized(T.transpose() * system.damping * T),
+                  symmetrized(T.transpose() * system.stiffness * T));
+    };
+    const double size = std::abs(expected[0]);
+    EXPECT_LE(worst_distance(all_eigenvalues(analyze(transformed())), widened(expected)),
+              1e-11 * size);
+    // Coordinates in which the mass is the identity, and rotations of them.
+    T = analyze(system).zero_modes.coordinates;
+    EXPECT_TRUE(near(transformed().mass, MatrixXd::Identity(5, 5), 1e-13));
+    T *= MatrixXd(random.matrix(5, 5).householderQr().householderQ());
+    EXPECT_LE(worst_distance(all_eigenvalues(analyze(transformed())), widened(expected)),
+              1e-12 * size);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis

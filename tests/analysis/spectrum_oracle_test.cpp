@@ -1,0 +1,223 @@
+// Spectra against references of 50 digits: every error is inside the bound that comes with the
+// result.
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/tests/support/oracle.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::analysis {
+namespace {
+
+using testing::ReferenceEigenvalue;
+using testing::SpectrumCase;
+using LongComplex = std::complex<long double>;
+using LongMatrix = Eigen::Matrix<LongComplex, Eigen::Dynamic, Eigen::Dynamic>;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+System<> system_of(const SpectrumCase& reference) {
+  System<> system(reference.n);
+  system.mass = reference.mass;
+  system.damping = reference.damping;
+  system.stiffness = reference.stiffness;
+  return system;
+}
+
+/// Largest backward error of the mode's right eigenpairs, in long double.
+double backward_error(const System<>& system, const Mode<>& mode) {
+  const LongMatrix M = system.mass.cast<LongComplex>();
+  const LongMatrix C = system.damping.cast<LongComplex>();
+  const LongMatrix K = system.stiffness.cast<LongComplex>();
+  long double worst = 0;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const LongComplex lambda = mode.eigenvalues[k];
+    const LongMatrix u = mode.shapes[k].cast<LongComplex>();
+    const long double residual = (lambda * lambda * (M * u) + lambda * (C * u) + K * u).norm();
+    const long double size =
+        (std::norm(lambda) * M.norm() + std::abs(lambda) * C.norm() + K.norm()) * u.norm();
+    worst = std::max(worst, residual / size);
+  }
+  return static_cast<double>(worst);
+}
+
+/// The smallest and the largest bound / error seen, of errors that are not zero.
+struct Tightness {
+  double tightest = kInfinity;
+  double loosest = 0;
+  void add(double bound, long double error) {
+    if (error == 0 || !std::isfinite(bound)) return;
+    const double ratio = bound / static_cast<double>(error);
+    tightest = std::min(tightest, ratio);
+    loosest = std::max(loosest, ratio);
+  }
+};
+
+class SpectrumOracle : public ::testing::TestWithParam<std::string> {
+ protected:
+  Status solve(SpectrumOptions::Residual residual) {
+    SpectrumOptions options;
+    options.residual = residual;
+    return SpectrumSolver<>(options).solve(system_, spectrum_);
+  }
+
+  /// Everything but the accuracy of eigenvalues.
+  void expect_complete() const {
+    ASSERT_EQ(spectrum_.status, Status::kOk) << to_text(spectrum_.status);
+    EXPECT_TRUE(spectrum_.symmetric);
+    EXPECT_EQ(spectrum_.zero_modes.count, reference_.r);
+    EXPECT_EQ(spectrum_.modes.size(), reference_.n - reference_.r);
+    // The eigenvalues of this one lie 1e-10 apart, and their vectors are all but parallel.
+    const double limit = reference_.name == "nearly_coinciding_n4_2^-33" ? 5e-13 : 1e-13;
+    for (const Mode<>& mode : spectrum_.modes) {
+      const double computed = backward_error(system_, mode);
+      EXPECT_LE(computed, limit) << "at " << mode.eigenvalues[0];
+      EXPECT_NEAR(mode.backward_error, computed, 2e-16 * (reference_.n + 4));
+    }
+  }
+
+  /// The eigenvalues of the modes, mode by mode, then those of the zero modes: 2n in all.
+  std::vector<Complex> eigenvalues() const {
+    std::vector<Complex> all;
+    for (const Mode<>& mode : spectrum_.modes) {
+      all.insert(all.end(), mode.eigenvalues.begin(), mode.eigenvalues.end());
+    }
+    all.resize(all.size() + static_cast<std::size_t>(spectrum_.zero_modes.count), 0.0);
+    for (const double rate : spectrum_.zero_mode_rates) all.emplace_back(rate);
+    return all;
+  }
+
+  void expect_within(const char* what, int mode, long double error, double bound) {
+    EXPECT_TRUE(error <= static_cast<long double>(bound) || bound == kInfinity)
+        << "error " << error << ", bound " << bound << ": " << what << " of mode " << mode + 1
+        << ", " << spectrum_.modes[mode].eigenvalues[0];
+    seen_.add(bound, error);
+  }
+
+  /// Each number of each mode within its bound of the reference.
+  void expect_enclosed() {
+    if (HasFatalFailure()) return;
+    const std::vector<Complex> computed = eigenvalues();
+    ASSERT_EQ(computed.size(), reference_.eigenvalues.size());
+    const auto matches = testing::match_eigenvalues(computed, reference_.eigenvalues);
+    for (int i = 0; i < spectrum_.modes.size(); ++i) {
+      const Mode<>& mode = spectrum_.modes[i];
+      const auto k = 2 * static_cast<std::size_t>(i);
+      expect_within("first eigenvalue", i, matches[k].absolute, mode.error_bound);
+      expect_within("second eigenvalue", i, matches[k + 1].absolute, mode.error_bound);
+      const ReferenceEigenvalue& first = reference_.eigenvalues[matches[k].reference];
+      const ReferenceEigenvalue& second = reference_.eigenvalues[matches[k + 1].reference];
+      const LongComplex a = first.value();
+      const LongComplex b = first.is_real() ? second.value() : std::conj(a);
+      const long double product = (a * b).real();
+      if (!(product > 0)) continue;
+      const long double omega = std::sqrt(product);
+      const long double zeta = -(a + b).real() / (2 * omega);
+      expect_within("natural frequency", i,
+                    std::abs(static_cast<long double>(mode.natural_frequency) - omega),
+                    mode.natural_frequency_bound);
+      expect_within("damping ratio", i,
+                    std::abs(static_cast<long double>(mode.damping_ratio) - zeta),
+                    mode.damping_ratio_bound);
+    }
+    RecordProperty("tightest_bound_over_error", std::to_string(seen_.tightest));
+    RecordProperty("loosest_bound_over_error", std::to_string(seen_.loosest));
+    all_seen_.tightest = std::min(all_seen_.tightest, seen_.tightest);
+    all_seen_.loosest = std::max(all_seen_.loosest, seen_.loosest);
+  }
+
+  /// Eigenvalues of zero modes come without a bound: as good as the data's condition allows.
+  void expect_zero_mode_rates() const {
+    if (HasFatalFailure()) return;
+    const std::vector<Complex> computed = eigenvalues();
+    const auto matches = testing::match_eigenvalues(computed, reference_.eigenvalues);
+    for (std::size_t k = 2 * static_cast<std::size_t>(spectrum_.modes.size()); k < computed.size();
+         ++k) {
+      const ReferenceEigenvalue& truth = reference_.eigenvalues[matches[k].reference];
+      if (truth.is_zero()) {
+        EXPECT_EQ(computed[k], 0.0);
+      } else {
+        EXPECT_LE(matches[k].relative, 1e-14 + 2e-16 * truth.condition) << truth;
+      }
+    }
+  }
+
+  static void TearDownTestSuite() {
+    RecordProperty("tightest_bound_over_error", std::to_string(all_seen_.tightest));
+    RecordProperty("loosest_bound_over_error", std::to_string(all_seen_.loosest));
+  }
+
+  const SpectrumCase& reference_ = testing::spectrum_case(GetParam());
+  System<> system_ = system_of(reference_);
+  Spectrum<> spectrum_;
+  Tightness seen_;
+  inline static Tightness all_seen_;
+};
+
+template <class Keep>
+std::vector<std::string> names_of_cases(const Keep& keep) {
+  std::vector<std::string> names;
+  for (const SpectrumCase& c : testing::spectrum_cases()) {
+    if (keep(c)) names.push_back(c.name);
+  }
+  return names;
+}
+
+std::string alphanumeric(const ::testing::TestParamInfo<std::string>& instance) {
+  std::string name;
+  for (const char c : instance.param) {
+    if (c == '+') name += "_plus_";
+    if (c == '-') name += "_minus_";
+    name += std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  }
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Systems, SpectrumOracle,
+    ::testing::ValuesIn(names_of_cases([](const SpectrumCase&) { return true; })), alphanumeric);
+
+TEST_P(SpectrumOracle, EnclosesTheTruthByDefault) {
+  solve(SpectrumOptions::Residual::kAutomatic);
+  expect_complete();
+  expect_enclosed();
+  expect_zero_mode_rates();
+}
+
+TEST_P(SpectrumOracle, EnclosesTheTruthWithExtendedResiduals) {
+  solve(SpectrumOptions::Residual::kExtended);
+  EXPECT_TRUE(spectrum_.extended);
+  expect_complete();
+  expect_enclosed();
+  expect_zero_mode_rates();
+}
+
+TEST_P(SpectrumOracle, EnclosesTheTruthWithWorkingResidualsWhateverTheStatus) {
+  const Status status = solve(SpectrumOptions::Residual::kWorking);
+  EXPECT_FALSE(spectrum_.extended);
+  EXPECT_TRUE(status == Status::kOk || status == Status::kUncertified) << to_text(status);
+  expect_enclosed();  // an infinite bound encloses anything
+}
+
+class SpectrumOracleWithFactor : public SpectrumOracle {};
+INSTANTIATE_TEST_SUITE_P(Systems, SpectrumOracleWithFactor,
+                         ::testing::ValuesIn(names_of_cases([](const SpectrumCase& c) {
+                           return c.stiffness_factor.has_value();
+                         })),
+                         alphanumeric);
+
+TEST_P(SpectrumOracleWithFactor, EnclosesTheTruth) {
+  system_.stiffness_factor = *reference_.stiffness_factor;
+  for (const auto residual :
+       {SpectrumOptions::Residual::kAutomatic, SpectrumOptions::Residual::kExtended}) {
+    solve(residual);
+    expect_complete();
+    expect_enclosed();
+    expect_zero_mode_rates();
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis

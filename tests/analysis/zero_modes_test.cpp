@@ -1,0 +1,165 @@
+// Which motions store no potential energy, and how safe that decision is.
+#include <dashpot/analysis/zero_modes.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::near;
+using testing::Random;
+
+MatrixXd symmetrized(const MatrixXd& A) {
+  return 0.5 * (A + A.transpose());
+}
+
+template <int N = kDynamic>
+ZeroModes<N> zero_modes_of(const System<N>& system) {
+  const Square<N> L = Eigen::LLT<Square<N>>(system.mass).matrixL();
+  return find_zero_modes<N>(system, L);
+}
+
+/// K = W'W with W of `rank` rows.
+System<> redundant(Random& random, int n, int rank, bool with_factor) {
+  System<> system(n);
+  system.mass = random.spd(n);
+  const MatrixXd W = random.matrix(rank, n);
+  system.stiffness = symmetrized(W.transpose() * W);
+  if (with_factor) system.stiffness_factor = W;
+  return system;
+}
+
+void expect_proper(const System<>& system, const ZeroModes<>& found) {
+  const Eigen::Index n = system.dof(), r = found.count;
+  const MatrixXd& T = found.coordinates;
+  EXPECT_TRUE(near(T.transpose() * system.mass * T, MatrixXd::Identity(n, n), 1e-13));
+  EXPECT_TRUE(near(found.basis, T.rightCols(r), 0));
+  EXPECT_TRUE(near(system.stiffness * found.basis, MatrixXd::Zero(n, r),
+                   1e-13 * system.stiffness.norm() * found.basis.norm()));
+  const VectorXd& kappa = found.stiffness_values;
+  EXPECT_TRUE(near(T.transpose() * system.stiffness * T, MatrixXd(kappa.asDiagonal()),
+                   1e-13 * std::abs(kappa[0])));
+  for (Eigen::Index i = 1; i < n; ++i) EXPECT_LE(std::abs(kappa[i]), std::abs(kappa[i - 1]));
+  EXPECT_TRUE(near(kappa.tail(r), VectorXd::Zero(r), 0));
+}
+
+TEST(ZeroModes, AreAsManyAsTheStiffnessLacksInRank) {
+  Random random(401);
+  for (int trial = 0; trial < 60; ++trial) {
+    const int n = random.integer(1, 12), rank = random.integer(0, n);
+    const System<> system = redundant(random, n, rank, trial % 2 == 0);
+    const ZeroModes<> found = zero_modes_of(system);
+    ASSERT_EQ(found.count, n - rank);
+    expect_proper(system, found);
+  }
+}
+
+TEST(ZeroModes, ReportTheGapBetweenKeptAndDropped) {
+  Random random(402);
+  for (const bool with_factor : {false, true}) {
+    const System<> system = redundant(random, 6, 4, with_factor);
+    const ZeroModes<> found = zero_modes_of(system);
+    const VectorXd kappa =
+        Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(system.stiffness, system.mass)
+            .eigenvalues();
+    EXPECT_NEAR(found.smallest_kept, std::sqrt(kappa[2]), 1e-12 * found.smallest_kept);
+    EXPECT_LE(found.largest_dropped, found.floor);
+    EXPECT_LT(found.floor, 1e-6 * found.smallest_kept);
+  }
+}
+
+TEST(ZeroModes, HaveAnInfiniteGapWithoutStiffnessAndNoneWithoutZeroModes) {
+  Random random(403);
+  const ZeroModes<> all = zero_modes_of(redundant(random, 3, 0, false));
+  EXPECT_EQ(all.count, 3);
+  EXPECT_EQ(all.smallest_kept, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(all.largest_dropped, 0);
+  const ZeroModes<> none = zero_modes_of(redundant(random, 3, 3, false));
+  EXPECT_EQ(none.count, 0);
+  EXPECT_EQ(none.basis.cols(), 0);
+  EXPECT_EQ(none.largest_dropped, 0);
+}
+
+TEST(ZeroModes, KeepSoftMotionsThatOnlyTheFactorShows) {
+  // Frequencies 1 and 1e-10: their squares are 1e-20 apart, below rounding in a full K.
+  Random random(404);
+  const MatrixXd Q = random.matrix(4, 4).householderQr().householderQ();
+  System<> system(4);
+  system.stiffness_factor = VectorXd{{1, 1e-3, 1e-10, 0}}.asDiagonal() * Q;
+  system.stiffness = symmetrized(system.stiffness_factor.transpose() * system.stiffness_factor);
+  const ZeroModes<> found = zero_modes_of(system);
+  EXPECT_EQ(found.count, 1);
+  EXPECT_NEAR(found.smallest_kept, 1e-10, 1e-15);
+  EXPECT_NEAR(found.stiffness_values[1], 1e-6, 1e-17);
+}
+
+TEST(ZeroModes, SeeThroughGradedMassesAndStiffnesses) {
+  // A chain of springs between masses and stiffnesses over twelve decades: free, then held.
+  for (const bool held : {false, true}) {
+    const int n = 5;
+    System<> system(n);
+    for (int i = 0; i < n; ++i) system.mass(i, i) = std::ldexp(1.0, 8 * i);
+    for (int i = 0; i + 1 < n; ++i) {
+      const double k = std::ldexp(1.0, 10 * i);
+      system.stiffness(i, i) += k;
+      system.stiffness(i + 1, i + 1) += k;
+      system.stiffness(i, i + 1) -= k;
+      system.stiffness(i + 1, i) -= k;
+    }
+    if (held) system.stiffness(0, 0) += 1;
+    const ZeroModes<> found = zero_modes_of(system);
+    EXPECT_EQ(found.count, held ? 0 : 1);
+    if (held) continue;
+    const VectorXd u = found.basis / found.basis(0, 0);
+    EXPECT_TRUE(near(u, VectorXd::Ones(n), 1e-12));
+  }
+}
+
+TEST(ZeroModes, KeepNegativeStiffness) {
+  System<> system(3);
+  system.stiffness.diagonal() << 4, -9, 0;
+  const ZeroModes<> found = zero_modes_of(system);
+  EXPECT_EQ(found.count, 1);
+  EXPECT_TRUE(near(found.stiffness_values, Eigen::Vector3d(-9, 4, 0), 1e-14));
+}
+
+TEST(ZeroModes, OfANonsymmetricStiffnessSpanItsNullSpace) {
+  Random random(405);
+  const MatrixXd J = random.matrix(3, 5);
+  System<> system(5);
+  system.mass = random.spd(5);
+  system.stiffness = J.transpose() * random.matrix(3, 3) * J;
+  const ZeroModes<> found = zero_modes_of(system);
+  ASSERT_EQ(found.count, 2);
+  EXPECT_TRUE(near(system.stiffness * found.basis, MatrixXd::Zero(5, 2),
+                   1e-13 * system.stiffness.norm() * found.basis.norm()));
+  EXPECT_TRUE(
+      near(found.basis.transpose() * system.mass * found.basis, MatrixXd::Identity(2, 2), 1e-13));
+}
+
+TEST(ZeroModes, OfFixedCapacityMatchDynamic) {
+  Random random(406);
+  for (const bool with_factor : {false, true}) {
+    const System<> system = redundant(random, 7, 5, with_factor);
+    System<kMaxDof> fixed(7);
+    fixed.mass = system.mass;
+    fixed.stiffness = system.stiffness;
+    fixed.stiffness_factor = system.stiffness_factor;
+    const ZeroModes<> a = zero_modes_of(system);
+    const ZeroModes<kMaxDof> b = zero_modes_of<kMaxDof>(fixed);
+    EXPECT_EQ(a.count, b.count);
+    EXPECT_TRUE(near(b.stiffness_values, a.stiffness_values, 1e-13 * a.stiffness_values[0]));
+    EXPECT_NEAR(a.smallest_kept, b.smallest_kept, 1e-12 * a.smallest_kept);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
