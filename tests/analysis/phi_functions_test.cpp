@@ -1,0 +1,155 @@
+// phi_0, phi_1, phi_2 of blocks against 25-digit references, from |A t| = 1e-12 to 1e6.
+#include <dashpot/analysis/phi_functions.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/reference_phi.hpp>
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::MatrixXd;
+using testing::near;
+using testing::reference_phi;
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+const std::vector<double> kTimes = {1e-12, 1e-8, 1e-4, 0.01, 0.3, 0.7, 1,
+                                    1.5,   4,    20,   300,  1e4, 1e6};
+
+MatrixXd matrix2(double a, double b, double c, double d) {
+  return (Matrix2d() << a, b, c, d).finished();
+}
+
+/// What a relative change of eps in A t alone does to phi_k: eps for its rational part and
+/// eps |A t| for its exponential part. `margin` roundings are allowed.
+void expect_accurate(const MatrixXd& A, double t, double omega = 0, double margin = 16) {
+  const double size = (A - Complex(0, omega) * MatrixXd::Identity(A.rows(), A.cols())).norm() * t;
+  const double growth = reference_phi(0, A, t, omega).cwiseAbs().maxCoeff();
+  for (int k = 0; k <= 2; ++k) {
+    const Eigen::MatrixXcd reference = reference_phi(k, A, t, omega);
+    const double exponential_part = size * growth / std::pow(std::max(1.0, size), k);
+    const double tolerance = margin * kEps * (reference.cwiseAbs().maxCoeff() + exponential_part);
+    EXPECT_TRUE(near(phi(k, A, t, omega), reference, tolerance))
+        << "k = " << k << ", t = " << t << ", omega = " << omega << ", A =\n"
+        << A;
+  }
+}
+
+TEST(Phi, OfZeroIsOneOverFactorial) {
+  EXPECT_EQ(phi(0, 0), 1.0);
+  EXPECT_EQ(phi(1, 0), 1.0);
+  EXPECT_EQ(phi(2, 0), 0.5);
+  EXPECT_TRUE(near(phi(2, MatrixXd::Zero(2, 2), 1.0), 0.5 * MatrixXd::Identity(2, 2), 0));
+  EXPECT_TRUE(near(phi(2, MatrixXd::Zero(4, 4), 1.0), 0.5 * MatrixXd::Identity(4, 4), kEps));
+}
+
+TEST(Phi, OfOneRealEigenvalueIsAccurateAtAllTimes) {
+  for (const double t : kTimes) {
+    expect_accurate(MatrixXd::Constant(1, 1, -1.0), t);
+    expect_accurate(MatrixXd::Constant(1, 1, -0.3), t);
+    expect_accurate(MatrixXd::Constant(1, 1, 0.2), std::min(t, 300.0));  // unstable
+  }
+}
+
+TEST(Phi, OfAComplexPairIsAccurateAtAllTimes) {
+  for (const double t : kTimes) {
+    expect_accurate(matrix2(0, 1, -1, 0), t);            // undamped
+    expect_accurate(matrix2(-1e-4, 1, -1, -1e-4), t);    // lightly damped
+    expect_accurate(matrix2(0, 1, -1, -1.4), t);         // companion form
+    expect_accurate(matrix2(-0.9, 0.4, -0.4, -0.9), t);  // nearly critical
+  }
+}
+
+TEST(Phi, OfTwoRealEigenvaluesIsAccurateAtAllTimes) {
+  for (const double t : kTimes) {
+    expect_accurate(matrix2(0, 1, -1, -2.5), t);
+    expect_accurate(matrix2(-1, 0.5, -0.5, -1e3), std::min(t, 1e4));  // strongly overdamped
+    expect_accurate(matrix2(0.3, 0.7, 0.1, -1), std::min(t, 300.0));  // statically unstable
+  }
+}
+
+TEST(Phi, IsSmoothThroughCriticalDamping) {
+  for (const double t : kTimes) {
+    for (const double gap : {0.0, 1e-16, -1e-16, 1e-8, -1e-8, 1e-3, -1e-3, 0.1, -0.1}) {
+      expect_accurate(matrix2(-1, 1, gap, -1), t);
+      expect_accurate(matrix2(-1, 1e3, 1e-3 * gap, -1), t);
+    }
+  }
+}
+
+TEST(Phi, OfAZeroModeBlockKeepsRelativeAccuracyOfEveryEntry) {
+  for (const double t : kTimes) {
+    for (const double a : {0.0, 1e-6, 0.5, 1.0, 40.0}) {
+      const MatrixXd A = matrix2(0, 1, 0, -a);
+      for (int k = 0; k <= 2; ++k) {
+        const Eigen::MatrixXcd reference = reference_phi(k, A, t);
+        const Eigen::MatrixXcd computed = phi(k, A, t);
+        for (const auto& [i, j] : {std::pair{0, 0}, {0, 1}, {1, 1}}) {
+          const double slack = k == 0 ? 1 + a * t : 1;
+          EXPECT_NEAR(computed(i, j).real(), reference(i, j).real(),
+                      8 * kEps * slack * std::abs(reference(i, j)))
+              << "k = " << k << ", a t = " << a * t << ", entry " << i << j;
+        }
+        EXPECT_EQ(computed(1, 0), 0.0);
+      }
+    }
+  }
+}
+
+TEST(Phi, OfALargeDefectiveBlockIsAccurate) {
+  MatrixXd pair_twice = MatrixXd::Zero(4, 4);
+  pair_twice << -0.1, 1, 1, 0,  //
+      -1, -0.1, 0, 1,           //
+      0, 0, -0.1, 1,            //
+      0, 0, -1, -0.1;
+  MatrixXd triple = -MatrixXd::Identity(3, 3);
+  triple(0, 1) = triple(1, 2) = 1;
+  for (const double t : {1e-12, 1e-4, 0.3, 1.0, 5.0, 100.0, 1e4}) {
+    expect_accurate(pair_twice, t, 0, 100);
+    expect_accurate(pair_twice, t, 1, 100);
+    expect_accurate(triple, t, 0, 100);
+  }
+}
+
+TEST(Phi, WithAShiftIsAccurateAtAndBesideResonance) {
+  for (const double t : {1e-8, 0.01, 0.5, 1.0, 3.0, 40.0, 1e3, 1e6}) {
+    for (const double omega : {0.0, 1e-9, 0.5, 1 - 1e-9, 1.0, 1 + 1e-5, 2.0, 1e3}) {
+      expect_accurate(matrix2(0, 1, -1, 0), t, omega);
+      expect_accurate(matrix2(-0.01, 1, -1, -0.01), t, omega);
+      expect_accurate(matrix2(-1, 1, 1e-9, -1), t, omega);
+      expect_accurate(matrix2(0, 1, 0, -0.3), t, omega);
+      expect_accurate(MatrixXd::Constant(1, 1, -0.7), t, omega);
+    }
+  }
+}
+
+TEST(Phi, OfRandomBlocksIsAccurate) {
+  testing::Random random(3);
+  for (int i = 0; i < 300; ++i) {
+    MatrixXd A = random.matrix(2, 2) - 2 * MatrixXd::Identity(2, 2);
+    A -= std::max(0.0, eigenvalue_pair(A).first.real()) * MatrixXd::Identity(2, 2);
+    A *= random.log_uniform(1e-3, 1e3);
+    expect_accurate(A, random.log_uniform(1e-9, 1e2), i % 2 == 0 ? 0 : random.log_uniform(0.1, 10));
+  }
+}
+
+TEST(Phi, RunsBackwardsInTime) {
+  for (const MatrixXd& A : {matrix2(0, 1, -1, -2.5), matrix2(-1, 1, 0.01, -1)}) {
+    const MatrixXd there = phi(0, A, 2.0).real();
+    const MatrixXd back = phi(0, A, -2.0).real();
+    EXPECT_TRUE(near(there * back, Matrix2d::Identity(), 1e-14));
+  }
+}
+
+TEST(EigenvaluePair, KeepsTheSmallRootOfAStronglyOverdampedBlock) {
+  const EigenvaluePair pair = eigenvalue_pair(matrix2(0, 1, -1, -1e9));
+  EXPECT_NEAR(pair.first.real(), -1e-9, 1e-24);
+  EXPECT_NEAR(pair.second.real(), -1e9, 1e-6);
+}
+
+}  // namespace
+}  // namespace dashpot::analysis

@@ -1,0 +1,166 @@
+// Responses against references of 50 digits, from t = 0 to long after all has died away.
+#include <dashpot/analysis/response.hpp>
+#include <dashpot/analysis/task_space.hpp>
+#include <dashpot/tests/support/equation_residual.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/oracle.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::near;
+using testing::ResponseCase;
+using testing::Trajectory;
+
+System<> system_of(const ResponseCase& reference) {
+  if (reference.jacobian) {
+    TaskImpedance impedance;
+    impedance.mass = reference.mass;
+    impedance.jacobian = reference.jacobian;
+    impedance.task_stiffness = reference.task_stiffness;
+    impedance.task_damping = reference.task_damping;
+    return to_joint_space(impedance);
+  }
+  System<> system(reference.n);
+  system.mass = reference.mass;
+  system.damping = reference.damping;
+  system.stiffness = reference.stiffness;
+  return system;
+}
+
+class ResponseOracle : public ::testing::TestWithParam<std::string> {
+ protected:
+  const ResponseCase& reference_ = testing::response_case(GetParam());
+  System<> system_ = system_of(reference_);
+  Response response_{system_, analyze(system_)};
+
+  template <class Ask>
+  void expect_agreement(const Trajectory& trajectory, double tolerance, const Ask& ask) {
+    const double position_size = trajectory.position.cwiseAbs().maxCoeff();
+    const double velocity_size = trajectory.velocity.cwiseAbs().maxCoeff();
+    for (std::size_t i = 0; i < trajectory.times.size(); ++i) {
+      const Motion motion = ask(trajectory.times[i]);
+      const auto column = static_cast<Eigen::Index>(i);
+      const VectorXd q = trajectory.position.col(column);
+      const VectorXd v = trajectory.velocity.col(column);
+      EXPECT_TRUE(near(motion.position, q, tolerance * position_size))
+          << "position at " << trajectory.times[i] << " s";
+      EXPECT_TRUE(near(motion.velocity, v, tolerance * velocity_size))
+          << "velocity at " << trajectory.times[i] << " s";
+    }
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Systems, ResponseOracle, ::testing::ValuesIn([] {
+                           std::vector<std::string> names;
+                           for (const ResponseCase& c : testing::response_cases()) {
+                             names.push_back(c.name);
+                           }
+                           return names;
+                         }()),
+                         [](const auto& instance) {
+                           std::string name = instance.param;
+                           std::replace_if(
+                               name.begin(), name.end(),
+                               [](unsigned char c) { return !std::isalnum(c); }, '_');
+                           return name;
+                         });
+
+constexpr double kTolerance = 1e-12;
+
+TEST_P(ResponseOracle, FreeMotion) {
+  expect_agreement(reference_.free, kTolerance, [&](double t) {
+    return response_.free(reference_.initial_position, reference_.initial_velocity, t);
+  });
+}
+
+TEST_P(ResponseOracle, Impulse) {
+  expect_agreement(reference_.impulse_response, kTolerance,
+                   [&](double t) { return response_.impulse(reference_.impulse, t); });
+}
+
+TEST_P(ResponseOracle, Step) {
+  expect_agreement(reference_.step_response, kTolerance,
+                   [&](double t) { return response_.step(reference_.constant_force, t); });
+}
+
+TEST_P(ResponseOracle, Harmonic) {
+  expect_agreement(reference_.harmonic_response, kTolerance, [&](double t) {
+    return response_.harmonic(reference_.harmonic_cosine, reference_.harmonic_sine,
+                              reference_.harmonic_frequency, t);
+  });
+}
+
+TEST_P(ResponseOracle, Sampled) {
+  const VectorXd rest = VectorXd::Zero(reference_.n);
+  expect_agreement(reference_.sampled_response, kTolerance, [&](double t) {
+    return response_.sampled(rest, rest, reference_.samples, reference_.sample_step, {t}).front();
+  });
+}
+
+TEST_P(ResponseOracle, Receptance) {
+  for (const auto& [frequency, value] : reference_.receptance) {
+    const Eigen::MatrixXcd H = response_.receptance(frequency);
+    EXPECT_TRUE(near(H, value, kTolerance * value.cwiseAbs().maxCoeff())) << frequency;
+  }
+}
+
+// ----------------------------------------------------------------- random systems, random times
+
+System<> random_system(testing::Random& random, int n, int r) {
+  System<> system(n);
+  const MatrixXd W = 5 * random.matrix(n - r, n);
+  system.mass = random.spd(n);
+  system.damping = random.uniform(0, 4) * random.spd(n);
+  system.stiffness = W.transpose() * W;
+  system.stiffness = (0.5 * (system.stiffness + system.stiffness.transpose())).eval();
+  system.stiffness_factor = W;
+  return system;
+}
+
+TEST(ResponseOfRandomSystems, MeetsItsInitialConditions) {
+  testing::Random random(41);
+  for (int i = 0; i < 100; ++i) {
+    const int n = random.integer(1, 8);
+    const System<> system = random_system(random, n, random.integer(0, std::min(2, n)));
+    const Response response(system, analyze(system));
+    const VectorXd q = random.vector(n);
+    const VectorXd v = 10 * random.vector(n);
+    const Motion motion = response.free(q, v, 0);
+    EXPECT_TRUE(near(motion.position, q, 1e-13 * q.norm()));
+    EXPECT_TRUE(near(motion.velocity, v, 1e-13 * (v.norm() + 50 * q.norm())));
+  }
+}
+
+TEST(ResponseOfRandomSystems, SolvesTheEquation) {
+  testing::Random random(42);
+  for (int i = 0; i < 50; ++i) {
+    const int n = random.integer(1, 8);
+    const System<> system = random_system(random, n, random.integer(0, std::min(2, n)));
+    const Response response(system, analyze(system));
+    const VectorXd q = random.vector(n);
+    const VectorXd v = 10 * random.vector(n);
+    const VectorXd f = 100 * random.vector(n);
+    const auto no_force = [n](double) -> VectorXd { return VectorXd::Zero(n); };
+    const auto residual = [&](const auto& motion, const auto& force) {
+      return testing::worst_residual(system, random, 0.01, 10, 5e-4, motion, force);
+    };
+    EXPECT_LT(residual([&](double t) { return response.free(q, v, t); }, no_force), 1e-10);
+    EXPECT_LT(residual([&](double t) { return response.step(f, t); },
+                       [&](double) { return VectorXd(f); }),
+              1e-10);
+    const double omega = random.log_uniform(0.1, 50);
+    EXPECT_LT(residual([&](double t) { return response.harmonic(f, q, omega, t); },
+                       [&](double t) -> VectorXd {
+                         return f * std::cos(omega * t) + q * std::sin(omega * t);
+                       }),
+              1e-10);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis

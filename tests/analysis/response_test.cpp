@@ -1,0 +1,283 @@
+// Responses of systems made from known bases: initial conditions, the differential equation itself,
+// and the identities that tie the responses to each other. No solver takes part.
+#include <dashpot/analysis/response.hpp>
+#include <dashpot/tests/support/equation_residual.hpp>
+#include <dashpot/tests/support/made_to_measure.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <functional>
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::MadeToMeasure;
+using testing::near;
+
+const VectorXd kNoForce = VectorXd::Zero(4);
+
+class ResponseOf : public ::testing::TestWithParam<MadeToMeasure (*)(testing::Random&)> {
+ protected:
+  testing::Random random_{31};
+  MadeToMeasure made_ = GetParam()(random_);
+  Response response_{made_.system, made_.spectrum};
+
+  double residual(const std::function<Motion(double)>& motion,
+                  const std::function<VectorXd(double)>& force) {
+    return testing::worst_residual(made_.system, random_, 0.02, 20, 1e-3, motion, force);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Blocks, ResponseOf,
+                         ::testing::Values(&testing::make_system_of_every_kind,
+                                           &testing::make_defective_system),
+                         [](const auto& instance) {
+                           return instance.index == 0 ? "EveryKind" : "Defective";
+                         });
+
+// -------------------------------------------------------------------------- initial conditions
+
+TEST_P(ResponseOf, InitialConditionsAreMet) {
+  for (int i = 0; i < 20; ++i) {
+    const VectorXd q = random_.vector(4);
+    const VectorXd v = random_.vector(4) * random_.log_uniform(0.1, 100);
+    const Motion motion = response_.free(q, v, 0);
+    const double size = q.norm() + v.norm();
+    EXPECT_TRUE(near(motion.position, q, 1e-13 * size));
+    EXPECT_TRUE(near(motion.velocity, v, 1e-12 * size));
+  }
+}
+
+TEST_P(ResponseOf, AnImpulseSetsTheVelocity) {
+  const VectorXd impulse = random_.vector(4);
+  const Motion motion = response_.impulse(impulse, 0);
+  EXPECT_TRUE(near(motion.velocity, made_.system.mass.lu().solve(impulse), 1e-11));
+  EXPECT_TRUE(near(motion.position, kNoForce, 1e-12));
+}
+
+TEST_P(ResponseOf, ForcesStartFromRest) {
+  const VectorXd f = random_.vector(4);
+  for (const Motion& motion : {response_.step(f, 0), response_.harmonic(f, f, 3, 0)}) {
+    EXPECT_TRUE(near(motion.position, kNoForce, 0));
+    EXPECT_TRUE(near(motion.velocity, kNoForce, 0));
+  }
+}
+
+// ------------------------------------------------------------------- the differential equation
+
+TEST_P(ResponseOf, FreeMotionSolvesTheEquation) {
+  const VectorXd q = random_.vector(4);
+  const VectorXd v = random_.vector(4);
+  EXPECT_LT(
+      residual([&](double t) { return response_.free(q, v, t); }, [](double) { return kNoForce; }),
+      1e-10);
+}
+
+TEST_P(ResponseOf, MotionUnderAStepSolvesTheEquation) {
+  const VectorXd f = random_.vector(4);
+  EXPECT_LT(
+      residual([&](double t) { return response_.step(f, t); }, [&](double) { return VectorXd(f); }),
+      1e-10);
+}
+
+TEST_P(ResponseOf, HarmonicMotionSolvesTheEquation) {
+  const VectorXd c = random_.vector(4);
+  const VectorXd s = random_.vector(4);
+  for (const double omega : {0.0, 0.5, 7.0, 12.0, 20.0}) {
+    EXPECT_LT(residual([&](double t) { return response_.harmonic(c, s, omega, t); },
+                       [&](double t) { return c * std::cos(omega * t) + s * std::sin(omega * t); }),
+              1e-10)
+        << omega;
+  }
+}
+
+TEST_P(ResponseOf, SampledMotionSolvesTheEquationBetweenSamples) {
+  const VectorXd start = random_.vector(4);
+  const VectorXd slope = random_.vector(4);
+  const MatrixXd ramp = (MatrixXd(4, 2) << start, start + 25 * slope).finished();
+  EXPECT_LT(
+      residual([&](double t) { return response_.sampled(slope, start, ramp, 25, {t}).front(); },
+               [&](double t) { return start + t * slope; }),
+      1e-10);
+}
+
+// ------------------------------------------------------------------ responses tied to each other
+
+TEST_P(ResponseOf, VelocityUnderAStepIsTheImpulseResponse) {
+  const VectorXd f = random_.vector(4);
+  for (const double t : {1e-6, 0.01, 0.3, 2.0, 10.0}) {
+    const VectorXd expected = response_.impulse(f, t).position;
+    EXPECT_TRUE(near(response_.step(f, t).velocity, expected, 1e-11 * (1 + expected.norm())));
+  }
+}
+
+TEST_P(ResponseOf, AHarmonicForceOfFrequencyZeroIsAStep) {
+  const VectorXd f = random_.vector(4);
+  for (const double t : {0.01, 1.0, 30.0}) {
+    const Motion step = response_.step(f, t);
+    const Motion harmonic = response_.harmonic(f, random_.vector(4), 0, t);
+    EXPECT_TRUE(near(harmonic.position, step.position, 1e-12 * step.position.norm()));
+    EXPECT_TRUE(near(harmonic.velocity, step.velocity, 1e-12 * (1 + step.velocity.norm())));
+  }
+}
+
+TEST_P(ResponseOf, TimeMayBeCutInTwo) {
+  const VectorXd q = random_.vector(4);
+  const VectorXd v = random_.vector(4);
+  const Motion half = response_.free(q, v, 1.3);
+  const Motion whole = response_.free(q, v, 1.9);
+  const Motion two = response_.free(half.position, half.velocity, 0.6);
+  const double size = whole.position.norm() + whole.velocity.norm();
+  EXPECT_TRUE(near(two.position, whole.position, 1e-11 * size));
+  EXPECT_TRUE(near(two.velocity, whole.velocity, 1e-11 * size));
+}
+
+TEST_P(ResponseOf, ConstantSamplesAreAStepAndFreeMotionSuperposes) {
+  const VectorXd q = random_.vector(4);
+  const VectorXd v = random_.vector(4);
+  const VectorXd f = random_.vector(4);
+  const MatrixXd forces = f.replicate(1, 41);
+  const std::vector<double> times = {0, 0.01, 0.05, 0.0625, 0.33, 0.33, 1.7, 2.0};
+  const std::vector<Motion> motions = response_.sampled(q, v, forces, 0.05, times);
+  ASSERT_EQ(motions.size(), times.size());
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const Motion free = response_.free(q, v, times[i]);
+    const Motion step = response_.step(f, times[i]);
+    EXPECT_TRUE(near(motions[i].position, free.position + step.position, 1e-11));
+    EXPECT_TRUE(near(motions[i].velocity, free.velocity + step.velocity, 1e-10));
+  }
+}
+
+TEST_P(ResponseOf, SampledMotionDoesNotDependOnHowOftenItIsAskedFor) {
+  const MatrixXd forces = random_.matrix(4, 30);
+  std::vector<double> often;
+  for (int i = 0; i <= 290; ++i) often.push_back(0.01 * i);
+  const auto many = response_.sampled(kNoForce, kNoForce, forces, 0.1, often);
+  const auto one = response_.sampled(kNoForce, kNoForce, forces, 0.1, {often.back()});
+  EXPECT_TRUE(near(many.back().position, one.back().position, 0));
+}
+
+// ------------------------------------------------------------------------------------ receptance
+
+TEST_P(ResponseOf, ReceptanceInvertsTheDynamicStiffness) {
+  const System<>& system = made_.system;
+  for (const double omega : {0.01, 1.0, 6.9, 12.0, 35.0, 1e3, 1e6}) {
+    const MatrixXcd dynamic_stiffness =
+        system.stiffness - omega * omega * system.mass + Complex(0, omega) * system.damping;
+    const MatrixXcd H = response_.receptance(omega);
+    EXPECT_TRUE(near(H, dynamic_stiffness.fullPivLu().inverse(), 1e-9 * H.norm())) << omega;
+  }
+}
+
+TEST_P(ResponseOf, ReceptanceIsInfiniteAtAFrequencyOfZeroWithAZeroMode) {
+  const MatrixXcd H = response_.receptance(0);
+  EXPECT_TRUE((H.real().array() == std::numeric_limits<double>::infinity()).all());
+}
+
+// ----------------------------------------------------------------------------- single coordinates
+
+/// One mass without spring: q'' + a q' = f.
+Response free_mass(double a) {
+  MatrixXd zero_mode(2, 2);
+  zero_mode << 0, 1, 0, -a;
+  MadeToMeasure made = testing::make_system(MatrixXd::Identity(1, 1),
+                                            (MatrixXd(1, 2) << 1, 0).finished(), {zero_mode});
+  made.spectrum.zero_modes.basis = MatrixXd::Identity(1, 1);
+  return {made.system, made.spectrum};
+}
+VectorXd one(double value) {
+  return VectorXd::Constant(1, value);
+}
+
+TEST(ResponseOfAFreeMass, PaperEq24DampedMotionComesToRest) {
+  const Response response = free_mass(0.5);
+  for (const double t : {1e-9, 0.1, 3.0, 1e6}) {
+    const Motion motion = response.free(one(2), one(3), t);
+    EXPECT_DOUBLE_EQ(motion.position(0), 2 - 3 * std::expm1(-0.5 * t) / 0.5);
+    EXPECT_NEAR(motion.velocity(0), 3 * std::exp(-0.5 * t), 1e-15 * std::exp(-0.5 * t));
+    EXPECT_DOUBLE_EQ(motion.zero_mode_position(0), motion.position(0));
+    EXPECT_DOUBLE_EQ(motion.zero_mode_velocity(0), motion.velocity(0));
+  }
+}
+
+TEST(ResponseOfAFreeMass, PaperEq26UndampedMotionDrifts) {
+  EXPECT_DOUBLE_EQ(free_mass(0).free(one(2), one(3), 1e6).position(0), 2 + 3e6);
+  EXPECT_DOUBLE_EQ(free_mass(0).step(one(3), 1e3).position(0), 1.5e6);
+}
+
+/// q'' + 9 q = f: the undamped mode resonates at 3 rad/s.
+Response resonator() {
+  const MadeToMeasure made =
+      testing::make_system(MatrixXd::Identity(1, 1), (MatrixXd(1, 2) << 1, 0).finished(),
+                           {(MatrixXd(2, 2) << 0, 3, -3, 0).finished()});
+  return {made.system, made.spectrum};
+}
+
+TEST(ResponseOfAResonator, GrowsLinearlyAtResonance) {
+  for (const double t : {0.1, 1.0, 1e4}) {
+    const Motion motion = resonator().harmonic(one(1), one(0), 3, t);
+    EXPECT_NEAR(motion.position(0), t * std::sin(3 * t) / 6, 1e-14 * t * (1 + t));
+    const Motion quadrature = resonator().harmonic(one(0), one(1), 3, t);
+    EXPECT_NEAR(quadrature.position(0), std::sin(3 * t) / 18 - t * std::cos(3 * t) / 6,
+                1e-14 * t * (1 + t));
+  }
+}
+
+TEST(ResponseOfAResonator, BeatsBesideResonance) {
+  const double omega = 3 + 1e-7;
+  for (const double t : {1.0, 1e3}) {
+    const double sum = 0.5 * (omega + 3) * t;
+    const double half_difference = 0.5 * (omega - 3) * t;
+    const double expected =
+        t * std::sin(sum) * (std::sin(half_difference) / half_difference) / (omega + 3);
+    EXPECT_NEAR(resonator().harmonic(one(1), one(0), omega, t).position(0), expected,
+                1e-14 * t * (1 + t));
+  }
+}
+
+TEST(ResponseOfAResonator, ReceptanceIsInfiniteAtResonanceAndExactBeside) {
+  EXPECT_EQ(resonator().receptance(3)(0, 0).real(), std::numeric_limits<double>::infinity());
+  const double omega = 3 + 0x1p-40;
+  const double exact = -1 / ((omega - 3) * (omega + 3));
+  EXPECT_NEAR(resonator().receptance(omega)(0, 0).real(), exact, 1e-14 * std::abs(exact));
+  EXPECT_DOUBLE_EQ(resonator().receptance(0)(0, 0).real(), 1.0 / 9);
+}
+
+// -------------------------------------------------------------------------------------- refusals
+
+TEST(Response, RefusesWrongSizesTimesAndSpectra) {
+  const Response response = free_mass(1);
+  const VectorXd two = VectorXd::Zero(2);
+  EXPECT_THROW(response.free(two, one(0), 1), std::invalid_argument);
+  EXPECT_THROW(response.free(one(0), two, 1), std::invalid_argument);
+  EXPECT_THROW(response.impulse(one(0), -1), std::invalid_argument);
+  EXPECT_THROW(response.step(one(0), std::nan("")), std::invalid_argument);
+  EXPECT_THROW(response.step(one(std::nan("")), 1), std::invalid_argument);
+  EXPECT_THROW(response.harmonic(one(0), two, 1, 1), std::invalid_argument);
+  const MatrixXd forces = MatrixXd::Zero(1, 3);
+  EXPECT_NO_THROW(response.sampled(one(0), one(0), forces, 0.1, {0, 0.2}));
+  EXPECT_THROW(response.sampled(one(0), one(0), forces, 0.1, {0.1, 0}), std::invalid_argument);
+  EXPECT_THROW(response.sampled(one(0), one(0), forces, 0.1, {0.21}), std::invalid_argument);
+  EXPECT_THROW(response.sampled(one(0), one(0), forces, 0, {0}), std::invalid_argument);
+  Spectrum<> failed;
+  failed.status = Status::kNotConverged;
+  EXPECT_THROW(Response(System<>(1), failed), std::invalid_argument);
+  EXPECT_THROW(Response(System<>(1), Spectrum<>()), std::invalid_argument);
+}
+
+TEST(Response, OfASystemWithoutCoordinatesIsEmpty) {
+  Spectrum<> spectrum;
+  spectrum.basis.U.resize(0, 0);
+  spectrum.zero_modes.basis.resize(0, 0);
+  const Response response(System<>(0), spectrum);
+  EXPECT_EQ(response.free(VectorXd(0), VectorXd(0), 1).position.size(), 0);
+  EXPECT_EQ(response.receptance(1).size(), 0);
+}
+
+}  // namespace
+}  // namespace dashpot::analysis

@@ -1,0 +1,265 @@
+// Joint-space systems of task-space impedances, exactly, and their factors.
+#include <dashpot/analysis/double_double.hpp>
+#include <dashpot/analysis/task_space.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/paper_examples.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::as_printed;
+using testing::near;
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
+TaskImpedance random_impedance(testing::Random& random, int n, int m) {
+  TaskImpedance impedance;
+  impedance.mass = random.spd(n);
+  impedance.jacobian = random.matrix(m, n);
+  impedance.task_stiffness = 1e3 * random.spd(m);
+  impedance.task_damping = 10 * random.spd(m);
+  return impedance;
+}
+
+// --------------------------------------------------------------------------------- the products
+
+TEST(ToJointSpace, PaperAppendix3DampingAndStiffnessOfTheArm) {
+  const System<> system = to_joint_space(testing::paper_baxter());
+  EXPECT_TRUE(
+      as_printed(system.damping,
+                 {{"1.949", "0.07297", "1.305", "0.1258", "0.5526", "0.09194", "0.0000"},
+                  {"0.07297", "2.956", "-0.3774", "2.388", "-0.4693", "1.670", "-0.05528"},
+                  {"1.305", "-0.3774", "1.963", "-0.3420", "1.623", "-0.3647", "0.1413"},
+                  {"0.1258", "2.388", "-0.3420", "2.173", "-0.4543", "1.738", "-0.05528"},
+                  {"0.5526", "-0.4693", "1.623", "-0.4543", "1.597", "-0.4639", "0.1625"},
+                  {"0.09194", "1.670", "-0.3647", "1.738", "-0.4639", "1.657", "-0.05528"},
+                  {"0.0000", "-0.05528", "0.1413", "-0.05528", "0.1625", "-0.05528", "0.01833"}}));
+  EXPECT_TRUE(
+      as_printed(system.stiffness,
+                 {{"162.4", "7.297", "108.7", "12.58", "46.05", "9.194", "0.0000"},
+                  {"7.297", "71.02", "3.605", "51.40", "0.5985", "20.69", "-0.1658"},
+                  {"108.7", "3.605", "78.97", "7.147", "37.93", "4.876", "0.8012"},
+                  {"12.58", "51.40", "7.147", "48.11", "2.098", "27.30", "-0.1658"},
+                  {"46.05", "0.5985", "37.93", "2.098", "21.22", "1.136", "0.9211"},
+                  {"9.194", "20.69", "4.876", "27.30", "1.136", "21.57", "-0.1658"},
+                  {"0.0000", "-0.1658", "0.8012", "-0.1658", "0.9211", "-0.1658", "0.1039"}}));
+}
+
+TEST(ToJointSpace, TailsHoldWhatRoundingTook) {
+  // Entries are multiples of 2^-30 below 1, so products of three are multiples of 2^-90, which
+  // 128-bit integers hold exactly.
+  __extension__ using Wide = __int128;
+  const auto integer = [](double value, int bits) {
+    return static_cast<Wide>(std::ldexp(value, bits));
+  };
+  testing::Random random(21);
+  const auto coarse = [&](int rows, int cols) {
+    return MatrixXd(MatrixXd::NullaryExpr(
+        rows, cols, [&] { return std::ldexp(random.integer(-(1 << 29), 1 << 29), -30); }));
+  };
+  TaskImpedance impedance;
+  impedance.mass = MatrixXd::Identity(3, 3);
+  const MatrixXd J = coarse(2, 3);
+  const MatrixXd half = coarse(2, 2);
+  const MatrixXd K = half + half.transpose();
+  impedance.jacobian = J;
+  impedance.task_stiffness = K;
+  const System<> system = to_joint_space(impedance);
+  ASSERT_TRUE(system.has_tails);
+  EXPECT_FALSE(system.stiffness_tail.isZero(0.0));
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      Wide exact = 0;
+      for (int k = 0; k < 2; ++k) {
+        for (int l = 0; l < 2; ++l) {
+          exact += integer(J(k, i), 30) * integer(K(k, l), 30) * integer(J(l, j), 30);
+        }
+      }
+      const double high = system.stiffness(i, j);
+      const double low = system.stiffness_tail(i, j);
+      EXPECT_TRUE(integer(high, 90) + integer(low, 90) == exact) << i << " " << j;
+      EXPECT_LE(std::abs(low), kEps * std::abs(high));
+    }
+  }
+}
+
+TEST(ToJointSpace, IsExactlySymmetric) {
+  testing::Random random(22);
+  TaskImpedance impedance = random_impedance(random, 7, 6);
+  impedance.stiffness = random.spd(7);
+  const System<> system = to_joint_space(impedance);
+  EXPECT_TRUE(system.symmetric());
+  EXPECT_EQ(system.stiffness_tail, system.stiffness_tail.transpose());
+  EXPECT_EQ(system.damping_tail, system.damping_tail.transpose());
+}
+
+TEST(ToJointSpace, AddsJointSpaceAndTaskSpaceParts) {
+  testing::Random random(23);
+  TaskImpedance both = random_impedance(random, 5, 3);
+  const System<> task_only = to_joint_space(both);
+  both.stiffness = random.spd(5);
+  both.damping = random.spd(5);
+  const System<> system = to_joint_space(both);
+  EXPECT_TRUE(near(system.stiffness, task_only.stiffness + *both.stiffness, 1e-11));
+  EXPECT_TRUE(near(system.damping, task_only.damping + *both.damping, 1e-13));
+}
+
+TEST(ToJointSpace, OfAMassAloneHasNeitherDampingNorStiffness) {
+  TaskImpedance impedance;
+  impedance.mass = 2 * MatrixXd::Identity(2, 2);
+  const System<> system = to_joint_space(impedance);
+  EXPECT_TRUE(system.damping.isZero(0.0));
+  EXPECT_TRUE(system.stiffness.isZero(0.0));
+  EXPECT_FALSE(system.has_tails);
+}
+
+TEST(ToJointSpace, OfJointSpaceMatricesTakesThemAsTheyAre) {
+  TaskImpedance impedance;
+  impedance.mass = testing::paper_chain().mass;
+  impedance.damping = testing::paper_chain().damping;
+  impedance.stiffness = testing::paper_chain().stiffness;
+  const System<> system = to_joint_space(impedance);
+  EXPECT_EQ(system.damping, *impedance.damping);
+  EXPECT_EQ(system.stiffness, *impedance.stiffness);
+  EXPECT_FALSE(system.has_tails);
+}
+
+TEST(ToJointSpace, AveragesRoundingInSymmetryAway) {
+  TaskImpedance impedance;
+  impedance.mass = 2 * MatrixXd::Identity(2, 2);
+  impedance.stiffness = (MatrixXd(2, 2) << 1, 1e-11, 3e-11, 1).finished();
+  EXPECT_DOUBLE_EQ(to_joint_space(impedance).stiffness(0, 1), 2e-11);
+  EXPECT_TRUE(to_joint_space(impedance).symmetric());
+}
+
+// ------------------------------------------------------------------------------ the Eq. 55 extras
+
+TEST(ToJointSpace, PaperEq55AddsDampingTimesTheRateOfTheJacobian) {
+  testing::Random random(24);
+  TaskImpedance impedance = random_impedance(random, 4, 3);
+  const System<> still = to_joint_space(impedance);
+  impedance.jacobian_rate = random.matrix(3, 4);
+  const System<> moving = to_joint_space(impedance);
+  const MatrixXd expected =
+      impedance.jacobian->transpose() * *impedance.task_damping * *impedance.jacobian_rate;
+  EXPECT_TRUE(near(moving.stiffness - still.stiffness, expected, 1e-11));
+  EXPECT_FALSE(moving.symmetric());
+  EXPECT_EQ(moving.stiffness_factor.rows(), 0);
+}
+
+/// Planar arm with two links of length 1: the tip's position, its Jacobian's derivatives.
+std::vector<MatrixXd> planar_derivatives(double q1, double q2) {
+  const double s1 = std::sin(q1);
+  const double c1 = std::cos(q1);
+  const double s12 = std::sin(q1 + q2);
+  const double c12 = std::cos(q1 + q2);
+  return {(MatrixXd(2, 2) << -c1 - c12, -c12, -s1 - s12, -s12).finished(),
+          (MatrixXd(2, 2) << -c12, -c12, -s12, -s12).finished()};
+}
+
+TEST(GeometricStiffness, PaperEq55OfAPlanarArmIsSymmetric) {
+  const VectorXd f = VectorXd{{3, -7}};
+  const MatrixXd K_G = geometric_stiffness(planar_derivatives(0.3, 0.8), f);
+  const double first = -std::cos(0.3) * f(0) - std::sin(0.3) * f(1);
+  const double second = -std::cos(1.1) * f(0) - std::sin(1.1) * f(1);
+  EXPECT_TRUE(
+      near(K_G, (MatrixXd(2, 2) << first + second, second, second, second).finished(), 1e-14));
+}
+
+TEST(GeometricStiffness, TakesOneColumnFromEachDerivative) {
+  const std::vector<MatrixXd> derivatives = {(MatrixXd(1, 2) << 1, 2).finished(),
+                                             (MatrixXd(1, 2) << 3, 4).finished()};
+  EXPECT_TRUE(near(geometric_stiffness(derivatives, VectorXd::Constant(1, 10)),
+                   (MatrixXd(2, 2) << 10, 30, 20, 40).finished(), 0));
+}
+
+TEST(ToJointSpace, PaperEq55AddsTheGeometricStiffness) {
+  TaskImpedance impedance;
+  impedance.mass = MatrixXd::Identity(2, 2);
+  impedance.stiffness = 100 * MatrixXd::Identity(2, 2);
+  impedance.wrench = VectorXd{{3, -7}};
+  impedance.jacobian_derivatives = planar_derivatives(0.3, 0.8);
+  impedance.jacobian_derivatives[0](0, 1) += 1e-15;  // rounding of another formula
+  const System<> system = to_joint_space(impedance);
+  EXPECT_TRUE(system.symmetric());
+  EXPECT_EQ(system.stiffness_factor.rows(), 0);
+  EXPECT_TRUE(near(system.stiffness - *impedance.stiffness,
+                   geometric_stiffness(impedance.jacobian_derivatives, *impedance.wrench), 1e-13));
+
+  impedance.jacobian_derivatives[0](0, 1) += 0.1;  // as of an angular row
+  EXPECT_FALSE(to_joint_space(impedance).symmetric());
+}
+
+// -------------------------------------------------------------------------------------- the factor
+
+void expect_factor(const System<>& system, Eigen::Index rows) {
+  const MatrixXd& W = system.stiffness_factor;
+  ASSERT_EQ(W.rows(), rows);
+  EXPECT_TRUE(near(W.transpose() * W, system.stiffness, 1e-14 * W.squaredNorm()));
+}
+
+TEST(StiffnessFactor, OfADiagonalTaskStiffnessHasItsRoots) {
+  const TaskImpedance arm = testing::paper_baxter();
+  const System<> system = to_joint_space(arm);
+  expect_factor(system, 5);
+  EXPECT_TRUE(near(system.stiffness_factor.cwiseAbs().colwise().sum(),
+                   (arm.task_stiffness->cwiseSqrt() * *arm.jacobian).cwiseAbs().colwise().sum(),
+                   1e-14));
+}
+
+TEST(StiffnessFactor, OfFullMatricesIsStacked) {
+  testing::Random random(25);
+  TaskImpedance impedance = random_impedance(random, 7, 6);
+  expect_factor(to_joint_space(impedance), 6);
+  impedance.stiffness = random.spd(7);
+  expect_factor(to_joint_space(impedance), 13);
+}
+
+TEST(StiffnessFactor, OfASingularTaskStiffnessHasExactZeros) {
+  testing::Random random(26);
+  for (int i = 0; i < 50; ++i) {
+    TaskImpedance impedance = random_impedance(random, 5, 4);
+    const MatrixXd root = random.matrix(4, 2);
+    const MatrixXd product = 1e4 * root * root.transpose();
+    impedance.task_stiffness = 0.5 * (product + product.transpose());
+    const System<> system = to_joint_space(impedance);
+    expect_factor(system, 4);
+    EXPECT_EQ((system.stiffness_factor.rowwise().norm().array() > 0).count(), 2);
+  }
+}
+
+TEST(StiffnessFactor, KeepsSmallStiffnessesBesideLargeOnes) {
+  TaskImpedance impedance;
+  impedance.mass = MatrixXd::Identity(3, 3);
+  impedance.stiffness =
+      (MatrixXd(3, 3) << 1e12, 1e3, 0, 1e3, 1e-4, 5e-11, 0, 5e-11, 1e-15).finished();
+  const System<> system = to_joint_space(impedance);
+  const MatrixXd product = system.stiffness_factor.transpose() * system.stiffness_factor;
+  const VectorXd scale = system.stiffness.diagonal().cwiseSqrt().cwiseInverse();
+  EXPECT_TRUE(near(scale.asDiagonal() * product * scale.asDiagonal(),
+                   scale.asDiagonal() * system.stiffness * scale.asDiagonal(), 1e-14));
+}
+
+TEST(StiffnessFactor, OfAnIndefiniteStiffnessIsLeftOut) {
+  testing::Random random(27);
+  TaskImpedance impedance = random_impedance(random, 4, 2);
+  for (const MatrixXd& indefinite :
+       {(MatrixXd(2, 2) << 1, 2, 2, 1).finished(), (MatrixXd(2, 2) << 0, 1, 1, 5).finished(),
+        (MatrixXd(2, 2) << 1, 0, 0, -1e-9).finished()}) {
+    impedance.task_stiffness = indefinite;
+    impedance.stiffness.reset();
+    EXPECT_EQ(to_joint_space(impedance).stiffness_factor.rows(), 0);
+    impedance.stiffness = random.spd(4);
+    EXPECT_EQ(to_joint_space(impedance).stiffness_factor.rows(), 0);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
