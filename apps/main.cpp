@@ -1,0 +1,67 @@
+#include <dashpot/apps/input_error.hpp>
+#include <dashpot/apps/subcommands.hpp>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+namespace dashpot::apps {
+namespace {
+
+constexpr int kFailure = 1;
+constexpr int kBadInput = 2;
+
+/// Says on one line of standard error what went wrong, and returns `status`.
+int report(const std::string& message, int status) {
+  std::fprintf(stderr, "%s\n", one_line(message).c_str());
+  return status;
+}
+
+int run(int argc, char** argv) {
+  CLI::App program("Vibration analysis of second-order systems and impedance-controlled robots",
+                   "dashpot");
+  program.set_version_flag("--version", "dashpot 0.1.0");
+  program.require_subcommand(0, 1);
+  add_analyze(program);
+
+  const auto name = [&program] {
+    const auto chosen = program.get_subcommands();
+    return "dashpot" + (chosen.empty() ? "" : " " + chosen.front()->get_name());
+  };
+  try {
+    program.parse(argc, argv);
+    if (!program.get_subcommands().empty()) return 0;
+    return report("dashpot: a subcommand is needed (dashpot --help)", kBadInput);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
+    return report(name() + ": " + error.what() + " (" + name() + " --help)", kBadInput);
+  } catch (const InputError& error) {
+    return report(name() + ": " + error.what(), kBadInput);
+  } catch (const std::bad_alloc&) {
+    return report(name() + ": out of memory", kFailure);
+  } catch (const std::exception& error) {
+    return report(name() + ": " + error.what(), kFailure);
+  }
+}
+
+}  // namespace
+
+void print(const std::string& text) {
+  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
+    throw std::runtime_error("cannot write to standard output");
+  }
+}
+
+}  // namespace dashpot::apps
+
+int main(int argc, char** argv) {
+  try {
+    return dashpot::apps::run(argc, argv);
+  } catch (...) {
+    std::fputs("dashpot: out of memory\n", stderr);
+    return 1;
+  }
+}

@@ -1,0 +1,15 @@
+#pragma once
+#include <CLI/App.hpp>
+
+// One function for each subcommand: adds it, with its options, to the program. The subcommand runs
+// when the command line is parsed. It throws InputError for bad input (exit status 2) and any other
+// exception for what is not the user's fault (exit status 1), and prints only when all went well.
+
+namespace dashpot::apps {
+
+void add_analyze(CLI::App& program);
+
+/// Writes all of `text` to standard output. Throws std::runtime_error if that fails.
+void print(const std::string& text);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,42 @@
+#pragma once
+#include <dashpot/analysis/task_space.hpp>
+#include <dashpot/apps/input_error.hpp>
+
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// One system as the user wrote it (SI units; n joints, m task directions). The vectors below have
+/// n entries; analysis::to_joint_space checks the matrices.
+struct SystemEntry {
+  analysis::TaskImpedance impedance;
+  std::optional<Eigen::VectorXd> initial_position;  ///< q(0), n
+  std::optional<Eigen::VectorXd> initial_velocity;  ///< q'(0), n
+  std::optional<Eigen::VectorXd> impulse;           ///< at t = 0, n
+  std::optional<Eigen::VectorXd> force;             ///< constant from t = 0 on, n
+  std::optional<Eigen::VectorXd> times;             ///< s, none negative, in any order
+
+  std::string prefix;                ///< of the keys in messages: "" or "[2]."
+  std::map<std::string, int> lines;  ///< of the keys given
+
+  /// The error of this entry that an exception of the analysis reports.
+  InputError error(const analysis::InvalidSystem& cause) const;
+};
+
+/// A file with one system, or with a list of them.
+struct SystemFile {
+  bool is_list = false;
+  std::vector<SystemEntry> entries;
+};
+
+/// Reads a YAML or JSON file, standard input if `path` is "-". Throws InputError.
+SystemFile read_systems(const std::string& path);
+
+/// The keys of a system and what they mean, for the help text.
+extern const char* const kSystemFileHelp;
+
+}  // namespace dashpot::apps

@@ -1,0 +1,32 @@
+#pragma once
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// Text in aligned columns: a heading of one or more lines, then rows.
+class TextTable {
+ public:
+  enum class Align { kLeft, kRight, kPoint };  ///< kPoint: numbers, decimal points in line
+
+  /// `heading` has as many lines as that of every other column.
+  void add_column(Align align, std::vector<std::string> heading);
+  void add_row(std::vector<std::string> cells);
+
+  /// Heading lines and rows, each indented by two spaces and ended by a newline.
+  std::string text() const;
+
+ private:
+  std::vector<Align> aligns_;
+  std::vector<std::vector<std::string>> headings_;
+  std::vector<std::vector<std::string>> rows_;
+};
+
+/// `value` with so many significant digits; "-" if it is NaN.
+std::string format_number(double value, int digits);
+
+/// Numbers of one column with as many decimals as give the largest so many significant digits; what
+/// rounds to zero is "0".
+std::vector<std::string> format_column(const std::vector<double>& values, int digits);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,24 @@
+#pragma once
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// One value of a YAML document, with its place. Aliases are already replaced by what they name.
+struct YamlNode {
+  enum class Kind { kNull, kScalar, kSequence, kMap };
+  Kind kind = Kind::kNull;
+  bool quoted = false;          ///< a scalar in quotes: text, whatever it looks like
+  int line = 0;                 ///< counts from 1
+  std::string text;             ///< of a scalar
+  std::vector<YamlNode> items;  ///< of a sequence; of a map key, value, key, value, ...
+};
+
+/// The bytes of the file at `path`, or of standard input if it is "-". Throws InputError.
+std::string read_text(const std::string& path);
+
+/// Parses text that holds one YAML (or JSON) document. Throws InputError on anything else, and on
+/// text that is too large or too deeply nested to be what this program reads.
+YamlNode parse_yaml(const std::string& text);
+
+}  // namespace dashpot::apps

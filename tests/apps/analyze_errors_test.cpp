@@ -1,0 +1,249 @@
+// What `dashpot analyze` says to bad input: one line that names the key, status 2, no output.
+#include <dashpot/tests/apps/run_program.hpp>
+
+#include <gmock/gmock.h>
+
+#include <ostream>
+
+namespace dashpot::tests {
+namespace {
+
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+void expect_refused(const Outcome& outcome, const std::string& start, const std::string& reason) {
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.out, IsEmpty());
+  EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
+  EXPECT_THAT(outcome.err, EndsWith("\n"));
+  EXPECT_THAT(outcome.err, StartsWith(start));
+  EXPECT_THAT(outcome.err, HasSubstr(reason));
+}
+
+struct BadInput {
+  const char* name;
+  const char* key;     ///< with the colon after it: what follows the file's name
+  const char* reason;  ///< a part of it
+  std::string text;
+};
+
+std::ostream& operator<<(std::ostream& out, const BadInput& input) {
+  return out << input.name;
+}
+
+const std::string kTwo =
+    "mass: [[2, 0], [0, 1]]\ndamping: [[1, 0], [0, 1]]\nstiffness: [[3, -1], [-1, 1]]\n";
+const std::string kMassAndDamping = "mass: [[2, 0], [0, 1]]\ndamping: [[1, 0], [0, 1]]\n";
+const std::string kTask = "mass: [[2, 0], [0, 1]]\njacobian: [[1, 1]]\n";
+
+class AnalyzeRefuses : public testing::TestWithParam<BadInput> {};
+
+TEST_P(AnalyzeRefuses, WithOneLineThatNamesTheKey) {
+  const BadInput& input = GetParam();
+  SCOPED_TRACE(input.text);
+  for (const bool json : {false, true}) {
+    const Outcome outcome = analyze_text(
+        input.text, json ? std::vector<std::string>{"--json"} : std::vector<std::string>{});
+    expect_refused(outcome, "dashpot analyze: -: " + std::string(input.key), input.reason);
+  }
+}
+
+std::string name_of(const testing::TestParamInfo<BadInput>& info) {
+  return info.param.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Matrices, AnalyzeRefuses,
+    testing::Values(
+        BadInput{"MissingMass", "mass: ", "missing", "stiffness: [[1]]\n"},
+        BadInput{"MissingStiffness", "stiffness: ", "missing", kMassAndDamping},
+        BadInput{"MassNotSquare", "mass: ", "2 x 3",
+                 "mass: [[1, 0, 0], [0, 1, 0]]\nstiffness: [[1, 0], [0, 1]]\n"},
+        BadInput{"MassNotSymmetric", "mass: ", "not symmetric",
+                 "mass: [[1, 0.5], [0, 1]]\nstiffness: [[1, 0], [0, 1]]\n"},
+        BadInput{"MassIndefinite", "mass: ", "not positive definite (line 1)",
+                 "mass: [[1, 2], [2, 1]]\nstiffness: [[1, 0], [0, 1]]\n"},
+        BadInput{"MassSingular", "mass: ", "not positive definite",
+                 "mass: [[0]]\nstiffness: [[1]]\n"},
+        BadInput{"DampingNotSquare", "damping: ", "1 x 2",
+                 "mass: [[1]]\nstiffness: [[1]]\ndamping: [[1, 2]]\n"},
+        BadInput{"DampingNotSymmetric", "damping: ", "(line 4)",
+                 "mass: [[2, 0], [0, 1]]\nstiffness: [[3, -1], [-1, 1]]\n\n"
+                 "damping: [[1, 0.1], [0, 1]]\n"},
+        BadInput{"StiffnessNotSymmetric", "stiffness: ", "not symmetric",
+                 kMassAndDamping + "stiffness: [[1, 1], [0, 1]]\n"},
+        BadInput{"StiffnessOfWrongSize", "stiffness: ", "expected 2 x 2",
+                 kMassAndDamping + "stiffness: [[1]]\n"},
+        BadInput{"RaggedRows", "stiffness: ", "row 2 has 1 entries, row 1 has 2 (line 3)",
+                 kMassAndDamping + "stiffness: [[1, 0], [0]]\n"},
+        BadInput{"NaN", "stiffness: ", "row 1, entry 2 is not finite",
+                 kMassAndDamping + "stiffness: [[1, .nan], [0, 1]]\n"},
+        BadInput{"Infinity", "damping: ", "row 2, entry 2 is not finite",
+                 "mass: [[2, 0], [0, 1]]\ndamping: [[1, 0], [0, -.inf]]\n"},
+        BadInput{"NaNAsJsonWritersPutIt", "mass: ", "not finite",
+                 "{\"mass\": [[NaN]], \"stiffness\": [[1]]}"},
+        BadInput{"NumberTooLarge", "mass: ", "not finite", "mass: [[1e999]]\nstiffness: [[1]]\n"},
+        BadInput{"NotANumber", "mass: ", "row 1, entry 1 is not a number but 'one'",
+                 "mass: [[one]]\nstiffness: [[1]]\n"},
+        BadInput{"HalfANumber", "mass: ", "'1.0kg'", "mass: [[1.0kg]]\nstiffness: [[1]]\n"},
+        BadInput{"NumberInQuotes", "mass: ", "the text '1'", "mass: [['1']]\nstiffness: [[1]]\n"},
+        BadInput{"NoValue", "mass: ", "nothing", "mass:\nstiffness: [[1]]\n"},
+        BadInput{"NullEntry", "mass: ", "nothing", "mass: [[null]]\nstiffness: [[1]]\n"},
+        BadInput{"NumberForAMatrix", "mass: ", "a list of rows is wanted", "mass: 1\n"},
+        BadInput{"VectorForAMatrix", "mass: ", "row 1: a list of numbers is wanted",
+                 "mass: [1, 1]\n"},
+        BadInput{"MatrixTooDeep", "mass: ", "not a number but a list",
+                 "mass: [[[1]]]\nstiffness: [[1]]\n"},
+        BadInput{"MappingForAMatrix", "mass: ", "a mapping", "mass: {a: 1}\n"}),
+    name_of);
+
+INSTANTIATE_TEST_SUITE_P(
+    TaskSpace, AnalyzeRefuses,
+    testing::Values(
+        BadInput{"TaskStiffnessWithoutJacobian", "task_stiffness: ", "jacobian",
+                 "mass: [[1]]\ntask_stiffness: [[1]]\n"},
+        BadInput{"JacobianAlone", "jacobian: ", "task_stiffness", kTwo + "jacobian: [[1, 1]]\n"},
+        BadInput{"JacobianOfWrongWidth", "jacobian: ", "expected 1 x 2",
+                 "mass: [[2, 0], [0, 1]]\njacobian: [[1, 1, 1]]\ntask_stiffness: [[1]]\n"},
+        BadInput{"TaskStiffnessOfWrongSize", "task_stiffness: ", "expected 1 x 1",
+                 kTask + "task_stiffness: [[1, 0], [0, 1]]\n"},
+        BadInput{"TaskDampingNotSymmetric", "task_damping: ", "not symmetric",
+                 "mass: [[2, 0], [0, 1]]\njacobian: [[1, 1], [0, 1]]\n"
+                 "task_stiffness: [[1, 0], [0, 1]]\ntask_damping: [[1, 1], [0, 1]]\n"},
+        BadInput{"RateWithoutTaskDamping", "jacobian_rate: ", "task_damping",
+                 kTask + "task_stiffness: [[1]]\njacobian_rate: [[0, 1]]\n"},
+        BadInput{"DerivativesWithoutWrench", "jacobian_derivatives: ", "wrench",
+                 kTask + "task_stiffness: [[1]]\njacobian_derivatives: [[[0, 1]], [[1, 0]]]\n"},
+        BadInput{"TooFewDerivatives", "jacobian_derivatives: ", "(line 4)",
+                 kTask + "task_stiffness: [[1]]\njacobian_derivatives: [[[0, 1]]]\nwrench: [1]\n"},
+        BadInput{"DerivativeOfWrongSize", "jacobian_derivatives[2]: ", "(line 4)",
+                 kTask + "task_stiffness: [[1]]\njacobian_derivatives: [[[0, 1]], [[1]]]\n"
+                         "wrench: [1]\n"},
+        BadInput{"WrenchOfWrongLength", "wrench: ", "expected 1 x 1",
+                 kTask + "task_stiffness: [[1]]\njacobian_derivatives: [[[0, 1]], [[1, 0]]]\n"
+                         "wrench: [1, 2]\n"}),
+    name_of);
+
+INSTANTIATE_TEST_SUITE_P(
+    Vectors, AnalyzeRefuses,
+    testing::Values(
+        BadInput{"PositionTooLong", "initial_position: ", "has 3 entries, mass has 2 rows (line 4)",
+                 kTwo + "initial_position: [0, 0, 1]\n"},
+        BadInput{"VelocityTooShort", "initial_velocity: ", "has 1 entries",
+                 kTwo + "initial_velocity: [0]\ntimes: [1]\n"},
+        BadInput{"ImpulseTooShort", "impulse: ", "has 0 entries", kTwo + "impulse: []\n"},
+        BadInput{"ForceTooLong", "force: ", "has 3 entries", kTwo + "force: [1, 2, 3]\n"},
+        BadInput{"ForceNotAList", "force: ", "a list of numbers is wanted", kTwo + "force: 1\n"},
+        BadInput{"ForceNotFinite", "force: ", "entry 2 is not finite", kTwo + "force: [0, .inf]\n"},
+        BadInput{"TimesNotNumbers", "times: ", "entry 1 is not a number", kTwo + "times: [soon]\n"},
+        BadInput{"TimeNegative", "times: ", "entry 2 is negative", kTwo + "times: [0, -1]\n"}),
+    name_of);
+
+INSTANTIATE_TEST_SUITE_P(
+    Keys, AnalyzeRefuses,
+    testing::Values(
+        BadInput{"UnknownKey", "stifness: ", "unknown key; the keys are mass, damping, stiffness",
+                 kTwo + "stifness: [[1]]\n"},
+        BadInput{"UnknownKeyOverSeveralLines", "a b: ", "unknown key", "\"a\\nb\": 1\n"},
+        BadInput{"UnknownKeyWithANul", "a b: ", "unknown key", "\"a\\0b\": 1\n"},
+        BadInput{"DuplicateKey", "mass: ", "duplicate key (line 4)", kTwo + "mass: [[1]]\n"},
+        BadInput{"KeyThatIsAList", "a key is a list", "", "? [mass]\n: 1\n"},
+        BadInput{"EntryOfAList", "[1].damping: ", "not finite: '.nan' (line 6)",
+                 "- mass: [[1]]\n  stiffness: [[1]]\n- mass: [[1]]\n  stiffness: [[1]]\n"
+                 "  damping:\n   - [.nan]\n"},
+        BadInput{"EntryOfAListByTheAnalysis", "[1].mass: ", "not positive definite (line 3)",
+                 "- mass: [[1]]\n  stiffness: [[1]]\n- mass: [[-1]]\n  stiffness: [[1]]\n"},
+        BadInput{"EntryThatIsNoSystem", "[0]: ", "a mapping of keys to values is wanted, not '3'",
+                 "- 3\n"},
+        BadInput{"EntryWithUnknownKey", "[1].mas: ", "unknown key",
+                 "[{mass: [[1]], stiffness: [[1]]}, {mas: 1}]\n"}),
+    name_of);
+
+INSTANTIATE_TEST_SUITE_P(
+    Files, AnalyzeRefuses,
+    testing::Values(BadInput{"Empty", "is empty", "", ""},
+                    BadInput{"OnlyComments", "is empty", "", "# mass\n"},
+                    BadInput{"OnlyAText", "a mapping of keys to values is wanted, not 'mass'", "",
+                             "mass\n"},
+                    BadInput{"NotYaml", "is not YAML: ", "(line 2)", "mass: [[1]]\nstiffness: ]\n"},
+                    BadInput{"CutOff", "is not YAML: ", "", "mass: [[1, 2]\n"},
+                    BadInput{"Binary", "is not YAML: ", "",
+                             std::string("\x7f"
+                                         "ELF\0\1\2",
+                                         7)},
+                    BadInput{"SeveralDocuments", "holds several documents; give a list instead", "",
+                             "---\n" + kTwo + "---\n" + kTwo},
+                    BadInput{"AliasOfNothing", "is not YAML: ", "", "mass: *m\n"},
+                    BadInput{"AliasOfItself", "an alias refers to itself", "", "mass: &m [*m]\n"},
+                    BadInput{"MergeKey", "[1].<<: ", "unknown key",
+                             "- &a {mass: [[1]], stiffness: [[1]]}\n- {<<: *a}\n"}),
+    name_of);
+
+TEST(AnalyzeErrors, NameTheFile) {
+  const Scratch scratch;
+  const std::string file = scratch.write("arm.yaml", "mass: [[1, 2]]\nstiffness: [[1]]\n");
+  expect_refused(run_program({"analyze", file}), "dashpot analyze: " + file + ": mass: ", "1 x 2");
+}
+
+TEST(AnalyzeErrors, StayOnOneLineWhateverTheFileIsCalled) {
+  const Outcome outcome = run_program({"analyze", "no\nfile\r.yaml"});
+  expect_refused(outcome, "dashpot analyze: no file .yaml: ", "cannot be opened");
+}
+
+TEST(AnalyzeErrors, TellAFileThatIsNotThereFromOneThatCannotBeRead) {
+  expect_refused(run_program({"analyze", "no-such-file.yaml"}),
+                 "dashpot analyze: no-such-file.yaml: ", "No such file or directory");
+  const Scratch scratch;
+  expect_refused(run_program({"analyze", scratch.path("")}),
+                 "dashpot analyze: " + scratch.path("") + ": ", "Is a directory");
+}
+
+TEST(AnalyzeErrors, AreForTheCommandLineToo) {
+  const std::string hint = "(dashpot analyze --help)";
+  expect_refused(run_program({"analyze"}), "dashpot analyze: ", hint);
+  expect_refused(run_program({"analyze", "a", "b"}), "dashpot analyze: ", hint);
+  expect_refused(run_program({"analyze", "-", "--nonsense"}), "dashpot analyze: ", "--nonsense");
+  for (const std::string value : {"-1", "nan", "inf", "1x", "", "fast"}) {
+    expect_refused(run_program({"analyze", "-", "--soft-frequency=" + value}),
+                   "dashpot analyze: ", "--soft-frequency");
+  }
+  expect_refused(run_program({"analyze", "-", "--pivot", "first"}), "dashpot analyze: ", "--pivot");
+  expect_refused(run_program({"analyze", "-", "--residual", "2"}),
+                 "dashpot analyze: ", "--residual");
+}
+
+std::string repeat(const std::string& text, std::size_t times) {
+  std::string result;
+  for (std::size_t i = 0; i < times; ++i) result += text;
+  return result;
+}
+
+TEST(AnalyzeErrors, CatchNestingThatWouldOverflowTheStack) {
+  const std::string start = "dashpot analyze: -: ";
+  expect_refused(analyze_text(repeat("[", 3'000'000)), start, "nested too deeply");
+  expect_refused(analyze_text(repeat("{a: ", 100'000)), start, "nested too deeply");
+  expect_refused(analyze_text(repeat("- ", 100'000)), start, "nested too deeply");
+  expect_refused(analyze_text(repeat("? ", 100'000)), start, "nested too deeply");
+  expect_refused(analyze_text("mass: " + repeat("[", 50) + "1" + repeat("]", 50)), start,
+                 "nested too deeply");
+}
+
+TEST(AnalyzeErrors, CatchTextThatWouldFillTheMemory) {
+  const std::string start = "dashpot analyze: -: ";
+  expect_refused(analyze_text(std::string((64u << 20) + 1, ' ')), start, "larger than 64 MiB");
+  expect_refused(analyze_text("mass: [" + repeat("1,", 4'000'001) + "]"), start, "4000000 values");
+  // Each list holds the one before ten times.
+  std::string bomb = "a: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n";
+  for (int i = 1; i < 12; ++i) {
+    const std::string number = std::to_string(i);
+    const std::string last = "*a" + std::to_string(i - 1) + ", ";
+    bomb.append("b").append(number).append(": &a").append(number);
+    bomb.append(" [").append(repeat(last, 10)).append("]\n");
+  }
+  expect_refused(analyze_text(bomb), start, "4000000 values");
+}
+
+}  // namespace
+}  // namespace dashpot::tests

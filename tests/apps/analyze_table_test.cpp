@@ -1,0 +1,135 @@
+// The table that `dashpot analyze` prints for people, and the program's other manners.
+#include <dashpot/tests/apps/run_program.hpp>
+
+#include <gmock/gmock.h>
+
+#include <sstream>
+
+namespace dashpot::tests {
+namespace {
+
+using testing::AllOf;
+using testing::ContainsRegex;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::StartsWith;
+
+std::string table(const Outcome& outcome) {
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, IsEmpty());
+  return outcome.out;
+}
+
+std::size_t widest_line(const std::string& text) {
+  std::size_t widest = 0;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) widest = std::max(widest, line.size());
+  return widest;
+}
+
+TEST(AnalyzeTable, ShowsTheModesOfThePaper) {
+  const std::string text = table(run_program({"analyze", example("chain3.yaml")}));
+  EXPECT_THAT(text, StartsWith("3 coordinates: 2 vibration modes, 1 zero mode\n"));
+  EXPECT_THAT(text, ContainsRegex("\n +1 +40\\.2214 +6\\.40144 +0\\.255794 +underdamped"));
+  EXPECT_THAT(text, ContainsRegex("\n +2 +30\\.9783 +4\\.93036 +0\\.0976200 +underdamped"));
+  EXPECT_THAT(text, ContainsRegex("-10\\.2884 +\\+- 38\\.8833i"));
+  EXPECT_THAT(text, HasSubstr("Rank: 1 zero mode; smallest frequency kept 30.9, largest dropped"));
+  EXPECT_THAT(text, HasSubstr(", independent."));
+  EXPECT_THAT(text, HasSubstr("eliminates q1.\n"));
+  EXPECT_THAT(text, HasSubstr("q1 + q2 + q3"));  // the shape of the zero mode
+  EXPECT_THAT(text, ContainsRegex("\n +0\\.3 +0\\.0047613 +0\\.003968 +0\\.0027945"));
+}
+
+TEST(AnalyzeTable, FitsAHundredColumns) {
+  for (const std::string name : {"chain3.yaml", "chain3_impulse.yaml", "baxter7.yaml"}) {
+    EXPECT_LE(widest_line(table(run_program({"analyze", example(name)}))), 100u) << name;
+  }
+}
+
+TEST(AnalyzeTable, HasNoEscapeCodesUnlessOnATerminal) {
+  EXPECT_THAT(table(run_program({"analyze", example("chain3.yaml")})), Not(HasSubstr("\033")));
+}
+
+TEST(AnalyzeTable, SaysWhatIsSpecialAboutASystem) {
+  const std::string general =
+      table(analyze_text("{mass: [[1]], damping: [[1]], stiffness: [[1]], jacobian: [[1]], "
+                         "task_damping: [[1]], jacobian_rate: [[1]]}"));
+  EXPECT_THAT(general, Not(HasSubstr("Note")));  // 1 x 1 is symmetric
+  const std::string coupled = table(analyze_text(
+      "{mass: [[1, 0], [0, 1]], damping: [[1, 0], [0, 0]], stiffness: [[1, -1], [-1, 1]]}"));
+  EXPECT_THAT(coupled, HasSubstr("Note: the damping couples zero modes and vibrations"));
+  EXPECT_THAT(coupled, HasSubstr(", solved together."));
+  EXPECT_THAT(table(analyze_text("{mass: [[1]], stiffness: [[1]]}")),
+              HasSubstr("Note: no damping given: taken as zero"));
+}
+
+TEST(AnalyzeTable, HeadsTheSystemsOfAListWithTheirIndex) {
+  const std::string text =
+      table(analyze_text("[{mass: [[1]], stiffness: [[1]]}, {mass: [[1]], stiffness: [[0]]}]"));
+  EXPECT_THAT(text, AllOf(StartsWith("[0] 1 coordinate: 1 vibration mode, no zero modes\n"),
+                          HasSubstr("\n[1] 1 coordinate: no vibration modes, 1 zero mode\n")));
+}
+
+TEST(AnalyzeTable, HasALineForASystemWithoutJoints) {
+  EXPECT_EQ(table(analyze_text("mass: []")), "no coordinates: no vibration modes, no zero modes\n");
+  EXPECT_EQ(table(analyze_text("[]")), "no systems\n");
+}
+
+TEST(AnalyzeTable, ShowsBothRealEigenvalues) {
+  EXPECT_THAT(table(analyze_text("{mass: [[1]], damping: [[5]], stiffness: [[4]]}")),
+              ContainsRegex("overdamped +-1\\.00000 +-4\\.00000"));
+}
+
+TEST(AnalyzeTable, SplitsTheResponseOfManyJoints) {
+  std::string unit = "[";
+  std::string zeros = "[";
+  for (int i = 0; i < 9; ++i) {
+    unit += "[";
+    for (int j = 0; j < 9; ++j) unit += i == j ? "1," : "0,";
+    unit += "],";
+    zeros += "1,";
+  }
+  const std::string text = table(analyze_text("{mass: " + unit + "], stiffness: " + unit +
+                                              "], force: " + zeros + "], times: [1]}"));
+  EXPECT_THAT(text, ContainsRegex("t, s +q1 .* q7\n"));
+  EXPECT_THAT(text, ContainsRegex("t, s +q8 +q9\n"));
+  EXPECT_LE(widest_line(text), 100u);
+}
+
+TEST(Program, TellsItsVersion) {
+  EXPECT_THAT(table(run_program({"--version"})),
+              ContainsRegex("^dashpot [0-9]+\\.[0-9]+\\.[0-9]+\n$"));
+}
+
+TEST(Program, ExplainsItself) {
+  EXPECT_THAT(table(run_program({"--help"})), HasSubstr("analyze"));
+  const std::string help = table(run_program({"analyze", "--help"}));
+  for (const std::string word :
+       {"mass", "damping", "stiffness", "jacobian", "task_damping", "task_stiffness",
+        "jacobian_rate", "jacobian_derivatives", "wrench", "initial_position", "initial_velocity",
+        "impulse", "force", "times", "--json", "--soft-frequency", "--residual", "--pivot"}) {
+    EXPECT_THAT(help, HasSubstr(word));
+  }
+}
+
+TEST(Program, WantsASubcommandItKnows) {
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{}, {"analyse"}, {"--jsno"}}) {
+    const Outcome outcome = run_program(arguments);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_THAT(outcome.err, StartsWith("dashpot: "));
+    EXPECT_EQ(count_lines(outcome.err), 1);
+  }
+}
+
+TEST(Program, FailsIfItCannotWrite) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  const Outcome outcome = run_program({"analyze", example("chain3.yaml")}, "", "/dev/full");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_EQ(outcome.err, "dashpot analyze: cannot write to standard output\n");
+}
+
+}  // namespace
+}  // namespace dashpot::tests

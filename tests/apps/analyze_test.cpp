@@ -1,0 +1,174 @@
+// What `dashpot analyze` prints as JSON for good input.
+#include <dashpot/tests/apps/json_result.hpp>
+
+#include <cmath>
+
+namespace dashpot::tests {
+namespace {
+
+TEST(Analyze, ReadsJsonFromStandardInput) {
+  const Json result =
+      analyze_json("{\n\t\"mass\": [[2]],\n\t\"damping\": [[1.2e0]], \"stiffness\":[[18.0]]\n}\n");
+  expect_near({of_modes(result, "natural_frequency")}, {{3}}, 1e-15);
+  expect_near({of_modes(result, "damping_ratio")}, {{0.1}}, 1e-15);
+}
+
+TEST(Analyze, AnswersAListWithAList) {
+  const Json result = analyze_json(
+      "- {mass: &m [[1]], stiffness: [[4]]}\n- {mass: *m, stiffness: [[9]]}\n"
+      "- {mass: [], stiffness: []}\n");
+  ASSERT_EQ(result.size(), 3u);
+  expect_near({of_modes(result[0], "natural_frequency")}, {{2}}, 1e-15);
+  expect_near({of_modes(result[1], "natural_frequency")}, {{3}}, 1e-15);
+  EXPECT_EQ(result[2]["dof"], 0);
+  EXPECT_EQ(analyze_json("[]"), Json::array());
+  EXPECT_TRUE(analyze_json("[{mass: [[1]], stiffness: [[4]]}]").is_array());
+}
+
+TEST(Analyze, AddsJointAndTaskSpaceUp) {
+  const Json result = analyze_json(
+      "mass: [[1, 0], [0, 1]]\nstiffness: [[1, 0], [0, 9]]\ndamping: [[0.2, 0], [0, 0]]\n"
+      "jacobian: [[2, 0]]\ntask_stiffness: [[6]]\ntask_damping: [[0.2]]\n");
+  expect_near({of_modes(result, "natural_frequency")}, {{5, 3}}, 1e-15);
+  expect_near({of_modes(result, "damping_ratio")}, {{0.1, 0}}, 1e-15);
+  EXPECT_EQ(result["modes"][1]["kind"], "undamped");
+}
+
+TEST(Analyze, AddsTheGeometricStiffnessAndTheJacobiansRate) {
+  // K = J' K_C J + K_G + J' C_C dJ/dt with J = [1 1], K_C = 4, f = 2, C_C = 1:
+  // [4 4; 4 4] + [6 0; 0 2] + [0 0; 0 0] first, then + [1 0; 1 0].
+  const std::string text =
+      "mass: [[1, 0], [0, 1]]\njacobian: [[1, 1]]\ntask_stiffness: [[4]]\ntask_damping: [[1]]\n"
+      "jacobian_derivatives: [[[3, 0]], [[0, 1]]]\nwrench: [2]\n";
+  const Json symmetric = analyze_json(text);
+  EXPECT_EQ(symmetric["symmetric"], true);
+  expect_near(symmetric["reduced"]["stiffness"], {{10, 4}, {4, 6}}, 1e-15);
+  const Json general = analyze_json(text + "jacobian_rate: [[1, 0]]\n");
+  EXPECT_EQ(general["symmetric"], false);
+  expect_near(general["reduced"]["stiffness"], {{11, 4}, {5, 6}}, 1e-15);
+  EXPECT_EQ(general["notes"],
+            Json::parse(R"(["stiffness is not symmetric: solved as a general problem"])"));
+}
+
+TEST(Analyze, SumsTheResponsesToAllThatIsGiven) {
+  const std::string system =
+      "mass: [[2, 0.5], [0.5, 1]]\ndamping: [[1, -0.3], [-0.3, 0.4]]\n"
+      "stiffness: [[9, -2], [-2, 3]]\ntimes: [2, 0, 0.7]\n";
+  const std::vector<std::string> causes = {"initial_position: [0.1, -0.2]\n",
+                                           "initial_velocity: [1, 0.5]\n", "impulse: [-1, 2]\n",
+                                           "force: [3, 1]\n"};
+  std::string everything = system;
+  Rows position(3, Numbers(2, 0.0));
+  Rows velocity = position;
+  for (const std::string& cause : causes) {
+    everything += cause;
+    const Json response = analyze_json(system + cause)["response"];
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 2; ++j) {
+        EXPECT_NE(response["velocity"][0][j], 0.0) << cause;
+        position[i][j] += response["position"][i][j].get<double>();
+        velocity[i][j] += response["velocity"][i][j].get<double>();
+      }
+    }
+  }
+  const Json response = analyze_json(everything)["response"];
+  EXPECT_EQ(response["times"], Json::parse("[2.0, 0.0, 0.7]"));
+  expect_near(response["position"], position, 1e-14);
+  expect_near(response["velocity"], velocity, 1e-14);
+}
+
+TEST(Analyze, SettlesWhereTheForceHoldsTheSpring) {
+  const Json result =
+      analyze_json("mass: [[1]]\ndamping: [[2]]\nstiffness: [[4]]\nforce: [2]\ntimes: [0, 50]\n");
+  expect_near(result["response"]["position"], {{0}, {0.5}}, 1e-14);
+}
+
+TEST(Analyze, NeedsNoJoints) {
+  for (const std::string text :
+       {"mass: []", "mass: []\ndamping: []\nstiffness: []\ntimes: [0, 1]\nforce: []\n"}) {
+    const Json result = analyze_json(text);
+    EXPECT_EQ(result["dof"], 0);
+    EXPECT_EQ(result["modes"], Json::array());
+    EXPECT_EQ(result["zero_modes"], Json::array());
+    EXPECT_EQ(analyze_text(text).status, 0);
+  }
+}
+
+TEST(Analyze, NamesTheKindsOfModes) {
+  const auto kind = [](const std::string& damping, const std::string& stiffness) {
+    const Json result = analyze_json("{mass: [[1]], damping: [[" + damping + "]], stiffness: [[" +
+                                     stiffness + "]]}");
+    return result["modes"][0]["kind"].get<std::string>();
+  };
+  EXPECT_EQ(kind("1", "4"), "underdamped");
+  EXPECT_EQ(kind("4", "4"), "critical");
+  EXPECT_EQ(kind("5", "4"), "overdamped");
+  EXPECT_EQ(kind("0", "4"), "undamped");
+  EXPECT_EQ(kind("-1", "4"), "unstable");
+  EXPECT_EQ(kind("1", "-4"), "unstable");
+}
+
+TEST(Analyze, PutsTheSlowerOfTwoRealEigenvaluesFirst) {
+  const Json result = analyze_json("{mass: [[1]], damping: [[5]], stiffness: [[4]]}");
+  expect_near(result["modes"][0]["eigenvalues"], {{-1, 0}, {-4, 0}}, 1e-15);
+  expect_near({of_modes(result, "damping_ratio")}, {{1.25}}, 1e-15);
+}
+
+TEST(Analyze, CallsModesBelowTheSoftFrequencySoft) {
+  const std::string text =
+      "{mass: [[1, 0], [0, 1]], damping: [[1, 0], [0, 0.001]], stiffness: [[4, 0], [0, 0.01]]}";
+  EXPECT_EQ(analyze_json(text)["modes"][1]["kind"], "underdamped");
+  const Json result = analyze_json(text, {"--soft-frequency", "0.5"});
+  EXPECT_EQ(result["modes"][0]["kind"], "underdamped");
+  EXPECT_EQ(result["modes"][1]["kind"], "soft");
+}
+
+TEST(Analyze, ReportsTheDampingThatCouplesZeroModesAndVibrations) {
+  const Json result = analyze_json(
+      "{mass: [[1, 0], [0, 1]], damping: [[1, 0], [0, 0]], stiffness: [[1, -1], [-1, 1]]}");
+  EXPECT_GT(result["coupling"], 0.1);
+  EXPECT_EQ(result["coupled"], true);
+  EXPECT_EQ(result["zero_modes"].size(), 1u);
+  // det [l^2 + l + 1, -1; -1, l^2 + 1] = l (l^3 + l^2 + 2 l + 1): the zero mode decays at the real
+  // root, the vibration has the complex pair.
+  const double root = -0.5698402909980532;
+  expect_near({result["zero_mode_rates"]}, {{root}}, 1e-13);
+  expect_near({of_modes(result, "natural_frequency")}, {{std::sqrt(-1 / root)}}, 1e-13);
+  EXPECT_THAT(result["notes"][0].get<std::string>(), testing::HasSubstr("couples"));
+}
+
+TEST(Analyze, WritesNumbersSoThatTheyReadBackTheSame) {
+  const Json result = analyze_json("{mass: [[0.30000000000000004]], stiffness: [[1e-7]]}");
+  EXPECT_EQ(result["reduced"]["mass"][0][0].get<double>(), 0.30000000000000004);
+}
+
+TEST(Analyze, WritesNullForWhatIsNotANumber) {
+  const Json result = analyze_json("{mass: [[1]], damping: [[1]], stiffness: [[-4]]}");
+  EXPECT_TRUE(result["modes"][0]["natural_frequency"].is_null());
+  const Json free = analyze_json("{mass: [[1]], damping: [[1]], stiffness: [[0]]}");
+  EXPECT_TRUE(free["rank_gap"]["smallest_kept"].is_null());
+}
+
+TEST(Analyze, NotesWhatTheReaderMayNotExpect) {
+  const auto notes = [](const std::string& more) {
+    return analyze_json("mass: [[1]]\nstiffness: [[4]]\n" + more)["notes"];
+  };
+  EXPECT_EQ(notes("damping: [[1]]\n"), Json::array());
+  EXPECT_EQ(notes(""), Json::parse(R"(["no damping given: taken as zero"])"));
+  EXPECT_EQ(notes("damping: [[1]]\nforce: [1]\n"),
+            Json::parse(R"(["no times given: no response computed"])"));
+  EXPECT_EQ(notes("damping: [[1]]\ntimes: [0]\n").size(), 1u);
+}
+
+TEST(Analyze, ProvesTighterBoundsWithExtendedResiduals) {
+  const auto bound = [](const std::string& residual) {
+    const Json result =
+        parse(run_program({"analyze", example("baxter7.yaml"), "--json", "--residual", residual}));
+    return result["modes"][4]["error_bound"].get<double>();
+  };
+  EXPECT_LT(bound("extended"), bound("working"));
+  EXPECT_GT(bound("extended"), 0);
+}
+
+}  // namespace
+}  // namespace dashpot::tests

@@ -1,0 +1,102 @@
+#pragma once
+// Runs the built program as a user would.
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace dashpot::tests {
+
+struct Outcome {
+  int status = -1;  ///< exit status; 128 + signal if one ended the program
+  std::string out;
+  std::string err;
+};
+
+/// A directory of this test alone, removed with it.
+class Scratch {
+ public:
+  Scratch() {
+    std::string name = testing::TempDir() + "dashpot.XXXXXX";
+    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no scratch directory");
+    directory_ = name;
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  ~Scratch() { std::filesystem::remove_all(directory_); }
+
+  std::string path(const std::string& name) const { return directory_ / name; }
+  /// Writes a file, and returns its path.
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(path(name), std::ios::binary) << text;
+    return path(name);
+  }
+  std::string read(const std::string& name) const {
+    std::ifstream stream(path(name), std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+
+ private:
+  std::filesystem::path directory_;
+};
+
+/// Runs `dashpot ARGUMENTS...` with `input` on standard input; its standard output goes to the file
+/// `sink` if one is named, and into the outcome otherwise.
+inline Outcome run_program(const std::vector<std::string>& arguments, const std::string& input = "",
+                           const std::string& sink = "") {
+  const Scratch scratch;
+  const std::string in = scratch.write("in", input);
+  const std::string out = sink.empty() ? scratch.path("out") : sink;
+  const std::string err = scratch.path("err");
+
+  std::vector<std::string> words = {DASHPOT_PROGRAM};
+  words.insert(words.end(), arguments.begin(), arguments.end());
+  std::vector<char*> argv(words.size() + 1, nullptr);
+  std::transform(words.begin(), words.end(), argv.begin(),
+                 [](std::string& word) { return word.data(); });
+
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, in.c_str(), O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, out.c_str(), O_WRONLY | O_CREAT, 0600);
+  posix_spawn_file_actions_addopen(&files, STDERR_FILENO, err.c_str(), O_WRONLY | O_CREAT, 0600);
+  pid_t child = 0;
+  const int failure = posix_spawn(&child, argv[0], &files, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&files);
+  if (failure != 0) throw std::runtime_error("cannot start " + words[0]);
+
+  int wait_status = 0;
+  waitpid(child, &wait_status, 0);
+  Outcome outcome;
+  outcome.status = WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : 128 + WTERMSIG(wait_status);
+  if (sink.empty()) outcome.out = scratch.read("out");
+  outcome.err = scratch.read("err");
+  return outcome;
+}
+
+/// `dashpot analyze - OPTIONS...` with `text` on standard input.
+inline Outcome analyze_text(const std::string& text, std::vector<std::string> options = {}) {
+  options.insert(options.begin(), {"analyze", "-"});
+  return run_program(options, text);
+}
+
+inline std::string example(const std::string& name) {
+  return std::string(DASHPOT_SOURCE_DIR) + "/apps/examples/" + name;
+}
+
+inline auto count_lines(const std::string& text) {
+  return std::count(text.begin(), text.end(), '\n');
+}
+
+}  // namespace dashpot::tests
