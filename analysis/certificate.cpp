@@ -10,10 +10,13 @@ namespace {
 constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Frobenius norms of the blocks of |F| + F_error (squares, off the diagonal), and separations.
+/// Sizes of the blocks of the perturbation, and separations.
 template <int N>
 struct BlockTable {
-  State<N> norm2;       ///< square of the block's norm; on the diagonal the norm of F_error alone
+  /// Off the diagonal the squared Frobenius norm of |F| + F_error, columns scaled to unit weight;
+  /// on it the norm itself (no square) of what is not added to Lambda: F_error, and |F| + F_error
+  /// for zero modes
+  State<N> norm2;
   State<N> separation;  ///< lower bounds
 };
 
@@ -46,10 +49,11 @@ void fill_table(const Defect<N>& defect, const ModalBasis<N>& basis, BlockTable<
   }
 }
 
-/// Bound for one group, or a negative number if it has to grow by `merge`.
+/// Bound for one group, or a negative number if it has to grow by the group of block `merge`.
+/// `everything` bounds the spectral norm of the whole perturbation.
 template <int N>
 double group_radius(const BlockTable<N>& table, const Certificate<N>& certificate, int group,
-                    double total_diagonal, int& merge) {
+                    double everything, int& merge) {
   const auto count = static_cast<int>(certificate.group.size());
   double inner = 0, inner_diagonal = 0, right = 0, left = 0, separation = kInfinity;
   merge = -1;
@@ -75,7 +79,7 @@ double group_radius(const BlockTable<N>& table, const Certificate<N>& certificat
   left = std::sqrt(left);
   if (merge < 0) return inner;
   // |E22|: everything outside, bounded by everything there is.
-  const double delta = separation - inner - total_diagonal;
+  const double delta = separation - inner - everything;
   if (!(delta > 0) || !(4 * right * left < delta * delta)) return -1;
   return inner + 2 * right * left / delta;
 }
@@ -138,16 +142,18 @@ void certify(const Defect<N>& defect, ModalBasis<N>& basis, Certificate<N>& cert
 double disc_radius(const Complex* eigenvalues, int count, int which, double block_norm,
                    double radius) noexcept {
   if (count == 1 || radius == 0 || !std::isfinite(radius)) return radius;
-  // An eigenvalue z of the perturbed block has  prod |z - mu_j| = |det| <= radius |block -
-  // z|^(k-1). At distance d from mu_i, the nearest, |z - mu_j| >= max(d, |mu_i - mu_j| / 2): find
-  // the d from which on the product is too large for that.
+  // An eigenvalue z of the perturbed block (k x k) makes the smallest singular value of block - z
+  // at most `radius`, and so
+  //     prod |z - mu_j| = |det(block - z)| <= radius |block - z|^(k-1).
+  // At distance d from mu_i, the nearest, |z - mu_j| >= max(d, |mu_i - mu_j| / 2): find the d from
+  // which on the product is too large for that.
   const Complex mu = eigenvalues[which];
   const double norm = block_norm + modulus(mu) * std::sqrt(static_cast<double>(count));
   if (count == 2) {
-    // d max(d, g/2) > radius (norm + d), solved for d.
-    const double gap = 0.5 * modulus(eigenvalues[0] - eigenvalues[1]);
-    const double simple = radius * norm / (gap - radius);
-    if (gap > radius && simple <= gap) return (1 + 1e-10) * simple;
+    // d max(d, half_gap) > radius (norm + d), solved for d.
+    const double half_gap = 0.5 * modulus(eigenvalues[0] - eigenvalues[1]);
+    const double simple = radius * norm / (half_gap - radius);
+    if (half_gap > radius && simple <= half_gap) return (1 + 1e-10) * simple;
     return (1 + 1e-10) * 0.5 * (radius + std::sqrt(radius * (radius + 4 * norm)));
   }
   double d = radius;

@@ -243,9 +243,8 @@ Invariants Reader<N>::invariants(int i, int j) const {
     v.sum = L(0, 0) + L(1, 1);
     v.discriminant = half_difference * half_difference + L(0, 1) * L(1, 0);
     v.product = half_sum * half_sum - v.discriminant;
-    if (!alone(a.block)) {
-      // Only the discs are known; fall through to the bounds below.
-    } else {
+    // In a group with other blocks only the discs are known: the bounds are those at the end.
+    if (alone(a.block)) {
       // Of a 2 x 2 matrix within rho of L: |tr| moves by sqrt(2) rho, det by |L| rho + rho^2 / 2,
       // and the discriminant by |L0| rho + rho^2 / 2 with L0 the traceless part.
       const double rho = certificate_.radius[a.block], size = L.norm();
@@ -307,7 +306,7 @@ void Reader<N>::write_numbers(int i, int j, Mode<N>& mode) const {
     mode.kind = ModeKind::kCritical;
   } else if (real) {
     mode.kind = ModeKind::kOverdamped;
-  } else if (0.5 * std::abs(v.sum) <= 0.5 * v.sum_error) {
+  } else if (std::abs(v.sum) <= v.sum_error) {
     mode.kind = ModeKind::kUndamped;
   } else {
     mode.kind = ModeKind::kUnderdamped;
@@ -416,7 +415,7 @@ void Reader<N>::write_modes() {
   for (int i = 0; i < root_count_; ++i) count += !root(i).used && root(i).partner > i ? 1 : 0;
   const int m = static_cast<int>(system_.dof()) - spectrum_.zero_modes.count;
   spectrum_.modes.resize(std::min(count, m));
-  // Order of falling natural frequency; those without one first (they grow fastest).
+  // By insertion, in the order of falling sqrt|l1 l2|: a mode without natural frequency has this.
   Eigen::Matrix<int, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1> order(count);
   StateVector<N> key(root_count_);
   int next = 0;

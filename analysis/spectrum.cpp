@@ -11,8 +11,9 @@
 namespace dashpot::analysis {
 namespace {
 
-/// Refinement steps tried with one kind of residual before the better result is taken as it is.
-constexpr int kMaxSteps = 4;
+/// Times the basis is evaluated with one kind of residual, with a refinement step between each two;
+/// the last evaluation is taken as it is.
+constexpr int kMaxEvaluations = 4;
 /// Refinement goes on until every mode's backward error is below this.
 constexpr double kTargetBackwardError = 2e-14;
 /// With a relative bound above this, residuals of working precision are not worth a step.
@@ -102,7 +103,7 @@ bool SpectrumSolver<N>::good(const Spectrum<N>& spectrum) const noexcept {
 template <int N>
 void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out) noexcept {
   Quality previous{kInfinity, kInfinity};
-  for (int step = 0; step < kMaxSteps; ++step) {
+  for (int evaluation = 1;; ++evaluation) {
     evaluate_defect<N>(system, out.symmetric, out.extended, out.basis, defect_);
     certify<N>(defect_, out.basis, certificate_);
     read_modes<N>(system, defect_, certificate_, options_.soft_frequency, out);
@@ -114,7 +115,7 @@ void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out) noexce
     const bool noise = !out.extended && (quality.bound > kHopeless ||
                                          (quality.backward_error <= kTargetBackwardError &&
                                           defect_.F.norm() <= defect_.F_error.norm()));
-    if (good(out) || !better || noise || step + 1 == kMaxSteps) return;
+    if (good(out) || !better || noise || evaluation == kMaxEvaluations) return;
     previous = quality;
     newton_step<N>(defect_, out.basis);
   }

@@ -45,19 +45,22 @@ struct Mode {
   /// Condition number of the worse eigenvalue in the same measure (Tisseur 2000); infinite at
   /// critical damping
   double condition = 0;
-  /// Proved bounds. |computed - true| of either eigenvalue, 1/s (of the two nearest each other):
+  /// Proved bounds of |computed - true|; infinite if none could be proved. Of either eigenvalue,
+  /// 1/s (of the two nearest each other):
   double error_bound = std::numeric_limits<double>::infinity();
   double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
   double damping_ratio_bound = std::numeric_limits<double>::infinity();
 };
 
 struct SpectrumOptions {
-  /// Modes with an undamped frequency below this are called soft, rad/s.
+  /// Modes with a natural frequency below this are called soft, rad/s.
   double soft_frequency = 1e-6;
-  /// Evaluate residuals with twice the working precision: always, never, or where the bound proved
-  /// with working precision exceeds `target_bound` times the mode's frequency.
+  /// Precision of the residuals: working, or twice that (kExtended), or kAutomatic: first working,
+  /// then extended for all modes if for one of them the proved bound exceeds `target_bound` times
+  /// |lambda_1| + |lambda_2|, the backward error exceeds 2e-14, or only the bound decides the kind
+  /// (critical; undamped in spite of damping).
   enum class Residual { kAutomatic, kWorking, kExtended } residual = Residual::kAutomatic;
-  double target_bound = 1e-10;
+  double target_bound = 1e-10;  ///< relative, no unit
 };
 
 /// A list of at most N modes that allocates only when N is kDynamic.
@@ -92,14 +95,14 @@ struct Spectrum {
   bool proportional = false;  ///< the undamped modes decouple the damping too (C = 0 included);
                               ///< then zero_modes.coordinates is the mass-normalised modal matrix,
                               ///< n x n, with the zero modes in its last columns
-  bool extended = false;  ///< residuals were evaluated with twice the working precision
+  bool extended = false;      ///< residuals were evaluated with twice the working precision
   bool coupled =
       false;            ///< the damping couples zero and nonzero modes, and that was solved exactly
   double coupling = 0;  ///< how strongly: |damping between nonzero and zero modes| / |damping|, in
                         ///< mass-normalised coordinates (Frobenius)
 
   ZeroModes<N> zero_modes;
-  ModeList<N> modes;  ///< n - r modes by falling natural frequency
+  ModeList<N> modes;  ///< n - r modes by falling natural frequency, or sqrt|l1 l2| if that is NaN
   /// Eigenvalues -a of the r zero modes' velocities, 1/s: zero if nothing damps them
   Vector<N> zero_mode_rates;
   ModalBasis<N> basis;
@@ -123,7 +126,7 @@ class SpectrumSolver {
   explicit SpectrumSolver(SpectrumOptions options = {}) : options_(options) {}
 
   /// Analyses `system` into `out`, and returns out.status. The work is bounded (see
-  /// hessenberg_eigenvalues; at most 8 refinement steps); for a fixed N there is no allocation. On
+  /// hessenberg_eigenvalues; at most 6 refinement steps); for a fixed N there is no allocation. On
   /// a status other than kOk and kUncertified `out` has no modes.
   Status solve(const System<N>& system, Spectrum<N>& out) noexcept;
 

@@ -13,7 +13,6 @@ constexpr double kEps = std::numeric_limits<double>::epsilon();
 constexpr double kCluster = 0.02;
 /// A cluster is parted into eigenvectors if their matrix has a condition number below this.
 constexpr double kPartable = 100;
-
 /// Shift of a subspace iteration off the middle of its cluster, relative.
 constexpr double kNudge = 1e-3;
 
@@ -246,19 +245,19 @@ StateVector<N> Builder<N>::state_vector(double value) const {
 template <int N>
 void Builder<N>::mark_zero_rates() {
   if (form_.coupled_zeros == 0) return;
-  StateVector<N> share = StateVector<N>::Constant(item_count_, -1);
+  StateVector<N> score = StateVector<N>::Constant(item_count_, -1);  // -1: not eligible
   for (int i = 0; i < item_count_; ++i) {
     if (item(i).value.imag() != 0) continue;
     const StateVector<N> z = state_vector(item(i).value.real());
-    const double velocity = z.tail(c_).squaredNorm();
+    const double kinetic = z.tail(c_).squaredNorm();  // of a total energy of 1
     // Velocities of zero modes have more kinetic than strain energy.
-    share[i] = z.tail(c_ - m_).squaredNorm() / velocity + (velocity > 0.5 ? 1 : 0);
+    score[i] = z.tail(c_ - m_).squaredNorm() / kinetic + (kinetic > 0.5 ? 1 : 0);
   }
   for (int wanted = form_.coupled_zeros; wanted > 0; --wanted) {
     Eigen::Index best = 0;
-    if (share.maxCoeff(&best) < 0) return;
+    if (score.maxCoeff(&best) < 0) return;
     item(static_cast<int>(best)).zero_rate = true;
-    share[best] = -1;
+    score[best] = -1;
   }
 }
 
@@ -332,8 +331,9 @@ void Builder<N>::write_single(Complex value) {
   append_pair(re_im, value);
 }
 
-/// State (s, v) of a decaying velocity: x = s / omega in the nonzero modes' coordinates, while the
-/// zero modes move with t = v - lambda x.
+/// Block of a coupled zero mode whose velocity changes as exp(rate t), with the state (s, v). Its
+/// columns are p0, the zero modes' part of v, and p1 = s / omega in the coordinates of the nonzero
+/// modes: Lambda = [0 1; 0 rate] gives the second column the velocity p0 + rate p1 = v.
 template <int N>
 void Builder<N>::write_zero_rate(double rate) {
   const StateVector<N> z = state_vector(rate);

@@ -29,7 +29,8 @@ struct System {
 
   /// Optional low-order parts: the exact coefficients are damping + damping_tail and
   /// stiffness + stiffness_tail. They carry what rounding took when the coefficients were formed
-  /// from others, such as K = J' K_C J. Read only if `has_tails`.
+  /// from others, such as K = J' K_C J. Read only if `has_tails`. The proved error bounds rely on
+  /// |tail| <= eps |coefficient| / 2 in every entry, which `validate` does not check.
   Square<N> damping_tail;
   Square<N> stiffness_tail;
   bool has_tails = false;
