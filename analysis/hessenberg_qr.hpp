@@ -70,7 +70,7 @@ inline void eigenvalues_2x2(double a, double b, double c, double d, Complex& fir
 /// Eigenvalues of an upper Hessenberg matrix by the implicit double-shift QR iteration of Francis;
 /// `H` is destroyed. Only the active window is touched, since no vectors are wanted. At most
 /// 30 sweeps per eigenvalue; returns false if that is not enough. (Golub and Van Loan, 4th ed.,
-/// Algorithm 7.5.2; exceptional shifts as in EISPACK's hqr.)
+/// Algorithm 7.5.2; exceptional shifts as in EISPACK's hqr, but about 0 instead of H(high, high).)
 template <typename Matrix>
 bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
   constexpr double kEps = std::numeric_limits<double>::epsilon();
