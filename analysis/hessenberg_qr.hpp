@@ -148,11 +148,12 @@ bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
         H(k, k - 1) = -H(k, k - 1);
       }
       // Reflection I - [v0 v1 v2]' [1 w1 w2]
-      const double v0 = (alpha - x) / alpha;
-      const double v1 = -y / alpha;
-      const double v2 = -z / alpha;
-      const double w1 = y / (x - alpha);
-      const double w2 = z / (x - alpha);
+      const double inverse_alpha = 1 / alpha, inverse_rest = 1 / (x - alpha);
+      const double v0 = 1 - x * inverse_alpha;
+      const double v1 = -y * inverse_alpha;
+      const double v2 = -z * inverse_alpha;
+      const double w1 = y * inverse_rest;
+      const double w2 = z * inverse_rest;
       const Eigen::Index last_row = std::min(high, k + 3);
       double* row = &H(k, k);
       const Eigen::Index stride = H.outerStride();

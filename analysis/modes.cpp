@@ -394,8 +394,14 @@ void Reader<N>::write_shapes(int i, int j, Mode<N>& mode) const {
     const Complex mu = root(which[k]).value;
     const auto combine = [&](const Wide<N>& X) {
       ComplexVector<N> x(X.rows());
-      x.real() = X.middleCols(b.first, b.size).lazyProduct(re);
-      x.imag() = X.middleCols(b.first, b.size).lazyProduct(im);
+      for (Eigen::Index i = 0; i < X.rows(); ++i) {
+        double real = 0, imag = 0;
+        for (Eigen::Index l = 0; l < b.size; ++l) {
+          real += X(i, b.first + l) * re[l];
+          imag += X(i, b.first + l) * im[l];
+        }
+        x[i] = Complex(real, imag);
+      }
       return x;
     };
     const ComplexVector<N> Mu = combine(defect_.MU), Cu = combine(defect_.CU),

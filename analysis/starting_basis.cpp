@@ -91,7 +91,7 @@ class Builder {
   ModalBasis<N>& basis_;
   Eigen::Index n_, m_, c_;
   State<N> A_;
-  double A_norm_ = 0;
+  double A_norm_ = 0, D_norm_ = 0, K_norm_ = 0;
   std::conditional_t<N == kDynamic, std::vector<Item>,
                      std::array<Item, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
       items_;
@@ -200,6 +200,8 @@ void Builder<N>::form_state_matrix() {
   }
   A_.bottomRightCorner(c_, c_) = -form_.damping.topLeftCorner(c_, c_);
   A_norm_ = A_.norm();
+  D_norm_ = form_.damping.topLeftCorner(c_, c_).norm();
+  K_norm_ = form_.stiffness.topLeftCorner(c_, c_).norm();
 }
 
 /// Eigenvalues, and their clusters: connected components of "near each other".
@@ -298,7 +300,7 @@ template <int N>
 void Builder<N>::write_single(Complex value) {
   const auto D = form_.damping.topLeftCorner(c_, c_);
   const auto Kp = form_.stiffness.topLeftCorner(c_, c_);
-  const double size = std::norm(value) + modulus(value) * D.norm() + Kp.norm();
+  const double size = std::norm(value) + modulus(value) * D_norm_ + K_norm_;
   const double good = 1e-4 / (kEps * size * static_cast<double>(c_));
   if (value.imag() == 0) {
     State<N> u = State<N>::Ones(c_, 1);
@@ -317,8 +319,11 @@ void Builder<N>::write_single(Complex value) {
   ComplexVector<N> u = ComplexVector<N>::Ones(c_);
   for (int k = 0; k < 3; ++k) {
     ComplexSquare Q(c_, c_);
-    Q.real() = Kp + value.real() * D;
-    Q.imag() = value.imag() * D;
+    for (Eigen::Index j = 0; j < c_; ++j) {
+      for (Eigen::Index i = 0; i < c_; ++i) {
+        Q(i, j) = Complex(Kp(i, j) + value.real() * D(i, j), value.imag() * D(i, j));
+      }
+    }
     Q.diagonal().array() += value * value;
     solve_in_place(Q, u, kEps * size);
     const double growth = u.norm();
