@@ -104,14 +104,15 @@ bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
       continue;
     }
     if (++sweeps > 30) return false;
-    // Shifts: eigenvalues of the trailing 2 x 2 block, or arbitrary ones where progress stalls.
-    double trace = H(high - 1, high - 1) + H(high, high);
-    double determinant =
-        H(high - 1, high - 1) * H(high, high) - H(high - 1, high) * H(high, high - 1);
+    // Shifts: eigenvalues of the trailing block [a b; c d], or, where progress stalls, of
+    // d I + size [0.75 -0.4375; 1 0.75]. Kept as a, d and bc: in a cluster of eigenvalues their
+    // trace and determinant would cancel against entries of H.
+    double a = H(high - 1, high - 1), d = H(high, high);
+    double bc = H(high - 1, high) * H(high, high - 1);
     if (sweeps % 10 == 0) {
       const double size = std::abs(H(high, high - 1)) + std::abs(H(high - 1, high - 2));
-      trace = 1.5 * size;
-      determinant = size * size;
+      a = d = d + 0.75 * size;
+      bc = -0.4375 * size * size;
     }
     // First column of (H - s1)(H - s2), started at the lowest row where two subdiagonal entries are
     // small together.
@@ -119,8 +120,8 @@ bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
     Eigen::Index start = high - 2;
     for (;; --start) {
       const double h = H(start, start);
-      x = h * h + H(start, start + 1) * H(start + 1, start) - trace * h + determinant;
-      y = H(start + 1, start) * (h + H(start + 1, start + 1) - trace);
+      x = (h - a) * (h - d) - bc + H(start, start + 1) * H(start + 1, start);
+      y = H(start + 1, start) * ((h - a) + (H(start + 1, start + 1) - d));
       z = H(start + 1, start) * H(start + 2, start + 1);
       const double size = std::abs(x) + std::abs(y) + std::abs(z);
       if (size != 0) x /= size, y /= size, z /= size;
