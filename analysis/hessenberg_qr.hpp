@@ -68,9 +68,10 @@ inline void eigenvalues_2x2(double a, double b, double c, double d, Complex& fir
 }
 
 /// Eigenvalues of an upper Hessenberg matrix by the implicit double-shift QR iteration of Francis;
-/// `H` is destroyed. Only the active window is touched, since no vectors are wanted. At most
-/// 30 sweeps per eigenvalue; returns false if that is not enough. (Golub and Van Loan, 4th ed.,
-/// Algorithm 7.5.2; exceptional shifts as in EISPACK's hqr, but about 0 instead of H(high, high).)
+/// `H` is destroyed. Only the active window is touched, since no vectors are wanted. At most 40
+/// sweeps per row of H in all, and 160 more (a cluster of nearly defective eigenvalues may need
+/// them all by itself); returns false if that is not enough. (Golub and Van Loan, 4th ed.,
+/// Algorithm 7.5.2.)
 template <typename Matrix>
 bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
   constexpr double kEps = std::numeric_limits<double>::epsilon();
@@ -80,7 +81,8 @@ bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
     for (Eigen::Index i = 0; i <= std::min(j + 1, n - 1); ++i) norm += std::abs(H(i, j));
   }
   Eigen::Index high = n - 1;
-  int sweeps = 0;
+  int sweeps = 0;  // since the last eigenvalue was found
+  Eigen::Index budget = 40 * n + 160;
   while (high >= 0) {
     Eigen::Index low = high;
     while (low > 0) {
@@ -103,7 +105,8 @@ bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
       sweeps = 0;
       continue;
     }
-    if (++sweeps > 30) return false;
+    ++sweeps;
+    if (--budget < 0) return false;
     // Shifts: eigenvalues of the trailing block [a b; c d], or, where progress stalls, of
     // d I + size [0.75 -0.4375; 1 0.75]. Kept as a, d and bc: in a cluster of eigenvalues their
     // trace and determinant would cancel against entries of H.

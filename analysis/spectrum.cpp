@@ -61,6 +61,10 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexc
   const Square<N> L = system.dof() > 0 ? Square<N>(cholesky.matrixL()) : Square<N>(0, 0);
   out.zero_modes = find_zero_modes<N>(system, L);
   const EnergyForm<N> form = to_energy_form<N>(system, out.zero_modes);
+  if (!form.damping.allFinite() || !form.stiffness.allFinite() ||
+      !out.zero_modes.coordinates.allFinite()) {
+    return out.status = Status::kOverflow;
+  }
   damped_ = !system.damping.isZero(0);
   out.symmetric = form.symmetric;
   out.proportional = form.proportional;
@@ -78,10 +82,11 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexc
   for (const Mode<N>& mode : out.modes) {
     if (!std::isfinite(modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]))) {
       out.modes.resize(0);
-      return out.status = Status::kOverflow;
+      return out.status = Status::kNotConverged;
     }
   }
-  const bool proved = std::isfinite(worst_quality(out).bound);
+  const bool proved = std::isfinite(worst_quality(out).bound) &&
+                      out.modes.size() == static_cast<int>(system.dof()) - out.zero_modes.count;
   return out.status = proved ? Status::kOk : Status::kUncertified;
 }
 
@@ -103,11 +108,18 @@ bool SpectrumSolver<N>::good(const Spectrum<N>& spectrum) const noexcept {
 template <int N>
 void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out) noexcept {
   Quality previous{kInfinity, kInfinity};
+  bool restored = false;
   for (int evaluation = 1;; ++evaluation) {
     evaluate_defect<N>(system, out.symmetric, out.extended, out.basis, defect_);
     certify<N>(defect_, out.basis, certificate_);
     read_modes<N>(system, defect_, certificate_, options_.soft_frequency, out);
     const Quality quality = worst_quality(out);
+    if (good(out) || restored || evaluation == kMaxEvaluations) return;
+    if (quality.bound > 2 * previous.bound) {  // the step did harm: back, and be done
+      out.basis = before_step_;
+      restored = true;
+      continue;
+    }
     const bool better = quality.bound < 0.5 * previous.bound ||
                         quality.backward_error < 0.5 * previous.backward_error ||
                         quality.bound == kInfinity;
@@ -115,8 +127,9 @@ void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out) noexce
     const bool noise = !out.extended && (quality.bound > kHopeless ||
                                          (quality.backward_error <= kTargetBackwardError &&
                                           defect_.F.norm() <= defect_.F_error.norm()));
-    if (good(out) || !better || noise || evaluation == kMaxEvaluations) return;
+    if (!better || noise) return;
     previous = quality;
+    before_step_ = out.basis;
     newton_step<N>(defect_, out.basis);
   }
 }
@@ -128,6 +141,7 @@ Spectrum<> analyze(const System<>& system, const SpectrumOptions& options) {
   SpectrumSolver<> solver(options);
   Spectrum<> spectrum;
   const Status status = solver.solve(symmetrized, spectrum);
+  if (status == Status::kOverflow) throw InvalidSystem("system", to_text(status));
   if (status != Status::kOk && status != Status::kUncertified) {
     throw std::runtime_error(to_text(status));
   }

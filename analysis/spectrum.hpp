@@ -103,7 +103,8 @@ struct Spectrum {
 
   ZeroModes<N> zero_modes;
   ModeList<N> modes;  ///< n - r modes by falling natural frequency, or sqrt|l1 l2| if that is NaN
-  /// Eigenvalues -a of the r zero modes' velocities, 1/s: zero if nothing damps them
+  /// Eigenvalues -a of the r zero modes' velocities, 1/s: zero if nothing damps them. Computed to
+  /// about the precision of the modes, but without a proved bound.
   Vector<N> zero_mode_rates;
   ModalBasis<N> basis;
 };
@@ -139,6 +140,7 @@ class SpectrumSolver {
   bool damped_ = true;
   Defect<N> defect_;
   Certificate<N> certificate_;
+  ModalBasis<N> before_step_;
 };
 
 /// The one obvious call: validates the system (throws InvalidSystem), solves it, and returns the

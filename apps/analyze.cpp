@@ -40,7 +40,11 @@ std::vector<Report> make_reports(const SystemFile& file, const Options& options)
   spectrum.residual = options.residual;
   std::vector<Report> reports;
   for (std::size_t i = 0; i < systems.size(); ++i) {
-    reports.push_back(make_report(file.entries[i], systems[i], spectrum, options.pivot));
+    try {
+      reports.push_back(make_report(file.entries[i], systems[i], spectrum, options.pivot));
+    } catch (const analysis::InvalidSystem& error) {
+      throw file.entries[i].error(error);
+    }
   }
   return reports;
 }

@@ -1,0 +1,59 @@
+// Many modes near critical damping at one frequency: how impedance controllers are often tuned, and
+// the hardest clusters of eigenvalues there are, since each mode is nearly defective by itself.
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <random>
+
+namespace dashpot::analysis {
+namespace {
+
+Eigen::MatrixXd symmetric_noise(Eigen::Index n, std::mt19937_64& generator) {
+  std::normal_distribution<double> normal;
+  const Eigen::MatrixXd A = Eigen::MatrixXd::NullaryExpr(n, n, [&] { return normal(generator); });
+  return 0.5 * (A + A.transpose());
+}
+
+TEST(NearCriticalCluster, IsSolvedHoweverWeaklyItsModesAreCoupled) {
+  constexpr unsigned kSeed = 7001;
+  SCOPED_TRACE("seed " + std::to_string(kSeed));
+  std::mt19937_64 generator(kSeed);
+  for (const double coupling : {1e-12, 1e-10, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2}) {
+    for (Eigen::Index n = 2; n <= 7; ++n) {
+      for (int repeat = 0; repeat < 20; ++repeat) {
+        System<> system(n);
+        system.damping = 2 * system.mass + coupling * symmetric_noise(n, generator);
+        system.stiffness = system.mass + coupling * symmetric_noise(n, generator);
+        const Spectrum<> spectrum = analyze(system);
+        SCOPED_TRACE("coupling " + std::to_string(coupling) + ", n " + std::to_string(n));
+        ASSERT_EQ(spectrum.modes.size(), n);
+        for (const Mode<>& mode : spectrum.modes) {
+          // All eigenvalues lie within the root of the coupling of -1 (times a modest factor).
+          for (const Complex& value : mode.eigenvalues) {
+            EXPECT_LT(modulus(value + 1.0), 10 * std::sqrt(coupling) + 1e-5);
+          }
+          EXPECT_LT(mode.backward_error, 1e-13);
+        }
+      }
+    }
+  }
+}
+
+TEST(NearCriticalCluster, OfTwoModesHasTheEigenvaluesOfItsParts) {
+  // Modes (1, 1) and (1, -1) decouple: l^2 + (2 +- e) l + (1 + d) with a common stiffness.
+  System<> system(2);
+  system.damping << 2, 1e-6, 1e-6, 2;
+  system.stiffness << 1, 0, 0, 1;
+  const Spectrum<> spectrum = analyze(system);
+  ASSERT_EQ(spectrum.modes.size(), 2);
+  for (const Mode<>& mode : spectrum.modes) {
+    EXPECT_NEAR(mode.natural_frequency, 1, 1e-13);
+    EXPECT_NEAR(std::abs(mode.damping_ratio - 1), 0.5e-6, 1e-13);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
