@@ -298,16 +298,20 @@ void Reader<N>::write_numbers(int i, int j, Mode<N>& mode) const {
             : kInfinity;
     if (!(mode.damping_ratio_bound >= 0)) mode.damping_ratio_bound = kInfinity;
   }
+  // Without a bound the kind goes by the numbers as they are: nothing that grows is called fine.
+  const bool proved = std::isfinite(mode.error_bound);
+  const auto error = [proved](double bound) { return proved ? bound : 0; };
   const double growth = std::max(mode.eigenvalues[0].real(), mode.eigenvalues[1].real());
-  if (growth > mode.error_bound || v.product < -v.product_error) {
+  if (growth > error(mode.error_bound) || v.sum > error(v.sum_error) ||
+      v.product < -error(v.product_error)) {
     mode.kind = ModeKind::kUnstable;
-  } else if (mode.natural_frequency < soft_frequency_) {
+  } else if (!(mode.natural_frequency >= soft_frequency_)) {
     mode.kind = ModeKind::kSoft;
-  } else if (std::abs(v.discriminant) <= v.discriminant_error) {
+  } else if (std::abs(v.discriminant) <= error(v.discriminant_error)) {
     mode.kind = ModeKind::kCritical;
   } else if (real) {
     mode.kind = ModeKind::kOverdamped;
-  } else if (0.5 * std::abs(v.sum) <= 0.5 * v.sum_error) {
+  } else if (std::abs(v.sum) <= error(v.sum_error)) {
     mode.kind = ModeKind::kUndamped;
   } else {
     mode.kind = ModeKind::kUnderdamped;

@@ -8,13 +8,15 @@
 
 namespace dashpot::analysis {
 
+/// Decided by the proved bounds; by the numbers as they are where no bound could be proved.
 enum class ModeKind {
   kUnderdamped,  ///< a complex pair, 0 < zeta < 1
   kCritical,     ///< a double real eigenvalue, as far as the error bound can tell
   kOverdamped,   ///< two real eigenvalues
   kUndamped,     ///< a purely imaginary pair, as far as the error bound can tell
   kUnstable,     ///< an eigenvalue with positive real part, beyond its error bound
-  kSoft,         ///< below SpectrumOptions::soft_frequency: its damping ratio means nothing
+  kSoft,         ///< below SpectrumOptions::soft_frequency, or no frequency because an eigenvalue
+                 ///< cannot be told from zero: its damping ratio means nothing
 };
 
 /// "underdamped", "critical", ...

@@ -1,0 +1,59 @@
+// Systems that once got a dangerous answer: a growing motion reported as a harmless one, numbers
+// with the status kOk that mean nothing.
+#include <dashpot/analysis/spectrum.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+
+Spectrum<> solve(const MatrixXd& mass, const MatrixXd& damping, const MatrixXd& stiffness) {
+  System<> system(mass.rows());
+  system.mass = mass;
+  system.damping = damping;
+  system.stiffness = stiffness;
+  Spectrum<> spectrum;
+  SpectrumSolver<>().solve(system, spectrum);
+  return spectrum;
+}
+
+// Eigenvalues 0.33 +- 0.56 i, of a defective system for which no bound is found.
+TEST(CertificateAttack, GrowingModesWithoutBoundsAreUnstable) {
+  for (int seed = 0; seed < 200; ++seed) {
+    // A chain of equal modes, each driven by the next: a Jordan block of size 2n.
+    const int n = 3 + seed % 3;
+    MatrixXd stiffness = MatrixXd::Identity(n, n);
+    MatrixXd damping = -0.01 * (1 + seed) * MatrixXd::Identity(n, n);
+    for (int i = 0; i + 1 < n; ++i) stiffness(i, i + 1) = 1;
+    const Spectrum<> spectrum = solve(MatrixXd::Identity(n, n), damping, stiffness);
+    for (const Mode<>& mode : spectrum.modes) {
+      if (std::isfinite(mode.error_bound)) continue;
+      EXPECT_EQ(mode.kind, ModeKind::kUnstable) << mode.eigenvalues[0] << ", seed " << seed;
+    }
+  }
+}
+
+// A pair (-945, 2.7e-11 +- 1.2e-9) has no frequency; it was called overdamped.
+TEST(CertificateAttack, ModesWithoutAFrequencyAreSoft) {
+  int seen = 0;
+  for (int i = 0; i < 200; ++i) {
+    MatrixXd mass(2, 2), damping(2, 2), stiffness(2, 2);
+    mass << 1, 0.3, 0.3, 2;
+    damping << 1000 + i, 7, 3, 900;
+    stiffness << 1, 1, 1, 1 + (i % 2 == 0 ? -1 : 1) * 1e-15 * i;
+    const Spectrum<> spectrum = solve(mass, damping, stiffness);
+    for (const Mode<>& mode : spectrum.modes) {
+      if (!std::isnan(mode.natural_frequency)) continue;
+      ++seen;
+      EXPECT_TRUE(mode.kind == ModeKind::kSoft || mode.kind == ModeKind::kUnstable) << i;
+    }
+  }
+  RecordProperty("modes_without_a_frequency", seen);
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
