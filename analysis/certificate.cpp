@@ -64,8 +64,9 @@ double group_radius(const BlockTable<N>& table, const Certificate<N>& certificat
       }
       right += table.norm2(i, j);
       left += table.norm2(j, i);
-      if (table.separation(i, j) < separation) {
-        separation = table.separation(i, j);
+      const double apart = std::max(0.0, table.separation(i, j));  // 0 if not a number
+      if (apart < separation || merge < 0) {
+        separation = apart;
         merge = j;
       }
     }
@@ -127,6 +128,7 @@ void certify(const Defect<N>& defect, ModalBasis<N>& basis, Certificate<N>& cert
         }
         break;
       }
+      if (merge < 0) break;  // not a number: nothing is proved
       const int absorbed = certificate.group[merge];
       for (int k = 0; k < count; ++k) {
         if (certificate.group[k] == absorbed) certificate.group[k] = i;

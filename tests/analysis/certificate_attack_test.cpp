@@ -55,5 +55,46 @@ TEST(CertificateAttack, ModesWithoutAFrequencyAreSoft) {
   RecordProperty("modes_without_a_frequency", seen);
 }
 
+// q'' = [0.1 -1; 1 0.1] q' grows as exp(0.1 t): it was reported as two zero modes at rest.
+TEST(CertificateAttack, ComplexPairsOfZeroModesAreListed) {
+  MatrixXd damping(2, 2);
+  damping << -0.1, 1, -1, -0.1;
+  const Spectrum<> spectrum = solve(MatrixXd::Identity(2, 2), damping, MatrixXd::Zero(2, 2));
+  EXPECT_EQ(spectrum.status, Status::kOk);
+  EXPECT_EQ(spectrum.zero_modes.count, 2);
+  ASSERT_EQ(spectrum.modes.size(), 1);
+  EXPECT_EQ(spectrum.modes[0].kind, ModeKind::kUnstable);
+  EXPECT_LE(std::abs(spectrum.modes[0].eigenvalues[0] - Complex(0.1, 1)),
+            spectrum.modes[0].error_bound);
+  for (const double rate : spectrum.zero_mode_rates) EXPECT_TRUE(std::isnan(rate));
+}
+
+// Of a fast pair of zero modes and a slow growing mode, the mode was the one left out.
+TEST(CertificateAttack, ComplexPairsOfZeroModesHideNoMode) {
+  MatrixXd damping = MatrixXd::Zero(3, 3), stiffness = MatrixXd::Zero(3, 3);
+  damping(0, 1) = 100;
+  damping(1, 0) = -100;
+  damping(2, 2) = -0.2;
+  stiffness(2, 2) = 4;
+  const Spectrum<> spectrum = solve(MatrixXd::Identity(3, 3), damping, stiffness);
+  EXPECT_EQ(spectrum.status, Status::kOk);
+  ASSERT_EQ(spectrum.modes.size(), 2);
+  EXPECT_NEAR(spectrum.modes[0].natural_frequency, 100, 1e-10);
+  EXPECT_EQ(spectrum.modes[1].kind, ModeKind::kUnstable);
+  EXPECT_NEAR(spectrum.modes[1].damping_ratio, -0.05, 1e-12);
+}
+
+// M^-1 K overflows; a matrix that is not symmetric got two zero modes and the status kOk.
+TEST(CertificateAttack, OverflowIsNotASystemOfZeroModes) {
+  for (const double other : {2e299, 3e299}) {
+    MatrixXd stiffness(2, 2);
+    stiffness << 1e300, 2e299, other, 1e300;
+    const MatrixXd mass = 1e-300 * MatrixXd::Identity(2, 2);
+    const Spectrum<> spectrum = solve(mass, MatrixXd::Zero(2, 2), stiffness);
+    EXPECT_EQ(spectrum.status, Status::kOverflow) << to_text(spectrum.status);
+    EXPECT_TRUE(spectrum.modes.empty());
+  }
+}
+
 }  // namespace
 }  // namespace dashpot::analysis
