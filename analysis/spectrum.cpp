@@ -59,6 +59,9 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexc
   }
   const Square<N> L = system.dof() > 0 ? Square<N>(cholesky.matrixL()) : Square<N>(0, 0);
   out.zero_modes = find_zero_modes<N>(system, L);
+  if (!std::isfinite(out.zero_modes.floor) || !out.zero_modes.coordinates.allFinite()) {
+    return out.status = Status::kOverflow;
+  }
   const EnergyForm<N> form = to_energy_form<N>(system, out.zero_modes);
   damped_ = !system.damping.isZero(0);
   out.symmetric = form.symmetric;
