@@ -182,7 +182,11 @@ void Reader<N>::take_zero_rates() {
           (negative ? 1 : 0);
       if (share > best) best = share, chosen = i;
     }
-    if (chosen < 0) return;
+    if (chosen < 0) {
+      // Left are complex pairs (of coefficients that are not symmetric): they count as modes.
+      spectrum_.zero_mode_rates.tail(r - found).setConstant(kNan);
+      return;
+    }
     root(chosen).used = true;
     spectrum_.zero_mode_rates[found] = root(chosen).value.real();
   }
@@ -409,7 +413,9 @@ void Reader<N>::write_shapes(int i, int j, Mode<N>& mode) const {
     const double u_norm = mode.shapes[k].norm(), y_norm = mode.left_shapes[k].norm();
     const double residual = (mu * mu * Mu + mu * Cu + Ku).norm();
     const double slope = std::abs((mode.left_shapes[k].transpose() * (2.0 * mu * Mu + Cu)).value());
-    mode.backward_error = std::max(mode.backward_error, residual / (size * u_norm));
+    const double backward_error = residual / (size * u_norm);
+    mode.backward_error =
+        std::max(mode.backward_error, backward_error >= 0 ? backward_error : kInfinity);
     mode.condition = std::max(mode.condition, y_norm * u_norm * size / (modulus(mu) * slope));
   }
 }
@@ -418,8 +424,7 @@ template <int N>
 void Reader<N>::write_modes() {
   int count = 0;
   for (int i = 0; i < root_count_; ++i) count += !root(i).used && root(i).partner > i ? 1 : 0;
-  const int m = static_cast<int>(system_.dof()) - spectrum_.zero_modes.count;
-  spectrum_.modes.resize(std::min(count, m));
+  spectrum_.modes.resize(count);  // two roots of 2n each: n at most
   // Order of falling natural frequency; those without one first (they grow fastest).
   Eigen::Matrix<int, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1> order(count);
   StateVector<N> key(root_count_);

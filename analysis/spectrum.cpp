@@ -83,7 +83,12 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexc
       return out.status = Status::kOverflow;
     }
   }
-  const bool proved = std::isfinite(worst_quality(out).bound);
+  // All 2n eigenvalues: r zeros, the rates that are numbers, and two a mode. Real eigenvalues of a
+  // larger block may be left without a partner.
+  const Eigen::Index unrated = (out.zero_mode_rates.array() != out.zero_mode_rates.array()).count();
+  const bool complete =
+      2 * out.modes.size() == 2 * (system.dof() - out.zero_modes.count) + unrated;
+  const bool proved = complete && std::isfinite(worst_quality(out).bound);
   return out.status = proved ? Status::kOk : Status::kUncertified;
 }
 

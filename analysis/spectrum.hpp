@@ -101,8 +101,11 @@ struct Spectrum {
                         ///< mass-normalised coordinates (Frobenius)
 
   ZeroModes<N> zero_modes;
-  ModeList<N> modes;  ///< n - r modes by falling natural frequency
-  /// Eigenvalues -a of the r zero modes' velocities, 1/s: zero if nothing damps them
+  /// n - r modes by falling natural frequency; more where zero modes' velocities form complex pairs
+  ModeList<N> modes;
+  /// Eigenvalues -a of the r zero modes' velocities, 1/s: zero if nothing damps them, positive if
+  /// they grow (no mode says so then), NaN if they are not real and so are among the modes. They
+  /// come without a proved bound.
   Vector<N> zero_mode_rates;
   ModalBasis<N> basis;
 };
