@@ -19,7 +19,7 @@ struct Root {
   int block = 0;
   int partner = -1;          ///< index of the other root of its mode
   double bound = kInfinity;  ///< |computed - true|, 1/s
-  bool used = false;
+  bool used = false;         ///< of a zero mode
 };
 
 /// Bounds on the sum and product of a mode's two eigenvalues, and on their discriminant
@@ -96,7 +96,6 @@ void Reader<N>::list_roots() {
   root_count_ = 0;
   for (int k = 0; k < basis_.blocks.size(); ++k) {
     const Block& b = basis_.blocks[k];
-    if (b.zero_mode) continue;
     const State<N> Lambda = basis_.Lambda.block(b.first, b.first, b.size, b.size);
     Eigen::Matrix<Complex, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1> values(b.size);
     if (b.size == 1) {
@@ -114,6 +113,7 @@ void Reader<N>::list_roots() {
       r = Root{};
       r.value = values[e];
       r.block = k;
+      r.used = b.zero_mode;  // of no mode, but its disc may hold the eigenvalue of another
       r.bound = disc_radius(values.data(), b.size, e, Lambda.norm(), radius);
     }
   }
