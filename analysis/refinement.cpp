@@ -290,6 +290,23 @@ void bound_residual(const System<N>& system, bool extended, const ModalBasis<N>&
   defect.R_size = gamma * defect.R_size + (dn + 2 * widest + 4) * kUnit * defect.R.cwiseAbs();
 }
 
+/// Whether no product that matters can underflow or overflow, extended ones included: the bounds
+/// count rounding errors only. Widths in powers of ten are far beyond any mechanism.
+template <int N>
+bool in_range(const System<N>& system, const ModalBasis<N>& basis) {
+  const auto inside = [](double x, double width) { return 1 / width < x && x < width; };
+  for (Eigen::Index i = 0; i < system.dof(); ++i) {
+    if (!inside(system.mass(i, i), 1e120)) return false;
+  }
+  for (const Block& b : basis.blocks) {
+    if (b.zero_mode) continue;
+    const double rate =
+        basis.Lambda.block(b.first, b.first, b.size, b.size).cwiseAbs().maxCoeff();
+    if (rate != 0 && !inside(rate, 1e60)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 template <int N>
@@ -326,8 +343,9 @@ void evaluate_defect(const System<N>& system, bool symmetric, bool extended, Mod
   }
   multiply(defect.YT, defect.R, defect.W);
   defect.F = -defect.W;
-  if (!(contraction < kNearlyOrthogonal)) {
-    // Far from orthogonal, the basis needs all of the Gram matrix, and proves nothing.
+  if (!(contraction < kNearlyOrthogonal) || !in_range(system, basis)) {
+    // Far from orthogonal, the basis needs all of the Gram matrix, and proves nothing. Nor do
+    // numbers whose products leave the range of doubles.
     State<N> gram = defect.gram;
     solve_in_place(gram, defect.F, std::numeric_limits<double>::min());
     defect.F_error.setConstant(std::numeric_limits<double>::infinity());

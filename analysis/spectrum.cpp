@@ -77,6 +77,10 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexc
     out.extended = true;
     refine(system, out);
   }
+  if (!out.basis.Lambda.allFinite() || !out.basis.U.allFinite()) {
+    out.modes.resize(0);
+    return out.status = Status::kOverflow;
+  }
   for (const Mode<N>& mode : out.modes) {
     if (!std::isfinite(modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]))) {
       out.modes.resize(0);

@@ -47,7 +47,8 @@ struct Mode {
   /// Condition number of the worse eigenvalue in the same measure (Tisseur 2000); infinite at
   /// critical damping
   double condition = 0;
-  /// Proved bounds. |computed - true| of either eigenvalue, 1/s (of the two nearest each other):
+  /// Proved bounds; infinite if frequencies leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120,
+  /// where underflow is not counted. |computed - true| of either eigenvalue, 1/s (of the two nearest each other):
   double error_bound = std::numeric_limits<double>::infinity();
   double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
   double damping_ratio_bound = std::numeric_limits<double>::infinity();

@@ -96,5 +96,21 @@ TEST(CertificateAttack, OverflowIsNotASystemOfZeroModes) {
   }
 }
 
+// Residuals of such numbers underflow to zero: errors of half an eigenvalue had bounds of 1e-13.
+TEST(CertificateAttack, UnderflowIsNotAProof) {
+  MatrixXd mass(3, 3), stiffness(3, 3);
+  mass << 2, 0.5, 0.1, 0.5, 1, 0.3, 0.1, 0.3, 3;
+  stiffness << 5, 1, 2, 1, 4, -1, 2, -1, 6;
+  for (const double scale : {1e-10, 1e-40, 1e-70, 1e-100, 1e-130, 1e-145, 1e70, 1e100}) {
+    const Spectrum<> spectrum =
+        solve(mass / scale, MatrixXd::Zero(3, 3), stiffness * scale);
+    const bool within = scale > 1e-60 && scale < 1e60;
+    EXPECT_EQ(spectrum.status == Status::kOk, within) << scale << ": " << to_text(spectrum.status);
+    for (const Mode<>& mode : spectrum.modes) {
+      EXPECT_EQ(std::isfinite(mode.error_bound), within) << scale;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace dashpot::analysis
