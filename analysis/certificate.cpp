@@ -68,8 +68,9 @@ double group_radius(const BlockTable<N>& table, const Certificate<N>& certificat
       }
       right += table.norm2(i, j);
       left += table.norm2(j, i);
-      if (table.separation(i, j) < separation) {
-        separation = table.separation(i, j);
+      const double apart = std::max(0.0, table.separation(i, j));  // 0 if not a number
+      if (apart < separation || merge < 0) {
+        separation = apart;
         merge = j;
       }
     }
@@ -95,7 +96,10 @@ void certify(const Defect<N>& defect, ModalBasis<N>& basis, Certificate<N>& cert
   if (!defect.F.allFinite()) return;
   const bool provable = defect.F_error.allFinite();
   BlockTable<N> table;
-  if (provable) fill_table(defect, basis, table);
+  if (provable) {
+    fill_table(defect, basis, table);
+    table.separation *= 1 - 1e-10;  // its own rounding errors
+  }
   for (const Block& b : basis.blocks) {
     if (b.zero_mode) continue;
     auto block = basis.Lambda.block(b.first, b.first, b.size, b.size);
@@ -110,8 +114,8 @@ void certify(const Defect<N>& defect, ModalBasis<N>& basis, Certificate<N>& cert
     table.norm2(i, i) = (1 + 1e-10) * table.norm2(i, i) + kUnit * block.norm();
     for (int j = 0; j < count; ++j) {
       if (j == i) continue;
-      table.separation(i, j) = (1 - 1e-10) * table.separation(i, j) - moved;
-      table.separation(j, i) -= moved;
+      table.separation(i, j) -= (1 + 1e-10) * moved;
+      table.separation(j, i) -= (1 + 1e-10) * moved;
     }
   }
   double everything = 0, largest_diagonal = 0;
@@ -131,6 +135,7 @@ void certify(const Defect<N>& defect, ModalBasis<N>& basis, Certificate<N>& cert
         }
         break;
       }
+      if (merge < 0) break;  // not a number: nothing is proved
       const int absorbed = certificate.group[merge];
       for (int k = 0; k < count; ++k) {
         if (certificate.group[k] == absorbed) certificate.group[k] = i;

@@ -19,7 +19,7 @@ struct Root {
   int block = 0;
   int partner = -1;          ///< index of the other root of its mode
   double bound = kInfinity;  ///< |computed - true|, 1/s
-  bool used = false;
+  bool used = false;         ///< of a zero mode
 };
 
 /// Bounds on the sum and product of a mode's two eigenvalues, and on their discriminant
@@ -96,7 +96,6 @@ void Reader<N>::list_roots() {
   root_count_ = 0;
   for (int k = 0; k < basis_.blocks.size(); ++k) {
     const Block& b = basis_.blocks[k];
-    if (b.zero_mode) continue;
     const State<N> Lambda = basis_.Lambda.block(b.first, b.first, b.size, b.size);
     Eigen::Matrix<Complex, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1> values(b.size);
     if (b.size == 1) {
@@ -108,12 +107,15 @@ void Reader<N>::list_roots() {
       reduce_to_hessenberg(H);
       if (!hessenberg_eigenvalues(H, values.data())) values.setConstant(kNan);
     }
-    const double radius = certificate_.radius[k] + 8 * b.size * kUnit * Lambda.norm();
+    // Backward error of the block's own QR iteration, generously.
+    const double radius =
+        certificate_.radius[k] + (b.size > 2 ? 64 * b.size : 8) * b.size * kUnit * Lambda.norm();
     for (int e = 0; e < b.size; ++e) {
       Root& r = root(root_count_++);
       r = Root{};
       r.value = values[e];
       r.block = k;
+      r.used = b.zero_mode;  // of no mode, but its disc may hold the eigenvalue of another
       r.bound = disc_radius(values.data(), b.size, e, Lambda.norm(), radius);
     }
   }
@@ -182,7 +184,11 @@ void Reader<N>::take_zero_rates() {
           (negative ? 1 : 0);
       if (share > best) best = share, chosen = i;
     }
-    if (chosen < 0) return;
+    if (chosen < 0) {
+      // Left are complex pairs (of coefficients that are not symmetric): they count as modes.
+      spectrum_.zero_mode_rates.tail(r - found).setConstant(kNan);
+      return;
+    }
     root(chosen).used = true;
     spectrum_.zero_mode_rates[found] = root(chosen).value.real();
   }
@@ -297,16 +303,20 @@ void Reader<N>::write_numbers(int i, int j, Mode<N>& mode) const {
             : kInfinity;
     if (!(mode.damping_ratio_bound >= 0)) mode.damping_ratio_bound = kInfinity;
   }
+  // Without a bound the kind goes by the numbers as they are: nothing that grows is called fine.
+  const bool proved = std::isfinite(mode.error_bound);
+  const auto error = [proved](double bound) { return proved ? bound : 0; };
   const double growth = std::max(mode.eigenvalues[0].real(), mode.eigenvalues[1].real());
-  if (growth > mode.error_bound || v.product < -v.product_error) {
+  if (growth > error(mode.error_bound) || v.sum > error(v.sum_error) ||
+      v.product < -error(v.product_error)) {
     mode.kind = ModeKind::kUnstable;
-  } else if (mode.natural_frequency < soft_frequency_) {
+  } else if (!(mode.natural_frequency >= soft_frequency_)) {
     mode.kind = ModeKind::kSoft;
-  } else if (std::abs(v.discriminant) <= v.discriminant_error) {
+  } else if (std::abs(v.discriminant) <= error(v.discriminant_error)) {
     mode.kind = ModeKind::kCritical;
   } else if (real) {
     mode.kind = ModeKind::kOverdamped;
-  } else if (std::abs(v.sum) <= v.sum_error) {
+  } else if (std::abs(v.sum) <= error(v.sum_error)) {
     mode.kind = ModeKind::kUndamped;
   } else {
     mode.kind = ModeKind::kUnderdamped;
@@ -410,7 +420,9 @@ void Reader<N>::write_shapes(int i, int j, Mode<N>& mode) const {
     const double u_norm = mode.shapes[k].norm(), y_norm = mode.left_shapes[k].norm();
     const double residual = (mu * mu * Mu + mu * Cu + Ku).norm();
     const double slope = std::abs((mode.left_shapes[k].transpose() * (2.0 * mu * Mu + Cu)).value());
-    mode.backward_error = std::max(mode.backward_error, residual / (size * u_norm));
+    const double backward_error = residual / (size * u_norm);
+    mode.backward_error =
+        std::max(mode.backward_error, backward_error >= 0 ? backward_error : kInfinity);
     mode.condition = std::max(mode.condition, y_norm * u_norm * size / (modulus(mu) * slope));
   }
 }
@@ -419,8 +431,7 @@ template <int N>
 void Reader<N>::write_modes() {
   int count = 0;
   for (int i = 0; i < root_count_; ++i) count += !root(i).used && root(i).partner > i ? 1 : 0;
-  const int m = static_cast<int>(system_.dof()) - spectrum_.zero_modes.count;
-  spectrum_.modes.resize(std::min(count, m));
+  spectrum_.modes.resize(count);  // two roots of 2n each: n at most
   // By insertion, in the order of falling sqrt|l1 l2|: a mode without natural frequency has this.
   Eigen::Matrix<int, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1> order(count);
   StateVector<N> key(root_count_);

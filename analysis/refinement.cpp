@@ -218,6 +218,8 @@ void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& ba
     y[j] = s.cwiseProduct(basis.Y.col(j)).norm();
     yg[j] = s.cwiseProduct(defect.YG.col(j)).norm();
   }
+  int widest = 1;
+  for (const Block& b : basis.blocks) widest = std::max(widest, b.size);
   const auto dn = static_cast<double>(n);
   const double terms = (2 * dn + 16) * dn * kUnit;
   const double gamma = extended ? 8 * terms * kUnit : terms;
@@ -227,8 +229,8 @@ void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& ba
   error.resize(states, states);
   for (Eigen::Index j = 0; j < states; ++j) {
     for (Eigen::Index i = 0; i < states; ++i) {
-      error(i, j) =
-          gamma * (y[i] * (c * u[j] + v[j]) + yg[i] * u[j]) + 8 * kUnit * std::abs(E(i, j));
+      error(i, j) = gamma * (y[i] * (c * u[j] + v[j]) + yg[i] * u[j]) +
+                    (8 + 2 * widest) * kUnit * std::abs(E(i, j));
     }
   }
   const State<N> size = basis.weight.cwiseAbs();
@@ -290,6 +292,22 @@ void bound_residual(const System<N>& system, bool extended, const ModalBasis<N>&
   defect.R_size = gamma * defect.R_size + (dn + 2 * widest + 4) * kUnit * defect.R.cwiseAbs();
 }
 
+/// Whether no product that matters can underflow or overflow, extended ones included: the bounds
+/// count rounding errors only. Widths in powers of ten are far beyond any mechanism.
+template <int N>
+bool in_range(const System<N>& system, const ModalBasis<N>& basis) {
+  const auto inside = [](double x, double width) { return 1 / width < x && x < width; };
+  for (Eigen::Index i = 0; i < system.dof(); ++i) {
+    if (!inside(system.mass(i, i), 1e120)) return false;
+  }
+  for (const Block& b : basis.blocks) {
+    if (b.zero_mode) continue;
+    const double rate = basis.Lambda.block(b.first, b.first, b.size, b.size).cwiseAbs().maxCoeff();
+    if (rate != 0 && !inside(rate, 1e60)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 template <int N>
@@ -326,8 +344,9 @@ void evaluate_defect(const System<N>& system, bool symmetric, bool extended, Mod
   }
   multiply(defect.YT, defect.R, defect.W);
   defect.F = -defect.W;
-  if (!(contraction < kNearlyOrthogonal)) {
-    // Far from orthogonal, the basis needs all of the Gram matrix, and proves nothing.
+  if (!(contraction < kNearlyOrthogonal) || !in_range(system, basis)) {
+    // Far from orthogonal, the basis needs all of the Gram matrix, and proves nothing. Nor do
+    // numbers whose products leave the range of doubles.
     State<N> gram = defect.gram;
     solve_in_place(gram, defect.F, std::numeric_limits<double>::min());
     defect.F_error.setConstant(std::numeric_limits<double>::infinity());
@@ -388,7 +407,8 @@ double solve_sylvester(const Eigen::Ref<const State<N>>& A, const Eigen::Ref<con
     State<N> inverse = State<N>::Identity(k, k);
     solve_in_place(shifted, inverse, std::numeric_limits<double>::min());
     X = inverse * C;
-    const double separation = 1 / inverse.norm();
+    const double rounding = static_cast<double>(k * k) * kUnit * (A.norm() + std::abs(B(0, 0)));
+    const double separation = 1 / inverse.norm() - rounding;
     if (!(separation > 0) || !X.allFinite()) X.setZero(k, l);
     return separation > 0 ? separation : 0;
   }
@@ -402,8 +422,10 @@ double solve_sylvester(const Eigen::Ref<const State<N>>& A, const Eigen::Ref<con
       map.block(j * k, i * k, k, k).diagonal().array() -= B(i, j);
     }
   }
+  const double map_norm = map.norm();
   solve_in_place(map, inverse, std::numeric_limits<double>::min());
-  const double separation = 1 / inverse.norm();
+  const double rounding = static_cast<double>(k * l * k * l) * kUnit * map_norm;
+  const double separation = 1 / inverse.norm() - rounding;
   if (!(separation > 0)) return 0;
   const StateVector<N> c = Eigen::Map<const StateVector<N>>(C.data(), k * l);
   const StateVector<N> x = inverse * c;

@@ -10,7 +10,8 @@ namespace dashpot::analysis {
 template <int N = kDynamic>
 struct Defect {
   State<N> F;          ///< 2n x 2n, 1/s
-  State<N> F_error;    ///< 2n x 2n, 1/s; infinite if the basis is too ill conditioned to say
+  State<N> F_error;    ///< 2n x 2n, 1/s; infinite if the basis is too ill conditioned to say, or if
+                       ///< frequencies leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120
   Wide<N> MU, CU, KU;  ///< M U, C U, K U: n x 2n
 
   // Workspace

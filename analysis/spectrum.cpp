@@ -60,9 +60,11 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexc
   }
   const Square<N> L = system.dof() > 0 ? Square<N>(cholesky.matrixL()) : Square<N>(0, 0);
   out.zero_modes = find_zero_modes<N>(system, L);
+  if (!std::isfinite(out.zero_modes.floor) || !out.zero_modes.coordinates.allFinite()) {
+    return out.status = Status::kOverflow;
+  }
   const EnergyForm<N> form = to_energy_form<N>(system, out.zero_modes);
-  if (!form.damping.allFinite() || !form.stiffness.allFinite() ||
-      !out.zero_modes.coordinates.allFinite()) {
+  if (!form.damping.allFinite() || !form.stiffness.allFinite()) {
     return out.status = Status::kOverflow;
   }
   damped_ = !system.damping.isZero(0);
@@ -79,14 +81,21 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexc
     out.extended = true;
     refine(system, out);
   }
+  if (!out.basis.Lambda.allFinite() || !out.basis.U.allFinite()) {
+    out.modes.resize(0);
+    return out.status = Status::kOverflow;
+  }
   for (const Mode<N>& mode : out.modes) {
     if (!std::isfinite(modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]))) {
       out.modes.resize(0);
       return out.status = Status::kNotConverged;
     }
   }
-  const bool proved = std::isfinite(worst_quality(out).bound) &&
-                      out.modes.size() == static_cast<int>(system.dof()) - out.zero_modes.count;
+  // All 2n eigenvalues: r zeros, the rates that are numbers, and two a mode. Real eigenvalues of a
+  // larger block may be left without a partner.
+  const Eigen::Index unrated = (out.zero_mode_rates.array() != out.zero_mode_rates.array()).count();
+  const bool complete = 2 * out.modes.size() == 2 * (system.dof() - out.zero_modes.count) + unrated;
+  const bool proved = complete && std::isfinite(worst_quality(out).bound);
   return out.status = proved ? Status::kOk : Status::kUncertified;
 }
 

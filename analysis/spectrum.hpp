@@ -8,13 +8,15 @@
 
 namespace dashpot::analysis {
 
+/// Decided by the proved bounds; by the numbers as they are where no bound could be proved.
 enum class ModeKind {
   kUnderdamped,  ///< a complex pair, 0 < zeta < 1
   kCritical,     ///< a double real eigenvalue, as far as the error bound can tell
   kOverdamped,   ///< two real eigenvalues
   kUndamped,     ///< a purely imaginary pair, as far as the error bound can tell
   kUnstable,     ///< an eigenvalue with positive real part, beyond its error bound
-  kSoft,         ///< below SpectrumOptions::soft_frequency: its damping ratio means nothing
+  kSoft,         ///< below SpectrumOptions::soft_frequency, or no frequency because an eigenvalue
+                 ///< cannot be told from zero: its damping ratio means nothing
 };
 
 /// "underdamped", "critical", ...
@@ -45,8 +47,9 @@ struct Mode {
   /// Condition number of the worse eigenvalue in the same measure (Tisseur 2000); infinite at
   /// critical damping
   double condition = 0;
-  /// Proved bounds of |computed - true|; infinite if none could be proved. Of either eigenvalue,
-  /// 1/s (of the two nearest each other):
+  /// Proved bounds of |computed - true|; infinite if none could be proved, and where frequencies
+  /// leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120, because underflow is not counted there.
+  /// Of either eigenvalue, 1/s (of the two nearest each other):
   double error_bound = std::numeric_limits<double>::infinity();
   double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
   double damping_ratio_bound = std::numeric_limits<double>::infinity();
@@ -102,9 +105,12 @@ struct Spectrum {
                         ///< mass-normalised coordinates (Frobenius)
 
   ZeroModes<N> zero_modes;
-  ModeList<N> modes;  ///< n - r modes by falling natural frequency, or sqrt|l1 l2| if that is NaN
-  /// Eigenvalues -a of the r zero modes' velocities, 1/s: zero if nothing damps them. Computed to
-  /// about the precision of the modes, but without a proved bound.
+  /// n - r modes by falling natural frequency, or sqrt|l1 l2| where that is NaN; more than n - r
+  /// where zero modes' velocities form complex pairs
+  ModeList<N> modes;
+  /// Eigenvalues -a of the r zero modes' velocities, 1/s: zero if nothing damps them, positive if
+  /// they grow (no mode says so then), NaN if they are not real and so are among the modes. They
+  /// come without a proved bound.
   Vector<N> zero_mode_rates;
   ModalBasis<N> basis;
 };

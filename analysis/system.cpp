@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace dashpot::analysis {
@@ -25,6 +26,20 @@ std::string entry_text(Eigen::Index row, Eigen::Index col) {
   return "entry (" + std::to_string(row + 1) + "," + std::to_string(col + 1) + ")";
 }
 
+/// Error bounds of working precision count on tails no larger than one rounding of the coefficient.
+void check_tail(const std::string& key, const Eigen::MatrixXd& matrix,
+                const Eigen::MatrixXd& tail) {
+  const double unit = std::numeric_limits<double>::epsilon();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
+      if (std::abs(tail(i, j)) > unit * std::abs(matrix(i, j))) {
+        throw InvalidSystem(key,
+                            entry_text(i, j) + " is more than a rounding error of the coefficient");
+      }
+    }
+  }
+}
+
 void check_optional_parts(const System<>& system) {
   const Eigen::Index n = system.dof();
   if (system.stiffness_factor.rows() > 0) {
@@ -36,6 +51,8 @@ void check_optional_parts(const System<>& system) {
     check_size("stiffness_tail", system.stiffness_tail, n, n);
     check_finite("damping_tail", system.damping_tail);
     check_finite("stiffness_tail", system.stiffness_tail);
+    check_tail("damping_tail", system.damping, system.damping_tail);
+    check_tail("stiffness_tail", system.stiffness, system.stiffness_tail);
   }
 }
 

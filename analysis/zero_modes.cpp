@@ -32,6 +32,7 @@ double from_factor(const StiffnessFactor<N>& W, const Square<N>& L, Square<N>& P
   StiffnessFactor<N> J_hat = W;
   L.template triangularView<Eigen::Lower>().transpose().template solveInPlace<Eigen::OnTheRight>(
       J_hat);
+  if (!J_hat.allFinite()) return std::numeric_limits<double>::infinity();
   const Eigen::JacobiSVD<StiffnessFactor<N>> svd(J_hat, Eigen::ComputeFullV);
   P = svd.matrixV();
   kappa.head(svd.singularValues().size()) = svd.singularValues().cwiseAbs2();
@@ -82,6 +83,7 @@ double from_stiffness(const System<N>& system, const Square<N>& L, Square<N>& P,
   lower.solveInPlace(K_hat);
   K_hat.transposeInPlace();
   lower.solveInPlace(K_hat);
+  if (!K_hat.allFinite()) return std::numeric_limits<double>::infinity();
   if (system.stiffness == system.stiffness.transpose()) {
     const Eigen::SelfAdjointEigenSolver<Square<N>> eigen(K_hat);
     P = eigen.eigenvectors();
