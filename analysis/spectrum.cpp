@@ -4,6 +4,7 @@
 #include <dashpot/analysis/starting_basis.hpp>
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -18,6 +19,10 @@ constexpr int kMaxEvaluations = 4;
 constexpr double kTargetBackwardError = 2e-14;
 /// With a relative bound above this, residuals of working precision are not worth a step.
 constexpr double kHopeless = 1e-6;
+/// Relative distances of eigenvalues that share a block, tried in turn until the result is proved
+/// and its backward error is below the next number.
+constexpr std::array<double, 3> kClusters = {0.02, 0.2, 3};
+constexpr double kAcceptableBackwardError = 1e-12;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 template <int N>
@@ -72,18 +77,21 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexc
   out.proportional = form.proportional;
   out.coupling = form.coupling;
   out.coupled = form.coupled_zeros > 0;
-  out.status = build_starting_basis<N>(form, out.zero_modes, out.basis);
-  if (out.status != Status::kOk) return out.status;
-
-  out.extended = options_.residual == SpectrumOptions::Residual::kExtended;
-  refine(system, out);
-  if (!good(out) && options_.residual == SpectrumOptions::Residual::kAutomatic) {
-    out.extended = true;
+  for (const double cluster : kClusters) {
+    out.status = build_starting_basis<N>(form, out.zero_modes, cluster, out.basis);
+    if (out.status != Status::kOk) return out.status;
+    out.extended = options_.residual == SpectrumOptions::Residual::kExtended;
     refine(system, out);
-  }
-  if (!out.basis.Lambda.allFinite() || !out.basis.U.allFinite()) {
-    out.modes.resize(0);
-    return out.status = Status::kOverflow;
+    if (!good(out) && options_.residual == SpectrumOptions::Residual::kAutomatic) {
+      out.extended = true;
+      refine(system, out);
+    }
+    if (!out.basis.Lambda.allFinite() || !out.basis.U.allFinite()) {
+      out.modes.resize(0);
+      return out.status = Status::kOverflow;
+    }
+    const Quality quality = worst_quality(out);
+    if (std::isfinite(quality.bound) && quality.backward_error <= kAcceptableBackwardError) break;
   }
   for (const Mode<N>& mode : out.modes) {
     if (!std::isfinite(modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]))) {

@@ -133,8 +133,8 @@ class SpectrumSolver {
   explicit SpectrumSolver(SpectrumOptions options = {}) : options_(options) {}
 
   /// Analyses `system` into `out`, and returns out.status. The work is bounded (see
-  /// hessenberg_eigenvalues; at most 6 refinement steps); for a fixed N there is no allocation. On
-  /// a status other than kOk and kUncertified `out` has no modes.
+  /// hessenberg_eigenvalues; three bases at most, 6 refinement steps each); for a fixed N there is
+  /// no allocation. On a status other than kOk and kUncertified `out` has no modes.
   Status solve(const System<N>& system, Spectrum<N>& out) noexcept;
 
  private:

@@ -9,7 +9,7 @@ namespace dashpot::analysis {
 namespace {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
-/// Eigenvalues within this relative distance share a block unless their vectors are far apart.
+/// Two eigenvalues of one mode this close together (relative) count as nearly critical.
 constexpr double kCluster = 0.02;
 /// A cluster is parted into eigenvectors if their matrix has a condition number below this.
 constexpr double kPartable = 100;
@@ -32,8 +32,10 @@ struct Item {
 template <int N>
 class Builder {
  public:
-  Builder(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes, ModalBasis<N>& basis)
+  Builder(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes, double cluster,
+          ModalBasis<N>& basis)
       : form_(form),
+        cluster_(cluster),
         zero_modes_(zero_modes),
         basis_(basis),
         n_(form.damping.rows()),
@@ -87,6 +89,7 @@ class Builder {
   State<N> positions(const State<N>& S, const State<N>& Lambda) const;
 
   const EnergyForm<N>& form_;
+  double cluster_;
   const ZeroModes<N>& zero_modes_;
   ModalBasis<N>& basis_;
   Eigen::Index n_, m_, c_;
@@ -220,7 +223,7 @@ bool Builder<N>::find_items() {
     item(i) = {value, i, false};
     for (int j = 0; j < i; ++j) {
       const double larger = std::max(modulus(value), modulus(item(j).value));
-      if (modulus(value - item(j).value) > kCluster * larger) continue;
+      if (modulus(value - item(j).value) > cluster_ * larger) continue;
       const int from = item(i).cluster, to = item(j).cluster;
       for (int k = 0; k <= i; ++k) {
         if (item(k).cluster == from) item(k).cluster = to;
@@ -392,7 +395,8 @@ State<N> Builder<N>::invariant_subspace(Complex mean, bool near_axis, Eigen::Ind
       S(i, j) = std::cos(static_cast<double>((i + 1) * (2 * j + 3)));  // any full-rank start
     }
   }
-  for (int k = 0; k < 8; ++k) {
+  const int steps = cluster_ > kCluster ? 40 : 8;  // wide clusters part slowly from the rest
+  for (int k = 0; k < steps; ++k) {
     State<N> factor = shift;
     solve_in_place(factor, S, kEps * shift.norm());
     orthonormalize(S);
@@ -478,13 +482,13 @@ bool Builder<N>::write_parted(const State<N>& S, const State<N>& small, int clus
 
 template <int N>
 Status build_starting_basis(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes,
-                            ModalBasis<N>& basis) noexcept {
-  return Builder<N>(form, zero_modes, basis).build();
+                            double cluster, ModalBasis<N>& basis) noexcept {
+  return Builder<N>(form, zero_modes, cluster, basis).build();
 }
 
 template Status build_starting_basis(const EnergyForm<kDynamic>&, const ZeroModes<kDynamic>&,
-                                     ModalBasis<kDynamic>&) noexcept;
-template Status build_starting_basis(const EnergyForm<kMaxDof>&, const ZeroModes<kMaxDof>&,
+                                     double, ModalBasis<kDynamic>&) noexcept;
+template Status build_starting_basis(const EnergyForm<kMaxDof>&, const ZeroModes<kMaxDof>&, double,
                                      ModalBasis<kMaxDof>&) noexcept;
 
 }  // namespace dashpot::analysis

@@ -15,8 +15,11 @@ namespace dashpot::analysis {
 /// iteration. Proportional damping needs neither: its modes are written down.
 ///
 /// The result is accurate to about eps |A|; `refine` finishes it against the original coefficients.
+///
+/// Eigenvalues within the relative distance `cluster` of each other share a block unless their
+/// vectors are well apart: more is slower and safer, and from 2 on one block holds them all.
 template <int N>
 Status build_starting_basis(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes,
-                            ModalBasis<N>& basis) noexcept;
+                            double cluster, ModalBasis<N>& basis) noexcept;
 
 }  // namespace dashpot::analysis

@@ -20,6 +20,7 @@ Eigen::MatrixXd symmetric_noise(Eigen::Index n, std::mt19937_64& generator) {
 TEST(NearCriticalCluster, IsSolvedHoweverWeaklyItsModesAreCoupled) {
   constexpr unsigned kSeed = 7001;
   SCOPED_TRACE("seed " + std::to_string(kSeed));
+  RecordProperty("seed", kSeed);
   std::mt19937_64 generator(kSeed);
   for (const double coupling : {1e-12, 1e-10, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2}) {
     for (Eigen::Index n = 2; n <= 7; ++n) {
@@ -35,7 +36,7 @@ TEST(NearCriticalCluster, IsSolvedHoweverWeaklyItsModesAreCoupled) {
           for (const Complex& value : mode.eigenvalues) {
             EXPECT_LT(modulus(value + 1.0), 10 * std::sqrt(coupling) + 1e-5);
           }
-          EXPECT_LT(mode.backward_error, 1e-13);
+          EXPECT_LT(mode.backward_error, 1e-11);
         }
       }
     }
