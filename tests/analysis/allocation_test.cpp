@@ -29,7 +29,7 @@ namespace {
 constinit thread_local bool counting = false;
 constinit thread_local int allocations = 0;
 
-void note_allocation() {
+[[maybe_unused]] void note_allocation() {
   if (counting) ++allocations;  // a breakpoint here shows who allocates
 }
 }  // namespace
