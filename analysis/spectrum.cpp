@@ -175,6 +175,7 @@ DualEigenvectors dual_eigenvectors(const System<>& system, const Spectrum<>& spe
     const Mode<>& mode = spectrum.modes[i];
     for (Eigen::Index k = 0; k < 2; ++k) {
       const auto which = static_cast<std::size_t>(k);
+      const Eigen::Index column = 2 * Eigen::Index{i} + k;
       const Complex lambda = mode.eigenvalues[which];
       const Eigen::VectorXcd& u = mode.shapes[which];
       const Eigen::VectorXcd& y = mode.left_shapes[which];
@@ -182,9 +183,9 @@ DualEigenvectors dual_eigenvectors(const System<>& system, const Spectrum<>& spe
       const Eigen::VectorXcd Cy = system.damping.transpose() * y;
       const Complex slope = ((2.0 * lambda * My + Cy).transpose() * u).value();
       const double norm = u.norm() * std::sqrt(1 + std::norm(lambda));
-      dual.eigenvalues[2 * i + k] = lambda;
-      dual.right.col(2 * i + k) << u / norm, lambda * u / norm;
-      dual.left.col(2 * i + k) << (lambda * My + Cy) * (norm / slope), My * (norm / slope);
+      dual.eigenvalues[column] = lambda;
+      dual.right.col(column) << u / norm, lambda * u / norm;
+      dual.left.col(column) << (lambda * My + Cy) * (norm / slope), My * (norm / slope);
     }
   }
   return dual;
