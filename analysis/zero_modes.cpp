@@ -29,10 +29,8 @@ void sort_by_magnitude(Square<N>& P, Vector<N>& values) {
 template <int N>
 double from_factor(const StiffnessFactor<N>& W, const Square<N>& L, Square<N>& P,
                    Vector<N>& kappa) {
-  StiffnessFactor<N> J_hat = W;
-  L.template triangularView<Eigen::Lower>().transpose().template solveInPlace<Eigen::OnTheRight>(
-      J_hat);
-  if (!J_hat.allFinite()) return std::numeric_limits<double>::infinity();
+  const auto upper = L.template triangularView<Eigen::Lower>().transpose();
+  const StiffnessFactor<N> J_hat = upper.template solve<Eigen::OnTheRight>(W);
   const Eigen::JacobiSVD<StiffnessFactor<N>> svd(J_hat, Eigen::ComputeFullV);
   P = svd.matrixV();
   kappa.head(svd.singularValues().size()) = svd.singularValues().cwiseAbs2();

@@ -15,7 +15,16 @@
 
 namespace {
 
-using namespace dashpot::analysis;
+using dashpot::analysis::Complex;
+using dashpot::analysis::kDynamic;
+using dashpot::analysis::kMaxDof;
+using dashpot::analysis::Mode;
+using dashpot::analysis::Spectrum;
+using dashpot::analysis::SpectrumOptions;
+using dashpot::analysis::SpectrumSolver;
+using dashpot::analysis::Status;
+using dashpot::analysis::System;
+using dashpot::analysis::to_text;
 
 constexpr unsigned kSeed = 20210001;
 

@@ -5,7 +5,14 @@
 #include <cmath>
 #include <cstdio>
 
-using namespace dashpot::analysis;
+using dashpot::analysis::analyze;
+using dashpot::analysis::kMaxDof;
+using dashpot::analysis::Mode;
+using dashpot::analysis::Spectrum;
+using dashpot::analysis::SpectrumSolver;
+using dashpot::analysis::Square;
+using dashpot::analysis::Status;
+using dashpot::analysis::System;
 
 static_assert(EIGEN_DEFAULT_ALIGN_BYTES == 64, "alignment of what Eigen allocates");
 static_assert(EIGEN_MAX_STATIC_ALIGN_BYTES == 64, "alignment of Eigen members");

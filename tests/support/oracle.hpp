@@ -31,6 +31,11 @@
 
 namespace dashpot::testing {
 
+/// The same number in a longer type.
+inline long double widened(double x) {
+  return static_cast<long double>(x);
+}
+
 /// An eigenvalue in rad/s as unevaluated sums of two doubles: re = re_hi + re_lo, right to 1e-32
 /// relative, each part by itself. A part that is exactly zero is stored as zero.
 struct ReferenceEigenvalue {
@@ -42,8 +47,7 @@ struct ReferenceEigenvalue {
 
   [[nodiscard]] std::complex<double> rounded() const { return {re_hi, im_hi}; }
   [[nodiscard]] std::complex<long double> value() const {
-    using Long = long double;
-    return {Long{re_hi} + Long{re_lo}, Long{im_hi} + Long{im_lo}};
+    return {widened(re_hi) + widened(re_lo), widened(im_hi) + widened(im_lo)};
   }
   [[nodiscard]] bool is_zero() const { return re_hi == 0 && im_hi == 0; }
   [[nodiscard]] bool is_real() const { return im_hi == 0; }
@@ -351,9 +355,10 @@ inline const ResponseCase& response_case(const std::string& name) {
 /// |computed - reference|, right to long double however close they are: hi is subtracted first,
 /// then lo.
 inline long double distance(std::complex<double> computed, const ReferenceEigenvalue& reference) {
-  using Long = long double;
-  const Long re = (Long{computed.real()} - Long{reference.re_hi}) - Long{reference.re_lo};
-  const Long im = (Long{computed.imag()} - Long{reference.im_hi}) - Long{reference.im_lo};
+  const long double re =
+      (widened(computed.real()) - widened(reference.re_hi)) - widened(reference.re_lo);
+  const long double im =
+      (widened(computed.imag()) - widened(reference.im_hi)) - widened(reference.im_lo);
   return std::hypot(re, im);
 }
 
