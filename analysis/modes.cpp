@@ -404,13 +404,13 @@ void Reader<N>::write_shapes(int i, int j, Mode<N>& mode) const {
     const Complex mu = root(which[k]).value;
     const auto combine = [&](const Wide<N>& X) {
       ComplexVector<N> x(X.rows());
-      for (Eigen::Index i = 0; i < X.rows(); ++i) {
+      for (Eigen::Index row = 0; row < X.rows(); ++row) {
         double real = 0, imag = 0;
         for (Eigen::Index l = 0; l < b.size; ++l) {
-          real += X(i, b.first + l) * re[l];
-          imag += X(i, b.first + l) * im[l];
+          real += X(row, b.first + l) * re[l];
+          imag += X(row, b.first + l) * im[l];
         }
-        x[i] = Complex(real, imag);
+        x[row] = Complex(real, imag);
       }
       return x;
     };
