@@ -1,0 +1,72 @@
+#pragma once
+// Plain data that goes into and out of the controller. Frames: B is the base link, T the tip (the
+// tool's frame). p_BT_B is the position of T in B, expressed in B's axes; R_BT turns T's axes into
+// B's. Twists and wrenches have the linear part first, are taken at the tip, in B's axes.
+
+#include <dashpot/analysis/types.hpp>
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+
+namespace dashpot::controller {
+
+/// The longest chain the controller takes.
+inline constexpr int kMaxJoints = analysis::kMaxDof;
+
+/// n: one entry a joint, from the base to the tip; rad (m for a prismatic joint), rad/s, N m, ...
+using JointVector = analysis::Vector<kMaxJoints>;
+/// n x n
+using JointMatrix = analysis::Square<kMaxJoints>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+/// Where a frame stands in the base link: p_BT_B in m, and R_BT.
+struct Pose {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+};
+
+/// What the robot reports at the beginning of a tick.
+struct RobotState {
+  std::int64_t time = 0;  ///< ns, of any clock that does not run backward
+  JointVector position;   ///< rad or m
+  JointVector velocity;   ///< rad/s or m/s
+  /// That the world exerts on the tip, N and N m; known or estimated. Only K_G uses it.
+  Vector6 external_wrench = Vector6::Zero();
+};
+
+/// Where the springs are fixed.
+enum class Mode : std::uint8_t {
+  kJoint,      ///< to a joint position
+  kCartesian,  ///< to a pose of the tip; a redundant arm also to a rest posture
+};
+
+/// In whose axes K_C, C_C and `directions` are given.
+enum class Frame : std::uint8_t { kBase, kTool };
+
+/// Springs and dampers. All matrices are symmetric positive semidefinite.
+struct Gains {
+  JointMatrix joint_stiffness;               ///< n x n, N m/rad, of mode kJoint
+  JointMatrix joint_damping;                 ///< n x n, N m s/rad, of mode kJoint
+  Matrix6 task_stiffness = Matrix6::Zero();  ///< K_C, N/m, N/rad and N m/rad
+  Matrix6 task_damping = Matrix6::Zero();    ///< C_C, N s/m, N s/rad and N m s/rad
+  Frame frame = Frame::kBase;
+  /// Task directions that the controller holds, in the axes of `frame`; the rest are as free as
+  /// the self-motion of a redundant arm.
+  std::array<bool, 6> directions{true, true, true, true, true, true};
+  JointVector null_stiffness;  ///< n, N m/rad, toward the rest posture, within the free motions
+  JointVector null_damping;    ///< n, N m s/rad, within the free motions
+};
+
+/// What the user wants. It may change at any tick; the controller goes there smoothly.
+struct Setpoint {
+  std::int64_t time = 0;  ///< ns, when it was given, on the clock of RobotState::time
+  Mode mode = Mode::kJoint;
+  JointVector joint_position;        ///< goal of mode kJoint; rest posture of mode kCartesian
+  Pose tip_pose;                     ///< goal of mode kCartesian
+  Vector6 wrench = Vector6::Zero();  ///< that the tip is to exert besides, N and N m
+  Gains gains;
+};
+
+}  // namespace dashpot::controller
