@@ -1,0 +1,93 @@
+#pragma once
+#include <dashpot/controller/types.hpp>
+
+#include <array>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace dashpot::controller {
+
+enum class JointType : std::uint8_t { kRevolute, kContinuous, kPrismatic };
+
+/// What a URDF says of a joint. For a prismatic joint read m for rad and N for N m.
+struct Joint {
+  std::string name;
+  JointType type = JointType::kRevolute;
+  double lower = 0;     ///< rad; -infinity for a continuous joint
+  double upper = 0;     ///< rad; infinity for a continuous joint
+  double velocity = 0;  ///< limit, rad/s, not negative; infinity if there is none
+  double effort = 0;    ///< limit, N m, not negative; infinity if there is none
+  double damping = 0;   ///< viscous friction, N m s/rad
+  double friction = 0;  ///< Coulomb friction, N m
+  double reflected_inertia = 0;  ///< of rotor and gear, as seen by the joint, kg m^2 (kg)
+};
+
+/// A body held at the tip, in the axes of the tip link.
+struct Payload {
+  double mass = 0;                                      ///< kg
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();     ///< of mass, from the tip link's origin, m
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();    ///< about the centre of mass, kg m^2
+};
+
+/// What a URDF does not say, or says wrong. A vector without entries leaves what the URDF says.
+struct ModelOptions {
+  Eigen::Vector3d gravity{0, 0, -9.81};  ///< in axes of the URDF's root link, m/s^2
+  /// Links that hang off the chain (fingers, cameras) count, rigid at their zero position.
+  bool include_off_chain = true;
+  JointVector reflected_inertia;  ///< n, kg m^2; none in a URDF
+  JointVector damping;            ///< n, N m s/rad
+  JointVector friction;           ///< n, N m
+  Payload payload;
+  Pose tool;  ///< the tool's frame T in the tip link
+};
+
+/// Thrown at set-up; what() is one line: "arm.urdf: joint 'elbow': mimics another joint".
+class InvalidModel : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
+/// A serial chain of 1 to 16 revolute, continuous or prismatic joints between two links of a URDF.
+/// Fixed joints are merged into the link before them. Immutable; a copy shares the data.
+///
+/// B is the base link, which stands still wherever it is in the file's tree: joints above it keep
+/// their zero position. T is the tool's frame: the tip link, or ModelOptions::tool in it.
+///
+/// The chain must be such that the mass matrix is positive definite: massless links are fine as
+/// long as something farther out resists each joint, or a reflected inertia does.
+class RobotModel {
+ public:
+  /// Both throw InvalidModel; `name` stands for the file in messages.
+  static RobotModel from_urdf_file(const std::string& path, const std::string& base,
+                                   const std::string& tip, const ModelOptions& options = {});
+  static RobotModel from_urdf_text(const std::string& text, const std::string& base,
+                                   const std::string& tip, const ModelOptions& options = {},
+                                   const std::string& name = "URDF");
+
+  /// Of the robot, as the URDF has it.
+  const std::string& name() const noexcept;
+  const std::string& base() const noexcept;
+  const std::string& tip() const noexcept;
+
+  /// n, from 1 to kMaxJoints
+  int dof() const noexcept;
+  /// n, from the base to the tip
+  const std::vector<Joint>& joints() const noexcept;
+  /// n: one property of all joints, `joint_values(&Joint::effort)`.
+  JointVector joint_values(double Joint::*property) const;
+
+  /// In B's axes, m/s^2
+  const Eigen::Vector3d& gravity() const noexcept;
+
+  /// What the model is made of; kdl_chain.hpp shows its KDL::Chain.
+  struct Data;
+  const Data& data() const noexcept { return *data_; }
+
+ private:
+  explicit RobotModel(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+  std::shared_ptr<const Data> data_;
+};
+
+}  // namespace dashpot::controller
