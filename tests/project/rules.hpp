@@ -19,7 +19,8 @@ struct Layer {
 inline const std::vector<Layer>& layers() {
   static const std::vector<Layer> table = {
       {"analysis", {"dashpot/analysis/", "Eigen/"}},
-      {"controller", {"dashpot/controller/", "dashpot/analysis/", "Eigen/", "kdl/", "urdf_"}},
+      {"controller",
+       {"dashpot/controller/", "dashpot/analysis/", "Eigen/", "kdl/", "urdf_", "console_bridge/"}},
       {"sim", {"dashpot/sim/", "Eigen/", "urdf_"}},  // an independent check of the two above
       {"lcmtypes",
        {"dashpot/lcmtypes/", "dashpot/analysis/types.hpp", "dashpot/controller/types.hpp", "lcm/"}},
