@@ -1,0 +1,168 @@
+// M, C(q, qd) qd, gravity torque, J, Jdot qd and the tip's pose at one state: Dashpot's kernel beside
+// KDL's solvers for the same, and Pinocchio's where it is installed, on the same chain. 7 joints are
+// the Panda; other numbers are random chains of revolute joints. The largest difference from KDL,
+// relative to the largest entry of each term, is printed beside each time.
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/tests/support/kdl_dynamics.hpp>
+#include <dashpot/tests/support/random_robot.hpp>
+
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#ifdef DASHPOT_HAVE_PINOCCHIO
+#include <pinocchio/algorithm/crba.hpp>
+#include <pinocchio/algorithm/frames.hpp>
+#include <pinocchio/algorithm/jacobian.hpp>
+#include <pinocchio/algorithm/kinematics.hpp>
+#include <pinocchio/algorithm/rnea.hpp>
+#include <pinocchio/parsers/urdf.hpp>
+#endif
+
+namespace {
+
+using dashpot::controller::Dynamics;
+using dashpot::controller::DynamicsKernel;
+using dashpot::controller::DynamicsResult;
+using dashpot::controller::JointVector;
+using dashpot::controller::RobotModel;
+using dashpot::testing::KdlDynamics;
+using dashpot::testing::RandomRobot;
+
+constexpr unsigned kSeed = 20210001;
+constexpr std::size_t kStates = 64;  // taken in turn, so that no branch is learnt by heart
+
+std::string chain_text(int n) {
+  return RandomRobot(kSeed + static_cast<unsigned>(n)).chain(n, 0);
+}
+
+RobotModel model_of(int n) {
+  if (n == 7) {
+    return RobotModel::from_urdf_file(DASHPOT_SOURCE_DIR "/sim/models/panda.urdf", "panda_link0",
+                                      "panda_hand_tcp");
+  }
+  return RobotModel::from_urdf_text(chain_text(n), "link0", "tip");
+}
+
+struct State {
+  JointVector q, qd;
+};
+
+std::vector<State> states(int n) {
+  RandomRobot random(kSeed);
+  std::vector<State> all(kStates);
+  for (State& state : all) {
+    state.q = JointVector::NullaryExpr(n, [&] { return random.uniform(-3, 3); });
+    state.qd = JointVector::NullaryExpr(n, [&] { return random.uniform(-1, 1); });
+  }
+  return all;
+}
+
+template <class A, class B>
+double difference(const A& a, const B& b) {
+  return (a - b).cwiseAbs().maxCoeff() / b.cwiseAbs().maxCoeff();
+}
+
+template <int N>
+double largest_difference(const Dynamics<N>& a, const DynamicsResult& b) {
+  return std::max({difference(a.M, b.M), difference(a.coriolis, b.coriolis),
+                   difference(a.gravity, b.gravity), difference(a.J, b.J),
+                   difference(a.Jdot_qd, b.Jdot_qd), difference(a.p_BT_B, b.p_BT_B),
+                   difference(a.R_BT, b.R_BT)});
+}
+
+template <int N>
+void dashpot_kernel(benchmark::State& state) {
+  const RobotModel model = model_of(N);
+  const DynamicsKernel<N> kernel(model);
+  using Vector = Eigen::Matrix<double, N, 1>;
+  std::vector<std::pair<Vector, Vector>> inputs;
+  for (const State& one : states(N)) inputs.emplace_back(one.q, one.qd);
+  Dynamics<N> result;
+  std::size_t i = 0;
+  for (auto _ : state) {
+    kernel.evaluate(inputs[i].first, inputs[i].second, result);
+    benchmark::DoNotOptimize(&result);
+    benchmark::ClobberMemory();
+    i = (i + 1) % kStates;
+  }
+  KdlDynamics kdl(model);
+  double worst = 0;
+  for (const auto& [q, qd] : inputs) {
+    kernel.evaluate(q, qd, result);
+    kdl.solve(q, qd);
+    worst = std::max(worst, largest_difference(result, kdl.result()));
+  }
+  state.counters["difference"] = worst;
+}
+
+void kdl(benchmark::State& state, int n) {
+  KdlDynamics solvers(model_of(n));
+  const std::vector<State> inputs = states(n);
+  std::size_t i = 0;
+  for (auto _ : state) {
+    solvers.solve(inputs[i].q, inputs[i].qd);
+    benchmark::ClobberMemory();
+    i = (i + 1) % kStates;
+  }
+}
+
+#ifdef DASHPOT_HAVE_PINOCCHIO
+void pinocchio_terms(benchmark::State& state) {
+  pinocchio::Model model;
+  pinocchio::urdf::buildModel(DASHPOT_SOURCE_DIR "/sim/models/panda.urdf", model);
+  pinocchio::Data data(model);
+  const auto tip = model.getFrameId("panda_hand_tcp");
+  std::vector<std::pair<Eigen::VectorXd, Eigen::VectorXd>> inputs;
+  for (const State& one : states(7)) inputs.emplace_back(one.q, one.qd);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(7);
+  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, 7);
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const auto& [q, qd] = inputs[i];
+    pinocchio::crba(model, data, q);
+    pinocchio::nonLinearEffects(model, data, q, qd);
+    pinocchio::computeGeneralizedGravity(model, data, q);
+    pinocchio::computeJointJacobians(model, data, q);
+    pinocchio::forwardKinematics(model, data, q, qd, zero);
+    pinocchio::updateFramePlacement(model, data, tip);
+    pinocchio::getFrameJacobian(model, data, tip, pinocchio::LOCAL_WORLD_ALIGNED, J);
+    auto bias = pinocchio::getFrameClassicalAcceleration(model, data, tip,
+                                                         pinocchio::LOCAL_WORLD_ALIGNED);
+    benchmark::DoNotOptimize(&bias);
+    benchmark::ClobberMemory();
+    i = (i + 1) % kStates;
+  }
+}
+#endif
+
+template <int N>
+void add() {
+  const std::string n = std::to_string(N);
+  benchmark::RegisterBenchmark(("dynamics/dashpot/" + n).c_str(), dashpot_kernel<N>)
+      ->Unit(benchmark::kMicrosecond);
+  benchmark::RegisterBenchmark(("dynamics/kdl/" + n).c_str(),
+                               [](benchmark::State& state) { kdl(state, N); })
+      ->Unit(benchmark::kMicrosecond);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  [&]<int... I>(std::integer_sequence<int, I...>) {
+    (add<I + 2>(), ...);
+  }(std::make_integer_sequence<int, 15>{});
+#ifdef DASHPOT_HAVE_PINOCCHIO
+  benchmark::RegisterBenchmark("dynamics/pinocchio/7", pinocchio_terms)
+      ->Unit(benchmark::kMicrosecond);
+#endif
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+  return 0;
+}
