@@ -26,6 +26,7 @@ int run(int argc, char** argv) {
   program.set_version_flag("--version", "dashpot 0.1.0");
   program.require_subcommand(0, 1);
   add_analyze(program);
+  add_inspect(program);
 
   const auto name = [&program] {
     const auto chosen = program.get_subcommands();

@@ -26,7 +26,11 @@ Eigen::Isometry3d to_eigen(const KDL::Frame& frame) {
 /// A rotation whose z axis is `axis`; the identity where that will do.
 Eigen::Matrix3d with_z(const Eigen::Vector3d& axis) {
   if (axis == Eigen::Vector3d::UnitZ()) return Eigen::Matrix3d::Identity();
-  return Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis).toRotationMatrix();
+  Eigen::Matrix3d R;
+  R.col(0) = axis.unitOrthogonal();
+  R.col(1) = axis.cross(R.col(0));
+  R.col(2) = axis;
+  return R;
 }
 
 /// Puts the entries of `values`, by columns, at joint i of the rows.

@@ -21,7 +21,11 @@ inline void sin_cos(const Four& angle, Four& sine, Four& cosine) noexcept {
 
   const Four shifted = angle * 0x1.45f306dc9c883p-1 + kToInteger;  // 2/pi
   const Four k = shifted - kToInteger;
-  const Four r = ((angle - k * kPart1) - k * kPart2) - k * kPart3 - k * kPart4;
+  const Four high = angle - k * kPart1;  // exact
+  const Four low = k * kPart2;           // exact
+  const Four difference = high - low;
+  const Four lost = (high - difference) - low;
+  const Four r = difference + (lost - (k * kPart3 + k * kPart4));
   const Four z = r * r;
   const Four s =
       r + r * z *

@@ -9,9 +9,9 @@
 #include <cstring>
 #include <exception>
 #include <fstream>
-#include <iterator>
 #include <map>
 #include <mutex>
+#include <sstream>
 
 namespace dashpot::controller {
 namespace {
@@ -31,6 +31,7 @@ class Messages : public console_bridge::OutputHandler {
     if (level != console_bridge::CONSOLE_BRIDGE_LOG_ERROR) return;
     errors_ += (errors_.empty() ? "" : "; ") + text;
   }
+  bool any() const { return !errors_.empty(); }
   /// All errors, in one line.
   std::string errors() const {
     std::string line = errors_.empty() ? "not a URDF" : errors_;
@@ -54,7 +55,8 @@ std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::
   } catch (const std::exception& error) {
     throw InvalidModel(name + ": " + error.what());
   }
-  if (!model) throw InvalidModel(name + ": " + messages.errors());
+  // Of a number that it cannot read, urdfdom just says so and goes on.
+  if (!model || messages.any()) throw InvalidModel(name + ": " + messages.errors());
   return model;
 }
 
@@ -87,12 +89,13 @@ std::shared_ptr<urdf::ModelInterface> read_urdf(const std::string& text, const s
 
 std::string read_text(const std::string& path) {
   errno = 0;
-  std::ifstream stream(path, std::ios::binary);
-  std::string text(std::istreambuf_iterator<char>(stream), {});
-  if (!stream.is_open() || stream.bad() || errno == EISDIR) {
+  const std::ifstream stream(path, std::ios::binary);
+  std::ostringstream text;
+  if (stream.is_open()) text << stream.rdbuf();
+  if (!stream.is_open() || text.bad() || errno == EISDIR) {
     throw InvalidModel(path + ": cannot be read: " + std::strerror(errno));
   }
-  return text;
+  return text.str();
 }
 
 }  // namespace dashpot::controller

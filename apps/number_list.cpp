@@ -1,0 +1,28 @@
+#include <dashpot/apps/input_error.hpp>
+#include <dashpot/apps/number_list.hpp>
+
+#include <charconv>
+#include <cmath>
+#include <sstream>
+#include <vector>
+
+namespace dashpot::apps {
+
+Eigen::VectorXd parse_numbers(const std::string& option, const std::string& text) {
+  std::vector<double> values;
+  std::istringstream words(text + ",");
+  for (std::string word; std::getline(words, word, ',');) {
+    const auto first = word.find_first_not_of(" +");
+    if (first != std::string::npos) word.erase(0, first);
+    double value = 0;
+    const char* end = word.data() + word.size();
+    const auto [stop, error] = std::from_chars(word.data(), end, value);
+    if (error != std::errc() || stop != end || !std::isfinite(value)) {
+      throw InputError(option, "'" + word + "' is not a finite number");
+    }
+    values.push_back(value);
+  }
+  return Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+}  // namespace dashpot::apps

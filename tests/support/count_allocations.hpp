@@ -1,0 +1,79 @@
+#pragma once
+// Allocations of a thread, counted in the program's own malloc and relatives on top of glibc's;
+// operator new and Eigen call them. Any number of a program's source files may include this.
+
+#include <cerrno>
+#include <cstddef>
+
+// Sanitizers bring their own malloc: there nothing is counted, and a test has to skip.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define DASHPOT_COUNTS_ALLOCATIONS 0
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
+    __has_feature(memory_sanitizer)
+#define DASHPOT_COUNTS_ALLOCATIONS 0
+#endif
+#endif
+#if !defined(DASHPOT_COUNTS_ALLOCATIONS) && defined(__GLIBC__)
+#define DASHPOT_COUNTS_ALLOCATIONS 1
+#elif !defined(DASHPOT_COUNTS_ALLOCATIONS)
+#define DASHPOT_COUNTS_ALLOCATIONS 0
+#endif
+
+namespace dashpot::testing {
+
+inline constinit thread_local bool counting_allocations = false;
+inline constinit thread_local int allocations = 0;
+
+inline void note_allocation() {
+  if (counting_allocations) ++allocations;  // a breakpoint here shows who allocates
+}
+
+/// Allocations of this thread while `act` runs.
+template <class Act>
+int allocations_of(const Act& act) {
+  allocations = 0;
+  counting_allocations = true;
+  act();
+  counting_allocations = false;
+  return allocations;
+}
+
+}  // namespace dashpot::testing
+
+#if DASHPOT_COUNTS_ALLOCATIONS
+#define DASHPOT_SHARED __attribute__((weak, visibility("default")))
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* block, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+DASHPOT_SHARED void* malloc(std::size_t size) noexcept {
+  dashpot::testing::note_allocation();
+  return __libc_malloc(size);
+}
+DASHPOT_SHARED void* calloc(std::size_t count, std::size_t size) noexcept {
+  dashpot::testing::note_allocation();
+  return __libc_calloc(count, size);
+}
+DASHPOT_SHARED void* realloc(void* block, std::size_t size) noexcept {
+  dashpot::testing::note_allocation();
+  return __libc_realloc(block, size);
+}
+DASHPOT_SHARED void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
+  dashpot::testing::note_allocation();
+  return __libc_memalign(alignment, size);
+}
+DASHPOT_SHARED void* memalign(std::size_t alignment, std::size_t size) noexcept {
+  dashpot::testing::note_allocation();
+  return __libc_memalign(alignment, size);
+}
+DASHPOT_SHARED int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
+  dashpot::testing::note_allocation();
+  *block = __libc_memalign(alignment, size);
+  return *block != nullptr ? 0 : ENOMEM;
+}
+}
+#undef DASHPOT_SHARED
+#endif
