@@ -31,8 +31,8 @@ JointVector joint_list(const std::string& option, const std::string& text, int n
   if (text.empty()) return JointVector::Zero(n);
   const Eigen::VectorXd values = parse_numbers(option, text);
   if (values.size() != n) {
-    throw InputError(option, std::to_string(values.size()) + " numbers for " + std::to_string(n) +
-                                 " joints");
+    throw InputError(
+        option, std::to_string(values.size()) + " numbers for " + std::to_string(n) + " joints");
   }
   return values;
 }
@@ -139,7 +139,8 @@ std::string tip_table(const DynamicsResult& dynamics) {
   using Align = TextTable::Align;
   table.add_column(Align::kLeft, {"", ""});
   table.add_column(Align::kPoint, {"", "position"});
-  for (const char* axis : {"x axis", "y axis", "z axis"}) table.add_column(Align::kPoint, {"tip's", axis});
+  for (const char* axis : {"x axis", "y axis", "z axis"})
+    table.add_column(Align::kPoint, {"tip's", axis});
   table.add_column(Align::kPoint, {"Jdot qd", "linear"});
   table.add_column(Align::kPoint, {"Jdot qd", "angular"});
   const std::vector<std::vector<std::string>> columns = {
@@ -163,8 +164,8 @@ std::string to_table(const RobotModel& model, const DynamicsResult& dynamics, co
          model.base() + " to " + model.tip() + ". SI units, axes of " + model.base() + ".\n\n" +
          joints_table(model, dynamics, q, qd) + "\nMass matrix\n" +
          matrix_table(dynamics.M, joints) + "\nJacobian at the tip\n" +
-         matrix_table(dynamics.J, {"linear x", "linear y", "linear z", "angular x", "angular y",
-                                   "angular z"}) +
+         matrix_table(dynamics.J,
+                      {"linear x", "linear y", "linear z", "angular x", "angular y", "angular z"}) +
          "\nTip\n" + tip_table(dynamics);
 }
 

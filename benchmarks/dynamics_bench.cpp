@@ -1,7 +1,7 @@
-// M, C(q, qd) qd, gravity torque, J, Jdot qd and the tip's pose at one state: Dashpot's kernel beside
-// KDL's solvers for the same, and Pinocchio's where it is installed, on the same chain. 7 joints are
-// the Panda; other numbers are random chains of revolute joints. The largest difference from KDL,
-// relative to the largest entry of each term, is printed beside each time.
+// M, C(q, qd) qd, gravity torque, J, Jdot qd and the tip's pose at one state: Dashpot's kernel
+// beside KDL's solvers for the same, and Pinocchio's where it is installed, on the same chain. 7
+// joints are the Panda; other numbers are random chains of revolute joints. The largest difference
+// from KDL, relative to the largest entry of each term, is printed beside each time.
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
@@ -132,8 +132,8 @@ void pinocchio_terms(benchmark::State& state) {
     pinocchio::forwardKinematics(model, data, q, qd, zero);
     pinocchio::updateFramePlacement(model, data, tip);
     pinocchio::getFrameJacobian(model, data, tip, pinocchio::LOCAL_WORLD_ALIGNED, J);
-    auto bias = pinocchio::getFrameClassicalAcceleration(model, data, tip,
-                                                         pinocchio::LOCAL_WORLD_ALIGNED);
+    auto bias =
+        pinocchio::getFrameClassicalAcceleration(model, data, tip, pinocchio::LOCAL_WORLD_ALIGNED);
     benchmark::DoNotOptimize(&bias);
     benchmark::ClobberMemory();
     i = (i + 1) % kStates;
@@ -146,9 +146,9 @@ void add() {
   const std::string n = std::to_string(N);
   benchmark::RegisterBenchmark(("dynamics/dashpot/" + n).c_str(), dashpot_kernel<N>)
       ->Unit(benchmark::kMicrosecond);
-  benchmark::RegisterBenchmark(("dynamics/kdl/" + n).c_str(),
-                               [](benchmark::State& state) { kdl(state, N); })
-      ->Unit(benchmark::kMicrosecond);
+  benchmark::RegisterBenchmark(("dynamics/kdl/" + n).c_str(), [](benchmark::State& state) {
+    kdl(state, N);
+  })->Unit(benchmark::kMicrosecond);
 }
 
 }  // namespace
@@ -157,7 +157,8 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   [&]<int... I>(std::integer_sequence<int, I...>) {
     (add<I + 2>(), ...);
-  }(std::make_integer_sequence<int, 15>{});
+  }
+  (std::make_integer_sequence<int, 15>{});
 #ifdef DASHPOT_HAVE_PINOCCHIO
   benchmark::RegisterBenchmark("dynamics/pinocchio/7", pinocchio_terms)
       ->Unit(benchmark::kMicrosecond);

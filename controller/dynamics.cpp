@@ -134,13 +134,11 @@ DynamicsKernel<N>::DynamicsKernel(const RobotModel& model)
     const Eigen::Vector3d center = link * to_eigen(body.getCOG());
     set_joint(first_moment_, i, body.getMass() * center);
     const KDL::RotationalInertia about_center = body.RefPoint(body.getCOG()).getRotationalInertia();
-    const Eigen::Matrix3d I =
-        link.linear() * Eigen::Map<const Eigen::Matrix3d>(about_center.data) *
-            link.linear().transpose() +
-        body.getMass() * (center.squaredNorm() * Eigen::Matrix3d::Identity() -
-                          center * center.transpose());
-    set_joint(inertia_, i,
-              Vector6{{I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}});
+    const Eigen::Matrix3d I = link.linear() * Eigen::Map<const Eigen::Matrix3d>(about_center.data) *
+                                  link.linear().transpose() +
+                              body.getMass() * (center.squaredNorm() * Eigen::Matrix3d::Identity() -
+                                                center * center.transpose());
+    set_joint(inertia_, i, Vector6{{I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}});
   }
   const Eigen::Isometry3d tip = link * to_eigen(chain.getSegment(N).pose(0));
   set_joint(offset_, N - 1, tip.translation());
@@ -213,24 +211,23 @@ void DynamicsKernel<N>::evaluate(const Eigen::Matrix<double, N, 1>& q_in,
   const L3 h_link = R * load3<G>(first_moment_);
   const LanesSymmetric<G> I_link = turned(R, load_symmetric<G>(inertia_));
   const L3 f = sum_inward(acceleration(h_link) + mass * a);
-  const L3 n = sum_inward(I_link * wd + cross(w, I_link * w) + cross(h_link, a) +
-                          cross(e, of_next(f)));
+  const L3 n =
+      sum_inward(I_link * wd + cross(w, I_link * w) + cross(h_link, a) + cross(e, of_next(f)));
   const L coriolis = dot(J_angular, n) + prismatic * dot(R.z, f);
 
   // Inward: what each joint carries.
   const L carried = L::load(carried_mass_.data()), beyond = of_next(carried);
   const L3 h = sum_inward(h_link + beyond * e);
-  const LanesSymmetric<G> I =
-      sum_inward(I_link + shift_term(of_next(h) + (0.5 * beyond) * e, e));
+  const LanesSymmetric<G> I = sum_inward(I_link + shift_term(of_next(h) + (0.5 * beyond) * e, e));
   const L3 F = cross(J_angular, h) + (prismatic * carried) * R.z;
   const L3 moment = I * J_angular + cross(h, prismatic * R.z) + cross(F, to_tip);
   const L gravity = -(gravity_.x() * F.x + gravity_.y() * F.y + gravity_.z() * F.z);
 
   // Out of the lanes.
   alignas(32) double rows[14][kPadded];
-  const L* columns[] = {&J_linear.x, &J_linear.y, &J_linear.z, &J_angular.x, &J_angular.y,
-                        &J_angular.z, &F.x, &F.y, &F.z, &moment.x, &moment.y, &moment.z,
-                        &coriolis, &gravity};
+  const L* columns[] = {&J_linear.x,  &J_linear.y, &J_linear.z, &J_angular.x, &J_angular.y,
+                        &J_angular.z, &F.x,        &F.y,        &F.z,         &moment.x,
+                        &moment.y,    &moment.z,   &coriolis,   &gravity};
   for (std::size_t k = 0; k < 14; ++k) columns[k]->store(rows[k]);
   for (int i = 0; i < N; ++i) {
     const int groups = i / 4 + 1;
@@ -292,7 +289,8 @@ DynamicsResult evaluate(const RobotModel& model, const JointVector& q, const Joi
   DynamicsResult result;
   [&]<int... I>(std::integer_sequence<int, I...>) {
     (void)((n == I + 1 && (evaluate_fixed<I + 1>(model, q, qd, result), true)) || ...);
-  }(std::make_integer_sequence<int, kMaxJoints>{});
+  }
+  (std::make_integer_sequence<int, kMaxJoints>{});
   return result;
 }
 

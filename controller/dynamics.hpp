@@ -5,8 +5,8 @@
 
 namespace dashpot::controller {
 
-/// Terms of  M(q) qdd + coriolis + gravity = torque + J' wrench  at one state, and where the tip is.
-/// For n joints; N is n, known at compile time, or at most kMaxJoints (see DynamicsResult).
+/// Terms of  M(q) qdd + coriolis + gravity = torque + J' wrench  at one state, and where the tip
+/// is. For n joints; N is n, known at compile time, or at most kMaxJoints (see DynamicsResult).
 template <int N>
 struct Dynamics {
   Eigen::Matrix<double, N, N> M;         ///< n x n, kg m^2; symmetric positive definite
@@ -20,9 +20,9 @@ struct Dynamics {
 
 /// The same with n chosen at run time, in fixed storage.
 struct DynamicsResult {
-  JointMatrix M;         ///< n x n
-  JointVector coriolis;  ///< n
-  JointVector gravity;   ///< n
+  JointMatrix M;                                                               ///< n x n
+  JointVector coriolis;                                                        ///< n
+  JointVector gravity;                                                         ///< n
   Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxJoints> J;  ///< 6 x n
   Vector6 Jdot_qd;
   Eigen::Vector3d p_BT_B;
@@ -60,15 +60,15 @@ class DynamicsKernel {
   using Row = std::array<double, kPadded>;
 
   // For link i, in its own axes.
-  alignas(64) std::array<Row, 9> rotation_;    ///< from link i to link i - 1 at q = 0, by columns
-  alignas(64) std::array<Row, 3> offset_;      ///< e_i at q = 0, m
-  alignas(64) std::array<Row, 3> next_slide_;  ///< axis of joint i + 1 if prismatic, else 0
-  alignas(64) std::array<Row, 3> first_moment_;   ///< mass times centre of mass, kg m
-  alignas(64) std::array<Row, 6> inertia_;        ///< about p_i: xx yy zz xy xz yz, kg m^2
-  alignas(64) Row mass_;                          ///< kg
-  alignas(64) Row carried_mass_;                  ///< of link i and all beyond it, kg
-  alignas(64) Row revolute_;                      ///< 1, or 0 for a prismatic joint
-  alignas(64) Row prismatic_;                     ///< the other way round
+  alignas(64) std::array<Row, 9> rotation_;      ///< from link i to link i - 1 at q = 0, by columns
+  alignas(64) std::array<Row, 3> offset_;        ///< e_i at q = 0, m
+  alignas(64) std::array<Row, 3> next_slide_;    ///< axis of joint i + 1 if prismatic, else 0
+  alignas(64) std::array<Row, 3> first_moment_;  ///< mass times centre of mass, kg m
+  alignas(64) std::array<Row, 6> inertia_;       ///< about p_i: xx yy zz xy xz yz, kg m^2
+  alignas(64) Row mass_;                         ///< kg
+  alignas(64) Row carried_mass_;                 ///< of link i and all beyond it, kg
+  alignas(64) Row revolute_;                     ///< 1, or 0 for a prismatic joint
+  alignas(64) Row prismatic_;                    ///< the other way round
   Eigen::Matrix<double, N, 1> reflected_inertia_;
   Eigen::Vector3d first_joint_;  ///< p_1 in B at q = 0, m
   Eigen::Vector3d first_slide_;  ///< axis of joint 1 in B if prismatic, else 0

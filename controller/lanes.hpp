@@ -204,8 +204,12 @@ LanesSymmetric<G> turned(const Lanes33<G>& R, const LanesSymmetric<G>& S) {
 template <int G>
 LanesSymmetric<G> shift_term(const Lanes3<G>& a, const Lanes3<G>& b) {
   const Lanes<G> x = a.x * b.x, y = a.y * b.y, z = a.z * b.z;
-  return {2 * (y + z), 2 * (x + z), 2 * (x + y), -(a.x * b.y + b.x * a.y),
-          -(a.x * b.z + b.x * a.z), -(a.y * b.z + b.y * a.z)};
+  return {2 * (y + z),
+          2 * (x + z),
+          2 * (x + y),
+          -(a.x * b.y + b.x * a.y),
+          -(a.x * b.z + b.x * a.z),
+          -(a.y * b.z + b.y * a.z)};
 }
 
 }  // namespace dashpot::controller

@@ -16,7 +16,8 @@ std::string number(double value) {
   return text.data();
 }
 
-KDL::RigidBodyInertia make_body(double mass, const Eigen::Vector3d& center, const Eigen::Matrix3d& I) {
+KDL::RigidBodyInertia make_body(double mass, const Eigen::Vector3d& center,
+                                const Eigen::Matrix3d& I) {
   return KDL::RigidBodyInertia(
       mass, to_kdl(center),
       KDL::RotationalInertia(I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)));
@@ -68,8 +69,7 @@ KDL::RigidBodyInertia body_of(const urdf::Link& link, const std::string& name) {
   Eigen::Matrix3d I;
   I << source.ixx, source.ixy, source.ixz, source.ixy, source.iyy, source.iyz, source.ixz,
       source.iyz, source.izz;
-  const std::string problem =
-      body_problem(source.mass, {frame.p.x(), frame.p.y(), frame.p.z()}, I);
+  const std::string problem = body_problem(source.mass, {frame.p.x(), frame.p.y(), frame.p.z()}, I);
   if (!problem.empty()) throw InvalidModel(name + ": link '" + link.name + "': " + problem);
   return frame * make_body(source.mass, Eigen::Vector3d::Zero(), I);
 }

@@ -3,8 +3,8 @@
 
 #include <dashpot/controller/robot_model.hpp>
 
-#include <kdl/rigidbodyinertia.hpp>
 #include <urdf_model/model.h>
+#include <kdl/rigidbodyinertia.hpp>
 
 #include <string>
 

@@ -15,20 +15,20 @@ enum class JointType : std::uint8_t { kRevolute, kContinuous, kPrismatic };
 struct Joint {
   std::string name;
   JointType type = JointType::kRevolute;
-  double lower = 0;     ///< rad; -infinity for a continuous joint
-  double upper = 0;     ///< rad; infinity for a continuous joint
-  double velocity = 0;  ///< limit, rad/s, not negative; infinity if there is none
-  double effort = 0;    ///< limit, N m, not negative; infinity if there is none
-  double damping = 0;   ///< viscous friction, N m s/rad
-  double friction = 0;  ///< Coulomb friction, N m
+  double lower = 0;              ///< rad; -infinity for a continuous joint
+  double upper = 0;              ///< rad; infinity for a continuous joint
+  double velocity = 0;           ///< limit, rad/s, not negative; infinity if there is none
+  double effort = 0;             ///< limit, N m, not negative; infinity if there is none
+  double damping = 0;            ///< viscous friction, N m s/rad
+  double friction = 0;           ///< Coulomb friction, N m
   double reflected_inertia = 0;  ///< of rotor and gear, as seen by the joint, kg m^2 (kg)
 };
 
 /// A body held at the tip, in the axes of the tip link.
 struct Payload {
-  double mass = 0;                                      ///< kg
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();     ///< of mass, from the tip link's origin, m
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();    ///< about the centre of mass, kg m^2
+  double mass = 0;                                    ///< kg
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();   ///< of mass, from the tip link's origin, m
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre of mass, kg m^2
 };
 
 /// What a URDF does not say, or says wrong. A vector without entries leaves what the URDF says.

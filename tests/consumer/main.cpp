@@ -1,6 +1,8 @@
 // Compiled against the installation, for the plainest processor: what the library was compiled for
 // must not show in the layout of its types.
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/kdl_chain.hpp>
 
 #include <cmath>
 #include <cstdio>
@@ -14,11 +16,31 @@ using dashpot::analysis::Square;
 using dashpot::analysis::Status;
 using dashpot::analysis::System;
 
+/// A pendulum of 2 kg, 0.5 m long, held out level; its dynamics from the library's kernel.
+bool model_works() {
+  using dashpot::controller::Dynamics;
+  using dashpot::controller::DynamicsKernel;
+  const auto model = dashpot::controller::RobotModel::from_urdf_text(
+      "<robot name='pendulum'><link name='wall'/><link name='arm'><inertial>"
+      "<origin xyz='0.5 0 0'/><mass value='2'/><inertia ixx='0' ixy='0' ixz='0' iyy='0' iyz='0' "
+      "izz='0'/></inertial></link><joint name='pivot' type='continuous'><parent link='wall'/>"
+      "<child link='arm'/><axis xyz='0 1 0'/></joint></robot>",
+      "wall", "arm");
+  const DynamicsKernel<1> kernel(model);
+  const Eigen::Matrix<double, 1, 1> zero = Eigen::Matrix<double, 1, 1>::Zero();
+  Dynamics<1> result;
+  kernel.evaluate(zero, zero, result);
+  std::printf("consumer: %.4f kg m^2, %.4f N m\n", result.M(0, 0), result.gravity[0]);
+  return std::abs(result.M(0, 0) - 0.5) < 1e-14 && std::abs(result.gravity[0] + 9.81) < 1e-13 &&
+         dashpot::controller::kdl_chain(model).getNrOfJoints() == 1;
+}
+
 static_assert(EIGEN_DEFAULT_ALIGN_BYTES == 64, "alignment of what Eigen allocates");
 static_assert(EIGEN_MAX_STATIC_ALIGN_BYTES == 64, "alignment of Eigen members");
 static_assert(alignof(Square<8>) == 64);
 
 int main() {
+  if (!model_works()) return 1;
   // Two masses of 1 kg on springs of 100 N/m and 50 N/m, lightly damped.
   System<> system(2);
   system.stiffness << 150, -50, -50, 50;

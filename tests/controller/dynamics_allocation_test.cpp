@@ -31,7 +31,8 @@ TEST(DynamicsAllocation, DoesNotHappen) {
   testing::Random random(751);
   [&]<int... I>(std::integer_sequence<int, I...>) {
     (expect_none<I + 1>(random), ...);
-  }(std::make_integer_sequence<int, kMaxJoints>{});
+  }
+  (std::make_integer_sequence<int, kMaxJoints>{});
 }
 
 }  // namespace

@@ -20,7 +20,8 @@ using testing::Random;
 using testing::RandomRobot;
 
 constexpr double kStep = 1e-4;
-constexpr double kTolerance = 1e-6;  // of differences over kStep, relative to quantities of order one
+constexpr double kTolerance =
+    1e-6;  // of differences over kStep, relative to quantities of order one
 
 /// (f(x + h) - f(x - h)) / 2h by fourth order.
 template <class Function>
@@ -32,8 +33,8 @@ std::vector<RobotModel> models() {
   std::vector<RobotModel> all;
   for (const auto& arm : testing::arms()) all.push_back(testing::arm_model(arm));
   for (const int n : {1, 3, 5, 9, 16}) {
-    all.push_back(RobotModel::from_urdf_text(RandomRobot(100 + static_cast<unsigned>(n)).chain(n, 0.3),
-                                             "link0", "tip"));
+    all.push_back(RobotModel::from_urdf_text(
+        RandomRobot(100 + static_cast<unsigned>(n)).chain(n, 0.3), "link0", "tip"));
   }
   return all;
 }
@@ -61,9 +62,8 @@ TEST(DynamicsPhysics, GravityIsTheGradientOfThePotential) {
     const JointVector gravity = evaluate(model, q, JointVector::Zero(n)).gravity;
     for (int i = 0; i < n; ++i) {
       const JointVector e = JointVector::Unit(n, i);
-      const auto slope = derivative([&](double h) {
-        return Eigen::Matrix<double, 1, 1>(potential(model, q + h * e));
-      });
+      const auto slope = derivative(
+          [&](double h) { return Eigen::Matrix<double, 1, 1>(potential(model, q + h * e)); });
       EXPECT_NEAR(gravity[i], slope[0], kTolerance * gravity.cwiseAbs().maxCoeff())
           << model.name() << ", joint " << i;
     }
@@ -82,8 +82,8 @@ TEST(DynamicsPhysics, JIsTheDerivativeOfThePose) {
         derivative([&](double h) { return pose(h).R_BT; }) * at.R_BT.transpose();
     const Vector6 twist = at.J * qd;
     EXPECT_TRUE(near(twist.head<3>(), v, 10 * kTolerance)) << model.name();
-    EXPECT_TRUE(near(twist.tail<3>(), Eigen::Vector3d(spin(2, 1), spin(0, 2), spin(1, 0)),
-                     10 * kTolerance))
+    EXPECT_TRUE(
+        near(twist.tail<3>(), Eigen::Vector3d(spin(2, 1), spin(0, 2), spin(1, 0)), 10 * kTolerance))
         << model.name();
     EXPECT_TRUE((at.R_BT * at.R_BT.transpose()).isIdentity(1e-13)) << model.name();
   }
@@ -108,8 +108,8 @@ std::vector<Eigen::MatrixXd> mass_derivatives(const RobotModel& model, const Joi
   std::vector<Eigen::MatrixXd> all;
   for (int k = 0; k < n; ++k) {
     const JointVector e = JointVector::Unit(n, k);
-    all.emplace_back(derivative(
-        [&](double h) { return evaluate(model, q + h * e, JointVector::Zero(n)).M; }));
+    all.emplace_back(
+        derivative([&](double h) { return evaluate(model, q + h * e, JointVector::Zero(n)).M; }));
   }
   return all;
 }
@@ -152,9 +152,7 @@ JointVector acceleration(const RobotModel& model, const State& s, const JointVec
 }
 
 State runge_kutta(const RobotModel& model, const State& s, const JointVector& torque, double h) {
-  const auto slope = [&](const State& at) {
-    return State{at.qd, acceleration(model, at, torque)};
-  };
+  const auto slope = [&](const State& at) { return State{at.qd, acceleration(model, at, torque)}; };
   const auto moved = [&](const State& k, double step) {
     return State{s.q + step * k.q, s.qd + step * k.qd};
   };
@@ -184,8 +182,7 @@ TEST(DynamicsPhysics, EnergyGrowsByTheWorkOfTheTorques) {
     const int n = model.dof();
     if (n > 9) continue;  // time
     const State start{0.5 * random.vector(n), 0.5 * random.vector(n)};
-    const JointVector torque =
-        evaluate(model, start.q, start.qd).gravity + 0.1 * random.vector(n);
+    const JointVector torque = evaluate(model, start.q, start.qd).gravity + 0.1 * random.vector(n);
     const double coarse = imbalance(model, start, torque, 2e-3);
     const double fine = imbalance(model, start, torque, 1e-3);
     EXPECT_LT(fine, 1e-6) << model.name() << n;

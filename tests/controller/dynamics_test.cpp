@@ -115,8 +115,8 @@ TEST(Dynamics, OfAPendulumAreThoseOfTheTextbook) {
 }
 
 TEST(Dynamics, OfAPrismaticPairFeelTheCoriolisForce) {
-  // A slider of 3 kg on a turntable about z, at q2 along x: inertia 3 q2^2, radial force -3 q2 qd1^2,
-  // torque 2 * 3 q2 qd1 qd2.
+  // A slider of 3 kg on a turntable about z, at q2 along x: inertia 3 q2^2, radial force -3 q2
+  // qd1^2, torque 2 * 3 q2 qd1 qd2.
   const std::string body = testing::inertial(3, {0, 0, 0}, Eigen::Matrix3d::Zero());
   const RobotModel model = RobotModel::from_urdf_text(
       "<robot name='slider'><link name='a'/><link name='b'/><link name='c'>" + body +
@@ -130,10 +130,10 @@ TEST(Dynamics, OfAPrismaticPairFeelTheCoriolisForce) {
   qd << 1.5, -0.5;
   const DynamicsResult result = evaluate(model, q, qd);
   EXPECT_TRUE(near(result.M, Eigen::Matrix2d{{3 * 0.16, 0}, {0, 3}}, 1e-15));
-  EXPECT_TRUE(near(result.coriolis,
-                   Eigen::Vector2d(2 * 3 * 0.4 * 1.5 * -0.5, -3 * 0.4 * 1.5 * 1.5), 1e-14));
-  EXPECT_TRUE(near(result.p_BT_B, Eigen::Vector3d(0.4 * std::cos(0.7), 0.4 * std::sin(0.7), 0),
-                   1e-15));
+  EXPECT_TRUE(near(result.coriolis, Eigen::Vector2d(2 * 3 * 0.4 * 1.5 * -0.5, -3 * 0.4 * 1.5 * 1.5),
+                   1e-14));
+  EXPECT_TRUE(
+      near(result.p_BT_B, Eigen::Vector3d(0.4 * std::cos(0.7), 0.4 * std::sin(0.7), 0), 1e-15));
   EXPECT_EQ(result.gravity, Eigen::Vector2d::Zero());
 }
 
@@ -147,8 +147,7 @@ TEST(Dynamics, OfThePandaGiveTheTranslationalModesOfThePaper) {
   ModelOptions fingers;
   fingers.payload.mass = 2 * 0.015;
   fingers.payload.center.z() = 0.0584 - 0.1034;  // their origin and the tip, from the hand
-  const DynamicsResult dynamics =
-      evaluate(arm_model(arms()[0], fingers), q, JointVector::Zero(7));
+  const DynamicsResult dynamics = evaluate(arm_model(arms()[0], fingers), q, JointVector::Zero(7));
   const auto diagonal = [](const Vector6& v) { return Eigen::MatrixXd(v.asDiagonal()); };
   analysis::TaskImpedance impedance;
   impedance.mass = dynamics.M;

@@ -34,7 +34,9 @@ std::string problem(const std::string& text, const ModelOptions& options = {},
   return message;
 }
 
-std::string robot(const std::string& parts) { return "<robot name='r'>" + parts + "</robot>"; }
+std::string robot(const std::string& parts) {
+  return "<robot name='r'>" + parts + "</robot>";
+}
 
 std::string joint(const std::string& name, const std::string& parent, const std::string& child,
                   const std::string& type = "revolute", const std::string& more = "") {
@@ -61,7 +63,9 @@ std::string arm(const std::string& link, const std::string& more = "",
                joint("j", "a", "b", type, more));
 }
 
-TEST(RobotModelErrors, AreNotThereForAGoodArm) { EXPECT_EQ(problem(arm(kGood)), "no error"); }
+TEST(RobotModelErrors, AreNotThereForAGoodArm) {
+  EXPECT_EQ(problem(arm(kGood)), "no error");
+}
 
 TEST(RobotModelErrors, NameTheFileThatCannotBeRead) {
   const auto message = [](const std::string& path) -> std::string {
@@ -86,7 +90,9 @@ struct Bad {
   const char* reason;  ///< a part of it
 };
 
-void PrintTo(const Bad& bad, std::ostream* out) { *out << bad.text; }
+void PrintTo(const Bad& bad, std::ostream* out) {
+  *out << bad.text;
+}
 
 std::string name_of(const ::testing::TestParamInfo<Bad>& info) {
   return info.param.name;
@@ -106,7 +112,8 @@ const std::string kMoreLinks = "<link name='c'/><link name='d'/>";
 INSTANTIATE_TEST_SUITE_P(
     Trees, RobotModelRefuses,
     ::testing::Values(
-        Bad{"Nothing", "", "", "Error document empty"}, Bad{"Words", "mass: [[1]]", "", "Error document empty"},
+        Bad{"Nothing", "", "", "Error document empty"},
+        Bad{"Words", "mass: [[1]]", "", "Error document empty"},
         Bad{"BrokenXml", "<robot name='r'><link name='a'", "", ""},
         Bad{"AnotherElement", "<sdf/>", "", "robot"},
         Bad{"NoLinks", robot(""), "", "No link elements"},
@@ -144,12 +151,10 @@ INSTANTIATE_TEST_SUITE_P(
             "joint 'j': ", "mimics joint 'k'"},
         Bad{"ZeroAxis", arm(kGood, "<axis xyz='0 0 0'/>"), "joint 'j': ", "axis"},
         Bad{"AxisNotANumber", arm(kGood, "<axis xyz='0 nan 1'/>"), "", "[j]"},
-        Bad{"LimitsReversed",
-            arm(kGood, "<limit lower='1' upper='-1' effort='1' velocity='1'/>"),
+        Bad{"LimitsReversed", arm(kGood, "<limit lower='1' upper='-1' effort='1' velocity='1'/>"),
             "joint 'j': ", "lower limit is above its upper"},
         Bad{"NoLimits", arm(kGood, "<!--<limit-->"), "", "limits"},
-        Bad{"NegativeVelocity",
-            arm(kGood, "<limit lower='0' upper='1' effort='1' velocity='-1'/>"),
+        Bad{"NegativeVelocity", arm(kGood, "<limit lower='0' upper='1' effort='1' velocity='-1'/>"),
             "joint 'j': ", "negative"},
         Bad{"NegativeDamping", arm(kGood, "<dynamics damping='-1' friction='0'/>"),
             "joint 'j': ", "damping is negative"},
@@ -164,12 +169,12 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"MassNotANumber", arm(inertial("nan", "1", "1", "1")), "", "[b]"},
         Bad{"MassWithAUnit", arm(inertial("2kg", "1", "1", "1")), "", "[b]"},
         Bad{"InertiaNotFinite", arm(inertial("2", "1e999", "1", "1")), "", "[b]"},
-        Bad{"NegativeMoment", arm(inertial("2", "-1", "1", "1")), "link 'b': ",
-            "not positive definite: a principal moment is -1 kg m^2"},
-        Bad{"Indefinite", arm(inertial("2", "1", "1", "1", "1.5")), "link 'b': ",
-            "not positive definite"},
-        Bad{"TriangleInequality", arm(inertial("2", "1", "1", "2.1")), "link 'b': ",
-            "breaks the triangle inequality: principal moments 1, 1, 2.1 kg m^2"},
+        Bad{"NegativeMoment", arm(inertial("2", "-1", "1", "1")),
+            "link 'b': ", "not positive definite: a principal moment is -1 kg m^2"},
+        Bad{"Indefinite", arm(inertial("2", "1", "1", "1", "1.5")),
+            "link 'b': ", "not positive definite"},
+        Bad{"TriangleInequality", arm(inertial("2", "1", "1", "2.1")),
+            "link 'b': ", "breaks the triangle inequality: principal moments 1, 1, 2.1 kg m^2"},
         Bad{"NoInertia", arm(""), "joint 'j': ", "no inertia resists it"},
         Bad{"MassOnTheAxisOnly",
             arm("<inertial><origin xyz='3 0 0'/><mass value='1'/><inertia ixx='0' ixy='0' ixz='0' "

@@ -152,10 +152,9 @@ TEST(RobotModel, TurnsGravityIntoTheAxesOfABaseThatIsNotTheRoot) {
   q.tail(5) = JointVector::LinSpaced(5, -1, 1.3);
   qd.tail(5) = JointVector::LinSpaced(5, 0.7, -0.4);
   const DynamicsResult all = evaluate(whole, q, qd), some = at(part);
-  const Eigen::Matrix3d R =
-      evaluate(RobotModel::from_urdf_text(text, "link0", "link3"), JointVector::Zero(3),
-               JointVector::Zero(3))
-          .R_BT;
+  const Eigen::Matrix3d R = evaluate(RobotModel::from_urdf_text(text, "link0", "link3"),
+                                     JointVector::Zero(3), JointVector::Zero(3))
+                                .R_BT;
   EXPECT_TRUE(near(some.M, all.M.bottomRightCorner(5, 5), 1e-12));
   EXPECT_TRUE(near(some.coriolis, all.coriolis.tail(5), 1e-12));
   EXPECT_TRUE(near(some.gravity, all.gravity.tail(5), 1e-12));
@@ -169,7 +168,8 @@ TEST(RobotModel, MovesTheTipToTheTool) {
   options.tool.position = {0.1, 0.2, -0.3};
   options.tool.rotation =
       Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
-  const DynamicsResult bare = at(testing::arm_model(arm)), tool = at(testing::arm_model(arm, options));
+  const DynamicsResult bare = at(testing::arm_model(arm)),
+                       tool = at(testing::arm_model(arm, options));
   const Eigen::Vector3d r = bare.R_BT * options.tool.position;
   EXPECT_TRUE(near(tool.p_BT_B, bare.p_BT_B + r, 1e-14));
   EXPECT_TRUE(near(tool.R_BT, bare.R_BT * options.tool.rotation, 1e-14));
@@ -184,8 +184,8 @@ TEST(RobotModel, MovesTheTipToTheTool) {
 TEST(RobotModel, MergesFixedJointsAndMasslessLinks) {
   RandomRobot random(745);
   // A link split in two by a fixed joint without an offset, with a massless one between.
-  const std::string head = "<robot name='r'><link name='a'/>" +
-                           random.joint("j", "revolute", "a", "b");
+  const std::string head =
+      "<robot name='r'><link name='a'/>" + random.joint("j", "revolute", "a", "b");
   const std::string inertia_1 = testing::inertial(1, {0.1, 0, 0}, random.inertia(1, 0.1));
   const std::string inertia_2 = testing::inertial(2, {0, 0.3, 0}, random.inertia(2, 0.1));
   const RobotModel split = RobotModel::from_urdf_text(
@@ -196,9 +196,9 @@ TEST(RobotModel, MergesFixedJointsAndMasslessLinks) {
       "a", "d");
   EXPECT_EQ(split.dof(), 1);
   // The second joint's offset undoes the first: Rz(1.5) (-2, 1, -3) + (1, 2, 3).
-  const Eigen::Vector3d p = Eigen::AngleAxisd(1.5, Eigen::Vector3d::UnitZ()) *
-                                Eigen::Vector3d(-2, 1, -3) +
-                            Eigen::Vector3d(1, 2, 3);
+  const Eigen::Vector3d p =
+      Eigen::AngleAxisd(1.5, Eigen::Vector3d::UnitZ()) * Eigen::Vector3d(-2, 1, -3) +
+      Eigen::Vector3d(1, 2, 3);
   const RobotModel joined = RobotModel::from_urdf_text(
       head + "<link name='b'>" + inertia_1 + "</link><link name='d'>" + inertia_2 +
           "</link><joint name='k' type='fixed'><parent link='b'/><child link='d'/><origin xyz='" +
@@ -208,9 +208,9 @@ TEST(RobotModel, MergesFixedJointsAndMasslessLinks) {
 }
 
 TEST(RobotModel, TakesAnAxisOfAnyLength) {
-  const std::string link =
-      "<link name='b'>" +
-      testing::inertial(1, {0.3, 0.1, 0}, 0.1 * Eigen::Matrix3d::Identity()) + "</link>";
+  const std::string link = "<link name='b'>" +
+                           testing::inertial(1, {0.3, 0.1, 0}, 0.1 * Eigen::Matrix3d::Identity()) +
+                           "</link>";
   const auto model = [&](const std::string& axis) {
     return RobotModel::from_urdf_text(
         "<robot name='r'><link name='a'/>" + link +

@@ -1,5 +1,6 @@
 #pragma once
-// EXPECT_TRUE(same_dynamics(computed, expected, qd, 1e-12)): every term, scaled by what it is made of.
+// EXPECT_TRUE(same_dynamics(computed, expected, qd, 1e-12)): every term, scaled by what it is made
+// of.
 
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/support/matrices.hpp>
@@ -30,8 +31,8 @@ inline ::testing::AssertionResult same_dynamics(const controller::DynamicsResult
   if (!result) return result;
   result = check("Jdot_qd", computed.Jdot_qd, expected.Jdot_qd, reach * speed);
   if (!result) return result;
-  result = check("p_BT_B", computed.p_BT_B, expected.p_BT_B,
-                 std::max(1.0, largest(expected.p_BT_B)));
+  result =
+      check("p_BT_B", computed.p_BT_B, expected.p_BT_B, std::max(1.0, largest(expected.p_BT_B)));
   if (!result) return result;
   return check("R_BT", computed.R_BT, expected.R_BT, 1);
 }

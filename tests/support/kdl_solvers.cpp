@@ -68,8 +68,8 @@ DASHPOT_VISIBLE KdlTerms KdlSolvers::terms() const {
   const auto list = [](const auto& matrix) {
     return std::vector<double>(matrix.data(), matrix.data() + matrix.size());
   };
-  KdlTerms terms{list(s.M.data), list(s.coriolis.data), list(s.gravity.data), list(s.J.data),
-                 {},             {},                    {}};
+  KdlTerms terms{
+      list(s.M.data), list(s.coriolis.data), list(s.gravity.data), list(s.J.data), {}, {}, {}};
   for (int i = 0; i < 3; ++i) {
     terms.Jdot_qd[i] = s.Jdot_qd.vel(i);
     terms.Jdot_qd[3 + i] = s.Jdot_qd.rot(i);

@@ -1,0 +1,153 @@
+// What `dashpot inspect` prints, and what it says to bad input.
+#include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/kdl_dynamics.hpp>
+
+#include <gmock/gmock.h>
+
+#include <string>
+#include <vector>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+using Words = std::vector<std::string>;
+
+Outcome inspect(const dashpot::testing::Arm& arm, Words more) {
+  Words words = {"inspect", "--urdf", dashpot::testing::arm_path(arm.file), "--base", arm.base,
+                 "--tip",   arm.tip};
+  words.insert(words.end(), more.begin(), more.end());
+  return run_program(words);
+}
+
+Outcome inspect_panda(const Words& more) {
+  return inspect(dashpot::testing::arms()[0], more);
+}
+
+Rows rows_of(const Eigen::MatrixXd& matrix) {
+  Rows rows;
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    rows.emplace_back();
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) rows.back().push_back(matrix(i, j));
+  }
+  return rows;
+}
+
+/// Compares the object with KDL's numbers.
+void expect_matches(const Json& result, const controller::DynamicsResult& expected) {
+  const auto vector = [](const Eigen::MatrixXd& v) { return rows_of(v.transpose()); };
+  EXPECT_EQ(result.size(), 7u);
+  expect_near(result["mass_matrix"], rows_of(expected.M), 1e-12);
+  expect_near({result["coriolis"]}, vector(expected.coriolis), 1e-12);
+  expect_near({result["gravity"]}, vector(expected.gravity), 1e-12);
+  expect_near(result["jacobian"], rows_of(expected.J), 1e-12);
+  expect_near({result["jacobian_dot_qd"]}, vector(expected.Jdot_qd), 1e-12);
+  expect_near({result["tip_position"]}, vector(expected.p_BT_B), 1e-12);
+  expect_near(result["tip_rotation"], rows_of(expected.R_BT), 1e-12);
+}
+
+TEST(Inspect, PrintsWhatKdlComputesForEachArm) {
+  for (const auto& arm : dashpot::testing::arms()) {
+    SCOPED_TRACE(arm.file);
+    const controller::RobotModel model = dashpot::testing::arm_model(arm);
+    const bool six = model.dof() == 6;
+    const std::string q = six ? "0.1,-0.2,0.3,-0.4,0.5,-0.6" : "0.1,-0.2,0.3,-0.4,0.5,-0.6,0.7";
+    const std::string qd = six ? "1,0,-1,0.5,2,-2" : "1,0,-1,0.5,2,-2,1e-1";
+    controller::JointVector position(model.dof()), velocity(model.dof());
+    for (int i = 0; i < model.dof(); ++i) position[i] = (i % 2 == 0 ? 0.1 : -0.1) * (i + 1);
+    velocity.head(6) << 1, 0, -1, 0.5, 2, -2;
+    if (!six) velocity[6] = 0.1;
+    expect_matches(parse(inspect(arm, {"--q", q, "--qd", qd, "--json"})),
+                   dashpot::testing::by_kdl(model, position, velocity));
+  }
+}
+
+TEST(Inspect, TakesZerosAndEarthsGravityUnlessToldOtherwise) {
+  const Json plain = parse(inspect_panda({"--json"}));
+  const Json zeros = parse(inspect_panda(
+      {"--json", "--q", "0,0,0,0,0,0,0", "--qd", "0,0,0,0,0,0,0", "--gravity", "0,0,-9.81"}));
+  EXPECT_EQ(plain, zeros);
+  EXPECT_EQ(plain["coriolis"], Json(Numbers(7, 0.0)));
+  const Json upside_down = parse(inspect_panda({"--json", "--gravity", "0,0,9.81"}));
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_EQ(upside_down["gravity"][i].get<double>(), -plain["gravity"][i].get<double>());
+  }
+}
+
+TEST(Inspect, AddsReflectedInertia) {
+  const Json bare = parse(inspect_panda({"--json"}));
+  const Json geared = parse(inspect_panda({"--json", "--reflected-inertia", "1,2,3,4,5,6,7"}));
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_NEAR(geared["mass_matrix"][i][i].get<double>(),
+                bare["mass_matrix"][i][i].get<double>() + i + 1, 1e-14);
+  }
+}
+
+TEST(Inspect, WeighsOrLeavesOutLinksOffTheChain) {
+  // The hand hangs off the chain that ends in link 7.
+  const dashpot::testing::Arm wrist = {"panda", "panda_link0", "panda_link7"};
+  const Json with_hand = parse(inspect(wrist, {"--json"}));
+  const Json without = parse(inspect(wrist, {"--json", "--exclude-off-chain"}));
+  expect_near(with_hand["mass_matrix"], parse(inspect_panda({"--json"}))["mass_matrix"], 1e-14);
+  EXPECT_GT(with_hand["mass_matrix"][0][0].get<double>(),
+            without["mass_matrix"][0][0].get<double>());
+  EXPECT_EQ(with_hand["jacobian"], without["jacobian"]);
+}
+
+TEST(Inspect, ShowsTablesToPeople) {
+  const Outcome outcome = inspect_panda({"--q", "0,-0.785,0,-2.356,0,1.571,0.785"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, IsEmpty());
+  EXPECT_THAT(outcome.out, StartsWith("panda: 7 joints from panda_link0 to panda_hand_tcp."));
+  EXPECT_THAT(outcome.out, HasSubstr("panda_joint4  revolute  -3.07180  -0.06980"));
+  EXPECT_THAT(outcome.out, HasSubstr("\nMass matrix\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("\nJacobian at the tip\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("  x  0.307020"));
+}
+
+void expect_refused(const Outcome& outcome, const std::string& text) {
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.out, IsEmpty());
+  EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
+  EXPECT_THAT(outcome.err, StartsWith("dashpot inspect: " + text));
+}
+
+TEST(Inspect, RefusesNumbersThatDoNotFit) {
+  expect_refused(inspect_panda({"--q", "1,2"}), "--q: 2 numbers for 7 joints");
+  expect_refused(inspect_panda({"--qd", "1,2,3,4,5,6,7,8"}), "--qd: 8 numbers for 7 joints");
+  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,nan"}), "--q: 'nan' is not a finite number");
+  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1e999"}), "--q: '1e999' is not");
+  expect_refused(inspect_panda({"--q", "0,0,0,,0,0,0"}), "--q: '' is not a finite number");
+  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1x"}), "--q: '1x' is not a finite number");
+  expect_refused(inspect_panda({"--gravity", "9.81"}), "--gravity: x,y,z is wanted");
+  expect_refused(
+      inspect_panda({"--reflected-inertia", "1,2"}),
+      dashpot::testing::arm_path("panda") + ": reflected inertia: has 2 entries for 7 joints");
+  expect_refused(inspect_panda({"--reflected-inertia", "1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1"}),
+                 "--reflected-inertia: more numbers than joints");
+}
+
+TEST(Inspect, RefusesFilesAndLinksThatDoNotFit) {
+  const auto panda = dashpot::testing::arm_path("panda");
+  expect_refused(inspect({"panda", "panda_link0", "hand"}, {}),
+                 panda + ": link 'hand': there is none");
+  expect_refused(inspect({"panda", "base", "panda_link7"}, {}),
+                 panda + ": link 'base': there is none");
+  expect_refused(inspect({"panda", "panda_link7", "panda_link0"}, {"--json"}),
+                 panda + ": link 'panda_link0': not beyond the base, 'panda_link7'");
+  const auto missing = dashpot::testing::arm_path("no_such_arm");
+  expect_refused(inspect({"no_such_arm", "a", "b"}, {}),
+                 missing + ": cannot be read: No such file");
+  const Scratch scratch;
+  const std::string broken = scratch.write("broken.urdf", "<robot name='r'><link");
+  expect_refused(run_program({"inspect", "--urdf", broken, "--base", "a", "--tip", "b"}),
+                 broken + ": ");
+  expect_refused(run_program({"inspect", "--base", "a", "--tip", "b"}), "--urdf is required");
+}
+
+}  // namespace
+}  // namespace dashpot::tests
