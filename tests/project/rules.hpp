@@ -21,7 +21,8 @@ inline const std::vector<Layer>& layers() {
       {"analysis", {"dashpot/analysis/", "Eigen/"}},
       {"controller",
        {"dashpot/controller/", "dashpot/analysis/", "Eigen/", "kdl/", "urdf_", "console_bridge/"}},
-      {"sim", {"dashpot/sim/", "Eigen/", "urdf_"}},  // an independent check of the two above
+      // an independent check of the two above:
+      {"sim", {"dashpot/sim/", "Eigen/", "urdf_", "console_bridge/"}},
       {"lcmtypes",
        {"dashpot/lcmtypes/", "dashpot/analysis/types.hpp", "dashpot/controller/types.hpp", "lcm/"}},
       {"apps", {""}},

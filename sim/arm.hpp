@@ -1,0 +1,86 @@
+#pragma once
+#include <dashpot/sim/articulated_body.hpp>
+#include <dashpot/sim/contact.hpp>
+#include <dashpot/sim/invalid_scene.hpp>
+#include <dashpot/sim/robot.hpp>
+#include <dashpot/sim/schedule.hpp>
+#include <dashpot/sim/system.hpp>
+
+#include <optional>
+#include <vector>
+
+namespace dashpot::sim {
+
+/// A frictionless, compliant half space that the tip's origin may press into.
+struct Wall {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();    ///< on the surface, m, in the base
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< out of the wall; any length but zero
+  Contact contact{1e4, 50};                           ///< N/m, N s/m
+};
+
+/// What acts on the arm beside gravity and torque. What is off or zero costs nothing.
+struct ArmOptions {
+  bool viscous_friction = true;  ///< with the coefficients of the robot
+  bool coulomb_friction = true;  ///< likewise: -coulomb tanh(qd / friction_velocity)
+  /// v_s, where Coulomb friction has three quarters of its value, rad/s or m/s. At rest it acts as
+  /// a damper of coulomb / v_s: joints creep slowly instead of sticking. With inertia m, RK4 then
+  /// needs steps below 2.7 m v_s / coulomb, semi-implicit Euler below 2 m v_s / coulomb.
+  double friction_velocity = 0.01;
+  std::optional<Contact> stops;  ///< at the position limits; N m/rad and N m s/rad (N/m, N s/m)
+  std::optional<Wall> wall;
+  std::vector<Piece<Vector6>> wrenches;  ///< of the world on the tip, at its origin, in base axes
+};
+
+/// A robot arm: M(q) qdd + C(q, qd) qd + g(q) = tau - friction + stops + J' (wall + wrenches).
+class Arm : public System {
+ public:
+  /// Throws InvalidScene.
+  explicit Arm(const Robot& robot, const ArmOptions& options = {});
+
+  const Robot& robot() const noexcept { return robot_; }
+  Pose tip_pose(const JointVector& q) noexcept;
+  /// Linear and angular velocity of the tip, m/s and rad/s, in the base's axes.
+  Vector6 tip_twist(const JointVector& q, const JointVector& qd) noexcept;
+
+  double begin_segment(double t) noexcept override;
+  void rates(const StateVector& y, StateVector& y_dot) noexcept override;
+  StoredEnergy stored_energy(const StateVector& y) noexcept override;
+  bool has_contacts() const noexcept override { return options_.stops || options_.wall; }
+  ContactModes contact_modes(const StateVector& y) noexcept override;
+  void freeze(ContactModes modes) noexcept override {
+    frozen_ = true;
+    frozen_modes_ = modes;
+  }
+  void thaw() noexcept override { frozen_ = false; }
+
+ private:
+  /// Adds one kind of force to the sums, and its power to the work channels.
+  struct Sums {
+    const double* q;
+    const double* qd;
+    double* tau;
+    double* work;
+  };
+  using Force = void (*)(Arm& arm, const Sums& sums) noexcept;
+  static void add_viscous_friction(Arm& arm, const Sums& sums) noexcept;
+  static void add_coulomb_friction(Arm& arm, const Sums& sums) noexcept;
+  static void add_stops(Arm& arm, const Sums& sums) noexcept;
+  static void add_wall(Arm& arm, const Sums& sums) noexcept;
+  static void add_wrench(Arm& arm, const Sums& sums) noexcept;
+
+  double wall_depth() const noexcept;
+  double wall_rate() const noexcept;
+  ContactMode mode_of(int contact_index, const Contact& contact, double depth,
+                      double rate) const noexcept;
+
+  Robot robot_;
+  ArmOptions options_;
+  ArticulatedBody bodies_;
+  std::vector<Force> forces_;  // those that this scene has
+  Schedule<Vector6> wrenches_;
+  Vector6 wrench_ = Vector6::Zero();
+  bool frozen_ = false;
+  ContactModes frozen_modes_ = 0;
+};
+
+}  // namespace dashpot::sim

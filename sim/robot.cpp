@@ -1,0 +1,323 @@
+#include <dashpot/sim/robot.hpp>
+
+#include <console_bridge/console.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+namespace dashpot::sim {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+[[noreturn]] void fail(const std::string& where, const std::string& reason) {
+  throw InvalidRobot(where + ": " + reason);
+}
+
+void require_finite(double value, double least, const std::string& where, const char* unit) {
+  if (std::isfinite(value) && value >= least) return;
+  std::ostringstream text;
+  text << "is " << value << " " << unit << ", must be finite"
+       << (least == 0 ? " and not negative" : "");
+  fail(where, text.str());
+}
+
+Vector3d vector_of(const urdf::Vector3& v) {
+  return {v.x, v.y, v.z};
+}
+
+Pose pose_of(const urdf::Pose& pose, const std::string& where) {
+  const Eigen::Quaterniond turn(pose.rotation.w, pose.rotation.x, pose.rotation.y, pose.rotation.z);
+  const Pose result{vector_of(pose.position), turn.normalized().toRotationMatrix()};
+  if (!result.position.allFinite()) fail(where, "origin xyz is not finite");
+  if (!result.rotation.allFinite()) fail(where, "origin rpy is not finite");
+  return result;
+}
+
+Pose operator*(const Pose& a, const Pose& b) {
+  return {a.position + a.rotation * b.position, a.rotation * b.rotation};
+}
+
+Inertia operator*(const Pose& pose, const Inertia& body) {
+  return {body.mass, pose.position + pose.rotation * body.center,
+          pose.rotation * body.about_center * pose.rotation.transpose()};
+}
+
+/// The inertia of a mass about a point that is off its centre by r: m (r.r 1 - r r').
+Matrix3d parallel_axes(double mass, const Vector3d& r) {
+  return mass * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose());
+}
+
+Inertia operator+(const Inertia& a, const Inertia& b) {
+  const double mass = a.mass + b.mass;
+  if (mass == 0) return {0, Vector3d::Zero(), a.about_center + b.about_center};
+  const Vector3d center = (a.mass * a.center + b.mass * b.center) / mass;
+  return {mass, center,
+          a.about_center + parallel_axes(a.mass, a.center - center) + b.about_center +
+              parallel_axes(b.mass, b.center - center)};
+}
+
+void require_physical(const Inertia& body, const std::string& where) {
+  require_finite(body.mass, 0, where + ": mass", "kg");
+  if (!body.center.allFinite()) fail(where, "the centre of mass is not finite");
+  if (!body.about_center.allFinite()) fail(where, "inertia is not finite");
+  if (body.about_center != body.about_center.transpose()) fail(where, "inertia is not symmetric");
+  const Vector3d moments =
+      Eigen::SelfAdjointEigenSolver<Matrix3d>(body.about_center, Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  if (moments[0] < -1e-9 * moments[2]) {
+    std::ostringstream text;
+    text << "inertia has the negative principal moment " << moments[0] << " kg m^2";
+    fail(where, text.str());
+  }
+}
+
+/// The parser says what is wrong through a logger; this keeps it.
+class ParserMessages : public console_bridge::OutputHandler {
+ public:
+  ParserMessages() { console_bridge::useOutputHandler(this); }
+  ~ParserMessages() override { console_bridge::restorePreviousOutputHandler(); }
+  ParserMessages(const ParserMessages&) = delete;
+  ParserMessages& operator=(const ParserMessages&) = delete;
+
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR || !first_.empty()) return;
+    first_ = text;
+    std::replace(first_.begin(), first_.end(), '\n', ' ');
+  }
+  const std::string& first() const { return first_; }
+
+ private:
+  std::string first_;
+};
+
+using Link = urdf::LinkConstSharedPtr;
+
+class Reader {
+ public:
+  Reader(const std::string& text, const std::string& name) : name_(name) {
+    ParserMessages messages;
+    model_ = urdf::parseURDF(text);
+    if (!model_) fail(name, messages.first().empty() ? "not a robot" : messages.first());
+    require_tree();
+  }
+
+  Link link(const std::string& name, const char* role) const {
+    const Link found = model_->getLink(name);
+    if (!found) fail(name_, std::string(role) + " link '" + name + "' does not exist");
+    return found;
+  }
+
+  /// The joints from the base link to the tip link, fixed ones too.
+  std::vector<urdf::JointConstSharedPtr> path(const Link& base, const Link& tip) const {
+    std::vector<urdf::JointConstSharedPtr> joints;
+    for (Link at = tip; at != base; at = at->getParent()) {
+      if (!at->parent_joint) {
+        fail(name_, "tip link '" + tip->name + "' does not hang on base link '" + base->name + "'");
+      }
+      joints.push_back(at->parent_joint);
+    }
+    std::reverse(joints.begin(), joints.end());
+    return joints;
+  }
+
+  std::string at(const urdf::Joint& joint) const { return name_ + ": joint '" + joint.name + "'"; }
+
+  Pose origin(const urdf::Joint& joint) const {
+    return pose_of(joint.parent_to_joint_origin_transform, at(joint));
+  }
+
+  /// Of the link and all that hangs on it, but for the joint `left_out`; in the link's axes.
+  Inertia lumped(const urdf::Link& link, const urdf::Joint* left_out) const {
+    Inertia sum = own(link);
+    for (const urdf::JointSharedPtr& joint : link.child_joints) {
+      if (joint.get() == left_out) continue;
+      sum = sum + origin(*joint) * lumped(*model_->getLink(joint->child_link_name), nullptr);
+    }
+    return sum;
+  }
+
+  Joint joint(const urdf::Joint& joint) const;
+  Vector3d axis(const urdf::Joint& joint) const;
+  const urdf::Link& child(const urdf::Joint& joint) const {
+    return *model_->getLink(joint.child_link_name);
+  }
+  Link root() const { return model_->getRoot(); }
+
+ private:
+  Inertia own(const urdf::Link& link) const {
+    if (!link.inertial) return {};
+    const std::string where = name_ + ": link '" + link.name + "'";
+    const urdf::Inertial& read = *link.inertial;
+    Inertia body;
+    body.mass = read.mass;
+    body.about_center << read.ixx, read.ixy, read.ixz,  //
+        read.ixy, read.iyy, read.iyz,                   //
+        read.ixz, read.iyz, read.izz;
+    require_physical(body, where);
+    return pose_of(read.origin, where) * body;
+  }
+
+  /// The parser lets links with two parents and loops pass.
+  void require_tree() const {
+    for (const auto& [name, joint] : model_->joints_) {
+      if (child(*joint).parent_joint != joint) {
+        fail(name_, "link '" + joint->child_link_name + "' is the child of two joints");
+      }
+    }
+    for (const auto& [name, link] : model_->links_) {
+      std::size_t steps = 0;
+      for (Link at = link; at != root(); at = at->getParent()) {
+        if (++steps > model_->links_.size()) fail(name_, "link '" + name + "' is part of a loop");
+      }
+    }
+  }
+
+  std::string name_;
+  urdf::ModelInterfaceSharedPtr model_;
+};
+
+/// All of a moving joint but its pose and inertia.
+Joint Reader::joint(const urdf::Joint& read) const {
+  const bool continuous = read.type == urdf::Joint::CONTINUOUS;
+  const bool prismatic = read.type == urdf::Joint::PRISMATIC;
+  const std::string where = at(read);
+  if (!continuous && !prismatic && read.type != urdf::Joint::REVOLUTE) {
+    fail(where, "type must be fixed, revolute, continuous or prismatic on the chain");
+  }
+  if (read.mimic) fail(where, "mimics another joint; on the chain it must move by itself");
+  Joint result;
+  result.name = read.name;
+  result.prismatic = prismatic;
+  const bool limited = read.limits && !continuous;
+  result.lower = limited ? read.limits->lower : -kInfinity;
+  result.upper = limited ? read.limits->upper : kInfinity;
+  if (!(result.lower < result.upper)) fail(where, "lower limit is not below upper limit");
+  // Files write 0 for a limit that they do not know.
+  result.effort = read.limits && read.limits->effort != 0 ? read.limits->effort : kInfinity;
+  result.velocity = read.limits && read.limits->velocity != 0 ? read.limits->velocity : kInfinity;
+  if (!(result.effort > 0)) fail(where, "limit effort is negative");
+  if (!(result.velocity > 0)) fail(where, "limit velocity is negative");
+  if (read.dynamics) {
+    result.viscous = read.dynamics->damping;
+    result.coulomb = read.dynamics->friction;
+  }
+  require_finite(result.viscous, 0, where + ": dynamics damping",
+                 prismatic ? "N s/m" : "N m s/rad");
+  require_finite(result.coulomb, 0, where + ": dynamics friction", prismatic ? "N" : "N m");
+  return result;
+}
+
+/// Unit vector, in the axes of the child link.
+Vector3d Reader::axis(const urdf::Joint& joint) const {
+  const Vector3d axis = vector_of(joint.axis);
+  const double norm = axis.norm();
+  if (!std::isfinite(norm) || norm < 1e-9) fail(at(joint), "axis is zero or not finite");
+  return axis / norm;
+}
+
+/// Columns x, y, z of a frame whose z axis is `axis`; the identity for (0, 0, 1).
+Matrix3d frame_on(const Vector3d& axis) {
+  return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
+}
+
+void override_with(const JointVector& values, double Joint::*member, const char* key,
+                   const char* unit, std::vector<Joint>& joints) {
+  if (values.size() == 0) return;
+  if (values.size() != static_cast<Eigen::Index>(joints.size())) {
+    std::ostringstream text;
+    text << "has " << values.size() << " entries, the chain has " << joints.size() << " joints";
+    fail(key, text.str());
+  }
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const double value = values[static_cast<Eigen::Index>(i)];
+    require_finite(value, 0, std::string(key) + " of joint '" + joints[i].name + "'", unit);
+    joints[i].*member = value;
+  }
+}
+
+/// Every joint must move something. Masses that lie on its axis in some position are not found
+/// here; the plant then reports Status::kStateNotFinite.
+void require_inertia(const std::vector<Joint>& joints, const std::string& name) {
+  double mass = 0, moment = 0;
+  for (auto joint = joints.rbegin(); joint != joints.rend(); ++joint) {
+    mass += joint->inertia.mass;
+    moment += joint->inertia.about_center.trace() +
+              joint->inertia.mass * joint->inertia.center.squaredNorm();
+    if (joint->armature == 0 && mass == 0 && (joint->prismatic || moment == 0)) {
+      fail(name + ": joint '" + joint->name + "'", "moves no mass and has no armature");
+    }
+  }
+}
+
+}  // namespace
+
+Robot Robot::from_file(const std::string& path, const std::string& base, const std::string& tip,
+                       const RobotParameters& parameters) {
+  std::ifstream stream(path, std::ios::binary);
+  std::ostringstream text;
+  text << stream.rdbuf();
+  if (!stream) fail(path, "cannot be read");
+  return from_text(text.str(), base, tip, parameters, path);
+}
+
+Robot Robot::from_text(const std::string& urdf, const std::string& base, const std::string& tip,
+                       const RobotParameters& parameters, const std::string& name) {
+  const Reader reader(urdf, name);
+  const Link base_link = reader.link(base, "base");
+  const Link tip_link = reader.link(tip, "tip");
+
+  Robot robot;
+  // What is fixed between the last moving joint's body, or the base, and the link reached so far.
+  Pose link_in_body;
+  const auto path = reader.path(base_link, tip_link);
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const urdf::Joint& read = *path[i];
+    link_in_body = link_in_body * reader.origin(read);
+    if (read.type != urdf::Joint::FIXED) {
+      Joint joint = reader.joint(read);
+      const Matrix3d R_LB = frame_on(reader.axis(read));  // body's axes in those of the link
+      joint.origin = link_in_body * Pose{Vector3d::Zero(), R_LB};
+      link_in_body = {Vector3d::Zero(), R_LB.transpose()};
+      robot.joints_.push_back(joint);
+    }
+    if (robot.joints_.empty()) continue;  // still part of the base
+    const urdf::Joint* next = i + 1 < path.size() ? path[i + 1].get() : nullptr;
+    Inertia& inertia = robot.joints_.back().inertia;
+    inertia = inertia + link_in_body * reader.lumped(reader.child(read), next);
+  }
+  robot.tip_ = link_in_body;
+
+  const std::size_t n = robot.joints_.size();
+  if (n < 1 || n > kMaxJoints) {
+    fail(name, "the chain from '" + base + "' to '" + tip + "' has " + std::to_string(n) +
+                   " moving joints, must have 1 to " + std::to_string(kMaxJoints));
+  }
+  require_physical(parameters.payload, "payload");
+  Inertia& last = robot.joints_.back().inertia;
+  last = last + robot.tip_ * parameters.payload;
+  override_with(parameters.armature, &Joint::armature, "armature", "kg m^2", robot.joints_);
+  override_with(parameters.viscous, &Joint::viscous, "viscous friction", "N m s/rad",
+                robot.joints_);
+  override_with(parameters.coulomb, &Joint::coulomb, "Coulomb friction", "N m", robot.joints_);
+  require_inertia(robot.joints_, name);
+
+  if (!parameters.gravity.allFinite()) fail("gravity", "is not finite");
+  Matrix3d R_RB = Matrix3d::Identity();  // from the base's axes to the root's
+  for (const auto& joint : reader.path(reader.root(), base_link)) {
+    R_RB = R_RB * reader.origin(*joint).rotation;
+  }
+  robot.gravity_ = R_RB.transpose() * parameters.gravity;
+  return robot;
+}
+
+}  // namespace dashpot::sim

@@ -1,0 +1,78 @@
+#pragma once
+#include <dashpot/sim/types.hpp>
+
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace dashpot::sim {
+
+/// Thrown at set-up; one line that names the file, the element and the reason.
+class InvalidRobot : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
+/// Mass distribution of a rigid body.
+struct Inertia {
+  double mass = 0;                                         ///< kg
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();        ///< of mass, m
+  Eigen::Matrix3d about_center = Eigen::Matrix3d::Zero();  ///< kg m^2
+};
+
+/// One joint with the rigid body that it moves. The body's frame stands on the joint with its z
+/// axis along the joint's axis; the frame of the parent is that of the joint before it, or the base
+/// link.
+struct Joint {
+  std::string name;
+  bool prismatic = false;
+  Pose origin;       ///< of the body's frame in the parent's, at position 0
+  Inertia inertia;   ///< in the body's frame; all links rigidly attached are in it
+  double lower = 0;  ///< position limits, rad or m; infinite if there are none
+  double upper = 0;
+  double effort = 0;    ///< largest torque, N m or N; infinite if there is none
+  double velocity = 0;  ///< largest velocity, rad/s or m/s; for information, nothing enforces it
+  double armature = 0;  ///< reflected inertia of the drive, kg m^2 or kg
+  double viscous = 0;   ///< friction, N m s/rad or N s/m
+  double coulomb = 0;   ///< friction, N m or N
+};
+
+/// What the file does not know, or what is to override it. An empty vector: as in the file.
+struct RobotParameters {
+  JointVector armature;                  ///< n, kg m^2; files have none, so empty is zero
+  JointVector viscous;                   ///< n, N m s/rad
+  JointVector coulomb;                   ///< n, N m
+  Inertia payload;                       ///< rigid at the tip, in the tip's axes
+  Eigen::Vector3d gravity{0, 0, -9.81};  ///< m/s^2, in the axes of the file's root link
+};
+
+/// A serial chain of 1 to 16 revolute, continuous or prismatic joints from a base link to a tip
+/// link. Immutable. The base link stands still. Fixed joints are merged; links that hang off the
+/// chain count, rigid at their zero position; links between the root and the base only turn
+/// gravity.
+class Robot {
+ public:
+  /// Reads a URDF file. Throws InvalidRobot.
+  static Robot from_file(const std::string& path, const std::string& base, const std::string& tip,
+                         const RobotParameters& parameters = {});
+  /// The same from a URDF text; `name` stands for the file in messages.
+  static Robot from_text(const std::string& urdf, const std::string& base, const std::string& tip,
+                         const RobotParameters& parameters = {}, const std::string& name = "urdf");
+
+  /// n
+  int dof() const noexcept { return static_cast<int>(joints_.size()); }
+  const std::vector<Joint>& joints() const noexcept { return joints_; }
+  /// Of the tip link in the last joint's body.
+  const Pose& tip() const noexcept { return tip_; }
+  /// m/s^2, in the axes of the base link.
+  const Eigen::Vector3d& gravity() const noexcept { return gravity_; }
+
+ private:
+  Robot() = default;
+
+  std::vector<Joint> joints_;
+  Pose tip_;
+  Eigen::Vector3d gravity_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace dashpot::sim

@@ -1,0 +1,68 @@
+#pragma once
+#include <dashpot/sim/types.hpp>
+
+#include <cstdint>
+
+namespace dashpot::sim {
+
+/// Where energy comes in and where it goes, in J since the start; integrated with the motion.
+enum WorkChannel : int {
+  kByActuators,   ///< in
+  kByWorld,       ///< in, by external wrenches or forces
+  kViscousHeat,   ///< out
+  kFrictionHeat,  ///< out, Coulomb
+  kContactHeat,   ///< out, dampers of joint stops and of the wall
+  kWorkChannels
+};
+
+/// What an integrator moves: position (n), velocity (n), and the work channels.
+using StateVector =
+    Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxJoints + kWorkChannels, 1>;
+
+/// J
+struct StoredEnergy {
+  double kinetic = 0;
+  double gravity = 0;
+  double springs = 0;  ///< of stops and wall, or of the system's own springs
+  double sum() const noexcept { return kinetic + gravity + springs; }
+};
+
+/// The modes of all contacts, two bits each.
+using ContactModes = std::uint64_t;
+
+/// Something that moves: y' = f(y) with y = (q, qd, work), where nothing but y changes within a
+/// segment of time. Segments end where the torque or an external force jumps.
+class System {
+ public:
+  System(const System&) = delete;
+  System& operator=(const System&) = delete;
+  virtual ~System() = default;
+
+  /// n
+  int dof() const noexcept { return static_cast<int>(torque_.size()); }
+  /// Held until the next call; n, N m.
+  void set_torque(const JointVector& torque) noexcept { torque_ = torque; }
+
+  /// A segment begins at t (s): external forces are those of this time. Returns when the next of
+  /// them jumps, infinity if none does.
+  virtual double begin_segment(double t) noexcept = 0;
+  /// y' at y; both have 2n + kWorkChannels entries.
+  virtual void rates(const StateVector& y, StateVector& y_dot) noexcept = 0;
+  virtual StoredEnergy stored_energy(const StateVector& y) noexcept = 0;
+
+  /// Whether rates() is only piecewise smooth, with pieces that contact_modes() tells apart.
+  virtual bool has_contacts() const noexcept { return false; }
+  virtual ContactModes contact_modes(const StateVector&) noexcept { return 0; }
+  /// Until thaw(), contacts keep these modes whatever y, and rates() is smooth.
+  virtual void freeze(ContactModes) noexcept {}
+  virtual void thaw() noexcept {}
+
+ protected:
+  explicit System(int n) : torque_(JointVector::Zero(n)) {}
+  const JointVector& torque() const noexcept { return torque_; }
+
+ private:
+  JointVector torque_;
+};
+
+}  // namespace dashpot::sim
