@@ -22,6 +22,7 @@ namespace dashpot::sim {
 class ArticulatedBody {
  public:
   explicit ArticulatedBody(const Robot& robot);
+  explicit ArticulatedBody(Robot&&) = delete;
 
   /// Poses, velocities, inertias and bias forces of all bodies; forgets the wrenches at the tip.
   void move_to(const double* q, const double* qd) noexcept;

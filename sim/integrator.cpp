@@ -14,6 +14,11 @@ int dof_of(const StateVector& y) noexcept {
   return static_cast<int>(y.size() - kWorkChannels) / 2;
 }
 
+/// Their equations may have no solution where a force jumps, so contacts keep still in a step.
+bool is_implicit(Method method) noexcept {
+  return method == Method::kImplicitMidpoint || method == Method::kRosenbrock;
+}
+
 }  // namespace
 
 Integrator::Integrator(const IntegratorOptions& options) : options_(options) {
@@ -67,12 +72,16 @@ Status Integrator::advance_fixed(System& system, double duration, StateVector& y
   // A remainder of rounding is no reason for another step.
   const double steps = std::max(1.0, std::ceil(duration / options_.max_step - 1e-9));
   const double h = duration / steps;
-  for (double i = 0; i < steps; ++i) {
-    if (const Status status = (this->*step_)(system, h); status != Status::kOk) return status;
+  const bool freezes = is_implicit(options_.method) && system.has_contacts();
+  Status status = Status::kOk;
+  for (double i = 0; i < steps && status == Status::kOk; ++i) {
+    if (freezes) system.freeze(system.contact_modes(y_));
+    status = (this->*step_)(system, h);
     y_ = next_;
   }
+  if (freezes) system.thaw();
   y = y_;
-  return Status::kOk;
+  return status;
 }
 
 Status Integrator::advance_adaptive(System& system, double duration, StateVector& y) noexcept {

@@ -22,7 +22,8 @@ struct IntegratorOptions {
   Method method = Method::kRungeKutta4;
   double max_step = 0.001;  ///< s; a segment is cut into equal steps no longer than this
   /// kDormandPrince and kRosenbrock: step size from the error estimate, up to max_step, and steps
-  /// end where a contact begins or ends. Otherwise contacts are met to within a step.
+  /// end where a contact begins or ends. Otherwise contacts begin and end within a step, or with
+  /// implicit methods at the end of one.
   bool adaptive = false;
   double absolute_tolerance = 1e-10;  ///< of a step, adaptive: rad, rad/s (m, m/s)
   double relative_tolerance = 1e-8;

@@ -13,6 +13,9 @@ namespace dashpot::testing {
 
 struct ChainFile {
   std::string name, urdf, base, tip;
+  friend std::ostream& operator<<(std::ostream& stream, const ChainFile& file) {
+    return stream << file.name;
+  }
 };
 
 inline ChainFile arm_file(const std::string& name, const std::string& base,

@@ -1,0 +1,275 @@
+// Integrators against what theory says of them.
+#include <dashpot/tests/sim/scenes.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+
+#include <gtest/gtest.h>
+
+#include <complex>
+#include <unsupported/Eigen/MatrixFunctions>
+
+namespace dashpot::sim {
+namespace {
+
+using Complex = std::complex<double>;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::fixed_steps;
+using testing::joints;
+using testing::kMethods;
+using testing::near;
+using testing::run;
+
+int order_of(Method method) {
+  switch (method) {
+    case Method::kSemiImplicitEuler:
+      return 1;
+    case Method::kImplicitMidpoint:
+      return 2;
+    case Method::kRosenbrock:
+      return 3;
+    case Method::kRungeKutta4:
+      return 4;
+    case Method::kDormandPrince:
+      return 5;
+  }
+  return 0;
+}
+
+std::string name_of(Method method) {
+  const char* const names[] = {"SemiImplicitEuler", "RungeKutta4", "DormandPrince",
+                               "ImplicitMidpoint", "Rosenbrock"};
+  return names[static_cast<int>(method)];
+}
+
+class Methods : public ::testing::TestWithParam<Method> {};
+INSTANTIATE_TEST_SUITE_P(All, Methods, ::testing::ValuesIn(kMethods),
+                         [](const auto& instance) { return name_of(instance.param); });
+
+VectorXd state_of(const Plant& plant) {
+  VectorXd state(2 * plant.position().size());
+  state << plant.position(), plant.velocity();
+  return state;
+}
+
+/// The slope of log error over log step must be the order.
+void expect_order(double coarse_error, double fine_error, Method method) {
+  EXPECT_GT(fine_error, 1e-13) << "only rounding is left";
+  EXPECT_NEAR(std::log2(coarse_error / fine_error), order_of(method), 0.35);
+}
+
+TEST_P(Methods, HaveTheirOrderOnALinearSystem) {
+  const testing::Chain3 chain;
+  MatrixXd A = MatrixXd::Zero(6, 6);
+  A.topRightCorner(3, 3).setIdentity();
+  A.bottomLeftCorner(3, 3) = -(chain.M.inverse() * chain.K);
+  A.bottomRightCorner(3, 3) = -(chain.M.inverse() * chain.C);
+  VectorXd start(6);
+  start << 0, 0.03, 0, 0.1, 0, -0.2;
+  const double end = 0.2;
+  const VectorXd expected = MatrixXd(end * A).exp() * start;
+  const auto error = [&](int steps) {
+    LinearSystem system(chain.M, chain.C, chain.K);
+    Plant plant(system, fixed_steps(GetParam(), end / steps), start.head(3), start.tail(3));
+    EXPECT_EQ(run(plant, steps), Status::kOk);
+    return (state_of(plant) - expected).norm();
+  };
+  const int steps = order_of(GetParam()) < 3 ? 400 : 100;
+  expect_order(error(steps), error(2 * steps), GetParam());
+}
+
+TEST_P(Methods, HaveTheirOrderOnAnArm) {
+  const auto end_of = [](const PlantOptions& options, int ticks) {
+    Arm arm(testing::pendulum(2));
+    Plant plant(arm, options, joints({1.2, -1}), joints({1, 2}));
+    EXPECT_EQ(run(plant, ticks), Status::kOk);
+    return state_of(plant);
+  };
+  const VectorXd expected = end_of(testing::precise(0.1), 5);
+  const auto error = [&](int steps) {
+    return (end_of(fixed_steps(GetParam(), 0.5 / steps), steps) - expected).norm();
+  };
+  const int steps = order_of(GetParam()) < 3 ? 800 : 80;
+  expect_order(error(steps), error(2 * steps), GetParam());
+}
+
+TEST_P(Methods, CloseTheEnergyAuditWithTheirOrder) {
+  ArmOptions options;
+  options.wrenches = {{0.013, 0.087, (Vector6() << 3, 1, -2, 0.1, 0.2, 0.3).finished()}};
+  RobotParameters parameters;
+  const auto imbalance = [&](int steps) {
+    Arm arm(testing::pendulum(2), options);
+    Plant plant(arm, fixed_steps(GetParam(), 0.4 / steps), joints({1.2, -1}), joints({1, 2}));
+    for (int i = 0; i < steps; ++i) EXPECT_EQ(plant.step(joints({2, -1})), Status::kOk);
+    return std::abs(plant.audit().imbalance());
+  };
+  const int steps = order_of(GetParam()) < 3 ? 800 : 40;
+  const double coarse = imbalance(steps), fine = imbalance(2 * steps);
+  // Some gain an order over the guarantee: an implicit midpoint does on the sum.
+  EXPECT_GT(std::log2(coarse / fine), order_of(GetParam()) - 0.3);
+  EXPECT_LT(coarse, order_of(GetParam()) == 1 ? 0.1 : 1e-4);
+}
+
+// ------------------------------------------------- the oscillator q'' = -q: y+ = R(i h) y
+
+const MatrixXd kOne = MatrixXd::Ones(1, 1), kZero = MatrixXd::Zero(1, 1);
+
+/// (q, qd) after one step from (1, 0).
+VectorXd oscillator_step(Method method, double h) {
+  LinearSystem system(kOne, kZero, kOne);
+  Plant plant(system, fixed_steps(method, h), joints({1}));
+  EXPECT_EQ(run(plant, 1), Status::kOk);
+  return state_of(plant);
+}
+
+TEST(Oscillator, StepsHaveTheStabilityFunctionOfTheMethod) {
+  for (const double h : {0.01, 0.3, 1.0, 2.5}) {
+    const Complex z(0, h);
+    const Complex taylor = 1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)));
+    const std::pair<Method, Complex> functions[] = {
+        {Method::kRungeKutta4, taylor},
+        {Method::kDormandPrince, taylor + std::pow(z, 5) / 120.0 + std::pow(z, 6) / 600.0},
+        {Method::kImplicitMidpoint, (1.0 + z / 2.0) / (1.0 - z / 2.0)},
+        // (1 - z/2)^4 R is a cubic that agrees with (1 - z/2)^4 e^z to order 3.
+        {Method::kRosenbrock, (1.0 - z + std::pow(z, 3) / 6.0) / std::pow(1.0 - z / 2.0, 4)}};
+    for (const auto& [method, R] : functions) {
+      // (q, qd) = (Re, -Im) of R. Rosenbrock's Jacobian is good to 8 digits.
+      const double tolerance = method == Method::kRosenbrock ? 1e-7 : 1e-13;
+      const VectorXd state = oscillator_step(method, h);
+      EXPECT_NEAR(state[0], R.real(), tolerance) << name_of(method) << ", h = " << h;
+      EXPECT_NEAR(state[1], -R.imag(), tolerance) << name_of(method) << ", h = " << h;
+    }
+    const VectorXd euler = oscillator_step(Method::kSemiImplicitEuler, h);
+    EXPECT_NEAR(euler[1], -h, 1e-15);
+    EXPECT_NEAR(euler[0], 1 - h * h, 1e-15);
+  }
+}
+
+/// Energy after `steps` steps, relative to that at the start.
+double energy_after(Method method, double h, int steps) {
+  LinearSystem system(kOne, kZero, kOne);
+  Plant plant(system, fixed_steps(method, h), joints({1}));
+  EXPECT_EQ(run(plant, steps), Status::kOk);
+  const EnergyAudit audit = plant.audit();
+  return audit.stored.sum() / audit.initial.sum();
+}
+
+TEST(Oscillator, EnergyDriftsAsTheoryPredicts) {
+  const double h = 0.1;
+  const int steps = 10000;
+  // |R|^2 = 1 - h^6/72 + h^8/576 for RK4.
+  EXPECT_NEAR(std::log(energy_after(Method::kRungeKutta4, h, steps)),
+              steps * std::log1p(-std::pow(h, 6) / 72 + std::pow(h, 8) / 576), 1e-9);
+  // Symplectic methods do not drift: what semi-implicit Euler keeps is q^2 + qd^2 + h q qd.
+  EXPECT_NEAR(energy_after(Method::kImplicitMidpoint, h, steps), 1, 1e-11);
+  double least = 2, most = 0;
+  for (int i = 0; i < 70; ++i) {
+    const double energy = energy_after(Method::kSemiImplicitEuler, h, steps + i);
+    least = std::min(least, energy);
+    most = std::max(most, energy);
+  }
+  EXPECT_GT(least, 1 / (1 + h));
+  EXPECT_LT(most, 1 / (1 - h));
+  EXPECT_GT(most - least, h / 4);
+}
+
+TEST(Pendulum, EnergyDriftsLessWithHigherOrder) {
+  const auto drift = [](Method method) {
+    Arm arm(testing::pendulum(1));
+    Plant plant(arm, fixed_steps(method, 0.01), joints({1.5}));
+    EXPECT_EQ(run(plant, 2000), Status::kOk);
+    const EnergyAudit audit = plant.audit();
+    return std::abs(audit.stored.sum() - audit.initial.sum());
+  };
+  EXPECT_LT(drift(Method::kDormandPrince), drift(Method::kRungeKutta4));
+  EXPECT_LT(drift(Method::kRungeKutta4), drift(Method::kRosenbrock));
+  EXPECT_LT(drift(Method::kRungeKutta4), drift(Method::kImplicitMidpoint));
+  EXPECT_LT(drift(Method::kImplicitMidpoint), drift(Method::kSemiImplicitEuler));
+}
+
+// ------------------------------------------------- a stiff joint: 1e5 N m/rad on 0.1 kg m^2
+
+/// 1000 rad/s, lightly damped, pushed by a constant torque of 100 N m.
+Status run_stiff(Method method, double h, int ticks, double damping, double& q) {
+  LinearSystem system(0.1 * kOne, damping * kOne, 1e5 * kOne);
+  Plant plant(system, fixed_steps(method, h), joints({0}));
+  Status status = Status::kOk;
+  for (int i = 0; i < ticks && status == Status::kOk; ++i) status = plant.step(joints({100}));
+  q = plant.position()[0];
+  return status;
+}
+
+TEST(StiffJoint, NeedsShortStepsOfExplicitMethodsOnly) {
+  double q = 0;
+  for (const Method method : {Method::kRungeKutta4, Method::kSemiImplicitEuler}) {
+    EXPECT_EQ(run_stiff(method, 0.001, 5000, 20, q), Status::kOk);
+    EXPECT_NEAR(q, 1e-3, 1e-9) << name_of(method);
+    EXPECT_EQ(run_stiff(method, 0.003, 5000, 20, q), Status::kStateNotFinite) << name_of(method);
+    EXPECT_TRUE(std::isfinite(q));
+  }
+  for (const double h : {0.001, 0.003, 0.1}) {
+    EXPECT_EQ(run_stiff(Method::kImplicitMidpoint, h, 5000, 20, q), Status::kOk);
+    EXPECT_NEAR(q, 1e-3, 1e-9) << h;
+    EXPECT_EQ(run_stiff(Method::kRosenbrock, h, 5000, 20, q), Status::kOk);
+    EXPECT_NEAR(q, 1e-3, 1e-9) << h;
+  }
+}
+
+TEST(StiffJoint, IsDampedWithinAStepByRosenbrockAndNotByMidpoint) {
+  const double h = 1;  // 1000 rad in a step: L-stable against A-stable
+  double q = 0;
+  EXPECT_EQ(run_stiff(Method::kRosenbrock, h, 3, 0, q), Status::kOk);
+  EXPECT_NEAR(q, 1e-3, 1e-6);
+  EXPECT_EQ(run_stiff(Method::kImplicitMidpoint, h, 3, 0, q), Status::kOk);
+  EXPECT_NEAR(q, 2e-3, 1e-6);
+}
+
+// --------------------------------------------------------------------------- step size control
+
+TEST(AdaptiveSteps, KeepToTheToleranceAndGrowWithIt) {
+  for (const Method method : {Method::kDormandPrince, Method::kRosenbrock}) {
+    double last_error = 0;
+    for (const double tolerance : {1e-9, 1e-6}) {
+      Arm arm(testing::pendulum(2));
+      PlantOptions options = fixed_steps(method, 0.5);
+      options.integrator.adaptive = true;
+      options.integrator.absolute_tolerance = tolerance;
+      options.integrator.relative_tolerance = tolerance;
+      Plant plant(arm, options, joints({1.2, -1}), joints({1, 2}));
+      Plant exact(arm, testing::precise(0.5), joints({1.2, -1}), joints({1, 2}));
+      ASSERT_EQ(run(plant, 1), Status::kOk);
+      ASSERT_EQ(run(exact, 1), Status::kOk);
+      const double error = (state_of(plant) - state_of(exact)).norm();
+      EXPECT_LT(error, 100 * tolerance) << name_of(method);
+      EXPECT_GT(error, 10 * last_error) << name_of(method);
+      last_error = error;
+    }
+  }
+}
+
+TEST(AdaptiveSteps, GiveUpWhenThereAreTooMany) {
+  Arm arm(testing::pendulum(2));
+  PlantOptions options = testing::precise(0.5);
+  options.integrator.max_steps = 3;
+  Plant plant(arm, options, joints({1.2, -1}));
+  EXPECT_EQ(run(plant, 1), Status::kTooManySteps);
+  EXPECT_EQ(plant.position(), joints({1.2, -1}));
+  EXPECT_EQ(plant.ticks(), 0);
+}
+
+TEST(Integrator, RefusesOptionsThatMakeNoSense) {
+  IntegratorOptions options;
+  options.max_step = 0;
+  EXPECT_THROW(Integrator{options}, InvalidScene);
+  options = {};
+  options.adaptive = true;
+  EXPECT_THROW(Integrator{options}, InvalidScene);
+  options = {};
+  options.absolute_tolerance = -1;
+  EXPECT_THROW(Integrator{options}, InvalidScene);
+  options = {};
+  options.max_steps = 0;
+  EXPECT_THROW(Integrator{options}, InvalidScene);
+}
+
+}  // namespace
+}  // namespace dashpot::sim

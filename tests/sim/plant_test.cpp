@@ -1,0 +1,304 @@
+// The loop as on hardware: what lies between command, motion and measurement.
+#include <dashpot/tests/sim/chains.hpp>
+#include <dashpot/tests/sim/scenes.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace dashpot::sim {
+namespace {
+
+using Eigen::MatrixXd;
+using testing::joints;
+using testing::near;
+using testing::run;
+
+const MatrixXd kOne = MatrixXd::Ones(1, 1), kZero = MatrixXd::Zero(1, 1);
+
+TEST(Plant, HoldsATorqueForAPeriod) {
+  LinearSystem mass(2 * kOne, kZero, kZero);
+  PlantOptions options;
+  options.period = 0.002;
+  Plant plant(mass, options, joints({1}), joints({3}));
+  EXPECT_EQ(plant.measured().time, 0);
+  ASSERT_EQ(plant.step(joints({5})), Status::kOk);
+  EXPECT_NEAR(plant.position()[0], 1 + 3 * 0.002 + 5.0 / 2 * 0.002 * 0.002 / 2, 1e-15);
+  EXPECT_NEAR(plant.velocity()[0], 3 + 5.0 / 2 * 0.002, 1e-15);
+  EXPECT_EQ(plant.measured().time, 2000000);
+  EXPECT_EQ(plant.measured().position, plant.position());
+  EXPECT_EQ(plant.measured().velocity, plant.velocity());
+  EXPECT_EQ(plant.measured().torque, joints({5}));
+}
+
+TEST(Plant, KeepsTimeWithoutDrift) {
+  LinearSystem mass(kOne, kZero, kZero);
+  Plant plant(mass, {}, joints({0}));
+  ASSERT_EQ(run(plant, 1234567), Status::kOk);
+  EXPECT_EQ(plant.measured().time, 1234567000000);
+}
+
+TEST(Torque, ArrivesAfterTheDelayToTheTick) {
+  for (const int delay : {0, 1, 2, 7}) {
+    LinearSystem mass(kOne, kZero, kZero);
+    PlantOptions options;
+    options.delay = delay;
+    options.initial_torque = joints({-4});
+    Plant plant(mass, options, joints({0}));
+    double speed = 0;
+    for (int i = 0; i < 30; ++i) {
+      ASSERT_EQ(plant.step(joints({1.0 * i * i})), Status::kOk);
+      const double expected = i < delay ? -4 : (i - delay) * (i - delay);
+      EXPECT_EQ(plant.torque()[0], expected) << "delay " << delay << ", tick " << i;
+      speed += 0.001 * expected;
+      EXPECT_NEAR(plant.velocity()[0], speed, 1e-13);
+    }
+  }
+}
+
+TEST(Torque, IsFilteredLikeAHeldInputByAFirstOrderLag) {
+  LinearSystem mass(kOne, kZero, kZero);
+  PlantOptions options;
+  options.torque_cutoff = 30;
+  options.initial_torque = joints({2});
+  Plant plant(mass, options, joints({0}));
+  for (int i = 1; i <= 100; ++i) {
+    ASSERT_EQ(plant.step(joints({10})), Status::kOk);
+    EXPECT_NEAR(plant.torque()[0], 10 - 8 * std::exp(-2 * std::numbers::pi * 30 * plant.time()),
+                1e-13);
+  }
+}
+
+TEST(Torque, IsDelayedAndThenFiltered) {
+  LinearSystem mass(kOne, kZero, kZero);
+  PlantOptions options;
+  options.torque_cutoff = 30;
+  options.delay = 3;
+  Plant plant(mass, options, joints({0}));
+  for (int i = 1; i <= 50; ++i) {
+    ASSERT_EQ(plant.step(joints({10})), Status::kOk);
+    const double since = std::max(0, i - 3) * 0.001;
+    EXPECT_NEAR(plant.torque()[0], 10 - 10 * std::exp(-2 * std::numbers::pi * 30 * since), 1e-13);
+  }
+}
+
+TEST(Torque, IsLimited) {
+  LinearSystem masses(MatrixXd::Identity(3, 3), MatrixXd::Zero(3, 3), MatrixXd::Zero(3, 3));
+  PlantOptions options;
+  options.torque_limit = joints({5, std::numeric_limits<double>::infinity(), 0});
+  Plant plant(masses, options, joints({0, 0, 0}));
+  ASSERT_EQ(plant.step(joints({-7, 1e6, 1})), Status::kOk);
+  EXPECT_EQ(plant.torque(), joints({-5, 1e6, 0}));
+  ASSERT_EQ(plant.step(joints({4, -1e6, -1})), Status::kOk);
+  EXPECT_EQ(plant.torque(), joints({4, -1e6, 0}));
+}
+
+// --------------------------------------------------------------------------------------- sensors
+
+TEST(Sensors, ShowMultiplesOfTheResolutionNearTheTruth) {
+  const double count = 2 * std::numbers::pi / 4096;
+  LinearSystem masses(MatrixXd::Identity(2, 2), MatrixXd::Zero(2, 2), MatrixXd::Zero(2, 2));
+  PlantOptions options;
+  options.position_resolution = joints({count, 0});
+  Plant plant(masses, options, joints({-1, 1}), joints({0.7, 0.7}));
+  double largest = 0;
+  for (int i = 0; i < 3000; ++i) {
+    ASSERT_EQ(run(plant, 1), Status::kOk);
+    const double shown = plant.measured().position[0], error = shown - plant.position()[0];
+    EXPECT_LE(std::abs(error), count / 2 * (1 + 1e-12));
+    EXPECT_NEAR(std::remainder(shown, count), 0, 1e-15);
+    EXPECT_EQ(plant.measured().position[1], plant.position()[1]);
+    largest = std::max(largest, std::abs(error));
+  }
+  EXPECT_GT(largest, 0.45 * count);
+}
+
+TEST(Sensors, DifferenceWhatTheyShow) {
+  LinearSystem mass(kOne, kZero, 40 * kOne);
+  PlantOptions options;
+  options.position_resolution = joints({1e-4});
+  options.position_noise = joints({3e-4});
+  options.difference_velocity = true;
+  Plant plant(mass, options, joints({1}), joints({0.5}));
+  double last = plant.measured().position[0];
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(run(plant, 1), Status::kOk);
+    const double shown = plant.measured().position[0];
+    EXPECT_EQ(plant.measured().velocity[0], (shown - last) / 0.001);
+    last = shown;
+  }
+}
+
+/// Mean, variance and correlations of N samples have standard errors of about 1 / sqrt(N).
+TEST(Sensors, HaveWhiteNormalNoiseOfTheGivenSize) {
+  LinearSystem masses(MatrixXd::Identity(2, 2), MatrixXd::Zero(2, 2), MatrixXd::Zero(2, 2));
+  PlantOptions options;
+  options.position_noise = joints({1e-3, 0});
+  options.velocity_noise = joints({0, 2e-2});
+  options.seed = 42;
+  Plant plant(masses, options, joints({0.5, -0.5}));
+  const int count = 40000;
+  double sum = 0, square = 0, fourth = 0, lag = 0, cross = 0, last = 0, v_square = 0;
+  for (int i = 0; i < count; ++i) {
+    ASSERT_EQ(run(plant, 1), Status::kOk);
+    const double x = (plant.measured().position[0] - 0.5) / 1e-3;
+    const double v = plant.measured().velocity[1] / 2e-2;
+    EXPECT_EQ(plant.measured().position[1], -0.5);
+    EXPECT_EQ(plant.measured().velocity[0], 0);
+    sum += x;
+    square += x * x;
+    fourth += x * x * x * x;
+    lag += x * last;
+    cross += x * v;
+    v_square += v * v;
+    last = x;
+  }
+  const double error = 5 / std::sqrt(count);
+  EXPECT_NEAR(sum / count, 0, error);
+  EXPECT_NEAR(square / count, 1, error * std::sqrt(2));
+  EXPECT_NEAR(fourth / count, 3, error * std::sqrt(96));
+  EXPECT_NEAR(lag / count, 0, error);
+  EXPECT_NEAR(cross / count, 0, error);
+  EXPECT_NEAR(v_square / count, 1, error * std::sqrt(2));
+}
+
+// ------------------------------------------------------------------------------------- same bits
+
+/// Everything that a plant can have.
+PlantOptions everything(std::uint64_t seed) {
+  PlantOptions options;
+  options.torque_limit = JointVector::Constant(7, 20);
+  options.delay = 2;
+  options.torque_cutoff = 100;
+  options.position_noise = JointVector::Constant(7, 1e-5);
+  options.position_resolution = JointVector::Constant(7, 1e-5);
+  options.difference_velocity = true;
+  options.seed = seed;
+  return options;
+}
+
+std::vector<double> closed_loop(PlantOptions options, const IntegratorOptions& integrator) {
+  options.integrator = integrator;
+  ArmOptions arm_options;
+  arm_options.stops = Contact{1000, 5};
+  arm_options.wrenches = {{0.01, 0.03, Vector6::Ones()}};
+  Arm arm(testing::robot_of(testing::panda_file()), arm_options);
+  const JointVector home = joints({0, -0.7, 0.2, -2.3, 0, 1.5, 0.7});
+  Plant plant(arm, options, home);
+  std::vector<double> trace;
+  for (int i = 0; i < 100; ++i) {
+    const Measurement& shown = plant.measured();
+    EXPECT_EQ(plant.step(100 * (home - shown.position) - 2 * shown.velocity), Status::kOk);
+    const JointVector q = plant.position();
+    trace.insert(trace.end(), q.begin(), q.end());
+    trace.insert(trace.end(), shown.velocity.begin(), shown.velocity.end());
+    trace.push_back(plant.audit().imbalance());
+  }
+  return trace;
+}
+
+TEST(Plant, GivesTheSameBitsTwice) {
+  for (const Method method : testing::kMethods) {
+    IntegratorOptions integrator;
+    integrator.method = method;
+    EXPECT_EQ(closed_loop(everything(3), integrator), closed_loop(everything(3), integrator));
+    integrator.adaptive = method == Method::kDormandPrince || method == Method::kRosenbrock;
+    EXPECT_EQ(closed_loop(everything(3), integrator), closed_loop(everything(3), integrator));
+  }
+  EXPECT_NE(closed_loop(everything(3), {}), closed_loop(everything(4), {}));
+}
+
+// --------------------------------------------------------------------------------------- failures
+
+TEST(Plant, RefusesBadCommandsAndStaysWhereItIs) {
+  Arm arm(testing::robot_of(testing::panda_file()));
+  PlantOptions options = everything(5);
+  const JointVector home = joints({0, -0.7, 0.2, -2.3, 0, 1.5, 0.7});
+  Plant plant(arm, options, home), twin(arm, options, home);
+  JointVector torque = JointVector::Constant(7, 3);
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_EQ(plant.step(JointVector::Zero(6)), Status::kCommandWrongSize);
+    torque[3] = std::nan("");
+    EXPECT_EQ(plant.step(torque), Status::kCommandNotFinite);
+    torque[3] = i;
+    EXPECT_EQ(plant.step(torque), Status::kOk);
+    EXPECT_EQ(twin.step(torque), Status::kOk);
+    EXPECT_EQ(plant.position(), twin.position());
+    EXPECT_EQ(plant.measured().position, twin.measured().position);
+  }
+}
+
+TEST(Plant, TakesAFailedStepBack) {
+  LinearSystem stiff(kOne, kZero, 1e8 * kOne);  // 10000 rad/s
+  PlantOptions options;
+  options.delay = 2;
+  options.torque_cutoff = 50;
+  Plant plant(stiff, options, joints({1}));
+  Status status = Status::kOk;
+  for (int i = 0; i < 10000 && status == Status::kOk; ++i) status = plant.step(joints({1.0 * i}));
+  ASSERT_EQ(status, Status::kStateNotFinite);
+  const JointVector q = plant.position(), torque = plant.torque();
+  const std::int64_t ticks = plant.ticks();
+  EXPECT_TRUE(q.allFinite());
+  EXPECT_EQ(plant.step(joints({7})), Status::kStateNotFinite);
+  EXPECT_EQ(plant.position(), q);
+  EXPECT_EQ(plant.torque(), torque);
+  EXPECT_EQ(plant.ticks(), ticks);
+  EXPECT_STREQ(to_text(status), "the motion is not finite");
+}
+
+TEST(Plant, RefusesOptionsThatMakeNoSense) {
+  LinearSystem mass(kOne, kZero, kZero);
+  const auto refused = [&](const PlantOptions& options, const JointVector& q) -> std::string {
+    try {
+      const Plant plant(mass, options, q);
+    } catch (const InvalidScene& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  const JointVector q = joints({0});
+  PlantOptions options;
+  EXPECT_EQ(refused(options, q), "accepted");
+  EXPECT_EQ(refused(options, joints({0, 0})), "initial position: has 2 entries, must have 1");
+  options.period = 0;
+  EXPECT_EQ(refused(options, q), "period: must be positive, s");
+  options = {};
+  options.delay = -1;
+  EXPECT_EQ(refused(options, q), "delay: must not be negative, ticks");
+  options = {};
+  options.torque_cutoff = -1;
+  EXPECT_EQ(refused(options, q), "torque_cutoff: must be finite and not negative, Hz");
+  options = {};
+  options.torque_limit = joints({-1});
+  EXPECT_EQ(refused(options, q), "torque_limit: must not be negative, N m");
+  options = {};
+  options.position_noise = joints({1, 1});
+  EXPECT_EQ(refused(options, q), "position_noise: has 2 entries, must have 1");
+}
+
+TEST(LinearSystem, RefusesMatricesThatMakeNoSense) {
+  const auto refused = [](const MatrixXd& M, const MatrixXd& C, const MatrixXd& K) -> std::string {
+    try {
+      const LinearSystem system(M, C, K);
+    } catch (const InvalidScene& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  const MatrixXd I = MatrixXd::Identity(2, 2);
+  EXPECT_EQ(refused(I, I, I), "accepted");
+  EXPECT_EQ(refused(I, kOne, I), "damping: is 1 x 1, must be 2 x 2");
+  EXPECT_EQ(refused(-I, I, I), "mass: is not positive definite");
+  EXPECT_EQ(refused(I, I, MatrixXd{{1, 2}, {3, 1}}),
+            "stiffness: is not symmetric: entry (1,2) is 2, entry (2,1) is 3");
+  EXPECT_EQ(refused(I, I / 0.0, I), "damping: has an entry that is not finite");
+  EXPECT_EQ(refused(MatrixXd(0, 0), I, I), "mass: has 0 rows, must have 1 to 16");
+}
+
+}  // namespace
+}  // namespace dashpot::sim
