@@ -77,13 +77,13 @@ double Arm::begin_segment(double t) noexcept {
 }
 
 void Arm::rates(const StateVector& y, StateVector& y_dot) noexcept {
-  const int n = dof();
+  const Eigen::Index n = dof();
   const double* const q = y.data();
   const double* const qd = q + n;
   double* const work = y_dot.data() + 2 * n;
   std::array<double, kMaxJoints> tau;
   double power = 0;
-  for (int i = 0; i < n; ++i) {
+  for (Eigen::Index i = 0; i < n; ++i) {
     tau[static_cast<std::size_t>(i)] = torque()[i];
     power += torque()[i] * qd[i];
     y_dot[i] = qd[i];

@@ -37,33 +37,10 @@ Vector3d vector_of(const urdf::Vector3& v) {
 
 Pose pose_of(const urdf::Pose& pose, const std::string& where) {
   const Eigen::Quaterniond turn(pose.rotation.w, pose.rotation.x, pose.rotation.y, pose.rotation.z);
-  const Pose result{vector_of(pose.position), turn.normalized().toRotationMatrix()};
+  Pose result{vector_of(pose.position), turn.normalized().toRotationMatrix()};
   if (!result.position.allFinite()) fail(where, "origin xyz is not finite");
   if (!result.rotation.allFinite()) fail(where, "origin rpy is not finite");
   return result;
-}
-
-Pose operator*(const Pose& a, const Pose& b) {
-  return {a.position + a.rotation * b.position, a.rotation * b.rotation};
-}
-
-Inertia operator*(const Pose& pose, const Inertia& body) {
-  return {body.mass, pose.position + pose.rotation * body.center,
-          pose.rotation * body.about_center * pose.rotation.transpose()};
-}
-
-/// The inertia of a mass about a point that is off its centre by r: m (r.r 1 - r r').
-Matrix3d parallel_axes(double mass, const Vector3d& r) {
-  return mass * (r.squaredNorm() * Matrix3d::Identity() - r * r.transpose());
-}
-
-Inertia operator+(const Inertia& a, const Inertia& b) {
-  const double mass = a.mass + b.mass;
-  if (mass == 0) return {0, Vector3d::Zero(), a.about_center + b.about_center};
-  const Vector3d center = (a.mass * a.center + b.mass * b.center) / mass;
-  return {mass, center,
-          a.about_center + parallel_axes(a.mass, a.center - center) + b.about_center +
-              parallel_axes(b.mass, b.center - center)};
 }
 
 void require_physical(const Inertia& body, const std::string& where) {
@@ -112,7 +89,7 @@ class Reader {
   }
 
   Link link(const std::string& name, const char* role) const {
-    const Link found = model_->getLink(name);
+    Link found = model_->getLink(name);
     if (!found) fail(name_, std::string(role) + " link '" + name + "' does not exist");
     return found;
   }
@@ -146,7 +123,7 @@ class Reader {
     return sum;
   }
 
-  Joint joint(const urdf::Joint& joint) const;
+  Joint joint(const urdf::Joint& read) const;
   Vector3d axis(const urdf::Joint& joint) const;
   const urdf::Link& child(const urdf::Joint& joint) const {
     return *model_->getLink(joint.child_link_name);
@@ -230,6 +207,29 @@ Matrix3d frame_on(const Vector3d& axis) {
   return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), axis).toRotationMatrix();
 }
 
+/// The moving joints along the path; returns the pose of its last link in the last one's body.
+Pose read_chain(const Reader& reader, const std::vector<urdf::JointConstSharedPtr>& path,
+                std::vector<Joint>& joints) {
+  // Of the link reached so far in the last moving joint's body, or in the base.
+  Pose link_in_body;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const urdf::Joint& read = *path[i];
+    link_in_body = link_in_body * reader.origin(read);
+    if (read.type != urdf::Joint::FIXED) {
+      Joint joint = reader.joint(read);
+      const Matrix3d R_LB = frame_on(reader.axis(read));  // from the body's axes to the link's
+      joint.origin = link_in_body * Pose{Vector3d::Zero(), R_LB};
+      link_in_body = {Vector3d::Zero(), R_LB.transpose()};
+      joints.push_back(joint);
+    }
+    if (joints.empty()) continue;  // still part of the base
+    const urdf::Joint* next = i + 1 < path.size() ? path[i + 1].get() : nullptr;
+    Inertia& inertia = joints.back().inertia;
+    inertia = inertia + link_in_body * reader.lumped(reader.child(read), next);
+  }
+  return link_in_body;
+}
+
 void override_with(const JointVector& values, double Joint::*member, const char* key,
                    const char* unit, std::vector<Joint>& joints) {
   if (values.size() == 0) return;
@@ -274,29 +274,8 @@ Robot Robot::from_text(const std::string& urdf, const std::string& base, const s
                        const RobotParameters& parameters, const std::string& name) {
   const Reader reader(urdf, name);
   const Link base_link = reader.link(base, "base");
-  const Link tip_link = reader.link(tip, "tip");
-
   Robot robot;
-  // What is fixed between the last moving joint's body, or the base, and the link reached so far.
-  Pose link_in_body;
-  const auto path = reader.path(base_link, tip_link);
-  for (std::size_t i = 0; i < path.size(); ++i) {
-    const urdf::Joint& read = *path[i];
-    link_in_body = link_in_body * reader.origin(read);
-    if (read.type != urdf::Joint::FIXED) {
-      Joint joint = reader.joint(read);
-      const Matrix3d R_LB = frame_on(reader.axis(read));  // body's axes in those of the link
-      joint.origin = link_in_body * Pose{Vector3d::Zero(), R_LB};
-      link_in_body = {Vector3d::Zero(), R_LB.transpose()};
-      robot.joints_.push_back(joint);
-    }
-    if (robot.joints_.empty()) continue;  // still part of the base
-    const urdf::Joint* next = i + 1 < path.size() ? path[i + 1].get() : nullptr;
-    Inertia& inertia = robot.joints_.back().inertia;
-    inertia = inertia + link_in_body * reader.lumped(reader.child(read), next);
-  }
-  robot.tip_ = link_in_body;
-
+  robot.tip_ = read_chain(reader, reader.path(base_link, reader.link(tip, "tip")), robot.joints_);
   const std::size_t n = robot.joints_.size();
   if (n < 1 || n > kMaxJoints) {
     fail(name, "the chain from '" + base + "' to '" + tip + "' has " + std::to_string(n) +

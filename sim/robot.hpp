@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/sim/inertia.hpp>
 #include <dashpot/sim/types.hpp>
 
 #include <stdexcept>
@@ -11,13 +12,6 @@ namespace dashpot::sim {
 class InvalidRobot : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
-};
-
-/// Mass distribution of a rigid body.
-struct Inertia {
-  double mass = 0;                                         ///< kg
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();        ///< of mass, m
-  Eigen::Matrix3d about_center = Eigen::Matrix3d::Zero();  ///< kg m^2
 };
 
 /// One joint with the rigid body that it moves. The body's frame stands on the joint with its z

@@ -30,9 +30,9 @@ struct Reference {
   Reference(const ChainFile& file, const VectorXd& q, const VectorXd& qd,
             const Eigen::Vector3d& g) {
     const KDL::Chain chain = testing::kdl_chain(file);
-    const auto n = static_cast<unsigned>(q.size());
+    const unsigned n = chain.getNrOfJoints();
     KDL::ChainDynParam dynamics(chain, KDL::Vector(g.x(), g.y(), g.z()));
-    KDL::JntSpaceInertiaMatrix mass(n);
+    KDL::JntSpaceInertiaMatrix mass(static_cast<int>(n));
     KDL::JntArray force(n);
     dynamics.JntToMass(kdl(q), mass);
     M = eigen(mass);
