@@ -72,13 +72,12 @@ MatrixXd append_step(const MatrixXd& mass, const VectorXd& u, Pivot pivot, Remov
   const Index n = u.size();
   const VectorXd s = mass * u;
   const Index i = choose_pivot(s, pivot);
-  VectorXd others(n - 1);
-  others << s.head(i), s.tail(n - 1 - i);
-
   MatrixXd step = MatrixXd::Zero(n, n - 1);
-  step.topRows(i).leftCols(i).setIdentity();
-  step.row(i) = -others.transpose() / s(i);
-  step.bottomRows(n - 1 - i).rightCols(n - 1 - i).setIdentity();
+  for (Index j = 0; j < n - 1; ++j) {
+    const Index kept = j < i ? j : j + 1;
+    step(kept, j) = 1;
+    step(i, j) = -s(kept) / s(i);
+  }
 
   std::vector<int> left(static_cast<std::size_t>(removal.constraint_matrix.rows()));
   std::iota(left.begin(), left.end(), 0);

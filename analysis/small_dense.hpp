@@ -92,6 +92,17 @@ void orthonormalize(Matrix& S) noexcept {
   }
 }
 
+/// Index of the coordinate axis farthest from what the orthonormal columns of S span.
+template <typename Matrix>
+Eigen::Index farthest_axis(const Matrix& S) noexcept {
+  Eigen::Index farthest = 0;
+  if (S.cols() == 0) return farthest;  // nothing stored: even the address of a row has no meaning
+  for (Eigen::Index i = 1; i < S.rows(); ++i) {
+    if (S.row(i).squaredNorm() < S.row(farthest).squaredNorm()) farthest = i;
+  }
+  return farthest;
+}
+
 namespace detail {
 
 /// Columns of A B for A with a number of rows known to the compiler, which then keeps a column of

@@ -175,11 +175,7 @@ void Builder<N>::write_leftover_zeros() {
   State<N> span = zero_span_;
   orthonormalize(span);
   for (Eigen::Index k = 0; k < missing; ++k) {
-    // The unit vector farthest from the span, made orthogonal to it.
-    Eigen::Index farthest = 0;
-    for (Eigen::Index i = 1; i < z; ++i) {
-      if (span.row(i).squaredNorm() < span.row(farthest).squaredNorm()) farthest = i;
-    }
+    const Eigen::Index farthest = farthest_axis(span);
     span.conservativeResize(z, span.cols() + 1);
     span.col(span.cols() - 1) = Vector<N>::Unit(z, farthest);
     orthonormalize(span);
@@ -427,10 +423,7 @@ bool Builder<N>::write_coinciding(const State<N>& S, const State<N>& small, Comp
   if (J2.norm() * b > tolerance) return false;
   State<N> done(size, 0);
   for (Eigen::Index k = 0; k < size; k += 2) {
-    Eigen::Index farthest = 0;
-    for (Eigen::Index i = 1; i < size; ++i) {
-      if (done.row(i).squaredNorm() < done.row(farthest).squaredNorm()) farthest = i;
-    }
+    const Eigen::Index farthest = farthest_axis(done);
     done.conservativeResize(size, k + 2);
     done.col(k) = StateVector<N>::Unit(size, farthest);
     done.col(k + 1) = J * done.col(k);
