@@ -1,3 +1,5 @@
+#include <dashpot/analysis/double_double.hpp>
+#include <dashpot/analysis/small_dense.hpp>
 #include <dashpot/analysis/zero_modes.hpp>
 
 #include <Eigen/Cholesky>
@@ -12,6 +14,10 @@ namespace {
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 /// Squared frequencies this far apart or less are right to half their digits straight from K.
 constexpr double kWellScaled = 1e-8;
+/// A correction of the null space (tangents of angles) up to which it is small enough to be one,
+/// and below which the next one would be rounding.
+constexpr double kCorrection = 0.1;
+constexpr double kSettled = 1e-8;
 
 template <int N>
 void sort_by_magnitude(Square<N>& P, Vector<N>& values) {
@@ -95,6 +101,39 @@ double from_stiffness(const System<N>& system, const Square<N>& L, Square<N>& P,
   return std::sqrt(static_cast<double>(system.dof()) * kEps * std::abs(kappa[0]));
 }
 
+/// Makes the last `count` columns P0 of P = [P1 P0] the null space of L^-1 K L^-T to full accuracy.
+/// A factor or the eigenvectors of K leave errors of eps kappa_1 / kappa_i along the i-th mode, by
+/// which damping that leaves the zero modes alone would seem to couple them. Newton steps
+/// P0 -= P1 X, X = diag(kappa)^-1 T1' K T0, [T1 T0] = L^-T P, with K T0 in double-double
+/// arithmetic.
+template <int N>
+void polish_null_space(const Square<N>& K, const Square<N>& L, const Vector<N>& kappa,
+                       Eigen::Index count, Square<N>& P) {
+  const Eigen::Index n = K.rows(), m = n - count;
+  for (int step = 0; step < 2; ++step) {
+    const Square<N> T = L.template triangularView<Eigen::Lower>().transpose().solve(P);
+    Square<N> residual(n, count);
+    for (Eigen::Index j = 0; j < count; ++j) {
+      for (Eigen::Index i = 0; i < n; ++i) {
+        DotAccumulator sum;
+        for (Eigen::Index k = 0; k < n; ++k) sum.add(K(i, k), T(k, m + j));
+        residual(i, j) = sum.value().high;
+      }
+    }
+    Square<N> X = T.leftCols(m).transpose() * residual;
+    for (Eigen::Index i = 0; i < m; ++i) X.row(i) /= kappa[i];
+    const double size = X.norm();
+    if (!(size < kCorrection)) return;
+    Square<N> columns(n, n);  // P0 first: it stays where it is while the others turn with it
+    columns.leftCols(count) = P.rightCols(count) - P.leftCols(m) * X;
+    columns.rightCols(m) = P.leftCols(m);
+    orthonormalize(columns);
+    P.leftCols(m) = columns.rightCols(m);
+    P.rightCols(count) = columns.leftCols(count);
+    if (size < kSettled) return;
+  }
+}
+
 }  // namespace
 
 template <int N>
@@ -125,6 +164,10 @@ ZeroModes<N> find_zero_modes(const System<N>& system, const Square<N>& L) noexce
       ++result.count;
       kappa[i] = 0;
     }
+  }
+  if (0 < result.count && result.count < n && system.stiffness_factor.rows() == 0 &&
+      system.stiffness == system.stiffness.transpose()) {
+    polish_null_space<N>(system.stiffness, L, kappa, result.count, P);
   }
   result.stiffness_values = kappa;
   result.coordinates = L.template triangularView<Eigen::Lower>().transpose().solve(P);

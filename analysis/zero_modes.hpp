@@ -30,7 +30,8 @@ struct ZeroModes {
 /// max(rows, n) eps times the largest. From K alone the frequencies are roots of eigenvalues and
 /// the floor is the root of n eps times the largest, unless the smallest one is that close: then a
 /// positive semidefinite K is factored first, with its rank decided on K scaled to a unit diagonal,
-/// so that neither graded masses nor graded stiffnesses hide a mode.
+/// so that neither graded masses nor graded stiffnesses hide a mode. The zero modes of a symmetric
+/// K are then polished with residuals in double-double arithmetic, to the accuracy a factor gives.
 template <int N>
 ZeroModes<N> find_zero_modes(const System<N>& system, const Square<N>& L) noexcept;
 

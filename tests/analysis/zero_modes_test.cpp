@@ -123,6 +123,35 @@ TEST(ZeroModes, SeeThroughGradedMassesAndStiffnesses) {
   }
 }
 
+TEST(ZeroModes, FromTheStiffnessAloneAreAsExactAlongSoftMotionsAsAlongStiffOnes) {
+  // K = W'W exactly, of integers and powers of two: rows of W over six decades, masses over three.
+  const int n = 12, rank = 9;
+  for (const std::uint64_t seed : {407, 408, 409, 410}) {
+    Random random(seed);
+    MatrixXd W(rank, n), G(n, n);
+    for (int i = 0; i < rank; ++i) {
+      for (int j = 0; j < n; ++j) W(i, j) = (i == j ? 3 : 0) + random.integer(-1, 1);
+    }
+    for (double& g : G.reshaped()) g = random.integer(-1, 1);
+    VectorXd S(n), stiff(rank);
+    for (double& s : S) s = std::ldexp(1.0, random.integer(0, 5));
+    for (int i = 0; i < rank; ++i) stiff[i] = std::ldexp(1.0, (20 * i) / (rank - 1));
+    W = stiff.asDiagonal() * W * S.asDiagonal();
+    System<> system(n);
+    system.mass =
+        S.asDiagonal() * (G.transpose() * G + n * MatrixXd::Identity(n, n)) * S.asDiagonal();
+    system.stiffness = W.transpose() * W;
+    ASSERT_EQ(W.cast<long double>().transpose() * W.cast<long double>(),
+              system.stiffness.cast<long double>());
+    const ZeroModes<> found = zero_modes_of(system);
+    ASSERT_EQ(found.count, n - rank);
+    for (int i = 0; i < rank; ++i) {
+      const double size = W.row(i).cwiseAbs().dot(found.basis.cwiseAbs().rowwise().maxCoeff());
+      EXPECT_LE((W.row(i) * found.basis).norm(), 1e-11 * size) << "row " << i + 1 << " of W";
+    }
+  }
+}
+
 TEST(ZeroModes, KeepNegativeStiffness) {
   System<> system(3);
   system.stiffness.diagonal() << 4, -9, 0;
