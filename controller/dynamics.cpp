@@ -62,7 +62,7 @@ Lanes<kGroups<N>> load(const Eigen::Matrix<double, N, 1>& values) {
   return result;
 }
 
-/// `count` columns of x, y, z and one unused entry each, turned into rows.
+/// One column for each joint, of x, y, z and an unused entry, turned into rows.
 template <int G>
 Lanes3<G> to_lanes(const Four (&columns)[4 * G]) {
   Lanes3<G> result;
@@ -77,6 +77,63 @@ Lanes3<G> to_lanes(const Four (&columns)[4 * G]) {
     result.z.group[g] = __builtin_shufflevector(z01, z23, 0, 1, 4, 5);
   }
   return result;
+}
+
+/// R_i for all links: `rotation` is that from link i to link i - 1 at q = 0, by columns, and link i
+/// turns by `angle` about its z axis besides. The products along the chain, which have to wait for
+/// one another, take a register for each column.
+template <int N, class Rows>
+Lanes33<kGroups<N>> link_rotations(const Rows& rotation, const Lanes<kGroups<N>>& angle) {
+  constexpr int G = kGroups<N>;
+  Lanes<G> sine, cosine;
+  for (int g = 0; g < G; ++g) sin_cos(angle.group[g], sine.group[g], cosine.group[g]);
+  const Lanes3<G> x_0 = load3<G>(rotation, 0), y_0 = load3<G>(rotation, 3);
+  const Lanes3<G> x_1 = cosine * x_0 + sine * y_0, y_1 = cosine * y_0 - sine * x_0;
+  alignas(32) double turned[6][kLanes<N>];
+  const Lanes<G>* entries[] = {&x_1.x, &x_1.y, &x_1.z, &y_1.x, &y_1.y, &y_1.z};
+  for (std::size_t k = 0; k < 6; ++k) entries[k]->store(turned[k]);
+
+  Four x_axes[4 * G] = {}, y_axes[4 * G] = {}, z_axes[4 * G] = {};
+  Four x{1, 0, 0, 0}, y{0, 1, 0, 0}, z{0, 0, 1, 0};
+  for (std::size_t i = 0; i < N; ++i) {
+    const Four new_x = x * turned[0][i] + y * turned[1][i] + z * turned[2][i];
+    const Four new_y = x * turned[3][i] + y * turned[4][i] + z * turned[5][i];
+    z = x * rotation[6][i] + y * rotation[7][i] + z * rotation[8][i];
+    x_axes[i] = x = new_x;
+    y_axes[i] = y = new_y;
+    z_axes[i] = z;
+  }
+  return {to_lanes<G>(x_axes), to_lanes<G>(y_axes), to_lanes<G>(z_axes)};
+}
+
+/// J, and M_ki = J_k . (force, moment)_i for k <= i, mirrored; the wrench is taken at the tip.
+template <int N>
+void write_J_and_M(const Lanes3<kGroups<N>>& J_linear, const Lanes3<kGroups<N>>& J_angular,
+                   const Lanes3<kGroups<N>>& force, const Lanes3<kGroups<N>>& moment,
+                   Dynamics<N>& result) {
+  using L = Lanes<kGroups<N>>;
+  const L* J[] = {&J_linear.x, &J_linear.y, &J_linear.z, &J_angular.x, &J_angular.y, &J_angular.z};
+  const L* wrench[] = {&force.x, &force.y, &force.z, &moment.x, &moment.y, &moment.z};
+  alignas(32) double J_rows[6][kLanes<N>], wrench_rows[6][kLanes<N>];
+  for (std::size_t k = 0; k < 6; ++k) {
+    J[k]->store(J_rows[k]);
+    wrench[k]->store(wrench_rows[k]);
+  }
+  for (int i = 0; i < N; ++i) {
+    for (int k = 0; k < 6; ++k) result.J(k, i) = J_rows[k][i];
+    alignas(32) double column[kLanes<N>];
+    for (int g = 0; g <= i / 4; ++g) {
+      Four entries{};
+      for (int k = 0; k < 6; ++k) entries += J[k]->group[g] * wrench_rows[k][i];
+      __builtin_memcpy(column + 4 * g, &entries, sizeof(entries));
+    }
+    for (int k = 0; k <= i; ++k) result.M(k, i) = result.M(i, k) = column[k];
+  }
+}
+
+template <int N>
+void store(const Lanes<kGroups<N>>& source, Eigen::Matrix<double, N, 1>& target) {
+  __builtin_memcpy(target.data(), &source, N * sizeof(double));
 }
 
 /// v of joint i.
@@ -157,36 +214,7 @@ void DynamicsKernel<N>::evaluate(const Eigen::Matrix<double, N, 1>& q_in,
   const L q = load<N>(q_in), qd = load<N>(qd_in);
   const L revolute = L::load(revolute_.data()), prismatic = L::load(prismatic_.data());
 
-  // Rotation from link i to link i - 1, times a turn about z by q.
-  L sine, cosine;
-  {
-    const L angle = revolute * q;
-    for (int g = 0; g < G; ++g) sin_cos(angle.group[g], sine.group[g], cosine.group[g]);
-  }
-  alignas(32) double turn[6][kPadded];
-  {
-    const L3 x = load3<G>(rotation_, 0), y = load3<G>(rotation_, 3);
-    const L3 turned_x = cosine * x + sine * y, turned_y = cosine * y - sine * x;
-    turned_x.x.store(turn[0]);
-    turned_x.y.store(turn[1]);
-    turned_x.z.store(turn[2]);
-    turned_y.x.store(turn[3]);
-    turned_y.y.store(turn[4]);
-    turned_y.z.store(turn[5]);
-  }
-
-  // R_i, one after the other; the only products that have to wait for one another.
-  Four x_axes[4 * G] = {}, y_axes[4 * G] = {}, z_axes[4 * G] = {};
-  Four x{1, 0, 0, 0}, y{0, 1, 0, 0}, z{0, 0, 1, 0};
-  for (std::size_t i = 0; i < N; ++i) {
-    const Four new_x = x * turn[0][i] + y * turn[1][i] + z * turn[2][i];
-    const Four new_y = x * turn[3][i] + y * turn[4][i] + z * turn[5][i];
-    z = x * rotation_[6][i] + y * rotation_[7][i] + z * rotation_[8][i];
-    x_axes[i] = x = new_x;
-    y_axes[i] = y = new_y;
-    z_axes[i] = z;
-  }
-  const Lanes33<G> R = {to_lanes<G>(x_axes), to_lanes<G>(y_axes), to_lanes<G>(z_axes)};
+  const Lanes33<G> R = link_rotations<N>(rotation_, revolute * q);
 
   // Positions from the first joint's origin, and the Jacobian at the tip.
   const L3 e = R * (load3<G>(offset_) + of_next(q) * load3<G>(next_slide_));
@@ -223,27 +251,10 @@ void DynamicsKernel<N>::evaluate(const Eigen::Matrix<double, N, 1>& q_in,
   const L3 moment = I * J_angular + cross(h, prismatic * R.z) + cross(F, to_tip);
   const L gravity = -(gravity_.x() * F.x + gravity_.y() * F.y + gravity_.z() * F.z);
 
-  // Out of the lanes.
-  alignas(32) double rows[14][kPadded];
-  const L* columns[] = {&J_linear.x,  &J_linear.y, &J_linear.z, &J_angular.x, &J_angular.y,
-                        &J_angular.z, &F.x,        &F.y,        &F.z,         &moment.x,
-                        &moment.y,    &moment.z,   &coriolis,   &gravity};
-  for (std::size_t k = 0; k < 14; ++k) columns[k]->store(rows[k]);
-  for (int i = 0; i < N; ++i) {
-    const int groups = i / 4 + 1;
-    alignas(32) double column[kPadded];
-    for (int g = 0; g < groups; ++g) {
-      const Four entry = J_linear.x.group[g] * rows[6][i] + J_linear.y.group[g] * rows[7][i] +
-                         J_linear.z.group[g] * rows[8][i] + J_angular.x.group[g] * rows[9][i] +
-                         J_angular.y.group[g] * rows[10][i] + J_angular.z.group[g] * rows[11][i];
-      __builtin_memcpy(column + 4 * g, &entry, sizeof(entry));
-    }
-    for (int k = 0; k <= i; ++k) result.M(k, i) = result.M(i, k) = column[k];
-    result.M(i, i) += reflected_inertia_[i];
-    for (int k = 0; k < 6; ++k) result.J(k, i) = rows[k][i];
-    result.coriolis[i] = rows[12][i];
-    result.gravity[i] = rows[13][i];
-  }
+  write_J_and_M<N>(J_linear, J_angular, F, moment, result);
+  result.M.diagonal() += reflected_inertia_;
+  store<N>(coriolis, result.coriolis);
+  store<N>(gravity, result.gravity);
   result.Jdot_qd << of_joint(a_tip, N - 1), of_joint(wd, N - 1);
   result.p_BT_B = first_joint_ + q_in[0] * first_slide_ + tip;
   Eigen::Matrix3d R_last;

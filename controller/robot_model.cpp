@@ -14,19 +14,23 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// Throws "arm.urdf: link 'hand': reason".
+[[noreturn]] void refuse(const std::string& name, const std::string& kind,
+                         const std::string& element, const std::string& reason) {
+  throw InvalidModel(name + ": " + kind + " '" + element + "': " + reason);
+}
+
 /// The joints from `base` to `tip`, fixed ones too.
 std::vector<urdf::JointConstSharedPtr> path_between(const urdf::ModelInterface& tree,
                                                     const std::string& base, const std::string& tip,
                                                     const std::string& name) {
   for (const std::string& link : {base, tip}) {
-    if (!tree.getLink(link)) throw InvalidModel(name + ": link '" + link + "': there is none");
+    if (!tree.getLink(link)) refuse(name, "link", link, "there is none");
   }
   std::vector<urdf::JointConstSharedPtr> path;
   for (urdf::LinkConstSharedPtr link = tree.getLink(tip); link->name != base;
        link = tree.getLink(link->parent_joint->parent_link_name)) {
-    if (!link->parent_joint) {
-      throw InvalidModel(name + ": link '" + tip + "': not beyond the base, '" + base + "'");
-    }
+    if (!link->parent_joint) refuse(name, "link", tip, "not beyond the base, '" + base + "'");
     path.push_back(link->parent_joint);
   }
   std::reverse(path.begin(), path.end());
@@ -97,8 +101,7 @@ void apply(const JointVector& option, double Joint::*property, const std::string
     double& value = joints[i].*property;
     if (option.size() != 0) value = option[static_cast<Eigen::Index>(i)];
     if (value >= 0 && std::isfinite(value)) continue;
-    throw InvalidModel(name + ": joint '" + joints[i].name + "': " + key +
-                       " is negative or not a finite number");
+    refuse(name, "joint", joints[i].name, key + " is negative or not a finite number");
   }
 }
 
@@ -144,7 +147,7 @@ std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& pat
     try {
       joints.push_back(read_joint(*joint));
     } catch (const std::invalid_argument& error) {
-      throw InvalidModel(name + ": joint '" + joint->name + "': " + error.what());
+      refuse(name, "joint", joint->name, error.what());
     }
   }
   apply(options.reflected_inertia, &Joint::reflected_inertia, "reflected inertia", joints, name);
@@ -216,9 +219,8 @@ void check_inertia(const RobotModel& model, const std::string& name) {
   if (unresisted_joint(model, 1.0) < 0) return;
   const int i = unresisted_joint(model, 2.5);
   if (i < 0) return;
-  throw InvalidModel(name + ": joint '" + model.joints()[static_cast<std::size_t>(i)].name +
-                     "': no inertia resists it: the links it moves lack mass, and it has no "
-                     "reflected inertia");
+  refuse(name, "joint", model.joints()[static_cast<std::size_t>(i)].name,
+         "no inertia resists it: the links it moves lack mass, and it has no reflected inertia");
 }
 
 }  // namespace
@@ -229,12 +231,11 @@ RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string
   const std::shared_ptr<urdf::ModelInterface> tree = read_urdf(text, name);
   const auto path = path_between(*tree, base, tip, name);
   std::vector<Joint> joints = read_joints(path, options, name);
-  if (joints.empty()) {
-    throw InvalidModel(name + ": link '" + tip + "': no joint moves it against '" + base + "'");
-  }
+  if (joints.empty()) refuse(name, "link", tip, "no joint moves it against '" + base + "'");
   if (joints.size() > static_cast<std::size_t>(kMaxJoints)) {
-    throw InvalidModel(name + ": link '" + tip + "': " + std::to_string(joints.size()) +
-                       " joints from '" + base + "', more than " + std::to_string(kMaxJoints));
+    refuse(name, "link", tip,
+           std::to_string(joints.size()) + " joints from '" + base + "', more than " +
+               std::to_string(kMaxJoints));
   }
   check_pose(options.tool, name);
   if (!options.gravity.allFinite()) throw InvalidModel(name + ": gravity: not finite");
