@@ -1,4 +1,5 @@
 #include <dashpot/controller/rigid_bodies.hpp>
+#include <dashpot/controller/urdf_tree.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <array>
@@ -70,7 +71,7 @@ KDL::RigidBodyInertia body_of(const urdf::Link& link, const std::string& name) {
   I << source.ixx, source.ixy, source.ixz, source.ixy, source.iyy, source.iyz, source.ixz,
       source.iyz, source.izz;
   const std::string problem = body_problem(source.mass, {frame.p.x(), frame.p.y(), frame.p.z()}, I);
-  if (!problem.empty()) throw InvalidModel(name + ": link '" + link.name + "': " + problem);
+  if (!problem.empty()) refuse(name, "link", link.name, problem);
   return frame * make_body(source.mass, Eigen::Vector3d::Zero(), I);
 }
 

@@ -14,12 +14,6 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Throws "arm.urdf: link 'hand': reason".
-[[noreturn]] void refuse(const std::string& name, const std::string& kind,
-                         const std::string& element, const std::string& reason) {
-  throw InvalidModel(name + ": " + kind + " '" + element + "': " + reason);
-}
-
 /// The joints from `base` to `tip`, fixed ones too.
 std::vector<urdf::JointConstSharedPtr> path_between(const urdf::ModelInterface& tree,
                                                     const std::string& base, const std::string& tip,

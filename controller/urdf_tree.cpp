@@ -65,21 +65,24 @@ void check_tree(const urdf::ModelInterface& model, const std::string& name) {
   for (const auto& [joint_name, joint] : model.joints_) {
     const auto [other, is_new] = joint_above.emplace(joint->child_link_name, joint_name);
     if (is_new) continue;
-    throw InvalidModel(name + ": link '" + joint->child_link_name + "': child of two joints, '" +
-                       other->second + "' and '" + joint_name + "'");
+    refuse(name, "link", joint->child_link_name,
+           "child of two joints, '" + other->second + "' and '" + joint_name + "'");
   }
   for (const auto& [link_name, link] : model.links_) {
     std::string at = link_name;
     for (std::size_t steps = 0; joint_above.count(at) != 0; ++steps) {
-      if (steps == model.links_.size()) {
-        throw InvalidModel(name + ": link '" + link_name + "': part of a loop of joints");
-      }
+      if (steps == model.links_.size()) refuse(name, "link", link_name, "part of a loop of joints");
       at = model.joints_.at(joint_above.at(at))->parent_link_name;
     }
   }
 }
 
 }  // namespace
+
+void refuse(const std::string& name, const std::string& kind, const std::string& element,
+            const std::string& reason) {
+  throw InvalidModel(name + ": " + kind + " '" + element + "': " + reason);
+}
 
 std::shared_ptr<urdf::ModelInterface> read_urdf(const std::string& text, const std::string& name) {
   std::shared_ptr<urdf::ModelInterface> model = parse(text, name);

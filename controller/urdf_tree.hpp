@@ -6,6 +6,11 @@
 
 namespace dashpot::controller {
 
+/// Throws InvalidModel: "arm.urdf: link 'hand': reason", where `name` is "arm.urdf" and `kind`
+/// "link".
+[[noreturn]] void refuse(const std::string& name, const std::string& kind,
+                         const std::string& element, const std::string& reason);
+
 /// Parses a URDF and makes sure that it is a tree: one root, one parent for every other link, no
 /// loop. urdfdom's messages become the text of InvalidModel and do not reach the console. `name`
 /// stands in front of every message.
