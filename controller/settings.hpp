@@ -1,13 +1,20 @@
 #pragma once
 #include <dashpot/controller/types.hpp>
 
+#include <stdexcept>
+#include <string>
+#include <utility>
+
 namespace dashpot::controller {
+
+class RobotModel;
 
 /// What is added to the springs and dampers. Each that is off costs nothing.
 struct FeedForward {
   bool gravity = true;       ///< off where the robot compensates gravity itself
   bool coriolis = true;      ///< C(q, qd) qd
-  bool friction = false;     ///< viscous and Coulomb friction of the model's parameters
+  bool friction = false;     ///< the model's viscous and Coulomb friction, at the velocity of the
+                             ///< moving set-point: it adds no feedback
   bool acceleration = true;  ///< M times the acceleration of the moving set-point
   bool wrench = true;        ///< J' times the wrench of the set-point
 };
@@ -18,15 +25,18 @@ struct TaskTerms {
   bool jacobian_rate = false;        ///< J' C_C Jdot, in the analysis
 };
 
-/// How fast set-points and gains may move.
+/// How fast set-points and gains may move. The path to a new set-point accelerates at these limits
+/// and brakes at half of them.
 struct Motion {
-  JointVector velocity;               ///< n, rad/s, positive
+  JointVector velocity;               ///< of the joint set-point, n, rad/s, positive
   JointVector acceleration;           ///< n, rad/s^2, positive
   double linear_velocity = 0.5;       ///< of the tip, m/s
   double linear_acceleration = 2.0;   ///< m/s^2
   double angular_velocity = 1.5;      ///< rad/s
   double angular_acceleration = 6.0;  ///< rad/s^2
-  double gain_time = 0.5;             ///< a change of gains or of mode takes this long, s
+  double smoothing = 0.03;  ///< acceleration of a path changes over this time, s; at least one
+                            ///< period, at most 256
+  double gain_time = 0.5;   ///< a change of gains, wrench or mode takes this long, s
 };
 
 /// Bounds that the torque and the robot keep to.
@@ -38,6 +48,7 @@ struct Limits {
   JointVector position_upper;    ///< n, rad; infinity if there is none
   double position_margin = 0.1;  ///< repulsion begins this far before a position limit, rad
   double repulsion = 0.5;        ///< its torque at the limit, as a fraction of the torque limit
+  JointVector damping;           ///< of the safe output "damp", n, N m s/rad, positive
 };
 
 /// When input is too old to act on.
@@ -67,5 +78,27 @@ struct Settings {
   Setpoint initial;  ///< mode and gains from the start; its positions are ignored: the
                      ///< controller starts by holding where the robot is
 };
+
+/// Thrown at set-up; `key` names the setting, such as "limits.torque" or
+/// "initial.gains.task_stiffness".
+class InvalidSettings : public std::invalid_argument {
+ public:
+  InvalidSettings(std::string key, const std::string& reason)
+      : std::invalid_argument(key + ": " + reason), key_(std::move(key)) {}
+  const std::string& key() const noexcept { return key_; }
+
+ private:
+  std::string key_;
+};
+
+/// Settings for a robot. Limits of torque, velocity and position are those of its URDF (100 N m,
+/// 2 rad/s and none where the URDF has none), torque may change fully within 0.1 s, set-points move
+/// at a quarter of the velocity limits. Gains suit the robot's inertia at the middle of its range:
+/// 1.5 Hz and a damping ratio of 0.7 for each joint alone; 400 N/m and 30 N m/rad at the tip.
+Settings default_settings(const RobotModel& model);
+
+/// Throws InvalidSettings, with key, value and unit, unless all sizes are n, all numbers are finite
+/// and in their ranges, and all gains are symmetric positive semidefinite.
+void validate(const Settings& settings, int n);
 
 }  // namespace dashpot::controller

@@ -3,19 +3,23 @@
 
 namespace dashpot::controller {
 
-/// Outcome of one tick. Every status comes with the safe output that stands beside
-/// it.
-///   hold:  springs stay where they are, whatever the set-point says
-///   damp:  no springs; gravity (where the controller compensates it) and joint damping
-///   ramp:  the last good torque goes to zero at the torque-rate limit, or within 0.1 s if that is
-///   slower
+/// Outcome of one tick: of several, the one that stands last here. Each comes with its safe output.
+///   hold:  the springs stop where they are, whatever the set-point says; no commanded wrench
+///   damp:  no springs: joint damping, and gravity where the controller compensates it
+///   ramp:  the last good torque goes to zero within 0.1 s
+/// Torque and torque-rate limits hold for all of them.
+///
+/// Recovery: what `status` names has to be over; nothing else is needed. After a ramp of at most
+/// Watchdog::longest_gap the controller goes on where it was. After a longer ramp and after every
+/// damp it starts afresh: springs where the robot is, gains growing from zero within
+/// Motion::gain_time, and set-points moving from there. Snapshot::restarts counts these.
 enum class Status : std::uint8_t {
   kOk,
   // The torque is as asked for, as far as it goes:
   kTorqueLimited,   ///< a torque or torque-rate limit is at work
   kNearJointLimit,  ///< a joint is within the margin of a position limit; its repulsion is at work
-  kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains or an unreachable
-                      ///< joint position; the last good one stays in force
+  kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, a rotation that is
+                      ///< none, or an unreachable joint position; the last good one stays in force
   // The set-point is too old:
   kSetpointStale,  ///< older than the first time-out: hold
   kSetpointLost,   ///< older than the second time-out: damp
@@ -23,9 +27,9 @@ enum class Status : std::uint8_t {
   kStateNotFinite,  ///< NaN or infinity: ramp
   kStateWrongSize,  ///< not n entries: ramp
   kStateJump,       ///< a position or velocity further from the last than the robot can move: ramp
-  kTimeBackward,    ///< time stamp at or before the last one: ramp
+  kTimeBackward,    ///< time stamp at or before that of the last tick: ramp
   kTimeGap,         ///< more than the longest gap since the last one: damp
-  kVelocityLimit,   ///< a joint moves faster than its limit: damp
+  kVelocityLimit,   ///< a joint moves faster than its limit: damp, until slower than 0.8 of it
   kPositionLimit,   ///< a joint is outside its position limits: damp, and push back
   kNotFinite,       ///< the law gave a NaN or infinity: ramp
 };

@@ -59,7 +59,8 @@ struct Gains {
   JointVector null_damping;    ///< n, N m s/rad, within the free motions
 };
 
-/// What the user wants. It may change at any tick; the controller goes there smoothly.
+/// What the user wants. It may change at any tick; the controller goes there smoothly. It is read
+/// when its time differs from that of the last one.
 struct Setpoint {
   std::int64_t time = 0;  ///< ns, when it was given, on the clock of RobotState::time
   Mode mode = Mode::kJoint;

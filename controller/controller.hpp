@@ -1,0 +1,65 @@
+#pragma once
+#include <dashpot/analysis/system.hpp>
+#include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/snapshot.hpp>
+
+#include <memory>
+
+namespace dashpot::controller {
+
+class ControllerCore;
+
+/// Impedance controller for one arm: from measured state and set-point to joint torque, once a
+/// tick.
+///
+///     const RobotModel model = RobotModel::from_urdf_file("panda.urdf", "panda_link0",
+///     "panda_hand"); Controller controller(model, default_settings(model)); JointVector torque;
+///     for (;;) {                                 // every Settings::period
+///       ...                                      // read `state`
+///       const Status status = controller.update(state, setpoint, torque);
+///       ...                                      // send `torque`, whatever the status
+///     }
+///
+/// Read in this order: robot_model.hpp, dynamics.hpp, setpoint_path.hpp, gain_path.hpp,
+/// impedance_law.hpp, safety_filter.hpp, and controller_core.hpp, which calls them.
+///
+/// One thread at a time may use a Controller; `Latest` (latest.hpp) hands set-points to the thread
+/// of `update` and snapshots from it.
+class Controller {
+ public:
+  /// Throws InvalidSettings with key, value and unit. The model is copied.
+  Controller(const RobotModel& model, const Settings& settings);
+  ~Controller();
+  Controller(Controller&&) noexcept;
+  Controller& operator=(Controller&&) noexcept;
+  Controller(const Controller&) = delete;
+  Controller& operator=(const Controller&) = delete;
+
+  /// One tick: sets `torque` (n, N m) to what the robot is to apply until the next one; with every
+  /// status it is safe to send (see Status). Bounded work; no allocation, lock, exception or system
+  /// call.
+  Status update(const RobotState& state, const Setpoint& setpoint, JointVector& torque) noexcept;
+
+  /// Of the last tick.
+  const Snapshot& snapshot() const noexcept;
+  /// Of the last tick that analysed, every Analysis::every of them.
+  const Vibration& vibration() const noexcept;
+  /// The closed loop at the last tick, linearised where its springs are at rest, in joint
+  /// coordinates (closed_loop.hpp): mass, damping, stiffness and its factor. Not to be called
+  /// before the first good state.
+  void closed_loop(analysis::System<kMaxJoints>& system) const noexcept;
+
+  /// Forgets everything: the next tick is like the first, and starts from zero torque.
+  void reset() noexcept;
+  /// The same, but the torque-rate limit counts from `torque` (n, N m), which the robot applies
+  /// now.
+  void reset(const JointVector& torque) noexcept;
+
+  int joints() const noexcept;  ///< n
+  const Settings& settings() const noexcept;
+
+ private:
+  std::unique_ptr<ControllerCore> core_;
+};
+
+}  // namespace dashpot::controller
