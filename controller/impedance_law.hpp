@@ -1,0 +1,148 @@
+#pragma once
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/null_space.hpp>
+#include <dashpot/controller/setpoint_path.hpp>
+#include <dashpot/controller/settings.hpp>
+
+namespace dashpot::controller {
+
+/// The paths on which the springs are fixed.
+template <int N>
+struct SpringPaths {
+  JointPath<N> joint;  ///< of mode kJoint: q_d
+  JointPath<N> rest;   ///< rest posture of a redundant arm: q_0
+  TipPath tip;         ///< of mode kCartesian: p_d, R_d and twist V_d
+};
+
+/// Joint torque of springs and dampers, between robot and set-point, and of the feed-forward:
+///
+///     tau = K_q (q_d - q) + C_q (qd_d - qd) + w_q M qdd_d           joint impedance
+///         + J' (K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d + f)     Cartesian impedance, wrench
+///         + N' K_0 N (q_0 - q) + N' C_0 N (qd_0 - qd)               redundancy
+///         + friction(qd_f) + coriolis + gravity                     the robot
+///
+/// e = (p_d - p, rotation vector of R_d R'), in B's axes at the tip: linear, then angular. K_C is
+/// the sum of the stiffness given in B's axes and R K_T R' of that given in the tool's, and so is
+/// C_C. w_q and w_C are the shares of the two modes, 0 or 1 except while the mode changes; K_q and
+/// C_q, K_C and C_C, K_0 and C_0 contain them. Lambda = (J M^-1 J')^-1 in the held directions, and
+/// N are those of NullSpace. f is the commanded wrench. qd_f = w_q qd_d + w_C (joint velocity that
+/// takes the tip along V_d), and friction_i(v) = damping_i v + friction_i tanh(v / 0.01 rad/s).
+/// Every term of the last column can be left out, see FeedForward.
+///
+/// The torque is bounded wherever the arm is: J' is, and so are N (see NullSpace) and e (|e_rot| at
+/// most 3/2 pi); nothing is divided by what vanishes at a singularity but Lambda, which is damped
+/// there.
+template <int N>
+class ImpedanceLaw {
+ public:
+  using Vector = Eigen::Matrix<double, N, 1>;
+
+  ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward)
+      : feed_forward_(feed_forward),
+        viscous_friction_(model.joint_values(&Joint::damping)),
+        coulomb_friction_(model.joint_values(&Joint::friction)) {}
+
+  /// `wrench`: f, which J' takes to the joints only if FeedForward::wrench is on.
+  Vector torque(const Dynamics<N>& robot, const Vector& q, const Vector& qd,
+                const Impedance<N>& impedance, const SpringPaths<N>& paths,
+                const Vector6& wrench) noexcept;
+
+  /// Orientation errors start from the short way round.
+  void reset() noexcept { orientation_.reset(); }
+
+  /// Of the last torque: e, and J' of it is the Cartesian part.
+  const Vector6& tip_error() const noexcept { return e_; }
+  const Vector6& tip_wrench() const noexcept { return F_; }
+
+ private:
+  /// K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d
+  Vector6 task_wrench(const Dynamics<N>& robot, const Vector& qd, const Impedance<N>& impedance,
+                      const TipPath& path) noexcept;
+  Vector friction(const Vector& velocity) const noexcept;
+
+  FeedForward feed_forward_;
+  Vector viscous_friction_;
+  Vector coulomb_friction_;
+  OrientationError orientation_;
+  NullSpace<N> null_space_;
+  Vector6 e_ = Vector6::Zero();
+  Vector6 F_ = Vector6::Zero();
+};
+
+/// K_T in the tool's axes times a vector in B's axes: R K_T R' a.
+inline Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R,
+                            const Vector6& a) noexcept {
+  Vector6 local, result;
+  local << R.transpose() * a.head<3>(), R.transpose() * a.tail<3>();
+  local = K_T * local;
+  result << R * local.head<3>(), R * local.tail<3>();
+  return result;
+}
+
+template <int N>
+Eigen::Matrix<double, N, 1> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q,
+                                                    const Vector& qd, const Impedance<N>& impedance,
+                                                    const SpringPaths<N>& paths,
+                                                    const Vector6& wrench) noexcept {
+  Vector tau = Vector::Zero();
+  Vector path_velocity = Vector::Zero();  // qd_f
+  e_.setZero();
+  F_.setZero();
+  if (impedance.joint_weight > 0) {
+    tau += impedance.joint_stiffness * (paths.joint.position() - q);
+    tau += impedance.joint_damping * (paths.joint.velocity() - qd);
+    if (feed_forward_.acceleration) {
+      tau += impedance.joint_weight * (robot.M * paths.joint.acceleration());
+    }
+    path_velocity += impedance.joint_weight * paths.joint.velocity();
+  }
+  if (impedance.task_weight > 0) {
+    const bool null_space = impedance.null_space();
+    if (null_space || feed_forward_.acceleration || feed_forward_.friction) {
+      null_space_.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
+    }
+    F_ = task_wrench(robot, qd, impedance, paths.tip);
+    if (null_space) {
+      tau += null_space_.torque(impedance.null_stiffness, paths.rest.position() - q);
+      tau += null_space_.torque(impedance.null_damping, paths.rest.velocity() - qd);
+    }
+    if (feed_forward_.friction) {
+      path_velocity += impedance.task_weight * null_space_.joint_velocity(paths.tip.velocity());
+    }
+  }
+  if (feed_forward_.wrench) F_ += wrench;
+  tau += robot.J.transpose() * F_;
+  if (feed_forward_.friction) tau += friction(path_velocity);
+  if (feed_forward_.coriolis) tau += robot.coriolis;
+  if (feed_forward_.gravity) tau += robot.gravity;
+  return tau;
+}
+
+template <int N>
+Vector6 ImpedanceLaw<N>::task_wrench(const Dynamics<N>& robot, const Vector& qd,
+                                     const Impedance<N>& impedance, const TipPath& path) noexcept {
+  e_ << path.position() - robot.p_BT_B,
+      orientation_.update(path.rotation(), Eigen::Quaterniond(robot.R_BT));
+  const Vector6 velocity_error = path.velocity() - robot.J * qd;
+  Vector6 F = Vector6::Zero();
+  if (!impedance.base.none()) {
+    F += impedance.base.stiffness * e_ + impedance.base.damping * velocity_error;
+  }
+  if (!impedance.tool.none()) {
+    F += in_tool_axes(impedance.tool.stiffness, robot.R_BT, e_) +
+         in_tool_axes(impedance.tool.damping, robot.R_BT, velocity_error);
+  }
+  if (feed_forward_.acceleration) {
+    F += impedance.task_weight * null_space_.wrench(path.acceleration());
+  }
+  return F;
+}
+
+template <int N>
+Eigen::Matrix<double, N, 1> ImpedanceLaw<N>::friction(const Vector& velocity) const noexcept {
+  constexpr double kRise = 0.01;  // rad/s; Coulomb friction changes sign smoothly over this
+  return viscous_friction_.cwiseProduct(velocity) +
+         coulomb_friction_.cwiseProduct((velocity / kRise).array().tanh().matrix());
+}
+
+}  // namespace dashpot::controller

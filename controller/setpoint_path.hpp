@@ -1,0 +1,132 @@
+#pragma once
+#include <dashpot/controller/orientation.hpp>
+#include <dashpot/controller/smooth_motion.hpp>
+#include <dashpot/controller/types.hpp>
+
+namespace dashpot::controller {
+
+/// Where the joint springs are fixed while the set-point moves. From rest the way is straight in
+/// joint space and all joints arrive together; velocity and acceleration keep to their limits, the
+/// acceleration is continuous, and the path ends exactly at its goal.
+template <int N>
+class JointPath {
+ public:
+  using Vector = Eigen::Matrix<double, N, 1>;
+
+  JointPath(const JointNorm<N>& norm, double period, int smoothing) noexcept
+      : norm_(norm), period_(period), smoothing_(smoothing) {
+    start(Vector::Zero());
+  }
+
+  /// At rest at `position`.
+  void start(const Vector& position) noexcept {
+    point_ = position_ = position;
+    velocity_.setZero();
+    smoothing_.reset();
+  }
+
+  /// One period toward `goal`.
+  void step(const Vector& goal) noexcept {
+    const Step<Vector> step = approach(Vector(goal - point_), velocity_, norm_, period_);
+    velocity_ = step.velocity;
+    point_ = step.arrives ? goal : Vector(point_ + period_ * velocity_);
+    smooth();
+  }
+
+  /// One period in which the path brakes, or stays where it is.
+  void halt() noexcept {
+    velocity_ = approach(Vector(Vector::Zero()), velocity_, norm_, period_).velocity;
+    point_ += period_ * velocity_;
+    smooth();
+  }
+
+  const Vector& position() const noexcept { return position_; }
+  const Vector& velocity() const noexcept { return smoothing_.velocity(); }
+  const Vector& acceleration() const noexcept { return smoothing_.acceleration(); }
+
+ private:
+  void smooth() noexcept {
+    smoothing_.step(velocity_, period_);
+    position_ = point_ + smoothing_.offset();
+  }
+
+  JointNorm<N> norm_;
+  double period_;
+  Smoothing<N> smoothing_;
+  Vector point_;  ///< before smoothing
+  Vector velocity_;
+  Vector position_;
+};
+
+/// Where the Cartesian springs are fixed while the set-point moves. From rest the tip goes along a
+/// straight line and turns about one axis, the short way round, and both arrive together.
+///
+/// The smoothed orientation is exp(offset) times the one before smoothing, and its angular velocity
+/// the average of those before. That is exact while the axis of rotation stands still; where a new
+/// goal changes it on the way, the two differ by a fraction |offset| (rad) of the angular velocity.
+class TipPath {
+ public:
+  TipPath(const TwistNorm& norm, double period, int smoothing) noexcept
+      : norm_(norm), period_(period), smoothing_(smoothing) {}
+
+  /// At rest.
+  void start(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation) noexcept {
+    point_ = position_ = position;
+    point_rotation_ = rotation_ = rotation;
+    velocity_.setZero();
+    smoothing_.reset();
+  }
+
+  /// One period toward a goal; `rotation` is a unit quaternion.
+  void step(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation) noexcept {
+    Eigen::Quaterniond turn = rotation * point_rotation_.conjugate();
+    if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
+    Vector6 d;
+    d << position - point_, rotation_vector(turn);
+    const Step<Vector6> step = approach(d, velocity_, norm_, period_);
+    velocity_ = step.velocity;
+    if (step.arrives) {
+      point_ = position;
+      point_rotation_ = rotation;
+    } else {
+      advance();
+    }
+    smooth();
+  }
+
+  /// One period in which the path brakes, or stays where it is.
+  void halt() noexcept {
+    velocity_ = approach(Vector6(Vector6::Zero()), velocity_, norm_, period_).velocity;
+    advance();
+    smooth();
+  }
+
+  const Eigen::Vector3d& position() const noexcept { return position_; }
+  const Eigen::Quaterniond& rotation() const noexcept { return rotation_; }
+  const Vector6& velocity() const noexcept { return smoothing_.velocity(); }
+  const Vector6& acceleration() const noexcept { return smoothing_.acceleration(); }
+
+ private:
+  void advance() noexcept {
+    point_ += period_ * velocity_.head<3>();
+    if ((velocity_.tail<3>().array() == 0).all()) return;
+    point_rotation_ = quaternion(period_ * velocity_.tail<3>()) * point_rotation_;
+    point_rotation_.normalize();
+  }
+  void smooth() noexcept {
+    smoothing_.step(velocity_, period_);
+    position_ = point_ + smoothing_.offset().head<3>();
+    rotation_ = quaternion(smoothing_.offset().tail<3>()) * point_rotation_;
+  }
+
+  TwistNorm norm_;
+  double period_;
+  Smoothing<6> smoothing_;
+  Eigen::Vector3d point_ = Eigen::Vector3d::Zero();  ///< before smoothing
+  Eigen::Quaterniond point_rotation_ = Eigen::Quaterniond::Identity();
+  Vector6 velocity_ = Vector6::Zero();
+  Eigen::Vector3d position_ = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();
+};
+
+}  // namespace dashpot::controller
