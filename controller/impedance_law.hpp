@@ -50,9 +50,11 @@ class ImpedanceLaw {
   /// Orientation errors start from the short way round.
   void reset() noexcept { orientation_.reset(); }
 
-  /// Of the last torque: e, and J' of it is the Cartesian part.
+  /// Of the last torque: e, what J' turned into the Cartesian part, and the null space, which is up
+  /// to date if the impedance has one.
   const Vector6& tip_error() const noexcept { return e_; }
   const Vector6& tip_wrench() const noexcept { return F_; }
+  const NullSpace<N>& null_space() const noexcept { return null_space_; }
 
  private:
   /// K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d

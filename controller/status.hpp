@@ -19,20 +19,27 @@ enum class Status : std::uint8_t {
   kTorqueLimited,   ///< a torque or torque-rate limit is at work
   kNearJointLimit,  ///< a joint is within the margin of a position limit; its repulsion is at work
   kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, a rotation that is
-                      ///< none, or an unreachable joint position; the last good one stays in force
+                      ///< none, an unreachable joint position or a time to come; the last good one
+                      ///< stays in force
   // The set-point is too old:
   kSetpointStale,  ///< older than the first time-out: hold
   kSetpointLost,   ///< older than the second time-out: damp
+  // The state cannot go on like this:
+  kTimeGap,        ///< more than the longest gap since the last tick: damp
+  kVelocityLimit,  ///< a joint moves faster than its limit: damp, until slower than 0.8 of it
+  kPositionLimit,  ///< a joint is outside its position limits: damp, and push back
   // The state cannot be trusted:
   kStateNotFinite,  ///< NaN or infinity: ramp
   kStateWrongSize,  ///< not n entries: ramp
   kStateJump,       ///< a position or velocity further from the last than the robot can move: ramp
   kTimeBackward,    ///< time stamp at or before that of the last tick: ramp
-  kTimeGap,         ///< more than the longest gap since the last one: damp
-  kVelocityLimit,   ///< a joint moves faster than its limit: damp, until slower than 0.8 of it
-  kPositionLimit,   ///< a joint is outside its position limits: damp, and push back
   kNotFinite,       ///< the law gave a NaN or infinity: ramp
 };
+
+/// The one that stands last.
+inline Status worse(Status a, Status b) noexcept {
+  return a < b ? b : a;
+}
 
 /// "ok", "torque limited", ...: a short English text.
 const char* to_text(Status status) noexcept;

@@ -1,0 +1,361 @@
+#pragma once
+#include <dashpot/controller/closed_loop.hpp>
+#include <dashpot/controller/controller_core.hpp>
+#include <dashpot/controller/gain_path.hpp>
+#include <dashpot/controller/impedance_law.hpp>
+#include <dashpot/controller/safety_filter.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
+#include <dashpot/controller/state_check.hpp>
+
+#include <cmath>
+#include <numbers>
+
+namespace dashpot::controller {
+
+/// The controller's core for N joints, known at compile time. One tick, in `update`:
+///     state -> StateCheck -> DynamicsKernel -> set-point, paths and gains -> ImpedanceLaw
+///           -> SafetyFilter -> torque;   and every so often -> closed loop -> VibrationAnalysis
+template <int N>
+class FixedCore final : public ControllerCore {
+ public:
+  using Vector = Eigen::Matrix<double, N, 1>;
+
+  FixedCore(const RobotModel& model, const Settings& settings);
+
+  Status update(const RobotState& state, const Setpoint& setpoint,
+                JointVector& torque) noexcept override;
+  void reset(const JointVector& torque) noexcept override;
+  void closed_loop(analysis::System<kMaxJoints>& system) const noexcept override;
+
+ private:
+  /// Takes over a set-point that is new and in order. Whether the one given is in order.
+  bool read(const Setpoint& setpoint) noexcept;
+  /// The way to the accepted set-point; paths whose springs are not in force start where the robot
+  /// is.
+  void aim() noexcept;
+  /// Springs where the robot is, gains growing from zero.
+  void start_afresh() noexcept;
+  /// Whether the state allows springs: kOk, kTimeGap, kVelocityLimit or kPositionLimit.
+  Status guard(Status input) noexcept;
+  /// Whether the set-point is fresh: kOk, kSetpointStale or kSetpointLost.
+  Status watch() const noexcept;
+  /// Moves gains and set-points on by one period, and gives the law's torque.
+  Vector act(bool hold) noexcept;
+  /// The safe output without springs.
+  Vector damp() noexcept;
+  /// The safe output without a state.
+  Status ramp(Status status, JointVector& torque) noexcept;
+  Status finish(Status status, const Vector& tau, JointVector& torque) noexcept;
+  void describe() noexcept;
+
+  DynamicsKernel<N> kernel_;
+  StateCheck state_check_;
+  SpringPaths<N> paths_;
+  GainPath<N> gains_;
+  Ramp<Vector6> wrench_;
+  ImpedanceLaw<N> law_;
+  SafetyFilter<N> filter_;
+  Vector damping_;           ///< of the safe output "damp", N m s/rad
+  Vector viscous_friction_;  ///< of the robot, N m s/rad
+  Vector turn_;              ///< 2 pi for a continuous joint, else 0
+
+  // The last good state, and the robot there
+  std::int64_t time_ = 0;
+  Vector q_ = Vector::Zero();
+  Vector qd_ = Vector::Zero();
+  Vector6 external_wrench_ = Vector6::Zero();
+  Dynamics<N> robot_;
+
+  Setpoint accepted_;             ///< the last good set-point
+  Vector goal_ = Vector::Zero();  ///< its joint position
+  Eigen::Quaterniond goal_rotation_ = Eigen::Quaterniond::Identity();
+  bool from_user_ = false;      ///< or else it is Settings::initial, where the robot started
+  bool looked_at_any_ = false;  ///< and at what time that was, and whether it was in order:
+  std::int64_t looked_at_ = 0;
+  bool in_order_ = true;
+
+  bool first_ = true;         ///< there was no good state yet
+  bool afresh_ = true;        ///< springs start afresh when they are next in force
+  bool damping_only_ = true;  ///< the last torque was that of `damp`
+  bool too_fast_ = false;
+  int ramp_ticks_ = 0;
+};
+
+template <int N>
+FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
+    : ControllerCore(settings),
+      kernel_(model),
+      state_check_(model, settings),
+      paths_([&] {
+        const Motion& motion = settings.motion;
+        const double T = settings.period;
+        const int window = static_cast<int>(std::lround(motion.smoothing / T));
+        const JointNorm<N> joints{motion.velocity.cwiseInverse(),
+                                  motion.acceleration.cwiseInverse()};
+        const TwistNorm twist{1 / motion.linear_velocity, 1 / motion.angular_velocity,
+                              1 / motion.linear_acceleration, 1 / motion.angular_acceleration};
+        return SpringPaths<N>{JointPath<N>(joints, T, window), JointPath<N>(joints, T, window),
+                              TipPath(twist, T, window)};
+      }()),
+      gains_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
+      wrench_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
+      law_(model, settings.feed_forward),
+      filter_(settings.limits, settings.period),
+      damping_(settings.limits.damping),
+      viscous_friction_(model.joint_values(&Joint::damping)) {
+  for (int i = 0; i < N; ++i) {
+    const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
+    turn_[i] = joint.type == JointType::kContinuous ? 2 * std::numbers::pi : 0;
+  }
+  reset(JointVector::Zero(N));
+}
+
+template <int N>
+void FixedCore<N>::reset(const JointVector& torque) noexcept {
+  state_check_.reset();
+  const bool usable = torque.size() == N && torque.allFinite();
+  filter_.reset(usable ? Vector(torque) : Vector(Vector::Zero()));
+  accepted_ = settings_.initial;
+  from_user_ = looked_at_any_ = too_fast_ = false;
+  in_order_ = first_ = afresh_ = damping_only_ = true;
+  ramp_ticks_ = 0;
+  snapshot_ = Snapshot();
+  for (JointVector* vector :
+       {&snapshot_.position, &snapshot_.velocity, &snapshot_.torque, &snapshot_.law_torque,
+        &snapshot_.setpoint_position, &snapshot_.setpoint_velocity, &snapshot_.joint_error}) {
+    vector->setZero(N);
+  }
+  vibration_.reset(N);
+}
+
+template <int N>
+Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
+                            JointVector& torque) noexcept {
+  ++snapshot_.tick;
+  snapshot_.time = state.time;
+  const Status input = state_check_.check(state);
+  if (input >= Status::kStateNotFinite) return ramp(input, torque);
+  time_ = state.time;
+  q_ = state_check_.position();
+  qd_ = state.velocity;
+  external_wrench_ = state.external_wrench;
+  kernel_.evaluate(q_, qd_, robot_);
+  if (first_) {
+    accepted_.time = time_;
+    first_ = false;
+  }
+
+  Status status = read(setpoint) ? Status::kOk : Status::kSetpointRejected;
+  status = worse(status, watch());
+  status = worse(status, guard(input));
+  Vector tau = status >= Status::kSetpointLost ? damp() : act(status == Status::kSetpointStale);
+  status = worse(status, filter_.apply(q_, qd_, tau));
+  if (status == Status::kNotFinite) {
+    afresh_ |= ++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap;
+  } else {
+    ramp_ticks_ = 0;
+  }
+  describe();
+  return finish(status, tau, torque);
+}
+
+template <int N>
+bool FixedCore<N>::read(const Setpoint& setpoint) noexcept {
+  if (looked_at_any_ && setpoint.time == looked_at_) return in_order_;
+  looked_at_any_ = true;
+  looked_at_ = setpoint.time;
+  const bool same = setpoint.mode == accepted_.mode && same_gains(setpoint.gains, accepted_.gains);
+  const double hold = settings_.watchdog.setpoint_hold;
+  const bool to_come = hold > 0 && seconds_between(time_, setpoint.time) > hold;
+  in_order_ = !to_come && !check_setpoint(setpoint, settings_.limits, same);
+  if (!in_order_) return false;
+  accepted_.time = setpoint.time;
+  accepted_.joint_position = setpoint.joint_position;
+  accepted_.tip_pose = setpoint.tip_pose;
+  accepted_.wrench = setpoint.wrench;
+  from_user_ = true;
+  if (!same) {
+    accepted_.mode = setpoint.mode;
+    accepted_.gains = setpoint.gains;
+    gains_.set_target(Impedance<N>::of(accepted_));
+  }
+  if (!afresh_) aim();
+  return true;
+}
+
+template <int N>
+void FixedCore<N>::aim() noexcept {
+  const bool joint = accepted_.mode == Mode::kJoint;
+  if (joint && gains_.now().joint_weight == 0) paths_.joint.start(q_);
+  if (!joint && gains_.now().task_weight == 0) {
+    paths_.rest.start(q_);
+    paths_.tip.start(robot_.p_BT_B, Eigen::Quaterniond(robot_.R_BT).normalized());
+    law_.reset();
+  }
+  const Vector& from = joint ? paths_.joint.position() : paths_.rest.position();
+  goal_ = from;
+  if (accepted_.joint_position.size() == N) {
+    goal_ = accepted_.joint_position;
+    for (int i = 0; i < N; ++i) {  // a continuous joint goes the short way
+      if (turn_[i] > 0) goal_[i] += turn_[i] * std::nearbyint((from[i] - goal_[i]) / turn_[i]);
+    }
+  }
+  goal_rotation_ = Eigen::Quaterniond(accepted_.tip_pose.rotation).normalized();
+}
+
+template <int N>
+void FixedCore<N>::start_afresh() noexcept {
+  const Impedance<N> target = Impedance<N>::of(accepted_);
+  Impedance<N> none;
+  none.base.held = target.base.held;
+  none.tool.held = target.tool.held;
+  gains_.start(none);
+  gains_.set_target(target);
+  wrench_.start(Vector6::Zero());
+  if (!from_user_) {
+    accepted_.joint_position = q_;
+    accepted_.tip_pose = {robot_.p_BT_B, robot_.R_BT};
+  }
+  aim();
+  afresh_ = false;
+  ++snapshot_.restarts;
+}
+
+template <int N>
+Status FixedCore<N>::watch() const noexcept {
+  const double age = seconds_between(accepted_.time, time_);
+  const Watchdog& limit = settings_.watchdog;
+  if (limit.setpoint_damp > 0 && age > limit.setpoint_damp) return Status::kSetpointLost;
+  if (limit.setpoint_hold > 0 && age > limit.setpoint_hold) return Status::kSetpointStale;
+  return Status::kOk;
+}
+
+template <int N>
+Status FixedCore<N>::guard(Status input) noexcept {
+  const double share = qd_.cwiseQuotient(Vector(settings_.limits.velocity)).cwiseAbs().maxCoeff();
+  too_fast_ = share > 1 || (too_fast_ && share > 0.8);
+  Status status = input;
+  if (too_fast_) status = worse(status, Status::kVelocityLimit);
+  if (filter_.outside(q_)) status = worse(status, Status::kPositionLimit);
+  return status;
+}
+
+template <int N>
+Eigen::Matrix<double, N, 1> FixedCore<N>::act(bool hold) noexcept {
+  if (afresh_) start_afresh();
+  damping_only_ = false;
+  gains_.step();
+  const Vector6 wrench = hold ? Vector6(Vector6::Zero()) : accepted_.wrench;
+  if (wrench != wrench_.target()) wrench_.set_target(wrench);
+  wrench_.step();
+
+  // Of two modes in force, the one that fades away stays where it is.
+  const Impedance<N>& impedance = gains_.now();
+  const bool joint = accepted_.mode == Mode::kJoint;
+  if (impedance.joint_weight > 0) {
+    if (joint && !hold) {
+      paths_.joint.step(goal_);
+    } else {
+      paths_.joint.halt();
+    }
+  }
+  if (impedance.task_weight > 0) {
+    if (!joint && !hold) {
+      paths_.tip.step(accepted_.tip_pose.position, goal_rotation_);
+      paths_.rest.step(goal_);
+    } else {
+      paths_.tip.halt();
+      paths_.rest.halt();
+    }
+  }
+  return law_.torque(robot_, q_, qd_, impedance, paths_, wrench_.now());
+}
+
+template <int N>
+Eigen::Matrix<double, N, 1> FixedCore<N>::damp() noexcept {
+  afresh_ = damping_only_ = true;
+  Vector tau = -damping_.cwiseProduct(qd_);
+  if (settings_.feed_forward.gravity) tau += robot_.gravity;
+  return tau;
+}
+
+template <int N>
+Status FixedCore<N>::ramp(Status status, JointVector& torque) noexcept {
+  afresh_ |= ++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap;
+  return finish(status, filter_.ramp(), torque);
+}
+
+template <int N>
+Status FixedCore<N>::finish(Status status, const Vector& tau, JointVector& torque) noexcept {
+  torque = tau;
+  snapshot_.status = status;
+  snapshot_.torque = tau;
+  if (status < Status::kStateNotFinite && vibration_.due(snapshot_.tick)) {
+    closed_loop(vibration_.system());
+    vibration_.update(time_, snapshot_.tick, snapshot_.position);
+  }
+  return status;
+}
+
+template <int N>
+void FixedCore<N>::describe() noexcept {
+  const Impedance<N>& impedance = gains_.now();
+  const bool springs = !damping_only_;
+  snapshot_.mode = accepted_.mode;
+  snapshot_.joint_weight = springs ? impedance.joint_weight : 0;
+  snapshot_.task_weight = springs ? impedance.task_weight : 0;
+  snapshot_.position = q_;
+  snapshot_.velocity = qd_;
+  snapshot_.law_torque = filter_.asked();
+  snapshot_.tip = {robot_.p_BT_B, robot_.R_BT};
+  if (snapshot_.joint_weight > 0 || snapshot_.task_weight > 0) {
+    const JointPath<N>& path = accepted_.mode == Mode::kJoint ? paths_.joint : paths_.rest;
+    snapshot_.setpoint_position = path.position();
+    snapshot_.setpoint_velocity = path.velocity();
+  } else {
+    snapshot_.setpoint_position = q_;
+    snapshot_.setpoint_velocity.setZero();
+  }
+  snapshot_.joint_error = snapshot_.setpoint_position - snapshot_.position;
+  if (snapshot_.task_weight > 0) {
+    snapshot_.setpoint_tip = {paths_.tip.position(), paths_.tip.rotation().toRotationMatrix()};
+    snapshot_.setpoint_twist = paths_.tip.velocity();
+    snapshot_.tip_error = law_.tip_error();
+  } else {
+    snapshot_.setpoint_tip = snapshot_.tip;
+    snapshot_.setpoint_twist.setZero();
+    snapshot_.tip_error.setZero();
+  }
+  snapshot_.tip_wrench = springs ? law_.tip_wrench() : Vector6(Vector6::Zero());
+}
+
+template <int N>
+void FixedCore<N>::closed_loop(analysis::System<kMaxJoints>& system) const noexcept {
+  Impedance<N> impedance;
+  if (damping_only_) {
+    impedance.joint_damping = damping_.asDiagonal();
+  } else {
+    impedance = gains_.now();
+  }
+  controller::closed_loop(robot_, qd_, impedance, law_.null_space(), viscous_friction_,
+                          settings_.task_terms, external_wrench_, system);
+}
+
+extern template class FixedCore<1>;
+extern template class FixedCore<2>;
+extern template class FixedCore<3>;
+extern template class FixedCore<4>;
+extern template class FixedCore<5>;
+extern template class FixedCore<6>;
+extern template class FixedCore<7>;
+extern template class FixedCore<8>;
+extern template class FixedCore<9>;
+extern template class FixedCore<10>;
+extern template class FixedCore<11>;
+extern template class FixedCore<12>;
+extern template class FixedCore<13>;
+extern template class FixedCore<14>;
+extern template class FixedCore<15>;
+extern template class FixedCore<16>;
+
+}  // namespace dashpot::controller

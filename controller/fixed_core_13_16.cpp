@@ -1,0 +1,11 @@
+// Compiled in four parts, to share the work.
+#include <dashpot/controller/fixed_core.hpp>
+
+namespace dashpot::controller {
+
+template class FixedCore<13>;
+template class FixedCore<14>;
+template class FixedCore<15>;
+template class FixedCore<16>;
+
+}  // namespace dashpot::controller

@@ -1,0 +1,11 @@
+// Compiled in four parts, to share the work.
+#include <dashpot/controller/fixed_core.hpp>
+
+namespace dashpot::controller {
+
+template class FixedCore<1>;
+template class FixedCore<2>;
+template class FixedCore<3>;
+template class FixedCore<4>;
+
+}  // namespace dashpot::controller

@@ -1,0 +1,11 @@
+// Compiled in four parts, to share the work.
+#include <dashpot/controller/fixed_core.hpp>
+
+namespace dashpot::controller {
+
+template class FixedCore<9>;
+template class FixedCore<10>;
+template class FixedCore<11>;
+template class FixedCore<12>;
+
+}  // namespace dashpot::controller

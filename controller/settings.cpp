@@ -1,0 +1,145 @@
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
+#include <dashpot/controller/settings.hpp>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+namespace dashpot::controller {
+namespace {
+
+[[noreturn]] void fail(const std::string& key, double value, const std::string& unit,
+                       const std::string& reason) {
+  std::ostringstream text;
+  text << "is " << value << (unit.empty() ? "" : " ") << unit << ", " << reason;
+  throw InvalidSettings(key, text.str());
+}
+
+void need_positive(const std::string& key, double value, const std::string& unit) {
+  if (!std::isfinite(value) || value <= 0) fail(key, value, unit, "has to be positive");
+}
+
+void need_not_negative(const std::string& key, double value, const std::string& unit) {
+  if (!std::isfinite(value) || value < 0) fail(key, value, unit, "must not be negative");
+}
+
+std::string entry(const std::string& key, Eigen::Index i) {
+  return key + "[" + std::to_string(i) + "]";
+}
+
+void need_size(const std::string& key, const JointVector& v, int n) {
+  if (v.size() != n) {
+    throw InvalidSettings(key, "has " + std::to_string(v.size()) + " entries, the robot has " +
+                                   std::to_string(n) + " joints");
+  }
+}
+
+void need_positive(const std::string& key, const JointVector& v, const std::string& unit, int n) {
+  need_size(key, v, n);
+  for (int i = 0; i < n; ++i) need_positive(entry(key, i), v[i], unit);
+}
+
+void validate(const Motion& motion, double period, int n) {
+  need_positive("motion.velocity", motion.velocity, "rad/s", n);
+  need_positive("motion.acceleration", motion.acceleration, "rad/s^2", n);
+  need_positive("motion.linear_velocity", motion.linear_velocity, "m/s");
+  need_positive("motion.linear_acceleration", motion.linear_acceleration, "m/s^2");
+  need_positive("motion.angular_velocity", motion.angular_velocity, "rad/s");
+  need_positive("motion.angular_acceleration", motion.angular_acceleration, "rad/s^2");
+  need_not_negative("motion.smoothing", motion.smoothing, "s");
+  if (motion.smoothing > 256 * period) {
+    fail("motion.smoothing", motion.smoothing, "s", "must be at most 256 periods");
+  }
+  need_positive("motion.gain_time", motion.gain_time, "s");
+  if (motion.gain_time > 1e6 * period) {
+    fail("motion.gain_time", motion.gain_time, "s", "must be at most 1e6 periods");
+  }
+}
+
+void validate(const Limits& limits, int n) {
+  need_positive("limits.torque", limits.torque, "N m", n);
+  need_positive("limits.torque_rate", limits.torque_rate, "N m/s", n);
+  need_positive("limits.velocity", limits.velocity, "rad/s", n);
+  need_positive("limits.damping", limits.damping, "N m s/rad", n);
+  need_size("limits.position_lower", limits.position_lower, n);
+  need_size("limits.position_upper", limits.position_upper, n);
+  for (int i = 0; i < n; ++i) {
+    if (!(limits.position_lower[i] < limits.position_upper[i])) {
+      fail(entry("limits.position_lower", i), limits.position_lower[i], "rad",
+           "has to be below the upper limit");
+    }
+  }
+  need_positive("limits.position_margin", limits.position_margin, "rad");
+  need_not_negative("limits.repulsion", limits.repulsion, "");
+  if (limits.repulsion > 1) fail("limits.repulsion", limits.repulsion, "", "must be at most 1");
+}
+
+double finite_or(double value, double otherwise) {
+  return std::isfinite(value) && value > 0 ? value : otherwise;
+}
+
+}  // namespace
+
+Settings default_settings(const RobotModel& model) {
+  const int n = model.dof();
+  const JointVector none = JointVector::Zero(n);
+  Settings settings;
+  Limits& limits = settings.limits;
+  limits.torque = limits.torque_rate = limits.velocity = limits.damping = none;
+  limits.position_lower = limits.position_upper = none;
+  JointVector middle = none;
+  for (int i = 0; i < n; ++i) {
+    const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
+    limits.torque[i] = finite_or(joint.effort, 100);
+    limits.torque_rate[i] = 10 * limits.torque[i];
+    limits.velocity[i] = finite_or(joint.velocity, 2);
+    limits.position_lower[i] = joint.lower;
+    limits.position_upper[i] = joint.upper;
+    const double center = 0.5 * (joint.lower + joint.upper);
+    middle[i] = std::isfinite(center) ? center : 0;
+  }
+  settings.motion.velocity = 0.25 * limits.velocity;
+  settings.motion.acceleration = limits.velocity;
+
+  const Eigen::MatrixXd M = evaluate(model, middle, none).M;
+  const Eigen::MatrixXd M_inverse = M.llt().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
+  limits.damping = 20 * M_inverse.diagonal().cwiseInverse();  // stops a joint within some 0.05 s
+
+  constexpr double kOmega = 2 * std::numbers::pi * 1.5;  // rad/s
+  constexpr double kRatio = 0.7;
+  Gains& gains = settings.initial.gains;
+  gains.joint_stiffness = JointMatrix::Zero(n, n);
+  gains.joint_damping = JointMatrix::Zero(n, n);
+  gains.joint_stiffness.diagonal() = kOmega * kOmega * M.diagonal();
+  gains.joint_damping.diagonal() = 2 * kRatio * kOmega * M.diagonal();
+  gains.task_stiffness.diagonal() << 400, 400, 400, 30, 30, 30;
+  gains.task_damping.diagonal() << 40, 40, 40, 2, 2, 2;
+  gains.null_stiffness = 0.25 * gains.joint_stiffness.diagonal();
+  gains.null_damping = 0.5 * gains.joint_damping.diagonal();
+  settings.initial.joint_position = middle;
+  return settings;
+}
+
+void validate(const Settings& settings, int n) {
+  need_positive("period", settings.period, "s");
+  validate(settings.motion, settings.period, n);
+  validate(settings.limits, n);
+  need_not_negative("watchdog.setpoint_hold", settings.watchdog.setpoint_hold, "s");
+  need_not_negative("watchdog.setpoint_damp", settings.watchdog.setpoint_damp, "s");
+  if (!(settings.watchdog.longest_gap > settings.period)) {
+    fail("watchdog.longest_gap", settings.watchdog.longest_gap, "s", "has to exceed the period");
+  }
+  if (settings.analysis.every < 1) {
+    fail("analysis.every", settings.analysis.every, "ticks", "has to be at least 1");
+  }
+  need_not_negative("analysis.soft_frequency", settings.analysis.soft_frequency, "rad/s");
+  const Setpoint& initial = settings.initial;
+  if (const SetpointFault fault = check_gains(initial.gains, initial.mode, n)) {
+    throw InvalidSettings(std::string("initial.gains.") + fault.key, fault.reason);
+  }
+  if (!initial.wrench.allFinite()) throw InvalidSettings("initial.wrench", "is not finite");
+}
+
+}  // namespace dashpot::controller

@@ -1,0 +1,39 @@
+#include <dashpot/controller/status.hpp>
+
+namespace dashpot::controller {
+
+const char* to_text(Status status) noexcept {
+  switch (status) {
+    case Status::kOk:
+      return "ok";
+    case Status::kTorqueLimited:
+      return "torque or torque rate limited";
+    case Status::kNearJointLimit:
+      return "near a joint's position limit";
+    case Status::kSetpointRejected:
+      return "set-point rejected";
+    case Status::kSetpointStale:
+      return "set-point stale, holding";
+    case Status::kSetpointLost:
+      return "set-point lost, damping";
+    case Status::kTimeGap:
+      return "gap between states, damping";
+    case Status::kVelocityLimit:
+      return "velocity limit exceeded, damping";
+    case Status::kPositionLimit:
+      return "position limit exceeded, damping";
+    case Status::kStateNotFinite:
+      return "state not finite, torque ramped down";
+    case Status::kStateWrongSize:
+      return "state of wrong size, torque ramped down";
+    case Status::kStateJump:
+      return "state jumped, torque ramped down";
+    case Status::kTimeBackward:
+      return "time not after the last, torque ramped down";
+    case Status::kNotFinite:
+      return "torque not finite, ramped down";
+  }
+  return "unknown status";
+}
+
+}  // namespace dashpot::controller
