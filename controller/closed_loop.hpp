@@ -11,51 +11,57 @@ namespace dashpot::controller {
 
 /// W with W' W = A for a symmetric positive semidefinite A; as many rows as A, the last ones zero
 /// if A has less than full rank. Cholesky factorisation, largest pivot first.
-template <class Matrix>
-Matrix semidefinite_factor(Matrix A) noexcept {
-  Matrix W = Matrix::Zero(A.rows(), A.cols());
-  const auto size = static_cast<double>(A.rows());
-  const double least = size * std::numeric_limits<double>::epsilon() * A.diagonal().maxCoeff();
-  for (Eigen::Index k = 0; k < A.rows(); ++k) {
-    Eigen::Index pivot = 0;
-    const double largest = A.diagonal().maxCoeff(&pivot);
-    if (!(largest > least)) break;
-    W.row(k) = A.row(pivot) / std::sqrt(largest);
-    A.noalias() -= W.row(k).transpose() * W.row(k);
-    A.row(pivot).setZero();
-    A.col(pivot).setZero();
+template <int N>
+JointSquare<N> semidefinite_factor(JointSquare<N> A) noexcept {
+  JointSquare<N> W = JointSquare<N>::Zero();
+  double least = 0;
+  for (int k = 0; k < N; ++k) {
+    int pivot = 0;
+    for (int i = 1; i < N; ++i) {
+      if (A(i, i) > A(pivot, pivot)) pivot = i;
+    }
+    if (k == 0) least = N * std::numeric_limits<double>::epsilon() * A(pivot, pivot);
+    if (!(A(pivot, pivot) > least)) break;
+    const double root = std::sqrt(A(pivot, pivot));
+    for (int i = 0; i < N; ++i) W(k, i) = A(i, pivot) / root;
+    for (int j = 0; j < N; ++j) {
+      for (int i = 0; i < N; ++i) A(i, j) -= W(k, i) * W(k, j);
+    }
+    for (int i = 0; i < N; ++i) A(i, pivot) = A(pivot, i) = 0;
   }
   return W;
 }
 
-/// Jdot (6 x n) at joint velocity qd: with j and k counted from the base, w and v the angular and
-/// linear rows of J,
+/// Jdot (6 x n) at joint velocity qd: with j and k counted from the base, v and w the linear and
+/// angular rows of J,
 ///     dJ_j/dq_k = (w_k x v_j, w_k x w_j) for k <= j,  (w_j x v_k, 0) for k > j.
 template <int N>
-Eigen::Matrix<double, 6, N> jacobian_rate(const Eigen::Matrix<double, 6, N>& J,
-                                          const Eigen::Matrix<double, N, 1>& qd) noexcept {
-  Eigen::Matrix<double, 6, N> rate;
-  Eigen::Vector3d w_inner = Eigen::Vector3d::Zero();       // sum of w_k qd_k for k <= j
-  Eigen::Vector3d v_outer = J.template topRows<3>() * qd;  // sum of v_k qd_k for k > j
+Jacobian<N> jacobian_rate(const Jacobian<N>& J, const Joints<N>& qd) noexcept {
+  Jacobian<N> rate;
+  Eigen::Vector3d inner = Eigen::Vector3d::Zero();    // sum of w_k qd_k for k <= j
+  Eigen::Vector3d outer = twist<N>(J, qd).template head<3>();  // sum of v_k qd_k for k > j
   for (int j = 0; j < N; ++j) {
-    const Eigen::Vector3d v = J.col(j).template head<3>(), w = J.col(j).template tail<3>();
-    w_inner += w * qd[j];
-    v_outer -= v * qd[j];
-    rate.col(j) << w_inner.cross(v) + w.cross(v_outer), w_inner.cross(w);
+    const Eigen::Vector3d v = column<N>(J, j).template head<3>();
+    const Eigen::Vector3d w = column<N>(J, j).template tail<3>();
+    inner += w * qd[j];
+    outer -= v * qd[j];
+    column<N>(rate, j).template head<3>() = inner.cross(v) + w.cross(outer);
+    column<N>(rate, j).template tail<3>() = inner.cross(w);
   }
   return rate;
 }
 
 /// K_G = [(dJ/dq_1)' f ... (dJ/dq_n)' f], n x n, for the wrench f in B's axes.
 template <int N>
-Eigen::Matrix<double, N, N> geometric_stiffness(const Eigen::Matrix<double, 6, N>& J,
-                                                const Vector6& f) noexcept {
-  Eigen::Matrix<double, N, N> K_G;
+JointSquare<N> geometric_stiffness(const Jacobian<N>& J, const Vector6& f) noexcept {
+  JointSquare<N> K_G;
   const Eigen::Vector3d force = f.head<3>(), moment = f.tail<3>();
   for (int k = 0; k < N; ++k) {
-    const Eigen::Vector3d v_k = J.col(k).template head<3>(), w_k = J.col(k).template tail<3>();
+    const Eigen::Vector3d v_k = column<N>(J, k).template head<3>();
+    const Eigen::Vector3d w_k = column<N>(J, k).template tail<3>();
     for (int j = 0; j < N; ++j) {
-      const Eigen::Vector3d v = J.col(j).template head<3>(), w = J.col(j).template tail<3>();
+      const Eigen::Vector3d v = column<N>(J, j).template head<3>();
+      const Eigen::Vector3d w = column<N>(J, j).template tail<3>();
       K_G(j, k) =
           k <= j ? force.dot(w_k.cross(v)) + moment.dot(w_k.cross(w)) : force.dot(w.cross(v_k));
     }
@@ -63,58 +69,107 @@ Eigen::Matrix<double, N, N> geometric_stiffness(const Eigen::Matrix<double, 6, N
   return K_G;
 }
 
+/// K += J1' A J2
+template <int N>
+void add_congruence(const Jacobian<N>& J1, const Matrix6& A, const Jacobian<N>& J2,
+                    JointSquare<N>& K) noexcept {
+  for (int j = 0; j < N; ++j) {
+    const Vector6 column_j = A * column<N>(J2, j);
+    for (int i = 0; i < N; ++i) K(i, j) += column<N>(J1, i).dot(column_j);
+  }
+}
+
+/// K += P' diag(k) P
+template <int N>
+void add_projected(const JointSquare<N>& P, const Joints<N>& k, JointSquare<N>& K) noexcept {
+  for (int j = 0; j < N; ++j) {
+    for (int i = 0; i < N; ++i) {
+      double sum = 0;
+      for (int l = 0; l < N; ++l) sum += P(l, i) * k[l] * P(l, j);
+      K(i, j) += sum;
+    }
+  }
+}
+
+/// K in the tool's axes, turned into B's: diag(R, R) K diag(R, R)'.
+inline Matrix6 turned(const Matrix6& K, const Eigen::Matrix3d& R) noexcept {
+  Matrix6 result;
+  for (int i = 0; i < 6; i += 3) {
+    for (int j = 0; j < 6; j += 3) {
+      result.block<3, 3>(i, j) = R * K.block<3, 3>(i, j) * R.transpose();
+    }
+  }
+  return result;
+}
+
 /// The robot with the springs and dampers of an impedance, M q'' + C q' + K q = f, linearised where
 /// the springs are at rest (e = 0, q = q_d, q = q_0) and N stands still:
 ///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot]  [+ K_G(external wrench)]
 ///     C = C_q + J' C_C J + N' C_0 N + viscous friction of the joints.
 /// The terms in brackets are there if TaskTerms asks for them; K is symmetric and has its factor W
-/// if none is. The feed-forward has no part in it: it depends on the set-point, not on the state.
+/// if none is. The feed-forward has no part in it: it depends on the set-point, not on the state,
+/// but for Coriolis and gravity, which cancel those of the robot.
 template <int N>
-void closed_loop(const Dynamics<N>& robot, const Eigen::Matrix<double, N, 1>& qd,
-                 const Impedance<N>& impedance, const NullSpace<N>& null_space,
-                 const Eigen::Matrix<double, N, 1>& viscous_friction, const TaskTerms& terms,
-                 const Vector6& external_wrench, analysis::System<kMaxJoints>& system) noexcept {
-  using Square = Eigen::Matrix<double, N, N>;
-  const auto& J = robot.J;
-  Matrix6 R = Matrix6::Zero();
-  R.topLeftCorner<3, 3>() = R.bottomRightCorner<3, 3>() = robot.R_BT;
-  const Matrix6 K_C = impedance.base.stiffness + R * impedance.tool.stiffness * R.transpose();
-  const Matrix6 C_C = impedance.base.damping + R * impedance.tool.damping * R.transpose();
-  Square K = impedance.joint_stiffness + J.transpose() * K_C * J;
-  Square C = impedance.joint_damping + J.transpose() * C_C * J;
-  C.diagonal() += viscous_friction;
-
-  Eigen::Matrix<double, N + 6, N> W;
-  W.template topRows<6>() = semidefinite_factor(K_C) * J;
+void closed_loop(const Dynamics<N>& robot, const Joints<N>& qd, const Impedance<N>& impedance,
+                 const NullSpace<N>& null_space, const Joints<N>& viscous_friction,
+                 const TaskTerms& terms, const Vector6& external_wrench,
+                 analysis::System<kMaxJoints>& system) noexcept {
+  const Jacobian<N>& J = robot.J;
+  const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
+  const Matrix6 C_C = impedance.base.damping + turned(impedance.tool.damping, robot.R_BT);
+  JointSquare<N> K_N = JointSquare<N>::Zero();  // what is not in the tip's springs
+  JointSquare<N> C = impedance.joint_damping;
+  JointSquare<N> projector = JointSquare<N>::Zero();
   if (impedance.null_space()) {
-    Square projector;
-    for (int i = 0; i < N; ++i) {
-      projector.col(i) = null_space.projected_velocity(Square::Identity().col(i));
+    for (int j = 0; j < N; ++j) {
+      Joints<N> unit = Joints<N>::Zero();
+      unit[j] = 1;
+      unit = null_space.projected_velocity(unit);
+      for (int i = 0; i < N; ++i) projector(i, j) = unit[i];
     }
-    const Square K_N = projector.transpose() * impedance.null_stiffness.asDiagonal() * projector;
-    K += K_N;
-    C += projector.transpose() * impedance.null_damping.asDiagonal() * projector;
-    if (impedance.joint_weight > 0) {
-      W.template bottomRows<N>() = semidefinite_factor(Square(impedance.joint_stiffness + K_N));
-    } else {
-      W.template bottomRows<N>() = impedance.null_stiffness.cwiseSqrt().asDiagonal() * projector;
-    }
-  } else {
-    W.template bottomRows<N>() = semidefinite_factor(impedance.joint_stiffness);
+    add_projected<N>(projector, impedance.null_stiffness, K_N);
+    add_projected<N>(projector, impedance.null_damping, C);
   }
-  K = (0.5 * (K + K.transpose())).eval();
-  C = (0.5 * (C + C.transpose())).eval();
-  if (terms.jacobian_rate) K += J.transpose() * C_C * jacobian_rate<N>(J, qd);
-  if (terms.geometric_stiffness) K += geometric_stiffness<N>(J, external_wrench);
+  for (int i = 0; i < N * N; ++i) K_N.data()[i] += impedance.joint_stiffness.data()[i];
+  JointSquare<N> K = K_N;
+  add_congruence<N>(J, K_C, J, K);
+  add_congruence<N>(J, C_C, J, C);
+  for (int i = 0; i < N; ++i) C(i, i) += viscous_friction[i];
 
-  system.mass = robot.M;
-  system.damping = C;
-  system.stiffness = K;
+  JointSquare<N> extra = JointSquare<N>::Zero();
+  if (terms.jacobian_rate) add_congruence<N>(J, C_C, jacobian_rate<N>(J, qd), extra);
+  if (terms.geometric_stiffness) {
+    const JointSquare<N> K_G = geometric_stiffness<N>(J, external_wrench);
+    for (int i = 0; i < N * N; ++i) extra.data()[i] += K_G.data()[i];
+  }
+
   system.has_tails = false;
+  system.mass.resize(N, N);
+  system.damping.resize(N, N);
+  system.stiffness.resize(N, N);
+  for (int j = 0; j < N; ++j) {
+    for (int i = 0; i < N; ++i) {
+      system.mass(i, j) = robot.M(i, j);
+      system.damping(i, j) = 0.5 * (C(i, j) + C(j, i));
+      system.stiffness(i, j) = 0.5 * (K(i, j) + K(j, i)) + extra(i, j);
+    }
+  }
   if (terms.jacobian_rate || terms.geometric_stiffness) {
     system.stiffness_factor.resize(0, N);
-  } else {
-    system.stiffness_factor = W;
+    return;
+  }
+  // Without joint springs the factor of K_N is that of K_0 times the projector: no digit is lost.
+  const bool plain = impedance.joint_weight == 0;
+  const JointSquare<N> W_N = plain ? projector : semidefinite_factor<N>(K_N);
+  const Matrix6 W_C = semidefinite_factor<6>(K_C);
+  system.stiffness_factor.resize(N + 6, N);
+  for (int j = 0; j < N; ++j) {
+    const Vector6 top = W_C * column<N>(J, j);
+    for (int i = 0; i < 6; ++i) system.stiffness_factor(i, j) = top[i];
+    for (int i = 0; i < N; ++i) {
+      const double scale = plain ? std::sqrt(impedance.null_stiffness[i]) : 1;
+      system.stiffness_factor(i + 6, j) = scale * W_N(i, j);
+    }
   }
 }
 

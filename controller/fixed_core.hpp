@@ -7,6 +7,7 @@
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/state_check.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -18,7 +19,7 @@ namespace dashpot::controller {
 template <int N>
 class FixedCore final : public ControllerCore {
  public:
-  using Vector = Eigen::Matrix<double, N, 1>;
+  using Vector = Joints<N>;
 
   FixedCore(const RobotModel& model, const Settings& settings);
 
@@ -90,10 +91,9 @@ FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
         const Motion& motion = settings.motion;
         const double T = settings.period;
         const int window = static_cast<int>(std::lround(motion.smoothing / T));
-        const JointNorm<N> joints{motion.velocity.cwiseInverse(),
-                                  motion.acceleration.cwiseInverse()};
-        const TwistNorm twist{1 / motion.linear_velocity, 1 / motion.angular_velocity,
-                              1 / motion.linear_acceleration, 1 / motion.angular_acceleration};
+        const JointNorm<N> joints{fixed<N>(motion.velocity), fixed<N>(motion.acceleration)};
+        const TwistNorm twist{motion.linear_velocity, motion.angular_velocity,
+                              motion.linear_acceleration, motion.angular_acceleration};
         return SpringPaths<N>{JointPath<N>(joints, T, window), JointPath<N>(joints, T, window),
                               TipPath(twist, T, window)};
       }()),
@@ -101,8 +101,8 @@ FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
       wrench_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
       law_(model, settings.feed_forward),
       filter_(settings.limits, settings.period),
-      damping_(settings.limits.damping),
-      viscous_friction_(model.joint_values(&Joint::damping)) {
+      damping_(fixed<N>(settings.limits.damping)),
+      viscous_friction_(fixed<N>(model.joint_values(&Joint::damping))) {
   for (int i = 0; i < N; ++i) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
     turn_[i] = joint.type == JointType::kContinuous ? 2 * std::numbers::pi : 0;
@@ -114,7 +114,7 @@ template <int N>
 void FixedCore<N>::reset(const JointVector& torque) noexcept {
   state_check_.reset();
   const bool usable = torque.size() == N && torque.allFinite();
-  filter_.reset(usable ? Vector(torque) : Vector(Vector::Zero()));
+  filter_.reset(usable ? fixed<N>(torque) : Vector(Vector::Zero()));
   accepted_ = settings_.initial;
   from_user_ = looked_at_any_ = too_fast_ = false;
   in_order_ = first_ = afresh_ = damping_only_ = true;
@@ -136,8 +136,8 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   const Status input = state_check_.check(state);
   if (input >= Status::kStateNotFinite) return ramp(input, torque);
   time_ = state.time;
-  q_ = state_check_.position();
-  qd_ = state.velocity;
+  q_ = fixed<N>(state_check_.position());
+  qd_ = fixed<N>(state.velocity);
   external_wrench_ = state.external_wrench;
   kernel_.evaluate(q_, qd_, robot_);
   if (first_) {
@@ -195,7 +195,7 @@ void FixedCore<N>::aim() noexcept {
   const Vector& from = joint ? paths_.joint.position() : paths_.rest.position();
   goal_ = from;
   if (accepted_.joint_position.size() == N) {
-    goal_ = accepted_.joint_position;
+    goal_ = fixed<N>(accepted_.joint_position);
     for (int i = 0; i < N; ++i) {  // a continuous joint goes the short way
       if (turn_[i] > 0) goal_[i] += turn_[i] * std::nearbyint((from[i] - goal_[i]) / turn_[i]);
     }
@@ -213,7 +213,7 @@ void FixedCore<N>::start_afresh() noexcept {
   gains_.set_target(target);
   wrench_.start(Vector6::Zero());
   if (!from_user_) {
-    accepted_.joint_position = q_;
+    copy<N>(q_, accepted_.joint_position);
     accepted_.tip_pose = {robot_.p_BT_B, robot_.R_BT};
   }
   aim();
@@ -232,7 +232,10 @@ Status FixedCore<N>::watch() const noexcept {
 
 template <int N>
 Status FixedCore<N>::guard(Status input) noexcept {
-  const double share = qd_.cwiseQuotient(Vector(settings_.limits.velocity)).cwiseAbs().maxCoeff();
+  double share = 0;
+  for (int i = 0; i < N; ++i) {
+    share = std::max(share, std::abs(qd_[i]) / settings_.limits.velocity[i]);
+  }
   too_fast_ = share > 1 || (too_fast_ && share > 0.8);
   Status status = input;
   if (too_fast_) status = worse(status, Status::kVelocityLimit);
@@ -241,7 +244,7 @@ Status FixedCore<N>::guard(Status input) noexcept {
 }
 
 template <int N>
-Eigen::Matrix<double, N, 1> FixedCore<N>::act(bool hold) noexcept {
+Joints<N> FixedCore<N>::act(bool hold) noexcept {
   if (afresh_) start_afresh();
   damping_only_ = false;
   gains_.step();
@@ -272,10 +275,11 @@ Eigen::Matrix<double, N, 1> FixedCore<N>::act(bool hold) noexcept {
 }
 
 template <int N>
-Eigen::Matrix<double, N, 1> FixedCore<N>::damp() noexcept {
+Joints<N> FixedCore<N>::damp() noexcept {
   afresh_ = damping_only_ = true;
-  Vector tau = -damping_.cwiseProduct(qd_);
-  if (settings_.feed_forward.gravity) tau += robot_.gravity;
+  Vector tau = Vector::Zero();
+  if (settings_.feed_forward.gravity) add<N>(robot_.gravity, tau);
+  for (int i = 0; i < N; ++i) tau[i] -= damping_[i] * qd_[i];
   return tau;
 }
 
@@ -287,9 +291,9 @@ Status FixedCore<N>::ramp(Status status, JointVector& torque) noexcept {
 
 template <int N>
 Status FixedCore<N>::finish(Status status, const Vector& tau, JointVector& torque) noexcept {
-  torque = tau;
+  copy<N>(tau, torque);
+  copy<N>(tau, snapshot_.torque);
   snapshot_.status = status;
-  snapshot_.torque = tau;
   if (status < Status::kStateNotFinite && vibration_.due(snapshot_.tick)) {
     closed_loop(vibration_.system());
     vibration_.update(time_, snapshot_.tick, snapshot_.position);
@@ -304,19 +308,21 @@ void FixedCore<N>::describe() noexcept {
   snapshot_.mode = accepted_.mode;
   snapshot_.joint_weight = springs ? impedance.joint_weight : 0;
   snapshot_.task_weight = springs ? impedance.task_weight : 0;
-  snapshot_.position = q_;
-  snapshot_.velocity = qd_;
-  snapshot_.law_torque = filter_.asked();
+  copy<N>(q_, snapshot_.position);
+  copy<N>(qd_, snapshot_.velocity);
+  copy<N>(filter_.asked(), snapshot_.law_torque);
   snapshot_.tip = {robot_.p_BT_B, robot_.R_BT};
   if (snapshot_.joint_weight > 0 || snapshot_.task_weight > 0) {
     const JointPath<N>& path = accepted_.mode == Mode::kJoint ? paths_.joint : paths_.rest;
-    snapshot_.setpoint_position = path.position();
-    snapshot_.setpoint_velocity = path.velocity();
+    copy<N>(path.position(), snapshot_.setpoint_position);
+    copy<N>(path.velocity(), snapshot_.setpoint_velocity);
   } else {
-    snapshot_.setpoint_position = q_;
-    snapshot_.setpoint_velocity.setZero();
+    copy<N>(q_, snapshot_.setpoint_position);
+    copy<N>(Vector::Zero(), snapshot_.setpoint_velocity);
   }
-  snapshot_.joint_error = snapshot_.setpoint_position - snapshot_.position;
+  for (int i = 0; i < N; ++i) {
+    snapshot_.joint_error[i] = snapshot_.setpoint_position[i] - q_[i];
+  }
   if (snapshot_.task_weight > 0) {
     snapshot_.setpoint_tip = {paths_.tip.position(), paths_.tip.rotation().toRotationMatrix()};
     snapshot_.setpoint_twist = paths_.tip.velocity();
@@ -333,12 +339,12 @@ template <int N>
 void FixedCore<N>::closed_loop(analysis::System<kMaxJoints>& system) const noexcept {
   Impedance<N> impedance;
   if (damping_only_) {
-    impedance.joint_damping = damping_.asDiagonal();
+    for (int i = 0; i < N; ++i) impedance.joint_damping(i, i) = damping_[i];
   } else {
     impedance = gains_.now();
   }
-  controller::closed_loop(robot_, qd_, impedance, law_.null_space(), viscous_friction_,
-                          settings_.task_terms, external_wrench_, system);
+  controller::closed_loop<N>(robot_, qd_, impedance, law_.null_space(), viscous_friction_,
+                             settings_.task_terms, external_wrench_, system);
 }
 
 extern template class FixedCore<1>;

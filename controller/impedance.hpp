@@ -1,31 +1,28 @@
 #pragma once
-#include <dashpot/controller/types.hpp>
+#include <dashpot/controller/joint_algebra.hpp>
 
 namespace dashpot::controller {
+
+/// Springs and dampers at the tip, and how much of each direction is held (0 to 1), in the axes of
+/// one frame.
+struct TipImpedance {
+  Matrix6 stiffness = Matrix6::Zero();
+  Matrix6 damping = Matrix6::Zero();
+  Vector6 held = Vector6::Zero();
+
+  bool none() const noexcept { return (held.array() == 0).all(); }
+};
 
 /// Springs and dampers of every mode and frame at once: those not in force are zero. Weighted means
 /// of two impedances are impedances, and their matrices stay positive semidefinite.
 template <int N>
 struct Impedance {
-  using Vector = Eigen::Matrix<double, N, 1>;
-  using Square = Eigen::Matrix<double, N, N>;
-
-  /// Springs and dampers at the tip, and how much of each direction is held (0 to 1), in the axes
-  /// of one frame.
-  struct Tip {
-    Matrix6 stiffness = Matrix6::Zero();
-    Matrix6 damping = Matrix6::Zero();
-    Vector6 held = Vector6::Zero();
-
-    bool none() const noexcept { return (held.array() == 0).all(); }
-  };
-
-  Square joint_stiffness = Square::Zero();
-  Square joint_damping = Square::Zero();
-  Tip base;
-  Tip tool;
-  Vector null_stiffness = Vector::Zero();
-  Vector null_damping = Vector::Zero();
+  JointSquare<N> joint_stiffness = JointSquare<N>::Zero();
+  JointSquare<N> joint_damping = JointSquare<N>::Zero();
+  TipImpedance base;  ///< in B's axes
+  TipImpedance tool;  ///< in T's
+  Joints<N> null_stiffness = Joints<N>::Zero();
+  Joints<N> null_damping = Joints<N>::Zero();
   double joint_weight = 0;  ///< share of the joint springs
   double task_weight = 0;   ///< share of the Cartesian springs
 
@@ -35,7 +32,9 @@ struct Impedance {
 
   /// Whether there is anything to do in the null space.
   bool null_space() const noexcept {
-    return (null_stiffness.array() != 0).any() || (null_damping.array() != 0).any();
+    bool any = false;
+    for (int i = 0; i < N; ++i) any |= null_stiffness[i] != 0 || null_damping[i] != 0;
+    return any;
   }
 };
 
@@ -45,12 +44,17 @@ Impedance<N> Impedance<N>::of(const Setpoint& setpoint) noexcept {
   const Gains& gains = setpoint.gains;
   if (setpoint.mode == Mode::kJoint) {
     result.joint_weight = 1;
-    result.joint_stiffness = 0.5 * (gains.joint_stiffness + gains.joint_stiffness.transpose());
-    result.joint_damping = 0.5 * (gains.joint_damping + gains.joint_damping.transpose());
+    const JointMatrix &K = gains.joint_stiffness, &C = gains.joint_damping;
+    for (int j = 0; j < N; ++j) {
+      for (int i = 0; i < N; ++i) {
+        result.joint_stiffness(i, j) = 0.5 * (K(i, j) + K(j, i));
+        result.joint_damping(i, j) = 0.5 * (C(i, j) + C(j, i));
+      }
+    }
     return result;
   }
   result.task_weight = 1;
-  Tip& tip = gains.frame == Frame::kBase ? result.base : result.tool;
+  TipImpedance& tip = gains.frame == Frame::kBase ? result.base : result.tool;
   int held = 0;
   for (int i = 0; i < 6; ++i) {
     const bool hold = gains.directions[static_cast<std::size_t>(i)];
@@ -63,8 +67,8 @@ Impedance<N> Impedance<N>::of(const Setpoint& setpoint) noexcept {
   tip.stiffness = in_held_directions(gains.task_stiffness);
   tip.damping = in_held_directions(gains.task_damping);
   if (N > held) {
-    if (gains.null_stiffness.size() == N) result.null_stiffness = gains.null_stiffness;
-    if (gains.null_damping.size() == N) result.null_damping = gains.null_damping;
+    if (gains.null_stiffness.size() == N) result.null_stiffness = fixed<N>(gains.null_stiffness);
+    if (gains.null_damping.size() == N) result.null_damping = fixed<N>(gains.null_damping);
   }
   return result;
 }
@@ -78,15 +82,20 @@ template <int N>
 Impedance<N> blend(const Impedance<N>& a, const Impedance<N>& b, double s) noexcept {
   const double r = 1 - s;
   Impedance<N> c;
-  c.joint_stiffness = r * a.joint_stiffness + s * b.joint_stiffness;
-  c.joint_damping = r * a.joint_damping + s * b.joint_damping;
+  const auto mix = [r, s](const auto& x, const auto& y, auto& z) {
+    for (Eigen::Index i = 0; i < z.size(); ++i) {
+      z.data()[i] = r * x.data()[i] + s * y.data()[i];
+    }
+  };
+  mix(a.joint_stiffness, b.joint_stiffness, c.joint_stiffness);
+  mix(a.joint_damping, b.joint_damping, c.joint_damping);
   for (const auto tip : {&Impedance<N>::base, &Impedance<N>::tool}) {
-    (c.*tip).stiffness = r * (a.*tip).stiffness + s * (b.*tip).stiffness;
-    (c.*tip).damping = r * (a.*tip).damping + s * (b.*tip).damping;
-    (c.*tip).held = r * (a.*tip).held + s * (b.*tip).held;
+    mix((a.*tip).stiffness, (b.*tip).stiffness, (c.*tip).stiffness);
+    mix((a.*tip).damping, (b.*tip).damping, (c.*tip).damping);
+    mix((a.*tip).held, (b.*tip).held, (c.*tip).held);
   }
-  c.null_stiffness = r * a.null_stiffness + s * b.null_stiffness;
-  c.null_damping = r * a.null_damping + s * b.null_damping;
+  mix(a.null_stiffness, b.null_stiffness, c.null_stiffness);
+  mix(a.null_damping, b.null_damping, c.null_damping);
   c.joint_weight = r * a.joint_weight + s * b.joint_weight;
   c.task_weight = r * a.task_weight + s * b.task_weight;
   return c;

@@ -25,7 +25,8 @@ struct SpringPaths {
 /// the sum of the stiffness given in B's axes and R K_T R' of that given in the tool's, and so is
 /// C_C. w_q and w_C are the shares of the two modes, 0 or 1 except while the mode changes; K_q and
 /// C_q, K_C and C_C, K_0 and C_0 contain them. Lambda = (J M^-1 J')^-1 in the held directions, and
-/// N are those of NullSpace. f is the commanded wrench. qd_f = w_q qd_d + w_C (joint velocity that
+/// N are those of TaskInertia and
+/// NullSpace. f is the commanded wrench. qd_f = w_q qd_d + w_C (joint velocity that
 /// takes the tip along V_d), and friction_i(v) = damping_i v + friction_i tanh(v / 0.01 rad/s).
 /// Every term of the last column can be left out, see FeedForward.
 ///
@@ -35,12 +36,12 @@ struct SpringPaths {
 template <int N>
 class ImpedanceLaw {
  public:
-  using Vector = Eigen::Matrix<double, N, 1>;
+  using Vector = Joints<N>;
 
   ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward)
       : feed_forward_(feed_forward),
-        viscous_friction_(model.joint_values(&Joint::damping)),
-        coulomb_friction_(model.joint_values(&Joint::friction)) {}
+        viscous_friction_(fixed<N>(model.joint_values(&Joint::damping))),
+        coulomb_friction_(fixed<N>(model.joint_values(&Joint::friction))) {}
 
   /// `wrench`: f, which J' takes to the joints only if FeedForward::wrench is on.
   Vector torque(const Dynamics<N>& robot, const Vector& q, const Vector& qd,
@@ -60,7 +61,7 @@ class ImpedanceLaw {
   /// K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d
   Vector6 task_wrench(const Dynamics<N>& robot, const Vector& qd, const Impedance<N>& impedance,
                       const TipPath& path) noexcept;
-  Vector friction(const Vector& velocity) const noexcept;
+  void add_friction(const Vector& velocity, Vector& tau) const noexcept;
 
   FeedForward feed_forward_;
   Vector viscous_friction_;
@@ -75,28 +76,30 @@ class ImpedanceLaw {
 inline Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R,
                             const Vector6& a) noexcept {
   Vector6 local, result;
-  local << R.transpose() * a.head<3>(), R.transpose() * a.tail<3>();
+  local.head<3>() = R.transpose() * a.head<3>();
+  local.tail<3>() = R.transpose() * a.tail<3>();
   local = K_T * local;
-  result << R * local.head<3>(), R * local.tail<3>();
+  result.head<3>() = R * local.head<3>();
+  result.tail<3>() = R * local.tail<3>();
   return result;
 }
 
 template <int N>
-Eigen::Matrix<double, N, 1> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q,
-                                                    const Vector& qd, const Impedance<N>& impedance,
-                                                    const SpringPaths<N>& paths,
-                                                    const Vector6& wrench) noexcept {
+Joints<N> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q, const Vector& qd,
+                                  const Impedance<N>& impedance, const SpringPaths<N>& paths,
+                                  const Vector6& wrench) noexcept {
   Vector tau = Vector::Zero();
   Vector path_velocity = Vector::Zero();  // qd_f
   e_.setZero();
   F_.setZero();
   if (impedance.joint_weight > 0) {
-    tau += impedance.joint_stiffness * (paths.joint.position() - q);
-    tau += impedance.joint_damping * (paths.joint.velocity() - qd);
+    const JointPath<N>& path = paths.joint;
+    add_product<N>(impedance.joint_stiffness, difference<N>(path.position(), q), tau);
+    add_product<N>(impedance.joint_damping, difference<N>(path.velocity(), qd), tau);
     if (feed_forward_.acceleration) {
-      tau += impedance.joint_weight * (robot.M * paths.joint.acceleration());
+      add_product<N>(robot.M, path.acceleration(), tau, impedance.joint_weight);
     }
-    path_velocity += impedance.joint_weight * paths.joint.velocity();
+    add<N>(path.velocity(), path_velocity, impedance.joint_weight);
   }
   if (impedance.task_weight > 0) {
     const bool null_space = impedance.null_space();
@@ -105,27 +108,30 @@ Eigen::Matrix<double, N, 1> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, co
     }
     F_ = task_wrench(robot, qd, impedance, paths.tip);
     if (null_space) {
-      tau += null_space_.torque(impedance.null_stiffness, paths.rest.position() - q);
-      tau += null_space_.torque(impedance.null_damping, paths.rest.velocity() - qd);
+      const Vector dq = difference<N>(paths.rest.position(), q);
+      const Vector dqd = difference<N>(paths.rest.velocity(), qd);
+      add<N>(null_space_.torque(impedance.null_stiffness, dq), tau);
+      add<N>(null_space_.torque(impedance.null_damping, dqd), tau);
     }
     if (feed_forward_.friction) {
-      path_velocity += impedance.task_weight * null_space_.joint_velocity(paths.tip.velocity());
+      add<N>(null_space_.joint_velocity(paths.tip.velocity()), path_velocity,
+             impedance.task_weight);
     }
   }
   if (feed_forward_.wrench) F_ += wrench;
-  tau += robot.J.transpose() * F_;
-  if (feed_forward_.friction) tau += friction(path_velocity);
-  if (feed_forward_.coriolis) tau += robot.coriolis;
-  if (feed_forward_.gravity) tau += robot.gravity;
+  add_torque<N>(robot.J, F_, tau);
+  if (feed_forward_.friction) add_friction(path_velocity, tau);
+  if (feed_forward_.coriolis) add<N>(robot.coriolis, tau);
+  if (feed_forward_.gravity) add<N>(robot.gravity, tau);
   return tau;
 }
 
 template <int N>
 Vector6 ImpedanceLaw<N>::task_wrench(const Dynamics<N>& robot, const Vector& qd,
                                      const Impedance<N>& impedance, const TipPath& path) noexcept {
-  e_ << path.position() - robot.p_BT_B,
-      orientation_.update(path.rotation(), Eigen::Quaterniond(robot.R_BT));
-  const Vector6 velocity_error = path.velocity() - robot.J * qd;
+  e_.head<3>() = path.position() - robot.p_BT_B;
+  e_.tail<3>() = orientation_.update(path.rotation(), Eigen::Quaterniond(robot.R_BT));
+  const Vector6 velocity_error = path.velocity() - twist<N>(robot.J, qd);
   Vector6 F = Vector6::Zero();
   if (!impedance.base.none()) {
     F += impedance.base.stiffness * e_ + impedance.base.damping * velocity_error;
@@ -135,16 +141,18 @@ Vector6 ImpedanceLaw<N>::task_wrench(const Dynamics<N>& robot, const Vector& qd,
          in_tool_axes(impedance.tool.damping, robot.R_BT, velocity_error);
   }
   if (feed_forward_.acceleration) {
-    F += impedance.task_weight * null_space_.wrench(path.acceleration());
+    F += impedance.task_weight * null_space_.inertia().wrench(path.acceleration());
   }
   return F;
 }
 
 template <int N>
-Eigen::Matrix<double, N, 1> ImpedanceLaw<N>::friction(const Vector& velocity) const noexcept {
+void ImpedanceLaw<N>::add_friction(const Vector& velocity, Vector& tau) const noexcept {
   constexpr double kRise = 0.01;  // rad/s; Coulomb friction changes sign smoothly over this
-  return viscous_friction_.cwiseProduct(velocity) +
-         coulomb_friction_.cwiseProduct((velocity / kRise).array().tanh().matrix());
+  for (int i = 0; i < N; ++i) {
+    tau[i] +=
+        viscous_friction_[i] * velocity[i] + coulomb_friction_[i] * std::tanh(velocity[i] / kRise);
+  }
 }
 
 }  // namespace dashpot::controller

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/controller/joint_algebra.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/status.hpp>
 
@@ -18,18 +19,22 @@ namespace dashpot::controller {
 template <int N>
 class SafetyFilter {
  public:
-  using Vector = Eigen::Matrix<double, N, 1>;
+  using Vector = Joints<N>;
 
   SafetyFilter(const Limits& limits, double period)
-      : limits_(limits),
-        largest_(limits.torque),
-        largest_step_(limits.torque_rate * period),
-        ramp_share_(period / kRampTime),
-        velocity_(limits.velocity) {}
+      : torque_(fixed<N>(limits.torque)),
+        velocity_(fixed<N>(limits.velocity)),
+        lower_(fixed<N>(limits.position_lower)),
+        upper_(fixed<N>(limits.position_upper)),
+        margin_(limits.position_margin),
+        repulsion_(limits.repulsion),
+        ramp_share_(period / kRampTime) {
+    for (int i = 0; i < N; ++i) torque_step_[i] = limits.torque_rate[i] * period;
+  }
 
   /// Forgets the past; `torque` is what acts now.
   void reset(const Vector& torque) noexcept {
-    last_ = torque.cwiseMax(-largest_).cwiseMin(largest_);
+    for (int i = 0; i < N; ++i) last_[i] = std::clamp(torque[i], -torque_[i], torque_[i]);
     ramping_ = false;
   }
 
@@ -38,7 +43,7 @@ class SafetyFilter {
   Status apply(const Vector& q, const Vector& qd, Vector& tau) noexcept {
     Status status = repel(q, qd, tau);
     asked_ = tau;
-    if (!tau.allFinite()) {
+    if (!finite<N>(tau)) {
       tau = ramp();
       return Status::kNotFinite;
     }
@@ -49,10 +54,15 @@ class SafetyFilter {
 
   /// Where nothing is known: the last torque goes evenly to zero within 0.1 s.
   Vector ramp() noexcept {
-    if (!ramping_) ramp_step_ = ramp_share_ * last_.cwiseAbs();
+    if (!ramping_) {
+      for (int i = 0; i < N; ++i) ramp_step_[i] = ramp_share_ * std::abs(last_[i]);
+    }
     ramping_ = true;
-    Vector tau = last_.cwiseAbs() - ramp_step_;
-    tau = (tau.array() > 1e-12 * largest_.array()).select(tau.cwiseProduct(last_.cwiseSign()), 0);
+    Vector tau;
+    for (int i = 0; i < N; ++i) {
+      const double left = std::abs(last_[i]) - ramp_step_[i];
+      tau[i] = left > 1e-12 * torque_[i] ? std::copysign(left, last_[i]) : 0;
+    }
     limit(tau);
     return tau;
   }
@@ -62,7 +72,7 @@ class SafetyFilter {
   /// Whether a position is outside its limits.
   bool outside(const Vector& q) const noexcept {
     for (int i = 0; i < N; ++i) {
-      if (q[i] < limits_.position_lower[i] || q[i] > limits_.position_upper[i]) return true;
+      if (q[i] < lower_[i] || q[i] > upper_[i]) return true;
     }
     return false;
   }
@@ -74,13 +84,13 @@ class SafetyFilter {
   Status repel(const Vector& q, const Vector& qd, Vector& tau) const noexcept {
     Status status = Status::kOk;
     for (int i = 0; i < N; ++i) {
-      const double below = q[i] - limits_.position_lower[i];
-      const double above = limits_.position_upper[i] - q[i];
-      if (below < limits_.position_margin) {
+      const double below = q[i] - lower_[i];
+      const double above = upper_[i] - q[i];
+      if (below < margin_) {
         tau[i] += repulsion(i, below, -qd[i]);
         status = worse(status, below < 0 ? Status::kPositionLimit : Status::kNearJointLimit);
       }
-      if (above < limits_.position_margin) {
+      if (above < margin_) {
         tau[i] -= repulsion(i, above, qd[i]);
         status = worse(status, above < 0 ? Status::kPositionLimit : Status::kNearJointLimit);
       }
@@ -88,25 +98,30 @@ class SafetyFilter {
     return status;
   }
   double repulsion(int i, double distance, double approach) const noexcept {
-    const double margin = limits_.position_margin;
-    const double x = std::min((margin - distance) / margin, 2.0);
-    return limits_.repulsion * largest_[i] * (x * x + x * std::max(approach, 0.0) / velocity_[i]);
+    const double x = std::min((margin_ - distance) / margin_, 2.0);
+    return repulsion_ * torque_[i] * (x * x + x * std::max(approach, 0.0) / velocity_[i]);
   }
 
   /// Bounds the finite `tau` and its change, and remembers it. Whether that changed it.
   bool limit(Vector& tau) noexcept {
-    const Vector wanted = tau;
-    tau = tau.cwiseMax(-largest_).cwiseMin(largest_);
-    tau = tau.cwiseMax(last_ - largest_step_).cwiseMin(last_ + largest_step_);
-    last_ = tau;
-    return tau != wanted;
+    bool changed = false;
+    for (int i = 0; i < N; ++i) {
+      double safe = std::clamp(tau[i], -torque_[i], torque_[i]);
+      safe = std::clamp(safe, last_[i] - torque_step_[i], last_[i] + torque_step_[i]);
+      changed |= safe != tau[i];
+      tau[i] = last_[i] = safe;
+    }
+    return changed;
   }
 
-  Limits limits_;
-  Vector largest_;       ///< N m
-  Vector largest_step_;  ///< change of torque in one tick, N m
-  double ramp_share_;    ///< of the torque, in one tick
-  Vector velocity_;
+  Vector torque_;       ///< limits, N m
+  Vector torque_step_;  ///< limits of its change in one tick, N m
+  Vector velocity_;     ///< limits, rad/s
+  Vector lower_;        ///< limits, rad
+  Vector upper_;
+  double margin_;
+  double repulsion_;
+  double ramp_share_;  ///< of the torque, in one tick
   Vector last_ = Vector::Zero();
   Vector asked_ = Vector::Zero();
   bool ramping_ = false;

@@ -11,7 +11,7 @@ namespace dashpot::controller {
 template <int N>
 class JointPath {
  public:
-  using Vector = Eigen::Matrix<double, N, 1>;
+  using Vector = Joints<N>;
 
   JointPath(const JointNorm<N>& norm, double period, int smoothing) noexcept
       : norm_(norm), period_(period), smoothing_(smoothing) {
@@ -27,16 +27,20 @@ class JointPath {
 
   /// One period toward `goal`.
   void step(const Vector& goal) noexcept {
-    const Step<Vector> step = approach(Vector(goal - point_), velocity_, norm_, period_);
+    const Step<N> step = approach<N>(difference<N>(goal, point_), velocity_, norm_, period_);
     velocity_ = step.velocity;
-    point_ = step.arrives ? goal : Vector(point_ + period_ * velocity_);
+    if (step.arrives) {
+      point_ = goal;
+    } else {
+      add<N>(velocity_, point_, period_);
+    }
     smooth();
   }
 
   /// One period in which the path brakes, or stays where it is.
   void halt() noexcept {
-    velocity_ = approach(Vector(Vector::Zero()), velocity_, norm_, period_).velocity;
-    point_ += period_ * velocity_;
+    velocity_ = approach<N>(Vector::Zero(), velocity_, norm_, period_).velocity;
+    add<N>(velocity_, point_, period_);
     smooth();
   }
 
@@ -47,7 +51,8 @@ class JointPath {
  private:
   void smooth() noexcept {
     smoothing_.step(velocity_, period_);
-    position_ = point_ + smoothing_.offset();
+    position_ = point_;
+    add<N>(smoothing_.offset(), position_);
   }
 
   JointNorm<N> norm_;
@@ -83,7 +88,7 @@ class TipPath {
     if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
     Vector6 d;
     d << position - point_, rotation_vector(turn);
-    const Step<Vector6> step = approach(d, velocity_, norm_, period_);
+    const Step<6> step = approach<6>(d, velocity_, norm_, period_);
     velocity_ = step.velocity;
     if (step.arrives) {
       point_ = position;
@@ -96,7 +101,7 @@ class TipPath {
 
   /// One period in which the path brakes, or stays where it is.
   void halt() noexcept {
-    velocity_ = approach(Vector6(Vector6::Zero()), velocity_, norm_, period_).velocity;
+    velocity_ = approach<6>(Vector6::Zero(), velocity_, norm_, period_).velocity;
     advance();
     smooth();
   }

@@ -13,19 +13,22 @@ class SmallCholesky {
   using Vector = Eigen::Matrix<double, N, 1>;
 
   void compute(const Eigen::Matrix<double, N, N>& A, double least_pivot) noexcept {
-    L_ = A;
+    for (int j = 0; j < N; ++j) {
+      for (int i = j; i < N; ++i) L_(i, j) = A(i, j);
+    }
     for (int k = 0; k < N; ++k) {
       const double pivot = L_(k, k) > least_pivot ? L_(k, k) : least_pivot;
       L_(k, k) = std::sqrt(pivot);
       per_diagonal_[k] = 1 / L_(k, k);
       for (int i = k + 1; i < N; ++i) L_(i, k) *= per_diagonal_[k];
       for (int j = k + 1; j < N; ++j) {
-        for (int i = j; i < N; ++i) L_(i, j) -= L_(i, k) * L_(j, k);
+        const double factor = L_(j, k);
+        for (int i = j; i < N; ++i) L_(i, j) -= L_(i, k) * factor;
       }
     }
   }
 
-  /// Lower triangle: L; above it: entries of A.
+  /// i >= j
   double L(int i, int j) const noexcept { return L_(i, j); }
   double per_diagonal(int i) const noexcept { return per_diagonal_[i]; }
 

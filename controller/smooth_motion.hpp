@@ -1,5 +1,6 @@
 #pragma once
-#include <Eigen/Core>
+#include <dashpot/controller/joint_algebra.hpp>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,39 +14,39 @@ inline constexpr int kMaxSmoothing = 256;
 /// the acceleration limits. Both are norms, and 1 at the limit.
 template <int N>
 struct JointNorm {
-  using Vector = Eigen::Matrix<double, N, 1>;
-  Vector per_velocity;      ///< 1 / velocity limit
-  Vector per_acceleration;  ///< 1 / acceleration limit
+  Joints<N> velocity;      ///< limits, rad/s
+  Joints<N> acceleration;  ///< rad/s^2
 
-  double speed(const Vector& v) const noexcept {
-    return v.cwiseProduct(per_velocity).cwiseAbs().maxCoeff();
-  }
-  double effort(const Vector& a) const noexcept {
-    return a.cwiseProduct(per_acceleration).cwiseAbs().maxCoeff();
+  double speed(const Joints<N>& v) const noexcept { return largest(v, velocity); }
+  double effort(const Joints<N>& a) const noexcept { return largest(a, acceleration); }
+
+ private:
+  static double largest(const Joints<N>& x, const Joints<N>& limit) noexcept {
+    double result = 0;
+    for (int i = 0; i < N; ++i) result = std::max(result, std::abs(x[i]) / limit[i]);
+    return result;
   }
 };
 
 /// Limits of a twist's linear and angular part: speed(V) = max(|v| / v_max, |w| / w_max).
 struct TwistNorm {
-  using Vector = Eigen::Matrix<double, 6, 1>;
-  double per_linear_velocity = 1;
-  double per_angular_velocity = 1;
-  double per_linear_acceleration = 1;
-  double per_angular_acceleration = 1;
+  double linear_velocity = 1;       ///< limits, m/s
+  double angular_velocity = 1;      ///< rad/s
+  double linear_acceleration = 1;   ///< m/s^2
+  double angular_acceleration = 1;  ///< rad/s^2
 
-  double speed(const Vector& V) const noexcept {
-    return std::max(V.head<3>().norm() * per_linear_velocity,
-                    V.tail<3>().norm() * per_angular_velocity);
+  double speed(const Vector6& V) const noexcept {
+    return std::max(V.head<3>().norm() / linear_velocity, V.tail<3>().norm() / angular_velocity);
   }
-  double effort(const Vector& A) const noexcept {
-    return std::max(A.head<3>().norm() * per_linear_acceleration,
-                    A.tail<3>().norm() * per_angular_acceleration);
+  double effort(const Vector6& A) const noexcept {
+    return std::max(A.head<3>().norm() / linear_acceleration,
+                    A.tail<3>().norm() / angular_acceleration);
   }
 };
 
-template <class Vector>
+template <int D>
 struct Step {
-  Vector velocity;
+  Joints<D> velocity;
   bool arrives = false;  ///< a period at this velocity ends at the goal
 };
 
@@ -60,20 +61,27 @@ struct Step {
 /// an effort of at most T. Once it equals c, the next c is shorter by b T d: the point brakes and
 /// its last period ends at the goal. It catches up with c, because braking at half the limit c
 /// changes no faster than v can, in whatever direction the point comes. The goal may move.
-template <class Vector, class Norm>
-Step<Vector> approach(const Vector& d, const Vector& v, const Norm& norm, double T) noexcept {
-  Vector c = Vector::Zero();
+template <int D, class Norm>
+Step<D> approach(const Joints<D>& d, const Joints<D>& v, const Norm& norm, double T) noexcept {
+  double rate = 0;  // c = rate d
   bool last = true;
   const double effort = norm.effort(d);
   if (effort > 1e-100) {
     const double bTT = 0.5 * T * T / effort;
     const double k = std::max(1.0, std::ceil(0.5 * (std::sqrt(1 + 8 / bTT) - 1)));
     last = k == 1;
-    c = d * std::min(1 / norm.speed(d), (last ? 1 : 1 / k + 0.5 * (k - 1) * bTT) / T);
+    rate = std::min(1 / norm.speed(d), (last ? 1 : 1 / k + 0.5 * (k - 1) * bTT) / T);
   }
-  const double change = norm.effort(c - v);
-  if (change <= T) return {c, last};
-  return {v + (c - v) * (T / change), false};
+  Joints<D> change;  // c - v
+  for (int i = 0; i < D; ++i) change[i] = rate * d[i] - v[i];
+  const double size = norm.effort(change);
+  Step<D> step;
+  step.arrives = size <= T && last;
+  const double share = size <= T ? 1 : T / size;
+  for (int i = 0; i < D; ++i) {
+    step.velocity[i] = size <= T ? rate * d[i] : v[i] + share * change[i];
+  }
+  return step;
 }
 
 /// Moving average of the last W velocities. It keeps every bound on velocity and acceleration and
@@ -83,7 +91,7 @@ Step<Vector> approach(const Vector& d, const Vector& v, const Norm& norm, double
 template <int D>
 class Smoothing {
  public:
-  using Vector = Eigen::Matrix<double, D, 1>;
+  using Vector = Joints<D>;
 
   explicit Smoothing(int window) noexcept : window_(std::clamp(window, 1, kMaxSmoothing)) {
     reset();
@@ -100,18 +108,25 @@ class Smoothing {
   }
 
   void step(const Vector& velocity, double T) noexcept {
-    still_ = (velocity.array() == 0).all() ? std::min(still_ + 1, window_) : 0;
     Vector& oldest = history_[static_cast<std::size_t>(next_)];
-    acceleration_ = (velocity - oldest) / (window_ * T);
-    sum_ += velocity - oldest;
-    oldest = velocity;
     next_ = next_ + 1 == window_ ? 0 : next_ + 1;
+    bool moves = false;
+    for (int i = 0; i < D; ++i) moves |= velocity[i] != 0;
+    still_ = moves ? 0 : std::min(still_ + 1, window_);
     if (still_ == window_) {  // sheds what rounding has left over
       sum_.setZero();
       offset_.setZero();
+      oldest.setZero();
     }
-    velocity_ = sum_ / window_;
-    offset_ += (velocity_ - velocity) * T;
+    const double share = 1.0 / window_;
+    for (int i = 0; i < D; ++i) {
+      const double change = velocity[i] - oldest[i];
+      acceleration_[i] = change * share / T;
+      sum_[i] += change;
+      oldest[i] = velocity[i];
+      velocity_[i] = sum_[i] * share;
+      offset_[i] += (velocity_[i] - velocity[i]) * T;
+    }
   }
 
   const Vector& velocity() const noexcept { return velocity_; }

@@ -1,0 +1,59 @@
+#pragma once
+#include <dashpot/controller/impedance.hpp>
+#include <dashpot/controller/small_cholesky.hpp>
+
+namespace dashpot::controller {
+
+/// Inertia of the tip in the directions that are held.
+///
+/// From A = J M^-1 J' (6 x 6) and H (6 x 6), the held directions:
+///     G = H A H + (I - H^2) D + l D.
+/// H is a projector, or on its way between two while gains change: then directions are held in
+/// part, which the second term makes smooth. D weighs metres against radians: in each block the
+/// mean of A's diagonal. H G^-1 H is the inertia (J M^-1 J')^-1 in the held directions.
+///
+/// l is zero unless the arm is nearly singular, so that G^-1 is exact elsewhere and stays bounded
+/// here: with w = 1 / trace(D G^-1) before, which is between 1/6 and 1 times the smallest
+/// eigenvalue of G relative to D,
+///     l = w_0 (1 - w / w_0)^2  for w < w_0.
+class TaskInertia {
+ public:
+  /// w_0
+  static constexpr double kNearlySingular = 1e-3;
+
+  /// `A`: J M^-1 J', in B's axes.
+  void compute(const Matrix6& A, const TipImpedance& base, const TipImpedance& tool,
+               const Eigen::Matrix3d& R_BT) noexcept;
+
+  /// H G^-1 H a: wrench that gives the tip the acceleration a in the held directions.
+  Vector6 wrench(const Vector6& acceleration) const noexcept {
+    Vector6 f = hold(acceleration);
+    factor_.solve_L(f);
+    factor_.solve_LT(f);
+    return hold(f);
+  }
+  /// w
+  double regularity() const noexcept { return regularity_; }
+
+ private:
+  /// H a
+  Vector6 hold(const Vector6& a) const noexcept;
+
+  Eigen::Matrix3d H_linear_ = Eigen::Matrix3d::Zero();  ///< the blocks of H; it has no others
+  Eigen::Matrix3d H_angular_ = Eigen::Matrix3d::Zero();
+  SmallCholesky<6> factor_;  ///< of G
+  double regularity_ = 1;
+};
+
+inline Vector6 TaskInertia::hold(const Vector6& a) const noexcept {
+  Vector6 result = Vector6::Zero();
+  for (int j = 0; j < 3; ++j) {
+    for (int i = 0; i < 3; ++i) {
+      result[i] += H_linear_(i, j) * a[j];
+      result[i + 3] += H_angular_(i, j) * a[j + 3];
+    }
+  }
+  return result;
+}
+
+}  // namespace dashpot::controller
