@@ -3,6 +3,7 @@
 #include <dashpot/controller/settings.hpp>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <sstream>
@@ -93,7 +94,7 @@ Settings default_settings(const RobotModel& model) {
   for (int i = 0; i < n; ++i) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
     limits.torque[i] = finite_or(joint.effort, 100);
-    limits.torque_rate[i] = 10 * limits.torque[i];
+    limits.torque_rate[i] = std::min(1000.0, 100 * limits.torque[i]);
     limits.velocity[i] = finite_or(joint.velocity, 2);
     limits.position_lower[i] = joint.lower;
     limits.position_upper[i] = joint.upper;

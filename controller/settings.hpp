@@ -92,9 +92,10 @@ class InvalidSettings : public std::invalid_argument {
 };
 
 /// Settings for a robot. Limits of torque, velocity and position are those of its URDF (100 N m,
-/// 2 rad/s and none where the URDF has none), torque may change fully within 0.1 s, set-points move
-/// at a quarter of the velocity limits. Gains suit the robot's inertia at the middle of its range:
-/// 1.5 Hz and a damping ratio of 0.7 for each joint alone; 400 N/m and 30 N m/rad at the tip.
+/// 2 rad/s and none where the URDF has none), torque changes by at most 1000 N m/s (fully within 10
+/// ms where that is slower), set-points move at a quarter of the velocity limits. Gains suit the
+/// robot's inertia at the middle of its range: 1.5 Hz and a damping ratio of 0.7 for each joint
+/// alone; 400 N/m and 30 N m/rad at the tip.
 Settings default_settings(const RobotModel& model);
 
 /// Throws InvalidSettings, with key, value and unit, unless all sizes are n, all numbers are finite

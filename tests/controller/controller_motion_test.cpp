@@ -1,0 +1,191 @@
+// Set-points, gains and modes change in closed loop with a simulated arm: no torque jumps, the
+// limits of rate never have to act, and the robot arrives.
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/simulated_arm.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::controller {
+namespace {
+
+using testing::near;
+using testing::SimulatedArm;
+
+struct Extremes {
+  double rate_share = 0;  ///< largest change of the law's torque as a share of the rate limit
+  Status worst = Status::kOk;
+};
+
+/// Runs the loop and watches the torque that the law asks for, before any limit.
+Extremes run(SimulatedArm& arm, double seconds) {
+  const Settings& settings = arm.controller.settings();
+  const JointVector largest_step = settings.limits.torque_rate * settings.period;
+  Extremes extremes;
+  JointVector last;
+  for (int k = 0; k < static_cast<int>(seconds / settings.period); ++k) {
+    extremes.worst = worse(extremes.worst, arm.step());
+    const JointVector& now = arm.controller.snapshot().law_torque;
+    if (last.size() > 0) {
+      extremes.rate_share = std::max(
+          extremes.rate_share, (now - last).cwiseAbs().cwiseQuotient(largest_step).maxCoeff());
+    }
+    last = now;
+  }
+  return extremes;
+}
+
+class Motion : public ::testing::Test {
+ protected:
+  Motion()
+      : model(testing::arm_model(testing::arms()[0])),
+        arm(model, testing::quiet_settings(model), testing::panda_ready()) {}
+
+  void start(Mode mode) {
+    arm.setpoint.mode = mode;
+    const Extremes extremes = run(arm, 1.0);
+    EXPECT_EQ(extremes.worst, Status::kOk) << to_text(extremes.worst);
+    EXPECT_LT(extremes.rate_share, 0.5);
+  }
+  void expect_smooth(double seconds) {
+    const Extremes extremes = run(arm, seconds);
+    EXPECT_EQ(extremes.worst, Status::kOk) << to_text(extremes.worst);
+    EXPECT_LT(extremes.rate_share, 0.5);
+  }
+
+  /// The world begins to pull, smoothly.
+  void load(const Vector6& wrench) {
+    for (int k = 1; k <= 1000; ++k) {
+      const double s = 1e-3 * k;
+      arm.state.external_wrench = s * s * (3 - 2 * s) * wrench;
+      arm.step();
+    }
+  }
+
+  RobotModel model;
+  SimulatedArm arm;
+};
+
+const Vector6 kLoad{30, -20, 25, 1, 2, -1};  // N, N m
+
+TEST_F(Motion, HoldsStillWhereItStarts) {
+  start(Mode::kJoint);
+  EXPECT_TRUE(near(arm.state.position, testing::panda_ready(), 1e-6));
+  EXPECT_EQ(arm.controller.snapshot().restarts, 1u);
+}
+
+TEST_F(Motion, JointStepArrives) {
+  start(Mode::kJoint);
+  arm.setpoint.joint_position[0] += 1.0;
+  arm.setpoint.joint_position[3] += 0.5;
+  expect_smooth(6.0);
+  EXPECT_TRUE(near(arm.state.position, arm.setpoint.joint_position, 1e-3));
+  EXPECT_EQ(arm.controller.snapshot().setpoint_position, arm.setpoint.joint_position);
+}
+
+TEST_F(Motion, PoseStepArrives) {
+  start(Mode::kCartesian);
+  arm.setpoint.tip_pose.position += Eigen::Vector3d(0.1, 0.2, -0.15);
+  arm.setpoint.tip_pose.rotation = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()) *
+                                   arm.setpoint.tip_pose.rotation;
+  expect_smooth(6.0);
+  EXPECT_TRUE(near(arm.tip().position, arm.setpoint.tip_pose.position, 2e-3));
+  EXPECT_TRUE(near(arm.tip().rotation, arm.setpoint.tip_pose.rotation, 1e-2));
+  EXPECT_EQ(arm.controller.snapshot().setpoint_tip.position, arm.setpoint.tip_pose.position);
+}
+
+TEST_F(Motion, AWrenchIsExertedAgainstAWall) {
+  start(Mode::kCartesian);
+  arm.setpoint.wrench << 0, 0, -20, 0, 0, 0;
+  load(Vector6{0, 0, 20, 0, 0, 0});
+  expect_smooth(6.0);
+  EXPECT_TRUE(near(arm.controller.snapshot().tip_wrench, arm.setpoint.wrench, 0.05));
+  EXPECT_TRUE(near(arm.tip().position, arm.setpoint.tip_pose.position, 1e-3));
+}
+
+TEST_F(Motion, GainStepUnderLoadIsSmooth) {
+  start(Mode::kCartesian);
+  load(kLoad);
+  run(arm, 2.0);
+  arm.setpoint.gains.task_stiffness *= 5;
+  arm.setpoint.gains.task_damping *= 2;
+  expect_smooth(6.0);
+  const Vector6 sag = arm.controller.snapshot().tip_error;
+  EXPECT_TRUE(near(arm.setpoint.gains.task_stiffness * sag, -kLoad, 0.05));
+}
+
+TEST_F(Motion, ModeSwitchesUnderLoadAreSmooth) {
+  start(Mode::kJoint);
+  load(0.5 * kLoad);
+  for (const Mode mode : {Mode::kCartesian, Mode::kJoint, Mode::kCartesian}) {
+    arm.setpoint.mode = mode;
+    arm.setpoint.joint_position = arm.state.position;
+    arm.setpoint.tip_pose = arm.tip();
+    expect_smooth(2.0);
+    EXPECT_EQ(arm.controller.snapshot().joint_weight, mode == Mode::kJoint ? 1 : 0);
+    EXPECT_EQ(arm.controller.snapshot().task_weight, mode == Mode::kCartesian ? 1 : 0);
+  }
+}
+
+TEST_F(Motion, TargetsMayChangeInTheMiddleOfABlend) {
+  start(Mode::kJoint);
+  for (int k = 0; k < 12; ++k) {
+    arm.setpoint.mode = k % 2 == 0 ? Mode::kCartesian : Mode::kJoint;
+    arm.setpoint.gains.frame = k % 4 < 2 ? Frame::kBase : Frame::kTool;
+    arm.setpoint.gains.directions[2] = k % 3 != 0;
+    arm.setpoint.tip_pose.position.y() += k % 3 == 0 ? 0.1 : -0.05;
+    arm.setpoint.joint_position[1] += k % 2 == 0 ? 0.1 : -0.1;
+    expect_smooth(0.17);
+  }
+}
+
+TEST_F(Motion, FreeDirectionsGiveWay) {
+  start(Mode::kCartesian);
+  arm.setpoint.gains.directions = {true, true, false, true, true, true};
+  run(arm, 1.0);
+  const Pose before = arm.tip();
+  load(Vector6{0, 0, 5, 0, 0, 0});
+  EXPECT_GT(arm.tip().position.z() - before.position.z(), 0.01);
+  EXPECT_LT((arm.tip().position - before.position).head<2>().norm(), 0.005);
+}
+
+TEST_F(Motion, PullsBackTheWayItCameBeyondHalfATurn) {
+  start(Mode::kCartesian);
+  // The goal turns past pi about z while the arm is kept from following.
+  Snapshot last = arm.controller.snapshot();
+  for (int k = 0; k < 6000; ++k) {
+    const double angle = std::min(3.6, 1e-3 * k);
+    arm.setpoint.tip_pose.rotation =
+        Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()) * last.tip.rotation;
+    arm.setpoint.time = arm.state.time;
+    arm.controller.update(arm.state, arm.setpoint, arm.torque);
+    arm.state.time += 1'000'000;
+    const Snapshot& now = arm.controller.snapshot();
+    EXPECT_LT((now.tip_error - last.tip_error).norm(), 0.01);
+    last.tip_error = now.tip_error;
+  }
+  EXPECT_NEAR(last.tip_error[5], 3.6, 1e-6);
+}
+
+TEST(MotionOfEveryArm, HoldsItsPoseUnderSmallLoads) {
+  for (const testing::Arm& which : testing::arms()) {
+    SCOPED_TRACE(which.file);
+    const RobotModel model = testing::arm_model(which);
+    Settings settings = testing::quiet_settings(model);
+    JointVector q = settings.initial.joint_position;
+    for (Eigen::Index i = 0; i < q.size(); ++i) q[i] += 0.3 + 0.1 * static_cast<double>(i % 3);
+    SimulatedArm arm(model, settings, q);
+    arm.setpoint.mode = Mode::kCartesian;
+    const Extremes extremes = run(arm, 2.0);
+    EXPECT_EQ(extremes.worst, Status::kOk) << to_text(extremes.worst);
+    EXPECT_LT(extremes.rate_share, 0.5);
+    EXPECT_TRUE(near(arm.tip().position, arm.setpoint.tip_pose.position, 1e-5));
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::controller
