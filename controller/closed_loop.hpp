@@ -38,7 +38,7 @@ JointSquare<N> semidefinite_factor(JointSquare<N> A) noexcept {
 template <int N>
 Jacobian<N> jacobian_rate(const Jacobian<N>& J, const Joints<N>& qd) noexcept {
   Jacobian<N> rate;
-  Eigen::Vector3d inner = Eigen::Vector3d::Zero();    // sum of w_k qd_k for k <= j
+  Eigen::Vector3d inner = Eigen::Vector3d::Zero();             // sum of w_k qd_k for k <= j
   Eigen::Vector3d outer = twist<N>(J, qd).template head<3>();  // sum of v_k qd_k for k > j
   for (int j = 0; j < N; ++j) {
     const Eigen::Vector3d v = column<N>(J, j).template head<3>();
@@ -106,9 +106,12 @@ inline Matrix6 turned(const Matrix6& K, const Eigen::Matrix3d& R) noexcept {
 /// the springs are at rest (e = 0, q = q_d, q = q_0) and N stands still:
 ///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot]  [+ K_G(external wrench)]
 ///     C = C_q + J' C_C J + N' C_0 N + viscous friction of the joints.
-/// The terms in brackets are there if TaskTerms asks for them; K is symmetric and has its factor W
-/// if none is. The feed-forward has no part in it: it depends on the set-point, not on the state,
-/// but for Coriolis and gravity, which cancel those of the robot.
+/// The law's null-space spring is N' K_0. Its part N' K_0 (I - N), by which deflections of the tip
+/// drive free motions but not the other way round, changes no eigenvalue (unless friction couples
+/// the two) and is left out, so that K is symmetric. The terms in brackets are there if TaskTerms
+/// asks for them; K is symmetric and has its factor W if none is. The feed-forward has no part in
+/// it: it depends on the set-point, not on the state, but for Coriolis and gravity, which cancel
+/// those of the robot.
 template <int N>
 void closed_loop(const Dynamics<N>& robot, const Joints<N>& qd, const Impedance<N>& impedance,
                  const NullSpace<N>& null_space, const Joints<N>& viscous_friction,

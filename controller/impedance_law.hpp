@@ -18,7 +18,7 @@ struct SpringPaths {
 ///
 ///     tau = K_q (q_d - q) + C_q (qd_d - qd) + w_q M qdd_d           joint impedance
 ///         + J' (K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d + f)     Cartesian impedance, wrench
-///         + N' K_0 N (q_0 - q) + N' C_0 N (qd_0 - qd)               redundancy
+///         + N' K_0 (q_0 - q) + N' C_0 N (qd_0 - qd)                 redundancy
 ///         + friction(qd_f) + coriolis + gravity                     the robot
 ///
 /// e = (p_d - p, rotation vector of R_d R'), in B's axes at the tip: linear, then angular. K_C is
@@ -110,8 +110,8 @@ Joints<N> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q, con
     if (null_space) {
       const Vector dq = difference<N>(paths.rest.position(), q);
       const Vector dqd = difference<N>(paths.rest.velocity(), qd);
-      add<N>(null_space_.torque(impedance.null_stiffness, dq), tau);
-      add<N>(null_space_.torque(impedance.null_damping, dqd), tau);
+      add<N>(null_space_.spring(impedance.null_stiffness, dq), tau);
+      add<N>(null_space_.damper(impedance.null_damping, dqd), tau);
     }
     if (feed_forward_.friction) {
       add<N>(null_space_.joint_velocity(paths.tip.velocity()), path_velocity,

@@ -22,15 +22,17 @@ class NullSpace {
   void compute(const JointSquare<N>& M, const Jacobian<N>& J, const TipImpedance& base,
                const TipImpedance& tool, const Eigen::Matrix3d& R_BT) noexcept;
 
-  /// N' (k o N dq): torque of springs k (n) for the deflection dq, within the free motions; for
-  /// dampers k and the velocity dq likewise.
-  Joints<N> torque(const Joints<N>& k, const Joints<N>& dq) const noexcept {
-    Joints<N> y = projected_velocity(dq);
-    for (int i = 0; i < N; ++i) y[i] *= k[i];
-    mass_.solve_L(y);
-    project(y);
-    mass_.multiply_L(y);
-    return y;
+  /// N' K_0 dq with K_0 = diag(k): torque of springs k (n) for the deflection dq.
+  Joints<N> spring(const Joints<N>& k, Joints<N> dq) const noexcept {
+    for (int i = 0; i < N; ++i) dq[i] *= k[i];
+    mass_.solve_L(dq);
+    project(dq);
+    mass_.multiply_L(dq);
+    return dq;
+  }
+  /// N' C_0 N dqd with C_0 = diag(c): torque of dampers c (n) for the velocity dqd.
+  Joints<N> damper(const Joints<N>& c, const Joints<N>& dqd) const noexcept {
+    return spring(c, projected_velocity(dqd));
   }
   /// N dq
   Joints<N> projected_velocity(Joints<N> dq) const noexcept {

@@ -88,6 +88,7 @@ class TipPath {
     if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
     Vector6 d;
     d << position - point_, rotation_vector(turn);
+    if (d.tail<3>().norm() < 1e-14) d.tail<3>().setZero();  // rounding of the product
     const Step<6> step = approach<6>(d, velocity_, norm_, period_);
     velocity_ = step.velocity;
     if (step.arrives) {

@@ -81,6 +81,38 @@ double finite_or(double value, double otherwise) {
   return std::isfinite(value) && value > 0 ? value : otherwise;
 }
 
+/// Velocities at the tip decay no faster than this, 1/s: far from where torque that is held for a
+/// period of 1 ms and arrives one late makes the loop unstable.
+constexpr double kFastestDecay = 200;
+
+struct TipInertia {
+  double linear;   ///< kg
+  double angular;  ///< kg m^2
+};
+
+/// What the tip weighs in the direction in which it weighs least, over 64 postures.
+TipInertia least_tip_inertia(const RobotModel& model, const Limits& limits) {
+  const int n = model.dof();
+  double mobility_linear = 0, mobility_angular = 0;
+  JointVector q = JointVector::Zero(n);
+  double share = 0;  // golden-ratio sequence in [0, 1)
+  for (int k = 0; k < 64; ++k) {
+    for (int i = 0; i < n; ++i) {
+      share += 0.6180339887498949;
+      share -= std::floor(share);
+      const double lower = std::max(limits.position_lower[i], -std::numbers::pi);
+      const double upper = std::min(limits.position_upper[i], std::numbers::pi);
+      q[i] = lower + share * (upper - lower);
+    }
+    const DynamicsResult robot = evaluate(model, q, JointVector::Zero(n));
+    const Eigen::MatrixXd M = robot.M, J = robot.J;
+    const Eigen::MatrixXd A = J * M.llt().solve(J.transpose());
+    mobility_linear = std::max(mobility_linear, A.topLeftCorner<3, 3>().trace());
+    mobility_angular = std::max(mobility_angular, A.bottomRightCorner<3, 3>().trace());
+  }
+  return {1 / mobility_linear, 1 / mobility_angular};
+}
+
 }  // namespace
 
 Settings default_settings(const RobotModel& model) {
@@ -104,19 +136,22 @@ Settings default_settings(const RobotModel& model) {
   settings.motion.velocity = 0.25 * limits.velocity;
   settings.motion.acceleration = limits.velocity;
 
+  // Between the inertia of a joint with all others held and with all others free.
   const Eigen::MatrixXd M = evaluate(model, middle, none).M;
-  const Eigen::MatrixXd M_inverse = M.llt().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n)));
-  limits.damping = 20 * M_inverse.diagonal().cwiseInverse();  // stops a joint within some 0.05 s
+  const Eigen::MatrixXd M_inverse = M.llt().solve(Eigen::MatrixXd::Identity(n, n));
+  const JointVector inertia = M.diagonal().cwiseQuotient(M_inverse.diagonal()).cwiseSqrt();
+  limits.damping = 20 * inertia;
 
   constexpr double kOmega = 2 * std::numbers::pi * 1.5;  // rad/s
   constexpr double kRatio = 0.7;
   Gains& gains = settings.initial.gains;
-  gains.joint_stiffness = JointMatrix::Zero(n, n);
-  gains.joint_damping = JointMatrix::Zero(n, n);
-  gains.joint_stiffness.diagonal() = kOmega * kOmega * M.diagonal();
-  gains.joint_damping.diagonal() = 2 * kRatio * kOmega * M.diagonal();
-  gains.task_stiffness.diagonal() << 400, 400, 400, 30, 30, 30;
-  gains.task_damping.diagonal() << 40, 40, 40, 2, 2, 2;
+  gains.joint_stiffness = (kOmega * kOmega * inertia).asDiagonal();
+  gains.joint_damping = (2 * kRatio * kOmega * inertia).asDiagonal();
+  const TipInertia least = least_tip_inertia(model, limits);
+  const double linear = std::min(40.0, kFastestDecay * least.linear);
+  const double angular = std::min(2.0, kFastestDecay * least.angular);
+  gains.task_damping.diagonal() << linear, linear, linear, angular, angular, angular;
+  gains.task_stiffness = 10 * gains.task_damping;
   gains.null_stiffness = 0.25 * gains.joint_stiffness.diagonal();
   gains.null_damping = 0.5 * gains.joint_damping.diagonal();
   settings.initial.joint_position = middle;

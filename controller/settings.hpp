@@ -94,8 +94,9 @@ class InvalidSettings : public std::invalid_argument {
 /// Settings for a robot. Limits of torque, velocity and position are those of its URDF (100 N m,
 /// 2 rad/s and none where the URDF has none), torque changes by at most 1000 N m/s (fully within 10
 /// ms where that is slower), set-points move at a quarter of the velocity limits. Gains suit the
-/// robot's inertia at the middle of its range: 1.5 Hz and a damping ratio of 0.7 for each joint
-/// alone; 400 N/m and 30 N m/rad at the tip.
+/// robot's inertia: 1.5 Hz and a damping ratio of 0.7 for each joint alone in the middle of its
+/// range, and 2 N m s/rad, 40 N s/m at the tip, or less where its inertia is too small for that
+/// anywhere, with stiffness 10/s times that.
 Settings default_settings(const RobotModel& model);
 
 /// Throws InvalidSettings, with key, value and unit, unless all sizes are n, all numbers are finite
