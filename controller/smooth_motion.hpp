@@ -113,11 +113,6 @@ class Smoothing {
     bool moves = false;
     for (int i = 0; i < D; ++i) moves |= velocity[i] != 0;
     still_ = moves ? 0 : std::min(still_ + 1, window_);
-    if (still_ == window_) {  // sheds what rounding has left over
-      sum_.setZero();
-      offset_.setZero();
-      oldest.setZero();
-    }
     const double share = 1.0 / window_;
     for (int i = 0; i < D; ++i) {
       const double change = velocity[i] - oldest[i];
@@ -126,6 +121,11 @@ class Smoothing {
       oldest[i] = velocity[i];
       velocity_[i] = sum_[i] * share;
       offset_[i] += (velocity_[i] - velocity[i]) * T;
+    }
+    if (still_ == window_) {  // sheds what rounding has left over
+      sum_.setZero();
+      velocity_.setZero();
+      offset_.setZero();
     }
   }
 

@@ -1,0 +1,102 @@
+#include <dashpot/controller/orientation.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::AngleAxisd;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using testing::near;
+using testing::Random;
+
+Quaterniond random_rotation(Random& random) {
+  return Quaterniond(Eigen::Vector4d(random.vector(4).normalized()));
+}
+constexpr double kPi = std::numbers::pi;
+
+TEST(RotationVector, IsTheLogarithmOfTheExponential) {
+  Random random(301);
+  for (const double size : {0.0, 1e-300, 1e-12, 1e-9, 1e-5, 2e-4, 0.1, 1.0, 3.0, kPi, 5.0, 6.0}) {
+    for (int k = 0; k < 50; ++k) {
+      const Vector3d e = size * Vector3d(random.vector(3)).normalized();
+      EXPECT_TRUE(near(rotation_vector(quaternion(e)), e, 4e-16 * (1 + size) + 1e-15 * size));
+      if (size > 0) {
+        const Quaterniond expected(AngleAxisd(size, e / size));
+        EXPECT_TRUE(near(quaternion(e).coeffs(), expected.coeffs(), 2e-15));
+      }
+    }
+  }
+}
+
+TEST(RotationVector, IsTheShorterOneForPositiveQuaternions) {
+  Random random(302);
+  for (int k = 0; k < 1000; ++k) {
+    Quaterniond q = random_rotation(random);
+    if (q.w() < 0) q.coeffs() = -q.coeffs();
+    EXPECT_LE(rotation_vector(q).norm(), kPi + 1e-15);
+  }
+}
+
+TEST(RotationDefect, TellsRotationsFromOtherMatrices) {
+  Random random(303);
+  for (int k = 0; k < 100; ++k) {
+    Eigen::Matrix3d R = random_rotation(random).toRotationMatrix();
+    EXPECT_LT(rotation_defect(R), 1e-14);
+    EXPECT_NEAR(rotation_defect(1.001 * R), 0.002001, 1e-9);
+    EXPECT_EQ(rotation_defect(-R), std::numeric_limits<double>::infinity());
+    R(k % 3, k / 3 % 3) = std::nan("");
+    EXPECT_EQ(rotation_defect(R), std::numeric_limits<double>::infinity());
+  }
+  EXPECT_EQ(rotation_defect(Eigen::Matrix3d::Zero()), std::numeric_limits<double>::infinity());
+}
+
+TEST(OrientationError, TurnsTheTipToTheGoal) {
+  Random random(304);
+  for (int k = 0; k < 1000; ++k) {
+    OrientationError error;
+    const Quaterniond goal = random_rotation(random), tip = random_rotation(random);
+    const Vector3d e = error.update(goal, tip);
+    EXPECT_LE(e.norm(), kPi + 1e-14);
+    EXPECT_TRUE(near((quaternion(e) * tip).toRotationMatrix(), goal.toRotationMatrix(), 1e-14));
+  }
+}
+
+TEST(OrientationError, IsContinuousThroughHalfATurn) {
+  Random random(305);
+  for (int k = 0; k < 50; ++k) {
+    OrientationError error;
+    const Quaterniond start = random_rotation(random);
+    const Vector3d axis = Vector3d(random.vector(3)).normalized();
+    Vector3d last = Vector3d::Zero();
+    for (double angle = 0; angle < 1.45 * kPi; angle += 0.01) {
+      Quaterniond goal = Quaterniond(AngleAxisd(angle, axis)) * start;
+      if (random.integer(0, 1) == 1) goal.coeffs() = -goal.coeffs();  // the same rotation
+      const Vector3d e = error.update(goal, start);
+      EXPECT_NEAR(e.norm(), angle, 1e-12);
+      EXPECT_LT((e - last).norm(), 0.0101);
+      last = e;
+    }
+  }
+}
+
+TEST(OrientationError, TakesTheShortWayPastThreeQuartersOfATurn) {
+  OrientationError error;
+  double largest = 0;
+  double at_last = 0;
+  for (double angle = 0; angle < 2 * kPi; angle += 0.01) {
+    at_last =
+        error.update(Quaterniond(AngleAxisd(angle, Vector3d::UnitX())), Quaterniond::Identity())[0];
+    largest = std::max(largest, at_last);
+  }
+  EXPECT_NEAR(largest, 1.5 * kPi, 0.02);
+  EXPECT_LT(std::abs(at_last), 0.02);
+}
+
+}  // namespace
+}  // namespace dashpot::controller

@@ -1,0 +1,184 @@
+#include <dashpot/controller/setpoint_path.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using testing::near;
+using testing::Random;
+
+Quaterniond random_rotation(Random& random) {
+  return Quaterniond(Eigen::Vector4d(random.vector(4).normalized()));
+}
+
+constexpr double kPeriod = 0.001;
+constexpr int kWindow = 30;
+
+JointNorm<3> joint_limits() {
+  return {Joints<3>(1.0, 0.5, 2.0), Joints<3>(4.0, 5.0, 3.0)};
+}
+
+/// Largest velocity, acceleration and change of acceleration of a path, as shares of their limits,
+/// from its positions alone.
+template <int N>
+struct Watch {
+  JointNorm<N> norm;
+  std::vector<Joints<N>> positions;
+  double speed = 0, effort = 0, jerk = 0, inconsistency = 0;
+  Joints<N> v = Joints<N>::Zero(), a = Joints<N>::Zero();
+
+  void see(const JointPath<N>& path) {
+    if (!positions.empty()) {
+      const Joints<N> v_now = (path.position() - positions.back()) / kPeriod;
+      const Joints<N> a_now = (v_now - v) / kPeriod;
+      speed = std::max(speed, norm.speed(v_now));
+      effort = std::max(effort, norm.effort(a_now));
+      jerk = std::max(jerk, norm.effort(a_now - a) / (2.0 / kWindow));
+      inconsistency = std::max({inconsistency, norm.speed(v_now - path.velocity()),
+                                norm.effort(a_now - path.acceleration())});
+      v = v_now;
+      a = a_now;
+    }
+    positions.push_back(path.position());
+  }
+  void expect_within_limits() const {
+    EXPECT_LE(speed, 1 + 1e-9);
+    EXPECT_LE(effort, 1 + 1e-6);
+    EXPECT_LE(jerk, 1 + 1e-3);
+    EXPECT_LT(inconsistency, 1e-6);  // velocity and acceleration are those of the positions
+  }
+};
+
+TEST(JointPath, GoesStraightFromRestAndArrivesExactly) {
+  JointPath<3> path(joint_limits(), kPeriod, kWindow);
+  const Joints<3> start(0.1, -0.2, 0.3), goal(1.1, 0.7, -1.3);
+  path.start(start);
+  Watch<3> watch{joint_limits()};
+  watch.see(path);
+  int ticks = 0;
+  while (path.position() != goal && ticks < 10000) {
+    path.step(goal);
+    watch.see(path);
+    ++ticks;
+  }
+  ASSERT_EQ(path.position(), goal);
+  EXPECT_EQ(path.velocity(), Joints<3>::Zero());
+  watch.expect_within_limits();
+  EXPECT_GT(watch.speed, 0.99);  // no slower than it may be
+  EXPECT_GT(watch.effort, 0.99);
+  // As shares of the way: joint 2 limits the speed, joint 3 the acceleration; braking takes twice
+  // as long as speeding up.
+  const double speed = 0.5 / 0.9, effort = 3.0 / 1.6, smoothing = kWindow * kPeriod;
+  EXPECT_NEAR(ticks * kPeriod, 1 / speed + 0.5 * speed * (1 / effort + 2 / effort) + smoothing,
+              2.5 * kPeriod);
+  for (const Joints<3>& p : watch.positions) {
+    const double share = (p - start).dot(goal - start) / (goal - start).squaredNorm();
+    EXPECT_TRUE(near(p, start + share * (goal - start), 1e-12));
+    EXPECT_LE(share, 1 + 1e-12);  // no overshoot
+  }
+}
+
+TEST(JointPath, KeepsItsLimitsWhateverTheGoalsAndArrives) {
+  Random random(311);
+  for (int trial = 0; trial < 100; ++trial) {
+    JointPath<3> path(joint_limits(), kPeriod, kWindow);
+    Watch<3> watch{joint_limits()};
+    watch.see(path);
+    Joints<3> goal = Joints<3>::Zero();
+    for (int k = 0; k < 3000; ++k) {
+      if (random.integer(0, 99) < (trial % 3 == 0 ? 100 : 1)) {  // every tick, or now and then
+        goal = random.log_uniform(1e-6, 2.0) * random.vector(3);
+      }
+      if (random.integer(0, 999) == 0) {
+        for (int halt = 0; halt < 50; ++halt) path.halt(), watch.see(path);
+      }
+      path.step(goal);
+      watch.see(path);
+    }
+    for (int k = 0; k < 30000 && path.position() != goal; ++k) {
+      path.step(goal);
+      watch.see(path);
+    }
+    EXPECT_EQ(path.position(), goal);
+    watch.expect_within_limits();
+  }
+}
+
+TEST(JointPath, HaltStopsWithinTheBrakingTime) {
+  JointPath<3> path(joint_limits(), kPeriod, kWindow);
+  for (int k = 0; k < 400; ++k) path.step(Joints<3>(5, 5, 5));
+  EXPECT_GT(path.velocity().norm(), 0.1);
+  for (int k = 0; k < 400; ++k) path.halt();
+  const Joints<3> stop = path.position();
+  EXPECT_EQ(path.velocity(), Joints<3>::Zero());
+  path.halt();
+  EXPECT_EQ(path.position(), stop);
+}
+
+TEST(TipPath, GoesStraightAndTurnsAboutOneAxis) {
+  Random random(312);
+  const TwistNorm limits{0.5, 1.5, 2.0, 6.0};
+  for (int trial = 0; trial < 20; ++trial) {
+    TipPath path(limits, kPeriod, kWindow);
+    const Vector3d p0 = random.vector(3), p1 = p0 + 0.3 * random.vector(3);
+    const Quaterniond q0 = random_rotation(random), q1 = random_rotation(random);
+    path.start(p0, q0);
+    Vector3d p = p0;
+    Quaterniond q = q0;
+    const Vector3d axis = Eigen::AngleAxisd(q1 * q0.conjugate()).axis();
+    int ticks = 0;
+    for (; ticks < 20000 && !(path.position() == p1 && path.velocity().isZero(0)); ++ticks) {
+      path.step(p1, q1);
+      const Vector3d v = (path.position() - p) / kPeriod;
+      Quaterniond turn = path.rotation() * q.conjugate();
+      if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
+      const Vector3d w = rotation_vector(turn) / kPeriod;
+      EXPECT_LE(v.norm(), 0.5 * (1 + 1e-9));
+      EXPECT_LE(w.norm(), 1.5 * (1 + 1e-9));
+      EXPECT_TRUE(near(path.velocity().head<3>(), v, 1e-9));
+      EXPECT_TRUE(near(path.velocity().tail<3>(), w, 1e-9));
+      EXPECT_LT(w.cross(axis).norm(), 1e-9);
+      p = path.position();
+      q = path.rotation();
+    }
+    EXPECT_EQ(path.position(), p1);
+    EXPECT_LT(q.angularDistance(q1), 1e-14);
+    EXPECT_TRUE(path.velocity().isZero(0));
+  }
+}
+
+TEST(TipPath, ArrivesFromEveryDetour) {
+  Random random(313);
+  const TwistNorm limits{0.5, 1.5, 2.0, 6.0};
+  for (int trial = 0; trial < 50; ++trial) {
+    TipPath path(limits, kPeriod, kWindow);
+    path.start(Vector3d::Zero(), Quaterniond::Identity());
+    Vector3d goal;
+    Quaterniond turned;
+    Vector6 last = Vector6::Zero();
+    for (int k = 0; k < 20; ++k) {
+      goal = 0.3 * random.vector(3);
+      turned = random_rotation(random);
+      for (int i = random.integer(1, 400); i > 0; --i) {
+        path.step(goal, turned);
+        EXPECT_LE(limits.speed(path.velocity()), 1 + 1e-9);
+        EXPECT_LE(limits.effort(path.velocity() - last) / kPeriod, 1 + 1e-9);
+        last = path.velocity();
+      }
+    }
+    for (int i = 0; i < 10000; ++i) path.step(goal, turned);
+    EXPECT_EQ(path.position(), goal);
+    EXPECT_LT(path.rotation().angularDistance(turned), 1e-14);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::controller
