@@ -16,7 +16,6 @@ using Eigen::VectorXd;
 using testing::fixed_steps;
 using testing::joints;
 using testing::kMethods;
-using testing::near;
 using testing::run;
 
 int order_of(Method method) {

@@ -15,7 +15,6 @@ namespace {
 
 using Eigen::MatrixXd;
 using testing::joints;
-using testing::near;
 using testing::run;
 
 const MatrixXd kOne = MatrixXd::Ones(1, 1), kZero = MatrixXd::Zero(1, 1);
