@@ -68,6 +68,12 @@ inline std::vector<std::string> forbidden_words(const std::string& text) {
   return found;
 }
 
+/// Whether the source text can start threads itself.
+inline bool includes_threads(const std::string& text) {
+  static const std::regex include(R"re((^|\n)\s*#\s*include\s*<(thread|future|pthread\.h)>)re");
+  return std::regex_search(text, include);
+}
+
 inline bool starts_with_pragma_once(std::string_view text) {
   return text.starts_with("#pragma once\n");
 }

@@ -55,6 +55,13 @@ TEST(WordRules, FindPathsOfAMachineAndNotesOfUnfinishedWork) {
   EXPECT_THAT(forbidden_words("a framework/of homes, done at /usr/share/work"), IsEmpty());
 }
 
+TEST(ThreadRules, FindTheHeadersThatStartThreads) {
+  EXPECT_TRUE(includes_threads("#include <thread>\n"));
+  EXPECT_TRUE(includes_threads("#pragma once\n # include <future>  // async\n"));
+  EXPECT_TRUE(includes_threads("#include <vector>\n\n#include <pthread.h>\n"));
+  EXPECT_FALSE(includes_threads("// #include <thread>\n#include <dashpot/tests/thread>\n"));
+}
+
 TEST(HeaderRules, AskForPragmaOnceInTheFirstLine) {
   EXPECT_TRUE(starts_with_pragma_once("#pragma once\n#include <vector>\n"));
   EXPECT_FALSE(starts_with_pragma_once("// A comment.\n#pragma once\n"));

@@ -74,6 +74,17 @@ TEST(Tree, HoldsNoPathOfAMachineAndNoNoteOfUnfinishedWork) {
   EXPECT_THAT(offences, IsEmpty());
 }
 
+TEST(Tree, KeepsTestsWithThreadsWhereTheThreadSanitizerRuns) {
+  std::vector<std::string> offences;
+  for (const File& file : files()) {
+    if (file.path.starts_with("tests/") && !file.path.starts_with("tests/threads/") &&
+        includes_threads(file.text)) {
+      offences.push_back(file.path);
+    }
+  }
+  EXPECT_THAT(offences, IsEmpty()) << "Their place is tests/threads.";
+}
+
 TEST(Tree, StartsEveryHeaderWithPragmaOnce) {
   std::vector<std::string> offences;
   for (const File& file : files()) {
