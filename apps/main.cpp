@@ -23,7 +23,7 @@ int report(const std::string& message, int status) {
 int run(int argc, char** argv) {
   CLI::App program("Vibration analysis of second-order systems and impedance-controlled robots",
                    "dashpot");
-  program.set_version_flag("--version", "dashpot 0.1.0");
+  program.set_version_flag("--version", "dashpot " DASHPOT_VERSION);
   program.require_subcommand(0, 1);
   add_analyze(program);
   add_inspect(program);
