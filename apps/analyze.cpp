@@ -107,7 +107,7 @@ void add_analyze(CLI::App& program) {
              "largest|last (largest)",
              {{"largest", analysis::Pivot::kLargest}, {"last", analysis::Pivot::kLast}}, options,
              &Options::pivot);
-  command->footer(kSystemFileHelp);
+  command->footer(std::string(kSystemFileHelp) + "\n\n" + kExitStatusHelp);
   command->callback([options] { run(*options); });
 }
 

@@ -200,6 +200,7 @@ void add_inspect(CLI::App& program) {
   command->add_flag("--exclude-off-chain", options->exclude_off_chain,
                     "Leave out links that hang off the chain");
   command->add_flag("--json", options->json, "Print JSON instead of tables");
+  command->footer(kExitStatusHelp);
   command->callback([options] { run(*options); });
 }
 

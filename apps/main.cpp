@@ -25,6 +25,7 @@ int run(int argc, char** argv) {
                    "dashpot");
   program.set_version_flag("--version", "dashpot " DASHPOT_VERSION);
   program.require_subcommand(0, 1);
+  program.footer(kExitStatusHelp);
   add_analyze(program);
   add_inspect(program);
 

@@ -7,6 +7,12 @@
 
 namespace dashpot::apps {
 
+/// For the help text of the program and of each subcommand.
+inline constexpr const char* kExitStatusHelp =
+    "Exit status: 0 if all went well, 2 if the input or the command line is bad, 1 if anything "
+    "else\n"
+    "failed.";
+
 void add_analyze(CLI::App& program);
 void add_inspect(CLI::App& program);
 

@@ -89,6 +89,7 @@ SystemEntry read_entry(const YamlNode& node, const std::string& prefix) {
 const char* const kSystemFileHelp =
     R"(FILE is YAML or JSON: one system, or a list of systems. "-" reads standard input.
 n joints, m task directions; SI units; matrices are lists of rows.
+Tables and messages count the systems of a list from 0: [0].mass is that of the first.
   mass              n x n, symmetric positive definite
   stiffness         n x n, symmetric                           } one of the two,
   task_stiffness    m x m, symmetric, with jacobian (m x n)    } or both: they add up

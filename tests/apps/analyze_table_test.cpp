@@ -112,6 +112,13 @@ TEST(Program, ExplainsItself) {
   }
 }
 
+TEST(Program, ExplainsItsExitStatusEverywhere) {
+  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+           {"--help"}, {"analyze", "--help"}, {"inspect", "--help"}}) {
+    EXPECT_THAT(table(run_program(arguments)), HasSubstr("\nExit status: 0 if "));
+  }
+}
+
 TEST(Program, WantsASubcommandItKnows) {
   for (const std::vector<std::string>& arguments :
        std::vector<std::vector<std::string>>{{}, {"analyse"}, {"--jsno"}}) {
