@@ -1,4 +1,5 @@
 // Forward dynamics and kinematics against KDL, which computes M, C qd and g in another way.
+#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/sim/articulated_body.hpp>
 #include <dashpot/tests/sim/kdl_chain.hpp>
 #include <dashpot/tests/support/matrices.hpp>
@@ -6,9 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
-#include <kdl/chaindynparam.hpp>
-#include <kdl/chainfksolverpos_recursive.hpp>
-#include <kdl/chainjnttojacsolver.hpp>
 
 namespace dashpot::sim {
 namespace {
@@ -16,36 +14,10 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::ChainFile;
-using testing::eigen;
-using testing::kdl;
+using testing::KdlReference;
 using testing::near;
 using testing::Random;
-
-/// What KDL says of one configuration.
-struct Reference {
-  MatrixXd M, J;
-  VectorXd coriolis, gravity;
-  KDL::Frame tip;
-
-  Reference(const ChainFile& file, const VectorXd& q, const VectorXd& qd,
-            const Eigen::Vector3d& g) {
-    const KDL::Chain chain = testing::kdl_chain(file);
-    const unsigned n = chain.getNrOfJoints();
-    KDL::ChainDynParam dynamics(chain, KDL::Vector(g.x(), g.y(), g.z()));
-    KDL::JntSpaceInertiaMatrix mass(static_cast<int>(n));
-    KDL::JntArray force(n);
-    EXPECT_EQ(dynamics.JntToMass(kdl(q), mass), 0);
-    M = eigen(mass);
-    EXPECT_EQ(dynamics.JntToCoriolis(kdl(q), kdl(qd), force), 0);
-    coriolis = eigen(force);
-    EXPECT_EQ(dynamics.JntToGravity(kdl(q), force), 0);
-    gravity = eigen(force);
-    KDL::Jacobian jacobian(n);
-    EXPECT_EQ(KDL::ChainJntToJacSolver(chain).JntToJac(kdl(q), jacobian), 0);
-    J = eigen(jacobian);
-    EXPECT_EQ(KDL::ChainFkSolverPos_recursive(chain).JntToCart(kdl(q), tip), 0);
-  }
-};
+using Terms = testing::KdlReference::Terms;
 
 /// The four arms, and chains made up of every length.
 std::vector<ChainFile> chains() {
@@ -59,7 +31,7 @@ class Dynamics : public ::testing::TestWithParam<ChainFile> {
  protected:
   const ChainFile& file() const { return GetParam(); }
   /// Forces of the equation of motion are this large.
-  static double size_of(const Reference& is, const VectorXd& qdd, const VectorXd& tau) {
+  static double size_of(const Terms& is, const VectorXd& qdd, const VectorXd& tau) {
     return (is.M.cwiseAbs() * qdd.cwiseAbs()).maxCoeff() + is.coriolis.cwiseAbs().maxCoeff() +
            is.gravity.cwiseAbs().maxCoeff() + tau.cwiseAbs().maxCoeff();
   }
@@ -74,6 +46,7 @@ TEST_P(Dynamics, SatisfyTheEquationOfMotion) {
   const Robot robot = testing::robot_of(file(), parameters);
   ArticulatedBody bodies(robot);
   const int n = robot.dof();
+  KdlReference reference(file(), robot.gravity());
   for (int trial = 0; trial < 50; ++trial) {
     const VectorXd q = 2 * random.vector(n), qd = random.vector(n), tau = 20 * random.vector(n);
     const Vector6 wrench = 10 * random.vector(6);
@@ -81,7 +54,7 @@ TEST_P(Dynamics, SatisfyTheEquationOfMotion) {
     bodies.move_to(q.data(), qd.data());
     bodies.push_tip(wrench);
     bodies.accelerations(tau.data(), qdd.data());
-    const Reference is(file(), q, qd, parameters.gravity);
+    const Terms is = reference.at(q, qd);
     const VectorXd left = is.M * qdd + is.coriolis + is.gravity;
     const VectorXd right = tau + is.J.transpose() * wrench;
     EXPECT_TRUE(near(left, right, 1e-11 * size_of(is, qdd, right)));
@@ -93,12 +66,13 @@ TEST_P(Dynamics, GiveTheAccelerationsOfTheMassMatrix) {
   const Robot robot = testing::robot_of(file());
   ArticulatedBody bodies(robot);
   const int n = robot.dof();
+  KdlReference reference(file(), robot.gravity());
   for (int trial = 0; trial < 50; ++trial) {
     const VectorXd q = 2 * random.vector(n), qd = random.vector(n), tau = 20 * random.vector(n);
     VectorXd qdd(n);
     bodies.move_to(q.data(), qd.data());
     bodies.accelerations(tau.data(), qdd.data());
-    const Reference is(file(), q, qd, {0, 0, -9.81});
+    const Terms is = reference.at(q, qd);
     const Eigen::LLT<MatrixXd> factors(is.M);
     ASSERT_EQ(factors.info(), Eigen::Success);
     // In coordinates where the mass is 1, so that light joints do not hide behind heavy ones.
@@ -116,12 +90,13 @@ TEST_P(Dynamics, AddArmatureToTheDiagonalOfTheMassMatrix) {
   parameters.armature = random.vector(n).cwiseAbs();
   const Robot robot = testing::robot_of(file(), parameters);
   ArticulatedBody bodies(robot);
+  KdlReference reference(file(), robot.gravity());
   for (int trial = 0; trial < 20; ++trial) {
     const VectorXd q = 2 * random.vector(n), qd = random.vector(n), tau = 20 * random.vector(n);
     VectorXd qdd(n);
     bodies.move_to(q.data(), qd.data());
     bodies.accelerations(tau.data(), qdd.data());
-    Reference is(file(), q, qd, parameters.gravity);
+    Terms is = reference.at(q, qd);
     is.M.diagonal() += parameters.armature;
     const VectorXd left = is.M * qdd + is.coriolis + is.gravity;
     EXPECT_TRUE(near(left, tau, 1e-11 * size_of(is, qdd, tau)));
@@ -134,16 +109,15 @@ TEST_P(Dynamics, PlaceTheTip) {
   const Robot robot = testing::robot_of(file());
   ArticulatedBody bodies(robot);
   const int n = robot.dof();
+  KdlReference reference(file(), robot.gravity());
   for (int trial = 0; trial < 20; ++trial) {
     const VectorXd q = 2 * random.vector(n), qd = random.vector(n);
     const Vector6 wrench = random.vector(6);
     bodies.move_to(q.data(), qd.data());
-    const Reference is(file(), q, qd, robot.gravity());
+    const Terms is = reference.at(q, qd);
     const Pose tip = bodies.tip_pose();
-    for (int i = 0; i < 3; ++i) {
-      EXPECT_NEAR(tip.position[i], is.tip.p[i], 1e-12 * n);
-      for (int j = 0; j < 3; ++j) EXPECT_NEAR(tip.rotation(i, j), is.tip.M(i, j), 1e-13 * n);
-    }
+    EXPECT_TRUE(near(tip.position, is.tip_position, 1e-12 * n));
+    EXPECT_TRUE(near(tip.rotation, is.tip_rotation, 1e-13 * n));
     EXPECT_TRUE(near(bodies.tip_twist(), is.J * qd, 1e-12 * (1 + (is.J * qd).norm())));
     VectorXd tau(n);
     bodies.transposed_jacobian(wrench, tau.data());
@@ -162,7 +136,7 @@ TEST_P(Dynamics, FallDownTheGradientOfTheGravityEnergy) {
     return bodies.gravity_energy();
   };
   const VectorXd q = random.vector(n);
-  const Reference is(file(), q, rest, robot.gravity());
+  const Terms is = KdlReference(file(), robot.gravity()).at(q, rest);
   for (int i = 0; i < n; ++i) {
     const VectorXd step = 1e-3 * VectorXd::Unit(n, i);
     const double slope =  // of order 4
@@ -170,6 +144,40 @@ TEST_P(Dynamics, FallDownTheGradientOfTheGravityEnergy) {
          (energy(q + 2 * step) - energy(q - 2 * step))) /
         12e-3;
     EXPECT_NEAR(slope, is.gravity[i], 1e-9 * (1 + std::abs(energy(q)))) << "joint " << i + 1;
+  }
+}
+
+/// The controller's own model of the same file: friction apart, they must agree with no KDL
+/// between.
+TEST_P(Dynamics, UndoWhatTheModelOfTheControllerAsksFor) {
+  Random random(707);
+  const int n = testing::robot_of(file()).dof();
+  controller::ModelOptions options;
+  options.gravity = 5 * random.vector(3);
+  options.reflected_inertia = random.vector(n).cwiseAbs();
+  options.payload.mass = 1.5;
+  options.payload.center = {0.05, -0.02, 0.1};
+  options.payload.inertia = testing::RandomRobot(random.engine()()).inertia(1.5, 0.05);
+  RobotParameters parameters;
+  parameters.gravity = options.gravity;
+  parameters.armature = options.reflected_inertia;
+  parameters.payload = {1.5, options.payload.center, options.payload.inertia};
+  const controller::RobotModel model =
+      controller::RobotModel::from_urdf_text(file().urdf, file().base, file().tip, options);
+  const Robot robot = testing::robot_of(file(), parameters);
+  ArticulatedBody bodies(robot);
+  for (int trial = 0; trial < 50; ++trial) {
+    const VectorXd q = 2 * random.vector(n), qd = random.vector(n), qdd = 5 * random.vector(n);
+    const Vector6 wrench = 10 * random.vector(6);
+    const controller::DynamicsResult is = controller::evaluate(model, q, qd);
+    const VectorXd tau = is.M * qdd + is.coriolis + is.gravity - is.J.transpose() * wrench;
+    VectorXd result(n);
+    bodies.move_to(q.data(), qd.data());
+    bodies.push_tip(wrench);
+    bodies.accelerations(tau.data(), result.data());
+    const VectorXd missing = is.M * (result - qdd);
+    const double size = (is.M.cwiseAbs() * qdd.cwiseAbs()).maxCoeff() + tau.cwiseAbs().maxCoeff();
+    EXPECT_TRUE(near(missing, VectorXd::Zero(n), 1e-11 * size));
   }
 }
 

@@ -2,12 +2,11 @@
 // The same chain in KDL, built straight from the URDF and without any code of the simulator.
 
 #include <dashpot/tests/sim/chains.hpp>
+#include <dashpot/tests/support/kdl_solvers.hpp>
 
 #include <urdf_parser/urdf_parser.h>
 
 #include <kdl/chain.hpp>
-#include <kdl/jntarray.hpp>
-#include <kdl/jntspaceinertiamatrix.hpp>
 #include <vector>
 
 namespace dashpot::testing {
@@ -56,29 +55,32 @@ inline KDL::Chain kdl_chain(const ChainFile& file) {
   return chain;
 }
 
-// KDL was compiled for another alignment of Eigen matrices: theirs are read and written entry by
-// entry, through KDL's own functions.
+/// KDL's solvers for that chain.
+class KdlReference {
+ public:
+  KdlReference(const ChainFile& file, const Eigen::Vector3d& gravity)
+      : solvers_(kdl_chain(file), gravity.data()) {}
 
-inline KDL::JntArray kdl(const Eigen::VectorXd& v) {
-  KDL::JntArray array(static_cast<unsigned>(v.size()));
-  for (unsigned i = 0; i < array.rows(); ++i) array(i) = v[i];
-  return array;
-}
-
-inline Eigen::VectorXd eigen(const KDL::JntArray& array) {
-  Eigen::VectorXd v(array.rows());
-  for (unsigned i = 0; i < array.rows(); ++i) v[i] = array(i);
-  return v;
-}
-
-/// Of a KDL::Jacobian or KDL::JntSpaceInertiaMatrix.
-template <class Matrix>
-Eigen::MatrixXd eigen(const Matrix& matrix) {
-  Eigen::MatrixXd A(matrix.rows(), matrix.columns());
-  for (unsigned i = 0; i < matrix.rows(); ++i) {
-    for (unsigned j = 0; j < matrix.columns(); ++j) A(i, j) = matrix(i, j);
+  struct Terms {
+    Eigen::MatrixXd M, J;
+    Eigen::VectorXd coriolis, gravity;
+    Eigen::Vector3d tip_position;
+    Eigen::Matrix3d tip_rotation;
+  };
+  Terms at(const Eigen::VectorXd& q, const Eigen::VectorXd& qd) {
+    solvers_.solve(q.data(), qd.data());
+    const KdlTerms terms = solvers_.terms();
+    const auto matrix = [](const auto& values, Eigen::Index rows, Eigen::Index cols) {
+      return Eigen::Map<const Eigen::MatrixXd>(&values[0], rows, cols);
+    };
+    const Eigen::Index n = q.size();
+    return {matrix(terms.M, n, n),        matrix(terms.J, 6, n),
+            matrix(terms.coriolis, n, 1), matrix(terms.gravity, n, 1),
+            matrix(terms.position, 3, 1), matrix(terms.rotation, 3, 3)};
   }
-  return A;
-}
+
+ private:
+  KdlSolvers solvers_;
+};
 
 }  // namespace dashpot::testing

@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-#include <kdl/chaindynparam.hpp>
 
 #include <cmath>
 
@@ -97,12 +96,10 @@ TEST(Momentum, AboutTheVerticalIsKept) {
   RobotParameters parameters;
   parameters.viscous = JointVector::Zero(7);
   Arm arm(testing::robot_of(file, parameters));
-  const KDL::Chain chain = testing::kdl_chain(file);  // KDL keeps a reference
-  KDL::ChainDynParam dynamics(chain, KDL::Vector(0, 0, -9.81));
+  testing::KdlReference reference(file, {0, 0, -9.81});
   const auto momentum = [&](const Plant& plant) {
-    KDL::JntSpaceInertiaMatrix mass(7);
-    EXPECT_EQ(dynamics.JntToMass(testing::kdl(plant.position()), mass), 0);
-    return (testing::eigen(mass) * plant.velocity())[0];
+    const JointVector qd = plant.velocity();
+    return reference.at(plant.position(), qd).M.row(0).dot(qd);
   };
   Plant plant(arm, precise(0.01), joints({0, -0.7, 0.2, -2.3, 0, 1.5, 0.7}),
               joints({1, 0.3, -0.5, 0.2, 1, -1, 2}));
