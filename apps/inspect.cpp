@@ -1,4 +1,3 @@
-#include <dashpot/apps/input_error.hpp>
 #include <dashpot/apps/matrix_json.hpp>
 #include <dashpot/apps/number_list.hpp>
 #include <dashpot/apps/subcommands.hpp>

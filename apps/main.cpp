@@ -1,5 +1,5 @@
-#include <dashpot/apps/input_error.hpp>
 #include <dashpot/apps/subcommands.hpp>
+#include <dashpot/controller/input_error.hpp>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -16,7 +16,7 @@ constexpr int kBadInput = 2;
 
 /// Says on one line of standard error what went wrong, and returns `status`.
 int report(const std::string& message, int status) {
-  std::fprintf(stderr, "%s\n", one_line(message).c_str());
+  std::fprintf(stderr, "%s\n", controller::one_line(message).c_str());
   return status;
 }
 

@@ -1,5 +1,5 @@
-#include <dashpot/apps/input_error.hpp>
 #include <dashpot/apps/number_list.hpp>
+#include <dashpot/controller/input_error.hpp>
 
 #include <charconv>
 #include <cmath>
@@ -18,7 +18,7 @@ Eigen::VectorXd parse_numbers(const std::string& option, const std::string& text
     const char* end = word.data() + word.size();
     const auto [stop, error] = std::from_chars(word.data(), end, value);
     if (error != std::errc() || stop != end || !std::isfinite(value)) {
-      throw InputError(option, "'" + word + "' is not a finite number");
+      throw controller::InputError(option, "'" + word + "' is not a finite number");
     }
     values.push_back(value);
   }

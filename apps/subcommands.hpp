@@ -1,5 +1,8 @@
 #pragma once
+#include <dashpot/controller/input_error.hpp>
+
 #include <CLI/App.hpp>
+#include <string>
 
 // One function for each subcommand: adds it, with its options, to the program. The subcommand runs
 // when the command line is parsed. It throws InputError for bad input (exit status 2) and any other
@@ -12,6 +15,8 @@ inline constexpr const char* kExitStatusHelp =
     "Exit status: 0 if all went well, 2 if the input or the command line is bad, 1 if anything "
     "else\n"
     "failed.";
+
+using controller::InputError;
 
 void add_analyze(CLI::App& program);
 void add_inspect(CLI::App& program);

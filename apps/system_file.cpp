@@ -1,6 +1,6 @@
 #include <dashpot/apps/system_file.hpp>
-#include <dashpot/apps/yaml_document.hpp>
-#include <dashpot/apps/yaml_mapping.hpp>
+#include <dashpot/controller/yaml_document.hpp>
+#include <dashpot/controller/yaml_mapping.hpp>
 
 #include <array>
 #include <string_view>
@@ -8,6 +8,9 @@
 
 namespace dashpot::apps {
 namespace {
+
+using controller::YamlMapping;
+using controller::YamlNode;
 
 constexpr std::array<std::string_view, 14> kKeys = {"mass",
                                                     "damping",
@@ -117,7 +120,7 @@ InputError SystemEntry::error(const analysis::InvalidSystem& cause) const {
 }
 
 SystemFile read_systems(const std::string& path) {
-  const YamlNode root = parse_yaml(read_text(path));
+  const YamlNode root = controller::parse_yaml(controller::read_text(path));
   if (root.kind == YamlNode::Kind::kNull) throw InputError("", "is empty");
   SystemFile file;
   file.is_list = root.kind == YamlNode::Kind::kSequence;

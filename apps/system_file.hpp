@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/analysis/task_space.hpp>
-#include <dashpot/apps/input_error.hpp>
+#include <dashpot/controller/input_error.hpp>
 
 #include <Eigen/Core>
 #include <map>
@@ -9,6 +9,8 @@
 #include <vector>
 
 namespace dashpot::apps {
+
+using controller::InputError;
 
 /// One system as the user wrote it (SI units; n joints, m task directions). The vectors below have
 /// n entries; analysis::to_joint_space checks the matrices.

@@ -20,7 +20,8 @@ inline const std::vector<Layer>& layers() {
   static const std::vector<Layer> table = {
       {"analysis", {"dashpot/analysis/", "Eigen/"}},
       {"controller",
-       {"dashpot/controller/", "dashpot/analysis/", "Eigen/", "kdl/", "urdf_", "console_bridge/"}},
+       {"dashpot/controller/", "dashpot/analysis/", "Eigen/", "kdl/", "urdf_", "console_bridge/",
+        "yaml-cpp/"}},
       // an independent check of the two above:
       {"sim", {"dashpot/sim/", "Eigen/", "urdf_", "console_bridge/"}},
       {"lcmtypes",

@@ -14,6 +14,7 @@ TEST(IncludeRules, AllowTheArrowsOfTheTable) {
   EXPECT_TRUE(may_include("analysis", "Eigen/Core"));
   EXPECT_TRUE(may_include("controller", "kdl/chain.hpp"));
   EXPECT_TRUE(may_include("controller", "urdf_parser/urdf_parser.h"));
+  EXPECT_TRUE(may_include("controller", "yaml-cpp/yaml.h"));
   EXPECT_TRUE(may_include("controller", "dashpot/analysis/spectrum.hpp"));
   EXPECT_TRUE(may_include("sim", "urdf_model/model.h"));
   EXPECT_TRUE(may_include("lcmtypes", "lcm/lcm-cpp.hpp"));

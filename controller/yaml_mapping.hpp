@@ -1,6 +1,6 @@
 #pragma once
-#include <dashpot/apps/input_error.hpp>
-#include <dashpot/apps/yaml_document.hpp>
+#include <dashpot/controller/input_error.hpp>
+#include <dashpot/controller/yaml_document.hpp>
 
 #include <Eigen/Core>
 #include <map>
@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace dashpot::apps {
+namespace dashpot::controller {
 
 /// Typed access to the keys of a YAML mapping. Everything wrong is an InputError that names the key
 /// (after `prefix`, such as "[2]." for the third entry of a list) and the line.
@@ -49,4 +49,4 @@ class YamlMapping {
   std::map<std::string_view, const YamlNode*> values_;
 };
 
-}  // namespace dashpot::apps
+}  // namespace dashpot::controller

@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-namespace dashpot::apps {
+namespace dashpot::controller {
 
 /// `text` with control characters replaced, so that it takes one line and is printed whole.
 inline std::string one_line(std::string text) {
@@ -14,8 +14,8 @@ inline std::string one_line(std::string text) {
   return text;
 }
 
-/// Something the user gave is wrong; the program says so in one line and ends with status 2.
-/// what() is "FILE: KEY: reason (line N)", without the parts that are not known.
+/// Something in a file that the user wrote is wrong; said in one line. The program ends with
+/// status 2. what() is "FILE: KEY: reason (line N)", without the parts that are not known.
 class InputError : public std::runtime_error {
  public:
   /// `line` counts from 1; 0 if not known.
@@ -39,4 +39,4 @@ class InputError : public std::runtime_error {
   int line_;
 };
 
-}  // namespace dashpot::apps
+}  // namespace dashpot::controller

@@ -1,5 +1,5 @@
-#include <dashpot/apps/input_error.hpp>
-#include <dashpot/apps/yaml_document.hpp>
+#include <dashpot/controller/input_error.hpp>
+#include <dashpot/controller/yaml_document.hpp>
 
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
@@ -13,7 +13,7 @@
 #include <sstream>
 #include <utility>
 
-namespace dashpot::apps {
+namespace dashpot::controller {
 namespace {
 
 // yaml-cpp keeps unfinished tokens (about 130 bytes each) and recurses into nested values, so both
@@ -157,4 +157,4 @@ YamlNode parse_yaml(const std::string& text) {
   }
 }
 
-}  // namespace dashpot::apps
+}  // namespace dashpot::controller

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-namespace dashpot::apps {
+namespace dashpot::controller {
 
 /// One value of a YAML document, with its place. Aliases are already replaced by what they name.
 struct YamlNode {
@@ -18,7 +18,7 @@ struct YamlNode {
 std::string read_text(const std::string& path);
 
 /// Parses text that holds one YAML (or JSON) document. Throws InputError on anything else, and on
-/// text that is too large or too deeply nested to be what this program reads.
+/// text that is too large or too deeply nested to be what Dashpot reads.
 YamlNode parse_yaml(const std::string& text);
 
-}  // namespace dashpot::apps
+}  // namespace dashpot::controller

@@ -1,4 +1,4 @@
-#include <dashpot/apps/yaml_mapping.hpp>
+#include <dashpot/controller/yaml_mapping.hpp>
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <utility>
 
-namespace dashpot::apps {
+namespace dashpot::controller {
 namespace {
 
 std::string join(std::span<const std::string_view> words) {
@@ -175,4 +175,4 @@ std::optional<std::vector<Eigen::MatrixXd>> YamlMapping::matrices(std::string_vi
   return result;
 }
 
-}  // namespace dashpot::apps
+}  // namespace dashpot::controller
