@@ -120,7 +120,7 @@ InputError SystemEntry::error(const analysis::InvalidSystem& cause) const {
 }
 
 SystemFile read_systems(const std::string& path) {
-  const YamlNode root = controller::parse_yaml(controller::read_text(path));
+  const YamlNode root = controller::parse_yaml(controller::read_file(path));
   if (root.kind == YamlNode::Kind::kNull) throw InputError("", "is empty");
   SystemFile file;
   file.is_list = root.kind == YamlNode::Kind::kSequence;

@@ -47,7 +47,13 @@ class TreeBuilder : public YAML::EventHandler {
   void OnDocumentEnd() override {}
 
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
-    open(YamlNode::Kind::kNull, mark, anchor);
+    YamlNode& node = open(YamlNode::Kind::kNull, mark, anchor);
+    // The mark of a value that is not there is that of what follows: its key's line says more.
+    const YamlNode* parent = open_.size() > 1 ? &open_[open_.size() - 2].node : nullptr;
+    if (parent != nullptr && parent->kind == YamlNode::Kind::kMap &&
+        parent->items.size() % 2 == 1) {
+      node.line = parent->items.back().line;
+    }
     close();
   }
   void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
@@ -122,7 +128,7 @@ class TreeBuilder : public YAML::EventHandler {
 
 }  // namespace
 
-std::string read_text(const std::string& path) {
+std::string read_file(const std::string& path) {
   const auto close = [](std::FILE* file) { return file == stdin ? 0 : std::fclose(file); };
   const std::unique_ptr<std::FILE, decltype(close)> file(
       path == "-" ? stdin : std::fopen(path.c_str(), "rb"), close);

@@ -15,7 +15,7 @@ struct YamlNode {
 };
 
 /// The bytes of the file at `path`, or of standard input if it is "-". Throws InputError.
-std::string read_text(const std::string& path);
+std::string read_file(const std::string& path);
 
 /// Parses text that holds one YAML (or JSON) document. Throws InputError on anything else, and on
 /// text that is too large or too deeply nested to be what Dashpot reads.

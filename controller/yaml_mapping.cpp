@@ -1,10 +1,8 @@
+#include <dashpot/controller/quantity.hpp>
 #include <dashpot/controller/yaml_mapping.hpp>
 
 #include <algorithm>
-#include <array>
-#include <charconv>
-#include <cmath>
-#include <cstdlib>
+#include <stdexcept>
 #include <utility>
 
 namespace dashpot::controller {
@@ -24,6 +22,8 @@ std::string shortened(const std::string& text) {
   return text.size() > kLongest ? text.substr(0, kLongest) + "..." : text;
 }
 
+}  // namespace
+
 std::string describe(const YamlNode& node) {
   switch (node.kind) {
     case YamlNode::Kind::kNull:
@@ -37,28 +37,6 @@ std::string describe(const YamlNode& node) {
   }
   return "";
 }
-
-/// The number that `text` writes; NaN or infinite for those and for what is too large; nothing if
-/// it is not a number.
-std::optional<double> to_number(std::string_view text) {
-  static constexpr std::array<std::string_view, 12> kNotFinite = {
-      ".nan",  ".NaN",  ".NAN",  ".inf",  ".Inf",  ".INF",
-      "-.inf", "-.Inf", "-.INF", "+.inf", "+.Inf", "+.INF"};
-  if (std::find(kNotFinite.begin(), kNotFinite.end(), text) != kNotFinite.end()) {
-    return std::nan("");
-  }
-  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  double value = 0;
-  const auto [end, status] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (status == std::errc::invalid_argument || end != text.data() + text.size()) return {};
-  // Too large or too small: this gives infinity, zero or a denormal number.
-  if (status == std::errc::result_out_of_range) {
-    return std::strtod(std::string(text).c_str(), nullptr);
-  }
-  return value;
-}
-
-}  // namespace
 
 YamlMapping::YamlMapping(const YamlNode& node, std::string prefix,
                          std::span<const std::string_view> known_keys)
@@ -97,6 +75,13 @@ InputError YamlMapping::error(std::string_view key, const std::string& reason, i
   return {prefix_ + std::string(key), reason, line > 0 ? line : this->line(key)};
 }
 
+YamlMapping YamlMapping::mapping(std::string_view key,
+                                 std::span<const std::string_view> known_keys) const {
+  static const YamlNode kEmpty{.kind = YamlNode::Kind::kMap, .text = {}, .items = {}};
+  const YamlNode* node = find(key);
+  return {node == nullptr ? kEmpty : *node, prefix_ + std::string(key) + ".", known_keys};
+}
+
 void YamlMapping::require_list(std::string_view key, const YamlNode& node,
                                const std::string& what) const {
   if (node.kind != YamlNode::Kind::kSequence) {
@@ -106,17 +91,23 @@ void YamlMapping::require_list(std::string_view key, const YamlNode& node,
 
 double YamlMapping::number(std::string_view key, const YamlNode& node,
                            const std::string& place) const {
-  if (node.kind != YamlNode::Kind::kScalar || node.quoted) {
-    throw error(key,
-                place + " is not a number but " + (node.quoted ? "the text " : "") + describe(node),
-                node.line);
+  if (node.quoted) {
+    throw error(key, place + " is not a number but the text " + describe(node), node.line);
   }
-  const std::optional<double> value = to_number(node.text);
-  if (!value) throw error(key, place + " is not a number but " + describe(node), node.line);
-  if (!std::isfinite(*value)) {
-    throw error(key, place + " is not finite: " + describe(node), node.line);
+  return quantity(key, node, "", place);
+}
+
+double YamlMapping::quantity(std::string_view key, const YamlNode& node, const std::string& unit,
+                             const std::string& place) const {
+  const std::string subject = place.empty() ? "" : place + " ";
+  if (node.kind != YamlNode::Kind::kScalar) {
+    throw error(key, subject + "is not a number but " + describe(node), node.line);
   }
-  return *value;
+  try {
+    return parse_quantity(node.text, unit);
+  } catch (const std::invalid_argument& reason) {
+    throw error(key, subject + reason.what(), node.line);
+  }
 }
 
 Eigen::VectorXd YamlMapping::vector(std::string_view key, const YamlNode& node,

@@ -12,6 +12,9 @@
 
 namespace dashpot::controller {
 
+/// "a list", "'12 m'", ...: a value in an error message.
+std::string describe(const YamlNode& node);
+
 /// Typed access to the keys of a YAML mapping. Everything wrong is an InputError that names the key
 /// (after `prefix`, such as "[2]." for the third entry of a list) and the line.
 class YamlMapping {
@@ -22,6 +25,8 @@ class YamlMapping {
               std::span<const std::string_view> known_keys);
 
   bool has(std::string_view key) const { return find(key) != nullptr; }
+  /// Null if the key is not there.
+  const YamlNode* find(std::string_view key) const;
   /// The line of the key's value; 0 if the key is not there.
   int line(std::string_view key) const;
 
@@ -35,8 +40,14 @@ class YamlMapping {
   /// An error about the value of `key`; `line` 0 stands for the value's own line.
   InputError error(std::string_view key, const std::string& reason, int line = 0) const;
 
+  /// The mapping under `key`; an empty one if the key is not there.
+  YamlMapping mapping(std::string_view key, std::span<const std::string_view> known_keys) const;
+  /// The number in `node`, which stands under `key`, in SI: see parse_quantity. In an error,
+  /// `place` says which entry it is ("entry 2"; "" if it is the only one).
+  double quantity(std::string_view key, const YamlNode& node, const std::string& unit,
+                  const std::string& place) const;
+
  private:
-  const YamlNode* find(std::string_view key) const;
   /// Throws unless `node` is a list; `what` says what it should list.
   void require_list(std::string_view key, const YamlNode& node, const std::string& what) const;
   double number(std::string_view key, const YamlNode& node, const std::string& place) const;

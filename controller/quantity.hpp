@@ -1,0 +1,16 @@
+#pragma once
+#include <string>
+#include <string_view>
+
+namespace dashpot::controller {
+
+/// The number that `text` writes, in the SI unit `unit`: "30 deg" wanted in "rad" is 0.5236.
+/// Without a unit of its own, `text` is taken to be in `unit` ("" if there is none). Known are g,
+/// kg, m, cm, mm, s, ms, us, rad, mrad, deg, N, kN, Hz, kHz, rpm, Nm and Nms, each with a power
+/// ("m^2"), multiplied by a space or '*' and divided by '/' ("kg m^2", "N m s/rad", "m/s^2"). The
+/// radian is a unit like any other: N m/rad is not N m, and Hz is not rad/s. Throws
+/// std::invalid_argument with a sentence about `text` if it is not a finite number, or not one in
+/// such a unit.
+double parse_quantity(std::string_view text, const std::string& unit);
+
+}  // namespace dashpot::controller
