@@ -1,6 +1,8 @@
 #pragma once
 // Runs the built program as a user would.
 
+#include <dashpot/tests/support/scratch.hpp>
+
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <spawn.h>
@@ -9,9 +11,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -22,33 +21,6 @@ struct Outcome {
   int status = -1;  ///< exit status; 128 + signal if one ended the program
   std::string out;
   std::string err;
-};
-
-/// A directory of this test alone, removed with it.
-class Scratch {
- public:
-  Scratch() {
-    std::string name = testing::TempDir() + "dashpot.XXXXXX";
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no scratch directory");
-    directory_ = name;
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  ~Scratch() { std::filesystem::remove_all(directory_); }
-
-  std::string path(const std::string& name) const { return directory_ / name; }
-  /// Writes a file, and returns its path.
-  std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(path(name), std::ios::binary) << text;
-    return path(name);
-  }
-  std::string read(const std::string& name) const {
-    std::ifstream stream(path(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-  }
-
- private:
-  std::filesystem::path directory_;
 };
 
 /// Runs `dashpot ARGUMENTS...` with `input` on standard input; its standard output goes to the file

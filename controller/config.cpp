@@ -1,0 +1,232 @@
+#include <dashpot/controller/config.hpp>
+#include <dashpot/controller/config_robot.hpp>
+#include <dashpot/controller/setting_reader.hpp>
+
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+
+namespace dashpot::controller {
+namespace {
+
+Units task_units(const char* linear, const char* angular) {
+  return {linear, linear, linear, angular, angular, angular};
+}
+
+void read_control(const YamlMapping& root, Settings& settings) {
+  static constexpr std::array<std::string_view, 5> kKeys = {"period", "rate", "mode",
+                                                            "geometric_stiffness", "jacobian_rate"};
+  const YamlMapping keys = root.mapping("control", kKeys);
+  if (keys.has("period") && keys.has("rate")) {
+    throw keys.error("rate", "stands beside period, which says the same");
+  }
+  read_number(keys, "period", "s", Sign::kPositive, settings.period);
+  if (keys.has("rate")) {
+    double rate = 0;
+    read_number(keys, "rate", "Hz", Sign::kPositive, rate);
+    settings.period = 1 / rate;
+  }
+  static constexpr std::array<std::pair<std::string_view, Mode>, 2> kModes = {
+      {{"joint", Mode::kJoint}, {"cartesian", Mode::kCartesian}}};
+  read_choice(keys, "mode", kModes, settings.initial.mode);
+  read_switch(keys, "geometric_stiffness", settings.task_terms.geometric_stiffness);
+  read_switch(keys, "jacobian_rate", settings.task_terms.jacobian_rate);
+}
+
+/// Damping that suits a default stiffness suits no other, so the two come together.
+void require_pair(const YamlMapping& keys) {
+  for (const auto& [key, other] : {std::pair("stiffness", "damping"), {"damping", "stiffness"}}) {
+    if (keys.has(key) && !keys.has(other)) {
+      throw keys.error(other, std::string("missing; it goes with ") + key, keys.line(key));
+    }
+  }
+}
+
+void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
+  static constexpr std::array<std::string_view, 6> kWords = {"x", "y", "z", "rx", "ry", "rz"};
+  const YamlNode* node = task.find("directions");
+  if (node == nullptr) return;
+  if (node->kind != YamlNode::Kind::kSequence) {
+    throw task.error("directions", "a list is wanted, not " + describe(*node));
+  }
+  directions = {};
+  for (std::size_t i = 0; i < node->items.size(); ++i) {
+    const std::string place = "entry " + std::to_string(i + 1);
+    bool& held = directions[find_word(task, "directions", node->items[i], kWords, place)];
+    if (held) throw task.error("directions", place + " is given twice", node->items[i].line);
+    held = true;
+  }
+}
+
+void read_gains(const YamlMapping& root, const RobotModel& model, Gains& gains) {
+  static constexpr std::array<std::string_view, 3> kKeys = {"joint", "task", "null_space"};
+  static constexpr std::array<std::string_view, 2> kPair = {"stiffness", "damping"};
+  static constexpr std::array<std::string_view, 4> kTaskKeys = {"stiffness", "damping", "frame",
+                                                                "directions"};
+  const YamlMapping keys = root.mapping("gains", kKeys);
+  const Units stiffness = joint_units(model, "N m/rad", "N/m");
+  const Units damping = joint_units(model, "N m s/rad", "N s/m");
+
+  const YamlMapping joint = keys.mapping("joint", kPair);
+  require_pair(joint);
+  read_matrix(joint, "stiffness", stiffness, gains.joint_stiffness);
+  read_matrix(joint, "damping", damping, gains.joint_damping);
+
+  const YamlMapping task = keys.mapping("task", kTaskKeys);
+  require_pair(task);
+  read_matrix(task, "stiffness", task_units("N/m", "N m/rad"), gains.task_stiffness);
+  read_matrix(task, "damping", task_units("N s/m", "N m s/rad"), gains.task_damping);
+  static constexpr std::array<std::pair<std::string_view, Frame>, 2> kFrames = {
+      {{"base", Frame::kBase}, {"tool", Frame::kTool}}};
+  read_choice(task, "frame", kFrames, gains.frame);
+  read_directions(task, gains.directions);
+
+  const YamlMapping null_space = keys.mapping("null_space", kPair);
+  require_pair(null_space);
+  read_numbers(null_space, "stiffness", stiffness, Sign::kNotNegative, gains.null_stiffness);
+  read_numbers(null_space, "damping", damping, Sign::kNotNegative, gains.null_damping);
+}
+
+void read_limits(const YamlMapping& root, const RobotModel& model, Limits& limits) {
+  static constexpr std::array<std::string_view, 8> kKeys = {
+      "torque",         "torque_rate",     "velocity",  "position_lower",
+      "position_upper", "position_margin", "repulsion", "damping"};
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const YamlMapping keys = root.mapping("limits", kKeys);
+  const Units position = joint_units(model, "rad", "m");
+  read_numbers(keys, "torque", joint_units(model, "N m", "N"), Sign::kPositive, limits.torque);
+  read_numbers(keys, "torque_rate", joint_units(model, "N m/s", "N/s"), Sign::kPositive,
+               limits.torque_rate);
+  read_numbers(keys, "velocity", joint_units(model, "rad/s", "m/s"), Sign::kPositive,
+               limits.velocity);
+  read_numbers_or_none(keys, "position_lower", position, -kInfinity, limits.position_lower);
+  read_numbers_or_none(keys, "position_upper", position, kInfinity, limits.position_upper);
+  read_number(keys, "position_margin", "rad", Sign::kNotNegative, limits.position_margin);
+  read_number(keys, "repulsion", "", Sign::kNotNegative, limits.repulsion);
+  read_numbers(keys, "damping", joint_units(model, "N m s/rad", "N s/m"), Sign::kPositive,
+               limits.damping);
+}
+
+void read_motion(const YamlMapping& root, const RobotModel& model, Motion& motion) {
+  static constexpr std::array<std::string_view, 8> kKeys = {
+      "velocity",         "acceleration",         "linear_velocity", "linear_acceleration",
+      "angular_velocity", "angular_acceleration", "smoothing",       "gain_time"};
+  const YamlMapping keys = root.mapping("motion", kKeys);
+  read_numbers(keys, "velocity", joint_units(model, "rad/s", "m/s"), Sign::kPositive,
+               motion.velocity);
+  read_numbers(keys, "acceleration", joint_units(model, "rad/s^2", "m/s^2"), Sign::kPositive,
+               motion.acceleration);
+  read_number(keys, "linear_velocity", "m/s", Sign::kPositive, motion.linear_velocity);
+  read_number(keys, "linear_acceleration", "m/s^2", Sign::kPositive, motion.linear_acceleration);
+  read_number(keys, "angular_velocity", "rad/s", Sign::kPositive, motion.angular_velocity);
+  read_number(keys, "angular_acceleration", "rad/s^2", Sign::kPositive,
+              motion.angular_acceleration);
+  read_number(keys, "smoothing", "s", Sign::kPositive, motion.smoothing);
+  read_number(keys, "gain_time", "s", Sign::kPositive, motion.gain_time);
+}
+
+void read_feed_forward(const YamlMapping& root, FeedForward& feed_forward) {
+  static constexpr std::array<std::string_view, 5> kKeys = {"gravity", "coriolis", "friction",
+                                                            "acceleration", "wrench"};
+  const YamlMapping keys = root.mapping("feed_forward", kKeys);
+  read_switch(keys, "gravity", feed_forward.gravity);
+  read_switch(keys, "coriolis", feed_forward.coriolis);
+  read_switch(keys, "friction", feed_forward.friction);
+  read_switch(keys, "acceleration", feed_forward.acceleration);
+  read_switch(keys, "wrench", feed_forward.wrench);
+}
+
+void read_watchdog(const YamlMapping& root, Watchdog& watchdog) {
+  static constexpr std::array<std::string_view, 3> kKeys = {"setpoint_hold", "setpoint_damp",
+                                                            "longest_gap"};
+  const YamlMapping keys = root.mapping("watchdog", kKeys);
+  read_number(keys, "setpoint_hold", "s", Sign::kNotNegative, watchdog.setpoint_hold);
+  read_number(keys, "setpoint_damp", "s", Sign::kNotNegative, watchdog.setpoint_damp);
+  read_number(keys, "longest_gap", "s", Sign::kPositive, watchdog.longest_gap);
+}
+
+void read_analysis(const YamlMapping& root, Analysis& analysis) {
+  static constexpr std::array<std::string_view, 3> kKeys = {"where", "every", "soft_frequency"};
+  static constexpr std::array<std::pair<std::string_view, Analysis::Where>, 2> kPlaces = {
+      {{"off", Analysis::Where::kOff}, {"inline", Analysis::Where::kInline}}};
+  const YamlMapping keys = root.mapping("analysis", kKeys);
+  read_choice(keys, "where", kPlaces, analysis.where);
+  read_count(keys, "every", 1, analysis.every);
+  read_number(keys, "soft_frequency", "rad/s", Sign::kNotNegative, analysis.soft_frequency);
+}
+
+/// "gains.joint.stiffness" for the setting "initial.gains.joint_stiffness", and so on.
+std::string key_of_setting(std::string setting) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kNames = {
+      {{"period", "control.period"},
+       {"task_terms.", "control."},
+       {"initial.mode", "control.mode"},
+       {"initial.gains.joint_", "gains.joint."},
+       {"initial.gains.null_", "gains.null_space."},
+       {"initial.gains.task_", "gains.task."}}};
+  for (const auto& [begin, key] : kNames) {
+    if (setting.starts_with(begin)) return setting.replace(0, begin.size(), key);
+  }
+  if (setting.starts_with("initial.gains.")) return "gains.task." + setting.substr(14);
+  return setting;
+}
+
+/// The line of the value under a key such as "limits.torque"; if it is not there, of what is
+/// nearest above it; 0 if nothing is.
+int line_of(const YamlNode& root, const std::string& key) {
+  const YamlNode* node = &root;
+  int line = 0;
+  for (std::size_t begin = 0; begin < key.size();) {
+    const std::size_t end = std::min(key.find('.', begin), key.size());
+    const auto item = std::find_if(
+        node->items.begin(), node->items.end(),
+        [&](const YamlNode& one) { return one.text == key.substr(begin, end - begin); });
+    if (node->kind != YamlNode::Kind::kMap || item == node->items.end()) break;
+    node = &*std::next(item);
+    line = node->line;
+    begin = end + 1;
+  }
+  return line;
+}
+
+/// Throws an InputError about the first setting that the controller would refuse, in either mode.
+void check(const Settings& settings, int n, const YamlNode& document) {
+  Settings other = settings;
+  other.initial.mode = settings.initial.mode == Mode::kJoint ? Mode::kCartesian : Mode::kJoint;
+  try {
+    validate(settings, n);
+    validate(other, n);
+  } catch (const InvalidSettings& error) {
+    const std::string key = key_of_setting(error.key());
+    std::string reason = error.what();
+    if (reason.starts_with(error.key() + ": ")) reason.erase(0, error.key().size() + 2);
+    throw InputError(key, reason, line_of(document, key.substr(0, key.find('['))));
+  }
+}
+
+Config read_config(const YamlNode& document, const std::filesystem::path& directory) {
+  static constexpr std::array<std::string_view, 8> kKeys = {
+      "robot", "control", "gains", "limits", "motion", "feed_forward", "watchdog", "analysis"};
+  const YamlMapping root(document, "", kKeys);
+  const RobotModel model = read_robot(root, directory);
+  Settings settings = default_settings(model);
+  read_control(root, settings);
+  read_gains(root, model, settings.initial.gains);
+  read_limits(root, model, settings.limits);
+  read_motion(root, model, settings.motion);
+  read_feed_forward(root, settings.feed_forward);
+  read_watchdog(root, settings.watchdog);
+  read_analysis(root, settings.analysis);
+  check(settings, model.dof(), document);
+  return {model, settings};
+}
+
+}  // namespace
+
+Config load_config(const std::string& path) try {
+  return read_config(parse_yaml(read_file(path)), std::filesystem::path(path).parent_path());
+} catch (const InputError& error) {
+  throw error.in_file(path);
+}
+
+}  // namespace dashpot::controller

@@ -1,0 +1,22 @@
+#pragma once
+#include <dashpot/controller/robot_model.hpp>
+#include <dashpot/controller/settings.hpp>
+
+#include <string>
+
+namespace dashpot::controller {
+
+/// What a configuration file says. Its keys, with units and defaults, stand in
+/// controller/examples/panda.yaml.
+struct Config {
+  RobotModel model;
+  Settings settings;
+};
+
+/// Reads a YAML file. The path of the URDF in it is relative to the file's directory. Throws
+/// InputError, which names file, key and line, for an unknown, duplicate or missing key, a wrong
+/// unit, size or sign, a number that is not finite, gains that are not symmetric positive
+/// semidefinite, and whatever is wrong with the URDF.
+Config load_config(const std::string& path);
+
+}  // namespace dashpot::controller

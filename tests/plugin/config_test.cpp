@@ -1,0 +1,337 @@
+// What a configuration file says is what the controller gets.
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/tests/plugin/config_file.hpp>
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Geometry>
+#include <limits>
+#include <numbers>
+#include <regex>
+
+namespace dashpot::tests {
+namespace {
+
+using controller::Config;
+using controller::Frame;
+using controller::JointVector;
+using controller::Mode;
+using controller::Settings;
+using Eigen::Matrix3d;
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+const std::string kExample = std::string(DASHPOT_SOURCE_DIR) + "/controller/examples/panda.yaml";
+
+std::string text_of(const std::string& path) {
+  std::ifstream stream(path);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// M(q) of the configured robot.
+MatrixXd mass_matrix(const Config& config, double q = 0.3) {
+  const JointVector position = JointVector::Constant(config.model.dof(), q);
+  const JointVector velocity = JointVector::Zero(config.model.dof());
+  return controller::evaluate(config.model, position, velocity).M;
+}
+
+void expect_same(const Settings& a, const Settings& b) {
+  EXPECT_EQ(a.period, b.period);
+  EXPECT_EQ(a.limits.torque, b.limits.torque);
+  EXPECT_EQ(a.limits.torque_rate, b.limits.torque_rate);
+  EXPECT_EQ(a.limits.velocity, b.limits.velocity);
+  EXPECT_EQ(a.limits.position_lower, b.limits.position_lower);
+  EXPECT_EQ(a.limits.position_upper, b.limits.position_upper);
+  EXPECT_EQ(a.limits.damping, b.limits.damping);
+  EXPECT_EQ(a.motion.velocity, b.motion.velocity);
+  EXPECT_EQ(a.motion.acceleration, b.motion.acceleration);
+  EXPECT_EQ(a.initial.mode, b.initial.mode);
+  EXPECT_EQ(a.initial.gains.joint_stiffness, b.initial.gains.joint_stiffness);
+  EXPECT_EQ(a.initial.gains.joint_damping, b.initial.gains.joint_damping);
+  EXPECT_EQ(a.initial.gains.task_stiffness, b.initial.gains.task_stiffness);
+  EXPECT_EQ(a.initial.gains.task_damping, b.initial.gains.task_damping);
+  EXPECT_EQ(a.initial.gains.directions, b.initial.gains.directions);
+}
+
+TEST(Config, NeedsARobotOnly) {
+  const Config config = load(panda());
+  EXPECT_EQ(config.model.dof(), 7);
+  EXPECT_EQ(config.model.tip(), "panda_hand_tcp");
+  expect_same(config.settings, controller::default_settings(config.model));
+}
+
+TEST(Config, TakesGroupsThatAreEmpty) {
+  const Config config = load(panda() +
+                             "control: {}\ngains: {joint: {}, task: {}, null_space: {}}\n"
+                             "limits: {}\nmotion: {}\nfeed_forward: {}\nwatchdog: {}\n"
+                             "analysis: {}\n");
+  expect_same(config.settings, controller::default_settings(config.model));
+}
+
+TEST(Config, FindsTheUrdfBesideTheFile) {
+  const Scratch scratch;
+  std::filesystem::copy_file(urdf_path("ur5.urdf"), scratch.path("my.urdf"));
+  const std::string file =
+      scratch.write("arm.yaml", "robot: {urdf: my.urdf, base: base_link, tip: ee_link}\n");
+  EXPECT_EQ(controller::load_config(file).model.dof(), 6);
+}
+
+TEST(Config, MayBeJson) {
+  const Config config = load(R"({"robot": {"urdf": ")" + urdf_path("panda.urdf") +
+                             R"(", "base": "panda_link0", "tip": "panda_link8"},
+                               "control": {"period": "2 ms", "mode": "cartesian"}})");
+  EXPECT_EQ(config.settings.period, 0.002);
+  EXPECT_EQ(config.settings.initial.mode, Mode::kCartesian);
+}
+
+TEST(Config, TakesTheRateForThePeriod) {
+  EXPECT_EQ(load(panda() + "control: {rate: 1 kHz}\n").settings.period, 0.001);
+  EXPECT_EQ(load(panda() + "control: {rate: 500}\n").settings.period, 0.002);
+  EXPECT_EQ(load(panda() + "control: {period: 4 ms}\n").settings.period, 0.004);
+}
+
+TEST(Config, FillsJointMatrices) {
+  const Settings one =
+      load(panda() + "gains: {joint: {stiffness: 600, damping: 20 Nms/rad}}\n").settings;
+  EXPECT_EQ(one.initial.gains.joint_stiffness, 600 * MatrixXd::Identity(7, 7));
+  EXPECT_EQ(one.initial.gains.joint_damping, 20 * MatrixXd::Identity(7, 7));
+  const Settings list = load(panda() +
+                             "gains:\n  joint:\n    stiffness: [1, 2, 3 Nm/rad, 4, 5, 6, 7]\n"
+                             "    damping: 1\n")
+                            .settings;
+  const VectorXd diagonal = VectorXd::LinSpaced(7, 1, 7);
+  EXPECT_EQ(list.initial.gains.joint_stiffness, MatrixXd(diagonal.asDiagonal()));
+  const Settings full = load(panda() +
+                             "gains:\n  joint:\n    damping: 0\n    stiffness:\n"
+                             "    - [9, 1, 0, 0, 0, 0, 0]\n    - [1, 8, 0, 0, 0, 0, 0]\n"
+                             "    - [0, 0, 7, 0, 0, 0, 0]\n    - [0, 0, 0, 6, 0, 0, 0]\n"
+                             "    - [0, 0, 0, 0, 5, 0, 0]\n    - [0, 0, 0, 0, 0, 4, 0]\n"
+                             "    - [0, 0, 0, 0, 0, 0, 3]\n")
+                            .settings;
+  MatrixXd expected = VectorXd::LinSpaced(7, 9, 3).asDiagonal();
+  expected(0, 1) = expected(1, 0) = 1;
+  EXPECT_EQ(full.initial.gains.joint_stiffness, expected);
+}
+
+TEST(Config, FillsTheTask) {
+  const auto gains =
+      load(panda() +
+           "gains:\n  task:\n    stiffness: [2000, 600, 2 kN/m, 100, 1 Nm/deg, 100]\n"
+           "    damping:\n    - [9, 1, 0, 0, 0, 0]\n    - [1, 8, 0, 0, 0, 0]\n"
+           "    - [0, 0, 7, 0, 0, 0]\n    - [0, 0, 0, 6, 0, 2]\n"
+           "    - [0, 0, 0, 0, 5, 0]\n    - [0, 0, 0, 2, 0, 4]\n"
+           "    frame: tool\n    directions: [z, rx]\n")
+          .settings.initial.gains;
+  VectorXd stiffness(6);
+  stiffness << 2000, 600, 2000, 100, 1 / kDegree, 100;
+  EXPECT_TRUE(gains.task_stiffness.isApprox(MatrixXd(stiffness.asDiagonal()), 1e-15));
+  EXPECT_EQ(gains.task_damping(0, 1), 1);
+  EXPECT_EQ(gains.task_damping(5, 3), 2);
+  EXPECT_EQ(gains.frame, Frame::kTool);
+  EXPECT_THAT(gains.directions, testing::ElementsAre(false, false, true, true, false, false));
+}
+
+TEST(Config, FillsLimits) {
+  const auto limits = load(panda() +
+                           "limits:\n  position_lower: [-90 deg, none, -1, -2, -1, 0, none]\n"
+                           "  position_upper: none\n  torque: 10\n"
+                           "  torque_rate: [1, 2, 3, 4, 5, 6, 7]\n  velocity: 30 rpm\n")
+                          .settings.limits;
+  EXPECT_DOUBLE_EQ(limits.position_lower[0], -90 * kDegree);
+  EXPECT_EQ(limits.position_lower[1], -kInfinity);
+  EXPECT_EQ(limits.position_lower[6], -kInfinity);
+  EXPECT_EQ(limits.position_upper, VectorXd::Constant(7, kInfinity));
+  EXPECT_EQ(limits.torque, VectorXd::Constant(7, 10));
+  EXPECT_EQ(limits.torque_rate, VectorXd::LinSpaced(7, 1, 7));
+  EXPECT_TRUE(limits.velocity.isApprox(VectorXd::Constant(7, std::numbers::pi), 1e-15));
+}
+
+TEST(Config, FillsTheRest) {
+  const Settings all =
+      load(panda() +
+           "control: {geometric_stiffness: true, jacobian_rate: true}\n"
+           "motion: {velocity: 1, acceleration: 180 deg/s^2, linear_velocity: 100 mm/s,\n"
+           "  linear_acceleration: 1, angular_velocity: 2, angular_acceleration: 3, smoothing: 20 "
+           "ms,\n"
+           "  gain_time: 1}\n"
+           "limits: {position_margin: 5 deg, repulsion: 0.25, damping: 3}\n"
+           "gains: {null_space: {stiffness: 4, damping: [1, 2, 3, 4, 5, 6, 7]}}\n"
+           "feed_forward: {gravity: false, coriolis: false, friction: true, acceleration: false,\n"
+           "  wrench: false}\n"
+           "watchdog: {setpoint_hold: 100 ms, setpoint_damp: 0, longest_gap: 5 ms}\n"
+           "analysis: {where: 'off', every: 7, soft_frequency: 0.2 rad/s}\n")
+          .settings;
+  EXPECT_TRUE(all.task_terms.geometric_stiffness);
+  EXPECT_TRUE(all.task_terms.jacobian_rate);
+  EXPECT_EQ(all.motion.velocity, VectorXd::Ones(7));
+  EXPECT_EQ(all.motion.acceleration, VectorXd::Constant(7, std::numbers::pi));
+  EXPECT_DOUBLE_EQ(all.motion.linear_velocity, 0.1);
+  EXPECT_EQ(all.motion.linear_acceleration, 1);
+  EXPECT_EQ(all.motion.angular_velocity, 2);
+  EXPECT_EQ(all.motion.angular_acceleration, 3);
+  EXPECT_EQ(all.motion.smoothing, 0.02);
+  EXPECT_EQ(all.motion.gain_time, 1);
+  EXPECT_DOUBLE_EQ(all.limits.position_margin, 5 * kDegree);
+  EXPECT_EQ(all.limits.repulsion, 0.25);
+  EXPECT_EQ(all.limits.damping, VectorXd::Constant(7, 3));
+  EXPECT_EQ(all.initial.gains.null_stiffness, VectorXd::Constant(7, 4));
+  EXPECT_EQ(all.initial.gains.null_damping, VectorXd::LinSpaced(7, 1, 7));
+  EXPECT_FALSE(all.feed_forward.gravity || all.feed_forward.coriolis ||
+               all.feed_forward.acceleration || all.feed_forward.wrench);
+  EXPECT_TRUE(all.feed_forward.friction);
+  EXPECT_DOUBLE_EQ(all.watchdog.setpoint_hold, 0.1);
+  EXPECT_EQ(all.watchdog.setpoint_damp, 0);
+  EXPECT_EQ(all.watchdog.longest_gap, 0.005);
+  EXPECT_EQ(all.analysis.where, controller::Analysis::Where::kOff);
+  EXPECT_EQ(all.analysis.every, 7);
+  EXPECT_EQ(all.analysis.soft_frequency, 0.2);
+}
+
+/// The Panda's first line, with more keys.
+std::string panda_with(const std::string& keys) {
+  std::string text = panda();
+  return text.insert(text.size() - 2, ", " + keys);
+}
+
+TEST(Config, GivesTheRobotReflectedInertiaAndFriction) {
+  const Config plain = load(panda());
+  const Config heavy =
+      load(panda_with("reflected_inertia: [1, 2, 3, 4, 5, 6, 7 kg m^2], viscous_friction: 0.5, "
+                      "coulomb_friction: 2 Nm"));
+  const MatrixXd difference = mass_matrix(heavy) - mass_matrix(plain);
+  EXPECT_TRUE(difference.isApprox(MatrixXd(VectorXd::LinSpaced(7, 1, 7).asDiagonal()), 1e-13));
+  EXPECT_EQ(heavy.model.joints()[3].damping, 0.5);
+  EXPECT_EQ(heavy.model.joints()[3].friction, 2);
+  EXPECT_EQ(load(panda_with("reflected_inertia: 0.1")).model.joints()[6].reflected_inertia, 0.1);
+}
+
+TEST(Config, GivesTheRobotAPayloadAToolAndGravity) {
+  const Config plain = load(panda());
+  const Config loaded = load(panda_with(
+      "payload: {mass: 500 g, center: [0, 0, 5 cm], inertia: 0.01}, gravity: [0, 9.81, 0],"
+      "tool: {position: [0.1, 0, 0], rpy: [90 deg, 0, 90 deg]}"));
+  const JointVector q = JointVector::Constant(7, 0.3);
+  const JointVector rest = JointVector::Zero(7);
+  const auto before = controller::evaluate(plain.model, q, rest);
+  const auto after = controller::evaluate(loaded.model, q, rest);
+  EXPECT_TRUE(loaded.model.gravity().isApprox(Vector3d(0, 9.81, 0)));
+  // Kinetic energy of the payload: its centre moves as the tip's link does, at 5 cm from the tip.
+  const Vector3d offset = before.R_BT * Vector3d(0, 0, 0.05);
+  MatrixXd J = before.J.topRows(3);
+  for (int i = 0; i < 7; ++i) J.col(i) += Vector3d(before.J.col(i).tail(3)).cross(offset);
+  const MatrixXd W = before.J.bottomRows(3);
+  const MatrixXd expected = 0.5 * J.transpose() * J + 0.01 * W.transpose() * W;
+  EXPECT_TRUE((after.M - before.M).isApprox(expected, 1e-12));
+  // rpy turns about fixed axes, x first: the tool's x, y, z axes are the tip's y, z, x.
+  Matrix3d turn;
+  turn << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  EXPECT_TRUE(after.R_BT.isApprox(before.R_BT * turn, 1e-14));
+  EXPECT_TRUE(after.p_BT_B.isApprox(before.p_BT_B + before.R_BT * Vector3d(0.1, 0, 0), 1e-14));
+}
+
+TEST(Config, MayDropWhatHangsOffTheChain) {
+  const std::string robot =
+      "robot: {urdf: " + urdf_path("panda.urdf") + ", base: panda_link0, tip: panda_link8";
+  const MatrixXd with = mass_matrix(load(robot + "}\n"));
+  const MatrixXd without = mass_matrix(load(robot + ", include_off_chain: false}\n"));
+  EXPECT_GT((with - without).norm(), 1e-2);
+}
+
+TEST(Config, KnowsPrismaticJoints) {
+  const std::string urdf = R"(<robot name="slide"><link name="rail"/>
+    <link name="cart"><inertial><mass value="2"/>
+      <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+    <joint name="slider" type="prismatic"><parent link="rail"/><child link="cart"/>
+      <limit lower="-1" upper="1" velocity="2" effort="50"/></joint></robot>)";
+  const Scratch scratch;
+  scratch.write("slide.urdf", urdf);
+  const std::string head = "robot: {urdf: slide.urdf, base: rail, tip: cart}\n";
+  const Settings settings =
+      controller::load_config(
+          scratch.write("arm.yaml", head +
+                                        "gains: {joint: {stiffness: 500 N/m, damping: 3 N s/m}}\n"
+                                        "limits: {torque: 40 N, position_upper: 50 cm}\n"))
+          .settings;
+  EXPECT_EQ(settings.initial.gains.joint_stiffness(0, 0), 500);
+  EXPECT_EQ(settings.limits.torque[0], 40);
+  EXPECT_EQ(settings.limits.position_upper[0], 0.5);
+  const std::string wrong = scratch.write("wrong.yaml", head + "limits: {torque: 40 Nm}\n");
+  try {
+    controller::load_config(wrong);
+    FAIL() << "40 Nm for a prismatic joint";
+  } catch (const controller::InputError& error) {
+    EXPECT_EQ(error.what(),
+              wrong + ": limits.torque: has a wrong unit: '40 Nm'; N is wanted (line 2)");
+  }
+}
+
+TEST(ConfigExample, Loads) {
+  const Config config = controller::load_config(kExample);
+  const Settings& settings = config.settings;
+  EXPECT_EQ(config.model.dof(), 7);
+  EXPECT_EQ(settings.initial.mode, Mode::kCartesian);
+  EXPECT_EQ(settings.initial.gains.task_stiffness.diagonal()[1], 600);
+  EXPECT_EQ(settings.limits.torque, config.model.joint_values(&controller::Joint::effort));
+  EXPECT_EQ(settings.limits.velocity, config.model.joint_values(&controller::Joint::velocity));
+}
+
+/// The values of keys whose default is the same for all robots are those defaults.
+TEST(ConfigExample, ShowsDefaults) {
+  const Settings shown = controller::load_config(kExample).settings;
+  const Settings none;
+  EXPECT_EQ(shown.period, none.period);
+  EXPECT_EQ(shown.task_terms.geometric_stiffness, none.task_terms.geometric_stiffness);
+  EXPECT_EQ(shown.task_terms.jacobian_rate, none.task_terms.jacobian_rate);
+  EXPECT_EQ(shown.initial.gains.frame, none.initial.gains.frame);
+  EXPECT_EQ(shown.initial.gains.directions, none.initial.gains.directions);
+  EXPECT_EQ(shown.limits.position_margin, none.limits.position_margin);
+  EXPECT_EQ(shown.limits.repulsion, none.limits.repulsion);
+  EXPECT_EQ(shown.motion.linear_velocity, none.motion.linear_velocity);
+  EXPECT_EQ(shown.motion.linear_acceleration, none.motion.linear_acceleration);
+  EXPECT_EQ(shown.motion.angular_velocity, none.motion.angular_velocity);
+  EXPECT_EQ(shown.motion.angular_acceleration, none.motion.angular_acceleration);
+  EXPECT_EQ(shown.motion.smoothing, none.motion.smoothing);
+  EXPECT_EQ(shown.motion.gain_time, none.motion.gain_time);
+  EXPECT_EQ(shown.feed_forward.gravity, none.feed_forward.gravity);
+  EXPECT_EQ(shown.feed_forward.coriolis, none.feed_forward.coriolis);
+  EXPECT_EQ(shown.feed_forward.friction, none.feed_forward.friction);
+  EXPECT_EQ(shown.feed_forward.acceleration, none.feed_forward.acceleration);
+  EXPECT_EQ(shown.feed_forward.wrench, none.feed_forward.wrench);
+  EXPECT_EQ(shown.watchdog.setpoint_hold, none.watchdog.setpoint_hold);
+  EXPECT_EQ(shown.watchdog.setpoint_damp, none.watchdog.setpoint_damp);
+  EXPECT_EQ(shown.watchdog.longest_gap, none.watchdog.longest_gap);
+  EXPECT_EQ(shown.analysis.where, none.analysis.where);
+  EXPECT_EQ(shown.analysis.every, none.analysis.every);
+  EXPECT_EQ(shown.analysis.soft_frequency, none.analysis.soft_frequency);
+}
+
+/// Every key that the reader says it knows stands in the example.
+TEST(ConfigExample, ShowsEveryKey) {
+  const std::string example = text_of(kExample);
+  const std::string robot = "robot: {urdf: u, base: b, tip: t";
+  for (const std::string& text :
+       {std::string("no: 1\n"), std::string("robot: {no: 1}\n"), robot + ", payload: {no: 1}}\n",
+        robot + ", tool: {no: 1}}\n", panda() + "control: {no: 1}\n", panda() + "gains: {no: 1}\n",
+        panda() + "gains: {joint: {no: 1}}\n", panda() + "gains: {task: {no: 1}}\n",
+        panda() + "gains: {null_space: {no: 1}}\n", panda() + "limits: {no: 1}\n",
+        panda() + "motion: {no: 1}\n", panda() + "feed_forward: {no: 1}\n",
+        panda() + "watchdog: {no: 1}\n", panda() + "analysis: {no: 1}\n"}) {
+    const std::string said = complaint(text);
+    const std::size_t list = said.find("the keys are ");
+    ASSERT_NE(list, std::string::npos) << said;
+    std::istringstream words(said.substr(list + 13, said.rfind(" (line") - list - 13));
+    int count = 0;
+    for (std::string word; words >> word; ++count) {
+      if (word.back() == ',') word.pop_back();
+      EXPECT_TRUE(std::regex_search(example, std::regex("(^|\n| )" + word + ":"))) << word;
+    }
+    EXPECT_GE(count, 2) << said;
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::tests
