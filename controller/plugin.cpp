@@ -1,0 +1,319 @@
+#include <dashpot/controller/config.hpp>
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/latest.hpp>
+#include <dashpot/controller/plugin_data.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <exception>
+#include <memory>
+
+using namespace dashpot::controller;  // NOLINT(google-build-using-namespace): the C functions
+
+namespace {
+
+/// What the other thread wants, as a whole: whichever the real-time thread fetches is complete.
+struct Request {
+  std::uint64_t setpoints = 0;  ///< how many were given so far
+  std::uint64_t gain_changes = 0;
+  bool on_arrival = false;  ///< the set-point's time is that of the tick that takes it up
+  Setpoint setpoint;        ///< with the gains
+};
+
+/// `time` plus `difference`, ns; past the end of the numbers it goes on from their beginning.
+std::int64_t later(std::int64_t time, std::int64_t difference) noexcept {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(time) +
+                                   static_cast<std::uint64_t>(difference));
+}
+
+}  // namespace
+
+/// One controller, and what its two threads hand each other.
+struct dashpot_controller {  // NOLINT(readability-identifier-naming)
+  explicit dashpot_controller(const Config& config)
+      : joints(config.model.joints()),
+        n(config.model.dof()),
+        settings(config.settings),
+        period(static_cast<std::int64_t>(std::min(1e9 * settings.period, 1e18))),
+        controller(config.model, config.settings),
+        setpoint(settings.initial) {
+    request.setpoint = settings.initial;
+  }
+
+  // For every thread:
+  const std::vector<Joint> joints;
+  const int n;
+  const Settings settings;
+  const std::int64_t period;  ///< ns
+
+  Latest<Request> requests;      ///< from the other thread to the real-time thread
+  Latest<Snapshot> snapshots;    ///< back
+  Latest<Vibration> vibrations;  ///< likewise
+
+  // Of the other thread:
+  Request request;
+
+  // Of the real-time thread:
+  Status update(const dashpot_state* given, const dashpot_setpoint* wanted,
+                JointVector& torque) noexcept;
+  void reset(const JointVector& torque) noexcept;
+
+ private:
+  /// Puts what the caller and the other thread want into `setpoint`. False if `wanted` is there,
+  /// but no set-point; the one in force stays then.
+  bool take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept;
+  /// As long as no set-point was given: the springs stay where they are, and are never stale.
+  void stay(std::int64_t now) noexcept;
+
+  Controller controller;
+  Setpoint setpoint;            ///< in force
+  bool has_setpoint = false;    ///< one was given
+  bool located = false;         ///< the controller knows where the robot is
+  std::int64_t time = 0;        ///< of the last state, ns
+  std::uint64_t setpoints = 0;  ///< of the other thread, taken up so far
+  std::uint64_t gain_changes = 0;
+  std::uint64_t published_modes = 0;  ///< the tick they belong to
+};
+
+Status dashpot_controller::update(const dashpot_state* given, const dashpot_setpoint* wanted,
+                                  JointVector& torque) noexcept {
+  const RobotState state = to_state(given, n, later(time, period));
+  time = state.time;
+  const bool accepted = take_up(wanted, time);
+  Status status = controller.update(state, setpoint, torque);
+  located |= status < Status::kStateNotFinite;
+  Snapshot snapshot = controller.snapshot();
+  if (!accepted) status = worse(status, Status::kSetpointRejected);
+  if (accepted && !has_setpoint && status == Status::kSetpointRejected) status = Status::kOk;
+  snapshot.status = status;
+  snapshots.write(snapshot);
+  if (controller.vibration().tick != published_modes) {
+    published_modes = controller.vibration().tick;
+    vibrations.write(controller.vibration());
+  }
+  return status;
+}
+
+void dashpot_controller::reset(const JointVector& torque) noexcept {
+  controller.reset(torque);
+  take_up(nullptr, time);  // the gains in it stay
+  const Gains gains = setpoint.gains;
+  setpoint = settings.initial;
+  setpoint.gains = gains;
+  has_setpoint = located = false;
+  published_modes = 0;
+}
+
+bool dashpot_controller::take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept {
+  const std::int64_t last = setpoint.time;
+  bool accepted = true;
+  if (requests.fetch()) {
+    const Request& latest = requests.value();
+    if (latest.setpoints != setpoints) {
+      setpoint = latest.setpoint;
+      if (latest.on_arrival) setpoint.time = now;
+      has_setpoint = true;
+    } else if (latest.gain_changes != gain_changes) {
+      setpoint.gains = latest.setpoint.gains;
+    }
+    setpoints = latest.setpoints;
+    gain_changes = latest.gain_changes;
+    if (setpoint.time == last)
+      setpoint.time = later(last, 1);  // equal times would say that nothing is new
+  }
+  if (wanted != nullptr) {
+    accepted = to_setpoint(wanted, n, now, setpoint) == DASHPOT_OK;
+    if (accepted && !has_setpoint && setpoint.time == last) setpoint.time = later(last, 1);
+    has_setpoint |= accepted;
+  }
+  if (!has_setpoint) stay(now);
+  return accepted;
+}
+
+void dashpot_controller::stay(std::int64_t now) noexcept {
+  const Snapshot& snapshot = controller.snapshot();
+  setpoint.time = now;
+  setpoint.mode = settings.initial.mode;
+  // Before the robot is located there is nothing to give: a set-point without entries is rejected,
+  // and the controller holds the robot where it finds it.
+  const bool cartesian = setpoint.mode == Mode::kCartesian;
+  setpoint.joint_position.resize(0);
+  setpoint.tip_pose.rotation.setZero();
+  if (located && !cartesian) setpoint.joint_position = snapshot.setpoint_position;
+  if (located && cartesian) setpoint.tip_pose = snapshot.setpoint_tip;
+}
+
+namespace {
+
+// In storage of fixed size: nothing to allocate, nothing to destroy when a thread ends.
+thread_local std::array<char, 1024> last_error{};
+
+/// Sets what dashpot_last_error says; returns `code`.
+std::int32_t finish(std::int32_t code, const char* text) noexcept {
+  std::snprintf(last_error.data(), last_error.size(), "%s", code == DASHPOT_OK ? "" : text);
+  return code;
+}
+
+std::int32_t finish(std::int32_t code) noexcept {
+  return finish(code, dashpot_status_text(code));
+}
+
+std::int32_t finish(const SetpointFault& fault) noexcept {
+  std::array<char, 128> text{};
+  std::snprintf(text.data(), text.size(), "%s %s", fault.key, fault.reason);
+  return finish(DASHPOT_WRONG_VALUE, text.data());
+}
+
+/// Whether there is a struct to write to.
+template <class Struct>
+std::int32_t check_result(const dashpot_controller* controller, const Struct* result) noexcept {
+  if (controller == nullptr || result == nullptr) return DASHPOT_NULL_ARGUMENT;
+  return result->struct_size == sizeof(Struct) ? DASHPOT_OK : DASHPOT_WRONG_STRUCT_SIZE;
+}
+
+}  // namespace
+
+extern "C" {
+
+dashpot_controller* dashpot_create(const char* config_path) {
+  if (config_path == nullptr) {
+    finish(DASHPOT_NULL_ARGUMENT);
+    return nullptr;
+  }
+  try {
+    auto controller = std::make_unique<dashpot_controller>(load_config(config_path));
+    finish(DASHPOT_OK);
+    return controller.release();
+  } catch (const std::exception& error) {
+    finish(DASHPOT_WRONG_VALUE, error.what());
+  } catch (...) {
+    finish(DASHPOT_WRONG_VALUE, "unknown failure");
+  }
+  return nullptr;
+}
+
+void dashpot_destroy(dashpot_controller* controller) {
+  delete controller;
+}
+
+const char* dashpot_last_error(void) {
+  return last_error.data();
+}
+
+uint32_t dashpot_joints(const dashpot_controller* controller) {
+  return controller == nullptr ? 0 : static_cast<std::uint32_t>(controller->n);
+}
+
+const char* dashpot_joint_name(const dashpot_controller* controller, uint32_t joint) {
+  return joint < dashpot_joints(controller) ? controller->joints[joint].name.c_str() : nullptr;
+}
+
+double dashpot_period(const dashpot_controller* controller) {
+  return controller == nullptr ? 0 : controller->settings.period;
+}
+
+int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* state,
+                       const dashpot_setpoint* setpoint, dashpot_output* output) {
+  const std::int32_t problem = check_result(controller, output);
+  if (problem != DASHPOT_OK) return problem;
+  if (output->torque == nullptr) return DASHPOT_NULL_ARGUMENT;
+  if (output->joints != dashpot_joints(controller)) return DASHPOT_WRONG_JOINTS;
+  JointVector torque;
+  const Status status = controller->update(state, setpoint, torque);
+  Eigen::Map<Eigen::VectorXd>(output->torque, controller->n) = torque;
+  return static_cast<std::int32_t>(status);
+}
+
+int32_t dashpot_reset(dashpot_controller* controller, const double* torque) {
+  if (controller == nullptr) return DASHPOT_NULL_ARGUMENT;
+  JointVector acting = JointVector::Zero(controller->n);
+  if (torque != nullptr) acting = Eigen::Map<const Eigen::VectorXd>(torque, controller->n);
+  controller->reset(acting);
+  return DASHPOT_OK;
+}
+
+int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpoint* setpoint) {
+  if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  Request& request = controller->request;
+  Setpoint wanted = request.setpoint;
+  const std::int32_t problem = to_setpoint(setpoint, controller->n, 0, wanted);
+  if (problem != DASHPOT_OK) return finish(problem);
+  const SetpointFault fault = check_setpoint(wanted, controller->settings.limits, true);
+  if (fault) return finish(fault);
+  request.setpoint = wanted;
+  request.on_arrival = setpoint->time == DASHPOT_ON_ARRIVAL;
+  ++request.setpoints;
+  controller->requests.write(request);
+  return finish(DASHPOT_OK);
+}
+
+int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains) {
+  if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  Request& request = controller->request;
+  Gains wanted = request.setpoint.gains;
+  const std::int32_t problem = to_gains(gains, controller->n, wanted);
+  if (problem != DASHPOT_OK) return finish(problem);
+  for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+    const SetpointFault fault = check_gains(wanted, mode, controller->n);
+    if (fault) return finish(fault);
+  }
+  request.setpoint.gains = wanted;
+  ++request.gain_changes;
+  controller->requests.write(request);
+  return finish(DASHPOT_OK);
+}
+
+int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* snapshot) {
+  const std::int32_t problem = check_result(controller, snapshot);
+  if (problem != DASHPOT_OK) return finish(problem);
+  controller->snapshots.fetch();
+  if (controller->snapshots.value().tick == 0) return finish(DASHPOT_NOTHING_YET);
+  to_c(controller->snapshots.value(), *snapshot);
+  return finish(DASHPOT_OK);
+}
+
+int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes) {
+  const std::int32_t problem = check_result(controller, modes);
+  if (problem != DASHPOT_OK) return finish(problem);
+  controller->vibrations.fetch();
+  if (controller->vibrations.value().tick == 0) return finish(DASHPOT_NOTHING_YET);
+  to_c(controller->vibrations.value(), *modes);
+  return finish(DASHPOT_OK);
+}
+
+const char* dashpot_status_text(int32_t status) {
+  switch (status) {
+    case DASHPOT_NULL_ARGUMENT:
+      return "a pointer that has to be there is NULL";
+    case DASHPOT_WRONG_STRUCT_SIZE:
+      return "struct_size is not that of this version of plugin.h";
+    case DASHPOT_WRONG_JOINTS:
+      return "joints is not the robot's number of joints";
+    case DASHPOT_WRONG_VALUE:
+      return "a value is not possible";
+    case DASHPOT_NOTHING_YET:
+      return "nothing to read so far";
+    default:
+      break;
+  }
+  if (status < DASHPOT_OK || status > DASHPOT_NOT_FINITE) return "unknown status";
+  return to_text(static_cast<Status>(status));
+}
+
+const char* dashpot_kind_text(int32_t kind) {
+  if (kind < DASHPOT_UNDERDAMPED || kind > DASHPOT_SOFT) return "unknown kind";
+  return to_text(static_cast<dashpot::analysis::ModeKind>(kind));
+}
+
+const dashpot_plugin* dashpot_plugin_interface(uint32_t version) {
+  static const dashpot_plugin kInterface = {
+      sizeof(dashpot_plugin), DASHPOT_PLUGIN_VERSION, dashpot_create,       dashpot_destroy,
+      dashpot_last_error,     dashpot_joints,         dashpot_joint_name,   dashpot_period,
+      dashpot_update,         dashpot_reset,          dashpot_set_setpoint, dashpot_set_gains,
+      dashpot_read_snapshot,  dashpot_read_modes,     dashpot_status_text,  dashpot_kind_text};
+  return version == DASHPOT_PLUGIN_VERSION ? &kInterface : nullptr;
+}
+
+}  // extern "C"

@@ -1,0 +1,255 @@
+#pragma once
+/* The Dashpot controller for hosts in any language: plain C99, arrays and numbers.
+ *
+ *   dashpot_controller* c = dashpot_create("panda.yaml");
+ *   if (!c) { puts(dashpot_last_error()); return 1; }
+ *   ... every millisecond:
+ *   dashpot_state state = {sizeof state, n, time_ns, q, qd, NULL};
+ *   dashpot_output output = {sizeof output, n, torque};
+ *   int32_t status = dashpot_update(c, &state, NULL, &output);   (holds still)
+ *
+ * Link with libdashpot_plugin.so, or load it and ask it for dashpot_plugin_interface.
+ *
+ * Units are SI: m, rad, kg, s, N, N m; time in nanoseconds. For a prismatic joint read m for rad
+ * and N for N m. n is the number of joints, from the base to the tip. Matrices are given row by
+ * row. Frames: B is the base link, T the tip or the tool's frame. Twists and wrenches have the
+ * linear part first, are taken at T's origin, in B's axes.
+ *
+ * Threads. One thread, the real-time one, calls dashpot_update and dashpot_reset. One other thread,
+ * any but always the same, calls dashpot_set_setpoint, dashpot_set_gains, dashpot_read_snapshot and
+ * dashpot_read_modes; none of these ever waits for another thread or makes one wait. The remaining
+ * functions may be called by any thread; dashpot_destroy only once no other call is under way.
+ * Controllers are independent of each other.
+ *
+ * Every struct begins with struct_size, which the caller sets to sizeof of that struct; a function
+ * refuses any other value. No exception leaves the library. */
+
+/* NOLINTBEGIN(readability-identifier-naming,modernize-use-using,modernize-deprecated-headers) */
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Grows whenever a function or struct changes; a library serves the versions it knows. */
+#define DASHPOT_PLUGIN_VERSION 1u
+#define DASHPOT_MAX_JOINTS 16
+
+typedef struct dashpot_controller dashpot_controller;
+
+/* What functions return. Zero and above: the status of a tick, with the torque that it comes with.
+ *   hold: the springs stop where they are, whatever the set-point says
+ *   damp: no springs: joint damping, and gravity where the controller compensates it
+ *   ramp: the last good torque goes to zero within 0.1 s
+ * Once the cause is over the controller goes on, after more than a short interruption with springs
+ * where the robot is. Below zero: a call that was refused and did nothing. */
+enum {
+  DASHPOT_OK = 0,
+  DASHPOT_TORQUE_LIMITED = 1,    /* a torque or torque-rate limit is at work */
+  DASHPOT_NEAR_JOINT_LIMIT = 2,  /* a joint is pushed back from a position limit that is near */
+  DASHPOT_SETPOINT_REJECTED = 3, /* the set-point is not possible; the last good one stays */
+  DASHPOT_SETPOINT_STALE = 4,    /* the set-point is old: hold */
+  DASHPOT_SETPOINT_LOST = 5,     /* the set-point is very old: damp */
+  DASHPOT_TIME_GAP = 6,          /* the last state is too long ago: damp */
+  DASHPOT_VELOCITY_LIMIT = 7,    /* a joint is too fast: damp */
+  DASHPOT_POSITION_LIMIT = 8,    /* a joint is outside its position limits: damp, and push back */
+  DASHPOT_STATE_NOT_FINITE = 9,  /* NaN or infinity in the state: ramp */
+  DASHPOT_STATE_WRONG_SIZE = 10, /* the state is missing or has not n joints: ramp */
+  DASHPOT_STATE_JUMP = 11,       /* farther from the last state than the robot can move: ramp */
+  DASHPOT_TIME_BACKWARD = 12,    /* the state's time is at or before the last one: ramp */
+  DASHPOT_NOT_FINITE = 13,       /* the torque would not be finite: ramp */
+
+  DASHPOT_NULL_ARGUMENT = -1,     /* a pointer that has to be there is NULL */
+  DASHPOT_WRONG_STRUCT_SIZE = -2, /* struct_size is not that of this version */
+  DASHPOT_WRONG_JOINTS = -3,      /* joints is not n */
+  DASHPOT_WRONG_VALUE = -4,       /* not finite, not semidefinite, out of reach, ... */
+  DASHPOT_NOTHING_YET = -5        /* nothing to read so far */
+};
+
+enum { DASHPOT_MODE_JOINT = 0, DASHPOT_MODE_CARTESIAN = 1 };
+enum { DASHPOT_FRAME_BASE = 0, DASHPOT_FRAME_TOOL = 1 };
+
+enum {
+  DASHPOT_UNDERDAMPED = 0,
+  DASHPOT_CRITICAL = 1,
+  DASHPOT_OVERDAMPED = 2,
+  DASHPOT_UNDAMPED = 3,
+  DASHPOT_UNSTABLE = 4,
+  DASHPOT_SOFT = 5
+};
+
+/* As dashpot_setpoint.time: given at the tick that takes it up. */
+#define DASHPOT_ON_ARRIVAL INT64_MIN
+
+/* What the robot reports at the beginning of a tick. */
+typedef struct dashpot_state {
+  uint32_t struct_size;
+  uint32_t joints;               /* n */
+  int64_t time;                  /* ns, of any clock that does not run backward */
+  const double* position;        /* n, rad */
+  const double* velocity;        /* n, rad/s */
+  const double* external_wrench; /* 6, that the world exerts on the tip, N and N m; NULL: zero */
+} dashpot_state;
+
+/* Where to go; the controller gets there smoothly. */
+typedef struct dashpot_setpoint {
+  uint32_t struct_size;
+  uint32_t joints;              /* n */
+  int64_t time;                 /* ns, when it was given, on the clock of dashpot_state, or
+                                   DASHPOT_ON_ARRIVAL; dashpot_update takes a set-point with the
+                                   time of the last one for the same */
+  int32_t mode;                 /* DASHPOT_MODE_JOINT or DASHPOT_MODE_CARTESIAN */
+  const double* joint_position; /* n, rad: the goal of the joint mode, and there wanted; otherwise
+                                   the rest posture, or NULL: the one there is */
+  const double* tip_position;   /* 3, of T in B, m: wanted in the Cartesian mode, else not used */
+  const double* tip_rotation;   /* 3 x 3, turns T's axes into B's; likewise */
+  const double* wrench;         /* 6, that the tip is to exert besides, N and N m; NULL: zero */
+} dashpot_setpoint;
+
+/* Springs and dampers. Matrices are symmetric positive semidefinite. What is NULL stays. */
+typedef struct dashpot_gains {
+  uint32_t struct_size;
+  uint32_t joints;               /* n */
+  const double* joint_stiffness; /* n x n, N m/rad */
+  const double* joint_damping;   /* n x n, N m s/rad */
+  const double* task_stiffness;  /* 6 x 6, N/m, N/rad and N m/rad */
+  const double* task_damping;    /* 6 x 6, N s/m, N s/rad and N m s/rad */
+  const double* null_stiffness;  /* n, not negative, N m/rad, toward the rest posture */
+  const double* null_damping;    /* n, not negative, N m s/rad */
+  const int32_t* frame;          /* in whose axes the 6 x 6 are: DASHPOT_FRAME_BASE or _TOOL */
+  const uint8_t* directions;     /* 6, whether the task holds this direction of `frame` */
+} dashpot_gains;
+
+/* What the robot's joints are to exert. */
+typedef struct dashpot_output {
+  uint32_t struct_size;
+  uint32_t joints; /* n */
+  double* torque;  /* n, written, N m */
+} dashpot_output;
+
+/* One tick, seen from outside. Entries from n on are zero. */
+typedef struct dashpot_snapshot {
+  uint32_t struct_size;
+  uint32_t joints;   /* n */
+  int64_t time;      /* of the state, ns */
+  uint64_t tick;     /* counts from 1 */
+  uint64_t restarts; /* how often the springs started afresh, the first time included */
+  int32_t status;    /* DASHPOT_OK, ... */
+  int32_t mode;      /* DASHPOT_MODE_JOINT or DASHPOT_MODE_CARTESIAN */
+  double position[DASHPOT_MAX_JOINTS];            /* rad */
+  double velocity[DASHPOT_MAX_JOINTS];            /* rad/s */
+  double torque[DASHPOT_MAX_JOINTS];              /* N m */
+  double tip_position[3];                         /* of T in B, m */
+  double tip_rotation[9];                         /* 3 x 3, turns T's axes into B's */
+  double goal_joint_position[DASHPOT_MAX_JOINTS]; /* where the springs are fixed just now, rad */
+  double goal_tip_position[3];                    /* m */
+  double goal_tip_rotation[9];                    /* 3 x 3 */
+} dashpot_snapshot;
+
+/* A vibration mode; see the README of Dashpot for what the numbers mean. A bound says how far the
+ * number can be wrong; it is infinite if none could be proved. */
+typedef struct dashpot_mode {
+  double natural_frequency;              /* rad/s; NaN if there is none */
+  double natural_frequency_bound;        /* rad/s */
+  double damping_ratio;                  /* above 1 if overdamped */
+  double damping_ratio_bound;            /* */
+  double damped_frequency;               /* rad/s */
+  double eigenvalues[2][2];              /* real and imaginary part, 1/s */
+  double eigenvalue_bound;               /* 1/s */
+  double backward_error;                 /* relative change of the matrices that it is exact for */
+  int32_t kind;                          /* DASHPOT_UNDERDAMPED, ... */
+  int32_t reserved;                      /* zero */
+  double shape_real[DASHPOT_MAX_JOINTS]; /* how far each joint moves, u^H M u = 1 */
+  double shape_imag[DASHPOT_MAX_JOINTS];
+} dashpot_mode;
+
+/* The modes at one tick, by falling natural frequency. */
+typedef struct dashpot_modes {
+  uint32_t struct_size;
+  uint32_t joints;                     /* n */
+  int64_t time;                        /* of the state that they belong to, ns */
+  uint64_t tick;                       /* likewise */
+  double position[DASHPOT_MAX_JOINTS]; /* likewise, rad */
+  int32_t status;                      /* 0: all numbers have a proved bound */
+  uint32_t zero_modes;                 /* motions that no spring resists */
+  uint32_t count;                      /* of the modes */
+  uint32_t reserved;                   /* zero */
+  dashpot_mode modes[DASHPOT_MAX_JOINTS];
+} dashpot_modes;
+
+/* Reads a YAML file (see controller/examples/panda.yaml) and the URDF that it names. NULL on
+ * failure: dashpot_last_error says why, in one line with file, key and line. */
+dashpot_controller* dashpot_create(const char* config_path);
+
+/* NULL is fine. */
+void dashpot_destroy(dashpot_controller* controller);
+
+/* What the last call of dashpot_create, dashpot_set_setpoint, dashpot_set_gains,
+ * dashpot_read_snapshot or dashpot_read_modes in this thread had to complain of, in one line; "" if
+ * nothing. Valid until the next such call in this thread. */
+const char* dashpot_last_error(void);
+
+/* n; 0 if `controller` is NULL */
+uint32_t dashpot_joints(const dashpot_controller* controller);
+/* Of joint 0 to n - 1, from the base to the tip, as in the URDF; NULL if there is no such joint.
+ * Valid until dashpot_destroy. */
+const char* dashpot_joint_name(const dashpot_controller* controller, uint32_t joint);
+/* Of the loop, s; 0 if `controller` is NULL */
+double dashpot_period(const dashpot_controller* controller);
+
+/* One tick, on the real-time thread: takes bounded time, allocates nothing, waits for nothing.
+ * `setpoint` NULL: the latest of dashpot_set_setpoint; the last one if there is no new one; until
+ * there is one at all, the robot is held where it is. Use one of the two ways, not both.
+ * Returns a status, or a negative code: then `output` is not written, and the host has to bring
+ * the robot to a stop. A state that is NULL or wrong is no refusal: it gives a torque and a
+ * status. A set-point that is wrong is rejected, and the last one stays. */
+int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* state,
+                       const dashpot_setpoint* setpoint, dashpot_output* output);
+
+/* On the real-time thread: forgets history and set-point, but not the gains; the next tick holds
+ * the robot where it is, as the first one did. The torque-rate limit counts from `torque` (n, N m),
+ * which the robot applies now; NULL: zero. */
+int32_t dashpot_reset(dashpot_controller* controller, const double* torque);
+
+/* On the other thread. The next tick takes it up; of several, the latest. */
+int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpoint* setpoint);
+int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains);
+
+/* On the other thread: the latest finished tick, and the latest modes. The caller sets
+ * struct_size, the rest is written. */
+int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* snapshot);
+int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes);
+
+/* A short English text for what a function returned ("torque limited"), and for the kind of a mode
+ * ("underdamped"). Never NULL. */
+const char* dashpot_status_text(int32_t status);
+const char* dashpot_kind_text(int32_t kind);
+
+/* All of the above, for hosts that load the library at run time. */
+typedef struct dashpot_plugin {
+  uint32_t struct_size;
+  uint32_t version; /* DASHPOT_PLUGIN_VERSION */
+  dashpot_controller* (*create)(const char*);
+  void (*destroy)(dashpot_controller*);
+  const char* (*last_error)(void);
+  uint32_t (*joints)(const dashpot_controller*);
+  const char* (*joint_name)(const dashpot_controller*, uint32_t);
+  double (*period)(const dashpot_controller*);
+  int32_t (*update)(dashpot_controller*, const dashpot_state*, const dashpot_setpoint*,
+                    dashpot_output*);
+  int32_t (*reset)(dashpot_controller*, const double*);
+  int32_t (*set_setpoint)(dashpot_controller*, const dashpot_setpoint*);
+  int32_t (*set_gains)(dashpot_controller*, const dashpot_gains*);
+  int32_t (*read_snapshot)(dashpot_controller*, dashpot_snapshot*);
+  int32_t (*read_modes)(dashpot_controller*, dashpot_modes*);
+  const char* (*status_text)(int32_t);
+  const char* (*kind_text)(int32_t);
+} dashpot_plugin;
+
+/* NULL if the library does not know this version. The struct lives as long as the library. */
+const dashpot_plugin* dashpot_plugin_interface(uint32_t version);
+
+#ifdef __cplusplus
+}
+#endif
+/* NOLINTEND(readability-identifier-naming,modernize-use-using,modernize-deprecated-headers) */

@@ -1,0 +1,597 @@
+// The C interface, driven as a host does that loads the library at run time.
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/tests/plugin/loaded_plugin.hpp>
+#include <dashpot/tests/support/count_allocations.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Cholesky>
+#include <array>
+#include <atomic>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <set>
+#include <sstream>
+#include <thread>
+
+namespace dashpot::tests {
+namespace {
+
+using controller::Config;
+using controller::Controller;
+using controller::JointVector;
+using Eigen::Map;
+using Eigen::VectorXd;
+
+const std::string kCartesian = "control: {mode: cartesian}\n";
+
+JointVector joint_vector(const std::vector<double>& values) {
+  return Map<const VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+/// Moves the arm of `model` for one period under the host's torque.
+void simulate(const controller::RobotModel& model, Host& host, double period = 0.001) {
+  const JointVector q = joint_vector(host.position);
+  const JointVector qd = joint_vector(host.velocity);
+  const auto robot = controller::evaluate(model, q, qd);
+  const VectorXd force = joint_vector(host.torque) - robot.coriolis - robot.gravity;
+  const Eigen::MatrixXd M = robot.M;
+  const VectorXd velocity = qd + period * M.llt().solve(force);
+  Map<VectorXd>(host.velocity.data(), velocity.size()) = velocity;
+  Map<VectorXd>(host.position.data(), velocity.size()) = q + period * velocity;
+}
+
+/// A Panda whose joints bear their gravity already.
+Host held_panda(const std::string& settings = "") {
+  Host host(create(panda() + settings), panda_posture());
+  const auto model = load(panda() + settings).model;
+  const JointVector q = joint_vector(panda_posture());
+  const VectorXd gravity = controller::evaluate(model, q, JointVector::Zero(7)).gravity;
+  EXPECT_EQ(plugin().reset(host.controller.get(), gravity.data()), DASHPOT_OK);
+  return host;
+}
+
+TEST(Plugin, ShowsItsFunctionsAndNothingElse) {
+  const std::string command = std::string("nm -D --defined-only '") + DASHPOT_PLUGIN + "'";
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(popen(command.c_str(), "r"), pclose);
+  ASSERT_TRUE(pipe);
+  std::set<std::string> names;
+  std::array<char, 512> line{};
+  while (std::fgets(line.data(), line.size(), pipe.get()) != nullptr) {
+    std::istringstream words(line.data());
+    std::string address;
+    std::string type;
+    std::string name;
+    words >> address >> type >> name;
+    names.insert(name);
+  }
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre(
+                         "dashpot_create", "dashpot_destroy", "dashpot_last_error",
+                         "dashpot_joints", "dashpot_joint_name", "dashpot_period", "dashpot_update",
+                         "dashpot_reset", "dashpot_set_setpoint", "dashpot_set_gains",
+                         "dashpot_read_snapshot", "dashpot_read_modes", "dashpot_status_text",
+                         "dashpot_kind_text", "dashpot_plugin_interface"));
+}
+
+TEST(Plugin, KnowsItsVersionOnly) {
+  const PluginInterface interface = plugin_interface();
+  EXPECT_EQ(interface(0), nullptr);
+  EXPECT_EQ(interface(DASHPOT_PLUGIN_VERSION + 1), nullptr);
+  const dashpot_plugin* plugin = interface(DASHPOT_PLUGIN_VERSION);
+  ASSERT_NE(plugin, nullptr);
+  EXPECT_EQ(plugin->version, DASHPOT_PLUGIN_VERSION);
+  EXPECT_EQ(plugin->struct_size, sizeof(dashpot_plugin));
+}
+
+TEST(Plugin, SaysWhyItCannotBeCreated) {
+  EXPECT_EQ(plugin().create(nullptr), nullptr);
+  EXPECT_STREQ(plugin().last_error(), "a pointer that has to be there is NULL");
+  EXPECT_EQ(plugin().create("no-such-file.yaml"), nullptr);
+  EXPECT_STREQ(plugin().last_error(),
+               "no-such-file.yaml: cannot be opened: No such file or directory");
+  EXPECT_EQ(create(panda() + "limits:\n  torque: 80 lbf\n"), nullptr);
+  EXPECT_THAT(plugin().last_error(),
+              ::testing::EndsWith("arm.yaml: limits.torque: is not a number but '80 lbf': unknown "
+                                  "unit 'lbf' (line 3)"));
+  std::thread([] { EXPECT_STREQ(plugin().last_error(), ""); }).join();
+  EXPECT_NE(create(panda()), nullptr);
+  EXPECT_STREQ(plugin().last_error(), "");
+}
+
+TEST(Plugin, TellsWhatItControls) {
+  const Handle arm = create(panda() + "control: {period: 2 ms}\n");
+  EXPECT_EQ(plugin().joints(arm.get()), 7u);
+  EXPECT_STREQ(plugin().joint_name(arm.get(), 0), "panda_joint1");
+  EXPECT_STREQ(plugin().joint_name(arm.get(), 6), "panda_joint7");
+  EXPECT_EQ(plugin().joint_name(arm.get(), 7), nullptr);
+  EXPECT_EQ(plugin().period(arm.get()), 0.002);
+}
+
+TEST(Plugin, HasATextForEverythingItReturns) {
+  std::set<std::string> texts;
+  for (std::int32_t code = DASHPOT_NOTHING_YET; code <= DASHPOT_NOT_FINITE; ++code) {
+    texts.insert(plugin().status_text(code));
+  }
+  EXPECT_EQ(texts.size(), 19u);
+  EXPECT_FALSE(texts.count("unknown status"));
+  for (const std::int32_t code : {DASHPOT_NOTHING_YET - 1, DASHPOT_NOT_FINITE + 1, 1000, -1000}) {
+    EXPECT_STREQ(plugin().status_text(code), "unknown status");
+  }
+  EXPECT_STREQ(plugin().status_text(DASHPOT_OK), "ok");
+  EXPECT_STREQ(plugin().kind_text(DASHPOT_UNDERDAMPED), "underdamped");
+  EXPECT_STREQ(plugin().kind_text(DASHPOT_SOFT), "soft");
+  EXPECT_STREQ(plugin().kind_text(DASHPOT_SOFT + 1), "unknown kind");
+  EXPECT_STREQ(plugin().kind_text(-1), "unknown kind");
+}
+
+/// The same torque, status, snapshot and modes as the C++ class on the same random ticks.
+TEST(Plugin, IsTheController) {
+  testing::Random random(711);
+  const std::string text = panda() + "analysis: {every: 3}\n";
+  const Config config = load(text);
+  Controller controller(config.model, config.settings);
+  Host host(create(text), panda_posture());
+  controller::Setpoint setpoint = config.settings.initial;
+  std::vector<double> goal = panda_posture();
+  for (int tick = 0; tick < 300; ++tick) {
+    for (std::size_t i = 0; i < 7; ++i) {
+      host.position[i] = panda_posture()[i] + 1e-3 * random.uniform(-1, 1);
+      host.velocity[i] = 0.1 * random.uniform(-1, 1);
+      goal[i] = panda_posture()[i] + 0.2 * random.uniform(-1, 1);
+    }
+    const dashpot_setpoint wanted = host.joint_setpoint(goal);
+    const std::int32_t status = host.tick(&wanted);
+    controller::RobotState state;
+    state.time = host.time;
+    state.position = joint_vector(host.position);
+    state.velocity = joint_vector(host.velocity);
+    setpoint.time = state.time;
+    setpoint.joint_position = joint_vector(goal);
+    JointVector torque;
+    ASSERT_EQ(static_cast<int>(controller.update(state, setpoint, torque)), status);
+    ASSERT_EQ(joint_vector(host.torque), torque) << "tick " << tick;
+  }
+  const dashpot_snapshot snapshot = host.snapshot();
+  EXPECT_EQ(snapshot.tick, 300u);
+  EXPECT_EQ(snapshot.time, host.time);
+  EXPECT_EQ(snapshot.joints, 7u);
+  EXPECT_EQ(snapshot.restarts, 1u);
+  EXPECT_EQ(Map<const VectorXd>(snapshot.torque, 7), joint_vector(host.torque));
+  EXPECT_EQ(Map<const VectorXd>(snapshot.position, 7), joint_vector(host.position));
+  EXPECT_EQ(Map<const Eigen::Vector3d>(snapshot.tip_position), controller.snapshot().tip.position);
+  EXPECT_EQ((Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(snapshot.tip_rotation)),
+            controller.snapshot().tip.rotation);
+  EXPECT_EQ(Map<const VectorXd>(snapshot.goal_joint_position, 7),
+            controller.snapshot().setpoint_position);
+
+  const dashpot_modes modes = host.modes();
+  const controller::Vibration& vibration = controller.vibration();
+  EXPECT_EQ(modes.tick, vibration.tick);
+  EXPECT_EQ(modes.tick, 298u);
+  ASSERT_EQ(modes.count, 7u);
+  for (std::size_t i = 0; i < 7; ++i) {
+    EXPECT_EQ(modes.modes[i].natural_frequency, vibration.modes[i].natural_frequency);
+    EXPECT_EQ(modes.modes[i].damping_ratio, vibration.modes[i].damping_ratio);
+    EXPECT_EQ(modes.modes[i].eigenvalue_bound, vibration.modes[i].error_bound);
+    EXPECT_EQ(modes.modes[i].kind, static_cast<int>(vibration.modes[i].kind));
+    EXPECT_EQ(modes.modes[i].shape_imag[3], vibration.modes[i].shape[3].imag());
+    EXPECT_LE(modes.modes[i].eigenvalue_bound, 1e-6);
+  }
+}
+
+class PluginHolds : public ::testing::TestWithParam<const char*> {};
+
+/// Without any set-point the arm stays where it was found, far beyond the watchdog's times.
+TEST_P(PluginHolds, StillWithoutASetpoint) {
+  const Config config = load(panda() + GetParam());
+  Host host = held_panda(GetParam());
+  for (int tick = 0; tick < 3000; ++tick) {
+    ASSERT_EQ(host.tick(), DASHPOT_OK) << "tick " << tick;
+    simulate(config.model, host);
+  }
+  for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(host.position[i], panda_posture()[i], 2e-2);
+  EXPECT_LT(joint_vector(host.velocity).norm(), 1e-2);
+}
+
+std::string name_of(const ::testing::TestParamInfo<const char*>& info) {
+  return info.index == 0 ? "Joint" : "Cartesian";
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, PluginHolds,
+                         ::testing::Values("control: {mode: joint}\n",
+                                           "control: {mode: cartesian}\n"),
+                         name_of);
+
+TEST(Plugin, GoesToASetpointFromTheOtherThreadsSide) {
+  const Config config = load(panda());
+  Host host = held_panda();
+  std::vector<double> goal = panda_posture();
+  goal[0] += 0.3;
+  goal[3] -= 0.2;
+  for (int tick = 0; tick < 4000; ++tick) {
+    if (tick % 100 == 0) {
+      const dashpot_setpoint setpoint = host.joint_setpoint(goal);
+      ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_OK);
+    }
+    ASSERT_EQ(host.tick(), DASHPOT_OK) << "tick " << tick;
+    simulate(config.model, host);
+  }
+  for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(host.position[i], goal[i], 2e-2);
+  EXPECT_EQ(host.snapshot().goal_joint_position[0], goal[0]);
+}
+
+TEST(Plugin, GoesToAPose) {
+  const Config config = load(panda() + kCartesian);
+  Host host = held_panda(kCartesian);
+  ASSERT_EQ(host.tick(), DASHPOT_OK);
+  const dashpot_snapshot start = host.snapshot();
+  const std::array<double, 3> goal = {start.tip_position[0] + 0.05, start.tip_position[1],
+                                      start.tip_position[2] - 0.1};
+  for (int tick = 0; tick < 4000; ++tick) {
+    const dashpot_setpoint setpoint = {sizeof(dashpot_setpoint), 7,       host.time,
+                                       DASHPOT_MODE_CARTESIAN,   nullptr, goal.data(),
+                                       start.tip_rotation,       nullptr};
+    ASSERT_EQ(host.tick(&setpoint), DASHPOT_OK) << "tick " << tick;
+    simulate(config.model, host);
+  }
+  const dashpot_snapshot end = host.snapshot();
+  EXPECT_EQ(end.mode, DASHPOT_MODE_CARTESIAN);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(end.tip_position[i], goal[i], 5e-3);
+  for (std::size_t i = 0; i < 9; ++i) EXPECT_NEAR(end.tip_rotation[i], start.tip_rotation[i], 2e-2);
+}
+
+TEST(Plugin, WatchesTheAgeOfSetpoints) {
+  Host host = held_panda();
+  const dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+  ASSERT_EQ(host.tick(&setpoint), DASHPOT_OK);
+  int stale = 0;
+  int lost = 0;
+  for (int tick = 1; tick <= 3000; ++tick) {
+    const std::int32_t status = host.tick();
+    if (stale == 0 && status == DASHPOT_SETPOINT_STALE) stale = tick;
+    if (lost == 0 && status == DASHPOT_SETPOINT_LOST) lost = tick;
+  }
+  EXPECT_NEAR(stale, 501, 1);
+  EXPECT_NEAR(lost, 2001, 1);
+  ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_OK);
+  EXPECT_LT(host.tick(), DASHPOT_SETPOINT_STALE);
+  EXPECT_EQ(host.snapshot().restarts, 2u);
+}
+
+TEST(Plugin, IsResetToHoldWhereTheRobotIs) {
+  Host host(create(panda()), panda_posture());
+  std::vector<double> goal = panda_posture();
+  goal[1] += 0.5;
+  const dashpot_setpoint setpoint = host.joint_setpoint(goal);
+  for (int tick = 0; tick < 100; ++tick) host.tick(&setpoint);
+  ASSERT_GT(std::abs(host.snapshot().goal_joint_position[1] - panda_posture()[1]), 1e-4);
+  const std::vector<double> acting = host.torque;
+  host.time -= 500'000'000;  // forgotten as well
+  ASSERT_EQ(plugin().reset(host.controller.get(), acting.data()), DASHPOT_OK);
+  ASSERT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
+  EXPECT_EQ(Map<const VectorXd>(host.snapshot().goal_joint_position, 7),
+            joint_vector(panda_posture()));
+  const VectorXd limit = 0.001 * load(panda()).settings.limits.torque_rate;
+  EXPECT_TRUE(((joint_vector(host.torque) - joint_vector(acting)).cwiseAbs().array() <=
+               limit.array() * (1 + 1e-12))
+                  .all());
+  ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_OK);  // too early
+  ASSERT_EQ(plugin().reset(host.controller.get(), nullptr), DASHPOT_OK);
+  host.tick();
+  EXPECT_EQ(Map<const VectorXd>(host.snapshot().goal_joint_position, 7),
+            joint_vector(panda_posture()));
+  EXPECT_TRUE((joint_vector(host.torque).cwiseAbs().array() <= limit.array() * (1 + 1e-12)).all());
+}
+
+/// Undamped frequencies grow as the square root of the stiffness: all together by 2^n if it is
+/// four times as high, whatever the damping.
+TEST(Plugin, ChangesGainsAtRunTime) {
+  Host host(create(panda() + "gains: {joint: {stiffness: 100, damping: 5}}\n"), panda_posture());
+  const auto product = [&] {
+    for (int tick = 0; tick < 1000; ++tick) EXPECT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
+    double value = 1;
+    const dashpot_modes modes = host.modes();
+    EXPECT_EQ(modes.count, 7u);
+    for (std::uint32_t i = 0; i < modes.count; ++i) value *= modes.modes[i].natural_frequency;
+    return value;
+  };
+  const double before = product();
+  const Eigen::Matrix<double, 7, 7> stiffness = 400 * Eigen::Matrix<double, 7, 7>::Identity();
+  dashpot_gains gains{};
+  gains.struct_size = sizeof gains;
+  gains.joints = 7;
+  gains.joint_stiffness = stiffness.data();
+  ASSERT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_OK);
+  EXPECT_NEAR(product() / before, 128, 1e-6);
+}
+
+// Misuse ----------------------------------------------------------------------------------------
+
+TEST(PluginRefuses, NullPointers) {
+  const Handle arm = create(panda());
+  Host host(create(panda()), panda_posture());
+  dashpot_output output = host.output();
+  const dashpot_state state = host.state();
+  EXPECT_EQ(plugin().update(nullptr, &state, nullptr, &output), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().update(arm.get(), &state, nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  output.torque = nullptr;
+  EXPECT_EQ(plugin().update(arm.get(), &state, nullptr, &output), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().reset(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().set_setpoint(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().set_setpoint(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
+  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+  setpoint.joint_position = nullptr;
+  EXPECT_EQ(plugin().set_setpoint(arm.get(), &setpoint), DASHPOT_NULL_ARGUMENT);
+  setpoint.mode = DASHPOT_MODE_CARTESIAN;
+  EXPECT_EQ(plugin().set_setpoint(arm.get(), &setpoint), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().set_gains(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().read_snapshot(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().read_modes(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_STREQ(plugin().last_error(), "a pointer that has to be there is NULL");
+  EXPECT_EQ(plugin().joints(nullptr), 0u);
+  EXPECT_EQ(plugin().joint_name(nullptr, 0), nullptr);
+  EXPECT_EQ(plugin().period(nullptr), 0);
+  plugin().destroy(nullptr);
+}
+
+TEST(PluginRefuses, StructsOfAnotherSize) {
+  Host host(create(panda()), panda_posture());
+  dashpot_controller* const arm = host.controller.get();
+  for (const std::uint32_t wrong : {0u, 4u, 1u << 20}) {
+    dashpot_output output = host.output();
+    output.struct_size = wrong;
+    const dashpot_state state = host.state();
+    host.torque.assign(7, 123.0);
+    EXPECT_EQ(plugin().update(arm, &state, nullptr, &output), DASHPOT_WRONG_STRUCT_SIZE);
+    EXPECT_THAT(host.torque, ::testing::Each(123.0));
+    dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+    setpoint.struct_size = wrong;
+    EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_STRUCT_SIZE);
+    dashpot_gains gains{};
+    gains.struct_size = wrong;
+    EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_STRUCT_SIZE);
+    dashpot_snapshot snapshot{};
+    snapshot.struct_size = wrong;
+    EXPECT_EQ(plugin().read_snapshot(arm, &snapshot), DASHPOT_WRONG_STRUCT_SIZE);
+    const auto modes = std::make_unique<dashpot_modes>();
+    modes->struct_size = wrong;
+    EXPECT_EQ(plugin().read_modes(arm, modes.get()), DASHPOT_WRONG_STRUCT_SIZE);
+    EXPECT_STREQ(plugin().last_error(), "struct_size is not that of this version of plugin.h");
+  }
+}
+
+TEST(PluginRefuses, AnotherNumberOfJoints) {
+  Host host(create(panda()), panda_posture());
+  dashpot_output output = host.output();
+  output.joints = 6;
+  const dashpot_state state = host.state();
+  EXPECT_EQ(plugin().update(host.controller.get(), &state, nullptr, &output), DASHPOT_WRONG_JOINTS);
+  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+  setpoint.joints = 8;
+  EXPECT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_WRONG_JOINTS);
+  dashpot_gains gains{};
+  gains.struct_size = sizeof gains;
+  EXPECT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_WRONG_JOINTS);
+}
+
+TEST(PluginRefuses, ImpossibleValues) {
+  const Host host(create(panda()), panda_posture());
+  dashpot_controller* const arm = host.controller.get();
+  const auto expect_refused = [&](const std::vector<double>& goal, const std::string& why) {
+    const dashpot_setpoint setpoint = host.joint_setpoint(goal);
+    EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_VALUE);
+    EXPECT_EQ(plugin().last_error(), why);
+  };
+  std::vector<double> goal = panda_posture();
+  goal[2] = std::numeric_limits<double>::quiet_NaN();
+  expect_refused(goal, "joint_position has an entry that is not finite");
+  goal[2] = 3;
+  expect_refused(goal, "joint_position is above a position limit");
+
+  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+  setpoint.mode = 2;
+  EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_VALUE);
+  const std::array<double, 9> reflection = {1, 0, 0, 0, 1, 0, 0, 0, -1};
+  setpoint = {sizeof setpoint,   7,      0, DASHPOT_MODE_CARTESIAN, nullptr, reflection.data(),
+              reflection.data(), nullptr};
+  EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_VALUE);
+  EXPECT_STREQ(plugin().last_error(), "tip_pose.rotation is not a rotation matrix");
+
+  dashpot_gains gains{};
+  gains.struct_size = sizeof gains;
+  gains.joints = 7;
+  const std::int32_t frame = 5;
+  gains.frame = &frame;
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);
+  gains.frame = nullptr;
+  Eigen::Matrix<double, 6, 6> K_C = Eigen::Matrix<double, 6, 6>::Identity();
+  K_C(0, 0) = -1;
+  gains.task_stiffness = K_C.data();
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);
+  EXPECT_STREQ(plugin().last_error(), "task_stiffness is not positive semidefinite");
+}
+
+TEST(PluginRefuses, ToReadBeforeTheFirstTick) {
+  const Handle arm = create(panda());
+  dashpot_snapshot snapshot{};
+  snapshot.struct_size = sizeof snapshot;
+  EXPECT_EQ(plugin().read_snapshot(arm.get(), &snapshot), DASHPOT_NOTHING_YET);
+  dashpot_modes modes{};
+  modes.struct_size = sizeof modes;
+  EXPECT_EQ(plugin().read_modes(arm.get(), &modes), DASHPOT_NOTHING_YET);
+  EXPECT_STREQ(plugin().last_error(), "nothing to read so far");
+}
+
+/// A wrong state is no refusal: torque ramps down to zero, and the controller recovers.
+TEST(Plugin, IsSafeWithoutAState) {
+  Host host = held_panda();
+  for (int tick = 0; tick < 200; ++tick) ASSERT_EQ(host.tick(), DASHPOT_OK);
+  ASSERT_GT(joint_vector(host.torque).norm(), 1);
+  dashpot_state wrong_size = host.state();
+  wrong_size.struct_size = 8;
+  dashpot_state wrong_joints = host.state();
+  wrong_joints.joints = 6;
+  dashpot_state no_position = host.state();
+  no_position.position = nullptr;
+  const std::array<const dashpot_state*, 4> states = {nullptr, &wrong_size, &wrong_joints,
+                                                      &no_position};
+  dashpot_output output = host.output();
+  for (std::size_t tick = 0; tick < 120; ++tick) {
+    ASSERT_EQ(plugin().update(host.controller.get(), states[tick % 4], nullptr, &output),
+              DASHPOT_STATE_WRONG_SIZE);
+    host.time += 1'000'000;
+  }
+  EXPECT_EQ(joint_vector(host.torque), VectorXd::Zero(7));
+  EXPECT_EQ(host.snapshot().status, DASHPOT_STATE_WRONG_SIZE);
+  EXPECT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
+  host.position[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(host.tick(), DASHPOT_STATE_NOT_FINITE);
+}
+
+TEST(Plugin, SurvivesAnyTime) {
+  Host host = held_panda();
+  for (const std::int64_t time : {std::int64_t{0}, std::numeric_limits<std::int64_t>::max(),
+                                  std::numeric_limits<std::int64_t>::min(), std::int64_t{5}}) {
+    const dashpot_setpoint setpoint = host.joint_setpoint(panda_posture(), time);
+    dashpot_state state = host.state();
+    state.time = time;
+    dashpot_output output = host.output();
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_GE(plugin().update(host.controller.get(), &state, &setpoint, &output), DASHPOT_OK);
+      EXPECT_GE(plugin().update(host.controller.get(), nullptr, nullptr, &output), DASHPOT_OK);
+      EXPECT_TRUE(joint_vector(host.torque).allFinite());
+    }
+  }
+}
+
+TEST(Plugin, RejectsAWrongSetpointOfATick) {
+  Host host = held_panda();
+  ASSERT_EQ(host.tick(), DASHPOT_OK);
+  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+  setpoint.struct_size = 0;
+  EXPECT_EQ(host.tick(&setpoint), DASHPOT_SETPOINT_REJECTED);
+  EXPECT_EQ(host.snapshot().status, DASHPOT_SETPOINT_REJECTED);
+  EXPECT_EQ(host.tick(), DASHPOT_OK);
+  std::vector<double> far = panda_posture();
+  far[0] = 4;
+  const dashpot_setpoint beyond = host.joint_setpoint(far);
+  EXPECT_EQ(host.tick(&beyond), DASHPOT_SETPOINT_REJECTED);
+  const dashpot_setpoint good = host.joint_setpoint(panda_posture());
+  EXPECT_EQ(host.tick(&good), DASHPOT_OK);
+}
+
+// Real time, threads, several at once -------------------------------------------------------------
+
+TEST(Plugin, AllocatesNothingInATick) {
+  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
+  EXPECT_GE(testing::allocations_of([] { create(panda()); }), 1);
+  for (const std::string& mode : {std::string(), kCartesian}) {
+    Host host(create(panda() + mode + "analysis: {every: 2}\n"), panda_posture());
+    std::vector<double> goal = panda_posture();
+    const dashpot_setpoint setpoint = host.joint_setpoint(goal);
+    dashpot_gains gains{};
+    gains.struct_size = sizeof gains;
+    gains.joints = 7;
+    Eigen::Matrix<double, 6, 6> K_C = Eigen::Matrix<double, 6, 6>::Identity();
+    gains.task_stiffness = K_C.data();
+    for (int tick = 0; tick < 500; ++tick) {
+      goal[0] = 1e-4 * tick;
+      K_C(0, 0) = tick;
+      if (tick % 7 == 1) plugin().set_gains(host.controller.get(), &gains);
+      if (tick % 11 == 2) plugin().set_setpoint(host.controller.get(), &setpoint);
+      ASSERT_EQ(testing::allocations_of([&] { host.tick(tick % 5 == 3 ? &setpoint : nullptr); }), 0)
+          << "tick " << tick;
+    }
+  }
+}
+
+/// The other thread sets and reads while the real-time thread runs; what it reads was written by
+/// one tick.
+TEST(Plugin, ServesTwoThreads) {
+  constexpr int kTicks = 3000;
+  // However rarely the other thread has its turn, no set-point is too old.
+  Host host(create(panda() + "analysis: {every: 4}\n"
+                             "watchdog: {setpoint_hold: 0, setpoint_damp: 0}\n"),
+            panda_posture());
+  std::vector<std::vector<double>> torques(kTicks + 1);
+  std::atomic<bool> running{true};
+  std::vector<dashpot_snapshot> snapshots;
+  std::atomic<int> modes_read{0};
+
+  std::thread other([&] {
+    dashpot_controller* const arm = host.controller.get();
+    std::vector<double> goal = panda_posture();
+    Eigen::Matrix<double, 7, 7> K = Eigen::Matrix<double, 7, 7>::Identity();
+    dashpot_gains gains{};
+    gains.struct_size = sizeof gains;
+    gains.joints = 7;
+    gains.joint_stiffness = K.data();
+    const auto modes = std::make_unique<dashpot_modes>();
+    std::uint64_t last = 0;
+    for (int round = 0; running.load(); ++round) {
+      goal[0] = 0.01 * (round % 10);
+      K.diagonal().setConstant(100 + round % 50);
+      const dashpot_setpoint setpoint = {sizeof(dashpot_setpoint),
+                                         7,
+                                         DASHPOT_ON_ARRIVAL,
+                                         DASHPOT_MODE_JOINT,
+                                         goal.data(),
+                                         nullptr,
+                                         nullptr,
+                                         nullptr};
+      EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_OK);
+      EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
+      dashpot_snapshot snapshot{};
+      snapshot.struct_size = sizeof snapshot;
+      if (plugin().read_snapshot(arm, &snapshot) == DASHPOT_OK) {
+        EXPECT_GE(snapshot.tick, last);
+        if (snapshot.tick != last) snapshots.push_back(snapshot);
+        last = snapshot.tick;
+      }
+      modes->struct_size = sizeof *modes;
+      if (plugin().read_modes(arm, modes.get()) == DASHPOT_OK) ++modes_read;
+    }
+  });
+  for (std::size_t tick = 1; tick <= kTicks; ++tick) {
+    EXPECT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
+    torques[tick] = host.torque;
+    if (tick % 50 == 0) std::this_thread::yield();
+  }
+  while (modes_read.load() == 0) std::this_thread::yield();
+  running = false;
+  other.join();
+
+  EXPECT_FALSE(snapshots.empty());
+  for (const dashpot_snapshot& snapshot : snapshots) {
+    ASSERT_LE(snapshot.tick, static_cast<std::uint64_t>(kTicks));
+    EXPECT_EQ(std::vector<double>(snapshot.torque, snapshot.torque + 7), torques[snapshot.tick]);
+  }
+}
+
+TEST(Plugin, RunsTwoArmsSideBySide) {
+  const std::string ur5 =
+      "robot: {urdf: " + urdf_path("ur5.urdf") + ", base: base_link, tip: ee_link}\n";
+  const std::vector<double> posture = {0, -1, 1, 0, 1, 0};
+  Host alone(create(panda()), panda_posture());
+  Host first(create(panda()), panda_posture());
+  Host second(create(ur5), posture);
+  Host second_alone(create(ur5), posture);
+  for (int tick = 0; tick < 50; ++tick) {
+    alone.velocity[1] = first.velocity[1] = 0.01 * tick;
+    ASSERT_LE(alone.tick(), DASHPOT_TORQUE_LIMITED);
+  }
+  for (int tick = 0; tick < 50; ++tick) ASSERT_LE(second_alone.tick(), DASHPOT_TORQUE_LIMITED);
+  for (int tick = 0; tick < 50; ++tick) {
+    first.velocity[1] = 0.01 * tick;
+    ASSERT_LE(first.tick(), DASHPOT_TORQUE_LIMITED);
+    ASSERT_LE(second.tick(), DASHPOT_TORQUE_LIMITED);
+  }
+  EXPECT_EQ(first.torque, alone.torque);
+  EXPECT_EQ(second.torque, second_alone.torque);
+}
+
+}  // namespace
+}  // namespace dashpot::tests
