@@ -25,7 +25,8 @@ inline const std::vector<Layer>& layers() {
       // an independent check of the two above:
       {"sim", {"dashpot/sim/", "Eigen/", "urdf_", "console_bridge/"}},
       {"lcmtypes",
-       {"dashpot/lcmtypes/", "dashpot/analysis/types.hpp", "dashpot/controller/types.hpp", "lcm/"}},
+       {"dashpot/lcmtypes/", "dashpot/analysis/types.hpp", "dashpot/controller/types.hpp",
+        "dashpot/controller/snapshot.hpp", "dashpot/controller/latest.hpp", "Eigen/", "lcm/"}},
       {"apps", {""}},
       {"tests", {""}},
       {"benchmarks", {""}},

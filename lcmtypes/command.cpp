@@ -1,0 +1,29 @@
+#include <dashpot/lcmtypes/command.hpp>
+#include <dashpot/lcmtypes/command_t.hpp>
+
+namespace dashpot::lcmtypes {
+
+void apply(const Command& command, controller::Setpoint& setpoint) noexcept {
+  const controller::Setpoint& from = command.setpoint;
+  const auto has = [&command](std::int32_t part) { return (command.parts & part) != 0; };
+  if (has(command_t::MODE)) setpoint.mode = from.mode;
+  if (has(command_t::JOINT_POSITION)) setpoint.joint_position = from.joint_position;
+  if (has(command_t::TIP_POSE)) setpoint.tip_pose = from.tip_pose;
+  if (has(command_t::WRENCH)) setpoint.wrench = from.wrench;
+  if (has(command_t::JOINT_GAINS)) {
+    setpoint.gains.joint_stiffness = from.gains.joint_stiffness;
+    setpoint.gains.joint_damping = from.gains.joint_damping;
+  }
+  if (has(command_t::TASK_GAINS)) {
+    setpoint.gains.frame = from.gains.frame;
+    setpoint.gains.directions = from.gains.directions;
+    setpoint.gains.task_stiffness = from.gains.task_stiffness;
+    setpoint.gains.task_damping = from.gains.task_damping;
+  }
+  if (has(command_t::NULL_GAINS)) {
+    setpoint.gains.null_stiffness = from.gains.null_stiffness;
+    setpoint.gains.null_damping = from.gains.null_damping;
+  }
+}
+
+}  // namespace dashpot::lcmtypes

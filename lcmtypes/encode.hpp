@@ -1,0 +1,27 @@
+#pragma once
+#include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/lcmtypes/samples.hpp>
+#include <dashpot/lcmtypes/state_t.hpp>
+
+#include <cstdint>
+#include <vector>
+
+namespace dashpot::lcmtypes {
+
+/// Quaternion w, x, y, z of a rotation matrix; of the two, the one with w >= 0.
+void write_quaternion(const Eigen::Matrix3d& R, double (&quaternion)[4]);
+
+/// Copies a sample into a message. What a sample does not know is left as it is:
+/// state_t::states_dropped, modes_t::sequence. Joint vectors that are not as long as the joint
+/// position are cut, or filled up with zeros.
+void fill(const StateSample& sample, state_t& message);
+void fill(const ModesSample& sample, modes_t& message);
+
+/// The bytes of a message as LCM sends them, in a buffer that is used again and again.
+template <class Message>
+void encode(const Message& message, std::vector<std::uint8_t>& bytes) {
+  bytes.resize(static_cast<std::size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+}
+
+}  // namespace dashpot::lcmtypes

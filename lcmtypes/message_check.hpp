@@ -1,0 +1,25 @@
+#pragma once
+#include <dashpot/lcmtypes/command_t.hpp>
+#include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/lcmtypes/state_t.hpp>
+
+#include <cstddef>
+
+namespace dashpot::lcmtypes {
+
+/// Largest message that is looked at, bytes; any that obeys the limits of its definition is
+/// smaller.
+inline constexpr std::size_t kMaxMessageSize = 65536;
+
+/// Decodes bytes of unknown origin. The generated decoders allocate whatever an array's length
+/// field says before they look at how many bytes there are; so the fingerprint and these fields are
+/// read first. Returns false, with `message` unspecified, unless
+///   - the fingerprint is that of the message type,
+///   - the sizes are within 1 <= n <= 16, 0 <= num_modes <= n,
+///   - and the message fills `size` bytes exactly.
+/// Allocates less than kMaxMessageSize. Values are not judged: they may be NaN or out of range.
+bool decode(const void* data, std::size_t size, state_t& message) noexcept;
+bool decode(const void* data, std::size_t size, modes_t& message) noexcept;
+bool decode(const void* data, std::size_t size, command_t& message) noexcept;
+
+}  // namespace dashpot::lcmtypes

@@ -1,0 +1,36 @@
+#pragma once
+// What the real-time thread hands over to be published: plain data, no memory of its own.
+
+#include <dashpot/controller/snapshot.hpp>
+
+#include <array>
+#include <cstdint>
+
+namespace dashpot::lcmtypes {
+
+/// How well the loop keeps time, and what became of the commands it was sent.
+struct LoopHealth {
+  std::int32_t tick_time = 0;          ///< computing time of the previous tick, ns
+  std::int32_t longest_tick_time = 0;  ///< since the start, ns
+  std::int64_t overruns = 0;           ///< ticks that ended after their period
+  std::int64_t commands_accepted = 0;
+  std::int64_t commands_rejected = 0;
+};
+
+/// One tick.
+struct StateSample {
+  std::int64_t utime = 0;  ///< beginning of the tick, us since 1970-01-01 UTC
+  controller::Snapshot snapshot;
+  LoopHealth health;
+};
+
+/// The modes at one configuration.
+struct ModesSample {
+  std::int64_t utime = 0;     ///< beginning of the tick they belong to, us since 1970-01-01 UTC
+  std::int8_t solved_by = 0;  ///< modes_t::DIRECT, ...
+  controller::Vibration vibration;
+  /// One mode keeps one label while it can be followed.
+  std::array<std::int32_t, controller::kMaxJoints> labels{};
+};
+
+}  // namespace dashpot::lcmtypes

@@ -1,0 +1,342 @@
+// Which commands count, and what they set.
+#include <dashpot/lcmtypes/command_filter.hpp>
+#include <dashpot/tests/lcmtypes/random_samples.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+namespace dashpot::lcmtypes {
+namespace {
+
+using Verdict = CommandVerdict;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::int64_t kSteady = 5'000'000;  // us
+
+Verdict judge(CommandFilter& filter, const command_t& message, std::int64_t later = 0) {
+  const Bytes bytes = bytes_of(message);
+  return filter.judge(bytes.data(), bytes.size(), kNow + later, kSteady + later);
+}
+
+TEST(CommandFilter, TakesEveryPart) {
+  Random random(921);
+  for (int n = 1; n <= controller::kMaxJoints; ++n) {
+    CommandFilter filter(limits_for(n));
+    const command_t message = random_command(random, n);
+    ASSERT_EQ(judge(filter, message), Verdict::kAccepted) << n;
+    controller::Setpoint setpoint;
+    setpoint.time = 77;
+    apply(filter.command(), setpoint);
+    EXPECT_EQ(setpoint.time, 77);
+    EXPECT_EQ(setpoint.mode, controller::Mode::kCartesian);
+    EXPECT_EQ(setpoint.gains.frame, controller::Frame::kTool);
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(setpoint.gains.directions[i], i != 5);
+    for (int i = 0; i < n; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      EXPECT_EQ(setpoint.joint_position[i], message.joint_position[k]);
+      EXPECT_EQ(setpoint.gains.null_stiffness[i], message.null_stiffness[k]);
+      EXPECT_EQ(setpoint.gains.null_damping[i], message.null_damping[k]);
+      for (int j = 0; j < n; ++j) {
+        const auto l = static_cast<std::size_t>(j);
+        EXPECT_EQ(setpoint.gains.joint_stiffness(i, j), message.joint_stiffness[k][l]);
+        EXPECT_EQ(setpoint.gains.joint_damping(i, j), message.joint_damping[k][l]);
+      }
+    }
+    double quaternion[4];
+    write_quaternion(setpoint.tip_pose.rotation, quaternion);
+    for (int i = 0; i < 4; ++i) EXPECT_NEAR(quaternion[i], message.tip_quaternion[i], 1e-15);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(setpoint.tip_pose.position[i], message.tip_position[i]);
+    for (int i = 0; i < 6; ++i) {
+      EXPECT_EQ(setpoint.wrench[i], message.wrench[i]);
+      for (int j = 0; j < 6; ++j) {
+        EXPECT_EQ(setpoint.gains.task_stiffness(i, j), message.task_stiffness[i][j]);
+        EXPECT_EQ(setpoint.gains.task_damping(i, j), message.task_damping[i][j]);
+      }
+    }
+  }
+}
+
+TEST(CommandFilter, LeavesAloneWhatNoCommandSet) {
+  Random random(922);
+  CommandFilter filter(limits_for(7));
+  command_t message = random_command(random, 7);
+  message.parts = command_t::JOINT_POSITION;
+  message.wrench[0] = NAN;  // not one of the parts: not looked at
+  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  controller::Setpoint setpoint, before;
+  before.wrench = random.vector(6);
+  before.gains.task_stiffness = random.spd(6);
+  setpoint = before;
+  apply(filter.command(), setpoint);
+  EXPECT_EQ(setpoint.joint_position.size(), 7);
+  EXPECT_EQ(setpoint.mode, before.mode);
+  EXPECT_EQ(setpoint.wrench, before.wrench);
+  EXPECT_EQ(setpoint.gains.task_stiffness, before.gains.task_stiffness);
+  EXPECT_EQ(setpoint.gains.joint_stiffness.size(), 0);
+}
+
+TEST(CommandFilter, AddsUpThePartsOfSeveralCommands) {
+  Random random(923);
+  CommandFilter filter(limits_for(7));
+  command_t first = random_command(random, 7), second = random_command(random, 7);
+  first.parts = command_t::WRENCH | 0;
+  second.parts = command_t::TIP_POSE | 0;
+  second.sequence = first.sequence + 1;
+  second.utime = first.utime + 1;
+  ASSERT_EQ(judge(filter, first), Verdict::kAccepted);
+  ASSERT_EQ(judge(filter, second), Verdict::kAccepted);
+  controller::Setpoint setpoint;
+  apply(filter.command(), setpoint);
+  EXPECT_EQ(setpoint.wrench[0], first.wrench[0]);
+  EXPECT_EQ(setpoint.tip_pose.position[0], second.tip_position[0]);
+}
+
+struct Fault {
+  const char* name;
+  Verdict verdict;
+  std::function<void(command_t&)> make;
+};
+
+const std::vector<Fault>& faults() {
+  static const std::vector<Fault> all = {
+      {"no part", Verdict::kUnknown, [](command_t& m) { m.parts = 0; }},
+      {"unknown part", Verdict::kUnknown, [](command_t& m) { m.parts = 128 + 1; }},
+      {"all bits", Verdict::kUnknown, [](command_t& m) { m.parts = -1; }},
+      {"unknown mode", Verdict::kUnknown, [](command_t& m) { m.mode = 2; }},
+      {"unknown frame", Verdict::kUnknown, [](command_t& m) { m.frame = -1; }},
+      {"position NaN", Verdict::kNotFinite, [](command_t& m) { m.joint_position[6] = NAN; }},
+      {"position infinite", Verdict::kNotFinite,
+       [](command_t& m) { m.joint_position[0] = -kInfinity; }},
+      {"tip NaN", Verdict::kNotFinite, [](command_t& m) { m.tip_position[1] = NAN; }},
+      {"quaternion NaN", Verdict::kNotFinite, [](command_t& m) { m.tip_quaternion[3] = NAN; }},
+      {"wrench infinite", Verdict::kNotFinite, [](command_t& m) { m.wrench[5] = kInfinity; }},
+      {"joint stiffness NaN", Verdict::kNotFinite,
+       [](command_t& m) { m.joint_stiffness[3][4] = NAN; }},
+      {"joint damping infinite", Verdict::kNotFinite,
+       [](command_t& m) { m.joint_damping[6][6] = kInfinity; }},
+      {"task stiffness NaN", Verdict::kNotFinite,
+       [](command_t& m) { m.task_stiffness[0][5] = NAN; }},
+      {"task damping NaN", Verdict::kNotFinite, [](command_t& m) { m.task_damping[5][5] = NAN; }},
+      {"null stiffness NaN", Verdict::kNotFinite, [](command_t& m) { m.null_stiffness[2] = NAN; }},
+      {"null damping NaN", Verdict::kNotFinite, [](command_t& m) { m.null_damping[2] = NAN; }},
+      {"position too low", Verdict::kOutOfLimits,
+       [](command_t& m) { m.joint_position[6] = -3.0001; }},
+      {"position too high", Verdict::kOutOfLimits,
+       [](command_t& m) { m.joint_position[0] = 3.0001; }},
+      {"tip out of reach", Verdict::kOutOfLimits, [](command_t& m) { m.tip_position[2] = 3.1; }},
+      {"tip overflows", Verdict::kOutOfLimits, [](command_t& m) { m.tip_position[2] = 1e200; }},
+      {"force too large", Verdict::kOutOfLimits, [](command_t& m) { m.wrench[2] = -201; }},
+      {"torque too large", Verdict::kOutOfLimits, [](command_t& m) { m.wrench[3] = 51; }},
+      {"joint stiffness too large", Verdict::kOutOfLimits,
+       [](command_t& m) { m.joint_stiffness[1][1] = 20001; }},
+      {"joint damping too large", Verdict::kOutOfLimits,
+       [](command_t& m) { m.joint_damping[1][1] = 2001; }},
+      {"task stiffness too large", Verdict::kOutOfLimits,
+       [](command_t& m) { m.task_stiffness[1][1] = 50001; }},
+      {"task damping too large", Verdict::kOutOfLimits,
+       [](command_t& m) { m.task_damping[1][1] = 5001; }},
+      {"null stiffness negative", Verdict::kOutOfLimits,
+       [](command_t& m) { m.null_stiffness[0] = -1e-3; }},
+      {"null damping too large", Verdict::kOutOfLimits,
+       [](command_t& m) { m.null_damping[6] = 2001; }},
+      {"quaternion too long", Verdict::kNotUnit,
+       [](command_t& m) {
+         for (double& x : m.tip_quaternion) x *= 1.002;
+       }},
+      {"quaternion zero", Verdict::kNotUnit,
+       [](command_t& m) {
+         for (double& x : m.tip_quaternion) x = 0;
+       }},
+      {"quaternion huge", Verdict::kNotUnit, [](command_t& m) { m.tip_quaternion[0] = 1e300; }},
+      {"joint stiffness not symmetric", Verdict::kIndefinite,
+       [](command_t& m) { m.joint_stiffness[0][1] += 1; }},
+      {"joint stiffness indefinite", Verdict::kIndefinite,
+       [](command_t& m) { m.joint_stiffness[2][2] = -1; }},
+      {"joint damping indefinite", Verdict::kIndefinite,
+       [](command_t& m) { m.joint_damping[2][2] = -0.1; }},
+      {"task stiffness indefinite", Verdict::kIndefinite,
+       [](command_t& m) { m.task_stiffness[4][4] = -1; }},
+      {"task damping not symmetric", Verdict::kIndefinite,
+       [](command_t& m) { m.task_damping[4][2] -= 1; }},
+      {"too old", Verdict::kStale, [](command_t& m) { m.utime -= 500'001; }},
+      {"very old", Verdict::kStale,
+       [](command_t& m) { m.utime = std::numeric_limits<std::int64_t>::min(); }},
+      {"ahead", Verdict::kFromFuture, [](command_t& m) { m.utime += 100'001; }},
+      {"very far ahead", Verdict::kFromFuture,
+       [](command_t& m) { m.utime = std::numeric_limits<std::int64_t>::max(); }},
+  };
+  return all;
+}
+
+TEST(CommandFilter, NamesEachFaultAndKeepsTheLastGoodCommand) {
+  Random random(924);
+  for (const Fault& fault : faults()) {
+    SCOPED_TRACE(fault.name);
+    CommandFilter filter(limits_for(7));
+    const command_t good = random_command(random, 7);
+    ASSERT_EQ(judge(filter, good), Verdict::kAccepted);
+    command_t bad = random_command(random, 7);
+    bad.utime = kNow + 10;
+    bad.sequence = good.sequence + 1;
+    const std::int64_t later = 10;
+    command_t sound = bad;
+    fault.make(bad);
+    EXPECT_EQ(judge(filter, bad, later), fault.verdict);
+    EXPECT_EQ(filter.command().sequence, good.sequence);
+    EXPECT_EQ(filter.command().utime, good.utime);
+    EXPECT_EQ(filter.command().setpoint.wrench[0], good.wrench[0]);
+    EXPECT_EQ(filter.command().setpoint.joint_position[0], good.joint_position[0]);
+    EXPECT_EQ(judge(filter, sound, later), Verdict::kAccepted);  // only the fault was in the way
+  }
+}
+
+TEST(CommandFilter, RefusesAnotherNumberOfJoints) {
+  Random random(925);
+  CommandFilter filter(limits_for(7));
+  EXPECT_EQ(judge(filter, random_command(random, 6)), Verdict::kWrongSize);
+  EXPECT_EQ(judge(filter, random_command(random, 8)), Verdict::kWrongSize);
+}
+
+TEST(CommandFilter, AcceptsGainsThatAreSemidefinite) {
+  Random random(926);
+  CommandFilter filter(limits_for(7));
+  command_t message = random_command(random, 7);
+  const Eigen::MatrixXd W = 10 * random.matrix(2, 7);
+  message.joint_stiffness = rows_of(W.transpose() * W);
+  for (auto& row : message.task_stiffness) std::fill(std::begin(row), std::end(row), 0.0);
+  for (auto& row : message.joint_damping) std::fill(row.begin(), row.end(), 0.0);
+  EXPECT_EQ(judge(filter, message), Verdict::kAccepted);
+}
+
+TEST(CommandFilter, RefusesReplays) {
+  Random random(927);
+  CommandFilter filter(limits_for(7));
+  command_t first = random_command(random, 7), second = first;
+  second.utime += 1000;
+  ++second.sequence;
+  ASSERT_EQ(judge(filter, first), Verdict::kAccepted);
+  EXPECT_EQ(judge(filter, first), Verdict::kReplayed);
+  ASSERT_EQ(judge(filter, second, 1000), Verdict::kAccepted);
+  // A recording of both, sent again and again until long after: never accepted.
+  for (std::int64_t later = 1000; later < 3'000'000; later += 10'000) {
+    const Verdict expected = later > 501'000 ? Verdict::kStale : Verdict::kReplayed;
+    EXPECT_EQ(judge(filter, second, later), expected) << later;
+    EXPECT_NE(judge(filter, first, later), Verdict::kAccepted) << later;
+  }
+  EXPECT_EQ(filter.command().sequence, second.sequence);
+}
+
+// The time is right, the sequence is not, and the other way round.
+TEST(CommandFilter, WantsBothTimeAndSequenceToRise) {
+  Random random(928);
+  CommandFilter filter(limits_for(7));
+  const command_t first = random_command(random, 7);
+  ASSERT_EQ(judge(filter, first), Verdict::kAccepted);
+  command_t message = first;
+  message.utime += 10;
+  EXPECT_EQ(judge(filter, message, 10), Verdict::kReplayed);
+  message = first;
+  message.sequence += 10;
+  EXPECT_EQ(judge(filter, message, 10), Verdict::kReplayed);
+}
+
+TEST(CommandFilter, LetsARestartedSenderBeginItsSequenceAnewAfterASilence) {
+  Random random(929);
+  CommandFilter filter(limits_for(7));
+  command_t message = random_command(random, 7);
+  message.sequence = std::numeric_limits<std::int64_t>::max();
+  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  message.sequence = 1;
+  message.utime = kNow + 600'000;
+  EXPECT_EQ(judge(filter, message, 600'000), Verdict::kReplayed);
+  message.utime = kNow + 600'001;
+  EXPECT_EQ(judge(filter, message, 600'001), Verdict::kAccepted);
+}
+
+TEST(CommandFilter, SurvivesAClockThatIsSetBack) {
+  Random random(930);
+  CommandFilter filter(limits_for(7));
+  command_t message = random_command(random, 7);
+  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  // One hour back, as all clocks of the machine; a second later commands count again.
+  const std::int64_t back = 3'600'000'000;
+  message.utime = kNow - back + 1'000'000;
+  ++message.sequence;
+  const Bytes bytes = bytes_of(message);
+  EXPECT_EQ(filter.judge(bytes.data(), bytes.size(), message.utime, kSteady + 1'000'000),
+            Verdict::kAccepted);
+}
+
+TEST(CommandFilter, LimitsTheRate) {
+  Random random(931);
+  CommandLimits limits = limits_for(7);
+  limits.most_per_second = 1000;
+  limits.burst = 10;
+  CommandFilter filter(limits);
+  command_t message = random_command(random, 7);
+  int accepted = 0, too_many = 0;
+  constexpr int kMessages = 10'000;  // over one second
+  for (int i = 0; i < kMessages; ++i) {
+    message.utime += 100;
+    ++message.sequence;
+    const Verdict verdict = judge(filter, message, 100 * (i + 1));
+    accepted += verdict == Verdict::kAccepted;
+    too_many += verdict == Verdict::kTooMany;
+  }
+  EXPECT_EQ(accepted + too_many, kMessages);
+  EXPECT_NEAR(accepted, 1010, 2);
+}
+
+TEST(CommandFilter, SurvivesRandomMutations) {
+  constexpr std::uint64_t kSeed = 932;
+  constexpr int kCases = 40'000;
+  constexpr int kAfterSequence = 28;  // one far ahead would have all others taken for replays
+  Random random(kSeed);
+  CommandFilter filter(limits_for(7));
+  const command_t good = random_command(random, 7);
+  std::array<int, kCommandVerdicts> verdicts{};
+  for (int i = 1; i <= kCases; ++i) {
+    command_t message = good;
+    message.utime = kNow + i;
+    message.sequence = good.sequence + i;
+    Bytes bytes = bytes_of(message);
+    const int last = static_cast<int>(bytes.size()) - 1;
+    for (int k = random.integer(1, 3); k > 0; --k) {
+      bytes[static_cast<std::size_t>(random.integer(kAfterSequence, last))] =
+          static_cast<std::uint8_t>(random.integer(0, 255));
+    }
+    const std::int64_t before = filter.command().sequence;
+    const Verdict verdict = filter.judge(bytes.data(), bytes.size(), kNow + i, kSteady + i * 1000);
+    ++verdicts[static_cast<std::size_t>(verdict)];
+    if (verdict != Verdict::kAccepted) {
+      ASSERT_EQ(filter.command().sequence, before);
+      continue;
+    }
+    const controller::Setpoint& setpoint = filter.command().setpoint;
+    ASSERT_TRUE(setpoint.joint_position.allFinite() && setpoint.wrench.allFinite() &&
+                setpoint.tip_pose.position.allFinite() && setpoint.tip_pose.rotation.allFinite());
+    ASSERT_LE(setpoint.joint_position.cwiseAbs().maxCoeff(), 3);
+    ASSERT_LE(setpoint.gains.task_stiffness.cwiseAbs().maxCoeff(), 50000);
+    ASSERT_TRUE(
+        (setpoint.tip_pose.rotation * setpoint.tip_pose.rotation.transpose()).isIdentity(1e-12));
+  }
+  std::printf("seed %llu:", static_cast<unsigned long long>(kSeed));
+  for (std::size_t i = 0; i < verdicts.size(); ++i) {
+    std::printf(" %d %s;", verdicts[i], to_text(static_cast<Verdict>(i)));
+  }
+  std::printf("\n");
+  EXPECT_GT(verdicts[0], 100);
+  EXPECT_GT(verdicts[static_cast<std::size_t>(Verdict::kIndefinite)], 100);
+}
+
+TEST(CommandFilter, WantsLimitsForEveryJoint) {
+  CommandLimits limits = limits_for(7);
+  limits.position_upper.resize(6);
+  EXPECT_THROW(CommandFilter{limits}, std::invalid_argument);
+  EXPECT_THROW(CommandFilter{CommandLimits()}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dashpot::lcmtypes

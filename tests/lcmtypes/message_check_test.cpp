@@ -1,0 +1,195 @@
+// Bytes of unknown origin never do harm: they decode to what was encoded, or not at all.
+#include <dashpot/lcmtypes/message_check.hpp>
+#include <dashpot/tests/lcmtypes/random_samples.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <limits>
+
+namespace dashpot::lcmtypes {
+namespace {
+
+template <class Message>
+Message random_message(Random& random, int n);
+
+template <>
+state_t random_message(Random& random, int n) {
+  return message_of<state_t>(random_state(random, n));
+}
+template <>
+modes_t random_message(Random& random, int n) {
+  return message_of<modes_t>(random_modes(random, n));
+}
+template <>
+command_t random_message(Random& random, int n) {
+  return random_command(random, n);
+}
+
+void write_int32(Bytes& bytes, std::size_t offset, std::int32_t value) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    bytes[offset + i] =
+        static_cast<std::uint8_t>(static_cast<std::uint32_t>(value) >> (24 - 8 * i));
+  }
+}
+
+template <class Message>
+class MessageCheck : public ::testing::Test {};
+using Messages = ::testing::Types<state_t, modes_t, command_t>;
+TYPED_TEST_SUITE(MessageCheck, Messages);
+
+/// The bytes in memory of exactly their size, so that the address sanitizer sees any read beyond.
+template <class Message>
+bool decodes(const Bytes& bytes, Message& message) {
+  const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
+  std::copy(bytes.begin(), bytes.end(), exact.get());
+  return decode(exact.get(), bytes.size(), message);
+}
+
+TYPED_TEST(MessageCheck, GivesBackWhatWasEncoded) {
+  Random random(911);
+  TypeParam reused;
+  for (int n = controller::kMaxJoints; n >= 1; --n) {
+    const Bytes bytes = bytes_of(random_message<TypeParam>(random, n));
+    ASSERT_TRUE(decodes(bytes, reused)) << n;
+    EXPECT_EQ(bytes_of(reused), bytes) << n;
+  }
+}
+
+TYPED_TEST(MessageCheck, RefusesEveryOtherLength) {
+  Random random(912);
+  const Bytes bytes = bytes_of(random_message<TypeParam>(random, 7));
+  TypeParam message;
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    EXPECT_FALSE(decodes(Bytes(bytes.data(), bytes.data() + size), message)) << size;
+  }
+  Bytes longer = bytes;
+  longer.push_back(0);
+  EXPECT_FALSE(decodes(longer, message));
+  longer.resize(kMaxMessageSize + 1);
+  EXPECT_FALSE(decodes(longer, message));
+  EXPECT_FALSE(decode(nullptr, 0, message));
+  EXPECT_FALSE(decode(nullptr, bytes.size(), message));
+}
+
+TYPED_TEST(MessageCheck, RefusesAForeignFingerprint) {
+  Random random(913);
+  const Bytes bytes = bytes_of(random_message<TypeParam>(random, 7));
+  TypeParam message;
+  for (std::size_t i = 0; i < 8; ++i) {
+    Bytes foreign = bytes;
+    foreign[i] ^= 1;
+    EXPECT_FALSE(decodes(foreign, message));
+  }
+}
+
+// With these the generated decoder would ask for up to 2^31 doubles before it looked any further.
+TYPED_TEST(MessageCheck, RefusesHostileSizes) {
+  Random random(914);
+  const Bytes bytes = bytes_of(random_message<TypeParam>(random, 7));
+  TypeParam message;
+  for (const std::int32_t size :
+       {0, -1, 6, 8, 17, 1000, 1 << 20, 1 << 28, std::numeric_limits<std::int32_t>::max(),
+        std::numeric_limits<std::int32_t>::min()}) {
+    Bytes hostile = bytes;
+    write_int32(hostile, 8, size);
+    EXPECT_FALSE(decodes(hostile, message)) << size;
+  }
+}
+
+TEST(ModesCheck, RefusesMoreModesThanJoints) {
+  Random random(915);
+  modes_t message;
+  ModesSample sample = random_modes(random, 7);
+  sample.vibration.count = 7;
+  for (auto& mode : sample.vibration.modes) mode.shape = analysis::ComplexVector<16>::Zero(7);
+  const Bytes bytes = bytes_of(message_of<modes_t>(sample));
+  ASSERT_TRUE(decodes(bytes, message));
+  for (const std::int32_t count : {-1, 8, 1 << 30, std::numeric_limits<std::int32_t>::min()}) {
+    Bytes hostile = bytes;
+    write_int32(hostile, 12, count);
+    EXPECT_FALSE(decodes(hostile, message)) << count;
+  }
+  modes_t many = message_of<modes_t>(sample);  // consistent, but there is no such robot
+  many.num_modes = 8;
+  for (auto* values :
+       {&many.natural_frequency, &many.damping_ratio, &many.damped_frequency,
+        &many.eigenvalue_bound, &many.natural_frequency_bound, &many.damping_ratio_bound}) {
+    values->resize(8);
+  }
+  many.label.resize(8);
+  many.kind.resize(8);
+  many.eigenvalue_real.resize(8, {0, 0});
+  many.eigenvalue_imag.resize(8, {0, 0});
+  many.shape_real.resize(8, std::vector<double>(7));
+  many.shape_imag.resize(8, std::vector<double>(7));
+  EXPECT_FALSE(decodes(bytes_of(many), message));
+}
+
+/// Changes some bytes, favouring the header; cuts; lengthens; repeats a piece.
+Bytes mutated(Random& random, Bytes bytes) {
+  const auto size = [&bytes] { return static_cast<int>(bytes.size()); };
+  const auto place = [&random](int end) {
+    return static_cast<std::size_t>(random.integer(0, std::max(0, end - 1)));
+  };
+  for (int k = random.integer(1, 4); k > 0 && !bytes.empty(); --k) {
+    switch (random.integer(0, 6)) {
+      case 0:
+        bytes[place(size())] = static_cast<std::uint8_t>(random.integer(0, 255));
+        break;
+      case 1:
+        bytes[8 + place(std::min(size() - 8, 20))] ^=
+            static_cast<std::uint8_t>(1 << random.integer(0, 7));
+        break;
+      case 2:
+        if (size() >= 16) write_int32(bytes, 8 + 4 * place(2), random.integer(-3, 20));
+        break;
+      case 3:
+        bytes.resize(place(size()) + 1);
+        break;
+      case 4:
+        bytes.insert(bytes.end(), place(40), static_cast<std::uint8_t>(random.integer(0, 255)));
+        break;
+      case 5: {
+        const Bytes piece(bytes.begin(),
+                          bytes.begin() + static_cast<std::ptrdiff_t>(place(size())));
+        bytes.insert(bytes.end(), piece.begin(), piece.end());
+        break;
+      }
+      default:
+        for (std::size_t i = place(size()); i < bytes.size(); ++i) {
+          bytes[i] = static_cast<std::uint8_t>(random.integer(0, 255));
+        }
+    }
+    if (bytes.size() <= 8) break;
+  }
+  return bytes;
+}
+
+TYPED_TEST(MessageCheck, SurvivesRandomMutations) {
+  constexpr std::uint64_t kSeed = 916;
+  constexpr int kCases = 60'000;
+  Random random(kSeed);
+  int good = 0;
+  TypeParam message;
+  Bytes original;
+  for (int i = 0; i < kCases; ++i) {
+    if (i % 20 == 0) {
+      original = bytes_of(random_message<TypeParam>(random, random.integer(1, 16)));
+    }
+    const Bytes bytes = mutated(random, original);
+    if (!decodes(bytes, message)) continue;
+    ++good;
+    ASSERT_GE(message.n, 1);
+    ASSERT_LE(message.n, controller::kMaxJoints);
+    ASSERT_EQ(bytes_of(message), bytes) << "case " << i;  // nothing was made up or left out
+  }
+  std::printf("seed %llu: %d cases, %d still well-formed\n", static_cast<unsigned long long>(kSeed),
+              kCases, good);
+  EXPECT_GT(good, kCases / 100);
+  EXPECT_LT(good, kCases);
+}
+
+}  // namespace
+}  // namespace dashpot::lcmtypes
