@@ -15,7 +15,7 @@ namespace dashpot::tests {
 class Scratch {
  public:
   Scratch() {
-    std::string name = testing::TempDir() + "dashpot.XXXXXX";
+    std::string name = ::testing::TempDir() + "dashpot.XXXXXX";
     if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no scratch directory");
     directory_ = name;
   }

@@ -1,0 +1,24 @@
+#pragma once
+#include <memory>
+#include <string>
+
+namespace lcm {
+class LCM;
+}
+
+namespace dashpot::lcmtypes {
+
+inline constexpr const char* kStateChannel = "DASHPOT_STATE";
+inline constexpr const char* kModesChannel = "DASHPOT_MODES";
+inline constexpr const char* kCommandChannel = "DASHPOT_COMMAND";
+
+/// The environment's LCM_DEFAULT_URL, or else multicast that does not leave this machine:
+/// udpm://239.255.76.67:7667?ttl=0.
+std::string default_url();
+
+/// Opens a bus: udpm://, memq:// (within the process: all who take part share the pointer),
+/// file://, tcpq://; empty for default_url(). Throws std::runtime_error that names the URL. One
+/// thread at a time may handle messages; any may publish.
+std::shared_ptr<lcm::LCM> open_bus(const std::string& url);
+
+}  // namespace dashpot::lcmtypes

@@ -1,0 +1,65 @@
+#pragma once
+#include <dashpot/lcmtypes/bus.hpp>
+#include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/lcmtypes/state_t.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace dashpot::lcmtypes {
+
+/// Takes what a controller publishes, from a bus or from a log, and hands on what is well-formed.
+struct MessageHandlers {
+  std::function<void(const state_t&)> on_state;
+  std::function<void(const modes_t&)> on_modes;
+  std::int64_t malformed = 0;  ///< messages on our channels that were not handed on
+
+  /// Decodes and hands on; other channels are ignored.
+  void take(std::string_view channel, const void* data, std::size_t size);
+};
+
+/// A live bus. `handlers` must outlive it.
+class BusReader {
+ public:
+  BusReader(std::shared_ptr<lcm::LCM> bus, MessageHandlers& handlers);
+  ~BusReader();
+  BusReader(const BusReader&) = delete;
+  BusReader& operator=(const BusReader&) = delete;
+
+  /// Handles one message, or gives up after so many milliseconds. Returns false if the bus is at
+  /// its end (a file:// log, or broken).
+  bool wait(int milliseconds);
+
+ private:
+  struct Subscriptions;
+  std::shared_ptr<lcm::LCM> bus_;
+  std::unique_ptr<Subscriptions> subscriptions_;
+};
+
+/// A log written by make_log_sink or lcm-logger. `handlers` must outlive it.
+class LogReader {
+ public:
+  /// Throws std::runtime_error that names the file and the reason.
+  LogReader(const std::string& path, MessageHandlers& handlers);
+  ~LogReader();
+  LogReader(const LogReader&) = delete;
+  LogReader& operator=(const LogReader&) = delete;
+
+  /// Reads the next event; false at the end of the log, or where it is damaged.
+  bool read();
+  /// Time of the event read last, us since 1970-01-01 UTC.
+  std::int64_t utime() const;
+  /// Hands that event on.
+  void handle();
+
+ private:
+  struct File;
+  std::unique_ptr<File> file_;
+  MessageHandlers& handlers_;
+};
+
+}  // namespace dashpot::lcmtypes

@@ -1,0 +1,226 @@
+// Good commands come through a bus; hostile senders on the same bus change nothing but counters.
+#include <dashpot/lcmtypes/command_receiver.hpp>
+#include <dashpot/tests/lcmtypes/random_samples.hpp>
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <lcm/lcm-cpp.hpp>
+#include <thread>
+
+namespace dashpot::lcmtypes {
+namespace {
+
+using Verdict = CommandVerdict;
+
+constexpr int kJoints = 7;
+constexpr std::int64_t kLongTime = 60'000'000;  // us, so that a busy machine spoils nothing
+
+CommandLimits patient_limits() {
+  CommandLimits limits = limits_for(kJoints);
+  limits.oldest = limits.furthest = kLongTime;
+  return limits;
+}
+
+std::int64_t unix_time() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+void send(lcm::LCM& bus, const Bytes& bytes) {
+  bus.publish(kCommandChannel, bytes.data(), static_cast<unsigned>(bytes.size()));
+}
+
+class Sender {
+ public:
+  Sender(lcm::LCM& bus, std::uint64_t seed, std::int64_t first_sequence = 1)
+      : bus_(bus), random_(seed), first_(first_sequence) {}
+
+  /// A good command, given now; returns its sequence.
+  std::int64_t send_good() {
+    command_t message = random_command(random_, kJoints);
+    message.utime = unix_time();
+    message.sequence = next_sequence();
+    sent_.push_back(message);
+    send(bus_, bytes_of(message));
+    return message.sequence;
+  }
+
+  /// One of every kind of bad message.
+  void send_bad() {
+    const Bytes last = bytes_of(sent_.back());
+    send(bus_, Bytes(last.begin(), last.end() - random_.integer(1, 100)));  // truncated
+    send(bus_, last);                                                       // replayed
+    send(bus_, {});
+    send(bus_, Bytes(static_cast<std::size_t>(random_.integer(1, 3000)), 0xff));
+    Bytes huge = last;  // a size that asks for gigabytes
+    huge[8] = 0x7f;
+    send(bus_, huge);
+    command_t message = random_command(random_, kJoints);
+    message.sequence = next_sequence();  // good but for one thing:
+    message.utime = unix_time() - 2 * kLongTime;
+    send(bus_, bytes_of(message));
+    message.utime = unix_time() + 2 * kLongTime;
+    send(bus_, bytes_of(message));
+    message.utime = unix_time();
+    message.wrench[2] = std::numeric_limits<double>::quiet_NaN();
+    send(bus_, bytes_of(message));
+    message.wrench[2] = 1e6;
+    send(bus_, bytes_of(message));
+    message = random_command(random_, kJoints - 1);
+    message.sequence = next_sequence();
+    message.utime = unix_time();
+    send(bus_, bytes_of(message));
+  }
+  static constexpr int kKindsOfBad = 10;
+
+  /// Whether `command` is one of the good ones, whole.
+  bool is_one(const Command& command) const {
+    const std::int64_t i = command.sequence - first_;
+    if (i < 0 || i >= static_cast<std::int64_t>(sent_.size())) return false;
+    const command_t& message = sent_[static_cast<std::size_t>(i)];
+    return command.utime == message.utime && command.setpoint.wrench[5] == message.wrench[5] &&
+           command.setpoint.joint_position[kJoints - 1] == message.joint_position[kJoints - 1] &&
+           command.setpoint.gains.joint_damping(6, 5) == message.joint_damping[6][5];
+  }
+  bool is_last(const Command& command) const {
+    return is_one(command) && command.sequence == sent_.back().sequence;
+  }
+
+ private:
+  std::int64_t next_sequence() const { return first_ + static_cast<std::int64_t>(sent_.size()); }
+
+  lcm::LCM& bus_;
+  Random random_;
+  std::int64_t first_;
+  std::vector<command_t> sent_;
+};
+
+/// Waits until the receiver has judged so many messages; false after ten seconds.
+bool wait_for(const CommandReceiver& receiver, std::int64_t judged) {
+  for (int i = 0; i < 10'000; ++i) {
+    if (receiver.count(Verdict::kAccepted) + receiver.rejected() >= judged) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return false;
+}
+
+/// Waits until the sequence has come through; false after ten seconds.
+bool wait_for_sequence(CommandReceiver& receiver, std::int64_t sequence) {
+  for (int i = 0; i < 10'000; ++i) {
+    if (receiver.fetch() && receiver.command().sequence == sequence) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return false;
+}
+
+TEST(CommandReceiver, HandsOnGoodCommands) {
+  const auto bus = open_bus("memq://");
+  CommandReceiver receiver(bus, patient_limits());
+  EXPECT_FALSE(receiver.fetch());
+  EXPECT_EQ(receiver.command().parts, 0);
+  Sender sender(*bus, 961);
+  for (int i = 1; i <= 20; ++i) {
+    ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));
+    EXPECT_TRUE(sender.is_last(receiver.command()));
+    EXPECT_FALSE(receiver.fetch());  // nothing new
+  }
+  EXPECT_EQ(receiver.count(Verdict::kAccepted), 20);
+  EXPECT_EQ(receiver.rejected(), 0);
+}
+
+TEST(CommandReceiver, KeepsTheLastGoodCommandUnderAttack) {
+  const auto bus = open_bus("memq://");
+  CommandReceiver receiver(bus, patient_limits());
+  Sender sender(*bus, 962);
+  std::int64_t judged = 0;
+  for (int round = 0; round < 50; ++round) {
+    ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));
+    ++judged;
+    sender.send_bad();
+    judged += Sender::kKindsOfBad;
+    ASSERT_TRUE(wait_for(receiver, judged));
+    EXPECT_FALSE(receiver.fetch());
+    EXPECT_TRUE(sender.is_last(receiver.command()));
+  }
+  EXPECT_EQ(receiver.count(Verdict::kAccepted), 50);
+  EXPECT_EQ(receiver.rejected(), 50 * Sender::kKindsOfBad);
+  EXPECT_EQ(receiver.count(Verdict::kMalformed), 50 * 4);
+  for (const Verdict verdict : {Verdict::kReplayed, Verdict::kStale, Verdict::kFromFuture,
+                                Verdict::kNotFinite, Verdict::kOutOfLimits, Verdict::kWrongSize}) {
+    EXPECT_EQ(receiver.count(verdict), 50) << to_text(verdict);
+  }
+}
+
+// Several senders at full speed, while the real-time thread reads at every tick: what it reads is
+// always a whole command of the good sender.
+TEST(CommandReceiver, IsNotConfusedByAFlood) {
+  const auto bus = open_bus("memq://");
+  CommandReceiver receiver(bus, patient_limits());
+  std::atomic<bool> stop{false};
+  std::vector<std::thread> flood;
+  for (std::uint64_t seed = 963; seed < 965; ++seed) {
+    flood.emplace_back([&bus, &stop, seed] {
+      std::mt19937_64 engine(seed);
+      while (!stop.load()) {
+        Bytes bytes(engine() % 2000);
+        for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(engine());
+        send(*bus, bytes);
+        std::this_thread::sleep_for(std::chrono::microseconds(20));
+      }
+    });
+  }
+  Sender sender(*bus, 966);
+  int came_through = 0;
+  for (int i = 0; i < 50; ++i) {
+    sender.send_good();
+    for (int tick = 0; tick < 5; ++tick) {
+      if (receiver.fetch()) {
+        EXPECT_TRUE(sender.is_one(receiver.command()));
+        ++came_through;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+  stop.store(true);
+  for (std::thread& thread : flood) thread.join();
+  ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));  // it works as before
+  EXPECT_TRUE(sender.is_last(receiver.command()));
+  EXPECT_GT(came_through, 0);
+  EXPECT_GT(receiver.count(Verdict::kMalformed), 100);
+  EXPECT_EQ(receiver.rejected(), receiver.count(Verdict::kMalformed));
+}
+
+// A sender that starts again begins its sequence anew; it counts once its predecessor is forgotten.
+TEST(CommandReceiver, OutlivesItsSenders) {
+  // A port of this process alone, so that tests may run side by side.
+  const std::string url =
+      "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 30000) + "?ttl=0";
+  const auto bus = open_bus(url);
+  CommandReceiver receiver(bus, limits_for(kJoints));
+  for (const std::int64_t first_sequence : {1'000'000, 1}) {
+    const auto own_bus = open_bus(url);
+    Sender sender(*own_bus, 967, first_sequence);
+    bool through = false;
+    for (int i = 0; i < 2000 && !through; ++i) {
+      sender.send_good();
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      through = receiver.fetch();
+    }
+    if (!through && receiver.rejected() == 0) {
+      GTEST_SKIP() << "multicast does not work on this machine: " << url;
+    }
+    ASSERT_TRUE(through) << first_sequence;
+    EXPECT_TRUE(sender.is_one(receiver.command()));
+  }
+  EXPECT_GT(receiver.count(Verdict::kReplayed), 0);
+}
+
+TEST(CommandReceiver, EndsWhileNobodySends) {
+  for (int i = 0; i < 5; ++i) CommandReceiver receiver(open_bus("memq://"), limits_for(kJoints));
+}
+
+}  // namespace
+}  // namespace dashpot::lcmtypes

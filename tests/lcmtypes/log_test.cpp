@@ -1,0 +1,174 @@
+// Logs can be read back, by our reader and by the stock tools; damaged ones do no harm.
+#include <dashpot/lcmtypes/message_reader.hpp>
+#include <dashpot/lcmtypes/publisher.hpp>
+#include <dashpot/tests/lcmtypes/random_samples.hpp>
+#include <dashpot/tests/support/scratch.hpp>
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <stdexcept>
+
+namespace dashpot::lcmtypes {
+namespace {
+
+using ::testing::HasSubstr;
+using tests::Scratch;
+
+struct Event {
+  std::int64_t utime = 0;
+  Bytes bytes;
+  bool operator==(const Event&) const = default;
+};
+
+/// All our messages in a log, encoded again; and how many were malformed.
+std::vector<Event> read_log(const std::string& path, std::int64_t* malformed = nullptr) {
+  std::vector<Event> events;
+  MessageHandlers handlers;
+  std::int64_t utime = 0;
+  handlers.on_state = [&](const state_t& message) { events.push_back({utime, bytes_of(message)}); };
+  handlers.on_modes = [&](const modes_t& message) { events.push_back({utime, bytes_of(message)}); };
+  LogReader reader(path, handlers);
+  while (reader.read()) {
+    utime = reader.utime();
+    reader.handle();
+  }
+  if (malformed != nullptr) *malformed = handlers.malformed;
+  return events;
+}
+
+/// Publishes random samples into a log, and returns what it should hold.
+std::vector<Event> write_log(const std::string& path, int ticks) {
+  Random random(951);
+  std::vector<std::unique_ptr<Sink>> sinks;
+  sinks.push_back(make_log_sink(path));
+  Publisher publisher(std::move(sinks));
+  std::vector<Event> expected;
+  for (int tick = 1; tick <= ticks; ++tick) {
+    StateSample state = random_state(random, 7);
+    ModesSample modes = random_modes(random, 7);
+    state.utime = modes.utime = kNow + 1000 * tick;
+    publisher.offer(state);
+    publisher.offer(modes);
+    publisher.publish_pending();
+    expected.push_back({state.utime, bytes_of(message_of<state_t>(state))});
+    auto message = message_of<modes_t>(modes);
+    message.sequence = tick;
+    expected.push_back({modes.utime, bytes_of(message)});
+  }
+  return expected;
+}
+
+TEST(Log, GivesBackWhatWasPublished) {
+  const Scratch scratch;
+  const std::vector<Event> expected = write_log(scratch.path("a.lcm"), 200);
+  std::int64_t malformed = -1;
+  EXPECT_EQ(read_log(scratch.path("a.lcm"), &malformed), expected);
+  EXPECT_EQ(malformed, 0);
+}
+
+TEST(Log, IsTheSameTwice) {
+  const Scratch scratch;
+  write_log(scratch.path("a.lcm"), 50);
+  write_log(scratch.path("b.lcm"), 50);
+  EXPECT_EQ(scratch.read("a.lcm"), scratch.read("b.lcm"));
+}
+
+TEST(Log, IsReplayedByTheStockPlayer) {
+  const Scratch scratch;
+  const std::vector<Event> expected = write_log(scratch.path("a.lcm"), 100);
+  const std::string command = "lcm-logplayer --speed=1000 --lcm-url='file://" +
+                              scratch.path("b.lcm") + "?mode=w' " + scratch.path("a.lcm") + " >" +
+                              scratch.path("out") + " 2>&1";
+  ASSERT_EQ(std::system(command.c_str()), 0) << scratch.read("out");  // NOLINT: a fixed command
+  const std::vector<Event> replayed = read_log(scratch.path("b.lcm"));
+  ASSERT_EQ(replayed.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ(replayed[i].bytes, expected[i].bytes) << i;  // times are those of the replay
+  }
+}
+
+TEST(Log, IsReadThroughAFileUrl) {
+  const Scratch scratch;
+  const std::vector<Event> expected = write_log(scratch.path("a.lcm"), 100);
+  std::vector<Bytes> seen;
+  MessageHandlers handlers;
+  handlers.on_state = [&](const state_t& message) { seen.push_back(bytes_of(message)); };
+  handlers.on_modes = [&](const modes_t& message) { seen.push_back(bytes_of(message)); };
+  BusReader reader(open_bus("file://" + scratch.path("a.lcm") + "?speed=0"), handlers);
+  while (seen.size() < expected.size() && reader.wait(10'000)) {
+  }
+  ASSERT_EQ(seen.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(seen[i], expected[i].bytes) << i;
+}
+
+TEST(Log, EndsWhereItIsCutOff) {
+  const Scratch scratch;
+  const std::vector<Event> expected = write_log(scratch.path("a.lcm"), 20);
+  const std::string whole = scratch.read("a.lcm");
+  for (std::size_t size = 0; size < whole.size(); size += 997) {
+    const std::vector<Event> events = read_log(scratch.write("cut.lcm", whole.substr(0, size)));
+    ASSERT_LE(events.size(), expected.size());
+    for (std::size_t i = 0; i < events.size(); ++i) EXPECT_EQ(events[i], expected[i]) << size;
+  }
+}
+
+TEST(Log, DoesNoHarmWhenDamaged) {
+  constexpr std::uint64_t kSeed = 952;
+  Random random(kSeed);
+  const Scratch scratch;
+  write_log(scratch.path("a.lcm"), 10);
+  const std::string whole = scratch.read("a.lcm");
+  std::int64_t events = 0, malformed = 0;
+  for (int i = 0; i < 300; ++i) {
+    std::string damaged = whole;
+    for (int k = random.integer(1, 20); k > 0; --k) {
+      damaged[static_cast<std::size_t>(random.integer(0, static_cast<int>(whole.size()) - 1))] =
+          static_cast<char>(random.integer(0, 255));
+    }
+    std::int64_t bad = 0;
+    events +=
+        static_cast<std::int64_t>(read_log(scratch.write("damaged.lcm", damaged), &bad).size());
+    malformed += bad;
+  }
+  std::printf("seed %llu: %lld messages read, %lld malformed\n",
+              static_cast<unsigned long long>(kSeed), static_cast<long long>(events),
+              static_cast<long long>(malformed));
+  EXPECT_GT(events, 300);
+  EXPECT_GT(malformed, 10);
+}
+
+TEST(Log, NamesTheFileThatCannotBeOpened) {
+  const std::string path = "/nonexistent/a.lcm";
+  MessageHandlers handlers;
+  const auto message_of_error = [](const auto& act) -> std::string {
+    try {
+      act();
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "nothing thrown";
+  };
+  EXPECT_EQ(message_of_error([&] { make_log_sink(path); }),
+            path + ": cannot write the log: No such file or directory");
+  EXPECT_EQ(message_of_error([&] { LogReader reader(path, handlers); }),
+            path + ": cannot read the log: No such file or directory");
+  EXPECT_THAT(message_of_error([] { open_bus("nonsense://"); }), HasSubstr("nonsense://"));
+}
+
+TEST(DefaultUrl, IsLocalUnlessTheEnvironmentSaysOtherwise) {
+  const char* before = std::getenv("LCM_DEFAULT_URL");
+  const std::string saved = before != nullptr ? before : "";
+  unsetenv("LCM_DEFAULT_URL");
+  EXPECT_EQ(default_url(), "udpm://239.255.76.67:7667?ttl=0");
+  setenv("LCM_DEFAULT_URL", "memq://", 1);
+  EXPECT_EQ(default_url(), "memq://");
+  if (before != nullptr) {
+    setenv("LCM_DEFAULT_URL", saved.c_str(), 1);
+  } else {
+    unsetenv("LCM_DEFAULT_URL");
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::lcmtypes

@@ -1,0 +1,317 @@
+// What the real-time thread offers is published once, in order, and never holds it up.
+#include <dashpot/lcmtypes/message_check.hpp>
+#include <dashpot/lcmtypes/publisher.hpp>
+#include <dashpot/tests/lcmtypes/random_samples.hpp>
+
+#include <gmock/gmock.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <stdexcept>
+
+namespace dashpot::lcmtypes {
+namespace {
+
+using ::testing::ElementsAre;
+
+/// What a sink has got; it may be held up.
+struct Received {
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool held_up = false;
+  bool waiting = false;  ///< a message is at the sink and cannot get through
+  std::vector<state_t> states;
+  std::vector<modes_t> modes;
+  std::vector<std::int64_t> times;
+  std::vector<std::string> order;
+};
+
+class MemorySink : public Sink {
+ public:
+  explicit MemorySink(Received& received) : received_(received) {}
+
+  bool send(const std::string& channel, const Bytes& bytes, std::int64_t utime) override {
+    std::unique_lock lock(received_.mutex);
+    received_.waiting = received_.held_up;
+    received_.changed.notify_all();
+    received_.changed.wait(lock, [this] { return !received_.held_up; });
+    received_.waiting = false;
+    received_.times.push_back(utime);
+    received_.order.push_back(channel);
+    if (channel == kStateChannel) {
+      return decode(bytes.data(), bytes.size(), received_.states.emplace_back());
+    }
+    return decode(bytes.data(), bytes.size(), received_.modes.emplace_back());
+  }
+
+ private:
+  Received& received_;
+};
+
+class FailingSink : public Sink {
+ public:
+  bool send(const std::string&, const Bytes&, std::int64_t) override { return false; }
+};
+
+std::vector<std::unique_ptr<Sink>> sink_into(Received& received) {
+  std::vector<std::unique_ptr<Sink>> sinks;
+  sinks.push_back(std::make_unique<MemorySink>(received));
+  return sinks;
+}
+
+StateSample state_at(std::int64_t tick) {
+  StateSample sample;
+  sample.utime = kNow + 1000 * tick;
+  sample.snapshot.tick = static_cast<std::uint64_t>(tick);
+  for (auto* vector :
+       {&sample.snapshot.position, &sample.snapshot.velocity, &sample.snapshot.torque,
+        &sample.snapshot.law_torque, &sample.snapshot.setpoint_position}) {
+    *vector = controller::JointVector::Constant(7, static_cast<double>(tick));
+  }
+  return sample;
+}
+
+std::vector<std::int64_t> ticks_of(const Received& received) {
+  std::vector<std::int64_t> ticks;
+  for (const state_t& message : received.states) ticks.push_back(message.tick);
+  return ticks;
+}
+
+TEST(Publisher, SendsEveryStateInOrder) {
+  Received received;
+  Publisher publisher(sink_into(received));
+  for (int tick = 1; tick <= 500; ++tick) publisher.offer(state_at(tick));
+  publisher.publish_pending();
+  ASSERT_EQ(received.states.size(), 500u);
+  for (int tick = 1; tick <= 500; ++tick) {
+    const auto i = static_cast<std::size_t>(tick - 1);
+    EXPECT_EQ(received.states[i].tick, tick);
+    EXPECT_EQ(received.states[i].joint_torque[6], tick);
+    EXPECT_EQ(received.times[i], kNow + 1000 * tick);
+  }
+  EXPECT_EQ(publisher.counters().states, 500);
+  EXPECT_EQ(publisher.counters().states_dropped, 0);
+}
+
+TEST(Publisher, SendsEveryNthState) {
+  Received received;
+  PublisherOptions options;
+  options.state_every = 3;
+  Publisher publisher(sink_into(received), options);
+  for (int tick = 1; tick <= 10; ++tick) publisher.offer(state_at(tick));
+  publisher.publish_pending();
+  EXPECT_THAT(ticks_of(received), ElementsAre(1, 4, 7, 10));
+}
+
+TEST(Publisher, CountsWhatFindsNoRoomAndSaysSoInTheNextMessage) {
+  Received received;
+  PublisherOptions options;
+  options.queue = 4;
+  Publisher publisher(sink_into(received), options);
+  for (int tick = 1; tick <= 10; ++tick) publisher.offer(state_at(tick));
+  publisher.publish_pending();
+  EXPECT_THAT(ticks_of(received), ElementsAre(1, 2, 3, 4));
+  publisher.offer(state_at(11));
+  publisher.publish_pending();
+  EXPECT_EQ(received.states.back().tick, 11);
+  EXPECT_EQ(received.states.back().states_dropped, 6);
+  EXPECT_EQ(publisher.counters().states_dropped, 6);
+}
+
+TEST(Publisher, LeavesNothingBehind) {
+  for (const bool threaded : {false, true}) {
+    Received received;
+    {
+      Publisher publisher(sink_into(received));
+      if (threaded) publisher.start();
+      for (int tick = 1; tick <= 100; ++tick) publisher.offer(state_at(tick));
+    }
+    EXPECT_EQ(received.states.size(), 100u);
+  }
+}
+
+TEST(Publisher, CountsLostMessagesAndServesTheOtherSinks) {
+  Received received;
+  auto sinks = sink_into(received);
+  sinks.insert(sinks.begin(), std::make_unique<FailingSink>());
+  Publisher publisher(std::move(sinks));
+  for (int tick = 1; tick <= 3; ++tick) publisher.offer(state_at(tick));
+  publisher.publish_pending();
+  EXPECT_THAT(ticks_of(received), ElementsAre(1, 2, 3));
+  EXPECT_EQ(publisher.counters().send_errors, 3);
+  EXPECT_EQ(publisher.counters().states, 3);
+}
+
+// A sink that hangs: the writer goes on for thousands of ticks, and once the sink moves again, all
+// that was in the queue arrives in order and the rest is counted.
+TEST(Publisher, IsNeverHeldUpByASlowSink) {
+  constexpr int kTicks = 5000;
+  Received received;
+  received.held_up = true;
+  {
+    Publisher publisher(sink_into(received));
+    publisher.start();
+    publisher.offer(state_at(1));
+    {
+      std::unique_lock lock(received.mutex);
+      received.changed.wait(lock, [&] { return received.waiting; });
+    }
+    Random random(941);
+    const ModesSample modes = random_modes(random, 7);
+    for (int tick = 2; tick <= kTicks; ++tick) {
+      publisher.offer(state_at(tick));  // would never return if it waited for the sink
+      publisher.offer(modes);
+    }
+    EXPECT_EQ(publisher.counters().states, 0);
+    EXPECT_EQ(publisher.counters().states_dropped, kTicks - 1 - 1024);
+    const std::lock_guard lock(received.mutex);
+    received.held_up = false;
+    received.changed.notify_all();
+  }
+  ASSERT_EQ(received.states.size(), 1025u);
+  for (std::size_t i = 0; i < received.states.size(); ++i) {
+    EXPECT_EQ(received.states[i].tick, static_cast<std::int64_t>(i) + 1);
+  }
+  EXPECT_EQ(received.states.back().states_dropped, kTicks - 1 - 1024);
+  EXPECT_EQ(received.modes.size(), 1u);
+}
+
+TEST(Publisher, HandsWholeSamplesFromThreadToThread) {
+  constexpr int kTicks = 20'000;
+  Received received;
+  std::int64_t dropped = 0;
+  {
+    Publisher publisher(sink_into(received));
+    publisher.start();
+    Random random(942);
+    ModesSample modes = random_modes(random, 7);
+    for (int tick = 1; tick <= kTicks; ++tick) {
+      publisher.offer(state_at(tick));
+      modes.vibration.tick = static_cast<std::uint64_t>(tick);
+      modes.vibration.position.setConstant(tick);
+      publisher.offer(modes);
+      if (tick % 500 == 0) std::this_thread::yield();
+    }
+    dropped = publisher.counters().states_dropped;
+  }
+  EXPECT_EQ(static_cast<std::int64_t>(received.states.size()) + dropped, kTicks);
+  std::int64_t last = 0;
+  for (const state_t& message : received.states) {
+    ASSERT_GT(message.tick, last);
+    last = message.tick;
+    for (std::size_t i = 0; i < 7; ++i) {
+      ASSERT_EQ(message.joint_position[i], static_cast<double>(message.tick));
+      ASSERT_EQ(message.joint_torque[i], static_cast<double>(message.tick));
+    }
+  }
+  last = 0;
+  for (const modes_t& message : received.modes) {
+    ASSERT_GT(message.tick, last);
+    last = message.tick;
+    for (const double q : message.joint_position) ASSERT_EQ(q, static_cast<double>(last));
+  }
+  EXPECT_EQ(last, kTicks);  // whatever was skipped, the newest arrives
+}
+
+class ModesPublisher : public ::testing::Test {
+ protected:
+  ModesPublisher() : random_(943), publisher_(sink_into(received_)) {
+    modes_.vibration.position = random_.vector(7);
+    modes_.utime = kNow;
+    modes_.vibration.count = 2;
+    modes_.vibration.zero_modes = 5;
+    for (std::size_t i = 0; i < 2; ++i) {
+      modes_.vibration.modes[i].natural_frequency = 20 - 5.0 * static_cast<double>(i);
+      modes_.vibration.modes[i].damping_ratio = 0.4;
+    }
+  }
+
+  /// Offers the modes again some time later, and says whether they were published.
+  bool is_published(std::int64_t later) {
+    const std::size_t before = received_.modes.size();
+    modes_.utime += later;
+    publisher_.offer(modes_);
+    publisher_.publish_pending();
+    return received_.modes.size() > before;
+  }
+
+  Random random_;
+  Received received_;
+  Publisher publisher_;
+  ModesSample modes_;
+};
+
+TEST_F(ModesPublisher, SkipsWhatIsUnchanged) {
+  EXPECT_TRUE(is_published(0));
+  for (int i = 0; i < 9; ++i) EXPECT_FALSE(is_published(100'000));
+  EXPECT_EQ(publisher_.counters().modes, 1);
+  EXPECT_EQ(publisher_.counters().modes_skipped, 9);
+}
+
+TEST_F(ModesPublisher, RepeatsWhatIsUnchangedOncePerHeartbeat) {
+  int published = 0;
+  for (int i = 0; i < 1000; ++i) published += is_published(10'000);
+  EXPECT_EQ(published, 10);
+  EXPECT_EQ(received_.modes.back().sequence, 10);
+}
+
+TEST_F(ModesPublisher, PublishesEveryChangeOfUse) {
+  ASSERT_TRUE(is_published(0));
+  controller::Vibration& vibration = modes_.vibration;
+  vibration.position[3] += 2e-6;
+  EXPECT_TRUE(is_published(1000)) << "position";
+  vibration.modes[1].natural_frequency *= 1 + 2e-6;
+  EXPECT_TRUE(is_published(1000)) << "frequency";
+  vibration.modes[0].damping_ratio *= 1 - 2e-6;
+  EXPECT_TRUE(is_published(1000)) << "ratio";
+  vibration.modes[0].natural_frequency = NAN;
+  EXPECT_TRUE(is_published(1000)) << "frequency lost";
+  EXPECT_FALSE(is_published(1000)) << "still lost";
+  vibration.modes[0].kind = analysis::ModeKind::kUnstable;
+  EXPECT_TRUE(is_published(1000)) << "kind";
+  modes_.labels[1] = 7;
+  EXPECT_TRUE(is_published(1000)) << "label";
+  vibration.status = analysis::Status::kUncertified;
+  EXPECT_TRUE(is_published(1000)) << "status";
+  vibration.zero_modes = 4;
+  EXPECT_TRUE(is_published(1000)) << "zero modes";
+  vibration.count = 3;
+  EXPECT_TRUE(is_published(1000)) << "number of modes";
+  vibration.position[0] = NAN;
+  EXPECT_TRUE(is_published(1000)) << "not a position";
+}
+
+// Slow drift does not creep past the tolerance: changes count from what was published.
+TEST_F(ModesPublisher, FollowsASlowDrift) {
+  ASSERT_TRUE(is_published(0));
+  int published = 0;
+  for (int i = 0; i < 100; ++i) {
+    modes_.vibration.position[2] += 0.25e-6;
+    published += is_published(1000);
+  }
+  EXPECT_EQ(published, 20);
+}
+
+TEST_F(ModesPublisher, CountsItsMessages) {
+  for (int i = 1; i <= 5; ++i) {
+    modes_.vibration.position[0] += 1;
+    ASSERT_TRUE(is_published(1000));
+    EXPECT_EQ(received_.modes.back().sequence, i);
+  }
+}
+
+TEST(PublisherOptions, AreChecked) {
+  const auto make = [](const PublisherOptions& options) { Publisher publisher({}, options); };
+  PublisherOptions options;
+  options.state_every = 0;
+  EXPECT_THROW(make(options), std::invalid_argument);
+  options = {};
+  options.modes_heartbeat = NAN;
+  EXPECT_THROW(make(options), std::invalid_argument);
+  options = {};
+  options.modes_tolerance = -1;
+  EXPECT_THROW(make(options), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dashpot::lcmtypes
