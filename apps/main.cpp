@@ -28,6 +28,7 @@ int run(int argc, char** argv) {
   program.footer(kExitStatusHelp);
   add_analyze(program);
   add_inspect(program);
+  add_monitor(program);
 
   const auto name = [&program] {
     const auto chosen = program.get_subcommands();

@@ -1,3 +1,4 @@
+#include <dashpot/apps/shape_text.hpp>
 #include <dashpot/apps/table_writer.hpp>
 #include <dashpot/apps/text_table.hpp>
 
@@ -6,7 +7,6 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
-#include <numeric>
 #include <utility>
 
 namespace dashpot::apps {
@@ -18,40 +18,6 @@ constexpr const char* kShapeHeading = "shape, relative to its largest entry (pha
 
 std::string count(Eigen::Index n, const std::string& what) {
   return (n == 0 ? "no" : std::to_string(n)) + " " + what + (n == 1 ? "" : "s");
-}
-
-std::string joint(Eigen::Index i) {
-  return "q" + std::to_string(i + 1);
-}
-
-/// "q2 - 0.43 q5 + 0.21 q1 (95 deg)": entries relative to the largest, by falling size, without the
-/// small ones; with the phase where an entry is not in step with the largest.
-std::string format_shape(const Eigen::VectorXcd& shape, std::size_t width) {
-  constexpr double kSmall = 0.02;
-  constexpr double kInStep = 0.176;  // tangent of 10 degrees
-  if (shape.size() == 0) return "";
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(shape.size()));
-  std::iota(order.begin(), order.end(), 0);
-  // In single precision, so that equal entries stay in order whatever their rounding errors.
-  const Eigen::VectorXf size = shape.cwiseAbs().cast<float>();
-  std::stable_sort(order.begin(), order.end(),
-                   [&size](Eigen::Index i, Eigen::Index j) { return size[i] > size[j]; });
-  std::string text = joint(order[0]);
-  for (std::size_t k = 1; k < order.size(); ++k) {
-    const analysis::Complex ratio = shape[order[k]] / shape[order[0]];
-    if (!(std::abs(ratio) >= kSmall)) break;
-    const bool in_step = std::abs(ratio.imag()) <= kInStep * std::abs(ratio.real());
-    std::string term = in_step && ratio.real() < 0 ? " - " : " + ";
-    if (std::abs(ratio) < 1 - 5e-3) term += format_number(std::abs(ratio), 2) + " ";
-    term += joint(order[k]);
-    if (!in_step) {
-      term +=
-          " (" + std::to_string(std::lround(std::arg(ratio) * 180 / std::numbers::pi)) + " deg)";
-    }
-    if (text.size() + term.size() + 4 > width) return text + " ...";
-    text += term;
-  }
-  return text;
 }
 
 /// What follows the real part of the first eigenvalue: the imaginary part of a complex pair, or the
@@ -143,7 +109,7 @@ class Writer {
             (spectrum.coupled ? ", solved together.\n" : ", independent.\n");
     out_ += "  The constraint matrix (--json) eliminates";
     for (std::size_t i = 0; i < report.removal.eliminated.size(); ++i) {
-      out_ += (i == 0 ? " " : ", ") + joint(report.removal.eliminated[i]);
+      out_ += (i == 0 ? " " : ", ") + joint_name(report.removal.eliminated[i]);
     }
     out_ += ".\n";
   }
@@ -170,7 +136,7 @@ class Writer {
       TextTable table;
       table.add_column(Align::kPoint, {"t, s"});
       for (Eigen::Index i = first; i < std::min(first + kColumns, n); ++i) {
-        table.add_column(Align::kRight, {joint(i)});
+        table.add_column(Align::kRight, {joint_name(i)});
         std::vector<double> values;
         for (const analysis::Motion& motion : response.motions) {
           const double value = (motion.*part)[i];

@@ -13,6 +13,11 @@ std::string default_url() {
 
 std::shared_ptr<lcm::LCM> open_bus(const std::string& url) {
   const std::string chosen = url.empty() ? default_url() : url;
+  const auto begins = [&chosen](const char* provider) { return chosen.starts_with(provider); };
+  if (!begins("udpm://") && !begins("memq://") && !begins("file://") && !begins("tcpq://")) {
+    throw std::runtime_error("cannot open the LCM bus " + chosen +
+                             ": it begins with none of udpm://, memq://, file://, tcpq://");
+  }
   auto bus = std::make_shared<lcm::LCM>(chosen);
   if (!bus->good()) throw std::runtime_error("cannot open the LCM bus " + chosen);
   return bus;

@@ -1,0 +1,51 @@
+#pragma once
+#include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/lcmtypes/state_t.hpp>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace dashpot::apps {
+
+/// What `dashpot monitor` shows: the last messages, and what they add up to.
+class MonitorView {
+ public:
+  void take(const state_t& message);
+  void take(const modes_t& message);
+
+  bool empty() const { return !state_ && !modes_; }
+  /// Time of the last message, s since the first one.
+  double time() const { return 1e-6 * static_cast<double>(last_utime_ - first_utime_); }
+
+  /// Everything, as a screen of text. `bold` marks headings for a terminal.
+  std::string screen(bool bold) const;
+  /// The same on one line, ended by a newline.
+  std::string line() const;
+  /// What all messages add up to, and the modes at the end; `malformed` were not shown.
+  std::string summary(std::int64_t malformed) const;
+
+ private:
+  void note_time(std::int64_t utime);
+  std::string health() const;
+  std::string joints() const;
+  std::string modes_table() const;
+
+  std::optional<state_t> state_;
+  std::optional<modes_t> modes_;
+  std::int64_t first_utime_ = 0;  // us
+  std::int64_t last_utime_ = 0;   // us
+  // Ticks a second: over about the last second
+  std::int64_t rate_utime_ = 0;  // us
+  std::int64_t rate_tick_ = 0;
+  double rate_ = 0;  // 1/s
+  // Sums
+  std::int64_t states_ = 0;
+  std::int64_t modes_messages_ = 0;
+  std::int64_t modes_lost_ = 0;  // by their sequence
+  std::array<std::int64_t, 256> statuses_{};
+  double largest_error_ = 0;  // of the tip, m
+};
+
+}  // namespace dashpot::apps

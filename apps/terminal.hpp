@@ -1,0 +1,29 @@
+#pragma once
+#include <string>
+
+namespace dashpot::apps {
+
+/// From its construction on, Ctrl-C (SIGINT) and SIGTERM do not end the program but are noted.
+class StopSignal {
+ public:
+  StopSignal();
+  static bool given();
+};
+
+/// Whether standard output is a terminal.
+bool on_terminal();
+
+/// The whole terminal for a text that is drawn again and again in its place; what was there before
+/// comes back at the end.
+class FullScreen {
+ public:
+  FullScreen();
+  ~FullScreen();
+  FullScreen(const FullScreen&) = delete;
+  FullScreen& operator=(const FullScreen&) = delete;
+
+  /// As much of `text` as fits.
+  void draw(const std::string& text);
+};
+
+}  // namespace dashpot::apps

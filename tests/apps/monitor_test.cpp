@@ -1,0 +1,279 @@
+// `dashpot monitor` on logs, on a live bus and on a terminal.
+#include <dashpot/lcmtypes/encode.hpp>
+#include <dashpot/lcmtypes/publisher.hpp>
+#include <dashpot/tests/apps/run_program.hpp>
+
+#include <gmock/gmock.h>
+#include <poll.h>
+#include <pty.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <sstream>
+#include <thread>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+constexpr std::int64_t kStart = 1'700'000'000'000'000;  // us
+
+lcmtypes::StateSample state_at(int tick) {
+  lcmtypes::StateSample sample;
+  sample.utime = kStart + 1000LL * tick;
+  controller::Snapshot& snapshot = sample.snapshot;
+  snapshot.tick = static_cast<std::uint64_t>(tick);
+  snapshot.restarts = 1;
+  snapshot.mode = controller::Mode::kCartesian;
+  snapshot.status = tick % 10 == 0 ? controller::Status::kTorqueLimited : controller::Status::kOk;
+  for (auto* vector : {&snapshot.position, &snapshot.velocity, &snapshot.torque,
+                       &snapshot.law_torque, &snapshot.setpoint_position}) {
+    *vector = controller::JointVector::LinSpaced(7, 0.1, 0.7);
+  }
+  snapshot.tip_error << 0.003, 0.004, 0, 0, 0, 0.01;
+  sample.health.tick_time = 12'300;
+  sample.health.longest_tick_time = 45'600;
+  sample.health.overruns = 2;
+  return sample;
+}
+
+/// The robot turns, so that every one is published.
+lcmtypes::ModesSample modes_at(int tick) {
+  lcmtypes::ModesSample sample;
+  sample.utime = kStart + 1000LL * tick;
+  controller::Vibration& vibration = sample.vibration;
+  vibration.tick = static_cast<std::uint64_t>(tick);
+  vibration.position = controller::JointVector::Constant(7, 1e-3 * tick);
+  vibration.zero_modes = 1;
+  vibration.count = 2;
+  for (std::size_t i = 0; i < 2; ++i) {
+    controller::VibrationMode& mode = vibration.modes[i];
+    mode.natural_frequency = i == 0 ? 20.234 : 9.761;
+    mode.damping_ratio = i == 0 ? 0.25 : 1.5;
+    mode.kind = i == 0 ? analysis::ModeKind::kUnderdamped : analysis::ModeKind::kOverdamped;
+    mode.natural_frequency_bound = 2.5e-13;
+    mode.shape.setZero(7);
+    mode.shape[static_cast<Eigen::Index>(i)] = 1;
+    mode.shape[5] = -0.5;
+  }
+  return sample;
+}
+
+/// `ticks` states, 1 ms apart, and modes with every hundredth.
+void publish(lcmtypes::Publisher& publisher, int ticks) {
+  for (int tick = 1; tick <= ticks; ++tick) {
+    publisher.offer(state_at(tick));
+    if (tick % 100 == 0) publisher.offer(modes_at(tick));
+    publisher.publish_pending();
+  }
+}
+
+std::string make_log(const Scratch& scratch, int ticks) {
+  const std::string path = scratch.path("run.lcm");
+  std::vector<std::unique_ptr<lcmtypes::Sink>> sinks;
+  sinks.push_back(lcmtypes::make_log_sink(path));
+  lcmtypes::Publisher publisher(std::move(sinks));
+  publish(publisher, ticks);
+  return path;
+}
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+TEST(Monitor, ShowsALineForEverySecondOfALog) {
+  const Scratch scratch;
+  const Outcome outcome = run_program({"monitor", "--log", make_log(scratch, 5500)});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_EQ(outcome.err, "");
+  const std::vector<std::string> lines = lines_of(outcome.out);
+  ASSERT_GT(lines.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_THAT(lines[i], AllOf(StartsWith(std::to_string(i) + ".0 s  tick "),
+                                HasSubstr("tick 12.3 us (longest 45.6), 2 overruns")));
+  }
+  EXPECT_THAT(lines[0], Not(HasSubstr("modes")));  // there are none yet
+  EXPECT_THAT(lines[3], AllOf(HasSubstr("1000 ticks/s"), HasSubstr("20.23 (0.250) 9.761 (1.50)")));
+  EXPECT_EQ(lines[6], "");  // the summary follows
+}
+
+TEST(Monitor, EndsALogWithASummary) {
+  const Scratch scratch;
+  const Outcome outcome = run_program({"monitor", "--log", make_log(scratch, 2000)});
+  EXPECT_THAT(outcome.out, HasSubstr("\n2000 states and 20 modes messages over 2.0 s; "
+                                     "0 modes messages lost, 0 messages malformed\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("  ok: 1800 states\n"));
+  EXPECT_THAT(outcome.out, HasSubstr(": 200 states\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("2 overruns, longest 45.6 us; largest tip error 5.00 mm\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("2 modes, 1 zero mode at tick 2000, solved anew: ok\n"));
+  const std::string last = lines_of(outcome.out).back();
+  EXPECT_THAT(last, AllOf(HasSubstr("2   9.76100"), HasSubstr("overdamped"), HasSubstr("2.5e-13"),
+                          HasSubstr("q2 - 0.50 q6")));
+}
+
+TEST(Monitor, CountsMalformedAndLostMessages) {
+  const Scratch scratch;
+  const std::string path = scratch.path("bad.lcm");
+  {
+    const auto sink = lcmtypes::make_log_sink(path);
+    std::vector<std::uint8_t> bytes(100, 0xab);
+    EXPECT_TRUE(sink->send(lcmtypes::kStateChannel, bytes, kStart));
+    EXPECT_TRUE(sink->send(lcmtypes::kModesChannel, bytes, kStart));
+    EXPECT_TRUE(sink->send("SOMETHING_ELSE", bytes, kStart));
+    modes_t message{};
+    lcmtypes::fill(modes_at(1), message);
+    for (const int sequence : {1, 2, 6}) {
+      message.sequence = sequence;
+      lcmtypes::encode(message, bytes);
+      EXPECT_TRUE(sink->send(lcmtypes::kModesChannel, bytes, kStart));
+    }
+  }
+  const Outcome outcome = run_program({"monitor", "--log", path});
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_THAT(outcome.out, HasSubstr("0 states and 3 modes messages over 0.0 s; "
+                                     "3 modes messages lost, 2 messages malformed\n"));
+}
+
+TEST(Monitor, SaysThatALogIsEmpty) {
+  const Scratch scratch;
+  const Outcome outcome = run_program({"monitor", "--log", scratch.write("empty.lcm", "")});
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_THAT(outcome.out, StartsWith("\n0 states and 0 modes messages"));
+}
+
+TEST(Monitor, NamesWhatIsWrongWithItsInput) {
+  const auto expect_error = [](const std::vector<std::string>& arguments, const std::string& text) {
+    const Outcome outcome = run_program(arguments);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
+    EXPECT_THAT(outcome.err, AllOf(StartsWith("dashpot monitor: "), HasSubstr(text)));
+  };
+  expect_error({"monitor", "--log", "/nonexistent/a.lcm"},
+               "/nonexistent/a.lcm: cannot read the log: No such file or directory");
+  expect_error({"monitor", "--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x");
+  expect_error({"monitor", "--log", "a", "--lcm-url", "memq://"}, "--lcm-url");
+  expect_error({"monitor", "--log", "a", "--speed", "-1"}, "--speed");
+}
+
+/// A `dashpot monitor` that runs beside the test, on a terminal of its own.
+class OnTerminal {
+ public:
+  explicit OnTerminal(std::vector<std::string> arguments) {
+    std::vector<char*> argv = {const_cast<char*>(DASHPOT_PROGRAM)};
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    const winsize size = {40, 120, 0, 0};
+    child_ = forkpty(&terminal_, nullptr, nullptr, &size);
+    if (child_ == 0) {
+      execv(argv[0], argv.data());
+      _exit(127);
+    }
+  }
+  OnTerminal(const OnTerminal&) = delete;
+  OnTerminal& operator=(const OnTerminal&) = delete;
+  ~OnTerminal() {
+    if (child_ > 0) kill(child_, SIGKILL), waitpid(child_, nullptr, 0);
+    close(terminal_);
+  }
+
+  /// Reads until `text` appears; false if it has not within ten seconds.
+  bool wait_for(const std::string& text) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    while (shown_.find(text) == std::string::npos) {
+      if (std::chrono::steady_clock::now() > end || !read_some(10'000)) return false;
+    }
+    return true;
+  }
+  /// Ctrl-C.
+  void interrupt() const { EXPECT_EQ(write(terminal_, "\003", 1), 1); }
+  /// Reads to the end; the exit status.
+  int finish() {
+    while (read_some(10'000)) {
+    }
+    int status = 0;
+    waitpid(child_, &status, 0);
+    child_ = 0;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+  const std::string& shown() const { return shown_; }
+
+ private:
+  bool read_some(int milliseconds) {
+    pollfd ready = {terminal_, POLLIN, 0};
+    if (poll(&ready, 1, milliseconds) <= 0) return false;
+    char buffer[4096];
+    const ssize_t size = read(terminal_, buffer, sizeof buffer);
+    if (size > 0) shown_.append(buffer, static_cast<std::size_t>(size));
+    return size > 0;
+  }
+
+  pid_t child_ = 0;
+  int terminal_ = -1;
+  std::string shown_;
+};
+
+TEST(Monitor, UpdatesATerminalInPlaceAndLeavesItClean) {
+  const Scratch scratch;
+  OnTerminal monitor({"monitor", "--log", make_log(scratch, 700), "--speed", "2"});
+  EXPECT_EQ(monitor.finish(), 0);
+  const std::string& shown = monitor.shown();
+  EXPECT_THAT(shown, StartsWith("\033[?1049h\033[?25l\033[?7l\033[H"));
+  const std::size_t end = shown.find("\033[?7h\033[?25h\033[?1049l");
+  ASSERT_NE(end, std::string::npos);
+  const std::string drawn = shown.substr(0, end);
+  EXPECT_THAT(drawn, HasSubstr("\033[1mModes\033[0m"));
+  EXPECT_THAT(drawn, HasSubstr("2 modes, 1 zero mode at tick"));
+  int screens = 0;
+  for (std::size_t at = 0; (at = drawn.find("\033[H", at)) != std::string::npos; ++at) ++screens;
+  EXPECT_GE(screens, 2);
+  EXPECT_LE(screens, 700 / 2);  // not one for each message
+  EXPECT_THAT(shown.substr(end), HasSubstr("700 states and 7 modes messages over 0.7 s"));
+}
+
+std::string own_url() {
+  // A port of this process alone, so that tests may run side by side.
+  return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 30000) + "?ttl=0";
+}
+
+TEST(Monitor, FollowsABusUntilCtrlC) {
+  const std::string url = own_url();
+  std::vector<std::unique_ptr<lcmtypes::Sink>> sinks;
+  sinks.push_back(lcmtypes::make_bus_sink(lcmtypes::open_bus(url)));
+  lcmtypes::Publisher publisher(std::move(sinks));
+  OnTerminal monitor({"monitor", "--lcm-url", url});
+  ASSERT_TRUE(monitor.wait_for("waiting for messages"));
+  std::atomic<bool> stop{false};
+  std::thread controller([&] {
+    while (!stop.load()) {
+      publish(publisher, 100);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  });
+  const bool seen = monitor.wait_for("2 modes, 1 zero mode at tick 100");
+  stop.store(true);
+  controller.join();
+  if (!seen) GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  monitor.interrupt();
+  EXPECT_EQ(monitor.finish(), 0);
+  EXPECT_THAT(monitor.shown(), HasSubstr("messages malformed\r\n"));
+}
+
+TEST(Monitor, WaitsForAControllerAndEndsOnCtrlCWithoutOne) {
+  OnTerminal monitor({"monitor", "--lcm-url", own_url()});
+  ASSERT_TRUE(monitor.wait_for("waiting for messages"));
+  monitor.interrupt();
+  EXPECT_EQ(monitor.finish(), 0);
+  EXPECT_THAT(monitor.shown(), HasSubstr("0 states and 0 modes messages"));
+}
+
+}  // namespace
+}  // namespace dashpot::tests
