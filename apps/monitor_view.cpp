@@ -110,8 +110,9 @@ std::string MonitorView::screen(bool bold) const {
     return bold ? "\033[1m" + text + "\033[0m\n" : text + "\n";
   };
   std::string out;
-  if (state_) out += heading("Loop") + health() + "\n" + joints() + "\n";
-  if (modes_) out += heading("Modes") + modes_table();
+  if (state_) out += heading("Loop") + health() + "\n";
+  if (modes_) out += heading("Modes") + modes_table() + "\n";
+  if (state_) out += heading("Joints") + joints();
   return out;
 }
 

@@ -18,10 +18,11 @@ using controller::Setpoint;
 using Verdict = CommandVerdict;
 
 constexpr std::int32_t kAllParts = 2 * command_t::NULL_GAINS - 1;
-constexpr double kUnitTolerance = 1e-3;      // of the length of a quaternion
-constexpr double kSymmetryTolerance = 1e-9;  // relative to the largest entry
+constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion
+// Relative to the largest entry; no wider than what the controller accepts
+constexpr double kSymmetryTolerance = 1e-9;
+constexpr double kDefiniteTolerance = 1e-11;
 
-/// The worst verdict wins: what is not finite is not compared with limits.
 Verdict first_fault(std::initializer_list<Verdict> verdicts) {
   for (const Verdict verdict : verdicts) {
     if (verdict != Verdict::kAccepted) return verdict;
@@ -42,12 +43,14 @@ template <class Matrix>
 Verdict judge_gains(Matrix& gains, double most) {
   const Verdict entries = judge_entries(gains, -most, most);
   if (entries != Verdict::kAccepted || gains.size() == 0) return entries;
-  const double tolerance = kSymmetryTolerance * gains.cwiseAbs().maxCoeff();
-  if ((gains - gains.transpose()).cwiseAbs().maxCoeff() > tolerance) return Verdict::kIndefinite;
+  const double largest = gains.cwiseAbs().maxCoeff();
+  const double skew = (gains - gains.transpose()).cwiseAbs().maxCoeff();
+  if (skew > kSymmetryTolerance * largest) return Verdict::kIndefinite;
   gains = (0.5 * (gains + gains.transpose())).eval();
   const Eigen::SelfAdjointEigenSolver<Matrix> solver(gains, Eigen::EigenvaluesOnly);
   if (solver.info() != Eigen::Success) return Verdict::kIndefinite;
-  return solver.eigenvalues().minCoeff() >= -tolerance ? Verdict::kAccepted : Verdict::kIndefinite;
+  const bool semidefinite = solver.eigenvalues().minCoeff() >= -kDefiniteTolerance * largest;
+  return semidefinite ? Verdict::kAccepted : Verdict::kIndefinite;
 }
 
 JointVector to_vector(const std::vector<double>& values) {
@@ -103,8 +106,7 @@ Verdict copy_tip_pose(const command_t& message, const CommandLimits& limits, Set
 
 Verdict copy_wrench(const command_t& message, const CommandLimits& limits, Setpoint& setpoint) {
   setpoint.wrench = Eigen::Map<const controller::Vector6>(message.wrench);
-  return first_fault({judge_entries(setpoint.wrench, -HUGE_VAL, HUGE_VAL),
-                      judge_entries(setpoint.wrench.head<3>(), -limits.force, limits.force),
+  return first_fault({judge_entries(setpoint.wrench.head<3>(), -limits.force, limits.force),
                       judge_entries(setpoint.wrench.tail<3>(), -limits.torque, limits.torque)});
 }
 

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <functional>
 #include <limits>
 
@@ -13,6 +12,7 @@ namespace {
 
 using Verdict = CommandVerdict;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t kSteady = 5'000'000;  // us
 
 Verdict judge(CommandFilter& filter, const command_t& message, std::int64_t later = 0) {
@@ -63,7 +63,7 @@ TEST(CommandFilter, LeavesAloneWhatNoCommandSet) {
   CommandFilter filter(limits_for(7));
   command_t message = random_command(random, 7);
   message.parts = command_t::JOINT_POSITION;
-  message.wrench[0] = NAN;  // not one of the parts: not looked at
+  message.wrench[0] = kNaN;  // not one of the parts: not looked at
   ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
   controller::Setpoint setpoint, before;
   before.wrench = random.vector(6);
@@ -106,21 +106,21 @@ const std::vector<Fault>& faults() {
       {"all bits", Verdict::kUnknown, [](command_t& m) { m.parts = -1; }},
       {"unknown mode", Verdict::kUnknown, [](command_t& m) { m.mode = 2; }},
       {"unknown frame", Verdict::kUnknown, [](command_t& m) { m.frame = -1; }},
-      {"position NaN", Verdict::kNotFinite, [](command_t& m) { m.joint_position[6] = NAN; }},
+      {"position NaN", Verdict::kNotFinite, [](command_t& m) { m.joint_position[6] = kNaN; }},
       {"position infinite", Verdict::kNotFinite,
        [](command_t& m) { m.joint_position[0] = -kInfinity; }},
-      {"tip NaN", Verdict::kNotFinite, [](command_t& m) { m.tip_position[1] = NAN; }},
-      {"quaternion NaN", Verdict::kNotFinite, [](command_t& m) { m.tip_quaternion[3] = NAN; }},
+      {"tip NaN", Verdict::kNotFinite, [](command_t& m) { m.tip_position[1] = kNaN; }},
+      {"quaternion NaN", Verdict::kNotFinite, [](command_t& m) { m.tip_quaternion[3] = kNaN; }},
       {"wrench infinite", Verdict::kNotFinite, [](command_t& m) { m.wrench[5] = kInfinity; }},
       {"joint stiffness NaN", Verdict::kNotFinite,
-       [](command_t& m) { m.joint_stiffness[3][4] = NAN; }},
+       [](command_t& m) { m.joint_stiffness[3][4] = kNaN; }},
       {"joint damping infinite", Verdict::kNotFinite,
        [](command_t& m) { m.joint_damping[6][6] = kInfinity; }},
       {"task stiffness NaN", Verdict::kNotFinite,
-       [](command_t& m) { m.task_stiffness[0][5] = NAN; }},
-      {"task damping NaN", Verdict::kNotFinite, [](command_t& m) { m.task_damping[5][5] = NAN; }},
-      {"null stiffness NaN", Verdict::kNotFinite, [](command_t& m) { m.null_stiffness[2] = NAN; }},
-      {"null damping NaN", Verdict::kNotFinite, [](command_t& m) { m.null_damping[2] = NAN; }},
+       [](command_t& m) { m.task_stiffness[0][5] = kNaN; }},
+      {"task damping NaN", Verdict::kNotFinite, [](command_t& m) { m.task_damping[5][5] = kNaN; }},
+      {"null stiffness NaN", Verdict::kNotFinite, [](command_t& m) { m.null_stiffness[2] = kNaN; }},
+      {"null damping NaN", Verdict::kNotFinite, [](command_t& m) { m.null_damping[2] = kNaN; }},
       {"position too low", Verdict::kOutOfLimits,
        [](command_t& m) { m.joint_position[6] = -3.0001; }},
       {"position too high", Verdict::kOutOfLimits,

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include <condition_variable>
+#include <limits>
 #include <mutex>
 #include <stdexcept>
 
@@ -13,6 +14,8 @@ namespace dashpot::lcmtypes {
 namespace {
 
 using ::testing::ElementsAre;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 /// What a sink has got; it may be held up.
 struct Received {
@@ -264,7 +267,7 @@ TEST_F(ModesPublisher, PublishesEveryChangeOfUse) {
   EXPECT_TRUE(is_published(1000)) << "frequency";
   vibration.modes[0].damping_ratio *= 1 - 2e-6;
   EXPECT_TRUE(is_published(1000)) << "ratio";
-  vibration.modes[0].natural_frequency = NAN;
+  vibration.modes[0].natural_frequency = kNaN;
   EXPECT_TRUE(is_published(1000)) << "frequency lost";
   EXPECT_FALSE(is_published(1000)) << "still lost";
   vibration.modes[0].kind = analysis::ModeKind::kUnstable;
@@ -277,7 +280,7 @@ TEST_F(ModesPublisher, PublishesEveryChangeOfUse) {
   EXPECT_TRUE(is_published(1000)) << "zero modes";
   vibration.count = 3;
   EXPECT_TRUE(is_published(1000)) << "number of modes";
-  vibration.position[0] = NAN;
+  vibration.position[0] = kNaN;
   EXPECT_TRUE(is_published(1000)) << "not a position";
 }
 
@@ -306,7 +309,7 @@ TEST(PublisherOptions, AreChecked) {
   options.state_every = 0;
   EXPECT_THROW(make(options), std::invalid_argument);
   options = {};
-  options.modes_heartbeat = NAN;
+  options.modes_heartbeat = kNaN;
   EXPECT_THROW(make(options), std::invalid_argument);
   options = {};
   options.modes_tolerance = -1;
