@@ -33,18 +33,18 @@ Allocations& allocations() noexcept {
 
 }  // namespace dashpot::lcmtypes
 
-#if DASHPOT_COUNTS_NEW  // for the whole program
-void* operator new(std::size_t size) {
+#if DASHPOT_COUNTS_NEW  // for the whole program; inlined, g++ 12 takes them for a mismatch
+[[gnu::noinline]] void* operator new(std::size_t size) {
   dashpot::lcmtypes::Allocations& all = dashpot::lcmtypes::allocations();
   ++all.count;
   all.largest = std::max(all.largest, size);
   if (void* block = std::malloc(size)) return block;
   throw std::bad_alloc();
 }
-void operator delete(void* block) noexcept {
+[[gnu::noinline]] void operator delete(void* block) noexcept {
   std::free(block);
 }
-void operator delete(void* block, std::size_t /*size*/) noexcept {
+[[gnu::noinline]] void operator delete(void* block, std::size_t /*size*/) noexcept {
   std::free(block);
 }
 #endif

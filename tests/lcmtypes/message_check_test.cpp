@@ -133,24 +133,31 @@ Bytes mutated(Random& random, Bytes bytes) {
   const auto place = [&random](int end) {
     return static_cast<std::size_t>(random.integer(0, std::max(0, end - 1)));
   };
+  const auto write_random = [&](std::size_t i) {
+    bytes[i] = static_cast<std::uint8_t>(random.integer(0, 255));
+  };
   for (int k = random.integer(1, 4); k > 0 && !bytes.empty(); --k) {
     switch (random.integer(0, 6)) {
       case 0:
-        bytes[place(size())] = static_cast<std::uint8_t>(random.integer(0, 255));
+        write_random(place(size()));
         break;
       case 1:
-        bytes[8 + place(std::min(size() - 8, 20))] ^=
-            static_cast<std::uint8_t>(1 << random.integer(0, 7));
+        write_random(8 + place(std::min(size() - 8, 20)));
         break;
       case 2:
-        if (size() >= 16) write_int32(bytes, 8 + 4 * place(2), random.integer(-3, 20));
+        if (size() >= 16) {
+          const std::size_t offset = 8 + 4 * place(2);
+          write_int32(bytes, offset, random.integer(-3, 20));
+        }
         break;
       case 3:
         bytes.resize(place(size()) + 1);
         break;
-      case 4:
-        bytes.insert(bytes.end(), place(40), static_cast<std::uint8_t>(random.integer(0, 255)));
+      case 4: {
+        const auto filler = static_cast<std::uint8_t>(random.integer(0, 255));
+        bytes.insert(bytes.end(), place(40), filler);
         break;
+      }
       case 5: {
         const Bytes piece(bytes.begin(),
                           bytes.begin() + static_cast<std::ptrdiff_t>(place(size())));
@@ -159,7 +166,7 @@ Bytes mutated(Random& random, Bytes bytes) {
       }
       default:
         for (std::size_t i = place(size()); i < bytes.size(); ++i) {
-          bytes[i] = static_cast<std::uint8_t>(random.integer(0, 255));
+          write_random(i);
         }
     }
     if (bytes.size() <= 8) break;

@@ -55,8 +55,10 @@ inline ModesSample random_modes(Random& random, int n) {
   for (std::size_t i = 0; i < static_cast<std::size_t>(vibration.count); ++i) {
     controller::VibrationMode& mode = vibration.modes[i];
     sample.labels[i] = random.integer(0, 1000);
-    mode.eigenvalues = {analysis::Complex(random.uniform(-9, 0), random.uniform(0, 9)),
-                        analysis::Complex(random.uniform(-9, 0), random.uniform(-9, 0))};
+    for (analysis::Complex& value : mode.eigenvalues) {
+      value.real(random.uniform(-9, 0));
+      value.imag(random.uniform(-9, 9));
+    }
     mode.natural_frequency = random.uniform(1, 99);
     mode.damping_ratio = random.uniform(0, 2);
     mode.damped_frequency = random.uniform(1, 99);
