@@ -1,4 +1,5 @@
 #include <dashpot/analysis/hessenberg_qr.hpp>
+#include <dashpot/analysis/mode_numbers.hpp>
 #include <dashpot/analysis/modes.hpp>
 #include <dashpot/analysis/small_dense.hpp>
 
@@ -14,19 +15,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// One eigenvalue of a block, with what is proved about it.
-struct Root {
-  Complex value;
+struct BlockRoot : Root {
   int block = 0;
-  int partner = -1;          ///< index of the other root of its mode
-  double bound = kInfinity;  ///< |computed - true|, 1/s
-  bool used = false;         ///< of a zero mode
-};
-
-/// Bounds on the sum and product of a mode's two eigenvalues, and on their discriminant
-/// ((lambda_1 - lambda_2) / 2)^2.
-struct Invariants {
-  double sum = 0, product = 0, discriminant = 0;
-  double sum_error = kInfinity, product_error = kInfinity, discriminant_error = kInfinity;
+  int partner = -1;   ///< index of the other root of its mode
+  bool used = false;  ///< of a zero mode
 };
 
 template <int N>
@@ -53,8 +45,8 @@ class Reader {
   }
 
  private:
-  Root& root(int i) { return roots_[static_cast<std::size_t>(i)]; }
-  const Root& root(int i) const { return roots_[static_cast<std::size_t>(i)]; }
+  BlockRoot& root(int i) { return roots_[static_cast<std::size_t>(i)]; }
+  const BlockRoot& root(int i) const { return roots_[static_cast<std::size_t>(i)]; }
   bool alone(int block) const;
 
   void list_roots();
@@ -74,8 +66,8 @@ class Reader {
   const ModalBasis<N>& basis_;
   Spectrum<N>& spectrum_;
   double soft_frequency_, M_norm_, C_norm_, K_norm_;
-  std::conditional_t<N == kDynamic, std::vector<Root>,
-                     std::array<Root, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
+  std::conditional_t<N == kDynamic, std::vector<BlockRoot>,
+                     std::array<BlockRoot, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
       roots_;
   int root_count_ = 0;
 };
@@ -111,8 +103,8 @@ void Reader<N>::list_roots() {
     const double radius =
         certificate_.radius[k] + (b.size > 2 ? 64 * b.size : 8) * b.size * kUnit * Lambda.norm();
     for (int e = 0; e < b.size; ++e) {
-      Root& r = root(root_count_++);
-      r = Root{};
+      BlockRoot& r = root(root_count_++);
+      r = BlockRoot{};
       r.value = values[e];
       r.block = k;
       r.used = b.zero_mode;  // of no mode, but its disc may hold the eigenvalue of another
@@ -240,87 +232,32 @@ void Reader<N>::pair_roots() {
 
 template <int N>
 Invariants Reader<N>::invariants(int i, int j) const {
-  const Root &a = root(i), &b = root(j);
-  Invariants v;
-  const Block& block = basis_.blocks[a.block];
-  if (a.block == b.block && block.size == 2) {
+  const Block& block = basis_.blocks[root(i).block];
+  Invariants v = root_invariants(root(i), root(j));
+  if (root(i).block == root(j).block && block.size == 2) {
     const auto L = basis_.Lambda.block(block.first, block.first, 2, 2);
-    const double half_difference = 0.5 * (L(0, 0) - L(1, 1)), half_sum = 0.5 * (L(0, 0) + L(1, 1));
-    v.sum = L(0, 0) + L(1, 1);
-    v.discriminant = half_difference * half_difference + L(0, 1) * L(1, 0);
-    v.product = half_sum * half_sum - v.discriminant;
-    // In a group with other blocks only the discs are known: the bounds are those at the end.
-    if (alone(a.block)) {
-      // Of a 2 x 2 matrix within rho of L: |tr| moves by sqrt(2) rho, det by |L| rho + rho^2 / 2,
-      // and the discriminant by |L0| rho + rho^2 / 2 with L0 the traceless part.
-      const double rho = certificate_.radius[a.block], size = L.norm();
-      const double traceless =
-          std::sqrt(2 * half_difference * half_difference + L(0, 1) * L(0, 1) + L(1, 0) * L(1, 0));
-      v.sum_error = std::sqrt(2.0) * rho + 4 * kUnit * size;
-      v.product_error = size * rho + 0.5 * rho * rho + 8 * kUnit * size * size;
-      v.discriminant_error = traceless * rho + 0.5 * rho * rho + 8 * kUnit * traceless * traceless;
-      return v;
-    }
-  } else {
-    v.sum = (a.value + b.value).real();
-    v.product = (a.value * b.value).real();
-    const Complex half = 0.5 * (a.value - b.value);
-    v.discriminant = (half * half).real();
+    const Invariants of_block =
+        block_invariants(L(0, 0), L(0, 1), L(1, 0), L(1, 1), certificate_.radius[root(i).block]);
+    if (alone(root(i).block)) return of_block;
+    // In a group with other blocks only the discs are known.
+    v.sum = of_block.sum;
+    v.product = of_block.product;
+    v.discriminant = of_block.discriminant;
   }
-  const double size = std::max(modulus(a.value), modulus(b.value));
-  v.sum_error = a.bound + b.bound + 4 * kUnit * size;
-  v.product_error = modulus(a.value) * b.bound + modulus(b.value) * a.bound + a.bound * b.bound +
-                    4 * kUnit * modulus(a.value) * modulus(b.value);
-  const double half = 0.5 * modulus(a.value - b.value), moved = 0.5 * (a.bound + b.bound);
-  v.discriminant_error = 2 * half * moved + moved * moved + 8 * kUnit * half * (half + size);
   return v;
 }
 
 template <int N>
 void Reader<N>::write_numbers(int i, int j, Mode<N>& mode) const {
-  const Invariants v = invariants(i, j);
-  mode.eigenvalues = {root(i).value, root(j).value};
-  mode.error_bound = std::max(root(i).bound, root(j).bound);
-  mode.damped_frequency = std::abs(mode.eigenvalues[0].imag());
-  const bool real = mode.eigenvalues[0].imag() == 0;
-  if (real && modulus(mode.eigenvalues[0]) > modulus(mode.eigenvalues[1])) {
-    std::swap(mode.eigenvalues[0], mode.eigenvalues[1]);
-  }
-  if (!(v.product > 0)) {
-    mode.natural_frequency = mode.damping_ratio = kNan;
-  } else {
-    const double omega = std::sqrt(v.product);
-    mode.natural_frequency = omega;
-    mode.damping_ratio = -0.5 * v.sum / omega;
-    const double relative = v.product_error / v.product;
-    mode.natural_frequency_bound =
-        relative < 1 ? omega * (relative / (1 + std::sqrt(1 - relative)) + 4 * kUnit) : kInfinity;
-    mode.damping_ratio_bound =
-        relative < 1
-            ? (0.5 * v.sum_error + std::abs(mode.damping_ratio) * mode.natural_frequency_bound) /
-                      (omega - mode.natural_frequency_bound) +
-                  4 * kUnit * std::abs(mode.damping_ratio)
-            : kInfinity;
-    if (!(mode.damping_ratio_bound >= 0)) mode.damping_ratio_bound = kInfinity;
-  }
-  // Without a bound the kind goes by the numbers as they are: nothing that grows is called fine.
-  const bool proved = std::isfinite(mode.error_bound);
-  const auto error = [proved](double bound) { return proved ? bound : 0; };
-  const double growth = std::max(mode.eigenvalues[0].real(), mode.eigenvalues[1].real());
-  if (growth > error(mode.error_bound) || v.sum > error(v.sum_error) ||
-      v.product < -error(v.product_error)) {
-    mode.kind = ModeKind::kUnstable;
-  } else if (!(mode.natural_frequency >= soft_frequency_)) {
-    mode.kind = ModeKind::kSoft;
-  } else if (std::abs(v.discriminant) <= error(v.discriminant_error)) {
-    mode.kind = ModeKind::kCritical;
-  } else if (real) {
-    mode.kind = ModeKind::kOverdamped;
-  } else if (std::abs(v.sum) <= error(v.sum_error)) {
-    mode.kind = ModeKind::kUndamped;
-  } else {
-    mode.kind = ModeKind::kUnderdamped;
-  }
+  const ModeNumbers numbers = mode_numbers(root(i), root(j), invariants(i, j), soft_frequency_);
+  mode.eigenvalues = numbers.eigenvalues;
+  mode.natural_frequency = numbers.natural_frequency;
+  mode.damping_ratio = numbers.damping_ratio;
+  mode.damped_frequency = numbers.damped_frequency;
+  mode.kind = numbers.kind;
+  mode.error_bound = numbers.error_bound;
+  mode.natural_frequency_bound = numbers.natural_frequency_bound;
+  mode.damping_ratio_bound = numbers.damping_ratio_bound;
 }
 
 /// Eigenvector of root i in joint coordinates, and its coefficients (re, im) in the block's
@@ -450,7 +387,6 @@ void Reader<N>::write_modes() {
     const int i = order[k], j = root(i).partner;
     const bool upper_first = root(i).value.imag() >= 0;
     Mode<N>& mode = spectrum_.modes[k];
-    mode.natural_frequency_bound = mode.damping_ratio_bound = kInfinity;
     write_numbers(upper_first ? i : j, upper_first ? j : i, mode);
     write_shapes(upper_first ? i : j, upper_first ? j : i, mode);
   }

@@ -10,6 +10,7 @@ enum class Status {
   kMassNotPositiveDefinite,  ///< the Cholesky factorisation of the mass matrix broke down
   kNotConverged,             ///< the eigenvalue iteration reached its cap
   kOverflow,                 ///< the entries are too large or too small to compute with
+  kWrongSize,               ///< matrices of different sizes
   kUncertified,  ///< modes are given, but no finite error bound could be proved for some
 };
 

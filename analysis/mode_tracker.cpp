@@ -1,0 +1,333 @@
+#include <dashpot/analysis/double_double.hpp>
+#include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/analysis/tracked_modes.hpp>
+#include <dashpot/analysis/tracked_start.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace dashpot::analysis {
+namespace {
+
+/// Steps this small leave eigenvectors right to their square once they are taken.
+constexpr double kLastStep = 3e-8;
+/// A step that is no smaller than this share of what it is compared with has not been foreseen.
+constexpr double kForeseen = 0.5;
+/// Blocks are balanced again when their columns lean this much towards each other.
+constexpr double kBalanced = 0.6;
+
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+/// 0 if the matrix is symmetric and its entries are finite.
+double asymmetry(const Square<kMaxDof>& matrix) {
+  const auto n = static_cast<int>(matrix.rows());
+  const double* const a = matrix.data();
+  double sum = 0;
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < j; ++i) sum += std::abs(a[i + j * n] - a[j + i * n]);
+    sum += std::abs(0 * a[j + j * n]);
+  }
+  return sum;
+}
+
+bool sizes_agree(const System<kMaxDof>& system) {
+  const Eigen::Index n = system.dof();
+  const Eigen::Index rows = system.stiffness_factor.rows();
+  const bool factored = rows > 0 && rows <= n;
+  const auto is_square = [n](const auto& matrix) {
+    return matrix.rows() == n && matrix.cols() == n;
+  };
+  return is_square(system.mass) && is_square(system.damping) &&
+         (factored ? system.stiffness_factor.cols() == n : is_square(system.stiffness));
+}
+
+/// K = W'W with about 32 digits: the stiffness and its tail.
+void form_stiffness(System<kMaxDof>& system) {
+  const auto& W = system.stiffness_factor;
+  const Eigen::Index n = system.dof();
+  system.stiffness.resize(n, n);
+  system.stiffness_tail.resize(n, n);
+  system.damping_tail.setZero(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i <= j; ++i) {
+      DotAccumulator sum;
+      for (Eigen::Index k = 0; k < W.rows(); ++k) sum.add(W(k, i), W(k, j));
+      system.stiffness(i, j) = system.stiffness(j, i) = sum.value().high;
+      system.stiffness_tail(i, j) = system.stiffness_tail(j, i) = sum.value().low;
+    }
+  }
+  system.has_tails = true;
+}
+
+double squared_norm(const PaddedRows& rows, int columns) {
+  Lanes sum{};
+  for (int k = 0; k < columns * rows.width; k += 4) {
+    const Lanes x = load(&rows.items[at(k)]);
+    sum += x * x;
+  }
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+/// out = a + sign b
+void add(const PaddedRows& a, double sign, const PaddedRows& b, int columns, PaddedRows& out) {
+  out.width = a.width;
+  for (int k = 0; k < columns * a.width; k += 4) {
+    store(&out.items[at(k)], load(&a.items[at(k)]) + sign * load(&b.items[at(k)]));
+  }
+}
+
+void copy(const PaddedRows& from, int columns, PaddedRows& to) {
+  to.width = from.width;
+  std::copy_n(from.items.begin(), columns * from.width, to.items.begin());
+}
+
+void set_zero(int width, int columns, PaddedRows& rows) {
+  rows.width = width;
+  std::fill_n(rows.items.begin(), columns * width, 0.0);
+}
+
+/// The largest error bound of a mode, relative to its eigenvalues; at critical damping of its
+/// frequency, because eigenvalues are worth half the digits there.
+double worst_bound(const TrackedSpectrum& spectrum) {
+  double worst = 0;
+  for (int i = 0; i < spectrum.mode_count; ++i) {
+    const ModeNumbers& mode = spectrum.modes[at(i)];
+    if (mode.kind == ModeKind::kSoft) continue;
+    const double size = modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]);
+    const double bound =
+        mode.kind == ModeKind::kCritical ? mode.natural_frequency_bound : mode.error_bound;
+    if (!(bound <= worst * size)) worst = bound / size;
+  }
+  return worst;
+}
+
+}  // namespace
+
+ModeTracker::ModeTracker(const TrackerOptions& options)
+    : options_(options), solver_([&] {
+        SpectrumOptions direct;
+        direct.soft_frequency = options.soft_frequency;
+        return direct;
+      }()) {
+  if (!(options.soft_frequency >= 0)) throw std::invalid_argument("soft_frequency: is negative");
+  if (!(options.target_bound > 0)) throw std::invalid_argument("target_bound: is not positive");
+  if (options.max_passes < 1) throw std::invalid_argument("max_passes: is not positive");
+}
+
+Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out) noexcept {
+  ++counters_.updates;
+  if (!sizes_agree(system)) {
+    ++counters_.failed;
+    out.mode_count = 0;
+    return out.status = Status::kWrongSize;
+  }
+  const StateForm form = state_form(system);
+  const bool symmetric = asymmetry(system.mass) == 0 && asymmetry(system.damping) == 0 &&
+                         (form.factored || asymmetry(system.stiffness) == 0);
+  if (!symmetric) return solve_directly(system, form, Fallback::kNotSymmetric, out);
+  Fallback reason = Fallback::kStart;
+  const StateForm last = state_form(last_);
+  if (has_basis_ && last.joints == form.joints && last.strains == form.strains &&
+      last.factored == form.factored) {
+    if (reuse(form, out)) return out.status;
+    if (follow(form, out, reason)) {
+      last_.mass = system.mass;
+      last_.damping = system.damping;
+      if (form.factored) {
+        last_.stiffness_factor = system.stiffness_factor;
+      } else {
+        last_.stiffness = system.stiffness;
+      }
+      return out.status;
+    }
+  }
+  return solve_directly(system, form, reason, out);
+}
+
+bool ModeTracker::publish(const StateForm& form, double distance, SpectrumOrigin origin,
+                          TrackedSpectrum& out) noexcept {
+  certify(form, sizes_, distance, basis_, defect_, certificate_);
+  std::array<bool, kMaxDof> soft = soft_;
+  read_numbers(basis_, certificate_, options_.soft_frequency, soft, out);
+  if (!(worst_bound(out) <= options_.target_bound)) return false;
+  soft_ = soft;
+  out.origin = origin;
+  if (!options_.shapes) {
+    ++counters_.shapes_skipped;
+    return true;
+  }
+  if (origin != SpectrumOrigin::kReused) {
+    velocities_.width = basis_.Z.width;
+    multiply_rows(basis_, E_, basis_.modes, form.joints, velocities_.row(0));
+  }
+  read_shapes(form, basis_, velocities_, work_, out);
+  return true;
+}
+
+bool ModeTracker::reuse(const StateForm& form, TrackedSpectrum& out) noexcept {
+  const double change = distance(form, state_form(last_), sizes_);
+  if (!(change <= options_.reuse_tolerance)) return false;
+  if (!publish(form, change, SpectrumOrigin::kReused, out)) return false;
+  ++counters_.reused;
+  return true;
+}
+
+void ModeTracker::step_basis(const PaddedRows& E) noexcept {
+  multiply_rows(basis_, E, 0, basis_.columns(), work_.row(0));
+  work_.width = basis_.Z.width;
+  copy(work_, basis_.columns(), basis_.Z);
+}
+
+bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept {
+  const int columns = basis_.columns(), width = basis_.Z.width;
+  if (predicting_) {
+    ++counters_.predicted;
+    add(E_, 1, last_step_, columns, E_);
+    copy(last_step_, columns, step_);
+  } else {
+    set_zero(width, columns, step_);
+  }
+  step_basis(E_);
+  const bool turned = balance(defect_, kBalanced, basis_);
+  sizes_ = coefficient_sizes(form);
+  if (!refine(form, out, reason)) return false;
+  if (turned) {
+    set_zero(width, columns, last_step_);
+    predicting_ = false;
+  } else {
+    learn_step();
+  }
+  ++counters_.tracked;
+  return true;
+}
+
+/// Whether this update's step was like the last one's: then the next one will be, too.
+void ModeTracker::learn_step() noexcept {
+  const int columns = basis_.columns();
+  last_step_.width = step_.width;
+  add(step_, -1, last_step_, columns, work_);
+  predicting_ = squared_norm(work_, columns) < kForeseen * kForeseen * squared_norm(step_, columns);
+  copy(step_, columns, last_step_);
+}
+
+/// Newton's method from the basis as it is. Leaves the last step to be taken.
+bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept {
+  const int columns = basis_.columns();
+  for (int pass = 1; pass <= options_.max_passes; ++pass) {
+    ++counters_.passes;
+    counters_.most_passes = std::max(counters_.most_passes, pass);
+    evaluate(form, basis_, defect_);
+    double size = 0;
+    const Conflict conflict = newton_step(basis_, defect_, certificate_.noise, E_, size);
+    add(step_, 1, E_, columns, step_);
+    if (conflict) {
+      reason = Fallback::kCoincidence;
+      return false;
+    }
+    if (size <= kLastStep) {
+      if (publish(form, 0, SpectrumOrigin::kTracked, out)) return true;
+    }
+    reason = Fallback::kNotConverged;
+    if (!(size < 1)) return false;
+    if (pass < options_.max_passes) step_basis(E_);
+  }
+  return false;
+}
+
+Status ModeTracker::solve_directly(const System<kMaxDof>& system, const StateForm& form,
+                                   Fallback reason, TrackedSpectrum& out) noexcept {
+  ++counters_.fallbacks[static_cast<std::size_t>(reason)];
+  direct_ = system;
+  direct_.has_tails = false;
+  if (!form.factored) direct_.stiffness_factor.resize(0, form.joints);
+  if (form.factored) form_stiffness(direct_);
+  const StateForm last = state_form(last_);
+  has_places_ = has_places_ && last.joints == form.joints && last.strains == form.strains &&
+                last.factored == form.factored;
+  has_basis_ = predicting_ = false;
+  last_ = direct_;
+  out.origin = SpectrumOrigin::kDirect;
+  out.status = solver_.solve(direct_, spectrum_);
+  if (out.status != Status::kOk && out.status != Status::kUncertified) {
+    ++counters_.failed;
+    out.mode_count = 0;
+    return out.status;
+  }
+  ++counters_.direct;
+  if (reason != Fallback::kNotSymmetric && form.joints > 0 && restart(form, out)) {
+    out.origin = SpectrumOrigin::kDirect;
+  } else {
+    publish_direct(form, out);
+  }
+  return out.status;
+}
+
+/// Makes the direct solution the basis to follow from now on.
+bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept {
+  before_ = basis_;
+  if (!start_basis(form, spectrum_, basis_)) {
+    basis_ = before_;
+    return false;
+  }
+  if (has_places_) keep_places(form, before_, basis_);
+  evaluate(form, basis_, defect_);
+  balance(defect_, 0, basis_);
+  sizes_ = coefficient_sizes(form);
+  set_zero(basis_.Z.width, basis_.columns(), step_);
+  set_zero(basis_.Z.width, basis_.columns(), last_step_);
+  if (!has_places_) {
+    evaluate(form, basis_, defect_);
+    certify(form, sizes_, 0, basis_, defect_, certificate_);
+    soft_ = {};
+    read_numbers(basis_, certificate_, 0, soft_, out);
+    std::array<int, kMaxDof> place{};
+    for (int i = 0; i < basis_.modes; ++i) place[at(out.by_frequency[at(i)])] = i;
+    move_modes(place, basis_);
+    soft_ = {};
+    has_places_ = true;
+  }
+  Fallback unused{};
+  has_basis_ = refine(form, out, unused);
+  return has_basis_;
+}
+
+/// The direct solution as it is, in the places of the modes that were followed so far.
+void ModeTracker::publish_direct(const StateForm& form, TrackedSpectrum& out) noexcept {
+  std::array<int, kMaxDof> place{};
+  if (!has_places_ || !find_places(form, basis_, spectrum_, place)) {
+    has_places_ = false;
+    for (int i = 0; i < kMaxDof; ++i) place[at(i)] = i;
+  }
+  out.mode_count = spectrum_.modes.size();
+  for (int i = 0; i < out.mode_count; ++i) {
+    const Mode<kMaxDof>& mode = spectrum_.modes[i];
+    ModeNumbers& numbers = out.modes[at(place[at(i)])];
+    numbers.eigenvalues = mode.eigenvalues;
+    numbers.natural_frequency = mode.natural_frequency;
+    numbers.damping_ratio = mode.damping_ratio;
+    numbers.damped_frequency = mode.damped_frequency;
+    numbers.kind = mode.kind;
+    numbers.error_bound = mode.error_bound;
+    numbers.natural_frequency_bound = mode.natural_frequency_bound;
+    numbers.damping_ratio_bound = mode.damping_ratio_bound;
+    if (!options_.shapes) continue;
+    TrackedShapes& shapes = out.shapes[at(place[at(i)])];
+    shapes.u = mode.shapes;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const ComplexVector<kMaxDof> Mu = direct_.mass * mode.shapes[k];
+      const ComplexVector<kMaxDof> Cu = direct_.damping * mode.shapes[k];
+      shapes.slope[k] =
+          (mode.shapes[k].transpose() * (2.0 * mode.eigenvalues[k] * Mu + Cu)).value();
+    }
+  }
+  out.zero_mode_count = spectrum_.zero_modes.count;
+  for (int k = 0; k < out.zero_mode_count; ++k) {
+    out.zero_mode_rates[at(k)] = spectrum_.zero_mode_rates[k];
+  }
+  sort_by_frequency(out);
+}
+
+}  // namespace dashpot::analysis

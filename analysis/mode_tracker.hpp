@@ -1,0 +1,141 @@
+#pragma once
+#include <dashpot/analysis/mode_numbers.hpp>
+#include <dashpot/analysis/tracked_certificate.hpp>
+
+#include <cstdint>
+
+namespace dashpot::analysis {
+
+/// Eigenvectors of a mode's two eigenvalues. Left ones are the same: coefficients are symmetric.
+struct TrackedShapes {
+  /// u in joint coordinates, n each, u^H M u = 1, largest entry real and positive. At critical
+  /// damping both are the one eigenvector there is.
+  std::array<ComplexVector<kMaxDof>, 2> u;
+  /// u' (2 lambda M + C) u (no conjugation), 1/s: the scale of dual vectors and of sensitivities;
+  /// zero at critical damping
+  std::array<Complex, 2> slope{};
+};
+
+/// Where a spectrum comes from.
+enum class SpectrumOrigin {
+  kTracked,  ///< the previous one, refined
+  kReused,   ///< the previous one: the system has hardly changed
+  kDirect,   ///< solved anew
+};
+
+struct TrackedSpectrum {
+  Status status = Status::kNotConverged;  ///< kUncertified: some bound is infinite
+  SpectrumOrigin origin = SpectrumOrigin::kDirect;
+  int mode_count = 0;
+  /// A mode keeps its place here along a path.
+  std::array<ModeNumbers, kMaxDof> modes{};
+  /// Places of the modes by falling sqrt|l1 l2|: the natural frequency where there is one.
+  std::array<int, kMaxDof> by_frequency{};
+  /// Where asked for: of the modes, in the same places.
+  std::array<TrackedShapes, kMaxDof> shapes;
+  int zero_mode_count = 0;
+  std::array<double, kMaxDof> zero_mode_rates{};  ///< eigenvalues of their velocities, 1/s
+};
+
+struct TrackerOptions {
+  /// Modes are called soft from below this natural frequency until above twice it, rad/s.
+  double soft_frequency = 1e-6;
+  /// Wanted: error bound / (|lambda_1| + |lambda_2|). What lies above is refined, then solved anew.
+  double target_bound = 1e-10;
+  /// Evaluations of the basis in one update, before the direct solver is called.
+  int max_passes = 4;
+  /// Relative change of the coefficients up to which the last spectrum is used again, with bounds
+  /// that include the change: see distance() in tracked_certificate.hpp. Negative: never.
+  double reuse_tolerance = 1e-14;
+  bool shapes = true;  ///< fill TrackedSpectrum::shapes
+};
+
+/// Why the direct solver was called.
+enum class Fallback {
+  kStart,         ///< nothing to start from: the first call, other sizes, after a failure
+  kNotSymmetric,  ///< damping or stiffness is not symmetric: always solved directly
+  kNotConverged,  ///< max_passes did not reach the target: a jump
+  kCoincidence,   ///< modes that could not be told apart
+};
+inline constexpr std::size_t kFallbackCount = 4;
+
+struct TrackerCounters {
+  std::int64_t updates = 0;
+  std::int64_t tracked = 0, reused = 0, direct = 0, failed = 0;  ///< add up to `updates`
+  std::array<std::int64_t, kFallbackCount> fallbacks{};          ///< calls of the direct solver
+  std::int64_t passes = 0;     ///< evaluations of the basis, in all
+  int most_passes = 0;         ///< in one update
+  std::int64_t repairs = 0;    ///< pairs of blocks parted anew
+  std::int64_t predicted = 0;  ///< updates that began with an extrapolated basis
+  std::int64_t shapes_skipped = 0;
+
+  std::int64_t of(Fallback reason) const { return fallbacks[static_cast<std::size_t>(reason)]; }
+};
+
+/// Follows the damped spectrum of a system that changes little from call to call, such as an arm
+/// under impedance control: M(t), C(t), K(t) with up to 16 coordinates.
+///
+///     ModeTracker tracker;
+///     while (running) {
+///       system.mass = ...; system.damping = ...; system.stiffness_factor = ...;
+///       if (tracker.update(system, spectrum) == Status::kOk) use(spectrum.modes);
+///     }
+///
+/// The basis of the last call is refined by Newton's method, and every number is published with a
+/// bound that holds for the coefficients as given, rounding errors included. What cannot be
+/// followed is solved directly (SpectrumSolver), in bounded time.
+class ModeTracker {
+ public:
+  /// Throws std::invalid_argument for options that are not positive numbers.
+  explicit ModeTracker(const TrackerOptions& options = {});
+
+  /// Fills `out` and returns out.status: kOk or kUncertified if it has modes. Of the system,
+  /// damping and mass are read, and stiffness_factor W if it has 1 to n rows: then K = W'W exactly
+  /// and `stiffness` is not read, nor are tails. Otherwise K = stiffness, which has to be positive
+  /// definite to be followed; semidefinite ones are solved directly on each call.
+  Status update(const System<kMaxDof>& system, TrackedSpectrum& out) noexcept;
+
+  /// Forgets the past: the next update starts anew.
+  void reset() noexcept { has_basis_ = false; }
+
+  const TrackerCounters& counters() const noexcept { return counters_; }
+
+ private:
+  bool reuse(const StateForm& form, TrackedSpectrum& out) noexcept;
+  bool follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
+  bool refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
+  bool publish(const StateForm& form, double distance, SpectrumOrigin origin,
+               TrackedSpectrum& out) noexcept;
+  void step_basis(const PaddedRows& E) noexcept;
+  void learn_step() noexcept;
+  Status solve_directly(const System<kMaxDof>& system, const StateForm& form, Fallback reason,
+                        TrackedSpectrum& out) noexcept;
+  bool restart(const StateForm& form, TrackedSpectrum& out) noexcept;
+  void publish_direct(const StateForm& form, TrackedSpectrum& out) noexcept;
+
+  TrackerOptions options_;
+  TrackerCounters counters_;
+
+  // The last spectrum: the basis as it was evaluated, and the step that is still to be taken.
+  bool has_basis_ = false;
+  bool has_places_ = false;  ///< basis_ says which mode is which
+  System<kMaxDof> last_;
+  CoefficientSizes sizes_;
+  TrackedBasis basis_;
+  TrackedDefect defect_;
+  TrackedCertificate certificate_;
+  PaddedRows E_;
+  std::array<bool, kMaxDof> soft_{};
+
+  // Extrapolation: the whole step of this update so far, and that of the last one.
+  PaddedRows step_, last_step_;
+  bool predicting_ = false;
+
+  PaddedRows velocities_, work_;
+  System<kMaxDof> direct_;
+  SpectrumSolver<kMaxDof> solver_;
+  Spectrum<kMaxDof> spectrum_;
+  TrackedBasis before_;
+};
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,59 @@
+#include <dashpot/analysis/padded_rows.hpp>
+
+#include <cstddef>
+#include <utility>
+
+namespace dashpot::analysis {
+namespace {
+
+/// `Count` rows of the result at a time, each of V times four doubles.
+template <int V, int Count>
+void multiply_rows(const Strided& A, int first, int inner, const double* X, const double* start,
+                   double sign, double* out) noexcept {
+  std::array<std::array<Lanes, V>, Count> sum{};
+  if (start != nullptr) {
+    const double* from = start + first * 4 * V;
+    for (auto& row : sum) {
+      for (Lanes& lanes : row) lanes = load(from), from += 4;
+    }
+  }
+  const double* a = A.data + first * A.row_step;
+  const double* x = X;
+  for (int k = 0; k < inner; ++k, a += A.column_step, x += 4 * V) {
+    for (int c = 0; c < Count; ++c) {
+      const double factor = a[c * A.row_step];
+      for (int v = 0; v < V; ++v) {
+        sum[static_cast<std::size_t>(c)][static_cast<std::size_t>(v)] += factor * load(x + 4 * v);
+      }
+    }
+  }
+  double* to = out + first * 4 * V;
+  for (const auto& row : sum) {
+    for (const Lanes& lanes : row) store(to, sign * lanes), to += 4;
+  }
+}
+
+template <int V>
+void multiply(const Strided& A, int rows, int inner, const double* X, const double* start,
+              double sign, double* out) noexcept {
+  constexpr int kTogether = V <= 2 ? 4 : V <= 4 ? 2 : 1;  // as many as registers hold
+  int i = 0;
+  for (; i + kTogether <= rows; i += kTogether) {
+    multiply_rows<V, kTogether>(A, i, inner, X, start, sign, out);
+  }
+  for (; i < rows; ++i) multiply_rows<V, 1>(A, i, inner, X, start, sign, out);
+}
+
+template <int... I>
+constexpr std::array<PaddedMultiply, sizeof...(I)> table(std::integer_sequence<int, I...>) {
+  return {multiply<I + 1>...};
+}
+
+}  // namespace
+
+PaddedMultiply padded_multiply(int width) noexcept {
+  static constexpr auto kTable = table(std::make_integer_sequence<int, kMaxWidth / 4>());
+  return kTable[static_cast<std::size_t>(width / 4 - 1)];
+}
+
+}  // namespace dashpot::analysis

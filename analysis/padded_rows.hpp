@@ -1,0 +1,50 @@
+#pragma once
+#include <array>
+#include <cstring>
+
+namespace dashpot::analysis {
+
+/// Four doubles that the compiler keeps in one register, or in two.
+using Lanes = double __attribute__((vector_size(32)));
+
+/// Four doubles from or to anywhere.
+inline Lanes load(const double* from) noexcept {
+  Lanes lanes;
+  std::memcpy(&lanes, from, sizeof lanes);
+  return lanes;
+}
+inline void store(double* to, const Lanes& lanes) noexcept {
+  std::memcpy(to, &lanes, sizeof lanes);
+}
+
+/// Longest row, in doubles: the eigenvectors of 16 joints.
+inline constexpr int kMaxWidth = 32;
+
+/// A matrix of at most 32 x 32, stored by rows of `width` doubles: its columns, padded to a
+/// multiple of four. What stands in the padding is finite and means nothing.
+struct PaddedRows {
+  alignas(64) std::array<double, kMaxWidth * kMaxWidth> items{};
+  int width = 4;
+
+  double* row(int i) { return items.data() + i * width; }
+  const double* row(int i) const { return items.data() + i * width; }
+  double& operator()(int i, int j) { return row(i)[j]; }
+  const double& operator()(int i, int j) const { return row(i)[j]; }
+};
+
+/// A matrix whose entry (i, k) is data[i * row_step + k * column_step].
+struct Strided {
+  const double* data;
+  int row_step, column_step;
+};
+
+/// out = sign (start + A X): `rows` rows of `width` doubles each, of A with `inner` columns.
+/// `start` may be null, for zero. Neither X nor out may be A, and X may not be out.
+using PaddedMultiply = void (*)(const Strided& A, int rows, int inner, const double* X,
+                                const double* start, double sign, double* out) noexcept;
+
+/// The multiplication for rows of this width, a multiple of 4 up to kMaxWidth; compiled for each
+/// width by itself, so that rows of the result stay in registers.
+PaddedMultiply padded_multiply(int width) noexcept;
+
+}  // namespace dashpot::analysis

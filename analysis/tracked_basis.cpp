@@ -1,0 +1,243 @@
+#include <dashpot/analysis/tracked_basis.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace dashpot::analysis {
+namespace {
+
+/// Up to this size a step is taken as it is.
+constexpr double kSmallStep = 0.3;
+
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+/// Columns of a row of modes are read in fours, and so up to three columns too far: those of the
+/// next part of the row, or of the next row. What comes of them is overwritten by that part, which
+/// is why parts are written in the order of the columns.
+void clear_padding(const TrackedBasis& basis, int rows, PaddedRows& X) {
+  for (int i = 0; i < rows; ++i) {
+    for (int j = basis.columns(); j < X.width; ++j) X(i, j) = 0;
+  }
+}
+
+void set_blocks(const PaddedRows& N, const PaddedRows& T, TrackedBasis& basis) {
+  const int m = basis.modes;
+  for (int i = 0; i < m; ++i) {
+    const int k = m + i;
+    const double n00 = N(i, i), n01 = N(i, k), n10 = N(k, i), n11 = N(k, k);
+    const double inverse = 1 / (n00 * n11 - n01 * n10);
+    basis.l00[at(i)] = inverse * (n11 * T(i, i) - n01 * T(k, i));
+    basis.l01[at(i)] = inverse * (n11 * T(i, k) - n01 * T(k, k));
+    basis.l10[at(i)] = inverse * (n00 * T(k, i) - n10 * T(i, i));
+    basis.l11[at(i)] = inverse * (n00 * T(k, k) - n10 * T(i, k));
+  }
+  for (int k = 0; k < basis.zeros; ++k) {
+    basis.rate[at(k)] = T(2 * m + k, 2 * m + k) / N(2 * m + k, 2 * m + k);
+  }
+}
+
+/// G = T - N Lambda, in the place of T.
+void subtract_blocks(const TrackedBasis& basis, const PaddedRows& N, PaddedRows& G) {
+  const int m = basis.modes;
+  for (int i = 0; i < basis.columns(); ++i) {
+    const double* const n = N.row(i);
+    double* const g = G.row(i);
+    std::array<Lanes, 2 * kMaxDof / 4> first, second;
+    for (int j = 0; j < m; j += 4) {
+      const Lanes n0 = load(n + j), n1 = load(n + m + j);
+      first[at(j / 4)] =
+          load(g + j) - (n0 * load(&basis.l00[at(j)]) + n1 * load(&basis.l10[at(j)]));
+      second[at(j / 4)] =
+          load(g + m + j) - (n0 * load(&basis.l01[at(j)]) + n1 * load(&basis.l11[at(j)]));
+    }
+    std::array<double, kMaxDof> rest{};
+    for (int k = 0; k < basis.zeros; ++k) {
+      rest[at(k)] = g[2 * m + k] - n[2 * m + k] * basis.rate[at(k)];
+    }
+    std::memcpy(g, &first, at(m) * sizeof(double));
+    std::memcpy(g + m, &second, at(m) * sizeof(double));
+    std::memcpy(g + 2 * m, &rest, at(basis.zeros) * sizeof(double));
+  }
+}
+
+void take_diagonal(const TrackedBasis& basis, PaddedRows& G, TrackedBasis::Entries& squares) {
+  for (int i = 0; i < basis.modes; ++i) {
+    squares[at(i)] = 0;
+    for (const int row : {i, basis.modes + i}) {
+      for (const int column : {i, basis.modes + i}) {
+        squares[at(i)] += G(row, column) * G(row, column);
+        G(row, column) = 0;
+      }
+    }
+  }
+}
+
+/// E between mode i and all others: with p the characteristic polynomial of B = Lambda_j,
+/// p(A) X = A Q - Q adj(B) solves A X - X B = Q (Cayley-Hamilton).
+void solve_row(const TrackedBasis& basis, const PaddedRows& G, int i, PaddedRows& E) {
+  const int m = basis.modes;
+  const double a = basis.l00[at(i)], b = basis.l01[at(i)], c = basis.l10[at(i)],
+               d = basis.l11[at(i)];
+  std::array<std::array<Lanes, kMaxDof / 4>, 4> X;
+  for (int j = 0; j < m; j += 4) {
+    const Lanes e = load(&basis.l00[at(j)]), f = load(&basis.l01[at(j)]),
+                g = load(&basis.l10[at(j)]), h = load(&basis.l11[at(j)]);
+    const Lanes q00 = -load(G.row(i) + j), q01 = -load(G.row(i) + m + j),
+                q10 = load(G.row(m + i) + j), q11 = load(G.row(m + i) + m + j);
+    const Lanes trace = e + h, determinant = e * h - f * g;
+    const Lanes across = (a + d) - trace;
+    const Lanes p00 = a * (a - trace) + (b * c + determinant);
+    const Lanes p11 = d * (d - trace) + (b * c + determinant);
+    const Lanes p01 = b * across, p10 = c * across;
+    const Lanes inverse = 1 / (p00 * p11 - p01 * p10);
+    const Lanes r00 = a * q00 + b * q10 - (q00 * h - q01 * g);
+    const Lanes r01 = a * q01 + b * q11 - (q01 * e - q00 * f);
+    const Lanes r10 = c * q00 + d * q10 - (q10 * h - q11 * g);
+    const Lanes r11 = c * q01 + d * q11 - (q11 * e - q10 * f);
+    X[0][at(j / 4)] = inverse * (p11 * r00 - p01 * r10);
+    X[1][at(j / 4)] = inverse * (p11 * r01 - p01 * r11);
+    X[2][at(j / 4)] = inverse * (p00 * r10 - p10 * r00);
+    X[3][at(j / 4)] = inverse * (p00 * r11 - p10 * r01);
+  }
+  std::memcpy(E.row(i), &X[0], at(m) * sizeof(double));
+  std::memcpy(E.row(i) + m, &X[1], at(m) * sizeof(double));
+  std::memcpy(E.row(m + i), &X[2], at(m) * sizeof(double));
+  std::memcpy(E.row(m + i) + m, &X[3], at(m) * sizeof(double));
+}
+
+/// E between mode i and zero mode k, both ways, and between zero modes.
+void solve_zeros(const TrackedBasis& basis, const PaddedRows& G, PaddedRows& E) {
+  const int m = basis.modes;
+  for (int k = 0; k < basis.zeros; ++k) {
+    const int column = 2 * m + k;
+    const double x = basis.rate[at(k)];
+    for (int i = 0; i < m; ++i) {
+      const double a = basis.l00[at(i)] - x, b = basis.l01[at(i)], c = basis.l10[at(i)],
+                   d = basis.l11[at(i)] - x;
+      const double inverse = 1 / (a * d - b * c);
+      const double q0 = -G(i, column), q1 = G(m + i, column);
+      E(i, column) = inverse * (d * q0 - b * q1);
+      E(m + i, column) = inverse * (a * q1 - c * q0);
+      const double w0 = G(column, i), w1 = G(column, m + i);  // x e - e Lambda_i = w
+      E(column, i) = -inverse * (w0 * d - w1 * c);
+      E(column, m + i) = -inverse * (w1 * a - w0 * b);
+    }
+    for (int l = 0; l < basis.zeros; ++l) {
+      E(column, 2 * m + l) = G(column, 2 * m + l) / (x - basis.rate[at(l)]);
+    }
+  }
+}
+
+template <typename Visit>
+void visit_block(const TrackedBasis& basis, int i, int j, const Visit& visit) {
+  visit(basis.first(i), basis.first(j));
+  if (j < basis.modes) visit(basis.first(i), basis.second(j));
+  if (i < basis.modes) {
+    visit(basis.second(i), basis.first(j));
+    if (j < basis.modes) visit(basis.second(i), basis.second(j));
+  }
+}
+
+double block_norm(const TrackedBasis& basis, const PaddedRows& X, int i, int j) {
+  double sum = 0;
+  visit_block(basis, i, j, [&](int row, int column) { sum += X(row, column) * X(row, column); });
+  return std::sqrt(sum);
+}
+
+/// E_ij = Sigma_i (Sigma - N)_ij / 2: the columns stay orthonormal, and are not told apart.
+void only_orthonormalize(const TrackedBasis& basis, const PaddedRows& N, int i, int j,
+                         PaddedRows& E) {
+  visit_block(basis, i, j, [&](int row, int column) {
+    const double sign = row < basis.modes ? 1 : -1;
+    E(row, column) = 0.5 * ((row == column ? 1 : 0) - sign * N(row, column));
+  });
+}
+
+}  // namespace
+
+StateForm state_form(const System<kMaxDof>& system) noexcept {
+  StateForm form;
+  form.joints = static_cast<int>(system.dof());
+  const auto rows = static_cast<int>(system.stiffness_factor.rows());
+  form.factored = rows > 0 && rows <= form.joints;
+  form.strains = form.factored ? rows : form.joints;
+  form.M = system.mass.data();
+  form.C = system.damping.data();
+  form.W = form.factored ? system.stiffness_factor.data() : system.stiffness.data();
+  return form;
+}
+
+void evaluate(const StateForm& form, TrackedBasis& basis, TrackedDefect& defect) noexcept {
+  const int n = form.joints, p = form.strains, states = form.states(), width = basis.Z.width;
+  const PaddedMultiply multiply = padded_multiply(width);
+  const double *const strain = basis.Z.row(0), *const velocity = basis.Z.row(p);
+  for (PaddedRows* rows : {&defect.N, &defect.G, &defect.MV, &defect.image}) rows->width = width;
+  // S Z = [Z_s or K Z_s; -M V] and B Z = [W V; W' Z_s + C V].
+  multiply({form.M, 1, n}, n, n, velocity, nullptr, -1, defect.MV.row(p));
+  multiply({form.W, 1, p}, p, n, velocity, nullptr, 1, defect.image.row(0));
+  multiply({form.W, p, 1}, n, p, strain, nullptr, 1, defect.image.row(p));
+  if (form.factored) {
+    std::copy(strain, velocity, defect.MV.row(0));
+  } else {
+    std::copy(defect.image.row(p), defect.image.row(p + n), defect.MV.row(0));
+  }
+  multiply({form.C, 1, n}, n, n, velocity, defect.image.row(p), 1, defect.image.row(p));
+  const Strided transposed{basis.Z.row(0), 1, width};
+  multiply(transposed, basis.columns(), states, defect.MV.row(0), nullptr, 1, defect.N.row(0));
+  multiply(transposed, basis.columns(), states, defect.image.row(0), nullptr, 1, defect.G.row(0));
+  set_blocks(defect.N, defect.G, basis);
+  subtract_blocks(basis, defect.N, defect.G);
+  take_diagonal(basis, defect.G, defect.diagonal);
+}
+
+Conflict newton_step(const TrackedBasis& basis, const TrackedDefect& defect, double noise,
+                     PaddedRows& E, double& size) noexcept {
+  E.width = basis.Z.width;
+  const int columns = basis.columns();
+  for (int i = 0; i < basis.modes; ++i) solve_row(basis, defect.G, i, E);
+  if (basis.zeros > 0) solve_zeros(basis, defect.G, E);
+  for (int i = 0; i < basis.blocks(); ++i) only_orthonormalize(basis, defect.N, i, i, E);
+  clear_padding(basis, columns, E);
+  Lanes squares{};
+  for (int i = 0; i < columns; ++i) {
+    for (int j = 0; j < E.width; j += 4) {
+      const Lanes e = load(E.row(i) + j);
+      squares += e * e;
+    }
+  }
+  size = std::sqrt(squares[0] + squares[1] + squares[2] + squares[3]);
+  Conflict conflict;
+  if (size < kSmallStep) return conflict;
+  double worst = 0;
+  for (int i = 0; i < basis.blocks(); ++i) {
+    for (int j = 0; j < i; ++j) {
+      const double step = std::max(block_norm(basis, E, i, j), block_norm(basis, E, j, i));
+      if (step < kSmallStep) continue;
+      const double coupling =
+          std::max(block_norm(basis, defect.G, i, j), block_norm(basis, defect.G, j, i));
+      only_orthonormalize(basis, defect.N, i, j, E);
+      only_orthonormalize(basis, defect.N, j, i, E);
+      if (coupling <= noise || coupling < worst) continue;
+      worst = coupling;
+      conflict = {j, i};
+    }
+  }
+  size = 0;
+  for (int i = 0; i < columns; ++i) {
+    for (int j = 0; j < columns; ++j) size += E(i, j) * E(i, j);
+  }
+  size = std::sqrt(size);
+  return conflict;
+}
+
+void multiply_rows(const TrackedBasis& basis, const PaddedRows& E, int first, int count,
+                   double* out) noexcept {
+  const int width = basis.Z.width;
+  const double* const rows = basis.Z.row(first);
+  padded_multiply(width)({rows, width, 1}, count, basis.columns(), E.row(0), rows, 1, out);
+}
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,185 @@
+#include <dashpot/analysis/hessenberg_qr.hpp>
+#include <dashpot/analysis/small_dense.hpp>
+#include <dashpot/analysis/tracked_modes.hpp>
+
+#include <cmath>
+
+namespace dashpot::analysis {
+namespace {
+
+constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
+
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+struct RootList {
+  std::array<Root, 2 * kMaxDof> items;
+  std::array<int, 2 * kMaxDof> block{};
+  int size = 0;
+
+  Root& operator[](int i) { return items[at(i)]; }
+  const Root& operator[](int i) const { return items[at(i)]; }
+};
+
+/// Two roots for each mode, in the order of the modes, then one for each zero mode; with the radius
+/// of the disc of each.
+void list_roots(const TrackedBasis& basis, const TrackedCertificate& certificate, RootList& roots) {
+  roots.size = basis.columns();
+  for (int i = 0; i < basis.modes; ++i) {
+    const double l00 = basis.l00[at(i)], l01 = basis.l01[at(i)], l10 = basis.l10[at(i)],
+                 l11 = basis.l11[at(i)];
+    std::array<Complex, 2> values;
+    eigenvalues_2x2(l00, l01, l10, l11, values[0], values[1]);
+    const double norm = std::sqrt(l00 * l00 + l01 * l01 + l10 * l10 + l11 * l11);
+    const double radius = certificate.radius[at(i)] + 16 * kUnit * norm;
+    for (int e = 0; e < 2; ++e) {
+      roots.block[at(2 * i + e)] = i;
+      roots[2 * i + e] = {values[at(e)], disc_radius(values.data(), 2, e, norm, radius)};
+    }
+  }
+  for (int k = 0; k < basis.zeros; ++k) {
+    roots.block[at(2 * basis.modes + k)] = basis.modes + k;
+    roots[2 * basis.modes + k] = {basis.rate[at(k)], certificate.radius[at(basis.modes + k)]};
+  }
+}
+
+/// Bound for root i where its disc may meet others of its group: all that is known then is how many
+/// eigenvalues the union of the discs holds, so that the bound is the sum of their diameters.
+double bound_in_group(const RootList& roots, const TrackedCertificate& certificate, int i) {
+  std::array<bool, 2 * kMaxDof> inside{};
+  inside[at(i)] = true;
+  double total = 2 * roots[i].bound;
+  bool several = false;
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (int j = 0; j < roots.size; ++j) {
+      if (inside[at(j)] ||
+          certificate.group[at(roots.block[at(i)])] != certificate.group[at(roots.block[at(j)])]) {
+        continue;
+      }
+      for (int k = 0; k < roots.size && !inside[at(j)]; ++k) {
+        if (!inside[at(k)]) continue;
+        if (!(modulus(roots[j].value - roots[k].value) > roots[j].bound + roots[k].bound)) {
+          inside[at(j)] = grown = several = true;
+          total += 2 * roots[j].bound;
+        }
+      }
+    }
+  }
+  return several ? total : roots[i].bound;
+}
+
+/// Eigenvector of a mode's block: (Lambda - mu) w = 0 from the row that says more.
+std::array<Complex, 2> block_vector(const TrackedBasis& basis, int i, const Complex& mu) {
+  const double l01 = basis.l01[at(i)], l10 = basis.l10[at(i)];
+  const Complex p = basis.l00[at(i)] - mu, s = basis.l11[at(i)] - mu;
+  std::array<Complex, 2> w;
+  if (std::norm(p) + l01 * l01 >= std::norm(s) + l10 * l10) {
+    w = {l01, -p};
+  } else {
+    w = {-s, l10};
+  }
+  if (w[0] == 0.0 && w[1] == 0.0) w = {1, 0};
+  return w;
+}
+
+/// u = V w, of unit kinetic energy u^H M u, its largest entry real and positive.
+void write_shape(const TrackedBasis& basis, const PaddedRows& velocities, const PaddedRows& momenta,
+                 int i, int which, const Complex& mu, TrackedShapes& shapes) {
+  const int n = basis.modes + basis.zeros;
+  const std::array<Complex, 2> w = block_vector(basis, i, mu);
+  std::array<double, kMaxDof> x{}, y{};
+  double energy = 0, largest = -1;
+  int pivot = 0;
+  for (int k = 0; k < n; ++k) {
+    const double first = velocities(k, i), second = velocities(k, basis.modes + i);
+    const double p_first = momenta(k, i), p_second = momenta(k, basis.modes + i);
+    x[at(k)] = first * w[0].real() + second * w[1].real();
+    y[at(k)] = first * w[0].imag() + second * w[1].imag();
+    energy += x[at(k)] * (p_first * w[0].real() + p_second * w[1].real()) +
+              y[at(k)] * (p_first * w[0].imag() + p_second * w[1].imag());
+    const double size = x[at(k)] * x[at(k)] + y[at(k)] * y[at(k)];
+    if (size > largest) largest = size, pivot = k;
+  }
+  const double factor = 1 / (std::sqrt(largest) * std::sqrt(energy));
+  const Complex f(x[at(pivot)] * factor, -y[at(pivot)] * factor);
+  ComplexVector<kMaxDof>& u = shapes.u[at(which)];
+  u.resize(n);
+  for (int k = 0; k < n; ++k) {
+    u[k] = Complex(f.real() * x[at(k)] - f.imag() * y[at(k)],
+                   f.real() * y[at(k)] + f.imag() * x[at(k)]);
+  }
+  // With the state x = (W u, mu u) = mu f Z w: u'(2 mu M + C) u = -x'Sx / mu (no conjugation).
+  const Complex sigma = product(w[0] - w[1], w[0] + w[1]);
+  shapes.slope[at(which)] = -product(product(mu, product(f, f)), sigma);
+}
+
+}  // namespace
+
+void sort_by_frequency(TrackedSpectrum& out) noexcept {
+  std::array<double, kMaxDof> key{};
+  for (int i = 0; i < out.mode_count; ++i) {
+    const auto& values = out.modes[at(i)].eigenvalues;
+    key[at(i)] = modulus(values[0]) * modulus(values[1]);
+    int position = i;
+    for (; position > 0 && key[at(out.by_frequency[at(position - 1)])] < key[at(i)]; --position) {
+      out.by_frequency[at(position)] = out.by_frequency[at(position - 1)];
+    }
+    out.by_frequency[at(position)] = i;
+  }
+}
+
+void read_numbers(const TrackedBasis& basis, const TrackedCertificate& certificate,
+                  double soft_frequency, std::array<bool, kMaxDof>& soft,
+                  TrackedSpectrum& out) noexcept {
+  RootList roots;
+  list_roots(basis, certificate, roots);
+  out.mode_count = basis.modes;
+  out.status = Status::kOk;
+  for (int i = 0; i < basis.modes; ++i) {
+    Root first = roots[2 * i], second = roots[2 * i + 1];
+    const bool apart = modulus(first.value - second.value) > first.bound + second.bound;
+    if (!certificate.alone[at(i)] || !apart) {
+      first.bound = bound_in_group(roots, certificate, 2 * i);
+      second.bound = bound_in_group(roots, certificate, 2 * i + 1);
+    }
+    first.bound += 2 * kUnit * modulus(first.value);
+    second.bound += 2 * kUnit * modulus(second.value);
+    Invariants invariants = block_invariants(basis.l00[at(i)], basis.l01[at(i)], basis.l10[at(i)],
+                                             basis.l11[at(i)], certificate.radius[at(i)]);
+    if (!certificate.alone[at(i)]) {
+      const Invariants of_roots = root_invariants(first, second);
+      invariants.sum_error = of_roots.sum_error;
+      invariants.product_error = of_roots.product_error;
+      invariants.discriminant_error = of_roots.discriminant_error;
+    }
+    ModeNumbers& mode = out.modes[at(i)];
+    mode = mode_numbers(first, second, invariants, soft_frequency * (soft[at(i)] ? 2 : 1));
+    soft[at(i)] = mode.kind == ModeKind::kSoft;
+    if (!std::isfinite(mode.error_bound)) out.status = Status::kUncertified;
+  }
+  out.zero_mode_count = basis.zeros;
+  for (int k = 0; k < basis.zeros; ++k) out.zero_mode_rates[at(k)] = basis.rate[at(k)];
+  sort_by_frequency(out);
+}
+
+void read_shapes(const StateForm& form, const TrackedBasis& basis, const PaddedRows& velocities,
+                 PaddedRows& momenta, TrackedSpectrum& out) noexcept {
+  momenta.width = basis.Z.width;
+  padded_multiply(momenta.width)({form.M, 1, form.joints}, form.joints, form.joints,
+                                 velocities.row(0), nullptr, 1, momenta.row(0));
+  for (int i = 0; i < basis.modes; ++i) {
+    const auto& values = out.modes[at(i)].eigenvalues;
+    TrackedShapes& shapes = out.shapes[at(i)];
+    write_shape(basis, velocities, momenta, i, 0, values[0], shapes);
+    if (values[0].imag() != 0) {
+      shapes.u[1] = shapes.u[0].conjugate();
+      shapes.slope[1] = std::conj(shapes.slope[0]);
+    } else {
+      write_shape(basis, velocities, momenta, i, 1, values[1], shapes);
+    }
+  }
+}
+
+}  // namespace dashpot::analysis

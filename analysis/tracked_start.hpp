@@ -1,0 +1,34 @@
+#pragma once
+#include <dashpot/analysis/mode_tracker.hpp>
+
+namespace dashpot::analysis {
+
+/// Builds a tracked basis from the basis of a direct solution: columns (W u, u Lambda), made
+/// orthonormal in the indefinite metric block by block; real eigenvalues are paired as the modes of
+/// `spectrum` are. Where a mode lost its stiffness (a singular arm), its strain is added, with a
+/// zero mode's velocity as its partner. Returns false if no such basis is found: blocks of several
+/// modes that cannot be parted, eigenvalues of equal sign type in one mode, a stiffness that is not
+/// positive definite and came without a factor.
+bool start_basis(const StateForm& form, const Spectrum<kMaxDof>& spectrum,
+                 TrackedBasis& basis) noexcept;
+
+/// Gives the modes of `basis` the places of those of `before` that they resemble: permutes columns
+/// so that the sum of overlaps (modal assurance criterion in the energy metric, of the planes that
+/// two modes span) is largest. Both bases have the same number of modes.
+void keep_places(const StateForm& form, const TrackedBasis& before, TrackedBasis& basis) noexcept;
+
+/// Moves mode i to place[i].
+void move_modes(const std::array<int, kMaxDof>& place, TrackedBasis& basis) noexcept;
+
+/// As keep_places, for modes known by their shapes alone: place[k] of mode k of `spectrum`. False,
+/// and places by falling frequency, if there are not as many modes as in `before`.
+bool find_places(const StateForm& form, const TrackedBasis& before,
+                 const Spectrum<kMaxDof>& spectrum, std::array<int, kMaxDof>& place) noexcept;
+
+/// Hyperbolic rotation of each block that makes its two columns orthogonal in the energy metric
+/// diag(I, M) as well, so that the basis stays as well conditioned as it can be. Blocks that are
+/// orthogonal to `tolerance` already are left alone; returns whether any was rotated. The defect is
+/// one of this basis, or nearly.
+bool balance(const TrackedDefect& defect, double tolerance, TrackedBasis& basis) noexcept;
+
+}  // namespace dashpot::analysis
