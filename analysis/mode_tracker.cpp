@@ -160,25 +160,18 @@ bool ModeTracker::publish(const StateForm& form, double distance, SpectrumOrigin
     return true;
   }
   if (origin != SpectrumOrigin::kReused) {
-    velocities_.width = basis_.Z.width;
-    multiply_rows(basis_, E_, basis_.modes, form.joints, velocities_.row(0));
+    stepped_velocities(basis_, E_, velocities_);
   }
   read_shapes(form, basis_, velocities_, work_, out);
   return true;
 }
 
 bool ModeTracker::reuse(const StateForm& form, TrackedSpectrum& out) noexcept {
-  const double change = distance(form, state_form(last_), sizes_);
+  const double change = distance(form, state_form(last_), sizes_, options_.reuse_tolerance);
   if (!(change <= options_.reuse_tolerance)) return false;
   if (!publish(form, change, SpectrumOrigin::kReused, out)) return false;
   ++counters_.reused;
   return true;
-}
-
-void ModeTracker::step_basis(const PaddedRows& E) noexcept {
-  multiply_rows(basis_, E, 0, basis_.columns(), work_.row(0));
-  work_.width = basis_.Z.width;
-  copy(work_, basis_.columns(), basis_.Z);
 }
 
 bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept {
@@ -190,7 +183,7 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   } else {
     set_zero(width, columns, step_);
   }
-  step_basis(E_);
+  take_step(E_, basis_);
   const bool turned = balance(defect_, kBalanced, basis_);
   sizes_ = coefficient_sizes(form);
   if (!refine(form, out, reason)) return false;
@@ -232,7 +225,7 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     }
     reason = Fallback::kNotConverged;
     if (!(size < 1)) return false;
-    if (pass < options_.max_passes) step_basis(E_);
+    if (pass < options_.max_passes) take_step(E_, basis_);
   }
   return false;
 }

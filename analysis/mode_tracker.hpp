@@ -106,7 +106,6 @@ class ModeTracker {
   bool refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
   bool publish(const StateForm& form, double distance, SpectrumOrigin origin,
                TrackedSpectrum& out) noexcept;
-  void step_basis(const PaddedRows& E) noexcept;
   void learn_step() noexcept;
   Status solve_directly(const System<kMaxDof>& system, const StateForm& form, Fallback reason,
                         TrackedSpectrum& out) noexcept;

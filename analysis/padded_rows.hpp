@@ -39,7 +39,7 @@ struct Strided {
 };
 
 /// out = sign (start + A X): `rows` rows of `width` doubles each, of A with `inner` columns.
-/// `start` may be null, for zero. Neither X nor out may be A, and X may not be out.
+/// `start` may be null, for zero. `out` may hold A or start, row by row, but not X.
 using PaddedMultiply = void (*)(const Strided& A, int rows, int inner, const double* X,
                                 const double* start, double sign, double* out) noexcept;
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 namespace dashpot::analysis {
 namespace {
@@ -14,9 +13,6 @@ std::size_t at(int i) {
   return static_cast<std::size_t>(i);
 }
 
-/// Columns of a row of modes are read in fours, and so up to three columns too far: those of the
-/// next part of the row, or of the next row. What comes of them is overwritten by that part, which
-/// is why parts are written in the order of the columns.
 void clear_padding(const TrackedBasis& basis, int rows, PaddedRows& X) {
   for (int i = 0; i < rows; ++i) {
     for (int j = basis.columns(); j < X.width; ++j) X(i, j) = 0;
@@ -39,13 +35,14 @@ void set_blocks(const PaddedRows& N, const PaddedRows& T, TrackedBasis& basis) {
   }
 }
 
-/// G = T - N Lambda, in the place of T.
+/// G = T - N Lambda, in the place of T. Lambda is zero in the lanes beyond the last mode, and so
+/// they write back what they read.
 void subtract_blocks(const TrackedBasis& basis, const PaddedRows& N, PaddedRows& G) {
   const int m = basis.modes;
   for (int i = 0; i < basis.columns(); ++i) {
     const double* const n = N.row(i);
     double* const g = G.row(i);
-    std::array<Lanes, 2 * kMaxDof / 4> first, second;
+    std::array<Lanes, kMaxDof / 4> first, second;
     for (int j = 0; j < m; j += 4) {
       const Lanes n0 = load(n + j), n1 = load(n + m + j);
       first[at(j / 4)] =
@@ -53,13 +50,9 @@ void subtract_blocks(const TrackedBasis& basis, const PaddedRows& N, PaddedRows&
       second[at(j / 4)] =
           load(g + m + j) - (n0 * load(&basis.l01[at(j)]) + n1 * load(&basis.l11[at(j)]));
     }
-    std::array<double, kMaxDof> rest{};
-    for (int k = 0; k < basis.zeros; ++k) {
-      rest[at(k)] = g[2 * m + k] - n[2 * m + k] * basis.rate[at(k)];
-    }
-    std::memcpy(g, &first, at(m) * sizeof(double));
-    std::memcpy(g + m, &second, at(m) * sizeof(double));
-    std::memcpy(g + 2 * m, &rest, at(basis.zeros) * sizeof(double));
+    for (int j = 0; j < m; j += 4) store(g + j, first[at(j / 4)]);
+    for (int j = 0; j < m; j += 4) store(g + m + j, second[at(j / 4)]);
+    for (int k = 0; k < basis.zeros; ++k) g[2 * m + k] -= n[2 * m + k] * basis.rate[at(k)];
   }
 }
 
@@ -102,10 +95,15 @@ void solve_row(const TrackedBasis& basis, const PaddedRows& G, int i, PaddedRows
     X[2][at(j / 4)] = inverse * (p00 * r10 - p10 * r00);
     X[3][at(j / 4)] = inverse * (p00 * r11 - p10 * r01);
   }
-  std::memcpy(E.row(i), &X[0], at(m) * sizeof(double));
-  std::memcpy(E.row(i) + m, &X[1], at(m) * sizeof(double));
-  std::memcpy(E.row(m + i), &X[2], at(m) * sizeof(double));
-  std::memcpy(E.row(m + i) + m, &X[3], at(m) * sizeof(double));
+  // What lanes beyond the last mode hold is overwritten by the next part of the row.
+  for (int j = 0; j < m; j += 4) {
+    store(E.row(i) + j, X[0][at(j / 4)]);
+    store(E.row(m + i) + j, X[2][at(j / 4)]);
+  }
+  for (int j = 0; j < m; j += 4) {
+    store(E.row(i) + m + j, X[1][at(j / 4)]);
+    store(E.row(m + i) + m + j, X[3][at(j / 4)]);
+  }
 }
 
 /// E between mode i and zero mode k, both ways, and between zero modes.
@@ -147,12 +145,11 @@ double block_norm(const TrackedBasis& basis, const PaddedRows& X, int i, int j) 
   return std::sqrt(sum);
 }
 
-/// E_ij = Sigma_i (Sigma - N)_ij / 2: the columns stay orthonormal, and are not told apart.
-void only_orthonormalize(const TrackedBasis& basis, const PaddedRows& N, int i, int j,
+/// E_ij = -Sigma_i R_ij / 2: the columns stay orthonormal, and are not told apart.
+void only_orthonormalize(const TrackedBasis& basis, const PaddedRows& R, int i, int j,
                          PaddedRows& E) {
   visit_block(basis, i, j, [&](int row, int column) {
-    const double sign = row < basis.modes ? 1 : -1;
-    E(row, column) = 0.5 * ((row == column ? 1 : 0) - sign * N(row, column));
+    E(row, column) = row < basis.modes ? -0.5 * R(row, column) : 0.5 * R(row, column);
   });
 }
 
@@ -174,7 +171,7 @@ void evaluate(const StateForm& form, TrackedBasis& basis, TrackedDefect& defect)
   const int n = form.joints, p = form.strains, states = form.states(), width = basis.Z.width;
   const PaddedMultiply multiply = padded_multiply(width);
   const double *const strain = basis.Z.row(0), *const velocity = basis.Z.row(p);
-  for (PaddedRows* rows : {&defect.N, &defect.G, &defect.MV, &defect.image}) rows->width = width;
+  for (PaddedRows* rows : {&defect.R, &defect.G, &defect.MV, &defect.image}) rows->width = width;
   // S Z = [Z_s or K Z_s; -M V] and B Z = [W V; W' Z_s + C V].
   multiply({form.M, 1, n}, n, n, velocity, nullptr, -1, defect.MV.row(p));
   multiply({form.W, 1, p}, p, n, velocity, nullptr, 1, defect.image.row(0));
@@ -186,10 +183,11 @@ void evaluate(const StateForm& form, TrackedBasis& basis, TrackedDefect& defect)
   }
   multiply({form.C, 1, n}, n, n, velocity, defect.image.row(p), 1, defect.image.row(p));
   const Strided transposed{basis.Z.row(0), 1, width};
-  multiply(transposed, basis.columns(), states, defect.MV.row(0), nullptr, 1, defect.N.row(0));
+  multiply(transposed, basis.columns(), states, defect.MV.row(0), nullptr, 1, defect.R.row(0));
   multiply(transposed, basis.columns(), states, defect.image.row(0), nullptr, 1, defect.G.row(0));
-  set_blocks(defect.N, defect.G, basis);
-  subtract_blocks(basis, defect.N, defect.G);
+  set_blocks(defect.R, defect.G, basis);
+  subtract_blocks(basis, defect.R, defect.G);
+  for (int i = 0; i < basis.columns(); ++i) defect.R(i, i) -= i < basis.modes ? 1 : -1;
   take_diagonal(basis, defect.G, defect.diagonal);
 }
 
@@ -199,7 +197,7 @@ Conflict newton_step(const TrackedBasis& basis, const TrackedDefect& defect, dou
   const int columns = basis.columns();
   for (int i = 0; i < basis.modes; ++i) solve_row(basis, defect.G, i, E);
   if (basis.zeros > 0) solve_zeros(basis, defect.G, E);
-  for (int i = 0; i < basis.blocks(); ++i) only_orthonormalize(basis, defect.N, i, i, E);
+  for (int i = 0; i < basis.blocks(); ++i) only_orthonormalize(basis, defect.R, i, i, E);
   clear_padding(basis, columns, E);
   Lanes squares{};
   for (int i = 0; i < columns; ++i) {
@@ -218,8 +216,8 @@ Conflict newton_step(const TrackedBasis& basis, const TrackedDefect& defect, dou
       if (step < kSmallStep) continue;
       const double coupling =
           std::max(block_norm(basis, defect.G, i, j), block_norm(basis, defect.G, j, i));
-      only_orthonormalize(basis, defect.N, i, j, E);
-      only_orthonormalize(basis, defect.N, j, i, E);
+      only_orthonormalize(basis, defect.R, i, j, E);
+      only_orthonormalize(basis, defect.R, j, i, E);
       if (coupling <= noise || coupling < worst) continue;
       worst = coupling;
       conflict = {j, i};
@@ -233,11 +231,22 @@ Conflict newton_step(const TrackedBasis& basis, const TrackedDefect& defect, dou
   return conflict;
 }
 
-void multiply_rows(const TrackedBasis& basis, const PaddedRows& E, int first, int count,
-                   double* out) noexcept {
-  const int width = basis.Z.width;
-  const double* const rows = basis.Z.row(first);
-  padded_multiply(width)({rows, width, 1}, count, basis.columns(), E.row(0), rows, 1, out);
+int padded_width(int modes, int zeros) noexcept {
+  const int lanes = modes + (modes + 3) / 4 * 4;
+  return (std::max(2 * modes + zeros, lanes) + 3) / 4 * 4;
+}
+
+void take_step(const PaddedRows& E, TrackedBasis& basis) noexcept {
+  const int width = basis.Z.width, columns = basis.columns();
+  double* const Z = basis.Z.row(0);
+  padded_multiply(width)({Z, width, 1}, columns, columns, E.row(0), Z, 1, Z);
+}
+
+void stepped_velocities(const TrackedBasis& basis, const PaddedRows& E, PaddedRows& out) noexcept {
+  const int width = out.width = basis.Z.width;
+  const double* const V = basis.Z.row(basis.modes);
+  padded_multiply(width)({V, width, 1}, basis.modes + basis.zeros, basis.columns(), E.row(0), V, 1,
+                         out.row(0));
 }
 
 }  // namespace dashpot::analysis

@@ -57,7 +57,7 @@ struct TrackedBasis {
 /// What a basis lacks: exactly S^-1 B Z = Z (Lambda + F) with
 ///     N F = G,     N = Z' S Z,     G = Z' B Z - N Lambda.
 struct TrackedDefect {
-  PaddedRows N;
+  PaddedRows R;  ///< N - Sigma
   PaddedRows G;                      ///< without the diagonal blocks of modes, 1/s
   TrackedBasis::Entries diagonal{};  ///< squared Frobenius norms of those, 1/s^2: rounding errors
   PaddedRows MV;     ///< -M V for the velocity rows V of Z, n rows: below the rows of S Z
@@ -81,8 +81,13 @@ struct Conflict {
 Conflict newton_step(const TrackedBasis& basis, const TrackedDefect& defect, double noise,
                      PaddedRows& E, double& size) noexcept;
 
-/// Rows [first, first + count) of Z (I + E) to `out`, which may not be Z.
-void multiply_rows(const TrackedBasis& basis, const PaddedRows& E, int first, int count,
-                   double* out) noexcept;
+/// Z <- Z (I + E).
+void take_step(const PaddedRows& E, TrackedBasis& basis) noexcept;
+
+/// The velocity rows (n) of Z (I + E).
+void stepped_velocities(const TrackedBasis& basis, const PaddedRows& E, PaddedRows& out) noexcept;
+
+/// Width of the rows of a basis: its columns, and room for what fours of modes write too far.
+int padded_width(int modes, int zeros) noexcept;
 
 }  // namespace dashpot::analysis

@@ -62,10 +62,10 @@ ErrorSizes error_sizes(const StateForm& form, const CoefficientSizes& sizes, dou
   e.c = sizes.damping;
   const double mass = std::sqrt(sizes.mass);
   for (int j = 0; j < width; j += 4) {
-    Lanes a{}, b{}, m{}, zero{};
+    Lanes a{}, b{}, m{};
     const auto magnitude = [&](int row) {
       const Lanes z = load(basis.Z.row(row) + j);
-      return z < zero ? -z : z;
+      return z < Lanes{} ? -z : z;
     };
     if (form.factored) {
       for (int k = 0; k < p; ++k) a += magnitude(k) * magnitude(k);
@@ -224,22 +224,17 @@ void Prover::sum_squares() {
   const int columns = basis_.columns(), width = basis_.Z.width;
   std::array<Lanes, kMaxWidth / 4> sums{};
   for (int i = 0; i < columns; ++i) {
-    Lanes G_sum{};
+    Lanes G_sum{}, R_sum{};
     const double* const g = defect_.G.row(i);
-    const double* const n = defect_.N.row(i);
+    const double* const r = defect_.R.row(i);
     for (int j = 0; j < width; j += 4) {
-      const Lanes x = load(g + j), squares = x * x;
+      const Lanes x = load(g + j), y = load(r + j), squares = x * x;
       G_sum += squares;
+      R_sum += y * y;
       sums[at(j / 4)] += squares;
     }
-    const double sign = i < basis_.modes ? 1 : -1;
-    std::array<double, kMaxWidth> R;
-    std::memcpy(R.data(), n, static_cast<std::size_t>(width) * sizeof(double));
-    R[at(i)] -= sign;
-    double R_square = 0;
-    for (int j = 0; j < width; ++j) R_square += square(R[at(j)]);
-    R_rows_[at(i)] = R_square;
-    R_total_ += R_square;
+    R_rows_[at(i)] = (R_sum[0] + R_sum[1]) + (R_sum[2] + R_sum[3]);
+    R_total_ += R_rows_[at(i)];
     G_rows_[at(i)] = (G_sum[0] + G_sum[1]) + (G_sum[2] + G_sum[3]);
     G_total_ += G_rows_[at(i)];
   }
@@ -342,8 +337,8 @@ CoefficientSizes coefficient_sizes(const StateForm& form) noexcept {
   return sizes;
 }
 
-double distance(const StateForm& form, const StateForm& other,
-                const CoefficientSizes& sizes) noexcept {
+double distance(const StateForm& form, const StateForm& other, const CoefficientSizes& sizes,
+                double limit) noexcept {
   const int n = form.joints;
   double mass = 0, damping = 0, stiffness = 0;
   // Changes relative to the sizes; zero by zero is no change.
@@ -360,6 +355,7 @@ double distance(const StateForm& form, const StateForm& other,
       W += square(form.W[i + j * form.strains] - other.W[i + j * form.strains]);
     }
     if (W > 0) stiffness = std::max(stiffness, std::sqrt(W) / sizes.strain[at(j)]);
+    if (mass > limit * sizes.mass) return kInfinity;
   }
   if (!form.factored && stiffness > 0) stiffness /= square(sizes.stiffness);
   if (damping > 0) damping /= sizes.damping;

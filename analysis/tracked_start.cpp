@@ -202,7 +202,7 @@ void Starter::write(TrackedBasis& basis) const {
   basis = TrackedBasis{};
   basis.modes = form_.strains;
   basis.zeros = form_.zeros();
-  basis.Z.width = (basis.columns() + 3) / 4 * 4;
+  basis.Z.width = padded_width(basis.modes, basis.zeros);
   for (int row = 0; row < form_.states(); ++row) {
     for (int i = 0; i < basis.modes; ++i) {
       basis.Z(row, i) = planes_[at(i)].first[at(row)];
