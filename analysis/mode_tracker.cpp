@@ -1,10 +1,12 @@
 #include <dashpot/analysis/double_double.hpp>
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/tracked_modes.hpp>
+#include <dashpot/analysis/tracked_parting.hpp>
 #include <dashpot/analysis/tracked_start.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace dashpot::analysis {
@@ -12,6 +14,9 @@ namespace {
 
 /// Steps this small leave eigenvectors right to their square once they are taken.
 constexpr double kLastStep = 3e-8;
+/// Below this, nothing but rounding errors is left to improve.
+constexpr double kConverged = 1e-11;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A step that is no smaller than this share of what it is compared with has not been foreseen.
 constexpr double kForeseen = 0.5;
 /// Blocks are balanced again when their columns lean this much towards each other.
@@ -147,21 +152,24 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out) 
   return solve_directly(system, form, reason, out);
 }
 
-bool ModeTracker::publish(const StateForm& form, double distance, SpectrumOrigin origin,
+/// Certifies the basis and reads its modes; false if a relative bound exceeds `target` or nothing
+/// is proved. The system is at this `distance` from the one that the basis was evaluated for;
+/// `fresh` if it was so just now.
+bool ModeTracker::publish(const StateForm& form, double distance, double target, bool fresh,
                           TrackedSpectrum& out) noexcept {
   certify(form, sizes_, distance, basis_, defect_, certificate_);
   std::array<bool, kMaxDof> soft = soft_;
   read_numbers(basis_, certificate_, options_.soft_frequency, soft, out);
-  if (!(worst_bound(out) <= options_.target_bound)) return false;
+  const double worst = worst_bound(out);
+  if (!(worst <= target) || out.status != Status::kOk) return false;
   soft_ = soft;
-  out.origin = origin;
+  out.origin = fresh ? SpectrumOrigin::kTracked : SpectrumOrigin::kReused;
+  if (fresh) bound_ = worst;
   if (!options_.shapes) {
     ++counters_.shapes_skipped;
     return true;
   }
-  if (origin != SpectrumOrigin::kReused) {
-    stepped_velocities(basis_, E_, velocities_);
-  }
+  if (fresh) stepped_velocities(basis_, E_, velocities_);
   read_shapes(form, basis_, velocities_, work_, out);
   return true;
 }
@@ -169,7 +177,7 @@ bool ModeTracker::publish(const StateForm& form, double distance, SpectrumOrigin
 bool ModeTracker::reuse(const StateForm& form, TrackedSpectrum& out) noexcept {
   const double change = distance(form, state_form(last_), sizes_, options_.reuse_tolerance);
   if (!(change <= options_.reuse_tolerance)) return false;
-  if (!publish(form, change, SpectrumOrigin::kReused, out)) return false;
+  if (!publish(form, change, std::max(options_.target_bound, 2 * bound_), false, out)) return false;
   ++counters_.reused;
   return true;
 }
@@ -184,10 +192,10 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
     set_zero(width, columns, step_);
   }
   take_step(E_, basis_);
-  const bool turned = balance(defect_, kBalanced, basis_);
+  turned_ = balance(defect_, kBalanced, basis_);
   sizes_ = coefficient_sizes(form);
   if (!refine(form, out, reason)) return false;
-  if (turned) {
+  if (turned_) {
     set_zero(width, columns, last_step_);
     predicting_ = false;
   } else {
@@ -209,6 +217,7 @@ void ModeTracker::learn_step() noexcept {
 /// Newton's method from the basis as it is. Leaves the last step to be taken.
 bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept {
   const int columns = basis_.columns();
+  reason = Fallback::kNotConverged;
   for (int pass = 1; pass <= options_.max_passes; ++pass) {
     ++counters_.passes;
     counters_.most_passes = std::max(counters_.most_passes, pass);
@@ -216,16 +225,17 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     double size = 0;
     const Conflict conflict = newton_step(basis_, defect_, certificate_.noise, E_, size);
     add(step_, 1, E_, columns, step_);
-    if (conflict) {
-      reason = Fallback::kCoincidence;
-      return false;
-    }
-    if (size <= kLastStep) {
-      if (publish(form, 0, SpectrumOrigin::kTracked, out)) return true;
-    }
-    reason = Fallback::kNotConverged;
     if (!(size < 1)) return false;
+    if (!conflict && size <= kLastStep &&
+        publish(form, 0, size <= kConverged ? kInfinity : options_.target_bound, true, out)) {
+      return true;
+    }
     if (pass < options_.max_passes) take_step(E_, basis_);
+    if (!conflict) continue;
+    reason = Fallback::kCoincidence;
+    turned_ = true;
+    if (!part_blocks(defect_, conflict, basis_)) return false;
+    ++counters_.repairs;
   }
   return false;
 }

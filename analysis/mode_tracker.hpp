@@ -40,7 +40,8 @@ struct TrackedSpectrum {
 struct TrackerOptions {
   /// Modes are called soft from below this natural frequency until above twice it, rad/s.
   double soft_frequency = 1e-6;
-  /// Wanted: error bound / (|lambda_1| + |lambda_2|). What lies above is refined, then solved anew.
+  /// Wanted: error bound / (|lambda_1| + |lambda_2|). What lies above is refined while there is
+  /// more than rounding errors to refine.
   double target_bound = 1e-10;
   /// Evaluations of the basis in one update, before the direct solver is called.
   int max_passes = 4;
@@ -104,7 +105,7 @@ class ModeTracker {
   bool reuse(const StateForm& form, TrackedSpectrum& out) noexcept;
   bool follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
   bool refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
-  bool publish(const StateForm& form, double distance, SpectrumOrigin origin,
+  bool publish(const StateForm& form, double distance, double target, bool fresh,
                TrackedSpectrum& out) noexcept;
   void learn_step() noexcept;
   Status solve_directly(const System<kMaxDof>& system, const StateForm& form, Fallback reason,
@@ -125,10 +126,12 @@ class ModeTracker {
   TrackedCertificate certificate_;
   PaddedRows E_;
   std::array<bool, kMaxDof> soft_{};
+  double bound_ = 0;  ///< its largest relative error bound
 
   // Extrapolation: the whole step of this update so far, and that of the last one.
   PaddedRows step_, last_step_;
   bool predicting_ = false;
+  bool turned_ = false;  ///< columns were rotated or parted: the step tells nothing
 
   PaddedRows velocities_, work_;
   System<kMaxDof> direct_;

@@ -57,7 +57,7 @@ struct TrackedBasis {
 /// What a basis lacks: exactly S^-1 B Z = Z (Lambda + F) with
 ///     N F = G,     N = Z' S Z,     G = Z' B Z - N Lambda.
 struct TrackedDefect {
-  PaddedRows R;  ///< N - Sigma
+  PaddedRows R;                      ///< N - Sigma
   PaddedRows G;                      ///< without the diagonal blocks of modes, 1/s
   TrackedBasis::Entries diagonal{};  ///< squared Frobenius norms of those, 1/s^2: rounding errors
   PaddedRows MV;     ///< -M V for the velocity rows V of Z, n rows: below the rows of S Z

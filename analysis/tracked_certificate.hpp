@@ -16,8 +16,7 @@ CoefficientSizes coefficient_sizes(const StateForm& form) noexcept;
 /// How far two systems of the same sizes differ: the least d with |M - M'| <= d mass s s',
 /// |C - C'| <= d damping s s', and likewise for K or the columns of W. All entries are finite.
 /// Infinite as soon as it is seen to exceed `limit`.
-double distance(const StateForm& form, const StateForm& other,
-                const CoefficientSizes& sizes,
+double distance(const StateForm& form, const StateForm& other, const CoefficientSizes& sizes,
                 double limit) noexcept;
 
 /// What is proved about the blocks of a basis.
