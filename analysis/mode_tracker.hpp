@@ -44,7 +44,7 @@ struct TrackerOptions {
   /// more than rounding errors to refine.
   double target_bound = 1e-10;
   /// Evaluations of the basis in one update, before the direct solver is called.
-  int max_passes = 4;
+  int max_passes = 6;
   /// Relative change of the coefficients up to which the last spectrum is used again, with bounds
   /// that include the change: see distance() in tracked_certificate.hpp. Negative: never.
   double reuse_tolerance = 1e-14;
