@@ -1,0 +1,363 @@
+// Paths through the hard places: critical damping, veering, exceptional points, real eigenvalues of
+// different modes that meet, coincidences, singular arms, jumps.
+#include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/tests/support/panda_path.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/true_spectrum.hpp>
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <numbers>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::expect_enclosed;
+using testing::Random;
+
+System<kMaxDof> make(const MatrixXd& mass, const MatrixXd& damping, const MatrixXd& stiffness) {
+  System<kMaxDof> system(mass.rows());
+  system.mass = 0.5 * (mass + mass.transpose());
+  system.damping = 0.5 * (damping + damping.transpose());
+  system.stiffness = 0.5 * (stiffness + stiffness.transpose());
+  return system;
+}
+
+/// A path is followed, and its bounds are checked at every `apart`-th step.
+class Follower {
+ public:
+  explicit Follower(const TrackerOptions& options = {})
+      : tracker(std::make_unique<ModeTracker>(options)),
+        spectrum(std::make_unique<TrackedSpectrum>()) {}
+
+  void follow(int steps, int apart, const std::function<System<kMaxDof>(double)>& at) {
+    for (int step = 0; step <= steps; ++step) {
+      const System<kMaxDof> system = at(static_cast<double>(step) / steps);
+      ASSERT_EQ(tracker->update(system, *spectrum), Status::kOk) << "step " << step;
+      std::vector<double> now;
+      for (int i = 0; i < spectrum->mode_count; ++i) {
+        now.push_back(mode(i).natural_frequency);
+        largest_jump = std::max(
+            largest_jump, last.empty() ? 0 : std::abs(now.back() - last[now.size() - 1]));
+      }
+      last = now;
+      if (step % apart != 0) continue;
+      SCOPED_TRACE("step " + std::to_string(step));
+      expect_enclosed(system, *spectrum);
+    }
+  }
+
+  const ModeNumbers& mode(int i) const { return spectrum->modes[static_cast<std::size_t>(i)]; }
+  const TrackerCounters& counters() const { return tracker->counters(); }
+
+  std::unique_ptr<ModeTracker> tracker;
+  std::unique_ptr<TrackedSpectrum> spectrum;
+  std::vector<double> last;
+  double largest_jump = 0;  ///< of a natural frequency from one step to the next, rad/s
+};
+
+/// The only call of the direct solver was the first.
+void expect_followed(const TrackerCounters& counters) {
+  EXPECT_EQ(counters.direct, 1);
+  EXPECT_EQ(counters.failed, 0);
+  EXPECT_EQ(counters.tracked + counters.reused, counters.updates - 1);
+  EXPECT_LE(counters.most_passes, TrackerOptions{}.max_passes);
+}
+
+TEST(TrackedPath, ThroughCriticalDampingIsSmooth) {
+  Random random(3001);
+  const MatrixXd T = random.spd(3);
+  const VectorXd omega = (VectorXd(3) << 4, 7, 12).finished();
+  Follower follower;
+  follower.follow(2000, 20, [&](double t) {
+    const double zeta = 0.5 + 1.2 * t;  // all three pass through 1, proportionally damped
+    const VectorXd d = 2 * zeta * omega, k = omega.cwiseAbs2();
+    return make(T * T, T * d.asDiagonal() * T, T * k.asDiagonal() * T);
+  });
+  expect_followed(follower.counters());
+  EXPECT_LT(follower.largest_jump, 1e-9);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(follower.mode(i).natural_frequency, omega[2 - i], 1e-10);
+    EXPECT_NEAR(follower.mode(i).damping_ratio, 1.7, 1e-10);
+    EXPECT_EQ(follower.mode(i).kind, ModeKind::kOverdamped);
+  }
+}
+
+TEST(TrackedPath, StandsAtExactlyCriticalDamping) {
+  Follower follower;
+  follower.follow(200, 1, [&](double t) {
+    // The first mode stays exactly critical while the second one changes.
+    return make(MatrixXd::Identity(2, 2), Eigen::Vector2d(2, 1 + t).asDiagonal(),
+                Eigen::Vector2d(1, 16 + t).asDiagonal());
+  });
+  expect_followed(follower.counters());
+  EXPECT_EQ(follower.mode(1).kind, ModeKind::kCritical);
+  EXPECT_NEAR(follower.mode(1).damping_ratio, 1, 1e-13);
+}
+
+/// Two oscillators whose frequencies exchange, coupled so that they come no nearer than `gap`.
+System<kMaxDof> exchange(double t, double gap) {
+  const double w = 10, difference = 4 * (t - 0.5);
+  MatrixXd K(2, 2);
+  K << w * w + w * difference, w * gap, w * gap, w * w - w * difference;
+  return make(MatrixXd::Identity(2, 2), 0.1 * MatrixXd::Identity(2, 2), K);
+}
+
+TEST(TrackedPath, VeersWhereModesAreCoupled) {
+  for (const double gap : {1.0, 0.3, 0.1, 0.03}) {
+    SCOPED_TRACE(gap);
+    Follower follower;
+    follower.follow(4000, 40, [&](double t) { return exchange(t, gap); });
+    expect_followed(follower.counters());
+    EXPECT_GT(follower.mode(0).natural_frequency, follower.mode(1).natural_frequency);
+    EXPECT_LT(follower.largest_jump, 1e-3);
+  }
+}
+
+TEST(TrackedPath, CrossesWhereModesAreNotCoupled) {
+  for (const int steps : {4000, 3999}) {  // even: one step is exactly at the crossing
+    Follower follower;
+    follower.follow(steps, 40, [&](double t) { return exchange(t, 0); });
+    expect_followed(follower.counters());
+    EXPECT_LT(follower.mode(0).natural_frequency, follower.mode(1).natural_frequency);
+    EXPECT_LT(follower.largest_jump, 1e-3);
+    EXPECT_EQ(follower.spectrum->by_frequency[0], 1);
+  }
+}
+
+TEST(TrackedPath, CrossesInMixedCoordinatesWithHeavyDamping) {
+  Random random(3002);
+  const MatrixXd T = random.spd(4);
+  for (const double zeta : {0.3, 0.98, 1.5}) {
+    SCOPED_TRACE(zeta);
+    Follower follower;
+    follower.follow(3000, 30, [&](double t) {
+      VectorXd omega(4);
+      omega << 8 + 4 * t, 10, 12 - 4 * t, 30;  // three meet at t = 0.5
+      return make(T * T, T * (2 * zeta * omega).asDiagonal() * T,
+                  T * omega.cwiseAbs2().asDiagonal() * T);
+    });
+    EXPECT_GE(follower.counters().tracked, 2990);
+    EXPECT_LT(follower.largest_jump, 5e-3);
+    EXPECT_EQ(follower.mode(0).natural_frequency, follower.last[0]);
+  }
+}
+
+TEST(TrackedPath, AroundAnExceptionalPointExchangesTheModes) {
+  // Two oscillators, equally stiff but not equally damped: for a coupling of about w (c1 - c2) / 2
+  // both pairs of eigenvalues coincide and have one eigenvector.
+  const double w = 10, c1 = 2, c2 = 0.4, center = w * (c1 - c2) / 2;
+  const auto at = [&](double t) {
+    const double angle = 2 * std::numbers::pi * t, radius = 0.5 * center;
+    const double difference = radius * std::sin(angle),
+                 coupling = center + radius * std::cos(angle);
+    MatrixXd K(2, 2);
+    K << w * w + difference, coupling, coupling, w * w - difference;
+    return make(MatrixXd::Identity(2, 2), Eigen::Vector2d(c1, c2).asDiagonal(), K);
+  };
+  Follower follower;
+  follower.follow(1, 1, [&](double) { return at(0); });
+  const ModeNumbers first = follower.mode(0), second = follower.mode(1);
+  EXPECT_GT(std::abs(first.eigenvalues[0] - second.eigenvalues[0]), 0.1);
+  follower.follow(2000, 20, at);
+  EXPECT_NEAR(std::abs(follower.mode(0).eigenvalues[0] - second.eigenvalues[0]), 0, 1e-9);
+  EXPECT_NEAR(std::abs(follower.mode(1).eigenvalues[0] - first.eigenvalues[0]), 0, 1e-9);
+  follower.follow(2000, 20, at);
+  EXPECT_NEAR(std::abs(follower.mode(0).eigenvalues[0] - first.eigenvalues[0]), 0, 1e-9);
+  EXPECT_EQ(follower.counters().direct, 1);
+  // A loop beside the point brings each mode back to itself.
+  Follower beside;
+  const auto shifted = [&](double t) {
+    System<kMaxDof> system = at(t);
+    system.stiffness(0, 0) += 3 * center;
+    return system;
+  };
+  beside.follow(1, 1, [&](double) { return shifted(0); });
+  const ModeNumbers before = beside.mode(0);
+  beside.follow(2000, 20, shifted);
+  EXPECT_NEAR(std::abs(beside.mode(0).eigenvalues[0] - before.eigenvalues[0]), 0, 1e-9);
+}
+
+TEST(TrackedPath, RealEigenvaluesOfTwoModesMeetAndPartAgain) {
+  // The fast eigenvalue of the first mode, -3.73, meets the slow one of the second; coupled, the two
+  // turn complex for a while.
+  for (const double coupling : {0.0, 1e-6, 0.01, 0.3, 1.5}) {
+    SCOPED_TRACE(coupling);
+    Follower follower;
+    follower.follow(4000, 20, [&](double t) {
+      const double c = 25 + 15 * t;  // of the second: slow eigenvalue from -5 to -2.7
+      MatrixXd C(2, 2), K(2, 2);
+      C << 4, coupling, coupling, c;
+      K << 1, 0.3 * coupling, 0.3 * coupling, 100;
+      return make(MatrixXd::Identity(2, 2), C, K);
+    });
+    EXPECT_GE(follower.counters().tracked, 3990);
+    if (coupling == 0.01 || coupling == 0.3) {
+      EXPECT_GE(follower.counters().repairs, 1);
+    }
+  }
+}
+
+TEST(TrackedPath, ModesThatStayEqualAreReportedEqual) {
+  Random random(3003);
+  const MatrixXd T = random.spd(5);
+  for (const double zeta : {0.0, 0.2, 1.0, 2.0}) {
+    SCOPED_TRACE(zeta);
+    Follower follower;
+    follower.follow(300, 5, [&](double t) {
+      const double omega = 5 + t;
+      VectorXd w(5);
+      w << omega, omega, omega, 20, 20;
+      return make(T * T, T * (2 * zeta * w).asDiagonal() * T, T * w.cwiseAbs2().asDiagonal() * T);
+    });
+    for (int i = 0; i < 5; ++i) {
+      EXPECT_NEAR(follower.mode(i).natural_frequency, i < 2 ? 20 : 6, 1e-5);
+      EXPECT_NEAR(follower.mode(i).damping_ratio, zeta, 1e-5);
+    }
+  }
+}
+
+TEST(TrackedPath, FrozenInputIsReused) {
+  const System<kMaxDof> system = exchange(0.2, 0.5);
+  Follower follower;
+  follower.follow(100, 10, [&](double) { return system; });
+  EXPECT_EQ(follower.counters().reused, 100);
+  EXPECT_EQ(follower.counters().direct, 1);
+  EXPECT_EQ(follower.spectrum->origin, SpectrumOrigin::kReused);
+}
+
+TEST(TrackedPath, NearlyFrozenInputIsReusedWithinABoundThatSaysSo) {
+  Random random(3004);
+  TrackerOptions options;
+  options.reuse_tolerance = 1e-8;
+  options.target_bound = 1e-4;
+  Follower follower(options);
+  const System<kMaxDof> base = exchange(0.2, 0.5);
+  follower.follow(200, 1, [&](double) {
+    System<kMaxDof> system = base;
+    system.stiffness(0, 0) *= 1 + random.uniform(-1e-9, 1e-9);
+    system.mass(1, 1) *= 1 + random.uniform(-1e-9, 1e-9);
+    return system;
+  });
+  EXPECT_EQ(follower.counters().reused, 200);
+  EXPECT_GT(follower.mode(0).error_bound, 1e-11);
+  EXPECT_LT(follower.mode(0).error_bound, 1e-5);
+}
+
+TEST(TrackedPath, JumpsAreSolvedAnew) {
+  Random random(3005);
+  Follower follower;
+  follower.follow(60, 1, [&](double) {
+    return make(random.spd(6), 3 * random.spd(6), 100 * random.spd(6));
+  });
+  EXPECT_GE(follower.counters().direct, 30);
+  EXPECT_EQ(follower.counters().of(Fallback::kStart), 1);
+  EXPECT_LE(follower.counters().most_passes, TrackerOptions{}.max_passes);
+}
+
+TEST(TrackedPath, KeepsPlacesOverASmallJump) {
+  const MatrixXd I = MatrixXd::Identity(3, 3);
+  const auto at = [&](double a, double b, double c) {
+    MatrixXd K = Eigen::Vector3d(a, b, c).asDiagonal();
+    K(0, 1) = K(1, 0) = 0.5;
+    return make(I, 0.3 * I, K);
+  };
+  Follower follower;
+  follower.follow(1, 1, [&](double) { return at(400, 100, 25); });
+  follower.tracker->reset();
+  // The frequencies are exchanged, the shapes hardly changed.
+  follower.follow(1, 1, [&](double) { return at(25, 400, 100); });
+  EXPECT_NEAR(follower.mode(0).natural_frequency, 5, 0.01);
+  EXPECT_NEAR(follower.mode(1).natural_frequency, 20, 0.01);
+  EXPECT_NEAR(follower.mode(2).natural_frequency, 10, 0.01);
+}
+
+/// A planar arm of three unit links, its hand held in x and y; singular where it is stretched.
+System<kMaxDof> planar_arm(const Eigen::Vector3d& q, double friction) {
+  MatrixXd J = MatrixXd::Zero(2, 3), M = 0.05 * MatrixXd::Identity(3, 3);
+  for (int link = 0; link < 3; ++link) {
+    MatrixXd J_link = MatrixXd::Zero(2, 3);
+    double angle = 0;
+    Eigen::Vector2d joint = Eigen::Vector2d::Zero();
+    std::vector<Eigen::Vector2d> joints;
+    for (int k = 0; k <= link; ++k) {
+      joints.push_back(joint);
+      angle += q[k];
+      joint += Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    }
+    for (int k = 0; k <= link; ++k) {
+      const Eigen::Vector2d arm = joint - joints[static_cast<std::size_t>(k)];
+      J_link.col(k) << -arm.y(), arm.x();
+    }
+    M += J_link.transpose() * J_link;
+    J = J_link;
+  }
+  const Eigen::Vector2d root_K(30, 20);
+  System<kMaxDof> system = make(
+      M, J.transpose() * Eigen::Vector2d(8, 12).asDiagonal() * J + friction * MatrixXd::Identity(3, 3),
+      MatrixXd::Zero(3, 3));
+  system.stiffness_factor = root_K.asDiagonal() * J;
+  return system;
+}
+
+TEST(TrackedPath, GoesThroughAStretchedSingularityAndBack) {
+  for (const double friction : {0.0, 0.2}) {
+    SCOPED_TRACE(friction);
+    TrackerOptions options;
+    options.soft_frequency = 0.05;
+    Follower follower(options);
+    bool was_soft = false;
+    double smallest = 1e9;
+    follower.follow(4000, 10, [&](double t) {
+      for (int i = 0; i < follower.spectrum->mode_count; ++i) {
+        was_soft = was_soft || follower.mode(i).kind == ModeKind::kSoft;
+        if (follower.mode(i).natural_frequency < smallest) {
+          smallest = follower.mode(i).natural_frequency;
+        }
+      }
+      // Stretched at t = 0.25 and 0.75, exactly so.
+      const double bend = 0.8 * std::cos(2 * std::numbers::pi * t);
+      const double exact = t == 0.25 || t == 0.75 ? 0 : bend;
+      return planar_arm({0.3 + 0.2 * t, exact, 0.7 * exact}, friction);
+    });
+    EXPECT_TRUE(was_soft);
+    EXPECT_LT(smallest, 0.05);
+    EXPECT_EQ(follower.spectrum->mode_count, 2);
+    EXPECT_EQ(follower.spectrum->zero_mode_count, 1);
+    EXPECT_GE(follower.counters().tracked, 3990)
+        << follower.counters().of(Fallback::kNotConverged) << " not converged, "
+        << follower.counters().of(Fallback::kCoincidence) << " coincidences, "
+        << follower.counters().of(Fallback::kStart) << " starts";
+  }
+}
+
+TEST(TrackedPath, StartsAtASingularity) {
+  Follower follower;
+  follower.follow(500, 5, [&](double t) { return planar_arm({0.3, t, 0.7 * t}, 0.1); });
+  EXPECT_EQ(follower.spectrum->mode_count, 2);
+  EXPECT_GE(follower.counters().tracked, 490);
+}
+
+TEST(TrackedPath, OfAPandaArmIsFollowedAtAnyDamping) {
+  for (const double ratio : {0.0, 0.03, 0.3, 1.0, 3.0, 10.0}) {
+    SCOPED_TRACE(ratio);
+    Follower follower;
+    follower.follow(3000, 25, [&](double t) {
+      return testing::panda_impedance(testing::swing(3 * t), ratio);
+    });
+    EXPECT_EQ(follower.spectrum->mode_count, 6);
+    EXPECT_LE(follower.counters().direct, 5);
+    EXPECT_LE(follower.counters().most_passes, TrackerOptions{}.max_passes);
+    if (ratio < 1) {
+      expect_followed(follower.counters());
+      EXPECT_LT(follower.largest_jump, 0.5);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
