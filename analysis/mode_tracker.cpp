@@ -170,7 +170,7 @@ bool ModeTracker::publish(const StateForm& form, double distance, double target,
     return true;
   }
   if (fresh) stepped_velocities(basis_, E_, velocities_);
-  read_shapes(form, basis_, velocities_, work_, out);
+  read_shapes(form, basis_, E_, velocities_, work_, out);
   return true;
 }
 

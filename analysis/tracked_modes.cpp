@@ -84,11 +84,15 @@ std::array<Complex, 2> block_vector(const TrackedBasis& basis, int i, const Comp
   return w;
 }
 
-/// u = V w, of unit kinetic energy u^H M u, its largest entry real and positive.
-void write_shape(const TrackedBasis& basis, const PaddedRows& velocities, const PaddedRows& momenta,
-                 int i, int which, const Complex& mu, TrackedShapes& shapes) {
+/// u = V w, of unit kinetic energy u^H M u, its largest entry real and positive. Lambda, and so w,
+/// is that of the basis before the step E.
+void write_shape(const TrackedBasis& basis, const PaddedRows& E, const PaddedRows& velocities,
+                 const PaddedRows& momenta, int i, int which, const Complex& mu,
+                 TrackedShapes& shapes) {
   const int n = basis.modes + basis.zeros;
-  const std::array<Complex, 2> w = block_vector(basis, i, mu);
+  const int j = basis.modes + i;
+  std::array<Complex, 2> w = block_vector(basis, i, mu);
+  w = {w[0] - (E(i, i) * w[0] + E(i, j) * w[1]), w[1] - (E(j, i) * w[0] + E(j, j) * w[1])};
   std::array<double, kMaxDof> x{}, y{};
   double energy = 0, largest = -1;
   int pivot = 0;
@@ -164,20 +168,20 @@ void read_numbers(const TrackedBasis& basis, const TrackedCertificate& certifica
   sort_by_frequency(out);
 }
 
-void read_shapes(const StateForm& form, const TrackedBasis& basis, const PaddedRows& velocities,
-                 PaddedRows& momenta, TrackedSpectrum& out) noexcept {
+void read_shapes(const StateForm& form, const TrackedBasis& basis, const PaddedRows& E,
+                 const PaddedRows& velocities, PaddedRows& momenta, TrackedSpectrum& out) noexcept {
   momenta.width = basis.Z.width;
   padded_multiply(momenta.width)({form.M, 1, form.joints}, form.joints, form.joints,
                                  velocities.row(0), nullptr, 1, momenta.row(0));
   for (int i = 0; i < basis.modes; ++i) {
     const auto& values = out.modes[at(i)].eigenvalues;
     TrackedShapes& shapes = out.shapes[at(i)];
-    write_shape(basis, velocities, momenta, i, 0, values[0], shapes);
+    write_shape(basis, E, velocities, momenta, i, 0, values[0], shapes);
     if (values[0].imag() != 0) {
       shapes.u[1] = shapes.u[0].conjugate();
       shapes.slope[1] = std::conj(shapes.slope[0]);
     } else {
-      write_shape(basis, velocities, momenta, i, 1, values[1], shapes);
+      write_shape(basis, E, velocities, momenta, i, 1, values[1], shapes);
     }
   }
 }

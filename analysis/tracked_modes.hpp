@@ -12,8 +12,8 @@ void read_numbers(const TrackedBasis& basis, const TrackedCertificate& certifica
 /// Fills out.by_frequency.
 void sort_by_frequency(TrackedSpectrum& out) noexcept;
 
-/// Eigenvectors from the velocity rows V of a basis (n rows); M V goes to `momenta`.
-void read_shapes(const StateForm& form, const TrackedBasis& basis, const PaddedRows& velocities,
-                 PaddedRows& momenta, TrackedSpectrum& out) noexcept;
+/// Eigenvectors from the velocity rows V (n) of Z (I + E); M V goes to `momenta`.
+void read_shapes(const StateForm& form, const TrackedBasis& basis, const PaddedRows& E,
+                 const PaddedRows& velocities, PaddedRows& momenta, TrackedSpectrum& out) noexcept;
 
 }  // namespace dashpot::analysis

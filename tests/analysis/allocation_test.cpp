@@ -1,5 +1,5 @@
 // A solver of fixed capacity never touches the heap, and finds what the dynamic one finds.
-#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/random.hpp>
 
 #include <gtest/gtest.h>
@@ -171,6 +171,27 @@ TEST(Allocation, DoesNotHappenInASolverOfFixedCapacity) {
       }
     }
   }
+}
+
+TEST(Allocation, DoesNotHappenInTheModeTracker) {
+  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
+  Random random(604);
+  const auto tracker = std::make_unique<ModeTracker>();
+  const auto spectrum = std::make_unique<TrackedSpectrum>();
+  for (int n = 0; n <= kMaxDof; ++n) {
+    for (const Named& one : systems_of_every_kind(random, n)) {
+      System<kMaxDof> system = fixed(one.system);
+      for (int step = 0; step < 4; ++step) {  // start, follow, follow the prediction, reuse
+        if (step < 3) system.mass.diagonal() *= 1.001;
+        EXPECT_EQ(allocations_of([&] { tracker->update(system, *spectrum); }), 0)
+            << one.name << ", n = " << n << ", step " << step;
+      }
+    }
+  }
+  const TrackerCounters& counters = tracker->counters();
+  EXPECT_GT(counters.tracked, 100);
+  EXPECT_GT(counters.reused, 50);
+  EXPECT_GT(counters.direct, 100);
 }
 
 TEST(FixedCapacity, GivesTheModesOfTheDynamicSolver) {

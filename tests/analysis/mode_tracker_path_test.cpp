@@ -41,8 +41,8 @@ class Follower {
       std::vector<double> now;
       for (int i = 0; i < spectrum->mode_count; ++i) {
         now.push_back(mode(i).natural_frequency);
-        largest_jump = std::max(
-            largest_jump, last.empty() ? 0 : std::abs(now.back() - last[now.size() - 1]));
+        largest_jump =
+            std::max(largest_jump, last.empty() ? 0 : std::abs(now.back() - last[now.size() - 1]));
       }
       last = now;
       if (step % apart != 0) continue;
@@ -183,8 +183,8 @@ TEST(TrackedPath, AroundAnExceptionalPointExchangesTheModes) {
 }
 
 TEST(TrackedPath, RealEigenvaluesOfTwoModesMeetAndPartAgain) {
-  // The fast eigenvalue of the first mode, -3.73, meets the slow one of the second; coupled, the two
-  // turn complex for a while.
+  // The fast eigenvalue of the first mode, -3.73, meets the slow one of the second; coupled, the
+  // two turn complex for a while.
   for (const double coupling : {0.0, 1e-6, 0.01, 0.3, 1.5}) {
     SCOPED_TRACE(coupling);
     Follower follower;
@@ -251,9 +251,8 @@ TEST(TrackedPath, NearlyFrozenInputIsReusedWithinABoundThatSaysSo) {
 TEST(TrackedPath, JumpsAreSolvedAnew) {
   Random random(3005);
   Follower follower;
-  follower.follow(60, 1, [&](double) {
-    return make(random.spd(6), 3 * random.spd(6), 100 * random.spd(6));
-  });
+  follower.follow(
+      60, 1, [&](double) { return make(random.spd(6), 3 * random.spd(6), 100 * random.spd(6)); });
   EXPECT_GE(follower.counters().direct, 30);
   EXPECT_EQ(follower.counters().of(Fallback::kStart), 1);
   EXPECT_LE(follower.counters().most_passes, TrackerOptions{}.max_passes);
@@ -298,7 +297,8 @@ System<kMaxDof> planar_arm(const Eigen::Vector3d& q, double friction) {
   }
   const Eigen::Vector2d root_K(30, 20);
   System<kMaxDof> system = make(
-      M, J.transpose() * Eigen::Vector2d(8, 12).asDiagonal() * J + friction * MatrixXd::Identity(3, 3),
+      M,
+      J.transpose() * Eigen::Vector2d(8, 12).asDiagonal() * J + friction * MatrixXd::Identity(3, 3),
       MatrixXd::Zero(3, 3));
   system.stiffness_factor = root_K.asDiagonal() * J;
   return system;
@@ -346,9 +346,8 @@ TEST(TrackedPath, OfAPandaArmIsFollowedAtAnyDamping) {
   for (const double ratio : {0.0, 0.03, 0.3, 1.0, 3.0, 10.0}) {
     SCOPED_TRACE(ratio);
     Follower follower;
-    follower.follow(3000, 25, [&](double t) {
-      return testing::panda_impedance(testing::swing(3 * t), ratio);
-    });
+    follower.follow(
+        3000, 25, [&](double t) { return testing::panda_impedance(testing::swing(3 * t), ratio); });
     EXPECT_EQ(follower.spectrum->mode_count, 6);
     EXPECT_LE(follower.counters().direct, 5);
     EXPECT_LE(follower.counters().most_passes, TrackerOptions{}.max_passes);

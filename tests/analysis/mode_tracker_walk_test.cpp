@@ -67,17 +67,18 @@ struct Size {
 };
 
 class RandomWalk : public ::testing::TestWithParam<Size> {};
-INSTANTIATE_TEST_SUITE_P(
-    Sizes, RandomWalk,
-    ::testing::Values(Size{1, 1}, Size{1, 0}, Size{2, 2}, Size{2, 1}, Size{3, 0}, Size{3, 2},
-                      Size{4, 3}, Size{5, 5}, Size{5, 0}, Size{6, 6}, Size{7, 6}, Size{7, 5},
-                      Size{7, 0}, Size{7, 3}, Size{8, 6}, Size{9, 6}, Size{10, 10}, Size{11, 0},
-                      Size{12, 6}, Size{13, 6}, Size{14, 3}, Size{15, 12}, Size{16, 6},
-                      Size{16, 0}, Size{16, 16}),
-    [](const auto& size) {
-      return "Joints" + std::to_string(size.param.joints) + "Rows" +
-             std::to_string(size.param.rows);
-    });
+INSTANTIATE_TEST_SUITE_P(Sizes, RandomWalk,
+                         ::testing::Values(Size{1, 1}, Size{1, 0}, Size{2, 2}, Size{2, 1},
+                                           Size{3, 0}, Size{3, 2}, Size{4, 3}, Size{5, 5},
+                                           Size{5, 0}, Size{6, 6}, Size{7, 6}, Size{7, 5},
+                                           Size{7, 0}, Size{7, 3}, Size{8, 6}, Size{9, 6},
+                                           Size{10, 10}, Size{11, 0}, Size{12, 6}, Size{13, 6},
+                                           Size{14, 3}, Size{15, 12}, Size{16, 6}, Size{16, 0},
+                                           Size{16, 16}),
+                         [](const auto& size) {
+                           return "Joints" + std::to_string(size.param.joints) + "Rows" +
+                                  std::to_string(size.param.rows);
+                         });
 
 TEST_P(RandomWalk, IsFollowedWithinItsBounds) {
   const auto [n, rows] = GetParam();

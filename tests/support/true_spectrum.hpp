@@ -76,12 +76,13 @@ inline Enclosure expect_enclosed(const analysis::System<analysis::kMaxDof>& syst
       const auto bound = static_cast<long double>(mode.error_bound);
       EXPECT_LE(error, bound + slack)
           << "mode " << i << " at " << mode.eigenvalues[k] << ", zeta " << mode.damping_ratio;
-      seen.tightest = std::max(
-          seen.tightest, static_cast<double>(std::max(error - slack, 0.0L) / bound));
+      seen.tightest =
+          std::max(seen.tightest, static_cast<double>(std::max(error - slack, 0.0L) / bound));
       if (std::abs(computed) > 0) {
         seen.widest = std::max(seen.widest, static_cast<double>(bound / std::abs(computed)));
       }
-      for (const LongComplex& other : truth) clear = clear && std::abs(other - computed) > 4 * bound;
+      for (const LongComplex& other : truth)
+        clear = clear && std::abs(other - computed) > 4 * bound;
     }
     const long double product = (found[0] * found[1]).real();
     if (!clear || !(product > 0) || std::isnan(mode.natural_frequency)) continue;

@@ -1,0 +1,349 @@
+// What the tracker says about single systems: shapes, slopes, states, counters, failures.
+#include <dashpot/analysis/assignment.hpp>
+#include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/tests/support/panda_path.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/true_spectrum.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <numeric>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using testing::expect_enclosed;
+using testing::panda_impedance;
+using testing::Random;
+using testing::swing;
+
+struct Tracked {
+  explicit Tracked(const TrackerOptions& options = {})
+      : tracker(std::make_unique<ModeTracker>(options)),
+        spectrum(std::make_unique<TrackedSpectrum>()) {}
+
+  Status update(const System<kMaxDof>& system) { return tracker->update(system, *spectrum); }
+  const ModeNumbers& mode(int i) const { return spectrum->modes[static_cast<std::size_t>(i)]; }
+
+  std::unique_ptr<ModeTracker> tracker;
+  std::unique_ptr<TrackedSpectrum> spectrum;
+};
+
+System<kMaxDof> random_system(Random& random, int n, double damping) {
+  System<kMaxDof> system(n);
+  system.mass = random.spd(n);
+  system.damping = damping * random.spd(n);
+  system.stiffness = 100 * random.spd(n);
+  return system;
+}
+
+/// |Q(lambda) u| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |u|)
+double backward_error(const System<kMaxDof>& system, const Complex& value,
+                      const ComplexVector<kMaxDof>& u) {
+  const ComplexVector<kMaxDof> residual =
+      value * value * (system.mass * u) + value * (system.damping * u) + system.stiffness * u;
+  const double size = std::norm(value) * system.mass.norm() +
+                      std::abs(value) * system.damping.norm() + system.stiffness.norm();
+  return residual.norm() / (size * u.norm());
+}
+
+TEST(ModeTracker, GivesEigenvectorsOfSmallBackwardError) {
+  for (const double ratio : {0.05, 0.5, 2.0}) {
+    SCOPED_TRACE(ratio);
+    Tracked tracked;
+    for (int step = 0; step < 300; ++step) {
+      const System<kMaxDof> system = panda_impedance(swing(1e-3 * step), ratio);
+      ASSERT_EQ(tracked.update(system), Status::kOk);
+      for (int i = 0; i < 6; ++i) {
+        const TrackedShapes& shapes = tracked.spectrum->shapes[static_cast<std::size_t>(i)];
+        for (std::size_t k = 0; k < 2; ++k) {
+          const Complex value = tracked.mode(i).eigenvalues[k];
+          const ComplexVector<kMaxDof>& u = shapes.u[k];
+          ASSERT_EQ(u.size(), 7);
+          EXPECT_LE(backward_error(system, value, u), ratio > 1 ? 1e-13 : 1e-14) << "step " << step;
+          EXPECT_NEAR((u.adjoint() * system.mass * u).value().real(), 1, 1e-12);
+          Eigen::Index largest = 0;
+          u.cwiseAbs().maxCoeff(&largest);
+          EXPECT_NEAR(u[largest].imag(), 0, 1e-14);
+          EXPECT_GT(u[largest].real(), 0);
+          const Complex slope =
+              (u.transpose() * (2.0 * value * (system.mass * u) + system.damping * u)).value();
+          EXPECT_LE(std::abs(slope - shapes.slope[k]), 1e-8 * std::abs(value));
+        }
+      }
+    }
+  }
+}
+
+TEST(ModeTracker, SlopePredictsHowAnEigenvalueMoves) {
+  Random random(4001);
+  const System<kMaxDof> system = random_system(random, 5, 2);
+  System<kMaxDof> changed = system;
+  const MatrixXd dC = random.spd(5);
+  changed.damping += 1e-6 * dC;
+  Tracked tracked;
+  ASSERT_EQ(tracked.update(system), Status::kOk);
+  const auto before = tracked.spectrum->modes;
+  const auto shapes = tracked.spectrum->shapes;
+  ASSERT_EQ(tracked.update(changed), Status::kOk);
+  EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kTracked);
+  for (std::size_t i = 0; i < 5; ++i) {
+    const auto& u = shapes[i].u[0];
+    const Complex lambda = before[i].eigenvalues[0];
+    const Complex predicted = -lambda * (u.transpose() * dC * u).value() / shapes[i].slope[0];
+    const Complex seen = (tracked.spectrum->modes[i].eigenvalues[0] - lambda) / 1e-6;
+    EXPECT_LE(std::abs(predicted - seen), 1e-4 * std::abs(predicted));
+  }
+}
+
+TEST(ModeTracker, GivesTheSameNumbersWithoutShapes) {
+  TrackerOptions options;
+  options.shapes = false;
+  Tracked with, without(options);
+  for (int step = 0; step < 200; ++step) {
+    const System<kMaxDof> system = panda_impedance(swing(1e-3 * step), 0.2);
+    ASSERT_EQ(with.update(system), Status::kOk);
+    ASSERT_EQ(without.update(system), Status::kOk);
+    for (int i = 0; i < 6; ++i) {
+      EXPECT_EQ(with.mode(i).natural_frequency, without.mode(i).natural_frequency);
+      EXPECT_EQ(with.mode(i).damping_ratio, without.mode(i).damping_ratio);
+      EXPECT_EQ(with.mode(i).error_bound, without.mode(i).error_bound);
+    }
+  }
+  EXPECT_EQ(with.tracker->counters().shapes_skipped, 0);
+  EXPECT_GE(without.tracker->counters().shapes_skipped, 200);
+  EXPECT_EQ(without.spectrum->shapes[0].u[0].size(), 0);
+}
+
+TEST(ModeTracker, SortsByFallingFrequency) {
+  Tracked tracked;
+  for (int step = 0; step < 500; ++step) {
+    ASSERT_EQ(tracked.update(panda_impedance(swing(5e-3 * step), 0.1)), Status::kOk);
+    std::array<bool, 6> seen{};
+    double last = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < 6; ++k) {
+      const int place = tracked.spectrum->by_frequency[k];
+      seen[static_cast<std::size_t>(place)] = true;
+      EXPECT_LE(tracked.mode(place).natural_frequency, last);
+      last = tracked.mode(place).natural_frequency;
+    }
+    EXPECT_TRUE(std::all_of(seen.begin(), seen.end(), [](bool s) { return s; }));
+  }
+}
+
+TEST(ModeTracker, ZeroModeRatesAreThoseOfTheirFriction) {
+  // Damping that acts on the self-motion alone, U'C = a U'M: the rate is -a.
+  System<kMaxDof> system(3);
+  system.mass.diagonal() << 2, 3, 4;
+  system.stiffness_factor.resize(1, 3);
+  system.stiffness_factor << 5, 0, 0;
+  system.damping.diagonal() << 1, 6, 2;
+  Tracked tracked;
+  ASSERT_EQ(tracked.update(system), Status::kOk);
+  ASSERT_EQ(tracked.spectrum->zero_mode_count, 2);
+  std::array<double, 2> rates{tracked.spectrum->zero_mode_rates[0],
+                              tracked.spectrum->zero_mode_rates[1]};
+  std::sort(rates.begin(), rates.end());
+  EXPECT_NEAR(rates[0], -2, 1e-14);
+  EXPECT_NEAR(rates[1], -0.5, 1e-14);
+  EXPECT_NEAR(tracked.mode(0).natural_frequency, 5 / std::sqrt(2.0), 1e-14);
+}
+
+TEST(ModeTracker, SmallFrequenciesKeepTheirDigitsWithAFactor) {
+  // 1e-5 beside 1e3 rad/s: squared, 16 orders of magnitude apart.
+  System<kMaxDof> system(2);
+  system.stiffness_factor.resize(2, 2);
+  system.stiffness_factor << 1e3, 0, 0, 1e-5;
+  system.damping << 0.2, 0, 0, 1e-6;
+  Tracked tracked;
+  ASSERT_EQ(tracked.update(system), Status::kOk);
+  system.mass(0, 0) = 1.0001;  // followed, too
+  ASSERT_EQ(tracked.update(system), Status::kOk);
+  EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kTracked);
+  EXPECT_NEAR(tracked.mode(1).natural_frequency, 1e-5, 1e-19);
+  EXPECT_NEAR(tracked.mode(1).damping_ratio, 0.05, 1e-12);
+}
+
+TEST(ModeTracker, SolvesNonsymmetricSystemsDirectly) {
+  Random random(4002);
+  System<kMaxDof> system = random_system(random, 4, 1);
+  system.stiffness(0, 1) += 1;
+  Tracked tracked;
+  for (int call = 1; call <= 3; ++call) {
+    EXPECT_EQ(tracked.update(system), Status::kOk);
+    EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kDirect);
+    EXPECT_EQ(tracked.spectrum->mode_count, 4);
+    EXPECT_EQ(tracked.tracker->counters().of(Fallback::kNotSymmetric), call);
+  }
+}
+
+TEST(ModeTracker, SolvesASingularStiffnessWithoutFactorDirectly) {
+  System<kMaxDof> system(2);
+  system.stiffness << 4, -4, -4, 4;
+  system.damping << 0.4, -0.4, -0.4, 0.4;
+  Tracked tracked;
+  for (int call = 0; call < 3; ++call) {
+    EXPECT_EQ(tracked.update(system), Status::kOk);
+    EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kDirect);
+    ASSERT_EQ(tracked.spectrum->mode_count, 1);
+    EXPECT_EQ(tracked.spectrum->zero_mode_count, 1);
+    EXPECT_NEAR(tracked.mode(0).natural_frequency, std::sqrt(8.0), 1e-14);
+  }
+}
+
+TEST(ModeTracker, SaysWhatIsWrongAndRecovers) {
+  Random random(4003);
+  const System<kMaxDof> good = random_system(random, 3, 1);
+  Tracked tracked;
+  const auto expect_failure = [&](const System<kMaxDof>& bad, Status status) {
+    ASSERT_EQ(tracked.update(good), Status::kOk);
+    EXPECT_EQ(tracked.update(bad), status);
+    EXPECT_EQ(tracked.spectrum->status, status);
+    EXPECT_EQ(tracked.spectrum->mode_count, 0);
+    ASSERT_EQ(tracked.update(good), Status::kOk);
+    EXPECT_EQ(tracked.spectrum->mode_count, 3);
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  System<kMaxDof> bad = good;
+  bad.mass(1, 1) = nan;
+  expect_failure(bad, Status::kNotFinite);
+  bad = good;
+  bad.damping(0, 2) = std::numeric_limits<double>::infinity();
+  expect_failure(bad, Status::kNotFinite);
+  bad = good;
+  bad.stiffness(2, 0) = nan;
+  expect_failure(bad, Status::kNotFinite);
+  bad = good;
+  bad.mass(0, 0) = -1;
+  expect_failure(bad, Status::kMassNotPositiveDefinite);
+  bad = good;
+  bad.mass(0, 1) += 0.1;
+  expect_failure(bad, Status::kNotSymmetric);
+  bad = good;
+  bad.damping.resize(2, 2);
+  expect_failure(bad, Status::kWrongSize);
+  bad = good;
+  bad.stiffness_factor.resize(2, 3);
+  bad.stiffness_factor.setConstant(nan);
+  expect_failure(bad, Status::kNotFinite);
+  EXPECT_EQ(tracked.tracker->counters().failed, 7);
+}
+
+TEST(ModeTracker, ChangesSizes) {
+  Random random(4004);
+  Tracked tracked;
+  for (const int n : {3, 7, 1, 16, 2}) {
+    for (int call = 0; call < 2; ++call) {
+      const System<kMaxDof> system = random_system(random, n, 1);
+      ASSERT_EQ(tracked.update(system), Status::kOk);
+      EXPECT_EQ(tracked.spectrum->mode_count, n);
+      expect_enclosed(system, *tracked.spectrum);
+    }
+  }
+  EXPECT_EQ(tracked.update(System<kMaxDof>(0)), Status::kOk);
+  EXPECT_EQ(tracked.spectrum->mode_count, 0);
+}
+
+TEST(ModeTracker, FindsUndampedAndUnstableModes) {
+  System<kMaxDof> system(2);
+  system.stiffness.diagonal() << 4, 9;
+  Tracked tracked;
+  for (const double damping : {0.0, -0.2, 0.1}) {
+    system.damping(0, 0) = damping;
+    ASSERT_EQ(tracked.update(system), Status::kOk);
+    EXPECT_EQ(tracked.mode(0).kind, ModeKind::kUndamped);
+    EXPECT_EQ(tracked.mode(1).kind, damping == 0  ? ModeKind::kUndamped
+                                    : damping < 0 ? ModeKind::kUnstable
+                                                  : ModeKind::kUnderdamped);
+    EXPECT_NEAR(tracked.mode(1).damping_ratio, damping / 4, 1e-15);
+  }
+}
+
+TEST(ModeTracker, NeverProvesAMassThatIsNotPositiveDefinite) {
+  // The mass slides into indefiniteness while everything else stands still.
+  System<kMaxDof> system(2);
+  system.stiffness.diagonal() << 4, 9;
+  system.damping.diagonal() << 0.1, 0.1;
+  Tracked tracked;
+  for (int step = 0; step <= 100; ++step) {
+    system.mass(0, 1) = system.mass(1, 0) = 0.5 + 0.01 * step;
+    const Status status = tracked.update(system);
+    if (system.mass(0, 1) < 0.995) {
+      EXPECT_EQ(status, Status::kOk) << step;
+    } else if (system.mass(0, 1) > 1.005) {
+      EXPECT_EQ(status, Status::kMassNotPositiveDefinite) << step;
+    }
+  }
+}
+
+TEST(ModeTracker, RefusesOptionsThatMeanNothing) {
+  TrackerOptions options;
+  options.target_bound = 0;
+  EXPECT_THROW(ModeTracker{options}, std::invalid_argument);
+  options = {};
+  options.max_passes = 0;
+  EXPECT_THROW(ModeTracker{options}, std::invalid_argument);
+  options = {};
+  options.soft_frequency = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(ModeTracker{options}, std::invalid_argument);
+}
+
+TEST(TrackedCertificate, OfAPerturbedBasisStillEncloses) {
+  Random random(4005);
+  int proved = 0;
+  for (int trial = 0; trial < 600; ++trial) {
+    const int n = random.integer(2, 7), rows = trial % 2 == 0 ? n - 1 : 0;
+    System<kMaxDof> system = random_system(random, n, random.log_uniform(0.1, 30));
+    if (rows > 0) system.stiffness_factor = 10 * random.matrix(rows, n);
+    const StateForm form = state_form(system);
+    // An orthonormal basis of the space, from the true eigenvectors disturbed: found by a tracker
+    // of a system that lies nearby.
+    System<kMaxDof> nearby = system;
+    const double size = random.log_uniform(1e-14, 1e-2);
+    nearby.mass += size * random.spd(n);
+    nearby.damping += size * random.spd(n);
+    TrackerOptions options;
+    options.target_bound = 1;
+    options.max_passes = 1;
+    Tracked tracked(options);
+    tracked.update(nearby);
+    const Status status = tracked.update(system);
+    if (status != Status::kOk) continue;
+    ++proved;
+    expect_enclosed(system, *tracked.spectrum);
+    EXPECT_EQ(form.zeros(), rows > 0 ? 1 : 0);
+  }
+  EXPECT_GE(proved, 500);
+}
+
+TEST(Assignment, IsTheBestOfAll) {
+  Random random(4006);
+  for (int trial = 0; trial < 200; ++trial) {
+    const int count = random.integer(1, 6);
+    Scores score{};
+    for (auto& row : score) {
+      for (double& entry : row) entry = random.uniform(0, 1);
+    }
+    const auto total = [&](const auto& places) {
+      double sum = 0;
+      for (int i = 0; i < count; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        sum += score[k][static_cast<std::size_t>(places[k])];
+      }
+      return sum;
+    };
+    std::vector<int> order(static_cast<std::size_t>(count));
+    std::iota(order.begin(), order.end(), 0);
+    double best = 0;
+    do {
+      best = std::max(best, total(order));
+    } while (std::next_permutation(order.begin(), order.end()));
+    EXPECT_NEAR(total(assign(score, count)), best, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
