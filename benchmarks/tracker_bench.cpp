@@ -1,0 +1,218 @@
+// The spectrum of a moving arm, call by call: a Panda whose joints swing by 0.5 rad, sampled at
+// 1 kHz, held by a Cartesian impedance (7 joints, 6 modes, one zero mode). `tracked` goes from
+// {M, C, W} to all modes with eigenvectors of both sides, frequencies, ratios and proved bounds;
+// `values_only` leaves out the eigenvectors; `reused` sees one system again and again. Beside them,
+// Eigen's fixed-size EigenSolver with right vectors and LAPACK's dgeev with both sides on the
+// 12 x 12 state matrices of the same path, which are formed outside the clock. `tracked_full` and
+// `eigen_full` (of run-time size) have n joints and n modes.
+#include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/tests/support/panda_path.hpp>
+
+#include <benchmark/benchmark.h>
+#include <lapacke.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace dashpot::analysis;  // NOLINT: a program's own file
+using dashpot::testing::panda_impedance;
+using dashpot::testing::swing;
+using Eigen::MatrixXd;
+
+constexpr int kSteps = 1000;
+constexpr unsigned kSeed = 20210002;
+
+/// One second of the path.
+const std::vector<System<kMaxDof>>& panda_path(double ratio) {
+  static std::vector<System<kMaxDof>> path;
+  static double of = -1;
+  if (of != ratio) {
+    path.clear();
+    for (int step = 0; step < kSteps; ++step) {
+      path.push_back(panda_impedance(swing(1e-3 * step), ratio));
+    }
+    of = ratio;
+  }
+  return path;
+}
+
+/// n joints and n modes; factors of the coefficients turn and swing smoothly.
+std::vector<System<kMaxDof>> full_path(int n) {
+  std::mt19937_64 generator(kSeed + static_cast<unsigned>(n));
+  std::normal_distribution<double> normal;
+  std::array<std::array<MatrixXd, 2>, 3> parts;
+  for (auto& part : parts) {
+    for (MatrixXd& matrix : part) {
+      matrix = MatrixXd::NullaryExpr(n, n, [&] { return normal(generator); });
+    }
+  }
+  std::vector<System<kMaxDof>> path;
+  for (int step = 0; step < kSteps; ++step) {
+    const double t = 1e-3 * step;
+    System<kMaxDof> system(n);
+    const std::array<Square<kMaxDof>*, 3> out = {&system.mass, &system.damping, &system.stiffness};
+    const std::array<double, 3> size = {1, 10, 1000}, floor = {0.1, 0.1, 0.01};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const MatrixXd F = parts[k][0] + 0.3 * std::sin(3 * t + static_cast<double>(k)) * parts[k][1];
+      const MatrixXd product = F * F.transpose() / n;
+      *out[k] =
+          size[k] * (0.5 * (product + product.transpose()) + floor[k] * MatrixXd::Identity(n, n));
+    }
+    path.push_back(system);
+  }
+  return path;
+}
+
+/// [0 G; -G' -D] of the motions that are no zero modes, in energy coordinates.
+MatrixXd state_matrix(const System<kMaxDof>& system) {
+  const MatrixXd L = MatrixXd(system.mass).llt().matrixL();
+  const auto lower = L.triangularView<Eigen::Lower>();
+  const MatrixXd CL = lower.solve(MatrixXd(system.damping));
+  const MatrixXd D = lower.solve(MatrixXd(CL.transpose()));
+  MatrixXd W = system.stiffness_factor;
+  if (W.rows() == 0) W = MatrixXd(system.stiffness).llt().matrixU();
+  const MatrixXd J = lower.solve(MatrixXd(W.transpose())).transpose();
+  const Eigen::JacobiSVD<MatrixXd> svd(J, Eigen::ComputeFullV);
+  const Eigen::Index m = J.rows();
+  const MatrixXd P = svd.matrixV().leftCols(m);
+  MatrixXd A = MatrixXd::Zero(2 * m, 2 * m);
+  A.topRightCorner(m, m) = J * P;
+  A.bottomLeftCorner(m, m) = -(J * P).transpose();
+  A.bottomRightCorner(m, m) = -P.transpose() * D * P;
+  return A;
+}
+
+double backward_error(const System<kMaxDof>& system, const Complex& value,
+                      const ComplexVector<kMaxDof>& u) {
+  const ComplexVector<kMaxDof> residual =
+      value * value * (system.mass * u) + value * (system.damping * u) + system.stiffness * u;
+  return residual.norm() / ((std::norm(value) * system.mass.norm() +
+                             std::abs(value) * system.damping.norm() + system.stiffness.norm()) *
+                            u.norm());
+}
+
+/// There and back again, so that the path has no jump.
+class Sweep {
+ public:
+  explicit Sweep(const std::vector<System<kMaxDof>>& path) : path_(path) {}
+  const System<kMaxDof>& next() {
+    if (at_ + direction_ < 0 || at_ + direction_ >= kSteps) direction_ = -direction_;
+    at_ += direction_;
+    return path_[static_cast<std::size_t>(at_)];
+  }
+
+ private:
+  const std::vector<System<kMaxDof>>& path_;
+  int at_ = 0, direction_ = 1;
+};
+
+void track(benchmark::State& state, const std::vector<System<kMaxDof>>& path,
+           const TrackerOptions& options, bool frozen) {
+  const auto tracker = std::make_unique<ModeTracker>(options);
+  const auto spectrum = std::make_unique<TrackedSpectrum>();
+  Sweep sweep(path);
+  for (int step = 0; step < 10; ++step) tracker->update(sweep.next(), *spectrum);
+  const TrackerCounters before = tracker->counters();
+  const System<kMaxDof>* system = &sweep.next();
+  tracker->update(*system, *spectrum);
+  for (auto _ : state) {
+    if (!frozen) system = &sweep.next();
+    benchmark::DoNotOptimize(tracker->update(*system, *spectrum));
+    benchmark::ClobberMemory();
+  }
+  if (spectrum->status != Status::kOk) state.SkipWithError(to_text(spectrum->status));
+  const TrackerCounters& counters = tracker->counters();
+  state.counters["passes"] = static_cast<double>(counters.passes - before.passes) /
+                             static_cast<double>(counters.updates - before.updates);
+  state.counters["direct"] = static_cast<double>(counters.direct - before.direct);
+  double bound = 0, error = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(spectrum->mode_count); ++i) {
+    const ModeNumbers& mode = spectrum->modes[i];
+    bound = std::max(bound, mode.error_bound / std::abs(mode.eigenvalues[1]));
+    if (!options.shapes) continue;
+    for (std::size_t k = 0; k < 2; ++k) {
+      error =
+          std::max(error, backward_error(*system, mode.eigenvalues[k], spectrum->shapes[i].u[k]));
+    }
+  }
+  state.counters["relative_bound"] = bound;
+  state.counters["backward_error"] = error;
+}
+
+/// Matrix is 12 x 12 or of run-time size.
+template <typename Matrix>
+void eigen(benchmark::State& state, const std::vector<System<kMaxDof>>& path) {
+  std::vector<Matrix, Eigen::aligned_allocator<Matrix>> matrices;
+  for (int step = 0; step < kSteps; step += 20) {
+    matrices.push_back(state_matrix(path[static_cast<std::size_t>(step)]));
+  }
+  Eigen::EigenSolver<Matrix> solver(matrices[0].rows());
+  std::size_t next = 0;
+  for (auto _ : state) {
+    solver.compute(matrices[next++ % matrices.size()], true);
+    benchmark::DoNotOptimize(solver.eigenvalues().data());
+    benchmark::ClobberMemory();
+  }
+}
+
+void lapack(benchmark::State& state, const std::vector<System<kMaxDof>>& path) {
+  std::vector<MatrixXd> matrices;
+  for (int step = 0; step < kSteps; step += 20) {
+    matrices.push_back(state_matrix(path[static_cast<std::size_t>(step)]));
+  }
+  const auto n = static_cast<lapack_int>(matrices[0].rows());
+  MatrixXd copy = matrices[0], left(n, n), right(n, n);
+  Eigen::VectorXd re(n), im(n), work(16 * n);
+  std::size_t next = 0;
+  for (auto _ : state) {
+    copy = matrices[next++ % matrices.size()];
+    LAPACKE_dgeev_work(LAPACK_COL_MAJOR, 'V', 'V', n, copy.data(), n, re.data(), im.data(),
+                       left.data(), n, right.data(), n, work.data(), 16 * n);
+    benchmark::ClobberMemory();
+  }
+}
+
+template <typename Function>
+void add(const std::string& name, Function function) {
+  benchmark::RegisterBenchmark(name.c_str(), function)->Unit(benchmark::kMicrosecond);
+}
+
+void add_full(int n) {
+  const std::string size = "/" + std::to_string(n);
+  add("spectrum/tracked_full" + size,
+      [=](benchmark::State& state) { track(state, full_path(n), {}, false); });
+  add("spectrum/eigen_full" + size,
+      [=](benchmark::State& state) { eigen<MatrixXd>(state, full_path(n)); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  TrackerOptions values_only;
+  values_only.shapes = false;
+  for (const auto& [suffix, ratio] :
+       {std::pair<std::string, double>{"", 0.1}, {"_heavy", 1.0}, {"_undamped", 0.0}}) {
+    const double damping = ratio;
+    const std::string end = suffix + "/6";
+    add("spectrum/tracked" + end,
+        [=](auto& state) { track(state, panda_path(damping), {}, false); });
+    add("spectrum/values_only" + end,
+        [=](auto& state) { track(state, panda_path(damping), values_only, false); });
+    add("spectrum/reused" + end, [=](auto& state) { track(state, panda_path(damping), {}, true); });
+    add("spectrum/path_eigen" + end,
+        [=](auto& state) { eigen<Eigen::Matrix<double, 12, 12>>(state, panda_path(damping)); });
+    add("spectrum/path_lapack" + end, [=](auto& state) { lapack(state, panda_path(damping)); });
+  }
+  for (int n = 2; n <= kMaxDof; ++n) add_full(n);
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+  return 0;
+}
