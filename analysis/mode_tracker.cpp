@@ -13,12 +13,12 @@ namespace dashpot::analysis {
 namespace {
 
 /// Steps this small leave eigenvectors right to their square once they are taken.
-constexpr double kLastStep = 3e-8;
+constexpr double kLastStep = 1e-7;
 /// Below this, nothing but rounding errors is left to improve.
 constexpr double kConverged = 1e-11;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// A step that is no smaller than this share of what it is compared with has not been foreseen.
-constexpr double kForeseen = 0.5;
+/// Squared error of an extrapolation, relative to that of a simpler one, that makes it worth using.
+constexpr double kForeseen = 0.25;
 /// Blocks are balanced again when their columns lean this much towards each other.
 constexpr double kBalanced = 0.6;
 
@@ -186,8 +186,8 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   const int columns = basis_.columns(), width = basis_.Z.width;
   if (predicting_) {
     ++counters_.predicted;
-    add(E_, 1, last_step_, columns, E_);
-    copy(last_step_, columns, step_);
+    add(E_, 1, prediction_, columns, E_);
+    copy(prediction_, columns, step_);
   } else {
     set_zero(width, columns, step_);
   }
@@ -196,8 +196,7 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   sizes_ = coefficient_sizes(form);
   if (!refine(form, out, reason)) return false;
   if (turned_) {
-    set_zero(width, columns, last_step_);
-    predicting_ = false;
+    forget_steps();
   } else {
     learn_step();
   }
@@ -205,13 +204,32 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   return true;
 }
 
-/// Whether this update's step was like the last one's: then the next one will be, too.
+/// Extrapolates the steps of the last three updates by that polynomial that would have foreseen this
+/// one best: degree 1, degree 0, or no step at all.
 void ModeTracker::learn_step() noexcept {
   const int columns = basis_.columns();
-  last_step_.width = step_.width;
-  add(step_, -1, last_step_, columns, work_);
-  predicting_ = squared_norm(work_, columns) < kForeseen * kForeseen * squared_norm(step_, columns);
+  add(step_, -1, last_step_, columns, prediction_);  // what this step had over the last one
+  add(prediction_, -1, last_change_, columns, work_);
+  const double by_nothing = squared_norm(step_, columns);
+  const double by_step = squared_norm(prediction_, columns);
+  const double by_change = squared_norm(work_, columns);
+  copy(prediction_, columns, last_change_);
   copy(step_, columns, last_step_);
+  const bool steady = by_change < kForeseen * by_step;
+  predicting_ = std::min(by_step, by_change) < kForeseen * by_nothing;
+  if (!predicting_) return;
+  if (steady) {
+    add(step_, 1, prediction_, columns, prediction_);
+  } else {
+    copy(step_, columns, prediction_);
+  }
+}
+
+void ModeTracker::forget_steps() noexcept {
+  set_zero(basis_.Z.width, basis_.columns(), step_);
+  set_zero(basis_.Z.width, basis_.columns(), last_step_);
+  set_zero(basis_.Z.width, basis_.columns(), last_change_);
+  predicting_ = false;
 }
 
 /// Newton's method from the basis as it is. Leaves the last step to be taken.
@@ -279,8 +297,7 @@ bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept 
   evaluate(form, basis_, defect_);
   balance(defect_, 0, basis_);
   sizes_ = coefficient_sizes(form);
-  set_zero(basis_.Z.width, basis_.columns(), step_);
-  set_zero(basis_.Z.width, basis_.columns(), last_step_);
+  forget_steps();
   if (!has_places_) {
     evaluate(form, basis_, defect_);
     certify(form, sizes_, 0, basis_, defect_, certificate_);

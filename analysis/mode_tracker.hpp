@@ -108,6 +108,7 @@ class ModeTracker {
   bool publish(const StateForm& form, double distance, double target, bool fresh,
                TrackedSpectrum& out) noexcept;
   void learn_step() noexcept;
+  void forget_steps() noexcept;
   Status solve_directly(const System<kMaxDof>& system, const StateForm& form, Fallback reason,
                         TrackedSpectrum& out) noexcept;
   bool restart(const StateForm& form, TrackedSpectrum& out) noexcept;
@@ -128,8 +129,9 @@ class ModeTracker {
   std::array<bool, kMaxDof> soft_{};
   double bound_ = 0;  ///< its largest relative error bound
 
-  // Extrapolation: the whole step of this update so far, and that of the last one.
-  PaddedRows step_, last_step_;
+  // Extrapolation: the whole step of this update so far, that of the last one, what that had over
+  // the one before, and what is expected next.
+  PaddedRows step_, last_step_, last_change_, prediction_;
   bool predicting_ = false;
   bool turned_ = false;  ///< columns were rotated or parted: the step tells nothing
 
