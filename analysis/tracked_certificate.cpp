@@ -23,6 +23,10 @@ double square(double x) {
   return x * x;
 }
 
+Lanes magnitude(const Lanes& x) {
+  return x < Lanes{} ? -x : x;
+}
+
 /// Errors of N and G, entrywise, with the vectors a, b, m (one entry a column of Z) and a factor
 /// gamma:   |N error| <= gamma (a a' + m m'),   |Z' B Z error| <= gamma (a b' + b a' + c m m').
 /// a is the size of a column's strains, b of what its velocities strain, m of its momenta.
@@ -63,18 +67,18 @@ ErrorSizes error_sizes(const StateForm& form, const CoefficientSizes& sizes, dou
   const double mass = std::sqrt(sizes.mass);
   for (int j = 0; j < width; j += 4) {
     Lanes a{}, b{}, m{};
-    const auto magnitude = [&](int row) {
-      const Lanes z = load(basis.Z.row(row) + j);
-      return z < Lanes{} ? -z : z;
-    };
+    const auto entries = [&](int row) { return magnitude(load(basis.Z.row(row) + j)); };
     if (form.factored) {
-      for (int k = 0; k < p; ++k) a += magnitude(k) * magnitude(k);
+      for (int k = 0; k < p; ++k) {
+        const Lanes z = load(basis.Z.row(k) + j);
+        a += z * z;
+      }
     } else {
-      for (int k = 0; k < p; ++k) a += (sizes.stiffness * sizes.s[at(k)]) * magnitude(k);
+      for (int k = 0; k < p; ++k) a += (sizes.stiffness * sizes.s[at(k)]) * entries(k);
       a *= a;
     }
     for (int k = 0; k < form.joints; ++k) {
-      const Lanes v = magnitude(p + k);
+      const Lanes v = entries(p + k);
       b += sizes.strain[at(k)] * v;
       m += (mass * sizes.s[at(k)]) * v;
     }
@@ -101,38 +105,74 @@ ErrorSizes error_sizes(const StateForm& form, const CoefficientSizes& sizes, dou
   return e;
 }
 
-/// Lower bound of the separation of modes i and j, or of mode i and zero mode j - modes: see
-/// block_separation in refinement.cpp.
-double separation(const TrackedBasis& basis, int i, int j) {
-  if (i >= basis.modes && j >= basis.modes) {
-    return std::abs(basis.rate[at(i - basis.modes)] - basis.rate[at(j - basis.modes)]);
+/// Lower bounds of sep(Lambda_i, Lambda_j), the smallest singular value of X -> Lambda_i X - X
+/// Lambda_j, for all pairs of blocks. With p the characteristic polynomial of B, and A X - X B = Q,
+/// p(A) X = (A - t/2) Q + Q (B - t/2), t = tr B, so that sep >= s_min(p(A)) / (|A - t/2| + |B -
+/// t/2|).
+class Separations {
+ public:
+  explicit Separations(const TrackedBasis& basis) : basis_(basis) {
+    for (std::size_t i = 0; i < at(basis.modes); ++i) {
+      const double half = 0.5 * (basis.l00[i] - basis.l11[i]);
+      const double cross = square(basis.l01[i]) + square(basis.l10[i]);
+      trace_[i] = basis.l00[i] + basis.l11[i];
+      determinant_[i] = basis.l00[i] * basis.l11[i] - basis.l01[i] * basis.l10[i];
+      traceless_[i] = std::sqrt(2 * square(half) + cross);
+      size2_[i] = square(basis.l00[i]) + square(basis.l11[i]) + cross;
+    }
   }
-  if (i >= basis.modes) std::swap(i, j);
-  const double b00 = basis.l00[at(i)], b01 = basis.l01[at(i)], b10 = basis.l10[at(i)],
-               b11 = basis.l11[at(i)];
-  const double trace = b00 + b11, determinant = b00 * b11 - b01 * b10, half = 0.5 * trace;
-  const double cross = square(b01) + square(b10), B2 = square(b00) + square(b11) + cross;
-  const double half_B = std::sqrt(square(b00 - half) + square(b11 - half) + cross);
-  double least = 0, half_A = 0, A2 = 0;
-  if (j >= basis.modes) {
-    const double x = basis.rate[at(j - basis.modes)];
-    least = std::abs(x * x - trace * x + determinant);
-    half_A = std::abs(x - half);
-    A2 = x * x;
-  } else {
-    const double a00 = basis.l00[at(j)], a01 = basis.l01[at(j)], a10 = basis.l10[at(j)],
-                 a11 = basis.l11[at(j)];
-    const double across = a00 + a11 - trace, product = a01 * a10 + determinant;
-    const double p00 = a00 * (a00 - trace) + product, p11 = a11 * (a11 - trace) + product;
-    const double p01 = across * a01, p10 = across * a10;
-    const double norm = std::sqrt(square(p00) + square(p01) + square(p10) + square(p11));
-    A2 = square(a00) + square(a01) + square(a10) + square(a11);
-    half_A = std::sqrt(square(a00 - half) + square(a11 - half) + square(a01) + square(a10));
-    least = norm > 0 ? std::abs(p00 * p11 - p01 * p10) / norm : 0;
+
+  /// Of mode i from every mode; what it is from itself means nothing.
+  std::array<double, kMaxDof> from_mode(int i) const {
+    std::array<double, kMaxDof> result;
+    const double a = basis_.l00[at(i)], b = basis_.l01[at(i)], c = basis_.l10[at(i)],
+                 d = basis_.l11[at(i)];
+    for (int j = 0; j < basis_.modes; j += 4) {
+      const Lanes trace = load(&trace_[at(j)]);
+      const Lanes across = trace_[at(i)] - trace, product = b * c + load(&determinant_[at(j)]);
+      const Lanes p00 = a * (a - trace) + product, p11 = d * (d - trace) + product;
+      const Lanes p01 = b * across, p10 = c * across;
+      // s_min = |det p| / s_max, s_max at most the sum of all entries, less p's rounding errors.
+      const Lanes sum = magnitude(p00) + magnitude(p01) + magnitude(p10) + magnitude(p11);
+      const Lanes rounding = 32 * kUnit * (size2_[at(i)] + trace * trace + load(&size2_[at(j)]));
+      const Lanes halves =
+          traceless_[at(i)] + load(&traceless_[at(j)]) + 0.7072 * magnitude(across);
+      const Lanes least = magnitude(p00 * p11 - p01 * p10) - rounding * sum;
+      store(&result[at(j)], least / (kSlack * sum * halves));
+    }
+    return result;
   }
-  least -= 16 * kUnit * (A2 + std::abs(trace) * std::sqrt(A2) + B2);
-  return least > 0 ? least / ((half_A + half_B) * kSlack) : 0;
-}
+
+  double between(int i, int j) const {
+    if (i >= basis_.modes && j >= basis_.modes) {
+      return std::abs(basis_.rate[at(i - basis_.modes)] - basis_.rate[at(j - basis_.modes)]);
+    }
+    if (i < basis_.modes && j < basis_.modes) return from_mode(i)[at(j)];
+    if (i >= basis_.modes) std::swap(i, j);
+    const double x = basis_.rate[at(j - basis_.modes)], trace = trace_[at(i)];
+    const double least = std::abs(x * x - trace * x + determinant_[at(i)]) -
+                         32 * kUnit * (x * x + square(trace) + size2_[at(i)]);
+    return least / (kSlack * (std::abs(x - 0.5 * trace) + traceless_[at(i)]));
+  }
+
+  /// Of mode i from all other blocks.
+  double from_rest(int i) const {
+    const std::array<double, kMaxDof> modes = from_mode(i);
+    double least = kInfinity;
+    for (int j = 0; j < basis_.modes; ++j) {
+      if (j != i && !(modes[at(j)] >= least)) least = modes[at(j)];
+    }
+    for (int j = basis_.modes; j < basis_.blocks(); ++j) {
+      const double apart = between(i, j);
+      if (!(apart >= least)) least = apart;
+    }
+    return least;
+  }
+
+ private:
+  const TrackedBasis& basis_;
+  TrackedBasis::Entries trace_{}, determinant_{}, traceless_{}, size2_{};
+};
 
 /// Norms of F for one set of blocks and the rest.
 struct SetNorms {
@@ -143,7 +183,10 @@ class Prover {
  public:
   Prover(const StateForm& form, const CoefficientSizes& sizes, double distance,
          const TrackedBasis& basis, const TrackedDefect& defect)
-      : basis_(basis), defect_(defect), sizes_(error_sizes(form, sizes, distance, basis)) {
+      : basis_(basis),
+        defect_(defect),
+        sizes_(error_sizes(form, sizes, distance, basis)),
+        separations_(basis) {
     sum_squares();
     const double N_error = sizes_.gamma * (square(sizes_.a_norm) + square(sizes_.m_norm));
     R_norm_ = std::sqrt(R_total_) + N_error;
@@ -158,14 +201,10 @@ class Prover {
 
   /// One mode: radius of its block, or a negative number if it cannot be separated.
   double mode_radius(int i) const {
-    double separated = kInfinity;
-    for (int j = 0; j < basis_.blocks(); ++j) {
-      if (j != i) separated = std::min(separated, separation(basis_, i, j));
-    }
     const std::size_t first = at(i), second = at(basis_.modes + i);
     return radius(finish(i, defect_.diagonal[at(i)], G_rows_[first] + G_rows_[second],
                          G_columns_[first] + G_columns_[second]),
-                  separated);
+                  separations_.from_rest(i));
   }
 
   /// Grows the group of block i until it can be separated, and writes its radius.
@@ -214,6 +253,7 @@ class Prover {
   const TrackedBasis& basis_;
   const TrackedDefect& defect_;
   ErrorSizes sizes_;
+  Separations separations_;
   std::array<double, kMaxWidth> G_rows_{}, G_columns_{}, R_rows_{};  ///< squared norms
   double G_total_ = 0, R_total_ = 0, G_error_ = 0, R_norm_ = 0, F_norm_ = 0;
 };
@@ -265,7 +305,7 @@ void Prover::prove_group(int i, TrackedCertificate& certificate) const {
       m_rate += square(block.m * block.rate);
       for (int k = 0; k < blocks; ++k) {
         if (inside(k)) continue;
-        const double apart = separation(basis_, j, k);
+        const double apart = std::max(0.0, separations_.between(j, k));
         if (apart < separated || nearest < 0) separated = apart, nearest = k;
       }
     }
@@ -340,6 +380,9 @@ CoefficientSizes coefficient_sizes(const StateForm& form) noexcept {
 double distance(const StateForm& form, const StateForm& other, const CoefficientSizes& sizes,
                 double limit) noexcept {
   const int n = form.joints;
+  for (int k = 0; k < n * n; k += n + 1) {  // mostly, a glance at the diagonal is enough
+    if (std::abs(form.M[k] - other.M[k]) > 2 * limit * sizes.mass * form.M[k]) return kInfinity;
+  }
   double mass = 0, damping = 0, stiffness = 0;
   // Changes relative to the sizes; zero by zero is no change.
   for (int j = 0; j < n; ++j) {
@@ -355,7 +398,6 @@ double distance(const StateForm& form, const StateForm& other, const Coefficient
       W += square(form.W[i + j * form.strains] - other.W[i + j * form.strains]);
     }
     if (W > 0) stiffness = std::max(stiffness, std::sqrt(W) / sizes.strain[at(j)]);
-    if (mass > limit * sizes.mass) return kInfinity;
   }
   if (!form.factored && stiffness > 0) stiffness /= square(sizes.stiffness);
   if (damping > 0) damping /= sizes.damping;
