@@ -184,6 +184,9 @@ bool ModeTracker::reuse(const StateForm& form, TrackedSpectrum& out) noexcept {
 
 bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept {
   const int columns = basis_.columns(), width = basis_.Z.width;
+  before_.modes = basis_.modes;
+  before_.zeros = basis_.zeros;
+  copy(basis_.Z, columns, before_.Z);
   if (predicting_) {
     ++counters_.predicted;
     add(E_, 1, prediction_, columns, E_);
@@ -194,7 +197,10 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   take_step(E_, basis_);
   turned_ = balance(defect_, kBalanced, basis_);
   sizes_ = coefficient_sizes(form);
-  if (!refine(form, out, reason)) return false;
+  if (!refine(form, out, reason)) {
+    copy(before_.Z, columns, basis_.Z);  // the last one that was right still names the modes
+    return false;
+  }
   if (turned_) {
     forget_steps();
   } else {
@@ -204,8 +210,8 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   return true;
 }
 
-/// Extrapolates the steps of the last three updates by that polynomial that would have foreseen this
-/// one best: degree 1, degree 0, or no step at all.
+/// Extrapolates the steps of the last three updates by that polynomial that would have foreseen
+/// this one best: degree 1, degree 0, or no step at all.
 void ModeTracker::learn_step() noexcept {
   const int columns = basis_.columns();
   add(step_, -1, last_step_, columns, prediction_);  // what this step had over the last one

@@ -139,7 +139,7 @@ class ModeTracker {
   System<kMaxDof> direct_;
   SpectrumSolver<kMaxDof> solver_;
   Spectrum<kMaxDof> spectrum_;
-  TrackedBasis before_;
+  TrackedBasis before_;  ///< the basis of the last update
 };
 
 }  // namespace dashpot::analysis

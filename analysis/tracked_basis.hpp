@@ -35,9 +35,9 @@ StateForm state_form(const System<kMaxDof>& system) noexcept;
 ///
 /// in which the system nearly falls apart into one real 2 x 2 block a mode and one rate a zero
 /// mode: S^-1 B Z = Z Lambda. A block has a complex pair or two real eigenvalues of opposite sign
-/// type, and stays well conditioned where the two meet (critical damping). Left vectors are S Z.
-/// Since S has as many negative squares as Sigma only if M is positive definite, a certified basis
-/// proves that.
+/// type, and stays well conditioned where the two meet (critical damping). Left vectors are S Z. S
+/// has as many negative squares as Sigma: with a factor, a certified basis proves M positive
+/// definite.
 struct TrackedBasis {
   using Entries = std::array<double, 20>;  ///< of up to 16 modes, read in fours
   int modes = 0;                           ///< p

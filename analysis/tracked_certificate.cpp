@@ -134,7 +134,7 @@ class Separations {
       const Lanes p01 = b * across, p10 = c * across;
       // s_min = |det p| / s_max, s_max at most the sum of all entries, less p's rounding errors.
       const Lanes sum = magnitude(p00) + magnitude(p01) + magnitude(p10) + magnitude(p11);
-      const Lanes rounding = 32 * kUnit * (size2_[at(i)] + trace * trace + load(&size2_[at(j)]));
+      const Lanes rounding = 64 * kUnit * (size2_[at(i)] + trace * trace + load(&size2_[at(j)]));
       const Lanes halves =
           traceless_[at(i)] + load(&traceless_[at(j)]) + 0.7072 * magnitude(across);
       const Lanes least = magnitude(p00 * p11 - p01 * p10) - rounding * sum;
@@ -151,7 +151,7 @@ class Separations {
     if (i >= basis_.modes) std::swap(i, j);
     const double x = basis_.rate[at(j - basis_.modes)], trace = trace_[at(i)];
     const double least = std::abs(x * x - trace * x + determinant_[at(i)]) -
-                         32 * kUnit * (x * x + square(trace) + size2_[at(i)]);
+                         64 * kUnit * (x * x + square(trace) + size2_[at(i)]);
     return least / (kSlack * (std::abs(x - 0.5 * trace) + traceless_[at(i)]));
   }
 
@@ -212,13 +212,11 @@ class Prover {
 
  private:
   void sum_squares();
-  BlockSizes total(int group, const TrackedCertificate& certificate) const;
 
   /// Errors and the Gram matrix added to the squared norms of a block's G, all rows and columns.
   SetNorms finish(int i, double inner, double right, double left) const {
     const BlockSizes block = block_sizes(basis_, sizes_, i);
-    double R = 0;
-    R = R_rows_[at(basis_.first(i))];
+    double R = R_rows_[at(basis_.first(i))];
     if (i < basis_.modes) R += R_rows_[at(basis_.second(i))];
     return add_errors(block, block.a * block.rate, block.m * block.rate, R, inner, right, left);
   }

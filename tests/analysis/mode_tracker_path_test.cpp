@@ -258,6 +258,35 @@ TEST(TrackedPath, JumpsAreSolvedAnew) {
   EXPECT_LE(follower.counters().most_passes, TrackerOptions{}.max_passes);
 }
 
+TEST(TrackedPath, KeepsPlacesWhereAJumpIsSolvedAnew) {
+  // The shapes turn by 40 degrees at once, too much to be followed, and the frequencies change.
+  const auto at = [](double degrees, double high, double low) {
+    const double angle = degrees * std::numbers::pi / 180;
+    MatrixXd R(2, 2);
+    R << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+    return make(MatrixXd::Identity(2, 2), 0.2 * MatrixXd::Identity(2, 2),
+                R * Eigen::Vector2d(high * high, low * low).asDiagonal() * R.transpose());
+  };
+  Follower follower;
+  follower.follow(50, 5, [&](double t) { return at(t, 20, 3 + t); });
+  follower.follow(1, 1, [&](double) { return at(40, 3, 20); });
+  EXPECT_EQ(follower.counters().direct, 2);
+  EXPECT_NEAR(follower.mode(0).natural_frequency, 3, 1e-6);
+  EXPECT_NEAR(follower.mode(1).natural_frequency, 20, 1e-6);
+}
+
+TEST(TrackedPath, PartsModesThatNearlyCrossBetweenTwoSteps) {
+  for (const double gap : {1e-3, 1e-5, 1e-8, 1e-11}) {
+    for (const double shift : {0.0, 1e-4, 3e-4}) {  // of the crossing against the steps
+      SCOPED_TRACE(gap);
+      Follower follower;
+      follower.follow(500, 1, [&](double t) { return exchange(t + shift, gap); });
+      EXPECT_GE(follower.counters().tracked, 495);
+      EXPECT_NEAR(follower.mode(0).damping_ratio * follower.mode(0).natural_frequency, 0.05, 1e-9);
+    }
+  }
+}
+
 TEST(TrackedPath, KeepsPlacesOverASmallJump) {
   const MatrixXd I = MatrixXd::Identity(3, 3);
   const auto at = [&](double a, double b, double c) {
@@ -265,14 +294,17 @@ TEST(TrackedPath, KeepsPlacesOverASmallJump) {
     K(0, 1) = K(1, 0) = 0.5;
     return make(I, 0.3 * I, K);
   };
-  Follower follower;
-  follower.follow(1, 1, [&](double) { return at(400, 100, 25); });
-  follower.tracker->reset();
-  // The frequencies are exchanged, the shapes hardly changed.
-  follower.follow(1, 1, [&](double) { return at(25, 400, 100); });
-  EXPECT_NEAR(follower.mode(0).natural_frequency, 5, 0.01);
-  EXPECT_NEAR(follower.mode(1).natural_frequency, 20, 0.01);
-  EXPECT_NEAR(follower.mode(2).natural_frequency, 10, 0.01);
+  for (const bool reset : {false, true}) {
+    Follower follower;
+    follower.follow(3, 1, [&](double t) { return at(400 + t, 100, 25); });
+    if (reset) follower.tracker->reset();
+    // The frequencies are exchanged, the shapes hardly changed.
+    follower.follow(1, 1, [&](double) { return at(25, 400, 100); });
+    EXPECT_EQ(follower.counters().direct, reset ? 2 : 1);
+    EXPECT_NEAR(follower.mode(0).natural_frequency, 5, 0.01);
+    EXPECT_NEAR(follower.mode(1).natural_frequency, 20, 0.01);
+    EXPECT_NEAR(follower.mode(2).natural_frequency, 10, 0.01);
+  }
 }
 
 /// A planar arm of three unit links, its hand held in x and y; singular where it is stretched.
