@@ -12,6 +12,10 @@ const char* to_text(Status status) noexcept {
       return "the mass matrix is not symmetric";
     case Status::kMassNotPositiveDefinite:
       return "the mass matrix is not positive definite";
+    case Status::kStiffnessIndefinite:
+      return "the stiffness matrix is not positive semidefinite";
+    case Status::kWrongSize:
+      return "a matrix has a shape that does not fit the others";
     case Status::kNotConverged:
       return "the eigenvalue iteration did not converge";
     case Status::kOverflow:

@@ -8,6 +8,8 @@ enum class Status {
   kNotFinite,                ///< an entry of the input is NaN or infinite
   kNotSymmetric,             ///< the mass matrix is not symmetric to rounding
   kMassNotPositiveDefinite,  ///< the Cholesky factorisation of the mass matrix broke down
+  kStiffnessIndefinite,      ///< a stiffness has to be positive semidefinite and is not
+  kWrongSize,                ///< a matrix has a shape that does not fit the others
   kNotConverged,             ///< the eigenvalue iteration reached its cap
   kOverflow,                 ///< the entries are too large or too small to compute with
   kWrongSize,               ///< matrices of different sizes
