@@ -1,6 +1,9 @@
 // A solver of fixed capacity never touches the heap, and finds what the dynamic one finds.
+#include <dashpot/analysis/damping_hold.hpp>
 #include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/random_arms.hpp>
 
 #include <gtest/gtest.h>
 
@@ -192,6 +195,28 @@ TEST(Allocation, DoesNotHappenInTheModeTracker) {
   EXPECT_GT(counters.tracked, 100);
   EXPECT_GT(counters.reused, 50);
   EXPECT_GT(counters.direct, 100);
+}
+
+TEST(Allocation, DoesNotHappenWhereTheLoopHoldsADampingRatio) {
+  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
+  Random random(604);
+  for (int n = 1; n <= kMaxDof; ++n) {
+    const TaskImpedance arm = testing::random_arm(random, n, 6);
+    const Square<kMaxDof> M = arm.mass;
+    const TaskJacobian<kMaxDof> J = *arm.jacobian;
+    const TaskMatrix K_C = *arm.task_stiffness;
+    DampingHold hold;
+    TaskMatrix C_C;
+    Status status = Status::kNotFinite;
+    EXPECT_EQ(allocations_of([&] {
+                hold.set_stiffness(K_C);
+                status = hold.update<kMaxDof>(M, J, C_C);
+                hold.update<kMaxDof>(M, J / 0.0, C_C);
+              }),
+              0)
+        << "n = " << n;
+    EXPECT_EQ(status, Status::kOk);
+  }
 }
 
 TEST(FixedCapacity, GivesTheModesOfTheDynamicSolver) {

@@ -1,0 +1,302 @@
+// Damping matrices of a structure, near a given one, within bounds, and for many configurations.
+#include <dashpot/analysis/damping_region.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random_arms.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::near;
+using testing::Random;
+using testing::random_arm;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double sum_of_squares(const Spectrum<>& spectrum, double zeta) {
+  double sum = 0;
+  for (const Mode<>& mode : spectrum.modes) {
+    sum += (mode.damping_ratio - zeta) * (mode.damping_ratio - zeta);
+  }
+  return sum;
+}
+
+double sum_with(const TaskImpedance& arm, const MatrixXd& damping, double zeta) {
+  return sum_of_squares(analyze(to_joint_space(with_damping(arm, damping))), zeta);
+}
+
+bool has_structure(const MatrixXd& A, DampingStructure structure) {
+  for (Index j = 0; j < A.cols(); ++j) {
+    for (Index i = 0; i < A.rows(); ++i) {
+      const bool free = i == j || structure == DampingStructure::kFull ||
+                        (structure == DampingStructure::kBlock && (i < 3) == (j < 3));
+      if (!free && A(i, j) != 0) return false;
+    }
+  }
+  return true;
+}
+
+class Structure : public ::testing::TestWithParam<DampingStructure> {};
+
+TEST_P(Structure, IsKeptAndNoSmallChangeWithinItDoesBetter) {
+  const DampingStructure structure = GetParam();
+  Random random(7301);
+  int reached = 0;
+  for (int i = 0; i < 12; ++i) {
+    const TaskImpedance arm = random_arm(random, 7, 6, 10, 30);
+    const DampingDesign design =
+        design_damping(arm, DampingTarget::constant(0.3), structure, std::nullopt);
+    SCOPED_TRACE("system " + std::to_string(i));
+    const MatrixXd& C = design.damping;
+    EXPECT_TRUE(has_structure(C, structure));
+    EXPECT_EQ(negative_eigenvalues(C).size(), 0);
+    if (design.misses.empty()) {
+      ++reached;
+      continue;
+    }
+    const double sum = sum_of_squares(design.spectrum, 0.3);
+    for (const DampingMiss& miss : design.misses) {
+      EXPECT_EQ(miss.reason, DampingMiss::Reason::kStructure);
+      EXPECT_EQ(miss.obtained, design.spectrum.modes[miss.mode].damping_ratio);
+    }
+    for (int k = 0; k < 40; ++k) {  // S (1 + E)(1 + E)' S, the structure's congruences
+      MatrixXd E = 1e-3 * random.matrix(6, 6);
+      for (Index q = 0; q < 6; ++q) {
+        for (Index p = 0; p < 6; ++p) {
+          MatrixXd one = MatrixXd::Zero(6, 6);
+          one(p, q) = 1;
+          if (!has_structure(one, structure)) E(p, q) = 0;
+        }
+      }
+      const MatrixXd T = MatrixXd::Identity(6, 6) + E;
+      const MatrixXd other = T * C * T.transpose();
+      EXPECT_GE(sum_with(arm, 0.5 * (other + other.transpose()), 0.3), sum * (1 - 2e-3));
+    }
+  }
+  std::printf("exact in %d of 12\n", reached);
+}
+
+std::string name_of(const ::testing::TestParamInfo<DampingStructure>& info) {
+  return info.param == DampingStructure::kFull    ? "Full"
+         : info.param == DampingStructure::kBlock ? "Block"
+                                                  : "Diagonal";
+}
+
+INSTANTIATE_TEST_SUITE_P(Designs, Structure,
+                         ::testing::Values(DampingStructure::kBlock, DampingStructure::kDiagonal),
+                         name_of);
+
+TEST(DiagonalDesign, FindsTheExactOneWhereThereIsOne) {
+  Random random(7302);
+  for (int i = 0; i < 20; ++i) {
+    TaskImpedance arm;
+    arm.mass = VectorXd(random.vector(6).cwiseAbs().array() + 0.2).asDiagonal();
+    arm.jacobian = MatrixXd::Identity(6, 6);
+    arm.task_stiffness = VectorXd((random.vector(6).array() + 5).exp()).asDiagonal();
+    const VectorXd expected =
+        1.4 * arm.mass.diagonal().cwiseProduct(arm.task_stiffness->diagonal()).cwiseSqrt();
+    // From far away, too.
+    const MatrixXd start = 10 * MatrixXd::Identity(6, 6);
+    for (const auto& from : {std::optional<MatrixXd>(), std::optional<MatrixXd>(start)}) {
+      const DampingDesign design =
+          design_damping(arm, DampingTarget::constant(0.7), DampingStructure::kDiagonal, from);
+      EXPECT_TRUE(design.misses.empty());
+      EXPECT_TRUE(near(design.damping.diagonal(), expected, 1e-7 * expected.maxCoeff()));
+    }
+  }
+}
+
+TEST(DesignNearAStart, ReachesTheTargetAndStaysThere) {
+  Random random(7303);
+  for (int i = 0; i < 20; ++i) {
+    const TaskImpedance arm = random_arm(random, 7, 6, 10, 30);
+    const DampingTarget target = DampingTarget::constant(0.5);
+    const MatrixXd exact = design_damping(arm, target).damping;
+    const MatrixXd T = MatrixXd::Identity(6, 6) + 0.05 * random.matrix(6, 6);
+    const MatrixXd start = T * exact * T.transpose();
+    const MatrixXd symmetric = 0.5 * (start + start.transpose());
+    const DampingDesign design = design_damping(arm, target, DampingStructure::kFull, symmetric);
+    EXPECT_TRUE(design.misses.empty());
+    EXPECT_EQ(negative_eigenvalues(design.damping).size(), 0);
+    const VectorXd unit = symmetric.diagonal().cwiseSqrt().cwiseInverse();
+    const auto size = [&unit](const MatrixXd& A) {
+      return MatrixXd(unit.asDiagonal() * A * unit.asDiagonal()).norm();
+    };
+    // No farther from the start than the closed form is.
+    EXPECT_LE(size(design.damping - symmetric), size(exact - symmetric));
+    const DampingDesign same = design_damping(arm, target, DampingStructure::kFull, exact);
+    EXPECT_TRUE(near(same.damping, exact, 1e-8 * exact.norm()));
+  }
+}
+
+TEST(DesignNearAStart, RefusesOneThatIsNoDamping) {
+  Random random(7304);
+  const TaskImpedance arm = random_arm(random, 7, 6);
+  MatrixXd start = MatrixXd::Identity(6, 6);
+  start(0, 1) = start(1, 0) = 2;
+  EXPECT_THROW(design_damping(arm, {}, DampingStructure::kFull, start), InvalidSystem);
+  start(0, 1) = 0;
+  EXPECT_THROW(design_damping(arm, {}, DampingStructure::kFull, start), InvalidSystem);
+  EXPECT_THROW(design_damping(arm, {}, DampingStructure::kFull, MatrixXd::Identity(5, 5)),
+               InvalidSystem);
+}
+
+TEST(DiagonalDesign, WorksInJointSpaceToo) {
+  Random random(7305);
+  TaskImpedance arm;
+  arm.mass = random.spd(5);
+  arm.stiffness = 100 * random.spd(5);
+  const DampingDesign design =
+      design_damping(arm, DampingTarget::constant(0.4), DampingStructure::kDiagonal);
+  EXPECT_TRUE(has_structure(design.damping, DampingStructure::kDiagonal));
+  EXPECT_LT(sum_of_squares(design.spectrum, 0.4), 0.05);
+}
+
+/// Two joints, two directions: small enough to try all diagonal matrices.
+TEST(LargestSmallestRatio, IsThatOfAnExhaustiveSearch) {
+  Random random(7306);
+  for (int i = 0; i < 4; ++i) {
+    const std::vector<TaskImpedance> region = {random_arm(random, 2, 2, 5, 5),
+                                               random_arm(random, 2, 2, 5, 5)};
+    RegionOptions options;
+    options.target = DampingTarget::constant(0.7);
+    options.structure = DampingStructure::kDiagonal;
+    options.ceiling = 0.8;
+    const RegionDesign design = design_region(region, options);
+    EXPECT_LE(design.violation, 2e-7);
+    double best = 0;
+    const double scale = design.damping.diagonal().maxCoeff();
+    for (double a = 1e-3 * scale; a < 4 * scale; a *= 1.08) {
+      for (double b = 1e-3 * scale; b < 4 * scale; b *= 1.08) {
+        double least = 1, largest = 0;
+        for (const TaskImpedance& arm : region) {
+          const MatrixXd C = Eigen::Vector2d(a, b).asDiagonal();
+          for (const Mode<>& mode : analyze(to_joint_space(with_damping(arm, C))).modes) {
+            least = std::min(least, mode.damping_ratio / 0.7);
+            largest = std::max(largest, mode.damping_ratio);
+          }
+        }
+        if (largest <= 0.8) best = std::max(best, least);
+      }
+    }
+    EXPECT_GE(design.level, best - 2e-3) << "system " << i;
+    EXPECT_LE(design.level, best + 0.05);  // of the grid
+  }
+}
+
+std::vector<TaskImpedance> path_of_configurations(Random& random, int count) {
+  const TaskImpedance arm = random_arm(random, 7, 6, 10, 30);
+  const MatrixXd swing = random.matrix(6, 7), root = 0.2 * random.matrix(7, 7);
+  std::vector<TaskImpedance> result;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 0.4 * std::sin(0.5 * i);
+    TaskImpedance one = arm;
+    one.jacobian = *arm.jacobian + 0.3 * angle * swing;
+    const MatrixXd T = MatrixXd::Identity(7, 7) + angle * root;
+    const MatrixXd M = T * arm.mass * T.transpose();
+    one.mass = 0.5 * (M + M.transpose());
+    result.push_back(one);
+  }
+  return result;
+}
+
+TEST(RegionDesign, RaisesTheWorstRatioAndMapsIt) {
+  Random random(7307);
+  const std::vector<TaskImpedance> region = path_of_configurations(random, 8);
+  RegionOptions options;
+  options.target = DampingTarget::constant(0.7);
+  std::vector<double> told;
+  options.progress = [&told](double done) { told.push_back(done); };
+  const RegionDesign design = design_region(region, options);
+  EXPECT_LE(design.violation, 2e-7);
+  EXPECT_EQ(negative_eigenvalues(design.damping).size(), 0);
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  EXPECT_EQ(told.front(), 0);
+  EXPECT_EQ(told.back(), 1);
+  ASSERT_EQ(design.samples.size(), region.size());
+  double least = kInfinity;
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    const RegionSample& sample = design.samples[i];
+    const Spectrum<> spectrum = analyze(to_joint_space(with_damping(region[i], design.damping)));
+    for (const Mode<>& mode : spectrum.modes) {
+      EXPECT_GE(mode.damping_ratio, sample.damping_ratio - 1e-12);
+      EXPECT_LE(mode.damping_ratio, 1.05 + 1e-6);
+    }
+    EXPECT_NEAR(spectrum.modes[sample.worst_mode].damping_ratio, sample.damping_ratio, 1e-10);
+    least = std::min(least, sample.damping_ratio);
+  }
+  EXPECT_NEAR(design.level, std::min(1.0, least / 0.7), 1e-12);
+  // Better than what suits any one configuration, scaled down to the same ceiling.
+  double others = 0;
+  for (const TaskImpedance& arm : region) {
+    MatrixXd C = design_damping(arm, options.target).damping;
+    RegionDesign one = evaluate_region(region, C, options);
+    for (; one.violation > 0; one = evaluate_region(region, C, options)) C *= 0.98;
+    others = std::max(others, one.level);
+  }
+  std::printf("level %.4f; best of the designs for one configuration %.4f\n", design.level, others);
+  EXPECT_GT(design.level, others);
+}
+
+TEST(RegionDesign, DoesNotDependOnTheNumberOfThreads) {
+  Random random(7308);
+  const std::vector<TaskImpedance> region = path_of_configurations(random, 5);
+  RegionOptions options;
+  options.target = DampingTarget::constant(0.6);
+  options.threads = 1;
+  const MatrixXd alone = design_region(region, options).damping;
+  options.threads = 3;
+  EXPECT_EQ(design_region(region, options).damping, alone);
+}
+
+TEST(RegionDesign, KeepsToBoundsOnTheEntries) {
+  Random random(7309);
+  const std::vector<TaskImpedance> region = {random_arm(random, 7, 6, 10, 30)};
+  RegionOptions options;
+  options.target = DampingTarget::constant(0.7);
+  const RegionDesign free = design_region(region, options);
+  EXPECT_EQ(free.level, 1);
+  options.bounds.upper = MatrixXd::Constant(6, 6, kInfinity);
+  options.bounds.lower = MatrixXd::Constant(6, 6, -kInfinity);
+  options.bounds.upper.diagonal() = 0.5 * free.damping.diagonal();
+  const RegionDesign bounded = design_region(region, options);
+  EXPECT_LE(bounded.violation, 2e-7);
+  EXPECT_LT(bounded.level, 1);
+  EXPECT_GE(bounded.level, 0.2);
+  for (Index i = 0; i < 6; ++i) {
+    EXPECT_LE(bounded.damping(i, i), options.bounds.upper(i, i) * (1 + 1e-6));
+  }
+  // No less than the exact design scaled down until it keeps to them.
+  EXPECT_GE(bounded.level, 0.5 - 1e-3);
+}
+
+TEST(RegionDesign, SaysWhereFrictionAloneIsTooMuch) {
+  Random random(7310);
+  TaskImpedance arm = random_arm(random, 7, 6, 10, 30);
+  arm.damping = 1000 * MatrixXd::Identity(7, 7);
+  RegionOptions options;
+  options.target = DampingTarget::constant(0.2);
+  EXPECT_GT(design_region({arm}, options).violation, 0.1);
+}
+
+TEST(RegionDesign, RefusesWhatDoesNotFit) {
+  Random random(7311);
+  RegionOptions options;
+  options.ceiling = 0.5;  // below the target
+  EXPECT_THROW(design_region({random_arm(random, 3, 3)}, options), std::invalid_argument);
+  options.ceiling.reset();
+  EXPECT_THROW(design_region({}, options), std::invalid_argument);
+  EXPECT_THROW(design_region({random_arm(random, 3, 3), random_arm(random, 3, 2)}, options),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dashpot::analysis

@@ -1,0 +1,46 @@
+#pragma once
+// Random impedance-controlled arms, tame and ill-conditioned, for tests of damping designs.
+
+#include <dashpot/analysis/task_space.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <Eigen/QR>
+#include <algorithm>
+
+namespace dashpot::testing {
+
+/// Random orthogonal matrix, n x n.
+inline Eigen::MatrixXd rotation(Random& random, Eigen::Index n) {
+  return Eigen::HouseholderQR<Eigen::MatrixXd>(random.matrix(n, n)).householderQ();
+}
+
+/// Symmetric, with eigenvalues from `largest` / `condition` to `largest`, these two included.
+inline Eigen::MatrixXd graded(Random& random, Eigen::Index n, double largest, double condition) {
+  const Eigen::MatrixXd Q = rotation(random, n);
+  Eigen::VectorXd values(n);
+  for (double& value : values) value = random.log_uniform(largest / condition, largest);
+  values[0] = largest;
+  values[n - 1] = n > 1 ? largest / condition : largest;
+  const Eigen::MatrixXd A = Q * values.asDiagonal() * Q.transpose();
+  return 0.5 * (A + A.transpose());
+}
+
+/// n joints, m task directions; mass and task stiffness with the given condition numbers.
+inline analysis::TaskImpedance random_arm(Random& random, Eigen::Index n, Eigen::Index m,
+                                          double mass_condition = 30,
+                                          double stiffness_condition = 30) {
+  analysis::TaskImpedance arm;
+  arm.mass = graded(random, n, 3, mass_condition);
+  arm.jacobian = 0.5 * random.matrix(m, n);
+  arm.task_stiffness = graded(random, m, 3000, stiffness_condition);
+  return arm;
+}
+
+/// Joint friction that is strong in some joints and weak in others; N m s/rad.
+inline Eigen::MatrixXd random_friction(Random& random, Eigen::Index n, double size) {
+  Eigen::VectorXd values(n);
+  for (double& value : values) value = size * random.log_uniform(0.01, 1);
+  return values.asDiagonal();
+}
+
+}  // namespace dashpot::testing
