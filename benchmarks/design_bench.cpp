@@ -1,0 +1,111 @@
+// Full task-space damping for one target ratio at a new configuration, six task directions:
+// design/full/n, warm-started along a path of a thousand configurations as the control loop sees
+// them; design/cold/n, each from nothing. Beside them what a plain double diagonalisation takes
+// (design/eigen/n): Lambda = (J M^-1 J')^-1, then Eigen's GeneralizedSelfAdjointEigenSolver, all in
+// fixed-size matrices.
+#include <dashpot/analysis/damping_hold.hpp>
+
+#include <benchmark/benchmark.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <random>
+#include <vector>
+
+namespace {
+
+using dashpot::analysis::DampingHold;
+using dashpot::analysis::DampingTarget;
+using dashpot::analysis::kMaxDof;
+using dashpot::analysis::Square;
+using dashpot::analysis::Status;
+using dashpot::analysis::TaskJacobian;
+using dashpot::analysis::TaskMatrix;
+
+constexpr double kRatio = 0.7;
+
+/// M and J of an arm's size that swing with 0.5 rad at about 1 rad/s, sampled at 1 kHz.
+struct Path {
+  std::vector<Square<kMaxDof>> mass;
+  std::vector<TaskJacobian<kMaxDof>> jacobian;
+  TaskMatrix stiffness;
+
+  explicit Path(Eigen::Index n) {
+    std::mt19937_64 generator(20210001);
+    std::normal_distribution<double> normal;
+    const auto random = [&](Eigen::Index rows, Eigen::Index cols) {
+      return Eigen::MatrixXd(
+          Eigen::MatrixXd::NullaryExpr(rows, cols, [&] { return normal(generator); }));
+    };
+    const Eigen::MatrixXd root = random(n, n), swing = random(n, n), J = random(6, n),
+                          J_swing = random(6, n);
+    for (int tick = 0; tick < 1000; ++tick) {
+      const double angle = 0.5 * std::sin(1e-3 * tick);
+      const Eigen::MatrixXd R = root + angle * swing;
+      mass.emplace_back(R * R.transpose() / static_cast<double>(n) +
+                        0.1 * Eigen::MatrixXd::Identity(n, n));
+      jacobian.emplace_back(0.4 * (J + angle * J_swing));
+    }
+    stiffness = Eigen::Matrix<double, 6, 1>(2000, 600, 2000, 100, 100, 100).asDiagonal();
+  }
+};
+
+void full(benchmark::State& state, bool warm) {
+  const Path path(state.range(0));
+  DampingHold hold(DampingTarget::constant(kRatio));
+  hold.set_stiffness(path.stiffness);
+  TaskMatrix C_C;
+  std::size_t tick = 0;
+  for (auto _ : state) {
+    if (!warm) hold.set_stiffness(path.stiffness);
+    const Status status = hold.update<kMaxDof>(path.mass[tick], path.jacobian[tick], C_C);
+    if (status != Status::kOk) state.SkipWithError("no damping found");
+    benchmark::DoNotOptimize(C_C.data());
+    tick = (tick + 1) % path.mass.size();
+  }
+}
+
+/// C_C = Lambda V diag(2 zeta omega) V' Lambda with K_C V = Lambda V diag(omega^2), V' Lambda V =
+/// I.
+template <int N>
+TaskMatrix double_diagonalisation(const Eigen::Matrix<double, N, N>& M,
+                                  const Eigen::Matrix<double, 6, N>& J, const TaskMatrix& K_C) {
+  const Eigen::Matrix<double, N, 6> X = M.llt().solve(J.transpose());
+  const TaskMatrix inverse = J.lazyProduct(X);
+  const TaskMatrix Lambda = inverse.llt().solve(TaskMatrix::Identity());
+  const Eigen::GeneralizedSelfAdjointEigenSolver<TaskMatrix> eigen(K_C, Lambda);
+  const TaskMatrix LV = Lambda.lazyProduct(eigen.eigenvectors());
+  const TaskMatrix scaled =
+      LV * (2 * kRatio * eigen.eigenvalues().cwiseMax(0).cwiseSqrt()).asDiagonal();
+  return scaled.lazyProduct(LV.transpose());
+}
+
+template <int N>
+void eigen(benchmark::State& state) {
+  const Path path(N);
+  std::vector<Eigen::Matrix<double, N, N>> mass(path.mass.begin(), path.mass.end());
+  std::vector<Eigen::Matrix<double, 6, N>> jacobian(path.jacobian.begin(), path.jacobian.end());
+  std::size_t tick = 0;
+  for (auto _ : state) {
+    TaskMatrix C_C = double_diagonalisation<N>(mass[tick], jacobian[tick], path.stiffness);
+    benchmark::DoNotOptimize(C_C.data());
+    tick = (tick + 1) % mass.size();
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  for (const int n : {6, 7, 12, 16}) {
+    benchmark::RegisterBenchmark("design/full", full, true)->Arg(n);
+    benchmark::RegisterBenchmark("design/cold", full, false)->Arg(n);
+  }
+  benchmark::RegisterBenchmark("design/eigen/6", eigen<6>);
+  benchmark::RegisterBenchmark("design/eigen/7", eigen<7>);
+  benchmark::RunSpecifiedBenchmarks();
+  benchmark::Shutdown();
+  return 0;
+}
