@@ -116,12 +116,20 @@ void write(const Json& value, const std::string& indent, std::string& out) {
 
 }  // namespace
 
+Json report_json(const Report& report) {
+  return to_value(report);
+}
+
+std::string json_text(const Json& document) {
+  std::string text;
+  write(document, "", text);
+  return text + '\n';
+}
+
 std::string to_json(const std::vector<Report>& reports, bool as_list) {
   Json document = Json::array();
   for (const Report& report : reports) document.push_back(to_value(report));
-  std::string text;
-  write(as_list ? document : document.at(0), "", text);
-  return text + '\n';
+  return json_text(as_list ? document : document.at(0));
 }
 
 }  // namespace dashpot::apps

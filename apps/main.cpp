@@ -29,6 +29,7 @@ int run(int argc, char** argv) {
   add_analyze(program);
   add_inspect(program);
   add_monitor(program);
+  add_design(program);
 
   const auto name = [&program] {
     const auto chosen = program.get_subcommands();

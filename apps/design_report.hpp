@@ -1,0 +1,35 @@
+#pragma once
+#include <dashpot/analysis/damping_region.hpp>
+#include <dashpot/analysis/sensitivity.hpp>
+#include <dashpot/apps/report.hpp>
+
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// What `dashpot design` says of one system.
+struct DesignReport {
+  std::string key;  ///< of the matrix: "task_damping", or "damping" where there is no jacobian
+  double ratio = 0;
+  analysis::TaskImpedance impedance;  ///< with the new damping
+  analysis::DampingDesign design;
+  Report before;  ///< with the damping that the file gives
+  Report after;
+  std::vector<analysis::ModeSensitivity> sensitivities;  ///< of `after`; none if not asked for
+  std::vector<std::string> notes;
+};
+
+/// What `dashpot design --region` says.
+struct RegionReport {
+  std::string key;
+  double ratio = 0;
+  analysis::RegionDesign design;
+};
+
+std::string design_json(const std::vector<DesignReport>& reports, bool as_list);
+std::string design_table(const std::vector<DesignReport>& reports, bool as_list);
+std::string region_json(const RegionReport& report);
+std::string region_table(const RegionReport& report);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,244 @@
+// `dashpot design` as a user runs it, judged by `dashpot analyze`.
+#include <dashpot/tests/apps/json_result.hpp>
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+
+namespace dashpot::tests {
+namespace {
+
+using testing::AllOf;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+/// `dashpot design - --damping-ratio RATIO OPTIONS...` with `text` on standard input.
+Outcome design_text(const std::string& text, const std::string& ratio,
+                    std::vector<std::string> options = {}) {
+  options.insert(options.begin(), {"design", "-", "--damping-ratio", ratio});
+  return run_program(options, text);
+}
+
+Json design_json(const std::string& text, const std::string& ratio,
+                 std::vector<std::string> options = {}) {
+  options.emplace_back("--json");
+  return parse(design_text(text, ratio, std::move(options)));
+}
+
+std::string baxter() {
+  std::ifstream stream(example("baxter7.yaml"), std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+Eigen::VectorXd eigenvalues_of(const Rows& rows) {
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd A(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      A(i, j) = rows[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+      EXPECT_EQ(A(i, j), rows[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)]);
+    }
+  }
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(A).eigenvalues();
+}
+
+TEST(Design, GivesEveryModeItsRatioAsAnalyzeSees) {
+  const Json result = design_json(baxter(), "0.7");
+  EXPECT_GT(eigenvalues_of(result["task_damping"])[0], 0);
+  EXPECT_EQ(result["reached"], true);
+  EXPECT_THAT(result["misses"], IsEmpty());
+  ASSERT_EQ(result["modes"].size(), 5U);
+  for (const double ratio : of_modes(result, "damping_ratio")) EXPECT_NEAR(ratio, 0.7, 1e-9);
+  const Json before = analyze_json(baxter());
+  EXPECT_EQ(of_modes(result["before"], "damping_ratio"), of_modes(before, "damping_ratio"));
+
+  // The matrix put into the file, in place of the last of its keys that matter.
+  std::string text = baxter();
+  text.replace(text.find("task_damping:"), std::string::npos,
+               "task_damping: " + result["task_damping"].dump() + "\n");
+  const Json after = analyze_json(text);
+  for (const double ratio : of_modes(after, "damping_ratio")) EXPECT_NEAR(ratio, 0.7, 1e-9);
+  EXPECT_EQ(of_modes(after, "damping_ratio"), of_modes(result, "damping_ratio"));
+  EXPECT_EQ(of_modes(after, "damping_ratio"), of_modes(result["after"], "damping_ratio"));
+}
+
+TEST(Design, KeepsAStructureAndNamesWhatItMisses) {
+  for (const std::string structure : {"diagonal", "block"}) {
+    const Json result = design_json(baxter(), "0.7", {"--keep-structure", structure});
+    const Rows C = result["task_damping"];
+    EXPECT_GE(eigenvalues_of(C)[0], 0);
+    for (std::size_t i = 0; i < C.size(); ++i) {
+      for (std::size_t j = 0; j < C.size(); ++j) {
+        const bool free = i == j || (structure == "block" && (i < 3) == (j < 3));
+        if (!free) EXPECT_EQ(C[i][j], 0);
+      }
+    }
+    EXPECT_EQ(result["reached"], false);
+    ASSERT_FALSE(result["misses"].empty());
+    for (const Json& miss : result["misses"]) {
+      const Json& mode = result["modes"].at(miss["mode"].get<std::size_t>());
+      EXPECT_EQ(miss["obtained"], mode["damping_ratio"]);
+      EXPECT_EQ(miss["wanted"], 0.7);
+      EXPECT_EQ(miss["reason"], "structure");
+    }
+  }
+}
+
+TEST(Design, NamesModesThatFrictionOverdoes) {
+  const std::string text =
+      "mass: [[1, 0], [0, 1]]\njacobian: [[1, 0], [0, 1]]\n"
+      "task_stiffness: [[100, 0], [0, 4]]\ndamping: [[3, 0], [0, 3]]\n";
+  const Json result = design_json(text, "0.5");  // 2 zeta omega is 10 and 2
+  expect_near(result["task_damping"], {{7, 0}, {0, 0}}, 1e-12);
+  EXPECT_NEAR(result["indefinite_by"], -1, 1e-12);
+  ASSERT_EQ(result["misses"].size(), 1U);
+  EXPECT_EQ(result["misses"][0]["mode"], 1);
+  EXPECT_EQ(result["misses"][0]["reason"], "overdone");
+  EXPECT_NEAR(result["misses"][0]["obtained"], 0.75, 1e-12);
+  EXPECT_NEAR(result["misses"][0]["missed_by"], 0.25, 1e-12);
+}
+
+TEST(Design, FlagsATaskDampingThatFeedsEnergyIn) {
+  const std::string text =
+      "mass: [[1, 0], [0, 1]]\njacobian: [[1, 0], [0, 1]]\n"
+      "task_stiffness: [[100, 0], [0, 4]]\ntask_damping: [[0.1, 10], [10, 10]]\n";
+  const Json result = design_json(text, "0.7");
+  ASSERT_EQ(result["notes"].size(), 1U);
+  EXPECT_THAT(result["notes"][0].get<std::string>(), HasSubstr("-6.1"));
+  const Outcome refused = design_text(text, "0.7", {"--near"});
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_THAT(refused.err, HasSubstr("task_damping: is not positive semidefinite"));
+}
+
+TEST(Design, StaysNearTheTaskDampingOfTheFile) {
+  const Json exact = design_json(baxter(), "0.7"), near = design_json(baxter(), "0.7", {"--near"});
+  for (const double ratio : of_modes(near, "damping_ratio")) EXPECT_NEAR(ratio, 0.7, 1e-9);
+  // The file says 3.5 for the first direction.
+  EXPECT_LT(near["task_damping"][0][0], 0.5 * exact["task_damping"][0][0].get<double>());
+}
+
+TEST(Design, OfARegionMapsTheWorstMode) {
+  const std::string one =
+      "- {mass: [[2, 0.3], [0.3, 1]], jacobian: [[1, 0.5], [0, 1]], task_stiffness: [[200, 0], [0, "
+      "30]]}\n";
+  const std::string other =
+      "- {mass: [[3, 0.1], [0.1, 1]], jacobian: [[1, 0.2], [0.3, 1]], task_stiffness: [[200, 0], "
+      "[0, 30]]}\n";
+  const Json result = design_json(one + other, "0.7", {"--region"});
+  EXPECT_GT(eigenvalues_of(result["task_damping"])[0], 0);
+  ASSERT_EQ(result["samples"].size(), 2U);
+  double least = 10;
+  for (const Json& sample : result["samples"]) {
+    EXPECT_LE(sample["largest_ratio"], 1.05 + 1e-6);
+    least = std::min(least, sample["damping_ratio"].get<double>());
+  }
+  EXPECT_NEAR(result["level"], std::min(1.0, least / 0.7), 1e-12);
+  EXPECT_GT(result["level"], 0.9);
+  EXPECT_THAT(design_json(one + other, "0.7"), testing::SizeIs(2));
+  const Outcome table = design_text(one + other, "0.7", {"--region"});
+  EXPECT_THAT(table.out, AllOf(StartsWith("task_damping\n"), HasSubstr("configuration")));
+  EXPECT_THAT(table.err, IsEmpty());
+}
+
+TEST(Design, GivesSensitivitiesOnRequest) {
+  const Json result = design_json(baxter(), "0.7", {"--sensitivity"});
+  ASSERT_EQ(result["sensitivity"].size(), 5U);
+  // All entries grown alike: zeta grows in proportion, and frequencies stay.
+  const Rows C = result["task_damping"];
+  for (const Json& by : result["sensitivity"]) {
+    double ratio = 0, frequency = 0;
+    for (std::size_t i = 0; i < 5; ++i) {
+      for (std::size_t j = 0; j < 5; ++j) {
+        ratio += by["damping_ratio"]["task_damping"][i][j].get<double>() * C[i][j];
+        frequency += by["natural_frequency"]["task_damping"][i][j].get<double>() * C[i][j];
+      }
+    }
+    EXPECT_NEAR(ratio, 0.7, 1e-8);
+    EXPECT_NEAR(frequency, 0, 1e-7);
+  }
+}
+
+TEST(Design, PrintsATableForPeople) {
+  const Outcome outcome = design_text(baxter(), "0.7", {"--sensitivity"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, AllOf(StartsWith("task_damping\n"), HasSubstr("before"),
+                                 HasSubstr("Every mode has a damping ratio of 0.700.\n"),
+                                 HasSubstr("Percent"), EndsWith("\n")));
+}
+
+struct Bad {
+  const char* name;
+  std::vector<std::string> arguments;
+  std::string text;
+  std::string reason;
+};
+
+void PrintTo(const Bad& bad, std::ostream* out) {
+  *out << bad.name;
+}
+
+const std::string kArm = "mass: [[2, 0], [0, 1]]\njacobian: [[1, 1]]\ntask_stiffness: [[9]]\n";
+
+class DesignRefuses : public testing::TestWithParam<Bad> {};
+
+TEST_P(DesignRefuses, WithOneLine) {
+  const Bad& bad = GetParam();
+  std::vector<std::string> arguments = {"design", "-"};
+  arguments.insert(arguments.end(), bad.arguments.begin(), bad.arguments.end());
+  const Outcome outcome = run_program(arguments, bad.text);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.out, IsEmpty());
+  EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
+  EXPECT_THAT(outcome.err, AllOf(StartsWith("dashpot design: "), HasSubstr(bad.reason)));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Input, DesignRefuses,
+    testing::Values(
+        Bad{"NoRatio", {}, kArm, "--damping-ratio is required"},
+        Bad{"NegativeRatio", {"--damping-ratio", "-1"}, kArm, "a positive ratio is wanted"},
+        Bad{"NoNumber", {"--damping-ratio", "0.7x"}, kArm, "a positive ratio is wanted"},
+        Bad{"Infinite", {"--damping-ratio", "inf"}, kArm, "a positive ratio is wanted"},
+        Bad{"Structure", {"--damping-ratio", "1", "--keep-structure", "odd"}, kArm, "odd not in"},
+        Bad{"CeilingAlone",
+            {"--damping-ratio", "1", "--largest-ratio", "2"},
+            kArm,
+            "--largest-ratio: needs --region"},
+        Bad{"LowCeiling",
+            {"--damping-ratio", "1", "--region", "--largest-ratio", "0.5"},
+            kArm,
+            "is below --damping-ratio"},
+        Bad{"NearNothing", {"--damping-ratio", "1", "--near"}, kArm, "task_damping: missing"},
+        Bad{"NearRegion", {"--damping-ratio", "1", "--near", "--region"}, kArm, "--near"},
+        Bad{"NoTaskStiffness",
+            {"--damping-ratio", "1"},
+            "mass: [[1]]\njacobian: [[1]]\ntask_damping: [[1]]\nstiffness: [[1]]\n",
+            "-: task_stiffness: missing"},
+        Bad{"IndefiniteStiffness",
+            {"--damping-ratio", "1"},
+            "mass: [[1]]\njacobian: [[1]]\ntask_stiffness: [[-1]]\n",
+            "-: task_stiffness: is not positive semidefinite"},
+        Bad{"IndefiniteStiffnessInARegion",
+            {"--damping-ratio", "1", "--region"},
+            "- {mass: [[1]], jacobian: [[1]], task_stiffness: [[1]]}\n"
+            "- {mass: [[1]], jacobian: [[1]], task_stiffness: [[-1]]}\n",
+            "-: [1].task_stiffness: is not positive semidefinite"},
+        Bad{"OtherDirections",
+            {"--damping-ratio", "1", "--region"},
+            "- {mass: [[1]], jacobian: [[1]], task_stiffness: [[1]]}\n"
+            "- {mass: [[1]], jacobian: [[1], [1]], task_stiffness: [[1, 0], [0, 1]]}\n",
+            "-: [1].jacobian: has other directions"},
+        Bad{"EmptyRegion", {"--damping-ratio", "1", "--region"}, "[]\n", "lists no configurations"},
+        Bad{"JacobianRate",
+            {"--damping-ratio", "1"},
+            kArm + "task_damping: [[1]]\njacobian_rate: [[1, 1]]\n",
+            "jacobian_rate: depends on the damping"},
+        Bad{"NotSymmetric",
+            {"--damping-ratio", "1"},
+            "mass: [[1, 0], [1, 1]]\nstiffness: [[1, 0], [0, 1]]\n",
+            "mass: is not symmetric"}),
+    [](const testing::TestParamInfo<Bad>& info) { return std::string(info.param.name); });
+
+}  // namespace
+}  // namespace dashpot::tests
