@@ -1,8 +1,8 @@
 // Full damping matrices for a target ratio, checked by the spectrum that the solver proves.
 #include <dashpot/analysis/damping_design.hpp>
-#include <dashpot/tests/support/random_arms.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/paper_examples.hpp>
+#include <dashpot/tests/support/random_arms.hpp>
 
 #include <gtest/gtest.h>
 
@@ -57,9 +57,8 @@ TEST(DampingDesign, GivesEveryModeOfRandomArmsItsRatio) {
   for (int i = 0; i < kSystems; ++i) {
     const int n = random.integer(1, 10), m = random.integer(1, std::min(n, 6));
     const bool hard = random.integer(0, 1) == 1;
-    const TaskImpedance arm =
-        random_arm(random, n, m, hard ? 1e8 : random.log_uniform(1, 1e8),
-                   hard ? 1e8 : random.log_uniform(1, 1e8));
+    const TaskImpedance arm = random_arm(random, n, m, hard ? 1e8 : random.log_uniform(1, 1e8),
+                                         hard ? 1e8 : random.log_uniform(1, 1e8));
     DampingTarget target = DampingTarget::constant(random.log_uniform(0.01, 2));
     target.soft_frequency = 1e-9;
     const DampingDesign design = design_damping(arm, target);
@@ -75,8 +74,10 @@ TEST(DampingDesign, GivesEveryModeOfRandomArmsItsRatio) {
     ASSERT_EQ(design.damping, design.damping.transpose());
     ASSERT_EQ(negative_eigenvalues(design.damping).size(), 0);
   }
-  std::printf("%d systems, %d redundant, %d with mass and stiffness conditioned 1e8: worst ratio off by %.2g\n",
-              kSystems, redundant, ill_conditioned, worst);
+  std::printf(
+      "%d systems, %d redundant, %d with mass and stiffness conditioned 1e8: worst ratio off by "
+      "%.2g\n",
+      kSystems, redundant, ill_conditioned, worst);
   EXPECT_GT(redundant, kSystems / 4);
   EXPECT_GT(ill_conditioned, kSystems / 4);
 }

@@ -2,8 +2,8 @@
 // another precision.
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_hold.hpp>
-#include <dashpot/tests/support/random_arms.hpp>
 #include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random_arms.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // Sensitivities, beside central differences of spectra computed in long double.
 #include <dashpot/analysis/sensitivity.hpp>
-#include <dashpot/tests/support/random_arms.hpp>
 #include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random_arms.hpp>
 
 #include <gtest/gtest.h>
 
