@@ -1,3 +1,4 @@
+#include <dashpot/apps/design_arm.hpp>
 #include <dashpot/apps/design_report.hpp>
 #include <dashpot/apps/subcommands.hpp>
 #include <dashpot/apps/system_file.hpp>
@@ -21,6 +22,7 @@ using analysis::DampingStructure;
 
 struct Options {
   std::string file;
+  ArmOptions arm;  // instead of a file
   double ratio = 0;
   std::string structure = "full";
   double soft_frequency = analysis::DampingTarget().soft_frequency;  // rad/s
@@ -132,6 +134,16 @@ RegionReport report_on_region(const SystemFile& file, const Options& options) {
 }
 
 void check(const Options& options) {
+  if (options.file.empty() == options.arm.urdf.empty()) {
+    throw InputError("FILE", "give a file, or --urdf with --base and --tip");
+  }
+  const ArmOptions& arm = options.arm;
+  if (!arm.urdf.empty() && (arm.base.empty() || arm.tip.empty())) {
+    throw InputError("--urdf", "needs --base and --tip");
+  }
+  const bool idle = !arm.base.empty() || !arm.tip.empty() || !arm.q.empty() ||
+                    !arm.task_stiffness.empty() || !arm.task_damping.empty();
+  if (arm.urdf.empty() && idle) throw InputError("--urdf", "missing, but wanted by other options");
   if (options.near && options.region) throw InputError("--near", "does not go with --region");
   if (options.largest_ratio && !options.region) {
     throw InputError("--largest-ratio", "needs --region");
@@ -142,7 +154,12 @@ void check(const Options& options) {
 }
 
 void run(const Options& options) try {
-  const SystemFile file = read_systems(options.file);
+  SystemFile file;
+  if (options.arm.urdf.empty()) {
+    file = read_systems(options.file);
+  } else {
+    file.entries.push_back(read_arm(options.arm));
+  }
   if (options.region) {
     const RegionReport report = report_on_region(file, options);
     print(options.json ? region_json(report) : region_table(report));
@@ -152,6 +169,7 @@ void run(const Options& options) try {
   for (const SystemEntry& entry : file.entries) reports.push_back(report_on(entry, options));
   print(options.json ? design_json(reports, file.is_list) : design_table(reports, file.is_list));
 } catch (const InputError& error) {
+  if (options.file.empty()) throw;
   throw error.in_file(options.file);
 }
 
@@ -180,8 +198,16 @@ void add_design(CLI::App& program) {
       program.add_subcommand("design", "The damping matrix that gives every mode a damping ratio");
   const auto options = std::make_shared<Options>();
   command->add_option("FILE", options->file, "YAML or JSON file; - reads standard input")
-      ->required()
       ->option_text(" ");
+  ArmOptions& arm = options->arm;
+  command->add_option("--urdf", arm.urdf, "Instead of FILE: an arm")->option_text("FILE");
+  command->add_option("--base", arm.base, "Its base link; axes of the task")->option_text("LINK");
+  command->add_option("--tip", arm.tip, "Its link with the task's origin")->option_text("LINK");
+  command->add_option("--q", arm.q, "Joint positions, rad or m")->option_text("a,b,... (0)");
+  command->add_option("--task-stiffness", arm.task_stiffness, "Diagonal of it, N/m and N m/rad")
+      ->option_text("x,y,z,rx,ry,rz");
+  command->add_option("--task-damping", arm.task_damping, "Diagonal of the one before")
+      ->option_text("x,y,z,rx,ry,rz");
   command->add_option("--damping-ratio", options->ratio, "The ratio wanted of every mode")
       ->required()
       ->check(positive("a positive ratio"))
