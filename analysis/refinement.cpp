@@ -308,6 +308,37 @@ bool in_range(const System<N>& system, const ModalBasis<N>& basis) {
   return true;
 }
 
+/// Lower bound of sep(A, B) for B of 2 x 2 and A of 1 x 1 or 2 x 2: the smallest singular value of
+/// p(A), with p the characteristic polynomial of B, over |A - tr(B) / 2|_F + |B - tr(B) / 2|_F.
+template <typename Left, typename Right>
+double small_separation(const Left& A, const Right& B) noexcept {
+  const double b00 = B(0, 0), b01 = B(0, 1), b10 = B(1, 0), b11 = B(1, 1);
+  const double trace = b00 + b11, determinant = b00 * b11 - b01 * b10;
+  const double half = 0.5 * trace;
+  const double B2 = b00 * b00 + b01 * b01 + b10 * b10 + b11 * b11;
+  const double half_B =
+      std::sqrt((b00 - half) * (b00 - half) + b01 * b01 + b10 * b10 + (b11 - half) * (b11 - half));
+  double least = 0, half_A = 0, A2 = 0;
+  if (A.rows() == 1) {
+    const double x = A(0, 0);
+    least = std::abs(x * x - trace * x + determinant);
+    half_A = std::abs(x - half);
+    A2 = x * x;
+  } else {
+    const double a00 = A(0, 0), a01 = A(0, 1), a10 = A(1, 0), a11 = A(1, 1);
+    A2 = a00 * a00 + a01 * a01 + a10 * a10 + a11 * a11;
+    half_A = std::sqrt((a00 - half) * (a00 - half) + a01 * a01 + a10 * a10 +
+                       (a11 - half) * (a11 - half));
+    const double p00 = a00 * a00 + a01 * a10 - trace * a00 + determinant;
+    const double p11 = a11 * a11 + a01 * a10 - trace * a11 + determinant;
+    const double p01 = (a00 + a11 - trace) * a01, p10 = (a00 + a11 - trace) * a10;
+    const double norm = std::sqrt(p00 * p00 + p01 * p01 + p10 * p10 + p11 * p11);
+    least = norm > 0 ? std::abs(p00 * p11 - p01 * p10) / norm : 0;  // <= smallest singular value
+  }
+  least -= 16 * kUnit * (A2 + std::abs(trace) * std::sqrt(A2) + B2);  // rounding errors of p
+  return least > 0 ? least / (half_A + half_B) : 0;
+}
+
 }  // namespace
 
 template <int N>
@@ -375,22 +406,14 @@ double solve_sylvester(const Eigen::Ref<const State<N>>& A, const Eigen::Ref<con
     // By Cayley-Hamilton, p(A) X = A C + C B - tr(B) C with p the characteristic polynomial of B.
     const double trace = B(0, 0) + B(1, 1);
     const double determinant = B(0, 0) * B(1, 1) - B(0, 1) * B(1, 0);
-    State<N> p = A * A - trace * A;
-    p.diagonal().array() += determinant;
-    State<N> right = A * C + C * B - trace * C;
-    const double p_norm = p.norm();
-    const double half_A = (A - 0.5 * trace * State<N>::Identity(k, k)).norm();
-    const double half_B = (B - 0.5 * trace * State<N>::Identity(l, l)).norm();
-    const double p_det = k == 1 ? p(0, 0) : p(0, 0) * p(1, 1) - p(0, 1) * p(1, 0);
-    // Smallest singular value of p, from below: |det| / |p|_F for 2 x 2, less p's rounding errors.
-    const double rounding =
-        16 * kUnit * (A.squaredNorm() + std::abs(trace) * A.norm() + B.squaredNorm());
-    const double least = (k == 1 ? std::abs(p_det) : std::abs(p_det) / p_norm) - rounding;
-    const double separation = least / (half_A + half_B);
+    const double separation = small_separation(A, B);
     if (!(separation > 0)) {
       X.setZero(k, l);
       return 0;
     }
+    State<N> p = A * A - trace * A;
+    p.diagonal().array() += determinant;
+    State<N> right = A * C + C * B - trace * C;
     solve_in_place(p, right, std::numeric_limits<double>::min());
     X = right;
     return separation;
@@ -443,37 +466,11 @@ double block_separation(const State<N>& Lambda, const Block& a, const Block& b) 
   }
   if (a.size == 1 && b.size == 1)
     return std::abs(Lambda(a.first, a.first) - Lambda(b.first, b.first));
-  // sep(A, B) = sep(B', A'): let B be 2 x 2, and see solve_sylvester.
+  // sep(A, B) = sep(B', A'): let B be 2 x 2.
   const Block& two = b.size == 2 ? b : a;
   const Block& other = b.size == 2 ? a : b;
-  const Eigen::Index t = two.first, o = other.first;
-  const double b00 = Lambda(t, t), b01 = Lambda(t, t + 1), b10 = Lambda(t + 1, t),
-               b11 = Lambda(t + 1, t + 1);
-  const double trace = b00 + b11, determinant = b00 * b11 - b01 * b10;
-  const double half = 0.5 * trace;
-  const double B2 = b00 * b00 + b01 * b01 + b10 * b10 + b11 * b11;
-  const double half_B =
-      std::sqrt((b00 - half) * (b00 - half) + b01 * b01 + b10 * b10 + (b11 - half) * (b11 - half));
-  double least = 0, half_A = 0, A2 = 0;
-  if (other.size == 1) {
-    const double x = Lambda(o, o);
-    least = std::abs(x * x - trace * x + determinant);
-    half_A = std::abs(x - half);
-    A2 = x * x;
-  } else {
-    const double a00 = Lambda(o, o), a01 = Lambda(o, o + 1), a10 = Lambda(o + 1, o),
-                 a11 = Lambda(o + 1, o + 1);
-    A2 = a00 * a00 + a01 * a01 + a10 * a10 + a11 * a11;
-    half_A = std::sqrt((a00 - half) * (a00 - half) + a01 * a01 + a10 * a10 +
-                       (a11 - half) * (a11 - half));
-    const double p00 = a00 * a00 + a01 * a10 - trace * a00 + determinant;
-    const double p11 = a11 * a11 + a01 * a10 - trace * a11 + determinant;
-    const double p01 = (a00 + a11 - trace) * a01, p10 = (a00 + a11 - trace) * a10;
-    const double norm = std::sqrt(p00 * p00 + p01 * p01 + p10 * p10 + p11 * p11);
-    least = norm > 0 ? std::abs(p00 * p11 - p01 * p10) / norm : 0;
-  }
-  least -= 16 * kUnit * (A2 + std::abs(trace) * std::sqrt(A2) + B2);
-  return least > 0 ? least / (half_A + half_B) : 0;
+  return small_separation(Lambda.block(other.first, other.first, other.size, other.size),
+                          Lambda.block(two.first, two.first, 2, 2));
 }
 
 template <int N>
