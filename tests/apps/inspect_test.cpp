@@ -73,7 +73,7 @@ TEST(Inspect, TakesZerosAndEarthsGravityUnlessToldOtherwise) {
   EXPECT_EQ(plain, zeros);
   EXPECT_EQ(plain["coriolis"], Json(Numbers(7, 0.0)));
   const Json upside_down = parse(inspect_panda({"--json", "--gravity", "0,0,9.81"}));
-  for (int i = 0; i < 7; ++i) {
+  for (std::size_t i = 0; i < 7; ++i) {
     EXPECT_EQ(upside_down["gravity"][i].get<double>(), -plain["gravity"][i].get<double>());
   }
 }
@@ -81,9 +81,9 @@ TEST(Inspect, TakesZerosAndEarthsGravityUnlessToldOtherwise) {
 TEST(Inspect, AddsReflectedInertia) {
   const Json bare = parse(inspect_panda({"--json"}));
   const Json geared = parse(inspect_panda({"--json", "--reflected-inertia", "1,2,3,4,5,6,7"}));
-  for (int i = 0; i < 7; ++i) {
+  for (std::size_t i = 0; i < 7; ++i) {
     EXPECT_NEAR(geared["mass_matrix"][i][i].get<double>(),
-                bare["mass_matrix"][i][i].get<double>() + i + 1, 1e-14);
+                bare["mass_matrix"][i][i].get<double>() + static_cast<double>(i + 1), 1e-14);
   }
 }
 
