@@ -1,6 +1,6 @@
 // The words in which to_joint_space() refuses an impedance.
 #include <dashpot/analysis/task_space.hpp>
-#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/random_impedance.hpp>
 
 #include <gtest/gtest.h>
 
@@ -14,15 +14,6 @@ using Eigen::VectorXd;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-TaskImpedance random_impedance(testing::Random& random, int n, int m) {
-  TaskImpedance impedance;
-  impedance.mass = random.spd(n);
-  impedance.jacobian = random.matrix(m, n);
-  impedance.task_stiffness = 1e3 * random.spd(m);
-  impedance.task_damping = 10 * random.spd(m);
-  return impedance;
-}
-
 std::string refusal(const TaskImpedance& impedance) {
   try {
     to_joint_space(impedance);
@@ -34,7 +25,7 @@ std::string refusal(const TaskImpedance& impedance) {
 
 TEST(ToJointSpace, NamesTheMemberThatIsMissing) {
   testing::Random random(28);
-  const TaskImpedance whole = random_impedance(random, 3, 2);
+  const TaskImpedance whole = testing::random_impedance(random, 3, 2);
   TaskImpedance impedance = whole;
   impedance.jacobian.reset();
   EXPECT_EQ(refusal(impedance), "task_damping: needs a jacobian");
@@ -62,7 +53,7 @@ TEST(ToJointSpace, NamesTheMemberThatIsMissing) {
 
 TEST(ToJointSpace, NamesTheMemberOfWrongSize) {
   testing::Random random(29);
-  const TaskImpedance whole = random_impedance(random, 3, 2);
+  const TaskImpedance whole = testing::random_impedance(random, 3, 2);
   TaskImpedance impedance = whole;
   impedance.mass = random.matrix(3, 2);
   EXPECT_EQ(refusal(impedance), "mass: is 3 x 2, expected 3 x 3");
@@ -93,7 +84,7 @@ TEST(ToJointSpace, NamesTheMemberOfWrongSize) {
 
 TEST(ToJointSpace, NamesTheMemberThatIsNotFiniteOrNotSymmetric) {
   testing::Random random(30);
-  const TaskImpedance whole = random_impedance(random, 3, 2);
+  const TaskImpedance whole = testing::random_impedance(random, 3, 2);
   TaskImpedance impedance = whole;
   (*impedance.jacobian)(1, 2) = kNan;
   EXPECT_EQ(refusal(impedance), "jacobian: entry (2,3) is not a finite number");

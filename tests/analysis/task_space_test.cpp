@@ -3,7 +3,7 @@
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/paper_examples.hpp>
-#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/random_impedance.hpp>
 
 #include <gtest/gtest.h>
 
@@ -18,15 +18,6 @@ using testing::as_printed;
 using testing::near;
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
-
-TaskImpedance random_impedance(testing::Random& random, int n, int m) {
-  TaskImpedance impedance;
-  impedance.mass = random.spd(n);
-  impedance.jacobian = random.matrix(m, n);
-  impedance.task_stiffness = 1e3 * random.spd(m);
-  impedance.task_damping = 10 * random.spd(m);
-  return impedance;
-}
 
 // --------------------------------------------------------------------------------- the products
 
@@ -92,7 +83,7 @@ TEST(ToJointSpace, TailsHoldWhatRoundingTook) {
 
 TEST(ToJointSpace, IsExactlySymmetric) {
   testing::Random random(22);
-  TaskImpedance impedance = random_impedance(random, 7, 6);
+  TaskImpedance impedance = testing::random_impedance(random, 7, 6);
   impedance.stiffness = random.spd(7);
   const System<> system = to_joint_space(impedance);
   EXPECT_TRUE(system.symmetric());
@@ -102,7 +93,7 @@ TEST(ToJointSpace, IsExactlySymmetric) {
 
 TEST(ToJointSpace, AddsJointSpaceAndTaskSpaceParts) {
   testing::Random random(23);
-  TaskImpedance both = random_impedance(random, 5, 3);
+  TaskImpedance both = testing::random_impedance(random, 5, 3);
   const System<> task_only = to_joint_space(both);
   both.stiffness = random.spd(5);
   both.damping = random.spd(5);
@@ -143,7 +134,7 @@ TEST(ToJointSpace, AveragesRoundingInSymmetryAway) {
 
 TEST(ToJointSpace, PaperEq55AddsDampingTimesTheRateOfTheJacobian) {
   testing::Random random(24);
-  TaskImpedance impedance = random_impedance(random, 4, 3);
+  TaskImpedance impedance = testing::random_impedance(random, 4, 3);
   const System<> still = to_joint_space(impedance);
   impedance.jacobian_rate = random.matrix(3, 4);
   const System<> moving = to_joint_space(impedance);
@@ -216,7 +207,7 @@ TEST(StiffnessFactor, OfADiagonalTaskStiffnessHasItsRoots) {
 
 TEST(StiffnessFactor, OfFullMatricesIsStacked) {
   testing::Random random(25);
-  TaskImpedance impedance = random_impedance(random, 7, 6);
+  TaskImpedance impedance = testing::random_impedance(random, 7, 6);
   expect_factor(to_joint_space(impedance), 6);
   impedance.stiffness = random.spd(7);
   expect_factor(to_joint_space(impedance), 13);
@@ -225,7 +216,7 @@ TEST(StiffnessFactor, OfFullMatricesIsStacked) {
 TEST(StiffnessFactor, OfASingularTaskStiffnessHasExactZeros) {
   testing::Random random(26);
   for (int i = 0; i < 50; ++i) {
-    TaskImpedance impedance = random_impedance(random, 5, 4);
+    TaskImpedance impedance = testing::random_impedance(random, 5, 4);
     const MatrixXd root = random.matrix(4, 2);
     const MatrixXd product = 1e4 * root * root.transpose();
     impedance.task_stiffness = 0.5 * (product + product.transpose());
@@ -249,7 +240,7 @@ TEST(StiffnessFactor, KeepsSmallStiffnessesBesideLargeOnes) {
 
 TEST(StiffnessFactor, OfAnIndefiniteStiffnessIsLeftOut) {
   testing::Random random(27);
-  TaskImpedance impedance = random_impedance(random, 4, 2);
+  TaskImpedance impedance = testing::random_impedance(random, 4, 2);
   for (const MatrixXd& indefinite :
        {(MatrixXd(2, 2) << 1, 2, 2, 1).finished(), (MatrixXd(2, 2) << 0, 1, 1, 5).finished(),
         (MatrixXd(2, 2) << 1, 0, 0, -1e-9).finished()}) {
