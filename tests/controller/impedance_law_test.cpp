@@ -1,0 +1,317 @@
+// The law against its equations written out with dense matrices, from KDL's M, J and bias torques.
+#include <dashpot/controller/closed_loop.hpp>
+#include <dashpot/controller/impedance_law.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/kdl_dynamics.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/random_robot.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/QR>
+#include <memory>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+using testing::near;
+using testing::Random;
+
+constexpr FeedForward kNone{false, false, false, false, false};
+constexpr FeedForward kAll{true, true, true, true, true};
+
+/// Gains of every kind, symmetric positive semidefinite.
+Gains random_gains(Random& random, int n) {
+  Gains gains;
+  gains.joint_stiffness = 100 * random.spd(n);
+  gains.joint_damping = 10 * random.spd(n);
+  gains.task_stiffness = 500 * random.spd(6);
+  gains.task_damping = 20 * random.spd(6);
+  gains.null_stiffness = 20 * random.vector(n).cwiseAbs();
+  gains.null_damping = 2 * random.vector(n).cwiseAbs();
+  return gains;
+}
+
+/// One arm, its law, and the same by hand.
+template <int N>
+struct Case {
+  RobotModel model;
+  Joints<N> q, qd;
+  Dynamics<N> robot;
+  DynamicsResult kdl;
+  SpringPaths<N> paths;
+  Vector3d p_d;
+  Quaterniond R_d;
+
+  Case(const RobotModel& robot_model, Random& random)
+      : model(robot_model),
+        q(random.vector(N)),
+        qd(0.5 * random.vector(N)),
+        kdl(testing::by_kdl(model, q, qd)),
+        paths{JointPath<N>({Joints<N>::Ones(), Joints<N>::Ones()}, 1e-3, 10),
+              JointPath<N>({Joints<N>::Ones(), Joints<N>::Ones()}, 1e-3, 10),
+              TipPath(TwistNorm{}, 1e-3, 10)} {
+    DynamicsKernel<N>(model).evaluate(q, qd, robot);
+    p_d = robot.p_BT_B + 0.05 * Vector3d(random.vector(3));
+    R_d = quaternion(0.3 * random.vector(3)) * Quaterniond(robot.R_BT);
+    paths.joint.start(q + Joints<N>(0.1 * random.vector(N)));
+    paths.rest.start(q + Joints<N>(0.1 * random.vector(N)));
+    paths.tip.start(p_d, R_d);
+    for (int k = 0; k < 40; ++k) {  // in motion, so that velocities and accelerations matter
+      paths.joint.step(Joints<N>(Joints<N>::Constant(1)));
+      paths.rest.step(Joints<N>(Joints<N>::Constant(-1)));
+      paths.tip.step(p_d + Vector3d::Ones(), R_d * quaternion(Vector3d(0.1, 1, 0.3)));
+    }
+  }
+  Joints<N> torque(const Impedance<N>& impedance, const FeedForward& parts, const Vector6& wrench) {
+    ImpedanceLaw<N> law(model, parts);
+    return law.torque(robot, q, qd, impedance, paths, wrench);
+  }
+  Vector6 tip_error() const {
+    Vector6 e;
+    const Eigen::AngleAxisd turn(
+        Eigen::Matrix3d(paths.tip.rotation().toRotationMatrix() * kdl.R_BT.transpose()));
+    e << paths.tip.position() - kdl.p_BT_B, turn.angle() * turn.axis();
+    return e;
+  }
+  VectorXd friction(const VectorXd& v) const {
+    VectorXd result(N);
+    for (int i = 0; i < N; ++i) {
+      const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
+      result[i] = joint.damping * v[i] + joint.friction * std::tanh(v[i] / 0.01);
+    }
+    return result;
+  }
+};
+
+RobotModel rough_chain(Random& random, int n) {
+  ModelOptions options;
+  options.damping = random.vector(n).cwiseAbs();
+  options.friction = random.vector(n).cwiseAbs();
+  return RobotModel::from_urdf_text(testing::RandomRobot(random.engine()()).chain(n, 0.2), "link0",
+                                    "tip", options);
+}
+
+template <int N>
+void expect_joint_law(Random& random) {
+  Case<N> one(rough_chain(random, N), random);
+  Setpoint setpoint;
+  setpoint.gains = random_gains(random, N);
+  const auto impedance = Impedance<N>::of(setpoint);
+  const Vector6 f = random.vector(6);
+  const JointPath<N>& path = one.paths.joint;
+  const VectorXd springs = setpoint.gains.joint_stiffness * (path.position() - one.q) +
+                           setpoint.gains.joint_damping * (path.velocity() - one.qd);
+  const double size = 1e-11 * (1 + springs.norm() + one.kdl.M.norm());
+  EXPECT_TRUE(near(one.torque(impedance, kNone, f), springs, size));
+  const VectorXd all = springs + one.kdl.M * path.acceleration() + one.kdl.coriolis +
+                       one.kdl.gravity + one.kdl.J.transpose() * f + one.friction(path.velocity());
+  EXPECT_TRUE(near(one.torque(impedance, kAll, f), all, size));
+}
+
+TEST(JointImpedance, IsItsEquation) {
+  Random random(321);
+  for (int k = 0; k < 20; ++k) {
+    expect_joint_law<1>(random);
+    expect_joint_law<4>(random);
+    expect_joint_law<6>(random);
+    expect_joint_law<7>(random);
+    expect_joint_law<16>(random);
+  }
+}
+
+/// Cartesian law for any directions and frame, with the Moore-Penrose form of the projector.
+template <int N>
+void expect_task_law(const RobotModel& model, Random& random) {
+  Case<N> one(model, random);
+  Setpoint setpoint;
+  setpoint.mode = Mode::kCartesian;
+  setpoint.gains = random_gains(random, N);
+  Gains& gains = setpoint.gains;
+  gains.frame = random.integer(0, 1) == 0 ? Frame::kBase : Frame::kTool;
+  int held = 0;
+  for (bool& direction : gains.directions) held += direction = random.integer(0, 4) > 0;
+  if (held == 0) return;
+  const auto impedance = Impedance<N>::of(setpoint);
+
+  // Rows of held directions: S takes a twist in B's axes to their components.
+  MatrixXd turn = MatrixXd::Identity(6, 6);
+  if (gains.frame == Frame::kTool) {
+    turn.topLeftCorner(3, 3) = turn.bottomRightCorner(3, 3) = one.kdl.R_BT.transpose();
+  }
+  MatrixXd S(held, 6);
+  for (int i = 0, row = 0; i < 6; ++i) {
+    if (gains.directions[static_cast<std::size_t>(i)]) S.row(row++) = turn.row(i);
+  }
+  const MatrixXd M = one.kdl.M, J = one.kdl.J, JS = S * J;
+  const MatrixXd A = JS * M.inverse() * JS.transpose();
+  if (Eigen::JacobiSVD<MatrixXd>(A).singularValues().reverse()[0] < 0.05 * A.norm()) return;
+  const MatrixXd K_C = S.transpose() * (S * turn.transpose()) * gains.task_stiffness *
+                       (S * turn.transpose()).transpose() * S;
+  const MatrixXd C_C = S.transpose() * (S * turn.transpose()) * gains.task_damping *
+                       (S * turn.transpose()).transpose() * S;
+  const TipPath& path = one.paths.tip;
+  VectorXd tau = J.transpose() * (K_C * one.tip_error() + C_C * (path.velocity() - J * one.qd));
+  if (N > held) {
+    const MatrixXd projector =
+        MatrixXd::Identity(N, N) - M.inverse() * JS.transpose() * A.inverse() * JS;
+    const JointPath<N>& rest = one.paths.rest;
+    tau += projector.transpose() * gains.null_stiffness.asDiagonal() * (rest.position() - one.q);
+    tau += projector.transpose() * gains.null_damping.asDiagonal() * projector *
+           (rest.velocity() - one.qd);
+  }
+  const double size = 1e-9 * (1 + tau.norm() + M.norm());
+  const Vector6 f = random.vector(6);
+  EXPECT_TRUE(near(one.torque(impedance, kNone, f), tau, size));
+  const VectorXd all =
+      tau + JS.transpose() * A.inverse() * S * path.acceleration() + one.kdl.coriolis +
+      one.kdl.gravity + J.transpose() * f +
+      one.friction(M.inverse() * JS.transpose() * A.inverse() * S * path.velocity());
+  EXPECT_TRUE(near(one.torque(impedance, kAll, f), all, size + 1e-9 * all.norm()));
+}
+
+TEST(CartesianImpedance, IsItsEquation) {
+  Random random(322);
+  for (int k = 0; k < 100; ++k) {
+    expect_task_law<7>(testing::arm_model(testing::arms()[0]), random);
+    expect_task_law<6>(testing::arm_model(testing::arms()[2]), random);
+    expect_task_law<9>(rough_chain(random, 9), random);
+    expect_task_law<14>(rough_chain(random, 14), random);
+  }
+}
+
+TEST(Law, SumsTheModesByTheirWeights) {
+  Random random(323);
+  for (int k = 0; k < 50; ++k) {
+    Case<7> one(testing::arm_model(testing::arms()[1]), random);
+    Setpoint setpoint;
+    setpoint.gains = random_gains(random, 7);
+    setpoint.gains.null_stiffness.setZero();
+    setpoint.gains.null_damping.setZero();
+    const auto joint = Impedance<7>::of(setpoint);
+    setpoint.mode = Mode::kCartesian;
+    const auto task = Impedance<7>::of(setpoint);
+    const double s = random.uniform(0, 1);
+    const Vector6 f = Vector6::Zero();
+    const VectorXd expected =
+        (1 - s) * one.torque(joint, kNone, f) + s * one.torque(task, kNone, f);
+    EXPECT_TRUE(near(one.torque(blend(joint, task, s), kNone, f), expected, 1e-9));
+  }
+}
+
+TEST(Law, StiffnessOfTheClosedLoopIsTheDerivativeOfItsTorque) {
+  Random random(324);
+  for (int k = 0; k < 30; ++k) {
+    Case<7> one(testing::arm_model(testing::arms()[0]), random);
+    Setpoint setpoint;
+    setpoint.gains = random_gains(random, 7);
+    const auto joint = Impedance<7>::of(setpoint);
+    setpoint.mode = Mode::kCartesian;
+    setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
+    auto impedance = Impedance<7>::of(setpoint);
+    if (k % 3 == 1) impedance = joint;
+    if (k % 3 == 2) impedance = blend(joint, impedance, 0.3);
+    // At rest on all springs
+    one.qd.setZero();
+    one.paths.joint.start(one.q);
+    one.paths.rest.start(one.q);
+    one.paths.tip.start(one.robot.p_BT_B, Quaterniond(one.robot.R_BT));
+    ImpedanceLaw<7> law(one.model, kNone);
+    const DynamicsKernel<7> kernel(one.model);
+    const auto torque = [&](const Joints<7>& q, const Joints<7>& qd) -> Joints<7> {
+      Dynamics<7> robot;
+      kernel.evaluate(q, qd, robot);
+      return law.torque(robot, q, qd, impedance, one.paths, Vector6::Zero());
+    };
+    MatrixXd K(7, 7), C(7, 7);
+    constexpr double kStep = 1e-5;
+    for (int i = 0; i < 7; ++i) {
+      const Joints<7> d = kStep * Joints<7>::Unit(i), z = Joints<7>::Zero();
+      K.col(i) = -(torque(one.q + d, z) - torque(one.q - d, z)) / (2 * kStep);
+      C.col(i) = -(torque(one.q, d) - torque(one.q, -d)) / (2 * kStep);
+    }
+    torque(one.q, one.qd);
+    analysis::System<kMaxJoints> system;
+    controller::closed_loop<7>(one.robot, one.qd, impedance, law.null_space(), Joints<7>::Zero(),
+                               TaskTerms{}, Vector6::Zero(), system);
+    EXPECT_TRUE(system.symmetric());
+    EXPECT_TRUE(near(system.mass, one.kdl.M, 1e-12));
+    EXPECT_TRUE(near(system.damping, C, 1e-6 * C.norm()));
+    EXPECT_TRUE(near(system.stiffness_factor.transpose() * system.stiffness_factor,
+                     system.stiffness, 1e-12 * K.norm()));
+    // The law's N' K_0 and the system's N' K_0 N differ by N' K_0 (I - N).
+    MatrixXd N(7, 7);
+    for (int i = 0; i < 7; ++i) {
+      N.col(i) = impedance.null_space() ? law.null_space().projected_velocity(Joints<7>::Unit(i))
+                                        : Joints<7>(Joints<7>::Zero());
+    }
+    const MatrixXd left_out =
+        N.transpose() * impedance.null_stiffness.asDiagonal() * (MatrixXd::Identity(7, 7) - N);
+    EXPECT_TRUE(near(system.stiffness + left_out, K, 1e-6 * K.norm()));
+  }
+}
+
+TEST(ClosedLoop, RateAndGeometricStiffnessAreDerivatives) {
+  Random random(325);
+  for (int k = 0; k < 20; ++k) {
+    const RobotModel model = rough_chain(random, 7);
+    const Joints<7> q = random.vector(7), qd = random.vector(7);
+    const DynamicsKernel<7> kernel(model);
+    const auto jacobian = [&](const Joints<7>& at) {
+      Dynamics<7> robot;
+      kernel.evaluate(at, qd, robot);
+      return robot.J;
+    };
+    constexpr double kStep = 1e-5;
+    const Jacobian<7> J = jacobian(q);
+    const MatrixXd rate = (jacobian(q + kStep * qd) - jacobian(q - kStep * qd)) / (2 * kStep);
+    EXPECT_TRUE(near(jacobian_rate<7>(J, qd), rate, 1e-7));
+    const Vector6 f = random.vector(6);
+    MatrixXd K_G(7, 7);
+    for (int i = 0; i < 7; ++i) {
+      const Joints<7> d = kStep * Joints<7>::Unit(i);
+      K_G.col(i) = (jacobian(q + d) - jacobian(q - d)).transpose() * f / (2 * kStep);
+    }
+    EXPECT_TRUE(near(geometric_stiffness<7>(J, f), K_G, 1e-7));
+  }
+}
+
+TEST(ClosedLoop, AddsOptionalTermsAndFriction) {
+  Random random(326);
+  Case<7> one(rough_chain(random, 7), random);
+  Setpoint setpoint;
+  setpoint.mode = Mode::kCartesian;
+  setpoint.gains = random_gains(random, 7);
+  const auto impedance = Impedance<7>::of(setpoint);
+  NullSpace<7> null_space;
+  null_space.compute(one.robot.M, one.robot.J, impedance.base, impedance.tool, one.robot.R_BT);
+  const Joints<7> friction = random.vector(7).cwiseAbs();
+  const Vector6 f = random.vector(6);
+  const auto system_with = [&](TaskTerms terms) {
+    analysis::System<kMaxJoints> system;
+    controller::closed_loop<7>(one.robot, one.qd, impedance, null_space, friction, terms, f,
+                               system);
+    return system;
+  };
+  const auto plain = system_with({false, false}), both = system_with({true, true});
+  const MatrixXd J = one.robot.J;
+  const MatrixXd extra =
+      J.transpose() * setpoint.gains.task_damping * jacobian_rate<7>(one.robot.J, one.qd) +
+      geometric_stiffness<7>(one.robot.J, f);
+  EXPECT_TRUE(near(both.stiffness - plain.stiffness, extra, 1e-9));
+  EXPECT_EQ(both.stiffness_factor.rows(), 0);
+  EXPECT_EQ(plain.stiffness_factor.rows(), 13);
+  const auto smooth = plain.damping - MatrixXd(friction.asDiagonal());
+  EXPECT_TRUE(near(smooth.diagonal() + friction, plain.damping.diagonal(), 1e-9));
+  EXPECT_GT((MatrixXd(plain.damping) - J.transpose() * setpoint.gains.task_damping * J).trace(),
+            friction.sum());
+}
+
+}  // namespace
+}  // namespace dashpot::controller

@@ -1,0 +1,208 @@
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/gain_path.hpp>
+#include <dashpot/controller/null_space.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::MatrixXd;
+using testing::near;
+using testing::Random;
+
+class NullSpaceOfPanda : public ::testing::Test {
+ protected:
+  NullSpaceOfPanda() : model(testing::arm_model(testing::arms()[0])), kernel(model) {
+    held.held.setOnes();
+  }
+  void at(const Joints<7>& q) {
+    kernel.evaluate(q, Joints<7>::Zero(), robot);
+    null_space.compute(robot.M, robot.J, held, tool, robot.R_BT);
+  }
+  /// Stretched out: joints 2, 4 and 6 at zero align the elbow with the rest.
+  static Joints<7> stretched(double bend) {
+    return Joints<7>{{0.3, bend, 0.1, -bend, 0.2, bend, 0.4}};
+  }
+
+  RobotModel model;
+  DynamicsKernel<7> kernel;
+  Dynamics<7> robot;
+  TipImpedance held, tool;
+  NullSpace<7> null_space;
+};
+
+TEST_F(NullSpaceOfPanda, DoesNotAccelerateTheTip) {
+  Random random(331);
+  int regular = 0;
+  for (int k = 0; k < 1000; ++k) {
+    at(random.vector(7));
+    if (null_space.inertia().regularity() < TaskInertia::kNearlySingular) continue;
+    ++regular;
+    const Joints<7> k0 = 30 * random.vector(7).cwiseAbs();
+    for (const Joints<7>& tau :
+         {null_space.spring(k0, random.vector(7)), null_space.damper(k0, random.vector(7))}) {
+      const Vector6 acceleration = robot.J * robot.M.llt().solve(tau);
+      EXPECT_LT(acceleration.norm(), 1e-9 * robot.M.llt().solve(tau).norm());
+      EXPECT_GT(tau.norm(), 1e-3);
+    }
+    EXPECT_LT((robot.J * null_space.projected_velocity(random.vector(7))).norm(), 1e-10);
+  }
+  EXPECT_GT(regular, 500);
+}
+
+TEST_F(NullSpaceOfPanda, HeldDirectionsAreExactForEverySubset) {
+  Random random(332);
+  for (int k = 0; k < 500; ++k) {
+    const bool in_tool = k % 2 == 0;
+    TipImpedance& one = in_tool ? tool : held;
+    (in_tool ? held : tool).held.setZero();
+    for (int i = 0; i < 6; ++i) one.held[i] = random.integer(0, 1);
+    at(random.vector(7));
+    if (null_space.inertia().regularity() < TaskInertia::kNearlySingular) continue;
+    const Joints<7> tau = null_space.spring(Joints<7>::Ones(), random.vector(7));
+    Vector6 acceleration = robot.J * robot.M.llt().solve(tau);
+    if (in_tool) {
+      acceleration.head<3>() = (robot.R_BT.transpose() * acceleration.head<3>()).eval();
+      acceleration.tail<3>() = (robot.R_BT.transpose() * acceleration.tail<3>()).eval();
+    }
+    EXPECT_LT(one.held.cwiseProduct(acceleration).norm(), 1e-9);
+  }
+}
+
+TEST_F(NullSpaceOfPanda, InertiaIsThatOfTheTip) {
+  Random random(333);
+  for (int k = 0; k < 200; ++k) {
+    at(random.vector(7));
+    if (null_space.inertia().regularity() < TaskInertia::kNearlySingular) continue;
+    const Vector6 a = random.vector(6);
+    const MatrixXd J = robot.J, M = robot.M;
+    const Eigen::VectorXd expected = (J * M.inverse() * J.transpose()).inverse() * a;
+    EXPECT_TRUE(near(null_space.inertia().wrench(a), expected, 1e-8 * expected.norm()));
+    EXPECT_TRUE(near(robot.J * null_space.joint_velocity(a), a, 1e-9));
+  }
+}
+
+TEST_F(NullSpaceOfPanda, TorqueKeepsItsBoundAndTurnsSmoothlyThroughTheStretchedArm) {
+  const double cond = [&] {
+    double worst = 0;
+    for (double bend = -0.5; bend <= 0.5; bend += 0.01) {
+      at(stretched(bend));
+      const Eigen::SelfAdjointEigenSolver<MatrixXd> values{MatrixXd(robot.M)};
+      worst = std::max(worst, values.eigenvalues()[6] / values.eigenvalues()[0]);
+    }
+    return worst;
+  }();
+  const Joints<7> k0{{30, 25, 20, 15, 10, 5, 2}}, dq{{0.3, -0.2, 0.5, 0.4, -0.3, 0.2, 0.6}};
+  Joints<7> last;
+  double least = 1, largest_step = 0;
+  for (int step = -50000; step <= 50000; ++step) {
+    at(stretched(1e-5 * step));
+    const Joints<7> spring = null_space.spring(k0, dq), damper = null_space.damper(k0, dq);
+    ASSERT_LE(spring.norm(), std::sqrt(cond) * 30 * dq.norm());
+    ASSERT_LE(damper.norm(), cond * 30 * dq.norm());
+    ASSERT_GE(dq.dot(damper), 0);
+    least = std::min(least, null_space.inertia().regularity());
+    if (step > -50000) largest_step = std::max(largest_step, (spring - last).norm());
+    last = spring;
+  }
+  EXPECT_LT(least, 1e-6);         // the sweep does meet the singularity
+  EXPECT_LT(largest_step, 0.05);  // N m in 1e-5 rad
+}
+
+TEST_F(NullSpaceOfPanda, EigenvaluesOfTheProjectorAreBetweenZeroAndOneEverywhere) {
+  Random random(334);
+  for (int k = 0; k < 500; ++k) {
+    for (int i = 0; i < 6; ++i) held.held[i] = random.uniform(0, 1);  // half held, while blending
+    for (int i = 0; i < 6; ++i) tool.held[i] = (1 - held.held[i]) * random.uniform(0, 1);
+    held.held *= 0.5;
+    tool.held *= 0.5;
+    at(k % 2 == 0 ? Joints<7>(random.vector(7)) : stretched(random.log_uniform(1e-9, 1)));
+    MatrixXd N(7, 7);
+    for (int i = 0; i < 7; ++i) N.col(i) = null_space.projected_velocity(Joints<7>::Unit(i));
+    const MatrixXd L = MatrixXd(robot.M).llt().matrixL();
+    const MatrixXd P = L.transpose() * N * L.transpose().inverse();
+    EXPECT_TRUE(near(P, P.transpose(), 1e-10));
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> values(P);
+    EXPECT_GE(values.eigenvalues().minCoeff(), -1e-10);
+    EXPECT_LE(values.eigenvalues().maxCoeff(), 1 + 1e-10);
+  }
+}
+
+TEST_F(NullSpaceOfPanda, SpringPullsDownhill) {
+  Random random(335);
+  for (int k = 0; k < 500; ++k) {
+    at(random.vector(7));
+    const Joints<7> k0 = 30 * random.vector(7).cwiseAbs(), dq = random.vector(7);
+    // What the spring does on its own: qdd = M^-1 N' K_0 dq, along which dq' K_0 dq falls.
+    const Joints<7> acceleration = robot.M.llt().solve(null_space.spring(k0, dq));
+    EXPECT_GE(acceleration.dot(k0.cwiseProduct(dq)), -1e-10);
+  }
+}
+
+double least_eigenvalue(const MatrixXd& A) {
+  return Eigen::SelfAdjointEigenSolver<MatrixXd>(A).eigenvalues().minCoeff() / (1 + A.norm());
+}
+
+TEST(GainPath, StaysPositiveSemidefiniteAndArrives) {
+  Random random(336);
+  constexpr int kTicks = 50;
+  GainPath<7> path(kTicks);
+  path.start(Impedance<7>{});
+  Impedance<7> target;
+  for (int change = 0; change < 60; ++change) {
+    Setpoint setpoint;
+    setpoint.mode = random.integer(0, 1) == 0 ? Mode::kJoint : Mode::kCartesian;
+    Gains& gains = setpoint.gains;
+    const MatrixXd thin = random.matrix(7, 3), flat = random.matrix(6, 2);  // singular ones too
+    gains.joint_stiffness = 1e3 * thin * thin.transpose();
+    gains.joint_damping = random.spd(7);
+    gains.task_stiffness = 1e4 * flat * flat.transpose();
+    gains.task_damping = random.spd(6);
+    gains.frame = random.integer(0, 1) == 0 ? Frame::kBase : Frame::kTool;
+    gains.null_stiffness = gains.null_damping = random.vector(7).cwiseAbs();
+    target = Impedance<7>::of(setpoint);
+    const Impedance<7> from = path.now();
+    path.set_target(target);
+    const int ticks = random.integer(1, 2 * kTicks);
+    Impedance<7> last = from;
+    for (int k = 0; k < ticks; ++k) {
+      path.step();
+      const Impedance<7>& now = path.now();
+      for (const MatrixXd& A : {MatrixXd(now.joint_stiffness), MatrixXd(now.joint_damping),
+                                MatrixXd(now.base.stiffness), MatrixXd(now.tool.stiffness),
+                                MatrixXd(now.base.damping), MatrixXd(now.tool.damping)}) {
+        EXPECT_GE(least_eigenvalue(A), -1e-14);
+      }
+      // At a bounded rate
+      EXPECT_LE((now.base.stiffness - last.base.stiffness).norm(),
+                (target.base.stiffness - from.base.stiffness).norm() * 1.001 / kTicks + 1e-9);
+      last = now;
+    }
+    if (ticks >= kTicks) {
+      EXPECT_EQ(path.now().joint_stiffness, target.joint_stiffness);
+      EXPECT_EQ(path.now().tool.damping, target.tool.damping);
+      EXPECT_EQ(path.now().task_weight, target.task_weight);
+    }
+  }
+}
+
+TEST(GainPath, FollowsTargetsThatComeEveryTick) {
+  Ramp<Vector6> path(100);
+  path.start(Vector6::Zero());
+  for (int k = 0; k < 1000; ++k) {
+    path.set_target(Vector6::Constant(1 + 1e-9 * k));
+    path.step();
+  }
+  EXPECT_TRUE(near(path.now(), Vector6(Vector6::Ones()), 1e-4));
+}
+
+}  // namespace
+}  // namespace dashpot::controller
