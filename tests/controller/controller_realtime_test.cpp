@@ -1,0 +1,106 @@
+// What update() never does: allocate, call the system, or put out a torque above its limits.
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/count_allocations.hpp>
+#include <dashpot/tests/support/hostile_ticks.hpp>
+#include <dashpot/tests/support/random_robot.hpp>
+
+#include <gtest/gtest.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <set>
+
+namespace dashpot::controller {
+namespace {
+
+using testing::allocations_of;
+using testing::HostileTicks;
+
+RobotModel panda() {
+  return testing::arm_model(testing::arms()[0]);
+}
+
+TEST(Realtime, UpdateNeverAllocates) {
+  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
+  const RobotModel model = panda();
+  Settings settings = HostileTicks::everything_on(model);
+  settings.task_terms = {true, true};
+  Controller controller(model, settings);
+  HostileTicks input(model, settings, 341, 0.02);
+  JointVector torque;
+  static_assert(noexcept(controller.update(input.state, input.setpoint, torque)));
+  const int count = allocations_of([&] {
+    for (int k = 0; k < 1'000'000; ++k) {
+      input.next();
+      controller.update(input.state, input.setpoint, torque);
+    }
+    controller.reset();
+  });
+  EXPECT_EQ(count, 0);
+  EXPECT_GT(controller.snapshot().tick + 1, 0u);
+}
+
+TEST(Realtime, HostileInputNeverGivesHostileTorque) {
+  std::set<Status> seen;
+  for (const int n : {1, 2, 6, 7, 11, 16}) {
+    SCOPED_TRACE(n);
+    const RobotModel model =
+        n == 7 ? panda()
+               : RobotModel::from_urdf_text(
+                     testing::RandomRobot(static_cast<unsigned>(n)).chain(n, 0.2), "link0", "tip");
+    const Settings settings = HostileTicks::everything_on(model);
+    Controller controller(model, settings);
+    HostileTicks input(model, settings, 342, 0.01);
+    testing::TorqueWatch watch(settings);
+    JointVector torque;
+    for (int k = 0; k < 50'000; ++k) {
+      input.next();
+      seen.insert(controller.update(input.state, input.setpoint, torque));
+      ASSERT_STREQ(watch.see(torque), nullptr) << "tick " << k;
+    }
+  }
+  // All but kNotFinite, which finite input within its limits does not reach
+  EXPECT_GE(seen.size(), static_cast<std::size_t>(Status::kNotFinite));
+}
+
+/// Signal that ended a process in which only read, write and exit are allowed while `act` runs; 0
+/// if none did.
+template <class Act>
+int signal_without_system_calls(const Act& act) {
+  const pid_t child = fork();
+  if (child == 0) {
+    if (prctl(PR_SET_SECCOMP, SECCOMP_MODE_STRICT) != 0) _exit(2);
+    act();
+    syscall(SYS_exit, 0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 2) return -1;
+  return WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+}
+
+TEST(Realtime, UpdateMakesNoSystemCall) {
+  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "sanitizers call the system";
+  const int forbidden = signal_without_system_calls([] { getppid(); });
+  if (forbidden == -1) GTEST_SKIP() << "no seccomp here";
+  ASSERT_EQ(forbidden, SIGKILL);  // the trap works
+  const RobotModel model = panda();
+  const Settings settings = HostileTicks::everything_on(model);
+  Controller controller(model, settings);
+  HostileTicks input(model, settings, 343, 0.02);
+  JointVector torque;
+  EXPECT_EQ(signal_without_system_calls([&] {
+              for (int k = 0; k < 100'000; ++k) {
+                input.next();
+                controller.update(input.state, input.setpoint, torque);
+              }
+            }),
+            0);
+}
+
+}  // namespace
+}  // namespace dashpot::controller
