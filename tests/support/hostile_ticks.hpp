@@ -38,7 +38,7 @@ class HostileTicks {
     wander();
     state = good_;
     if (chance(0.05)) change_setpoint();
-    if (chance(0.0005)) silent_ = static_cast<int>(engine_() % 3000);  // the set-point ages
+    if (chance(0.0001)) silent_ = static_cast<int>(engine_() % 3000);  // the set-point ages
     if (--silent_ < 0) good_setpoint_.time = good_.time;
     setpoint = good_setpoint_;
     if (chance(share_)) spoil_state();
@@ -78,16 +78,19 @@ class HostileTicks {
   /// Moves as an arm might, at times too fast or out of its range.
   void wander() {
     good_.time += 1'000'000;
+    if (chance(0.0005)) wild_ = 200;
+    --wild_;
+    const double most = wild_ > 0 ? 1.1 : 0.5, room = wild_ > 0 ? -0.05 : 0.05;
     for (Eigen::Index i = 0; i < n_; ++i) {
       const double limit = settings_.limits.velocity[i];
-      good_.velocity[i] =
-          std::clamp(good_.velocity[i] + uniform(-0.1, 0.1) * limit, -1.1 * limit, 1.1 * limit);
-      double& q = good_.position[i];
-      q += 1e-3 * good_.velocity[i];
-      const double lower = std::max(settings_.limits.position_lower[i], -10.0) - 0.05;
-      const double upper = std::min(settings_.limits.position_upper[i], 10.0) + 0.05;
-      if (q < lower || q > upper) good_.velocity[i] = -good_.velocity[i];
-      q = std::clamp(q, lower, upper);
+      double &q = good_.position[i], &qd = good_.velocity[i];
+      double push = uniform(-0.1, 0.1) - (wild_ > 0 ? 0 : 0.02) * qd / limit;
+      if (q < std::max(settings_.limits.position_lower[i], -10.0) + room) push = 0.1;
+      if (q > std::min(settings_.limits.position_upper[i], 10.0) - room) push = -0.1;
+      const double slowest = std::min(-most, qd / limit + 0.1);  // brakes from wild to tame
+      const double fastest = std::max(most, qd / limit - 0.1);
+      qd = limit * std::clamp(qd / limit + push, slowest, fastest);
+      q += 1e-3 * qd;
     }
     if (chance(0.01)) good_.external_wrench[static_cast<int>(engine_() % 6)] = uniform(-50, 50);
   }
@@ -203,6 +206,7 @@ class HostileTicks {
   controller::Settings settings_;
   std::mt19937_64 engine_;
   double share_;
+  int wild_ = 0;    ///< ticks to go
   int silent_ = 0;  ///< ticks without a new set-point
   controller::RobotState good_;
   controller::Setpoint good_setpoint_;
