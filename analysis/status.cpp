@@ -20,8 +20,6 @@ const char* to_text(Status status) noexcept {
       return "the eigenvalue iteration did not converge";
     case Status::kOverflow:
       return "the entries are too large or too small to compute with";
-    case Status::kWrongSize:
-      return "the matrices differ in size";
     case Status::kUncertified:
       return "no error bound could be proved for some of the modes";
   }

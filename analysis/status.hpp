@@ -12,7 +12,6 @@ enum class Status {
   kWrongSize,                ///< a matrix has a shape that does not fit the others
   kNotConverged,             ///< the eigenvalue iteration reached its cap
   kOverflow,                 ///< the entries are too large or too small to compute with
-  kWrongSize,               ///< matrices of different sizes
   kUncertified,  ///< modes are given, but no finite error bound could be proved for some
 };
 

@@ -71,7 +71,9 @@ TEST(Design, KeepsAStructureAndNamesWhatItMisses) {
     for (std::size_t i = 0; i < C.size(); ++i) {
       for (std::size_t j = 0; j < C.size(); ++j) {
         const bool free = i == j || (structure == "block" && (i < 3) == (j < 3));
-        if (!free) EXPECT_EQ(C[i][j], 0);
+        if (!free) {
+          EXPECT_EQ(C[i][j], 0);
+        }
       }
     }
     EXPECT_EQ(result["reached"], false);
@@ -238,7 +240,7 @@ INSTANTIATE_TEST_SUITE_P(
             {"--damping-ratio", "1"},
             "mass: [[1, 0], [1, 1]]\nstiffness: [[1, 0], [0, 1]]\n",
             "mass: is not symmetric"}),
-    [](const testing::TestParamInfo<Bad>& info) { return std::string(info.param.name); });
+    [](const testing::TestParamInfo<Bad>& bad) { return std::string(bad.param.name); });
 
 }  // namespace
 }  // namespace dashpot::tests

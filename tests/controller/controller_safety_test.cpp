@@ -192,7 +192,9 @@ TEST_F(Safety, HoldsWithAStaleSetpointThenDampsAndRecovers) {
   for (int k = 0; k < 500; ++k) EXPECT_EQ(arm->step(), Status::kOk);
   for (int k = 0; k < 1200; ++k) {
     arm->step();
-    if (k > 1) EXPECT_EQ(snapshot().status, Status::kSetpointStale);
+    if (k > 1) {
+      EXPECT_EQ(snapshot().status, Status::kSetpointStale);
+    }
   }
   EXPECT_EQ(snapshot().setpoint_velocity.norm(), 0.0);
   EXPECT_EQ(snapshot().joint_weight, 1.0);

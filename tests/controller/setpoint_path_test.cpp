@@ -31,7 +31,7 @@ JointNorm<3> joint_limits() {
 template <int N>
 struct Watch {
   JointNorm<N> norm;
-  std::vector<Joints<N>> positions;
+  std::vector<Joints<N>> positions = {};
   double speed = 0, effort = 0, jerk = 0, inconsistency = 0;
   Joints<N> v = Joints<N>::Zero(), a = Joints<N>::Zero();
 
