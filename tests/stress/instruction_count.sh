@@ -9,8 +9,8 @@ program=$1 folder=$2 ticks=1000 skip=20 status=0 settled=0
 for kind in joint cartesian blend; do
   rm -f "$folder"/ticks.out*
   valgrind -q --tool=callgrind --callgrind-out-file="$folder/ticks.out" \
-    --toggle-collect='dashpot::controller::Controller::update(*' \
-    --dump-after='dashpot::controller::Controller::update(*' "$program" "$kind" $((ticks + skip))
+    --toggle-collect='dashpot::controller::FixedCore<7>::update(*' \
+    --dump-before=end_of_tick "$program" "$kind" $((ticks + skip))
   # One file a tick, with its total; the first ticks start the springs.
   read -r least median most < <(
     for ((i = skip + 1; i <= skip + ticks; ++i)); do
