@@ -72,7 +72,9 @@ inline ArmModel panda(const Eigen::VectorXd& q) {
     Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, 7);
     for (std::size_t k = 0; k < axes.size(); ++k) {
       const auto column = static_cast<Eigen::Index>(k);
-      J.col(column) << axes[k].cross(point - points[k]), axes[k];
+      const Eigen::Vector3d lever = point - points[k];
+      J.col(column).head<3>() = axes[k].cross(lever);
+      J.col(column).tail<3>() = axes[k];
     }
     return J;
   };
