@@ -20,8 +20,8 @@ class ControllerCore;
 ///       ...                                      // send `torque`, whatever the status
 ///     }
 ///
-/// Read in this order: robot_model.hpp, dynamics.hpp, setpoint_follower.hpp,
-/// impedance_law.hpp, safety_filter.hpp, and fixed_core.hpp, which calls them.
+/// Read in this order: robot_model.hpp, dynamics.hpp, setpoint_path.hpp, gain_path.hpp,
+/// impedance_law.hpp, safety_filter.hpp, and controller_core.hpp, which calls them.
 ///
 /// One thread at a time may use a Controller; `Latest` (latest.hpp) hands set-points to the thread
 /// of `update` and snapshots from it.

@@ -1,19 +1,21 @@
 #pragma once
 #include <dashpot/controller/closed_loop.hpp>
 #include <dashpot/controller/controller_core.hpp>
+#include <dashpot/controller/gain_path.hpp>
 #include <dashpot/controller/impedance_law.hpp>
 #include <dashpot/controller/safety_filter.hpp>
-#include <dashpot/controller/setpoint_follower.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/state_check.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace dashpot::controller {
 
 /// The controller's core for N joints, known at compile time. One tick, in `update`:
-///     state -> StateCheck -> DynamicsKernel -> SetpointFollower -> ImpedanceLaw -> SafetyFilter
-///           -> torque;   and every so often -> closed loop -> VibrationAnalysis
+///     state -> StateCheck -> DynamicsKernel -> set-point, paths and gains -> ImpedanceLaw
+///           -> SafetyFilter -> torque;   and every so often -> closed loop -> VibrationAnalysis
 template <int N>
 class FixedCore final : public ControllerCore {
  public:
@@ -27,28 +29,36 @@ class FixedCore final : public ControllerCore {
   void closed_loop(analysis::System<kMaxJoints>& system) const noexcept override;
 
  private:
+  /// Takes over a set-point that is new and in order. Whether the one given is in order.
+  bool read(const Setpoint& setpoint) noexcept;
+  /// The way to the accepted set-point; paths whose springs are not in force start where the robot
+  /// is.
+  void aim() noexcept;
+  /// Springs where the robot is, gains growing from zero.
+  void start_afresh() noexcept;
   /// Whether the state allows springs: kOk, kTimeGap, kVelocityLimit or kPositionLimit.
   Status guard(Status input) noexcept;
+  /// Whether the set-point is fresh: kOk, kSetpointStale or kSetpointLost.
+  Status watch() const noexcept;
   /// Moves gains and set-points on by one period, and gives the law's torque.
   Vector act(bool hold) noexcept;
   /// The safe output without springs.
   Vector damp() noexcept;
   /// The safe output without a state.
   Status ramp(Status status, JointVector& torque) noexcept;
-  /// One more tick of it; springs do not outlast a long one.
-  void count_ramp() noexcept {
-    if (++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap) follower_.stop();
-  }
   Status finish(Status status, const Vector& tau, JointVector& torque) noexcept;
   void describe() noexcept;
 
   DynamicsKernel<N> kernel_;
   StateCheck state_check_;
-  SetpointFollower<N> follower_;
+  SpringPaths<N> paths_;
+  GainPath<N> gains_;
+  Ramp<Vector6> wrench_;
   ImpedanceLaw<N> law_;
   SafetyFilter<N> filter_;
   Vector damping_;           ///< of the safe output "damp", N m s/rad
   Vector viscous_friction_;  ///< of the robot, N m s/rad
+  Vector turn_;              ///< 2 pi for a continuous joint, else 0
 
   // The last good state, and the robot there
   std::int64_t time_ = 0;
@@ -57,7 +67,17 @@ class FixedCore final : public ControllerCore {
   Vector6 external_wrench_ = Vector6::Zero();
   Dynamics<N> robot_;
 
-  bool first_ = true;  ///< there was no good state yet
+  Setpoint accepted_;             ///< the last good set-point
+  Vector goal_ = Vector::Zero();  ///< its joint position
+  Eigen::Quaterniond goal_rotation_ = Eigen::Quaterniond::Identity();
+  bool from_user_ = false;      ///< or else it is Settings::initial, where the robot started
+  bool looked_at_any_ = false;  ///< and at what time that was, and whether it was in order:
+  std::int64_t looked_at_ = 0;
+  bool in_order_ = true;
+
+  bool first_ = true;         ///< there was no good state yet
+  bool afresh_ = true;        ///< springs start afresh when they are next in force
+  bool damping_only_ = true;  ///< the last torque was that of `damp`
   bool too_fast_ = false;
   int ramp_ticks_ = 0;
 };
@@ -67,11 +87,26 @@ FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
     : ControllerCore(settings),
       kernel_(model),
       state_check_(model, settings),
-      follower_(model, settings),
+      paths_([&] {
+        const Motion& motion = settings.motion;
+        const double T = settings.period;
+        const int window = static_cast<int>(std::lround(motion.smoothing / T));
+        const JointNorm<N> joints{fixed<N>(motion.velocity), fixed<N>(motion.acceleration)};
+        const TwistNorm twist{motion.linear_velocity, motion.angular_velocity,
+                              motion.linear_acceleration, motion.angular_acceleration};
+        return SpringPaths<N>{JointPath<N>(joints, T, window), JointPath<N>(joints, T, window),
+                              TipPath(twist, T, window)};
+      }()),
+      gains_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
+      wrench_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
       law_(model, settings.feed_forward),
       filter_(settings.limits, settings.period),
       damping_(fixed<N>(settings.limits.damping)),
       viscous_friction_(fixed<N>(model.joint_values(&Joint::damping))) {
+  for (int i = 0; i < N; ++i) {
+    const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
+    turn_[i] = joint.type == JointType::kContinuous ? 2 * std::numbers::pi : 0;
+  }
   reset(JointVector::Zero(N));
 }
 
@@ -80,9 +115,9 @@ void FixedCore<N>::reset(const JointVector& torque) noexcept {
   state_check_.reset();
   const bool usable = torque.size() == N && torque.allFinite();
   filter_.reset(usable ? fixed<N>(torque) : Vector(Vector::Zero()));
-  follower_.reset();
-  first_ = true;
-  too_fast_ = false;
+  accepted_ = settings_.initial;
+  from_user_ = looked_at_any_ = too_fast_ = false;
+  in_order_ = first_ = afresh_ = damping_only_ = true;
   ramp_ticks_ = 0;
   snapshot_ = Snapshot();
   for (JointVector* vector :
@@ -106,23 +141,93 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   external_wrench_ = state.external_wrench;
   kernel_.evaluate(q_, qd_, robot_);
   if (first_) {
-    follower_.begin(time_);
+    accepted_.time = time_;
     first_ = false;
   }
 
-  const bool in_order = follower_.read(setpoint, time_, q_, robot_);
-  Status status = in_order ? Status::kOk : Status::kSetpointRejected;
-  status = worse(status, follower_.watch(time_));
+  Status status = read(setpoint) ? Status::kOk : Status::kSetpointRejected;
+  status = worse(status, watch());
   status = worse(status, guard(input));
   Vector tau = status >= Status::kSetpointLost ? damp() : act(status == Status::kSetpointStale);
   status = worse(status, filter_.apply(q_, qd_, tau));
   if (status == Status::kNotFinite) {
-    count_ramp();
+    afresh_ |= ++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap;
   } else {
     ramp_ticks_ = 0;
   }
   describe();
   return finish(status, tau, torque);
+}
+
+template <int N>
+bool FixedCore<N>::read(const Setpoint& setpoint) noexcept {
+  if (looked_at_any_ && setpoint.time == looked_at_) return in_order_;
+  looked_at_any_ = true;
+  looked_at_ = setpoint.time;
+  const bool same = setpoint.mode == accepted_.mode && same_gains(setpoint.gains, accepted_.gains);
+  const double hold = settings_.watchdog.setpoint_hold;
+  const bool to_come = hold > 0 && seconds_between(time_, setpoint.time) > hold;
+  in_order_ = !to_come && !check_setpoint(setpoint, settings_.limits, same);
+  if (!in_order_) return false;
+  accepted_.time = setpoint.time;
+  accepted_.joint_position = setpoint.joint_position;
+  accepted_.tip_pose = setpoint.tip_pose;
+  accepted_.wrench = setpoint.wrench;
+  from_user_ = true;
+  if (!same) {
+    accepted_.mode = setpoint.mode;
+    accepted_.gains = setpoint.gains;
+    gains_.set_target(Impedance<N>::of(accepted_));
+  }
+  if (!afresh_) aim();
+  return true;
+}
+
+template <int N>
+void FixedCore<N>::aim() noexcept {
+  const bool joint = accepted_.mode == Mode::kJoint;
+  if (joint && gains_.now().joint_weight == 0) paths_.joint.start(q_);
+  if (!joint && gains_.now().task_weight == 0) {
+    paths_.rest.start(q_);
+    paths_.tip.start(robot_.p_BT_B, Eigen::Quaterniond(robot_.R_BT).normalized());
+    law_.reset();
+  }
+  const Vector& from = joint ? paths_.joint.position() : paths_.rest.position();
+  goal_ = from;
+  if (accepted_.joint_position.size() == N) {
+    goal_ = fixed<N>(accepted_.joint_position);
+    for (int i = 0; i < N; ++i) {  // a continuous joint goes the short way
+      if (turn_[i] > 0) goal_[i] += turn_[i] * std::nearbyint((from[i] - goal_[i]) / turn_[i]);
+    }
+  }
+  goal_rotation_ = Eigen::Quaterniond(accepted_.tip_pose.rotation).normalized();
+}
+
+template <int N>
+void FixedCore<N>::start_afresh() noexcept {
+  const Impedance<N> target = Impedance<N>::of(accepted_);
+  Impedance<N> none;
+  none.base.held = target.base.held;
+  none.tool.held = target.tool.held;
+  gains_.start(none);
+  gains_.set_target(target);
+  wrench_.start(Vector6::Zero());
+  if (!from_user_) {
+    copy<N>(q_, accepted_.joint_position);
+    accepted_.tip_pose = {robot_.p_BT_B, robot_.R_BT};
+  }
+  aim();
+  afresh_ = false;
+  ++snapshot_.restarts;
+}
+
+template <int N>
+Status FixedCore<N>::watch() const noexcept {
+  const double age = seconds_between(accepted_.time, time_);
+  const Watchdog& limit = settings_.watchdog;
+  if (limit.setpoint_damp > 0 && age > limit.setpoint_damp) return Status::kSetpointLost;
+  if (limit.setpoint_hold > 0 && age > limit.setpoint_hold) return Status::kSetpointStale;
+  return Status::kOk;
 }
 
 template <int N>
@@ -140,17 +245,38 @@ Status FixedCore<N>::guard(Status input) noexcept {
 
 template <int N>
 Joints<N> FixedCore<N>::act(bool hold) noexcept {
-  if (!follower_.running()) {
-    follower_.start(q_, robot_);
-    ++snapshot_.restarts;
+  if (afresh_) start_afresh();
+  damping_only_ = false;
+  gains_.step();
+  const Vector6 wrench = hold ? Vector6(Vector6::Zero()) : accepted_.wrench;
+  if (wrench != wrench_.target()) wrench_.set_target(wrench);
+  wrench_.step();
+
+  // Of two modes in force, the one that fades away stays where it is.
+  const Impedance<N>& impedance = gains_.now();
+  const bool joint = accepted_.mode == Mode::kJoint;
+  if (impedance.joint_weight > 0) {
+    if (joint && !hold) {
+      paths_.joint.step(goal_);
+    } else {
+      paths_.joint.halt();
+    }
   }
-  follower_.step(hold);
-  return law_.torque(robot_, q_, qd_, follower_.impedance(), follower_.paths(), follower_.wrench());
+  if (impedance.task_weight > 0) {
+    if (!joint && !hold) {
+      paths_.tip.step(accepted_.tip_pose.position, goal_rotation_);
+      paths_.rest.step(goal_);
+    } else {
+      paths_.tip.halt();
+      paths_.rest.halt();
+    }
+  }
+  return law_.torque(robot_, q_, qd_, impedance, paths_, wrench_.now());
 }
 
 template <int N>
 Joints<N> FixedCore<N>::damp() noexcept {
-  follower_.stop();
+  afresh_ = damping_only_ = true;
   Vector tau = Vector::Zero();
   if (settings_.feed_forward.gravity) add<N>(robot_.gravity, tau);
   for (int i = 0; i < N; ++i) tau[i] -= damping_[i] * qd_[i];
@@ -159,7 +285,7 @@ Joints<N> FixedCore<N>::damp() noexcept {
 
 template <int N>
 Status FixedCore<N>::ramp(Status status, JointVector& torque) noexcept {
-  count_ramp();
+  afresh_ |= ++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap;
   return finish(status, filter_.ramp(), torque);
 }
 
@@ -177,17 +303,17 @@ Status FixedCore<N>::finish(Status status, const Vector& tau, JointVector& torqu
 
 template <int N>
 void FixedCore<N>::describe() noexcept {
-  const bool springs = follower_.running();
-  const SpringPaths<N>& paths = follower_.paths();
-  snapshot_.mode = follower_.mode();
-  snapshot_.joint_weight = springs ? follower_.impedance().joint_weight : 0;
-  snapshot_.task_weight = springs ? follower_.impedance().task_weight : 0;
+  const Impedance<N>& impedance = gains_.now();
+  const bool springs = !damping_only_;
+  snapshot_.mode = accepted_.mode;
+  snapshot_.joint_weight = springs ? impedance.joint_weight : 0;
+  snapshot_.task_weight = springs ? impedance.task_weight : 0;
   copy<N>(q_, snapshot_.position);
   copy<N>(qd_, snapshot_.velocity);
   copy<N>(filter_.asked(), snapshot_.law_torque);
   snapshot_.tip = {robot_.p_BT_B, robot_.R_BT};
-  if (springs) {
-    const JointPath<N>& path = follower_.mode() == Mode::kJoint ? paths.joint : paths.rest;
+  if (snapshot_.joint_weight > 0 || snapshot_.task_weight > 0) {
+    const JointPath<N>& path = accepted_.mode == Mode::kJoint ? paths_.joint : paths_.rest;
     copy<N>(path.position(), snapshot_.setpoint_position);
     copy<N>(path.velocity(), snapshot_.setpoint_velocity);
   } else {
@@ -198,8 +324,8 @@ void FixedCore<N>::describe() noexcept {
     snapshot_.joint_error[i] = snapshot_.setpoint_position[i] - q_[i];
   }
   if (snapshot_.task_weight > 0) {
-    snapshot_.setpoint_tip = {paths.tip.position(), paths.tip.rotation().toRotationMatrix()};
-    snapshot_.setpoint_twist = paths.tip.velocity();
+    snapshot_.setpoint_tip = {paths_.tip.position(), paths_.tip.rotation().toRotationMatrix()};
+    snapshot_.setpoint_twist = paths_.tip.velocity();
     snapshot_.tip_error = law_.tip_error();
   } else {
     snapshot_.setpoint_tip = snapshot_.tip;
@@ -212,10 +338,10 @@ void FixedCore<N>::describe() noexcept {
 template <int N>
 void FixedCore<N>::closed_loop(analysis::System<kMaxJoints>& system) const noexcept {
   Impedance<N> impedance;
-  if (follower_.running()) {
-    impedance = follower_.impedance();
-  } else {
+  if (damping_only_) {
     for (int i = 0; i < N; ++i) impedance.joint_damping(i, i) = damping_[i];
+  } else {
+    impedance = gains_.now();
   }
   controller::closed_loop<N>(robot_, qd_, impedance, law_.null_space(), viscous_friction_,
                              settings_.task_terms, external_wrench_, system);

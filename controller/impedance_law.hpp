@@ -6,6 +6,14 @@
 
 namespace dashpot::controller {
 
+/// The paths on which the springs are fixed.
+template <int N>
+struct SpringPaths {
+  JointPath<N> joint;  ///< of mode kJoint: q_d
+  JointPath<N> rest;   ///< rest posture of a redundant arm: q_0
+  TipPath tip;         ///< of mode kCartesian: p_d, R_d and twist V_d
+};
+
 /// Joint torque of springs and dampers, between robot and set-point, and of the feed-forward:
 ///
 ///     tau = K_q (q_d - q) + C_q (qd_d - qd) + w_q M qdd_d           joint impedance
@@ -39,6 +47,9 @@ class ImpedanceLaw {
   Vector torque(const Dynamics<N>& robot, const Vector& q, const Vector& qd,
                 const Impedance<N>& impedance, const SpringPaths<N>& paths,
                 const Vector6& wrench) noexcept;
+
+  /// Orientation errors start from the short way round.
+  void reset() noexcept { orientation_.reset(); }
 
   /// Of the last torque: e, what J' turned into the Cartesian part, and the null space, which is up
   /// to date if the impedance has one.

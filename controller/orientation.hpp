@@ -41,8 +41,7 @@ inline double rotation_defect(const Eigen::Matrix3d& R) noexcept {
 ///
 /// The shortest rotation jumps from pi to -pi where the tip is half a turn from its goal. This one
 /// goes on beyond pi instead: of the two rotation vectors of a quaternion, q and -q, it takes the
-/// one that continues the last. Past 3/4 of a whole turn it gives up and takes the short way; so it
-/// does after an error of zero.
+/// one that continues the last. Past 3/4 of a whole turn it gives up and takes the short way.
 class OrientationError {
  public:
   /// Both unit quaternions.
@@ -53,6 +52,8 @@ class OrientationError {
     last_ = error;
     return rotation_vector(error);
   }
+  /// The next error is the short way round, at most pi.
+  void reset() noexcept { last_ = Eigen::Quaterniond::Identity(); }
 
  private:
   static constexpr double kShortWay = -0.5 * std::numbers::sqrt2;  // cos(3/4 pi): 3/2 pi in all

@@ -135,12 +135,4 @@ class TipPath {
   Eigen::Quaterniond rotation_ = Eigen::Quaterniond::Identity();
 };
 
-/// The paths on which the springs are fixed.
-template <int N>
-struct SpringPaths {
-  JointPath<N> joint;  ///< of mode kJoint: q_d
-  JointPath<N> rest;   ///< rest posture of a redundant arm: q_0
-  TipPath tip;         ///< of mode kCartesian: p_d, R_d and twist V_d
-};
-
 }  // namespace dashpot::controller

@@ -30,8 +30,8 @@ JointNorm<3> joint_limits() {
 /// from its positions alone.
 template <int N>
 struct Watch {
-  JointNorm<N> norm = joint_limits();
-  std::vector<Joints<N>> positions{};
+  JointNorm<N> norm;
+  std::vector<Joints<N>> positions = {};
   double speed = 0, effort = 0, jerk = 0, inconsistency = 0;
   Joints<N> v = Joints<N>::Zero(), a = Joints<N>::Zero();
 
@@ -61,7 +61,7 @@ TEST(JointPath, GoesStraightFromRestAndArrivesExactly) {
   JointPath<3> path(joint_limits(), kPeriod, kWindow);
   const Joints<3> start(0.1, -0.2, 0.3), goal(1.1, 0.7, -1.3);
   path.start(start);
-  Watch<3> watch;
+  Watch<3> watch{joint_limits()};
   watch.see(path);
   int ticks = 0;
   while (path.position() != goal && ticks < 10000) {
@@ -90,7 +90,7 @@ TEST(JointPath, KeepsItsLimitsWhateverTheGoalsAndArrives) {
   Random random(311);
   for (int trial = 0; trial < 100; ++trial) {
     JointPath<3> path(joint_limits(), kPeriod, kWindow);
-    Watch<3> watch;
+    Watch<3> watch{joint_limits()};
     watch.see(path);
     Joints<3> goal = Joints<3>::Zero();
     for (int k = 0; k < 3000; ++k) {
