@@ -1,0 +1,352 @@
+// The loop as it really runs: against characteristic equations in closed form, and to first order.
+#include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/random_impedance.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using testing::Random;
+
+System<> one_joint(double mass, double damping, double stiffness) {
+  System<> system(1);
+  system.mass(0, 0) = mass;
+  system.damping(0, 0) = damping;
+  system.stiffness(0, 0) = stiffness;
+  return system;
+}
+
+System<> random_system(Random& random, Eigen::Index n) {
+  System<> system(n);
+  system.mass = random.spd(n);
+  system.stiffness = 1000 * random.spd(n);
+  system.damping = random.log_uniform(1, 10) * random.spd(n);
+  return system;
+}
+
+SampledSpectrum sample(const System<>& system, const SampledLoop& loop) {
+  return sample_loop(system, analyze(system), loop);
+}
+
+std::vector<Complex> all_multipliers(const SampledSpectrum& sampled) {
+  std::vector<Complex> all = sampled.others;
+  all.insert(all.end(), sampled.zero_modes.begin(), sampled.zero_modes.end());
+  for (const SampledMode& mode : sampled.modes) {
+    all.insert(all.end(), mode.multipliers.begin(), mode.multipliers.end());
+  }
+  return all;
+}
+
+/// 1 / (transfer from the command to the torque, in z)
+Complex per_actuation(const SampledLoop& loop, Complex z) {
+  const double a = std::exp(-2 * std::numbers::pi * loop.torque_cutoff * loop.period);
+  const Complex filter = loop.torque_cutoff > 0 ? (1 - a) * z / (z - a) : 1;
+  return std::pow(z, loop.delay) / filter;
+}
+
+SampledLoop random_loop(Random& random) {
+  SampledLoop loop;
+  loop.period = random.log_uniform(1e-4, 5e-3);
+  loop.delay = random.integer(0, 3);
+  loop.torque_cutoff = random.integer(0, 1) * random.log_uniform(50, 500);
+  loop.difference_velocity = random.integer(0, 1) == 1;
+  return loop;
+}
+
+// --------------------------------------------------------------------- characteristic equations
+
+/// A mass under held torque moves by q += T q' + T^2/2 M^-1 f, q' += T M^-1 f, so that
+///     det( (z - 1)^2 / actuation(z) M + T^2 (z + 1)/2 K + T (z - 1) C ) = 0,
+/// with (z^2 - 1) / (2 z) for z - 1 in the last term if velocities are differenced.
+TEST(SampledLoop, SolvesTheCharacteristicEquation) {
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    Random random(seed);
+    const Eigen::Index n = random.integer(1, 6);
+    const System<> system = random_system(random, n);
+    const SampledLoop loop = random_loop(random);
+    const SampledSpectrum sampled = sample(system, loop);
+    const std::vector<Complex> all = all_multipliers(sampled);
+    const Eigen::Index memory =
+        loop.delay + (loop.torque_cutoff > 0 ? 1 : 0) + (loop.difference_velocity ? 1 : 0);
+    EXPECT_EQ(static_cast<Eigen::Index>(all.size()), (2 + memory) * n);
+    double largest = 0;
+    for (const Complex z : all) {
+      largest = std::max(largest, modulus(z));
+      if (modulus(z) < 0.1) continue;  // of high multiplicity
+      const double T = loop.period;
+      const Complex damping = T * (loop.difference_velocity ? (z * z - 1.0) / (2.0 * z) : z - 1.0);
+      const MatrixXcd P = (z - 1.0) * (z - 1.0) * per_actuation(loop, z) * system.mass +
+                          T * T * (z + 1.0) / 2.0 * system.stiffness + damping * system.damping;
+      const auto values = Eigen::JacobiSVD<MatrixXcd>(P).singularValues();
+      // P is linear in z with slope about |z - 1|; z is good to the root of the precision at worst
+      EXPECT_LT(values[n - 1], 1e-9 * system.mass.norm() + 1e-7 * values[0]) << z;
+    }
+    EXPECT_NEAR(sampled.spectral_radius, largest, 1e-13);
+    EXPECT_EQ(sampled.stable(), largest < 1);
+  }
+}
+
+/// One joint with friction and gravity: with r1 and r2 the roots of M r^2 + D r + G, the robot's
+/// transfer from held torque to position is that of partial fractions,
+///     q / f = sum over i of (e^(r_i T) - 1) / (M r_i (r_i - r_j) (z - e^(r_i T))),
+/// and the velocity has r_i times each term.
+TEST(SampledLoop, KnowsFrictionAndGravity) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    Random random(seed);
+    const double M = random.log_uniform(0.1, 5), C = random.log_uniform(1, 50);
+    const double K = random.log_uniform(100, 2000), D = random.uniform(0.1, 0.9) * C;
+    const double G = random.uniform(-20, 20);
+    SampledLoop loop = random_loop(random);
+    loop.difference_velocity = false;
+    loop.friction = MatrixXd::Constant(1, 1, D);
+    loop.gravity_gradient = MatrixXd::Constant(1, 1, G);
+    const double T = loop.period;
+    const Complex root = std::sqrt(Complex(D * D - 4 * M * G));
+    const Complex r[] = {(-D + root) / (2 * M), (-D - root) / (2 * M)};
+    for (const Complex z : all_multipliers(sample(one_joint(M, C, K), loop))) {
+      if (modulus(z) < 1e-3) continue;  // memory that nothing reads
+      Complex position = 0, velocity = 0;
+      for (int i = 0; i < 2; ++i) {
+        const Complex e = std::exp(r[i] * T);
+        const Complex term = (e - 1.0) / (M * r[i] * (r[i] - r[1 - i]) * (z - e));
+        position += term;
+        velocity += r[i] * term;
+      }
+      const Complex command = (K - G) * position + (C - D) * velocity;
+      EXPECT_LT(modulus(per_actuation(loop, z) + command), 1e-7 * (1 + modulus(command))) << z;
+    }
+  }
+}
+
+// ------------------------------------------------------------------------------- to first order
+
+/// The hold acts like half a tick of delay: zeta falls by (1 - 2 zeta^2) omega t / 2 and omega
+/// grows by the factor 1 + zeta omega t.
+TEST(SampledLoop, ShiftsModesLikeHalfATickOfDelay) {
+  for (const double zeta : {0.0, 0.1, 0.5, 0.9}) {
+    const double omega = 40;
+    const System<> system = one_joint(2, 4 * zeta * omega, 2 * omega * omega);
+    for (const int delay : {0, 1, 2, 3}) {
+      for (const double cutoff : {0.0, 400.0}) {
+        SampledLoop loop;
+        loop.period = 1e-5;
+        loop.delay = delay;
+        loop.torque_cutoff = cutoff / loop.period / 1e3;  // a lag of a fixed number of ticks
+        const double a = std::exp(-2 * std::numbers::pi * cutoff / 1e3);
+        const double lag = cutoff > 0 ? a / (1 - a) : 0;
+        const double t = (delay + 0.5 + lag) * loop.period;
+        const SampledMode mode = sample(system, loop).modes.at(0);
+        EXPECT_NEAR((mode.damping_ratio - zeta) / (omega * t), -(1 - 2 * zeta * zeta) / 2, 5e-3);
+        EXPECT_NEAR((mode.natural_frequency / omega - 1) / (omega * t), zeta, 5e-3);
+      }
+    }
+  }
+}
+
+TEST(SampledLoop, DelaysDifferencedVelocitiesByHalfATickMore) {
+  const double omega = 40, zeta = 0.3;
+  SampledLoop loop;
+  loop.period = 1e-6;
+  const System<> system = one_joint(2, 4 * zeta * omega, 2 * omega * omega);
+  const SampledMode exact = sample(system, loop).modes.at(0);
+  loop.difference_velocity = true;
+  const SampledMode differenced = sample(system, loop).modes.at(0);
+  // lambda^2 (1 - c T/2) + ...: the mass seems smaller by C T/2
+  EXPECT_NEAR((differenced.natural_frequency / exact.natural_frequency - 1) / (omega * 1e-6),
+              zeta / 2, 1e-3);
+  EXPECT_NEAR((differenced.damping_ratio / exact.damping_ratio - 1) / (omega * 1e-6), zeta / 2,
+              1e-3);
+}
+
+// --------------------------------------------------------------------------------------- matching
+
+TEST(SampledLoop, PutsModesInThePlacesOfTheContinuousOnes) {
+  int compared = 0;
+  for (std::uint64_t seed = 100; seed < 160; ++seed) {
+    Random random(seed);
+    const System<> system = random_system(random, random.integer(2, 7));
+    const Spectrum<> spectrum = analyze(system);
+    SampledLoop loop = random_loop(random);
+    loop.period = 0.003 / spectrum.modes[0].natural_frequency;
+    loop.torque_cutoff *= 1e-3 / loop.period;
+    const SampledSpectrum sampled = sample_loop(system, spectrum, loop);
+    ASSERT_EQ(static_cast<int>(sampled.modes.size()), spectrum.modes.size());
+    for (int k = 0; k < spectrum.modes.size(); ++k) {
+      const Mode<>& mode = spectrum.modes[k];
+      const SampledMode& image = sampled.modes[static_cast<std::size_t>(k)];
+      for (std::size_t i = 0; i < 2 && std::abs(mode.damping_ratio - 1) > 0.1; ++i) {
+        EXPECT_LT(modulus(image.eigenvalues[i] - mode.eigenvalues[i]),
+                  0.05 * (1 + mode.damping_ratio) * modulus(mode.eigenvalues[i]));
+        ++compared;
+      }
+    }
+  }
+  EXPECT_GT(compared, 300);
+}
+
+TEST(SampledLoop, FollowsAnOverdampedMode) {
+  SampledLoop loop;
+  loop.period = 1e-4;
+  const SampledMode mode = sample(one_joint(1, 200, 1000), loop).modes.at(0);
+  EXPECT_EQ(mode.kind, ModeKind::kOverdamped);
+  EXPECT_EQ(mode.damped_frequency, 0);
+  EXPECT_NEAR(mode.eigenvalues[0].real(), -5.13, 0.01);
+  EXPECT_NEAR(mode.eigenvalues[1].real(), -196.9, 0.1);  // -194.9, faster by its square times T/2
+}
+
+TEST(SampledLoop, IsTheSameInFixedStorage) {
+  Random random(170);
+  const System<> system = random_system(random, 6);
+  System<kMaxDof> fixed(6);
+  fixed.mass = system.mass;
+  fixed.damping = system.damping;
+  fixed.stiffness = system.stiffness;
+  Spectrum<kMaxDof> spectrum;
+  SpectrumSolver<kMaxDof> solver;
+  ASSERT_EQ(solver.solve(fixed, spectrum), Status::kOk);
+  const SampledLoop loop = random_loop(random);
+  const SampledSpectrum a = sample(system, loop), b = sample_loop(fixed, spectrum, loop);
+  ASSERT_EQ(a.modes.size(), b.modes.size());
+  for (std::size_t k = 0; k < a.modes.size(); ++k) {
+    EXPECT_NEAR(a.modes[k].natural_frequency, b.modes[k].natural_frequency, 1e-9);
+    EXPECT_NEAR(a.modes[k].damping_ratio, b.modes[k].damping_ratio, 1e-10);
+  }
+}
+
+// ------------------------------------------------------------------------------------- zero modes
+
+/// A free self-motion has z = 1, twice if nothing damps it: neither counts.
+TEST(SampledLoop, LeavesOutTheOnesOfZeroModes) {
+  for (std::uint64_t seed = 200; seed < 220; ++seed) {
+    Random random(seed);
+    System<> system = to_joint_space(testing::random_impedance(random, 7, 6));
+    SampledLoop loop = random_loop(random);
+    loop.period = 1e-4;
+    const SampledSpectrum free = sample(system, loop);
+    const Eigen::Index memory =
+        loop.delay + (loop.torque_cutoff > 0 ? 1 : 0) + (loop.difference_velocity ? 1 : 0);
+    EXPECT_TRUE(free.zero_modes.empty());
+    // The self-motion's own memory is deadbeat or the filter's: 7 * memory in all.
+    EXPECT_EQ(static_cast<Eigen::Index>(free.others.size()), 7 * memory);
+    EXPECT_LT(free.spectral_radius, 1 - 1e-6);
+    EXPECT_TRUE(free.stable());
+
+    loop.friction = 0.5 * MatrixXd::Identity(7, 7);
+    system.damping += MatrixXd(loop.friction);
+    const Spectrum<> spectrum = analyze(system);
+    const SampledSpectrum damped = sample_loop(system, spectrum, loop);
+    ASSERT_EQ(damped.zero_modes.size(), 1u);
+    EXPECT_EQ(static_cast<Eigen::Index>(damped.others.size()), 7 * memory);
+    const double rate = std::log(damped.zero_modes[0].real()) / loop.period;
+    EXPECT_NEAR(rate, spectrum.zero_mode_rates[0], 0.02 * std::abs(spectrum.zero_mode_rates[0]));
+    EXPECT_GE(damped.spectral_radius, damped.zero_modes[0].real());
+    EXPECT_TRUE(damped.stable());
+  }
+}
+
+/// Held torque that damps a free mass: v += T (-a v), exactly.
+TEST(SampledLoop, DampsAFreeMassStepByStep) {
+  SampledLoop loop;
+  loop.period = 0.01;
+  const SampledSpectrum sampled = sample(one_joint(2, 6, 0), loop);
+  ASSERT_EQ(sampled.zero_modes.size(), 1u);
+  EXPECT_NEAR(sampled.zero_modes[0].real(), 1 - 0.03, 1e-14);
+  EXPECT_TRUE(sampled.modes.empty());
+  EXPECT_TRUE(sampled.others.empty());
+}
+
+/// Gravity that is compensated a moment too late moves a free mass that stands on top of a hill
+/// only if it moves already: positions stay at z = 1 whatever the delay.
+TEST(SampledLoop, KeepsZeroModesInCompensatedGravity) {
+  for (const int delay : {0, 2}) {
+    SampledLoop loop;
+    loop.delay = delay;
+    loop.torque_cutoff = 100;
+    loop.gravity_gradient = MatrixXd::Constant(1, 1, -5.0);
+    const SampledSpectrum sampled = sample(one_joint(2, 6, 0), loop);
+    ASSERT_EQ(sampled.zero_modes.size(), 1u);
+    EXPECT_EQ(sampled.others.size(), static_cast<std::size_t>(delay + 1));
+    const double lag = 0.001 * (delay + 0.5) + 1 / (2 * std::numbers::pi * 100);
+    EXPECT_NEAR(std::log(sampled.zero_modes[0].real()) / 0.001, -3 + 2.5 * lag, 0.2);
+    EXPECT_TRUE(sampled.stable());
+  }
+}
+
+// -------------------------------------------------------------------------------------- stability
+
+/// Without delay one joint is stable for T^2 K / 2 < T C and T C < 2 M.
+TEST(GainMargin, IsThatOfOneJoint) {
+  Random random(300);
+  for (int i = 0; i < 20; ++i) {
+    SampledLoop loop;
+    loop.period = random.log_uniform(1e-4, 1e-2);
+    const double M = random.log_uniform(0.1, 10);
+    const double C = random.uniform(0.01, 5) * M / loop.period;
+    const double K = random.uniform(0.01, 1.9) * C / loop.period;
+    const System<> system = one_joint(M, C, K);
+    const double expected = 2 * M / (loop.period * C);
+    EXPECT_NEAR(gain_margin(system, analyze(system), loop), expected, 1e-5 * expected);
+    EXPECT_EQ(sample(system, loop).stable(), expected > 1);
+  }
+}
+
+TEST(GainMargin, IsZeroIfNothingHelpsAndInfiniteIfNothingHarms) {
+  const System<> undamped = one_joint(1, 0, 100);
+  EXPECT_EQ(gain_margin(undamped, analyze(undamped), {}), 0);
+  SampledLoop passive;  // the friction is all there is
+  passive.friction = MatrixXd::Constant(1, 1, 3);
+  const System<> free = one_joint(1, 3, 0);
+  EXPECT_EQ(gain_margin(free, analyze(free), passive), std::numeric_limits<double>::infinity());
+}
+
+TEST(GainMargin, IsWhereTheSpectralRadiusIsOne) {
+  for (std::uint64_t seed = 310; seed < 330; ++seed) {
+    Random random(seed);
+    System<> system = random_system(random, random.integer(1, 5));
+    SampledLoop loop = random_loop(random);
+    loop.friction = 0.1 * system.damping;
+    const double margin = gain_margin(system, analyze(system), loop);
+    if (margin == 0 || !std::isfinite(margin)) continue;
+    const System<> nominal = system;
+    for (const double factor : {0.999 * margin, 1.001 * margin}) {
+      system.stiffness = factor * nominal.stiffness;
+      system.damping = loop.friction + factor * (nominal.damping - loop.friction);
+      EXPECT_EQ(sample(system, loop).stable(), factor < margin);
+    }
+  }
+}
+
+TEST(SampledLoop, RefusesOptionsThatMakeNoSense) {
+  const System<> system = one_joint(1, 2, 3);
+  const auto refused = [&](const SampledLoop& loop) -> std::string {
+    try {
+      sample(system, loop);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(refused({}), "accepted");
+  EXPECT_EQ(refused({.period = 0}), "sample_loop: period has to be positive, s");
+  EXPECT_EQ(refused({.delay = -1}), "sample_loop: delay must not be negative, ticks");
+  EXPECT_EQ(refused({.torque_cutoff = -1}),
+            "sample_loop: torque_cutoff must be finite and not negative, Hz");
+  EXPECT_EQ(refused({.friction = MatrixXd::Zero(2, 2)}), "sample_loop: friction has to be n x n");
+  EXPECT_EQ(refused({.gravity_gradient = MatrixXd::Constant(1, 1, std::nan(""))}),
+            "sample_loop: gravity_gradient is not finite");
+  const Spectrum<> other = analyze(System<>(2));
+  EXPECT_THROW(sample_loop(system, other, {}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
