@@ -1,4 +1,5 @@
 #include <dashpot/controller/config.hpp>
+#include <dashpot/controller/config_gains.hpp>
 #include <dashpot/controller/config_robot.hpp>
 #include <dashpot/controller/setting_reader.hpp>
 
@@ -8,10 +9,6 @@
 
 namespace dashpot::controller {
 namespace {
-
-Units task_units(const char* linear, const char* angular) {
-  return {linear, linear, linear, angular, angular, angular};
-}
 
 void read_control(const YamlMapping& root, Settings& settings) {
   static constexpr std::array<std::string_view, 5> kKeys = {"period", "rate", "mode",
@@ -31,60 +28,6 @@ void read_control(const YamlMapping& root, Settings& settings) {
   read_choice(keys, "mode", kModes, settings.initial.mode);
   read_switch(keys, "geometric_stiffness", settings.task_terms.geometric_stiffness);
   read_switch(keys, "jacobian_rate", settings.task_terms.jacobian_rate);
-}
-
-/// Damping that suits a default stiffness suits no other, so the two come together.
-void require_pair(const YamlMapping& keys) {
-  for (const auto& [key, other] : {std::pair("stiffness", "damping"), {"damping", "stiffness"}}) {
-    if (keys.has(key) && !keys.has(other)) {
-      throw keys.error(other, std::string("missing; it goes with ") + key, keys.line(key));
-    }
-  }
-}
-
-void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
-  static constexpr std::array<std::string_view, 6> kWords = {"x", "y", "z", "rx", "ry", "rz"};
-  const YamlNode* node = task.find("directions");
-  if (node == nullptr) return;
-  if (node->kind != YamlNode::Kind::kSequence) {
-    throw task.error("directions", "a list is wanted, not " + describe(*node));
-  }
-  directions = {};
-  for (std::size_t i = 0; i < node->items.size(); ++i) {
-    const std::string place = "entry " + std::to_string(i + 1);
-    bool& held = directions[find_word(task, "directions", node->items[i], kWords, place)];
-    if (held) throw task.error("directions", place + " is given twice", node->items[i].line);
-    held = true;
-  }
-}
-
-void read_gains(const YamlMapping& root, const RobotModel& model, Gains& gains) {
-  static constexpr std::array<std::string_view, 3> kKeys = {"joint", "task", "null_space"};
-  static constexpr std::array<std::string_view, 2> kPair = {"stiffness", "damping"};
-  static constexpr std::array<std::string_view, 4> kTaskKeys = {"stiffness", "damping", "frame",
-                                                                "directions"};
-  const YamlMapping keys = root.mapping("gains", kKeys);
-  const Units stiffness = joint_units(model, "N m/rad", "N/m");
-  const Units damping = joint_units(model, "N m s/rad", "N s/m");
-
-  const YamlMapping joint = keys.mapping("joint", kPair);
-  require_pair(joint);
-  read_matrix(joint, "stiffness", stiffness, gains.joint_stiffness);
-  read_matrix(joint, "damping", damping, gains.joint_damping);
-
-  const YamlMapping task = keys.mapping("task", kTaskKeys);
-  require_pair(task);
-  read_matrix(task, "stiffness", task_units("N/m", "N m/rad"), gains.task_stiffness);
-  read_matrix(task, "damping", task_units("N s/m", "N m s/rad"), gains.task_damping);
-  static constexpr std::array<std::pair<std::string_view, Frame>, 2> kFrames = {
-      {{"base", Frame::kBase}, {"tool", Frame::kTool}}};
-  read_choice(task, "frame", kFrames, gains.frame);
-  read_directions(task, gains.directions);
-
-  const YamlMapping null_space = keys.mapping("null_space", kPair);
-  require_pair(null_space);
-  read_numbers(null_space, "stiffness", stiffness, Sign::kNotNegative, gains.null_stiffness);
-  read_numbers(null_space, "damping", damping, Sign::kNotNegative, gains.null_damping);
 }
 
 void read_limits(const YamlMapping& root, const RobotModel& model, Limits& limits) {
@@ -205,13 +148,15 @@ void check(const Settings& settings, int n, const YamlNode& document) {
 }
 
 Config read_config(const YamlNode& document, const std::filesystem::path& directory) {
-  static constexpr std::array<std::string_view, 8> kKeys = {
-      "robot", "control", "gains", "limits", "motion", "feed_forward", "watchdog", "analysis"};
+  // What stands under the last two is for a simulator of the robot.
+  static constexpr std::array<std::string_view, 10> kKeys = {
+      "robot",        "control",  "gains",    "limits",     "motion",
+      "feed_forward", "watchdog", "analysis", "simulation", "scenario"};
   const YamlMapping root(document, "", kKeys);
   const RobotModel model = read_robot(root, directory);
   Settings settings = default_settings(model);
   read_control(root, settings);
-  read_gains(root, model, settings.initial.gains);
+  read_gains(root, model, GainPairs::kTogether, settings.initial.gains);
   read_limits(root, model, settings.limits);
   read_motion(root, model, settings.motion);
   read_feed_forward(root, settings.feed_forward);
