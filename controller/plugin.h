@@ -144,6 +144,9 @@ typedef struct dashpot_snapshot {
   double goal_joint_position[DASHPOT_MAX_JOINTS]; /* where the springs are fixed just now, rad */
   double goal_tip_position[3];                    /* m */
   double goal_tip_rotation[9];                    /* 3 x 3 */
+  double law_torque[DASHPOT_MAX_JOINTS];          /* what the law asked for, before limits, N m */
+  double tip_error[6];  /* goal less tip, m, and rotation vector from tip to goal, rad */
+  double tip_wrench[6]; /* of Cartesian springs, dampers and feed-forward, N and N m */
 } dashpot_snapshot;
 
 /* A vibration mode; see the README of Dashpot for what the numbers mean. A bound says how far the

@@ -134,6 +134,9 @@ void to_c(const Snapshot& snapshot, dashpot_snapshot& out) noexcept {
   put(snapshot.setpoint_position, out.goal_joint_position);
   put(snapshot.tip, out.tip_position, out.tip_rotation);
   put(snapshot.setpoint_tip, out.goal_tip_position, out.goal_tip_rotation);
+  put(snapshot.law_torque, out.law_torque);
+  put(snapshot.tip_error, out.tip_error);
+  put(snapshot.tip_wrench, out.tip_wrench);
 }
 
 void to_c(const Vibration& vibration, dashpot_modes& out) noexcept {
