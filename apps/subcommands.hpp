@@ -22,6 +22,7 @@ void add_analyze(CLI::App& program);
 void add_inspect(CLI::App& program);
 void add_monitor(CLI::App& program);
 void add_design(CLI::App& program);
+void add_run(CLI::App& program);
 
 /// Writes all of `text` to standard output. Throws std::runtime_error if that fails.
 void print(const std::string& text);

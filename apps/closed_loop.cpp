@@ -1,0 +1,100 @@
+#include <dashpot/apps/closed_loop.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::apps {
+namespace {
+
+constexpr double kRepeat = 0.1;       // s between two repetitions of a set-point
+constexpr double kSettling = 0.1;     // s, beyond the time that the springs take to set in
+constexpr double kGuidedSpeed = 0.2;  // at most this fraction of the velocity limits
+constexpr double kShortestWay = 0.5;  // s
+constexpr double kNanoseconds = 1e9;  // in a second
+
+/// Smooth from 0 at 0 to 1 at 1, at rest at both ends; and its slope.
+std::pair<double, double> ease(double s) {
+  return {s * s * s * (10 + s * (-15 + 6 * s)), 30 * s * s * (1 - s) * (1 - s)};
+}
+
+/// How long the hand takes from rest to start, s.
+double guidance_time(const Scene& scene) {
+  const JointVector way = (scene.start - scene.rest).cwiseAbs();
+  if (way.isZero(0)) return 0;
+  const JointVector speed = kGuidedSpeed * scene.arm->config.settings.limits.velocity;
+  return std::max(kShortestWay, 1.875 * way.cwiseQuotient(speed).maxCoeff());
+}
+
+}  // namespace
+
+ClosedLoop::ClosedLoop(const Scene& scene, LoopController& controller)
+    : scene_(scene), controller_(controller), mechanism_(make_mechanism(scene)) {
+  torque_ = JointVector::Zero(scene.dof());
+  repeat_every_ = std::max<std::int64_t>(1, std::llround(kRepeat / scene.plant.period));
+  sim::PlantOptions options = scene.plant;
+  if (scene.arm) {
+    guide(scene.rest, scene.start, guidance_time(scene),
+          scene.arm->config.settings.motion.gain_time + kSettling);
+    options.initial_torque = torque_;
+  }
+  plant_.emplace(*mechanism_, options, scene.start, scene.velocity);
+}
+
+void ClosedLoop::guide(const JointVector& from, const JointVector& to, double duration,
+                       double settling) {
+  const double period = scene_.plant.period;
+  const auto count = [period](double seconds) {
+    return static_cast<std::int64_t>(std::ceil(seconds / period));
+  };
+  const std::int64_t before = count(settling), way = count(duration);
+  guided_ticks_ = before + way + (way > 0 ? before : 0);
+  std::int32_t status = DASHPOT_OK;
+  for (std::int64_t i = 0; i < guided_ticks_; ++i) {
+    const double s =
+        way == 0 ? 0
+                 : std::clamp(static_cast<double>(i - before) / static_cast<double>(way), 0.0, 1.0);
+    const auto [place, slope] = ease(s);
+    const JointVector q = from + place * (to - from);
+    const JointVector qd =
+        way == 0 ? JointVector(0 * from)
+                 : JointVector((slope / (static_cast<double>(way) * period)) * (to - from));
+    if (i == 0) {
+      setpoint_ = scene_.steps.front().setpoint;
+      const std::int32_t code = controller_.hold(setpoint_);
+      if (code != DASHPOT_OK) throw InputError("scenario.start", "the controller refuses it");
+    } else if (i % repeat_every_ == 0) {
+      controller_.hold(setpoint_);
+    }
+    const std::int64_t time =
+        std::llround(kNanoseconds * period * static_cast<double>(i - guided_ticks_));
+    status = controller_.update(time, q, qd, torque_);
+    if (status >= DASHPOT_SETPOINT_REJECTED) {
+      throw InputError("scenario.start", "the controller reports status " + std::to_string(status));
+    }
+  }
+}
+
+std::int32_t ClosedLoop::control() noexcept {
+  if (scene_.arm) follow_scenario();
+  const sim::Measurement& measured = plant_->measured();
+  ++ticks_;
+  return controller_.update(measured.time, measured.position, measured.velocity, torque_);
+}
+
+void ClosedLoop::follow_scenario() noexcept {
+  const auto& steps = scene_.steps;
+  bool news = ticks_ % repeat_every_ == 0;
+  while (next_step_ < steps.size() && steps[next_step_].at <= plant_->time()) {
+    setpoint_ = steps[next_step_++].setpoint;
+    news = true;
+  }
+  if (news && controller_.hold(setpoint_) != DASHPOT_OK) ++refused_;
+}
+
+std::int32_t ClosedLoop::hold(const controller::Setpoint& setpoint) noexcept {
+  const std::int32_t code = controller_.hold(setpoint);
+  if (code == DASHPOT_OK) setpoint_ = setpoint;
+  return code;
+}
+
+}  // namespace dashpot::apps

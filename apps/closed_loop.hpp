@@ -1,0 +1,56 @@
+#pragma once
+#include <dashpot/apps/loop_controller.hpp>
+#include <dashpot/apps/scene.hpp>
+
+#include <cstdint>
+#include <optional>
+
+namespace dashpot::apps {
+
+/// A scene in motion: a controller and the simulated mechanism, one period at a time:
+///     ClosedLoop loop(scene, controller);
+///     while (...) { loop.control(); loop.move(); }
+/// The same calls give the same bits. Only the constructor allocates or throws.
+///
+/// The constructor brings the robot to its start as a person would: a hand holds it at rest where
+/// the springs are fixed until the controller's torque has settled, guides it slowly to where it is
+/// to start, and lets go of it at time 0.
+class ClosedLoop {
+ public:
+  /// Both must outlive it. Throws InputError if the controller refuses the first set-point, or is
+  /// not content with what the hand does.
+  ClosedLoop(const Scene& scene, LoopController& controller);
+
+  /// The controller's part of a tick: reads the sensors and finds a torque. Returns a status.
+  std::int32_t control() noexcept;
+  /// The robot's part: one period under that torque.
+  sim::Status move() noexcept { return plant_->step(torque_); }
+
+  /// Holds this from the next tick on; the scenario's steps to come still take their turn.
+  std::int32_t hold(const controller::Setpoint& setpoint) noexcept;
+  /// What the controller was told to hold last.
+  const controller::Setpoint& setpoint() const noexcept { return setpoint_; }
+
+  LoopController& controller() noexcept { return controller_; }
+  const sim::Plant& plant() const noexcept { return *plant_; }
+  /// How many set-points of the scenario, and repetitions of the last one, were refused.
+  std::int64_t refused() const noexcept { return refused_; }
+
+ private:
+  void guide(const JointVector& from, const JointVector& to, double duration, double settling);
+  void follow_scenario() noexcept;
+
+  const Scene& scene_;
+  LoopController& controller_;
+  std::unique_ptr<sim::System> mechanism_;
+  std::optional<sim::Plant> plant_;
+  JointVector torque_;
+  controller::Setpoint setpoint_;
+  std::size_t next_step_ = 0;
+  std::int64_t repeat_every_ = 1;  // ticks
+  std::int64_t ticks_ = 0;         // since the start
+  std::int64_t guided_ticks_ = 0;  // until the start
+  std::int64_t refused_ = 0;
+};
+
+}  // namespace dashpot::apps

@@ -1,0 +1,11 @@
+#pragma once
+#include <dashpot/controller/plugin.h>
+#include <dashpot/lcmtypes/samples.hpp>
+
+namespace dashpot::apps {
+
+/// The plugin's structs as what the publisher takes. Nothing here allocates.
+void fill(const dashpot_snapshot& from, controller::Snapshot& to) noexcept;
+void fill(const dashpot_modes& from, lcmtypes::ModesSample& to) noexcept;
+
+}  // namespace dashpot::apps

@@ -1,0 +1,99 @@
+#pragma once
+#include <dashpot/apps/closed_loop.hpp>
+#include <dashpot/lcmtypes/command_receiver.hpp>
+#include <dashpot/lcmtypes/publisher.hpp>
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace dashpot::apps {
+
+enum class Pace { kRealTime, kFast };
+
+/// What the operating system granted to a loop in real time.
+struct Privileges {
+  bool scheduled = false;  ///< SCHED_FIFO
+  bool locked = false;     ///< all memory stays resident
+};
+
+/// What a loop saw while it ran.
+struct LoopRecord {
+  std::int64_t ticks = 0;
+  std::int64_t overruns = 0;        ///< ticks that ended after their period
+  std::int64_t own_overruns = 0;    ///< of these, where the loop itself computed longer than that
+  std::int64_t latest_wake_up = 0;  ///< after its deadline, ns
+  std::vector<std::int32_t> tick_times;     ///< of the controller, ns
+  std::array<std::int64_t, 32> statuses{};  ///< ticks with each status of the controller
+  sim::Status simulation = sim::Status::kOk;
+  std::int64_t commands_refused = 0;  ///< by the controller, though well-formed
+  dashpot_modes first_modes{};        ///< tick 0: there were none
+  dashpot_modes last_modes{};
+  // The largest distances between where the springs are fixed and where the robot is:
+  double tip_error = 0;        ///< m, while the Cartesian springs were in force
+  double tip_angle_error = 0;  ///< rad, likewise
+  double joint_error = 0;      ///< rad, while the joint springs were in force
+};
+
+/// Runs a closed loop on a thread of its own until it has made its ticks, the simulation fails or
+/// somebody stops it. In real time ticks begin at absolute deadlines; a deadline that lies more
+/// than a tick back is given up, and counted as an overrun. The loop allocates nothing, and waits
+/// for nothing but its deadlines; only without real time it publishes on its own thread, so that no
+/// message is lost.
+class LoopThread {
+ public:
+  struct Options {
+    Pace pace = Pace::kRealTime;
+    double period = 0.001;  ///< s
+    std::int64_t ticks = 0;
+  };
+
+  /// `receiver` may be null. All must outlive it. In real time the publisher's thread runs already.
+  LoopThread(ClosedLoop& loop, lcmtypes::Publisher& publisher, lcmtypes::CommandReceiver* receiver,
+             const Options& options);
+  ~LoopThread();
+  LoopThread(const LoopThread&) = delete;
+  LoopThread& operator=(const LoopThread&) = delete;
+
+  void start();
+  /// The loop ends with its next tick.
+  void stop() noexcept { stop_ = true; }
+  bool done() const noexcept { return done_; }
+  void join();
+
+  // While it runs:
+  std::int64_t ticks() const noexcept { return ticks_; }
+  std::int64_t overruns() const noexcept { return overruns_; }
+
+  // After join():
+  const LoopRecord& record() const noexcept { return record_; }
+  const Privileges& privileges() const noexcept { return privileges_; }
+
+ private:
+  void run() noexcept;
+  void tick(std::int64_t utime) noexcept;
+  void take_commands() noexcept;
+  void note(const dashpot_snapshot& snapshot) noexcept;
+  void publish(std::int64_t utime) noexcept;
+
+  ClosedLoop& loop_;
+  lcmtypes::Publisher& publisher_;
+  lcmtypes::CommandReceiver* receiver_;
+  Options options_;
+  std::thread thread_;
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> done_{false};
+  std::atomic<std::int64_t> ticks_{0};
+  std::atomic<std::int64_t> overruns_{0};
+  Privileges privileges_;
+
+  // The loop's own:
+  LoopRecord record_;
+  lcmtypes::StateSample state_;
+  lcmtypes::ModesSample modes_;
+};
+
+}  // namespace dashpot::apps

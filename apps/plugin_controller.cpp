@@ -1,0 +1,125 @@
+#include <dashpot/apps/loop_controller.hpp>
+
+#include <dlfcn.h>
+#include <Eigen/Core>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+namespace dashpot::apps {
+namespace {
+
+constexpr const char* kLibraryName = "libdashpot_plugin.so";
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
+                               controller::kMaxJoints, controller::kMaxJoints>;
+
+class PluginController : public LoopController {
+ public:
+  PluginController(const dashpot_plugin& plugin, const std::string& config_path, int joints)
+      : plugin_(plugin), handle_(plugin.create(config_path.c_str()), plugin.destroy) {
+    if (!handle_) throw InputError("", plugin.last_error());
+    if (plugin.joints(handle_.get()) != static_cast<std::uint32_t>(joints)) {
+      throw InputError("robot", "the plugin finds another number of joints");
+    }
+    snapshot_.struct_size = sizeof snapshot_;
+    modes_.struct_size = sizeof modes_;
+  }
+
+  std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
+                      JointVector& torque) noexcept override {
+    const dashpot_state state = {sizeof(dashpot_state), n(), time, q.data(), qd.data(), nullptr};
+    dashpot_output output = {sizeof(dashpot_output), n(), torque.data()};
+    return plugin_.update(handle_.get(), &state, nullptr, &output);
+  }
+
+  const dashpot_snapshot& snapshot() noexcept override {
+    plugin_.read_snapshot(handle_.get(), &snapshot_);
+    return snapshot_;
+  }
+
+  const dashpot_modes* new_modes() noexcept override {
+    const std::uint64_t last = modes_.tick;
+    if (plugin_.read_modes(handle_.get(), &modes_) != DASHPOT_OK) return nullptr;
+    return modes_.tick == last ? nullptr : &modes_;
+  }
+
+  std::int32_t hold(const controller::Setpoint& setpoint) noexcept override {
+    const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rotation = setpoint.tip_pose.rotation;
+    const dashpot_setpoint wanted = {
+        sizeof(dashpot_setpoint),
+        n(),
+        DASHPOT_ON_ARRIVAL,
+        setpoint.mode == controller::Mode::kCartesian ? DASHPOT_MODE_CARTESIAN : DASHPOT_MODE_JOINT,
+        setpoint.joint_position.data(),
+        setpoint.tip_pose.position.data(),
+        rotation.data(),
+        setpoint.wrench.data()};
+    const std::int32_t code = plugin_.set_setpoint(handle_.get(), &wanted);
+    return code == DASHPOT_OK ? set_gains(setpoint.gains) : code;
+  }
+
+ private:
+  std::uint32_t n() const noexcept { return plugin_.joints(handle_.get()); }
+
+  std::int32_t set_gains(const controller::Gains& gains) noexcept {
+    const RowMajor joint_stiffness = gains.joint_stiffness, joint_damping = gains.joint_damping;
+    const RowMajor task_stiffness = gains.task_stiffness, task_damping = gains.task_damping;
+    const std::int32_t frame =
+        gains.frame == controller::Frame::kTool ? DASHPOT_FRAME_TOOL : DASHPOT_FRAME_BASE;
+    std::array<std::uint8_t, 6> directions{};
+    for (std::size_t i = 0; i < 6; ++i) directions[i] = gains.directions[i] ? 1 : 0;
+    const dashpot_gains wanted = {sizeof(dashpot_gains),
+                                  n(),
+                                  joint_stiffness.data(),
+                                  joint_damping.data(),
+                                  task_stiffness.data(),
+                                  task_damping.data(),
+                                  gains.null_stiffness.data(),
+                                  gains.null_damping.data(),
+                                  &frame,
+                                  directions.data()};
+    return plugin_.set_gains(handle_.get(), &wanted);
+  }
+
+  const dashpot_plugin& plugin_;
+  std::unique_ptr<dashpot_controller, void (*)(dashpot_controller*)> handle_;
+  dashpot_snapshot snapshot_{};
+  dashpot_modes modes_{};
+};
+
+/// Where to look for the library, in this order.
+std::vector<std::string> places(const std::string& path) {
+  if (!path.empty()) return {std::filesystem::absolute(path)};
+  std::error_code ignored;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();
+  return {program / kLibraryName, program / ".." / DASHPOT_LIBRARY_DIR / kLibraryName,
+          kLibraryName};
+}
+
+}  // namespace
+
+PluginLibrary::PluginLibrary(const std::string& path) {
+  void* library = nullptr;
+  std::string reason;
+  for (const std::string& place : places(path)) {
+    library = dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (library != nullptr) break;
+    if (reason.empty()) reason = dlerror();
+  }
+  if (library == nullptr) throw InputError("--plugin", "cannot load the controller: " + reason);
+  using Interface = const dashpot_plugin* (*)(std::uint32_t);
+  const auto interface = reinterpret_cast<Interface>(dlsym(library, "dashpot_plugin_interface"));
+  if (interface == nullptr) throw InputError("--plugin", "is not a controller plugin of Dashpot");
+  functions_ = interface(DASHPOT_PLUGIN_VERSION);
+  if (functions_ == nullptr || functions_->struct_size != sizeof(dashpot_plugin)) {
+    throw InputError("--plugin", "is of another version than this program");
+  }
+}
+
+std::unique_ptr<LoopController> PluginLibrary::create(const std::string& config_path,
+                                                      int joints) const {
+  return std::make_unique<PluginController>(*functions_, config_path, joints);
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,142 @@
+#include <dashpot/analysis/motion_fit.hpp>
+#include <dashpot/apps/closed_loop.hpp>
+#include <dashpot/apps/ring_down.hpp>
+#include <dashpot/apps/sampled_modes.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace dashpot::apps {
+namespace {
+
+using analysis::Recording;
+
+constexpr double kRelease = 1e-4;       // rad: what is not linear is that much smaller
+constexpr double kDuration = 2;         // s
+constexpr double kSamplePeriod = 1e-3;  // s, or one control period if that is longer
+constexpr double kFarthest = 0.5;       // relative, of two eigenvalues of one mode
+
+/// The scene from another start, where nothing else happens and sensors are exact.
+Scene quiet_scene(const Scene& scene, const JointVector& start) {
+  Scene quiet = scene;
+  quiet.start = start;
+  quiet.velocity.setZero();
+  quiet.plant.position_noise.resize(0);
+  quiet.plant.velocity_noise.resize(0);
+  quiet.plant.position_resolution.resize(0);
+  if (quiet.arm) {
+    quiet.arm->options.wrenches.clear();
+    quiet.steps.resize(1);
+  } else {
+    quiet.matrices->forces.clear();
+  }
+  return quiet;
+}
+
+struct Motion {
+  Recording recording;
+  dashpot_modes modes{};  ///< the first ones
+};
+
+Motion record(const Scene& scene, const ControllerFactory& make_controller, int every) {
+  const auto controller = make_controller();
+  ClosedLoop loop(scene, *controller);
+  const auto samples = static_cast<Eigen::Index>(kDuration / (every * scene.plant.period));
+  Motion motion;
+  motion.recording.position.resize(scene.dof(), samples);
+  motion.recording.velocity.resize(scene.dof(), samples);
+  for (Eigen::Index i = 0; i < samples; ++i) {
+    motion.recording.position.col(i) = loop.plant().position();
+    motion.recording.velocity.col(i) = loop.plant().velocity();
+    for (int k = 0; k < every; ++k) {
+      loop.control();
+      const dashpot_modes* modes = controller->new_modes();
+      if (modes != nullptr && modes->time >= 0 && motion.modes.tick == 0) motion.modes = *modes;
+      const sim::Status status = loop.move();
+      if (status != sim::Status::kOk) {
+        throw std::runtime_error(std::string("a small release does not ring down: ") +
+                                 sim::to_text(status));
+      }
+    }
+  }
+  return motion;
+}
+
+/// Pairs modes whose eigenvalues are nearest to each other, the best pair first; a mode that has
+/// none within kFarthest of itself stays alone.
+std::vector<RingDownMode> match(const dashpot_modes& predicted,
+                                std::vector<analysis::FittedMode> fitted) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  std::vector<RingDownMode> result(predicted.count);
+  for (std::uint32_t i = 0; i < predicted.count; ++i) {
+    const dashpot_mode& mode = predicted.modes[i];
+    result[i] = {mode.natural_frequency, mode.damping_ratio, kNaN, kNaN, kNaN, kNaN};
+  }
+  const auto distance = [&](std::uint32_t i, const analysis::FittedMode& mode) {
+    double sum = 0;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const auto& value = predicted.modes[i].eigenvalues[k];
+      const analysis::Complex wanted(value[0], value[1]);
+      sum += std::norm(mode.eigenvalues[k] - wanted) / std::norm(wanted);
+    }
+    return std::sqrt(sum);
+  };
+  while (!fitted.empty()) {
+    double least = kFarthest;
+    std::pair<std::uint32_t, std::size_t> best{predicted.count, 0};
+    for (std::uint32_t i = 0; i < predicted.count; ++i) {
+      for (std::size_t k = 0; std::isnan(result[i].measured_frequency) && k < fitted.size(); ++k) {
+        if (!(distance(i, fitted[k]) < least)) continue;
+        least = distance(i, fitted[k]);
+        best = {i, k};
+      }
+    }
+    if (best.first == predicted.count) break;
+    RingDownMode& row = result[best.first];
+    row.measured_frequency = fitted[best.second].natural_frequency;
+    row.measured_ratio = fitted[best.second].damping_ratio;
+    fitted.erase(fitted.begin() + static_cast<std::ptrdiff_t>(best.second));
+  }
+  return result;
+}
+
+/// What the modes become in the sampled loop, where these are the modes of the scene at rest.
+void add_sampled(const Scene& scene, RingDown& ring_down) {
+  const SampledModes modes = sampled_modes(scene);
+  ring_down.gain_margin = modes.gain_margin;
+  ring_down.growth = std::max(0.0, std::log(modes.sampled.spectral_radius) / scene.plant.period);
+  for (std::size_t i = 0; i < std::min(modes.sampled.modes.size(), ring_down.modes.size()); ++i) {
+    ring_down.modes[i].sampled_frequency = modes.sampled.modes[i].natural_frequency;
+    ring_down.modes[i].sampled_ratio = modes.sampled.modes[i].damping_ratio;
+  }
+}
+
+}  // namespace
+
+RingDown measure_ring_down(const Scene& scene, const ControllerFactory& make_controller) {
+  const int every = std::max(1, static_cast<int>(std::lround(kSamplePeriod / scene.plant.period)));
+  const Motion rest = record(quiet_scene(scene, scene.rest), make_controller, every);
+  std::vector<Recording> recordings;
+  for (int i = 0; i < scene.dof(); ++i) {
+    const JointVector start = scene.rest + kRelease * JointVector::Unit(scene.dof(), i);
+    Recording motion = record(quiet_scene(scene, start), make_controller, every).recording;
+    // What happens without a release, such as sagging, is not of interest.
+    motion.position -= rest.recording.position;
+    motion.velocity -= rest.recording.velocity;
+    recordings.push_back(std::move(motion));
+  }
+  analysis::MotionFitOptions options;
+  options.period = every * scene.plant.period;
+  const analysis::MotionFit fit = analysis::fit_motion(recordings, options);
+  RingDown result;
+  result.modes = match(rest.modes, fit.modes);
+  result.releases = scene.dof();
+  result.residual = fit.residual;
+  if (scene.arm) add_sampled(scene, result);
+  return result;
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,164 @@
+#include <dashpot/apps/scene.hpp>
+#include <dashpot/apps/scene_parts.hpp>
+#include <dashpot/controller/config_robot.hpp>
+
+#include <filesystem>
+
+namespace dashpot::apps {
+namespace {
+
+using controller::Joint;
+using controller::Sign;
+using controller::Units;
+using controller::YamlMapping;
+using controller::YamlNode;
+
+/// Where the robot's URDF is, for the simulator's own reading of it.
+struct RobotFile {
+  std::string urdf, base, tip;
+};
+
+RobotFile robot_file(const YamlMapping& root, const std::filesystem::path& directory) {
+  static constexpr std::array<std::string_view, 10> kKeys = {"urdf",
+                                                             "base",
+                                                             "tip",
+                                                             "gravity",
+                                                             "include_off_chain",
+                                                             "reflected_inertia",
+                                                             "viscous_friction",
+                                                             "coulomb_friction",
+                                                             "payload",
+                                                             "tool"};
+  const YamlMapping keys = root.mapping("robot", kKeys);
+  RobotFile file;
+  read_text(keys, "urdf", file.urdf);
+  read_text(keys, "base", file.base);
+  read_text(keys, "tip", file.tip);
+  file.urdf = directory / file.urdf;
+  return file;
+}
+
+/// What the controller believes of the robot, which is true unless `simulation.robot` says
+/// otherwise.
+sim::RobotParameters believed(const YamlMapping& root, const controller::RobotModel& model) {
+  sim::RobotParameters parameters;
+  parameters.armature = model.joint_values(&Joint::reflected_inertia);
+  parameters.viscous = model.joint_values(&Joint::damping);
+  parameters.coulomb = model.joint_values(&Joint::friction);
+  const YamlNode* robot = root.find("robot");
+  for (std::size_t i = 0; i + 1 < robot->items.size(); i += 2) {
+    const std::string& key = robot->items[i].text;
+    const YamlNode& value = robot->items[i + 1];
+    if (key == "gravity") {
+      static constexpr std::array<std::string_view, 1> kKey = {"gravity"};
+      YamlNode part = *robot;
+      part.items = {robot->items[i], value};
+      read_vector3(YamlMapping(part, "robot.", kKey), "gravity", "m/s^2", parameters.gravity);
+    } else if (key == "payload") {
+      static constexpr std::array<std::string_view, 3> kKeys = {"mass", "center", "inertia"};
+      const YamlMapping payload(value, "robot.payload.", kKeys);
+      read_number(payload, "mass", "kg", Sign::kNotNegative, parameters.payload.mass);
+      read_vector3(payload, "center", "m", parameters.payload.center);
+      read_matrix(payload, "inertia", Units(3, "kg m^2"), parameters.payload.about_center);
+    }
+  }
+  return parameters;
+}
+
+void read_arm(const YamlNode& document, const std::string& path, Scene& scene) {
+  static constexpr std::array<std::string_view, 10> kKeys = {
+      "robot",        "control",  "gains",    "limits",     "motion",
+      "feed_forward", "watchdog", "analysis", "simulation", "scenario"};
+  const YamlMapping root(document, "", kKeys);
+  controller::Config config = controller::load_config(path);
+  const Units positions = controller::joint_units(config.model, "rad", "m");
+  const RobotFile file = robot_file(root, std::filesystem::path(path).parent_path());
+  ArmSimulation simulation{believed(root, config.model), {}};
+  scene.plant.period = config.settings.period;
+  read_simulation(root, positions, scene.plant, &simulation);
+  try {
+    scene.arm.emplace(
+        ControlledArm{std::move(config),
+                      sim::Robot::from_file(file.urdf, file.base, file.tip, simulation.parameters),
+                      simulation.options});
+  } catch (const sim::InvalidRobot& error) {
+    throw InputError("simulation", error.what());
+  }
+  read_scenario(root, positions, scene);
+}
+
+void read_system(const YamlNode& document, Scene& scene) {
+  static constexpr std::array<std::string_view, 4> kKeys = {"system", "control", "simulation",
+                                                            "scenario"};
+  static constexpr std::array<std::string_view, 3> kMatrices = {"mass", "damping", "stiffness"};
+  static constexpr std::array<std::string_view, 1> kControl = {"period"};
+  const YamlMapping root(document, "", kKeys);
+  const YamlMapping system = root.mapping("system", kMatrices);
+  MatrixSystem& matrices = scene.matrices.emplace();
+  for (const auto& [key, matrix] : {std::pair("mass", &matrices.mass),
+                                    {"damping", &matrices.damping},
+                                    {"stiffness", &matrices.stiffness}}) {
+    const auto given = system.matrix(key);
+    if (!given) throw system.error(key, "missing", root.line("system"));
+    *matrix = *given;
+    if (given->rows() != given->cols() || given->rows() < 1 ||
+        given->rows() > controller::kMaxJoints || given->rows() != matrices.mass.rows()) {
+      throw system.error(key, "a square matrix of 1 to 16 rows is wanted, all three of one size");
+    }
+  }
+  read_number(root.mapping("control", kControl), "period", "s", Sign::kPositive,
+              scene.plant.period);
+  const Units positions(static_cast<std::size_t>(matrices.mass.rows()), "m");
+  read_simulation(root, positions, scene.plant, nullptr);
+  read_scenario(root, positions, scene);
+}
+
+/// Throws unless the simulator takes the scene.
+void check(const Scene& scene) try {
+  const auto mechanism = make_mechanism(scene);
+  const sim::Plant plant(*mechanism, scene.plant, scene.start, scene.velocity);
+} catch (const sim::InvalidScene& error) {
+  throw InputError(scene.matrices ? "system" : "simulation", error.what());
+}
+
+bool has_key(const YamlNode& document, std::string_view key) {
+  for (std::size_t i = 0; i + 1 < document.items.size(); i += 2) {
+    if (document.kind == YamlNode::Kind::kMap && document.items[i].text == key) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Scene load_scene(const std::string& path) {
+  const auto read = [&] {
+    Scene scene;
+    scene.path = path;
+    const YamlNode document = controller::parse_yaml(controller::read_file(path));
+    if (has_key(document, "system")) {
+      read_system(document, scene);
+    } else {
+      read_arm(document, path, scene);
+    }
+    check(scene);
+    return scene;
+  };
+  try {
+    return read();
+  } catch (const InputError& error) {
+    // Errors of the controller's part name the file already.
+    if (std::string(error.what()).starts_with(path + ": ")) throw;
+    throw error.in_file(path);
+  }
+}
+
+std::unique_ptr<sim::System> make_mechanism(const Scene& scene) {
+  if (scene.matrices) {
+    const MatrixSystem& system = *scene.matrices;
+    return std::make_unique<sim::LinearSystem>(system.mass, system.damping, system.stiffness,
+                                               system.forces);
+  }
+  return std::make_unique<sim::Arm>(scene.arm->robot, scene.arm->options);
+}
+
+}  // namespace dashpot::apps

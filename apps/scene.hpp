@@ -1,0 +1,70 @@
+#pragma once
+// A scene of `dashpot run`: a robot with its controller, how it is simulated, and what happens.
+
+#include <dashpot/controller/config.hpp>
+#include <dashpot/controller/input_error.hpp>
+#include <dashpot/sim/arm.hpp>
+#include <dashpot/sim/linear_system.hpp>
+#include <dashpot/sim/plant.hpp>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+using controller::InputError;
+using controller::JointVector;
+
+/// Masses on springs and dampers that nobody controls: M qdd + C qd + K q = f(t).
+struct MatrixSystem {
+  Eigen::MatrixXd mass, damping, stiffness;
+  std::vector<sim::Piece<JointVector>> forces;
+};
+
+/// A controlled robot arm.
+struct ControlledArm {
+  controller::Config config;
+  sim::Robot robot;
+  sim::ArmOptions options;
+};
+
+/// From this time on the controller is given this set-point.
+struct ScenarioStep {
+  double at = 0;  ///< s
+  int line = 0;   ///< of the file
+  controller::Setpoint setpoint;
+};
+
+/// Joint vectors have n entries.
+struct Scene {
+  std::string path;
+  std::optional<ControlledArm> arm;      ///< either this
+  std::optional<MatrixSystem> matrices;  ///< or this
+  double duration = 5;                   ///< s
+  bool ring_down = false;                ///< fit the modes of small releases, too
+  sim::PlantOptions plant;
+  JointVector rest;                 ///< where the springs are fixed at first, rad
+  JointVector start;                ///< where the robot is let go, rad
+  JointVector velocity;             ///< with this velocity, rad/s; zero for an arm
+  std::vector<ScenarioStep> steps;  ///< of an arm, by time; the first one at 0
+
+  int dof() const { return static_cast<int>(rest.size()); }
+};
+
+/// Reads a YAML file. For an arm it is a configuration file of the controller (load_config) with
+/// two keys more, `simulation` and `scenario`; otherwise `system` has the matrices. sim/scenes has
+/// examples with all keys. Throws InputError.
+Scene load_scene(const std::string& path);
+
+/// The mechanism of the scene.
+std::unique_ptr<sim::System> make_mechanism(const Scene& scene);
+
+/// The joint position next to `q` where the tip is displaced from its pose at `q` by `displacement`
+/// (m, and a rotation vector in rad; base axes): the one that is reached with the least kinetic
+/// energy, step by step. Nothing if it cannot be reached.
+std::optional<JointVector> displaced(const controller::RobotModel& model, const JointVector& q,
+                                     const controller::Vector6& displacement);
+
+}  // namespace dashpot::apps

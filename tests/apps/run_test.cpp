@@ -1,0 +1,306 @@
+// `dashpot run` in fast motion: a whole robot, its controller as a plugin, and what is written.
+#include <dashpot/tests/apps/json_result.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+namespace dashpot::tests {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::string scene(const std::string& name) {
+  return std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes/" + name + ".yaml";
+}
+
+std::string text_of(const std::string& path) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+Outcome run_scene(const std::string& path, std::vector<std::string> options = {}) {
+  options.insert(options.begin(), {"run", path, "--fast"});
+  return run_program(options);
+}
+
+Json run_json(const std::string& path, std::vector<std::string> options = {}) {
+  options.emplace_back("--json");
+  return parse(run_scene(path, options));
+}
+
+/// A scene with `from` replaced, its URDF named absolutely, in a file of its own.
+std::string changed(const Scratch& scratch, const std::string& name, const std::string& from,
+                    const std::string& to) {
+  std::string text = text_of(scene(name));
+  const auto replace = [&text](const std::string& old, const std::string& by) {
+    const std::size_t at = text.find(old);
+    if (at == std::string::npos) throw std::runtime_error("no '" + old + "' in the scene");
+    text.replace(at, old.size(), by);
+  };
+  replace(from, to);
+  if (text.find("../models") != std::string::npos) {
+    replace("../models", std::string(DASHPOT_SOURCE_DIR) + "/sim/models");
+  }
+  return scratch.write("scene.yaml", text);
+}
+
+/// The columns of a CSV by name.
+std::map<std::string, Numbers> table(const std::string& path) {
+  std::istringstream lines(text_of(path));
+  std::map<std::string, Numbers> columns;
+  std::vector<std::string> names;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    std::size_t i = 0;
+    for (std::string cell; std::getline(cells, cell, ','); ++i) {
+      if (columns.size() < names.size() + 1 && columns.find(cell) == columns.end() &&
+          line.starts_with("time")) {
+        names.push_back(cell);
+      } else {
+        columns[names.at(i)].push_back(std::stod(cell));
+      }
+    }
+  }
+  return columns;
+}
+
+class EveryScene : public testing::TestWithParam<std::string> {};
+
+TEST_P(EveryScene, RunsWithoutAnOverrunAndAccountsForItsEnergy) {
+  const Json result = run_json(scene(GetParam()), {"--duration", "1"});
+  EXPECT_EQ(result["ticks"], 1000);
+  EXPECT_EQ(result["messages"]["states"], 1000);
+  EXPECT_EQ(result["messages"]["states_dropped"], 0);
+  EXPECT_GT(result["messages"]["modes"].get<int>(), 10);
+  EXPECT_FALSE(result["modes"]["start"].empty());
+  for (const Json& mode : result["modes"]["end"]) {
+    EXPECT_LT(mode["error_bound"].get<double>(), 1e-6);
+    EXPECT_NE(mode["kind"], "unstable");
+  }
+  for (const auto& [status, ticks] : result["status"].items()) {
+    EXPECT_THAT((std::vector<std::string>{"ok", "torque or torque rate limited"}),
+                testing::Contains(status));
+    EXPECT_GT(ticks.get<int>(), 0);
+  }
+  EXPECT_LT(std::abs(result["energy"]["imbalance"].get<double>()), 1e-6);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
+                         testing::Values("panda", "panda_release_c1", "panda_release_c2", "iiwa14",
+                                         "ur5", "baxter_left", "chain3"));
+
+TEST(Scenes, AreAllTested) {
+  std::size_t files = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes")) {
+    files += entry.path().extension() == ".yaml" ? 1 : 0;
+  }
+  EXPECT_EQ(files, 7U);  // those of EveryScene
+}
+
+TEST(Run, TheSameSceneGivesTheSameBits) {
+  const Scratch scratch;
+  for (const char* name : {"a.csv", "b.csv"}) {
+    EXPECT_EQ(run_scene(scene("panda"), {"--duration", "2.5", "--csv", scratch.path(name)}).status,
+              0);
+  }
+  const std::string first = scratch.read("a.csv");
+  EXPECT_EQ(count_lines(first), 2501);
+  EXPECT_EQ(first, scratch.read("b.csv"));
+}
+
+// Table 1 of the paper: 20.25, 10.98, 9.755 rad/s with 0.0255, 0.0316, 0.0294 (C1), 20.23, 10.95,
+// 11.17 with 0.2235, 0.2032, 0.2288 (C2). Its hand weighs a little more than that of the model.
+TEST(Run, ShowsTheReleasesOfThePaper) {
+  const auto slow_modes = [](const std::string& name) {
+    Rows rows;
+    const Json result = run_json(scene(name), {"--ring-down"});
+    for (const Json& mode : result["ring_down"]["modes"]) {
+      if (mode["predicted_frequency"].get<double>() > 30) continue;
+      // To first order the held torque takes omega T / 4 off a light damping ratio.
+      EXPECT_NEAR(mode["measured_ratio"].get<double>(),
+                  mode["predicted_ratio"].get<double>() -
+                      0.001 * mode["predicted_frequency"].get<double>() / 4,
+                  0.0015);
+      EXPECT_NEAR(mode["measured_frequency"].get<double>(), mode["sampled_frequency"].get<double>(),
+                  1e-4 * mode["sampled_frequency"].get<double>());
+      EXPECT_NEAR(mode["measured_ratio"].get<double>(), mode["sampled_ratio"].get<double>(), 5e-5);
+      rows.push_back({mode["predicted_frequency"], mode["predicted_ratio"]});
+    }
+    return rows;
+  };
+  const auto expect_close = [](const Rows& rows, const Rows& paper) {
+    ASSERT_EQ(rows.size(), 3U);
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_NEAR(rows[i][0], paper[i][0], 0.009 * paper[i][0]);
+      EXPECT_NEAR(rows[i][1], paper[i][1], 0.0027);
+    }
+  };
+  expect_close(slow_modes("panda_release_c1"), {{20.25, 0.0255}, {10.98, 0.0316}, {9.755, 0.0294}});
+  expect_close(slow_modes("panda_release_c2"), {{20.23, 0.2235}, {11.17, 0.2288}, {10.95, 0.2032}});
+}
+
+TEST(Run, MovesMatricesAsTheClosedFormSays) {
+  const Scratch scratch;
+  const std::string csv = scratch.path("chain.csv");
+  const std::string file = changed(
+      scratch, "chain3", "scenario:", "simulation: {integrator: {step: 0.1 ms}}\nscenario:");
+  EXPECT_EQ(run_scene(file, {"--csv", csv}).status, 0);
+  const auto columns = table(csv);
+  const Json exact = analyze_json(text_of(example("chain3.yaml")));
+  const Numbers times = exact["response"]["times"];
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    const auto row = static_cast<std::size_t>(std::lround(1000 * times[k]));
+    if (row >= 1000) continue;  // the state at 1 s is not one of the run's
+    for (std::size_t j = 0; j < 3; ++j) {
+      EXPECT_NEAR(columns.at("q" + std::to_string(j + 1)).at(row),
+                  exact["response"]["position"][k][j].get<double>(), 1e-10)
+          << "at " << times[k] << " s";
+    }
+  }
+  EXPECT_EQ(run_json(file)["zero_modes"], 1);
+}
+
+TEST(Run, WritesALogThatTheMonitorReads) {
+  const Scratch scratch;
+  const std::string log = scratch.path("a.lcm");
+  EXPECT_EQ(run_scene(scene("ur5"), {"--duration", "1.5", "--log", log}).status, 0);
+  const Outcome outcome = run_program({"monitor", "--log", log});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("\n1500 states and "));
+  EXPECT_THAT(outcome.out, HasSubstr("0 modes messages lost, 0 messages malformed\n"));
+}
+
+// Mass matrix, Jacobian and all else by plain vector algebra in Python.
+TEST(Run, PublishesTheModesThatAStrangerComputes) {
+  const Scratch scratch;
+  const std::string log = scratch.path("a.lcm");
+  const std::string source = DASHPOT_SOURCE_DIR;
+  EXPECT_EQ(run_scene(scene("panda_release_c2"), {"--duration", "0.5", "--log", log}).status, 0);
+  const auto shell = [](const std::string& command) {
+    EXPECT_EQ(std::system(command.c_str()), 0) << command;
+  };
+  shell("lcm-gen --python --ppath " + scratch.path("types") + " " + source + "/lcmtypes/*.lcm");
+  shell("python3 " + source + "/tests/apps/own_modes.py " + scratch.path("types") + " " + log +
+        " " + source + "/sim/models/panda.urdf panda_link0 panda_hand_tcp" +
+        " 2000,600,2000,100,100,100 22.5,23.5,45,2,12,1 40 >" + scratch.path("out"));
+  const Json result = Json::parse(scratch.read("out"));
+  EXPECT_EQ(result["messages"], 40);
+  EXPECT_LT(result["residual"].get<double>(), 1e-13);
+  EXPECT_LT(result["sum"].get<double>(), 1e-12);
+}
+
+TEST(Run, PrintsTablesForPeople) {
+  const Outcome outcome = run_scene(scene("baxter_left"), {"--duration", "0.5"});
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(outcome.err, "");
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("7 joints, 500 ticks of 1.00 ms, as fast as possible"),
+                    HasSubstr("Tick of the controller: median "), HasSubstr("\n  Status: ok 500\n"),
+                    HasSubstr("\nModes at the start, 2 zero modes\n"),
+                    HasSubstr("\nModes at the end, 2 zero modes\n")));
+}
+
+TEST(Run, SaysWhenTheSimulationFails) {
+  const Scratch scratch;
+  // A damper that no step of a millisecond can follow.
+  const Outcome outcome =
+      run_scene(changed(scratch, "chain3", "[25, -15, -10]", "[2.5e6, -15, -10]"), {"--json"});
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err,
+              AllOf(StartsWith("dashpot run: the simulation ended at "), HasSubstr("s: ")));
+  EXPECT_EQ(count_lines(outcome.err), 1);
+}
+
+struct BadScene {
+  const char* name;
+  const char* scene;
+  const char* from;
+  const char* to;
+  const char* message;
+};
+
+class RunRefuses : public testing::TestWithParam<BadScene> {};
+
+TEST_P(RunRefuses, InOneLineThatNamesTheKey) {
+  const Scratch scratch;
+  const BadScene& bad = GetParam();
+  const std::string path = changed(scratch, bad.scene, bad.from, bad.to);
+  const Outcome outcome = run_scene(path);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(outcome.err, "dashpot run: " + path + ": " + bad.message + "\n");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, RunRefuses,
+    testing::Values(
+        BadScene{"UnknownKey", "ur5", "duration:", "duratoin:",
+                 "scenario.duratoin: unknown key; the keys are duration, start, pushes, steps, "
+                 "ring_down (line 17)"},
+        BadScene{"WrongUnit", "ur5", "duration: 6 s", "duration: 6 kg",
+                 "scenario.duration: has a wrong unit: '6 kg'; s is wanted (line 17)"},
+        BadScene{"NegativeDuration", "ur5", "duration: 6 s", "duration: -6 s",
+                 "scenario.duration: is -6 s, not positive (line 17)"},
+        BadScene{"OutOfReach", "ur5", "[2 cm, 0, 0, 0, 0, 0]", "[3 m, 0, 0, 0, 0, 0]",
+                 "scenario.start.tip_displacement: is out of the arm's reach (line 20)"},
+        BadScene{"OutOfLimits", "panda", "position: [0, -45 deg", "position: [0, -145 deg",
+                 "scenario.start.position: joint 2 would be at -2.530727 rad, outside its limits "
+                 "(line 56)"},
+        BadScene{"NoStart", "iiwa14", "    position: [0, 30 deg, 0, -80 deg, 0, 60 deg, 0]\n", "",
+                 "scenario.start.position: missing (line 20)"},
+        BadScene{"StepsOutOfOrder", "ur5", "at: 4 s", "at: 1 s",
+                 "scenario.steps[2].at: is before the step above it (line 24)"},
+        BadScene{"StepThatTheControllerRefuses", "iiwa14", "joint_position: [0.3, 0.7",
+                 "joint_position: [9.3, 0.7",
+                 "scenario.steps: the controller refuses this: joint_position is above a "
+                 "position limit (line 25)"},
+        BadScene{"IndefiniteDamping", "panda", "damping: [20 N s/m, 20", "damping: [-20 N s/m, 20",
+                 "scenario.steps: the controller refuses this: task_damping is not positive "
+                 "semidefinite (line 64)"},
+        BadScene{"EndBeforeBegin", "iiwa14", "end: 1.6 s", "end: 1.4 s",
+                 "scenario.pushes[1].end: is not after begin (line 23)"},
+        BadScene{"WrongLength", "iiwa14", "joint_displacement: [0.02, 0.02",
+                 "joint_displacement: [0.02",
+                 "scenario.start.joint_displacement: has 6 entries; a list of 7, or one number for "
+                 "all, is wanted (line 21)"},
+        BadScene{"UnknownMethod", "panda", "method: rk4", "method: rk5",
+                 "simulation.integrator.method: semi_implicit_euler, rk4, dormand_prince, "
+                 "implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 23)"},
+        BadScene{"MassNotDefinite", "chain3", "[[8, 0, 0]", "[[-8, 0, 0]",
+                 "system: mass: is not positive definite"},
+        BadScene{"WallOfASystem", "chain3", "scenario:", "simulation: {wall: {}}\nscenario:",
+                 "simulation.wall: is for robot arms; this scene is a system (line 8)"},
+        BadScene{"NoUrdf", "ur5", "../models/ur5.urdf", "/nonexistent/a.urdf",
+                 "robot: /nonexistent/a.urdf: cannot be read: No such file or directory (line 5)"}),
+    [](const testing::TestParamInfo<BadScene>& instance) {
+      return std::string(instance.param.name);
+    });
+
+TEST(Run, NamesBadOptions) {
+  const auto expect_error = [](const std::vector<std::string>& options, const std::string& text) {
+    const Outcome outcome = run_scene(scene("ur5"), options);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
+    EXPECT_THAT(outcome.err, AllOf(StartsWith("dashpot run: "), HasSubstr(text)));
+  };
+  expect_error({"--duration", "-1"}, "--duration");
+  expect_error({"--duration", "nan"}, "--duration");
+  expect_error({"--realtime"}, "--realtime");
+  expect_error({"--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x");
+  expect_error({"--log", "/nonexistent/a.lcm"}, "/nonexistent/a.lcm: cannot write the log");
+  expect_error({"--csv", "/nonexistent/a.csv"}, "/nonexistent/a.csv: cannot write");
+  expect_error({"--plugin", "/nonexistent/a.so"}, "--plugin: cannot load the controller");
+}
+
+}  // namespace
+}  // namespace dashpot::tests
