@@ -155,7 +155,6 @@ DynamicsKernel<N>::DynamicsKernel(const RobotModel& model)
       carried_mass_{},
       revolute_{},
       prismatic_{},
-      reflected_inertia_(model.dof()),
       gravity_(model.gravity()) {
   if (model.dof() != N) {
     throw std::invalid_argument("DynamicsKernel<" + std::to_string(N) + ">: the model has " +
