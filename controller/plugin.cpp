@@ -308,12 +308,12 @@ const char* dashpot_kind_text(int32_t kind) {
 }
 
 const dashpot_plugin* dashpot_plugin_interface(uint32_t version) {
-  static const dashpot_plugin kInterface = {
+  static const dashpot_plugin functions = {
       sizeof(dashpot_plugin), DASHPOT_PLUGIN_VERSION, dashpot_create,       dashpot_destroy,
       dashpot_last_error,     dashpot_joints,         dashpot_joint_name,   dashpot_period,
       dashpot_update,         dashpot_reset,          dashpot_set_setpoint, dashpot_set_gains,
       dashpot_read_snapshot,  dashpot_read_modes,     dashpot_status_text,  dashpot_kind_text};
-  return version == DASHPOT_PLUGIN_VERSION ? &kInterface : nullptr;
+  return version == DASHPOT_PLUGIN_VERSION ? &functions : nullptr;
 }
 
 }  // extern "C"
