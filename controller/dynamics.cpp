@@ -108,7 +108,7 @@ Lanes33<kGroups<N>> link_rotations(const Rows& rotation, const Lanes<kGroups<N>>
 
 /// J, and M_ki = J_k . (force, moment)_i for k <= i, mirrored; the wrench is taken at the tip.
 template <int N>
-void write_J_and_M(const Lanes3<kGroups<N>>& J_linear, const Lanes3<kGroups<N>>& J_angular,
+void write_J_M(const Lanes3<kGroups<N>>& J_linear, const Lanes3<kGroups<N>>& J_angular,
                    const Lanes3<kGroups<N>>& force, const Lanes3<kGroups<N>>& moment,
                    Dynamics<N>& result) {
   using L = Lanes<kGroups<N>>;
@@ -250,7 +250,7 @@ void DynamicsKernel<N>::evaluate(const Eigen::Matrix<double, N, 1>& q_in,
   const L3 moment = I * J_angular + cross(h, prismatic * R.z) + cross(F, to_tip);
   const L gravity = -(gravity_.x() * F.x + gravity_.y() * F.y + gravity_.z() * F.z);
 
-  write_J_and_M<N>(J_linear, J_angular, F, moment, result);
+  write_J_M<N>(J_linear, J_angular, F, moment, result);
   result.M.diagonal() += reflected_inertia_;
   store<N>(coriolis, result.coriolis);
   store<N>(gravity, result.gravity);
