@@ -109,8 +109,8 @@ Lanes33<kGroups<N>> link_rotations(const Rows& rotation, const Lanes<kGroups<N>>
 /// J, and M_ki = J_k . (force, moment)_i for k <= i, mirrored; the wrench is taken at the tip.
 template <int N>
 void write_J_M(const Lanes3<kGroups<N>>& J_linear, const Lanes3<kGroups<N>>& J_angular,
-                   const Lanes3<kGroups<N>>& force, const Lanes3<kGroups<N>>& moment,
-                   Dynamics<N>& result) {
+               const Lanes3<kGroups<N>>& force, const Lanes3<kGroups<N>>& moment,
+               Dynamics<N>& result) {
   using L = Lanes<kGroups<N>>;
   const L* J[] = {&J_linear.x, &J_linear.y, &J_linear.z, &J_angular.x, &J_angular.y, &J_angular.z};
   const L* wrench[] = {&force.x, &force.y, &force.z, &moment.x, &moment.y, &moment.z};
