@@ -70,7 +70,7 @@ ClosedForm solve_closed_form(const TaskImpedance& impedance, const MatrixXd& map
   const Index count = omega.size();
   Values damper(count);
   for (Index i = 0; i < count; ++i) {
-    damper[i] = target.damper(static_cast<double>(omega[i]), soft);
+    damper[i] = static_cast<Extended>(target.damper(static_cast<double>(omega[i]), soft));
   }
   const Matrix FU = F * svd.matrixV();
   if (!impedance.damping) {
@@ -81,9 +81,10 @@ ClosedForm solve_closed_form(const TaskImpedance& impedance, const MatrixXd& map
   Values S(count), wanted(count);
   for (Index i = 0; i < count; ++i) {
     const double frequency = static_cast<double>(omega[i]);
-    wanted[i] = 2 * target.ratio(frequency) * frequency;
+    wanted[i] = static_cast<Extended>(2 * target.ratio(frequency) * frequency);
     DampingTarget unit = DampingTarget::constant(1);
-    S[i] = frequency > 0 ? std::sqrt(unit.damper(frequency, soft) / (2 * frequency)) : 0;
+    const double s = frequency > 0 ? std::sqrt(unit.damper(frequency, soft) / (2 * frequency)) : 0;
+    S[i] = static_cast<Extended>(s);
   }
   const Matrix D = symmetric_part(*impedance.damping).cast<Extended>();
   const Matrix LV = cholesky.matrixU().solve(svd.matrixU());  // L^-T V

@@ -46,8 +46,9 @@ Invariants root_invariants(const Root& a, const Root& b) noexcept {
   return v;
 }
 
-ModeNumbers mode_numbers(const Root& first, const Root& second, const Invariants& v,
+ModeNumbers mode_numbers(const Root& first, const Root& second, const Invariants& invariants,
                          double soft_frequency) noexcept {
+  const Invariants& v = invariants;
   ModeNumbers mode;
   mode.eigenvalues = {first.value, second.value};
   mode.error_bound = std::max(first.bound, second.bound);

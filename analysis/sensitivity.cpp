@@ -89,9 +89,9 @@ class ModeReader {
     const Eigen::Matrix2d L = basis_.Lambda.block<2, 2>(at, at);
     const Eigen::Matrix2d adjugate = L.trace() * Eigen::Matrix2d::Identity() - L;
     const MatrixXd wY = basis_.weight.block<2, 2>(at, at) * basis_.Y.middleCols(at, 2).transpose();
-    Eigen::Matrix2d power_of_L = Eigen::Matrix2d::Identity();
-    for (int k = 0; k < power; ++k) power_of_L *= L;
-    const MatrixXd UL = basis_.U.middleCols(at, 2) * power_of_L;
+    Eigen::Matrix2d L_power = Eigen::Matrix2d::Identity();
+    for (int k = 0; k < power; ++k) L_power *= L;
+    const MatrixXd UL = basis_.U.middleCols(at, 2) * L_power;
     PairGradient result{-(UL * wY).transpose(), -(UL * adjugate * wY).transpose()};
     if (symmetric_) {
       result.sum = (0.5 * (result.sum + result.sum.transpose())).eval();

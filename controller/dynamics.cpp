@@ -108,9 +108,9 @@ Lanes33<kGroups<N>> link_rotations(const Rows& rotation, const Lanes<kGroups<N>>
 
 /// J, and M_ki = J_k . (force, moment)_i for k <= i, mirrored; the wrench is taken at the tip.
 template <int N>
-void write_J_and_M(const Lanes3<kGroups<N>>& J_linear, const Lanes3<kGroups<N>>& J_angular,
-                   const Lanes3<kGroups<N>>& force, const Lanes3<kGroups<N>>& moment,
-                   Dynamics<N>& result) {
+void write_J_M(const Lanes3<kGroups<N>>& J_linear, const Lanes3<kGroups<N>>& J_angular,
+               const Lanes3<kGroups<N>>& force, const Lanes3<kGroups<N>>& moment,
+               Dynamics<N>& result) {
   using L = Lanes<kGroups<N>>;
   const L* J[] = {&J_linear.x, &J_linear.y, &J_linear.z, &J_angular.x, &J_angular.y, &J_angular.z};
   const L* wrench[] = {&force.x, &force.y, &force.z, &moment.x, &moment.y, &moment.z};
@@ -155,7 +155,6 @@ DynamicsKernel<N>::DynamicsKernel(const RobotModel& model)
       carried_mass_{},
       revolute_{},
       prismatic_{},
-      reflected_inertia_(model.dof()),
       gravity_(model.gravity()) {
   if (model.dof() != N) {
     throw std::invalid_argument("DynamicsKernel<" + std::to_string(N) + ">: the model has " +
@@ -251,7 +250,7 @@ void DynamicsKernel<N>::evaluate(const Eigen::Matrix<double, N, 1>& q_in,
   const L3 moment = I * J_angular + cross(h, prismatic * R.z) + cross(F, to_tip);
   const L gravity = -(gravity_.x() * F.x + gravity_.y() * F.y + gravity_.z() * F.z);
 
-  write_J_and_M<N>(J_linear, J_angular, F, moment, result);
+  write_J_M<N>(J_linear, J_angular, F, moment, result);
   result.M.diagonal() += reflected_inertia_;
   store<N>(coriolis, result.coriolis);
   store<N>(gravity, result.gravity);

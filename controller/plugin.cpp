@@ -37,8 +37,8 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
         n(config.model.dof()),
         settings(config.settings),
         period(static_cast<std::int64_t>(std::min(1e9 * settings.period, 1e18))),
-        controller(config.model, config.settings),
-        setpoint(settings.initial) {
+        controller_(config.model, config.settings),
+        setpoint_(settings.initial) {
     request.setpoint = settings.initial;
   }
 
@@ -61,88 +61,88 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
   void reset(const JointVector& torque) noexcept;
 
  private:
-  /// Puts what the caller and the other thread want into `setpoint`. False if `wanted` is there,
+  /// Puts what the caller and the other thread want into `setpoint_`. False if `wanted` is there,
   /// but no set-point; the one in force stays then.
   bool take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept;
   /// As long as no set-point was given: the springs stay where they are, and are never stale.
   void stay(std::int64_t now) noexcept;
 
-  Controller controller;
-  Setpoint setpoint;            ///< in force
-  bool has_setpoint = false;    ///< one was given
-  bool located = false;         ///< the controller knows where the robot is
-  std::int64_t time = 0;        ///< of the last state, ns
-  std::uint64_t setpoints = 0;  ///< of the other thread, taken up so far
-  std::uint64_t gain_changes = 0;
-  std::uint64_t published_modes = 0;  ///< the tick they belong to
+  Controller controller_;
+  Setpoint setpoint_;            ///< in force
+  bool has_setpoint_ = false;    ///< one was given
+  bool located_ = false;         ///< the controller knows where the robot is
+  std::int64_t time_ = 0;        ///< of the last state, ns
+  std::uint64_t setpoints_ = 0;  ///< of the other thread, taken up so far
+  std::uint64_t gain_changes_ = 0;
+  std::uint64_t published_modes_ = 0;  ///< the tick they belong to
 };
 
 Status dashpot_controller::update(const dashpot_state* given, const dashpot_setpoint* wanted,
                                   JointVector& torque) noexcept {
-  const RobotState state = to_state(given, n, later(time, period));
-  time = state.time;
-  const bool accepted = take_up(wanted, time);
-  Status status = controller.update(state, setpoint, torque);
-  located |= status < Status::kStateNotFinite;
-  Snapshot snapshot = controller.snapshot();
+  const RobotState state = to_state(given, n, later(time_, period));
+  time_ = state.time;
+  const bool accepted = take_up(wanted, time_);
+  Status status = controller_.update(state, setpoint_, torque);
+  located_ |= status < Status::kStateNotFinite;
+  Snapshot snapshot = controller_.snapshot();
   if (!accepted) status = worse(status, Status::kSetpointRejected);
-  if (accepted && !has_setpoint && status == Status::kSetpointRejected) status = Status::kOk;
+  if (accepted && !has_setpoint_ && status == Status::kSetpointRejected) status = Status::kOk;
   snapshot.status = status;
   snapshots.write(snapshot);
-  if (controller.vibration().tick != published_modes) {
-    published_modes = controller.vibration().tick;
-    vibrations.write(controller.vibration());
+  if (controller_.vibration().tick != published_modes_) {
+    published_modes_ = controller_.vibration().tick;
+    vibrations.write(controller_.vibration());
   }
   return status;
 }
 
 void dashpot_controller::reset(const JointVector& torque) noexcept {
-  controller.reset(torque);
-  take_up(nullptr, time);  // the gains in it stay
-  const Gains gains = setpoint.gains;
-  setpoint = settings.initial;
-  setpoint.gains = gains;
-  has_setpoint = located = false;
-  published_modes = 0;
+  controller_.reset(torque);
+  take_up(nullptr, time_);  // the gains in it stay
+  const Gains gains = setpoint_.gains;
+  setpoint_ = settings.initial;
+  setpoint_.gains = gains;
+  has_setpoint_ = located_ = false;
+  published_modes_ = 0;
 }
 
 bool dashpot_controller::take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept {
-  const std::int64_t last = setpoint.time;
+  const std::int64_t last = setpoint_.time;
   bool accepted = true;
   if (requests.fetch()) {
     const Request& latest = requests.value();
-    if (latest.setpoints != setpoints) {
-      setpoint = latest.setpoint;
-      if (latest.on_arrival) setpoint.time = now;
-      has_setpoint = true;
-    } else if (latest.gain_changes != gain_changes) {
-      setpoint.gains = latest.setpoint.gains;
+    if (latest.setpoints != setpoints_) {
+      setpoint_ = latest.setpoint;
+      if (latest.on_arrival) setpoint_.time = now;
+      has_setpoint_ = true;
+    } else if (latest.gain_changes != gain_changes_) {
+      setpoint_.gains = latest.setpoint.gains;
     }
-    setpoints = latest.setpoints;
-    gain_changes = latest.gain_changes;
-    if (setpoint.time == last)
-      setpoint.time = later(last, 1);  // equal times would say that nothing is new
+    setpoints_ = latest.setpoints;
+    gain_changes_ = latest.gain_changes;
+    if (setpoint_.time == last)
+      setpoint_.time = later(last, 1);  // equal times would say that nothing is new
   }
   if (wanted != nullptr) {
-    accepted = to_setpoint(wanted, n, now, setpoint) == DASHPOT_OK;
-    if (accepted && !has_setpoint && setpoint.time == last) setpoint.time = later(last, 1);
-    has_setpoint |= accepted;
+    accepted = to_setpoint(wanted, n, now, setpoint_) == DASHPOT_OK;
+    if (accepted && !has_setpoint_ && setpoint_.time == last) setpoint_.time = later(last, 1);
+    has_setpoint_ |= accepted;
   }
-  if (!has_setpoint) stay(now);
+  if (!has_setpoint_) stay(now);
   return accepted;
 }
 
 void dashpot_controller::stay(std::int64_t now) noexcept {
-  const Snapshot& snapshot = controller.snapshot();
-  setpoint.time = now;
-  setpoint.mode = settings.initial.mode;
+  const Snapshot& snapshot = controller_.snapshot();
+  setpoint_.time = now;
+  setpoint_.mode = settings.initial.mode;
   // Before the robot is located there is nothing to give: a set-point without entries is rejected,
   // and the controller holds the robot where it finds it.
-  const bool cartesian = setpoint.mode == Mode::kCartesian;
-  setpoint.joint_position.resize(0);
-  setpoint.tip_pose.rotation.setZero();
-  if (located && !cartesian) setpoint.joint_position = snapshot.setpoint_position;
-  if (located && cartesian) setpoint.tip_pose = snapshot.setpoint_tip;
+  const bool cartesian = setpoint_.mode == Mode::kCartesian;
+  setpoint_.joint_position.resize(0);
+  setpoint_.tip_pose.rotation.setZero();
+  if (located_ && !cartesian) setpoint_.joint_position = snapshot.setpoint_position;
+  if (located_ && cartesian) setpoint_.tip_pose = snapshot.setpoint_tip;
 }
 
 namespace {
@@ -198,7 +198,7 @@ void dashpot_destroy(dashpot_controller* controller) {
   delete controller;
 }
 
-const char* dashpot_last_error(void) {
+const char* dashpot_last_error() {
   return last_error.data();
 }
 
@@ -308,12 +308,12 @@ const char* dashpot_kind_text(int32_t kind) {
 }
 
 const dashpot_plugin* dashpot_plugin_interface(uint32_t version) {
-  static const dashpot_plugin kInterface = {
+  static const dashpot_plugin functions = {
       sizeof(dashpot_plugin), DASHPOT_PLUGIN_VERSION, dashpot_create,       dashpot_destroy,
       dashpot_last_error,     dashpot_joints,         dashpot_joint_name,   dashpot_period,
       dashpot_update,         dashpot_reset,          dashpot_set_setpoint, dashpot_set_gains,
       dashpot_read_snapshot,  dashpot_read_modes,     dashpot_status_text,  dashpot_kind_text};
-  return version == DASHPOT_PLUGIN_VERSION ? &kInterface : nullptr;
+  return version == DASHPOT_PLUGIN_VERSION ? &functions : nullptr;
 }
 
 }  // extern "C"

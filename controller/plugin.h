@@ -234,7 +234,7 @@ typedef struct dashpot_plugin {
   uint32_t version; /* DASHPOT_PLUGIN_VERSION */
   dashpot_controller* (*create)(const char*);
   void (*destroy)(dashpot_controller*);
-  const char* (*last_error)(void);
+  const char* (*last_error)(void); /* NOLINT(modernize-redundant-void-arg): C needs it */
   uint32_t (*joints)(const dashpot_controller*);
   const char* (*joint_name)(const dashpot_controller*, uint32_t);
   double (*period)(const dashpot_controller*);

@@ -49,14 +49,14 @@ std::size_t find_word(const YamlMapping& keys, std::string_view key, const YamlN
                       std::span<const std::string_view> words, const std::string& place = "");
 
 /// One of several words, each with what it stands for.
-template <class Value, std::size_t kCount>
+template <class Value, std::size_t Count>
 void read_choice(const YamlMapping& keys, std::string_view key,
-                 const std::array<std::pair<std::string_view, Value>, kCount>& choices,
+                 const std::array<std::pair<std::string_view, Value>, Count>& choices,
                  Value& value) {
   const YamlNode* node = keys.find(key);
   if (node == nullptr) return;
-  std::array<std::string_view, kCount> words;
-  for (std::size_t i = 0; i < kCount; ++i) words[i] = choices[i].first;
+  std::array<std::string_view, Count> words;
+  for (std::size_t i = 0; i < Count; ++i) words[i] = choices[i].first;
   value = choices[find_word(keys, key, *node, words)].second;
 }
 

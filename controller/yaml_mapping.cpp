@@ -77,9 +77,9 @@ InputError YamlMapping::error(std::string_view key, const std::string& reason, i
 
 YamlMapping YamlMapping::mapping(std::string_view key,
                                  std::span<const std::string_view> known_keys) const {
-  static const YamlNode kEmpty{.kind = YamlNode::Kind::kMap, .text = {}, .items = {}};
+  static const YamlNode empty{.kind = YamlNode::Kind::kMap, .text = {}, .items = {}};
   const YamlNode* node = find(key);
-  return {node == nullptr ? kEmpty : *node, prefix_ + std::string(key) + ".", known_keys};
+  return {node == nullptr ? empty : *node, prefix_ + std::string(key) + ".", known_keys};
 }
 
 void YamlMapping::require_list(std::string_view key, const YamlNode& node,

@@ -49,7 +49,8 @@ Pair pair_of(const Coefficients& system, const Mode<>& mode) {
   const Eigen::EigenSolver<Matrix> solver(A, false);
   std::vector<ExtendedComplex> values(solver.eigenvalues().begin(), solver.eigenvalues().end());
   const auto take_nearest = [&values](const Complex& to) {
-    const ExtendedComplex target(to.real(), to.imag());
+    const ExtendedComplex target{static_cast<Extended>(to.real()),
+                                 static_cast<Extended>(to.imag())};
     const auto nearest = std::min_element(
         values.begin(), values.end(),
         [&](const auto& a, const auto& b) { return std::abs(a - target) < std::abs(b - target); });

@@ -126,7 +126,7 @@ TEST(ZeroModes, SeeThroughGradedMassesAndStiffnesses) {
 TEST(ZeroModes, FromTheStiffnessAloneAreAsExactAlongSoftMotionsAsAlongStiffOnes) {
   // K = W'W exactly, of integers and powers of two: rows of W over six decades, masses over three.
   const int n = 12, rank = 9;
-  for (const std::uint64_t seed : {407, 408, 409, 410}) {
+  for (const std::uint64_t seed : {407u, 408u, 409u, 410u}) {
     Random random(seed);
     MatrixXd W(rank, n), G(n, n);
     for (int i = 0; i < rank; ++i) {

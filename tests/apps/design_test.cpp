@@ -176,8 +176,8 @@ struct Bad {
   std::string reason;
 };
 
-void PrintTo(const Bad& bad, std::ostream* out) {
-  *out << bad.name;
+std::ostream& operator<<(std::ostream& out, const Bad& bad) {
+  return out << bad.name;
 }
 
 const std::string kArm = "mass: [[2, 0], [0, 1]]\njacobian: [[1, 1]]\ntask_stiffness: [[9]]\n";

@@ -307,7 +307,7 @@ TEST(ClosedLoop, AddsOptionalTermsAndFriction) {
   EXPECT_TRUE(near(both.stiffness - plain.stiffness, extra, 1e-9));
   EXPECT_EQ(both.stiffness_factor.rows(), 0);
   EXPECT_EQ(plain.stiffness_factor.rows(), 13);
-  const auto smooth = plain.damping - MatrixXd(friction.asDiagonal());
+  const MatrixXd smooth = plain.damping - MatrixXd(friction.asDiagonal());
   EXPECT_TRUE(near(smooth.diagonal() + friction, plain.damping.diagonal(), 1e-9));
   EXPECT_GT((MatrixXd(plain.damping) - J.transpose() * setpoint.gains.task_damping * J).trace(),
             friction.sum());

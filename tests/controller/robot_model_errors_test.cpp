@@ -90,8 +90,8 @@ struct Bad {
   const char* reason;  ///< a part of it
 };
 
-void PrintTo(const Bad& bad, std::ostream* out) {
-  *out << bad.text;
+std::ostream& operator<<(std::ostream& out, const Bad& bad) {
+  return out << bad.text;
 }
 
 std::string name_of(const ::testing::TestParamInfo<Bad>& info) {

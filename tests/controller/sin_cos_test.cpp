@@ -16,7 +16,8 @@ using testing::Random;
 double ulps(double computed, long double exact) {
   const double rounded = std::abs(static_cast<double>(exact));
   const double unit = std::nextafter(rounded, std::numeric_limits<double>::infinity()) - rounded;
-  return static_cast<double>(std::abs(computed - exact) / unit);
+  return static_cast<double>(std::abs(static_cast<long double>(computed) - exact) /
+                             static_cast<long double>(unit));
 }
 
 /// The worst of sine and cosine, each of four angles in its own lane.
@@ -25,7 +26,7 @@ double error(const Four& angles) {
   sin_cos(angles, sine, cosine);
   double worst = 0;
   for (int i = 0; i < 4; ++i) {
-    const long double angle = angles[i];
+    const auto angle = static_cast<long double>(angles[i]);
     worst = std::max({worst, ulps(sine[i], std::sin(angle)), ulps(cosine[i], std::cos(angle))});
   }
   return worst;

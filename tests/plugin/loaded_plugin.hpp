@@ -15,9 +15,9 @@
 namespace dashpot::tests {
 
 inline void* plugin_library() {
-  static void* const kLibrary = dlopen(DASHPOT_PLUGIN, RTLD_NOW | RTLD_LOCAL);
-  if (kLibrary == nullptr) throw std::runtime_error(dlerror());
-  return kLibrary;
+  static void* const library = dlopen(DASHPOT_PLUGIN, RTLD_NOW | RTLD_LOCAL);
+  if (library == nullptr) throw std::runtime_error(dlerror());
+  return library;
 }
 
 using PluginInterface = const dashpot_plugin* (*)(uint32_t);
@@ -29,8 +29,8 @@ inline PluginInterface plugin_interface() {
 }
 
 inline const dashpot_plugin& plugin() {
-  static const dashpot_plugin& kPlugin = *plugin_interface()(DASHPOT_PLUGIN_VERSION);
-  return kPlugin;
+  static const dashpot_plugin& functions = *plugin_interface()(DASHPOT_PLUGIN_VERSION);
+  return functions;
 }
 
 struct Destroy {
@@ -97,8 +97,8 @@ struct Host {
 
 /// Away from limits and singularities.
 inline const std::vector<double>& panda_posture() {
-  static const std::vector<double> kPosture = {0, -0.785, 0, -2.356, 0, 1.571, 0.785};
-  return kPosture;
+  static const std::vector<double> posture = {0, -0.785, 0, -2.356, 0, 1.571, 0.785};
+  return posture;
 }
 
 }  // namespace dashpot::tests

@@ -139,7 +139,7 @@ TEST(Robot, ReadsLimitsAndFriction) {
   EXPECT_EQ(elbow.viscous, 0.003);
   EXPECT_EQ(elbow.coulomb, 0);
   EXPECT_EQ(elbow.armature, 0);
-  const Joint& hinge = testing::pendulum(1).joints()[0];
+  const Joint hinge = testing::pendulum(1).joints()[0];
   EXPECT_EQ(hinge.lower, -std::numeric_limits<double>::infinity());
   EXPECT_EQ(hinge.upper, std::numeric_limits<double>::infinity());
   EXPECT_EQ(hinge.effort, std::numeric_limits<double>::infinity());
