@@ -34,6 +34,8 @@ class TaskInertia {
   }
   /// w
   double regularity() const noexcept { return regularity_; }
+  /// l > 0
+  bool nearly_singular() const noexcept { return !(regularity_ >= kNearlySingular); }
 
  private:
   /// H a
