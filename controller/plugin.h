@@ -192,6 +192,7 @@ typedef struct dashpot_modes {
   /* ... and what some of them could leave out. */
   uint64_t no_zero_modes; /* springs hold every motion */
   uint64_t no_wrench;     /* geometric_stiffness is on, but there is no external wrench */
+  uint64_t no_shapes;     /* nobody asks for shapes */
   uint64_t at_rest;       /* jacobian_rate is on, but the robot stands still */
   dashpot_mode modes[DASHPOT_MAX_JOINTS];
 } dashpot_modes;

@@ -160,6 +160,7 @@ void to_c(const Vibration& vibration, dashpot_modes& out) noexcept {
   out.missed = counters.missed;
   out.no_zero_modes = counters.no_zero_modes;
   out.no_wrench = counters.no_wrench;
+  out.no_shapes = counters.no_shapes;
   out.at_rest = counters.at_rest;
   for (std::uint32_t i = 0; i < out.count; ++i) {
     const VibrationMode& from = vibration.modes[i];

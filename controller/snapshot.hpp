@@ -59,6 +59,7 @@ struct VibrationCounters {
   // ... and what some of them could leave out.
   std::uint64_t no_zero_modes = 0;  ///< springs hold every motion: nothing to keep apart
   std::uint64_t no_wrench = 0;      ///< K_G is on, but there is no external wrench
+  std::uint64_t no_shapes = 0;      ///< nobody asks for shapes
   std::uint64_t at_rest = 0;        ///< J' C_C Jdot is on, but the robot stands still
 };
 

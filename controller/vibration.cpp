@@ -24,6 +24,7 @@ VibrationSolver::VibrationSolver(const Analysis& settings)
 void VibrationSolver::reset() noexcept {
   tracker_.forget();
   counters_ = {};
+  skipped_ = static_cast<std::uint64_t>(tracker_.counters().shapes_skipped);
   solved_ = 0;
 }
 
@@ -35,6 +36,7 @@ void VibrationSolver::solve(const VibrationTask& task, Vibration& result) noexce
   solved_ = task.number;
   if (task.springs) {
     tracker_.update(task.system, spectrum_);
+    counters_.no_shapes = static_cast<std::uint64_t>(tracker_.counters().shapes_skipped) - skipped_;
     publish_modes(result);
     const bool found =
         result.status == analysis::Status::kOk || result.status == analysis::Status::kUncertified;

@@ -35,7 +35,8 @@ class VibrationSolver {
   analysis::ModeTracker tracker_;
   analysis::TrackedSpectrum spectrum_;
   VibrationCounters counters_;
-  std::uint64_t solved_ = 0;  ///< number of the last task
+  std::uint64_t solved_ = 0;   ///< number of the last task
+  std::uint64_t skipped_ = 0;  ///< shapes that the tracker had left out at the last reset
 };
 
 class VibrationThread;

@@ -323,6 +323,8 @@ TEST(VibrationInTheTick, LeavesOutShapesThatNobodyWants) {
     full.tick();
   }
   ASSERT_EQ(led.modes().count, 7);
+  EXPECT_GE(led.modes().counters.no_shapes, led.modes().counters.tracked);
+  EXPECT_EQ(full.modes().counters.no_shapes, 0u);
   for (std::size_t i = 0; i < 7; ++i) {
     EXPECT_EQ(led.modes().modes[i].shape.size(), 0);
     EXPECT_EQ(full.modes().modes[i].shape.size(), 7);
@@ -457,7 +459,9 @@ TEST(VibrationInTheTick, ForgetsAtAReset) {
       led.tick();
     }
   };
+  again.setpoint.mode = Mode::kJoint;  // its modes are not those of the Cartesian mode
   run(again);
+  again.setpoint.mode = Mode::kCartesian;
   again.controller.reset();
   EXPECT_EQ(again.modes().tick, 0u);
   EXPECT_EQ(again.modes().count, 0);
