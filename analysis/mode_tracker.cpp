@@ -163,6 +163,7 @@ bool ModeTracker::publish(const StateForm& form, double distance, double target,
   const double worst = worst_bound(out);
   if (!(worst <= target) || out.status != Status::kOk) return false;
   soft_ = soft;
+  out.lineage = lineage_;
   out.origin = fresh ? SpectrumOrigin::kTracked : SpectrumOrigin::kReused;
   if (fresh) bound_ = worst;
   if (!options_.shapes) {
@@ -314,6 +315,7 @@ bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept 
     move_modes(place, basis_);
     soft_ = {};
     has_places_ = true;
+    ++lineage_;
   }
   Fallback unused{};
   has_basis_ = refine(form, out, unused);
@@ -325,8 +327,10 @@ void ModeTracker::publish_direct(const StateForm& form, TrackedSpectrum& out) no
   std::array<int, kMaxDof> place{};
   if (!has_places_ || !find_places(form, basis_, spectrum_, place)) {
     has_places_ = false;
+    ++lineage_;
     for (int i = 0; i < kMaxDof; ++i) place[at(i)] = i;
   }
+  out.lineage = lineage_;
   out.mode_count = spectrum_.modes.size();
   for (int i = 0; i < out.mode_count; ++i) {
     const Mode<kMaxDof>& mode = spectrum_.modes[i];

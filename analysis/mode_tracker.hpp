@@ -16,18 +16,13 @@ struct TrackedShapes {
   std::array<Complex, 2> slope{};
 };
 
-/// Where a spectrum comes from.
-enum class SpectrumOrigin {
-  kTracked,  ///< the previous one, refined
-  kReused,   ///< the previous one: the system has hardly changed
-  kDirect,   ///< solved anew
-};
-
 struct TrackedSpectrum {
   Status status = Status::kNotConverged;  ///< kUncertified: some bound is infinite
   SpectrumOrigin origin = SpectrumOrigin::kDirect;
   int mode_count = 0;
-  /// A mode keeps its place here along a path.
+  /// A mode keeps its place here along a path, as long as `lineage` stays the same: it grows when
+  /// modes cannot be recognised, because there are more or fewer of them or none were found.
+  std::uint64_t lineage = 0;
   std::array<ModeNumbers, kMaxDof> modes{};
   /// Places of the modes by falling sqrt|l1 l2|: the natural frequency where there is one.
   std::array<int, kMaxDof> by_frequency{};
@@ -96,8 +91,15 @@ class ModeTracker {
   /// definite to be followed; semidefinite ones are solved directly on each call.
   Status update(const System<kMaxDof>& system, TrackedSpectrum& out) noexcept;
 
-  /// Forgets the past: the next update starts anew.
+  /// The next update starts anew; modes that it recognises keep their places.
   void reset() noexcept { has_basis_ = false; }
+  /// Forgets the past, but not what was counted: the next update is like the first.
+  void forget() noexcept {
+    has_basis_ = has_places_ = false;
+    soft_ = {};
+    certificate_.noise = 0;
+    lineage_ = 0;
+  }
 
   const TrackerCounters& counters() const noexcept { return counters_; }
 
@@ -120,6 +122,7 @@ class ModeTracker {
   // The last spectrum: the basis as it was evaluated, and the step that is still to be taken.
   bool has_basis_ = false;
   bool has_places_ = false;  ///< basis_ says which mode is which
+  std::uint64_t lineage_ = 0;
   System<kMaxDof> last_;
   CoefficientSizes sizes_;
   TrackedBasis basis_;

@@ -22,6 +22,13 @@ enum class ModeKind {
 /// "underdamped", "critical", ...
 const char* to_text(ModeKind kind) noexcept;
 
+/// Where a spectrum comes from.
+enum class SpectrumOrigin {
+  kTracked,  ///< the previous one, refined
+  kReused,   ///< the previous one: the system has hardly changed
+  kDirect,   ///< solved anew
+};
+
 /// One vibration mode: a pair of eigenvalues of  (lambda^2 M + lambda C + K) u = 0.
 template <int N = kDynamic>
 struct Mode {

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/small_dense.hpp>
 #include <dashpot/analysis/tracked_modes.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 namespace dashpot::analysis {
@@ -84,39 +85,66 @@ std::array<Complex, 2> block_vector(const TrackedBasis& basis, int i, const Comp
   return w;
 }
 
-/// u = V w, of unit kinetic energy u^H M u, its largest entry real and positive. Lambda, and so w,
-/// is that of the basis before the step E.
-void write_shape(const TrackedBasis& basis, const PaddedRows& E, const PaddedRows& velocities,
-                 const PaddedRows& momenta, int i, int which, const Complex& mu,
-                 TrackedShapes& shapes) {
-  const int n = basis.modes + basis.zeros;
+/// What a group of four modes needs for one eigenvector each: w, and the eigenvalues mu.
+struct VectorGroup {
+  std::array<Complex, 4> w0, w1, mu;
+};
+
+/// Lambda, and so w, is that of the basis before the step E.
+void set_vector(const TrackedBasis& basis, const PaddedRows& E, int i, const Complex& mu, int lane,
+                VectorGroup& group) {
   const int j = basis.modes + i;
-  std::array<Complex, 2> w = block_vector(basis, i, mu);
-  w = {w[0] - (E(i, i) * w[0] + E(i, j) * w[1]), w[1] - (E(j, i) * w[0] + E(j, j) * w[1])};
-  std::array<double, kMaxDof> x{}, y{};
-  double energy = 0, largest = -1;
-  int pivot = 0;
+  const std::array<Complex, 2> w = block_vector(basis, i, mu);
+  group.mu[at(lane)] = mu;
+  group.w0[at(lane)] = w[0] - (E(i, i) * w[0] + E(i, j) * w[1]);
+  group.w1[at(lane)] = w[1] - (E(j, i) * w[0] + E(j, j) * w[1]);
+}
+
+/// u = V w of unit kinetic energy u^H M u, its largest entry real and positive, for `lanes` modes
+/// from `first` on.
+void write_shapes(const TrackedBasis& basis, const PaddedRows& velocities,
+                  const PaddedRows& momenta, int first, int lanes, std::size_t which,
+                  const VectorGroup& group, std::array<TrackedShapes, kMaxDof>& out) {
+  const int n = basis.modes + basis.zeros;
+  const auto gather = [](const std::array<Complex, 4>& from, bool imaginary) {
+    Lanes result;
+    for (int l = 0; l < 4; ++l) result[l] = imaginary ? from[at(l)].imag() : from[at(l)].real();
+    return result;
+  };
+  const Lanes a = gather(group.w0, false), b = gather(group.w0, true);
+  const Lanes c = gather(group.w1, false), d = gather(group.w1, true);
+  std::array<Lanes, kMaxDof> x, y;
+  Lanes energy{}, largest{}, x_largest{}, y_largest{};
   for (int k = 0; k < n; ++k) {
-    const double first = velocities(k, i), second = velocities(k, basis.modes + i);
-    const double p_first = momenta(k, i), p_second = momenta(k, basis.modes + i);
-    x[at(k)] = first * w[0].real() + second * w[1].real();
-    y[at(k)] = first * w[0].imag() + second * w[1].imag();
-    energy += x[at(k)] * (p_first * w[0].real() + p_second * w[1].real()) +
-              y[at(k)] * (p_first * w[0].imag() + p_second * w[1].imag());
-    const double size = x[at(k)] * x[at(k)] + y[at(k)] * y[at(k)];
-    if (size > largest) largest = size, pivot = k;
+    const Lanes v = load(velocities.row(k) + first);
+    const Lanes w = load(velocities.row(k) + basis.modes + first);
+    const Lanes p = load(momenta.row(k) + first);
+    const Lanes q = load(momenta.row(k) + basis.modes + first);
+    const Lanes re = v * a + w * c, im = v * b + w * d;
+    energy += re * (p * a + q * c) + im * (p * b + q * d);
+    const Lanes size = re * re + im * im;
+    const auto larger = size > largest;
+    largest = larger ? size : largest;
+    x_largest = larger ? re : x_largest;
+    y_largest = larger ? im : y_largest;
+    x[at(k)] = re;
+    y[at(k)] = im;
   }
-  const double factor = 1 / (std::sqrt(largest) * std::sqrt(energy));
-  const Complex f(x[at(pivot)] * factor, -y[at(pivot)] * factor);
-  ComplexVector<kMaxDof>& u = shapes.u[at(which)];
-  u.resize(n);
-  for (int k = 0; k < n; ++k) {
-    u[k] = Complex(f.real() * x[at(k)] - f.imag() * y[at(k)],
-                   f.real() * y[at(k)] + f.imag() * x[at(k)]);
+  for (int lane = 0; lane < lanes; ++lane) {
+    const double factor = 1 / (std::sqrt(largest[lane]) * std::sqrt(energy[lane]));
+    const Complex f(x_largest[lane] * factor, -y_largest[lane] * factor);
+    TrackedShapes& shapes = out[at(first + lane)];
+    ComplexVector<kMaxDof>& u = shapes.u[which];
+    u.resize(n);
+    for (int k = 0; k < n; ++k) {
+      u[k] = Complex(f.real() * x[at(k)][lane] - f.imag() * y[at(k)][lane],
+                     f.real() * y[at(k)][lane] + f.imag() * x[at(k)][lane]);
+    }
+    // With the state x = (W u, mu u) = mu f Z w: u'(2 mu M + C) u = -x'Sx / mu (no conjugation).
+    const Complex w0 = group.w0[at(lane)], w1 = group.w1[at(lane)];
+    shapes.slope[which] =
+        -product(product(group.mu[at(lane)], product(f, f)), product(w0 - w1, w0 + w1));
   }
-  // With the state x = (W u, mu u) = mu f Z w: u'(2 mu M + C) u = -x'Sx / mu (no conjugation).
-  const Complex sigma = product(w[0] - w[1], w[0] + w[1]);
-  shapes.slope[at(which)] = -product(product(mu, product(f, f)), sigma);
 }
 
 }  // namespace
@@ -173,15 +201,25 @@ void read_shapes(const StateForm& form, const TrackedBasis& basis, const PaddedR
   momenta.width = basis.Z.width;
   padded_multiply(momenta.width)({form.M, 1, form.joints}, form.joints, form.joints,
                                  velocities.row(0), nullptr, 1, momenta.row(0));
-  for (int i = 0; i < basis.modes; ++i) {
-    const auto& values = out.modes[at(i)].eigenvalues;
-    TrackedShapes& shapes = out.shapes[at(i)];
-    write_shape(basis, E, velocities, momenta, i, 0, values[0], shapes);
-    if (values[0].imag() != 0) {
+  for (int first = 0; first < basis.modes; first += 4) {
+    const int lanes = std::min(4, basis.modes - first);
+    VectorGroup group{};
+    bool any_real = false;
+    const auto vectors = [&](std::size_t which) {
+      for (int lane = 0; lane < lanes; ++lane) {
+        const auto& values = out.modes[at(first + lane)].eigenvalues;
+        set_vector(basis, E, first + lane, values[which], lane, group);
+        any_real |= values[0].imag() == 0;
+      }
+      write_shapes(basis, velocities, momenta, first, lanes, which, group, out.shapes);
+    };
+    vectors(0);
+    if (any_real) vectors(1);
+    for (int i = first; i < first + lanes; ++i) {
+      if (out.modes[at(i)].eigenvalues[0].imag() == 0) continue;
+      TrackedShapes& shapes = out.shapes[at(i)];
       shapes.u[1] = shapes.u[0].conjugate();
       shapes.slope[1] = std::conj(shapes.slope[0]);
-    } else {
-      write_shape(basis, E, velocities, momenta, i, 1, values[1], shapes);
     }
   }
 }

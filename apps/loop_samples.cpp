@@ -40,6 +40,7 @@ void fill(const dashpot_modes& from, lcmtypes::ModesSample& to) noexcept {
   vibration.tick = from.tick;
   vibration.position = vector(from.position, from.joints);
   vibration.status = static_cast<analysis::Status>(from.status);
+  vibration.origin = static_cast<analysis::SpectrumOrigin>(from.origin);
   vibration.zero_modes = static_cast<int>(from.zero_modes);
   vibration.count = static_cast<int>(from.count);
   for (std::uint32_t i = 0; i < from.count; ++i) {
@@ -48,6 +49,7 @@ void fill(const dashpot_modes& from, lcmtypes::ModesSample& to) noexcept {
     for (std::size_t k = 0; k < 2; ++k) {
       result.eigenvalues[k] = {mode.eigenvalues[k][0], mode.eigenvalues[k][1]};
     }
+    result.label = mode.label;
     result.natural_frequency = mode.natural_frequency;
     result.damping_ratio = mode.damping_ratio;
     result.damped_frequency = mode.damped_frequency;
@@ -55,7 +57,6 @@ void fill(const dashpot_modes& from, lcmtypes::ModesSample& to) noexcept {
     result.shape.resize(from.joints);
     result.shape.real() = vector(mode.shape_real, from.joints);
     result.shape.imag() = vector(mode.shape_imag, from.joints);
-    result.backward_error = mode.backward_error;
     result.error_bound = mode.eigenvalue_bound;
     result.natural_frequency_bound = mode.natural_frequency_bound;
     result.damping_ratio_bound = mode.damping_ratio_bound;

@@ -72,10 +72,9 @@ std::string modes_table(const dashpot_modes& modes) {
   table.add_column(Align::kLeft, {"", "kind"});
   table.add_column(Align::kRight, {"error <", "rad/s"});
   table.add_column(Align::kLeft, {"", "shape"});
-  int i = 0;
   for (const dashpot_mode& mode : list(modes)) {
     const double bound = mode.natural_frequency_bound;
-    table.add_row({std::to_string(++i), format_number(mode.natural_frequency, 6),
+    table.add_row({std::to_string(mode.label), format_number(mode.natural_frequency, 6),
                    format_number(mode.natural_frequency / (2 * std::numbers::pi), 6),
                    format_number(mode.damping_ratio, 6), kind_text(mode),
                    std::isfinite(bound) ? format_number(bound, 2) : "none",
@@ -151,6 +150,23 @@ std::string statuses_text(const LoopRecord& loop) {
   return out + "\n";
 }
 
+/// What the analysis did since the controller's first tick.
+std::string solved_text(const dashpot_modes& modes) {
+  std::string out = "  Modes:";
+  const auto add = [&out](std::uint64_t ticks, const char* what) {
+    if (ticks == 0) return;
+    out += (out.back() == ':' ? " " : ", ") + std::to_string(ticks) + " " + what;
+  };
+  add(modes.tracked, "tracked");
+  add(modes.reused, "reused");
+  add(modes.unchanged, "unchanged");
+  add(modes.direct, "solved anew");
+  add(modes.no_springs, "without springs");
+  add(modes.failed, "failed");
+  add(modes.missed, "missed");
+  return out + "\n";
+}
+
 std::string error_text(const LoopRecord& loop) {
   return "  Largest distance from where the springs are fixed: tip " +
          format_number(1e3 * loop.tip_error, 4) + " mm and " +
@@ -184,7 +200,8 @@ Json modes_json(const dashpot_modes& modes) {
     for (std::uint32_t j = 0; j < modes.joints; ++j) {
       shape.push_back({mode.shape_real[j], mode.shape_imag[j]});
     }
-    result.push_back({{"eigenvalues", eigenvalues},
+    result.push_back({{"label", mode.label},
+                      {"eigenvalues", eigenvalues},
                       {"natural_frequency", mode.natural_frequency},
                       {"damping_ratio", mode.damping_ratio},
                       {"damped_frequency", mode.damped_frequency},
@@ -195,6 +212,13 @@ Json modes_json(const dashpot_modes& modes) {
                       {"damping_ratio_bound", mode.damping_ratio_bound}});
   }
   return result;
+}
+
+Json solved_json(const dashpot_modes& modes) {
+  return {{"tracked", modes.tracked},       {"reused", modes.reused},
+          {"direct", modes.direct},         {"unchanged", modes.unchanged},
+          {"no_springs", modes.no_springs}, {"failed", modes.failed},
+          {"missed", modes.missed}};
 }
 
 Json energy_json(const sim::EnergyAudit& energy) {
@@ -235,6 +259,7 @@ std::string to_table(const RunReport& report) {
   out += timing_text(report) + statuses_text(loop) + error_text(loop) + energy_text(report.energy) +
          messages_text(report);
   if (loop.first_modes.tick != 0) {
+    out += solved_text(loop.last_modes);
     out += "\nModes at the start, " + count(loop.first_modes.zero_modes, "zero mode") + "\n" +
            modes_table(loop.first_modes);
     out += "\nModes at the end, " + count(loop.last_modes.zero_modes, "zero mode") + "\n" +
@@ -278,6 +303,7 @@ std::string to_json(const RunReport& report) {
       {"status", statuses},
       {"zero_modes", loop.last_modes.zero_modes},
       {"modes", {{"start", modes_json(loop.first_modes)}, {"end", modes_json(loop.last_modes)}}},
+      {"solved", solved_json(loop.last_modes)},
       {"largest_tracking_error",
        {{"tip", loop.tip_error}, {"tip_angle", loop.tip_angle_error}, {"joint", loop.joint_error}}},
       {"energy", energy_json(report.energy)},

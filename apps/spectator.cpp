@@ -17,6 +17,8 @@ dashpot_modes modes_of(const MatrixSystem& system) {
   modes.struct_size = sizeof modes;
   modes.joints = static_cast<std::uint32_t>(system.mass.rows());
   modes.status = static_cast<std::int32_t>(spectrum.status);
+  modes.origin = DASHPOT_DIRECT;
+  modes.direct = 1;
   modes.zero_modes = static_cast<std::uint32_t>(spectrum.zero_modes.count);
   modes.count = static_cast<std::uint32_t>(std::min(spectrum.modes.size(), DASHPOT_MAX_JOINTS));
   for (std::uint32_t i = 0; i < modes.count; ++i) {
@@ -32,7 +34,7 @@ dashpot_modes modes_of(const MatrixSystem& system) {
       to.eigenvalues[k][1] = from.eigenvalues[k].imag();
     }
     to.eigenvalue_bound = from.error_bound;
-    to.backward_error = from.backward_error;
+    to.label = static_cast<std::int32_t>(i + 1);
     to.kind = static_cast<std::int32_t>(from.kind);
     for (Eigen::Index j = 0; j < from.shapes[0].size(); ++j) {
       to.shape_real[j] = from.shapes[0][j].real();

@@ -1,13 +1,17 @@
 // A whole control tick: state check, model, set-point path, law and safety, with all feed-forward
 // and moving set-points. `tick/cartesian` has the null space where the arm is redundant,
 // `tick/joint` is joint impedance. 6 joints are the UR5, 7 the Panda, 14 a random chain. The arm
-// swings, and its state is a new one at every tick.
+// swings, and its state is a new one at every tick. `tick/full` has the spectrum of each as well,
+// with shapes, and the snapshot; `_values_only` without shapes; `_background` hands it to a thread;
+// `_percentiles` times a million ticks one by one.
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
 
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -45,44 +49,93 @@ std::vector<RobotState> swing(const JointVector& center) {
   return states;
 }
 
-void tick(benchmark::State& bench, Mode mode, Analysis analysis) {
-  const RobotModel model = model_of(static_cast<int>(bench.range(0)));
-  Settings settings = default_settings(model);
-  settings.analysis = analysis;
-  settings.feed_forward.friction = true;
-  settings.limits.torque *= 1e3;  // so that no limit is at work
-  settings.limits.torque_rate *= 1e6;
-  Controller controller(model, settings);
+/// A controller in the loop with a swinging arm.
+class Loop {
+ public:
+  Loop(int n, Mode mode, const Analysis& analysis) : Loop(model_of(n), mode, analysis) {}
 
-  JointVector center = settings.initial.joint_position;
-  if (model.dof() == 7) center << 0, -0.785, 0, -2.356, 0, 1.571, 0.785;
-  std::vector<RobotState> states = swing(center);
-  Setpoint setpoint = settings.initial;
-  setpoint.mode = mode;
-  setpoint.joint_position = center;
-  const DynamicsResult there = evaluate(model, center, JointVector::Zero(center.size()));
-  setpoint.tip_pose = {there.p_BT_B, there.R_BT};
+  Status step() {
+    RobotState& state = states_[k_];
+    state.time = time_ += 1'000'000;
+    setpoint_.time = time_;
+    const bool up = k_ % 512 == 0;
+    if (k_ % 256 == 0) setpoint_.tip_pose.position.z() += up ? 0.05 : -0.05;
+    if (k_ % 256 == 0) setpoint_.joint_position[0] += up ? 0.1 : -0.1;
+    k_ = k_ + 1 == kStates ? 0 : k_ + 1;
+    const Status status = controller_.update(state, setpoint_, torque_);
+    benchmark::DoNotOptimize(torque_.data());
+    return status;
+  }
+  const Vibration& vibration() const { return controller_.vibration(); }
 
-  JointVector torque;
-  std::int64_t time = 0;
-  std::size_t k = 0;
-  const auto step = [&] {
-    RobotState& state = states[k];
-    state.time = time += 1'000'000;
-    setpoint.time = time;
-    if (k % 256 == 0) setpoint.tip_pose.position.z() += k % 512 == 0 ? 0.05 : -0.05;
-    if (k % 256 == 0) setpoint.joint_position[0] += k % 512 == 0 ? 0.1 : -0.1;
-    k = k + 1 == kStates ? 0 : k + 1;
-    return controller.update(state, setpoint, torque);
-  };
-  for (std::size_t i = 0; i < kStates; ++i) step();
+ private:
+  Loop(const RobotModel& model, Mode mode, const Analysis& analysis)
+      : controller_(model, settings_for(model, analysis)) {
+    setpoint_ = controller_.settings().initial;
+    JointVector center = setpoint_.joint_position;
+    if (model.dof() == 7) center << 0, -0.785, 0, -2.356, 0, 1.571, 0.785;
+    states_ = swing(center);
+    setpoint_.mode = mode;
+    setpoint_.joint_position = center;
+    const DynamicsResult there = evaluate(model, center, JointVector::Zero(center.size()));
+    setpoint_.tip_pose = {there.p_BT_B, there.R_BT};
+    for (std::size_t i = 0; i < kStates; ++i) step();
+  }
+  static Settings settings_for(const RobotModel& model, const Analysis& analysis) {
+    Settings settings = default_settings(model);
+    settings.analysis = analysis;
+    settings.feed_forward.friction = true;
+    settings.limits.torque *= 1e3;  // so that no limit is at work
+    settings.limits.torque_rate *= 1e6;
+    return settings;
+  }
+
+  Controller controller_;
+  std::vector<RobotState> states_;
+  Setpoint setpoint_;
+  JointVector torque_;
+  std::int64_t time_ = 0;
+  std::size_t k_ = 0;
+};
+
+void tick(benchmark::State& bench, Mode mode, const Analysis& analysis) {
+  Loop loop(static_cast<int>(bench.range(0)), mode, analysis);
+  const VibrationCounters before = loop.vibration().counters;
   Status worst = Status::kOk;
   for (auto _ : bench) {
-    worst = worse(worst, step());
-    benchmark::DoNotOptimize(torque.data());
+    worst = worse(worst, loop.step());
     benchmark::ClobberMemory();
   }
   if (worst != Status::kOk) bench.SkipWithError(to_text(worst));
+  if (analysis.where != Analysis::Where::kInline) return;
+  const VibrationCounters& counters = loop.vibration().counters;
+  bench.counters["modes"] = loop.vibration().count;
+  bench.counters["direct"] = static_cast<double>(counters.direct - before.direct);
+  bench.counters["tracked"] = static_cast<double>(counters.tracked - before.tracked);
+}
+
+/// Each of the ticks timed by itself: percentiles in us. What else the machine does is in them.
+void percentiles(benchmark::State& bench, Mode mode, const Analysis& analysis) {
+  using Clock = std::chrono::steady_clock;
+  Loop loop(static_cast<int>(bench.range(0)), mode, analysis);
+  const std::uint64_t direct = loop.vibration().counters.direct;
+  std::vector<double> times(static_cast<std::size_t>(bench.max_iterations));
+  std::size_t k = 0;
+  for (auto _ : bench) {
+    const Clock::time_point start = Clock::now();
+    loop.step();
+    times[k] = std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+    bench.SetIterationTime(1e-6 * times[k++]);
+  }
+  std::sort(times.begin(), times.end());
+  const auto at = [&](double share) {
+    return times[static_cast<std::size_t>(share * static_cast<double>(times.size() - 1))];
+  };
+  bench.counters["median_us"] = at(0.5);
+  bench.counters["p99_us"] = at(0.99);
+  bench.counters["p99.9_us"] = at(0.999);
+  bench.counters["max_us"] = at(1);
+  bench.counters["direct"] = static_cast<double>(loop.vibration().counters.direct - direct);
 }
 
 void add(const std::string& name, Mode mode, Analysis analysis, std::initializer_list<int> joints) {
@@ -102,7 +155,20 @@ int main(int argc, char** argv) {
   const Analysis every_tick{Analysis::Where::kInline, 1, 0.1};
   add("tick/cartesian", Mode::kCartesian, off, {6, 7, 14});
   add("tick/joint", Mode::kJoint, off, {6, 7, 14});
-  add("tick/full", Mode::kCartesian, every_tick, {7});
+  const Analysis values_only{Analysis::Where::kInline, 1, 0.1, false};
+  const Analysis background{Analysis::Where::kBackground, 1, 0.1};
+  add("tick/full", Mode::kCartesian, every_tick,
+      {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
+  add("tick/full_joint", Mode::kJoint, every_tick, {6, 7, 14});
+  add("tick/full_values_only", Mode::kCartesian, values_only, {6, 7, 14});
+  add("tick/full_background", Mode::kCartesian, background, {6, 7, 14});
+  benchmark::RegisterBenchmark(
+      "tick/full_percentiles",
+      [=](benchmark::State& bench) { percentiles(bench, Mode::kCartesian, every_tick); })
+      ->Arg(7)
+      ->Iterations(1'000'000)
+      ->UseManualTime()
+      ->Unit(benchmark::kMicrosecond);
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
   return 0;

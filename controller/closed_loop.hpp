@@ -3,34 +3,11 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/null_space.hpp>
 #include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/spring_factors.hpp>
 
 #include <cmath>
-#include <limits>
 
 namespace dashpot::controller {
-
-/// W with W' W = A for a symmetric positive semidefinite A; as many rows as A, the last ones zero
-/// if A has less than full rank. Cholesky factorisation, largest pivot first.
-template <int N>
-JointSquare<N> semidefinite_factor(JointSquare<N> A) noexcept {
-  JointSquare<N> W = JointSquare<N>::Zero();
-  double least = 0;
-  for (int k = 0; k < N; ++k) {
-    int pivot = 0;
-    for (int i = 1; i < N; ++i) {
-      if (A(i, i) > A(pivot, pivot)) pivot = i;
-    }
-    if (k == 0) least = N * std::numeric_limits<double>::epsilon() * A(pivot, pivot);
-    if (!(A(pivot, pivot) > least)) break;
-    const double root = std::sqrt(A(pivot, pivot));
-    for (int i = 0; i < N; ++i) W(k, i) = A(i, pivot) / root;
-    for (int j = 0; j < N; ++j) {
-      for (int i = 0; i < N; ++i) A(i, j) -= W(k, i) * W(k, j);
-    }
-    for (int i = 0; i < N; ++i) A(i, pivot) = A(pivot, i) = 0;
-  }
-  return W;
-}
 
 /// Jdot (6 x n) at joint velocity qd: with j and k counted from the base, v and w the linear and
 /// angular rows of J,

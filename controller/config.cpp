@@ -89,13 +89,17 @@ void read_watchdog(const YamlMapping& root, Watchdog& watchdog) {
 }
 
 void read_analysis(const YamlMapping& root, Analysis& analysis) {
-  static constexpr std::array<std::string_view, 3> kKeys = {"where", "every", "soft_frequency"};
-  static constexpr std::array<std::pair<std::string_view, Analysis::Where>, 2> kPlaces = {
-      {{"off", Analysis::Where::kOff}, {"inline", Analysis::Where::kInline}}};
+  static constexpr std::array<std::string_view, 4> kKeys = {"where", "every", "soft_frequency",
+                                                            "shapes"};
+  static constexpr std::array<std::pair<std::string_view, Analysis::Where>, 3> kPlaces = {
+      {{"off", Analysis::Where::kOff},
+       {"inline", Analysis::Where::kInline},
+       {"background", Analysis::Where::kBackground}}};
   const YamlMapping keys = root.mapping("analysis", kKeys);
   read_choice(keys, "where", kPlaces, analysis.where);
   read_count(keys, "every", 1, analysis.every);
   read_number(keys, "soft_frequency", "rad/s", Sign::kNotNegative, analysis.soft_frequency);
+  read_switch(keys, "shapes", analysis.shapes);
 }
 
 /// "gains.joint.stiffness" for the setting "initial.gains.joint_stiffness", and so on.

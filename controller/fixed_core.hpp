@@ -1,8 +1,8 @@
 #pragma once
-#include <dashpot/controller/closed_loop.hpp>
 #include <dashpot/controller/controller_core.hpp>
 #include <dashpot/controller/gain_path.hpp>
 #include <dashpot/controller/impedance_law.hpp>
+#include <dashpot/controller/loop_system.hpp>
 #include <dashpot/controller/safety_filter.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/state_check.hpp>
@@ -15,7 +15,7 @@ namespace dashpot::controller {
 
 /// The controller's core for N joints, known at compile time. One tick, in `update`:
 ///     state -> StateCheck -> DynamicsKernel -> set-point, paths and gains -> ImpedanceLaw
-///           -> SafetyFilter -> torque;   and every so often -> closed loop -> VibrationAnalysis
+///           -> SafetyFilter -> torque;   and with these gains -> LoopSystem -> VibrationAnalysis
 template <int N>
 class FixedCore final : public ControllerCore {
  public:
@@ -48,6 +48,10 @@ class FixedCore final : public ControllerCore {
   Status ramp(Status status, JointVector& torque) noexcept;
   Status finish(Status status, const Vector& tau, JointVector& torque) noexcept;
   void describe() noexcept;
+  void analyse() noexcept;
+  /// Whether the closed loop is that of the last analysis, exactly.
+  bool looks_the_same(bool with_wrench, bool with_velocity) noexcept;
+  Impedance<N> impedance() const noexcept;
 
   DynamicsKernel<N> kernel_;
   StateCheck state_check_;
@@ -66,6 +70,14 @@ class FixedCore final : public ControllerCore {
   Vector qd_ = Vector::Zero();
   Vector6 external_wrench_ = Vector6::Zero();
   Dynamics<N> robot_;
+
+  LoopSystem<N> loop_;
+  struct {
+    bool any = false, damping_only = false;
+    std::uint64_t gain_changes = 0;
+    Vector q, qd;  ///< qd and wrench: zero where they do not matter
+    Vector6 wrench;
+  } analysed_;  ///< what the last analysis was of
 
   Setpoint accepted_;             ///< the last good set-point
   Vector goal_ = Vector::Zero();  ///< its joint position
@@ -126,6 +138,8 @@ void FixedCore<N>::reset(const JointVector& torque) noexcept {
     vector->setZero(N);
   }
   vibration_.reset(N);
+  loop_.reset();
+  analysed_.any = false;
 }
 
 template <int N>
@@ -294,11 +308,46 @@ Status FixedCore<N>::finish(Status status, const Vector& tau, JointVector& torqu
   copy<N>(tau, torque);
   copy<N>(tau, snapshot_.torque);
   snapshot_.status = status;
-  if (status < Status::kStateNotFinite && vibration_.due(snapshot_.tick)) {
-    closed_loop(vibration_.system());
-    vibration_.update(time_, snapshot_.tick, snapshot_.position);
-  }
+  vibration_.collect();
+  if (status < Status::kStateNotFinite && vibration_.due(snapshot_.tick)) analyse();
   return status;
+}
+
+template <int N>
+void FixedCore<N>::analyse() noexcept {
+  const TaskTerms& terms = settings_.task_terms;
+  const bool with_wrench = terms.geometric_stiffness && !external_wrench_.isZero(0);
+  bool with_velocity = false;
+  for (int i = 0; i < N && terms.jacobian_rate; ++i) with_velocity |= qd_[i] != 0;
+  if (looks_the_same(with_wrench, with_velocity)) {
+    vibration_.repeat(time_, snapshot_.tick);
+    return;
+  }
+  if (terms.geometric_stiffness && !with_wrench) ++vibration_.counters().no_wrench;
+  if (terms.jacobian_rate && !with_velocity) ++vibration_.counters().at_rest;
+  VibrationTask& task = vibration_.task();
+  task.time = time_;
+  task.tick = snapshot_.tick;
+  task.position = snapshot_.position;
+  if (with_wrench || with_velocity) {
+    closed_loop(task.system);
+    task.springs = true;
+  } else {
+    loop_.form(robot_, impedance(), law_.null_space(), viscous_friction_, task.system);
+    task.springs = task.system.stiffness_factor.rows() > 0;
+  }
+  vibration_.update();
+}
+
+template <int N>
+bool FixedCore<N>::looks_the_same(bool with_wrench, bool with_velocity) noexcept {
+  const Vector6 wrench = with_wrench ? external_wrench_ : Vector6(Vector6::Zero());
+  const Vector qd = with_velocity ? qd_ : Vector(Vector::Zero());
+  bool same = analysed_.any && analysed_.damping_only == damping_only_ &&
+              analysed_.gain_changes == gains_.changes() && analysed_.wrench == wrench;
+  for (int i = 0; i < N; ++i) same &= analysed_.q[i] == q_[i] && analysed_.qd[i] == qd[i];
+  analysed_ = {true, damping_only_, gains_.changes(), q_, qd, wrench};
+  return same;
 }
 
 template <int N>
@@ -336,14 +385,16 @@ void FixedCore<N>::describe() noexcept {
 }
 
 template <int N>
+Impedance<N> FixedCore<N>::impedance() const noexcept {
+  if (!damping_only_) return gains_.now();
+  Impedance<N> damping;
+  for (int i = 0; i < N; ++i) damping.joint_damping(i, i) = damping_[i];
+  return damping;
+}
+
+template <int N>
 void FixedCore<N>::closed_loop(analysis::System<kMaxJoints>& system) const noexcept {
-  Impedance<N> impedance;
-  if (damping_only_) {
-    for (int i = 0; i < N; ++i) impedance.joint_damping(i, i) = damping_[i];
-  } else {
-    impedance = gains_.now();
-  }
-  controller::closed_loop<N>(robot_, qd_, impedance, law_.null_space(), viscous_friction_,
+  controller::closed_loop<N>(robot_, qd_, impedance(), law_.null_space(), viscous_friction_,
                              settings_.task_terms, external_wrench_, system);
 }
 

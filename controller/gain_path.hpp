@@ -22,6 +22,7 @@ class Ramp {
   void start(const Value& value) noexcept {
     from_ = to_ = now_ = value;
     s_ = 1;
+    ++changes_;
   }
   void set_target(const Value& to) noexcept {
     from_ = now_;
@@ -30,16 +31,20 @@ class Ramp {
   }
   void step() noexcept {
     if (s_ == 1) return;
+    ++changes_;
     s_ = s_ > 1 - 1.5 * step_ ? 1 : s_ + step_;
     now_ = s_ == 1 ? to_ : blend(from_, to_, s_);
   }
 
   const Value& now() const noexcept { return now_; }
   const Value& target() const noexcept { return to_; }
+  /// How often the value changed so far.
+  std::uint64_t changes() const noexcept { return changes_; }
 
  private:
   double step_;
   double s_ = 1;
+  std::uint64_t changes_ = 0;
   Value from_{};
   Value to_{};
   Value now_{};

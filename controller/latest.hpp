@@ -19,7 +19,13 @@ class Latest {
 
   /// Of the writing thread.
   void write(const Value& value) noexcept {
-    slots_[writer_] = value;
+    slot() = value;
+    publish();
+  }
+  /// Of the writing thread: where the next value is written in place, over an old one, ...
+  Value& slot() noexcept { return slots_[writer_]; }
+  /// ... and then handed over.
+  void publish() noexcept {
     writer_ =
         shared_.exchange(static_cast<std::uint8_t>(writer_ | kFresh), std::memory_order_acq_rel) &
         kIndex;

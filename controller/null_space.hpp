@@ -50,14 +50,15 @@ class NullSpace {
     return y;
   }
   const TaskInertia& inertia() const noexcept { return inertia_; }
-
- private:
+  /// L
+  const SmallCholesky<N>& mass() const noexcept { return mass_; }
   /// y <- P y
   void project(Joints<N>& y) const noexcept {
     const Vector6 f = inertia_.wrench(twist<N>(Jh_, y));
     add_torque<N>(Jh_, -f, y);
   }
 
+ private:
   SmallCholesky<N> mass_;
   Jacobian<N> Jh_;
   TaskInertia inertia_;

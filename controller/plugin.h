@@ -32,7 +32,7 @@ extern "C" {
 #endif
 
 /* Grows whenever a function or struct changes; a library serves the versions it knows. */
-#define DASHPOT_PLUGIN_VERSION 1u
+#define DASHPOT_PLUGIN_VERSION 2u
 #define DASHPOT_MAX_JOINTS 16
 
 typedef struct dashpot_controller dashpot_controller;
@@ -76,6 +76,13 @@ enum {
   DASHPOT_UNDAMPED = 3,
   DASHPOT_UNSTABLE = 4,
   DASHPOT_SOFT = 5
+};
+
+/* Where modes come from. */
+enum {
+  DASHPOT_TRACKED = 0, /* the modes before, refined */
+  DASHPOT_REUSED = 1,  /* the modes before: nothing that matters has changed */
+  DASHPOT_DIRECT = 2   /* solved anew */
 };
 
 /* As dashpot_setpoint.time: given at the tick that takes it up. */
@@ -159,10 +166,10 @@ typedef struct dashpot_mode {
   double damped_frequency;               /* rad/s */
   double eigenvalues[2][2];              /* real and imaginary part, 1/s */
   double eigenvalue_bound;               /* 1/s */
-  double backward_error;                 /* relative change of the matrices that it is exact for */
   int32_t kind;                          /* DASHPOT_UNDERDAMPED, ... */
-  int32_t reserved;                      /* zero */
-  double shape_real[DASHPOT_MAX_JOINTS]; /* how far each joint moves, u^H M u = 1 */
+  int32_t label;                         /* stays with this mode as long as it can be followed */
+  double shape_real[DASHPOT_MAX_JOINTS]; /* how far each joint moves, u^H M u = 1; zero if the
+                                            configuration asks for no shapes */
   double shape_imag[DASHPOT_MAX_JOINTS];
 } dashpot_mode;
 
@@ -176,7 +183,20 @@ typedef struct dashpot_modes {
   int32_t status;                      /* 0: all numbers have a proved bound */
   uint32_t zero_modes;                 /* motions that no spring resists */
   uint32_t count;                      /* of the modes */
-  uint32_t reserved;                   /* zero */
+  int32_t origin;                      /* DASHPOT_TRACKED, ... */
+  /* Ticks since the start or the last reset, each of which counts once here, ... */
+  uint64_t tracked;    /* the modes before were refined */
+  uint64_t reused;     /* the modes before still held within their bounds */
+  uint64_t direct;     /* solved anew */
+  uint64_t unchanged;  /* joints and gains did not move at all: nothing was computed */
+  uint64_t no_springs; /* nothing vibrates: nothing was solved */
+  uint64_t failed;     /* no modes */
+  uint64_t missed;     /* the background thread was busy */
+  /* ... and what some of them could leave out. */
+  uint64_t no_zero_modes; /* springs hold every motion */
+  uint64_t no_wrench;     /* geometric_stiffness is on, but there is no external wrench */
+  uint64_t no_shapes;     /* nobody asks for shapes */
+  uint64_t at_rest;       /* jacobian_rate is on, but the robot stands still */
   dashpot_mode modes[DASHPOT_MAX_JOINTS];
 } dashpot_modes;
 

@@ -57,6 +57,9 @@ static_assert(DASHPOT_OVERDAMPED == static_cast<int>(analysis::ModeKind::kOverda
 static_assert(DASHPOT_UNDAMPED == static_cast<int>(analysis::ModeKind::kUndamped));
 static_assert(DASHPOT_UNSTABLE == static_cast<int>(analysis::ModeKind::kUnstable));
 static_assert(DASHPOT_SOFT == static_cast<int>(analysis::ModeKind::kSoft));
+static_assert(DASHPOT_TRACKED == static_cast<int>(analysis::SpectrumOrigin::kTracked));
+static_assert(DASHPOT_REUSED == static_cast<int>(analysis::SpectrumOrigin::kReused));
+static_assert(DASHPOT_DIRECT == static_cast<int>(analysis::SpectrumOrigin::kDirect));
 static_assert(DASHPOT_MAX_JOINTS == kMaxJoints);
 
 }  // namespace
@@ -149,6 +152,19 @@ void to_c(const Vibration& vibration, dashpot_modes& out) noexcept {
   out.status = static_cast<std::int32_t>(vibration.status);
   out.zero_modes = static_cast<std::uint32_t>(vibration.zero_modes);
   out.count = static_cast<std::uint32_t>(vibration.count);
+  out.origin = static_cast<std::int32_t>(vibration.origin);
+  const VibrationCounters& counters = vibration.counters;
+  out.tracked = counters.tracked;
+  out.reused = counters.reused;
+  out.direct = counters.direct;
+  out.unchanged = counters.unchanged;
+  out.no_springs = counters.no_springs;
+  out.failed = counters.failed;
+  out.missed = counters.missed;
+  out.no_zero_modes = counters.no_zero_modes;
+  out.no_wrench = counters.no_wrench;
+  out.no_shapes = counters.no_shapes;
+  out.at_rest = counters.at_rest;
   for (std::uint32_t i = 0; i < out.count; ++i) {
     const VibrationMode& from = vibration.modes[i];
     dashpot_mode& to = out.modes[i];
@@ -162,8 +178,8 @@ void to_c(const Vibration& vibration, dashpot_modes& out) noexcept {
       to.eigenvalues[k][1] = from.eigenvalues[k].imag();
     }
     to.eigenvalue_bound = from.error_bound;
-    to.backward_error = from.backward_error;
     to.kind = static_cast<std::int32_t>(from.kind);
+    to.label = from.label;
     for (Eigen::Index k = 0; k < from.shape.size(); ++k) {
       to.shape_real[k] = from.shape[k].real();
       to.shape_imag[k] = from.shape[k].imag();

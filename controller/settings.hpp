@@ -60,9 +60,14 @@ struct Watchdog {
 
 /// The vibration analysis beside the law.
 struct Analysis {
-  enum class Where : std::uint8_t { kOff, kInline } where = Where::kInline;
-  int every = 10;               ///< ticks between two analyses, at least 1
+  enum class Where : std::uint8_t {
+    kOff,
+    kInline,      ///< within the tick
+    kBackground,  ///< on a thread of its own, one tick later or when it gets round to it
+  } where = Where::kInline;
+  int every = 1;                ///< ticks between two analyses, at least 1
   double soft_frequency = 0.1;  ///< modes below this have no meaningful damping ratio, rad/s
+  bool shapes = true;           ///< with eigenvectors
 };
 
 /// Everything that is set once. Defaults stand here; those that depend on the robot are filled in

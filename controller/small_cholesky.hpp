@@ -65,22 +65,18 @@ class SmallCholesky {
       for (int j = i + 1; j < N; ++j) x[i] += L_(j, i) * x[j];
     }
   }
-  /// trace(diag(d) A^-1) = sum of d_k |column k of L^-1|^2
-  double trace_of_inverse(const Vector& d) const noexcept {
-    double trace = 0;
+  /// L^-1
+  Eigen::Matrix<double, N, N> inverse_L() const noexcept {
+    Eigen::Matrix<double, N, N> X = Eigen::Matrix<double, N, N>::Zero();
     for (int k = 0; k < N; ++k) {
-      Vector column;  // of L^-1, from row k on
-      column[k] = per_diagonal_[k];
-      double square = column[k] * column[k];
+      X(k, k) = per_diagonal_[k];
       for (int j = k + 1; j < N; ++j) {
         double sum = 0;
-        for (int i = k; i < j; ++i) sum -= L_(j, i) * column[i];
-        column[j] = sum * per_diagonal_[j];
-        square += column[j] * column[j];
+        for (int i = k; i < j; ++i) sum -= L_(j, i) * X(i, k);
+        X(j, k) = sum * per_diagonal_[j];
       }
-      trace += d[k] * square;
     }
-    return trace;
+    return X;
   }
 
  private:

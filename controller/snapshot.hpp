@@ -32,16 +32,35 @@ struct Snapshot {
 
 /// One vibration mode of the closed loop; the terms are those of analysis::Mode.
 struct VibrationMode {
+  /// Number that the mode keeps as long as it can be followed; no other mode gets it meanwhile.
+  std::int32_t label = 0;
+  analysis::ModeKind kind = analysis::ModeKind::kUnderdamped;
   std::array<analysis::Complex, 2> eigenvalues{};  ///< 1/s
   double natural_frequency = 0;                    ///< rad/s
   double damping_ratio = 0;
-  double damped_frequency = 0;  ///< rad/s
-  analysis::ModeKind kind = analysis::ModeKind::kUnderdamped;
-  analysis::ComplexVector<kMaxJoints> shape;  ///< n, u^H M u = 1
-  double backward_error = 0;
+  double damped_frequency = 0;         ///< rad/s
   double error_bound = 0;              ///< 1/s, proved; infinite if there is none
   double natural_frequency_bound = 0;  ///< rad/s
   double damping_ratio_bound = 0;
+  /// Of the first eigenvalue, n, u^H M u = 1; empty if Analysis::shapes is off.
+  analysis::ComplexVector<kMaxJoints> shape;
+};
+
+/// What the analysis did since the start or the last reset, in ticks, ...
+struct VibrationCounters {
+  // ... each of which counts once here, ...
+  std::uint64_t tracked = 0;     ///< the modes before were refined
+  std::uint64_t reused = 0;      ///< the modes before still hold within bounds that say so
+  std::uint64_t direct = 0;      ///< solved anew
+  std::uint64_t unchanged = 0;   ///< joints and gains did not move at all: nothing was computed
+  std::uint64_t no_springs = 0;  ///< nothing vibrates: nothing was solved
+  std::uint64_t failed = 0;      ///< no modes: Vibration::status says why
+  std::uint64_t missed = 0;      ///< the background thread was busy
+  // ... and what some of them could leave out.
+  std::uint64_t no_zero_modes = 0;  ///< springs hold every motion: nothing to keep apart
+  std::uint64_t no_wrench = 0;      ///< K_G is on, but there is no external wrench
+  std::uint64_t no_shapes = 0;      ///< nobody asks for shapes
+  std::uint64_t at_rest = 0;        ///< J' C_C Jdot is on, but the robot stands still
 };
 
 /// Vibration modes of the robot with the springs and dampers of one tick.
@@ -50,9 +69,11 @@ struct Vibration {
   std::uint64_t tick = 0;  ///< 0: none yet
   JointVector position;    ///< q it belongs to, n, rad
   analysis::Status status = analysis::Status::kOk;
+  analysis::SpectrumOrigin origin = analysis::SpectrumOrigin::kDirect;
   int zero_modes = 0;
-  int count = 0;  ///< of modes
-  std::array<VibrationMode, kMaxJoints> modes;
+  int count = 0;                                ///< of modes
+  std::array<VibrationMode, kMaxJoints> modes;  ///< by falling natural frequency
+  VibrationCounters counters;
 };
 
 }  // namespace dashpot::controller

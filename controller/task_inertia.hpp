@@ -26,34 +26,15 @@ class TaskInertia {
                const Eigen::Matrix3d& R_BT) noexcept;
 
   /// H G^-1 H a: wrench that gives the tip the acceleration a in the held directions.
-  Vector6 wrench(const Vector6& acceleration) const noexcept {
-    Vector6 f = hold(acceleration);
-    factor_.solve_L(f);
-    factor_.solve_LT(f);
-    return hold(f);
-  }
+  Vector6 wrench(const Vector6& acceleration) const noexcept { return inertia_ * acceleration; }
   /// w
   double regularity() const noexcept { return regularity_; }
+  /// l > 0
+  bool nearly_singular() const noexcept { return !(regularity_ >= kNearlySingular); }
 
  private:
-  /// H a
-  Vector6 hold(const Vector6& a) const noexcept;
-
-  Eigen::Matrix3d H_linear_ = Eigen::Matrix3d::Zero();  ///< the blocks of H; it has no others
-  Eigen::Matrix3d H_angular_ = Eigen::Matrix3d::Zero();
-  SmallCholesky<6> factor_;  ///< of G
+  Matrix6 inertia_ = Matrix6::Zero();  ///< H G^-1 H
   double regularity_ = 1;
 };
-
-inline Vector6 TaskInertia::hold(const Vector6& a) const noexcept {
-  Vector6 result = Vector6::Zero();
-  for (int j = 0; j < 3; ++j) {
-    for (int i = 0; i < 3; ++i) {
-      result[i] += H_linear_(i, j) * a[j];
-      result[i + 3] += H_angular_(i, j) * a[j + 3];
-    }
-  }
-  return result;
-}
 
 }  // namespace dashpot::controller

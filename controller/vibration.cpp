@@ -1,52 +1,147 @@
-#include <dashpot/controller/vibration.hpp>
-
-#include <algorithm>
+#include <dashpot/controller/vibration_thread.hpp>
 
 namespace dashpot::controller {
+namespace {
 
-VibrationAnalysis::VibrationAnalysis(const Analysis& settings)
-    : every_(settings.where == Analysis::Where::kOff ? 0
-                                                     : static_cast<std::uint64_t>(settings.every)),
-      solver_([&] {
-        analysis::SpectrumOptions options;
-        options.soft_frequency = settings.soft_frequency;
-        options.residual = analysis::SpectrumOptions::Residual::kWorking;
-        return options;
-      }()) {}
+using analysis::SpectrumOrigin;
 
-VibrationAnalysis::~VibrationAnalysis() = default;
-
-void VibrationAnalysis::reset(Eigen::Index n) noexcept {
-  result_.time = 0;
-  result_.tick = 0;
-  result_.position.setZero(n);
-  result_.status = analysis::Status::kOk;
-  result_.zero_modes = 0;
-  result_.count = 0;
+analysis::TrackerOptions tracker_options(const Analysis& settings) {
+  analysis::TrackerOptions options;
+  options.soft_frequency = settings.soft_frequency;
+  options.shapes = settings.shapes;
+  return options;
 }
 
-void VibrationAnalysis::update(std::int64_t time, std::uint64_t tick,
-                               const JointVector& position) noexcept {
-  result_.time = time;
-  result_.tick = tick;
-  result_.position = position;
-  result_.status = solver_.solve(system_, spectrum_);
-  result_.zero_modes = spectrum_.zero_modes.count;
-  result_.count = std::min(spectrum_.modes.size(), kMaxJoints);
-  for (int i = 0; i < result_.count; ++i) {
-    const analysis::Mode<kMaxJoints>& from = spectrum_.modes[i];
-    VibrationMode& to = result_.modes[static_cast<std::size_t>(i)];
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+}  // namespace
+
+VibrationSolver::VibrationSolver(const Analysis& settings)
+    : shapes_(settings.shapes), tracker_(tracker_options(settings)) {}
+
+void VibrationSolver::reset() noexcept {
+  tracker_.forget();
+  counters_ = {};
+  skipped_ = static_cast<std::uint64_t>(tracker_.counters().shapes_skipped);
+  solved_ = 0;
+}
+
+void VibrationSolver::solve(const VibrationTask& task, Vibration& result) noexcept {
+  result.time = task.time;
+  result.tick = task.tick;
+  result.position = task.position;
+  counters_.missed += task.number - solved_ - 1;
+  solved_ = task.number;
+  if (task.springs) {
+    tracker_.update(task.system, spectrum_);
+    counters_.no_shapes = static_cast<std::uint64_t>(tracker_.counters().shapes_skipped) - skipped_;
+    publish_modes(result);
+    const bool found =
+        result.status == analysis::Status::kOk || result.status == analysis::Status::kUncertified;
+    if (!found) {
+      result.zero_modes = 0;
+      ++counters_.failed;
+    } else {
+      ++(result.origin == SpectrumOrigin::kTracked  ? counters_.tracked
+         : result.origin == SpectrumOrigin::kReused ? counters_.reused
+                                                    : counters_.direct);
+      if (result.zero_modes == 0) ++counters_.no_zero_modes;
+    }
+  } else {
+    result.status = analysis::Status::kOk;
+    result.origin = SpectrumOrigin::kDirect;
+    result.zero_modes = static_cast<int>(task.position.size());
+    result.count = 0;
+    ++counters_.no_springs;
+  }
+  result.counters = counters_;
+  result.counters.unchanged = task.counters.unchanged;
+  result.counters.no_wrench = task.counters.no_wrench;
+  result.counters.at_rest = task.counters.at_rest;
+}
+
+void VibrationSolver::publish_modes(Vibration& result) const noexcept {
+  result.status = spectrum_.status;
+  result.origin = spectrum_.origin;
+  result.zero_modes = spectrum_.zero_mode_count;
+  result.count = spectrum_.mode_count;
+  // Labels of modes that cannot be recognised any more come back after 2^26 such losses.
+  const std::uint64_t family = (spectrum_.lineage - 1) % (1u << 26);
+  for (int i = 0; i < result.count; ++i) {
+    const int place = spectrum_.by_frequency[at(i)];
+    const analysis::ModeNumbers& from = spectrum_.modes[at(place)];
+    VibrationMode& to = result.modes[at(i)];
+    to.label = static_cast<std::int32_t>(family * kMaxJoints) + place + 1;
+    to.kind = from.kind;
     to.eigenvalues = from.eigenvalues;
     to.natural_frequency = from.natural_frequency;
     to.damping_ratio = from.damping_ratio;
     to.damped_frequency = from.damped_frequency;
-    to.kind = from.kind;
-    to.shape = from.shapes[0];
-    to.backward_error = from.backward_error;
     to.error_bound = from.error_bound;
     to.natural_frequency_bound = from.natural_frequency_bound;
     to.damping_ratio_bound = from.damping_ratio_bound;
+    if (shapes_) to.shape = spectrum_.shapes[at(place)].u[0];
   }
+}
+
+VibrationAnalysis::VibrationAnalysis(const Analysis& settings)
+    : every_(settings.where == Analysis::Where::kOff ? 0
+                                                     : static_cast<std::uint64_t>(settings.every)),
+      solver_(settings) {
+  if (settings.where == Analysis::Where::kBackground) {
+    thread_ = std::make_unique<VibrationThread>(settings);
+  }
+}
+
+VibrationAnalysis::~VibrationAnalysis() = default;
+
+VibrationTask& VibrationAnalysis::task() noexcept {
+  return thread_ ? thread_->tasks.slot() : task_;
+}
+
+void VibrationAnalysis::update() noexcept {
+  VibrationTask& given = task();
+  given.number = ++tasks_;
+  given.resets = resets_;
+  given.counters = counters_;
+  if (thread_) {
+    thread_->tasks.publish();
+  } else {
+    solver_.solve(given, result_);
+  }
+}
+
+void VibrationAnalysis::repeat(std::int64_t time, std::uint64_t tick) noexcept {
+  ++counters_.unchanged;
+  if (thread_) return;
+  result_.time = time;
+  result_.tick = tick;
+  if (result_.count > 0) result_.origin = SpectrumOrigin::kReused;
+  ++result_.counters.unchanged;
+}
+
+void VibrationAnalysis::collect() noexcept {
+  if (!thread_ || !thread_->results.fetch()) return;
+  const VibrationThread::Result& latest = thread_->results.value();
+  if (latest.resets == resets_) shown_ = &latest.vibration;
+}
+
+void VibrationAnalysis::reset(Eigen::Index n) noexcept {
+  ++resets_;
+  tasks_ = 0;
+  counters_ = {};
+  solver_.reset();
+  result_.time = 0;
+  result_.tick = 0;
+  result_.position.setZero(n);
+  result_.status = analysis::Status::kOk;
+  result_.origin = SpectrumOrigin::kDirect;
+  result_.zero_modes = 0;
+  result_.count = 0;
+  result_.counters = {};
+  shown_ = &result_;
 }
 
 }  // namespace dashpot::controller

@@ -1,11 +1,52 @@
 #pragma once
-#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/snapshot.hpp>
 
+#include <memory>
+
 namespace dashpot::controller {
 
-/// Finds the vibration modes of the closed loop. All memory is set aside at set-up.
+/// One tick to be analysed.
+struct VibrationTask {
+  std::int64_t time = 0;
+  std::uint64_t tick = 0;
+  JointVector position;
+  analysis::System<kMaxJoints> system;  ///< the closed loop; see LoopSystem
+  bool springs = true;                  ///< there is a stiffness at all
+  std::uint64_t number = 0;             ///< of tasks so far, this one included
+  std::uint64_t resets = 0;             ///< results of before a reset are not wanted
+  VibrationCounters counters;           ///< those of the ticks that were not even tasks, or in part
+};
+
+/// Finds the modes of one task after the other, each from those before.
+class VibrationSolver {
+ public:
+  explicit VibrationSolver(const Analysis& settings);
+  /// Bounded work, no allocation, no system call.
+  void solve(const VibrationTask& task, Vibration& result) noexcept;
+  /// Forgets the past.
+  void reset() noexcept;
+
+ private:
+  void publish_modes(Vibration& result) const noexcept;
+
+  bool shapes_;
+  analysis::ModeTracker tracker_;
+  analysis::TrackedSpectrum spectrum_;
+  VibrationCounters counters_;
+  std::uint64_t solved_ = 0;   ///< number of the last task
+  std::uint64_t skipped_ = 0;  ///< shapes that the tracker had left out at the last reset
+};
+
+class VibrationThread;
+
+/// Finds the vibration modes of the closed loop: within the tick, on a thread of its own, or not at
+/// all. All memory is set aside, and the thread started, at set-up.
+///
+/// Where no modes are found the result's status says why, its count is zero, and nothing else is
+/// affected. Results on the thread have the same numbers as those within the tick as long as it
+/// keeps up; where it missed some, other numbers within the proved bounds.
 class VibrationAnalysis {
  public:
   explicit VibrationAnalysis(const Analysis& settings);
@@ -15,18 +56,29 @@ class VibrationAnalysis {
 
   /// Whether this tick (counted from 1) is one to analyse.
   bool due(std::uint64_t tick) const noexcept { return every_ != 0 && (tick - 1) % every_ == 0; }
-  /// Where the caller puts the closed loop before `update`.
-  analysis::System<kMaxJoints>& system() noexcept { return system_; }
-  void update(std::int64_t time, std::uint64_t tick, const JointVector& position) noexcept;
+  /// Where the caller puts all but `number`, `resets` and `counters` before `update`.
+  VibrationTask& task() noexcept;
+  /// Of the ticks that the caller knows to need less.
+  VibrationCounters& counters() noexcept { return counters_; }
+  void update() noexcept;
+  /// Instead of `task` and `update`, for a tick whose closed loop is exactly that of the last one.
+  void repeat(std::int64_t time, std::uint64_t tick) noexcept;
+  /// Fetches what the thread has found.
+  void collect() noexcept;
   void reset(Eigen::Index n) noexcept;
-  const Vibration& result() const noexcept { return result_; }
+  const Vibration& result() const noexcept { return *shown_; }
 
  private:
   std::uint64_t every_;  ///< 0: never
-  analysis::System<kMaxJoints> system_;
-  analysis::SpectrumSolver<kMaxJoints> solver_;
-  analysis::Spectrum<kMaxJoints> spectrum_;
+  std::uint64_t tasks_ = 0, resets_ = 0;
+  VibrationCounters counters_;
+  // Within the tick:
+  VibrationTask task_;
+  VibrationSolver solver_;
   Vibration result_;
+  // Or apart from it:
+  std::unique_ptr<VibrationThread> thread_;
+  const Vibration* shown_ = &result_;
 };
 
 }  // namespace dashpot::controller

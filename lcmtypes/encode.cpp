@@ -30,6 +30,18 @@ static_assert(static_cast<int>(ModeKind::kSoft) == modes_t::SOFT);
 static_assert(static_cast<int>(controller::Mode::kJoint) == state_t::JOINT);
 static_assert(static_cast<int>(controller::Mode::kCartesian) == state_t::CARTESIAN);
 
+std::int8_t solved_by(analysis::SpectrumOrigin origin) {
+  switch (origin) {
+    case analysis::SpectrumOrigin::kTracked:
+      return modes_t::TRACKED;
+    case analysis::SpectrumOrigin::kReused:
+      return modes_t::REUSED;
+    case analysis::SpectrumOrigin::kDirect:
+      break;
+  }
+  return modes_t::DIRECT;
+}
+
 void resize_modes(std::size_t count, modes_t& message) {
   for (auto* list : {&message.natural_frequency, &message.damping_ratio, &message.damped_frequency,
                      &message.eigenvalue_bound, &message.natural_frequency_bound,
@@ -47,6 +59,7 @@ void resize_modes(std::size_t count, modes_t& message) {
 /// Copies a mode of a robot with n joints to place i.
 void fill_mode(const controller::VibrationMode& mode, std::size_t n, std::size_t i,
                modes_t& message) {
+  message.label[i] = mode.label;
   message.kind[i] = static_cast<std::int8_t>(mode.kind);
   message.natural_frequency[i] = mode.natural_frequency;
   message.damping_ratio[i] = mode.damping_ratio;
@@ -109,13 +122,12 @@ void fill(const ModesSample& sample, modes_t& message) {
   message.num_modes = static_cast<std::int32_t>(count);
   message.utime = sample.utime;
   message.tick = static_cast<std::int64_t>(vibration.tick);
-  message.solved_by = sample.solved_by;
+  message.solved_by = solved_by(vibration.origin);
   message.status = static_cast<std::int8_t>(vibration.status);
   copy_to(vibration.position, n, message.joint_position);
   message.zero_modes = vibration.zero_modes;
   resize_modes(count, message);
   for (std::size_t i = 0; i < count; ++i) {
-    message.label[i] = sample.labels[i];
     fill_mode(vibration.modes[i], n, i, message);
   }
 }

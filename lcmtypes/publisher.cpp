@@ -22,7 +22,8 @@ bool differ(double a, double b, double tolerance) {
 
 bool differ(const controller::VibrationMode& a, const controller::VibrationMode& b,
             double tolerance) {
-  return a.kind != b.kind || differ(a.natural_frequency, b.natural_frequency, tolerance) ||
+  return a.label != b.label || a.kind != b.kind ||
+         differ(a.natural_frequency, b.natural_frequency, tolerance) ||
          differ(a.damping_ratio, b.damping_ratio, tolerance);
 }
 
@@ -118,7 +119,7 @@ void Publisher::send(const char* channel, const Message& message) {
 
 bool Publisher::is_new(const ModesSample& sample) const {
   const double silence = 1e-6 * static_cast<double>(sample.utime - published_modes_.utime);
-  return !(silence < options_.modes_heartbeat) || sample.labels != published_modes_.labels ||
+  return !(silence < options_.modes_heartbeat) ||
          differ(sample.vibration, published_modes_.vibration, options_.modes_tolerance);
 }
 

@@ -3,7 +3,6 @@
 
 #include <dashpot/controller/snapshot.hpp>
 
-#include <array>
 #include <cstdint>
 
 namespace dashpot::lcmtypes {
@@ -26,12 +25,8 @@ struct StateSample {
 
 /// The modes at one configuration.
 struct ModesSample {
-  std::int64_t utime = 0;     ///< beginning of the tick they belong to, us since 1970-01-01 UTC
-  std::int8_t solved_by = 0;  ///< modes_t::DIRECT, ...
+  std::int64_t utime = 0;  ///< beginning of the tick they belong to, us since 1970-01-01 UTC
   controller::Vibration vibration;
-  /// One mode keeps one label while it can be followed; without that, its rank.
-  std::array<std::int32_t, controller::kMaxJoints> labels{1, 2,  3,  4,  5,  6,  7,  8,
-                                                          9, 10, 11, 12, 13, 14, 15, 16};
 };
 
 }  // namespace dashpot::lcmtypes

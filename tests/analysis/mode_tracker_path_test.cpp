@@ -287,6 +287,22 @@ TEST(TrackedPath, PartsModesThatNearlyCrossBetweenTwoSteps) {
   }
 }
 
+TEST(TrackedPath, StartsAfreshIfToldToForget) {
+  const MatrixXd I = MatrixXd::Identity(3, 3);
+  const auto at = [&](double a, double b, double c) {
+    MatrixXd K = Eigen::Vector3d(a, b, c).asDiagonal();
+    K(0, 1) = K(1, 0) = 0.5;
+    return make(I, 0.3 * I, K);
+  };
+  Follower follower;
+  follower.follow(3, 1, [&](double t) { return at(400 + t, 100, 25); });
+  follower.tracker->forget();
+  follower.follow(1, 1, [&](double) { return at(25, 400, 100); });
+  for (const int i : {0, 1, 2}) {
+    EXPECT_NEAR(follower.mode(i).natural_frequency, 20.0 / (1 << i), 0.01);
+  }
+}
+
 TEST(TrackedPath, KeepsPlacesOverASmallJump) {
   const MatrixXd I = MatrixXd::Identity(3, 3);
   const auto at = [&](double a, double b, double c) {

@@ -44,6 +44,31 @@ TEST(Realtime, UpdateNeverAllocates) {
   EXPECT_GT(controller.snapshot().tick + 1, 0u);
 }
 
+/// With the spectrum in every tick, followed and solved anew, and on a thread.
+TEST(Realtime, AnalysisNeverAllocates) {
+  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
+  const RobotModel model = panda();
+  for (const Analysis::Where where : {Analysis::Where::kInline, Analysis::Where::kBackground}) {
+    Settings settings = HostileTicks::everything_on(model);
+    settings.analysis.where = where;
+    settings.analysis.every = 1;
+    Controller controller(model, settings);
+    HostileTicks input(model, settings, 344, 0.001);
+    JointVector torque;
+    const int count = allocations_of([&] {
+      for (int k = 0; k < 200'000; ++k) {
+        input.next();
+        controller.update(input.state, input.setpoint, torque);
+      }
+    });
+    EXPECT_EQ(count, 0);
+    if (where != Analysis::Where::kInline) continue;
+    const VibrationCounters& counters = controller.vibration().counters;
+    EXPECT_GT(counters.tracked, 100'000u);
+    EXPECT_GT(counters.direct, 100u);
+  }
+}
+
 TEST(Realtime, HostileInputNeverGivesHostileTorque) {
   std::set<Status> seen;
   for (const int n : {1, 2, 6, 7, 11, 16}) {
@@ -89,17 +114,22 @@ TEST(Realtime, UpdateMakesNoSystemCall) {
   if (forbidden == -1) GTEST_SKIP() << "no seccomp here";
   ASSERT_EQ(forbidden, SIGKILL);  // the trap works
   const RobotModel model = panda();
-  const Settings settings = HostileTicks::everything_on(model);
-  Controller controller(model, settings);
-  HostileTicks input(model, settings, 343, 0.02);
-  JointVector torque;
-  EXPECT_EQ(signal_without_system_calls([&] {
-              for (int k = 0; k < 100'000; ++k) {
-                input.next();
-                controller.update(input.state, input.setpoint, torque);
-              }
-            }),
-            0);
+  // The thread that analyses in the background stays behind in the parent process.
+  for (const Analysis::Where where : {Analysis::Where::kInline, Analysis::Where::kBackground}) {
+    Settings settings = HostileTicks::everything_on(model);
+    settings.analysis.where = where;
+    settings.analysis.every = 1;
+    Controller controller(model, settings);
+    HostileTicks input(model, settings, 343, 0.02);
+    JointVector torque;
+    EXPECT_EQ(signal_without_system_calls([&] {
+                for (int k = 0; k < 100'000; ++k) {
+                  input.next();
+                  controller.update(input.state, input.setpoint, torque);
+                }
+              }),
+              0);
+  }
 }
 
 }  // namespace

@@ -115,11 +115,14 @@ TEST(ModesMessage, SaysWhatTheSampleSays) {
     EXPECT_EQ(message.zero_modes, vibration.zero_modes);
     EXPECT_EQ(message.utime, sample.utime);
     EXPECT_EQ(message.tick, static_cast<std::int64_t>(vibration.tick));
-    EXPECT_EQ(message.solved_by, sample.solved_by);
+    EXPECT_EQ(message.solved_by,
+              vibration.origin == analysis::SpectrumOrigin::kTracked  ? modes_t::TRACKED
+              : vibration.origin == analysis::SpectrumOrigin::kReused ? modes_t::REUSED
+                                                                      : modes_t::DIRECT);
     EXPECT_THAT(message.joint_position, ElementsAreArray(list(vibration.position)));
     for (std::size_t i = 0; i < static_cast<std::size_t>(vibration.count); ++i) {
       const controller::VibrationMode& mode = vibration.modes[i];
-      EXPECT_EQ(message.label[i], sample.labels[i]);
+      EXPECT_EQ(message.label[i], vibration.modes[i].label);
       EXPECT_EQ(message.kind[i], static_cast<int>(mode.kind));
       for (std::size_t k = 0; k < 2; ++k) {
         EXPECT_EQ(message.eigenvalue_real[i][k], mode.eigenvalues[k].real());

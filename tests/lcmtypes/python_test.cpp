@@ -77,7 +77,7 @@ TEST(Python, ReadsALogWithGeneratedTypes) {
     EXPECT_EQ(message["q"], list(vibration.position));
     for (std::size_t k = 0; k < static_cast<std::size_t>(vibration.count); ++k) {
       EXPECT_EQ(message["frequency"][k], vibration.modes[k].natural_frequency);
-      EXPECT_EQ(message["label"][k], modes[i].labels[k]);
+      EXPECT_EQ(message["label"][k], vibration.modes[k].label);
       const Eigen::VectorXd shape = vibration.modes[k].shape.real();
       EXPECT_EQ(message["shape"][k], list(shape));
     }

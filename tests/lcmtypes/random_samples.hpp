@@ -46,15 +46,15 @@ inline StateSample random_state(Random& random, int n) {
 inline ModesSample random_modes(Random& random, int n) {
   ModesSample sample;
   sample.utime = kNow + random.integer(0, 1'000'000'000);
-  sample.solved_by = static_cast<std::int8_t>(random.integer(0, 2));
   controller::Vibration& vibration = sample.vibration;
   vibration.tick = static_cast<std::uint64_t>(random.integer(1, 1'000'000'000));
+  vibration.origin = static_cast<analysis::SpectrumOrigin>(random.integer(0, 2));
   vibration.position = random.vector(n);
   vibration.zero_modes = random.integer(0, n);
   vibration.count = n - vibration.zero_modes;
   for (std::size_t i = 0; i < static_cast<std::size_t>(vibration.count); ++i) {
     controller::VibrationMode& mode = vibration.modes[i];
-    sample.labels[i] = random.integer(0, 1000);
+    mode.label = random.integer(0, 1000);
     for (analysis::Complex& value : mode.eigenvalues) {
       value.real(random.uniform(-9, 0));
       value.imag(random.uniform(-9, 9));

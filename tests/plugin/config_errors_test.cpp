@@ -182,7 +182,8 @@ INSTANTIATE_TEST_SUITE_P(
                   "gains: {task: {directions: x}}\n"},
         BadConfig{"NoSwitch", "feed_forward.gravity: true or false is wanted, not 'yes' (line 2)",
                   "feed_forward: {gravity: yes}\n"},
-        BadConfig{"UnknownPlace", "analysis.where: off or inline is wanted, not a list (line 2)",
+        BadConfig{"UnknownPlace",
+                  "analysis.where: off, inline or background is wanted, not a list (line 2)",
                   "analysis: {where: []}\n"}),
     name_of);
 

@@ -163,7 +163,7 @@ TEST(Config, FillsTheRest) {
            "feed_forward: {gravity: false, coriolis: false, friction: true, acceleration: false,\n"
            "  wrench: false}\n"
            "watchdog: {setpoint_hold: 100 ms, setpoint_damp: 0, longest_gap: 5 ms}\n"
-           "analysis: {where: 'off', every: 7, soft_frequency: 0.2 rad/s}\n")
+           "analysis: {where: 'off', every: 7, soft_frequency: 0.2 rad/s, shapes: false}\n")
           .settings;
   EXPECT_TRUE(all.task_terms.geometric_stiffness);
   EXPECT_TRUE(all.task_terms.jacobian_rate);
@@ -189,6 +189,7 @@ TEST(Config, FillsTheRest) {
   EXPECT_EQ(all.analysis.where, controller::Analysis::Where::kOff);
   EXPECT_EQ(all.analysis.every, 7);
   EXPECT_EQ(all.analysis.soft_frequency, 0.2);
+  EXPECT_FALSE(all.analysis.shapes);
 }
 
 /// The Panda's first line, with more keys.
@@ -307,6 +308,7 @@ TEST(ConfigExample, ShowsDefaults) {
   EXPECT_EQ(shown.analysis.where, none.analysis.where);
   EXPECT_EQ(shown.analysis.every, none.analysis.every);
   EXPECT_EQ(shown.analysis.soft_frequency, none.analysis.soft_frequency);
+  EXPECT_EQ(shown.analysis.shapes, none.analysis.shapes);
 }
 
 /// Every key that the reader says it knows stands in the example.

@@ -51,8 +51,8 @@ class Mode(c.Structure):
     _fields_ = [("natural_frequency", c.c_double), ("natural_frequency_bound", c.c_double),
                 ("damping_ratio", c.c_double), ("damping_ratio_bound", c.c_double),
                 ("damped_frequency", c.c_double), ("eigenvalues", c.c_double * 4),
-                ("eigenvalue_bound", c.c_double), ("backward_error", c.c_double),
-                ("kind", c.c_int32), ("reserved", c.c_int32),
+                ("eigenvalue_bound", c.c_double),
+                ("kind", c.c_int32), ("label", c.c_int32),
                 ("shape_real", c.c_double * MAX_JOINTS), ("shape_imag", c.c_double * MAX_JOINTS)]
 
 
@@ -60,7 +60,11 @@ class Modes(c.Structure):
     _fields_ = [("struct_size", c.c_uint32), ("joints", c.c_uint32), ("time", c.c_int64),
                 ("tick", c.c_uint64), ("position", c.c_double * MAX_JOINTS),
                 ("status", c.c_int32), ("zero_modes", c.c_uint32), ("count", c.c_uint32),
-                ("reserved", c.c_uint32), ("modes", Mode * MAX_JOINTS)]
+                ("origin", c.c_int32), ("tracked", c.c_uint64), ("reused", c.c_uint64),
+                ("direct", c.c_uint64), ("unchanged", c.c_uint64), ("no_springs", c.c_uint64),
+                ("failed", c.c_uint64), ("missed", c.c_uint64), ("no_zero_modes", c.c_uint64),
+                ("no_wrench", c.c_uint64), ("no_shapes", c.c_uint64), ("at_rest", c.c_uint64),
+                ("modes", Mode * MAX_JOINTS)]
 
 
 Handle = c.c_void_p
@@ -90,8 +94,8 @@ def load(path):
     library.dashpot_plugin_interface.restype = c.POINTER(Plugin)
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
-    plugin = library.dashpot_plugin_interface(1).contents
-    assert plugin.version == 1 and plugin.struct_size == c.sizeof(Plugin)
+    plugin = library.dashpot_plugin_interface(2).contents
+    assert plugin.version == 2 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
 

@@ -53,6 +53,7 @@ lcmtypes::ModesSample modes_at(int tick) {
   vibration.count = 2;
   for (std::size_t i = 0; i < 2; ++i) {
     controller::VibrationMode& mode = vibration.modes[i];
+    mode.label = static_cast<std::int32_t>(i + 1);
     mode.natural_frequency = i == 0 ? 20.234 : 9.761;
     mode.damping_ratio = i == 0 ? 0.25 : 1.5;
     mode.kind = i == 0 ? analysis::ModeKind::kUnderdamped : analysis::ModeKind::kOverdamped;

@@ -272,7 +272,7 @@ TEST_F(ModesPublisher, PublishesEveryChangeOfUse) {
   EXPECT_FALSE(is_published(1000)) << "still lost";
   vibration.modes[0].kind = analysis::ModeKind::kUnstable;
   EXPECT_TRUE(is_published(1000)) << "kind";
-  modes_.labels[1] = 7;
+  vibration.modes[1].label = 7;
   EXPECT_TRUE(is_published(1000)) << "label";
   vibration.status = analysis::Status::kUncertified;
   EXPECT_TRUE(is_published(1000)) << "status";
