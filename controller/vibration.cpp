@@ -14,8 +14,6 @@ VibrationAnalysis::VibrationAnalysis(const Analysis& settings)
         return options;
       }()) {}
 
-VibrationAnalysis::~VibrationAnalysis() = default;
-
 void VibrationAnalysis::reset(Eigen::Index n) noexcept {
   result_.time = 0;
   result_.tick = 0;

@@ -9,7 +9,6 @@ namespace dashpot::controller {
 class VibrationAnalysis {
  public:
   explicit VibrationAnalysis(const Analysis& settings);
-  ~VibrationAnalysis();
   VibrationAnalysis(const VibrationAnalysis&) = delete;
   VibrationAnalysis& operator=(const VibrationAnalysis&) = delete;
 
