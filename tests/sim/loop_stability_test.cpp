@@ -1,0 +1,152 @@
+// The stability that the analysis of the sampled loop promises, against plants in simulation: gains
+// 2 % inside the boundary settle, 2 % outside they do not.
+#include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/sim/linear_system.hpp>
+#include <dashpot/tests/support/released_arm.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace dashpot {
+namespace {
+
+using controller::JointVector;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::Random;
+
+sim::PlantOptions plant_options(const analysis::SampledLoop& loop) {
+  sim::PlantOptions options;
+  options.period = loop.period;
+  options.integrator.max_step = loop.period;
+  options.delay = loop.delay;
+  options.torque_cutoff = loop.torque_cutoff;
+  options.difference_velocity = loop.difference_velocity;
+  return options;
+}
+
+/// Ticks in which |z| or its inverse grows to e^12, and those before the largest |z| rules.
+int ticks_to_tell(double spectral_radius) {
+  return 200 + static_cast<int>(12 / std::abs(std::log(spectral_radius)));
+}
+
+/// Growth of |q| from the first to the last tenth of the ticks.
+template <class Step>
+double growth(int ticks, const Step& step) {
+  double first = 0, last = 0;
+  for (int k = 0; k < ticks; ++k) {
+    const double size = step();
+    if (k < ticks / 10) first = std::max(first, size);
+    if (k >= ticks - ticks / 10) last = std::max(last, size);
+  }
+  return last / first;
+}
+
+TEST(LoopStability, TurnsWhereTheAnalysisSays) {
+  int compared = 0;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    Random random(seed);
+    const int n = random.integer(1, 5);
+    analysis::System<> nominal(n);
+    nominal.mass = random.spd(n);
+    nominal.stiffness = 1000 * random.spd(n);
+    nominal.damping = 20 * random.spd(n);
+    analysis::SampledLoop loop;
+    loop.period = random.log_uniform(5e-4, 4e-3);
+    loop.delay = static_cast<int>(seed % 4);
+    loop.torque_cutoff = random.integer(0, 1) * random.log_uniform(0.05, 0.3) / loop.period;
+    loop.difference_velocity = random.integer(0, 1) == 1;
+    loop.friction = 0.5 * random.spd(n);
+    nominal.damping += loop.friction;
+    const double margin = gain_margin(nominal, analyze(nominal), loop);
+    ASSERT_GT(margin, 0);
+    ASSERT_TRUE(std::isfinite(margin));
+    for (const double factor : {0.98, 1.02}) {
+      analysis::System<> system = nominal;
+      system.stiffness *= factor * margin;
+      system.damping = loop.friction + factor * margin * (nominal.damping - loop.friction);
+      const analysis::SampledSpectrum sampled = sample_loop(system, analyze(system), loop);
+      EXPECT_EQ(sampled.stable(), factor < 1);
+      sim::LinearSystem masses(system.mass, loop.friction, MatrixXd::Zero(n, n));
+      sim::Plant plant(masses, plant_options(loop), random.vector(n));
+      const MatrixXd C = system.damping - loop.friction;
+      const double grown = growth(ticks_to_tell(sampled.spectral_radius), [&] {
+        const sim::Measurement& seen = plant.measured();
+        EXPECT_EQ(plant.step(-system.stiffness * seen.position - C * seen.velocity),
+                  sim::Status::kOk);
+        return plant.position().norm();
+      });
+      if (factor < 1) {
+        EXPECT_LT(grown, 0.1) << "margin " << margin << ", |z| " << sampled.spectral_radius;
+      } else {
+        EXPECT_GT(grown, 10) << "margin " << margin << ", |z| " << sampled.spectral_radius;
+      }
+      ++compared;
+    }
+  }
+  EXPECT_EQ(compared, 80);
+}
+
+/// The real controller and the arms at 1 kHz with one tick of delay, and with what else there is.
+class ArmStability : public ::testing::TestWithParam<testing::Arm> {};
+INSTANTIATE_TEST_SUITE_P(Arms, ArmStability, ::testing::ValuesIn(testing::arms()),
+                         [](const auto& instance) { return std::string(instance.param.file); });
+
+TEST_P(ArmStability, TurnsWhereTheAnalysisSays) {
+  const testing::TwinModels twin(GetParam());
+  for (int seed = 1; seed <= 5; ++seed) {
+    Random random(static_cast<std::uint64_t>(seed));
+    const JointVector q0 = random_posture(twin, random);
+    controller::Gains gains =
+        tip_gains(twin, q0, VectorXd::Constant(6, 50), VectorXd::Constant(6, 0.7), 0.3, random);
+    if (twin.dof() > 6) {
+      gains.null_damping.setConstant(40 / self_motion(twin, q0).squaredNorm());
+    }
+    analysis::SampledLoop loop;
+    loop.delay = 1;
+    loop.torque_cutoff = seed % 2 == 0 ? 150 : 0;
+    loop.friction = twin.friction();
+    loop.gravity_gradient = twin.gravity_gradient(q0);
+    const auto release = [&](double factor, testing::ReleasedArm*& arm, auto& keep) {
+      controller::Gains scaled = gains;
+      scaled.task_stiffness *= factor;
+      scaled.task_damping *= factor;
+      scaled.null_damping *= factor;
+      const JointVector dq = 1e-7 * random.vector(q0.size());
+      keep.emplace(twin, release_settings(twin, scaled, loop.period), q0, dq, plant_options(loop));
+      arm = &*keep;
+    };
+    std::optional<testing::ReleasedArm> keep;
+    testing::ReleasedArm* arm = nullptr;
+    const auto spectrum_of = [&](const analysis::System<controller::kMaxJoints>& system) {
+      analysis::Spectrum<controller::kMaxJoints> spectrum;
+      analysis::SpectrumSolver<controller::kMaxJoints>().solve(system, spectrum);
+      return spectrum;
+    };
+    release(1, arm, keep);
+    const double margin = gain_margin(arm->closed_loop, spectrum_of(arm->closed_loop), loop);
+    ASSERT_GT(margin, 1);
+    ASSERT_TRUE(std::isfinite(margin));
+    for (const double factor : {0.98, 1.02}) {
+      release(factor * margin, arm, keep);
+      const analysis::SampledSpectrum sampled =
+          sample_loop(arm->closed_loop, spectrum_of(arm->closed_loop), loop);
+      EXPECT_EQ(sampled.stable(), factor < 1);
+      // Speeds: a free self-motion comes to rest elsewhere.
+      const double grown = growth(ticks_to_tell(sampled.spectral_radius), [&] {
+        EXPECT_EQ(arm->step(), sim::Status::kOk);
+        return arm->plant().velocity().norm();
+      });
+      if (factor < 1) {
+        EXPECT_LT(grown, 0.1) << "margin " << margin << ", |z| " << sampled.spectral_radius;
+      } else {
+        EXPECT_GT(grown, 10) << "margin " << margin << ", |z| " << sampled.spectral_radius;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dashpot

@@ -1,0 +1,210 @@
+#pragma once
+// The real controller and the simulator's arm, which share no code, in one loop; and what it takes
+// to displace the arm and let it go.
+
+#include <dashpot/analysis/motion_fit.hpp>
+#include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/robot_model.hpp>
+#include <dashpot/sim/arm.hpp>
+#include <dashpot/sim/plant.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace dashpot::testing {
+
+/// A robot, as both sides read it from the file: with or without its viscous friction, without
+/// Coulomb friction, and with the drives' inertia, which files lack.
+struct TwinModels {
+  static constexpr double kReflectedInertia = 0.1;  // kg m^2
+
+  controller::RobotModel model;
+  sim::Robot robot;
+
+  explicit TwinModels(const Arm& arm, bool friction = true)
+      : model(arm_model(arm)), robot(sim::Robot::from_file(arm_path(arm.file), arm.base, arm.tip)) {
+    controller::ModelOptions options;
+    options.reflected_inertia.setConstant(model.dof(), kReflectedInertia);
+    sim::RobotParameters parameters;
+    parameters.armature = options.reflected_inertia;
+    if (!friction) {
+      options.damping = parameters.viscous = controller::JointVector::Zero(model.dof());
+    }
+    model = arm_model(arm, options);
+    robot = sim::Robot::from_file(arm_path(arm.file), arm.base, arm.tip, parameters);
+  }
+
+  int dof() const { return model.dof(); }
+  Eigen::MatrixXd friction() const {
+    return Eigen::VectorXd(model.joint_values(&controller::Joint::damping)).asDiagonal();
+  }
+  /// dg/dq, n x n, by central differences: good to 1e-9.
+  Eigen::MatrixXd gravity_gradient(const controller::JointVector& q) const {
+    const controller::JointVector none = controller::JointVector::Zero(q.size());
+    Eigen::MatrixXd G(q.size(), q.size());
+    for (Eigen::Index i = 0; i < q.size(); ++i) {
+      controller::JointVector ahead = q, behind = q;
+      ahead[i] += 1e-5;
+      behind[i] -= 1e-5;
+      G.col(i) =
+          (evaluate(model, ahead, none).gravity - evaluate(model, behind, none).gravity) / 2e-5;
+    }
+    return G;
+  }
+};
+
+/// Well inside the position limits, and twice as far from a singularity as the controller's
+/// NullSpace is exact (TaskInertia::kNearlySingular, in its measure).
+inline controller::JointVector random_posture(const TwinModels& twin, Random& random) {
+  const controller::JointVector lower = twin.model.joint_values(&controller::Joint::lower);
+  const controller::JointVector upper = twin.model.joint_values(&controller::Joint::upper);
+  for (;;) {
+    controller::JointVector q(twin.dof());
+    for (Eigen::Index i = 0; i < q.size(); ++i) {
+      q[i] = random.uniform(std::max(lower[i], -2.5) + 0.2, std::min(upper[i], 2.5) - 0.2);
+    }
+    const auto robot = evaluate(twin.model, q, controller::JointVector::Zero(q.size()));
+    const Eigen::MatrixXd M = robot.M, J = robot.J, A = J * M.llt().solve(J.transpose());
+    const Eigen::MatrixXd inverse = A.inverse();
+    const double trace =
+        A.topLeftCorner<3, 3>().trace() * inverse.topLeftCorner<3, 3>().trace() +
+        A.bottomRightCorner<3, 3>().trace() * inverse.bottomRightCorner<3, 3>().trace();
+    if (3 / trace > 2e-3) return q;
+  }
+}
+
+/// Springs and dampers at the tip with which, friction apart, the modes have these frequencies
+/// (rad/s) and about these ratios: with A = J M^-1 J' = L L' and a rotation R,
+///     K_C = F diag(omega^2) F',  C_C = F D (1 + coupling S) D F',  F = L^-T R,
+/// D^2 = diag(2 zeta omega) and S random, symmetric positive definite, of size one.
+inline controller::Gains tip_gains(const TwinModels& twin, const controller::JointVector& q,
+                                   const Eigen::VectorXd& omega, const Eigen::VectorXd& zeta,
+                                   double coupling, Random& random) {
+  using Eigen::MatrixXd;
+  const auto robot = evaluate(twin.model, q, controller::JointVector::Zero(q.size()));
+  const MatrixXd M = robot.M, J = robot.J, A = J * M.llt().solve(J.transpose());
+  const MatrixXd R = Eigen::HouseholderQR<MatrixXd>(random.matrix(6, 6)).householderQ();
+  const MatrixXd F = A.llt().matrixU().solve(R);
+  const MatrixXd D = (2 * zeta.cwiseProduct(omega)).cwiseSqrt().asDiagonal();
+  const MatrixXd S = random.spd(6);
+  const MatrixXd K = F * omega.cwiseAbs2().asDiagonal() * F.transpose();
+  const MatrixXd C =
+      F * D * (MatrixXd::Identity(6, 6) + coupling / S.norm() * S) * D * F.transpose();
+  controller::Gains gains;
+  gains.task_stiffness = 0.5 * (K + K.transpose());
+  gains.task_damping = 0.5 * (C + C.transpose());
+  gains.null_stiffness = gains.null_damping = controller::JointVector::Zero(q.size());
+  return gains;
+}
+
+/// The direction of the self-motion of an arm with one joint too many, n, M-orthonormal.
+inline Eigen::VectorXd self_motion(const TwinModels& twin, const controller::JointVector& q) {
+  const auto robot = evaluate(twin.model, q, controller::JointVector::Zero(q.size()));
+  const Eigen::MatrixXd J = robot.J, M = robot.M;
+  const Eigen::VectorXd u = Eigen::FullPivLU<Eigen::MatrixXd>(J).kernel().col(0);
+  return u / std::sqrt(u.dot(M * u));
+}
+
+/// Settings with these Cartesian gains from the first tick on and nothing that interferes.
+inline controller::Settings release_settings(const TwinModels& twin, const controller::Gains& gains,
+                                             double period) {
+  controller::Settings settings = controller::default_settings(twin.model);
+  settings.period = period;
+  settings.motion.gain_time = period;
+  settings.motion.smoothing = 20 * period;
+  settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
+  settings.analysis.every = 1'000'000'000;  // at the first tick only
+  settings.initial.mode = controller::Mode::kCartesian;
+  const controller::Gains before = settings.initial.gains;
+  settings.initial.gains = gains;
+  settings.initial.gains.joint_stiffness = before.joint_stiffness;
+  settings.initial.gains.joint_damping = before.joint_damping;
+  return settings;
+}
+
+/// The controller starts with its springs at rest at q0; then a hand leads the arm smoothly along
+/// q0 + s dq, holds it there, and lets go.
+class ReleasedArm {
+ public:
+  controller::Controller controller;
+  /// Of the controller at q0.
+  controller::Vibration vibration;
+  analysis::System<controller::kMaxJoints> closed_loop;
+  controller::Status worst = controller::Status::kOk;  ///< of all ticks
+  controller::JointVector torque;                      ///< of the last tick
+
+  ReleasedArm(const TwinModels& twin, const controller::Settings& settings,
+              const controller::JointVector& q0, const controller::JointVector& dq,
+              sim::PlantOptions plant_options = {}, sim::ArmOptions arm_options = {})
+      : controller(twin.model, settings), setpoint_(settings.initial) {
+    const double T = settings.period;
+    const controller::JointVector none = controller::JointVector::Zero(q0.size());
+    const auto robot = evaluate(twin.model, q0, none);
+    setpoint_.joint_position = q0;
+    setpoint_.tip_pose = {robot.p_BT_B, robot.R_BT};
+    controller.reset(robot.gravity);
+    tick(q0, none);
+    vibration = controller.vibration();
+    controller.closed_loop(closed_loop);
+    const int ticks = std::max(50, static_cast<int>(std::ceil(dq.norm() / (0.3 * T))));
+    for (int k = 1; k <= ticks && !dq.isZero(0); ++k) {
+      const double s = static_cast<double>(k) / ticks;
+      tick(q0 + s * s * (3 - 2 * s) * dq, 6 * s * (1 - s) / (ticks * T) * dq);
+    }
+    plant_options.period = T;
+    plant_options.initial_torque = torque;  // all the while
+    arm_options.coulomb_friction = false;
+    arm_.emplace(twin.robot, arm_options);
+    plant_.emplace(*arm_, plant_options, q0 + dq);
+  }
+  ReleasedArm(const ReleasedArm&) = delete;
+  ReleasedArm& operator=(const ReleasedArm&) = delete;
+
+  sim::Arm& arm() { return *arm_; }
+  const sim::Plant& plant() const { return *plant_; }
+
+  sim::Status step() {
+    tick(plant_->measured().position, plant_->measured().velocity);
+    return plant_->step(torque);
+  }
+
+  /// Every so many ticks of `ticks`, after `skipped` ticks; deviations from q0.
+  analysis::Recording record(const controller::JointVector& q0, int ticks, int every = 1,
+                             int skipped = 0) {
+    for (int k = 0; k < skipped; ++k) EXPECT_EQ(step(), sim::Status::kOk);
+    analysis::Recording recording{Eigen::MatrixXd(q0.size(), ticks / every),
+                                  Eigen::MatrixXd(q0.size(), ticks / every)};
+    for (int k = 0; k < ticks; ++k) {
+      if (k % every == 0) {
+        recording.position.col(k / every) = plant_->position() - q0;
+        recording.velocity.col(k / every) = plant_->velocity();
+      }
+      EXPECT_EQ(step(), sim::Status::kOk);
+    }
+    return recording;
+  }
+
+ private:
+  void tick(const controller::JointVector& q, const controller::JointVector& qd) {
+    state_.time += std::llround(1e9 * controller.settings().period);
+    state_.position = q;
+    state_.velocity = qd;
+    setpoint_.time = state_.time;
+    worst = controller::worse(worst, controller.update(state_, setpoint_, torque));
+  }
+
+  controller::RobotState state_;
+  controller::Setpoint setpoint_;
+  std::optional<sim::Arm> arm_;
+  std::optional<sim::Plant> plant_;
+};
+
+}  // namespace dashpot::testing
