@@ -18,17 +18,19 @@ struct SpringPaths {
 ///
 ///     tau = K_q (q_d - q) + C_q (qd_d - qd) + w_q M qdd_d           joint impedance
 ///         + J' (K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d + f)     Cartesian impedance, wrench
-///         + N' K_0 (q_0 - q) + N' C_0 N (qd_0 - qd)                 redundancy
+///         + N' K_0 (q_0 - q - s J# e) + N' C_0 N (qd_0 - qd)        redundancy
 ///         + friction(qd_f) + coriolis + gravity                     the robot
 ///
 /// e = (p_d - p, rotation vector of R_d R'), in B's axes at the tip: linear, then angular. K_C is
 /// the sum of the stiffness given in B's axes and R K_T R' of that given in the tool's, and so is
 /// C_C. w_q and w_C are the shares of the two modes, 0 or 1 except while the mode changes; K_q and
-/// C_q, K_C and C_C, K_0 and C_0 contain them. Lambda = (J M^-1 J')^-1 in the held directions, and
-/// N are those of TaskInertia and
-/// NullSpace. f is the commanded wrench. qd_f = w_q qd_d + w_C (joint velocity that
-/// takes the tip along V_d), and friction_i(v) = damping_i v + friction_i tanh(v / 0.01 rad/s).
-/// Every term of the last column can be left out, see FeedForward.
+/// C_q, K_C and C_C, K_0 and C_0 contain them. Lambda = (J M^-1 J')^-1 in the held directions, N
+/// and J# = M^-1 J' Lambda are those of TaskInertia and NullSpace. f is the commanded wrench. qd_f
+/// = w_q qd_d + w_C (joint velocity that takes the tip along V_d), and friction_i(v) = damping_i v
+/// + friction_i tanh(v / 0.01 rad/s). J# e is the part of q_0 - q that a deflection of the tip
+/// explains: without it, deflections of the tip would drive the self-motion, and the stiffness of
+/// the loop would not be symmetric. It counts fully while it is small: s = 1 / sqrt(1 + (|J# e| /
+/// 0.3 rad)^2). Every term of the last column can be left out, see FeedForward.
 ///
 /// The torque is bounded wherever the arm is: J' is, and so are N (see NullSpace) and e (|e_rot| at
 /// most 3/2 pi); nothing is divided by what vanishes at a singularity but Lambda, which is damped
@@ -61,6 +63,8 @@ class ImpedanceLaw {
   /// K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d
   Vector6 task_wrench(const Dynamics<N>& robot, const Vector& qd, const Impedance<N>& impedance,
                       const TipPath& path) noexcept;
+  /// s J# e
+  Vector posture_share() const noexcept;
   void add_friction(const Vector& velocity, Vector& tau) const noexcept;
 
   FeedForward feed_forward_;
@@ -108,7 +112,8 @@ Joints<N> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q, con
     }
     F_ = task_wrench(robot, qd, impedance, paths.tip);
     if (null_space) {
-      const Vector dq = difference<N>(paths.rest.position(), q);
+      Vector dq = difference<N>(paths.rest.position(), q);
+      dq -= posture_share();
       const Vector dqd = difference<N>(paths.rest.velocity(), qd);
       add<N>(null_space_.spring(impedance.null_stiffness, dq), tau);
       add<N>(null_space_.damper(impedance.null_damping, dqd), tau);
@@ -144,6 +149,17 @@ Vector6 ImpedanceLaw<N>::task_wrench(const Dynamics<N>& robot, const Vector& qd,
     F += impedance.task_weight * null_space_.inertia().wrench(path.acceleration());
   }
   return F;
+}
+
+template <int N>
+Joints<N> ImpedanceLaw<N>::posture_share() const noexcept {
+  constexpr double kMost = 0.3;  // rad
+  Vector share = null_space_.joint_velocity(e_);
+  double square = 0;
+  for (int i = 0; i < N; ++i) square += share[i] * share[i];
+  const double scale = 1 / std::sqrt(1 + square / (kMost * kMost));
+  for (int i = 0; i < N; ++i) share[i] *= scale;
+  return share;
 }
 
 template <int N>

@@ -104,8 +104,9 @@ struct Scene {
       const Complex wanted = sampled ? image.eigenvalues[0] : mode.eigenvalues[0];
       const analysis::FittedMode& seen = nearest(fit, wanted);
       worst.add(std::abs(seen.natural_frequency / omega - 1), std::abs(seen.damping_ratio - ratio));
-      EXPECT_LT(std::abs(seen.natural_frequency / omega - 1), 0.005) << seen.natural_frequency;
-      EXPECT_LT(std::abs(seen.damping_ratio - ratio), 0.005) << seen.damping_ratio;
+      const double most = sampled ? 1e-4 : 0.005;
+      EXPECT_LT(std::abs(seen.natural_frequency / omega - 1), most) << seen.natural_frequency;
+      EXPECT_LT(std::abs(seen.damping_ratio - ratio), most) << seen.damping_ratio;
     }
   }
 };
@@ -114,14 +115,9 @@ class RingDown : public ::testing::TestWithParam<testing::Arm> {
  protected:
   static constexpr int kPostures = 20;
   TwinModels twin_{GetParam()};
-  TwinModels frictionless_{GetParam(), false};
 
-  /// Every other one holds its posture, without friction: what the published modes leave out of
-  /// posture springs (see closed_loop.hpp) matters where friction couples the self-motion.
-  Scene scene_of(int seed, Random& random) const {
-    const bool hold_posture = seed % 2 == 0;
-    return {hold_posture ? frictionless_ : twin_, random, hold_posture};
-  }
+  /// Every other one holds its posture.
+  Scene scene_of(int seed, Random& random) const { return {twin_, random, seed % 2 == 0}; }
   void report(const Worst& worst) const {
     std::printf("%-12s %3d modes, seeds 1 to %d: frequency within %.2e, ratio within %.2e\n",
                 GetParam().file, worst.modes, kPostures, worst.frequency, worst.ratio);
