@@ -78,7 +78,10 @@ std::int32_t ClosedLoop::control() noexcept {
   if (scene_.arm) follow_scenario();
   const sim::Measurement& measured = plant_->measured();
   ++ticks_;
-  return controller_.update(measured.time, measured.position, measured.velocity, torque_);
+  const std::int32_t status =
+      controller_.update(measured.time, measured.position, measured.velocity, torque_);
+  if (status < 0) torque_.setZero();  // a refused call leaves the robot to its host
+  return status;
 }
 
 void ClosedLoop::follow_scenario() noexcept {

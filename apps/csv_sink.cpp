@@ -10,6 +10,8 @@
 namespace dashpot::apps {
 namespace {
 
+constexpr std::int64_t kFlushPeriod = 100'000;  // us
+
 class CsvSink : public lcmtypes::Sink {
  public:
   explicit CsvSink(const std::string& path) : file_(std::fopen(path.c_str(), "w"), std::fclose) {
@@ -30,7 +32,13 @@ class CsvSink : public lcmtypes::Sink {
     }
     write(state.tip_position, 3);
     write(state.tip_error, 6);
-    return std::fputc('\n', file_.get()) != EOF;
+    std::fprintf(file_.get(), ",%d\n", state.status);
+    if (utime - flushed_at_ >=
+        kFlushPeriod) {     // so that errors are noticed, and a killed run leaves
+      flushed_at_ = utime;  // its table
+      std::fflush(file_.get());
+    }
+    return std::ferror(file_.get()) == 0;
   }
 
  private:
@@ -39,7 +47,7 @@ class CsvSink : public lcmtypes::Sink {
     for (const char* name : {"q", "qd", "torque"}) {
       for (int i = 1; i <= n; ++i) std::fprintf(file_.get(), ",%s%d", name, i);
     }
-    std::fputs(",x,y,z,error_x,error_y,error_z,error_rx,error_ry,error_rz\n", file_.get());
+    std::fputs(",x,y,z,error_x,error_y,error_z,error_rx,error_ry,error_rz,status\n", file_.get());
   }
 
   void write(const double* values, std::size_t count) {
@@ -48,7 +56,8 @@ class CsvSink : public lcmtypes::Sink {
 
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
   bool any_ = false;
-  std::int64_t begin_ = 0;  // us
+  std::int64_t begin_ = 0;       // us
+  std::int64_t flushed_at_ = 0;  // us
 };
 
 }  // namespace

@@ -130,7 +130,9 @@ void LoopThread::take_commands() noexcept {
   if (receiver_ == nullptr) return;
   if (receiver_->fetch()) {
     controller::Setpoint setpoint = loop_.setpoint();
-    lcmtypes::apply(receiver_->command(), setpoint);
+    // Only what is new: older parts may have been replaced by the scenario since.
+    lcmtypes::apply(receiver_->command(), setpoint, commands_applied_);
+    commands_applied_ = receiver_->command().accepted;
     if (loop_.hold(setpoint) != DASHPOT_OK) ++record_.commands_refused;
   }
   state_.health.commands_accepted = receiver_->count(lcmtypes::CommandVerdict::kAccepted);
@@ -158,6 +160,7 @@ void LoopThread::publish(std::int64_t utime) noexcept {
 }
 
 void LoopThread::note(const dashpot_snapshot& snapshot) noexcept {
+  if (snapshot.status >= DASHPOT_STATE_NOT_FINITE) return;  // of an earlier tick
   if (snapshot.mode == DASHPOT_MODE_CARTESIAN) {
     record_.cartesian = true;
     const Eigen::Map<const controller::Vector6> error(snapshot.tip_error);

@@ -94,6 +94,7 @@ class LoopThread {
 
   // The loop's own:
   LoopRecord record_;
+  std::int64_t commands_applied_ = 0;
   lcmtypes::StateSample state_;
   lcmtypes::ModesSample modes_;
 };

@@ -55,8 +55,8 @@ class PluginController : public LoopController {
         setpoint.tip_pose.position.data(),
         rotation.data(),
         setpoint.wrench.data()};
-    const std::int32_t code = plugin_.set_setpoint(handle_.get(), &wanted);
-    return code == DASHPOT_OK ? set_gains(setpoint.gains) : code;
+    const std::int32_t code = set_gains(setpoint.gains);
+    return code == DASHPOT_OK ? plugin_.set_setpoint(handle_.get(), &wanted) : code;
   }
 
  private:

@@ -182,13 +182,20 @@ std::string error_text(const LoopRecord& loop) {
   return out;
 }
 
+/// Whether more than a hundredth of the energy that was moved came from nowhere or went there.
+bool doubtful(const sim::EnergyAudit& energy) {
+  const double moved = std::abs(energy.by_actuators) + std::abs(energy.by_world) +
+                       energy.dissipated() + std::abs(energy.stored.sum() - energy.initial.sum());
+  return std::abs(energy.imbalance()) > 0.01 * moved && std::abs(energy.imbalance()) > 1e-9;
+}
+
 std::string energy_text(const sim::EnergyAudit& energy) {
   const auto joule = [](double value) { return format_number(value, 4) + " J"; };
   return "  Energy: stored " + joule(energy.initial.sum()) + " at the start, " +
          joule(energy.stored.sum()) + " at the end; in by the drives " +
          joule(energy.by_actuators) + ", by the world " + joule(energy.by_world) + "; lost " +
          joule(energy.dissipated()) + "; unaccounted for " + format_number(energy.imbalance(), 2) +
-         " J\n";
+         " J" + (doubtful(energy) ? ": the integrator's steps are too long" : "") + "\n";
 }
 
 std::string messages_text(const RunReport& report) {

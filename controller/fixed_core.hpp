@@ -45,6 +45,9 @@ class FixedCore final : public ControllerCore {
   /// The safe output without springs.
   Vector damp() noexcept;
   /// The safe output without a state.
+  /// Whole ns, which add up without rounding errors.
+  static double nanoseconds(double seconds) noexcept { return std::round(1e9 * seconds); }
+  void show_measured(const RobotState& state) noexcept;
   Status ramp(Status status, JointVector& torque) noexcept;
   Status finish(Status status, const Vector& tau, JointVector& torque) noexcept;
   void describe() noexcept;
@@ -66,6 +69,7 @@ class FixedCore final : public ControllerCore {
 
   // The last good state, and the robot there
   std::int64_t time_ = 0;
+  double setpoint_age_ = 0;  ///< ns, counted on, whatever the clock does after it was accepted
   Vector q_ = Vector::Zero();
   Vector qd_ = Vector::Zero();
   Vector6 external_wrench_ = Vector6::Zero();
@@ -74,6 +78,7 @@ class FixedCore final : public ControllerCore {
   LoopSystem<N> loop_;
   struct {
     bool any = false, damping_only = false;
+    bool gains_moved = false;
     std::uint64_t gain_changes = 0;
     Vector q, qd;  ///< qd and wrench: zero where they do not matter
     Vector6 wrench;
@@ -148,14 +153,22 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   ++snapshot_.tick;
   snapshot_.time = state.time;
   const Status input = state_check_.check(state);
-  if (input >= Status::kStateNotFinite) return ramp(input, torque);
+  if (input >= Status::kStateNotFinite) {
+    setpoint_age_ += nanoseconds(settings_.period);
+    show_measured(state);
+    return ramp(input, torque);
+  }
+  if (!first_) {
+    setpoint_age_ +=
+        std::max(nanoseconds(settings_.period), nanoseconds(seconds_between(time_, state.time)));
+  }
   time_ = state.time;
   q_ = fixed<N>(state_check_.position());
   qd_ = fixed<N>(state.velocity);
   external_wrench_ = state.external_wrench;
   kernel_.evaluate(q_, qd_, robot_);
   if (first_) {
-    accepted_.time = time_;
+    setpoint_age_ = 0;
     first_ = false;
   }
 
@@ -180,10 +193,12 @@ bool FixedCore<N>::read(const Setpoint& setpoint) noexcept {
   looked_at_ = setpoint.time;
   const bool same = setpoint.mode == accepted_.mode && same_gains(setpoint.gains, accepted_.gains);
   const double hold = settings_.watchdog.setpoint_hold;
-  const bool to_come = hold > 0 && seconds_between(time_, setpoint.time) > hold;
+  const double patience = hold > 0 ? hold : settings_.watchdog.setpoint_damp;
+  const bool to_come = patience > 0 && seconds_between(time_, setpoint.time) > patience;
   in_order_ = !to_come && !check_setpoint(setpoint, settings_.limits, same);
   if (!in_order_) return false;
   accepted_.time = setpoint.time;
+  setpoint_age_ = nanoseconds(seconds_between(setpoint.time, time_));
   accepted_.joint_position = setpoint.joint_position;
   accepted_.tip_pose = setpoint.tip_pose;
   accepted_.wrench = setpoint.wrench;
@@ -237,7 +252,7 @@ void FixedCore<N>::start_afresh() noexcept {
 
 template <int N>
 Status FixedCore<N>::watch() const noexcept {
-  const double age = seconds_between(accepted_.time, time_);
+  const double age = 1e-9 * setpoint_age_;
   const Watchdog& limit = settings_.watchdog;
   if (limit.setpoint_damp > 0 && age > limit.setpoint_damp) return Status::kSetpointLost;
   if (limit.setpoint_hold > 0 && age > limit.setpoint_hold) return Status::kSetpointStale;
@@ -297,6 +312,14 @@ Joints<N> FixedCore<N>::damp() noexcept {
   return tau;
 }
 
+/// What was measured, as far as it is numbers; all else in the snapshot stays that of the last good
+/// state.
+template <int N>
+void FixedCore<N>::show_measured(const RobotState& state) noexcept {
+  if (state.position.size() == N && state.position.allFinite()) snapshot_.position = state.position;
+  if (state.velocity.size() == N && state.velocity.allFinite()) snapshot_.velocity = state.velocity;
+}
+
 template <int N>
 Status FixedCore<N>::ramp(Status status, JointVector& torque) noexcept {
   afresh_ |= ++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap;
@@ -346,8 +369,11 @@ bool FixedCore<N>::looks_the_same(bool with_wrench, bool with_velocity) noexcept
   bool same = analysed_.any && analysed_.damping_only == damping_only_ &&
               analysed_.gain_changes == gains_.changes() && analysed_.wrench == wrench;
   for (int i = 0; i < N; ++i) same &= analysed_.q[i] == q_[i] && analysed_.qd[i] == qd[i];
-  analysed_ = {true, damping_only_, gains_.changes(), q_, qd, wrench};
-  return same;
+  const bool gains_moved = analysed_.any && analysed_.gain_changes != gains_.changes();
+  const bool settled = analysed_.gains_moved && !gains_moved;
+  analysed_ = {true, damping_only_, gains_moved, gains_.changes(), q_, qd, wrench};
+  vibration_.task().anew = settled;
+  return same && !settled;
 }
 
 template <int N>

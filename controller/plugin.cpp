@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -229,6 +230,9 @@ int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* stat
 int32_t dashpot_reset(dashpot_controller* controller, const double* torque) {
   if (controller == nullptr) return DASHPOT_NULL_ARGUMENT;
   JointVector acting = JointVector::Zero(controller->n);
+  for (int i = 0; torque != nullptr && i < controller->n; ++i) {
+    if (!std::isfinite(torque[i])) return DASHPOT_WRONG_VALUE;
+  }
   if (torque != nullptr) acting = Eigen::Map<const Eigen::VectorXd>(torque, controller->n);
   controller->reset(acting);
   return DASHPOT_OK;

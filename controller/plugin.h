@@ -40,7 +40,7 @@ typedef struct dashpot_controller dashpot_controller;
 /* What functions return. Zero and above: the status of a tick, with the torque that it comes with.
  *   hold: the springs stop where they are, whatever the set-point says
  *   damp: no springs: joint damping, and gravity where the controller compensates it
- *   ramp: the last good torque goes to zero within 0.1 s
+ *   ramp: the last good torque goes to zero within 0.1 s, or as fast as limits.torque_rate allows
  * Once the cause is over the controller goes on, after more than a short interruption with springs
  * where the robot is. Below zero: a call that was refused and did nothing. */
 enum {
@@ -134,7 +134,9 @@ typedef struct dashpot_output {
   double* torque;  /* n, written, N m */
 } dashpot_output;
 
-/* One tick, seen from outside. Entries from n on are zero. */
+/* One tick, seen from outside. Entries from n on are zero. With a status whose output is "ramp",
+ * position and velocity are those given, where they are numbers; tip, goals, law_torque, tip_error
+ * and tip_wrench are those of the last good state. */
 typedef struct dashpot_snapshot {
   uint32_t struct_size;
   uint32_t joints;   /* n */

@@ -5,7 +5,9 @@
 
 namespace dashpot::controller {
 
-/// What one tick saw and did: plain data to copy to another thread.
+/// What one tick saw and did: plain data to copy to another thread. With a status whose safe output
+/// is "ramp", position and velocity are those measured, where they are numbers, and what follows
+/// from them is still that of the last good state.
 struct Snapshot {
   std::int64_t time = 0;       ///< ns, of the state
   std::uint64_t tick = 0;      ///< counted from 1

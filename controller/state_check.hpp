@@ -8,10 +8,16 @@ namespace dashpot::controller {
 
 /// Tells states that a robot can be in from those that only a broken sensor, link or clock reports.
 ///
-/// A state is compared with the last good one, t seconds older: no position may differ by more than
-/// 2 velocity_i t + 0.001 rad, no velocity by more than velocity_i (1/2 + 10/s t), where velocity
-/// is the limit. Both bounds grow with t, so that a state that really is elsewhere is believed
-/// after a while.
+/// A state is compared with the last good one, t seconds older. A position may differ by 2
+/// velocity_i t + 0.001 rad, where velocity is the limit of the
+/// settings or the robot's own, whichever is higher, or by what the measured velocities say,
+/// the mean of the two times t, give or take half of the larger one times t and 0.001 rad: a robot
+/// that is faster than its limit is no broken sensor. A velocity may differ by velocity_i (1/2 +
+/// 10/s t).
+///
+/// States that agree with each other in this way for 20 ms (or longest_gap, if that is longer) are
+/// believed, even if they do not agree with the last good one; others at the latest when t has
+/// grown enough.
 ///
 /// A continuous joint may report its angle modulo 2 pi: `position` follows it without jumps.
 class StateCheck {
@@ -22,14 +28,24 @@ class StateCheck {
   /// state's, good or not.
   Status check(const RobotState& state) noexcept;
   /// Of the last good state, n, rad.
-  const JointVector& position() const noexcept { return position_; }
+  const JointVector& position() const noexcept { return good_.position; }
   /// The next state is like the first.
   void reset() noexcept;
 
  private:
-  bool jumped(const RobotState& state) noexcept;
+  /// The last state, whatever it was: good, or only finite.
+  struct Last {
+    bool any = false;
+    double age = 0;  ///< s
+    JointVector position;
+    JointVector velocity;
+  };
+
+  bool follows(const Last& last, const RobotState& state) const noexcept;
+  /// Whether this state and those before have agreed with each other for long enough.
+  bool believed(const RobotState& state, double gap) noexcept;
   /// Angles of continuous joints nearest to their last.
-  void unwrap(JointVector& position) const noexcept;
+  void unwrap(JointVector& position, const JointVector& last) const noexcept;
 
   Eigen::Index n_;
   double period_;
@@ -38,12 +54,11 @@ class StateCheck {
   std::array<bool, kMaxJoints> continuous_{};
   bool any_continuous_ = false;
 
-  bool timed_ = false;    ///< last_time_ is known
-  bool started_ = false;  ///< there was a good state
+  bool timed_ = false;  ///< last_time_ is known
   std::int64_t last_time_ = 0;
-  double age_ = 0;  ///< of the last good state, s
-  JointVector position_;
-  JointVector velocity_;
+  Last good_;
+  Last doubtful_;         ///< since the last good one
+  double agreement_ = 0;  ///< for how long the doubtful ones have agreed with each other, s
 };
 
 /// Seconds from `earlier` to `later`, in ns each, of any size.

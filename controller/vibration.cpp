@@ -35,6 +35,7 @@ void VibrationSolver::solve(const VibrationTask& task, Vibration& result) noexce
   counters_.missed += task.number - solved_ - 1;
   solved_ = task.number;
   if (task.springs) {
+    if (task.anew) tracker_.reset();
     tracker_.update(task.system, spectrum_);
     counters_.no_shapes = static_cast<std::uint64_t>(tracker_.counters().shapes_skipped) - skipped_;
     publish_modes(result);

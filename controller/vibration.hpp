@@ -14,9 +14,11 @@ struct VibrationTask {
   JointVector position;
   analysis::System<kMaxJoints> system;  ///< the closed loop; see LoopSystem
   bool springs = true;                  ///< there is a stiffness at all
-  std::uint64_t number = 0;             ///< of tasks so far, this one included
-  std::uint64_t resets = 0;             ///< results of before a reset are not wanted
-  VibrationCounters counters;           ///< those of the ticks that were not even tasks, or in part
+  bool anew = false;  ///< to be solved anew: what real eigenvalues form a mode depends on the way
+                      ///< there, and should not on that of the gains
+  std::uint64_t number = 0;    ///< of tasks so far, this one included
+  std::uint64_t resets = 0;    ///< results of before a reset are not wanted
+  VibrationCounters counters;  ///< those of the ticks that were not even tasks, or in part
 };
 
 /// Finds the modes of one task after the other, each from those before.

@@ -1,5 +1,7 @@
 #include <dashpot/controller/vibration_thread.hpp>
 
+#include <pthread.h>
+#include <sched.h>
 #include <chrono>
 
 namespace dashpot::controller {
@@ -13,6 +15,9 @@ VibrationThread::~VibrationThread() {
 }
 
 void VibrationThread::run() noexcept {
+  // Whoever made the controller may be a real-time thread; this one must not delay it.
+  const sched_param ordinary{};
+  pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
   std::uint64_t resets = 0;
   while (!stop_.load(std::memory_order_relaxed)) {
     if (!tasks.fetch()) {

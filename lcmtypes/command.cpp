@@ -1,11 +1,16 @@
 #include <dashpot/lcmtypes/command.hpp>
 #include <dashpot/lcmtypes/command_t.hpp>
 
+#include <bit>
+
 namespace dashpot::lcmtypes {
 
-void apply(const Command& command, controller::Setpoint& setpoint) noexcept {
+void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t after) noexcept {
   const controller::Setpoint& from = command.setpoint;
-  const auto has = [&command](std::int32_t part) { return (command.parts & part) != 0; };
+  const auto has = [&](std::int32_t part) {
+    const auto bit = static_cast<std::size_t>(std::countr_zero(static_cast<std::uint32_t>(part)));
+    return (command.parts & part) != 0 && command.set_by[bit] > after;
+  };
   if (has(command_t::MODE)) setpoint.mode = from.mode;
   if (has(command_t::JOINT_POSITION)) setpoint.joint_position = from.joint_position;
   if (has(command_t::TIP_POSE)) setpoint.tip_pose = from.tip_pose;

@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/controller/types.hpp>
 
+#include <array>
 #include <cstdint>
 
 namespace dashpot::lcmtypes {
@@ -8,13 +9,17 @@ namespace dashpot::lcmtypes {
 /// Everything that the accepted commands have set so far, so that no part is lost when two arrive
 /// within one tick.
 struct Command {
-  std::int64_t utime = 0;         ///< of the last accepted one, us since 1970-01-01 UTC
-  std::int64_t sequence = 0;      ///< of the last accepted one
-  std::int32_t parts = 0;         ///< sum of command_t::MODE, ... that were ever set
+  std::int64_t utime = 0;     ///< of the last accepted one, us since 1970-01-01 UTC
+  std::int64_t sequence = 0;  ///< of the last accepted one
+  std::int32_t parts = 0;     ///< sum of command_t::MODE, ... that were ever set
+  std::int64_t accepted = 0;  ///< commands so far
+  /// For each bit of `parts`, which accepted command set it last, counted from 1.
+  std::array<std::int64_t, 7> set_by{};
   controller::Setpoint setpoint;  ///< only these parts of it have a meaning; not its time
 };
 
-/// Copies the parts that were set into `setpoint`, and leaves the others and its time alone.
-void apply(const Command& command, controller::Setpoint& setpoint) noexcept;
+/// Copies the parts that were set by commands later than the `after`-th accepted one into
+/// `setpoint`, and leaves the others and its time alone.
+void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t after = 0) noexcept;
 
 }  // namespace dashpot::lcmtypes

@@ -163,6 +163,10 @@ CommandVerdict copy_values(const command_t& message, const CommandLimits& limits
             [&] { return copy_null_gains(message, limits, setpoint.gains); }),
   });
   command.parts |= message.parts;
+  ++command.accepted;
+  for (std::size_t bit = 0; bit < command.set_by.size(); ++bit) {
+    if ((message.parts >> bit & 1) != 0) command.set_by[bit] = command.accepted;
+  }
   command.utime = message.utime;
   command.sequence = message.sequence;
   return verdict;

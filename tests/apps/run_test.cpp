@@ -239,6 +239,25 @@ TEST(Run, PrintsTablesForPeople) {
                     HasSubstr("\nModes at the end, 2 zero modes\n")));
 }
 
+TEST(Run, SaysThatItCouldNotWrite) {
+  for (const char* option : {"--csv", "--log"}) {
+    const Outcome outcome = run_scene(scene("ur5"), {"--duration", "0.5", option, "/dev/full"});
+    EXPECT_EQ(outcome.status, 1) << option;
+    EXPECT_THAT(outcome.err, HasSubstr("messages could not be written"));
+  }
+  EXPECT_EQ(run_scene(scene("ur5"), {"--csv", "/dev/null", "--log", "/dev/null"}).status, 2);
+}
+
+TEST(Run, DampsAnArmThatIsPushedHard) {
+  const Scratch scratch;
+  const std::string file =
+      changed(scratch, "panda", "{begin: 1 s, end: 1.1 s, wrench: [0, 20 N, 0, 0, 0, 0]}",
+              "{begin: 1 s, end: 1.1 s, wrench: [100 N, 100 N, 0, 0, 0, 0]}");
+  const Json result = run_json(file, {"--duration", "2"});
+  EXPECT_GT(result["status"]["velocity limit exceeded, damping"].get<int>(), 10);
+  EXPECT_LT(result["status"].value("state jumped, torque ramped down", 0), 30);
+}
+
 TEST(Run, SaysWhenTheSimulationFails) {
   const Scratch scratch;
   // A damper that no step of a millisecond can follow.

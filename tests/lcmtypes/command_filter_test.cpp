@@ -91,6 +91,11 @@ TEST(CommandFilter, AddsUpThePartsOfSeveralCommands) {
   apply(filter.command(), setpoint);
   EXPECT_EQ(setpoint.wrench[0], first.wrench[0]);
   EXPECT_EQ(setpoint.tip_pose.position[0], second.tip_position[0]);
+  // What the first command set does not come back with the second.
+  controller::Setpoint later;
+  apply(filter.command(), later, 1);
+  EXPECT_EQ(later.wrench[0], 0);
+  EXPECT_EQ(later.tip_pose.position[0], second.tip_position[0]);
 }
 
 struct Fault {
