@@ -48,8 +48,6 @@ class HeldDamping {
       in_force_ = given;
       if (!held_) damper_.reset();
       set_stiffness(given, robot);
-    } else if (held && two_frames(given)) {
-      set_stiffness(given, robot);
     }
     held_ = held;
     changes_ = gains.changes();
@@ -63,6 +61,7 @@ class HeldDamping {
   void reset() noexcept { held_ = false; }
 
  private:
+  /// Only while gains change, and so K_C is anew at every tick anyway.
   static bool two_frames(const Impedance<N>& given) noexcept {
     return !given.base.none() && !given.tool.none();
   }
