@@ -159,11 +159,13 @@ void LoopThread::publish(std::int64_t utime) noexcept {
 
 void LoopThread::note(const dashpot_snapshot& snapshot) noexcept {
   if (snapshot.mode == DASHPOT_MODE_CARTESIAN) {
+    record_.cartesian = true;
     const Eigen::Map<const controller::Vector6> error(snapshot.tip_error);
     record_.tip_error = std::max(record_.tip_error, error.head<3>().norm());
     record_.tip_angle_error = std::max(record_.tip_angle_error, error.tail<3>().norm());
     return;
   }
+  record_.joint = true;
   for (std::uint32_t i = 0; i < snapshot.joints; ++i) {
     const double error = std::abs(snapshot.goal_joint_position[i] - snapshot.position[i]);
     record_.joint_error = std::max(record_.joint_error, error);

@@ -32,10 +32,12 @@ struct LoopRecord {
   std::int64_t commands_refused = 0;  ///< by the controller, though well-formed
   dashpot_modes first_modes{};        ///< tick 0: there were none
   dashpot_modes last_modes{};
-  // The largest distances between where the springs are fixed and where the robot is:
-  double tip_error = 0;        ///< m, while the Cartesian springs were in force
-  double tip_angle_error = 0;  ///< rad, likewise
-  double joint_error = 0;      ///< rad, while the joint springs were in force
+  bool cartesian = false;  ///< Cartesian springs were in force
+  bool joint = false;      ///< joint springs were in force
+  // The largest distances between where these springs are fixed and where the robot is:
+  double tip_error = 0;        ///< m
+  double tip_angle_error = 0;  ///< rad
+  double joint_error = 0;      ///< rad
 };
 
 /// Runs a closed loop on a thread of its own until it has made its ticks, the simulation fails or

@@ -4,6 +4,7 @@
 #include <dashpot/apps/sampled_modes.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -19,7 +20,7 @@ constexpr double kDuration = 2;         // s
 constexpr double kSamplePeriod = 1e-3;  // s, or one control period if that is longer
 constexpr double kFarthest = 0.5;       // relative, of two eigenvalues of one mode
 
-/// The scene from another start, where nothing else happens and sensors are exact.
+/// The scene from another start, without pushes and steps, with exact sensors.
 Scene quiet_scene(const Scene& scene, const JointVector& start) {
   Scene quiet = scene;
   quiet.start = start;
@@ -65,6 +66,20 @@ Motion record(const Scene& scene, const ControllerFactory& make_controller, int 
   return motion;
 }
 
+using Eigenvalues = std::array<analysis::Complex, 2>;
+
+Eigenvalues eigenvalues(const dashpot_mode& mode) {
+  const auto& [first, second] = mode.eigenvalues;
+  return {analysis::Complex(first[0], first[1]), analysis::Complex(second[0], second[1])};
+}
+
+/// How far `other` is from `wanted`, relative.
+double distance(const Eigenvalues& wanted, const Eigenvalues& other) {
+  double sum = 0;
+  for (std::size_t k = 0; k < 2; ++k) sum += std::norm(other[k] - wanted[k]) / std::norm(wanted[k]);
+  return std::sqrt(sum);
+}
+
 /// Pairs modes whose eigenvalues are nearest to each other, the best pair first; a mode that has
 /// none within kFarthest of itself stays alone.
 std::vector<RingDownMode> match(const dashpot_modes& predicted,
@@ -73,24 +88,16 @@ std::vector<RingDownMode> match(const dashpot_modes& predicted,
   std::vector<RingDownMode> result(predicted.count);
   for (std::uint32_t i = 0; i < predicted.count; ++i) {
     const dashpot_mode& mode = predicted.modes[i];
-    result[i] = {mode.natural_frequency, mode.damping_ratio, kNaN, kNaN, kNaN, kNaN};
+    result[i] = {mode.label, mode.natural_frequency, mode.damping_ratio, kNaN, kNaN, kNaN, kNaN};
   }
-  const auto distance = [&](std::uint32_t i, const analysis::FittedMode& mode) {
-    double sum = 0;
-    for (std::size_t k = 0; k < 2; ++k) {
-      const auto& value = predicted.modes[i].eigenvalues[k];
-      const analysis::Complex wanted(value[0], value[1]);
-      sum += std::norm(mode.eigenvalues[k] - wanted) / std::norm(wanted);
-    }
-    return std::sqrt(sum);
-  };
   while (!fitted.empty()) {
     double least = kFarthest;
     std::pair<std::uint32_t, std::size_t> best{predicted.count, 0};
     for (std::uint32_t i = 0; i < predicted.count; ++i) {
       for (std::size_t k = 0; std::isnan(result[i].measured_frequency) && k < fitted.size(); ++k) {
-        if (!(distance(i, fitted[k]) < least)) continue;
-        least = distance(i, fitted[k]);
+        const double apart = distance(eigenvalues(predicted.modes[i]), fitted[k].eigenvalues);
+        if (!(apart < least)) continue;
+        least = apart;
         best = {i, k};
       }
     }
@@ -103,14 +110,23 @@ std::vector<RingDownMode> match(const dashpot_modes& predicted,
   return result;
 }
 
-/// What the modes become in the sampled loop, where these are the modes of the scene at rest.
+/// What the modes become in the sampled loop; a mode that moves farther than kFarthest has no
+/// counterpart there that could be told from others.
 void add_sampled(const Scene& scene, RingDown& ring_down) {
   const SampledModes modes = sampled_modes(scene);
   ring_down.gain_margin = modes.gain_margin;
   ring_down.growth = std::max(0.0, std::log(modes.sampled.spectral_radius) / scene.plant.period);
-  for (std::size_t i = 0; i < std::min(modes.sampled.modes.size(), ring_down.modes.size()); ++i) {
-    ring_down.modes[i].sampled_frequency = modes.sampled.modes[i].natural_frequency;
-    ring_down.modes[i].sampled_ratio = modes.sampled.modes[i].damping_ratio;
+  for (RingDownMode& row : ring_down.modes) {
+    for (int i = 0; i < modes.continuous.modes.size(); ++i) {
+      const analysis::Mode<>& from = modes.continuous.modes[i];
+      const analysis::SampledMode& to = modes.sampled.modes[static_cast<std::size_t>(i)];
+      const bool same = std::abs(from.natural_frequency - row.predicted_frequency) <=
+                            1e-6 * row.predicted_frequency &&
+                        std::abs(from.damping_ratio - row.predicted_ratio) <= 1e-6;
+      if (!same || distance(from.eigenvalues, to.eigenvalues) > kFarthest) continue;
+      row.sampled_frequency = to.natural_frequency;
+      row.sampled_ratio = to.damping_ratio;
+    }
   }
 }
 

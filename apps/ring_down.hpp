@@ -10,6 +10,7 @@ namespace dashpot::apps {
 
 /// A mode as the analysis predicts it and as the simulated motion shows it.
 struct RingDownMode {
+  int label = 0;                   ///< as published
   double predicted_frequency = 0;  ///< natural, rad/s, published at the start
   double predicted_ratio = 0;
   double sampled_frequency = 0;  ///< rad/s: the same with the torque held over a period, delayed
@@ -32,7 +33,8 @@ struct RingDown {
 using ControllerFactory = std::function<std::unique_ptr<LoopController>()>;
 
 /// Releases the robot near its start, once for each joint, records how it rings down, and fits
-/// modes to the motion (analysis/motion_fit.hpp). Throws InputError.
+/// modes to the motion (analysis/motion_fit.hpp). Throws InputError, and std::runtime_error if the
+/// simulation fails.
 RingDown measure_ring_down(const Scene& scene, const ControllerFactory& make_controller);
 
 }  // namespace dashpot::apps

@@ -160,6 +160,9 @@ RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
 }
 
 void run(const Options& options) {
+  if (!options.log.empty() && options.log == options.csv) {
+    throw InputError("--csv", "is the same file as --log");
+  }
   Scene scene = load_scene(options.scene);
   if (options.duration) scene.duration = *options.duration;
   std::optional<PluginLibrary> plugin;
@@ -183,6 +186,10 @@ void run(const Options& options) {
     report.ring_down = measure_ring_down(scene, make_controller);
   }
   print(options.json ? to_json(report) : to_table(report));
+  if (report.messages.send_errors > 0 && !(options.log.empty() && options.csv.empty())) {
+    throw std::runtime_error(std::to_string(report.messages.send_errors) +
+                             " messages could not be written");
+  }
   if (report.loop.simulation != sim::Status::kOk) {
     throw std::runtime_error(std::string("the simulation ended at ") +
                              std::to_string(report.simulated_time) +

@@ -65,7 +65,7 @@ Eigen::VectorXcd shape_of(const dashpot_modes& modes, const dashpot_mode& mode) 
 
 std::string modes_table(const dashpot_modes& modes) {
   TextTable table;
-  table.add_column(Align::kRight, {"", "mode"});
+  table.add_column(Align::kRight, {"", "label"});
   table.add_column(Align::kPoint, {"natural", "rad/s"});
   table.add_column(Align::kPoint, {"frequency", "Hz"});
   table.add_column(Align::kPoint, {"damping", "ratio"});
@@ -85,16 +85,15 @@ std::string modes_table(const dashpot_modes& modes) {
 
 std::string ring_down_table(const RingDown& ring_down) {
   TextTable table;
-  table.add_column(Align::kRight, {"", "mode"});
+  table.add_column(Align::kRight, {"", "label"});
   table.add_column(Align::kPoint, {"predicted", "rad/s"});
   table.add_column(Align::kPoint, {"", "ratio"});
   table.add_column(Align::kPoint, {"sampled", "rad/s"});
   table.add_column(Align::kPoint, {"", "ratio"});
   table.add_column(Align::kPoint, {"simulated", "rad/s"});
   table.add_column(Align::kPoint, {"", "ratio"});
-  int i = 0;
   for (const RingDownMode& mode : ring_down.modes) {
-    table.add_row({std::to_string(++i), format_number(mode.predicted_frequency, 5),
+    table.add_row({std::to_string(mode.label), format_number(mode.predicted_frequency, 5),
                    format_number(mode.predicted_ratio, 4), format_number(mode.sampled_frequency, 5),
                    format_number(mode.sampled_ratio, 4), format_number(mode.measured_frequency, 5),
                    format_number(mode.measured_ratio, 4)});
@@ -150,28 +149,37 @@ std::string statuses_text(const LoopRecord& loop) {
   return out + "\n";
 }
 
-/// What the analysis did since the controller's first tick.
-std::string solved_text(const dashpot_modes& modes) {
+/// How the modes were found, in ticks after the first one of the run.
+std::string solved_text(const dashpot_modes& first, const dashpot_modes& last) {
   std::string out = "  Modes:";
-  const auto add = [&out](std::uint64_t ticks, const char* what) {
-    if (ticks == 0) return;
-    out += (out.back() == ':' ? " " : ", ") + std::to_string(ticks) + " " + what;
+  const auto add = [&](std::uint64_t dashpot_modes::*ticks, const char* what) {
+    if (last.*ticks == first.*ticks) return;
+    out +=
+        (out.back() == ':' ? " " : ", ") + std::to_string(last.*ticks - first.*ticks) + " " + what;
   };
-  add(modes.tracked, "tracked");
-  add(modes.reused, "reused");
-  add(modes.unchanged, "unchanged");
-  add(modes.direct, "solved anew");
-  add(modes.no_springs, "without springs");
-  add(modes.failed, "failed");
-  add(modes.missed, "missed");
+  add(&dashpot_modes::tracked, "tracked");
+  add(&dashpot_modes::reused, "reused");
+  add(&dashpot_modes::unchanged, "unchanged");
+  add(&dashpot_modes::direct, "solved anew");
+  add(&dashpot_modes::no_springs, "without springs");
+  add(&dashpot_modes::failed, "failed");
+  add(&dashpot_modes::missed, "missed");
   return out + "\n";
 }
 
 std::string error_text(const LoopRecord& loop) {
-  return "  Largest distance from where the springs are fixed: tip " +
-         format_number(1e3 * loop.tip_error, 4) + " mm and " +
-         format_number(loop.tip_angle_error, 3) + " rad, joint " +
-         format_number(loop.joint_error, 3) + " rad (each while its springs held)\n";
+  std::string out;
+  if (loop.cartesian) {
+    out += "  Tip farthest from where its springs are fixed: " +
+           format_number(1e3 * loop.tip_error, 4) + " mm, " +
+           format_number(loop.tip_angle_error, 3) + " rad\n";
+  }
+  if (loop.joint) {
+    out +=
+        "  Joint farthest from where its springs are fixed: " + format_number(loop.joint_error, 3) +
+        " rad (m)\n";
+  }
+  return out;
 }
 
 std::string energy_text(const sim::EnergyAudit& energy) {
@@ -187,7 +195,8 @@ std::string messages_text(const RunReport& report) {
   const lcmtypes::PublisherCounters& sent = report.messages;
   return "  Messages: " + count(sent.states, "state") + ", " + std::to_string(sent.modes) +
          " of modes (" + std::to_string(sent.modes_skipped) + " unchanged, not sent), " +
-         std::to_string(sent.states_dropped) + " dropped, " + count(sent.send_errors, "error") +
+         std::to_string(sent.states_dropped + sent.modes_dropped) + " dropped, " +
+         count(sent.send_errors, "error") +
          "; commands: " + std::to_string(report.commands_accepted) + " accepted, " +
          std::to_string(report.commands_rejected) + " rejected\n";
 }
@@ -214,11 +223,14 @@ Json modes_json(const dashpot_modes& modes) {
   return result;
 }
 
-Json solved_json(const dashpot_modes& modes) {
-  return {{"tracked", modes.tracked},       {"reused", modes.reused},
-          {"direct", modes.direct},         {"unchanged", modes.unchanged},
-          {"no_springs", modes.no_springs}, {"failed", modes.failed},
-          {"missed", modes.missed}};
+Json solved_json(const dashpot_modes& first, const dashpot_modes& last) {
+  return {{"tracked", last.tracked - first.tracked},
+          {"reused", last.reused - first.reused},
+          {"direct", last.direct - first.direct},
+          {"unchanged", last.unchanged - first.unchanged},
+          {"no_springs", last.no_springs - first.no_springs},
+          {"failed", last.failed - first.failed},
+          {"missed", last.missed - first.missed}};
 }
 
 Json energy_json(const sim::EnergyAudit& energy) {
@@ -234,7 +246,8 @@ Json energy_json(const sim::EnergyAudit& energy) {
 Json ring_down_json(const RingDown& ring_down) {
   Json modes = Json::array();
   for (const RingDownMode& mode : ring_down.modes) {
-    modes.push_back({{"predicted_frequency", mode.predicted_frequency},
+    modes.push_back({{"label", mode.label},
+                     {"predicted_frequency", mode.predicted_frequency},
                      {"predicted_ratio", mode.predicted_ratio},
                      {"sampled_frequency", mode.sampled_frequency},
                      {"sampled_ratio", mode.sampled_ratio},
@@ -259,7 +272,7 @@ std::string to_table(const RunReport& report) {
   out += timing_text(report) + statuses_text(loop) + error_text(loop) + energy_text(report.energy) +
          messages_text(report);
   if (loop.first_modes.tick != 0) {
-    out += solved_text(loop.last_modes);
+    out += solved_text(loop.first_modes, loop.last_modes);
     out += "\nModes at the start, " + count(loop.first_modes.zero_modes, "zero mode") + "\n" +
            modes_table(loop.first_modes);
     out += "\nModes at the end, " + count(loop.last_modes.zero_modes, "zero mode") + "\n" +
@@ -303,7 +316,7 @@ std::string to_json(const RunReport& report) {
       {"status", statuses},
       {"zero_modes", loop.last_modes.zero_modes},
       {"modes", {{"start", modes_json(loop.first_modes)}, {"end", modes_json(loop.last_modes)}}},
-      {"solved", solved_json(loop.last_modes)},
+      {"solved", solved_json(loop.first_modes, loop.last_modes)},
       {"largest_tracking_error",
        {{"tip", loop.tip_error}, {"tip_angle", loop.tip_angle_error}, {"joint", loop.joint_error}}},
       {"energy", energy_json(report.energy)},
@@ -312,6 +325,7 @@ std::string to_json(const RunReport& report) {
         {"modes", report.messages.modes},
         {"modes_skipped", report.messages.modes_skipped},
         {"states_dropped", report.messages.states_dropped},
+        {"modes_dropped", report.messages.modes_dropped},
         {"errors", report.messages.send_errors}}},
       {"commands",
        {{"accepted", report.commands_accepted}, {"rejected", report.commands_rejected}}}};

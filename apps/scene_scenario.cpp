@@ -16,6 +16,7 @@ using controller::Vector6;
 using controller::YamlMapping;
 using controller::YamlNode;
 
+constexpr double kLongest = 1e7;  // s
 const Units kTaskUnits = {"m", "m", "m", "rad", "rad", "rad"};
 const Units kWrenchUnits = {"N", "N", "N", "N m", "N m", "N m"};
 
@@ -150,6 +151,7 @@ void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scen
     read_number(keys, "at", "s", Sign::kNotNegative, step.at);
     step.line = keys.line("at");
     if (step.at < scene.steps.back().at) throw keys.error("at", "is before the step above it");
+    if (step.at > scene.duration) throw keys.error("at", "is after the end of the scenario");
     controller::Setpoint& setpoint = step.setpoint;
     read_choice(keys, "mode", kModes, setpoint.mode);
     read_numbers(keys, "joint_position", positions, Sign::kAny, setpoint.joint_position);
@@ -194,6 +196,7 @@ void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene
                                                             "ring_down"};
   const YamlMapping keys = root.mapping("scenario", kKeys);
   read_number(keys, "duration", "s", Sign::kPositive, scene.duration);
+  if (scene.duration > kLongest) throw keys.error("duration", "is more than 1e7 s");
   read_switch(keys, "ring_down", scene.ring_down);
   scene.rest = scene.velocity = JointVector::Zero(static_cast<Eigen::Index>(positions.size()));
   if (scene.arm) {

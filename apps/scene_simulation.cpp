@@ -10,6 +10,8 @@ using controller::Sign;
 using controller::Units;
 using controller::YamlMapping;
 
+constexpr double kMostSteps = 1000;  // of the integrator in a control period
+
 /// The unit for each joint: `revolute`, or `prismatic` where a position is in m.
 Units joint_units(const Units& positions, const char* revolute, const char* prismatic) {
   Units units;
@@ -27,7 +29,8 @@ void read_joint_option(const YamlMapping& keys, std::string_view key, const Unit
   read_numbers(keys, key, units, sign, value);
 }
 
-void read_integrator(const YamlMapping& simulation, sim::IntegratorOptions& options) {
+void read_integrator(const YamlMapping& simulation, double period,
+                     sim::IntegratorOptions& options) {
   static constexpr std::array<std::string_view, 5> kKeys = {
       "method", "step", "adaptive", "absolute_tolerance", "relative_tolerance"};
   static constexpr std::array<std::pair<std::string_view, sim::Method>, 5> kMethods = {
@@ -40,6 +43,13 @@ void read_integrator(const YamlMapping& simulation, sim::IntegratorOptions& opti
   read_choice(keys, "method", kMethods, options.method);
   read_number(keys, "step", "s", Sign::kPositive, options.max_step);
   read_switch(keys, "adaptive", options.adaptive);
+  if (options.max_step < period / kMostSteps) {
+    throw keys.error("step", "is less than a thousandth of the control period");
+  }
+  if (options.adaptive && options.method != sim::Method::kDormandPrince &&
+      options.method != sim::Method::kRosenbrock) {
+    throw keys.error("adaptive", "goes with method dormand_prince or rosenbrock only");
+  }
   read_number(keys, "absolute_tolerance", "", Sign::kPositive, options.absolute_tolerance);
   read_number(keys, "relative_tolerance", "", Sign::kPositive, options.relative_tolerance);
 }
@@ -104,6 +114,7 @@ void read_surroundings(const YamlMapping& simulation, sim::ArmOptions& options) 
     sim::Wall& wall = options.wall.emplace();
     read_vector3(keys, "point", "m", wall.point);
     read_vector3(keys, "normal", "", wall.normal);
+    if (wall.normal.isZero(0)) throw keys.error("normal", "has no direction");
     read_contact(keys, "N/m", "N s/m", wall.contact);
   }
 }
@@ -116,7 +127,7 @@ void read_simulation(const YamlMapping& root, const Units& positions, sim::Plant
       "integrator", "drives", "sensors", "seed", "robot", "stops", "wall"};
   const YamlMapping keys = root.mapping("simulation", kKeys);
   plant.integrator.max_step = plant.period;
-  read_integrator(keys, plant.integrator);
+  read_integrator(keys, plant.period, plant.integrator);
   read_drives(keys, positions, plant);
   read_sensors(keys, positions, plant);
   int seed = 1;

@@ -27,7 +27,7 @@ std::string format_shape(const Eigen::VectorXcd& shape, std::size_t width) {
   std::string text = joint_name(order[0]);
   for (std::size_t k = 1; k < order.size(); ++k) {
     const std::complex<double> ratio = shape[order[k]] / shape[order[0]];
-    if (!(std::abs(ratio) >= kSmall)) break;
+    if (!(std::abs(ratio) >= kSmall) || !std::isfinite(std::arg(ratio))) break;
     const bool in_step = std::abs(ratio.imag()) <= kInStep * std::abs(ratio.real());
     std::string term = in_step && ratio.real() < 0 ? " - " : " + ";
     if (std::abs(ratio) < 1 - 5e-3) term += format_number(std::abs(ratio), 2) + " ";

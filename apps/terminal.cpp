@@ -26,6 +26,7 @@ int height() {
 StopSignal::StopSignal() {
   struct sigaction action {};
   action.sa_handler = note_stop;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // a second one ends the program
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
 }

@@ -3,7 +3,8 @@
 
 namespace dashpot::apps {
 
-/// From its construction on, Ctrl-C (SIGINT) and SIGTERM do not end the program but are noted.
+/// From its construction on, the first Ctrl-C (SIGINT) and the first SIGTERM do not end the program
+/// but are noted.
 class StopSignal {
  public:
   StopSignal();

@@ -72,10 +72,9 @@ void add_projected(const JointSquare<N>& P, const Joints<N>& k, JointSquare<N>& 
 /// the springs are at rest (e = 0, q = q_d, q = q_0) and N stands still:
 ///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot]  [+ K_G(external wrench)]
 ///     C = C_q + J' C_C J + N' C_0 N + viscous friction of the joints.
-/// The terms in brackets are there if TaskTerms
-/// asks for them; K is symmetric and has its factor W if none is. The feed-forward has no part in
-/// it: it depends on the set-point, not on the state, but for Coriolis and gravity, which cancel
-/// those of the robot.
+/// The terms in brackets are there if TaskTerms asks for them; K is symmetric and has its factor W
+/// if none is. The feed-forward has no part in it: it depends on the set-point, not on the state,
+/// but for Coriolis and gravity, which cancel those of the robot.
 template <int N>
 void closed_loop(const Dynamics<N>& robot, const Joints<N>& qd, const Impedance<N>& impedance,
                  const NullSpace<N>& null_space, const Joints<N>& viscous_friction,

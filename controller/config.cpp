@@ -79,10 +79,12 @@ void read_feed_forward(const YamlMapping& root, FeedForward& feed_forward) {
   read_switch(keys, "wrench", feed_forward.wrench);
 }
 
-void read_watchdog(const YamlMapping& root, Watchdog& watchdog) {
+void read_watchdog(const YamlMapping& root, double period, Watchdog& watchdog) {
+  constexpr double kGap = 2.5;  // periods
   static constexpr std::array<std::string_view, 3> kKeys = {"setpoint_hold", "setpoint_damp",
                                                             "longest_gap"};
   const YamlMapping keys = root.mapping("watchdog", kKeys);
+  watchdog.longest_gap = std::max(watchdog.longest_gap, kGap * period);  // of slow loops
   read_number(keys, "setpoint_hold", "s", Sign::kNotNegative, watchdog.setpoint_hold);
   read_number(keys, "setpoint_damp", "s", Sign::kNotNegative, watchdog.setpoint_damp);
   read_number(keys, "longest_gap", "s", Sign::kPositive, watchdog.longest_gap);
@@ -164,7 +166,7 @@ Config read_config(const YamlNode& document, const std::filesystem::path& direct
   read_limits(root, model, settings.limits);
   read_motion(root, model, settings.motion);
   read_feed_forward(root, settings.feed_forward);
-  read_watchdog(root, settings.watchdog);
+  read_watchdog(root, settings.period, settings.watchdog);
   read_analysis(root, settings.analysis);
   check(settings, model.dof(), document);
   return {model, settings};

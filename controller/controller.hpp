@@ -12,8 +12,12 @@ class ControllerCore;
 /// Impedance controller for one arm: from measured state and set-point to joint torque, once a
 /// tick.
 ///
-///     const RobotModel model = RobotModel::from_urdf_file("panda.urdf", "panda_link0",
-///     "panda_hand"); Controller controller(model, default_settings(model)); JointVector torque;
+///     const auto model = RobotModel::from_urdf_file("panda.urdf", "panda_link0", "panda_hand");
+///
+///     Controller controller(model, default_settings(model));
+///
+///     JointVector torque;
+///
 ///     for (;;) {                                 // every Settings::period
 ///       ...                                      // read `state`
 ///       const Status status = controller.update(state, setpoint, torque);
@@ -21,7 +25,8 @@ class ControllerCore;
 ///     }
 ///
 /// Read in this order: robot_model.hpp, dynamics.hpp, setpoint_path.hpp, gain_path.hpp,
-/// held_damping.hpp, impedance_law.hpp, safety_filter.hpp, and controller_core.hpp, which calls them.
+/// held_damping.hpp, impedance_law.hpp, safety_filter.hpp, vibration.hpp, and fixed_core.hpp, which
+/// calls them.
 ///
 /// One thread at a time may use a Controller; `Latest` (latest.hpp) hands set-points to the thread
 /// of `update` and snapshots from it.

@@ -44,7 +44,10 @@ bool differ(const controller::Vibration& a, const controller::Vibration& b, doub
 }  // namespace
 
 Publisher::Publisher(std::vector<std::unique_ptr<Sink>> sinks, PublisherOptions options)
-    : options_(options), sinks_(std::move(sinks)), states_(options.queue) {
+    : options_(options),
+      sinks_(std::move(sinks)),
+      states_(options.queue),
+      modes_(options.modes_queue) {
   if (options.state_every < 1) throw std::invalid_argument("publisher: state_every is below 1");
   if (!(options.modes_heartbeat >= 0)) {
     throw std::invalid_argument("publisher: modes_heartbeat is not at least 0 s");
@@ -73,7 +76,7 @@ void Publisher::offer(const StateSample& sample) noexcept {
 }
 
 void Publisher::offer(const ModesSample& sample) noexcept {
-  newest_modes_.write(sample);
+  if (!modes_.push(sample)) overflow_.write(sample);
 }
 
 void Publisher::start() {
@@ -99,13 +102,23 @@ void Publisher::publish_pending() {
     send(kStateChannel, state_message_);
     count(states_sent_);
   }
-  if (!newest_modes_.fetch()) return;
-  const ModesSample& modes = newest_modes_.value();
-  if (!is_new(modes)) return count(modes_skipped_);
+  for (std::size_t i = 0; i < options_.modes_queue; ++i) {
+    const ModesSample* sample = modes_.front();
+    if (sample == nullptr) break;
+    publish(*sample);
+    modes_.pop();
+  }
+  if (overflow_.fetch() && overflow_.value().vibration.tick > published_modes_.vibration.tick) {
+    publish(overflow_.value());
+  }
+}
+
+void Publisher::publish(const ModesSample& sample) {
+  if (!is_new(sample)) return count(modes_skipped_);
   ++modes_message_.sequence;
-  fill(modes, modes_message_);
+  fill(sample, modes_message_);
   send(kModesChannel, modes_message_);
-  published_modes_ = modes;
+  published_modes_ = sample;
   count(modes_sent_);
 }
 
@@ -124,8 +137,11 @@ bool Publisher::is_new(const ModesSample& sample) const {
 }
 
 PublisherCounters Publisher::counters() const noexcept {
-  return {states_sent_.load(std::memory_order_relaxed), modes_sent_.load(std::memory_order_relaxed),
-          modes_skipped_.load(std::memory_order_relaxed), states_.dropped(),
+  return {states_sent_.load(std::memory_order_relaxed),
+          modes_sent_.load(std::memory_order_relaxed),
+          modes_skipped_.load(std::memory_order_relaxed),
+          states_.dropped(),
+          modes_.dropped(),
           send_errors_.load(std::memory_order_relaxed)};
 }
 

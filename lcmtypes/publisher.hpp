@@ -21,6 +21,7 @@ struct PublisherOptions {
   double modes_tolerance = 1e-6;  ///< changes up to this do not count: of a joint, rad (m); of a
                                   ///< frequency or ratio, relative
   std::size_t queue = 1024;       ///< states that may wait
+  std::size_t modes_queue = 64;   ///< modes that may wait
   std::chrono::microseconds poll{1000};  ///< how often the thread looks for new samples
 };
 
@@ -30,6 +31,7 @@ struct PublisherCounters {
   std::int64_t modes = 0;
   std::int64_t modes_skipped = 0;   ///< not new
   std::int64_t states_dropped = 0;  ///< no room in the queue
+  std::int64_t modes_dropped = 0;   ///< likewise; the latest of them goes out all the same
   std::int64_t send_errors = 0;     ///< of any sink
 };
 
@@ -59,6 +61,7 @@ class Publisher {
 
  private:
   void run();
+  void publish(const ModesSample& sample);
   template <class Message>
   void send(const char* channel, const Message& message);
   bool is_new(const ModesSample& sample) const;
@@ -68,7 +71,8 @@ class Publisher {
 
   // Between the two threads
   SampleQueue<StateSample> states_;
-  controller::Latest<ModesSample> newest_modes_;
+  SampleQueue<ModesSample> modes_;
+  controller::Latest<ModesSample> overflow_;  ///< the latest that found no room
   std::atomic<bool> stop_{false};
   std::atomic<std::int64_t> states_sent_{0};
   std::atomic<std::int64_t> modes_sent_{0};

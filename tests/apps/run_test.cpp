@@ -107,6 +107,36 @@ TEST(Scenes, AreAllTested) {
   EXPECT_EQ(files, 8U);  // those of EveryScene
 }
 
+/// Every key that the reader says it knows stands in the example.
+TEST(Scenes, TheExampleShowsEveryKey) {
+  const Scratch scratch;
+  const std::string example = text_of(scene("panda"));
+  for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
+           {"simulation:", "simulation:\n  no: 1"},
+           {"  integrator:", "  integrator:\n    no: 1"},
+           {"  robot:                 ", "  robot:\n    no: 1\n    #"},
+           {"stops: {", "stops: {no: 1, "},
+           {"  wall:", "  wall:\n    no: 1\n    #"},
+           {"  drives:", "  drives:\n    no: 1"},
+           {"  sensors:", "  sensors:\n    no: 1"},
+           {"payload: {", "payload: {no: 1, "},
+           {"scenario:", "scenario:\n  no: 1"},
+           {"  start:", "  start:\n    no: 1"},
+           {"{begin: 1 s", "{no: 1, begin: 1 s"},
+           {"- at: 2 s", "- no: 1\n      at: 2 s"}}) {
+    const std::string said = run_scene(changed(scratch, "panda", from, to)).err;
+    const std::size_t list = said.find("unknown key; the keys are ");
+    ASSERT_NE(list, std::string::npos) << said;
+    std::istringstream words(said.substr(list + 26, said.rfind(" (line") - list - 26));
+    int count = 0;
+    for (std::string word; words >> word; ++count) {
+      if (word.ends_with(',')) word.pop_back();
+      EXPECT_NE(example.find(word), std::string::npos) << word;
+    }
+    EXPECT_GT(count, 1) << said;
+  }
+}
+
 TEST(Run, TheSameSceneGivesTheSameBits) {
   const Scratch scratch;
   for (const char* name : {"a.csv", "b.csv"}) {

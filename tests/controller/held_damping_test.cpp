@@ -215,9 +215,12 @@ TEST(HeldDamping, FollowsChangesOfStiffnessAndRatio) {
       EXPECT_NEAR(held, std::min(ratio, 1.0), 1e-6);  // real eigenvalues above 1
     }
   }
-  // Half-way between two stiffnesses the ratio is that of both.
+  // Half-way between two stiffnesses in two frames the ratio is that of both.
   gains.task_stiffness *= 8;
-  for (int k = 0; k < 250; ++k) {
+  gains.task_stiffness(0, 0) *= 3;
+  gains.frame = Frame::kTool;
+  for (int k = 0; k < 600; ++k) {
+    led.swing(1e-3 * k);
     led.tick();
     const Vibration& modes = led.controller.vibration();
     for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(modes.modes[i].damping_ratio, 0.7, 1e-6);
@@ -225,9 +228,34 @@ TEST(HeldDamping, FollowsChangesOfStiffnessAndRatio) {
   // And off: the damping that was given.
   gains.task_damping_ratio = 0;
   led.settle();
+  gains.frame = Frame::kBase;
+  led.settle();
   const Eigen::MatrixXd J = evaluate(model, led.state.position, led.state.velocity).J;
   EXPECT_TRUE(
       testing::near(led.damping(), Eigen::MatrixXd(J.transpose() * gains.task_damping * J), 1e-9));
+}
+
+/// On, another, off: evenly over Motion::gain_time.
+TEST(HeldDamping, TheRatioChangesEvenly) {
+  const RobotModel model = panda();
+  LedArm led(model, plain_settings(model));
+  led.settle();
+  led.state.velocity.setConstant(0.3);
+  led.tick();
+  for (const double ratio : {1.4, 0.0, 0.7}) {
+    led.setpoint.gains.task_damping_ratio = ratio;
+    JointVector last = led.controller.snapshot().law_torque;
+    const JointVector first = last;
+    double step = 0;
+    for (int k = 0; k < 505; ++k) {
+      led.tick();
+      const JointVector now = led.controller.snapshot().law_torque;
+      step = std::max(step, (now - last).norm());
+      last = now;
+    }
+    EXPECT_GT((last - first).norm(), 1);
+    EXPECT_LT(step, 1.01 / 500 * (last - first).norm());
+  }
 }
 
 TEST(HeldDamping, IsSemidefiniteWhateverChanges) {
