@@ -69,16 +69,13 @@ class PluginController : public LoopController {
         gains.frame == controller::Frame::kTool ? DASHPOT_FRAME_TOOL : DASHPOT_FRAME_BASE;
     std::array<std::uint8_t, 6> directions{};
     for (std::size_t i = 0; i < 6; ++i) directions[i] = gains.directions[i] ? 1 : 0;
-    const dashpot_gains wanted = {sizeof(dashpot_gains),
-                                  n(),
-                                  joint_stiffness.data(),
-                                  joint_damping.data(),
-                                  task_stiffness.data(),
-                                  task_damping.data(),
-                                  gains.null_stiffness.data(),
-                                  gains.null_damping.data(),
-                                  &frame,
-                                  directions.data()};
+    const dashpot_gains wanted = {
+        sizeof(dashpot_gains),     n(),
+        joint_stiffness.data(),    joint_damping.data(),
+        task_stiffness.data(),     gains.task_damping_ratio > 0 ? nullptr : task_damping.data(),
+        &gains.task_damping_ratio, gains.null_stiffness.data(),
+        gains.null_damping.data(), &frame,
+        directions.data()};
     return plugin_.set_gains(handle_.get(), &wanted);
   }
 

@@ -2,7 +2,8 @@
 // and moving set-points. `tick/cartesian` has the null space where the arm is redundant,
 // `tick/joint` is joint impedance. 6 joints are the UR5, 7 the Panda, 14 a random chain. The arm
 // swings, and its state is a new one at every tick. `tick/full` has the spectrum of each as well,
-// with shapes, and the snapshot; `_values_only` without shapes; `_background` hands it to a thread;
+// with shapes, and the snapshot; `tick/design` besides holds a damping ratio; `_values_only`
+// without shapes; `_background` hands it to a thread;
 // `_percentiles` times a million ticks one by one.
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -52,7 +53,9 @@ std::vector<RobotState> swing(const JointVector& center) {
 /// A controller in the loop with a swinging arm.
 class Loop {
  public:
-  Loop(int n, Mode mode, const Analysis& analysis) : Loop(model_of(n), mode, analysis) {}
+  /// `ratio`: damping ratio that is held; 0: none.
+  Loop(int n, Mode mode, const Analysis& analysis, double ratio = 0)
+      : Loop(model_of(n), mode, analysis, ratio) {}
 
   Status step() {
     RobotState& state = states_[k_];
@@ -69,8 +72,8 @@ class Loop {
   const Vibration& vibration() const { return controller_.vibration(); }
 
  private:
-  Loop(const RobotModel& model, Mode mode, const Analysis& analysis)
-      : controller_(model, settings_for(model, analysis)) {
+  Loop(const RobotModel& model, Mode mode, const Analysis& analysis, double ratio)
+      : controller_(model, settings_for(model, analysis, ratio)) {
     setpoint_ = controller_.settings().initial;
     JointVector center = setpoint_.joint_position;
     if (model.dof() == 7) center << 0, -0.785, 0, -2.356, 0, 1.571, 0.785;
@@ -81,8 +84,9 @@ class Loop {
     setpoint_.tip_pose = {there.p_BT_B, there.R_BT};
     for (std::size_t i = 0; i < kStates; ++i) step();
   }
-  static Settings settings_for(const RobotModel& model, const Analysis& analysis) {
+  static Settings settings_for(const RobotModel& model, const Analysis& analysis, double ratio) {
     Settings settings = default_settings(model);
+    settings.initial.gains.task_damping_ratio = ratio;
     settings.analysis = analysis;
     settings.feed_forward.friction = true;
     settings.limits.torque *= 1e3;  // so that no limit is at work
@@ -98,8 +102,8 @@ class Loop {
   std::size_t k_ = 0;
 };
 
-void tick(benchmark::State& bench, Mode mode, const Analysis& analysis) {
-  Loop loop(static_cast<int>(bench.range(0)), mode, analysis);
+void tick(benchmark::State& bench, Mode mode, const Analysis& analysis, double ratio) {
+  Loop loop(static_cast<int>(bench.range(0)), mode, analysis, ratio);
   const VibrationCounters before = loop.vibration().counters;
   Status worst = Status::kOk;
   for (auto _ : bench) {
@@ -138,10 +142,11 @@ void percentiles(benchmark::State& bench, Mode mode, const Analysis& analysis) {
   bench.counters["direct"] = static_cast<double>(loop.vibration().counters.direct - direct);
 }
 
-void add(const std::string& name, Mode mode, Analysis analysis, std::initializer_list<int> joints) {
+void add(const std::string& name, Mode mode, Analysis analysis, std::initializer_list<int> joints,
+         double ratio = 0) {
   for (const int n : joints) {
-    benchmark::RegisterBenchmark(name.c_str(),
-                                 [=](benchmark::State& bench) { tick(bench, mode, analysis); })
+    benchmark::RegisterBenchmark(
+        name.c_str(), [=](benchmark::State& bench) { tick(bench, mode, analysis, ratio); })
         ->Arg(n)
         ->Unit(benchmark::kMicrosecond);
   }
@@ -159,6 +164,7 @@ int main(int argc, char** argv) {
   const Analysis background{Analysis::Where::kBackground, 1, 0.1};
   add("tick/full", Mode::kCartesian, every_tick,
       {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
+  add("tick/design", Mode::kCartesian, every_tick, {6, 7, 14}, 0.7);
   add("tick/full_joint", Mode::kJoint, every_tick, {6, 7, 14});
   add("tick/full_values_only", Mode::kCartesian, values_only, {6, 7, 14});
   add("tick/full_background", Mode::kCartesian, background, {6, 7, 14});

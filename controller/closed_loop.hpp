@@ -68,17 +68,6 @@ void add_projected(const JointSquare<N>& P, const Joints<N>& k, JointSquare<N>& 
   }
 }
 
-/// K in the tool's axes, turned into B's: diag(R, R) K diag(R, R)'.
-inline Matrix6 turned(const Matrix6& K, const Eigen::Matrix3d& R) noexcept {
-  Matrix6 result;
-  for (int i = 0; i < 6; i += 3) {
-    for (int j = 0; j < 6; j += 3) {
-      result.block<3, 3>(i, j) = R * K.block<3, 3>(i, j) * R.transpose();
-    }
-  }
-  return result;
-}
-
 /// The robot with the springs and dampers of an impedance, M q'' + C q' + K q = f, linearised where
 /// the springs are at rest (e = 0, q = q_d, q = q_0) and N stands still:
 ///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot]  [+ K_G(external wrench)]

@@ -1,6 +1,7 @@
 #include <dashpot/controller/config_gains.hpp>
 #include <dashpot/controller/config_robot.hpp>
 
+#include <sstream>
 #include <utility>
 
 namespace dashpot::controller {
@@ -10,13 +11,31 @@ Units task_units(const char* linear, const char* angular) {
   return {linear, linear, linear, angular, angular, angular};
 }
 
-/// Damping that suits a default stiffness suits no other, so the two come together.
+/// Damping that suits a default stiffness suits no other, so the two come together; a damping ratio
+/// suits any.
 void require_pair(const YamlMapping& keys) {
   for (const auto& [key, other] : {std::pair("stiffness", "damping"), {"damping", "stiffness"}}) {
-    if (keys.has(key) && !keys.has(other)) {
+    if (keys.has(key) && !keys.has(other) && !keys.has("damping_ratio")) {
       throw keys.error(other, std::string("missing; it goes with ") + key, keys.line(key));
     }
   }
+}
+
+/// Of `damping` and `damping_ratio`, the one given ends the other.
+void read_task_damping(const YamlMapping& task, Gains& gains) {
+  const Units units = task_units("N s/m", "N m s/rad");
+  read_matrix(task, "damping", units, gains.task_damping);
+  if (task.has("damping")) gains.task_damping_ratio = 0;
+  if (!task.has("damping_ratio")) return;
+  if (task.has("damping")) {
+    throw task.error("damping_ratio", "stands beside damping, in place of which it is meant");
+  }
+  double& ratio = gains.task_damping_ratio;
+  read_number(task, "damping_ratio", "", Sign::kPositive, ratio);
+  if (ratio <= kLargestDampingRatio) return;
+  std::ostringstream text;
+  text << "is " << ratio << ", must be at most " << kLargestDampingRatio;
+  throw task.error("damping_ratio", text.str());
 }
 
 void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
@@ -40,8 +59,8 @@ void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
 void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pairs, Gains& gains) {
   static constexpr std::array<std::string_view, 3> kKeys = {"joint", "task", "null_space"};
   static constexpr std::array<std::string_view, 2> kPair = {"stiffness", "damping"};
-  static constexpr std::array<std::string_view, 4> kTaskKeys = {"stiffness", "damping", "frame",
-                                                                "directions"};
+  static constexpr std::array<std::string_view, 5> kTaskKeys = {
+      "stiffness", "damping", "damping_ratio", "frame", "directions"};
   const YamlMapping keys = parent.mapping("gains", kKeys);
   const auto require = [pairs](const YamlMapping& part) {
     if (pairs == GainPairs::kTogether) require_pair(part);
@@ -57,7 +76,7 @@ void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pa
   const YamlMapping task = keys.mapping("task", kTaskKeys);
   require(task);
   read_matrix(task, "stiffness", task_units("N/m", "N m/rad"), gains.task_stiffness);
-  read_matrix(task, "damping", task_units("N s/m", "N m s/rad"), gains.task_damping);
+  read_task_damping(task, gains);
   static constexpr std::array<std::pair<std::string_view, Frame>, 2> kFrames = {
       {{"base", Frame::kBase}, {"tool", Frame::kTool}}};
   read_choice(task, "frame", kFrames, gains.frame);

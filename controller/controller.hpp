@@ -25,7 +25,8 @@ class ControllerCore;
 ///     }
 ///
 /// Read in this order: robot_model.hpp, dynamics.hpp, setpoint_path.hpp, gain_path.hpp,
-/// impedance_law.hpp, safety_filter.hpp, vibration.hpp, and fixed_core.hpp, which calls them.
+/// held_damping.hpp, impedance_law.hpp, safety_filter.hpp, vibration.hpp, and fixed_core.hpp, which
+/// calls them.
 ///
 /// One thread at a time may use a Controller; `Latest` (latest.hpp) hands set-points to the thread
 /// of `update` and snapshots from it.

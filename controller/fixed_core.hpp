@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/controller/controller_core.hpp>
-#include <dashpot/controller/gain_path.hpp>
+#include <dashpot/controller/held_damping.hpp>
 #include <dashpot/controller/impedance_law.hpp>
 #include <dashpot/controller/loop_system.hpp>
 #include <dashpot/controller/safety_filter.hpp>
@@ -14,8 +14,8 @@
 namespace dashpot::controller {
 
 /// The controller's core for N joints, known at compile time. One tick, in `update`:
-///     state -> StateCheck -> DynamicsKernel -> set-point, paths and gains -> ImpedanceLaw
-///           -> SafetyFilter -> torque;   and with these gains -> LoopSystem -> VibrationAnalysis
+///     state -> StateCheck -> DynamicsKernel -> set-point, paths and gains -> HeldDamping
+///           -> ImpedanceLaw -> SafetyFilter -> torque;   and with these gains -> LoopSystem -> VibrationAnalysis
 template <int N>
 class FixedCore final : public ControllerCore {
  public:
@@ -60,6 +60,7 @@ class FixedCore final : public ControllerCore {
   StateCheck state_check_;
   SpringPaths<N> paths_;
   GainPath<N> gains_;
+  HeldDamping<N> held_;
   Ramp<Vector6> wrench_;
   ImpedanceLaw<N> law_;
   SafetyFilter<N> filter_;
@@ -143,6 +144,7 @@ void FixedCore<N>::reset(const JointVector& torque) noexcept {
     vector->setZero(N);
   }
   vibration_.reset(N);
+  held_.reset();
   loop_.reset();
   analysed_.any = false;
 }
@@ -282,7 +284,7 @@ Joints<N> FixedCore<N>::act(bool hold) noexcept {
   wrench_.step();
 
   // Of two modes in force, the one that fades away stays where it is.
-  const Impedance<N>& impedance = gains_.now();
+  const Impedance<N>& impedance = held_.update(gains_, robot_);
   const bool joint = accepted_.mode == Mode::kJoint;
   if (impedance.joint_weight > 0) {
     if (joint && !hold) {
@@ -412,7 +414,7 @@ void FixedCore<N>::describe() noexcept {
 
 template <int N>
 Impedance<N> FixedCore<N>::impedance() const noexcept {
-  if (!damping_only_) return gains_.now();
+  if (!damping_only_) return held_.now(gains_.now());
   Impedance<N> damping;
   for (int i = 0; i < N; ++i) damping.joint_damping(i, i) = damping_[i];
   return damping;

@@ -23,8 +23,9 @@ struct Impedance {
   TipImpedance tool;  ///< in T's
   Joints<N> null_stiffness = Joints<N>::Zero();
   Joints<N> null_damping = Joints<N>::Zero();
-  double joint_weight = 0;  ///< share of the joint springs
-  double task_weight = 0;   ///< share of the Cartesian springs
+  double damping_ratio = 0;  ///< that HeldDamping gives the tip's springs, beside `damping`
+  double joint_weight = 0;   ///< share of the joint springs
+  double task_weight = 0;    ///< share of the Cartesian springs
 
   /// What a valid set-point asks for. Directions that are not held have no springs and dampers. The
   /// null space is empty unless there are more joints than directions held.
@@ -65,10 +66,25 @@ Impedance<N> Impedance<N>::of(const Setpoint& setpoint) noexcept {
     return tip.held.asDiagonal() * (0.5 * (A + A.transpose())) * tip.held.asDiagonal();
   };
   tip.stiffness = in_held_directions(gains.task_stiffness);
-  tip.damping = in_held_directions(gains.task_damping);
+  if (gains.task_damping_ratio > 0) {
+    result.damping_ratio = gains.task_damping_ratio;
+  } else {
+    tip.damping = in_held_directions(gains.task_damping);
+  }
   if (N > held) {
     if (gains.null_stiffness.size() == N) result.null_stiffness = fixed<N>(gains.null_stiffness);
     if (gains.null_damping.size() == N) result.null_damping = fixed<N>(gains.null_damping);
+  }
+  return result;
+}
+
+/// K in the tool's axes, turned into B's: diag(R, R) K diag(R, R)'.
+inline Matrix6 turned(const Matrix6& K, const Eigen::Matrix3d& R) noexcept {
+  Matrix6 result;
+  for (int i = 0; i < 6; i += 3) {
+    for (int j = 0; j < 6; j += 3) {
+      result.block<3, 3>(i, j) = R * K.block<3, 3>(i, j) * R.transpose();
+    }
   }
   return result;
 }
@@ -96,6 +112,7 @@ Impedance<N> blend(const Impedance<N>& a, const Impedance<N>& b, double s) noexc
   }
   mix(a.null_stiffness, b.null_stiffness, c.null_stiffness);
   mix(a.null_damping, b.null_damping, c.null_damping);
+  c.damping_ratio = r * a.damping_ratio + s * b.damping_ratio;
   c.joint_weight = r * a.joint_weight + s * b.joint_weight;
   c.task_weight = r * a.task_weight + s * b.task_weight;
   return c;

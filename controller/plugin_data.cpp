@@ -107,6 +107,14 @@ std::int32_t to_gains(const dashpot_gains* given, int n, Gains& gains) noexcept 
       *given->frame != DASHPOT_FRAME_TOOL) {
     return DASHPOT_WRONG_VALUE;
   }
+  if (given->task_damping_ratio != nullptr) {
+    if (given->task_damping != nullptr && *given->task_damping_ratio != 0) {
+      return DASHPOT_WRONG_VALUE;
+    }
+    gains.task_damping_ratio = *given->task_damping_ratio;
+  } else if (given->task_damping != nullptr) {
+    gains.task_damping_ratio = 0;
+  }
   if (given->joint_stiffness != nullptr) gains.joint_stiffness = square(given->joint_stiffness, n);
   if (given->joint_damping != nullptr) gains.joint_damping = square(given->joint_damping, n);
   if (given->task_stiffness != nullptr) gains.task_stiffness = square(given->task_stiffness, 6);

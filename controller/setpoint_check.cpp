@@ -75,6 +75,9 @@ SetpointFault check_gains(const Gains& gains, Mode mode, Eigen::Index n) noexcep
   }
   if ((reason = matrix_fault(gains.task_stiffness, 6))) return {"task_stiffness", reason};
   if ((reason = matrix_fault(gains.task_damping, 6))) return {"task_damping", reason};
+  if (!(gains.task_damping_ratio >= 0 && gains.task_damping_ratio <= kLargestDampingRatio)) {
+    return {"task_damping_ratio", "is not between 0 and 2"};
+  }
   if ((reason = vector_fault(gains.null_stiffness, n))) return {"null_stiffness", reason};
   if ((reason = vector_fault(gains.null_damping, n))) return {"null_damping", reason};
   if (gains.frame != Frame::kBase && gains.frame != Frame::kTool) return {"frame", "is unknown"};
@@ -110,7 +113,8 @@ bool same_gains(const Gains& a, const Gains& b) noexcept {
   return a.frame == b.frame && a.directions == b.directions &&
          same(a.joint_stiffness, b.joint_stiffness) && same(a.joint_damping, b.joint_damping) &&
          a.task_stiffness == b.task_stiffness && a.task_damping == b.task_damping &&
-         same(a.null_stiffness, b.null_stiffness) && same(a.null_damping, b.null_damping);
+         a.task_damping_ratio == b.task_damping_ratio && same(a.null_stiffness, b.null_stiffness) &&
+         same(a.null_damping, b.null_damping);
 }
 
 }  // namespace dashpot::controller

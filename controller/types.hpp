@@ -45,12 +45,18 @@ enum class Mode : std::uint8_t {
 /// In whose axes K_C, C_C and `directions` are given.
 enum class Frame : std::uint8_t { kBase, kTool };
 
+/// The largest damping ratio that can be asked for.
+inline constexpr double kLargestDampingRatio = 2;
+
 /// Springs and dampers. All matrices are symmetric positive semidefinite.
 struct Gains {
   JointMatrix joint_stiffness;               ///< n x n, N m/rad, of mode kJoint
   JointMatrix joint_damping;                 ///< n x n, N m s/rad, of mode kJoint
   Matrix6 task_stiffness = Matrix6::Zero();  ///< K_C, N/m, N/rad and N m/rad
   Matrix6 task_damping = Matrix6::Zero();    ///< C_C, N s/m, N s/rad and N m s/rad
+  /// Damping ratio that every mode of K_C is to have, 0 < ratio <= 2: C_C is then designed anew at
+  /// every tick (see HeldDamping) and task_damping is not used. 0: C_C is task_damping.
+  double task_damping_ratio = 0;
   Frame frame = Frame::kBase;
   /// Task directions that the controller holds, in the axes of `frame`; the rest are as free as
   /// the self-motion of a redundant arm.

@@ -24,6 +24,7 @@ void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t 
     setpoint.gains.directions = from.gains.directions;
     setpoint.gains.task_stiffness = from.gains.task_stiffness;
     setpoint.gains.task_damping = from.gains.task_damping;
+    setpoint.gains.task_damping_ratio = from.gains.task_damping_ratio;
   }
   if (has(command_t::NULL_GAINS)) {
     setpoint.gains.null_stiffness = from.gains.null_stiffness;

@@ -3,8 +3,8 @@
 
 usage: release.py DASHPOT SCENE_JSON CSV
 
-CSV is what `dashpot run --csv` wrote; SCENE_JSON names the robot, K_C, C_C and the joint position at
-which the springs are fixed. Mass and Jacobian there come from `dashpot inspect`, the closed-form
+CSV is what `dashpot run --csv` wrote; SCENE_JSON names the robot, K_C, C_C (or the damping ratio that
+the controller holds) and the joint position at which the springs are fixed. Mass and Jacobian there come from `dashpot inspect`, the closed-form
 response from `dashpot analyze`. Prints a table: time (s), displacement of the tip along y (mm) as
 simulated, and as predicted.
 """
@@ -26,6 +26,13 @@ def diagonal(values):
     return [[value if i == j else 0 for j in range(len(values))] for i, value in enumerate(values)]
 
 
+def task_damping(program, scene, system):
+    if "damping" in scene:
+        return diagonal(scene["damping"])
+    return dashpot(program, "design", "-", "--damping-ratio", str(scene["damping_ratio"]),
+                   text=json.dumps(system))["task_damping"]
+
+
 def main():
     program, scene_text, csv_path = sys.argv[1:]
     scene = json.loads(scene_text)
@@ -37,9 +44,9 @@ def main():
     start = [float(rows[0][f"q{i + 1}"]) - q for i, q in enumerate(rest)]
     times = [float(row["time"]) for row in rows]
     system = {"mass": arm["mass_matrix"], "jacobian": arm["jacobian"],
-              "task_stiffness": diagonal(scene["stiffness"]),
-              "task_damping": diagonal(scene["damping"]),
-              "initial_position": start, "times": times}
+              "task_stiffness": diagonal(scene["stiffness"])}
+    system |= {"task_damping": task_damping(program, scene, system),
+               "initial_position": start, "times": times}
     response = dashpot(program, "analyze", "-", text=json.dumps(system))["response"]
     y = arm["jacobian"][1]
     for time, row, q in zip(times, rows, response["position"]):

@@ -94,8 +94,9 @@ TEST_P(EveryScene, RunsWithoutAnOverrunAndAccountsForItsEnergy) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
-                         testing::Values("panda", "panda_release_c1", "panda_release_c2", "iiwa14",
-                                         "ur5", "baxter_left", "chain3"));
+                         testing::Values("panda", "panda_release_c1", "panda_release_c2",
+                                         "panda_release_held", "iiwa14", "ur5", "baxter_left",
+                                         "chain3"));
 
 TEST(Scenes, AreAllTested) {
   std::size_t files = 0;
@@ -103,7 +104,7 @@ TEST(Scenes, AreAllTested) {
        std::filesystem::directory_iterator(std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes")) {
     files += entry.path().extension() == ".yaml" ? 1 : 0;
   }
-  EXPECT_EQ(files, 7U);  // those of EveryScene
+  EXPECT_EQ(files, 8U);  // those of EveryScene
 }
 
 /// Every key that the reader says it knows stands in the example.
@@ -176,6 +177,16 @@ TEST(Run, ShowsTheReleasesOfThePaper) {
   };
   expect_close(slow_modes("panda_release_c1"), {{20.25, 0.0255}, {10.98, 0.0316}, {9.755, 0.0294}});
   expect_close(slow_modes("panda_release_c2"), {{20.23, 0.2235}, {11.17, 0.2288}, {10.95, 0.2032}});
+}
+
+TEST(Run, HoldsADampingRatioWhereverTheArmIs) {
+  const Json result = run_json(scene("panda_release_held"), {"--duration", "2"});
+  for (const char* when : {"start", "end"}) {
+    ASSERT_EQ(result["modes"][when].size(), 6U);
+    for (const Json& mode : result["modes"][when]) {
+      EXPECT_NEAR(mode["damping_ratio"].get<double>(), 0.7, 1e-6);
+    }
+  }
 }
 
 TEST(Run, MovesMatricesAsTheClosedFormSays) {

@@ -135,6 +135,17 @@ TEST(Config, FillsTheTask) {
   EXPECT_THAT(gains.directions, testing::ElementsAre(false, false, true, true, false, false));
 }
 
+TEST(Config, ADampingRatioStandsForTheDampingOfTheTask) {
+  const auto gains = [](const std::string& task) {
+    return load(panda() + "gains: {task: {" + task + "}}\n").settings.initial.gains;
+  };
+  EXPECT_EQ(gains("").task_damping_ratio, 0);
+  EXPECT_EQ(gains("damping_ratio: 0.7").task_damping_ratio, 0.7);
+  const auto both = gains("stiffness: [9, 8, 7, 6, 5, 4], damping_ratio: 2");
+  EXPECT_EQ(both.task_damping_ratio, 2);
+  EXPECT_EQ(both.task_stiffness(0, 0), 9);
+}
+
 TEST(Config, FillsLimits) {
   const auto limits = load(panda() +
                            "limits:\n  position_lower: [-90 deg, none, -1, -2, -1, 0, none]\n"

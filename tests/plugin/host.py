@@ -27,6 +27,7 @@ class Gains(c.Structure):
     _fields_ = [("struct_size", c.c_uint32), ("joints", c.c_uint32),
                 ("joint_stiffness", Doubles), ("joint_damping", Doubles),
                 ("task_stiffness", Doubles), ("task_damping", Doubles),
+                ("task_damping_ratio", Doubles),
                 ("null_stiffness", Doubles), ("null_damping", Doubles),
                 ("frame", c.POINTER(c.c_int32)), ("directions", c.POINTER(c.c_uint8))]
 

@@ -122,6 +122,7 @@ class HostileTicks {
         Eigen::Matrix<double, 6, 1> u;
         for (int k = 0; k < 6; ++k) u[k] = uniform(-30, 30);
         gains.task_stiffness = u * u.transpose();
+        gains.task_damping_ratio = std::max(0.0, u[0] / 15);
         break;
       }
       case 5:
@@ -192,7 +193,7 @@ class HostileTicks {
         s.gains.joint_stiffness(joint(), joint()) = odd();
         break;
       case 7:
-        s.gains.task_damping(k, k) = odd();
+        (k == 0 ? s.gains.task_damping_ratio : s.gains.task_damping(k, k)) = odd();
         break;
       case 8:
         s.gains.null_stiffness.resize(static_cast<Eigen::Index>(engine_() % 17));

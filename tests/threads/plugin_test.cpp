@@ -308,6 +308,52 @@ TEST(Plugin, ChangesGainsAtRunTime) {
   EXPECT_NEAR(product() / before, 128, 1e-6);
 }
 
+/// Six modes of the task with the ratio that is held, or with those of a damping matrix again.
+TEST(Plugin, HoldsADampingRatio) {
+  Host host(create("robot: {urdf: " + urdf_path("panda.urdf") +
+                   ", base: panda_link0, tip: panda_hand_tcp, viscous_friction: 0}\n"
+                   "control: {mode: cartesian}\n"
+                   "gains: {null_space: {stiffness: 0, damping: 0}}\n"),
+            panda_posture());
+  dashpot_controller* const arm = host.controller.get();
+  const auto modes_with = [&](double ratio) {
+    for (int tick = 0; tick < 1000; ++tick) EXPECT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
+    const dashpot_modes modes = host.modes();
+    EXPECT_EQ(modes.count, 6u);
+    int count = 0;
+    for (std::uint32_t i = 0; i < modes.count; ++i) {
+      count += std::abs(modes.modes[i].damping_ratio - ratio) < 1e-6 ? 1 : 0;
+    }
+    return count;
+  };
+  double ratio = 0.4;
+  dashpot_gains gains{};
+  gains.struct_size = sizeof gains;
+  gains.joints = 7;
+  gains.task_damping_ratio = &ratio;
+  ASSERT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
+  EXPECT_EQ(modes_with(0.4), 6);
+  const Eigen::Matrix<double, 6, 6> C_C = Eigen::Matrix<double, 6, 6>::Identity();
+  gains.task_damping = C_C.data();
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);  // one or the other
+  ratio = 0;
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
+  EXPECT_EQ(modes_with(0.4), 0);
+  gains.task_damping = nullptr;
+  for (const double wrong : {-0.1, 2.1, std::numeric_limits<double>::quiet_NaN()}) {
+    ratio = wrong;
+    EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);
+    EXPECT_STREQ(plugin().last_error(), "task_damping_ratio is not between 0 and 2");
+  }
+  ratio = 0.9;
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
+  EXPECT_EQ(modes_with(0.9), 6);
+  gains.task_damping_ratio = nullptr;
+  gains.task_damping = C_C.data();  // ends the ratio
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
+  EXPECT_EQ(modes_with(0.9), 0);
+}
+
 // Misuse ----------------------------------------------------------------------------------------
 
 TEST(PluginRefuses, NullPointers) {
