@@ -21,7 +21,8 @@ inline const std::vector<Layer>& layers() {
       {"analysis", {"dashpot/analysis/", "Eigen/"}},
       {"controller",
        {"dashpot/controller/", "dashpot/analysis/", "Eigen/", "kdl/", "urdf_", "console_bridge/",
-        "yaml-cpp/", "stdint.h"}},  // plugin.h is C
+        "yaml-cpp/", "stdint.h", "pthread.h",
+        "sched.h"}},  // plugin.h is C; threads have priorities
       // an independent check of the two above:
       {"sim", {"dashpot/sim/", "Eigen/", "urdf_", "console_bridge/"}},
       {"lcmtypes",

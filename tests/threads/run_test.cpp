@@ -18,7 +18,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
-using ::testing::StartsWith;
 
 std::string scene(const std::string& name) {
   return std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes/" + name + ".yaml";
