@@ -12,7 +12,7 @@ class RobotModel;
 /// What is added to the springs and dampers. Each that is off costs nothing.
 struct FeedForward {
   bool gravity = true;       ///< off where the robot compensates gravity itself
-  bool coriolis = true;      ///< C(q, qd) qd
+  bool coriolis = true;      ///< C(q, qd) qd; with it, energy is not conserved at high speed
   bool friction = false;     ///< the model's viscous and Coulomb friction, at the velocity of the
                              ///< moving set-point: it adds no feedback
   bool acceleration = true;  ///< M times the acceleration of the moving set-point

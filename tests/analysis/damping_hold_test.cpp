@@ -17,7 +17,6 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using testing::graded;
 using testing::near;
 using testing::Random;
 using testing::random_arm;

@@ -124,8 +124,8 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
     }
     RecordProperty("tightest_bound_over_error", std::to_string(seen_.tightest));
     RecordProperty("loosest_bound_over_error", std::to_string(seen_.loosest));
-    all_seen_.tightest = std::min(all_seen_.tightest, seen_.tightest);
-    all_seen_.loosest = std::max(all_seen_.loosest, seen_.loosest);
+    all_seen.tightest = std::min(all_seen.tightest, seen_.tightest);
+    all_seen.loosest = std::max(all_seen.loosest, seen_.loosest);
   }
 
   /// Eigenvalues of zero modes come without a bound: as good as the data's condition allows.
@@ -145,15 +145,15 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
   }
 
   static void TearDownTestSuite() {
-    RecordProperty("tightest_bound_over_error", std::to_string(all_seen_.tightest));
-    RecordProperty("loosest_bound_over_error", std::to_string(all_seen_.loosest));
+    RecordProperty("tightest_bound_over_error", std::to_string(all_seen.tightest));
+    RecordProperty("loosest_bound_over_error", std::to_string(all_seen.loosest));
   }
 
   const SpectrumCase& reference_ = testing::spectrum_case(GetParam());
   System<> system_ = system_of(reference_);
   Spectrum<> spectrum_;
   Tightness seen_;
-  inline static Tightness all_seen_;
+  inline static Tightness all_seen;
 };
 
 template <class Keep>

@@ -18,7 +18,6 @@ namespace {
 using analysis::SpectrumOrigin;
 using testing::LongComplex;
 using testing::LongMatrix;
-using testing::SimulatedArm;
 
 RobotModel panda() {
   return testing::arm_model(testing::arms()[0]);
