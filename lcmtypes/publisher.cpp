@@ -76,7 +76,9 @@ void Publisher::offer(const StateSample& sample) noexcept {
 }
 
 void Publisher::offer(const ModesSample& sample) noexcept {
-  if (!modes_.push(sample)) overflow_.write(sample);
+  ++offered_modes_.number;
+  offered_modes_.sample = sample;
+  if (!modes_.push(offered_modes_)) overflow_.write(offered_modes_);
 }
 
 void Publisher::start() {
@@ -103,17 +105,18 @@ void Publisher::publish_pending() {
     count(states_sent_);
   }
   for (std::size_t i = 0; i < options_.modes_queue; ++i) {
-    const ModesSample* sample = modes_.front();
-    if (sample == nullptr) break;
-    publish(*sample);
+    const NumberedModes* modes = modes_.front();
+    if (modes == nullptr) break;
+    publish(*modes);
     modes_.pop();
   }
-  if (overflow_.fetch() && overflow_.value().vibration.tick > published_modes_.vibration.tick) {
-    publish(overflow_.value());
-  }
+  if (overflow_.fetch()) publish(overflow_.value());
 }
 
-void Publisher::publish(const ModesSample& sample) {
+void Publisher::publish(const NumberedModes& modes) {
+  if (modes.number <= published_number_) return;
+  published_number_ = modes.number;
+  const ModesSample& sample = modes.sample;
   if (!is_new(sample)) return count(modes_skipped_);
   ++modes_message_.sequence;
   fill(sample, modes_message_);

@@ -60,8 +60,13 @@ class Publisher {
   PublisherCounters counters() const noexcept;
 
  private:
+  struct NumberedModes {
+    std::uint64_t number = 0;  ///< of those offered, from 1
+    ModesSample sample;
+  };
   void run();
-  void publish(const ModesSample& sample);
+  /// Unless later ones went out already.
+  void publish(const NumberedModes& modes);
   template <class Message>
   void send(const char* channel, const Message& message);
   bool is_new(const ModesSample& sample) const;
@@ -71,8 +76,8 @@ class Publisher {
 
   // Between the two threads
   SampleQueue<StateSample> states_;
-  SampleQueue<ModesSample> modes_;
-  controller::Latest<ModesSample> overflow_;  ///< the latest that found no room
+  SampleQueue<NumberedModes> modes_;
+  controller::Latest<NumberedModes> overflow_;  ///< the latest that found no room
   std::atomic<bool> stop_{false};
   std::atomic<std::int64_t> states_sent_{0};
   std::atomic<std::int64_t> modes_sent_{0};
@@ -81,9 +86,11 @@ class Publisher {
 
   // The real-time thread's
   int ticks_until_state_ = 0;
+  NumberedModes offered_modes_;  ///< the last
 
   // The publishing thread's
   ModesSample published_modes_;  ///< without joints before the first
+  std::uint64_t published_number_ = 0;
   state_t state_message_;
   modes_t modes_message_;
   std::vector<std::uint8_t> bytes_;
