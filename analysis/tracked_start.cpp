@@ -145,24 +145,29 @@ bool Starter::take(const Block& block) {
   return block.size <= 2;
 }
 
-/// Each real eigenvalue of type + goes with the one of type - whose shape is most like its own;
-/// those of type - that are left over are velocities of zero modes.
+/// Each real eigenvalue of type + goes with one of type - whose shape is like its own, the likest
+/// two first, as in the direct solution (modes.cpp); those of type - that are left over are
+/// velocities of zero modes.
 bool Starter::pair_reals() {
   if (plus_count_ > minus_count_) return false;
-  for (int i = 0; i < plus_count_; ++i) {
-    const Column& x = plus_[at(i)];
-    const double x_size = products(form_, x, x).velocities;
+  while (plus_count_ > 0) {
     double best = -1;
-    int chosen = -1;
-    for (int j = 0; j < minus_count_; ++j) {
-      const Column& y = minus_[at(j)];
-      const double overlap = products(form_, x, y).velocities;
-      const double likeness = overlap * overlap / (x_size * products(form_, y, y).velocities);
-      if (!(likeness <= best)) best = likeness, chosen = j;
+    int first = -1, second = -1;
+    for (int i = 0; i < plus_count_; ++i) {
+      const Column& x = plus_[at(i)];
+      const double x_size = products(form_, x, x).velocities;
+      for (int j = 0; j < minus_count_; ++j) {
+        const Column& y = minus_[at(j)];
+        const double overlap = products(form_, x, y).velocities;
+        const double likeness = overlap * overlap / (x_size * products(form_, y, y).velocities);
+        if (!(likeness <= best)) best = likeness, first = i, second = j;
+      }
     }
     Plane plane;
-    if (!make_plane(form_, x, minus_[at(chosen)], plane) || !add_plane(plane)) return false;
-    minus_[at(chosen)] = minus_[at(--minus_count_)];
+    if (!make_plane(form_, plus_[at(first)], minus_[at(second)], plane)) return false;
+    if (!add_plane(plane)) return false;
+    plus_[at(first)] = plus_[at(--plus_count_)];
+    minus_[at(second)] = minus_[at(--minus_count_)];
   }
   for (int j = 0; j < minus_count_; ++j) {
     Column& y = minus_[at(j)];

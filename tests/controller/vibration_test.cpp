@@ -184,6 +184,41 @@ TEST(VibrationInTheTick, IsWhatADirectSolutionGivesThere) {
   }
 }
 
+// Which two real eigenvalues form a mode must not depend on how the gains came to be what they are.
+TEST(VibrationInTheTick, PairsRealEigenvaluesAsADirectSolutionDoes) {
+  for (const testing::Arm& description : testing::arms()) {
+    const RobotModel model = testing::arm_model(description);
+    Settings settings = inline_settings(model);
+    settings.initial.gains.joint_damping *= 4;  // most modes are overdamped
+    settings.initial.gains.task_damping *= 4;
+    for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+      LedArm arm(model, settings, mode);
+      arm.settle();
+      for (int k = 0; k < 3; ++k) arm.tick();
+      analysis::System<kMaxJoints> system;
+      arm.controller.closed_loop(system);
+      analysis::SpectrumOptions options;
+      options.soft_frequency = settings.analysis.soft_frequency;
+      analysis::SpectrumSolver<kMaxJoints> solver(options);
+      analysis::Spectrum<kMaxJoints> direct;
+      ASSERT_EQ(solver.solve(system, direct), analysis::Status::kOk);
+      ASSERT_EQ(arm.modes().count, direct.modes.size()) << description.file;
+      int overdamped = 0;
+      for (int i = 0; i < arm.modes().count; ++i) {
+        const VibrationMode& found = arm.modes().modes[at(i)];
+        overdamped += found.kind == analysis::ModeKind::kOverdamped ? 1 : 0;
+        EXPECT_NEAR(found.natural_frequency, direct.modes[i].natural_frequency,
+                    1e-9 * direct.modes[i].natural_frequency)
+            << description.file;
+        EXPECT_NEAR(found.damping_ratio, direct.modes[i].damping_ratio,
+                    1e-9 * direct.modes[i].damping_ratio)
+            << description.file;
+      }
+      EXPECT_GT(overdamped, 1) << description.file;
+    }
+  }
+}
+
 TEST(VibrationInTheTick, ProvesItsBounds) {
   const RobotModel model = panda();
   const Settings settings = inline_settings(model);
