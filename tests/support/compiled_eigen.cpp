@@ -1,0 +1,2 @@
+#define DASHPOT_COMPILED_HERE
+#include <dashpot/tests/support/compiled_eigen.hpp>
