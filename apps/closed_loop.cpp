@@ -47,9 +47,8 @@ void ClosedLoop::guide(const JointVector& from, const JointVector& to, double du
     return static_cast<std::int64_t>(std::ceil(seconds / period));
   };
   const std::int64_t before = count(settling), way = count(duration);
-  guided_ticks_ = before + way + (way > 0 ? before : 0);
-  std::int32_t status = DASHPOT_OK;
-  for (std::int64_t i = 0; i < guided_ticks_; ++i) {
+  const std::int64_t ticks = before + way + (way > 0 ? before : 0);
+  for (std::int64_t i = 0; i < ticks; ++i) {
     const double s =
         way == 0 ? 0
                  : std::clamp(static_cast<double>(i - before) / static_cast<double>(way), 0.0, 1.0);
@@ -65,9 +64,8 @@ void ClosedLoop::guide(const JointVector& from, const JointVector& to, double du
     } else if (i % repeat_every_ == 0) {
       controller_.hold(setpoint_);
     }
-    const std::int64_t time =
-        std::llround(kNanoseconds * period * static_cast<double>(i - guided_ticks_));
-    status = controller_.update(time, q, qd, torque_);
+    const std::int64_t time = std::llround(kNanoseconds * period * static_cast<double>(i - ticks));
+    const std::int32_t status = controller_.update(time, q, qd, torque_);
     if (status >= DASHPOT_SETPOINT_REJECTED) {
       throw InputError("scenario.start", "the controller reports status " + std::to_string(status));
     }
@@ -91,7 +89,8 @@ void ClosedLoop::follow_scenario() noexcept {
     setpoint_ = steps[next_step_++].setpoint;
     news = true;
   }
-  if (news && controller_.hold(setpoint_) != DASHPOT_OK) ++refused_;
+  // A refusal shows in the status: the watchdog ends what was held before.
+  if (news) controller_.hold(setpoint_);
 }
 
 std::int32_t ClosedLoop::hold(const controller::Setpoint& setpoint) noexcept {

@@ -33,8 +33,6 @@ class ClosedLoop {
 
   LoopController& controller() noexcept { return controller_; }
   const sim::Plant& plant() const noexcept { return *plant_; }
-  /// How many set-points of the scenario, and repetitions of the last one, were refused.
-  std::int64_t refused() const noexcept { return refused_; }
 
  private:
   void guide(const JointVector& from, const JointVector& to, double duration, double settling);
@@ -49,8 +47,6 @@ class ClosedLoop {
   std::size_t next_step_ = 0;
   std::int64_t repeat_every_ = 1;  // ticks
   std::int64_t ticks_ = 0;         // since the start
-  std::int64_t guided_ticks_ = 0;  // until the start
-  std::int64_t refused_ = 0;
 };
 
 }  // namespace dashpot::apps

@@ -24,6 +24,8 @@ class LoopController {
   virtual const dashpot_snapshot& snapshot() noexcept = 0;
   /// Those that are newer than what was returned last; null if there are none.
   virtual const dashpot_modes* new_modes() noexcept = 0;
+  /// Likewise of the sampled loop.
+  virtual const dashpot_sampled_modes* new_sampled_modes() noexcept { return nullptr; }
   /// What to hold from the next tick on. Returns DASHPOT_OK, or the code of a refusal.
   virtual std::int32_t hold(const controller::Setpoint& setpoint) noexcept = 0;
 };

@@ -63,4 +63,24 @@ void fill(const dashpot_modes& from, lcmtypes::ModesSample& to) noexcept {
   }
 }
 
+void fill(const dashpot_sampled_modes& from, lcmtypes::SampledModesSample& to) noexcept {
+  controller::SampledVibration& vibration = to.vibration;
+  vibration.time = from.time;
+  vibration.tick = from.tick;
+  vibration.position = vector(from.position, from.joints);
+  vibration.status = static_cast<analysis::Status>(from.status);
+  vibration.spectral_radius = from.spectral_radius;
+  vibration.gain_margin = from.gain_margin;
+  vibration.count = static_cast<int>(from.count);
+  for (std::uint32_t i = 0; i < from.count; ++i) {
+    const dashpot_sampled_mode& mode = from.modes[i];
+    vibration.modes[i] = {static_cast<analysis::ModeKind>(mode.kind),
+                          mode.continuous_frequency,
+                          mode.continuous_ratio,
+                          mode.natural_frequency,
+                          mode.damping_ratio,
+                          mode.damped_frequency};
+  }
+}
+
 }  // namespace dashpot::apps

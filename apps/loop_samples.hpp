@@ -7,5 +7,6 @@ namespace dashpot::apps {
 /// The plugin's structs as what the publisher takes. Nothing here allocates.
 void fill(const dashpot_snapshot& from, controller::Snapshot& to) noexcept;
 void fill(const dashpot_modes& from, lcmtypes::ModesSample& to) noexcept;
+void fill(const dashpot_sampled_modes& from, lcmtypes::SampledModesSample& to) noexcept;
 
 }  // namespace dashpot::apps

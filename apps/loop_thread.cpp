@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;  // ns
 constexpr std::int64_t kMostTimes = 1 << 24;     // tick times that are kept
-constexpr std::int64_t kPublishEvery = 64;       // ticks, without real time
+constexpr std::int64_t kPublishEvery = 64;       // ticks: all without real time, and samples
 constexpr int kPriority = 80;                    // of SCHED_FIFO
 
 std::int64_t now(clockid_t clock) noexcept {
@@ -74,6 +74,7 @@ void LoopThread::join() {
 void LoopThread::run() noexcept {
   const bool real_time = options_.pace == Pace::kRealTime;
   if (real_time) privileges_.scheduled = schedule_ahead_of_others();
+  loop_.controller().snapshot();  // what a first call allocates, see plugin.h
   const std::int64_t period = std::llround(1e9 * options_.period);
   std::int64_t deadline = now(CLOCK_MONOTONIC) + period;
   while (!stop_ && record_.ticks < options_.ticks && record_.simulation == sim::Status::kOk) {
@@ -157,6 +158,18 @@ void LoopThread::publish(std::int64_t utime) noexcept {
     publish_now = true;
   }
   if (options_.pace == Pace::kFast && publish_now) publisher_.publish_pending();
+  // Their thread keeps its own pace: with a faster one they would come at no particular time.
+  if (options_.pace == Pace::kRealTime && record_.ticks % kPublishEvery == 0) {
+    publish_sampled(utime, snapshot.time);
+  }
+}
+
+void LoopThread::publish_sampled(std::int64_t utime, std::int64_t time) noexcept {
+  const dashpot_sampled_modes* modes = loop_.controller().new_sampled_modes();
+  if (modes == nullptr || modes->time < 0) return;  // of the hand's guidance
+  sampled_.utime = utime - (time - modes->time) / 1000;
+  fill(*modes, sampled_);
+  publisher_.offer(sampled_);
 }
 
 void LoopThread::note(const dashpot_snapshot& snapshot) noexcept {

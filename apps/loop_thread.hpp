@@ -80,6 +80,7 @@ class LoopThread {
   void take_commands() noexcept;
   void note(const dashpot_snapshot& snapshot) noexcept;
   void publish(std::int64_t utime) noexcept;
+  void publish_sampled(std::int64_t utime, std::int64_t time) noexcept;
 
   ClosedLoop& loop_;
   lcmtypes::Publisher& publisher_;
@@ -97,6 +98,7 @@ class LoopThread {
   std::int64_t commands_applied_ = 0;
   lcmtypes::StateSample state_;
   lcmtypes::ModesSample modes_;
+  lcmtypes::SampledModesSample sampled_;
 };
 
 }  // namespace dashpot::apps

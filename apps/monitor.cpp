@@ -105,6 +105,7 @@ void run(const Options& options) {
   lcmtypes::MessageHandlers handlers;
   handlers.on_state = [&view](const state_t& message) { view.take(message); };
   handlers.on_modes = [&view](const modes_t& message) { view.take(message); };
+  handlers.on_sampled_modes = [&view](const sampled_modes_t& message) { view.take(message); };
   if (!options.log.empty()) {
     watch_log(options, view, handlers);
   } else {

@@ -50,6 +50,20 @@ std::string solver_text(std::int8_t solved_by) {
   }
 }
 
+/// Whether the loop is stable, and by how much.
+std::string verdict(const sampled_modes_t& modes) {
+  const auto status = static_cast<analysis::Status>(modes.status);
+  if (status != analysis::Status::kOk && status != analysis::Status::kUncertified) {
+    return analysis::to_text(status);
+  }
+  const std::string margin = format_number(modes.gain_margin, 3);
+  if (!(modes.spectral_radius < 1)) {
+    return "UNSTABLE; all gains have to shrink to " + margin + " of what they are";
+  }
+  if (std::isinf(modes.gain_margin)) return "stable, however large the gains";
+  return "stable; all gains can grow to " + margin + " times what they are";
+}
+
 double tip_error(const state_t& state) {
   return std::hypot(state.tip_error[0], state.tip_error[1], state.tip_error[2]);
 }
@@ -105,6 +119,11 @@ void MonitorView::take(const modes_t& message) {
   modes_ = message;
 }
 
+void MonitorView::take(const sampled_modes_t& message) {
+  note_time(message.utime);
+  sampled_ = message;
+}
+
 std::string MonitorView::screen(bool bold) const {
   const auto heading = [bold](const std::string& text) {
     return bold ? "\033[1m" + text + "\033[0m\n" : text + "\n";
@@ -112,6 +131,7 @@ std::string MonitorView::screen(bool bold) const {
   std::string out;
   if (state_) out += heading("Loop") + health() + "\n";
   if (modes_) out += heading("Modes") + modes_table() + "\n";
+  if (sampled_) out += heading("Sampled loop") + sampled_table() + "\n";
   if (state_) out += heading("Joints") + joints();
   return out;
 }
@@ -175,6 +195,24 @@ std::string MonitorView::modes_table() const {
   return out + table.text();
 }
 
+std::string MonitorView::sampled_table() const {
+  const sampled_modes_t& modes = *sampled_;
+  std::string out = "  tick " + std::to_string(modes.tick) + ": " + verdict(modes) + "\n\n";
+  TextTable table;
+  table.add_column(Align::kPoint, {"continuous", "rad/s"});
+  table.add_column(Align::kPoint, {"", "ratio"});
+  table.add_column(Align::kPoint, {"sampled", "rad/s"});
+  table.add_column(Align::kPoint, {"", "ratio"});
+  table.add_column(Align::kLeft, {"kind", ""});
+  for (std::size_t i = 0; i < static_cast<std::size_t>(modes.num_modes); ++i) {
+    table.add_row({format_number(modes.continuous_frequency[i], 6),
+                   format_number(modes.continuous_ratio[i], 6),
+                   format_number(modes.natural_frequency[i], 6),
+                   format_number(modes.damping_ratio[i], 6), kind_text(modes.kind[i])});
+  }
+  return out + table.text();
+}
+
 std::string MonitorView::line() const {
   std::string out = fixed(time(), 1) + " s";
   if (state_) {
@@ -208,6 +246,7 @@ std::string MonitorView::summary(std::int64_t malformed) const {
            fixed(1e3 * largest_error_, 2) + " mm\n";
   }
   if (modes_) out += "\nModes at the end\n" + modes_table();
+  if (sampled_) out += "\nSampled loop at the end\n" + sampled_table();
   return out;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
 
 #include <array>
@@ -14,8 +15,9 @@ class MonitorView {
  public:
   void take(const state_t& message);
   void take(const modes_t& message);
+  void take(const sampled_modes_t& message);
 
-  bool empty() const { return !state_ && !modes_; }
+  bool empty() const { return !state_ && !modes_ && !sampled_; }
   /// Time of the last message, s since the first one.
   double time() const { return 1e-6 * static_cast<double>(last_utime_ - first_utime_); }
 
@@ -31,9 +33,11 @@ class MonitorView {
   std::string health() const;
   std::string joints() const;
   std::string modes_table() const;
+  std::string sampled_table() const;
 
   std::optional<state_t> state_;
   std::optional<modes_t> modes_;
+  std::optional<sampled_modes_t> sampled_;
   std::int64_t first_utime_ = 0;  // us
   std::int64_t last_utime_ = 0;   // us
   // Ticks a second: over about the last second

@@ -24,6 +24,7 @@ class PluginController : public LoopController {
     }
     snapshot_.struct_size = sizeof snapshot_;
     modes_.struct_size = sizeof modes_;
+    sampled_modes_.struct_size = sizeof sampled_modes_;
   }
 
   std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
@@ -42,6 +43,12 @@ class PluginController : public LoopController {
     const std::uint64_t last = modes_.tick;
     if (plugin_.read_modes(handle_.get(), &modes_) != DASHPOT_OK) return nullptr;
     return modes_.tick == last ? nullptr : &modes_;
+  }
+
+  const dashpot_sampled_modes* new_sampled_modes() noexcept override {
+    const std::uint64_t last = sampled_modes_.tick;
+    if (plugin_.read_sampled_modes(handle_.get(), &sampled_modes_) != DASHPOT_OK) return nullptr;
+    return sampled_modes_.tick == last ? nullptr : &sampled_modes_;
   }
 
   std::int32_t hold(const controller::Setpoint& setpoint) noexcept override {
@@ -83,6 +90,7 @@ class PluginController : public LoopController {
   std::unique_ptr<dashpot_controller, void (*)(dashpot_controller*)> handle_;
   dashpot_snapshot snapshot_{};
   dashpot_modes modes_{};
+  dashpot_sampled_modes sampled_modes_{};
 };
 
 /// Where to look for the library, in this order.

@@ -148,7 +148,7 @@ RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
     thread.join();
   }
   report.wall_time = seconds_since(start);
-  if (!options.fast) std::this_thread::sleep_for(kLook);  // the publisher sends the last states
+  publisher.stop();  // the counters below are final
   report.privileges = thread.privileges();
   report.loop = thread.record();
   report.messages = publisher.counters();

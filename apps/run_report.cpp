@@ -205,7 +205,11 @@ std::string messages_text(const RunReport& report) {
          std::to_string(sent.states_dropped + sent.modes_dropped) + " dropped, " +
          count(sent.send_errors, "error") +
          "; commands: " + std::to_string(report.commands_accepted) + " accepted, " +
-         std::to_string(report.commands_rejected) + " rejected\n";
+         std::to_string(report.commands_rejected) + " rejected" +
+         (report.loop.commands_refused == 0 ? ""
+                                            : ", " + std::to_string(report.loop.commands_refused) +
+                                                  " of those accepted refused by the controller") +
+         "\n";
 }
 
 Json modes_json(const dashpot_modes& modes) {
@@ -333,9 +337,12 @@ std::string to_json(const RunReport& report) {
         {"modes_skipped", report.messages.modes_skipped},
         {"states_dropped", report.messages.states_dropped},
         {"modes_dropped", report.messages.modes_dropped},
+        {"sampled_modes", report.messages.sampled_modes},
         {"errors", report.messages.send_errors}}},
       {"commands",
-       {{"accepted", report.commands_accepted}, {"rejected", report.commands_rejected}}}};
+       {{"accepted", report.commands_accepted},
+        {"rejected", report.commands_rejected},
+        {"refused", loop.commands_refused}}}};
   if (report.ring_down) result["ring_down"] = ring_down_json(*report.ring_down);
   return json_text(result);
 }

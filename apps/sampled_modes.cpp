@@ -1,6 +1,6 @@
 #include <dashpot/apps/sampled_modes.hpp>
 #include <dashpot/controller/controller.hpp>
-#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/sampled_analysis.hpp>
 
 #include <cmath>
 
@@ -32,20 +32,6 @@ analysis::System<> loop_at_rest(const Scene& scene) {
   return result;
 }
 
-/// dg/dq by central differences, good to 1e-9 relative.
-Eigen::MatrixXd gravity_gradient(const controller::RobotModel& model, const JointVector& q) {
-  constexpr double kStep = 1e-5;  // rad
-  const JointVector none = JointVector::Zero(q.size());
-  Eigen::MatrixXd gradient(q.size(), q.size());
-  for (Eigen::Index i = 0; i < q.size(); ++i) {
-    const JointVector step = kStep * JointVector::Unit(q.size(), i);
-    gradient.col(i) = (controller::evaluate(model, q + step, none).gravity -
-                       controller::evaluate(model, q - step, none).gravity) /
-                      (2 * kStep);
-  }
-  return gradient;
-}
-
 }  // namespace
 
 SampledModes sampled_modes(const Scene& scene) {
@@ -57,7 +43,7 @@ SampledModes sampled_modes(const Scene& scene) {
   loop.difference_velocity = scene.plant.difference_velocity;
   loop.friction = Eigen::VectorXd(model.joint_values(&controller::Joint::damping)).asDiagonal();
   if (scene.arm->config.settings.feed_forward.gravity) {
-    loop.gravity_gradient = gravity_gradient(model, scene.rest);
+    loop.gravity_gradient = controller::gravity_gradient(model, scene.rest);
   }
   const analysis::System<> system = loop_at_rest(scene);
   SampledModes result;

@@ -13,74 +13,35 @@ using controller::Units;
 using controller::YamlMapping;
 using controller::YamlNode;
 
-/// Where the robot's URDF is, for the simulator's own reading of it.
-struct RobotFile {
-  std::string urdf, base, tip;
-};
-
-RobotFile robot_file(const YamlMapping& root, const std::filesystem::path& directory) {
-  static constexpr std::array<std::string_view, 10> kKeys = {"urdf",
-                                                             "base",
-                                                             "tip",
-                                                             "gravity",
-                                                             "include_off_chain",
-                                                             "reflected_inertia",
-                                                             "viscous_friction",
-                                                             "coulomb_friction",
-                                                             "payload",
-                                                             "tool"};
-  const YamlMapping keys = root.mapping("robot", kKeys);
-  RobotFile file;
-  read_text(keys, "urdf", file.urdf);
-  read_text(keys, "base", file.base);
-  read_text(keys, "tip", file.tip);
-  file.urdf = directory / file.urdf;
-  return file;
-}
-
 /// What the controller believes of the robot, which is true unless `simulation.robot` says
 /// otherwise.
-sim::RobotParameters believed(const YamlMapping& root, const controller::RobotModel& model) {
+sim::RobotParameters believed(const controller::Config& config) {
+  const controller::ModelOptions& options = config.robot.options;
   sim::RobotParameters parameters;
-  parameters.armature = model.joint_values(&Joint::reflected_inertia);
-  parameters.viscous = model.joint_values(&Joint::damping);
-  parameters.coulomb = model.joint_values(&Joint::friction);
-  const YamlNode* robot = root.find("robot");
-  for (std::size_t i = 0; i + 1 < robot->items.size(); i += 2) {
-    const std::string& key = robot->items[i].text;
-    const YamlNode& value = robot->items[i + 1];
-    if (key == "gravity") {
-      static constexpr std::array<std::string_view, 1> kKey = {"gravity"};
-      YamlNode part = *robot;
-      part.items = {robot->items[i], value};
-      read_vector3(YamlMapping(part, "robot.", kKey), "gravity", "m/s^2", parameters.gravity);
-    } else if (key == "payload") {
-      static constexpr std::array<std::string_view, 3> kKeys = {"mass", "center", "inertia"};
-      const YamlMapping payload(value, "robot.payload.", kKeys);
-      read_number(payload, "mass", "kg", Sign::kNotNegative, parameters.payload.mass);
-      read_vector3(payload, "center", "m", parameters.payload.center);
-      read_matrix(payload, "inertia", Units(3, "kg m^2"), parameters.payload.about_center);
-    }
-  }
+  parameters.armature = config.model.joint_values(&Joint::reflected_inertia);
+  parameters.viscous = config.model.joint_values(&Joint::damping);
+  parameters.coulomb = config.model.joint_values(&Joint::friction);
+  parameters.gravity = options.gravity;
+  parameters.payload = {options.payload.mass, options.payload.center, options.payload.inertia};
   return parameters;
 }
 
-void read_arm(const YamlNode& document, const std::string& path, Scene& scene) {
+void read_arm(const YamlNode& document, const std::filesystem::path& directory, Scene& scene) {
   static constexpr std::array<std::string_view, 10> kKeys = {
       "robot",        "control",  "gains",    "limits",     "motion",
       "feed_forward", "watchdog", "analysis", "simulation", "scenario"};
   const YamlMapping root(document, "", kKeys);
-  controller::Config config = controller::load_config(path);
+  controller::Config config = controller::read_config(document, directory);
+  const controller::RobotDescription robot = config.robot;
   const Units positions = controller::joint_units(config.model, "rad", "m");
-  const RobotFile file = robot_file(root, std::filesystem::path(path).parent_path());
-  ArmSimulation simulation{believed(root, config.model), {}};
+  ArmSimulation simulation{believed(config), {}};
   scene.plant.period = config.settings.period;
   read_simulation(root, positions, scene.plant, &simulation);
   try {
-    scene.arm.emplace(
-        ControlledArm{std::move(config),
-                      sim::Robot::from_file(file.urdf, file.base, file.tip, simulation.parameters),
-                      simulation.options});
+    scene.arm.emplace(ControlledArm{
+        std::move(config),
+        sim::Robot::from_file(robot.urdf, robot.base, robot.tip, simulation.parameters),
+        simulation.options});
   } catch (const sim::InvalidRobot& error) {
     throw InputError("simulation", error.what());
   }
@@ -130,26 +91,19 @@ bool has_key(const YamlNode& document, std::string_view key) {
 
 }  // namespace
 
-Scene load_scene(const std::string& path) {
-  const auto read = [&] {
-    Scene scene;
-    scene.path = path;
-    const YamlNode document = controller::parse_yaml(controller::read_file(path));
-    if (has_key(document, "system")) {
-      read_system(document, scene);
-    } else {
-      read_arm(document, path, scene);
-    }
-    check(scene);
-    return scene;
-  };
-  try {
-    return read();
-  } catch (const InputError& error) {
-    // Errors of the controller's part name the file already.
-    if (std::string(error.what()).starts_with(path + ": ")) throw;
-    throw error.in_file(path);
+Scene load_scene(const std::string& path) try {
+  Scene scene;
+  scene.path = path;
+  const YamlNode document = controller::parse_yaml(controller::read_file(path));
+  if (has_key(document, "system")) {
+    read_system(document, scene);
+  } else {
+    read_arm(document, std::filesystem::path(path).parent_path(), scene);
   }
+  check(scene);
+  return scene;
+} catch (const InputError& error) {
+  throw error.in_file(path);
 }
 
 std::unique_ptr<sim::System> make_mechanism(const Scene& scene) {

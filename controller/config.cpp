@@ -4,7 +4,6 @@
 #include <dashpot/controller/setting_reader.hpp>
 
 #include <algorithm>
-#include <filesystem>
 #include <limits>
 
 namespace dashpot::controller {
@@ -91,8 +90,8 @@ void read_watchdog(const YamlMapping& root, double period, Watchdog& watchdog) {
 }
 
 void read_analysis(const YamlMapping& root, Analysis& analysis) {
-  static constexpr std::array<std::string_view, 4> kKeys = {"where", "every", "soft_frequency",
-                                                            "shapes"};
+  static constexpr std::array<std::string_view, 5> kKeys = {"where", "every", "soft_frequency",
+                                                            "shapes", "sampled"};
   static constexpr std::array<std::pair<std::string_view, Analysis::Where>, 3> kPlaces = {
       {{"off", Analysis::Where::kOff},
        {"inline", Analysis::Where::kInline},
@@ -102,6 +101,13 @@ void read_analysis(const YamlMapping& root, Analysis& analysis) {
   read_count(keys, "every", 1, analysis.every);
   read_number(keys, "soft_frequency", "rad/s", Sign::kNotNegative, analysis.soft_frequency);
   read_switch(keys, "shapes", analysis.shapes);
+  static constexpr std::array<std::string_view, 4> kSampledKeys = {"interval", "delay", "cutoff",
+                                                                   "difference_velocity"};
+  const YamlMapping sampled = keys.mapping("sampled", kSampledKeys);
+  read_number(sampled, "interval", "s", Sign::kNotNegative, analysis.sampled.interval);
+  read_count(sampled, "delay", 0, analysis.sampled.delay);
+  read_number(sampled, "cutoff", "Hz", Sign::kNotNegative, analysis.sampled.cutoff);
+  read_switch(sampled, "difference_velocity", analysis.sampled.difference_velocity);
 }
 
 /// "gains.joint.stiffness" for the setting "initial.gains.joint_stiffness", and so on.
@@ -153,13 +159,16 @@ void check(const Settings& settings, int n, const YamlNode& document) {
   }
 }
 
+}  // namespace
+
 Config read_config(const YamlNode& document, const std::filesystem::path& directory) {
   // What stands under the last two is for a simulator of the robot.
   static constexpr std::array<std::string_view, 10> kKeys = {
       "robot",        "control",  "gains",    "limits",     "motion",
       "feed_forward", "watchdog", "analysis", "simulation", "scenario"};
   const YamlMapping root(document, "", kKeys);
-  const RobotModel model = read_robot(root, directory);
+  const RobotDescription robot = read_robot(root, directory);
+  const RobotModel model = robot.model();
   Settings settings = default_settings(model);
   read_control(root, settings);
   read_gains(root, model, GainPairs::kTogether, settings.initial.gains);
@@ -169,10 +178,8 @@ Config read_config(const YamlNode& document, const std::filesystem::path& direct
   read_watchdog(root, settings.period, settings.watchdog);
   read_analysis(root, settings.analysis);
   check(settings, model.dof(), document);
-  return {model, settings};
+  return {robot, model, settings};
 }
-
-}  // namespace
 
 Config load_config(const std::string& path) try {
   return read_config(parse_yaml(read_file(path)), std::filesystem::path(path).parent_path());

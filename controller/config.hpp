@@ -1,14 +1,27 @@
 #pragma once
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/yaml_document.hpp>
 
+#include <filesystem>
 #include <string>
 
 namespace dashpot::controller {
 
+/// What makes a RobotModel, or another program's model of the same robot.
+struct RobotDescription {
+  std::string urdf;  ///< path
+  std::string base, tip;
+  ModelOptions options;
+
+  /// Throws InvalidModel.
+  RobotModel model() const;
+};
+
 /// What a configuration file says. Its keys, with units and defaults, stand in
 /// controller/examples/panda.yaml.
 struct Config {
+  RobotDescription robot;
   RobotModel model;
   Settings settings;
 };
@@ -19,5 +32,8 @@ struct Config {
 /// unit, size or sign, a number that is not finite, gains that are not symmetric positive
 /// semidefinite, and whatever is wrong with the URDF.
 Config load_config(const std::string& path);
+/// Likewise for a file that is parsed already. A relative path of the URDF begins at `directory`;
+/// errors do not name the file.
+Config read_config(const YamlNode& document, const std::filesystem::path& directory);
 
 }  // namespace dashpot::controller

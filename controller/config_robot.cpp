@@ -42,6 +42,10 @@ void read_joint_option(const YamlMapping& robot, std::string_view key, const Uni
 
 }  // namespace
 
+RobotModel RobotDescription::model() const {
+  return RobotModel::from_urdf_file(urdf, base, tip, options);
+}
+
 Units joint_units(const RobotModel& model, const char* revolute, const char* prismatic) {
   Units units;
   for (const Joint& joint : model.joints()) {
@@ -50,7 +54,7 @@ Units joint_units(const RobotModel& model, const char* revolute, const char* pri
   return units;
 }
 
-RobotModel read_robot(const YamlMapping& root, const std::filesystem::path& directory) try {
+RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path& directory) try {
   static constexpr std::array<std::string_view, 10> kKeys = {"urdf",
                                                              "base",
                                                              "tip",
@@ -62,29 +66,30 @@ RobotModel read_robot(const YamlMapping& root, const std::filesystem::path& dire
                                                              "payload",
                                                              "tool"};
   const YamlMapping keys = root.mapping("robot", kKeys);
-  const std::string urdf = directory / required_text(root, keys, "urdf");
-  const std::string base = required_text(root, keys, "base");
-  const std::string tip = required_text(root, keys, "tip");
-
-  ModelOptions options;
+  RobotDescription robot;
+  robot.urdf = directory / required_text(root, keys, "urdf");
+  robot.base = required_text(root, keys, "base");
+  robot.tip = required_text(root, keys, "tip");
+  ModelOptions& options = robot.options;
   read_vector3(keys, "gravity", "m/s^2", options.gravity);
   read_switch(keys, "include_off_chain", options.include_off_chain);
   read_payload(keys, options.payload);
   read_tool(keys, options.tool);
 
   // What the joints are is known once there is a model; some inertia makes any model possible.
-  ModelOptions preliminary = options;
+  RobotDescription preliminary = robot;
   const YamlNode* inertia = keys.find("reflected_inertia");
   if (inertia != nullptr && inertia->items.size() <= kMaxJoints) {
-    preliminary.reflected_inertia.setOnes(static_cast<Eigen::Index>(inertia->items.size()));
+    preliminary.options.reflected_inertia.setOnes(static_cast<Eigen::Index>(inertia->items.size()));
   }
-  const RobotModel model = RobotModel::from_urdf_file(urdf, base, tip, preliminary);
+  const RobotModel model = preliminary.model();
   const Units damping = joint_units(model, "N m s/rad", "N s/m");
   read_joint_option(keys, "reflected_inertia", joint_units(model, "kg m^2", "kg"),
                     options.reflected_inertia);
   read_joint_option(keys, "viscous_friction", damping, options.damping);
   read_joint_option(keys, "coulomb_friction", joint_units(model, "N m", "N"), options.friction);
-  return RobotModel::from_urdf_file(urdf, base, tip, options);
+  robot.model();  // throws what is wrong with it
+  return robot;
 } catch (const InvalidModel& error) {
   throw root.error("robot", error.what());
 }

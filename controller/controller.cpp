@@ -42,6 +42,10 @@ const Snapshot& Controller::snapshot() const noexcept {
 const Vibration& Controller::vibration() const noexcept {
   return core_->vibration();
 }
+const SampledVibration* Controller::new_sampled_vibration() noexcept {
+  SampledAnalysis* sampled = core_->sampled();
+  return sampled == nullptr ? nullptr : sampled->fetch();
+}
 void Controller::closed_loop(analysis::System<kMaxJoints>& system) const noexcept {
   core_->closed_loop(system);
 }

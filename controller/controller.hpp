@@ -13,11 +13,8 @@ class ControllerCore;
 /// tick.
 ///
 ///     const auto model = RobotModel::from_urdf_file("panda.urdf", "panda_link0", "panda_hand");
-///
 ///     Controller controller(model, default_settings(model));
-///
 ///     JointVector torque;
-///
 ///     for (;;) {                                 // every Settings::period
 ///       ...                                      // read `state`
 ///       const Status status = controller.update(state, setpoint, torque);
@@ -49,6 +46,10 @@ class Controller {
   const Snapshot& snapshot() const noexcept;
   /// Of the last tick that analysed, every Analysis::every of them.
   const Vibration& vibration() const noexcept;
+  /// What the analysis of the sampled loop (Analysis::Sampled) has found since this was called
+  /// last; null if there is nothing new. For one thread, always the same, which may be another than
+  /// that of `update`; the result is good until its next call.
+  const SampledVibration* new_sampled_vibration() noexcept;
   /// The closed loop at the last tick, linearised where its springs are at rest, in joint
   /// coordinates (closed_loop.hpp): mass, damping, stiffness and its factor. Not to be called
   /// before the first good state.

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/controller/sampled_analysis.hpp>
 #include <dashpot/controller/vibration.hpp>
 
 #include <memory>
@@ -20,15 +21,22 @@ class ControllerCore {
 
   const Snapshot& snapshot() const noexcept { return snapshot_; }
   const Vibration& vibration() const noexcept { return vibration_.result(); }
+  /// Null unless Analysis::Sampled asks for it.
+  SampledAnalysis* sampled() noexcept { return sampled_.get(); }
   const Settings& settings() const noexcept { return settings_; }
 
  protected:
-  explicit ControllerCore(const Settings& settings)
-      : settings_(settings), vibration_(settings.analysis) {}
+  ControllerCore(const RobotModel& model, const Settings& settings)
+      : settings_(settings), vibration_(settings.analysis) {
+    if (settings.analysis.sampled.interval > 0) {
+      sampled_ = std::make_unique<SampledAnalysis>(model, settings);
+    }
+  }
 
   Settings settings_;
   Snapshot snapshot_;
   VibrationAnalysis vibration_;
+  std::unique_ptr<SampledAnalysis> sampled_;
 };
 
 /// The core for the model's number of joints. The settings are valid.

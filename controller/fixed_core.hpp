@@ -15,7 +15,8 @@ namespace dashpot::controller {
 
 /// The controller's core for N joints, known at compile time. One tick, in `update`:
 ///     state -> StateCheck -> DynamicsKernel -> set-point, paths and gains -> HeldDamping
-///           -> ImpedanceLaw -> SafetyFilter -> torque;   and with these gains -> LoopSystem -> VibrationAnalysis
+///           -> ImpedanceLaw -> SafetyFilter -> torque;   and with these gains -> LoopSystem ->
+///           VibrationAnalysis
 template <int N>
 class FixedCore final : public ControllerCore {
  public:
@@ -52,6 +53,8 @@ class FixedCore final : public ControllerCore {
   Status finish(Status status, const Vector& tau, JointVector& torque) noexcept;
   void describe() noexcept;
   void analyse() noexcept;
+  /// Hands the closed loop to the analysis of the sampled loop.
+  void hand_over() noexcept;
   /// Whether the closed loop is that of the last analysis, exactly.
   bool looks_the_same(bool with_wrench, bool with_velocity) noexcept;
   Impedance<N> impedance() const noexcept;
@@ -102,7 +105,7 @@ class FixedCore final : public ControllerCore {
 
 template <int N>
 FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
-    : ControllerCore(settings),
+    : ControllerCore(model, settings),
       kernel_(model),
       state_check_(model, settings),
       paths_([&] {
@@ -147,6 +150,7 @@ void FixedCore<N>::reset(const JointVector& torque) noexcept {
   held_.reset();
   loop_.reset();
   analysed_.any = false;
+  if (sampled_) sampled_->reset();
 }
 
 template <int N>
@@ -334,8 +338,20 @@ Status FixedCore<N>::finish(Status status, const Vector& tau, JointVector& torqu
   copy<N>(tau, snapshot_.torque);
   snapshot_.status = status;
   vibration_.collect();
-  if (status < Status::kStateNotFinite && vibration_.due(snapshot_.tick)) analyse();
+  if (status >= Status::kStateNotFinite) return status;
+  if (vibration_.due(snapshot_.tick)) analyse();
+  if (sampled_ && sampled_->due(snapshot_.tick)) hand_over();
   return status;
+}
+
+template <int N>
+void FixedCore<N>::hand_over() noexcept {
+  SampledAnalysis::Task& task = sampled_->task();
+  task.time = time_;
+  task.tick = snapshot_.tick;
+  task.position = snapshot_.position;
+  closed_loop(task.system);
+  sampled_->hand_over();
 }
 
 template <int N>

@@ -55,6 +55,12 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
 
   // Of the other thread:
   Request request;
+  SampledVibration sampled;  ///< the latest
+  /// Fetches what is new of the sampled loop.
+  void look_at_samples() noexcept {
+    const SampledVibration* found = controller_.new_sampled_vibration();
+    if (found != nullptr) sampled = *found;
+  }
 
   // Of the real-time thread:
   Status update(const dashpot_state* given, const dashpot_setpoint* wanted,
@@ -287,6 +293,15 @@ int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes)
   return finish(DASHPOT_OK);
 }
 
+int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampled_modes* modes) {
+  const std::int32_t problem = check_result(controller, modes);
+  if (problem != DASHPOT_OK) return finish(problem);
+  controller->look_at_samples();
+  if (controller->sampled.tick == 0) return finish(DASHPOT_NOTHING_YET);
+  to_c(controller->sampled, *modes);
+  return finish(DASHPOT_OK);
+}
+
 const char* dashpot_status_text(int32_t status) {
   switch (status) {
     case DASHPOT_NULL_ARGUMENT:
@@ -313,10 +328,12 @@ const char* dashpot_kind_text(int32_t kind) {
 
 const dashpot_plugin* dashpot_plugin_interface(uint32_t version) {
   static const dashpot_plugin functions = {
-      sizeof(dashpot_plugin), DASHPOT_PLUGIN_VERSION, dashpot_create,       dashpot_destroy,
-      dashpot_last_error,     dashpot_joints,         dashpot_joint_name,   dashpot_period,
-      dashpot_update,         dashpot_reset,          dashpot_set_setpoint, dashpot_set_gains,
-      dashpot_read_snapshot,  dashpot_read_modes,     dashpot_status_text,  dashpot_kind_text};
+      sizeof(dashpot_plugin), DASHPOT_PLUGIN_VERSION, dashpot_create,
+      dashpot_destroy,        dashpot_last_error,     dashpot_joints,
+      dashpot_joint_name,     dashpot_period,         dashpot_update,
+      dashpot_reset,          dashpot_set_setpoint,   dashpot_set_gains,
+      dashpot_read_snapshot,  dashpot_read_modes,     dashpot_read_sampled_modes,
+      dashpot_status_text,    dashpot_kind_text};
   return version == DASHPOT_PLUGIN_VERSION ? &functions : nullptr;
 }
 

@@ -16,10 +16,12 @@
  * linear part first, are taken at T's origin, in B's axes.
  *
  * Threads. One thread, the real-time one, calls dashpot_update and dashpot_reset. One other thread,
- * any but always the same, calls dashpot_set_setpoint, dashpot_set_gains, dashpot_read_snapshot and
- * dashpot_read_modes; none of these ever waits for another thread or makes one wait. The remaining
- * functions may be called by any thread; dashpot_destroy only once no other call is under way.
- * Controllers are independent of each other.
+ * any but always the same, calls dashpot_set_setpoint, dashpot_set_gains, dashpot_read_snapshot,
+ * dashpot_read_modes and dashpot_read_sampled_modes; none of these ever waits for another thread or
+ * makes one wait. The remaining functions may be called by any thread; dashpot_destroy only once no
+ * other call is under way. Controllers are independent of each other. dashpot_update and
+ * dashpot_reset leave nothing for dashpot_last_error; of the others, the first call in a thread may
+ * allocate that thread's text.
  *
  * Every struct begins with struct_size, which the caller sets to sizeof of that struct; a function
  * refuses any other value. No exception leaves the library. */
@@ -32,7 +34,7 @@ extern "C" {
 #endif
 
 /* Grows whenever a function or struct changes; a library serves the versions it knows. */
-#define DASHPOT_PLUGIN_VERSION 2u
+#define DASHPOT_PLUGIN_VERSION 3u
 #define DASHPOT_MAX_JOINTS 16
 
 typedef struct dashpot_controller dashpot_controller;
@@ -206,6 +208,33 @@ typedef struct dashpot_modes {
   dashpot_mode modes[DASHPOT_MAX_JOINTS];
 } dashpot_modes;
 
+/* A mode of the continuous loop, and what becomes of it because the torque is held over a tick,
+ * delayed and filtered. */
+typedef struct dashpot_sampled_mode {
+  double continuous_frequency; /* natural, rad/s */
+  double continuous_ratio;     /* */
+  double natural_frequency;    /* rad/s; NaN if there is none */
+  double damping_ratio;        /* */
+  double damped_frequency;     /* rad/s */
+  int32_t kind;                /* DASHPOT_UNDERDAMPED, ... */
+  int32_t reserved;            /* 0 */
+} dashpot_sampled_mode;
+
+/* The sampled loop at one tick, now and then, if the configuration asks for it
+ * (analysis: sampled: interval). */
+typedef struct dashpot_sampled_modes {
+  uint32_t struct_size;
+  uint32_t joints;                     /* n */
+  int64_t time;                        /* of the state that they belong to, ns */
+  uint64_t tick;                       /* likewise */
+  double position[DASHPOT_MAX_JOINTS]; /* likewise, rad */
+  double spectral_radius;              /* the loop is stable below 1 */
+  double gain_margin; /* all gains can grow by this factor before it is unstable; infinity: any */
+  int32_t status;     /* 0: all modes were found */
+  uint32_t count;     /* of the modes, by falling continuous_frequency */
+  dashpot_sampled_mode modes[DASHPOT_MAX_JOINTS];
+} dashpot_sampled_modes;
+
 /* Reads a YAML file (see controller/examples/panda.yaml) and the URDF that it names. NULL on
  * failure: dashpot_last_error says why, in one line with file, key and line. */
 dashpot_controller* dashpot_create(const char* config_path);
@@ -214,8 +243,8 @@ dashpot_controller* dashpot_create(const char* config_path);
 void dashpot_destroy(dashpot_controller* controller);
 
 /* What the last call of dashpot_create, dashpot_set_setpoint, dashpot_set_gains,
- * dashpot_read_snapshot or dashpot_read_modes in this thread had to complain of, in one line; "" if
- * nothing. Valid until the next such call in this thread. */
+ * dashpot_read_snapshot, ..._modes or ..._sampled_modes in this thread had to complain of, in one
+ * line; "" if nothing. Valid until the next such call in this thread. */
 const char* dashpot_last_error(void);
 
 /* n; 0 if `controller` is NULL */
@@ -244,10 +273,11 @@ int32_t dashpot_reset(dashpot_controller* controller, const double* torque);
 int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpoint* setpoint);
 int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains);
 
-/* On the other thread: the latest finished tick, and the latest modes. The caller sets
- * struct_size, the rest is written. */
+/* On the other thread: the latest finished tick, the latest modes, and the latest of the sampled
+ * loop. The caller sets struct_size, the rest is written. */
 int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* snapshot);
 int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes);
+int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampled_modes* modes);
 
 /* A short English text for what a function returned ("torque limited"), and for the kind of a mode
  * ("underdamped"). Never NULL. */
@@ -271,6 +301,7 @@ typedef struct dashpot_plugin {
   int32_t (*set_gains)(dashpot_controller*, const dashpot_gains*);
   int32_t (*read_snapshot)(dashpot_controller*, dashpot_snapshot*);
   int32_t (*read_modes)(dashpot_controller*, dashpot_modes*);
+  int32_t (*read_sampled_modes)(dashpot_controller*, dashpot_sampled_modes*);
   const char* (*status_text)(int32_t);
   const char* (*kind_text)(int32_t);
 } dashpot_plugin;

@@ -195,4 +195,27 @@ void to_c(const Vibration& vibration, dashpot_modes& out) noexcept {
   }
 }
 
+void to_c(const SampledVibration& vibration, dashpot_sampled_modes& out) noexcept {
+  out = {};
+  out.struct_size = sizeof out;
+  out.joints = static_cast<std::uint32_t>(vibration.position.size());
+  out.time = vibration.time;
+  out.tick = vibration.tick;
+  put(vibration.position, out.position);
+  out.spectral_radius = vibration.spectral_radius;
+  out.gain_margin = vibration.gain_margin;
+  out.status = static_cast<std::int32_t>(vibration.status);
+  out.count = static_cast<std::uint32_t>(vibration.count);
+  for (std::uint32_t i = 0; i < out.count; ++i) {
+    const SampledVibrationMode& from = vibration.modes[i];
+    out.modes[i] = {from.continuous_frequency,
+                    from.continuous_ratio,
+                    from.natural_frequency,
+                    from.damping_ratio,
+                    from.damped_frequency,
+                    static_cast<std::int32_t>(from.kind),
+                    0};
+  }
+}
+
 }  // namespace dashpot::controller

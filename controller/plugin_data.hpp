@@ -21,5 +21,6 @@ std::int32_t to_gains(const dashpot_gains* given, int n, Gains& gains) noexcept;
 
 void to_c(const Snapshot& snapshot, dashpot_snapshot& out) noexcept;
 void to_c(const Vibration& vibration, dashpot_modes& out) noexcept;
+void to_c(const SampledVibration& vibration, dashpot_sampled_modes& out) noexcept;
 
 }  // namespace dashpot::controller

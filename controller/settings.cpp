@@ -83,6 +83,7 @@ double finite_or(double value, double otherwise) {
 
 /// Velocities at the tip decay no faster than this, 1/s: far from where torque that is held for a
 /// period of 1 ms and arrives one late makes the loop unstable.
+constexpr int kLongestDelay = 20;  // ticks
 constexpr double kFastestDecay = 200;
 
 struct TipInertia {
@@ -171,6 +172,12 @@ void validate(const Settings& settings, int n) {
     fail("analysis.every", settings.analysis.every, "ticks", "has to be at least 1");
   }
   need_not_negative("analysis.soft_frequency", settings.analysis.soft_frequency, "rad/s");
+  const Analysis::Sampled& sampled = settings.analysis.sampled;
+  need_not_negative("analysis.sampled.interval", sampled.interval, "s");
+  need_not_negative("analysis.sampled.cutoff", sampled.cutoff, "Hz");
+  if (sampled.delay < 0 || sampled.delay > kLongestDelay) {
+    fail("analysis.sampled.delay", sampled.delay, "ticks", "has to be between 0 and 20");
+  }
   const Setpoint& initial = settings.initial;
   const double ratio = initial.gains.task_damping_ratio;
   if (!(ratio >= 0 && ratio <= kLargestDampingRatio)) {

@@ -68,6 +68,14 @@ struct Analysis {
   int every = 1;                ///< ticks between two analyses, at least 1
   double soft_frequency = 0.1;  ///< modes below this have no meaningful damping ratio, rad/s
   bool shapes = true;           ///< with eigenvectors
+
+  /// The modes of the loop as it runs, beside the continuous ones; see SampledAnalysis.
+  struct Sampled {
+    double interval = 0;               ///< between two analyses, s; 0: none
+    int delay = 0;                     ///< ticks from a torque to its effect, beyond the hold
+    double cutoff = 0;                 ///< of the drives' first-order low-pass, Hz; 0: none
+    bool difference_velocity = false;  ///< the robot reports (q_k - q_k-1) / period for velocity
+  } sampled;
 };
 
 /// Everything that is set once. Defaults stand here; those that depend on the robot are filled in

@@ -78,4 +78,27 @@ struct Vibration {
   VibrationCounters counters;
 };
 
+/// A mode of the continuous loop, and what becomes of it in the loop as it is sampled; the terms
+/// are those of analysis::SampledMode.
+struct SampledVibrationMode {
+  analysis::ModeKind kind = analysis::ModeKind::kUnderdamped;
+  double continuous_frequency = 0;  ///< natural, rad/s
+  double continuous_ratio = 0;
+  double natural_frequency = 0;  ///< rad/s; NaN where there is none
+  double damping_ratio = 0;
+  double damped_frequency = 0;  ///< rad/s
+};
+
+/// The sampled loop with the springs and dampers of one tick.
+struct SampledVibration {
+  std::int64_t time = 0;                            ///< ns, of the state it belongs to
+  std::uint64_t tick = 0;                           ///< 0: none yet
+  JointVector position;                             ///< q it belongs to, n, rad
+  analysis::Status status = analysis::Status::kOk;  ///< of the continuous spectrum
+  double spectral_radius = 0;                       ///< the loop is stable below 1
+  double gain_margin = 0;  ///< all gains can grow by this factor before it is unstable
+  int count = 0;           ///< of modes
+  std::array<SampledVibrationMode, kMaxJoints> modes;  ///< by falling continuous frequency
+};
+
 }  // namespace dashpot::controller

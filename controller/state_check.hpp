@@ -8,12 +8,14 @@ namespace dashpot::controller {
 
 /// Tells states that a robot can be in from those that only a broken sensor, link or clock reports.
 ///
-/// A state is compared with the last good one, t seconds older. A position may differ by 2
-/// velocity_i t + 0.001 rad, where velocity is the limit of the
-/// settings or the robot's own, whichever is higher, or by what the measured velocities say,
-/// the mean of the two times t, give or take half of the larger one times t and 0.001 rad: a robot
-/// that is faster than its limit is no broken sensor. A velocity may differ by velocity_i (1/2 +
-/// 10/s t).
+/// A state is compared with the last good one, t seconds older. A position may differ by
+///
+///     2 velocity_i t + 0.001 rad,
+///
+/// velocity_i being the limit of the settings or the robot's own, whichever is higher; or by what
+/// the measured velocities say, the mean of the two times t, give or take half of the larger one
+/// times t and 0.001 rad: a robot that is faster than its limit is no broken sensor. A velocity may
+/// differ by velocity_i (1/2 + 10/s t).
 ///
 /// States that agree with each other in this way for 20 ms (or longest_gap, if that is longer) are
 /// believed, even if they do not agree with the last good one; others at the latest when t has
@@ -33,7 +35,7 @@ class StateCheck {
   void reset() noexcept;
 
  private:
-  /// The last state, whatever it was: good, or only finite.
+  /// A finite state to compare with.
   struct Last {
     bool any = false;
     double age = 0;  ///< s

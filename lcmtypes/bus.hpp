@@ -10,6 +10,7 @@ namespace dashpot::lcmtypes {
 
 inline constexpr const char* kStateChannel = "DASHPOT_STATE";
 inline constexpr const char* kModesChannel = "DASHPOT_MODES";
+inline constexpr const char* kSampledModesChannel = "DASHPOT_SAMPLED_MODES";
 inline constexpr const char* kCommandChannel = "DASHPOT_COMMAND";
 
 /// The environment's LCM_DEFAULT_URL, or else multicast that does not leave this machine:

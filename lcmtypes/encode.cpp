@@ -132,4 +132,33 @@ void fill(const ModesSample& sample, modes_t& message) {
   }
 }
 
+void fill(const SampledModesSample& sample, sampled_modes_t& message) {
+  const controller::SampledVibration& vibration = sample.vibration;
+  const auto n = static_cast<std::size_t>(vibration.position.size());
+  const auto count = std::min(static_cast<std::size_t>(std::max(vibration.count, 0)), n);
+  message.n = static_cast<std::int32_t>(n);
+  message.num_modes = static_cast<std::int32_t>(count);
+  message.utime = sample.utime;
+  message.tick = static_cast<std::int64_t>(vibration.tick);
+  message.status = static_cast<std::int8_t>(vibration.status);
+  copy_to(vibration.position, n, message.joint_position);
+  message.spectral_radius = vibration.spectral_radius;
+  message.gain_margin = vibration.gain_margin;
+  for (auto* list :
+       {&message.continuous_frequency, &message.continuous_ratio, &message.natural_frequency,
+        &message.damping_ratio, &message.damped_frequency}) {
+    list->resize(count);
+  }
+  message.kind.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const controller::SampledVibrationMode& mode = vibration.modes[i];
+    message.continuous_frequency[i] = mode.continuous_frequency;
+    message.continuous_ratio[i] = mode.continuous_ratio;
+    message.natural_frequency[i] = mode.natural_frequency;
+    message.damping_ratio[i] = mode.damping_ratio;
+    message.damped_frequency[i] = mode.damped_frequency;
+    message.kind[i] = static_cast<std::int8_t>(mode.kind);
+  }
+}
+
 }  // namespace dashpot::lcmtypes

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/samples.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
 
@@ -12,10 +13,11 @@ namespace dashpot::lcmtypes {
 void write_quaternion(const Eigen::Matrix3d& R, double (&quaternion)[4]);
 
 /// Copies a sample into a message. What a sample does not know is left as it is:
-/// state_t::states_dropped, modes_t::sequence. Joint vectors that are not as long as the joint
-/// position are cut, or filled up with zeros.
+/// state_t::states_dropped, and `sequence` of the others. Joint vectors that are not as long as the
+/// joint position are cut, or filled up with zeros.
 void fill(const StateSample& sample, state_t& message);
 void fill(const ModesSample& sample, modes_t& message);
+void fill(const SampledModesSample& sample, sampled_modes_t& message);
 
 /// The bytes of a message as LCM sends them, in a buffer that is used again and again.
 template <class Message>

@@ -52,6 +52,13 @@ bool decode_with_joints(const void* data, std::size_t size, Message& message) no
          decode_exactly(data, size, message);
 }
 
+template <class Message>
+bool decode_with_modes(const void* data, std::size_t size, Message& message) noexcept {
+  std::array<std::int32_t, 2> sizes{};  // n, num_modes
+  return read_sizes<Message>(data, size, sizes) && within(sizes[0], 1, controller::kMaxJoints) &&
+         within(sizes[1], 0, sizes[0]) && decode_exactly(data, size, message);
+}
+
 }  // namespace
 
 bool decode(const void* data, std::size_t size, state_t& message) noexcept {
@@ -59,9 +66,11 @@ bool decode(const void* data, std::size_t size, state_t& message) noexcept {
 }
 
 bool decode(const void* data, std::size_t size, modes_t& message) noexcept {
-  std::array<std::int32_t, 2> sizes{};  // n, num_modes
-  return read_sizes<modes_t>(data, size, sizes) && within(sizes[0], 1, controller::kMaxJoints) &&
-         within(sizes[1], 0, sizes[0]) && decode_exactly(data, size, message);
+  return decode_with_modes(data, size, message);
+}
+
+bool decode(const void* data, std::size_t size, sampled_modes_t& message) noexcept {
+  return decode_with_modes(data, size, message);
 }
 
 bool decode(const void* data, std::size_t size, command_t& message) noexcept {

@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/lcmtypes/command_t.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
 
 #include <cstddef>
@@ -20,6 +21,7 @@ inline constexpr std::size_t kMaxMessageSize = 65536;
 /// Allocates less than kMaxMessageSize. Values are not judged: they may be NaN or out of range.
 bool decode(const void* data, std::size_t size, state_t& message) noexcept;
 bool decode(const void* data, std::size_t size, modes_t& message) noexcept;
+bool decode(const void* data, std::size_t size, sampled_modes_t& message) noexcept;
 bool decode(const void* data, std::size_t size, command_t& message) noexcept;
 
 }  // namespace dashpot::lcmtypes

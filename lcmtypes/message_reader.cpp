@@ -6,6 +6,7 @@
 #include <lcm/lcm-cpp.hpp>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 namespace dashpot::lcmtypes {
 namespace {
@@ -25,13 +26,13 @@ void MessageHandlers::take(std::string_view channel, const void* data, std::size
   bool good = true;
   if (channel == kStateChannel) good = hand_on(data, size, on_state);
   if (channel == kModesChannel) good = hand_on(data, size, on_modes);
+  if (channel == kSampledModesChannel) good = hand_on(data, size, on_sampled_modes);
   if (!good) ++malformed;
 }
 
 struct BusReader::Subscriptions {
   MessageHandlers* handlers = nullptr;
-  lcm::Subscription* state = nullptr;
-  lcm::Subscription* modes = nullptr;
+  std::vector<lcm::Subscription*> all;
 
   void take(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
     handlers->take(channel, buffer->data, buffer->data_size);
@@ -41,18 +42,16 @@ struct BusReader::Subscriptions {
 BusReader::BusReader(std::shared_ptr<lcm::LCM> bus, MessageHandlers& handlers)
     : bus_(std::move(bus)), subscriptions_(std::make_unique<Subscriptions>()) {
   subscriptions_->handlers = &handlers;
-  subscriptions_->state =
-      bus_->subscribe(kStateChannel, &Subscriptions::take, subscriptions_.get());
-  subscriptions_->modes =
-      bus_->subscribe(kModesChannel, &Subscriptions::take, subscriptions_.get());
-  if (subscriptions_->state == nullptr || subscriptions_->modes == nullptr) {
-    throw std::runtime_error("cannot subscribe to the LCM bus");
+  for (const char* channel : {kStateChannel, kModesChannel, kSampledModesChannel}) {
+    lcm::Subscription* subscription =
+        bus_->subscribe(channel, &Subscriptions::take, subscriptions_.get());
+    if (subscription == nullptr) throw std::runtime_error("cannot subscribe to the LCM bus");
+    subscriptions_->all.push_back(subscription);
   }
 }
 
 BusReader::~BusReader() {
-  bus_->unsubscribe(subscriptions_->state);
-  bus_->unsubscribe(subscriptions_->modes);
+  for (lcm::Subscription* subscription : subscriptions_->all) bus_->unsubscribe(subscription);
 }
 
 bool BusReader::wait(int milliseconds) {

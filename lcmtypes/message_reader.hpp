@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
 
 #include <cstddef>
@@ -16,6 +17,7 @@ namespace dashpot::lcmtypes {
 struct MessageHandlers {
   std::function<void(const state_t&)> on_state;
   std::function<void(const modes_t&)> on_modes;
+  std::function<void(const sampled_modes_t&)> on_sampled_modes;
   std::int64_t malformed = 0;  ///< messages on our channels that were not handed on
 
   /// Decodes and hands on; other channels are ignored.

@@ -55,10 +55,10 @@ Publisher::Publisher(std::vector<std::unique_ptr<Sink>> sinks, PublisherOptions 
   if (!(options.modes_tolerance >= 0)) {
     throw std::invalid_argument("publisher: modes_tolerance is not at least 0");
   }
-  modes_message_.sequence = 0;
+  modes_message_.sequence = sampled_message_.sequence = 0;
 }
 
-Publisher::~Publisher() {
+void Publisher::stop() {
   if (thread_.joinable()) {
     stop_.store(true, std::memory_order_release);
     thread_.join();
@@ -79,6 +79,10 @@ void Publisher::offer(const ModesSample& sample) noexcept {
   ++offered_modes_.number;
   offered_modes_.sample = sample;
   if (!modes_.push(offered_modes_)) overflow_.write(offered_modes_);
+}
+
+void Publisher::offer(const SampledModesSample& sample) noexcept {
+  sampled_.write(sample);
 }
 
 void Publisher::start() {
@@ -111,6 +115,11 @@ void Publisher::publish_pending() {
     modes_.pop();
   }
   if (overflow_.fetch()) publish(overflow_.value());
+  if (!sampled_.fetch()) return;
+  ++sampled_message_.sequence;
+  fill(sampled_.value(), sampled_message_);
+  send(kSampledModesChannel, sampled_message_);
+  count(sampled_sent_);
 }
 
 void Publisher::publish(const NumberedModes& modes) {
@@ -145,6 +154,7 @@ PublisherCounters Publisher::counters() const noexcept {
           modes_skipped_.load(std::memory_order_relaxed),
           states_.dropped(),
           modes_.dropped(),
+          sampled_sent_.load(std::memory_order_relaxed),
           send_errors_.load(std::memory_order_relaxed)};
 }
 

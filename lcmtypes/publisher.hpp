@@ -2,6 +2,7 @@
 #include <dashpot/controller/latest.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
 #include <dashpot/lcmtypes/sample_queue.hpp>
+#include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/samples.hpp>
 #include <dashpot/lcmtypes/sink.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
@@ -32,11 +33,13 @@ struct PublisherCounters {
   std::int64_t modes_skipped = 0;   ///< not new
   std::int64_t states_dropped = 0;  ///< no room in the queue
   std::int64_t modes_dropped = 0;   ///< likewise; the latest of them goes out all the same
-  std::int64_t send_errors = 0;     ///< of any sink
+  std::int64_t sampled_modes = 0;
+  std::int64_t send_errors = 0;  ///< of any sink
 };
 
 /// Publishes what the real-time thread offers: every `state_every`-th state, and modes when the
-/// configuration, their number, kind, label, frequency or ratio has changed. `offer` is for one
+/// configuration, their number, kind, label, frequency or ratio has changed. Those of the sampled
+/// loop come seldom: the latest is published. `offer` is for one
 /// thread and never waits, allocates or calls the system. The rest happens in a thread of its own
 /// after `start()`; a simulation that is faster than real time calls `publish_pending()` instead.
 class Publisher {
@@ -44,17 +47,19 @@ class Publisher {
   /// Each message is encoded once and goes to every sink. Throws std::invalid_argument for options
   /// out of range.
   explicit Publisher(std::vector<std::unique_ptr<Sink>> sinks, PublisherOptions options = {});
-  /// Publishes what is waiting.
-  ~Publisher();
+  ~Publisher() { stop(); }
   Publisher(const Publisher&) = delete;
   Publisher& operator=(const Publisher&) = delete;
 
   void offer(const StateSample& sample) noexcept;
   void offer(const ModesSample& sample) noexcept;
+  void offer(const SampledModesSample& sample) noexcept;
 
   /// Starts the thread; to be called once.
   void start();
-  /// Publishes what is waiting, on the caller's thread. Not after `start()`.
+  /// Ends the thread, if there is one, and publishes what is still waiting.
+  void stop();
+  /// Publishes what is waiting, on the caller's thread. Not between `start()` and `stop()`.
   void publish_pending();
 
   PublisherCounters counters() const noexcept;
@@ -78,10 +83,12 @@ class Publisher {
   SampleQueue<StateSample> states_;
   SampleQueue<NumberedModes> modes_;
   controller::Latest<NumberedModes> overflow_;  ///< the latest that found no room
+  controller::Latest<SampledModesSample> sampled_;
   std::atomic<bool> stop_{false};
   std::atomic<std::int64_t> states_sent_{0};
   std::atomic<std::int64_t> modes_sent_{0};
   std::atomic<std::int64_t> modes_skipped_{0};
+  std::atomic<std::int64_t> sampled_sent_{0};
   std::atomic<std::int64_t> send_errors_{0};
 
   // The real-time thread's
@@ -93,6 +100,7 @@ class Publisher {
   std::uint64_t published_number_ = 0;
   state_t state_message_;
   modes_t modes_message_;
+  sampled_modes_t sampled_message_;
   std::vector<std::uint8_t> bytes_;
   std::thread thread_;
 };

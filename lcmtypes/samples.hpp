@@ -29,4 +29,10 @@ struct ModesSample {
   controller::Vibration vibration;
 };
 
+/// What becomes of them in the loop as it is sampled.
+struct SampledModesSample {
+  std::int64_t utime = 0;  ///< as in ModesSample
+  controller::SampledVibration vibration;
+};
+
 }  // namespace dashpot::lcmtypes

@@ -36,20 +36,25 @@ Json run_json(const std::string& path, std::vector<std::string> options = {}) {
   return parse(run_scene(path, options));
 }
 
-/// A scene with `from` replaced, its URDF named absolutely, in a file of its own.
-std::string changed(const Scratch& scratch, const std::string& name, const std::string& from,
-                    const std::string& to) {
+/// A scene with parts of its text replaced, its URDF named absolutely, in a file of its own.
+std::string changed(const Scratch& scratch, const std::string& name,
+                    const std::vector<std::pair<std::string, std::string>>& replacements) {
   std::string text = text_of(scene(name));
   const auto replace = [&text](const std::string& old, const std::string& by) {
     const std::size_t at = text.find(old);
     if (at == std::string::npos) throw std::runtime_error("no '" + old + "' in the scene");
     text.replace(at, old.size(), by);
   };
-  replace(from, to);
+  for (const auto& [from, to] : replacements) replace(from, to);
   if (text.find("../models") != std::string::npos) {
     replace("../models", std::string(DASHPOT_SOURCE_DIR) + "/sim/models");
   }
   return scratch.write("scene.yaml", text);
+}
+
+std::string changed(const Scratch& scratch, const std::string& name, const std::string& from,
+                    const std::string& to) {
+  return changed(scratch, name, {{from, to}});
 }
 
 /// The columns of a CSV by name.
@@ -189,6 +194,20 @@ TEST(Run, HoldsADampingRatioWhereverTheArmIs) {
   }
 }
 
+// The arm stays where it is if the controller carries just the weight that is simulated.
+TEST(Run, SimulatesTheRobotThatTheControllerIsTold) {
+  const Scratch scratch;
+  const std::string file = changed(
+      scratch, "panda_release_c2",
+      {{"tip: panda_hand_tcp",
+        "tip: panda_hand_tcp\n"
+        "  payload: {mass: 2 kg, center: [0, 3 cm, 5 cm], inertia: [0.01, 0.02, 0.03]}\n"
+        "  gravity: [3, 1, -9]"},
+       {"tip_displacement: [0, 2 cm, 0, 0, 0, 0]", "tip_displacement: [0, 0, 0, 0, 0, 0]"}});
+  const Json result = run_json(file, {"--duration", "1"});
+  EXPECT_LT(result["largest_tracking_error"]["tip"].get<double>(), 1e-9);
+}
+
 TEST(Run, MovesMatricesAsTheClosedFormSays) {
   const Scratch scratch;
   const std::string csv = scratch.path("chain.csv");
@@ -314,7 +333,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "scenario.start.tip_displacement: is out of the arm's reach (line 20)"},
         BadScene{"OutOfLimits", "panda", "position: [0, -45 deg", "position: [0, -145 deg",
                  "scenario.start.position: joint 2 would be at -2.530727 rad, outside its limits "
-                 "(line 56)"},
+                 "(line 59)"},
         BadScene{"NoStart", "iiwa14", "    position: [0, 30 deg, 0, -80 deg, 0, 60 deg, 0]\n", "",
                  "scenario.start.position: missing (line 20)"},
         BadScene{"StepsOutOfOrder", "ur5", "at: 4 s", "at: 1 s",
@@ -325,7 +344,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "position limit (line 25)"},
         BadScene{"IndefiniteDamping", "panda", "damping: [20 N s/m, 20", "damping: [-20 N s/m, 20",
                  "scenario.steps: the controller refuses this: task_damping is not positive "
-                 "semidefinite (line 64)"},
+                 "semidefinite (line 67)"},
         BadScene{"EndBeforeBegin", "iiwa14", "end: 1.6 s", "end: 1.4 s",
                  "scenario.pushes[1].end: is not after begin (line 23)"},
         BadScene{"WrongLength", "iiwa14", "joint_displacement: [0.02, 0.02",
@@ -334,7 +353,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "all, is wanted (line 21)"},
         BadScene{"UnknownMethod", "panda", "method: rk4", "method: rk5",
                  "simulation.integrator.method: semi_implicit_euler, rk4, dormand_prince, "
-                 "implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 23)"},
+                 "implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 26)"},
         BadScene{"MassNotDefinite", "chain3", "[[8, 0, 0]", "[[-8, 0, 0]",
                  "system: mass: is not positive definite"},
         BadScene{"WallOfASystem", "chain3", "scenario:", "simulation: {wall: {}}\nscenario:",

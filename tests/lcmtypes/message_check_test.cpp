@@ -23,6 +23,10 @@ modes_t random_message(Random& random, int n) {
   return message_of<modes_t>(random_modes(random, n));
 }
 template <>
+sampled_modes_t random_message(Random& random, int n) {
+  return message_of<sampled_modes_t>(random_sampled_modes(random, n));
+}
+template <>
 command_t random_message(Random& random, int n) {
   return random_command(random, n);
 }
@@ -36,7 +40,7 @@ void write_int32(Bytes& bytes, std::size_t offset, std::int32_t value) {
 
 template <class Message>
 class MessageCheck : public ::testing::Test {};
-using Messages = ::testing::Types<state_t, modes_t, command_t>;
+using Messages = ::testing::Types<state_t, modes_t, sampled_modes_t, command_t>;
 TYPED_TEST_SUITE(MessageCheck, Messages);
 
 /// The bytes in memory of exactly their size, so that the address sanitizer sees any read beyond.

@@ -34,6 +34,7 @@ Eigen::Matrix3d rotation_of(const double (&q)[4]) {
 TEST(Messages, KeepTheirFingerprints) {
   EXPECT_EQ(static_cast<std::uint64_t>(state_t::getHash()), 0xbfe53796c93f9803u);
   EXPECT_EQ(static_cast<std::uint64_t>(modes_t::getHash()), 0xcdb9f46fc36ad3a0u);
+  EXPECT_EQ(static_cast<std::uint64_t>(sampled_modes_t::getHash()), 0xd03418d8965d7894u);
   EXPECT_EQ(static_cast<std::uint64_t>(command_t::getHash()), 0x1884b7ae000f9d2u);
 }
 
@@ -100,6 +101,34 @@ TEST(StateMessage, FillsUpVectorsThatAreTooShort) {
   const auto message = message_of<state_t>(sample);
   EXPECT_THAT(message.joint_torque, ElementsAreArray(std::vector<double>(7, 0.0)));
   EXPECT_THAT(message.joint_velocity, ElementsAreArray(list(sample.snapshot.velocity.head(7))));
+}
+
+TEST(SampledModesMessage, SaysWhatTheSampleSays) {
+  Random random(907);
+  for (int n = 1; n <= controller::kMaxJoints; ++n) {
+    const SampledModesSample sample = random_sampled_modes(random, n);
+    const Bytes bytes = bytes_of(message_of<sampled_modes_t>(sample));
+    sampled_modes_t message;
+    ASSERT_TRUE(decode(bytes.data(), bytes.size(), message));
+    const controller::SampledVibration& vibration = sample.vibration;
+    EXPECT_EQ(message.n, n);
+    EXPECT_EQ(message.num_modes, vibration.count);
+    EXPECT_EQ(message.utime, sample.utime);
+    EXPECT_EQ(message.tick, static_cast<std::int64_t>(vibration.tick));
+    EXPECT_EQ(message.status, static_cast<int>(vibration.status));
+    EXPECT_THAT(message.joint_position, ElementsAreArray(list(vibration.position)));
+    EXPECT_EQ(message.spectral_radius, vibration.spectral_radius);
+    EXPECT_EQ(message.gain_margin, vibration.gain_margin);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(vibration.count); ++i) {
+      const controller::SampledVibrationMode& mode = vibration.modes[i];
+      EXPECT_EQ(message.continuous_frequency[i], mode.continuous_frequency);
+      EXPECT_EQ(message.continuous_ratio[i], mode.continuous_ratio);
+      EXPECT_EQ(message.natural_frequency[i], mode.natural_frequency);
+      EXPECT_EQ(message.damping_ratio[i], mode.damping_ratio);
+      EXPECT_EQ(message.damped_frequency[i], mode.damped_frequency);
+      EXPECT_EQ(message.kind[i], static_cast<int>(mode.kind));
+    }
+  }
 }
 
 TEST(ModesMessage, SaysWhatTheSampleSays) {

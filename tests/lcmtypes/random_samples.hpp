@@ -73,6 +73,27 @@ inline ModesSample random_modes(Random& random, int n) {
   return sample;
 }
 
+inline SampledModesSample random_sampled_modes(Random& random, int n) {
+  SampledModesSample sample;
+  sample.utime = kNow + random.integer(0, 1'000'000'000);
+  controller::SampledVibration& vibration = sample.vibration;
+  vibration.tick = static_cast<std::uint64_t>(random.integer(1, 1'000'000'000));
+  vibration.position = random.vector(n);
+  vibration.status = static_cast<analysis::Status>(random.integer(0, 8));
+  vibration.spectral_radius = random.uniform(0.9, 1.1);
+  vibration.gain_margin = random.uniform(0.1, 9);
+  vibration.count = random.integer(0, n);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(vibration.count); ++i) {
+    vibration.modes[i] = {static_cast<analysis::ModeKind>(random.integer(0, 5)),
+                          random.uniform(1, 99),
+                          random.uniform(0, 2),
+                          random.uniform(1, 99),
+                          random.uniform(0, 2),
+                          random.uniform(1, 99)};
+  }
+  return sample;
+}
+
 inline std::vector<std::vector<double>> rows_of(const Eigen::MatrixXd& matrix) {
   std::vector<std::vector<double>> rows;
   for (Eigen::Index i = 0; i < matrix.rows(); ++i) {

@@ -123,7 +123,10 @@ INSTANTIATE_TEST_SUITE_P(
                   "analysis: {every: 2.5}\n"},
         BadConfig{"CountTooSmall",
                   "analysis.every: is 0; a whole number, 1 or more, is wanted (line 2)",
-                  "analysis: {every: 0}\n"}),
+                  "analysis: {every: 0}\n"},
+        BadConfig{"LongDelay",
+                  "analysis.sampled.delay: is 21 ticks, has to be between 0 and 20 (line 2)",
+                  "analysis: {sampled: {delay: 21}}\n"}),
     name_of);
 
 INSTANTIATE_TEST_SUITE_P(

@@ -174,7 +174,8 @@ TEST(Config, FillsTheRest) {
            "feed_forward: {gravity: false, coriolis: false, friction: true, acceleration: false,\n"
            "  wrench: false}\n"
            "watchdog: {setpoint_hold: 100 ms, setpoint_damp: 0, longest_gap: 5 ms}\n"
-           "analysis: {where: 'off', every: 7, soft_frequency: 0.2 rad/s, shapes: false}\n")
+           "analysis: {where: 'off', every: 7, soft_frequency: 0.2 rad/s, shapes: false,\n"
+           "  sampled: {interval: 500 ms, delay: 2, cutoff: 30 Hz, difference_velocity: true}}\n")
           .settings;
   EXPECT_TRUE(all.task_terms.geometric_stiffness);
   EXPECT_TRUE(all.task_terms.jacobian_rate);
@@ -201,6 +202,10 @@ TEST(Config, FillsTheRest) {
   EXPECT_EQ(all.analysis.every, 7);
   EXPECT_EQ(all.analysis.soft_frequency, 0.2);
   EXPECT_FALSE(all.analysis.shapes);
+  EXPECT_DOUBLE_EQ(all.analysis.sampled.interval, 0.5);
+  EXPECT_EQ(all.analysis.sampled.delay, 2);
+  EXPECT_EQ(all.analysis.sampled.cutoff, 30);
+  EXPECT_TRUE(all.analysis.sampled.difference_velocity);
 }
 
 /// The Panda's first line, with more keys.

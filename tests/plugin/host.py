@@ -68,6 +68,19 @@ class Modes(c.Structure):
                 ("modes", Mode * MAX_JOINTS)]
 
 
+class SampledMode(c.Structure):
+    _fields_ = [("continuous_frequency", c.c_double), ("continuous_ratio", c.c_double),
+                ("natural_frequency", c.c_double), ("damping_ratio", c.c_double),
+                ("damped_frequency", c.c_double), ("kind", c.c_int32), ("reserved", c.c_int32)]
+
+
+class SampledModes(c.Structure):
+    _fields_ = [("struct_size", c.c_uint32), ("joints", c.c_uint32), ("time", c.c_int64),
+                ("tick", c.c_uint64), ("position", c.c_double * MAX_JOINTS),
+                ("spectral_radius", c.c_double), ("gain_margin", c.c_double),
+                ("status", c.c_int32), ("count", c.c_uint32), ("modes", SampledMode * MAX_JOINTS)]
+
+
 Handle = c.c_void_p
 
 
@@ -86,6 +99,7 @@ class Plugin(c.Structure):
                 ("set_gains", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Gains))),
                 ("read_snapshot", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Snapshot))),
                 ("read_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Modes))),
+                ("read_sampled_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(SampledModes))),
                 ("status_text", c.CFUNCTYPE(c.c_char_p, c.c_int32)),
                 ("kind_text", c.CFUNCTYPE(c.c_char_p, c.c_int32))]
 
@@ -95,8 +109,8 @@ def load(path):
     library.dashpot_plugin_interface.restype = c.POINTER(Plugin)
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
-    plugin = library.dashpot_plugin_interface(2).contents
-    assert plugin.version == 2 and plugin.struct_size == c.sizeof(Plugin)
+    plugin = library.dashpot_plugin_interface(3).contents
+    assert plugin.version == 3 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
 

@@ -10,6 +10,8 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
+#include <limits>
 #include <sstream>
 #include <thread>
 
@@ -118,6 +120,37 @@ TEST(Monitor, EndsALogWithASummary) {
   const std::string last = lines_of(outcome.out).back();
   EXPECT_THAT(last, AllOf(HasSubstr("2   9.76100"), HasSubstr("overdamped"), HasSubstr("2.5e-13"),
                           HasSubstr("q2 - 0.50 q6")));
+}
+
+TEST(Monitor, ShowsTheSampledLoop) {
+  const Scratch scratch;
+  const auto summary = [&scratch](double radius, double margin) {
+    const std::string path = scratch.path("sampled.lcm");
+    lcmtypes::SampledModesSample sample;
+    sample.utime = kStart;
+    sample.vibration.tick = 501;
+    sample.vibration.position = controller::JointVector::Zero(7);
+    sample.vibration.spectral_radius = radius;
+    sample.vibration.gain_margin = margin;
+    sample.vibration.count = 1;
+    sample.vibration.modes[0] = {analysis::ModeKind::kUnderdamped, 20.25, 0.7, 20.5, 0.65, 15.5};
+    std::filesystem::remove(path);
+    {
+      std::vector<std::unique_ptr<lcmtypes::Sink>> sinks;
+      sinks.push_back(lcmtypes::make_log_sink(path));
+      lcmtypes::Publisher publisher(std::move(sinks));
+      publisher.offer(sample);
+    }
+    return run_program({"monitor", "--log", path}).out;
+  };
+  const std::string stable = summary(0.999, 3.25);
+  EXPECT_THAT(stable, HasSubstr("Sampled loop at the end\n  tick 501: stable; all gains can grow "
+                                "to 3.25 times what they are\n"));
+  EXPECT_THAT(lines_of(stable).back(),
+              ::testing::ContainsRegex("20.2500 +0.700000 +20.5000 +0.650000 +underdamped"));
+  EXPECT_THAT(summary(1.001, 0.5), HasSubstr("UNSTABLE; all gains have to shrink to 0.500 of"));
+  EXPECT_THAT(summary(0.5, std::numeric_limits<double>::infinity()),
+              HasSubstr("stable, however large the gains"));
 }
 
 TEST(Monitor, CountsMalformedAndLostMessages) {

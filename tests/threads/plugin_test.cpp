@@ -68,12 +68,13 @@ TEST(Plugin, ShowsItsFunctionsAndNothingElse) {
     words >> address >> type >> name;
     names.insert(name);
   }
-  EXPECT_THAT(names, ::testing::UnorderedElementsAre(
-                         "dashpot_create", "dashpot_destroy", "dashpot_last_error",
-                         "dashpot_joints", "dashpot_joint_name", "dashpot_period", "dashpot_update",
-                         "dashpot_reset", "dashpot_set_setpoint", "dashpot_set_gains",
-                         "dashpot_read_snapshot", "dashpot_read_modes", "dashpot_status_text",
-                         "dashpot_kind_text", "dashpot_plugin_interface"));
+  EXPECT_THAT(names,
+              ::testing::UnorderedElementsAre(
+                  "dashpot_create", "dashpot_destroy", "dashpot_last_error", "dashpot_joints",
+                  "dashpot_joint_name", "dashpot_period", "dashpot_update", "dashpot_reset",
+                  "dashpot_set_setpoint", "dashpot_set_gains", "dashpot_read_snapshot",
+                  "dashpot_read_modes", "dashpot_read_sampled_modes", "dashpot_status_text",
+                  "dashpot_kind_text", "dashpot_plugin_interface"));
 }
 
 TEST(Plugin, KnowsItsVersionOnly) {
@@ -376,6 +377,7 @@ TEST(PluginRefuses, NullPointers) {
   EXPECT_EQ(plugin().set_gains(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
   EXPECT_EQ(plugin().read_snapshot(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
   EXPECT_EQ(plugin().read_modes(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().read_sampled_modes(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
   EXPECT_STREQ(plugin().last_error(), "a pointer that has to be there is NULL");
   EXPECT_EQ(plugin().joints(nullptr), 0u);
   EXPECT_EQ(plugin().joint_name(nullptr, 0), nullptr);
@@ -468,6 +470,10 @@ TEST(PluginRefuses, ToReadBeforeTheFirstTick) {
   dashpot_modes modes{};
   modes.struct_size = sizeof modes;
   EXPECT_EQ(plugin().read_modes(arm.get(), &modes), DASHPOT_NOTHING_YET);
+  dashpot_sampled_modes sampled{};
+  EXPECT_EQ(plugin().read_sampled_modes(arm.get(), &sampled), DASHPOT_WRONG_STRUCT_SIZE);
+  sampled.struct_size = sizeof sampled;
+  EXPECT_EQ(plugin().read_sampled_modes(arm.get(), &sampled), DASHPOT_NOTHING_YET);
   EXPECT_STREQ(plugin().last_error(), "nothing to read so far");
 }
 

@@ -216,6 +216,18 @@ TEST(Publisher, HandsWholeSamplesFromThreadToThread) {
   EXPECT_EQ(last, kTicks);  // whatever was skipped, the newest arrives
 }
 
+TEST(PublisherThread, HasSentAllThatWasOfferedWhenItIsStopped) {
+  Received received;
+  Publisher publisher(sink_into(received));
+  publisher.start();
+  for (int tick = 1; tick <= 300; ++tick) publisher.offer(state_at(tick));
+  publisher.stop();
+  EXPECT_EQ(ticks_of(received).size(), 300U);
+  EXPECT_EQ(publisher.counters().states, 300);
+  publisher.stop();  // once is enough
+  EXPECT_EQ(publisher.counters().states, 300);
+}
+
 class ModesPublisher : public ::testing::Test {
  protected:
   ModesPublisher() : random_(943), publisher_(sink_into(received_)) {

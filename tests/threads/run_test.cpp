@@ -81,6 +81,10 @@ class Listener {
       ++modes_messages;
       modes = message;
     };
+    handlers_.on_sampled_modes = [this](const sampled_modes_t& message) {
+      ++sampled_messages;
+      sampled = message;
+    };
     reader_.emplace(bus_, handlers_);
   }
 
@@ -97,9 +101,10 @@ class Listener {
   lcm::LCM& bus() { return *bus_; }
   std::int64_t malformed() const { return handlers_.malformed; }
 
-  std::int64_t states = 0, modes_messages = 0;
+  std::int64_t states = 0, modes_messages = 0, sampled_messages = 0;
   state_t state{};
   modes_t modes{};
+  sampled_modes_t sampled{};
 
  private:
   std::shared_ptr<lcm::LCM> bus_;
@@ -188,6 +193,31 @@ TEST(RunInRealTime, TakesGoodCommandsAndKeepsTheLastOne) {
   const Json result = Json::parse(run.output());
   EXPECT_EQ(result["commands"]["accepted"], 1);
   EXPECT_EQ(result["commands"]["rejected"], 4);
+}
+
+TEST(RunInRealTime, PublishesTheSampledLoop) {
+  const std::string url = own_url();
+  Listener listener(url);
+  Running run({"run", scene("panda"), "--lcm-url", url, "--duration", "60", "--json"});
+  if (!listener.until([&] { return listener.states > 100; })) {
+    GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  }
+  ASSERT_TRUE(listener.until([&] { return listener.sampled_messages >= 2; }));
+  EXPECT_EQ(listener.malformed(), 0);
+  run.send(SIGTERM);
+  EXPECT_EQ(run.finish(), 0);
+  const sampled_modes_t& sampled = listener.sampled;
+  EXPECT_EQ(sampled.n, 7);
+  EXPECT_EQ(sampled.status, 0);
+  EXPECT_LT(sampled.spectral_radius, 1);
+  EXPECT_GT(sampled.gain_margin, 1);
+  ASSERT_GE(sampled.num_modes, 6);
+  for (std::size_t i = 0; i < 6; ++i) {  // a mode that is slow changes little
+    if (sampled.continuous_frequency[i] > 30) continue;
+    EXPECT_NEAR(sampled.natural_frequency[i], sampled.continuous_frequency[i],
+                0.1 * sampled.continuous_frequency[i]);
+  }
+  EXPECT_GE(Json::parse(run.output())["messages"]["sampled_modes"].get<int>(), 2);
 }
 
 TEST(RunInRealTime, DoesNotNoticeWhoListens) {
