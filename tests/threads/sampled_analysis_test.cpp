@@ -1,0 +1,138 @@
+// The sampled loop, analysed on a thread: the numbers of analysis::sample_loop for that loop.
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/sampled_analysis.hpp>
+#include <dashpot/tests/support/arms.hpp>
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+namespace dashpot::controller {
+namespace {
+
+/// A Panda that is held still at one place by Cartesian springs.
+struct StillArm {
+  explicit StillArm(const Analysis::Sampled& sampled)
+      : model(testing::arm_model(testing::arms()[0])), controller(model, settings(sampled)) {
+    state.position.resize(7);
+    state.position << 0, -0.785, 0.1, -2.2, 0.2, 1.7, 0.785;
+    state.velocity = JointVector::Zero(7);
+    setpoint = controller.settings().initial;
+    setpoint.mode = Mode::kCartesian;
+    const DynamicsResult there = evaluate(model, state.position, state.velocity);
+    setpoint.tip_pose = {there.p_BT_B, there.R_BT};
+    setpoint.joint_position = state.position;
+  }
+  Settings settings(const Analysis::Sampled& sampled) const {
+    Settings result = default_settings(model);
+    result.motion.gain_time = result.period;  // at once
+    result.analysis.sampled = sampled;
+    return result;
+  }
+  void tick() {
+    setpoint.time = state.time += 1'000'000;
+    controller.update(state, setpoint, torque);
+  }
+  /// Ticks until something new has been found about a tick after `tick_number`.
+  const SampledVibration* wait_for(std::uint64_t tick_number) {
+    using std::chrono::steady_clock;
+    const auto end = steady_clock::now() + std::chrono::seconds(60);
+    while (steady_clock::now() < end) {
+      tick();
+      const SampledVibration* found = controller.new_sampled_vibration();
+      if (found != nullptr && found->tick > tick_number) return found;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return nullptr;
+  }
+
+  RobotModel model;
+  Controller controller;
+  RobotState state;
+  Setpoint setpoint;
+  JointVector torque;
+};
+
+TEST(SampledAnalysis, FindsWhatTheAnalysisOfThatLoopFinds) {
+  for (const bool difference : {false, true}) {
+    StillArm arm({0.02, 2, 40, difference});
+    const SampledVibration* found = arm.wait_for(20);  // the gains have grown
+    ASSERT_NE(found, nullptr);
+    EXPECT_EQ(found->status, analysis::Status::kOk);
+    EXPECT_EQ(found->position, arm.state.position);
+
+    analysis::System<kMaxJoints> loop;
+    arm.controller.closed_loop(loop);
+    analysis::System<> system(7);
+    system.mass = loop.mass;
+    system.damping = loop.damping;
+    system.stiffness = loop.stiffness;
+    system.stiffness_factor = loop.stiffness_factor;
+    const analysis::Spectrum<> continuous = analysis::analyze(system);
+    analysis::SampledLoop drives;
+    drives.delay = 2;
+    drives.torque_cutoff = 40;
+    drives.difference_velocity = difference;
+    drives.friction = Eigen::VectorXd(arm.model.joint_values(&Joint::damping)).asDiagonal();
+    drives.gravity_gradient = gravity_gradient(arm.model, arm.state.position);
+    const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, drives);
+    ASSERT_EQ(static_cast<std::size_t>(found->count), sampled.modes.size());
+    ASSERT_GE(found->count, 6);
+    EXPECT_DOUBLE_EQ(found->spectral_radius, sampled.spectral_radius);
+    EXPECT_DOUBLE_EQ(found->gain_margin, analysis::gain_margin(system, continuous, drives));
+    for (std::size_t i = 0; i < sampled.modes.size(); ++i) {
+      const SampledVibrationMode& mode = found->modes[i];
+      const analysis::SampledMode& wanted = sampled.modes[i];
+      const auto& origin = continuous.modes[static_cast<int>(i)];
+      EXPECT_EQ(mode.kind, wanted.kind);
+      EXPECT_DOUBLE_EQ(mode.continuous_frequency, origin.natural_frequency);
+      EXPECT_DOUBLE_EQ(mode.continuous_ratio, origin.damping_ratio);
+      EXPECT_DOUBLE_EQ(mode.natural_frequency, wanted.natural_frequency);
+      EXPECT_DOUBLE_EQ(mode.damping_ratio, wanted.damping_ratio);
+      EXPECT_DOUBLE_EQ(mode.damped_frequency, wanted.damped_frequency);
+    }
+  }
+}
+
+TEST(SampledAnalysis, TellsWhereDelayTakesTheStabilityAway) {
+  StillArm prompt({0.02, 0, 0, false}), late({0.02, 20, 0, false});
+  const SampledVibration* found = prompt.wait_for(20);
+  ASSERT_NE(found, nullptr);
+  EXPECT_LT(found->spectral_radius, 1);
+  EXPECT_GT(found->gain_margin, 1);
+  found = late.wait_for(20);
+  ASSERT_NE(found, nullptr);
+  EXPECT_GT(found->spectral_radius, 1);
+  EXPECT_LT(found->gain_margin, 1);
+}
+
+TEST(SampledAnalysis, LooksAtTheLoopOnceInAnInterval) {
+  StillArm arm({0.05, 0, 0, false});
+  std::uint64_t last = 0;
+  for (int k = 0; k < 5; ++k) {
+    const SampledVibration* found = arm.wait_for(last);
+    ASSERT_NE(found, nullptr);
+    EXPECT_EQ(found->tick % 50, 1U);
+    last = found->tick;
+  }
+}
+
+TEST(SampledAnalysis, BeginsAnewAfterAReset) {
+  StillArm arm({10, 0, 0, false});
+  ASSERT_NE(arm.wait_for(0), nullptr);
+  arm.controller.reset();
+  const SampledVibration* found = arm.wait_for(0);
+  ASSERT_NE(found, nullptr);
+  EXPECT_EQ(found->tick, 1U);
+}
+
+TEST(SampledAnalysis, IsThereOnlyIfAskedFor) {
+  StillArm arm({});
+  for (int k = 0; k < 50; ++k) arm.tick();
+  EXPECT_EQ(arm.controller.new_sampled_vibration(), nullptr);
+}
+
+}  // namespace
+}  // namespace dashpot::controller
