@@ -333,7 +333,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "scenario.start.tip_displacement: is out of the arm's reach (line 20)"},
         BadScene{"OutOfLimits", "panda", "position: [0, -45 deg", "position: [0, -145 deg",
                  "scenario.start.position: joint 2 would be at -2.530727 rad, outside its limits "
-                 "(line 59)"},
+                 "(line 58)"},
         BadScene{"NoStart", "iiwa14", "    position: [0, 30 deg, 0, -80 deg, 0, 60 deg, 0]\n", "",
                  "scenario.start.position: missing (line 20)"},
         BadScene{"StepsOutOfOrder", "ur5", "at: 4 s", "at: 1 s",
@@ -344,7 +344,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "position limit (line 25)"},
         BadScene{"IndefiniteDamping", "panda", "damping: [20 N s/m, 20", "damping: [-20 N s/m, 20",
                  "scenario.steps: the controller refuses this: task_damping is not positive "
-                 "semidefinite (line 67)"},
+                 "semidefinite (line 66)"},
         BadScene{"EndBeforeBegin", "iiwa14", "end: 1.6 s", "end: 1.4 s",
                  "scenario.pushes[1].end: is not after begin (line 23)"},
         BadScene{"WrongLength", "iiwa14", "joint_displacement: [0.02, 0.02",
@@ -353,7 +353,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "all, is wanted (line 21)"},
         BadScene{"UnknownMethod", "panda", "method: rk4", "method: rk5",
                  "simulation.integrator.method: semi_implicit_euler, rk4, dormand_prince, "
-                 "implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 26)"},
+                 "implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 25)"},
         BadScene{"MassNotDefinite", "chain3", "[[8, 0, 0]", "[[-8, 0, 0]",
                  "system: mass: is not positive definite"},
         BadScene{"WallOfASystem", "chain3", "scenario:", "simulation: {wall: {}}\nscenario:",
