@@ -49,7 +49,8 @@ class HostileTicks {
   static controller::Settings everything_on(const controller::RobotModel& model) {
     controller::Settings settings = controller::default_settings(model);
     settings.feed_forward = {true, true, true, true, true};
-    settings.analysis = {controller::Analysis::Where::kInline, 100, 0.1};
+    settings.analysis.where = controller::Analysis::Where::kInline;
+    settings.analysis.every = 100;
     return settings;
   }
 
