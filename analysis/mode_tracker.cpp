@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
 
@@ -17,6 +18,8 @@ constexpr double kLastStep = 1e-7;
 /// Below this, nothing but rounding errors is left to improve.
 constexpr double kConverged = 1e-11;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// A change of the coefficients that none is as small as.
+constexpr double kNothing = -1;
 /// Squared error of an extrapolation, relative to that of a simpler one, that makes it worth using.
 constexpr double kForeseen = 0.25;
 /// Blocks are balanced again when their columns lean this much towards each other.
@@ -89,6 +92,36 @@ void copy(const PaddedRows& from, int columns, PaddedRows& to) {
   std::copy_n(from.items.begin(), columns * from.width, to.items.begin());
 }
 
+/// The parts that say something, of n joints.
+void copy(const TrackedSpectrum& from, int n, bool shapes, TrackedSpectrum& to) {
+  to.status = from.status;
+  to.origin = from.origin;
+  to.mode_count = from.mode_count;
+  to.lineage = from.lineage;
+  to.zero_mode_count = from.zero_mode_count;
+  to.zero_mode_rates = from.zero_mode_rates;
+  to.by_frequency = from.by_frequency;
+  std::copy_n(from.modes.begin(), from.mode_count, to.modes.begin());
+  for (int i = 0; shapes && i < from.mode_count; ++i) {
+    const TrackedShapes& source = from.shapes[at(i)];
+    TrackedShapes& target = to.shapes[at(i)];
+    target.slope = source.slope;
+    for (std::size_t k = 0; k < 2; ++k) {
+      target.u[k].resize(n);
+      std::copy_n(source.u[k].data(), n, target.u[k].data());
+    }
+  }
+}
+
+/// Whether all coefficients agree to the last bit.
+bool identical(const StateForm& a, const StateForm& b) {
+  const auto same = [](const double* x, const double* y, int count) {
+    return std::memcmp(x, y, static_cast<std::size_t>(count) * sizeof(double)) == 0;
+  };
+  const int n = a.joints;
+  return same(a.M, b.M, n * n) && same(a.C, b.C, n * n) && same(a.W, b.W, a.strains * n);
+}
+
 void set_zero(int width, int columns, PaddedRows& rows) {
   rows.width = width;
   std::fill_n(rows.items.begin(), columns * width, 0.0);
@@ -130,14 +163,17 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out) 
     return out.status = Status::kWrongSize;
   }
   const StateForm form = state_form(system);
+  const StateForm last = state_form(last_);
+  const bool alike = has_basis_ && last.joints == form.joints && last.strains == form.strains &&
+                     last.factored == form.factored;
+  if (alike && identical(form, last) && reuse(form, 0, out)) return out.status;
   const bool symmetric = asymmetry(system.mass) == 0 && asymmetry(system.damping) == 0 &&
                          (form.factored || asymmetry(system.stiffness) == 0);
   if (!symmetric) return solve_directly(system, form, Fallback::kNotSymmetric, out);
   Fallback reason = Fallback::kStart;
-  const StateForm last = state_form(last_);
-  if (has_basis_ && last.joints == form.joints && last.strains == form.strains &&
-      last.factored == form.factored) {
-    if (reuse(form, out)) return out.status;
+  if (alike) {
+    const double change = distance(form, last, sizes_, options_.reuse_tolerance);
+    if (reuse(form, change, out)) return out.status;
     if (follow(form, out, reason)) {
       last_.mass = system.mass;
       last_.damping = system.damping;
@@ -163,6 +199,7 @@ bool ModeTracker::publish(const StateForm& form, double distance, double target,
   const double worst = worst_bound(out);
   if (!(worst <= target) || out.status != Status::kOk) return false;
   soft_ = soft;
+  if (fresh) kept_for_ = kNothing;
   out.lineage = lineage_;
   out.origin = fresh ? SpectrumOrigin::kTracked : SpectrumOrigin::kReused;
   if (fresh) bound_ = worst;
@@ -175,10 +212,25 @@ bool ModeTracker::publish(const StateForm& form, double distance, double target,
   return true;
 }
 
-bool ModeTracker::reuse(const StateForm& form, TrackedSpectrum& out) noexcept {
-  const double change = distance(form, state_form(last_), sizes_, options_.reuse_tolerance);
-  if (!(change <= options_.reuse_tolerance)) return false;
-  if (!publish(form, change, std::max(options_.target_bound, 2 * bound_), false, out)) return false;
+/// With the bounds that were proved when it was first used again, if the system has not changed
+/// more than these allow for; else proves them for all that may be reused, or at least for this
+/// one.
+bool ModeTracker::reuse(const StateForm& form, double change, TrackedSpectrum& out) noexcept {
+  const double tolerance = options_.reuse_tolerance;
+  if (!(change <= tolerance)) return false;
+  if (!(change <= kept_for_)) {
+    const double target = std::max(options_.target_bound, 2 * bound_);
+    kept_for_ = change > 0 ? tolerance : 0;
+    if (!publish(form, kept_for_, target, false, kept_)) {
+      kept_for_ = kNothing;
+      if (!(change > 0) || !publish(form, change, target, false, out)) return false;
+      ++counters_.reused;
+      return true;
+    }
+  } else if (!options_.shapes) {
+    ++counters_.shapes_skipped;
+  }
+  copy(kept_, form.joints, options_.shapes, out);
   ++counters_.reused;
   return true;
 }
