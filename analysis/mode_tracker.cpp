@@ -70,20 +70,14 @@ void form_stiffness(System<kMaxDof>& system) {
   system.has_tails = true;
 }
 
-double squared_norm(const PaddedRows& rows, int columns) {
-  Lanes sum{};
-  for (int k = 0; k < columns * rows.width; k += 4) {
-    const Lanes x = load(&rows.items[at(k)]);
-    sum += x * x;
-  }
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+double sum(const Lanes& x) {
+  return (x[0] + x[1]) + (x[2] + x[3]);
 }
 
-/// out = a + sign b
-void add(const PaddedRows& a, double sign, const PaddedRows& b, int columns, PaddedRows& out) {
-  out.width = a.width;
+/// a += b
+void add(const PaddedRows& b, int columns, PaddedRows& a) {
   for (int k = 0; k < columns * a.width; k += 4) {
-    store(&out.items[at(k)], load(&a.items[at(k)]) + sign * load(&b.items[at(k)]));
+    store(&a.items[at(k)], load(&a.items[at(k)]) + load(&b.items[at(k)]));
   }
 }
 
@@ -242,7 +236,7 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   copy(basis_.Z, columns, before_.Z);
   if (predicting_) {
     ++counters_.predicted;
-    add(E_, 1, prediction_, columns, E_);
+    add(prediction_, columns, E_);
     copy(prediction_, columns, step_);
   } else {
     set_zero(width, columns, step_);
@@ -263,31 +257,44 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   return true;
 }
 
-/// Extrapolates the steps of the last three updates by that polynomial that would have foreseen
-/// this one best: degree 1, degree 0, or no step at all.
+/// Extrapolates the steps of the last updates by that polynomial that would have foreseen this one
+/// best: degree 2, 1, 0, or no step at all.
 void ModeTracker::learn_step() noexcept {
-  const int columns = basis_.columns();
-  add(step_, -1, last_step_, columns, prediction_);  // what this step had over the last one
-  add(prediction_, -1, last_change_, columns, work_);
-  const double by_nothing = squared_norm(step_, columns);
-  const double by_step = squared_norm(prediction_, columns);
-  const double by_change = squared_norm(work_, columns);
-  copy(prediction_, columns, last_change_);
-  copy(step_, columns, last_step_);
-  const bool steady = by_change < kForeseen * by_step;
-  predicting_ = std::min(by_step, by_change) < kForeseen * by_nothing;
+  const int columns = basis_.columns(), width = basis_.Z.width;
+  for (PaddedRows* rows : {&prediction_, &last_step_, &last_change_, &last_curve_}) {
+    rows->width = width;
+  }
+  Lanes by_nothing{}, by_step{}, by_change{}, by_curve{};
+  for (int k = 0; k < columns * width; k += 4) {
+    const Lanes step = load(&step_.items[at(k)]);
+    const Lanes change = step - load(&last_step_.items[at(k)]);
+    const Lanes curve = change - load(&last_change_.items[at(k)]);
+    const Lanes rest = curve - load(&last_curve_.items[at(k)]);
+    by_nothing += step * step;
+    by_step += change * change;
+    by_change += curve * curve;
+    by_curve += rest * rest;
+    store(&last_step_.items[at(k)], step);
+    store(&last_change_.items[at(k)], change);
+    store(&last_curve_.items[at(k)], curve);
+  }
+  const double none = sum(by_nothing), first = sum(by_step), second = sum(by_change),
+               third = sum(by_curve);
+  predicting_ = std::min({first, second, third}) < kForeseen * none;
   if (!predicting_) return;
-  if (steady) {
-    add(step_, 1, prediction_, columns, prediction_);
-  } else {
-    copy(step_, columns, prediction_);
+  const double change = std::min(second, third) < kForeseen * first ? 1 : 0;
+  const double curve = change != 0 && third < kForeseen * second ? 1 : 0;
+  for (int k = 0; k < columns * width; k += 4) {
+    store(&prediction_.items[at(k)], load(&last_step_.items[at(k)]) +
+                                         change * load(&last_change_.items[at(k)]) +
+                                         curve * load(&last_curve_.items[at(k)]));
   }
 }
 
 void ModeTracker::forget_steps() noexcept {
-  set_zero(basis_.Z.width, basis_.columns(), step_);
-  set_zero(basis_.Z.width, basis_.columns(), last_step_);
-  set_zero(basis_.Z.width, basis_.columns(), last_change_);
+  for (PaddedRows* rows : {&step_, &last_step_, &last_change_, &last_curve_}) {
+    set_zero(basis_.Z.width, basis_.columns(), *rows);
+  }
   predicting_ = false;
 }
 
@@ -301,7 +308,7 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     evaluate(form, basis_, defect_);
     double size = 0;
     const Conflict conflict = newton_step(basis_, defect_, certificate_.noise, E_, size);
-    add(step_, 1, E_, columns, step_);
+    add(E_, columns, step_);
     if (!(size < 1)) return false;
     if (!conflict && size <= kLastStep &&
         publish(form, 0, size <= kConverged ? kInfinity : options_.target_bound, true, out)) {

@@ -134,9 +134,9 @@ class ModeTracker {
   TrackedSpectrum kept_;  ///< the last spectrum with bounds that hold for changes up to kept_for_,
   double kept_for_ = -1;  ///< see distance(); none if negative
 
-  // Extrapolation: the whole step of this update so far, that of the last one, what that had over
-  // the one before, and what is expected next.
-  PaddedRows step_, last_step_, last_change_, prediction_;
+  // Extrapolation: the whole step of this update so far, that of the last one and its first two
+  // differences from those before, and what is expected next.
+  PaddedRows step_, last_step_, last_change_, last_curve_, prediction_;
   bool predicting_ = false;
   bool turned_ = false;  ///< columns were rotated or parted: the step tells nothing
 
