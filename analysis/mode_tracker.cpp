@@ -318,7 +318,7 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     if (!conflict) continue;
     reason = Fallback::kCoincidence;
     turned_ = true;
-    if (!part_blocks(defect_, conflict, basis_)) return false;
+    if (!part_coinciding(defect_, basis_) && !part_blocks(defect_, conflict, basis_)) return false;
     ++counters_.repairs;
   }
   return false;
@@ -359,9 +359,10 @@ bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept 
     basis_ = before_;
     return false;
   }
-  if (has_places_) keep_places(form, before_, basis_);
   evaluate(form, basis_, defect_);
+  if (part_coinciding(defect_, basis_)) evaluate(form, basis_, defect_);
   balance(defect_, 0, basis_);
+  if (has_places_) keep_places(form, before_, basis_);
   sizes_ = coefficient_sizes(form);
   forget_steps();
   if (!has_places_) {

@@ -130,7 +130,7 @@ class ModeTracker {
   TrackedCertificate certificate_;
   PaddedRows E_;
   std::array<bool, kMaxDof> soft_{};
-  double bound_ = 0;  ///< its largest relative error bound
+  double bound_ = 0;      ///< its largest relative error bound
   TrackedSpectrum kept_;  ///< the last spectrum with bounds that hold for changes up to kept_for_,
   double kept_for_ = -1;  ///< see distance(); none if negative
 
