@@ -5,6 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 namespace dashpot::testing {
 namespace {
 
@@ -39,6 +42,20 @@ TEST(ArmPath, KeepsItsModesThroughTheStretchedSingularity) {
       arm_model(arm).dof() == 6 ? lead<6>(arm, scales) : lead<7>(arm, scales);
     }
   }
+}
+
+/// The tip's springs have as many rows as there are joints: nothing may turn them at once.
+TEST(ArmPath, OfSixJointsPassesASingularityBetweenTwoTicks) {
+  ArmLoop<6> loop(arm_model(arms()[2]), {});
+  const auto tracker = std::make_unique<analysis::ModeTracker>();
+  const auto spectrum = std::make_unique<analysis::TrackedSpectrum>();
+  for (int tick = 300; tick < 450; ++tick) {  // the elbow is stretched after tick 372
+    controller::JointVector q(6);
+    for (int i = 0; i < 6; ++i) q[i] = 0.2 * std::sin(2 * std::numbers::pi * tick / 2048 + i);
+    ASSERT_EQ(tracker->update(loop.at(q), *spectrum), analysis::Status::kOk);
+  }
+  EXPECT_EQ(tracker->counters().direct, 1);
+  EXPECT_LE(tracker->counters().most_passes, 4);
 }
 
 }  // namespace
