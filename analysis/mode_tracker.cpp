@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
 
@@ -17,6 +18,8 @@ constexpr double kLastStep = 1e-7;
 /// Below this, nothing but rounding errors is left to improve.
 constexpr double kConverged = 1e-11;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// A change of the coefficients that none is as small as.
+constexpr double kNothing = -1;
 /// Squared error of an extrapolation, relative to that of a simpler one, that makes it worth using.
 constexpr double kForeseen = 0.25;
 /// Blocks are balanced again when their columns lean this much towards each other.
@@ -67,26 +70,50 @@ void form_stiffness(System<kMaxDof>& system) {
   system.has_tails = true;
 }
 
-double squared_norm(const PaddedRows& rows, int columns) {
-  Lanes sum{};
-  for (int k = 0; k < columns * rows.width; k += 4) {
-    const Lanes x = load(&rows.items[at(k)]);
-    sum += x * x;
-  }
-  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+double sum(const Lanes& x) {
+  return (x[0] + x[1]) + (x[2] + x[3]);
 }
 
-/// out = a + sign b
-void add(const PaddedRows& a, double sign, const PaddedRows& b, int columns, PaddedRows& out) {
-  out.width = a.width;
+/// a += b
+void add(const PaddedRows& b, int columns, PaddedRows& a) {
   for (int k = 0; k < columns * a.width; k += 4) {
-    store(&out.items[at(k)], load(&a.items[at(k)]) + sign * load(&b.items[at(k)]));
+    store(&a.items[at(k)], load(&a.items[at(k)]) + load(&b.items[at(k)]));
   }
 }
 
 void copy(const PaddedRows& from, int columns, PaddedRows& to) {
   to.width = from.width;
   std::copy_n(from.items.begin(), columns * from.width, to.items.begin());
+}
+
+/// The parts that say something, of n joints.
+void copy(const TrackedSpectrum& from, int n, bool shapes, TrackedSpectrum& to) {
+  to.status = from.status;
+  to.origin = from.origin;
+  to.mode_count = from.mode_count;
+  to.lineage = from.lineage;
+  to.zero_mode_count = from.zero_mode_count;
+  to.zero_mode_rates = from.zero_mode_rates;
+  to.by_frequency = from.by_frequency;
+  std::copy_n(from.modes.begin(), from.mode_count, to.modes.begin());
+  for (int i = 0; shapes && i < from.mode_count; ++i) {
+    const TrackedShapes& source = from.shapes[at(i)];
+    TrackedShapes& target = to.shapes[at(i)];
+    target.slope = source.slope;
+    for (std::size_t k = 0; k < 2; ++k) {
+      target.u[k].resize(n);
+      std::copy_n(source.u[k].data(), n, target.u[k].data());
+    }
+  }
+}
+
+/// Whether all coefficients agree to the last bit.
+bool identical(const StateForm& a, const StateForm& b) {
+  const auto same = [](const double* x, const double* y, int count) {
+    return std::memcmp(x, y, static_cast<std::size_t>(count) * sizeof(double)) == 0;
+  };
+  const int n = a.joints;
+  return same(a.M, b.M, n * n) && same(a.C, b.C, n * n) && same(a.W, b.W, a.strains * n);
 }
 
 void set_zero(int width, int columns, PaddedRows& rows) {
@@ -130,14 +157,17 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out) 
     return out.status = Status::kWrongSize;
   }
   const StateForm form = state_form(system);
+  const StateForm last = state_form(last_);
+  const bool alike = has_basis_ && last.joints == form.joints && last.strains == form.strains &&
+                     last.factored == form.factored;
+  if (alike && identical(form, last) && reuse(form, 0, out)) return out.status;
   const bool symmetric = asymmetry(system.mass) == 0 && asymmetry(system.damping) == 0 &&
                          (form.factored || asymmetry(system.stiffness) == 0);
   if (!symmetric) return solve_directly(system, form, Fallback::kNotSymmetric, out);
   Fallback reason = Fallback::kStart;
-  const StateForm last = state_form(last_);
-  if (has_basis_ && last.joints == form.joints && last.strains == form.strains &&
-      last.factored == form.factored) {
-    if (reuse(form, out)) return out.status;
+  if (alike) {
+    const double change = distance(form, last, sizes_, options_.reuse_tolerance);
+    if (reuse(form, change, out)) return out.status;
     if (follow(form, out, reason)) {
       last_.mass = system.mass;
       last_.damping = system.damping;
@@ -163,6 +193,7 @@ bool ModeTracker::publish(const StateForm& form, double distance, double target,
   const double worst = worst_bound(out);
   if (!(worst <= target) || out.status != Status::kOk) return false;
   soft_ = soft;
+  if (fresh) kept_for_ = kNothing;
   out.lineage = lineage_;
   out.origin = fresh ? SpectrumOrigin::kTracked : SpectrumOrigin::kReused;
   if (fresh) bound_ = worst;
@@ -175,10 +206,25 @@ bool ModeTracker::publish(const StateForm& form, double distance, double target,
   return true;
 }
 
-bool ModeTracker::reuse(const StateForm& form, TrackedSpectrum& out) noexcept {
-  const double change = distance(form, state_form(last_), sizes_, options_.reuse_tolerance);
-  if (!(change <= options_.reuse_tolerance)) return false;
-  if (!publish(form, change, std::max(options_.target_bound, 2 * bound_), false, out)) return false;
+/// With the bounds that were proved when it was first used again, if the system has not changed
+/// more than these allow for; else proves them for all that may be reused, or at least for this
+/// one.
+bool ModeTracker::reuse(const StateForm& form, double change, TrackedSpectrum& out) noexcept {
+  const double tolerance = options_.reuse_tolerance;
+  if (!(change <= tolerance)) return false;
+  if (!(change <= kept_for_)) {
+    const double target = std::max(options_.target_bound, 2 * bound_);
+    kept_for_ = change > 0 ? tolerance : 0;
+    if (!publish(form, kept_for_, target, false, kept_)) {
+      kept_for_ = kNothing;
+      if (!(change > 0) || !publish(form, change, target, false, out)) return false;
+      ++counters_.reused;
+      return true;
+    }
+  } else if (!options_.shapes) {
+    ++counters_.shapes_skipped;
+  }
+  copy(kept_, form.joints, options_.shapes, out);
   ++counters_.reused;
   return true;
 }
@@ -190,7 +236,7 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   copy(basis_.Z, columns, before_.Z);
   if (predicting_) {
     ++counters_.predicted;
-    add(E_, 1, prediction_, columns, E_);
+    add(prediction_, columns, E_);
     copy(prediction_, columns, step_);
   } else {
     set_zero(width, columns, step_);
@@ -211,31 +257,44 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   return true;
 }
 
-/// Extrapolates the steps of the last three updates by that polynomial that would have foreseen
-/// this one best: degree 1, degree 0, or no step at all.
+/// Extrapolates the steps of the last updates by that polynomial that would have foreseen this one
+/// best: degree 2, 1, 0, or no step at all.
 void ModeTracker::learn_step() noexcept {
-  const int columns = basis_.columns();
-  add(step_, -1, last_step_, columns, prediction_);  // what this step had over the last one
-  add(prediction_, -1, last_change_, columns, work_);
-  const double by_nothing = squared_norm(step_, columns);
-  const double by_step = squared_norm(prediction_, columns);
-  const double by_change = squared_norm(work_, columns);
-  copy(prediction_, columns, last_change_);
-  copy(step_, columns, last_step_);
-  const bool steady = by_change < kForeseen * by_step;
-  predicting_ = std::min(by_step, by_change) < kForeseen * by_nothing;
+  const int columns = basis_.columns(), width = basis_.Z.width;
+  for (PaddedRows* rows : {&prediction_, &last_step_, &last_change_, &last_curve_}) {
+    rows->width = width;
+  }
+  Lanes by_nothing{}, by_step{}, by_change{}, by_curve{};
+  for (int k = 0; k < columns * width; k += 4) {
+    const Lanes step = load(&step_.items[at(k)]);
+    const Lanes change = step - load(&last_step_.items[at(k)]);
+    const Lanes curve = change - load(&last_change_.items[at(k)]);
+    const Lanes rest = curve - load(&last_curve_.items[at(k)]);
+    by_nothing += step * step;
+    by_step += change * change;
+    by_change += curve * curve;
+    by_curve += rest * rest;
+    store(&last_step_.items[at(k)], step);
+    store(&last_change_.items[at(k)], change);
+    store(&last_curve_.items[at(k)], curve);
+  }
+  const double none = sum(by_nothing), first = sum(by_step), second = sum(by_change),
+               third = sum(by_curve);
+  predicting_ = std::min({first, second, third}) < kForeseen * none;
   if (!predicting_) return;
-  if (steady) {
-    add(step_, 1, prediction_, columns, prediction_);
-  } else {
-    copy(step_, columns, prediction_);
+  const double change = std::min(second, third) < kForeseen * first ? 1 : 0;
+  const double curve = change != 0 && third < kForeseen * second ? 1 : 0;
+  for (int k = 0; k < columns * width; k += 4) {
+    store(&prediction_.items[at(k)], load(&last_step_.items[at(k)]) +
+                                         change * load(&last_change_.items[at(k)]) +
+                                         curve * load(&last_curve_.items[at(k)]));
   }
 }
 
 void ModeTracker::forget_steps() noexcept {
-  set_zero(basis_.Z.width, basis_.columns(), step_);
-  set_zero(basis_.Z.width, basis_.columns(), last_step_);
-  set_zero(basis_.Z.width, basis_.columns(), last_change_);
+  for (PaddedRows* rows : {&step_, &last_step_, &last_change_, &last_curve_}) {
+    set_zero(basis_.Z.width, basis_.columns(), *rows);
+  }
   predicting_ = false;
 }
 
@@ -249,7 +308,7 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     evaluate(form, basis_, defect_);
     double size = 0;
     const Conflict conflict = newton_step(basis_, defect_, certificate_.noise, E_, size);
-    add(step_, 1, E_, columns, step_);
+    add(E_, columns, step_);
     if (!(size < 1)) return false;
     if (!conflict && size <= kLastStep &&
         publish(form, 0, size <= kConverged ? kInfinity : options_.target_bound, true, out)) {
@@ -259,7 +318,7 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     if (!conflict) continue;
     reason = Fallback::kCoincidence;
     turned_ = true;
-    if (!part_blocks(defect_, conflict, basis_)) return false;
+    if (!part_coinciding(defect_, basis_) && !part_blocks(defect_, conflict, basis_)) return false;
     ++counters_.repairs;
   }
   return false;
@@ -300,9 +359,10 @@ bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept 
     basis_ = before_;
     return false;
   }
-  if (has_places_) keep_places(form, before_, basis_);
   evaluate(form, basis_, defect_);
+  if (part_coinciding(defect_, basis_)) evaluate(form, basis_, defect_);
   balance(defect_, 0, basis_);
+  if (has_places_) keep_places(form, before_, basis_);
   sizes_ = coefficient_sizes(form);
   forget_steps();
   if (!has_places_) {

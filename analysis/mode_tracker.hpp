@@ -104,7 +104,7 @@ class ModeTracker {
   const TrackerCounters& counters() const noexcept { return counters_; }
 
  private:
-  bool reuse(const StateForm& form, TrackedSpectrum& out) noexcept;
+  bool reuse(const StateForm& form, double change, TrackedSpectrum& out) noexcept;
   bool follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
   bool refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
   bool publish(const StateForm& form, double distance, double target, bool fresh,
@@ -130,11 +130,13 @@ class ModeTracker {
   TrackedCertificate certificate_;
   PaddedRows E_;
   std::array<bool, kMaxDof> soft_{};
-  double bound_ = 0;  ///< its largest relative error bound
+  double bound_ = 0;      ///< its largest relative error bound
+  TrackedSpectrum kept_;  ///< the last spectrum with bounds that hold for changes up to kept_for_,
+  double kept_for_ = -1;  ///< see distance(); none if negative
 
-  // Extrapolation: the whole step of this update so far, that of the last one, what that had over
-  // the one before, and what is expected next.
-  PaddedRows step_, last_step_, last_change_, prediction_;
+  // Extrapolation: the whole step of this update so far, that of the last one and its first two
+  // differences from those before, and what is expected next.
+  PaddedRows step_, last_step_, last_change_, last_curve_, prediction_;
   bool predicting_ = false;
   bool turned_ = false;  ///< columns were rotated or parted: the step tells nothing
 

@@ -6,8 +6,10 @@
 namespace dashpot::analysis {
 namespace {
 
-/// Up to this size a step is taken as it is.
+/// A step as large as this does not say what it seems to.
 constexpr double kSmallStep = 0.3;
+/// Up to this size it does no harm if it comes of rounding errors.
+constexpr double kTinyStep = 1e-6;
 
 std::size_t at(int i) {
   return static_cast<std::size_t>(i);
@@ -208,21 +210,25 @@ Conflict newton_step(const TrackedBasis& basis, const TrackedDefect& defect, dou
   }
   size = std::sqrt(squares[0] + squares[1] + squares[2] + squares[3]);
   Conflict conflict;
-  if (size < kSmallStep) return conflict;
+  if (size < kTinyStep) return conflict;
   double worst = 0;
+  bool left_out = false;
   for (int i = 0; i < basis.blocks(); ++i) {
     for (int j = 0; j < i; ++j) {
       const double step = std::max(block_norm(basis, E, i, j), block_norm(basis, E, j, i));
-      if (step < kSmallStep) continue;
+      if (step < kTinyStep) continue;
       const double coupling =
           std::max(block_norm(basis, defect.G, i, j), block_norm(basis, defect.G, j, i));
+      if (coupling > noise && step < kSmallStep) continue;
       only_orthonormalize(basis, defect.R, i, j, E);
       only_orthonormalize(basis, defect.R, j, i, E);
+      left_out = true;
       if (coupling <= noise || coupling < worst) continue;
       worst = coupling;
       conflict = {j, i};
     }
   }
+  if (!left_out) return conflict;
   size = 0;
   for (int i = 0; i < columns; ++i) {
     for (int j = 0; j < columns; ++j) size += E(i, j) * E(i, j);

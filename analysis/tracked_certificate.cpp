@@ -382,11 +382,13 @@ double distance(const StateForm& form, const StateForm& other, const Coefficient
     if (std::abs(form.M[k] - other.M[k]) > 2 * limit * sizes.mass * form.M[k]) return kInfinity;
   }
   double mass = 0, damping = 0, stiffness = 0;
+  std::array<double, kMaxDof> inverse{};
+  for (int k = 0; k < n; ++k) inverse[at(k)] = 1 / sizes.s[at(k)];
   // Changes relative to the sizes; zero by zero is no change.
   for (int j = 0; j < n; ++j) {
-    for (int i = 0; i < n; ++i) {
+    for (int i = 0; i <= j; ++i) {
       const int k = i + j * n;
-      const double unit = 1 / (sizes.s[at(i)] * sizes.s[at(j)]);
+      const double unit = inverse[at(i)] * inverse[at(j)];
       mass = std::max(mass, std::abs(form.M[k] - other.M[k]) * unit);
       damping = std::max(damping, std::abs(form.C[k] - other.C[k]) * unit);
       if (!form.factored) stiffness = std::max(stiffness, std::abs(form.W[k] - other.W[k]) * unit);

@@ -14,8 +14,9 @@ struct CoefficientSizes {
 CoefficientSizes coefficient_sizes(const StateForm& form) noexcept;
 
 /// How far two systems of the same sizes differ: the least d with |M - M'| <= d mass s s',
-/// |C - C'| <= d damping s s', and likewise for K or the columns of W. All entries are finite.
-/// Infinite as soon as it is seen to exceed `limit`.
+/// |C - C'| <= d damping s s', and likewise for K or the columns of W. All entries are finite, and
+/// of symmetric matrices the upper triangles are read. Infinite as soon as it is seen to exceed
+/// `limit`.
 double distance(const StateForm& form, const StateForm& other, const CoefficientSizes& sizes,
                 double limit) noexcept;
 

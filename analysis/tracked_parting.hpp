@@ -12,4 +12,10 @@ namespace dashpot::analysis {
 bool part_blocks(const TrackedDefect& defect, const Conflict& conflict,
                  TrackedBasis& basis) noexcept;
 
+/// Modes whose eigenvalues coincide share a space of which any orthonormal columns will do: gives
+/// each of them a plane that is orthogonal to the others', in the metric and in the energy, and as
+/// well conditioned as the space allows. What a direct solution has instead depends on rounding
+/// errors. `defect` is one of the basis; returns whether there were any such modes.
+bool part_coinciding(const TrackedDefect& defect, TrackedBasis& basis) noexcept;
+
 }  // namespace dashpot::analysis

@@ -1,7 +1,8 @@
 // The spectrum of a moving arm, call by call: a Panda whose joints swing by 0.5 rad, sampled at
 // 1 kHz, held by a Cartesian impedance (7 joints, 6 modes, one zero mode). `tracked` goes from
 // {M, C, W} to all modes with eigenvectors of both sides, frequencies, ratios and proved bounds;
-// `values_only` leaves out the eigenvectors; `reused` sees one system again and again. Beside them,
+// `values_only` leaves out the eigenvectors; `reused` sees one system again and again, and
+// `nearly_reused` one that trembles in the last digit. Beside them,
 // Eigen's fixed-size EigenSolver with right vectors and LAPACK's dgeev with both sides on the
 // 12 x 12 state matrices of the same path, which are formed outside the clock. `tracked_full` and
 // `eigen_full` (of run-time size) have n joints and n modes.
@@ -113,8 +114,14 @@ class Sweep {
   int at_ = 0, direction_ = 1;
 };
 
+enum class Input {
+  kMoving,
+  kFrozen,
+  kTrembling,  ///< in the last digit of one entry
+};
+
 void track(benchmark::State& state, const std::vector<System<kMaxDof>>& path,
-           const TrackerOptions& options, bool frozen) {
+           const TrackerOptions& options, Input input) {
   const auto tracker = std::make_unique<ModeTracker>(options);
   const auto spectrum = std::make_unique<TrackedSpectrum>();
   Sweep sweep(path);
@@ -122,8 +129,12 @@ void track(benchmark::State& state, const std::vector<System<kMaxDof>>& path,
   const TrackerCounters before = tracker->counters();
   const System<kMaxDof>* system = &sweep.next();
   tracker->update(*system, *spectrum);
+  std::array<System<kMaxDof>, 2> two{*system, *system};
+  two[1].mass(0, 0) *= 1 + 2e-16;
+  std::size_t which = 0;
   for (auto _ : state) {
-    if (!frozen) system = &sweep.next();
+    if (input == Input::kMoving) system = &sweep.next();
+    if (input == Input::kTrembling) system = &two[which = 1 - which];
     benchmark::DoNotOptimize(tracker->update(*system, *spectrum));
     benchmark::ClobberMemory();
   }
@@ -187,7 +198,7 @@ void add(const std::string& name, Function function) {
 void add_full(int n) {
   const std::string size = "/" + std::to_string(n);
   add("spectrum/tracked_full" + size,
-      [=](benchmark::State& state) { track(state, full_path(n), {}, false); });
+      [=](benchmark::State& state) { track(state, full_path(n), {}, Input::kMoving); });
   add("spectrum/eigen_full" + size,
       [=](benchmark::State& state) { eigen<MatrixXd>(state, full_path(n)); });
 }
@@ -203,10 +214,13 @@ int main(int argc, char** argv) {
     const double damping = ratio;
     const std::string end = suffix + "/6";
     add("spectrum/tracked" + end,
-        [=](auto& state) { track(state, panda_path(damping), {}, false); });
+        [=](auto& state) { track(state, panda_path(damping), {}, Input::kMoving); });
     add("spectrum/values_only" + end,
-        [=](auto& state) { track(state, panda_path(damping), values_only, false); });
-    add("spectrum/reused" + end, [=](auto& state) { track(state, panda_path(damping), {}, true); });
+        [=](auto& state) { track(state, panda_path(damping), values_only, Input::kMoving); });
+    add("spectrum/reused" + end,
+        [=](auto& state) { track(state, panda_path(damping), {}, Input::kFrozen); });
+    add("spectrum/nearly_reused" + end,
+        [=](auto& state) { track(state, panda_path(damping), {}, Input::kTrembling); });
     add("spectrum/path_eigen" + end,
         [=](auto& state) { eigen<Eigen::Matrix<double, 12, 12>>(state, panda_path(damping)); });
     add("spectrum/path_lapack" + end, [=](auto& state) { lapack(state, panda_path(damping)); });

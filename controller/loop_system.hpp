@@ -13,9 +13,10 @@ namespace dashpot::controller {
 ///     G' (L Q)'         the null space: with M = L L', Q (n x r) spans the free motions in energy
 ///                       coordinates, G G' = Q' L^-1 K_0 L^-T Q,
 ///     H'                K_q = H H'.
-/// As many rows as joints, or more, are turned into the one upper triangle with W' W = K. Q is that
-/// of the last tick, projected. Where the arm is nearly singular or gains change between two sets
-/// of held directions, N has no such Q, and sqrt(K_0) N stands for the null space.
+/// As many rows as joints, or more, are turned into the one upper triangle with W' W = K, but for
+/// those of the tip alone where these are as many. Q is that of the last tick, projected. Where the
+/// arm is nearly singular or gains change between two sets of held directions, N has no such Q, and
+/// sqrt(K_0) N stands for the null space.
 template <int N>
 class LoopSystem {
  public:
@@ -191,7 +192,7 @@ void LoopSystem<N>::form(const Dynamics<N>& robot, const Impedance<N>& impedance
   rows_.clear();
   JointSquare<N> C = impedance.joint_damping;
   for (int i = 0; i < N; ++i) C(i, i) += viscous_friction[i];
-  bool whole = false;  // the rows are upper triangular already
+  bool whole = false;  // the rows are fit as they are
   if (impedance.task_weight > 0) {
     add_tip_springs(robot.J, impedance.base, nullptr, base_);
     add_tip_springs(robot.J, impedance.tool, &robot.R_BT, tool_);
@@ -209,6 +210,8 @@ void LoopSystem<N>::form(const Dynamics<N>& robot, const Impedance<N>& impedance
     }
     rows_.grow(joint_.rows());
   }
+  // The tip's rows alone move smoothly through singularities, where a triangle's may turn at once.
+  whole |= rows_.size() == N && impedance.joint_weight == 0 && !impedance.null_space();
   if (rows_.size() >= N && !whole) rows_.triangularize();
 
   system.has_tails = false;

@@ -218,6 +218,7 @@ TEST(TrackedPath, ModesThatStayEqualAreReportedEqual) {
       EXPECT_NEAR(follower.mode(i).natural_frequency, i < 2 ? 20 : 6, 1e-5);
       EXPECT_NEAR(follower.mode(i).damping_ratio, zeta, 1e-5);
     }
+    EXPECT_GE(follower.counters().tracked, 290);
   }
 }
 

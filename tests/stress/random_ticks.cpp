@@ -1,10 +1,14 @@
 // Control ticks of a Panda at random states, one as little like the last as can be, with set-points
 // that move all the time: what instruction_count.sh counts.
-//     random_ticks joint|cartesian|blend TICKS
+//     random_ticks joint|cartesian|blend|modes|lost|still TICKS
 // Every 16th state is next to a singularity; `blend` changes gains, frame and mode at every tick.
+// The others find the modes in every tick: `modes` of a swinging arm, `lost` at random states,
+// where nothing can be followed and each tick ends in the direct solver, `still` of one that
+// trembles.
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/robot_model.hpp>
 
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <random>
@@ -19,9 +23,9 @@ namespace {
 
 using namespace dashpot::controller;  // NOLINT(google-build-using-namespace)
 
-Settings settings_for(const RobotModel& model) {
+Settings settings_for(const RobotModel& model, bool modes) {
   Settings settings = default_settings(model);
-  settings.analysis.where = Analysis::Where::kOff;
+  settings.analysis.where = modes ? Analysis::Where::kInline : Analysis::Where::kOff;
   settings.feed_forward.friction = true;
   settings.limits.velocity.setConstant(1e6);  // so that states may jump
   settings.motion.gain_time = 0.01;
@@ -35,7 +39,9 @@ int main(int argc, char** argv) {
   const std::string kind = argv[1];
   const RobotModel model = RobotModel::from_urdf_file(DASHPOT_SOURCE_DIR "/sim/models/panda.urdf",
                                                       "panda_link0", "panda_hand_tcp");
-  const Settings settings = settings_for(model);
+  const bool still = kind == "still", swinging = kind == "modes" || still;
+  const bool modes = swinging || kind == "lost";
+  const Settings settings = settings_for(model, modes);
   Controller controller(model, settings);
   std::mt19937_64 engine(351);
   const auto uniform = [&](double low, double high) {
@@ -55,7 +61,16 @@ int main(int argc, char** argv) {
       setpoint.joint_position[i] = uniform(limits.position_lower[i], limits.position_upper[i]);
       state.velocity[i] = uniform(-2, 2);
     }
-    if (k % 16 == 0) state.position[1] = state.position[2] = uniform(-1e-4, 1e-4);
+    if (swinging) {
+      for (Eigen::Index i = 0; i < 7; ++i) {
+        const double phase = (2 + 0.3 * static_cast<double>(i)) * (still ? 0 : 1e-3 * k);
+        const double middle = settings.limits.position_lower[i] + settings.limits.position_upper[i];
+        state.position[i] = 0.5 * middle + 0.4 * std::sin(phase + static_cast<double>(i));
+      }
+      if (still) state.position[0] *= 1 + 1e-16 * (k % 3);
+    } else if (k % 16 == 0) {
+      state.position[1] = state.position[2] = uniform(-1e-4, 1e-4);
+    }
     setpoint.time = state.time;
     setpoint.tip_pose.position = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
     if (kind == "blend") {
@@ -67,6 +82,14 @@ int main(int argc, char** argv) {
     worst = worse(worst, controller.update(state, setpoint, torque));
     end_of_tick();
   }
-  std::fprintf(stderr, "random_ticks %s: %s\n", kind.c_str(), to_text(worst));
+  std::fprintf(stderr, "random_ticks %s: %s", kind.c_str(), to_text(worst));
+  if (modes) {
+    const VibrationCounters& counters = controller.vibration().counters;
+    std::fprintf(stderr, "; modes tracked %llu, direct %llu, reused %llu",
+                 static_cast<unsigned long long>(counters.tracked),
+                 static_cast<unsigned long long>(counters.direct),
+                 static_cast<unsigned long long>(counters.reused + counters.unchanged));
+  }
+  std::fprintf(stderr, "\n");
   return worst <= Status::kNearJointLimit ? 0 : 1;
 }

@@ -1,0 +1,75 @@
+// Leads each arm of sim/models through its workspace, through its stretched singularity and back,
+// at 1 kHz, with its modes followed as in the controller's tick, and watches them:
+//     arm_stress [SECONDS]
+#include <dashpot/tests/support/arm_path.hpp>
+#include <dashpot/tests/support/enclosure.hpp>
+
+#include <cstdio>
+#include <cstdlib>
+
+namespace {
+
+using namespace dashpot::testing;  // NOLINT(google-build-using-namespace)
+using dashpot::analysis::Fallback;
+using dashpot::analysis::TrackerCounters;
+
+void print(const char* arm, const GainScales& scales, const TrackerCounters& c, const ModeWatch& w,
+           const Verdict& all) {
+  std::printf(
+      "%-12s %4g %4g | %6lld %6lld %5lld | %5lld %4lld %4lld | %4.2f %4d %4lld | %4.2f %7.1e | "
+      "%7ld "
+      "%4ld | %7ld %5ld %4ld %4ld %4ld | %7.1e\n",
+      arm, scales.damping, scales.null_space, static_cast<long long>(c.updates),
+      static_cast<long long>(c.tracked), static_cast<long long>(c.direct),
+      static_cast<long long>(c.of(Fallback::kStart)),
+      static_cast<long long>(c.of(Fallback::kNotConverged)),
+      static_cast<long long>(c.of(Fallback::kCoincidence)),
+      static_cast<double>(c.passes) / static_cast<double>(c.updates), c.most_passes,
+      static_cast<long long>(c.repairs), all.tightest, all.widest, w.separated, w.lost, w.foreseen,
+      w.finer, w.paired_anew, w.veered, w.unexplained, w.largest_change);
+}
+
+template <int N>
+bool lead(const Arm& arm, const GainScales& scales, long ticks) {
+  const auto watched = std::make_unique<WatchedArm<N>>(arm_model(arm), scales, arm.file);
+  Verdict all;
+  for (long tick = 0; tick <= ticks; ++tick) {
+    watched->step(static_cast<double>(tick) / static_cast<double>(ticks));
+    if (tick % 20 != 0) continue;
+    const Verdict verdict = judge<long double>(watched->system(), watched->spectrum(), 0);
+    all.enclosed = all.enclosed && verdict.enclosed;
+    all.tightest = std::max(all.tightest, verdict.tightest);
+    all.widest = std::max(all.widest, verdict.widest);
+  }
+  const ModeWatch& w = watched->watch();
+  print(arm.file, scales, watched->counters(), w, all);
+  const bool good = all.enclosed && w.lost == 0 && w.unexplained == 0 && w.not_numbers == 0 &&
+                    w.bounds_missing == 0 && watched->counters().failed == 0;
+  if (!good) {
+    std::printf("  NOT GOOD: enclosed %d, not a number %ld, without bound %ld\n", all.enclosed,
+                w.not_numbers, w.bounds_missing);
+  }
+  return good;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const long ticks = 1000 * (argc > 1 ? std::atol(argv[1]) : 20);
+  std::printf(
+      "Damping and null space: multiples of the default gains. Modes: identity decided by the "
+      "eigenvalues,\nlost; damping ratio from tick to tick within bounds and derivative, or so "
+      "with "
+      "finer steps,\nreal eigenvalues paired anew, veered within a tick, unexplained, largest "
+      "change.\n"
+      "arm          damp null |  ticks track. dir.  | start jump coin | pass most part | err/ "
+      "widest  |"
+      "  apart  lost |  deriv. finer pair veer unex | change\n");
+  bool good = true;
+  for (const Arm& arm : arms()) {
+    for (const GainScales& scales : {GainScales{1, 1}, GainScales{0.1, 0}, GainScales{3, 1}}) {
+      good &= arm_model(arm).dof() == 6 ? lead<6>(arm, scales, ticks) : lead<7>(arm, scales, ticks);
+    }
+  }
+  return good ? 0 : 1;
+}

@@ -1,0 +1,255 @@
+#pragma once
+// The arms of sim/models on their way through the workspace, through the stretched singularity, and
+// back, at 1 kHz, with their modes followed and watched.
+
+#include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/controller/impedance.hpp>
+#include <dashpot/controller/loop_system.hpp>
+#include <dashpot/controller/settings.hpp>
+#include <dashpot/tests/support/arms.hpp>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+namespace dashpot::testing {
+
+/// Joint positions at the share t of the way, 0 to 1: every joint swings, and the elbow goes from
+/// bent over stretched (at 0.25 and 0.75) to bent the other way, and back. Stretched arms are
+/// singular: the Panda and the Baxter, whose links are offset, to 1e-4 or so, the others exactly.
+inline controller::JointVector arm_way(const std::string& arm, double t) {
+  const bool panda = arm == "panda", ur5 = arm == "ur5", baxter = arm == "baxter_left";
+  const int elbow = ur5 ? 2 : 3;
+  const double stretched = panda ? -0.447676721 : baxter ? 0.1672256 : 0;  // rad
+  const double bent = panda || !(ur5 || baxter) ? -1.9 : 1.5;
+  controller::JointVector q(ur5 ? 6 : 7);
+  if (ur5) {
+    q << 0.2, -1.1, 0, -1.3, 1.2, 0.3;
+  } else if (baxter) {
+    q << -0.3, -0.4, 0.2, 0, 0.3, 0.9, 0.2;
+  } else {
+    q << 0.1, 0.5, 0.2, 0, 0.3, 1.2, 0.4;
+  }
+  const double angle = 2 * std::numbers::pi * t;
+  for (int i = 0; i < static_cast<int>(q.size()); ++i) {
+    q[i] += 0.3 * (std::sin((1 + i % 3) * angle + i) - std::sin(i));
+  }
+  const double share = t == 0.25 || t == 0.75 ? 0 : std::cos(angle);
+  q[elbow] = stretched + (bent - stretched) * share;
+  return q;
+}
+
+/// Of an arm's default gains: what their damping is multiplied with, and the springs and dampers of
+/// the null space, which are not there for 0.
+struct GainScales {
+  double damping = 1, null_space = 1;
+};
+
+/// The closed loop of an arm of N joints in the form in which the controller follows it.
+template <int N>
+class ArmLoop {
+ public:
+  ArmLoop(const controller::RobotModel& model, const GainScales& scales)
+      : kernel_(model),
+        friction_(controller::fixed<N>(model.joint_values(&controller::Joint::damping))) {
+    controller::Setpoint setpoint = controller::default_settings(model).initial;
+    setpoint.mode = controller::Mode::kCartesian;
+    setpoint.gains.task_damping *= scales.damping;
+    setpoint.gains.null_stiffness *= scales.null_space;
+    setpoint.gains.null_damping *= scales.damping * scales.null_space;
+    impedance_ = controller::Impedance<N>::of(setpoint);
+  }
+
+  const analysis::System<analysis::kMaxDof>& at(const controller::JointVector& q) {
+    const controller::Joints<N> rest = controller::Joints<N>::Zero();
+    kernel_.evaluate(controller::fixed<N>(q), rest, robot_);
+    null_space_.compute(robot_.M, robot_.J, impedance_.base, impedance_.tool, robot_.R_BT);
+    loop_.form(robot_, impedance_, null_space_, friction_, system_);
+    return system_;
+  }
+
+ private:
+  controller::DynamicsKernel<N> kernel_;
+  controller::Joints<N> friction_;
+  controller::Impedance<N> impedance_;
+  controller::NullSpace<N> null_space_;
+  controller::LoopSystem<N> loop_;
+  controller::Dynamics<N> robot_;
+  analysis::System<analysis::kMaxDof> system_;
+};
+
+/// What is wrong with the modes of a tick, or odd.
+struct ModeWatch {
+  long modes = 0;        ///< compared with those of the tick before; soft ones are not
+  long separated = 0;    ///< whose identity the eigenvalues alone decide
+  long lost = 0;         ///< of these, those that were given another place
+  long foreseen = 0;     ///< damping ratio within bounds and derivative
+  long finer = 0;        ///< within them on a way of finer steps
+  long paired_anew = 0;  ///< of real eigenvalues that go together in another way
+  long veered = 0;       ///< exchanged with another mode within the tick
+  long unexplained = 0;
+  long not_numbers = 0, bounds_missing = 0;
+  double largest_change = 0;  ///< of a damping ratio from tick to tick
+};
+
+/// Follows the modes of one arm and compares each tick with the one before.
+template <int N>
+class WatchedArm {
+ public:
+  using System = analysis::System<analysis::kMaxDof>;
+
+  WatchedArm(const controller::RobotModel& model, const GainScales& scales, std::string name)
+      : name_(std::move(name)), loop_(model, scales), tracker_(options()) {}
+
+  /// Up to the share t of the way.
+  void step(double t) {
+    before_ = now_;
+    before_system_ = system_;
+    const ArmLoop<N> loop_before = loop_;
+    *tracker_before_ = tracker_;
+    advance(t);
+    if (ticks_++ > 0) compare(loop_before, t);
+    t_ = t;
+  }
+
+  const System& system() const { return system_; }
+  const analysis::TrackedSpectrum& spectrum() const { return now_; }
+  const analysis::TrackerCounters& counters() const { return tracker_.counters(); }
+  const ModeWatch& watch() const { return watch_; }
+
+ private:
+  static analysis::TrackerOptions options() {
+    analysis::TrackerOptions options;
+    options.soft_frequency = 0.1;
+    return options;
+  }
+  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+  void advance(double t) {
+    system_ = loop_.at(arm_way(name_, t));
+    tracker_.update(system_, now_);
+  }
+
+  void compare(const ArmLoop<N>& loop_before, double t);
+  /// Another place that holds what this mode was, as far as its eigenvalues tell.
+  bool given_away(int i, bool& separated) const;
+  /// Damping ratio within the bounds of both spectra and the change that their derivative foresees.
+  bool foreseen(int i, const analysis::TrackedSpectrum& from, const System& from_system,
+                const analysis::TrackedSpectrum& to, const System& to_system) const;
+  bool explained_by_finer_steps(int i, const ArmLoop<N>& loop_before, double t);
+
+  std::string name_;
+  ArmLoop<N> loop_;
+  analysis::ModeTracker tracker_;
+  std::unique_ptr<analysis::ModeTracker> tracker_before_ =
+      std::make_unique<analysis::ModeTracker>(options());
+  System system_, before_system_;
+  analysis::TrackedSpectrum now_, before_;
+  ModeWatch watch_;
+  double t_ = 0;
+  long ticks_ = 0;
+};
+
+template <int N>
+void WatchedArm<N>::compare(const ArmLoop<N>& loop_before, double t) {
+  using analysis::ModeKind;
+  if (now_.mode_count != before_.mode_count || now_.lineage != before_.lineage) return;
+  for (int i = 0; i < now_.mode_count; ++i) {
+    const analysis::ModeNumbers &was = before_.modes[at(i)], &is = now_.modes[at(i)];
+    if (!std::isfinite(is.error_bound)) ++watch_.bounds_missing;
+    if (was.kind == ModeKind::kSoft || is.kind == ModeKind::kSoft) continue;
+    if (std::isnan(is.damping_ratio) || std::isnan(is.natural_frequency)) {
+      ++watch_.not_numbers;
+      continue;
+    }
+    ++watch_.modes;
+    bool separated = false;
+    const bool lost = given_away(i, separated);
+    watch_.separated += separated ? 1 : 0;
+    watch_.lost += lost ? 1 : 0;
+    const double change = std::abs(is.damping_ratio - was.damping_ratio);
+    watch_.largest_change = std::max(watch_.largest_change, change);
+    if (foreseen(i, before_, before_system_, now_, system_)) {
+      ++watch_.foreseen;
+    } else if (explained_by_finer_steps(i, loop_before, t)) {
+      ++watch_.finer;
+    } else if (was.eigenvalues[0].imag() == 0 || is.eigenvalues[0].imag() == 0) {
+      ++watch_.paired_anew;
+    } else if (!separated) {
+      ++watch_.veered;
+    } else {
+      ++watch_.unexplained;
+    }
+  }
+}
+
+template <int N>
+bool WatchedArm<N>::given_away(int i, bool& separated) const {
+  const analysis::Complex was = before_.modes[at(i)].eigenvalues[0];
+  double nearest = 1e300, second = 1e300;
+  int place = -1;
+  for (int j = 0; j < now_.mode_count; ++j) {
+    const double apart = std::abs(now_.modes[at(j)].eigenvalues[0] - was);
+    if (apart < nearest) {
+      second = nearest;
+      nearest = apart;
+      place = j;
+    } else {
+      second = std::min(second, apart);
+    }
+  }
+  const bool real = was.imag() == 0 || now_.modes[at(place)].eigenvalues[0].imag() == 0;
+  separated = !real && second > 4 * nearest;
+  return separated && place != i;
+}
+
+template <int N>
+bool WatchedArm<N>::foreseen(int i, const analysis::TrackedSpectrum& from,
+                             const System& from_system, const analysis::TrackedSpectrum& to,
+                             const System& to_system) const {
+  using Matrix = Eigen::MatrixXd;
+  const Matrix M = to_system.mass - from_system.mass, C = to_system.damping - from_system.damping;
+  const Matrix W = to_system.stiffness_factor, V = from_system.stiffness_factor;
+  const Matrix K = W.transpose() * (W - V) + (W - V).transpose() * V;
+  const analysis::ModeNumbers &was = from.modes[at(i)], &is = to.modes[at(i)];
+  analysis::Complex sum = 0, product = 1;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const auto& u = from.shapes[at(i)].u[k];
+    const analysis::Complex z = was.eigenvalues[k];
+    const Eigen::VectorXcd change = z * z * (M * u) + z * (C * u) + K * u;
+    const analysis::Complex moved = (u.transpose() * change).value();
+    const analysis::Complex there = z - moved / from.shapes[at(i)].slope[k];
+    sum += there;
+    product *= there;
+  }
+  const double predicted = -0.5 * sum.real() / std::sqrt(product.real());
+  const double bounds = was.damping_ratio_bound + is.damping_ratio_bound;
+  const double rate = std::abs(predicted - was.damping_ratio);
+  return std::abs(is.damping_ratio - predicted) <= bounds + 0.2 * rate + 1e-6;
+}
+
+template <int N>
+bool WatchedArm<N>::explained_by_finer_steps(int i, const ArmLoop<N>& loop_before, double t) {
+  for (const int parts : {16, 256, 4096}) {
+    ArmLoop<N> loop = loop_before;
+    const auto tracker = std::make_unique<analysis::ModeTracker>(*tracker_before_);
+    const auto from = std::make_unique<analysis::TrackedSpectrum>(before_);
+    const auto to = std::make_unique<analysis::TrackedSpectrum>(before_);
+    System from_system = before_system_;
+    bool smooth = true;
+    for (int part = 1; part <= parts && smooth; ++part) {
+      const double share = static_cast<double>(part) / parts;
+      const System system = loop.at(arm_way(name_, part == parts ? t : t_ + share * (t - t_)));
+      tracker->update(system, *to);
+      smooth = foreseen(i, *from, from_system, *to, system);
+      *from = *to;
+      from_system = system;
+    }
+    const analysis::ModeNumbers &fine = to->modes[at(i)], &is = now_.modes[at(i)];
+    const double apart = std::abs(fine.damping_ratio - is.damping_ratio);
+    if (smooth && apart <= fine.damping_ratio_bound + is.damping_ratio_bound + 1e-9) return true;
+  }
+  return false;
+}
+
+}  // namespace dashpot::testing
