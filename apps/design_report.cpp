@@ -44,6 +44,26 @@ Json gradient_values(const DesignReport& report, const analysis::ModeSensitivity
   return result;
 }
 
+Json to_value(const LoopReport& report) {
+  const analysis::SampledLoop& loop = report.limit.loop;
+  Json modes = Json::array();
+  for (const analysis::SampledMode& mode : report.sampled.modes) {
+    modes.push_back({{"natural_frequency", mode.natural_frequency},
+                     {"damping_ratio", mode.damping_ratio},
+                     {"damped_frequency", mode.damped_frequency},
+                     {"kind", analysis::to_text(mode.kind)}});
+  }
+  return {{"period", loop.period},
+          {"delay", loop.delay},
+          {"cutoff", loop.torque_cutoff},
+          {"difference_velocity", loop.difference_velocity},
+          {"margin", report.limit.gain_margin},
+          {"gain_margin", report.gain_margin},
+          {"level", report.level},
+          {"spectral_radius", report.sampled.spectral_radius},
+          {"modes", modes}};
+}
+
 Json to_value(const DesignReport& report) {
   Json before = report_json(report.before), after = report_json(report.after);
   Json misses = Json::array();
@@ -58,6 +78,7 @@ Json to_value(const DesignReport& report) {
                  {"modes", after["modes"]},
                  {"before", before},
                  {"after", after}};
+  if (report.loop) result["loop"] = to_value(*report.loop);
   if (!report.sensitivities.empty()) {
     Json list = Json::array();
     for (const analysis::ModeSensitivity& by : report.sensitivities) {
@@ -97,6 +118,10 @@ std::string mode_table(const DesignReport& report) {
   table.add_column(Align::kPoint, {"after", "rad/s"});
   table.add_column(Align::kPoint, {"", "ratio"});
   table.add_column(Align::kLeft, {"", "kind"});
+  if (report.loop) {
+    table.add_column(Align::kPoint, {"sampled", "rad/s"});
+    table.add_column(Align::kPoint, {"", "ratio"});
+  }
   for (int i = 0; i < std::max(before.size(), after.size()); ++i) {
     std::vector<std::string> row = {std::to_string(i + 1)};
     for (const auto* modes : {&before, &after}) {
@@ -105,17 +130,40 @@ std::string mode_table(const DesignReport& report) {
       row.push_back(there ? format_number((*modes)[i].damping_ratio, 6) : "");
     }
     row.emplace_back(i < after.size() ? analysis::to_text(after[i].kind) : "");
+    if (report.loop) {
+      const auto& modes = report.loop->sampled.modes;
+      const auto at = static_cast<std::size_t>(i);
+      row.push_back(at < modes.size() ? format_number(modes[at].natural_frequency, 6) : "");
+      row.push_back(at < modes.size() ? format_number(modes[at].damping_ratio, 6) : "");
+    }
     table.add_row(std::move(row));
   }
   return table.text();
 }
 
+std::string loop_text(const DesignReport& report) {
+  const LoopReport& loop = *report.loop;
+  if (loop.level == 1) {
+    return "  Springs and damping may grow by a factor of " + format_number(loop.gain_margin, 3) +
+           " together before the loop is unstable.\n";
+  }
+  return "  The loop bears " + format_number(loop.level * report.ratio, 6) + " instead of " +
+         format_number(report.ratio, 3) + ": with more damping, a gain margin of " +
+         format_number(loop.limit.gain_margin, 3) + " is lost.\n";
+}
+
 std::string miss_text(const DesignReport& report) {
-  if (report.design.misses.empty()) {
-    return "  Every mode has a damping ratio of " + format_number(report.ratio, 3) + ".\n";
+  const double ratio = report.ratio * (report.loop ? report.loop->level : 1);
+  const auto misses = [](const DampingMiss& miss) {
+    return miss.reason != DampingMiss::Reason::kLoop;
+  };
+  if (std::none_of(report.design.misses.begin(), report.design.misses.end(), misses)) {
+    return "  Every mode has a damping ratio of " +
+           format_number(ratio, ratio < report.ratio ? 6 : 3) + ".\n";
   }
   std::string text;
   for (const DampingMiss& miss : report.design.misses) {
+    if (!misses(miss)) continue;
     text += "  Mode " + std::to_string(miss.mode + 1) +
             " misses: " + format_number(miss.obtained, 6) + " instead of " +
             format_number(miss.wanted, 6);
@@ -131,6 +179,8 @@ std::string miss_text(const DesignReport& report) {
         break;
       case DampingMiss::Reason::kCoupling:
         text += "; no exact matrix was found beside what is there already.\n";
+        break;
+      case DampingMiss::Reason::kLoop:
         break;
     }
   }
@@ -182,6 +232,7 @@ std::string design_table(const std::vector<DesignReport>& reports, bool as_list)
     if (as_list) text += "[" + std::to_string(i) + "] ";
     text += report.key + "\n" + matrix_text(report.design.damping) + "\n";
     for (const std::string& note : report.notes) text += "  Note: " + note + "\n";
+    if (report.loop) text += loop_text(report);
     text += miss_text(report);
     if (!report.after.spectrum.modes.empty()) text += "\n" + mode_table(report);
     if (!report.sensitivities.empty()) text += sensitivity_text(report);
