@@ -15,7 +15,8 @@ namespace dashpot::controller {
 
 /// The controller's core for N joints, known at compile time. One tick, in `update`:
 ///     state -> StateCheck -> DynamicsKernel -> set-point, paths and gains -> HeldDamping
-///           -> ImpedanceLaw -> SafetyFilter -> torque;   and with these gains -> LoopSystem -> VibrationAnalysis
+///           -> ImpedanceLaw -> SafetyFilter -> torque;   and with these gains -> LoopSystem ->
+///           VibrationAnalysis
 template <int N>
 class FixedCore final : public ControllerCore {
  public:
@@ -116,6 +117,7 @@ FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
                               TipPath(twist, T, window)};
       }()),
       gains_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
+      held_(fixed<N>(model.joint_values(&Joint::damping))),
       wrench_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
       law_(model, settings.feed_forward),
       filter_(settings.limits, settings.period),
