@@ -8,6 +8,7 @@
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -39,7 +40,7 @@ Found design_one(const SystemEntry& entry, const DesignOptions& options) {
   if (!options.period) return {analysis::design_damping(given, target, structure, start), {}};
   analysis::LoopLimit limit = options.limit;
   limit.loop.period = *options.period;
-  if (given.damping) limit.loop.friction = *given.damping;
+  limit.loop.friction = entry.friction;
   analysis::SampledDamping found = analysis::design_damping(given, target, limit, structure, start);
   if (!found.kept) {
     const std::string where =
@@ -125,6 +126,13 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
   }
 }
 
+void write_file(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw std::runtime_error(path + ": cannot write");
+}
+
 void run(const DesignOptions& options) try {
   SystemFile file;
   if (options.arm.urdf.empty()) {
@@ -134,6 +142,7 @@ void run(const DesignOptions& options) try {
   }
   if (options.region) {
     const RegionReport report = report_on_region(file, options);
+    if (!options.csv.empty()) write_file(options.csv, region_csv(report));
     print(options.json ? region_json(report) : region_table(report));
     return;
   }

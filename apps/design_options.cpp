@@ -46,6 +46,14 @@ void add_arm(CLI::App& command, ArmOptions& arm) {
   add("--q", arm.q, "Joint positions, rad or m", "a,b,... (0)");
   add("--task-stiffness", arm.task_stiffness, "Diagonal of it, N/m and N m/rad", "x,y,z,rx,ry,rz");
   add("--task-damping", arm.task_damping, "Diagonal of the one before", "x,y,z,rx,ry,rz");
+  add("--viscous-friction", arm.viscous_friction, "In the joints, N m s/rad; urdf: the file's",
+      "a,b,...|x|urdf (0)");
+  add("--null-damping", arm.null_damping, "Of the motions that the task leaves free, N m s/rad",
+      "a,b,...|x (0)");
+  add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
+      "a,b,...|x (0)");
+  add("--payload", arm.payload, "Mass at the tip, kg, and its center in the tip's axes, m",
+      "m[,x,y,z] (0)");
 }
 
 void add_loop(CLI::App& command, DesignOptions& options) {
@@ -103,6 +111,8 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
       .add_option("--largest-ratio", options.largest_ratio, "With --region: no mode may have more")
       ->check(positive("a positive ratio"))
       ->option_text("R (1 or 1.5 Z)");
+  command.add_option("--csv", options.csv, "With --region: write the map of the worst mode there")
+      ->option_text("FILE");
   command.add_option("--threads", options.threads, "With --region; 0: one for each processor")
       ->check(CLI::Range(0, 1024))
       ->option_text("N (0)");
@@ -124,9 +134,8 @@ void check(const DesignOptions& options) {
   if (!arm.urdf.empty() && (arm.base.empty() || arm.tip.empty())) {
     throw InputError("--urdf", "needs --base and --tip");
   }
-  const bool idle = !arm.base.empty() || !arm.tip.empty() || !arm.q.empty() ||
-                    !arm.task_stiffness.empty() || !arm.task_damping.empty();
-  if (arm.urdf.empty() && idle) throw InputError("--urdf", "missing, but wanted by other options");
+  if (arm.urdf.empty() && arm.any())
+    throw InputError("--urdf", "missing, but wanted by other options");
   if (options.near && options.region) throw InputError("--near", "does not go with --region");
   if (options.largest_ratio && !options.region) {
     throw InputError("--largest-ratio", "needs --region");
@@ -134,6 +143,7 @@ void check(const DesignOptions& options) {
   if (options.largest_ratio && *options.largest_ratio < options.ratio) {
     throw InputError("--largest-ratio", "is below --damping-ratio");
   }
+  if (!options.csv.empty() && !options.region) throw InputError("--csv", "needs --region");
   const analysis::LoopLimit& limit = options.limit;
   const bool loop = limit.loop.delay > 0 || limit.loop.torque_cutoff > 0 ||
                     limit.loop.difference_velocity || limit.gain_margin != 2;

@@ -19,6 +19,7 @@ struct DesignOptions {
   analysis::LoopLimit limit;     ///< but for the period
   std::optional<double> largest_ratio;
   int threads = 0;
+  std::string csv;  ///< where the map of the region goes; nowhere if empty
   bool near = false;
   bool region = false;
   bool sensitivity = false;

@@ -1,4 +1,5 @@
 #include <dashpot/apps/design_report.hpp>
+#include <dashpot/apps/design_trends.hpp>
 #include <dashpot/apps/json_writer.hpp>
 #include <dashpot/apps/matrix_json.hpp>
 #include <dashpot/apps/text_table.hpp>
@@ -7,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 namespace dashpot::apps {
 namespace {
@@ -28,20 +30,6 @@ Json to_value(const DampingMiss& miss) {
           {"obtained", miss.obtained},
           {"missed_by", miss.obtained - miss.wanted},
           {"reason", analysis::to_text(miss.reason)}};
-}
-
-/// Gradients by the entries of M, C_C and K_C; C and K without a jacobian.
-Json gradient_values(const DesignReport& report, const analysis::ModeSensitivity& by,
-                     MatrixXd analysis::ModeGradient::*number) {
-  const auto& J = report.impedance.jacobian;
-  Json result = {{"mass", json_rows(by.mass.*number)},
-                 {"damping", json_rows(by.damping.*number)},
-                 {"stiffness", json_rows(by.stiffness.*number)}};
-  if (J) {
-    result["task_damping"] = json_rows(analysis::task_gradient(*J, by.damping.*number));
-    result["task_stiffness"] = json_rows(analysis::task_gradient(*J, by.stiffness.*number));
-  }
-  return result;
 }
 
 Json to_value(const LoopReport& report) {
@@ -79,17 +67,7 @@ Json to_value(const DesignReport& report) {
                  {"before", before},
                  {"after", after}};
   if (report.loop) result["loop"] = to_value(*report.loop);
-  if (!report.sensitivities.empty()) {
-    Json list = Json::array();
-    for (const analysis::ModeSensitivity& by : report.sensitivities) {
-      list.push_back(
-          {{"regular", by.regular},
-           {"damping_ratio", gradient_values(report, by, &analysis::ModeGradient::damping_ratio)},
-           {"natural_frequency",
-            gradient_values(report, by, &analysis::ModeGradient::natural_frequency)}});
-    }
-    result["sensitivity"] = list;
-  }
+  if (!report.sensitivities.empty()) result["sensitivity"] = sensitivity_json(report);
   return result;
 }
 
@@ -192,29 +170,6 @@ std::string miss_text(const DesignReport& report) {
   return text;
 }
 
-/// Percent by which each ratio changes when a diagonal entry grows by one percent.
-std::string sensitivity_text(const DesignReport& report) {
-  const MatrixXd& damping = report.design.damping;
-  TextTable table;
-  table.add_column(Align::kRight, {"mode"});
-  for (Index i = 0; i < damping.rows(); ++i) {
-    table.add_column(Align::kPoint, {"entry " + std::to_string(i + 1)});
-  }
-  for (std::size_t k = 0; k < report.sensitivities.size(); ++k) {
-    const analysis::Mode<>& mode = report.after.spectrum.modes[static_cast<int>(k)];
-    MatrixXd G = report.sensitivities[k].damping.damping_ratio;
-    if (report.impedance.jacobian) G = analysis::task_gradient(*report.impedance.jacobian, G);
-    std::vector<std::string> row = {std::to_string(k + 1)};
-    for (Index i = 0; i < damping.rows(); ++i) {
-      const double part = G(i, i) * damping(i, i) / mode.damping_ratio;
-      row.push_back(format_number(std::abs(part) < 5e-4 ? 0 : part, 3));
-    }
-    table.add_row(std::move(row));
-  }
-  return "\n  Percent that the ratio changes by, for one percent of a diagonal entry\n" +
-         table.text();
-}
-
 }  // namespace
 
 std::string design_json(const std::vector<DesignReport>& reports, bool as_list) {
@@ -291,6 +246,18 @@ std::string region_table(const RegionReport& report) {
                    std::to_string(sample.soft_modes)});
   }
   return text + "\n" + table.text();
+}
+
+std::string region_csv(const RegionReport& report) {
+  std::ostringstream text;
+  text.precision(17);
+  text << "configuration,worst_mode,natural_frequency,damping_ratio,largest_ratio,soft_modes\n";
+  for (std::size_t i = 0; i < report.design.samples.size(); ++i) {
+    const analysis::RegionSample& sample = report.design.samples[i];
+    text << i << ',' << sample.worst_mode << ',' << sample.natural_frequency << ','
+         << sample.damping_ratio << ',' << sample.largest_ratio << ',' << sample.soft_modes << '\n';
+  }
+  return text.str();
 }
 
 }  // namespace dashpot::apps

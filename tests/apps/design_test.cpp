@@ -143,6 +143,26 @@ TEST(Design, OfARegionMapsTheWorstMode) {
   EXPECT_THAT(table.err, IsEmpty());
 }
 
+TEST(Design, WritesTheMapOfARegion) {
+  const std::string list = "[{mass: [[1]], stiffness: [[4]]}, {mass: [[4]], stiffness: [[4]]}]";
+  const Scratch scratch;
+  const std::string path = scratch.path("map.csv");
+  const Json result = design_json(list, "0.5", {"--region", "--csv", path});
+  std::ifstream file(path);
+  std::string heading, line;
+  std::getline(file, heading);
+  EXPECT_THAT(heading, StartsWith("configuration,worst_mode,natural_frequency,damping_ratio"));
+  for (const Json& sample : result["samples"]) {
+    std::getline(file, line);
+    EXPECT_THAT(line, HasSubstr("," + sample["damping_ratio"].dump().substr(0, 12)));
+  }
+  EXPECT_FALSE(std::getline(file, line));
+  const Outcome nowhere = design_text(list, "0.5", {"--region", "--csv", "/nowhere/map.csv"});
+  EXPECT_EQ(nowhere.status, 1);
+  EXPECT_THAT(nowhere.out, IsEmpty());
+  EXPECT_THAT(design_text(list, "0.5", {"--csv", path}).err, HasSubstr("--csv: needs --region"));
+}
+
 TEST(Design, GivesSensitivitiesOnRequest) {
   const Json result = design_json(baxter(), "0.7", {"--sensitivity"});
   ASSERT_EQ(result["sensitivity"].size(), 5U);
