@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <complex>
 
 namespace dashpot::tests {
 namespace {
@@ -63,7 +64,8 @@ std::vector<double> ratios(const controller::ModelOptions& options, const Matrix
   A.bottomLeftCorner(7, 7) = -inverse * J.transpose() * K_C * J;
   A.bottomRightCorner(7, 7) = -inverse * (J.transpose() * C_C * J + D);
   std::vector<double> result;
-  for (const auto& value : Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues()) {
+  const Eigen::VectorXcd values = Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues();
+  for (const std::complex<double>& value : values) {
     if (value.imag() > 1) result.push_back(-value.real() / std::abs(value));
   }
   return result;
