@@ -110,7 +110,7 @@ TEST(HeldBesideFriction, TakesOffWhatFrictionDampsAlready) {
       const bool redundant = model.dof() > 6;
       const double worst = worst_ratio(led, model.dof() - (redundant ? 1 : 0));
       std::printf("%s: ratios off by up to %.2g\n", arm.file, worst);
-      EXPECT_LT(worst, redundant ? 0.01 : 1e-6) << arm.file;
+      EXPECT_LT(worst, redundant ? 2e-3 : 1e-6) << arm.file;
     }
   }
 }
@@ -129,7 +129,7 @@ TEST(HeldBesideFriction, IsSemidefiniteWhereFrictionIsTooMuch) {
 
 TEST(HeldInJoints, HoldsTheRatioAlongAPathOfEveryArm) {
   for (const testing::Arm& arm : testing::arms()) {
-    for (const double friction : {0.0, 2.0}) {
+    for (const double friction : {0.0, 0.5}) {
       const RobotModel model = rubbing(arm, friction);
       Led led(model, plain_settings(model, Mode::kJoint));
       EXPECT_LT(worst_ratio(led, model.dof()), 1e-6) << arm.file << ", friction " << friction;
