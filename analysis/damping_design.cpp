@@ -141,6 +141,8 @@ const char* to_text(DampingMiss::Reason reason) noexcept {
       return "structure";
     case DampingMiss::Reason::kCoupling:
       return "coupling";
+    case DampingMiss::Reason::kLoop:
+      return "loop";
   }
   return "unknown";
 }

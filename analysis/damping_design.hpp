@@ -16,6 +16,7 @@ struct DampingMiss {
     kOverdone,   ///< what is there already damps some direction more than is wanted
     kStructure,  ///< no matrix of the structure asked for was found that gives it
     kCoupling,   ///< what is there already couples modes, and no exact matrix was found
+    kLoop,       ///< period and delay of the loop do not bear more (damping_sampled.hpp)
   };
   int mode = 0;                  ///< index in the spectrum
   double natural_frequency = 0;  ///< rad/s

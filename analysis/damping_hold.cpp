@@ -1,4 +1,6 @@
 #include <dashpot/analysis/damping_hold.hpp>
+#include <dashpot/analysis/modal_damping.hpp>
+#include <dashpot/analysis/semidefinite_cholesky.hpp>
 
 #include <cmath>
 #include <limits>
@@ -10,7 +12,6 @@ namespace {
 using PairedRow = DampingHold::PairedRow;
 using PairedRows = DampingHold::PairedRows;
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 constexpr std::size_t kDirections = kTaskDirections;
 constexpr std::size_t kLanes = 4;
 /// Cosines between columns below this are squared by the sweep that has seen them.
@@ -23,11 +24,13 @@ double& entry(PairedRow& row, std::size_t column) {
   return column < 3 ? row.left[column] : row.right[column - 3];
 }
 
-/// Rows of L^-1 J' F for n = Joints; false unless M is positive definite.
+template <std::size_t Joints>
+using LowerTriangle = std::array<std::array<double, Joints>, Joints>;  // by columns
+
+/// L and the rows of L^-1 J' F for n = Joints; false unless M is positive definite.
 template <std::size_t Joints>
 bool scaled_rows(const double* M, Eigen::Index stride, const double* J, const PairedRows& F,
-                 std::array<PairedRow, Joints>& A) noexcept {
-  std::array<std::array<double, Joints>, Joints> L;  // by columns
+                 LowerTriangle<Joints>& L, std::array<PairedRow, Joints>& A) noexcept {
   for (std::size_t j = 0; j < Joints; ++j) {
     const double* const column = M + static_cast<Eigen::Index>(j) * stride;
     for (std::size_t i = j; i < Joints; ++i) L[j][i] = column[i];
@@ -111,12 +114,41 @@ double sweep(std::array<PairedRow, Joints>& A, PairedRows& B) noexcept {
   return std::max(std::max(worst[0], worst[1]), worst[2]);
 }
 
-/// Sweeps until the columns are orthogonal; their lengths are the frequencies.
+/// (L^-T A)' diag(d) L^-T A, of which the upper triangle is computed; A is overwritten by L^-T A.
 template <std::size_t Joints>
-Status frequencies(const double* M, Eigen::Index stride, const double* J, PairedRows& B,
-                   std::array<double, kDirections>& omega) noexcept {
+void task_friction(const LowerTriangle<Joints>& L, const double* d,
+                   std::array<PairedRow, Joints>& A, TaskMatrix& G) noexcept {
+  G.setZero();
+  for (std::size_t i = Joints; i-- > 0;) {
+    PairedRow row = A[i];
+    for (std::size_t k = i + 1; k < Joints; ++k) {
+      for (std::size_t l = 0; l < kLanes; ++l) {
+        row.left[l] -= L[i][k] * A[k].left[l];
+        row.right[l] -= L[i][k] * A[k].right[l];
+      }
+    }
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      row.left[l] /= L[i][i];
+      row.right[l] /= L[i][i];
+    }
+    A[i] = row;
+    for (std::size_t q = 0; q < kDirections; ++q) {
+      const double scaled = d[i] * entry(row, q);
+      for (std::size_t p = 0; p <= q; ++p) {
+        G(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(q)) += scaled * entry(row, p);
+      }
+    }
+  }
+}
+
+/// Sweeps until the columns are orthogonal; their lengths are the frequencies. With friction d (n),
+/// also G = (L^-T A)' diag(d) L^-T A of these columns.
+template <std::size_t Joints>
+Status frequencies(const double* M, Eigen::Index stride, const double* J, const double* d,
+                   PairedRows& B, std::array<double, kDirections>& omega, TaskMatrix& G) noexcept {
   std::array<PairedRow, Joints> A;
-  if (!scaled_rows<Joints>(M, stride, J, B, A)) return Status::kMassNotPositiveDefinite;
+  LowerTriangle<Joints> L;
+  if (!scaled_rows<Joints>(M, stride, J, B, L, A)) return Status::kMassNotPositiveDefinite;
   double worst = 1;
   for (int count = 0; !(worst <= kConverged * kConverged); ++count) {
     if (count == kMaxSweeps) return Status::kNotConverged;
@@ -130,11 +162,12 @@ Status frequencies(const double* M, Eigen::Index stride, const double* J, Paired
     }
   }
   for (std::size_t i = 0; i < kDirections; ++i) omega[i] = std::sqrt(entry(squares, i));
+  if (d != nullptr) task_friction<Joints>(L, d, A, G);
   return Status::kOk;
 }
 
-using Frequencies = Status (*)(const double*, Eigen::Index, const double*, PairedRows&,
-                               std::array<double, kDirections>&) noexcept;
+using Frequencies = Status (*)(const double*, Eigen::Index, const double*, const double*,
+                               PairedRows&, std::array<double, kDirections>&, TaskMatrix&) noexcept;
 
 template <std::size_t... I>
 constexpr std::array<Frequencies, sizeof...(I)> frequencies_table(std::index_sequence<I...>) {
@@ -142,6 +175,32 @@ constexpr std::array<Frequencies, sizeof...(I)> frequencies_table(std::index_seq
 }
 
 constexpr auto kFrequencies = frequencies_table(std::make_index_sequence<kMaxDof>());
+
+/// B R B' for what friction, with its G, leaves to do.
+Status damping_beside_friction(const PairedRows& B, const std::array<double, kDirections>& omega,
+                               const DampingTarget& target, double soft, const TaskMatrix& G,
+                               TaskMatrix& out, bool& overdone) noexcept {
+  Vector<kMaxDof> frequencies(kTaskDirections);
+  Square<kMaxDof> R(kTaskDirections, kTaskDirections);
+  TaskMatrix rows;
+  for (Eigen::Index j = 0; j < kTaskDirections; ++j) {
+    frequencies[j] = omega[static_cast<std::size_t>(j)];
+    for (Eigen::Index i = 0; i <= j; ++i) {
+      const double size = omega[static_cast<std::size_t>(i)] * omega[static_cast<std::size_t>(j)];
+      R(i, j) = R(j, i) = size > 0 ? G(i, j) / size : 0;
+    }
+    PairedRow row = B[static_cast<std::size_t>(j)];
+    for (std::size_t k = 0; k < kDirections; ++k) {
+      rows(j, static_cast<Eigen::Index>(k)) = entry(row, k);
+    }
+  }
+  const Status status = missing_damping(frequencies, target, soft, R, overdone);
+  if (status != Status::kOk) return status;
+  const TaskMatrix half = rows.lazyProduct(TaskMatrix(R));
+  const TaskMatrix whole = half.lazyProduct(rows.transpose());
+  out = 0.5 * (whole + whole.transpose());
+  return Status::kOk;
+}
 
 /// B diag(weight) B', of which one half is computed.
 void weighted_square(const PairedRows& B, const std::array<double, kDirections>& weight,
@@ -170,23 +229,8 @@ void weighted_square(const PairedRows& B, const std::array<double, kDirections>&
 
 Status DampingHold::set_stiffness(const TaskMatrix& K_C) noexcept {
   if (!K_C.allFinite()) return Status::kNotFinite;
-  // Cholesky; a pivot that cannot be told from zero ends its column, the rest of which then has to
-  // be zero too.
-  TaskMatrix F = TaskMatrix::Zero();
-  for (Eigen::Index j = 0; j < kTaskDirections; ++j) {
-    const double rounding = 16 * kTaskDirections * kEps * std::abs(K_C(j, j));
-    const double pivot = K_C(j, j) - F.row(j).head(j).squaredNorm();
-    if (pivot < -rounding) return Status::kStiffnessIndefinite;
-    const bool zero = pivot <= rounding;
-    for (Eigen::Index i = j; i < kTaskDirections; ++i) {
-      const double rest = K_C(i, j) - F.row(i).head(j).dot(F.row(j).head(j));
-      if (!zero) F(i, j) = rest / std::sqrt(pivot);
-      // |rest|^2 <= pivot_i pivot_j for a semidefinite matrix
-      if (zero && rest * rest > 64 * rounding * std::abs(K_C(i, i))) {
-        return Status::kStiffnessIndefinite;
-      }
-    }
-  }
+  TaskMatrix F;
+  if (!semidefinite_cholesky(K_C, F)) return Status::kStiffnessIndefinite;
   for (std::size_t i = 0; i < kDirections; ++i) {
     for (std::size_t j = 0; j < kDirections; ++j) {
       entry(factor_[i], j) = F(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
@@ -201,10 +245,13 @@ template <int N>
 Status DampingHold::update(const Square<N>& M, const TaskJacobian<N>& J, TaskMatrix& C_C) noexcept {
   const Eigen::Index n = M.rows();
   if (n == 0 || n > kMaxDof || M.cols() != n || J.cols() != n) return Status::kWrongSize;
+  const bool friction = friction_.size() > 0;
+  if (friction && friction_.size() != n) return Status::kWrongSize;
   PairedRows B = updates_ < kFreshStart ? rotated_ : factor_;
   std::array<double, kDirections> omega, weight;
-  const Status status =
-      kFrequencies[static_cast<std::size_t>(n - 1)](M.data(), M.outerStride(), J.data(), B, omega);
+  TaskMatrix G;
+  Status status = kFrequencies[static_cast<std::size_t>(n - 1)](
+      M.data(), M.outerStride(), J.data(), friction ? friction_.data() : nullptr, B, omega, G);
   if (status != Status::kOk) return status;
   double fastest = 0;
   for (const double value : omega) {
@@ -212,8 +259,14 @@ Status DampingHold::update(const Square<N>& M, const TaskJacobian<N>& J, TaskMat
     fastest = std::max(fastest, value);
   }
   const double soft = target_.soft_limit(fastest);
-  for (std::size_t i = 0; i < kDirections; ++i) weight[i] = target_.damper(omega[i], soft);
-  weighted_square(B, weight, C_C);
+  overdone_ = false;
+  if (friction) {
+    status = damping_beside_friction(B, omega, target_, soft, G, C_C, overdone_);
+    if (status != Status::kOk) return status;
+  } else {
+    for (std::size_t i = 0; i < kDirections; ++i) weight[i] = target_.damper(omega[i], soft);
+    weighted_square(B, weight, C_C);
+  }
   updates_ = updates_ < kFreshStart ? updates_ + 1 : 0;
   rotated_ = B;
   frequencies_ = omega;

@@ -34,6 +34,12 @@ using TaskJacobian =
 /// |C_C| <= 2 max(zeta) kPeak |K_C| / soft_frequency, whatever the singularity.
 /// Directions that K_C leaves free, or that no joint moves, get no damping.
 ///
+/// With viscous friction D = diag(d) in the joints, what that does already is taken off:
+///     C_C = F U R U' F',    R as in modal_damping.hpp,
+/// is exact for six joints and directions; a redundant arm's friction couples vibrations with its
+/// free motions besides, and the ratios are then right to first order in that coupling. Where
+/// friction is more than is wanted, C_C is the nearest semidefinite matrix, and `overdone` says so.
+///
 /// Fewer task directions: leave rows of J and K_C zero. Nothing here allocates or throws, and the
 /// work is bounded; each step starts from the rotations of the last one, which changes the result
 /// by rounding only.
@@ -44,6 +50,9 @@ class DampingHold {
   void set_target(const DampingTarget& target) noexcept { target_ = target; }
   const DampingTarget& target() const noexcept { return target_; }
 
+  /// d, n, N m s/rad, not negative; without entries: none.
+  void set_friction(const Vector<kMaxDof>& friction) noexcept { friction_ = friction; }
+
   /// Factors K_C; of it only the lower triangle is read. On kStiffnessIndefinite or kNotFinite the
   /// stiffness before stays.
   Status set_stiffness(const TaskMatrix& K_C) noexcept;
@@ -52,6 +61,9 @@ class DampingHold {
   /// `C_C` keeps its value. kNotConverged cannot be excluded, but was never seen.
   template <int N>
   Status update(const Square<N>& M, const TaskJacobian<N>& J, TaskMatrix& C_C) noexcept;
+
+  /// Whether friction was too much for the target at the last good update.
+  bool overdone() const noexcept { return overdone_; }
 
   /// Undamped frequencies of the last good update, rad/s, in no order; zero ones of directions
   /// without stiffness or motion included.
@@ -67,6 +79,8 @@ class DampingHold {
 
  private:
   DampingTarget target_;
+  Vector<kMaxDof> friction_;
+  bool overdone_ = false;
   PairedRows factor_{};   // F
   PairedRows rotated_{};  // F U of the last update
   int updates_ = 0;       // since rotated_ was F

@@ -1,4 +1,5 @@
-#include <dashpot/apps/design_arm.hpp>
+#include <dashpot/analysis/damping_sampled.hpp>
+#include <dashpot/apps/design_options.hpp>
 #include <dashpot/apps/design_report.hpp>
 #include <dashpot/apps/subcommands.hpp>
 #include <dashpot/apps/system_file.hpp>
@@ -6,69 +7,61 @@
 
 #include <unistd.h>
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <map>
+#include <fstream>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace dashpot::apps {
 namespace {
 
-using analysis::DampingStructure;
-
-struct Options {
-  std::string file;
-  ArmOptions arm;  // instead of a file
-  double ratio = 0;
-  std::string structure = "full";
-  double soft_frequency = analysis::DampingTarget().soft_frequency;  // rad/s
-  std::optional<double> largest_ratio;
-  int threads = 0;
-  bool near = false;
-  bool region = false;
-  bool sensitivity = false;
-  bool json = false;
-};
-
-const std::map<std::string, DampingStructure>& structures() {
-  static const std::map<std::string, DampingStructure> all = {
-      {"full", DampingStructure::kFull},
-      {"block", DampingStructure::kBlock},
-      {"diagonal", DampingStructure::kDiagonal}};
-  return all;
-}
-
-analysis::DampingTarget target_of(const Options& options) {
-  analysis::DampingTarget target = analysis::DampingTarget::constant(options.ratio);
-  target.soft_frequency = options.soft_frequency;
-  return target;
-}
-
 std::string key_of(const analysis::TaskImpedance& impedance) {
   return impedance.jacobian ? "task_damping" : "damping";
 }
 
-analysis::DampingDesign design_one(const SystemEntry& entry, const Options& options) {
+/// The damping for one system, and what the loop makes of it where that counts.
+struct Found {
+  analysis::DampingDesign design;
+  std::optional<LoopReport> loop;
+};
+
+Found design_one(const SystemEntry& entry, const DesignOptions& options) {
   const analysis::TaskImpedance& given = entry.impedance;
-  const DampingStructure structure = structures().at(options.structure);
-  if (!options.near) {
-    return analysis::design_damping(given, target_of(options), structure);
-  }
-  if (!given.jacobian || !given.task_damping) {
+  const analysis::DampingStructure structure = options.damping_structure();
+  if (options.near && (!given.jacobian || !given.task_damping)) {
     throw InputError(entry.prefix + "task_damping", "missing; --near stays near it");
   }
-  return analysis::design_damping(given, target_of(options), structure, given.task_damping);
+  const auto start = options.near ? given.task_damping : std::nullopt;
+  const analysis::DampingTarget target = options.target();
+  if (!options.period) return {analysis::design_damping(given, target, structure, start), {}};
+  analysis::LoopLimit limit = options.limit;
+  limit.loop.period = *options.period;
+  limit.loop.friction = entry.friction;
+  analysis::SampledDamping found = analysis::design_damping(given, target, limit, structure, start);
+  if (!found.kept) {
+    const std::string where =
+        entry.prefix.empty() ? "" : entry.prefix.substr(0, entry.prefix.size() - 1) + ": ";
+    throw std::runtime_error(where + "no damping ratio up to " + format_number(options.ratio, 3) +
+                             " keeps a gain margin of " + format_number(limit.gain_margin, 3) +
+                             " with this period and delay; the largest margin is " +
+                             format_number(found.gain_margin, 3) + ", with a ratio of " +
+                             format_number(found.level * options.ratio, 3));
+  }
+  return {std::move(found.design),
+          LoopReport{limit, found.level, found.gain_margin, std::move(found.sampled)}};
 }
 
-DesignReport report_on(const SystemEntry& entry, const Options& options) try {
+DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) try {
   DesignReport report;
   report.key = key_of(entry.impedance);
   report.ratio = options.ratio;
-  report.design = design_one(entry, options);
+  Found found = design_one(entry, options);
+  report.design = std::move(found.design);
+  report.loop = std::move(found.loop);
   report.impedance = analysis::with_damping(entry.impedance, report.design.damping);
   analysis::SpectrumOptions spectrum;
   spectrum.soft_frequency = options.soft_frequency;
@@ -98,7 +91,7 @@ void show_progress(double done) {
   std::fprintf(stderr, done < 1 ? "\r%3.0f %%" : "\r     \r", 100 * done);
 }
 
-RegionReport report_on_region(const SystemFile& file, const Options& options) {
+RegionReport report_on_region(const SystemFile& file, const DesignOptions& options) {
   if (file.entries.empty()) throw InputError("", "lists no configurations");
   std::vector<analysis::TaskImpedance> configurations;
   for (const SystemEntry& entry : file.entries) {
@@ -119,8 +112,8 @@ RegionReport report_on_region(const SystemFile& file, const Options& options) {
     configurations.push_back(impedance);
   }
   analysis::RegionOptions region;
-  region.target = target_of(options);
-  region.structure = structures().at(options.structure);
+  region.target = options.target();
+  region.structure = options.damping_structure();
   region.ceiling = options.largest_ratio;
   region.threads = options.threads;
   if (isatty(STDERR_FILENO) != 0) region.progress = show_progress;
@@ -133,27 +126,14 @@ RegionReport report_on_region(const SystemFile& file, const Options& options) {
   }
 }
 
-void check(const Options& options) {
-  if (options.file.empty() == options.arm.urdf.empty()) {
-    throw InputError("FILE", "give a file, or --urdf with --base and --tip");
-  }
-  const ArmOptions& arm = options.arm;
-  if (!arm.urdf.empty() && (arm.base.empty() || arm.tip.empty())) {
-    throw InputError("--urdf", "needs --base and --tip");
-  }
-  const bool idle = !arm.base.empty() || !arm.tip.empty() || !arm.q.empty() ||
-                    !arm.task_stiffness.empty() || !arm.task_damping.empty();
-  if (arm.urdf.empty() && idle) throw InputError("--urdf", "missing, but wanted by other options");
-  if (options.near && options.region) throw InputError("--near", "does not go with --region");
-  if (options.largest_ratio && !options.region) {
-    throw InputError("--largest-ratio", "needs --region");
-  }
-  if (options.largest_ratio && *options.largest_ratio < options.ratio) {
-    throw InputError("--largest-ratio", "is below --damping-ratio");
-  }
+void write_file(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw std::runtime_error(path + ": cannot write");
 }
 
-void run(const Options& options) try {
+void run(const DesignOptions& options) try {
   SystemFile file;
   if (options.arm.urdf.empty()) {
     file = read_systems(options.file);
@@ -162,6 +142,7 @@ void run(const Options& options) try {
   }
   if (options.region) {
     const RegionReport report = report_on_region(file, options);
+    if (!options.csv.empty()) write_file(options.csv, region_csv(report));
     print(options.json ? region_json(report) : region_table(report));
     return;
   }
@@ -173,69 +154,21 @@ void run(const Options& options) try {
   throw error.in_file(options.file);
 }
 
-/// Fails for text that is not a positive number; `what` says what is wanted.
-CLI::Validator positive(const std::string& what) {
-  return CLI::Validator(
-      [what](const std::string& text) -> std::string {
-        char* end = nullptr;
-        const double value = std::strtod(text.c_str(), &end);
-        const bool good = end != text.c_str() && *end == '\0' && std::isfinite(value) && value > 0;
-        return good ? "" : what + " is wanted, not '" + text + "'";
-      },
-      "");
-}
-
 constexpr const char* kHelp =
     R"(FILE is as for `dashpot analyze`, with mass, jacobian and task_stiffness; damping is what is
 there already (joint friction, null-space damping). A task_damping is what `before` shows, and what
 --near stays near. Without a jacobian the damping is designed in joint space. The matrix is always
-positive semidefinite; a mode that cannot have its ratio is named, with the reason.)";
+positive semidefinite; a mode that cannot have its ratio is named, with the reason. With --period it
+is one that the sampled loop bears with the margin: the ratio is lowered where it has to be, and
+where no ratio will do, the exit status is 1.)";
 
 }  // namespace
 
 void add_design(CLI::App& program) {
   CLI::App* command =
       program.add_subcommand("design", "The damping matrix that gives every mode a damping ratio");
-  const auto options = std::make_shared<Options>();
-  command->add_option("FILE", options->file, "YAML or JSON file; - reads standard input")
-      ->option_text(" ");
-  ArmOptions& arm = options->arm;
-  command->add_option("--urdf", arm.urdf, "Instead of FILE: an arm")->option_text("FILE");
-  command->add_option("--base", arm.base, "Its base link; axes of the task")->option_text("LINK");
-  command->add_option("--tip", arm.tip, "Its link with the task's origin")->option_text("LINK");
-  command->add_option("--q", arm.q, "Joint positions, rad or m")->option_text("a,b,... (0)");
-  command->add_option("--task-stiffness", arm.task_stiffness, "Diagonal of it, N/m and N m/rad")
-      ->option_text("x,y,z,rx,ry,rz");
-  command->add_option("--task-damping", arm.task_damping, "Diagonal of the one before")
-      ->option_text("x,y,z,rx,ry,rz");
-  command->add_option("--damping-ratio", options->ratio, "The ratio wanted of every mode")
-      ->required()
-      ->check(positive("a positive ratio"))
-      ->option_text("Z");
-  command
-      ->add_option("--keep-structure", options->structure,
-                   "Entries that may differ from zero; block: translation apart from rotation")
-      ->check(CLI::IsMember({"full", "block", "diagonal"}))
-      ->option_text("full|block|diagonal (full)");
-  command->add_flag("--near", options->near, "Stay near the task_damping of the file");
-  command->add_flag("--region", options->region,
-                    "FILE lists configurations: one matrix that raises their smallest ratio");
-  command
-      ->add_option("--largest-ratio", options->largest_ratio,
-                   "With --region: no mode may have more")
-      ->check(positive("a positive ratio"))
-      ->option_text("R (1 or 1.5 Z)");
-  command->add_option("--threads", options->threads, "With --region; 0: one for each processor")
-      ->check(CLI::Range(0, 1024))
-      ->option_text("N (0)");
-  command
-      ->add_option("--soft-frequency", options->soft_frequency,
-                   "Give up the ratio of modes below this many rad/s")
-      ->check(positive("a frequency in rad/s"))
-      ->option_text("W (0.001)");
-  command->add_flag("--sensitivity", options->sensitivity,
-                    "How frequencies and ratios answer to the entries of the matrices");
-  command->add_flag("--json", options->json, "Print JSON instead of a table");
+  const auto options = std::make_shared<DesignOptions>();
+  add_design_options(*command, *options);
   command->footer(kHelp);
   command->callback([options] {
     check(*options);

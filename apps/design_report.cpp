@@ -1,4 +1,5 @@
 #include <dashpot/apps/design_report.hpp>
+#include <dashpot/apps/design_trends.hpp>
 #include <dashpot/apps/json_writer.hpp>
 #include <dashpot/apps/matrix_json.hpp>
 #include <dashpot/apps/text_table.hpp>
@@ -7,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 namespace dashpot::apps {
 namespace {
@@ -30,18 +32,24 @@ Json to_value(const DampingMiss& miss) {
           {"reason", analysis::to_text(miss.reason)}};
 }
 
-/// Gradients by the entries of M, C_C and K_C; C and K without a jacobian.
-Json gradient_values(const DesignReport& report, const analysis::ModeSensitivity& by,
-                     MatrixXd analysis::ModeGradient::*number) {
-  const auto& J = report.impedance.jacobian;
-  Json result = {{"mass", json_rows(by.mass.*number)},
-                 {"damping", json_rows(by.damping.*number)},
-                 {"stiffness", json_rows(by.stiffness.*number)}};
-  if (J) {
-    result["task_damping"] = json_rows(analysis::task_gradient(*J, by.damping.*number));
-    result["task_stiffness"] = json_rows(analysis::task_gradient(*J, by.stiffness.*number));
+Json to_value(const LoopReport& report) {
+  const analysis::SampledLoop& loop = report.limit.loop;
+  Json modes = Json::array();
+  for (const analysis::SampledMode& mode : report.sampled.modes) {
+    modes.push_back({{"natural_frequency", mode.natural_frequency},
+                     {"damping_ratio", mode.damping_ratio},
+                     {"damped_frequency", mode.damped_frequency},
+                     {"kind", analysis::to_text(mode.kind)}});
   }
-  return result;
+  return {{"period", loop.period},
+          {"delay", loop.delay},
+          {"cutoff", loop.torque_cutoff},
+          {"difference_velocity", loop.difference_velocity},
+          {"margin", report.limit.gain_margin},
+          {"gain_margin", report.gain_margin},
+          {"level", report.level},
+          {"spectral_radius", report.sampled.spectral_radius},
+          {"modes", modes}};
 }
 
 Json to_value(const DesignReport& report) {
@@ -58,17 +66,8 @@ Json to_value(const DesignReport& report) {
                  {"modes", after["modes"]},
                  {"before", before},
                  {"after", after}};
-  if (!report.sensitivities.empty()) {
-    Json list = Json::array();
-    for (const analysis::ModeSensitivity& by : report.sensitivities) {
-      list.push_back(
-          {{"regular", by.regular},
-           {"damping_ratio", gradient_values(report, by, &analysis::ModeGradient::damping_ratio)},
-           {"natural_frequency",
-            gradient_values(report, by, &analysis::ModeGradient::natural_frequency)}});
-    }
-    result["sensitivity"] = list;
-  }
+  if (report.loop) result["loop"] = to_value(*report.loop);
+  if (!report.sensitivities.empty()) result["sensitivity"] = sensitivity_json(report);
   return result;
 }
 
@@ -97,6 +96,10 @@ std::string mode_table(const DesignReport& report) {
   table.add_column(Align::kPoint, {"after", "rad/s"});
   table.add_column(Align::kPoint, {"", "ratio"});
   table.add_column(Align::kLeft, {"", "kind"});
+  if (report.loop) {
+    table.add_column(Align::kPoint, {"sampled", "rad/s"});
+    table.add_column(Align::kPoint, {"", "ratio"});
+  }
   for (int i = 0; i < std::max(before.size(), after.size()); ++i) {
     std::vector<std::string> row = {std::to_string(i + 1)};
     for (const auto* modes : {&before, &after}) {
@@ -105,17 +108,40 @@ std::string mode_table(const DesignReport& report) {
       row.push_back(there ? format_number((*modes)[i].damping_ratio, 6) : "");
     }
     row.emplace_back(i < after.size() ? analysis::to_text(after[i].kind) : "");
+    if (report.loop) {
+      const auto& modes = report.loop->sampled.modes;
+      const auto at = static_cast<std::size_t>(i);
+      row.push_back(at < modes.size() ? format_number(modes[at].natural_frequency, 6) : "");
+      row.push_back(at < modes.size() ? format_number(modes[at].damping_ratio, 6) : "");
+    }
     table.add_row(std::move(row));
   }
   return table.text();
 }
 
+std::string loop_text(const DesignReport& report) {
+  const LoopReport& loop = *report.loop;
+  if (loop.level == 1) {
+    return "  Springs and damping may grow by a factor of " + format_number(loop.gain_margin, 3) +
+           " together before the loop is unstable.\n";
+  }
+  return "  The loop bears " + format_number(loop.level * report.ratio, 6) + " instead of " +
+         format_number(report.ratio, 3) + ": with more damping, a gain margin of " +
+         format_number(loop.limit.gain_margin, 3) + " is lost.\n";
+}
+
 std::string miss_text(const DesignReport& report) {
-  if (report.design.misses.empty()) {
-    return "  Every mode has a damping ratio of " + format_number(report.ratio, 3) + ".\n";
+  const double ratio = report.ratio * (report.loop ? report.loop->level : 1);
+  const auto misses = [](const DampingMiss& miss) {
+    return miss.reason != DampingMiss::Reason::kLoop;
+  };
+  if (std::none_of(report.design.misses.begin(), report.design.misses.end(), misses)) {
+    return "  Every mode has a damping ratio of " +
+           format_number(ratio, ratio < report.ratio ? 6 : 3) + ".\n";
   }
   std::string text;
   for (const DampingMiss& miss : report.design.misses) {
+    if (!misses(miss)) continue;
     text += "  Mode " + std::to_string(miss.mode + 1) +
             " misses: " + format_number(miss.obtained, 6) + " instead of " +
             format_number(miss.wanted, 6);
@@ -132,6 +158,8 @@ std::string miss_text(const DesignReport& report) {
       case DampingMiss::Reason::kCoupling:
         text += "; no exact matrix was found beside what is there already.\n";
         break;
+      case DampingMiss::Reason::kLoop:
+        break;
     }
   }
   if (report.design.indefinite_by < 0) {
@@ -140,29 +168,6 @@ std::string miss_text(const DesignReport& report) {
             " 1/s in modal coordinates); this is the damping matrix nearest to it.\n";
   }
   return text;
-}
-
-/// Percent by which each ratio changes when a diagonal entry grows by one percent.
-std::string sensitivity_text(const DesignReport& report) {
-  const MatrixXd& damping = report.design.damping;
-  TextTable table;
-  table.add_column(Align::kRight, {"mode"});
-  for (Index i = 0; i < damping.rows(); ++i) {
-    table.add_column(Align::kPoint, {"entry " + std::to_string(i + 1)});
-  }
-  for (std::size_t k = 0; k < report.sensitivities.size(); ++k) {
-    const analysis::Mode<>& mode = report.after.spectrum.modes[static_cast<int>(k)];
-    MatrixXd G = report.sensitivities[k].damping.damping_ratio;
-    if (report.impedance.jacobian) G = analysis::task_gradient(*report.impedance.jacobian, G);
-    std::vector<std::string> row = {std::to_string(k + 1)};
-    for (Index i = 0; i < damping.rows(); ++i) {
-      const double part = G(i, i) * damping(i, i) / mode.damping_ratio;
-      row.push_back(format_number(std::abs(part) < 5e-4 ? 0 : part, 3));
-    }
-    table.add_row(std::move(row));
-  }
-  return "\n  Percent that the ratio changes by, for one percent of a diagonal entry\n" +
-         table.text();
 }
 
 }  // namespace
@@ -182,6 +187,7 @@ std::string design_table(const std::vector<DesignReport>& reports, bool as_list)
     if (as_list) text += "[" + std::to_string(i) + "] ";
     text += report.key + "\n" + matrix_text(report.design.damping) + "\n";
     for (const std::string& note : report.notes) text += "  Note: " + note + "\n";
+    if (report.loop) text += loop_text(report);
     text += miss_text(report);
     if (!report.after.spectrum.modes.empty()) text += "\n" + mode_table(report);
     if (!report.sensitivities.empty()) text += sensitivity_text(report);
@@ -240,6 +246,18 @@ std::string region_table(const RegionReport& report) {
                    std::to_string(sample.soft_modes)});
   }
   return text + "\n" + table.text();
+}
+
+std::string region_csv(const RegionReport& report) {
+  std::ostringstream text;
+  text.precision(17);
+  text << "configuration,worst_mode,natural_frequency,damping_ratio,largest_ratio,soft_modes\n";
+  for (std::size_t i = 0; i < report.design.samples.size(); ++i) {
+    const analysis::RegionSample& sample = report.design.samples[i];
+    text << i << ',' << sample.worst_mode << ',' << sample.natural_frequency << ','
+         << sample.damping_ratio << ',' << sample.largest_ratio << ',' << sample.soft_modes << '\n';
+  }
+  return text.str();
 }
 
 }  // namespace dashpot::apps

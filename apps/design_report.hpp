@@ -1,12 +1,22 @@
 #pragma once
 #include <dashpot/analysis/damping_region.hpp>
+#include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/analysis/sensitivity.hpp>
 #include <dashpot/apps/report.hpp>
 
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace dashpot::apps {
+
+/// What the sampled loop makes of a design.
+struct LoopReport {
+  analysis::LoopLimit limit;
+  double level = 1;  ///< of the ratio wanted, that the loop bears
+  double gain_margin = 0;
+  analysis::SampledSpectrum sampled;
+};
 
 /// What `dashpot design` says of one system.
 struct DesignReport {
@@ -17,6 +27,7 @@ struct DesignReport {
   Report before;  ///< with the damping that the file gives
   Report after;
   std::vector<analysis::ModeSensitivity> sensitivities;  ///< of `after`; none if not asked for
+  std::optional<LoopReport> loop;  ///< none if the loop is taken for continuous
   std::vector<std::string> notes;
 };
 
@@ -31,5 +42,7 @@ std::string design_json(const std::vector<DesignReport>& reports, bool as_list);
 std::string design_table(const std::vector<DesignReport>& reports, bool as_list);
 std::string region_json(const RegionReport& report);
 std::string region_table(const RegionReport& report);
+/// The map of the worst mode, a line for each configuration after one of headings.
+std::string region_csv(const RegionReport& report);
 
 }  // namespace dashpot::apps

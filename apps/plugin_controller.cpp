@@ -78,11 +78,11 @@ class PluginController : public LoopController {
     for (std::size_t i = 0; i < 6; ++i) directions[i] = gains.directions[i] ? 1 : 0;
     const dashpot_gains wanted = {
         sizeof(dashpot_gains),     n(),
-        joint_stiffness.data(),    joint_damping.data(),
+        joint_stiffness.data(),    gains.joint_damping_ratio > 0 ? nullptr : joint_damping.data(),
         task_stiffness.data(),     gains.task_damping_ratio > 0 ? nullptr : task_damping.data(),
         &gains.task_damping_ratio, gains.null_stiffness.data(),
         gains.null_damping.data(), &frame,
-        directions.data()};
+        directions.data(),         &gains.joint_damping_ratio};
     return plugin_.set_gains(handle_.get(), &wanted);
   }
 

@@ -1,7 +1,9 @@
+#include <dashpot/analysis/null_damping.hpp>
 #include <dashpot/apps/system_file.hpp>
 #include <dashpot/controller/yaml_document.hpp>
 #include <dashpot/controller/yaml_mapping.hpp>
 
+#include <Eigen/Cholesky>
 #include <array>
 #include <string_view>
 #include <utility>
@@ -12,7 +14,7 @@ namespace {
 using controller::YamlMapping;
 using controller::YamlNode;
 
-constexpr std::array<std::string_view, 14> kKeys = {"mass",
+constexpr std::array<std::string_view, 17> kKeys = {"mass",
                                                     "damping",
                                                     "stiffness",
                                                     "jacobian",
@@ -21,6 +23,9 @@ constexpr std::array<std::string_view, 14> kKeys = {"mass",
                                                     "jacobian_rate",
                                                     "jacobian_derivatives",
                                                     "wrench",
+                                                    "reflected_inertia",
+                                                    "payload",
+                                                    "null_damping",
                                                     "initial_position",
                                                     "initial_velocity",
                                                     "impulse",
@@ -43,6 +48,41 @@ std::optional<Eigen::MatrixXd> task_rows(const YamlMapping& keys, std::string_vi
   std::optional<Eigen::MatrixXd> result = keys.matrix(key);
   if (result && result->rows() == 0) result->resize(0, n);
   return result;
+}
+
+/// n numbers, none negative.
+std::optional<Eigen::VectorXd> per_joint(const YamlMapping& keys, std::string_view key,
+                                         Eigen::Index n) {
+  std::optional<Eigen::VectorXd> result = joint_vector(keys, key, n);
+  if (result && n > 0 && result->minCoeff() < 0) throw keys.error(key, "has a negative entry");
+  return result;
+}
+
+/// What is there besides the matrices given: inertia of drives and of a point mass at the origin of
+/// the task, and damping in the null space.
+void read_additions(const YamlMapping& keys, SystemEntry& entry) {
+  analysis::TaskImpedance& impedance = entry.impedance;
+  const Eigen::Index n = impedance.mass.rows();
+  if (impedance.damping) entry.friction = *impedance.damping;
+  const bool square = impedance.mass.cols() == n;
+  if (const auto inertia = per_joint(keys, "reflected_inertia", n); inertia && square) {
+    impedance.mass.diagonal() += *inertia;
+  }
+  if (const YamlNode* node = keys.find("payload")) {
+    const double payload = keys.quantity("payload", *node, "kg", "");
+    if (payload < 0) throw keys.error("payload", "is negative");
+    const auto& J = impedance.jacobian;
+    if (!J || J->rows() != 6 || J->cols() != n) {
+      throw keys.error("payload", "needs a jacobian of six rows");
+    }
+    if (square) impedance.mass += payload * J->topRows(3).transpose() * J->topRows(3);
+  }
+  if (const auto damping = per_joint(keys, "null_damping", n)) {
+    if (!impedance.jacobian || !impedance.task_stiffness) {
+      throw keys.error("null_damping", "needs jacobian and task_stiffness");
+    }
+    entry.add_null_damping(damping->asDiagonal());
+  }
 }
 
 SystemEntry read_entry(const YamlNode& node, const std::string& prefix) {
@@ -72,6 +112,7 @@ SystemEntry read_entry(const YamlNode& node, const std::string& prefix) {
                      "missing; give it, or jacobian and task_stiffness, or both", node.line);
   }
 
+  read_additions(keys, entry);
   entry.initial_position = joint_vector(keys, "initial_position", n);
   entry.initial_velocity = joint_vector(keys, "initial_velocity", n);
   entry.impulse = joint_vector(keys, "impulse", n);
@@ -102,6 +143,10 @@ Tables and messages count the systems of a list from 0: [0].mass is that of the 
   jacobian_derivatives, wrench
                     n matrices m x n, dJ/dq_k, and the wrench (m) of the task spring at
                     equilibrium: adds the geometric stiffness [(dJ/dq_1)' f ...]
+  reflected_inertia n, of drives, added to the diagonal of mass
+  payload           a mass, kg, at the origin of a task of six directions, added to mass
+  null_damping      n, damping of the motions that task_stiffness leaves free, as a
+                    controller adds it: N' diag(null_damping) N, see README
   times             asks for the response at these times (s, none negative). It is the
                     sum of what each of the following causes; what is not given is zero:
   initial_position  n
@@ -110,6 +155,19 @@ Tables and messages count the systems of a list from 0: [0].mass is that of the 
   force             n, constant from t = 0 on
                     Without times there is no response and these four are only checked.
 A system without joints (mass: []) is a proper one, without modes.)";
+
+void SystemEntry::add_null_damping(const Eigen::MatrixXd& D) {
+  const Eigen::Index n = impedance.mass.rows();
+  const auto &J = impedance.jacobian, &K_C = impedance.task_stiffness;
+  if (n == 0 || impedance.mass.cols() != n || !J || J->cols() != n || !K_C ||
+      K_C->rows() != J->rows() || K_C->cols() != J->rows() ||
+      impedance.mass.llt().info() != Eigen::Success ||
+      (impedance.damping && (impedance.damping->rows() != n || impedance.damping->cols() != n))) {
+    return;
+  }
+  const Eigen::MatrixXd added = analysis::null_space_damping(impedance.mass, *J, *K_C, D);
+  impedance.damping = impedance.damping ? Eigen::MatrixXd(*impedance.damping + added) : added;
+}
 
 InputError SystemEntry::error(const analysis::InvalidSystem& cause) const {
   std::string reason = cause.what();

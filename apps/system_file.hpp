@@ -15,7 +15,9 @@ using controller::InputError;
 /// One system as the user wrote it (SI units; n joints, m task directions). The vectors below have
 /// n entries; analysis::to_joint_space checks the matrices.
 struct SystemEntry {
-  analysis::TaskImpedance impedance;
+  analysis::TaskImpedance impedance;  ///< with all that the keys add
+  /// The part of its damping that the joints supply themselves, n x n; none if empty.
+  Eigen::MatrixXd friction;
   std::optional<Eigen::VectorXd> initial_position;  ///< q(0), n
   std::optional<Eigen::VectorXd> initial_velocity;  ///< q'(0), n
   std::optional<Eigen::VectorXd> impulse;           ///< at t = 0, n
@@ -24,6 +26,10 @@ struct SystemEntry {
 
   std::string prefix;                ///< of the keys in messages: "" or "[2]."
   std::map<std::string, int> lines;  ///< of the keys given
+
+  /// Adds N' D N, the damping D (n x n) of what task_stiffness leaves free, to the damping. Does
+  /// nothing where mass or task do not allow it, which analysis::to_joint_space then says.
+  void add_null_damping(const Eigen::MatrixXd& D);
 
   /// The error of this entry that an exception of the analysis reports.
   InputError error(const analysis::InvalidSystem& cause) const;

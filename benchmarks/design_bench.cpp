@@ -2,8 +2,12 @@
 // design/full/n, warm-started along a path of a thousand configurations as the control loop sees
 // them; design/cold/n, each from nothing. Beside them what a plain double diagonalisation takes
 // (design/eigen/n): Lambda = (J M^-1 J')^-1, then Eigen's GeneralizedSelfAdjointEigenSolver, all in
-// fixed-size matrices.
+// fixed-size matrices. design/friction/n takes joint friction off besides, design/joint/n is that
+// of springs in the joints. design/region/n designs one matrix for 32 configurations of n joints on
+// one thread, design/map/n only judges one there; items_per_second counts configurations.
 #include <dashpot/analysis/damping_hold.hpp>
+#include <dashpot/analysis/damping_region.hpp>
+#include <dashpot/analysis/joint_damping_hold.hpp>
 
 #include <benchmark/benchmark.h>
 
@@ -51,19 +55,65 @@ struct Path {
   }
 };
 
-void full(benchmark::State& state, bool warm) {
+enum class Start { kWarm, kCold, kBesideFriction };
+
+void full(benchmark::State& state, Start start) {
   const Path path(state.range(0));
   DampingHold hold(DampingTarget::constant(kRatio));
+  if (start == Start::kBesideFriction) hold.set_friction(Eigen::VectorXd::Ones(state.range(0)));
   hold.set_stiffness(path.stiffness);
   TaskMatrix C_C;
   std::size_t tick = 0;
   for (auto _ : state) {
-    if (!warm) hold.set_stiffness(path.stiffness);
+    if (start == Start::kCold) hold.set_stiffness(path.stiffness);
     const Status status = hold.update<kMaxDof>(path.mass[tick], path.jacobian[tick], C_C);
     if (status != Status::kOk) state.SkipWithError("no damping found");
     benchmark::DoNotOptimize(C_C.data());
     tick = (tick + 1) % path.mass.size();
   }
+}
+
+void joint(benchmark::State& state) {
+  const Path path(state.range(0));
+  dashpot::analysis::JointDampingHold hold;
+  hold.set_target(DampingTarget::constant(kRatio));
+  hold.set_stiffness(500 * Eigen::MatrixXd::Identity(state.range(0), state.range(0)));
+  Square<kMaxDof> C;
+  std::size_t tick = 0;
+  for (auto _ : state) {
+    if (hold.update(path.mass[tick], C) != Status::kOk) state.SkipWithError("no damping found");
+    benchmark::DoNotOptimize(C.data());
+    tick = (tick + 1) % path.mass.size();
+  }
+}
+
+/// Every so many configurations of the path.
+std::vector<dashpot::analysis::TaskImpedance> configurations(Eigen::Index n) {
+  constexpr std::size_t kCount = 32;
+  const Path path(n);
+  std::vector<dashpot::analysis::TaskImpedance> result(kCount);
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const std::size_t tick = i * path.mass.size() / kCount;
+    result[i].mass = path.mass[tick];
+    result[i].jacobian = path.jacobian[tick];
+    result[i].task_stiffness = path.stiffness;
+  }
+  return result;
+}
+
+void region(benchmark::State& state, bool design) {
+  const auto all = configurations(state.range(0));
+  dashpot::analysis::RegionOptions options;
+  options.target = DampingTarget::constant(kRatio);
+  options.threads = 1;
+  const Eigen::MatrixXd damping = design_damping(all[0], options.target).damping;
+  double level = 0;
+  for (auto _ : state) {
+    level =
+        design ? design_region(all, options).level : evaluate_region(all, damping, options).level;
+  }
+  state.counters["level"] = level;
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(all.size()));
 }
 
 /// C_C = Lambda V diag(2 zeta omega) V' Lambda with K_C V = Lambda V diag(omega^2), V' Lambda V =
@@ -100,11 +150,18 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   for (const int n : {6, 7, 12, 16}) {
-    benchmark::RegisterBenchmark("design/full", full, true)->Arg(n);
-    benchmark::RegisterBenchmark("design/cold", full, false)->Arg(n);
+    benchmark::RegisterBenchmark("design/full", full, Start::kWarm)->Arg(n);
+    benchmark::RegisterBenchmark("design/cold", full, Start::kCold)->Arg(n);
+    benchmark::RegisterBenchmark("design/friction", full, Start::kBesideFriction)->Arg(n);
+    benchmark::RegisterBenchmark("design/joint", joint)->Arg(n);
   }
   benchmark::RegisterBenchmark("design/eigen/6", eigen<6>);
   benchmark::RegisterBenchmark("design/eigen/7", eigen<7>);
+  for (const bool design : {true, false}) {
+    benchmark::RegisterBenchmark(design ? "design/region" : "design/map", region, design)
+        ->Arg(7)
+        ->Unit(benchmark::kMillisecond);
+  }
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
   return 0;

@@ -21,21 +21,20 @@ void require_pair(const YamlMapping& keys) {
   }
 }
 
-/// Of `damping` and `damping_ratio`, the one given ends the other.
-void read_task_damping(const YamlMapping& task, Gains& gains) {
-  const Units units = task_units("N s/m", "N m s/rad");
-  read_matrix(task, "damping", units, gains.task_damping);
-  if (task.has("damping")) gains.task_damping_ratio = 0;
-  if (!task.has("damping_ratio")) return;
-  if (task.has("damping")) {
-    throw task.error("damping_ratio", "stands beside damping, in place of which it is meant");
+/// Of `damping`, read into the matrix, and `damping_ratio`, the one given ends the other.
+template <class Matrix>
+void read_damping(const YamlMapping& keys, const Units& units, Matrix& damping, double& ratio) {
+  read_matrix(keys, "damping", units, damping);
+  if (keys.has("damping")) ratio = 0;
+  if (!keys.has("damping_ratio")) return;
+  if (keys.has("damping")) {
+    throw keys.error("damping_ratio", "stands beside damping, in place of which it is meant");
   }
-  double& ratio = gains.task_damping_ratio;
-  read_number(task, "damping_ratio", "", Sign::kPositive, ratio);
+  read_number(keys, "damping_ratio", "", Sign::kPositive, ratio);
   if (ratio <= kLargestDampingRatio) return;
   std::ostringstream text;
   text << "is " << ratio << ", must be at most " << kLargestDampingRatio;
-  throw task.error("damping_ratio", text.str());
+  throw keys.error("damping_ratio", text.str());
 }
 
 void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
@@ -59,6 +58,8 @@ void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
 void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pairs, Gains& gains) {
   static constexpr std::array<std::string_view, 3> kKeys = {"joint", "task", "null_space"};
   static constexpr std::array<std::string_view, 2> kPair = {"stiffness", "damping"};
+  static constexpr std::array<std::string_view, 3> kJointKeys = {"stiffness", "damping",
+                                                                 "damping_ratio"};
   static constexpr std::array<std::string_view, 5> kTaskKeys = {
       "stiffness", "damping", "damping_ratio", "frame", "directions"};
   const YamlMapping keys = parent.mapping("gains", kKeys);
@@ -68,15 +69,16 @@ void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pa
   const Units stiffness = joint_units(model, "N m/rad", "N/m");
   const Units damping = joint_units(model, "N m s/rad", "N s/m");
 
-  const YamlMapping joint = keys.mapping("joint", kPair);
+  const YamlMapping joint = keys.mapping("joint", kJointKeys);
   require(joint);
   read_matrix(joint, "stiffness", stiffness, gains.joint_stiffness);
-  read_matrix(joint, "damping", damping, gains.joint_damping);
+  read_damping(joint, damping, gains.joint_damping, gains.joint_damping_ratio);
 
   const YamlMapping task = keys.mapping("task", kTaskKeys);
   require(task);
   read_matrix(task, "stiffness", task_units("N/m", "N m/rad"), gains.task_stiffness);
-  read_task_damping(task, gains);
+  read_damping(task, task_units("N s/m", "N m s/rad"), gains.task_damping,
+               gains.task_damping_ratio);
   static constexpr std::array<std::pair<std::string_view, Frame>, 2> kFrames = {
       {{"base", Frame::kBase}, {"tool", Frame::kTool}}};
   read_choice(task, "frame", kFrames, gains.frame);

@@ -119,6 +119,7 @@ FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
                               TipPath(twist, T, window)};
       }()),
       gains_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
+      held_(fixed<N>(model.joint_values(&Joint::damping))),
       wrench_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
       law_(model, settings.feed_forward),
       filter_(settings.limits, settings.period),

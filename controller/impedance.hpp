@@ -23,9 +23,10 @@ struct Impedance {
   TipImpedance tool;  ///< in T's
   Joints<N> null_stiffness = Joints<N>::Zero();
   Joints<N> null_damping = Joints<N>::Zero();
-  double damping_ratio = 0;  ///< that HeldDamping gives the tip's springs, beside `damping`
-  double joint_weight = 0;   ///< share of the joint springs
-  double task_weight = 0;    ///< share of the Cartesian springs
+  double damping_ratio = 0;        ///< that HeldDamping gives the tip's springs, beside `damping`
+  double joint_damping_ratio = 0;  ///< the same of the joints' springs, beside `joint_damping`
+  double joint_weight = 0;         ///< share of the joint springs
+  double task_weight = 0;          ///< share of the Cartesian springs
 
   /// What a valid set-point asks for. Directions that are not held have no springs and dampers. The
   /// null space is empty unless there are more joints than directions held.
@@ -45,13 +46,15 @@ Impedance<N> Impedance<N>::of(const Setpoint& setpoint) noexcept {
   const Gains& gains = setpoint.gains;
   if (setpoint.mode == Mode::kJoint) {
     result.joint_weight = 1;
+    const bool designed = gains.joint_damping_ratio > 0;
     const JointMatrix &K = gains.joint_stiffness, &C = gains.joint_damping;
     for (int j = 0; j < N; ++j) {
       for (int i = 0; i < N; ++i) {
         result.joint_stiffness(i, j) = 0.5 * (K(i, j) + K(j, i));
-        result.joint_damping(i, j) = 0.5 * (C(i, j) + C(j, i));
+        if (!designed) result.joint_damping(i, j) = 0.5 * (C(i, j) + C(j, i));
       }
     }
+    if (designed) result.joint_damping_ratio = gains.joint_damping_ratio;
     return result;
   }
   result.task_weight = 1;
@@ -113,6 +116,7 @@ Impedance<N> blend(const Impedance<N>& a, const Impedance<N>& b, double s) noexc
   mix(a.null_stiffness, b.null_stiffness, c.null_stiffness);
   mix(a.null_damping, b.null_damping, c.null_damping);
   c.damping_ratio = r * a.damping_ratio + s * b.damping_ratio;
+  c.joint_damping_ratio = r * a.joint_damping_ratio + s * b.joint_damping_ratio;
   c.joint_weight = r * a.joint_weight + s * b.joint_weight;
   c.task_weight = r * a.task_weight + s * b.task_weight;
   return c;

@@ -118,19 +118,21 @@ typedef struct dashpot_setpoint {
 /* Springs and dampers. Matrices are symmetric positive semidefinite. What is NULL stays. */
 typedef struct dashpot_gains {
   uint32_t struct_size;
-  uint32_t joints;                  /* n */
-  const double* joint_stiffness;    /* n x n, N m/rad */
-  const double* joint_damping;      /* n x n, N m s/rad */
-  const double* task_stiffness;     /* 6 x 6, N/m, N/rad and N m/rad */
-  const double* task_damping;       /* 6 x 6, N s/m, N s/rad and N m s/rad */
-  const double* task_damping_ratio; /* 1, from 0 to 2: above 0, C_C is designed at every tick so
-                                       that every mode of the task has this damping ratio, in place
-                                       of task_damping; 0: C_C is task_damping. task_damping alone
-                                       makes it 0, and does not go with one above 0. */
-  const double* null_stiffness;     /* n, not negative, N m/rad, toward the rest posture */
-  const double* null_damping;       /* n, not negative, N m s/rad */
-  const int32_t* frame;             /* in whose axes the 6 x 6 are: DASHPOT_FRAME_BASE or _TOOL */
-  const uint8_t* directions;        /* 6, whether the task holds this direction of `frame` */
+  uint32_t joints;                   /* n */
+  const double* joint_stiffness;     /* n x n, N m/rad */
+  const double* joint_damping;       /* n x n, N m s/rad */
+  const double* task_stiffness;      /* 6 x 6, N/m, N/rad and N m/rad */
+  const double* task_damping;        /* 6 x 6, N s/m, N s/rad and N m s/rad */
+  const double* task_damping_ratio;  /* 1, from 0 to 2: above 0, C_C is designed at every tick so
+                                        that every mode of the task has this damping ratio, in place
+                                        of task_damping; 0: C_C is task_damping. task_damping alone
+                                        makes it 0, and does not go with one above 0. */
+  const double* null_stiffness;      /* n, not negative, N m/rad, toward the rest posture */
+  const double* null_damping;        /* n, not negative, N m s/rad */
+  const int32_t* frame;              /* in whose axes the 6 x 6 are: DASHPOT_FRAME_BASE or _TOOL */
+  const uint8_t* directions;         /* 6, whether the task holds this direction of `frame` */
+  const double* joint_damping_ratio; /* 1, from 0 to 2: what task_damping_ratio is to the task, for
+                                        the modes of the joint mode and joint_damping */
 } dashpot_gains;
 
 /* What the robot's joints are to exert. */

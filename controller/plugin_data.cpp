@@ -62,6 +62,19 @@ static_assert(DASHPOT_REUSED == static_cast<int>(analysis::SpectrumOrigin::kReus
 static_assert(DASHPOT_DIRECT == static_cast<int>(analysis::SpectrumOrigin::kDirect));
 static_assert(DASHPOT_MAX_JOINTS == kMaxJoints);
 
+/// A damping ratio above zero stands in place of a damping matrix.
+bool ratio_fits(const double* damping, const double* ratio) noexcept {
+  return ratio == nullptr || *ratio == 0 || damping == nullptr;
+}
+
+void take_ratio(const double* damping, const double* given, double& ratio) noexcept {
+  if (given != nullptr) {
+    ratio = *given;
+  } else if (damping != nullptr) {
+    ratio = 0;
+  }
+}
+
 }  // namespace
 
 RobotState to_state(const dashpot_state* given, int n, std::int64_t time) noexcept {
@@ -107,14 +120,12 @@ std::int32_t to_gains(const dashpot_gains* given, int n, Gains& gains) noexcept 
       *given->frame != DASHPOT_FRAME_TOOL) {
     return DASHPOT_WRONG_VALUE;
   }
-  if (given->task_damping_ratio != nullptr) {
-    if (given->task_damping != nullptr && *given->task_damping_ratio != 0) {
-      return DASHPOT_WRONG_VALUE;
-    }
-    gains.task_damping_ratio = *given->task_damping_ratio;
-  } else if (given->task_damping != nullptr) {
-    gains.task_damping_ratio = 0;
+  if (!ratio_fits(given->task_damping, given->task_damping_ratio) ||
+      !ratio_fits(given->joint_damping, given->joint_damping_ratio)) {
+    return DASHPOT_WRONG_VALUE;
   }
+  take_ratio(given->task_damping, given->task_damping_ratio, gains.task_damping_ratio);
+  take_ratio(given->joint_damping, given->joint_damping_ratio, gains.joint_damping_ratio);
   if (given->joint_stiffness != nullptr) gains.joint_stiffness = square(given->joint_stiffness, n);
   if (given->joint_damping != nullptr) gains.joint_damping = square(given->joint_damping, n);
   if (given->task_stiffness != nullptr) gains.task_stiffness = square(given->task_stiffness, 6);

@@ -64,6 +64,12 @@ const char* position_fault(const JointVector& q, const Limits& limits) noexcept 
   return nullptr;
 }
 
+constexpr const char* kNoRatio = "is not between 0 and 2";
+
+bool is_ratio(double ratio) noexcept {
+  return ratio >= 0 && ratio <= kLargestDampingRatio;
+}
+
 }  // namespace
 
 SetpointFault check_gains(const Gains& gains, Mode mode, Eigen::Index n) noexcept {
@@ -71,13 +77,12 @@ SetpointFault check_gains(const Gains& gains, Mode mode, Eigen::Index n) noexcep
   if (mode == Mode::kJoint) {
     if ((reason = matrix_fault(gains.joint_stiffness, n))) return {"joint_stiffness", reason};
     if ((reason = matrix_fault(gains.joint_damping, n))) return {"joint_damping", reason};
+    if (!is_ratio(gains.joint_damping_ratio)) return {"joint_damping_ratio", kNoRatio};
     return {};
   }
   if ((reason = matrix_fault(gains.task_stiffness, 6))) return {"task_stiffness", reason};
   if ((reason = matrix_fault(gains.task_damping, 6))) return {"task_damping", reason};
-  if (!(gains.task_damping_ratio >= 0 && gains.task_damping_ratio <= kLargestDampingRatio)) {
-    return {"task_damping_ratio", "is not between 0 and 2"};
-  }
+  if (!is_ratio(gains.task_damping_ratio)) return {"task_damping_ratio", kNoRatio};
   if ((reason = vector_fault(gains.null_stiffness, n))) return {"null_stiffness", reason};
   if ((reason = vector_fault(gains.null_damping, n))) return {"null_damping", reason};
   if (gains.frame != Frame::kBase && gains.frame != Frame::kTool) return {"frame", "is unknown"};
@@ -112,9 +117,9 @@ SetpointFault check_setpoint(const Setpoint& setpoint, const Limits& limits,
 bool same_gains(const Gains& a, const Gains& b) noexcept {
   return a.frame == b.frame && a.directions == b.directions &&
          same(a.joint_stiffness, b.joint_stiffness) && same(a.joint_damping, b.joint_damping) &&
-         a.task_stiffness == b.task_stiffness && a.task_damping == b.task_damping &&
-         a.task_damping_ratio == b.task_damping_ratio && same(a.null_stiffness, b.null_stiffness) &&
-         same(a.null_damping, b.null_damping);
+         a.joint_damping_ratio == b.joint_damping_ratio && a.task_stiffness == b.task_stiffness &&
+         a.task_damping == b.task_damping && a.task_damping_ratio == b.task_damping_ratio &&
+         same(a.null_stiffness, b.null_stiffness) && same(a.null_damping, b.null_damping);
 }
 
 }  // namespace dashpot::controller

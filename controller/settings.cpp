@@ -179,9 +179,12 @@ void validate(const Settings& settings, int n) {
     fail("analysis.sampled.delay", sampled.delay, "ticks", "has to be between 0 and 20");
   }
   const Setpoint& initial = settings.initial;
-  const double ratio = initial.gains.task_damping_ratio;
-  if (!(ratio >= 0 && ratio <= kLargestDampingRatio)) {
-    fail("initial.gains.task_damping_ratio", ratio, "", "must be between 0 and 2");
+  for (const auto& [key, ratio] :
+       {std::pair("task_damping_ratio", initial.gains.task_damping_ratio),
+        {"joint_damping_ratio", initial.gains.joint_damping_ratio}}) {
+    if (!(ratio >= 0 && ratio <= kLargestDampingRatio)) {
+      fail(std::string("initial.gains.") + key, ratio, "", "must be between 0 and 2");
+    }
   }
   if (const SetpointFault fault = check_gains(initial.gains, initial.mode, n)) {
     throw InvalidSettings(std::string("initial.gains.") + fault.key, fault.reason);

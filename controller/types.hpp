@@ -50,8 +50,11 @@ inline constexpr double kLargestDampingRatio = 2;
 
 /// Springs and dampers. All matrices are symmetric positive semidefinite.
 struct Gains {
-  JointMatrix joint_stiffness;               ///< n x n, N m/rad, of mode kJoint
-  JointMatrix joint_damping;                 ///< n x n, N m s/rad, of mode kJoint
+  JointMatrix joint_stiffness;  ///< n x n, N m/rad, of mode kJoint
+  JointMatrix joint_damping;    ///< n x n, N m s/rad, of mode kJoint
+  /// Damping ratio that every mode of mode kJoint is to have, 0 < ratio <= 2, in place of
+  /// joint_damping; 0: joint_damping acts.
+  double joint_damping_ratio = 0;
   Matrix6 task_stiffness = Matrix6::Zero();  ///< K_C, N/m, N/rad and N m/rad
   Matrix6 task_damping = Matrix6::Zero();    ///< C_C, N s/m, N s/rad and N m s/rad
   /// Damping ratio that every mode of K_C is to have, 0 < ratio <= 2: C_C is then designed anew at

@@ -18,6 +18,7 @@ void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t 
   if (has(command_t::JOINT_GAINS)) {
     setpoint.gains.joint_stiffness = from.gains.joint_stiffness;
     setpoint.gains.joint_damping = from.gains.joint_damping;
+    setpoint.gains.joint_damping_ratio = from.gains.joint_damping_ratio;
   }
   if (has(command_t::TASK_GAINS)) {
     setpoint.gains.frame = from.gains.frame;

@@ -6,7 +6,7 @@ usage: release.py DASHPOT SCENE_JSON CSV
 CSV is what `dashpot run --csv` wrote; SCENE_JSON names the robot, K_C, C_C (or the damping ratio that
 the controller holds) and the joint position at which the springs are fixed. Mass and Jacobian there come from `dashpot inspect`, the closed-form
 response from `dashpot analyze`. Prints a table: time (s), displacement of the tip along y (mm) as
-simulated, and as predicted.
+simulated, and as predicted; after a line with the smallest damping ratio that is predicted.
 """
 import csv
 import json
@@ -47,8 +47,10 @@ def main():
               "task_stiffness": diagonal(scene["stiffness"])}
     system |= {"task_damping": task_damping(program, scene, system),
                "initial_position": start, "times": times}
-    response = dashpot(program, "analyze", "-", text=json.dumps(system))["response"]
+    result = dashpot(program, "analyze", "-", text=json.dumps(system))
+    response = result["response"]
     y = arm["jacobian"][1]
+    print(f"# smallest_ratio {min(mode['damping_ratio'] for mode in result['modes'])!r}")
     for time, row, q in zip(times, rows, response["position"]):
         simulated = 1e3 * (float(row["y"]) - arm["tip_position"][1])
         predicted = 1e3 * sum(a * b for a, b in zip(y, q))

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
+#include <sstream>
 
 namespace dashpot::tests {
 namespace {
@@ -141,6 +142,28 @@ TEST(Design, OfARegionMapsTheWorstMode) {
   const Outcome table = design_text(one + other, "0.7", {"--region"});
   EXPECT_THAT(table.out, AllOf(StartsWith("task_damping\n"), HasSubstr("configuration")));
   EXPECT_THAT(table.err, IsEmpty());
+}
+
+TEST(Design, WritesTheMapOfARegion) {
+  const std::string list = "[{mass: [[1]], stiffness: [[4]]}, {mass: [[4]], stiffness: [[4]]}]";
+  const Scratch scratch;
+  const std::string path = scratch.path("map.csv");
+  const Json result = design_json(list, "0.5", {"--region", "--csv", path});
+  std::ifstream file(path);
+  std::string heading, line;
+  std::getline(file, heading);
+  EXPECT_THAT(heading, StartsWith("configuration,worst_mode,natural_frequency,damping_ratio"));
+  for (const Json& sample : result["samples"]) {
+    std::getline(file, line);
+    std::istringstream fields(line);
+    for (int i = 0; i < 4; ++i) std::getline(fields, line, ',');
+    EXPECT_EQ(std::stod(line), sample["damping_ratio"]);
+  }
+  EXPECT_FALSE(std::getline(file, line));
+  const Outcome nowhere = design_text(list, "0.5", {"--region", "--csv", "/nowhere/map.csv"});
+  EXPECT_EQ(nowhere.status, 1);
+  EXPECT_THAT(nowhere.out, IsEmpty());
+  EXPECT_THAT(design_text(list, "0.5", {"--csv", path}).err, HasSubstr("--csv: needs --region"));
 }
 
 TEST(Design, GivesSensitivitiesOnRequest) {

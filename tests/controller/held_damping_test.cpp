@@ -389,7 +389,7 @@ TEST(HeldDamping, NeverAllocates) {
 
 TEST(HeldDamping, KeepsTheLastDesignWhereThereIsNone) {
   TaskDamper damper;
-  damper.set(Matrix6(100 * Matrix6::Identity()), 0.7);
+  damper.set(Matrix6(100 * Matrix6::Identity()), 0.7, {});
   analysis::Square<kMaxJoints> M = Eigen::MatrixXd::Identity(7, 7), broken = M;
   analysis::TaskJacobian<kMaxJoints> J = Eigen::MatrixXd::Identity(6, 7);
   broken(3, 3) = -1;
@@ -407,7 +407,7 @@ TEST(HeldDamping, KeepsTheLastDesignWhereThereIsNone) {
   }
   // A stiffness that rounding has made indefinite, as far as check_gains lets it pass, is taken.
   Matrix6 flat = Vector6(100, 100, 100, 100, 100, -5e-9).asDiagonal();
-  damper.set(flat, 0.35);
+  damper.set(flat, 0.35, {});
   damper.update(M, J);
   EXPECT_NEAR(damper.damping()(0, 0), 7, 1e-6);
   EXPECT_NEAR(damper.damping()(5, 5), 0, 1e-3);
@@ -416,7 +416,7 @@ TEST(HeldDamping, KeepsTheLastDesignWhereThereIsNone) {
 TEST(HeldDamping, IsBoundedHoweverSingularTheJacobian) {
   TaskDamper damper;
   const double K = 2000, ratio = 0.7;
-  damper.set(Matrix6(K * Matrix6::Identity()), ratio);
+  damper.set(Matrix6(K * Matrix6::Identity()), ratio, {});
   double largest = 0;
   for (int k = 0; k < 200; ++k) {
     analysis::Square<kMaxJoints> M = Eigen::MatrixXd::Identity(7, 7);

@@ -37,7 +37,8 @@ INSTANTIATE_TEST_SUITE_P(
                   "feed_forward, watchdog, analysis, simulation, scenario (line 2)",
                   "gain: {}\n"},
         BadConfig{"UnknownKey",
-                  "gains.joint.stifness: unknown key; the keys are stiffness, damping (line 4)",
+                  "gains.joint.stifness: unknown key; the keys are stiffness, damping, "
+                  "damping_ratio (line 4)",
                   "gains:\n  joint:\n    stifness: 600\n"},
         BadConfig{"DuplicateGroup", "limits: duplicate key (line 3)", "limits: {}\nlimits: {}\n"},
         BadConfig{"DuplicateKey", "limits.torque: duplicate key (line 4)",
@@ -60,6 +61,13 @@ INSTANTIATE_TEST_SUITE_P(
                   "gains.task.damping_ratio: stands beside damping, in place of which it is meant "
                   "(line 5)",
                   "gains:\n  task:\n    damping: [0, 0, 0, 0, 0, 0]\n    damping_ratio: 0.7\n"},
+        BadConfig{"JointDampingTwice",
+                  "gains.joint.damping_ratio: stands beside damping, in place of which it is meant "
+                  "(line 5)",
+                  "gains:\n  joint:\n    damping: 1\n    damping_ratio: 0.7\n"},
+        BadConfig{"JointDampingRatioTooLarge",
+                  "gains.joint.damping_ratio: is 2.5, must be at most 2 (line 4)",
+                  "gains:\n  joint:\n    damping_ratio: 2.5\n"},
         BadConfig{"DampingRatioOfNone", "gains.task.damping_ratio: is 0, not positive (line 2)",
                   "gains: {task: {damping_ratio: 0}}\n"},
         BadConfig{"DampingRatioTooLarge",

@@ -117,6 +117,15 @@ TEST(Config, FillsJointMatrices) {
   EXPECT_EQ(full.initial.gains.joint_stiffness, expected);
 }
 
+TEST(Config, TakesADampingRatioOfTheJoints) {
+  const auto gains = [](const std::string& joint) {
+    return load(panda() + "gains: {joint: {" + joint + "}}\n").settings.initial.gains;
+  };
+  EXPECT_EQ(gains("").joint_damping_ratio, 0);
+  EXPECT_EQ(gains("stiffness: 300, damping_ratio: 0.7").joint_damping_ratio, 0.7);
+  EXPECT_EQ(gains("stiffness: 300, damping_ratio: 0.7").task_damping_ratio, 0);
+}
+
 TEST(Config, FillsTheTask) {
   const auto gains =
       load(panda() +

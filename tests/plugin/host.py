@@ -29,7 +29,8 @@ class Gains(c.Structure):
                 ("task_stiffness", Doubles), ("task_damping", Doubles),
                 ("task_damping_ratio", Doubles),
                 ("null_stiffness", Doubles), ("null_damping", Doubles),
-                ("frame", c.POINTER(c.c_int32)), ("directions", c.POINTER(c.c_uint8))]
+                ("frame", c.POINTER(c.c_int32)), ("directions", c.POINTER(c.c_uint8)),
+                ("joint_damping_ratio", Doubles)]
 
 
 class Output(c.Structure):

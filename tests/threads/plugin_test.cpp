@@ -353,6 +353,12 @@ TEST(Plugin, HoldsADampingRatio) {
   gains.task_damping = C_C.data();  // ends the ratio
   EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
   EXPECT_EQ(modes_with(0.9), 0);
+  const Eigen::Matrix<double, 7, 7> C_q = Eigen::Matrix<double, 7, 7>::Identity();
+  gains.joint_damping = C_q.data();
+  gains.joint_damping_ratio = &ratio;
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);  // one or the other
+  gains.joint_damping = nullptr;
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
 }
 
 // Misuse ----------------------------------------------------------------------------------------

@@ -1,0 +1,34 @@
+#pragma once
+#include <dashpot/analysis/types.hpp>
+
+#include <cmath>
+#include <limits>
+
+namespace dashpot::analysis {
+
+/// F (n x n, lower triangular) with K = F F' for a symmetric positive semidefinite K of which the
+/// lower triangle is read. A pivot that cannot be told from zero ends its column, the rest of which
+/// then has to be zero too. False, with F half done, unless K is semidefinite to rounding.
+template <class Matrix>
+bool semidefinite_cholesky(const Matrix& K, Matrix& F) noexcept {
+  const Eigen::Index n = K.rows();
+  F.setZero(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const double rounding =
+        16 * static_cast<double>(n) * std::numeric_limits<double>::epsilon() * std::abs(K(j, j));
+    double pivot = K(j, j);
+    for (Eigen::Index k = 0; k < j; ++k) pivot -= F(j, k) * F(j, k);
+    if (pivot < -rounding) return false;
+    const bool zero = pivot <= rounding;
+    for (Eigen::Index i = j; i < n; ++i) {
+      double rest = K(i, j);
+      for (Eigen::Index k = 0; k < j; ++k) rest -= F(i, k) * F(j, k);
+      if (!zero) F(i, j) = rest / std::sqrt(pivot);
+      // |rest|^2 <= pivot_i pivot_j for a semidefinite matrix
+      if (zero && rest * rest > 64 * rounding * std::abs(K(i, i))) return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,205 @@
+// `dashpot design` beside what is there already: friction, null-space damping, inertia of the
+// drives and a payload, from a file and from a robot description; and the trends by them.
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/support/arms.hpp>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+namespace dashpot::tests {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+const std::string kQ = "0,-0.785,0,-2.356,0,1.571,0.785";
+const std::vector<std::string> kPanda = {"design",
+                                         "--urdf",
+                                         testing::arm_path("panda"),
+                                         "--base",
+                                         "panda_link0",
+                                         "--tip",
+                                         "panda_hand_tcp",
+                                         "--q",
+                                         kQ,
+                                         "--task-stiffness",
+                                         "2000,600,2000,100,100,100",
+                                         "--damping-ratio",
+                                         "0.7"};
+
+Json panda(std::vector<std::string> options) {
+  options.insert(options.begin(), kPanda.begin(), kPanda.end());
+  options.emplace_back("--json");
+  return parse(run_program(options));
+}
+
+MatrixXd matrix(const Json& rows) {
+  MatrixXd A(rows.size(), rows[0].size());
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    for (Eigen::Index j = 0; j < A.cols(); ++j) {
+      A(i, j) = rows[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+    }
+  }
+  return A;
+}
+
+/// Ratios of the oscillating modes of an arm of the controller's model, with the damping designed
+/// and what is there besides, from eigenvalues of the first-order system.
+std::vector<double> ratios(const controller::ModelOptions& options, const MatrixXd& C_C,
+                           const MatrixXd& D) {
+  const auto model = testing::arm_model(testing::arms()[0], options);
+  controller::JointVector q(7);
+  q << 0, -0.785, 0, -2.356, 0, 1.571, 0.785;
+  const auto robot = evaluate(model, q, controller::JointVector::Zero(7));
+  const MatrixXd M = robot.M, J = robot.J, inverse = M.inverse();
+  const MatrixXd K_C = VectorXd{{2000, 600, 2000, 100, 100, 100}}.asDiagonal();
+  MatrixXd A = MatrixXd::Zero(14, 14);
+  A.topRightCorner(7, 7).setIdentity();
+  A.bottomLeftCorner(7, 7) = -inverse * J.transpose() * K_C * J;
+  A.bottomRightCorner(7, 7) = -inverse * (J.transpose() * C_C * J + D);
+  std::vector<double> result;
+  const Eigen::VectorXcd values = Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues();
+  for (const std::complex<double>& value : values) {
+    if (value.imag() > 1) result.push_back(-value.real() / std::abs(value));
+  }
+  return result;
+}
+
+TEST(DesignBesideWhatIsThere, CountsWhatTheOptionsAdd) {
+  const Json result = panda({"--viscous-friction", "0.2", "--reflected-inertia",
+                             "0.1,0.2,0.1,0.1,0.05,0.05,0.05", "--payload", "1.5,0,0,0.05"});
+  EXPECT_EQ(result["reached"], true);
+  controller::ModelOptions options;
+  options.reflected_inertia = VectorXd{{0.1, 0.2, 0.1, 0.1, 0.05, 0.05, 0.05}};
+  options.payload.mass = 1.5;
+  options.payload.center.z() = 0.05;
+  const MatrixXd friction = 0.2 * MatrixXd::Identity(7, 7);
+  const auto found = ratios(options, matrix(result["task_damping"]), friction);
+  ASSERT_EQ(found.size(), 6U);
+  for (const double ratio : found) EXPECT_NEAR(ratio, 0.7, 1e-7);
+  const auto without = ratios({}, matrix(result["task_damping"]), friction);
+  EXPECT_GT(std::abs(*std::max_element(without.begin(), without.end()) - 0.7), 0.05);
+}
+
+TEST(DesignBesideWhatIsThere, TakesTheFrictionOfTheDescriptionOnlyIfAsked) {
+  const double plain = panda({})["task_damping"][0][0];
+  const double with = panda({"--viscous-friction", "urdf"})["task_damping"][0][0];
+  EXPECT_LT(with, plain);
+  EXPECT_NEAR(with, panda({"--viscous-friction", "0.003"})["task_damping"][0][0], 1e-12);
+}
+
+// N' D N damps the self-motion alone.
+TEST(DesignBesideWhatIsThere, NullSpaceDampingLeavesTheDesignAlone) {
+  const Json plain = panda({}), with = panda({"--null-damping", "5"});
+  const MatrixXd C = matrix(plain["task_damping"]);
+  EXPECT_LT((matrix(with["task_damping"]) - C).norm(), 1e-9 * C.norm());
+  EXPECT_EQ(with["reached"], true);
+  EXPECT_NEAR(plain["after"]["zero_mode_rates"][0], 0, 1e-9);
+  EXPECT_LT(with["after"]["zero_mode_rates"][0], -1);
+}
+
+TEST(DesignBesideWhatIsThere, MissesModeByModeWhereFrictionIsTooMuch) {
+  const Json result = panda({"--viscous-friction", "20"});
+  EXPECT_EQ(result["reached"], false);
+  EXPECT_LT(result["indefinite_by"], 0);
+  EXPECT_GE(result["smallest_eigenvalue"], -1e-9);
+  ASSERT_FALSE(result["misses"].empty());
+  for (const Json& miss : result["misses"]) {
+    EXPECT_EQ(miss["reason"], "overdone");
+    EXPECT_EQ(miss["obtained"], result["modes"][miss["mode"].get<std::size_t>()]["damping_ratio"]);
+  }
+}
+
+const std::string kSix =
+    "mass: [[2,0,0,0,0,0],[0,2,0,0,0,0],[0,0,2,0,0,0],[0,0,0,1,0,0],[0,0,0,0,1,0],[0,0,0,0,0,1]]\n"
+    "jacobian: [[1,0,0,0,0,0],[0,1,0,0,0,0],[0,0,1,0,0,0],[0,0,0,1,0,0],[0,0,0,0,1,0],"
+    "[0,0,0,0,0,0]]\n"
+    "task_stiffness: [[100,0,0,0,0,0],[0,100,0,0,0,0],[0,0,100,0,0,0],[0,0,0,9,0,0],[0,0,0,0,9,0],"
+    "[0,0,0,0,0,9]]\n";
+
+TEST(DesignBesideWhatIsThere, ReadsTheSameFromAFile) {
+  const auto design = [](const std::string& text) {
+    return parse(run_program({"design", "-", "--damping-ratio", "0.5", "--json"}, kSix + text));
+  };
+  // sqrt(k m): 10 sqrt(2 + 2), sqrt(9 (1 + 3)), less friction
+  const Json result = design(
+      "payload: 2\nreflected_inertia: [0, 0, 0, 3, 0, 0]\n"
+      "null_damping: [0, 0, 0, 0, 0, 4]\n");
+  EXPECT_NEAR(result["task_damping"][0][0], 20, 1e-10);
+  EXPECT_NEAR(result["task_damping"][3][3], 6, 1e-10);
+  EXPECT_NEAR(result["task_damping"][4][4], 3, 1e-10);
+  EXPECT_NEAR(result["after"]["zero_mode_rates"][0], -4, 1e-10);
+  for (const std::string wrong :
+       {"payload: -1\n", "payload: [1]\n", "reflected_inertia: [1]\n", "null_damping: [1, 2]\n",
+        "reflected_inertia: [0, 0, 0, -3, 0, 0]\n"}) {
+    const Outcome outcome = run_program({"design", "-", "--damping-ratio", "0.5"}, kSix + wrong);
+    EXPECT_EQ(outcome.status, 2) << wrong;
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_EQ(count_lines(outcome.err), 1);
+    EXPECT_THAT(outcome.err, HasSubstr(wrong.substr(0, wrong.find(':'))));
+  }
+}
+
+TEST(DesignBesideWhatIsThere, RefusesOptionsThatDoNotFit) {
+  const auto refused = [](std::vector<std::string> options, const std::string& reason) {
+    options.insert(options.begin(), kPanda.begin(), kPanda.end());
+    const Outcome outcome = run_program(options);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(reason));
+  };
+  refused({"--viscous-friction", "1,2"}, "--viscous-friction: 2 numbers, expected 1 or 7");
+  refused({"--reflected-inertia", "-1"}, "--reflected-inertia: a number is negative");
+  refused({"--payload", "1,2"}, "--payload: 1 or 4 numbers");
+  refused({"--payload", "-1"}, "--payload: the mass is negative");
+  const Outcome idle = run_program({"design", "x.yaml", "--damping-ratio", "1", "--payload", "1"});
+  EXPECT_THAT(idle.err, HasSubstr("--urdf: missing"));
+}
+
+// The trends by what a user can change, against the program itself with that changed.
+TEST(DesignTrends, MatchWhatTheProgramSaysOfAChangedArm) {
+  const Json base =
+      panda({"--sensitivity", "--viscous-friction", "0.1", "--reflected-inertia", "0.1"});
+  const MatrixXd C = matrix(base["task_damping"]);
+  const MatrixXd friction = 0.1 * MatrixXd::Identity(7, 7);
+  const auto of = [&](double inertia, double payload, double rub) {
+    controller::ModelOptions options;
+    options.reflected_inertia = VectorXd::Constant(7, 0.1);
+    options.reflected_inertia[3] += inertia;
+    options.payload.mass = payload;
+    MatrixXd D = friction;
+    D(3, 3) += rub;
+    auto found = ratios(options, C, D);
+    std::sort(found.begin(), found.end());
+    return found;
+  };
+  // All ratios are 0.7 at first, so that their sum tells what the sorted ones cannot.
+  const auto change = [&](const std::vector<double>& to, const std::vector<double>& from) {
+    double sum = 0;
+    for (std::size_t i = 0; i < 6; ++i) sum += to[i] - from[i];
+    return sum;
+  };
+  const double h = 1e-4;
+  double by_inertia = 0, by_payload = 0, by_friction = 0;
+  for (const Json& mode : base["sensitivity"]) {
+    by_inertia += mode["damping_ratio"]["reflected_inertia"][3].get<double>();
+    by_payload += mode["damping_ratio"]["payload"].get<double>();
+    by_friction += mode["damping_ratio"]["viscous_friction"][3].get<double>();
+  }
+  EXPECT_NEAR(change(of(h, 0, 0), of(-h, 0, 0)) / (2 * h), by_inertia, 1e-3 * std::abs(by_inertia));
+  EXPECT_NEAR(change(of(0, 2 * h, 0), of(0, 0, 0)) / (2 * h), by_payload,
+              2e-2 * std::abs(by_payload));
+  EXPECT_NEAR(change(of(0, 0, h), of(0, 0, -h)) / (2 * h), by_friction,
+              1e-3 * std::abs(by_friction));
+  EXPECT_GT(std::abs(by_inertia), 1e-3);
+  EXPECT_GT(std::abs(by_payload), 1e-3);
+}
+
+}  // namespace
+}  // namespace dashpot::tests

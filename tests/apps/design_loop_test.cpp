@@ -1,0 +1,96 @@
+// `dashpot design --period`: what a sampled loop bears, of a mass under a held force.
+#include <dashpot/tests/apps/json_result.hpp>
+
+#include <cmath>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// 2 kg on 800 N/m: 20 rad/s. Sampled every 20 ms it is stable for 8 N s/m < c < 200 N s/m.
+const std::string kMass = "mass: [[2]]\nstiffness: [[800]]\n";
+
+Outcome design(const std::string& text, std::vector<std::string> options) {
+  options.insert(options.begin(), {"design", "-"});
+  return run_program(options, text);
+}
+
+Json design_json(const std::string& text, std::vector<std::string> options) {
+  options.emplace_back("--json");
+  return parse(design(text, std::move(options)));
+}
+
+TEST(DesignForALoop, KeepsTheRatioWhereTheLoopBearsIt) {
+  const Json result = design_json(kMass, {"--damping-ratio", "1", "--period", "0.02"});
+  EXPECT_EQ(result["reached"], true);
+  EXPECT_EQ(result["loop"]["level"], 1);
+  EXPECT_EQ(result["loop"]["margin"], 2);
+  EXPECT_NEAR(result["loop"]["gain_margin"], 2.5, 1e-5);  // 80 of 200 N s/m
+  ASSERT_EQ(result["loop"]["modes"].size(), 1U);
+  // s^2 + 40 s + 400 seen every 20 ms through a hold: z^2 - 1.12 z + 0.28 = 0
+  const double rate = -std::log(0.28) / 2 / 0.02;  // of both roots together, halved
+  const Json& mode = result["loop"]["modes"][0];
+  EXPECT_NEAR(mode["damping_ratio"].get<double>() * mode["natural_frequency"].get<double>(), rate,
+              1e-6);
+}
+
+TEST(DesignForALoop, LowersTheRatioToWhatKeepsTheMarginAndSaysSo) {
+  const std::vector<std::string> options = {"--damping-ratio", "2",  "--period", "0.02",
+                                            "--margin",        "1.6"};
+  const Json result = design_json(kMass, options);
+  const double borne = 200 / 1.6 / 80;  // 1.5625
+  EXPECT_EQ(result["reached"], false);
+  EXPECT_NEAR(result["loop"]["level"], borne / 2, 2e-6);
+  EXPECT_NEAR(result["modes"][0]["damping_ratio"], borne, 4e-6);
+  ASSERT_EQ(result["misses"].size(), 1U);
+  EXPECT_EQ(result["misses"][0]["reason"], "loop");
+  EXPECT_EQ(result["misses"][0]["wanted"], 2);
+  const Outcome table = design(kMass, options);
+  EXPECT_EQ(table.status, 0);
+  EXPECT_THAT(table.out, HasSubstr("The loop bears 1.56250 instead of 2.00"));
+  EXPECT_THAT(table.out, HasSubstr("Every mode has a damping ratio of 1.56250"));
+}
+
+// Friction of the joints acts at once: it takes none of what the loop bears.
+TEST(DesignForALoop, TakesTheDampingThatIsThereForTheJointsOwn) {
+  const Json result =
+      design_json(kMass + "damping: [[40]]\n", {"--damping-ratio", "2.5", "--period", "0.02"});
+  const double without = design_json(
+      kMass, {"--damping-ratio", "2.5", "--period", "0.02"})["modes"][0]["damping_ratio"];
+  EXPECT_NEAR(without, 100. / 80, 1e-5);
+  // about (100 + 40) / 80, less as friction brakes within a tick
+  EXPECT_GT(result["modes"][0]["damping_ratio"], without + 0.3);
+}
+
+TEST(DesignForALoop, ProposesNothingWhereNoRatioWillDo) {
+  const Outcome outcome = design("- " + std::string("{mass: [[2]], stiffness: [[800]]}\n"),
+                                 {"--damping-ratio", "0.09", "--period", "0.02"});
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.out, IsEmpty());
+  EXPECT_EQ(count_lines(outcome.err), 1);
+  EXPECT_THAT(outcome.err,
+              HasSubstr("[0]: no damping ratio up to 0.0900 keeps a gain margin of 2"));
+}
+
+TEST(DesignForALoop, RefusesOptionsThatMakeNoLoop) {
+  const auto refused = [](std::vector<std::string> options, const std::string& reason) {
+    options.insert(options.end(), {"--damping-ratio", "1"});
+    const Outcome outcome = design(kMass, options);
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.out, IsEmpty());
+    EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(reason));
+  };
+  refused({"--delay", "1"}, "--period: missing");
+  refused({"--margin", "3"}, "--period: missing");
+  refused({"--period", "0"}, "a time in s is wanted");
+  refused({"--period", "0.001", "--margin", "0.99"}, "a factor of at least 1");
+  refused({"--period", "0.001", "--delay", "-1"}, "--delay");
+  refused({"--period", "0.001", "--cutoff", "nan"}, "a frequency in Hz");
+  refused({"--period", "0.001", "--region"}, "--period: does not go with --region");
+}
+
+}  // namespace
+}  // namespace dashpot::tests

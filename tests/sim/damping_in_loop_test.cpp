@@ -1,0 +1,206 @@
+// Damping that is designed for a sampled loop, in that loop: what is proposed settles, and a little
+// more than the gain margin that it claims does not.
+#include <dashpot/analysis/damping_sampled.hpp>
+#include <dashpot/sim/linear_system.hpp>
+#include <dashpot/tests/support/random_arms.hpp>
+#include <dashpot/tests/support/released_arm.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+
+namespace dashpot {
+namespace {
+
+using analysis::DampingMiss;
+using analysis::DampingTarget;
+using analysis::LoopLimit;
+using analysis::SampledDamping;
+using analysis::TaskImpedance;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::Random;
+
+sim::PlantOptions plant_options(const analysis::SampledLoop& loop) {
+  sim::PlantOptions options;
+  options.period = loop.period;
+  options.integrator.max_step = loop.period;
+  options.delay = loop.delay;
+  options.torque_cutoff = loop.torque_cutoff;
+  options.difference_velocity = loop.difference_velocity;
+  return options;
+}
+
+/// Largest speed in the last tenth of a release, by that of the first tenth. `factor` multiplies
+/// springs and the controller's damping.
+double growth(const analysis::System<>& system, const analysis::SampledLoop& loop, double factor,
+              const VectorXd& start) {
+  const Eigen::Index n = system.dof();
+  const MatrixXd D = loop.friction.size() > 0 ? loop.friction : MatrixXd::Zero(n, n);
+  const MatrixXd K = factor * system.stiffness, C = factor * (system.damping - D);
+  analysis::System<> scaled = system;
+  scaled.stiffness = K;
+  scaled.damping = C + D;
+  scaled.stiffness_factor.resize(0, n);
+  scaled.has_tails = false;
+  const double radius = sample_loop(scaled, analyze(scaled), loop).spectral_radius;
+  const double wanted = 200 + 12 / std::abs(std::log(radius));
+  const int ticks = static_cast<int>(std::min(wanted, 50000.0));
+  sim::LinearSystem masses(system.mass, D, MatrixXd::Zero(n, n));
+  sim::Plant plant(masses, plant_options(loop), start);
+  double first = 0, last = 0;
+  for (int k = 0; k < ticks; ++k) {
+    const sim::Measurement& seen = plant.measured();
+    EXPECT_EQ(plant.step(-K * seen.position - C * seen.velocity), sim::Status::kOk);
+    const double speed = plant.velocity().norm();
+    if (k < ticks / 10) first = std::max(first, speed);
+    if (k >= ticks - ticks / 10) last = std::max(last, speed);
+  }
+  return last / first;
+}
+
+/// A loop that the fastest mode of the arm tries.
+LoopLimit random_limit(const TaskImpedance& arm, Random& random, int seed) {
+  const double fastest = design_damping(arm, {}).spectrum.modes[0].natural_frequency;
+  LoopLimit limit;
+  limit.gain_margin = random.uniform(1.05, 2.5);
+  limit.loop.period = random.log_uniform(0.1, 0.5) / fastest;
+  limit.loop.delay = seed % 3;
+  limit.loop.torque_cutoff =
+      random.integer(0, 1) * random.log_uniform(0.1, 0.3) / limit.loop.period;
+  limit.loop.difference_velocity = random.integer(0, 1) == 1;
+  return limit;
+}
+
+TEST(DampingInLoop, SettlesWithTheMarginThatItClaimsAndNoMore) {
+  int kept = 0, lowered = 0, given_up = 0;
+  for (int seed = 1; seed <= 40; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(static_cast<std::uint64_t>(seed));
+    const int n = random.integer(2, 5);
+    TaskImpedance arm = random_arm(random, n, random.integer(1, n));
+    LoopLimit limit = random_limit(arm, random, seed);
+    if (seed % 3 == 0) {
+      arm.damping = testing::random_friction(random, n, 1);
+      limit.loop.friction = *arm.damping;
+    }
+    const DampingTarget target = DampingTarget::constant(random.uniform(0.3, 2));
+    const SampledDamping result = design_damping(arm, target, limit);
+    if (!result.kept) {
+      EXPECT_LT(result.gain_margin, limit.gain_margin);
+      ++given_up;
+      continue;
+    }
+    EXPECT_GE(result.gain_margin, limit.gain_margin);
+    EXPECT_TRUE(result.sampled.stable());
+    EXPECT_EQ(analysis::negative_eigenvalues(result.design.damping).size(), 0);
+    ++(result.level < 1 ? lowered : kept);
+    if (!std::isfinite(result.gain_margin)) continue;
+    const VectorXd start = random.vector(n);
+    const auto& system = result.design.system;
+    EXPECT_LT(growth(system, limit.loop, 1, start), 0.1);
+    EXPECT_LT(growth(system, limit.loop, 0.95 * result.gain_margin, start), 0.1);
+    EXPECT_GT(growth(system, limit.loop, 1.05 * result.gain_margin, start), 10);
+  }
+  std::printf("ratio kept %d times, lowered %d, given up %d\n", kept, lowered, given_up);
+  EXPECT_GT(kept, 10);
+  EXPECT_GT(lowered, 5);
+  EXPECT_GT(given_up, 3);
+}
+
+TEST(DampingInLoop, LowersTheRatioNoFurtherThanItHasTo) {
+  int lowered = 0;
+  for (int seed = 1; seed <= 30; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(static_cast<std::uint64_t>(seed));
+    const TaskImpedance arm = random_arm(random, 4, 3);
+    const LoopLimit limit = random_limit(arm, random, seed);
+    const SampledDamping result = design_damping(arm, DampingTarget::constant(1.2), limit);
+    if (!result.kept || result.level == 1) continue;
+    ++lowered;
+    for (const analysis::Mode<>& mode : result.design.spectrum.modes) {
+      EXPECT_NEAR(mode.damping_ratio, 1.2 * result.level, 1e-9);
+    }
+    ASSERT_EQ(result.design.misses.size(), 3U);
+    for (const DampingMiss& miss : result.design.misses) {
+      EXPECT_EQ(miss.reason, DampingMiss::Reason::kLoop);
+      EXPECT_EQ(miss.wanted, 1.2);
+    }
+    for (double level = 1.0001 * result.level; level < 1; level *= 1.03) {
+      const analysis::DampingDesign more =
+          design_damping(arm, DampingTarget::constant(1.2 * level));
+      EXPECT_LT(gain_margin(more.system, more.spectrum, limit.loop), limit.gain_margin) << level;
+    }
+  }
+  EXPECT_GT(lowered, 8);
+}
+
+// Under a held force z^2 + (c T/m + k T^2/2m - 2) z + 1 - c T/m + k T^2/2m = 0: stable for
+// k T / 2 < c < 2 m / T.
+TEST(DampingInLoop, FindsTheBoundsOfASingleMass) {
+  TaskImpedance mass;
+  mass.mass = MatrixXd::Constant(1, 1, 2);
+  mass.stiffness = MatrixXd::Constant(1, 1, 800);  // 20 rad/s
+  LoopLimit limit;
+  limit.loop.period = 0.02;
+  limit.gain_margin = 1.5;
+  const double largest = 2 * 2 / 0.02 / 1.5;                  // N s/m
+  const double ratio = largest / (2 * std::sqrt(2 * 800.0));  // 1.667
+  EXPECT_NEAR(design_damping(mass, DampingTarget::constant(3), limit).level, ratio / 3, 2e-6);
+  EXPECT_EQ(design_damping(mass, DampingTarget::constant(0.99 * ratio), limit).level, 1);
+  // k T / 2 = 8 N s/m is a ratio of 0.1: less is unstable, and nothing lower helps.
+  const SampledDamping none = design_damping(mass, DampingTarget::constant(0.09), limit);
+  EXPECT_FALSE(none.kept);
+  EXPECT_LT(none.gain_margin, 1);
+}
+
+TEST(DampingInLoop, GivesUpWhereSpringsAloneAreTooMuch) {
+  Random random(7);
+  TaskImpedance arm = random_arm(random, 4, 3);
+  LoopLimit limit;
+  limit.loop.period = 0.2;
+  limit.loop.delay = 3;
+  const SampledDamping result = design_damping(arm, DampingTarget::constant(0.7), limit);
+  EXPECT_FALSE(result.kept);
+  EXPECT_LT(result.gain_margin, 1);
+}
+
+TEST(DampingInLoop, FindsAMarginThatOnlyFewRatiosKeep) {
+  Random random(8);
+  const TaskImpedance arm = random_arm(random, 4, 3);
+  LoopLimit limit;
+  limit.loop.delay = 2;
+  double most = 0, best = 0;
+  for (double level = 1; level > 0.01; level *= 0.998) {
+    const analysis::DampingDesign design = design_damping(arm, DampingTarget::constant(level));
+    const double margin = gain_margin(design.system, design.spectrum, limit.loop);
+    if (margin > most) most = margin, best = level;
+  }
+  ASSERT_LT(best, 1);
+  const DampingTarget target = DampingTarget::constant(best / 0.95);  // between grid points
+  limit.gain_margin = 1e9;                                            // out of reach
+  const SampledDamping none = design_damping(arm, target, limit);
+  EXPECT_FALSE(none.kept);
+  EXPECT_GE(none.gain_margin, most * (1 - 1e-4));
+  limit.gain_margin = most * (1 - 1e-4);
+  const SampledDamping narrow = design_damping(arm, target, limit);
+  EXPECT_TRUE(narrow.kept);
+  EXPECT_NEAR(narrow.level, 0.95, 0.01);
+}
+
+TEST(DampingInLoop, RefusesAMarginThatIsNone) {
+  Random random(9);
+  const TaskImpedance arm = random_arm(random, 3, 3);
+  LoopLimit limit;
+  limit.gain_margin = 0.9;
+  EXPECT_THROW(design_damping(arm, {}, limit), std::invalid_argument);
+  limit.gain_margin = std::nan("");
+  EXPECT_THROW(design_damping(arm, {}, limit), std::invalid_argument);
+  limit.gain_margin = 2;
+  limit.loop.period = 0;
+  EXPECT_THROW(design_damping(arm, {}, limit), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dashpot
