@@ -40,6 +40,7 @@ class MujocoPanda {
   State run(ReleasedPanda& /*ours*/, int steps) {
     active() = this;
     mjcb_passive = &push_tip;
+    mju_user_warning = [](const char*) {};  // of unstable steps; otherwise they go to a file
     put(ReleasedPanda::start());
     for (int i = 0; i < steps; ++i) mj_step(model_.get(), data_.get());
     State y{};

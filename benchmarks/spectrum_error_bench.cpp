@@ -6,7 +6,7 @@
 //     are formed outside the clock
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/benchmarks/quad_spectrum.hpp>
+#include <dashpot/tests/support/quad_spectrum.hpp>
 
 #include <benchmark/benchmark.h>
 #include <lapacke.h>
@@ -21,7 +21,7 @@
 namespace {
 
 using namespace dashpot::analysis;  // NOLINT(google-build-using-namespace)
-using dashpot::bench::QuadComplex;
+using dashpot::testing::QuadComplex;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Values = std::vector<std::complex<double>>;
@@ -97,11 +97,11 @@ std::vector<QuadComplex> truth_of(const System<>& system) {
   for (std::size_t i = 0; i < start.size(); ++i) {  // no two may be the same
     start[i].re *= 1 + 1e-10 * static_cast<double>(i + 1);
   }
-  return dashpot::bench::refine_eigenvalues(system, start);
+  return dashpot::testing::refine_eigenvalues(system, start);
 }
 
 void report(benchmark::State& state, const Problem& problem, const Values& found) {
-  state.counters["error"] = dashpot::bench::largest_error(problem.truth, found);
+  state.counters["error"] = dashpot::testing::largest_error(problem.truth, found);
 }
 
 template <int N>
