@@ -42,7 +42,9 @@ def merge(parts):
 
 
 def microseconds(row):
-    return row["cpu_time"] * NANOSECONDS[row["time_unit"]] / 1e3
+    """CPU time, but real time of what runs on several threads."""
+    kind = "real_time" if row["name"].endswith("/real_time") else "cpu_time"
+    return row[kind] * NANOSECONDS[row["time_unit"]] / 1e3
 
 
 class Results:
@@ -146,15 +148,15 @@ def accuracy_table(results):
 def exponents(results):
     """Time = c n^p, by least squares of the logarithms."""
     families = collections.defaultdict(list)
-    pattern = re.compile(r"((?:spectrum|dynamics|tick|growth|design)/\w+)/(\d+)$")
+    pattern = re.compile(r"((?:spectrum|dynamics|tick|growth|design)/\w+)/(\d+)(?:/real_time)?$")
     for name, row in results.rows.items():
         match = pattern.match(name)
         if match:
             families[match[1]].append((int(match[2]), microseconds(row)))
     lines = []
     for family, points in sorted(families.items()):
-        points = sorted(p for p in points if p[0] >= 2)
-        if len(points) < 4:
+        points = sorted(p for p in points if p[0] >= 2 or "threads" in family)
+        if len(points) < 3:
             continue
         x = [math.log(p[0]) for p in points]
         y = [math.log(p[1]) for p in points]
@@ -211,7 +213,7 @@ def main():
     print(text)
     print("Simulation, the fastest to an accuracy (and how much slower the rival is):")
     print("\n".join(accuracy_table(results)))
-    print("\nGrowth with the number of joints or modes:")
+    print("\nGrowth with the number of joints, modes, configurations, threads:")
     print("\n".join(exponents(results)))
     if "--publish" in sys.argv:
         publish(sys.argv[sys.argv.index("--publish") + 1], text)
