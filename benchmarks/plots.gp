@@ -1,8 +1,11 @@
 # Draws what report.py wrote: gnuplot -e "dir='build/bench'" benchmarks/plots.gp
 
-set style line 1 lc rgb '#1f5fa8' lw 2 pt 7 ps 0.5
-set style line 2 lc rgb '#d95f02' lw 1.5 pt 5 ps 0.4
-set style line 3 lc rgb '#7a7a7a' lw 1.5 pt 9 ps 0.5
+set style line 1 lc rgb '#1f5fa8' lw 3 pt 7 ps 0.6
+set style line 2 lc rgb '#d95f02' lw 3 pt 5 ps 0.6
+set style line 3 lc rgb '#7a7a7a' lw 3 pt 9 ps 0.6
+set style line 11 lc rgb '#9fbfe0' lw 1
+set style line 12 lc rgb '#f3c39b' lw 1
+set style line 13 lc rgb '#cccccc' lw 1
 set grid lc rgb '#dddddd'
 set border lc rgb '#555555'
 set logscale xy
@@ -15,17 +18,22 @@ do for [kind in 'svg png'] {
     set terminal pngcairo size 1200,460 background rgb 'white' font 'sans,10'
   }
   set output dir.'/simulation.'.kind
-  set multiplot layout 1,3 title 'A second of a released Panda: error against time, a line for each method'
+  set key top right
+  set multiplot layout 1,3 title 'A second of a released Panda: error against time; thin: each method, thick: the best of a library'
   set xlabel 'CPU time, us'
   set ylabel 'error of the joint angles, rad'
   set xrange [20:1e5]
   set yrange [1e-13:0.1]
-  set key bottom left
+  set key top right
   do for [gains in 'soft ordinary stiff'] {
     set title gains.(gains eq 'soft' ? ', 1e2 N/m' : gains eq 'ordinary' ? ', 1e3 N/m' : ', 1e5 N/m')
-    plot dir.'/simulation_'.gains.'_mujoco.dat' using 1:2 with linespoints ls 3 title 'MuJoCo', \
-         dir.'/simulation_'.gains.'_odeint.dat' using 1:2 with linespoints ls 2 title 'Boost.Odeint', \
-         dir.'/simulation_'.gains.'_ours.dat' using 1:2 with linespoints ls 1 title 'Dashpot'
+    file(whose, end) = dir.'/simulation_'.gains.'_'.whose.end.'.dat'
+    plot file('mujoco', '') using 1:2 with lines ls 13 notitle, \
+         file('odeint', '') using 1:2 with lines ls 12 notitle, \
+         file('ours', '') using 1:2 with lines ls 11 notitle, \
+         file('mujoco', '_front') using 1:2 with linespoints ls 3 title 'MuJoCo', \
+         file('odeint', '_front') using 1:2 with linespoints ls 2 title 'Boost.Odeint', \
+         file('ours', '_front') using 1:2 with linespoints ls 1 title 'Dashpot'
   }
   unset multiplot
   unset output
@@ -40,9 +48,9 @@ do for [kind in 'svg png'] {
   set ylabel 'relative error'
   set xrange [0.2:1e4]
   set yrange [1e-17:20]
-  set key top right
   do for [scaling in 'well badly'] {
     do for [family in 'light critical heavy'] {
+      if (scaling eq 'well') { set key top right } else { unset key }
       set title family.' damping, '.scaling.' scaled'
       name = dir.'/spectrum_'.family.'_'.scaling.'_'
       plot name.'dggev.dat' using 1:2 with points lc rgb '#7a7a7a' pt 9 title 'LAPACK dggev', \

@@ -167,6 +167,19 @@ def exponents(results):
     return lines
 
 
+def front(points):
+    """Those (time, error) that no other beats in both."""
+    best = []
+    for time, error in sorted(points):
+        if not best or error < best[-1][1]:
+            best.append((time, error))
+    return best
+
+
+def write_points(file, points):
+    file.writelines(f"{time:.6g} {min(max(error, 1e-17), 10):.6g}\n" for time, error in points)
+
+
 def write_plot_data(results, directory):
     for gains in GAINS:
         for whose in ("ours", "odeint", "mujoco"):
@@ -175,23 +188,21 @@ def write_plot_data(results, directory):
                 methods[method.split("/")[0]].append((time, error))
             with open(directory / f"simulation_{gains}_{whose}.dat", "w") as file:
                 for method, points in sorted(methods.items()):
-                    front = []  # what no other run of the method beats in both
-                    for time, error in sorted(points):
-                        if not front or error < front[-1][1]:
-                            front.append((time, error))
                     file.write(f"# {method}\n")
-                    file.writelines(f"{t:.6g} {max(e, 1e-15):.6g}\n" for t, e in front)
+                    write_points(file, front(points))
                     file.write("\n")
+            with open(directory / f"simulation_{gains}_{whose}_front.dat", "w") as file:
+                write_points(file, front(sum(methods.values(), [])))
     for family in ("light", "critical", "heavy"):
         for scaling in ("well", "badly"):
             rows = collections.defaultdict(list)
             for name, row in results.rows.items():
                 parts = name.split("/")
                 if parts[:2] == ["spectrum_error", f"{family}_{scaling}"]:
-                    rows[parts[2]].append((microseconds(row), max(row["error"], 1e-17)))
+                    rows[parts[2]].append((microseconds(row), row["error"]))
             for method, points in rows.items():
                 with open(directory / f"spectrum_{family}_{scaling}_{method}.dat", "w") as file:
-                    file.writelines(f"{t:.6g} {min(e, 1e1):.6g}\n" for t, e in sorted(points))
+                    write_points(file, sorted(points))
 
 
 def publish(path, text):
