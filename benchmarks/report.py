@@ -215,7 +215,8 @@ def publish(path, text):
 def main():
     directory = pathlib.Path(sys.argv[1])
     names = sorted(glob.glob(str(directory / "parts" / "*.json")))
-    merged = merge([json.load(open(name)) for name in names])
+    # A program of which a filter leaves nothing writes nothing.
+    merged = merge([json.load(open(name)) for name in names if pathlib.Path(name).stat().st_size])
     (directory / "results.json").write_text(json.dumps(merged, indent=1))
     results = Results(merged)
     text = markdown(headline(results), merged["context"])

@@ -144,6 +144,9 @@ TEST(Oscillator, StepsHaveTheStabilityFunctionOfTheMethod) {
     const VectorXd euler = oscillator_step(Method::kSemiImplicitEuler, h);
     EXPECT_NEAR(euler[1], -h, 1e-15);
     EXPECT_NEAR(euler[0], 1 - h * h, 1e-15);
+    const VectorXd verlet = oscillator_step(Method::kVelocityVerlet, h);
+    EXPECT_NEAR(verlet[0], 1 - h * h / 2, 1e-15);
+    EXPECT_NEAR(verlet[1], -h + h * h * h / 4, 1e-14);
   }
 }
 
@@ -229,7 +232,8 @@ TEST(StiffJoint, IsDampedWithinAStepByRosenbrockAndNotByMidpoint) {
 // --------------------------------------------------------------------------- step size control
 
 TEST(AdaptiveSteps, KeepToTheToleranceAndGrowWithIt) {
-  for (const Method method : {Method::kDormandPrince, Method::kRosenbrock}) {
+  for (const Method method :
+       {Method::kDormandPrince, Method::kDormandPrince8, Method::kRosenbrock}) {
     double last_error = 0;
     for (const double tolerance : {1e-9, 1e-6}) {
       Arm arm(testing::pendulum(2));
@@ -247,6 +251,43 @@ TEST(AdaptiveSteps, KeepToTheToleranceAndGrowWithIt) {
       last_error = error;
     }
   }
+}
+
+/// An oscillator that counts how often it is asked.
+class CountingOscillator : public LinearSystem {
+ public:
+  CountingOscillator() : LinearSystem(kOne, kZero, kOne) {}
+  void rates(const StateVector& y, StateVector& y_dot) noexcept override {
+    ++evaluations;
+    LinearSystem::rates(y, y_dot);
+  }
+  int evaluations = 0;
+};
+
+TEST(Evaluations, AreNotMadeTwice) {
+  const auto evaluations = [](Method method, bool adaptive) {
+    IntegratorOptions options;
+    options.method = method;
+    options.max_step = 0.01;
+    options.adaptive = adaptive;
+    options.absolute_tolerance = 1;  // every step is as long as it may be
+    Integrator integrator(options);
+    CountingOscillator system;
+    StateVector y = StateVector::Zero(2 + kWorkChannels);
+    y[0] = 1;
+    EXPECT_EQ(integrator.advance(system, 1, y), Status::kOk);
+    EXPECT_NEAR(y[0], std::cos(1), 1e-2);
+    return system.evaluations;
+  };
+  EXPECT_EQ(evaluations(Method::kSemiImplicitEuler, false), 100);
+  EXPECT_EQ(evaluations(Method::kVelocityVerlet, false), 101);
+  EXPECT_EQ(evaluations(Method::kRungeKutta4, false), 400);
+  EXPECT_EQ(evaluations(Method::kDormandPrince, false), 600);
+  EXPECT_EQ(evaluations(Method::kDormandPrince8, false), 1200);
+  // One more finds the first step; the last stage is the next step's first one.
+  EXPECT_EQ(evaluations(Method::kDormandPrince, true), 1 + 1 + 6 * 100);
+  EXPECT_EQ(evaluations(Method::kDormandPrince8, true), 1 + 12 * 100);
+  EXPECT_EQ(evaluations(Method::kRosenbrock, true), 1 + 5 * 100);
 }
 
 TEST(AdaptiveSteps, GiveUpWhenThereAreTooMany) {
