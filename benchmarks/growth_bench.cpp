@@ -15,7 +15,7 @@ using namespace dashpot;  // NOLINT(google-build-using-namespace)
 void design(benchmark::State& state, int configurations, int threads) {
   std::vector<analysis::TaskImpedance> region;
   for (int i = 0; i < configurations; ++i) {
-    const testing::ArmModel arm = testing::panda(testing::swing(0.1 * i));
+    const testing::ArmModel arm = testing::panda(testing::swing(3.2 * i / configurations));
     analysis::TaskImpedance impedance;
     impedance.mass = arm.mass;
     impedance.jacobian = arm.jacobian;

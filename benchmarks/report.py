@@ -47,9 +47,17 @@ def microseconds(row):
     return row[kind] * NANOSECONDS[row["time_unit"]] / 1e3
 
 
+def is_too_short(row):
+    """Interrupted while it was found how often to repeat it, so that it ran a few times, cold."""
+    nanoseconds = row["cpu_time"] * NANOSECONDS[row["time_unit"]]
+    return nanoseconds < 1e5 and nanoseconds * row["iterations"] < 2e5
+
+
 class Results:
     def __init__(self, merged):
-        self.rows = {r["name"]: r for r in merged["benchmarks"] if not r.get("error_occurred")}
+        rows = [r for r in merged["benchmarks"] if not r.get("error_occurred")]
+        self.too_short = [r["name"] for r in rows if is_too_short(r)]
+        self.rows = {r["name"]: r for r in rows if not is_too_short(r)}
 
     def time(self, name):
         return microseconds(self.rows[name]) if name in self.rows else None
@@ -227,6 +235,9 @@ def main():
     print("\n".join(accuracy_table(results)))
     print("\nGrowth with the number of joints, modes, configurations, threads:")
     print("\n".join(exponents(results)))
+    if results.too_short:
+        print("\nLeft out of all this, for they ran too short (a busy machine?); run again:")
+        print("  " + ", ".join(results.too_short))
     if "--publish" in sys.argv:
         publish(sys.argv[sys.argv.index("--publish") + 1], text)
 

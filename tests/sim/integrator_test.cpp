@@ -91,7 +91,7 @@ TEST_P(Methods, HaveTheirOrderOnAnArm) {
   const auto error = [&](int steps) {
     return (end_of(fixed_steps(GetParam(), 0.5 / steps), steps) - expected).norm();
   };
-  const int steps = order_of(GetParam()) < 3 ? 800 : order_of(GetParam()) < 8 ? 80 : 8;
+  const int steps = order_of(GetParam()) < 3 ? 800 : order_of(GetParam()) < 8 ? 80 : 6;
   expect_order(error(steps), error(2 * steps), GetParam());
 }
 
