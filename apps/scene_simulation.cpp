@@ -33,10 +33,12 @@ void read_integrator(const YamlMapping& simulation, double period,
                      sim::IntegratorOptions& options) {
   static constexpr std::array<std::string_view, 5> kKeys = {
       "method", "step", "adaptive", "absolute_tolerance", "relative_tolerance"};
-  static constexpr std::array<std::pair<std::string_view, sim::Method>, 5> kMethods = {
+  static constexpr std::array<std::pair<std::string_view, sim::Method>, 7> kMethods = {
       {{"semi_implicit_euler", sim::Method::kSemiImplicitEuler},
        {"rk4", sim::Method::kRungeKutta4},
+       {"velocity_verlet", sim::Method::kVelocityVerlet},
        {"dormand_prince", sim::Method::kDormandPrince},
+       {"dormand_prince_8", sim::Method::kDormandPrince8},
        {"implicit_midpoint", sim::Method::kImplicitMidpoint},
        {"rosenbrock", sim::Method::kRosenbrock}}};
   const YamlMapping keys = simulation.mapping("integrator", kKeys);
@@ -46,9 +48,9 @@ void read_integrator(const YamlMapping& simulation, double period,
   if (options.max_step < period / kMostSteps) {
     throw keys.error("step", "is less than a thousandth of the control period");
   }
-  if (options.adaptive && options.method != sim::Method::kDormandPrince &&
-      options.method != sim::Method::kRosenbrock) {
-    throw keys.error("adaptive", "goes with method dormand_prince or rosenbrock only");
+  if (options.adaptive && !sim::estimates_error(options.method)) {
+    throw keys.error("adaptive",
+                     "goes with method dormand_prince, dormand_prince_8 or rosenbrock only");
   }
   read_number(keys, "absolute_tolerance", "", Sign::kPositive, options.absolute_tolerance);
   read_number(keys, "relative_tolerance", "", Sign::kPositive, options.relative_tolerance);

@@ -26,9 +26,11 @@ struct Stepper {
   const char* name;
   Method method;
 };
-constexpr std::array<Stepper, 5> kSteppers = {{{"euler", Method::kSemiImplicitEuler},
+constexpr std::array<Stepper, 7> kSteppers = {{{"euler", Method::kSemiImplicitEuler},
                                                {"rk4", Method::kRungeKutta4},
+                                               {"velocity_verlet", Method::kVelocityVerlet},
                                                {"dormand_prince", Method::kDormandPrince},
+                                               {"dormand_prince_8", Method::kDormandPrince8},
                                                {"implicit_midpoint", Method::kImplicitMidpoint},
                                                {"rosenbrock", Method::kRosenbrock}}};
 

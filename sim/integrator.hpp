@@ -12,7 +12,10 @@ namespace dashpot::sim {
 enum class Method : std::uint8_t {
   kSemiImplicitEuler,  ///< order 1, symplectic: qd += h qdd(q, qd), then q += h qd; 1 evaluation
   kRungeKutta4,        ///< order 4, 4 evaluations; stable on the axes for omega h < 2.8
+  kVelocityVerlet,     ///< order 2, 1 evaluation; as stable as kSemiImplicitEuler where damping is
+                       ///< small
   kDormandPrince,      ///< order 5 with an error estimate of order 4, 6 evaluations
+  kDormandPrince8,     ///< order 8 with an error estimate of orders 5 and 3, 12 evaluations
   kImplicitMidpoint,   ///< order 2, symplectic, stable for any stiffness; 2n + 4 or so evaluations
   kRosenbrock,  ///< RODAS3: order 3 with an estimate of order 2, damps the stiffest (L-stable)
                 ///< 2n + 3 evaluations, nothing to iterate
@@ -21,14 +24,17 @@ enum class Method : std::uint8_t {
 struct IntegratorOptions {
   Method method = Method::kRungeKutta4;
   double max_step = 0.001;  ///< s; a segment is cut into equal steps no longer than this
-  /// kDormandPrince and kRosenbrock: step size from the error estimate, up to max_step, and steps
-  /// end where a contact begins or ends. Otherwise contacts begin and end within a step, or with
-  /// implicit methods at the end of one.
+  /// Methods with an error estimate: step size from it, up to max_step, and steps end where a
+  /// contact begins or ends. Otherwise contacts begin and end within a step, or with implicit
+  /// methods at the end of one.
   bool adaptive = false;
   double absolute_tolerance = 1e-10;  ///< of a step, adaptive: rad, rad/s (m, m/s)
   double relative_tolerance = 1e-8;
   int max_steps = 100000;  ///< in one segment, rejected ones too, adaptive
 };
+
+/// Whether a method has an error estimate, which IntegratorOptions::adaptive needs.
+bool estimates_error(Method method) noexcept;
 
 /// Moves a system through a segment of time (system.hpp). Allocates nothing.
 class Integrator {
@@ -43,7 +49,9 @@ class Integrator {
   using StepFunction = Status (Integrator::*)(System& system, double h) noexcept;
   Status semi_implicit_euler(System& system, double h) noexcept;
   Status runge_kutta_4(System& system, double h) noexcept;
+  Status velocity_verlet(System& system, double h) noexcept;
   Status dormand_prince(System& system, double h) noexcept;
+  Status dormand_prince_8(System& system, double h) noexcept;
   Status implicit_midpoint(System& system, double h) noexcept;
   Status rosenbrock(System& system, double h) noexcept;
 
@@ -51,6 +59,13 @@ class Integrator {
   Status advance_adaptive(System& system, double duration, StateVector& y) noexcept;
   Status land_on_contact(System& system, ContactModes modes, double& h) noexcept;
   double error_norm() const noexcept;
+  double weighted_size(const StateVector& x) const noexcept;
+  double first_step(System& system) noexcept;
+
+  /// rates_[0] := y' at y_, unless it is known.
+  void begin_step(System& system) noexcept;
+  /// y_ := next_
+  void end_step() noexcept;
 
   /// (d qdd, d work') / d (q, qd) at y_ by differences; rates_[0] is y' there.
   void differentiate(System& system) noexcept;
@@ -65,9 +80,12 @@ class Integrator {
   IntegratorOptions options_;
   StepFunction step_;
   double exponent_ = 0;                   // of the error in the choice of the step, adaptive
-  double next_step_ = 0;                  // s, adaptive
+  double next_step_ = 0;                  // s, adaptive; 0: none tried so far
   StateVector y_, next_, error_, stage_;  // a step goes from y_ to next_
-  std::array<StateVector, 7> rates_;
+  std::array<StateVector, 12> rates_;     // y' at the stages, the first at y_
+  int rates_at_next_ = 0;                 // index of y' at next_, if a step finds it; 0: none
+  bool start_known_ = false;              // rates_[0] is y' at y_
+  bool jacobian_known_ = false;           // jacobian_ is that at y_
   JacobianMatrix jacobian_;
   JointMatrix reduced_;
   Eigen::PartialPivLU<JointMatrix> factors_;

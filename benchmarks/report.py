@@ -1,0 +1,245 @@
+"""Makes of the benchmarks' parts what ./run bench shows:
+    report.py DIR [--publish README]
+reads DIR/parts/*.json (Google Benchmark's, repeated), writes DIR/results.json (a row for each name,
+with medians), DIR/headline.md, and DIR/*.dat for plots.gp, and prints the table and the exponents.
+--publish puts the headline into README, between its marks."""
+
+import collections
+import datetime
+import glob
+import json
+import math
+import pathlib
+import re
+import statistics
+import sys
+
+ACCURACIES = [10.0**-k for k in range(3, 10)]  # rad
+GAINS = {"soft": "1e2", "ordinary": "1e3", "stiff": "1e5"}
+TIMES = ("real_time", "cpu_time")
+NANOSECONDS = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9}
+
+
+def merge(parts):
+    """One row for each name: times are medians, `spread` is (longest - shortest) / median."""
+    repeated = collections.defaultdict(list)
+    for part in parts:
+        for row in part["benchmarks"]:
+            if row.get("run_type") != "aggregate":
+                repeated[row["name"]].append(row)
+    rows = []
+    for name, runs in repeated.items():
+        times = sorted(run.get("cpu_time", 0) for run in runs)
+        row = dict(runs[len(runs) // 2])
+        for key in TIMES:
+            if key in row:
+                row[key] = statistics.median(run[key] for run in runs)
+        row["repetitions"] = len(runs)
+        row["repetition_index"] = 0
+        row["spread"] = (times[-1] - times[0]) / row["cpu_time"] if row.get("cpu_time") else 0
+        rows.append(row)
+    return {"context": parts[0]["context"], "benchmarks": rows}
+
+
+def microseconds(row):
+    """CPU time, but real time of what runs on several threads."""
+    kind = "real_time" if row["name"].endswith("/real_time") else "cpu_time"
+    return row[kind] * NANOSECONDS[row["time_unit"]] / 1e3
+
+
+def is_too_short(row):
+    """Interrupted while it was found how often to repeat it, so that it ran a few times, cold."""
+    nanoseconds = row["cpu_time"] * NANOSECONDS[row["time_unit"]]
+    return nanoseconds < 1e5 and nanoseconds * row["iterations"] < 2e5
+
+
+class Results:
+    def __init__(self, merged):
+        rows = [r for r in merged["benchmarks"] if not r.get("error_occurred")]
+        self.too_short = [r["name"] for r in rows if is_too_short(r)]
+        self.rows = {r["name"]: r for r in rows if not is_too_short(r)}
+
+    def time(self, name):
+        return microseconds(self.rows[name]) if name in self.rows else None
+
+    def simulations(self, gains, whose):
+        """(error, us, method) of all runs."""
+        for name, row in self.rows.items():
+            parts = name.split("/")
+            if parts[:3] == ["simulation", gains, whose]:
+                yield row["error"], microseconds(row), "/".join(parts[3:])
+
+    def fastest(self, gains, whose, accuracy):
+        good = [s for s in self.simulations(gains, whose) if s[0] <= accuracy]
+        return min(good, key=lambda s: s[1]) if good else None
+
+
+def us(value):
+    return "-" if value is None else f"{value:.3g}"
+
+
+def comparison(results, what, ours, rivals):
+    """A row of the headline: the fastest of the rivals."""
+    mine = results.time(ours)
+    known = [(results.time(name), label) for name, label in rivals if results.time(name)]
+    if mine is None:
+        return None
+    if not known:
+        return [what, us(mine), "-", "", ""]
+    best = min(known)
+    return [what, us(mine), us(best[0]), best[1], f"{best[0] / mine:.2g}"]
+
+
+def headline(results):
+    rows = [
+        comparison(results, "spectrum of 6 modes, tracked, with proved bounds", "spectrum/tracked/6",
+                   [("spectrum/path_eigen/6", "Eigen"), ("spectrum/path_lapack/6", "LAPACK")]),
+        comparison(results, "the same, values only", "spectrum/values_only/6", []),
+        comparison(results, "the same, nothing has changed", "spectrum/reused/6", []),
+        comparison(results, "spectrum of 6 modes, from nothing, with bounds", "spectrum/direct/6",
+                   [("spectrum/eigen/6", "Eigen"), ("spectrum/lapack/6", "LAPACK")]),
+        comparison(results, "dynamics of 7 joints", "dynamics/dashpot/7",
+                   [("dynamics/kdl/7", "KDL"), ("dynamics/pinocchio/7", "Pinocchio")]),
+        comparison(results, "tick: Cartesian law, safety", "tick/cartesian/7", []),
+        comparison(results, "tick: with modes and snapshot", "tick/full/7", []),
+        comparison(results, "tick: with a damping ratio held", "tick/design/7", []),
+    ]
+    for gains in GAINS:
+        for accuracy in (1e-3, 1e-6, 1e-9):
+            mine = results.fastest(gains, "ours", accuracy)
+            rivals = [(results.fastest(gains, whose, accuracy), whose)
+                      for whose in ("odeint", "mujoco")]
+            rivals = [(found[1], f"{whose} {found[2].split('/')[0]}")
+                      for found, whose in rivals if found]
+            if mine and rivals:
+                best = min(rivals)
+                rows.append([f"1 s of a released arm, {gains}, to {accuracy:.0e} rad "
+                             f"({mine[2].split('/')[0]})", us(mine[1]), us(best[0]), best[1],
+                             f"{best[0] / mine[1]:.2g}"])
+    return [row for row in rows if row]
+
+
+def machine(context):
+    model = "unknown processor"
+    for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines():
+        if line.startswith("model name"):
+            model = line.split(":", 1)[1].strip()
+            break
+    return (f"{model}, {context['num_cpus']} x {context['mhz_per_cpu'] / 1000:.1f} GHz, "
+            f"{datetime.date.today().isoformat()}")
+
+
+def markdown(rows, context):
+    lines = [f"CPU time, median of repetitions in random order; {machine(context)}.", "",
+             "| | Dashpot, us | fastest rival, us | which | rival / Dashpot |",
+             "|---|---|---|---|---|"]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def accuracy_table(results):
+    """Of every accuracy, ours and the fastest rival."""
+    lines = []
+    for gains in GAINS:
+        for accuracy in ACCURACIES:
+            found = {whose: results.fastest(gains, whose, accuracy)
+                     for whose in ("ours", "odeint", "mujoco")}
+            if not found["ours"] or not found["odeint"]:
+                continue
+            text = "  ".join(f"{whose} {f[1]:7.0f} us ({f[2]})"
+                             for whose, f in found.items() if f)
+            ratio = min(f[1] for w, f in found.items() if f and w != "ours") / found["ours"][1]
+            lines.append(f"  {gains:8} {accuracy:.0e} rad  {ratio:5.2f}x  {text}")
+    return lines
+
+
+def exponents(results):
+    """Time = c n^p, by least squares of the logarithms."""
+    families = collections.defaultdict(list)
+    pattern = re.compile(r"((?:spectrum|dynamics|tick|growth|design)/\w+)/(\d+)(?:/real_time)?$")
+    for name, row in results.rows.items():
+        match = pattern.match(name)
+        if match:
+            families[match[1]].append((int(match[2]), microseconds(row)))
+    lines = []
+    for family, points in sorted(families.items()):
+        points = sorted(p for p in points if p[0] >= 2 or "threads" in family)
+        if len(points) < 3:
+            continue
+        x = [math.log(p[0]) for p in points]
+        y = [math.log(p[1]) for p in points]
+        middle_x, middle_y = statistics.mean(x), statistics.mean(y)
+        slope = (sum((a - middle_x) * (b - middle_y) for a, b in zip(x, y)) /
+                 sum((a - middle_x)**2 for a in x))
+        lines.append(f"  {family:28} n^{slope:4.2f}  ({points[0][0]} to {points[-1][0]})")
+    return lines
+
+
+def front(points):
+    """Those (time, error) that no other beats in both."""
+    best = []
+    for time, error in sorted(points):
+        if not best or error < best[-1][1]:
+            best.append((time, error))
+    return best
+
+
+def write_points(file, points):
+    file.writelines(f"{time:.6g} {min(max(error, 1e-17), 10):.6g}\n" for time, error in points)
+
+
+def write_plot_data(results, directory):
+    for gains in GAINS:
+        for whose in ("ours", "odeint", "mujoco"):
+            methods = collections.defaultdict(list)
+            for error, time, method in results.simulations(gains, whose):
+                methods[method.split("/")[0]].append((time, error))
+            with open(directory / f"simulation_{gains}_{whose}.dat", "w") as file:
+                for method, points in sorted(methods.items()):
+                    file.write(f"# {method}\n")
+                    write_points(file, front(points))
+                    file.write("\n")
+            with open(directory / f"simulation_{gains}_{whose}_front.dat", "w") as file:
+                write_points(file, front(sum(methods.values(), [])))
+    for family in ("light", "critical", "heavy"):
+        for scaling in ("well", "badly"):
+            rows = collections.defaultdict(list)
+            for name, row in results.rows.items():
+                parts = name.split("/")
+                if parts[:2] == ["spectrum_error", f"{family}_{scaling}"]:
+                    rows[parts[2]].append((microseconds(row), row["error"]))
+            for method, points in rows.items():
+                with open(directory / f"spectrum_{family}_{scaling}_{method}.dat", "w") as file:
+                    write_points(file, sorted(points))
+
+
+def publish(path, text):
+    begin, end = "<!-- headline of ./run bench -->\n", "<!-- end of headline -->\n"
+    readme = pathlib.Path(path).read_text()
+    before, rest = readme.split(begin)
+    pathlib.Path(path).write_text(before + begin + text + end + rest.split(end)[1])
+
+
+def main():
+    directory = pathlib.Path(sys.argv[1])
+    names = sorted(glob.glob(str(directory / "parts" / "*.json")))
+    # A program of which a filter leaves nothing writes nothing.
+    merged = merge([json.load(open(name)) for name in names if pathlib.Path(name).stat().st_size])
+    (directory / "results.json").write_text(json.dumps(merged, indent=1))
+    results = Results(merged)
+    text = markdown(headline(results), merged["context"])
+    (directory / "headline.md").write_text(text)
+    write_plot_data(results, directory)
+    print(text)
+    print("Simulation, the fastest to an accuracy (and how much slower the rival is):")
+    print("\n".join(accuracy_table(results)))
+    print("\nGrowth with the number of joints, modes, configurations, threads:")
+    print("\n".join(exponents(results)))
+    if results.too_short:
+        print("\nLeft out of all this, for they ran too short (a busy machine?); run again:")
+        print("  " + ", ".join(results.too_short))
+    if "--publish" in sys.argv:
+        publish(sys.argv[sys.argv.index("--publish") + 1], text)
+
+
+main()
