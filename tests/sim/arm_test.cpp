@@ -109,15 +109,15 @@ class Bounce {
 
 class Contacts : public ::testing::TestWithParam<bool> {
  protected:
-  const Contact contact_{20000, 60};
-  const double height_ = 0.05;
+  const Contact contact{20000, 60};
+  const double height = 0.05;
 
   ArmOptions options() const {
     ArmOptions options;
     if (GetParam()) {
-      options.wall = Wall{Vector3d(3, -2, 0), Vector3d(0, 0, 5), contact_};
+      options.wall = Wall{Vector3d(3, -2, 0), Vector3d(0, 0, 5), contact};
     } else {
-      options.stops = contact_;  // the slider's lower limit is 0
+      options.stops = contact;  // the slider's lower limit is 0
     }
     return options;
   }
@@ -127,9 +127,9 @@ INSTANTIATE_TEST_SUITE_P(Kinds, Contacts, ::testing::Bool(), [](const auto& inst
 });
 
 TEST_P(Contacts, BounceAsTheClosedFormSays) {
-  const Bounce expected(height_, contact_);
+  const Bounce expected(height, contact);
   Arm arm(slider(kDown), options());
-  Plant plant(arm, precise(0.001), joints({height_}));
+  Plant plant(arm, precise(0.001), joints({height}));
   for (int i = 0; i < 170; ++i) {
     ASSERT_EQ(run(plant, 1), Status::kOk);
     EXPECT_NEAR(plant.position()[0], expected.height(plant.time()), 1e-9) << plant.time();
@@ -138,14 +138,14 @@ TEST_P(Contacts, BounceAsTheClosedFormSays) {
   ASSERT_GT(plant.time(), expected.leaves_at() + 0.01);
   EXPECT_GT(plant.velocity()[0], 0.1);
   EXPECT_NEAR(plant.audit().contact_heat,
-              expected.heat() - contact_energy(contact_, -plant.position()[0]), 1e-8);
+              expected.heat() - contact_energy(contact, -plant.position()[0]), 1e-8);
 }
 
 TEST_P(Contacts, AreMetWithinAStepByFixedSteps) {
-  const Bounce expected(height_, contact_);
+  const Bounce expected(height, contact);
   for (const Method method : kMethods) {
     Arm arm(slider(kDown), options());
-    Plant plant(arm, fixed_steps(method, 1e-5), joints({height_}));
+    Plant plant(arm, fixed_steps(method, 1e-5), joints({height}));
     ASSERT_EQ(run(plant, 17000), Status::kOk);
     EXPECT_NEAR(plant.position()[0], expected.height(plant.time()), 2e-5)
         << static_cast<int>(method);
@@ -157,7 +157,7 @@ TEST_P(Contacts, ComeToRestOnTheSpring) {
   Arm arm(slider(kDown), options());
   Plant plant(arm, precise(0.01), joints({0.001}));
   ASSERT_EQ(run(plant, 300), Status::kOk);
-  EXPECT_NEAR(plant.position()[0], -kMass * 9.81 / contact_.stiffness, 1e-9);
+  EXPECT_NEAR(plant.position()[0], -kMass * 9.81 / contact.stiffness, 1e-9);
   EXPECT_NEAR(plant.velocity()[0], 0, 1e-9);
   EXPECT_NEAR(plant.audit().imbalance(), 0, 1e-9);
 }

@@ -114,10 +114,10 @@ struct Scene {
 class RingDown : public ::testing::TestWithParam<testing::Arm> {
  protected:
   static constexpr int kPostures = 20;
-  TwinModels twin_{GetParam()};
+  TwinModels twin{GetParam()};
 
   /// Every other one holds its posture.
-  Scene scene_of(int seed, Random& random) const { return {twin_, random, seed % 2 == 0}; }
+  Scene scene_of(int seed, Random& random) const { return {twin, random, seed % 2 == 0}; }
   void report(const Worst& worst) const {
     std::printf("%-12s %3d modes, seeds 1 to %d: frequency within %.2e, ratio within %.2e\n",
                 GetParam().file, worst.modes, kPostures, worst.frequency, worst.ratio);
