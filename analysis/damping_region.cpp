@@ -72,16 +72,17 @@ RegionDesign evaluate(const std::vector<DampingSample>& samples, const DampingFi
     system.has_tails = false;
     design.samples[i] = read(analyze(system), options.target);
   });
-  design.level = 1;
+  double smallest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const RegionSample& sample = design.samples[i];
     if (sample.worst_mode < 0 || !(sample.wanted > 0)) continue;
     const double level = sample.damping_ratio / sample.wanted;
-    if (design.worst_sample < 0 || level < design.level) {
-      design.level = std::min(1.0, level);
+    if (level < smallest) {
+      smallest = level;
       design.worst_sample = static_cast<int>(i);
     }
   }
+  design.level = std::min(1.0, smallest);
   design.violation = fit.violation(damping, {options.target, 0, ceiling_of(options)});
   return design;
 }

@@ -135,8 +135,11 @@ void check(const DesignOptions& options) {
     throw InputError("--urdf", "needs --base and --tip");
   }
   if (arm.urdf.empty() && arm.any())
-    throw InputError("--urdf", "missing, but wanted by other options");
+    throw InputError("--urdf", "missing; options that describe an arm need it");
   if (options.near && options.region) throw InputError("--near", "does not go with --region");
+  if (options.sensitivity && options.region) {
+    throw InputError("--sensitivity", "does not go with --region");
+  }
   if (options.largest_ratio && !options.region) {
     throw InputError("--largest-ratio", "needs --region");
   }
@@ -148,7 +151,7 @@ void check(const DesignOptions& options) {
   const bool loop = limit.loop.delay > 0 || limit.loop.torque_cutoff > 0 ||
                     limit.loop.difference_velocity || limit.gain_margin != 2;
   if (!options.period && loop) {
-    throw InputError("--period", "missing, but wanted by other options");
+    throw InputError("--period", "missing; --delay, --cutoff and --margin need it");
   }
   if (options.period && options.region) throw InputError("--period", "does not go with --region");
 }

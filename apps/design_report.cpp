@@ -150,7 +150,7 @@ std::string miss_text(const DesignReport& report) {
         text += "; too slow, next to a singularity.\n";
         break;
       case DampingMiss::Reason::kOverdone:
-        text += "; the damping there already is too much for it.\n";
+        text += "; what is there damps too much in some direction.\n";
         break;
       case DampingMiss::Reason::kStructure:
         text += "; no matrix of this structure was found that gives it.\n";

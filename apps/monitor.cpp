@@ -7,9 +7,11 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 
 namespace dashpot::apps {
@@ -64,6 +66,13 @@ auto open_input(const std::string& option, const Open& open) {
   }
 }
 
+/// Throws if a file in which no message was found cannot be a log that has just begun.
+void check_log(const std::string& path) {
+  std::error_code unknown;
+  if (std::filesystem::file_size(path, unknown) == 0 && !unknown) return;
+  throw CLI::ValidationError("--log", path + ": is no LCM log");
+}
+
 void watch_log(const Options& options, MonitorView& view, lcmtypes::MessageHandlers& handlers) {
   const auto reader = open_input(
       "--log", [&] { return std::make_unique<lcmtypes::LogReader>(options.log, handlers); });
@@ -85,6 +94,7 @@ void watch_log(const Options& options, MonitorView& view, lcmtypes::MessageHandl
     reader->handle();
     display.update(view);
   }
+  if (!first && !StopSignal::given()) check_log(options.log);
 }
 
 void watch_bus(const Options& options, MonitorView& view, lcmtypes::MessageHandlers& handlers) {
@@ -132,7 +142,10 @@ void add_monitor(CLI::App& program) {
   command
       ->add_option("--speed", options->speed,
                    "Pace of a log relative to its recording; 0 is as fast as possible")
-      ->check(CLI::NonNegativeNumber)
+      ->check([](const std::string& text) {
+        const double value = std::strtod(text.c_str(), nullptr);
+        return value >= 0 && value <= 1e6 ? "" : text + " is not in the range 0 to 1e6";
+      })
       ->option_text("X (1 on a terminal, otherwise 0)");
   command->footer(
       "Updated in place on a terminal; otherwise one line for each second. Ctrl-C, or the end of\n"

@@ -167,6 +167,9 @@ void run(const Options& options) {
   if (options.duration) scene.duration = *options.duration;
   std::optional<PluginLibrary> plugin;
   if (scene.arm) plugin.emplace(options.plugin);
+  if (!scene.arm && !options.plugin.empty()) {
+    throw InputError("--plugin", "has nothing to control: the scene is a system of matrices");
+  }
   const auto make_controller = [&] {
     return plugin ? plugin->create(scene.path, scene.dof())
                   : make_spectator(*scene.matrices, scene.plant.period);

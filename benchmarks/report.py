@@ -75,7 +75,9 @@ class Results:
 
 
 def us(value):
-    return "-" if value is None else f"{value:.3g}"
+    if value is None:
+        return "-"
+    return f"{value:.0f}" if value >= 100 else f"{value:#.3g}"
 
 
 def comparison(results, what, ours, rivals):

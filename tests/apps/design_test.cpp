@@ -144,6 +144,18 @@ TEST(Design, OfARegionMapsTheWorstMode) {
   EXPECT_THAT(table.err, IsEmpty());
 }
 
+TEST(Design, NamesTheWorstConfigurationWhereAllReachTheirRatio) {
+  const std::string list = "[{mass: [[1]], stiffness: [[4]]}, {mass: [[2]], stiffness: [[4]]}]";
+  const Json result = design_json(list, "0.7", {"--region"});
+  ASSERT_EQ(result["samples"].size(), 2U);
+  const double first = result["samples"][0]["damping_ratio"].get<double>();
+  const double second = result["samples"][1]["damping_ratio"].get<double>();
+  ASSERT_GT(first, second);
+  ASSERT_GT(second, 0.7);
+  EXPECT_EQ(result["worst_sample"], 1);
+  EXPECT_EQ(result["level"], 1);
+}
+
 TEST(Design, WritesTheMapOfARegion) {
   const std::string list = "[{mass: [[1]], stiffness: [[4]]}, {mass: [[4]], stiffness: [[4]]}]";
   const Scratch scratch;

@@ -193,6 +193,11 @@ TEST(Monitor, NamesWhatIsWrongWithItsInput) {
   };
   expect_error({"monitor", "--log", "/nonexistent/a.lcm"},
                "/nonexistent/a.lcm: cannot read the log: No such file or directory");
+  const Scratch scratch;
+  const std::string text = scratch.write("a.txt", std::string(200, 'x'));
+  expect_error({"monitor", "--log", text}, "a.txt: is no LCM log");
+  expect_error({"monitor", "--log", scratch.path("")}, "is no LCM log");
+  expect_error({"monitor", "--log", text, "--speed", "nan"}, "--speed");
   expect_error({"monitor", "--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x");
   expect_error({"monitor", "--log", "a", "--lcm-url", "memq://"}, "--lcm-url");
   expect_error({"monitor", "--log", "a", "--speed", "-1"}, "--speed");
