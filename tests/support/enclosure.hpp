@@ -143,7 +143,7 @@ Verdict judge(const analysis::System<analysis::kMaxDof>& system,
   const std::vector<Point<Real>> truth = precise_eigenvalues<Real>(system);
   Real size(0);
   for (const Point<Real>& z : truth) size = std::max<Real>(size, distance(z, Point<Real>{}));
-  const Real slack = accuracy * size;
+  const Real slack = Real(accuracy) * size;
   std::vector<Point<Real>> published;
   std::vector<Real> reach;
   Verdict verdict;
