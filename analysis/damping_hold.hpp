@@ -38,7 +38,8 @@ using TaskJacobian =
 ///     C_C = F U R U' F',    R as in modal_damping.hpp,
 /// is exact for six joints and directions; a redundant arm's friction couples vibrations with its
 /// free motions besides, and the ratios are then right to first order in that coupling. Where
-/// friction is more than is wanted, C_C is the nearest semidefinite matrix, and `overdone` says so.
+/// friction is more than is wanted, C_C is a semidefinite matrix near it, bounded like the one
+/// without friction but for a factor of a few, and `overdone` says so.
 ///
 /// Fewer task directions: leave rows of J and K_C zero. Nothing here allocates or throws, and the
 /// work is bounded; each step starts from the rotations of the last one, which changes the result

@@ -13,7 +13,7 @@ namespace dashpot::analysis {
 ///     C = H U R U' H',    R as in modal_damping.hpp;
 /// for one zeta, without friction, C = 2 zeta (M # K), the geometric mean. It is exact wherever
 /// friction alone does not damp some direction more than is wanted, and K has full rank; where
-/// friction does, C is the nearest PSD matrix in modal coordinates, and `overdone` says so.
+/// friction does, C is a PSD matrix near it, and `overdone` says so.
 ///
 /// The singular values are found by one-sided Jacobi rotations, which start from those of the last
 /// update. C is symmetric and positive semidefinite to rounding. Nothing here allocates or throws,

@@ -42,15 +42,33 @@ bool make_semidefinite(Matrix& T) noexcept {
 
 }  // namespace
 
+namespace {
+
+/// How much of a mode's coupling counts: all of it unless what is there damps the mode more than is
+/// wanted; then less, and twice continuously differentiable down to 0 with the share x of the two.
+double coupling_share(double wanted, double there) noexcept {
+  if (!(there > wanted)) return 1;
+  const double rest = 1 - wanted / there;
+  return 1 - rest * rest * rest;
+}
+
+}  // namespace
+
 Status missing_damping(const Vector<kMaxDof>& omega, const DampingTarget& target, double soft,
                        Matrix& G, bool& overdone) noexcept {
   const Index k = omega.size();
-  Vector<kMaxDof> S(k);
+  Vector<kMaxDof> S(k), wanted(k), share(k);
+  for (Index i = 0; i < k; ++i) {
+    wanted[i] = 2 * target.ratio(omega[i]) * omega[i];
+    share[i] = coupling_share(wanted[i], G(i, i));
+  }
   for (Index i = 0; i < k; ++i) {
     const DampingTarget unit = DampingTarget::constant(1);
     S[i] = omega[i] > 0 ? std::sqrt(unit.damper(omega[i], soft) / (2 * omega[i])) : 0;
-    for (Index j = 0; j < k; ++j) G(i, j) = -G(i, j);
-    G(i, i) += S[i] > 0 ? 2 * target.ratio(omega[i]) * omega[i] : 1;  // R is 0 there
+    for (Index j = 0; j < k; ++j) {
+      if (j != i) G(i, j) *= -share[i] * share[j];
+    }
+    G(i, i) = S[i] > 0 ? wanted[i] - G(i, i) : 1;  // R is 0 there
   }
   overdone = !definite(G);
   if (overdone && !make_semidefinite(G)) return Status::kNotConverged;

@@ -57,6 +57,7 @@ std::string verdict(const sampled_modes_t& modes) {
     return analysis::to_text(status);
   }
   const std::string margin = format_number(modes.gain_margin, 3);
+  if (std::isnan(modes.spectral_radius)) return "unknown";
   if (!(modes.spectral_radius < 1)) {
     return "UNSTABLE; all gains have to shrink to " + margin + " of what they are";
   }

@@ -10,8 +10,8 @@ namespace dashpot::controller {
 namespace {
 
 void read_control(const YamlMapping& root, Settings& settings) {
-  static constexpr std::array<std::string_view, 5> kKeys = {"period", "rate", "mode",
-                                                            "geometric_stiffness", "jacobian_rate"};
+  static constexpr std::array<std::string_view, 6> kKeys = {
+      "period", "rate", "mode", "geometric_stiffness", "jacobian_rate", "subtract_friction"};
   const YamlMapping keys = root.mapping("control", kKeys);
   if (keys.has("period") && keys.has("rate")) {
     throw keys.error("rate", "stands beside period, which says the same");
@@ -27,6 +27,7 @@ void read_control(const YamlMapping& root, Settings& settings) {
   read_choice(keys, "mode", kModes, settings.initial.mode);
   read_switch(keys, "geometric_stiffness", settings.task_terms.geometric_stiffness);
   read_switch(keys, "jacobian_rate", settings.task_terms.jacobian_rate);
+  read_switch(keys, "subtract_friction", settings.subtract_friction);
 }
 
 void read_limits(const YamlMapping& root, const RobotModel& model, Limits& limits) {

@@ -42,9 +42,9 @@ const Snapshot& Controller::snapshot() const noexcept {
 const Vibration& Controller::vibration() const noexcept {
   return core_->vibration();
 }
-const SampledVibration* Controller::new_sampled_vibration() noexcept {
+const SampledVibration* Controller::sampled_vibration() noexcept {
   SampledAnalysis* sampled = core_->sampled();
-  return sampled == nullptr ? nullptr : sampled->fetch();
+  return sampled == nullptr ? nullptr : sampled->latest();
 }
 void Controller::closed_loop(analysis::System<kMaxJoints>& system) const noexcept {
   core_->closed_loop(system);

@@ -46,10 +46,10 @@ class Controller {
   const Snapshot& snapshot() const noexcept;
   /// Of the last tick that analysed, every Analysis::every of them.
   const Vibration& vibration() const noexcept;
-  /// What the analysis of the sampled loop (Analysis::Sampled) has found since this was called
-  /// last; null if there is nothing new. For one thread, always the same, which may be another than
-  /// that of `update`; the result is good until its next call.
-  const SampledVibration* new_sampled_vibration() noexcept;
+  /// The latest that the analysis of the sampled loop (Analysis::Sampled) has found; null as long
+  /// as there is nothing since the last reset. For one thread, always the same, which may be
+  /// another than that of `update`; the result is good until its next call.
+  const SampledVibration* sampled_vibration() noexcept;
   /// The closed loop at the last tick, linearised where its springs are at rest, in joint
   /// coordinates (closed_loop.hpp): mass, damping, stiffness and its factor. Not to be called
   /// before the first good state.

@@ -45,10 +45,10 @@ class FixedCore final : public ControllerCore {
   Vector act(bool hold) noexcept;
   /// The safe output without springs.
   Vector damp() noexcept;
-  /// The safe output without a state.
   /// Whole ns, which add up without rounding errors.
   static double nanoseconds(double seconds) noexcept { return std::round(1e9 * seconds); }
   void show_measured(const RobotState& state) noexcept;
+  /// The safe output without a state.
   Status ramp(Status status, JointVector& torque) noexcept;
   Status finish(Status status, const Vector& tau, JointVector& torque) noexcept;
   void describe() noexcept;
@@ -119,7 +119,8 @@ FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
                               TipPath(twist, T, window)};
       }()),
       gains_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
-      held_(fixed<N>(model.joint_values(&Joint::damping))),
+      held_(settings.subtract_friction ? fixed<N>(model.joint_values(&Joint::damping))
+                                       : Vector(Vector::Zero())),
       wrench_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
       law_(model, settings.feed_forward),
       filter_(settings.limits, settings.period),
@@ -245,6 +246,8 @@ void FixedCore<N>::start_afresh() noexcept {
   Impedance<N> none;
   none.base.held = target.base.held;
   none.tool.held = target.tool.held;
+  none.damping_ratio = target.damping_ratio;  // of springs that grow from zero
+  none.joint_damping_ratio = target.joint_damping_ratio;
   gains_.start(none);
   gains_.set_target(target);
   wrench_.start(Vector6::Zero());

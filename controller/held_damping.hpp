@@ -52,7 +52,7 @@ class JointDamper {
 /// Springs and dampers in force: those of the gain path, and, as far as they have a damping ratio,
 /// the C_C and C_q that give it to the springs of tip and joints where the robot is. Ratio and
 /// stiffness are those of the path, so that the damping changes as smoothly as they do. What the
-/// joints' viscous friction damps already is taken off; of two modes in force, each takes off its
+/// viscous friction given damps already is taken off; of two modes in force, each takes off its
 /// share. Damping in the null space comes on top.
 template <int N>
 class HeldDamping {

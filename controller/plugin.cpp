@@ -55,12 +55,7 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
 
   // Of the other thread:
   Request request;
-  SampledVibration sampled;  ///< the latest
-  /// Fetches what is new of the sampled loop.
-  void look_at_samples() noexcept {
-    const SampledVibration* found = controller_.new_sampled_vibration();
-    if (found != nullptr) sampled = *found;
-  }
+  const SampledVibration* sampled() noexcept { return controller_.sampled_vibration(); }
 
   // Of the real-time thread:
   Status update(const dashpot_state* given, const dashpot_setpoint* wanted,
@@ -296,9 +291,9 @@ int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes)
 int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampled_modes* modes) {
   const std::int32_t problem = check_result(controller, modes);
   if (problem != DASHPOT_OK) return finish(problem);
-  controller->look_at_samples();
-  if (controller->sampled.tick == 0) return finish(DASHPOT_NOTHING_YET);
-  to_c(controller->sampled, *modes);
+  const SampledVibration* found = controller->sampled();
+  if (found == nullptr) return finish(DASHPOT_NOTHING_YET);
+  to_c(*found, *modes);
   return finish(DASHPOT_OK);
 }
 

@@ -45,6 +45,9 @@ SampledAnalysis::SampledAnalysis(const RobotModel& model, const Settings& settin
       gravity_(settings.feed_forward.gravity),
       interval_(static_cast<std::uint64_t>(
           std::clamp(std::round(settings.analysis.sampled.interval / settings.period), 1.0, 1e15))),
+      first_(1 + static_cast<std::uint64_t>(std::clamp(
+                     std::ceil(settings.motion.gain_time / settings.period), 1.0, 1e15))),
+      next_(first_),
       loop_(loop_of(model, settings)),
       thread_([this] { run(); }) {}
 
@@ -55,11 +58,19 @@ SampledAnalysis::~SampledAnalysis() {
 
 void SampledAnalysis::hand_over() noexcept {
   next_ = task().tick + interval_;
+  task().resets = resets_.load(std::memory_order_relaxed);
   tasks_.publish();
 }
 
-const SampledVibration* SampledAnalysis::fetch() noexcept {
-  return results_.fetch() ? &results_.value() : nullptr;
+void SampledAnalysis::reset() noexcept {
+  next_ = first_;
+  resets_.fetch_add(1, std::memory_order_relaxed);
+}
+
+const SampledVibration* SampledAnalysis::latest() noexcept {
+  results_.fetch();
+  const SampledVibration& found = results_.value();
+  return found.resets == resets_.load(std::memory_order_relaxed) ? &found : nullptr;
 }
 
 void SampledAnalysis::run() noexcept {
@@ -76,7 +87,11 @@ void SampledAnalysis::run() noexcept {
       solve(tasks_.value(), result);
     } catch (const std::exception&) {
       result.count = 0;
-      if (result.status == analysis::Status::kOk) result.status = analysis::Status::kNotConverged;
+      if (result.status == analysis::Status::kOk ||
+          result.status == analysis::Status::kUncertified) {
+        result.status = analysis::Status::kNotConverged;
+      }
+      result.spectral_radius = result.gain_margin = std::numeric_limits<double>::quiet_NaN();
     }
     results_.publish();
   }
@@ -86,6 +101,7 @@ void SampledAnalysis::solve(const Task& task, SampledVibration& result) {
   result = SampledVibration();
   result.time = task.time;
   result.tick = task.tick;
+  result.resets = task.resets;
   result.position = task.position;
   analysis::System<> system(task.position.size());
   system.mass = task.system.mass;

@@ -19,13 +19,14 @@ Eigen::MatrixXd gravity_gradient(const RobotModel& model, const JointVector& q);
 /// takes milliseconds and allocates.
 ///
 /// The real-time thread calls `due`, `task`, `hand_over` and `reset`; one other thread, always the
-/// same, `fetch`. None of these waits, allocates or calls the system.
+/// same, `latest`. None of these waits, allocates or calls the system.
 class SampledAnalysis {
  public:
   /// A closed loop as Controller::closed_loop gives it.
   struct Task {
     std::int64_t time = 0;
     std::uint64_t tick = 0;
+    std::uint64_t resets = 0;  ///< filled in by `hand_over`
     JointVector position;
     analysis::System<kMaxJoints> system;
   };
@@ -35,15 +36,17 @@ class SampledAnalysis {
   SampledAnalysis(const SampledAnalysis&) = delete;
   SampledAnalysis& operator=(const SampledAnalysis&) = delete;
 
-  /// Whether it is time for the next task. Ticks count from 1, and begin anew after `reset`.
+  /// Whether it is time for the next task: once the gains have grown, and then at each interval.
+  /// Ticks count from 1, and begin anew after `reset`.
   bool due(std::uint64_t tick) const noexcept { return tick >= next_; }
   /// To be filled in, and then handed over.
   Task& task() noexcept { return tasks_.slot(); }
   void hand_over() noexcept;
-  void reset() noexcept { next_ = 1; }
+  void reset() noexcept;
 
-  /// The latest result if there is a new one, else null.
-  const SampledVibration* fetch() noexcept;
+  /// The latest result; null as long as there is none since the last `reset`. Good until the next
+  /// call.
+  const SampledVibration* latest() noexcept;
 
  private:
   void run() noexcept;
@@ -52,8 +55,10 @@ class SampledAnalysis {
   RobotModel model_;
   bool gravity_;  ///< is compensated
   std::uint64_t interval_;
-  std::uint64_t next_ = 1;
-  analysis::SampledLoop loop_;  ///< the thread's
+  std::uint64_t first_;  ///< tick
+  std::uint64_t next_;
+  std::atomic<std::uint64_t> resets_{1};  ///< so that a result that is none does not fit
+  analysis::SampledLoop loop_;            ///< the thread's
   Latest<Task> tasks_;
   Latest<SampledVibration> results_;
   std::atomic<bool> stop_{false};

@@ -83,8 +83,9 @@ double finite_or(double value, double otherwise) {
 
 /// Velocities at the tip decay no faster than this, 1/s: far from where torque that is held for a
 /// period of 1 ms and arrives one late makes the loop unstable.
-constexpr int kLongestDelay = 20;  // ticks
 constexpr double kFastestDecay = 200;
+
+constexpr int kLongestDelay = 20;  // ticks, that the analysis of the sampled loop takes
 
 struct TipInertia {
   double linear;   ///< kg

@@ -84,6 +84,9 @@ struct Settings {
   double period = 0.001;  ///< of the control loop, s
   FeedForward feed_forward;
   TaskTerms task_terms;
+  /// Whether the joints' viscous friction, as the model has it, is taken off the damping that holds
+  /// a ratio. Only where it is measured: if the robot has less, its modes have less than the ratio.
+  bool subtract_friction = false;
   Motion motion;
   Limits limits;
   Watchdog watchdog;

@@ -3,6 +3,8 @@
 #include <dashpot/controller/status.hpp>
 #include <dashpot/controller/types.hpp>
 
+#include <limits>
+
 namespace dashpot::controller {
 
 /// What one tick saw and did: plain data to copy to another thread. With a status whose safe output
@@ -95,10 +97,13 @@ struct SampledVibration {
   std::uint64_t tick = 0;                           ///< 0: none yet
   JointVector position;                             ///< q it belongs to, n, rad
   analysis::Status status = analysis::Status::kOk;  ///< of the continuous spectrum
-  double spectral_radius = 0;                       ///< the loop is stable below 1
-  double gain_margin = 0;  ///< all gains can grow by this factor before it is unstable
-  int count = 0;           ///< of modes
+  /// The loop is stable below 1; NaN if it could not be analysed.
+  double spectral_radius = std::numeric_limits<double>::quiet_NaN();
+  /// All gains can grow by this factor before it is unstable; NaN likewise.
+  double gain_margin = std::numeric_limits<double>::quiet_NaN();
+  int count = 0;                                       ///< of modes
   std::array<SampledVibrationMode, kMaxJoints> modes;  ///< by falling continuous frequency
+  std::uint64_t resets = 0;                            ///< of the controller before that tick
 };
 
 }  // namespace dashpot::controller

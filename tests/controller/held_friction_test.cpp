@@ -27,6 +27,7 @@ RobotModel rubbing(const testing::Arm& arm, double friction) {
 Settings plain_settings(const RobotModel& model, Mode mode) {
   Settings settings = default_settings(model);
   settings.initial.mode = mode;
+  settings.subtract_friction = true;
   Gains& gains = settings.initial.gains;
   gains.null_stiffness.setZero();
   gains.null_damping.setZero();

@@ -173,7 +173,7 @@ TEST(Config, FillsLimits) {
 TEST(Config, FillsTheRest) {
   const Settings all =
       load(panda() +
-           "control: {geometric_stiffness: true, jacobian_rate: true}\n"
+           "control: {geometric_stiffness: true, jacobian_rate: true, subtract_friction: true}\n"
            "motion: {velocity: 1, acceleration: 180 deg/s^2, linear_velocity: 100 mm/s,\n"
            "  linear_acceleration: 1, angular_velocity: 2, angular_acceleration: 3, smoothing: 20 "
            "ms,\n"
@@ -188,6 +188,7 @@ TEST(Config, FillsTheRest) {
           .settings;
   EXPECT_TRUE(all.task_terms.geometric_stiffness);
   EXPECT_TRUE(all.task_terms.jacobian_rate);
+  EXPECT_TRUE(all.subtract_friction);
   EXPECT_EQ(all.motion.velocity, VectorXd::Ones(7));
   EXPECT_EQ(all.motion.acceleration, VectorXd::Constant(7, std::numbers::pi));
   EXPECT_DOUBLE_EQ(all.motion.linear_velocity, 0.1);

@@ -131,6 +131,7 @@ TEST_P(HeldRingDownOf, JointsBesideFrictionHasTheRatio) {
     controller::Gains gains;
     gains.null_stiffness = gains.null_damping = JointVector::Zero(twin.dof());
     controller::Settings settings = release_settings(twin, gains, 1e-3);
+    settings.subtract_friction = true;
     settings.initial.mode = controller::Mode::kJoint;
     settings.initial.gains.joint_stiffness = 400 * MatrixXd::Identity(twin.dof(), twin.dof());
     settings.initial.gains.joint_damping_ratio = kRatio;

@@ -41,7 +41,7 @@ struct StillArm {
     const auto end = steady_clock::now() + std::chrono::seconds(60);
     while (steady_clock::now() < end) {
       tick();
-      const SampledVibration* found = controller.new_sampled_vibration();
+      const SampledVibration* found = controller.sampled_vibration();
       if (found != nullptr && found->tick > tick_number) return found;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -114,7 +114,7 @@ TEST(SampledAnalysis, LooksAtTheLoopOnceInAnInterval) {
   for (int k = 0; k < 5; ++k) {
     const SampledVibration* found = arm.wait_for(last);
     ASSERT_NE(found, nullptr);
-    EXPECT_EQ(found->tick % 50, 1U);
+    EXPECT_EQ(found->tick % 50, 2U);
     last = found->tick;
   }
 }
@@ -122,16 +122,18 @@ TEST(SampledAnalysis, LooksAtTheLoopOnceInAnInterval) {
 TEST(SampledAnalysis, BeginsAnewAfterAReset) {
   StillArm arm({10, 0, 0, false});
   ASSERT_NE(arm.wait_for(0), nullptr);
+  ASSERT_NE(arm.controller.sampled_vibration(), nullptr);
   arm.controller.reset();
+  EXPECT_EQ(arm.controller.sampled_vibration(), nullptr);
   const SampledVibration* found = arm.wait_for(0);
   ASSERT_NE(found, nullptr);
-  EXPECT_EQ(found->tick, 1U);
+  EXPECT_EQ(found->tick, 2U);
 }
 
 TEST(SampledAnalysis, IsThereOnlyIfAskedFor) {
   StillArm arm({});
   for (int k = 0; k < 50; ++k) arm.tick();
-  EXPECT_EQ(arm.controller.new_sampled_vibration(), nullptr);
+  EXPECT_EQ(arm.controller.sampled_vibration(), nullptr);
 }
 
 }  // namespace
