@@ -138,6 +138,22 @@ TEST(HeldInJoints, HoldsTheRatioAlongAPathOfEveryArm) {
   }
 }
 
+/// Springs that grow from zero have their ratio from the start.
+TEST(HeldInJoints, HoldsTheRatioWhileTheSpringsGrow) {
+  const RobotModel model = rubbing(testing::arms()[0], 0);
+  for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+    Settings settings = plain_settings(model, mode);
+    Led arm(model, settings);
+    arm.controller.reset();
+    for (int k = 0; k < 100; ++k) arm.tick();
+    const Vibration& found = arm.controller.vibration();
+    ASSERT_GE(found.count, 6);
+    for (int i = 0; i < found.count; ++i) {
+      EXPECT_NEAR(found.modes[static_cast<std::size_t>(i)].damping_ratio, 0.7, 1e-6);
+    }
+  }
+}
+
 TEST(HeldInJoints, IsInTheTorque) {
   const RobotModel model = rubbing(testing::arms()[0], 0.5);
   Led led(model, plain_settings(model, Mode::kJoint));
