@@ -2,6 +2,7 @@
 // more than the gain margin that it claims does not.
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/sim/linear_system.hpp>
+#include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 
@@ -20,17 +21,8 @@ using analysis::SampledDamping;
 using analysis::TaskImpedance;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using testing::plant_options;
 using testing::Random;
-
-sim::PlantOptions plant_options(const analysis::SampledLoop& loop) {
-  sim::PlantOptions options;
-  options.period = loop.period;
-  options.integrator.max_step = loop.period;
-  options.delay = loop.delay;
-  options.torque_cutoff = loop.torque_cutoff;
-  options.difference_velocity = loop.difference_velocity;
-  return options;
-}
 
 /// Largest speed in the last tenth of a release, by that of the first tenth. `factor` multiplies
 /// springs and the controller's damping.

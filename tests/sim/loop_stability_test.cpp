@@ -2,6 +2,7 @@
 // 2 % inside the boundary settle, 2 % outside they do not.
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/sim/linear_system.hpp>
+#include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 
 #include <gtest/gtest.h>
@@ -15,17 +16,8 @@ namespace {
 using controller::JointVector;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using testing::plant_options;
 using testing::Random;
-
-sim::PlantOptions plant_options(const analysis::SampledLoop& loop) {
-  sim::PlantOptions options;
-  options.period = loop.period;
-  options.integrator.max_step = loop.period;
-  options.delay = loop.delay;
-  options.torque_cutoff = loop.torque_cutoff;
-  options.difference_velocity = loop.difference_velocity;
-  return options;
-}
 
 /// Ticks in which |z| or its inverse grows to e^12, and those before the largest |z| rules.
 int ticks_to_tell(double spectral_radius) {
