@@ -2,8 +2,7 @@
 #include <Eigen/Dense>
 
 /// What tests use of Eigen over and over, compiled once (compiled_eigen.cpp) instead of in every
-/// file: it halves the time to build them. Precompiled for the suites, so no file has to include
-/// it.
+/// file. Precompiled for the suites, so no file has to include it.
 #ifndef DASHPOT_COMPILED_HERE
 #define DASHPOT_COMPILED_HERE extern
 #endif
