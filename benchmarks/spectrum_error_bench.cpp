@@ -21,7 +21,9 @@
 namespace {
 
 using namespace dashpot::analysis;  // NOLINT(google-build-using-namespace)
+using dashpot::testing::Quad;
 using dashpot::testing::QuadComplex;
+using dashpot::testing::to_quad;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Values = std::vector<std::complex<double>>;
@@ -92,10 +94,10 @@ std::vector<QuadComplex> truth_of(const System<>& system) {
   solver.solve(system, spectrum);
   std::vector<QuadComplex> start;
   for (const Mode<>& mode : spectrum.modes) {
-    for (const Complex& value : mode.eigenvalues) start.push_back({value.real(), value.imag()});
+    for (const Complex& value : mode.eigenvalues) start.push_back(to_quad(value));
   }
   for (std::size_t i = 0; i < start.size(); ++i) {  // no two may be the same
-    start[i].re *= 1 + 1e-10 * static_cast<double>(i + 1);
+    start[i].re *= static_cast<Quad>(1 + 1e-10 * static_cast<double>(i + 1));
   }
   return dashpot::testing::refine_eigenvalues(system, start);
 }

@@ -57,14 +57,14 @@ VectorXd nonzero_velocity(const Motion& motion) {
 
 class PaperChain : public ::testing::Test {
  protected:
-  System<> system_ = testing::paper_chain();
-  Spectrum<> spectrum_ = analyze(system_);
-  Response response_{system_, spectrum_};
+  System<> system = testing::paper_chain();
+  Spectrum<> spectrum = analyze(system);
+  Response response{system, spectrum};
 
   Motion free(double t) const {
-    return response_.free(VectorXd{{0, 0.03, 0}}, VectorXd::Zero(3), t);
+    return response.free(VectorXd{{0, 0.03, 0}}, VectorXd::Zero(3), t);
   }
-  Motion impulse(double t) const { return response_.impulse(VectorXd{{1, 0, 0}}, t); }
+  Motion impulse(double t) const { return response.impulse(VectorXd{{1, 0, 0}}, t); }
 };
 
 TEST_F(PaperChain, PaperEq43RigidBodyPartOfTheFreeMotion) {
@@ -74,7 +74,7 @@ TEST_F(PaperChain, PaperEq43RigidBodyPartOfTheFreeMotion) {
 
 TEST_F(PaperChain, PaperAppendix1FreeMotion) {
   EXPECT_TRUE(as_printed(
-      coefficients(eigenvalues_of(spectrum_), [&](double t) { return nonzero_part(free(t)); }),
+      coefficients(eigenvalues_of(spectrum), [&](double t) { return nonzero_part(free(t)); }),
       {{"-0.002293", "-0.001256", "-0.001707", "0.0003660"},
        {"0.001563", "0.001344", "0.02444", "0.005522"},
        {"0.003044", "0.001472", "-0.007044", "-0.002794"}}));
@@ -87,14 +87,14 @@ TEST_F(PaperChain, PaperEq48RigidBodyPartOfTheImpulseResponse) {
 
 TEST_F(PaperChain, PaperAppendix2ImpulseResponse) {
   EXPECT_TRUE(as_printed(
-      coefficients(eigenvalues_of(spectrum_), [&](double t) { return nonzero_part(impulse(t)); }),
+      coefficients(eigenvalues_of(spectrum), [&](double t) { return nonzero_part(impulse(t)); }),
       {{"-0.00004006", "0.001863", "0.00004006", "0.00003087"},
        {"0.0003357", "-0.001430", "-0.0003357", "-0.0006435"},
        {"-0.00007018", "-0.002408", "0.00007018", "0.0002080"}}));
 }
 
 TEST_F(PaperChain, PaperEq49VelocitiesOfTheImpulseResponse) {
-  const MatrixXd all = coefficients(eigenvalues_of(spectrum_),
+  const MatrixXd all = coefficients(eigenvalues_of(spectrum),
                                     [&](double t) { return nonzero_velocity(impulse(t)); });
   EXPECT_TRUE(as_printed(all.topRows(2), {{"0.05755", "-0.004398", "0.0007881", "-0.001875"},
                                           {"-0.04510", "-0.006025", "-0.02157", "0.01967"}}));

@@ -20,32 +20,32 @@ using testing::TwinModels;
 
 class ClosedLoop : public ::testing::TestWithParam<testing::Arm> {
  protected:
-  TwinModels twin_{GetParam()};
-  Random random_{7};
+  TwinModels twin{GetParam()};
+  Random random{7};
 
   /// Modes from 8 to 30 rad/s with this ratio.
   controller::Gains gains(const JointVector& q, double zeta) {
     const VectorXd omega{{8, 11, 14, 18, 23, 30}};
-    return tip_gains(twin_, q, omega, VectorXd::Constant(6, zeta), 0, random_);
+    return tip_gains(twin, q, omega, VectorXd::Constant(6, zeta), 0, random);
   }
   /// One that the drives can hold with torque to spare.
   JointVector posture() {
-    const JointVector limit = twin_.model.joint_values(&controller::Joint::effort);
+    const JointVector limit = twin.model.joint_values(&controller::Joint::effort);
     for (;;) {
-      const JointVector q = random_posture(twin_, random_);
-      const auto robot = evaluate(twin_.model, q, JointVector::Zero(q.size()));
+      const JointVector q = random_posture(twin, random);
+      const auto robot = evaluate(twin.model, q, JointVector::Zero(q.size()));
       if ((robot.gravity.cwiseAbs().array() < 0.6 * limit.array()).all()) return q;
     }
   }
   /// Springs toward the rest posture besides, where there is a self-motion.
   void hold_posture(const JointVector& q, controller::Gains& gains) {
-    if (twin_.dof() == 6) return;
-    const double softness = self_motion(twin_, q).squaredNorm();
+    if (twin.dof() == 6) return;
+    const double softness = self_motion(twin, q).squaredNorm();
     gains.null_stiffness.setConstant(100 / softness);
     gains.null_damping.setConstant(10 / softness);
   }
   Eigen::Vector3d tip(const JointVector& q) const {
-    return evaluate(twin_.model, q, JointVector::Zero(q.size())).p_BT_B;
+    return evaluate(twin.model, q, JointVector::Zero(q.size())).p_BT_B;
   }
 };
 INSTANTIATE_TEST_SUITE_P(Arms, ClosedLoop, ::testing::ValuesIn(testing::arms()),
@@ -54,8 +54,8 @@ INSTANTIATE_TEST_SUITE_P(Arms, ClosedLoop, ::testing::ValuesIn(testing::arms()),
 TEST_P(ClosedLoop, KeepsItsEquilibrium) {
   for (int i = 0; i < 5; ++i) {
     const JointVector q0 = posture();
-    const controller::Settings settings = release_settings(twin_, gains(q0, 0.3), 0.001);
-    ReleasedArm arm(twin_, settings, q0, JointVector::Zero(q0.size()));
+    const controller::Settings settings = release_settings(twin, gains(q0, 0.3), 0.001);
+    ReleasedArm arm(twin, settings, q0, JointVector::Zero(q0.size()));
     for (int k = 0; k < 1000; ++k) ASSERT_EQ(arm.step(), sim::Status::kOk);
     EXPECT_LT((arm.plant().position() - q0).norm(), 1e-10);
     EXPECT_LT(arm.plant().velocity().norm(), 1e-10);
@@ -66,12 +66,12 @@ TEST_P(ClosedLoop, KeepsItsEquilibrium) {
 TEST_P(ClosedLoop, ComesBackAfterAPush) {
   for (int i = 0; i < 5; ++i) {
     const JointVector q0 = posture();
-    const controller::Settings settings = release_settings(twin_, gains(q0, 0.7), 0.001);
+    const controller::Settings settings = release_settings(twin, gains(q0, 0.7), 0.001);
     sim::ArmOptions options;
     Vector6 push = Vector6::Zero();
-    push.head<3>() = 5 * random_.vector(3).normalized();
+    push.head<3>() = 5 * random.vector(3).normalized();
     options.wrenches = {{0.1, 0.3, push}};
-    ReleasedArm arm(twin_, settings, q0, JointVector::Zero(q0.size()), {}, options);
+    ReleasedArm arm(twin, settings, q0, JointVector::Zero(q0.size()), {}, options);
     double farthest = 0;
     for (int k = 0; k < 3000; ++k) {
       ASSERT_EQ(arm.step(), sim::Status::kOk);
@@ -85,21 +85,21 @@ TEST_P(ClosedLoop, ComesBackAfterAPush) {
 
 /// With a free posture, an arm displaced along its self-motion feels no spring and stays.
 TEST_P(ClosedLoop, StoresNothingInTheSelfMotion) {
-  if (twin_.dof() == 6) GTEST_SKIP() << "no self-motion";
+  if (twin.dof() == 6) GTEST_SKIP() << "no self-motion";
   for (int i = 0; i < 5; ++i) {
     const JointVector q0 = posture();
     const JointVector none = JointVector::Zero(q0.size());
-    const auto home = evaluate(twin_.model, q0, none);
+    const auto home = evaluate(twin.model, q0, none);
     // Along the self-motion by steps, each corrected by Newton's method.
     JointVector q = q0;
-    VectorXd last = self_motion(twin_, q0);
+    VectorXd last = self_motion(twin, q0);
     for (int k = 0; k < 50; ++k) {
-      VectorXd u = self_motion(twin_, q).normalized();
+      VectorXd u = self_motion(twin, q).normalized();
       if (u.dot(last) < 0) u = -u;
       last = u;
       q += 0.004 * u;
       for (int pass = 0; pass < 4; ++pass) {
-        const auto robot = evaluate(twin_.model, q, none);
+        const auto robot = evaluate(twin.model, q, none);
         const Eigen::AngleAxisd turn(home.R_BT * robot.R_BT.transpose());
         Vector6 error;
         error << home.p_BT_B - robot.p_BT_B, turn.angle() * turn.axis();
@@ -109,14 +109,14 @@ TEST_P(ClosedLoop, StoresNothingInTheSelfMotion) {
     }
     const JointVector dq = q - q0;
     ASSERT_GT(dq.norm(), 0.15);
-    const controller::Settings settings = release_settings(twin_, gains(q0, 0.3), 0.001);
-    ReleasedArm arm(twin_, settings, q0, dq);
+    const controller::Settings settings = release_settings(twin, gains(q0, 0.3), 0.001);
+    ReleasedArm arm(twin, settings, q0, dq);
     for (int k = 0; k < 300; ++k) {
       ASSERT_EQ(arm.step(), sim::Status::kOk);
       ASSERT_LT(arm.controller.snapshot().tip_wrench.norm(), 1e-6);
     }
     EXPECT_LT((arm.plant().position() - q).norm(), 1e-8);
-    const auto there = evaluate(twin_.model, q, none);
+    const auto there = evaluate(twin.model, q, none);
     EXPECT_LT((arm.torque - there.gravity).norm(), 1e-6);
   }
 }
@@ -125,11 +125,11 @@ TEST_P(ClosedLoop, KeepsToTheTorqueLimits) {
   const JointVector q0 = posture();
   controller::Gains springs = gains(q0, 0.5);
   hold_posture(q0, springs);
-  controller::Settings settings = release_settings(twin_, springs, 0.001);
+  controller::Settings settings = release_settings(twin, springs, 0.001);
   const JointVector gravity =
-      evaluate(twin_.model, q0, JointVector::Zero(q0.size())).gravity.cwiseAbs();
+      evaluate(twin.model, q0, JointVector::Zero(q0.size())).gravity.cwiseAbs();
   settings.limits.torque = gravity.array() + 4;
-  ReleasedArm arm(twin_, settings, q0, 0.05 * random_.vector(q0.size()).normalized());
+  ReleasedArm arm(twin, settings, q0, 0.05 * random.vector(q0.size()).normalized());
   JointVector last = arm.torque;
   for (int k = 0; k < 3000; ++k) {
     ASSERT_EQ(arm.step(), sim::Status::kOk);
@@ -196,8 +196,8 @@ EnergyRun run(const TwinModels& twin, const JointVector& q0, const JointVector& 
 TEST_P(ClosedLoop, LosesEnergyAtEveryTickWithEnoughDamping) {
   for (int i = 0; i < 3; ++i) {
     const JointVector q0 = posture();
-    const JointVector dq = 0.05 * random_.vector(q0.size()).normalized();
-    const EnergyRun damped = run(twin_, q0, dq, 0.02, 5e-4, 5e-4);
+    const JointVector dq = 0.05 * random.vector(q0.size()).normalized();
+    const EnergyRun damped = run(twin, q0, dq, 0.02, 5e-4, 5e-4);
     EXPECT_LT(damped.largest_rise, 1e-5 * damped.start);
     EXPECT_LT(damped.end, 0.9 * damped.start);
   }
@@ -208,7 +208,7 @@ TEST_P(ClosedLoop, GainsNoEnergyButThroughTheHold) {
   const TwinModels twin(GetParam(), false);
   for (int i = 0; i < 2; ++i) {
     const JointVector q0 = posture();
-    const JointVector dq = 0.05 * random_.vector(q0.size()).normalized();
+    const JointVector dq = 0.05 * random.vector(q0.size()).normalized();
     double last = 0;
     for (const double period : {1e-3, 5e-4, 2.5e-4}) {
       const EnergyRun free = run(twin, q0, dq, 0, period, period);
@@ -224,9 +224,9 @@ TEST_P(ClosedLoop, GainsNoEnergyButThroughTheHold) {
 
 TEST_P(ClosedLoop, BalancesItsBooksToTheIntegratorsOrder) {
   const JointVector q0 = posture();
-  const JointVector dq = 0.1 * random_.vector(q0.size()).normalized();
-  const EnergyRun coarse = run(twin_, q0, dq, 0.02, 8e-3, 8e-3);
-  const EnergyRun fine = run(twin_, q0, dq, 0.02, 8e-3, 4e-3);
+  const JointVector dq = 0.1 * random.vector(q0.size()).normalized();
+  const EnergyRun coarse = run(twin, q0, dq, 0.02, 8e-3, 8e-3);
+  const EnergyRun fine = run(twin, q0, dq, 0.02, 8e-3, 4e-3);
   EXPECT_LT(coarse.imbalance, 1e-5 * coarse.start);
   EXPECT_LT(fine.imbalance, coarse.imbalance / 8 + 1e-10 * coarse.start);
 }

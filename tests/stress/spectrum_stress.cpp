@@ -22,6 +22,7 @@ namespace {
 using namespace dashpot::analysis;  // NOLINT(google-build-using-namespace)
 using dashpot::testing::Quad;
 using dashpot::testing::QuadComplex;
+using dashpot::testing::to_quad;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
@@ -92,16 +93,16 @@ struct Judgement {
 std::vector<QuadComplex> truth_of(const System<>& system, const Spectrum<>& spectrum) {
   std::vector<QuadComplex> start;
   for (const Mode<>& mode : spectrum.modes) {
-    for (const Complex& value : mode.eigenvalues) start.push_back({value.real(), value.imag()});
+    for (const Complex& value : mode.eigenvalues) start.push_back(to_quad(value));
   }
   const double size = start.empty() ? 1
                                     : std::hypot(static_cast<double>(start.back().re),
                                                  static_cast<double>(start.back().im));
   while (start.size() < 2 * kModes) {  // those of zero modes
-    start.push_back({-1e-9 * size * static_cast<double>(start.size()), 1e-10 * size});
+    start.push_back(to_quad({-1e-9 * size * static_cast<double>(start.size()), 1e-10 * size}));
   }
   for (std::size_t i = 0; i < start.size(); ++i) {
-    start[i].re *= 1 + 1e-10 * static_cast<double>(i + 1);
+    start[i].re *= static_cast<Quad>(1 + 1e-10 * static_cast<double>(i + 1));
   }
   return dashpot::testing::refine_eigenvalues(system, start);
 }
@@ -124,11 +125,11 @@ Judgement judge(const System<>& system) {
       continue;
     }
     for (const Complex& value : mode.eigenvalues) {
-      Quad nearest = std::numeric_limits<double>::infinity();
+      auto nearest = static_cast<Quad>(std::numeric_limits<double>::infinity());
       for (const QuadComplex& z : truth) {
-        nearest = std::min(nearest, (z - QuadComplex{value.real(), value.imag()}).norm());
+        nearest = std::min(nearest, (z - to_quad(value)).norm());
       }
-      const Quad bound = mode.error_bound;
+      const auto bound = static_cast<Quad>(mode.error_bound);
       if (!(nearest <= bound * bound)) result.verdict = Verdict::kWrong;
     }
   }

@@ -28,6 +28,10 @@ struct QuadComplex {
   Quad norm() const { return re * re + im * im; }
 };
 
+inline QuadComplex to_quad(const std::complex<double>& z) {
+  return {static_cast<Quad>(z.real()), static_cast<Quad>(z.imag())};
+}
+
 /// Row by row.
 using QuadMatrix = std::vector<std::vector<QuadComplex>>;
 
@@ -60,14 +64,14 @@ inline QuadComplex logarithmic_derivative(const analysis::System<>& system, Quad
   const auto n = static_cast<std::size_t>(system.dof());
   QuadMatrix Q(n, std::vector<QuadComplex>(n)), dQ = Q;
   const auto scaled = [](QuadComplex z, double factor) -> QuadComplex {
-    return {z.re * factor, z.im * factor};
+    return {z.re * static_cast<Quad>(factor), z.im * static_cast<Quad>(factor)};
   };
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < n; ++j) {
       const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
       const double M = system.mass(row, column), C = system.damping(row, column);
-      Q[i][j] = scaled(l * l, M) + scaled(l, C) + QuadComplex{system.stiffness(row, column), 0};
-      dQ[i][j] = scaled(l, 2 * M) + QuadComplex{C, 0};
+      Q[i][j] = scaled(l * l, M) + scaled(l, C) + to_quad(system.stiffness(row, column));
+      dQ[i][j] = scaled(l, 2 * M) + to_quad(C);
     }
   }
   solve(Q, dQ);
@@ -104,7 +108,7 @@ inline double largest_error(std::vector<QuadComplex> truth,
   double largest = found.size() == truth.size() ? 0 : 1;
   for (const std::complex<double>& value : found) {
     if (truth.empty()) return 1;
-    const QuadComplex z{value.real(), value.imag()};
+    const QuadComplex z = to_quad(value);
     const auto nearest = std::min_element(
         truth.begin(), truth.end(),
         [&](QuadComplex a, QuadComplex b) { return (a - z).norm() < (b - z).norm(); });

@@ -230,49 +230,49 @@ TEST(PublisherThread, HasSentAllThatWasOfferedWhenItIsStopped) {
 
 class ModesPublisher : public ::testing::Test {
  protected:
-  ModesPublisher() : random_(943), publisher_(sink_into(received_)) {
-    modes_.vibration.position = random_.vector(7);
-    modes_.utime = kNow;
-    modes_.vibration.count = 2;
-    modes_.vibration.zero_modes = 5;
+  ModesPublisher() : random(943), publisher(sink_into(received)) {
+    modes.vibration.position = random.vector(7);
+    modes.utime = kNow;
+    modes.vibration.count = 2;
+    modes.vibration.zero_modes = 5;
     for (std::size_t i = 0; i < 2; ++i) {
-      modes_.vibration.modes[i].natural_frequency = 20 - 5.0 * static_cast<double>(i);
-      modes_.vibration.modes[i].damping_ratio = 0.4;
+      modes.vibration.modes[i].natural_frequency = 20 - 5.0 * static_cast<double>(i);
+      modes.vibration.modes[i].damping_ratio = 0.4;
     }
   }
 
   /// Offers the modes again some time later, and says whether they were published.
   bool is_published(std::int64_t later) {
-    const std::size_t before = received_.modes.size();
-    modes_.utime += later;
-    publisher_.offer(modes_);
-    publisher_.publish_pending();
-    return received_.modes.size() > before;
+    const std::size_t before = received.modes.size();
+    modes.utime += later;
+    publisher.offer(modes);
+    publisher.publish_pending();
+    return received.modes.size() > before;
   }
 
-  Random random_;
-  Received received_;
-  Publisher publisher_;
-  ModesSample modes_;
+  Random random;
+  Received received;
+  Publisher publisher;
+  ModesSample modes;
 };
 
 TEST_F(ModesPublisher, SkipsWhatIsUnchanged) {
   EXPECT_TRUE(is_published(0));
   for (int i = 0; i < 9; ++i) EXPECT_FALSE(is_published(100'000));
-  EXPECT_EQ(publisher_.counters().modes, 1);
-  EXPECT_EQ(publisher_.counters().modes_skipped, 9);
+  EXPECT_EQ(publisher.counters().modes, 1);
+  EXPECT_EQ(publisher.counters().modes_skipped, 9);
 }
 
 TEST_F(ModesPublisher, RepeatsWhatIsUnchangedOncePerHeartbeat) {
   int published = 0;
   for (int i = 0; i < 1000; ++i) published += is_published(10'000);
   EXPECT_EQ(published, 10);
-  EXPECT_EQ(received_.modes.back().sequence, 10);
+  EXPECT_EQ(received.modes.back().sequence, 10);
 }
 
 TEST_F(ModesPublisher, PublishesEveryChangeOfUse) {
   ASSERT_TRUE(is_published(0));
-  controller::Vibration& vibration = modes_.vibration;
+  controller::Vibration& vibration = modes.vibration;
   vibration.position[3] += 2e-6;
   EXPECT_TRUE(is_published(1000)) << "position";
   vibration.modes[1].natural_frequency *= 1 + 2e-6;
@@ -301,7 +301,7 @@ TEST_F(ModesPublisher, FollowsASlowDrift) {
   ASSERT_TRUE(is_published(0));
   int published = 0;
   for (int i = 0; i < 100; ++i) {
-    modes_.vibration.position[2] += 0.25e-6;
+    modes.vibration.position[2] += 0.25e-6;
     published += is_published(1000);
   }
   EXPECT_EQ(published, 20);
@@ -309,9 +309,9 @@ TEST_F(ModesPublisher, FollowsASlowDrift) {
 
 TEST_F(ModesPublisher, CountsItsMessages) {
   for (int i = 1; i <= 5; ++i) {
-    modes_.vibration.position[0] += 1;
+    modes.vibration.position[0] += 1;
     ASSERT_TRUE(is_published(1000));
-    EXPECT_EQ(received_.modes.back().sequence, i);
+    EXPECT_EQ(received.modes.back().sequence, i);
   }
 }
 
