@@ -29,16 +29,16 @@ std::size_t at(int i) {
   return static_cast<std::size_t>(i);
 }
 
-/// 0 if the matrix is symmetric and its entries are finite.
-double asymmetry(const Square<kMaxDof>& matrix) {
+/// Whether the matrix equals its transpose and its entries are finite.
+bool is_symmetric(const Square<kMaxDof>& matrix) {
   const auto n = static_cast<int>(matrix.rows());
   const double* const a = matrix.data();
-  double sum = 0;
+  bool differs = false;  // comparisons do not wait for each other, as the terms of a sum would
   for (int j = 0; j < n; ++j) {
-    for (int i = 0; i < j; ++i) sum += std::abs(a[i + j * n] - a[j + i * n]);
-    sum += std::abs(0 * a[j + j * n]);
+    for (int i = 0; i < j; ++i) differs |= !(a[i + j * n] - a[j + i * n] == 0);
+    differs |= !(0 * a[j + j * n] == 0);
   }
-  return sum;
+  return !differs;
 }
 
 bool sizes_agree(const System<kMaxDof>& system) {
@@ -161,8 +161,8 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out) 
   const bool alike = has_basis_ && last.joints == form.joints && last.strains == form.strains &&
                      last.factored == form.factored;
   if (alike && identical(form, last) && reuse(form, 0, out)) return out.status;
-  const bool symmetric = asymmetry(system.mass) == 0 && asymmetry(system.damping) == 0 &&
-                         (form.factored || asymmetry(system.stiffness) == 0);
+  const bool symmetric = is_symmetric(system.mass) && is_symmetric(system.damping) &&
+                         (form.factored || is_symmetric(system.stiffness));
   if (!symmetric) return solve_directly(system, form, Fallback::kNotSymmetric, out);
   Fallback reason = Fallback::kStart;
   if (alike) {

@@ -17,6 +17,10 @@ inline void store(double* to, const Lanes& lanes) noexcept {
   std::memcpy(to, &lanes, sizeof lanes);
 }
 
+inline Lanes magnitude(const Lanes& x) noexcept {
+  return x < Lanes{} ? -x : x;
+}
+
 /// Longest row, in doubles: the eigenvectors of 16 joints.
 inline constexpr int kMaxWidth = 32;
 

@@ -21,16 +21,26 @@ void clear_padding(const TrackedBasis& basis, int rows, PaddedRows& X) {
   }
 }
 
+/// X(row, column), X(row + 1, column + 1), ...: four entries, of which `count` exist.
+Lanes diagonal(const PaddedRows& X, int row, int column, int count, double otherwise) {
+  Lanes lanes;
+  for (int k = 0; k < 4; ++k) lanes[k] = k < count ? X(row + k, column + k) : otherwise;
+  return lanes;
+}
+
 void set_blocks(const PaddedRows& N, const PaddedRows& T, TrackedBasis& basis) {
   const int m = basis.modes;
-  for (int i = 0; i < m; ++i) {
-    const int k = m + i;
-    const double n00 = N(i, i), n01 = N(i, k), n10 = N(k, i), n11 = N(k, k);
-    const double inverse = 1 / (n00 * n11 - n01 * n10);
-    basis.l00[at(i)] = inverse * (n11 * T(i, i) - n01 * T(k, i));
-    basis.l01[at(i)] = inverse * (n11 * T(i, k) - n01 * T(k, k));
-    basis.l10[at(i)] = inverse * (n00 * T(k, i) - n10 * T(i, i));
-    basis.l11[at(i)] = inverse * (n00 * T(k, k) - n10 * T(i, k));
+  for (int i = 0; i < m; i += 4) {
+    const int k = m + i, count = std::min(4, m - i);
+    const Lanes n00 = diagonal(N, i, i, count, 1), n01 = diagonal(N, i, k, count, 0),
+                n10 = diagonal(N, k, i, count, 0), n11 = diagonal(N, k, k, count, 1);
+    const Lanes t00 = diagonal(T, i, i, count, 0), t01 = diagonal(T, i, k, count, 0),
+                t10 = diagonal(T, k, i, count, 0), t11 = diagonal(T, k, k, count, 0);
+    const Lanes inverse = 1 / (n00 * n11 - n01 * n10);
+    store(&basis.l00[at(i)], inverse * (n11 * t00 - n01 * t10));
+    store(&basis.l01[at(i)], inverse * (n11 * t01 - n01 * t11));
+    store(&basis.l10[at(i)], inverse * (n00 * t10 - n10 * t00));
+    store(&basis.l11[at(i)], inverse * (n00 * t11 - n10 * t01));
   }
   for (int k = 0; k < basis.zeros; ++k) {
     basis.rate[at(k)] = T(2 * m + k, 2 * m + k) / N(2 * m + k, 2 * m + k);

@@ -1,24 +1,7 @@
 #pragma once
-#include <dashpot/analysis/tracked_basis.hpp>
+#include <dashpot/analysis/coefficient_sizes.hpp>
 
 namespace dashpot::analysis {
-
-/// Sizes of the coefficients, for bounds of rounding errors and of small changes: with
-/// s_k = sqrt(M_kk), entrywise |M| <= mass s s', |C| <= damping s s' and |K| <= stiffness^2 s s'
-/// (without a factor), and columns of W are no longer than strain(k).
-struct CoefficientSizes {
-  std::array<double, kMaxDof> s{}, strain{};
-  double mass = 0, damping = 0, stiffness = 0;
-  bool in_range = false;  ///< no product that matters can underflow or overflow
-};
-CoefficientSizes coefficient_sizes(const StateForm& form) noexcept;
-
-/// How far two systems of the same sizes differ: the least d with |M - M'| <= d mass s s',
-/// |C - C'| <= d damping s s', and likewise for K or the columns of W. All entries are finite, and
-/// of symmetric matrices the upper triangles are read. Infinite as soon as it is seen to exceed
-/// `limit`.
-double distance(const StateForm& form, const StateForm& other, const CoefficientSizes& sizes,
-                double limit) noexcept;
 
 /// What is proved about the blocks of a basis.
 struct TrackedCertificate {

@@ -34,9 +34,12 @@ void list_roots(const TrackedBasis& basis, const TrackedCertificate& certificate
     eigenvalues_2x2(l00, l01, l10, l11, values[0], values[1]);
     const double norm = std::sqrt(l00 * l00 + l01 * l01 + l10 * l10 + l11 * l11);
     const double radius = certificate.radius[at(i)] + 16 * kUnit * norm;
+    const bool conjugate = values[0].imag() != 0;
     for (int e = 0; e < 2; ++e) {
       roots.block[at(2 * i + e)] = i;
-      roots[2 * i + e] = {values[at(e)], disc_radius(values.data(), 2, e, norm, radius)};
+      roots[2 * i + e] = {values[at(e)], e == 1 && conjugate
+                                             ? roots[2 * i].bound
+                                             : disc_radius(values.data(), 2, e, norm, radius)};
     }
   }
   for (int k = 0; k < basis.zeros; ++k) {

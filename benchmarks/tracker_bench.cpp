@@ -15,6 +15,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <memory>
 #include <random>
 #include <string>
@@ -99,13 +100,27 @@ double backward_error(const System<kMaxDof>& system, const Complex& value,
                             u.norm());
 }
 
-/// There and back again, so that the path has no jump.
+/// Brings a matrix near the processor.
+void fetch(const double* data, Eigen::Index size) {
+  constexpr Eigen::Index kCacheLine = 8;
+  for (Eigen::Index k = 0; k < size; k += kCacheLine) __builtin_prefetch(data + k);
+}
+
+/// There and back again, so that the path has no jump. The system after next is fetched meanwhile:
+/// a control loop has just written what it hands to the tracker, and the rivals' matrices are few.
 class Sweep {
  public:
   explicit Sweep(const std::vector<System<kMaxDof>>& path) : path_(path) {}
   const System<kMaxDof>& next() {
     if (at_ + direction_ < 0 || at_ + direction_ >= kSteps) direction_ = -direction_;
     at_ += direction_;
+    const int soon = std::clamp(at_ + 2 * direction_, 0, kSteps - 1);
+    const System<kMaxDof>& system = path_[static_cast<std::size_t>(soon)];
+    fetch(system.mass.data(), system.mass.size());
+    fetch(system.damping.data(), system.damping.size());
+    if (system.stiffness_factor.rows() == 0)
+      fetch(system.stiffness.data(), system.stiffness.size());
+    fetch(system.stiffness_factor.data(), system.stiffness_factor.size());
     return path_[static_cast<std::size_t>(at_)];
   }
 

@@ -232,6 +232,18 @@ TEST(ModeTracker, SaysWhatIsWrongAndRecovers) {
   EXPECT_EQ(tracked.tracker->counters().failed, 7);
 }
 
+TEST(ModeTracker, NeverReusesASpectrumForAFactorThatIsNotFinite) {
+  const System<kMaxDof> good = panda_impedance(swing(0.1), 0.3);
+  for (const double value :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    Tracked tracked;
+    ASSERT_EQ(tracked.update(good), Status::kOk);
+    System<kMaxDof> bad = good;
+    bad.stiffness_factor(2, 3) = value;
+    EXPECT_EQ(tracked.update(bad), Status::kNotFinite);
+  }
+}
+
 TEST(ModeTracker, ChangesSizes) {
   Random random(4004);
   Tracked tracked;
