@@ -36,8 +36,8 @@ System<> system_of(const ResponseCase& reference) {
 class ResponseOracle : public ::testing::TestWithParam<std::string> {
  protected:
   const ResponseCase& reference_ = testing::response_case(GetParam());
-  System<> system_ = system_of(reference_);
-  Response response_{system_, analyze(system_)};
+  System<> system = system_of(reference_);
+  Response response{system, analyze(system)};
 
   template <class Ask>
   void expect_agreement(const Trajectory& trajectory, double tolerance, const Ask& ask) {
@@ -74,23 +74,23 @@ constexpr double kTolerance = 1e-12;
 
 TEST_P(ResponseOracle, FreeMotion) {
   expect_agreement(reference_.free, kTolerance, [&](double t) {
-    return response_.free(reference_.initial_position, reference_.initial_velocity, t);
+    return response.free(reference_.initial_position, reference_.initial_velocity, t);
   });
 }
 
 TEST_P(ResponseOracle, Impulse) {
   expect_agreement(reference_.impulse_response, kTolerance,
-                   [&](double t) { return response_.impulse(reference_.impulse, t); });
+                   [&](double t) { return response.impulse(reference_.impulse, t); });
 }
 
 TEST_P(ResponseOracle, Step) {
   expect_agreement(reference_.step_response, kTolerance,
-                   [&](double t) { return response_.step(reference_.constant_force, t); });
+                   [&](double t) { return response.step(reference_.constant_force, t); });
 }
 
 TEST_P(ResponseOracle, Harmonic) {
   expect_agreement(reference_.harmonic_response, kTolerance, [&](double t) {
-    return response_.harmonic(reference_.harmonic_cosine, reference_.harmonic_sine,
+    return response.harmonic(reference_.harmonic_cosine, reference_.harmonic_sine,
                               reference_.harmonic_frequency, t);
   });
 }
@@ -98,13 +98,13 @@ TEST_P(ResponseOracle, Harmonic) {
 TEST_P(ResponseOracle, Sampled) {
   const VectorXd rest = VectorXd::Zero(reference_.n);
   expect_agreement(reference_.sampled_response, kTolerance, [&](double t) {
-    return response_.sampled(rest, rest, reference_.samples, reference_.sample_step, {t}).front();
+    return response.sampled(rest, rest, reference_.samples, reference_.sample_step, {t}).front();
   });
 }
 
 TEST_P(ResponseOracle, Receptance) {
   for (const auto& [frequency, value] : reference_.receptance) {
-    const Eigen::MatrixXcd H = response_.receptance(frequency);
+    const Eigen::MatrixXcd H = response.receptance(frequency);
     EXPECT_TRUE(near(H, value, kTolerance * value.cwiseAbs().maxCoeff())) << frequency;
   }
 }

@@ -24,13 +24,13 @@ const VectorXd kNoForce = VectorXd::Zero(4);
 
 class ResponseOf : public ::testing::TestWithParam<MadeToMeasure (*)(testing::Random&)> {
  protected:
-  testing::Random random_{31};
-  MadeToMeasure made_ = GetParam()(random_);
-  Response response_{made_.system, made_.spectrum};
+  testing::Random random{31};
+  MadeToMeasure made = GetParam()(random);
+  Response response{made.system, made.spectrum};
 
   double residual(const std::function<Motion(double)>& motion,
                   const std::function<VectorXd(double)>& force) {
-    return testing::worst_residual(made_.system, random_, 0.02, 20, 1e-3, motion, force);
+    return testing::worst_residual(made.system, random, 0.02, 20, 1e-3, motion, force);
   }
 };
 INSTANTIATE_TEST_SUITE_P(Blocks, ResponseOf,
@@ -44,9 +44,9 @@ INSTANTIATE_TEST_SUITE_P(Blocks, ResponseOf,
 
 TEST_P(ResponseOf, InitialConditionsAreMet) {
   for (int i = 0; i < 20; ++i) {
-    const VectorXd q = random_.vector(4);
-    const VectorXd v = random_.vector(4) * random_.log_uniform(0.1, 100);
-    const Motion motion = response_.free(q, v, 0);
+    const VectorXd q = random.vector(4);
+    const VectorXd v = random.vector(4) * random.log_uniform(0.1, 100);
+    const Motion motion = response.free(q, v, 0);
     const double size = q.norm() + v.norm();
     EXPECT_TRUE(near(motion.position, q, 1e-13 * size));
     EXPECT_TRUE(near(motion.velocity, v, 1e-12 * size));
@@ -54,15 +54,15 @@ TEST_P(ResponseOf, InitialConditionsAreMet) {
 }
 
 TEST_P(ResponseOf, AnImpulseSetsTheVelocity) {
-  const VectorXd impulse = random_.vector(4);
-  const Motion motion = response_.impulse(impulse, 0);
-  EXPECT_TRUE(near(motion.velocity, made_.system.mass.lu().solve(impulse), 1e-11));
+  const VectorXd impulse = random.vector(4);
+  const Motion motion = response.impulse(impulse, 0);
+  EXPECT_TRUE(near(motion.velocity, made.system.mass.lu().solve(impulse), 1e-11));
   EXPECT_TRUE(near(motion.position, kNoForce, 1e-12));
 }
 
 TEST_P(ResponseOf, ForcesStartFromRest) {
-  const VectorXd f = random_.vector(4);
-  for (const Motion& motion : {response_.step(f, 0), response_.harmonic(f, f, 3, 0)}) {
+  const VectorXd f = random.vector(4);
+  for (const Motion& motion : {response.step(f, 0), response.harmonic(f, f, 3, 0)}) {
     EXPECT_TRUE(near(motion.position, kNoForce, 0));
     EXPECT_TRUE(near(motion.velocity, kNoForce, 0));
   }
@@ -71,25 +71,25 @@ TEST_P(ResponseOf, ForcesStartFromRest) {
 // ------------------------------------------------------------------- the differential equation
 
 TEST_P(ResponseOf, FreeMotionSolvesTheEquation) {
-  const VectorXd q = random_.vector(4);
-  const VectorXd v = random_.vector(4);
+  const VectorXd q = random.vector(4);
+  const VectorXd v = random.vector(4);
   EXPECT_LT(
-      residual([&](double t) { return response_.free(q, v, t); }, [](double) { return kNoForce; }),
+      residual([&](double t) { return response.free(q, v, t); }, [](double) { return kNoForce; }),
       1e-10);
 }
 
 TEST_P(ResponseOf, MotionUnderAStepSolvesTheEquation) {
-  const VectorXd f = random_.vector(4);
+  const VectorXd f = random.vector(4);
   EXPECT_LT(
-      residual([&](double t) { return response_.step(f, t); }, [&](double) { return VectorXd(f); }),
+      residual([&](double t) { return response.step(f, t); }, [&](double) { return VectorXd(f); }),
       1e-10);
 }
 
 TEST_P(ResponseOf, HarmonicMotionSolvesTheEquation) {
-  const VectorXd c = random_.vector(4);
-  const VectorXd s = random_.vector(4);
+  const VectorXd c = random.vector(4);
+  const VectorXd s = random.vector(4);
   for (const double omega : {0.0, 0.5, 7.0, 12.0, 20.0}) {
-    EXPECT_LT(residual([&](double t) { return response_.harmonic(c, s, omega, t); },
+    EXPECT_LT(residual([&](double t) { return response.harmonic(c, s, omega, t); },
                        [&](double t) { return c * std::cos(omega * t) + s * std::sin(omega * t); }),
               1e-10)
         << omega;
@@ -97,11 +97,11 @@ TEST_P(ResponseOf, HarmonicMotionSolvesTheEquation) {
 }
 
 TEST_P(ResponseOf, SampledMotionSolvesTheEquationBetweenSamples) {
-  const VectorXd start = random_.vector(4);
-  const VectorXd slope = random_.vector(4);
+  const VectorXd start = random.vector(4);
+  const VectorXd slope = random.vector(4);
   const MatrixXd ramp = (MatrixXd(4, 2) << start, start + 25 * slope).finished();
   EXPECT_LT(
-      residual([&](double t) { return response_.sampled(slope, start, ramp, 25, {t}).front(); },
+      residual([&](double t) { return response.sampled(slope, start, ramp, 25, {t}).front(); },
                [&](double t) { return start + t * slope; }),
       1e-10);
 }
@@ -109,73 +109,73 @@ TEST_P(ResponseOf, SampledMotionSolvesTheEquationBetweenSamples) {
 // ------------------------------------------------------------------ responses tied to each other
 
 TEST_P(ResponseOf, VelocityUnderAStepIsTheImpulseResponse) {
-  const VectorXd f = random_.vector(4);
+  const VectorXd f = random.vector(4);
   for (const double t : {1e-6, 0.01, 0.3, 2.0, 10.0}) {
-    const VectorXd expected = response_.impulse(f, t).position;
-    EXPECT_TRUE(near(response_.step(f, t).velocity, expected, 1e-11 * (1 + expected.norm())));
+    const VectorXd expected = response.impulse(f, t).position;
+    EXPECT_TRUE(near(response.step(f, t).velocity, expected, 1e-11 * (1 + expected.norm())));
   }
 }
 
 TEST_P(ResponseOf, AHarmonicForceOfFrequencyZeroIsAStep) {
-  const VectorXd f = random_.vector(4);
+  const VectorXd f = random.vector(4);
   for (const double t : {0.01, 1.0, 30.0}) {
-    const Motion step = response_.step(f, t);
-    const Motion harmonic = response_.harmonic(f, random_.vector(4), 0, t);
+    const Motion step = response.step(f, t);
+    const Motion harmonic = response.harmonic(f, random.vector(4), 0, t);
     EXPECT_TRUE(near(harmonic.position, step.position, 1e-12 * step.position.norm()));
     EXPECT_TRUE(near(harmonic.velocity, step.velocity, 1e-12 * (1 + step.velocity.norm())));
   }
 }
 
 TEST_P(ResponseOf, TimeMayBeCutInTwo) {
-  const VectorXd q = random_.vector(4);
-  const VectorXd v = random_.vector(4);
-  const Motion half = response_.free(q, v, 1.3);
-  const Motion whole = response_.free(q, v, 1.9);
-  const Motion two = response_.free(half.position, half.velocity, 0.6);
+  const VectorXd q = random.vector(4);
+  const VectorXd v = random.vector(4);
+  const Motion half = response.free(q, v, 1.3);
+  const Motion whole = response.free(q, v, 1.9);
+  const Motion two = response.free(half.position, half.velocity, 0.6);
   const double size = whole.position.norm() + whole.velocity.norm();
   EXPECT_TRUE(near(two.position, whole.position, 1e-11 * size));
   EXPECT_TRUE(near(two.velocity, whole.velocity, 1e-11 * size));
 }
 
 TEST_P(ResponseOf, ConstantSamplesAreAStepAndFreeMotionSuperposes) {
-  const VectorXd q = random_.vector(4);
-  const VectorXd v = random_.vector(4);
-  const VectorXd f = random_.vector(4);
+  const VectorXd q = random.vector(4);
+  const VectorXd v = random.vector(4);
+  const VectorXd f = random.vector(4);
   const MatrixXd forces = f.replicate(1, 41);
   const std::vector<double> times = {0, 0.01, 0.05, 0.0625, 0.33, 0.33, 1.7, 2.0};
-  const std::vector<Motion> motions = response_.sampled(q, v, forces, 0.05, times);
+  const std::vector<Motion> motions = response.sampled(q, v, forces, 0.05, times);
   ASSERT_EQ(motions.size(), times.size());
   for (std::size_t i = 0; i < times.size(); ++i) {
-    const Motion free = response_.free(q, v, times[i]);
-    const Motion step = response_.step(f, times[i]);
+    const Motion free = response.free(q, v, times[i]);
+    const Motion step = response.step(f, times[i]);
     EXPECT_TRUE(near(motions[i].position, free.position + step.position, 1e-11));
     EXPECT_TRUE(near(motions[i].velocity, free.velocity + step.velocity, 1e-10));
   }
 }
 
 TEST_P(ResponseOf, SampledMotionDoesNotDependOnHowOftenItIsAskedFor) {
-  const MatrixXd forces = random_.matrix(4, 30);
+  const MatrixXd forces = random.matrix(4, 30);
   std::vector<double> often;
   for (int i = 0; i <= 290; ++i) often.push_back(0.01 * i);
-  const auto many = response_.sampled(kNoForce, kNoForce, forces, 0.1, often);
-  const auto one = response_.sampled(kNoForce, kNoForce, forces, 0.1, {often.back()});
+  const auto many = response.sampled(kNoForce, kNoForce, forces, 0.1, often);
+  const auto one = response.sampled(kNoForce, kNoForce, forces, 0.1, {often.back()});
   EXPECT_TRUE(near(many.back().position, one.back().position, 0));
 }
 
 // ------------------------------------------------------------------------------------ receptance
 
 TEST_P(ResponseOf, ReceptanceInvertsTheDynamicStiffness) {
-  const System<>& system = made_.system;
+  const System<>& system = made.system;
   for (const double omega : {0.01, 1.0, 6.9, 12.0, 35.0, 1e3, 1e6}) {
     const MatrixXcd dynamic_stiffness =
         system.stiffness - omega * omega * system.mass + Complex(0, omega) * system.damping;
-    const MatrixXcd H = response_.receptance(omega);
+    const MatrixXcd H = response.receptance(omega);
     EXPECT_TRUE(near(H, dynamic_stiffness.fullPivLu().inverse(), 1e-9 * H.norm())) << omega;
   }
 }
 
 TEST_P(ResponseOf, ReceptanceIsInfiniteAtAFrequencyOfZeroWithAZeroMode) {
-  const MatrixXcd H = response_.receptance(0);
+  const MatrixXcd H = response.receptance(0);
   EXPECT_TRUE((H.real().array() == std::numeric_limits<double>::infinity()).all());
 }
 

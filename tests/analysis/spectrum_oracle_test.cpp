@@ -60,19 +60,19 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
   Status solve(SpectrumOptions::Residual residual) {
     SpectrumOptions options;
     options.residual = residual;
-    return SpectrumSolver<>(options).solve(system_, spectrum_);
+    return SpectrumSolver<>(options).solve(system, spectrum);
   }
 
   /// Everything but the accuracy of eigenvalues.
   void expect_complete() const {
-    ASSERT_EQ(spectrum_.status, Status::kOk) << to_text(spectrum_.status);
-    EXPECT_TRUE(spectrum_.symmetric);
-    EXPECT_EQ(spectrum_.zero_modes.count, reference_.r);
-    EXPECT_EQ(spectrum_.modes.size(), reference_.n - reference_.r);
+    ASSERT_EQ(spectrum.status, Status::kOk) << to_text(spectrum.status);
+    EXPECT_TRUE(spectrum.symmetric);
+    EXPECT_EQ(spectrum.zero_modes.count, reference_.r);
+    EXPECT_EQ(spectrum.modes.size(), reference_.n - reference_.r);
     // The eigenvalues of this one lie 1e-10 apart, and their vectors are all but parallel.
     const double limit = reference_.name == "nearly_coinciding_n4_2^-33" ? 5e-13 : 1e-13;
-    for (const Mode<>& mode : spectrum_.modes) {
-      const double computed = backward_error(system_, mode);
+    for (const Mode<>& mode : spectrum.modes) {
+      const double computed = backward_error(system, mode);
       EXPECT_LE(computed, limit) << "at " << mode.eigenvalues[0];
       EXPECT_NEAR(mode.backward_error, computed, 2e-16 * (reference_.n + 4));
     }
@@ -81,19 +81,19 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
   /// The eigenvalues of the modes, mode by mode, then those of the zero modes: 2n in all.
   std::vector<Complex> eigenvalues() const {
     std::vector<Complex> all;
-    for (const Mode<>& mode : spectrum_.modes) {
+    for (const Mode<>& mode : spectrum.modes) {
       all.insert(all.end(), mode.eigenvalues.begin(), mode.eigenvalues.end());
     }
-    all.resize(all.size() + static_cast<std::size_t>(spectrum_.zero_modes.count), 0.0);
-    for (const double rate : spectrum_.zero_mode_rates) all.emplace_back(rate);
+    all.resize(all.size() + static_cast<std::size_t>(spectrum.zero_modes.count), 0.0);
+    for (const double rate : spectrum.zero_mode_rates) all.emplace_back(rate);
     return all;
   }
 
   void expect_within(const char* what, int mode, long double error, double bound) {
     EXPECT_TRUE(error <= static_cast<long double>(bound) || bound == kInfinity)
         << "error " << error << ", bound " << bound << ": " << what << " of mode " << mode + 1
-        << ", " << spectrum_.modes[mode].eigenvalues[0];
-    seen_.add(bound, error);
+        << ", " << spectrum.modes[mode].eigenvalues[0];
+    seen.add(bound, error);
   }
 
   /// Each number of each mode within its bound of the reference.
@@ -102,8 +102,8 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
     const std::vector<Complex> computed = eigenvalues();
     ASSERT_EQ(computed.size(), reference_.eigenvalues.size());
     const auto matches = testing::match_eigenvalues(computed, reference_.eigenvalues);
-    for (int i = 0; i < spectrum_.modes.size(); ++i) {
-      const Mode<>& mode = spectrum_.modes[i];
+    for (int i = 0; i < spectrum.modes.size(); ++i) {
+      const Mode<>& mode = spectrum.modes[i];
       const auto k = 2 * static_cast<std::size_t>(i);
       expect_within("first eigenvalue", i, matches[k].absolute, mode.error_bound);
       expect_within("second eigenvalue", i, matches[k + 1].absolute, mode.error_bound);
@@ -122,10 +122,10 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
                     std::abs(static_cast<long double>(mode.damping_ratio) - zeta),
                     mode.damping_ratio_bound);
     }
-    RecordProperty("tightest_bound_over_error", std::to_string(seen_.tightest));
-    RecordProperty("loosest_bound_over_error", std::to_string(seen_.loosest));
-    all_seen.tightest = std::min(all_seen.tightest, seen_.tightest);
-    all_seen.loosest = std::max(all_seen.loosest, seen_.loosest);
+    RecordProperty("tightest_bound_over_error", std::to_string(seen.tightest));
+    RecordProperty("loosest_bound_over_error", std::to_string(seen.loosest));
+    all_seen.tightest = std::min(all_seen.tightest, seen.tightest);
+    all_seen.loosest = std::max(all_seen.loosest, seen.loosest);
   }
 
   /// Eigenvalues of zero modes come without a bound: as good as the data's condition allows.
@@ -133,7 +133,7 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
     if (HasFatalFailure()) return;
     const std::vector<Complex> computed = eigenvalues();
     const auto matches = testing::match_eigenvalues(computed, reference_.eigenvalues);
-    for (std::size_t k = 2 * static_cast<std::size_t>(spectrum_.modes.size()); k < computed.size();
+    for (std::size_t k = 2 * static_cast<std::size_t>(spectrum.modes.size()); k < computed.size();
          ++k) {
       const ReferenceEigenvalue& truth = reference_.eigenvalues[matches[k].reference];
       if (truth.is_zero()) {
@@ -150,9 +150,9 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
   }
 
   const SpectrumCase& reference_ = testing::spectrum_case(GetParam());
-  System<> system_ = system_of(reference_);
-  Spectrum<> spectrum_;
-  Tightness seen_;
+  System<> system = system_of(reference_);
+  Spectrum<> spectrum;
+  Tightness seen;
   inline static Tightness all_seen;
 };
 
@@ -188,7 +188,7 @@ TEST_P(SpectrumOracle, EnclosesTheTruthByDefault) {
 
 TEST_P(SpectrumOracle, EnclosesTheTruthWithExtendedResiduals) {
   solve(SpectrumOptions::Residual::kExtended);
-  EXPECT_TRUE(spectrum_.extended);
+  EXPECT_TRUE(spectrum.extended);
   expect_complete();
   expect_enclosed();
   expect_zero_mode_rates();
@@ -196,7 +196,7 @@ TEST_P(SpectrumOracle, EnclosesTheTruthWithExtendedResiduals) {
 
 TEST_P(SpectrumOracle, EnclosesTheTruthWithWorkingResidualsWhateverTheStatus) {
   const Status status = solve(SpectrumOptions::Residual::kWorking);
-  EXPECT_FALSE(spectrum_.extended);
+  EXPECT_FALSE(spectrum.extended);
   EXPECT_TRUE(status == Status::kOk || status == Status::kUncertified) << to_text(status);
   expect_enclosed();  // an infinite bound encloses anything
 }
@@ -209,7 +209,7 @@ INSTANTIATE_TEST_SUITE_P(Systems, SpectrumOracleWithFactor,
                          alphanumeric);
 
 TEST_P(SpectrumOracleWithFactor, EnclosesTheTruth) {
-  system_.stiffness_factor = *reference_.stiffness_factor;
+  system.stiffness_factor = *reference_.stiffness_factor;
   for (const auto residual :
        {SpectrumOptions::Residual::kAutomatic, SpectrumOptions::Residual::kExtended}) {
     solve(residual);
