@@ -22,6 +22,13 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNothing = -1;
 /// Squared error of an extrapolation, relative to that of a simpler one, that makes it worth using.
 constexpr double kForeseen = 0.25;
+/// A proportional basis stays one as long as no more than this of strains and velocities mixes:
+/// what eigenvectors then lack, to its square.
+constexpr double kLeastMixing = 1e-9;
+/// Times the step squared: a step mixes as much by itself.
+constexpr double kStepMixing = 4;
+/// Updates between two looks whether the damping is proportional.
+constexpr int kLookEvery = 64;
 /// Blocks are balanced again when their columns lean this much towards each other.
 constexpr double kBalanced = 0.6;
 
@@ -241,8 +248,13 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   } else {
     set_zero(width, columns, step_);
   }
+  PlaneAngles angles;
+  const bool pure =
+      --look_in_ <= 0 && !basis_.proportional && has_pure_planes(defect_, basis_, angles);
+  if (look_in_ <= 0) look_in_ = kLookEvery;
   take_step(E_, basis_);
-  turned_ = balance(defect_, kBalanced, basis_);
+  turned_ = !basis_.proportional &&
+            ((pure && make_proportional(angles, basis_)) || balance(defect_, kBalanced, basis_));
   sizes_ = coefficient_sizes(form);
   if (!refine(form, out, reason)) {
     copy(before_.Z, columns, basis_.Z);  // the last one that was right still names the modes
@@ -254,6 +266,7 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
     learn_step();
   }
   ++counters_.tracked;
+  if (basis_.proportional) ++counters_.proportional;
   return true;
 }
 
@@ -310,6 +323,8 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     const Conflict conflict = newton_step(basis_, defect_, certificate_.noise, E_, size);
     add(E_, columns, step_);
     if (!(size < 1)) return false;
+    const double mixed = kLeastMixing + kStepMixing * size * size;
+    basis_.proportional = basis_.proportional && mixing(basis_, E_) <= mixed;
     if (!conflict && size <= kLastStep &&
         publish(form, 0, size <= kConverged ? kInfinity : options_.target_bound, true, out)) {
       return true;
@@ -318,10 +333,16 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     if (!conflict) continue;
     reason = Fallback::kCoincidence;
     turned_ = true;
-    if (!part_coinciding(defect_, basis_) && !part_blocks(defect_, conflict, basis_)) return false;
+    if (!part(conflict)) return false;
+    basis_.proportional = basis_.proportional && mixing(basis_, basis_.Z) == 0;
     ++counters_.repairs;
   }
   return false;
+}
+
+bool ModeTracker::part(const Conflict& conflict) noexcept {
+  if (conflict.first >= basis_.modes) return part_zero_modes(defect_, basis_);
+  return part_coinciding(defect_, basis_) || part_blocks(defect_, conflict, basis_);
 }
 
 Status ModeTracker::solve_directly(const System<kMaxDof>& system, const StateForm& form,
@@ -361,7 +382,10 @@ bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept 
   }
   evaluate(form, basis_, defect_);
   if (part_coinciding(defect_, basis_)) evaluate(form, basis_, defect_);
-  balance(defect_, 0, basis_);
+  PlaneAngles angles;
+  if (!has_pure_planes(defect_, basis_, angles) || !make_proportional(angles, basis_)) {
+    balance(defect_, 0, basis_);
+  }
   if (has_places_) keep_places(form, before_, basis_);
   sizes_ = coefficient_sizes(form);
   forget_steps();

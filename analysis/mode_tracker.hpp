@@ -59,6 +59,9 @@ struct TrackerCounters {
   std::int64_t updates = 0;
   std::int64_t tracked = 0, reused = 0, direct = 0, failed = 0;  ///< add up to `updates`
   std::array<std::int64_t, kFallbackCount> fallbacks{};          ///< calls of the direct solver
+  /// Of the tracked: damping that the undamped modes decouple, so that strains and velocities are
+  /// followed apart from each other
+  std::int64_t proportional = 0;
   std::int64_t passes = 0;     ///< evaluations of the basis, in all
   int most_passes = 0;         ///< in one update
   std::int64_t repairs = 0;    ///< pairs of blocks parted anew
@@ -107,6 +110,7 @@ class ModeTracker {
   bool reuse(const StateForm& form, double change, TrackedSpectrum& out) noexcept;
   bool follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
   bool refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
+  bool part(const Conflict& conflict) noexcept;
   bool publish(const StateForm& form, double distance, double target, bool fresh,
                TrackedSpectrum& out) noexcept;
   void learn_step() noexcept;
@@ -139,6 +143,7 @@ class ModeTracker {
   PaddedRows step_, last_step_, last_change_, last_curve_, prediction_;
   bool predicting_ = false;
   bool turned_ = false;  ///< columns were rotated or parted: the step tells nothing
+  int look_in_ = 0;      ///< updates until proportional damping is looked for
 
   PaddedRows velocities_, work_;
   System<kMaxDof> direct_;

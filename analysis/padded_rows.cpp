@@ -9,17 +9,18 @@ namespace {
 /// `Count` rows of the result at a time, each of V times four doubles.
 template <int V, int Count>
 void multiply_rows(const Strided& A, int first, int inner, const double* X, const double* start,
-                   double sign, double* out) noexcept {
+                   double sign, double* out, int stride) noexcept {
   std::array<std::array<Lanes, V>, Count> sum{};
   if (start != nullptr) {
-    const double* from = start + first * 4 * V;
+    const double* from = start + first * stride;
     for (auto& row : sum) {
-      for (Lanes& lanes : row) lanes = load(from), from += 4;
+      for (std::size_t v = 0; v < V; ++v) row[v] = load(from + 4 * v);
+      from += stride;
     }
   }
   const double* a = A.data + first * A.row_step;
   const double* x = X;
-  for (int k = 0; k < inner; ++k, a += A.column_step, x += 4 * V) {
+  for (int k = 0; k < inner; ++k, a += A.column_step, x += stride) {
     for (int c = 0; c < Count; ++c) {
       const double factor = a[c * A.row_step];
       for (int v = 0; v < V; ++v) {
@@ -27,21 +28,22 @@ void multiply_rows(const Strided& A, int first, int inner, const double* X, cons
       }
     }
   }
-  double* to = out + first * 4 * V;
+  double* to = out + first * stride;
   for (const auto& row : sum) {
-    for (const Lanes& lanes : row) store(to, sign * lanes), to += 4;
+    for (std::size_t v = 0; v < V; ++v) store(to + 4 * v, sign * row[v]);
+    to += stride;
   }
 }
 
 template <int V>
 void multiply(const Strided& A, int rows, int inner, const double* X, const double* start,
-              double sign, double* out) noexcept {
+              double sign, double* out, int stride) noexcept {
   constexpr int kTogether = V <= 2 ? 4 : V <= 4 ? 2 : 1;  // as many as registers hold
   int i = 0;
   for (; i + kTogether <= rows; i += kTogether) {
-    multiply_rows<V, kTogether>(A, i, inner, X, start, sign, out);
+    multiply_rows<V, kTogether>(A, i, inner, X, start, sign, out, stride);
   }
-  for (; i < rows; ++i) multiply_rows<V, 1>(A, i, inner, X, start, sign, out);
+  for (; i < rows; ++i) multiply_rows<V, 1>(A, i, inner, X, start, sign, out, stride);
 }
 
 template <int... I>
@@ -51,9 +53,9 @@ constexpr std::array<PaddedMultiply, sizeof...(I)> table(std::integer_sequence<i
 
 }  // namespace
 
-PaddedMultiply padded_multiply(int width) noexcept {
+PaddedMultiply padded_multiply(int columns) noexcept {
   static constexpr auto kTable = table(std::make_integer_sequence<int, kMaxWidth / 4>());
-  return kTable[static_cast<std::size_t>(width / 4 - 1)];
+  return kTable[static_cast<std::size_t>((columns + 3) / 4 - 1)];
 }
 
 }  // namespace dashpot::analysis

@@ -42,13 +42,14 @@ struct Strided {
   int row_step, column_step;
 };
 
-/// out = sign (start + A X): `rows` rows of `width` doubles each, of A with `inner` columns.
-/// `start` may be null, for zero. `out` may hold A or start, row by row, but not X.
+/// out = sign (start + A X): `rows` rows, of A with `inner` columns. Rows of X, start and out lie
+/// `stride` doubles apart. `start` may be null, for zero. `out` may hold A or start, row by row,
+/// but not X.
 using PaddedMultiply = void (*)(const Strided& A, int rows, int inner, const double* X,
-                                const double* start, double sign, double* out) noexcept;
+                                const double* start, double sign, double* out, int stride) noexcept;
 
-/// The multiplication for rows of this width, a multiple of 4 up to kMaxWidth; compiled for each
-/// width by itself, so that rows of the result stay in registers.
-PaddedMultiply padded_multiply(int width) noexcept;
+/// The multiplication for this number of columns, rounded up to a multiple of 4, at most kMaxWidth;
+/// compiled for each by itself, so that rows of the result stay in registers.
+PaddedMultiply padded_multiply(int columns) noexcept;
 
 }  // namespace dashpot::analysis

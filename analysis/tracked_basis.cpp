@@ -8,6 +8,9 @@ namespace {
 
 /// A step as large as this does not say what it seems to.
 constexpr double kSmallStep = 0.3;
+/// Between zero modes, whose couplings and rates are often small together: they are better parted
+/// all at once.
+constexpr double kSmallZeroStep = 1e-3;
 /// Up to this size it does no harm if it comes of rounding errors.
 constexpr double kTinyStep = 1e-6;
 
@@ -165,6 +168,78 @@ void only_orthonormalize(const TrackedBasis& basis, const PaddedRows& R, int i, 
   });
 }
 
+double squared_norm(const TrackedBasis& basis, const PaddedRows& X) {
+  Lanes squares{};
+  for (int i = 0; i < basis.columns(); ++i) {
+    for (int j = 0; j < X.width; j += 4) squares += load(X.row(i) + j) * load(X.row(i) + j);
+  }
+  return (squares[0] + squares[1]) + (squares[2] + squares[3]);
+}
+
+/// Couplings between zero modes that come of what the rest of the step, to its square, lets them
+/// have of the modes' damping: they go away with it.
+double zeros_disturbance(const TrackedBasis& basis, const PaddedRows& E) {
+  if (basis.zeros < 2) return 0;
+  double rates = 0, among_zeros = 0;
+  for (const TrackedBasis::Entries* l : {&basis.l00, &basis.l01, &basis.l10, &basis.l11}) {
+    for (int i = 0; i < basis.modes; ++i) rates += (*l)[at(i)] * (*l)[at(i)];
+  }
+  for (int i = 2 * basis.modes; i < basis.columns(); ++i) {
+    for (int j = 2 * basis.modes; j < basis.columns(); ++j) among_zeros += E(i, j) * E(i, j);
+  }
+  return std::sqrt(rates) * std::max(0.0, squared_norm(basis, E) - among_zeros);
+}
+
+/// R = Z' S Z (Sigma is not yet subtracted) and G = Z' B Z, with S Z = [Z_s or K Z_s; -M V] and
+/// B Z = [W V; W' Z_s + C V].
+void multiply_mixed(const StateForm& form, const TrackedBasis& basis, TrackedDefect& defect) {
+  const int n = form.joints, p = form.strains, states = form.states(), width = basis.Z.width;
+  const auto multiply = [product = padded_multiply(width), width](
+                            const Strided& A, int rows, int inner, const double* X,
+                            const double* start, double sign,
+                            double* out) { product(A, rows, inner, X, start, sign, out, width); };
+  const double *const strain = basis.Z.row(0), *const velocity = basis.Z.row(p);
+  multiply({form.M, 1, n}, n, n, velocity, nullptr, -1, defect.MV.row(p));
+  multiply({form.W, 1, p}, p, n, velocity, nullptr, 1, defect.image.row(0));
+  multiply({form.W, p, 1}, n, p, strain, nullptr, 1, defect.image.row(p));
+  if (form.factored) {
+    std::copy(strain, velocity, defect.MV.row(0));
+  } else {
+    std::copy(defect.image.row(p), defect.image.row(p + n), defect.MV.row(0));
+  }
+  multiply({form.C, 1, n}, n, n, velocity, defect.image.row(p), 1, defect.image.row(p));
+  const Strided transposed{basis.Z.row(0), 1, width};
+  multiply(transposed, basis.columns(), states, defect.MV.row(0), nullptr, 1, defect.R.row(0));
+  multiply(transposed, basis.columns(), states, defect.image.row(0), nullptr, 1, defect.G.row(0));
+}
+
+/// The same of a proportional basis, with Z_s (p columns) and V (n columns):
+///     R = diag(Z_s' Z_s or Z_s' K Z_s, -V' M V),     G = [0, Z_s' W V; its transpose, V' C V].
+void multiply_pure(const StateForm& form, const TrackedBasis& basis, TrackedDefect& defect) {
+  const int n = form.joints, p = form.strains, m = basis.modes, width = basis.Z.width;
+  const PaddedMultiply strains = padded_multiply(m), velocities = padded_multiply(n);
+  const double *const Z_s = basis.Z.row(0), *const V = basis.Z.row(p) + m;
+  const Strided Z_s_transposed{Z_s, 1, width}, V_transposed{V, 1, width};
+  const auto clear = [&](PaddedRows& X, int first, int rows) {
+    std::fill_n(X.row(first), rows * width, 0.0);
+  };
+  clear(defect.MV, p, n);
+  velocities({form.M, 1, n}, n, n, V, nullptr, -1, defect.MV.row(p) + m, width);
+  velocities({form.W, 1, p}, p, n, V, nullptr, 1, defect.image.row(0) + m, width);
+  velocities({form.C, 1, n}, n, n, V, nullptr, 1, defect.image.row(p) + m, width);
+  if (!form.factored) strains({form.W, 1, p}, p, p, Z_s, nullptr, 1, defect.MV.row(0), width);
+  const double* const KZ_s = form.factored ? Z_s : defect.MV.row(0);
+  clear(defect.R, 0, basis.columns());
+  clear(defect.G, 0, basis.columns());
+  strains(Z_s_transposed, m, p, KZ_s, nullptr, 1, defect.R.row(0), width);
+  velocities(V_transposed, n, n, defect.MV.row(p) + m, nullptr, 1, defect.R.row(m) + m, width);
+  velocities(Z_s_transposed, m, p, defect.image.row(0) + m, nullptr, 1, defect.G.row(0) + m, width);
+  velocities(V_transposed, n, n, defect.image.row(p) + m, nullptr, 1, defect.G.row(m) + m, width);
+  for (int i = 0; i < m; ++i) {
+    for (int j = m; j < basis.columns(); ++j) defect.G(j, i) = defect.G(i, j);
+  }
+}
+
 }  // namespace
 
 StateForm state_form(const System<kMaxDof>& system) noexcept {
@@ -180,23 +255,14 @@ StateForm state_form(const System<kMaxDof>& system) noexcept {
 }
 
 void evaluate(const StateForm& form, TrackedBasis& basis, TrackedDefect& defect) noexcept {
-  const int n = form.joints, p = form.strains, states = form.states(), width = basis.Z.width;
-  const PaddedMultiply multiply = padded_multiply(width);
-  const double *const strain = basis.Z.row(0), *const velocity = basis.Z.row(p);
-  for (PaddedRows* rows : {&defect.R, &defect.G, &defect.MV, &defect.image}) rows->width = width;
-  // S Z = [Z_s or K Z_s; -M V] and B Z = [W V; W' Z_s + C V].
-  multiply({form.M, 1, n}, n, n, velocity, nullptr, -1, defect.MV.row(p));
-  multiply({form.W, 1, p}, p, n, velocity, nullptr, 1, defect.image.row(0));
-  multiply({form.W, p, 1}, n, p, strain, nullptr, 1, defect.image.row(p));
-  if (form.factored) {
-    std::copy(strain, velocity, defect.MV.row(0));
-  } else {
-    std::copy(defect.image.row(p), defect.image.row(p + n), defect.MV.row(0));
+  for (PaddedRows* rows : {&defect.R, &defect.G, &defect.MV, &defect.image}) {
+    rows->width = basis.Z.width;
   }
-  multiply({form.C, 1, n}, n, n, velocity, defect.image.row(p), 1, defect.image.row(p));
-  const Strided transposed{basis.Z.row(0), 1, width};
-  multiply(transposed, basis.columns(), states, defect.MV.row(0), nullptr, 1, defect.R.row(0));
-  multiply(transposed, basis.columns(), states, defect.image.row(0), nullptr, 1, defect.G.row(0));
+  if (basis.proportional) {
+    multiply_pure(form, basis, defect);
+  } else {
+    multiply_mixed(form, basis, defect);
+  }
   set_blocks(defect.R, defect.G, basis);
   subtract_blocks(basis, defect.R, defect.G);
   for (int i = 0; i < basis.columns(); ++i) defect.R(i, i) -= i < basis.modes ? 1 : -1;
@@ -206,63 +272,74 @@ void evaluate(const StateForm& form, TrackedBasis& basis, TrackedDefect& defect)
 Conflict newton_step(const TrackedBasis& basis, const TrackedDefect& defect, double noise,
                      PaddedRows& E, double& size) noexcept {
   E.width = basis.Z.width;
-  const int columns = basis.columns();
   for (int i = 0; i < basis.modes; ++i) solve_row(basis, defect.G, i, E);
   if (basis.zeros > 0) solve_zeros(basis, defect.G, E);
   for (int i = 0; i < basis.blocks(); ++i) only_orthonormalize(basis, defect.R, i, i, E);
-  clear_padding(basis, columns, E);
-  Lanes squares{};
-  for (int i = 0; i < columns; ++i) {
-    for (int j = 0; j < E.width; j += 4) {
-      const Lanes e = load(E.row(i) + j);
-      squares += e * e;
-    }
-  }
-  size = std::sqrt(squares[0] + squares[1] + squares[2] + squares[3]);
+  clear_padding(basis, basis.columns(), E);
+  size = std::sqrt(squared_norm(basis, E));
   Conflict conflict;
   if (size < kTinyStep) return conflict;
+  const double zeros_noise = noise + zeros_disturbance(basis, E);
   double worst = 0;
   bool left_out = false;
   for (int i = 0; i < basis.blocks(); ++i) {
     for (int j = 0; j < i; ++j) {
       const double step = std::max(block_norm(basis, E, i, j), block_norm(basis, E, j, i));
       if (step < kTinyStep) continue;
+      const bool zeros = j >= basis.modes;
+      const double small = zeros ? kSmallZeroStep : kSmallStep, least = zeros ? zeros_noise : noise;
       const double coupling =
           std::max(block_norm(basis, defect.G, i, j), block_norm(basis, defect.G, j, i));
-      if (coupling > noise && step < kSmallStep) continue;
+      if (coupling > noise && step < small) continue;
       only_orthonormalize(basis, defect.R, i, j, E);
       only_orthonormalize(basis, defect.R, j, i, E);
       left_out = true;
-      if (coupling <= noise || coupling < worst) continue;
+      if (coupling <= least || coupling < worst) continue;
       worst = coupling;
       conflict = {j, i};
     }
   }
-  if (!left_out) return conflict;
-  size = 0;
-  for (int i = 0; i < columns; ++i) {
-    for (int j = 0; j < columns; ++j) size += E(i, j) * E(i, j);
-  }
-  size = std::sqrt(size);
+  if (left_out) size = std::sqrt(squared_norm(basis, E));
   return conflict;
 }
 
 int padded_width(int modes, int zeros) noexcept {
-  const int lanes = modes + (modes + 3) / 4 * 4;
+  const int lanes = modes + (modes + zeros + 3) / 4 * 4;
   return (std::max(2 * modes + zeros, lanes) + 3) / 4 * 4;
 }
 
+double mixing(const TrackedBasis& basis, const PaddedRows& E) noexcept {
+  double squares = 0;
+  for (int i = 0; i < basis.modes; ++i) {
+    for (int j = basis.modes; j < basis.columns(); ++j) {
+      squares += E(i, j) * E(i, j) + E(j, i) * E(j, i);
+    }
+  }
+  return std::sqrt(squares);
+}
+
 void take_step(const PaddedRows& E, TrackedBasis& basis) noexcept {
-  const int width = basis.Z.width, columns = basis.columns();
+  const int width = basis.Z.width, columns = basis.columns(), m = basis.modes;
   double* const Z = basis.Z.row(0);
-  padded_multiply(width)({Z, width, 1}, columns, columns, E.row(0), Z, 1, Z);
+  if (!basis.proportional) {
+    padded_multiply(width)({Z, width, 1}, columns, columns, E.row(0), Z, 1, Z, width);
+    return;
+  }
+  const int n = m + basis.zeros;
+  double* const V = basis.Z.row(m) + m;
+  padded_multiply(m)({Z, width, 1}, m, m, E.row(0), Z, 1, Z, width);
+  for (int i = 0; i < m; ++i) {  // fours of columns reach beyond the strains'
+    for (int j = m; j < (m + 3) / 4 * 4; ++j) basis.Z(i, j) = 0;
+  }
+  padded_multiply(n)({V, width, 1}, n, n, E.row(m) + m, V, 1, V, width);
 }
 
 void stepped_velocities(const TrackedBasis& basis, const PaddedRows& E, PaddedRows& out) noexcept {
-  const int width = out.width = basis.Z.width;
+  const int width = out.width = basis.Z.width, n = basis.modes + basis.zeros;
+  const int first = basis.proportional ? basis.modes : 0;  // columns that hold velocities
   const double* const V = basis.Z.row(basis.modes);
-  padded_multiply(width)({V, width, 1}, basis.modes + basis.zeros, basis.columns(), E.row(0), V, 1,
-                         out.row(0));
+  padded_multiply(width)({V + first, width, 1}, n, basis.columns() - first, E.row(first), V, 1,
+                         out.row(0), width);
 }
 
 }  // namespace dashpot::analysis

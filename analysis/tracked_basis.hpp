@@ -43,6 +43,9 @@ struct TrackedBasis {
   int modes = 0;                           ///< p
   int zeros = 0;                           ///< n - p
   PaddedRows Z;                            ///< n + p rows and columns: strains, then velocities
+  /// The undamped modes decouple the damping: first columns are strains alone, all others
+  /// velocities alone, to the last bit, and so they stay.
+  bool proportional = false;
   /// Lambda of mode i is [l00 l01; l10 l11](i), 1/s.
   Entries l00{}, l01{}, l10{}, l11{};
   Entries rate{};  ///< of the zero modes, 1/s
@@ -64,7 +67,9 @@ struct TrackedDefect {
   PaddedRows image;  ///< B Z
 };
 
-/// Evaluates the defect, after setting the blocks of Lambda to N_ii^-1 (Z' B Z)_ii.
+/// Evaluates the defect, after setting the blocks of Lambda to N_ii^-1 (Z' B Z)_ii. Of a
+/// proportional basis Z = [Z_s 0; 0 V], only W V and C V and what they become in Z_s and V are
+/// computed.
 void evaluate(const StateForm& form, TrackedBasis& basis, TrackedDefect& defect) noexcept;
 
 /// Two blocks that a Newton step cannot tell apart.
@@ -81,7 +86,11 @@ struct Conflict {
 Conflict newton_step(const TrackedBasis& basis, const TrackedDefect& defect, double noise,
                      PaddedRows& E, double& size) noexcept;
 
-/// Z <- Z (I + E).
+/// What a step E mixes of strains into velocities, and the other way: the Frobenius norm of its (or
+/// of Z's) entries between first columns and others.
+double mixing(const TrackedBasis& basis, const PaddedRows& E) noexcept;
+
+/// Z <- Z (I + E); a proportional basis stays one, and takes no part of the mixing in E.
 void take_step(const PaddedRows& E, TrackedBasis& basis) noexcept;
 
 /// The velocity rows (n) of Z (I + E).

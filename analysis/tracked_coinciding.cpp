@@ -102,15 +102,16 @@ bool pair_columns(const Shared& shared, Cluster& X) {
   return X.allFinite();
 }
 
-void turn_columns(const Shared& shared, const Cluster& X, TrackedBasis& basis) {
-  const int size = 2 * shared.modes;
+void turn_columns(const std::array<int, kMaxWidth>& columns, const Cluster& X,
+                  TrackedBasis& basis) {
+  const auto size = static_cast<int>(X.cols());
   for (int row = 0; row < basis.columns(); ++row) {
     std::array<double, kMaxWidth> z{};
-    for (int j = 0; j < size; ++j) z[at(j)] = basis.Z(row, shared.columns[at(j)]);
+    for (int j = 0; j < size; ++j) z[at(j)] = basis.Z(row, columns[at(j)]);
     for (int j = 0; j < size; ++j) {
       double sum = 0;
       for (int k = 0; k < size; ++k) sum += z[at(k)] * X(k, j);
-      basis.Z(row, shared.columns[at(j)]) = sum;
+      basis.Z(row, columns[at(j)]) = sum;
     }
   }
 }
@@ -136,10 +137,27 @@ bool part_coinciding(const TrackedDefect& defect, TrackedBasis& basis) noexcept 
     pose(basis, defect, shared);
     Cluster X;
     if (!orthonormal_columns(shared, X) || !pair_columns(shared, X)) continue;
-    turn_columns(shared, X, basis);
+    turn_columns(shared.columns, X, basis);
     any = true;
   }
   return any;
+}
+
+bool part_zero_modes(const TrackedDefect& defect, TrackedBasis& basis) noexcept {
+  const int first = 2 * basis.modes, count = basis.zeros;
+  Cluster T(count, count);
+  std::array<int, kMaxWidth> columns{};
+  for (int j = 0; j < count; ++j) {
+    columns[at(j)] = first + j;
+    for (int i = 0; i < count; ++i) {
+      const double N = defect.R(first + i, first + j) - (i == j ? 1 : 0);
+      T(i, j) = defect.G(first + i, first + j) + N * basis.rate[at(j)];
+    }
+  }
+  const ClusterSolver rates(T);  // reads one triangle: T is symmetric but for rounding errors
+  if (!rates.eigenvectors().allFinite()) return false;
+  turn_columns(columns, rates.eigenvectors(), basis);
+  return true;
 }
 
 }  // namespace dashpot::analysis

@@ -203,7 +203,7 @@ void read_shapes(const StateForm& form, const TrackedBasis& basis, const PaddedR
                  const PaddedRows& velocities, PaddedRows& momenta, TrackedSpectrum& out) noexcept {
   momenta.width = basis.Z.width;
   padded_multiply(momenta.width)({form.M, 1, form.joints}, form.joints, form.joints,
-                                 velocities.row(0), nullptr, 1, momenta.row(0));
+                                 velocities.row(0), nullptr, 1, momenta.row(0), momenta.width);
   for (int first = 0; first < basis.modes; first += 4) {
     const int lanes = std::min(4, basis.modes - first);
     VectorGroup group{};

@@ -18,4 +18,8 @@ bool part_blocks(const TrackedDefect& defect, const Conflict& conflict,
 /// errors. `defect` is one of the basis; returns whether there were any such modes.
 bool part_coinciding(const TrackedDefect& defect, TrackedBasis& basis) noexcept;
 
+/// Turns the columns of the zero modes, which are orthonormal or nearly so, until the damping tells
+/// them apart, all at once. `defect` is one of the basis, or nearly. False if it is not finite.
+bool part_zero_modes(const TrackedDefect& defect, TrackedBasis& basis) noexcept;
+
 }  // namespace dashpot::analysis

@@ -11,6 +11,10 @@ namespace {
 /// Squared lengths in the metric below this, relative to those in the energy metric, belong to
 /// vectors of no sign type: a pair at critical damping that is not in one block.
 constexpr double kNeutral = 1e-6;
+/// Squared sine of the angle up to which two columns count as parallel, relative.
+constexpr double kParallel = 1e-10;
+/// Entries this small, relative to their column, are left out of a proportional basis.
+constexpr double kPure = 1e-7;
 
 std::size_t at(int i) {
   return static_cast<std::size_t>(i);
@@ -274,6 +278,33 @@ std::array<int, kMaxDof> best_places(const StateForm& form, const TrackedBasis& 
   return assign(scores, count);
 }
 
+/// v' M v of the columns of block i, and between the two; strain energies differ from these by
+/// Z' S Z = Sigma.
+struct Kinetic {
+  double first = 0, second = 0, mixed = 0;
+};
+
+Kinetic kinetic_energies(const TrackedBasis& basis, const TrackedDefect& defect, int i) {
+  const int m = basis.modes;
+  Kinetic sum;
+  for (int k = m; k < basis.columns(); ++k) {
+    sum.first -= basis.Z(k, i) * defect.MV(k, i);
+    sum.second -= basis.Z(k, m + i) * defect.MV(k, m + i);
+    sum.mixed -= basis.Z(k, i) * defect.MV(k, m + i);
+  }
+  return sum;
+}
+
+/// Hyperbolic rotation of the two columns of mode i.
+void rotate_block(double angle, int i, TrackedBasis& basis) {
+  const double c = std::cosh(angle), s = std::sinh(angle);
+  for (int row = 0; row < basis.columns(); ++row) {
+    const double x = basis.Z(row, i), y = basis.Z(row, basis.modes + i);
+    basis.Z(row, i) = c * x + s * y;
+    basis.Z(row, basis.modes + i) = s * x + c * y;
+  }
+}
+
 }  // namespace
 
 bool start_basis(const StateForm& form, const Spectrum<kMaxDof>& spectrum,
@@ -308,28 +339,50 @@ bool find_places(const StateForm& form, const TrackedBasis& before,
 }
 
 bool balance(const TrackedDefect& defect, double tolerance, TrackedBasis& basis) noexcept {
-  const int m = basis.modes, p = basis.modes, n = basis.modes + basis.zeros;
   bool any = false;
-  for (int i = 0; i < m; ++i) {
-    // Kinetic energies; the strain energies differ by Z' S Z = Sigma.
-    double first = 0, second = 0, mixed = 0;
-    for (int k = p; k < p + n; ++k) {
-      first -= basis.Z(k, i) * defect.MV(k, i);
-      second -= basis.Z(k, m + i) * defect.MV(k, m + i);
-      mixed -= basis.Z(k, i) * defect.MV(k, m + i);
-    }
+  for (int i = 0; i < basis.modes; ++i) {
+    const Kinetic kinetic = kinetic_energies(basis, defect, i);
     // In the energy metric: 2 first + 1, 2 second - 1, 2 mixed.
-    const double tangent = -2 * mixed / (first + second);
+    const double tangent = -2 * kinetic.mixed / (kinetic.first + kinetic.second);
     if (!(std::abs(tangent) > tolerance) || !(std::abs(tangent) < 1)) continue;
     any = true;
-    const double angle = 0.5 * std::atanh(tangent), c = std::cosh(angle), s = std::sinh(angle);
-    for (int row = 0; row < p + n; ++row) {
-      const double x = basis.Z(row, i), y = basis.Z(row, m + i);
-      basis.Z(row, i) = c * x + s * y;
-      basis.Z(row, m + i) = s * x + c * y;
-    }
+    rotate_block(0.5 * std::atanh(tangent), i, basis);
   }
   return any;
+}
+
+bool has_pure_planes(const TrackedDefect& defect, const TrackedBasis& basis,
+                     PlaneAngles& angles) noexcept {
+  for (int i = 0; i < basis.modes; ++i) {
+    const auto [first, second, mixed] = kinetic_energies(basis, defect, i);
+    // Kinetic energies of parallel velocities, strain energies of parallel strains.
+    const double squared = mixed * mixed, limit = kParallel * (1 + first) * second;
+    if (!(std::abs(first * second - squared) <= limit)) return false;
+    if (!(std::abs((1 + first) * (second - 1) - squared) <= limit)) return false;
+    angles[at(i)] = 0.5 * std::atanh(-2 * mixed / (first + second));
+  }
+  return true;
+}
+
+bool make_proportional(const PlaneAngles& angles, TrackedBasis& basis) noexcept {
+  const int m = basis.modes, columns = basis.columns();
+  TrackedBasis pure = basis;
+  for (int i = 0; i < m; ++i) rotate_block(angles[at(i)], i, pure);
+  for (int column = 0; column < columns; ++column) {
+    const bool strain = column < m;
+    double stays = 0, goes = 0;
+    for (int row = 0; row < columns; ++row) {
+      double& entry = pure.Z(row, column);
+      const bool kept = (row < m) == strain;
+      double& largest = kept ? stays : goes;
+      if (!(std::abs(entry) <= largest)) largest = std::abs(entry);
+      if (!kept) entry = 0;
+    }
+    if (!(goes <= kPure * stays)) return false;
+  }
+  pure.proportional = true;
+  basis = pure;
+  return true;
 }
 
 }  // namespace dashpot::analysis

@@ -31,4 +31,17 @@ bool find_places(const StateForm& form, const TrackedBasis& before,
 /// one of this basis, or nearly.
 bool balance(const TrackedDefect& defect, double tolerance, TrackedBasis& basis) noexcept;
 
+/// Of each mode's hyperbolic rotation.
+using PlaneAngles = std::array<double, kMaxDof>;
+
+/// Whether each mode's plane is that of one strain and one velocity, as it is if the undamped modes
+/// decouple the damping; and the rotations that make its columns so. The defect is one of this
+/// basis.
+bool has_pure_planes(const TrackedDefect& defect, const TrackedBasis& basis,
+                     PlaneAngles& angles) noexcept;
+
+/// Rotates, and leaves out what little mixing there is (see TrackedBasis::proportional). Returns
+/// false, and leaves `basis` as it was, if it is not little.
+bool make_proportional(const PlaneAngles& angles, TrackedBasis& basis) noexcept;
+
 }  // namespace dashpot::analysis

@@ -1,0 +1,191 @@
+// Paths on which the undamped modes decouple the damping, and onto and off such paths: strains and
+// velocities are then followed apart from each other, and nothing else may change.
+#include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/tests/support/panda_path.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/true_spectrum.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <memory>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::expect_enclosed;
+using testing::panda_impedance;
+using testing::Random;
+using testing::swing;
+
+struct Tracked {
+  Status update(const System<kMaxDof>& system) { return tracker->update(system, *spectrum); }
+  const ModeNumbers& mode(int i) const { return spectrum->modes[static_cast<std::size_t>(i)]; }
+  const TrackerCounters& counters() const { return tracker->counters(); }
+
+  std::unique_ptr<ModeTracker> tracker = std::make_unique<ModeTracker>();
+  std::unique_ptr<TrackedSpectrum> spectrum = std::make_unique<TrackedSpectrum>();
+};
+
+/// C = M Phi diag(2 zeta omega) Phi' M with the undamped modes Phi, and none for zero modes.
+void damp(System<kMaxDof>& system, double zeta) {
+  const MatrixXd M = system.mass;
+  const MatrixXd W = system.stiffness_factor;
+  const MatrixXd K = W.rows() > 0 ? MatrixXd(W.transpose() * W) : MatrixXd(system.stiffness);
+  const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> modes(K, M);
+  VectorXd rates = VectorXd::Zero(M.rows());
+  const Eigen::Index zeros = W.rows() > 0 ? M.rows() - W.rows() : 0;
+  for (Eigen::Index k = zeros; k < M.rows(); ++k) {
+    rates[k] = 2 * zeta * std::sqrt(modes.eigenvalues()[k]);
+  }
+  const MatrixXd MPhi = M * modes.eigenvectors();
+  const MatrixXd C = MPhi * rates.asDiagonal() * MPhi.transpose();
+  system.damping = 0.5 * (C + C.transpose());
+}
+
+/// Without a factor, if `full`: three joints more than modes become springs of their own.
+System<kMaxDof> arm(double t, double zeta, bool full) {
+  System<kMaxDof> system = panda_impedance(swing(t), 0);
+  if (full) {
+    const MatrixXd W = system.stiffness_factor;
+    const MatrixXd K = W.transpose() * W + 30 * MatrixXd::Identity(7, 7);
+    system.stiffness = 0.5 * (K + K.transpose());
+    system.stiffness_factor.resize(0, 7);
+  }
+  damp(system, zeta);
+  return system;
+}
+
+class ProportionalPath : public ::testing::TestWithParam<std::tuple<double, bool>> {};
+
+TEST_P(ProportionalPath, IsFollowedWithStrainsAndVelocitiesApart) {
+  const auto [zeta, full] = GetParam();
+  Tracked tracked;
+  for (int step = 0; step < 400; ++step) {
+    const System<kMaxDof> system = arm(1e-3 * step, zeta, full);
+    ASSERT_EQ(tracked.update(system), Status::kOk);
+    if (step % 20 != 0) continue;
+    SCOPED_TRACE("step " + std::to_string(step));
+    expect_enclosed(system, *tracked.spectrum);
+    for (int i = 0; i < tracked.spectrum->mode_count; ++i) {
+      EXPECT_NEAR(tracked.mode(i).damping_ratio, zeta, 1e-9);
+      const TrackedShapes& shapes = tracked.spectrum->shapes[static_cast<std::size_t>(i)];
+      for (std::size_t k = 0; k < 2; ++k) {
+        const Complex value = tracked.mode(i).eigenvalues[k];
+        const ComplexVector<kMaxDof>& u = shapes.u[k];
+        const MatrixXd K =
+            full ? MatrixXd(system.stiffness)
+                 : MatrixXd(system.stiffness_factor.transpose() * system.stiffness_factor);
+        const ComplexVector<kMaxDof> residual =
+            value * value * (system.mass * u) + value * (system.damping * u) + K * u;
+        EXPECT_LE(residual.norm(), 1e-13 *
+                                       (std::norm(value) * system.mass.norm() +
+                                        std::abs(value) * system.damping.norm() + K.norm()) *
+                                       u.norm());
+      }
+    }
+  }
+  EXPECT_EQ(tracked.counters().tracked, 399);
+  EXPECT_EQ(tracked.counters().proportional, 399);
+  EXPECT_LE(tracked.counters().passes, full ? 800 : 450);
+}
+
+INSTANTIATE_TEST_SUITE_P(Ratios, ProportionalPath,
+                         ::testing::Combine(::testing::Values(0.0, 0.1, 0.7, 3.0),
+                                            ::testing::Bool()));
+
+TEST(ProportionalRoad, IsFoundWhenItBegins) {
+  for (const bool full : {false, true}) {
+    Tracked tracked;
+    for (int step = 0; step < 300; ++step) {
+      System<kMaxDof> system = arm(1e-3 * step, 0.3, full);
+      // Another damping fades until step 100.
+      const double other = std::max(0.0, 1 - 0.01 * step);
+      system.damping(2, 2) += 5 * other * other;
+      ASSERT_EQ(tracked.update(system), Status::kOk);
+      if (step == 90) {
+        EXPECT_EQ(tracked.counters().proportional, 0);
+      }
+      if (step % 10 == 0) expect_enclosed(system, *tracked.spectrum);
+    }
+    EXPECT_EQ(tracked.counters().direct, 1);
+    EXPECT_EQ(tracked.spectrum->lineage, 1U);
+    EXPECT_GE(tracked.counters().proportional, 130);  // looked for each 64 updates
+  }
+}
+
+TEST(ProportionalRoad, IsLeftWhenItEnds) {
+  for (const bool full : {false, true}) {
+    Tracked tracked;
+    for (int step = 0; step < 200; ++step) {
+      System<kMaxDof> system = arm(1e-3 * step, 0.3, full);
+      const double other = std::max(0.0, 0.01 * (step - 100));
+      system.damping(2, 2) += 5 * other * other;
+      ASSERT_EQ(tracked.update(system), Status::kOk);
+      if (step % 10 == 0) expect_enclosed(system, *tracked.spectrum);
+    }
+    EXPECT_EQ(tracked.counters().direct, 1);
+    EXPECT_NEAR(static_cast<double>(tracked.counters().proportional), 100, 2);
+  }
+}
+
+TEST(ProportionalRoad, IsNotMistakenForDampingOfOneModeMore) {
+  // A damper that couples the modes by less than the bound of what may be left out still counts in
+  // the certificate.
+  Tracked tracked;
+  for (int step = 0; step < 200; ++step) {
+    System<kMaxDof> system = arm(1e-3 * step, 0.3, false);
+    system.damping(2, 2) += 1e-9;
+    ASSERT_EQ(tracked.update(system), Status::kOk);
+    if (step % 10 == 0) expect_enclosed(system, *tracked.spectrum);
+  }
+}
+
+TEST(ProportionalRoad, SurvivesModesThatCross) {
+  Tracked tracked;
+  Random random(5300);
+  const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(random.matrix(5, 5)).householderQ();
+  for (int step = 0; step <= 2000; ++step) {
+    const double t = 1e-3 * step;
+    VectorXd kappa{{100, 400 - 140 * t, 200, 900, 300 + 100 * t}};
+    const MatrixXd K = Q * kappa.asDiagonal() * Q.transpose();
+    System<kMaxDof> system(5);
+    system.mass.setIdentity();
+    system.stiffness = 0.5 * (K + K.transpose());
+    const MatrixXd C = Q * (0.4 * kappa.cwiseSqrt()).asDiagonal() * Q.transpose();
+    system.damping = 0.5 * (C + C.transpose());
+    ASSERT_EQ(tracked.update(system), Status::kOk) << "step " << step;
+    if (step % 50 == 0) expect_enclosed(system, *tracked.spectrum);
+  }
+  EXPECT_EQ(tracked.spectrum->lineage, 1U);
+  EXPECT_GE(tracked.counters().proportional, 1500);
+}
+
+TEST(ProportionalRoad, IsTakenForAnyNumberOfJointsAndModes) {
+  Random random(5301);
+  for (int n = 1; n <= kMaxDof; ++n) {
+    for (int p = 1; p <= n; ++p) {
+      SCOPED_TRACE(std::to_string(n) + " joints, " + std::to_string(p) + " modes");
+      System<kMaxDof> system(n);
+      const MatrixXd M = MatrixXd::Identity(n, n) + 0.1 / n * random.spd(n);
+      MatrixXd W = 0.3 * random.matrix(p, n);
+      for (int i = 0; i < p; ++i) W(i, i) += 10 + i;
+      const MatrixXd dM = 1e-5 * random.spd(n), dW = 1e-3 * random.matrix(p, n);
+      Tracked tracked;
+      for (int step = 0; step < 4; ++step) {
+        system.mass = M + step * dM;
+        system.stiffness_factor = W + step * dW;
+        damp(system, 0.4);
+        ASSERT_EQ(tracked.update(system), Status::kOk);
+        expect_enclosed(system, *tracked.spectrum);
+      }
+      EXPECT_EQ(tracked.counters().proportional, 3);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis

@@ -1,0 +1,74 @@
+// Arms with several zero modes, as a stiffness of translations alone leaves them: their rates often
+// coincide, and must not keep the modes from being followed.
+#include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/true_spectrum.hpp>
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::expect_enclosed;
+using testing::Random;
+
+enum class Friction {
+  kNone,      ///< of the zero modes: all rates are zero
+  kEqual,     ///< one rate for all
+  kSmall,     ///< of each joint, a millionth of the springs' damping
+  kOrdinary,  ///< of each joint
+};
+
+class SeveralZeroModes : public ::testing::TestWithParam<std::tuple<int, Friction>> {};
+
+TEST_P(SeveralZeroModes, AreFollowed) {
+  const auto [p, friction] = GetParam();
+  const int n = 9;
+  Random random(5400 + p);
+  const MatrixXd M = MatrixXd::Identity(n, n) + 0.1 / n * random.spd(n);
+  MatrixXd W = 0.3 * random.matrix(p, n);
+  for (int i = 0; i < p; ++i) W(i, i) += 10 + 2 * i;
+  const MatrixXd dM = 1e-6 * random.spd(n), dW = 1e-3 * random.matrix(p, n);
+  const VectorXd joints = VectorXd::NullaryExpr(n, [&] { return random.uniform(0.5, 2); });
+  ModeTracker tracker;
+  const auto spectrum = std::make_unique<TrackedSpectrum>();
+  for (int step = 0; step < 500; ++step) {
+    System<kMaxDof> system(n);
+    system.mass = M + step * dM;
+    const MatrixXd factor = W + step * dW;
+    system.stiffness_factor = factor;
+    MatrixXd C = 0.03 * factor.transpose() * factor;
+    if (friction == Friction::kEqual) C += 0.5 * system.mass;
+    if (friction == Friction::kSmall) C += 1e-6 * MatrixXd(joints.asDiagonal());
+    if (friction == Friction::kOrdinary) C += MatrixXd(joints.asDiagonal());
+    system.damping = 0.5 * (C + C.transpose());
+    ASSERT_EQ(tracker.update(system, *spectrum), Status::kOk) << "step " << step;
+    if (step % 50 != 0) continue;
+    SCOPED_TRACE("step " + std::to_string(step));
+    expect_enclosed(system, *spectrum);
+    for (int k = 0; k < spectrum->zero_mode_count; ++k) {
+      const double rate = spectrum->zero_mode_rates[static_cast<std::size_t>(k)];
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const auto& value : testing::true_eigenvalues(system)) {
+        nearest =
+            std::min(nearest, static_cast<double>(std::abs(value - testing::LongComplex(rate))));
+      }
+      EXPECT_LE(nearest, 1e-11);
+    }
+  }
+  EXPECT_EQ(tracker.counters().direct, 1);
+  EXPECT_LE(tracker.counters().passes, 1300);
+}
+
+INSTANTIATE_TEST_SUITE_P(Arms, SeveralZeroModes,
+                         ::testing::Combine(::testing::Values(1, 2, 3, 6),
+                                            ::testing::Values(Friction::kNone, Friction::kEqual,
+                                                              Friction::kSmall,
+                                                              Friction::kOrdinary)));
+
+}  // namespace
+}  // namespace dashpot::analysis
