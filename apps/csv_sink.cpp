@@ -1,11 +1,9 @@
 #include <dashpot/apps/csv_sink.hpp>
+#include <dashpot/apps/output_file.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
 
-#include <cerrno>
 #include <cstdio>
-#include <cstring>
-#include <stdexcept>
 
 namespace dashpot::apps {
 namespace {
@@ -14,9 +12,7 @@ constexpr std::int64_t kFlushPeriod = 100'000;  // us
 
 class CsvSink : public lcmtypes::Sink {
  public:
-  explicit CsvSink(const std::string& path) : file_(std::fopen(path.c_str(), "w"), std::fclose) {
-    if (!file_) throw std::runtime_error(path + ": cannot write: " + std::strerror(errno));
-  }
+  explicit CsvSink(const std::string& path) : file_(open_output("--csv", path)) {}
 
   bool send(const std::string& channel, const std::vector<std::uint8_t>& bytes,
             std::int64_t utime) override {
@@ -54,7 +50,7 @@ class CsvSink : public lcmtypes::Sink {
     for (std::size_t i = 0; i < count; ++i) std::fprintf(file_.get(), ",%.17g", values[i]);
   }
 
-  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
+  OutputFile file_;
   bool any_ = false;
   std::int64_t begin_ = 0;       // us
   std::int64_t flushed_at_ = 0;  // us

@@ -1,6 +1,7 @@
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/apps/design_options.hpp>
 #include <dashpot/apps/design_report.hpp>
+#include <dashpot/apps/output_file.hpp>
 #include <dashpot/apps/subcommands.hpp>
 #include <dashpot/apps/system_file.hpp>
 #include <dashpot/apps/text_table.hpp>
@@ -8,7 +9,6 @@
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -126,14 +126,15 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
   }
 }
 
-void write_file(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw std::runtime_error(path + ": cannot write");
+void write_csv(OutputFile file, const std::string& path, const std::string& text) {
+  const bool written = std::fwrite(text.data(), 1, text.size(), file.get()) == text.size();
+  if (std::fclose(file.release()) != 0 || !written) {
+    throw std::runtime_error("--csv: " + path + ": cannot write");
+  }
 }
 
-void run(const DesignOptions& options) try {
+/// `csv`: may be null.
+void run(const DesignOptions& options, OutputFile csv) try {
   SystemFile file;
   if (options.arm.urdf.empty()) {
     file = read_systems(options.file);
@@ -142,7 +143,7 @@ void run(const DesignOptions& options) try {
   }
   if (options.region) {
     const RegionReport report = report_on_region(file, options);
-    if (!options.csv.empty()) write_file(options.csv, region_csv(report));
+    if (csv) write_csv(std::move(csv), options.csv, region_csv(report));
     print(options.json ? region_json(report) : region_table(report));
     return;
   }
@@ -172,7 +173,9 @@ void add_design(CLI::App& program) {
   command->footer(kHelp);
   command->callback([options] {
     check(*options);
-    run(*options);
+    OutputFile csv(nullptr, std::fclose);
+    if (!options->csv.empty()) csv = open_output("--csv", options->csv);
+    run(*options, std::move(csv));
   });
 }
 

@@ -22,19 +22,11 @@ std::optional<Eigen::VectorXd> numbers(const std::string& option, const std::str
   return values;
 }
 
-/// n numbers that are not negative, one for all joints if only one is given; nothing if there is no
-/// text.
+/// As numbers_per_joint; nothing if there is no text.
 std::optional<Eigen::VectorXd> per_joint(const std::string& option, const std::string& text,
                                          Eigen::Index n) {
   if (text.empty()) return std::nullopt;
-  Eigen::VectorXd values = parse_numbers(option, text);
-  if (values.size() == 1) values = Eigen::VectorXd::Constant(n, values[0]).eval();
-  if (values.size() != n) {
-    throw InputError(
-        option, std::to_string(values.size()) + " numbers, expected 1 or " + std::to_string(n));
-  }
-  if (values.minCoeff() < 0) throw InputError(option, "a number is negative");
-  return values;
+  return numbers_per_joint(option, text, n);
 }
 
 controller::Payload read_payload(const std::string& text) {

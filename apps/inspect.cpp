@@ -44,14 +44,12 @@ RobotModel read_model(const Options& options) {
     if (gravity.size() != 3) throw InputError("--gravity", "x,y,z is wanted");
     model.gravity = gravity;
   }
-  if (!options.reflected_inertia.empty()) {
-    const Eigen::VectorXd inertia = parse_numbers("--reflected-inertia", options.reflected_inertia);
-    if (inertia.size() > controller::kMaxJoints) {
-      throw InputError("--reflected-inertia", "more numbers than joints");
-    }
-    model.reflected_inertia = inertia;
-  }
   try {
+    if (!options.reflected_inertia.empty()) {
+      const RobotModel plain = RobotModel::from_urdf_file(options.urdf, options.base, options.tip);
+      model.reflected_inertia =
+          numbers_per_joint("--reflected-inertia", options.reflected_inertia, plain.dof());
+    }
     return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
   } catch (const controller::InvalidModel& error) {
     throw InputError("", error.what());
@@ -195,7 +193,8 @@ void add_inspect(CLI::App& program) {
   add("--gravity", &Options::gravity, "In axes of the file's root link, m/s^2",
       "x,y,z (0,0,-9.81)");
   add("--reflected-inertia", &Options::reflected_inertia,
-      "Of rotors and gears at the joints, kg m^2 or kg", "a,b,... (0)");
+      "Of rotors and gears at the joints, kg m^2 or kg; one number is that of all joints",
+      "a,b,... (0)");
   command->add_flag("--exclude-off-chain", options->exclude_off_chain,
                     "Leave out links that hang off the chain");
   command->add_flag("--json", options->json, "Print JSON instead of tables");

@@ -102,6 +102,8 @@ void LoopThread::run() noexcept {
 
 void LoopThread::tick(std::int64_t utime) noexcept {
   take_commands();
+  const bool fast = options_.pace == Pace::kFast;
+  const std::int64_t computed_before = fast ? now(CLOCK_THREAD_CPUTIME_ID) : 0;
   const std::int64_t begin = now(CLOCK_MONOTONIC);
   const std::int32_t status = loop_.control();
   const std::int64_t time = std::min<std::int64_t>(now(CLOCK_MONOTONIC) - begin,
@@ -112,8 +114,11 @@ void LoopThread::tick(std::int64_t utime) noexcept {
   if (kept < record_.tick_times.size()) record_.tick_times[kept] = tick_time;
   const auto last = record_.statuses.size() - 1;
   ++record_.statuses[status < 0 ? last : std::min(static_cast<std::size_t>(status), last)];
-  // Without real time the pace of the machine does not matter, only that the tick fits.
-  if (options_.pace == Pace::kFast && 1e-9 * tick_time > options_.period) {
+  // Without real time nobody waits for the tick: all that matters is that its computing fits, and
+  // not what else the machine does meanwhile.
+  if (fast && 1e-9 * tick_time > options_.period &&
+      1e-9 * static_cast<double>(now(CLOCK_THREAD_CPUTIME_ID) - computed_before) >
+          options_.period) {
     ++record_.overruns;
     ++record_.own_overruns;
   }

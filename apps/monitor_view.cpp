@@ -65,6 +65,10 @@ std::string verdict(const sampled_modes_t& modes) {
   return "stable; all gains can grow to " + margin + " times what they are";
 }
 
+constexpr const char* kMixed =
+    "more than one loop sends to this bus: what is shown is a mixture; an --lcm-url for each "
+    "keeps them apart";
+
 double tip_error(const state_t& state) {
   return std::hypot(state.tip_error[0], state.tip_error[1], state.tip_error[2]);
 }
@@ -89,8 +93,17 @@ void MonitorView::note_time(std::int64_t utime) {
   last_utime_ = utime;
 }
 
+void MonitorView::note_order(std::int64_t tick) {
+  constexpr std::int64_t kMostLost = 100;  // messages of a loop, while another one's came
+  const std::int64_t last = state_->tick;
+  const bool returned = tick > last + 1 && tick > left_at_ && tick <= left_at_ + kMostLost;
+  if (tick == last || (left_at_ > last && returned)) ++returns_;
+  if (tick < last) left_at_ = last;
+}
+
 void MonitorView::take(const state_t& message) {
   note_time(message.utime);
+  if (state_) note_order(message.tick);
   const bool restarted = state_ && message.tick < state_->tick;
   if (!state_ || restarted) {
     rate_utime_ = message.utime;
@@ -130,6 +143,7 @@ std::string MonitorView::screen(bool bold) const {
     return bold ? "\033[1m" + text + "\033[0m\n" : text + "\n";
   };
   std::string out;
+  if (mixed()) out += heading(std::string("Warning: ") + kMixed) + "\n";
   if (state_) out += heading("Loop") + health() + "\n";
   if (modes_) out += heading("Modes") + modes_table() + "\n";
   if (sampled_) out += heading("Sampled loop") + sampled_table() + "\n";
@@ -228,6 +242,7 @@ std::string MonitorView::line() const {
              format_number(modes_->damping_ratio[i], 3) + ")";
     }
   }
+  if (mixed()) out += "  WARNING: more than one loop on this bus";
   return out + "\n";
 }
 
@@ -236,6 +251,7 @@ std::string MonitorView::summary(std::int64_t malformed) const {
                     count(modes_messages_, "modes message") + " over " + fixed(time(), 1) + " s; " +
                     count(modes_lost_, "modes message") + " lost, " + count(malformed, "message") +
                     " malformed\n";
+  if (mixed()) out += std::string("  Warning: ") + kMixed + "\n";
   for (std::size_t i = 0; i < statuses_.size(); ++i) {
     if (statuses_[i] == 0) continue;
     out += "  " + status_text(static_cast<std::int8_t>(i)) + ": " + count(statuses_[i], "state") +

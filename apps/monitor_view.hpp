@@ -17,6 +17,9 @@ class MonitorView {
   void take(const modes_t& message);
   void take(const sampled_modes_t& message);
 
+  /// Whether states of more than one loop come over the bus. Nothing in a message says who sends
+  /// it: this is concluded from ticks that go back, and then on from where they were.
+  bool mixed() const { return returns_ > 2; }
   bool empty() const { return !state_ && !modes_ && !sampled_; }
   /// Time of the last message, s since the first one.
   double time() const { return 1e-6 * static_cast<double>(last_utime_ - first_utime_); }
@@ -30,6 +33,7 @@ class MonitorView {
 
  private:
   void note_time(std::int64_t utime);
+  void note_order(std::int64_t tick);
   std::string health() const;
   std::string joints() const;
   std::string modes_table() const;
@@ -44,6 +48,9 @@ class MonitorView {
   std::int64_t rate_utime_ = 0;  // us
   std::int64_t rate_tick_ = 0;
   double rate_ = 0;  // 1/s
+  // Whether there is another loop: the tick from which they went back, and how often they returned
+  std::int64_t left_at_ = 0;
+  std::int64_t returns_ = 0;
   // Sums
   std::int64_t states_ = 0;
   std::int64_t modes_messages_ = 0;

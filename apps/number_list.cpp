@@ -25,4 +25,16 @@ Eigen::VectorXd parse_numbers(const std::string& option, const std::string& text
   return Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
+Eigen::VectorXd numbers_per_joint(const std::string& option, const std::string& text,
+                                  Eigen::Index n) {
+  const Eigen::VectorXd values = parse_numbers(option, text);
+  if (values.size() != 1 && values.size() != n) {
+    throw controller::InputError(
+        option, std::to_string(values.size()) + " numbers, expected 1 or " + std::to_string(n));
+  }
+  if (values.minCoeff() < 0) throw controller::InputError(option, "a number is negative");
+  if (values.size() == n) return values;
+  return Eigen::VectorXd::Constant(n, values[0]);
+}
+
 }  // namespace dashpot::apps

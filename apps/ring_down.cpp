@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -42,7 +43,9 @@ struct Motion {
   dashpot_modes modes{};  ///< the first ones
 };
 
-Motion record(const Scene& scene, const ControllerFactory& make_controller, int every) {
+/// Nothing if `stopped` says so first.
+std::optional<Motion> record(const Scene& scene, const ControllerFactory& make_controller,
+                             int every, const std::function<bool()>& stopped) {
   const auto controller = make_controller();
   ClosedLoop loop(scene, *controller);
   const auto samples = static_cast<Eigen::Index>(kDuration / (every * scene.plant.period));
@@ -50,6 +53,7 @@ Motion record(const Scene& scene, const ControllerFactory& make_controller, int 
   motion.recording.position.resize(scene.dof(), samples);
   motion.recording.velocity.resize(scene.dof(), samples);
   for (Eigen::Index i = 0; i < samples; ++i) {
+    if (stopped()) return std::nullopt;
     motion.recording.position.col(i) = loop.plant().position();
     motion.recording.velocity.col(i) = loop.plant().velocity();
     for (int k = 0; k < every; ++k) {
@@ -132,23 +136,27 @@ void add_sampled(const Scene& scene, RingDown& ring_down) {
 
 }  // namespace
 
-RingDown measure_ring_down(const Scene& scene, const ControllerFactory& make_controller) {
+std::optional<RingDown> measure_ring_down(const Scene& scene,
+                                          const ControllerFactory& make_controller,
+                                          const std::function<bool()>& stopped) {
   const int every = std::max(1, static_cast<int>(std::lround(kSamplePeriod / scene.plant.period)));
-  const Motion rest = record(quiet_scene(scene, scene.rest), make_controller, every);
+  const auto rest = record(quiet_scene(scene, scene.rest), make_controller, every, stopped);
+  if (!rest) return std::nullopt;
   std::vector<Recording> recordings;
   for (int i = 0; i < scene.dof(); ++i) {
     const JointVector start = scene.rest + kRelease * JointVector::Unit(scene.dof(), i);
-    Recording motion = record(quiet_scene(scene, start), make_controller, every).recording;
+    auto motion = record(quiet_scene(scene, start), make_controller, every, stopped);
+    if (!motion) return std::nullopt;
     // What happens without a release, such as sagging, is not of interest.
-    motion.position -= rest.recording.position;
-    motion.velocity -= rest.recording.velocity;
-    recordings.push_back(std::move(motion));
+    motion->recording.position -= rest->recording.position;
+    motion->recording.velocity -= rest->recording.velocity;
+    recordings.push_back(std::move(motion->recording));
   }
   analysis::MotionFitOptions options;
   options.period = every * scene.plant.period;
   const analysis::MotionFit fit = analysis::fit_motion(recordings, options);
   RingDown result;
-  result.modes = match(rest.modes, fit.modes);
+  result.modes = match(rest->modes, fit.modes);
   result.releases = scene.dof();
   result.residual = fit.residual;
   if (scene.arm) add_sampled(scene, result);

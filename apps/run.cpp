@@ -95,9 +95,7 @@ std::vector<std::unique_ptr<lcmtypes::Sink>> make_sinks(const Options& options,
   if (!options.log.empty()) {
     sinks.push_back(open_for("--log", [&] { return lcmtypes::make_log_sink(options.log); }));
   }
-  if (!options.csv.empty()) {
-    sinks.push_back(open_for("--csv", [&] { return make_csv_sink(options.csv); }));
-  }
+  if (!options.csv.empty()) sinks.push_back(make_csv_sink(options.csv));
   return sinks;
 }
 
@@ -186,7 +184,8 @@ void run(const Options& options) {
   report.simulated_time = loop.plant().time();
   report.energy = loop.plant().audit();
   if ((scene.ring_down || options.ring_down) && !report.interrupted) {
-    report.ring_down = measure_ring_down(scene, make_controller);
+    report.ring_down = measure_ring_down(scene, make_controller, StopSignal::given);
+    report.interrupted = !report.ring_down;
   }
   print(options.json ? to_json(report) : to_table(report));
   if (report.messages.send_errors > 0 && !(options.log.empty() && options.csv.empty())) {

@@ -1,4 +1,6 @@
+#include <dashpot/apps/arm_reach.hpp>
 #include <dashpot/apps/scene_parts.hpp>
+#include <dashpot/apps/text_table.hpp>
 #include <dashpot/controller/config_gains.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/orientation.hpp>
@@ -53,6 +55,49 @@ void require(const YamlMapping& keys, std::string_view key, const YamlMapping& p
   if (!keys.has(key)) throw keys.error(key, "missing", parent.line(name));
 }
 
+/// Throws unless the joints may be at q, which stands under `key`.
+void check_limits(const YamlMapping& keys, std::string_view key, const JointVector& q,
+                  const Units& positions, const Scene& scene) {
+  const controller::Limits& limits = scene.arm->config.settings.limits;
+  for (int i = 0; i < scene.dof(); ++i) {
+    if (q[i] >= limits.position_lower[i] && q[i] <= limits.position_upper[i]) continue;
+    throw keys.error(key, "joint " + std::to_string(i + 1) + " would be at " +
+                              std::to_string(q[i]) + " " + positions[static_cast<std::size_t>(i)] +
+                              ", outside its limits");
+  }
+}
+
+/// Throws if the arm would start inside the wall.
+void check_wall(const YamlMapping& keys, std::string_view key, const Scene& scene) {
+  const auto& wall = scene.arm->options.wall;
+  if (!wall) return;
+  const Eigen::Vector3d tip = sim::Arm(scene.arm->robot).tip_pose(scene.start).position;
+  const double depth = wall->normal.normalized().dot(wall->point - tip);
+  if (depth > 0) {
+    throw keys.error(key, "puts the tip " + format_number(depth, 3) + " m inside the wall");
+  }
+}
+
+std::string out_of_reach(const Vector6& by) {
+  return "is out of the arm's reach, by " + format_number(by.head<3>().norm(), 3) + " m and " +
+         format_number(by.tail<3>().norm(), 3) + " rad";
+}
+
+/// Throws unless the arm can bring its tip where a Cartesian set-point holds it.
+void check_reach(const YamlMapping& keys, const controller::Setpoint& setpoint,
+                 const Scene& scene) {
+  if (setpoint.mode != controller::Mode::kCartesian) return;
+  TipGoal goal{setpoint.tip_pose, {}, {}};
+  for (int i = 0; i < 6; ++i) {
+    goal.held[i] = setpoint.gains.directions[static_cast<std::size_t>(i)] ? 1 : 0;
+  }
+  if (setpoint.gains.frame == controller::Frame::kTool) goal.R = setpoint.tip_pose.rotation;
+  const controller::Config& config = scene.arm->config;
+  const Vector6 by = out_of_reach_by(config.model, config.settings.limits, goal, scene.rest);
+  const char* key = keys.has("tip_displacement") ? "tip_displacement" : "mode";
+  if (!by.isZero(0)) throw keys.error(key, out_of_reach(by));
+}
+
 void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& scene) {
   static constexpr std::array<std::string_view, 3> kKeys = {"position", "joint_displacement",
                                                             "tip_displacement"};
@@ -72,20 +117,21 @@ void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& 
     Eigen::VectorXd displacement = Eigen::VectorXd::Zero(6);
     read_numbers(keys, "tip_displacement", kTaskUnits, Sign::kAny, displacement);
     const auto q = displaced(scene.arm->config.model, scene.rest, displacement);
-    if (!q) throw keys.error("tip_displacement", "is out of the arm's reach");
+    if (!q) {
+      const TipGoal goal{moved(tip_at(scene.arm->config.model, scene.rest), displacement)};
+      throw keys.error(
+          "tip_displacement",
+          out_of_reach(out_of_reach_by(scene.arm->config.model, scene.arm->config.settings.limits,
+                                       goal, scene.rest)));
+    }
     scene.start = *q;
   }
-  const controller::Limits& limits = scene.arm->config.settings.limits;
-  for (const auto& [q, key] :
-       {std::pair(scene.rest, "position"),
-        {scene.start, keys.has("tip_displacement") ? "tip_displacement" : "joint_displacement"}}) {
-    for (int i = 0; i < scene.dof(); ++i) {
-      if (q[i] >= limits.position_lower[i] && q[i] <= limits.position_upper[i]) continue;
-      throw keys.error(key, "joint " + std::to_string(i + 1) + " would be at " +
-                                std::to_string(q[i]) + " " +
-                                positions[static_cast<std::size_t>(i)] + ", outside its limits");
-    }
-  }
+  const char* moved_by = keys.has("tip_displacement")     ? "tip_displacement"
+                         : keys.has("joint_displacement") ? "joint_displacement"
+                                                          : "position";
+  check_limits(keys, "position", scene.rest, positions, scene);
+  check_limits(keys, moved_by, scene.start, positions, scene);
+  check_wall(keys, moved_by, scene);
 }
 
 void read_system_start(const YamlMapping& scenario, const Units& positions, Scene& scene) {
@@ -155,6 +201,9 @@ void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scen
     controller::Setpoint& setpoint = step.setpoint;
     read_choice(keys, "mode", kModes, setpoint.mode);
     read_numbers(keys, "joint_position", positions, Sign::kAny, setpoint.joint_position);
+    if (keys.has("joint_position")) {
+      check_limits(keys, "joint_position", setpoint.joint_position, positions, scene);
+    }
     if (keys.has("tip_displacement")) {
       Eigen::VectorXd displacement = Eigen::VectorXd::Zero(6);
       read_numbers(keys, "tip_displacement", kTaskUnits, Sign::kAny, displacement);
@@ -162,6 +211,7 @@ void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scen
     }
     read_numbers(keys, "wrench", kWrenchUnits, Sign::kAny, setpoint.wrench);
     controller::read_gains(keys, model, controller::GainPairs::kEither, setpoint.gains);
+    check_reach(keys, setpoint, scene);
     scene.steps.push_back(step);
   }
 }

@@ -31,9 +31,9 @@ void read_control(const YamlMapping& root, Settings& settings) {
 }
 
 void read_limits(const YamlMapping& root, const RobotModel& model, Limits& limits) {
-  static constexpr std::array<std::string_view, 8> kKeys = {
-      "torque",         "torque_rate",     "velocity",  "position_lower",
-      "position_upper", "position_margin", "repulsion", "damping"};
+  static constexpr std::array<std::string_view, 10> kKeys = {
+      "torque",          "torque_rate", "velocity",     "position_lower", "position_upper",
+      "position_margin", "repulsion",   "linear_error", "angular_error",  "damping"};
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const YamlMapping keys = root.mapping("limits", kKeys);
   const Units position = joint_units(model, "rad", "m");
@@ -46,6 +46,8 @@ void read_limits(const YamlMapping& root, const RobotModel& model, Limits& limit
   read_numbers_or_none(keys, "position_upper", position, kInfinity, limits.position_upper);
   read_number(keys, "position_margin", "rad", Sign::kNotNegative, limits.position_margin);
   read_number(keys, "repulsion", "", Sign::kNotNegative, limits.repulsion);
+  read_number(keys, "linear_error", "m", Sign::kPositive, limits.linear_error);
+  read_number(keys, "angular_error", "rad", Sign::kPositive, limits.angular_error);
   read_numbers(keys, "damping", joint_units(model, "N m s/rad", "N s/m"), Sign::kPositive,
                limits.damping);
 }

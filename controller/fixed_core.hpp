@@ -32,6 +32,8 @@ class FixedCore final : public ControllerCore {
  private:
   /// Takes over a set-point that is new and in order. Whether the one given is in order.
   bool read(const Setpoint& setpoint) noexcept;
+  /// Springs that are to grow from zero start where the robot is.
+  void start_new_springs() noexcept;
   /// The way to the accepted set-point; paths whose springs are not in force start where the robot
   /// is.
   void aim() noexcept;
@@ -67,6 +69,7 @@ class FixedCore final : public ControllerCore {
   Ramp<Vector6> wrench_;
   ImpedanceLaw<N> law_;
   SafetyFilter<N> filter_;
+  SpringReach reach_;
   Vector damping_;           ///< of the safe output "damp", N m s/rad
   Vector viscous_friction_;  ///< of the robot, N m s/rad
   Vector turn_;              ///< 2 pi for a continuous joint, else 0
@@ -124,6 +127,7 @@ FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
       wrench_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
       law_(model, settings.feed_forward),
       filter_(settings.limits, settings.period),
+      reach_{settings.limits.linear_error, settings.limits.angular_error},
       damping_(fixed<N>(settings.limits.damping)),
       viscous_friction_(fixed<N>(model.joint_values(&Joint::damping))) {
   for (int i = 0; i < N; ++i) {
@@ -148,6 +152,7 @@ void FixedCore<N>::reset(const JointVector& torque) noexcept {
         &snapshot_.setpoint_position, &snapshot_.setpoint_velocity, &snapshot_.joint_error}) {
     vector->setZero(N);
   }
+  external_wrench_.setZero();
   vibration_.reset(N);
   held_.reset();
   loop_.reset();
@@ -173,14 +178,16 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   time_ = state.time;
   q_ = fixed<N>(state_check_.position());
   qd_ = fixed<N>(state.velocity);
-  external_wrench_ = state.external_wrench;
+  const bool wrench_known = state.external_wrench.allFinite();
+  if (wrench_known) external_wrench_ = state.external_wrench;
   kernel_.evaluate(q_, qd_, robot_);
   if (first_) {
     setpoint_age_ = 0;
     first_ = false;
   }
 
-  Status status = read(setpoint) ? Status::kOk : Status::kSetpointRejected;
+  Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
+  if (!read(setpoint)) status = worse(status, Status::kSetpointRejected);
   status = worse(status, watch());
   status = worse(status, guard(input));
   Vector tau = status >= Status::kSetpointLost ? damp() : act(status == Status::kSetpointStale);
@@ -192,81 +199,6 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   }
   describe();
   return finish(status, tau, torque);
-}
-
-template <int N>
-bool FixedCore<N>::read(const Setpoint& setpoint) noexcept {
-  if (looked_at_any_ && setpoint.time == looked_at_) return in_order_;
-  looked_at_any_ = true;
-  looked_at_ = setpoint.time;
-  const bool same = setpoint.mode == accepted_.mode && same_gains(setpoint.gains, accepted_.gains);
-  const double hold = settings_.watchdog.setpoint_hold;
-  const double patience = hold > 0 ? hold : settings_.watchdog.setpoint_damp;
-  const bool to_come = patience > 0 && seconds_between(time_, setpoint.time) > patience;
-  in_order_ = !to_come && !check_setpoint(setpoint, settings_.limits, same);
-  if (!in_order_) return false;
-  accepted_.time = setpoint.time;
-  setpoint_age_ = nanoseconds(seconds_between(setpoint.time, time_));
-  accepted_.joint_position = setpoint.joint_position;
-  accepted_.tip_pose = setpoint.tip_pose;
-  accepted_.wrench = setpoint.wrench;
-  from_user_ = true;
-  if (!same) {
-    accepted_.mode = setpoint.mode;
-    accepted_.gains = setpoint.gains;
-    gains_.set_target(Impedance<N>::of(accepted_));
-  }
-  if (!afresh_) aim();
-  return true;
-}
-
-template <int N>
-void FixedCore<N>::aim() noexcept {
-  const bool joint = accepted_.mode == Mode::kJoint;
-  if (joint && gains_.now().joint_weight == 0) paths_.joint.start(q_);
-  if (!joint && gains_.now().task_weight == 0) {
-    paths_.rest.start(q_);
-    paths_.tip.start(robot_.p_BT_B, Eigen::Quaterniond(robot_.R_BT).normalized());
-    law_.reset();
-  }
-  const Vector& from = joint ? paths_.joint.position() : paths_.rest.position();
-  goal_ = from;
-  if (accepted_.joint_position.size() == N) {
-    goal_ = fixed<N>(accepted_.joint_position);
-    for (int i = 0; i < N; ++i) {  // a continuous joint goes the short way
-      if (turn_[i] > 0) goal_[i] += turn_[i] * std::nearbyint((from[i] - goal_[i]) / turn_[i]);
-    }
-  }
-  goal_rotation_ = Eigen::Quaterniond(accepted_.tip_pose.rotation).normalized();
-}
-
-template <int N>
-void FixedCore<N>::start_afresh() noexcept {
-  const Impedance<N> target = Impedance<N>::of(accepted_);
-  Impedance<N> none;
-  none.base.held = target.base.held;
-  none.tool.held = target.tool.held;
-  none.damping_ratio = target.damping_ratio;  // of springs that grow from zero
-  none.joint_damping_ratio = target.joint_damping_ratio;
-  gains_.start(none);
-  gains_.set_target(target);
-  wrench_.start(Vector6::Zero());
-  if (!from_user_) {
-    copy<N>(q_, accepted_.joint_position);
-    accepted_.tip_pose = {robot_.p_BT_B, robot_.R_BT};
-  }
-  aim();
-  afresh_ = false;
-  ++snapshot_.restarts;
-}
-
-template <int N>
-Status FixedCore<N>::watch() const noexcept {
-  const double age = 1e-9 * setpoint_age_;
-  const Watchdog& limit = settings_.watchdog;
-  if (limit.setpoint_damp > 0 && age > limit.setpoint_damp) return Status::kSetpointLost;
-  if (limit.setpoint_hold > 0 && age > limit.setpoint_hold) return Status::kSetpointStale;
-  return Status::kOk;
 }
 
 template <int N>
@@ -283,38 +215,8 @@ Status FixedCore<N>::guard(Status input) noexcept {
 }
 
 template <int N>
-Joints<N> FixedCore<N>::act(bool hold) noexcept {
-  if (afresh_) start_afresh();
-  damping_only_ = false;
-  gains_.step();
-  const Vector6 wrench = hold ? Vector6(Vector6::Zero()) : accepted_.wrench;
-  if (wrench != wrench_.target()) wrench_.set_target(wrench);
-  wrench_.step();
-
-  // Of two modes in force, the one that fades away stays where it is.
-  const Impedance<N>& impedance = held_.update(gains_, robot_);
-  const bool joint = accepted_.mode == Mode::kJoint;
-  if (impedance.joint_weight > 0) {
-    if (joint && !hold) {
-      paths_.joint.step(goal_);
-    } else {
-      paths_.joint.halt();
-    }
-  }
-  if (impedance.task_weight > 0) {
-    if (!joint && !hold) {
-      paths_.tip.step(accepted_.tip_pose.position, goal_rotation_);
-      paths_.rest.step(goal_);
-    } else {
-      paths_.tip.halt();
-      paths_.rest.halt();
-    }
-  }
-  return law_.torque(robot_, q_, qd_, impedance, paths_, wrench_.now());
-}
-
-template <int N>
 Joints<N> FixedCore<N>::damp() noexcept {
+  if (!damping_only_ || ramp_ticks_ > 0) filter_.begin_anew();
   afresh_ = damping_only_ = true;
   Vector tau = Vector::Zero();
   if (settings_.feed_forward.gravity) add<N>(robot_.gravity, tau);
@@ -346,56 +248,6 @@ Status FixedCore<N>::finish(Status status, const Vector& tau, JointVector& torqu
   if (vibration_.due(snapshot_.tick)) analyse();
   if (sampled_ && sampled_->due(snapshot_.tick)) hand_over();
   return status;
-}
-
-template <int N>
-void FixedCore<N>::hand_over() noexcept {
-  SampledAnalysis::Task& task = sampled_->task();
-  task.time = time_;
-  task.tick = snapshot_.tick;
-  task.position = snapshot_.position;
-  closed_loop(task.system);
-  sampled_->hand_over();
-}
-
-template <int N>
-void FixedCore<N>::analyse() noexcept {
-  const TaskTerms& terms = settings_.task_terms;
-  const bool with_wrench = terms.geometric_stiffness && !external_wrench_.isZero(0);
-  bool with_velocity = false;
-  for (int i = 0; i < N && terms.jacobian_rate; ++i) with_velocity |= qd_[i] != 0;
-  if (looks_the_same(with_wrench, with_velocity)) {
-    vibration_.repeat(time_, snapshot_.tick);
-    return;
-  }
-  if (terms.geometric_stiffness && !with_wrench) ++vibration_.counters().no_wrench;
-  if (terms.jacobian_rate && !with_velocity) ++vibration_.counters().at_rest;
-  VibrationTask& task = vibration_.task();
-  task.time = time_;
-  task.tick = snapshot_.tick;
-  task.position = snapshot_.position;
-  if (with_wrench || with_velocity) {
-    closed_loop(task.system);
-    task.springs = true;
-  } else {
-    loop_.form(robot_, impedance(), law_.null_space(), viscous_friction_, task.system);
-    task.springs = task.system.stiffness_factor.rows() > 0;
-  }
-  vibration_.update();
-}
-
-template <int N>
-bool FixedCore<N>::looks_the_same(bool with_wrench, bool with_velocity) noexcept {
-  const Vector6 wrench = with_wrench ? external_wrench_ : Vector6(Vector6::Zero());
-  const Vector qd = with_velocity ? qd_ : Vector(Vector::Zero());
-  bool same = analysed_.any && analysed_.damping_only == damping_only_ &&
-              analysed_.gain_changes == gains_.changes() && analysed_.wrench == wrench;
-  for (int i = 0; i < N; ++i) same &= analysed_.q[i] == q_[i] && analysed_.qd[i] == qd[i];
-  const bool gains_moved = analysed_.any && analysed_.gain_changes != gains_.changes();
-  const bool settled = analysed_.gains_moved && !gains_moved;
-  analysed_ = {true, damping_only_, gains_moved, gains_.changes(), q_, qd, wrench};
-  vibration_.task().anew = settled;
-  return same && !settled;
 }
 
 template <int N>
@@ -432,19 +284,13 @@ void FixedCore<N>::describe() noexcept {
   snapshot_.tip_wrench = springs ? law_.tip_wrench() : Vector6(Vector6::Zero());
 }
 
-template <int N>
-Impedance<N> FixedCore<N>::impedance() const noexcept {
-  if (!damping_only_) return held_.now(gains_.now());
-  Impedance<N> damping;
-  for (int i = 0; i < N; ++i) damping.joint_damping(i, i) = damping_[i];
-  return damping;
-}
+}  // namespace dashpot::controller
 
-template <int N>
-void FixedCore<N>::closed_loop(analysis::System<kMaxJoints>& system) const noexcept {
-  controller::closed_loop<N>(robot_, qd_, impedance(), law_.null_space(), viscous_friction_,
-                             settings_.task_terms, external_wrench_, system);
-}
+// The rest of its functions:
+#include <dashpot/controller/fixed_core_analysis.hpp>
+#include <dashpot/controller/fixed_core_motion.hpp>
+
+namespace dashpot::controller {
 
 extern template class FixedCore<1>;
 extern template class FixedCore<2>;

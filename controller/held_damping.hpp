@@ -16,7 +16,7 @@ namespace dashpot::controller {
 /// zero.
 class TaskDamper {
  public:
-  static constexpr double kSoftFrequency = 0.1;  ///< rad/s
+  static constexpr double kSoftFrequency = controller::kSoftFrequency;
 
   /// Forgets the last design.
   void reset() noexcept { C_C_.setZero(); }

@@ -4,6 +4,8 @@
 #include <dashpot/controller/setpoint_path.hpp>
 #include <dashpot/controller/settings.hpp>
 
+#include <limits>
+
 namespace dashpot::controller {
 
 /// The paths on which the springs are fixed.
@@ -32,9 +34,11 @@ struct SpringPaths {
 /// the loop would not be symmetric. It counts fully while it is small: s = 1 / sqrt(1 + (|J# e| /
 /// 0.3 rad)^2). Every term of the last column can be left out, see FeedForward.
 ///
-/// The torque is bounded wherever the arm is: J' is, and so are N (see NullSpace) and e (|e_rot| at
-/// most 3/2 pi); nothing is divided by what vanishes at a singularity but Lambda, which is damped
-/// there.
+/// K_C acts on e as far as the springs reach (see SpringReach): a tip that is farther away is
+/// pulled no harder.
+///
+/// The torque is bounded wherever the arm is: J' is, and so are N (see NullSpace) and e; nothing is
+/// divided by what vanishes at a singularity but Lambda, which is damped there.
 template <int N>
 class ImpedanceLaw {
  public:
@@ -47,8 +51,8 @@ class ImpedanceLaw {
 
   /// `wrench`: f, which J' takes to the joints only if FeedForward::wrench is on.
   Vector torque(const Dynamics<N>& robot, const Vector& q, const Vector& qd,
-                const Impedance<N>& impedance, const SpringPaths<N>& paths,
-                const Vector6& wrench) noexcept;
+                const Impedance<N>& impedance, const SpringPaths<N>& paths, const Vector6& wrench,
+                const SpringReach& reach = kEndless) noexcept;
 
   /// Orientation errors start from the short way round.
   void reset() noexcept { orientation_.reset(); }
@@ -60,9 +64,12 @@ class ImpedanceLaw {
   const NullSpace<N>& null_space() const noexcept { return null_space_; }
 
  private:
+  static constexpr SpringReach kEndless{std::numeric_limits<double>::infinity(),
+                                        std::numeric_limits<double>::infinity()};
+
   /// K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d
   Vector6 task_wrench(const Dynamics<N>& robot, const Vector& qd, const Impedance<N>& impedance,
-                      const TipPath& path) noexcept;
+                      const TipPath& path, const SpringReach& reach) noexcept;
   /// s J# e
   Vector posture_share() const noexcept;
   void add_friction(const Vector& velocity, Vector& tau) const noexcept;
@@ -91,7 +98,7 @@ inline Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R,
 template <int N>
 Joints<N> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q, const Vector& qd,
                                   const Impedance<N>& impedance, const SpringPaths<N>& paths,
-                                  const Vector6& wrench) noexcept {
+                                  const Vector6& wrench, const SpringReach& reach) noexcept {
   Vector tau = Vector::Zero();
   Vector path_velocity = Vector::Zero();  // qd_f
   e_.setZero();
@@ -110,7 +117,7 @@ Joints<N> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q, con
     if (null_space || feed_forward_.acceleration || feed_forward_.friction) {
       null_space_.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
     }
-    F_ = task_wrench(robot, qd, impedance, paths.tip);
+    F_ = task_wrench(robot, qd, impedance, paths.tip, reach);
     if (null_space) {
       Vector dq = difference<N>(paths.rest.position(), q);
       dq -= posture_share();
@@ -133,16 +140,18 @@ Joints<N> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q, con
 
 template <int N>
 Vector6 ImpedanceLaw<N>::task_wrench(const Dynamics<N>& robot, const Vector& qd,
-                                     const Impedance<N>& impedance, const TipPath& path) noexcept {
+                                     const Impedance<N>& impedance, const TipPath& path,
+                                     const SpringReach& reach) noexcept {
   e_.head<3>() = path.position() - robot.p_BT_B;
   e_.tail<3>() = orientation_.update(path.rotation(), Eigen::Quaterniond(robot.R_BT));
+  const Vector6 drawn_out = reach.shortened(e_, impedance.base, impedance.tool, robot.R_BT);
   const Vector6 velocity_error = path.velocity() - twist<N>(robot.J, qd);
   Vector6 F = Vector6::Zero();
   if (!impedance.base.none()) {
-    F += impedance.base.stiffness * e_ + impedance.base.damping * velocity_error;
+    F += impedance.base.stiffness * drawn_out + impedance.base.damping * velocity_error;
   }
   if (!impedance.tool.none()) {
-    F += in_tool_axes(impedance.tool.stiffness, robot.R_BT, e_) +
+    F += in_tool_axes(impedance.tool.stiffness, robot.R_BT, drawn_out) +
          in_tool_axes(impedance.tool.damping, robot.R_BT, velocity_error);
   }
   if (feed_forward_.acceleration) {

@@ -106,6 +106,7 @@ void dashpot_controller::reset(const JointVector& torque) noexcept {
   setpoint_.gains = gains;
   has_setpoint_ = located_ = false;
   published_modes_ = 0;
+  vibrations.write(controller_.vibration());  // there is none
 }
 
 bool dashpot_controller::take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept {

@@ -34,7 +34,7 @@ extern "C" {
 #endif
 
 /* Grows whenever a function or struct changes; a library serves the versions it knows. */
-#define DASHPOT_PLUGIN_VERSION 3u
+#define DASHPOT_PLUGIN_VERSION 4u
 #define DASHPOT_MAX_JOINTS 16
 
 typedef struct dashpot_controller dashpot_controller;
@@ -43,23 +43,25 @@ typedef struct dashpot_controller dashpot_controller;
  *   hold: the springs stop where they are, whatever the set-point says
  *   damp: no springs: joint damping, and gravity where the controller compensates it
  *   ramp: the last good torque goes to zero within 0.1 s, or as fast as limits.torque_rate allows
+ * Where damp and ramp take torque away, it fades evenly, in all joints alike.
  * Once the cause is over the controller goes on, after more than a short interruption with springs
  * where the robot is. Below zero: a call that was refused and did nothing. */
 enum {
   DASHPOT_OK = 0,
-  DASHPOT_TORQUE_LIMITED = 1,    /* a torque or torque-rate limit is at work */
-  DASHPOT_NEAR_JOINT_LIMIT = 2,  /* a joint is pushed back from a position limit that is near */
-  DASHPOT_SETPOINT_REJECTED = 3, /* the set-point is not possible; the last good one stays */
-  DASHPOT_SETPOINT_STALE = 4,    /* the set-point is old: hold */
-  DASHPOT_SETPOINT_LOST = 5,     /* the set-point is very old: damp */
-  DASHPOT_TIME_GAP = 6,          /* the last state is too long ago: damp */
-  DASHPOT_VELOCITY_LIMIT = 7,    /* a joint is too fast: damp */
-  DASHPOT_POSITION_LIMIT = 8,    /* a joint is outside its position limits: damp, and push back */
-  DASHPOT_STATE_NOT_FINITE = 9,  /* NaN or infinity in the state: ramp */
-  DASHPOT_STATE_WRONG_SIZE = 10, /* the state is missing or has not n joints: ramp */
-  DASHPOT_STATE_JUMP = 11,       /* farther from the last state than the robot can move: ramp */
-  DASHPOT_TIME_BACKWARD = 12,    /* the state's time is at or before the last one: ramp */
-  DASHPOT_NOT_FINITE = 13,       /* the torque would not be finite: ramp */
+  DASHPOT_TORQUE_LIMITED = 1,     /* a torque or torque-rate limit is at work */
+  DASHPOT_NEAR_JOINT_LIMIT = 2,   /* a joint is pushed back from a position limit that is near */
+  DASHPOT_WRENCH_NOT_FINITE = 3,  /* NaN or infinity in the external wrench: the last one stays */
+  DASHPOT_SETPOINT_REJECTED = 4,  /* the set-point is not possible; the last good one stays */
+  DASHPOT_SETPOINT_STALE = 5,     /* the set-point is old: hold */
+  DASHPOT_SETPOINT_LOST = 6,      /* the set-point is very old: damp */
+  DASHPOT_TIME_GAP = 7,           /* the last state is too long ago: damp */
+  DASHPOT_VELOCITY_LIMIT = 8,     /* a joint is too fast: damp */
+  DASHPOT_POSITION_LIMIT = 9,     /* a joint is outside its position limits: damp, and push back */
+  DASHPOT_STATE_NOT_FINITE = 10,  /* NaN or infinity in position or velocity: ramp */
+  DASHPOT_STATE_WRONG_SIZE = 11,  /* the state is missing or has not n joints: ramp */
+  DASHPOT_STATE_JUMP = 12,        /* farther from the last state than the robot can move: ramp */
+  DASHPOT_TIME_BACKWARD = 13,     /* the state's time is at or before the last one: ramp */
+  DASHPOT_NOT_FINITE = 14,        /* the torque would not be finite: ramp */
 
   DASHPOT_NULL_ARGUMENT = -1,     /* a pointer that has to be there is NULL */
   DASHPOT_WRONG_STRUCT_SIZE = -2, /* struct_size is not that of this version */
@@ -97,7 +99,8 @@ typedef struct dashpot_state {
   int64_t time;                  /* ns, of any clock that does not run backward */
   const double* position;        /* n, rad */
   const double* velocity;        /* n, rad/s */
-  const double* external_wrench; /* 6, that the world exerts on the tip, N and N m; NULL: zero */
+  const double* external_wrench; /* 6, that the world exerts on the tip, N and N m; NULL: zero. For
+                                    the analysis alone: no torque depends on it. */
 } dashpot_state;
 
 /* Where to go; the controller gets there smoothly. */
@@ -267,8 +270,8 @@ int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* stat
                        const dashpot_setpoint* setpoint, dashpot_output* output);
 
 /* On the real-time thread: forgets history and set-point, but not the gains; the next tick holds
- * the robot where it is, as the first one did. The torque-rate limit counts from `torque` (n, N m),
- * which the robot applies now; NULL: zero. */
+ * the robot where it is, as the first one did, and until modes are found anew there are none. The
+ * torque-rate limit counts from `torque` (n, N m), which the robot applies now; NULL: zero. */
 int32_t dashpot_reset(dashpot_controller* controller, const double* torque);
 
 /* On the other thread. The next tick takes it up; of several, the latest. */

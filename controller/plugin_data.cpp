@@ -38,6 +38,7 @@ std::int32_t check(const Struct* given, int n) noexcept {
 static_assert(DASHPOT_OK == static_cast<int>(Status::kOk));
 static_assert(DASHPOT_TORQUE_LIMITED == static_cast<int>(Status::kTorqueLimited));
 static_assert(DASHPOT_NEAR_JOINT_LIMIT == static_cast<int>(Status::kNearJointLimit));
+static_assert(DASHPOT_WRENCH_NOT_FINITE == static_cast<int>(Status::kWrenchNotFinite));
 static_assert(DASHPOT_SETPOINT_REJECTED == static_cast<int>(Status::kSetpointRejected));
 static_assert(DASHPOT_SETPOINT_STALE == static_cast<int>(Status::kSetpointStale));
 static_assert(DASHPOT_SETPOINT_LOST == static_cast<int>(Status::kSetpointLost));

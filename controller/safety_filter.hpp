@@ -16,6 +16,10 @@ namespace dashpot::controller {
 ///     repulsion torque_i (x^2 + x v / velocity_i),   v >= 0 the velocity toward the limit,
 /// away from the limit: zero with zero slope at the margin, Limits::repulsion of the torque limit
 /// at the position limit, and a damper that takes energy out on the way in.
+///
+/// Where springs end or start afresh, what the last torque has beyond the new one fades evenly: in
+/// all joints alike, in the least time in which no joint's rate limit has to act on it. Otherwise
+/// joints with little torque would let go first, and turn the wrench that the tip exerts.
 template <int N>
 class SafetyFilter {
  public:
@@ -36,7 +40,10 @@ class SafetyFilter {
   void reset(const Vector& torque) noexcept {
     for (int i = 0; i < N; ++i) last_[i] = std::clamp(torque[i], -torque_[i], torque_[i]);
     ramping_ = false;
+    begin_anew();
   }
+  /// The next torque to be applied does not continue the last: the difference fades evenly.
+  void begin_anew() noexcept { anew_ = true; }
 
   /// Makes a torque safe, in place. kOk, kTorqueLimited, kNearJointLimit, kPositionLimit, or
   /// kNotFinite, and then what `ramp` gives.
@@ -48,14 +55,22 @@ class SafetyFilter {
       return Status::kNotFinite;
     }
     ramping_ = false;
-    if (limit(tau)) status = worse(status, Status::kTorqueLimited);
+    const bool fades = fade(tau);
+    if (limit(tau) || fades) status = worse(status, Status::kTorqueLimited);
     return status;
   }
 
-  /// Where nothing is known: the last torque goes evenly to zero within 0.1 s.
+  /// Where nothing is known: the last torque goes evenly to zero within 0.1 s, or as fast as the
+  /// rate limits allow.
   Vector ramp() noexcept {
     if (!ramping_) {
-      for (int i = 0; i < N; ++i) ramp_step_[i] = ramp_share_ * std::abs(last_[i]);
+      double share = ramp_share_;
+      for (int i = 0; i < N; ++i) {
+        if (std::abs(last_[i]) * share > torque_step_[i]) {
+          share = torque_step_[i] / std::abs(last_[i]);
+        }
+      }
+      for (int i = 0; i < N; ++i) ramp_step_[i] = share * std::abs(last_[i]);
     }
     ramping_ = true;
     Vector tau;
@@ -102,6 +117,23 @@ class SafetyFilter {
     return repulsion_ * torque_[i] * (x * x + x * std::max(approach, 0.0) / velocity_[i]);
   }
 
+  /// Adds to the finite `tau` what is left of the torque before `begin_anew`. Whether anything is.
+  bool fade(Vector& tau) noexcept {
+    if (anew_) {
+      double ticks = 1;
+      for (int i = 0; i < N; ++i) {
+        excess_[i] = last_[i] - std::clamp(tau[i], -torque_[i], torque_[i]);
+        ticks = std::max(ticks, std::abs(excess_[i]) / torque_step_[i]);
+      }
+      share_step_ = 1 / ticks;
+      share_ = 1;
+      anew_ = false;
+    }
+    share_ = share_ > 1.5 * share_step_ ? share_ - share_step_ : 0;
+    if (share_ > 0) add<N>(excess_, tau, share_);
+    return share_ > 0;
+  }
+
   /// Bounds the finite `tau` and its change, and remembers it. Whether that changed it.
   bool limit(Vector& tau) noexcept {
     bool changed = false;
@@ -126,6 +158,10 @@ class SafetyFilter {
   Vector asked_ = Vector::Zero();
   bool ramping_ = false;
   Vector ramp_step_ = Vector::Zero();
+  bool anew_ = true;
+  Vector excess_ = Vector::Zero();  ///< of the torque before `begin_anew`, N m
+  double share_ = 0;                ///< of it that is left
+  double share_step_ = 1;           ///< in one tick
 };
 
 }  // namespace dashpot::controller

@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/controller/orientation.hpp>
 #include <dashpot/controller/smooth_motion.hpp>
+#include <dashpot/controller/spring_reach.hpp>
 #include <dashpot/controller/types.hpp>
 
 namespace dashpot::controller {
@@ -37,6 +38,12 @@ class JointPath {
     smooth();
   }
 
+  /// Coordinate i goes on from `position`, with the velocity it has.
+  void relocate(int i, double position) noexcept {
+    point_[i] += position - position_[i];
+    position_[i] = position;
+  }
+
   /// One period in which the path brakes, or stays where it is.
   void halt() noexcept {
     velocity_ = approach<N>(Vector::Zero(), velocity_, norm_, period_).velocity;
@@ -63,12 +70,24 @@ class JointPath {
   Vector position_;
 };
 
+/// The rotation vector of a unit quaternion, the short way round.
+inline Eigen::Vector3d short_turn(Eigen::Quaterniond turn) noexcept {
+  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
+  return rotation_vector(turn);
+}
+
 /// Where the Cartesian springs are fixed while the set-point moves. From rest the tip goes along a
 /// straight line and turns about one axis, the short way round, and both arrive together.
 ///
 /// The smoothed orientation is exp(offset) times the one before smoothing, and its angular velocity
 /// the average of those before. That is exact while the axis of rotation stands still; where a new
 /// goal changes it on the way, the two differ by a fraction |offset| (rad) of the angular velocity.
+///
+/// A tether keeps the path where the springs may reach from the tip: with d the way to the goal and
+/// e what the path is ahead of the tip (m, and rad as a rotation vector), the way it takes is
+///     SpringReach::shortened(e + d) - e.
+/// So the path brakes for the end of the tether as for a goal, goes along with a robot that cannot
+/// follow or is led away, and turns back from there: nothing winds up.
 class TipPath {
  public:
   TipPath(const TwistNorm& norm, double period, int smoothing) noexcept
@@ -82,22 +101,29 @@ class TipPath {
     smoothing_.reset();
   }
 
+  /// From here on, with the velocity it has.
+  void relocate(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation) noexcept {
+    point_ += position - position_;
+    position_ = position;
+    rotation_ = rotation;
+    point_rotation_ = quaternion(-smoothing_.offset().tail<3>()) * rotation;
+  }
+
   /// One period toward a goal; `rotation` is a unit quaternion.
   void step(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation) noexcept {
-    Eigen::Quaterniond turn = rotation * point_rotation_.conjugate();
-    if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
-    Vector6 d;
-    d << position - point_, rotation_vector(turn);
-    if (d.tail<3>().norm() < 1e-14) d.tail<3>().setZero();  // rounding of the product
-    const Step<6> step = approach<6>(d, velocity_, norm_, period_);
-    velocity_ = step.velocity;
-    if (step.arrives) {
-      point_ = position;
-      point_rotation_ = rotation;
-    } else {
-      advance();
-    }
-    smooth();
+    go(position, rotation, way_to(position, rotation), true);
+  }
+  /// The same on a tether.
+  void step(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation,
+            const Tether& tether) noexcept {
+    const Vector6 d = way_to(position, rotation);
+    if (tether.near(position, rotation)) return go(position, rotation, d, true);
+    Vector6 e;  // of the path before smoothing
+    e << point_ - tether.position, short_turn(point_rotation_ * tether.rotation.conjugate());
+    const Vector6 goal = e + d;
+    const Vector6 within = tether.shortened(goal);
+    if (within == goal) return go(position, rotation, d, true);
+    go(position, rotation, within - e, false);
   }
 
   /// One period in which the path brakes, or stays where it is.
@@ -113,6 +139,26 @@ class TipPath {
   const Vector6& acceleration() const noexcept { return smoothing_.acceleration(); }
 
  private:
+  Vector6 way_to(const Eigen::Vector3d& position,
+                 const Eigen::Quaterniond& rotation) const noexcept {
+    Vector6 d;
+    d << position - point_, short_turn(rotation * point_rotation_.conjugate());
+    if (d.tail<3>().norm() < 1e-14) d.tail<3>().setZero();  // rounding of the product
+    return d;
+  }
+  /// One period along the way `d`, which `ends` at the goal given or before it.
+  void go(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation, const Vector6& d,
+          bool ends) noexcept {
+    const Step<6> step = approach<6>(d, velocity_, norm_, period_);
+    velocity_ = step.velocity;
+    if (step.arrives && ends) {
+      point_ = position;
+      point_rotation_ = rotation;
+    } else {
+      advance();
+    }
+    smooth();
+  }
   void advance() noexcept {
     point_ += period_ * velocity_.head<3>();
     if ((velocity_.tail<3>().array() == 0).all()) return;

@@ -75,6 +75,8 @@ void validate(const Limits& limits, int n) {
   need_positive("limits.position_margin", limits.position_margin, "rad");
   need_not_negative("limits.repulsion", limits.repulsion, "");
   if (limits.repulsion > 1) fail("limits.repulsion", limits.repulsion, "", "must be at most 1");
+  need_positive("limits.linear_error", limits.linear_error, "m");
+  need_positive("limits.angular_error", limits.angular_error, "rad");
 }
 
 double finite_or(double value, double otherwise) {

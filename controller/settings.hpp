@@ -11,8 +11,12 @@ class RobotModel;
 
 /// What is added to the springs and dampers. Each that is off costs nothing.
 struct FeedForward {
-  bool gravity = true;       ///< off where the robot compensates gravity itself
-  bool coriolis = true;      ///< C(q, qd) qd; with it, energy is not conserved at high speed
+  bool gravity = true;  ///< off where the robot compensates gravity itself
+  /// C(q, qd) qd, as measured. With it the loop is M qdd + D qd + K e = external torque, that of
+  /// the modes, at any speed; but its energy then changes by -qd' (D - 1/2 dM/dt) qd, so that it is
+  /// passive only as long as D - 1/2 dM/dt is positive semidefinite. Without it the change is
+  /// -qd' D qd: passive at any speed, see README.
+  bool coriolis = true;
   bool friction = false;     ///< the model's viscous and Coulomb friction, at the velocity of the
                              ///< moving set-point: it adds no feedback
   bool acceleration = true;  ///< M times the acceleration of the moving set-point
@@ -48,7 +52,12 @@ struct Limits {
   JointVector position_upper;    ///< n, rad; infinity if there is none
   double position_margin = 0.1;  ///< repulsion begins this far before a position limit, rad
   double repulsion = 0.5;        ///< its torque at the limit, as a fraction of the torque limit
-  JointVector damping;           ///< of the safe output "damp", n, N m s/rad, positive
+  /// The Cartesian springs are drawn out no farther than this, m and rad, however far away the goal
+  /// is: beyond it they pull no harder, and their path waits for the robot (see TipPath). A path
+  /// that is to brake within this is no faster than sqrt(acceleration times it).
+  double linear_error = 0.3;
+  double angular_error = 1.0;
+  JointVector damping;  ///< of the safe output "damp", n, N m s/rad, positive
 };
 
 /// When input is too old to act on.
@@ -65,9 +74,9 @@ struct Analysis {
     kInline,      ///< within the tick
     kBackground,  ///< on a thread of its own, one tick later or when it gets round to it
   } where = Where::kInline;
-  int every = 1;                ///< ticks between two analyses, at least 1
-  double soft_frequency = 0.1;  ///< modes below this have no meaningful damping ratio, rad/s
-  bool shapes = true;           ///< with eigenvectors
+  int every = 1;                           ///< ticks between two analyses, at least 1
+  double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
+  bool shapes = true;                      ///< with eigenvectors
 
   /// The modes of the loop as it runs, beside the continuous ones; see SampledAnalysis.
   struct Sampled {

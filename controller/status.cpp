@@ -10,6 +10,8 @@ const char* to_text(Status status) noexcept {
       return "torque or torque rate limited";
     case Status::kNearJointLimit:
       return "near a joint's position limit";
+    case Status::kWrenchNotFinite:
+      return "external wrench not finite, the last one stays";
     case Status::kSetpointRejected:
       return "set-point rejected";
     case Status::kSetpointStale:

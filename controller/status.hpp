@@ -7,7 +7,8 @@ namespace dashpot::controller {
 ///   hold:  the springs stop where they are, whatever the set-point says; no commanded wrench
 ///   damp:  no springs: joint damping, and gravity where the controller compensates it
 ///   ramp:  the last good torque goes to zero within 0.1 s
-/// Torque and torque-rate limits hold for all of them.
+/// Torque and torque-rate limits hold for all of them. Where damp and ramp take torque away, it
+/// fades evenly: in all joints alike, as slowly as the slowest torque-rate limit makes it.
 ///
 /// Recovery: what `status` names has to be over; nothing else is needed. After a ramp of at most
 /// Watchdog::longest_gap the controller goes on where it was. After a longer ramp and after every
@@ -16,8 +17,10 @@ namespace dashpot::controller {
 enum class Status : std::uint8_t {
   kOk,
   // The torque is as asked for, as far as it goes:
-  kTorqueLimited,   ///< a torque or torque-rate limit is at work
-  kNearJointLimit,  ///< a joint is within the margin of a position limit; its repulsion is at work
+  kTorqueLimited,    ///< a torque or torque-rate limit is at work
+  kNearJointLimit,   ///< a joint is within the margin of a position limit; its repulsion is at work
+  kWrenchNotFinite,  ///< NaN or infinity in RobotState::external_wrench; the last finite one stays
+                     ///< in force, in the analysis, which alone uses it
   kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, a rotation that is
                       ///< none, an unreachable joint position or a time to come; the last good one
                       ///< stays in force

@@ -32,7 +32,8 @@ struct RobotState {
   std::int64_t time = 0;  ///< ns, of any clock that does not run backward
   JointVector position;   ///< rad or m
   JointVector velocity;   ///< rad/s or m/s
-  /// That the world exerts on the tip, N and N m; known or estimated. Only K_G uses it.
+  /// That the world exerts on the tip, N and N m; known or estimated. Only K_G uses it, in the
+  /// analysis: what is not finite is reported (Status::kWrenchNotFinite), and changes no torque.
   Vector6 external_wrench = Vector6::Zero();
 };
 
@@ -44,6 +45,10 @@ enum class Mode : std::uint8_t {
 
 /// In whose axes K_C, C_C and `directions` are given.
 enum class Frame : std::uint8_t { kBase, kTool };
+
+/// Modes slower than this have no damping ratio worth the name, rad/s: a swing takes a minute. The
+/// analysis calls them soft unless it is set otherwise, and a ratio that is held lets go of them.
+inline constexpr double kSoftFrequency = 0.1;
 
 /// The largest damping ratio that can be asked for.
 inline constexpr double kLargestDampingRatio = 2;

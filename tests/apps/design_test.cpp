@@ -173,8 +173,11 @@ TEST(Design, WritesTheMapOfARegion) {
   }
   EXPECT_FALSE(std::getline(file, line));
   const Outcome nowhere = design_text(list, "0.5", {"--region", "--csv", "/nowhere/map.csv"});
-  EXPECT_EQ(nowhere.status, 1);
+  EXPECT_EQ(nowhere.status, 2);
   EXPECT_THAT(nowhere.out, IsEmpty());
+  EXPECT_EQ(nowhere.err,  // as `dashpot run` says it
+            "dashpot design: --csv: /nowhere/map.csv: cannot write: No such file or directory\n");
+  EXPECT_EQ(design_text(list, "0.5", {"--region", "--csv", "/dev/full"}).status, 1);
   EXPECT_THAT(design_text(list, "0.5", {"--csv", path}).err, HasSubstr("--csv: needs --region"));
 }
 

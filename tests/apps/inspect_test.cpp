@@ -85,6 +85,8 @@ TEST(Inspect, AddsReflectedInertia) {
     EXPECT_NEAR(geared["mass_matrix"][i][i].get<double>(),
                 bare["mass_matrix"][i][i].get<double>() + static_cast<double>(i + 1), 1e-14);
   }
+  EXPECT_EQ(parse(inspect_panda({"--json", "--reflected-inertia", "0.5"})),
+            parse(inspect_panda({"--json", "--reflected-inertia", "0.5,0.5,0.5,0.5,0.5,0.5,0.5"})));
 }
 
 TEST(Inspect, WeighsOrLeavesOutLinksOffTheChain) {
@@ -124,11 +126,12 @@ TEST(Inspect, RefusesNumbersThatDoNotFit) {
   expect_refused(inspect_panda({"--q", "0,0,0,,0,0,0"}), "--q: '' is not a finite number");
   expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1x"}), "--q: '1x' is not a finite number");
   expect_refused(inspect_panda({"--gravity", "9.81"}), "--gravity: x,y,z is wanted");
-  expect_refused(
-      inspect_panda({"--reflected-inertia", "1,2"}),
-      dashpot::testing::arm_path("panda") + ": reflected inertia: has 2 entries for 7 joints");
+  expect_refused(inspect_panda({"--reflected-inertia", "1,2"}),
+                 "--reflected-inertia: 2 numbers, expected 1 or 7");
   expect_refused(inspect_panda({"--reflected-inertia", "1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1"}),
-                 "--reflected-inertia: more numbers than joints");
+                 "--reflected-inertia: 17 numbers, expected 1 or 7");
+  expect_refused(inspect_panda({"--reflected-inertia", "-1"}),
+                 "--reflected-inertia: a number is negative");
 }
 
 TEST(Inspect, RefusesFilesAndLinksThatDoNotFit) {

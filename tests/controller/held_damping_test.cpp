@@ -1,25 +1,22 @@
 // The controller designs its damping at every tick: the ratio is held, in the modes and in the
 // torque, and nothing jumps.
-#include <dashpot/controller/held_damping.hpp>
-#include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/tests/support/arms.hpp>
-#include <dashpot/tests/support/count_allocations.hpp>
+#include <dashpot/tests/support/led_arm.hpp>
 #include <dashpot/tests/support/matrices.hpp>
-#include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/simulated_arm.hpp>
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 
 namespace dashpot::controller {
 namespace {
 
+using testing::LedArm;
+using testing::plain_settings;
 using testing::SimulatedArm;
 
 /// An arm without friction.
@@ -32,68 +29,6 @@ RobotModel smooth_arm(const testing::Arm& arm) {
 RobotModel panda() {
   return smooth_arm(testing::arms()[0]);
 }
-
-/// Nothing acts but springs and dampers of the tip, and no limit interferes.
-Settings plain_settings(const RobotModel& model) {
-  Settings settings = default_settings(model);
-  settings.initial.mode = Mode::kCartesian;
-  settings.initial.gains.null_stiffness.setZero();
-  settings.initial.gains.null_damping.setZero();
-  settings.initial.gains.task_damping_ratio = 0.7;
-  settings.initial.gains.task_stiffness = Vector6(2000, 600, 2000, 100, 100, 100).asDiagonal();
-  settings.feed_forward = {false, false, false, false, false};
-  settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
-  settings.limits.velocity.setConstant(1e3);
-  settings.limits.position_lower.setConstant(-10);
-  settings.limits.position_upper.setConstant(10);
-  return settings;
-}
-
-/// Led along a path; nothing but its state matters.
-struct LedArm {
-  LedArm(const RobotModel& robot, const Settings& settings)
-      : model(robot), controller(robot, settings), setpoint(settings.initial) {
-    center = JointVector::LinSpaced(model.dof(), 0.3, 1.2);
-    if (model.dof() == 7) center << 0, -0.785, 0.1, -2.2, 0.2, 1.7, 0.785;
-    place(center);
-    const DynamicsResult there = evaluate(model, center, state.velocity);
-    setpoint.joint_position = center;
-    setpoint.tip_pose = {there.p_BT_B, there.R_BT};
-  }
-  void place(const JointVector& q) {
-    state.position = q;
-    state.velocity = JointVector::Zero(q.size());
-  }
-  /// Swings of 0.4 rad, one in 2 s.
-  void swing(double t) {
-    for (Eigen::Index i = 0; i < center.size(); ++i) {
-      const double phase = std::numbers::pi * t + static_cast<double>(i);
-      state.position[i] = center[i] + 0.4 * (std::sin(phase) - std::sin(static_cast<double>(i)));
-      state.velocity[i] = 0.4 * std::numbers::pi * std::cos(phase);
-    }
-  }
-  Status tick() {
-    setpoint.time = state.time += 1'000'000;
-    return controller.update(state, setpoint, torque);
-  }
-  /// Until the gains have grown.
-  void settle() {
-    const int ticks = static_cast<int>(controller.settings().motion.gain_time * 1000) + 2;
-    for (int k = 0; k < ticks; ++k) tick();
-  }
-  /// C, n x n
-  Eigen::MatrixXd damping() const {
-    analysis::System<kMaxJoints> system;
-    controller.closed_loop(system);
-    return system.damping;
-  }
-
-  RobotModel model;
-  Controller controller;
-  RobotState state;
-  Setpoint setpoint;
-  JointVector center, torque;
-};
 
 /// K_C in B's axes.
 Eigen::MatrixXd stiffness_in_base(const Gains& gains, const Eigen::Matrix3d& R_BT) {
@@ -127,7 +62,7 @@ TEST(HeldDamping, HoldsTheRatioAlongAPathOfEveryArm) {
     for (const Frame frame : {Frame::kBase, Frame::kTool}) {
       SCOPED_TRACE(std::string(arm.file) + (frame == Frame::kBase ? " base" : " tool"));
       const RobotModel model = smooth_arm(arm);
-      Settings settings = plain_settings(model);
+      Settings settings = plain_settings(model, Mode::kCartesian);
       Gains& gains = settings.initial.gains;
       gains.frame = frame;
       gains.task_damping_ratio = frame == Frame::kBase ? 0.7 : 0.25;
@@ -162,7 +97,7 @@ TEST(HeldDamping, HoldsTheRatioAlongAPathOfEveryArm) {
 
 TEST(HeldDamping, LeavesFreeDirectionsAndTheNullSpaceAlone) {
   const RobotModel model = panda();
-  Settings settings = plain_settings(model);
+  Settings settings = plain_settings(model, Mode::kCartesian);
   Gains& gains = settings.initial.gains;
   gains.directions = {true, true, true, false, false, true};
   gains.null_stiffness.setConstant(5);
@@ -184,7 +119,7 @@ TEST(HeldDamping, LeavesFreeDirectionsAndTheNullSpaceAlone) {
 TEST(HeldDamping, IsInTheTorque) {
   for (const Frame frame : {Frame::kBase, Frame::kTool}) {
     const RobotModel model = panda();
-    Settings settings = plain_settings(model);
+    Settings settings = plain_settings(model, Mode::kCartesian);
     settings.initial.gains.frame = frame;
     LedArm led(model, settings);
     led.settle();
@@ -204,7 +139,7 @@ TEST(HeldDamping, IsInTheTorque) {
 
 TEST(HeldDamping, FollowsChangesOfStiffnessAndRatio) {
   const RobotModel model = panda();
-  LedArm led(model, plain_settings(model));
+  LedArm led(model, plain_settings(model, Mode::kCartesian));
   led.settle();
   Gains& gains = led.setpoint.gains;
   for (const double ratio : {0.2, 2.0, 0.7}) {
@@ -238,7 +173,7 @@ TEST(HeldDamping, FollowsChangesOfStiffnessAndRatio) {
 /// On, another, off: evenly over Motion::gain_time.
 TEST(HeldDamping, TheRatioChangesEvenly) {
   const RobotModel model = panda();
-  LedArm led(model, plain_settings(model));
+  LedArm led(model, plain_settings(model, Mode::kCartesian));
   led.settle();
   led.state.velocity.setConstant(0.3);
   led.tick();
@@ -256,72 +191,6 @@ TEST(HeldDamping, TheRatioChangesEvenly) {
     EXPECT_GT((last - first).norm(), 1);
     EXPECT_LT(step, 1.01 / 500 * (last - first).norm());
   }
-}
-
-TEST(HeldDamping, IsSemidefiniteWhateverChanges) {
-  const RobotModel model = panda();
-  LedArm led(model, plain_settings(model));
-  testing::Random random(20210606);
-  Gains& gains = led.setpoint.gains;
-  double smallest = 0, largest = 0;
-  for (int k = 0; k < 20'000; ++k) {
-    if (k % 150 == 0) {
-      const Eigen::Index rank = 1 + k / 150 % 6;
-      const Eigen::MatrixXd root = 20 * random.matrix(6, rank);
-      gains.task_stiffness = root * root.transpose();
-      gains.task_damping_ratio = k / 150 % 4 == 0 ? 0 : 0.35 * static_cast<double>(rank) - 0.3;
-      gains.frame = k / 450 % 2 == 0 ? Frame::kBase : Frame::kTool;
-      gains.directions[static_cast<std::size_t>(rank - 1)] ^= true;
-      if (k / 150 % 5 == 0) led.setpoint.mode = Mode::kJoint;
-      if (k / 150 % 5 == 1) led.setpoint.mode = Mode::kCartesian;
-    }
-    led.swing(1e-3 * k);
-    ASSERT_LE(led.tick(), Status::kTorqueLimited);
-    if (k % 10 != 0) continue;
-    const Eigen::VectorXd values =
-        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(led.damping()).eigenvalues();
-    smallest = std::min(smallest, values.minCoeff() / std::max(values.maxCoeff(), 1e-9));
-    largest = std::max(largest, values.maxCoeff());
-  }
-  EXPECT_GT(smallest, -1e-12);
-  EXPECT_GT(largest, 10);
-}
-
-/// Stretched, the arm loses a direction: the damping in the joints stays what the frequencies
-/// allow, and so does the torque.
-TEST(HeldDamping, IsBoundedThroughASingularity) {
-  const RobotModel model = panda();
-  Settings settings = plain_settings(model);
-  LedArm led(model, settings);
-  JointVector stretched = led.center;
-  stretched << 0, 0, 0, 0, 0, 0.3, 0;
-  led.settle();
-  double least = 1, most = 0, step = 0;
-  JointVector last;
-  for (int k = -1500; k <= 1500; ++k) {
-    const double s = 1 - std::abs(k) / 1500.0;
-    led.state.position = led.center + s * (stretched - led.center);
-    led.state.velocity = (k < 0 ? 1 : -1) / 1.5 * (stretched - led.center);
-    if (k == 0) led.state.velocity.setZero();
-    led.setpoint.tip_pose.position.x() += k % 500 < 250 ? 1e-4 : -1e-4;
-    ASSERT_LE(led.tick(), Status::kTorqueLimited);
-    const DynamicsResult robot = evaluate(model, led.state.position, led.state.velocity);
-    const Eigen::MatrixXd M = robot.M, J = robot.J;
-    least = std::min(least, Eigen::JacobiSVD<Eigen::MatrixXd>(J).singularValues()[5]);
-    const Eigen::MatrixXd K = J.transpose() * settings.initial.gains.task_stiffness * J;
-    const auto largest = [&](const Eigen::MatrixXd& A) {
-      return Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd>(A, M).eigenvalues()[6];
-    };
-    EXPECT_LE(largest(led.damping()), 1.4 * std::sqrt(largest(K)) * (1 + 1e-6));
-    const JointVector& now = led.controller.snapshot().law_torque;
-    most = std::max(most, now.cwiseAbs().maxCoeff());
-    // Where the velocity turns round, it jumps.
-    if (k > -1500 && std::abs(k) > 1) step = std::max(step, (now - last).cwiseAbs().maxCoeff());
-    last = now;
-  }
-  EXPECT_LT(least, 1e-6);
-  EXPECT_LT(most, 2500);
-  EXPECT_LT(step, 5);
 }
 
 /// The largest change of the law's torque from tick to tick, as a share of the rate limit.
@@ -366,94 +235,6 @@ TEST(HeldDamping, ChangesAreSmoothInMotion) {
     arm.setpoint.joint_position = arm.state.position;
     arm.setpoint.tip_pose = arm.tip();
     EXPECT_LT(rate_share(arm, 1), 0.25);
-  }
-}
-
-TEST(HeldDamping, NeverAllocates) {
-  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
-  const RobotModel model = panda();
-  LedArm led(model, plain_settings(model));
-  const Matrix6 stiffness = led.setpoint.gains.task_stiffness;
-  const int count = testing::allocations_of([&] {
-    for (int k = 0; k < 3000; ++k) {
-      Gains& gains = led.setpoint.gains;
-      if (k % 300 == 0) gains.task_stiffness = (1 + 1e-3 * k) * stiffness;
-      if (k % 700 == 0) gains.task_damping_ratio = 0.7 - gains.task_damping_ratio;
-      if (k % 1100 == 0) gains.frame = k % 2200 == 0 ? Frame::kTool : Frame::kBase;
-      led.swing(1e-3 * k);
-      led.tick();
-    }
-  });
-  EXPECT_EQ(count, 0);
-}
-
-TEST(HeldDamping, KeepsTheLastDesignWhereThereIsNone) {
-  TaskDamper damper;
-  damper.set(Matrix6(100 * Matrix6::Identity()), 0.7, {});
-  analysis::Square<kMaxJoints> M = Eigen::MatrixXd::Identity(7, 7), broken = M;
-  analysis::TaskJacobian<kMaxJoints> J = Eigen::MatrixXd::Identity(6, 7);
-  broken(3, 3) = -1;
-  damper.update(broken, J);
-  EXPECT_EQ(damper.damping(), Matrix6::Zero());
-  damper.update(M, J);
-  const Matrix6 good = damper.damping();
-  EXPECT_TRUE(
-      testing::near(Eigen::MatrixXd(good), Eigen::MatrixXd(14 * Matrix6::Identity()), 1e-9));
-  for (const double wrong : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
-    broken = M;
-    broken(3, 3) = wrong;
-    damper.update(broken, J);
-    EXPECT_EQ(damper.damping(), good);
-  }
-  // A stiffness that rounding has made indefinite, as far as check_gains lets it pass, is taken.
-  Matrix6 flat = Vector6(100, 100, 100, 100, 100, -5e-9).asDiagonal();
-  damper.set(flat, 0.35, {});
-  damper.update(M, J);
-  EXPECT_NEAR(damper.damping()(0, 0), 7, 1e-6);
-  EXPECT_NEAR(damper.damping()(5, 5), 0, 1e-3);
-}
-
-TEST(HeldDamping, IsBoundedHoweverSingularTheJacobian) {
-  TaskDamper damper;
-  const double K = 2000, ratio = 0.7;
-  damper.set(Matrix6(K * Matrix6::Identity()), ratio, {});
-  double largest = 0;
-  for (int k = 0; k < 200; ++k) {
-    analysis::Square<kMaxJoints> M = Eigen::MatrixXd::Identity(7, 7);
-    analysis::TaskJacobian<kMaxJoints> J = Eigen::MatrixXd::Identity(6, 7);
-    J.row(2) *= std::pow(10, -0.1 * k);  // its frequency falls from 45 to 4e-19 rad/s
-    damper.update(M, J);
-    const Matrix6& C_C = damper.damping();
-    EXPECT_GE(Eigen::SelfAdjointEigenSolver<Matrix6>(C_C).eigenvalues()[0], -1e-9);
-    largest = std::max(largest, C_C(2, 2));
-  }
-  EXPECT_LT(largest, 2.3 * ratio * K / TaskDamper::kSoftFrequency);
-  EXPECT_GT(largest, 1.9 * ratio * K / TaskDamper::kSoftFrequency);
-}
-
-TEST(HeldDamping, RefusesWhatIsNoRatio) {
-  const RobotModel model = panda();
-  const Settings settings = plain_settings(model);
-  for (const double wrong : {-1e-9, 2.0001, std::numeric_limits<double>::infinity(),
-                             std::numeric_limits<double>::quiet_NaN()}) {
-    Settings bad = settings;
-    bad.initial.gains.task_damping_ratio = wrong;
-    try {
-      Controller controller(model, bad);
-      FAIL() << wrong;
-    } catch (const InvalidSettings& error) {
-      EXPECT_EQ(error.key(), "initial.gains.task_damping_ratio");
-      EXPECT_NE(std::string(error.what()).find("must be between 0 and 2"), std::string::npos);
-    }
-    const SetpointFault fault = check_gains(bad.initial.gains, Mode::kCartesian, 7);
-    EXPECT_STREQ(fault.key, "task_damping_ratio");
-    LedArm led(model, settings);
-    led.settle();
-    const Eigen::MatrixXd before = led.damping();
-    led.setpoint.gains.task_damping_ratio = wrong;
-    EXPECT_EQ(led.tick(), Status::kSetpointRejected);
-    led.settle();
-    EXPECT_TRUE(testing::near(led.damping(), before, 1e-9));
   }
 }
 

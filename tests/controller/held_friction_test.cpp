@@ -1,16 +1,15 @@
 // Damping ratios held beside friction in the joints, and in the joint mode.
-#include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/held_damping.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>
+#include <dashpot/tests/support/led_arm.hpp>
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
 namespace dashpot::controller {
 namespace {
@@ -23,58 +22,20 @@ RobotModel rubbing(const testing::Arm& arm, double friction) {
   return testing::arm_model(arm, options);
 }
 
-/// Nothing acts but springs and dampers, and no limit interferes.
-Settings plain_settings(const RobotModel& model, Mode mode) {
-  Settings settings = default_settings(model);
-  settings.initial.mode = mode;
+/// Settings that take the friction off.
+Settings rubbing_settings(const RobotModel& model, Mode mode) {
+  Settings settings = testing::plain_settings(model, mode);
   settings.subtract_friction = true;
-  Gains& gains = settings.initial.gains;
-  gains.null_stiffness.setZero();
-  gains.null_damping.setZero();
-  gains.task_damping_ratio = gains.joint_damping_ratio = 0.7;
-  gains.task_stiffness = Vector6(2000, 600, 2000, 100, 100, 100).asDiagonal();
-  settings.feed_forward = {false, false, false, false, false};
-  settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
-  settings.limits.velocity.setConstant(1e3);
-  settings.limits.position_lower.setConstant(-10);
-  settings.limits.position_upper.setConstant(10);
   return settings;
 }
 
-/// Led along swings of 0.4 rad.
-struct Led {
-  Led(const RobotModel& model, const Settings& settings)
-      : controller(model, settings), setpoint(settings.initial) {
-    center = JointVector::LinSpaced(model.dof(), 0.3, 1.2);
-    if (model.dof() == 7) center << 0, -0.785, 0.1, -2.2, 0.2, 1.7, 0.785;
-    setpoint.joint_position = center;
-    const DynamicsResult there = evaluate(model, center, JointVector::Zero(model.dof()));
-    setpoint.tip_pose = {there.p_BT_B, there.R_BT};
-    swing(0);
-    for (int k = 0; k < settings.motion.gain_time * 1000 + 2; ++k) tick();
-  }
+/// Its gains have grown; swings are so slow that velocities do not matter.
+struct Led : testing::LedArm {
+  Led(const RobotModel& robot, const Settings& settings) : LedArm(robot, settings) { settle(); }
   void swing(double t) {
-    state.position = center;
-    state.velocity = JointVector::Zero(center.size());
-    for (Eigen::Index i = 0; i < center.size(); ++i) {
-      const double phase = std::numbers::pi * t + static_cast<double>(i);
-      state.position[i] += 0.4 * (std::sin(phase) - std::sin(static_cast<double>(i)));
-    }
+    LedArm::swing(t);
+    state.velocity.setZero();
   }
-  Status tick() {
-    setpoint.time = state.time += 1'000'000;
-    return controller.update(state, setpoint, torque);
-  }
-  Eigen::MatrixXd damping() const {
-    analysis::System<kMaxJoints> system;
-    controller.closed_loop(system);
-    return system.damping;
-  }
-
-  Controller controller;
-  RobotState state;
-  Setpoint setpoint;
-  JointVector center, torque;
 };
 
 /// Largest difference of a published ratio from 0.7, of modes that are not soft.
@@ -105,7 +66,7 @@ TEST(HeldBesideFriction, TakesOffWhatFrictionDampsAlready) {
   for (const testing::Arm& arm : testing::arms()) {
     for (const Frame frame : {Frame::kBase, Frame::kTool}) {
       const RobotModel model = rubbing(arm, 0.3);
-      Settings settings = plain_settings(model, Mode::kCartesian);
+      Settings settings = rubbing_settings(model, Mode::kCartesian);
       settings.initial.gains.frame = frame;
       Led led(model, settings);
       const bool redundant = model.dof() > 6;
@@ -118,7 +79,7 @@ TEST(HeldBesideFriction, TakesOffWhatFrictionDampsAlready) {
 
 TEST(HeldBesideFriction, IsSemidefiniteWhereFrictionIsTooMuch) {
   const RobotModel model = rubbing(testing::arms()[0], 30);
-  Led led(model, plain_settings(model, Mode::kCartesian));
+  Led led(model, rubbing_settings(model, Mode::kCartesian));
   for (int k = 1; k <= 50; ++k) {
     led.swing(0.01 * k);
     ASSERT_LE(led.tick(), Status::kTorqueLimited);
@@ -132,7 +93,7 @@ TEST(HeldInJoints, HoldsTheRatioAlongAPathOfEveryArm) {
   for (const testing::Arm& arm : testing::arms()) {
     for (const double friction : {0.0, 0.5}) {
       const RobotModel model = rubbing(arm, friction);
-      Led led(model, plain_settings(model, Mode::kJoint));
+      Led led(model, rubbing_settings(model, Mode::kJoint));
       EXPECT_LT(worst_ratio(led, model.dof()), 1e-6) << arm.file << ", friction " << friction;
     }
   }
@@ -142,7 +103,7 @@ TEST(HeldInJoints, HoldsTheRatioAlongAPathOfEveryArm) {
 TEST(HeldInJoints, HoldsTheRatioWhileTheSpringsGrow) {
   const RobotModel model = rubbing(testing::arms()[0], 0);
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
-    Settings settings = plain_settings(model, mode);
+    Settings settings = rubbing_settings(model, mode);
     Led arm(model, settings);
     arm.controller.reset();
     for (int k = 0; k < 100; ++k) arm.tick();
@@ -156,7 +117,7 @@ TEST(HeldInJoints, HoldsTheRatioWhileTheSpringsGrow) {
 
 TEST(HeldInJoints, IsInTheTorque) {
   const RobotModel model = rubbing(testing::arms()[0], 0.5);
-  Led led(model, plain_settings(model, Mode::kJoint));
+  Led led(model, rubbing_settings(model, Mode::kJoint));
   led.swing(0.3);
   led.state.velocity << 0.1, -0.2, 0.3, 0.1, -0.1, 0.2, 0.1;
   const JointVector velocity = led.state.velocity;
@@ -173,7 +134,7 @@ TEST(HeldInJoints, IsInTheTorque) {
 // From one mode to the other and back: friction is taken off once, not twice.
 TEST(HeldInJoints, ChangesModesWithoutLosingDamping) {
   const RobotModel model = rubbing(testing::arms()[0], 0.5);
-  Led led(model, plain_settings(model, Mode::kJoint));
+  Led led(model, rubbing_settings(model, Mode::kJoint));
   double least = 1e9;
   Eigen::MatrixXd before = led.damping();
   for (int k = 0; k < 2200; ++k) {
@@ -193,7 +154,7 @@ TEST(HeldInJoints, NeverAllocates) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
   for (const double friction : {0.0, 0.5, 30.0}) {
     const RobotModel model = rubbing(testing::arms()[0], friction);
-    Led led(model, plain_settings(model, Mode::kJoint));
+    Led led(model, rubbing_settings(model, Mode::kJoint));
     const int count = testing::allocations_of([&] {
       for (int k = 0; k < 2000; ++k) {
         if (k % 700 == 500) led.setpoint.mode = Mode::kCartesian;
@@ -210,7 +171,7 @@ TEST(HeldInJoints, NeverAllocates) {
 TEST(HeldInJoints, RefusesWhatIsNoRatio) {
   const RobotModel model = rubbing(testing::arms()[0], 0);
   for (const double wrong : {-1e-9, 2.0001, std::nan("")}) {
-    Settings settings = plain_settings(model, Mode::kJoint);
+    Settings settings = rubbing_settings(model, Mode::kJoint);
     settings.initial.gains.joint_damping_ratio = wrong;
     try {
       Controller controller(model, settings);

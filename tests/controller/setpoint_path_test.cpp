@@ -180,5 +180,78 @@ TEST(TipPath, ArrivesFromEveryDetour) {
   }
 }
 
+/// Springs on every direction of the base.
+TipImpedance all_sprung() {
+  TipImpedance base;
+  base.stiffness.setIdentity();
+  base.held.setOnes();
+  return base;
+}
+
+// Tied to a tip that stands still, the path ends where the springs may reach, and turns back there.
+TEST(TipPath, GoesNoFartherThanItsTether) {
+  Random random(314);
+  const TwistNorm limits{0.5, 1.5, 2.0, 6.0};
+  const SpringReach reach{0.2, 0.6};
+  const TipImpedance base = all_sprung(), none;
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  for (int trial = 0; trial < 20; ++trial) {
+    TipPath path(limits, kPeriod, kWindow);
+    const Vector3d tip = random.vector(3);
+    const Quaterniond turned = random_rotation(random);
+    const Tether tether{tip, turned, I, base, none, reach};
+    path.start(tip, turned);
+    const Vector3d away = Vector3d(random.vector(3)).normalized();
+    const Quaterniond far = quaternion(2.5 * away) * turned;
+    Vector6 last = Vector6::Zero();
+    for (int k = 0; k < 5000; ++k) {
+      path.step(tip + 3 * away, far, tether);
+      EXPECT_LE((path.position() - tip).norm(), 0.2 + 1e-9);
+      EXPECT_LE(path.rotation().angularDistance(turned), 0.6 + 1e-9);
+      EXPECT_LE(limits.effort(path.velocity() - last) / kPeriod, 1 + 1e-9);
+      last = path.velocity();
+    }
+    EXPECT_TRUE(near(path.position(), tip + 0.2 * away, 1e-6));
+    EXPECT_NEAR(path.rotation().angularDistance(turned), 0.6, 1e-6);
+    for (int k = 0; k < 2000; ++k) path.step(tip, turned, tether);  // home: 0.2 m and 0.6 rad
+    EXPECT_EQ(path.position(), tip);
+  }
+}
+
+TEST(TipPath, GoesAlongWithATipThatIsLedAway) {
+  TipPath path({0.5, 1.5, 2.0, 6.0}, kPeriod, kWindow);
+  const SpringReach reach{0.2, 0.6};
+  const TipImpedance base = all_sprung(), none;
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  const Quaterniond still = Quaterniond::Identity();
+  Vector3d tip = Vector3d::Zero();
+  path.start(tip, still);
+  for (int k = 0; k < 4000; ++k) {
+    tip.x() = 0.25e-3 * k;  // to 1 m
+    path.step(Vector3d::Zero(), still, {tip, still, I, base, none, reach});
+  }
+  EXPECT_NEAR(path.position().x(), tip.x() - 0.2, 0.05);
+}
+
+TEST(SpringReach, ShortensOnlyWhereThereAreSprings) {
+  const SpringReach reach{0.1, 0.5};
+  TipImpedance base = all_sprung(), none;
+  base.stiffness(2, 2) = 0;
+  Vector6 e;
+  e << 0.06, 0.08, 7, 0.3, 0, 0.4;
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  EXPECT_EQ(reach.shortened(e, base, none, I), e);
+  Vector6 expected = e;
+  e.head<2>() *= 2;
+  e.tail<3>() *= 4;
+  EXPECT_TRUE(near(reach.shortened(e, base, none, I), expected, 1e-15));
+  // The same in the axes of a tool.
+  const Eigen::Matrix3d R = quaternion(Vector3d(0.3, -0.5, 0.8)).toRotationMatrix();
+  Vector6 e_B, expected_B;
+  e_B << R * e.head<3>(), R * e.tail<3>();
+  expected_B << R * expected.head<3>(), R * expected.tail<3>();
+  EXPECT_TRUE(near(reach.shortened(e_B, none, base, R), expected_B, 1e-15));
+}
+
 }  // namespace
 }  // namespace dashpot::controller

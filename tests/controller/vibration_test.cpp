@@ -1,7 +1,6 @@
-// Modes from within the tick: right, each with its number, and without work that is not needed.
+// Modes from within the tick: right, with proved bounds, each with its number.
 #include <dashpot/tests/support/arms.hpp>
-#include <dashpot/tests/support/hostile_ticks.hpp>
-#include <dashpot/tests/support/simulated_arm.hpp>
+#include <dashpot/tests/support/led_arm.hpp>
 #include <dashpot/tests/support/true_spectrum.hpp>
 
 #include <gtest/gtest.h>
@@ -15,9 +14,11 @@
 namespace dashpot::controller {
 namespace {
 
-using analysis::SpectrumOrigin;
+using testing::LedArm;
 using testing::LongComplex;
 using testing::LongMatrix;
+using testing::unlimited_settings;
+constexpr double kSwing = 0.2;  // rad
 
 RobotModel panda() {
   return testing::arm_model(testing::arms()[0]);
@@ -27,63 +28,10 @@ std::size_t at(int i) {
   return static_cast<std::size_t>(i);
 }
 
-/// No limit or watchdog interferes.
-Settings inline_settings(const RobotModel& model) {
-  Settings settings = default_settings(model);
-  settings.analysis.where = Analysis::Where::kInline;
-  settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
-  settings.limits.velocity.setConstant(1e3);
-  settings.limits.position_lower.setConstant(-10);
-  settings.limits.position_upper.setConstant(10);
+Settings in_mode(Settings settings, Mode mode) {
+  settings.initial.mode = mode;
   return settings;
 }
-
-/// The arm is led along a path; nothing but its state matters.
-struct LedArm {
-  LedArm(const RobotModel& robot, const Settings& settings, Mode mode)
-      : model(robot), controller(robot, settings), setpoint(settings.initial) {
-    setpoint.mode = mode;
-    center = settings.initial.joint_position;
-    if (model.dof() == 7) {
-      center << 0, -0.785, 0.1, -2.2, 0.2, 1.7, 0.785;
-    } else {
-      center = JointVector::LinSpaced(model.dof(), 0.3, 1.2);
-    }
-    place(center);
-    const DynamicsResult there = evaluate(model, center, JointVector::Zero(model.dof()));
-    setpoint.joint_position = center;
-    setpoint.tip_pose = {there.p_BT_B, there.R_BT};
-  }
-
-  void place(const JointVector& q) {
-    state.position = q;
-    state.velocity = JointVector::Zero(q.size());
-  }
-  /// Swings of 0.2 rad, one in 2 s.
-  void swing(double t) {
-    for (Eigen::Index i = 0; i < center.size(); ++i) {
-      const double phase = std::numbers::pi * t + static_cast<double>(i);
-      state.position[i] = center[i] + 0.2 * (std::sin(phase) - std::sin(static_cast<double>(i)));
-      state.velocity[i] = 0.2 * std::numbers::pi * std::cos(phase);
-    }
-  }
-  Status tick() {
-    setpoint.time = state.time += 1'000'000;
-    return controller.update(state, setpoint, torque);
-  }
-  /// Until the gains have grown.
-  void settle() {
-    const int ticks = static_cast<int>(controller.settings().motion.gain_time * 1000) + 2;
-    for (int k = 0; k < ticks; ++k) tick();
-  }
-  const Vibration& modes() const { return controller.vibration(); }
-
-  RobotModel model;
-  Controller controller;
-  RobotState state;
-  Setpoint setpoint;
-  JointVector center, torque;
-};
 
 /// Eigenvalues of M q'' + C q' + K q = 0, by a solver of their own in long double.
 std::vector<LongComplex> eigenvalues_of(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
@@ -151,9 +99,9 @@ TEST(VibrationInTheTick, IsWhatADirectSolutionGivesThere) {
     const RobotModel model = testing::arm_model(arm);
     for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
       SCOPED_TRACE(std::string(arm.file) + (mode == Mode::kJoint ? " joint" : " cartesian"));
-      Settings settings = inline_settings(model);
+      Settings settings = unlimited_settings(model);
       settings.initial.mode = mode;
-      LedArm led(model, settings, mode);
+      LedArm led(model, in_mode(settings, mode), kSwing);
       led.settle();
       for (int k = 1; k <= 1000; ++k) {
         led.swing(1e-3 * k);
@@ -188,11 +136,11 @@ TEST(VibrationInTheTick, IsWhatADirectSolutionGivesThere) {
 TEST(VibrationInTheTick, PairsRealEigenvaluesAsADirectSolutionDoes) {
   for (const testing::Arm& description : testing::arms()) {
     const RobotModel model = testing::arm_model(description);
-    Settings settings = inline_settings(model);
+    Settings settings = unlimited_settings(model);
     settings.initial.gains.joint_damping *= 4;  // most modes are overdamped
     settings.initial.gains.task_damping *= 4;
     for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
-      LedArm arm(model, settings, mode);
+      LedArm arm(model, in_mode(settings, mode), kSwing);
       arm.settle();
       for (int k = 0; k < 3; ++k) arm.tick();
       analysis::System<kMaxJoints> system;
@@ -221,8 +169,8 @@ TEST(VibrationInTheTick, PairsRealEigenvaluesAsADirectSolutionDoes) {
 
 TEST(VibrationInTheTick, ProvesItsBounds) {
   const RobotModel model = panda();
-  const Settings settings = inline_settings(model);
-  LedArm led(model, settings, Mode::kCartesian);
+  const Settings settings = unlimited_settings(model);
+  LedArm led(model, in_mode(settings, Mode::kCartesian), kSwing);
   led.settle();
   double largest = 0;
   for (int k = 1; k <= 500; ++k) {
@@ -245,7 +193,7 @@ TEST(VibrationInTheTick, KeepsTheNumbersOfModes) {
   for (const testing::Arm& arm : testing::arms()) {
     SCOPED_TRACE(arm.file);
     const RobotModel model = testing::arm_model(arm);
-    LedArm led(model, inline_settings(model), Mode::kCartesian);
+    LedArm led(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSwing);
     led.settle();
     std::map<int, VibrationMode> last;
     std::set<std::vector<int>> orders;
@@ -276,100 +224,10 @@ TEST(VibrationInTheTick, KeepsTheNumbersOfModes) {
   EXPECT_GE(crossings, 3u);
 }
 
-TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {
-  const RobotModel model = panda();
-  LedArm led(model, inline_settings(model), Mode::kCartesian);
-  led.settle();
-  const Vibration before = led.modes();
-  for (int k = 0; k < 100; ++k) led.tick();
-  const Vibration& after = led.modes();
-  EXPECT_EQ(after.counters.unchanged, before.counters.unchanged + 100);
-  EXPECT_EQ(after.counters.tracked, before.counters.tracked);
-  EXPECT_EQ(after.counters.direct, before.counters.direct);
-  EXPECT_EQ(after.origin, SpectrumOrigin::kReused);
-  EXPECT_EQ(after.tick, before.tick + 100);
-  EXPECT_EQ(after.time, led.state.time);
-  for (int i = 0; i < after.count; ++i) {
-    EXPECT_EQ(after.modes[at(i)].eigenvalues, before.modes[at(i)].eigenvalues);
-  }
-  // The smallest motion that there is: the bounds grow to include it.
-  led.state.position[3] = std::nextafter(led.state.position[3], 0.0);
-  led.tick();
-  EXPECT_EQ(led.modes().counters.unchanged, after.counters.unchanged);
-  EXPECT_EQ(led.modes().counters.reused, before.counters.reused + 1);
-  EXPECT_EQ(led.modes().origin, SpectrumOrigin::kReused);
-  EXPECT_GE(led.modes().modes[0].error_bound, before.modes[0].error_bound);
-  // And one that matters.
-  led.state.position[3] += 1e-4;
-  led.tick();
-  EXPECT_EQ(led.modes().origin, SpectrumOrigin::kTracked);
-}
-
-/// A change of gains is no standing still.
-TEST(VibrationInTheTick, SeesGainsChange) {
-  const RobotModel model = panda();
-  LedArm led(model, inline_settings(model), Mode::kJoint);
-  led.settle();
-  led.tick();
-  const Vibration before = led.modes();
-  led.setpoint.gains.joint_stiffness *= 4;
-  led.settle();
-  const Vibration& after = led.modes();
-  ASSERT_EQ(after.count, 7);
-  double ratio = 1;
-  for (std::size_t i = 0; i < 7; ++i) {
-    ratio *= after.modes[i].natural_frequency / before.modes[i].natural_frequency;
-  }
-  EXPECT_NEAR(ratio, 128, 1e-6);
-  std::set<int> labels, old;
-  for (std::size_t i = 0; i < 7; ++i) {
-    labels.insert(after.modes[i].label);
-    old.insert(before.modes[i].label);
-  }
-  EXPECT_EQ(labels, old);
-}
-
-TEST(VibrationInTheTick, IsNotThereIfOff) {
-  const RobotModel model = panda();
-  Settings settings = inline_settings(model);
-  settings.analysis.where = Analysis::Where::kOff;
-  LedArm led(model, settings, Mode::kCartesian);
-  led.settle();
-  EXPECT_EQ(led.modes().tick, 0u);
-  EXPECT_EQ(led.modes().count, 0);
-  const VibrationCounters& counters = led.modes().counters;
-  EXPECT_EQ(counters.tracked + counters.reused + counters.direct + counters.unchanged +
-                counters.no_springs + counters.failed + counters.missed,
-            0u);
-}
-
-TEST(VibrationInTheTick, LeavesOutShapesThatNobodyWants) {
-  const RobotModel model = panda();
-  Settings settings = inline_settings(model);
-  settings.analysis.shapes = false;
-  LedArm led(model, settings, Mode::kCartesian);
-  settings.analysis.shapes = true;
-  LedArm full(model, settings, Mode::kCartesian);
-  for (int k = 0; k < 600; ++k) {
-    led.swing(1e-3 * k);
-    full.swing(1e-3 * k);
-    led.tick();
-    full.tick();
-  }
-  ASSERT_EQ(led.modes().count, 7);
-  EXPECT_GE(led.modes().counters.no_shapes, led.modes().counters.tracked);
-  EXPECT_EQ(full.modes().counters.no_shapes, 0u);
-  for (std::size_t i = 0; i < 7; ++i) {
-    EXPECT_EQ(led.modes().modes[i].shape.size(), 0);
-    EXPECT_EQ(full.modes().modes[i].shape.size(), 7);
-    EXPECT_EQ(led.modes().modes[i].eigenvalues, full.modes().modes[i].eigenvalues);
-  }
-}
-
 /// Published shapes solve the equation of motion and have unit kinetic energy.
 TEST(VibrationInTheTick, ShapesBelongToTheClosedLoop) {
   const RobotModel model = panda();
-  LedArm led(model, inline_settings(model), Mode::kCartesian);
+  LedArm led(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSwing);
   led.settle();
   for (int k = 1; k <= 100; ++k) {
     led.swing(1e-3 * k);
@@ -389,135 +247,14 @@ TEST(VibrationInTheTick, ShapesBelongToTheClosedLoop) {
   }
 }
 
-TEST(VibrationInTheTick, HasNothingToSolveWithoutSprings) {
-  const RobotModel model = panda();
-  Settings settings = inline_settings(model);
-  settings.watchdog.setpoint_damp = 0.01;
-  LedArm led(model, settings, Mode::kJoint);
-  led.settle();
-  const std::uint64_t solved = led.modes().counters.tracked + led.modes().counters.direct;
-  for (int k = 1; k <= 50; ++k) {
-    led.swing(1e-3 * k);
-    led.state.time += 1'000'000;
-    led.controller.update(led.state, led.setpoint, led.torque);
-  }
-  EXPECT_EQ(led.controller.snapshot().status, Status::kSetpointLost);
-  EXPECT_EQ(led.modes().tick, led.controller.snapshot().tick);
-  EXPECT_EQ(led.modes().status, analysis::Status::kOk);
-  EXPECT_EQ(led.modes().count, 0);
-  EXPECT_EQ(led.modes().zero_modes, 7);
-  EXPECT_GE(led.modes().counters.no_springs, 35u);
-  EXPECT_LE(led.modes().counters.tracked + led.modes().counters.direct, solved + 15);
-}
-
-TEST(VibrationInTheTick, TellsZeroModesFromVibrations) {
-  const RobotModel model = panda();
-  Settings settings = inline_settings(model);
-  settings.initial.gains.null_stiffness.setZero();
-  LedArm free(model, settings, Mode::kCartesian);
-  free.settle();
-  for (int k = 1; k <= 100; ++k) {
-    free.swing(1e-3 * k);
-    free.tick();
-  }
-  EXPECT_EQ(free.modes().count, 6);
-  EXPECT_EQ(free.modes().zero_modes, 1);
-  EXPECT_EQ(free.modes().counters.no_zero_modes, 0u);
-  EXPECT_GE(free.modes().counters.tracked, 100u);
-  LedArm held(model, inline_settings(model), Mode::kCartesian);
-  held.settle();
-  EXPECT_EQ(held.modes().zero_modes, 0);
-  EXPECT_EQ(
-      held.modes().counters.no_zero_modes,
-      held.modes().counters.tracked + held.modes().counters.direct + held.modes().counters.reused);
-}
-
-TEST(VibrationInTheTick, LeavesOutTermsThatAreZero) {
-  const RobotModel model = panda();
-  Settings settings = inline_settings(model);
-  settings.task_terms = {true, true};
-  LedArm led(model, settings, Mode::kCartesian);
-  led.settle();
-  const auto swing = [&](int from) {
-    for (int k = from + 1; k <= from + 100; ++k) {
-      led.swing(1e-3 * k);
-      led.state.velocity.setZero();
-      led.tick();
-    }
-    return led.modes().counters;
-  };
-  const VibrationCounters before = led.modes().counters;
-  const VibrationCounters still = swing(0);
-  EXPECT_EQ(still.no_wrench, before.no_wrench + 100);
-  EXPECT_EQ(still.at_rest, before.at_rest + 100);
-  EXPECT_EQ(still.tracked, before.tracked + 100);
-  led.state.external_wrench << 20, 0, -10, 0, 1, 0;
-  const VibrationCounters loaded = swing(100);
-  EXPECT_EQ(loaded.no_wrench, still.no_wrench);
-  EXPECT_EQ(loaded.at_rest, still.at_rest + 100);
-  EXPECT_EQ(loaded.direct, still.direct + 100);  // a nonsymmetric stiffness
-}
-
-/// Whatever the analysis makes of hostile input, the torque is what it is without.
-TEST(VibrationInTheTick, NeverTouchesTheTorque) {
-  const RobotModel model = panda();
-  Settings settings = testing::HostileTicks::everything_on(model);
-  settings.analysis.every = 1;
-  settings.task_terms = {true, false};
-  Controller with(model, settings);
-  settings.analysis.where = Analysis::Where::kOff;
-  Controller without(model, settings);
-  testing::HostileTicks input(model, settings, 611, 0.02);
-  JointVector torque, plain;
-  for (int k = 0; k < 20'000; ++k) {
-    input.next();
-    ASSERT_EQ(with.update(input.state, input.setpoint, torque),
-              without.update(input.state, input.setpoint, plain));
-    ASSERT_EQ(torque, plain);
-    const Vibration& modes = with.vibration();
-    ASSERT_TRUE(modes.count > 0 || modes.zero_modes == 7 || modes.status != analysis::Status::kOk ||
-                modes.tick == 0);
-  }
-  const VibrationCounters& counters = with.vibration().counters;
-  EXPECT_GT(counters.tracked, 0u);
-  EXPECT_GT(counters.direct, 0u);
-}
-
-TEST(VibrationInTheTick, ForgetsAtAReset) {
-  const RobotModel model = panda();
-  LedArm first(model, inline_settings(model), Mode::kCartesian);
-  LedArm again(model, inline_settings(model), Mode::kCartesian);
-  const auto run = [](LedArm& led) {
-    for (int k = 0; k < 600; ++k) {
-      led.swing(1e-3 * k);
-      led.tick();
-    }
-  };
-  again.setpoint.mode = Mode::kJoint;  // its modes are not those of the Cartesian mode
-  run(again);
-  again.setpoint.mode = Mode::kCartesian;
-  again.controller.reset();
-  EXPECT_EQ(again.modes().tick, 0u);
-  EXPECT_EQ(again.modes().count, 0);
-  EXPECT_EQ(again.modes().counters.tracked, 0u);
-  run(again);
-  run(first);
-  ASSERT_EQ(again.modes().count, 7);
-  EXPECT_EQ(again.modes().counters.tracked, first.modes().counters.tracked);
-  for (std::size_t i = 0; i < 7; ++i) {
-    EXPECT_EQ(again.modes().modes[i].label, first.modes().modes[i].label);
-    EXPECT_EQ(again.modes().modes[i].eigenvalues, first.modes().modes[i].eigenvalues);
-  }
-}
-
 /// Through the stretched posture and back, where the arm loses a direction.
 TEST(VibrationInTheTick, GoesThroughASingularity) {
   const RobotModel model = panda();
-  Settings settings = inline_settings(model);
+  Settings settings = unlimited_settings(model);
   for (const double null_stiffness : {0.0, 20.0}) {
     SCOPED_TRACE(null_stiffness);
     settings.initial.gains.null_stiffness.setConstant(null_stiffness);
-    LedArm led(model, settings, Mode::kCartesian);
+    LedArm led(model, in_mode(settings, Mode::kCartesian), kSwing);
     led.settle();
     const JointVector start = led.center;
     JointVector stretched = start;

@@ -110,8 +110,8 @@ def load(path):
     library.dashpot_plugin_interface.restype = c.POINTER(Plugin)
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
-    plugin = library.dashpot_plugin_interface(3).contents
-    assert plugin.version == 3 and plugin.struct_size == c.sizeof(Plugin)
+    plugin = library.dashpot_plugin_interface(4).contents
+    assert plugin.version == 4 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
 

@@ -176,6 +176,43 @@ TEST(Monitor, CountsMalformedAndLostMessages) {
                                      "3 modes messages lost, 2 messages malformed\n"));
 }
 
+std::string summary_of_ticks(const std::vector<int>& ticks) {
+  const Scratch scratch;
+  const std::string path = scratch.path("ticks.lcm");
+  {
+    std::vector<std::unique_ptr<lcmtypes::Sink>> sinks;
+    sinks.push_back(lcmtypes::make_log_sink(path));
+    lcmtypes::Publisher publisher(std::move(sinks));
+    for (const int tick : ticks) {
+      publisher.offer(state_at(tick));
+      publisher.publish_pending();
+    }
+  }
+  return run_program({"monitor", "--log", path}).out;
+}
+
+TEST(Monitor, WarnsOfASecondLoopOnTheBus) {
+  std::vector<int> apart, together, slow;
+  for (int i = 1; i <= 50; ++i) {
+    apart.insert(apart.end(), {5000 + i, 20 + i});
+    together.insert(together.end(), {i, i});
+    slow.push_back(5000 + i);
+    if (i % 10 == 0) slow.push_back(i / 10);
+  }
+  for (const auto& ticks : {apart, together, slow}) {
+    const std::string shown = summary_of_ticks(ticks);
+    EXPECT_THAT(shown, HasSubstr("\n  Warning: more than one loop sends to this bus: "));
+  }
+}
+
+TEST(Monitor, TakesALoopThatIsStartedAnewForOne) {
+  std::vector<int> ticks;
+  for (int run = 0; run < 8; ++run) {
+    for (int i = 1; i <= 100; i += i % 9 == 0 ? 3 : 1) ticks.push_back(i);  // some get lost
+  }
+  EXPECT_THAT(summary_of_ticks(ticks), Not(HasSubstr("more than one loop")));
+}
+
 TEST(Monitor, SaysThatALogIsEmpty) {
   const Scratch scratch;
   const Outcome outcome = run_program({"monitor", "--log", scratch.write("empty.lcm", "")});

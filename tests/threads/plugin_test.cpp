@@ -1,18 +1,14 @@
 // The C interface, driven as a host does that loads the library at run time.
 #include <dashpot/controller/controller.hpp>
-#include <dashpot/controller/dynamics.hpp>
-#include <dashpot/tests/plugin/loaded_plugin.hpp>
-#include <dashpot/tests/support/count_allocations.hpp>
+#include <dashpot/tests/plugin/held_panda.hpp>
 #include <dashpot/tests/support/random.hpp>
 
 #include <gmock/gmock.h>
 
-#include <Eigen/Cholesky>
 #include <array>
-#include <atomic>
 #include <cstdio>
-#include <cstring>
 #include <limits>
+#include <memory>
 #include <set>
 #include <sstream>
 #include <thread>
@@ -27,32 +23,6 @@ using Eigen::Map;
 using Eigen::VectorXd;
 
 const std::string kCartesian = "control: {mode: cartesian}\n";
-
-JointVector joint_vector(const std::vector<double>& values) {
-  return Map<const VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
-/// Moves the arm of `model` for one period under the host's torque.
-void simulate(const controller::RobotModel& model, Host& host, double period = 0.001) {
-  const JointVector q = joint_vector(host.position);
-  const JointVector qd = joint_vector(host.velocity);
-  const auto robot = controller::evaluate(model, q, qd);
-  const VectorXd force = joint_vector(host.torque) - robot.coriolis - robot.gravity;
-  const Eigen::MatrixXd M = robot.M;
-  const VectorXd velocity = qd + period * M.llt().solve(force);
-  Map<VectorXd>(host.velocity.data(), velocity.size()) = velocity;
-  Map<VectorXd>(host.position.data(), velocity.size()) = q + period * velocity;
-}
-
-/// A Panda whose joints bear their gravity already.
-Host held_panda(const std::string& settings = "") {
-  Host host(create(panda() + settings), panda_posture());
-  const auto model = load(panda() + settings).model;
-  const JointVector q = joint_vector(panda_posture());
-  const VectorXd gravity = controller::evaluate(model, q, JointVector::Zero(7)).gravity;
-  EXPECT_EQ(plugin().reset(host.controller.get(), gravity.data()), DASHPOT_OK);
-  return host;
-}
 
 TEST(Plugin, ShowsItsFunctionsAndNothingElse) {
   const std::string command = std::string("nm -D --defined-only '") + DASHPOT_PLUGIN + "'";
@@ -116,7 +86,7 @@ TEST(Plugin, HasATextForEverythingItReturns) {
   for (std::int32_t code = DASHPOT_NOTHING_YET; code <= DASHPOT_NOT_FINITE; ++code) {
     texts.insert(plugin().status_text(code));
   }
-  EXPECT_EQ(texts.size(), 19u);
+  EXPECT_EQ(texts.size(), 20u);
   EXPECT_FALSE(texts.count("unknown status"));
   for (const std::int32_t code : {DASHPOT_NOTHING_YET - 1, DASHPOT_NOT_FINITE + 1, 1000, -1000}) {
     EXPECT_STREQ(plugin().status_text(code), "unknown status");
@@ -287,6 +257,23 @@ TEST(Plugin, IsResetToHoldWhereTheRobotIs) {
   EXPECT_TRUE((joint_vector(host.torque).cwiseAbs().array() <= limit.array() * (1 + 1e-12)).all());
 }
 
+/// Of the ticks before a reset nothing is left to read.
+TEST(Plugin, HasNoModesAfterAReset) {
+  for (const char* where : {"inline", "background"}) {
+    Host host = held_panda("analysis: {where: " + std::string(where) + "}\n");
+    dashpot_controller* const arm = host.controller.get();
+    dashpot_modes modes{};
+    modes.struct_size = sizeof modes;
+    while (plugin().read_modes(arm, &modes) != DASHPOT_OK) host.tick();
+    ASSERT_EQ(plugin().reset(arm, host.torque.data()), DASHPOT_OK);
+    EXPECT_EQ(plugin().read_modes(arm, &modes), DASHPOT_NOTHING_YET);
+    host.position[1] += 0.1;
+    while (plugin().read_modes(arm, &modes) != DASHPOT_OK) host.tick();
+    EXPECT_EQ(modes.position[1], host.position[1]);
+    EXPECT_EQ(modes.count, 7u);
+  }
+}
+
 /// Undamped frequencies grow as the square root of the stiffness: all together by 2^n if it is
 /// four times as high, whatever the damping.
 TEST(Plugin, ChangesGainsAtRunTime) {
@@ -359,296 +346,6 @@ TEST(Plugin, HoldsADampingRatio) {
   EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);  // one or the other
   gains.joint_damping = nullptr;
   EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
-}
-
-// Misuse ----------------------------------------------------------------------------------------
-
-TEST(PluginRefuses, NullPointers) {
-  const Handle arm = create(panda());
-  Host host(create(panda()), panda_posture());
-  dashpot_output output = host.output();
-  const dashpot_state state = host.state();
-  EXPECT_EQ(plugin().update(nullptr, &state, nullptr, &output), DASHPOT_NULL_ARGUMENT);
-  EXPECT_EQ(plugin().update(arm.get(), &state, nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
-  output.torque = nullptr;
-  EXPECT_EQ(plugin().update(arm.get(), &state, nullptr, &output), DASHPOT_NULL_ARGUMENT);
-  EXPECT_EQ(plugin().reset(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
-  EXPECT_EQ(plugin().set_setpoint(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
-  EXPECT_EQ(plugin().set_setpoint(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
-  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
-  setpoint.joint_position = nullptr;
-  EXPECT_EQ(plugin().set_setpoint(arm.get(), &setpoint), DASHPOT_NULL_ARGUMENT);
-  setpoint.mode = DASHPOT_MODE_CARTESIAN;
-  EXPECT_EQ(plugin().set_setpoint(arm.get(), &setpoint), DASHPOT_NULL_ARGUMENT);
-  EXPECT_EQ(plugin().set_gains(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
-  EXPECT_EQ(plugin().read_snapshot(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
-  EXPECT_EQ(plugin().read_modes(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
-  EXPECT_EQ(plugin().read_sampled_modes(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
-  EXPECT_STREQ(plugin().last_error(), "a pointer that has to be there is NULL");
-  EXPECT_EQ(plugin().joints(nullptr), 0u);
-  EXPECT_EQ(plugin().joint_name(nullptr, 0), nullptr);
-  EXPECT_EQ(plugin().period(nullptr), 0);
-  plugin().destroy(nullptr);
-}
-
-TEST(PluginRefuses, StructsOfAnotherSize) {
-  Host host(create(panda()), panda_posture());
-  dashpot_controller* const arm = host.controller.get();
-  for (const std::uint32_t wrong : {0u, 4u, 1u << 20}) {
-    dashpot_output output = host.output();
-    output.struct_size = wrong;
-    const dashpot_state state = host.state();
-    host.torque.assign(7, 123.0);
-    EXPECT_EQ(plugin().update(arm, &state, nullptr, &output), DASHPOT_WRONG_STRUCT_SIZE);
-    EXPECT_THAT(host.torque, ::testing::Each(123.0));
-    dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
-    setpoint.struct_size = wrong;
-    EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_STRUCT_SIZE);
-    dashpot_gains gains{};
-    gains.struct_size = wrong;
-    EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_STRUCT_SIZE);
-    dashpot_snapshot snapshot{};
-    snapshot.struct_size = wrong;
-    EXPECT_EQ(plugin().read_snapshot(arm, &snapshot), DASHPOT_WRONG_STRUCT_SIZE);
-    const auto modes = std::make_unique<dashpot_modes>();
-    modes->struct_size = wrong;
-    EXPECT_EQ(plugin().read_modes(arm, modes.get()), DASHPOT_WRONG_STRUCT_SIZE);
-    EXPECT_STREQ(plugin().last_error(), "struct_size is not that of this version of plugin.h");
-  }
-}
-
-TEST(PluginRefuses, AnotherNumberOfJoints) {
-  Host host(create(panda()), panda_posture());
-  dashpot_output output = host.output();
-  output.joints = 6;
-  const dashpot_state state = host.state();
-  EXPECT_EQ(plugin().update(host.controller.get(), &state, nullptr, &output), DASHPOT_WRONG_JOINTS);
-  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
-  setpoint.joints = 8;
-  EXPECT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_WRONG_JOINTS);
-  dashpot_gains gains{};
-  gains.struct_size = sizeof gains;
-  EXPECT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_WRONG_JOINTS);
-}
-
-TEST(PluginRefuses, ImpossibleValues) {
-  const Host host(create(panda()), panda_posture());
-  dashpot_controller* const arm = host.controller.get();
-  const auto expect_refused = [&](const std::vector<double>& goal, const std::string& why) {
-    const dashpot_setpoint setpoint = host.joint_setpoint(goal);
-    EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_VALUE);
-    EXPECT_EQ(plugin().last_error(), why);
-  };
-  std::vector<double> goal = panda_posture();
-  goal[2] = std::numeric_limits<double>::quiet_NaN();
-  expect_refused(goal, "joint_position has an entry that is not finite");
-  goal[2] = 3;
-  expect_refused(goal, "joint_position is above a position limit");
-
-  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
-  setpoint.mode = 2;
-  EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_VALUE);
-  const std::array<double, 9> reflection = {1, 0, 0, 0, 1, 0, 0, 0, -1};
-  setpoint = {sizeof setpoint,   7,      0, DASHPOT_MODE_CARTESIAN, nullptr, reflection.data(),
-              reflection.data(), nullptr};
-  EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_VALUE);
-  EXPECT_STREQ(plugin().last_error(), "tip_pose.rotation is not a rotation matrix");
-
-  dashpot_gains gains{};
-  gains.struct_size = sizeof gains;
-  gains.joints = 7;
-  const std::int32_t frame = 5;
-  gains.frame = &frame;
-  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);
-  gains.frame = nullptr;
-  Eigen::Matrix<double, 6, 6> K_C = Eigen::Matrix<double, 6, 6>::Identity();
-  K_C(0, 0) = -1;
-  gains.task_stiffness = K_C.data();
-  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);
-  EXPECT_STREQ(plugin().last_error(), "task_stiffness is not positive semidefinite");
-}
-
-TEST(PluginRefuses, ToReadBeforeTheFirstTick) {
-  const Handle arm = create(panda());
-  dashpot_snapshot snapshot{};
-  snapshot.struct_size = sizeof snapshot;
-  EXPECT_EQ(plugin().read_snapshot(arm.get(), &snapshot), DASHPOT_NOTHING_YET);
-  dashpot_modes modes{};
-  modes.struct_size = sizeof modes;
-  EXPECT_EQ(plugin().read_modes(arm.get(), &modes), DASHPOT_NOTHING_YET);
-  dashpot_sampled_modes sampled{};
-  EXPECT_EQ(plugin().read_sampled_modes(arm.get(), &sampled), DASHPOT_WRONG_STRUCT_SIZE);
-  sampled.struct_size = sizeof sampled;
-  EXPECT_EQ(plugin().read_sampled_modes(arm.get(), &sampled), DASHPOT_NOTHING_YET);
-  EXPECT_STREQ(plugin().last_error(), "nothing to read so far");
-}
-
-/// A wrong state is no refusal: torque ramps down to zero, and the controller recovers.
-TEST(Plugin, IsSafeWithoutAState) {
-  Host host = held_panda();
-  for (int tick = 0; tick < 200; ++tick) ASSERT_EQ(host.tick(), DASHPOT_OK);
-  ASSERT_GT(joint_vector(host.torque).norm(), 1);
-  dashpot_state wrong_size = host.state();
-  wrong_size.struct_size = 8;
-  dashpot_state wrong_joints = host.state();
-  wrong_joints.joints = 6;
-  dashpot_state no_position = host.state();
-  no_position.position = nullptr;
-  const std::array<const dashpot_state*, 4> states = {nullptr, &wrong_size, &wrong_joints,
-                                                      &no_position};
-  dashpot_output output = host.output();
-  for (std::size_t tick = 0; tick < 120; ++tick) {
-    ASSERT_EQ(plugin().update(host.controller.get(), states[tick % 4], nullptr, &output),
-              DASHPOT_STATE_WRONG_SIZE);
-    host.time += 1'000'000;
-  }
-  EXPECT_EQ(joint_vector(host.torque), VectorXd::Zero(7));
-  EXPECT_EQ(host.snapshot().status, DASHPOT_STATE_WRONG_SIZE);
-  EXPECT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
-  host.position[0] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(host.tick(), DASHPOT_STATE_NOT_FINITE);
-}
-
-TEST(Plugin, SurvivesAnyTime) {
-  Host host = held_panda();
-  for (const std::int64_t time : {std::int64_t{0}, std::numeric_limits<std::int64_t>::max(),
-                                  std::numeric_limits<std::int64_t>::min(), std::int64_t{5}}) {
-    const dashpot_setpoint setpoint = host.joint_setpoint(panda_posture(), time);
-    dashpot_state state = host.state();
-    state.time = time;
-    dashpot_output output = host.output();
-    for (int i = 0; i < 3; ++i) {
-      EXPECT_GE(plugin().update(host.controller.get(), &state, &setpoint, &output), DASHPOT_OK);
-      EXPECT_GE(plugin().update(host.controller.get(), nullptr, nullptr, &output), DASHPOT_OK);
-      EXPECT_TRUE(joint_vector(host.torque).allFinite());
-    }
-  }
-}
-
-TEST(Plugin, RejectsAWrongSetpointOfATick) {
-  Host host = held_panda();
-  ASSERT_EQ(host.tick(), DASHPOT_OK);
-  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
-  setpoint.struct_size = 0;
-  EXPECT_EQ(host.tick(&setpoint), DASHPOT_SETPOINT_REJECTED);
-  EXPECT_EQ(host.snapshot().status, DASHPOT_SETPOINT_REJECTED);
-  EXPECT_EQ(host.tick(), DASHPOT_OK);
-  std::vector<double> far = panda_posture();
-  far[0] = 4;
-  const dashpot_setpoint beyond = host.joint_setpoint(far);
-  EXPECT_EQ(host.tick(&beyond), DASHPOT_SETPOINT_REJECTED);
-  const dashpot_setpoint good = host.joint_setpoint(panda_posture());
-  EXPECT_EQ(host.tick(&good), DASHPOT_OK);
-}
-
-// Real time, threads, several at once -------------------------------------------------------------
-
-TEST(Plugin, AllocatesNothingInATick) {
-  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
-  EXPECT_GE(testing::allocations_of([] { create(panda()); }), 1);
-  for (const std::string& mode : {std::string(), kCartesian}) {
-    Host host(create(panda() + mode + "analysis: {every: 2}\n"), panda_posture());
-    std::vector<double> goal = panda_posture();
-    const dashpot_setpoint setpoint = host.joint_setpoint(goal);
-    dashpot_gains gains{};
-    gains.struct_size = sizeof gains;
-    gains.joints = 7;
-    Eigen::Matrix<double, 6, 6> K_C = Eigen::Matrix<double, 6, 6>::Identity();
-    gains.task_stiffness = K_C.data();
-    for (int tick = 0; tick < 500; ++tick) {
-      goal[0] = 1e-4 * tick;
-      K_C(0, 0) = tick;
-      if (tick % 7 == 1) plugin().set_gains(host.controller.get(), &gains);
-      if (tick % 11 == 2) plugin().set_setpoint(host.controller.get(), &setpoint);
-      ASSERT_EQ(testing::allocations_of([&] { host.tick(tick % 5 == 3 ? &setpoint : nullptr); }), 0)
-          << "tick " << tick;
-    }
-  }
-}
-
-/// The other thread sets and reads while the real-time thread runs; what it reads was written by
-/// one tick.
-TEST(Plugin, ServesTwoThreads) {
-  constexpr int kTicks = 3000;
-  // However rarely the other thread has its turn, no set-point is too old.
-  Host host(create(panda() + "analysis: {every: 4}\n"
-                             "watchdog: {setpoint_hold: 0, setpoint_damp: 0}\n"),
-            panda_posture());
-  std::vector<std::vector<double>> torques(kTicks + 1);
-  std::atomic<bool> running{true};
-  std::vector<dashpot_snapshot> snapshots;
-  std::atomic<int> modes_read{0};
-
-  std::thread other([&] {
-    dashpot_controller* const arm = host.controller.get();
-    std::vector<double> goal = panda_posture();
-    Eigen::Matrix<double, 7, 7> K = Eigen::Matrix<double, 7, 7>::Identity();
-    dashpot_gains gains{};
-    gains.struct_size = sizeof gains;
-    gains.joints = 7;
-    gains.joint_stiffness = K.data();
-    const auto modes = std::make_unique<dashpot_modes>();
-    std::uint64_t last = 0;
-    for (int round = 0; running.load(); ++round) {
-      goal[0] = 0.01 * (round % 10);
-      K.diagonal().setConstant(100 + round % 50);
-      const dashpot_setpoint setpoint = {sizeof(dashpot_setpoint),
-                                         7,
-                                         DASHPOT_ON_ARRIVAL,
-                                         DASHPOT_MODE_JOINT,
-                                         goal.data(),
-                                         nullptr,
-                                         nullptr,
-                                         nullptr};
-      EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_OK);
-      EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
-      dashpot_snapshot snapshot{};
-      snapshot.struct_size = sizeof snapshot;
-      if (plugin().read_snapshot(arm, &snapshot) == DASHPOT_OK) {
-        EXPECT_GE(snapshot.tick, last);
-        if (snapshot.tick != last) snapshots.push_back(snapshot);
-        last = snapshot.tick;
-      }
-      modes->struct_size = sizeof *modes;
-      if (plugin().read_modes(arm, modes.get()) == DASHPOT_OK) ++modes_read;
-    }
-  });
-  for (std::size_t tick = 1; tick <= kTicks; ++tick) {
-    EXPECT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
-    torques[tick] = host.torque;
-    if (tick % 50 == 0) std::this_thread::yield();
-  }
-  while (modes_read.load() == 0) std::this_thread::yield();
-  running = false;
-  other.join();
-
-  EXPECT_FALSE(snapshots.empty());
-  for (const dashpot_snapshot& snapshot : snapshots) {
-    ASSERT_LE(snapshot.tick, static_cast<std::uint64_t>(kTicks));
-    EXPECT_EQ(std::vector<double>(snapshot.torque, snapshot.torque + 7), torques[snapshot.tick]);
-  }
-}
-
-TEST(Plugin, RunsTwoArmsSideBySide) {
-  const std::string ur5 =
-      "robot: {urdf: " + urdf_path("ur5.urdf") + ", base: base_link, tip: ee_link}\n";
-  const std::vector<double> posture = {0, -1, 1, 0, 1, 0};
-  Host alone(create(panda()), panda_posture());
-  Host first(create(panda()), panda_posture());
-  Host second(create(ur5), posture);
-  Host second_alone(create(ur5), posture);
-  for (int tick = 0; tick < 50; ++tick) {
-    alone.velocity[1] = first.velocity[1] = 0.01 * tick;
-    ASSERT_LE(alone.tick(), DASHPOT_TORQUE_LIMITED);
-  }
-  for (int tick = 0; tick < 50; ++tick) ASSERT_LE(second_alone.tick(), DASHPOT_TORQUE_LIMITED);
-  for (int tick = 0; tick < 50; ++tick) {
-    first.velocity[1] = 0.01 * tick;
-    ASSERT_LE(first.tick(), DASHPOT_TORQUE_LIMITED);
-    ASSERT_LE(second.tick(), DASHPOT_TORQUE_LIMITED);
-  }
-  EXPECT_EQ(first.torque, alone.torque);
-  EXPECT_EQ(second.torque, second_alone.torque);
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 
 #include <chrono>
 #include <csignal>
+#include <fstream>
+#include <iterator>
 #include <lcm/lcm-cpp.hpp>
 #include <nlohmann/json.hpp>
 #include <thread>
@@ -238,6 +240,59 @@ TEST(RunInRealTime, DoesNotNoticeWhoListens) {
   EXPECT_EQ(result["ticks"], 3000);
   EXPECT_EQ(result["status"], Json({{"ok", 3000}}));
   EXPECT_EQ(result["messages"]["errors"], 0);
+}
+
+/// Waits for the first row of a table that a run writes; false if there is none within ten seconds.
+bool has_a_row(const std::string& csv) {
+  const auto end = Clock::now() + std::chrono::seconds(10);
+  while (Clock::now() < end) {
+    std::ifstream table(csv);
+    std::string heading, row;
+    if (std::getline(table, heading) && std::getline(table, row)) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+// Whoever takes the processor away for longer than a period makes no tick slower.
+TEST(RunInFastMotion, CountsItsOwnComputingAlone) {
+  const Scratch scratch;
+  const std::string csv = scratch.path("states.csv");
+  Running run(
+      {"run", scene("panda_release_c2"), "--fast", "--duration", "1000", "--csv", csv, "--json"});
+  ASSERT_TRUE(has_a_row(csv));
+  for (int i = 0; i < 60; ++i) {
+    run.send(SIGSTOP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(4));
+    run.send(SIGCONT);
+    std::this_thread::sleep_for(std::chrono::milliseconds(4));
+  }
+  run.send(SIGINT);
+  EXPECT_EQ(run.finish(), 0) << run.complaints();
+  const Json result = Json::parse(run.output());
+  EXPECT_EQ(result["overruns"], 0);
+  EXPECT_GT(result["tick_time"]["longest"].get<double>(), 0.003);  // it was away within a tick
+}
+
+// The releases take long with a period this short; the run itself is over when its table is there.
+TEST(RunInFastMotion, EndsItsRingDownOnCtrlC) {
+  const Scratch scratch;
+  std::ifstream original(scene("panda_release_c1"));
+  std::string text(std::istreambuf_iterator<char>(original), {});
+  text.replace(text.find("../models"), 9, std::string(DASHPOT_SOURCE_DIR) + "/sim/models");
+  const std::string control = "control:\n";
+  ASSERT_NE(text.find(control), std::string::npos);
+  text.insert(text.find(control) + control.size(), "  period: 10 us\n");
+  const std::string file = scratch.write("slow.yaml", text), csv = scratch.path("states.csv");
+  Running run(
+      {"run", file, "--fast", "--ring-down", "--duration", "0.00001", "--csv", csv, "--json"});
+  ASSERT_TRUE(has_a_row(csv));
+  run.send(SIGINT);
+  EXPECT_EQ(run.finish(), 0) << run.complaints();
+  const Json result = Json::parse(run.output());
+  EXPECT_EQ(result["ticks"], 1);
+  EXPECT_EQ(result["interrupted"], true);
+  EXPECT_FALSE(result.contains("ring_down"));
 }
 
 TEST(RunInRealTime, ShowsHowFarItIs) {

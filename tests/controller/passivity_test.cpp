@@ -1,0 +1,123 @@
+// What the law does to energy: kinetic, and that of its springs. The arm moves by the equations of
+// motion, without drives and sampling.
+#include <dashpot/controller/impedance_law.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/simulated_arm.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+namespace dashpot::controller {
+namespace {
+
+using testing::Random;
+
+struct Motion {
+  Joints<7> q, qd;
+};
+
+/// A Panda under the law, with springs at rest that stand still.
+class Swing {
+ public:
+  Swing(Mode mode, bool coriolis, const Motion& start)
+      : law_(model_, FeedForward{true, coriolis, false, true, false}), at(start) {
+    Setpoint setpoint;
+    setpoint.mode = mode;
+    setpoint.gains = default_settings(model_).initial.gains;
+    setpoint.gains.joint_damping.setZero();
+    setpoint.gains.task_damping.setZero();
+    setpoint.gains.task_stiffness.diagonal() << 300, 500, 200, 20, 20, 20;
+    setpoint.gains.null_stiffness.setZero();
+    setpoint.gains.null_damping.setZero();
+    impedance_ = Impedance<7>::of(setpoint);
+    const Joints<7> home = fixed<7>(testing::panda_ready());
+    DynamicsKernel<7>(model_).evaluate(home, Joints<7>::Zero(), robot_);
+    paths_.joint.start(home);
+    paths_.tip.start(robot_.p_BT_B, Eigen::Quaterniond(robot_.R_BT));
+  }
+
+  /// Kinetic, and of the springs, J.
+  double energy() {
+    torque(at);
+    const Joints<7> e = paths_.joint.position() - at.q;
+    const double springs = 0.5 * e.dot(impedance_.joint_stiffness * e) +
+                           0.5 * law_.tip_error().dot(impedance_.base.stiffness * law_.tip_error());
+    return springs + 0.5 * at.qd.dot(robot_.M * at.qd);
+  }
+
+  /// One step of Runge and Kutta's method.
+  void step(double h) {
+    const Motion k1 = rate(at), k2 = rate(moved(k1, h / 2)), k3 = rate(moved(k2, h / 2)),
+                 k4 = rate(moved(k3, h));
+    at.q += h / 6 * (k1.q + 2 * k2.q + 2 * k3.q + k4.q);
+    at.qd += h / 6 * (k1.qd + 2 * k2.qd + 2 * k3.qd + k4.qd);
+  }
+
+ private:
+  Motion moved(const Motion& rate, double h) const {
+    return {at.q + h * rate.q, at.qd + h * rate.qd};
+  }
+  Joints<7> torque(const Motion& there) {
+    kernel_.evaluate(there.q, there.qd, robot_);
+    return law_.torque(robot_, there.q, there.qd, impedance_, paths_, Vector6::Zero());
+  }
+  Motion rate(const Motion& there) {
+    const Joints<7> tau = torque(there);
+    return {there.qd, robot_.M.llt().solve(tau - robot_.coriolis - robot_.gravity)};
+  }
+
+  RobotModel model_ = testing::arm_model(testing::arms()[0]);
+  DynamicsKernel<7> kernel_{model_};
+  ImpedanceLaw<7> law_;
+  Impedance<7> impedance_;
+  SpringPaths<7> paths_{JointPath<7>({Joints<7>::Ones(), Joints<7>::Ones()}, 1e-3, 1),
+                        JointPath<7>({Joints<7>::Ones(), Joints<7>::Ones()}, 1e-3, 1),
+                        TipPath(TwistNorm{}, 1e-3, 1)};
+  Dynamics<7> robot_;
+
+ public:
+  Motion at;
+};
+
+/// Largest and smallest energy of half a second at speed, relative to that at the start.
+std::pair<double, double> range_of_energy(Mode mode, bool coriolis, Random& random) {
+  const Joints<7> q = fixed<7>(testing::panda_ready()) + Joints<7>(0.2 * random.vector(7));
+  Swing swing(mode, coriolis, {q, 3 * random.vector(7)});
+  const double start = swing.energy();
+  std::pair<double, double> range(1, 1);
+  for (int k = 0; k < 500; ++k) {
+    swing.step(1e-3);
+    const double now = swing.energy() / start;
+    range = {std::min(range.first, now), std::max(range.second, now)};
+  }
+  return range;
+}
+
+TEST(Passivity, SpringsKeepAllEnergyWithoutTheCoriolisFeedForward) {
+  Random random(341);
+  for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+    for (int trial = 0; trial < 5; ++trial) {
+      const auto [least, most] = range_of_energy(mode, false, random);
+      EXPECT_NEAR(least, 1, 1e-5);
+      EXPECT_NEAR(most, 1, 1e-5);
+    }
+  }
+}
+
+// With it the loop is that of the modes, whatever the speed; but 1/2 qd' dM/dt qd comes and goes.
+TEST(Passivity, TheCoriolisFeedForwardMayGiveEnergyAtSpeed) {
+  Random random(342);
+  for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+    double largest = 1;
+    for (int trial = 0; trial < 5; ++trial) {
+      largest = std::max(largest, range_of_energy(mode, true, random).second);
+    }
+    EXPECT_GT(largest, 1.05);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::controller

@@ -1,0 +1,178 @@
+// States that cannot be trusted: the torque is ramped down, and the controller recovers.
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/safety.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+namespace dashpot::controller {
+namespace {
+
+using testing::near;
+using testing::Safety;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// A fault for some ticks: the torque ramps to zero, and a good state brings the controller back.
+class Ramp : public Safety, public ::testing::WithParamInterface<int> {
+ protected:
+  void spoil(RobotState& state) const {
+    switch (GetParam()) {
+      case 0:
+        state.position[1] = std::nan("");
+        break;
+      case 1:
+        state.velocity[6] = kInfinity;
+        break;
+      case 2:
+        state.position.conservativeResize(6);
+        break;
+      case 3:
+        state.velocity.resize(0);
+        break;
+      case 4:
+        state.position[5] += 0.2;
+        break;
+      case 5:
+        state.velocity[5] += 2.0;
+        break;
+      case 6:
+        state.time -= 5'000'000;
+        break;
+      default:
+        break;
+    }
+  }
+  Status expected() const {
+    constexpr Status kExpected[] = {Status::kStateNotFinite, Status::kStateNotFinite,
+                                    Status::kStateWrongSize, Status::kStateWrongSize,
+                                    Status::kStateJump,      Status::kStateJump,
+                                    Status::kTimeBackward};
+    return kExpected[GetParam()];
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Faults, Ramp, ::testing::Range(0, 7));
+
+TEST_P(Ramp, OneBadTickCostsLittleAndNothingStartsAfresh) {
+  run(1.0);
+  const JointVector before = arm->torque;
+  const RobotState good = arm->state;
+  arm->setpoint.time = arm->state.time;
+  spoil(arm->state);
+  EXPECT_EQ(tick(), expected());
+  EXPECT_TRUE(near(arm->torque, 0.99 * before, 1e-9));
+  arm->state = good;
+  EXPECT_EQ(next(), Status::kOk);
+  EXPECT_TRUE(near(arm->torque, before, 1e-3));
+  EXPECT_EQ(snapshot().restarts, 1u);
+}
+
+class LongRamp : public Ramp {};
+// A jump is believed after a while, see below.
+INSTANTIATE_TEST_SUITE_P(Faults, LongRamp, ::testing::Values(0, 1, 2, 3, 6));
+
+TEST_P(LongRamp, EndsAtZeroTorqueAndStartsAfresh) {
+  run(1.0);
+  const RobotState good = arm->state;
+  JointVector last = arm->torque;
+  const JointVector step = settings.limits.torque_rate * settings.period;
+  for (int k = 0; k < 150; ++k) {
+    arm->state = good;
+    arm->state.time += expected() == Status::kTimeBackward ? -k : 1'000'000 * k;
+    spoil(arm->state);
+    EXPECT_EQ(tick(), expected());
+    EXPECT_TRUE(arm->torque.norm() < last.norm() || k >= 100);
+    EXPECT_LE(((arm->torque - last).cwiseAbs() - step).maxCoeff(), 1e-12);
+    last = arm->torque;
+  }
+  EXPECT_EQ(arm->torque.norm(), 0.0);
+  const std::int64_t time = std::max(good.time, arm->state.time);
+  arm->state = good;
+  arm->state.time = time;
+  arm->fresh = true;
+  std::set<Status> seen;
+  for (int k = 0; k < 3000; ++k) seen.insert(arm->step());
+  EXPECT_EQ(snapshot().status, Status::kOk);
+  EXPECT_EQ(snapshot().restarts, 2u);
+}
+
+TEST_F(Safety, AStateThatStaysElsewhereIsBelievedAndSpringsStartThere) {
+  run(1.0);
+  arm->state.position[5] += 0.3;
+  EXPECT_EQ(next(), Status::kStateJump);
+  int ticks = 1;
+  while (next() == Status::kStateJump && ticks < 1000) ++ticks;
+  EXPECT_GE(ticks, 20);  // the states agree with each other for 20 ms
+  EXPECT_LT(ticks, 30);
+  EXPECT_EQ(snapshot().restarts, 2u);
+  EXPECT_NEAR(snapshot().setpoint_position[5], arm->state.position[5], 1e-4);
+}
+
+TEST_F(Safety, AFlickeringSensorIsNeverBelieved) {
+  run(1.0);
+  for (int k = 0; k < 50; ++k) {  // 0.5 rad to and fro, at rest: before the bound has grown to it
+    arm->state.position[5] += k % 2 == 0 ? 0.5 : -0.5;
+    EXPECT_EQ(next(), k % 2 == 0 ? Status::kStateJump : Status::kOk);
+  }
+}
+
+TEST_F(Safety, ShowsWhatIsMeasuredWhileTheTorqueIsRampedDown) {
+  run(1.0);
+  arm->state.position[5] += 0.3;
+  arm->state.velocity[5] = 0.1;
+  ASSERT_EQ(next(), Status::kStateJump);
+  EXPECT_EQ(snapshot().position, arm->state.position);
+  EXPECT_EQ(snapshot().velocity, arm->state.velocity);
+  const JointVector last = arm->state.position;
+  arm->state.position[2] = std::nan("");
+  ASSERT_EQ(next(), Status::kStateNotFinite);
+  EXPECT_EQ(snapshot().position, last);
+}
+
+TEST_F(Safety, AnExternalWrenchThatIsNotFiniteIsReportedAndChangesNothing) {
+  settings.task_terms.geometric_stiffness = true;
+  settings.analysis.where = Analysis::Where::kInline;
+  settings.initial.mode = Mode::kCartesian;
+  make();
+  arm->state.external_wrench << 5, 0, 20, 0, 0, 1;
+  arm->controller.reset(gravity());
+  for (int k = 0; k < 700; ++k) next();
+  ASSERT_EQ(next(), Status::kOk);
+  const JointVector before = arm->torque;
+  const double frequency = arm->controller.vibration().modes[0].natural_frequency;
+  const Vector6 good = arm->state.external_wrench;
+  for (const double bad : {std::nan(""), kInfinity, -kInfinity}) {
+    for (int i = 0; i < 6; ++i) {
+      arm->state.external_wrench = good;
+      arm->state.external_wrench[i] = bad;
+      EXPECT_EQ(next(), Status::kWrenchNotFinite);
+      EXPECT_TRUE(near(arm->torque, before, 1e-9));
+      EXPECT_EQ(arm->controller.vibration().status, analysis::Status::kOk);
+      EXPECT_EQ(arm->controller.vibration().modes[0].natural_frequency, frequency);
+    }
+  }
+  arm->state.external_wrench = good;
+  EXPECT_EQ(next(), Status::kOk);
+  EXPECT_EQ(snapshot().restarts, 1u);
+}
+
+TEST_F(Safety, ARampTakesTheTorqueFromAllJointsAlike) {
+  settings.limits.torque_rate.setConstant(100);  // too little for the largest torque in 0.1 s
+  make();
+  run(1.0);
+  const JointVector before = arm->torque;
+  Eigen::Index heaviest = 0;
+  ASSERT_GT(before.cwiseAbs().maxCoeff(&heaviest), 15);
+  arm->state.position[1] = std::nan("");
+  for (int k = 1; k <= 20; ++k) {
+    next();
+    const double share = arm->torque[heaviest] / before[heaviest];
+    EXPECT_NEAR((1 - share) * std::abs(before[heaviest]), 0.1 * k, 1e-9);
+    EXPECT_TRUE(near(arm->torque, share * before, 1e-9)) << k;
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::controller

@@ -1,0 +1,91 @@
+#pragma once
+// An arm that is led along a path, whatever its controller wants: nothing but its state matters.
+
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/robot_model.hpp>
+
+#include <cmath>
+#include <numbers>
+
+namespace dashpot::testing {
+
+/// Settings in which no limit or watchdog interferes.
+inline controller::Settings unlimited_settings(const controller::RobotModel& model) {
+  controller::Settings settings = controller::default_settings(model);
+  settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
+  settings.limits.velocity.setConstant(1e3);
+  settings.limits.position_lower.setConstant(-10);
+  settings.limits.position_upper.setConstant(10);
+  return settings;
+}
+
+/// The same where besides nothing acts but springs, and dampers that hold a ratio of 0.7.
+inline controller::Settings plain_settings(const controller::RobotModel& model,
+                                           controller::Mode mode) {
+  controller::Settings settings = unlimited_settings(model);
+  settings.initial.mode = mode;
+  settings.feed_forward = {false, false, false, false, false};
+  controller::Gains& gains = settings.initial.gains;
+  gains.null_stiffness.setZero();
+  gains.null_damping.setZero();
+  gains.task_damping_ratio = gains.joint_damping_ratio = 0.7;
+  gains.task_stiffness = controller::Vector6(2000, 600, 2000, 100, 100, 100).asDiagonal();
+  return settings;
+}
+
+struct LedArm {
+  /// Swings by `amplitude`, rad.
+  LedArm(const controller::RobotModel& robot, const controller::Settings& settings,
+         double amplitude = 0.4)
+      : model(robot),
+        controller(robot, settings),
+        setpoint(settings.initial),
+        swings_by(amplitude) {
+    center = controller::JointVector::LinSpaced(model.dof(), 0.3, 1.2);
+    if (model.dof() == 7) center << 0, -0.785, 0.1, -2.2, 0.2, 1.7, 0.785;
+    place(center);
+    const auto there = controller::evaluate(model, center, state.velocity);
+    setpoint.joint_position = center;
+    setpoint.tip_pose = {there.p_BT_B, there.R_BT};
+  }
+  /// At rest.
+  void place(const controller::JointVector& q) {
+    state.position = q;
+    state.velocity = controller::JointVector::Zero(q.size());
+  }
+  /// Where it swings at time t, one swing in 2 s.
+  void swing(double t) {
+    for (Eigen::Index i = 0; i < center.size(); ++i) {
+      const auto shift = static_cast<double>(i);
+      const double phase = std::numbers::pi * t + shift;
+      state.position[i] = center[i] + swings_by * (std::sin(phase) - std::sin(shift));
+      state.velocity[i] = swings_by * std::numbers::pi * std::cos(phase);
+    }
+  }
+  controller::Status tick() {
+    setpoint.time = state.time += 1'000'000;
+    return controller.update(state, setpoint, torque);
+  }
+  /// Until the gains have grown.
+  void settle() {
+    const int ticks = static_cast<int>(controller.settings().motion.gain_time * 1000) + 2;
+    for (int k = 0; k < ticks; ++k) tick();
+  }
+  const controller::Vibration& modes() const { return controller.vibration(); }
+  /// C of the closed loop, n x n.
+  Eigen::MatrixXd damping() const {
+    analysis::System<controller::kMaxJoints> system;
+    controller.closed_loop(system);
+    return system.damping;
+  }
+
+  controller::RobotModel model;
+  controller::Controller controller;
+  controller::RobotState state;
+  controller::Setpoint setpoint;
+  controller::JointVector center, torque;
+  double swings_by;
+};
+
+}  // namespace dashpot::testing

@@ -1,0 +1,208 @@
+// The C interface with arguments that it refuses, or takes for a fault of the robot.
+#include <dashpot/tests/plugin/held_panda.hpp>
+
+#include <gmock/gmock.h>
+
+#include <array>
+#include <limits>
+#include <memory>
+
+namespace dashpot::tests {
+namespace {
+
+using Eigen::VectorXd;
+
+TEST(PluginRefuses, NullPointers) {
+  const Handle arm = create(panda());
+  Host host(create(panda()), panda_posture());
+  dashpot_output output = host.output();
+  const dashpot_state state = host.state();
+  EXPECT_EQ(plugin().update(nullptr, &state, nullptr, &output), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().update(arm.get(), &state, nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  output.torque = nullptr;
+  EXPECT_EQ(plugin().update(arm.get(), &state, nullptr, &output), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().reset(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().set_setpoint(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().set_setpoint(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
+  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+  setpoint.joint_position = nullptr;
+  EXPECT_EQ(plugin().set_setpoint(arm.get(), &setpoint), DASHPOT_NULL_ARGUMENT);
+  setpoint.mode = DASHPOT_MODE_CARTESIAN;
+  EXPECT_EQ(plugin().set_setpoint(arm.get(), &setpoint), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().set_gains(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().read_snapshot(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().read_modes(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().read_sampled_modes(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_STREQ(plugin().last_error(), "a pointer that has to be there is NULL");
+  EXPECT_EQ(plugin().joints(nullptr), 0u);
+  EXPECT_EQ(plugin().joint_name(nullptr, 0), nullptr);
+  EXPECT_EQ(plugin().period(nullptr), 0);
+  plugin().destroy(nullptr);
+}
+
+TEST(PluginRefuses, StructsOfAnotherSize) {
+  Host host(create(panda()), panda_posture());
+  dashpot_controller* const arm = host.controller.get();
+  for (const std::uint32_t wrong : {0u, 4u, 1u << 20}) {
+    dashpot_output output = host.output();
+    output.struct_size = wrong;
+    const dashpot_state state = host.state();
+    host.torque.assign(7, 123.0);
+    EXPECT_EQ(plugin().update(arm, &state, nullptr, &output), DASHPOT_WRONG_STRUCT_SIZE);
+    EXPECT_THAT(host.torque, ::testing::Each(123.0));
+    dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+    setpoint.struct_size = wrong;
+    EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_STRUCT_SIZE);
+    dashpot_gains gains{};
+    gains.struct_size = wrong;
+    EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_STRUCT_SIZE);
+    dashpot_snapshot snapshot{};
+    snapshot.struct_size = wrong;
+    EXPECT_EQ(plugin().read_snapshot(arm, &snapshot), DASHPOT_WRONG_STRUCT_SIZE);
+    const auto modes = std::make_unique<dashpot_modes>();
+    modes->struct_size = wrong;
+    EXPECT_EQ(plugin().read_modes(arm, modes.get()), DASHPOT_WRONG_STRUCT_SIZE);
+    EXPECT_STREQ(plugin().last_error(), "struct_size is not that of this version of plugin.h");
+  }
+}
+
+TEST(PluginRefuses, AnotherNumberOfJoints) {
+  Host host(create(panda()), panda_posture());
+  dashpot_output output = host.output();
+  output.joints = 6;
+  const dashpot_state state = host.state();
+  EXPECT_EQ(plugin().update(host.controller.get(), &state, nullptr, &output), DASHPOT_WRONG_JOINTS);
+  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+  setpoint.joints = 8;
+  EXPECT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_WRONG_JOINTS);
+  dashpot_gains gains{};
+  gains.struct_size = sizeof gains;
+  EXPECT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_WRONG_JOINTS);
+}
+
+TEST(PluginRefuses, ImpossibleValues) {
+  const Host host(create(panda()), panda_posture());
+  dashpot_controller* const arm = host.controller.get();
+  const auto expect_refused = [&](const std::vector<double>& goal, const std::string& why) {
+    const dashpot_setpoint setpoint = host.joint_setpoint(goal);
+    EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_VALUE);
+    EXPECT_EQ(plugin().last_error(), why);
+  };
+  std::vector<double> goal = panda_posture();
+  goal[2] = std::numeric_limits<double>::quiet_NaN();
+  expect_refused(goal, "joint_position has an entry that is not finite");
+  goal[2] = 3;
+  expect_refused(goal, "joint_position is above a position limit");
+
+  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+  setpoint.mode = 2;
+  EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_VALUE);
+  const std::array<double, 9> reflection = {1, 0, 0, 0, 1, 0, 0, 0, -1};
+  setpoint = {sizeof setpoint,   7,      0, DASHPOT_MODE_CARTESIAN, nullptr, reflection.data(),
+              reflection.data(), nullptr};
+  EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_VALUE);
+  EXPECT_STREQ(plugin().last_error(), "tip_pose.rotation is not a rotation matrix");
+
+  dashpot_gains gains{};
+  gains.struct_size = sizeof gains;
+  gains.joints = 7;
+  const std::int32_t frame = 5;
+  gains.frame = &frame;
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);
+  gains.frame = nullptr;
+  Eigen::Matrix<double, 6, 6> K_C = Eigen::Matrix<double, 6, 6>::Identity();
+  K_C(0, 0) = -1;
+  gains.task_stiffness = K_C.data();
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);
+  EXPECT_STREQ(plugin().last_error(), "task_stiffness is not positive semidefinite");
+}
+
+TEST(PluginRefuses, ToReadBeforeTheFirstTick) {
+  const Handle arm = create(panda());
+  dashpot_snapshot snapshot{};
+  snapshot.struct_size = sizeof snapshot;
+  EXPECT_EQ(plugin().read_snapshot(arm.get(), &snapshot), DASHPOT_NOTHING_YET);
+  dashpot_modes modes{};
+  modes.struct_size = sizeof modes;
+  EXPECT_EQ(plugin().read_modes(arm.get(), &modes), DASHPOT_NOTHING_YET);
+  dashpot_sampled_modes sampled{};
+  EXPECT_EQ(plugin().read_sampled_modes(arm.get(), &sampled), DASHPOT_WRONG_STRUCT_SIZE);
+  sampled.struct_size = sizeof sampled;
+  EXPECT_EQ(plugin().read_sampled_modes(arm.get(), &sampled), DASHPOT_NOTHING_YET);
+  EXPECT_STREQ(plugin().last_error(), "nothing to read so far");
+}
+
+/// A wrong state is no refusal: torque ramps down to zero, and the controller recovers.
+TEST(Plugin, IsSafeWithoutAState) {
+  Host host = held_panda();
+  for (int tick = 0; tick < 200; ++tick) ASSERT_EQ(host.tick(), DASHPOT_OK);
+  ASSERT_GT(joint_vector(host.torque).norm(), 1);
+  dashpot_state wrong_size = host.state();
+  wrong_size.struct_size = 8;
+  dashpot_state wrong_joints = host.state();
+  wrong_joints.joints = 6;
+  dashpot_state no_position = host.state();
+  no_position.position = nullptr;
+  const std::array<const dashpot_state*, 4> states = {nullptr, &wrong_size, &wrong_joints,
+                                                      &no_position};
+  dashpot_output output = host.output();
+  for (std::size_t tick = 0; tick < 120; ++tick) {
+    ASSERT_EQ(plugin().update(host.controller.get(), states[tick % 4], nullptr, &output),
+              DASHPOT_STATE_WRONG_SIZE);
+    host.time += 1'000'000;
+  }
+  EXPECT_EQ(joint_vector(host.torque), VectorXd::Zero(7));
+  EXPECT_EQ(host.snapshot().status, DASHPOT_STATE_WRONG_SIZE);
+  EXPECT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
+  host.position[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(host.tick(), DASHPOT_STATE_NOT_FINITE);
+}
+
+TEST(Plugin, ReportsAnExternalWrenchThatIsNotFinite) {
+  Host host = held_panda();
+  ASSERT_EQ(host.tick(), DASHPOT_OK);
+  const std::array<double, 6> wrench = {0, 0, std::numeric_limits<double>::quiet_NaN(), 0, 0, 0};
+  host.time += 1'000'000;
+  dashpot_state state = host.state();
+  state.external_wrench = wrench.data();
+  dashpot_output output = host.output();
+  EXPECT_EQ(plugin().update(host.controller.get(), &state, nullptr, &output),
+            DASHPOT_WRENCH_NOT_FINITE);
+  EXPECT_EQ(host.snapshot().status, DASHPOT_WRENCH_NOT_FINITE);
+  EXPECT_EQ(host.tick(), DASHPOT_OK);
+}
+
+TEST(Plugin, SurvivesAnyTime) {
+  Host host = held_panda();
+  for (const std::int64_t time : {std::int64_t{0}, std::numeric_limits<std::int64_t>::max(),
+                                  std::numeric_limits<std::int64_t>::min(), std::int64_t{5}}) {
+    const dashpot_setpoint setpoint = host.joint_setpoint(panda_posture(), time);
+    dashpot_state state = host.state();
+    state.time = time;
+    dashpot_output output = host.output();
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_GE(plugin().update(host.controller.get(), &state, &setpoint, &output), DASHPOT_OK);
+      EXPECT_GE(plugin().update(host.controller.get(), nullptr, nullptr, &output), DASHPOT_OK);
+      EXPECT_TRUE(joint_vector(host.torque).allFinite());
+    }
+  }
+}
+
+TEST(Plugin, RejectsAWrongSetpointOfATick) {
+  Host host = held_panda();
+  ASSERT_EQ(host.tick(), DASHPOT_OK);
+  dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
+  setpoint.struct_size = 0;
+  EXPECT_EQ(host.tick(&setpoint), DASHPOT_SETPOINT_REJECTED);
+  EXPECT_EQ(host.snapshot().status, DASHPOT_SETPOINT_REJECTED);
+  EXPECT_EQ(host.tick(), DASHPOT_OK);
+  std::vector<double> far = panda_posture();
+  far[0] = 4;
+  const dashpot_setpoint beyond = host.joint_setpoint(far);
+  EXPECT_EQ(host.tick(&beyond), DASHPOT_SETPOINT_REJECTED);
+  const dashpot_setpoint good = host.joint_setpoint(panda_posture());
+  EXPECT_EQ(host.tick(&good), DASHPOT_OK);
+}
+
+}  // namespace
+}  // namespace dashpot::tests
