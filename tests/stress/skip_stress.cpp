@@ -74,6 +74,19 @@ bool ticks(long steps, std::uint64_t seed) {
   return good;
 }
 
+bool simulations(long rounds, std::uint64_t seed) {
+  std::vector<PlantSkip> scenes = plant_skips();
+  SkipTally contact{"rates kept from the step before"};
+  for (long k = 0; k < rounds; ++k) {
+    const std::uint64_t round_seed = seed + static_cast<std::uint64_t>(k);
+    for (PlantSkip& skip : scenes) run_skip(round_seed, skip);
+    run_contact_skip(round_seed, contact);
+  }
+  bool good = print(contact);
+  for (const PlantSkip& skip : scenes) good &= print(skip.tally);
+  return good;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -86,11 +99,6 @@ int main(int argc, char** argv) {
       static_cast<unsigned long long>(seed), "left out", "times", "numbers", "largest");
   bool good = spectra(steps, seed);
   good &= ticks(steps, seed);
-  for (PlantSkip& skip : plant_skips()) {
-    for (long k = 0; k < std::max(1L, steps / 10'000); ++k) {
-      run_skip(seed + static_cast<std::uint64_t>(k), skip);
-    }
-    good &= print(skip.tally);
-  }
+  good &= simulations(std::max(1L, steps / 10'000), seed);
   return good ? 0 : 1;
 }

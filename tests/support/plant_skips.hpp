@@ -105,4 +105,43 @@ inline void run_skip(std::uint64_t seed, PlantSkip& skip) {
   }
 }
 
+/// A Panda that falls onto a wall below its tip, moved by adaptive steps: those of order 5 begin
+/// with the rates that the step before ended with, unless a contact changed; those of order 8
+/// evaluate them anew.
+inline void run_contact_skip(std::uint64_t seed, SkipTally& tally) {
+  constexpr int kTicks = 300;
+  constexpr double kAllowed = 1e-7;  // rad and rad/s, of a tolerance of 1e-10 a step
+  Dice dice(seed);
+  sim::JointVector q(7);
+  q << 0, -0.5, 0, -2.0, 0, 1.571, 0.785;
+  for (double& angle : q) angle += dice.uniform(-0.2, 0.2);
+  PlantScene scene;
+  scene.parameters.viscous.setConstant(7, 1.0);
+  const sim::Robot robot = sim::Robot::from_file(DASHPOT_SOURCE_DIR "/sim/models/panda.urdf",
+                                                 "panda_link0", "panda_hand_tcp", scene.parameters);
+  scene.arm.wall = sim::Wall{};
+  scene.arm.wall->point.z() = sim::Arm(robot).tip_pose(q).position.z() - 0.05;
+  scene.plant.integrator.adaptive = true;
+  scene.plant.integrator.absolute_tolerance = 1e-10;
+  scene.plant.integrator.relative_tolerance = 0;
+  scene.plant.period = 0.002;  // several steps
+  scene.plant.integrator.max_step = scene.plant.period;
+  sim::Arm first(robot, scene.arm), second(robot, scene.arm);
+  scene.plant.integrator.method = sim::Method::kDormandPrince;
+  sim::Plant keeping(first, scene.plant, q);
+  scene.plant.integrator.method = sim::Method::kDormandPrince8;
+  sim::Plant evaluating(second, scene.plant, q);
+  const sim::JointVector torque = sim::JointVector::Zero(7);
+  for (int k = 0; k < kTicks; ++k) {
+    if (keeping.step(torque) != sim::Status::kOk || evaluating.step(torque) != sim::Status::kOk) {
+      return tally.fail();
+    }
+    for (Eigen::Index i = 0; i < 7; ++i) {
+      tally.see(keeping.position()[i], evaluating.position()[i], kAllowed);
+      tally.see(keeping.velocity()[i], evaluating.velocity()[i], kAllowed);
+    }
+  }
+  if (keeping.audit().contact_heat > 0) ++tally.left_out;  // it did touch
+}
+
 }  // namespace dashpot::testing
