@@ -414,6 +414,7 @@ void ModeTracker::publish_direct(const StateForm& form, TrackedSpectrum& out) no
     ++lineage_;
     for (int i = 0; i < kMaxDof; ++i) place[at(i)] = i;
   }
+  out.status = spectrum_.status;  // not that of an attempt to follow
   out.lineage = lineage_;
   out.mode_count = spectrum_.modes.size();
   for (int i = 0; i < out.mode_count; ++i) {

@@ -139,6 +139,41 @@ def markdown(rows, context):
     return "\n".join(lines) + "\n"
 
 
+SPECTRA = [("from nothing", "direct", "eigen", "lapack"),
+           ("tracked", "tracked", "path_eigen", "path_lapack"),
+           ("tracked, n joints", "tracked_full", "eigen_full")]
+
+
+def backward_errors(results, what, size):
+    """(whose, worst normwise backward error, us) of a spectrum of this kind and number of modes."""
+    found = []
+    for whose, name in zip(("Dashpot", "Eigen", "LAPACK"), what[1:]):
+        row = results.rows.get(f"spectrum/{name}/{size}")
+        if row and "backward_error" in row:
+            found.append((whose, row["backward_error"], microseconds(row)))
+    return found
+
+
+def backward_error_table(results):
+    lines = []
+    for what in SPECTRA:
+        for size in range(1, 100):
+            found = backward_errors(results, what, size)
+            text = "  ".join(f"{whose} {error:.1e} ({us(time)} us)" for whose, error, time in found)
+            if found:
+                lines.append(f"  {size:2} modes, {what[0]:18} {text}")
+    return lines
+
+
+def backward_error_sentence(results):
+    parts = []
+    for what in SPECTRA[:2]:
+        found = backward_errors(results, what, 6)
+        if len(found) > 1:
+            parts.append(f"{what[0]}: " + ", ".join(f"{w} {error:.1e}" for w, error, _ in found))
+    return "Worst backward error of the 6 modes, " + "; ".join(parts) + ".\n" if parts else ""
+
+
 def accuracy_table(results):
     """Of every accuracy, ours and the fastest rival."""
     lines = []
@@ -230,10 +265,15 @@ def main():
     (directory / "results.json").write_text(json.dumps(merged, indent=1))
     results = Results(merged)
     text = markdown(headline(results), merged["context"])
+    errors = backward_error_sentence(results)
+    if errors:
+        text += "\n" + errors
     (directory / "headline.md").write_text(text)
     write_plot_data(results, directory)
     print(text)
-    print("Simulation, the fastest to an accuracy (and how much slower the rival is):")
+    print("Spectra, worst backward error (and time):")
+    print("\n".join(backward_error_table(results)))
+    print("\nSimulation, the fastest to an accuracy (and how much slower the rival is):")
     print("\n".join(accuracy_table(results)))
     print("\nGrowth with the number of joints, modes, configurations, threads:")
     print("\n".join(exponents(results)))

@@ -26,7 +26,7 @@ struct Stepper {
   const char* name;
   Method method;
 };
-constexpr std::array<Stepper, 7> kSteppers = {{{"euler", Method::kSemiImplicitEuler},
+constexpr std::array<Stepper, 7> kSteppers = {{{"semi_implicit_euler", Method::kSemiImplicitEuler},
                                                {"rk4", Method::kRungeKutta4},
                                                {"velocity_verlet", Method::kVelocityVerlet},
                                                {"dormand_prince", Method::kDormandPrince},

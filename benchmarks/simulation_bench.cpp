@@ -201,13 +201,14 @@ using Adams =
 
 void add_fixed(const std::string& gains, double gain, int steps) {
   const std::string end = "/" + std::to_string(steps);
-  for (const auto& [name, method] : {std::pair("euler", sim::Method::kSemiImplicitEuler),
-                                     {"rk4", sim::Method::kRungeKutta4},
-                                     {"verlet", sim::Method::kVelocityVerlet},
-                                     {"dopri5", sim::Method::kDormandPrince},
-                                     {"dopri8", sim::Method::kDormandPrince8},
-                                     {"midpoint", sim::Method::kImplicitMidpoint},
-                                     {"rosenbrock", sim::Method::kRosenbrock}}) {
+  for (const auto& [name, method] :
+       {std::pair("semi_implicit_euler", sim::Method::kSemiImplicitEuler),
+        {"rk4", sim::Method::kRungeKutta4},
+        {"velocity_verlet", sim::Method::kVelocityVerlet},
+        {"dormand_prince", sim::Method::kDormandPrince},
+        {"dormand_prince_8", sim::Method::kDormandPrince8},
+        {"implicit_midpoint", sim::Method::kImplicitMidpoint},
+        {"rosenbrock", sim::Method::kRosenbrock}}) {
     const bool implicit =
         method == sim::Method::kImplicitMidpoint || method == sim::Method::kRosenbrock;
     if (implicit && steps > 1000) continue;  // takes long
@@ -228,8 +229,8 @@ void add_fixed(const std::string& gains, double gain, int steps) {
 
 void add_adaptive(const std::string& gains, double gain, double tolerance) {
   const std::string end = "/" + text(tolerance);
-  for (const auto& [name, method] : {std::pair("dopri5", sim::Method::kDormandPrince),
-                                     {"dopri8", sim::Method::kDormandPrince8},
+  for (const auto& [name, method] : {std::pair("dormand_prince", sim::Method::kDormandPrince),
+                                     {"dormand_prince_8", sim::Method::kDormandPrince8},
                                      {"rosenbrock", sim::Method::kRosenbrock}}) {
     if (method == sim::Method::kRosenbrock && tolerance < 1e-6) continue;  // takes long
     add(gains, gain, "ours/adaptive_" + std::string(name) + end, ours_adaptive(method, tolerance));

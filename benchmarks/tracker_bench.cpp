@@ -5,7 +5,8 @@
 // `nearly_reused` one that trembles in the last digit. Beside them,
 // Eigen's fixed-size EigenSolver with right vectors and LAPACK's dgeev with both sides on the
 // 12 x 12 state matrices of the same path, which are formed outside the clock. `tracked_full` and
-// `eigen_full` (of run-time size) have n joints and n modes.
+// `eigen_full` (of run-time size) have n joints and n modes. `backward_error` is the worst along
+// the path, of every kRivalSteps-th system.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 
@@ -29,6 +30,7 @@ using dashpot::testing::swing;
 using Eigen::MatrixXd;
 
 constexpr int kSteps = 1000;
+constexpr int kRivalSteps = 20;  ///< apart are the systems that rivals solve
 constexpr unsigned kSeed = 20210002;
 
 /// One second of the path.
@@ -72,8 +74,13 @@ std::vector<System<kMaxDof>> full_path(int n) {
   return path;
 }
 
-/// [0 G; -G' -D] of the motions that are no zero modes, in energy coordinates.
-MatrixXd state_matrix(const System<kMaxDof>& system) {
+/// A = [0 G; -G' -D] of the motions that are no zero modes, in energy coordinates; the lower half y
+/// of an eigenvector is the motion u = lift y of the joints.
+struct StateMatrix {
+  MatrixXd A, lift;
+};
+
+StateMatrix state_matrix(const System<kMaxDof>& system) {
   const MatrixXd L = MatrixXd(system.mass).llt().matrixL();
   const auto lower = L.triangularView<Eigen::Lower>();
   const MatrixXd CL = lower.solve(MatrixXd(system.damping));
@@ -88,7 +95,7 @@ MatrixXd state_matrix(const System<kMaxDof>& system) {
   A.topRightCorner(m, m) = J * P;
   A.bottomLeftCorner(m, m) = -(J * P).transpose();
   A.bottomRightCorner(m, m) = -P.transpose() * D * P;
-  return A;
+  return {A, L.transpose().triangularView<Eigen::Upper>().solve(P)};
 }
 
 double backward_error(const System<kMaxDof>& system, const Complex& value,
@@ -98,6 +105,27 @@ double backward_error(const System<kMaxDof>& system, const Complex& value,
   return residual.norm() / ((std::norm(value) * system.mass.norm() +
                              std::abs(value) * system.damping.norm() + system.stiffness.norm()) *
                             u.norm());
+}
+
+double worst_backward_error(const System<kMaxDof>& system, const TrackedSpectrum& spectrum) {
+  double worst = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(spectrum.mode_count); ++i) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      worst = std::max(
+          worst, backward_error(system, spectrum.modes[i].eigenvalues[k], spectrum.shapes[i].u[k]));
+    }
+  }
+  return worst;
+}
+
+/// Of eigenvectors of the state matrix, in the columns of X.
+double worst_backward_error(const System<kMaxDof>& system, const MatrixXd& lift,
+                            const Eigen::VectorXcd& values, const Eigen::MatrixXcd& X) {
+  double worst = 0;
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    worst = std::max(worst, backward_error(system, values[i], lift * X.col(i).tail(lift.cols())));
+  }
+  return worst;
 }
 
 /// Brings a matrix near the processor.
@@ -158,27 +186,41 @@ void track(benchmark::State& state, const std::vector<System<kMaxDof>>& path,
   state.counters["passes"] = static_cast<double>(counters.passes - before.passes) /
                              static_cast<double>(counters.updates - before.updates);
   state.counters["direct"] = static_cast<double>(counters.direct - before.direct);
-  double bound = 0, error = 0;
+  double bound = 0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(spectrum->mode_count); ++i) {
     const ModeNumbers& mode = spectrum->modes[i];
     bound = std::max(bound, mode.error_bound / std::abs(mode.eigenvalues[1]));
-    if (!options.shapes) continue;
-    for (std::size_t k = 0; k < 2; ++k) {
-      error =
-          std::max(error, backward_error(*system, mode.eigenvalues[k], spectrum->shapes[i].u[k]));
-    }
   }
   state.counters["relative_bound"] = bound;
+  if (!options.shapes) return;
+  double error = worst_backward_error(*system, *spectrum);
+  for (int step = 0; step < kSteps && input == Input::kMoving; ++step) {
+    system = &sweep.next();
+    tracker->update(*system, *spectrum);
+    if (step % kRivalSteps == 0) error = std::max(error, worst_backward_error(*system, *spectrum));
+  }
   state.counters["backward_error"] = error;
 }
+
+/// What rivals solve.
+struct RivalPath {
+  std::vector<System<kMaxDof>> systems;
+  std::vector<StateMatrix> matrices;
+
+  explicit RivalPath(const std::vector<System<kMaxDof>>& path) {
+    for (int step = 0; step < kSteps; step += kRivalSteps) {
+      systems.push_back(path[static_cast<std::size_t>(step)]);
+      matrices.push_back(state_matrix(systems.back()));
+    }
+  }
+};
 
 /// Matrix is 12 x 12 or of run-time size.
 template <typename Matrix>
 void eigen(benchmark::State& state, const std::vector<System<kMaxDof>>& path) {
+  const RivalPath rival(path);
   std::vector<Matrix, Eigen::aligned_allocator<Matrix>> matrices;
-  for (int step = 0; step < kSteps; step += 20) {
-    matrices.push_back(state_matrix(path[static_cast<std::size_t>(step)]));
-  }
+  for (const StateMatrix& matrix : rival.matrices) matrices.push_back(matrix.A);
   Eigen::EigenSolver<Matrix> solver(matrices[0].rows());
   std::size_t next = 0;
   for (auto _ : state) {
@@ -186,23 +228,69 @@ void eigen(benchmark::State& state, const std::vector<System<kMaxDof>>& path) {
     benchmark::DoNotOptimize(solver.eigenvalues().data());
     benchmark::ClobberMemory();
   }
+  double error = 0;
+  for (std::size_t k = 0; k < matrices.size(); ++k) {
+    solver.compute(matrices[k], true);
+    error = std::max(error, worst_backward_error(rival.systems[k], rival.matrices[k].lift,
+                                                 solver.eigenvalues(), solver.eigenvectors()));
+  }
+  state.counters["backward_error"] = error;
 }
 
-void lapack(benchmark::State& state, const std::vector<System<kMaxDof>>& path) {
-  std::vector<MatrixXd> matrices;
-  for (int step = 0; step < kSteps; step += 20) {
-    matrices.push_back(state_matrix(path[static_cast<std::size_t>(step)]));
+/// LAPACK's dgeev with both sides.
+class Dgeev {
+ public:
+  explicit Dgeev(Eigen::Index size)
+      : n_(static_cast<lapack_int>(size)),
+        copy_(size, size),
+        left_(size, size),
+        right_(size, size),
+        re_(size),
+        im_(size),
+        work_(16 * size) {}
+
+  void solve(const MatrixXd& A) {
+    copy_ = A;
+    LAPACKE_dgeev_work(LAPACK_COL_MAJOR, 'V', 'V', n_, copy_.data(), n_, re_.data(), im_.data(),
+                       left_.data(), n_, right_.data(), n_, work_.data(), 16 * n_);
   }
-  const auto n = static_cast<lapack_int>(matrices[0].rows());
-  MatrixXd copy = matrices[0], left(n, n), right(n, n);
-  Eigen::VectorXd re(n), im(n), work(16 * n);
+  Eigen::VectorXcd values() const {
+    Eigen::VectorXcd result(n_);
+    result.real() = re_;
+    result.imag() = im_;
+    return result;
+  }
+  Eigen::MatrixXcd vectors() const {
+    Eigen::MatrixXcd X = right_.cast<Complex>();
+    for (Eigen::Index i = 0; i < n_; ++i) {
+      if (im_[i] <= 0) continue;
+      X.col(i).imag() = right_.col(i + 1);
+      X.col(i + 1) = X.col(i).conjugate();
+    }
+    return X;
+  }
+
+ private:
+  lapack_int n_;
+  MatrixXd copy_, left_, right_;
+  Eigen::VectorXd re_, im_, work_;
+};
+
+void lapack(benchmark::State& state, const std::vector<System<kMaxDof>>& path) {
+  const RivalPath rival(path);
+  Dgeev solver(rival.matrices[0].A.rows());
   std::size_t next = 0;
   for (auto _ : state) {
-    copy = matrices[next++ % matrices.size()];
-    LAPACKE_dgeev_work(LAPACK_COL_MAJOR, 'V', 'V', n, copy.data(), n, re.data(), im.data(),
-                       left.data(), n, right.data(), n, work.data(), 16 * n);
+    solver.solve(rival.matrices[next++ % rival.matrices.size()].A);
     benchmark::ClobberMemory();
   }
+  double error = 0;
+  for (std::size_t k = 0; k < rival.matrices.size(); ++k) {
+    solver.solve(rival.matrices[k].A);
+    error = std::max(error, worst_backward_error(rival.systems[k], rival.matrices[k].lift,
+                                                 solver.values(), solver.vectors()));
+  }
+  state.counters["backward_error"] = error;
 }
 
 template <typename Function>

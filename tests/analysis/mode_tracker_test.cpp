@@ -7,7 +7,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <numeric>
 
@@ -329,6 +331,37 @@ TEST(TrackedCertificate, OfAPerturbedBasisStillEncloses) {
     EXPECT_EQ(form.zeros(), rows > 0 ? 1 : 0);
   }
   EXPECT_GE(proved, 500);
+}
+
+/// Where bounds begin to fail, following fails before the direct solver does, and the other way
+/// round.
+TEST(ModeTracker, SaysOkOnlyIfAllBoundsAreFinite) {
+  constexpr int kModes = 6;
+  Random random(4007);
+  int uncertified = 0;
+  for (double exponent = 9; exponent <= 14; exponent += 0.125) {
+    SCOPED_TRACE(exponent);
+    System<kMaxDof> system = random_system(random, kModes, 1);
+    const MatrixXd V = Eigen::HouseholderQR<MatrixXd>(random.matrix(kModes, kModes)).householderQ();
+    const Eigen::VectorXd masses =
+        Eigen::VectorXd::LinSpaced(kModes, -exponent, 0).unaryExpr([](double power) {
+          return std::pow(10, power);
+        });
+    const MatrixXd mass = V * masses.asDiagonal() * V.transpose();
+    system.mass = 0.5 * (mass + mass.transpose());
+    Tracked tracked;
+    for (int update = 0; update < 2; ++update) {
+      const Status status = tracked.update(system);
+      bool all = true;
+      for (int i = 0; i < tracked.spectrum->mode_count; ++i) {
+        all = all && std::isfinite(tracked.mode(i).error_bound);
+      }
+      EXPECT_EQ(status, all ? Status::kOk : Status::kUncertified);
+      uncertified += all ? 0 : 1;
+      system.stiffness *= 1 + 1e-7;
+    }
+  }
+  EXPECT_GT(uncertified, 0);
 }
 
 TEST(Assignment, IsTheBestOfAll) {

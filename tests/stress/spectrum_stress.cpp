@@ -1,19 +1,25 @@
-// Sweeps the conditioning of systems until the spectrum breaks, and says where and how it says so:
-//     spectrum_stress
-// Every eigenvalue with a finite bound has to lie within it of a true one (33 digits). What cannot
-// be proved has to be said: by an infinite bound, or by a status. Anything else ends with exit
-// status 1.
+// Sweeps the conditioning of systems until the spectrum, solved or tracked from a system nearby,
+// breaks, and says where and how it says so:
+//     spectrum_stress [APART]
+// APART: of the steps that are taken, for a coarser sweep. Every eigenvalue with a finite bound has
+// to lie within it of a true one (33 digits). What cannot be proved has to be said: by an infinite
+// bound, or by a status. Anything else ends with exit status 1.
+#include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/quad_spectrum.hpp>
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
-#include <limits>
+#include <map>
+#include <memory>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -107,36 +113,89 @@ std::vector<QuadComplex> truth_of(const System<>& system, const Spectrum<>& spec
   return dashpot::testing::refine_eigenvalues(system, start);
 }
 
-Judgement judge(const System<>& system) {
-  SpectrumSolver<> solver;
-  Spectrum<> spectrum;
-  Judgement result;
-  result.status = solver.solve(system, spectrum);
-  if (result.status != Status::kOk && result.status != Status::kUncertified) {
-    result.verdict = Verdict::kRefused;
-    return result;
+/// Gives each of the first a partner of its own among those near it (their indices), by augmenting
+/// paths.
+bool have_partners(const std::vector<std::vector<std::size_t>>& near) {
+  std::map<std::size_t, std::size_t> owner;
+  std::set<std::size_t> visited;
+  const std::function<bool(std::size_t)> place = [&](std::size_t i) {
+    for (const std::size_t k : near[i]) {
+      if (!visited.insert(k).second) continue;
+      const auto taken = owner.find(k);
+      if (taken != owner.end() && !place(taken->second)) continue;
+      owner[k] = i;
+      return true;
+    }
+    return false;
+  };
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    visited.clear();
+    if (!place(i)) return false;
   }
-  result.zero_modes = kModes - spectrum.modes.size();
-  const std::vector<QuadComplex> truth = truth_of(system, spectrum);
+  return true;
+}
+
+/// Modes of any kind, from `begin` to `end`.
+template <typename Iterator>
+Verdict judge_modes(Iterator begin, Iterator end, Status status,
+                    const std::vector<QuadComplex>& truth) {
   bool all = true;
-  for (const Mode<>& mode : spectrum.modes) {
-    if (!std::isfinite(mode.error_bound)) {
+  std::vector<std::vector<std::size_t>> near;
+  for (Iterator mode = begin; mode != end; ++mode) {
+    if (!std::isfinite(mode->error_bound)) {
       all = false;
       continue;
     }
-    for (const Complex& value : mode.eigenvalues) {
-      auto nearest = static_cast<Quad>(std::numeric_limits<double>::infinity());
-      for (const QuadComplex& z : truth) {
-        nearest = std::min(nearest, (z - to_quad(value)).norm());
+    const auto bound = static_cast<Quad>(mode->error_bound);
+    for (const Complex& value : mode->eigenvalues) {
+      near.emplace_back();
+      for (std::size_t k = 0; k < truth.size(); ++k) {
+        const Quad apart = (truth[k] - to_quad(value)).norm();
+        if (apart <= bound * bound) near.back().push_back(k);
       }
-      const auto bound = static_cast<Quad>(mode.error_bound);
-      if (!(nearest <= bound * bound)) result.verdict = Verdict::kWrong;
     }
   }
-  if (!all && result.status == Status::kOk) result.verdict = Verdict::kWrong;
-  if (result.status == Status::kUncertified && result.verdict == Verdict::kProved) {
-    result.verdict = Verdict::kUnproved;
+  if (!have_partners(near) || (!all && status == Status::kOk)) return Verdict::kWrong;
+  return status == Status::kUncertified ? Verdict::kUnproved : Verdict::kProved;
+}
+
+bool is_refusal(Status status) {
+  return status != Status::kOk && status != Status::kUncertified;
+}
+
+/// What the solver makes of a system; and the tracker, which comes from a system nearby.
+struct Judgements {
+  Judgement direct, tracked;
+};
+
+Judgements judge(const System<>& system, dashpot::analysis::ModeTracker& tracker) {
+  Judgements result;
+  Spectrum<> spectrum;
+  result.direct.status = SpectrumSolver<>().solve(system, spectrum);
+  if (is_refusal(result.direct.status)) {
+    result.direct.verdict = result.tracked.verdict = Verdict::kRefused;
+    return result;
   }
+  result.direct.zero_modes = kModes - spectrum.modes.size();
+  const std::vector<QuadComplex> truth = truth_of(system, spectrum);
+  result.direct.verdict =
+      judge_modes(spectrum.modes.begin(), spectrum.modes.end(), result.direct.status, truth);
+
+  System<kMaxDof> here(kModes);
+  here.mass = system.mass;
+  here.damping = system.damping;
+  here.stiffness = (1 + 1e-7) * system.stiffness;
+  const auto tracked = std::make_unique<TrackedSpectrum>();
+  tracker.reset();
+  tracker.update(here, *tracked);
+  here.stiffness = system.stiffness;
+  result.tracked.status = tracker.update(here, *tracked);
+  result.tracked.zero_modes = tracked->zero_mode_count;
+  result.tracked.verdict =
+      is_refusal(result.tracked.status)
+          ? Verdict::kRefused
+          : judge_modes(tracked->modes.begin(), tracked->modes.begin() + tracked->mode_count,
+                        result.tracked.status, truth);
   return result;
 }
 
@@ -233,30 +292,41 @@ const char* name_of(Verdict verdict) {
   return "";
 }
 
+std::string text_of(const Judgement& found) {
+  std::string text = name_of(found.verdict);
+  if (found.verdict != Verdict::kProved) text += std::string(" (") + to_text(found.status) + ")";
+  if (found.zero_modes > 0) text += ", " + std::to_string(found.zero_modes) + " zero modes";
+  return text;
+}
+
 /// Prints where the outcome changes. Whether nothing is wrong.
-bool run(const Sweep& sweep) {
+bool run(const Sweep& sweep, int apart) {
   std::printf("%s\n", sweep.what);
   bool good = true;
-  std::string last;
+  std::string last, last_tracked;
+  const auto tracker = std::make_unique<dashpot::analysis::ModeTracker>();
   const int steps = static_cast<int>(std::lround((sweep.last - sweep.first) / sweep.step));
-  for (int i = 0; i <= steps; ++i) {
+  for (int i = 0; i <= steps; i += apart) {
     const double x = sweep.first + i * sweep.step;
-    const Judgement found = judge(sweep.make(x));
-    good &= found.verdict != Verdict::kWrong;
-    std::string text = name_of(found.verdict);
-    if (found.verdict != Verdict::kProved) text += std::string(" (") + to_text(found.status) + ")";
-    if (found.zero_modes > 0) text += ", " + std::to_string(found.zero_modes) + " zero modes";
+    const Judgements found = judge(sweep.make(x), *tracker);
+    good &= found.direct.verdict != Verdict::kWrong && found.tracked.verdict != Verdict::kWrong;
+    const std::string text = text_of(found.direct), tracked = text_of(found.tracked);
     if (text != last) std::printf("  from x = %-5g %s\n", x, text.c_str());
+    if (tracked != last_tracked && tracked != text) {
+      std::printf("  from x = %-5g tracked: %s\n", x, tracked.c_str());
+    }
     last = text;
+    last_tracked = tracked;
   }
   return good;
 }
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  const int apart = argc > 1 ? std::max(1, std::atoi(argv[1])) : 1;
   bool good = true;
-  for (const Sweep& sweep : sweeps()) good &= run(sweep);
+  for (const Sweep& sweep : sweeps()) good &= run(sweep, apart);
   std::printf(good ? "Every finite bound held, and whatever has none was said.\n"
                    : "Some bound did not hold, or was missing without a word.\n");
   return good ? 0 : 1;

@@ -69,6 +69,10 @@ void follow(const PathFamily& family, std::uint64_t seed, int steps, Tally& tall
       tally.widest = std::max(tally.widest, verdict.widest);
     } else {
       ++tally.unproved;
+      if (status == Status::kOk && verdict.enclosed) {
+        verdict.enclosed = false;
+        verdict.what = "a bound is missing without a word";
+      }
     }
     if (verdict.enclosed) continue;
     if (tally.outside++ == 0) {

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 namespace dashpot::testing {
@@ -94,13 +95,19 @@ struct Verdict {
   const char* what = "";  ///< was not enclosed
 };
 
-/// Gives each published eigenvalue a true one of its own within `reach(i)`, by augmenting paths.
+/// Gives each published eigenvalue i a true one j of its own within reach[i] + slack[j], by
+/// augmenting paths; no slack: what is true is exact.
 template <typename Real>
 class Matching {
  public:
   Matching(const std::vector<Point<Real>>& published, const std::vector<Point<Real>>& truth,
-           const std::vector<Real>& reach)
-      : published_(published), truth_(truth), reach_(reach), owner_(truth.size(), -1) {
+           const std::vector<Real>& reach, std::vector<Real> slack = {})
+      : published_(published),
+        truth_(truth),
+        reach_(reach),
+        slack_(std::move(slack)),
+        owner_(truth.size(), -1) {
+    slack_.resize(truth.size(), Real(0));
     for (std::size_t i = 0; i < published.size(); ++i) {
       visited_.assign(truth.size(), false);
       complete_ = complete_ && place(i);
@@ -116,7 +123,7 @@ class Matching {
  private:
   bool place(std::size_t i) {
     for (std::size_t j = 0; j < truth_.size(); ++j) {
-      if (visited_[j] || !(distance(published_[i], truth_[j]) <= reach_[i])) continue;
+      if (visited_[j] || !(distance(published_[i], truth_[j]) <= reach_[i] + slack_[j])) continue;
       visited_[j] = true;
       if (owner_[j] >= 0 && !place(static_cast<std::size_t>(owner_[j]))) continue;
       owner_[j] = static_cast<int>(i);
@@ -127,6 +134,7 @@ class Matching {
 
   const std::vector<Point<Real>>&published_, &truth_;
   const std::vector<Real>& reach_;
+  std::vector<Real> slack_;
   std::vector<int> owner_;
   std::vector<bool> visited_;
   bool complete_ = true;
