@@ -164,6 +164,9 @@ std::string solved_text(const dashpot_modes& first, const dashpot_modes& last) {
   add(&dashpot_modes::no_springs, "without springs");
   add(&dashpot_modes::failed, "failed");
   add(&dashpot_modes::missed, "missed");
+  if (last.proportional > first.proportional) {
+    out += "; damping proportional in " + std::to_string(last.proportional - first.proportional);
+  }
   return out + "\n";
 }
 
@@ -238,6 +241,7 @@ Json solved_json(const dashpot_modes& first, const dashpot_modes& last) {
   return {{"tracked", last.tracked - first.tracked},
           {"reused", last.reused - first.reused},
           {"direct", last.direct - first.direct},
+          {"proportional", last.proportional - first.proportional},
           {"unchanged", last.unchanged - first.unchanged},
           {"no_springs", last.no_springs - first.no_springs},
           {"failed", last.failed - first.failed},

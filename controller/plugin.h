@@ -207,6 +207,7 @@ typedef struct dashpot_modes {
   uint64_t missed;     /* the background thread was busy */
   /* ... and what some of them could leave out. */
   uint64_t no_zero_modes; /* springs hold every motion */
+  uint64_t proportional;  /* the undamped modes decouple the damping, by design or for want of it */
   uint64_t no_wrench;     /* geometric_stiffness is on, but there is no external wrench */
   uint64_t no_shapes;     /* nobody asks for shapes */
   uint64_t at_rest;       /* jacobian_rate is on, but the robot stands still */

@@ -25,6 +25,7 @@ void VibrationSolver::reset() noexcept {
   tracker_.forget();
   counters_ = {};
   skipped_ = static_cast<std::uint64_t>(tracker_.counters().shapes_skipped);
+  proportional_ = static_cast<std::uint64_t>(tracker_.counters().proportional);
   solved_ = 0;
 }
 
@@ -37,7 +38,9 @@ void VibrationSolver::solve(const VibrationTask& task, Vibration& result) noexce
   if (task.springs) {
     if (task.anew) tracker_.reset();
     tracker_.update(task.system, spectrum_);
-    counters_.no_shapes = static_cast<std::uint64_t>(tracker_.counters().shapes_skipped) - skipped_;
+    const analysis::TrackerCounters& counters = tracker_.counters();
+    counters_.no_shapes = static_cast<std::uint64_t>(counters.shapes_skipped) - skipped_;
+    counters_.proportional = static_cast<std::uint64_t>(counters.proportional) - proportional_;
     publish_modes(result);
     const bool found =
         result.status == analysis::Status::kOk || result.status == analysis::Status::kUncertified;

@@ -37,8 +37,9 @@ class VibrationSolver {
   analysis::ModeTracker tracker_;
   analysis::TrackedSpectrum spectrum_;
   VibrationCounters counters_;
-  std::uint64_t solved_ = 0;   ///< number of the last task
-  std::uint64_t skipped_ = 0;  ///< shapes that the tracker had left out at the last reset
+  std::uint64_t solved_ = 0;  ///< number of the last task
+  /// Of the tracker at the last reset: shapes left out, and updates of proportional damping.
+  std::uint64_t skipped_ = 0, proportional_ = 0;
 };
 
 class VibrationThread;

@@ -95,6 +95,34 @@ TEST(HeldDamping, HoldsTheRatioAlongAPathOfEveryArm) {
   }
 }
 
+/// One ratio for all modes means that the undamped ones decouple the damping.
+TEST(HeldDamping, IsFollowedAsProportional) {
+  const RobotModel model = panda();
+  Settings settings = plain_settings(model, Mode::kCartesian);
+  LedArm led(model, settings);
+  led.settle();
+  const VibrationCounters before = led.modes().counters;
+  for (int k = 1; k <= 200; ++k) {
+    led.swing(1e-3 * k);
+    led.tick();
+  }
+  const VibrationCounters held = led.modes().counters;
+  EXPECT_GE(held.tracked - before.tracked, 195U);
+  EXPECT_EQ(held.proportional - before.proportional, held.tracked - before.tracked);
+  settings.initial.gains.task_damping_ratio = 0;
+  settings.initial.gains.task_damping = controller::Vector6(22.5, 23.5, 45, 2, 12, 1).asDiagonal();
+  LedArm other(model, settings);
+  other.settle();
+  for (int k = 1; k <= 200; ++k) {
+    other.swing(1e-3 * k);
+    other.tick();
+  }
+  EXPECT_EQ(other.modes().counters.proportional, 0U);
+  led.controller.reset();
+  led.tick();
+  EXPECT_EQ(led.modes().counters.proportional, 0U);
+}
+
 TEST(HeldDamping, LeavesFreeDirectionsAndTheNullSpaceAlone) {
   const RobotModel model = panda();
   Settings settings = plain_settings(model, Mode::kCartesian);

@@ -65,7 +65,8 @@ class Modes(c.Structure):
                 ("origin", c.c_int32), ("tracked", c.c_uint64), ("reused", c.c_uint64),
                 ("direct", c.c_uint64), ("unchanged", c.c_uint64), ("no_springs", c.c_uint64),
                 ("failed", c.c_uint64), ("missed", c.c_uint64), ("no_zero_modes", c.c_uint64),
-                ("no_wrench", c.c_uint64), ("no_shapes", c.c_uint64), ("at_rest", c.c_uint64),
+                ("proportional", c.c_uint64), ("no_wrench", c.c_uint64),
+                ("no_shapes", c.c_uint64), ("at_rest", c.c_uint64),
                 ("modes", Mode * MAX_JOINTS)]
 
 
