@@ -20,8 +20,6 @@ constexpr double kConverged = 1e-11;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A change of the coefficients that none is as small as.
 constexpr double kNothing = -1;
-/// Squared error of an extrapolation, relative to that of a simpler one, that makes it worth using.
-constexpr double kForeseen = 0.25;
 /// A proportional basis stays one as long as no more than this of strains and velocities mixes:
 /// what eigenvectors then lack, to its square.
 constexpr double kLeastMixing = 1e-9;
@@ -77,17 +75,6 @@ void form_stiffness(System<kMaxDof>& system) {
   system.has_tails = true;
 }
 
-double sum(const Lanes& x) {
-  return (x[0] + x[1]) + (x[2] + x[3]);
-}
-
-/// a += b
-void add(const PaddedRows& b, int columns, PaddedRows& a) {
-  for (int k = 0; k < columns * a.width; k += 4) {
-    store(&a.items[at(k)], load(&a.items[at(k)]) + load(&b.items[at(k)]));
-  }
-}
-
 void copy(const PaddedRows& from, int columns, PaddedRows& to) {
   to.width = from.width;
   std::copy_n(from.items.begin(), columns * from.width, to.items.begin());
@@ -121,11 +108,6 @@ bool identical(const StateForm& a, const StateForm& b) {
   };
   const int n = a.joints;
   return same(a.M, b.M, n * n) && same(a.C, b.C, n * n) && same(a.W, b.W, a.strains * n);
-}
-
-void set_zero(int width, int columns, PaddedRows& rows) {
-  rows.width = width;
-  std::fill_n(rows.items.begin(), columns * width, 0.0);
 }
 
 /// The largest error bound of a mode, relative to its eigenvalues; at critical damping of its
@@ -241,10 +223,10 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   before_.modes = basis_.modes;
   before_.zeros = basis_.zeros;
   copy(basis_.Z, columns, before_.Z);
-  if (predicting_) {
+  if (prediction_.ready()) {
     ++counters_.predicted;
-    add(prediction_, columns, E_);
-    copy(prediction_, columns, step_);
+    add(prediction_.next(), columns, E_);
+    copy(prediction_.next(), columns, step_);
   } else {
     set_zero(width, columns, step_);
   }
@@ -261,54 +243,13 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
     return false;
   }
   if (turned_) {
-    forget_steps();
+    prediction_.forget(width, columns);
   } else {
-    learn_step();
+    prediction_.learn(step_, columns);
   }
   ++counters_.tracked;
   if (basis_.proportional) ++counters_.proportional;
   return true;
-}
-
-/// Extrapolates the steps of the last updates by that polynomial that would have foreseen this one
-/// best: degree 2, 1, 0, or no step at all.
-void ModeTracker::learn_step() noexcept {
-  const int columns = basis_.columns(), width = basis_.Z.width;
-  for (PaddedRows* rows : {&prediction_, &last_step_, &last_change_, &last_curve_}) {
-    rows->width = width;
-  }
-  Lanes by_nothing{}, by_step{}, by_change{}, by_curve{};
-  for (int k = 0; k < columns * width; k += 4) {
-    const Lanes step = load(&step_.items[at(k)]);
-    const Lanes change = step - load(&last_step_.items[at(k)]);
-    const Lanes curve = change - load(&last_change_.items[at(k)]);
-    const Lanes rest = curve - load(&last_curve_.items[at(k)]);
-    by_nothing += step * step;
-    by_step += change * change;
-    by_change += curve * curve;
-    by_curve += rest * rest;
-    store(&last_step_.items[at(k)], step);
-    store(&last_change_.items[at(k)], change);
-    store(&last_curve_.items[at(k)], curve);
-  }
-  const double none = sum(by_nothing), first = sum(by_step), second = sum(by_change),
-               third = sum(by_curve);
-  predicting_ = std::min({first, second, third}) < kForeseen * none;
-  if (!predicting_) return;
-  const double change = std::min(second, third) < kForeseen * first ? 1 : 0;
-  const double curve = change != 0 && third < kForeseen * second ? 1 : 0;
-  for (int k = 0; k < columns * width; k += 4) {
-    store(&prediction_.items[at(k)], load(&last_step_.items[at(k)]) +
-                                         change * load(&last_change_.items[at(k)]) +
-                                         curve * load(&last_curve_.items[at(k)]));
-  }
-}
-
-void ModeTracker::forget_steps() noexcept {
-  for (PaddedRows* rows : {&step_, &last_step_, &last_change_, &last_curve_}) {
-    set_zero(basis_.Z.width, basis_.columns(), *rows);
-  }
-  predicting_ = false;
 }
 
 /// Newton's method from the basis as it is. Leaves the last step to be taken.
@@ -355,7 +296,8 @@ Status ModeTracker::solve_directly(const System<kMaxDof>& system, const StateFor
   const StateForm last = state_form(last_);
   has_places_ = has_places_ && last.joints == form.joints && last.strains == form.strains &&
                 last.factored == form.factored;
-  has_basis_ = predicting_ = false;
+  has_basis_ = false;
+  prediction_.pause();
   last_ = direct_;
   out.origin = SpectrumOrigin::kDirect;
   out.status = solver_.solve(direct_, spectrum_);
@@ -388,7 +330,8 @@ bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept 
   }
   if (has_places_) keep_places(form, before_, basis_);
   sizes_ = coefficient_sizes(form);
-  forget_steps();
+  prediction_.forget(basis_.Z.width, basis_.columns());
+  set_zero(basis_.Z.width, basis_.columns(), step_);
   if (!has_places_) {
     evaluate(form, basis_, defect_);
     certify(form, sizes_, 0, basis_, defect_, certificate_);

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/analysis/mode_numbers.hpp>
+#include <dashpot/analysis/step_prediction.hpp>
 #include <dashpot/analysis/tracked_certificate.hpp>
 
 #include <cstdint>
@@ -113,8 +114,6 @@ class ModeTracker {
   bool part(const Conflict& conflict) noexcept;
   bool publish(const StateForm& form, double distance, double target, bool fresh,
                TrackedSpectrum& out) noexcept;
-  void learn_step() noexcept;
-  void forget_steps() noexcept;
   Status solve_directly(const System<kMaxDof>& system, const StateForm& form, Fallback reason,
                         TrackedSpectrum& out) noexcept;
   bool restart(const StateForm& form, TrackedSpectrum& out) noexcept;
@@ -138,10 +137,8 @@ class ModeTracker {
   TrackedSpectrum kept_;  ///< the last spectrum with bounds that hold for changes up to kept_for_,
   double kept_for_ = -1;  ///< see distance(); none if negative
 
-  // Extrapolation: the whole step of this update so far, that of the last one and its first two
-  // differences from those before, and what is expected next.
-  PaddedRows step_, last_step_, last_change_, last_curve_, prediction_;
-  bool predicting_ = false;
+  PaddedRows step_;  ///< the whole step of this update so far
+  StepPrediction prediction_;
   bool turned_ = false;  ///< columns were rotated or parted: the step tells nothing
   int look_in_ = 0;      ///< updates until proportional damping is looked for
 
