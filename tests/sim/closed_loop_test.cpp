@@ -205,13 +205,13 @@ TEST_P(ClosedLoop, LosesEnergyAtEveryTickWithEnoughDamping) {
 
 /// C = 0: what energy the loop gains is that of the hold, and halves with the period.
 TEST_P(ClosedLoop, GainsNoEnergyButThroughTheHold) {
-  const TwinModels twin(GetParam(), false);
+  const TwinModels smooth(GetParam(), false);
   for (int i = 0; i < 2; ++i) {
     const JointVector q0 = posture();
     const JointVector dq = 0.05 * random.vector(q0.size()).normalized();
     double last = 0;
     for (const double period : {1e-3, 5e-4, 2.5e-4}) {
-      const EnergyRun free = run(twin, q0, dq, 0, period, period);
+      const EnergyRun free = run(smooth, q0, dq, 0, period, period);
       const double gain = free.end - free.start;
       EXPECT_LT(std::abs(gain), 0.5 * free.start);
       if (last != 0) {
