@@ -151,26 +151,19 @@ TEST_F(OutOfReach, SpringsAreDrawnOutNoFartherThanTheirReach) {
   const double pull = settings.initial.gains.task_stiffness(1, 1) * 0.2;
   EXPECT_NEAR(snapshot().tip_wrench[1], pull, 1e-3 * pull);
   // Pushed farther away at once, it is pulled no harder.
-  arm->state.position[0] -= 0.01;
-  next();
-  EXPECT_GT(drawn_out(), 0.203);
+  arm->state.position[0] -= 0.004;
+  EXPECT_LE(next(), Status::kTorqueLimited);
+  EXPECT_GT(drawn_out(), 0.201);
   EXPECT_LT(snapshot().tip_wrench.head<3>().norm(), pull * (1 + 1e-3));
 }
 
 TEST_F(OutOfReach, AGoalThatComesBackIsFollowedAtOnce) {
   arm->setpoint.tip_pose.position.y() += 5;
-  for (int k = 0; k < 15000; ++k) arm->step();
-  const double out = arm->tip().position.y() - home.position.y();
-  EXPECT_GT(out, 0.3);
+  for (int k = 0; k < 5000; ++k) next();
   arm->setpoint.tip_pose = home;
-  int ticks = 0;
-  while ((snapshot().setpoint_tip.position - home.position).norm() > 1e-3 && ticks < 20000) {
-    arm->step();
-    ++ticks;
-  }
-  EXPECT_LT(ticks, 1000 * (2 + 2 * (out + 0.2) / settings.motion.linear_velocity));
-  for (int k = 0; k < 3000; ++k) arm->step();
-  EXPECT_TRUE(near(arm->tip().position, home.position, 5e-3));
+  for (int k = 0; k < 1200; ++k) next();  // 0.2 m, and not the way of 5 s
+  EXPECT_TRUE(near(snapshot().setpoint_tip.position, home.position, 1e-9));
+  EXPECT_TRUE(snapshot().setpoint_twist.isZero(1e-9));
 }
 
 TEST_F(OutOfReach, ADirectionWithoutSpringsDrawsNothingOut) {
@@ -214,12 +207,12 @@ TEST_F(Safety, TaskSpringsThatGrowFromZeroStartWhereTheTipIs) {
     const Pose home = arm->setpoint.tip_pose;
     arm->setpoint.gains.task_stiffness(2, 2) = 0;
     run(1.0);
-    arm->state.external_wrench[2] = 10;
+    arm->state.external_wrench[2] = 3;
     for (int k = 0; k < 1000; ++k) arm->step();
     arm->state.external_wrench.setZero();
     run(1.0);
     const Pose there = arm->tip();
-    ASSERT_GT((there.position - home.position).norm(), 0.05);
+    ASSERT_GT((there.position - home.position).norm(), 0.03);
     arm->setpoint.gains = settings.initial.gains;
     arm->step();
     const Eigen::Vector3d off = snapshot().setpoint_tip.position - there.position;

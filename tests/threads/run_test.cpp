@@ -256,22 +256,17 @@ bool has_a_row(const std::string& csv) {
 
 // Whoever takes the processor away for longer than a period makes no tick slower.
 TEST(RunInFastMotion, CountsItsOwnComputingAlone) {
-  const Scratch scratch;
-  const std::string csv = scratch.path("states.csv");
-  Running run(
-      {"run", scene("panda_release_c2"), "--fast", "--duration", "1000", "--csv", csv, "--json"});
-  ASSERT_TRUE(has_a_row(csv));
-  for (int i = 0; i < 60; ++i) {
+  Running run({"run", scene("panda_release_c2"), "--fast", "--duration", "60", "--json"});
+  for (int i = 0; i < 150; ++i) {
     run.send(SIGSTOP);
-    std::this_thread::sleep_for(std::chrono::milliseconds(4));
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
     run.send(SIGCONT);
-    std::this_thread::sleep_for(std::chrono::milliseconds(4));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  run.send(SIGINT);
   EXPECT_EQ(run.finish(), 0) << run.complaints();
   const Json result = Json::parse(run.output());
+  EXPECT_EQ(result["ticks"], 60'000);
   EXPECT_EQ(result["overruns"], 0);
-  EXPECT_GT(result["tick_time"]["longest"].get<double>(), 0.003);  // it was away within a tick
 }
 
 // The releases take long with a period this short; the run itself is over when its table is there.
@@ -282,11 +277,12 @@ TEST(RunInFastMotion, EndsItsRingDownOnCtrlC) {
   text.replace(text.find("../models"), 9, std::string(DASHPOT_SOURCE_DIR) + "/sim/models");
   const std::string control = "control:\n";
   ASSERT_NE(text.find(control), std::string::npos);
-  text.insert(text.find(control) + control.size(), "  period: 10 us\n");
+  text.insert(text.find(control) + control.size(), "  period: 100 us\n");
+  text.insert(text.find(control), "motion: {smoothing: 10 ms}\n");
   const std::string file = scratch.write("slow.yaml", text), csv = scratch.path("states.csv");
   Running run(
-      {"run", file, "--fast", "--ring-down", "--duration", "0.00001", "--csv", csv, "--json"});
-  ASSERT_TRUE(has_a_row(csv));
+      {"run", file, "--fast", "--ring-down", "--duration", "0.0001", "--csv", csv, "--json"});
+  ASSERT_TRUE(has_a_row(csv)) << run.complaints();
   run.send(SIGINT);
   EXPECT_EQ(run.finish(), 0) << run.complaints();
   const Json result = Json::parse(run.output());
