@@ -2,6 +2,8 @@
 // is the largest relative one of an eigenvalue against 33 digits, `bound` what we prove of it.
 //   ours_direct, ours_tracked (from a system that differs by 1e-4), ours_values (the same without
 //     shapes), ours_reused (the same system again): {M, C, K} to modes, with proved bounds
+//   ours_working, ours_extended: directly, with residuals in working precision or in twice that
+//   ours_moved_1e-K: tracked from a system that differs by 1e-K; `passes` grow with the change
 //   eigen, eigen_values, dgeev (both sides), dgeev_values, dggev: from the 2m x 2m matrices, which
 //     are formed outside the clock
 #include <dashpot/analysis/mode_tracker.hpp>
@@ -107,12 +109,14 @@ void report(benchmark::State& state, const Problem& problem, const Values& found
 }
 
 template <int N>
-void direct(benchmark::State& state, const Problem& problem) {
+void direct(benchmark::State& state, const Problem& problem, SpectrumOptions::Residual residual) {
   System<N> system(problem.system.dof());
   system.mass = problem.system.mass;
   system.damping = problem.system.damping;
   system.stiffness = problem.system.stiffness;
-  SpectrumSolver<N> solver;
+  SpectrumOptions options;
+  options.residual = residual;
+  SpectrumSolver<N> solver(options);
   Spectrum<N> spectrum;
   for (auto _ : state) {
     benchmark::DoNotOptimize(solver.solve(system, spectrum));
@@ -128,13 +132,15 @@ void direct(benchmark::State& state, const Problem& problem) {
   state.counters["bound"] = bound;
 }
 
-void track(benchmark::State& state, const Problem& problem, bool shapes, bool reuse) {
+/// There and back by a relative `change`.
+void track(benchmark::State& state, const Problem& problem, bool shapes, double change) {
   System<kMaxDof> system(problem.system.dof());
   system.mass = problem.system.mass;
   system.damping = problem.system.damping;
   system.stiffness = problem.system.stiffness;
   System<kMaxDof> other = system;
-  if (!reuse) other.stiffness *= 1 + 1e-4, other.mass *= 1 - 1e-4;
+  other.stiffness *= 1 + change;
+  other.mass *= 1 - change;
   TrackerOptions options;
   options.shapes = shapes;
   const auto tracker = std::make_unique<ModeTracker>(options);
@@ -142,13 +148,16 @@ void track(benchmark::State& state, const Problem& problem, bool shapes, bool re
   tracker->update(system, *spectrum);
   long runs = 0;
   const TrackerCounters before = tracker->counters();
-  for (auto _ : state) {  // there or back
+  for (auto _ : state) {
     ++runs;
     benchmark::DoNotOptimize(tracker->update(runs % 2 == 0 ? system : other, *spectrum));
     benchmark::ClobberMemory();
   }
+  const TrackerCounters& after = tracker->counters();
   state.counters["direct_share"] =
-      static_cast<double>(tracker->counters().direct - before.direct) / static_cast<double>(runs);
+      static_cast<double>(after.direct - before.direct) / static_cast<double>(runs);
+  state.counters["passes"] =
+      static_cast<double>(after.passes - before.passes) / static_cast<double>(runs);
   if (runs % 2 != 0) tracker->update(system, *spectrum);
   Values found;
   double bound = 0;
@@ -233,13 +242,27 @@ void add_problem(const Family& family, int m) {
       function(state, *problem);
     })->Unit(benchmark::kMicrosecond);
   };
+  using Residual = SpectrumOptions::Residual;
+  const auto add_direct = [&](const std::string& method, Residual residual) {
+    add(method, [=](auto& state, const Problem& p) {
+      m <= kMaxDof ? direct<kMaxDof>(state, p, residual) : direct<kDynamic>(state, p, residual);
+    });
+  };
+  const auto add_tracked = [&](const std::string& method, bool shapes, double change) {
+    add(method, [=](auto& state, const Problem& p) { track(state, p, shapes, change); });
+  };
+  add_direct("ours_direct", Residual::kAutomatic);
   if (m <= kMaxDof) {
-    add("ours_direct", direct<kMaxDof>);
-    add("ours_tracked", [](auto& state, const Problem& p) { track(state, p, true, false); });
-    add("ours_values", [](auto& state, const Problem& p) { track(state, p, false, false); });
-    add("ours_reused", [](auto& state, const Problem& p) { track(state, p, true, true); });
-  } else {
-    add("ours_direct", direct<kDynamic>);
+    add_tracked("ours_tracked", true, 1e-4);
+    add_tracked("ours_values", false, 1e-4);
+    add_tracked("ours_reused", true, 0);
+  }
+  if (m == 6) {
+    add_direct("ours_working", Residual::kWorking);
+    add_direct("ours_extended", Residual::kExtended);
+    for (const int digits : {1, 2, 3, 5, 7, 9, 11}) {
+      add_tracked("ours_moved_1e-" + std::to_string(digits), true, std::pow(10, -digits));
+    }
   }
   add("eigen", [](auto& state, const Problem& p) { eigen(state, p, true); });
   add("eigen_values", [](auto& state, const Problem& p) { eigen(state, p, false); });

@@ -29,7 +29,8 @@ void simulations() {
       for (int tick = 0; tick < 500; ++tick) plant.step(torque);
       const std::string name = "simulation." + std::to_string(static_cast<int>(method)) +
                                (adaptive ? ".adaptive" : ".fixed");
-      print_all("motion", name, plant.position());
+      const bool numerical = method == sim::Method::kRosenbrock;
+      print_all(numerical ? "numerical_motion" : "motion", name, plant.position());
     }
   }
 }

@@ -14,8 +14,8 @@ using namespace dashpot;  // NOLINT(google-build-using-namespace)
 using agree::print;
 
 void print_mode(const std::string& name, const analysis::ModeNumbers& mode) {
-  print("frequency", name + ".frequency", mode.natural_frequency);
-  print("ratio", name + ".ratio", mode.damping_ratio);
+  print("tracked_frequency", name + ".frequency", mode.natural_frequency);
+  print("tracked_ratio", name + ".ratio", mode.damping_ratio);
 }
 
 void spectra() {

@@ -6,10 +6,13 @@ import sys
 
 # kind: (relative, absolute), of the larger of the two
 TOLERANCES = {
-    "frequency": (1e-10, 0),  # rad/s
-    "ratio": (0, 1e-10),
-    "torque": (1e-10, 1e-7),  # N m
-    "motion": (0, 1e-8),  # rad, after half a second
+    "frequency": (1e-12, 0),  # rad/s
+    "ratio": (0, 1e-12),
+    "tracked_frequency": (1e-10, 0),  # what is followed is refined until it is right to this
+    "tracked_ratio": (0, 1e-10),
+    "torque": (1e-12, 1e-12),  # N m
+    "motion": (0, 1e-12),  # rad, after half a second
+    "numerical_motion": (0, 1e-8),  # by a method whose derivatives are numerical: half the digits
 }
 
 

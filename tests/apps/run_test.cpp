@@ -152,6 +152,12 @@ TEST(Run, TheSameSceneGivesTheSameBits) {
   const std::string first = scratch.read("a.csv");
   EXPECT_EQ(count_lines(first), 2501);
   EXPECT_EQ(first, scratch.read("b.csv"));
+  // Nor does it matter whether states and modes are published.
+  EXPECT_EQ(run_scene(scene("panda"), {"--duration", "2.5", "--csv", scratch.path("c.csv"), "--log",
+                                       scratch.path("c.lcm")})
+                .status,
+            0);
+  EXPECT_EQ(first, scratch.read("c.csv"));
 }
 
 // Table 1 of the paper: 20.25, 10.98, 9.755 rad/s with 0.0255, 0.0316, 0.0294 (C1), 20.23, 10.95,

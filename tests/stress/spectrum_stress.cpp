@@ -173,7 +173,8 @@ Judgements judge(const System<>& system, dashpot::analysis::ModeTracker& tracker
   Spectrum<> spectrum;
   result.direct.status = SpectrumSolver<>().solve(system, spectrum);
   if (is_refusal(result.direct.status)) {
-    result.direct.verdict = result.tracked.verdict = Verdict::kRefused;
+    result.direct.verdict = Verdict::kRefused;
+    result.tracked = result.direct;
     return result;
   }
   result.direct.zero_modes = kModes - spectrum.modes.size();
