@@ -48,20 +48,20 @@ typedef struct dashpot_controller dashpot_controller;
  * where the robot is. Below zero: a call that was refused and did nothing. */
 enum {
   DASHPOT_OK = 0,
-  DASHPOT_TORQUE_LIMITED = 1,     /* a torque or torque-rate limit is at work */
-  DASHPOT_NEAR_JOINT_LIMIT = 2,   /* a joint is pushed back from a position limit that is near */
-  DASHPOT_WRENCH_NOT_FINITE = 3,  /* NaN or infinity in the external wrench: the last one stays */
-  DASHPOT_SETPOINT_REJECTED = 4,  /* the set-point is not possible; the last good one stays */
-  DASHPOT_SETPOINT_STALE = 5,     /* the set-point is old: hold */
-  DASHPOT_SETPOINT_LOST = 6,      /* the set-point is very old: damp */
-  DASHPOT_TIME_GAP = 7,           /* the last state is too long ago: damp */
-  DASHPOT_VELOCITY_LIMIT = 8,     /* a joint is too fast: damp */
-  DASHPOT_POSITION_LIMIT = 9,     /* a joint is outside its position limits: damp, and push back */
-  DASHPOT_STATE_NOT_FINITE = 10,  /* NaN or infinity in position or velocity: ramp */
-  DASHPOT_STATE_WRONG_SIZE = 11,  /* the state is missing or has not n joints: ramp */
-  DASHPOT_STATE_JUMP = 12,        /* farther from the last state than the robot can move: ramp */
-  DASHPOT_TIME_BACKWARD = 13,     /* the state's time is at or before the last one: ramp */
-  DASHPOT_NOT_FINITE = 14,        /* the torque would not be finite: ramp */
+  DASHPOT_TORQUE_LIMITED = 1,    /* a torque or torque-rate limit is at work */
+  DASHPOT_NEAR_JOINT_LIMIT = 2,  /* a joint is pushed back from a position limit that is near */
+  DASHPOT_WRENCH_NOT_FINITE = 3, /* NaN or infinity in the external wrench: the last one stays */
+  DASHPOT_SETPOINT_REJECTED = 4, /* the set-point is not possible; the last good one stays */
+  DASHPOT_SETPOINT_STALE = 5,    /* the set-point is old: hold */
+  DASHPOT_SETPOINT_LOST = 6,     /* the set-point is very old: damp */
+  DASHPOT_TIME_GAP = 7,          /* the last state is too long ago: damp */
+  DASHPOT_VELOCITY_LIMIT = 8,    /* a joint is too fast: damp */
+  DASHPOT_POSITION_LIMIT = 9,    /* a joint is outside its position limits: damp, and push back */
+  DASHPOT_STATE_NOT_FINITE = 10, /* NaN or infinity in position or velocity: ramp */
+  DASHPOT_STATE_WRONG_SIZE = 11, /* the state is missing or has not n joints: ramp */
+  DASHPOT_STATE_JUMP = 12,       /* farther from the last state than the robot can move: ramp */
+  DASHPOT_TIME_BACKWARD = 13,    /* the state's time is at or before the last one: ramp */
+  DASHPOT_NOT_FINITE = 14,       /* the torque would not be finite: ramp */
 
   DASHPOT_NULL_ARGUMENT = -1,     /* a pointer that has to be there is NULL */
   DASHPOT_WRONG_STRUCT_SIZE = -2, /* struct_size is not that of this version */

@@ -64,9 +64,9 @@ struct VibrationCounters {
   std::uint64_t no_zero_modes = 0;  ///< springs hold every motion: nothing to keep apart
   /// Of the tracked: the undamped modes decouple the damping, and strains are followed alone
   std::uint64_t proportional = 0;
-  std::uint64_t no_wrench = 0;      ///< K_G is on, but there is no external wrench
-  std::uint64_t no_shapes = 0;      ///< nobody asks for shapes
-  std::uint64_t at_rest = 0;        ///< J' C_C Jdot is on, but the robot stands still
+  std::uint64_t no_wrench = 0;  ///< K_G is on, but there is no external wrench
+  std::uint64_t no_shapes = 0;  ///< nobody asks for shapes
+  std::uint64_t at_rest = 0;    ///< J' C_C Jdot is on, but the robot stands still
 };
 
 /// Vibration modes of the robot with the springs and dampers of one tick.

@@ -91,7 +91,7 @@ TEST_P(ResponseOracle, Step) {
 TEST_P(ResponseOracle, Harmonic) {
   expect_agreement(reference_.harmonic_response, kTolerance, [&](double t) {
     return response.harmonic(reference_.harmonic_cosine, reference_.harmonic_sine,
-                              reference_.harmonic_frequency, t);
+                             reference_.harmonic_frequency, t);
   });
 }
 
