@@ -28,7 +28,7 @@ class SeveralZeroModes : public ::testing::TestWithParam<std::tuple<int, Frictio
 TEST_P(SeveralZeroModes, AreFollowed) {
   const auto [p, friction] = GetParam();
   const int n = 9;
-  Random random(5400 + p);
+  Random random(5400U + static_cast<unsigned>(p));
   const MatrixXd M = MatrixXd::Identity(n, n) + 0.1 / n * random.spd(n);
   MatrixXd W = 0.3 * random.matrix(p, n);
   for (int i = 0; i < p; ++i) W(i, i) += 10 + 2 * i;
@@ -54,8 +54,9 @@ TEST_P(SeveralZeroModes, AreFollowed) {
       const double rate = spectrum->zero_mode_rates[static_cast<std::size_t>(k)];
       double nearest = std::numeric_limits<double>::infinity();
       for (const auto& value : testing::true_eigenvalues(system)) {
-        nearest =
-            std::min(nearest, static_cast<double>(std::abs(value - testing::LongComplex(rate))));
+        nearest = std::min(
+            nearest, static_cast<double>(
+                         std::abs(value - testing::LongComplex(static_cast<long double>(rate)))));
       }
       EXPECT_LE(nearest, 1e-11);
     }
