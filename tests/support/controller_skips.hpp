@@ -60,7 +60,10 @@ class AnalysisSkips {
     compare_bits(plain_modes(plain_->vibration()), plain_modes(modes), shapes);
     ++shapes.left_out;
     const controller::Vibration& rare = rare_->vibration();
-    if (rare.tick != modes.tick) return void(++every.left_out);
+    if (rare.tick != modes.tick) {
+      ++every.left_out;
+      return;
+    }
     if (has_modes(rare))
       compare_bounded(plain_modes(rare), plain_modes(modes), modes.zero_modes, 0, every);
   }
