@@ -35,8 +35,8 @@ System<> system_of(const ResponseCase& reference) {
 
 class ResponseOracle : public ::testing::TestWithParam<std::string> {
  protected:
-  const ResponseCase& reference_ = testing::response_case(GetParam());
-  System<> system = system_of(reference_);
+  const ResponseCase& reference = testing::response_case(GetParam());
+  System<> system = system_of(reference);
   Response response{system, analyze(system)};
 
   template <class Ask>
@@ -73,37 +73,37 @@ INSTANTIATE_TEST_SUITE_P(Systems, ResponseOracle, ::testing::ValuesIn([] {
 constexpr double kTolerance = 1e-12;
 
 TEST_P(ResponseOracle, FreeMotion) {
-  expect_agreement(reference_.free, kTolerance, [&](double t) {
-    return response.free(reference_.initial_position, reference_.initial_velocity, t);
+  expect_agreement(reference.free, kTolerance, [&](double t) {
+    return response.free(reference.initial_position, reference.initial_velocity, t);
   });
 }
 
 TEST_P(ResponseOracle, Impulse) {
-  expect_agreement(reference_.impulse_response, kTolerance,
-                   [&](double t) { return response.impulse(reference_.impulse, t); });
+  expect_agreement(reference.impulse_response, kTolerance,
+                   [&](double t) { return response.impulse(reference.impulse, t); });
 }
 
 TEST_P(ResponseOracle, Step) {
-  expect_agreement(reference_.step_response, kTolerance,
-                   [&](double t) { return response.step(reference_.constant_force, t); });
+  expect_agreement(reference.step_response, kTolerance,
+                   [&](double t) { return response.step(reference.constant_force, t); });
 }
 
 TEST_P(ResponseOracle, Harmonic) {
-  expect_agreement(reference_.harmonic_response, kTolerance, [&](double t) {
-    return response.harmonic(reference_.harmonic_cosine, reference_.harmonic_sine,
-                             reference_.harmonic_frequency, t);
+  expect_agreement(reference.harmonic_response, kTolerance, [&](double t) {
+    return response.harmonic(reference.harmonic_cosine, reference.harmonic_sine,
+                             reference.harmonic_frequency, t);
   });
 }
 
 TEST_P(ResponseOracle, Sampled) {
-  const VectorXd rest = VectorXd::Zero(reference_.n);
-  expect_agreement(reference_.sampled_response, kTolerance, [&](double t) {
-    return response.sampled(rest, rest, reference_.samples, reference_.sample_step, {t}).front();
+  const VectorXd rest = VectorXd::Zero(reference.n);
+  expect_agreement(reference.sampled_response, kTolerance, [&](double t) {
+    return response.sampled(rest, rest, reference.samples, reference.sample_step, {t}).front();
   });
 }
 
 TEST_P(ResponseOracle, Receptance) {
-  for (const auto& [frequency, value] : reference_.receptance) {
+  for (const auto& [frequency, value] : reference.receptance) {
     const Eigen::MatrixXcd H = response.receptance(frequency);
     EXPECT_TRUE(near(H, value, kTolerance * value.cwiseAbs().maxCoeff())) << frequency;
   }

@@ -67,14 +67,14 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
   void expect_complete() const {
     ASSERT_EQ(spectrum.status, Status::kOk) << to_text(spectrum.status);
     EXPECT_TRUE(spectrum.symmetric);
-    EXPECT_EQ(spectrum.zero_modes.count, reference_.r);
-    EXPECT_EQ(spectrum.modes.size(), reference_.n - reference_.r);
+    EXPECT_EQ(spectrum.zero_modes.count, reference.r);
+    EXPECT_EQ(spectrum.modes.size(), reference.n - reference.r);
     // The eigenvalues of this one lie 1e-10 apart, and their vectors are all but parallel.
-    const double limit = reference_.name == "nearly_coinciding_n4_2^-33" ? 5e-13 : 1e-13;
+    const double limit = reference.name == "nearly_coinciding_n4_2^-33" ? 5e-13 : 1e-13;
     for (const Mode<>& mode : spectrum.modes) {
       const double computed = backward_error(system, mode);
       EXPECT_LE(computed, limit) << "at " << mode.eigenvalues[0];
-      EXPECT_NEAR(mode.backward_error, computed, 2e-16 * (reference_.n + 4));
+      EXPECT_NEAR(mode.backward_error, computed, 2e-16 * (reference.n + 4));
     }
   }
 
@@ -100,15 +100,15 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
   void expect_enclosed() {
     if (HasFatalFailure()) return;
     const std::vector<Complex> computed = eigenvalues();
-    ASSERT_EQ(computed.size(), reference_.eigenvalues.size());
-    const auto matches = testing::match_eigenvalues(computed, reference_.eigenvalues);
+    ASSERT_EQ(computed.size(), reference.eigenvalues.size());
+    const auto matches = testing::match_eigenvalues(computed, reference.eigenvalues);
     for (int i = 0; i < spectrum.modes.size(); ++i) {
       const Mode<>& mode = spectrum.modes[i];
       const auto k = 2 * static_cast<std::size_t>(i);
       expect_within("first eigenvalue", i, matches[k].absolute, mode.error_bound);
       expect_within("second eigenvalue", i, matches[k + 1].absolute, mode.error_bound);
-      const ReferenceEigenvalue& first = reference_.eigenvalues[matches[k].reference];
-      const ReferenceEigenvalue& second = reference_.eigenvalues[matches[k + 1].reference];
+      const ReferenceEigenvalue& first = reference.eigenvalues[matches[k].reference];
+      const ReferenceEigenvalue& second = reference.eigenvalues[matches[k + 1].reference];
       const LongComplex a = first.value();
       const LongComplex b = first.is_real() ? second.value() : std::conj(a);
       const long double product = (a * b).real();
@@ -132,10 +132,10 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
   void expect_zero_mode_rates() const {
     if (HasFatalFailure()) return;
     const std::vector<Complex> computed = eigenvalues();
-    const auto matches = testing::match_eigenvalues(computed, reference_.eigenvalues);
+    const auto matches = testing::match_eigenvalues(computed, reference.eigenvalues);
     for (std::size_t k = 2 * static_cast<std::size_t>(spectrum.modes.size()); k < computed.size();
          ++k) {
-      const ReferenceEigenvalue& truth = reference_.eigenvalues[matches[k].reference];
+      const ReferenceEigenvalue& truth = reference.eigenvalues[matches[k].reference];
       if (truth.is_zero()) {
         EXPECT_EQ(computed[k], 0.0);
       } else {
@@ -149,8 +149,8 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
     RecordProperty("loosest_bound_over_error", std::to_string(all_seen.loosest));
   }
 
-  const SpectrumCase& reference_ = testing::spectrum_case(GetParam());
-  System<> system = system_of(reference_);
+  const SpectrumCase& reference = testing::spectrum_case(GetParam());
+  System<> system = system_of(reference);
   Spectrum<> spectrum;
   Tightness seen;
   inline static Tightness all_seen;
@@ -209,7 +209,7 @@ INSTANTIATE_TEST_SUITE_P(Systems, SpectrumOracleWithFactor,
                          alphanumeric);
 
 TEST_P(SpectrumOracleWithFactor, EnclosesTheTruth) {
-  system.stiffness_factor = *reference_.stiffness_factor;
+  system.stiffness_factor = *reference.stiffness_factor;
   for (const auto residual :
        {SpectrumOptions::Residual::kAutomatic, SpectrumOptions::Residual::kExtended}) {
     solve(residual);
