@@ -53,21 +53,21 @@ Index checked_dof(const std::vector<Recording>& recordings, const MotionFitOptio
 /// The recordings in the coordinates x.
 struct States {
   std::vector<MatrixXd> of;  // 2n x samples each
-  MatrixXd L_transposed;     // n x n
+  MatrixXd L_T;              // n x n
   double weight = 1;         // w, 1/s
 
   States(const std::vector<Recording>& recordings, const MatrixXd& mass, Index n)
-      : L_transposed(MatrixXd::Identity(n, n)) {
+      : L_T(MatrixXd::Identity(n, n)) {
     if (mass.size() != 0) {
       const Eigen::LLT<MatrixXd> factors(mass);
       require(mass.allFinite() && factors.info() == Eigen::Success,
               "mass is not positive definite");
-      L_transposed = factors.matrixU();
+      L_T = factors.matrixU();
     }
     double q_size = 0, v_size = 0;
     for (const auto& [q, v] : recordings) {
       MatrixXd x(2 * n, q.cols());
-      x << L_transposed * q, L_transposed * v;
+      x << L_T * q, L_T * v;
       q_size += x.topRows(n).squaredNorm();
       v_size += x.bottomRows(n).squaredNorm();
       of.push_back(std::move(x));
@@ -129,7 +129,7 @@ LinearFit::LinearFit(const States& states, int stride, const MotionFitOptions& o
 
   const Eigen::EigenSolver<MatrixXd> solver(A);
   require(solver.info() == Eigen::Success, "the eigenvalue iteration did not converge");
-  const VectorXcd z = solver.eigenvalues();
+  const VectorXcd& z = solver.eigenvalues();
   const MatrixXcd right = solver.eigenvectors(), left = right.inverse();
   const double duration = stride * options.period;
   const Index n = X0.rows() / 2;
@@ -163,14 +163,14 @@ int chosen_stride(const States& states, const MotionFitOptions& options) {
   return static_cast<int>(std::clamp(stride, 1.0, longest));
 }
 
-FittedMode to_mode(const FittedRoot& first, const FittedRoot& second, const MatrixXd& L_transposed,
+FittedMode to_mode(const FittedRoot& first, const FittedRoot& second, const MatrixXd& L_T,
                    double soft_frequency) {
   const ModeNumbers numbers =
       mode_numbers(first, second, root_invariants(first, second), soft_frequency);
   const VectorXcd& shape = numbers.eigenvalues[0] == first.value ? first.shape : second.shape;
   VectorXcd u(shape.size());
-  u.real() = L_transposed.triangularView<Eigen::Upper>().solve(shape.real());
-  u.imag() = L_transposed.triangularView<Eigen::Upper>().solve(shape.imag());
+  u.real() = L_T.triangularView<Eigen::Upper>().solve(shape.real());
+  u.imag() = L_T.triangularView<Eigen::Upper>().solve(shape.imag());
   return {numbers.eigenvalues,
           numbers.natural_frequency,
           numbers.damping_ratio,
@@ -217,13 +217,13 @@ MotionFit fit_motion(const std::vector<Recording>& recordings, const MotionFitOp
     if (!roots[i].pairs || roots[i].value.imag() <= 0) continue;
     FittedRoot conjugate = roots[i];
     conjugate.value = std::conj(conjugate.value);
-    fit.modes.push_back(to_mode(roots[i], conjugate, states.L_transposed, options.soft_frequency));
+    fit.modes.push_back(to_mode(roots[i], conjugate, states.L_T, options.soft_frequency));
   }
   for (;;) {
     const auto [i, j] = most_alike(roots, used);
     if (i == j) break;
     used[i] = used[j] = true;
-    fit.modes.push_back(to_mode(roots[i], roots[j], states.L_transposed, options.soft_frequency));
+    fit.modes.push_back(to_mode(roots[i], roots[j], states.L_T, options.soft_frequency));
   }
   for (std::size_t i = 0; i < roots.size(); ++i) {
     if (!used[i]) fit.unpaired.push_back(roots[i].value);

@@ -27,7 +27,7 @@ Eigen::VectorXd parse_numbers(const std::string& option, const std::string& text
 
 Eigen::VectorXd numbers_per_joint(const std::string& option, const std::string& text,
                                   Eigen::Index n) {
-  const Eigen::VectorXd values = parse_numbers(option, text);
+  Eigen::VectorXd values = parse_numbers(option, text);
   if (values.size() != 1 && values.size() != n) {
     throw controller::InputError(
         option, std::to_string(values.size()) + " numbers, expected 1 or " + std::to_string(n));

