@@ -219,7 +219,7 @@ void multiply_pure(const StateForm& form, const TrackedBasis& basis, TrackedDefe
   const int n = form.joints, p = form.strains, m = basis.modes, width = basis.Z.width;
   const PaddedMultiply strains = padded_multiply(m), velocities = padded_multiply(n);
   const double *const Z_s = basis.Z.row(0), *const V = basis.Z.row(p) + m;
-  const Strided Z_s_transposed{Z_s, 1, width}, V_transposed{V, 1, width};
+  const Strided Z_sT{Z_s, 1, width}, V_T{V, 1, width};
   const auto clear = [&](PaddedRows& X, int first, int rows) {
     std::fill_n(X.row(first), rows * width, 0.0);
   };
@@ -231,10 +231,10 @@ void multiply_pure(const StateForm& form, const TrackedBasis& basis, TrackedDefe
   const double* const KZ_s = form.factored ? Z_s : defect.MV.row(0);
   clear(defect.R, 0, basis.columns());
   clear(defect.G, 0, basis.columns());
-  strains(Z_s_transposed, m, p, KZ_s, nullptr, 1, defect.R.row(0), width);
-  velocities(V_transposed, n, n, defect.MV.row(p) + m, nullptr, 1, defect.R.row(m) + m, width);
-  velocities(Z_s_transposed, m, p, defect.image.row(0) + m, nullptr, 1, defect.G.row(0) + m, width);
-  velocities(V_transposed, n, n, defect.image.row(p) + m, nullptr, 1, defect.G.row(m) + m, width);
+  strains(Z_sT, m, p, KZ_s, nullptr, 1, defect.R.row(0), width);
+  velocities(V_T, n, n, defect.MV.row(p) + m, nullptr, 1, defect.R.row(m) + m, width);
+  velocities(Z_sT, m, p, defect.image.row(0) + m, nullptr, 1, defect.G.row(0) + m, width);
+  velocities(V_T, n, n, defect.image.row(p) + m, nullptr, 1, defect.G.row(m) + m, width);
   for (int i = 0; i < m; ++i) {
     for (int j = m; j < basis.columns(); ++j) defect.G(j, i) = defect.G(i, j);
   }

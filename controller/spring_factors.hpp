@@ -157,10 +157,12 @@ class FactorRows {
   }
 
  private:
-  static std::size_t place(int j) noexcept { return static_cast<std::size_t>(j * kMost); }
+  static std::size_t place(int j) noexcept {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(kMost);
+  }
   double* column(int j) noexcept { return items_.data() + place(j); }
 
-  std::array<double, static_cast<std::size_t>(N* kMost)> items_{};
+  std::array<double, static_cast<std::size_t>(N) * static_cast<std::size_t>(kMost)> items_{};
   int size_ = 0;
 };
 
