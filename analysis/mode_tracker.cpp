@@ -25,6 +25,8 @@ constexpr double kNothing = -1;
 constexpr double kLeastMixing = 1e-9;
 /// Times the step squared: a step mixes as much by itself.
 constexpr double kStepMixing = 4;
+/// From this pass on a basis is not kept proportional: nothing may slow Newton's method down.
+constexpr int kPurePasses = 4;
 /// Updates between two looks whether the damping is proportional.
 constexpr int kLookEvery = 64;
 /// Blocks are balanced again when their columns lean this much towards each other.
@@ -265,7 +267,7 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     add(E_, columns, step_);
     if (!(size < 1)) return false;
     const double mixed = kLeastMixing + kStepMixing * size * size;
-    basis_.proportional = basis_.proportional && mixing(basis_, E_) <= mixed;
+    basis_.proportional = basis_.proportional && pass < kPurePasses && mixing(basis_, E_) <= mixed;
     if (!conflict && size <= kLastStep &&
         publish(form, 0, size <= kConverged ? kInfinity : options_.target_bound, true, out)) {
       return true;
