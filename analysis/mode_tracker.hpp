@@ -103,6 +103,7 @@ class ModeTracker {
     soft_ = {};
     certificate_.noise = 0;
     lineage_ = 0;
+    look_in_ = 0;
   }
 
   const TrackerCounters& counters() const noexcept { return counters_; }

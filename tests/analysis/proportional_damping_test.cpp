@@ -164,6 +164,27 @@ TEST(ProportionalRoad, SurvivesModesThatCross) {
   EXPECT_GE(tracked.counters().proportional, 1500);
 }
 
+TEST(ProportionalRoad, IsLookedForAnewOnceThePastIsForgotten) {
+  const auto system = [](int step) {
+    System<kMaxDof> at = arm(1e-3 * step, 0.3, true);
+    at.damping(2, 2) += step < 10 ? 5 : 0;
+    return at;
+  };
+  Tracked used, fresh;
+  for (int step = 0; step < 30; ++step)
+    ASSERT_EQ(used.update(arm(1e-3 * step, 0.3, true)), Status::kOk);
+  used.tracker->forget();
+  for (int step = 0; step < 100; ++step) {
+    const auto before = used.counters().proportional;
+    const auto before_fresh = fresh.counters().proportional;
+    ASSERT_EQ(used.update(system(step)), Status::kOk);
+    ASSERT_EQ(fresh.update(system(step)), Status::kOk);
+    ASSERT_EQ(used.counters().proportional - before, fresh.counters().proportional - before_fresh)
+        << "step " << step;
+    for (int i = 0; i < 7; ++i) ASSERT_EQ(used.mode(i).eigenvalues, fresh.mode(i).eigenvalues);
+  }
+}
+
 TEST(ProportionalRoad, IsTakenForAnyNumberOfJointsAndModes) {
   Random random(5301);
   for (int n = 1; n <= kMaxDof; ++n) {
