@@ -1,5 +1,6 @@
 #include <dashpot/analysis/padded_rows.hpp>
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 
@@ -52,6 +53,17 @@ constexpr std::array<PaddedMultiply, sizeof...(I)> table(std::integer_sequence<i
 }
 
 }  // namespace
+
+void set_zero(int width, int rows, PaddedRows& X) noexcept {
+  X.width = width;
+  std::fill_n(X.items.begin(), rows * width, 0.0);
+}
+
+void add(const PaddedRows& Y, int rows, PaddedRows& X) noexcept {
+  for (int k = 0; k < rows * X.width; k += 4) {
+    store(X.items.data() + k, load(X.items.data() + k) + load(Y.items.data() + k));
+  }
+}
 
 PaddedMultiply padded_multiply(int columns) noexcept {
   static constexpr auto kTable = table(std::make_integer_sequence<int, kMaxWidth / 4>());

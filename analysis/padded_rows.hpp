@@ -21,6 +21,10 @@ inline Lanes magnitude(const Lanes& x) noexcept {
   return x < Lanes{} ? -x : x;
 }
 
+inline double sum(const Lanes& x) noexcept {
+  return (x[0] + x[1]) + (x[2] + x[3]);
+}
+
 /// Longest row, in doubles: the eigenvectors of 16 joints.
 inline constexpr int kMaxWidth = 32;
 
@@ -35,6 +39,11 @@ struct PaddedRows {
   double& operator()(int i, int j) { return row(i)[j]; }
   const double& operator()(int i, int j) const { return row(i)[j]; }
 };
+
+/// X(i, j) = 0 for `rows` rows of this width.
+void set_zero(int width, int rows, PaddedRows& X) noexcept;
+/// X += Y, of `rows` rows.
+void add(const PaddedRows& Y, int rows, PaddedRows& X) noexcept;
 
 /// A matrix whose entry (i, k) is data[i * row_step + k * column_step].
 struct Strided {

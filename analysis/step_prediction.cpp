@@ -12,22 +12,7 @@ std::size_t at(int i) {
   return static_cast<std::size_t>(i);
 }
 
-double sum(const Lanes& x) {
-  return (x[0] + x[1]) + (x[2] + x[3]);
-}
-
 }  // namespace
-
-void set_zero(int width, int rows, PaddedRows& X) noexcept {
-  X.width = width;
-  std::fill_n(X.items.begin(), rows * width, 0.0);
-}
-
-void add(const PaddedRows& Y, int rows, PaddedRows& X) noexcept {
-  for (int k = 0; k < rows * X.width; k += 4) {
-    store(&X.items[at(k)], load(&X.items[at(k)]) + load(&Y.items[at(k)]));
-  }
-}
 
 void StepPrediction::learn(const PaddedRows& step, int rows) noexcept {
   const int size = rows * step.width;

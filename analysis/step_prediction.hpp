@@ -3,11 +3,6 @@
 
 namespace dashpot::analysis {
 
-/// X(i, j) = 0 for `rows` rows of this width.
-void set_zero(int width, int rows, PaddedRows& X) noexcept;
-/// X += Y, of `rows` rows.
-void add(const PaddedRows& Y, int rows, PaddedRows& X) noexcept;
-
 /// Foresees the step by which a basis changes from one update to the next, from its last three: by
 /// that polynomial which would have foreseen the last one best, of degree 2, 1, 0, or no step at
 /// all.

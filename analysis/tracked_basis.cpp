@@ -173,7 +173,7 @@ double squared_norm(const TrackedBasis& basis, const PaddedRows& X) {
   for (int i = 0; i < basis.columns(); ++i) {
     for (int j = 0; j < X.width; j += 4) squares += load(X.row(i) + j) * load(X.row(i) + j);
   }
-  return (squares[0] + squares[1]) + (squares[2] + squares[3]);
+  return sum(squares);
 }
 
 /// Couplings between zero modes that come of what the rest of the step, to its square, lets them
@@ -220,17 +220,14 @@ void multiply_pure(const StateForm& form, const TrackedBasis& basis, TrackedDefe
   const PaddedMultiply strains = padded_multiply(m), velocities = padded_multiply(n);
   const double *const Z_s = basis.Z.row(0), *const V = basis.Z.row(p) + m;
   const Strided Z_sT{Z_s, 1, width}, V_T{V, 1, width};
-  const auto clear = [&](PaddedRows& X, int first, int rows) {
-    std::fill_n(X.row(first), rows * width, 0.0);
-  };
-  clear(defect.MV, p, n);
+  for (PaddedRows* rows : {&defect.R, &defect.G, &defect.MV}) {
+    set_zero(width, basis.columns(), *rows);
+  }
   velocities({form.M, 1, n}, n, n, V, nullptr, -1, defect.MV.row(p) + m, width);
   velocities({form.W, 1, p}, p, n, V, nullptr, 1, defect.image.row(0) + m, width);
   velocities({form.C, 1, n}, n, n, V, nullptr, 1, defect.image.row(p) + m, width);
   if (!form.factored) strains({form.W, 1, p}, p, p, Z_s, nullptr, 1, defect.MV.row(0), width);
   const double* const KZ_s = form.factored ? Z_s : defect.MV.row(0);
-  clear(defect.R, 0, basis.columns());
-  clear(defect.G, 0, basis.columns());
   strains(Z_sT, m, p, KZ_s, nullptr, 1, defect.R.row(0), width);
   velocities(V_T, n, n, defect.MV.row(p) + m, nullptr, 1, defect.R.row(m) + m, width);
   velocities(Z_sT, m, p, defect.image.row(0) + m, nullptr, 1, defect.G.row(0) + m, width);

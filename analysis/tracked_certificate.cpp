@@ -33,10 +33,6 @@ Lanes square_root(Lanes x) {
   return x;
 }
 
-double sum(const Lanes& x) {
-  return (x[0] + x[1]) + (x[2] + x[3]);
-}
-
 /// What bounds the errors of a set of blocks, of one, or of one in each lane.
 template <typename T>
 struct BlockSizes {
