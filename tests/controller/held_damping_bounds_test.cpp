@@ -20,13 +20,7 @@ namespace {
 
 using testing::LedArm;
 using testing::plain_settings;
-
-/// An arm without friction.
-RobotModel smooth_arm(const testing::Arm& arm) {
-  ModelOptions options;
-  options.damping = Eigen::VectorXd::Zero(testing::arm_model(arm).dof());
-  return testing::arm_model(arm, options);
-}
+using testing::smooth_arm;
 
 RobotModel panda() {
   return smooth_arm(testing::arms()[0]);

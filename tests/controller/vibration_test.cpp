@@ -14,6 +14,7 @@
 namespace dashpot::controller {
 namespace {
 
+using testing::in_mode;
 using testing::LedArm;
 using testing::LongComplex;
 using testing::LongMatrix;
@@ -26,11 +27,6 @@ RobotModel panda() {
 
 std::size_t at(int i) {
   return static_cast<std::size_t>(i);
-}
-
-Settings in_mode(Settings settings, Mode mode) {
-  settings.initial.mode = mode;
-  return settings;
 }
 
 /// Eigenvalues of M q'' + C q' + K q = 0, by a solver of their own in long double.
@@ -99,9 +95,8 @@ TEST(VibrationInTheTick, IsWhatADirectSolutionGivesThere) {
     const RobotModel model = testing::arm_model(arm);
     for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
       SCOPED_TRACE(std::string(arm.file) + (mode == Mode::kJoint ? " joint" : " cartesian"));
-      Settings settings = unlimited_settings(model);
-      settings.initial.mode = mode;
-      LedArm led(model, in_mode(settings, mode), kSwing);
+      const Settings settings = in_mode(unlimited_settings(model), mode);
+      LedArm led(model, settings, kSwing);
       led.settle();
       for (int k = 1; k <= 1000; ++k) {
         led.swing(1e-3 * k);

@@ -12,6 +12,7 @@ namespace dashpot::controller {
 namespace {
 
 using analysis::SpectrumOrigin;
+using testing::in_mode;
 using testing::LedArm;
 using testing::unlimited_settings;
 constexpr double kSwing = 0.2;  // rad
@@ -22,11 +23,6 @@ RobotModel panda() {
 
 std::size_t at(int i) {
   return static_cast<std::size_t>(i);
-}
-
-Settings in_mode(Settings settings, Mode mode) {
-  settings.initial.mode = mode;
-  return settings;
 }
 
 TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {

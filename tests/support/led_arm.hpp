@@ -4,11 +4,19 @@
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/tests/support/arms.hpp>
 
 #include <cmath>
 #include <numbers>
 
 namespace dashpot::testing {
+
+/// An arm without friction.
+inline controller::RobotModel smooth_arm(const Arm& arm) {
+  controller::ModelOptions options;
+  options.damping = Eigen::VectorXd::Zero(arm_model(arm).dof());
+  return arm_model(arm, options);
+}
 
 /// Settings in which no limit or watchdog interferes.
 inline controller::Settings unlimited_settings(const controller::RobotModel& model) {
@@ -20,11 +28,15 @@ inline controller::Settings unlimited_settings(const controller::RobotModel& mod
   return settings;
 }
 
-/// The same where besides nothing acts but springs, and dampers that hold a ratio of 0.7.
+inline controller::Settings in_mode(controller::Settings settings, controller::Mode mode) {
+  settings.initial.mode = mode;
+  return settings;
+}
+
+/// Those where nothing acts but springs, and dampers that hold a ratio of 0.7.
 inline controller::Settings plain_settings(const controller::RobotModel& model,
                                            controller::Mode mode) {
-  controller::Settings settings = unlimited_settings(model);
-  settings.initial.mode = mode;
+  controller::Settings settings = in_mode(unlimited_settings(model), mode);
   settings.feed_forward = {false, false, false, false, false};
   controller::Gains& gains = settings.initial.gains;
   gains.null_stiffness.setZero();
