@@ -4,6 +4,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -79,6 +80,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::Random;
+using testing::symmetrized;
 
 /// Allocations of this thread while `act` runs.
 template <class Act>
@@ -88,10 +90,6 @@ int allocations_of(const Act& act) {
   act();
   counting = false;
   return allocations;
-}
-
-MatrixXd symmetrized(const MatrixXd& A) {
-  return 0.5 * (A + A.transpose());
 }
 
 struct Named {

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/certificate.hpp>
 #include <dashpot/analysis/modes.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -12,11 +13,10 @@ namespace dashpot::analysis {
 namespace {
 
 using Eigen::MatrixXd;
+using testing::kInfinity;
+using testing::LongComplex;
 using testing::Random;
-using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
-using LongComplex = std::complex<long double>;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using testing::true_eigenvalues;
 
 System<> random_system(Random& random, int n) {
   System<> system(n);
@@ -24,17 +24,6 @@ System<> random_system(Random& random, int n) {
   system.damping = random.log_uniform(1e-2, 10) * random.spd(n);
   system.stiffness = 40 * random.spd(n);
   return system;
-}
-
-std::vector<LongComplex> true_eigenvalues(const System<>& system) {
-  const Eigen::Index n = system.dof();
-  const auto lu = system.mass.cast<long double>().fullPivLu();
-  LongMatrix A(2 * n, 2 * n);
-  A << LongMatrix::Zero(n, n), LongMatrix::Identity(n, n),
-      -lu.solve(system.stiffness.cast<long double>()),
-      -lu.solve(system.damping.cast<long double>());
-  const auto values = Eigen::EigenSolver<LongMatrix>(A, false).eigenvalues().eval();
-  return {values.begin(), values.end()};
 }
 
 /// The modes of the spectrum's basis as it stands, certified.

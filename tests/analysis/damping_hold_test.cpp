@@ -19,15 +19,9 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::near;
+using testing::padded;
 using testing::Random;
 using testing::random_arm;
-
-/// K_C or C_C with rows and columns of zeros for the directions that are not there.
-TaskMatrix padded(const MatrixXd& A) {
-  TaskMatrix result = TaskMatrix::Zero();
-  result.topLeftCorner(A.rows(), A.cols()) = A;
-  return result;
-}
 
 TaskJacobian<kMaxDof> padded_rows(const MatrixXd& J) {
   TaskJacobian<kMaxDof> result = TaskJacobian<kMaxDof>::Zero(6, J.cols());

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -15,11 +16,10 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using testing::kInfinity;
 using testing::near;
 using testing::Random;
 using testing::random_arm;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 double sum_of_squares(const Spectrum<>& spectrum, double zeta) {
   double sum = 0;

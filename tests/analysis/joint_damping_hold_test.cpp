@@ -21,6 +21,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::graded;
 using testing::near;
+using testing::padded;
 using testing::Random;
 using Matrix = JointDampingHold::Matrix;
 
@@ -135,12 +136,6 @@ TEST(JointDampingHold, NeverAllocates) {
     EXPECT_EQ(testing::allocations_of([&] { hold.update(M, C); }), 0);
     EXPECT_EQ(hold.overdone(), friction > 100);
   }
-}
-
-TaskMatrix padded(const MatrixXd& A) {
-  TaskMatrix result = TaskMatrix::Zero();
-  result.topLeftCorner(A.rows(), A.cols()) = A;
-  return result;
 }
 
 // As many joints as directions: nothing couples, and both are exact unless friction is too much.

@@ -19,7 +19,8 @@ using Eigen::VectorXd;
 using testing::expect_enclosed;
 using testing::Random;
 
-System<kMaxDof> make(const MatrixXd& mass, const MatrixXd& damping, const MatrixXd& stiffness) {
+System<kMaxDof> symmetric_system(const MatrixXd& mass, const MatrixXd& damping,
+                                 const MatrixXd& stiffness) {
   System<kMaxDof> system(mass.rows());
   system.mass = 0.5 * (mass + mass.transpose());
   system.damping = 0.5 * (damping + damping.transpose());
@@ -76,7 +77,7 @@ TEST(TrackedPath, ThroughCriticalDampingIsSmooth) {
   follower.follow(2000, 20, [&](double t) {
     const double zeta = 0.5 + 1.2 * t;  // all three pass through 1, proportionally damped
     const VectorXd d = 2 * zeta * omega, k = omega.cwiseAbs2();
-    return make(T * T, T * d.asDiagonal() * T, T * k.asDiagonal() * T);
+    return symmetric_system(T * T, T * d.asDiagonal() * T, T * k.asDiagonal() * T);
   });
   expect_followed(follower.counters());
   EXPECT_LT(follower.largest_jump, 1e-9);
@@ -91,8 +92,8 @@ TEST(TrackedPath, StandsAtExactlyCriticalDamping) {
   Follower follower;
   follower.follow(200, 1, [&](double t) {
     // The first mode stays exactly critical while the second one changes.
-    return make(MatrixXd::Identity(2, 2), Eigen::Vector2d(2, 1 + t).asDiagonal(),
-                Eigen::Vector2d(1, 16 + t).asDiagonal());
+    return symmetric_system(MatrixXd::Identity(2, 2), Eigen::Vector2d(2, 1 + t).asDiagonal(),
+                            Eigen::Vector2d(1, 16 + t).asDiagonal());
   });
   expect_followed(follower.counters());
   EXPECT_EQ(follower.mode(1).kind, ModeKind::kCritical);
@@ -104,7 +105,7 @@ System<kMaxDof> exchange(double t, double gap) {
   const double w = 10, difference = 4 * (t - 0.5);
   MatrixXd K(2, 2);
   K << w * w + w * difference, w * gap, w * gap, w * w - w * difference;
-  return make(MatrixXd::Identity(2, 2), 0.1 * MatrixXd::Identity(2, 2), K);
+  return symmetric_system(MatrixXd::Identity(2, 2), 0.1 * MatrixXd::Identity(2, 2), K);
 }
 
 TEST(TrackedPath, VeersWhereModesAreCoupled) {
@@ -138,8 +139,8 @@ TEST(TrackedPath, CrossesInMixedCoordinatesWithHeavyDamping) {
     follower.follow(3000, 30, [&](double t) {
       VectorXd omega(4);
       omega << 8 + 4 * t, 10, 12 - 4 * t, 30;  // three meet at t = 0.5
-      return make(T * T, T * (2 * zeta * omega).asDiagonal() * T,
-                  T * omega.cwiseAbs2().asDiagonal() * T);
+      return symmetric_system(T * T, T * (2 * zeta * omega).asDiagonal() * T,
+                              T * omega.cwiseAbs2().asDiagonal() * T);
     });
     EXPECT_GE(follower.counters().tracked, 2990);
     EXPECT_LT(follower.largest_jump, 5e-3);
@@ -157,7 +158,7 @@ TEST(TrackedPath, AroundAnExceptionalPointExchangesTheModes) {
                  coupling = center + radius * std::cos(angle);
     MatrixXd K(2, 2);
     K << w * w + difference, coupling, coupling, w * w - difference;
-    return make(MatrixXd::Identity(2, 2), Eigen::Vector2d(c1, c2).asDiagonal(), K);
+    return symmetric_system(MatrixXd::Identity(2, 2), Eigen::Vector2d(c1, c2).asDiagonal(), K);
   };
   Follower follower;
   follower.follow(1, 1, [&](double) { return at(0); });
@@ -193,7 +194,7 @@ TEST(TrackedPath, RealEigenvaluesOfTwoModesMeetAndPartAgain) {
       MatrixXd C(2, 2), K(2, 2);
       C << 4, coupling, coupling, c;
       K << 1, 0.3 * coupling, 0.3 * coupling, 100;
-      return make(MatrixXd::Identity(2, 2), C, K);
+      return symmetric_system(MatrixXd::Identity(2, 2), C, K);
     });
     EXPECT_GE(follower.counters().tracked, 3990);
     if (coupling == 0.01 || coupling == 0.3) {
@@ -212,7 +213,8 @@ TEST(TrackedPath, ModesThatStayEqualAreReportedEqual) {
       const double omega = 5 + t;
       VectorXd w(5);
       w << omega, omega, omega, 20, 20;
-      return make(T * T, T * (2 * zeta * w).asDiagonal() * T, T * w.cwiseAbs2().asDiagonal() * T);
+      return symmetric_system(T * T, T * (2 * zeta * w).asDiagonal() * T,
+                              T * w.cwiseAbs2().asDiagonal() * T);
     });
     for (int i = 0; i < 5; ++i) {
       EXPECT_NEAR(follower.mode(i).natural_frequency, i < 2 ? 20 : 6, 1e-5);
@@ -252,8 +254,9 @@ TEST(TrackedPath, NearlyFrozenInputIsReusedWithinABoundThatSaysSo) {
 TEST(TrackedPath, JumpsAreSolvedAnew) {
   Random random(3005);
   Follower follower;
-  follower.follow(
-      60, 1, [&](double) { return make(random.spd(6), 3 * random.spd(6), 100 * random.spd(6)); });
+  follower.follow(60, 1, [&](double) {
+    return symmetric_system(random.spd(6), 3 * random.spd(6), 100 * random.spd(6));
+  });
   EXPECT_GE(follower.counters().direct, 30);
   EXPECT_EQ(follower.counters().of(Fallback::kStart), 1);
   EXPECT_LE(follower.counters().most_passes, TrackerOptions{}.max_passes);
@@ -265,8 +268,9 @@ TEST(TrackedPath, KeepsPlacesWhereAJumpIsSolvedAnew) {
     const double angle = degrees * std::numbers::pi / 180;
     MatrixXd R(2, 2);
     R << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
-    return make(MatrixXd::Identity(2, 2), 0.2 * MatrixXd::Identity(2, 2),
-                R * Eigen::Vector2d(high * high, low * low).asDiagonal() * R.transpose());
+    return symmetric_system(
+        MatrixXd::Identity(2, 2), 0.2 * MatrixXd::Identity(2, 2),
+        R * Eigen::Vector2d(high * high, low * low).asDiagonal() * R.transpose());
   };
   Follower follower;
   follower.follow(50, 5, [&](double t) { return at(t, 20, 3 + t); });
@@ -293,7 +297,7 @@ TEST(TrackedPath, StartsAfreshIfToldToForget) {
   const auto at = [&](double a, double b, double c) {
     MatrixXd K = Eigen::Vector3d(a, b, c).asDiagonal();
     K(0, 1) = K(1, 0) = 0.5;
-    return make(I, 0.3 * I, K);
+    return symmetric_system(I, 0.3 * I, K);
   };
   Follower follower;
   follower.follow(3, 1, [&](double t) { return at(400 + t, 100, 25); });
@@ -309,7 +313,7 @@ TEST(TrackedPath, KeepsPlacesOverASmallJump) {
   const auto at = [&](double a, double b, double c) {
     MatrixXd K = Eigen::Vector3d(a, b, c).asDiagonal();
     K(0, 1) = K(1, 0) = 0.5;
-    return make(I, 0.3 * I, K);
+    return symmetric_system(I, 0.3 * I, K);
   };
   for (const bool reset : {false, true}) {
     Follower follower;
@@ -345,7 +349,7 @@ System<kMaxDof> planar_arm(const Eigen::Vector3d& q, double friction) {
     J = J_link;
   }
   const Eigen::Vector2d root_K(30, 20);
-  System<kMaxDof> system = make(
+  System<kMaxDof> system = symmetric_system(
       M,
       J.transpose() * Eigen::Vector2d(8, 12).asDiagonal() * J + friction * MatrixXd::Identity(3, 3),
       MatrixXd::Zero(3, 3));

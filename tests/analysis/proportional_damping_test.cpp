@@ -3,6 +3,7 @@
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/tracked.hpp>
 #include <dashpot/tests/support/true_spectrum.hpp>
 
 #include <gtest/gtest.h>
@@ -20,15 +21,7 @@ using testing::expect_enclosed;
 using testing::panda_impedance;
 using testing::Random;
 using testing::swing;
-
-struct Tracked {
-  Status update(const System<kMaxDof>& system) { return tracker->update(system, *spectrum); }
-  const ModeNumbers& mode(int i) const { return spectrum->modes[static_cast<std::size_t>(i)]; }
-  const TrackerCounters& counters() const { return tracker->counters(); }
-
-  std::unique_ptr<ModeTracker> tracker = std::make_unique<ModeTracker>();
-  std::unique_ptr<TrackedSpectrum> spectrum = std::make_unique<TrackedSpectrum>();
-};
+using testing::Tracked;
 
 /// C = M Phi diag(2 zeta omega) Phi' M with the undamped modes Phi, and none for zero modes.
 void damp(System<kMaxDof>& system, double zeta) {

@@ -19,11 +19,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using testing::Random;
 using Extended = long double;
-using Matrix = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
+using ExtendedMatrix = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
 using ExtendedComplex = std::complex<Extended>;
 
 struct Coefficients {
-  Matrix mass, damping, stiffness;
+  ExtendedMatrix mass, damping, stiffness;
 };
 
 Coefficients extended(const System<>& system) {
@@ -40,12 +40,12 @@ struct Pair {
 /// The two eigenvalues nearest those of `mode`.
 Pair pair_of(const Coefficients& system, const Mode<>& mode) {
   const Index n = system.mass.rows();
-  Matrix A = Matrix::Zero(2 * n, 2 * n);
+  ExtendedMatrix A = ExtendedMatrix::Zero(2 * n, 2 * n);
   A.topRightCorner(n, n).setIdentity();
-  const Eigen::PartialPivLU<Matrix> mass(system.mass);
+  const Eigen::PartialPivLU<ExtendedMatrix> mass(system.mass);
   A.bottomLeftCorner(n, n) = -mass.solve(system.stiffness);
   A.bottomRightCorner(n, n) = -mass.solve(system.damping);
-  const Eigen::EigenSolver<Matrix> solver(A, false);
+  const Eigen::EigenSolver<ExtendedMatrix> solver(A, false);
   std::vector<ExtendedComplex> values(solver.eigenvalues().begin(), solver.eigenvalues().end());
   const auto take_nearest = [&values](const Complex& to) {
     const ExtendedComplex target{static_cast<Extended>(to.real()),
@@ -65,7 +65,7 @@ Pair pair_of(const Coefficients& system, const Mode<>& mode) {
 
 enum class Part { kMass, kDamping, kStiffness };
 
-Matrix& part_of(Coefficients& system, Part part) {
+ExtendedMatrix& part_of(Coefficients& system, Part part) {
   return part == Part::kMass      ? system.mass
          : part == Part::kDamping ? system.damping
                                   : system.stiffness;
@@ -123,7 +123,7 @@ void expect_differences(const System<>& system, Random& random, double tolerance
   }
 }
 
-System<> random_system(Random& random, Index n, double damping) {
+System<> random_damped(Random& random, Index n, double damping) {
   System<> system(n);
   system.mass = random.spd(n);
   system.stiffness = 200 * random.spd(n);
@@ -135,7 +135,7 @@ TEST(Sensitivity, MatchesDifferencesInExtendedPrecision) {
   Random random(7201);
   for (int i = 0; i < 20; ++i) {
     SCOPED_TRACE("system " + std::to_string(i));
-    expect_differences(random_system(random, random.integer(1, 6), random.log_uniform(0.1, 3)),
+    expect_differences(random_damped(random, random.integer(1, 6), random.log_uniform(0.1, 3)),
                        random, 1e-7, true);
   }
 }
@@ -143,7 +143,7 @@ TEST(Sensitivity, MatchesDifferencesInExtendedPrecision) {
 TEST(Sensitivity, MatchesDifferencesForHeavyDamping) {
   Random random(7202);
   for (int i = 0; i < 10; ++i) {
-    System<> system = random_system(random, 3, 1);
+    System<> system = random_damped(random, 3, 1);
     system.damping = (40 * system.mass + 0.05 * system.stiffness).eval();
     system.damping = (0.5 * (system.damping + system.damping.transpose())).eval();
     SCOPED_TRACE("system " + std::to_string(i));
@@ -154,7 +154,7 @@ TEST(Sensitivity, MatchesDifferencesForHeavyDamping) {
 TEST(Sensitivity, MatchesDifferencesOfCoefficientsThatAreNotSymmetric) {
   Random random(7203);
   for (int i = 0; i < 10; ++i) {
-    System<> system = random_system(random, 4, 1);
+    System<> system = random_damped(random, 4, 1);
     system.stiffness += random.matrix(4, 4);
     SCOPED_TRACE("system " + std::to_string(i));
     expect_differences(system, random, 1e-7, true);

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -13,37 +14,14 @@ namespace {
 
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
+using testing::kInfinity;
+using testing::kNan;
+using testing::LongComplex;
 using testing::near;
 using testing::Random;
-using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
-using LongComplex = std::complex<long double>;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-MatrixXd symmetrized(const MatrixXd& A) {
-  return 0.5 * (A + A.transpose());
-}
-
-System<> make(const MatrixXd& mass, const MatrixXd& damping, const MatrixXd& stiffness) {
-  System<> system(mass.rows());
-  system.mass = mass;
-  system.damping = damping;
-  system.stiffness = stiffness;
-  return system;
-}
-
-/// Eigenvalues of [0 I; -M^-1 K  -M^-1 C] in long double, by Eigen.
-std::vector<LongComplex> true_eigenvalues(const System<>& system) {
-  const Eigen::Index n = system.dof();
-  const auto lu = system.mass.cast<long double>().fullPivLu();
-  LongMatrix A(2 * n, 2 * n);
-  A << LongMatrix::Zero(n, n), LongMatrix::Identity(n, n),
-      -lu.solve(system.stiffness.cast<long double>()),
-      -lu.solve(system.damping.cast<long double>());
-  const auto values = Eigen::EigenSolver<LongMatrix>(A, false).eigenvalues().eval();
-  return {values.begin(), values.end()};
-}
+using testing::symmetrized;
+using testing::system_from;
+using testing::true_eigenvalues;
 
 /// All 2n: of the modes, then of the zero modes.
 std::vector<Complex> all_eigenvalues(const Spectrum<>& spectrum) {
@@ -128,12 +106,12 @@ TEST(SpectrumOfOneCoordinate, IsTheTextbookOscillator) {
 TEST(SpectrumWithoutStiffness, HasOnlyZeroModes) {
   Random random(301);
   const MatrixXd M = random.spd(4), Z = MatrixXd::Zero(4, 4);
-  const Spectrum<> still = analyze(make(M, Z, Z));
+  const Spectrum<> still = analyze(system_from(M, Z, Z));
   EXPECT_EQ(still.zero_modes.count, 4);
   EXPECT_TRUE(still.modes.empty());
   EXPECT_TRUE(near(still.zero_mode_rates, MatrixXd::Zero(4, 1), 0));
 
-  const System<> damped = make(M, random.spd(4), Z);
+  const System<> damped = system_from(M, random.spd(4), Z);
   const Spectrum<> spectrum = analyze(damped);
   EXPECT_EQ(spectrum.zero_modes.count, 4);
   EXPECT_TRUE(spectrum.modes.empty());
@@ -145,13 +123,13 @@ TEST(SpectrumOfBadInput, HasAStatusAndNoModes) {
   Random random(302);
   for (const double bad : {kNan, kInfinity, -kInfinity}) {
     for (const auto part : {&System<>::mass, &System<>::damping, &System<>::stiffness}) {
-      System<> system = make(random.spd(3), random.spd(3), random.spd(3));
+      System<> system = system_from(random.spd(3), random.spd(3), random.spd(3));
       (system.*part)(1, 1) = bad;
       EXPECT_EQ(status_of(system), Status::kNotFinite) << bad;
       EXPECT_THROW(analyze(system), InvalidSystem);
     }
   }
-  System<> system = make(random.spd(3), random.spd(3), random.spd(3));
+  System<> system = system_from(random.spd(3), random.spd(3), random.spd(3));
   system.mass(0, 1) += 0.1;
   EXPECT_EQ(status_of(system), Status::kNotSymmetric);
   system.mass = Eigen::Vector3d(1, 0, 1).asDiagonal();
@@ -163,7 +141,7 @@ TEST(SpectrumOfBadInput, HasAStatusAndNoModes) {
 
 TEST(SpectrumSolver, RecoversAfterBadInput) {
   Random random(303);
-  const System<> good = make(random.spd(4), random.spd(4), random.spd(4));
+  const System<> good = system_from(random.spd(4), random.spd(4), random.spd(4));
   System<> bad = good;
   bad.mass.setZero();
   SpectrumSolver<> solver;
@@ -182,8 +160,8 @@ TEST(SpectrumOfNonsymmetricSystems, AgreesWithTheStateMatrix) {
     const double gyroscopic = trial % 3 == 0 ? 0 : random.log_uniform(1e-6, 1);
     const double circulatory = trial % 3 == 1 ? 0 : random.log_uniform(1e-6, 1);
     const System<> system =
-        make(random.spd(n), random.spd(n) + gyroscopic * (skew - skew.transpose()),
-             50 * random.spd(n) + circulatory * (skew - skew.transpose()));
+        system_from(random.spd(n), random.spd(n) + gyroscopic * (skew - skew.transpose()),
+                    50 * random.spd(n) + circulatory * (skew - skew.transpose()));
     const Spectrum<> spectrum = analyze(system);
     ASSERT_EQ(spectrum.status, Status::kOk);
     EXPECT_FALSE(spectrum.symmetric);
@@ -200,7 +178,8 @@ TEST(SpectrumOfNonsymmetricSystems, MayHaveZeroModes) {
   for (int trial = 0; trial < 20; ++trial) {
     const MatrixXd J = random.matrix(3, 5), skew = random.matrix(3, 3);
     const MatrixXd core = 20 * random.spd(3) + (skew - skew.transpose());
-    const System<> system = make(random.spd(5), 0.5 * random.spd(5), J.transpose() * core * J);
+    const System<> system =
+        system_from(random.spd(5), 0.5 * random.spd(5), J.transpose() * core * J);
     const Spectrum<> spectrum = analyze(system);
     ASSERT_EQ(spectrum.status, Status::kOk);
     ASSERT_EQ(spectrum.zero_modes.count, 2);
@@ -215,8 +194,9 @@ TEST(SpectrumOfNonsymmetricSystems, MayHaveZeroModes) {
 System<> redundant_with_friction(Random& random, double friction) {
   const MatrixXd J = random.matrix(3, 5);
   const MatrixXd joint = random.vector(5).cwiseAbs().asDiagonal();
-  return make(random.spd(5), symmetrized(J.transpose() * random.spd(3) * J + friction * joint),
-              symmetrized(J.transpose() * (40 * random.spd(3)) * J));
+  return system_from(random.spd(5),
+                     symmetrized(J.transpose() * random.spd(3) * J + friction * joint),
+                     symmetrized(J.transpose() * (40 * random.spd(3)) * J));
 }
 
 TEST(CoupledZeroModes, AreSolvedExactly) {
@@ -242,7 +222,7 @@ TEST(CoupledZeroModes, AreSolvedExactly) {
     D.topRightCorner(3, 2).setZero();
     D.bottomLeftCorner(2, 3).setZero();
     const MatrixXd K = spectrum.zero_modes.stiffness_values.asDiagonal();
-    const Spectrum<> uncoupled = analyze(make(MatrixXd::Identity(5, 5), symmetrized(D), K));
+    const Spectrum<> uncoupled = analyze(system_from(MatrixXd::Identity(5, 5), symmetrized(D), K));
     EXPECT_FALSE(uncoupled.coupled);
     uncoupled_error = std::max(
         uncoupled_error, worst_distance(all_eigenvalues(uncoupled), truth) / std::abs(computed[0]));
@@ -266,7 +246,7 @@ TEST(SpectrumLaws, ScalingTimeScalesEigenvalues) {
   Random random(308);
   for (const double s : {1e-8, 1e-3, 3.7, 1e5}) {
     const System<> system = redundant_with_friction(random, 0.5);
-    const System<> faster = make(system.mass, s * system.damping, s * s * system.stiffness);
+    const System<> faster = system_from(system.mass, s * system.damping, s * s * system.stiffness);
     std::vector<Complex> expected = all_eigenvalues(analyze(system));
     for (Complex& value : expected) value *= s;
     SpectrumOptions options;
@@ -279,13 +259,13 @@ TEST(SpectrumLaws, ScalingTimeScalesEigenvalues) {
 TEST(SpectrumLaws, CongruencesLeaveEigenvaluesAlone) {
   Random random(309);
   for (int trial = 0; trial < 20; ++trial) {
-    const System<> system = make(random.spd(5), random.spd(5), 30 * random.spd(5));
+    const System<> system = system_from(random.spd(5), random.spd(5), 30 * random.spd(5));
     const std::vector<Complex> expected = all_eigenvalues(analyze(system));
     MatrixXd T = random.matrix(5, 5) + 3 * MatrixXd::Identity(5, 5);
     const auto transformed = [&] {
-      return make(symmetrized(T.transpose() * system.mass * T),
-                  symmetrized(T.transpose() * system.damping * T),
-                  symmetrized(T.transpose() * system.stiffness * T));
+      return system_from(symmetrized(T.transpose() * system.mass * T),
+                         symmetrized(T.transpose() * system.damping * T),
+                         symmetrized(T.transpose() * system.stiffness * T));
     };
     const double size = std::abs(expected[0]);
     EXPECT_LE(worst_distance(all_eigenvalues(analyze(transformed())), widened(expected)),

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -17,22 +18,12 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::near;
 using testing::Random;
-
-MatrixXd symmetrized(const MatrixXd& A) {
-  return 0.5 * (A + A.transpose());
-}
-
-System<> make(const MatrixXd& mass, const MatrixXd& damping, const MatrixXd& stiffness) {
-  System<> system(mass.rows());
-  system.mass = mass;
-  system.damping = damping;
-  system.stiffness = stiffness;
-  return system;
-}
+using testing::symmetrized;
+using testing::system_from;
 
 System<> scalar(double mass, double damping, double stiffness) {
-  return make(MatrixXd::Constant(1, 1, mass), MatrixXd::Constant(1, 1, damping),
-              MatrixXd::Constant(1, 1, stiffness));
+  return system_from(MatrixXd::Constant(1, 1, mass), MatrixXd::Constant(1, 1, damping),
+                     MatrixXd::Constant(1, 1, stiffness));
 }
 
 struct ClosedForm {
@@ -68,8 +59,8 @@ System<> classical(Random& random, const VectorXd& omega, double zeta) {
   const MatrixXd M = random.spd(n);
   const MatrixXd L = M.llt().matrixL();
   const MatrixXd P = L * MatrixXd(random.matrix(n, n).householderQr().householderQ());
-  return make(M, symmetrized(P * VectorXd(2 * zeta * omega).asDiagonal() * P.transpose()),
-              symmetrized(P * omega.cwiseAbs2().asDiagonal() * P.transpose()));
+  return system_from(M, symmetrized(P * VectorXd(2 * zeta * omega).asDiagonal() * P.transpose()),
+                     symmetrized(P * omega.cwiseAbs2().asDiagonal() * P.transpose()));
 }
 
 /// NLEVP "spring": unit masses, each tied to its neighbours and to the ground by springs (5) and
@@ -85,7 +76,8 @@ TEST(SpringFamily, HasItsClosedForm) {
       const double s = 3 - 2 * std::cos(k * std::numbers::pi / (n + 1));
       expected.push_back(of_coefficients(10 * s, 5 * s));
     }
-    const Spectrum<> spectrum = analyze(make(MatrixXd::Identity(n, n), 10 * chain, 5 * chain));
+    const Spectrum<> spectrum =
+        analyze(system_from(MatrixXd::Identity(n, n), 10 * chain, 5 * chain));
     expect_modes(spectrum, expected, 1e-13);
     for (const Mode<>& mode : spectrum.modes) EXPECT_EQ(mode.kind, ModeKind::kOverdamped);
   }
@@ -106,7 +98,7 @@ TEST(SleeperFamily, HasItsClosedFormAndTwoCriticalModes) {
       expected.push_back(of_coefficients(1 + a * a, 1 + a + a * a));
     }
     const MatrixXd I = MatrixXd::Identity(n, n);
-    const Spectrum<> spectrum = analyze(make(I, I + A * A, I + A + A * A));
+    const Spectrum<> spectrum = analyze(system_from(I, I + A * A, I + A + A * A));
     expect_modes(spectrum, expected, 1e-12);
     int critical = 0;
     for (const Mode<>& mode : spectrum.modes) {
@@ -173,7 +165,7 @@ TEST(IdenticalOscillators, StayIdenticalInMixedCoordinates) {
   for (const double c : {0.0, 0.5, 4.0, 16.0}) {
     SCOPED_TRACE(c);
     const ClosedForm each = of_coefficients(c, 4);
-    expect_modes(analyze(make(M, c * M, 4 * M)), {each, each, each}, 1e-13);
+    expect_modes(analyze(system_from(M, c * M, 4 * M)), {each, each, each}, 1e-13);
   }
 }
 
@@ -184,7 +176,7 @@ TEST(ProportionalDamping, ComesWithAModalMatrix) {
     const double a = trial % 3 == 0 ? 0 : random.log_uniform(1e-3, 10);
     const double b = trial % 3 == 0 ? 0 : random.log_uniform(1e-4, 1);
     const MatrixXd M = random.spd(n), K = 100 * random.spd(n);
-    const System<> system = make(M, a * M + b * K, K);
+    const System<> system = system_from(M, a * M + b * K, K);
     const Spectrum<> spectrum = analyze(system);
     EXPECT_TRUE(spectrum.proportional);
     const MatrixXd& Phi = spectrum.zero_modes.coordinates;
@@ -205,7 +197,7 @@ TEST(ProportionalDamping, ComesWithAModalMatrix) {
 
 TEST(ProportionalDamping, IsNotSeenWhereDampingMixesTheModes) {
   Random random(503);
-  EXPECT_FALSE(analyze(make(random.spd(4), random.spd(4), random.spd(4))).proportional);
+  EXPECT_FALSE(analyze(system_from(random.spd(4), random.spd(4), random.spd(4))).proportional);
 }
 
 TEST(VeryLightDamping, IsNotTakenForNone) {
@@ -223,7 +215,7 @@ TEST(NegativeDamping, IsUnstable) {
   Random random(504);
   MatrixXd C = random.spd(4);
   C(2, 2) = -3;
-  const Spectrum<> several = analyze(make(random.spd(4), C, 30 * random.spd(4)));
+  const Spectrum<> several = analyze(system_from(random.spd(4), C, 30 * random.spd(4)));
   ASSERT_EQ(several.status, Status::kOk);
   int unstable = 0;
   for (const Mode<>& mode : several.modes) {
@@ -235,8 +227,8 @@ TEST(NegativeDamping, IsUnstable) {
 }
 
 TEST(IndefiniteStiffness, IsUnstableWithoutAFrequency) {
-  System<> system = make(MatrixXd::Identity(2, 2), 0.3 * MatrixXd::Identity(2, 2),
-                         Eigen::Vector2d(4, -9).asDiagonal());
+  System<> system = system_from(MatrixXd::Identity(2, 2), 0.3 * MatrixXd::Identity(2, 2),
+                                Eigen::Vector2d(4, -9).asDiagonal());
   const Spectrum<> spectrum = analyze(system);
   ASSERT_EQ(spectrum.modes.size(), 2);
   EXPECT_EQ(spectrum.zero_modes.count, 0);
@@ -254,8 +246,8 @@ TEST(IndefiniteStiffness, IsUnstableWithoutAFrequency) {
 }
 
 TEST(SoftModes, AreThoseBelowTheFrequencyGiven) {
-  const System<> system = make(MatrixXd::Identity(2, 2), 0.01 * MatrixXd::Identity(2, 2),
-                               Eigen::Vector2d(1e-8, 4).asDiagonal());
+  const System<> system = system_from(MatrixXd::Identity(2, 2), 0.01 * MatrixXd::Identity(2, 2),
+                                      Eigen::Vector2d(1e-8, 4).asDiagonal());
   SpectrumOptions options;
   options.soft_frequency = 1e-3;
   const Spectrum<> spectrum = analyze(system, options);

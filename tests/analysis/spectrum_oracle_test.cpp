@@ -2,6 +2,7 @@
 // result.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/oracle.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -11,12 +12,11 @@
 namespace dashpot::analysis {
 namespace {
 
+using testing::kInfinity;
+using testing::LongComplex;
 using testing::ReferenceEigenvalue;
 using testing::SpectrumCase;
-using LongComplex = std::complex<long double>;
-using LongMatrix = Eigen::Matrix<LongComplex, Eigen::Dynamic, Eigen::Dynamic>;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+using LongComplexMatrix = Eigen::Matrix<LongComplex, Eigen::Dynamic, Eigen::Dynamic>;
 
 System<> system_of(const SpectrumCase& reference) {
   System<> system(reference.n);
@@ -28,13 +28,13 @@ System<> system_of(const SpectrumCase& reference) {
 
 /// Largest backward error of the mode's right eigenpairs, in long double.
 double backward_error(const System<>& system, const Mode<>& mode) {
-  const LongMatrix M = system.mass.cast<LongComplex>();
-  const LongMatrix C = system.damping.cast<LongComplex>();
-  const LongMatrix K = system.stiffness.cast<LongComplex>();
+  const LongComplexMatrix M = system.mass.cast<LongComplex>();
+  const LongComplexMatrix C = system.damping.cast<LongComplex>();
+  const LongComplexMatrix K = system.stiffness.cast<LongComplex>();
   long double worst = 0;
   for (std::size_t k = 0; k < 2; ++k) {
     const LongComplex lambda = mode.eigenvalues[k];
-    const LongMatrix u = mode.shapes[k].cast<LongComplex>();
+    const LongComplexMatrix u = mode.shapes[k].cast<LongComplex>();
     const long double residual = (lambda * lambda * (M * u) + lambda * (C * u) + K * u).norm();
     const long double size =
         (std::norm(lambda) * M.norm() + std::abs(lambda) * C.norm() + K.norm()) * u.norm();

@@ -1,6 +1,7 @@
 // The words in which to_joint_space() refuses an impedance.
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/random_impedance.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -11,8 +12,7 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+using testing::kNan;
 
 std::string refusal(const TaskImpedance& impedance) {
   try {

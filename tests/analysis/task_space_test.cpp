@@ -17,8 +17,6 @@ using Eigen::VectorXd;
 using testing::as_printed;
 using testing::near;
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
-
 // --------------------------------------------------------------------------------- the products
 
 TEST(ToJointSpace, PaperAppendix3DampingAndStiffnessOfTheArm) {
@@ -76,7 +74,7 @@ TEST(ToJointSpace, TailsHoldWhatRoundingTook) {
       const double high = system.stiffness(i, j);
       const double low = system.stiffness_tail(i, j);
       EXPECT_TRUE(integer(high, 90) + integer(low, 90) == exact) << i << " " << j;
-      EXPECT_LE(std::abs(low), kEps * std::abs(high));
+      EXPECT_LE(std::abs(low), std::numeric_limits<double>::epsilon() * std::abs(high));
     }
   }
 }

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/zero_modes.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -16,10 +17,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::near;
 using testing::Random;
-
-MatrixXd symmetrized(const MatrixXd& A) {
-  return 0.5 * (A + A.transpose());
-}
+using testing::symmetrized;
 
 template <int N = kDynamic>
 ZeroModes<N> zero_modes_of(const System<N>& system) {

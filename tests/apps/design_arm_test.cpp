@@ -16,7 +16,7 @@ const std::string kPandaPose =
     "0,-0.785398163397448,0,-2.356194490192345,0,1.570796326794897,"
     "0.785398163397448";
 
-std::vector<std::string> panda(std::vector<std::string> options) {
+std::vector<std::string> for_panda(std::vector<std::string> options) {
   options.insert(options.begin(), {"design", "--urdf", testing::arm_path("panda"), "--base",
                                    "panda_link0", "--tip", "panda_hand_tcp"});
   return options;
@@ -25,9 +25,9 @@ std::vector<std::string> panda(std::vector<std::string> options) {
 // K_C and C1 of Fig. 1; the paper's Table 1 has 0.0294, 0.0316, 0.0255 at 9.755, 10.98, 20.25 rad/s
 // for the three slow modes.
 TEST(DesignOfThePaper, LiftsThePandaFromThreeHundredthsToWhatIsWanted) {
-  const Json result = parse(
-      run_program(panda({"--q", kPandaPose, "--task-stiffness", "2000,600,2000,100,100,100",
-                         "--task-damping", "5,3,5,1,1,1", "--damping-ratio", "0.7", "--json"})));
+  const Json result = parse(run_program(
+      for_panda({"--q", kPandaPose, "--task-stiffness", "2000,600,2000,100,100,100",
+                 "--task-damping", "5,3,5,1,1,1", "--damping-ratio", "0.7", "--json"})));
   const Numbers before = of_modes(result["before"], "damping_ratio");
   const Numbers frequencies = of_modes(result["before"], "natural_frequency");
   ASSERT_EQ(before.size(), 6U);
@@ -84,7 +84,7 @@ TEST(DesignOfThePaper, OutdoesItsDiscussionWithADampingThatIsOne) {
 
 TEST(DesignOfAnArm, SaysWhatIsMissing) {
   const auto refused = [](const std::vector<std::string>& options, const std::string& reason) {
-    const Outcome outcome = run_program(panda(options));
+    const Outcome outcome = run_program(for_panda(options));
     EXPECT_EQ(outcome.status, 2);
     EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr(reason));

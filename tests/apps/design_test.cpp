@@ -8,11 +8,11 @@
 namespace dashpot::tests {
 namespace {
 
-using testing::AllOf;
-using testing::EndsWith;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::StartsWith;
+using ::testing::AllOf;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
 
 /// `dashpot design - --damping-ratio RATIO OPTIONS...` with `text` on standard input.
 Outcome design_text(const std::string& text, const std::string& ratio,
@@ -138,7 +138,7 @@ TEST(Design, OfARegionMapsTheWorstMode) {
   }
   EXPECT_NEAR(result["level"], std::min(1.0, least / 0.7), 1e-12);
   EXPECT_GT(result["level"], 0.9);
-  EXPECT_THAT(design_json(one + other, "0.7"), testing::SizeIs(2));
+  EXPECT_THAT(design_json(one + other, "0.7"), ::testing::SizeIs(2));
   const Outcome table = design_text(one + other, "0.7", {"--region"});
   EXPECT_THAT(table.out, AllOf(StartsWith("task_damping\n"), HasSubstr("configuration")));
   EXPECT_THAT(table.err, IsEmpty());
@@ -220,7 +220,7 @@ std::ostream& operator<<(std::ostream& out, const Bad& bad) {
 
 const std::string kArm = "mass: [[2, 0], [0, 1]]\njacobian: [[1, 1]]\ntask_stiffness: [[9]]\n";
 
-class DesignRefuses : public testing::TestWithParam<Bad> {};
+class DesignRefuses : public ::testing::TestWithParam<Bad> {};
 
 TEST_P(DesignRefuses, WithOneLine) {
   const Bad& bad = GetParam();
@@ -235,7 +235,7 @@ TEST_P(DesignRefuses, WithOneLine) {
 
 INSTANTIATE_TEST_SUITE_P(
     Input, DesignRefuses,
-    testing::Values(
+    ::testing::Values(
         Bad{"NoRatio", {}, kArm, "--damping-ratio is required"},
         Bad{"NegativeRatio", {"--damping-ratio", "-1"}, kArm, "a positive ratio is wanted"},
         Bad{"NoNumber", {"--damping-ratio", "0.7x"}, kArm, "a positive ratio is wanted"},
@@ -278,7 +278,7 @@ INSTANTIATE_TEST_SUITE_P(
             {"--damping-ratio", "1"},
             "mass: [[1, 0], [1, 1]]\nstiffness: [[1, 0], [0, 1]]\n",
             "mass: is not symmetric"}),
-    [](const testing::TestParamInfo<Bad>& bad) { return std::string(bad.param.name); });
+    [](const ::testing::TestParamInfo<Bad>& bad) { return std::string(bad.param.name); });
 
 }  // namespace
 }  // namespace dashpot::tests

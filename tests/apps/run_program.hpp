@@ -66,6 +66,15 @@ inline Outcome analyze_text(const std::string& text, std::vector<std::string> op
 inline std::string example(const std::string& name) {
   return std::string(DASHPOT_SOURCE_DIR) + "/apps/examples/" + name;
 }
+/// One of the project's scenes.
+inline std::string scene(const std::string& name) {
+  return std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes/" + name + ".yaml";
+}
+
+/// Of a bus of this process alone, so that tests may run side by side.
+inline std::string own_url() {
+  return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 30000) + "?ttl=0";
+}
 
 inline auto count_lines(const std::string& text) {
   return std::count(text.begin(), text.end(), '\n');

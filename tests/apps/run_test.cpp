@@ -1,62 +1,18 @@
 // `dashpot run` in fast motion: a whole robot, its controller as a plugin, and what is written.
-#include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/apps/scene_run.hpp>
 
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <regex>
 #include <sstream>
 
 namespace dashpot::tests {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::StartsWith;
-
-std::string scene(const std::string& name) {
-  return std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes/" + name + ".yaml";
-}
-
-std::string text_of(const std::string& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-Outcome run_scene(const std::string& path, std::vector<std::string> options = {}) {
-  options.insert(options.begin(), {"run", path, "--fast"});
-  return run_program(options);
-}
-
-Json run_json(const std::string& path, std::vector<std::string> options = {}) {
-  options.emplace_back("--json");
-  return parse(run_scene(path, options));
-}
-
-/// A scene with parts of its text replaced, its URDF named absolutely, in a file of its own.
-std::string changed(const Scratch& scratch, const std::string& name,
-                    const std::vector<std::pair<std::string, std::string>>& replacements) {
-  std::string text = text_of(scene(name));
-  const auto replace = [&text](const std::string& old, const std::string& by) {
-    const std::size_t at = text.find(old);
-    if (at == std::string::npos) throw std::runtime_error("no '" + old + "' in the scene");
-    text.replace(at, old.size(), by);
-  };
-  for (const auto& [from, to] : replacements) replace(from, to);
-  if (text.find("../models") != std::string::npos) {
-    replace("../models", std::string(DASHPOT_SOURCE_DIR) + "/sim/models");
-  }
-  return scratch.write("scene.yaml", text);
-}
-
-std::string changed(const Scratch& scratch, const std::string& name, const std::string& from,
-                    const std::string& to) {
-  return changed(scratch, name, {{from, to}});
-}
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 /// The columns of a CSV by name.
 std::map<std::string, Numbers> table(const std::string& path) {
@@ -78,7 +34,7 @@ std::map<std::string, Numbers> table(const std::string& path) {
   return columns;
 }
 
-class EveryScene : public testing::TestWithParam<std::string> {};
+class EveryScene : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(EveryScene, RunsWithoutAnOverrunAndAccountsForItsEnergy) {
   const Json result = run_json(scene(GetParam()), {"--duration", "1"});
@@ -93,16 +49,16 @@ TEST_P(EveryScene, RunsWithoutAnOverrunAndAccountsForItsEnergy) {
   }
   for (const auto& [status, ticks] : result["status"].items()) {
     EXPECT_THAT((std::vector<std::string>{"ok", "torque or torque rate limited"}),
-                testing::Contains(status));
+                ::testing::Contains(status));
     EXPECT_GT(ticks.get<int>(), 0);
   }
   EXPECT_LT(std::abs(result["energy"]["imbalance"].get<double>()), 1e-6);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
-                         testing::Values("panda", "panda_release_c1", "panda_release_c2",
-                                         "panda_release_held", "iiwa14", "ur5", "baxter_left",
-                                         "chain3"));
+                         ::testing::Values("panda", "panda_release_c1", "panda_release_c2",
+                                           "panda_release_held", "iiwa14", "ur5", "baxter_left",
+                                           "chain3"));
 
 TEST(Scenes, AreAllTested) {
   std::size_t files = 0;
@@ -304,101 +260,6 @@ TEST(Run, SaysWhenTheSimulationFails) {
   EXPECT_THAT(outcome.err,
               AllOf(StartsWith("dashpot run: the simulation ended at "), HasSubstr("s: ")));
   EXPECT_EQ(count_lines(outcome.err), 1);
-}
-
-struct BadScene {
-  const char* name;
-  const char* scene;
-  const char* from;
-  const char* to;
-  const char* message;
-};
-
-class RunRefuses : public testing::TestWithParam<BadScene> {};
-
-TEST_P(RunRefuses, InOneLineThatNamesTheKey) {
-  const Scratch scratch;
-  const BadScene& bad = GetParam();
-  const std::string path = changed(scratch, bad.scene, bad.from, bad.to);
-  const Outcome outcome = run_scene(path);
-  EXPECT_EQ(outcome.status, 2);
-  EXPECT_EQ(outcome.out, "");
-  // An @ stands for a number.
-  std::string pattern = "dashpot run: " + path + ": " + bad.message + "\n";
-  pattern = std::regex_replace(pattern, std::regex(R"([.()\[\]+?*\\])"), R"(\$&)");
-  pattern = std::regex_replace(pattern, std::regex("@"), "[0-9.e-]+");
-  EXPECT_TRUE(std::regex_match(outcome.err, std::regex(pattern))) << outcome.err << pattern;
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Scenes, RunRefuses,
-    testing::Values(
-        BadScene{"UnknownKey", "ur5", "duration:", "duratoin:",
-                 "scenario.duratoin: unknown key; the keys are duration, start, pushes, steps, "
-                 "ring_down (line 17)"},
-        BadScene{"WrongUnit", "ur5", "duration: 6 s", "duration: 6 kg",
-                 "scenario.duration: has a wrong unit: '6 kg'; s is wanted (line 17)"},
-        BadScene{"NegativeDuration", "ur5", "duration: 6 s", "duration: -6 s",
-                 "scenario.duration: is -6 s, not positive (line 17)"},
-        BadScene{"OutOfReach", "ur5", "[2 cm, 0, 0, 0, 0, 0]", "[3 m, 0, 0, 0, 0, 0]",
-                 "scenario.start.tip_displacement: is out of the arm's reach, by @ m and @ rad "
-                 "(line 20)"},
-        BadScene{"StartInTheWall", "panda", "point: [0, 0, 0.2 m]", "point: [0, 0, 0.9 m]",
-                 "scenario.start.tip_displacement: puts the tip @ m inside the wall (line 59)"},
-        BadScene{"StepOutOfReach", "panda", "[5 cm, 5 cm, -5 cm, 0, 0, 20 deg]",
-                 "[5 cm, 1.5 m, -5 cm, 0, 0, 20 deg]",
-                 "scenario.steps[1].tip_displacement: is out of the arm's reach, by @ m and @ rad "
-                 "(line 65)"},
-        BadScene{"OutOfLimits", "panda", "position: [0, -45 deg", "position: [0, -145 deg",
-                 "scenario.start.position: joint 2 would be at -2.530727 rad, outside its limits "
-                 "(line 58)"},
-        BadScene{"NoStart", "iiwa14", "    position: [0, 30 deg, 0, -80 deg, 0, 60 deg, 0]\n", "",
-                 "scenario.start.position: missing (line 20)"},
-        BadScene{"StepsOutOfOrder", "ur5", "at: 4 s", "at: 1 s",
-                 "scenario.steps[2].at: is before the step above it (line 24)"},
-        BadScene{"StepThatTheControllerRefuses", "iiwa14", "joint_position: [0.3, 0.7",
-                 "joint_position: [9.3, 0.7",
-                 "scenario.steps[1].joint_position: joint 1 would be at 9.300000 rad, outside its "
-                 "limits (line 26)"},
-        BadScene{"IndefiniteDamping", "panda", "damping: [20 N s/m, 20", "damping: [-20 N s/m, 20",
-                 "scenario.steps: the controller refuses this: task_damping is not positive "
-                 "semidefinite (line 66)"},
-        BadScene{"EndBeforeBegin", "iiwa14", "end: 1.6 s", "end: 1.4 s",
-                 "scenario.pushes[1].end: is not after begin (line 23)"},
-        BadScene{"WrongLength", "iiwa14", "joint_displacement: [0.02, 0.02",
-                 "joint_displacement: [0.02",
-                 "scenario.start.joint_displacement: has 6 entries; a list of 7, or one number for "
-                 "all, is wanted (line 21)"},
-        BadScene{"UnknownMethod", "panda", "method: rk4", "method: rk5",
-                 "simulation.integrator.method: semi_implicit_euler, rk4, velocity_verlet, "
-                 "dormand_prince, dormand_prince_8, implicit_midpoint or rosenbrock is wanted, not "
-                 "'rk5' (line 25)"},
-        BadScene{"MassNotDefinite", "chain3", "[[8, 0, 0]", "[[-8, 0, 0]",
-                 "system: mass: is not positive definite"},
-        BadScene{"WallOfASystem", "chain3", "scenario:", "simulation: {wall: {}}\nscenario:",
-                 "simulation.wall: is for robot arms; this scene is a system (line 8)"},
-        BadScene{"NoUrdf", "ur5", "../models/ur5.urdf", "/nonexistent/a.urdf",
-                 "robot: /nonexistent/a.urdf: cannot be read: No such file or directory (line 5)"}),
-    [](const testing::TestParamInfo<BadScene>& instance) {
-      return std::string(instance.param.name);
-    });
-
-TEST(Run, NamesBadOptions) {
-  const auto expect_error = [](const std::vector<std::string>& options, const std::string& text) {
-    const Outcome outcome = run_scene(scene("ur5"), options);
-    EXPECT_EQ(outcome.status, 2);
-    EXPECT_EQ(outcome.out, "");
-    EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
-    EXPECT_THAT(outcome.err, AllOf(StartsWith("dashpot run: "), HasSubstr(text)));
-  };
-  expect_error({"--duration", "-1"}, "--duration");
-  expect_error({"--duration", "nan"}, "--duration");
-  expect_error({"--realtime"}, "--realtime");
-  expect_error({"--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x");
-  expect_error({"--log", "/nonexistent/a.lcm"}, "/nonexistent/a.lcm: cannot write the log");
-  expect_error({"--csv", "/nonexistent/a.csv"},
-               "--csv: /nonexistent/a.csv: cannot write: No such file or directory");
-  expect_error({"--plugin", "/nonexistent/a.so"}, "--plugin: cannot load the controller");
 }
 
 }  // namespace

@@ -19,14 +19,11 @@ namespace {
 
 using testing::allocations_of;
 using testing::HostileTicks;
-
-RobotModel panda() {
-  return testing::arm_model(testing::arms()[0]);
-}
+using testing::panda_model;
 
 TEST(Realtime, UpdateNeverAllocates) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   Settings settings = HostileTicks::everything_on(model);
   settings.task_terms = {true, true};
   Controller controller(model, settings);
@@ -47,7 +44,7 @@ TEST(Realtime, UpdateNeverAllocates) {
 /// With the spectrum in every tick, followed and solved anew, and on a thread.
 TEST(Realtime, AnalysisNeverAllocates) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   for (const Analysis::Where where : {Analysis::Where::kInline, Analysis::Where::kBackground}) {
     Settings settings = HostileTicks::everything_on(model);
     settings.analysis.where = where;
@@ -74,7 +71,7 @@ TEST(Realtime, HostileInputNeverGivesHostileTorque) {
   for (const int n : {1, 2, 6, 7, 11, 16}) {
     SCOPED_TRACE(n);
     const RobotModel model =
-        n == 7 ? panda()
+        n == 7 ? panda_model()
                : RobotModel::from_urdf_text(
                      testing::RandomRobot(static_cast<unsigned>(n)).chain(n, 0.2), "link0", "tip");
     const Settings settings = HostileTicks::everything_on(model);
@@ -113,7 +110,7 @@ TEST(Realtime, UpdateMakesNoSystemCall) {
   const int forbidden = signal_without_system_calls([] { getppid(); });
   if (forbidden == -1) GTEST_SKIP() << "no seccomp here";
   ASSERT_EQ(forbidden, SIGKILL);  // the trap works
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   // The thread that analyses in the background stays behind in the parent process.
   for (const Analysis::Where where : {Analysis::Where::kInline, Analysis::Where::kBackground}) {
     Settings settings = HostileTicks::everything_on(model);

@@ -20,8 +20,8 @@ using testing::Random;
 using testing::RandomRobot;
 
 constexpr double kStep = 1e-4;
-constexpr double kTolerance =
-    1e-6;  // of differences over kStep, relative to quantities of order one
+/// Of differences over kStep, relative to quantities of order one.
+constexpr double kDifference = 1e-6;
 
 /// (f(x + h) - f(x - h)) / 2h by fourth order.
 template <class Function>
@@ -64,7 +64,7 @@ TEST(DynamicsPhysics, GravityIsTheGradientOfThePotential) {
       const JointVector e = JointVector::Unit(n, i);
       const auto slope = derivative(
           [&](double h) { return Eigen::Matrix<double, 1, 1>(potential(model, q + h * e)); });
-      EXPECT_NEAR(gravity[i], slope[0], kTolerance * gravity.cwiseAbs().maxCoeff())
+      EXPECT_NEAR(gravity[i], slope[0], kDifference * gravity.cwiseAbs().maxCoeff())
           << model.name() << ", joint " << i;
     }
   }
@@ -81,9 +81,9 @@ TEST(DynamicsPhysics, JIsTheDerivativeOfThePose) {
     const Eigen::Matrix3d spin =
         derivative([&](double h) { return pose(h).R_BT; }) * at.R_BT.transpose();
     const Vector6 twist = at.J * qd;
-    EXPECT_TRUE(near(twist.head<3>(), v, 10 * kTolerance)) << model.name();
-    EXPECT_TRUE(
-        near(twist.tail<3>(), Eigen::Vector3d(spin(2, 1), spin(0, 2), spin(1, 0)), 10 * kTolerance))
+    EXPECT_TRUE(near(twist.head<3>(), v, 10 * kDifference)) << model.name();
+    EXPECT_TRUE(near(twist.tail<3>(), Eigen::Vector3d(spin(2, 1), spin(0, 2), spin(1, 0)),
+                     10 * kDifference))
         << model.name();
     EXPECT_TRUE((at.R_BT * at.R_BT.transpose()).isIdentity(1e-13)) << model.name();
   }
@@ -97,7 +97,7 @@ TEST(DynamicsPhysics, JdotQdIsTheAccelerationAtConstantJointVelocity) {
     const Vector6 expected =
         derivative([&](double h) { return (evaluate(model, q + h * qd, qd).J * qd).eval(); });
     EXPECT_TRUE(near(evaluate(model, q, qd).Jdot_qd, expected,
-                     kTolerance * std::max(10.0, expected.cwiseAbs().maxCoeff())))
+                     kDifference * std::max(10.0, expected.cwiseAbs().maxCoeff())))
         << model.name();
   }
 }
@@ -133,11 +133,11 @@ TEST(DynamicsPhysics, CoriolisIsThatOfChristoffelAndMdotMinusTwoCIsSkew) {
     }
     const JointVector coriolis = evaluate(model, q, qd).coriolis;
     const double size = evaluate(model, q, qd).M.maxCoeff() * qd.squaredNorm();
-    EXPECT_TRUE(near(coriolis, C * qd, kTolerance * size)) << model.name();
+    EXPECT_TRUE(near(coriolis, C * qd, kDifference * size)) << model.name();
     // So coriolis = C qd for the one C with Mdot - 2 C skew, which keeps power balanced:
     const Eigen::MatrixXd N = Mdot - 2 * C;
-    EXPECT_TRUE(near(N, -N.transpose(), kTolerance * size)) << model.name();
-    EXPECT_NEAR(0.5 * qd.dot(Mdot * qd), qd.dot(coriolis), kTolerance * size * qd.norm())
+    EXPECT_TRUE(near(N, -N.transpose(), kDifference * size)) << model.name();
+    EXPECT_NEAR(0.5 * qd.dot(Mdot * qd), qd.dot(coriolis), kDifference * size * qd.norm())
         << model.name();
   }
 }

@@ -141,9 +141,9 @@ TEST(Dynamics, OfThePandaGiveTheTranslationalModesOfThePaper) {
   // Kao and Saldarriaga, Fig. 1 and Table 1, printed as 9.755, 10.98, 20.25 rad/s with damping
   // ratios 0.0294, 0.0316, 0.0255. The numbers below are those of the public model, with two
   // fingers of 15 g; the paper's rotational modes hang on wrist inertias that differ from it.
-  constexpr double kPi = std::numbers::pi;
   JointVector q(7);
-  q << 0, -kPi / 4, 0, -3 * kPi / 4, 0, kPi / 2, kPi / 4;
+  q << 0, -std::numbers::pi / 4, 0, -3 * std::numbers::pi / 4, 0, std::numbers::pi / 2,
+      std::numbers::pi / 4;
   ModelOptions fingers;
   fingers.payload.mass = 2 * 0.015;
   fingers.payload.center.z() = 0.0584 - 0.1034;  // their origin and the tip, from the hand

@@ -20,14 +20,10 @@ namespace {
 
 using testing::LedArm;
 using testing::plain_settings;
-using testing::smooth_arm;
-
-RobotModel panda() {
-  return smooth_arm(testing::arms()[0]);
-}
+using testing::smooth_panda;
 
 TEST(HeldDamping, IsSemidefiniteWhateverChanges) {
-  const RobotModel model = panda();
+  const RobotModel model = smooth_panda();
   LedArm led(model, plain_settings(model, Mode::kCartesian));
   testing::Random random(20210606);
   Gains& gains = led.setpoint.gains;
@@ -58,7 +54,7 @@ TEST(HeldDamping, IsSemidefiniteWhateverChanges) {
 /// Stretched, the arm loses a direction: the damping in the joints stays what the frequencies
 /// allow, and so does the torque.
 TEST(HeldDamping, IsBoundedThroughASingularity) {
-  const RobotModel model = panda();
+  const RobotModel model = smooth_panda();
   Settings settings = plain_settings(model, Mode::kCartesian);
   LedArm led(model, settings);
   JointVector stretched = led.center;
@@ -94,7 +90,7 @@ TEST(HeldDamping, IsBoundedThroughASingularity) {
 
 TEST(HeldDamping, NeverAllocates) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
-  const RobotModel model = panda();
+  const RobotModel model = smooth_panda();
   LedArm led(model, plain_settings(model, Mode::kCartesian));
   const Matrix6 stiffness = led.setpoint.gains.task_stiffness;
   const int count = testing::allocations_of([&] {
@@ -155,7 +151,7 @@ TEST(HeldDamping, IsBoundedHoweverSingularTheJacobian) {
 }
 
 TEST(HeldDamping, RefusesWhatIsNoRatio) {
-  const RobotModel model = panda();
+  const RobotModel model = smooth_panda();
   const Settings settings = plain_settings(model, Mode::kCartesian);
   for (const double wrong : {-1e-9, 2.0001, std::numeric_limits<double>::infinity(),
                              std::numeric_limits<double>::quiet_NaN()}) {

@@ -20,11 +20,8 @@ using testing::LedArm;
 using testing::plain_settings;
 using testing::SimulatedArm;
 using testing::smooth_arm;
+using testing::smooth_panda;
 using testing::unlimited_settings;
-
-RobotModel panda() {
-  return smooth_arm(testing::arms()[0]);
-}
 
 /// K_C in B's axes.
 Eigen::MatrixXd stiffness_in_base(const Gains& gains, const Eigen::Matrix3d& R_BT) {
@@ -93,7 +90,7 @@ TEST(HeldDamping, HoldsTheRatioAlongAPathOfEveryArm) {
 
 /// One ratio for all modes means that the undamped ones decouple the damping.
 TEST(HeldDamping, IsFollowedAsProportional) {
-  const RobotModel model = panda();
+  const RobotModel model = smooth_panda();
   Settings settings = plain_settings(model, Mode::kCartesian);
   LedArm led(model, settings);
   led.settle();
@@ -141,7 +138,7 @@ TEST(HeldDamping, LosesNoModesOfALongChain) {
 }
 
 TEST(HeldDamping, LeavesFreeDirectionsAndTheNullSpaceAlone) {
-  const RobotModel model = panda();
+  const RobotModel model = smooth_panda();
   Settings settings = plain_settings(model, Mode::kCartesian);
   Gains& gains = settings.initial.gains;
   gains.directions = {true, true, true, false, false, true};
@@ -163,7 +160,7 @@ TEST(HeldDamping, LeavesFreeDirectionsAndTheNullSpaceAlone) {
 /// What the dampers add to the torque is C of the published modes times the velocity.
 TEST(HeldDamping, IsInTheTorque) {
   for (const Frame frame : {Frame::kBase, Frame::kTool}) {
-    const RobotModel model = panda();
+    const RobotModel model = smooth_panda();
     Settings settings = plain_settings(model, Mode::kCartesian);
     settings.initial.gains.frame = frame;
     LedArm led(model, settings);
@@ -183,7 +180,7 @@ TEST(HeldDamping, IsInTheTorque) {
 }
 
 TEST(HeldDamping, FollowsChangesOfStiffnessAndRatio) {
-  const RobotModel model = panda();
+  const RobotModel model = smooth_panda();
   LedArm led(model, plain_settings(model, Mode::kCartesian));
   led.settle();
   Gains& gains = led.setpoint.gains;
@@ -217,7 +214,7 @@ TEST(HeldDamping, FollowsChangesOfStiffnessAndRatio) {
 
 /// On, another, off: evenly over Motion::gain_time.
 TEST(HeldDamping, TheRatioChangesEvenly) {
-  const RobotModel model = panda();
+  const RobotModel model = smooth_panda();
   LedArm led(model, plain_settings(model, Mode::kCartesian));
   led.settle();
   led.state.velocity.setConstant(0.3);
@@ -256,7 +253,7 @@ double rate_share(SimulatedArm& arm, double seconds) {
 }
 
 TEST(HeldDamping, ChangesAreSmoothInMotion) {
-  const RobotModel model = panda();
+  const RobotModel model = smooth_panda();
   SimulatedArm arm(model, testing::quiet_settings(model), testing::panda_ready());
   arm.setpoint.mode = Mode::kCartesian;
   Gains& gains = arm.setpoint.gains;

@@ -14,10 +14,8 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using testing::near;
 using testing::Random;
+using testing::random_rotation;
 
-Quaterniond random_rotation(Random& random) {
-  return Quaterniond(Eigen::Vector4d(random.vector(4).normalized()));
-}
 constexpr double kPi = std::numbers::pi;
 
 TEST(RotationVector, IsTheLogarithmOfTheExponential) {

@@ -2,6 +2,7 @@
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/dynamics_match.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gmock/gmock.h>
 
@@ -14,6 +15,7 @@ namespace dashpot::controller {
 namespace {
 
 using ::testing::ElementsAre;
+using testing::kInfinity;
 using testing::near;
 using testing::RandomRobot;
 using testing::same_dynamics;
@@ -59,7 +61,6 @@ TEST(RobotModel, GivesAContinuousJointNoLimits) {
           "</link><joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint>"
           "</robot>",
       "a", "b");
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const Joint& joint = model.joints()[0];
   EXPECT_EQ(joint.type, JointType::kContinuous);
   EXPECT_EQ(joint.lower, -kInfinity);

@@ -14,10 +14,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using testing::near;
 using testing::Random;
-
-Quaterniond random_rotation(Random& random) {
-  return Quaterniond(Eigen::Vector4d(random.vector(4).normalized()));
-}
+using testing::random_rotation;
 
 constexpr double kPeriod = 0.001;
 constexpr int kWindow = 30;

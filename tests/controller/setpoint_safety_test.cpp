@@ -13,10 +13,9 @@
 namespace dashpot::controller {
 namespace {
 
+using testing::kInfinity;
 using testing::near;
 using testing::Safety;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 TEST_F(Safety, RejectsBadSetpointsAndKeepsTheLastGoodOne) {
   run(1.0);
   const double nan = std::nan("");

@@ -1,6 +1,7 @@
 // Sine and cosine in lanes against those of the C library in extended precision.
 #include <dashpot/controller/sin_cos.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
 
@@ -10,6 +11,7 @@
 namespace dashpot::controller {
 namespace {
 
+using testing::kInfinity;
 using testing::Random;
 
 /// Distance of `computed` from `exact` in units in the last place of a double.
@@ -69,7 +71,6 @@ TEST(SinCos, OfZeroAreExact) {
 TEST(SinCos, OfHugeAnglesAreThoseOfTheLibraryAndNeighboursDoNotCare) {
   const Four angles = {1e7, 0.5, -1e300, 1e6};
   EXPECT_LT(error(angles), 2);
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   Four sine, cosine;
   sin_cos(Four{kInfinity, 0.5, -kInfinity, std::nan("")}, sine, cosine);
   for (const int i : {0, 2, 3}) {

@@ -11,10 +11,9 @@
 namespace dashpot::controller {
 namespace {
 
+using testing::kInfinity;
 using testing::near;
 using testing::Safety;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 /// A fault for some ticks: the torque ramps to zero, and a good state brings the controller back.
 class Ramp : public Safety, public ::testing::WithParamInterface<int> {
  protected:

@@ -14,20 +14,14 @@
 namespace dashpot::controller {
 namespace {
 
+using testing::at;
 using testing::in_mode;
+using testing::kSmallSwing;
 using testing::LedArm;
 using testing::LongComplex;
 using testing::LongMatrix;
+using testing::panda_model;
 using testing::unlimited_settings;
-constexpr double kSwing = 0.2;  // rad
-
-RobotModel panda() {
-  return testing::arm_model(testing::arms()[0]);
-}
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// Eigenvalues of M q'' + C q' + K q = 0, by a solver of their own in long double.
 std::vector<LongComplex> eigenvalues_of(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
@@ -96,7 +90,7 @@ TEST(VibrationInTheTick, IsWhatADirectSolutionGivesThere) {
     for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
       SCOPED_TRACE(std::string(arm.file) + (mode == Mode::kJoint ? " joint" : " cartesian"));
       const Settings settings = in_mode(unlimited_settings(model), mode);
-      LedArm led(model, settings, kSwing);
+      LedArm led(model, settings, kSmallSwing);
       led.settle();
       for (int k = 1; k <= 1000; ++k) {
         led.swing(1e-3 * k);
@@ -135,7 +129,7 @@ TEST(VibrationInTheTick, PairsRealEigenvaluesAsADirectSolutionDoes) {
     settings.initial.gains.joint_damping *= 4;  // most modes are overdamped
     settings.initial.gains.task_damping *= 4;
     for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
-      LedArm arm(model, in_mode(settings, mode), kSwing);
+      LedArm arm(model, in_mode(settings, mode), kSmallSwing);
       arm.settle();
       for (int k = 0; k < 3; ++k) arm.tick();
       analysis::System<kMaxJoints> system;
@@ -163,9 +157,9 @@ TEST(VibrationInTheTick, PairsRealEigenvaluesAsADirectSolutionDoes) {
 }
 
 TEST(VibrationInTheTick, ProvesItsBounds) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   const Settings settings = unlimited_settings(model);
-  LedArm led(model, in_mode(settings, Mode::kCartesian), kSwing);
+  LedArm led(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
   led.settle();
   double largest = 0;
   for (int k = 1; k <= 500; ++k) {
@@ -188,7 +182,7 @@ TEST(VibrationInTheTick, KeepsTheNumbersOfModes) {
   for (const testing::Arm& arm : testing::arms()) {
     SCOPED_TRACE(arm.file);
     const RobotModel model = testing::arm_model(arm);
-    LedArm led(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSwing);
+    LedArm led(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSmallSwing);
     led.settle();
     std::map<int, VibrationMode> last;
     std::set<std::vector<int>> orders;
@@ -221,8 +215,8 @@ TEST(VibrationInTheTick, KeepsTheNumbersOfModes) {
 
 /// Published shapes solve the equation of motion and have unit kinetic energy.
 TEST(VibrationInTheTick, ShapesBelongToTheClosedLoop) {
-  const RobotModel model = panda();
-  LedArm led(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSwing);
+  const RobotModel model = panda_model();
+  LedArm led(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSmallSwing);
   led.settle();
   for (int k = 1; k <= 100; ++k) {
     led.swing(1e-3 * k);
@@ -244,12 +238,12 @@ TEST(VibrationInTheTick, ShapesBelongToTheClosedLoop) {
 
 /// Through the stretched posture and back, where the arm loses a direction.
 TEST(VibrationInTheTick, GoesThroughASingularity) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   Settings settings = unlimited_settings(model);
   for (const double null_stiffness : {0.0, 20.0}) {
     SCOPED_TRACE(null_stiffness);
     settings.initial.gains.null_stiffness.setConstant(null_stiffness);
-    LedArm led(model, in_mode(settings, Mode::kCartesian), kSwing);
+    LedArm led(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
     led.settle();
     const JointVector start = led.center;
     JointVector stretched = start;

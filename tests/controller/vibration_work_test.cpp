@@ -12,22 +12,16 @@ namespace dashpot::controller {
 namespace {
 
 using analysis::SpectrumOrigin;
+using testing::at;
 using testing::in_mode;
+using testing::kSmallSwing;
 using testing::LedArm;
+using testing::panda_model;
 using testing::unlimited_settings;
-constexpr double kSwing = 0.2;  // rad
-
-RobotModel panda() {
-  return testing::arm_model(testing::arms()[0]);
-}
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {
-  const RobotModel model = panda();
-  LedArm led(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSwing);
+  const RobotModel model = panda_model();
+  LedArm led(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSmallSwing);
   led.settle();
   const Vibration before = led.modes();
   for (int k = 0; k < 100; ++k) led.tick();
@@ -56,8 +50,8 @@ TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {
 
 /// A change of gains is no standing still.
 TEST(VibrationInTheTick, SeesGainsChange) {
-  const RobotModel model = panda();
-  LedArm led(model, in_mode(unlimited_settings(model), Mode::kJoint), kSwing);
+  const RobotModel model = panda_model();
+  LedArm led(model, in_mode(unlimited_settings(model), Mode::kJoint), kSmallSwing);
   led.settle();
   led.tick();
   const Vibration before = led.modes();
@@ -79,10 +73,10 @@ TEST(VibrationInTheTick, SeesGainsChange) {
 }
 
 TEST(VibrationInTheTick, IsNotThereIfOff) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   Settings settings = unlimited_settings(model);
   settings.analysis.where = Analysis::Where::kOff;
-  LedArm led(model, in_mode(settings, Mode::kCartesian), kSwing);
+  LedArm led(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
   led.settle();
   EXPECT_EQ(led.modes().tick, 0u);
   EXPECT_EQ(led.modes().count, 0);
@@ -93,12 +87,12 @@ TEST(VibrationInTheTick, IsNotThereIfOff) {
 }
 
 TEST(VibrationInTheTick, LeavesOutShapesThatNobodyWants) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   Settings settings = unlimited_settings(model);
   settings.analysis.shapes = false;
-  LedArm led(model, in_mode(settings, Mode::kCartesian), kSwing);
+  LedArm led(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
   settings.analysis.shapes = true;
-  LedArm full(model, in_mode(settings, Mode::kCartesian), kSwing);
+  LedArm full(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
   for (int k = 0; k < 600; ++k) {
     led.swing(1e-3 * k);
     full.swing(1e-3 * k);
@@ -116,10 +110,10 @@ TEST(VibrationInTheTick, LeavesOutShapesThatNobodyWants) {
 }
 
 TEST(VibrationInTheTick, HasNothingToSolveWithoutSprings) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   Settings settings = unlimited_settings(model);
   settings.watchdog.setpoint_damp = 0.01;
-  LedArm led(model, in_mode(settings, Mode::kJoint), kSwing);
+  LedArm led(model, in_mode(settings, Mode::kJoint), kSmallSwing);
   led.settle();
   const std::uint64_t solved = led.modes().counters.tracked + led.modes().counters.direct;
   for (int k = 1; k <= 50; ++k) {
@@ -137,10 +131,10 @@ TEST(VibrationInTheTick, HasNothingToSolveWithoutSprings) {
 }
 
 TEST(VibrationInTheTick, TellsZeroModesFromVibrations) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   Settings settings = unlimited_settings(model);
   settings.initial.gains.null_stiffness.setZero();
-  LedArm free(model, in_mode(settings, Mode::kCartesian), kSwing);
+  LedArm free(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
   free.settle();
   for (int k = 1; k <= 100; ++k) {
     free.swing(1e-3 * k);
@@ -150,7 +144,7 @@ TEST(VibrationInTheTick, TellsZeroModesFromVibrations) {
   EXPECT_EQ(free.modes().zero_modes, 1);
   EXPECT_EQ(free.modes().counters.no_zero_modes, 0u);
   EXPECT_GE(free.modes().counters.tracked, 100u);
-  LedArm held(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSwing);
+  LedArm held(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSmallSwing);
   held.settle();
   EXPECT_EQ(held.modes().zero_modes, 0);
   EXPECT_EQ(
@@ -159,10 +153,10 @@ TEST(VibrationInTheTick, TellsZeroModesFromVibrations) {
 }
 
 TEST(VibrationInTheTick, LeavesOutTermsThatAreZero) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   Settings settings = unlimited_settings(model);
   settings.task_terms = {true, true};
-  LedArm led(model, in_mode(settings, Mode::kCartesian), kSwing);
+  LedArm led(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
   led.settle();
   const auto swing = [&](int from) {
     for (int k = from + 1; k <= from + 100; ++k) {
@@ -186,7 +180,7 @@ TEST(VibrationInTheTick, LeavesOutTermsThatAreZero) {
 
 /// Whatever the analysis makes of hostile input, the torque is what it is without.
 TEST(VibrationInTheTick, NeverTouchesTheTorque) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   Settings settings = testing::HostileTicks::everything_on(model);
   settings.analysis.every = 1;
   settings.task_terms = {true, false};
@@ -210,9 +204,9 @@ TEST(VibrationInTheTick, NeverTouchesTheTorque) {
 }
 
 TEST(VibrationInTheTick, ForgetsAtAReset) {
-  const RobotModel model = panda();
-  LedArm first(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSwing);
-  LedArm again(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSwing);
+  const RobotModel model = panda_model();
+  LedArm first(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSmallSwing);
+  LedArm again(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSmallSwing);
   const auto run = [](LedArm& led) {
     for (int k = 0; k < 600; ++k) {
       led.swing(1e-3 * k);

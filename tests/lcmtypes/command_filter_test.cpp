@@ -1,6 +1,7 @@
 // Which commands count, and what they set.
 #include <dashpot/lcmtypes/command_filter.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
 
@@ -10,8 +11,9 @@
 namespace dashpot::lcmtypes {
 namespace {
 
+using testing::kInfinity;
+
 using Verdict = CommandVerdict;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t kSteady = 5'000'000;  // us
 

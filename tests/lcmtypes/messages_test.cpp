@@ -14,11 +14,6 @@ namespace {
 
 using ::testing::ElementsAreArray;
 
-template <class Vector>
-std::vector<double> list(const Vector& values) {
-  return {values.data(), values.data() + values.size()};
-}
-
 /// The rotation matrix of w, x, y, z, by Rodrigues' formula in the quaternion's entries.
 Eigen::Matrix3d rotation_of(const double (&q)[4]) {
   const double w = q[0], x = q[1], y = q[2], z = q[3];

@@ -32,11 +32,6 @@ void make_consistent(Random& random, ModesSample& sample) {
   }
 }
 
-template <class Vector>
-std::vector<double> list(const Vector& values) {
-  return {values.data(), values.data() + values.size()};
-}
-
 TEST(Python, ReadsALogWithGeneratedTypes) {
   const Scratch scratch;
   Random random(971);

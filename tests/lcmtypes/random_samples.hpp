@@ -17,6 +17,11 @@ using Bytes = std::vector<std::uint8_t>;
 
 inline constexpr std::int64_t kNow = 1'700'000'000'000'000;  // us, some day in 2023
 
+template <class Vector>
+std::vector<double> list(const Vector& values) {
+  return {values.data(), values.data() + values.size()};
+}
+
 inline controller::Pose random_pose(Random& random) {
   const Eigen::Vector4d q = random.vector(4).normalized();
   return {random.vector(3), Eigen::Quaterniond(q).toRotationMatrix()};

@@ -18,20 +18,20 @@ std::ostream& operator<<(std::ostream& out, const BadConfig& config) {
   return out << config.name;
 }
 
-class ConfigRefuses : public testing::TestWithParam<BadConfig> {};
+class ConfigRefuses : public ::testing::TestWithParam<BadConfig> {};
 
 TEST_P(ConfigRefuses, WithTheLine) {
   SCOPED_TRACE(GetParam().text);
   EXPECT_EQ(complaint(panda() + GetParam().text), GetParam().said);
 }
 
-std::string name_of(const testing::TestParamInfo<BadConfig>& info) {
+std::string name_of(const ::testing::TestParamInfo<BadConfig>& info) {
   return info.param.name;
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Keys, ConfigRefuses,
-    testing::Values(
+    ::testing::Values(
         BadConfig{"UnknownGroup",
                   "gain: unknown key; the keys are robot, control, gains, limits, motion, "
                   "feed_forward, watchdog, analysis, simulation, scenario (line 2)",
@@ -83,7 +83,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(
     Numbers, ConfigRefuses,
-    testing::Values(
+    ::testing::Values(
         BadConfig{"WrongUnit", "control.period: has a wrong unit: '1 kHz'; s is wanted (line 2)",
                   "control: {period: 1 kHz}\n"},
         BadConfig{"WrongUnitInAList",
@@ -139,7 +139,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(
     Sizes, ConfigRefuses,
-    testing::Values(
+    ::testing::Values(
         BadConfig{"ListTooShort",
                   "limits.torque: has 6 entries; a list of 7, or one number for all, is wanted "
                   "(line 2)",
@@ -170,7 +170,7 @@ const std::string kTaskRows =
 
 INSTANTIATE_TEST_SUITE_P(
     Values, ConfigRefuses,
-    testing::Values(
+    ::testing::Values(
         BadConfig{"NegativeStiffness",
                   "gains.joint.stiffness: is not positive semidefinite (line 2)",
                   "gains: {joint: {stiffness: -600, damping: 1}}\n"},
@@ -212,10 +212,10 @@ INSTANTIATE_TEST_SUITE_P(
 
 INSTANTIATE_TEST_SUITE_P(
     Files, ConfigRefuses,
-    testing::Values(BadConfig{"Yaml", "is not YAML: illegal flow end (line 2)", "limits: ]\n"},
-                    BadConfig{"SecondDocument",
-                              "holds several documents; give a list instead (line 3)",
-                              "---\nlimits: {}\n"}),
+    ::testing::Values(BadConfig{"Yaml", "is not YAML: illegal flow end (line 2)", "limits: ]\n"},
+                      BadConfig{"SecondDocument",
+                                "holds several documents; give a list instead (line 3)",
+                                "---\nlimits: {}\n"}),
     name_of);
 
 /// What is wrong with the robot; `keys` follow urdf, base and tip.
@@ -260,11 +260,11 @@ TEST(ConfigRobot, HasAUrdfThatIsInOrder) {
                      ", tip: panda_link8}\n");
   };
   EXPECT_THAT(with("/nowhere.urdf", "panda_link0"),
-              testing::MatchesRegex("robot: /nowhere.urdf: .*No such file.* \\(line 2\\)"));
+              ::testing::MatchesRegex("robot: /nowhere.urdf: .*No such file.* \\(line 2\\)"));
   EXPECT_THAT(with(urdf_path("panda.urdf"), "panda_link99"),
-              testing::MatchesRegex("robot: .*panda.urdf: link 'panda_link99': .* \\(line 2\\)"));
+              ::testing::MatchesRegex("robot: .*panda.urdf: link 'panda_link99': .* \\(line 2\\)"));
   EXPECT_THAT(complaint_about(", reflected_inertia: [1, 2]"),
-              testing::MatchesRegex("robot.*2 entries.* \\(line 2\\)"));
+              ::testing::MatchesRegex("robot.*2 entries.* \\(line 2\\)"));
 }
 
 TEST(ConfigFile, HasToBeThere) {

@@ -1,6 +1,7 @@
 // What a configuration file says is what the controller gets.
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/plugin/config_file.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gmock/gmock.h>
 
@@ -21,9 +22,9 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
+using testing::kInfinity;
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 const std::string kExample = std::string(DASHPOT_SOURCE_DIR) + "/controller/examples/panda.yaml";
 
@@ -141,7 +142,7 @@ TEST(Config, FillsTheTask) {
   EXPECT_EQ(gains.task_damping(0, 1), 1);
   EXPECT_EQ(gains.task_damping(5, 3), 2);
   EXPECT_EQ(gains.frame, Frame::kTool);
-  EXPECT_THAT(gains.directions, testing::ElementsAre(false, false, true, true, false, false));
+  EXPECT_THAT(gains.directions, ::testing::ElementsAre(false, false, true, true, false, false));
 }
 
 TEST(Config, ADampingRatioStandsForTheDampingOfTheTask) {

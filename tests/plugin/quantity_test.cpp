@@ -81,7 +81,7 @@ TEST(Quantity, RefusesAnUnknownUnit) {
 
 TEST(Quantity, RefusesWhatIsNoNumber) {
   for (const char* text : {"", " ", "fast", "m", "ms 1", "--1", "+-1", "0x", ","}) {
-    EXPECT_THAT(complaint(text, "m"), testing::StartsWith("is not "));
+    EXPECT_THAT(complaint(text, "m"), ::testing::StartsWith("is not "));
   }
   EXPECT_EQ(complaint("fast", "m/s"), "is not a number but 'fast'");
   for (const char* text : {"nan", ".nan", ".NaN", "inf", "-inf", ".inf", "-.Inf", "1e999 m"}) {

@@ -33,4 +33,8 @@ inline controller::RobotModel arm_model(const Arm& arm,
   return controller::RobotModel::from_urdf_file(arm_path(arm.file), arm.base, arm.tip, options);
 }
 
+inline controller::RobotModel panda_model() {
+  return arm_model(arms()[0]);
+}
+
 }  // namespace dashpot::testing

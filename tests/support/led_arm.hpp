@@ -18,6 +18,10 @@ inline controller::RobotModel smooth_arm(const Arm& arm) {
   return arm_model(arm, options);
 }
 
+inline controller::RobotModel smooth_panda() {
+  return smooth_arm(arms()[0]);
+}
+
 /// Settings in which no limit or watchdog interferes.
 inline controller::Settings unlimited_settings(const controller::RobotModel& model) {
   controller::Settings settings = controller::default_settings(model);
@@ -44,6 +48,12 @@ inline controller::Settings plain_settings(const controller::RobotModel& model,
   gains.task_damping_ratio = gains.joint_damping_ratio = 0.7;
   gains.task_stiffness = controller::Vector6(2000, 600, 2000, 100, 100, 100).asDiagonal();
   return settings;
+}
+
+inline constexpr double kSmallSwing = 0.2;  // rad
+
+inline std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
 }
 
 struct LedArm {

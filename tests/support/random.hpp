@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -48,5 +49,9 @@ class Random {
   std::mt19937_64 engine_;
   ::testing::ScopedTrace trace_;
 };
+
+inline Eigen::Quaterniond random_rotation(Random& random) {
+  return Eigen::Quaterniond(Eigen::Vector4d(random.vector(4).normalized()));
+}
 
 }  // namespace dashpot::testing

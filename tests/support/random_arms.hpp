@@ -1,6 +1,7 @@
 #pragma once
 // Random impedance-controlled arms, tame and ill-conditioned, for tests of damping designs.
 
+#include <dashpot/analysis/damping_hold.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/random.hpp>
 
@@ -34,6 +35,13 @@ inline analysis::TaskImpedance random_arm(Random& random, Eigen::Index n, Eigen:
   arm.jacobian = 0.5 * random.matrix(m, n);
   arm.task_stiffness = graded(random, m, 3000, stiffness_condition);
   return arm;
+}
+
+/// K_C or C_C with rows and columns of zeros for the directions that are not there.
+inline analysis::TaskMatrix padded(const Eigen::MatrixXd& A) {
+  analysis::TaskMatrix result = analysis::TaskMatrix::Zero();
+  result.topLeftCorner(A.rows(), A.cols()) = A;
+  return result;
 }
 
 /// Joint friction that is strong in some joints and weak in others; N m s/rad.

@@ -3,6 +3,7 @@
 
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/simulated_arm.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
 

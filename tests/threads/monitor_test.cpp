@@ -315,11 +315,6 @@ TEST(Monitor, UpdatesATerminalInPlaceAndLeavesItClean) {
   EXPECT_THAT(shown.substr(end), HasSubstr("700 states and 7 modes messages over 0.7 s"));
 }
 
-std::string own_url() {
-  // A port of this process alone, so that tests may run side by side.
-  return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 30000) + "?ttl=0";
-}
-
 TEST(Monitor, FollowsABusUntilCtrlC) {
   const std::string url = own_url();
   std::vector<std::unique_ptr<lcmtypes::Sink>> sinks;

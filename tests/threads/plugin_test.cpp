@@ -22,8 +22,6 @@ using controller::JointVector;
 using Eigen::Map;
 using Eigen::VectorXd;
 
-const std::string kCartesian = "control: {mode: cartesian}\n";
-
 TEST(Plugin, ShowsItsFunctionsAndNothingElse) {
   const std::string command = std::string("nm -D --defined-only '") + DASHPOT_PLUGIN + "'";
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(popen(command.c_str(), "r"), pclose);

@@ -11,8 +11,6 @@
 namespace dashpot::tests {
 namespace {
 
-const std::string kCartesian = "control: {mode: cartesian}\n";
-
 TEST(Plugin, AllocatesNothingInATick) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
   EXPECT_GE(testing::allocations_of([] { create(panda()); }), 1);

@@ -21,15 +21,6 @@ using Clock = std::chrono::steady_clock;
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
 
-std::string scene(const std::string& name) {
-  return std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes/" + name + ".yaml";
-}
-
-std::string own_url() {
-  // A port of this process alone, so that tests may run side by side.
-  return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 30000) + "?ttl=0";
-}
-
 /// A `dashpot` that runs beside the test, with its output in files.
 class Running {
  public:

@@ -11,6 +11,8 @@
 namespace dashpot::controller {
 namespace {
 
+using testing::panda_model;
+
 struct SwingingArm {
   SwingingArm(const RobotModel& model, Analysis::Where where)
       : controller(model,
@@ -57,10 +59,6 @@ struct SwingingArm {
   double phase = 0;
 };
 
-RobotModel panda() {
-  return testing::arm_model(testing::arms()[0]);
-}
-
 /// Each tick counts once.
 std::uint64_t due_ticks(const VibrationCounters& counters) {
   return counters.tracked + counters.reused + counters.direct + counters.unchanged +
@@ -84,7 +82,7 @@ void expect_same_modes(const Vibration& a, const Vibration& b) {
 
 /// The thread has the time to solve every task: the same numbers to the last bit.
 TEST(VibrationThread, GivesTheNumbersOfTheTick) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   SwingingArm apart(model, Analysis::Where::kBackground);
   SwingingArm within(model, Analysis::Where::kInline);
   for (int k = 0; k < 200; ++k) {
@@ -103,7 +101,7 @@ TEST(VibrationThread, GivesTheNumbersOfTheTick) {
 
 /// As fast as it goes: what it finds is right within the bounds, ticks are missed and counted.
 TEST(VibrationThread, KeepsUpAsFarAsItCan) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   SwingingArm apart(model, Analysis::Where::kBackground);
   SwingingArm within(model, Analysis::Where::kInline);
   std::vector<Vibration> expected(1);
@@ -130,7 +128,7 @@ TEST(VibrationThread, KeepsUpAsFarAsItCan) {
 
 /// What was found before a reset is not shown after it.
 TEST(VibrationThread, ForgetsAtAReset) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   SwingingArm arm(model, Analysis::Where::kBackground);
   for (int round = 0; round < 20; ++round) {
     arm.tick();
@@ -149,7 +147,7 @@ TEST(VibrationThread, ForgetsAtAReset) {
 }
 
 TEST(VibrationThread, EndsWithItsController) {
-  const RobotModel model = panda();
+  const RobotModel model = panda_model();
   for (int round = 0; round < 20; ++round) {
     SwingingArm arm(model, Analysis::Where::kBackground);
     if (round % 2 == 0) arm.tick();

@@ -1,0 +1,49 @@
+#pragma once
+// `dashpot run` of the project's scenes, as they are and changed.
+#include <dashpot/tests/apps/json_result.hpp>
+
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+namespace dashpot::tests {
+
+inline std::string text_of(const std::string& path) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+inline Outcome run_scene(const std::string& path, std::vector<std::string> options = {}) {
+  options.insert(options.begin(), {"run", path, "--fast"});
+  return run_program(options);
+}
+
+inline Json run_json(const std::string& path, std::vector<std::string> options = {}) {
+  options.emplace_back("--json");
+  return parse(run_scene(path, options));
+}
+
+/// A scene with parts of its text replaced, its URDF named absolutely, in a file of its own.
+inline std::string changed(const Scratch& scratch, const std::string& name,
+                           const std::vector<std::pair<std::string, std::string>>& replacements) {
+  std::string text = text_of(scene(name));
+  const auto replace = [&text](const std::string& old, const std::string& by) {
+    const std::size_t at = text.find(old);
+    if (at == std::string::npos) throw std::runtime_error("no '" + old + "' in the scene");
+    text.replace(at, old.size(), by);
+  };
+  for (const auto& [from, to] : replacements) replace(from, to);
+  if (text.find("../models") != std::string::npos) {
+    replace("../models", std::string(DASHPOT_SOURCE_DIR) + "/sim/models");
+  }
+  return scratch.write("scene.yaml", text);
+}
+
+inline std::string changed(const Scratch& scratch, const std::string& name, const std::string& from,
+                           const std::string& to) {
+  return changed(scratch, name, {{from, to}});
+}
+
+}  // namespace dashpot::tests
