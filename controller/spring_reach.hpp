@@ -66,10 +66,10 @@ struct Tether {
   /// Whether a pose is within reach, by a bound that costs little: the angle between two unit
   /// quaternions is at most pi sqrt(1 - (their product)^2).
   bool near(const Eigen::Vector3d& p, const Eigen::Quaterniond& q) const noexcept {
-    constexpr double kPi = std::numbers::pi;
     const double cosine = q.dot(rotation);
     return (p - position).squaredNorm() <= reach.linear * reach.linear &&
-           kPi * kPi * (1 - cosine * cosine) <= reach.angular * reach.angular;
+           std::numbers::pi * std::numbers::pi * (1 - cosine * cosine) <=
+               reach.angular * reach.angular;
   }
 };
 
