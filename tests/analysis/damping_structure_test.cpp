@@ -2,7 +2,7 @@
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
-#include <dashpot/tests/support/systems.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,12 +3,12 @@
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/tracked.hpp>
 #include <dashpot/tests/support/true_spectrum.hpp>
 
 #include <gtest/gtest.h>
 
 #include <functional>
-#include <memory>
 #include <numbers>
 
 namespace dashpot::analysis {
@@ -19,8 +19,8 @@ using Eigen::VectorXd;
 using testing::expect_enclosed;
 using testing::Random;
 
-System<kMaxDof> symmetric_system(const MatrixXd& mass, const MatrixXd& damping,
-                                 const MatrixXd& stiffness) {
+System<kMaxDof> system_of(const MatrixXd& mass, const MatrixXd& damping,
+                          const MatrixXd& stiffness) {
   System<kMaxDof> system(mass.rows());
   system.mass = 0.5 * (mass + mass.transpose());
   system.damping = 0.5 * (damping + damping.transpose());
@@ -29,16 +29,13 @@ System<kMaxDof> symmetric_system(const MatrixXd& mass, const MatrixXd& damping,
 }
 
 /// A path is followed, and its bounds are checked at every `apart`-th step.
-class Follower {
- public:
-  explicit Follower(const TrackerOptions& options = {})
-      : tracker(std::make_unique<ModeTracker>(options)),
-        spectrum(std::make_unique<TrackedSpectrum>()) {}
+struct Follower : testing::Tracked {
+  using Tracked::Tracked;
 
   void follow(int steps, int apart, const std::function<System<kMaxDof>(double)>& at) {
     for (int step = 0; step <= steps; ++step) {
       const System<kMaxDof> system = at(static_cast<double>(step) / steps);
-      ASSERT_EQ(tracker->update(system, *spectrum), Status::kOk) << "step " << step;
+      ASSERT_EQ(update(system), Status::kOk) << "step " << step;
       std::vector<double> now;
       for (int i = 0; i < spectrum->mode_count; ++i) {
         now.push_back(mode(i).natural_frequency);
@@ -52,11 +49,6 @@ class Follower {
     }
   }
 
-  const ModeNumbers& mode(int i) const { return spectrum->modes[static_cast<std::size_t>(i)]; }
-  const TrackerCounters& counters() const { return tracker->counters(); }
-
-  std::unique_ptr<ModeTracker> tracker;
-  std::unique_ptr<TrackedSpectrum> spectrum;
   std::vector<double> last;
   double largest_jump = 0;  ///< of a natural frequency from one step to the next, rad/s
 };
@@ -77,7 +69,7 @@ TEST(TrackedPath, ThroughCriticalDampingIsSmooth) {
   follower.follow(2000, 20, [&](double t) {
     const double zeta = 0.5 + 1.2 * t;  // all three pass through 1, proportionally damped
     const VectorXd d = 2 * zeta * omega, k = omega.cwiseAbs2();
-    return symmetric_system(T * T, T * d.asDiagonal() * T, T * k.asDiagonal() * T);
+    return system_of(T * T, T * d.asDiagonal() * T, T * k.asDiagonal() * T);
   });
   expect_followed(follower.counters());
   EXPECT_LT(follower.largest_jump, 1e-9);
@@ -92,8 +84,8 @@ TEST(TrackedPath, StandsAtExactlyCriticalDamping) {
   Follower follower;
   follower.follow(200, 1, [&](double t) {
     // The first mode stays exactly critical while the second one changes.
-    return symmetric_system(MatrixXd::Identity(2, 2), Eigen::Vector2d(2, 1 + t).asDiagonal(),
-                            Eigen::Vector2d(1, 16 + t).asDiagonal());
+    return system_of(MatrixXd::Identity(2, 2), Eigen::Vector2d(2, 1 + t).asDiagonal(),
+                     Eigen::Vector2d(1, 16 + t).asDiagonal());
   });
   expect_followed(follower.counters());
   EXPECT_EQ(follower.mode(1).kind, ModeKind::kCritical);
@@ -105,7 +97,7 @@ System<kMaxDof> exchange(double t, double gap) {
   const double w = 10, difference = 4 * (t - 0.5);
   MatrixXd K(2, 2);
   K << w * w + w * difference, w * gap, w * gap, w * w - w * difference;
-  return symmetric_system(MatrixXd::Identity(2, 2), 0.1 * MatrixXd::Identity(2, 2), K);
+  return system_of(MatrixXd::Identity(2, 2), 0.1 * MatrixXd::Identity(2, 2), K);
 }
 
 TEST(TrackedPath, VeersWhereModesAreCoupled) {
@@ -139,8 +131,8 @@ TEST(TrackedPath, CrossesInMixedCoordinatesWithHeavyDamping) {
     follower.follow(3000, 30, [&](double t) {
       VectorXd omega(4);
       omega << 8 + 4 * t, 10, 12 - 4 * t, 30;  // three meet at t = 0.5
-      return symmetric_system(T * T, T * (2 * zeta * omega).asDiagonal() * T,
-                              T * omega.cwiseAbs2().asDiagonal() * T);
+      return system_of(T * T, T * (2 * zeta * omega).asDiagonal() * T,
+                       T * omega.cwiseAbs2().asDiagonal() * T);
     });
     EXPECT_GE(follower.counters().tracked, 2990);
     EXPECT_LT(follower.largest_jump, 5e-3);
@@ -158,7 +150,7 @@ TEST(TrackedPath, AroundAnExceptionalPointExchangesTheModes) {
                  coupling = center + radius * std::cos(angle);
     MatrixXd K(2, 2);
     K << w * w + difference, coupling, coupling, w * w - difference;
-    return symmetric_system(MatrixXd::Identity(2, 2), Eigen::Vector2d(c1, c2).asDiagonal(), K);
+    return system_of(MatrixXd::Identity(2, 2), Eigen::Vector2d(c1, c2).asDiagonal(), K);
   };
   Follower follower;
   follower.follow(1, 1, [&](double) { return at(0); });
@@ -194,7 +186,7 @@ TEST(TrackedPath, RealEigenvaluesOfTwoModesMeetAndPartAgain) {
       MatrixXd C(2, 2), K(2, 2);
       C << 4, coupling, coupling, c;
       K << 1, 0.3 * coupling, 0.3 * coupling, 100;
-      return symmetric_system(MatrixXd::Identity(2, 2), C, K);
+      return system_of(MatrixXd::Identity(2, 2), C, K);
     });
     EXPECT_GE(follower.counters().tracked, 3990);
     if (coupling == 0.01 || coupling == 0.3) {
@@ -213,8 +205,8 @@ TEST(TrackedPath, ModesThatStayEqualAreReportedEqual) {
       const double omega = 5 + t;
       VectorXd w(5);
       w << omega, omega, omega, 20, 20;
-      return symmetric_system(T * T, T * (2 * zeta * w).asDiagonal() * T,
-                              T * w.cwiseAbs2().asDiagonal() * T);
+      return system_of(T * T, T * (2 * zeta * w).asDiagonal() * T,
+                       T * w.cwiseAbs2().asDiagonal() * T);
     });
     for (int i = 0; i < 5; ++i) {
       EXPECT_NEAR(follower.mode(i).natural_frequency, i < 2 ? 20 : 6, 1e-5);
@@ -255,7 +247,7 @@ TEST(TrackedPath, JumpsAreSolvedAnew) {
   Random random(3005);
   Follower follower;
   follower.follow(60, 1, [&](double) {
-    return symmetric_system(random.spd(6), 3 * random.spd(6), 100 * random.spd(6));
+    return system_of(random.spd(6), 3 * random.spd(6), 100 * random.spd(6));
   });
   EXPECT_GE(follower.counters().direct, 30);
   EXPECT_EQ(follower.counters().of(Fallback::kStart), 1);
@@ -268,9 +260,8 @@ TEST(TrackedPath, KeepsPlacesWhereAJumpIsSolvedAnew) {
     const double angle = degrees * std::numbers::pi / 180;
     MatrixXd R(2, 2);
     R << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
-    return symmetric_system(
-        MatrixXd::Identity(2, 2), 0.2 * MatrixXd::Identity(2, 2),
-        R * Eigen::Vector2d(high * high, low * low).asDiagonal() * R.transpose());
+    return system_of(MatrixXd::Identity(2, 2), 0.2 * MatrixXd::Identity(2, 2),
+                     R * Eigen::Vector2d(high * high, low * low).asDiagonal() * R.transpose());
   };
   Follower follower;
   follower.follow(50, 5, [&](double t) { return at(t, 20, 3 + t); });
@@ -297,7 +288,7 @@ TEST(TrackedPath, StartsAfreshIfToldToForget) {
   const auto at = [&](double a, double b, double c) {
     MatrixXd K = Eigen::Vector3d(a, b, c).asDiagonal();
     K(0, 1) = K(1, 0) = 0.5;
-    return symmetric_system(I, 0.3 * I, K);
+    return system_of(I, 0.3 * I, K);
   };
   Follower follower;
   follower.follow(3, 1, [&](double t) { return at(400 + t, 100, 25); });
@@ -313,7 +304,7 @@ TEST(TrackedPath, KeepsPlacesOverASmallJump) {
   const auto at = [&](double a, double b, double c) {
     MatrixXd K = Eigen::Vector3d(a, b, c).asDiagonal();
     K(0, 1) = K(1, 0) = 0.5;
-    return symmetric_system(I, 0.3 * I, K);
+    return system_of(I, 0.3 * I, K);
   };
   for (const bool reset : {false, true}) {
     Follower follower;
@@ -349,7 +340,7 @@ System<kMaxDof> planar_arm(const Eigen::Vector3d& q, double friction) {
     J = J_link;
   }
   const Eigen::Vector2d root_K(30, 20);
-  System<kMaxDof> system = symmetric_system(
+  System<kMaxDof> system = system_of(
       M,
       J.transpose() * Eigen::Vector2d(8, 12).asDiagonal() * J + friction * MatrixXd::Identity(3, 3),
       MatrixXd::Zero(3, 3));

@@ -24,7 +24,7 @@ using testing::Random;
 using testing::swing;
 using testing::Tracked;
 
-System<kMaxDof> random_start(Random& random, int n, double damping) {
+System<kMaxDof> random_fixed_system(Random& random, int n, double damping) {
   System<kMaxDof> system(n);
   system.mass = random.spd(n);
   system.damping = damping * random.spd(n);
@@ -72,7 +72,7 @@ TEST(ModeTracker, GivesEigenvectorsOfSmallBackwardError) {
 
 TEST(ModeTracker, SlopePredictsHowAnEigenvalueMoves) {
   Random random(4001);
-  const System<kMaxDof> system = random_start(random, 5, 2);
+  const System<kMaxDof> system = random_fixed_system(random, 5, 2);
   System<kMaxDof> changed = system;
   const MatrixXd dC = random.spd(5);
   changed.damping += 1e-6 * dC;
@@ -161,7 +161,7 @@ TEST(ModeTracker, SmallFrequenciesKeepTheirDigitsWithAFactor) {
 
 TEST(ModeTracker, SolvesNonsymmetricSystemsDirectly) {
   Random random(4002);
-  System<kMaxDof> system = random_start(random, 4, 1);
+  System<kMaxDof> system = random_fixed_system(random, 4, 1);
   system.stiffness(0, 1) += 1;
   Tracked tracked;
   for (int call = 1; call <= 3; ++call) {
@@ -188,7 +188,7 @@ TEST(ModeTracker, SolvesASingularStiffnessWithoutFactorDirectly) {
 
 TEST(ModeTracker, SaysWhatIsWrongAndRecovers) {
   Random random(4003);
-  const System<kMaxDof> good = random_start(random, 3, 1);
+  const System<kMaxDof> good = random_fixed_system(random, 3, 1);
   Tracked tracked;
   const auto expect_failure = [&](const System<kMaxDof>& bad, Status status) {
     ASSERT_EQ(tracked.update(good), Status::kOk);
@@ -241,7 +241,7 @@ TEST(ModeTracker, ChangesSizes) {
   Tracked tracked;
   for (const int n : {3, 7, 1, 16, 2}) {
     for (int call = 0; call < 2; ++call) {
-      const System<kMaxDof> system = random_start(random, n, 1);
+      const System<kMaxDof> system = random_fixed_system(random, n, 1);
       ASSERT_EQ(tracked.update(system), Status::kOk);
       EXPECT_EQ(tracked.spectrum->mode_count, n);
       expect_enclosed(system, *tracked.spectrum);
@@ -300,7 +300,7 @@ TEST(TrackedCertificate, OfAPerturbedBasisStillEncloses) {
   int proved = 0;
   for (int trial = 0; trial < 600; ++trial) {
     const int n = random.integer(2, 7), rows = trial % 2 == 0 ? n - 1 : 0;
-    System<kMaxDof> system = random_start(random, n, random.log_uniform(0.1, 30));
+    System<kMaxDof> system = random_fixed_system(random, n, random.log_uniform(0.1, 30));
     if (rows > 0) system.stiffness_factor = 10 * random.matrix(rows, n);
     const StateForm form = state_form(system);
     // An orthonormal basis of the space, from the true eigenvectors disturbed: found by a tracker
@@ -331,7 +331,7 @@ TEST(ModeTracker, SaysOkOnlyIfAllBoundsAreFinite) {
   int uncertified = 0;
   for (double exponent = 9; exponent <= 14; exponent += 0.125) {
     SCOPED_TRACE(exponent);
-    System<kMaxDof> system = random_start(random, kModes, 1);
+    System<kMaxDof> system = random_fixed_system(random, kModes, 1);
     const MatrixXd V = Eigen::HouseholderQR<MatrixXd>(random.matrix(kModes, kModes)).householderQ();
     const Eigen::VectorXd masses =
         Eigen::VectorXd::LinSpaced(kModes, -exponent, 0).unaryExpr([](double power) {

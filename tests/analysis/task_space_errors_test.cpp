@@ -1,7 +1,7 @@
 // The words in which to_joint_space() refuses an impedance.
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/random_impedance.hpp>
-#include <dashpot/tests/support/systems.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
 

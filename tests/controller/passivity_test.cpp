@@ -15,14 +15,14 @@ namespace {
 
 using testing::Random;
 
-struct Moment {
+struct JointState {
   Joints<7> q, qd;
 };
 
 /// A Panda under the law, with springs at rest that stand still.
 class Swing {
  public:
-  Swing(Mode mode, bool coriolis, const Moment& start)
+  Swing(Mode mode, bool coriolis, const JointState& start)
       : law_(model_, FeedForward{true, coriolis, false, true, false}), at(start) {
     Setpoint setpoint;
     setpoint.mode = mode;
@@ -50,21 +50,21 @@ class Swing {
 
   /// One step of Runge and Kutta's method.
   void step(double h) {
-    const Moment k1 = rate(at), k2 = rate(moved(k1, h / 2)), k3 = rate(moved(k2, h / 2)),
-                 k4 = rate(moved(k3, h));
+    const JointState k1 = rate(at), k2 = rate(moved(k1, h / 2)), k3 = rate(moved(k2, h / 2)),
+                     k4 = rate(moved(k3, h));
     at.q += h / 6 * (k1.q + 2 * k2.q + 2 * k3.q + k4.q);
     at.qd += h / 6 * (k1.qd + 2 * k2.qd + 2 * k3.qd + k4.qd);
   }
 
  private:
-  Moment moved(const Moment& rate, double h) const {
+  JointState moved(const JointState& rate, double h) const {
     return {at.q + h * rate.q, at.qd + h * rate.qd};
   }
-  Joints<7> torque(const Moment& there) {
+  Joints<7> torque(const JointState& there) {
     kernel_.evaluate(there.q, there.qd, robot_);
     return law_.torque(robot_, there.q, there.qd, impedance_, paths_, Vector6::Zero());
   }
-  Moment rate(const Moment& there) {
+  JointState rate(const JointState& there) {
     const Joints<7> tau = torque(there);
     return {there.qd, robot_.M.llt().solve(tau - robot_.coriolis - robot_.gravity)};
   }
@@ -79,7 +79,7 @@ class Swing {
   Dynamics<7> robot_;
 
  public:
-  Moment at;
+  JointState at;
 };
 
 /// Largest and smallest energy of half a second at speed, relative to that at the start.

@@ -16,6 +16,8 @@ using Eigen::VectorXd;
 using testing::fixed_steps;
 using testing::joints;
 using testing::kMethods;
+using testing::kOne;
+using testing::kZero;
 using testing::run;
 
 int order_of(Method method) {
@@ -113,8 +115,6 @@ TEST_P(Methods, CloseTheEnergyAuditWithTheirOrder) {
 }
 
 // ------------------------------------------------- the oscillator q'' = -q: y+ = R(i h) y
-
-const MatrixXd kOne = MatrixXd::Ones(1, 1), kZero = MatrixXd::Zero(1, 1);
 
 /// (q, qd) after one step from (1, 0).
 VectorXd oscillator_step(Method method, double h) {

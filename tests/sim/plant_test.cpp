@@ -15,12 +15,12 @@ namespace {
 
 using Eigen::MatrixXd;
 using testing::joints;
+using testing::kOne;
+using testing::kZero;
 using testing::run;
 
-const MatrixXd kUnit = MatrixXd::Ones(1, 1), kNothing = MatrixXd::Zero(1, 1);
-
 TEST(Plant, HoldsATorqueForAPeriod) {
-  LinearSystem mass(2 * kUnit, kNothing, kNothing);
+  LinearSystem mass(2 * kOne, kZero, kZero);
   PlantOptions options;
   options.period = 0.002;
   Plant plant(mass, options, joints({1}), joints({3}));
@@ -35,7 +35,7 @@ TEST(Plant, HoldsATorqueForAPeriod) {
 }
 
 TEST(Plant, KeepsTimeWithoutDrift) {
-  LinearSystem mass(kUnit, kNothing, kNothing);
+  LinearSystem mass(kOne, kZero, kZero);
   Plant plant(mass, {}, joints({0}));
   ASSERT_EQ(run(plant, 1234567), Status::kOk);
   EXPECT_EQ(plant.measured().time, 1234567000000);
@@ -43,7 +43,7 @@ TEST(Plant, KeepsTimeWithoutDrift) {
 
 TEST(Torque, ArrivesAfterTheDelayToTheTick) {
   for (const int delay : {0, 1, 2, 7}) {
-    LinearSystem mass(kUnit, kNothing, kNothing);
+    LinearSystem mass(kOne, kZero, kZero);
     PlantOptions options;
     options.delay = delay;
     options.initial_torque = joints({-4});
@@ -60,7 +60,7 @@ TEST(Torque, ArrivesAfterTheDelayToTheTick) {
 }
 
 TEST(Torque, IsFilteredLikeAHeldInputByAFirstOrderLag) {
-  LinearSystem mass(kUnit, kNothing, kNothing);
+  LinearSystem mass(kOne, kZero, kZero);
   PlantOptions options;
   options.torque_cutoff = 30;
   options.initial_torque = joints({2});
@@ -73,7 +73,7 @@ TEST(Torque, IsFilteredLikeAHeldInputByAFirstOrderLag) {
 }
 
 TEST(Torque, IsDelayedAndThenFiltered) {
-  LinearSystem mass(kUnit, kNothing, kNothing);
+  LinearSystem mass(kOne, kZero, kZero);
   PlantOptions options;
   options.torque_cutoff = 30;
   options.delay = 3;
@@ -117,7 +117,7 @@ TEST(Sensors, ShowMultiplesOfTheResolutionNearTheTruth) {
 }
 
 TEST(Sensors, DifferenceWhatTheyShow) {
-  LinearSystem mass(kUnit, kNothing, 40 * kUnit);
+  LinearSystem mass(kOne, kZero, 40 * kOne);
   PlantOptions options;
   options.position_resolution = joints({1e-4});
   options.position_noise = joints({3e-4});
@@ -232,7 +232,7 @@ TEST(Plant, RefusesBadCommandsAndStaysWhereItIs) {
 }
 
 TEST(Plant, TakesAFailedStepBack) {
-  LinearSystem stiff(kUnit, kNothing, 1e8 * kUnit);  // 10000 rad/s
+  LinearSystem stiff(kOne, kZero, 1e8 * kOne);  // 10000 rad/s
   PlantOptions options;
   options.delay = 2;
   options.torque_cutoff = 50;
@@ -251,7 +251,7 @@ TEST(Plant, TakesAFailedStepBack) {
 }
 
 TEST(Plant, RefusesOptionsThatMakeNoSense) {
-  LinearSystem mass(kUnit, kNothing, kNothing);
+  LinearSystem mass(kOne, kZero, kZero);
   const auto refused = [&](const PlantOptions& options, const JointVector& q) -> std::string {
     try {
       const Plant plant(mass, options, q);
@@ -291,7 +291,7 @@ TEST(LinearSystem, RefusesMatricesThatMakeNoSense) {
   };
   const MatrixXd I = MatrixXd::Identity(2, 2);
   EXPECT_EQ(refused(I, I, I), "accepted");
-  EXPECT_EQ(refused(I, kUnit, I), "damping: is 1 x 1, must be 2 x 2");
+  EXPECT_EQ(refused(I, kOne, I), "damping: is 1 x 1, must be 2 x 2");
   EXPECT_EQ(refused(-I, I, I), "mass: is not positive definite");
   EXPECT_EQ(refused(I, I, MatrixXd{{1, 2}, {3, 1}}),
             "stiffness: is not symmetric: entry (1,2) is 2, entry (2,1) is 3");

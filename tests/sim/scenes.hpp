@@ -9,6 +9,9 @@
 
 namespace dashpot::testing {
 
+inline const Eigen::MatrixXd kOne = Eigen::MatrixXd::Ones(1, 1),
+                             kZero = Eigen::MatrixXd::Zero(1, 1);
+
 inline sim::JointVector joints(std::initializer_list<double> values) {
   sim::JointVector v(static_cast<Eigen::Index>(values.size()));
   Eigen::Index i = 0;

@@ -3,18 +3,15 @@
 // coordinates), and the check that published bounds enclose them.
 
 #include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <complex>
 #include <vector>
 
 namespace dashpot::testing {
-
-using LongComplex = std::complex<long double>;
-using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
 
 /// Of [0 J; -J' -D], with M = L L', D = L^-1 C L^-T and J = W L^-T (p x n): p + n of them. Without
 /// a factor W, J is the transposed Cholesky factor of L^-1 K L^-T.
