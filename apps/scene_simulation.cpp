@@ -33,10 +33,12 @@ void read_integrator(const YamlMapping& simulation, double period,
                      sim::IntegratorOptions& options) {
   static constexpr std::array<std::string_view, 5> kKeys = {
       "method", "step", "adaptive", "absolute_tolerance", "relative_tolerance"};
-  static constexpr std::array<std::pair<std::string_view, sim::Method>, 7> kMethods = {
+  static constexpr std::array<std::pair<std::string_view, sim::Method>, 9> kMethods = {
       {{"semi_implicit_euler", sim::Method::kSemiImplicitEuler},
        {"rk4", sim::Method::kRungeKutta4},
        {"velocity_verlet", sim::Method::kVelocityVerlet},
+       {"modified_midpoint", sim::Method::kModifiedMidpoint},
+       {"cash_karp", sim::Method::kCashKarp},
        {"dormand_prince", sim::Method::kDormandPrince},
        {"dormand_prince_8", sim::Method::kDormandPrince8},
        {"implicit_midpoint", sim::Method::kImplicitMidpoint},
@@ -50,7 +52,8 @@ void read_integrator(const YamlMapping& simulation, double period,
   }
   if (options.adaptive && !sim::estimates_error(options.method)) {
     throw keys.error("adaptive",
-                     "goes with method dormand_prince, dormand_prince_8 or rosenbrock only");
+                     "goes with method cash_karp, dormand_prince, dormand_prince_8 or rosenbrock "
+                     "only");
   }
   read_number(keys, "absolute_tolerance", "", Sign::kPositive, options.absolute_tolerance);
   read_number(keys, "relative_tolerance", "", Sign::kPositive, options.relative_tolerance);

@@ -23,8 +23,8 @@ bool is_implicit(Method method) noexcept {
 }  // namespace
 
 bool estimates_error(Method method) noexcept {
-  return method == Method::kDormandPrince || method == Method::kDormandPrince8 ||
-         method == Method::kRosenbrock;
+  return method == Method::kCashKarp || method == Method::kDormandPrince ||
+         method == Method::kDormandPrince8 || method == Method::kRosenbrock;
 }
 
 Integrator::Integrator(const IntegratorOptions& options) : options_(options) {
@@ -46,6 +46,13 @@ Integrator::Integrator(const IntegratorOptions& options) : options_(options) {
       break;
     case Method::kVelocityVerlet:
       step_ = &Integrator::velocity_verlet;
+      break;
+    case Method::kModifiedMidpoint:
+      step_ = &Integrator::modified_midpoint;
+      break;
+    case Method::kCashKarp:
+      step_ = &Integrator::cash_karp;
+      exponent_ = -1.0 / 5;
       break;
     case Method::kDormandPrince:
       step_ = &Integrator::dormand_prince;
@@ -214,6 +221,17 @@ Status Integrator::velocity_verlet(System& system, double h) noexcept {
   next_.head(n) = stage_.head(n);
   rates_[1].head(n) = next_.segment(n, n);
   rates_at_next_ = 1;
+  return Status::kOk;
+}
+
+/// W. B. Gragg, SIAM J. Numer. Anal. 2 (1965): two midpoint steps of h / 2 and his smoothing.
+Status Integrator::modified_midpoint(System& system, double h) noexcept {
+  begin_step(system);
+  stage_ = y_ + (h / 2) * rates_[0];
+  system.rates(stage_, rates_[1]);
+  stage_ = y_ + h * rates_[1];
+  system.rates(stage_, rates_[2]);
+  next_ = y_ + (h / 4) * (rates_[0] + 2 * rates_[1] + rates_[2]);
   return Status::kOk;
 }
 

@@ -14,9 +14,13 @@ enum class Method : std::uint8_t {
   kRungeKutta4,        ///< order 4, 4 evaluations; stable on the axes for omega h < 2.8
   kVelocityVerlet,     ///< order 2, 1 evaluation; as stable as kSemiImplicitEuler where damping is
                        ///< small
-  kDormandPrince,      ///< order 5 with an error estimate of order 4, 6 evaluations
-  kDormandPrince8,     ///< order 8 with an error estimate of orders 5 and 3, 12 evaluations
-  kImplicitMidpoint,   ///< order 2, symplectic, stable for any stiffness; 2n + 4 or so evaluations
+  kModifiedMidpoint,  ///< order 2, 3 evaluations; for errors of a percent of what is damped: stable
+                      ///< there in longer steps than kRungeKutta4, evaluation by evaluation
+  kCashKarp,          ///< order 5 with an error estimate of order 4, 6 evaluations; damps well in
+                      ///< long steps
+  kDormandPrince,     ///< order 5 with an error estimate of order 4, 6 evaluations
+  kDormandPrince8,    ///< order 8 with an error estimate of orders 5 and 3, 12 evaluations
+  kImplicitMidpoint,  ///< order 2, symplectic, stable for any stiffness; 2n + 4 or so evaluations
   kRosenbrock,  ///< RODAS3: order 3 with an estimate of order 2, damps the stiffest (L-stable)
                 ///< 2n + 3 evaluations, nothing to iterate
 };
@@ -50,6 +54,8 @@ class Integrator {
   Status semi_implicit_euler(System& system, double h) noexcept;
   Status runge_kutta_4(System& system, double h) noexcept;
   Status velocity_verlet(System& system, double h) noexcept;
+  Status modified_midpoint(System& system, double h) noexcept;
+  Status cash_karp(System& system, double h) noexcept;
   Status dormand_prince(System& system, double h) noexcept;
   Status dormand_prince_8(System& system, double h) noexcept;
   Status implicit_midpoint(System& system, double h) noexcept;

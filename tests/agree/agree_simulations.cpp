@@ -17,8 +17,8 @@ void simulations() {
                                      "panda_hand_tcp"));
   for (const sim::Method method :
        {sim::Method::kSemiImplicitEuler, sim::Method::kRungeKutta4, sim::Method::kVelocityVerlet,
-        sim::Method::kDormandPrince, sim::Method::kDormandPrince8, sim::Method::kImplicitMidpoint,
-        sim::Method::kRosenbrock}) {
+        sim::Method::kModifiedMidpoint, sim::Method::kCashKarp, sim::Method::kDormandPrince,
+        sim::Method::kDormandPrince8, sim::Method::kImplicitMidpoint, sim::Method::kRosenbrock}) {
     for (const bool adaptive : {false, true}) {
       if (adaptive && !sim::estimates_error(method)) continue;
       sim::PlantOptions options;

@@ -25,12 +25,14 @@ int order_of(Method method) {
     case Method::kSemiImplicitEuler:
       return 1;
     case Method::kVelocityVerlet:
+    case Method::kModifiedMidpoint:
     case Method::kImplicitMidpoint:
       return 2;
     case Method::kRosenbrock:
       return 3;
     case Method::kRungeKutta4:
       return 4;
+    case Method::kCashKarp:
     case Method::kDormandPrince:
       return 5;
     case Method::kDormandPrince8:
@@ -40,9 +42,9 @@ int order_of(Method method) {
 }
 
 std::string name_of(Method method) {
-  const char* const names[] = {"SemiImplicitEuler", "RungeKutta4",    "VelocityVerlet",
-                               "DormandPrince",     "DormandPrince8", "ImplicitMidpoint",
-                               "Rosenbrock"};
+  const char* const names[] = {"SemiImplicitEuler", "RungeKutta4",      "VelocityVerlet",
+                               "ModifiedMidpoint",  "CashKarp",         "DormandPrince",
+                               "DormandPrince8",    "ImplicitMidpoint", "Rosenbrock"};
   return names[static_cast<int>(method)];
 }
 
@@ -130,6 +132,8 @@ TEST(Oscillator, StepsHaveTheStabilityFunctionOfTheMethod) {
     const Complex taylor = 1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)));
     const std::pair<Method, Complex> functions[] = {
         {Method::kRungeKutta4, taylor},
+        {Method::kModifiedMidpoint, 1.0 + z + z * z / 2.0 + std::pow(z, 3) / 8.0},
+        {Method::kCashKarp, taylor + std::pow(z, 5) / 120.0 + std::pow(z, 6) / 800.0},
         {Method::kDormandPrince, taylor + std::pow(z, 5) / 120.0 + std::pow(z, 6) / 600.0},
         {Method::kImplicitMidpoint, (1.0 + z / 2.0) / (1.0 - z / 2.0)},
         // (1 - z/2)^4 R is a cubic that agrees with (1 - z/2)^4 e^z to order 3.
@@ -233,7 +237,7 @@ TEST(StiffJoint, IsDampedWithinAStepByRosenbrockAndNotByMidpoint) {
 
 TEST(AdaptiveSteps, KeepToTheToleranceAndGrowWithIt) {
   for (const Method method :
-       {Method::kDormandPrince, Method::kDormandPrince8, Method::kRosenbrock}) {
+       {Method::kCashKarp, Method::kDormandPrince, Method::kDormandPrince8, Method::kRosenbrock}) {
     double last_error = 0;
     for (const double tolerance : {1e-9, 1e-6}) {
       Arm arm(testing::pendulum(2));
@@ -282,9 +286,12 @@ TEST(Evaluations, AreNotMadeTwice) {
   EXPECT_EQ(evaluations(Method::kSemiImplicitEuler, false), 100);
   EXPECT_EQ(evaluations(Method::kVelocityVerlet, false), 101);
   EXPECT_EQ(evaluations(Method::kRungeKutta4, false), 400);
+  EXPECT_EQ(evaluations(Method::kModifiedMidpoint, false), 300);
+  EXPECT_EQ(evaluations(Method::kCashKarp, false), 600);
   EXPECT_EQ(evaluations(Method::kDormandPrince, false), 600);
   EXPECT_EQ(evaluations(Method::kDormandPrince8, false), 1200);
   // One more finds the first step; the last stage is the next step's first one.
+  EXPECT_EQ(evaluations(Method::kCashKarp, true), 1 + 6 * 100);
   EXPECT_EQ(evaluations(Method::kDormandPrince, true), 1 + 1 + 6 * 100);
   EXPECT_EQ(evaluations(Method::kDormandPrince8, true), 1 + 12 * 100);
   EXPECT_EQ(evaluations(Method::kRosenbrock, true), 1 + 5 * 100);

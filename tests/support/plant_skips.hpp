@@ -73,8 +73,8 @@ inline void run_skip(std::uint64_t seed, PlantSkip& skip) {
   using sim::Method;
   for (const Method method :
        {Method::kSemiImplicitEuler, Method::kRungeKutta4, Method::kVelocityVerlet,
-        Method::kDormandPrince, Method::kDormandPrince8, Method::kImplicitMidpoint,
-        Method::kRosenbrock}) {
+        Method::kModifiedMidpoint, Method::kCashKarp, Method::kDormandPrince,
+        Method::kDormandPrince8, Method::kImplicitMidpoint, Method::kRosenbrock}) {
     PlantScene lean;
     lean.parameters.viscous = lean.parameters.coulomb = sim::JointVector::Zero(7);
     lean.plant.integrator.method = method;
