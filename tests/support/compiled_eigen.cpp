@@ -1,2 +1,2 @@
-#define DASHPOT_COMPILED_HERE
+#define DASHPOT_COMPILED_FOR_TESTS_HERE
 #include <dashpot/tests/support/compiled_eigen.hpp>
