@@ -10,6 +10,10 @@ namespace {
 constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+/// The radius of a disc is found within kLeap^(1 / 2^kHalves), 4 %, over the range of numbers.
+constexpr double kLeap = 16;
+constexpr int kHalves = 6, kMostLeaps = 530;
+
 /// Sizes of the blocks of the perturbation, and separations.
 template <int N>
 struct BlockTable {
@@ -161,16 +165,27 @@ double disc_radius(const Complex* eigenvalues, int count, int which, double bloc
     if (half_gap > radius && simple <= half_gap) return (1 + 1e-10) * simple;
     return (1 + 1e-10) * 0.5 * (radius + std::sqrt(radius * (radius + 4 * norm)));
   }
-  double d = radius;
-  for (int doubling = 0; doubling < 2000; ++doubling) {
+  const auto is_outside = [&](double d) {
+    const double inverse = 1 / (norm + d);
     double product = 1;
     for (int j = 0; j < count; ++j) {
-      product *= std::max(d, 0.5 * modulus(mu - eigenvalues[j])) / (norm + d);
+      product *= std::max(d, 0.5 * modulus(mu - eigenvalues[j])) * inverse;
     }
-    if (product * (norm + d) > radius) return d;
-    d *= 1.1;
+    return (1 - 1e-10) * product * (norm + d) > radius;
+  };
+  // What is outside stays so with a larger d: the border is found by leaps, then by halves of the
+  // last one.
+  double inside = radius, outside = radius;
+  for (int leap = 0; !is_outside(outside); ++leap) {
+    if (leap == kMostLeaps) return kInfinity;
+    inside = outside;
+    outside *= kLeap;
   }
-  return kInfinity;
+  for (int half = 0; half < kHalves && inside < outside; ++half) {
+    const double middle = std::sqrt(inside) * std::sqrt(outside);
+    (is_outside(middle) ? outside : inside) = middle;
+  }
+  return outside;
 }
 
 template void certify(const Defect<kDynamic>&, ModalBasis<kDynamic>&,

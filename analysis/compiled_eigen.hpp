@@ -4,7 +4,7 @@
 #include <Eigen/Dense>
 
 /// What many files use of Eigen, compiled once (compiled_eigen.cpp) instead of in every file.
-/// Precompiled for the libraries and the tests, so no file has to include it.
+/// Precompiled for the libraries and the tests, so no file has to include it. Not for users.
 #ifndef DASHPOT_COMPILED_HERE
 #define DASHPOT_COMPILED_HERE extern
 #endif

@@ -144,7 +144,7 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out) 
   ++counters_.updates;
   if (!sizes_agree(system)) {
     ++counters_.failed;
-    out.mode_count = 0;
+    out.mode_count = out.zero_mode_count = 0;
     return out.status = Status::kWrongSize;
   }
   const StateForm form = state_form(system);
@@ -305,14 +305,14 @@ Status ModeTracker::solve_directly(const System<kMaxDof>& system, const StateFor
   out.status = solver_.solve(direct_, spectrum_);
   if (out.status != Status::kOk && out.status != Status::kUncertified) {
     ++counters_.failed;
-    out.mode_count = 0;
+    out.mode_count = out.zero_mode_count = 0;
     return out.status;
   }
   ++counters_.direct;
   if (reason != Fallback::kNotSymmetric && form.joints > 0 && restart(form, out)) {
     out.origin = SpectrumOrigin::kDirect;
   } else {
-    publish_direct(form, out);
+    publish_direct(form, reason != Fallback::kNotSymmetric, out);
   }
   return out.status;
 }
@@ -330,6 +330,7 @@ bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept 
   if (!has_pure_planes(defect_, basis_, angles) || !make_proportional(angles, basis_)) {
     balance(defect_, 0, basis_);
   }
+  has_places_ = has_places_ && before_.modes == basis_.modes;
   if (has_places_) keep_places(form, before_, basis_);
   sizes_ = coefficient_sizes(form);
   prediction_.forget(basis_.Z.width, basis_.columns());
@@ -351,14 +352,16 @@ bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept 
   return has_basis_;
 }
 
-/// The direct solution as it is, in the places of the modes that were followed so far.
-void ModeTracker::publish_direct(const StateForm& form, TrackedSpectrum& out) noexcept {
+/// The direct solution as it is, in the places of the modes that were found last.
+void ModeTracker::publish_direct(const StateForm& form, bool symmetric,
+                                 TrackedSpectrum& out) noexcept {
   std::array<int, kMaxDof> place{};
   if (!has_places_ || !find_places(form, basis_, spectrum_, place)) {
-    has_places_ = false;
     ++lineage_;
     for (int i = 0; i < kMaxDof; ++i) place[at(i)] = i;
   }
+  keep_planes(form, spectrum_, place, basis_);
+  has_places_ = true;
   out.status = spectrum_.status;  // not that of an attempt to follow
   out.lineage = lineage_;
   out.mode_count = spectrum_.modes.size();
@@ -376,7 +379,8 @@ void ModeTracker::publish_direct(const StateForm& form, TrackedSpectrum& out) no
     if (!options_.shapes) continue;
     TrackedShapes& shapes = out.shapes[at(place[at(i)])];
     shapes.u = mode.shapes;
-    for (std::size_t k = 0; k < 2; ++k) {
+    shapes.slope = {};
+    for (std::size_t k = 0; symmetric && k < 2; ++k) {
       const ComplexVector<kMaxDof> Mu = direct_.mass * mode.shapes[k];
       const ComplexVector<kMaxDof> Cu = direct_.damping * mode.shapes[k];
       shapes.slope[k] =

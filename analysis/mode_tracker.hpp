@@ -7,13 +7,15 @@
 
 namespace dashpot::analysis {
 
-/// Eigenvectors of a mode's two eigenvalues. Left ones are the same: coefficients are symmetric.
+/// Eigenvectors of a mode's two eigenvalues. Left ones are the same where coefficients are
+/// symmetric.
 struct TrackedShapes {
   /// u in joint coordinates, n each, u^H M u = 1, largest entry real and positive. At critical
-  /// damping both are the one eigenvector there is.
+  /// damping both are the one eigenvector there is. Zero where an eigenvalue is exactly zero: that
+  /// of a strain which no motion changes.
   std::array<ComplexVector<kMaxDof>, 2> u;
   /// u' (2 lambda M + C) u (no conjugation), 1/s: the scale of dual vectors and of sensitivities;
-  /// zero at critical damping
+  /// zero at critical damping, and where coefficients are not symmetric
   std::array<Complex, 2> slope{};
 };
 
@@ -22,7 +24,9 @@ struct TrackedSpectrum {
   SpectrumOrigin origin = SpectrumOrigin::kDirect;
   int mode_count = 0;
   /// A mode keeps its place here along a path, as long as `lineage` stays the same: it grows when
-  /// modes cannot be recognised, because there are more or fewer of them or none were found.
+  /// modes cannot be recognised, because there are more or fewer of them, or the stiffness comes
+  /// with a factor where it came without one. After a jump or a failure modes take the places of
+  /// those that they resemble most.
   std::uint64_t lineage = 0;
   std::array<ModeNumbers, kMaxDof> modes{};
   /// Places of the modes by falling sqrt|l1 l2|: the natural frequency where there is one.
@@ -118,7 +122,7 @@ class ModeTracker {
   Status solve_directly(const System<kMaxDof>& system, const StateForm& form, Fallback reason,
                         TrackedSpectrum& out) noexcept;
   bool restart(const StateForm& form, TrackedSpectrum& out) noexcept;
-  void publish_direct(const StateForm& form, TrackedSpectrum& out) noexcept;
+  void publish_direct(const StateForm& form, bool symmetric, TrackedSpectrum& out) noexcept;
 
   TrackerOptions options_;
   TrackerCounters counters_;

@@ -103,6 +103,9 @@ void set_vector(const TrackedBasis& basis, const PaddedRows& E, int i, const Com
   group.w1[at(lane)] = w[1] - (E(j, i) * w[0] + E(j, j) * w[1]);
 }
 
+/// Largest velocity times root of the energy, below which a vector of unit strain does not move.
+constexpr double kNoMotion = 1e-290;
+
 /// u = V w of unit kinetic energy u^H M u, its largest entry real and positive, for `lanes` modes
 /// from `first` on.
 void write_shapes(const TrackedBasis& basis, const PaddedRows& velocities,
@@ -134,7 +137,8 @@ void write_shapes(const TrackedBasis& basis, const PaddedRows& velocities,
     y[at(k)] = im;
   }
   for (int lane = 0; lane < lanes; ++lane) {
-    const double factor = 1 / (std::sqrt(largest[lane]) * std::sqrt(energy[lane]));
+    const double size = std::sqrt(largest[lane]) * std::sqrt(energy[lane]);
+    const double factor = size > kNoMotion ? 1 / size : 0;
     const Complex f(x_largest[lane] * factor, -y_largest[lane] * factor);
     TrackedShapes& shapes = out[at(first + lane)];
     ComplexVector<kMaxDof>& u = shapes.u[which];

@@ -338,6 +338,21 @@ bool find_places(const StateForm& form, const TrackedBasis& before,
   return true;
 }
 
+void keep_planes(const StateForm& form, const Spectrum<kMaxDof>& spectrum,
+                 const std::array<int, kMaxDof>& place, TrackedBasis& basis) noexcept {
+  basis = TrackedBasis{};
+  basis.modes = spectrum.modes.size();
+  basis.zeros = form.zeros();
+  basis.Z.width = padded_width(basis.modes, basis.zeros);
+  for (int k = 0; k < basis.modes; ++k) {
+    const Plane plane = plane_of(form, spectrum.modes[k]);
+    for (int row = 0; row < form.states(); ++row) {
+      basis.Z(row, place[at(k)]) = plane.first[at(row)];
+      basis.Z(row, basis.modes + place[at(k)]) = plane.second[at(row)];
+    }
+  }
+}
+
 bool balance(const TrackedDefect& defect, double tolerance, TrackedBasis& basis) noexcept {
   bool any = false;
   for (int i = 0; i < basis.modes; ++i) {

@@ -25,6 +25,11 @@ void move_modes(const std::array<int, kMaxDof>& place, TrackedBasis& basis) noex
 bool find_places(const StateForm& form, const TrackedBasis& before,
                  const Spectrum<kMaxDof>& spectrum, std::array<int, kMaxDof>& place) noexcept;
 
+/// Makes the columns of `basis` the planes of the modes of `spectrum`, mode k in place[k]: to be
+/// compared with what is found next, not to be followed.
+void keep_planes(const StateForm& form, const Spectrum<kMaxDof>& spectrum,
+                 const std::array<int, kMaxDof>& place, TrackedBasis& basis) noexcept;
+
 /// Hyperbolic rotation of each block that makes its two columns orthogonal in the energy metric
 /// diag(I, M) as well, so that the basis stays as well conditioned as it can be. Blocks that are
 /// orthogonal to `tolerance` already are left alone; returns whether any was rotated. The defect is

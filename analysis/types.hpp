@@ -7,6 +7,10 @@
 #include <cmath>
 #include <complex>
 
+#ifdef __FAST_MATH__
+#error "the error bounds rest on IEEE arithmetic: compile without -ffast-math"
+#endif
+
 namespace dashpot::analysis {
 
 inline constexpr int kDynamic = Eigen::Dynamic;

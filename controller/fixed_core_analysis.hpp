@@ -41,7 +41,7 @@ bool FixedCore<N>::looks_the_same(bool with_wrench, bool with_velocity) noexcept
   const bool gains_moved = analysed_.any && analysed_.gain_changes != gains_.changes();
   const bool settled = analysed_.gains_moved && !gains_moved;
   analysed_ = {true, damping_only_, gains_moved, gains_.changes(), q_, qd, wrench};
-  vibration_.task().anew = settled;
+  if (settled) vibration_.restart();
   return same && !settled;
 }
 

@@ -26,7 +26,7 @@ void VibrationSolver::reset() noexcept {
   counters_ = {};
   skipped_ = static_cast<std::uint64_t>(tracker_.counters().shapes_skipped);
   proportional_ = static_cast<std::uint64_t>(tracker_.counters().proportional);
-  solved_ = 0;
+  solved_ = restarted_ = 0;
 }
 
 void VibrationSolver::solve(const VibrationTask& task, Vibration& result) noexcept {
@@ -36,7 +36,8 @@ void VibrationSolver::solve(const VibrationTask& task, Vibration& result) noexce
   counters_.missed += task.number - solved_ - 1;
   solved_ = task.number;
   if (task.springs) {
-    if (task.anew) tracker_.reset();
+    if (task.restarts != restarted_) tracker_.reset();
+    restarted_ = task.restarts;
     tracker_.update(task.system, spectrum_);
     const analysis::TrackerCounters& counters = tracker_.counters();
     counters_.no_shapes = static_cast<std::uint64_t>(counters.shapes_skipped) - skipped_;
@@ -108,6 +109,7 @@ VibrationTask& VibrationAnalysis::task() noexcept {
 void VibrationAnalysis::update() noexcept {
   VibrationTask& given = task();
   given.number = ++tasks_;
+  given.restarts = restarts_;
   given.resets = resets_;
   given.counters = counters_;
   if (thread_) {
@@ -134,7 +136,7 @@ void VibrationAnalysis::collect() noexcept {
 
 void VibrationAnalysis::reset(Eigen::Index n) noexcept {
   ++resets_;
-  tasks_ = 0;
+  tasks_ = restarts_ = 0;
   counters_ = {};
   solver_.reset();
   result_.time = 0;

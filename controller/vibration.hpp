@@ -14,9 +14,8 @@ struct VibrationTask {
   JointVector position;
   analysis::System<kMaxJoints> system;  ///< the closed loop; see LoopSystem
   bool springs = true;                  ///< there is a stiffness at all
-  bool anew = false;  ///< to be solved anew: what real eigenvalues form a mode depends on the way
-                      ///< there, and should not on that of the gains
-  std::uint64_t number = 0;    ///< of tasks so far, this one included
+  std::uint64_t number = 0;             ///< of tasks so far, this one included
+  std::uint64_t restarts = 0;  ///< of tasks so far that were to be solved anew, this one included
   std::uint64_t resets = 0;    ///< results of before a reset are not wanted
   VibrationCounters counters;  ///< those of the ticks that were not even tasks, or in part
 };
@@ -37,7 +36,7 @@ class VibrationSolver {
   analysis::ModeTracker tracker_;
   analysis::TrackedSpectrum spectrum_;
   VibrationCounters counters_;
-  std::uint64_t solved_ = 0;  ///< number of the last task
+  std::uint64_t solved_ = 0, restarted_ = 0;  ///< numbers of the last task
   /// Of the tracker at the last reset: shapes left out, and updates of proportional damping.
   std::uint64_t skipped_ = 0, proportional_ = 0;
 };
@@ -49,7 +48,8 @@ class VibrationThread;
 ///
 /// Where no modes are found the result's status says why, its count is zero, and nothing else is
 /// affected. Results on the thread have the same numbers as those within the tick as long as it
-/// keeps up; where it missed some, other numbers within the proved bounds.
+/// keeps up; where it missed some, eigenvalues that agree within the proved bounds. (Which of two
+/// real ones form a mode may then differ, where several modes are overdamped, until gains change.)
 class VibrationAnalysis {
  public:
   explicit VibrationAnalysis(const Analysis& settings);
@@ -59,11 +59,14 @@ class VibrationAnalysis {
 
   /// Whether this tick (counted from 1) is one to analyse.
   bool due(std::uint64_t tick) const noexcept { return every_ != 0 && (tick - 1) % every_ == 0; }
-  /// Where the caller puts all but `number`, `resets` and `counters` before `update`.
+  /// Where the caller puts all but numbers and counters before `update`.
   VibrationTask& task() noexcept;
   /// Of the ticks that the caller knows to need less.
   VibrationCounters& counters() noexcept { return counters_; }
   void update() noexcept;
+  /// The next update is to be solved anew: what real eigenvalues form a mode depends on the way
+  /// there, and should not on that of the gains.
+  void restart() noexcept { ++restarts_; }
   /// Instead of `task` and `update`, for a tick whose closed loop is exactly that of the last one.
   void repeat(std::int64_t time, std::uint64_t tick) noexcept;
   /// Fetches what the thread has found.
@@ -73,7 +76,7 @@ class VibrationAnalysis {
 
  private:
   std::uint64_t every_;  ///< 0: never
-  std::uint64_t tasks_ = 0, resets_ = 0;
+  std::uint64_t tasks_ = 0, restarts_ = 0, resets_ = 0;
   VibrationCounters counters_;
   // Within the tick:
   VibrationTask task_;

@@ -247,6 +247,22 @@ TEST(DiscRadius, CoversEveryPerturbedEigenvalue) {
   }
 }
 
+/// prod |z - mu_j| <= radius (norm + d)^(k-1) at the border, and no longer 5 % outside of it.
+TEST(DiscRadius, IsNoLargerThanItsInequalityAsks) {
+  for (const double radius : {1e-300, 1e-12, 1e-3}) {
+    const std::array<Complex, 4> values{Complex(-1, 0), Complex(-1.001, 0), Complex(-1.001, 1e-4),
+                                        Complex(-2, 0)};
+    constexpr double kNorm = 3;
+    const double d = disc_radius(values.data(), 4, 1, kNorm, radius) / 1.05;
+    const double norm = kNorm + 2 * std::abs(values[1]);
+    double product = 1;
+    for (const Complex& value : values) {
+      product *= std::max(d, 0.5 * std::abs(values[1] - value)) / (norm + d);
+    }
+    EXPECT_TRUE(d < radius || product * (norm + d) <= radius) << d;
+  }
+}
+
 TEST(DiscRadius, IsProportionalToTheRadiusWhereEigenvaluesAreFarApart) {
   const std::array<Complex, 2> pair{Complex(-1, 2), Complex(-1, -2)};
   EXPECT_LE(disc_radius(pair.data(), 2, 0, 3.2, 1e-10), 1e-8);

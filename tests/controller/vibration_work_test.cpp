@@ -1,4 +1,5 @@
 // Modes from within the tick: what is computed, what is left out, and what is forgotten.
+#include <dashpot/controller/vibration.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/hostile_ticks.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
@@ -46,6 +47,28 @@ TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {
   led.state.position[3] += 1e-4;
   led.tick();
   EXPECT_EQ(led.modes().origin, SpectrumOrigin::kTracked);
+}
+
+/// One that was to be solved anew may be missed; the next one then is.
+TEST(VibrationSolver, SolvesAnewAfterATaskThatItMissed) {
+  VibrationSolver solver(Analysis{});
+  Vibration result;
+  VibrationTask task;
+  task.position.setZero(2);
+  task.system = analysis::System<kMaxJoints>(2);
+  task.system.stiffness.diagonal() << 100, 400;
+  const auto solved = [&](std::uint64_t number, std::uint64_t restarts) {
+    task.number = number;
+    task.restarts = restarts;
+    task.system.mass(0, 0) += 1e-4;
+    solver.solve(task, result);
+    return result.origin;
+  };
+  EXPECT_EQ(solved(1, 0), SpectrumOrigin::kDirect);
+  EXPECT_EQ(solved(2, 0), SpectrumOrigin::kTracked);
+  EXPECT_EQ(solved(4, 1), SpectrumOrigin::kDirect);
+  EXPECT_EQ(solved(5, 1), SpectrumOrigin::kTracked);
+  EXPECT_EQ(result.counters.missed, 1);
 }
 
 /// A change of gains is no standing still.
