@@ -138,8 +138,7 @@ void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out) noexce
       continue;
     }
     const bool better = quality.bound < 0.5 * previous.bound ||
-                        quality.backward_error < 0.5 * previous.backward_error ||
-                        quality.bound == kInfinity;
+                        quality.backward_error < 0.5 * previous.backward_error;
     // Where rounding errors of the residual are all there is to see, a step would only add to them.
     const bool noise = !out.extended && (quality.bound > kHopeless ||
                                          (quality.backward_error <= kTargetBackwardError &&
