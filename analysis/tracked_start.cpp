@@ -72,6 +72,7 @@ Column combination(double a, const Column& x, double b, const Column& y) {
 struct Plane {
   Column first{}, second{};
 };
+using Planes = std::array<Plane, kMaxDof>;
 
 /// Orthonormal columns of the plane that x and y span; false unless it has both sign types.
 bool make_plane(const StateForm& form, const Column& x, const Column& y, Plane& plane) {
@@ -126,7 +127,7 @@ class Starter {
 
   const StateForm& form_;
   const ModalBasis<kMaxDof>& source_;
-  std::array<Plane, kMaxDof> planes_;
+  Planes planes_;
   std::array<Column, kMaxWidth> plus_, minus_, zeros_;  ///< of unit length
   int plane_count_ = 0, plus_count_ = 0, minus_count_ = 0, zero_count_ = 0;
 };
@@ -207,16 +208,23 @@ bool Starter::add_strains() {
   return true;
 }
 
-void Starter::write(TrackedBasis& basis) const {
+/// A basis of the planes of `count` modes.
+void write_planes(const StateForm& form, const Planes& planes, int count, TrackedBasis& basis) {
   basis = TrackedBasis{};
-  basis.modes = form_.strains;
-  basis.zeros = form_.zeros();
+  basis.modes = count;
+  basis.zeros = form.zeros();
   basis.Z.width = padded_width(basis.modes, basis.zeros);
-  for (int row = 0; row < form_.states(); ++row) {
-    for (int i = 0; i < basis.modes; ++i) {
-      basis.Z(row, i) = planes_[at(i)].first[at(row)];
-      basis.Z(row, basis.modes + i) = planes_[at(i)].second[at(row)];
+  for (int row = 0; row < form.states(); ++row) {
+    for (int i = 0; i < count; ++i) {
+      basis.Z(row, i) = planes[at(i)].first[at(row)];
+      basis.Z(row, count + i) = planes[at(i)].second[at(row)];
     }
+  }
+}
+
+void Starter::write(TrackedBasis& basis) const {
+  write_planes(form_, planes_, plane_count_, basis);
+  for (int row = 0; row < form_.states(); ++row) {
     for (int k = 0; k < basis.zeros; ++k) {
       basis.Z(row, 2 * basis.modes + k) = zeros_[at(k)][at(row)];
     }
@@ -269,7 +277,7 @@ template <typename NewPlane>
 std::array<int, kMaxDof> best_places(const StateForm& form, const TrackedBasis& before, int count,
                                      const NewPlane& new_plane) {
   Scores scores{};
-  std::array<Plane, kMaxDof> old;
+  Planes old;
   for (int j = 0; j < count; ++j) old[at(j)] = plane_of(form, before, j);
   for (int i = 0; i < count; ++i) {
     const Plane plane = new_plane(i);
@@ -340,17 +348,10 @@ bool find_places(const StateForm& form, const TrackedBasis& before,
 
 void keep_planes(const StateForm& form, const Spectrum<kMaxDof>& spectrum,
                  const std::array<int, kMaxDof>& place, TrackedBasis& basis) noexcept {
-  basis = TrackedBasis{};
-  basis.modes = spectrum.modes.size();
-  basis.zeros = form.zeros();
-  basis.Z.width = padded_width(basis.modes, basis.zeros);
-  for (int k = 0; k < basis.modes; ++k) {
-    const Plane plane = plane_of(form, spectrum.modes[k]);
-    for (int row = 0; row < form.states(); ++row) {
-      basis.Z(row, place[at(k)]) = plane.first[at(row)];
-      basis.Z(row, basis.modes + place[at(k)]) = plane.second[at(row)];
-    }
-  }
+  const int count = spectrum.modes.size();
+  Planes planes;
+  for (int k = 0; k < count; ++k) planes[at(place[at(k)])] = plane_of(form, spectrum.modes[k]);
+  write_planes(form, planes, count, basis);
 }
 
 bool balance(const TrackedDefect& defect, double tolerance, TrackedBasis& basis) noexcept {
