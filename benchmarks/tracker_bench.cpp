@@ -6,7 +6,7 @@
 // Eigen's fixed-size EigenSolver with right vectors and LAPACK's dgeev with both sides on the
 // 12 x 12 state matrices of the same path, which are formed outside the clock. `tracked_full` and
 // `eigen_full` (of run-time size) have n joints and n modes. `backward_error` is the worst along
-// the path, of every kRivalSteps-th system.
+// the path, of every kRivalSteps-th system. `unproved` is what a hostile system takes.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 
@@ -202,6 +202,24 @@ void track(benchmark::State& state, const std::vector<System<kMaxDof>>& path,
   state.counters["backward_error"] = error;
 }
 
+/// The dearest update known: n coinciding modes at critical damping under a stiffness that is not
+/// symmetric, solved directly and not proved.
+void unproved(benchmark::State& state, int n) {
+  std::mt19937 engine(kSeed);
+  std::uniform_real_distribution<double> small(-1e-6, 1e-6);
+  System<kMaxDof> system(n);
+  system.damping.diagonal().setConstant(20);
+  for (double& entry : system.stiffness.reshaped()) entry = small(engine);
+  system.stiffness.diagonal().array() += 100;
+  const auto tracker = std::make_unique<ModeTracker>();
+  const auto spectrum = std::make_unique<TrackedSpectrum>();
+  for (auto _ : state) {
+    system.stiffness(0, 0) += 1e-6;  // never the same twice
+    benchmark::DoNotOptimize(tracker->update(system, *spectrum));
+  }
+  if (spectrum->status != Status::kUncertified) state.SkipWithError(to_text(spectrum->status));
+}
+
 /// What rivals solve.
 struct RivalPath {
   std::vector<System<kMaxDof>> systems;
@@ -329,6 +347,10 @@ int main(int argc, char** argv) {
     add("spectrum/path_lapack" + end, [=](auto& state) { lapack(state, panda_path(damping)); });
   }
   for (int n = 2; n <= kMaxDof; ++n) add_full(n);
+  for (const int n : {7, kMaxDof}) {
+    add("spectrum/unproved/" + std::to_string(n),
+        [=](benchmark::State& state) { unproved(state, n); });
+  }
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
   return 0;
