@@ -78,9 +78,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"UnknownMethod", "panda", "method: rk4", "method: rk5",
                  "simulation.integrator.method: semi_implicit_euler, rk4, velocity_verlet, "
                  "modified_midpoint, cash_karp, dormand_prince, dormand_prince_8, "
-                 "implicit_midpoint or rosenbrock is "
-                 "wanted, not "
-                 "'rk5' (line 25)"},
+                 "implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 25)"},
         BadScene{"MassNotDefinite", "chain3", "[[8, 0, 0]", "[[-8, 0, 0]",
                  "system: mass: is not positive definite"},
         BadScene{"WallOfASystem", "chain3", "scenario:", "simulation: {wall: {}}\nscenario:",

@@ -183,7 +183,7 @@ TEST(CartesianImpedance, IsItsEquation) {
     expect_task_law<7>(testing::arm_model(testing::arms()[0]), random);
     expect_task_law<6>(testing::arm_model(testing::arms()[2]), random);
     expect_task_law<9>(rough_chain(random, 9), random);
-    expect_task_law<16>(rough_chain(random, 16), random);
+    expect_task_law<14>(rough_chain(random, 14), random);
   }
 }
 
