@@ -16,9 +16,14 @@ using Eigen::VectorXcd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-double radius(const UnitLoop& loop) {
-  const VectorXcd z = loop.multipliers();
-  return z.size() > 0 ? z.cwiseAbs().maxCoeff() : 0;
+/// Largest |z| with |log z| >= slowest.
+double radius(const UnitLoop& loop, double slowest) {
+  double result = 0;
+  for (const Complex z : loop.multipliers()) {
+    if (slowest > 0 && z != 0.0 && modulus(std::log(z)) < slowest) continue;
+    result = std::max(result, modulus(z));
+  }
+  return result;
 }
 
 /// An eigenvalue (per tick) of a mode after the loop's delays, to first order: the Newton step from
@@ -178,22 +183,23 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
 }
 
 template <int N>
-double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop) {
+double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
+                   double most, double slowest) {
   const UnitLoop unit(system, spectrum, loop);
   const auto stable = [&](double factor) {
     UnitLoop scaled = unit;
     scaled.K *= factor;
     scaled.C = unit.D + factor * (unit.C - unit.D);
-    return radius(scaled) < 1;
+    return radius(scaled, slowest * loop.period) < 1;
   };
   const bool grow = stable(1);
   double inside = 1, outside = 1;
   for (;;) {
     if (grow) {
-      outside = 1.25 * inside;
+      if (inside >= most) return kInfinity;
+      outside = std::min(1.25 * inside, most);
       if (!stable(outside)) break;
       inside = outside;
-      if (inside > 1e6) return kInfinity;
     } else {
       inside = 0.8 * outside;
       if (stable(inside)) break;
@@ -212,7 +218,9 @@ template SampledSpectrum sample_loop(const System<kDynamic>&, const Spectrum<kDy
                                      const SampledLoop&);
 template SampledSpectrum sample_loop(const System<kMaxDof>&, const Spectrum<kMaxDof>&,
                                      const SampledLoop&);
-template double gain_margin(const System<kDynamic>&, const Spectrum<kDynamic>&, const SampledLoop&);
-template double gain_margin(const System<kMaxDof>&, const Spectrum<kMaxDof>&, const SampledLoop&);
+template double gain_margin(const System<kDynamic>&, const Spectrum<kDynamic>&, const SampledLoop&,
+                            double, double);
+template double gain_margin(const System<kMaxDof>&, const Spectrum<kMaxDof>&, const SampledLoop&,
+                            double, double);
 
 }  // namespace dashpot::analysis

@@ -64,10 +64,12 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
 
 /// The factor by which K and the controller's damping C - D may grow together before the loop
 /// becomes unstable, to six digits: the first boundary above 1, searched in steps of a quarter;
-/// infinite if there is none up to 1e6. Where the loop is unstable as it is: the first boundary
-/// below 1, zero if there is none down to 1e-3. Some tens of eigenproblems. Throws like
-/// sample_loop.
+/// infinite if there is none up to `most`. Where the loop is unstable as it is: the first boundary
+/// below 1, zero if there is none down to 1e-3. Motions with |log z| / T below `slowest`, rad/s, do
+/// not count: a self-motion that the held gravity compensation feeds is no vibration. Some tens of
+/// eigenproblems. Throws like sample_loop.
 template <int N>
-double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop);
+double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
+                   double most = 1e6, double slowest = 0);
 
 }  // namespace dashpot::analysis

@@ -28,6 +28,15 @@ class LoopController {
   virtual const dashpot_sampled_modes* new_sampled_modes() noexcept { return nullptr; }
   /// What to hold from the next tick on. Returns DASHPOT_OK, or the code of a refusal.
   virtual std::int32_t hold(const controller::Setpoint& setpoint) noexcept = 0;
+  /// The next tick releases a latched fault.
+  virtual std::int32_t release() noexcept { return DASHPOT_OK; }
+  /// On any thread: whether the gains of a set-point would be taken at a joint position (n, rad;
+  /// null: where the robot is). Returns DASHPOT_OK, or a code and the `reason`. Takes milliseconds
+  /// and allocates.
+  virtual std::int32_t judge(const controller::Setpoint& /*setpoint*/, std::string& /*reason*/,
+                             const JointVector* /*position*/ = nullptr) {
+    return DASHPOT_OK;
+  }
 };
 
 /// The controller plugin, loaded at run time as any host would.

@@ -66,23 +66,51 @@ class PluginController : public LoopController {
     return code == DASHPOT_OK ? plugin_.set_setpoint(handle_.get(), &wanted) : code;
   }
 
+  std::int32_t release() noexcept override { return plugin_.release(handle_.get()); }
+
+  std::int32_t judge(const controller::Setpoint& setpoint, std::string& reason,
+                     const JointVector* position) override {
+    const GainArrays arrays(setpoint.gains);
+    const dashpot_gains wanted = arrays.gains(n());
+    const std::int32_t code = plugin_.judge_gains(
+        handle_.get(), &wanted, position != nullptr ? position->data() : nullptr, nullptr);
+    if (code != DASHPOT_OK) reason = plugin_.last_error();
+    return code;
+  }
+
  private:
+  /// Gains in the form that plugin.h wants them in.
+  struct GainArrays {
+    explicit GainArrays(const controller::Gains& from)
+        : given(from),
+          joint_stiffness(from.joint_stiffness),
+          joint_damping(from.joint_damping),
+          task_stiffness(from.task_stiffness),
+          task_damping(from.task_damping),
+          frame(from.frame == controller::Frame::kTool ? DASHPOT_FRAME_TOOL : DASHPOT_FRAME_BASE) {
+      for (std::size_t i = 0; i < 6; ++i) directions[i] = from.directions[i] ? 1 : 0;
+    }
+    dashpot_gains gains(std::uint32_t n) const noexcept {
+      return {
+          sizeof(dashpot_gains),     n,
+          joint_stiffness.data(),    given.joint_damping_ratio > 0 ? nullptr : joint_damping.data(),
+          task_stiffness.data(),     given.task_damping_ratio > 0 ? nullptr : task_damping.data(),
+          &given.task_damping_ratio, given.null_stiffness.data(),
+          given.null_damping.data(), &frame,
+          directions.data(),         &given.joint_damping_ratio};
+    }
+
+    const controller::Gains& given;
+    RowMajor joint_stiffness, joint_damping, task_stiffness, task_damping;
+    std::int32_t frame;
+    std::array<std::uint8_t, 6> directions{};
+  };
+
   std::uint32_t n() const noexcept { return plugin_.joints(handle_.get()); }
 
   std::int32_t set_gains(const controller::Gains& gains) noexcept {
-    const RowMajor joint_stiffness = gains.joint_stiffness, joint_damping = gains.joint_damping;
-    const RowMajor task_stiffness = gains.task_stiffness, task_damping = gains.task_damping;
-    const std::int32_t frame =
-        gains.frame == controller::Frame::kTool ? DASHPOT_FRAME_TOOL : DASHPOT_FRAME_BASE;
-    std::array<std::uint8_t, 6> directions{};
-    for (std::size_t i = 0; i < 6; ++i) directions[i] = gains.directions[i] ? 1 : 0;
-    const dashpot_gains wanted = {
-        sizeof(dashpot_gains),     n(),
-        joint_stiffness.data(),    gains.joint_damping_ratio > 0 ? nullptr : joint_damping.data(),
-        task_stiffness.data(),     gains.task_damping_ratio > 0 ? nullptr : task_damping.data(),
-        &gains.task_damping_ratio, gains.null_stiffness.data(),
-        gains.null_damping.data(), &frame,
-        directions.data(),         &gains.joint_damping_ratio};
+    const GainArrays arrays(gains);
+    const dashpot_gains wanted = arrays.gains(n());
     return plugin_.set_gains(handle_.get(), &wanted);
   }
 

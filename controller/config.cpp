@@ -4,6 +4,7 @@
 #include <dashpot/controller/setting_reader.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace dashpot::controller {
@@ -30,10 +31,34 @@ void read_control(const YamlMapping& root, Settings& settings) {
   read_switch(keys, "subtract_friction", settings.subtract_friction);
 }
 
+void read_walls(const YamlMapping& limits, std::vector<Wall>& walls) {
+  static constexpr std::array<std::string_view, 2> kKeys = {"point", "normal"};
+  const YamlNode* list = limits.find("walls");
+  if (list == nullptr) return;
+  if (list->kind != YamlNode::Kind::kSequence) {
+    throw limits.error("walls", "a list is wanted, not " + describe(*list));
+  }
+  walls.clear();
+  for (std::size_t i = 0; i < list->items.size(); ++i) {
+    const YamlMapping keys(list->items[i], "limits.walls[" + std::to_string(i + 1) + "].", kKeys);
+    Wall& wall = walls.emplace_back();
+    for (const std::string_view key : kKeys) {
+      if (!keys.has(key)) throw keys.error(key, "missing", limits.line("walls"));
+    }
+    read_vector3(keys, "point", "m", wall.point);
+    read_vector3(keys, "normal", "", wall.normal);
+    const double length = wall.normal.norm();
+    if (!(length > 1e-9) || !std::isfinite(length)) throw keys.error("normal", "has no direction");
+    wall.normal /= length;
+  }
+}
+
 void read_limits(const YamlMapping& root, const RobotModel& model, Limits& limits) {
-  static constexpr std::array<std::string_view, 10> kKeys = {
-      "torque",          "torque_rate", "velocity",     "position_lower", "position_upper",
-      "position_margin", "repulsion",   "linear_error", "angular_error",  "damping"};
+  static constexpr std::array<std::string_view, 17> kKeys = {
+      "torque",         "torque_rate",     "velocity",  "tip_velocity",    "position_lower",
+      "position_upper", "position_margin", "repulsion", "return_velocity", "linear_error",
+      "angular_error",  "damping",         "power",     "external_torque", "external_force",
+      "walls",          "gain_margin"};
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const YamlMapping keys = root.mapping("limits", kKeys);
   const Units position = joint_units(model, "rad", "m");
@@ -44,12 +69,21 @@ void read_limits(const YamlMapping& root, const RobotModel& model, Limits& limit
                limits.velocity);
   read_numbers_or_none(keys, "position_lower", position, -kInfinity, limits.position_lower);
   read_numbers_or_none(keys, "position_upper", position, kInfinity, limits.position_upper);
-  read_number(keys, "position_margin", "rad", Sign::kNotNegative, limits.position_margin);
+  read_numbers(keys, "position_margin", position, Sign::kPositive, limits.position_margin);
   read_number(keys, "repulsion", "", Sign::kNotNegative, limits.repulsion);
   read_number(keys, "linear_error", "m", Sign::kPositive, limits.linear_error);
   read_number(keys, "angular_error", "rad", Sign::kPositive, limits.angular_error);
   read_numbers(keys, "damping", joint_units(model, "N m s/rad", "N s/m"), Sign::kPositive,
                limits.damping);
+  read_number(keys, "tip_velocity", "m/s", Sign::kPositive, limits.tip_velocity);
+  read_numbers(keys, "return_velocity", joint_units(model, "rad/s", "m/s"), Sign::kNotNegative,
+               limits.return_velocity);
+  read_number(keys, "power", "W", Sign::kPositive, limits.power);
+  read_numbers_or_none(keys, "external_torque", joint_units(model, "N m", "N"), kInfinity,
+                       limits.external_torque);
+  read_number(keys, "external_force", "N", Sign::kPositive, limits.external_force);
+  read_walls(keys, limits.walls);
+  read_number(keys, "gain_margin", "", Sign::kPositive, limits.gain_margin);
 }
 
 void read_motion(const YamlMapping& root, const RobotModel& model, Motion& motion) {
@@ -83,13 +117,15 @@ void read_feed_forward(const YamlMapping& root, FeedForward& feed_forward) {
 
 void read_watchdog(const YamlMapping& root, double period, Watchdog& watchdog) {
   constexpr double kGap = 2.5;  // periods
-  static constexpr std::array<std::string_view, 3> kKeys = {"setpoint_hold", "setpoint_damp",
-                                                            "longest_gap"};
+  static constexpr std::array<std::string_view, 5> kKeys = {
+      "setpoint_hold", "setpoint_damp", "longest_gap", "frozen", "release_after"};
   const YamlMapping keys = root.mapping("watchdog", kKeys);
   watchdog.longest_gap = std::max(watchdog.longest_gap, kGap * period);  // of slow loops
   read_number(keys, "setpoint_hold", "s", Sign::kNotNegative, watchdog.setpoint_hold);
   read_number(keys, "setpoint_damp", "s", Sign::kNotNegative, watchdog.setpoint_damp);
   read_number(keys, "longest_gap", "s", Sign::kPositive, watchdog.longest_gap);
+  read_number(keys, "frozen", "s", Sign::kNotNegative, watchdog.frozen);
+  read_number(keys, "release_after", "s", Sign::kNotNegative, watchdog.release_after);
 }
 
 void read_analysis(const YamlMapping& root, Analysis& analysis) {

@@ -55,6 +55,9 @@ void Controller::reset() noexcept {
 void Controller::reset(const JointVector& torque) noexcept {
   core_->reset(torque);
 }
+void Controller::release() noexcept {
+  if (core_->snapshot().fault != Status::kOk) core_->release();
+}
 int Controller::joints() const noexcept {
   return static_cast<int>(core_->settings().limits.torque.size());
 }

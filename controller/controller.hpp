@@ -55,11 +55,17 @@ class Controller {
   /// before the first good state.
   void closed_loop(analysis::System<kMaxJoints>& system) const noexcept;
 
-  /// Forgets everything: the next tick is like the first, and starts from zero torque.
+  /// Forgets everything, faults too: the next tick is like the first, and holds the robot where it
+  /// is. The torque-rate limit counts from the last torque; if there was none yet, from the weight
+  /// of the arm at that tick.
   void reset() noexcept;
   /// The same, but the torque-rate limit counts from `torque` (n, N m), which the robot applies
   /// now.
   void reset(const JointVector& torque) noexcept;
+  /// Releases a latched fault (see Status): unless its cause is still there, the next tick's
+  /// springs start where the robot is, with the gains in force, and hold it there until there is
+  /// another set-point. Nothing happens without a fault.
+  void release() noexcept;
 
   int joints() const noexcept;  ///< n
   const Settings& settings() const noexcept;

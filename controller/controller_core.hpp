@@ -17,6 +17,7 @@ class ControllerCore {
   virtual Status update(const RobotState& state, const Setpoint& setpoint,
                         JointVector& torque) noexcept = 0;
   virtual void reset(const JointVector& torque) noexcept = 0;
+  virtual void release() noexcept = 0;
   virtual void closed_loop(analysis::System<kMaxJoints>& system) const noexcept = 0;
 
   const Snapshot& snapshot() const noexcept { return snapshot_; }

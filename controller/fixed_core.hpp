@@ -2,7 +2,9 @@
 #include <dashpot/controller/controller_core.hpp>
 #include <dashpot/controller/held_damping.hpp>
 #include <dashpot/controller/impedance_law.hpp>
+#include <dashpot/controller/least_inertia.hpp>
 #include <dashpot/controller/loop_system.hpp>
+#include <dashpot/controller/motion_watch.hpp>
 #include <dashpot/controller/safety_filter.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/state_check.hpp>
@@ -14,9 +16,9 @@
 namespace dashpot::controller {
 
 /// The controller's core for N joints, known at compile time. One tick, in `update`:
-///     state -> StateCheck -> DynamicsKernel -> set-point, paths and gains -> HeldDamping
-///           -> ImpedanceLaw -> SafetyFilter -> torque;   and with these gains -> LoopSystem ->
-///           VibrationAnalysis
+///     state -> StateCheck -> DynamicsKernel -> MotionWatch -> set-point, paths and gains
+///           -> HeldDamping -> ImpedanceLaw -> SafetyFilter -> torque;   and with these gains ->
+///           LoopSystem -> VibrationAnalysis
 template <int N>
 class FixedCore final : public ControllerCore {
  public:
@@ -27,9 +29,12 @@ class FixedCore final : public ControllerCore {
   Status update(const RobotState& state, const Setpoint& setpoint,
                 JointVector& torque) noexcept override;
   void reset(const JointVector& torque) noexcept override;
+  void release() noexcept override;
   void closed_loop(analysis::System<kMaxJoints>& system) const noexcept override;
 
  private:
+  static constexpr double kMostRestarts = 3;
+
   /// Takes over a set-point that is new and in order. Whether the one given is in order.
   bool read(const Setpoint& setpoint) noexcept;
   /// Springs that are to grow from zero start where the robot is.
@@ -39,14 +44,21 @@ class FixedCore final : public ControllerCore {
   void aim() noexcept;
   /// Springs where the robot is, gains growing from zero.
   void start_afresh() noexcept;
-  /// Whether the state allows springs: kOk, kTimeGap, kVelocityLimit or kPositionLimit.
-  Status guard(Status input) noexcept;
+  /// Latches and releases faults. Returns kOk if the state allows springs, or kFaultLatched or
+  /// worse.
+  Status watch_motion(Status input, double dt) noexcept;
+  /// True once the robot has been at rest for Watchdog::release_after.
+  bool rested(double dt) noexcept;
+  void latch(Status fault) noexcept;
   /// Whether the set-point is fresh: kOk, kSetpointStale or kSetpointLost.
-  Status watch() const noexcept;
+  Status setpoint_age_status() const noexcept;
   /// Moves gains and set-points on by one period, and gives the law's torque.
   Vector act(bool hold) noexcept;
   /// The safe output without springs.
   Vector damp() noexcept;
+  double tip_path_speed() const noexcept;
+  /// True if no path moves that springs are fixed on.
+  bool paths_still() const noexcept;
   /// Whole ns, which add up without rounding errors.
   static double nanoseconds(double seconds) noexcept { return std::round(1e9 * seconds); }
   void show_measured(const RobotState& state) noexcept;
@@ -59,6 +71,7 @@ class FixedCore final : public ControllerCore {
   void hand_over() noexcept;
   /// Whether the closed loop is that of the last analysis, exactly.
   bool looks_the_same(bool with_wrench, bool with_velocity) noexcept;
+  Impedance<N> damper() const noexcept;
   Impedance<N> impedance() const noexcept;
 
   DynamicsKernel<N> kernel_;
@@ -69,6 +82,7 @@ class FixedCore final : public ControllerCore {
   Ramp<Vector6> wrench_;
   ImpedanceLaw<N> law_;
   SafetyFilter<N> filter_;
+  MotionWatch<N> motion_watch_;
   SpringReach reach_;
   Vector damping_;           ///< of the safe output "damp", N m s/rad
   Vector viscous_friction_;  ///< of the robot, N m s/rad
@@ -99,10 +113,12 @@ class FixedCore final : public ControllerCore {
   std::int64_t looked_at_ = 0;
   bool in_order_ = true;
 
-  bool first_ = true;         ///< there was no good state yet
-  bool afresh_ = true;        ///< springs start afresh when they are next in force
-  bool damping_only_ = true;  ///< the last torque was that of `damp`
-  bool too_fast_ = false;
+  bool first_ = true;           ///< there was no good state yet
+  bool afresh_ = true;          ///< springs start afresh when they are next in force
+  bool damping_only_ = true;    ///< the last torque was that of `damp`
+  Status fault_ = Status::kOk;  ///< that latched
+  double rest_ = 0;             ///< for how long the robot has been at rest since, s
+  double restarts_ = 0;         ///< of the last second or so
   int ramp_ticks_ = 0;
 };
 
@@ -126,26 +142,34 @@ FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
                                        : Vector(Vector::Zero())),
       wrench_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
       law_(model, settings.feed_forward),
-      filter_(settings.limits, settings.period),
+      filter_(settings, fixed<N>(least_joint_inertia(model, settings.limits.position_lower,
+                                                     settings.limits.position_upper))),
+      motion_watch_(model, settings),
       reach_{settings.limits.linear_error, settings.limits.angular_error},
-      damping_(fixed<N>(settings.limits.damping)),
+      damping_(filter_.borne(fixed<N>(settings.limits.damping))),
       viscous_friction_(fixed<N>(model.joint_values(&Joint::damping))) {
   for (int i = 0; i < N; ++i) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
     turn_[i] = joint.type == JointType::kContinuous ? 2 * std::numbers::pi : 0;
   }
-  reset(JointVector::Zero(N));
+  reset(JointVector());
 }
 
 template <int N>
 void FixedCore<N>::reset(const JointVector& torque) noexcept {
   state_check_.reset();
-  const bool usable = torque.size() == N && torque.allFinite();
-  filter_.reset(usable ? fixed<N>(torque) : Vector(Vector::Zero()));
+  motion_watch_.reset();
+  if (torque.size() == N && torque.allFinite()) {
+    filter_.reset(fixed<N>(torque));
+  } else {
+    filter_.restart();
+  }
+  release();
   accepted_ = settings_.initial;
-  from_user_ = looked_at_any_ = too_fast_ = false;
-  in_order_ = first_ = afresh_ = damping_only_ = true;
+  looked_at_any_ = false;
+  in_order_ = first_ = true;
   ramp_ticks_ = 0;
+  restarts_ = 0;
   snapshot_ = Snapshot();
   for (JointVector* vector :
        {&snapshot_.position, &snapshot_.velocity, &snapshot_.torque, &snapshot_.law_torque,
@@ -161,6 +185,21 @@ void FixedCore<N>::reset(const JointVector& torque) noexcept {
 }
 
 template <int N>
+void FixedCore<N>::release() noexcept {
+  fault_ = Status::kOk;
+  rest_ = 0;
+  afresh_ = damping_only_ = true;
+  const Gains gains = accepted_.gains;
+  const Mode mode = accepted_.mode;
+  accepted_ = settings_.initial;
+  if (from_user_) {
+    accepted_.gains = gains;
+    accepted_.mode = mode;
+  }
+  from_user_ = false;
+}
+
+template <int N>
 Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
                             JointVector& torque) noexcept {
   ++snapshot_.tick;
@@ -171,29 +210,29 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
     show_measured(state);
     return ramp(input, torque);
   }
-  if (!first_) {
-    setpoint_age_ +=
-        std::max(nanoseconds(settings_.period), nanoseconds(seconds_between(time_, state.time)));
-  }
+  double dt = settings_.period;
+  if (!first_) dt = std::max(dt, seconds_between(time_, state.time));
+  setpoint_age_ = first_ ? 0 : setpoint_age_ + nanoseconds(dt);
   time_ = state.time;
   q_ = fixed<N>(state_check_.position());
-  qd_ = fixed<N>(state.velocity);
+  qd_ = fixed<N>(state_check_.velocity());
   const bool wrench_known = state.external_wrench.allFinite();
   if (wrench_known) external_wrench_ = state.external_wrench;
   kernel_.evaluate(q_, qd_, robot_);
-  if (first_) {
-    setpoint_age_ = 0;
-    first_ = false;
-  }
+  const Vector weight = settings_.feed_forward.gravity ? robot_.gravity : Vector(Vector::Zero());
+  filter_.assume(weight);
+  first_ = false;
 
   Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
   if (!read(setpoint)) status = worse(status, Status::kSetpointRejected);
-  status = worse(status, watch());
-  status = worse(status, guard(input));
+  status = worse(status, setpoint_age_status());
+  status = worse(status, watch_motion(input, dt));
   Vector tau = status >= Status::kSetpointLost ? damp() : act(status == Status::kSetpointStale);
-  status = worse(status, filter_.apply(q_, qd_, tau));
+  const bool returns = fault_ == Status::kPositionLimit;
+  status = worse(status, filter_.apply({q_, qd_, motion_watch_.tip_speed(), returns}, weight, tau));
+  motion_watch_.applied(tau, difference<N>(tau, weight));
   if (status == Status::kNotFinite) {
-    afresh_ |= ++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap;
+    if (++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap) latch(status);
   } else {
     ramp_ticks_ = 0;
   }
@@ -202,16 +241,37 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
 }
 
 template <int N>
-Status FixedCore<N>::guard(Status input) noexcept {
-  double share = 0;
-  for (int i = 0; i < N; ++i) {
-    share = std::max(share, std::abs(qd_[i]) / settings_.limits.velocity[i]);
+Status FixedCore<N>::watch_motion(Status input, double dt) noexcept {
+  restarts_ = std::max(0.0, restarts_ - dt);
+  const bool still = paths_still();
+  const Status motion = motion_watch_.check({dt, q_, qd_, robot_, external_wrench_, still});
+  Status now = worse(input, motion);
+  if (restarts_ > kMostRestarts) now = worse(now, Status::kTooManyRestarts);
+  if (latches(now)) {
+    latch(now);
+    rest_ = 0;
+  } else if (fault_ != Status::kOk && rested(dt)) {
+    release();
   }
-  too_fast_ = share > 1 || (too_fast_ && share > 0.8);
-  Status status = input;
-  if (too_fast_) status = worse(status, Status::kVelocityLimit);
-  if (filter_.outside(q_)) status = worse(status, Status::kPositionLimit);
-  return status;
+  return fault_ == Status::kOk ? Status::kOk : worse(now, Status::kFaultLatched);
+}
+
+template <int N>
+void FixedCore<N>::latch(Status fault) noexcept {
+  if (fault_ == Status::kOk) fault_ = fault;
+  afresh_ = true;
+}
+
+template <int N>
+bool FixedCore<N>::rested(double dt) noexcept {
+  constexpr double kAtRest = 0.01;  // of the velocity limits
+  const double wanted = settings_.watchdog.release_after;
+  if (wanted == 0) return false;
+  rest_ += dt;
+  for (int i = 0; i < N; ++i) {
+    if (std::abs(qd_[i]) > kAtRest * settings_.limits.velocity[i]) rest_ = 0;
+  }
+  return rest_ >= wanted;
 }
 
 template <int N>
@@ -220,6 +280,7 @@ Joints<N> FixedCore<N>::damp() noexcept {
   afresh_ = damping_only_ = true;
   Vector tau = Vector::Zero();
   if (settings_.feed_forward.gravity) add<N>(robot_.gravity, tau);
+  if (fault_ == Status::kStateFrozen) return tau;  // the velocity means nothing
   for (int i = 0; i < N; ++i) tau[i] -= damping_[i] * qd_[i];
   return tau;
 }
@@ -234,7 +295,7 @@ void FixedCore<N>::show_measured(const RobotState& state) noexcept {
 
 template <int N>
 Status FixedCore<N>::ramp(Status status, JointVector& torque) noexcept {
-  afresh_ |= ++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap;
+  if (++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap) latch(status);
   return finish(status, filter_.ramp(), torque);
 }
 
@@ -243,6 +304,7 @@ Status FixedCore<N>::finish(Status status, const Vector& tau, JointVector& torqu
   copy<N>(tau, torque);
   copy<N>(tau, snapshot_.torque);
   snapshot_.status = status;
+  snapshot_.fault = fault_;
   vibration_.collect();
   if (status >= Status::kStateNotFinite) return status;
   if (vibration_.due(snapshot_.tick)) analyse();

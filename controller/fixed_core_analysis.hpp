@@ -55,12 +55,27 @@ void FixedCore<N>::hand_over() noexcept {
   sampled_->hand_over();
 }
 
+/// Those of the safe output "damp".
+template <int N>
+Impedance<N> FixedCore<N>::damper() const noexcept {
+  Impedance<N> result;
+  if (fault_ == Status::kStateFrozen) return result;
+  for (int i = 0; i < N; ++i) result.joint_damping(i, i) = damping_[i];
+  return result;
+}
+
+/// Springs and dampers in force, the repulsion of position limits included.
 template <int N>
 Impedance<N> FixedCore<N>::impedance() const noexcept {
-  if (!damping_only_) return held_.now(gains_.now());
-  Impedance<N> damping;
-  for (int i = 0; i < N; ++i) damping.joint_damping(i, i) = damping_[i];
-  return damping;
+  Impedance<N> all = damping_only_ ? damper() : held_.now(gains_.now());
+  Vector stiffness, damping;
+  if (!filter_.repels(q_, stiffness, damping)) return all;
+  for (int i = 0; i < N; ++i) {
+    all.joint_stiffness(i, i) += stiffness[i];
+    all.joint_damping(i, i) += damping[i];
+  }
+  all.joint_weight = 1;  // there are joint springs
+  return all;
 }
 
 template <int N>

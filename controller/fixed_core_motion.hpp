@@ -89,15 +89,42 @@ void FixedCore<N>::start_afresh() noexcept {
   filter_.begin_anew();
   afresh_ = false;
   ++snapshot_.restarts;
+  if (snapshot_.restarts > 1) ++restarts_;
 }
 
 template <int N>
-Status FixedCore<N>::watch() const noexcept {
+bool FixedCore<N>::paths_still() const noexcept {
+  const auto at_rest = [](const auto& velocity) {
+    bool rest = true;
+    for (Eigen::Index i = 0; i < velocity.size(); ++i) rest &= velocity[i] == 0;
+    return rest;
+  };
+  return at_rest(paths_.joint.velocity()) && at_rest(paths_.rest.velocity()) &&
+         at_rest(paths_.tip.velocity());
+}
+
+template <int N>
+Status FixedCore<N>::setpoint_age_status() const noexcept {
   const double age = 1e-9 * setpoint_age_;
   const Watchdog& limit = settings_.watchdog;
   if (limit.setpoint_damp > 0 && age > limit.setpoint_damp) return Status::kSetpointLost;
   if (limit.setpoint_hold > 0 && age > limit.setpoint_hold) return Status::kSetpointStale;
   return Status::kOk;
+}
+
+/// The share of its speed limits at which the tip's path takes no joint beyond kPathShare of its
+/// velocity limit where the robot is.
+template <int N>
+double FixedCore<N>::tip_path_speed() const noexcept {
+  constexpr double kPathShare = 0.5;  // what is left is for vibrations and the null space
+  const double speed = paths_.tip.speed();
+  if (speed == 0) return 1;
+  const Vector qd = law_.null_space().joint_velocity(paths_.tip.point_velocity());
+  double share = 0;
+  for (int i = 0; i < N; ++i) {
+    share = std::max(share, std::abs(qd[i]) / settings_.limits.velocity[i]);
+  }
+  return share > kPathShare * speed ? kPathShare * speed / share : 1;
 }
 
 template <int N>
@@ -123,7 +150,8 @@ Joints<N> FixedCore<N>::act(bool hold) noexcept {
     if (!joint && !hold) {
       const Eigen::Quaterniond tip(robot_.R_BT);
       paths_.tip.step(accepted_.tip_pose.position, goal_rotation_,
-                      {robot_.p_BT_B, tip, robot_.R_BT, impedance.base, impedance.tool, reach_});
+                      {robot_.p_BT_B, tip, robot_.R_BT, impedance.base, impedance.tool, reach_},
+                      tip_path_speed());
       paths_.rest.step(goal_);
     } else {
       paths_.tip.halt();

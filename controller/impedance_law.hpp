@@ -114,7 +114,8 @@ Joints<N> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q, con
   }
   if (impedance.task_weight > 0) {
     const bool null_space = impedance.null_space();
-    if (null_space || feed_forward_.acceleration || feed_forward_.friction) {
+    const bool moves = (paths.tip.point_velocity().array() != 0).any();
+    if (null_space || moves || feed_forward_.acceleration || feed_forward_.friction) {
       null_space_.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
     }
     F_ = task_wrench(robot, qd, impedance, paths.tip, reach);

@@ -1,15 +1,20 @@
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/controller/latest.hpp>
 #include <dashpot/controller/plugin_data.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <exception>
 #include <memory>
+#include <mutex>
+#include <string>
 
 using namespace dashpot::controller;  // NOLINT(google-build-using-namespace): the C functions
 
@@ -19,6 +24,7 @@ namespace {
 struct Request {
   std::uint64_t setpoints = 0;  ///< how many were given so far
   std::uint64_t gain_changes = 0;
+  std::uint64_t releases = 0;
   bool on_arrival = false;  ///< the set-point's time is that of the tick that takes it up
   Setpoint setpoint;        ///< with the gains
 };
@@ -29,6 +35,55 @@ std::int64_t later(std::int64_t time, std::int64_t difference) noexcept {
                                    static_cast<std::uint64_t>(difference));
 }
 
+/// Judges gains for all threads, one after the other.
+class Judgement {
+ public:
+  Judgement(const Config& config)
+      : wanted_(config.settings.limits.gain_margin),
+        position_(config.settings.initial.joint_position),
+        judge_(config.model, config.settings) {
+    for (Eigen::Index i = 0; i < position_.size(); ++i)
+      latest_[static_cast<std::size_t>(i)] = position_[i];
+  }
+
+  /// Of the real-time thread: where the robot is now.
+  void locate(const JointVector& q) noexcept {
+    for (Eigen::Index i = 0; i < q.size(); ++i) {
+      latest_[static_cast<std::size_t>(i)].store(q[i], std::memory_order_relaxed);
+    }
+  }
+
+  /// Gains that have passed check_gains, at `q`, or where the robot is. Without `again` those that
+  /// were accepted last are not judged anew. Throws what memory and eigenvalue solvers throw.
+  GainJudge::Verdict judge(const Gains& gains, const double* q, bool again) {
+    const std::lock_guard lock(mutex_);
+    if (wanted_ <= 1 || (!again && any_ && same_gains(gains, accepted_))) {
+      return {wanted_, Mode::kJoint};
+    }
+    for (Eigen::Index i = 0; i < position_.size(); ++i) {
+      position_[i] = q != nullptr
+                         ? q[i]
+                         : latest_[static_cast<std::size_t>(i)].load(std::memory_order_relaxed);
+    }
+    const GainJudge::Verdict verdict = judge_.judge(position_, gains);
+    if (judge_.enough(verdict)) accepted_ = gains, any_ = true;
+    return verdict;
+  }
+  bool enough(const GainJudge::Verdict& verdict) const noexcept {
+    return verdict.margin >= wanted_;
+  }
+  double wanted() const noexcept { return wanted_; }
+
+ private:
+  const double wanted_;
+  std::array<std::atomic<double>, kMaxJoints> latest_{};
+  std::mutex mutex_;  ///< of what follows
+  JointVector position_;
+  GainJudge judge_;
+  bool any_ = false;
+  Gains accepted_;
+};
+
 }  // namespace
 
 /// One controller, and what its two threads hand each other.
@@ -38,6 +93,8 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
         n(config.model.dof()),
         settings(config.settings),
         period(static_cast<std::int64_t>(std::min(1e9 * settings.period, 1e18))),
+        model(config.model),
+        judgement(config),
         controller_(config.model, config.settings),
         setpoint_(settings.initial) {
     request.setpoint = settings.initial;
@@ -48,6 +105,8 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
   const int n;
   const Settings settings;
   const std::int64_t period;  ///< ns
+  const RobotModel model;
+  Judgement judgement;
 
   Latest<Request> requests;      ///< from the other thread to the real-time thread
   Latest<Snapshot> snapshots;    ///< back
@@ -60,9 +119,11 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
   // Of the real-time thread:
   Status update(const dashpot_state* given, const dashpot_setpoint* wanted,
                 JointVector& torque) noexcept;
+  /// Without entries: the last torque acts.
   void reset(const JointVector& torque) noexcept;
 
  private:
+  void forget_setpoint() noexcept;
   /// Puts what the caller and the other thread want into `setpoint_`. False if `wanted` is there,
   /// but no set-point; the one in force stays then.
   bool take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept;
@@ -76,6 +137,7 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
   std::int64_t time_ = 0;        ///< of the last state, ns
   std::uint64_t setpoints_ = 0;  ///< of the other thread, taken up so far
   std::uint64_t gain_changes_ = 0;
+  std::uint64_t releases_ = 0;
   std::uint64_t published_modes_ = 0;  ///< the tick they belong to
 };
 
@@ -87,6 +149,7 @@ Status dashpot_controller::update(const dashpot_state* given, const dashpot_setp
   Status status = controller_.update(state, setpoint_, torque);
   located_ |= status < Status::kStateNotFinite;
   Snapshot snapshot = controller_.snapshot();
+  if (status < Status::kStateNotFinite) judgement.locate(snapshot.position);
   if (!accepted) status = worse(status, Status::kSetpointRejected);
   if (accepted && !has_setpoint_ && status == Status::kSetpointRejected) status = Status::kOk;
   snapshot.status = status;
@@ -101,12 +164,17 @@ Status dashpot_controller::update(const dashpot_state* given, const dashpot_setp
 void dashpot_controller::reset(const JointVector& torque) noexcept {
   controller_.reset(torque);
   take_up(nullptr, time_);  // the gains in it stay
+  forget_setpoint();
+  located_ = false;
+  published_modes_ = 0;
+  vibrations.write(controller_.vibration());  // there is none
+}
+
+void dashpot_controller::forget_setpoint() noexcept {
   const Gains gains = setpoint_.gains;
   setpoint_ = settings.initial;
   setpoint_.gains = gains;
-  has_setpoint_ = located_ = false;
-  published_modes_ = 0;
-  vibrations.write(controller_.vibration());  // there is none
+  has_setpoint_ = false;
 }
 
 bool dashpot_controller::take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept {
@@ -114,6 +182,11 @@ bool dashpot_controller::take_up(const dashpot_setpoint* wanted, std::int64_t no
   bool accepted = true;
   if (requests.fetch()) {
     const Request& latest = requests.value();
+    if (latest.releases != releases_ && controller_.snapshot().fault != Status::kOk) {
+      controller_.release();
+      forget_setpoint();
+    }
+    releases_ = latest.releases;
     if (latest.setpoints != setpoints_) {
       setpoint_ = latest.setpoint;
       if (latest.on_arrival) setpoint_.time = now;
@@ -163,10 +236,42 @@ std::int32_t finish(std::int32_t code) noexcept {
   return finish(code, dashpot_status_text(code));
 }
 
+/// Judges gains at q, or where the robot is. DASHPOT_OK or why not.
+std::int32_t judge(dashpot_controller& controller, const Gains& gains, const double* q, bool again,
+                   double* margin) noexcept {
+  Judgement& judgement = controller.judgement;
+  GainJudge::Verdict verdict{0, Mode::kJoint};
+  try {
+    verdict = judgement.judge(gains, q, again);
+  } catch (...) {
+    return finish(DASHPOT_UNSTABLE_GAINS, "the gains could not be judged");
+  }
+  if (margin != nullptr) *margin = verdict.margin;
+  if (judgement.enough(verdict)) return finish(DASHPOT_OK);
+  std::array<char, 256> text{};
+  std::snprintf(text.data(), text.size(),
+                "the sampled loop with the %s gains has a gain margin of %.3g, limits.gain_margin "
+                "asks for %.3g",
+                verdict.mode == Mode::kJoint ? "joint" : "task", verdict.margin,
+                judgement.wanted());
+  return finish(DASHPOT_UNSTABLE_GAINS, text.data());
+}
+
 std::int32_t finish(const SetpointFault& fault) noexcept {
   std::array<char, 128> text{};
   std::snprintf(text.data(), text.size(), "%s %s", fault.key, fault.reason);
   return finish(DASHPOT_WRONG_VALUE, text.data());
+}
+
+/// Puts the gains given into `wanted`. DASHPOT_OK or why they are none.
+std::int32_t read_gains(const dashpot_gains* given, int n, Gains& wanted) noexcept {
+  const std::int32_t problem = to_gains(given, n, wanted);
+  if (problem != DASHPOT_OK) return finish(problem);
+  for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+    const SetpointFault fault = check_gains(wanted, mode, n);
+    if (fault) return finish(fault);
+  }
+  return DASHPOT_OK;
 }
 
 /// Whether there is a struct to write to.
@@ -187,8 +292,13 @@ dashpot_controller* dashpot_create(const char* config_path) {
   }
   try {
     auto controller = std::make_unique<dashpot_controller>(load_config(config_path));
-    finish(DASHPOT_OK);
-    return controller.release();
+    const Gains& gains = controller->settings.initial.gains;
+    if (judge(*controller, gains, nullptr, true, nullptr) == DASHPOT_OK)
+      return controller.release();
+    const std::string reason = last_error.data();
+    finish(DASHPOT_WRONG_VALUE, (std::string(config_path) + ": gains: " + reason +
+                                 " (in the middle of the joints' ranges)")
+                                    .c_str());
   } catch (const std::exception& error) {
     finish(DASHPOT_WRONG_VALUE, error.what());
   } catch (...) {
@@ -229,9 +339,31 @@ int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* stat
   return static_cast<std::int32_t>(status);
 }
 
+int32_t dashpot_start(dashpot_controller* controller, const double* position,
+                      const double* torque) {
+  if (controller == nullptr || position == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  const JointVector q = Eigen::Map<const Eigen::VectorXd>(position, controller->n);
+  if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
+  const std::int32_t code =
+      judge(*controller, controller->request.setpoint.gains, position, true, nullptr);
+  if (code != DASHPOT_OK) return code;
+  if (torque != nullptr) return finish(dashpot_reset(controller, torque));
+  const bool holds = controller->settings.feed_forward.gravity;
+  const JointVector rest = JointVector::Zero(controller->n);
+  controller->reset(holds ? evaluate(controller->model, q, rest).gravity : rest);
+  return DASHPOT_OK;
+}
+
+int32_t dashpot_release(dashpot_controller* controller) {
+  if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  ++controller->request.releases;
+  controller->requests.write(controller->request);
+  return finish(DASHPOT_OK);
+}
+
 int32_t dashpot_reset(dashpot_controller* controller, const double* torque) {
   if (controller == nullptr) return DASHPOT_NULL_ARGUMENT;
-  JointVector acting = JointVector::Zero(controller->n);
+  JointVector acting;
   for (int i = 0; torque != nullptr && i < controller->n; ++i) {
     if (!std::isfinite(torque[i])) return DASHPOT_WRONG_VALUE;
   }
@@ -259,16 +391,27 @@ int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* g
   if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
   Request& request = controller->request;
   Gains wanted = request.setpoint.gains;
-  const std::int32_t problem = to_gains(gains, controller->n, wanted);
-  if (problem != DASHPOT_OK) return finish(problem);
-  for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
-    const SetpointFault fault = check_gains(wanted, mode, controller->n);
-    if (fault) return finish(fault);
+  std::int32_t problem = read_gains(gains, controller->n, wanted);
+  if (problem == DASHPOT_OK && !same_gains(wanted, request.setpoint.gains)) {
+    problem = judge(*controller, wanted, nullptr, false, nullptr);
   }
+  if (problem != DASHPOT_OK) return problem;
   request.setpoint.gains = wanted;
   ++request.gain_changes;
   controller->requests.write(request);
   return finish(DASHPOT_OK);
+}
+
+int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
+                            const double* position, double* margin) {
+  if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  Gains wanted = controller->settings.initial.gains;
+  const std::int32_t problem = read_gains(gains, controller->n, wanted);
+  if (problem != DASHPOT_OK) return problem;
+  for (int i = 0; position != nullptr && i < controller->n; ++i) {
+    if (!std::isfinite(position[i])) return finish(DASHPOT_WRONG_VALUE);
+  }
+  return judge(*controller, wanted, position, true, margin);
 }
 
 int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* snapshot) {
@@ -310,6 +453,8 @@ const char* dashpot_status_text(int32_t status) {
       return "a value is not possible";
     case DASHPOT_NOTHING_YET:
       return "nothing to read so far";
+    case DASHPOT_UNSTABLE_GAINS:
+      return "the sampled loop would have less than the gain margin";
     default:
       break;
   }
@@ -327,7 +472,8 @@ const dashpot_plugin* dashpot_plugin_interface(uint32_t version) {
       sizeof(dashpot_plugin), DASHPOT_PLUGIN_VERSION, dashpot_create,
       dashpot_destroy,        dashpot_last_error,     dashpot_joints,
       dashpot_joint_name,     dashpot_period,         dashpot_update,
-      dashpot_reset,          dashpot_set_setpoint,   dashpot_set_gains,
+      dashpot_start,          dashpot_reset,          dashpot_release,
+      dashpot_set_setpoint,   dashpot_set_gains,      dashpot_judge_gains,
       dashpot_read_snapshot,  dashpot_read_modes,     dashpot_read_sampled_modes,
       dashpot_status_text,    dashpot_kind_text};
   return version == DASHPOT_PLUGIN_VERSION ? &functions : nullptr;

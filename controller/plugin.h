@@ -2,11 +2,12 @@
 /* The Dashpot controller for hosts in any language: plain C99, arrays and numbers.
  *
  *   dashpot_controller* c = dashpot_create("panda.yaml");
- *   if (!c) { puts(dashpot_last_error()); return 1; }
+ *   if (!c || dashpot_start(c, q, NULL)) { puts(dashpot_last_error()); return 1; }
  *   ... every millisecond:
  *   dashpot_state state = {sizeof state, n, time_ns, q, qd, NULL};
  *   dashpot_output output = {sizeof output, n, torque};
  *   int32_t status = dashpot_update(c, &state, NULL, &output);   (holds still)
+ *   ... send torque, whatever the status
  *
  * Link with libdashpot_plugin.so, or load it and ask it for dashpot_plugin_interface.
  *
@@ -16,9 +17,10 @@
  * linear part first, are taken at T's origin, in B's axes.
  *
  * Threads. One thread, the real-time one, calls dashpot_update and dashpot_reset. One other thread,
- * any but always the same, calls dashpot_set_setpoint, dashpot_set_gains, dashpot_read_snapshot,
- * dashpot_read_modes and dashpot_read_sampled_modes; none of these ever waits for another thread or
- * makes one wait. The remaining functions may be called by any thread; dashpot_destroy only once no
+ * any but always the same, calls dashpot_set_setpoint, dashpot_set_gains, dashpot_release,
+ * dashpot_read_snapshot, dashpot_read_modes and dashpot_read_sampled_modes; none of these ever waits
+ * for the real-time thread or makes it wait. dashpot_start is called before the loop begins. The
+ * remaining functions may be called by any thread; dashpot_destroy only once no
  * other call is under way. Controllers are independent of each other. dashpot_update and
  * dashpot_reset leave nothing for dashpot_last_error; of the others, the first call in a thread may
  * allocate that thread's text.
@@ -34,40 +36,56 @@ extern "C" {
 #endif
 
 /* Grows whenever a function or struct changes; a library serves the versions it knows. */
-#define DASHPOT_PLUGIN_VERSION 4u
+#define DASHPOT_PLUGIN_VERSION 5u
 #define DASHPOT_MAX_JOINTS 16
 
 typedef struct dashpot_controller dashpot_controller;
 
 /* What functions return. Zero and above: the status of a tick, with the torque that it comes with.
- *   hold: the springs stop where they are, whatever the set-point says
- *   damp: no springs: joint damping, and gravity where the controller compensates it
- *   ramp: the last good torque goes to zero within 0.1 s, or as fast as limits.torque_rate allows
+ *   hold: the springs stop where they are, whatever the set-point says.
+ *   damp: no springs: joint damping, and the weight of the arm where the controller compensates it.
+ *   ramp: the last good torque goes to zero within 0.1 s, or as fast as limits.torque_rate allows.
  * Where damp and ramp take torque away, it fades evenly, in all joints alike.
- * Once the cause is over the controller goes on, after more than a short interruption with springs
- * where the robot is. Below zero: a call that was refused and did nothing. */
+ * Faults latch: after any "damp" but DASHPOT_SETPOINT_LOST, and after a "ramp" of more than
+ * watchdog.longest_gap, the arm stays damped, with its weight held, and the status is at least
+ * DASHPOT_FAULT_LATCHED, until dashpot_release or dashpot_reset, or, where the configuration has
+ * watchdog.release_after, until the arm has been at rest for that long. dashpot_snapshot.fault names
+ * the fault. Springs then start where the robot is. docs/safety.md has each fault in full. Below zero:
+ * a call that was refused and did nothing. */
 enum {
   DASHPOT_OK = 0,
-  DASHPOT_TORQUE_LIMITED = 1,    /* a torque or torque-rate limit is at work */
+  DASHPOT_TORQUE_LIMITED = 1,    /* a limit of torque, torque rate, power or speed is at work */
   DASHPOT_NEAR_JOINT_LIMIT = 2,  /* a joint is pushed back from a position limit that is near */
   DASHPOT_WRENCH_NOT_FINITE = 3, /* NaN or infinity in the external wrench: the last one stays */
   DASHPOT_SETPOINT_REJECTED = 4, /* the set-point is not possible; the last good one stays */
-  DASHPOT_SETPOINT_STALE = 5,    /* the set-point is old: hold */
-  DASHPOT_SETPOINT_LOST = 6,     /* the set-point is very old: damp */
-  DASHPOT_TIME_GAP = 7,          /* the last state is too long ago: damp */
-  DASHPOT_VELOCITY_LIMIT = 8,    /* a joint is too fast: damp */
-  DASHPOT_POSITION_LIMIT = 9,    /* a joint is outside its position limits: damp, and push back */
-  DASHPOT_STATE_NOT_FINITE = 10, /* NaN or infinity in position or velocity: ramp */
-  DASHPOT_STATE_WRONG_SIZE = 11, /* the state is missing or has not n joints: ramp */
-  DASHPOT_STATE_JUMP = 12,       /* farther from the last state than the robot can move: ramp */
-  DASHPOT_TIME_BACKWARD = 13,    /* the state's time is at or before the last one: ramp */
-  DASHPOT_NOT_FINITE = 14,       /* the torque would not be finite: ramp */
+  DASHPOT_WEIGHT_NOT_HELD = 5,   /* the weight needs more than a torque limit: the arm sinks */
+  DASHPOT_SETPOINT_STALE = 6,    /* the set-point is old: hold */
+  DASHPOT_SETPOINT_LOST = 7,     /* the set-point is very old: damp */
+  DASHPOT_FAULT_LATCHED = 8,     /* a fault is over, but was not released: damp */
+  DASHPOT_TOO_MANY_RESTARTS = 9, /* springs started anew too often: damp */
+  DASHPOT_TIME_GAP = 10,         /* the last good state is too long ago: damp */
+  DASHPOT_WRONG_RATE = 11,       /* the loop runs at another rate than the configured one: damp */
+  DASHPOT_COLLISION = 12,        /* an external torque or force above its threshold: damp */
+  DASHPOT_INSTABILITY = 13,      /* a vibration grows, or the torque reverses all the time: damp */
+  DASHPOT_TIP_SPEED_LIMIT = 14,  /* the tip is too fast: damp */
+  DASHPOT_VELOCITY_LIMIT = 15,   /* a joint is too fast: damp */
+  DASHPOT_WALL = 16,             /* the tip is beyond a wall of limits.walls: damp */
+  DASHPOT_POSITION_LIMIT = 17,   /* a joint is outside its position limits: damp; slow return */
+  DASHPOT_STATE_FROZEN = 18,     /* the state never changes though the torque does: weight alone */
+  DASHPOT_STATE_CONTRADICTORY = 19, /* positions do not move as the velocities say: damp, by what
+                                       the positions say */
+  DASHPOT_STATE_NOT_FINITE = 20, /* NaN or infinity in position or velocity: ramp */
+  DASHPOT_STATE_WRONG_SIZE = 21, /* the state is missing or has not n joints: ramp */
+  DASHPOT_STATE_JUMP = 22,       /* farther from the last state than the robot can move: ramp */
+  DASHPOT_TIME_BACKWARD = 23,    /* the state's time is at or before the last one: ramp */
+  DASHPOT_NOT_FINITE = 24,       /* the torque would not be finite: ramp */
 
   DASHPOT_NULL_ARGUMENT = -1,     /* a pointer that has to be there is NULL */
   DASHPOT_WRONG_STRUCT_SIZE = -2, /* struct_size is not that of this version */
   DASHPOT_WRONG_JOINTS = -3,      /* joints is not n */
   DASHPOT_WRONG_VALUE = -4,       /* not finite, not semidefinite, out of reach, ... */
-  DASHPOT_NOTHING_YET = -5        /* nothing to read so far */
+  DASHPOT_NOTHING_YET = -5,       /* nothing to read so far */
+  DASHPOT_UNSTABLE_GAINS = -6     /* the sampled loop would have less than limits.gain_margin */
 };
 
 enum { DASHPOT_MODE_JOINT = 0, DASHPOT_MODE_CARTESIAN = 1 };
@@ -155,7 +173,9 @@ typedef struct dashpot_snapshot {
   uint64_t tick;     /* counts from 1 */
   uint64_t restarts; /* how often the springs started afresh, the first time included */
   int32_t status;    /* DASHPOT_OK, ... */
+  int32_t fault;     /* the status that latched; DASHPOT_OK: none */
   int32_t mode;      /* DASHPOT_MODE_JOINT or DASHPOT_MODE_CARTESIAN */
+  int32_t reserved;  /* 0 */
   double position[DASHPOT_MAX_JOINTS];            /* rad */
   double velocity[DASHPOT_MAX_JOINTS];            /* rad/s */
   double torque[DASHPOT_MAX_JOINTS];              /* N m */
@@ -248,8 +268,8 @@ dashpot_controller* dashpot_create(const char* config_path);
 /* NULL is fine. */
 void dashpot_destroy(dashpot_controller* controller);
 
-/* What the last call of dashpot_create, dashpot_set_setpoint, dashpot_set_gains,
- * dashpot_read_snapshot, ..._modes or ..._sampled_modes in this thread had to complain of, in one
+/* What the last call of dashpot_create, dashpot_start, dashpot_set_setpoint, dashpot_set_gains,
+ * dashpot_judge_gains, dashpot_release, dashpot_read_snapshot, ..._modes or ..._sampled_modes in this thread had to complain of, in one
  * line; "" if nothing. Valid until the next such call in this thread. */
 const char* dashpot_last_error(void);
 
@@ -270,14 +290,38 @@ double dashpot_period(const dashpot_controller* controller);
 int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* state,
                        const dashpot_setpoint* setpoint, dashpot_output* output);
 
-/* On the real-time thread: forgets history and set-point, but not the gains; the next tick holds
- * the robot where it is, as the first one did, and until modes are found anew there are none. The
- * torque-rate limit counts from `torque` (n, N m), which the robot applies now; NULL: zero. */
+/* Before the loop begins, with the robot at rest at `position` (n, rad): judges the gains of the
+ * configuration there, as dashpot_set_gains does, and then does what dashpot_reset does, but that
+ * `torque` NULL stands for the arm's weight there (zero where the robot compensates it). Takes some
+ * milliseconds and allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error says more.
+ * A loop that never called it starts safely too, but with gains that nobody judged where the robot
+ * is: dashpot_create judges them in the middle of the joints' ranges. */
+int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);
+
+/* On the real-time thread: forgets history, faults and set-point, but not the gains; the next tick
+ * holds the robot where it is, as the first one did, and until modes are found anew there are none.
+ * The torque-rate limit counts from `torque` (n, N m), which the robot applies now; NULL: from the
+ * last one put out, or, before the first tick, from the arm's weight. */
 int32_t dashpot_reset(dashpot_controller* controller, const double* torque);
 
-/* On the other thread. The next tick takes it up; of several, the latest. */
+/* On the other thread: the next tick releases a latched fault, unless its cause is still there, and
+ * holds the robot where it is until there is another set-point. Without a fault it does nothing. */
+int32_t dashpot_release(dashpot_controller* controller);
+
+/* On the other thread. The next tick takes it up; of several, the latest. dashpot_set_gains refuses
+ * gains (DASHPOT_UNSTABLE_GAINS) with which the loop as it is sampled, at the posture of the latest
+ * tick, would have less than limits.gain_margin: in either mode, with the delay and the filters of
+ * analysis.sampled. A motion that needs more than 6 s to swing or to grow e-fold does not count. It
+ * judges gains that are new, which takes some milliseconds and allocates. */
 int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpoint* setpoint);
 int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains);
+
+/* On any thread, for instance the one that receives gains: judges them as dashpot_set_gains would,
+ * at `position` (n, rad; NULL: at the posture of the latest tick), and sets `margin` (NULL: not
+ * wanted) to the factor by which they could grow, or to limits.gain_margin if it is more. What it has
+ * accepted last dashpot_set_gains does not judge again. */
+int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
+                            const double* position, double* margin);
 
 /* On the other thread: the latest finished tick, the latest modes, and the latest of the sampled
  * loop. The caller sets struct_size, the rest is written. */
@@ -302,9 +346,12 @@ typedef struct dashpot_plugin {
   double (*period)(const dashpot_controller*);
   int32_t (*update)(dashpot_controller*, const dashpot_state*, const dashpot_setpoint*,
                     dashpot_output*);
+  int32_t (*start)(dashpot_controller*, const double*, const double*);
   int32_t (*reset)(dashpot_controller*, const double*);
+  int32_t (*release)(dashpot_controller*);
   int32_t (*set_setpoint)(dashpot_controller*, const dashpot_setpoint*);
   int32_t (*set_gains)(dashpot_controller*, const dashpot_gains*);
+  int32_t (*judge_gains)(dashpot_controller*, const dashpot_gains*, const double*, double*);
   int32_t (*read_snapshot)(dashpot_controller*, dashpot_snapshot*);
   int32_t (*read_modes)(dashpot_controller*, dashpot_modes*);
   int32_t (*read_sampled_modes)(dashpot_controller*, dashpot_sampled_modes*);

@@ -28,7 +28,7 @@ struct NamedUnit {
   Unit unit;
 };
 
-constexpr std::array<NamedUnit, 18> kUnits = {{
+constexpr std::array<NamedUnit, 19> kUnits = {{
     //         factor       kg m  s  rad
     {"g", {1e-3, {1, 0, 0, 0}}},
     {"kg", {1, {1, 0, 0, 0}}},
@@ -48,6 +48,7 @@ constexpr std::array<NamedUnit, 18> kUnits = {{
     {"rpm", {std::numbers::pi / 30, {0, 0, -1, 1}}},
     {"Nm", {1, {1, 2, -2, 0}}},
     {"Nms", {1, {1, 2, -1, 0}}},
+    {"W", {1, {1, 2, -3, 0}}},
 }};
 
 constexpr std::string_view kSpaces = " \t";

@@ -5,19 +5,47 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace dashpot::controller {
 
-/// The last stop of every torque: nothing leaves the controller that does not keep
+/// Returns how late torque acts on what was measured, s: a tick, those of the delay, and the lags
+/// of the drives' low-pass and of a differenced velocity.
+inline double loop_lag(const Settings& settings) noexcept {
+  const Analysis::Sampled& loop = settings.analysis.sampled;
+  const double filter = loop.cutoff > 0 ? 1 / (2 * std::numbers::pi * loop.cutoff) : 0;
+  return settings.period * (1 + loop.delay + (loop.difference_velocity ? 0.5 : 0)) + filter;
+}
+
+/// The last stop of every torque. With w the weight (the gravity torque that the controller
+/// compensates, n) the torque is
+///     tau = w + r + s x,       x = f(law's torque - w),
+/// r being the repulsion of position limits, and keeps
 ///     |tau_i| <= torque_i   and   |tau_i - last tau_i| <= torque_rate_i T.
 ///
-/// Before that, joints near a position limit are pushed back. With m the margin, g the distance to
-/// the limit (negative beyond it) and x = min((m - g) / m, 2), for x > 0:
-///     repulsion torque_i (x^2 + x v / velocity_i),   v >= 0 the velocity toward the limit,
-/// away from the limit: zero with zero slope at the margin, Limits::repulsion of the torque limit
-/// at the position limit, and a damper that takes energy out on the way in.
+/// - s <= 1 is one number for all joints: what exceeds the weight shrinks evenly where torques
+///   saturate, so that the wrench at the tip keeps its direction. So it does where the power x' qd
+///   would be above Limits::power.
+/// - f takes away what drives a joint that is about as fast as its velocity limit, or a tip that is
+///   about as fast as its own: nothing but the weight drives a joint further that moves at 0.95 of
+///   its limit or more, or any joint while the tip does. From half the limit on the drive is
+///   bounded so that the torque-rate limit can still take it away in time:
+///     x_i <= min(sqrt(torque_rate_i I_i v), 0.4 I_i v / lag),   v = 0.95 velocity_i - |qd_i|.
+/// - Near a position limit, with m the margin, g the distance to the limit and y = (m - g) / m
+///   between 0 and 1, f bounds the law's torque toward the limit by E_i g / m, and the repulsion is
+///     r_i = -F_i y^2 - c_i y qd_i     (away from an upper limit),
+///   a spring and a damper that the sampled loop bears whatever else is at its limit:
+///     c_i = 0.4 I_i / lag,   F_i = min(Limits::repulsion torque_i, c_i velocity_i / 2),
+///     E_i = min(torque_i, 0.2 I_i m / lag^2).
+///   So a joint that it pushes back is no faster than half its velocity limit.
+/// - Outside a position limit no spring acts. If the joint `returns`, the torque is that of a
+/// damper
+///   that moves inward: r_i = c_i (return_velocity_i z - qd_i), |r_i| <= F_i, z growing from 0 to 1
+///   within a second. Otherwise z = 0.
 ///
-/// Where springs end or start afresh, what the last torque has beyond the new one fades evenly: in
+/// I_i is least_joint_inertia, lag is loop_lag: delays make all this weaker, not unstable.
+///
+/// Where springs end or start anew, what the last torque has beyond the new one fades evenly: in
 /// all joints alike, in the least time in which no joint's rate limit has to act on it. Otherwise
 /// joints with little torque would let go first, and turn the wrench that the tip exerts.
 template <int N>
@@ -25,143 +53,111 @@ class SafetyFilter {
  public:
   using Vector = Joints<N>;
 
-  SafetyFilter(const Limits& limits, double period)
-      : torque_(fixed<N>(limits.torque)),
-        velocity_(fixed<N>(limits.velocity)),
-        lower_(fixed<N>(limits.position_lower)),
-        upper_(fixed<N>(limits.position_upper)),
-        margin_(limits.position_margin),
-        repulsion_(limits.repulsion),
-        ramp_share_(period / kRampTime) {
-    for (int i = 0; i < N; ++i) torque_step_[i] = limits.torque_rate[i] * period;
-  }
+  /// What the robot does at this tick.
+  struct Motion {
+    const Vector& q;
+    const Vector& qd;
+    double tip_speed;  ///< m/s
+    bool returns;      ///< joints outside their limits are to return
+  };
 
+  /// `inertia`: I, n, kg m^2.
+  SafetyFilter(const Settings& settings, const Vector& inertia) noexcept;
+
+  /// Forgets the past. The next torque continues the last one.
+  void restart() noexcept;
   /// Forgets the past; `torque` is what acts now.
   void reset(const Vector& torque) noexcept {
     for (int i = 0; i < N; ++i) last_[i] = std::clamp(torque[i], -torque_[i], torque_[i]);
-    ramping_ = false;
-    begin_anew();
+    known_ = true;
+    restart();
+  }
+  /// As long as nothing is known of the torque that acts: it is the weight.
+  void assume(const Vector& weight) noexcept {
+    if (!known_) reset(weight);
   }
   /// The next torque to be applied does not continue the last: the difference fades evenly.
   void begin_anew() noexcept { anew_ = true; }
 
-  /// Makes a torque safe, in place. kOk, kTorqueLimited, kNearJointLimit, kPositionLimit, or
-  /// kNotFinite, and then what `ramp` gives.
-  Status apply(const Vector& q, const Vector& qd, Vector& tau) noexcept {
-    Status status = repel(q, qd, tau);
-    asked_ = tau;
-    if (!finite<N>(tau)) {
-      tau = ramp();
-      return Status::kNotFinite;
-    }
-    ramping_ = false;
-    const bool fades = fade(tau);
-    if (limit(tau) || fades) status = worse(status, Status::kTorqueLimited);
-    return status;
-  }
+  /// Makes a torque safe, in place. Returns kOk, kTorqueLimited, kNearJointLimit, kWeightNotHeld,
+  /// or kNotFinite, and then sets what `ramp` gives.
+  Status apply(const Motion& motion, const Vector& weight, Vector& tau) noexcept;
 
   /// Where nothing is known: the last torque goes evenly to zero within 0.1 s, or as fast as the
   /// rate limits allow.
-  Vector ramp() noexcept {
-    if (!ramping_) {
-      double share = ramp_share_;
-      for (int i = 0; i < N; ++i) {
-        if (std::abs(last_[i]) * share > torque_step_[i]) {
-          share = torque_step_[i] / std::abs(last_[i]);
-        }
-      }
-      for (int i = 0; i < N; ++i) ramp_step_[i] = share * std::abs(last_[i]);
-    }
-    ramping_ = true;
-    Vector tau;
-    for (int i = 0; i < N; ++i) {
-      const double left = std::abs(last_[i]) - ramp_step_[i];
-      tau[i] = left > 1e-12 * torque_[i] ? std::copysign(left, last_[i]) : 0;
-    }
-    limit(tau);
-    return tau;
-  }
+  Vector ramp() noexcept;
 
-  /// What the last `apply` was to put out, and the repulsion, before the limits.
+  /// Returns what the last `apply` was given, before the limits.
   const Vector& asked() const noexcept { return asked_; }
-  /// Whether a position is outside its limits.
+  /// Returns what the last `apply` or `ramp` put out.
+  const Vector& last() const noexcept { return last_; }
+  /// True if a position is outside its limits.
   bool outside(const Vector& q) const noexcept {
     for (int i = 0; i < N; ++i) {
       if (q[i] < lower_[i] || q[i] > upper_[i]) return true;
     }
     return false;
   }
+  /// True if repulsion acts at q; it then has this stiffness and damping, N m/rad and N m s/rad.
+  bool repels(const Vector& q, Vector& stiffness, Vector& damping) const noexcept;
+  /// Dampers (n, N m s/rad), each no larger than what the sampled loop bears twice.
+  Vector borne(Vector damping) const noexcept {
+    for (int i = 0; i < N; ++i) damping[i] = std::min(damping[i], 2.5 * damper_[i]);
+    return damping;
+  }
 
  private:
   static constexpr double kRampTime = 0.1;  // s
+  static constexpr double kReturnRise = 1;  // s
+  static constexpr double kFull = 0.95;     // of a velocity limit: nothing drives further
+  static constexpr double kFirst = 0.5;     // from here on the drive is bounded ...
+  static constexpr double kWholly = 0.7;    // ... and from here on to what can be taken away
 
-  /// Adds the repulsion.
-  Status repel(const Vector& q, const Vector& qd, Vector& tau) const noexcept {
-    Status status = Status::kOk;
-    for (int i = 0; i < N; ++i) {
-      const double below = q[i] - lower_[i];
-      const double above = upper_[i] - q[i];
-      if (below < margin_) {
-        tau[i] += repulsion(i, below, -qd[i]);
-        status = worse(status, below < 0 ? Status::kPositionLimit : Status::kNearJointLimit);
-      }
-      if (above < margin_) {
-        tau[i] -= repulsion(i, above, qd[i]);
-        status = worse(status, above < 0 ? Status::kPositionLimit : Status::kNearJointLimit);
-      }
-    }
-    return status;
+  /// Distance to the nearer limit, and the sign of the way to it.
+  struct Near {
+    double distance;
+    double toward;
+  };
+  Near nearer(int i, double q) const noexcept {
+    const double below = q - lower_[i], above = upper_[i] - q;
+    return below < above ? Near{below, -1} : Near{above, 1};
   }
-  double repulsion(int i, double distance, double approach) const noexcept {
-    const double x = std::min((margin_ - distance) / margin_, 2.0);
-    return repulsion_ * torque_[i] * (x * x + x * std::max(approach, 0.0) / velocity_[i]);
-  }
-
-  /// Adds to the finite `tau` what is left of the torque before `begin_anew`. Whether anything is.
-  bool fade(Vector& tau) noexcept {
-    if (anew_) {
-      double ticks = 1;
-      for (int i = 0; i < N; ++i) {
-        excess_[i] = last_[i] - std::clamp(tau[i], -torque_[i], torque_[i]);
-        ticks = std::max(ticks, std::abs(excess_[i]) / torque_step_[i]);
-      }
-      share_step_ = 1 / ticks;
-      share_ = 1;
-      anew_ = false;
-    }
-    share_ = share_ > 1.5 * share_step_ ? share_ - share_step_ : 0;
-    if (share_ > 0) add<N>(excess_, tau, share_);
-    return share_ > 0;
-  }
-
-  /// Bounds the finite `tau` and its change, and remembers it. Whether that changed it.
-  bool limit(Vector& tau) noexcept {
-    bool changed = false;
-    for (int i = 0; i < N; ++i) {
-      double safe = std::clamp(tau[i], -torque_[i], torque_[i]);
-      safe = std::clamp(safe, last_[i] - torque_step_[i], last_[i] + torque_step_[i]);
-      changed |= safe != tau[i];
-      tau[i] = last_[i] = safe;
-    }
-    return changed;
-  }
+  /// Sets `repulsion`, and bounds the `excess` toward limits.
+  Status repel(const Motion& motion, Vector& excess, Vector& repulsion) noexcept;
+  /// Bounds what drives joints or tip at their velocity limits. True if that changed anything.
+  bool hold_back(const Motion& motion, Vector& excess) const noexcept;
+  /// Scales `excess` for the limits of power and of torque beyond `base`. True if it did.
+  bool shrink(const Vector& qd, const Vector& base, Vector& excess) const noexcept;
+  bool fade(Vector& tau) noexcept;
+  bool limit(Vector& tau) noexcept;
 
   Vector torque_;       ///< limits, N m
   Vector torque_step_;  ///< limits of its change in one tick, N m
   Vector velocity_;     ///< limits, rad/s
   Vector lower_;        ///< limits, rad
   Vector upper_;
-  double margin_;
-  double repulsion_;
-  double ramp_share_;  ///< of the torque, in one tick
+  Vector margin_;
+  Vector return_velocity_;
+  Vector damper_;     ///< c
+  Vector repulsion_;  ///< F
+  Vector toward_;     ///< E
+  Vector late_;       ///< torque_rate I, of f
+  double tip_velocity_;
+  double power_;
+  double ramp_share_;     ///< of the torque, in one tick
+  double return_step_;    ///< of z
+  double returning_ = 0;  ///< z
   Vector last_ = Vector::Zero();
   Vector asked_ = Vector::Zero();
+  bool known_ = false;
   bool ramping_ = false;
   Vector ramp_step_ = Vector::Zero();
   bool anew_ = true;
-  Vector excess_ = Vector::Zero();  ///< of the torque before `begin_anew`, N m
-  double share_ = 0;                ///< of it that is left
-  double share_step_ = 1;           ///< in one tick
+  Vector left_ = Vector::Zero();  ///< of the torque before `begin_anew`, N m
+  double share_ = 0;              ///< of it that is still there
+  double share_step_ = 1;         ///< in one tick
 };
 
 }  // namespace dashpot::controller
+
+#include <dashpot/controller/safety_filter_steps.hpp>

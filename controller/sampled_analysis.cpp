@@ -14,7 +14,9 @@ namespace {
 
 constexpr std::chrono::milliseconds kLook{5};  // how often the thread looks for a task
 
-analysis::SampledLoop loop_of(const RobotModel& model, const Settings& settings) {
+}  // namespace
+
+analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& settings) {
   const Analysis::Sampled& sampled = settings.analysis.sampled;
   analysis::SampledLoop loop;
   loop.period = settings.period;
@@ -24,8 +26,6 @@ analysis::SampledLoop loop_of(const RobotModel& model, const Settings& settings)
   loop.friction = Eigen::VectorXd(model.joint_values(&Joint::damping)).asDiagonal();
   return loop;
 }
-
-}  // namespace
 
 Eigen::MatrixXd gravity_gradient(const RobotModel& model, const JointVector& q) {
   constexpr double kStep = 1e-5;  // rad
@@ -48,7 +48,7 @@ SampledAnalysis::SampledAnalysis(const RobotModel& model, const Settings& settin
       first_(1 + static_cast<std::uint64_t>(std::clamp(
                      std::ceil(settings.motion.gain_time / settings.period), 1.0, 1e15))),
       next_(first_),
-      loop_(loop_of(model, settings)),
+      loop_(sampled_loop(model, settings)),
       thread_([this] { run(); }) {}
 
 SampledAnalysis::~SampledAnalysis() {

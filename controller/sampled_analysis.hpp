@@ -14,6 +14,9 @@ namespace dashpot::controller {
 /// relative. Allocates.
 Eigen::MatrixXd gravity_gradient(const RobotModel& model, const JointVector& q);
 
+/// The loop as the settings describe it, without gravity.
+analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& settings);
+
 /// Finds, now and then and on a thread of its own, what becomes of the modes because the torque is
 /// held over a tick, delayed and filtered: analysis::sample_loop, and analysis::gain_margin. That
 /// takes milliseconds and allocates.

@@ -111,19 +111,19 @@ class TipPath {
 
   /// One period toward a goal; `rotation` is a unit quaternion.
   void step(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation) noexcept {
-    go(position, rotation, way_to(position, rotation), true);
+    go(position, rotation, way_to(position, rotation), true, 1);
   }
-  /// The same on a tether.
+  /// The same on a tether, with a `share` of the speed limits, from 0 to 1.
   void step(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation,
-            const Tether& tether) noexcept {
+            const Tether& tether, double share = 1) noexcept {
     const Vector6 d = way_to(position, rotation);
-    if (tether.near(position, rotation)) return go(position, rotation, d, true);
+    if (tether.near(position, rotation)) return go(position, rotation, d, true, share);
     Vector6 e;  // of the path before smoothing
     e << point_ - tether.position, short_turn(point_rotation_ * tether.rotation.conjugate());
     const Vector6 goal = e + d;
     const Vector6 within = tether.shortened(goal);
-    if (within == goal) return go(position, rotation, d, true);
-    go(position, rotation, within - e, false);
+    if (within == goal) return go(position, rotation, d, true, share);
+    go(position, rotation, within - e, false, share);
   }
 
   /// One period in which the path brakes, or stays where it is.
@@ -137,6 +137,9 @@ class TipPath {
   const Eigen::Quaterniond& rotation() const noexcept { return rotation_; }
   const Vector6& velocity() const noexcept { return smoothing_.velocity(); }
   const Vector6& acceleration() const noexcept { return smoothing_.acceleration(); }
+  /// Returns the velocity before smoothing, m/s and rad/s, and its share of the speed limits.
+  const Vector6& point_velocity() const noexcept { return velocity_; }
+  double speed() const noexcept { return norm_.speed(velocity_); }
 
  private:
   Vector6 way_to(const Eigen::Vector3d& position,
@@ -148,8 +151,8 @@ class TipPath {
   }
   /// One period along the way `d`, which `ends` at the goal given or before it.
   void go(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation, const Vector6& d,
-          bool ends) noexcept {
-    const Step<6> step = approach<6>(d, velocity_, norm_, period_);
+          bool ends, double share) noexcept {
+    const Step<6> step = approach<6>(d, velocity_, norm_, period_, share);
     velocity_ = step.velocity;
     if (step.arrives && ends) {
       point_ = position;

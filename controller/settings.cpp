@@ -1,4 +1,5 @@
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/least_inertia.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/settings.hpp>
 
@@ -24,6 +25,11 @@ void need_positive(const std::string& key, double value, const std::string& unit
 
 void need_not_negative(const std::string& key, double value, const std::string& unit) {
   if (!std::isfinite(value) || value < 0) fail(key, value, unit, "must not be negative");
+}
+
+/// Positive, or infinite.
+void need_above_zero(const std::string& key, double value, const std::string& unit) {
+  if (!(value > 0)) fail(key, value, unit, "has to be positive");
 }
 
 std::string entry(const std::string& key, Eigen::Index i) {
@@ -72,7 +78,27 @@ void validate(const Limits& limits, int n) {
            "has to be below the upper limit");
     }
   }
-  need_positive("limits.position_margin", limits.position_margin, "rad");
+  need_positive("limits.position_margin", limits.position_margin, "rad", n);
+  need_size("limits.return_velocity", limits.return_velocity, n);
+  need_size("limits.external_torque", limits.external_torque, n);
+  for (int i = 0; i < n; ++i) {
+    need_not_negative(entry("limits.return_velocity", i), limits.return_velocity[i], "rad/s");
+    need_above_zero(entry("limits.external_torque", i), limits.external_torque[i], "N m");
+  }
+  need_positive("limits.tip_velocity", limits.tip_velocity, "m/s");
+  need_above_zero("limits.power", limits.power, "W");
+  need_above_zero("limits.external_force", limits.external_force, "N");
+  if (!(limits.gain_margin >= 1 && limits.gain_margin <= 1000)) {
+    fail("limits.gain_margin", limits.gain_margin, "", "must be between 1 and 1000");
+  }
+  if (limits.walls.size() > kMaxWalls) {
+    fail("limits.walls", static_cast<double>(limits.walls.size()), "walls", "must be at most 8");
+  }
+  for (const Wall& wall : limits.walls) {
+    if (!wall.point.allFinite() || !(std::abs(wall.normal.norm() - 1) < 1e-6)) {
+      throw InvalidSettings("limits.walls", "a point is not finite, or a normal not of length 1");
+    }
+  }
   need_not_negative("limits.repulsion", limits.repulsion, "");
   if (limits.repulsion > 1) fail("limits.repulsion", limits.repulsion, "", "must be at most 1");
   need_positive("limits.linear_error", limits.linear_error, "m");
@@ -89,34 +115,6 @@ constexpr double kFastestDecay = 200;
 
 constexpr int kLongestDelay = 20;  // ticks, that the analysis of the sampled loop takes
 
-struct TipInertia {
-  double linear;   ///< kg
-  double angular;  ///< kg m^2
-};
-
-/// What the tip weighs in the direction in which it weighs least, over 64 postures.
-TipInertia least_tip_inertia(const RobotModel& model, const Limits& limits) {
-  const int n = model.dof();
-  double mobility_linear = 0, mobility_angular = 0;
-  JointVector q = JointVector::Zero(n);
-  double share = 0;  // golden-ratio sequence in [0, 1)
-  for (int k = 0; k < 64; ++k) {
-    for (int i = 0; i < n; ++i) {
-      share += 0.6180339887498949;
-      share -= std::floor(share);
-      const double lower = std::max(limits.position_lower[i], -std::numbers::pi);
-      const double upper = std::min(limits.position_upper[i], std::numbers::pi);
-      q[i] = lower + share * (upper - lower);
-    }
-    const DynamicsResult robot = evaluate(model, q, JointVector::Zero(n));
-    const Eigen::MatrixXd M = robot.M, J = robot.J;
-    const Eigen::MatrixXd A = J * M.llt().solve(J.transpose());
-    mobility_linear = std::max(mobility_linear, A.topLeftCorner<3, 3>().trace());
-    mobility_angular = std::max(mobility_angular, A.bottomRightCorner<3, 3>().trace());
-  }
-  return {1 / mobility_linear, 1 / mobility_angular};
-}
-
 }  // namespace
 
 Settings default_settings(const RobotModel& model) {
@@ -126,14 +124,21 @@ Settings default_settings(const RobotModel& model) {
   Limits& limits = settings.limits;
   limits.torque = limits.torque_rate = limits.velocity = limits.damping = none;
   limits.position_lower = limits.position_upper = none;
+  limits.position_margin = limits.return_velocity = none;
+  limits.external_torque = JointVector::Constant(n, std::numeric_limits<double>::infinity());
   JointVector middle = none;
   for (int i = 0; i < n; ++i) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
     limits.torque[i] = finite_or(joint.effort, 100);
-    limits.torque_rate[i] = std::min(1000.0, 100 * limits.torque[i]);
+    const bool slides = joint.type == JointType::kPrismatic;
+    limits.torque_rate[i] = 100 * limits.torque[i];
+    if (!slides) limits.torque_rate[i] = std::min(1000.0, limits.torque_rate[i]);
     limits.velocity[i] = finite_or(joint.velocity, 2);
     limits.position_lower[i] = joint.lower;
     limits.position_upper[i] = joint.upper;
+    limits.position_margin[i] =
+        std::min(slides ? 0.02 : 0.1, 0.1 * std::max(joint.upper - joint.lower, 1e-6));
+    limits.return_velocity[i] = slides ? 0.01 : 0.05;
     const double center = 0.5 * (joint.lower + joint.upper);
     middle[i] = std::isfinite(center) ? center : 0;
   }
@@ -151,7 +156,7 @@ Settings default_settings(const RobotModel& model) {
   Gains& gains = settings.initial.gains;
   gains.joint_stiffness = (kOmega * kOmega * inertia).asDiagonal();
   gains.joint_damping = (2 * kRatio * kOmega * inertia).asDiagonal();
-  const TipInertia least = least_tip_inertia(model, limits);
+  const TipInertia least = least_tip_inertia(model, limits.position_lower, limits.position_upper);
   const double linear = std::min(40.0, kFastestDecay * least.linear);
   const double angular = std::min(2.0, kFastestDecay * least.angular);
   gains.task_damping.diagonal() << linear, linear, linear, angular, angular, angular;
@@ -171,6 +176,8 @@ void validate(const Settings& settings, int n) {
   if (!(settings.watchdog.longest_gap > settings.period)) {
     fail("watchdog.longest_gap", settings.watchdog.longest_gap, "s", "has to exceed the period");
   }
+  need_not_negative("watchdog.frozen", settings.watchdog.frozen, "s");
+  need_not_negative("watchdog.release_after", settings.watchdog.release_after, "s");
   if (settings.analysis.every < 1) {
     fail("analysis.every", settings.analysis.every, "ticks", "has to be at least 1");
   }

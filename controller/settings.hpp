@@ -1,9 +1,11 @@
 #pragma once
 #include <dashpot/controller/types.hpp>
 
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace dashpot::controller {
 
@@ -43,28 +45,59 @@ struct Motion {
   double gain_time = 0.5;   ///< a change of gains, wrench or mode takes this long, s
 };
 
-/// Bounds that the torque and the robot keep to.
+/// A plane that the tip must not cross, in B's axes. The side to which `normal` points is free.
+struct Wall {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();    ///< of the plane, m
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< of length 1
+
+  /// Returns how far a point is in front of the wall, m; negative beyond it.
+  double distance(const Eigen::Vector3d& p) const noexcept { return normal.dot(p - point); }
+};
+
+/// Bounds that the torque and the robot keep to. See SafetyFilter and MotionWatch, which hold them.
 struct Limits {
-  JointVector torque;            ///< n, N m, positive
-  JointVector torque_rate;       ///< n, N m/s, positive
-  JointVector velocity;          ///< n, rad/s, positive
-  JointVector position_lower;    ///< n, rad; -infinity if there is none
-  JointVector position_upper;    ///< n, rad; infinity if there is none
-  double position_margin = 0.1;  ///< repulsion begins this far before a position limit, rad
-  double repulsion = 0.5;        ///< its torque at the limit, as a fraction of the torque limit
+  JointVector torque;           ///< n, N m, positive
+  JointVector torque_rate;      ///< n, N m/s, positive
+  JointVector velocity;         ///< n, rad/s, positive
+  double tip_velocity = 1.5;    ///< of the tip's origin, m/s, positive
+  JointVector position_lower;   ///< n, rad; -infinity if there is none
+  JointVector position_upper;   ///< n, rad; infinity if there is none
+  JointVector position_margin;  ///< repulsion begins this far before a position limit, n, rad
+  /// Its torque at the limit, as a fraction of the torque limit; less where that would make it
+  /// vibrate, or push a joint back faster than half its velocity limit.
+  double repulsion = 0.5;
+  JointVector return_velocity;  ///< with which a joint outside its limits returns, n, rad/s; 0: not
   /// The Cartesian springs are drawn out no farther than this, m and rad, however far away the goal
   /// is: beyond it they pull no harder, and their path waits for the robot (see TipPath). A path
   /// that is to brake within this is no faster than sqrt(acceleration times it).
   double linear_error = 0.3;
   double angular_error = 1.0;
-  JointVector damping;  ///< of the safe output "damp", n, N m s/rad, positive
+  /// Of the safe output "damp", n, N m s/rad, positive; less where the sampled loop would not bear
+  /// it.
+  JointVector damping;
+  /// Most power of all that exceeds the weight, W; infinity: any. More is scaled down evenly.
+  double power = std::numeric_limits<double>::infinity();
+  /// External torque of a joint (n, N m) that counts as a collision; infinity: none does. It is
+  /// estimated from the motion, and so contains the friction that the model does not know.
+  JointVector external_torque;
+  /// The same of the force in RobotState::external_wrench, N.
+  double external_force = std::numeric_limits<double>::infinity();
+  std::vector<Wall> walls;  ///< at most kMaxWalls
+  /// Gains are refused if the sampled loop is unstable with them grown by this factor or less; 1
+  /// accepts all. See GainJudge.
+  double gain_margin = 2;
 };
+
+inline constexpr std::size_t kMaxWalls = 8;
 
 /// When input is too old to act on.
 struct Watchdog {
   double setpoint_hold = 0.5;  ///< a set-point older than this: hold, s; 0: never
   double setpoint_damp = 2.0;  ///< older than this: damp, s; 0: never
-  double longest_gap = 0.01;   ///< between two states, s
+  double longest_gap = 0.01;   ///< between two good states, s; a longer one is a fault
+  double frozen = 0.2;         ///< a state that stays the same for so long, s, while the torque
+                               ///< changes, is a fault; 0: never
+  double release_after = 0;    ///< faults are released after a rest of so long, s; 0: never
 };
 
 /// The vibration analysis beside the law.
@@ -118,10 +151,12 @@ class InvalidSettings : public std::invalid_argument {
 
 /// Settings for a robot. Limits of torque, velocity and position are those of its URDF (100 N m,
 /// 2 rad/s and none where the URDF has none), torque changes by at most 1000 N m/s (fully within 10
-/// ms where that is slower), set-points move at a quarter of the velocity limits. Gains suit the
-/// robot's inertia: 1.5 Hz and a damping ratio of 0.7 for each joint alone in the middle of its
-/// range, and 2 N m s/rad, 40 N s/m at the tip, or less where its inertia is too small for that
-/// anywhere, with stiffness 10/s times that.
+/// ms where that is slower, and for prismatic joints), the margin before a position limit is a
+/// tenth of the range, at most 0.1 rad or 2 cm, a joint returns with 0.05 rad/s or 1 cm/s,
+/// set-points move at a quarter of the velocity limits. Gains suit the robot's inertia: 1.5 Hz and
+/// a damping ratio of 0.7 for each joint alone in the middle of its range, and 2 N m s/rad, 40 N
+/// s/m at the tip, or less where its inertia is too small for that anywhere, with stiffness 10/s
+/// times that.
 Settings default_settings(const RobotModel& model);
 
 /// Throws InvalidSettings, with key, value and unit, unless all sizes are n, all numbers are finite

@@ -59,10 +59,13 @@ struct Step {
 ///
 /// The result is a weighted mean of v and c, so its speed stays at most 1, and it differs from v by
 /// an effort of at most T. Once it equals c, the next c is shorter by b T d: the point brakes and
-/// its last period ends at the goal. It catches up with c, because braking at half the limit c
-/// changes no faster than v can, in whatever direction the point comes. The goal may move.
+/// its last period ends at the goal. `share` (0 to 1) of the speed limit counts: with less of it
+/// the point slows down as far as the acceleration limit allows. It catches up with c, because
+/// braking at half the limit c changes no faster than v can, in whatever direction the point comes.
+/// The goal may move.
 template <int D, class Norm>
-Step<D> approach(const Joints<D>& d, const Joints<D>& v, const Norm& norm, double T) noexcept {
+Step<D> approach(const Joints<D>& d, const Joints<D>& v, const Norm& norm, double T,
+                 double share = 1) noexcept {
   double rate = 0;  // c = rate d
   bool last = true;
   const double effort = norm.effort(d);
@@ -70,16 +73,16 @@ Step<D> approach(const Joints<D>& d, const Joints<D>& v, const Norm& norm, doubl
     const double bTT = 0.5 * T * T / effort;
     const double k = std::max(1.0, std::ceil(0.5 * (std::sqrt(1 + 8 / bTT) - 1)));
     last = k == 1;
-    rate = std::min(1 / norm.speed(d), (last ? 1 : 1 / k + 0.5 * (k - 1) * bTT) / T);
+    rate = std::min(share / norm.speed(d), (last ? 1 : 1 / k + 0.5 * (k - 1) * bTT) / T);
   }
   Joints<D> change;  // c - v
   for (int i = 0; i < D; ++i) change[i] = rate * d[i] - v[i];
   const double size = norm.effort(change);
   Step<D> step;
   step.arrives = size <= T && last;
-  const double share = size <= T ? 1 : T / size;
+  const double part = size <= T ? 1 : T / size;
   for (int i = 0; i < D; ++i) {
-    step.velocity[i] = size <= T ? rate * d[i] : v[i] + share * change[i];
+    step.velocity[i] = size <= T ? rate * d[i] : v[i] + part * change[i];
   }
   return step;
 }

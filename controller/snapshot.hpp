@@ -15,6 +15,7 @@ struct Snapshot {
   std::uint64_t tick = 0;      ///< counted from 1
   std::uint64_t restarts = 0;  ///< how often the springs started afresh, the first time included
   Status status = Status::kOk;
+  Status fault = Status::kOk;     ///< that latched, and was not released; kOk: none
   Mode mode = Mode::kJoint;       ///< of the set-point in force
   double joint_weight = 0;        ///< share of the joint springs, 0 to 1
   double task_weight = 0;         ///< share of the Cartesian springs, 0 to 1

@@ -15,22 +15,33 @@ namespace dashpot::controller {
 /// velocity_i being the limit of the settings or the robot's own, whichever is higher; or by what
 /// the measured velocities say, the mean of the two times t, give or take half of the larger one
 /// times t and 0.001 rad: a robot that is faster than its limit is no broken sensor. A velocity may
-/// differ by velocity_i (1/2 + 10/s t).
+/// differ by velocity_i (1/2 + 10/s t), or by any amount that the position agrees with: at least a
+/// third of the way from where the old velocity leads to where the new one does. So a blow is no
+/// broken sensor either.
 ///
 /// States that agree with each other in this way for 20 ms (or longest_gap, if that is longer) are
-/// believed, even if they do not agree with the last good one; others at the latest when t has
-/// grown enough.
+/// followed, even if they do not agree with the last good one; others at the latest when t has
+/// grown enough. By then a fault has latched (see Status), because the jump took longer than
+/// longest_gap.
 ///
-/// A continuous joint may report its angle modulo 2 pi: `position` follows it without jumps.
+/// Good states are compared with each other over about half a second: what the positions moved by
+/// against what the velocities say, and the time stamps against the period. See kStateContradictory
+/// and kWrongRate.
+///
+/// A continuous joint may report its angle modulo 2 pi: `position` follows it without jumps. For
+/// any other joint a wrap is a jump.
 class StateCheck {
  public:
   StateCheck(const RobotModel& model, const Settings& settings);
 
-  /// kOk, kTimeGap, or a status whose safe output is "ramp". Times are compared with the last
-  /// state's, good or not.
+  /// Returns kOk; kTimeGap, kWrongRate or kStateContradictory, whose safe output is "damp"; or a
+  /// status whose safe output is "ramp". Times are compared with the last state's, good or not.
   Status check(const RobotState& state) noexcept;
-  /// Of the last good state, n, rad.
+  /// Returns the last good position, n, rad.
   const JointVector& position() const noexcept { return good_.position; }
+  /// Returns the last good velocity, n, rad/s: the measured one, or, once that contradicts the
+  /// positions, how fast these change.
+  const JointVector& velocity() const noexcept { return velocity_; }
   /// The next state is like the first.
   void reset() noexcept;
 
@@ -44,15 +55,21 @@ class StateCheck {
   };
 
   bool follows(const Last& last, const RobotState& state) const noexcept;
-  /// Whether this state and those before have agreed with each other for long enough.
+  /// True if this state and those before have agreed with each other for long enough.
   bool believed(const RobotState& state, double gap) noexcept;
-  /// Angles of continuous joints nearest to their last.
+  /// Brings angles of continuous joints next to their last.
   void unwrap(JointVector& position, const JointVector& last) const noexcept;
+  /// True if ticks have come at another rate than the configured one.
+  bool wrong_rate(double gap) noexcept;
+  /// True if positions have moved otherwise than the velocities say since `last`.
+  bool contradictory(const Last& last) noexcept;
+  void forget_motion() noexcept;
 
   Eigen::Index n_;
   double period_;
   double longest_gap_;
   JointVector velocity_limit_;
+  JointVector tolerance_;  ///< of `contradictory`, rad (m)
   std::array<bool, kMaxJoints> continuous_{};
   bool any_continuous_ = false;
 
@@ -61,9 +78,15 @@ class StateCheck {
   Last good_;
   Last doubtful_;         ///< since the last good one
   double agreement_ = 0;  ///< for how long the doubtful ones have agreed with each other, s
+
+  JointVector velocity_;
+  int intervals_ = 0;        ///< between ticks that `wrong_rate` has seen, at most kIntervals
+  double excess_ = 0;        ///< mean of interval / period - 1
+  JointVector unexplained_;  ///< what the positions moved beyond the velocities, lately, rad
+  JointVector travelled_;    ///< the larger of what both moved, lately, rad
 };
 
-/// Seconds from `earlier` to `later`, in ns each, of any size.
+/// Returns seconds from `earlier` to `later`, in ns each, of any size.
 inline double seconds_between(std::int64_t earlier, std::int64_t later) noexcept {
   std::int64_t difference = 0;
   if (__builtin_sub_overflow(later, earlier, &difference)) return later > earlier ? 1e10 : -1e10;

@@ -7,23 +7,43 @@ const char* to_text(Status status) noexcept {
     case Status::kOk:
       return "ok";
     case Status::kTorqueLimited:
-      return "torque or torque rate limited";
+      return "torque, torque rate, power or speed limited";
     case Status::kNearJointLimit:
       return "near a joint's position limit";
     case Status::kWrenchNotFinite:
       return "external wrench not finite, the last one stays";
     case Status::kSetpointRejected:
       return "set-point rejected";
+    case Status::kWeightNotHeld:
+      return "torque limit below the arm's weight";
     case Status::kSetpointStale:
       return "set-point stale, holding";
     case Status::kSetpointLost:
       return "set-point lost, damping";
+    case Status::kFaultLatched:
+      return "fault latched, damping until released";
+    case Status::kTooManyRestarts:
+      return "springs restarted too often, damping";
     case Status::kTimeGap:
       return "gap between states, damping";
+    case Status::kWrongRate:
+      return "loop at the wrong rate, damping";
+    case Status::kCollision:
+      return "collision, damping";
+    case Status::kInstability:
+      return "vibration grows, damping";
+    case Status::kTipSpeedLimit:
+      return "tip speed limit exceeded, damping";
     case Status::kVelocityLimit:
       return "velocity limit exceeded, damping";
+    case Status::kWall:
+      return "tip beyond a wall, damping";
     case Status::kPositionLimit:
       return "position limit exceeded, damping";
+    case Status::kStateFrozen:
+      return "state frozen, holding the weight";
+    case Status::kStateContradictory:
+      return "position and velocity contradict each other, damping";
     case Status::kStateNotFinite:
       return "state not finite, torque ramped down";
     case Status::kStateWrongSize:

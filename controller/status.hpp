@@ -3,48 +3,67 @@
 
 namespace dashpot::controller {
 
-/// Outcome of one tick: of several, the one that stands last here. Each comes with its safe output.
-///   hold:  the springs stop where they are, whatever the set-point says; no commanded wrench
-///   damp:  no springs: joint damping, and gravity where the controller compensates it
-///   ramp:  the last good torque goes to zero within 0.1 s
+/// Result of one tick. If several conditions hold, the most severe, the last in this list, is
+/// returned. Each comes with a documented safe output:
+///   hold:  the springs stop where they are, whatever the set-point says; no commanded wrench.
+///   damp:  no springs: joint damping, and the arm's weight where the controller compensates it.
+///   ramp:  the last good torque goes to zero within 0.1 s.
 /// Torque and torque-rate limits hold for all of them. Where damp and ramp take torque away, it
 /// fades evenly: in all joints alike, as slowly as the slowest torque-rate limit makes it.
 ///
-/// Recovery: what `status` names has to be over; nothing else is needed. After a ramp of at most
-/// Watchdog::longest_gap the controller goes on where it was. After a longer ramp and after every
-/// damp it starts afresh: springs where the robot is, gains growing from zero within
-/// Motion::gain_time, and set-points moving from there. Snapshot::restarts counts these.
+/// Faults latch. A status whose safe output is "damp" (but kSetpointLost), and "ramp" for longer
+/// than Watchdog::longest_gap, leave a fault behind: the arm is damped, with its weight held, until
+/// Controller::release or reset, or, if Watchdog::release_after says so, until it has been at rest
+/// for that long. Meanwhile the status is kFaultLatched or worse, and Snapshot::fault names the
+/// fault. After that, and after a lost set-point, the springs start where the robot is, with gains
+/// that grow from zero within Motion::gain_time; Snapshot::restarts counts these. After a ramp of
+/// at most Watchdog::longest_gap the controller goes on where it was.
 enum class Status : std::uint8_t {
   kOk,
   // The torque is as asked for, as far as it goes:
-  kTorqueLimited,    ///< a torque or torque-rate limit is at work
+  kTorqueLimited,    ///< a limit of torque, torque rate, power or speed is at work
   kNearJointLimit,   ///< a joint is within the margin of a position limit; its repulsion is at work
   kWrenchNotFinite,  ///< NaN or infinity in RobotState::external_wrench; the last finite one stays
                      ///< in force, in the analysis, which alone uses it
   kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, a rotation that is
                       ///< none, an unreachable joint position or a time to come; the last good one
                       ///< stays in force
+  kWeightNotHeld,     ///< the weight of the arm needs more than a torque limit: it sinks
   // The set-point is too old:
   kSetpointStale,  ///< older than the first time-out: hold
   kSetpointLost,   ///< older than the second time-out: damp
-  // The state cannot go on like this:
-  kTimeGap,        ///< more than the longest gap since the last tick: damp
-  kVelocityLimit,  ///< a joint moves faster than its limit: damp, until slower than 0.8 of it
-  kPositionLimit,  ///< a joint is outside its position limits: damp, and push back
-  // The state cannot be trusted:
-  kStateNotFinite,  ///< NaN or infinity: ramp
-  kStateWrongSize,  ///< not n entries: ramp
-  kStateJump,       ///< a position or velocity further from the last than the robot can move: ramp
-  kTimeBackward,    ///< time stamp at or before that of the last tick: ramp
-  kNotFinite,       ///< the law gave a NaN or infinity: ramp
+  // The state cannot go on like this: damp, and the fault latches:
+  kFaultLatched,        ///< none of the following any more, but one was and was not released
+  kTooManyRestarts,     ///< springs started anew more than three times within about a second
+  kTimeGap,             ///< more than the longest gap since the last tick
+  kWrongRate,           ///< ticks come at less than 2/3 or more than 3/2 of the configured rate
+  kCollision,           ///< an external torque or force above its threshold
+  kInstability,         ///< a vibration that grows, or a torque that reverses in every other tick
+  kTipSpeedLimit,       ///< the tip moves faster than its limit
+  kVelocityLimit,       ///< a joint moves faster than its limit
+  kWall,                ///< the tip is beyond a wall that it must not cross
+  kPositionLimit,       ///< a joint is outside its position limits; it may return slowly
+  kStateFrozen,         ///< the state does not change at all though the torque does: weight alone
+  kStateContradictory,  ///< positions do not move as the velocities say
+  // The state cannot be trusted: ramp:
+  kStateNotFinite,  ///< NaN or infinity
+  kStateWrongSize,  ///< not n entries
+  kStateJump,       ///< a position or velocity farther from the last than the robot can move
+  kTimeBackward,    ///< time stamp at or before that of the last tick
+  kNotFinite,       ///< the law gave a NaN or infinity
 };
 
-/// The one that stands last.
+/// The more severe one, which stands last.
 inline Status worse(Status a, Status b) noexcept {
   return a < b ? b : a;
 }
 
-/// "ok", "torque limited", ...: a short English text.
+/// True for what latches as soon as it happens; what leads to "ramp" latches after a while.
+inline bool latches(Status status) noexcept {
+  return status > Status::kFaultLatched && status < Status::kStateNotFinite;
+}
+
+/// Returns "ok", "torque limited", ...: a short English text.
 const char* to_text(Status status) noexcept;
 
 }  // namespace dashpot::controller
