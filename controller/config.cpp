@@ -118,13 +118,13 @@ void read_feed_forward(const YamlMapping& root, FeedForward& feed_forward) {
 void read_watchdog(const YamlMapping& root, double period, Watchdog& watchdog) {
   constexpr double kGap = 2.5;  // periods
   static constexpr std::array<std::string_view, 5> kKeys = {
-      "setpoint_hold", "setpoint_damp", "longest_gap", "frozen", "release_after"};
+      "setpoint_hold", "setpoint_damp", "longest_gap", "feedback", "release_after"};
   const YamlMapping keys = root.mapping("watchdog", kKeys);
   watchdog.longest_gap = std::max(watchdog.longest_gap, kGap * period);  // of slow loops
   read_number(keys, "setpoint_hold", "s", Sign::kNotNegative, watchdog.setpoint_hold);
   read_number(keys, "setpoint_damp", "s", Sign::kNotNegative, watchdog.setpoint_damp);
   read_number(keys, "longest_gap", "s", Sign::kPositive, watchdog.longest_gap);
-  read_number(keys, "frozen", "s", Sign::kNotNegative, watchdog.frozen);
+  read_number(keys, "feedback", "s", Sign::kNotNegative, watchdog.feedback);
   read_number(keys, "release_after", "s", Sign::kNotNegative, watchdog.release_after);
 }
 

@@ -229,7 +229,9 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   status = worse(status, watch_motion(input, dt));
   Vector tau = status >= Status::kSetpointLost ? damp() : act(status == Status::kSetpointStale);
   const bool returns = fault_ == Status::kPositionLimit;
-  status = worse(status, filter_.apply({q_, qd_, motion_watch_.tip_speed(), returns}, weight, tau));
+  status = worse(
+      status,
+      filter_.apply({q_, qd_, motion_watch_.tip_speed(), !damping_only_, returns}, weight, tau));
   motion_watch_.applied(tau, difference<N>(tau, weight));
   if (status == Status::kNotFinite) {
     if (++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap) latch(status);

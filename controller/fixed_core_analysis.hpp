@@ -69,7 +69,7 @@ template <int N>
 Impedance<N> FixedCore<N>::impedance() const noexcept {
   Impedance<N> all = damping_only_ ? damper() : held_.now(gains_.now());
   Vector stiffness, damping;
-  if (!filter_.repels(q_, stiffness, damping)) return all;
+  if (!filter_.repels(q_, !damping_only_, stiffness, damping)) return all;
   for (int i = 0; i < N; ++i) {
     all.joint_stiffness(i, i) += stiffness[i];
     all.joint_damping(i, i) += damping[i];

@@ -21,7 +21,8 @@ namespace dashpot::controller {
 ///   ten half swings, to more than a tenth of its limit, while the springs stand still; or the
 ///   torque beyond the weight reverses, at more than a twentieth of its limit, in every tick for 40
 ///   ticks, or in every other tick for 180.
-/// - kStateFrozen: position and velocity stay the same to the last bit for Watchdog::frozen, while
+/// - kStateFrozen: position and velocity stay the same to the last bit for 0.4 Watchdog::feedback,
+/// while
 ///   that torque changes by a twentieth of its limit more than Coulomb friction explains.
 template <int N>
 class MotionWatch {
@@ -89,7 +90,7 @@ MotionWatch<N>::MotionWatch(const RobotModel& model, const Settings& settings) n
       external_limit_(fixed<N>(settings.limits.external_torque)),
       external_force_(settings.limits.external_force),
       tip_limit_(settings.limits.tip_velocity),
-      frozen_after_(settings.watchdog.frozen),
+      frozen_after_(0.4 * settings.watchdog.feedback),
       wall_count_(std::min(settings.limits.walls.size(), kMaxWalls)) {
   std::copy_n(settings.limits.walls.begin(), wall_count_, walls_.begin());
   for (int i = 0; i < N; ++i) estimates_ |= std::isfinite(external_limit_[i]);
@@ -116,7 +117,8 @@ Status MotionWatch<N>::check(const Tick& tick) noexcept {
     fast |= std::abs(tick.qd[i]) > velocity_limit_[i];
     outside |= tick.q[i] < lower_[i] || tick.q[i] > upper_[i];
   }
-  tip_speed_ = v.norm();
+  const double largest = v.cwiseAbs().maxCoeff();  // whose square may overflow
+  tip_speed_ = largest > 0 ? largest * (v / largest).norm() : 0;
   Status status = Status::kOk;
   if (collides(tick)) status = Status::kCollision;
   if (grows(tick) || reverses()) status = Status::kInstability;

@@ -35,9 +35,10 @@ inline double loop_lag(const Settings& settings) noexcept {
 ///   between 0 and 1, f bounds the law's torque toward the limit by E_i g / m, and the repulsion is
 ///     r_i = -F_i y^2 - c_i y qd_i     (away from an upper limit),
 ///   a spring and a damper that the sampled loop bears whatever else is at its limit:
-///     c_i = 0.4 I_i / lag,   F_i = min(Limits::repulsion torque_i, c_i velocity_i / 2),
+///     c_i = 0.4 I_i / lag,   F_i = min(Limits::repulsion torque_i, c_i velocity_i / 10),
 ///     E_i = min(torque_i, 0.2 I_i m / lag^2).
-///   So a joint that it pushes back is no faster than half its velocity limit.
+///   So a joint that it pushes back is no faster than a tenth of its velocity limit. F_i counts
+///   only while springs are in force.
 /// - Outside a position limit no spring acts. If the joint `returns`, the torque is that of a
 /// damper
 ///   that moves inward: r_i = c_i (return_velocity_i z - qd_i), |r_i| <= F_i, z growing from 0 to 1
@@ -58,6 +59,7 @@ class SafetyFilter {
     const Vector& q;
     const Vector& qd;
     double tip_speed;  ///< m/s
+    bool springs;      ///< are in force, and so are those of the repulsion
     bool returns;      ///< joints outside their limits are to return
   };
 
@@ -99,7 +101,7 @@ class SafetyFilter {
     return false;
   }
   /// True if repulsion acts at q; it then has this stiffness and damping, N m/rad and N m s/rad.
-  bool repels(const Vector& q, Vector& stiffness, Vector& damping) const noexcept;
+  bool repels(const Vector& q, bool springs, Vector& stiffness, Vector& damping) const noexcept;
   /// Dampers (n, N m s/rad), each no larger than what the sampled loop bears twice.
   Vector borne(Vector damping) const noexcept {
     for (int i = 0; i < N; ++i) damping[i] = std::min(damping[i], 2.5 * damper_[i]);

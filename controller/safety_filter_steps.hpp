@@ -22,7 +22,7 @@ SafetyFilter<N>::SafetyFilter(const Settings& settings, const Vector& inertia) n
     torque_step_[i] = settings.limits.torque_rate[i] * settings.period;
     damper_[i] = 0.4 * inertia[i] / lag;
     repulsion_[i] =
-        std::min(settings.limits.repulsion * torque_[i], 0.5 * damper_[i] * velocity_[i]);
+        std::min(settings.limits.repulsion * torque_[i], 0.1 * damper_[i] * velocity_[i]);
     toward_[i] = std::min(torque_[i], 0.2 * inertia[i] * margin_[i] / (lag * lag));
     late_[i] = settings.limits.torque_rate[i] * inertia[i];
   }
@@ -73,7 +73,8 @@ Status SafetyFilter<N>::repel(const Motion& motion, Vector& excess, Vector& repu
     excess[i] = toward * std::min(toward * excess[i], toward_[i] * room);
     if (near.distance >= 0) {
       const double y = 1 - room;
-      repulsion[i] = -toward * (repulsion_[i] * y * y + damper_[i] * y * rate);
+      const double spring = motion.springs ? repulsion_[i] * y * y : 0;
+      repulsion[i] = -toward * (spring + damper_[i] * y * rate);
       status = worse(status, Status::kNearJointLimit);
       continue;
     }
@@ -178,7 +179,8 @@ bool SafetyFilter<N>::limit(Vector& tau) noexcept {
 }
 
 template <int N>
-bool SafetyFilter<N>::repels(const Vector& q, Vector& stiffness, Vector& damping) const noexcept {
+bool SafetyFilter<N>::repels(const Vector& q, bool springs, Vector& stiffness,
+                             Vector& damping) const noexcept {
   bool any = false;
   for (int i = 0; i < N; ++i) {
     stiffness[i] = damping[i] = 0;
@@ -186,7 +188,7 @@ bool SafetyFilter<N>::repels(const Vector& q, Vector& stiffness, Vector& damping
     if (!(distance < margin_[i])) continue;
     any = true;
     const double y = 1 - std::max(distance, 0.0) / margin_[i];
-    stiffness[i] = distance >= 0 ? 2 * repulsion_[i] * y / margin_[i] : 0;
+    stiffness[i] = springs && distance >= 0 ? 2 * repulsion_[i] * y / margin_[i] : 0;
     damping[i] = damper_[i] * y;
   }
   return any;

@@ -109,6 +109,11 @@ SetpointFault check_setpoint(const Setpoint& setpoint, const Limits& limits,
     if (!(rotation_defect(setpoint.tip_pose.rotation) <= 1e-6)) {
       return {"tip_pose.rotation", "is not a rotation matrix"};
     }
+    for (const Wall& wall : limits.walls) {
+      if (wall.distance(setpoint.tip_pose.position) < 0) {
+        return {"tip_pose.position", "is beyond a wall"};
+      }
+    }
   }
   if (known_gains) return {};
   return check_gains(setpoint.gains, setpoint.mode, limits.torque.size());

@@ -176,7 +176,7 @@ void validate(const Settings& settings, int n) {
   if (!(settings.watchdog.longest_gap > settings.period)) {
     fail("watchdog.longest_gap", settings.watchdog.longest_gap, "s", "has to exceed the period");
   }
-  need_not_negative("watchdog.frozen", settings.watchdog.frozen, "s");
+  need_not_negative("watchdog.feedback", settings.watchdog.feedback, "s");
   need_not_negative("watchdog.release_after", settings.watchdog.release_after, "s");
   if (settings.analysis.every < 1) {
     fail("analysis.every", settings.analysis.every, "ticks", "has to be at least 1");

@@ -95,9 +95,10 @@ struct Watchdog {
   double setpoint_hold = 0.5;  ///< a set-point older than this: hold, s; 0: never
   double setpoint_damp = 2.0;  ///< older than this: damp, s; 0: never
   double longest_gap = 0.01;   ///< between two good states, s; a longer one is a fault
-  double frozen = 0.2;         ///< a state that stays the same for so long, s, while the torque
-                               ///< changes, is a fault; 0: never
-  double release_after = 0;    ///< faults are released after a rest of so long, s; 0: never
+  /// States are checked against each other over about so long, s: positions against velocities, and
+  /// for two fifths of it whether they change at all; 0: not
+  double feedback = 0.5;
+  double release_after = 0;  ///< faults are released after a rest of so long, s; 0: never
 };
 
 /// The vibration analysis beside the law.

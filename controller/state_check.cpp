@@ -11,9 +11,8 @@ namespace {
 // Of wrong_rate: long enough for the jitter of a loop that is not in real time.
 constexpr int kIntervals = 50;
 constexpr double kFastest = -1.0 / 3, kSlowest = 0.5;  // mean interval / period - 1
-// Of contradictory: half a second is longer than any filter of velocities lags behind, and in it a
-// joint at a hundredth of its usual speed moves farther than the tolerance.
-constexpr double kMemory = 0.5;            // s
+// Of contradictory: in half a second a joint at a hundredth of its usual speed moves farther than
+// the tolerance, and no filter of velocities lags behind for so long.
 constexpr double kUnexplained = 0.3;       // of what was travelled
 constexpr double kAngleTolerance = 0.02;   // rad
 constexpr double kSlideTolerance = 0.005;  // m
@@ -24,6 +23,7 @@ StateCheck::StateCheck(const RobotModel& model, const Settings& settings)
     : n_(model.dof()),
       period_(settings.period),
       longest_gap_(settings.watchdog.longest_gap),
+      memory_(settings.watchdog.feedback),
       velocity_limit_(settings.limits.velocity),
       tolerance_(JointVector::Constant(n_, kAngleTolerance)) {
   for (std::size_t i = 0; i < model.joints().size(); ++i) {
@@ -114,7 +114,8 @@ bool StateCheck::wrong_rate(double gap) noexcept {
 }
 
 bool StateCheck::contradictory(const Last& last) noexcept {
-  const double keep = std::max(0.0, 1 - last.age / kMemory);
+  if (memory_ == 0) return false;
+  const double keep = std::max(0.0, 1 - last.age / memory_);
   bool found = false;
   for (Eigen::Index i = 0; i < n_; ++i) {
     const double moved = good_.position[i] - last.position[i];

@@ -24,9 +24,9 @@ namespace dashpot::controller {
 /// grown enough. By then a fault has latched (see Status), because the jump took longer than
 /// longest_gap.
 ///
-/// Good states are compared with each other over about half a second: what the positions moved by
-/// against what the velocities say, and the time stamps against the period. See kStateContradictory
-/// and kWrongRate.
+/// Good states are compared with each other over about Watchdog::feedback: what the positions moved
+/// by against what the velocities say, and the time stamps against the period. See
+/// kStateContradictory and kWrongRate.
 ///
 /// A continuous joint may report its angle modulo 2 pi: `position` follows it without jumps. For
 /// any other joint a wrap is a jump.
@@ -68,6 +68,7 @@ class StateCheck {
   Eigen::Index n_;
   double period_;
   double longest_gap_;
+  double memory_;  ///< of `contradictory`, s; 0: none
   JointVector velocity_limit_;
   JointVector tolerance_;  ///< of `contradictory`, rad (m)
   std::array<bool, kMaxJoints> continuous_{};

@@ -124,6 +124,7 @@ TEST(HeldDamping, LosesNoModesOfALongChain) {
   Settings settings = unlimited_settings(model);
   settings.initial.mode = Mode::kCartesian;
   settings.initial.gains.task_damping_ratio = 0.7;
+  settings.limits.torque.setConstant(1e4);  // holds the weight
   LedArm led(model, settings, 0.2);
   led.place(led.center = settings.initial.joint_position);
   led.settle();

@@ -170,7 +170,7 @@ TEST_F(OutOfReach, ADirectionWithoutSpringsDrawsNothingOut) {
   arm->setpoint.gains.task_damping(2, 2) = 0;
   arm->setpoint.tip_pose.position.x() += 0.05;
   arm->setpoint.tip_pose.position.z() += 5;
-  for (int k = 0; k < 12000; ++k) next();
+  for (int k = 0; k < 40000; ++k) next();
   EXPECT_NEAR(snapshot().setpoint_tip.position.x(), home.position.x() + 0.05, 1e-9);
 }
 

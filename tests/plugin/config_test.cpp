@@ -179,11 +179,15 @@ TEST(Config, FillsTheRest) {
            "  linear_acceleration: 1, angular_velocity: 2, angular_acceleration: 3, smoothing: 20 "
            "ms,\n"
            "  gain_time: 1}\n"
-           "limits: {position_margin: 5 deg, repulsion: 0.25, damping: 3}\n"
+           "limits: {position_margin: 5 deg, repulsion: 0.25, damping: 3, tip_velocity: 2, power: "
+           "80 W,\n"
+           "  return_velocity: 1 deg/s, external_torque: 9, external_force: 40, gain_margin: 3,\n"
+           "  walls: [{point: [0, 0, 10 cm], normal: [0, 0, 2]}]}\n"
            "gains: {null_space: {stiffness: 4, damping: [1, 2, 3, 4, 5, 6, 7]}}\n"
            "feed_forward: {gravity: false, coriolis: false, friction: true, acceleration: false,\n"
            "  wrench: false}\n"
-           "watchdog: {setpoint_hold: 100 ms, setpoint_damp: 0, longest_gap: 5 ms}\n"
+           "watchdog: {setpoint_hold: 100 ms, setpoint_damp: 0, longest_gap: 5 ms, feedback: 1,\n"
+           "  release_after: 3}\n"
            "analysis: {where: 'off', every: 7, soft_frequency: 0.2 rad/s, shapes: false,\n"
            "  sampled: {interval: 500 ms, delay: 2, cutoff: 30 Hz, difference_velocity: true}}\n")
           .settings;
@@ -198,7 +202,15 @@ TEST(Config, FillsTheRest) {
   EXPECT_EQ(all.motion.angular_acceleration, 3);
   EXPECT_EQ(all.motion.smoothing, 0.02);
   EXPECT_EQ(all.motion.gain_time, 1);
-  EXPECT_DOUBLE_EQ(all.limits.position_margin, 5 * kDegree);
+  EXPECT_TRUE(all.limits.position_margin.isApprox(VectorXd::Constant(7, 5 * kDegree), 1e-15));
+  EXPECT_EQ(all.limits.tip_velocity, 2);
+  EXPECT_EQ(all.limits.power, 80);
+  EXPECT_TRUE(all.limits.return_velocity.isApprox(VectorXd::Constant(7, kDegree), 1e-15));
+  EXPECT_EQ(all.limits.external_torque, VectorXd::Constant(7, 9));
+  EXPECT_EQ(all.limits.external_force, 40);
+  EXPECT_EQ(all.limits.gain_margin, 3);
+  ASSERT_EQ(all.limits.walls.size(), 1u);
+  EXPECT_DOUBLE_EQ(all.limits.walls[0].distance(Eigen::Vector3d(5, 6, 0.3)), 0.2);
   EXPECT_EQ(all.limits.repulsion, 0.25);
   EXPECT_EQ(all.limits.damping, VectorXd::Constant(7, 3));
   EXPECT_EQ(all.initial.gains.null_stiffness, VectorXd::Constant(7, 4));
@@ -209,6 +221,8 @@ TEST(Config, FillsTheRest) {
   EXPECT_DOUBLE_EQ(all.watchdog.setpoint_hold, 0.1);
   EXPECT_EQ(all.watchdog.setpoint_damp, 0);
   EXPECT_EQ(all.watchdog.longest_gap, 0.005);
+  EXPECT_EQ(all.watchdog.feedback, 1);
+  EXPECT_EQ(all.watchdog.release_after, 3);
   EXPECT_EQ(all.analysis.where, controller::Analysis::Where::kOff);
   EXPECT_EQ(all.analysis.every, 7);
   EXPECT_EQ(all.analysis.soft_frequency, 0.2);
@@ -316,7 +330,13 @@ TEST(ConfigExample, ShowsDefaults) {
   EXPECT_EQ(shown.task_terms.jacobian_rate, none.task_terms.jacobian_rate);
   EXPECT_EQ(shown.initial.gains.frame, none.initial.gains.frame);
   EXPECT_EQ(shown.initial.gains.directions, none.initial.gains.directions);
-  EXPECT_EQ(shown.limits.position_margin, none.limits.position_margin);
+  EXPECT_EQ(shown.limits.position_margin, VectorXd::Constant(7, 0.1));
+  EXPECT_EQ(shown.limits.return_velocity, VectorXd::Constant(7, 0.05));
+  EXPECT_EQ(shown.limits.tip_velocity, none.limits.tip_velocity);
+  EXPECT_EQ(shown.limits.power, none.limits.power);
+  EXPECT_EQ(shown.limits.gain_margin, none.limits.gain_margin);
+  EXPECT_EQ(shown.watchdog.feedback, none.watchdog.feedback);
+  EXPECT_EQ(shown.watchdog.release_after, none.watchdog.release_after);
   EXPECT_EQ(shown.limits.repulsion, none.limits.repulsion);
   EXPECT_EQ(shown.motion.linear_velocity, none.motion.linear_velocity);
   EXPECT_EQ(shown.motion.linear_acceleration, none.motion.linear_acceleration);

@@ -40,7 +40,8 @@ class Output(c.Structure):
 class Snapshot(c.Structure):
     _fields_ = [("struct_size", c.c_uint32), ("joints", c.c_uint32), ("time", c.c_int64),
                 ("tick", c.c_uint64), ("restarts", c.c_uint64), ("status", c.c_int32),
-                ("mode", c.c_int32), ("position", c.c_double * MAX_JOINTS),
+                ("fault", c.c_int32), ("mode", c.c_int32), ("reserved", c.c_int32),
+                ("position", c.c_double * MAX_JOINTS),
                 ("velocity", c.c_double * MAX_JOINTS), ("torque", c.c_double * MAX_JOINTS),
                 ("tip_position", c.c_double * 3), ("tip_rotation", c.c_double * 9),
                 ("goal_joint_position", c.c_double * MAX_JOINTS),
@@ -96,9 +97,13 @@ class Plugin(c.Structure):
                 ("period", c.CFUNCTYPE(c.c_double, Handle)),
                 ("update", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(State), c.POINTER(Setpoint),
                                        c.POINTER(Output))),
+                ("start", c.CFUNCTYPE(c.c_int32, Handle, Doubles, Doubles)),
                 ("reset", c.CFUNCTYPE(c.c_int32, Handle, Doubles)),
+                ("release", c.CFUNCTYPE(c.c_int32, Handle)),
                 ("set_setpoint", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Setpoint))),
                 ("set_gains", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Gains))),
+                ("judge_gains", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Gains), Doubles,
+                                            Doubles)),
                 ("read_snapshot", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Snapshot))),
                 ("read_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Modes))),
                 ("read_sampled_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(SampledModes))),
@@ -111,8 +116,8 @@ def load(path):
     library.dashpot_plugin_interface.restype = c.POINTER(Plugin)
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
-    plugin = library.dashpot_plugin_interface(4).contents
-    assert plugin.version == 4 and plugin.struct_size == c.sizeof(Plugin)
+    plugin = library.dashpot_plugin_interface(5).contents
+    assert plugin.version == 5 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
 

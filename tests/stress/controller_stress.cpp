@@ -42,6 +42,7 @@ bool drive(const Robot& robot, long ticks, std::uint64_t seed) {
   JointVector torque;
   for (long k = 0; k < ticks; ++k) {
     input.next();
+    if (input.releases()) controller.release();
     ++seen[controller.update(input.state, input.setpoint, torque)];
     if (const char* fault = watch.see(torque)) {
       std::printf("%s, seed %llu, tick %ld: torque %s\n", robot.name.c_str(),

@@ -45,6 +45,9 @@ class HostileTicks {
     if (chance(share_)) spoil_setpoint();
   }
 
+  /// Whether a latched fault is to be released before this tick: often, so that springs come back.
+  bool releases() { return chance(0.02); }
+
   /// Settings with every feature on.
   static controller::Settings everything_on(const controller::RobotModel& model) {
     controller::Settings settings = controller::default_settings(model);
@@ -227,10 +230,12 @@ class TorqueWatch {
     for (Eigen::Index i = 0; i < torque.size(); ++i) {
       if (!std::isfinite(torque[i])) return "not finite";
       if (std::abs(torque[i]) > limits_.torque[i]) return "above the torque limit";
-      if (std::abs(torque[i] - last_[i]) > limits_.torque_rate[i] * period_ * (1 + 1e-9)) {
+      if (!first_ &&
+          std::abs(torque[i] - last_[i]) > limits_.torque_rate[i] * period_ * (1 + 1e-9)) {
         return "above the torque-rate limit";
       }
     }
+    first_ = false;  // which may be the weight at once
     last_ = torque;
     return nullptr;
   }
@@ -238,6 +243,7 @@ class TorqueWatch {
  private:
   controller::Limits limits_;
   double period_;
+  bool first_ = true;
   controller::JointVector last_;
 };
 

@@ -26,7 +26,9 @@ inline controller::RobotModel smooth_panda() {
 inline controller::Settings unlimited_settings(const controller::RobotModel& model) {
   controller::Settings settings = controller::default_settings(model);
   settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
+  settings.watchdog.feedback = 0;
   settings.limits.velocity.setConstant(1e3);
+  settings.limits.tip_velocity = 1e3;
   settings.limits.position_lower.setConstant(-10);
   settings.limits.position_upper.setConstant(10);
   return settings;

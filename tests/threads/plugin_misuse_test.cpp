@@ -134,7 +134,7 @@ TEST(PluginRefuses, ToReadBeforeTheFirstTick) {
 
 /// A wrong state is no refusal: torque ramps down to zero, and the controller recovers.
 TEST(Plugin, IsSafeWithoutAState) {
-  Host host = held_panda();
+  Host host = held_panda("watchdog: {feedback: 0}\n");  // the arm stays where it is
   for (int tick = 0; tick < 200; ++tick) ASSERT_EQ(host.tick(), DASHPOT_OK);
   ASSERT_GT(joint_vector(host.torque).norm(), 1);
   dashpot_state wrong_size = host.state();
@@ -153,7 +153,11 @@ TEST(Plugin, IsSafeWithoutAState) {
   }
   EXPECT_EQ(joint_vector(host.torque), VectorXd::Zero(7));
   EXPECT_EQ(host.snapshot().status, DASHPOT_STATE_WRONG_SIZE);
+  EXPECT_EQ(host.tick(), DASHPOT_FAULT_LATCHED);  // the weight comes back, the springs do not
+  EXPECT_EQ(host.snapshot().fault, DASHPOT_STATE_WRONG_SIZE);
+  ASSERT_EQ(plugin().release(host.controller.get()), DASHPOT_OK);
   EXPECT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
+  EXPECT_EQ(host.snapshot().fault, DASHPOT_OK);
   host.position[0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(host.tick(), DASHPOT_STATE_NOT_FINITE);
 }

@@ -1,6 +1,7 @@
 // The C interface, driven as a host does that loads the library at run time.
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/tests/plugin/held_panda.hpp>
+#include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 
 #include <gmock/gmock.h>
@@ -36,13 +37,13 @@ TEST(Plugin, ShowsItsFunctionsAndNothingElse) {
     words >> address >> type >> name;
     names.insert(name);
   }
-  EXPECT_THAT(names,
-              ::testing::UnorderedElementsAre(
-                  "dashpot_create", "dashpot_destroy", "dashpot_last_error", "dashpot_joints",
-                  "dashpot_joint_name", "dashpot_period", "dashpot_update", "dashpot_reset",
-                  "dashpot_set_setpoint", "dashpot_set_gains", "dashpot_read_snapshot",
-                  "dashpot_read_modes", "dashpot_read_sampled_modes", "dashpot_status_text",
-                  "dashpot_kind_text", "dashpot_plugin_interface"));
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre(
+                         "dashpot_create", "dashpot_destroy", "dashpot_last_error",
+                         "dashpot_joints", "dashpot_joint_name", "dashpot_period", "dashpot_update",
+                         "dashpot_start", "dashpot_reset", "dashpot_release", "dashpot_judge_gains",
+                         "dashpot_set_setpoint", "dashpot_set_gains", "dashpot_read_snapshot",
+                         "dashpot_read_modes", "dashpot_read_sampled_modes", "dashpot_status_text",
+                         "dashpot_kind_text", "dashpot_plugin_interface"));
 }
 
 TEST(Plugin, KnowsItsVersionOnly) {
@@ -81,12 +82,13 @@ TEST(Plugin, TellsWhatItControls) {
 
 TEST(Plugin, HasATextForEverythingItReturns) {
   std::set<std::string> texts;
-  for (std::int32_t code = DASHPOT_NOTHING_YET; code <= DASHPOT_NOT_FINITE; ++code) {
+  for (std::int32_t code = DASHPOT_UNSTABLE_GAINS; code <= DASHPOT_NOT_FINITE; ++code) {
     texts.insert(plugin().status_text(code));
   }
-  EXPECT_EQ(texts.size(), 20u);
+  EXPECT_EQ(texts.size(), 31u);
   EXPECT_FALSE(texts.count("unknown status"));
-  for (const std::int32_t code : {DASHPOT_NOTHING_YET - 1, DASHPOT_NOT_FINITE + 1, 1000, -1000}) {
+  for (const std::int32_t code :
+       {DASHPOT_UNSTABLE_GAINS - 1, DASHPOT_NOT_FINITE + 1, 1000, -1000}) {
     EXPECT_STREQ(plugin().status_text(code), "unknown status");
   }
   EXPECT_STREQ(plugin().status_text(DASHPOT_OK), "ok");
@@ -248,11 +250,67 @@ TEST(Plugin, IsResetToHoldWhereTheRobotIs) {
                limit.array() * (1 + 1e-12))
                   .all());
   ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_OK);  // too early
+  const std::vector<double> before = host.torque;
   ASSERT_EQ(plugin().reset(host.controller.get(), nullptr), DASHPOT_OK);
   host.tick();
   EXPECT_EQ(Map<const VectorXd>(host.snapshot().goal_joint_position, 7),
             joint_vector(panda_posture()));
-  EXPECT_TRUE((joint_vector(host.torque).cwiseAbs().array() <= limit.array() * (1 + 1e-12)).all());
+  // Without a torque that acts, from the last one.
+  EXPECT_TRUE(((joint_vector(host.torque) - joint_vector(before)).cwiseAbs().array() <=
+               limit.array() * (1 + 1e-12))
+                  .all());
+}
+
+/// Starts from the weight, told or not, and judges the gains of the configuration where the robot
+/// is.
+TEST(Plugin, StartsFromTheWeight) {
+  const VectorXd weight =
+      controller::evaluate(load(panda()).model, joint_vector(panda_posture()), VectorXd::Zero(7))
+          .gravity;
+  for (const bool started : {true, false}) {
+    Host host(create(panda()), panda_posture());
+    if (started) {
+      ASSERT_EQ(plugin().start(host.controller.get(), panda_posture().data(), nullptr), DASHPOT_OK);
+    }
+    EXPECT_EQ(host.tick(), DASHPOT_OK);
+    EXPECT_TRUE(testing::near(joint_vector(host.torque), weight, 1e-9));
+  }
+  Host host(create(panda()), panda_posture());
+  const std::vector<double> acting(7, 5.0);
+  ASSERT_EQ(plugin().start(host.controller.get(), panda_posture().data(), acting.data()),
+            DASHPOT_OK);
+  EXPECT_EQ(host.tick(), DASHPOT_TORQUE_LIMITED);
+  EXPECT_LE((joint_vector(host.torque) - VectorXd::Constant(7, 5)).cwiseAbs().maxCoeff(), 1 + 1e-9);
+  EXPECT_EQ(plugin().start(host.controller.get(), nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+}
+
+/// A wrist that weighs next to nothing bears less damping than a shoulder.
+TEST(Plugin, RefusesGainsThatTheSampledLoopDoesNotBear) {
+  const std::string stiff =
+      "gains: {joint: {stiffness: 100, damping: [20, 20, 20, 20, 20, 20, 20]}}\n";
+  EXPECT_EQ(create(panda() + stiff), nullptr);
+  EXPECT_THAT(plugin().last_error(),
+              ::testing::HasSubstr("the sampled loop with the joint gains has a gain margin of "));
+  EXPECT_NE(create(panda() + stiff + "limits: {gain_margin: 1}\n"), nullptr);
+  Host host(create(panda()), panda_posture());
+  host.tick();
+  std::array<double, 49> damping{};
+  dashpot_gains gains = {};
+  gains.struct_size = sizeof gains;
+  gains.joints = 7;
+  gains.joint_damping = damping.data();
+  for (std::size_t i = 0; i < 7; ++i) damping[8 * i] = 20;
+  double margin = 0;
+  EXPECT_EQ(plugin().judge_gains(host.controller.get(), &gains, nullptr, &margin),
+            DASHPOT_UNSTABLE_GAINS);
+  EXPECT_GT(margin, 0.05);
+  EXPECT_LT(margin, 1);
+  EXPECT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_UNSTABLE_GAINS);
+  for (std::size_t i = 0; i < 7; ++i) damping[8 * i] = 20 * 0.45 * margin;
+  EXPECT_EQ(plugin().judge_gains(host.controller.get(), &gains, panda_posture().data(), &margin),
+            DASHPOT_OK);
+  EXPECT_EQ(margin, 2);
+  EXPECT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_OK);
 }
 
 /// Of the ticks before a reset nothing is left to read.

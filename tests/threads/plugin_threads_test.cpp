@@ -40,8 +40,9 @@ TEST(Plugin, ServesTwoThreads) {
   constexpr int kTicks = 3000;
   // However rarely the other thread has its turn, no set-point is too old.
   Host host(create(panda() + "analysis: {every: 4}\n"
-                             "watchdog: {setpoint_hold: 0, setpoint_damp: 0}\n"),
+                             "watchdog: {setpoint_hold: 0, setpoint_damp: 0, feedback: 0}\n"),
             panda_posture());
+  ASSERT_NE(host.controller, nullptr) << plugin().last_error();
   std::vector<std::vector<double>> torques(kTicks + 1);
   std::atomic<bool> running{true};
   std::vector<dashpot_snapshot> snapshots;
