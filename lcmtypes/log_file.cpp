@@ -16,7 +16,6 @@ constexpr std::uint32_t kSync = 0xEDA1DA01;
 constexpr std::uint64_t kSyncSize = 4;
 constexpr std::size_t kHeaderSize = 24;        // number, time, and two lengths
 constexpr std::uint32_t kLongestChannel = 63;  // LCM sends none that is longer
-constexpr std::uint32_t kLargestData = 0x7FFFFFFF;
 
 std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t count) {
   std::uint64_t value = 0;
@@ -59,13 +58,13 @@ bool LogFile::read() {
 
 bool LogFile::find_sync() {
   std::uint32_t word = 0;
-  for (std::uint64_t count = 1;; ++count) {
+  while (word != kSync) {
     const int byte = std::fgetc(file_.get());
     if (byte == EOF) return false;
     ++at_;
     word = word << 8 | static_cast<std::uint32_t>(byte);
-    if (count >= kSyncSize && word == kSync) return true;
   }
+  return true;
 }
 
 LogFile::Found LogFile::read_event() {
@@ -74,9 +73,7 @@ LogFile::Found LogFile::read_event() {
   event_.utime = static_cast<std::int64_t>(read_big_endian(header.data() + 8, 8));
   const std::uint64_t channel = read_big_endian(header.data() + 16, 4);
   event_.size = read_big_endian(header.data() + 20, 4);
-  if (channel < 1 || channel > kLongestChannel || event_.size > kLargestData) {
-    return Found::kDamage;
-  }
+  if (channel < 1 || channel > kLongestChannel) return Found::kDamage;
   if (!may_hold(channel + event_.size)) return Found::kCut;
   event_.channel.resize(channel);
   event_.data.resize(event_.size <= kMaxMessageSize ? event_.size : 0);

@@ -132,8 +132,7 @@ class XmlCheck {
     char quote = '\0';
     while (next() != '>') {
       const char c = next();
-      if (c == '\0' || c == '<' || c == '[' || c == '&')
-        fail("holds a declaration that is not read");
+      if (c == '\0' || c == '<' || c == '&') fail("holds a declaration that is not read");
       if ((c == '"' || c == '\'') && (quote == '\0' || quote == c)) quote = quote == c ? '\0' : c;
       read_character();
     }

@@ -158,6 +158,10 @@ TEST(Log, IsReadOnAfterLengthsThatAreFalse) {
               Said("A B ", "damaged at byte 34, 32 bytes skipped"))
         << length;
   }
+  const std::string longest(63, 'c');
+  EXPECT_EQ(channels_of(event_bytes(longest, "1")), Said(longest + " ", ""));
+  EXPECT_EQ(channels_of(event_bytes(longest + "c", "1") + b),
+            Said("B ", "damaged at byte 0, 93 bytes skipped"));
   const std::string bad = event_bytes("X", "123", {}, 0x7FFFFFFF);
   EXPECT_EQ(channels_of(bad + a + bad + bad + b + "junk" + b),
             Said("A B B ", "damaged at byte 0 and 2 more times after it, 100 bytes skipped"));

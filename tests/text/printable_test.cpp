@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <string>
+#include <string_view>
 
 namespace dashpot::text {
 namespace {
@@ -41,10 +42,13 @@ TEST(Printable, EscapesBytesThatAreNotUtf8) {
   EXPECT_EQ(printable("\x9b"), "\\x9b") << "a C1 control character of Latin-1";
   EXPECT_EQ(printable("\xc3"), "\\xc3") << "cut off";
   EXPECT_EQ(printable("\xe2\x82"), "\\xe2\\x82") << "cut off";
+  EXPECT_EQ(printable(std::string_view("\u20ac").substr(0, 2)), "\\xe2\\x82") << "cut off";
   EXPECT_EQ(printable("\xc3(\xa9"), "\\xc3(\\xa9");
   EXPECT_EQ(printable("\xc0\x9b"), "\\xc0\\x9b") << "overlong";
   EXPECT_EQ(printable("\xe0\x80\x9b"), "\\xe0\\x80\\x9b") << "overlong";
   EXPECT_EQ(printable("\xf0\x80\x80\x9b"), "\\xf0\\x80\\x80\\x9b") << "overlong";
+  EXPECT_EQ(printable("\xe0\x9f\xbf"), "\\xe0\\x9f\\xbf") << "just overlong";
+  EXPECT_EQ(printable("\xf0\x8f\xbf\xbf"), "\\xf0\\x8f\\xbf\\xbf") << "just overlong";
   EXPECT_EQ(printable("\xed\xa0\x80"), "\\xed\\xa0\\x80") << "a surrogate";
   EXPECT_EQ(printable("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80") << "above U+10FFFF";
 }
