@@ -53,7 +53,11 @@ void run(const Options& options) try {
   const SystemFile file = read_systems(options.file);
   const std::vector<Report> reports = make_reports(file, options);
   const bool bold = isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
-  print(options.json ? to_json(reports, file.is_list) : to_table(reports, file.is_list, bold));
+  if (options.json) {
+    print(to_json(reports, file.is_list));
+  } else {  // a table of numbers: no text of the file is in it
+    print_styled(to_table(reports, file.is_list, bold));
+  }
 } catch (const InputError& error) {
   throw error.in_file(options.file);
 }

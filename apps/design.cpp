@@ -173,6 +173,8 @@ void add_design(CLI::App& program) {
   command->footer(kHelp);
   command->callback([options] {
     check(*options);
+    check_outputs({{"--csv", options->csv}},
+                  {{"FILE", options->file}, {"--urdf", options->arm.urdf}});
     OutputFile csv(nullptr, std::fclose);
     if (!options->csv.empty()) csv = open_output("--csv", options->csv);
     run(*options, std::move(csv));

@@ -3,6 +3,7 @@
 #include <dashpot/apps/subcommands.hpp>
 #include <dashpot/apps/text_table.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -107,7 +108,8 @@ std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics
   add("gravity", "torque", dynamics.gravity);
   for (std::size_t i = 0; i < model.joints().size(); ++i) {
     const Joint& joint = model.joints()[i];
-    std::vector<std::string> row = {std::to_string(i + 1), joint.name, to_text(joint.type)};
+    std::vector<std::string> row = {std::to_string(i + 1), text::printable(joint.name),
+                                    to_text(joint.type)};
     for (const auto& column : columns) row.push_back(column[i]);
     table.add_row(row);
   }
@@ -157,9 +159,10 @@ std::string to_table(const RobotModel& model, const DynamicsResult& dynamics, co
   std::vector<std::string> joints;
   for (int i = 1; i <= model.dof(); ++i) joints.push_back(std::to_string(i));
   const std::string n = std::to_string(model.dof());
-  return model.name() + ": " + n + (model.dof() == 1 ? " joint" : " joints") + " from " +
-         model.base() + " to " + model.tip() + ". SI units, axes of " + model.base() + ".\n\n" +
-         joints_table(model, dynamics, q, qd) + "\nMass matrix\n" +
+  const std::string base = text::printable(model.base());
+  return text::printable(model.name()) + ": " + n + (model.dof() == 1 ? " joint" : " joints") +
+         " from " + base + " to " + text::printable(model.tip()) + ". SI units, axes of " + base +
+         ".\n\n" + joints_table(model, dynamics, q, qd) + "\nMass matrix\n" +
          matrix_table(dynamics.M, joints) + "\nJacobian at the tip\n" +
          matrix_table(dynamics.J,
                       {"linear x", "linear y", "linear z", "angular x", "angular y", "angular z"}) +

@@ -93,13 +93,19 @@ Json to_value(const Report& report) {
   return result;
 }
 
+/// The value on one line, in ASCII: other characters as \u00e9, what is not UTF-8 as \ufffd. Names
+/// of robots and files come from elsewhere, and must neither end the program nor steer a terminal.
+std::string one_line(const Json& value) {
+  return value.dump(-1, ' ', true, Json::error_handler_t::replace);
+}
+
 /// Objects and lists of objects get a line for each item; numbers, vectors and matrices stay on
 /// one.
 void write(const Json& value, const std::string& indent, std::string& out) {
   const bool spread =
       value.is_object() || (value.is_array() && !value.empty() && value.front().is_object());
   if (!spread || value.empty()) {
-    out += value.dump();
+    out += one_line(value);
     return;
   }
   const std::string inner = indent + "  ";
@@ -107,7 +113,7 @@ void write(const Json& value, const std::string& indent, std::string& out) {
   out += value.is_object() ? '{' : '[';
   for (const auto& [key, item] : value.items()) {
     out += separator + inner;
-    if (value.is_object()) out += Json(key).dump() + ": ";
+    if (value.is_object()) out += one_line(key) + ": ";
     write(item, inner, out);
     separator = ",\n";
   }

@@ -1,5 +1,6 @@
 #include <dashpot/apps/subcommands.hpp>
 #include <dashpot/controller/input_error.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -14,9 +15,9 @@ namespace {
 constexpr int kFailure = 1;
 constexpr int kBadInput = 2;
 
-/// Says on one line of standard error what went wrong, and returns `status`.
+/// Says what went wrong, and returns `status`.
 int report(const std::string& message, int status) {
-  std::fprintf(stderr, "%s\n", controller::one_line(message).c_str());
+  print_error(message);
   return status;
 }
 
@@ -55,9 +56,17 @@ int run(int argc, char** argv) {
 }  // namespace
 
 void print(const std::string& text) {
+  print_styled(text::printable(text, "\n"));
+}
+
+void print_styled(const std::string& text) {
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
     throw std::runtime_error("cannot write to standard output");
   }
+}
+
+void print_error(const std::string& message) {
+  std::fprintf(stderr, "%s\n", controller::one_line(message).c_str());
 }
 
 }  // namespace dashpot::apps

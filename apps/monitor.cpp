@@ -2,6 +2,7 @@
 #include <dashpot/apps/subcommands.hpp>
 #include <dashpot/apps/terminal.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -31,7 +32,7 @@ constexpr double kLinePeriod = 1;  // s
 /// Shows the view: in place on a terminal, and otherwise as a line for each second of its time.
 class Display {
  public:
-  explicit Display(std::string source) : source_(std::move(source)) {
+  explicit Display(const std::string& source) : source_(text::printable(source)) {
     if (on_terminal()) screen_.emplace();
   }
 
@@ -73,17 +74,20 @@ void check_log(const std::string& path) {
   throw CLI::ValidationError("--log", path + ": is no LCM log");
 }
 
-void watch_log(const Options& options, MonitorView& view, lcmtypes::MessageHandlers& handlers) {
+/// Returns what is wrong with the log, "" if nothing is.
+std::string watch_log(const Options& options, MonitorView& view,
+                      lcmtypes::MessageHandlers& handlers) {
   const auto reader = open_input(
       "--log", [&] { return std::make_unique<lcmtypes::LogReader>(options.log, handlers); });
   Display display(options.log);
   const double speed = options.speed.value_or(on_terminal() ? 1 : 0);
   const Clock::time_point start = Clock::now();
-  std::optional<std::int64_t> first;
+  std::optional<double> first;  // us
   while (!StopSignal::given() && reader->read()) {
-    if (!first) first = reader->utime();
+    const auto utime = static_cast<double>(reader->utime());
+    if (!first) first = utime;
     if (speed > 0) {
-      const double due = 1e-6 * static_cast<double>(reader->utime() - *first) / speed;
+      const double due = 1e-6 * (utime - *first) / speed;
       const auto due_at = start + std::chrono::duration<double>(due);
       while (!StopSignal::given() && Clock::now() < due_at) {
         display.update(view);
@@ -95,6 +99,7 @@ void watch_log(const Options& options, MonitorView& view, lcmtypes::MessageHandl
     display.update(view);
   }
   if (!first && !StopSignal::given()) check_log(options.log);
+  return reader->damage();
 }
 
 void watch_bus(const Options& options, MonitorView& view, lcmtypes::MessageHandlers& handlers) {
@@ -102,7 +107,7 @@ void watch_bus(const Options& options, MonitorView& view, lcmtypes::MessageHandl
   const auto reader = open_input("--lcm-url", [&] {
     return std::make_unique<lcmtypes::BusReader>(lcmtypes::open_bus(url), handlers);
   });
-  if (!on_terminal()) std::fprintf(stderr, "waiting for messages on %s\n", url.c_str());
+  if (!on_terminal()) print_error("waiting for messages on " + url);
   Display display(url);
   while (!StopSignal::given() && reader->wait(static_cast<int>(kRedraw.count()))) {
     display.update(view);
@@ -116,12 +121,14 @@ void run(const Options& options) {
   handlers.on_state = [&view](const state_t& message) { view.take(message); };
   handlers.on_modes = [&view](const modes_t& message) { view.take(message); };
   handlers.on_sampled_modes = [&view](const sampled_modes_t& message) { view.take(message); };
+  std::string damage;
   if (!options.log.empty()) {
-    watch_log(options, view, handlers);
+    damage = watch_log(options, view, handlers);
   } else {
     watch_bus(options, view, handlers);
   }
-  print(view.summary(handlers.malformed));
+  print(view.summary(handlers.malformed) +
+        (damage.empty() ? "" : "\nThe log is " + damage + ".\n"));
 }
 
 }  // namespace

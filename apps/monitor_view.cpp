@@ -69,6 +69,11 @@ constexpr const char* kMixed =
     "more than one loop sends to this bus: what is shown is a mixture; an --lcm-url for each "
     "keeps them apart";
 
+/// a - b; numbers of a hostile sender may be so far apart that it overflows, and wraps around.
+std::int64_t minus(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
+}
+
 double tip_error(const state_t& state) {
   return std::hypot(state.tip_error[0], state.tip_error[1], state.tip_error[2]);
 }
@@ -96,7 +101,8 @@ void MonitorView::note_time(std::int64_t utime) {
 void MonitorView::note_order(std::int64_t tick) {
   constexpr std::int64_t kMostLost = 100;  // messages of a loop, while another one's came
   const std::int64_t last = state_->tick;
-  const bool returned = tick > last + 1 && tick > left_at_ && tick <= left_at_ + kMostLost;
+  const bool returned =
+      minus(tick, last) > 1 && tick > left_at_ && minus(tick, left_at_) <= kMostLost;
   if (tick == last || (left_at_ > last && returned)) ++returns_;
   if (tick < last) left_at_ = last;
 }
@@ -110,9 +116,9 @@ void MonitorView::take(const state_t& message) {
     rate_tick_ = message.tick;
     rate_ = 0;
   }
-  const double elapsed = 1e-6 * static_cast<double>(message.utime - rate_utime_);
+  const double elapsed = 1e-6 * static_cast<double>(minus(message.utime, rate_utime_));
   if (elapsed >= 1) {
-    rate_ = static_cast<double>(message.tick - rate_tick_) / elapsed;
+    rate_ = static_cast<double>(minus(message.tick, rate_tick_)) / elapsed;
     rate_utime_ = message.utime;
     rate_tick_ = message.tick;
   }
@@ -126,9 +132,9 @@ void MonitorView::take(const state_t& message) {
 
 void MonitorView::take(const modes_t& message) {
   note_time(message.utime);
-  if (modes_ && message.sequence > modes_->sequence) {
-    modes_lost_ += message.sequence - modes_->sequence - 1;
-  }
+  constexpr std::int64_t kFarthest = 1'000'000'000;  // that a sequence may jump
+  const std::int64_t gap = modes_ ? minus(message.sequence, modes_->sequence) : 1;
+  if (gap > 1 && gap < kFarthest) modes_lost_ += gap - 1;
   ++modes_messages_;
   modes_ = message;
 }

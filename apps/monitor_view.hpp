@@ -22,7 +22,9 @@ class MonitorView {
   bool mixed() const { return returns_ > 2; }
   bool empty() const { return !state_ && !modes_ && !sampled_; }
   /// Time of the last message, s since the first one.
-  double time() const { return 1e-6 * static_cast<double>(last_utime_ - first_utime_); }
+  double time() const {
+    return 1e-6 * (static_cast<double>(last_utime_) - static_cast<double>(first_utime_));
+  }
 
   /// Everything, as a screen of text. `bold` marks headings for a terminal.
   std::string screen(bool bold) const;

@@ -6,9 +6,7 @@
 namespace dashpot::apps {
 namespace {
 
-using analysis::Motion;
-
-void add(Motion& sum, const Motion& part) {
+void add(analysis::Motion& sum, const analysis::Motion& part) {
   sum.position += part.position;
   sum.velocity += part.velocity;
   sum.zero_mode_position += part.zero_mode_position;
@@ -21,7 +19,7 @@ ReportedResponse respond(const SystemEntry& entry, const analysis::System<>& sys
   const analysis::Response response(system, spectrum);
   ReportedResponse result;
   for (const double time : *entry.times) {
-    Motion motion{
+    analysis::Motion motion{
         .position = zero, .velocity = zero, .zero_mode_position = zero, .zero_mode_velocity = zero};
     if (entry.initial_position || entry.initial_velocity) {
       add(motion, response.free(entry.initial_position.value_or(zero),

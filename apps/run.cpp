@@ -1,4 +1,5 @@
 #include <dashpot/apps/csv_sink.hpp>
+#include <dashpot/apps/output_file.hpp>
 #include <dashpot/apps/run_report.hpp>
 #include <dashpot/apps/subcommands.hpp>
 #include <dashpot/apps/terminal.hpp>
@@ -83,7 +84,7 @@ std::shared_ptr<lcm::LCM> open_bus(const Options& options) {
   try {
     return lcmtypes::open_bus("");
   } catch (const std::runtime_error& error) {
-    std::fprintf(stderr, "running without a bus: %s\n", error.what());
+    print_error(std::string("running without a bus: ") + error.what());
     return nullptr;
   }
 }
@@ -157,11 +158,20 @@ RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
   return report;
 }
 
+/// Throws if what is written would overwrite what is read, or each other.
+void check_files(const Options& options, const Scene& scene) {
+  std::vector<NamedFile> inputs = {{"the scene", options.scene}, {"--plugin", options.plugin}};
+  if (scene.arm) inputs.push_back({"the robot description", scene.arm->config.robot.urdf});
+  const std::string url =
+      options.url.empty() && !options.fast ? lcmtypes::default_url() : options.url;
+  check_outputs(
+      {{"--lcm-url", lcmtypes::path_of(url)}, {"--log", options.log}, {"--csv", options.csv}},
+      inputs);
+}
+
 void run(const Options& options) {
-  if (!options.log.empty() && options.log == options.csv) {
-    throw InputError("--csv", "is the same file as --log");
-  }
   Scene scene = load_scene(options.scene);
+  check_files(options, scene);
   if (options.duration) scene.duration = *options.duration;
   std::optional<PluginLibrary> plugin;
   if (scene.arm) plugin.emplace(options.plugin);

@@ -4,6 +4,7 @@
 #include <dashpot/apps/shape_text.hpp>
 #include <dashpot/apps/text_table.hpp>
 #include <dashpot/controller/status.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <nlohmann/json.hpp>
 
@@ -280,7 +281,7 @@ Json ring_down_json(const RingDown& ring_down) {
 
 std::string to_table(const RunReport& report) {
   const LoopRecord& loop = report.loop;
-  std::string out = report.scene + ": " + count(report.joints, "joint") + ", " +
+  std::string out = text::printable(report.scene) + ": " + count(report.joints, "joint") + ", " +
                     count(loop.ticks, "tick") + " of " + format_number(1e3 * report.period, 3) +
                     " ms, " + pace_text(report) + (report.interrupted ? "; interrupted" : "") +
                     "\n\n";

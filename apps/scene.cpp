@@ -94,7 +94,7 @@ bool has_key(const YamlNode& document, std::string_view key) {
 Scene load_scene(const std::string& path) try {
   Scene scene;
   scene.path = path;
-  const YamlNode document = controller::parse_yaml(controller::read_file(path));
+  const YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
   if (has_key(document, "system")) {
     read_system(document, scene);
   } else {

@@ -24,7 +24,15 @@ void add_monitor(CLI::App& program);
 void add_design(CLI::App& program);
 void add_run(CLI::App& program);
 
-/// Writes all of `text` to standard output. Throws std::runtime_error if that fails.
+/// Writes all of `text` to standard output, what could steer a terminal as escapes (files and
+/// messages hold names that others chose). Throws std::runtime_error if that fails.
 void print(const std::string& text);
+
+/// The same with escape sequences of our own: nothing in `text` may come from elsewhere unless
+/// text::printable() was applied to it.
+void print_styled(const std::string& text);
+
+/// Writes one line to standard error, printable whatever is in `message`.
+void print_error(const std::string& message);
 
 }  // namespace dashpot::apps

@@ -41,12 +41,12 @@ bool on_terminal() {
 
 // Second screen, cursor hidden, long lines cut off instead of wrapped; and back.
 FullScreen::FullScreen() {
-  print("\033[?1049h\033[?25l\033[?7l");
+  print_styled("\033[?1049h\033[?25l\033[?7l");
 }
 
 FullScreen::~FullScreen() {
   try {
-    print("\033[?7h\033[?25h\033[?1049l");
+    print_styled("\033[?7h\033[?25h\033[?1049l");
   } catch (...) {  // the terminal is gone
   }
 }
@@ -58,7 +58,7 @@ void FullScreen::draw(const std::string& text) {
   for (std::string line; row < height() - 1 && std::getline(lines, line); ++row) {
     out += line + "\033[K\r\n";
   }
-  print(out + "\033[J");
+  print_styled(out + "\033[J");
 }
 
 }  // namespace dashpot::apps

@@ -23,7 +23,7 @@ class FullScreen {
   FullScreen(const FullScreen&) = delete;
   FullScreen& operator=(const FullScreen&) = delete;
 
-  /// As much of `text` as fits.
+  /// As much of `text` as fits. What comes from elsewhere in it must be printable.
   void draw(const std::string& text);
 };
 

@@ -221,7 +221,8 @@ Config read_config(const YamlNode& document, const std::filesystem::path& direct
 }
 
 Config load_config(const std::string& path) try {
-  return read_config(parse_yaml(read_file(path)), std::filesystem::path(path).parent_path());
+  return read_config(parse_yaml(read_regular_file(path)),
+                     std::filesystem::path(path).parent_path());
 } catch (const InputError& error) {
   throw error.in_file(path);
 }

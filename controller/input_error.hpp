@@ -1,4 +1,6 @@
 #pragma once
+#include <dashpot/text/printable.hpp>
+
 #include <algorithm>
 #include <stdexcept>
 #include <string>
@@ -6,12 +8,14 @@
 
 namespace dashpot::controller {
 
-/// `text` with control characters replaced, so that it takes one line and is printed whole.
+/// Returns `text` as one line that a terminal shows and does nothing else with: white space becomes
+/// blanks, other control characters become escapes, and what is too long to be read is cut off.
 inline std::string one_line(std::string text) {
+  constexpr std::size_t kLongest = 2000;  // bytes: names in files may have millions
+  if (text.size() > kLongest) text.replace(kLongest, std::string::npos, "...");
   std::replace_if(
-      text.begin(), text.end(),
-      [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, ' ');
-  return text;
+      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+  return text::printable(text);
 }
 
 /// Something in a file that the user wrote is wrong; said in one line. The program ends with

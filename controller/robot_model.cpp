@@ -100,17 +100,24 @@ void apply(const JointVector& option, double Joint::*property, const std::string
 }
 
 /// Inertia of `link`, and, if wanted, of all that hangs on it but the branch that begins with joint
-/// `next`, at its zero position; in the link's axes.
-KDL::RigidBodyInertia lump(const urdf::Link& link, const std::string& next, bool include_off_chain,
+/// `next`, at its zero position; in the link's axes. It does not call itself: branches may be
+/// thousands of links long.
+KDL::RigidBodyInertia lump(const urdf::ModelInterface& tree, const std::string& link,
+                           const std::string& next, bool include_off_chain,
                            const std::string& name) {
-  KDL::RigidBodyInertia sum = body_of(link, name);
-  if (!include_off_chain) return sum;
-  for (const urdf::JointSharedPtr& joint : link.child_joints) {
-    if (joint->name == next) continue;
-    const auto child = std::find_if(
-        link.child_links.begin(), link.child_links.end(),
-        [&](const urdf::LinkSharedPtr& one) { return one->name == joint->child_link_name; });
-    sum = sum + to_kdl(joint->parent_to_joint_origin_transform) * lump(**child, "", true, name);
+  KDL::RigidBodyInertia sum = KDL::RigidBodyInertia::Zero();
+  std::vector<std::pair<urdf::LinkConstSharedPtr, KDL::Frame>> open;  // with their poses in `link`
+  open.emplace_back(tree.getLink(link), KDL::Frame::Identity());
+  while (!open.empty()) {
+    const auto [at, frame] = open.back();
+    open.pop_back();
+    sum = sum + frame * body_of(*at, name);
+    if (!include_off_chain) break;
+    for (const urdf::JointSharedPtr& joint : at->child_joints) {
+      if (joint->name == next) continue;
+      open.emplace_back(tree.getLink(joint->child_link_name),
+                        frame * to_kdl(joint->parent_to_joint_origin_transform));
+    }
   }
   return sum;
 }
@@ -182,8 +189,7 @@ KDL::Chain make_chain(const urdf::ModelInterface& tree,
     }
     frame = moves ? KDL::Frame::Identity() : origin;
     if (moving == 0) continue;
-    body = body + frame * lump(*tree.getLink(joint.child_link_name), next,
-                               options.include_off_chain, name);
+    body = body + frame * lump(tree, joint.child_link_name, next, options.include_off_chain, name);
   }
   body = body + frame * body_of(options.payload, name);
   finish();

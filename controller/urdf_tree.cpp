@@ -1,17 +1,15 @@
+#include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/controller/urdf_tree.hpp>
+#include <dashpot/text/read_file.hpp>
+#include <dashpot/text/xml_check.hpp>
 
 #include <console_bridge/console.h>
 #include <urdf_parser/urdf_parser.h>
 
-#include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <exception>
-#include <fstream>
 #include <map>
 #include <mutex>
-#include <sstream>
 
 namespace dashpot::controller {
 namespace {
@@ -28,17 +26,12 @@ class Messages : public console_bridge::OutputHandler {
 
   void log(const std::string& text, console_bridge::LogLevel level, const char* /*file*/,
            int /*line*/) override {
-    if (level != console_bridge::CONSOLE_BRIDGE_LOG_ERROR) return;
+    constexpr std::size_t kEnough = 1000;  // bytes; a bad file may cause a message for each line
+    if (level != console_bridge::CONSOLE_BRIDGE_LOG_ERROR || errors_.size() > kEnough) return;
     errors_ += (errors_.empty() ? "" : "; ") + text;
   }
   bool any() const { return !errors_.empty(); }
-  /// All errors, in one line.
-  std::string errors() const {
-    std::string line = errors_.empty() ? "not a URDF" : errors_;
-    std::replace_if(
-        line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
-    return line;
-  }
+  std::string errors() const { return errors_.empty() ? "not a URDF" : errors_; }
 
  private:
   console_bridge::OutputHandler* previous_;
@@ -51,12 +44,13 @@ std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::
   const Messages messages;
   std::shared_ptr<urdf::ModelInterface> model;
   try {
+    text::check_xml(text);
     model = urdf::parseURDF(text);
   } catch (const std::exception& error) {
-    throw InvalidModel(name + ": " + error.what());
+    throw InvalidModel(one_line(name + ": " + error.what()));
   }
   // Of a number that it cannot read, urdfdom just says so and goes on.
-  if (!model || messages.any()) throw InvalidModel(name + ": " + messages.errors());
+  if (!model || messages.any()) throw InvalidModel(one_line(name + ": " + messages.errors()));
   return model;
 }
 
@@ -68,11 +62,16 @@ void check_tree(const urdf::ModelInterface& model, const std::string& name) {
     refuse(name, "link", joint->child_link_name,
            "child of two joints, '" + other->second + "' and '" + joint_name + "'");
   }
+  std::map<std::string, std::size_t> walk_through;  // by link: which of the walks up came there
+  std::size_t walk = 0;
   for (const auto& [link_name, link] : model.links_) {
-    std::string at = link_name;
-    for (std::size_t steps = 0; joint_above.count(at) != 0; ++steps) {
-      if (steps == model.links_.size()) refuse(name, "link", link_name, "part of a loop of joints");
-      at = model.joints_.at(joint_above.at(at))->parent_link_name;
+    ++walk;
+    for (std::string at = link_name; joint_above.count(at) != 0;
+         at = model.joints_.at(joint_above.at(at))->parent_link_name) {
+      const auto [seen, is_new] = walk_through.emplace(at, walk);
+      if (is_new) continue;
+      if (seen->second == walk) refuse(name, "link", link_name, "part of a loop of joints");
+      break;  // an earlier walk came to its end from here
     }
   }
 }
@@ -81,7 +80,7 @@ void check_tree(const urdf::ModelInterface& model, const std::string& name) {
 
 void refuse(const std::string& name, const std::string& kind, const std::string& element,
             const std::string& reason) {
-  throw InvalidModel(name + ": " + kind + " '" + element + "': " + reason);
+  throw InvalidModel(one_line(name + ": " + kind + " '" + element + "': " + reason));
 }
 
 std::shared_ptr<urdf::ModelInterface> read_urdf(const std::string& text, const std::string& name) {
@@ -90,15 +89,10 @@ std::shared_ptr<urdf::ModelInterface> read_urdf(const std::string& text, const s
   return model;
 }
 
-std::string read_text(const std::string& path) {
-  errno = 0;
-  const std::ifstream stream(path, std::ios::binary);
-  std::ostringstream text;
-  if (stream.is_open()) text << stream.rdbuf();
-  if (!stream.is_open() || text.bad() || errno == EISDIR) {
-    throw InvalidModel(path + ": cannot be read: " + std::strerror(errno));
-  }
-  return text.str();
+std::string read_text(const std::string& path) try {
+  return text::read_file(path, text::kLargestXml);
+} catch (const std::runtime_error& error) {
+  throw InvalidModel(one_line(path + ": " + error.what()));
 }
 
 }  // namespace dashpot::controller

@@ -11,12 +11,12 @@ namespace dashpot::controller {
 [[noreturn]] void refuse(const std::string& name, const std::string& kind,
                          const std::string& element, const std::string& reason);
 
-/// Parses a URDF and makes sure that it is a tree: one root, one parent for every other link, no
-/// loop. urdfdom's messages become the text of InvalidModel and do not reach the console. `name`
-/// stands in front of every message.
+/// Parses a URDF that text::check_xml lets pass, and makes sure that it is a tree: one root, one
+/// parent for every other link, no loop. urdfdom's messages become the text of InvalidModel and do
+/// not reach the console. `name` stands in front of every message.
 std::shared_ptr<urdf::ModelInterface> read_urdf(const std::string& text, const std::string& name);
 
-/// The whole file. Throws InvalidModel if it cannot be read.
+/// The whole file, which must be a regular one. Throws InvalidModel if it cannot be read.
 std::string read_text(const std::string& path);
 
 }  // namespace dashpot::controller

@@ -8,9 +8,11 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 namespace dashpot::controller {
@@ -61,6 +63,7 @@ class TreeBuilder : public YAML::EventHandler {
     YamlNode& node = open(YamlNode::Kind::kScalar, mark, anchor);
     node.quoted = tag == "!";
     node.text = value;
+    count({0, value.size()}, mark.line + 1);
     close();
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string& /*tag*/, YAML::anchor_t anchor,
@@ -76,32 +79,38 @@ class TreeBuilder : public YAML::EventHandler {
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     const auto found = anchored_.find(anchor);
     if (found == anchored_.end()) throw InputError("", "an alias refers to itself", mark.line + 1);
-    count(found->second.values, mark);
+    count(found->second.size, mark.line + 1);
     attach(YamlNode(found->second.node));
   }
 
  private:
+  /// Of a node with all that is in it.
+  struct Size {
+    std::size_t values = 0;
+    std::size_t text = 0;  ///< bytes
+  };
   struct Open {
     YamlNode node;
     YAML::anchor_t anchor;
-    std::size_t values_before;
+    Size before;
   };
   struct Anchored {
     YamlNode node;
-    std::size_t values;
+    Size size;
   };
 
-  void count(std::size_t values, const YAML::Mark& mark) {
-    values_ += values;
-    if (values_ > kMostValues) {
-      throw InputError("", "holds more than 4000000 values", mark.line + 1);
-    }
+  /// Aliases and what is kept for them count in full: a few lines can stand for any number.
+  void count(const Size& more, int line) {
+    total_.values += more.values;
+    total_.text += more.text;
+    if (total_.values > kMostValues) throw InputError("", "holds more than 4000000 values", line);
+    if (total_.text > kLargestText) throw InputError("", "holds more than 64 MiB of text", line);
   }
 
   YamlNode& open(YamlNode::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
     if (open_.size() >= kDeepestNesting) throw InputError("", "nested too deeply", mark.line + 1);
-    const std::size_t before = values_;
-    count(1, mark);
+    const Size before = total_;
+    count({1, 0}, mark.line + 1);
     open_.push_back(
         {YamlNode{.kind = kind, .line = mark.line + 1, .text = {}, .items = {}}, anchor, before});
     return open_.back().node;
@@ -111,7 +120,9 @@ class TreeBuilder : public YAML::EventHandler {
     Open done = std::move(open_.back());
     open_.pop_back();
     if (done.anchor != 0) {
-      anchored_.insert_or_assign(done.anchor, Anchored{done.node, values_ - done.values_before});
+      const Size size{total_.values - done.before.values, total_.text - done.before.text};
+      count(size, done.node.line);
+      anchored_.insert_or_assign(done.anchor, Anchored{done.node, size});
     }
     attach(std::move(done.node));
   }
@@ -123,7 +134,7 @@ class TreeBuilder : public YAML::EventHandler {
   YamlNode root_;
   std::vector<Open> open_;
   std::map<YAML::anchor_t, Anchored> anchored_;
-  std::size_t values_ = 0;
+  Size total_;
 };
 
 }  // namespace
@@ -144,6 +155,16 @@ std::string read_file(const std::string& path) {
     throw InputError("", std::string("cannot be read: ") + std::strerror(errno));
   }
   return text;
+}
+
+std::string read_regular_file(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code none;  // opening it says more
+  const fs::file_status status = fs::status(path, none);
+  if (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status)) {
+    throw InputError("", "is not a regular file");
+  }
+  return read_file(path);
 }
 
 YamlNode parse_yaml(const std::string& text) {

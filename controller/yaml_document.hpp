@@ -17,6 +17,9 @@ struct YamlNode {
 /// The bytes of the file at `path`, or of standard input if it is "-". Throws InputError.
 std::string read_file(const std::string& path);
 
+/// The same of a file, but for pipes and devices, which may never end or keep the caller waiting.
+std::string read_regular_file(const std::string& path);
+
 /// Parses text that holds one YAML (or JSON) document. Throws InputError on anything else, and on
 /// text that is too large or too deeply nested to be what Dashpot reads.
 YamlNode parse_yaml(const std::string& text);

@@ -17,9 +17,13 @@ inline constexpr const char* kCommandChannel = "DASHPOT_COMMAND";
 /// udpm://239.255.76.67:7667?ttl=0.
 std::string default_url();
 
+/// Of a file:// URL: the log that it names; otherwise "".
+std::string path_of(const std::string& url);
+
 /// Opens a bus: udpm://, memq:// (within the process: all who take part share the pointer),
-/// file://, tcpq://; empty for default_url(). Throws std::runtime_error that names the URL. One
-/// thread at a time may handle messages; any may publish.
+/// file://, tcpq://; empty for default_url(). Throws std::runtime_error that names the URL, also
+/// for a log that is damaged or cut off (LogReader reads what is left of it). One thread at a time
+/// may handle messages; any may publish.
 std::shared_ptr<lcm::LCM> open_bus(const std::string& url);
 
 }  // namespace dashpot::lcmtypes

@@ -1,8 +1,6 @@
 #include <dashpot/lcmtypes/message_check.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 
-#include <cerrno>
-#include <cstring>
 #include <lcm/lcm-cpp.hpp>
 #include <stdexcept>
 #include <utility>
@@ -58,34 +56,9 @@ bool BusReader::wait(int milliseconds) {
   return bus_->handleTimeout(milliseconds) >= 0;
 }
 
-struct LogReader::File {
-  explicit File(const std::string& path) : log(path, "r") {}
-  lcm::LogFile log;
-  const lcm::LogEvent* event = nullptr;
-};
-
-LogReader::LogReader(const std::string& path, MessageHandlers& handlers)
-    : file_(std::make_unique<File>(path)), handlers_(handlers) {
-  if (!file_->log.good()) {
-    throw std::runtime_error(path + ": cannot read the log: " + std::strerror(errno));
-  }
-}
-
-LogReader::~LogReader() = default;
-
-bool LogReader::read() {
-  file_->event = file_->log.readNextEvent();
-  return file_->event != nullptr;
-}
-
-std::int64_t LogReader::utime() const {
-  return file_->event != nullptr ? file_->event->timestamp : 0;
-}
-
 void LogReader::handle() {
-  if (file_->event == nullptr) return;
-  handlers_.take(file_->event->channel, file_->event->data,
-                 static_cast<std::size_t>(file_->event->datalen));
+  const LogFile::Event& event = file_.event();
+  handlers_.take(event.channel, event.data.data(), event.size);
 }
 
 }  // namespace dashpot::lcmtypes

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/lcmtypes/bus.hpp>
+#include <dashpot/lcmtypes/log_file.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
 #include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
@@ -46,21 +47,20 @@ class BusReader {
 class LogReader {
  public:
   /// Throws std::runtime_error that names the file and the reason.
-  LogReader(const std::string& path, MessageHandlers& handlers);
-  ~LogReader();
-  LogReader(const LogReader&) = delete;
-  LogReader& operator=(const LogReader&) = delete;
+  LogReader(const std::string& path, MessageHandlers& handlers)
+      : file_(path), handlers_(handlers) {}
 
-  /// Reads the next event; false at the end of the log, or where it is damaged.
-  bool read();
+  /// Reads the next event; false at the end of the log.
+  bool read() { return file_.read(); }
   /// Time of the event read last, us since 1970-01-01 UTC.
-  std::int64_t utime() const;
+  std::int64_t utime() const { return file_.event().utime; }
   /// Hands that event on.
   void handle();
+  /// What was found wrong with the log so far, "" if nothing: see describe(LogFile::Damage).
+  std::string damage() const { return describe(file_.damage()); }
 
  private:
-  struct File;
-  std::unique_ptr<File> file_;
+  LogFile file_;
   MessageHandlers& handlers_;
 };
 

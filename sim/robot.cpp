@@ -1,4 +1,7 @@
 #include <dashpot/sim/robot.hpp>
+#include <dashpot/text/printable.hpp>
+#include <dashpot/text/read_file.hpp>
+#include <dashpot/text/xml_check.hpp>
 
 #include <console_bridge/console.h>
 #include <urdf_parser/urdf_parser.h>
@@ -7,9 +10,11 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <exception>
 #include <limits>
+#include <set>
 #include <sstream>
+#include <utility>
 
 namespace dashpot::sim {
 namespace {
@@ -20,7 +25,7 @@ using Eigen::Vector3d;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 [[noreturn]] void fail(const std::string& where, const std::string& reason) {
-  throw InvalidRobot(where + ": " + reason);
+  throw InvalidRobot(text::printable(where + ": " + reason));
 }
 
 void require_finite(double value, double least, const std::string& where, const char* unit) {
@@ -68,7 +73,8 @@ class ParserMessages : public console_bridge::OutputHandler {
 
   void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
     if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR || !first_.empty()) return;
-    first_ = text;
+    constexpr std::size_t kEnough = 1000;  // bytes; it may quote a text of any length
+    first_ = text.substr(0, kEnough);
     std::replace(first_.begin(), first_.end(), '\n', ' ');
   }
   const std::string& first() const { return first_; }
@@ -83,7 +89,12 @@ class Reader {
  public:
   Reader(const std::string& text, const std::string& name) : name_(name) {
     ParserMessages messages;
-    model_ = urdf::parseURDF(text);
+    try {
+      text::check_xml(text);
+      model_ = urdf::parseURDF(text);
+    } catch (const std::exception& error) {
+      fail(name, error.what());
+    }
     if (!model_) fail(name, messages.first().empty() ? "not a robot" : messages.first());
     require_tree();
   }
@@ -115,10 +126,15 @@ class Reader {
 
   /// Of the link and all that hangs on it, but for the joint `left_out`; in the link's axes.
   Inertia lumped(const urdf::Link& link, const urdf::Joint* left_out) const {
-    Inertia sum = own(link);
-    for (const urdf::JointSharedPtr& joint : link.child_joints) {
-      if (joint.get() == left_out) continue;
-      sum = sum + origin(*joint) * lumped(*model_->getLink(joint->child_link_name), nullptr);
+    Inertia sum;
+    std::vector<std::pair<const urdf::Link*, Pose>> open = {{&link, Pose()}};  // pose in `link`
+    while (!open.empty()) {  // branches may be too long for recursion
+      const auto [at, pose] = open.back();
+      open.pop_back();
+      sum = sum + pose * own(*at);
+      for (const urdf::JointSharedPtr& joint : at->child_joints) {
+        if (joint.get() != left_out) open.emplace_back(&child(*joint), pose * origin(*joint));
+      }
     }
     return sum;
   }
@@ -151,11 +167,16 @@ class Reader {
         fail(name_, "link '" + joint->child_link_name + "' is the child of two joints");
       }
     }
+    std::vector<Link> open = {root()};
+    std::set<std::string> reached;
+    while (!open.empty()) {
+      const Link at = open.back();
+      open.pop_back();
+      reached.insert(at->name);
+      for (const urdf::LinkSharedPtr& below : at->child_links) open.push_back(below);
+    }
     for (const auto& [name, link] : model_->links_) {
-      std::size_t steps = 0;
-      for (Link at = link; at != root(); at = at->getParent()) {
-        if (++steps > model_->links_.size()) fail(name_, "link '" + name + "' is part of a loop");
-      }
+      if (reached.count(name) == 0) fail(name_, "link '" + name + "' is part of a loop");
     }
   }
 
@@ -263,11 +284,13 @@ void require_inertia(const std::vector<Joint>& joints, const std::string& name) 
 
 Robot Robot::from_file(const std::string& path, const std::string& base, const std::string& tip,
                        const RobotParameters& parameters) {
-  std::ifstream stream(path, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  if (!stream) fail(path, "cannot be read");
-  return from_text(text.str(), base, tip, parameters, path);
+  std::string text;
+  try {
+    text = text::read_file(path, text::kLargestXml);
+  } catch (const std::exception& error) {
+    fail(path, error.what());
+  }
+  return from_text(text, base, tip, parameters, path);
 }
 
 Robot Robot::from_text(const std::string& urdf, const std::string& base, const std::string& tip,

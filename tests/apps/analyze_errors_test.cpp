@@ -147,7 +147,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"UnknownKey", "stifness: ", "unknown key; the keys are mass, damping, stiffness",
                  kTwo + "stifness: [[1]]\n"},
         BadInput{"UnknownKeyOverSeveralLines", "a b: ", "unknown key", "\"a\\nb\": 1\n"},
-        BadInput{"UnknownKeyWithANul", "a b: ", "unknown key", "\"a\\0b\": 1\n"},
+        BadInput{"UnknownKeyWithANul", "a\\x00b: ", "unknown key", "\"a\\0b\": 1\n"},
         BadInput{"DuplicateKey", "mass: ", "duplicate key (line 4)", kTwo + "mass: [[1]]\n"},
         BadInput{"KeyThatIsAList", "a key is a list", "", "? [mass]\n: 1\n"},
         BadInput{"EntryOfAList", "[1].damping: ", "not finite: '.nan' (line 6)",
@@ -243,6 +243,21 @@ TEST(AnalyzeErrors, CatchTextThatWouldFillTheMemory) {
     bomb.append(" [").append(repeat(last, 10)).append("]\n");
   }
   expect_refused(analyze_text(bomb), start, "4000000 values");
+  // A long text, a thousand times.
+  const std::string long_text = "a: &a " + std::string(1u << 20, 'x') + "\nb: [";
+  expect_refused(analyze_text(long_text + repeat("*a, ", 1000) + "]"), start, "64 MiB of text");
+  // Each list is kept for its name, within the others.
+  std::string named = "mass: ";
+  for (int i = 0; i < 10; ++i) named += "&a" + std::to_string(i) + " [";
+  named += repeat("1,", 600'000) + repeat("]", 10);
+  expect_refused(analyze_text(named), start, "4000000 values");
+}
+
+TEST(AnalyzeErrors, ShowWhatSteersATerminalAsEscapes) {
+  expect_refused(analyze_text("\"\\e[2J\": 1\n"), "dashpot analyze: -: \\x1b[2J: ", "unknown key");
+  expect_refused(run_program({"analyze", "\x1b[31m\x9b.yaml"}),
+                 "dashpot analyze: \\x1b[31m\\x9b.yaml: ", "cannot be opened");
+  expect_refused(run_program({"analyze", "-", "--\x1b[31m"}), "dashpot analyze: ", "\\x1b[31m");
 }
 
 }  // namespace

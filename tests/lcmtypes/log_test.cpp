@@ -7,7 +7,9 @@
 #include <gmock/gmock.h>
 
 #include <cstdlib>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
 namespace dashpot::lcmtypes {
 namespace {
@@ -111,6 +113,117 @@ TEST(Log, EndsWhereItIsCutOff) {
     ASSERT_LE(events.size(), expected.size());
     for (std::size_t i = 0; i < events.size(); ++i) EXPECT_EQ(events[i], expected[i]) << size;
   }
+}
+
+/// An event as it stands in a log, with these lengths in place of the true ones.
+std::string event_bytes(const std::string& channel, const std::string& data,
+                        std::optional<std::uint32_t> channel_length = {},
+                        std::optional<std::uint32_t> data_length = {}) {
+  std::string bytes;
+  const auto add = [&bytes](std::uint64_t value, int count) {
+    while (count-- > 0) bytes += static_cast<char>(value >> (8 * count) & 0xFF);
+  };
+  add(0xEDA1DA01, 4);
+  add(7, 8);  // number
+  add(kNow, 8);
+  add(channel_length.value_or(static_cast<std::uint32_t>(channel.size())), 4);
+  add(data_length.value_or(static_cast<std::uint32_t>(data.size())), 4);
+  return bytes + channel + data;
+}
+
+/// The channels of the events that are read from these bytes, and what is said of the log.
+std::pair<std::string, std::string> channels_of(const std::string& bytes) {
+  const Scratch scratch;
+  LogFile log(scratch.write("a.lcm", bytes));
+  std::string channels;
+  while (log.read()) channels += log.event().channel + " ";
+  EXPECT_FALSE(log.read());
+  return {channels, describe(log.damage())};
+}
+
+using Said = std::pair<std::string, std::string>;
+
+TEST(Log, IsReadOnAfterLengthsThatAreFalse) {
+  const std::string a = event_bytes("A", "12345"), b = event_bytes("B", "");
+  ASSERT_EQ(a.size(), 34u);
+  EXPECT_EQ(channels_of(a + b), Said("A B ", ""));
+  // 2^31 - 1 bytes of data ended the program: LCM's reader makes room for one more.
+  for (const std::uint32_t length : {0x7FFFFFFFu, 0x7FFFFFFEu, 0x80000000u, 0xFFFFFFFFu, 40u}) {
+    EXPECT_EQ(channels_of(a + event_bytes("X", "123", {}, length) + b),
+              Said("A B ", "damaged at byte 34, 32 bytes skipped"))
+        << length;
+  }
+  for (const std::uint32_t length : {0u, 64u, 999u, 0x7FFFFFFFu, 0xFFFFFFFFu}) {
+    EXPECT_EQ(channels_of(a + event_bytes("X", "123", length) + b),
+              Said("A B ", "damaged at byte 34, 32 bytes skipped"))
+        << length;
+  }
+  const std::string longest(63, 'c');
+  EXPECT_EQ(channels_of(event_bytes(longest, "1")), Said(longest + " ", ""));
+  EXPECT_EQ(channels_of(event_bytes(longest + "c", "1") + b),
+            Said("B ", "damaged at byte 0, 93 bytes skipped"));
+  const std::string bad = event_bytes("X", "123", {}, 0x7FFFFFFF);
+  EXPECT_EQ(channels_of(bad + a + bad + bad + b + "junk" + b),
+            Said("A B B ", "damaged at byte 0 and 2 more times after it, 100 bytes skipped"));
+}
+
+TEST(Log, SaysWhereItIsCutOffOrDamaged) {
+  const std::string a = event_bytes("A", "12345"), b = event_bytes("B", "678");
+  for (std::size_t kept = 1; kept < b.size(); ++kept) {
+    EXPECT_EQ(channels_of(a + b.substr(0, kept)), Said("A ", "cut off in the event at byte 34"))
+        << kept;
+  }
+  EXPECT_EQ(channels_of(a + "junk that is no event"),
+            Said("A ", "damaged at byte 34, 21 bytes skipped"));
+  EXPECT_EQ(channels_of("junk" + b + "junk" + a.substr(0, 30)),
+            Said("B ",
+                 "damaged at byte 0 and 1 more times after it, 8 bytes skipped; cut off in "
+                 "the event at byte 40"));
+  EXPECT_EQ(channels_of(""), Said("", ""));
+}
+
+TEST(Log, KeepsNoDataThatIsTooLargeForAMessage) {
+  const Scratch scratch;
+  const std::string large(200'000, 'x');
+  LogFile log(scratch.write("a.lcm", event_bytes("CAMERA", large) + event_bytes("B", "1")));
+  ASSERT_TRUE(log.read());
+  EXPECT_EQ(log.event().size, large.size());
+  EXPECT_TRUE(log.event().data.empty());
+  ASSERT_TRUE(log.read());
+  EXPECT_EQ(log.event().data, std::vector<std::uint8_t>{'1'});
+  EXPECT_EQ(describe(log.damage()), "");
+
+  MessageHandlers handlers;
+  LogReader reader(scratch.write("b.lcm", event_bytes(kStateChannel, large)), handlers);
+  while (reader.read()) reader.handle();
+  EXPECT_EQ(handlers.malformed, 1);
+  EXPECT_EQ(reader.damage(), "");
+}
+
+// LCM reads it then.
+TEST(Log, IsNoBusIfItIsDamaged) {
+  const Scratch scratch;
+  const std::string path = scratch.write(
+      "a.lcm", event_bytes("A", "1") + event_bytes(kStateChannel, "123", {}, 0x7FFFFFFF));
+  for (const std::string options : {"", "?speed=0", "?mode=r", "?mode=w&mode=r"}) {
+    const std::string url = "file://" + path + options;
+    try {
+      open_bus(url);
+      ADD_FAILURE() << url;
+    } catch (const std::runtime_error& error) {
+      EXPECT_EQ(error.what(),
+                "cannot open the LCM bus " + url + ": cut off in the event at byte 30");
+    }
+  }
+  EXPECT_THROW(open_bus("file:///dev/zero"), std::runtime_error);
+  EXPECT_THROW(open_bus("file://" + scratch.path("none")), std::runtime_error);
+}
+
+TEST(Log, IsTheFileOfAUrl) {
+  EXPECT_EQ(path_of("file://a/b.lcm?mode=w"), "a/b.lcm");
+  EXPECT_EQ(path_of("file:///b.lcm"), "/b.lcm");
+  EXPECT_EQ(path_of("udpm://239.255.76.67:7667?ttl=0"), "");
+  EXPECT_EQ(path_of(""), "");
 }
 
 TEST(Log, DoesNoHarmWhenDamaged) {

@@ -2,6 +2,7 @@
 #include <dashpot/tests/plugin/config_file.hpp>
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <ostream>
 
@@ -265,6 +266,29 @@ TEST(ConfigRobot, HasAUrdfThatIsInOrder) {
               ::testing::MatchesRegex("robot: .*panda.urdf: link 'panda_link99': .* \\(line 2\\)"));
   EXPECT_THAT(complaint_about(", reflected_inertia: [1, 2]"),
               ::testing::MatchesRegex("robot.*2 entries.* \\(line 2\\)"));
+}
+
+TEST(ConfigRobot, HasAUrdfThatAParserCanBear) {
+  const Scratch scratch;
+  std::string text = "<robot name='r'>";
+  for (int i = 0; i < 100'000; ++i) text += "<a>";
+  const std::string urdf = scratch.write("deep.urdf", text);
+  EXPECT_EQ(complaint("robot: {urdf: " + urdf + ", base: a, tip: b}\n"),
+            "robot: " + urdf + ": line 1: elements are nested more than 64 deep (line 1)");
+}
+
+TEST(ConfigFile, HasAnEnd) {
+  const Scratch scratch;
+  const std::string pipe = scratch.path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const std::string& path : {pipe, std::string("/dev/zero")}) {
+    try {
+      controller::load_config(path);
+      ADD_FAILURE() << path;
+    } catch (const controller::InputError& error) {
+      EXPECT_EQ(error.what(), path + ": is not a regular file");
+    }
+  }
 }
 
 TEST(ConfigFile, HasToBeThere) {

@@ -16,6 +16,8 @@ TEST(IncludeRules, AllowTheArrowsOfTheTable) {
   EXPECT_TRUE(may_include("controller", "urdf_parser/urdf_parser.h"));
   EXPECT_TRUE(may_include("controller", "yaml-cpp/yaml.h"));
   EXPECT_TRUE(may_include("controller", "dashpot/analysis/spectrum.hpp"));
+  EXPECT_TRUE(may_include("controller", "dashpot/text/xml_check.hpp"));
+  EXPECT_TRUE(may_include("sim", "dashpot/text/xml_check.hpp"));
   EXPECT_TRUE(may_include("sim", "urdf_model/model.h"));
   EXPECT_TRUE(may_include("lcmtypes", "lcm/lcm-cpp.hpp"));
   EXPECT_TRUE(may_include("lcmtypes", "dashpot/controller/snapshot.hpp"));
@@ -32,6 +34,9 @@ TEST(IncludeRules, ForbidEveryOtherArrow) {
   EXPECT_FALSE(may_include("analysis", "lapacke.h"));
   EXPECT_FALSE(may_include("controller", "dashpot/sim/scene.hpp"));
   EXPECT_FALSE(may_include("controller", "lcm/lcm-cpp.hpp"));
+  EXPECT_FALSE(may_include("text", "Eigen/Core"));
+  EXPECT_FALSE(may_include("text", "dashpot/controller/types.hpp"));
+  EXPECT_FALSE(may_include("analysis", "dashpot/text/printable.hpp"));
   EXPECT_FALSE(may_include("sim", "dashpot/analysis/types.hpp"));
   EXPECT_FALSE(may_include("sim", "dashpot/controller/law.hpp"));
   EXPECT_FALSE(may_include("sim", "kdl/chain.hpp"));

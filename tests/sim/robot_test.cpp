@@ -253,13 +253,42 @@ TEST(RobotErrors, NameTheFileThatIsNotThereOrNotARobot) {
     return "accepted";
   };
   EXPECT_EQ(refused([] { Robot::from_file("/nowhere/arm.urdf", "a", "b"); }),
-            "/nowhere/arm.urdf: cannot be read");
+            "/nowhere/arm.urdf: cannot be read: No such file or directory");
   EXPECT_THAT(refused([] { Robot::from_text("garbage", "a", "b", {}, "arm.urdf"); }),
               ::testing::StartsWith("arm.urdf: "));
   EXPECT_EQ(refused([] {
               Robot::from_text(testing::panda_file().urdf, "panda_link3", "panda_link1", {}, "p");
             }),
             "p: tip link 'panda_link1' does not hang on base link 'panda_link3'");
+}
+
+TEST(RobotErrors, AreForTextsThatWouldOverflowTheStack) {
+  const auto refused = [](const std::string& text) -> std::string {
+    try {
+      Robot::from_text(text, "l0", "l1", {}, "p");
+    } catch (const InvalidRobot& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  std::string nested;
+  for (int i = 0; i < 100'000; ++i) nested += "<a>";
+  for (int i = 0; i < 100'000; ++i) nested += "</a>";
+  EXPECT_EQ(refused("<robot name='r'>" + nested + "</robot>"),
+            "p: line 1: elements are nested more than 64 deep");
+  const auto chain = [](int links) {
+    std::string text = "<robot name='r'><link name='l0'/>";
+    for (int i = 1; i <= links; ++i) {
+      const std::string number = std::to_string(i), before = std::to_string(i - 1);
+      text += "<link name='l" + number + "'>" + kTool + "</link><joint name='j" + number +
+              "' type='" + (i == 1 ? "continuous" : "fixed") + "'><parent link='l" + before +
+              "'/><child link='l" + number + "'/></joint>";
+    }
+    return text + "</robot>";
+  };
+  EXPECT_EQ(refused(chain(2500)), "p: line 1: holds more than 2000 links");
+  const Robot robot = Robot::from_text(chain(1900), "l0", "l1");
+  EXPECT_NEAR(robot.joints()[0].inertia.mass, 1900 * 1.3, 1e-9);
 }
 
 }  // namespace

@@ -19,6 +19,7 @@ namespace dashpot::tests {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -211,6 +212,54 @@ TEST(Monitor, TakesALoopThatIsStartedAnewForOne) {
     for (int i = 1; i <= 100; i += i % 9 == 0 ? 3 : 1) ticks.push_back(i);  // some get lost
   }
   EXPECT_THAT(summary_of_ticks(ticks), Not(HasSubstr("more than one loop")));
+}
+
+TEST(Monitor, SaysWhereALogIsDamagedOrCutOff) {
+  const Scratch scratch;
+  make_log(scratch, 500);
+  const std::string whole = scratch.read("run.lcm");
+  const auto shown = [&scratch](const std::string& bytes) {
+    const Outcome outcome = run_program({"monitor", "--log", scratch.write("a.lcm", bytes)});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return outcome.out;
+  };
+  EXPECT_THAT(shown(whole), Not(HasSubstr("The log is")));
+  const std::string sync = "\xED\xA1\xDA\x01";
+  const std::size_t last = whole.rfind(sync);
+  EXPECT_THAT(
+      shown(whole.substr(0, whole.size() - 1)),
+      EndsWith("\nThe log is cut off in the event at byte " + std::to_string(last) + ".\n"));
+  std::string damaged = whole;  // the length of the first event's data: 2^31 - 1
+  damaged.replace(24, 4, "\x7F\xFF\xFF\xFF");
+  const std::size_t second = whole.find(sync, 1);
+  const std::string out = shown(damaged);
+  EXPECT_THAT(out, HasSubstr("\n499 states and 5 modes messages"));
+  EXPECT_THAT(out, EndsWith("\nThe log is damaged at byte 0, " + std::to_string(second) +
+                            " bytes skipped.\n"));
+}
+
+TEST(Monitor, BearsTimesAndTicksOfAnySize) {
+  constexpr std::int64_t kLeast = std::numeric_limits<std::int64_t>::min();
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  const Scratch scratch;
+  const std::string path = scratch.path("a.lcm");
+  {
+    std::vector<std::unique_ptr<lcmtypes::Sink>> sinks;
+    sinks.push_back(lcmtypes::make_log_sink(path));
+    lcmtypes::Publisher publisher(std::move(sinks));
+    for (const std::int64_t number : {kMost, kLeast, kMost - 1, kLeast, std::int64_t{0}, kMost}) {
+      lcmtypes::StateSample state = state_at(1);
+      lcmtypes::ModesSample modes = modes_at(1);
+      state.utime = modes.utime = number;
+      state.snapshot.tick = modes.vibration.tick = static_cast<std::uint64_t>(number);
+      publisher.offer(state);
+      publisher.offer(modes);
+      publisher.publish_pending();
+    }
+  }
+  const Outcome outcome = run_program({"monitor", "--log", path});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("\n6 states and "));
 }
 
 TEST(Monitor, SaysThatALogIsEmpty) {
