@@ -1,0 +1,200 @@
+#pragma once
+// Limits, encoders, feedback: points 1 to 5 of the list of what was seen.
+
+#include <dashpot/tests/stress/safety_row.hpp>
+
+#include <numbers>
+
+namespace dashpot::stress {
+
+inline sim::Contact hard_stops() {
+  return {2000, 20};
+}
+
+inline JointVector moved(JointVector q, int joint, double by) {
+  q[joint] += by;
+  return q;
+}
+
+/// A configuration whose upper limit of one joint lies at `upper`.
+inline std::string upper_limit(const TestArm& arm, int joint, double upper) {
+  const sim::Robot robot = simulated_robot(arm);
+  JointVector limits(robot.dof());
+  for (int i = 0; i < robot.dof(); ++i)
+    limits[i] = robot.joints()[static_cast<std::size_t>(i)].upper;
+  limits[joint] = upper;
+  return "limits:\n  position_upper: " + yaml_list(limits) + "\n";
+}
+
+inline bool slides(const TestArm& arm, int joint) {
+  return simulated_robot(arm).joints()[static_cast<std::size_t>(joint)].prismatic;
+}
+
+/// Parked beyond a limit, maybe on the way back already.
+inline Act outside(double by_angle, double by_length, double speed) {
+  return [=](const PluginFile& plugin, const TestArm& arm, Row& row) {
+    const int joint = arm.joint;
+    RigOptions options;
+    options.start = start_of(arm);
+    const double by = slides(arm, joint) ? by_length : by_angle;
+    const double upper = options.start[joint] - (slides(arm, joint) ? 0.05 : 0);
+    options.start[joint] = upper + by;
+    options.config = upper_limit(arm, joint, upper);
+    options.velocity = JointVector::Zero(options.start.size());
+    options.velocity[joint] =
+        -speed * simulated_robot(arm).joints()[static_cast<std::size_t>(joint)].velocity;
+    Rig rig(plugin, arm, options);
+    rig.run(0.002);
+    const double at_first = rig.seen.kinetic_energy;
+    rig.run(4);
+    row.finish(rig, {speed + 0.3, true, true});
+    row.note = "put in " + number(std::max(0.0, row.seen.kinetic_energy - at_first)) + " J";
+    row.require(speed > 0 || row.seen.return_share <= kSlowReturn, "thrown back");
+  };
+}
+
+/// A light joint is guided past its limit and let go.
+inline void light_joint_past_limit(const PluginFile& plugin, const TestArm& arm, Row& row) {
+  RigOptions options;
+  const double upper = arm.start[static_cast<std::size_t>(arm.light)] + 0.3;
+  options.config = upper_limit(arm, arm.light, upper);
+  Rig rig(plugin, arm, options);
+  rig.run(0.2);
+  rig.guide(moved(rig.position(), arm.light, 0.35), 1.5);
+  rig.run(4);
+  row.finish(rig, {0.5, true, true});
+  row.note = "torque turns round in " + number(100 * row.seen.reversals, "%.0f") + " % of ticks";
+}
+
+/// The 4 cm finger stands a quarter of its way from one end.
+inline void finger_at_rest(const PluginFile& plugin, const TestArm& arm, Row& row) {
+  RigOptions options;
+  options.start = start_of(arm);
+  options.start[4] = 0.01;
+  options.world.stops = hard_stops();
+  Rig rig(plugin, arm, options);
+  rig.run(4);
+  row.finish(rig, {0.5, true, true});
+  const double moved_by = std::abs(rig.position()[4] - 0.01);
+  row.note = "finger moved " + number(1e3 * moved_by) + " mm";
+  row.require(moved_by < 1e-3, "finger moves by itself");
+}
+
+/// An encoder is off by so many radians from 0.5 s on.
+inline Act encoder_off(double by) {
+  return [by](const PluginFile& plugin, const TestArm& arm, Row& row) {
+    const int joint = slides(arm, arm.joint) ? 1 : arm.joint;
+    RigOptions options;
+    options.world.stops = hard_stops();
+    sim::SensorFault fault;
+    fault.begin = 0.5;
+    fault.position_offset = moved(JointVector::Zero(start_of(arm).size()), joint, by);
+    options.faults = {fault};
+    Rig rig(plugin, arm, options);
+    rig.goal = Goal{DASHPOT_MODE_JOINT, rig.position(), {}, {}};
+    rig.run(5);
+    row.finish(rig, {1, true, false});
+    const double moved_by = std::abs(rig.position()[joint] - start_of(arm)[joint]);
+    const double share = std::abs(rig.plant().torque()[joint] - rig.weight(rig.position())[joint]) /
+                         rig.limits().torque[joint];
+    row.note = "joint moved " + number(moved_by) + " rad, pushes with " +
+               number(100 * share, "%.0f") + " % of its torque";
+    row.require(moved_by < 0.3 && share < 0.1, "an encoder that slipped is believed");
+  };
+}
+
+/// Joint gains with more damping than the sampled loop of light joints stands, or a wrench without
+/// springs: both drive joints into their velocity limits again and again.
+inline void unstable_gains(const PluginFile& plugin, const TestArm& arm, Row& row) {
+  Rig rig(plugin, arm, {});
+  rig.run(0.2);
+  const Eigen::MatrixXd K = Eigen::MatrixXd::Identity(rig.n(), rig.n()) * 100;
+  const Eigen::MatrixXd D = Eigen::MatrixXd::Identity(rig.n(), rig.n()) * 100;
+  const bool taken = rig.set_joint_gains(K, D) == DASHPOT_OK;
+  rig.run(4);
+  row.finish(rig, {1.5, true, true});
+  row.note = (taken ? "gains taken; " : "gains refused; ") + std::to_string(row.seen.changes) +
+             " changes of status";
+}
+
+inline void wrench_without_springs(const PluginFile& plugin, const TestArm& arm, Row& row) {
+  RigOptions options;
+  options.config =
+      "control: {mode: cartesian}\ngains:\n  task: {stiffness: [0, 0, 0, 0, 0, 0], damping: [0, 0, "
+      "0, 0, 0, 0]}\n  null_space: {stiffness: 0, damping: 0}\n";
+  Rig rig(plugin, arm, options);
+  rig.goal = Goal{DASHPOT_MODE_CARTESIAN, {}, rig.tip_at(rig.position()), {}};
+  rig.goal->wrench << 0, 30, 0, 0, 0, 0;
+  rig.run(6);
+  row.finish(rig, {1.5, true, true});
+  row.note = std::to_string(row.seen.changes) + " changes of status";
+}
+
+/// The controller is not called for 10 s; meanwhile a hand moves the robot.
+inline void moved_in_a_pause(const PluginFile& plugin, const TestArm& arm, Row& row) {
+  Rig rig(plugin, arm, {});
+  rig.goal = Goal{DASHPOT_MODE_JOINT, rig.position(), {}, {}};
+  rig.run(1);
+  rig.guide(moved(rig.position(), arm.joint, slides(arm, arm.joint) ? 0.15 : 0.5), 10, true);
+  rig.measure_afresh();
+  const JointVector there = rig.position();
+  rig.run(6);
+  row.finish(rig, {1, true, true});
+  const double back = (rig.position() - there).cwiseAbs().maxCoeff();
+  row.note = "drives back " + number(back) + (slides(arm, arm.joint) ? " m" : " rad") + " unasked";
+  row.require(back < 0.02, "drives back unasked");
+}
+
+/// Feedback fails in the middle of a motion of the tip, or of the joints.
+inline Act bad_feedback(const std::function<void(sim::SensorFault&, Eigen::Index)>& spoil) {
+  return [spoil](const PluginFile& plugin, const TestArm& arm, Row& row) {
+    RigOptions options;
+    options.world.stops = hard_stops();
+    sim::SensorFault fault;
+    fault.begin = 0.5;
+    spoil(fault, start_of(arm).size());
+    options.faults = {fault};
+    Rig rig(plugin, arm, options);
+    JointVector to = moved(rig.position(), arm.joint, slides(arm, arm.joint) ? 0.2 : 0.8);
+    to[1] += 0.4;
+    rig.goal = Goal{DASHPOT_MODE_JOINT, to, {}, {}};
+    rig.run(6);
+    row.finish(rig, {1, true, false});
+    row.note = "status at the end: " + row.seen.last_status.substr(0, 30);
+    row.require(row.seen.first_status != "ok", "never noticed");
+  };
+}
+
+inline void freeze(sim::SensorFault& fault, Eigen::Index) {
+  fault.frozen = true;
+}
+inline void no_velocity(sim::SensorFault& fault, Eigen::Index n) {
+  fault.velocity_factor = JointVector::Zero(n);
+}
+inline void wrong_sign(sim::SensorFault& fault, Eigen::Index n) {
+  fault.velocity_factor = -JointVector::Ones(n);
+}
+
+/// A push about the axis of the light joint that is stronger than any drive, for some ticks.
+inline void hard_push(const PluginFile& plugin, const TestArm& arm, Row& row) {
+  const JointVector q = start_of(arm);
+  RigOptions options;
+  Rig first(plugin, arm, options);  // for the inertia
+  const auto there = controller::evaluate(first.model(), q, JointVector::Zero(q.size()));
+  controller::Vector6 wrench = controller::Vector6::Zero();
+  const Eigen::Vector3d axis = there.J.col(arm.light).tail<3>();
+  const JointVector unit = there.J.bottomRows<3>().transpose() * axis;
+  const JointVector acceleration = Eigen::MatrixXd(there.M).ldlt().solve(Eigen::VectorXd(unit));
+  wrench.tail<3>() = 1500 / acceleration[arm.light] * axis;
+  options.world.wrenches = {{0.5, 0.501, wrench}};
+  Rig rig(plugin, arm, options);
+  rig.run(0.4);
+  rig.measure_afresh();
+  rig.run(3);
+  row.finish(rig, {2, true, true});
+  row.note = "carries " + number(100 * row.seen.least_weight, "%.0f") +
+             " % of the weight at least, " + "sags " + number(1e3 * row.seen.tip_moved) + " mm";
+  row.require(row.seen.least_weight > 0.7, "drops the weight");
+}
+
+}  // namespace dashpot::stress
