@@ -20,7 +20,8 @@ struct TestArm {
   double reflected_inertia;   ///< kg m^2 or kg, each joint: simulated, and known to the controller
   std::vector<double> start;  ///< rad or m, well within the limits
   int joint;                  ///< that is taken out of its limits, slips, ...
-  int light;                  ///< the one with the least inertia
+  int light;                  ///< the revolute one with the least inertia
+  const char* limits;         ///< lines of the configuration under `limits`
 };
 
 inline const std::vector<TestArm>& test_arms() {
@@ -32,7 +33,8 @@ inline const std::vector<TestArm>& test_arms() {
        0,
        {0, -0.785, 0, -2.356, 0, 1.571, 0.785},
        0,
-       6},
+       6,
+       ""},
       {"iiwa14",
        "iiwa14",
        "iiwa_link_0",
@@ -40,7 +42,8 @@ inline const std::vector<TestArm>& test_arms() {
        0,
        {0, 0.524, 0, -1.396, 0, 1.047, 0},
        0,
-       6},
+       6,
+       ""},
       {"iiwa14+rotors",
        "iiwa14",
        "iiwa_link_0",
@@ -48,9 +51,18 @@ inline const std::vector<TestArm>& test_arms() {
        0.1,
        {0, 0.524, 0, -1.396, 0, 1.047, 0},
        0,
-       6},
-      {"ur5", "ur5", "base_link", "ee_link", 0, {0, -1.222, 1.571, -1.920, -1.571, 0}, 0, 5},
-      {"lift+gripper", "lift_gripper", "base", "fingertip", 0, {0.4, 0.5, -1.0, 0.3, 0.02}, 0, 3},
+       6,
+       ""},
+      {"ur5", "ur5", "base_link", "ee_link", 0, {0, -1.222, 1.571, -1.920, -1.571, 0}, 0, 5, ""},
+      {"lift+gripper",
+       "lift_gripper",
+       "base",
+       "fingertip",
+       0,
+       {0.4, 0.5, -1.0, 0.3, 0.02},
+       0,
+       3,
+       "  position_margin: 0.005\n"},  // not more than the finger's way
   };
   return all;
 }

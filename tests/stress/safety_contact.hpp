@@ -13,10 +13,9 @@ constexpr const char* kCartesian = "control: {mode: cartesian}\n";
 inline Act table(double depth) {
   return [depth](const PluginFile& plugin, const TestArm& arm, Row& row) {
     RigOptions options;
-    options.config =
-        std::string(kCartesian) +
-        "gains:\n  task: {stiffness: [1500, 1500, 1500, 80, 80, 80], damping: [60, 60, "
-        "60, 4, 4, 4]}\n";
+    options.config = std::string(kCartesian) +
+                     "gains:\n  task: {stiffness: [1500, 1500, 1500, 30, 30, 30], "
+                     "damping_ratio: 0.7}\n";
     sim::Wall wall;
     wall.point = sim::Arm(simulated_robot(arm)).tip_pose(start_of(arm)).position;
     wall.point.z() -= 0.03;
@@ -95,7 +94,7 @@ inline void stiff_undamped(const PluginFile& plugin, const TestArm& arm, Row& ro
   rig.goal = Goal{DASHPOT_MODE_CARTESIAN, {}, rig.tip_at(rig.position()), {}};
   const Eigen::Vector3d middle = rig.goal->tip.position;
   for (int i = 0; i < 12; ++i) {
-    rig.goal->tip.position = middle + Eigen::Vector3d(0, i % 2 == 0 ? 0.1 : -0.1, 0);
+    rig.goal->tip.position = middle + Eigen::Vector3d(0, i % 2 == 0 ? 0.2 : -0.2, 0);
     rig.run(0.3);
   }
   row.finish(rig, {1.5, false, true});
@@ -161,14 +160,13 @@ inline void untold_weight(const PluginFile& plugin, const TestArm& arm, Row& row
 /// Every torque limit at half of the largest weight.
 inline void too_weak(const PluginFile& plugin, const TestArm& arm, Row& row) {
   RigOptions options;
-  options.world.stops = hard_stops();
   const sim::Robot robot = simulated_robot(arm);
   const double heaviest = Rig(plugin, arm, {}).weight(start_of(arm)).cwiseAbs().maxCoeff();
   JointVector most(robot.dof());
   for (int i = 0; i < robot.dof(); ++i) {
     most[i] = std::min(0.5 * heaviest, robot.joints()[static_cast<std::size_t>(i)].effort);
   }
-  options.config = "limits:\n  torque: " + yaml_list(most) + "\n";
+  options.limits = arm.limits + ("  torque: " + yaml_list(most) + "\n");
   Rig rig(plugin, arm, options);
   rig.run(4);
   row.finish(rig, {1e9, false, false});

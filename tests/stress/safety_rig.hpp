@@ -59,10 +59,11 @@ class PluginFile {
 
 /// What a rig is made of; what is left out is the arm's own.
 struct RigOptions {
-  std::string config;     ///< YAML lines after `robot`, without `analysis`
-  JointVector start;      ///< rad or m
-  JointVector velocity;   ///< rad/s or m/s
-  sim::ArmOptions world;  ///< wall, pushes, stops
+  std::string config;                 ///< YAML lines beside `robot`, `limits` and `analysis`
+  std::optional<std::string> limits;  ///< lines under `limits`; default: the arm's
+  JointVector start;                  ///< rad or m
+  JointVector velocity;               ///< rad/s or m/s
+  sim::ArmOptions world;              ///< wall, pushes; stops are added
   std::vector<sim::SensorFault> faults;
   bool told_weight = true;  ///< dashpot_reset with the weight before the first tick
 };
@@ -100,9 +101,9 @@ class Rig {
   /// Throws std::runtime_error with the plugin's words if it refuses the configuration.
   Rig(const PluginFile& plugin, const TestArm& arm, const RigOptions& options)
       : plugin_(plugin),
-        config_(controller::load_config(write_config(arm, options.config))),
+        config_(controller::load_config(write_config(arm, options))),
         controller_(plugin.create(path_.c_str()), plugin.destroy),
-        body_(simulated_robot(arm), options.world) {
+        body_(simulated_robot(arm), with_stops(options.world)) {
     unlink(path_.c_str());
     if (!controller_) throw std::runtime_error(plugin.last_error());
     const JointVector start = options.start.size() > 0 ? options.start : start_of(arm);
@@ -110,9 +111,7 @@ class Rig {
     sim::PlantOptions plant;
     plant.period = config_.settings.period;
     plant.integrator.max_step = plant.period / 2;
-    if (options.world.stops || options.world.wall) {
-      plant.integrator.method = sim::Method::kRosenbrock;  // light joints on hard stops
-    }
+    plant.integrator.method = sim::Method::kRosenbrock;  // light joints on hard stops
     plant.initial_torque = weight(start);
     plant.faults = options.faults;
     plant_.emplace(body_, plant, start, options.velocity);
@@ -196,13 +195,19 @@ class Rig {
   }
 
  private:
-  std::string write_config(const TestArm& arm, const std::string& text) {
+  static sim::ArmOptions with_stops(sim::ArmOptions world) {
+    world.stops = sim::Contact{2000, 20};
+    return world;
+  }
+  std::string write_config(const TestArm& arm, const RigOptions& options) {
     char name[] = "/tmp/dashpot_safety.XXXXXX.yaml";
     const int file = mkstemps(name, 5);
     if (file < 0) throw std::runtime_error("cannot write a temporary file");
     close(file);
     path_ = name;
-    std::ofstream(path_) << robot_yaml(arm) << "analysis: {where: off}\n" << text;
+    const std::string limits = options.limits.value_or(arm.limits);
+    std::ofstream(path_) << robot_yaml(arm) << "analysis: {where: off}\n"
+                         << options.config << (limits.empty() ? "" : "limits:\n") << limits;
     return path_;
   }
 

@@ -19,6 +19,7 @@ struct Bounds {
 /// Joints come back from outside a position limit no faster than this share of their velocity
 /// limits, unless they did so when the controller saw them first.
 constexpr double kSlowReturn = 0.3;
+constexpr double kRest = 0.05;  ///< of the velocity limit: what is slower counts as still
 
 struct Row {
   std::string scenario;
@@ -38,7 +39,7 @@ struct Row {
     require(!bounds.driven || seen.driven == 0,
             "driven on while too fast, " + std::to_string(std::lround(1e3 * seen.driven)) + " ms");
     if (!bounds.rest) return;
-    require(seen.last_speed < 0.02, "moves at the end");
+    require(seen.last_speed < kRest, "moves at the end");
     require(seen.last_changes < 5, "status changes at the end");
     require(seen.reversals < 0.2, "torque turns round at the end");
   }

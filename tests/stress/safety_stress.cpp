@@ -17,7 +17,8 @@ std::vector<Scenario> scenarios() {
       {"1", "parked 60 deg outside (lift: 0.2 m)", {}, outside(pi / 3, 0.2, 0)},
       {"1", "5 deg outside (lift: 2 cm)", {}, outside(pi / 36, 0.02, 0)},
       {"1", "outside, moving inward at 3.7 x limit", {}, outside(pi / 3, 0.2, 3.7)},
-      {"2", "light joint guided past its limit", {}, light_joint_past_limit},
+      {"2", "light joint pressed to its limit", {}, light_joint_pressed},
+      {"2", "light joint let go past its limit", {}, light_joint_let_go},
       {"2", "finger of 4 cm, left alone", lift, finger_at_rest},
       {"3", "encoder wraps by 2 pi", {}, encoder_off(-2 * pi)},
       {"3", "encoder slips by 0.5 rad", {}, encoder_off(-0.5)},
@@ -27,7 +28,7 @@ std::vector<Scenario> scenarios() {
       {"5", "feedback frozen", {}, bad_feedback(freeze)},
       {"5", "velocity always zero", {}, bad_feedback(no_velocity)},
       {"5", "velocity of the wrong sign", {}, bad_feedback(wrong_sign)},
-      {"5", "hard push, 1500 rad/s^2 at the wrist", {}, hard_push},
+      {"5", "hard jolts at the wrist", {}, hard_jolts},
       {"6", "table, goal 15 cm below", three, table(0.15)},
       {"6", "table, goal 20 cm below", three, table(0.2)},
       {"7", "12 moves of the tip, all defaults", {}, default_moves},
@@ -47,9 +48,11 @@ void print(const Row& row, bool first) {
   std::printf("%-40s %-14s %-7s %8.2f %8.2f %8.2f %6.0f %7d %5s  %-32.32s %s\n",
               first ? row.scenario.c_str() : "", first ? row.arm.c_str() : "", row.plugin.c_str(),
               seen.speed_share, seen.tip_speed, seen.kinetic_energy, 100 * seen.reversals,
-              seen.changes, seen.last_speed < 0.02 ? "yes" : "no", seen.first_status.c_str(),
+              seen.changes, seen.last_speed < kRest ? "yes" : "no", seen.first_status.c_str(),
               row.note.c_str());
-  for (const std::string& what : row.broken) std::printf("%72s! %s\n", "", what.c_str());
+  std::string broken;
+  for (const std::string& what : row.broken) broken += (broken.empty() ? "" : "; ") + what;
+  if (!broken.empty()) std::printf("%64s! %s\n", "", broken.c_str());
   std::fflush(stdout);
 }
 
