@@ -22,7 +22,7 @@ inline Act table(double depth) {
     wall.contact = {2e4, 200};
     options.world.wall = wall;
     Rig rig(plugin, arm, options);
-    rig.goal = Goal{DASHPOT_MODE_CARTESIAN, {}, rig.tip_at(rig.position()), {}};
+    rig.goal = Goal::at(rig.tip_at(rig.position()));
     rig.goal->tip.position.z() -= 0.03 + depth;
     rig.run(8);
     row.finish(rig, {1.1, true, true});
@@ -52,7 +52,7 @@ inline void default_moves(const PluginFile& plugin, const TestArm& arm, Row& row
       to[i] = std::clamp(options.start[i] + half * uniform(-1, 1), middle - half, middle + half);
     }
     Rig rig(plugin, arm, options);
-    rig.goal = Goal{DASHPOT_MODE_CARTESIAN, {}, rig.tip_at(to), {}};
+    rig.goal = Goal::at(rig.tip_at(to));
     rig.run(4);
     row.finish(rig, {1.05, false, true});
     const bool tripped = row.seen.speed_share > 1;
@@ -72,7 +72,7 @@ inline void stretched(const PluginFile& plugin, const TestArm& arm, Row& row) {
   RigOptions options;
   options.config = kCartesian;
   Rig rig(plugin, arm, options);
-  rig.goal = Goal{DASHPOT_MODE_CARTESIAN, {}, rig.tip_at(rig.position()), {}};
+  rig.goal = Goal::at(rig.tip_at(rig.position()));
   Eigen::Vector3d out = rig.goal->tip.position;
   out.z() = 0;
   rig.goal->tip.position += 0.6 * out.normalized();
@@ -91,7 +91,7 @@ inline void stiff_undamped(const PluginFile& plugin, const TestArm& arm, Row& ro
   Eigen::MatrixXd K = D;
   K.diagonal() << 50000, 50000, 50000, 500, 500, 500;
   const bool taken = rig.set_task_gains(K, D) == DASHPOT_OK;
-  rig.goal = Goal{DASHPOT_MODE_CARTESIAN, {}, rig.tip_at(rig.position()), {}};
+  rig.goal = Goal::at(rig.tip_at(rig.position()));
   const Eigen::Vector3d middle = rig.goal->tip.position;
   for (int i = 0; i < 12; ++i) {
     rig.goal->tip.position = middle + Eigen::Vector3d(0, i % 2 == 0 ? 0.2 : -0.2, 0);
@@ -121,7 +121,7 @@ inline Act slow_loop(int every) {
     Rig rig(plugin, arm, {});
     rig.every = every;
     JointVector to = moved(rig.position(), arm.joint, slides(arm, arm.joint) ? 0.1 : 0.4);
-    rig.goal = Goal{DASHPOT_MODE_JOINT, to, {}, {}};
+    rig.goal = Goal::joints(to);
     rig.run(6);
     row.finish(rig, {1.5, true, true});
     row.require(row.seen.first_status != "ok", "never noticed");
@@ -132,7 +132,7 @@ inline void reset_in_motion(const PluginFile& plugin, const TestArm& arm, Row& r
   Rig rig(plugin, arm, {});
   JointVector to = moved(rig.position(), arm.joint, slides(arm, arm.joint) ? 0.2 : 1.0);
   to[1] -= 0.3;
-  rig.goal = Goal{DASHPOT_MODE_JOINT, to, {}, {}};
+  rig.goal = Goal::joints(to);
   rig.run(1);
   rig.goal.reset();
   rig.measure_afresh();

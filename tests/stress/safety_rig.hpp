@@ -74,6 +74,18 @@ struct Goal {
   JointVector position;  ///< empty: NULL
   sim::Pose tip;
   controller::Vector6 wrench = controller::Vector6::Zero();
+
+  static Goal joints(const JointVector& q) {
+    Goal goal;
+    goal.position = q;
+    return goal;
+  }
+  static Goal at(const sim::Pose& pose) {
+    Goal goal;
+    goal.mode = DASHPOT_MODE_CARTESIAN;
+    goal.tip = pose;
+    return goal;
+  }
 };
 
 /// What was seen, of the robot itself and not of its sensors, while the robot moved freely.
@@ -86,6 +98,7 @@ struct Measures {
   double least_weight = 1;    ///< least share of its weight that the torque carried
   double torque_step = 0;     ///< greatest change of a torque within a tick, N m
   double tip_moved = 0;       ///< farthest from where the tip was at the start, m
+  int refused_goals = 0;      ///< set-points that the plugin did not take
   int changes = 0;            ///< of the status
   std::string first_status = "ok";  ///< the first that was not ok
   std::string last_status = "ok";
@@ -222,7 +235,7 @@ class Rig {
                                        tip.data(),
                                        rotation.data(),
                                        goal->wrench.data()};
-    plugin_.set_setpoint(controller_.get(), &setpoint);
+    if (plugin_.set_setpoint(controller_.get(), &setpoint) != DASHPOT_OK) ++seen.refused_goals;
   }
 
   void control() {

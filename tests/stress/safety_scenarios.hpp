@@ -62,10 +62,10 @@ inline void light_joint_pressed(const PluginFile& plugin, const TestArm& arm, Ro
   Rig rig(plugin, arm, options);
   const auto there = controller::evaluate(rig.model(), to, JointVector::Zero(to.size()));
   Eigen::MatrixXd K = Eigen::MatrixXd::Identity(to.size(), to.size()) * 200, D = 0 * K;
-  K(arm.light, arm.light) = 20;
+  K(arm.light, arm.light) = 4 * rig.limits().torque[arm.light];
   D.diagonal() = 1.4 * K.diagonal().cwiseProduct(Eigen::VectorXd(there.M.diagonal())).cwiseSqrt();
   const bool taken = rig.set_joint_gains(K, D) == DASHPOT_OK;
-  rig.goal = Goal{DASHPOT_MODE_JOINT, to, {}, {}};
+  rig.goal = Goal::joints(to);
   rig.run(5);
   row.finish(rig, {1, true, true});
   row.note = "torque turns round in " + number(100 * row.seen.reversals, "%.0f") + " % of ticks" +
@@ -109,7 +109,7 @@ inline Act encoder_off(double by) {
     fault.position_offset = moved(JointVector::Zero(start_of(arm).size()), joint, by);
     options.faults = {fault};
     Rig rig(plugin, arm, options);
-    rig.goal = Goal{DASHPOT_MODE_JOINT, rig.position(), {}, {}};
+    rig.goal = Goal::joints(rig.position());
     rig.run(5);
     row.finish(rig, {1, true, false});
     const double moved_by = std::abs(rig.position()[joint] - start_of(arm)[joint]);
@@ -142,7 +142,7 @@ inline void wrench_without_springs(const PluginFile& plugin, const TestArm& arm,
       "0, 0, 0, 0]}\n";
   if (arm.start.size() > 6) options.config += "  null_space: {stiffness: 0, damping: 0}\n";
   Rig rig(plugin, arm, options);
-  rig.goal = Goal{DASHPOT_MODE_CARTESIAN, {}, rig.tip_at(rig.position()), {}};
+  rig.goal = Goal::at(rig.tip_at(rig.position()));
   rig.goal->wrench << 0, 30, 0, 0, 0, 0;
   rig.run(6);
   row.finish(rig, {1.5, true, true});
@@ -152,7 +152,7 @@ inline void wrench_without_springs(const PluginFile& plugin, const TestArm& arm,
 /// The controller is not called for 10 s; meanwhile a hand moves the robot.
 inline void moved_in_a_pause(const PluginFile& plugin, const TestArm& arm, Row& row) {
   Rig rig(plugin, arm, {});
-  rig.goal = Goal{DASHPOT_MODE_JOINT, rig.position(), {}, {}};
+  rig.goal = Goal::joints(rig.position());
   rig.run(1);
   rig.guide(moved(rig.position(), arm.joint, slides(arm, arm.joint) ? 0.15 : 0.5), 10, true);
   rig.measure_afresh();
@@ -175,7 +175,7 @@ inline Act bad_feedback(const std::function<void(sim::SensorFault&, Eigen::Index
     Rig rig(plugin, arm, options);
     JointVector to = moved(rig.position(), arm.joint, slides(arm, arm.joint) ? 0.2 : 0.8);
     to[1] += 0.4;
-    rig.goal = Goal{DASHPOT_MODE_JOINT, to, {}, {}};
+    rig.goal = Goal::joints(to);
     rig.run(6);
     row.finish(rig, {1, true, false});
     row.note = "status at the end: " + row.seen.last_status.substr(0, 30);

@@ -51,6 +51,7 @@ void print(const Row& row, bool first) {
               seen.changes, seen.last_speed < kRest ? "yes" : "no", seen.first_status.c_str(),
               row.note.c_str());
   std::string broken;
+  if (seen.refused_goals > 0) broken = std::to_string(seen.refused_goals) + " goals refused";
   for (const std::string& what : row.broken) broken += (broken.empty() ? "" : "; ") + what;
   if (!broken.empty()) std::printf("%64s! %s\n", "", broken.c_str());
   std::fflush(stdout);
