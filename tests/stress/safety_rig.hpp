@@ -147,7 +147,7 @@ class Rig {
   }
 
   std::optional<Goal> goal;  ///< what the host wants
-  int every = 1;             ///< the controller is called every so many periods
+  int every = 1;             ///< the controller is called every so many periods; 0: not at all
   Measures seen;
 
   /// `seen`, with what the last second was like.
@@ -184,7 +184,7 @@ class Rig {
   /// Ticks with the robot free.
   void run(double seconds) {
     for (std::int64_t i = std::llround(seconds / period()); i > 0; --i) {
-      if (ticks_ % every == 0) control();
+      if (every > 0 && ticks_ % every == 0) control();
       ++ticks_;
       if (plant_->step(torque_) != sim::Status::kOk) {
         throw std::runtime_error("the simulation failed at " + std::to_string(plant_->time()) +
