@@ -25,11 +25,11 @@ TEST(Faults, ShiftAnEncoderWhileTheyLast) {
   const auto columns =
       with_faults("begin: 0.3 s, end: 0.302 s, position_offset: [0, 0.01, 0, 0, 0, 0]");
   const Numbers& q = columns.at("q2");
-  EXPECT_NEAR(q[299], q[298], 1e-4);
-  EXPECT_NEAR(q[300], q[299] + 0.01, 1e-4);
-  EXPECT_NEAR(q[301], q[299] + 0.01, 1e-4);
-  EXPECT_NEAR(q[302], q[299], 1e-4);
-  EXPECT_NEAR(columns.at("q3")[300], columns.at("q3")[299], 1e-4);
+  EXPECT_NEAR(q[299], q[298], 1e-3);
+  EXPECT_NEAR(q[300], q[299] + 0.01, 1e-3);
+  EXPECT_NEAR(q[301], q[299] + 0.01, 1e-3);
+  EXPECT_NEAR(q[302], q[299], 1e-3);
+  EXPECT_NEAR(columns.at("q3")[300], columns.at("q3")[299], 1e-3);
 }
 
 TEST(Faults, TurnVelocitiesRound) {
@@ -143,7 +143,10 @@ std::vector<std::string> safety_scenes() {
 class SafetyScene : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(SafetyScene, RunsToItsEndAndAccountsForItsEnergy) {
-  const Json result = run_json(scene("safety/" + GetParam()));
+  // Those that need long say on standard error how far they are.
+  const Outcome outcome = run_scene(scene("safety/" + GetParam()), {"--json"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json result = Json::parse(outcome.out);
   EXPECT_GE(result["ticks"].get<int>(), 3000);
   const Json& energy = result["energy"];
   const double moved = 1 + std::abs(energy["by_actuators"].get<double>()) +

@@ -105,7 +105,6 @@ struct Measures {
   double reversals = 0;   ///< share of the last second's ticks in which a torque turned round
   double last_speed = 0;  ///< greatest joint speed over its limit in the last half second
   int last_changes = 0;   ///< of the status, in the last second
-  double simulated = 0;   ///< s
 };
 
 /// A controller of the plugin, a simulated arm, and a clock.
@@ -123,8 +122,11 @@ class Rig {
     n_ = static_cast<std::uint32_t>(start.size());
     sim::PlantOptions plant;
     plant.period = config_.settings.period;
-    plant.integrator.max_step = plant.period / 2;
+    plant.integrator.max_step = plant.period;
     plant.integrator.method = sim::Method::kRosenbrock;  // light joints on hard stops
+    plant.integrator.adaptive = true;
+    plant.integrator.absolute_tolerance = 1e-6;
+    plant.integrator.relative_tolerance = 1e-4;
     plant.initial_torque = weight(start);
     plant.faults = options.faults;
     plant_.emplace(body_, plant, start, options.velocity);
@@ -326,7 +328,6 @@ inline void Rig::watch() {
   if (g.norm() > 1) {
     seen.least_weight = std::min(seen.least_weight, plant_->torque().dot(g) / g.squaredNorm());
   }
-  seen.simulated = plant_->time();
   const auto second = static_cast<std::size_t>(std::llround(1 / period()));
   turned_.push_back(turns);
   if (turned_.size() > second) turned_.pop_front();

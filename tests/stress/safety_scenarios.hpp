@@ -62,7 +62,7 @@ inline void light_joint_pressed(const PluginFile& plugin, const TestArm& arm, Ro
   Rig rig(plugin, arm, options);
   const auto there = controller::evaluate(rig.model(), to, JointVector::Zero(to.size()));
   Eigen::MatrixXd K = Eigen::MatrixXd::Identity(to.size(), to.size()) * 200, D = 0 * K;
-  K(arm.light, arm.light) = 4 * rig.limits().torque[arm.light];
+  K(arm.light, arm.light) = 2 * rig.limits().torque[arm.light];
   D.diagonal() = 1.4 * K.diagonal().cwiseProduct(Eigen::VectorXd(there.M.diagonal())).cwiseSqrt();
   const bool taken = rig.set_joint_gains(K, D) == DASHPOT_OK;
   rig.goal = Goal::joints(to);
