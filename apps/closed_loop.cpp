@@ -33,7 +33,9 @@ ClosedLoop::ClosedLoop(const Scene& scene, LoopController& controller)
   repeat_every_ = std::max<std::int64_t>(1, std::llround(kRepeat / scene.plant.period));
   sim::PlantOptions options = scene.plant;
   if (scene.arm) {
-    guide(scene.rest, scene.start, guidance_time(scene),
+    arm_ = dynamic_cast<sim::Arm*>(mechanism_.get());
+    const bool outside = scene.outside_limits;
+    guide(outside ? scene.start : scene.rest, scene.start, outside ? 0 : guidance_time(scene),
           scene.arm->config.settings.motion.gain_time + kSettling);
     options.initial_torque = torque_;
   }
@@ -66,31 +68,71 @@ void ClosedLoop::guide(const JointVector& from, const JointVector& to, double du
     }
     const std::int64_t time = std::llround(kNanoseconds * period * static_cast<double>(i - ticks));
     const std::int32_t status = controller_.update(time, q, qd, torque_);
-    if (status >= DASHPOT_SETPOINT_REJECTED) {
+    if (status >= DASHPOT_SETPOINT_REJECTED && !scene_.outside_limits) {
       throw InputError("scenario.start", "the controller reports status " + std::to_string(status));
     }
   }
 }
 
+const LoopFault* ClosedLoop::loop_fault() const noexcept {
+  const double now = plant_->time() + 1e-6 * scene_.plant.period;
+  for (const LoopFault& fault : scene_.loop_faults) {
+    if (fault.begin <= now && now < fault.end) return &fault;
+  }
+  return nullptr;
+}
+
 std::int32_t ClosedLoop::control() noexcept {
-  if (scene_.arm) follow_scenario();
+  const LoopFault* const fault = loop_fault();
+  const std::int64_t tick = ticks_++;
+  if (fault != nullptr && (fault->every == 0 || tick % fault->every != 0)) return status_;
+  if (scene_.arm) follow_scenario(tick);
   const sim::Measurement& measured = plant_->measured();
-  ++ticks_;
-  const std::int32_t status =
-      controller_.update(measured.time, measured.position, measured.velocity, torque_);
-  if (status < 0) torque_.setZero();  // a refused call leaves the robot to its host
+  status_ = controller_.update(measured.time, measured.position, measured.velocity, torque_);
+  if (status_ < 0) torque_.setZero();  // a refused call leaves the robot to its host
+  return status_;
+}
+
+sim::Status ClosedLoop::move() noexcept {
+  const LoopFault* const fault = loop_fault();
+  if (fault != nullptr && fault->moved_by.size() > 0) {
+    carry(*fault);
+    return sim::Status::kOk;
+  }
+  const sim::Status status = plant_->step(torque_);
+  extremes_.kinetic_energy = std::max(extremes_.kinetic_energy, plant_->audit().stored.kinetic);
+  if (arm_ == nullptr) return status;
+  const JointVector velocity = plant_->velocity();
+  const JointVector& limit = scene_.arm->config.settings.limits.velocity;
+  extremes_.speed_share =
+      std::max(extremes_.speed_share, velocity.cwiseAbs().cwiseQuotient(limit).maxCoeff());
+  extremes_.tip_speed =
+      std::max(extremes_.tip_speed, arm_->tip_twist(plant_->position(), velocity).head<3>().norm());
   return status;
 }
 
-void ClosedLoop::follow_scenario() noexcept {
+/// One period in the hand, which takes the robot at rest and leaves it at rest.
+void ClosedLoop::carry(const LoopFault& fault) noexcept {
+  if (hand_ != &fault) taken_at_ = plant_->position();
+  hand_ = &fault;
+  const double duration = fault.end - fault.begin;
+  const double s =
+      std::clamp((plant_->time() + scene_.plant.period - fault.begin) / duration, 0.0, 1.0);
+  const auto [place, slope] = ease(s);
+  plant_->carry(taken_at_ + place * fault.moved_by, slope / duration * fault.moved_by);
+}
+
+void ClosedLoop::follow_scenario(std::int64_t tick) noexcept {
   const auto& steps = scene_.steps;
-  bool news = ticks_ % repeat_every_ == 0;
+  bool news = tick - told_at_ >= repeat_every_;
   while (next_step_ < steps.size() && steps[next_step_].at <= plant_->time()) {
     setpoint_ = steps[next_step_++].setpoint;
     news = true;
   }
   // A refusal shows in the status: the watchdog ends what was held before.
-  if (news) controller_.hold(setpoint_);
+  if (!news) return;
+  told_at_ = tick;
+  controller_.hold(setpoint_);
 }
 
 std::int32_t ClosedLoop::hold(const controller::Setpoint& setpoint) noexcept {

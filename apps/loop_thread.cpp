@@ -114,6 +114,8 @@ void LoopThread::tick(std::int64_t utime) noexcept {
   if (kept < record_.tick_times.size()) record_.tick_times[kept] = tick_time;
   const auto last = record_.statuses.size() - 1;
   ++record_.statuses[status < 0 ? last : std::min(static_cast<std::size_t>(status), last)];
+  if (record_.ticks > 0 && status != last_status_) ++record_.status_changes;
+  last_status_ = status;
   // Without real time nobody waits for the tick: all that matters is that its computing fits, and
   // not what else the machine does meanwhile.
   if (fast && 1e-9 * tick_time > options_.period &&
@@ -148,6 +150,8 @@ void LoopThread::take_commands() noexcept {
 void LoopThread::publish(std::int64_t utime) noexcept {
   const dashpot_snapshot& snapshot = loop_.controller().snapshot();
   note(snapshot);
+  if (record_.ticks == 0) first_restarts_ = snapshot.restarts;
+  record_.restarts = snapshot.restarts - first_restarts_;
   state_.utime = utime;
   fill(snapshot, state_.snapshot);
   publisher_.offer(state_);

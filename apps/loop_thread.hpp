@@ -28,6 +28,8 @@ struct LoopRecord {
   std::int64_t latest_wake_up = 0;  ///< after its deadline, ns
   std::vector<std::int32_t> tick_times;     ///< of the controller, ns
   std::array<std::int64_t, 32> statuses{};  ///< ticks with each status of the controller
+  std::int64_t status_changes = 0;
+  std::uint64_t restarts = 0;  ///< of the springs, after the first tick
   sim::Status simulation = sim::Status::kOk;
   std::int64_t commands_refused = 0;  ///< by the controller, though well-formed
   dashpot_modes first_modes{};        ///< tick 0: there were none
@@ -96,6 +98,8 @@ class LoopThread {
   // The loop's own:
   LoopRecord record_;
   std::int64_t commands_applied_ = 0;
+  std::int32_t last_status_ = DASHPOT_OK;
+  std::uint64_t first_restarts_ = 0;
   lcmtypes::StateSample state_;
   lcmtypes::ModesSample modes_;
   lcmtypes::SampledModesSample sampled_;

@@ -193,6 +193,7 @@ void run(const Options& options) {
   report.period = scene.plant.period;
   report.simulated_time = loop.plant().time();
   report.energy = loop.plant().audit();
+  report.extremes = loop.extremes();
   if ((scene.ring_down || options.ring_down) && !report.interrupted) {
     report.ring_down = measure_ring_down(scene, make_controller, StopSignal::given);
     report.interrupted = !report.ring_down;

@@ -147,7 +147,15 @@ std::string statuses_text(const LoopRecord& loop) {
     out +=
         (out.back() == ':' ? " " : ", ") + status_text(i) + " " + std::to_string(loop.statuses[i]);
   }
-  return out + "\n";
+  return out + "\n  " + count(loop.status_changes, "change") + " of status, " +
+         count(static_cast<std::int64_t>(loop.restarts), "restart") + " of the springs\n";
+}
+
+std::string extremes_text(const Extremes& extremes) {
+  const std::string energy = "kinetic energy " + format_number(extremes.kinetic_energy, 3) + " J\n";
+  if (extremes.tip_speed == 0) return "  Greatest " + energy;
+  return "  Greatest speed of a joint " + format_number(100 * extremes.speed_share, 3) +
+         " % of its limit, of the tip " + format_number(extremes.tip_speed, 3) + " m/s, " + energy;
 }
 
 /// How the modes were found, in ticks after the first one of the run.
@@ -285,8 +293,8 @@ std::string to_table(const RunReport& report) {
                     count(loop.ticks, "tick") + " of " + format_number(1e3 * report.period, 3) +
                     " ms, " + pace_text(report) + (report.interrupted ? "; interrupted" : "") +
                     "\n\n";
-  out += timing_text(report) + statuses_text(loop) + error_text(loop) + energy_text(report.energy) +
-         messages_text(report);
+  out += timing_text(report) + statuses_text(loop) + extremes_text(report.extremes) +
+         error_text(loop) + energy_text(report.energy) + messages_text(report);
   if (loop.first_modes.tick != 0) {
     out += solved_text(loop.first_modes, loop.last_modes);
     out += "\nModes at the start, " + count(loop.first_modes.zero_modes, "zero mode") + "\n" +
@@ -330,6 +338,12 @@ std::string to_json(const RunReport& report) {
         {"p99_9", 1e-6 * times.p99_9},
         {"longest", 1e-6 * times.longest}}},
       {"status", statuses},
+      {"status_changes", loop.status_changes},
+      {"restarts", loop.restarts},
+      {"greatest",
+       {{"joint_speed_share", report.extremes.speed_share},
+        {"tip_speed", report.extremes.tip_speed},
+        {"kinetic_energy", report.extremes.kinetic_energy}}},
       {"zero_modes", loop.last_modes.zero_modes},
       {"modes", {{"start", modes_json(loop.first_modes)}, {"end", modes_json(loop.last_modes)}}},
       {"solved", solved_json(loop.first_modes, loop.last_modes)},

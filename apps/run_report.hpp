@@ -19,6 +19,7 @@ struct RunReport {
   LoopRecord loop;
   double simulated_time = 0;  ///< s
   sim::EnergyAudit energy;
+  Extremes extremes;
   lcmtypes::PublisherCounters messages;
   std::int64_t commands_accepted = 0;
   std::int64_t commands_rejected = 0;

@@ -37,6 +37,15 @@ struct ScenarioStep {
   controller::Setpoint setpoint;
 };
 
+/// From `begin` until just before `end`, s, the controller is called in every so many periods only.
+struct LoopFault {
+  double begin = 0;
+  double end = 0;
+  int every = 1;         ///< 0: not at all
+  JointVector moved_by;  ///< n, rad; so far a hand moves the robot meanwhile; zero: it is held
+                         ///< where it is; empty: the last torque acts on
+};
+
 /// Joint vectors have n entries.
 struct Scene {
   std::string path;
@@ -45,10 +54,12 @@ struct Scene {
   double duration = 5;                   ///< s
   bool ring_down = false;                ///< fit the modes of small releases, too
   sim::PlantOptions plant;
-  JointVector rest;                 ///< where the springs are fixed at first, rad
-  JointVector start;                ///< where the robot is let go, rad
-  JointVector velocity;             ///< with this velocity, rad/s; zero for an arm
-  std::vector<ScenarioStep> steps;  ///< of an arm, by time; the first one at 0
+  std::vector<LoopFault> loop_faults;  ///< of an arm; of several at a time the first one counts
+  bool outside_limits = false;         ///< an arm may start outside its position limits
+  JointVector rest;                    ///< where the springs are fixed at first, rad
+  JointVector start;                   ///< where the robot is let go, rad
+  JointVector velocity;                ///< with this velocity, rad/s; zero for an arm
+  std::vector<ScenarioStep> steps;     ///< of an arm, by time; the first one at 0
 
   int dof() const { return static_cast<int>(rest.size()); }
 };

@@ -21,4 +21,17 @@ void read_simulation(const controller::YamlMapping& root, const controller::Unit
 void read_scenario(const controller::YamlMapping& root, const controller::Units& positions,
                    Scene& scene);
 
+/// Reads `scenario.faults` into the plant's options and the scene. Throws InputError.
+void read_faults(const controller::YamlMapping& scenario, const controller::Units& positions,
+                 Scene& scene);
+
+/// The entries of a list of mappings under `scenario`, each with the prefix of its keys in
+/// messages.
+std::vector<controller::YamlMapping> mappings(const controller::YamlMapping& keys,
+                                              std::string_view key,
+                                              std::span<const std::string_view> known_keys);
+/// Throws unless `keys` has `key`; `parent` has `keys` under `name`.
+void require(const controller::YamlMapping& keys, std::string_view key,
+             const controller::YamlMapping& parent, std::string_view name);
+
 }  // namespace dashpot::apps

@@ -33,28 +33,6 @@ Pose moved(const Pose& pose, const Vector6& displacement) {
               pose.rotation};
 }
 
-/// The entries of a list of mappings, each with the prefix of its keys in messages.
-std::vector<YamlMapping> mappings(const YamlMapping& keys, std::string_view key,
-                                  std::span<const std::string_view> known_keys) {
-  const YamlNode* node = keys.find(key);
-  std::vector<YamlMapping> result;
-  if (node == nullptr) return result;
-  if (node->kind != YamlNode::Kind::kSequence) {
-    throw keys.error(key, "a list is wanted, not " + controller::describe(*node));
-  }
-  for (std::size_t i = 0; i < node->items.size(); ++i) {
-    result.emplace_back(node->items[i],
-                        "scenario." + std::string(key) + "[" + std::to_string(i + 1) + "].",
-                        known_keys);
-  }
-  return result;
-}
-
-void require(const YamlMapping& keys, std::string_view key, const YamlMapping& parent,
-             std::string_view name) {
-  if (!keys.has(key)) throw keys.error(key, "missing", parent.line(name));
-}
-
 /// Throws unless the joints may be at q, which stands under `key`.
 void check_limits(const YamlMapping& keys, std::string_view key, const JointVector& q,
                   const Units& positions, const Scene& scene) {
@@ -99,9 +77,10 @@ void check_reach(const YamlMapping& keys, const controller::Setpoint& setpoint,
 }
 
 void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 3> kKeys = {"position", "joint_displacement",
-                                                            "tip_displacement"};
+  static constexpr std::array<std::string_view, 4> kKeys = {"position", "joint_displacement",
+                                                            "tip_displacement", "outside_limits"};
   const YamlMapping keys = scenario.mapping("start", kKeys);
+  read_switch(keys, "outside_limits", scene.outside_limits);
   require(keys, "position", scenario, "start");
   read_numbers(keys, "position", positions, Sign::kAny, scene.rest);
   scene.start = scene.rest;
@@ -129,8 +108,12 @@ void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& 
   const char* moved_by = keys.has("tip_displacement")     ? "tip_displacement"
                          : keys.has("joint_displacement") ? "joint_displacement"
                                                           : "position";
+  if (scene.outside_limits) {
+    const controller::Limits& limits = scene.arm->config.settings.limits;
+    scene.rest = scene.start.cwiseMax(limits.position_lower).cwiseMin(limits.position_upper);
+  }
   check_limits(keys, "position", scene.rest, positions, scene);
-  check_limits(keys, moved_by, scene.start, positions, scene);
+  if (!scene.outside_limits) check_limits(keys, moved_by, scene.start, positions, scene);
   check_wall(keys, moved_by, scene);
 }
 
@@ -218,6 +201,27 @@ void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scen
 
 }  // namespace
 
+std::vector<YamlMapping> mappings(const YamlMapping& keys, std::string_view key,
+                                  std::span<const std::string_view> known_keys) {
+  const YamlNode* node = keys.find(key);
+  std::vector<YamlMapping> result;
+  if (node == nullptr) return result;
+  if (node->kind != YamlNode::Kind::kSequence) {
+    throw keys.error(key, "a list is wanted, not " + controller::describe(*node));
+  }
+  for (std::size_t i = 0; i < node->items.size(); ++i) {
+    result.emplace_back(node->items[i],
+                        "scenario." + std::string(key) + "[" + std::to_string(i + 1) + "].",
+                        known_keys);
+  }
+  return result;
+}
+
+void require(const YamlMapping& keys, std::string_view key, const YamlMapping& parent,
+             std::string_view name) {
+  if (!keys.has(key)) throw keys.error(key, "missing", parent.line(name));
+}
+
 std::optional<JointVector> displaced(const RobotModel& model, const JointVector& q,
                                      const Vector6& displacement) {
   const Pose goal = moved(tip_at(model, q), displacement);
@@ -242,8 +246,8 @@ std::optional<JointVector> displaced(const RobotModel& model, const JointVector&
 }
 
 void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 5> kKeys = {"duration", "start", "pushes", "steps",
-                                                            "ring_down"};
+  static constexpr std::array<std::string_view, 6> kKeys = {"duration", "start",  "pushes",
+                                                            "steps",    "faults", "ring_down"};
   const YamlMapping keys = root.mapping("scenario", kKeys);
   read_number(keys, "duration", "s", Sign::kPositive, scene.duration);
   if (scene.duration > kLongest) throw keys.error("duration", "is more than 1e7 s");
@@ -253,10 +257,13 @@ void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene
     read_arm_start(keys, positions, scene);
     read_arm_pushes(keys, scene);
     read_steps(keys, positions, scene);
+    read_faults(keys, positions, scene);
   } else {
     read_system_start(keys, positions, scene);
     read_system_pushes(keys, positions, scene);
-    if (keys.has("steps")) throw keys.error("steps", "is for robot arms; this scene is a system");
+    for (const char* key : {"steps", "faults"}) {
+      if (keys.has(key)) throw keys.error(key, "is for robot arms; this scene is a system");
+    }
   }
 }
 

@@ -32,6 +32,16 @@ bool is_on(const JointVector& values, int n, const char* key, const char* unit) 
   return (values.array() > 0).any();
 }
 
+void check(const SensorFault& fault, int n) {
+  if (!(fault.begin < fault.end)) fail("faults", "one does not begin before it ends");
+  if (fault.position_offset.size() != 0) {
+    require_finite(fault.position_offset, n, "faults: position_offset");
+  }
+  if (fault.velocity_factor.size() != 0) {
+    require_finite(fault.velocity_factor, n, "faults: velocity_factor");
+  }
+}
+
 }  // namespace
 
 Plant::Plant(System& system, const PlantOptions& options, const JointVector& q,
@@ -78,9 +88,15 @@ Plant::Plant(System& system, const PlantOptions& options, const JointVector& q,
   if (is_on(options.position_resolution, n, "position_resolution", "rad")) {
     sensing_.push_back(&quantise);
   }
+  for (const SensorFault& fault : options.faults) check(fault, n);
+  if (!options.faults.empty()) sensing_.push_back(&shift_positions);
   measure();
   last_position_ = measured_.position;
   if (options.difference_velocity) sensing_.push_back(&difference);
+  if (options.faults.empty()) return;
+  shown_ = measured_;
+  spoil(*this);
+  sensing_.push_back(&spoil);
 }
 
 Status Plant::step(const JointVector& command) noexcept {
@@ -107,6 +123,16 @@ Status Plant::step(const JointVector& command) noexcept {
   ++ticks_;
   measure();
   return Status::kOk;
+}
+
+void Plant::carry(const JointVector& q, const JointVector& qd) noexcept {
+  const Eigen::Index n = system_->dof();
+  const double before = system_->stored_energy(y_).sum();
+  y_.head(n) = q;
+  y_.segment(n, n) = qd;
+  y_[2 * n + kByWorld] += system_->stored_energy(y_).sum() - before;
+  ++ticks_;
+  measure();
 }
 
 /// Through one period, cut where external forces jump.
@@ -170,6 +196,36 @@ void Plant::quantise(Plant& plant) noexcept {
     double& position = plant.measured_.position[i];
     position = count * std::nearbyint(position / count);
   }
+}
+
+bool Plant::acts(const SensorFault& fault) const noexcept {
+  // By whole ticks: a sum of periods may lie a rounding error before the time that was meant.
+  const double now = time() + 1e-6 * options_.period;
+  return fault.begin <= now && now < fault.end;
+}
+
+void Plant::shift_positions(Plant& plant) noexcept {
+  for (const SensorFault& fault : plant.options_.faults) {
+    if (fault.position_offset.size() == 0 || !plant.acts(fault)) continue;
+    plant.measured_.position += fault.position_offset;
+  }
+}
+
+void Plant::spoil(Plant& plant) noexcept {
+  Measurement& shown = plant.measured_;
+  for (const SensorFault& fault : plant.options_.faults) {
+    if (!plant.acts(fault)) continue;
+    if (fault.velocity_factor.size() != 0) {
+      shown.velocity = shown.velocity.cwiseProduct(fault.velocity_factor);
+    }
+    if (fault.frozen) {
+      shown.position = plant.shown_.position;
+      shown.velocity = plant.shown_.velocity;
+    }
+    if (fault.not_a_number) shown.position.setConstant(std::nan(""));
+    shown.time += fault.clock_offset;
+  }
+  plant.shown_ = shown;
 }
 
 void Plant::difference(Plant& plant) noexcept {

@@ -5,9 +5,22 @@
 #include <dashpot/sim/system.hpp>
 
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace dashpot::sim {
+
+/// What goes wrong with the feedback from `begin` until just before `end`, s. What is zero, empty
+/// or false stays right.
+struct SensorFault {
+  double begin = 0;
+  double end = std::numeric_limits<double>::infinity();
+  JointVector position_offset;    ///< n, rad; added to the positions, before they are differenced
+  JointVector velocity_factor;    ///< n; the velocities are multiplied by it
+  bool frozen = false;            ///< positions and velocities stay what was shown before `begin`
+  bool not_a_number = false;      ///< all positions
+  std::int64_t clock_offset = 0;  ///< ns, added to the time stamp
+};
 
 /// What lies between controller and mechanism. What is off (zero or empty) costs nothing.
 struct PlantOptions {
@@ -28,6 +41,7 @@ struct PlantOptions {
   JointVector position_resolution;   ///< rad per count; measured positions are multiples of it
   bool difference_velocity = false;  ///< (position - last position) / period, as measured
   std::uint64_t seed = 1;            ///< of the noise
+  std::vector<SensorFault> faults;
 };
 
 /// What the sensors show at a tick.
@@ -71,6 +85,9 @@ class Plant {
 
   /// One period with the torque commanded now, N m. Unless the status is kOk, nothing has changed.
   Status step(const JointVector& command) noexcept;
+  /// One period in which a hand or a brake, and not the torque, brings the robot to position q with
+  /// velocity qd, n entries each. The energy counts as the world's work.
+  void carry(const JointVector& q, const JointVector& qd) noexcept;
 
   const Measurement& measured() const noexcept { return measured_; }
 
@@ -93,7 +110,10 @@ class Plant {
   static void add_position_noise(Plant& plant) noexcept;
   static void add_velocity_noise(Plant& plant) noexcept;
   static void quantise(Plant& plant) noexcept;
+  static void shift_positions(Plant& plant) noexcept;
   static void difference(Plant& plant) noexcept;
+  static void spoil(Plant& plant) noexcept;
+  bool acts(const SensorFault& fault) const noexcept;
 
   Status move(StateVector& y) noexcept;
   void measure() noexcept;
@@ -115,6 +135,7 @@ class Plant {
   std::vector<JointVector> delayed_;  // ring
   std::size_t oldest_ = 0;
   JointVector last_position_;  // as measured
+  Measurement shown_;          // at the tick before
   Noise noise_;
 };
 

@@ -41,7 +41,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         BadScene{"UnknownKey", "ur5", "duration:", "duratoin:",
                  "scenario.duratoin: unknown key; the keys are duration, start, pushes, steps, "
-                 "ring_down (line 17)"},
+                 "faults, ring_down (line 17)"},
         BadScene{"WrongUnit", "ur5", "duration: 6 s", "duration: 6 kg",
                  "scenario.duration: has a wrong unit: '6 kg'; s is wanted (line 17)"},
         BadScene{"NegativeDuration", "ur5", "duration: 6 s", "duration: -6 s",
@@ -54,7 +54,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"StepOutOfReach", "panda", "[5 cm, 5 cm, -5 cm, 0, 0, 20 deg]",
                  "[5 cm, 1.5 m, -5 cm, 0, 0, 20 deg]",
                  "scenario.steps[1].tip_displacement: is out of the arm's reach, by @ m and @ rad "
-                 "(line 65)"},
+                 "(line 67)"},
         BadScene{"OutOfLimits", "panda", "position: [0, -45 deg", "position: [0, -145 deg",
                  "scenario.start.position: joint 2 would be at -2.530727 rad, outside its limits "
                  "(line 58)"},
@@ -68,7 +68,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "limits (line 26)"},
         BadScene{"IndefiniteDamping", "panda", "damping: [20 N s/m, 20", "damping: [-20 N s/m, 20",
                  "scenario.steps: the controller refuses this: task_damping is not positive "
-                 "semidefinite (line 66)"},
+                 "semidefinite (line 68)"},
         BadScene{"EndBeforeBegin", "iiwa14", "end: 1.6 s", "end: 1.4 s",
                  "scenario.pushes[1].end: is not after begin (line 23)"},
         BadScene{"WrongLength", "iiwa14", "joint_displacement: [0.02, 0.02",
@@ -79,6 +79,20 @@ INSTANTIATE_TEST_SUITE_P(
                  "simulation.integrator.method: semi_implicit_euler, rk4, velocity_verlet, "
                  "modified_midpoint, cash_karp, dormand_prince, dormand_prince_8, "
                  "implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 25)"},
+        BadScene{"FaultThatDoesNothing", "ur5", "  steps:", "  faults: [{begin: 1 s}]\n  steps:",
+                 "scenario.faults[1].begin: is of a fault that does nothing (line 21)"},
+        BadScene{"FaultThatEndsFirst", "ur5",
+                 "  steps:", "  faults: [{begin: 1 s, end: 0.5 s, frozen: true}]\n  steps:",
+                 "scenario.faults[1].end: is not after begin (line 21)"},
+        BadScene{"HandWithoutAPause", "ur5",
+                 "  steps:", "  faults: [{begin: 1 s, end: 2 s, moved_by: 0.1 rad}]\n  steps:",
+                 "scenario.faults[1].moved_by: goes with a pause that has an end (line 21)"},
+        BadScene{"PauseWithCalls", "ur5",
+                 "  steps:", "  faults: [{begin: 1 s, pause: true, call_every: 2}]\n  steps:",
+                 "scenario.faults[1].call_every: stands beside pause, in which there are no calls "
+                 "(line 21)"},
+        BadScene{"FaultsOfASystem", "chain3", "scenario:", "scenario:\n  faults: []",
+                 "scenario.faults: is for robot arms; this scene is a system (line 9)"},
         BadScene{"MassNotDefinite", "chain3", "[[8, 0, 0]", "[[-8, 0, 0]",
                  "system: mass: is not positive definite"},
         BadScene{"WallOfASystem", "chain3", "scenario:", "simulation: {wall: {}}\nscenario:",

@@ -3,6 +3,7 @@
 #include <dashpot/tests/apps/json_result.hpp>
 
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 
@@ -44,6 +45,26 @@ inline std::string changed(const Scratch& scratch, const std::string& name,
 inline std::string changed(const Scratch& scratch, const std::string& name, const std::string& from,
                            const std::string& to) {
   return changed(scratch, name, {{from, to}});
+}
+
+/// The columns of a CSV by name.
+inline std::map<std::string, Numbers> table(const std::string& path) {
+  std::istringstream lines(text_of(path));
+  std::map<std::string, Numbers> columns;
+  std::vector<std::string> names;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    std::size_t i = 0;
+    for (std::string cell; std::getline(cells, cell, ','); ++i) {
+      if (columns.size() < names.size() + 1 && columns.find(cell) == columns.end() &&
+          line.starts_with("time")) {
+        names.push_back(cell);
+      } else {
+        columns[names.at(i)].push_back(std::stod(cell));
+      }
+    }
+  }
+  return columns;
 }
 
 }  // namespace dashpot::tests

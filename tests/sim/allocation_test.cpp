@@ -33,6 +33,11 @@ void expect_no_allocation(System& system, PlantOptions options, const JointVecto
   options.position_noise = JointVector::Constant(n, 1e-5);
   options.velocity_noise = JointVector::Constant(n, 1e-5);
   options.position_resolution = JointVector::Constant(n, 1e-5);
+  SensorFault fault;
+  fault.begin = 0.05;
+  fault.position_offset = fault.velocity_factor = JointVector::Constant(n, 0.5);
+  fault.frozen = true;
+  options.faults = {fault};
   for (const bool difference : {false, true}) {
     options.difference_velocity = difference;
     for (const Method method : testing::kMethods) {
@@ -50,6 +55,7 @@ void expect_no_allocation(System& system, PlantOptions options, const JointVecto
                       status = plant.step(torque);
                       refused = plant.step(bad);
                       audit = plant.audit();
+                      if (i % 50 == 0) plant.carry(plant.position(), plant.velocity());
                     }
                   }),
                   0)

@@ -1,0 +1,161 @@
+// Scenes in which something goes wrong, and what the summary says of them.
+#include <dashpot/tests/apps/scene_run.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+namespace dashpot::tests {
+namespace {
+
+/// The table of a second of the UR5's scene with `faults` in it.
+std::map<std::string, Numbers> with_faults(const std::string& faults) {
+  const Scratch scratch;
+  const std::string csv = scratch.path("a.csv");
+  const std::string file =
+      changed(scratch, "ur5", "  steps:", "  faults:\n    - {" + faults + "}\n  steps:");
+  EXPECT_EQ(run_scene(file, {"--duration", "1", "--csv", csv}).status, 0);
+  return table(csv);
+}
+
+TEST(Faults, ShiftAnEncoderWhileTheyLast) {
+  const auto columns =
+      with_faults("begin: 0.3 s, end: 0.302 s, position_offset: [0, 0.01, 0, 0, 0, 0]");
+  const Numbers& q = columns.at("q2");
+  EXPECT_NEAR(q[299], q[298], 1e-3);
+  EXPECT_NEAR(q[300], q[299] + 0.01, 1e-3);
+  EXPECT_NEAR(q[301], q[299] + 0.01, 1e-3);
+  EXPECT_NEAR(q[302], q[299], 1e-3);
+  EXPECT_NEAR(columns.at("q3")[300], columns.at("q3")[299], 1e-3);
+}
+
+TEST(Faults, TurnVelocitiesRound) {
+  const auto right = with_faults("begin: 0.9 s, frozen: true");
+  const auto wrong = with_faults("begin: 0.1 s, end: 0.101 s, velocity_factor: -1");
+  EXPECT_EQ(wrong.at("qd2")[99], right.at("qd2")[99]);
+  EXPECT_EQ(wrong.at("qd2")[100], -right.at("qd2")[100]);
+  EXPECT_NE(right.at("qd2")[100], 0);
+}
+
+TEST(Faults, FreezeTheFeedback) {
+  const auto columns = with_faults("begin: 0.1 s, end: 0.105 s, frozen: true");
+  for (const char* name : {"q2", "qd2"}) {
+    const Numbers& shown = columns.at(name);
+    EXPECT_NE(shown[98], shown[99]);
+    for (std::size_t i = 100; i < 105; ++i) EXPECT_EQ(shown[i], shown[99]) << name;
+    EXPECT_NE(shown[105], shown[99]);
+  }
+}
+
+TEST(Faults, SpoilNumbersAndClock) {
+  for (const char* fault : {"not_a_number: true", "clock_offset: -0.5 s"}) {
+    const auto columns = with_faults(std::string("begin: 0.1 s, end: 0.101 s, ") + fault);
+    const Numbers& status = columns.at("status");
+    EXPECT_EQ(status[99], 0) << fault;
+    EXPECT_NE(status[100], 0) << fault;
+  }
+}
+
+TEST(Faults, CallTheControllerNowAndThen) {
+  const Numbers torque = with_faults("begin: 0 s, end: 0.5 s, call_every: 5").at("torque2");
+  for (std::size_t i = 1; i < 500; ++i) EXPECT_EQ(torque[i] == torque[i - 1], i % 5 != 0) << i;
+  for (std::size_t i = 501; i < 600; ++i) EXPECT_NE(torque[i], torque[i - 1]) << i;
+}
+
+TEST(Faults, LetAHandMoveTheRobotInAPause) {
+  const Numbers q =
+      with_faults("begin: 0.2 s, end: 0.7 s, pause: true, moved_by: 0.3 rad").at("q2");
+  for (std::size_t i = 200; i < 700; ++i) EXPECT_EQ(q[i], q[199]) << i;
+  EXPECT_NEAR(q[700], q[199] + 0.3, 1e-3);
+  // Without a hand the last torque goes on.
+  const Numbers left = with_faults("begin: 0.2 s, end: 0.21 s, pause: true").at("q2");
+  EXPECT_EQ(left[209], left[199]);
+  EXPECT_NE(left[210], left[199]);
+  EXPECT_NEAR(left[210], left[199], 0.01);
+}
+
+TEST(Faults, StartOutsideTheLimitsOnlyWhereTheSceneSaysSo) {
+  const Scratch scratch;
+  const std::string path =
+      std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes/safety/outside_limit.yaml";
+  std::string text = text_of(path);
+  text.replace(text.find("../../models"), 12, std::string(DASHPOT_SOURCE_DIR) + "/sim/models");
+  const std::string csv = scratch.path("a.csv");
+  const std::string said = "    outside_limits: true\n";
+  EXPECT_EQ(run_scene(scratch.write("scene.yaml", text), {"--csv", csv, "--duration", "1"}).status,
+            0);
+  EXPECT_NEAR(table(csv).at("q1")[0], std::numbers::pi / 2, 1e-9);
+  text.replace(text.find(said), said.size(), "");
+  const Outcome refused = run_scene(scratch.write("scene.yaml", text));
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_THAT(refused.err, ::testing::HasSubstr("joint 1 would be at 1.570796 rad, outside its"));
+}
+
+TEST(Summary, SaysHowFarTheRobotWent) {
+  // A push of 200 N for 10 ms.
+  const Scratch scratch;
+  const std::string file =
+      changed(scratch, "ur5", "  steps:",
+              "  pushes: [{begin: 0.2 s, end: 0.21 s, wrench: [0, 200 N, 0, 0, 0, 0]}]\n  faults:\n"
+              "    - {begin: 0.5 s, end: 0.6 s, pause: true}\n  steps:");
+  const Json result = run_json(file, {"--duration", "1", "--csv", scratch.path("a.csv")});
+  const auto columns = table(scratch.path("a.csv"));
+  double fastest = 0;
+  for (int i = 1; i <= 6; ++i) {
+    const double limit = i <= 3 ? 3.15 : 3.2;  // of the URDF, rad/s
+    for (const double speed : columns.at("qd" + std::to_string(i))) {
+      fastest = std::max(fastest, std::abs(speed) / limit);
+    }
+  }
+  EXPECT_NEAR(result["greatest"]["joint_speed_share"].get<double>(), fastest, 1e-3 * fastest);
+  double tip = 0;
+  for (std::size_t k = 1; k < 500; ++k) {
+    double square = 0;
+    for (const char* axis : {"x", "y", "z"}) {
+      const Numbers& at = columns.at(axis);
+      square += std::pow((at[k] - at[k - 1]) / 0.001, 2);
+    }
+    tip = std::max(tip, std::sqrt(square));
+  }
+  EXPECT_NEAR(result["greatest"]["tip_speed"].get<double>(), tip, 0.1 * tip);
+  EXPECT_GT(result["greatest"]["kinetic_energy"].get<double>(), 0.1);
+  EXPECT_GE(result["status_changes"].get<int>(), 1);
+  const Json calm = run_json(scene("ur5"), {"--duration", "0.1"});
+  EXPECT_EQ(calm["restarts"], 0);
+  const std::string text = run_scene(file, {"--duration", "1"}).out;
+  EXPECT_THAT(text, ::testing::AllOf(::testing::HasSubstr("\n  Greatest speed of a joint "),
+                                     ::testing::HasSubstr(" changes of status, ")));
+}
+
+std::vector<std::string> safety_scenes() {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(std::string(DASHPOT_SOURCE_DIR) +
+                                                               "/sim/scenes/safety")) {
+    names.push_back(entry.path().stem());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+class SafetyScene : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(SafetyScene, RunsToItsEndAndAccountsForItsEnergy) {
+  // Those that need long say on standard error how far they are.
+  const Outcome outcome = run_scene(scene("safety/" + GetParam()), {"--json"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const Json result = Json::parse(outcome.out);
+  EXPECT_GE(result["ticks"].get<int>(), 3000);
+  const Json& energy = result["energy"];
+  const double moved = 1 + std::abs(energy["by_actuators"].get<double>()) +
+                       std::abs(energy["by_world"].get<double>());
+  EXPECT_LT(std::abs(energy["imbalance"].get<double>()), 1e-2 * moved);
+  EXPECT_GT(result["greatest"]["joint_speed_share"].get<double>(), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, SafetyScene, ::testing::ValuesIn(safety_scenes()));
+
+}  // namespace
+}  // namespace dashpot::tests

@@ -1,0 +1,106 @@
+#pragma once
+// The robots that the safety of the plugin is shown on.
+
+#include <dashpot/controller/config.hpp>
+#include <dashpot/sim/arm.hpp>
+
+#include <string>
+#include <vector>
+
+namespace dashpot::stress {
+
+using controller::JointVector;
+
+/// A robot, where it starts, and which of its joints things happen to.
+struct TestArm {
+  const char* name;
+  const char* file;
+  const char* base;
+  const char* tip;
+  double reflected_inertia;   ///< kg m^2 or kg, each joint: simulated, and known to the controller
+  std::vector<double> start;  ///< rad or m, well within the limits
+  int joint;                  ///< that is taken out of its limits, slips, ...
+  int light;                  ///< the revolute one with the least inertia
+  const char* limits;         ///< lines of the configuration under `limits`
+};
+
+inline const std::vector<TestArm>& test_arms() {
+  static const std::vector<TestArm> all = {
+      {"panda",
+       "panda",
+       "panda_link0",
+       "panda_hand_tcp",
+       0,
+       {0, -0.785, 0, -2.356, 0, 1.571, 0.785},
+       0,
+       6,
+       ""},
+      {"iiwa14",
+       "iiwa14",
+       "iiwa_link_0",
+       "iiwa_link_ee_kuka",
+       0,
+       {0, 0.524, 0, -1.396, 0, 1.047, 0},
+       0,
+       6,
+       ""},
+      {"iiwa14+rotors",
+       "iiwa14",
+       "iiwa_link_0",
+       "iiwa_link_ee_kuka",
+       0.1,
+       {0, 0.524, 0, -1.396, 0, 1.047, 0},
+       0,
+       6,
+       ""},
+      {"ur5", "ur5", "base_link", "ee_link", 0, {0, -1.222, 1.571, -1.920, -1.571, 0}, 0, 5, ""},
+      {"lift+gripper",
+       "lift_gripper",
+       "base",
+       "fingertip",
+       0,
+       {0.4, 0.5, -1.0, 0.3, 0.02},
+       0,
+       3,
+       "  position_margin: 0.005\n"},  // not more than the finger's way
+  };
+  return all;
+}
+
+inline JointVector start_of(const TestArm& arm) {
+  return Eigen::Map<const Eigen::VectorXd>(arm.start.data(),
+                                           static_cast<Eigen::Index>(arm.start.size()));
+}
+
+/// A flow list of YAML.
+inline std::string yaml_list(const JointVector& values) {
+  std::string text = "[";
+  for (const double value : values) {
+    text += (text.size() > 1 ? ", " : "") +
+            (std::isfinite(value) ? std::to_string(value) : std::string("none"));
+  }
+  return text + "]";
+}
+
+/// The lines of a configuration that name the robot.
+inline std::string robot_yaml(const TestArm& arm) {
+  std::string text = "robot:\n  urdf: " + std::string(DASHPOT_SOURCE_DIR "/sim/models/") +
+                     arm.file + ".urdf\n  base: " + arm.base + "\n  tip: " + arm.tip + "\n";
+  if (arm.reflected_inertia > 0) {
+    text += "  reflected_inertia: " +
+            yaml_list(JointVector::Constant(static_cast<Eigen::Index>(arm.start.size()),
+                                            arm.reflected_inertia)) +
+            "\n";
+  }
+  return text;
+}
+
+inline sim::Robot simulated_robot(const TestArm& arm) {
+  sim::RobotParameters parameters;
+  parameters.armature.setConstant(static_cast<Eigen::Index>(arm.start.size()),
+                                  arm.reflected_inertia);
+  return sim::Robot::from_file(std::string(DASHPOT_SOURCE_DIR "/sim/models/") + arm.file + ".urdf",
+                               arm.base, arm.tip, parameters);
+}
+
+}  // namespace dashpot::stress

@@ -1,0 +1,100 @@
+// Drives plugin files through every scenario that this project has seen go wrong, on several arms,
+// and shows in one table what comes of it:
+//     safety_stress [LABEL=]PLUGIN...
+// The last plugin has to keep what is promised; the others are there to compare it with.
+#include <dashpot/tests/stress/safety_contact.hpp>
+#include <dashpot/tests/stress/safety_scenarios.hpp>
+
+namespace {
+
+using namespace dashpot::stress;  // NOLINT(google-build-using-namespace)
+
+std::vector<Scenario> scenarios() {
+  using std::numbers::pi;
+  const std::vector<std::string> lift = {"lift+gripper"};
+  const std::vector<std::string> three = {"panda", "iiwa14", "ur5"};
+  return {
+      {"1", "parked 60 deg outside (lift: 0.2 m)", {}, outside(pi / 3, 0.2, 0)},
+      {"1", "5 deg outside (lift: 2 cm)", {}, outside(pi / 36, 0.02, 0)},
+      {"1", "outside, moving inward at 3.7 x limit", {}, outside(pi / 3, 0.2, 3.7)},
+      {"2", "light joint pressed to its limit", {}, light_joint_pressed},
+      {"2", "light joint let go past its limit", {}, light_joint_let_go},
+      {"2", "finger of 4 cm, left alone", lift, finger_at_rest},
+      {"3", "encoder wraps by 2 pi", {}, encoder_off(-2 * pi)},
+      {"3", "encoder slips by 0.5 rad", {}, encoder_off(-0.5)},
+      {"4", "unstable gains", {}, unstable_gains},
+      {"4", "wrench without springs", {}, wrench_without_springs},
+      {"4", "moved by hand in a pause of 10 s", {}, moved_in_a_pause},
+      {"5", "feedback frozen", {}, bad_feedback(freeze)},
+      {"5", "velocity always zero", {}, bad_feedback(no_velocity)},
+      {"5", "velocity of the wrong sign", {}, bad_feedback(wrong_sign)},
+      {"5", "hard jolts at the wrist", {}, hard_jolts},
+      {"6", "table, goal 15 cm below", three, table(0.15)},
+      {"6", "table, goal 20 cm below", three, table(0.2)},
+      {"7", "12 moves of the tip, all defaults", {}, default_moves},
+      {"7", "toward a stretched arm", {}, stretched},
+      {"9", "K = 50000, D = 0, alternating goals", {}, stiff_undamped},
+      {"9", "D = 5000 at rest", {}, over_damped},
+      {"10", "loop at 1/2 of its rate", {}, slow_loop(2)},
+      {"10", "loop at 1/5 of its rate", {}, slow_loop(5)},
+      {"10", "reset(NULL) in motion", {}, reset_in_motion},
+      {"10", "start without reset(weight)", {}, untold_weight},
+      {"10", "torque limits below the weight", {}, too_weak},
+  };
+}
+
+void print(const Row& row, bool first) {
+  const Measures& seen = row.seen;
+  std::printf("%-40s %-14s %-7s %8.2f %8.2f %8.2f %6.0f %7d %5s  %-32.32s %s\n",
+              first ? row.scenario.c_str() : "", first ? row.arm.c_str() : "", row.plugin.c_str(),
+              seen.speed_share, seen.tip_speed, seen.kinetic_energy, 100 * seen.reversals,
+              seen.changes, seen.last_speed < kRest ? "yes" : "no", seen.first_status.c_str(),
+              row.note.c_str());
+  std::string broken;
+  if (seen.refused_goals > 0) broken = std::to_string(seen.refused_goals) + " goals refused";
+  for (const std::string& what : row.broken) broken += (broken.empty() ? "" : "; ") + what;
+  if (!broken.empty()) std::printf("%64s! %s\n", "", broken.c_str());
+  std::fflush(stdout);
+}
+
+bool chosen(const Scenario& scenario, const TestArm& arm) {
+  if (scenario.arms.empty()) return true;
+  return std::find(scenario.arms.begin(), scenario.arms.end(), arm.name) != scenario.arms.end();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  std::vector<PluginFile> plugins;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    const std::size_t equals = word.find('=');
+    const bool labelled = equals != std::string::npos;
+    plugins.emplace_back(labelled ? word.substr(0, equals) : "today",
+                         labelled ? word.substr(equals + 1) : word);
+  }
+  if (plugins.empty()) plugins.emplace_back("today", DASHPOT_PLUGIN);
+  std::printf("%-40s %-14s %-7s %8s %8s %8s %6s %7s %5s  %-32s\n", "", "", "", "joint", "tip",
+              "kinetic", "turns", "changes", "", "");
+  std::printf("%-40s %-14s %-7s %8s %8s %8s %6s %7s %5s  %-32s %s\n", "scenario", "arm", "plugin",
+              "/ limit", "m/s", "J", "%", "", "rest", "first status", "");
+  std::size_t broken = 0, rows = 0;
+  for (const Scenario& scenario : scenarios()) {
+    for (const TestArm& arm : test_arms()) {
+      if (!chosen(scenario, arm)) continue;
+      for (const PluginFile& plugin : plugins) {
+        const Row row = run_scenario(scenario, plugin, arm);
+        print(row, &plugin == &plugins.front());
+        if (&plugin != &plugins.back()) continue;
+        ++rows;
+        broken += row.broken.empty() ? 0 : 1;
+      }
+    }
+  }
+  std::printf("\n%s: %zu of %zu rows break what is promised\n", plugins.back().label.c_str(),
+              broken, rows);
+  return broken == 0 ? 0 : 1;
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "safety_stress: %s\n", error.what());
+  return 2;
+}
