@@ -6,6 +6,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 namespace dashpot::controller {
 namespace {
@@ -228,6 +230,127 @@ TEST(TipPath, GoesAlongWithATipThatIsLedAway) {
     path.step(Vector3d::Zero(), still, {tip, still, I, base, none, reach});
   }
   EXPECT_NEAR(path.position().x(), tip.x() - 0.2, 0.05);
+}
+
+// Moved to another place on its way, it is there at once, and goes on with the velocity it has.
+TEST(TipPath, GoesOnFromWhereItIsMovedToWhileItMovesAndTurns) {
+  Random random(315);
+  for (int trial = 0; trial < 20; ++trial) {
+    TipPath path({0.5, 1.5, 2.0, 6.0}, kPeriod, kWindow);
+    const Vector3d goal = 0.5 * Vector3d(random.vector(3)).normalized();
+    const Quaterniond turned = quaternion(2.0 * Vector3d(random.vector(3)).normalized());
+    path.start(Vector3d::Zero(), Quaterniond::Identity());
+    for (int k = 0; k < 60; ++k) path.step(goal, turned);  // it speeds up: smoothing lags behind
+    const Vector6 velocity = path.velocity();
+    ASSERT_GT(velocity.head<3>().norm(), 0.02);
+    ASSERT_GT(velocity.tail<3>().norm(), 0.1);
+    const Vector3d p = 0.1 * random.vector(3);
+    const Quaterniond q = quaternion(0.2 * random.vector(3));
+    path.relocate(p, q);
+    EXPECT_EQ(path.position(), p);
+    EXPECT_EQ(path.rotation().coeffs(), q.coeffs());
+    EXPECT_EQ(path.velocity(), velocity);
+    path.step(goal, turned);
+    const Vector6 then = path.velocity();
+    EXPECT_TRUE(near(path.position(), p + kPeriod * then.head<3>(), 1e-12));
+    // But for the axis of rotation, which the new place changes: a fraction of the small offset.
+    const Quaterniond expected = quaternion(kPeriod * then.tail<3>()) * q;
+    EXPECT_LT(path.rotation().angularDistance(expected), 1e-4);
+    for (int k = 0; k < 10000; ++k) path.step(goal, turned);
+    EXPECT_EQ(path.position(), goal);
+    EXPECT_LT(path.rotation().angularDistance(turned), 1e-14);
+  }
+}
+
+TEST(JointPath, GoesOnFromWhereItIsMovedToWhileItMoves) {
+  JointPath<3> path(joint_limits(), kPeriod, kWindow);
+  const Joints<3> goal(1, -1, 2);
+  for (int k = 0; k < 60; ++k) path.step(goal);
+  const Joints<3> before = path.position(), velocity = path.velocity();
+  path.relocate(1, 0.7);
+  EXPECT_EQ(path.position(), Joints<3>(before[0], 0.7, before[2]));
+  EXPECT_EQ(path.velocity(), velocity);
+  path.step(goal);
+  EXPECT_NEAR(path.position()[1], 0.7 + kPeriod * path.velocity()[1], 1e-12);
+  for (int k = 0; k < 10000; ++k) path.step(goal);
+  EXPECT_EQ(path.position(), goal);
+}
+
+// Started anew in motion, a path is at rest and keeps nothing of before.
+TEST(Paths, AreAtRestWhereTheyAreStarted) {
+  TipPath tip({0.5, 1.5, 2.0, 6.0}, kPeriod, kWindow);
+  JointPath<3> joints(joint_limits(), kPeriod, kWindow);
+  const Quaterniond turned = quaternion(Vector3d(0.3, -1, 0.5));
+  for (int k = 0; k < 60; ++k) tip.step(Vector3d::Ones(), turned), joints.step(Joints<3>::Ones());
+  const Vector3d p(0.4, 0.5, -0.6);
+  tip.start(p, turned);
+  joints.start(p);
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_EQ(tip.position(), p);
+    EXPECT_EQ(tip.rotation().coeffs(), turned.coeffs());
+    EXPECT_TRUE(tip.velocity().isZero(0));
+    EXPECT_TRUE(tip.acceleration().isZero(0));
+    EXPECT_EQ(joints.position(), p);
+    EXPECT_TRUE(joints.velocity().isZero(0));
+    EXPECT_TRUE(joints.acceleration().isZero(0));
+    tip.halt();
+    joints.halt();
+  }
+}
+
+// What is near is within reach, up to half a turn; beyond twice the reach over pi it may be denied.
+TEST(Tether, SeesWhatIsNearUpToHalfATurn) {
+  Random random(316);
+  const TipImpedance base = all_sprung(), none;
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  for (const double angular : {0.1, 1.0, 2.0, 3.0, 3.14, 3.15}) {
+    const SpringReach reach{0.2, angular};
+    for (int k = 0; k < 200; ++k) {
+      const Vector3d tip = random.vector(3);
+      const Quaterniond turned = random_rotation(random);
+      const Tether tether{tip, turned, I, base, none, reach};
+      const Vector3d axis = Vector3d(random.vector(3)).normalized();
+      const double angle = random.uniform(0, std::numbers::pi);
+      Quaterniond goal = quaternion(angle * axis) * turned;
+      if (k % 2 == 0) goal.coeffs() = -goal.coeffs();                 // the same rotation
+      const double bound = std::numbers::pi * std::sin(0.5 * angle);  // at least the angle
+      if (std::abs(bound - angular) > 1e-9) {
+        EXPECT_EQ(tether.near(tip, goal), bound < angular) << angle << " of " << angular;
+      }
+      EXPECT_TRUE(tether.near(tip + 0.199 * axis, turned));
+      EXPECT_FALSE(tether.near(tip + 0.201 * axis, turned));
+    }
+  }
+}
+
+// Up to the reach a deflection is as it was, to the last bit; beyond it the way is its direction's,
+// also where the rotation vector is longer than half a turn.
+TEST(SpringReach, EndsExactlyAtItsReach) {
+  Random random(317);
+  const TipImpedance base = all_sprung(), none;
+  const Eigen::Matrix3d R = random_rotation(random).toRotationMatrix();
+  for (const double angular : {0.5, 3.0, 3.14, 3.5}) {
+    const SpringReach reach{0.1, angular};
+    for (int k = 0; k < 100; ++k) {
+      const Vector3d a = Vector3d(random.vector(3)).normalized();
+      const Vector3d b = Vector3d(random.vector(3)).normalized();
+      const double size = random.uniform(0.9, 1.5);
+      for (const bool in_tool : {false, true}) {
+        const auto shortened = [&](const Vector6& e) {
+          return in_tool ? reach.shortened(e, none, base, R) : reach.shortened(e, base, none, R);
+        };
+        Vector6 e, expected;
+        e << 0.05 * a, size * angular * b;
+        expected << 0.05 * a, std::min(size, 1.0) * angular * b;
+        EXPECT_TRUE(near(shortened(e), expected, 1e-14));
+        e << size * 0.1 * a, 0.9 * angular * b;
+        expected << std::min(size, 1.0) * 0.1 * a, 0.9 * angular * b;
+        EXPECT_TRUE(near(shortened(e), expected, 1e-14));
+        e << 0.0999 * a, 0.999 * angular * b;
+        EXPECT_EQ(shortened(e), e);
+      }
+    }
+  }
 }
 
 TEST(SpringReach, ShortensOnlyWhereThereAreSprings) {

@@ -1,0 +1,172 @@
+// The closed loop in factored form against the plain one of closed_loop.hpp, for all kinds of
+// gains.
+#include <dashpot/controller/closed_loop.hpp>
+#include <dashpot/controller/loop_system.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/random_robot.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <functional>
+#include <utility>
+#include <vector>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::MatrixXd;
+using testing::near;
+using testing::Random;
+
+/// One robot in one posture, and its loop with whatever springs.
+template <int N>
+struct Loop {
+  RobotModel model;
+  Joints<N> q, friction;
+  Dynamics<N> robot;
+  LoopSystem<N> factored;
+
+  Loop(const RobotModel& robot_model, Random& random)
+      : model(robot_model), friction(random.vector(N).cwiseAbs()) {
+    move_to(random.vector(N));
+  }
+  void move_to(const Joints<N>& there) {
+    q = there;
+    DynamicsKernel<N>(model).evaluate(q, Joints<N>::Zero(), robot);
+  }
+  /// Expects the same M, C and K of both forms; returns the number of rows of the factor.
+  Eigen::Index expect_agreement(const Impedance<N>& impedance) {
+    NullSpace<N> null_space;
+    null_space.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
+    analysis::System<kMaxJoints> plain, system;
+    system.has_tails = true;  // of what was there before
+    system.stiffness_factor.setOnes(3, 2);
+    closed_loop<N>(robot, Joints<N>::Zero(), impedance, null_space, friction, TaskTerms{},
+                   Vector6::Zero(), plain);
+    factored.form(robot, impedance, null_space, friction, system);
+    EXPECT_FALSE(system.has_tails);
+    EXPECT_EQ(system.stiffness_factor.cols(), N);
+    EXPECT_TRUE(near(system.mass, plain.mass, 0));
+    EXPECT_EQ(system.damping, system.damping.transpose());
+    EXPECT_TRUE(near(system.damping, plain.damping, 1e-9 * (1 + plain.damping.norm())));
+    const MatrixXd W = system.stiffness_factor;
+    EXPECT_TRUE(near(W.transpose() * W, plain.stiffness, 1e-9 * (1 + plain.stiffness.norm())));
+    return W.rows();
+  }
+};
+
+/// Springs of the tip in some directions of a frame, and in the null space.
+Setpoint tip_setpoint(Random& random, int n, Frame frame, int held) {
+  Setpoint setpoint;
+  setpoint.mode = Mode::kCartesian;
+  Gains& gains = setpoint.gains;
+  gains.frame = frame;
+  gains.directions.fill(false);
+  for (int left = held; left > 0;) {
+    bool& direction = gains.directions[static_cast<std::size_t>(random.integer(0, 5))];
+    left -= direction ? 0 : 1;
+    direction = true;
+  }
+  gains.task_stiffness = 100 * random.spd(6);
+  gains.task_damping = 10 * random.spd(6);
+  gains.null_stiffness = 20 * random.vector(n).cwiseAbs();
+  gains.null_damping = 2 * random.vector(n).cwiseAbs();
+  return setpoint;
+}
+
+template <int N>
+void expect_tip_springs(Random& random) {
+  Loop<N> loop(RobotModel::from_urdf_text(testing::RandomRobot(random.engine()()).chain(N, 0.2),
+                                          "link0", "tip", {}),
+               random);
+  for (const Frame frame : {Frame::kBase, Frame::kTool}) {
+    for (int held = 1; held <= 6; ++held) {
+      Setpoint setpoint = tip_setpoint(random, N, frame, held);
+      Gains& gains = setpoint.gains;
+      const Eigen::Index free = std::max(0, N - held);
+      EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held + free);
+      for (int k = 0; k < 3; ++k) {  // a little farther each time: the free motions are followed
+        loop.move_to(loop.q + Joints<N>(0.02 * random.vector(N)));
+        EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held + free);
+      }
+      // Null-space springs in a single joint are not definite in all of the null space; dampers
+      // alone give no rows; nor does nothing at all.
+      for (int i = 0; i < N && free > 1; ++i) {
+        gains.null_stiffness = 30 * JointVector::Unit(N, i);
+        EXPECT_GE(loop.expect_agreement(Impedance<N>::of(setpoint)), held);
+      }
+      gains.null_stiffness.setZero(N);
+      EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held);
+      gains.null_damping.setZero(N);
+      EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held);
+      gains.task_stiffness.setZero();
+      EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), 0);
+    }
+  }
+}
+
+TEST(LoopSystem, HasTheTipSpringsAndAsManyRowsAsTheyHold) {
+  Random random(361);
+  for (int k = 0; k < 5; ++k) {
+    expect_tip_springs<6>(random);
+    expect_tip_springs<7>(random);
+    expect_tip_springs<9>(random);
+  }
+}
+
+TEST(LoopSystem, HasTheJointSprings) {
+  Random random(362);
+  Loop<7> loop(testing::arm_model(testing::arms()[0]), random);
+  Setpoint setpoint;
+  for (int k = 0; k < 20; ++k) {
+    setpoint.gains.joint_stiffness = 100 * random.spd(7);
+    setpoint.gains.joint_damping = 10 * random.spd(7);
+    EXPECT_EQ(loop.expect_agreement(Impedance<7>::of(setpoint)), 7);
+    const int rank = k % 7;
+    const MatrixXd thin = random.matrix(7, rank);
+    setpoint.gains.joint_stiffness = thin * thin.transpose();
+    EXPECT_EQ(loop.expect_agreement(Impedance<7>::of(setpoint)), rank);
+  }
+}
+
+TEST(LoopSystem, HasTheSpringsOfTwoModesAndFramesAtOnce) {
+  Random random(363);
+  for (int k = 0; k < 20; ++k) {
+    Loop<7> loop(testing::arm_model(testing::arms()[1]), random);
+    Setpoint joint;
+    joint.gains.joint_stiffness = 100 * random.spd(7);
+    joint.gains.joint_damping = 10 * random.spd(7);
+    const auto base = Impedance<7>::of(tip_setpoint(random, 7, Frame::kBase, random.integer(1, 6)));
+    const auto tool = Impedance<7>::of(tip_setpoint(random, 7, Frame::kTool, random.integer(1, 6)));
+    const double s = random.uniform(0.1, 0.9);
+    EXPECT_EQ(loop.expect_agreement(blend(Impedance<7>::of(joint), base, s)), 7);
+    EXPECT_EQ(loop.expect_agreement(blend(tool, Impedance<7>::of(joint), s)), 7);
+    EXPECT_EQ(loop.expect_agreement(blend(base, tool, s)), 7);
+    EXPECT_EQ(loop.expect_agreement(tool), 7);
+  }
+}
+
+TEST(DirectionsHeld, CountsThoseOfOneFrame) {
+  TipImpedance base, tool;
+  EXPECT_EQ(directions_held(base, tool), 0);
+  for (TipImpedance* one : {&base, &tool}) {
+    for (int i = 0; i < 6; ++i) {
+      one->held.setZero();
+      one->held[i] = 1;
+      EXPECT_EQ(directions_held(base, tool), 1);
+      one->held[5 - i] = 0.5;  // while gains change
+      EXPECT_EQ(directions_held(base, tool), -1);
+    }
+    one->held.setOnes();
+    EXPECT_EQ(directions_held(base, tool), 6);
+    one->held.setZero();
+  }
+  base.held[0] = tool.held[0] = 1;
+  EXPECT_EQ(directions_held(base, tool), -1);
+}
+
+}  // namespace
+}  // namespace dashpot::controller

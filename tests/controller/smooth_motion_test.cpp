@@ -1,0 +1,144 @@
+// Moving average, ramp and one step of a path, each against its definition.
+#include <dashpot/controller/gain_path.hpp>
+#include <dashpot/controller/smooth_motion.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace dashpot::controller {
+namespace {
+
+using testing::near;
+using testing::Random;
+
+constexpr double kTick = 0.002;
+
+TEST(Smoothing, IsTheMeanOfTheLastVelocities) {
+  Random random(351);
+  for (const int asked : {-1, 0, 1, 2, 7, 256, 1000}) {
+    const int window = std::clamp(asked, 1, 256);
+    Smoothing<3> smoothing(asked);
+    for (int again = 0; again < 2; ++again) {  // and after a reset in motion
+      smoothing.reset();
+      EXPECT_TRUE(smoothing.velocity().isZero(0));
+      EXPECT_TRUE(smoothing.acceleration().isZero(0));
+      EXPECT_TRUE(smoothing.offset().isZero(0));
+      std::vector<Joints<3>> v(static_cast<std::size_t>(window), Joints<3>::Zero());
+      Joints<3> mean_before = Joints<3>::Zero(), offset = Joints<3>::Zero();
+      for (int k = 0; k < 3 * window; ++k) {
+        v.emplace_back(random.vector(3));
+        smoothing.step(v.back(), kTick);
+        Joints<3> mean = Joints<3>::Zero();
+        for (auto one = v.end() - window; one != v.end(); ++one) mean += *one / window;
+        offset += (mean - v.back()) * kTick;
+        EXPECT_TRUE(near(smoothing.velocity(), mean, 1e-13));
+        EXPECT_TRUE(near(smoothing.acceleration(), (mean - mean_before) / kTick, 1e-10));
+        EXPECT_TRUE(near(smoothing.offset(), offset, 1e-12));
+        mean_before = mean;
+      }
+      for (int k = 0; k < window; ++k) {
+        EXPECT_FALSE(smoothing.velocity().isZero(0));
+        smoothing.step(Joints<3>::Zero(), kTick);
+      }
+      EXPECT_TRUE(smoothing.velocity().isZero(0));
+      EXPECT_TRUE(smoothing.offset().isZero(0));
+      smoothing.step(Joints<3>::Ones(), kTick);  // still in motion when it is reset
+    }
+  }
+}
+
+TEST(Ramp, TakesItsTicksEvenlyAndEndsExactly) {
+  for (const int ticks : {-3, 0, 1, 2, 3, 10, 77, 1000}) {
+    const int length = std::max(1, ticks);
+    Ramp<Vector6> ramp(ticks);
+    const Vector6 from = Vector6::Constant(0.3), to = Vector6::Constant(-1.7);
+    ramp.start(from);
+    const auto changes = ramp.changes();
+    EXPECT_EQ(ramp.now(), from);
+    EXPECT_EQ(ramp.target(), from);
+    ramp.step();
+    EXPECT_EQ(ramp.changes(), changes);  // at rest
+    ramp.set_target(to);
+    EXPECT_EQ(ramp.now(), from);
+    EXPECT_EQ(ramp.target(), to);
+    for (int k = 1; k <= length; ++k) {
+      ramp.step();
+      EXPECT_TRUE(near(ramp.now(), from + (to - from) * k / length, 1e-12));
+      EXPECT_EQ(ramp.now() == to, k == length);
+      EXPECT_EQ(ramp.changes(), changes + static_cast<std::uint64_t>(k));
+    }
+    ramp.step();
+    EXPECT_EQ(ramp.now(), to);
+    EXPECT_EQ(ramp.changes(), changes + static_cast<std::uint64_t>(length));
+    ramp.start(from);
+    EXPECT_EQ(ramp.now(), from);
+    EXPECT_GT(ramp.changes(), changes + static_cast<std::uint64_t>(length));
+  }
+}
+
+/// Norm of the one coordinate's limits: velocity 2, acceleration 5.
+JointNorm<1> one_joint() {
+  return {Joints<1>(2.0), Joints<1>(5.0)};
+}
+Step<1> one_step(double d, double v) {
+  return approach<1>(Joints<1>(d), Joints<1>(v), one_joint(), kTick);
+}
+
+TEST(Approach, EndsWithinATickWhereItCan) {
+  // A speed of d / T that may be had at once, and half the acceleration limit to brake: d <= a
+  // T^2/2
+  const double farthest = 0.5 * 5 * kTick * kTick;
+  for (const double share : {-0.999, 0.5, 0.999}) {
+    const Step<1> step = one_step(share * farthest, 0);
+    EXPECT_TRUE(step.arrives) << share;
+    EXPECT_DOUBLE_EQ(step.velocity[0], share * farthest / kTick);
+  }
+  for (const double share : {-1.001, 1.001, 3.0}) {
+    EXPECT_FALSE(one_step(share * farthest, 0).arrives) << share;
+  }
+  EXPECT_TRUE(one_step(0, 0).arrives);
+  EXPECT_TRUE(one_step(0, 0.99 * 5 * kTick).arrives);
+  EXPECT_FALSE(one_step(0, 1.01 * 5 * kTick).arrives);
+}
+
+TEST(Approach, SpeedsUpAtItsLimitAndBrakesAtHalfOfIt) {
+  EXPECT_DOUBLE_EQ(one_step(100, 0).velocity[0], 5 * kTick);
+  EXPECT_DOUBLE_EQ(one_step(-100, 0).velocity[0], -5 * kTick);
+  EXPECT_DOUBLE_EQ(one_step(100, 2).velocity[0], 2);
+  EXPECT_NEAR(one_step(-100, 2).velocity[0], 2 - 5 * kTick, 1e-15);
+  // With k periods to go it has slowed down to k times what it may brake in one.
+  const double braking = 0.5 * 5 * kTick;
+  for (const int k : {1, 2, 3, 10, 100}) {
+    const double d = braking * kTick * k * (k + 1) / 2;
+    const Step<1> step = one_step(d * (1 - 1e-12), braking * (k + 1));
+    EXPECT_NEAR(step.velocity[0], braking * k, 1e-9);
+    EXPECT_EQ(step.arrives, k == 1);
+  }
+}
+
+TEST(TwistNorm, TakesTheLargerShareOfItsTwoParts) {
+  const TwistNorm norm{2, 4, 5, 10};
+  Vector6 twist;
+  twist << 0, 3, 4, 0, 0, 0;
+  EXPECT_DOUBLE_EQ(norm.speed(twist), 2.5);
+  EXPECT_DOUBLE_EQ(norm.effort(twist), 1);
+  twist << 0, 0, 0, 6, 8, 0;
+  EXPECT_DOUBLE_EQ(norm.speed(twist), 2.5);
+  EXPECT_DOUBLE_EQ(norm.effort(twist), 1);
+  twist << 1, 0, 0, 0, 0, -8;
+  EXPECT_DOUBLE_EQ(norm.speed(twist), 2);
+  EXPECT_DOUBLE_EQ(norm.effort(twist), 0.8);
+}
+
+TEST(JointNorm, TakesTheLargestShare) {
+  const JointNorm<3> norm{Joints<3>(1, 2, 4), Joints<3>(10, 10, 1)};
+  EXPECT_DOUBLE_EQ(norm.speed(Joints<3>(0.5, -3, 4)), 1.5);
+  EXPECT_DOUBLE_EQ(norm.effort(Joints<3>(0.5, -3, 4)), 4);
+}
+
+}  // namespace
+}  // namespace dashpot::controller

@@ -1,0 +1,200 @@
+// The small factorisations by themselves: against their definitions, and where they give up.
+#include <dashpot/controller/small_cholesky.hpp>
+#include <dashpot/controller/spring_factors.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::near;
+using testing::Random;
+
+/// Symmetric, positive semidefinite, of a given rank, with integers for entries: exactly so.
+MatrixXd of_rank(Random& random, int n, int rank) {
+  MatrixXd root(n, rank);
+  for (double& entry : root.reshaped()) entry = random.integer(-3, 3);
+  return root * root.transpose();
+}
+
+template <int N>
+void expect_small_cholesky(Random& random) {
+  const Eigen::Matrix<double, N, N> A = random.spd(N);
+  const MatrixXd L = A.llt().matrixL();
+  SmallCholesky<N> factor;
+  factor.compute(A, 1e-14);
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j <= i; ++j) EXPECT_NEAR(factor.L(i, j), L(i, j), 1e-14);
+    EXPECT_NEAR(factor.per_diagonal(i), 1 / L(i, i), 1e-13 / L(i, i));
+  }
+  const Eigen::Matrix<double, N, 1> x = random.vector(N);
+  const auto expect = [&](const auto& act, const VectorXd& wanted) {
+    Eigen::Matrix<double, N, 1> y = x;
+    act(y);
+    EXPECT_TRUE(near(y, wanted, 1e-12 * (1 + wanted.norm())));
+  };
+  expect([&](auto& y) { factor.solve_L(y); }, L.triangularView<Eigen::Lower>().solve(x));
+  expect([&](auto& y) { factor.solve_LT(y); },
+         L.transpose().triangularView<Eigen::Upper>().solve(x));
+  expect([&](auto& y) { factor.multiply_L(y); }, L * x);
+  expect([&](auto& y) { factor.multiply_LT(y); }, L.transpose() * x);
+  EXPECT_TRUE(near(factor.inverse_L() * L, MatrixXd::Identity(N, N), 1e-12));
+}
+
+TEST(SmallCholesky, IsTheFactorAndItsInverse) {
+  Random random(341);
+  for (int k = 0; k < 20; ++k) {
+    expect_small_cholesky<1>(random);
+    expect_small_cholesky<2>(random);
+    expect_small_cholesky<6>(random);
+    expect_small_cholesky<9>(random);
+  }
+}
+
+TEST(SmallCholesky, RaisesPivotsThatAreTooSmall) {
+  SmallCholesky<3> factor;
+  factor.compute(Eigen::Vector3d(4, 1e-6, -1).asDiagonal(), 1e-4);
+  EXPECT_DOUBLE_EQ(factor.L(0, 0), 2);
+  EXPECT_DOUBLE_EQ(factor.L(1, 1), 1e-2);
+  EXPECT_DOUBLE_EQ(factor.L(2, 2), 1e-2);
+  factor.compute(Eigen::Vector3d(1.01e-4, 0.99e-4, 1).asDiagonal(), 1e-4);
+  EXPECT_DOUBLE_EQ(factor.L(0, 0), std::sqrt(1.01e-4));
+  EXPECT_DOUBLE_EQ(factor.L(1, 1), 1e-2);
+}
+
+TEST(SemidefiniteFactor, HasAsManyRowsAsTheRankLargestPivotFirst) {
+  Random random(342);
+  for (int rank = 0; rank <= 6; ++rank) {
+    for (int k = 0; k < 20; ++k) {
+      const Matrix6 A = of_rank(random, 6, rank);
+      const Matrix6 W = semidefinite_factor<6>(A);
+      EXPECT_TRUE(near(W.transpose() * W, A, 1e-13 * (1 + A.norm())));
+      const auto full = Eigen::FullPivLU<MatrixXd>(A).rank();  // of the random integers
+      EXPECT_TRUE(W.bottomRows(6 - full).isZero(0)) << A;
+      if (full > 0) {
+        EXPECT_DOUBLE_EQ(W.row(0).cwiseAbs().maxCoeff(), std::sqrt(A.diagonal().maxCoeff()));
+      }
+    }
+  }
+}
+
+TEST(SemidefiniteFactor, LeavesOutWhatIsBelowRounding) {
+  // Left out up to 3 eps of the largest: 6.7e-16
+  for (const auto& [small, rows] : {std::pair(5e-16, 1), std::pair(9e-16, 2)}) {
+    const Eigen::Matrix3d A = Eigen::Vector3d(1, 0, small).asDiagonal();
+    const Eigen::Matrix3d W = semidefinite_factor<3>(A);
+    EXPECT_EQ((W.rowwise().norm().array() > 0).count(), rows) << small;
+  }
+}
+
+TEST(LowerCholesky, RefusesWhatIsNotDefiniteBeyondRounding) {
+  Random random(343);
+  for (int r = 1; r <= 6; ++r) {
+    const MatrixXd A = random.spd(r);
+    Matrix6 L = Matrix6::Constant(7);
+    L.topLeftCorner(r, r) = A;
+    ASSERT_TRUE(lower_cholesky<6>(r, L));
+    const MatrixXd lower = L.topLeftCorner(r, r).triangularView<Eigen::Lower>();
+    EXPECT_TRUE(near(lower * lower.transpose(), A, 1e-14));
+    if (r < 6) {
+      EXPECT_TRUE((L.bottomRows(6 - r).array() == 7).all());
+    }
+    Matrix6 thin = Matrix6::Zero();
+    thin.topLeftCorner(r, r) = of_rank(random, r, r - 1);
+    EXPECT_FALSE(lower_cholesky<6>(r, thin));
+  }
+  // At 16 n eps of the trace: 7.1e-15 for n = 2
+  for (const auto& [small, definite] : {std::pair(6.4e-15, false), std::pair(7.8e-15, true)}) {
+    Eigen::Matrix2d A = Eigen::Vector2d(1, small).asDiagonal();
+    EXPECT_EQ(lower_cholesky<2>(2, A), definite) << small;
+  }
+}
+
+TEST(Orthonormalize, TellsWhatIsLeftOfAVector) {
+  Random random(344);
+  for (int k = 0; k < 100; ++k) {
+    std::array<Joints<5>, 3> Q;
+    for (int i = 0; i < 3; ++i) {
+      Joints<5>& y = Q[static_cast<std::size_t>(i)];
+      y = random.vector(5);
+      ASSERT_TRUE(orthonormalize<5>(Q.data(), i, 1e-3, y));
+      for (int j = 0; j <= i; ++j) {
+        EXPECT_NEAR(Q[static_cast<std::size_t>(j)].dot(y), i == j ? 1 : 0, 1e-15);
+      }
+    }
+    // Of a vector next to their span little is left, but that is orthogonal to all its digits.
+    Joints<5> beside = random.vector(5);
+    ASSERT_TRUE(orthonormalize<5>(Q.data(), 3, 1e-3, beside));
+    Joints<5> y = Q[0] - 2 * Q[1] + Q[2] + 1e-6 * beside;
+    Joints<5> same = y;
+    EXPECT_FALSE(orthonormalize<5>(Q.data(), 3, 1.01e-6, same));
+    ASSERT_TRUE(orthonormalize<5>(Q.data(), 3, 0.99e-6, y));
+    for (const Joints<5>& q : Q) EXPECT_NEAR(q.dot(y), 0, 1e-15);
+    EXPECT_TRUE(near(y, beside, 1e-9));
+  }
+}
+
+TEST(SpringFactor, FollowsItsMatrix) {
+  Random random(345);
+  SpringFactor<6> factor;
+  EXPECT_EQ(factor.rows(), 0);
+  const Matrix6 whole = random.spd(6);
+  Matrix6 other = whole;  // in the last entry alone
+  other(5, 5) += 1;
+  for (const Matrix6& K : {Matrix6(Matrix6::Zero()), whole, other, Matrix6(of_rank(random, 6, 2)),
+                           Matrix6(of_rank(random, 6, 2)), whole, Matrix6(Matrix6::Zero())}) {
+    for (int again = 0; again < 2; ++again) {
+      factor.update(K);
+      const MatrixXd W = factor.matrix().topRows(factor.rows());
+      EXPECT_TRUE(near(W.transpose() * W, K, 1e-13 * (1 + K.norm())));
+      EXPECT_EQ(factor.rows(), Eigen::FullPivLU<MatrixXd>(K).rank());
+    }
+    if (factor.rows() == 6) {
+      EXPECT_TRUE(factor.matrix().isUpperTriangular(0));
+    }
+  }
+}
+
+TEST(FactorRows, BecomeATriangleWithTheSameProduct) {
+  Random random(346);
+  FactorRows<4> rows;
+  EXPECT_EQ(rows.size(), 0);
+  for (int k = 0; k < 100; ++k) {
+    rows.clear();
+    EXPECT_EQ(rows.size(), 0);
+    MatrixXd W = random.matrix(random.integer(4, 20), 4);
+    if (k % 3 == 1) W.col(k % 4).setZero();
+    if (k % 3 == 2) W.row(k % 4).setZero();
+    // In two blocks
+    const auto first = static_cast<int>(W.rows()) / 2, all = static_cast<int>(W.rows());
+    for (const auto& [from, to] : {std::pair(0, first), std::pair(first, all)}) {
+      for (int i = from; i < to; ++i) {
+        for (int j = 0; j < 4; ++j) rows.at(i - from, j) = W(i, j);
+      }
+      rows.grow(to - from);
+    }
+    ASSERT_EQ(rows.size(), W.rows());
+    for (int i = 0; i < all; ++i) {
+      for (int j = 0; j < 4; ++j) EXPECT_EQ(rows.at_row(i, j), W(i, j));
+    }
+    rows.triangularize();
+    ASSERT_EQ(rows.size(), 4);
+    MatrixXd R(4, 4);
+    for (int i = 0; i < 4; ++i) {
+      for (int j = 0; j < 4; ++j) R(i, j) = rows.at_row(i, j);
+      EXPECT_GE(R(i, i), 0);
+    }
+    EXPECT_TRUE(R.isUpperTriangular(0));
+    EXPECT_TRUE(near(R.transpose() * R, W.transpose() * W, 1e-13 * (1 + W.squaredNorm())));
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::controller
