@@ -188,6 +188,7 @@ template <int N>
 void FixedCore<N>::release() noexcept {
   fault_ = Status::kOk;
   rest_ = 0;
+  state_check_.trust_velocities();
   afresh_ = damping_only_ = true;
   const Gains gains = accepted_.gains;
   const Mode mode = accepted_.mode;

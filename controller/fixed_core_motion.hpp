@@ -116,7 +116,7 @@ Status FixedCore<N>::setpoint_age_status() const noexcept {
 /// velocity limit where the robot is.
 template <int N>
 double FixedCore<N>::tip_path_speed() const noexcept {
-  constexpr double kPathShare = 0.5;  // what is left is for vibrations and the null space
+  constexpr double kPathShare = 0.4;  // what is left is for vibrations and the null space
   const double speed = paths_.tip.speed();
   if (speed == 0) return 1;
   const Vector qd = law_.null_space().joint_velocity(paths_.tip.point_velocity());

@@ -25,7 +25,6 @@ class GainJudge {
   /// `q`: n, rad. The gains have passed check_gains in both modes. Zero where the loop could not be
   /// analysed.
   Verdict judge(const JointVector& q, const Gains& gains);
-  bool enough(const Verdict& verdict) const noexcept { return verdict.margin >= wanted_; }
 
  private:
   double margin(const JointVector& q, const Gains& gains, Mode mode);

@@ -1,19 +1,17 @@
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/controller/latest.hpp>
 #include <dashpot/controller/plugin_data.hpp>
+#include <dashpot/controller/plugin_judgement.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <exception>
 #include <memory>
-#include <mutex>
 #include <string>
 
 using namespace dashpot::controller;  // NOLINT(google-build-using-namespace): the C functions
@@ -35,55 +33,6 @@ std::int64_t later(std::int64_t time, std::int64_t difference) noexcept {
                                    static_cast<std::uint64_t>(difference));
 }
 
-/// Judges gains for all threads, one after the other.
-class Judgement {
- public:
-  Judgement(const Config& config)
-      : wanted_(config.settings.limits.gain_margin),
-        position_(config.settings.initial.joint_position),
-        judge_(config.model, config.settings) {
-    for (Eigen::Index i = 0; i < position_.size(); ++i)
-      latest_[static_cast<std::size_t>(i)] = position_[i];
-  }
-
-  /// Of the real-time thread: where the robot is now.
-  void locate(const JointVector& q) noexcept {
-    for (Eigen::Index i = 0; i < q.size(); ++i) {
-      latest_[static_cast<std::size_t>(i)].store(q[i], std::memory_order_relaxed);
-    }
-  }
-
-  /// Gains that have passed check_gains, at `q`, or where the robot is. Without `again` those that
-  /// were accepted last are not judged anew. Throws what memory and eigenvalue solvers throw.
-  GainJudge::Verdict judge(const Gains& gains, const double* q, bool again) {
-    const std::lock_guard lock(mutex_);
-    if (wanted_ <= 1 || (!again && any_ && same_gains(gains, accepted_))) {
-      return {wanted_, Mode::kJoint};
-    }
-    for (Eigen::Index i = 0; i < position_.size(); ++i) {
-      position_[i] = q != nullptr
-                         ? q[i]
-                         : latest_[static_cast<std::size_t>(i)].load(std::memory_order_relaxed);
-    }
-    const GainJudge::Verdict verdict = judge_.judge(position_, gains);
-    if (judge_.enough(verdict)) accepted_ = gains, any_ = true;
-    return verdict;
-  }
-  bool enough(const GainJudge::Verdict& verdict) const noexcept {
-    return verdict.margin >= wanted_;
-  }
-  double wanted() const noexcept { return wanted_; }
-
- private:
-  const double wanted_;
-  std::array<std::atomic<double>, kMaxJoints> latest_{};
-  std::mutex mutex_;  ///< of what follows
-  JointVector position_;
-  GainJudge judge_;
-  bool any_ = false;
-  Gains accepted_;
-};
-
 }  // namespace
 
 /// One controller, and what its two threads hand each other.
@@ -94,7 +43,7 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
         settings(config.settings),
         period(static_cast<std::int64_t>(std::min(1e9 * settings.period, 1e18))),
         model(config.model),
-        judgement(config),
+        judgement(config.model, config.settings),
         controller_(config.model, config.settings),
         setpoint_(settings.initial) {
     request.setpoint = settings.initial;
@@ -236,9 +185,9 @@ std::int32_t finish(std::int32_t code) noexcept {
   return finish(code, dashpot_status_text(code));
 }
 
-/// Judges gains at q, or where the robot is. DASHPOT_OK or why not.
-std::int32_t judge(dashpot_controller& controller, const Gains& gains, const double* q, bool again,
-                   double* margin) noexcept {
+/// Judges gains at q. DASHPOT_OK or why not.
+std::int32_t judge(dashpot_controller& controller, const Gains& gains, const JointVector& q,
+                   bool again, double* margin) noexcept {
   Judgement& judgement = controller.judgement;
   GainJudge::Verdict verdict{0, Mode::kJoint};
   try {
@@ -250,8 +199,8 @@ std::int32_t judge(dashpot_controller& controller, const Gains& gains, const dou
   if (judgement.enough(verdict)) return finish(DASHPOT_OK);
   std::array<char, 256> text{};
   std::snprintf(text.data(), text.size(),
-                "the sampled loop with the %s gains has a gain margin of %.3g, limits.gain_margin "
-                "asks for %.3g",
+                "with the %s gains the sampled loop has a gain margin of %.3g here, "
+                "limits.gain_margin asks for %.3g",
                 verdict.mode == Mode::kJoint ? "joint" : "task", verdict.margin,
                 judgement.wanted());
   return finish(DASHPOT_UNSTABLE_GAINS, text.data());
@@ -292,13 +241,8 @@ dashpot_controller* dashpot_create(const char* config_path) {
   }
   try {
     auto controller = std::make_unique<dashpot_controller>(load_config(config_path));
-    const Gains& gains = controller->settings.initial.gains;
-    if (judge(*controller, gains, nullptr, true, nullptr) == DASHPOT_OK)
-      return controller.release();
-    const std::string reason = last_error.data();
-    finish(DASHPOT_WRONG_VALUE, (std::string(config_path) + ": gains: " + reason +
-                                 " (in the middle of the joints' ranges)")
-                                    .c_str());
+    finish(DASHPOT_OK);
+    return controller.release();
   } catch (const std::exception& error) {
     finish(DASHPOT_WRONG_VALUE, error.what());
   } catch (...) {
@@ -345,8 +289,9 @@ int32_t dashpot_start(dashpot_controller* controller, const double* position,
   const JointVector q = Eigen::Map<const Eigen::VectorXd>(position, controller->n);
   if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
   const std::int32_t code =
-      judge(*controller, controller->request.setpoint.gains, position, true, nullptr);
+      judge(*controller, controller->request.setpoint.gains, q, true, nullptr);
   if (code != DASHPOT_OK) return code;
+  controller->judgement.locate(q);
   if (torque != nullptr) return finish(dashpot_reset(controller, torque));
   const bool holds = controller->settings.feed_forward.gravity;
   const JointVector rest = JointVector::Zero(controller->n);
@@ -392,8 +337,10 @@ int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* g
   Request& request = controller->request;
   Gains wanted = request.setpoint.gains;
   std::int32_t problem = read_gains(gains, controller->n, wanted);
-  if (problem == DASHPOT_OK && !same_gains(wanted, request.setpoint.gains)) {
-    problem = judge(*controller, wanted, nullptr, false, nullptr);
+  JointVector q;
+  const bool located = controller->judgement.where(q);  // or else dashpot_start judges them
+  if (problem == DASHPOT_OK && located && !same_gains(wanted, request.setpoint.gains)) {
+    problem = judge(*controller, wanted, q, false, nullptr);
   }
   if (problem != DASHPOT_OK) return problem;
   request.setpoint.gains = wanted;
@@ -408,10 +355,14 @@ int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains*
   Gains wanted = controller->settings.initial.gains;
   const std::int32_t problem = read_gains(gains, controller->n, wanted);
   if (problem != DASHPOT_OK) return problem;
-  for (int i = 0; position != nullptr && i < controller->n; ++i) {
-    if (!std::isfinite(position[i])) return finish(DASHPOT_WRONG_VALUE);
+  JointVector q;
+  if (position != nullptr) {
+    q = Eigen::Map<const Eigen::VectorXd>(position, controller->n);
+  } else if (!controller->judgement.where(q)) {
+    return finish(DASHPOT_NOTHING_YET);
   }
-  return judge(*controller, wanted, position, true, margin);
+  if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
+  return judge(*controller, wanted, q, true, margin);
 }
 
 int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* snapshot) {

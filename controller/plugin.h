@@ -294,8 +294,7 @@ int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* stat
  * configuration there, as dashpot_set_gains does, and then does what dashpot_reset does, but that
  * `torque` NULL stands for the arm's weight there (zero where the robot compensates it). Takes some
  * milliseconds and allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error says more.
- * A loop that never called it starts safely too, but with gains that nobody judged where the robot
- * is: dashpot_create judges them in the middle of the joints' ranges. */
+ * A loop that never called it starts from the weight too, but with gains that nobody judged. */
 int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);
 
 /* On the real-time thread: forgets history, faults and set-point, but not the gains; the next tick
@@ -308,7 +307,8 @@ int32_t dashpot_reset(dashpot_controller* controller, const double* torque);
  * holds the robot where it is until there is another set-point. Without a fault it does nothing. */
 int32_t dashpot_release(dashpot_controller* controller);
 
-/* On the other thread. The next tick takes it up; of several, the latest. dashpot_set_gains refuses
+/* On the other thread. The next tick takes it up; of several, the latest. Once the robot has been
+ * somewhere (dashpot_start, dashpot_update), dashpot_set_gains refuses
  * gains (DASHPOT_UNSTABLE_GAINS) with which the loop as it is sampled, at the posture of the latest
  * tick, would have less than limits.gain_margin: in either mode, with the delay and the filters of
  * analysis.sampled. A motion that needs more than 6 s to swing or to grow e-fold does not count. It
@@ -317,7 +317,7 @@ int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpo
 int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains);
 
 /* On any thread, for instance the one that receives gains: judges them as dashpot_set_gains would,
- * at `position` (n, rad; NULL: at the posture of the latest tick), and sets `margin` (NULL: not
+ * at `position` (n, rad; NULL: at the posture of the latest tick, if there was one), and sets `margin` (NULL: not
  * wanted) to the factor by which they could grow, or to limits.gain_margin if it is more. What it has
  * accepted last dashpot_set_gains does not judge again. */
 int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,

@@ -26,11 +26,13 @@ inline double loop_lag(const Settings& settings) noexcept {
 /// - s <= 1 is one number for all joints: what exceeds the weight shrinks evenly where torques
 ///   saturate, so that the wrench at the tip keeps its direction. So it does where the power x' qd
 ///   would be above Limits::power.
-/// - f takes away what drives a joint that is about as fast as its velocity limit, or a tip that is
-///   about as fast as its own: nothing but the weight drives a joint further that moves at 0.95 of
-///   its limit or more, or any joint while the tip does. From half the limit on the drive is
+/// - f takes away what drives a robot that is about as fast as its limits. With v the largest share
+///   of a velocity limit, of a joint or of the tip, x shrinks evenly by (0.95 - v) / 0.25 for v >
+///   0.7 where it adds energy (x' qd > 0). And from half its limit on, what drives a joint is
 ///   bounded so that the torque-rate limit can still take it away in time:
-///     x_i <= min(sqrt(torque_rate_i I_i v), 0.4 I_i v / lag),   v = 0.95 velocity_i - |qd_i|.
+///     x_i <= min(sqrt(torque_rate_i I_i d), 0.4 I_i d / lag),   d = 0.95 velocity_i - |qd_i|.
+///   So nothing but the weight drives a joint further that moves at 0.95 of its limit or more, or
+///   adds energy to a robot whose tip does.
 /// - Near a position limit, with m the margin, g the distance to the limit and y = (m - g) / m
 ///   between 0 and 1, f bounds the law's torque toward the limit by E_i g / m, and the repulsion is
 ///     r_i = -F_i y^2 - c_i y qd_i     (away from an upper limit),

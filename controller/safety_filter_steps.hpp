@@ -90,21 +90,27 @@ Status SafetyFilter<N>::repel(const Motion& motion, Vector& excess, Vector& repu
 
 template <int N>
 bool SafetyFilter<N>::hold_back(const Motion& motion, Vector& excess) const noexcept {
-  const double tip = motion.tip_speed / tip_velocity_;
-  const double by_tip = tip > 0.8 ? std::max(0.0, (kFull - tip) / (kFull - 0.8)) : 1;
+  double power = 0, fastest = motion.tip_speed / tip_velocity_;
+  for (int i = 0; i < N; ++i) {
+    power += excess[i] * motion.qd[i];
+    fastest = std::max(fastest, std::abs(motion.qd[i]) / velocity_[i]);
+  }
+  if (fastest <= kFirst) return false;
   bool changed = false;
+  if (power > 0 && fastest > kWholly) {
+    const double share = std::max(0.0, (kFull - fastest) / (kFull - kWholly));
+    for (int i = 0; i < N; ++i) excess[i] *= share;
+    changed = true;
+  }
   for (int i = 0; i < N; ++i) {
     const double speed = std::abs(motion.qd[i]), share = speed / velocity_[i];
-    if (!(excess[i] * motion.qd[i] > 0) || (share <= kFirst && by_tip == 1)) continue;
-    double drive = by_tip * std::abs(excess[i]);
-    if (share > kFirst) {
-      const double room = std::max(0.0, kFull * velocity_[i] - speed);
-      const double most = std::min(std::sqrt(late_[i] * room), damper_[i] * room) +
-                          torque_[i] * std::max(0.0, (kWholly - share) / (kWholly - kFirst));
-      drive = std::min(drive, most);
-    }
-    changed |= drive < std::abs(excess[i]);
-    excess[i] = std::copysign(drive, excess[i]);
+    if (!(excess[i] * motion.qd[i] > 0) || share <= kFirst) continue;
+    const double room = std::max(0.0, kFull * velocity_[i] - speed);
+    const double most = std::min(std::sqrt(late_[i] * room), damper_[i] * room) +
+                        torque_[i] * std::max(0.0, (kWholly - share) / (kWholly - kFirst));
+    if (std::abs(excess[i]) <= most) continue;
+    excess[i] = std::copysign(most, excess[i]);
+    changed = true;
   }
   return changed;
 }

@@ -48,6 +48,7 @@ void StateCheck::reset() noexcept {
     last->velocity.setZero(n_);
   }
   velocity_.setZero(n_);
+  blind_ = false;
   intervals_ = 0;
   excess_ = 0;
   forget_motion();
@@ -88,7 +89,8 @@ Status StateCheck::check(const RobotState& state) noexcept {
   } else {
     good_.position = state.position;
   }
-  good_.velocity = velocity_ = state.velocity;
+  good_.velocity = state.velocity;
+  if (!blind_) velocity_ = state.velocity;
   good_.age = 0;
   good_.any = true;
   if (!last.any) return Status::kOk;
@@ -99,10 +101,11 @@ Status StateCheck::check(const RobotState& state) noexcept {
   }
   if (contradictory(last)) {
     status = Status::kStateContradictory;
-    velocity_ = (good_.position - last.position) / last.age;
+    blind_ = true;
   } else if (wrong_rate(gap)) {
     status = Status::kWrongRate;
   }
+  if (blind_) velocity_ += ((good_.position - last.position) / last.age - velocity_) / 3;
   return status;
 }
 
@@ -142,7 +145,7 @@ bool StateCheck::follows(const Last& last, const RobotState& state) const noexce
     const bool smooth = std::abs(change) <= (0.5 + 10 * last.age) * limit;
     const double beyond = (moved - before * last.age) * std::copysign(1, change);
     const bool blow = 3 * beyond >= std::abs(change) * last.age;  // the position moved with it
-    if (!(near || as_measured) || !(smooth || (as_measured && blow))) return false;
+    if (blind_ ? !near : !(near || as_measured) || !(smooth || (as_measured && blow))) return false;
   }
   return true;
 }

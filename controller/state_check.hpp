@@ -39,9 +39,11 @@ class StateCheck {
   Status check(const RobotState& state) noexcept;
   /// Returns the last good position, n, rad.
   const JointVector& position() const noexcept { return good_.position; }
-  /// Returns the last good velocity, n, rad/s: the measured one, or, once that contradicts the
-  /// positions, how fast these change.
+  /// Returns the last good velocity, n, rad/s: the measured one, or, from a contradiction on until
+  /// `trust_velocities`, how fast positions change, smoothed over three ticks.
   const JointVector& velocity() const noexcept { return velocity_; }
+  /// Velocities are measured again, after a contradiction.
+  void trust_velocities() noexcept { blind_ = false; }
   /// The next state is like the first.
   void reset() noexcept;
 
@@ -81,6 +83,7 @@ class StateCheck {
   double agreement_ = 0;  ///< for how long the doubtful ones have agreed with each other, s
 
   JointVector velocity_;
+  bool blind_ = false;       ///< the measured velocities contradicted the positions
   int intervals_ = 0;        ///< between ticks that `wrong_rate` has seen, at most kIntervals
   double excess_ = 0;        ///< mean of interval / period - 1
   JointVector unexplained_;  ///< what the positions moved beyond the velocities, lately, rad

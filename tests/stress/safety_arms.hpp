@@ -62,7 +62,7 @@ inline const std::vector<TestArm>& test_arms() {
        {0.4, 0.5, -1.0, 0.3, 0.02},
        0,
        3,
-       "  position_margin: 0.005\n"},  // not more than the finger's way
+       ""},
   };
   return all;
 }

@@ -1,0 +1,65 @@
+#pragma once
+#include <dashpot/controller/gain_judge.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
+
+#include <array>
+#include <atomic>
+#include <mutex>
+
+namespace dashpot::controller {
+
+/// Judges gains for all threads of a host, one after the other.
+class Judgement {
+ public:
+  Judgement(const RobotModel& model, const Settings& settings)
+      : joints_(model.dof()), wanted_(settings.limits.gain_margin), judge_(model, settings) {}
+
+  /// Of one thread: where the robot is now (n, rad).
+  void locate(const JointVector& q) noexcept {
+    for (int i = 0; i < joints_; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      position_[at].store(q[i], std::memory_order_relaxed);
+    }
+    located_.store(true, std::memory_order_release);
+  }
+  /// Sets `q` to where the robot is, each joint within the last tick or two; false if nobody knows.
+  bool where(JointVector& q) const noexcept {
+    if (!located_.load(std::memory_order_acquire)) return false;
+    q.resize(joints_);
+    for (int i = 0; i < joints_; ++i) {
+      q[i] = position_[static_cast<std::size_t>(i)].load(std::memory_order_relaxed);
+    }
+    return true;
+  }
+
+  /// Judges gains that have passed check_gains, at q. Unless it is to be done `again`, those that
+  /// were accepted last pass. Throws if there is no memory.
+  GainJudge::Verdict judge(const Gains& gains, const JointVector& q, bool again) {
+    const std::lock_guard lock(mutex_);
+    const bool known = any_ && same_gains(gains, accepted_);
+    if (wanted_ <= 1 || (known && !again)) return {wanted_, Mode::kJoint};
+    const GainJudge::Verdict verdict = judge_.judge(q, gains);
+    if (enough(verdict)) {
+      accepted_ = gains;
+      any_ = true;
+    }
+    return verdict;
+  }
+  bool enough(const GainJudge::Verdict& verdict) const noexcept {
+    return verdict.margin >= wanted_;
+  }
+  /// Returns Limits::gain_margin.
+  double wanted() const noexcept { return wanted_; }
+
+ private:
+  const int joints_;
+  const double wanted_;
+  std::array<std::atomic<double>, kMaxJoints> position_{};
+  std::atomic<bool> located_{false};
+  std::mutex mutex_;  ///< of what follows
+  GainJudge judge_;
+  bool any_ = false;
+  Gains accepted_;
+};
+
+}  // namespace dashpot::controller
