@@ -1,4 +1,5 @@
 #include <dashpot/apps/closed_loop.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -33,6 +34,7 @@ ClosedLoop::ClosedLoop(const Scene& scene, LoopController& controller)
   repeat_every_ = std::max<std::int64_t>(1, std::llround(kRepeat / scene.plant.period));
   sim::PlantOptions options = scene.plant;
   if (scene.arm) {
+    begin();
     arm_ = dynamic_cast<sim::Arm*>(mechanism_.get());
     const bool outside = scene.outside_limits;
     guide(outside ? scene.start : scene.rest, scene.start, outside ? 0 : guidance_time(scene),
@@ -40,6 +42,16 @@ ClosedLoop::ClosedLoop(const Scene& scene, LoopController& controller)
     options.initial_torque = torque_;
   }
   plant_.emplace(*mechanism_, options, scene.start, scene.velocity);
+}
+
+void ClosedLoop::begin() {
+  setpoint_ = accepted_ = scene_.steps.front().setpoint;
+  gains_ = setpoint_.gains;
+  std::string reason;
+  if (controller_.start(scene_.outside_limits ? scene_.start : scene_.rest, reason) != DASHPOT_OK ||
+      controller_.set_gains(gains_, reason) != DASHPOT_OK) {
+    throw InputError("scenario.start", "the controller refuses it: " + reason);
+  }
 }
 
 void ClosedLoop::guide(const JointVector& from, const JointVector& to, double duration,
@@ -59,15 +71,9 @@ void ClosedLoop::guide(const JointVector& from, const JointVector& to, double du
     const JointVector qd =
         way == 0 ? JointVector(0 * from)
                  : JointVector((slope / (static_cast<double>(way) * period)) * (to - from));
-    if (i == 0) {
-      setpoint_ = scene_.steps.front().setpoint;
-      const std::int32_t code = controller_.hold(setpoint_);
-      if (code != DASHPOT_OK) throw InputError("scenario.start", "the controller refuses it");
-    } else if (i % repeat_every_ == 0) {
-      controller_.hold(setpoint_);
-    }
     const std::int64_t time = std::llround(kNanoseconds * period * static_cast<double>(i - ticks));
-    const std::int32_t status = controller_.update(time, q, qd, torque_);
+    if (i % repeat_every_ == 0) setpoint_.time = time;
+    const std::int32_t status = controller_.update(time, q, qd, &setpoint_, torque_);
     if (status >= DASHPOT_SETPOINT_REJECTED && !scene_.outside_limits) {
       throw InputError("scenario.start", "the controller reports status " + std::to_string(status));
     }
@@ -86,9 +92,16 @@ std::int32_t ClosedLoop::control() noexcept {
   const LoopFault* const fault = loop_fault();
   const std::int64_t tick = ticks_++;
   if (fault != nullptr && (fault->every == 0 || tick % fault->every != 0)) return status_;
-  if (scene_.arm) follow_scenario(tick);
   const sim::Measurement& measured = plant_->measured();
-  status_ = controller_.update(measured.time, measured.position, measured.velocity, torque_);
+  if (news_) setpoint_.time = measured.time;
+  const bool told = scene_.arm && in_force_;
+  status_ = controller_.update(measured.time, measured.position, measured.velocity,
+                               told ? &setpoint_ : nullptr, torque_);
+  // What was rejected shows in the status, once; then what was held before goes on.
+  const bool rejected = told && news_ && status_ == DASHPOT_SETPOINT_REJECTED;
+  if (rejected) setpoint_ = accepted_;
+  if (told && news_ && !rejected) accepted_ = setpoint_;
+  news_ = rejected;
   if (status_ < 0) torque_.setZero();  // a refused call leaves the robot to its host
   return status_;
 }
@@ -122,23 +135,60 @@ void ClosedLoop::carry(const LoopFault& fault) noexcept {
   plant_->carry(taken_at_ + place * fault.moved_by, slope / duration * fault.moved_by);
 }
 
-void ClosedLoop::follow_scenario(std::int64_t tick) noexcept {
+void ClosedLoop::follow_scenario() noexcept {
+  if (!scene_.arm) return;
   const auto& steps = scene_.steps;
-  bool news = tick - told_at_ >= repeat_every_;
+  if (ticks_ % repeat_every_ == 0) news_ = true;
   while (next_step_ < steps.size() && steps[next_step_].at <= plant_->time()) {
-    setpoint_ = steps[next_step_++].setpoint;
-    news = true;
+    hold(steps[next_step_++].setpoint);
+    due_steps_.store(next_step_, std::memory_order_release);
   }
-  // A refusal shows in the status: the watchdog ends what was held before.
-  if (!news) return;
-  told_at_ = tick;
-  controller_.hold(setpoint_);
+  if (!leave_gains_) follow_gains();
+  // New gains count with a set-point that is read again.
+  const std::int64_t changes = gain_changes_.load(std::memory_order_acquire);
+  if (changes != gain_changes_seen_) news_ = true;
+  gain_changes_seen_ = changes;
 }
 
-std::int32_t ClosedLoop::hold(const controller::Setpoint& setpoint) noexcept {
-  const std::int32_t code = controller_.hold(setpoint);
-  if (code == DASHPOT_OK) setpoint_ = setpoint;
+void ClosedLoop::hold(const controller::Setpoint& setpoint) noexcept {
+  setpoint_ = setpoint;
+  in_force_ = news_ = true;
+}
+
+void ClosedLoop::note_fault(bool latched) noexcept {
+  if (latched) in_force_ = false;
+  if (faulted_ && !latched && !released_.exchange(false, std::memory_order_acquire)) {
+    in_force_ = news_ = true;
+  }
+  faulted_ = latched;
+}
+
+std::int32_t ClosedLoop::change_gains(const std::function<void(controller::Gains&)>& change,
+                                      std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  controller::Gains wanted = gains_;
+  change(wanted);
+  if (controller::same_gains(wanted, gains_)) return DASHPOT_OK;
+  const std::int32_t code = controller_.set_gains(wanted, reason);
+  if (code != DASHPOT_OK) return code;
+  gains_ = wanted;
+  gain_changes_.fetch_add(1, std::memory_order_release);
   return code;
+}
+
+void ClosedLoop::release() {
+  const std::lock_guard lock(mutex_);
+  released_.store(true, std::memory_order_release);  // first, so that no tick takes it for its own
+  controller_.release();
+}
+
+void ClosedLoop::follow_gains() {
+  const std::size_t due = due_steps_.load(std::memory_order_acquire);
+  if (due == followed_steps_) return;
+  followed_steps_ = due;
+  const controller::Gains& wanted = scene_.steps[due - 1].setpoint.gains;
+  const auto change = [&wanted](controller::Gains& gains) { gains = wanted; };
+  if (change_gains(change, refusal_) != DASHPOT_OK) ++refused_steps_;
 }
 
 }  // namespace dashpot::apps

@@ -88,14 +88,13 @@ std::vector<std::string> numbers(const Eigen::VectorXd& values) {
 std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics,
                          const JointVector& q, const JointVector& qd) {
   TextTable table;
-  using Align = TextTable::Align;
-  table.add_column(Align::kRight, {"", "joint"});
-  table.add_column(Align::kLeft, {"", "name"});
-  table.add_column(Align::kLeft, {"", "type"});
+  table.add_column(TextTable::Align::kRight, {"", "joint"});
+  table.add_column(TextTable::Align::kLeft, {"", "name"});
+  table.add_column(TextTable::Align::kLeft, {"", "type"});
   std::vector<std::vector<std::string>> columns;
   const auto add = [&](const std::string& above, const std::string& name,
                        const Eigen::VectorXd& values) {
-    table.add_column(Align::kPoint, {above, name});
+    table.add_column(TextTable::Align::kPoint, {above, name});
     columns.push_back(numbers(values));
   };
   add("lower", "limit", model.joint_values(&Joint::lower));
@@ -135,13 +134,12 @@ std::string matrix_table(const Eigen::MatrixXd& matrix, const std::vector<std::s
 
 std::string tip_table(const DynamicsResult& dynamics) {
   TextTable table;
-  using Align = TextTable::Align;
-  table.add_column(Align::kLeft, {"", ""});
-  table.add_column(Align::kPoint, {"", "position"});
+  table.add_column(TextTable::Align::kLeft, {"", ""});
+  table.add_column(TextTable::Align::kPoint, {"", "position"});
   for (const char* axis : {"x axis", "y axis", "z axis"})
-    table.add_column(Align::kPoint, {"tip's", axis});
-  table.add_column(Align::kPoint, {"Jdot qd", "linear"});
-  table.add_column(Align::kPoint, {"Jdot qd", "angular"});
+    table.add_column(TextTable::Align::kPoint, {"tip's", axis});
+  table.add_column(TextTable::Align::kPoint, {"Jdot qd", "linear"});
+  table.add_column(TextTable::Align::kPoint, {"Jdot qd", "angular"});
   const std::vector<std::vector<std::string>> columns = {
       numbers(dynamics.p_BT_B),          numbers(dynamics.R_BT.col(0)),
       numbers(dynamics.R_BT.col(1)),     numbers(dynamics.R_BT.col(2)),

@@ -8,8 +8,9 @@
 
 namespace dashpot::apps {
 
-/// What stands between a measurement and a torque, in the terms of plugin.h. But for the
-/// constructors nothing allocates, throws or waits.
+/// What stands between a measurement and a torque, in the terms of plugin.h. The loop's thread
+/// calls what is noexcept, and there nothing allocates or waits. Another thread, one at a time,
+/// calls the rest, which may take milliseconds; where nothing hurries it may be the same thread.
 class LoopController {
  public:
   LoopController() = default;
@@ -18,7 +19,9 @@ class LoopController {
   virtual ~LoopController() = default;
 
   /// A tick: the torque for this measurement, and a status. `time` in ns; n entries each.
+  /// `setpoint` says where to go, and is new if its time is; its gains do not count. Null: no news.
   virtual std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
+                              const controller::Setpoint* setpoint,
                               JointVector& torque) noexcept = 0;
   /// Of the last tick.
   virtual const dashpot_snapshot& snapshot() noexcept = 0;
@@ -26,17 +29,19 @@ class LoopController {
   virtual const dashpot_modes* new_modes() noexcept = 0;
   /// Likewise of the sampled loop.
   virtual const dashpot_sampled_modes* new_sampled_modes() noexcept { return nullptr; }
-  /// What to hold from the next tick on. Returns DASHPOT_OK, or the code of a refusal.
-  virtual std::int32_t hold(const controller::Setpoint& setpoint) noexcept = 0;
-  /// The next tick releases a latched fault.
-  virtual std::int32_t release() noexcept { return DASHPOT_OK; }
-  /// On any thread: whether the gains of a set-point would be taken at a joint position (n, rad;
-  /// null: where the robot is). Returns DASHPOT_OK, or a code and the `reason`. Takes milliseconds
-  /// and allocates.
-  virtual std::int32_t judge(const controller::Setpoint& /*setpoint*/, std::string& /*reason*/,
-                             const JointVector* /*position*/ = nullptr) {
-    return DASHPOT_OK;
-  }
+
+  /// Before the loop begins, with the robot at rest at q. Returns DASHPOT_OK, or the code of a
+  /// refusal; `reason` then says why, in one line.
+  virtual std::int32_t start(const JointVector& q, std::string& reason) = 0;
+  /// The springs and dampers from the next tick on. Returns as start().
+  virtual std::int32_t set_gains(const controller::Gains& gains, std::string& reason) = 0;
+  /// Whether the controller would go there, with these gains, from q; for one that is in no loop.
+  /// Returns as start().
+  virtual std::int32_t check(const controller::Setpoint& setpoint, const JointVector& q,
+                             std::string& reason) = 0;
+  /// Releases a latched fault at the next tick: the robot is held where it is, until there is a new
+  /// set-point.
+  virtual std::int32_t release() = 0;
 };
 
 /// The controller plugin, loaded at run time as any host would.

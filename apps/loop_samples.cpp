@@ -21,6 +21,7 @@ void fill(const dashpot_snapshot& from, controller::Snapshot& to) noexcept {
   to.tick = from.tick;
   to.restarts = from.restarts;
   to.status = static_cast<controller::Status>(from.status);
+  to.fault = static_cast<controller::Status>(from.fault);
   to.mode = static_cast<controller::Mode>(from.mode);
   to.position = vector(from.position, n);
   to.velocity = vector(from.velocity, n);

@@ -48,9 +48,9 @@ bool schedule_ahead_of_others() noexcept {
 
 }  // namespace
 
-LoopThread::LoopThread(ClosedLoop& loop, lcmtypes::Publisher& publisher,
-                       lcmtypes::CommandReceiver* receiver, const Options& options)
-    : loop_(loop), publisher_(publisher), receiver_(receiver), options_(options) {
+LoopThread::LoopThread(ClosedLoop& loop, lcmtypes::Publisher& publisher, CommandSource* commands,
+                       const Options& options)
+    : loop_(loop), publisher_(publisher), commands_(commands), options_(options) {
   record_.tick_times.assign(static_cast<std::size_t>(std::min(options.ticks, kMostTimes)), 0);
 }
 
@@ -60,7 +60,10 @@ LoopThread::~LoopThread() {
 }
 
 void LoopThread::start() {
-  if (options_.pace == Pace::kRealTime) privileges_.locked = lock_memory();
+  if (options_.pace == Pace::kRealTime) {
+    privileges_.locked = lock_memory();
+    loop_.leave_gains();
+  }
   thread_ = std::thread([this] { run(); });
 }
 
@@ -101,7 +104,9 @@ void LoopThread::run() noexcept {
 }
 
 void LoopThread::tick(std::int64_t utime) noexcept {
-  take_commands();
+  released_ = commands_ != nullptr && commands_->take();
+  if (commands_ != nullptr) state_.health.commands = commands_->fetch_tally();
+  loop_.follow_scenario();
   const bool fast = options_.pace == Pace::kFast;
   const std::int64_t computed_before = fast ? now(CLOCK_THREAD_CPUTIME_ID) : 0;
   const std::int64_t begin = now(CLOCK_MONOTONIC);
@@ -109,6 +114,9 @@ void LoopThread::tick(std::int64_t utime) noexcept {
   const std::int64_t time = std::min<std::int64_t>(now(CLOCK_MONOTONIC) - begin,
                                                    std::numeric_limits<std::int32_t>::max());
   const auto tick_time = static_cast<std::int32_t>(time);
+
+  const bool commanded = commands_ != nullptr && commands_->taken();
+  if (commanded && status == DASHPOT_SETPOINT_REJECTED) ++record_.commands_refused;
 
   const auto kept = static_cast<std::size_t>(record_.ticks % kMostTimes);
   if (kept < record_.tick_times.size()) record_.tick_times[kept] = tick_time;
@@ -134,17 +142,19 @@ void LoopThread::tick(std::int64_t utime) noexcept {
   ticks_ = ++record_.ticks;
 }
 
-void LoopThread::take_commands() noexcept {
-  if (receiver_ == nullptr) return;
-  if (receiver_->fetch()) {
-    controller::Setpoint setpoint = loop_.setpoint();
-    // Only what is new: older parts may have been replaced by the scenario since.
-    lcmtypes::apply(receiver_->command(), setpoint, commands_applied_);
-    commands_applied_ = receiver_->command().accepted;
-    if (loop_.hold(setpoint) != DASHPOT_OK) ++record_.commands_refused;
+void LoopThread::note_fault(const dashpot_snapshot& snapshot) noexcept {
+  // One that latches again at the tick that released it has another name.
+  if (snapshot.fault != record_.fault || (released_ && snapshot.fault != DASHPOT_OK)) {
+    record_.fault = snapshot.fault;
+    record_.fault_tick = 0;
+    if (record_.fault != DASHPOT_OK) {
+      record_.fault_tick = static_cast<std::int64_t>(snapshot.tick);
+      ++record_.faults;
+    }
   }
-  state_.health.commands_accepted = receiver_->count(lcmtypes::CommandVerdict::kAccepted);
-  state_.health.commands_rejected = receiver_->rejected();
+  state_.health.fault_tick = record_.fault_tick;
+  loop_.note_fault(record_.fault != DASHPOT_OK);
+  if (commands_ != nullptr) commands_->set_fault_tick(record_.fault_tick);
 }
 
 void LoopThread::publish(std::int64_t utime) noexcept {
@@ -152,6 +162,7 @@ void LoopThread::publish(std::int64_t utime) noexcept {
   note(snapshot);
   if (record_.ticks == 0) first_restarts_ = snapshot.restarts;
   record_.restarts = snapshot.restarts - first_restarts_;
+  note_fault(snapshot);
   state_.utime = utime;
   fill(snapshot, state_.snapshot);
   publisher_.offer(state_);

@@ -1,6 +1,5 @@
 #pragma once
-#include <dashpot/apps/closed_loop.hpp>
-#include <dashpot/lcmtypes/command_receiver.hpp>
+#include <dashpot/apps/command_source.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
 
 #include <array>
@@ -31,7 +30,10 @@ struct LoopRecord {
   std::int64_t status_changes = 0;
   std::uint64_t restarts = 0;  ///< of the springs, after the first tick
   sim::Status simulation = sim::Status::kOk;
-  std::int64_t commands_refused = 0;  ///< by the controller, though well-formed
+  std::int64_t commands_refused = 0;  ///< by the controller, though accepted
+  std::int64_t faults = 0;            ///< how often one latched
+  std::int32_t fault = DASHPOT_OK;    ///< that is latched; DASHPOT_OK: none
+  std::int64_t fault_tick = 0;        ///< when it latched; 0: there is none
   dashpot_modes first_modes{};        ///< tick 0: there were none
   dashpot_modes last_modes{};
   bool cartesian = false;  ///< Cartesian springs were in force
@@ -45,8 +47,9 @@ struct LoopRecord {
 /// Runs a closed loop on a thread of its own until it has made its ticks, the simulation fails or
 /// somebody stops it. In real time ticks begin at absolute deadlines; a deadline that lies more
 /// than a tick back is given up, and counted as an overrun. The loop allocates nothing, and waits
-/// for nothing but its deadlines; only without real time it publishes on its own thread, so that no
-/// message is lost.
+/// for nothing but its deadlines: the gains of the scenario are left to another thread, which calls
+/// ClosedLoop::follow_gains. Only without real time it has them judged and publishes on its own
+/// thread, so that no message is lost.
 class LoopThread {
  public:
   struct Options {
@@ -55,8 +58,9 @@ class LoopThread {
     std::int64_t ticks = 0;
   };
 
-  /// `receiver` may be null. All must outlive it. In real time the publisher's thread runs already.
-  LoopThread(ClosedLoop& loop, lcmtypes::Publisher& publisher, lcmtypes::CommandReceiver* receiver,
+  /// `commands` may be null: none are taken. All must outlive it. In real time the publisher's
+  /// thread runs already.
+  LoopThread(ClosedLoop& loop, lcmtypes::Publisher& publisher, CommandSource* commands,
              const Options& options);
   ~LoopThread();
   LoopThread(const LoopThread&) = delete;
@@ -79,14 +83,14 @@ class LoopThread {
  private:
   void run() noexcept;
   void tick(std::int64_t utime) noexcept;
-  void take_commands() noexcept;
+  void note_fault(const dashpot_snapshot& snapshot) noexcept;
   void note(const dashpot_snapshot& snapshot) noexcept;
   void publish(std::int64_t utime) noexcept;
   void publish_sampled(std::int64_t utime, std::int64_t time) noexcept;
 
   ClosedLoop& loop_;
   lcmtypes::Publisher& publisher_;
-  lcmtypes::CommandReceiver* receiver_;
+  CommandSource* commands_;
   Options options_;
   std::thread thread_;
   std::atomic<bool> stop_{false};
@@ -97,7 +101,7 @@ class LoopThread {
 
   // The loop's own:
   LoopRecord record_;
-  std::int64_t commands_applied_ = 0;
+  bool released_ = false;  ///< this tick takes up the release of a fault
   std::int32_t last_status_ = DASHPOT_OK;
   std::uint64_t first_restarts_ = 0;
   lcmtypes::StateSample state_;

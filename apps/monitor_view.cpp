@@ -1,4 +1,5 @@
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/apps/command_report.hpp>
 #include <dashpot/apps/monitor_view.hpp>
 #include <dashpot/apps/shape_text.hpp>
 #include <dashpot/apps/text_table.hpp>
@@ -27,6 +28,11 @@ std::string fixed(double value, int decimals) {
 
 std::string status_text(std::int8_t status) {
   return controller::to_text(static_cast<controller::Status>(status));
+}
+
+std::string latched(const state_t& state) {
+  return "FAULT LATCHED at tick " + std::to_string(state.fault_tick) + ": " +
+         status_text(state.fault);
 }
 
 std::string mode_text(std::int8_t mode) {
@@ -162,17 +168,32 @@ std::string MonitorView::health() const {
   std::string out = "  tick " + std::to_string(state.tick) + ", " + fixed(time(), 1) +
                     " s: " + status_text(state.status) + "; mode " + mode_text(state.mode) +
                     "; started " + count(state.restarts, "time") + "\n";
+  if (state.fault != 0) out += "  " + latched(state) + "\n";
   out += "  " + (rate_ > 0 ? fixed(rate_, 0) : "-") + " ticks/s, " + tick_times(state) + ", " +
          count(state.overruns, "overrun") + ", " + count(state.states_dropped, "state") +
          " not published\n";
-  out += "  commands: " + std::to_string(state.commands_accepted) + " accepted, " +
-         std::to_string(state.commands_rejected) + " rejected\n";
+  out += commands();
   out += "  tip off its set-point by " + fixed(1e3 * tip_error(state), 2) + " mm and " +
          fixed(std::hypot(state.tip_error[3], state.tip_error[4], state.tip_error[5]) * 180 /
                    std::numbers::pi,
                2) +
          " deg\n";
   return out;
+}
+
+std::string MonitorView::commands() const {
+  const state_t& state = *state_;
+  std::string out =
+      "  commands: " + verdicts_text(state.verdicts) + "; " +
+      (state.commander == 0 ? "nobody commands"
+                            : "sender " + std::to_string(state.commander) + " commands") +
+      "\n";
+  if (state.last_refusal == state_t::ACCEPTED) return out;
+  const auto verdict = static_cast<lcmtypes::CommandVerdict>(state.last_refusal);
+  return out + "  last rejected " +
+         fixed(1e-6 * static_cast<double>(state.utime - state.last_refusal_utime), 1) +
+         " s before: " + lcmtypes::to_text(verdict) + ", of sender " +
+         std::to_string(state.last_refused_sender) + "\n";
 }
 
 std::string MonitorView::joints() const {
@@ -240,6 +261,7 @@ std::string MonitorView::line() const {
     out += "  tick " + std::to_string(state_->tick) + "  " + status_text(state_->status) + "  " +
            (rate_ > 0 ? fixed(rate_, 0) : "-") + " ticks/s, " + tick_times(*state_) + ", " +
            count(state_->overruns, "overrun");
+    if (state_->fault != 0) out += "  " + latched(*state_);
   }
   if (modes_) {
     out += "  modes, rad/s (ratio):";
@@ -266,7 +288,8 @@ std::string MonitorView::summary(std::int64_t malformed) const {
   if (state_) {
     out += "  " + count(state_->overruns, "overrun") + ", longest " +
            fixed(1e-3 * state_->longest_tick_time, 1) + " us; largest tip error " +
-           fixed(1e3 * largest_error_, 2) + " mm\n";
+           fixed(1e3 * largest_error_, 2) + " mm\n" + commands();
+    if (state_->fault != 0) out += "  " + latched(*state_) + "\n";
   }
   if (modes_) out += "\nModes at the end\n" + modes_table();
   if (sampled_) out += "\nSampled loop at the end\n" + sampled_table();

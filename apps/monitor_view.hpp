@@ -37,6 +37,7 @@ class MonitorView {
   void note_time(std::int64_t utime);
   void note_order(std::int64_t tick);
   std::string health() const;
+  std::string commands() const;
   std::string joints() const;
   std::string modes_table() const;
   std::string sampled_table() const;

@@ -14,6 +14,8 @@ constexpr const char* kLibraryName = "libdashpot_plugin.so";
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor,
                                controller::kMaxJoints, controller::kMaxJoints>;
 
+using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
 class PluginController : public LoopController {
  public:
   PluginController(const dashpot_plugin& plugin, const std::string& config_path, int joints)
@@ -28,10 +30,13 @@ class PluginController : public LoopController {
   }
 
   std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
-                      JointVector& torque) noexcept override {
+                      const controller::Setpoint* setpoint, JointVector& torque) noexcept override {
     const dashpot_state state = {sizeof(dashpot_state), n(), time, q.data(), qd.data(), nullptr};
     dashpot_output output = {sizeof(dashpot_output), n(), torque.data()};
-    return plugin_.update(handle_.get(), &state, nullptr, &output);
+    if (setpoint == nullptr) return plugin_.update(handle_.get(), &state, nullptr, &output);
+    const RowMajor3 rotation = setpoint->tip_pose.rotation;
+    const dashpot_setpoint wanted = in_c(*setpoint, setpoint->time, rotation);
+    return plugin_.update(handle_.get(), &state, &wanted, &output);
   }
 
   const dashpot_snapshot& snapshot() noexcept override {
@@ -51,32 +56,29 @@ class PluginController : public LoopController {
     return sampled_modes_.tick == last ? nullptr : &sampled_modes_;
   }
 
-  std::int32_t hold(const controller::Setpoint& setpoint) noexcept override {
-    const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> rotation = setpoint.tip_pose.rotation;
-    const dashpot_setpoint wanted = {
-        sizeof(dashpot_setpoint),
-        n(),
-        DASHPOT_ON_ARRIVAL,
-        setpoint.mode == controller::Mode::kCartesian ? DASHPOT_MODE_CARTESIAN : DASHPOT_MODE_JOINT,
-        setpoint.joint_position.data(),
-        setpoint.tip_pose.position.data(),
-        rotation.data(),
-        setpoint.wrench.data()};
-    const std::int32_t code = set_gains(setpoint.gains);
-    return code == DASHPOT_OK ? plugin_.set_setpoint(handle_.get(), &wanted) : code;
+  std::int32_t start(const JointVector& q, std::string& reason) override {
+    return explain(plugin_.start(handle_.get(), q.data(), nullptr), reason);
   }
 
-  std::int32_t release() noexcept override { return plugin_.release(handle_.get()); }
-
-  std::int32_t judge(const controller::Setpoint& setpoint, std::string& reason,
-                     const JointVector* position) override {
-    const GainArrays arrays(setpoint.gains);
+  std::int32_t set_gains(const controller::Gains& gains, std::string& reason) override {
+    const GainArrays arrays(gains);
     const dashpot_gains wanted = arrays.gains(n());
-    const std::int32_t code = plugin_.judge_gains(
-        handle_.get(), &wanted, position != nullptr ? position->data() : nullptr, nullptr);
-    if (code != DASHPOT_OK) reason = plugin_.last_error();
-    return code;
+    return explain(plugin_.set_gains(handle_.get(), &wanted), reason);
   }
+
+  std::int32_t check(const controller::Setpoint& setpoint, const JointVector& q,
+                     std::string& reason) override {
+    const GainArrays arrays(setpoint.gains);
+    const dashpot_gains gains = arrays.gains(n());
+    std::int32_t code = plugin_.judge_gains(handle_.get(), &gains, q.data(), nullptr);
+    if (code == DASHPOT_OK) code = plugin_.set_gains(handle_.get(), &gains);
+    if (code != DASHPOT_OK) return explain(code, reason);
+    const RowMajor3 rotation = setpoint.tip_pose.rotation;
+    const dashpot_setpoint wanted = in_c(setpoint, DASHPOT_ON_ARRIVAL, rotation);
+    return explain(plugin_.set_setpoint(handle_.get(), &wanted), reason);
+  }
+
+  std::int32_t release() override { return plugin_.release(handle_.get()); }
 
  private:
   /// Gains in the form that plugin.h wants them in.
@@ -108,10 +110,23 @@ class PluginController : public LoopController {
 
   std::uint32_t n() const noexcept { return plugin_.joints(handle_.get()); }
 
-  std::int32_t set_gains(const controller::Gains& gains) noexcept {
-    const GainArrays arrays(gains);
-    const dashpot_gains wanted = arrays.gains(n());
-    return plugin_.set_gains(handle_.get(), &wanted);
+  std::int32_t explain(std::int32_t code, std::string& reason) const {
+    if (code != DASHPOT_OK) reason = plugin_.last_error();
+    return code;
+  }
+
+  /// Refers to `setpoint` and `rotation`.
+  dashpot_setpoint in_c(const controller::Setpoint& setpoint, std::int64_t time,
+                        const RowMajor3& rotation) const noexcept {
+    return {
+        sizeof(dashpot_setpoint),
+        n(),
+        time,
+        setpoint.mode == controller::Mode::kCartesian ? DASHPOT_MODE_CARTESIAN : DASHPOT_MODE_JOINT,
+        setpoint.joint_position.data(),
+        setpoint.tip_pose.position.data(),
+        rotation.data(),
+        setpoint.wrench.data()};
   }
 
   const dashpot_plugin& plugin_;

@@ -38,18 +38,18 @@ Scene quiet_scene(const Scene& scene, const JointVector& start) {
   return quiet;
 }
 
-struct Motion {
+struct RecordedMotion {
   Recording recording;
   dashpot_modes modes{};  ///< the first ones
 };
 
 /// Nothing if `stopped` says so first.
-std::optional<Motion> record(const Scene& scene, const ControllerFactory& make_controller,
-                             int every, const std::function<bool()>& stopped) {
+std::optional<RecordedMotion> record(const Scene& scene, const ControllerFactory& make_controller,
+                                     int every, const std::function<bool()>& stopped) {
   const auto controller = make_controller();
   ClosedLoop loop(scene, *controller);
   const auto samples = static_cast<Eigen::Index>(kDuration / (every * scene.plant.period));
-  Motion motion;
+  RecordedMotion motion;
   motion.recording.position.resize(scene.dof(), samples);
   motion.recording.velocity.resize(scene.dof(), samples);
   for (Eigen::Index i = 0; i < samples; ++i) {
@@ -57,6 +57,7 @@ std::optional<Motion> record(const Scene& scene, const ControllerFactory& make_c
     motion.recording.position.col(i) = loop.plant().position();
     motion.recording.velocity.col(i) = loop.plant().velocity();
     for (int k = 0; k < every; ++k) {
+      loop.follow_scenario();
       loop.control();
       const dashpot_modes* modes = controller->new_modes();
       if (modes != nullptr && modes->time >= 0 && motion.modes.tick == 0) motion.modes = *modes;

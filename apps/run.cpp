@@ -26,11 +26,12 @@ struct Options {
   std::optional<double> duration;
   bool fast = false;
   bool real_time = false;  // which it is unless `fast`
+  bool commands = false;
   bool ring_down = false;
   bool json = false;
 };
 
-constexpr std::chrono::milliseconds kLook{50};     // how often the loop's progress is looked at
+constexpr std::chrono::milliseconds kLook{5};      // how often the loop's progress is looked at
 constexpr std::chrono::milliseconds kRedraw{200};  // of the progress on a terminal
 constexpr std::chrono::seconds kLinePeriod{2};     // of the progress elsewhere
 
@@ -81,6 +82,7 @@ std::shared_ptr<lcm::LCM> open_bus(const Options& options) {
     return open_for("--lcm-url", [&] { return lcmtypes::open_bus(options.url); });
   }
   if (options.fast) return nullptr;
+  if (options.commands) return open_for("--commands", [] { return lcmtypes::open_bus(""); });
   try {
     return lcmtypes::open_bus("");
   } catch (const std::runtime_error& error) {
@@ -103,22 +105,16 @@ std::vector<std::unique_ptr<lcmtypes::Sink>> make_sinks(const Options& options,
 /// Throws unless the controller takes every set-point of the scenario.
 void check_steps(const Scene& scene, const PluginLibrary& plugin) {
   const auto controller = plugin.create(scene.path, scene.dof());
+  std::string reason;
+  const JointVector& begin = scene.outside_limits ? scene.start : scene.rest;
+  if (controller->start(begin, reason) != DASHPOT_OK) {
+    throw InputError("scenario.start", "the controller refuses it: " + reason).in_file(scene.path);
+  }
   for (const ScenarioStep& step : scene.steps) {
-    if (controller->hold(step.setpoint) == DASHPOT_OK) continue;
-    throw InputError("scenario.steps",
-                     std::string("the controller refuses this: ") + plugin.functions().last_error(),
-                     step.line)
+    if (controller->check(step.setpoint, begin, reason) == DASHPOT_OK) continue;
+    throw InputError("scenario.steps", "the controller refuses this: " + reason, step.line)
         .in_file(scene.path);
   }
-}
-
-std::unique_ptr<lcmtypes::CommandReceiver> make_receiver(const Scene& scene,
-                                                         const std::shared_ptr<lcm::LCM>& bus) {
-  if (!bus || !scene.arm) return nullptr;
-  lcmtypes::CommandLimits limits;
-  limits.position_lower = scene.arm->config.settings.limits.position_lower;
-  limits.position_upper = scene.arm->config.settings.limits.position_upper;
-  return std::make_unique<lcmtypes::CommandReceiver>(bus, limits);
 }
 
 /// Runs the loop to its end, or until the user stops it.
@@ -126,18 +122,20 @@ RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
                    const std::shared_ptr<lcm::LCM>& bus) {
   RunReport report;
   report.pace = options.fast ? Pace::kFast : Pace::kRealTime;
-  const auto receiver = options.fast ? nullptr : make_receiver(scene, bus);
+  std::optional<CommandSource> commands;
+  if (options.commands) commands.emplace(bus, scene.commands, loop);
   lcmtypes::Publisher publisher(make_sinks(options, bus));
   if (!options.fast) publisher.start();
   const double period = scene.plant.period;
   const std::int64_t ticks = std::max<std::int64_t>(1, std::llround(scene.duration / period));
   const Clock::time_point start = Clock::now();
-  LoopThread thread(loop, publisher, receiver.get(), {report.pace, period, ticks});
+  LoopThread thread(loop, publisher, commands ? &*commands : nullptr, {report.pace, period, ticks});
   {
     Progress progress(ticks, period);
     thread.start();
     while (!thread.done()) {
-      std::this_thread::sleep_for(options.fast ? kLook / 10 : kLook);
+      std::this_thread::sleep_for(kLook);
+      if (!options.fast) loop.follow_gains();
       progress.show(thread.ticks(), thread.overruns());
       if (StopSignal::given()) {
         thread.stop();
@@ -147,14 +145,15 @@ RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
     thread.join();
   }
   report.wall_time = seconds_since(start);
+  if (loop.refused_steps() > 0) {
+    std::fprintf(stderr, "gains of %d steps of the scenario were refused, the last: %s\n",
+                 loop.refused_steps(), loop.refusal().c_str());
+  }
   publisher.stop();  // the counters below are final
   report.privileges = thread.privileges();
   report.loop = thread.record();
   report.messages = publisher.counters();
-  if (receiver) {
-    report.commands_accepted = receiver->count(lcmtypes::CommandVerdict::kAccepted);
-    report.commands_rejected = receiver->rejected();
-  }
+  if (commands) report.commands = {commands->tally(), commands->last_reason()};
   return report;
 }
 
@@ -170,8 +169,15 @@ void check_files(const Options& options, const Scene& scene) {
 }
 
 void run(const Options& options) {
+  if (options.commands && options.fast) {
+    throw InputError("--commands",
+                     "is for real time: with --fast commands would come at no particular time");
+  }
   Scene scene = load_scene(options.scene);
   check_files(options, scene);
+  if (options.commands && !scene.arm) {
+    throw InputError("--commands", "has nothing to command: the scene is a system of matrices");
+  }
   if (options.duration) scene.duration = *options.duration;
   std::optional<PluginLibrary> plugin;
   if (scene.arm) plugin.emplace(options.plugin);
@@ -225,11 +231,13 @@ void add_run(CLI::App& program) {
         return value >= 1e-6 && value <= 1e7 ? "" : text + " is not in the range 1e-6 to 1e7 s";
       })
       ->option_text("S");
-  CLI::Option* real_time = command->add_flag("--realtime", options->real_time,
-                                             "At the robot's pace; commands are taken (default)");
+  CLI::Option* real_time =
+      command->add_flag("--realtime", options->real_time, "At the robot's pace (default)");
   command
       ->add_flag("--fast", options->fast, "As fast as possible; without a bus unless one is named")
       ->excludes(real_time);
+  command->add_flag("--commands", options->commands,
+                    "Take commands from the bus; without it none are taken");
   command
       ->add_option("--lcm-url", options->url,
                    "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine")

@@ -215,13 +215,7 @@ std::string messages_text(const RunReport& report) {
   return "  Messages: " + count(sent.states, "state") + ", " + std::to_string(sent.modes) +
          " of modes (" + std::to_string(sent.modes_skipped) + " unchanged, not sent), " +
          std::to_string(sent.states_dropped + sent.modes_dropped) + " dropped, " +
-         count(sent.send_errors, "error") +
-         "; commands: " + std::to_string(report.commands_accepted) + " accepted, " +
-         std::to_string(report.commands_rejected) + " rejected" +
-         (report.loop.commands_refused == 0 ? ""
-                                            : ", " + std::to_string(report.loop.commands_refused) +
-                                                  " of those accepted refused by the controller") +
-         "\n";
+         count(sent.send_errors, "error") + "\n";
 }
 
 Json modes_json(const dashpot_modes& modes) {
@@ -294,7 +288,8 @@ std::string to_table(const RunReport& report) {
                     " ms, " + pace_text(report) + (report.interrupted ? "; interrupted" : "") +
                     "\n\n";
   out += timing_text(report) + statuses_text(loop) + extremes_text(report.extremes) +
-         error_text(loop) + energy_text(report.energy) + messages_text(report);
+         error_text(loop) + energy_text(report.energy) + fault_text(loop) + messages_text(report) +
+         commands_text(report.commands, loop.commands_refused);
   if (loop.first_modes.tick != 0) {
     out += solved_text(loop.first_modes, loop.last_modes);
     out += "\nModes at the start, " + count(loop.first_modes.zero_modes, "zero mode") + "\n" +
@@ -358,10 +353,9 @@ std::string to_json(const RunReport& report) {
         {"modes_dropped", report.messages.modes_dropped},
         {"sampled_modes", report.messages.sampled_modes},
         {"errors", report.messages.send_errors}}},
-      {"commands",
-       {{"accepted", report.commands_accepted},
-        {"rejected", report.commands_rejected},
-        {"refused", loop.commands_refused}}}};
+      {"commands", commands_json(report.commands, loop.commands_refused)},
+      {"faults", loop.faults},
+      {"fault", fault_json(loop)}};
   if (report.ring_down) result["ring_down"] = ring_down_json(*report.ring_down);
   return json_text(result);
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/apps/command_report.hpp>
 #include <dashpot/apps/loop_thread.hpp>
 #include <dashpot/apps/ring_down.hpp>
 
@@ -21,8 +22,7 @@ struct RunReport {
   sim::EnergyAudit energy;
   Extremes extremes;
   lcmtypes::PublisherCounters messages;
-  std::int64_t commands_accepted = 0;
-  std::int64_t commands_rejected = 0;
+  std::optional<CommandReport> commands;  ///< if any were to be taken
   std::optional<RingDown> ring_down;
 };
 

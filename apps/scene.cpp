@@ -27,15 +27,18 @@ sim::RobotParameters believed(const controller::Config& config) {
 }
 
 void read_arm(const YamlNode& document, const std::filesystem::path& directory, Scene& scene) {
-  static constexpr std::array<std::string_view, 10> kKeys = {
-      "robot",        "control",  "gains",    "limits",     "motion",
-      "feed_forward", "watchdog", "analysis", "simulation", "scenario"};
+  static constexpr std::array<std::string_view, 11> kKeys = {
+      "robot",    "control",  "gains",    "limits",     "motion",  "feed_forward",
+      "watchdog", "analysis", "commands", "simulation", "scenario"};
   const YamlMapping root(document, "", kKeys);
   controller::Config config = controller::read_config(document, directory);
   const controller::RobotDescription robot = config.robot;
   const Units positions = controller::joint_units(config.model, "rad", "m");
   ArmSimulation simulation{believed(config), {}};
   scene.plant.period = config.settings.period;
+  scene.commands.position_lower = config.settings.limits.position_lower;
+  scene.commands.position_upper = config.settings.limits.position_upper;
+  read_commands(root, scene.commands);
   read_simulation(root, positions, scene.plant, &simulation);
   try {
     scene.arm.emplace(ControlledArm{

@@ -3,6 +3,7 @@
 
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/input_error.hpp>
+#include <dashpot/lcmtypes/command_filter.hpp>
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/linear_system.hpp>
 #include <dashpot/sim/plant.hpp>
@@ -54,6 +55,7 @@ struct Scene {
   double duration = 5;                   ///< s
   bool ring_down = false;                ///< fit the modes of small releases, too
   sim::PlantOptions plant;
+  lcmtypes::CommandLimits commands;    ///< what an arm may be commanded over a bus
   std::vector<LoopFault> loop_faults;  ///< of an arm; of several at a time the first one counts
   bool outside_limits = false;         ///< an arm may start outside its position limits
   JointVector rest;                    ///< where the springs are fixed at first, rad
@@ -65,8 +67,8 @@ struct Scene {
 };
 
 /// Reads a YAML file. For an arm it is a configuration file of the controller (load_config) with
-/// two keys more, `simulation` and `scenario`; otherwise `system` has the matrices. sim/scenes has
-/// examples with all keys. Throws InputError.
+/// three keys more, `commands`, `simulation` and `scenario`; otherwise `system` has the matrices.
+/// sim/scenes has examples with all keys. Throws InputError.
 Scene load_scene(const std::string& path);
 
 /// The mechanism of the scene.

@@ -17,6 +17,9 @@ struct ArmSimulation {
 void read_simulation(const controller::YamlMapping& root, const controller::Units& positions,
                      sim::PlantOptions& plant, ArmSimulation* arm);
 
+/// Reads `commands`, of an arm. Throws InputError.
+void read_commands(const controller::YamlMapping& root, lcmtypes::CommandLimits& limits);
+
 /// Reads `scenario` into the scene, whose arm or matrices are there already. Throws InputError.
 void read_scenario(const controller::YamlMapping& root, const controller::Units& positions,
                    Scene& scene);

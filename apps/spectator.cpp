@@ -57,6 +57,7 @@ class Spectator : public LoopController {
   }
 
   std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
+                      const controller::Setpoint* /*setpoint*/,
                       JointVector& torque) noexcept override {
     ++snapshot_.tick;
     snapshot_.time = time;
@@ -76,7 +77,12 @@ class Spectator : public LoopController {
     return &modes_;
   }
 
-  std::int32_t hold(const controller::Setpoint&) noexcept override { return DASHPOT_OK; }
+  std::int32_t start(const JointVector&, std::string&) override { return DASHPOT_OK; }
+  std::int32_t set_gains(const controller::Gains&, std::string&) override { return DASHPOT_OK; }
+  std::int32_t check(const controller::Setpoint&, const JointVector&, std::string&) override {
+    return DASHPOT_OK;
+  }
+  std::int32_t release() override { return DASHPOT_OK; }
 
  private:
   static constexpr double kModesPeriod = 0.01;  // s

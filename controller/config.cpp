@@ -201,10 +201,10 @@ void check(const Settings& settings, int n, const YamlNode& document) {
 }  // namespace
 
 Config read_config(const YamlNode& document, const std::filesystem::path& directory) {
-  // What stands under the last two is for a simulator of the robot.
-  static constexpr std::array<std::string_view, 10> kKeys = {
-      "robot",        "control",  "gains",    "limits",     "motion",
-      "feed_forward", "watchdog", "analysis", "simulation", "scenario"};
+  // What stands under the last three is for the program that runs the controller.
+  static constexpr std::array<std::string_view, 11> kKeys = {
+      "robot",    "control",  "gains",    "limits",     "motion",  "feed_forward",
+      "watchdog", "analysis", "commands", "simulation", "scenario"};
   const YamlMapping root(document, "", kKeys);
   const RobotDescription robot = read_robot(root, directory);
   const RobotModel model = robot.model();

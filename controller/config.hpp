@@ -27,7 +27,7 @@ struct Config {
 };
 
 /// Reads a YAML file. The path of the URDF in it is relative to the file's directory. The keys
-/// `simulation` and `scenario` are left alone: they make the file a scene of `dashpot run`. Throws
+/// `commands`, `simulation` and `scenario` are left alone: they are for `dashpot run`. Throws
 /// InputError, which names file, key and line, for an unknown, duplicate or missing key, a wrong
 /// unit, size or sign, a number that is not finite, gains that are not symmetric positive
 /// semidefinite, and whatever is wrong with the URDF.

@@ -13,8 +13,8 @@ inline constexpr const char* kModesChannel = "DASHPOT_MODES";
 inline constexpr const char* kSampledModesChannel = "DASHPOT_SAMPLED_MODES";
 inline constexpr const char* kCommandChannel = "DASHPOT_COMMAND";
 
-/// The environment's LCM_DEFAULT_URL, or else multicast that does not leave this machine:
-/// udpm://239.255.76.67:7667?ttl=0.
+/// The environment's LCM_DEFAULT_URL, or else udpm://239.255.76.67:7667?ttl=0: multicast whose
+/// messages do not leave this machine, though those of others can come in.
 std::string default_url();
 
 /// Of a file:// URL: the log that it names; otherwise "".

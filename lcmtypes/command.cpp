@@ -5,12 +5,14 @@
 
 namespace dashpot::lcmtypes {
 
+bool has_set(const Command& command, std::int32_t part, std::int64_t after) noexcept {
+  const auto bit = static_cast<std::size_t>(std::countr_zero(static_cast<std::uint32_t>(part)));
+  return (command.parts & part) != 0 && command.set_by[bit] > after;
+}
+
 void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t after) noexcept {
   const controller::Setpoint& from = command.setpoint;
-  const auto has = [&](std::int32_t part) {
-    const auto bit = static_cast<std::size_t>(std::countr_zero(static_cast<std::uint32_t>(part)));
-    return (command.parts & part) != 0 && command.set_by[bit] > after;
-  };
+  const auto has = [&](std::int32_t part) { return has_set(command, part, after); };
   if (has(command_t::MODE)) setpoint.mode = from.mode;
   if (has(command_t::JOINT_POSITION)) setpoint.joint_position = from.joint_position;
   if (has(command_t::TIP_POSE)) setpoint.tip_pose = from.tip_pose;

@@ -10,13 +10,17 @@ namespace dashpot::lcmtypes {
 /// within one tick.
 struct Command {
   std::int64_t utime = 0;     ///< of the last accepted one, us since 1970-01-01 UTC
-  std::int64_t sequence = 0;  ///< of the last accepted one
+  std::int64_t sequence = 0;  ///< likewise
   std::int32_t parts = 0;     ///< sum of command_t::MODE, ... that were ever set
   std::int64_t accepted = 0;  ///< commands so far
   /// For each bit of `parts`, which accepted command set it last, counted from 1.
-  std::array<std::int64_t, 7> set_by{};
+  std::array<std::int64_t, 9> set_by{};
+  std::int64_t fault_tick = 0;    ///< of part RELEASE: the fault to release, by its tick
   controller::Setpoint setpoint;  ///< only these parts of it have a meaning; not its time
 };
+
+/// True if a command later than the `after`-th accepted one has set `part` (command_t::MODE, ...).
+bool has_set(const Command& command, std::int32_t part, std::int64_t after) noexcept;
 
 /// Copies the parts that were set by commands later than the `after`-th accepted one into
 /// `setpoint`, and leaves the others and its time alone.

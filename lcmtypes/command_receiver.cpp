@@ -9,6 +9,7 @@ namespace dashpot::lcmtypes {
 namespace {
 
 constexpr int kLongestWait = 20;  // ms, between two looks at stop_
+constexpr int kQueue = 256;       // messages that may wait while gains are judged
 
 template <class Clock>
 std::int64_t now() {
@@ -23,21 +24,27 @@ struct CommandReceiver::Subscription {
   lcm::Subscription* handle = nullptr;
 
   void take(const lcm::ReceiveBuffer* buffer, const std::string& /*channel*/) {
+    CommandFilter& filter = receiver.filter_;
+    filter.set_fault_tick(receiver.fault_tick_.load(std::memory_order_relaxed));
     const CommandVerdict verdict =
-        receiver.filter_.judge(buffer->data, buffer->data_size, now<std::chrono::system_clock>(),
-                               now<std::chrono::steady_clock>());
-    if (verdict == CommandVerdict::kAccepted) receiver.newest_.write(receiver.filter_.command());
-    receiver.counts_[static_cast<std::size_t>(verdict)].fetch_add(1, std::memory_order_relaxed);
+        filter.judge(buffer->data, buffer->data_size, now<std::chrono::system_clock>(),
+                     now<std::chrono::steady_clock>());
+    receiver.show_tally();
+    if (verdict == CommandVerdict::kAccepted) receiver.newest_.write(filter.command());
   }
 };
 
-CommandReceiver::CommandReceiver(std::shared_ptr<lcm::LCM> bus, const CommandLimits& limits)
-    : bus_(std::move(bus)), filter_(limits), subscription_(new Subscription{*this}) {
+CommandReceiver::CommandReceiver(std::shared_ptr<lcm::LCM> bus, const CommandLimits& limits,
+                                 CommandTaker take)
+    : bus_(std::move(bus)),
+      filter_(limits, std::move(take)),
+      subscription_(new Subscription{*this}) {
   subscription_->handle =
       bus_->subscribe(kCommandChannel, &Subscription::take, subscription_.get());
   if (subscription_->handle == nullptr) {
     throw std::runtime_error("cannot subscribe to the LCM bus");
   }
+  subscription_->handle->setQueueCapacity(kQueue);
   thread_ = std::thread([this] { run(); });
 }
 
@@ -49,21 +56,31 @@ CommandReceiver::~CommandReceiver() {
 
 void CommandReceiver::run() {
   while (!stop_.load(std::memory_order_acquire)) {
-    if (bus_->handleTimeout(kLongestWait) < 0) {  // a broken bus: nothing to do but not to spin
+    const int handled = bus_->handleTimeout(kLongestWait);
+    if (handled < 0) {  // a broken bus: nothing to do but not to spin
       std::this_thread::sleep_for(std::chrono::milliseconds(kLongestWait));
     }
+    if (handled > 0 || filter_.tally().commander == 0) continue;
+    filter_.notice_silence(now<std::chrono::steady_clock>());
+    if (filter_.tally().commander == 0) show_tally();
   }
 }
 
-std::int64_t CommandReceiver::count(CommandVerdict verdict) const noexcept {
-  return counts_[static_cast<std::size_t>(verdict)].load(std::memory_order_relaxed);
+void CommandReceiver::show_tally() {
+  tallies_.write(filter_.tally());
+  const std::lock_guard lock(mutex_);
+  tally_ = filter_.tally();
+  last_reason_ = filter_.last_reason();
 }
 
-std::int64_t CommandReceiver::rejected() const noexcept {
-  std::int64_t sum = 0;
-  for (std::size_t i = 1; i < counts_.size(); ++i)
-    sum += counts_[i].load(std::memory_order_relaxed);
-  return sum;
+CommandTally CommandReceiver::tally() const {
+  const std::lock_guard lock(mutex_);
+  return tally_;
+}
+
+std::string CommandReceiver::last_reason() const {
+  const std::lock_guard lock(mutex_);
+  return last_reason_;
 }
 
 }  // namespace dashpot::lcmtypes

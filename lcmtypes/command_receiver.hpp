@@ -3,10 +3,11 @@
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/command_filter.hpp>
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <string>
 #include <thread>
 
 namespace dashpot::lcmtypes {
@@ -15,30 +16,49 @@ namespace dashpot::lcmtypes {
 /// the real-time thread. Whatever else arrives, or if nothing does, only counters change.
 class CommandReceiver {
  public:
-  /// Handles all messages of `bus` from now on: nobody else may. Throws std::invalid_argument for
-  /// bad limits, std::runtime_error if it cannot subscribe.
-  CommandReceiver(std::shared_ptr<lcm::LCM> bus, const CommandLimits& limits);
+  /// Handles all messages of `bus` from now on: nobody else may. `take` is called on the
+  /// receiver's thread. Throws std::invalid_argument for bad limits, std::runtime_error if it
+  /// cannot subscribe.
+  CommandReceiver(std::shared_ptr<lcm::LCM> bus, const CommandLimits& limits,
+                  CommandTaker take = {});
   ~CommandReceiver();
   CommandReceiver(const CommandReceiver&) = delete;
   CommandReceiver& operator=(const CommandReceiver&) = delete;
 
-  /// Real-time thread only, never waits: whether commands were accepted since the last call; then
-  /// `command()` says what they have set so far.
+  // Real-time thread only; none of these ever waits.
+  /// Whether commands were accepted since the last call; then `command()` says what they have set
+  /// so far.
   bool fetch() noexcept { return newest_.fetch(); }
   const Command& command() const noexcept { return newest_.value(); }
+  /// What became of the commands that have arrived.
+  const CommandTally& fetch_tally() noexcept {
+    tallies_.fetch();
+    return tallies_.value();
+  }
+  /// The fault that commands may release from now on, by the tick at which it latched; 0: none.
+  void set_fault_tick(std::int64_t tick) noexcept {
+    fault_tick_.store(tick, std::memory_order_relaxed);
+  }
 
-  /// Any thread: how many messages got this verdict, and all but kAccepted.
-  std::int64_t count(CommandVerdict verdict) const noexcept;
-  std::int64_t rejected() const noexcept;
+  // Other threads; the receiver's own may have to wait meanwhile.
+  CommandTally tally() const;
+  /// Why the last command that was refused was refused, in one line; "" if none was.
+  std::string last_reason() const;
 
  private:
   struct Subscription;
   void run();
+  /// Shows the filter's tally to the other threads.
+  void show_tally();
 
   std::shared_ptr<lcm::LCM> bus_;
   CommandFilter filter_;
   controller::Latest<Command> newest_;
-  std::array<std::atomic<std::int64_t>, kCommandVerdicts> counts_{};
+  controller::Latest<CommandTally> tallies_;
+  mutable std::mutex mutex_;  ///< guards the next two
+  CommandTally tally_;
+  std::string last_reason_;
+  std::atomic<std::int64_t> fault_tick_{0};
   std::atomic<bool> stop_{false};
   std::unique_ptr<Subscription> subscription_;
   std::thread thread_;

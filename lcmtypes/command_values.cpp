@@ -17,7 +17,7 @@ using controller::Matrix6;
 using controller::Setpoint;
 using Verdict = CommandVerdict;
 
-constexpr std::int32_t kAllParts = 2 * command_t::NULL_GAINS - 1;
+constexpr std::int32_t kAllParts = 2 * command_t::GIVE_UP - 1;
 constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion
 // Relative to the largest entry; no wider than what the controller accepts
 constexpr double kSymmetryTolerance = 1e-9;
@@ -169,6 +169,7 @@ CommandVerdict copy_values(const command_t& message, const CommandLimits& limits
   }
   command.utime = message.utime;
   command.sequence = message.sequence;
+  if ((message.parts & command_t::RELEASE) != 0) command.fault_tick = message.fault_tick;
   return verdict;
 }
 

@@ -27,6 +27,22 @@ static_assert(static_cast<int>(ModeKind::kOverdamped) == modes_t::OVERDAMPED);
 static_assert(static_cast<int>(ModeKind::kUndamped) == modes_t::UNDAMPED);
 static_assert(static_cast<int>(ModeKind::kUnstable) == modes_t::UNSTABLE);
 static_assert(static_cast<int>(ModeKind::kSoft) == modes_t::SOFT);
+static_assert(static_cast<int>(CommandVerdict::kMalformed) == state_t::MALFORMED);
+static_assert(static_cast<int>(CommandVerdict::kWrongSize) == state_t::WRONG_SIZE);
+static_assert(static_cast<int>(CommandVerdict::kUnknown) == state_t::UNKNOWN);
+static_assert(static_cast<int>(CommandVerdict::kNotFinite) == state_t::NOT_FINITE);
+static_assert(static_cast<int>(CommandVerdict::kNotUnit) == state_t::NOT_UNIT);
+static_assert(static_cast<int>(CommandVerdict::kOutOfLimits) == state_t::OUT_OF_LIMITS);
+static_assert(static_cast<int>(CommandVerdict::kIndefinite) == state_t::INDEFINITE);
+static_assert(static_cast<int>(CommandVerdict::kStale) == state_t::STALE);
+static_assert(static_cast<int>(CommandVerdict::kFromFuture) == state_t::FROM_FUTURE);
+static_assert(static_cast<int>(CommandVerdict::kReplayed) == state_t::REPLAYED);
+static_assert(static_cast<int>(CommandVerdict::kTooMany) == state_t::TOO_MANY);
+static_assert(static_cast<int>(CommandVerdict::kNoSender) == state_t::NO_SENDER);
+static_assert(static_cast<int>(CommandVerdict::kOtherSender) == state_t::OTHER_SENDER);
+static_assert(static_cast<int>(CommandVerdict::kUnstable) == state_t::UNSTABLE);
+static_assert(static_cast<int>(CommandVerdict::kNoSuchFault) == state_t::NO_SUCH_FAULT);
+static_assert(sizeof(state_t::verdicts) == kCommandVerdicts * sizeof(std::int64_t));
 static_assert(static_cast<int>(controller::Mode::kJoint) == state_t::JOINT);
 static_assert(static_cast<int>(controller::Mode::kCartesian) == state_t::CARTESIAN);
 
@@ -74,6 +90,16 @@ void fill_mode(const controller::VibrationMode& mode, std::size_t n, std::size_t
   copy_to(mode.shape.imag().eval(), n, message.shape_imag[i]);
 }
 
+void fill(const CommandTally& tally, state_t& message) {
+  std::copy(tally.verdicts.begin(), tally.verdicts.end(), std::begin(message.verdicts));
+  message.last_refusal = static_cast<std::int8_t>(tally.last_refusal);
+  message.last_refusal_utime = tally.last_refusal_utime;
+  message.last_refused_sender = tally.last_refused_sender;
+  message.commander = tally.commander;
+  message.commands_accepted = tally.accepted();
+  message.commands_rejected = tally.rejected();
+}
+
 }  // namespace
 
 void write_quaternion(const Eigen::Matrix3d& R, double (&quaternion)[4]) {
@@ -94,6 +120,8 @@ void fill(const StateSample& sample, state_t& message) {
   message.restarts = static_cast<std::int64_t>(snapshot.restarts);
   message.mode = static_cast<std::int8_t>(snapshot.mode);
   message.status = static_cast<std::int8_t>(snapshot.status);
+  message.fault = static_cast<std::int8_t>(snapshot.fault);
+  message.fault_tick = sample.health.fault_tick;
 
   copy_to(snapshot.position, n, message.joint_position);
   copy_to(snapshot.velocity, n, message.joint_velocity);
@@ -110,8 +138,7 @@ void fill(const StateSample& sample, state_t& message) {
   message.tick_time = sample.health.tick_time;
   message.longest_tick_time = sample.health.longest_tick_time;
   message.overruns = sample.health.overruns;
-  message.commands_accepted = sample.health.commands_accepted;
-  message.commands_rejected = sample.health.commands_rejected;
+  fill(sample.health.commands, message);
 }
 
 void fill(const ModesSample& sample, modes_t& message) {

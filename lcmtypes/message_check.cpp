@@ -77,4 +77,13 @@ bool decode(const void* data, std::size_t size, command_t& message) noexcept {
   return decode_with_joints(data, size, message);
 }
 
+bool read_sender(const void* data, std::size_t size, std::int64_t& sender) noexcept {
+  constexpr std::size_t kPlace = kFingerprintSize + sizeof(command_t::n);
+  std::array<std::int32_t, 1> sizes{};
+  if (!read_sizes<command_t>(data, size, sizes) || size < kPlace + sizeof(sender)) return false;
+  const auto* bytes = static_cast<const unsigned char*>(data);
+  sender = static_cast<std::int64_t>(read_big_endian(bytes + kPlace, sizeof(sender)));
+  return true;
+}
+
 }  // namespace dashpot::lcmtypes

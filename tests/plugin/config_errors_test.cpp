@@ -35,7 +35,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         BadConfig{"UnknownGroup",
                   "gain: unknown key; the keys are robot, control, gains, limits, motion, "
-                  "feed_forward, watchdog, analysis, simulation, scenario (line 2)",
+                  "feed_forward, watchdog, analysis, commands, simulation, scenario (line 2)",
                   "gain: {}\n"},
         BadConfig{"UnknownKey",
                   "gains.joint.stifness: unknown key; the keys are stiffness, damping, "

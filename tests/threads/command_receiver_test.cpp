@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <future>
 #include <lcm/lcm-cpp.hpp>
 #include <thread>
 
@@ -101,7 +102,7 @@ class Sender {
 /// Waits until the receiver has judged so many messages; false after ten seconds.
 bool wait_for(const CommandReceiver& receiver, std::int64_t judged) {
   for (int i = 0; i < 10'000; ++i) {
-    if (receiver.count(Verdict::kAccepted) + receiver.rejected() >= judged) return true;
+    if (receiver.tally().accepted() + receiver.tally().rejected() >= judged) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   return false;
@@ -127,8 +128,8 @@ TEST(CommandReceiver, HandsOnGoodCommands) {
     EXPECT_TRUE(sender.is_last(receiver.command()));
     EXPECT_FALSE(receiver.fetch());  // nothing new
   }
-  EXPECT_EQ(receiver.count(Verdict::kAccepted), 20);
-  EXPECT_EQ(receiver.rejected(), 0);
+  EXPECT_EQ(receiver.tally().count(Verdict::kAccepted), 20);
+  EXPECT_EQ(receiver.tally().rejected(), 0);
 }
 
 TEST(CommandReceiver, KeepsTheLastGoodCommandUnderAttack) {
@@ -145,12 +146,12 @@ TEST(CommandReceiver, KeepsTheLastGoodCommandUnderAttack) {
     EXPECT_FALSE(receiver.fetch());
     EXPECT_TRUE(sender.is_last(receiver.command()));
   }
-  EXPECT_EQ(receiver.count(Verdict::kAccepted), 50);
-  EXPECT_EQ(receiver.rejected(), 50 * Sender::kKindsOfBad);
-  EXPECT_EQ(receiver.count(Verdict::kMalformed), 50 * 4);
+  EXPECT_EQ(receiver.tally().count(Verdict::kAccepted), 50);
+  EXPECT_EQ(receiver.tally().rejected(), 50 * Sender::kKindsOfBad);
+  EXPECT_EQ(receiver.tally().count(Verdict::kMalformed), 50 * 4);
   for (const Verdict verdict : {Verdict::kReplayed, Verdict::kStale, Verdict::kFromFuture,
                                 Verdict::kNotFinite, Verdict::kOutOfLimits, Verdict::kWrongSize}) {
-    EXPECT_EQ(receiver.count(verdict), 50) << to_text(verdict);
+    EXPECT_EQ(receiver.tally().count(verdict), 50) << to_text(verdict);
   }
 }
 
@@ -189,8 +190,95 @@ TEST(CommandReceiver, IsNotConfusedByAFlood) {
   ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));  // it works as before
   EXPECT_TRUE(sender.is_last(receiver.command()));
   EXPECT_GT(came_through, 0);
-  EXPECT_GT(receiver.count(Verdict::kMalformed), 100);
-  EXPECT_EQ(receiver.rejected(), receiver.count(Verdict::kMalformed));
+  EXPECT_GT(receiver.tally().count(Verdict::kMalformed), 100);
+  EXPECT_EQ(receiver.tally().rejected(), receiver.tally().count(Verdict::kMalformed));
+}
+
+// Programs that command without being asked to, at full speed: whoever commands is still heard.
+TEST(CommandReceiver, HearsTheOneThatCommandsThroughAFloodOfOthers) {
+  const auto bus = open_bus("memq://");
+  CommandReceiver receiver(bus, patient_limits());
+  Sender sender(*bus, 968);
+  ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));
+  std::atomic<bool> stop{false};
+  std::vector<std::thread> flood;
+  for (std::int64_t other = 1; other <= 2; ++other) {
+    flood.emplace_back([&bus, &stop, other] {
+      Random random(969);
+      command_t message = random_command(random, kJoints);
+      message.sender = other;
+      message.sequence = std::numeric_limits<std::int64_t>::max();
+      while (!stop.load()) {
+        message.utime = unix_time();
+        send(*bus, bytes_of(message));
+        std::this_thread::sleep_for(std::chrono::microseconds(20));
+      }
+    });
+  }
+  int came_through = 0;
+  for (int i = 0; i < 50; ++i) {
+    const std::int64_t sequence = sender.send_good();
+    for (int tick = 0; tick < 20; ++tick) {
+      if (receiver.fetch()) {
+        EXPECT_TRUE(sender.is_one(receiver.command()));
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      if (receiver.command().sequence == sequence) break;
+    }
+    if (receiver.command().sequence == sequence) ++came_through;
+  }
+  stop.store(true);
+  for (std::thread& thread : flood) thread.join();
+  EXPECT_GT(came_through, 0);
+  const CommandTally tally = receiver.tally();
+  EXPECT_EQ(tally.commander, kSender);
+  EXPECT_GT(tally.count(Verdict::kOtherSender), 100);
+  EXPECT_EQ(tally.rejected(), tally.count(Verdict::kOtherSender));
+  EXPECT_EQ(receiver.last_reason(), "another sender commands");
+  EXPECT_TRUE(tally.last_refused_sender == 1 || tally.last_refused_sender == 2);
+}
+
+// The real-time thread goes on while gains are judged, and sees them only once they have passed.
+TEST(CommandReceiver, JudgesGainsOnItsOwnThread) {
+  const auto bus = open_bus("memq://");
+  std::promise<std::thread::id> begun;
+  std::promise<bool> answer;
+  bool first = true;
+  CommandReceiver receiver(bus, patient_limits(), [&](const Command&, std::string& reason) {
+    if (!first) return true;
+    first = false;
+    begun.set_value(std::this_thread::get_id());
+    reason = "too little is left";
+    return answer.get_future().get();
+  });
+  Sender sender(*bus, 970);
+  sender.send_good();
+  EXPECT_NE(begun.get_future().get(), std::this_thread::get_id());
+  for (int tick = 0; tick < 100; ++tick) {
+    EXPECT_FALSE(receiver.fetch());
+    EXPECT_EQ(receiver.fetch_tally().accepted() + receiver.fetch_tally().rejected(), 0);
+  }
+  answer.set_value(false);
+  ASSERT_TRUE(wait_for(receiver, 1));
+  EXPECT_FALSE(receiver.fetch());
+  EXPECT_EQ(receiver.fetch_tally().count(Verdict::kUnstable), 1);
+  EXPECT_EQ(receiver.last_reason(), "gains refused by the controller: too little is left");
+  ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));
+}
+
+// The state says that nobody commands, though no message comes that could say so.
+TEST(CommandReceiver, LetsGoOfASilentSender) {
+  const auto bus = open_bus("memq://");
+  CommandLimits limits = patient_limits();
+  limits.silence = 1;  // us
+  CommandReceiver receiver(bus, limits);
+  Sender sender(*bus, 972);
+  ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));
+  for (int i = 0; i < 10'000 && receiver.fetch_tally().commander != 0; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(receiver.fetch_tally().commander, 0);
+  EXPECT_EQ(receiver.fetch_tally().accepted(), 1);
 }
 
 // A sender that starts again begins its sequence anew; it counts once its predecessor is forgotten.
@@ -209,13 +297,13 @@ TEST(CommandReceiver, OutlivesItsSenders) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
       through = receiver.fetch();
     }
-    if (!through && receiver.rejected() == 0) {
+    if (!through && receiver.tally().rejected() == 0) {
       GTEST_SKIP() << "multicast does not work on this machine: " << url;
     }
     ASSERT_TRUE(through) << first_sequence;
     EXPECT_TRUE(sender.is_one(receiver.command()));
   }
-  EXPECT_GT(receiver.count(Verdict::kReplayed), 0);
+  EXPECT_GT(receiver.tally().count(Verdict::kReplayed), 0);
 }
 
 TEST(CommandReceiver, EndsWhileNobodySends) {

@@ -1,0 +1,110 @@
+#pragma once
+// A `dashpot` that runs beside the test, and what it says over its bus.
+
+#include <dashpot/lcmtypes/bus.hpp>
+#include <dashpot/lcmtypes/message_reader.hpp>
+#include <dashpot/tests/apps/run_program.hpp>
+
+#include <chrono>
+#include <csignal>
+#include <lcm/lcm-cpp.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dashpot::tests {
+
+using Clock = std::chrono::steady_clock;
+
+/// A `dashpot` that runs beside the test, with its output in files.
+class Running {
+ public:
+  explicit Running(std::vector<std::string> words) {
+    words.insert(words.begin(), DASHPOT_PROGRAM);
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    child_ = fork();
+    if (child_ != 0) return;
+    if (std::freopen(out().c_str(), "w", stdout) == nullptr ||
+        std::freopen(err().c_str(), "w", stderr) == nullptr) {
+      _exit(126);
+    }
+    execv(argv[0], argv.data());
+    _exit(127);
+  }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+  ~Running() {
+    if (child_ > 0) kill(child_, SIGKILL), waitpid(child_, nullptr, 0);
+  }
+
+  void send(int signal) const { kill(child_, signal); }
+  /// Waits for the end; the exit status.
+  int finish() {
+    int status = 0;
+    waitpid(child_, &status, 0);
+    child_ = 0;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  }
+  std::string out() const { return scratch_.path("out"); }
+  std::string err() const { return scratch_.path("err"); }
+  std::string output() const { return scratch_.read("out"); }
+  std::string complaints() const { return scratch_.read("err"); }
+
+ private:
+  Scratch scratch_;
+  pid_t child_ = 0;
+};
+
+/// What comes over a bus.
+class Listener {
+ public:
+  explicit Listener(const std::string& url) : bus_(lcmtypes::open_bus(url)) {
+    handlers_.on_state = [this](const state_t& message) {
+      ++states;
+      state = message;
+    };
+    handlers_.on_modes = [this](const modes_t& message) {
+      ++modes_messages;
+      modes = message;
+    };
+    handlers_.on_sampled_modes = [this](const sampled_modes_t& message) {
+      ++sampled_messages;
+      sampled = message;
+    };
+    reader_.emplace(bus_, handlers_);
+  }
+
+  /// Listens until `done()`; false if it was not within ten seconds.
+  template <class Done>
+  bool until(const Done& done) {
+    const auto end = Clock::now() + std::chrono::seconds(10);
+    while (!done()) {
+      if (Clock::now() > end) return false;
+      reader_->wait(50);
+    }
+    return true;
+  }
+  lcm::LCM& bus() { return *bus_; }
+  std::int64_t malformed() const { return handlers_.malformed; }
+
+  std::int64_t states = 0, modes_messages = 0, sampled_messages = 0;
+  state_t state{};
+  modes_t modes{};
+  sampled_modes_t sampled{};
+
+ private:
+  std::shared_ptr<lcm::LCM> bus_;
+  lcmtypes::MessageHandlers handlers_;
+  std::optional<lcmtypes::BusReader> reader_;
+};
+
+/// Now, us since 1970-01-01 UTC.
+inline std::int64_t utime() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+}  // namespace dashpot::tests
