@@ -184,8 +184,8 @@ TEST(Config, FillsTheRest) {
            "feed_forward: {gravity: false, coriolis: false, friction: true, acceleration: false,\n"
            "  wrench: false}\n"
            "watchdog: {setpoint_hold: 100 ms, setpoint_damp: 0, longest_gap: 5 ms}\n"
-           "analysis: {where: 'off', every: 7, soft_frequency: 0.2 rad/s, shapes: false,\n"
-           "  sampled: {interval: 500 ms, delay: 2, cutoff: 30 Hz, difference_velocity: true}}\n")
+           "analysis: {where: 'off', every: 7, share: 0.3, soft_frequency: 0.2 rad/s,\n"
+           "  shapes: false, sampled: {interval: 500 ms, delay: 2, cutoff: 30 Hz, difference_velocity: true}}\n")
           .settings;
   EXPECT_TRUE(all.task_terms.geometric_stiffness);
   EXPECT_TRUE(all.task_terms.jacobian_rate);
@@ -211,6 +211,7 @@ TEST(Config, FillsTheRest) {
   EXPECT_EQ(all.watchdog.longest_gap, 0.005);
   EXPECT_EQ(all.analysis.where, controller::Analysis::Where::kOff);
   EXPECT_EQ(all.analysis.every, 7);
+  EXPECT_EQ(all.analysis.share, 0.3);
   EXPECT_EQ(all.analysis.soft_frequency, 0.2);
   EXPECT_FALSE(all.analysis.shapes);
   EXPECT_DOUBLE_EQ(all.analysis.sampled.interval, 0.5);
@@ -334,6 +335,7 @@ TEST(ConfigExample, ShowsDefaults) {
   EXPECT_EQ(shown.watchdog.longest_gap, none.watchdog.longest_gap);
   EXPECT_EQ(shown.analysis.where, none.analysis.where);
   EXPECT_EQ(shown.analysis.every, none.analysis.every);
+  EXPECT_EQ(shown.analysis.share, none.analysis.share);
   EXPECT_EQ(shown.analysis.soft_frequency, none.analysis.soft_frequency);
   EXPECT_EQ(shown.analysis.shapes, none.analysis.shapes);
 }
