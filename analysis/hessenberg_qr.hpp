@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/analysis/types.hpp>
+#include <dashpot/analysis/work.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -70,10 +71,10 @@ inline void eigenvalues_2x2(double a, double b, double c, double d, Complex& fir
 /// Eigenvalues of an upper Hessenberg matrix by the implicit double-shift QR iteration of Francis;
 /// `H` is destroyed. Only the active window is touched, since no vectors are wanted. At most 40
 /// sweeps per row of H in all, and 160 more (a cluster of nearly defective eigenvalues may need
-/// them all by itself); returns false if that is not enough. (Golub and Van Loan, 4th ed.,
-/// Algorithm 7.5.2.)
+/// them all by itself); returns false if that is not enough, or more than `work` grants. (Golub and
+/// Van Loan, 4th ed., Algorithm 7.5.2.)
 template <typename Matrix>
-bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
+bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues, Work& work) noexcept {
   constexpr double kEps = std::numeric_limits<double>::epsilon();
   const Eigen::Index n = H.rows();
   double norm = 0;
@@ -107,6 +108,8 @@ bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
     }
     ++sweeps;
     if (--budget < 0) return false;
+    const std::int64_t window = high - low + 1;
+    if (!work.take(squared(window, 38) + 160 * window)) return false;
     // Shifts: eigenvalues of the trailing block [a b; c d], or, where progress stalls, of
     // d I + size [0.75 -0.4375; 1 0.75]. Kept as a, d and bc: in a cluster of eigenvalues their
     // trace and determinant would cancel against entries of H.
@@ -192,6 +195,12 @@ bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
     }
   }
   return true;
+}
+
+template <typename Matrix>
+bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues) noexcept {
+  Work work;
+  return hessenberg_eigenvalues(H, eigenvalues, work);
 }
 
 }  // namespace dashpot::analysis

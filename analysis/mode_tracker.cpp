@@ -31,6 +31,8 @@ constexpr int kPurePasses = 4;
 constexpr int kLookEvery = 64;
 /// Blocks are balanced again when their columns lean this much towards each other.
 constexpr double kBalanced = 0.6;
+/// Units of Work of parting two blocks.
+constexpr std::int64_t kPartingWork = 60'000;
 
 std::size_t at(int i) {
   return static_cast<std::size_t>(i);
@@ -46,6 +48,21 @@ bool is_symmetric(const Square<kMaxDof>& matrix) {
     differs |= !(0 * a[j + j * n] == 0);
   }
   return !differs;
+}
+
+/// Work of evaluating a basis, and of the step that follows.
+std::int64_t pass_work(const TrackedBasis& basis) {
+  return cubed(basis.columns(), 16) + squared(basis.columns(), 60);
+}
+
+/// Work of the certificate, the modes and their shapes, of n joints.
+std::int64_t publishing_work(int n) {
+  return squared(n, 900) + 6000;
+}
+
+/// Work of a basis from a direct solution, with its modes in the places of the last one's.
+std::int64_t restart_work(int n) {
+  return cubed(n, 360) + publishing_work(n);
 }
 
 bool sizes_agree(const System<kMaxDof>& system) {
@@ -140,7 +157,8 @@ ModeTracker::ModeTracker(const TrackerOptions& options)
   if (options.max_passes < 1) throw std::invalid_argument("max_passes: is not positive");
 }
 
-Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out) noexcept {
+Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
+                           Work& work) noexcept {
   ++counters_.updates;
   if (!sizes_agree(system)) {
     ++counters_.failed;
@@ -154,12 +172,12 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out) 
   if (alike && identical(form, last) && reuse(form, 0, out)) return out.status;
   const bool symmetric = is_symmetric(system.mass) && is_symmetric(system.damping) &&
                          (form.factored || is_symmetric(system.stiffness));
-  if (!symmetric) return solve_directly(system, form, Fallback::kNotSymmetric, out);
+  if (!symmetric) return solve_directly(system, form, Fallback::kNotSymmetric, out, work);
   Fallback reason = Fallback::kStart;
   if (alike) {
     const double change = distance(form, last, sizes_, options_.reuse_tolerance);
     if (reuse(form, change, out)) return out.status;
-    if (follow(form, out, reason)) {
+    if (follow(form, out, reason, work)) {
       last_.mass = system.mass;
       last_.damping = system.damping;
       if (form.factored) {
@@ -170,7 +188,7 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out) 
       return out.status;
     }
   }
-  return solve_directly(system, form, reason, out);
+  return solve_directly(system, form, reason, out, work);
 }
 
 /// Certifies the basis and reads its modes; false if a relative bound exceeds `target` or nothing
@@ -220,7 +238,8 @@ bool ModeTracker::reuse(const StateForm& form, double change, TrackedSpectrum& o
   return true;
 }
 
-bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept {
+bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason,
+                         Work& work) noexcept {
   const int columns = basis_.columns(), width = basis_.Z.width;
   before_.modes = basis_.modes;
   before_.zeros = basis_.zeros;
@@ -240,7 +259,7 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   turned_ = !basis_.proportional &&
             ((pure && make_proportional(angles, basis_)) || balance(defect_, kBalanced, basis_));
   sizes_ = coefficient_sizes(form);
-  if (!refine(form, out, reason)) {
+  if (!refine(form, out, reason, work)) {
     copy(before_.Z, columns, basis_.Z);  // the last one that was right still names the modes
     return false;
   }
@@ -255,10 +274,12 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
 }
 
 /// Newton's method from the basis as it is. Leaves the last step to be taken.
-bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept {
+bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason,
+                         Work& work) noexcept {
   const int columns = basis_.columns();
   reason = Fallback::kNotConverged;
   for (int pass = 1; pass <= options_.max_passes; ++pass) {
+    if (!work.take(pass_work(basis_))) return false;
     ++counters_.passes;
     counters_.most_passes = std::max(counters_.most_passes, pass);
     evaluate(form, basis_, defect_);
@@ -268,7 +289,7 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     if (!(size < 1)) return false;
     const double mixed = kLeastMixing + kStepMixing * size * size;
     basis_.proportional = basis_.proportional && pass < kPurePasses && mixing(basis_, E_) <= mixed;
-    if (!conflict && size <= kLastStep &&
+    if (!conflict && size <= kLastStep && work.take(publishing_work(form.joints)) &&
         publish(form, 0, size <= kConverged ? kInfinity : options_.target_bound, true, out)) {
       return true;
     }
@@ -276,20 +297,21 @@ bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& 
     if (!conflict) continue;
     reason = Fallback::kCoincidence;
     turned_ = true;
-    if (!part(conflict)) return false;
+    if (!part(conflict, work)) return false;
     basis_.proportional = basis_.proportional && mixing(basis_, basis_.Z) == 0;
     ++counters_.repairs;
   }
   return false;
 }
 
-bool ModeTracker::part(const Conflict& conflict) noexcept {
+bool ModeTracker::part(const Conflict& conflict, Work& work) noexcept {
+  if (!work.take(kPartingWork)) return false;
   if (conflict.first >= basis_.modes) return part_zero_modes(defect_, basis_);
-  return part_coinciding(defect_, basis_) || part_blocks(defect_, conflict, basis_);
+  return part_coinciding(defect_, basis_, work) || part_blocks(defect_, conflict, basis_);
 }
 
 Status ModeTracker::solve_directly(const System<kMaxDof>& system, const StateForm& form,
-                                   Fallback reason, TrackedSpectrum& out) noexcept {
+                                   Fallback reason, TrackedSpectrum& out, Work& work) noexcept {
   ++counters_.fallbacks[static_cast<std::size_t>(reason)];
   direct_ = system;
   direct_.has_tails = false;
@@ -302,14 +324,20 @@ Status ModeTracker::solve_directly(const System<kMaxDof>& system, const StateFor
   prediction_.pause();
   last_ = direct_;
   out.origin = SpectrumOrigin::kDirect;
-  out.status = solver_.solve(direct_, spectrum_);
+  if (work.over()) return give_up(out);
+  out.status = solver_.solve(direct_, spectrum_, work);
+  if (work.over()) return give_up(out);
   if (out.status != Status::kOk && out.status != Status::kUncertified) {
     ++counters_.failed;
     out.mode_count = out.zero_mode_count = 0;
     return out.status;
   }
+  if (!work.take(restart_work(form.joints))) return give_up(out);
+  const bool followed =
+      reason != Fallback::kNotSymmetric && form.joints > 0 && restart(form, out, work);
+  if (work.over()) return give_up(out);
   ++counters_.direct;
-  if (reason != Fallback::kNotSymmetric && form.joints > 0 && restart(form, out)) {
+  if (followed) {
     out.origin = SpectrumOrigin::kDirect;
   } else {
     publish_direct(form, reason != Fallback::kNotSymmetric, out);
@@ -317,15 +345,22 @@ Status ModeTracker::solve_directly(const System<kMaxDof>& system, const StateFor
   return out.status;
 }
 
+Status ModeTracker::give_up(TrackedSpectrum& out) noexcept {
+  ++counters_.unfinished;
+  has_basis_ = false;
+  out.mode_count = out.zero_mode_count = 0;
+  return out.status = Status::kUnfinished;
+}
+
 /// Makes the direct solution the basis to follow from now on.
-bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept {
+bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out, Work& work) noexcept {
   before_ = basis_;
   if (!start_basis(form, spectrum_, basis_)) {
     basis_ = before_;
     return false;
   }
   evaluate(form, basis_, defect_);
-  if (part_coinciding(defect_, basis_)) evaluate(form, basis_, defect_);
+  if (part_coinciding(defect_, basis_, work)) evaluate(form, basis_, defect_);
   PlaneAngles angles;
   if (!has_pure_planes(defect_, basis_, angles) || !make_proportional(angles, basis_)) {
     balance(defect_, 0, basis_);
@@ -348,7 +383,7 @@ bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out) noexcept 
     ++lineage_;
   }
   Fallback unused{};
-  has_basis_ = refine(form, out, unused);
+  has_basis_ = refine(form, out, unused, work);
   return has_basis_;
 }
 

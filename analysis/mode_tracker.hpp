@@ -62,8 +62,9 @@ inline constexpr std::size_t kFallbackCount = 4;
 
 struct TrackerCounters {
   std::int64_t updates = 0;
-  std::int64_t tracked = 0, reused = 0, direct = 0, failed = 0;  ///< add up to `updates`
-  std::array<std::int64_t, kFallbackCount> fallbacks{};          ///< calls of the direct solver
+  /// They add up to `updates`.
+  std::int64_t tracked = 0, reused = 0, direct = 0, failed = 0, unfinished = 0;
+  std::array<std::int64_t, kFallbackCount> fallbacks{};  ///< calls of the direct solver
   /// Of the tracked: damping that the undamped modes decouple, so that strains and velocities are
   /// followed apart from each other
   std::int64_t proportional = 0;
@@ -97,7 +98,13 @@ class ModeTracker {
   /// damping and mass are read, and stiffness_factor W if it has 1 to n rows: then K = W'W exactly
   /// and `stiffness` is not read, nor are tails. Otherwise K = stiffness, which has to be positive
   /// definite to be followed; semidefinite ones are solved directly on each call.
-  Status update(const System<kMaxDof>& system, TrackedSpectrum& out) noexcept;
+  Status update(const System<kMaxDof>& system, TrackedSpectrum& out) noexcept {
+    Work work;
+    return update(system, out, work);
+  }
+  /// The same, with no more work than is granted. If that is not enough, the status is kUnfinished
+  /// and there are no modes; an update that is granted more then finds them, in their places.
+  Status update(const System<kMaxDof>& system, TrackedSpectrum& out, Work& work) noexcept;
 
   /// The next update starts anew; modes that it recognises keep their places.
   void reset() noexcept { has_basis_ = false; }
@@ -110,18 +117,21 @@ class ModeTracker {
     look_in_ = 0;
   }
 
+  /// True if the next update starts from the last one, and need not be solved directly.
+  bool follows() const noexcept { return has_basis_; }
   const TrackerCounters& counters() const noexcept { return counters_; }
 
  private:
   bool reuse(const StateForm& form, double change, TrackedSpectrum& out) noexcept;
-  bool follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
-  bool refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason) noexcept;
-  bool part(const Conflict& conflict) noexcept;
+  bool follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason, Work& work) noexcept;
+  bool refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason, Work& work) noexcept;
+  bool part(const Conflict& conflict, Work& work) noexcept;
   bool publish(const StateForm& form, double distance, double target, bool fresh,
                TrackedSpectrum& out) noexcept;
   Status solve_directly(const System<kMaxDof>& system, const StateForm& form, Fallback reason,
-                        TrackedSpectrum& out) noexcept;
-  bool restart(const StateForm& form, TrackedSpectrum& out) noexcept;
+                        TrackedSpectrum& out, Work& work) noexcept;
+  Status give_up(TrackedSpectrum& out) noexcept;
+  bool restart(const StateForm& form, TrackedSpectrum& out, Work& work) noexcept;
   void publish_direct(const StateForm& form, bool symmetric, TrackedSpectrum& out) noexcept;
 
   TrackerOptions options_;

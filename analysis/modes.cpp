@@ -117,30 +117,26 @@ void Reader<N>::list_roots() {
 template <int N>
 void Reader<N>::bound_roots() {
   StateVector<N> total(root_count_);
+  const auto meet = [&](int j, int k) {
+    return certificate_.group[root(j).block] == certificate_.group[root(k).block] &&
+           modulus(root(j).value - root(k).value) <= root(j).bound + root(k).bound;
+  };
   for (int i = 0; i < root_count_; ++i) {
-    // Grow the set of discs that hang together with disc i.
-    Eigen::Matrix<int, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1> inside =
-        Eigen::Matrix<int, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1>::Zero(root_count_);
+    // Grow the set of discs that hang together with disc i; each of it is looked at once.
+    using Indices = Eigen::Matrix<int, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1>;
+    Indices inside = Indices::Zero(root_count_), set(root_count_);
+    int size = 0;
     inside[i] = 1;
-    bool grown = true, several = false;
-    while (grown) {
-      grown = false;
+    set[size++] = i;
+    for (int next = 0; next < size; ++next) {
       for (int j = 0; j < root_count_; ++j) {
-        if (inside[j] != 0 ||
-            certificate_.group[root(i).block] != certificate_.group[root(j).block]) {
-          continue;
-        }
-        for (int k = 0; k < root_count_ && inside[j] == 0; ++k) {
-          if (inside[k] != 0 &&
-              modulus(root(j).value - root(k).value) <= root(j).bound + root(k).bound) {
-            inside[j] = 1;
-            grown = several = true;
-          }
-        }
+        if (inside[j] != 0 || !meet(j, set[next])) continue;
+        inside[j] = 1;
+        set[size++] = j;
       }
     }
     total[i] = root(i).bound;
-    if (!several) continue;
+    if (size == 1) continue;
     total[i] = 0;
     for (int j = 0; j < root_count_; ++j) {
       if (inside[j] != 0) total[i] += 2 * root(j).bound;
@@ -207,21 +203,26 @@ void Reader<N>::pair_roots() {
   const auto free = [&](int i) {
     return !root(i).used && root(i).partner < 0 && root(i).value.imag() == 0;
   };
+  const auto likeness = [&](int i, int j) {
+    const Eigen::Index ci = basis_.blocks[root(i).block].first;
+    const Eigen::Index cj = basis_.blocks[root(j).block].first;
+    const double overlap = basis_.U.col(ci).dot(defect_.MU.col(cj));
+    const double score =
+        overlap * overlap /
+        (basis_.U.col(ci).dot(defect_.MU.col(ci)) * basis_.U.col(cj).dot(defect_.MU.col(cj)));
+    return basis_.weight(ci, ci) * basis_.weight(cj, cj) < 0 ? score + 2 : score;
+  };
+  State<N> scores(root_count_, root_count_);
+  for (int i = 0; i < root_count_; ++i) {
+    for (int j = i + 1; free(i) && j < root_count_; ++j)
+      scores(i, j) = free(j) ? likeness(i, j) : 0;
+  }
   for (;;) {
     double best = -1;
     int first = -1, second = -1;
     for (int i = 0; i < root_count_; ++i) {
-      if (!free(i)) continue;
-      const Eigen::Index ci = basis_.blocks[root(i).block].first;
-      for (int j = i + 1; j < root_count_; ++j) {
-        if (!free(j)) continue;
-        const Eigen::Index cj = basis_.blocks[root(j).block].first;
-        const double overlap = basis_.U.col(ci).dot(defect_.MU.col(cj));
-        double score =
-            overlap * overlap /
-            (basis_.U.col(ci).dot(defect_.MU.col(ci)) * basis_.U.col(cj).dot(defect_.MU.col(cj)));
-        if (basis_.weight(ci, ci) * basis_.weight(cj, cj) < 0) score += 2;
-        if (!(score <= best)) best = score, first = i, second = j;
+      for (int j = i + 1; free(i) && j < root_count_; ++j) {
+        if (free(j) && !(scores(i, j) <= best)) best = scores(i, j), first = i, second = j;
       }
     }
     if (first < 0) return;
@@ -285,9 +286,9 @@ ComplexVector<N> Reader<N>::shape(int i, bool left, StateVector<N>& re, StateVec
     // well be worse (Wilkinson 1979).
     ComplexVector<kTwice<N>> x = ComplexVector<kTwice<N>>::Ones(b.size);
     double best = 0;
+    Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, kTwice<N>, kTwice<N>> shifted;
     for (int k = 0; k < 3; ++k) {
-      Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, kTwice<N>, kTwice<N>> shifted =
-          L.template cast<Complex>();
+      shifted = L.template cast<Complex>();
       shifted.diagonal().array() -= mu;
       solve_in_place(shifted, x, kUnit * L.norm());
       const double growth = x.stableNorm();

@@ -101,6 +101,25 @@ double solve_sylvester(const Eigen::Ref<const State<N>>& A, const Eigen::Ref<con
 }
 
 template <int N>
+std::int64_t sylvester_work(const BlockList<N>& blocks) noexcept {
+  std::int64_t units = 0;
+  for (const Block& a : blocks) {
+    for (const Block& b : blocks) {
+      if (a.first >= b.first) continue;
+      const std::int64_t unknowns = std::int64_t{a.size} * b.size;
+      if (a.size <= 2 && b.size <= 2) {
+        units += 250;
+      } else if (a.size == 1 || b.size == 1) {
+        units += cubed(unknowns, 4) + squared(unknowns, 40) + 500;
+      } else if (N == kDynamic || unknowns <= kTwice<N>) {
+        units += cubed(unknowns, 4) + squared(unknowns, 60);
+      }
+    }
+  }
+  return units;
+}
+
+template <int N>
 double block_separation(const State<N>& Lambda, const Block& a, const Block& b) noexcept {
   if (a.size > 2 || b.size > 2) {
     State<N> unused;
@@ -150,6 +169,8 @@ template double block_separation<kDynamic>(const State<kDynamic>&, const Block&,
                                            const Block&) noexcept;
 template double block_separation<kMaxDof>(const State<kMaxDof>&, const Block&,
                                           const Block&) noexcept;
+template std::int64_t sylvester_work(const BlockList<kDynamic>&) noexcept;
+template std::int64_t sylvester_work(const BlockList<kMaxDof>&) noexcept;
 template void newton_step(const Defect<kDynamic>&, ModalBasis<kDynamic>&) noexcept;
 template void newton_step(const Defect<kMaxDof>&, ModalBasis<kMaxDof>&) noexcept;
 template double solve_sylvester<kDynamic>(const Eigen::Ref<const State<kDynamic>>&,

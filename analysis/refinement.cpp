@@ -12,6 +12,10 @@ constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
 /// up to which it is looked at as a perturbation of them.
 constexpr double kOrthogonal = 1e-8;
 constexpr double kNearlyOrthogonal = 0.1;
+/// Units of Work, times n^3: of the products of a basis, with either precision; of the inverse of
+/// its Gram matrix; and of all that is done once.
+constexpr std::int64_t kProductsWork = 80, kExtendedWork = 1600, kInverseWork = 110,
+                       kDefectWork = 90;
 
 /// X Lambda for a block-diagonal Lambda.
 template <int N, typename Left, typename Out>
@@ -312,7 +316,13 @@ bool in_range(const System<N>& system, const ModalBasis<N>& basis) {
 
 template <int N>
 void evaluate_defect(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
-                     Defect<N>& defect) noexcept {
+                     Defect<N>& defect, Work& work) noexcept {
+  const std::int64_t products_work = cubed(system.dof(), extended ? kExtendedWork : kProductsWork);
+  const std::int64_t inverse_work = cubed(system.dof(), kInverseWork);
+  if (!work.take(cubed(system.dof(), kDefectWork) + products_work +
+                 (symmetric ? 0 : inverse_work))) {
+    return;
+  }
   if (system.dof() == 0) {
     defect = Defect<N>{};
     basis.Y = basis.U;
@@ -332,6 +342,7 @@ void evaluate_defect(const System<N>& system, bool symmetric, bool extended, Mod
   }
   double contraction = evaluate_products<N>(system, extended, basis, defect);
   if (symmetric && !(contraction < kOrthogonal)) {
+    if (!work.take(inverse_work + 2 * products_work)) return;
     orthogonalize_left<N>(defect.gram, basis);
     const double dual_contraction = evaluate_products<N>(system, extended, basis, defect);
     if (dual_contraction < contraction) {
@@ -368,8 +379,8 @@ void evaluate_defect(const System<N>& system, bool symmetric, bool extended, Mod
 }
 
 template void evaluate_defect(const System<kDynamic>&, bool, bool, ModalBasis<kDynamic>&,
-                              Defect<kDynamic>&) noexcept;
+                              Defect<kDynamic>&, Work&) noexcept;
 template void evaluate_defect(const System<kMaxDof>&, bool, bool, ModalBasis<kMaxDof>&,
-                              Defect<kMaxDof>&) noexcept;
+                              Defect<kMaxDof>&, Work&) noexcept;
 
 }  // namespace dashpot::analysis

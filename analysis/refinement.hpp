@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/analysis/modal_basis.hpp>
 #include <dashpot/analysis/system.hpp>
+#include <dashpot/analysis/work.hpp>
 
 namespace dashpot::analysis {
 
@@ -21,10 +22,17 @@ struct Defect {
 
 /// Evaluates the defect of (basis.U, basis.Lambda) for the original coefficients, and sets the
 /// basis's left part and weight. With `extended`, the residual M U Lambda^2 + C U Lambda + K U is
-/// accumulated in double-double arithmetic, tails included, and so is the Gram matrix.
+/// accumulated in double-double arithmetic, tails included, and so is the Gram matrix. If `work`
+/// does not grant it, the result has no meaning.
 template <int N>
 void evaluate_defect(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
-                     Defect<N>& defect) noexcept;
+                     Defect<N>& defect, Work& work) noexcept;
+template <int N>
+void evaluate_defect(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
+                     Defect<N>& defect) noexcept {
+  Work work;
+  evaluate_defect<N>(system, symmetric, extended, basis, defect, work);
+}
 
 /// One Newton step on the whole basis: U <- U (I + X), where the blocks of X off the diagonal solve
 /// the Sylvester equations  Lambda_i X_ij - X_ij Lambda_j = -F_ij. (Its other half, Lambda <-
@@ -40,6 +48,10 @@ void newton_step(const Defect<N>& defect, ModalBasis<N>& basis) noexcept;
 template <int N>
 double solve_sylvester(const Eigen::Ref<const State<N>>& A, const Eigen::Ref<const State<N>>& B,
                        const State<N>& C, State<N>& X) noexcept;
+
+/// Work of the Sylvester equations of all pairs of these blocks, one for each pair.
+template <int N>
+std::int64_t sylvester_work(const BlockList<N>& blocks) noexcept;
 
 /// The lower bound of the separation alone, for two blocks of Lambda.
 template <int N>

@@ -33,6 +33,27 @@ Status check(const System<N>& system) {
   return system.mass == system.mass.transpose() ? Status::kOk : Status::kNotSymmetric;
 }
 
+/// Work of what comes before the basis: the zero modes' singular value decomposition above all.
+std::int64_t form_work(Eigen::Index n) {
+  return cubed(n, 260) + 6000;
+}
+
+/// Work of certify and read_modes; blocks of more than two columns have an iteration of their own.
+template <int N>
+std::int64_t reading_work(Eigen::Index n, const BlockList<N>& blocks) {
+  std::int64_t units = squared(n, 1500) + cubed(n, 20) + sylvester_work(blocks);
+  for (const Block& block : blocks) {
+    if (block.size > 2) units += cubed(block.size, 60) + squared(block.size, 1500);
+  }
+  return units;
+}
+
+/// Work of a Newton step.
+template <int N>
+std::int64_t step_work(Eigen::Index n, const BlockList<N>& blocks) {
+  return cubed(n, 180) + 3 * sylvester_work(blocks);
+}
+
 }  // namespace
 
 const char* to_text(ModeKind kind) noexcept {
@@ -54,11 +75,12 @@ const char* to_text(ModeKind kind) noexcept {
 }
 
 template <int N>
-Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexcept {
+Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work& work) noexcept {
   out.modes.resize(0);
   out.extended = false;
   out.status = check(system);
   if (out.status != Status::kOk) return out.status;
+  if (!work.take(form_work(system.dof()))) return out.status = Status::kUnfinished;
   const Eigen::LLT<Square<N>> cholesky(system.mass);
   if (system.dof() > 0 && cholesky.info() != Eigen::Success) {
     return out.status = Status::kMassNotPositiveDefinite;
@@ -78,13 +100,20 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out) noexc
   out.coupling = form.coupling;
   out.coupled = form.coupled_zeros > 0;
   for (const double cluster : kClusters) {
-    out.status = build_starting_basis<N>(form, out.zero_modes, cluster, out.basis);
-    if (out.status != Status::kOk) return out.status;
+    out.status = build_starting_basis<N>(form, out.zero_modes, cluster, out.basis, work);
+    if (out.status != Status::kOk) {
+      out.modes.resize(0);
+      return out.status;
+    }
     out.extended = options_.residual == SpectrumOptions::Residual::kExtended;
-    refine(system, out);
-    if (!good(out) && options_.residual == SpectrumOptions::Residual::kAutomatic) {
+    refine(system, out, work);
+    if (!work.over() && !good(out) && options_.residual == SpectrumOptions::Residual::kAutomatic) {
       out.extended = true;
-      refine(system, out);
+      refine(system, out, work);
+    }
+    if (work.over()) {
+      out.modes.resize(0);
+      return out.status = Status::kUnfinished;
     }
     if (!out.basis.Lambda.allFinite() || !out.basis.U.allFinite()) {
       out.modes.resize(0);
@@ -123,11 +152,12 @@ bool SpectrumSolver<N>::good(const Spectrum<N>& spectrum) const noexcept {
 }
 
 template <int N>
-void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out) noexcept {
+void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out, Work& work) noexcept {
   Quality previous{kInfinity, kInfinity};
   bool restored = false;
   for (int evaluation = 1;; ++evaluation) {
-    evaluate_defect<N>(system, out.symmetric, out.extended, out.basis, defect_);
+    evaluate_defect<N>(system, out.symmetric, out.extended, out.basis, defect_, work);
+    if (!work.take(reading_work<N>(system.dof(), out.basis.blocks))) return;
     certify<N>(defect_, out.basis, certificate_);
     read_modes<N>(system, defect_, certificate_, options_.soft_frequency, out);
     const Quality quality = worst_quality(out);
@@ -145,6 +175,7 @@ void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out) noexce
                                           defect_.F.norm() <= defect_.F_error.norm()));
     if (!better || noise) return;
     previous = quality;
+    if (!work.take(step_work<N>(system.dof(), out.basis.blocks))) return;
     before_step_ = out.basis;
     newton_step<N>(defect_, out.basis);
   }

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/certificate.hpp>
 #include <dashpot/analysis/modal_basis.hpp>
 #include <dashpot/analysis/status.hpp>
+#include <dashpot/analysis/work.hpp>
 #include <dashpot/analysis/zero_modes.hpp>
 
 #include <limits>
@@ -142,12 +143,17 @@ class SpectrumSolver {
   /// Analyses `system` into `out`, and returns out.status. The work is bounded (see
   /// hessenberg_eigenvalues; three bases at most, 6 refinement steps each); for a fixed N there is
   /// no allocation. On a status other than kOk and kUncertified `out` has no modes.
-  Status solve(const System<N>& system, Spectrum<N>& out) noexcept;
+  Status solve(const System<N>& system, Spectrum<N>& out) noexcept {
+    Work work;
+    return solve(system, out, work);
+  }
+  /// The same, with no more work than is granted: kUnfinished if that is not enough.
+  Status solve(const System<N>& system, Spectrum<N>& out, Work& work) noexcept;
 
  private:
   bool good(const Spectrum<N>& spectrum) const noexcept;
   /// Evaluates, certifies and reads the modes; improves the basis while that helps.
-  void refine(const System<N>& system, Spectrum<N>& out) noexcept;
+  void refine(const System<N>& system, Spectrum<N>& out, Work& work) noexcept;
 
   SpectrumOptions options_;
   bool damped_ = true;

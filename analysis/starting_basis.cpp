@@ -33,8 +33,9 @@ template <int N>
 class Builder {
  public:
   Builder(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes, double cluster,
-          ModalBasis<N>& basis)
+          ModalBasis<N>& basis, Work& work)
       : form_(form),
+        work_(work),
         cluster_(cluster),
         zero_modes_(zero_modes),
         basis_(basis),
@@ -51,9 +52,10 @@ class Builder {
       write_proportional();
     } else if (c_ > 0) {
       form_state_matrix();
-      if (!find_items()) return Status::kNotConverged;
+      if (!find_items()) return work_.over() ? Status::kUnfinished : Status::kNotConverged;
       mark_zero_rates();
-      for (int i = 0; i < item_count_; ++i) write_cluster_of(i);
+      for (int i = 0; i < item_count_ && !work_.over(); ++i) write_cluster_of(i);
+      if (work_.over()) return Status::kUnfinished;
     }
     write_free_zeros();
     write_leftover_zeros();
@@ -82,6 +84,7 @@ class Builder {
 
   void write_cluster_of(int first);
   void write_single(Complex value);
+  bool grants_inverse_iteration(Eigen::Index size, std::int64_t factor) const;
   void write_zero_rate(double rate);
   bool write_coinciding(const State<N>& S, const State<N>& small, Complex mean);
   bool write_parted(const State<N>& S, const State<N>& small, int cluster);
@@ -89,6 +92,7 @@ class Builder {
   State<N> positions(const State<N>& S, const State<N>& Lambda) const;
 
   const EnergyForm<N>& form_;
+  Work& work_;
   double cluster_;
   const ZeroModes<N>& zero_modes_;
   ModalBasis<N>& basis_;
@@ -209,9 +213,10 @@ bool Builder<N>::find_items() {
   const Eigen::Index size = A_.rows();
   ComplexStateVector<N> values(size);
   if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(size));
+  if (!work_.take(cubed(size, 9) + squared(size, 20))) return false;
   State<N> H = A_;
   reduce_to_hessenberg(H);
-  if (!hessenberg_eigenvalues(H, values.data())) return false;
+  if (!hessenberg_eigenvalues(H, values.data(), work_)) return false;
   item_count_ = 0;
   for (const Complex& value : values) {
     if (value.imag() < 0) continue;
@@ -229,11 +234,18 @@ bool Builder<N>::find_items() {
   return true;
 }
 
+/// True if a system of this size may be solved for one vector; `factor` is 1, or 2 for complex
+/// numbers.
+template <int N>
+bool Builder<N>::grants_inverse_iteration(Eigen::Index size, std::int64_t factor) const {
+  return work_.take(factor * (cubed(size, 2) + squared(size, 24) + 60 * size) + 2500);
+}
+
 /// Eigenvector of A to a real eigenvalue.
 template <int N>
 StateVector<N> Builder<N>::state_vector(double value) const {
   StateVector<N> z = StateVector<N>::Ones(A_.rows());
-  for (int k = 0; k < 3; ++k) {
+  for (int k = 0; k < 3 && grants_inverse_iteration(A_.rows(), 1); ++k) {
     State<N> shifted = A_;
     shifted.diagonal().array() -= value;
     solve_in_place(shifted, z, kEps * A_norm_);
@@ -286,6 +298,10 @@ void Builder<N>::write_cluster_of(int first) {
     write_single(mean);
   } else {
     const State<N> S = invariant_subspace(mean, near_axis, size);
+    // To part the cluster: inverse iterations for each member, and products.
+    const std::int64_t parting_work = members * (cubed(size, 24) + squared(size, 240) + 900) +
+                                      cubed(size, 60) + cubed(A_.rows(), 4) + 5000;
+    if (!work_.take(parting_work)) return;
     const State<N> AS = A_ * S;
     const State<N> small = S.transpose() * AS;
     if (write_coinciding(S, small, mean) || write_parted(S, small, cluster)) return;
@@ -303,7 +319,7 @@ void Builder<N>::write_single(Complex value) {
   const double good = 1e-4 / (kEps * size * static_cast<double>(c_));
   if (value.imag() == 0) {
     State<N> u = State<N>::Ones(c_, 1);
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < 3 && grants_inverse_iteration(c_, 1); ++k) {
       Square<N> Q = Kp + value.real() * D;
       Q.diagonal().array() += value.real() * value.real();
       solve_in_place(Q, u, kEps * size);
@@ -316,8 +332,8 @@ void Builder<N>::write_single(Complex value) {
   }
   using ComplexSquare = Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, N, N>;
   ComplexVector<N> u = ComplexVector<N>::Ones(c_);
-  for (int k = 0; k < 3; ++k) {
-    ComplexSquare Q(c_, c_);
+  ComplexSquare Q(c_, c_);  // once: it is filled with zeros first
+  for (int k = 0; k < 3 && grants_inverse_iteration(c_, 2); ++k) {
     for (Eigen::Index j = 0; j < c_; ++j) {
       for (Eigen::Index i = 0; i < c_; ++i) {
         Q(i, j) = Complex(Kp(i, j) + value.real() * D(i, j), value.imag() * D(i, j));
@@ -392,7 +408,9 @@ State<N> Builder<N>::invariant_subspace(Complex mean, bool near_axis, Eigen::Ind
     }
   }
   const int steps = cluster_ > kCluster ? 40 : 8;  // wide clusters part slowly from the rest
-  for (int k = 0; k < steps; ++k) {
+  const std::int64_t step_work = cubed(states, 2) + squared(states, 20) +
+                                 size * (squared(states, 5) + 18 * size * states + 200);
+  for (int k = 0; k < steps && work_.take(step_work); ++k) {
     State<N> factor = shift;
     solve_in_place(factor, S, kEps * shift.norm());
     orthonormalize(S);
@@ -442,13 +460,14 @@ template <int N>
 bool Builder<N>::write_parted(const State<N>& S, const State<N>& small, int cluster) {
   const Eigen::Index size = small.rows();
   State<N> W(size, size);
+  ComplexState<N> shifted;  // once: it is filled with zeros first
   Eigen::Index column = 0;
   for (int i = 0; i < item_count_; ++i) {
     if (item(i).cluster != cluster) continue;
     ComplexStateVector<N> w = ComplexStateVector<N>::Ones(size);
     for (Eigen::Index k = 0; k < size; ++k) w[k] += 0.1 * static_cast<double>(k * (i + 1));
     for (int k = 0; k < 3; ++k) {
-      ComplexState<N> shifted = small.template cast<Complex>();
+      shifted = small.template cast<Complex>();
       shifted.diagonal().array() -= item(i).value;
       solve_in_place(shifted, w, kEps * small.norm());
       w /= w.stableNorm();
@@ -475,13 +494,13 @@ bool Builder<N>::write_parted(const State<N>& S, const State<N>& small, int clus
 
 template <int N>
 Status build_starting_basis(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes,
-                            double cluster, ModalBasis<N>& basis) noexcept {
-  return Builder<N>(form, zero_modes, cluster, basis).build();
+                            double cluster, ModalBasis<N>& basis, Work& work) noexcept {
+  return Builder<N>(form, zero_modes, cluster, basis, work).build();
 }
 
 template Status build_starting_basis(const EnergyForm<kDynamic>&, const ZeroModes<kDynamic>&,
-                                     double, ModalBasis<kDynamic>&) noexcept;
+                                     double, ModalBasis<kDynamic>&, Work&) noexcept;
 template Status build_starting_basis(const EnergyForm<kMaxDof>&, const ZeroModes<kMaxDof>&, double,
-                                     ModalBasis<kMaxDof>&) noexcept;
+                                     ModalBasis<kMaxDof>&, Work&) noexcept;
 
 }  // namespace dashpot::analysis

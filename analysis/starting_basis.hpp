@@ -2,6 +2,7 @@
 #include <dashpot/analysis/energy_form.hpp>
 #include <dashpot/analysis/modal_basis.hpp>
 #include <dashpot/analysis/status.hpp>
+#include <dashpot/analysis/work.hpp>
 
 namespace dashpot::analysis {
 
@@ -18,8 +19,9 @@ namespace dashpot::analysis {
 ///
 /// Eigenvalues within the relative distance `cluster` of each other share a block unless their
 /// vectors are well apart: more is slower and safer, and from 2 on one block holds them all.
+/// Returns kUnfinished, and no basis, if `work` does not grant enough.
 template <int N>
 Status build_starting_basis(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes,
-                            double cluster, ModalBasis<N>& basis) noexcept;
+                            double cluster, ModalBasis<N>& basis, Work& work) noexcept;
 
 }  // namespace dashpot::analysis

@@ -22,6 +22,8 @@ const char* to_text(Status status) noexcept {
       return "the entries are too large or too small to compute with";
     case Status::kUncertified:
       return "no error bound could be proved for some of the modes";
+    case Status::kUnfinished:
+      return "too much work for one tick: it goes on in the background";
   }
   return "unknown status";
 }

@@ -13,6 +13,7 @@ enum class Status {
   kNotConverged,             ///< the eigenvalue iteration reached its cap
   kOverflow,                 ///< the entries are too large or too small to compute with
   kUncertified,  ///< modes are given, but no finite error bound could be proved for some
+  kUnfinished,   ///< more work than one tick may take: another thread goes on with it
 };
 
 /// A short English text, without a full stop.

@@ -118,7 +118,7 @@ void turn_columns(const std::array<int, kMaxWidth>& columns, const Cluster& X,
 
 }  // namespace
 
-bool part_coinciding(const TrackedDefect& defect, TrackedBasis& basis) noexcept {
+bool part_coinciding(const TrackedDefect& defect, TrackedBasis& basis, Work& work) noexcept {
   std::array<bool, kMaxDof> done{};
   bool any = false;
   for (int i = 0; i < basis.modes; ++i) {
@@ -130,6 +130,7 @@ bool part_coinciding(const TrackedDefect& defect, TrackedBasis& basis) noexcept 
       members[at(shared.modes++)] = j;
     }
     if (shared.modes < 2) continue;
+    if (!work.take(cubed(2 * shared.modes, 60) + squared(2 * shared.modes, 300))) return any;
     for (int j = 0; j < shared.modes; ++j) {
       shared.columns[at(j)] = members[at(j)];
       shared.columns[at(shared.modes + j)] = basis.modes + members[at(j)];

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/analysis/tracked_basis.hpp>
+#include <dashpot/analysis/work.hpp>
 
 namespace dashpot::analysis {
 
@@ -15,8 +16,9 @@ bool part_blocks(const TrackedDefect& defect, const Conflict& conflict,
 /// Modes whose eigenvalues coincide share a space of which any orthonormal columns will do: gives
 /// each of them a plane that is orthogonal to the others', in the metric and in the energy, and as
 /// well conditioned as the space allows. What a direct solution has instead depends on rounding
-/// errors. `defect` is one of the basis; returns whether there were any such modes.
-bool part_coinciding(const TrackedDefect& defect, TrackedBasis& basis) noexcept;
+/// errors. `defect` is one of the basis; returns whether there were any such modes. Those for which
+/// `work` does not grant enough stay as they are.
+bool part_coinciding(const TrackedDefect& defect, TrackedBasis& basis, Work& work) noexcept;
 
 /// Turns the columns of the zero modes, which are orthonormal or nearly so, until the damping tells
 /// them apart, all at once. `defect` is one of the basis, or nearly. False if it is not finite.

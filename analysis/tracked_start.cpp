@@ -262,11 +262,31 @@ Plane plane_of(const StateForm& form, const Mode<kMaxDof>& mode) {
   return energy_plane(form, state(form, u.real(), zero), state(form, zero, u.real()));
 }
 
-double overlap(const StateForm& form, const Plane& a, const Plane& b) {
+/// The energy metric times x.
+Column energy_image(const StateForm& form, const Column& x) {
+  const int n = form.joints, p = form.strains;
+  Column image{};
+  const auto multiply = [](const double* matrix, int size, const double* v, double* out) {
+    for (int j = 0; j < size; ++j) {
+      for (int i = 0; i < size; ++i) out[i] += matrix[i + j * size] * v[j];
+    }
+  };
+  multiply(form.M, n, x.data() + p, image.data() + p);
+  if (form.factored) {
+    std::copy_n(x.begin(), p, image.begin());
+  } else {
+    multiply(form.W, p, x.data(), image.data());
+  }
+  return image;
+}
+
+/// Of plane a, and of the energy metric times plane b.
+double overlap(const StateForm& form, const Plane& a, const Plane& image) {
   double sum = 0;
   for (const Column* x : {&a.first, &a.second}) {
-    for (const Column* y : {&b.first, &b.second}) {
-      const double product = products(form, *x, *y).energy();
+    for (const Column* y : {&image.first, &image.second}) {
+      double product = 0;
+      for (int k = 0; k < form.states(); ++k) product += (*x)[at(k)] * (*y)[at(k)];
       sum += product * product;
     }
   }
@@ -277,11 +297,14 @@ template <typename NewPlane>
 std::array<int, kMaxDof> best_places(const StateForm& form, const TrackedBasis& before, int count,
                                      const NewPlane& new_plane) {
   Scores scores{};
-  Planes old;
-  for (int j = 0; j < count; ++j) old[at(j)] = plane_of(form, before, j);
+  Planes images;  // once, as each is compared with every new plane
+  for (int j = 0; j < count; ++j) {
+    const Plane old = plane_of(form, before, j);
+    images[at(j)] = {energy_image(form, old.first), energy_image(form, old.second)};
+  }
   for (int i = 0; i < count; ++i) {
     const Plane plane = new_plane(i);
-    for (int j = 0; j < count; ++j) scores[at(i)][at(j)] = overlap(form, plane, old[at(j)]);
+    for (int j = 0; j < count; ++j) scores[at(i)][at(j)] = overlap(form, plane, images[at(j)]);
   }
   return assign(scores, count);
 }

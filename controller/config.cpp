@@ -129,8 +129,8 @@ void read_watchdog(const YamlMapping& root, double period, Watchdog& watchdog) {
 }
 
 void read_analysis(const YamlMapping& root, Analysis& analysis) {
-  static constexpr std::array<std::string_view, 5> kKeys = {"where", "every", "soft_frequency",
-                                                            "shapes", "sampled"};
+  static constexpr std::array<std::string_view, 6> kKeys = {"where",          "every",  "share",
+                                                            "soft_frequency", "shapes", "sampled"};
   static constexpr std::array<std::pair<std::string_view, Analysis::Where>, 3> kPlaces = {
       {{"off", Analysis::Where::kOff},
        {"inline", Analysis::Where::kInline},
@@ -138,6 +138,7 @@ void read_analysis(const YamlMapping& root, Analysis& analysis) {
   const YamlMapping keys = root.mapping("analysis", kKeys);
   read_choice(keys, "where", kPlaces, analysis.where);
   read_count(keys, "every", 1, analysis.every);
+  read_number(keys, "share", "", Sign::kPositive, analysis.share);
   read_number(keys, "soft_frequency", "rad/s", Sign::kNotNegative, analysis.soft_frequency);
   read_switch(keys, "shapes", analysis.shapes);
   static constexpr std::array<std::string_view, 4> kSampledKeys = {"interval", "delay", "cutoff",

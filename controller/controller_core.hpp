@@ -28,7 +28,7 @@ class ControllerCore {
 
  protected:
   ControllerCore(const RobotModel& model, const Settings& settings)
-      : settings_(settings), vibration_(settings.analysis) {
+      : settings_(settings), vibration_(settings) {
     if (settings.analysis.sampled.interval > 0) {
       sampled_ = std::make_unique<SampledAnalysis>(model, settings);
     }

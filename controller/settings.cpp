@@ -181,6 +181,10 @@ void validate(const Settings& settings, int n) {
   if (settings.analysis.every < 1) {
     fail("analysis.every", settings.analysis.every, "ticks", "has to be at least 1");
   }
+  need_positive("analysis.share", settings.analysis.share, "");
+  if (settings.analysis.share > 1) {
+    fail("analysis.share", settings.analysis.share, "", "must be at most 1");
+  }
   need_not_negative("analysis.soft_frequency", settings.analysis.soft_frequency, "rad/s");
   const Analysis::Sampled& sampled = settings.analysis.sampled;
   need_not_negative("analysis.sampled.interval", sampled.interval, "s");

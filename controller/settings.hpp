@@ -108,7 +108,12 @@ struct Analysis {
     kInline,      ///< within the tick
     kBackground,  ///< on a thread of its own, one tick later or when it gets round to it
   } where = Where::kInline;
-  int every = 1;                           ///< ticks between two analyses, at least 1
+  int every = 1;  ///< ticks between two analyses, at least 1
+  /// Of a period that the analysis within a tick may take, above 0 and at most 1: what needs more
+  /// goes on on a thread of its own, and says so (analysis::Status::kUnfinished). It is counted,
+  /// not timed: kWorkPerSecond units of analysis::Work are a second.
+  double share = 0.1;
+  static constexpr double kWorkPerSecond = 1e10;
   double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
   bool shapes = true;                      ///< with eigenvectors
 

@@ -60,7 +60,7 @@ struct VibrationCounters {
   std::uint64_t unchanged = 0;   ///< joints and gains did not move at all: nothing was computed
   std::uint64_t no_springs = 0;  ///< nothing vibrates: nothing was solved
   std::uint64_t failed = 0;      ///< no modes: Vibration::status says why
-  std::uint64_t missed = 0;      ///< the background thread was busy
+  std::uint64_t missed = 0;      ///< the background thread was busy with an earlier one
   // ... and what some of them could leave out.
   std::uint64_t no_zero_modes = 0;  ///< springs hold every motion: nothing to keep apart
   /// Of the tracked: the undamped modes decouple the damping, and strains are followed alone
@@ -81,6 +81,7 @@ struct Vibration {
   int count = 0;                                ///< of modes
   std::array<VibrationMode, kMaxJoints> modes;  ///< by falling natural frequency
   VibrationCounters counters;
+  std::int64_t work = 0;  ///< done within the last tick, in units of analysis::Work
 };
 
 /// A mode of the continuous loop, and what becomes of it in the loop as it is sampled; the terms

@@ -1,5 +1,7 @@
 #include <dashpot/controller/vibration_thread.hpp>
 
+#include <algorithm>
+
 namespace dashpot::controller {
 namespace {
 
@@ -11,6 +13,14 @@ analysis::TrackerOptions tracker_options(const Analysis& settings) {
   options.shapes = settings.shapes;
   return options;
 }
+
+std::int64_t analysis_budget(const Settings& settings) {
+  const double units = settings.analysis.share * settings.period * Analysis::kWorkPerSecond;
+  return static_cast<std::int64_t>(std::min(units, 1e18));
+}
+
+/// Tasks until one that could not be followed is tried within the tick again: at most so many.
+constexpr int kLongestWait = 64;
 
 std::size_t at(int i) {
   return static_cast<std::size_t>(i);
@@ -29,16 +39,22 @@ void VibrationSolver::reset() noexcept {
   solved_ = restarted_ = 0;
 }
 
-void VibrationSolver::solve(const VibrationTask& task, Vibration& result) noexcept {
+bool VibrationSolver::solve(const VibrationTask& task, Vibration& result,
+                            analysis::Work& work) noexcept {
+  if (task.resets != resets_) reset();
+  resets_ = task.resets;
+  if (task.springs) {
+    if (task.restarts != restarted_) tracker_.reset();
+    restarted_ = task.restarts;
+    if (tracker_.update(task.system, spectrum_, work) == analysis::Status::kUnfinished)
+      return false;
+  }
   result.time = task.time;
   result.tick = task.tick;
   result.position = task.position;
   counters_.missed += task.number - solved_ - 1;
   solved_ = task.number;
   if (task.springs) {
-    if (task.restarts != restarted_) tracker_.reset();
-    restarted_ = task.restarts;
-    tracker_.update(task.system, spectrum_);
     const analysis::TrackerCounters& counters = tracker_.counters();
     counters_.no_shapes = static_cast<std::uint64_t>(counters.shapes_skipped) - skipped_;
     counters_.proportional = static_cast<std::uint64_t>(counters.proportional) - proportional_;
@@ -65,6 +81,7 @@ void VibrationSolver::solve(const VibrationTask& task, Vibration& result) noexce
   result.counters.unchanged = task.counters.unchanged;
   result.counters.no_wrench = task.counters.no_wrench;
   result.counters.at_rest = task.counters.at_rest;
+  return true;
 }
 
 void VibrationSolver::publish_modes(Vibration& result) const noexcept {
@@ -91,19 +108,19 @@ void VibrationSolver::publish_modes(Vibration& result) const noexcept {
   }
 }
 
-VibrationAnalysis::VibrationAnalysis(const Analysis& settings)
-    : every_(settings.where == Analysis::Where::kOff ? 0
-                                                     : static_cast<std::uint64_t>(settings.every)),
-      solver_(settings) {
-  if (settings.where == Analysis::Where::kBackground) {
-    thread_ = std::make_unique<VibrationThread>(settings);
-  }
+VibrationAnalysis::VibrationAnalysis(const Settings& settings)
+    : every_(settings.analysis.where == Analysis::Where::kOff
+                 ? 0
+                 : static_cast<std::uint64_t>(settings.analysis.every)),
+      background_(settings.analysis.where == Analysis::Where::kBackground),
+      budget_(analysis_budget(settings)) {
+  if (every_ != 0) thread_ = std::make_unique<VibrationThread>(settings.analysis);
 }
 
 VibrationAnalysis::~VibrationAnalysis() = default;
 
 VibrationTask& VibrationAnalysis::task() noexcept {
-  return thread_ ? thread_->tasks.slot() : task_;
+  return thread_->tasks.slot();
 }
 
 void VibrationAnalysis::update() noexcept {
@@ -112,33 +129,92 @@ void VibrationAnalysis::update() noexcept {
   given.restarts = restarts_;
   given.resets = resets_;
   given.counters = counters_;
-  if (thread_) {
+  if (background_) {
     thread_->tasks.publish();
+    return;
+  }
+  result_.work = 0;
+  missed_ = away_;
+  if (!away_) try_within_tick(given);
+  if (!away_) return;
+  if (!from_thread_) announce(given);
+  if (!missed_) thread_->tasks.publish();
+}
+
+/// Solves the task, or leaves it to the thread.
+void VibrationAnalysis::try_within_tick(const VibrationTask& given) noexcept {
+  away_ = true;
+  if (!worth_trying(given)) return;
+  analysis::Work work(budget_);
+  away_ = !thread_->solver.solve(given, result_, work);
+  result_.work = work.done();
+  if (away_) {
+    wait_ = next_wait_ = std::min(2 * next_wait_ + 1, kLongestWait);
   } else {
-    solver_.solve(given, result_);
+    wait_ = next_wait_ = 0;
+    from_thread_ = false;
   }
 }
 
+bool VibrationAnalysis::worth_trying(const VibrationTask& given) noexcept {
+  const bool anew = given.restarts != tried_restarts_;
+  if (!anew && given.springs && !thread_->solver.follows() && wait_ > 0) {
+    --wait_;
+    return false;
+  }
+  tried_restarts_ = given.restarts;
+  from_thread_ = from_thread_ && !anew;
+  return true;
+}
+
+/// Says that there are no modes yet.
+void VibrationAnalysis::announce(const VibrationTask& given) noexcept {
+  result_.time = given.time;
+  result_.tick = given.tick;
+  result_.position = given.position;
+  result_.status = analysis::Status::kUnfinished;
+  result_.origin = SpectrumOrigin::kDirect;
+  result_.zero_modes = result_.count = 0;
+}
+
 void VibrationAnalysis::repeat(std::int64_t time, std::uint64_t tick) noexcept {
+  if (missed_) {  // it is still where it was put
+    task().time = time;
+    task().tick = tick;
+    update();
+    return;
+  }
   ++counters_.unchanged;
-  if (thread_) return;
+  if (background_) return;
   result_.time = time;
   result_.tick = tick;
   if (result_.count > 0) result_.origin = SpectrumOrigin::kReused;
-  ++result_.counters.unchanged;
+  result_.counters.unchanged = counters_.unchanged;
+  result_.work = 0;
 }
 
 void VibrationAnalysis::collect() noexcept {
-  if (!thread_ || !thread_->results.fetch()) return;
+  if (!(background_ || away_) || !thread_->results.fetch()) return;
   const VibrationThread::Result& latest = thread_->results.value();
-  if (latest.resets == resets_) shown_ = &latest.vibration;
+  away_ = false;
+  if (latest.resets != resets_) return;
+  if (background_) {
+    shown_ = &latest.vibration;
+    return;
+  }
+  result_ = latest.vibration;
+  result_.counters.unchanged = counters_.unchanged;
+  result_.work = 0;
+  from_thread_ = true;
 }
 
 void VibrationAnalysis::reset(Eigen::Index n) noexcept {
   ++resets_;
   tasks_ = restarts_ = 0;
   counters_ = {};
-  solver_.reset();
+  missed_ = from_thread_ = false;
+  tried_restarts_ = 0;
+  wait_ = next_wait_ = 0;
   result_.time = 0;
   result_.tick = 0;
   result_.position.setZero(n);
@@ -147,6 +223,7 @@ void VibrationAnalysis::reset(Eigen::Index n) noexcept {
   result_.zero_modes = 0;
   result_.count = 0;
   result_.counters = {};
+  result_.work = 0;
   shown_ = &result_;
 }
 

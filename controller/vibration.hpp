@@ -24,19 +24,26 @@ struct VibrationTask {
 class VibrationSolver {
  public:
   explicit VibrationSolver(const Analysis& settings);
-  /// Bounded work, no allocation, no system call.
-  void solve(const VibrationTask& task, Vibration& result) noexcept;
-  /// Forgets the past.
-  void reset() noexcept;
+  /// No more work than is granted, no allocation, no system call. Returns false, with the result as
+  /// it was, if that is not enough: the task then counts when it is solved. Forgets the past where
+  /// the task is the first one after a reset.
+  bool solve(const VibrationTask& task, Vibration& result, analysis::Work& work) noexcept;
+  void solve(const VibrationTask& task, Vibration& result) noexcept {
+    analysis::Work unlimited;
+    solve(task, result, unlimited);
+  }
+  /// True if the next task starts from the last one.
+  bool follows() const noexcept { return tracker_.follows(); }
 
  private:
+  void reset() noexcept;
   void publish_modes(Vibration& result) const noexcept;
 
   bool shapes_;
   analysis::ModeTracker tracker_;
   analysis::TrackedSpectrum spectrum_;
   VibrationCounters counters_;
-  std::uint64_t solved_ = 0, restarted_ = 0;  ///< numbers of the last task
+  std::uint64_t solved_ = 0, restarted_ = 0, resets_ = 0;  ///< numbers of the last task
   /// Of the tracker at the last reset: shapes left out, and updates of proportional damping.
   std::uint64_t skipped_ = 0, proportional_ = 0;
 };
@@ -46,13 +53,19 @@ class VibrationThread;
 /// Finds the vibration modes of the closed loop: within the tick, on a thread of its own, or not at
 /// all. All memory is set aside, and the thread started, at set-up.
 ///
+/// Within the tick no more work is done than Settings::Analysis::share grants. A task that needs
+/// more goes to the thread, with all that is known of the modes: until it is solved the status is
+/// analysis::Status::kUnfinished, then the modes are those of that task's tick, and the next tick
+/// goes on from them if they can be followed. Where they cannot, tasks go straight to the thread,
+/// and solving one within the tick is tried more and more seldom.
+///
 /// Where no modes are found the result's status says why, its count is zero, and nothing else is
 /// affected. Results on the thread have the same numbers as those within the tick as long as it
 /// keeps up; where it missed some, eigenvalues that agree within the proved bounds. (Which of two
 /// real ones form a mode may then differ, where several modes are overdamped, until gains change.)
 class VibrationAnalysis {
  public:
-  explicit VibrationAnalysis(const Analysis& settings);
+  explicit VibrationAnalysis(const Settings& settings);
   ~VibrationAnalysis();
   VibrationAnalysis(const VibrationAnalysis&) = delete;
   VibrationAnalysis& operator=(const VibrationAnalysis&) = delete;
@@ -75,16 +88,25 @@ class VibrationAnalysis {
   const Vibration& result() const noexcept { return *shown_; }
 
  private:
+  bool worth_trying(const VibrationTask& given) noexcept;
+  void try_within_tick(const VibrationTask& given) noexcept;
+  void announce(const VibrationTask& given) noexcept;
+
   std::uint64_t every_;  ///< 0: never
+  bool background_;
+  std::int64_t budget_;  ///< units of Work in a tick
   std::uint64_t tasks_ = 0, restarts_ = 0, resets_ = 0;
   VibrationCounters counters_;
-  // Within the tick:
-  VibrationTask task_;
-  VibrationSolver solver_;
   Vibration result_;
-  // Or apart from it:
-  std::unique_ptr<VibrationThread> thread_;
+  std::unique_ptr<VibrationThread> thread_;  ///< none where there is nothing to analyse
   const Vibration* shown_ = &result_;
+
+  // Of tasks within the tick:
+  bool away_ = false;         ///< the thread has one, and the solver with it
+  bool missed_ = false;       ///< the last one came meanwhile
+  bool from_thread_ = false;  ///< the thread solved what is shown, and none was solved since
+  std::uint64_t tried_restarts_ = 0;  ///< of the last one that was tried
+  int wait_ = 0, next_wait_ = 0;      ///< tasks until one is tried again, now and the next time
 };
 
 }  // namespace dashpot::controller

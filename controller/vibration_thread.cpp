@@ -2,15 +2,20 @@
 
 #include <pthread.h>
 #include <sched.h>
+#include <algorithm>
 #include <chrono>
 
 namespace dashpot::controller {
 
 VibrationThread::VibrationThread(const Analysis& settings)
-    : solver_(settings), thread_([this] { run(); }) {}
+    : solver(settings), thread_([this] { run(); }) {}
 
 VibrationThread::~VibrationThread() {
-  stop_.store(true, std::memory_order_relaxed);
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  stopped_.notify_one();
   thread_.join();
 }
 
@@ -18,19 +23,23 @@ void VibrationThread::run() noexcept {
   // Whoever made the controller may be a real-time thread; this one must not delay it.
   const sched_param ordinary{};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
-  std::uint64_t resets = 0;
-  while (!stop_.load(std::memory_order_relaxed)) {
+  constexpr int kBusyLooks = 50;
+  int looks = 0;  // for tasks, since the last one
+  std::unique_lock lock(mutex_);
+  while (!stop_) {
     if (!tasks.fetch()) {
-      std::this_thread::sleep_for(std::chrono::microseconds(200));
+      looks = std::min(looks + 1, kBusyLooks);
+      stopped_.wait_for(lock, std::chrono::microseconds(looks < kBusyLooks ? 200 : 2000));
       continue;
     }
+    looks = 0;
+    lock.unlock();
     const VibrationTask& task = tasks.value();
-    if (task.resets != resets) solver_.reset();
-    resets = task.resets;
     Result& result = results.slot();
-    solver_.solve(task, result.vibration);
-    result.resets = resets;
+    solver.solve(task, result.vibration);
+    result.resets = task.resets;
     results.publish();
+    lock.lock();
   }
 }
 

@@ -310,6 +310,7 @@ TEST_F(Safety, ShowsWhatIsMeasuredWhileTheTorqueIsRampedDown) {
 TEST_F(Safety, AnExternalWrenchThatIsNotFiniteIsReportedAndChangesNothing) {
   settings.task_terms.geometric_stiffness = true;
   settings.analysis.where = Analysis::Where::kInline;
+  settings.analysis.share = 1;  // all within the tick
   settings.initial.mode = Mode::kCartesian;
   make();
   arm->state.external_wrench << 5, 0, 20, 0, 0, 1;

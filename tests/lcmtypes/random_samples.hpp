@@ -94,7 +94,7 @@ inline SampledModesSample random_sampled_modes(Random& random, int n) {
   controller::SampledVibration& vibration = sample.vibration;
   vibration.tick = static_cast<std::uint64_t>(random.integer(1, 1'000'000'000));
   vibration.position = random.vector(n);
-  vibration.status = static_cast<analysis::Status>(random.integer(0, 8));
+  vibration.status = static_cast<analysis::Status>(random.integer(0, 9));
   vibration.spectral_radius = random.uniform(0.9, 1.1);
   vibration.gain_margin = random.uniform(0.1, 9);
   vibration.count = random.integer(0, n);

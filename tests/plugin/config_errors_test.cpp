@@ -133,6 +133,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadConfig{"CountTooSmall",
                   "analysis.every: is 0; a whole number, 1 or more, is wanted (line 2)",
                   "analysis: {every: 0}\n"},
+        BadConfig{"MoreThanAPeriod", "analysis.share: is 1.5, must be at most 1 (line 2)",
+                  "analysis: {share: 1.5}\n"},
         BadConfig{"LongDelay",
                   "analysis.sampled.delay: is 21 ticks, has to be between 0 and 20 (line 2)",
                   "analysis: {sampled: {delay: 21}}\n"}),

@@ -188,7 +188,8 @@ TEST(Config, FillsTheRest) {
            "  wrench: false}\n"
            "watchdog: {setpoint_hold: 100 ms, setpoint_damp: 0, longest_gap: 5 ms, feedback: 1,\n"
            "  release_after: 3}\n"
-           "analysis: {where: 'off', every: 7, soft_frequency: 0.2 rad/s, shapes: false,\n"
+           "analysis: {where: 'off', every: 7, share: 0.3, soft_frequency: 0.2 rad/s,\n"
+           "  shapes: false,\n"
            "  sampled: {interval: 500 ms, delay: 2, cutoff: 30 Hz, difference_velocity: true}}\n")
           .settings;
   EXPECT_TRUE(all.task_terms.geometric_stiffness);
@@ -225,6 +226,7 @@ TEST(Config, FillsTheRest) {
   EXPECT_EQ(all.watchdog.release_after, 3);
   EXPECT_EQ(all.analysis.where, controller::Analysis::Where::kOff);
   EXPECT_EQ(all.analysis.every, 7);
+  EXPECT_EQ(all.analysis.share, 0.3);
   EXPECT_EQ(all.analysis.soft_frequency, 0.2);
   EXPECT_FALSE(all.analysis.shapes);
   EXPECT_DOUBLE_EQ(all.analysis.sampled.interval, 0.5);
@@ -354,6 +356,7 @@ TEST(ConfigExample, ShowsDefaults) {
   EXPECT_EQ(shown.watchdog.longest_gap, none.watchdog.longest_gap);
   EXPECT_EQ(shown.analysis.where, none.analysis.where);
   EXPECT_EQ(shown.analysis.every, none.analysis.every);
+  EXPECT_EQ(shown.analysis.share, none.analysis.share);
   EXPECT_EQ(shown.analysis.soft_frequency, none.analysis.soft_frequency);
   EXPECT_EQ(shown.analysis.shapes, none.analysis.shapes);
 }
