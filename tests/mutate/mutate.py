@@ -18,7 +18,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import judge
-from changes import find
+from changes import find, one_line
 from rewrite import copy_tree
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -191,14 +191,19 @@ def build(folders):
             raise SystemExit("mutate: build failed:\n" + "\n".join(errors[:20]))
 
 
+def named(change):
+    """A change as tests/mutate/equivalent.txt names it, wherever its line is."""
+    line = (ROOT / change.file).read_text().split("\n")[change.line - 1]
+    return (f"{change.file}: {one_line(line)}",
+            f"{change.operator}: {change.old} -> {change.new or '(nothing)'}")
+
+
 def reviewed():
-    """Changes that make no difference that a test could see: {(file, operator, old, new)}."""
-    known = {}
-    for line in (ROOT / "tests/mutate/equivalent.txt").read_text().split("\n"):
-        if line and not line.startswith("#"):
-            *key, reason = (part.strip() for part in line.split(" | "))
-            known[tuple(key)] = reason
-    return known
+    """Why a change makes no difference that a test could see, by its name."""
+    text = (ROOT / "tests/mutate/equivalent.txt").read_text()
+    blocks = [block.split("\n") for block in text.split("\n\n")]
+    return {tuple(block[:2]): " ".join(block[2:]).strip() for block in blocks
+            if len(block) > 2 and not block[0].startswith("#")}
 
 
 def judge_all(changes, tests, before):
@@ -206,10 +211,9 @@ def judge_all(changes, tests, before):
     known = reviewed()
 
     def verdict(number, change):
-        key = (change.file, change.operator, change.old, change.new)
-        if key in known:
-            return "equivalent: " + known[key]
-        last = before.get(key + (change.line,), "")
+        if named(change) in known:
+            return "equivalent: " + known[named(change)]
+        last = before.get(named(change), "")
         if last.startswith("noticed"):
             return last
         if not any(number in test.reached for test in tests):
@@ -226,8 +230,7 @@ def judge_all(changes, tests, before):
 
 def report(results, slow):
     for row in results:
-        print(f"{row['number']:4} {row['file']}:{row['line']}: {row['operator']}: {row['old']}"
-              f"  ->  {row['new'] or '(nothing)'}\n     {row['verdict']}")
+        print(f"{row['number']:4} {row['place']}: {row['name'][1]}\n     {row['verdict']}")
 
     def count(kind):
         return sum(row["verdict"].startswith(kind) for row in results)
@@ -262,12 +265,11 @@ def main():
         raise SystemExit("mutate: " + "\n".join(failures))
     results_path, before = WORK / "results.json", {}
     if options.again:
-        before = {tuple(row[name] for name in ("file", "operator", "old", "new", "line")):
-                  row["verdict"] for row in json.loads(results_path.read_text())}
+        before = {tuple(row["name"]): row["verdict"]
+                  for row in json.loads(results_path.read_text())}
     quick = [test for test in tests if test.seconds <= options.slow]
     verdicts = judge_all(changes, quick, before)
-    results = [{"number": number, "file": change.file, "line": change.line,
-                "operator": change.operator, "old": change.old, "new": change.new,
+    results = [{"number": number, "place": f"{change.file}:{change.line}", "name": named(change),
                 "verdict": verdict}
                for number, (change, verdict) in enumerate(zip(changes, verdicts), 1)]
     results_path.write_text(json.dumps(results, indent=1) + "\n")
