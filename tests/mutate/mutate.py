@@ -138,18 +138,40 @@ def to_blame(output, changes):
     return blamed
 
 
-def compile_errors(name, command):
-    """What the compiler has to say against a file; empty if it takes it."""
+def errors_in(output):
+    """Of what a compiler prints the errors, each with where it comes from, without the warnings."""
+    errors, before = [], []
+    for line in output.split("\n"):
+        if " warning: " in line:
+            before = []
+        elif "error: " in line:
+            errors += [*before, line]
+            before = []
+        else:
+            before.append(line)
+    return "\n".join(errors)
+
+
+def compile_errors(command):
+    """What the compiler has against a file; empty if nothing."""
     command = command[:command.index("-o")] + ["-fsyntax-only", command[-1]]
     done = subprocess.run(command, cwd=BUILD, capture_output=True, text=True)
-    return done.stderr if done.returncode else ""
+    return errors_in(done.stderr) or done.stderr if done.returncode else ""
+
+
+def misfits(blamed=()):
+    """Changes that are known not to compile, with those to be remembered now."""
+    file = WORK / "misfits.json"
+    known = set(json.loads(file.read_text())) if file.exists() else set()
+    known |= {repr(change) for change in blamed}
+    file.write_text(json.dumps(sorted(known)))
+    return known
 
 
 def without_misfits(changes, folders, commands):
-    """The changes that compile; leaves the copy of the tree as they make it."""
-    known = WORK / "misfits.json"
-    misfits = set(json.loads(known.read_text())) if known.exists() else set()
-    changes = [change for change in changes if repr(change) not in misfits]
+    """The changes that compile in the libraries; leaves the copy of the tree as they make it."""
+    known = misfits()
+    changes = [change for change in changes if repr(change) not in known]
     checked = WORK / "checked"  # there while all that was written has been
     if any(name.split("/")[0] in SUITES
            for name in copy_tree(ROOT, SOURCE, list(enumerate(changes, 1)))):
@@ -164,13 +186,12 @@ def without_misfits(changes, folders, commands):
                    check=True, stdout=subprocess.DEVNULL)
     while unchecked:
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            errors = list(pool.map(lambda name: compile_errors(name, commands[name]), unchecked))
+            errors = list(pool.map(lambda name: compile_errors(commands[name]), unchecked))
         blamed = set().union(*(to_blame(text, changes) for text in errors))
         if any(errors) and not blamed:
             raise SystemExit("mutate: does not compile:\n" + "".join(errors)[:3000])
+        misfits(blamed)
         changes = [change for change in changes if change not in blamed]
-        misfits |= {repr(change) for change in blamed}
-        known.write_text(json.dumps(sorted(misfits)))
         copy_tree(ROOT, SOURCE, list(enumerate(changes, 1)))
         unchecked = [name for name, text in zip(unchecked, errors) if text]
     checked.touch()
@@ -178,17 +199,30 @@ def without_misfits(changes, folders, commands):
 
 
 def build(folders):
+    """Builds the tests; returns what the compiler complains of, empty if of nothing."""
     suites = sorted({suite for folder in folders for suite in SUITES[folder]})
-    targets = [f"{suite}_tests" for suite in suites]
-    if "plugin" in suites:
-        targets.append("plugin_host")
+    targets = [f"{suite}_tests" for suite in suites] + ["plugin_host"] * ("plugin" in suites)
     command = ["cmake", "--build", BUILD, "--parallel", str(os.cpu_count()), "--target", *targets]
     with open(WORK / "build.log", "w") as log:  # changed code makes many warnings
-        if subprocess.run(command, stdout=log, stderr=subprocess.STDOUT).returncode:
-            log.flush()
-            errors = [line for line in (WORK / "build.log").read_text().split("\n")
-                      if "error" in line]
-            raise SystemExit("mutate: build failed:\n" + "\n".join(errors[:20]))
+        done = subprocess.run(command, stdout=log, stderr=subprocess.STDOUT)
+    if done.returncode == 0:
+        return ""
+    return errors_in((WORK / "build.log").read_text()) or str(WORK / "build.log")
+
+
+def build_changed(drawn, folders, commands):
+    """Builds the tests with those of the changes that compile, and returns these."""
+    while True:
+        changes = without_misfits(drawn, folders, commands)
+        print(f"{len(changes)} changes ({len(drawn) - len(changes)} more do not compile)",
+              flush=True)
+        errors = build(folders)
+        if not errors:
+            return changes
+        blamed = to_blame(errors, changes)  # what is instantiated by tests alone
+        if not blamed:
+            raise SystemExit("mutate: the build fails:\n" + errors[:3000])
+        misfits(blamed)
 
 
 def named(change):
@@ -213,7 +247,7 @@ def judge_all(changes, tests, before):
     def verdict(number, change):
         if named(change) in known:
             return "equivalent: " + known[named(change)]
-        last = before.get(named(change), "")
+        last = before.get((f"{change.file}:{change.line}", *named(change)), "")
         if last.startswith("noticed"):
             return last
         if not any(number in test.reached for test in tests):
@@ -255,9 +289,7 @@ def main():
     commands = configure()
     print("Looking for what can be changed", flush=True)
     drawn = sample(all_changes(folders, commands), options.places, options.count, options.seed)
-    changes = without_misfits(drawn, folders, commands)
-    print(f"{len(changes)} changes ({len(drawn) - len(changes)} more do not compile)", flush=True)
-    build(folders)
+    changes = build_changed(drawn, folders, commands)
     print("Running each test with no change in force", flush=True)
     tests = judge.list_tests(BUILD)
     failures = judge.explore(tests, os.cpu_count())
@@ -265,7 +297,7 @@ def main():
         raise SystemExit("mutate: " + "\n".join(failures))
     results_path, before = WORK / "results.json", {}
     if options.again:
-        before = {tuple(row["name"]): row["verdict"]
+        before = {(row["place"], *row["name"]): row["verdict"]
                   for row in json.loads(results_path.read_text())}
     quick = [test for test in tests if test.seconds <= options.slow]
     verdicts = judge_all(changes, quick, before)
