@@ -206,6 +206,39 @@ TEST(Law, SumsTheModesByTheirWeights) {
   }
 }
 
+// Of the feed-forward, too, each mode gives its share while one passes into the other.
+TEST(Law, FeedsForwardEachModeByItsWeight) {
+  Random random(327);
+  for (int k = 0; k < 50; ++k) {
+    Case<7> one(rough_chain(random, 7), random);
+    Setpoint setpoint;
+    setpoint.gains = random_gains(random, 7);
+    const auto joint = Impedance<7>::of(setpoint);
+    setpoint.mode = Mode::kCartesian;
+    const double s = random.uniform(0.1, 0.9);
+    const auto impedance = blend(joint, Impedance<7>::of(setpoint), s);
+    const Vector6 f = Vector6::Zero();
+    const VectorXd plain = one.torque(impedance, kNone, f);
+    NullSpace<7> null_space;  // of directions that are held in part
+    null_space.compute(one.robot.M, one.robot.J, impedance.base, impedance.tool, one.robot.R_BT);
+
+    const VectorXd acceleration =
+        one.torque(impedance, {false, false, false, true, false}, f) - plain;
+    const VectorXd of_joints = one.kdl.M * one.paths.joint.acceleration();
+    const VectorXd of_tip =
+        one.kdl.J.transpose() * null_space.inertia().wrench(one.paths.tip.acceleration());
+    const VectorXd expected = (1 - s) * of_joints + s * of_tip;
+    ASSERT_GT(of_joints.norm(), 1e-2);
+    ASSERT_GT(of_tip.norm(), 1e-2);
+    EXPECT_TRUE(near(acceleration, expected, 1e-9 * (1 + plain.norm())));
+
+    const VectorXd friction = one.torque(impedance, {false, false, true, false, false}, f) - plain;
+    const VectorXd velocity = (1 - s) * one.paths.joint.velocity() +
+                              s * null_space.joint_velocity(one.paths.tip.velocity());
+    EXPECT_TRUE(near(friction, one.friction(velocity), 1e-9 * (1 + plain.norm())));
+  }
+}
+
 TEST(Law, StiffnessOfTheClosedLoopIsTheDerivativeOfItsTorque) {
   Random random(324);
   for (int k = 0; k < 30; ++k) {

@@ -42,12 +42,14 @@ struct Loop {
     NullSpace<N> null_space;
     null_space.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
     analysis::System<kMaxJoints> plain, system;
-    system.has_tails = true;  // of what was there before
-    system.stiffness_factor.setOnes(3, 2);
+    for (analysis::System<kMaxJoints>* one : {&plain, &system}) {  // of what was there before
+      one->has_tails = true;
+      one->stiffness_factor.setOnes(3, 2);
+    }
     closed_loop<N>(robot, Joints<N>::Zero(), impedance, null_space, friction, TaskTerms{},
                    Vector6::Zero(), plain);
     factored.form(robot, impedance, null_space, friction, system);
-    EXPECT_FALSE(system.has_tails);
+    EXPECT_FALSE(plain.has_tails || system.has_tails);
     EXPECT_EQ(system.stiffness_factor.cols(), N);
     EXPECT_TRUE(near(system.mass, plain.mass, 0));
     EXPECT_EQ(system.damping, system.damping.transpose());
@@ -98,6 +100,11 @@ void expect_tip_springs(Random& random) {
         gains.null_stiffness = 30 * JointVector::Unit(N, i);
         EXPECT_GE(loop.expect_agreement(Impedance<N>::of(setpoint)), held);
       }
+      gains.null_stiffness.setOnes(N);
+      const Matrix6 task_stiffness = gains.task_stiffness;
+      gains.task_stiffness.setZero();
+      EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), free);
+      gains.task_stiffness = task_stiffness;
       gains.null_stiffness.setZero(N);
       EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held);
       gains.null_damping.setZero(N);
@@ -146,6 +153,13 @@ TEST(LoopSystem, HasTheSpringsOfTwoModesAndFramesAtOnce) {
     EXPECT_EQ(loop.expect_agreement(blend(tool, Impedance<7>::of(joint), s)), 7);
     EXPECT_EQ(loop.expect_agreement(blend(base, tool, s)), 7);
     EXPECT_EQ(loop.expect_agreement(tool), 7);
+    // Of a direction in either frame, with dampers alone in the null space
+    Setpoint one = tip_setpoint(random, 7, Frame::kBase, 1);
+    one.gains.null_stiffness.setZero();
+    const auto in_base = Impedance<7>::of(one);
+    one.gains.frame = Frame::kTool;
+    EXPECT_EQ(loop.expect_agreement(blend(in_base, Impedance<7>::of(one), s)), 2);
+    EXPECT_EQ(loop.expect_agreement(blend(Impedance<7>::of(joint), in_base, s)), 7);
   }
 }
 

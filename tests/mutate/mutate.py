@@ -12,26 +12,12 @@ import json
 import os
 import pickle
 import re
-import shlex
-import subprocess
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import judge
-from changes import find
+from building import BUILD, ROOT, SOURCE, SUITES, WORK, build_changed, configure
+from changes import find, one_line
 from rewrite import copy_tree
-
-ROOT = Path(__file__).resolve().parents[2]
-WORK = ROOT / "build/mutate"
-SOURCE = WORK / "src"
-BUILD = SOURCE / "build/release"  # so that ccache knows what is as in the tree
-# The programs with tests that could notice what changes in a folder.
-SUITES = {
-    "analysis": ["analysis", "controller", "sim"],
-    "controller": ["controller", "plugin", "sim", "threads"],
-    "sim": ["sim", "threads", "apps"],
-    "lcmtypes": ["lcmtypes", "threads", "apps"],
-}
 
 
 def arguments():
@@ -45,16 +31,6 @@ def arguments():
     parser.add_argument("--again", action="store_true",
                         help="the same changes, but only those that went unnoticed last time")
     return parser.parse_args()
-
-
-def configure():
-    subprocess.run(["cmake", "--preset", "release", "-DDASHPOT_WARNINGS_AS_ERRORS=OFF"],
-                   cwd=SOURCE, check=True, stdout=subprocess.DEVNULL)
-    subprocess.run(["cmake", "--build", BUILD, "--target", "dashpot_messages"],
-                   check=True, stdout=subprocess.DEVNULL)
-    with open(BUILD / "compile_commands.json") as file:
-        return {str(Path(entry["file"]).relative_to(SOURCE)): shlex.split(entry["command"])
-                for entry in json.load(file) if entry["file"].startswith(str(SOURCE))}
 
 
 def all_changes(folders, commands):
@@ -125,80 +101,19 @@ def sample(changes, places, count, seed):
                   key=lambda change: (change.file, change.begin, -change.end, change.new))
 
 
-def to_blame(output, changes):
-    """The changes in lines that the compiler complains of."""
-    lines = set(re.findall(r"([\w/.]+):(\d+):\d*", output))
-    lines = {(os.path.relpath(file, ROOT), int(line)) for file, line in lines
-             if file.startswith(str(ROOT))}
-    blamed = set()
-    for change in changes:
-        last = change.line + (ROOT / change.file).read_bytes()[change.begin:change.end].count(b"\n")
-        if any((change.file, line) in lines for line in range(change.line, last + 1)):
-            blamed.add(change)
-    return blamed
-
-
-def compile_errors(name, command):
-    """What the compiler has to say against a file; empty if it takes it."""
-    command = command[:command.index("-o")] + ["-fsyntax-only", command[-1]]
-    done = subprocess.run(command, cwd=BUILD, capture_output=True, text=True)
-    return done.stderr if done.returncode else ""
-
-
-def without_misfits(changes, folders, commands):
-    """The changes that compile; leaves the copy of the tree as they make it."""
-    known = WORK / "misfits.json"
-    misfits = set(json.loads(known.read_text())) if known.exists() else set()
-    changes = [change for change in changes if repr(change) not in misfits]
-    checked = WORK / "checked"  # there while all that was written has been
-    if any(name.split("/")[0] in SUITES
-           for name in copy_tree(ROOT, SOURCE, list(enumerate(changes, 1)))):
-        checked.unlink(missing_ok=True)
-    if checked.exists():
-        return changes
-    alike = {re.sub(r"\d", "", name): name for name in commands if name.split("/")[0] in folders}
-    unchecked = list(alike.values())  # one of those that instantiate the same for other sizes
-    precompiled = {os.path.relpath(word, BUILD) + ".gch" for name in unchecked
-                   for word in commands[name] if word.endswith("cmake_pch.hxx")}
-    subprocess.run(["cmake", "--build", BUILD, "--target", *precompiled],
-                   check=True, stdout=subprocess.DEVNULL)
-    while unchecked:
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            errors = list(pool.map(lambda name: compile_errors(name, commands[name]), unchecked))
-        blamed = set().union(*(to_blame(text, changes) for text in errors))
-        if any(errors) and not blamed:
-            raise SystemExit("mutate: does not compile:\n" + "".join(errors)[:3000])
-        changes = [change for change in changes if change not in blamed]
-        misfits |= {repr(change) for change in blamed}
-        known.write_text(json.dumps(sorted(misfits)))
-        copy_tree(ROOT, SOURCE, list(enumerate(changes, 1)))
-        unchecked = [name for name, text in zip(unchecked, errors) if text]
-    checked.touch()
-    return changes
-
-
-def build(folders):
-    suites = sorted({suite for folder in folders for suite in SUITES[folder]})
-    targets = [f"{suite}_tests" for suite in suites]
-    if "plugin" in suites:
-        targets.append("plugin_host")
-    command = ["cmake", "--build", BUILD, "--parallel", str(os.cpu_count()), "--target", *targets]
-    with open(WORK / "build.log", "w") as log:  # changed code makes many warnings
-        if subprocess.run(command, stdout=log, stderr=subprocess.STDOUT).returncode:
-            log.flush()
-            errors = [line for line in (WORK / "build.log").read_text().split("\n")
-                      if "error" in line]
-            raise SystemExit("mutate: build failed:\n" + "\n".join(errors[:20]))
+def named(change):
+    """A change as tests/mutate/equivalent.txt names it, wherever its line is."""
+    line = (ROOT / change.file).read_text().split("\n")[change.line - 1]
+    return (f"{change.file}: {one_line(line)}",
+            f"{change.operator}: {change.old} -> {change.new or '(nothing)'}")
 
 
 def reviewed():
-    """Changes that make no difference that a test could see: {(file, operator, old, new)}."""
-    known = {}
-    for line in (ROOT / "tests/mutate/equivalent.txt").read_text().split("\n"):
-        if line and not line.startswith("#"):
-            *key, reason = (part.strip() for part in line.split(" | "))
-            known[tuple(key)] = reason
-    return known
+    """Why a change makes no difference that a test could see, by its name."""
+    text = (ROOT / "tests/mutate/equivalent.txt").read_text()
+    blocks = [block.split("\n") for block in text.split("\n\n")]
+    return {tuple(block[:2]): " ".join(block[2:]).strip() for block in blocks
+            if len(block) > 2 and not block[0].startswith("#")}
 
 
 def judge_all(changes, tests, before):
@@ -206,10 +121,9 @@ def judge_all(changes, tests, before):
     known = reviewed()
 
     def verdict(number, change):
-        key = (change.file, change.operator, change.old, change.new)
-        if key in known:
-            return "equivalent: " + known[key]
-        last = before.get(key + (change.line,), "")
+        if named(change) in known:
+            return "equivalent: " + known[named(change)]
+        last = before.get((f"{change.file}:{change.line}", *named(change)), "")
         if last.startswith("noticed"):
             return last
         if not any(number in test.reached for test in tests):
@@ -226,8 +140,7 @@ def judge_all(changes, tests, before):
 
 def report(results, slow):
     for row in results:
-        print(f"{row['number']:4} {row['file']}:{row['line']}: {row['operator']}: {row['old']}"
-              f"  ->  {row['new'] or '(nothing)'}\n     {row['verdict']}")
+        print(f"{row['number']:4} {row['place']}: {row['name'][1]}\n     {row['verdict']}")
 
     def count(kind):
         return sum(row["verdict"].startswith(kind) for row in results)
@@ -252,9 +165,7 @@ def main():
     commands = configure()
     print("Looking for what can be changed", flush=True)
     drawn = sample(all_changes(folders, commands), options.places, options.count, options.seed)
-    changes = without_misfits(drawn, folders, commands)
-    print(f"{len(changes)} changes ({len(drawn) - len(changes)} more do not compile)", flush=True)
-    build(folders)
+    changes = build_changed(drawn, folders, commands)
     print("Running each test with no change in force", flush=True)
     tests = judge.list_tests(BUILD)
     failures = judge.explore(tests, os.cpu_count())
@@ -262,12 +173,11 @@ def main():
         raise SystemExit("mutate: " + "\n".join(failures))
     results_path, before = WORK / "results.json", {}
     if options.again:
-        before = {tuple(row[name] for name in ("file", "operator", "old", "new", "line")):
-                  row["verdict"] for row in json.loads(results_path.read_text())}
+        before = {(row["place"], *row["name"]): row["verdict"]
+                  for row in json.loads(results_path.read_text())}
     quick = [test for test in tests if test.seconds <= options.slow]
     verdicts = judge_all(changes, quick, before)
-    results = [{"number": number, "file": change.file, "line": change.line,
-                "operator": change.operator, "old": change.old, "new": change.new,
+    results = [{"number": number, "place": f"{change.file}:{change.line}", "name": named(change),
                 "verdict": verdict}
                for number, (change, verdict) in enumerate(zip(changes, verdicts), 1)]
     results_path.write_text(json.dumps(results, indent=1) + "\n")

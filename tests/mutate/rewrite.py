@@ -40,10 +40,9 @@ def copy_tree(root, target, numbered):
     for number, change in numbered:
         by_file.setdefault(change.file, []).append((number, change))
     kept = set()
-    for source in sorted(Path(root).rglob("*")):
+    tops = [top for top in Path(root).iterdir() if not re.match(r"build|\.", top.name)]
+    for source in [path for top in tops for path in (top, *top.rglob("*")) if path.is_file()]:
         name = source.relative_to(root)
-        if re.match(r"build|\.", name.parts[0]) or not source.is_file():
-            continue
         content = source.read_bytes()
         changes = by_file.get(str(name))
         if changes:

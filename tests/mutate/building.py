@@ -1,0 +1,134 @@
+"""Compiles the changed copy of the tree, without those changes that do not compile."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from rewrite import copy_tree
+
+ROOT = Path(__file__).resolve().parents[2]
+WORK = ROOT / "build/mutate"
+SOURCE = WORK / "src"
+BUILD = SOURCE / "build/release"  # so that ccache knows what is as in the tree
+# The programs with tests that could notice what changes in a folder.
+SUITES = {
+    "analysis": ["analysis", "controller", "sim"],
+    "controller": ["controller", "plugin", "sim", "threads"],
+    "sim": ["sim", "threads", "apps"],
+    "lcmtypes": ["lcmtypes", "threads", "apps"],
+}
+
+
+def configure():
+    subprocess.run(["cmake", "--preset", "release", "-DDASHPOT_WARNINGS_AS_ERRORS=OFF"],
+                   cwd=SOURCE, check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(["cmake", "--build", BUILD, "--target", "dashpot_messages"],
+                   check=True, stdout=subprocess.DEVNULL)
+    with open(BUILD / "compile_commands.json") as file:
+        return {str(Path(entry["file"]).relative_to(SOURCE)): shlex.split(entry["command"])
+                for entry in reversed(json.load(file))  # the library's, where tests have it too
+                if entry["file"].startswith(str(SOURCE))}
+
+
+def to_blame(output, changes):
+    """The changes in lines that the compiler complains of."""
+    lines = set(re.findall(r"([\w/.]+):(\d+):\d*", output))
+    lines = {(os.path.relpath(file, ROOT), int(line)) for file, line in lines
+             if file.startswith(str(ROOT))}
+    blamed = set()
+    for change in changes:
+        last = change.line + (ROOT / change.file).read_bytes()[change.begin:change.end].count(b"\n")
+        if any((change.file, line) in lines for line in range(change.line, last + 1)):
+            blamed.add(change)
+    return blamed
+
+
+def errors_in(output):
+    """Of what a compiler prints the errors, each with where it comes from, without the warnings."""
+    errors, before = [], []
+    for line in output.split("\n"):
+        if " warning: " in line:
+            before = []
+        elif "error: " in line:
+            errors += [*before, line]
+            before = []
+        else:
+            before.append(line)
+    return "\n".join(errors)
+
+
+def compile_errors(command):
+    """What the compiler has against a file; empty if nothing."""
+    command = command[:command.index("-o")] + ["-fsyntax-only", command[-1]]
+    done = subprocess.run(command, cwd=BUILD, capture_output=True, text=True)
+    return errors_in(done.stderr) or done.stderr if done.returncode else ""
+
+
+def misfits(blamed=()):
+    """Changes that are known not to compile, with those to be remembered now."""
+    file = WORK / "misfits.json"
+    known = set(json.loads(file.read_text())) if file.exists() else set()
+    known |= {repr(change) for change in blamed}
+    file.write_text(json.dumps(sorted(known)))
+    return known
+
+
+def without_misfits(changes, folders, commands):
+    """The changes that compile in the libraries; leaves the copy of the tree as they make it."""
+    known = misfits()
+    changes = [change for change in changes if repr(change) not in known]
+    checked = WORK / "checked"  # there while all that was written has been
+    if any(name.split("/")[0] in SUITES
+           for name in copy_tree(ROOT, SOURCE, list(enumerate(changes, 1)))):
+        checked.unlink(missing_ok=True)
+    if checked.exists():
+        return changes
+    alike = {re.sub(r"\d", "", name): name for name in commands if name.split("/")[0] in folders}
+    unchecked = list(alike.values())  # one of those that instantiate the same for other sizes
+    precompiled = {os.path.relpath(word, BUILD) + ".gch" for name in unchecked
+                   for word in commands[name] if word.endswith("cmake_pch.hxx")}
+    subprocess.run(["cmake", "--build", BUILD, "--target", *precompiled],
+                   check=True, stdout=subprocess.DEVNULL)
+    while unchecked:
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            errors = list(pool.map(lambda name: compile_errors(commands[name]), unchecked))
+        blamed = set().union(*(to_blame(text, changes) for text in errors))
+        if any(errors) and not blamed:
+            raise SystemExit("mutate: does not compile:\n" + "".join(errors)[:3000])
+        misfits(blamed)
+        changes = [change for change in changes if change not in blamed]
+        copy_tree(ROOT, SOURCE, list(enumerate(changes, 1)))
+        unchecked = [name for name, text in zip(unchecked, errors) if text]
+    checked.touch()
+    return changes
+
+
+def build(folders):
+    """Builds the tests; returns what the compiler complains of, empty if of nothing."""
+    suites = sorted({suite for folder in folders for suite in SUITES[folder]})
+    targets = [f"{suite}_tests" for suite in suites] + ["plugin_host"] * ("plugin" in suites)
+    command = ["cmake", "--build", BUILD, "--parallel", str(os.cpu_count()), "--target", *targets]
+    with open(WORK / "build.log", "w") as log:  # changed code makes many warnings
+        done = subprocess.run(command, stdout=log, stderr=subprocess.STDOUT)
+    if done.returncode == 0:
+        return ""
+    return errors_in((WORK / "build.log").read_text()) or str(WORK / "build.log")
+
+
+def build_changed(drawn, folders, commands):
+    """Builds the tests with those of the changes that compile, and returns these."""
+    while True:
+        changes = without_misfits(drawn, folders, commands)
+        print(f"{len(changes)} changes ({len(drawn) - len(changes)} more do not compile)",
+              flush=True)
+        errors = build(folders)
+        if not errors:
+            return changes
+        blamed = to_blame(errors, changes)  # what is instantiated by tests alone
+        if not blamed:
+            raise SystemExit("mutate: the build fails:\n" + errors[:3000])
+        misfits(blamed)
