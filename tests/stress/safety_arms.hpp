@@ -21,7 +21,7 @@ struct TestArm {
   std::vector<double> start;  ///< rad or m, well within the limits
   int joint;                  ///< that is taken out of its limits, slips, ...
   int light;                  ///< the revolute one with the least inertia
-  const char* limits;         ///< lines of the configuration under `limits`
+  const char* limits;         ///< lines under `limits` for plugins whose defaults do not fit it
 };
 
 inline const std::vector<TestArm>& test_arms() {

@@ -166,7 +166,7 @@ inline void too_weak(const PluginFile& plugin, const TestArm& arm, Row& row) {
   for (int i = 0; i < robot.dof(); ++i) {
     most[i] = std::min(0.5 * heaviest, robot.joints()[static_cast<std::size_t>(i)].effort);
   }
-  options.limits = arm.limits + ("  torque: " + yaml_list(most) + "\n");
+  options.limits = "  torque: " + yaml_list(most) + "\n";
   Rig rig(plugin, arm, options);
   rig.run(4);
   row.finish(rig, {1e9, false, false});

@@ -1,12 +1,11 @@
 #pragma once
 // A plugin file, driven through its C interface alone, in a loop with the simulator.
 
-#include <dashpot/controller/plugin.h>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/sim/plant.hpp>
+#include <dashpot/tests/stress/plugin_file.hpp>
 #include <dashpot/tests/stress/safety_arms.hpp>
 
-#include <dlfcn.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -23,47 +22,14 @@
 
 namespace dashpot::stress {
 
-/// The functions of a plugin file whose C interface has stayed what it was since version 4.
-class PluginFile {
- public:
-  PluginFile(std::string label_text, const std::string& path) : label(std::move(label_text)) {
-    void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (library == nullptr) throw std::runtime_error(dlerror());
-    find(library, "dashpot_create", create);
-    find(library, "dashpot_destroy", destroy);
-    find(library, "dashpot_update", update);
-    find(library, "dashpot_reset", reset);
-    find(library, "dashpot_set_setpoint", set_setpoint);
-    find(library, "dashpot_set_gains", set_gains);
-    find(library, "dashpot_last_error", last_error);
-    find(library, "dashpot_status_text", status_text);
-  }
-
-  std::string label;  ///< "before", "after"
-  decltype(&dashpot_create) create = nullptr;
-  decltype(&dashpot_destroy) destroy = nullptr;
-  decltype(&dashpot_update) update = nullptr;
-  decltype(&dashpot_reset) reset = nullptr;
-  decltype(&dashpot_set_setpoint) set_setpoint = nullptr;
-  decltype(&dashpot_set_gains) set_gains = nullptr;
-  decltype(&dashpot_last_error) last_error = nullptr;
-  decltype(&dashpot_status_text) status_text = nullptr;
-
- private:
-  template <class Function>
-  static void find(void* library, const char* name, Function& function) {
-    function = reinterpret_cast<Function>(dlsym(library, name));
-    if (function == nullptr) throw std::runtime_error(dlerror());
-  }
-};
-
 /// What a rig is made of; what is left out is the arm's own.
 struct RigOptions {
-  std::string config;                 ///< YAML lines beside `robot`, `limits` and `analysis`
-  std::optional<std::string> limits;  ///< lines under `limits`; default: the arm's
-  JointVector start;                  ///< rad or m
-  JointVector velocity;               ///< rad/s or m/s
-  sim::ArmOptions world;              ///< wall, pushes; stops are added
+  std::string config;           ///< YAML lines beside `robot`, `limits` and `analysis`
+  std::string limits;           ///< lines under `limits`
+  bool defaults_alone = false;  ///< not the arm's lines there
+  JointVector start;            ///< rad or m
+  JointVector velocity;         ///< rad/s or m/s
+  sim::ArmOptions world;        ///< wall, pushes; stops are added
   std::vector<sim::SensorFault> faults;
   bool told_weight = true;  ///< dashpot_reset with the weight before the first tick
 };
@@ -113,8 +79,8 @@ class Rig {
   /// Throws std::runtime_error with the plugin's words if it refuses the configuration.
   Rig(const PluginFile& plugin, const TestArm& arm, const RigOptions& options)
       : plugin_(plugin),
-        config_(controller::load_config(write_config(arm, options))),
-        controller_(plugin.create(path_.c_str()), plugin.destroy),
+        config_(controller::load_config(write_config(arm, options, options.limits))),
+        controller_(make_controller(arm, options), plugin.destroy),
         body_(simulated_robot(arm), with_stops(options.world)) {
     unlink(path_.c_str());
     if (!controller_) throw std::runtime_error(plugin.last_error());
@@ -214,13 +180,24 @@ class Rig {
     world.stops = sim::Contact{2000, 20};
     return world;
   }
-  std::string write_config(const TestArm& arm, const RigOptions& options) {
-    char name[] = "/tmp/dashpot_safety.XXXXXX.yaml";
-    const int file = mkstemps(name, 5);
-    if (file < 0) throw std::runtime_error("cannot write a temporary file");
-    close(file);
-    path_ = name;
-    const std::string limits = options.limits.value_or(arm.limits);
+  /// A controller for these options, with the arm's own limits where the plugin knows them.
+  dashpot_controller* make_controller(const TestArm& arm, const RigOptions& options) {
+    dashpot_controller* result = nullptr;
+    if (!options.defaults_alone) {
+      result = plugin_.create(write_config(arm, options, arm.limits + options.limits).c_str());
+    }
+    if (result != nullptr) return result;
+    return plugin_.create(write_config(arm, options, options.limits).c_str());
+  }
+  std::string write_config(const TestArm& arm, const RigOptions& options,
+                           const std::string& limits) {
+    if (path_.empty()) {
+      char name[] = "/tmp/dashpot_safety.XXXXXX.yaml";
+      const int file = mkstemps(name, 5);
+      if (file < 0) throw std::runtime_error("cannot write a temporary file");
+      close(file);
+      path_ = name;
+    }
     std::ofstream(path_) << robot_yaml(arm) << "analysis: {where: off}\n"
                          << options.config << (limits.empty() ? "" : "limits:\n") << limits;
     return path_;

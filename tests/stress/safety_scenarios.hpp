@@ -19,7 +19,7 @@ inline std::string upper_limit(const TestArm& arm, int joint, double upper) {
   for (int i = 0; i < robot.dof(); ++i)
     limits[i] = robot.joints()[static_cast<std::size_t>(i)].upper;
   limits[joint] = upper;
-  return arm.limits + ("  position_upper: " + yaml_list(limits) + "\n");
+  return "  position_upper: " + yaml_list(limits) + "\n";
 }
 
 inline bool slides(const TestArm& arm, int joint) {
@@ -90,7 +90,7 @@ inline void finger_at_rest(const PluginFile& plugin, const TestArm& arm, Row& ro
   RigOptions options;
   options.start = start_of(arm);
   options.start[4] = 0.01;
-  options.limits = "";
+  options.defaults_alone = true;
   Rig rig(plugin, arm, options);
   rig.run(4);
   row.finish(rig, {0.5, true, true});
