@@ -170,12 +170,7 @@ class Bench {
       const Vibration& modes = controller_.vibration();
       most = std::max(most, modes.work);
       report(modes);
-      // The thread finishes what it has, so that the next tick is tried.
-      for (int wait = 1; controller_.vibration().status == kUnfinished && wait < 1e6; wait *= 2) {
-        std::this_thread::sleep_for(std::chrono::microseconds(200 * wait));
-        tick();
-        report(controller_.vibration());
-      }
+      wait_for_thread(report);
     }
     return most;
   }
@@ -188,6 +183,7 @@ class Bench {
           settings_.initial.joint_position[i] + 0.4 * std::sin(phase + static_cast<double>(i));
     }
     tick();
+    wait_for_thread([](const Vibration&) {});
   }
   const Vibration& modes() const { return controller_.vibration(); }
 
@@ -198,6 +194,16 @@ class Bench {
     setpoint_.time = state_.time += 1'000'000;
     worst_ = worse(worst_, controller_.update(state_, setpoint_, torque_));
     end_of_tick();
+  }
+  /// The thread finishes what it has, so that the next tick is tried.
+  template <class Report>
+  void wait_for_thread(const Report& report) {
+    for (int wait = 1; controller_.vibration().status == kUnfinished && wait < 1'000'000;
+         wait *= 2) {
+      std::this_thread::sleep_for(std::chrono::microseconds(200 * wait));
+      tick();
+      report(controller_.vibration());
+    }
   }
   void move() { state_.position += 1e-3 * state_.velocity; }
 
