@@ -88,6 +88,7 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
   std::uint64_t gain_changes_ = 0;
   std::uint64_t releases_ = 0;
   std::uint64_t published_modes_ = 0;  ///< the tick they belong to
+  dashpot::analysis::Status published_status_ = dashpot::analysis::Status::kOk;
 };
 
 Status dashpot_controller::update(const dashpot_state* given, const dashpot_setpoint* wanted,
@@ -103,8 +104,10 @@ Status dashpot_controller::update(const dashpot_state* given, const dashpot_setp
   if (accepted && !has_setpoint_ && status == Status::kSetpointRejected) status = Status::kOk;
   snapshot.status = status;
   snapshots.write(snapshot);
-  if (controller_.vibration().tick != published_modes_) {
-    published_modes_ = controller_.vibration().tick;
+  const Vibration& found = controller_.vibration();
+  if (found.tick != published_modes_ || found.status != published_status_) {
+    published_modes_ = found.tick;
+    published_status_ = found.status;
     vibrations.write(controller_.vibration());
   }
   return status;

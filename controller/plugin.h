@@ -16,10 +16,10 @@
  * row. Frames: B is the base link, T the tip or the tool's frame. Twists and wrenches have the
  * linear part first, are taken at T's origin, in B's axes.
  *
- * Threads. One thread, the real-time one, calls dashpot_update and dashpot_reset. One other thread,
- * any but always the same, calls dashpot_set_setpoint, dashpot_set_gains, dashpot_release,
- * dashpot_read_snapshot, dashpot_read_modes and dashpot_read_sampled_modes; none of these ever waits
- * for the real-time thread or makes it wait. dashpot_start is called before the loop begins. The
+ * Threads. One thread, the real-time one, calls dashpot_update and dashpot_reset. One other thread at
+ * a time calls dashpot_set_setpoint, dashpot_set_gains and dashpot_release, and one, which may be the
+ * real-time thread, dashpot_read_snapshot, dashpot_read_modes and dashpot_read_sampled_modes; none of
+ * these ever waits for the real-time thread or makes it wait. dashpot_start is called before the loop begins. The
  * remaining functions may be called by any thread; dashpot_destroy only once no
  * other call is under way. Controllers are independent of each other. dashpot_update and
  * dashpot_reset leave nothing for dashpot_last_error; of the others, the first call in a thread may
@@ -283,7 +283,8 @@ double dashpot_period(const dashpot_controller* controller);
 
 /* One tick, on the real-time thread: takes bounded time, allocates nothing, waits for nothing.
  * `setpoint` NULL: the latest of dashpot_set_setpoint; the last one if there is no new one; until
- * there is one at all, the robot is held where it is. Use one of the two ways, not both.
+ * there is one at all, the robot is held where it is. Use one of the two ways, not both. New gains
+ * count from the next set-point that is new, by its time, or NULL.
  * Returns a status, or a negative code: then `output` is not written, and the host has to bring
  * the robot to a stop. A state that is NULL or wrong is no refusal: it gives a torque and a
  * status. A set-point that is wrong is rejected, and the last one stays. */

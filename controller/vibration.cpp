@@ -15,8 +15,11 @@ analysis::TrackerOptions tracker_options(const Analysis& settings) {
 }
 
 std::int64_t analysis_budget(const Settings& settings) {
-  const double units = settings.analysis.share * settings.period * Analysis::kWorkPerSecond;
-  return static_cast<std::int64_t>(std::min(units, 1e18));
+  const double share = settings.analysis.share;
+  const double size = static_cast<double>(settings.limits.torque.size()) / 7;
+  const double even = 10 * share * Analysis::kEvenWork * std::max(1.0, size * size * size);
+  return static_cast<std::int64_t>(
+      std::min(share * settings.period * Analysis::kWorkPerSecond, even));
 }
 
 /// Tasks until one that could not be followed is tried within the tick again: at most so many.

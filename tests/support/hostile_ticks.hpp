@@ -54,6 +54,7 @@ class HostileTicks {
     settings.feed_forward = {true, true, true, true, true};
     settings.analysis.where = controller::Analysis::Where::kInline;
     settings.analysis.every = 100;
+    settings.analysis.share = 1;
     return settings;
   }
 

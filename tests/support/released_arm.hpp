@@ -121,6 +121,7 @@ inline controller::Settings release_settings(const TwinModels& twin, const contr
   settings.motion.gain_time = period;
   settings.motion.smoothing = 20 * period;
   settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
+  settings.analysis.share = 1;
   settings.analysis.every = 1'000'000'000;  // at the first tick only
   settings.initial.mode = controller::Mode::kCartesian;
   const controller::Gains before = settings.initial.gains;
