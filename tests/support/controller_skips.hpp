@@ -148,6 +148,9 @@ class LedPair {
   /// No limit or watchdog interferes.
   static Settings quiet(Settings settings) {
     settings.limits.velocity.setConstant(1e3);
+    settings.limits.tip_velocity = 1e3;
+    settings.watchdog.feedback = 0;
+    settings.analysis.share = 1;
     settings.limits.position_lower.setConstant(-10);
     settings.limits.position_upper.setConstant(10);
     settings.initial.mode = controller::Mode::kCartesian;

@@ -198,7 +198,7 @@ TEST(RunWithCommands, IsReleasedFromAFaultThatIsNamed) {
   // A joint that may hardly move, and a push that moves it.
   const std::string file =
       patient_scene(scratch, "scenario:",
-                    "limits: {velocity: 0.2 rad/s}\nscenario:\n"
+                    "limits: {velocity: 0.4 rad/s}\nscenario:\n"
                     "  pushes: [{begin: 1 s, end: 1.1 s, wrench: [60 N, 60 N, 0, 0, 0, 0]}]");
   Running run({"run", file, "--commands", "--lcm-url", url, "--duration", "60", "--json"});
   if (!listener.until([&] { return listener.states > 100; })) {
@@ -222,7 +222,9 @@ TEST(RunWithCommands, IsReleasedFromAFaultThatIsNamed) {
   ASSERT_TRUE(listener.until([&] { return listener.state.tick > tick + 1500; }));
   ASSERT_EQ(listener.state.fault_tick, fault_tick);
   release(fault_tick, 2);
-  ASSERT_TRUE(listener.until([&] { return listener.state.fault == 0; }));
+  ASSERT_TRUE(listener.until([&] { return listener.state.fault == 0; }))
+      << "fault " << int{listener.state.fault} << " since tick " << listener.state.fault_tick
+      << ", before " << fault_tick << ", accepted " << listener.state.commands_accepted;
   EXPECT_EQ(listener.state.fault_tick, 0);
   // It is held where it is, and does not go back by itself.
   const std::vector<double> where = listener.state.joint_position;
