@@ -30,8 +30,8 @@ inline double loop_lag(const Settings& settings) noexcept {
 ///   of a velocity limit, of a joint or of the tip, x shrinks evenly by (0.95 - v) / 0.25 for v >
 ///   0.7 where it adds energy (x' qd > 0). And from half its limit on, what drives a joint is
 ///   bounded so that the torque-rate limit can still take it away in time:
-///     x_i <= min(sqrt(torque_rate_i I_i d), 0.4 I_i d / lag),   d = 0.95 velocity_i - |qd_i|.
-///   So nothing but the weight drives a joint further that moves at 0.95 of its limit or more, or
+///     x_i <= min(sqrt(torque_rate_i I_i d), 0.4 I_i d / lag),   d = 0.9 velocity_i - |qd_i|.
+///   So nothing but the weight drives a joint further that moves at 0.9 of its limit or more, or
 ///   adds energy to a robot whose tip does.
 /// - Near a position limit, with m the margin, g the distance to the limit and y = (m - g) / m
 ///   between 0 and 1, f bounds the law's torque toward the limit by E_i g / m, and the repulsion is
@@ -113,9 +113,9 @@ class SafetyFilter {
  private:
   static constexpr double kRampTime = 0.1;  // s
   static constexpr double kReturnRise = 1;  // s
-  static constexpr double kFull = 0.95;     // of a velocity limit: nothing drives further
+  static constexpr double kFull = 0.9;      // of a velocity limit: nothing drives further
   static constexpr double kFirst = 0.5;     // from here on the drive is bounded ...
-  static constexpr double kWholly = 0.7;    // ... and from here on to what can be taken away
+  static constexpr double kWholly = 0.65;   // ... and from here on to what can be taken away
 
   /// Distance to the nearer limit, and the sign of the way to it.
   struct Near {

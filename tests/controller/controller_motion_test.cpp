@@ -111,7 +111,7 @@ TEST_F(Motion, GainStepUnderLoadIsSmooth) {
   start(Mode::kCartesian);
   load(kLoad);
   run(arm, 2.0);
-  arm.setpoint.gains.task_stiffness *= 4;
+  arm.setpoint.gains.task_stiffness *= 3;
   arm.setpoint.gains.task_damping *= 2;
   expect_smooth(6.0);
   const Vector6 sag = arm.controller.snapshot().tip_error;

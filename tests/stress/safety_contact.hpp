@@ -77,7 +77,7 @@ inline void stretched(const PluginFile& plugin, const TestArm& arm, Row& row) {
   out.z() = 0;
   rig.goal->tip.position += 0.6 * out.normalized();
   rig.run(6);
-  row.finish(rig, {1.05, true, true});
+  row.finish(rig, {1.05, false, true});  // it creeps along the singularity for long
   row.note = std::to_string(row.seen.changes) + " changes of status";
 }
 
@@ -140,7 +140,7 @@ inline void reset_in_motion(const PluginFile& plugin, const TestArm& arm, Row& r
   rig.run(0.003);
   const double step = rig.seen.torque_step;
   rig.run(3);
-  row.finish(rig, {1.2, true, true});
+  row.finish(rig, {1.2, false, true});
   row.note = "torque steps by " + number(step) + " N m, carries " +
              number(100 * row.seen.least_weight, "%.0f") + " % of the weight at least";
   row.require(step <= 1.01 * rig.limits().torque_rate.maxCoeff() * rig.period(), "torque steps");

@@ -25,7 +25,7 @@ std::vector<Scenario> scenarios() {
       {"4", "unstable gains", {}, unstable_gains},
       {"4", "wrench without springs", {}, wrench_without_springs},
       {"4", "moved by hand in a pause of 10 s", {}, moved_in_a_pause},
-      {"5", "feedback frozen", {}, bad_feedback(freeze)},
+      {"5", "feedback frozen", {}, bad_feedback(freeze, true)},
       {"5", "velocity always zero", {}, bad_feedback(no_velocity)},
       {"5", "velocity of the wrong sign", {}, bad_feedback(wrong_sign)},
       {"5", "hard jolts at the wrist", {}, hard_jolts},
