@@ -18,7 +18,8 @@ struct NamedFile {
 };
 
 /// Throws InputError if one of `outputs` is the same file as an input or another output, also
-/// through links: opening it would empty the input. Devices and pipes may be the same by different names.
+/// through links: opening it would empty the input. Devices and pipes may be the same by different
+/// names.
 void check_outputs(const std::vector<NamedFile>& outputs, const std::vector<NamedFile>& inputs);
 
 }  // namespace dashpot::apps

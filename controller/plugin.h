@@ -16,14 +16,14 @@
  * row. Frames: B is the base link, T the tip or the tool's frame. Twists and wrenches have the
  * linear part first, are taken at T's origin, in B's axes.
  *
- * Threads. One thread, the real-time one, calls dashpot_update and dashpot_reset. One other thread at
- * a time calls dashpot_set_setpoint, dashpot_set_gains and dashpot_release, and one, which may be the
- * real-time thread, dashpot_read_snapshot, dashpot_read_modes and dashpot_read_sampled_modes; none of
- * these ever waits for the real-time thread or makes it wait. dashpot_start is called before the loop begins. The
- * remaining functions may be called by any thread; dashpot_destroy only once no
- * other call is under way. Controllers are independent of each other. dashpot_update and
- * dashpot_reset leave nothing for dashpot_last_error; of the others, the first call in a thread may
- * allocate that thread's text.
+ * Threads. One thread, the real-time one, calls dashpot_update and dashpot_reset. One other thread
+ * at a time calls dashpot_set_setpoint, dashpot_set_gains and dashpot_release, and one, which may
+ * be the real-time thread, dashpot_read_snapshot, dashpot_read_modes and
+ * dashpot_read_sampled_modes; none of these ever waits for the real-time thread or makes it wait.
+ * dashpot_start is called before the loop begins. The remaining functions may be called by any
+ * thread; dashpot_destroy only once no other call is under way. Controllers are independent of each
+ * other. dashpot_update and dashpot_reset leave nothing for dashpot_last_error; of the others, the
+ * first call in a thread may allocate that thread's text.
  *
  * Every struct begins with struct_size, which the caller sets to sizeof of that struct; a function
  * refuses any other value. No exception leaves the library. */
@@ -49,9 +49,9 @@ typedef struct dashpot_controller dashpot_controller;
  * Faults latch: after any "damp" but DASHPOT_SETPOINT_LOST, and after a "ramp" of more than
  * watchdog.longest_gap, the arm stays damped, with its weight held, and the status is at least
  * DASHPOT_FAULT_LATCHED, until dashpot_release or dashpot_reset, or, where the configuration has
- * watchdog.release_after, until the arm has been at rest for that long. dashpot_snapshot.fault names
- * the fault. Springs then start where the robot is. docs/safety.md has each fault in full. Below zero:
- * a call that was refused and did nothing. */
+ * watchdog.release_after, until the arm has been at rest for that long. dashpot_snapshot.fault
+ * names the fault. Springs then start where the robot is. docs/safety.md has each fault in full.
+ * Below zero: a call that was refused and did nothing. */
 enum {
   DASHPOT_OK = 0,
   DASHPOT_TORQUE_LIMITED = 1,    /* a limit of torque, torque rate, power or speed is at work */
@@ -74,11 +74,11 @@ enum {
   DASHPOT_STATE_FROZEN = 18,     /* the state never changes though the torque does: weight alone */
   DASHPOT_STATE_CONTRADICTORY = 19, /* positions do not move as the velocities say: damp, by what
                                        the positions say */
-  DASHPOT_STATE_NOT_FINITE = 20, /* NaN or infinity in position or velocity: ramp */
-  DASHPOT_STATE_WRONG_SIZE = 21, /* the state is missing or has not n joints: ramp */
-  DASHPOT_STATE_JUMP = 22,       /* farther from the last state than the robot can move: ramp */
-  DASHPOT_TIME_BACKWARD = 23,    /* the state's time is at or before the last one: ramp */
-  DASHPOT_NOT_FINITE = 24,       /* the torque would not be finite: ramp */
+  DASHPOT_STATE_NOT_FINITE = 20,    /* NaN or infinity in position or velocity: ramp */
+  DASHPOT_STATE_WRONG_SIZE = 21,    /* the state is missing or has not n joints: ramp */
+  DASHPOT_STATE_JUMP = 22,          /* farther from the last state than the robot can move: ramp */
+  DASHPOT_TIME_BACKWARD = 23,       /* the state's time is at or before the last one: ramp */
+  DASHPOT_NOT_FINITE = 24,          /* the torque would not be finite: ramp */
 
   DASHPOT_NULL_ARGUMENT = -1,     /* a pointer that has to be there is NULL */
   DASHPOT_WRONG_STRUCT_SIZE = -2, /* struct_size is not that of this version */
@@ -269,8 +269,9 @@ dashpot_controller* dashpot_create(const char* config_path);
 void dashpot_destroy(dashpot_controller* controller);
 
 /* What the last call of dashpot_create, dashpot_start, dashpot_set_setpoint, dashpot_set_gains,
- * dashpot_judge_gains, dashpot_release, dashpot_read_snapshot, ..._modes or ..._sampled_modes in this thread had to complain of, in one
- * line; "" if nothing. Valid until the next such call in this thread. */
+ * dashpot_judge_gains, dashpot_release, dashpot_read_snapshot, ..._modes or ..._sampled_modes in
+ * this thread had to complain of, in one line; "" if nothing. Valid until the next such call in
+ * this thread. */
 const char* dashpot_last_error(void);
 
 /* n; 0 if `controller` is NULL */
@@ -318,9 +319,9 @@ int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpo
 int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains);
 
 /* On any thread, for instance the one that receives gains: judges them as dashpot_set_gains would,
- * at `position` (n, rad; NULL: at the posture of the latest tick, if there was one), and sets `margin` (NULL: not
- * wanted) to the factor by which they could grow, or to limits.gain_margin if it is more. What it has
- * accepted last dashpot_set_gains does not judge again. */
+ * at `position` (n, rad; NULL: at the posture of the latest tick, if there was one), and sets
+ * `margin` (NULL: not wanted) to the factor by which they could grow, or to limits.gain_margin if
+ * it is more. What it has accepted last dashpot_set_gains does not judge again. */
 int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
                             const double* position, double* margin);
 
