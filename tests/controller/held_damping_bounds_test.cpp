@@ -150,6 +150,40 @@ TEST(HeldDamping, IsBoundedHoweverSingularTheJacobian) {
   EXPECT_GT(largest, 1.9 * ratio * K / TaskDamper::kSoftFrequency);
 }
 
+// Rounding may leave a mass matrix singular, and springs a little indefinite: both have a design.
+TEST(HeldDamping, IsDesignedForWhatRoundingMadeSingular) {
+  const JointMatrix singular{{1.0, 1.0}, {1.0, 1.0}};
+  JointMatrix K_q{{100.0, 100.0}, {100.0, 100.0}};
+  for (const double indefinite : {0.0, -5e-9}) {
+    K_q(1, 1) = 100 + indefinite;
+    JointDamper joints;
+    joints.reset(2);
+    joints.set(K_q, 0.7, JointVector());
+    JointMatrix M = singular;
+    joints.update(M);
+    const Eigen::MatrixXd C_q = joints.damping();
+    ASSERT_TRUE(C_q.allFinite());
+    // Along (1, 1), with mass 2 and stiffness 200 in the one direction that there is
+    EXPECT_NEAR(C_q.trace(), 2 * 0.7 * std::sqrt(200.0 / 2) * 2, 0.01);
+    EXPECT_TRUE(testing::near(C_q, C_q.transpose(), 0));
+
+    Matrix6 K_C = Matrix6::Zero();
+    K_C.topLeftCorner<2, 2>() = K_q;
+    analysis::TaskJacobian<kMaxJoints> J = analysis::TaskJacobian<kMaxJoints>::Zero(6, 2);
+    J.topRows<2>().setIdentity();
+    TaskDamper tip;
+    tip.set(K_C, 0.7, JointVector());
+    analysis::Square<kMaxJoints> mass = singular;
+    tip.update(mass, J);
+    ASSERT_TRUE(tip.damping().allFinite());
+    EXPECT_NEAR(tip.damping().trace(), 2 * 0.7 * std::sqrt(200.0 / 2) * 2, 0.01);
+    tip.reset();
+    EXPECT_TRUE(tip.damping().isZero(0));
+    joints.reset(2);
+    EXPECT_TRUE(joints.damping().isZero(0));
+  }
+}
+
 TEST(HeldDamping, RefusesWhatIsNoRatio) {
   const RobotModel model = smooth_panda();
   const Settings settings = plain_settings(model, Mode::kCartesian);

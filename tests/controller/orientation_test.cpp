@@ -41,6 +41,17 @@ TEST(RotationVector, IsTheShorterOneForPositiveQuaternions) {
   }
 }
 
+// Next to no rotation at all both quaternions give the small vector, and none a whole turn.
+TEST(RotationVector, OfNextToNothingIsNextToNothing) {
+  for (const double size : {0.0, 1e-300, 1e-20, 1e-12, 1.9e-9}) {
+    const Vector3d e = size * Vector3d(0.6, 0, -0.8);
+    Quaterniond q = quaternion(e);
+    EXPECT_TRUE(near(rotation_vector(q), e, 1e-15 * size));
+    q.coeffs() = -q.coeffs();
+    EXPECT_TRUE(near(rotation_vector(q), e, 1e-15 * size));
+  }
+}
+
 TEST(RotationDefect, TellsRotationsFromOtherMatrices) {
   Random random(303);
   for (int k = 0; k < 100; ++k) {
@@ -81,6 +92,17 @@ TEST(OrientationError, IsContinuousThroughHalfATurn) {
       last = e;
     }
   }
+}
+
+TEST(OrientationError, TakesTheShortWayAfterAReset) {
+  OrientationError error;
+  const auto at = [&](double angle) {
+    return error.update(Quaterniond(AngleAxisd(angle, Vector3d::UnitZ())), Quaterniond::Identity());
+  };
+  for (double angle = 0; angle < 1.2 * kPi; angle += 0.1) at(angle);
+  EXPECT_NEAR(at(1.2 * kPi).z(), 1.2 * kPi, 1e-12);
+  error.reset();
+  EXPECT_NEAR(at(1.2 * kPi).z(), -0.8 * kPi, 1e-12);
 }
 
 TEST(OrientationError, TakesTheShortWayPastThreeQuartersOfATurn) {

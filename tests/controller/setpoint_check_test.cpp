@@ -154,6 +154,16 @@ TEST(SetpointCheck, AsksForEverySize) {
   expect_fault(Mode::kCartesian, "", [](Setpoint& s) { s.gains.frame = Frame::kTool; });
 }
 
+TEST(SetpointCheck, LooksAtThePoseInItsModeAlone) {
+  Setpoint setpoint = good_setpoint(Mode::kJoint);
+  setpoint.tip_pose.position[0] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(fault(setpoint), "");
+  setpoint.mode = Mode::kCartesian;
+  EXPECT_EQ(fault(setpoint), "tip_pose.position");
+  setpoint.mode = static_cast<Mode>(2);
+  EXPECT_EQ(fault(setpoint), "mode");
+}
+
 // Of a joint without limits the position is bounded all the same.
 TEST(SetpointCheck, BoundsThePositionOfAContinuousJoint) {
   Limits limits = limits_of_two_joints();

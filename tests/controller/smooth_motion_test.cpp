@@ -23,7 +23,7 @@ TEST(Smoothing, IsTheMeanOfTheLastVelocities) {
     const int window = std::clamp(asked, 1, 256);
     Smoothing<3> smoothing(asked);
     for (int again = 0; again < 2; ++again) {  // and after a reset in motion
-      smoothing.reset();
+      if (again == 1) smoothing.reset();
       EXPECT_TRUE(smoothing.velocity().isZero(0));
       EXPECT_TRUE(smoothing.acceleration().isZero(0));
       EXPECT_TRUE(smoothing.offset().isZero(0));
@@ -49,6 +49,49 @@ TEST(Smoothing, IsTheMeanOfTheLastVelocities) {
       smoothing.step(Joints<3>::Ones(), kTick);  // still in motion when it is reset
     }
   }
+}
+
+TEST(Smoothing, MovesAsLongAsOneCoordinateDoes) {
+  for (int i = 0; i < 3; ++i) {
+    Smoothing<3> smoothing(10);
+    for (int k = 0; k < 30; ++k) smoothing.step(Joints<3>::Unit(i), kTick);
+    EXPECT_TRUE(near(smoothing.velocity(), Joints<3>::Unit(i), 1e-12));
+  }
+}
+
+// At rest all rounding is gone: what comes then is what comes of a new one, to the last bit.
+TEST(Smoothing, KeepsNothingOfAMotionThatHasEnded) {
+  Random random(352);
+  Smoothing<3> used(10), fresh(10);
+  for (int k = 0; k < 1000; ++k) used.step(random.vector(3), kTick);
+  for (int k = 0; k < 10; ++k) used.step(Joints<3>::Zero(), kTick);
+  for (int k = 0; k < 30; ++k) {
+    const Joints<3> v = random.vector(3);
+    used.step(v, kTick);
+    fresh.step(v, kTick);
+    EXPECT_EQ(used.velocity(), fresh.velocity());
+    EXPECT_EQ(used.offset(), fresh.offset());
+  }
+}
+
+TEST(Ramp, SetsOutFromWhereItIs) {
+  Ramp<Vector6> ramp(10);
+  const Vector6 zero = Vector6::Zero(), one = Vector6::Ones();
+  ramp.start(zero);
+  ramp.set_target(one);
+  for (int k = 0; k < 5; ++k) ramp.step();
+  ramp.set_target(zero);
+  for (int k = 1; k <= 10; ++k) {
+    ramp.step();
+    EXPECT_TRUE(near(ramp.now(), (0.5 - 0.05 * k) * one, 1e-12));
+  }
+  ramp.set_target(one);
+  ramp.step();
+  ramp.start(3 * one);  // on its way
+  const auto changes = ramp.changes();
+  ramp.step();
+  EXPECT_EQ(ramp.now(), 3 * one);
+  EXPECT_EQ(ramp.changes(), changes);
 }
 
 TEST(Ramp, TakesItsTicksEvenlyAndEndsExactly) {
@@ -121,6 +164,10 @@ TEST(Approach, SpeedsUpAtItsLimitAndBrakesAtHalfOfIt) {
 }
 
 TEST(TwistNorm, TakesTheLargerShareOfItsTwoParts) {
+  EXPECT_DOUBLE_EQ(TwistNorm{}.speed(3 * Vector6::Unit(1)), 3);
+  EXPECT_DOUBLE_EQ(TwistNorm{}.speed(3 * Vector6::Unit(4)), 3);
+  EXPECT_DOUBLE_EQ(TwistNorm{}.effort(3 * Vector6::Unit(2)), 3);
+  EXPECT_DOUBLE_EQ(TwistNorm{}.effort(3 * Vector6::Unit(5)), 3);
   const TwistNorm norm{2, 4, 5, 10};
   Vector6 twist;
   twist << 0, 3, 4, 0, 0, 0;

@@ -110,10 +110,14 @@ TEST(LowerCholesky, RefusesWhatIsNotDefiniteBeyondRounding) {
     thin.topLeftCorner(r, r) = of_rank(random, r, r - 1);
     EXPECT_FALSE(lower_cholesky<6>(r, thin));
   }
-  // At 16 n eps of the trace: 7.1e-15 for n = 2
-  for (const auto& [small, definite] : {std::pair(6.4e-15, false), std::pair(7.8e-15, true)}) {
-    Eigen::Matrix2d A = Eigen::Vector2d(1, small).asDiagonal();
-    EXPECT_EQ(lower_cholesky<2>(2, A), definite) << small;
+  // At 16 n eps of the trace, wherever the small one is: 7.105e-15 of it for n = 2
+  for (const auto& [share, definite] : {std::pair(6.97e-15, false), std::pair(7.25e-15, true)}) {
+    for (const double size : {0.01, 1.0, 4.0}) {
+      Eigen::Matrix2d A = Eigen::Vector2d(size, share * size).asDiagonal();
+      EXPECT_EQ(lower_cholesky<2>(2, A), definite) << share;
+      A = Eigen::Vector2d(share * size, size).asDiagonal();
+      EXPECT_EQ(lower_cholesky<2>(2, A), definite) << share;
+    }
   }
 }
 
@@ -148,8 +152,10 @@ TEST(SpringFactor, FollowsItsMatrix) {
   const Matrix6 whole = random.spd(6);
   Matrix6 other = whole;  // in the last entry alone
   other(5, 5) += 1;
-  for (const Matrix6& K : {Matrix6(Matrix6::Zero()), whole, other, Matrix6(of_rank(random, 6, 2)),
-                           Matrix6(of_rank(random, 6, 2)), whole, Matrix6(Matrix6::Zero())}) {
+  const auto along = [](int i) { return Matrix6(Vector6::Unit(i).asDiagonal()); };
+  for (const Matrix6& K :
+       {Matrix6(Matrix6::Zero()), along(5), along(0), whole, other, Matrix6(of_rank(random, 6, 2)),
+        Matrix6(of_rank(random, 6, 2)), whole, Matrix6(Matrix6::Zero())}) {
     for (int again = 0; again < 2; ++again) {
       factor.update(K);
       const MatrixXd W = factor.matrix().topRows(factor.rows());
@@ -193,6 +199,23 @@ TEST(FactorRows, BecomeATriangleWithTheSameProduct) {
     }
     EXPECT_TRUE(R.isUpperTriangular(0));
     EXPECT_TRUE(near(R.transpose() * R, W.transpose() * W, 1e-13 * (1 + W.squaredNorm())));
+  }
+}
+
+// A column that is one entry and next to nothing else turns without cancellation.
+TEST(FactorRows, KeepTheirDigitsWhereATriangleIsAlmostThere) {
+  for (const double head : {0.5, -0.5, 2.0, -2.0}) {
+    FactorRows<2> rows;
+    const Eigen::Matrix<double, 3, 2> W{{head, 3.0}, {1e-12, 2.0}, {1e-12, -1.0}};
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 2; ++j) rows.at(i, j) = W(i, j);
+    }
+    rows.grow(3);
+    rows.triangularize();
+    EXPECT_DOUBLE_EQ(rows.at_row(0, 0), std::abs(head));
+    EXPECT_NEAR(rows.at_row(0, 1), std::copysign(3.0, head), 1e-11);
+    EXPECT_NEAR(rows.at_row(1, 1), std::sqrt(5), 1e-11);
+    EXPECT_EQ(rows.at_row(1, 0), 0);
   }
 }
 

@@ -48,14 +48,15 @@ def to_blame(output, changes):
 
 
 def errors_in(output):
-    """Of what a compiler prints the errors, each with where it comes from, without the warnings."""
-    errors, before = [], []
+    """Of what a compiler prints the errors, with where they come from and notes, no warnings."""
+    errors, before, relevant = [], [], False
     for line in output.split("\n"):
-        if " warning: " in line:
+        if " warning: " in line or " error: " in line:
+            relevant = " error: " in line
+            errors += [*before, line] if relevant else []
             before = []
-        elif "error: " in line:
-            errors += [*before, line]
-            before = []
+        elif relevant and " note: " in line:
+            errors.append(line)
         else:
             before.append(line)
     return "\n".join(errors)

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <array>
+#include <cstring>
 #include <numeric>
 #include <vector>
 
@@ -110,8 +112,13 @@ TEST(FromC, ASetpointHasWhatIsGiven) {
   given.joint_position = nullptr;
   ASSERT_EQ(to_setpoint(&given, 2, 5, setpoint), DASHPOT_OK);
   EXPECT_EQ(setpoint.joint_position.size(), 0);
+  given.mode = DASHPOT_MODE_JOINT;
+  given.joint_position = joints.data();
+  ASSERT_EQ(to_setpoint(&given, 2, 5, setpoint), DASHPOT_OK);
+  EXPECT_EQ(setpoint.tip_pose.position, Pose().position);
+  EXPECT_EQ(setpoint.tip_pose.rotation, Pose().rotation);
 
-  given.mode = 2;
+  given.mode = 7;
   EXPECT_EQ(to_setpoint(&given, 2, 5, setpoint), DASHPOT_WRONG_VALUE);
   EXPECT_EQ(to_setpoint(&given, 3, 5, setpoint), DASHPOT_WRONG_JOINTS);
   ++given.struct_size;
@@ -131,7 +138,7 @@ TEST(FromC, GainsHaveWhatIsGivenAndKeepTheRest) {
   const auto K_q = numbers(4), C_q = numbers(4), K_C = numbers(36), C_C = numbers(36);
   const auto K_0 = numbers(2), C_0 = numbers(2);
   const std::int32_t tool = DASHPOT_FRAME_TOOL, base = DASHPOT_FRAME_BASE, neither = 2;
-  const std::vector<std::uint8_t> directions{1, 0, 2, 0, 0, 1};
+  const std::vector<std::uint8_t> directions{0, 0, 2, 0, 1, 0};
   Gains gains;
   dashpot_gains given = no_gains();
   given.joint_stiffness = K_q.data();
@@ -156,7 +163,7 @@ TEST(FromC, GainsHaveWhatIsGivenAndKeepTheRest) {
   EXPECT_EQ(gains.null_stiffness, seen(K_0.data(), 2));
   EXPECT_EQ(gains.null_damping, seen(C_0.data(), 2));
   EXPECT_EQ(gains.frame, Frame::kTool);
-  EXPECT_EQ(gains.directions, (std::array{true, false, true, false, false, true}));
+  EXPECT_EQ(gains.directions, (std::array{false, false, true, false, true, false}));
   given = no_gains();
   ASSERT_EQ(to_gains(&given, 2, gains), DASHPOT_OK);
   EXPECT_EQ(gains.frame, Frame::kTool);
@@ -219,7 +226,7 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
   snapshot.tip_error = numbers.vector(6);
   snapshot.tip_wrench = numbers.vector(6);
   dashpot_snapshot out;
-  out.position[3] = 7;
+  std::memset(&out, 7, sizeof out);
   to_c(snapshot, out);
   EXPECT_EQ(out.struct_size, sizeof out);
   EXPECT_EQ(out.joints, 3u);
@@ -271,6 +278,7 @@ TEST(ToC, ModesHaveAllThatIsInThem) {
     mode.shape = numbers.vector(3) + analysis::Complex(0, 1) * numbers.vector(3);
   }
   dashpot_modes out;
+  std::memset(&out, 7, sizeof out);
   to_c(vibration, out);
   EXPECT_EQ(out.struct_size, sizeof out);
   EXPECT_EQ(out.joints, 3u);
@@ -304,6 +312,7 @@ TEST(ToC, ModesHaveAllThatIsInThem) {
     EXPECT_EQ(seen(mode.shape_imag, DASHPOT_MAX_JOINTS), padded(from.shape.imag()));
   }
   EXPECT_EQ(out.modes[2].natural_frequency, 0);
+  EXPECT_EQ(out.modes[2].label, 0);
 }
 
 TEST(ToC, TheSampledLoopHasAllThatIsInIt) {
@@ -321,6 +330,7 @@ TEST(ToC, TheSampledLoopHasAllThatIsInIt) {
         analysis::ModeKind::kUnstable, numbers(), numbers(), numbers(), numbers(), numbers()};
   }
   dashpot_sampled_modes out;
+  std::memset(&out, 7, sizeof out);
   to_c(vibration, out);
   EXPECT_EQ(out.struct_size, sizeof out);
   EXPECT_EQ(out.joints, 3u);
@@ -340,6 +350,7 @@ TEST(ToC, TheSampledLoopHasAllThatIsInIt) {
     EXPECT_EQ(out.modes[i].kind, DASHPOT_UNSTABLE);
     EXPECT_EQ(out.modes[i].reserved, 0);
   }
+  EXPECT_EQ(out.modes[2].natural_frequency, 0);
 }
 
 }  // namespace
