@@ -190,14 +190,9 @@ void FixedCore<N>::release() noexcept {
   rest_ = 0;
   state_check_.trust_velocities();
   afresh_ = damping_only_ = true;
-  const Gains gains = accepted_.gains;
-  const Mode mode = accepted_.mode;
-  accepted_ = settings_.initial;
-  if (from_user_) {
-    accepted_.gains = gains;
-    accepted_.mode = mode;
-  }
-  from_user_ = false;
+  accepted_.wrench = settings_.initial.wrench;
+  accepted_.joint_position = settings_.initial.joint_position;
+  from_user_ = false;  // springs start where the robot is, with the gains in force
 }
 
 template <int N>
@@ -209,6 +204,10 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   if (input >= Status::kStateNotFinite) {
     setpoint_age_ += nanoseconds(settings_.period);
     show_measured(state);
+    rest_ = 0;
+    const bool long_ago =
+        !first_ && seconds_between(time_, state.time) > settings_.watchdog.longest_gap;
+    if (long_ago) latch(input);
     return ramp(input, torque);
   }
   double dt = settings_.period;
@@ -227,7 +226,9 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
   if (!read(setpoint)) status = worse(status, Status::kSetpointRejected);
   status = worse(status, setpoint_age_status());
-  status = worse(status, watch_motion(input, dt));
+  // A reflex that has lost its sensor protects nobody.
+  const bool blind = !wrench_known && std::isfinite(settings_.limits.external_force);
+  status = worse(status, watch_motion(blind ? worse(input, Status::kCollision) : input, dt));
   Vector tau = status >= Status::kSetpointLost ? damp() : act(status == Status::kSetpointStale);
   const bool returns = fault_ == Status::kPositionLimit;
   status = worse(
@@ -270,7 +271,7 @@ bool FixedCore<N>::rested(double dt) noexcept {
   constexpr double kAtRest = 0.01;  // of the velocity limits
   const double wanted = settings_.watchdog.release_after;
   if (wanted == 0) return false;
-  rest_ += dt;
+  rest_ = dt > settings_.watchdog.longest_gap ? 0 : rest_ + dt;
   for (int i = 0; i < N; ++i) {
     if (std::abs(qd_[i]) > kAtRest * settings_.limits.velocity[i]) rest_ = 0;
   }

@@ -64,14 +64,15 @@ double GainJudge::margin(const JointVector& q, const Gains& gains, Mode mode) tr
   for (int tick = 0; tick < 3; ++tick) {
     time_ += period;
     state.time = setpoint.time = time_;
-    if (controller_.update(state, setpoint, torque) >= Status::kSetpointRejected) return 0;
+    const Status status = controller_.update(state, setpoint, torque);
+    if (status == Status::kSetpointRejected || status > Status::kWeightNotHeld) return 0;
   }
   analysis::System<kMaxJoints> system;
   controller_.closed_loop(system);
   analysis::SpectrumSolver<kMaxJoints> solver;
   analysis::Spectrum<kMaxJoints> spectrum;
-  const analysis::Status status = solver.solve(system, spectrum);
-  if (status != analysis::Status::kOk && status != analysis::Status::kUncertified) return 0;
+  const analysis::Status solved = solver.solve(system, spectrum);
+  if (solved != analysis::Status::kOk && solved != analysis::Status::kUncertified) return 0;
   return analysis::gain_margin(system, spectrum, loop_, wanted_, kSlowest);
 } catch (const std::exception&) {  // no convergence
   return 0;

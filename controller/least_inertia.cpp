@@ -17,7 +17,9 @@ class Postures {
   Postures(const JointVector& lower, const JointVector& upper)
       : lower_(lower.cwiseMax(-std::numbers::pi)), upper_(upper.cwiseMin(std::numbers::pi)) {
     for (Eigen::Index i = 0; i < lower.size(); ++i) {  // limits that are all beyond half a turn
-      if (lower_[i] > upper_[i]) lower_[i] = lower[i], upper_[i] = upper[i];
+      if (lower_[i] <= upper_[i]) continue;
+      lower_[i] = std::max(lower[i], upper[i] - 2 * std::numbers::pi);
+      upper_[i] = std::min(upper[i], lower_[i] + 2 * std::numbers::pi);
     }
   }
 

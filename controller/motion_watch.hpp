@@ -61,6 +61,7 @@ class MotionWatch {
   Vector coulomb_;
   Vector external_limit_;
   bool estimates_ = false;
+  bool gravity_;  ///< is compensated here
   double external_force_;
   double tip_limit_;
   double frozen_after_;
@@ -88,6 +89,7 @@ MotionWatch<N>::MotionWatch(const RobotModel& model, const Settings& settings) n
       upper_(fixed<N>(settings.limits.position_upper)),
       coulomb_(fixed<N>(model.joint_values(&Joint::friction))),
       external_limit_(fixed<N>(settings.limits.external_torque)),
+      gravity_(settings.feed_forward.gravity),
       external_force_(settings.limits.external_force),
       tip_limit_(settings.limits.tip_velocity),
       frozen_after_(0.4 * settings.watchdog.feedback),
@@ -157,7 +159,8 @@ bool MotionWatch<N>::collides(const Tick& tick) noexcept {
   bool found = false;
   const double share = std::min(1.0, tick.dt / kTimeConstant);
   for (int i = 0; i < N; ++i) {
-    const double now = force[i] + tick.robot.coriolis[i] + tick.robot.gravity[i] - torque_[i];
+    const double weight = gravity_ ? tick.robot.gravity[i] : 0;  // or the robot holds it itself
+    const double now = force[i] + tick.robot.coriolis[i] + weight - torque_[i];
     external_[i] += share * (now - external_[i]);
     found |= std::abs(external_[i]) > external_limit_[i];
   }

@@ -87,6 +87,9 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
   std::uint64_t setpoints_ = 0;  ///< of the other thread, taken up so far
   std::uint64_t gain_changes_ = 0;
   std::uint64_t releases_ = 0;
+  bool latched_ = false;         ///< a fault was, after the last tick
+  std::int64_t given_time_ = 0;  ///< of the last set-point that the caller gave, as it was given
+  bool forgotten_ = false;       ///< it was, with the release of a fault: it is none any more
   std::uint64_t published_modes_ = 0;  ///< the tick they belong to
   dashpot::analysis::Status published_status_ = dashpot::analysis::Status::kOk;
 };
@@ -98,6 +101,9 @@ Status dashpot_controller::update(const dashpot_state* given, const dashpot_setp
   const bool accepted = take_up(wanted, time_);
   Status status = controller_.update(state, setpoint_, torque);
   located_ |= status < Status::kStateNotFinite;
+  const bool latched = controller_.snapshot().fault != Status::kOk;
+  if (latched_ && !latched) forget_setpoint();  // released by a rest
+  latched_ = latched;
   Snapshot snapshot = controller_.snapshot();
   if (status < Status::kStateNotFinite) judgement.locate(snapshot.position);
   if (!accepted) status = worse(status, Status::kSetpointRejected);
@@ -117,12 +123,14 @@ void dashpot_controller::reset(const JointVector& torque) noexcept {
   controller_.reset(torque);
   take_up(nullptr, time_);  // the gains in it stay
   forget_setpoint();
+  forgotten_ = latched_ = false;
   located_ = false;
   published_modes_ = 0;
   vibrations.write(controller_.vibration());  // there is none
 }
 
 void dashpot_controller::forget_setpoint() noexcept {
+  forgotten_ = has_setpoint_ && given_time_ != DASHPOT_ON_ARRIVAL;
   const Gains gains = setpoint_.gains;
   setpoint_ = settings.initial;
   setpoint_.gains = gains;
@@ -137,6 +145,7 @@ bool dashpot_controller::take_up(const dashpot_setpoint* wanted, std::int64_t no
     if (latest.releases != releases_ && controller_.snapshot().fault != Status::kOk) {
       controller_.release();
       forget_setpoint();
+      latched_ = false;
     }
     releases_ = latest.releases;
     if (latest.setpoints != setpoints_) {
@@ -151,10 +160,16 @@ bool dashpot_controller::take_up(const dashpot_setpoint* wanted, std::int64_t no
     if (setpoint_.time == last)
       setpoint_.time = later(last, 1);  // equal times would say that nothing is new
   }
-  if (wanted != nullptr) {
+  const bool old = wanted != nullptr && forgotten_ && wanted->struct_size == sizeof *wanted &&
+                   wanted->time == given_time_;
+  if (wanted != nullptr && !old) {
     accepted = to_setpoint(wanted, n, now, setpoint_) == DASHPOT_OK;
     if (accepted && !has_setpoint_ && setpoint_.time == last) setpoint_.time = later(last, 1);
     has_setpoint_ |= accepted;
+    if (accepted) {
+      given_time_ = wanted->time;
+      forgotten_ = false;
+    }
   }
   if (!has_setpoint_) stay(now);
   return accepted;

@@ -33,14 +33,16 @@ class Judgement {
   }
 
   /// Judges gains that have passed check_gains, at q. Unless it is to be done `again`, those that
-  /// were accepted last pass. Throws if there is no memory.
+  /// were accepted last, no joint farther than 0.1 rad from q, pass. Throws if there is no memory.
   GainJudge::Verdict judge(const Gains& gains, const JointVector& q, bool again) {
     const std::lock_guard lock(mutex_);
-    const bool known = any_ && same_gains(gains, accepted_);
+    const bool known =
+        any_ && same_gains(gains, accepted_) && (q - accepted_at_).cwiseAbs().maxCoeff() < 0.1;
     if (wanted_ <= 1 || (known && !again)) return {wanted_, Mode::kJoint};
     const GainJudge::Verdict verdict = judge_.judge(q, gains);
     if (enough(verdict)) {
       accepted_ = gains;
+      accepted_at_ = q;
       any_ = true;
     }
     return verdict;
@@ -60,6 +62,7 @@ class Judgement {
   GainJudge judge_;
   bool any_ = false;
   Gains accepted_;
+  JointVector accepted_at_;  ///< n, rad
 };
 
 }  // namespace dashpot::controller

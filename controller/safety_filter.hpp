@@ -111,11 +111,12 @@ class SafetyFilter {
   }
 
  private:
-  static constexpr double kRampTime = 0.1;  // s
-  static constexpr double kReturnRise = 1;  // s
-  static constexpr double kFull = 0.9;      // of a velocity limit: nothing drives further
-  static constexpr double kFirst = 0.5;     // from here on the drive is bounded ...
-  static constexpr double kWholly = 0.65;   // ... and from here on to what can be taken away
+  static constexpr double kRampTime = 0.1;    // s
+  static constexpr double kLeastRoom = 0.05;  // of a torque limit
+  static constexpr double kReturnRise = 1;    // s
+  static constexpr double kFull = 0.9;        // of a velocity limit: nothing drives further
+  static constexpr double kFirst = 0.5;       // from here on the drive is bounded ...
+  static constexpr double kWholly = 0.65;     // ... and from here on to what can be taken away
 
   /// Distance to the nearer limit, and the sign of the way to it.
   struct Near {
@@ -128,8 +129,9 @@ class SafetyFilter {
   }
   /// Sets `repulsion`, and bounds the `excess` toward limits.
   Status repel(const Motion& motion, Vector& excess, Vector& repulsion) noexcept;
-  /// Bounds what drives joints or tip at their velocity limits. True if that changed anything.
-  bool hold_back(const Motion& motion, Vector& excess) const noexcept;
+  /// Bounds what drives a robot that moves with the share `fastest` of a velocity limit. True if
+  /// that changed anything.
+  bool hold_back(const Vector& qd, double fastest, Vector& excess) const noexcept;
   /// Scales `excess` for the limits of power and of torque beyond `base`. True if it did.
   bool shrink(const Vector& qd, const Vector& base, Vector& excess) const noexcept;
   bool fade(Vector& tau) noexcept;
@@ -142,11 +144,12 @@ class SafetyFilter {
   Vector upper_;
   Vector margin_;
   Vector return_velocity_;
-  Vector damper_;     ///< c
-  Vector repulsion_;  ///< F
-  Vector toward_;     ///< E
-  Vector late_;       ///< torque_rate I, of f
-  double tip_velocity_;
+  Vector damper_;        ///< c
+  Vector repulsion_;     ///< F
+  Vector toward_;        ///< E
+  Vector late_;          ///< torque_rate I, of f
+  Vector per_velocity_;  ///< s/rad
+  double per_tip_velocity_;
   double power_;
   double ramp_share_;     ///< of the torque, in one tick
   double return_step_;    ///< of z

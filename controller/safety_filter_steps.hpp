@@ -13,13 +13,14 @@ SafetyFilter<N>::SafetyFilter(const Settings& settings, const Vector& inertia) n
       upper_(fixed<N>(settings.limits.position_upper)),
       margin_(fixed<N>(settings.limits.position_margin)),
       return_velocity_(fixed<N>(settings.limits.return_velocity)),
-      tip_velocity_(settings.limits.tip_velocity),
+      per_tip_velocity_(1 / settings.limits.tip_velocity),
       power_(settings.limits.power),
       ramp_share_(settings.period / kRampTime),
       return_step_(settings.period / kReturnRise) {
   const double lag = loop_lag(settings);
   for (int i = 0; i < N; ++i) {
     torque_step_[i] = settings.limits.torque_rate[i] * settings.period;
+    per_velocity_[i] = 1 / velocity_[i];
     damper_[i] = 0.4 * inertia[i] / lag;
     repulsion_[i] =
         std::min(settings.limits.repulsion * torque_[i], 0.1 * damper_[i] * velocity_[i]);
@@ -46,8 +47,15 @@ Status SafetyFilter<N>::apply(const Motion& motion, const Vector& weight, Vector
   Vector excess = difference<N>(tau, weight);
   Vector base;
   Status status = repel(motion, excess, base);
-  bool limited = hold_back(motion, excess);
-  limited |= hold_back(motion, base);
+  double fastest = motion.tip_speed * per_tip_velocity_;
+  for (int i = 0; i < N; ++i) {
+    fastest = std::max(fastest, std::abs(motion.qd[i]) * per_velocity_[i]);
+  }
+  bool limited = false;
+  if (fastest > kFirst) {
+    limited = hold_back(motion.qd, fastest, excess);
+    limited |= hold_back(motion.qd, fastest, base);
+  }
   for (int i = 0; i < N; ++i) {
     if (std::abs(weight[i]) > torque_[i]) status = worse(status, Status::kWeightNotHeld);
     base[i] = std::clamp(base[i] + weight[i], -torque_[i], torque_[i]);
@@ -89,13 +97,9 @@ Status SafetyFilter<N>::repel(const Motion& motion, Vector& excess, Vector& repu
 }
 
 template <int N>
-bool SafetyFilter<N>::hold_back(const Motion& motion, Vector& excess) const noexcept {
-  double power = 0, fastest = motion.tip_speed / tip_velocity_;
-  for (int i = 0; i < N; ++i) {
-    power += excess[i] * motion.qd[i];
-    fastest = std::max(fastest, std::abs(motion.qd[i]) / velocity_[i]);
-  }
-  if (fastest <= kFirst) return false;
+bool SafetyFilter<N>::hold_back(const Vector& qd, double fastest, Vector& excess) const noexcept {
+  double power = 0;
+  for (int i = 0; i < N; ++i) power += excess[i] * qd[i];
   bool changed = false;
   if (power > 0 && fastest > kWholly) {
     const double share = std::max(0.0, (kFull - fastest) / (kFull - kWholly));
@@ -103,8 +107,8 @@ bool SafetyFilter<N>::hold_back(const Motion& motion, Vector& excess) const noex
     changed = true;
   }
   for (int i = 0; i < N; ++i) {
-    const double speed = std::abs(motion.qd[i]), share = speed / velocity_[i];
-    if (!(excess[i] * motion.qd[i] > 0) || share <= kFirst) continue;
+    const double speed = std::abs(qd[i]), share = speed * per_velocity_[i];
+    if (!(excess[i] * qd[i] > 0) || share <= kFirst) continue;
     const double room = std::max(0.0, kFull * velocity_[i] - speed);
     const double most = std::min(std::sqrt(late_[i] * room), damper_[i] * room) +
                         torque_[i] * std::max(0.0, (kWholly - share) / (kWholly - kFirst));
@@ -121,11 +125,10 @@ bool SafetyFilter<N>::shrink(const Vector& qd, const Vector& base, Vector& exces
   for (int i = 0; i < N; ++i) power += excess[i] * qd[i];
   double share = power > power_ ? power_ / power : 1;
   for (int i = 0; i < N; ++i) {
-    const double room = torque_[i] - std::copysign(1, excess[i]) * base[i];
-    // A joint whose weight is at the limit has no say: it holds what it can.
-    if (room > 1e-9 * torque_[i] && share * std::abs(excess[i]) > room) {
-      share = room / std::abs(excess[i]);
-    }
+    // A joint whose weight is about at its limit has little say: `limit` clips what is left of it.
+    const double room =
+        std::max(torque_[i] - std::copysign(1, excess[i]) * base[i], kLeastRoom * torque_[i]);
+    if (share * std::abs(excess[i]) > room) share = room / std::abs(excess[i]);
   }
   if (share == 1) return false;
   for (int i = 0; i < N; ++i) excess[i] *= share;
@@ -134,6 +137,7 @@ bool SafetyFilter<N>::shrink(const Vector& qd, const Vector& base, Vector& exces
 
 template <int N>
 Joints<N> SafetyFilter<N>::ramp() noexcept {
+  known_ = true;  // what it puts out is what acts
   if (!ramping_) {
     double share = ramp_share_;
     for (int i = 0; i < N; ++i) {

@@ -63,14 +63,11 @@ std::string printable(std::string_view text, std::string_view kept) {
     const std::size_t length = utf8_length(text);
     const std::uint32_t code = length == 0 ? byte_at(text, 0) : decode(text, length);
     const std::string_view character = text.substr(0, std::max<std::size_t>(length, 1));
-    if (length == 1 && kept.find(character) != std::string_view::npos) {
+    const bool kept_as_it_is = length == 1 && kept.find(character) != std::string_view::npos;
+    if (kept_as_it_is || (length > 0 && !steers(code))) {
       result += character;
-    } else if (length == 0 || (code < 0x80 && steers(code))) {
-      result += escaped("\\x%02x", code);
-    } else if (steers(code)) {
-      result += escaped("\\u%04x", code);
     } else {
-      result += character;
+      result += escaped(length == 0 || code < 0x80 ? "\\x%02x" : "\\u%04x", code);
     }
     text.remove_prefix(character.size());
   }

@@ -51,61 +51,60 @@ struct Edge {
 };
 
 TEST(SetpointCheck, HasItsBoundsWhereItSaysSo) {
-  const Mode kJoint = Mode::kJoint, kTip = Mode::kCartesian;
+  const Mode joint = Mode::kJoint, tip = Mode::kCartesian;
   const auto turned_by = [](Setpoint& s, double defect) {  // |R'R - I| = defect
     const Eigen::Quaterniond q = quaternion(Eigen::Vector3d(0.3, -0.5, 0.8));
     s.tip_pose.rotation = std::sqrt(1 + defect) * q.toRotationMatrix();
   };
   const std::vector<Edge> edges = {
-      {kJoint, "joint_position", [](Setpoint& s, double x) { s.joint_position[1] = x; }, -1,
-       -1.001},
-      {kJoint, "joint_position", [](Setpoint& s, double x) { s.joint_position[1] = x; }, 2, 2.001},
-      {kTip, "joint_position", [](Setpoint& s, double x) { s.joint_position[0] = x; }, 2, 2.001},
-      {kJoint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(1, 1) = x; },
+      {joint, "joint_position", [](Setpoint& s, double x) { s.joint_position[1] = x; }, -1, -1.001},
+      {joint, "joint_position", [](Setpoint& s, double x) { s.joint_position[1] = x; }, 2, 2.001},
+      {tip, "joint_position", [](Setpoint& s, double x) { s.joint_position[0] = x; }, 2, 2.001},
+      {joint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(1, 1) = x; },
        1e9, 1.001e9},
-      {kJoint, "joint_damping", [](Setpoint& s, double x) { s.gains.joint_damping(0, 0) = x; }, 0,
+      {joint, "joint_damping", [](Setpoint& s, double x) { s.gains.joint_damping(0, 0) = x; }, 0,
        -1e-3},
       // Symmetric within 1e-9 of the largest entry, which is 100
-      {kJoint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(0, 1) += x; },
+      {joint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(0, 1) += x; },
        0.9e-7, 1.1e-7},
-      {kJoint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(1, 0) += x; },
+      {joint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(1, 0) += x; },
        0.9e-7, 1.1e-7},
       // Positive semidefinite within 1e-10 of it
-      {kJoint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(1, 1) = x; },
+      {joint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(1, 1) = x; },
        -0.9e-8, -1.1e-8},
-      {kJoint, "joint_stiffness",  // the eigenvalues 100 +- x
+      {joint, "joint_stiffness",  // the eigenvalues 100 +- x
        [](Setpoint& s, double x) {
          s.gains.joint_stiffness(0, 1) = s.gains.joint_stiffness(1, 0) = x;
        },
        99.999, 100.001},
-      {kTip, "task_stiffness", [](Setpoint& s, double x) { s.gains.task_stiffness(5, 5) = x; }, 0,
+      {tip, "task_stiffness", [](Setpoint& s, double x) { s.gains.task_stiffness(5, 5) = x; }, 0,
        -1e-3},
-      {kTip, "task_stiffness",
+      {tip, "task_stiffness",
        [](Setpoint& s, double x) {
          s.gains.task_stiffness(5, 2) = s.gains.task_stiffness(2, 5) = x;
        },
        0.999, 1.001},
-      {kTip, "task_damping", [](Setpoint& s, double x) { s.gains.task_damping(4, 4) = x; }, 1e9,
+      {tip, "task_damping", [](Setpoint& s, double x) { s.gains.task_damping(4, 4) = x; }, 1e9,
        1.001e9},
-      {kTip, "null_stiffness", [](Setpoint& s, double x) { s.gains.null_stiffness[1] = x; }, 0,
+      {tip, "null_stiffness", [](Setpoint& s, double x) { s.gains.null_stiffness[1] = x; }, 0,
        -1e-9},
-      {kTip, "null_stiffness", [](Setpoint& s, double x) { s.gains.null_stiffness[0] = x; }, 1e9,
+      {tip, "null_stiffness", [](Setpoint& s, double x) { s.gains.null_stiffness[0] = x; }, 1e9,
        1.001e9},
-      {kTip, "null_damping", [](Setpoint& s, double x) { s.gains.null_damping[1] = x; }, 0, -1e-9},
-      {kJoint, "joint_damping_ratio",
-       [](Setpoint& s, double x) { s.gains.joint_damping_ratio = x; }, 2, 2.001},
-      {kJoint, "joint_damping_ratio",
-       [](Setpoint& s, double x) { s.gains.joint_damping_ratio = x; }, 0, -1e-9},
-      {kTip, "task_damping_ratio", [](Setpoint& s, double x) { s.gains.task_damping_ratio = x; }, 2,
+      {tip, "null_damping", [](Setpoint& s, double x) { s.gains.null_damping[1] = x; }, 0, -1e-9},
+      {joint, "joint_damping_ratio", [](Setpoint& s, double x) { s.gains.joint_damping_ratio = x; },
+       2, 2.001},
+      {joint, "joint_damping_ratio", [](Setpoint& s, double x) { s.gains.joint_damping_ratio = x; },
+       0, -1e-9},
+      {tip, "task_damping_ratio", [](Setpoint& s, double x) { s.gains.task_damping_ratio = x; }, 2,
        2.001},
-      {kTip, "task_damping_ratio", [](Setpoint& s, double x) { s.gains.task_damping_ratio = x; }, 0,
+      {tip, "task_damping_ratio", [](Setpoint& s, double x) { s.gains.task_damping_ratio = x; }, 0,
        -1e-9},
-      {kJoint, "wrench", [](Setpoint& s, double x) { s.wrench[5] = x; }, 1e9, 1.001e9},
-      {kJoint, "wrench", [](Setpoint& s, double x) { s.wrench[0] = x; }, -1e9, -1.001e9},
-      {kTip, "tip_pose.position", [](Setpoint& s, double x) { s.tip_pose.position.y() = x; }, -1e6,
+      {joint, "wrench", [](Setpoint& s, double x) { s.wrench[5] = x; }, 1e9, 1.001e9},
+      {joint, "wrench", [](Setpoint& s, double x) { s.wrench[0] = x; }, -1e9, -1.001e9},
+      {tip, "tip_pose.position", [](Setpoint& s, double x) { s.tip_pose.position.y() = x; }, -1e6,
        -1.001e6},
-      {kTip, "tip_pose.rotation", turned_by, 0.9e-6, 1.1e-6},
-      {kTip, "tip_pose.rotation", turned_by, -0.9e-6, -1.1e-6},
+      {tip, "tip_pose.rotation", turned_by, 0.9e-6, 1.1e-6},
+      {tip, "tip_pose.rotation", turned_by, -0.9e-6, -1.1e-6},
   };
   for (const Edge& edge : edges) {
     SCOPED_TRACE(edge.key + ": " + std::to_string(edge.bad));

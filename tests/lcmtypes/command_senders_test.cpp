@@ -22,41 +22,41 @@ class CommandSenders : public ::testing::Test {
 
   /// A good command of `sender`, given now.
   command_t command_of(std::int64_t sender) {
-    command_t message = good_;
+    command_t message = sample;
     message.sender = sender;
-    message.utime = kNow + time_;
-    message.sequence = ++sequence_;
+    message.utime = kNow + elapsed;
+    message.sequence = ++last_sequence;
     return message;
   }
   Verdict arrive(CommandFilter& filter, const command_t& message) const {
     const Bytes bytes = bytes_of(message);
-    return filter.judge(bytes.data(), bytes.size(), kNow + time_, kSteadyStart + time_);
+    return filter.judge(bytes.data(), bytes.size(), kNow + elapsed, kSteadyStart + elapsed);
   }
-  Verdict send_as(std::int64_t sender) { return arrive(filter_, command_of(sender)); }
+  Verdict send_as(std::int64_t sender) { return arrive(shared, command_of(sender)); }
   Verdict send_parts(std::int64_t sender, std::int32_t parts, std::int64_t fault_tick = 0) {
     command_t message = command_of(sender);
     message.parts = parts;
     message.fault_tick = fault_tick;
-    return arrive(filter_, message);
+    return arrive(shared, message);
   }
-  void pass(std::int64_t microseconds) { time_ += microseconds; }
+  void pass(std::int64_t microseconds) { elapsed += microseconds; }
 
   static constexpr std::int64_t kSteadyStart = 5'000'000;  // us
-  Random random_{941};
-  command_t good_ = random_command(random_, 7);
-  std::int64_t time_ = 0;      // us since the start
-  std::int64_t sequence_ = 0;  // of all senders
-  CommandFilter filter_{limits_for(7)};
+  Random engine{941};
+  command_t sample = random_command(engine, 7);
+  std::int64_t elapsed = 0;        // us since the start
+  std::int64_t last_sequence = 0;  // of all senders
+  CommandFilter shared{limits_for(7)};
 };
 
 TEST_F(CommandSenders, TheFirstCommandsUntilItHasBeenSilent) {
-  EXPECT_EQ(filter_.tally().commander, 0);
+  EXPECT_EQ(shared.tally().commander, 0);
   EXPECT_EQ(send_as(1), Verdict::kAccepted);
-  EXPECT_EQ(filter_.tally().commander, 1);
+  EXPECT_EQ(shared.tally().commander, 1);
   for (int i = 0; i < 100; ++i) {
     pass(kSilence / 10);
     EXPECT_EQ(send_as(2), Verdict::kOtherSender);
-    EXPECT_EQ(filter_.command().accepted, 1 + i / 5);
+    EXPECT_EQ(shared.command().accepted, 1 + i / 5);
     if (i % 5 == 4) {
       EXPECT_EQ(send_as(1), Verdict::kAccepted);
     }
@@ -65,17 +65,17 @@ TEST_F(CommandSenders, TheFirstCommandsUntilItHasBeenSilent) {
   EXPECT_EQ(send_as(2), Verdict::kOtherSender);
   pass(1);
   EXPECT_EQ(send_as(2), Verdict::kAccepted);
-  EXPECT_EQ(filter_.tally().commander, 2);
+  EXPECT_EQ(shared.tally().commander, 2);
   EXPECT_EQ(send_as(1), Verdict::kOtherSender);
 }
 
 TEST_F(CommandSenders, SilenceIsNoticedWithoutACommand) {
   EXPECT_EQ(send_as(1), Verdict::kAccepted);
-  filter_.notice_silence(kSteadyStart + kSilence);
-  EXPECT_EQ(filter_.tally().commander, 1);
-  filter_.notice_silence(kSteadyStart + kSilence + 1);
-  EXPECT_EQ(filter_.tally().commander, 0);
-  EXPECT_EQ(filter_.tally().accepted(), 1);
+  shared.notice_silence(kSteadyStart + kSilence);
+  EXPECT_EQ(shared.tally().commander, 1);
+  shared.notice_silence(kSteadyStart + kSilence + 1);
+  EXPECT_EQ(shared.tally().commander, 0);
+  EXPECT_EQ(shared.tally().accepted(), 1);
 }
 
 TEST_F(CommandSenders, CommandsThatAreRefusedKeepNoArm) {
@@ -93,22 +93,22 @@ TEST_F(CommandSenders, OneThatGivesUpIsFollowedAtOnce) {
   pass(kMillisecond);
   const std::int32_t last_parts = int{command_t::WRENCH} + int{command_t::GIVE_UP};
   EXPECT_EQ(send_parts(2, last_parts), Verdict::kOtherSender);
-  EXPECT_EQ(filter_.tally().commander, 1);
+  EXPECT_EQ(shared.tally().commander, 1);
   EXPECT_EQ(send_parts(1, last_parts), Verdict::kAccepted);
-  EXPECT_TRUE(has_set(filter_.command(), command_t::WRENCH, 1));  // the other part counts as well
-  EXPECT_EQ(filter_.tally().commander, 0);
+  EXPECT_TRUE(has_set(shared.command(), command_t::WRENCH, 1));  // the other part counts as well
+  EXPECT_EQ(shared.tally().commander, 0);
   EXPECT_EQ(send_as(2), Verdict::kAccepted);
-  EXPECT_EQ(filter_.tally().commander, 2);
+  EXPECT_EQ(shared.tally().commander, 2);
 }
 
 // What was recorded of a sender counts no more than before once it has given up.
 TEST_F(CommandSenders, ARecordingCountsForNobody) {
   command_t recorded = command_of(1);
-  EXPECT_EQ(arrive(filter_, recorded), Verdict::kAccepted);
+  EXPECT_EQ(arrive(shared, recorded), Verdict::kAccepted);
   pass(kMillisecond);
   EXPECT_EQ(send_parts(1, command_t::GIVE_UP), Verdict::kAccepted);
   for (int i = 0; i < 700; ++i, pass(kMillisecond)) {
-    EXPECT_NE(arrive(filter_, recorded), Verdict::kAccepted) << i;
+    EXPECT_NE(arrive(shared, recorded), Verdict::kAccepted) << i;
     if (i == 100) {
       EXPECT_EQ(send_parts(2, command_t::GIVE_UP), Verdict::kAccepted);
     }
@@ -117,9 +117,9 @@ TEST_F(CommandSenders, ARecordingCountsForNobody) {
   EXPECT_EQ(send_as(1), Verdict::kAccepted);
   pass(kMillisecond);
   recorded = command_of(1);
-  EXPECT_EQ(arrive(filter_, recorded), Verdict::kAccepted);
+  EXPECT_EQ(arrive(shared, recorded), Verdict::kAccepted);
   recorded.sender = 2;
-  EXPECT_EQ(arrive(filter_, recorded), Verdict::kOtherSender);
+  EXPECT_EQ(arrive(shared, recorded), Verdict::kOtherSender);
 }
 
 TEST_F(CommandSenders, AFloodOfAnotherTakesNothingFromTheOneThatCommands) {
@@ -168,7 +168,7 @@ TEST_F(CommandSenders, AHugeSequenceLocksNobodyOut) {
   command_t far = command_of(2);
   far.sequence = std::numeric_limits<std::int64_t>::max();
   far.utime += 100 * kMillisecond;  // as far ahead as it may be
-  EXPECT_EQ(arrive(filter_, far), Verdict::kAccepted);
+  EXPECT_EQ(arrive(shared, far), Verdict::kAccepted);
   pass(kMillisecond);
   EXPECT_EQ(send_as(2), Verdict::kReplayed);  // it has locked itself out
   pass(kSilence);
@@ -180,7 +180,7 @@ TEST_F(CommandSenders, AHugeSequenceLocksNobodyOut) {
   far.sequence = std::numeric_limits<std::int64_t>::max();
   far.utime += 100 * kMillisecond;
   far.parts = command_t::GIVE_UP;
-  EXPECT_EQ(arrive(filter_, far), Verdict::kAccepted);
+  EXPECT_EQ(arrive(shared, far), Verdict::kAccepted);
   EXPECT_EQ(send_as(3), Verdict::kAccepted);
 }
 
@@ -189,12 +189,12 @@ TEST_F(CommandSenders, AreRememberedAsLongAsTheirCommandsCouldBeReplayed) {
   for (std::int64_t sender = 1; sender <= 8; ++sender) {
     recorded.push_back(command_of(sender));
     recorded.back().parts |= command_t::GIVE_UP;
-    EXPECT_EQ(arrive(filter_, recorded.back()), Verdict::kAccepted);
+    EXPECT_EQ(arrive(shared, recorded.back()), Verdict::kAccepted);
     pass(kMillisecond);
   }
   EXPECT_EQ(send_as(9), Verdict::kTooMany);  // no room to remember it
   for (const command_t& message : recorded) {
-    EXPECT_EQ(arrive(filter_, message), Verdict::kReplayed);
+    EXPECT_EQ(arrive(shared, message), Verdict::kReplayed);
   }
   pass(kRemembered - 8 * kMillisecond);
   EXPECT_EQ(send_as(9), Verdict::kTooMany);
@@ -212,22 +212,22 @@ TEST_F(CommandSenders, AReleaseNamesTheFaultThatIsLatched) {
     message.fault_tick = 400;  // all that its sender can know before the fault at 500
     return message;
   }();
-  filter_.set_fault_tick(500);
+  shared.set_fault_tick(500);
   pass(kMillisecond);
-  EXPECT_EQ(arrive(filter_, before), Verdict::kNoSuchFault);
+  EXPECT_EQ(arrive(shared, before), Verdict::kNoSuchFault);
   for (const std::int64_t tick : {std::int64_t{0}, std::int64_t{499}, std::int64_t{501},
                                   std::numeric_limits<std::int64_t>::max()}) {
     EXPECT_EQ(send_parts(1, release, tick), Verdict::kNoSuchFault) << tick;
   }
-  EXPECT_FALSE(has_set(filter_.command(), release, 0));
+  EXPECT_FALSE(has_set(shared.command(), release, 0));
   EXPECT_EQ(send_parts(1, release, 500), Verdict::kAccepted);
-  EXPECT_TRUE(has_set(filter_.command(), release, 0));
-  EXPECT_EQ(filter_.command().fault_tick, 500);
+  EXPECT_TRUE(has_set(shared.command(), release, 0));
+  EXPECT_EQ(shared.command().fault_tick, 500);
   // Whatever comes next brings it no second time, and the next fault has another name.
   pass(kMillisecond);
   EXPECT_EQ(send_parts(1, command_t::WRENCH), Verdict::kAccepted);
-  EXPECT_FALSE(has_set(filter_.command(), release, 1));
-  filter_.set_fault_tick(900);
+  EXPECT_FALSE(has_set(shared.command(), release, 1));
+  shared.set_fault_tick(900);
   pass(kMillisecond);
   EXPECT_EQ(send_parts(1, release, 500), Verdict::kNoSuchFault);
   EXPECT_EQ(send_parts(2, release, 900), Verdict::kOtherSender);
@@ -260,7 +260,7 @@ TEST_F(CommandSenders, TheControllerIsAskedLastAndItsReasonKept) {
   EXPECT_EQ(judged.size(), 2U);
   // Not asked about what is out of order otherwise, or comes of others.
   good = true;
-  message.sequence = ++sequence_;
+  message.sequence = ++last_sequence;
   EXPECT_EQ(arrive(filter, message), Verdict::kAccepted);
   EXPECT_EQ(judged.size(), 3U);
   EXPECT_EQ(arrive(filter, message), Verdict::kReplayed);
@@ -281,8 +281,8 @@ TEST_F(CommandSenders, AreKeptApartWhateverTheySend) {
     if (random.integer(0, 2) == 0) message.sequence = random.integer(0, 1'000'000);
     if (random.integer(0, 5) == 0) message.utime += random.integer(-700'000, 200'000);
     if (random.integer(0, 9) == 0) message.parts = command_t::GIVE_UP;
-    const Verdict verdict = arrive(filter_, message);
-    const bool free = commander == 0 || time_ - heard_at > kSilence;
+    const Verdict verdict = arrive(shared, message);
+    const bool free = commander == 0 || elapsed - heard_at > kSilence;
     if (!free && sender != commander) {
       ASSERT_EQ(verdict, Verdict::kOtherSender) << i;
     } else {
@@ -290,12 +290,12 @@ TEST_F(CommandSenders, AreKeptApartWhateverTheySend) {
     }
     if (free) commander = 0;
     if (verdict != Verdict::kAccepted) continue;
-    heard_at = time_;
+    heard_at = elapsed;
     commander = message.parts == command_t::GIVE_UP ? 0 : sender;
-    ASSERT_EQ(filter_.tally().commander, commander) << i;
+    ASSERT_EQ(shared.tally().commander, commander) << i;
   }
-  EXPECT_GT(filter_.tally().accepted(), 1000);
-  EXPECT_GT(filter_.tally().count(Verdict::kOtherSender), 1000);
+  EXPECT_GT(shared.tally().accepted(), 1000);
+  EXPECT_GT(shared.tally().count(Verdict::kOtherSender), 1000);
 }
 
 }  // namespace

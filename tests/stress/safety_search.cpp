@@ -45,49 +45,50 @@ struct Attack {
       fastest[i] = 0.9 * joint.velocity;
     }
     Numbers numbers(values);
-    options.start = numbers.vector(lower, upper);
-    options.velocity = numbers.vector(-fastest, fastest);
-    cartesian = numbers.next(0, 1) < 0.5;
-    stiffness = numbers.log(0, 5);
-    damping = numbers.log(-1, 4);
-    turning_stiffness = numbers.log(-1, 3.5);
-    turning_damping = numbers.log(-2, 3);
-    for (JointVector& goal : joint_goals) goal = numbers.vector(lower, upper);
-    for (Eigen::Vector3d& goal : tip_goals) goal = numbers.vector(kNear, -kNear);
-    switch_every = numbers.next(0.02, 0.5);
+    options_.start = numbers.vector(lower, upper);
+    options_.velocity = numbers.vector(-fastest, fastest);
+    cartesian_ = numbers.next(0, 1) < 0.5;
+    stiffness_ = numbers.log(0, 5);
+    damping_ = numbers.log(-1, 4);
+    turning_stiffness_ = numbers.log(-1, 3.5);
+    turning_damping_ = numbers.log(-2, 3);
+    for (JointVector& goal : joint_goals_) goal = numbers.vector(lower, upper);
+    for (Eigen::Vector3d& goal : tip_goals_) goal = numbers.vector(kNear, -kNear);
+    switch_every_ = numbers.next(0.02, 0.5);
     const JointVector push = numbers.vector(100 * kNear, -100 * kNear);
     const double begin = numbers.next(0, 1);
     dashpot::controller::Vector6 wrench = dashpot::controller::Vector6::Zero();
     wrench.head<3>() = push;
-    options.world.wrenches = {{begin, begin + numbers.next(0.001, 0.05), wrench}};
-    gap_at = numbers.next(0, 1);
-    gap = numbers.next(-0.05, 0.1);
-    options.config = cartesian ? "control: {mode: cartesian}\n" : "";
+    options_.world.wrenches = {{begin, begin + numbers.next(0.001, 0.05), wrench}};
+    gap_at_ = numbers.next(0, 1);
+    gap_ = numbers.next(-0.05, 0.1);
+    options_.config = cartesian_ ? "control: {mode: cartesian}\n" : "";
   }
 
   /// What comes of it; null if the simulation could not follow.
   std::optional<Measures> run(const PluginFile& plugin, const TestArm& arm) const try {
-    Rig rig(plugin, arm, options);
+    Rig rig(plugin, arm, options_);
     const Eigen::Vector3d tip = rig.tip_at(rig.position()).position;
-    if (cartesian) {
+    if (cartesian_) {
       Eigen::MatrixXd K = Eigen::MatrixXd::Zero(6, 6), D = K;
-      K.diagonal() << stiffness, stiffness, stiffness, VectorXd::Constant(3, turning_stiffness);
-      D.diagonal() << damping, damping, damping, VectorXd::Constant(3, turning_damping);
+      K.diagonal() << stiffness_, stiffness_, stiffness_, VectorXd::Constant(3, turning_stiffness_);
+      D.diagonal() << damping_, damping_, damping_, VectorXd::Constant(3, turning_damping_);
       rig.set_task_gains(K, D);
     } else {
       const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(rig.n(), rig.n());
-      rig.set_joint_gains(turning_stiffness * one, turning_damping * one);
+      rig.set_joint_gains(turning_stiffness_ * one, turning_damping_ * one);
     }
     bool gone = false;
     for (int part = 0; rig.plant().time() < kDuration; ++part) {
       const auto which = static_cast<std::size_t>(part % 2);
-      rig.goal = cartesian ? Goal::at(rig.tip_at(options.start)) : Goal::joints(joint_goals[which]);
-      if (cartesian) rig.goal->tip.position = tip + tip_goals[which];
-      rig.run(switch_every);
-      if (gap <= 0 || gone || rig.plant().time() < gap_at) continue;
+      rig.goal =
+          cartesian_ ? Goal::at(rig.tip_at(options_.start)) : Goal::joints(joint_goals_[which]);
+      if (cartesian_) rig.goal->tip.position = tip + tip_goals_[which];
+      rig.run(switch_every_);
+      if (gap_ <= 0 || gone || rig.plant().time() < gap_at_) continue;
       gone = true;
       rig.every = 0;
-      rig.run(gap);
+      rig.run(gap_);
       rig.every = 1;
     }
     return rig.at_the_end();
@@ -96,38 +97,38 @@ struct Attack {
   }
 
   void print() const {
-    std::printf("    start %s, velocity %s\n", yaml_list(options.start).c_str(),
-                yaml_list(options.velocity).c_str());
-    if (cartesian) {
-      std::printf("    springs of the tip %.4g N/m, %.4g N m/rad, dampers %.4g, %.4g\n", stiffness,
-                  turning_stiffness, damping, turning_damping);
-      for (const Eigen::Vector3d& goal : tip_goals) {
+    std::printf("    start %s, velocity %s\n", yaml_list(options_.start).c_str(),
+                yaml_list(options_.velocity).c_str());
+    if (cartesian_) {
+      std::printf("    springs of the tip %.4g N/m, %.4g N m/rad, dampers %.4g, %.4g\n", stiffness_,
+                  turning_stiffness_, damping_, turning_damping_);
+      for (const Eigen::Vector3d& goal : tip_goals_) {
         std::printf("    goal %s m from the start\n", yaml_list(goal).c_str());
       }
     } else {
-      std::printf("    springs of the joints %.4g N m/rad, dampers %.4g\n", turning_stiffness,
-                  turning_damping);
-      for (const JointVector& goal : joint_goals) {
+      std::printf("    springs of the joints %.4g N m/rad, dampers %.4g\n", turning_stiffness_,
+                  turning_damping_);
+      for (const JointVector& goal : joint_goals_) {
         std::printf("    goal %s\n", yaml_list(goal).c_str());
       }
     }
-    const auto& push = options.world.wrenches.front();
-    std::printf("    the other goal every %.3f s; push %s N from %.3f to %.3f s; ", switch_every,
+    const auto& push = options_.world.wrenches.front();
+    std::printf("    the other goal every %.3f s; push %s N from %.3f to %.3f s; ", switch_every_,
                 yaml_list(JointVector(push.value.head<3>())).c_str(), push.begin, push.end);
-    if (gap > 0) std::printf("gap of %.3f s after %.3f s\n", gap, gap_at);
-    if (gap <= 0) std::printf("no gap\n");
+    if (gap_ > 0) std::printf("gap of %.3f s after %.3f s\n", gap_, gap_at_);
+    if (gap_ <= 0) std::printf("no gap\n");
   }
 
  private:
   static inline const JointVector kNear = JointVector::Constant(3, -0.5);  // m
 
-  RigOptions options;
-  bool cartesian;
-  double stiffness, damping, turning_stiffness, turning_damping;
-  std::array<JointVector, 2> joint_goals;
-  std::array<Eigen::Vector3d, 2> tip_goals;
-  double switch_every;  // s
-  double gap_at, gap;   // s
+  RigOptions options_;
+  bool cartesian_;
+  double stiffness_, damping_, turning_stiffness_, turning_damping_;
+  std::array<JointVector, 2> joint_goals_;
+  std::array<Eigen::Vector3d, 2> tip_goals_;
+  double switch_every_;  // s
+  double gap_at_, gap_;  // s
 };
 
 struct Found {
