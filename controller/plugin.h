@@ -118,7 +118,8 @@ typedef struct dashpot_state {
   const double* position;        /* n, rad */
   const double* velocity;        /* n, rad/s */
   const double* external_wrench; /* 6, that the world exerts on the tip, N and N m; NULL: zero. For
-                                    the analysis alone: no torque depends on it. */
+                                    the analysis and limits.external_force: with that, one that is
+                                    not finite is a collision; else no torque depends on it. */
 } dashpot_state;
 
 /* Where to go; the controller gets there smoothly. */
@@ -321,7 +322,8 @@ int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* g
 /* On any thread, for instance the one that receives gains: judges them as dashpot_set_gains would,
  * at `position` (n, rad; NULL: at the posture of the latest tick, if there was one), and sets
  * `margin` (NULL: not wanted) to the factor by which they could grow, or to limits.gain_margin if
- * it is more. What it has accepted last dashpot_set_gains does not judge again. */
+ * it is more. What is NULL in `gains` is that of the configuration. What it has accepted last
+ * dashpot_set_gains does not judge again, within 0.1 rad of that posture. */
 int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
                             const double* position, double* margin);
 

@@ -24,8 +24,8 @@ inline double loop_lag(const Settings& settings) noexcept {
 ///     |tau_i| <= torque_i   and   |tau_i - last tau_i| <= torque_rate_i T.
 ///
 /// - s <= 1 is one number for all joints: what exceeds the weight shrinks evenly where torques
-///   saturate, so that the wrench at the tip keeps its direction. So it does where the power x' qd
-///   would be above Limits::power.
+///   saturate while springs are in force, so that the wrench at the tip keeps its direction. So it
+///   does where the power x' qd would be above Limits::power.
 /// - f takes away what drives a robot that is about as fast as its limits. With v the largest share
 ///   of a velocity limit, of a joint or of the tip, x shrinks evenly by (0.95 - v) / 0.25 for v >
 ///   0.7 where it adds energy (x' qd > 0). And from half its limit on, what drives a joint is

@@ -60,7 +60,9 @@ Status SafetyFilter<N>::apply(const Motion& motion, const Vector& weight, Vector
     if (std::abs(weight[i]) > torque_[i]) status = worse(status, Status::kWeightNotHeld);
     base[i] = std::clamp(base[i] + weight[i], -torque_[i], torque_[i]);
   }
-  limited |= shrink(motion.qd, base, excess);
+  // Dampers alone oppose each joint's motion: they are clipped one by one, and lose nothing
+  // elsewhere.
+  if (motion.springs) limited |= shrink(motion.qd, base, excess);
   tau = base;
   add<N>(excess, tau);
   limited |= fade(tau);

@@ -64,7 +64,7 @@ struct Limits {
   JointVector position_upper;   ///< n, rad; infinity if there is none
   JointVector position_margin;  ///< repulsion begins this far before a position limit, n, rad
   /// Its torque at the limit, as a fraction of the torque limit; less where that would make it
-  /// vibrate, or push a joint back faster than half its velocity limit.
+  /// vibrate, or push a joint back faster than a tenth of its velocity limit.
   double repulsion = 0.5;
   JointVector return_velocity;  ///< with which a joint outside its limits returns, n, rad/s; 0: not
   /// The Cartesian springs are drawn out no farther than this, m and rad, however far away the goal

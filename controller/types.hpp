@@ -32,8 +32,9 @@ struct RobotState {
   std::int64_t time = 0;  ///< ns, of any clock that does not run backward
   JointVector position;   ///< rad or m
   JointVector velocity;   ///< rad/s or m/s
-  /// That the world exerts on the tip, N and N m; known or estimated. Only K_G uses it, in the
-  /// analysis: what is not finite is reported (Status::kWrenchNotFinite), and changes no torque.
+  /// That the world exerts on the tip, N and N m; known or estimated. K_G uses it, in the
+  /// analysis, and Limits::external_force: with that, a wrench that is not finite is a collision;
+  /// else it is reported (Status::kWrenchNotFinite), and changes no torque.
   Vector6 external_wrench = Vector6::Zero();
 };
 
