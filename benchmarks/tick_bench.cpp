@@ -156,12 +156,12 @@ void add(const std::string& name, Mode mode, Analysis analysis, std::initializer
 
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
-  const Analysis off{Analysis::Where::kOff, 1, 0.1, true, {}};
-  const Analysis every_tick{Analysis::Where::kInline, 1, 0.1, true, {}};
+  const Analysis off{Analysis::Where::kOff, 1, 0.1, 0.1, true, {}};
+  const Analysis every_tick{Analysis::Where::kInline, 1, 0.1, 0.1, true, {}};
   add("tick/cartesian", Mode::kCartesian, off, {6, 7, 14});
   add("tick/joint", Mode::kJoint, off, {6, 7, 14});
-  const Analysis values_only{Analysis::Where::kInline, 1, 0.1, false, {}};
-  const Analysis background{Analysis::Where::kBackground, 1, 0.1, true, {}};
+  const Analysis values_only{Analysis::Where::kInline, 1, 0.1, 0.1, false, {}};
+  const Analysis background{Analysis::Where::kBackground, 1, 0.1, 0.1, true, {}};
   add("tick/full", Mode::kCartesian, every_tick,
       {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
   add("tick/design", Mode::kCartesian, every_tick, {6, 7, 14}, 0.7);
