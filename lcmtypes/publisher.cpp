@@ -143,7 +143,8 @@ void Publisher::send(const char* channel, const Message& message) {
 }
 
 bool Publisher::is_new(const ModesSample& sample) const {
-  const double silence = 1e-6 * static_cast<double>(sample.utime - published_modes_.utime);
+  const double silence = 1e-6 * (static_cast<double>(sample.utime) -  // whatever the times are
+                                 static_cast<double>(published_modes_.utime));
   return !(silence < options_.modes_heartbeat) ||
          differ(sample.vibration, published_modes_.vibration, options_.modes_tolerance);
 }
