@@ -3,15 +3,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 
 namespace dashpot::controller {
 namespace {
 
 constexpr double kLargestGain = 1e9;
 
-template <class A, class B>
-bool same(const A& a, const B& b) noexcept {
-  return a.rows() == b.rows() && a.cols() == b.cols() && a == b;
+/// Almost always the bits are equal, which takes a tenth of the time of comparing numbers.
+template <class Matrix>
+bool same(const Matrix& a, const Matrix& b) noexcept {
+  if (a.rows() != b.rows() || a.cols() != b.cols()) return false;
+  const auto bytes = static_cast<std::size_t>(a.size()) * sizeof(double);
+  return std::memcmp(a.data(), b.data(), bytes) == 0 || a == b;
 }
 
 /// Whether A + slack I has a Cholesky factor.
@@ -122,9 +127,10 @@ SetpointFault check_setpoint(const Setpoint& setpoint, const Limits& limits,
 bool same_gains(const Gains& a, const Gains& b) noexcept {
   return a.frame == b.frame && a.directions == b.directions &&
          same(a.joint_stiffness, b.joint_stiffness) && same(a.joint_damping, b.joint_damping) &&
-         a.joint_damping_ratio == b.joint_damping_ratio && a.task_stiffness == b.task_stiffness &&
-         a.task_damping == b.task_damping && a.task_damping_ratio == b.task_damping_ratio &&
-         same(a.null_stiffness, b.null_stiffness) && same(a.null_damping, b.null_damping);
+         a.joint_damping_ratio == b.joint_damping_ratio &&
+         same(a.task_stiffness, b.task_stiffness) && same(a.task_damping, b.task_damping) &&
+         a.task_damping_ratio == b.task_damping_ratio && same(a.null_stiffness, b.null_stiffness) &&
+         same(a.null_damping, b.null_damping);
 }
 
 }  // namespace dashpot::controller

@@ -23,7 +23,7 @@ SetpointFault check_gains(const Gains& gains, Mode mode, Eigen::Index n) noexcep
 SetpointFault check_setpoint(const Setpoint& setpoint, const Limits& limits,
                              bool known_gains = false) noexcept;
 
-/// Same sizes and entries.
+/// True if sizes and entries are equal. Gains without NaN are expected.
 bool same_gains(const Gains& a, const Gains& b) noexcept;
 
 }  // namespace dashpot::controller

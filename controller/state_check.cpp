@@ -17,6 +17,12 @@ constexpr double kUnexplained = 0.3;       // of what was travelled
 constexpr double kAngleTolerance = 0.02;   // rad
 constexpr double kSlideTolerance = 0.005;  // m
 
+/// Returns the multiple of 2 pi that is nearest to `angle`.
+double whole_turns(double angle) noexcept {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  return kTurn * std::nearbyint(angle / kTurn);
+}
+
 }  // namespace
 
 StateCheck::StateCheck(const RobotModel& model, const Settings& settings)
@@ -81,32 +87,31 @@ Status StateCheck::check(const RobotState& state) noexcept {
   if (backward || status != Status::kStateJump) doubtful_.any = false;
   if (status != Status::kOk) return status;
 
-  const Last last = good_;
-  if (any_continuous_ && good_.any) {
-    JointVector position = state.position;
-    unwrap(position, good_.position);
-    good_.position = position;
-  } else {
-    good_.position = state.position;
-  }
-  good_.velocity = state.velocity;
+  JointVector position = state.position;
+  if (any_continuous_ && good_.any) unwrap(position, good_.position);
   if (!blind_) velocity_ = state.velocity;
-  good_.age = 0;
-  good_.any = true;
-  if (!last.any) return Status::kOk;
-  if (relocated || last.age > longest_gap_) {
+  if (good_.any && (relocated || good_.age > longest_gap_)) {
     forget_motion();
     intervals_ = 0;
-    return gap > longest_gap_ ? Status::kTimeGap : Status::kOk;
+    if (gap > longest_gap_) status = Status::kTimeGap;
+  } else if (good_.any) {
+    status = compare(position, state.velocity, gap);
   }
-  if (contradictory(last)) {
-    status = Status::kStateContradictory;
-    blind_ = true;
-  } else if (wrong_rate(gap)) {
-    status = Status::kWrongRate;
-  }
-  if (blind_) velocity_ += ((good_.position - last.position) / last.age - velocity_) / 3;
+  good_.position = position;
+  good_.velocity = state.velocity;
+  good_.age = 0;
+  good_.any = true;
   return status;
+}
+
+Status StateCheck::compare(const JointVector& position, const JointVector& velocity,
+                           double gap) noexcept {
+  const bool contradicts = contradictory(position, velocity);
+  blind_ |= contradicts;
+  const bool wrong = !contradicts && wrong_rate(gap);
+  if (blind_) velocity_ += ((position - good_.position) / good_.age - velocity_) / 3;
+  if (contradicts) return Status::kStateContradictory;
+  return wrong ? Status::kWrongRate : Status::kOk;
 }
 
 bool StateCheck::wrong_rate(double gap) noexcept {
@@ -116,13 +121,13 @@ bool StateCheck::wrong_rate(double gap) noexcept {
   return intervals_ == kIntervals && (excess_ < kFastest || excess_ > kSlowest);
 }
 
-bool StateCheck::contradictory(const Last& last) noexcept {
+bool StateCheck::contradictory(const JointVector& position, const JointVector& velocity) noexcept {
   if (memory_ == 0) return false;
-  const double keep = std::max(0.0, 1 - last.age / memory_);
+  const double keep = std::max(0.0, 1 - good_.age / memory_);
   bool found = false;
   for (Eigen::Index i = 0; i < n_; ++i) {
-    const double moved = good_.position[i] - last.position[i];
-    const double said = 0.5 * (last.velocity[i] + good_.velocity[i]) * last.age;
+    const double moved = position[i] - good_.position[i];
+    const double said = 0.5 * (good_.velocity[i] + velocity[i]) * good_.age;
     unexplained_[i] = keep * unexplained_[i] + moved - said;
     travelled_[i] = keep * travelled_[i] + std::max(std::abs(moved), std::abs(said));
     found |= std::abs(unexplained_[i]) > tolerance_[i] + kUnexplained * travelled_[i];
@@ -131,12 +136,11 @@ bool StateCheck::contradictory(const Last& last) noexcept {
 }
 
 bool StateCheck::follows(const Last& last, const RobotState& state) const noexcept {
-  JointVector position = state.position;
-  if (any_continuous_) unwrap(position, last.position);
   for (Eigen::Index i = 0; i < n_; ++i) {
     const double limit = velocity_limit_[i];
     const double before = last.velocity[i], now = state.velocity[i];
-    const double moved = position[i] - last.position[i];
+    double moved = state.position[i] - last.position[i];
+    if (any_continuous_ && continuous_[static_cast<std::size_t>(i)]) moved -= whole_turns(moved);
     const double apart = std::abs(moved - 0.5 * (before + now) * last.age);
     const double fastest = std::max(std::abs(before), std::abs(now));
     const bool near = std::abs(moved) <= 2 * last.age * limit + 1e-3;
@@ -161,10 +165,8 @@ bool StateCheck::believed(const RobotState& state, double gap) noexcept {
 }
 
 void StateCheck::unwrap(JointVector& position, const JointVector& last) const noexcept {
-  constexpr double kTurn = 2 * std::numbers::pi;
   for (Eigen::Index i = 0; i < n_; ++i) {
-    if (!continuous_[static_cast<std::size_t>(i)]) continue;
-    position[i] += kTurn * std::nearbyint((last[i] - position[i]) / kTurn);
+    if (continuous_[static_cast<std::size_t>(i)]) position[i] += whole_turns(last[i] - position[i]);
   }
 }
 

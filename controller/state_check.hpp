@@ -63,8 +63,10 @@ class StateCheck {
   void unwrap(JointVector& position, const JointVector& last) const noexcept;
   /// True if ticks have come at another rate than the configured one.
   bool wrong_rate(double gap) noexcept;
-  /// True if positions have moved otherwise than the velocities say since `last`.
-  bool contradictory(const Last& last) noexcept;
+  /// Compares a good state with the one before. Returns kOk, kStateContradictory or kWrongRate.
+  Status compare(const JointVector& position, const JointVector& velocity, double gap) noexcept;
+  /// True if positions have lately moved otherwise than the velocities say.
+  bool contradictory(const JointVector& position, const JointVector& velocity) noexcept;
   void forget_motion() noexcept;
 
   Eigen::Index n_;

@@ -28,6 +28,10 @@ Settings settings_for(const RobotModel& model, bool modes) {
   settings.analysis.where = modes ? Analysis::Where::kInline : Analysis::Where::kOff;
   settings.feed_forward.friction = true;
   settings.limits.velocity.setConstant(1e6);  // so that states may jump
+  settings.limits.tip_velocity = 1e6;
+  settings.limits.torque *= 1e3;  // and torques with them
+  settings.limits.torque_rate *= 1e6;
+  settings.watchdog.feedback = 0;
   settings.motion.gain_time = 0.01;
   return settings;
 }
