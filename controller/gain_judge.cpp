@@ -3,14 +3,18 @@
 #include <dashpot/controller/sampled_analysis.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <numbers>
 
 namespace dashpot::controller {
 namespace {
 
 constexpr double kSlowest = 1;  // rad/s
+constexpr std::array<double, kMaxJoints> kPrimes{2,  3,  5,  7,  11, 13, 17, 19,
+                                                 23, 29, 31, 37, 41, 43, 47, 53};
 
 /// Those of a controller whose closed loop has the gains of a set-point from the second tick on,
 /// wherever the robot is.
@@ -30,6 +34,8 @@ Settings judging(Settings settings) {
 
 GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
     : model_(model),
+      lower_(settings.limits.position_lower),
+      upper_(settings.limits.position_upper),
       wanted_(settings.limits.gain_margin),
       gravity_(settings.feed_forward.gravity),
       loop_(sampled_loop(model, settings)),
@@ -45,6 +51,25 @@ GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
   }
   worst.margin = std::min(worst.margin, wanted_);
   return worst;
+}
+
+GainJudge::Verdict GainJudge::judge_anywhere(const Gains& gains) {
+  Verdict best{-1, Mode::kJoint};
+  JointVector q(lower_.size());
+  for (int k = 0; k < kPostures && best.margin < wanted_; ++k) {
+    for (Eigen::Index i = 0; i < q.size(); ++i) {
+      // Kronecker's sequence of the roots of primes: no two joints run through the same values.
+      const double share = std::fmod((k + 1) * std::sqrt(kPrimes[static_cast<std::size_t>(i)]), 1);
+      const double turn = 2 * std::numbers::pi;  // where there is no limit
+      double low = std::isfinite(upper_[i]) ? upper_[i] - turn : -turn / 2;
+      if (std::isfinite(lower_[i])) low = lower_[i];
+      const double high = std::isfinite(upper_[i]) ? upper_[i] : low + turn;
+      q[i] = low + share * (high - low);
+    }
+    const Verdict found = judge(q, gains);
+    if (found.margin > best.margin) best = found;
+  }
+  return best;
 }
 
 double GainJudge::margin(const JointVector& q, const Gains& gains, Mode mode) try {

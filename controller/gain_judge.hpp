@@ -25,11 +25,16 @@ class GainJudge {
   /// `q`: n, rad. The gains have passed check_gains in both modes. Zero where the loop could not be
   /// analysed.
   Verdict judge(const JointVector& q, const Gains& gains);
+  /// Where nobody knows yet where the robot is: the best verdict of kPostures postures, spread over
+  /// the position limits. Gains that none of them bears are wrong anywhere.
+  Verdict judge_anywhere(const Gains& gains);
+  static constexpr int kPostures = 8;
 
  private:
   double margin(const JointVector& q, const Gains& gains, Mode mode);
 
   RobotModel model_;
+  JointVector lower_, upper_;  ///< of the positions, rad
   double wanted_;
   bool gravity_;
   analysis::SampledLoop loop_;

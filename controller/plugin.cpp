@@ -203,13 +203,13 @@ std::int32_t finish(std::int32_t code) noexcept {
   return finish(code, dashpot_status_text(code));
 }
 
-/// Judges gains at q. DASHPOT_OK or why not.
+/// Judges gains at q, or, where `q` has no entries, anywhere. DASHPOT_OK or why not.
 std::int32_t judge(dashpot_controller& controller, const Gains& gains, const JointVector& q,
                    bool again, double* margin) noexcept {
   Judgement& judgement = controller.judgement;
   GainJudge::Verdict verdict{0, Mode::kJoint};
   try {
-    verdict = judgement.judge(gains, q, again);
+    verdict = q.size() == 0 ? judgement.judge_anywhere(gains) : judgement.judge(gains, q, again);
   } catch (...) {
     return finish(DASHPOT_UNSTABLE_GAINS, "the gains could not be judged");
   }
@@ -217,10 +217,10 @@ std::int32_t judge(dashpot_controller& controller, const Gains& gains, const Joi
   if (judgement.enough(verdict)) return finish(DASHPOT_OK);
   std::array<char, 256> text{};
   std::snprintf(text.data(), text.size(),
-                "with the %s gains the sampled loop has a gain margin of %.3g here, "
+                "with the %s gains the sampled loop has a gain margin of %.3g %s, "
                 "limits.gain_margin asks for %.3g",
                 verdict.mode == Mode::kJoint ? "joint" : "task", verdict.margin,
-                judgement.wanted());
+                q.size() == 0 ? "at best, wherever the robot is" : "here", judgement.wanted());
   return finish(DASHPOT_UNSTABLE_GAINS, text.data());
 }
 
@@ -259,8 +259,11 @@ dashpot_controller* dashpot_create(const char* config_path) {
   }
   try {
     auto controller = std::make_unique<dashpot_controller>(load_config(config_path));
-    finish(DASHPOT_OK);
-    return controller.release();
+    const std::int32_t code =
+        judge(*controller, controller->request.setpoint.gains, JointVector(), true, nullptr);
+    if (code == DASHPOT_OK) return controller.release();
+    finish(code, (std::string(config_path) + ": gains: " + dashpot_last_error()).c_str());
+    return nullptr;
   } catch (const std::exception& error) {
     finish(DASHPOT_WRONG_VALUE, error.what());
   } catch (...) {
@@ -356,8 +359,8 @@ int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* g
   Gains wanted = request.setpoint.gains;
   std::int32_t problem = read_gains(gains, controller->n, wanted);
   JointVector q;
-  const bool located = controller->judgement.where(q);  // or else dashpot_start judges them
-  if (problem == DASHPOT_OK && located && !same_gains(wanted, request.setpoint.gains)) {
+  controller->judgement.where(q);
+  if (problem == DASHPOT_OK && !same_gains(wanted, request.setpoint.gains)) {
     problem = judge(*controller, wanted, q, false, nullptr);
   }
   if (problem != DASHPOT_OK) return problem;

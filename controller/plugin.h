@@ -263,7 +263,8 @@ typedef struct dashpot_sampled_modes {
 } dashpot_sampled_modes;
 
 /* Reads a YAML file (see controller/examples/panda.yaml) and the URDF that it names. NULL on
- * failure: dashpot_last_error says why, in one line with file, key and line. */
+ * failure: dashpot_last_error says why, in one line with file, key and line. Gains that
+ * dashpot_set_gains would refuse are a failure. */
 dashpot_controller* dashpot_create(const char* config_path);
 
 /* NULL is fine. */
@@ -297,7 +298,8 @@ int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* stat
  * configuration there, as dashpot_set_gains does, and then does what dashpot_reset does, but that
  * `torque` NULL stands for the arm's weight there (zero where the robot compensates it). Takes some
  * milliseconds and allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error says more.
- * A loop that never called it starts from the weight too, but with gains that nobody judged. */
+ * A loop that never called it starts from the weight too, but with gains that nobody judged at its
+ * posture. */
 int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);
 
 /* On the real-time thread: forgets history, faults and set-point, but not the gains; the next tick
@@ -310,12 +312,13 @@ int32_t dashpot_reset(dashpot_controller* controller, const double* torque);
  * holds the robot where it is until there is another set-point. Without a fault it does nothing. */
 int32_t dashpot_release(dashpot_controller* controller);
 
-/* On the other thread. The next tick takes it up; of several, the latest. Once the robot has been
- * somewhere (dashpot_start, dashpot_update), dashpot_set_gains refuses
+/* On the other thread. The next tick takes it up; of several, the latest. dashpot_set_gains refuses
  * gains (DASHPOT_UNSTABLE_GAINS) with which the loop as it is sampled, at the posture of the latest
  * tick, would have less than limits.gain_margin: in either mode, with the delay and the filters of
- * analysis.sampled. A motion that needs more than 6 s to swing or to grow e-fold does not count. It
- * judges gains that are new, which takes some milliseconds and allocates. */
+ * analysis.sampled. Before dashpot_start and the first tick, it refuses those that have it at none
+ * of eight postures spread over the position limits. A motion that needs more than 6 s to swing or
+ * to grow e-fold does not count. It judges gains that are new, which takes some milliseconds and
+ * allocates. */
 int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpoint* setpoint);
 int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains);
 

@@ -47,6 +47,12 @@ class Judgement {
     }
     return verdict;
   }
+  /// Judges gains that have passed check_gains, as long as nobody knows where the robot is.
+  GainJudge::Verdict judge_anywhere(const Gains& gains) {
+    const std::lock_guard lock(mutex_);
+    if (wanted_ <= 1) return {wanted_, Mode::kJoint};
+    return judge_.judge_anywhere(gains);
+  }
   bool enough(const GainJudge::Verdict& verdict) const noexcept {
     return verdict.margin >= wanted_;
   }
