@@ -208,11 +208,12 @@ bool Starter::add_strains() {
   return true;
 }
 
-/// A basis of the planes of `count` modes.
-void write_planes(const StateForm& form, const Planes& planes, int count, TrackedBasis& basis) {
+/// A basis of the planes of `count` modes, with room for `zeros` columns of zero modes.
+void write_planes(const StateForm& form, const Planes& planes, int count, int zeros,
+                  TrackedBasis& basis) {
   basis = TrackedBasis{};
   basis.modes = count;
-  basis.zeros = form.zeros();
+  basis.zeros = zeros;
   basis.Z.width = padded_width(basis.modes, basis.zeros);
   for (int row = 0; row < form.states(); ++row) {
     for (int i = 0; i < count; ++i) {
@@ -223,7 +224,7 @@ void write_planes(const StateForm& form, const Planes& planes, int count, Tracke
 }
 
 void Starter::write(TrackedBasis& basis) const {
-  write_planes(form_, planes_, plane_count_, basis);
+  write_planes(form_, planes_, plane_count_, form_.zeros(), basis);
   for (int row = 0; row < form_.states(); ++row) {
     for (int k = 0; k < basis.zeros; ++k) {
       basis.Z(row, 2 * basis.modes + k) = zeros_[at(k)][at(row)];
@@ -374,7 +375,9 @@ void keep_planes(const StateForm& form, const Spectrum<kMaxDof>& spectrum,
   const int count = spectrum.modes.size();
   Planes planes;
   for (int k = 0; k < count; ++k) planes[at(place[at(k)])] = plane_of(form, spectrum.modes[k]);
-  write_planes(form, planes, count, basis);
+  // Nonsymmetric damping and rounding errors can make modes of zero modes: there are more of them
+  // than rows of W then, and no room for zero modes as well.
+  write_planes(form, planes, count, 0, basis);
 }
 
 bool balance(const TrackedDefect& defect, double tolerance, TrackedBasis& basis) noexcept {

@@ -1,4 +1,5 @@
 // Systems that the tracker does not follow, but solves directly, and modes without a motion.
+#include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/tracked.hpp>
 
 #include <gtest/gtest.h>
@@ -65,6 +66,39 @@ TEST(ModeTracker, HasNoShapeWhereNothingMoves) {
       EXPECT_EQ(still, 1);
     }
   }
+}
+
+/// Nonsymmetric damping of a spring and two zero modes can leave two complex pairs: a mode more
+/// than the stiffness factor has rows, and two zero modes as well.
+TEST(ModeTracker, HasRoomForModesThatDampingMakesOfZeroModes) {
+  testing::Random random(431);
+  System<kMaxDof> system(16);
+  system.stiffness_factor.setZero(14, 16);
+  system.damping.diagonal().setConstant(0.1);
+  for (Eigen::Index i = 0; i < 14; ++i) {
+    system.stiffness_factor(i, i) = i < 13 ? 10 + static_cast<double>(i) : 3;
+  }
+  int found = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    system.damping.bottomRightCorner(3, 3) = 10 * random.matrix(3, 3);
+    Tracked tracked;
+    for (int call = 0; call < 3; ++call) {
+      system.stiffness_factor(0, 0) += 1e-3;
+      const Status status = tracked.update(system);
+      ASSERT_TRUE(status == Status::kOk || status == Status::kUncertified) << to_text(status);
+      if (tracked.spectrum->mode_count != 15) break;
+      ++found;
+      for (int i = 0; i < 13; ++i) {
+        bool known = false;
+        for (int k = 0; k < 15; ++k) {
+          const double frequency = tracked.mode(k).natural_frequency;
+          known |= std::abs(frequency - system.stiffness_factor(i, i)) < 1e-9;
+        }
+        EXPECT_TRUE(known) << i;
+      }
+    }
+  }
+  EXPECT_GT(found, 3);
 }
 
 TEST(ModeTracker, SolvesASingularStiffnessWithoutFactorDirectly) {
