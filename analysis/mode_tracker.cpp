@@ -169,15 +169,16 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
   const StateForm last = state_form(last_);
   const bool alike = has_basis_ && last.joints == form.joints && last.strains == form.strains &&
                      last.factored == form.factored;
-  if (alike && identical(form, last) && reuse(form, 0, out)) return out.status;
+  if (alike && evaluated_ && identical(form, last) && reuse(form, 0, out)) return out.status;
   const bool symmetric = is_symmetric(system.mass) && is_symmetric(system.damping) &&
                          (form.factored || is_symmetric(system.stiffness));
   if (!symmetric) return solve_directly(system, form, Fallback::kNotSymmetric, out, work);
   Fallback reason = Fallback::kStart;
   if (alike) {
     const double change = distance(form, last, sizes_, options_.reuse_tolerance);
-    if (reuse(form, change, out)) return out.status;
+    if (evaluated_ && reuse(form, change, out)) return out.status;
     if (follow(form, out, reason, work)) {
+      evaluated_ = true;
       last_.mass = system.mass;
       last_.damping = system.damping;
       if (form.factored) {
@@ -187,6 +188,8 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
       }
       return out.status;
     }
+    evaluated_ = false;
+    if (work.over()) return give_up(out);  // the next update goes on from the last basis
   }
   return solve_directly(system, form, reason, out, work);
 }
@@ -243,6 +246,7 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   const int columns = basis_.columns(), width = basis_.Z.width;
   before_.modes = basis_.modes;
   before_.zeros = basis_.zeros;
+  before_.proportional = basis_.proportional;
   copy(basis_.Z, columns, before_.Z);
   if (prediction_.ready()) {
     ++counters_.predicted;
@@ -261,6 +265,8 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   sizes_ = coefficient_sizes(form);
   if (!refine(form, out, reason, work)) {
     copy(before_.Z, columns, basis_.Z);  // the last one that was right still names the modes
+    basis_.proportional = before_.proportional;
+    set_zero(width, columns, E_);
     return false;
   }
   if (turned_) {
@@ -347,7 +353,6 @@ Status ModeTracker::solve_directly(const System<kMaxDof>& system, const StateFor
 
 Status ModeTracker::give_up(TrackedSpectrum& out) noexcept {
   ++counters_.unfinished;
-  has_basis_ = false;
   out.mode_count = out.zero_mode_count = 0;
   return out.status = Status::kUnfinished;
 }
@@ -383,7 +388,7 @@ bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out, Work& wor
     ++lineage_;
   }
   Fallback unused{};
-  has_basis_ = refine(form, out, unused, work);
+  has_basis_ = evaluated_ = refine(form, out, unused, work);
   return has_basis_;
 }
 

@@ -103,7 +103,8 @@ class ModeTracker {
     return update(system, out, work);
   }
   /// The same, with no more work than is granted. If that is not enough, the status is kUnfinished
-  /// and there are no modes; an update that is granted more then finds them, in their places.
+  /// and there are no modes; an update that is granted more then finds them, in their places. What
+  /// could not be followed within the work granted is followed by a later update, if it can be.
   Status update(const System<kMaxDof>& system, TrackedSpectrum& out, Work& work) noexcept;
 
   /// The next update starts anew; modes that it recognises keep their places.
@@ -139,6 +140,7 @@ class ModeTracker {
 
   // The last spectrum: the basis as it was evaluated, and the step that is still to be taken.
   bool has_basis_ = false;
+  bool evaluated_ = false;   ///< blocks and defect are those of the basis and of last_
   bool has_places_ = false;  ///< basis_ says which mode is which
   std::uint64_t lineage_ = 0;
   System<kMaxDof> last_;

@@ -88,16 +88,16 @@ TEST(Work, OfTheTrackerIsAllOrNothing) {
   EXPECT_TRUE(tracker->follows());
   system.stiffness *= 4;  // a jump, to be solved directly: all is twice as fast
   system.damping *= 2;
-  Work first_pass(100'000);
-  EXPECT_EQ(tracker->update(system, *spectrum, first_pass), Status::kUnfinished);
+  Work unfollowed(400'000);
+  EXPECT_EQ(tracker->update(system, *spectrum, unfollowed), Status::kUnfinished);
   EXPECT_EQ(spectrum->mode_count, 0);
-  EXPECT_LE(first_pass.done(), 100'000);
+  EXPECT_LE(unfollowed.done(), 400'000);
   EXPECT_FALSE(tracker->follows());
   Work none(0);
   EXPECT_EQ(tracker->update(system, *spectrum, none), Status::kUnfinished);
   Work unlimited;
   ASSERT_EQ(tracker->update(system, *spectrum, unlimited), Status::kOk);
-  EXPECT_GT(unlimited.done(), 100'000);
+  EXPECT_GT(unlimited.done(), 400'000);
   EXPECT_TRUE(tracker->follows());
   EXPECT_EQ(spectrum->lineage, before->lineage);
   for (std::size_t i = 0; i < 7; ++i) {
@@ -108,6 +108,38 @@ TEST(Work, OfTheTrackerIsAllOrNothing) {
   EXPECT_EQ(counters.unfinished, 2);
   EXPECT_EQ(counters.updates, counters.tracked + counters.reused + counters.direct +
                                   counters.failed + counters.unfinished);
+}
+
+/// An update that ends before it has followed the modes loses nothing: neither what the next one
+/// follows, nor a bound.
+TEST(Work, LeavesWhatCanBeFollowedToALaterUpdate) {
+  Random random(813);
+  auto tracker = std::make_unique<ModeTracker>();
+  auto spectrum = std::make_unique<TrackedSpectrum>();
+  auto exact = std::make_unique<Spectrum<kMaxDof>>();
+  System<kMaxDof> system = ordinary_system(random, 12);
+  ASSERT_EQ(tracker->update(system, *spectrum), Status::kOk);
+  const System<kMaxDof> change = ordinary_system(random, 12);
+  for (int step = 0; step < 6; ++step) {
+    const double way = step == 3 ? -1e-4 : 1e-4;  // once back to what was followed last
+    system.stiffness += way * change.stiffness;
+    for (const std::int64_t units : {0, 150'000, 300'000}) {
+      Work little(units);
+      ASSERT_EQ(tracker->update(system, *spectrum, little), Status::kUnfinished);
+      EXPECT_TRUE(tracker->follows());
+    }
+    if (step == 2) continue;
+    ASSERT_EQ(tracker->update(system, *spectrum), Status::kOk);
+    EXPECT_EQ(spectrum->origin, SpectrumOrigin::kTracked);
+    ASSERT_EQ(SpectrumSolver<kMaxDof>().solve(system, *exact), Status::kOk);
+    for (int i = 0; i < 12; ++i) {
+      const ModeNumbers& mode = spectrum->modes[static_cast<std::size_t>(
+          spectrum->by_frequency[static_cast<std::size_t>(i)])];
+      EXPECT_LE(std::abs(mode.eigenvalues[0] - exact->modes[i].eigenvalues[0]),
+                mode.error_bound + exact->modes[i].error_bound);
+    }
+  }
+  EXPECT_EQ(tracker->counters().direct, 1);
 }
 
 }  // namespace
