@@ -28,7 +28,7 @@ struct RunReport {
 
 /// For people: tables, each line ended by a newline.
 std::string to_table(const RunReport& report);
-/// One JSON object. README.md lists the keys.
+/// One JSON object. docs/command-line.md lists the keys.
 std::string to_json(const RunReport& report);
 
 }  // namespace dashpot::apps

@@ -146,7 +146,7 @@ Tables and messages count the systems of a list from 0: [0].mass is that of the 
   reflected_inertia n, of drives, added to the diagonal of mass
   payload           a mass, kg, at the origin of a task of six directions, added to mass
   null_damping      n, damping of the motions that task_stiffness leaves free, as a
-                    controller adds it: N' diag(null_damping) N, see README
+                    controller adds it: N' diag(null_damping) N, see docs/command-line.md
   times             asks for the response at these times (s, none negative). It is the
                     sum of what each of the following causes; what is not given is zero:
   initial_position  n

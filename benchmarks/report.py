@@ -1,8 +1,9 @@
 """Makes of the benchmarks' parts what ./run bench shows:
-    report.py DIR [--publish README]
+    report.py DIR [--publish]
 reads DIR/parts/*.json (Google Benchmark's, repeated), writes DIR/results.json (a row for each name,
 with medians), DIR/headline.md, and DIR/*.dat for plots.gp, and prints the table and the exponents.
---publish puts the headline into README, between its marks."""
+--publish puts the headline into benchmarks/README.md and four figures of it into README.md, between
+their marks."""
 
 import collections
 import datetime
@@ -15,6 +16,7 @@ import statistics
 import sys
 
 ACCURACIES = [10.0**-k for k in range(3, 10)]  # rad
+ROOT = pathlib.Path(__file__).parent.parent
 GAINS = {"soft": "1e2", "ordinary": "1e3", "stiff": "1e5"}
 TIMES = ("real_time", "cpu_time")
 NANOSECONDS = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9}
@@ -267,11 +269,29 @@ def write_plot_data(results, directory):
                     write_points(file, sorted(points))
 
 
-def publish(path, text):
-    begin, end = "<!-- headline of ./run bench -->\n", "<!-- end of headline -->\n"
-    readme = pathlib.Path(path).read_text()
-    before, rest = readme.split(begin)
-    pathlib.Path(path).write_text(before + begin + text + end + rest.split(end)[1])
+def figures(results, context):
+    """The four figures of README.md; the rival, where there is one, is the fastest that ran."""
+    rows = [
+        comparison(results, "one control tick, safety and tracked modes included", "tick/full/7", []),
+        comparison(results, "the same with ratio damping", "tick/design/7", []),
+        comparison(results, "six modes, tracked, with proved bounds", "spectrum/tracked/6",
+                   [("spectrum/path_eigen/6", "Eigen"), ("spectrum/path_lapack/6", "LAPACK")]),
+        comparison(results, "dynamics of seven joints", "dynamics/dashpot/7",
+                   [("dynamics/kdl/7", "KDL"), ("dynamics/pinocchio/7", "Pinocchio")]),
+    ]
+    if None in rows:
+        sys.exit("report.py: a figure of README.md was not measured; nothing is published")
+    lines = [f"| CPU time, {machine(context)} | us | fastest rival, us |", "|---|---|---|"]
+    lines += [f"| {what} | {mine} | {f'{rival} ({whose})' if whose else '-'} |"
+              for what, mine, rival, whose, _ in rows]
+    return "\n".join(lines) + "\n"
+
+
+def put_between(path, name, text):
+    """Replaces what stands between the marks of this name."""
+    begin, end = f"<!-- {name} of ./run bench -->\n", f"<!-- end of {name} -->\n"
+    before, rest = path.read_text().split(begin)
+    path.write_text(before + begin + text + end + rest.split(end)[1])
 
 
 def main():
@@ -301,7 +321,9 @@ def main():
         print("\nLeft out of all this, for they ran too short (a busy machine?); run again:")
         print("  " + ", ".join(results.too_short))
     if "--publish" in sys.argv:
-        publish(sys.argv[sys.argv.index("--publish") + 1], text)
+        short = figures(results, merged["context"])
+        put_between(ROOT / "benchmarks" / "README.md", "headline", text)
+        put_between(ROOT / "README.md", "figures", short)
 
 
 main()

@@ -9,7 +9,7 @@
 namespace dashpot::controller {
 
 /// Careful with KDL's solvers: JntArray, Jacobian and others hold Eigen matrices in the alignment
-/// that KDL was compiled with, 16 bytes on Debian. Dashpot asks for 64 (CONTRIBUTING.md), so code
+/// that KDL was compiled with, 16 bytes on Debian. Dashpot asks for 64 (docs/decisions), so code
 /// that hands these types over belongs in a shared library that is compiled without Dashpot's
 /// definitions, as tests/support/kdl_solvers.hpp is. A KDL::Chain and KDL's frames hold none.
 

@@ -190,7 +190,7 @@ typedef struct dashpot_snapshot {
   double tip_wrench[6]; /* of Cartesian springs, dampers and feed-forward, N and N m */
 } dashpot_snapshot;
 
-/* A vibration mode; see the README of Dashpot for what the numbers mean. A bound says how far the
+/* A vibration mode; docs/concepts.md says what the numbers mean. A bound says how far the
  * number can be wrong; it is infinite if none could be proved. */
 typedef struct dashpot_mode {
   double natural_frequency;              /* rad/s; NaN if there is none */

@@ -17,7 +17,7 @@ struct FeedForward {
   /// C(q, qd) qd, as measured. With it the loop is M qdd + D qd + K e = external torque, that of
   /// the modes, at any speed; but its energy then changes by -qd' (D - 1/2 dM/dt) qd, so that it is
   /// passive only as long as D - 1/2 dM/dt is positive semidefinite. Without it the change is
-  /// -qd' D qd: passive at any speed, see README.
+  /// -qd' D qd: passive at any speed, see docs/energy.md.
   bool coriolis = true;
   bool friction = false;     ///< the model's viscous and Coulomb friction, at the velocity of the
                              ///< moving set-point: it adds no feedback

@@ -1,8 +1,10 @@
 // Applies the rules to every file of the source tree.
+#include <dashpot/tests/project/markdown.hpp>
 #include <dashpot/tests/project/rules.hpp>
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -91,6 +93,49 @@ TEST(Tree, StartsEveryHeaderWithPragmaOnce) {
     if (file.has_end(".hpp") && !starts_with_pragma_once(file.text)) offences.push_back(file.path);
   }
   EXPECT_THAT(offences, IsEmpty());
+}
+
+/// The file of this path; null if there is none, or it is no text.
+const File* find_file(const std::string& path) {
+  const auto found = std::find_if(files().begin(), files().end(),
+                                  [&](const File& file) { return file.path == path; });
+  return found == files().end() ? nullptr : &*found;
+}
+
+/// What is wrong with a link of a document; empty if it leads somewhere.
+std::string offence(const File& from, const Link& link) {
+  const fs::path path = link.path.empty()
+                            ? fs::path(from.path)
+                            : (fs::path(from.path).parent_path() / link.path).lexically_normal();
+  if (!fs::exists(DASHPOT_SOURCE_DIR / path)) return "there is no " + path.string();
+  if (link.heading.empty()) return "";
+  const File* const to = find_file(path.string());
+  if (to == nullptr) return path.string() + " has no headings";
+  const std::vector<std::string> headings = anchors(to->text);
+  return std::find(headings.begin(), headings.end(), link.heading) != headings.end()
+             ? ""
+             : path.string() + " has no heading #" + link.heading;
+}
+
+TEST(Documents, LinkOnlyToFilesAndHeadingsThatExist) {
+  std::vector<std::string> offences;
+  int links = 0;
+  for (const File& file : files()) {
+    if (!file.has_end(".md")) continue;
+    for (const Link& link : relative_links(file.text)) {
+      ++links;
+      const std::string found = offence(file, link);
+      if (!found.empty()) offences.push_back(file.path + ": " + found);
+    }
+  }
+  EXPECT_THAT(offences, IsEmpty());
+  EXPECT_GT(links, 50);
+}
+
+TEST(Documents, KeepTheReadmeShort) {
+  const File* const readme = find_file("README.md");
+  ASSERT_NE(readme, nullptr);
+  EXPECT_LE(std::count(readme->text.begin(), readme->text.end(), '\n'), 150);
 }
 
 }  // namespace
