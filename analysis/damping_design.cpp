@@ -1,6 +1,7 @@
 #include <dashpot/analysis/checks.hpp>
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_fit.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>

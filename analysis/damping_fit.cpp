@@ -1,5 +1,6 @@
 #include <dashpot/analysis/damping_fit.hpp>
 #include <dashpot/analysis/sensitivity.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 
 #include <Eigen/Cholesky>
 #include <algorithm>

@@ -1,5 +1,6 @@
 #pragma once
-#include <dashpot/analysis/damping_design.hpp>
+#include <dashpot/analysis/damping_target.hpp>
+#include <dashpot/analysis/task_space.hpp>
 
 #include <functional>
 #include <optional>

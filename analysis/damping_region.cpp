@@ -1,4 +1,6 @@
+#include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_region.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 
 #include <algorithm>
 #include <cmath>

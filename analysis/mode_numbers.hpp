@@ -1,9 +1,8 @@
 #pragma once
 // From two eigenvalues with proved bounds to the numbers of a mode.
 
-#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/mode.hpp>
 
-#include <array>
 #include <limits>
 
 namespace dashpot::analysis {
@@ -29,20 +28,6 @@ struct Root {
 
 /// Of two eigenvalues of which no more is known.
 Invariants root_invariants(const Root& a, const Root& b) noexcept;
-
-/// What follows from a mode's two eigenvalues; see Mode, which has the same numbers.
-struct ModeNumbers {
-  /// A complex pair (positive imaginary part first) or two real ones (nearer zero first), 1/s
-  std::array<Complex, 2> eigenvalues{};
-  double natural_frequency = 0;  ///< rad/s; NaN if the eigenvalues' product is negative
-  double damping_ratio = 0;
-  double damped_frequency = 0;  ///< rad/s
-  ModeKind kind = ModeKind::kUnderdamped;
-  /// Proved bounds of |computed - true|; infinite if none could be proved
-  double error_bound = std::numeric_limits<double>::infinity();  ///< of either eigenvalue, 1/s
-  double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
-  double damping_ratio_bound = std::numeric_limits<double>::infinity();
-};
 
 /// `first` has the positive imaginary part if the two are complex. Modes below `soft_frequency`
 /// (rad/s) are called soft.

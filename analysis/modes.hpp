@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/analysis/certificate.hpp>
-#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/spectrum_result.hpp>
 
 namespace dashpot::analysis {
 

@@ -56,24 +56,6 @@ std::int64_t step_work(Eigen::Index n, const BlockList<N>& blocks) {
 
 }  // namespace
 
-const char* to_text(ModeKind kind) noexcept {
-  switch (kind) {
-    case ModeKind::kUnderdamped:
-      return "underdamped";
-    case ModeKind::kCritical:
-      return "critical";
-    case ModeKind::kOverdamped:
-      return "overdamped";
-    case ModeKind::kUndamped:
-      return "undamped";
-    case ModeKind::kUnstable:
-      return "unstable";
-    case ModeKind::kSoft:
-      return "soft";
-  }
-  return "unknown";
-}
-
 template <int N>
 Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work& work) noexcept {
   out.modes.resize(0);

@@ -1,4 +1,6 @@
+#include <dashpot/analysis/certificate.hpp>
 #include <dashpot/analysis/hessenberg_qr.hpp>
+#include <dashpot/analysis/mode_numbers.hpp>
 #include <dashpot/analysis/small_dense.hpp>
 #include <dashpot/analysis/tracked_modes.hpp>
 

@@ -1,5 +1,6 @@
 #pragma once
-#include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/analysis/tracked_certificate.hpp>
+#include <dashpot/analysis/tracked_spectrum.hpp>
 
 namespace dashpot::analysis {
 

@@ -1,5 +1,6 @@
 #pragma once
-#include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/analysis/spectrum_result.hpp>
+#include <dashpot/analysis/tracked_basis.hpp>
 
 namespace dashpot::analysis {
 

@@ -1,7 +1,8 @@
 #pragma once
 // One tick of a sampled loop as a matrix.
 
-#include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/analysis/sampled_spectrum.hpp>
+#include <dashpot/analysis/spectrum_result.hpp>
 
 namespace dashpot::analysis {
 

@@ -1,4 +1,5 @@
 #include <dashpot/apps/closed_loop.hpp>
+#include <dashpot/apps/scene_file.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
 #include <algorithm>

@@ -1,6 +1,7 @@
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/apps/design_options.hpp>
 #include <dashpot/apps/design_report.hpp>
+#include <dashpot/apps/design_writer.hpp>
 #include <dashpot/apps/output_file.hpp>
 #include <dashpot/apps/subcommands.hpp>
 #include <dashpot/apps/system_file.hpp>

@@ -38,11 +38,4 @@ struct RegionReport {
   analysis::RegionDesign design;
 };
 
-std::string design_json(const std::vector<DesignReport>& reports, bool as_list);
-std::string design_table(const std::vector<DesignReport>& reports, bool as_list);
-std::string region_json(const RegionReport& report);
-std::string region_table(const RegionReport& report);
-/// The map of the worst mode, a line for each configuration after one of headings.
-std::string region_csv(const RegionReport& report);
-
 }  // namespace dashpot::apps

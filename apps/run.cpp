@@ -1,6 +1,7 @@
 #include <dashpot/apps/csv_sink.hpp>
 #include <dashpot/apps/output_file.hpp>
 #include <dashpot/apps/run_report.hpp>
+#include <dashpot/apps/scene_file.hpp>
 #include <dashpot/apps/subcommands.hpp>
 #include <dashpot/apps/terminal.hpp>
 #include <dashpot/lcmtypes/bus.hpp>

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/apps/sampled_modes.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/sampled_analysis.hpp>

@@ -8,7 +8,6 @@
 #include <dashpot/sim/linear_system.hpp>
 #include <dashpot/sim/plant.hpp>
 
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -65,19 +64,5 @@ struct Scene {
 
   int dof() const { return static_cast<int>(rest.size()); }
 };
-
-/// Reads a YAML file. For an arm it is a configuration file of the controller (load_config) with
-/// three keys more, `commands`, `simulation` and `scenario`; otherwise `system` has the matrices.
-/// sim/scenes has examples with all keys. Throws InputError.
-Scene load_scene(const std::string& path);
-
-/// The mechanism of the scene.
-std::unique_ptr<sim::System> make_mechanism(const Scene& scene);
-
-/// The joint position next to `q` where the tip is displaced from its pose at `q` by `displacement`
-/// (m, and a rotation vector in rad; base axes): the one that is reached with the least kinetic
-/// energy, step by step. Nothing if it cannot be reached.
-std::optional<JointVector> displaced(const controller::RobotModel& model, const JointVector& q,
-                                     const controller::Vector6& displacement);
 
 }  // namespace dashpot::apps

@@ -37,4 +37,10 @@ std::vector<controller::YamlMapping> mappings(const controller::YamlMapping& key
 void require(const controller::YamlMapping& keys, std::string_view key,
              const controller::YamlMapping& parent, std::string_view name);
 
+/// The joint position next to `q` where the tip is displaced from its pose at `q` by `displacement`
+/// (m, and a rotation vector in rad; base axes): the one that is reached with the least kinetic
+/// energy, step by step. Nothing if it cannot be reached.
+std::optional<JointVector> displaced(const controller::RobotModel& model, const JointVector& q,
+                                     const controller::Vector6& displacement);
+
 }  // namespace dashpot::apps

@@ -1,7 +1,9 @@
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/config_gains.hpp>
 #include <dashpot/controller/config_robot.hpp>
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/setting_reader.hpp>
+#include <dashpot/controller/settings_check.hpp>
 
 #include <algorithm>
 #include <cmath>

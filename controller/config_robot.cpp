@@ -42,10 +42,6 @@ void read_joint_option(const YamlMapping& robot, std::string_view key, const Uni
 
 }  // namespace
 
-RobotModel RobotDescription::model() const {
-  return RobotModel::from_urdf_file(urdf, base, tip, options);
-}
-
 Units joint_units(const RobotModel& model, const char* revolute, const char* prismatic) {
   Units units;
   for (const Joint& joint : model.joints()) {

@@ -1,7 +1,7 @@
 #pragma once
 // The part of a configuration file under the key `robot`.
 
-#include <dashpot/controller/config.hpp>
+#include <dashpot/controller/robot_description.hpp>
 #include <dashpot/controller/setting_reader.hpp>
 
 #include <filesystem>

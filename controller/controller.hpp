@@ -1,6 +1,8 @@
 #pragma once
 #include <dashpot/analysis/system.hpp>
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/settings_check.hpp>
 #include <dashpot/controller/snapshot.hpp>
 
 #include <memory>

@@ -5,7 +5,7 @@
 #include <dashpot/controller/least_inertia.hpp>
 #include <dashpot/controller/loop_system.hpp>
 #include <dashpot/controller/motion_watch.hpp>
-#include <dashpot/controller/safety_filter.hpp>
+#include <dashpot/controller/safety_filter_steps.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/state_check.hpp>
 
@@ -349,14 +349,6 @@ void FixedCore<N>::describe() noexcept {
   }
   snapshot_.tip_wrench = springs ? law_.tip_wrench() : Vector6(Vector6::Zero());
 }
-
-}  // namespace dashpot::controller
-
-// The rest of its functions:
-#include <dashpot/controller/fixed_core_analysis.hpp>
-#include <dashpot/controller/fixed_core_motion.hpp>
-
-namespace dashpot::controller {
 
 extern template class FixedCore<1>;
 extern template class FixedCore<2>;

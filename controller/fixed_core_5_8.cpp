@@ -1,5 +1,6 @@
 // Compiled in four parts, to share the work.
-#include <dashpot/controller/fixed_core.hpp>
+#include <dashpot/controller/fixed_core_analysis.hpp>
+#include <dashpot/controller/fixed_core_motion.hpp>
 
 namespace dashpot::controller {
 

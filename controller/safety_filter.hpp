@@ -166,5 +166,3 @@ class SafetyFilter {
 };
 
 }  // namespace dashpot::controller
-
-#include <dashpot/controller/safety_filter_steps.hpp>

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/sampled_analysis.hpp>
 

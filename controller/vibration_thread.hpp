@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/controller/latest.hpp>
-#include <dashpot/controller/vibration.hpp>
+#include <dashpot/controller/vibration_solver.hpp>
 
 #include <condition_variable>
 #include <mutex>

@@ -1,5 +1,8 @@
 #pragma once
-#include <dashpot/lcmtypes/command_filter.hpp>
+#include <dashpot/lcmtypes/command.hpp>
+#include <dashpot/lcmtypes/command_limits.hpp>
+#include <dashpot/lcmtypes/command_t.hpp>
+#include <dashpot/lcmtypes/command_verdict.hpp>
 
 namespace dashpot::lcmtypes {
 

@@ -3,6 +3,7 @@
 // back, at 1 kHz, with their modes followed and watched.
 
 #include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/impedance.hpp>
 #include <dashpot/controller/loop_system.hpp>
 #include <dashpot/controller/settings.hpp>

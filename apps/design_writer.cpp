@@ -1,5 +1,5 @@
-#include <dashpot/apps/design_report.hpp>
 #include <dashpot/apps/design_trends.hpp>
+#include <dashpot/apps/design_writer.hpp>
 #include <dashpot/apps/json_writer.hpp>
 #include <dashpot/apps/matrix_json.hpp>
 #include <dashpot/apps/text_table.hpp>

@@ -1,4 +1,4 @@
-#include <dashpot/apps/scene.hpp>
+#include <dashpot/apps/scene_file.hpp>
 #include <dashpot/apps/scene_parts.hpp>
 #include <dashpot/controller/config_robot.hpp>
 
