@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/analysis/damping_target.hpp>
-#include <dashpot/analysis/spectrum_result.hpp>
+#include <dashpot/analysis/spectrum/spectrum_result.hpp>
 #include <dashpot/analysis/task_space.hpp>
 
 #include <optional>

@@ -1,8 +1,8 @@
 #pragma once
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/analysis/step_prediction.hpp>
-#include <dashpot/analysis/tracked_certificate.hpp>
 #include <dashpot/analysis/tracked_spectrum.hpp>
+#include <dashpot/analysis/tracker/step_prediction.hpp>
+#include <dashpot/analysis/tracker/tracked_certificate.hpp>
 
 #include <cstdint>
 

@@ -1,6 +1,6 @@
 #pragma once
-#include <dashpot/analysis/sampled_spectrum.hpp>
-#include <dashpot/analysis/spectrum_result.hpp>
+#include <dashpot/analysis/sampled/sampled_spectrum.hpp>
+#include <dashpot/analysis/spectrum/spectrum_result.hpp>
 
 namespace dashpot::analysis {
 

@@ -1,6 +1,6 @@
 #pragma once
-#include <dashpot/analysis/certificate.hpp>
-#include <dashpot/analysis/spectrum_result.hpp>
+#include <dashpot/analysis/spectrum/certificate.hpp>
+#include <dashpot/analysis/spectrum/spectrum_result.hpp>
 #include <dashpot/analysis/work.hpp>
 
 namespace dashpot::analysis {

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/checks.hpp>
+#include <dashpot/analysis/system/checks.hpp>
 #include <dashpot/analysis/types.hpp>
 
 namespace dashpot::analysis {

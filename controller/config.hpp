@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/controller/robot_description.hpp>
 #include <dashpot/controller/settings.hpp>
-#include <dashpot/controller/yaml_document.hpp>
+#include <dashpot/controller/yaml/yaml_document.hpp>
 
 #include <filesystem>
 #include <string>
