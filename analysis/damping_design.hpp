@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/analysis/damping_target.hpp>
-#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/spectrum/spectrum_result.hpp>
 #include <dashpot/analysis/task_space.hpp>
 
 #include <optional>
@@ -27,13 +27,6 @@ struct DampingMiss {
 
 /// "soft", "overdone", ...
 const char* to_text(DampingMiss::Reason reason) noexcept;
-
-/// Entries of the damping matrix that may differ from zero.
-enum class DampingStructure {
-  kFull,
-  kBlock,  ///< the first three directions apart from the rest: translation and rotation
-  kDiagonal,
-};
 
 /// A damping matrix, which is always positive semidefinite, and what it does.
 struct DampingDesign {

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/damping_fit.hpp>
+#include <dashpot/analysis/design/damping_fit.hpp>
 
 #include <functional>
 #include <optional>

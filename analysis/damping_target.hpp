@@ -54,4 +54,11 @@ struct DampingTarget {
   }
 };
 
+/// Entries of the damping matrix that may differ from zero.
+enum class DampingStructure {
+  kFull,
+  kBlock,  ///< the first three directions apart from the rest: translation and rotation
+  kDiagonal,
+};
+
 }  // namespace dashpot::analysis

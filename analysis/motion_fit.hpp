@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/mode.hpp>
 
 #include <vector>
 

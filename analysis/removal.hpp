@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/analysis/system.hpp>
-#include <dashpot/analysis/zero_modes.hpp>
+#include <dashpot/analysis/system/zero_modes.hpp>
 
 #include <vector>
 

@@ -1,8 +1,6 @@
 #pragma once
+#include <dashpot/analysis/system/checks.hpp>
 #include <dashpot/analysis/types.hpp>
-
-#include <stdexcept>
-#include <string>
 
 namespace dashpot::analysis {
 
@@ -48,17 +46,6 @@ struct System {
   bool symmetric() const {
     return damping == damping.transpose() && stiffness == stiffness.transpose();
   }
-};
-
-/// Thrown at set-up for a system that is not a proper one; `key` names the part ("mass", ...).
-class InvalidSystem : public std::invalid_argument {
- public:
-  InvalidSystem(std::string key, const std::string& reason)
-      : std::invalid_argument(key + ": " + reason), key_(std::move(key)) {}
-  const std::string& key() const noexcept { return key_; }
-
- private:
-  std::string key_;
 };
 
 /// Throws InvalidSystem unless the coefficients are square, of one size and finite, and the mass is

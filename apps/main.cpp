@@ -1,4 +1,4 @@
-#include <dashpot/apps/subcommands.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/text/printable.hpp>
 

@@ -5,6 +5,7 @@
 // fixed-size matrices. design/friction/n takes joint friction off besides, design/joint/n is that
 // of springs in the joints. design/region/n designs one matrix for 32 configurations of n joints on
 // one thread, design/map/n only judges one there; items_per_second counts configurations.
+#include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_hold.hpp>
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/analysis/joint_damping_hold.hpp>

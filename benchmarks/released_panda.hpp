@@ -1,7 +1,7 @@
 #pragma once
 // A Panda under Cartesian impedance control that is let go: one right-hand side for everyone's
 // integrators.
-#include <dashpot/sim/articulated_body.hpp>
+#include <dashpot/sim/dynamics/articulated_body.hpp>
 #include <dashpot/sim/system.hpp>
 
 #include <Eigen/Geometry>

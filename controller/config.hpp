@@ -1,22 +1,12 @@
 #pragma once
-#include <dashpot/controller/robot_model.hpp>
+#include <dashpot/controller/robot_description.hpp>
 #include <dashpot/controller/settings.hpp>
-#include <dashpot/controller/yaml_document.hpp>
+#include <dashpot/controller/yaml/yaml_document.hpp>
 
 #include <filesystem>
 #include <string>
 
 namespace dashpot::controller {
-
-/// What makes a RobotModel, or another program's model of the same robot.
-struct RobotDescription {
-  std::string urdf;  ///< path
-  std::string base, tip;
-  ModelOptions options;
-
-  /// Throws InvalidModel.
-  RobotModel model() const;
-};
 
 /// What a configuration file says. Its keys, with units and defaults, stand in
 /// controller/examples/panda.yaml.

@@ -1,6 +1,8 @@
 #pragma once
 #include <dashpot/analysis/system.hpp>
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/settings_check.hpp>
 #include <dashpot/controller/snapshot.hpp>
 
 #include <memory>
@@ -21,9 +23,9 @@ class ControllerCore;
 ///       ...                                      // send `torque`, whatever the status
 ///     }
 ///
-/// Read in this order: robot_model.hpp, dynamics.hpp, setpoint_path.hpp, gain_path.hpp,
-/// held_damping.hpp, impedance_law.hpp, safety_filter.hpp, vibration.hpp, and fixed_core.hpp, which
-/// calls them.
+/// Read in this order: robot_model.hpp, dynamics.hpp, motion/setpoint_path.hpp, law/gain_path.hpp,
+/// law/held_damping.hpp, law/impedance_law.hpp, safety/safety_filter.hpp, vibration/vibration.hpp,
+/// and core/fixed_core.hpp, which calls them.
 ///
 /// One thread at a time may use a Controller; `Latest` (latest.hpp) hands set-points to the thread
 /// of `update` and snapshots from it.
@@ -51,8 +53,8 @@ class Controller {
   /// another than that of `update`; the result is good until its next call.
   const SampledVibration* sampled_vibration() noexcept;
   /// The closed loop at the last tick, linearised where its springs are at rest, in joint
-  /// coordinates (closed_loop.hpp): mass, damping, stiffness and its factor. Not to be called
-  /// before the first good state.
+  /// coordinates (vibration/closed_loop.hpp): mass, damping, stiffness and its factor. Not to be
+  /// called before the first good state.
   void closed_loop(analysis::System<kMaxJoints>& system) const noexcept;
 
   /// Forgets everything, faults too: the next tick is like the first, and holds the robot where it

@@ -2,14 +2,9 @@
 #include <dashpot/controller/types.hpp>
 
 #include <limits>
-#include <stdexcept>
-#include <string>
-#include <utility>
 #include <vector>
 
 namespace dashpot::controller {
-
-class RobotModel;
 
 /// What is added to the springs and dampers. Each that is off costs nothing.
 struct FeedForward {
@@ -145,31 +140,5 @@ struct Settings {
   Setpoint initial;  ///< mode and gains from the start; its positions are ignored: the
                      ///< controller starts by holding where the robot is
 };
-
-/// Thrown at set-up; `key` names the setting, such as "limits.torque" or
-/// "initial.gains.task_stiffness".
-class InvalidSettings : public std::invalid_argument {
- public:
-  InvalidSettings(std::string key, const std::string& reason)
-      : std::invalid_argument(key + ": " + reason), key_(std::move(key)) {}
-  const std::string& key() const noexcept { return key_; }
-
- private:
-  std::string key_;
-};
-
-/// Settings for a robot. Limits of torque, velocity and position are those of its URDF (100 N m,
-/// 2 rad/s and none where the URDF has none), torque changes by at most 1000 N m/s (fully within 10
-/// ms where that is slower, and for prismatic joints), the margin before a position limit is a
-/// tenth of the range, at most 0.1 rad or 2 cm, a joint returns with 0.05 rad/s or 1 cm/s,
-/// set-points move at a quarter of the velocity limits. Gains suit the robot's inertia: 1.5 Hz and
-/// a damping ratio of 0.7 for each joint alone in the middle of its range, and 2 N m s/rad, 40 N
-/// s/m at the tip, or less where its inertia is too small for that anywhere, with stiffness 10/s
-/// times that.
-Settings default_settings(const RobotModel& model);
-
-/// Throws InvalidSettings, with key, value and unit, unless all sizes are n, all numbers are finite
-/// and in their ranges, and all gains are symmetric positive semidefinite.
-void validate(const Settings& settings, int n);
 
 }  // namespace dashpot::controller

@@ -1,5 +1,6 @@
 #pragma once
-#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/mode.hpp>
+#include <dashpot/analysis/status.hpp>
 #include <dashpot/controller/status.hpp>
 #include <dashpot/controller/types.hpp>
 

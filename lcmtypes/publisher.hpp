@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/controller/latest.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
-#include <dashpot/lcmtypes/sample_queue.hpp>
+#include <dashpot/lcmtypes/publish/sample_queue.hpp>
 #include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/samples.hpp>
 #include <dashpot/lcmtypes/sink.hpp>

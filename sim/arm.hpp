@@ -1,6 +1,6 @@
 #pragma once
-#include <dashpot/sim/articulated_body.hpp>
-#include <dashpot/sim/contact.hpp>
+#include <dashpot/sim/dynamics/articulated_body.hpp>
+#include <dashpot/sim/dynamics/contact.hpp>
 #include <dashpot/sim/invalid_scene.hpp>
 #include <dashpot/sim/robot.hpp>
 #include <dashpot/sim/schedule.hpp>

@@ -1,6 +1,6 @@
 #pragma once
+#include <dashpot/sim/hardware/noise.hpp>
 #include <dashpot/sim/integrator.hpp>
-#include <dashpot/sim/noise.hpp>
 #include <dashpot/sim/status.hpp>
 #include <dashpot/sim/system.hpp>
 

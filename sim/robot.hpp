@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/sim/inertia.hpp>
+#include <dashpot/sim/dynamics/inertia.hpp>
 #include <dashpot/sim/types.hpp>
 
 #include <stdexcept>

@@ -1,6 +1,7 @@
 // Bounds proved from a defect enclose the truth, however bad the basis.
-#include <dashpot/analysis/certificate.hpp>
-#include <dashpot/analysis/modes.hpp>
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/spectrum/certificate.hpp>
+#include <dashpot/analysis/spectrum/modes.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>
 

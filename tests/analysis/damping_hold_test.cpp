@@ -2,7 +2,8 @@
 // another precision.
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_hold.hpp>
-#include <dashpot/analysis/modal_damping.hpp>
+#include <dashpot/analysis/design/modal_damping.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
 

@@ -1,5 +1,7 @@
 // Damping matrices of a structure, near a given one, within bounds, and for many configurations.
+#include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_region.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
 #include <dashpot/tests/support/special_values.hpp>

@@ -1,5 +1,5 @@
 // Double-double arithmetic against exact identities and long integers.
-#include <dashpot/analysis/double_double.hpp>
+#include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/tests/support/random.hpp>
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Eigenvalues by the double-shift QR iteration, beside those of Eigen in long double.
-#include <dashpot/analysis/hessenberg_qr.hpp>
+#include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 

@@ -1,6 +1,6 @@
 // Coordinates and drive of a modal basis, from bases that are exact by construction and from the
 // solver's.
-#include <dashpot/analysis/modal_basis.hpp>
+#include <dashpot/analysis/spectrum/modal_basis.hpp>
 #include <dashpot/tests/support/made_to_measure.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 

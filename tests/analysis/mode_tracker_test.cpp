@@ -1,5 +1,5 @@
 // What the tracker says about single systems: shapes, slopes, states, counters, failures.
-#include <dashpot/analysis/assignment.hpp>
+#include <dashpot/analysis/linalg/assignment.hpp>
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 #include <dashpot/tests/support/random.hpp>

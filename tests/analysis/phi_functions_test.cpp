@@ -1,5 +1,5 @@
 // phi_0, phi_1, phi_2 of blocks against 25-digit references, from |A t| = 1e-12 to 1e6.
-#include <dashpot/analysis/phi_functions.hpp>
+#include <dashpot/analysis/linalg/phi_functions.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/reference_phi.hpp>

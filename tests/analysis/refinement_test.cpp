@@ -1,7 +1,7 @@
 // The defect of a basis and its bound, the Sylvester solver's separation, and Newton's convergence.
-#include <dashpot/analysis/certificate.hpp>
-#include <dashpot/analysis/refinement.hpp>
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/spectrum/certificate.hpp>
+#include <dashpot/analysis/spectrum/refinement.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 

@@ -1,5 +1,6 @@
 // Responses against references of 50 digits, from t = 0 to long after all has died away.
 #include <dashpot/analysis/response.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/equation_residual.hpp>
 #include <dashpot/tests/support/matrices.hpp>

@@ -1,6 +1,7 @@
 // The responses that the source paper prints as formulas: Eqs. 43-51 with Appendices 1 and 2, Eq.
 // 64 with Appendix 3. The coefficients are read off computed motions by a linear fit.
 #include <dashpot/analysis/response.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/paper_examples.hpp>

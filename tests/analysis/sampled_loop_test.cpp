@@ -1,5 +1,6 @@
 // The loop as it really runs: against characteristic equations in closed form, and to first order.
 #include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_impedance.hpp>
 

@@ -1,5 +1,6 @@
 // Sensitivities, beside central differences of spectra computed in long double.
 #include <dashpot/analysis/sensitivity.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
 

@@ -1,5 +1,5 @@
 // Elimination and orthogonalisation of small matrices.
-#include <dashpot/analysis/small_dense.hpp>
+#include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 

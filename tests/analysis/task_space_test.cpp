@@ -1,5 +1,5 @@
 // Joint-space systems of task-space impedances, exactly, and their factors.
-#include <dashpot/analysis/double_double.hpp>
+#include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/paper_examples.hpp>

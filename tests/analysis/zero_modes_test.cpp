@@ -1,5 +1,5 @@
 // Which motions store no potential energy, and how safe that decision is.
-#include <dashpot/analysis/zero_modes.hpp>
+#include <dashpot/analysis/system/zero_modes.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>

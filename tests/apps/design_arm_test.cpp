@@ -1,5 +1,6 @@
 // The arms of the paper: its Panda (Fig. 1) and the task of its Discussion.
 #include <dashpot/analysis/damping_design.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>

@@ -1,5 +1,5 @@
 // What `dashpot run` says of commands: its option, its limits, and what the monitor shows of them.
-#include <dashpot/lcmtypes/encode.hpp>
+#include <dashpot/lcmtypes/publish/encode.hpp>
 #include <dashpot/lcmtypes/sink.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 

@@ -1,6 +1,6 @@
 // What the robot itself may not do: limits of torque, velocity and position, and their safe
 // outputs.
-#include <dashpot/controller/least_inertia.hpp>
+#include <dashpot/controller/model/least_inertia.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/safety.hpp>
 

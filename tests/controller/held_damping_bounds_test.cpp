@@ -1,5 +1,5 @@
 // Damping designed at every tick is semidefinite and bounded, whatever it is designed for.
-#include <dashpot/controller/held_damping.hpp>
+#include <dashpot/controller/law/held_damping.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>

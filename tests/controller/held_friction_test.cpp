@@ -1,5 +1,5 @@
 // Damping ratios held beside friction in the joints, and in the joint mode.
-#include <dashpot/controller/held_damping.hpp>
+#include <dashpot/controller/law/held_damping.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>

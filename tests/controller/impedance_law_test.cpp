@@ -1,6 +1,6 @@
 // The law against its equations written out with dense matrices, from KDL's M, J and bias torques.
-#include <dashpot/controller/closed_loop.hpp>
-#include <dashpot/controller/impedance_law.hpp>
+#include <dashpot/controller/law/impedance_law.hpp>
+#include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>
 #include <dashpot/tests/support/matrices.hpp>

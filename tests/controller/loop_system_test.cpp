@@ -1,7 +1,7 @@
 // The closed loop in factored form against the plain one of closed_loop.hpp, for all kinds of
 // gains.
-#include <dashpot/controller/closed_loop.hpp>
-#include <dashpot/controller/loop_system.hpp>
+#include <dashpot/controller/vibration/closed_loop.hpp>
+#include <dashpot/controller/vibration/loop_system.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>

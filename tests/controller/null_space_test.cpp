@@ -1,6 +1,6 @@
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/gain_path.hpp>
-#include <dashpot/controller/null_space.hpp>
+#include <dashpot/controller/law/gain_path.hpp>
+#include <dashpot/controller/law/null_space.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>

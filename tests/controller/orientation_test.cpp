@@ -1,4 +1,4 @@
-#include <dashpot/controller/orientation.hpp>
+#include <dashpot/controller/base/orientation.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 

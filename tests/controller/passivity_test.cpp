@@ -1,6 +1,6 @@
 // What the law does to energy: kinetic, and that of its springs. The arm moves by the equations of
 // motion, without drives and sampling.
-#include <dashpot/controller/impedance_law.hpp>
+#include <dashpot/controller/law/impedance_law.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/simulated_arm.hpp>

@@ -1,5 +1,5 @@
 // Gains and goals on either side of every bound and tolerance.
-#include <dashpot/controller/orientation.hpp>
+#include <dashpot/controller/base/orientation.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
 #include <gtest/gtest.h>

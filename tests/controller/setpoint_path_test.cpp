@@ -1,4 +1,4 @@
-#include <dashpot/controller/setpoint_path.hpp>
+#include <dashpot/controller/motion/setpoint_path.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 

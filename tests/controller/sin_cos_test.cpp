@@ -1,5 +1,5 @@
 // Sine and cosine in lanes against those of the C library in extended precision.
-#include <dashpot/controller/sin_cos.hpp>
+#include <dashpot/controller/base/sin_cos.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/special_values.hpp>
 

@@ -1,6 +1,6 @@
 // The small factorisations by themselves: against their definitions, and where they give up.
-#include <dashpot/controller/small_cholesky.hpp>
-#include <dashpot/controller/spring_factors.hpp>
+#include <dashpot/controller/base/small_cholesky.hpp>
+#include <dashpot/controller/vibration/spring_factors.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 

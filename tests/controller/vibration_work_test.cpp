@@ -1,5 +1,5 @@
 // Modes from within the tick: what is computed, what is left out, and what is forgotten.
-#include <dashpot/controller/vibration.hpp>
+#include <dashpot/controller/vibration/vibration.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/hostile_ticks.hpp>
 #include <dashpot/tests/support/led_arm.hpp>

@@ -1,9 +1,9 @@
 // The input as a file of `dashpot analyze` and `dashpot design`.
 #include <dashpot/analysis/damping_design.hpp>
-#include <dashpot/apps/json_writer.hpp>
-#include <dashpot/apps/report.hpp>
-#include <dashpot/apps/system_file.hpp>
-#include <dashpot/apps/table_writer.hpp>
+#include <dashpot/apps/analyze/json_writer.hpp>
+#include <dashpot/apps/analyze/report.hpp>
+#include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/apps/analyze/table_writer.hpp>
 #include <dashpot/tests/fuzz/fuzz_input.hpp>
 
 #include <nlohmann/json.hpp>

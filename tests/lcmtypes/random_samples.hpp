@@ -2,7 +2,7 @@
 // Samples and commands with random content, and their bytes.
 
 #include <dashpot/lcmtypes/command_filter.hpp>
-#include <dashpot/lcmtypes/encode.hpp>
+#include <dashpot/lcmtypes/publish/encode.hpp>
 #include <dashpot/lcmtypes/samples.hpp>
 #include <dashpot/tests/support/random.hpp>
 

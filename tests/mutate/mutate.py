@@ -41,7 +41,7 @@ def all_changes(folders, commands):
         (include / "dashpot").symlink_to(ROOT)
     files, units = [], []
     for folder in folders:
-        own = sorted(str(path.relative_to(ROOT)) for path in (ROOT / folder).glob("*.[ch]pp")
+        own = sorted(str(path.relative_to(ROOT)) for path in (ROOT / folder).rglob("*.[ch]pp")
                      if path.name not in ("compiled_eigen.hpp", "compiled_eigen.cpp"))
         sources = [name for name in own if name in commands]
         command = commands[sources[0]]
@@ -83,7 +83,7 @@ def sample(changes, places, count, seed):
     others = [place.rstrip("/") for place in places if ":" not in place]
     lines = {}
     for change in changes:
-        if change.file in others or change.file.split("/")[0] in others:
+        if any((change.file + "/").startswith(other + "/") for other in others):
             lines.setdefault((change.file, change.line), []).append(change)
     texts, ranked = {}, []
     for (file, line), here in sorted(lines.items()):

@@ -1,4 +1,5 @@
 // What a configuration file says is what the controller gets.
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/plugin/config_file.hpp>
 #include <dashpot/tests/support/special_values.hpp>

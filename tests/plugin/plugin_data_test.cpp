@@ -1,5 +1,5 @@
 // From the C structs to the controller's types and back: every field arrives, and in its own place.
-#include <dashpot/controller/plugin_data.hpp>
+#include <dashpot/controller/plugin/plugin_data.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Numbers with units: what they are worth in SI, and what is refused.
-#include <dashpot/controller/quantity.hpp>
+#include <dashpot/controller/yaml/quantity.hpp>
 
 #include <gmock/gmock.h>
 

@@ -3,63 +3,11 @@
 
 #include <algorithm>
 #include <regex>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace dashpot::tests {
-
-struct Layer {
-  std::string_view directory;
-  std::vector<std::string_view> may_include;  ///< how an included name may begin; "" is anything
-};
-
-/// Who may include whom. Headers of the standard library ("vector") are open to all.
-inline const std::vector<Layer>& layers() {
-  static const std::vector<Layer> table = {
-      {"text", {"dashpot/text/", "fcntl.h", "sys/stat.h", "unistd.h"}},
-      {"analysis", {"dashpot/analysis/", "Eigen/"}},
-      {"controller",
-       {"dashpot/controller/", "dashpot/analysis/", "dashpot/text/", "Eigen/", "kdl/", "urdf_",
-        "console_bridge/", "yaml-cpp/", "stdint.h", "pthread.h",
-        "sched.h"}},  // plugin.h is C; threads have priorities
-      // an independent check of the two above, which shares no mechanics with them:
-      {"sim", {"dashpot/sim/", "dashpot/text/", "Eigen/", "urdf_", "console_bridge/"}},
-      {"lcmtypes",
-       {"dashpot/lcmtypes/", "dashpot/analysis/types.hpp", "dashpot/controller/types.hpp",
-        "dashpot/controller/snapshot.hpp", "dashpot/controller/latest.hpp", "Eigen/", "lcm/"}},
-      {"apps", {""}},
-      {"tests", {""}},
-      {"benchmarks", {""}},
-  };
-  return table;
-}
-
-/// Whether a file of the top directory `directory` may include `header` ("Eigen/Core").
-inline bool may_include(std::string_view directory, std::string_view header) {
-  if (header.find_first_of("./") == std::string_view::npos) return true;  // standard library
-  return std::any_of(layers().begin(), layers().end(), [&](const Layer& layer) {
-    return layer.directory == directory &&
-           std::any_of(layer.may_include.begin(), layer.may_include.end(),
-                       [&](std::string_view prefix) { return header.starts_with(prefix); });
-  });
-}
-
-/// Every include in the source text of a file of `directory` that is not allowed there. Headers in
-/// quotes never are: the line <dashpot/...> works in the tree and installed.
-inline std::vector<std::string> forbidden_includes(std::string_view directory,
-                                                   const std::string& text) {
-  static const std::regex include(R"re(^\s*#\s*include\s*([<"])([^>"]+)[>"].*)re");
-  std::vector<std::string> found;
-  std::istringstream lines(text);
-  std::smatch match;
-  for (std::string line; std::getline(lines, line);) {
-    if (line.find('#') == std::string::npos || !std::regex_match(line, match, include)) continue;
-    if (match[1] == "\"" || !may_include(directory, match[2].str())) found.push_back(line);
-  }
-  return found;
-}
 
 /// Every piece of text that belongs in no file: paths of one machine, notes of unfinished work.
 inline std::vector<std::string> forbidden_words(const std::string& text) {
@@ -76,6 +24,18 @@ inline std::vector<std::string> forbidden_words(const std::string& text) {
 inline bool includes_threads(const std::string& text) {
   static const std::regex include(R"re((^|\n)\s*#\s*include\s*<(thread|future|pthread\.h)>)re");
   return std::regex_search(text, include);
+}
+
+/// The folders that have a line in the table of the section "Rooms" of docs/architecture.md.
+inline std::vector<std::string> described_rooms(const std::string& text) {
+  static const std::regex line(R"re((?:^|\n)\| `([^`]+)` \| [^|\n]+ \|)re");
+  const std::size_t begin = std::min(text.find("\n## Rooms\n"), text.size());
+  const std::string section = text.substr(begin, text.find("\n## ", begin + 1) - begin);
+  std::vector<std::string> found;
+  for (std::sregex_iterator at(section.begin(), section.end(), line), end; at != end; ++at) {
+    found.push_back((*at)[1].str());
+  }
+  return found;
 }
 
 inline bool starts_with_pragma_once(std::string_view text) {

@@ -1,12 +1,12 @@
 // Applies the rules to every file of the source tree.
 #include <dashpot/tests/project/markdown.hpp>
 #include <dashpot/tests/project/rules.hpp>
+#include <dashpot/tests/project/tree.hpp>
 
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 
 namespace dashpot::tests {
 namespace {
@@ -16,54 +16,9 @@ using testing::Contains;
 using testing::Field;
 using testing::IsEmpty;
 
-struct File {
-  std::string path;  ///< from the top of the tree, "analysis/types.hpp"
-  std::string text;
-
-  std::string directory() const { return path.substr(0, path.find('/')); }
-  bool is_source() const { return has_end(".hpp") || has_end(".cpp") || has_end(".h"); }
-  bool has_end(std::string_view end) const { return path.ends_with(end); }
-};
-
-bool is_hidden_or_built(const std::string& name) {
-  return (name.starts_with(".") && name != ".ci") || name.starts_with("build");
-}
-
-/// All text files but those of hidden directories and of the build.
-const std::vector<File>& files() {
-  static const std::vector<File> all = [] {
-    std::vector<File> found;
-    const fs::path root = DASHPOT_SOURCE_DIR;
-    for (auto entry = fs::recursive_directory_iterator(root); entry != end(entry); ++entry) {
-      if (entry->is_directory() && entry.depth() == 0 &&
-          is_hidden_or_built(entry->path().filename().string())) {
-        entry.disable_recursion_pending();
-      }
-      if (!entry->is_regular_file()) continue;
-      std::ifstream stream(entry->path(), std::ios::binary);
-      std::string text(std::istreambuf_iterator<char>(stream), {});
-      if (text.find('\0') != std::string::npos) continue;
-      found.push_back({entry->path().lexically_relative(root).string(), std::move(text)});
-    }
-    return found;
-  }();
-  return all;
-}
-
 TEST(Tree, IsRead) {
   EXPECT_THAT(files(), Contains(Field(&File::path, "CMakeLists.txt")));
   EXPECT_THAT(files(), Contains(Field(&File::path, "tests/project/tree_test.cpp")));
-}
-
-TEST(Tree, IncludesOnlyWhatTheLayersAllow) {
-  std::vector<std::string> offences;
-  for (const File& file : files()) {
-    if (!file.is_source()) continue;
-    for (const std::string& line : forbidden_includes(file.directory(), file.text)) {
-      offences.push_back(file.path + ": " + line);
-    }
-  }
-  EXPECT_THAT(offences, IsEmpty());
 }
 
 TEST(Tree, HoldsNoPathOfAMachineAndNoNoteOfUnfinishedWork) {

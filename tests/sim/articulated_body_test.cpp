@@ -1,6 +1,6 @@
 // Forward dynamics and kinematics against KDL, which computes M, C qd and g in another way.
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/sim/articulated_body.hpp>
+#include <dashpot/sim/dynamics/articulated_body.hpp>
 #include <dashpot/tests/sim/kdl_chain.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 

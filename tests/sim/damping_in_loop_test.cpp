@@ -1,6 +1,7 @@
 // Damping that is designed for a sampled loop, in that loop: what is proposed settles, and a little
 // more than the gain margin that it claims does not.
 #include <dashpot/analysis/damping_sampled.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/sim/linear_system.hpp>
 #include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/random_arms.hpp>

@@ -1,6 +1,7 @@
 // The stability that the analysis of the sampled loop promises, against plants in simulation: gains
 // 2 % inside the boundary settle, 2 % outside they do not.
 #include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/sim/linear_system.hpp>
 #include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/released_arm.hpp>

@@ -1,5 +1,5 @@
 // Mechanisms whose motion is known.
-#include <dashpot/sim/articulated_body.hpp>
+#include <dashpot/sim/dynamics/articulated_body.hpp>
 #include <dashpot/tests/sim/kdl_chain.hpp>
 #include <dashpot/tests/sim/scenes.hpp>
 #include <dashpot/tests/support/random.hpp>

@@ -1,5 +1,6 @@
 // The arms ring down as the controller says: its published modes against those that a fit finds in
 // the simulated motion after small releases.
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Reading robots: what is merged, lumped and turned, and what bad files are told.
-#include <dashpot/sim/articulated_body.hpp>
+#include <dashpot/sim/dynamics/articulated_body.hpp>
 #include <dashpot/tests/sim/chains.hpp>
 #include <dashpot/tests/sim/scenes.hpp>
 #include <dashpot/tests/support/matrices.hpp>

@@ -3,9 +3,10 @@
 // back, at 1 kHz, with their modes followed and watched.
 
 #include <dashpot/analysis/mode_tracker.hpp>
-#include <dashpot/controller/impedance.hpp>
-#include <dashpot/controller/loop_system.hpp>
+#include <dashpot/controller/base/impedance.hpp>
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/vibration/loop_system.hpp>
 #include <dashpot/tests/support/arms.hpp>
 
 #include <cmath>

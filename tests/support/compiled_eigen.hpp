@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/compiled_eigen.hpp>
+#include <dashpot/analysis/base/compiled_eigen.hpp>
 
 /// What tests use of Eigen besides.
 #ifndef DASHPOT_COMPILED_FOR_TESTS_HERE

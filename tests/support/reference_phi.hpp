@@ -2,7 +2,7 @@
 // phi_k((A - i omega I) t) with about 25 digits, by nothing but the Taylor series, scaling and
 // squaring of an augmented matrix of double-doubles: slow, and far from the code under test.
 
-#include <dashpot/analysis/double_double.hpp>
+#include <dashpot/analysis/linalg/double_double.hpp>
 
 #include <Eigen/Core>
 #include <cmath>

@@ -1,5 +1,5 @@
 // `dashpot monitor` on logs, on a live bus and on a terminal.
-#include <dashpot/lcmtypes/encode.hpp>
+#include <dashpot/lcmtypes/publish/encode.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/tests/apps/run_program.hpp>
 

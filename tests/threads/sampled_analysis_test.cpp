@@ -1,7 +1,8 @@
 // The sampled loop, analysed on a thread: the numbers of analysis::sample_loop for that loop.
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/sampled_analysis.hpp>
+#include <dashpot/controller/vibration/sampled_analysis.hpp>
 #include <dashpot/tests/support/arms.hpp>
 
 #include <gtest/gtest.h>

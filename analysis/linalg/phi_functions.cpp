@@ -1,0 +1,178 @@
+#include <dashpot/analysis/linalg/phi_functions.hpp>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace dashpot::analysis {
+namespace {
+
+/// Terms of the Taylor series of phi_k that matter for |z| < 1.
+constexpr int kTerms = 18;
+
+double reciprocal_factorial(int k) {
+  double value = 1;
+  for (int i = 2; i <= k; ++i) value /= i;
+  return value;
+}
+
+/// a b + c d with one rounding error of the result (Kahan).
+double sum_of_products(double a, double b, double c, double d) {
+  const double second = c * d;
+  const double error = std::fma(c, d, -second);
+  return std::fma(a, b, second) + error;
+}
+
+/// A function of a 2 x 2 matrix Z with eigenvalues x +- sqrt(d):  f(Z) = mean I + slope (Z - x I),
+/// where mean is the average of f over the two eigenvalues and slope its divided difference. Both
+/// stay smooth where the eigenvalues meet.
+struct PairFunction {
+  Complex mean;
+  Complex slope;
+};
+
+/// Z as the two numbers its functions depend on, and its eigenvalues.
+struct Pair {
+  Complex x;
+  double d = 0;
+  Complex first;  ///< x + sqrt(d)
+  Complex second;
+};
+
+PairFunction exponential(const Pair& z) {
+  const double root = std::sqrt(std::abs(z.d));
+  if (z.d < 0) {
+    const Complex scale = std::exp(z.x);
+    return {scale * std::cos(root), scale * (std::sin(root) / root)};
+  }
+  // cosh and sinh times e^x may overflow times underflow; the two exponentials cannot.
+  const Complex slower = std::exp(z.first);
+  return {slower * (0.5 * (1 + std::exp(-2 * root))), slower * phi(1, -2 * root)};
+}
+
+/// Horner's rule with numbers a + b N, N^2 = d.
+PairFunction taylor(int k, const Pair& z) {
+  double coefficient = reciprocal_factorial(k + kTerms);
+  PairFunction sum{coefficient, 0};
+  for (int j = kTerms - 1; j >= 0; --j) {
+    coefficient *= k + j + 1;
+    sum = {coefficient + sum.mean * z.x + sum.slope * z.d, sum.mean + sum.slope * z.x};
+  }
+  return sum;
+}
+
+PairFunction pair_function(int k, const Pair& z) {
+  if (k == 0) return exponential(z);
+  const double size = std::max(std::abs(z.first), std::abs(z.second));
+  if (size < 1) return taylor(k, z);
+
+  const Complex gap = z.first - z.second;
+  if (std::abs(gap) > 0.2 * size) {
+    const Complex first = phi(k, z.first);
+    const Complex second = phi(k, z.second);
+    return {0.5 * (first + second), (first - second) / gap};
+  }
+  // phi_k = Z^-1 (phi_{k-1} - phi_{k-1}(0)), with Z^-1 = (x - N) / (x^2 - d): well conditioned
+  // here.
+  const PairFunction previous = pair_function(k - 1, z);
+  const Complex p = previous.mean - reciprocal_factorial(k - 1);
+  const Complex q = previous.slope;
+  const Complex determinant = z.first * z.second;
+  return {(p * z.x - q * z.d) / determinant, (q * z.x - p) / determinant};
+}
+
+Eigen::Matrix2cd phi_two(int k, const Eigen::Matrix2d& A, double t, double omega) {
+  const EigenvaluePair values = eigenvalue_pair(A);
+  const Complex shift(0, omega);
+  Pair z{(values.mean - shift) * t, values.discriminant * t * t, (values.first - shift) * t,
+         (values.second - shift) * t};
+  if (t < 0) std::swap(z.first, z.second);
+  const PairFunction f = pair_function(k, z);
+
+  Eigen::Matrix2cd result;
+  if (A(1, 0) == 0) {  // a zero mode: both eigenvalues are on the diagonal
+    result << phi(k, (A(0, 0) - shift) * t), f.slope * (A(0, 1) * t),  //
+        0, phi(k, (A(1, 1) - shift) * t);
+    return result;
+  }
+  const double half_difference = 0.5 * (A(0, 0) - A(1, 1));
+  result << f.mean + f.slope * (half_difference * t), f.slope * (A(0, 1) * t),
+      f.slope * (A(1, 0) * t), f.mean - f.slope * (half_difference * t);
+  return result;
+}
+
+/// e^Z by scaling and squaring of the Taylor series. The mean eigenvalue is taken out first, which
+/// leaves little to square where the eigenvalues lie close together, as they do in large blocks.
+Eigen::MatrixXcd matrix_exponential(const Eigen::MatrixXcd& Z) {
+  const auto identity = Eigen::MatrixXcd::Identity(Z.rows(), Z.cols());
+  const Complex mean = Z.trace() / static_cast<double>(Z.rows());
+  Eigen::MatrixXcd scaled = Z - mean * identity;
+  const double norm = scaled.cwiseAbs().colwise().sum().maxCoeff();
+  const int squarings = norm < 1 ? 0 : std::ilogb(norm) + 1;
+  scaled *= std::ldexp(1.0, -squarings);
+
+  double coefficient = reciprocal_factorial(kTerms);
+  Eigen::MatrixXcd sum = coefficient * identity;
+  for (int j = kTerms - 1; j >= 0; --j) {
+    coefficient *= j + 1;
+    sum = coefficient * identity + sum * scaled;
+  }
+  for (int i = 0; i < squarings; ++i) sum = (sum * sum).eval();
+  return std::exp(mean) * sum;
+}
+
+Eigen::MatrixXcd phi_general(int k, const Eigen::MatrixXcd& Z) {
+  if (k == 0) return matrix_exponential(Z);
+  const Eigen::Index n = Z.rows();
+  const Eigen::MatrixXcd inverse = Z.partialPivLu().inverse();
+  if (inverse.cwiseAbs().colwise().sum().maxCoeff() <= 1) {  // false if it is not finite
+    const Complex value_at_zero = reciprocal_factorial(k - 1);
+    return inverse * (phi_general(k - 1, Z) - value_at_zero * Eigen::MatrixXcd::Identity(n, n));
+  }
+  // exp([Z I 0; 0 0 I; 0 0 0]) = [phi_0 phi_1 phi_2; ...]
+  Eigen::MatrixXcd augmented = Eigen::MatrixXcd::Zero((k + 1) * n, (k + 1) * n);
+  augmented.topLeftCorner(n, n) = Z;
+  augmented.topRightCorner(k * n, k * n).setIdentity();
+  return matrix_exponential(augmented).topRightCorner(n, n);
+}
+
+}  // namespace
+
+Complex phi(int k, Complex z) {
+  if (k == 0) return std::exp(z);
+  if (std::abs(z) >= 1) return (phi(k - 1, z) - reciprocal_factorial(k - 1)) / z;
+  double coefficient = reciprocal_factorial(k + kTerms);
+  Complex sum = coefficient;
+  for (int j = kTerms - 1; j >= 0; --j) {
+    coefficient *= k + j + 1;
+    sum = coefficient + sum * z;
+  }
+  return sum;
+}
+
+Eigen::MatrixXcd phi(int k, const Eigen::MatrixXd& A, double t, double omega) {
+  const Complex shift(0, omega);
+  if (A.rows() == 1) {
+    return Eigen::MatrixXcd::Constant(1, 1, phi(k, (A(0, 0) - shift) * t));
+  }
+  if (A.rows() == 2) return phi_two(k, A, t, omega);
+  const auto identity = Eigen::MatrixXcd::Identity(A.rows(), A.cols());
+  return phi_general(k, (A - shift * identity) * t);
+}
+
+EigenvaluePair eigenvalue_pair(const Eigen::Matrix2d& A) {
+  const double half_difference = 0.5 * (A(0, 0) - A(1, 1));
+  const double mean = 0.5 * (A(0, 0) + A(1, 1));
+  const double discriminant = sum_of_products(half_difference, half_difference, A(0, 1), A(1, 0));
+  const double root = std::sqrt(std::abs(discriminant));
+  if (discriminant < 0) return {mean, discriminant, {mean, root}, {mean, -root}};
+
+  // The larger one has no cancellation, and the determinant gives the smaller one.
+  const double larger = mean + std::copysign(root, mean);
+  const double determinant = sum_of_products(A(0, 0), A(1, 1), -A(0, 1), A(1, 0));
+  const double smaller = larger == 0 ? 0 : determinant / larger;
+  return {mean, discriminant, std::max(smaller, larger), std::min(smaller, larger)};
+}
+
+}  // namespace dashpot::analysis

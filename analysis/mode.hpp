@@ -1,0 +1,103 @@
+#pragma once
+#include <dashpot/analysis/types.hpp>
+
+#include <array>
+#include <limits>
+#include <type_traits>
+#include <vector>
+
+namespace dashpot::analysis {
+
+/// Decided by the proved bounds; by the numbers as they are where no bound could be proved.
+enum class ModeKind {
+  kUnderdamped,  ///< a complex pair, 0 < zeta < 1
+  kCritical,     ///< a double real eigenvalue, as far as the error bound can tell
+  kOverdamped,   ///< two real eigenvalues
+  kUndamped,     ///< a purely imaginary pair, as far as the error bound can tell
+  kUnstable,     ///< an eigenvalue with positive real part, beyond its error bound
+  kSoft,         ///< below SpectrumOptions::soft_frequency, or no frequency because an eigenvalue
+                 ///< cannot be told from zero: its damping ratio means nothing
+};
+
+/// "underdamped", "critical", ...
+const char* to_text(ModeKind kind) noexcept;
+
+/// Where a spectrum comes from.
+enum class SpectrumOrigin {
+  kTracked,  ///< the previous one, refined
+  kReused,   ///< the previous one: the system has hardly changed
+  kDirect,   ///< solved anew
+};
+
+/// What follows from a mode's two eigenvalues; Mode has the same numbers.
+struct ModeNumbers {
+  /// A complex pair (positive imaginary part first) or two real ones (nearer zero first), 1/s
+  std::array<Complex, 2> eigenvalues{};
+  double natural_frequency = 0;  ///< rad/s; NaN if the eigenvalues' product is negative
+  double damping_ratio = 0;
+  double damped_frequency = 0;  ///< rad/s
+  ModeKind kind = ModeKind::kUnderdamped;
+  /// Proved bounds of |computed - true|; infinite if none could be proved
+  double error_bound = std::numeric_limits<double>::infinity();  ///< of either eigenvalue, 1/s
+  double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
+  double damping_ratio_bound = std::numeric_limits<double>::infinity();
+};
+
+/// One vibration mode: a pair of eigenvalues of  (lambda^2 M + lambda C + K) u = 0.
+template <int N = kDynamic>
+struct Mode {
+  /// A complex pair (positive imaginary part first) or two real ones (slower, nearer zero, first),
+  /// 1/s
+  std::array<Complex, 2> eigenvalues{};
+  /// sqrt(lambda_1 lambda_2), rad/s; NaN if the product is negative (static instability)
+  double natural_frequency = 0;
+  /// -(lambda_1 + lambda_2) / (2 natural_frequency); above 1 if overdamped
+  double damping_ratio = 0;
+  /// Imaginary part of the first eigenvalue, rad/s; zero if real
+  double damped_frequency = 0;
+  ModeKind kind = ModeKind::kUnderdamped;
+  /// Right eigenvectors u of the two eigenvalues in joint coordinates, n each, u^H M u = 1, largest
+  /// entry real and positive. At critical damping both are the one eigenvector there is.
+  std::array<ComplexVector<N>, 2> shapes;
+  /// Left eigenvectors y, y^T (lambda^2 M + lambda C + K) = 0; equal to `shapes` if symmetric.
+  std::array<ComplexVector<N>, 2> left_shapes;
+  /// Normwise backward error of the worse eigenpair (Tisseur 2000):
+  /// |Q(lambda) u| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |u|), Frobenius norms of the
+  /// coefficients
+  double backward_error = 0;
+  /// Condition number of the worse eigenvalue in the same measure (Tisseur 2000); infinite at
+  /// critical damping
+  double condition = 0;
+  /// Proved bounds of |computed - true|; infinite if none could be proved, and where frequencies
+  /// leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120, because underflow is not counted there.
+  /// Of either eigenvalue, 1/s (of the two nearest each other):
+  double error_bound = std::numeric_limits<double>::infinity();
+  double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
+  double damping_ratio_bound = std::numeric_limits<double>::infinity();
+};
+
+/// A list of at most N modes that allocates only when N is kDynamic.
+template <int N>
+class ModeList {
+ public:
+  void resize(int size) {
+    size_ = size;
+    if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(size));
+  }
+  int size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  const Mode<N>& operator[](int i) const { return items_[static_cast<std::size_t>(i)]; }
+  Mode<N>& operator[](int i) { return items_[static_cast<std::size_t>(i)]; }
+  const Mode<N>* begin() const { return items_.data(); }
+  const Mode<N>* end() const { return items_.data() + size_; }
+  Mode<N>* begin() { return items_.data(); }
+  Mode<N>* end() { return items_.data() + size_; }
+
+ private:
+  std::conditional_t<N == kDynamic, std::vector<Mode<N>>,
+                     std::array<Mode<N>, static_cast<std::size_t>(N == kDynamic ? 1 : N)>>
+      items_;
+  int size_ = 0;
+};
+
+}  // namespace dashpot::analysis

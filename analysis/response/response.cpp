@@ -1,0 +1,229 @@
+#include <dashpot/analysis/linalg/phi_functions.hpp>
+#include <dashpot/analysis/response.hpp>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using Eigen::VectorXcd;
+using Eigen::VectorXd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+void require(bool condition, const std::string& message) {
+  if (!condition) throw std::invalid_argument("Response: " + message);
+}
+
+void require_vector(const VectorXd& vector, Index n, const std::string& name) {
+  require(vector.size() == n, name + " has " + std::to_string(vector.size()) +
+                                  " entries, expected " + std::to_string(n));
+  require(vector.allFinite(), name + " is not finite");
+}
+
+void require_forced_time(double time) {
+  require(std::isfinite(time) && time >= 0, "time is not a finite number of at least 0 s");
+}
+
+/// The square block of a block-diagonal matrix.
+MatrixXd part(const MatrixXd& matrix, const Block& block) {
+  return matrix.block(block.first, block.first, block.size, block.size);
+}
+
+/// Adds numerator / 0 + finite to the receptance: infinite where the numerator is not zero to
+/// rounding, `finite` elsewhere.
+void add_singular(const MatrixXcd& numerator, const MatrixXcd& finite, MatrixXcd& receptance) {
+  const double negligible = 16 * kEpsilon * numerator.cwiseAbs().maxCoeff();
+  for (Index j = 0; j < numerator.cols(); ++j) {
+    for (Index i = 0; i < numerator.rows(); ++i) {
+      const bool reached = std::abs(numerator(i, j)) > negligible;
+      receptance(i, j) += reached ? Complex(kInfinity, 0) : finite(i, j);
+    }
+  }
+}
+
+/// Adds left (i omega I - A)^-1 right for a block A with one row or two.
+void add_small_resolvent(const MatrixXcd& left, const MatrixXd& A, const MatrixXcd& right,
+                         double omega, MatrixXcd& receptance) {
+  const Complex shift(0, omega);
+  Complex determinant = shift - A(0, 0);
+  Complex slope = 1;  // d determinant / d shift
+  MatrixXcd adjugate = MatrixXcd::Ones(1, 1);
+  if (A.rows() == 2) {
+    const EigenvaluePair values = eigenvalue_pair(A);
+    determinant = (shift - values.first) * (shift - values.second);
+    slope = 2.0 * (shift - values.mean);
+    adjugate.resize(2, 2);
+    adjugate << shift - A(1, 1), A(0, 1), A(1, 0), shift - A(0, 0);
+  }
+  const MatrixXcd numerator = left * adjugate * right;
+  if (determinant != 0.0) {
+    receptance += numerator / determinant;
+    return;
+  }
+  // Where the numerator vanishes with the determinant, the quotient of their slopes is the limit.
+  MatrixXcd limit = MatrixXcd::Zero(numerator.rows(), numerator.cols());
+  if (A.rows() == 2 && slope != 0.0) limit = left * right / slope;
+  add_singular(numerator, limit, receptance);
+}
+
+}  // namespace
+
+Response::Response(const System<>& system, const Spectrum<>& spectrum)
+    : mass_(system.mass), damping_(system.damping), basis_(spectrum.basis) {
+  const Index n = system.dof();
+  require(spectrum.status == Status::kOk || spectrum.status == Status::kUncertified,
+          std::string("the spectrum holds no modes: ") + to_text(spectrum.status));
+  require(basis_.U.rows() == n && basis_.U.cols() == 2 * n,
+          "the spectrum is not that of a system with " + std::to_string(n) + " coordinates");
+  velocity_basis_ = basis_.U * basis_.Lambda;
+  const MatrixXd& zero_modes = spectrum.zero_modes.basis;
+  zero_projector_ = zero_modes * (zero_modes.transpose() * mass_);
+}
+
+Motion Response::free(const VectorXd& position, const VectorXd& velocity, double time) const {
+  require(std::isfinite(time), "time is not a finite number");
+  return motion(phi_of_basis(0, time) * start(position, velocity));
+}
+
+Motion Response::impulse(const VectorXd& impulse, double time) const {
+  require_forced_time(time);
+  return motion(phi_of_basis(0, time) * drive_of(impulse, "impulse"));
+}
+
+Motion Response::step(const VectorXd& force, double time) const {
+  require_forced_time(time);
+  return motion(time * (phi_of_basis(1, time) * drive_of(force, "force")));
+}
+
+Motion Response::harmonic(const VectorXd& cosine, const VectorXd& sine, double omega,
+                          double time) const {
+  require_forced_time(time);
+  require(std::isfinite(omega), "omega is not a finite number");
+  const VectorXd real_drive = drive_of(cosine, "cosine");
+  const VectorXd imaginary_drive = -drive_of(sine, "sine");
+  // The force is Re((cosine - i sine) e^(i omega t)). With xi = Re(e^(i omega t) eta), eta answers
+  // the constant drive in the blocks Lambda - i omega: at resonance phi_1 is simply 1.
+  const Complex rotation = time * std::polar(1.0, omega * time);
+  VectorXd xi(basis_.U.cols());
+  for (const Block& block : basis_.blocks) {
+    const VectorXcd drive = real_drive.segment(block.first, block.size) +
+                            Complex(0, 1) * imaginary_drive.segment(block.first, block.size);
+    const MatrixXcd integral = phi(1, part(basis_.Lambda, block), time, omega);
+    xi.segment(block.first, block.size) = (rotation * (integral * drive)).real();
+  }
+  return motion(xi);
+}
+
+std::vector<Motion> Response::sampled(const VectorXd& position, const VectorXd& velocity,
+                                      const MatrixXd& forces, double h,
+                                      const std::vector<double>& times) const {
+  require(std::isfinite(h) && h > 0, "the sampling interval is not a positive number");
+  require(forces.cols() > 0, "there are no force samples");
+  const Index last = forces.cols() - 1;
+  const double end = static_cast<double>(last) * h * (1 + 4 * kEpsilon);
+
+  VectorXd xi = start(position, velocity);  // at k h
+  VectorXd drive_now = drive_of(forces.col(0), "forces");
+  VectorXd drive_next = drive_of(forces.col(std::min<Index>(1, last)), "forces");
+  const auto after = [&](double s, const MatrixXd& phi_0, const MatrixXd& phi_1,
+                         const MatrixXd& phi_2) -> VectorXd {
+    return phi_0 * xi + s * (phi_1 * drive_now) + (s * s / h) * (phi_2 * (drive_next - drive_now));
+  };
+  const MatrixXd phi_0 = phi_of_basis(0, h);
+  const MatrixXd phi_1 = phi_of_basis(1, h);
+  const MatrixXd phi_2 = phi_of_basis(2, h);
+
+  std::vector<Motion> motions;
+  motions.reserve(times.size());
+  Index k = 0;
+  double previous = 0;
+  for (const double time : times) {
+    require(time >= previous && time <= end, "times do not rise within [0, (s-1) h]");
+    previous = time;
+    while (k + 1 < last && static_cast<double>(k + 1) * h <= time) {
+      xi = after(h, phi_0, phi_1, phi_2);
+      ++k;
+      drive_now = drive_next;
+      drive_next = drive_of(forces.col(k + 1), "forces");
+    }
+    const double s = time - static_cast<double>(k) * h;
+    motions.push_back(motion(after(s, phi_of_basis(0, s), phi_of_basis(1, s), phi_of_basis(2, s))));
+  }
+  return motions;
+}
+
+MatrixXcd Response::receptance(double omega) const {
+  require(std::isfinite(omega), "omega is not a finite number");
+  const Index n = mass_.rows();
+  MatrixXcd sum = MatrixXcd::Zero(n, n);
+  if (n == 0) return sum;
+  // (s - A)^-1 = (I + A (s - A)^-1) / s. The first term adds up to U weight Y' / s = 0, so leave it
+  // out at high frequencies, where the small sum would drown in its rounding errors.
+  const Complex s(0, omega);
+  const bool high = std::abs(omega) > basis_.Lambda.cwiseAbs().rowwise().sum().maxCoeff();
+  const MatrixXcd modes = high ? MatrixXcd(velocity_basis_ / s) : MatrixXcd(basis_.U);
+  for (const Block& block : basis_.blocks) {
+    const MatrixXcd left = modes.middleCols(block.first, block.size);
+    const MatrixXcd right =
+        part(basis_.weight, block) * basis_.Y.middleCols(block.first, block.size).transpose();
+    const MatrixXd A = part(basis_.Lambda, block);
+    if (block.size <= 2) {
+      add_small_resolvent(left, A, right, omega, sum);
+      continue;
+    }
+    const Eigen::FullPivLU<MatrixXcd> resolvent(s * MatrixXcd::Identity(block.size, block.size) -
+                                                A);
+    if (resolvent.isInvertible()) {
+      sum += left * resolvent.solve(right);
+    } else {
+      sum.array() += Complex(kInfinity, 0);
+    }
+  }
+  return sum;
+}
+
+VectorXd Response::start(const VectorXd& position, const VectorXd& velocity) const {
+  require_vector(position, mass_.rows(), "position");
+  require_vector(velocity, mass_.rows(), "velocity");
+  return coordinates(basis_, mass_, damping_, position, velocity);
+}
+
+VectorXd Response::drive_of(const VectorXd& force, const char* name) const {
+  require_vector(force, mass_.rows(), name);
+  return drive(basis_, force);
+}
+
+/// phi_k(Lambda time), block by block.
+MatrixXd Response::phi_of_basis(int k, double time) const {
+  MatrixXd result = MatrixXd::Zero(basis_.Lambda.rows(), basis_.Lambda.cols());
+  for (const Block& block : basis_.blocks) {
+    result.block(block.first, block.first, block.size, block.size) =
+        phi(k, part(basis_.Lambda, block), time).real();
+  }
+  return result;
+}
+
+Motion Response::motion(const VectorXd& xi) const {
+  Motion result;
+  result.position = basis_.U * xi;
+  result.velocity = velocity_basis_ * xi;
+  if (zero_projector_.isZero(0)) {  // not 0 times what may have grown beyond all numbers
+    result.zero_mode_position = result.zero_mode_velocity = Eigen::VectorXd::Zero(mass_.rows());
+    return result;
+  }
+  result.zero_mode_position = zero_projector_ * result.position;
+  result.zero_mode_velocity = zero_projector_ * result.velocity;
+  return result;
+}
+
+}  // namespace dashpot::analysis

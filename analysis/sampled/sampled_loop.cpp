@@ -1,0 +1,226 @@
+#include <dashpot/analysis/sampled/unit_loop.hpp>
+#include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/analysis/spectrum/mode_numbers.hpp>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXcd;
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Largest |z| with |log z| >= slowest.
+double radius(const UnitLoop& loop, double slowest) {
+  double result = 0;
+  for (const Complex z : loop.multipliers()) {
+    if (slowest > 0 && z != 0.0 && modulus(std::log(z)) < slowest) continue;
+    result = std::max(result, modulus(z));
+  }
+  return result;
+}
+
+/// An eigenvalue (per tick) of a mode after the loop's delays, to first order: the Newton step from
+/// the continuous one to a zero of
+///     lambda^2 + lambda D + G + h(lambda) (K - G + lambda e^(-lambda/2 if differenced) (C - D)),
+/// h = e^(-lambda (d + 1/2)) times the filter.
+Complex delayed(const UnitLoop& loop, Complex lambda, const VectorXcd& u, const VectorXcd& y) {
+  Complex h = std::exp(-lambda * (loop.delay + 0.5));
+  h *= loop.filter_gain / (1.0 - (1 - loop.filter_gain) * std::exp(-lambda));
+  const Complex v = lambda * (loop.difference ? std::exp(-0.5 * lambda) : Complex(1));
+  const auto form = [&](const MatrixXd& A) -> Complex {
+    return (y.transpose() * A.cast<Complex>() * u).value();
+  };
+  const Complex product = (y.transpose() * u).value();
+  const Complex value = lambda * lambda * product + lambda * form(loop.D) + form(loop.G) +
+                        h * (form(loop.K - loop.G) + v * form(loop.C - loop.D));
+  const Complex step = -value / (2.0 * lambda * product + form(loop.C));
+  return modulus(step) < 0.5 * modulus(lambda) ? lambda + step
+                                               : lambda;  // not so near a double one
+}
+
+/// Gives the z one by one to what they belong to.
+class Matcher {
+ public:
+  explicit Matcher(const VectorXcd& z) : z_(z), free_(static_cast<std::size_t>(z.size()), true) {}
+
+  struct Nearest {
+    Index index = -1;
+    double distance = kInfinity;
+  };
+  /// The free z nearest to e^lambda in log(z); `real`: among the real ones.
+  Nearest nearest(Complex lambda, bool real) const {
+    Nearest best;
+    for (Index i = 0; i < z_.size(); ++i) {
+      if (!is_free(i) || z_[i] == 0.0 || z_[i].imag() < 0 || (real && z_[i].imag() != 0)) continue;
+      const double distance = modulus(std::log(z_[i]) - lambda);
+      if (distance < best.distance) best = {i, distance};
+    }
+    return best;
+  }
+  /// With its conjugate.
+  Complex take(Index i) {
+    free_[static_cast<std::size_t>(i)] = false;
+    for (Index j = 0; j < z_.size() && z_[i].imag() != 0; ++j) {
+      if (z_[j] == std::conj(z_[i])) free_[static_cast<std::size_t>(j)] = false;
+    }
+    return z_[i];
+  }
+  std::vector<Complex> rest() const {
+    std::vector<Complex> result;
+    for (Index i = 0; i < z_.size(); ++i) {
+      if (is_free(i)) result.push_back(z_[i]);
+    }
+    return result;
+  }
+
+ private:
+  bool is_free(Index i) const { return free_[static_cast<std::size_t>(i)]; }
+
+  const VectorXcd& z_;
+  std::vector<bool> free_;
+};
+
+/// What is looked for: the two eigenvalues of a mode, or one of a zero mode, per tick.
+struct Wanted {
+  std::array<Complex, 2> lambda;
+  int mode = -1;  // -1: a zero mode
+  bool done = false;
+};
+
+SampledMode to_mode(std::array<Complex, 2> z, double period) {
+  if (z[1].imag() == 0 && modulus(std::log(z[0])) > modulus(std::log(z[1]))) std::swap(z[0], z[1]);
+  const Root first{std::log(z[0]) / period, kInfinity};
+  const Root second{z[0].imag() != 0 ? std::conj(first.value) : std::log(z[1]) / period, kInfinity};
+  const ModeNumbers numbers = mode_numbers(first, second, root_invariants(first, second), 0);
+  return {z,
+          {first.value, second.value},
+          numbers.natural_frequency,
+          numbers.damping_ratio,
+          numbers.damped_frequency,
+          numbers.kind};
+}
+
+template <int N>
+std::vector<Wanted> list_wanted(const System<N>& system, const Spectrum<N>& spectrum,
+                                const UnitLoop& loop, double T) {
+  const Eigen::LLT<MatrixXd> mass{MatrixXd(system.mass)};
+  const auto unit = [&](const ComplexVector<N>& u) -> VectorXcd {
+    VectorXcd w(u.size());
+    w.real() = mass.matrixU() * Eigen::VectorXd(u.real());
+    w.imag() = mass.matrixU() * Eigen::VectorXd(u.imag());
+    return w;
+  };
+  std::vector<Wanted> wanted;
+  for (int k = 0; k < spectrum.modes.size(); ++k) {
+    const Mode<N>& mode = spectrum.modes[k];
+    Wanted one{{}, k};
+    for (std::size_t i = 0; i < 2; ++i) {
+      one.lambda[i] =
+          delayed(loop, T * mode.eigenvalues[i], unit(mode.shapes[i]), unit(mode.left_shapes[i]));
+    }
+    wanted.push_back(one);
+  }
+  std::vector<double> rates;  // of the zero modes that are damped: the fastest
+  for (const double rate : spectrum.zero_mode_rates) {
+    if (rate == rate) rates.push_back(T * rate);
+  }
+  std::sort(rates.begin(), rates.end(),
+            [](double a, double b) { return std::abs(a) > std::abs(b); });
+  const Index r = loop.zero_modes.cols(), damped = 2 * r - loop.motions_of_one().cols();
+  rates.resize(std::min(rates.size(), static_cast<std::size_t>(damped)));
+  for (const double rate : rates) wanted.push_back({{rate, rate}});
+  return wanted;
+}
+
+}  // namespace
+
+template <int N>
+SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum,
+                            const SampledLoop& loop) {
+  const UnitLoop unit(system, spectrum, loop);
+  const VectorXcd z = unit.multipliers();
+  std::vector<Wanted> wanted = list_wanted(system, spectrum, unit, loop.period);
+  SampledSpectrum result;
+  result.spectral_radius = z.size() > 0 ? z.cwiseAbs().maxCoeff() : 0;
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  SampledMode none{{kNan, kNan}, {kNan, kNan}, kNan, kNan, kNan, ModeKind::kSoft};
+  result.modes.assign(static_cast<std::size_t>(spectrum.modes.size()), none);
+  Matcher matcher(z);
+  for (;;) {
+    Matcher::Nearest best;
+    Wanted* owner = nullptr;
+    std::size_t which = 0;
+    for (Wanted& one : wanted) {
+      for (std::size_t i = 0; i < (one.mode < 0 ? 1 : 2) && !one.done; ++i) {
+        const Matcher::Nearest found = matcher.nearest(one.lambda[i], one.mode < 0);
+        if (found.distance < best.distance) best = found, owner = &one, which = i;
+      }
+    }
+    if (owner == nullptr) break;
+    owner->done = true;
+    const Complex first = matcher.take(best.index);
+    if (owner->mode < 0) {
+      result.zero_modes.push_back(first);
+      continue;
+    }
+    Complex second = std::conj(first);
+    if (first.imag() == 0) {
+      const Matcher::Nearest other = matcher.nearest(owner->lambda[1 - which], true);
+      if (other.index < 0) continue;
+      second = matcher.take(other.index);
+    }
+    result.modes[static_cast<std::size_t>(owner->mode)] = to_mode({first, second}, loop.period);
+  }
+  result.others = matcher.rest();
+  return result;
+}
+
+template <int N>
+double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
+                   double most, double slowest) {
+  const UnitLoop unit(system, spectrum, loop);
+  const auto stable = [&](double factor) {
+    UnitLoop scaled = unit;
+    scaled.K *= factor;
+    scaled.C = unit.D + factor * (unit.C - unit.D);
+    return radius(scaled, slowest * loop.period) < 1;
+  };
+  const bool grow = stable(1);
+  double inside = 1, outside = 1;
+  for (;;) {
+    if (grow) {
+      if (inside >= most) return kInfinity;
+      outside = std::min(1.25 * inside, most);
+      if (!stable(outside)) break;
+      inside = outside;
+    } else {
+      inside = 0.8 * outside;
+      if (stable(inside)) break;
+      outside = inside;
+      if (outside < 1e-3) return 0;
+    }
+  }
+  while (outside - inside > 1e-7 * outside) {
+    const double middle = 0.5 * (inside + outside);
+    (stable(middle) ? inside : outside) = middle;
+  }
+  return 0.5 * (inside + outside);
+}
+
+template SampledSpectrum sample_loop(const System<kDynamic>&, const Spectrum<kDynamic>&,
+                                     const SampledLoop&);
+template SampledSpectrum sample_loop(const System<kMaxDof>&, const Spectrum<kMaxDof>&,
+                                     const SampledLoop&);
+template double gain_margin(const System<kDynamic>&, const Spectrum<kDynamic>&, const SampledLoop&,
+                            double, double);
+template double gain_margin(const System<kMaxDof>&, const Spectrum<kMaxDof>&, const SampledLoop&,
+                            double, double);
+
+}  // namespace dashpot::analysis

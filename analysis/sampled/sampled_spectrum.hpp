@@ -1,0 +1,43 @@
+#pragma once
+#include <dashpot/analysis/mode.hpp>
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+namespace dashpot::analysis {
+
+/// What lies between the springs and dampers of a controller and the joints.
+struct SampledLoop {
+  double period = 0.001;             ///< T, of the control loop, s
+  int delay = 0;                     ///< d, ticks from a command to its effect, beyond the hold
+  double torque_cutoff = 0;          ///< f_c, of the torque's first-order low-pass, Hz; 0: none
+  bool difference_velocity = false;  ///< the controller takes (q_k - q_k-1) / T for q'
+  /// D, n x n, N m s/rad: the part of the damping that the joints supply. Empty: none.
+  Eigen::MatrixXd friction = {};
+  /// G = dg/dq, n x n, N m/rad: of the gravity that the controller compensates. Empty: none.
+  Eigen::MatrixXd gravity_gradient = {};
+};
+
+/// A mode as it is with the loop closed once a tick.
+struct SampledMode {
+  std::array<Complex, 2> multipliers{};  ///< z: a complex pair or two real ones
+  std::array<Complex, 2> eigenvalues{};  ///< log(z) / T, 1/s: a complex pair or two real ones
+  double natural_frequency = 0;          ///< rad/s; NaN if the eigenvalues' product is negative
+  double damping_ratio = 0;
+  double damped_frequency = 0;  ///< rad/s
+  ModeKind kind = ModeKind::kUnderdamped;
+};
+
+struct SampledSpectrum {
+  std::vector<SampledMode> modes;   ///< in the places of the continuous modes they come from
+  std::vector<Complex> zero_modes;  ///< z of the velocities along the zero modes that are damped
+  std::vector<Complex> others;      ///< z of the loop's own memory: delay, filter, last position
+  /// Largest |z| of all but the zero modes' z = 1: of their positions, and of the velocities along
+  /// them that nothing damps. Below 1 the loop is stable.
+  double spectral_radius = 0;
+
+  bool stable() const noexcept { return spectral_radius < 1; }
+};
+
+}  // namespace dashpot::analysis

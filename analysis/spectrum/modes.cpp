@@ -1,0 +1,425 @@
+#include <dashpot/analysis/linalg/hessenberg_qr.hpp>
+#include <dashpot/analysis/linalg/small_dense.hpp>
+#include <dashpot/analysis/spectrum/mode_numbers.hpp>
+#include <dashpot/analysis/spectrum/modes.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// One eigenvalue of a block, with what is proved about it.
+struct BlockRoot : Root {
+  int block = 0;
+  int partner = -1;   ///< index of the other root of its mode
+  bool used = false;  ///< of a zero mode
+};
+
+template <int N>
+class Reader {
+ public:
+  Reader(const System<N>& system, const Defect<N>& defect, const Certificate<N>& certificate,
+         double soft_frequency, Spectrum<N>& spectrum)
+      : system_(system),
+        defect_(defect),
+        certificate_(certificate),
+        basis_(spectrum.basis),
+        spectrum_(spectrum),
+        soft_frequency_(soft_frequency),
+        M_norm_(system.mass.norm()),
+        C_norm_(system.damping.norm()),
+        K_norm_(system.stiffness.norm()) {}
+
+  void read() {
+    list_roots();
+    bound_roots();
+    take_zero_rates();
+    pair_roots();
+    write_modes();
+  }
+
+ private:
+  BlockRoot& root(int i) { return roots_[static_cast<std::size_t>(i)]; }
+  const BlockRoot& root(int i) const { return roots_[static_cast<std::size_t>(i)]; }
+  bool alone(int block) const;
+
+  void list_roots();
+  void bound_roots();
+  void take_zero_rates();
+  void pair_roots();
+  void write_modes();
+
+  Invariants invariants(int i, int j) const;
+  void write_numbers(int i, int j, Mode<N>& mode) const;
+  void write_shapes(int i, int j, Mode<N>& mode) const;
+  ComplexVector<N> shape(int i, bool left, StateVector<N>& re, StateVector<N>& im) const;
+
+  const System<N>& system_;
+  const Defect<N>& defect_;
+  const Certificate<N>& certificate_;
+  const ModalBasis<N>& basis_;
+  Spectrum<N>& spectrum_;
+  double soft_frequency_, M_norm_, C_norm_, K_norm_;
+  std::conditional_t<N == kDynamic, std::vector<BlockRoot>,
+                     std::array<BlockRoot, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
+      roots_;
+  int root_count_ = 0;
+};
+
+/// Whether the certificate speaks of this block by itself.
+template <int N>
+bool Reader<N>::alone(int block) const {
+  int members = 0;
+  for (int k = 0; k < basis_.blocks.size(); ++k) {
+    if (certificate_.group[k] == certificate_.group[block]) ++members;
+  }
+  return members == 1;
+}
+
+template <int N>
+void Reader<N>::list_roots() {
+  if constexpr (N == kDynamic) roots_.resize(static_cast<std::size_t>(basis_.U.cols()));
+  root_count_ = 0;
+  for (int k = 0; k < basis_.blocks.size(); ++k) {
+    const Block& b = basis_.blocks[k];
+    const State<N> Lambda = basis_.Lambda.block(b.first, b.first, b.size, b.size);
+    Eigen::Matrix<Complex, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1> values(b.size);
+    if (b.size == 1) {
+      values[0] = Lambda(0, 0);
+    } else if (b.size == 2) {
+      eigenvalues_2x2(Lambda(0, 0), Lambda(0, 1), Lambda(1, 0), Lambda(1, 1), values[0], values[1]);
+    } else {
+      State<N> H = Lambda;
+      reduce_to_hessenberg(H);
+      if (!hessenberg_eigenvalues(H, values.data())) values.setConstant(kNan);
+    }
+    // Backward error of the block's own QR iteration, generously.
+    const double radius =
+        certificate_.radius[k] + (b.size > 2 ? 64 * b.size : 8) * b.size * kUnit * Lambda.norm();
+    for (int e = 0; e < b.size; ++e) {
+      BlockRoot& r = root(root_count_++);
+      r = BlockRoot{};
+      r.value = values[e];
+      r.block = k;
+      r.used = b.zero_mode;  // of no mode, but its disc may hold the eigenvalue of another
+      r.bound = disc_radius(values.data(), b.size, e, Lambda.norm(), radius);
+    }
+  }
+}
+
+/// Where discs of one group meet, all that is known is how many eigenvalues their union holds.
+template <int N>
+void Reader<N>::bound_roots() {
+  StateVector<N> total(root_count_);
+  const auto meet = [&](int j, int k) {
+    return certificate_.group[root(j).block] == certificate_.group[root(k).block] &&
+           modulus(root(j).value - root(k).value) <= root(j).bound + root(k).bound;
+  };
+  for (int i = 0; i < root_count_; ++i) {
+    // Grow the set of discs that hang together with disc i; each of it is looked at once.
+    using Indices = Eigen::Matrix<int, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1>;
+    Indices inside = Indices::Zero(root_count_), set(root_count_);
+    int size = 0;
+    inside[i] = 1;
+    set[size++] = i;
+    for (int next = 0; next < size; ++next) {
+      for (int j = 0; j < root_count_; ++j) {
+        if (inside[j] != 0 || !meet(j, set[next])) continue;
+        inside[j] = 1;
+        set[size++] = j;
+      }
+    }
+    total[i] = root(i).bound;
+    if (size == 1) continue;
+    total[i] = 0;
+    for (int j = 0; j < root_count_; ++j) {
+      if (inside[j] != 0) total[i] += 2 * root(j).bound;
+    }
+  }
+  for (int i = 0; i < root_count_; ++i)
+    root(i).bound = total[i] + 2 * kUnit * modulus(root(i).value);
+}
+
+template <int N>
+void Reader<N>::take_zero_rates() {
+  const int r = spectrum_.zero_modes.count;
+  spectrum_.zero_mode_rates = Vector<N>::Zero(r);
+  int found = 0;
+  for (const Block& b : basis_.blocks) {
+    if (b.zero_mode && b.size == 2 && found < r) {
+      spectrum_.zero_mode_rates[found++] = basis_.Lambda(b.first + 1, b.first + 1);
+    }
+  }
+  // The rest are real eigenvalues whose motion is mostly along the zero modes.
+  for (; found < r; ++found) {
+    double best = -1;
+    int chosen = -1;
+    for (int i = 0; i < root_count_; ++i) {
+      if (root(i).used || root(i).value.imag() != 0) continue;
+      const Block& b = basis_.blocks[root(i).block];
+      if (b.size != 1) continue;
+      const auto momentum = defect_.MU.col(b.first);
+      const double kinetic = basis_.U.col(b.first).dot(momentum);
+      const bool negative = basis_.weight(b.first, b.first) < 0;
+      const double share =
+          (spectrum_.zero_modes.basis.transpose() * momentum).squaredNorm() / kinetic +
+          (negative ? 1 : 0);
+      if (share > best) best = share, chosen = i;
+    }
+    if (chosen < 0) {
+      // Left are complex pairs (of coefficients that are not symmetric): they count as modes.
+      spectrum_.zero_mode_rates.tail(r - found).setConstant(kNan);
+      return;
+    }
+    root(chosen).used = true;
+    spectrum_.zero_mode_rates[found] = root(chosen).value.real();
+  }
+}
+
+/// Complex roots pair with their conjugates; real ones of one two-column block with each other;
+/// other real ones by the likeness of their shapes, one of each sign type where the system is
+/// symmetric.
+template <int N>
+void Reader<N>::pair_roots() {
+  for (int i = 0; i < root_count_; ++i) {
+    if (root(i).used || root(i).partner >= 0) continue;
+    for (int j = i + 1; j < root_count_; ++j) {
+      if (root(j).used || root(j).partner >= 0 || root(j).block != root(i).block) continue;
+      const bool conjugate = root(i).value.imag() != 0 && root(j).value == std::conj(root(i).value);
+      const bool real_pair = basis_.blocks[root(i).block].size == 2 && root(i).value.imag() == 0;
+      if (conjugate || real_pair) {
+        root(i).partner = j;
+        root(j).partner = i;
+        break;
+      }
+    }
+  }
+  const auto free = [&](int i) {
+    return !root(i).used && root(i).partner < 0 && root(i).value.imag() == 0;
+  };
+  const auto likeness = [&](int i, int j) {
+    const Eigen::Index ci = basis_.blocks[root(i).block].first;
+    const Eigen::Index cj = basis_.blocks[root(j).block].first;
+    const double overlap = basis_.U.col(ci).dot(defect_.MU.col(cj));
+    const double score =
+        overlap * overlap /
+        (basis_.U.col(ci).dot(defect_.MU.col(ci)) * basis_.U.col(cj).dot(defect_.MU.col(cj)));
+    return basis_.weight(ci, ci) * basis_.weight(cj, cj) < 0 ? score + 2 : score;
+  };
+  State<N> scores(root_count_, root_count_);
+  for (int i = 0; i < root_count_; ++i) {
+    for (int j = i + 1; free(i) && j < root_count_; ++j)
+      scores(i, j) = free(j) ? likeness(i, j) : 0;
+  }
+  for (;;) {
+    double best = -1;
+    int first = -1, second = -1;
+    for (int i = 0; i < root_count_; ++i) {
+      for (int j = i + 1; free(i) && j < root_count_; ++j) {
+        if (free(j) && !(scores(i, j) <= best)) best = scores(i, j), first = i, second = j;
+      }
+    }
+    if (first < 0) return;
+    root(first).partner = second;
+    root(second).partner = first;
+  }
+}
+
+template <int N>
+Invariants Reader<N>::invariants(int i, int j) const {
+  const Block& block = basis_.blocks[root(i).block];
+  Invariants v = root_invariants(root(i), root(j));
+  if (root(i).block == root(j).block && block.size == 2) {
+    const auto L = basis_.Lambda.block(block.first, block.first, 2, 2);
+    const Invariants of_block =
+        block_invariants(L(0, 0), L(0, 1), L(1, 0), L(1, 1), certificate_.radius[root(i).block]);
+    if (alone(root(i).block)) return of_block;
+    // In a group with other blocks only the discs are known.
+    v.sum = of_block.sum;
+    v.product = of_block.product;
+    v.discriminant = of_block.discriminant;
+  }
+  return v;
+}
+
+template <int N>
+void Reader<N>::write_numbers(int i, int j, Mode<N>& mode) const {
+  const ModeNumbers numbers = mode_numbers(root(i), root(j), invariants(i, j), soft_frequency_);
+  mode.eigenvalues = numbers.eigenvalues;
+  mode.natural_frequency = numbers.natural_frequency;
+  mode.damping_ratio = numbers.damping_ratio;
+  mode.damped_frequency = numbers.damped_frequency;
+  mode.kind = numbers.kind;
+  mode.error_bound = numbers.error_bound;
+  mode.natural_frequency_bound = numbers.natural_frequency_bound;
+  mode.damping_ratio_bound = numbers.damping_ratio_bound;
+}
+
+/// Eigenvector of root i in joint coordinates, and its coefficients (re, im) in the block's
+/// columns.
+template <int N>
+ComplexVector<N> Reader<N>::shape(int i, bool left, StateVector<N>& re, StateVector<N>& im) const {
+  const Block& b = basis_.blocks[root(i).block];
+  const Complex mu = root(i).value;
+  const auto& matrix = left ? basis_.Gamma : basis_.Lambda;
+  const State<N> L = matrix.block(b.first, b.first, b.size, b.size);
+  ComplexVector<kTwice<N>> w(b.size);
+  if (b.size == 1) {
+    w[0] = 1;
+  } else if (b.size == 2) {
+    // (L - mu) w = 0 from the row that says more.
+    const Complex p = L(0, 0) - mu, s = L(1, 1) - mu;
+    if (std::norm(p) + L(0, 1) * L(0, 1) >= std::norm(s) + L(1, 0) * L(1, 0)) {
+      w << L(0, 1), -p;
+    } else {
+      w << -s, L(1, 0);
+    }
+    if (w.squaredNorm() == 0) w << 1, 0;
+  } else {
+    // Inverse iteration, kept where it grows most: near a defective eigenvalue a further step may
+    // well be worse (Wilkinson 1979).
+    ComplexVector<kTwice<N>> x = ComplexVector<kTwice<N>>::Ones(b.size);
+    double best = 0;
+    Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, kTwice<N>, kTwice<N>> shifted;
+    for (int k = 0; k < 3; ++k) {
+      shifted = L.template cast<Complex>();
+      shifted.diagonal().array() -= mu;
+      solve_in_place(shifted, x, kUnit * L.norm());
+      const double growth = x.stableNorm();
+      x /= growth;
+      if (growth > best) best = growth, w = x;
+    }
+  }
+  const auto& U = left ? basis_.Y : basis_.U;
+  const auto columns = U.middleCols(b.first, b.size);
+  re = w.real();
+  im = w.imag();
+  const Vector<N> x = columns.lazyProduct(re), y = columns.lazyProduct(im);
+  // Unit kinetic energy; largest entry real and positive.
+  double energy = 0;
+  if (left) {
+    energy = x.dot(system_.mass * x) + y.dot(system_.mass * y);
+  } else {
+    const auto momenta = defect_.MU.middleCols(b.first, b.size);
+    energy = x.dot(momenta.lazyProduct(re)) + y.dot(momenta.lazyProduct(im));
+  }
+  const double norm = std::sqrt(energy);
+  Eigen::Index largest = 0;
+  (x.cwiseAbs2() + y.cwiseAbs2()).maxCoeff(&largest);
+  const Complex pivot(x[largest], y[largest]);
+  const Complex factor = std::conj(pivot) / (modulus(pivot) * norm);
+  ComplexVector<N> u(x.size());
+  u.real() = factor.real() * x - factor.imag() * y;
+  u.imag() = factor.real() * y + factor.imag() * x;
+  w *= factor;
+  re = w.real();
+  im = w.imag();
+  return u;
+}
+
+template <int N>
+void Reader<N>::write_shapes(int i, int j, Mode<N>& mode) const {
+  mode.backward_error = mode.condition = 0;
+  const std::array<int, 2> which =
+      root(i).value == mode.eigenvalues[0] ? std::array<int, 2>{i, j} : std::array<int, 2>{j, i};
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (k == 1 && mode.eigenvalues[0].imag() != 0) {
+      mode.shapes[1] = mode.shapes[0].conjugate();
+      mode.left_shapes[1] = mode.left_shapes[0].conjugate();
+      break;
+    }
+    StateVector<N> re, im, unused_re, unused_im;
+    mode.shapes[k] = shape(which[k], false, re, im);
+    mode.left_shapes[k] =
+        spectrum_.symmetric ? mode.shapes[k] : shape(which[k], true, unused_re, unused_im);
+    const Block& b = basis_.blocks[root(which[k]).block];
+    const Complex mu = root(which[k]).value;
+    const auto combine = [&](const Wide<N>& X) {
+      ComplexVector<N> x(X.rows());
+      for (Eigen::Index row = 0; row < X.rows(); ++row) {
+        double real = 0, imag = 0;
+        for (Eigen::Index l = 0; l < b.size; ++l) {
+          real += X(row, b.first + l) * re[l];
+          imag += X(row, b.first + l) * im[l];
+        }
+        x[row] = Complex(real, imag);
+      }
+      return x;
+    };
+    const ComplexVector<N> Mu = combine(defect_.MU), Cu = combine(defect_.CU),
+                           Ku = combine(defect_.KU);
+    const double size = std::norm(mu) * M_norm_ + modulus(mu) * C_norm_ + K_norm_;
+    const double u_norm = mode.shapes[k].norm(), y_norm = mode.left_shapes[k].norm();
+    const double residual = (mu * mu * Mu + mu * Cu + Ku).norm();
+    const double slope = std::abs((mode.left_shapes[k].transpose() * (2.0 * mu * Mu + Cu)).value());
+    const double backward_error = residual / (size * u_norm);
+    mode.backward_error =
+        std::max(mode.backward_error, backward_error >= 0 ? backward_error : kInfinity);
+    mode.condition = std::max(mode.condition, y_norm * u_norm * size / (modulus(mu) * slope));
+  }
+}
+
+template <int N>
+void Reader<N>::write_modes() {
+  int count = 0;
+  for (int i = 0; i < root_count_; ++i) count += !root(i).used && root(i).partner > i ? 1 : 0;
+  spectrum_.modes.resize(count);  // two roots of 2n each: n at most
+  // By insertion, in the order of falling sqrt|l1 l2|: a mode without natural frequency has this.
+  Eigen::Matrix<int, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1> order(count);
+  StateVector<N> key(root_count_);
+  int next = 0;
+  for (int i = 0; i < root_count_; ++i) {
+    const int j = root(i).partner;
+    if (root(i).used || j <= i) continue;
+    key[i] = std::sqrt(modulus(root(i).value) * modulus(root(j).value));
+    int position = next++;
+    for (; position > 0 && key[order[position - 1]] < key[i]; --position) {
+      order[position] = order[position - 1];
+    }
+    order[position] = i;
+  }
+  for (int k = 0; k < spectrum_.modes.size(); ++k) {
+    const int i = order[k], j = root(i).partner;
+    const bool upper_first = root(i).value.imag() >= 0;
+    Mode<N>& mode = spectrum_.modes[k];
+    write_numbers(upper_first ? i : j, upper_first ? j : i, mode);
+    write_shapes(upper_first ? i : j, upper_first ? j : i, mode);
+  }
+}
+
+}  // namespace
+
+template <int N>
+void read_modes(const System<N>& system, const Defect<N>& defect, const Certificate<N>& certificate,
+                double soft_frequency, Spectrum<N>& spectrum) noexcept {
+  Reader<N>(system, defect, certificate, soft_frequency, spectrum).read();
+}
+
+template <int N>
+Quality worst_quality(const Spectrum<N>& spectrum) noexcept {
+  Quality worst;
+  for (const Mode<N>& mode : spectrum.modes) {
+    // At critical damping the eigenvalues are worth half the digits of their sum and product.
+    const double size = modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]);
+    const double bound =
+        mode.kind == ModeKind::kCritical ? mode.natural_frequency_bound : mode.error_bound;
+    worst.bound = std::max(worst.bound, std::isfinite(bound) ? bound / size : kInfinity);
+    worst.backward_error = std::max(worst.backward_error, mode.backward_error);
+  }
+  return worst;
+}
+
+template void read_modes(const System<kDynamic>&, const Defect<kDynamic>&,
+                         const Certificate<kDynamic>&, double, Spectrum<kDynamic>&) noexcept;
+template void read_modes(const System<kMaxDof>&, const Defect<kMaxDof>&,
+                         const Certificate<kMaxDof>&, double, Spectrum<kMaxDof>&) noexcept;
+template Quality worst_quality(const Spectrum<kDynamic>&) noexcept;
+template Quality worst_quality(const Spectrum<kMaxDof>&) noexcept;
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,23 @@
+#pragma once
+#include <dashpot/analysis/spectrum/certificate.hpp>
+#include <dashpot/analysis/spectrum/spectrum_result.hpp>
+
+namespace dashpot::analysis {
+
+/// Reads the modes off a certified basis: eigenvalues and shapes of every block, pairs of real
+/// eigenvalues, frequencies, ratios, kinds, bounds, backward errors; sorted by falling sqrt|l1 l2|,
+/// which is the natural frequency where there is one. `soft_frequency` in rad/s.
+/// Fills spectrum.modes and zero_mode_rates from spectrum.basis and zero_modes.
+template <int N>
+void read_modes(const System<N>& system, const Defect<N>& defect, const Certificate<N>& certificate,
+                double soft_frequency, Spectrum<N>& spectrum) noexcept;
+
+/// How good a spectrum is, at its worst mode.
+struct Quality {
+  double bound = 0;  ///< error bound / (|lambda_1| + |lambda_2|); infinite if one is missing
+  double backward_error = 0;
+};
+template <int N>
+Quality worst_quality(const Spectrum<N>& spectrum) noexcept;
+
+}  // namespace dashpot::analysis

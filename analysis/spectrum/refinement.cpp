@@ -1,0 +1,386 @@
+#include <dashpot/analysis/linalg/double_double.hpp>
+#include <dashpot/analysis/linalg/small_dense.hpp>
+#include <dashpot/analysis/spectrum/refinement.hpp>
+
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
+/// Distance of the Gram matrix from its diagonal blocks up to which these serve for all of it, and
+/// up to which it is looked at as a perturbation of them.
+constexpr double kOrthogonal = 1e-8;
+constexpr double kNearlyOrthogonal = 0.1;
+/// Units of Work, times n^3: of the products of a basis, with either precision; of the inverse of
+/// its Gram matrix; and of all that is done once.
+constexpr std::int64_t kProductsWork = 80, kExtendedWork = 1600, kInverseWork = 110,
+                       kDefectWork = 90;
+
+/// X Lambda for a block-diagonal Lambda.
+template <int N, typename Left, typename Out>
+void times_blocks(const Left& X, const State<N>& Lambda, const BlockList<N>& blocks, Out& out) {
+  out.resize(X.rows(), X.cols());
+  const Eigen::Index n = X.rows();
+  for (const Block& b : blocks) {
+    const double* const x = X.data() + b.first * n;
+    double* const y = out.data() + b.first * n;
+    if (b.size == 1) {
+      const double factor = Lambda(b.first, b.first);
+      for (Eigen::Index i = 0; i < n; ++i) y[i] = factor * x[i];
+    } else if (b.size == 2) {
+      const Eigen::Index k = b.first;
+      const double l00 = Lambda(k, k), l10 = Lambda(k + 1, k), l01 = Lambda(k, k + 1),
+                   l11 = Lambda(k + 1, k + 1);
+      for (Eigen::Index i = 0; i < n; ++i) {
+        y[i] = x[i] * l00 + x[i + n] * l10;
+        y[i + n] = x[i] * l01 + x[i + n] * l11;
+      }
+    } else {
+      out.middleCols(b.first, b.size) =
+          X.middleCols(b.first, b.size).lazyProduct(Lambda.block(b.first, b.first, b.size, b.size));
+    }
+  }
+}
+
+/// weight X for a block-diagonal weight.
+template <int N>
+void weigh(const State<N>& weight, const BlockList<N>& blocks, State<N>& X) {
+  const Eigen::Index states = X.rows();
+  for (const Block& b : blocks) {
+    const Eigen::Index k = b.first;
+    double* x = X.data() + k;
+    if (b.size == 1) {
+      const double factor = weight(k, k);
+      for (Eigen::Index j = 0; j < states; ++j, x += states) x[0] *= factor;
+    } else if (b.size == 2) {
+      const double w00 = weight(k, k), w10 = weight(k + 1, k), w01 = weight(k, k + 1),
+                   w11 = weight(k + 1, k + 1);
+      for (Eigen::Index j = 0; j < states; ++j, x += states) {
+        const double x0 = x[0], x1 = x[1];
+        x[0] = w00 * x0 + w01 * x1;
+        x[1] = w10 * x0 + w11 * x1;
+      }
+    } else {
+      const State<N> rows = weight.block(k, k, b.size, b.size) * X.middleRows(k, b.size);
+      X.middleRows(k, b.size) = rows;
+    }
+  }
+}
+
+/// A table of double-doubles, n x 2n, that allocates only when N is kDynamic.
+template <int N>
+class WideDoubleDouble {
+ public:
+  explicit WideDoubleDouble(Eigen::Index n) : rows_(n) {
+    if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(2 * n * n));
+  }
+  DoubleDouble& operator()(Eigen::Index i, Eigen::Index j) {
+    return items_[static_cast<std::size_t>(j * rows_ + i)];
+  }
+
+ private:
+  Eigen::Index rows_;
+  std::conditional_t<
+      N == kDynamic, std::vector<DoubleDouble>,
+      std::array<DoubleDouble, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N * N)>>
+      items_;
+};
+
+/// X Lambda in double-double arithmetic, X(i, j) giving doubles or double-doubles.
+template <int N, typename Left>
+WideDoubleDouble<N> times_blocks_extended(Left&& X, const ModalBasis<N>& basis) {
+  const Eigen::Index n = basis.U.rows();
+  WideDoubleDouble<N> out(n);
+  for (const Block& b : basis.blocks) {
+    for (Eigen::Index j = b.first; j < b.first + b.size; ++j) {
+      for (Eigen::Index i = 0; i < n; ++i) {
+        DotAccumulator sum;
+        for (Eigen::Index k = b.first; k < b.first + b.size; ++k)
+          sum.add(X(i, k), basis.Lambda(k, j));
+        out(i, j) = sum.value();
+      }
+    }
+  }
+  return out;
+}
+
+/// In double-double arithmetic, rounded once at the end: the residual
+/// R = K U + C U Lambda + M U Lambda^2, and the Gram matrix Y' (C U + M U Lambda) + (Y Gamma)' M U.
+template <int N>
+void evaluate_extended(const System<N>& system, const ModalBasis<N>& basis, Defect<N>& defect) {
+  const Eigen::Index n = system.dof();
+  WideDoubleDouble<N> V = times_blocks_extended<N>(basis.U, basis);
+  WideDoubleDouble<N> A = times_blocks_extended<N>(V, basis);
+  WideDoubleDouble<N> momentum(n), tested(n);
+  for (Eigen::Index j = 0; j < 2 * n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) {
+      DotAccumulator residual, p, t;
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const double u = basis.U(k, j);
+        residual.add(u, system.stiffness(i, k));
+        residual.add(V(k, j), system.damping(i, k));
+        residual.add(A(k, j), system.mass(i, k));
+        p.add(u, system.mass(i, k));
+        t.add(u, system.damping(i, k));
+        t.add(V(k, j), system.mass(i, k));
+        if (system.has_tails) {
+          residual.add(u, system.stiffness_tail(i, k));
+          residual.add(V(k, j), system.damping_tail(i, k));
+          t.add(u, system.damping_tail(i, k));
+        }
+      }
+      defect.R(i, j) = residual.value().high;
+      momentum(i, j) = p.value();
+      tested(i, j) = t.value();
+    }
+  }
+  for (Eigen::Index j = 0; j < 2 * n; ++j) {
+    for (Eigen::Index i = 0; i < 2 * n; ++i) {
+      DotAccumulator sum;
+      for (Eigen::Index k = 0; k < n; ++k) {
+        sum.add(tested(k, j), basis.Y(k, i));
+        sum.add(momentum(k, j), defect.YG(k, i));
+      }
+      defect.gram(i, j) = sum.value().high;
+    }
+  }
+}
+
+/// Left basis dual to the right one: the inverse of [C U + M U Lambda; M U].
+template <int N>
+void dual_basis(const Defect<N>& defect, ModalBasis<N>& basis) {
+  const Eigen::Index n = basis.U.rows();
+  State<N> B(2 * n, 2 * n), inverse = State<N>::Identity(2 * n, 2 * n);
+  B.topRows(n) = defect.CU + defect.MV;
+  B.bottomRows(n) = defect.MU;
+  solve_in_place(B, inverse, std::numeric_limits<double>::min());
+  basis.Y = inverse.leftCols(n).transpose();
+  basis.Gamma = basis.Lambda.transpose();
+}
+
+/// The same for a symmetric system whose blocks are not orthogonal to each other, because some have
+/// eigenvalues in common: Y = U G^-1 with the Gram matrix G, scaled before it is inverted.
+template <int N>
+void orthogonalize_left(const State<N>& gram, ModalBasis<N>& basis) {
+  StateVector<N> scale(gram.rows());
+  for (const Block& b : basis.blocks) {
+    const auto own = gram.block(b.first, b.first, b.size, b.size);
+    scale.segment(b.first, b.size).setConstant(1 / std::sqrt(own.norm()));
+  }
+  State<N> factor = scale.asDiagonal() * gram * scale.asDiagonal();
+  State<N> inverse = State<N>::Identity(gram.rows(), gram.rows());
+  solve_in_place(factor, inverse, std::numeric_limits<double>::min());
+  inverse = (scale.asDiagonal() * inverse * scale.asDiagonal()).eval();
+  basis.Y.noalias() = basis.U * inverse.transpose();
+  basis.Gamma = basis.Lambda.transpose();
+}
+
+/// Inverses of the diagonal blocks of the Gram matrix.
+template <int N>
+void invert_blocks(const State<N>& gram, ModalBasis<N>& basis) {
+  basis.weight.setZero(gram.rows(), gram.cols());
+  for (const Block& b : basis.blocks) {
+    const Eigen::Index k = b.first;
+    if (b.size == 1) {
+      basis.weight(k, k) = 1 / gram(k, k);
+      continue;
+    }
+    if (b.size == 2) {
+      const double inverse =
+          1 / (gram(k, k) * gram(k + 1, k + 1) - gram(k, k + 1) * gram(k + 1, k));
+      basis.weight(k, k) = gram(k + 1, k + 1) * inverse;
+      basis.weight(k + 1, k + 1) = gram(k, k) * inverse;
+      basis.weight(k, k + 1) = -gram(k, k + 1) * inverse;
+      basis.weight(k + 1, k) = -gram(k + 1, k) * inverse;
+      continue;
+    }
+    State<N> factor = gram.block(b.first, b.first, b.size, b.size);
+    State<N> inverse = State<N>::Identity(b.size, b.size);
+    solve_in_place(factor, inverse, std::numeric_limits<double>::min());
+    basis.weight.block(b.first, b.first, b.size, b.size) = inverse;
+  }
+}
+
+/// Entrywise bound on |weight G* - I|, where G* is the exact Gram matrix and `gram` the computed
+/// one. Uses |M_kl| <= s_k s_l with s_k = sqrt(M_kk), so that graded masses stay graded.
+template <int N>
+void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& basis,
+                 Defect<N>& defect) {
+  const Eigen::Index n = system.dof(), states = 2 * n;
+  const Vector<N> s = system.mass.diagonal().cwiseSqrt();
+  double c = 0;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) {
+      c = std::max(c, std::abs(system.damping(i, j)) / (s[i] * s[j]));
+    }
+  }
+  StateVector<N> u(states), v(states), y(states), yg(states);
+  for (Eigen::Index j = 0; j < states; ++j) {
+    u[j] = s.cwiseProduct(basis.U.col(j)).norm();
+    v[j] = s.cwiseProduct(defect.V.col(j)).norm();
+    y[j] = s.cwiseProduct(basis.Y.col(j)).norm();
+    yg[j] = s.cwiseProduct(defect.YG.col(j)).norm();
+  }
+  int widest = 1;
+  for (const Block& b : basis.blocks) widest = std::max(widest, b.size);
+  const auto dn = static_cast<double>(n);
+  const double terms = (2 * dn + 16) * dn * kUnit;
+  const double gamma = extended ? 8 * terms * kUnit : terms;
+  State<N>& E = defect.E;
+  State<N>& error = defect.F_error;  // used as workspace here
+  E = defect.gram;
+  error.resize(states, states);
+  for (Eigen::Index j = 0; j < states; ++j) {
+    for (Eigen::Index i = 0; i < states; ++i) {
+      error(i, j) = gamma * (y[i] * (c * u[j] + v[j]) + yg[i] * u[j]) +
+                    (8 + 2 * widest) * kUnit * std::abs(E(i, j));
+    }
+  }
+  const State<N> size = basis.weight.cwiseAbs();
+  weigh<N>(size, basis.blocks, error);
+  weigh<N>(basis.weight, basis.blocks, E);
+  E.diagonal().array() -= 1;
+  E = E.cwiseAbs() + error;
+}
+
+/// Gram matrix and residual for the left basis (Y, Gamma), the blocks' weights, and the bound E.
+/// Returns the largest column sum of E.
+template <int N>
+double evaluate_products(const System<N>& system, bool extended, ModalBasis<N>& basis,
+                         Defect<N>& defect) {
+  times_blocks<N>(basis.Y, basis.Gamma, basis.blocks, defect.YG);
+  defect.YT = basis.Y.transpose();
+  defect.R.resize(basis.U.rows(), basis.U.cols());
+  defect.gram.resize(basis.U.cols(), basis.U.cols());
+  if (extended) {
+    evaluate_extended<N>(system, basis, defect);
+  } else {
+    const Wide<N> tested = defect.CU + defect.MV;
+    multiply(defect.YT, tested, defect.gram);
+    const State<N> YGT = defect.YG.transpose();
+    multiply(YGT, defect.MU, defect.E);
+    defect.gram += defect.E;
+    times_blocks<N>(tested, basis.Lambda, basis.blocks, defect.R);
+    defect.R += defect.KU;
+  }
+  invert_blocks<N>(defect.gram, basis);
+  gram_defect<N>(system, extended, basis, defect);
+  return defect.E.colwise().sum().maxCoeff();
+}
+
+/// Entrywise bound on the error of the computed residual R.
+template <int N>
+void bound_residual(const System<N>& system, bool extended, const ModalBasis<N>& basis,
+                    Defect<N>& defect) {
+  int widest = 1;
+  for (const Block& b : basis.blocks) widest = std::max(widest, b.size);
+  const State<N> Lambda_size = basis.Lambda.cwiseAbs();
+  const Wide<N> size_U = basis.U.cwiseAbs();
+  Wide<N> size_V, size_A;
+  times_blocks<N>(size_U, Lambda_size, basis.blocks, size_V);
+  times_blocks<N>(size_V, Lambda_size, basis.blocks, size_A);
+  Wide<N> part;
+  Square<N> size = system.stiffness.cwiseAbs();
+  multiply(size, size_U, defect.R_size);
+  size = system.damping.cwiseAbs();
+  multiply(size, size_V, part);
+  defect.R_size += part;
+  size = system.mass.cwiseAbs();
+  multiply(size, size_A, part);
+  defect.R_size += part;
+  const auto dn = static_cast<double>(system.dof());
+  const double terms = 3 * dn + 2 * widest + (system.has_tails ? 6 : 4);
+  const double gamma = extended ? 8 * terms * kUnit * kUnit : terms * kUnit;
+  // The second term is the rounding of R itself, and of the product Y' R.
+  defect.R_size = gamma * defect.R_size + (dn + 2 * widest + 4) * kUnit * defect.R.cwiseAbs();
+}
+
+/// Whether no product that matters can underflow or overflow, extended ones included: the bounds
+/// count rounding errors only. Widths in powers of ten are far beyond any mechanism.
+template <int N>
+bool in_range(const System<N>& system, const ModalBasis<N>& basis) {
+  const auto inside = [](double x, double width) { return 1 / width < x && x < width; };
+  for (Eigen::Index i = 0; i < system.dof(); ++i) {
+    if (!inside(system.mass(i, i), 1e120)) return false;
+  }
+  for (const Block& b : basis.blocks) {
+    if (b.zero_mode) continue;
+    const double rate = basis.Lambda.block(b.first, b.first, b.size, b.size).cwiseAbs().maxCoeff();
+    if (rate != 0 && !inside(rate, 1e60)) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+template <int N>
+void evaluate_defect(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
+                     Defect<N>& defect, Work& work) noexcept {
+  const std::int64_t products_work = cubed(system.dof(), extended ? kExtendedWork : kProductsWork);
+  const std::int64_t inverse_work = cubed(system.dof(), kInverseWork);
+  if (!work.take(cubed(system.dof(), kDefectWork) + products_work +
+                 (symmetric ? 0 : inverse_work))) {
+    return;
+  }
+  if (system.dof() == 0) {
+    defect = Defect<N>{};
+    basis.Y = basis.U;
+    basis.Gamma = basis.weight = basis.Lambda;
+    return;
+  }
+  times_blocks<N>(basis.U, basis.Lambda, basis.blocks, defect.V);
+  multiply(system.mass, basis.U, defect.MU);
+  multiply(system.damping, basis.U, defect.CU);
+  multiply(system.stiffness, basis.U, defect.KU);
+  times_blocks<N>(defect.MU, basis.Lambda, basis.blocks, defect.MV);
+  if (symmetric) {
+    basis.Y = basis.U;
+    basis.Gamma = basis.Lambda;
+  } else {
+    dual_basis<N>(defect, basis);
+  }
+  double contraction = evaluate_products<N>(system, extended, basis, defect);
+  if (symmetric && !(contraction < kOrthogonal)) {
+    if (!work.take(inverse_work + 2 * products_work)) return;
+    orthogonalize_left<N>(defect.gram, basis);
+    const double dual_contraction = evaluate_products<N>(system, extended, basis, defect);
+    if (dual_contraction < contraction) {
+      contraction = dual_contraction;
+    } else {
+      basis.Y = basis.U;
+      basis.Gamma = basis.Lambda;
+      contraction = evaluate_products<N>(system, extended, basis, defect);
+    }
+  }
+  multiply(defect.YT, defect.R, defect.W);
+  defect.F = -defect.W;
+  if (!(contraction < kNearlyOrthogonal) || !in_range(system, basis)) {
+    // Far from orthogonal, the basis needs all of the Gram matrix, and proves nothing. Nor do
+    // numbers whose products leave the range of doubles.
+    State<N> gram = defect.gram;
+    solve_in_place(gram, defect.F, std::numeric_limits<double>::min());
+    defect.F_error.setConstant(std::numeric_limits<double>::infinity());
+    return;
+  }
+  // |F* - F| <= |weight| |error of Y'R|, then the Gram matrix's distance from block form.
+  weigh<N>(basis.weight, basis.blocks, defect.F);
+  bound_residual<N>(system, extended, basis, defect);
+  defect.YT = defect.YT.cwiseAbs();
+  multiply(defect.YT, defect.R_size, defect.F_error);
+  const State<N> weight_size = basis.weight.cwiseAbs();
+  weigh<N>(weight_size, basis.blocks, defect.F_error);
+  const StateVector<N> E_rows = defect.E.rowwise().maxCoeff();
+  for (Eigen::Index j = 0; j < defect.F.cols(); ++j) {
+    const double column =
+        (defect.F.col(j).cwiseAbs() + defect.F_error.col(j)).sum() / (1 - contraction);
+    defect.F_error.col(j) = (1 + 1e-10) * (defect.F_error.col(j) + E_rows * column);
+  }
+}
+
+template void evaluate_defect(const System<kDynamic>&, bool, bool, ModalBasis<kDynamic>&,
+                              Defect<kDynamic>&, Work&) noexcept;
+template void evaluate_defect(const System<kMaxDof>&, bool, bool, ModalBasis<kMaxDof>&,
+                              Defect<kMaxDof>&, Work&) noexcept;
+
+}  // namespace dashpot::analysis

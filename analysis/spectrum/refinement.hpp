@@ -1,0 +1,60 @@
+#pragma once
+#include <dashpot/analysis/spectrum/modal_basis.hpp>
+#include <dashpot/analysis/system.hpp>
+#include <dashpot/analysis/work.hpp>
+
+namespace dashpot::analysis {
+
+/// What is left over of a system in a nearly invariant basis. In exact arithmetic the system is
+/// similar to the state matrix Lambda + F*, and entrywise |F* - F| <= F_error: a proved bound that
+/// includes every rounding error made in computing F.
+template <int N = kDynamic>
+struct Defect {
+  State<N> F;          ///< 2n x 2n, 1/s
+  State<N> F_error;    ///< 2n x 2n, 1/s; infinite if the basis is too ill conditioned to say, or if
+                       ///< frequencies leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120
+  Wide<N> MU, CU, KU;  ///< M U, C U, K U: n x 2n
+
+  // Workspace
+  Wide<N> V, R, R_size, MV, YG;
+  State<N> gram, E, W, YT;
+};
+
+/// Evaluates the defect of (basis.U, basis.Lambda) for the original coefficients, and sets the
+/// basis's left part and weight. With `extended`, the residual M U Lambda^2 + C U Lambda + K U is
+/// accumulated in double-double arithmetic, tails included, and so is the Gram matrix. If `work`
+/// does not grant it, the result has no meaning.
+template <int N>
+void evaluate_defect(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
+                     Defect<N>& defect, Work& work) noexcept;
+template <int N>
+void evaluate_defect(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
+                     Defect<N>& defect) noexcept {
+  Work work;
+  evaluate_defect<N>(system, symmetric, extended, basis, defect, work);
+}
+
+/// One Newton step on the whole basis: U <- U (I + X), where the blocks of X off the diagonal solve
+/// the Sylvester equations  Lambda_i X_ij - X_ij Lambda_j = -F_ij. (Its other half, Lambda <-
+/// Lambda + the diagonal blocks of F, is done by `certify`, but for the decay rates of zero modes.)
+/// Converges quadratically; pairs of blocks with (nearly) common eigenvalues are left alone.
+/// (Dongarra, Moler, Wilkinson 1983; Davies, Modi 1986; Ogita, Aishima 2018.)
+template <int N>
+void newton_step(const Defect<N>& defect, ModalBasis<N>& basis) noexcept;
+
+/// Solves A X - X B = C for X (k x l), A (k x k), B (l x l), and returns a lower bound of the
+/// separation of A and B (the smallest singular value of X -> A X - X B, Frobenius); X is zero and
+/// so is the bound if they have a common eigenvalue.
+template <int N>
+double solve_sylvester(const Eigen::Ref<const State<N>>& A, const Eigen::Ref<const State<N>>& B,
+                       const State<N>& C, State<N>& X) noexcept;
+
+/// Work of the Sylvester equations of all pairs of these blocks, one for each pair.
+template <int N>
+std::int64_t sylvester_work(const BlockList<N>& blocks) noexcept;
+
+/// The lower bound of the separation alone, for two blocks of Lambda.
+template <int N>
+double block_separation(const State<N>& Lambda, const Block& a, const Block& b) noexcept;
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,209 @@
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/spectrum/modes.hpp>
+#include <dashpot/analysis/spectrum/starting_basis.hpp>
+#include <dashpot/analysis/system/energy_form.hpp>
+
+#include <Eigen/Cholesky>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace dashpot::analysis {
+namespace {
+
+/// Times the basis is evaluated with one kind of residual, with a refinement step between each two;
+/// the last evaluation is taken as it is.
+constexpr int kMaxEvaluations = 4;
+/// Refinement goes on until every mode's backward error is below this.
+constexpr double kTargetBackwardError = 2e-14;
+/// With a relative bound above this, residuals of working precision are not worth a step.
+constexpr double kHopeless = 1e-6;
+/// Relative distances of eigenvalues that share a block, tried in turn until the result is proved
+/// and its backward error is below the next number.
+constexpr std::array<double, 3> kClusters = {0.02, 0.2, 3};
+constexpr double kAcceptableBackwardError = 1e-12;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+template <int N>
+Status check(const System<N>& system) {
+  if (!system.mass.allFinite() || !system.damping.allFinite() || !system.stiffness.allFinite()) {
+    return Status::kNotFinite;
+  }
+  return system.mass == system.mass.transpose() ? Status::kOk : Status::kNotSymmetric;
+}
+
+/// Work of what comes before the basis: the zero modes' singular value decomposition above all.
+std::int64_t form_work(Eigen::Index n) {
+  return cubed(n, 260) + 6000;
+}
+
+/// Work of certify and read_modes; blocks of more than two columns have an iteration of their own.
+template <int N>
+std::int64_t reading_work(Eigen::Index n, const BlockList<N>& blocks) {
+  std::int64_t units = squared(n, 1500) + cubed(n, 20) + sylvester_work(blocks);
+  for (const Block& block : blocks) {
+    if (block.size > 2) units += cubed(block.size, 60) + squared(block.size, 1500);
+  }
+  return units;
+}
+
+/// Work of a Newton step.
+template <int N>
+std::int64_t step_work(Eigen::Index n, const BlockList<N>& blocks) {
+  return cubed(n, 180) + 3 * sylvester_work(blocks);
+}
+
+}  // namespace
+
+template <int N>
+Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work& work) noexcept {
+  out.modes.resize(0);
+  out.extended = false;
+  out.status = check(system);
+  if (out.status != Status::kOk) return out.status;
+  if (!work.take(form_work(system.dof()))) return out.status = Status::kUnfinished;
+  const Eigen::LLT<Square<N>> cholesky(system.mass);
+  if (system.dof() > 0 && cholesky.info() != Eigen::Success) {
+    return out.status = Status::kMassNotPositiveDefinite;
+  }
+  const Square<N> L = system.dof() > 0 ? Square<N>(cholesky.matrixL()) : Square<N>(0, 0);
+  out.zero_modes = find_zero_modes<N>(system, L);
+  if (!std::isfinite(out.zero_modes.floor) || !out.zero_modes.coordinates.allFinite()) {
+    return out.status = Status::kOverflow;
+  }
+  const EnergyForm<N> form = to_energy_form<N>(system, out.zero_modes);
+  if (!form.damping.allFinite() || !form.stiffness.allFinite()) {
+    return out.status = Status::kOverflow;
+  }
+  damped_ = !system.damping.isZero(0);
+  out.symmetric = form.symmetric;
+  out.proportional = form.proportional;
+  out.coupling = form.coupling;
+  out.coupled = form.coupled_zeros > 0;
+  for (const double cluster : kClusters) {
+    out.status = build_starting_basis<N>(form, out.zero_modes, cluster, out.basis, work);
+    if (out.status != Status::kOk) {
+      out.modes.resize(0);
+      return out.status;
+    }
+    out.extended = options_.residual == SpectrumOptions::Residual::kExtended;
+    refine(system, out, work);
+    if (!work.over() && !good(out) && options_.residual == SpectrumOptions::Residual::kAutomatic) {
+      out.extended = true;
+      refine(system, out, work);
+    }
+    if (work.over()) {
+      out.modes.resize(0);
+      return out.status = Status::kUnfinished;
+    }
+    if (!out.basis.Lambda.allFinite() || !out.basis.U.allFinite()) {
+      out.modes.resize(0);
+      return out.status = Status::kOverflow;
+    }
+    const Quality quality = worst_quality(out);
+    if (std::isfinite(quality.bound) && quality.backward_error <= kAcceptableBackwardError) break;
+  }
+  for (const Mode<N>& mode : out.modes) {
+    if (!std::isfinite(modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]))) {
+      out.modes.resize(0);
+      return out.status = Status::kNotConverged;
+    }
+  }
+  // All 2n eigenvalues: r zeros, the rates that are numbers, and two a mode. Real eigenvalues of a
+  // larger block may be left without a partner.
+  const Eigen::Index unrated = (out.zero_mode_rates.array() != out.zero_mode_rates.array()).count();
+  const bool complete = 2 * out.modes.size() == 2 * (system.dof() - out.zero_modes.count) + unrated;
+  const bool proved = complete && std::isfinite(worst_quality(out).bound);
+  return out.status = proved ? Status::kOk : Status::kUncertified;
+}
+
+template <int N>
+bool SpectrumSolver<N>::good(const Spectrum<N>& spectrum) const noexcept {
+  const Quality quality = worst_quality(spectrum);
+  if (quality.bound > options_.target_bound || quality.backward_error > kTargetBackwardError) {
+    return false;
+  }
+  // A kind that only the error bound decides is worth a better bound, once.
+  for (const Mode<N>& mode : spectrum.modes) {
+    const bool undecided =
+        mode.kind == ModeKind::kCritical || (mode.kind == ModeKind::kUndamped && damped_);
+    if (undecided && !spectrum.extended) return false;
+  }
+  return true;
+}
+
+template <int N>
+void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out, Work& work) noexcept {
+  Quality previous{kInfinity, kInfinity};
+  bool restored = false;
+  for (int evaluation = 1;; ++evaluation) {
+    evaluate_defect<N>(system, out.symmetric, out.extended, out.basis, defect_, work);
+    if (!work.take(reading_work<N>(system.dof(), out.basis.blocks))) return;
+    certify<N>(defect_, out.basis, certificate_);
+    read_modes<N>(system, defect_, certificate_, options_.soft_frequency, out);
+    const Quality quality = worst_quality(out);
+    if (good(out) || restored || evaluation == kMaxEvaluations) return;
+    if (quality.bound > 2 * previous.bound) {  // the step did harm: back, and be done
+      out.basis = before_step_;
+      restored = true;
+      continue;
+    }
+    const bool better = quality.bound < 0.5 * previous.bound ||
+                        quality.backward_error < 0.5 * previous.backward_error;
+    // Where rounding errors of the residual are all there is to see, a step would only add to them.
+    const bool noise = !out.extended && (quality.bound > kHopeless ||
+                                         (quality.backward_error <= kTargetBackwardError &&
+                                          defect_.F.norm() <= defect_.F_error.norm()));
+    if (!better || noise) return;
+    previous = quality;
+    if (!work.take(step_work<N>(system.dof(), out.basis.blocks))) return;
+    before_step_ = out.basis;
+    newton_step<N>(defect_, out.basis);
+  }
+}
+
+Spectrum<> analyze(const System<>& system, const SpectrumOptions& options) {
+  validate(system);
+  System<> symmetrized = system;  // the mass is symmetric to rounding by now
+  symmetrized.mass = 0.5 * (system.mass + system.mass.transpose());
+  SpectrumSolver<> solver(options);
+  Spectrum<> spectrum;
+  const Status status = solver.solve(symmetrized, spectrum);
+  if (status == Status::kOverflow) throw InvalidSystem("system", to_text(status));
+  if (status != Status::kOk && status != Status::kUncertified) {
+    throw std::runtime_error(to_text(status));
+  }
+  return spectrum;
+}
+
+DualEigenvectors dual_eigenvectors(const System<>& system, const Spectrum<>& spectrum) {
+  const Eigen::Index n = system.dof(), m = spectrum.modes.size();
+  DualEigenvectors dual;
+  dual.eigenvalues.resize(2 * m);
+  dual.right.resize(2 * n, 2 * m);
+  dual.left.resize(2 * n, 2 * m);
+  for (int i = 0; i < m; ++i) {
+    const Mode<>& mode = spectrum.modes[i];
+    for (Eigen::Index k = 0; k < 2; ++k) {
+      const auto which = static_cast<std::size_t>(k);
+      const Eigen::Index column = 2 * Eigen::Index{i} + k;
+      const Complex lambda = mode.eigenvalues[which];
+      const Eigen::VectorXcd& u = mode.shapes[which];
+      const Eigen::VectorXcd& y = mode.left_shapes[which];
+      const Eigen::VectorXcd My = system.mass.transpose() * y;
+      const Eigen::VectorXcd Cy = system.damping.transpose() * y;
+      const Complex slope = ((2.0 * lambda * My + Cy).transpose() * u).value();
+      const double norm = u.norm() * std::sqrt(1 + std::norm(lambda));
+      dual.eigenvalues[column] = lambda;
+      dual.right.col(column) << u / norm, lambda * u / norm;
+      dual.left.col(column) << (lambda * My + Cy) * (norm / slope), My * (norm / slope);
+    }
+  }
+  return dual;
+}
+
+template class SpectrumSolver<kDynamic>;
+template class SpectrumSolver<kMaxDof>;
+
+}  // namespace dashpot::analysis

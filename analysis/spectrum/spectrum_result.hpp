@@ -1,0 +1,34 @@
+#pragma once
+#include <dashpot/analysis/mode.hpp>
+#include <dashpot/analysis/spectrum/modal_basis.hpp>
+#include <dashpot/analysis/status.hpp>
+#include <dashpot/analysis/system/zero_modes.hpp>
+
+namespace dashpot::analysis {
+
+/// Everything the analysis knows of one system.
+template <int N = kDynamic>
+struct Spectrum {
+  Status status = Status::kOk;
+  bool symmetric = true;      ///< damping and stiffness equal their transposes
+  bool proportional = false;  ///< the undamped modes decouple the damping too (C = 0 included);
+                              ///< then zero_modes.coordinates is the mass-normalised modal matrix,
+                              ///< n x n, with the zero modes in its last columns
+  bool extended = false;      ///< residuals were evaluated with twice the working precision
+  bool coupled =
+      false;            ///< the damping couples zero and nonzero modes, and that was solved exactly
+  double coupling = 0;  ///< how strongly: |damping between nonzero and zero modes| / |damping|, in
+                        ///< mass-normalised coordinates (Frobenius)
+
+  ZeroModes<N> zero_modes;
+  /// n - r modes by falling natural frequency, or sqrt|l1 l2| where that is NaN; more than n - r
+  /// where zero modes' velocities form complex pairs
+  ModeList<N> modes;
+  /// Eigenvalues -a of the r zero modes' velocities, 1/s: zero if nothing damps them, positive if
+  /// they grow (no mode says so then), NaN if they are not real and so are among the modes. They
+  /// come without a proved bound.
+  Vector<N> zero_mode_rates;
+  ModalBasis<N> basis;
+};
+
+}  // namespace dashpot::analysis

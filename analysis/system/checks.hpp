@@ -1,0 +1,37 @@
+#pragma once
+// Checks of matrices at set-up. Each throws InvalidSystem with the key and a readable reason;
+// entries are counted from 1.
+
+#include <Eigen/Core>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace dashpot::analysis {
+
+/// Thrown at set-up for a system that is not a proper one; `key` names the part ("mass", ...).
+class InvalidSystem : public std::invalid_argument {
+ public:
+  InvalidSystem(std::string key, const std::string& reason)
+      : std::invalid_argument(key + ": " + reason), key_(std::move(key)) {}
+  const std::string& key() const noexcept { return key_; }
+
+ private:
+  std::string key_;
+};
+
+/// Entries of a matrix and its transpose may differ by this much of the largest entry.
+inline constexpr double kSymmetryTolerance = 1e-10;
+
+/// "is 3 x 2, expected 3 x 3"
+void check_size(const std::string& key, const Eigen::MatrixXd& matrix, Eigen::Index rows,
+                Eigen::Index cols);
+/// "entry (2,3) is not a finite number"
+void check_finite(const std::string& key, const Eigen::MatrixXd& matrix);
+/// "is not symmetric: entry (1,2) is 3, entry (2,1) is 4", for the two that differ most
+void check_symmetric(const std::string& key, const Eigen::MatrixXd& matrix);
+/// "entry (1,2) is more than a rounding error of the coefficient": error bounds of working
+/// precision count on tails no larger than one rounding of the coefficient.
+void check_tail(const std::string& key, const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& tail);
+
+}  // namespace dashpot::analysis

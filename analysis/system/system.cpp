@@ -1,0 +1,43 @@
+#include <dashpot/analysis/system.hpp>
+
+#include <Eigen/Cholesky>
+
+namespace dashpot::analysis {
+
+namespace {
+
+void check_optional_parts(const System<>& system) {
+  const Eigen::Index n = system.dof();
+  if (system.stiffness_factor.rows() > 0) {
+    check_size("stiffness_factor", system.stiffness_factor, system.stiffness_factor.rows(), n);
+    check_finite("stiffness_factor", system.stiffness_factor);
+  }
+  if (system.has_tails) {
+    check_size("damping_tail", system.damping_tail, n, n);
+    check_size("stiffness_tail", system.stiffness_tail, n, n);
+    check_finite("damping_tail", system.damping_tail);
+    check_finite("stiffness_tail", system.stiffness_tail);
+    check_tail("damping_tail", system.damping, system.damping_tail);
+    check_tail("stiffness_tail", system.stiffness, system.stiffness_tail);
+  }
+}
+
+}  // namespace
+
+void validate(const System<>& system) {
+  const Eigen::Index n = system.mass.rows();
+  check_size("mass", system.mass, n, n);
+  check_size("damping", system.damping, n, n);
+  check_size("stiffness", system.stiffness, n, n);
+  check_finite("mass", system.mass);
+  check_finite("damping", system.damping);
+  check_finite("stiffness", system.stiffness);
+  check_optional_parts(system);
+
+  check_symmetric("mass", system.mass);
+  if (n > 0 && system.mass.llt().info() != Eigen::Success) {
+    throw InvalidSystem("mass", "is not positive definite");
+  }
+}
+
+}  // namespace dashpot::analysis

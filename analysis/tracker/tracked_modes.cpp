@@ -1,0 +1,236 @@
+#include <dashpot/analysis/linalg/hessenberg_qr.hpp>
+#include <dashpot/analysis/linalg/small_dense.hpp>
+#include <dashpot/analysis/spectrum/certificate.hpp>
+#include <dashpot/analysis/spectrum/mode_numbers.hpp>
+#include <dashpot/analysis/tracker/tracked_modes.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::analysis {
+namespace {
+
+constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
+
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+struct RootList {
+  std::array<Root, 2 * kMaxDof> items;
+  std::array<int, 2 * kMaxDof> block{};
+  int size = 0;
+
+  Root& operator[](int i) { return items[at(i)]; }
+  const Root& operator[](int i) const { return items[at(i)]; }
+};
+
+/// Two roots for each mode, in the order of the modes, then one for each zero mode; with the radius
+/// of the disc of each.
+void list_roots(const TrackedBasis& basis, const TrackedCertificate& certificate, RootList& roots) {
+  roots.size = basis.columns();
+  for (int i = 0; i < basis.modes; ++i) {
+    const double l00 = basis.l00[at(i)], l01 = basis.l01[at(i)], l10 = basis.l10[at(i)],
+                 l11 = basis.l11[at(i)];
+    std::array<Complex, 2> values;
+    eigenvalues_2x2(l00, l01, l10, l11, values[0], values[1]);
+    const double norm = std::sqrt(l00 * l00 + l01 * l01 + l10 * l10 + l11 * l11);
+    const double radius = certificate.radius[at(i)] + 16 * kUnit * norm;
+    const bool conjugate = values[0].imag() != 0;
+    for (int e = 0; e < 2; ++e) {
+      roots.block[at(2 * i + e)] = i;
+      roots[2 * i + e] = {values[at(e)], e == 1 && conjugate
+                                             ? roots[2 * i].bound
+                                             : disc_radius(values.data(), 2, e, norm, radius)};
+    }
+  }
+  for (int k = 0; k < basis.zeros; ++k) {
+    roots.block[at(2 * basis.modes + k)] = basis.modes + k;
+    roots[2 * basis.modes + k] = {basis.rate[at(k)], certificate.radius[at(basis.modes + k)]};
+  }
+}
+
+/// Bound for root i where its disc may meet others of its group: all that is known then is how many
+/// eigenvalues the union of the discs holds, so that the bound is the sum of their diameters.
+double bound_in_group(const RootList& roots, const TrackedCertificate& certificate, int i) {
+  std::array<bool, 2 * kMaxDof> inside{};
+  inside[at(i)] = true;
+  double total = 2 * roots[i].bound;
+  bool several = false;
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (int j = 0; j < roots.size; ++j) {
+      if (inside[at(j)] ||
+          certificate.group[at(roots.block[at(i)])] != certificate.group[at(roots.block[at(j)])]) {
+        continue;
+      }
+      for (int k = 0; k < roots.size && !inside[at(j)]; ++k) {
+        if (!inside[at(k)]) continue;
+        if (!(modulus(roots[j].value - roots[k].value) > roots[j].bound + roots[k].bound)) {
+          inside[at(j)] = grown = several = true;
+          total += 2 * roots[j].bound;
+        }
+      }
+    }
+  }
+  return several ? total : roots[i].bound;
+}
+
+/// Eigenvector of a mode's block: (Lambda - mu) w = 0 from the row that says more.
+std::array<Complex, 2> block_vector(const TrackedBasis& basis, int i, const Complex& mu) {
+  const double l01 = basis.l01[at(i)], l10 = basis.l10[at(i)];
+  const Complex p = basis.l00[at(i)] - mu, s = basis.l11[at(i)] - mu;
+  std::array<Complex, 2> w;
+  if (std::norm(p) + l01 * l01 >= std::norm(s) + l10 * l10) {
+    w = {l01, -p};
+  } else {
+    w = {-s, l10};
+  }
+  if (w[0] == 0.0 && w[1] == 0.0) w = {1, 0};
+  return w;
+}
+
+/// What a group of four modes needs for one eigenvector each: w, and the eigenvalues mu.
+struct VectorGroup {
+  std::array<Complex, 4> w0, w1, mu;
+};
+
+/// Lambda, and so w, is that of the basis before the step E.
+void set_vector(const TrackedBasis& basis, const PaddedRows& E, int i, const Complex& mu, int lane,
+                VectorGroup& group) {
+  const int j = basis.modes + i;
+  const std::array<Complex, 2> w = block_vector(basis, i, mu);
+  group.mu[at(lane)] = mu;
+  group.w0[at(lane)] = w[0] - (E(i, i) * w[0] + E(i, j) * w[1]);
+  group.w1[at(lane)] = w[1] - (E(j, i) * w[0] + E(j, j) * w[1]);
+}
+
+/// Largest velocity times root of the energy, below which a vector of unit strain does not move.
+constexpr double kNoMotion = 1e-290;
+
+/// u = V w of unit kinetic energy u^H M u, its largest entry real and positive, for `lanes` modes
+/// from `first` on.
+void write_shapes(const TrackedBasis& basis, const PaddedRows& velocities,
+                  const PaddedRows& momenta, int first, int lanes, std::size_t which,
+                  const VectorGroup& group, std::array<TrackedShapes, kMaxDof>& out) {
+  const int n = basis.modes + basis.zeros;
+  const auto gather = [](const std::array<Complex, 4>& from, bool imaginary) {
+    Lanes result;
+    for (int l = 0; l < 4; ++l) result[l] = imaginary ? from[at(l)].imag() : from[at(l)].real();
+    return result;
+  };
+  const Lanes a = gather(group.w0, false), b = gather(group.w0, true);
+  const Lanes c = gather(group.w1, false), d = gather(group.w1, true);
+  std::array<Lanes, kMaxDof> x, y;
+  Lanes energy{}, largest{}, x_largest{}, y_largest{};
+  for (int k = 0; k < n; ++k) {
+    const Lanes v = load(velocities.row(k) + first);
+    const Lanes w = load(velocities.row(k) + basis.modes + first);
+    const Lanes p = load(momenta.row(k) + first);
+    const Lanes q = load(momenta.row(k) + basis.modes + first);
+    const Lanes re = v * a + w * c, im = v * b + w * d;
+    energy += re * (p * a + q * c) + im * (p * b + q * d);
+    const Lanes size = re * re + im * im;
+    const auto larger = size > largest;
+    largest = larger ? size : largest;
+    x_largest = larger ? re : x_largest;
+    y_largest = larger ? im : y_largest;
+    x[at(k)] = re;
+    y[at(k)] = im;
+  }
+  for (int lane = 0; lane < lanes; ++lane) {
+    const double size = std::sqrt(largest[lane]) * std::sqrt(energy[lane]);
+    const double factor = size > kNoMotion ? 1 / size : 0;
+    const Complex f(x_largest[lane] * factor, -y_largest[lane] * factor);
+    TrackedShapes& shapes = out[at(first + lane)];
+    ComplexVector<kMaxDof>& u = shapes.u[which];
+    u.resize(n);
+    for (int k = 0; k < n; ++k) {
+      u[k] = Complex(f.real() * x[at(k)][lane] - f.imag() * y[at(k)][lane],
+                     f.real() * y[at(k)][lane] + f.imag() * x[at(k)][lane]);
+    }
+    // With the state x = (W u, mu u) = mu f Z w: u'(2 mu M + C) u = -x'Sx / mu (no conjugation).
+    const Complex w0 = group.w0[at(lane)], w1 = group.w1[at(lane)];
+    shapes.slope[which] =
+        -product(product(group.mu[at(lane)], product(f, f)), product(w0 - w1, w0 + w1));
+  }
+}
+
+}  // namespace
+
+void sort_by_frequency(TrackedSpectrum& out) noexcept {
+  std::array<double, kMaxDof> key{};
+  for (int i = 0; i < out.mode_count; ++i) {
+    const auto& values = out.modes[at(i)].eigenvalues;
+    key[at(i)] = modulus(values[0]) * modulus(values[1]);
+    int position = i;
+    for (; position > 0 && key[at(out.by_frequency[at(position - 1)])] < key[at(i)]; --position) {
+      out.by_frequency[at(position)] = out.by_frequency[at(position - 1)];
+    }
+    out.by_frequency[at(position)] = i;
+  }
+}
+
+void read_numbers(const TrackedBasis& basis, const TrackedCertificate& certificate,
+                  double soft_frequency, std::array<bool, kMaxDof>& soft,
+                  TrackedSpectrum& out) noexcept {
+  RootList roots;
+  list_roots(basis, certificate, roots);
+  out.mode_count = basis.modes;
+  out.status = Status::kOk;
+  for (int i = 0; i < basis.modes; ++i) {
+    Root first = roots[2 * i], second = roots[2 * i + 1];
+    const bool apart = modulus(first.value - second.value) > first.bound + second.bound;
+    if (!certificate.alone[at(i)] || !apart) {
+      first.bound = bound_in_group(roots, certificate, 2 * i);
+      second.bound = bound_in_group(roots, certificate, 2 * i + 1);
+    }
+    first.bound += 2 * kUnit * modulus(first.value);
+    second.bound += 2 * kUnit * modulus(second.value);
+    Invariants invariants = block_invariants(basis.l00[at(i)], basis.l01[at(i)], basis.l10[at(i)],
+                                             basis.l11[at(i)], certificate.radius[at(i)]);
+    if (!certificate.alone[at(i)]) {
+      const Invariants of_roots = root_invariants(first, second);
+      invariants.sum_error = of_roots.sum_error;
+      invariants.product_error = of_roots.product_error;
+      invariants.discriminant_error = of_roots.discriminant_error;
+    }
+    ModeNumbers& mode = out.modes[at(i)];
+    mode = mode_numbers(first, second, invariants, soft_frequency * (soft[at(i)] ? 2 : 1));
+    soft[at(i)] = mode.kind == ModeKind::kSoft;
+    if (!std::isfinite(mode.error_bound)) out.status = Status::kUncertified;
+  }
+  out.zero_mode_count = basis.zeros;
+  for (int k = 0; k < basis.zeros; ++k) out.zero_mode_rates[at(k)] = basis.rate[at(k)];
+  sort_by_frequency(out);
+}
+
+void read_shapes(const StateForm& form, const TrackedBasis& basis, const PaddedRows& E,
+                 const PaddedRows& velocities, PaddedRows& momenta, TrackedSpectrum& out) noexcept {
+  momenta.width = basis.Z.width;
+  padded_multiply(momenta.width)({form.M, 1, form.joints}, form.joints, form.joints,
+                                 velocities.row(0), nullptr, 1, momenta.row(0), momenta.width);
+  for (int first = 0; first < basis.modes; first += 4) {
+    const int lanes = std::min(4, basis.modes - first);
+    VectorGroup group{};
+    bool any_real = false;
+    const auto vectors = [&](std::size_t which) {
+      for (int lane = 0; lane < lanes; ++lane) {
+        const auto& values = out.modes[at(first + lane)].eigenvalues;
+        set_vector(basis, E, first + lane, values[which], lane, group);
+        any_real |= values[0].imag() == 0;
+      }
+      write_shapes(basis, velocities, momenta, first, lanes, which, group, out.shapes);
+    };
+    vectors(0);
+    if (any_real) vectors(1);
+    for (int i = first; i < first + lanes; ++i) {
+      if (out.modes[at(i)].eigenvalues[0].imag() == 0) continue;
+      TrackedShapes& shapes = out.shapes[at(i)];
+      shapes.u[1] = shapes.u[0].conjugate();
+      shapes.slope[1] = std::conj(shapes.slope[0]);
+    }
+  }
+}
+
+}  // namespace dashpot::analysis

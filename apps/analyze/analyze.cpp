@@ -1,0 +1,118 @@
+#include <dashpot/apps/analyze/json_writer.hpp>
+#include <dashpot/apps/analyze/report.hpp>
+#include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/apps/analyze/table_writer.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
+
+#include <unistd.h>
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+namespace {
+
+using Residual = analysis::SpectrumOptions::Residual;
+
+struct Options {
+  std::string file;
+  bool json = false;
+  double soft_frequency = analysis::SpectrumOptions().soft_frequency;  // rad/s
+  Residual residual = Residual::kAutomatic;
+  analysis::Pivot pivot = analysis::Pivot::kLargest;
+};
+
+std::vector<Report> make_reports(const SystemFile& file, const Options& options) {
+  std::vector<analysis::System<>> systems;
+  for (const SystemEntry& entry : file.entries) {
+    try {
+      systems.push_back(analysis::to_joint_space(entry.impedance));
+    } catch (const analysis::InvalidSystem& error) {
+      throw entry.error(error);
+    }
+  }
+  analysis::SpectrumOptions spectrum;
+  spectrum.soft_frequency = options.soft_frequency;
+  spectrum.residual = options.residual;
+  std::vector<Report> reports;
+  for (std::size_t i = 0; i < systems.size(); ++i) {
+    try {
+      reports.push_back(make_report(file.entries[i], systems[i], spectrum, options.pivot));
+    } catch (const analysis::InvalidSystem& error) {
+      throw file.entries[i].error(error);
+    }
+  }
+  return reports;
+}
+
+void run(const Options& options) try {
+  const SystemFile file = read_systems(options.file);
+  const std::vector<Report> reports = make_reports(file, options);
+  const bool bold = isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
+  if (options.json) {
+    print(to_json(reports, file.is_list));
+  } else {  // a table of numbers: no text of the file is in it
+    print_styled(to_table(reports, file.is_list, bold));
+  }
+} catch (const InputError& error) {
+  throw error.in_file(options.file);
+}
+
+std::string frequency_problem(const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  const bool good = end != text.c_str() && *end == '\0' && std::isfinite(value) && value >= 0;
+  return good ? "" : "a frequency in rad/s is wanted, not '" + text + "'";
+}
+
+/// An option whose value is one of the words in `choices`; `words` lists them for the help text.
+template <class Value>
+void add_choice(CLI::App& command, const std::string& name, const std::string& help,
+                const std::string& words, const std::map<std::string, Value>& choices,
+                const std::shared_ptr<Options>& options, Value Options::*member) {
+  command
+      .add_option_function<std::string>(
+          name,
+          [choices, options, member](const std::string& word) {
+            (*options).*member = choices.at(word);
+          },
+          help)
+      ->check(CLI::IsMember(choices))
+      ->option_text(words);
+}
+
+}  // namespace
+
+void add_analyze(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "analyze", "Frequencies, damping ratios, zero modes and response of a system");
+  const auto options = std::make_shared<Options>();
+  command->add_option("FILE", options->file, "YAML or JSON file; - reads standard input")
+      ->required()
+      ->option_text(" ");
+  command->add_flag("--json", options->json, "Print JSON instead of a table");
+  command
+      ->add_option("--soft-frequency", options->soft_frequency,
+                   "Call modes below this many rad/s soft")
+      ->check(CLI::Validator(frequency_problem, ""))
+      ->option_text("W (1e-06)");
+  add_choice(*command, "--residual", "Precision of the residuals behind the error bounds",
+             "automatic|working|extended (automatic)",
+             {{"automatic", Residual::kAutomatic},
+              {"working", Residual::kWorking},
+              {"extended", Residual::kExtended}},
+             options, &Options::residual);
+  add_choice(*command, "--pivot",
+             "Coordinate that the constraint matrix eliminates for a zero mode",
+             "largest|last (largest)",
+             {{"largest", analysis::Pivot::kLargest}, {"last", analysis::Pivot::kLast}}, options,
+             &Options::pivot);
+  command->footer(std::string(kSystemFileHelp) + "\n\n" + kExitStatusHelp);
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,32 @@
+#pragma once
+#include <dashpot/analysis/removal.hpp>
+#include <dashpot/analysis/response.hpp>
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/apps/analyze/system_file.hpp>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// Motion at the times asked for: the sum of the responses to all that was given.
+struct ReportedResponse {
+  std::vector<double> times;              ///< s
+  std::vector<analysis::Motion> motions;  ///< one for each time
+};
+
+/// What `dashpot analyze` says of one system.
+struct Report {
+  Eigen::Index dof = 0;
+  analysis::Spectrum<> spectrum;
+  analysis::Removal removal;  ///< the paper's reduction, for reading beside it
+  std::optional<ReportedResponse> response;
+  std::vector<std::string> notes;  ///< what the reader may not expect, a sentence each
+};
+
+/// Analyses `system`, which is what `entry` gives in joint space.
+Report make_report(const SystemEntry& entry, const analysis::System<>& system,
+                   const analysis::SpectrumOptions& options, analysis::Pivot pivot);
+
+}  // namespace dashpot::apps

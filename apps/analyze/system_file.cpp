@@ -1,0 +1,195 @@
+#include <dashpot/analysis/null_damping.hpp>
+#include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/controller/yaml/yaml_document.hpp>
+#include <dashpot/controller/yaml/yaml_mapping.hpp>
+
+#include <Eigen/Cholesky>
+#include <array>
+#include <string_view>
+#include <utility>
+
+namespace dashpot::apps {
+namespace {
+
+using controller::YamlMapping;
+using controller::YamlNode;
+
+constexpr std::array<std::string_view, 17> kKeys = {"mass",
+                                                    "damping",
+                                                    "stiffness",
+                                                    "jacobian",
+                                                    "task_damping",
+                                                    "task_stiffness",
+                                                    "jacobian_rate",
+                                                    "jacobian_derivatives",
+                                                    "wrench",
+                                                    "reflected_inertia",
+                                                    "payload",
+                                                    "null_damping",
+                                                    "initial_position",
+                                                    "initial_velocity",
+                                                    "impulse",
+                                                    "force",
+                                                    "times"};
+
+std::optional<Eigen::VectorXd> joint_vector(const YamlMapping& keys, std::string_view key,
+                                            Eigen::Index n) {
+  std::optional<Eigen::VectorXd> result = keys.vector(key);
+  if (result && result->size() != n) {
+    throw keys.error(key, "has " + std::to_string(result->size()) + " entries, mass has " +
+                              std::to_string(n) + " rows");
+  }
+  return result;
+}
+
+/// A Jacobian-like matrix; [] has no rows but n columns.
+std::optional<Eigen::MatrixXd> task_rows(const YamlMapping& keys, std::string_view key,
+                                         Eigen::Index n) {
+  std::optional<Eigen::MatrixXd> result = keys.matrix(key);
+  if (result && result->rows() == 0) result->resize(0, n);
+  return result;
+}
+
+/// n numbers, none negative.
+std::optional<Eigen::VectorXd> per_joint(const YamlMapping& keys, std::string_view key,
+                                         Eigen::Index n) {
+  std::optional<Eigen::VectorXd> result = joint_vector(keys, key, n);
+  if (result && n > 0 && result->minCoeff() < 0) throw keys.error(key, "has a negative entry");
+  return result;
+}
+
+/// What is there besides the matrices given: inertia of drives and of a point mass at the origin of
+/// the task, and damping in the null space.
+void read_additions(const YamlMapping& keys, SystemEntry& entry) {
+  analysis::TaskImpedance& impedance = entry.impedance;
+  const Eigen::Index n = impedance.mass.rows();
+  if (impedance.damping) entry.friction = *impedance.damping;
+  const bool square = impedance.mass.cols() == n;
+  if (const auto inertia = per_joint(keys, "reflected_inertia", n); inertia && square) {
+    impedance.mass.diagonal() += *inertia;
+  }
+  if (const YamlNode* node = keys.find("payload")) {
+    const double payload = keys.quantity("payload", *node, "kg", "");
+    if (payload < 0) throw keys.error("payload", "is negative");
+    const auto& J = impedance.jacobian;
+    if (!J || J->rows() != 6 || J->cols() != n) {
+      throw keys.error("payload", "needs a jacobian of six rows");
+    }
+    if (square) impedance.mass += payload * J->topRows(3).transpose() * J->topRows(3);
+  }
+  if (const auto damping = per_joint(keys, "null_damping", n)) {
+    if (!impedance.jacobian || !impedance.task_stiffness) {
+      throw keys.error("null_damping", "needs jacobian and task_stiffness");
+    }
+    entry.add_null_damping(damping->asDiagonal());
+  }
+}
+
+SystemEntry read_entry(const YamlNode& node, const std::string& prefix) {
+  const YamlMapping keys(node, prefix, kKeys);
+  SystemEntry entry;
+  entry.prefix = prefix;
+  for (const std::string_view key : kKeys) {
+    if (keys.has(key)) entry.lines.emplace(key, keys.line(key));
+  }
+
+  std::optional<Eigen::MatrixXd> mass = keys.matrix("mass");
+  if (!mass) throw InputError(prefix + "mass", "missing", node.line);
+  const Eigen::Index n = mass->rows();
+  analysis::TaskImpedance& impedance = entry.impedance;
+  impedance.mass = std::move(*mass);
+  impedance.damping = keys.matrix("damping");
+  impedance.stiffness = keys.matrix("stiffness");
+  impedance.jacobian = task_rows(keys, "jacobian", n);
+  impedance.task_damping = keys.matrix("task_damping");
+  impedance.task_stiffness = keys.matrix("task_stiffness");
+  impedance.jacobian_rate = task_rows(keys, "jacobian_rate", n);
+  impedance.jacobian_derivatives =
+      keys.matrices("jacobian_derivatives").value_or(std::vector<Eigen::MatrixXd>());
+  impedance.wrench = keys.vector("wrench");
+  if (!impedance.stiffness && !impedance.task_stiffness && n > 0) {
+    throw InputError(prefix + "stiffness",
+                     "missing; give it, or jacobian and task_stiffness, or both", node.line);
+  }
+
+  read_additions(keys, entry);
+  entry.initial_position = joint_vector(keys, "initial_position", n);
+  entry.initial_velocity = joint_vector(keys, "initial_velocity", n);
+  entry.impulse = joint_vector(keys, "impulse", n);
+  entry.force = joint_vector(keys, "force", n);
+  entry.times = keys.vector("times");
+  if (entry.times) {
+    for (Eigen::Index i = 0; i < entry.times->size(); ++i) {
+      if ((*entry.times)[i] < 0) {
+        throw keys.error("times", "entry " + std::to_string(i + 1) + " is negative");
+      }
+    }
+  }
+  return entry;
+}
+
+}  // namespace
+
+const char* const kSystemFileHelp =
+    R"(FILE is YAML or JSON: one system, or a list of systems. "-" reads standard input.
+n joints, m task directions; SI units; matrices are lists of rows.
+Tables and messages count the systems of a list from 0: [0].mass is that of the first.
+  mass              n x n, symmetric positive definite
+  stiffness         n x n, symmetric                           } one of the two,
+  task_stiffness    m x m, symmetric, with jacobian (m x n)    } or both: they add up
+  damping           n x n, symmetric                           } the same; if neither
+  task_damping      m x m, symmetric, with jacobian            } is given, there is none
+  jacobian_rate     m x n, dJ/dt: adds J' C_C dJ/dt to the stiffness
+  jacobian_derivatives, wrench
+                    n matrices m x n, dJ/dq_k, and the wrench (m) of the task spring at
+                    equilibrium: adds the geometric stiffness [(dJ/dq_1)' f ...]
+  reflected_inertia n, of drives, added to the diagonal of mass
+  payload           a mass, kg, at the origin of a task of six directions, added to mass
+  null_damping      n, damping of the motions that task_stiffness leaves free, as a
+                    controller adds it: N' diag(null_damping) N, see docs/command-line.md
+  times             asks for the response at these times (s, none negative). It is the
+                    sum of what each of the following causes; what is not given is zero:
+  initial_position  n
+  initial_velocity  n
+  impulse           n, at t = 0
+  force             n, constant from t = 0 on
+                    Without times there is no response and these four are only checked.
+A system without joints (mass: []) is a proper one, without modes.)";
+
+void SystemEntry::add_null_damping(const Eigen::MatrixXd& D) {
+  const Eigen::Index n = impedance.mass.rows();
+  const auto &J = impedance.jacobian, &K_C = impedance.task_stiffness;
+  if (n == 0 || impedance.mass.cols() != n || !J || J->cols() != n || !K_C ||
+      K_C->rows() != J->rows() || K_C->cols() != J->rows() ||
+      impedance.mass.llt().info() != Eigen::Success ||
+      (impedance.damping && (impedance.damping->rows() != n || impedance.damping->cols() != n))) {
+    return;
+  }
+  const Eigen::MatrixXd added = analysis::null_space_damping(impedance.mass, *J, *K_C, D);
+  impedance.damping = impedance.damping ? Eigen::MatrixXd(*impedance.damping + added) : added;
+}
+
+InputError SystemEntry::error(const analysis::InvalidSystem& cause) const {
+  std::string reason = cause.what();
+  if (reason.starts_with(cause.key() + ": ")) reason.erase(0, cause.key().size() + 2);
+  // "jacobian_derivatives[2]" is found under "jacobian_derivatives".
+  const auto line = lines.find(cause.key().substr(0, cause.key().find('[')));
+  return {prefix + cause.key(), reason, line == lines.end() ? 0 : line->second};
+}
+
+SystemFile read_systems(const std::string& path) {
+  const YamlNode root = controller::parse_yaml(controller::read_file(path));
+  if (root.kind == YamlNode::Kind::kNull) throw InputError("", "is empty");
+  SystemFile file;
+  file.is_list = root.kind == YamlNode::Kind::kSequence;
+  if (!file.is_list) {
+    file.entries.push_back(read_entry(root, ""));
+    return file;
+  }
+  for (std::size_t i = 0; i < root.items.size(); ++i) {
+    file.entries.push_back(read_entry(root.items[i], "[" + std::to_string(i) + "]."));
+  }
+  return file;
+}
+
+}  // namespace dashpot::apps

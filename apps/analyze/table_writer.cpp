@@ -1,0 +1,191 @@
+#include <dashpot/apps/analyze/table_writer.hpp>
+#include <dashpot/apps/cli/shape_text.hpp>
+#include <dashpot/apps/cli/text_table.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <utility>
+
+namespace dashpot::apps {
+namespace {
+
+using Align = TextTable::Align;
+constexpr std::size_t kWidth = 100;
+constexpr const char* kShapeHeading = "shape, relative to its largest entry (phase if over 10 deg)";
+
+std::string count(Eigen::Index n, const std::string& what) {
+  return (n == 0 ? "no" : std::to_string(n)) + " " + what + (n == 1 ? "" : "s");
+}
+
+/// What follows the real part of the first eigenvalue: the imaginary part of a complex pair, or the
+/// second of two real ones.
+std::string second_eigenvalue(const analysis::Mode<>& mode) {
+  const analysis::Complex first = mode.eigenvalues[0];
+  if (first.imag() == 0) return format_number(mode.eigenvalues[1].real(), 6);
+  return "+- " + format_number(std::abs(first.imag()), 6) + "i";
+}
+
+class Writer {
+ public:
+  explicit Writer(bool bold) : bold_(bold) {}
+
+  void write(const Report& report, const std::string& label) {
+    const analysis::Spectrum<>& spectrum = report.spectrum;
+    heading(label + count(report.dof, "coordinate") + ": " +
+            count(spectrum.modes.size(), "vibration mode") + ", " +
+            count(spectrum.zero_modes.count, "zero mode"));
+    for (const std::string& note : report.notes) out_ += "  Note: " + note + "\n";
+    if (!spectrum.modes.empty()) write_modes(spectrum);
+    if (report.dof > 0) write_zero_modes(report);
+    if (report.response && !report.response->times.empty()) {
+      write_response(*report.response, report);
+    }
+  }
+
+  void blank_line() { out_ += '\n'; }
+  std::string take() { return std::move(out_); }
+
+ private:
+  void heading(const std::string& text) {
+    out_ += bold_ ? "\033[1m" + text + "\033[0m\n" : text + "\n";
+  }
+
+  void write_modes(const analysis::Spectrum<>& spectrum) {
+    TextTable table;
+    table.add_column(Align::kRight, {"", "mode"});
+    table.add_column(Align::kPoint, {"natural", "rad/s"});
+    table.add_column(Align::kPoint, {"frequency", "Hz"});
+    table.add_column(Align::kPoint, {"damping", "ratio"});
+    table.add_column(Align::kLeft, {"", "kind"});
+    table.add_column(Align::kPoint, {"eigenvalues", "1/s"});
+    table.add_column(Align::kLeft, {"", ""});
+    table.add_column(Align::kRight, {"error <", "1/s"});
+    table.add_column(Align::kRight, {"backward", "error"});
+    TextTable shapes;
+    shapes.add_column(Align::kRight, {"mode"});
+    shapes.add_column(Align::kLeft, {kShapeHeading});
+    for (int i = 0; i < spectrum.modes.size(); ++i) {
+      const analysis::Mode<>& mode = spectrum.modes[i];
+      const std::string number = std::to_string(i + 1);
+      table.add_row({number, format_number(mode.natural_frequency, 6),
+                     format_number(mode.natural_frequency / (2 * std::numbers::pi), 6),
+                     format_number(mode.damping_ratio, 6), analysis::to_text(mode.kind),
+                     format_number(mode.eigenvalues[0].real(), 6), second_eigenvalue(mode),
+                     std::isfinite(mode.error_bound) ? format_number(mode.error_bound, 2) : "none",
+                     format_number(mode.backward_error, 2)});
+      shapes.add_row({number, format_shape(mode.shapes[0], kWidth - 10)});
+    }
+    out_ += '\n' + table.text() + '\n' + shapes.text();
+  }
+
+  void write_zero_modes(const Report& report) {
+    const analysis::Spectrum<>& spectrum = report.spectrum;
+    const analysis::ZeroModes<>& zero = spectrum.zero_modes;
+    if (zero.count > 0) {
+      TextTable table;
+      table.add_column(Align::kRight, {"zero mode"});
+      table.add_column(Align::kRight, {"velocity decays, 1/s"});
+      table.add_column(Align::kLeft, {kShapeHeading});
+      for (int i = 0; i < zero.count; ++i) {
+        table.add_row({std::to_string(i + 1), format_number(-spectrum.zero_mode_rates[i], 6),
+                       format_shape(zero.basis.col(i).cast<analysis::Complex>(), kWidth - 40)});
+      }
+      out_ += '\n' + table.text();
+    }
+    out_ += "\n  Rank: " + count(zero.count, "zero mode") + ";";
+    if (zero.count < report.dof) {
+      out_ += " smallest frequency kept " + format_number(zero.smallest_kept, 3) + ",";
+    }
+    if (zero.count > 0) {
+      out_ += " largest dropped " + format_number(zero.largest_dropped, 2) + ",";
+    }
+    out_ += " floor " + format_number(zero.floor, 2) + " rad/s.\n";
+    if (zero.count == 0 || zero.count == report.dof) return;
+    out_ += "  Coupling of zero modes and vibrations by the damping: " +
+            format_number(spectrum.coupling, 2) +
+            (spectrum.coupled ? ", solved together.\n" : ", independent.\n");
+    out_ += "  The constraint matrix (--json) eliminates";
+    for (std::size_t i = 0; i < report.removal.eliminated.size(); ++i) {
+      out_ += (i == 0 ? " " : ", ") + joint_name(report.removal.eliminated[i]);
+    }
+    out_ += ".\n";
+  }
+
+  void write_response(const ReportedResponse& response, const Report& report) {
+    write_motion("Position", response, &analysis::Motion::position, report.dof);
+    write_motion("Velocity", response, &analysis::Motion::velocity, report.dof);
+    if (report.spectrum.zero_modes.count > 0) {
+      write_motion("Position, part along the zero modes", response,
+                   &analysis::Motion::zero_mode_position, report.dof);
+    }
+  }
+
+  void write_motion(const std::string& title, const ReportedResponse& response,
+                    Eigen::VectorXd analysis::Motion::*part, Eigen::Index n) {
+    constexpr Eigen::Index kColumns = 7;
+    blank_line();
+    heading(title);
+    std::vector<std::string> times;
+    for (const double time : response.times) times.push_back(format_time(time));
+    const double negligible = 1e-13 * largest(response, part);
+    for (Eigen::Index first = 0; first < n; first += kColumns) {
+      std::vector<std::vector<std::string>> columns = {times};
+      TextTable table;
+      table.add_column(Align::kPoint, {"t, s"});
+      for (Eigen::Index i = first; i < std::min(first + kColumns, n); ++i) {
+        table.add_column(Align::kRight, {joint_name(i)});
+        std::vector<double> values;
+        for (const analysis::Motion& motion : response.motions) {
+          const double value = (motion.*part)[i];
+          values.push_back(std::abs(value) <= negligible ? 0 : value);
+        }
+        columns.push_back(format_column(values, 5));
+      }
+      for (std::size_t k = 0; k < times.size(); ++k) {
+        std::vector<std::string> row(columns.size());
+        std::transform(columns.begin(), columns.end(), row.begin(),
+                       [k](const std::vector<std::string>& column) { return column[k]; });
+        table.add_row(std::move(row));
+      }
+      if (first > 0) blank_line();
+      out_ += table.text();
+    }
+  }
+
+  static double largest(const ReportedResponse& response, Eigen::VectorXd analysis::Motion::*part) {
+    double result = 0;
+    for (const analysis::Motion& motion : response.motions) {
+      for (const double value : motion.*part) {
+        if (std::isfinite(value)) result = std::max(result, std::abs(value));
+      }
+    }
+    return result;
+  }
+
+  /// In the fewest digits, up to six.
+  static std::string format_time(double time) {
+    std::array<char, 32> buffer{};
+    std::snprintf(buffer.data(), buffer.size(), "%g", time);
+    return buffer.data();
+  }
+
+  bool bold_;
+  std::string out_;
+};
+
+}  // namespace
+
+std::string to_table(const std::vector<Report>& reports, bool as_list, bool bold) {
+  if (reports.empty()) return "no systems\n";
+  Writer writer(bold);
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    if (i > 0) writer.blank_line();
+    writer.write(reports[i], as_list ? "[" + std::to_string(i) + "] " : "");
+  }
+  return writer.take();
+}
+
+}  // namespace dashpot::apps

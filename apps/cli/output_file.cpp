@@ -1,0 +1,54 @@
+#include <dashpot/apps/cli/output_file.hpp>
+#include <dashpot/controller/input_error.hpp>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <system_error>
+
+namespace dashpot::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using controller::InputError;
+
+/// Where a file is made that is not there yet: the end of all links.
+fs::path resolved(fs::path path) {
+  constexpr int kMostLinks = 40;  // Linux follows as many
+  std::error_code none;
+  for (int links = 0; links < kMostLinks && fs::is_symlink(path, none); ++links) {
+    path = path.parent_path() / fs::read_symlink(path, none);
+  }
+  return fs::weakly_canonical(fs::absolute(path, none), none);
+}
+
+bool same_file(const NamedFile& one, const NamedFile& other) {
+  if (one.path.empty() || other.path.empty()) return false;
+  const fs::path a = one.path;
+  const fs::path b = other.path == "-" ? "/dev/stdin" : other.path;
+  std::error_code none;
+  if (a == b) return true;  // a device too: two writers would mix there
+  if (!fs::exists(a, none) && !fs::exists(b, none)) return resolved(a) == resolved(b);
+  return fs::is_regular_file(a, none) && fs::equivalent(a, b, none);
+}
+
+}  // namespace
+
+OutputFile open_output(const std::string& option, const std::string& path) {
+  OutputFile file(std::fopen(path.c_str(), "w"), std::fclose);
+  if (!file) throw InputError(option, path + ": cannot write: " + std::strerror(errno));
+  return file;
+}
+
+void check_outputs(const std::vector<NamedFile>& outputs, const std::vector<NamedFile>& inputs) {
+  std::vector<NamedFile> others = inputs;
+  for (const NamedFile& output : outputs) {
+    for (const NamedFile& other : others) {
+      if (!same_file(output, other)) continue;
+      throw InputError(output.what, "is the same file as " + other.what);
+    }
+    others.push_back(output);
+  }
+}
+
+}  // namespace dashpot::apps

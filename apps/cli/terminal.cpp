@@ -1,0 +1,64 @@
+#include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
+
+#include <sys/ioctl.h>
+#include <unistd.h>
+#include <csignal>
+#include <sstream>
+
+namespace dashpot::apps {
+namespace {
+
+volatile std::sig_atomic_t stop_given = 0;
+
+void note_stop(int /*signal*/) {
+  stop_given = 1;
+}
+
+/// Rows of the terminal.
+int height() {
+  winsize size{};
+  return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_row > 0 ? size.ws_row : 24;
+}
+
+}  // namespace
+
+StopSignal::StopSignal() {
+  struct sigaction action {};
+  action.sa_handler = note_stop;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // a second one ends the program
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+bool StopSignal::given() {
+  return stop_given != 0;
+}
+
+bool on_terminal() {
+  return isatty(STDOUT_FILENO) != 0;
+}
+
+// Second screen, cursor hidden, long lines cut off instead of wrapped; and back.
+FullScreen::FullScreen() {
+  print_styled("\033[?1049h\033[?25l\033[?7l");
+}
+
+FullScreen::~FullScreen() {
+  try {
+    print_styled("\033[?7h\033[?25h\033[?1049l");
+  } catch (...) {  // the terminal is gone
+  }
+}
+
+void FullScreen::draw(const std::string& text) {
+  std::istringstream lines(text);
+  std::string out = "\033[H";
+  int row = 0;
+  for (std::string line; row < height() - 1 && std::getline(lines, line); ++row) {
+    out += line + "\033[K\r\n";
+  }
+  print_styled(out + "\033[J");
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,94 @@
+#include <dashpot/apps/cli/text_table.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+namespace dashpot::apps {
+namespace {
+
+/// Pads the cells of a column on the right so that, aligned right, their points stand in line.
+void pad_after_point(std::vector<std::vector<std::string>>& lines, std::size_t column) {
+  const auto after_point = [](const std::string& text) {
+    return text.size() - std::min(text.find_first_of(".e"), text.size());
+  };
+  std::size_t longest = 0;
+  for (const auto& line : lines) longest = std::max(longest, after_point(line[column]));
+  for (auto& line : lines) line[column].append(longest - after_point(line[column]), ' ');
+}
+
+}  // namespace
+
+void TextTable::add_column(Align align, std::vector<std::string> heading) {
+  aligns_.push_back(align);
+  headings_.push_back(std::move(heading));
+}
+
+void TextTable::add_row(std::vector<std::string> cells) {
+  rows_.push_back(std::move(cells));
+}
+
+std::string TextTable::text() const {
+  std::vector<std::vector<std::string>> lines = rows_;
+  for (std::size_t i = 0; i < aligns_.size(); ++i) {
+    if (aligns_[i] == Align::kPoint) pad_after_point(lines, i);
+  }
+  for (std::size_t k = headings_.empty() ? 0 : headings_[0].size(); k-- > 0;) {
+    std::vector<std::string> line;
+    for (const auto& heading : headings_) line.push_back(heading[k]);
+    lines.insert(lines.begin(), std::move(line));
+  }
+
+  std::vector<std::size_t> widths(aligns_.size(), 0);
+  for (const auto& line : lines) {
+    for (std::size_t i = 0; i < line.size(); ++i) widths[i] = std::max(widths[i], line[i].size());
+  }
+  std::string result;
+  for (const auto& line : lines) {
+    std::string out;
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      const std::string padding(widths[i] - line[i].size(), ' ');
+      out += "  ";
+      out += aligns_[i] == Align::kLeft ? line[i] + padding : padding + line[i];
+    }
+    out.erase(out.find_last_not_of(' ') + 1);
+    result += out + '\n';
+  }
+  return result;
+}
+
+std::string format_number(double value, int digits) {
+  if (std::isnan(value)) return "-";
+  if (value == 0) return "0";
+  std::array<char, 40> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), "%#.*g", digits, value);
+  std::string text = buffer.data();
+  if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+std::vector<std::string> format_column(const std::vector<double>& values, int digits) {
+  double largest = 0;
+  for (const double value : values) {
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  const int exponent = largest > 0 ? static_cast<int>(std::floor(std::log10(largest))) : 0;
+  const bool fixed = exponent >= -4 && exponent < digits;
+  const int decimals = digits - 1 - exponent;
+  std::vector<std::string> result;
+  for (const double value : values) {
+    const bool zero = std::abs(value) < 0.5 * std::pow(10.0, -decimals);
+    if (zero || !fixed || !std::isfinite(value)) {
+      result.push_back(format_number(zero ? 0 : value, digits));
+      continue;
+    }
+    std::array<char, 40> buffer{};
+    std::snprintf(buffer.data(), buffer.size(), "%.*f", decimals, value);
+    result.emplace_back(buffer.data());
+  }
+  return result;
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,185 @@
+#include <dashpot/analysis/damping_sampled.hpp>
+#include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/apps/cli/output_file.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/design/design_options.hpp>
+#include <dashpot/apps/design/design_report.hpp>
+#include <dashpot/apps/design/design_writer.hpp>
+
+#include <unistd.h>
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace dashpot::apps {
+namespace {
+
+std::string key_of(const analysis::TaskImpedance& impedance) {
+  return impedance.jacobian ? "task_damping" : "damping";
+}
+
+/// The damping for one system, and what the loop makes of it where that counts.
+struct Found {
+  analysis::DampingDesign design;
+  std::optional<LoopReport> loop;
+};
+
+Found design_one(const SystemEntry& entry, const DesignOptions& options) {
+  const analysis::TaskImpedance& given = entry.impedance;
+  const analysis::DampingStructure structure = options.damping_structure();
+  if (options.near && (!given.jacobian || !given.task_damping)) {
+    throw InputError(entry.prefix + "task_damping", "missing; --near stays near it");
+  }
+  const auto start = options.near ? given.task_damping : std::nullopt;
+  const analysis::DampingTarget target = options.target();
+  if (!options.period) return {analysis::design_damping(given, target, structure, start), {}};
+  analysis::LoopLimit limit = options.limit;
+  limit.loop.period = *options.period;
+  limit.loop.friction = entry.friction;
+  analysis::SampledDamping found = analysis::design_damping(given, target, limit, structure, start);
+  if (!found.kept) {
+    const std::string where =
+        entry.prefix.empty() ? "" : entry.prefix.substr(0, entry.prefix.size() - 1) + ": ";
+    throw std::runtime_error(where + "no damping ratio up to " + format_number(options.ratio, 3) +
+                             " keeps a gain margin of " + format_number(limit.gain_margin, 3) +
+                             " with this period and delay; the largest margin is " +
+                             format_number(found.gain_margin, 3) + ", with a ratio of " +
+                             format_number(found.level * options.ratio, 3));
+  }
+  return {std::move(found.design),
+          LoopReport{limit, found.level, found.gain_margin, std::move(found.sampled)}};
+}
+
+DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) try {
+  DesignReport report;
+  report.key = key_of(entry.impedance);
+  report.ratio = options.ratio;
+  Found found = design_one(entry, options);
+  report.design = std::move(found.design);
+  report.loop = std::move(found.loop);
+  report.impedance = analysis::with_damping(entry.impedance, report.design.damping);
+  analysis::SpectrumOptions spectrum;
+  spectrum.soft_frequency = options.soft_frequency;
+  const auto largest = analysis::Pivot::kLargest;
+  SystemEntry plain = entry;  // no responses
+  plain.times.reset();
+  report.before = make_report(plain, analysis::to_joint_space(entry.impedance), spectrum, largest);
+  plain.impedance = report.impedance;
+  report.after = make_report(plain, report.design.system, spectrum, largest);
+  if (options.sensitivity) {
+    report.sensitivities = analysis::sensitivities(report.design.system, report.after.spectrum);
+  }
+  if (const auto& given = entry.impedance.task_damping) {
+    const Eigen::VectorXd negative = analysis::negative_eigenvalues(*given);
+    if (negative.size() > 0) {
+      report.notes.push_back("the task_damping given has the eigenvalue " +
+                             format_number(negative[0], 4) + ": it feeds energy in");
+    }
+  }
+  return report;
+} catch (const analysis::InvalidSystem& error) {
+  throw entry.error(error);
+}
+
+/// Says on the last line of a terminal how much is done.
+void show_progress(double done) {
+  std::fprintf(stderr, done < 1 ? "\r%3.0f %%" : "\r     \r", 100 * done);
+}
+
+RegionReport report_on_region(const SystemFile& file, const DesignOptions& options) {
+  if (file.entries.empty()) throw InputError("", "lists no configurations");
+  std::vector<analysis::TaskImpedance> configurations;
+  for (const SystemEntry& entry : file.entries) {
+    const analysis::TaskImpedance& impedance = entry.impedance;
+    try {
+      analysis::damping_sample(impedance);
+    } catch (const analysis::InvalidSystem& error) {
+      throw entry.error(error);
+    }
+    const auto directions = [](const analysis::TaskImpedance& of) {
+      return of.jacobian ? of.jacobian->rows() : of.mass.rows();
+    };
+    if (key_of(impedance) != key_of(file.entries[0].impedance) ||
+        directions(impedance) != directions(file.entries[0].impedance)) {
+      throw InputError(entry.prefix + (impedance.jacobian ? "jacobian" : "mass"),
+                       "has other directions than the first configuration");
+    }
+    configurations.push_back(impedance);
+  }
+  analysis::RegionOptions region;
+  region.target = options.target();
+  region.structure = options.damping_structure();
+  region.ceiling = options.largest_ratio;
+  region.threads = options.threads;
+  if (isatty(STDERR_FILENO) != 0) region.progress = show_progress;
+  try {
+    return {key_of(configurations[0]), options.ratio,
+            analysis::design_region(configurations, region)};
+  } catch (const analysis::InvalidSystem&) {
+    for (const SystemEntry& entry : file.entries) report_on(entry, options);  // names the entry
+    throw;
+  }
+}
+
+void write_csv(OutputFile file, const std::string& path, const std::string& text) {
+  const bool written = std::fwrite(text.data(), 1, text.size(), file.get()) == text.size();
+  if (std::fclose(file.release()) != 0 || !written) {
+    throw std::runtime_error("--csv: " + path + ": cannot write");
+  }
+}
+
+/// `csv`: may be null.
+void run(const DesignOptions& options, OutputFile csv) try {
+  SystemFile file;
+  if (options.arm.urdf.empty()) {
+    file = read_systems(options.file);
+  } else {
+    file.entries.push_back(read_arm(options.arm));
+  }
+  if (options.region) {
+    const RegionReport report = report_on_region(file, options);
+    if (csv) write_csv(std::move(csv), options.csv, region_csv(report));
+    print(options.json ? region_json(report) : region_table(report));
+    return;
+  }
+  std::vector<DesignReport> reports;
+  for (const SystemEntry& entry : file.entries) reports.push_back(report_on(entry, options));
+  print(options.json ? design_json(reports, file.is_list) : design_table(reports, file.is_list));
+} catch (const InputError& error) {
+  if (options.file.empty()) throw;
+  throw error.in_file(options.file);
+}
+
+constexpr const char* kHelp =
+    R"(FILE is as for `dashpot analyze`, with mass, jacobian and task_stiffness; damping is what is
+there already (joint friction, null-space damping). A task_damping is what `before` shows, and what
+--near stays near. Without a jacobian the damping is designed in joint space. The matrix is always
+positive semidefinite; a mode that cannot have its ratio is named, with the reason. With --period it
+is one that the sampled loop bears with the margin: the ratio is lowered where it has to be, and
+where no ratio will do, the exit status is 1.)";
+
+}  // namespace
+
+void add_design(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("design", "The damping matrix that gives every mode a damping ratio");
+  const auto options = std::make_shared<DesignOptions>();
+  add_design_options(*command, *options);
+  command->footer(kHelp);
+  command->callback([options] {
+    check(*options);
+    check_outputs({{"--csv", options->csv}},
+                  {{"FILE", options->file}, {"--urdf", options->arm.urdf}});
+    OutputFile csv(nullptr, std::fclose);
+    if (!options->csv.empty()) csv = open_output("--csv", options->csv);
+    run(*options, std::move(csv));
+  });
+}
+
+}  // namespace dashpot::apps

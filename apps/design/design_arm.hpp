@@ -1,0 +1,29 @@
+#pragma once
+#include <dashpot/apps/analyze/system_file.hpp>
+
+#include <string>
+
+namespace dashpot::apps {
+
+/// An arm at one configuration, as the options of `dashpot design --urdf` give it; lists of numbers
+/// between commas.
+struct ArmOptions {
+  std::string urdf, base, tip;
+  std::string q;               ///< n; zeros if empty
+  std::string task_stiffness;  ///< diagonal of K_C, 6: linear, then angular; N/m, N m/rad
+  std::string task_damping;    ///< diagonal of C_C before, 6; none if empty
+  // What is there besides, none where empty; n numbers, or one for all joints
+  std::string viscous_friction;   ///< N m s/rad, or "urdf" for that of the description
+  std::string null_damping;       ///< of the motions that the task leaves free, N m s/rad
+  std::string reflected_inertia;  ///< kg m^2
+  std::string payload;            ///< mass at the tip and its center: m, or m,x,y,z; kg, m
+
+  bool any() const;  ///< whether any option but `urdf` is there
+};
+
+/// The arm with its springs, as a file would give it: mass, jacobian (6 x n, base-aligned axes at
+/// the tip), task_stiffness, task_damping, and damping with what friction and null space add.
+/// Throws InputError.
+SystemEntry read_arm(const ArmOptions& options);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,159 @@
+#include <dashpot/apps/design/design_options.hpp>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+
+namespace dashpot::apps {
+namespace {
+
+using analysis::DampingStructure;
+
+const std::map<std::string, DampingStructure>& structures() {
+  static const std::map<std::string, DampingStructure> all = {
+      {"full", DampingStructure::kFull},
+      {"block", DampingStructure::kBlock},
+      {"diagonal", DampingStructure::kDiagonal}};
+  return all;
+}
+
+/// Fails for text that is not a number of at least `least`, or above it if `strictly`; `what` says
+/// what is wanted.
+CLI::Validator number(double least, bool strictly, const std::string& what) {
+  return CLI::Validator(
+      [=](const std::string& text) -> std::string {
+        char* end = nullptr;
+        const double value = std::strtod(text.c_str(), &end);
+        const bool good = end != text.c_str() && *end == '\0' && std::isfinite(value) &&
+                          (strictly ? value > least : value >= least);
+        return good ? "" : what + " is wanted, not '" + text + "'";
+      },
+      "");
+}
+
+CLI::Validator positive(const std::string& what) {
+  return number(0, true, what);
+}
+
+void add_arm(CLI::App& command, ArmOptions& arm) {
+  const auto add = [&](const char* name, std::string& text, const char* help, const char* words) {
+    command.add_option(name, text, help)->option_text(words);
+  };
+  add("--urdf", arm.urdf, "Instead of FILE: an arm", "FILE");
+  add("--base", arm.base, "Its base link; axes of the task", "LINK");
+  add("--tip", arm.tip, "Its link with the task's origin", "LINK");
+  add("--q", arm.q, "Joint positions, rad or m", "a,b,... (0)");
+  add("--task-stiffness", arm.task_stiffness, "Diagonal of it, N/m and N m/rad", "x,y,z,rx,ry,rz");
+  add("--task-damping", arm.task_damping, "Diagonal of the one before", "x,y,z,rx,ry,rz");
+  add("--viscous-friction", arm.viscous_friction, "In the joints, N m s/rad; urdf: the file's",
+      "a,b,...|x|urdf (0)");
+  add("--null-damping", arm.null_damping, "Of the motions that the task leaves free, N m s/rad",
+      "a,b,...|x (0)");
+  add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
+      "a,b,...|x (0)");
+  add("--payload", arm.payload, "Mass at the tip, kg, and its center in the tip's axes, m",
+      "m[,x,y,z] (0)");
+}
+
+void add_loop(CLI::App& command, DesignOptions& options) {
+  analysis::SampledLoop& loop = options.limit.loop;
+  command
+      .add_option("--period", options.period,
+                  "Of the control loop: propose only what it bears sampled and held")
+      ->check(positive("a time in s"))
+      ->option_text("S");
+  command.add_option("--delay", loop.delay, "Ticks from a command to its effect, beyond the hold")
+      ->check(CLI::Range(0, 100))
+      ->option_text("N (0)");
+  command.add_option("--cutoff", loop.torque_cutoff, "Of a low-pass on the torque; 0: none")
+      ->check(number(0, false, "a frequency in Hz"))
+      ->option_text("HZ (0)");
+  command.add_flag("--difference-velocity", loop.difference_velocity,
+                   "The controller takes velocities from positions");
+  command
+      .add_option("--margin", options.limit.gain_margin,
+                  "Springs and damping may grow by this factor together")
+      ->check(number(1, false, "a factor of at least 1"))
+      ->option_text("G (2)");
+}
+
+}  // namespace
+
+DampingStructure DesignOptions::damping_structure() const {
+  return structures().at(structure);
+}
+
+analysis::DampingTarget DesignOptions::target() const {
+  analysis::DampingTarget result = analysis::DampingTarget::constant(ratio);
+  result.soft_frequency = soft_frequency;
+  return result;
+}
+
+void add_design_options(CLI::App& command, DesignOptions& options) {
+  command.add_option("FILE", options.file, "YAML or JSON file; - reads standard input")
+      ->option_text(" ");
+  add_arm(command, options.arm);
+  command.add_option("--damping-ratio", options.ratio, "The ratio wanted of every mode")
+      ->required()
+      ->check(positive("a positive ratio"))
+      ->option_text("Z");
+  command
+      .add_option("--keep-structure", options.structure,
+                  "Entries that may differ from zero; block: translation apart from rotation")
+      ->check(CLI::IsMember({"full", "block", "diagonal"}))
+      ->option_text("full|block|diagonal (full)");
+  command.add_flag("--near", options.near, "Stay near the task_damping of the file");
+  add_loop(command, options);
+  command.add_flag("--region", options.region,
+                   "FILE lists configurations: one matrix that raises their smallest ratio");
+  command
+      .add_option("--largest-ratio", options.largest_ratio, "With --region: no mode may have more")
+      ->check(positive("a positive ratio"))
+      ->option_text("R (1 or 1.5 Z)");
+  command.add_option("--csv", options.csv, "With --region: write the map of the worst mode there")
+      ->option_text("FILE");
+  command.add_option("--threads", options.threads, "With --region; 0: one for each processor")
+      ->check(CLI::Range(0, 1024))
+      ->option_text("N (0)");
+  command
+      .add_option("--soft-frequency", options.soft_frequency,
+                  "Give up the ratio of modes below this many rad/s")
+      ->check(positive("a frequency in rad/s"))
+      ->option_text("W (0.001)");
+  command.add_flag("--sensitivity", options.sensitivity,
+                   "How frequencies and ratios answer to the entries of the matrices");
+  command.add_flag("--json", options.json, "Print JSON instead of a table");
+}
+
+void check(const DesignOptions& options) {
+  if (options.file.empty() == options.arm.urdf.empty()) {
+    throw InputError("FILE", "give a file, or --urdf with --base and --tip");
+  }
+  const ArmOptions& arm = options.arm;
+  if (!arm.urdf.empty() && (arm.base.empty() || arm.tip.empty())) {
+    throw InputError("--urdf", "needs --base and --tip");
+  }
+  if (arm.urdf.empty() && arm.any())
+    throw InputError("--urdf", "missing; options that describe an arm need it");
+  if (options.near && options.region) throw InputError("--near", "does not go with --region");
+  if (options.sensitivity && options.region) {
+    throw InputError("--sensitivity", "does not go with --region");
+  }
+  if (options.largest_ratio && !options.region) {
+    throw InputError("--largest-ratio", "needs --region");
+  }
+  if (options.largest_ratio && *options.largest_ratio < options.ratio) {
+    throw InputError("--largest-ratio", "is below --damping-ratio");
+  }
+  if (!options.csv.empty() && !options.region) throw InputError("--csv", "needs --region");
+  const analysis::LoopLimit& limit = options.limit;
+  const bool loop = limit.loop.delay > 0 || limit.loop.torque_cutoff > 0 ||
+                    limit.loop.difference_velocity || limit.gain_margin != 2;
+  if (!options.period && loop) {
+    throw InputError("--period", "missing; --delay, --cutoff and --margin need it");
+  }
+  if (options.period && options.region) throw InputError("--period", "does not go with --region");
+}
+
+}  // namespace dashpot::apps

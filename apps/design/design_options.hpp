@@ -1,0 +1,38 @@
+#pragma once
+#include <dashpot/analysis/damping_sampled.hpp>
+#include <dashpot/apps/design/design_arm.hpp>
+
+#include <CLI/App.hpp>
+#include <optional>
+#include <string>
+
+namespace dashpot::apps {
+
+/// The command line of `dashpot design`.
+struct DesignOptions {
+  std::string file;
+  ArmOptions arm;  ///< instead of a file
+  double ratio = 0;
+  std::string structure = "full";
+  double soft_frequency = analysis::DampingTarget().soft_frequency;  ///< rad/s
+  std::optional<double> period;  ///< s; none: the loop is taken for continuous
+  analysis::LoopLimit limit;     ///< but for the period
+  std::optional<double> largest_ratio;
+  int threads = 0;
+  std::string csv;  ///< where the map of the region goes; nowhere if empty
+  bool near = false;
+  bool region = false;
+  bool sensitivity = false;
+  bool json = false;
+
+  analysis::DampingStructure damping_structure() const;
+  analysis::DampingTarget target() const;
+};
+
+/// Adds the options to the subcommand; they are written to `options`.
+void add_design_options(CLI::App& command, DesignOptions& options);
+
+/// Throws InputError for options that do not go together.
+void check(const DesignOptions& options);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,41 @@
+#pragma once
+#include <dashpot/analysis/damping_region.hpp>
+#include <dashpot/analysis/damping_sampled.hpp>
+#include <dashpot/analysis/sensitivity.hpp>
+#include <dashpot/apps/analyze/report.hpp>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// What the sampled loop makes of a design.
+struct LoopReport {
+  analysis::LoopLimit limit;
+  double level = 1;  ///< of the ratio wanted, that the loop bears
+  double gain_margin = 0;
+  analysis::SampledSpectrum sampled;
+};
+
+/// What `dashpot design` says of one system.
+struct DesignReport {
+  std::string key;  ///< of the matrix: "task_damping", or "damping" where there is no jacobian
+  double ratio = 0;
+  analysis::TaskImpedance impedance;  ///< with the new damping
+  analysis::DampingDesign design;
+  Report before;  ///< with the damping that the file gives
+  Report after;
+  std::vector<analysis::ModeSensitivity> sensitivities;  ///< of `after`; none if not asked for
+  std::optional<LoopReport> loop;  ///< none if the loop is taken for continuous
+  std::vector<std::string> notes;
+};
+
+/// What `dashpot design --region` says.
+struct RegionReport {
+  std::string key;
+  double ratio = 0;
+  analysis::RegionDesign design;
+};
+
+}  // namespace dashpot::apps

@@ -1,0 +1,263 @@
+#include <dashpot/apps/analyze/json_writer.hpp>
+#include <dashpot/apps/cli/matrix_json.hpp>
+#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/design/design_trends.hpp>
+#include <dashpot/apps/design/design_writer.hpp>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace dashpot::apps {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Align = TextTable::Align;
+using analysis::DampingMiss;
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+double smallest_eigenvalue(const MatrixXd& A) {
+  return A.size() == 0 ? 0 : Eigen::SelfAdjointEigenSolver<MatrixXd>(A).eigenvalues()[0];
+}
+
+Json to_value(const DampingMiss& miss) {
+  return {{"mode", miss.mode},
+          {"natural_frequency", miss.natural_frequency},
+          {"wanted", miss.wanted},
+          {"obtained", miss.obtained},
+          {"missed_by", miss.obtained - miss.wanted},
+          {"reason", analysis::to_text(miss.reason)}};
+}
+
+Json to_value(const LoopReport& report) {
+  const analysis::SampledLoop& loop = report.limit.loop;
+  Json modes = Json::array();
+  for (const analysis::SampledMode& mode : report.sampled.modes) {
+    modes.push_back({{"natural_frequency", mode.natural_frequency},
+                     {"damping_ratio", mode.damping_ratio},
+                     {"damped_frequency", mode.damped_frequency},
+                     {"kind", analysis::to_text(mode.kind)}});
+  }
+  return {{"period", loop.period},
+          {"delay", loop.delay},
+          {"cutoff", loop.torque_cutoff},
+          {"difference_velocity", loop.difference_velocity},
+          {"margin", report.limit.gain_margin},
+          {"gain_margin", report.gain_margin},
+          {"level", report.level},
+          {"spectral_radius", report.sampled.spectral_radius},
+          {"modes", modes}};
+}
+
+Json to_value(const DesignReport& report) {
+  Json before = report_json(report.before), after = report_json(report.after);
+  Json misses = Json::array();
+  for (const DampingMiss& miss : report.design.misses) misses.push_back(to_value(miss));
+  Json result = {{report.key, json_rows(report.design.damping)},
+                 {"smallest_eigenvalue", smallest_eigenvalue(report.design.damping)},
+                 {"wanted", report.ratio},
+                 {"reached", report.design.misses.empty()},
+                 {"misses", misses},
+                 {"indefinite_by", report.design.indefinite_by},
+                 {"notes", report.notes},
+                 {"modes", after["modes"]},
+                 {"before", before},
+                 {"after", after}};
+  if (report.loop) result["loop"] = to_value(*report.loop);
+  if (!report.sensitivities.empty()) result["sensitivity"] = sensitivity_json(report);
+  return result;
+}
+
+/// The matrix in aligned columns; entries that are rounding beside the largest are 0.
+std::string matrix_text(const MatrixXd& matrix) {
+  TextTable table;
+  for (Index j = 0; j < matrix.cols(); ++j) table.add_column(Align::kPoint, {});
+  const double negligible = 1e-13 * (matrix.size() > 0 ? matrix.cwiseAbs().maxCoeff() : 0);
+  for (Index i = 0; i < matrix.rows(); ++i) {
+    std::vector<std::string> row;
+    for (const double value : matrix.row(i)) {
+      row.push_back(format_number(std::abs(value) <= negligible ? 0 : value, 6));
+    }
+    table.add_row(std::move(row));
+  }
+  return table.text();
+}
+
+std::string mode_table(const DesignReport& report) {
+  const auto& before = report.before.spectrum.modes;
+  const auto& after = report.after.spectrum.modes;
+  TextTable table;
+  table.add_column(Align::kRight, {"", "mode"});
+  table.add_column(Align::kPoint, {"before", "rad/s"});
+  table.add_column(Align::kPoint, {"", "ratio"});
+  table.add_column(Align::kPoint, {"after", "rad/s"});
+  table.add_column(Align::kPoint, {"", "ratio"});
+  table.add_column(Align::kLeft, {"", "kind"});
+  if (report.loop) {
+    table.add_column(Align::kPoint, {"sampled", "rad/s"});
+    table.add_column(Align::kPoint, {"", "ratio"});
+  }
+  for (int i = 0; i < std::max(before.size(), after.size()); ++i) {
+    std::vector<std::string> row = {std::to_string(i + 1)};
+    for (const auto* modes : {&before, &after}) {
+      const bool there = i < modes->size();
+      row.push_back(there ? format_number((*modes)[i].natural_frequency, 6) : "");
+      row.push_back(there ? format_number((*modes)[i].damping_ratio, 6) : "");
+    }
+    row.emplace_back(i < after.size() ? analysis::to_text(after[i].kind) : "");
+    if (report.loop) {
+      const auto& modes = report.loop->sampled.modes;
+      const auto at = static_cast<std::size_t>(i);
+      row.push_back(at < modes.size() ? format_number(modes[at].natural_frequency, 6) : "");
+      row.push_back(at < modes.size() ? format_number(modes[at].damping_ratio, 6) : "");
+    }
+    table.add_row(std::move(row));
+  }
+  return table.text();
+}
+
+std::string loop_text(const DesignReport& report) {
+  const LoopReport& loop = *report.loop;
+  if (loop.level == 1) {
+    return "  Springs and damping may grow by a factor of " + format_number(loop.gain_margin, 3) +
+           " together before the loop is unstable.\n";
+  }
+  return "  The loop bears " + format_number(loop.level * report.ratio, 6) + " instead of " +
+         format_number(report.ratio, 3) + ": with more damping, a gain margin of " +
+         format_number(loop.limit.gain_margin, 3) + " is lost.\n";
+}
+
+std::string miss_text(const DesignReport& report) {
+  const double ratio = report.ratio * (report.loop ? report.loop->level : 1);
+  const auto misses = [](const DampingMiss& miss) {
+    return miss.reason != DampingMiss::Reason::kLoop;
+  };
+  if (std::none_of(report.design.misses.begin(), report.design.misses.end(), misses)) {
+    return "  Every mode has a damping ratio of " +
+           format_number(ratio, ratio < report.ratio ? 6 : 3) + ".\n";
+  }
+  std::string text;
+  for (const DampingMiss& miss : report.design.misses) {
+    if (!misses(miss)) continue;
+    text += "  Mode " + std::to_string(miss.mode + 1) +
+            " misses: " + format_number(miss.obtained, 6) + " instead of " +
+            format_number(miss.wanted, 6);
+    switch (miss.reason) {
+      case DampingMiss::Reason::kSoft:
+        text += "; too slow, next to a singularity.\n";
+        break;
+      case DampingMiss::Reason::kOverdone:
+        text += "; what is there damps too much in some direction.\n";
+        break;
+      case DampingMiss::Reason::kStructure:
+        text += "; no matrix of this structure was found that gives it.\n";
+        break;
+      case DampingMiss::Reason::kCoupling:
+        text += "; no exact matrix was found beside what is there already.\n";
+        break;
+      case DampingMiss::Reason::kLoop:
+        break;
+    }
+  }
+  if (report.design.indefinite_by < 0) {
+    text += "  The exact answer would feed energy in (eigenvalue " +
+            format_number(report.design.indefinite_by, 3) +
+            " 1/s in modal coordinates); this is the damping matrix nearest to it.\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string design_json(const std::vector<DesignReport>& reports, bool as_list) {
+  Json document = Json::array();
+  for (const DesignReport& report : reports) document.push_back(to_value(report));
+  return json_text(as_list ? document : document.at(0));
+}
+
+std::string design_table(const std::vector<DesignReport>& reports, bool as_list) {
+  if (reports.empty()) return "no systems\n";
+  std::string text;
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    const DesignReport& report = reports[i];
+    if (i > 0) text += '\n';
+    if (as_list) text += "[" + std::to_string(i) + "] ";
+    text += report.key + "\n" + matrix_text(report.design.damping) + "\n";
+    for (const std::string& note : report.notes) text += "  Note: " + note + "\n";
+    if (report.loop) text += loop_text(report);
+    text += miss_text(report);
+    if (!report.after.spectrum.modes.empty()) text += "\n" + mode_table(report);
+    if (!report.sensitivities.empty()) text += sensitivity_text(report);
+  }
+  return text;
+}
+
+std::string region_json(const RegionReport& report) {
+  const analysis::RegionDesign& design = report.design;
+  Json samples = Json::array();
+  for (const analysis::RegionSample& sample : design.samples) {
+    samples.push_back({{"worst_mode", sample.worst_mode},
+                       {"natural_frequency", sample.natural_frequency},
+                       {"damping_ratio", sample.damping_ratio},
+                       {"wanted", sample.wanted},
+                       {"largest_ratio", sample.largest_ratio},
+                       {"soft_modes", sample.soft_modes}});
+  }
+  return json_text({{report.key, json_rows(design.damping)},
+                    {"smallest_eigenvalue", smallest_eigenvalue(design.damping)},
+                    {"wanted", report.ratio},
+                    {"level", design.level},
+                    {"violation", design.violation},
+                    {"worst_sample", design.worst_sample},
+                    {"samples", samples}});
+}
+
+std::string region_table(const RegionReport& report) {
+  const analysis::RegionDesign& design = report.design;
+  std::string text = report.key + "\n" + matrix_text(design.damping) + "\n";
+  if (design.worst_sample >= 0) {
+    const analysis::RegionSample& worst =
+        design.samples[static_cast<std::size_t>(design.worst_sample)];
+    text += "  Smallest ratio " + format_number(worst.damping_ratio, 6) + ", wanted " +
+            format_number(worst.wanted, 3) + ", at configuration [" +
+            std::to_string(design.worst_sample) + "].\n";
+  }
+  if (design.violation > 1e-6) {
+    text += "  What is there already damps more than is allowed, by " +
+            format_number(design.violation, 3) + ".\n";
+  }
+  TextTable table;
+  table.add_column(Align::kRight, {"", "configuration"});
+  table.add_column(Align::kRight, {"worst", "mode"});
+  table.add_column(Align::kPoint, {"", "rad/s"});
+  table.add_column(Align::kPoint, {"smallest", "ratio"});
+  table.add_column(Align::kPoint, {"largest", "ratio"});
+  table.add_column(Align::kRight, {"soft", "modes"});
+  for (std::size_t i = 0; i < design.samples.size(); ++i) {
+    const analysis::RegionSample& sample = design.samples[i];
+    const bool any = sample.worst_mode >= 0;
+    table.add_row({"[" + std::to_string(i) + "]", any ? std::to_string(sample.worst_mode + 1) : "-",
+                   any ? format_number(sample.natural_frequency, 6) : "-",
+                   any ? format_number(sample.damping_ratio, 6) : "-",
+                   any ? format_number(sample.largest_ratio, 6) : "-",
+                   std::to_string(sample.soft_modes)});
+  }
+  return text + "\n" + table.text();
+}
+
+std::string region_csv(const RegionReport& report) {
+  std::ostringstream text;
+  text.precision(17);
+  text << "configuration,worst_mode,natural_frequency,damping_ratio,largest_ratio,soft_modes\n";
+  for (std::size_t i = 0; i < report.design.samples.size(); ++i) {
+    const analysis::RegionSample& sample = report.design.samples[i];
+    text << i << ',' << sample.worst_mode << ',' << sample.natural_frequency << ','
+         << sample.damping_ratio << ',' << sample.largest_ratio << ',' << sample.soft_modes << '\n';
+  }
+  return text.str();
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,16 @@
+#pragma once
+#include <dashpot/apps/design/design_report.hpp>
+
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+std::string design_json(const std::vector<DesignReport>& reports, bool as_list);
+std::string design_table(const std::vector<DesignReport>& reports, bool as_list);
+std::string region_json(const RegionReport& report);
+std::string region_table(const RegionReport& report);
+/// The map of the worst mode, a line for each configuration after one of headings.
+std::string region_csv(const RegionReport& report);
+
+}  // namespace dashpot::apps

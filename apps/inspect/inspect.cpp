@@ -1,0 +1,206 @@
+#include <dashpot/apps/cli/matrix_json.hpp>
+#include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/text/printable.hpp>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+namespace {
+
+using controller::DynamicsResult;
+using controller::Joint;
+using controller::JointVector;
+using controller::RobotModel;
+
+struct Options {
+  std::string urdf, base, tip;
+  std::string q, qd, gravity, reflected_inertia;
+  bool exclude_off_chain = false;
+  bool json = false;
+};
+
+/// Of joint space; zeros if `text` is empty.
+JointVector joint_list(const std::string& option, const std::string& text, int n) {
+  if (text.empty()) return JointVector::Zero(n);
+  const Eigen::VectorXd values = parse_numbers(option, text);
+  if (values.size() != n) {
+    throw InputError(
+        option, std::to_string(values.size()) + " numbers for " + std::to_string(n) + " joints");
+  }
+  return values;
+}
+
+RobotModel read_model(const Options& options) {
+  controller::ModelOptions model;
+  model.include_off_chain = !options.exclude_off_chain;
+  if (!options.gravity.empty()) {
+    const Eigen::VectorXd gravity = parse_numbers("--gravity", options.gravity);
+    if (gravity.size() != 3) throw InputError("--gravity", "x,y,z is wanted");
+    model.gravity = gravity;
+  }
+  try {
+    if (!options.reflected_inertia.empty()) {
+      const RobotModel plain = RobotModel::from_urdf_file(options.urdf, options.base, options.tip);
+      model.reflected_inertia =
+          numbers_per_joint("--reflected-inertia", options.reflected_inertia, plain.dof());
+    }
+    return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
+  } catch (const controller::InvalidModel& error) {
+    throw InputError("", error.what());
+  }
+}
+
+std::string to_json(const DynamicsResult& dynamics) {
+  const nlohmann::ordered_json result = {{"mass_matrix", json_rows(dynamics.M)},
+                                         {"coriolis", json_list(dynamics.coriolis)},
+                                         {"gravity", json_list(dynamics.gravity)},
+                                         {"jacobian", json_rows(dynamics.J)},
+                                         {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
+                                         {"tip_position", json_list(dynamics.p_BT_B)},
+                                         {"tip_rotation", json_rows(dynamics.R_BT)}};
+  return result.dump(2) + "\n";
+}
+
+const char* to_text(controller::JointType type) {
+  switch (type) {
+    case controller::JointType::kRevolute:
+      return "revolute";
+    case controller::JointType::kContinuous:
+      return "continuous";
+    case controller::JointType::kPrismatic:
+      return "prismatic";
+  }
+  return "";
+}
+
+std::vector<std::string> numbers(const Eigen::VectorXd& values) {
+  return format_column({values.begin(), values.end()}, 6);
+}
+
+/// One row for each joint.
+std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics,
+                         const JointVector& q, const JointVector& qd) {
+  TextTable table;
+  table.add_column(TextTable::Align::kRight, {"", "joint"});
+  table.add_column(TextTable::Align::kLeft, {"", "name"});
+  table.add_column(TextTable::Align::kLeft, {"", "type"});
+  std::vector<std::vector<std::string>> columns;
+  const auto add = [&](const std::string& above, const std::string& name,
+                       const Eigen::VectorXd& values) {
+    table.add_column(TextTable::Align::kPoint, {above, name});
+    columns.push_back(numbers(values));
+  };
+  add("lower", "limit", model.joint_values(&Joint::lower));
+  add("upper", "limit", model.joint_values(&Joint::upper));
+  add("velocity", "limit", model.joint_values(&Joint::velocity));
+  add("effort", "limit", model.joint_values(&Joint::effort));
+  add("", "q", q);
+  add("", "qd", qd);
+  add("Coriolis", "torque", dynamics.coriolis);
+  add("gravity", "torque", dynamics.gravity);
+  for (std::size_t i = 0; i < model.joints().size(); ++i) {
+    const Joint& joint = model.joints()[i];
+    std::vector<std::string> row = {std::to_string(i + 1), text::printable(joint.name),
+                                    to_text(joint.type)};
+    for (const auto& column : columns) row.push_back(column[i]);
+    table.add_row(row);
+  }
+  return table.text();
+}
+
+/// Rows under joint numbers.
+std::string matrix_table(const Eigen::MatrixXd& matrix, const std::vector<std::string>& names) {
+  TextTable table;
+  table.add_column(TextTable::Align::kLeft, {""});
+  std::vector<std::vector<std::string>> columns;
+  for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
+    table.add_column(TextTable::Align::kPoint, {std::to_string(j + 1)});
+    columns.push_back(numbers(matrix.col(j)));
+  }
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    std::vector<std::string> row = {names[static_cast<std::size_t>(i)]};
+    for (const auto& column : columns) row.push_back(column[static_cast<std::size_t>(i)]);
+    table.add_row(row);
+  }
+  return table.text();
+}
+
+std::string tip_table(const DynamicsResult& dynamics) {
+  TextTable table;
+  table.add_column(TextTable::Align::kLeft, {"", ""});
+  table.add_column(TextTable::Align::kPoint, {"", "position"});
+  for (const char* axis : {"x axis", "y axis", "z axis"})
+    table.add_column(TextTable::Align::kPoint, {"tip's", axis});
+  table.add_column(TextTable::Align::kPoint, {"Jdot qd", "linear"});
+  table.add_column(TextTable::Align::kPoint, {"Jdot qd", "angular"});
+  const std::vector<std::vector<std::string>> columns = {
+      numbers(dynamics.p_BT_B),          numbers(dynamics.R_BT.col(0)),
+      numbers(dynamics.R_BT.col(1)),     numbers(dynamics.R_BT.col(2)),
+      numbers(dynamics.Jdot_qd.head(3)), numbers(dynamics.Jdot_qd.tail(3))};
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::vector<std::string> row = {std::string(1, "xyz"[i])};
+    for (const auto& column : columns) row.push_back(column[i]);
+    table.add_row(row);
+  }
+  return table.text();
+}
+
+std::string to_table(const RobotModel& model, const DynamicsResult& dynamics, const JointVector& q,
+                     const JointVector& qd) {
+  std::vector<std::string> joints;
+  for (int i = 1; i <= model.dof(); ++i) joints.push_back(std::to_string(i));
+  const std::string n = std::to_string(model.dof());
+  const std::string base = text::printable(model.base());
+  return text::printable(model.name()) + ": " + n + (model.dof() == 1 ? " joint" : " joints") +
+         " from " + base + " to " + text::printable(model.tip()) + ". SI units, axes of " + base +
+         ".\n\n" + joints_table(model, dynamics, q, qd) + "\nMass matrix\n" +
+         matrix_table(dynamics.M, joints) + "\nJacobian at the tip\n" +
+         matrix_table(dynamics.J,
+                      {"linear x", "linear y", "linear z", "angular x", "angular y", "angular z"}) +
+         "\nTip\n" + tip_table(dynamics);
+}
+
+void run(const Options& options) {
+  const RobotModel model = read_model(options);
+  const JointVector q = joint_list("--q", options.q, model.dof());
+  const JointVector qd = joint_list("--qd", options.qd, model.dof());
+  const DynamicsResult dynamics = controller::evaluate(model, q, qd);
+  print(options.json ? to_json(dynamics) : to_table(model, dynamics, q, qd));
+}
+
+}  // namespace
+
+void add_inspect(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "inspect", "Mass matrix, Jacobian, gravity and Coriolis torques of an arm at one state");
+  const auto options = std::make_shared<Options>();
+  const auto add = [&](const char* name, std::string Options::*member, const char* help,
+                       const char* words) {
+    return command->add_option(name, (*options).*member, help)->option_text(words);
+  };
+  add("--urdf", &Options::urdf, "Robot description", "FILE")->required();
+  add("--base", &Options::base, "Link that stands still; results are in its axes", "LINK")
+      ->required();
+  add("--tip", &Options::tip, "Link at the end of the chain", "LINK")->required();
+  add("--q", &Options::q, "Joint positions, rad or m", "a,b,... (0)");
+  add("--qd", &Options::qd, "Joint velocities, rad/s or m/s", "a,b,... (0)");
+  add("--gravity", &Options::gravity, "In axes of the file's root link, m/s^2",
+      "x,y,z (0,0,-9.81)");
+  add("--reflected-inertia", &Options::reflected_inertia,
+      "Of rotors and gears at the joints, kg m^2 or kg; one number is that of all joints",
+      "a,b,... (0)");
+  command->add_flag("--exclude-off-chain", options->exclude_off_chain,
+                    "Leave out links that hang off the chain");
+  command->add_flag("--json", options->json, "Print JSON instead of tables");
+  command->footer(kExitStatusHelp);
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace dashpot::apps

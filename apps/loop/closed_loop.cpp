@@ -1,0 +1,195 @@
+#include <dashpot/apps/loop/closed_loop.hpp>
+#include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::apps {
+namespace {
+
+constexpr double kRepeat = 0.1;       // s between two repetitions of a set-point
+constexpr double kSettling = 0.1;     // s, beyond the time that the springs take to set in
+constexpr double kGuidedSpeed = 0.2;  // at most this fraction of the velocity limits
+constexpr double kShortestWay = 0.5;  // s
+constexpr double kNanoseconds = 1e9;  // in a second
+
+/// Smooth from 0 at 0 to 1 at 1, at rest at both ends; and its slope.
+std::pair<double, double> ease(double s) {
+  return {s * s * s * (10 + s * (-15 + 6 * s)), 30 * s * s * (1 - s) * (1 - s)};
+}
+
+/// How long the hand takes from rest to start, s.
+double guidance_time(const Scene& scene) {
+  const JointVector way = (scene.start - scene.rest).cwiseAbs();
+  if (way.isZero(0)) return 0;
+  const JointVector speed = kGuidedSpeed * scene.arm->config.settings.limits.velocity;
+  return std::max(kShortestWay, 1.875 * way.cwiseQuotient(speed).maxCoeff());
+}
+
+}  // namespace
+
+ClosedLoop::ClosedLoop(const Scene& scene, LoopController& controller)
+    : scene_(scene), controller_(controller), mechanism_(make_mechanism(scene)) {
+  torque_ = JointVector::Zero(scene.dof());
+  repeat_every_ = std::max<std::int64_t>(1, std::llround(kRepeat / scene.plant.period));
+  sim::PlantOptions options = scene.plant;
+  if (scene.arm) {
+    begin();
+    arm_ = dynamic_cast<sim::Arm*>(mechanism_.get());
+    const bool outside = scene.outside_limits;
+    guide(outside ? scene.start : scene.rest, scene.start, outside ? 0 : guidance_time(scene),
+          scene.arm->config.settings.motion.gain_time + kSettling);
+    options.initial_torque = torque_;
+  }
+  plant_.emplace(*mechanism_, options, scene.start, scene.velocity);
+}
+
+void ClosedLoop::begin() {
+  setpoint_ = accepted_ = scene_.steps.front().setpoint;
+  gains_ = setpoint_.gains;
+  std::string reason;
+  if (controller_.start(scene_.outside_limits ? scene_.start : scene_.rest, reason) != DASHPOT_OK ||
+      controller_.set_gains(gains_, reason) != DASHPOT_OK) {
+    throw InputError("scenario.start", "the controller refuses it: " + reason);
+  }
+}
+
+void ClosedLoop::guide(const JointVector& from, const JointVector& to, double duration,
+                       double settling) {
+  const double period = scene_.plant.period;
+  const auto count = [period](double seconds) {
+    return static_cast<std::int64_t>(std::ceil(seconds / period));
+  };
+  const std::int64_t before = count(settling), way = count(duration);
+  const std::int64_t ticks = before + way + (way > 0 ? before : 0);
+  for (std::int64_t i = 0; i < ticks; ++i) {
+    const double s =
+        way == 0 ? 0
+                 : std::clamp(static_cast<double>(i - before) / static_cast<double>(way), 0.0, 1.0);
+    const auto [place, slope] = ease(s);
+    const JointVector q = from + place * (to - from);
+    const JointVector qd =
+        way == 0 ? JointVector(0 * from)
+                 : JointVector((slope / (static_cast<double>(way) * period)) * (to - from));
+    const std::int64_t time = std::llround(kNanoseconds * period * static_cast<double>(i - ticks));
+    if (i % repeat_every_ == 0) setpoint_.time = time;
+    const std::int32_t status = controller_.update(time, q, qd, &setpoint_, torque_);
+    if (status >= DASHPOT_SETPOINT_REJECTED && !scene_.outside_limits) {
+      throw InputError("scenario.start", "the controller reports status " + std::to_string(status));
+    }
+  }
+}
+
+const LoopFault* ClosedLoop::loop_fault() const noexcept {
+  const double now = plant_->time() + 1e-6 * scene_.plant.period;
+  for (const LoopFault& fault : scene_.loop_faults) {
+    if (fault.begin <= now && now < fault.end) return &fault;
+  }
+  return nullptr;
+}
+
+std::int32_t ClosedLoop::control() noexcept {
+  const LoopFault* const fault = loop_fault();
+  const std::int64_t tick = ticks_++;
+  if (fault != nullptr && (fault->every == 0 || tick % fault->every != 0)) return status_;
+  const sim::Measurement& measured = plant_->measured();
+  if (news_) setpoint_.time = measured.time;
+  const bool told = scene_.arm && in_force_;
+  status_ = controller_.update(measured.time, measured.position, measured.velocity,
+                               told ? &setpoint_ : nullptr, torque_);
+  // What was rejected shows in the status, once; then what was held before goes on.
+  const bool rejected = told && news_ && status_ == DASHPOT_SETPOINT_REJECTED;
+  if (rejected) setpoint_ = accepted_;
+  if (told && news_ && !rejected) accepted_ = setpoint_;
+  news_ = rejected;
+  if (status_ < 0) torque_.setZero();  // a refused call leaves the robot to its host
+  return status_;
+}
+
+sim::Status ClosedLoop::move() noexcept {
+  const LoopFault* const fault = loop_fault();
+  if (fault != nullptr && fault->moved_by.size() > 0) {
+    carry(*fault);
+    return sim::Status::kOk;
+  }
+  const sim::Status status = plant_->step(torque_);
+  extremes_.kinetic_energy = std::max(extremes_.kinetic_energy, plant_->audit().stored.kinetic);
+  if (arm_ == nullptr) return status;
+  const JointVector velocity = plant_->velocity();
+  const JointVector& limit = scene_.arm->config.settings.limits.velocity;
+  extremes_.speed_share =
+      std::max(extremes_.speed_share, velocity.cwiseAbs().cwiseQuotient(limit).maxCoeff());
+  extremes_.tip_speed =
+      std::max(extremes_.tip_speed, arm_->tip_twist(plant_->position(), velocity).head<3>().norm());
+  return status;
+}
+
+/// One period in the hand, which takes the robot at rest and leaves it at rest.
+void ClosedLoop::carry(const LoopFault& fault) noexcept {
+  if (hand_ != &fault) taken_at_ = plant_->position();
+  hand_ = &fault;
+  const double duration = fault.end - fault.begin;
+  const double s =
+      std::clamp((plant_->time() + scene_.plant.period - fault.begin) / duration, 0.0, 1.0);
+  const auto [place, slope] = ease(s);
+  plant_->carry(taken_at_ + place * fault.moved_by, slope / duration * fault.moved_by);
+}
+
+void ClosedLoop::follow_scenario() noexcept {
+  if (!scene_.arm) return;
+  const auto& steps = scene_.steps;
+  if (ticks_ % repeat_every_ == 0) news_ = true;
+  while (next_step_ < steps.size() && steps[next_step_].at <= plant_->time()) {
+    hold(steps[next_step_++].setpoint);
+    due_steps_.store(next_step_, std::memory_order_release);
+  }
+  if (!leave_gains_) follow_gains();
+  // New gains count with a set-point that is read again.
+  const std::int64_t changes = gain_changes_.load(std::memory_order_acquire);
+  if (changes != gain_changes_seen_) news_ = true;
+  gain_changes_seen_ = changes;
+}
+
+void ClosedLoop::hold(const controller::Setpoint& setpoint) noexcept {
+  setpoint_ = setpoint;
+  in_force_ = news_ = true;
+}
+
+void ClosedLoop::note_fault(bool latched) noexcept {
+  if (latched) in_force_ = false;
+  if (faulted_ && !latched && !released_.exchange(false, std::memory_order_acquire)) {
+    in_force_ = news_ = true;
+  }
+  faulted_ = latched;
+}
+
+std::int32_t ClosedLoop::change_gains(const std::function<void(controller::Gains&)>& change,
+                                      std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  controller::Gains wanted = gains_;
+  change(wanted);
+  if (controller::same_gains(wanted, gains_)) return DASHPOT_OK;
+  const std::int32_t code = controller_.set_gains(wanted, reason);
+  if (code != DASHPOT_OK) return code;
+  gains_ = wanted;
+  gain_changes_.fetch_add(1, std::memory_order_release);
+  return code;
+}
+
+void ClosedLoop::release() {
+  const std::lock_guard lock(mutex_);
+  released_.store(true, std::memory_order_release);  // first, so that no tick takes it for its own
+  controller_.release();
+}
+
+void ClosedLoop::follow_gains() {
+  const std::size_t due = due_steps_.load(std::memory_order_acquire);
+  if (due == followed_steps_) return;
+  followed_steps_ = due;
+  const controller::Gains& wanted = scene_.steps[due - 1].setpoint.gains;
+  const auto change = [&wanted](controller::Gains& gains) { gains = wanted; };
+  if (change_gains(change, refusal_) != DASHPOT_OK) ++refused_steps_;
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,33 @@
+#pragma once
+#include <dashpot/apps/loop/loop_thread.hpp>
+#include <dashpot/lcmtypes/command_verdict.hpp>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace dashpot::apps {
+
+/// What became of the commands of a run.
+struct CommandReport {
+  lcmtypes::CommandTally tally;
+  std::string last_reason;  ///< why the last one that was rejected was rejected
+};
+
+/// "3 accepted, 2 rejected (1 too old, 1 not finite)", of state_t::verdicts.
+std::string verdicts_text(std::span<const std::int64_t> verdicts);
+
+/// For people: lines that begin with two spaces. `report` without a value: none were taken;
+/// `refused`: accepted ones that the controller refused.
+std::string commands_text(const std::optional<CommandReport>& report, std::int64_t refused);
+std::string fault_text(const LoopRecord& loop);
+
+nlohmann::ordered_json commands_json(const std::optional<CommandReport>& report,
+                                     std::int64_t refused);
+/// null if no fault is latched at the end
+nlohmann::ordered_json fault_json(const LoopRecord& loop);
+
+}  // namespace dashpot::apps

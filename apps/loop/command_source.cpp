@@ -1,0 +1,52 @@
+#include <dashpot/apps/loop/command_source.hpp>
+
+#include <utility>
+
+namespace dashpot::apps {
+namespace {
+
+using lcmtypes::Command;
+
+/// The receiver's part of a command that is in order: false if the controller refuses its gains.
+bool carry_out(const Command& command, ClosedLoop& loop, std::string& reason) {
+  const std::int64_t before = command.accepted - 1;
+  const auto change = [&command, before](controller::Gains& gains) {
+    controller::Setpoint changed;
+    changed.gains = gains;
+    lcmtypes::apply(command, changed, before);
+    gains = changed.gains;
+  };
+  if (loop.change_gains(change, reason) != DASHPOT_OK) return false;
+  if (lcmtypes::has_set(command, command_t::RELEASE, before)) loop.release();
+  return true;
+}
+
+}  // namespace
+
+CommandSource::CommandSource(std::shared_ptr<lcm::LCM> bus, const lcmtypes::CommandLimits& limits,
+                             ClosedLoop& loop)
+    : loop_(loop),
+      receiver_(std::move(bus), limits, [&loop](const Command& command, std::string& reason) {
+        return carry_out(command, loop, reason);
+      }) {}
+
+bool CommandSource::take() noexcept {
+  constexpr std::int32_t kGoals = int{command_t::MODE} + int{command_t::JOINT_POSITION} +
+                                  int{command_t::TIP_POSE} + int{command_t::WRENCH};
+  taken_ = false;
+  if (!receiver_.fetch()) return false;
+  const Command& command = receiver_.command();
+  // Only what is new: older parts may have been replaced by the scenario since.
+  const std::int64_t before = std::exchange(commands_, command.accepted);
+  for (std::int32_t part = 1; part <= kGoals; part *= 2) {
+    taken_ = taken_ || ((kGoals & part) != 0 && lcmtypes::has_set(command, part, before));
+  }
+  if (taken_) {
+    controller::Setpoint setpoint = loop_.setpoint();
+    lcmtypes::apply(command, setpoint, before);
+    loop_.hold(setpoint);
+  }
+  return lcmtypes::has_set(command, command_t::RELEASE, before);
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,40 @@
+#pragma once
+#include <dashpot/apps/loop/closed_loop.hpp>
+#include <dashpot/lcmtypes/command_receiver.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace dashpot::apps {
+
+/// Takes commands for a closed loop from a bus. Gains and releases go to the controller on the
+/// receiver's thread, because gains are judged, which may take milliseconds; what it refuses is
+/// refused whole. The rest goes to the loop's thread.
+class CommandSource {
+ public:
+  /// `loop` must outlive it. Otherwise as CommandReceiver.
+  CommandSource(std::shared_ptr<lcm::LCM> bus, const lcmtypes::CommandLimits& limits,
+                ClosedLoop& loop);
+
+  // The loop's thread; none of these ever waits.
+  /// Before a tick: tells the loop where to go. True if a fault is released with this tick.
+  bool take() noexcept;
+  /// Whether this tick's set-point was commanded.
+  bool taken() const noexcept { return taken_; }
+  const lcmtypes::CommandTally& fetch_tally() noexcept { return receiver_.fetch_tally(); }
+  /// The fault that commands may release from now on, by the tick at which it latched; 0: none.
+  void set_fault_tick(std::int64_t tick) noexcept { receiver_.set_fault_tick(tick); }
+
+  // Other threads.
+  lcmtypes::CommandTally tally() const { return receiver_.tally(); }
+  std::string last_reason() const { return receiver_.last_reason(); }
+
+ private:
+  ClosedLoop& loop_;
+  std::int64_t commands_ = 0;  ///< accepted ones that the loop was told
+  bool taken_ = false;
+  lcmtypes::CommandReceiver receiver_;
+};
+
+}  // namespace dashpot::apps

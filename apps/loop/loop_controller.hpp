@@ -1,0 +1,65 @@
+#pragma once
+#include <dashpot/controller/plugin.h>
+#include <dashpot/apps/scene/scene.hpp>
+#include <dashpot/controller/types.hpp>
+
+#include <memory>
+#include <string>
+
+namespace dashpot::apps {
+
+/// What stands between a measurement and a torque, in the terms of plugin.h. The loop's thread
+/// calls what is noexcept, and there nothing allocates or waits. Another thread, one at a time,
+/// calls the rest, which may take milliseconds; where nothing hurries it may be the same thread.
+class LoopController {
+ public:
+  LoopController() = default;
+  LoopController(const LoopController&) = delete;
+  LoopController& operator=(const LoopController&) = delete;
+  virtual ~LoopController() = default;
+
+  /// A tick: the torque for this measurement, and a status. `time` in ns; n entries each.
+  /// `setpoint` says where to go, and is new if its time is; its gains do not count. Null: no news.
+  virtual std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
+                              const controller::Setpoint* setpoint,
+                              JointVector& torque) noexcept = 0;
+  /// Of the last tick.
+  virtual const dashpot_snapshot& snapshot() noexcept = 0;
+  /// Those that are newer than what was returned last; null if there are none.
+  virtual const dashpot_modes* new_modes() noexcept = 0;
+  /// Likewise of the sampled loop.
+  virtual const dashpot_sampled_modes* new_sampled_modes() noexcept { return nullptr; }
+
+  /// Before the loop begins, with the robot at rest at q. Returns DASHPOT_OK, or the code of a
+  /// refusal; `reason` then says why, in one line.
+  virtual std::int32_t start(const JointVector& q, std::string& reason) = 0;
+  /// The springs and dampers from the next tick on. Returns as start().
+  virtual std::int32_t set_gains(const controller::Gains& gains, std::string& reason) = 0;
+  /// Whether the controller would go there, with these gains, from q; for one that is in no loop.
+  /// Returns as start().
+  virtual std::int32_t check(const controller::Setpoint& setpoint, const JointVector& q,
+                             std::string& reason) = 0;
+  /// Releases a latched fault at the next tick: the robot is held where it is, until there is a new
+  /// set-point.
+  virtual std::int32_t release() = 0;
+};
+
+/// The controller plugin, loaded at run time as any host would.
+class PluginLibrary {
+ public:
+  /// Empty: libdashpot_plugin.so beside the program, where it is installed, or where the system
+  /// looks for libraries. Throws InputError.
+  explicit PluginLibrary(const std::string& path);
+
+  /// A controller for the file. Throws InputError with the plugin's own words.
+  std::unique_ptr<LoopController> create(const std::string& config_path, int joints) const;
+  const dashpot_plugin& functions() const noexcept { return *functions_; }
+
+ private:
+  const dashpot_plugin* functions_ = nullptr;  // for the rest of the program
+};
+
+/// Nobody controls the masses of a system: zero torque, and the modes that its matrices have.
+std::unique_ptr<LoopController> make_spectator(const MatrixSystem& system, double period);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,299 @@
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/apps/cli/shape_text.hpp>
+#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/loop/command_report.hpp>
+#include <dashpot/apps/monitor/monitor_view.hpp>
+#include <dashpot/controller/status.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <vector>
+
+namespace dashpot::apps {
+namespace {
+
+using Align = TextTable::Align;
+
+std::string count(std::int64_t n, const std::string& what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
+std::string fixed(double value, int decimals) {
+  std::array<char, 64> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), "%.*f", decimals, value);
+  return buffer.data();
+}
+
+std::string status_text(std::int8_t status) {
+  return controller::to_text(static_cast<controller::Status>(status));
+}
+
+std::string latched(const state_t& state) {
+  return "FAULT LATCHED at tick " + std::to_string(state.fault_tick) + ": " +
+         status_text(state.fault);
+}
+
+std::string mode_text(std::int8_t mode) {
+  return mode == state_t::JOINT ? "joint" : mode == state_t::CARTESIAN ? "Cartesian" : "unknown";
+}
+
+std::string kind_text(std::int8_t kind) {
+  return analysis::to_text(static_cast<analysis::ModeKind>(kind));
+}
+
+std::string solver_text(std::int8_t solved_by) {
+  switch (solved_by) {
+    case modes_t::DIRECT:
+      return "solved anew";
+    case modes_t::TRACKED:
+      return "tracked";
+    case modes_t::REUSED:
+      return "reused";
+    default:
+      return "unknown";
+  }
+}
+
+/// Whether the loop is stable, and by how much.
+std::string verdict(const sampled_modes_t& modes) {
+  const auto status = static_cast<analysis::Status>(modes.status);
+  if (status != analysis::Status::kOk && status != analysis::Status::kUncertified) {
+    return analysis::to_text(status);
+  }
+  const std::string margin = format_number(modes.gain_margin, 3);
+  if (std::isnan(modes.spectral_radius)) return "unknown";
+  if (!(modes.spectral_radius < 1)) {
+    return "UNSTABLE; all gains have to shrink to " + margin + " of what they are";
+  }
+  if (std::isinf(modes.gain_margin)) return "stable, however large the gains";
+  return "stable; all gains can grow to " + margin + " times what they are";
+}
+
+constexpr const char* kMixed =
+    "more than one loop sends to this bus: what is shown is a mixture; an --lcm-url for each "
+    "keeps them apart";
+
+/// a - b; numbers of a hostile sender may be so far apart that it overflows, and wraps around.
+std::int64_t minus(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
+}
+
+double tip_error(const state_t& state) {
+  return std::hypot(state.tip_error[0], state.tip_error[1], state.tip_error[2]);
+}
+
+std::string tick_times(const state_t& state) {
+  return "tick " + fixed(1e-3 * state.tick_time, 1) + " us (longest " +
+         fixed(1e-3 * state.longest_tick_time, 1) + ")";
+}
+
+Eigen::VectorXcd shape_of(const modes_t& modes, std::size_t i) {
+  Eigen::VectorXcd shape(modes.n);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(modes.n); ++k) {
+    shape[static_cast<Eigen::Index>(k)] = {modes.shape_real[i][k], modes.shape_imag[i][k]};
+  }
+  return shape;
+}
+
+}  // namespace
+
+void MonitorView::note_time(std::int64_t utime) {
+  if (empty()) first_utime_ = utime;
+  last_utime_ = utime;
+}
+
+void MonitorView::note_order(std::int64_t tick) {
+  constexpr std::int64_t kMostLost = 100;  // messages of a loop, while another one's came
+  const std::int64_t last = state_->tick;
+  const bool returned =
+      minus(tick, last) > 1 && tick > left_at_ && minus(tick, left_at_) <= kMostLost;
+  if (tick == last || (left_at_ > last && returned)) ++returns_;
+  if (tick < last) left_at_ = last;
+}
+
+void MonitorView::take(const state_t& message) {
+  note_time(message.utime);
+  if (state_) note_order(message.tick);
+  const bool restarted = state_ && message.tick < state_->tick;
+  if (!state_ || restarted) {
+    rate_utime_ = message.utime;
+    rate_tick_ = message.tick;
+    rate_ = 0;
+  }
+  const double elapsed = 1e-6 * static_cast<double>(minus(message.utime, rate_utime_));
+  if (elapsed >= 1) {
+    rate_ = static_cast<double>(minus(message.tick, rate_tick_)) / elapsed;
+    rate_utime_ = message.utime;
+    rate_tick_ = message.tick;
+  }
+  ++states_;
+  ++statuses_[static_cast<std::uint8_t>(message.status)];
+  if (message.mode == state_t::CARTESIAN) {
+    largest_error_ = std::max(largest_error_, tip_error(message));
+  }
+  state_ = message;
+}
+
+void MonitorView::take(const modes_t& message) {
+  note_time(message.utime);
+  constexpr std::int64_t kFarthest = 1'000'000'000;  // that a sequence may jump
+  const std::int64_t gap = modes_ ? minus(message.sequence, modes_->sequence) : 1;
+  if (gap > 1 && gap < kFarthest) modes_lost_ += gap - 1;
+  ++modes_messages_;
+  modes_ = message;
+}
+
+void MonitorView::take(const sampled_modes_t& message) {
+  note_time(message.utime);
+  sampled_ = message;
+}
+
+std::string MonitorView::screen(bool bold) const {
+  const auto heading = [bold](const std::string& text) {
+    return bold ? "\033[1m" + text + "\033[0m\n" : text + "\n";
+  };
+  std::string out;
+  if (mixed()) out += heading(std::string("Warning: ") + kMixed) + "\n";
+  if (state_) out += heading("Loop") + health() + "\n";
+  if (modes_) out += heading("Modes") + modes_table() + "\n";
+  if (sampled_) out += heading("Sampled loop") + sampled_table() + "\n";
+  if (state_) out += heading("Joints") + joints();
+  return out;
+}
+
+std::string MonitorView::health() const {
+  const state_t& state = *state_;
+  std::string out = "  tick " + std::to_string(state.tick) + ", " + fixed(time(), 1) +
+                    " s: " + status_text(state.status) + "; mode " + mode_text(state.mode) +
+                    "; started " + count(state.restarts, "time") + "\n";
+  if (state.fault != 0) out += "  " + latched(state) + "\n";
+  out += "  " + (rate_ > 0 ? fixed(rate_, 0) : "-") + " ticks/s, " + tick_times(state) + ", " +
+         count(state.overruns, "overrun") + ", " + count(state.states_dropped, "state") +
+         " not published\n";
+  out += commands();
+  out += "  tip off its set-point by " + fixed(1e3 * tip_error(state), 2) + " mm and " +
+         fixed(std::hypot(state.tip_error[3], state.tip_error[4], state.tip_error[5]) * 180 /
+                   std::numbers::pi,
+               2) +
+         " deg\n";
+  return out;
+}
+
+std::string MonitorView::commands() const {
+  const state_t& state = *state_;
+  std::string out =
+      "  commands: " + verdicts_text(state.verdicts) + "; " +
+      (state.commander == 0 ? "nobody commands"
+                            : "sender " + std::to_string(state.commander) + " commands") +
+      "\n";
+  if (state.last_refusal == state_t::ACCEPTED) return out;
+  const auto verdict = static_cast<lcmtypes::CommandVerdict>(state.last_refusal);
+  return out + "  last rejected " +
+         fixed(1e-6 * static_cast<double>(state.utime - state.last_refusal_utime), 1) +
+         " s before: " + lcmtypes::to_text(verdict) + ", of sender " +
+         std::to_string(state.last_refused_sender) + "\n";
+}
+
+std::string MonitorView::joints() const {
+  const state_t& state = *state_;
+  TextTable table;
+  table.add_column(Align::kRight, {"joint", ""});
+  table.add_column(Align::kRight, {"position", "rad"});
+  table.add_column(Align::kRight, {"goal", "rad"});
+  table.add_column(Align::kRight, {"velocity", "rad/s"});
+  table.add_column(Align::kRight, {"torque", "N m"});
+  for (std::size_t i = 0; i < static_cast<std::size_t>(state.n); ++i) {
+    table.add_row({joint_name(static_cast<Eigen::Index>(i)), fixed(state.joint_position[i], 4),
+                   fixed(state.joint_position_goal[i], 4), fixed(state.joint_velocity[i], 4),
+                   fixed(state.joint_torque[i], 3)});
+  }
+  return table.text();
+}
+
+std::string MonitorView::modes_table() const {
+  const modes_t& modes = *modes_;
+  std::string out = "  " + count(modes.num_modes, "mode") + ", " +
+                    count(modes.zero_modes, "zero mode") + " at tick " +
+                    std::to_string(modes.tick) + ", " + solver_text(modes.solved_by) + ": " +
+                    analysis::to_text(static_cast<analysis::Status>(modes.status)) + "\n\n";
+  TextTable table;
+  table.add_column(Align::kRight, {"mode", ""});
+  table.add_column(Align::kPoint, {"natural", "rad/s"});
+  table.add_column(Align::kPoint, {"frequency", "Hz"});
+  table.add_column(Align::kPoint, {"damping", "ratio"});
+  table.add_column(Align::kLeft, {"kind", ""});
+  table.add_column(Align::kRight, {"error <", "rad/s"});
+  table.add_column(Align::kLeft, {"shape", ""});
+  for (std::size_t i = 0; i < static_cast<std::size_t>(modes.num_modes); ++i) {
+    const double bound = modes.natural_frequency_bound[i];
+    table.add_row({std::to_string(modes.label[i]), format_number(modes.natural_frequency[i], 6),
+                   format_number(modes.natural_frequency[i] / (2 * std::numbers::pi), 6),
+                   format_number(modes.damping_ratio[i], 6), kind_text(modes.kind[i]),
+                   std::isfinite(bound) ? format_number(bound, 2) : "none",
+                   format_shape(shape_of(modes, i), 36)});
+  }
+  return out + table.text();
+}
+
+std::string MonitorView::sampled_table() const {
+  const sampled_modes_t& modes = *sampled_;
+  std::string out = "  tick " + std::to_string(modes.tick) + ": " + verdict(modes) + "\n\n";
+  TextTable table;
+  table.add_column(Align::kPoint, {"continuous", "rad/s"});
+  table.add_column(Align::kPoint, {"", "ratio"});
+  table.add_column(Align::kPoint, {"sampled", "rad/s"});
+  table.add_column(Align::kPoint, {"", "ratio"});
+  table.add_column(Align::kLeft, {"kind", ""});
+  for (std::size_t i = 0; i < static_cast<std::size_t>(modes.num_modes); ++i) {
+    table.add_row({format_number(modes.continuous_frequency[i], 6),
+                   format_number(modes.continuous_ratio[i], 6),
+                   format_number(modes.natural_frequency[i], 6),
+                   format_number(modes.damping_ratio[i], 6), kind_text(modes.kind[i])});
+  }
+  return out + table.text();
+}
+
+std::string MonitorView::line() const {
+  std::string out = fixed(time(), 1) + " s";
+  if (state_) {
+    out += "  tick " + std::to_string(state_->tick) + "  " + status_text(state_->status) + "  " +
+           (rate_ > 0 ? fixed(rate_, 0) : "-") + " ticks/s, " + tick_times(*state_) + ", " +
+           count(state_->overruns, "overrun");
+    if (state_->fault != 0) out += "  " + latched(*state_);
+  }
+  if (modes_) {
+    out += "  modes, rad/s (ratio):";
+    for (std::size_t i = 0; i < static_cast<std::size_t>(modes_->num_modes); ++i) {
+      out += " " + format_number(modes_->natural_frequency[i], 4) + " (" +
+             format_number(modes_->damping_ratio[i], 3) + ")";
+    }
+  }
+  if (mixed()) out += "  WARNING: more than one loop on this bus";
+  return out + "\n";
+}
+
+std::string MonitorView::summary(std::int64_t malformed) const {
+  std::string out = "\n" + count(states_, "state") + " and " +
+                    count(modes_messages_, "modes message") + " over " + fixed(time(), 1) + " s; " +
+                    count(modes_lost_, "modes message") + " lost, " + count(malformed, "message") +
+                    " malformed\n";
+  if (mixed()) out += std::string("  Warning: ") + kMixed + "\n";
+  for (std::size_t i = 0; i < statuses_.size(); ++i) {
+    if (statuses_[i] == 0) continue;
+    out += "  " + status_text(static_cast<std::int8_t>(i)) + ": " + count(statuses_[i], "state") +
+           "\n";
+  }
+  if (state_) {
+    out += "  " + count(state_->overruns, "overrun") + ", longest " +
+           fixed(1e-3 * state_->longest_tick_time, 1) + " us; largest tip error " +
+           fixed(1e3 * largest_error_, 2) + " mm\n" + commands();
+    if (state_->fault != 0) out += "  " + latched(*state_) + "\n";
+  }
+  if (modes_) out += "\nModes at the end\n" + modes_table();
+  if (sampled_) out += "\nSampled loop at the end\n" + sampled_table();
+  return out;
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,167 @@
+#include <dashpot/analysis/motion_fit.hpp>
+#include <dashpot/apps/loop/closed_loop.hpp>
+#include <dashpot/apps/run/ring_down.hpp>
+#include <dashpot/apps/run/sampled_modes.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+namespace dashpot::apps {
+namespace {
+
+using analysis::Recording;
+
+constexpr double kRelease = 1e-4;       // rad: what is not linear is that much smaller
+constexpr double kDuration = 2;         // s
+constexpr double kSamplePeriod = 1e-3;  // s, or one control period if that is longer
+constexpr double kFarthest = 0.5;       // relative, of two eigenvalues of one mode
+
+/// The scene from another start, without pushes and steps, with exact sensors.
+Scene quiet_scene(const Scene& scene, const JointVector& start) {
+  Scene quiet = scene;
+  quiet.start = start;
+  quiet.velocity.setZero();
+  quiet.plant.position_noise.resize(0);
+  quiet.plant.velocity_noise.resize(0);
+  quiet.plant.position_resolution.resize(0);
+  if (quiet.arm) {
+    quiet.arm->options.wrenches.clear();
+    quiet.steps.resize(1);
+  } else {
+    quiet.matrices->forces.clear();
+  }
+  return quiet;
+}
+
+struct RecordedMotion {
+  Recording recording;
+  dashpot_modes modes{};  ///< the first ones
+};
+
+/// Nothing if `stopped` says so first.
+std::optional<RecordedMotion> record(const Scene& scene, const ControllerFactory& make_controller,
+                                     int every, const std::function<bool()>& stopped) {
+  const auto controller = make_controller();
+  ClosedLoop loop(scene, *controller);
+  const auto samples = static_cast<Eigen::Index>(kDuration / (every * scene.plant.period));
+  RecordedMotion motion;
+  motion.recording.position.resize(scene.dof(), samples);
+  motion.recording.velocity.resize(scene.dof(), samples);
+  for (Eigen::Index i = 0; i < samples; ++i) {
+    if (stopped()) return std::nullopt;
+    motion.recording.position.col(i) = loop.plant().position();
+    motion.recording.velocity.col(i) = loop.plant().velocity();
+    for (int k = 0; k < every; ++k) {
+      loop.follow_scenario();
+      loop.control();
+      const dashpot_modes* modes = controller->new_modes();
+      if (modes != nullptr && modes->time >= 0 && motion.modes.tick == 0) motion.modes = *modes;
+      const sim::Status status = loop.move();
+      if (status != sim::Status::kOk) {
+        throw std::runtime_error(std::string("a small release does not ring down: ") +
+                                 sim::to_text(status));
+      }
+    }
+  }
+  return motion;
+}
+
+using Eigenvalues = std::array<analysis::Complex, 2>;
+
+Eigenvalues eigenvalues(const dashpot_mode& mode) {
+  const auto& [first, second] = mode.eigenvalues;
+  return {analysis::Complex(first[0], first[1]), analysis::Complex(second[0], second[1])};
+}
+
+/// How far `other` is from `wanted`, relative.
+double distance(const Eigenvalues& wanted, const Eigenvalues& other) {
+  double sum = 0;
+  for (std::size_t k = 0; k < 2; ++k) sum += std::norm(other[k] - wanted[k]) / std::norm(wanted[k]);
+  return std::sqrt(sum);
+}
+
+/// Pairs modes whose eigenvalues are nearest to each other, the best pair first; a mode that has
+/// none within kFarthest of itself stays alone.
+std::vector<RingDownMode> match(const dashpot_modes& predicted,
+                                std::vector<analysis::FittedMode> fitted) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  std::vector<RingDownMode> result(predicted.count);
+  for (std::uint32_t i = 0; i < predicted.count; ++i) {
+    const dashpot_mode& mode = predicted.modes[i];
+    result[i] = {mode.label, mode.natural_frequency, mode.damping_ratio, kNaN, kNaN, kNaN, kNaN};
+  }
+  while (!fitted.empty()) {
+    double least = kFarthest;
+    std::pair<std::uint32_t, std::size_t> best{predicted.count, 0};
+    for (std::uint32_t i = 0; i < predicted.count; ++i) {
+      for (std::size_t k = 0; std::isnan(result[i].measured_frequency) && k < fitted.size(); ++k) {
+        const double apart = distance(eigenvalues(predicted.modes[i]), fitted[k].eigenvalues);
+        if (!(apart < least)) continue;
+        least = apart;
+        best = {i, k};
+      }
+    }
+    if (best.first == predicted.count) break;
+    RingDownMode& row = result[best.first];
+    row.measured_frequency = fitted[best.second].natural_frequency;
+    row.measured_ratio = fitted[best.second].damping_ratio;
+    fitted.erase(fitted.begin() + static_cast<std::ptrdiff_t>(best.second));
+  }
+  return result;
+}
+
+/// What the modes become in the sampled loop; a mode that moves farther than kFarthest has no
+/// counterpart there that could be told from others.
+void add_sampled(const Scene& scene, RingDown& ring_down) {
+  const SampledModes modes = sampled_modes(scene);
+  ring_down.gain_margin = modes.gain_margin;
+  ring_down.growth = std::max(0.0, std::log(modes.sampled.spectral_radius) / scene.plant.period);
+  for (RingDownMode& row : ring_down.modes) {
+    for (int i = 0; i < modes.continuous.modes.size(); ++i) {
+      const analysis::Mode<>& from = modes.continuous.modes[i];
+      const analysis::SampledMode& to = modes.sampled.modes[static_cast<std::size_t>(i)];
+      const bool same = std::abs(from.natural_frequency - row.predicted_frequency) <=
+                            1e-6 * row.predicted_frequency &&
+                        std::abs(from.damping_ratio - row.predicted_ratio) <= 1e-6;
+      if (!same || distance(from.eigenvalues, to.eigenvalues) > kFarthest) continue;
+      row.sampled_frequency = to.natural_frequency;
+      row.sampled_ratio = to.damping_ratio;
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<RingDown> measure_ring_down(const Scene& scene,
+                                          const ControllerFactory& make_controller,
+                                          const std::function<bool()>& stopped) {
+  const int every = std::max(1, static_cast<int>(std::lround(kSamplePeriod / scene.plant.period)));
+  const auto rest = record(quiet_scene(scene, scene.rest), make_controller, every, stopped);
+  if (!rest) return std::nullopt;
+  std::vector<Recording> recordings;
+  for (int i = 0; i < scene.dof(); ++i) {
+    const JointVector start = scene.rest + kRelease * JointVector::Unit(scene.dof(), i);
+    auto motion = record(quiet_scene(scene, start), make_controller, every, stopped);
+    if (!motion) return std::nullopt;
+    // What happens without a release, such as sagging, is not of interest.
+    motion->recording.position -= rest->recording.position;
+    motion->recording.velocity -= rest->recording.velocity;
+    recordings.push_back(std::move(motion->recording));
+  }
+  analysis::MotionFitOptions options;
+  options.period = every * scene.plant.period;
+  const analysis::MotionFit fit = analysis::fit_motion(recordings, options);
+  RingDown result;
+  result.modes = match(rest->modes, fit.modes);
+  result.releases = scene.dof();
+  result.residual = fit.residual;
+  if (scene.arm) add_sampled(scene, result);
+  return result;
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,258 @@
+#include <dashpot/apps/cli/output_file.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/run/csv_sink.hpp>
+#include <dashpot/apps/run/run_report.hpp>
+#include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/lcmtypes/bus.hpp>
+
+#include <unistd.h>
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <utility>
+
+namespace dashpot::apps {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  std::string scene, url, log, csv, plugin;
+  std::optional<double> duration;
+  bool fast = false;
+  bool real_time = false;  // which it is unless `fast`
+  bool commands = false;
+  bool ring_down = false;
+  bool json = false;
+};
+
+constexpr std::chrono::milliseconds kLook{5};      // how often the loop's progress is looked at
+constexpr std::chrono::milliseconds kRedraw{200};  // of the progress on a terminal
+constexpr std::chrono::seconds kLinePeriod{2};     // of the progress elsewhere
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// A line on standard error that says how far the run is: in place on a terminal.
+class Progress {
+ public:
+  Progress(std::int64_t ticks, double period)
+      : ticks_(ticks), period_(period), in_place_(isatty(STDERR_FILENO) != 0) {}
+  ~Progress() {
+    if (in_place_) std::fputs("\r\033[K", stderr);
+  }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+
+  void show(std::int64_t done, std::int64_t overruns) {
+    const auto now = Clock::now();
+    if (now - shown_at_ < (in_place_ ? std::chrono::milliseconds(kRedraw) : kLinePeriod)) return;
+    shown_at_ = now;
+    const auto time = [this](std::int64_t ticks) { return static_cast<double>(ticks) * period_; };
+    std::fprintf(stderr, "%s%.1f of %.1f s, %lld overruns%s", in_place_ ? "\r\033[K" : "",
+                 time(done), time(ticks_), static_cast<long long>(overruns), in_place_ ? "" : "\n");
+  }
+
+ private:
+  std::int64_t ticks_;
+  double period_;
+  bool in_place_;
+  Clock::time_point shown_at_ = Clock::now();
+};
+
+/// Opens what the user has named; a failure is bad input.
+template <class Open>
+auto open_for(const std::string& option, const Open& open) {
+  try {
+    return open();
+  } catch (const std::runtime_error& error) {
+    throw InputError(option, error.what());
+  }
+}
+
+/// The bus of a run: null in fast motion unless it is asked for.
+std::shared_ptr<lcm::LCM> open_bus(const Options& options) {
+  if (!options.url.empty()) {
+    return open_for("--lcm-url", [&] { return lcmtypes::open_bus(options.url); });
+  }
+  if (options.fast) return nullptr;
+  if (options.commands) return open_for("--commands", [] { return lcmtypes::open_bus(""); });
+  try {
+    return lcmtypes::open_bus("");
+  } catch (const std::runtime_error& error) {
+    print_error(std::string("running without a bus: ") + error.what());
+    return nullptr;
+  }
+}
+
+std::vector<std::unique_ptr<lcmtypes::Sink>> make_sinks(const Options& options,
+                                                        const std::shared_ptr<lcm::LCM>& bus) {
+  std::vector<std::unique_ptr<lcmtypes::Sink>> sinks;
+  if (bus) sinks.push_back(lcmtypes::make_bus_sink(bus));
+  if (!options.log.empty()) {
+    sinks.push_back(open_for("--log", [&] { return lcmtypes::make_log_sink(options.log); }));
+  }
+  if (!options.csv.empty()) sinks.push_back(make_csv_sink(options.csv));
+  return sinks;
+}
+
+/// Throws unless the controller takes every set-point of the scenario.
+void check_steps(const Scene& scene, const PluginLibrary& plugin) {
+  const auto controller = plugin.create(scene.path, scene.dof());
+  std::string reason;
+  const JointVector& begin = scene.outside_limits ? scene.start : scene.rest;
+  if (controller->start(begin, reason) != DASHPOT_OK) {
+    throw InputError("scenario.start", "the controller refuses it: " + reason).in_file(scene.path);
+  }
+  for (const ScenarioStep& step : scene.steps) {
+    if (controller->check(step.setpoint, begin, reason) == DASHPOT_OK) continue;
+    throw InputError("scenario.steps", "the controller refuses this: " + reason, step.line)
+        .in_file(scene.path);
+  }
+}
+
+/// Runs the loop to its end, or until the user stops it.
+RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
+                   const std::shared_ptr<lcm::LCM>& bus) {
+  RunReport report;
+  report.pace = options.fast ? Pace::kFast : Pace::kRealTime;
+  std::optional<CommandSource> commands;
+  if (options.commands) commands.emplace(bus, scene.commands, loop);
+  lcmtypes::Publisher publisher(make_sinks(options, bus));
+  if (!options.fast) publisher.start();
+  const double period = scene.plant.period;
+  const std::int64_t ticks = std::max<std::int64_t>(1, std::llround(scene.duration / period));
+  const Clock::time_point start = Clock::now();
+  LoopThread thread(loop, publisher, commands ? &*commands : nullptr, {report.pace, period, ticks});
+  {
+    Progress progress(ticks, period);
+    thread.start();
+    while (!thread.done()) {
+      std::this_thread::sleep_for(kLook);
+      if (!options.fast) loop.follow_gains();
+      progress.show(thread.ticks(), thread.overruns());
+      if (StopSignal::given()) {
+        thread.stop();
+        report.interrupted = true;
+      }
+    }
+    thread.join();
+  }
+  report.wall_time = seconds_since(start);
+  if (loop.refused_steps() > 0) {
+    std::fprintf(stderr, "gains of %d steps of the scenario were refused, the last: %s\n",
+                 loop.refused_steps(), loop.refusal().c_str());
+  }
+  publisher.stop();  // the counters below are final
+  report.privileges = thread.privileges();
+  report.loop = thread.record();
+  report.messages = publisher.counters();
+  if (commands) report.commands = {commands->tally(), commands->last_reason()};
+  return report;
+}
+
+/// Throws if what is written would overwrite what is read, or each other.
+void check_files(const Options& options, const Scene& scene) {
+  std::vector<NamedFile> inputs = {{"the scene", options.scene}, {"--plugin", options.plugin}};
+  if (scene.arm) inputs.push_back({"the robot description", scene.arm->config.robot.urdf});
+  const std::string url =
+      options.url.empty() && !options.fast ? lcmtypes::default_url() : options.url;
+  check_outputs(
+      {{"--lcm-url", lcmtypes::path_of(url)}, {"--log", options.log}, {"--csv", options.csv}},
+      inputs);
+}
+
+void run(const Options& options) {
+  if (options.commands && options.fast) {
+    throw InputError("--commands",
+                     "is for real time: with --fast commands would come at no particular time");
+  }
+  Scene scene = load_scene(options.scene);
+  check_files(options, scene);
+  if (options.commands && !scene.arm) {
+    throw InputError("--commands", "has nothing to command: the scene is a system of matrices");
+  }
+  if (options.duration) scene.duration = *options.duration;
+  std::optional<PluginLibrary> plugin;
+  if (scene.arm) plugin.emplace(options.plugin);
+  if (!scene.arm && !options.plugin.empty()) {
+    throw InputError("--plugin", "has nothing to control: the scene is a system of matrices");
+  }
+  const auto make_controller = [&] {
+    return plugin ? plugin->create(scene.path, scene.dof())
+                  : make_spectator(*scene.matrices, scene.plant.period);
+  };
+  if (plugin) check_steps(scene, *plugin);
+
+  const auto controller = make_controller();
+  ClosedLoop loop(scene, *controller);
+  const StopSignal stop;
+  RunReport report = run_loop(options, scene, loop, open_bus(options));
+  report.scene = options.scene;
+  report.joints = scene.dof();
+  report.period = scene.plant.period;
+  report.simulated_time = loop.plant().time();
+  report.energy = loop.plant().audit();
+  report.extremes = loop.extremes();
+  if ((scene.ring_down || options.ring_down) && !report.interrupted) {
+    report.ring_down = measure_ring_down(scene, make_controller, StopSignal::given);
+    report.interrupted = !report.ring_down;
+  }
+  print(options.json ? to_json(report) : to_table(report));
+  if (report.messages.send_errors > 0 && !(options.log.empty() && options.csv.empty())) {
+    throw std::runtime_error(std::to_string(report.messages.send_errors) +
+                             " messages could not be written");
+  }
+  if (report.loop.simulation != sim::Status::kOk) {
+    throw std::runtime_error(std::string("the simulation ended at ") +
+                             std::to_string(report.simulated_time) +
+                             " s: " + sim::to_text(report.loop.simulation));
+  }
+}
+
+}  // namespace
+
+void add_run(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("run", "A robot and its controller in simulation, watched over LCM");
+  const auto options = std::make_shared<Options>();
+  command->add_option("scene", options->scene, "Scene file: sim/scenes has examples")
+      ->required()
+      ->option_text("FILE");
+  command->add_option("--duration", options->duration, "Instead of that of the scene, s")
+      ->check([](const std::string& text) {
+        const double value = std::strtod(text.c_str(), nullptr);
+        return value >= 1e-6 && value <= 1e7 ? "" : text + " is not in the range 1e-6 to 1e7 s";
+      })
+      ->option_text("S");
+  CLI::Option* real_time =
+      command->add_flag("--realtime", options->real_time, "At the robot's pace (default)");
+  command
+      ->add_flag("--fast", options->fast, "As fast as possible; without a bus unless one is named")
+      ->excludes(real_time);
+  command->add_flag("--commands", options->commands,
+                    "Take commands from the bus; without it none are taken");
+  command
+      ->add_option("--lcm-url", options->url,
+                   "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine")
+      ->option_text("URL");
+  command->add_option("--log", options->log, "LCM log to write")->option_text("FILE");
+  command->add_option("--csv", options->csv, "Table of the states to write")->option_text("FILE");
+  command->add_option("--plugin", options->plugin, "Controller to load instead of Dashpot's own")
+      ->option_text("FILE");
+  command->add_flag("--ring-down", options->ring_down,
+                    "Fit the modes of small releases, and show them beside those predicted");
+  command->add_flag("--json", options->json, "End with one JSON object instead of tables");
+  command->footer("Ctrl-C ends it with the summary of what was run.\n" +
+                  std::string(kExitStatusHelp));
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace dashpot::apps

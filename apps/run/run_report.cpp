@@ -1,0 +1,363 @@
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/apps/analyze/json_writer.hpp>
+#include <dashpot/apps/cli/shape_text.hpp>
+#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/run/run_report.hpp>
+#include <dashpot/controller/status.hpp>
+#include <dashpot/text/printable.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+namespace dashpot::apps {
+namespace {
+
+using Align = TextTable::Align;
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kShapeWidth = 40;
+
+std::string count(std::int64_t n, const std::string& what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
+/// Tick times in us at and below which this share of the ticks lies.
+double percentile(const std::vector<std::int32_t>& sorted, double share) {
+  if (sorted.empty()) return std::nan("");
+  const auto rank = std::lround(share * static_cast<double>(sorted.size() - 1));
+  return 1e-3 * sorted[static_cast<std::size_t>(rank)];
+}
+
+struct TickTimes {
+  double median, p99, p99_9, longest;  // us
+};
+
+TickTimes tick_times(const LoopRecord& record) {
+  std::vector<std::int32_t> sorted = record.tick_times;
+  std::sort(sorted.begin(), sorted.end());
+  return {percentile(sorted, 0.5), percentile(sorted, 0.99), percentile(sorted, 0.999),
+          percentile(sorted, 1)};
+}
+
+std::string status_text(std::size_t status) {
+  if (status > DASHPOT_NOT_FINITE) return "call refused";
+  return controller::to_text(static_cast<controller::Status>(status));
+}
+
+const char* kind_text(const dashpot_mode& mode) {
+  return analysis::to_text(static_cast<analysis::ModeKind>(mode.kind));
+}
+
+std::span<const dashpot_mode> list(const dashpot_modes& modes) {
+  return {modes.modes, modes.count};
+}
+
+Eigen::VectorXcd shape_of(const dashpot_modes& modes, const dashpot_mode& mode) {
+  Eigen::VectorXcd shape(modes.joints);
+  for (std::uint32_t j = 0; j < modes.joints; ++j) {
+    shape[j] = {mode.shape_real[j], mode.shape_imag[j]};
+  }
+  return shape;
+}
+
+std::string modes_table(const dashpot_modes& modes) {
+  TextTable table;
+  table.add_column(Align::kRight, {"", "label"});
+  table.add_column(Align::kPoint, {"natural", "rad/s"});
+  table.add_column(Align::kPoint, {"frequency", "Hz"});
+  table.add_column(Align::kPoint, {"damping", "ratio"});
+  table.add_column(Align::kLeft, {"", "kind"});
+  table.add_column(Align::kRight, {"error <", "rad/s"});
+  table.add_column(Align::kLeft, {"", "shape"});
+  for (const dashpot_mode& mode : list(modes)) {
+    const double bound = mode.natural_frequency_bound;
+    table.add_row({std::to_string(mode.label), format_number(mode.natural_frequency, 6),
+                   format_number(mode.natural_frequency / (2 * std::numbers::pi), 6),
+                   format_number(mode.damping_ratio, 6), kind_text(mode),
+                   std::isfinite(bound) ? format_number(bound, 2) : "none",
+                   format_shape(shape_of(modes, mode), kShapeWidth)});
+  }
+  return table.text();
+}
+
+std::string ring_down_table(const RingDown& ring_down) {
+  TextTable table;
+  table.add_column(Align::kRight, {"", "label"});
+  table.add_column(Align::kPoint, {"predicted", "rad/s"});
+  table.add_column(Align::kPoint, {"", "ratio"});
+  table.add_column(Align::kPoint, {"sampled", "rad/s"});
+  table.add_column(Align::kPoint, {"", "ratio"});
+  table.add_column(Align::kPoint, {"simulated", "rad/s"});
+  table.add_column(Align::kPoint, {"", "ratio"});
+  for (const RingDownMode& mode : ring_down.modes) {
+    table.add_row({std::to_string(mode.label), format_number(mode.predicted_frequency, 5),
+                   format_number(mode.predicted_ratio, 4), format_number(mode.sampled_frequency, 5),
+                   format_number(mode.sampled_ratio, 4), format_number(mode.measured_frequency, 5),
+                   format_number(mode.measured_ratio, 4)});
+  }
+  return table.text();
+}
+
+std::string stability_text(const RingDown& ring_down) {
+  if (ring_down.growth > 0) {
+    return "  In this loop a motion grows e-fold every " + format_number(1 / ring_down.growth, 3) +
+           " s: the torque comes too late.\n";
+  }
+  if (!(ring_down.gain_margin > 0)) return "";  // nothing is sampled
+  return "  All gains together may grow by a factor of " + format_number(ring_down.gain_margin, 3) +
+         " before this loop becomes unstable.\n";
+}
+
+std::string pace_text(const RunReport& report) {
+  if (report.pace == Pace::kFast) {
+    return "as fast as possible: " + format_number(report.wall_time, 3) + " s, " +
+           format_number(report.simulated_time / report.wall_time, 3) + " times real time";
+  }
+  const Privileges& granted = report.privileges;
+  return std::string("in real time; ") +
+         (granted.scheduled ? "scheduled ahead of others (SCHED_FIFO)"
+                            : "without SCHED_FIFO, which the system did not allow") +
+         ", " +
+         (granted.locked ? "memory locked" : "memory not locked, which the system did not allow");
+}
+
+std::string timing_text(const RunReport& report) {
+  const LoopRecord& loop = report.loop;
+  const TickTimes times = tick_times(loop);
+  std::string out = "  Tick of the controller: median " + format_number(times.median, 3) +
+                    " us, 99 % within " + format_number(times.p99, 3) + ", 99.9 % " +
+                    format_number(times.p99_9, 3) + ", longest " + format_number(times.longest, 3) +
+                    "\n  " + count(loop.overruns, "overrun");
+  if (report.pace == Pace::kRealTime) {
+    out += ", " + std::to_string(loop.own_overruns) +
+           " of them by computing, the others by waiting for the processor; latest wake-up " +
+           format_number(1e-6 * static_cast<double>(loop.latest_wake_up), 3) + " ms";
+  }
+  return out + "\n";
+}
+
+std::string statuses_text(const LoopRecord& loop) {
+  std::string out = "  Status:";
+  for (std::size_t i = 0; i < loop.statuses.size(); ++i) {
+    if (loop.statuses[i] == 0) continue;
+    out +=
+        (out.back() == ':' ? " " : ", ") + status_text(i) + " " + std::to_string(loop.statuses[i]);
+  }
+  return out + "\n  " + count(loop.status_changes, "change") + " of status, " +
+         count(static_cast<std::int64_t>(loop.restarts), "restart") + " of the springs\n";
+}
+
+std::string extremes_text(const Extremes& extremes) {
+  const std::string energy = "kinetic energy " + format_number(extremes.kinetic_energy, 3) + " J\n";
+  if (extremes.tip_speed == 0) return "  Greatest " + energy;
+  return "  Greatest speed of a joint " + format_number(100 * extremes.speed_share, 3) +
+         " % of its limit, of the tip " + format_number(extremes.tip_speed, 3) + " m/s, " + energy;
+}
+
+/// How the modes were found, in ticks after the first one of the run.
+std::string solved_text(const dashpot_modes& first, const dashpot_modes& last) {
+  std::string out = "  Modes:";
+  const auto add = [&](std::uint64_t dashpot_modes::*ticks, const char* what) {
+    if (last.*ticks == first.*ticks) return;
+    out +=
+        (out.back() == ':' ? " " : ", ") + std::to_string(last.*ticks - first.*ticks) + " " + what;
+  };
+  add(&dashpot_modes::tracked, "tracked");
+  add(&dashpot_modes::reused, "reused");
+  add(&dashpot_modes::unchanged, "unchanged");
+  add(&dashpot_modes::direct, "solved anew");
+  add(&dashpot_modes::no_springs, "without springs");
+  add(&dashpot_modes::failed, "failed");
+  add(&dashpot_modes::missed, "missed");
+  if (last.proportional > first.proportional) {
+    out += "; damping proportional in " + std::to_string(last.proportional - first.proportional);
+  }
+  return out + "\n";
+}
+
+std::string error_text(const LoopRecord& loop) {
+  std::string out;
+  if (loop.cartesian) {
+    out += "  Tip farthest from where its springs are fixed: " +
+           format_number(1e3 * loop.tip_error, 4) + " mm, " +
+           format_number(loop.tip_angle_error, 3) + " rad\n";
+  }
+  if (loop.joint) {
+    out +=
+        "  Joint farthest from where its springs are fixed: " + format_number(loop.joint_error, 3) +
+        " rad (m)\n";
+  }
+  return out;
+}
+
+/// Whether more than a hundredth of the energy that was moved came from nowhere or went there.
+bool doubtful(const sim::EnergyAudit& energy) {
+  const double moved = std::abs(energy.by_actuators) + std::abs(energy.by_world) +
+                       energy.dissipated() + std::abs(energy.stored.sum() - energy.initial.sum());
+  return std::abs(energy.imbalance()) > 0.01 * moved && std::abs(energy.imbalance()) > 1e-9;
+}
+
+std::string energy_text(const sim::EnergyAudit& energy) {
+  const auto joule = [](double value) { return format_number(value, 4) + " J"; };
+  return "  Energy: stored " + joule(energy.initial.sum()) + " at the start, " +
+         joule(energy.stored.sum()) + " at the end; in by the drives " +
+         joule(energy.by_actuators) + ", by the world " + joule(energy.by_world) + "; lost " +
+         joule(energy.dissipated()) + "; unaccounted for " + format_number(energy.imbalance(), 2) +
+         " J" + (doubtful(energy) ? ": the integrator's steps are too long" : "") + "\n";
+}
+
+std::string messages_text(const RunReport& report) {
+  const lcmtypes::PublisherCounters& sent = report.messages;
+  return "  Messages: " + count(sent.states, "state") + ", " + std::to_string(sent.modes) +
+         " of modes (" + std::to_string(sent.modes_skipped) + " unchanged, not sent), " +
+         std::to_string(sent.states_dropped + sent.modes_dropped) + " dropped, " +
+         count(sent.send_errors, "error") + "\n";
+}
+
+Json modes_json(const dashpot_modes& modes) {
+  Json result = Json::array();
+  for (const dashpot_mode& mode : list(modes)) {
+    Json eigenvalues = Json::array(), shape = Json::array();
+    for (const auto& value : mode.eigenvalues) eigenvalues.push_back({value[0], value[1]});
+    for (std::uint32_t j = 0; j < modes.joints; ++j) {
+      shape.push_back({mode.shape_real[j], mode.shape_imag[j]});
+    }
+    result.push_back({{"label", mode.label},
+                      {"eigenvalues", eigenvalues},
+                      {"natural_frequency", mode.natural_frequency},
+                      {"damping_ratio", mode.damping_ratio},
+                      {"damped_frequency", mode.damped_frequency},
+                      {"kind", kind_text(mode)},
+                      {"shape", shape},
+                      {"error_bound", mode.eigenvalue_bound},
+                      {"natural_frequency_bound", mode.natural_frequency_bound},
+                      {"damping_ratio_bound", mode.damping_ratio_bound}});
+  }
+  return result;
+}
+
+Json solved_json(const dashpot_modes& first, const dashpot_modes& last) {
+  return {{"tracked", last.tracked - first.tracked},
+          {"reused", last.reused - first.reused},
+          {"direct", last.direct - first.direct},
+          {"proportional", last.proportional - first.proportional},
+          {"unchanged", last.unchanged - first.unchanged},
+          {"no_springs", last.no_springs - first.no_springs},
+          {"failed", last.failed - first.failed},
+          {"missed", last.missed - first.missed}};
+}
+
+Json energy_json(const sim::EnergyAudit& energy) {
+  const auto stored = [](const sim::StoredEnergy& at) {
+    return Json{{"kinetic", at.kinetic}, {"gravity", at.gravity}, {"springs", at.springs}};
+  };
+  return {{"initial", stored(energy.initial)},   {"final", stored(energy.stored)},
+          {"by_actuators", energy.by_actuators}, {"by_world", energy.by_world},
+          {"viscous_heat", energy.viscous_heat}, {"friction_heat", energy.friction_heat},
+          {"contact_heat", energy.contact_heat}, {"imbalance", energy.imbalance()}};
+}
+
+Json ring_down_json(const RingDown& ring_down) {
+  Json modes = Json::array();
+  for (const RingDownMode& mode : ring_down.modes) {
+    modes.push_back({{"label", mode.label},
+                     {"predicted_frequency", mode.predicted_frequency},
+                     {"predicted_ratio", mode.predicted_ratio},
+                     {"sampled_frequency", mode.sampled_frequency},
+                     {"sampled_ratio", mode.sampled_ratio},
+                     {"measured_frequency", mode.measured_frequency},
+                     {"measured_ratio", mode.measured_ratio}});
+  }
+  return {{"releases", ring_down.releases},
+          {"residual", ring_down.residual},
+          {"growth", ring_down.growth},
+          {"gain_margin", ring_down.gain_margin},
+          {"modes", modes}};
+}
+
+}  // namespace
+
+std::string to_table(const RunReport& report) {
+  const LoopRecord& loop = report.loop;
+  std::string out = text::printable(report.scene) + ": " + count(report.joints, "joint") + ", " +
+                    count(loop.ticks, "tick") + " of " + format_number(1e3 * report.period, 3) +
+                    " ms, " + pace_text(report) + (report.interrupted ? "; interrupted" : "") +
+                    "\n\n";
+  out += timing_text(report) + statuses_text(loop) + extremes_text(report.extremes) +
+         error_text(loop) + energy_text(report.energy) + fault_text(loop) + messages_text(report) +
+         commands_text(report.commands, loop.commands_refused);
+  if (loop.first_modes.tick != 0) {
+    out += solved_text(loop.first_modes, loop.last_modes);
+    out += "\nModes at the start, " + count(loop.first_modes.zero_modes, "zero mode") + "\n" +
+           modes_table(loop.first_modes);
+    out += "\nModes at the end, " + count(loop.last_modes.zero_modes, "zero mode") + "\n" +
+           modes_table(loop.last_modes);
+  }
+  if (report.ring_down) {
+    out += "\nRing-down after " + count(report.ring_down->releases, "small release") +
+           " (sampled: predicted with the drives of the scene)\n" +
+           ring_down_table(*report.ring_down);
+    out += stability_text(*report.ring_down);
+  }
+  return out;
+}
+
+std::string to_json(const RunReport& report) {
+  const LoopRecord& loop = report.loop;
+  const TickTimes times = tick_times(loop);
+  Json statuses = Json::object();
+  for (std::size_t i = 0; i < loop.statuses.size(); ++i) {
+    if (loop.statuses[i] != 0) statuses[status_text(i)] = loop.statuses[i];
+  }
+  Json result = {
+      {"scene", report.scene},
+      {"joints", report.joints},
+      {"period", report.period},
+      {"ticks", loop.ticks},
+      {"simulated_time", report.simulated_time},
+      {"wall_time", report.wall_time},
+      {"real_time", report.pace == Pace::kRealTime},
+      {"scheduled_ahead", report.privileges.scheduled},
+      {"memory_locked", report.privileges.locked},
+      {"interrupted", report.interrupted},
+      {"overruns", loop.overruns},
+      {"overruns_by_computing", loop.own_overruns},
+      {"latest_wake_up", 1e-9 * static_cast<double>(loop.latest_wake_up)},
+      {"tick_time",
+       {{"median", 1e-6 * times.median},
+        {"p99", 1e-6 * times.p99},
+        {"p99_9", 1e-6 * times.p99_9},
+        {"longest", 1e-6 * times.longest}}},
+      {"status", statuses},
+      {"status_changes", loop.status_changes},
+      {"restarts", loop.restarts},
+      {"greatest",
+       {{"joint_speed_share", report.extremes.speed_share},
+        {"tip_speed", report.extremes.tip_speed},
+        {"kinetic_energy", report.extremes.kinetic_energy}}},
+      {"zero_modes", loop.last_modes.zero_modes},
+      {"modes", {{"start", modes_json(loop.first_modes)}, {"end", modes_json(loop.last_modes)}}},
+      {"solved", solved_json(loop.first_modes, loop.last_modes)},
+      {"largest_tracking_error",
+       {{"tip", loop.tip_error}, {"tip_angle", loop.tip_angle_error}, {"joint", loop.joint_error}}},
+      {"energy", energy_json(report.energy)},
+      {"messages",
+       {{"states", report.messages.states},
+        {"modes", report.messages.modes},
+        {"modes_skipped", report.messages.modes_skipped},
+        {"states_dropped", report.messages.states_dropped},
+        {"modes_dropped", report.messages.modes_dropped},
+        {"sampled_modes", report.messages.sampled_modes},
+        {"errors", report.messages.send_errors}}},
+      {"commands", commands_json(report.commands, loop.commands_refused)},
+      {"faults", loop.faults},
+      {"fault", fault_json(loop)}};
+  if (report.ring_down) result["ring_down"] = ring_down_json(*report.ring_down);
+  return json_text(result);
+}
+
+}  // namespace dashpot::apps

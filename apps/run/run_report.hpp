@@ -1,0 +1,34 @@
+#pragma once
+#include <dashpot/apps/loop/command_report.hpp>
+#include <dashpot/apps/loop/loop_thread.hpp>
+#include <dashpot/apps/run/ring_down.hpp>
+
+#include <optional>
+#include <string>
+
+namespace dashpot::apps {
+
+/// What `dashpot run` has to tell at its end.
+struct RunReport {
+  std::string scene;  ///< the file
+  int joints = 0;
+  double period = 0;     ///< s
+  double wall_time = 0;  ///< s
+  Pace pace = Pace::kFast;
+  bool interrupted = false;  ///< by the user
+  Privileges privileges;
+  LoopRecord loop;
+  double simulated_time = 0;  ///< s
+  sim::EnergyAudit energy;
+  Extremes extremes;
+  lcmtypes::PublisherCounters messages;
+  std::optional<CommandReport> commands;  ///< if any were to be taken
+  std::optional<RingDown> ring_down;
+};
+
+/// For people: tables, each line ended by a newline.
+std::string to_table(const RunReport& report);
+/// One JSON object. docs/command-line.md lists the keys.
+std::string to_json(const RunReport& report);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,94 @@
+#pragma once
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/motion/setpoint_path.hpp>
+#include <dashpot/controller/settings.hpp>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace dashpot::apps {
+
+/// Where the tip is to be, in what directions: `held` (1 or 0 each) in the axes R.
+struct TipGoal {
+  controller::Pose pose;
+  controller::Vector6 held = controller::Vector6::Ones();
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+
+  /// What is missing at `tip`, in the held directions: m, and a rotation vector in rad; base axes.
+  controller::Vector6 miss(const controller::DynamicsResult& tip) const {
+    controller::Vector6 error;
+    error << pose.position - tip.p_BT_B,
+        controller::short_turn(
+            Eigen::Quaterniond(Eigen::Matrix3d(pose.rotation * tip.R_BT.transpose())));
+    return controller::part_along(held, R, error);
+  }
+};
+
+/// The goal's miss at the nearest position within the position limits that a descent from `q`
+/// finds: Levenberg and Marquardt's, with joints that would leave their limits held there.
+inline controller::Vector6 descend(const controller::RobotModel& model,
+                                   const controller::Limits& limits, const TipGoal& goal,
+                                   controller::JointVector q) {
+  constexpr int kSteps = 100;
+  constexpr double kExact = 1e-9;
+  const Eigen::Index n = q.size();
+  const controller::JointVector still = controller::JointVector::Zero(n);
+  controller::DynamicsResult robot = controller::evaluate(model, q, still);
+  controller::Vector6 miss = goal.miss(robot);
+  double damping = 1e-3;
+  for (int step = 0; step < kSteps && miss.norm() > kExact && damping < 1e6; ++step) {
+    Eigen::MatrixXd J(6, n);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      J.col(j) = controller::part_along(goal.held, goal.R, robot.J.col(j));
+    }
+    const Eigen::VectorXd downhill = J.transpose() * miss;
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const bool out =
+          downhill[j] > 0 ? q[j] >= limits.position_upper[j] : q[j] <= limits.position_lower[j];
+      if (out) J.col(j).setZero();
+    }
+    const Eigen::MatrixXd A = J * J.transpose() + damping * Eigen::MatrixXd::Identity(6, 6);
+    const controller::JointVector next = (q + J.transpose() * A.llt().solve(miss))
+                                             .cwiseMax(limits.position_lower)
+                                             .cwiseMin(limits.position_upper);
+    const controller::DynamicsResult there = controller::evaluate(model, next, still);
+    const controller::Vector6 left = goal.miss(there);
+    if (left.norm() < miss.norm()) {
+      q = next;
+      robot = there;
+      miss = left;
+      damping = std::max(1e-9, 0.1 * damping);
+    } else {
+      damping *= 10;
+    }
+  }
+  return miss;
+}
+
+/// By how much the arm misses the goal at the nearest position found within its limits, from `q`
+/// and from postures all over its range: zero, to 1e-6 m and rad, if it gets there.
+inline controller::Vector6 out_of_reach_by(const controller::RobotModel& model,
+                                           const controller::Limits& limits, const TipGoal& goal,
+                                           controller::JointVector q) {
+  constexpr int kPostures = 32;
+  constexpr double kThere = 1e-6;
+  constexpr double kGoldenRatio = 0.6180339887498949;
+  controller::Vector6 least = descend(model, limits, goal, q);
+  double share = 0;
+  for (int k = 0; k < kPostures && least.norm() > kThere; ++k) {
+    for (Eigen::Index i = 0; i < q.size(); ++i) {
+      share += kGoldenRatio;
+      share -= std::floor(share);
+      const double lower = std::max(limits.position_lower[i], -std::numbers::pi);
+      const double upper = std::min(limits.position_upper[i], std::numbers::pi);
+      q[i] = lower + share * (upper - lower);
+    }
+    const controller::Vector6 miss = descend(model, limits, goal, q);
+    if (miss.norm() < least.norm()) least = miss;
+  }
+  return least.norm() > kThere ? least : controller::Vector6(controller::Vector6::Zero());
+}
+
+}  // namespace dashpot::apps

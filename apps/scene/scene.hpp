@@ -1,0 +1,68 @@
+#pragma once
+// A scene of `dashpot run`: a robot with its controller, how it is simulated, and what happens.
+
+#include <dashpot/controller/config.hpp>
+#include <dashpot/controller/input_error.hpp>
+#include <dashpot/lcmtypes/command_filter.hpp>
+#include <dashpot/sim/arm.hpp>
+#include <dashpot/sim/linear_system.hpp>
+#include <dashpot/sim/plant.hpp>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+using controller::InputError;
+using controller::JointVector;
+
+/// Masses on springs and dampers that nobody controls: M qdd + C qd + K q = f(t).
+struct MatrixSystem {
+  Eigen::MatrixXd mass, damping, stiffness;
+  std::vector<sim::Piece<JointVector>> forces;
+};
+
+/// A controlled robot arm.
+struct ControlledArm {
+  controller::Config config;
+  sim::Robot robot;
+  sim::ArmOptions options;
+};
+
+/// From this time on the controller is given this set-point.
+struct ScenarioStep {
+  double at = 0;  ///< s
+  int line = 0;   ///< of the file
+  controller::Setpoint setpoint;
+};
+
+/// From `begin` until just before `end`, s, the controller is called in every so many periods only.
+struct LoopFault {
+  double begin = 0;
+  double end = 0;
+  int every = 1;         ///< 0: not at all
+  JointVector moved_by;  ///< n, rad; so far a hand moves the robot meanwhile; zero: it is held
+                         ///< where it is; empty: the last torque acts on
+};
+
+/// Joint vectors have n entries.
+struct Scene {
+  std::string path;
+  std::optional<ControlledArm> arm;      ///< either this
+  std::optional<MatrixSystem> matrices;  ///< or this
+  double duration = 5;                   ///< s
+  bool ring_down = false;                ///< fit the modes of small releases, too
+  sim::PlantOptions plant;
+  lcmtypes::CommandLimits commands;    ///< what an arm may be commanded over a bus
+  std::vector<LoopFault> loop_faults;  ///< of an arm; of several at a time the first one counts
+  bool outside_limits = false;         ///< an arm may start outside its position limits
+  JointVector rest;                    ///< where the springs are fixed at first, rad
+  JointVector start;                   ///< where the robot is let go, rad
+  JointVector velocity;                ///< with this velocity, rad/s; zero for an arm
+  std::vector<ScenarioStep> steps;     ///< of an arm, by time; the first one at 0
+
+  int dof() const { return static_cast<int>(rest.size()); }
+};
+
+}  // namespace dashpot::apps

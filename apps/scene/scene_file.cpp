@@ -1,0 +1,121 @@
+#include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/apps/scene/scene_parts.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
+
+#include <filesystem>
+
+namespace dashpot::apps {
+namespace {
+
+using controller::Joint;
+using controller::Sign;
+using controller::Units;
+using controller::YamlMapping;
+using controller::YamlNode;
+
+/// What the controller believes of the robot, which is true unless `simulation.robot` says
+/// otherwise.
+sim::RobotParameters believed(const controller::Config& config) {
+  const controller::ModelOptions& options = config.robot.options;
+  sim::RobotParameters parameters;
+  parameters.armature = config.model.joint_values(&Joint::reflected_inertia);
+  parameters.viscous = config.model.joint_values(&Joint::damping);
+  parameters.coulomb = config.model.joint_values(&Joint::friction);
+  parameters.gravity = options.gravity;
+  parameters.payload = {options.payload.mass, options.payload.center, options.payload.inertia};
+  return parameters;
+}
+
+void read_arm(const YamlNode& document, const std::filesystem::path& directory, Scene& scene) {
+  static constexpr std::array<std::string_view, 11> kKeys = {
+      "robot",    "control",  "gains",    "limits",     "motion",  "feed_forward",
+      "watchdog", "analysis", "commands", "simulation", "scenario"};
+  const YamlMapping root(document, "", kKeys);
+  controller::Config config = controller::read_config(document, directory);
+  const controller::RobotDescription robot = config.robot;
+  const Units positions = controller::joint_units(config.model, "rad", "m");
+  ArmSimulation simulation{believed(config), {}};
+  scene.plant.period = config.settings.period;
+  scene.commands.position_lower = config.settings.limits.position_lower;
+  scene.commands.position_upper = config.settings.limits.position_upper;
+  read_commands(root, scene.commands);
+  read_simulation(root, positions, scene.plant, &simulation);
+  try {
+    scene.arm.emplace(ControlledArm{
+        std::move(config),
+        sim::Robot::from_file(robot.urdf, robot.base, robot.tip, simulation.parameters),
+        simulation.options});
+  } catch (const sim::InvalidRobot& error) {
+    throw InputError("simulation", error.what());
+  }
+  read_scenario(root, positions, scene);
+}
+
+void read_system(const YamlNode& document, Scene& scene) {
+  static constexpr std::array<std::string_view, 4> kKeys = {"system", "control", "simulation",
+                                                            "scenario"};
+  static constexpr std::array<std::string_view, 3> kMatrices = {"mass", "damping", "stiffness"};
+  static constexpr std::array<std::string_view, 1> kControl = {"period"};
+  const YamlMapping root(document, "", kKeys);
+  const YamlMapping system = root.mapping("system", kMatrices);
+  MatrixSystem& matrices = scene.matrices.emplace();
+  for (const auto& [key, matrix] : {std::pair("mass", &matrices.mass),
+                                    {"damping", &matrices.damping},
+                                    {"stiffness", &matrices.stiffness}}) {
+    const auto given = system.matrix(key);
+    if (!given) throw system.error(key, "missing", root.line("system"));
+    *matrix = *given;
+    if (given->rows() != given->cols() || given->rows() < 1 ||
+        given->rows() > controller::kMaxJoints || given->rows() != matrices.mass.rows()) {
+      throw system.error(key, "a square matrix of 1 to 16 rows is wanted, all three of one size");
+    }
+  }
+  read_number(root.mapping("control", kControl), "period", "s", Sign::kPositive,
+              scene.plant.period);
+  const Units positions(static_cast<std::size_t>(matrices.mass.rows()), "m");
+  read_simulation(root, positions, scene.plant, nullptr);
+  read_scenario(root, positions, scene);
+}
+
+/// Throws unless the simulator takes the scene.
+void check(const Scene& scene) try {
+  const auto mechanism = make_mechanism(scene);
+  const sim::Plant plant(*mechanism, scene.plant, scene.start, scene.velocity);
+} catch (const sim::InvalidScene& error) {
+  throw InputError(scene.matrices ? "system" : "simulation", error.what());
+}
+
+bool has_key(const YamlNode& document, std::string_view key) {
+  for (std::size_t i = 0; i + 1 < document.items.size(); i += 2) {
+    if (document.kind == YamlNode::Kind::kMap && document.items[i].text == key) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+Scene load_scene(const std::string& path) try {
+  Scene scene;
+  scene.path = path;
+  const YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
+  if (has_key(document, "system")) {
+    read_system(document, scene);
+  } else {
+    read_arm(document, std::filesystem::path(path).parent_path(), scene);
+  }
+  check(scene);
+  return scene;
+} catch (const InputError& error) {
+  throw error.in_file(path);
+}
+
+std::unique_ptr<sim::System> make_mechanism(const Scene& scene) {
+  if (scene.matrices) {
+    const MatrixSystem& system = *scene.matrices;
+    return std::make_unique<sim::LinearSystem>(system.mass, system.damping, system.stiffness,
+                                               system.forces);
+  }
+  return std::make_unique<sim::Arm>(scene.arm->robot, scene.arm->options);
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,17 @@
+#pragma once
+#include <dashpot/apps/scene/scene.hpp>
+
+#include <memory>
+#include <string>
+
+namespace dashpot::apps {
+
+/// Reads a YAML file. For an arm it is a configuration file of the controller (load_config) with
+/// three keys more, `commands`, `simulation` and `scenario`; otherwise `system` has the matrices.
+/// sim/scenes has examples with all keys. Throws InputError.
+Scene load_scene(const std::string& path);
+
+/// The mechanism of the scene.
+std::unique_ptr<sim::System> make_mechanism(const Scene& scene);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,46 @@
+#pragma once
+// The parts of a scene file, each under its key.
+
+#include <dashpot/apps/scene/scene.hpp>
+#include <dashpot/controller/yaml/setting_reader.hpp>
+
+namespace dashpot::apps {
+
+/// What the simulation of an arm needs besides its options.
+struct ArmSimulation {
+  sim::RobotParameters parameters;
+  sim::ArmOptions options;
+};
+
+/// Reads `simulation` of a scene of n joints into `plant`, and for an arm into `arm`; units are
+/// those of `positions` ("rad" or "m" each). Throws InputError.
+void read_simulation(const controller::YamlMapping& root, const controller::Units& positions,
+                     sim::PlantOptions& plant, ArmSimulation* arm);
+
+/// Reads `commands`, of an arm. Throws InputError.
+void read_commands(const controller::YamlMapping& root, lcmtypes::CommandLimits& limits);
+
+/// Reads `scenario` into the scene, whose arm or matrices are there already. Throws InputError.
+void read_scenario(const controller::YamlMapping& root, const controller::Units& positions,
+                   Scene& scene);
+
+/// Reads `scenario.faults` into the plant's options and the scene. Throws InputError.
+void read_faults(const controller::YamlMapping& scenario, const controller::Units& positions,
+                 Scene& scene);
+
+/// The entries of a list of mappings under `scenario`, each with the prefix of its keys in
+/// messages.
+std::vector<controller::YamlMapping> mappings(const controller::YamlMapping& keys,
+                                              std::string_view key,
+                                              std::span<const std::string_view> known_keys);
+/// Throws unless `keys` has `key`; `parent` has `keys` under `name`.
+void require(const controller::YamlMapping& keys, std::string_view key,
+             const controller::YamlMapping& parent, std::string_view name);
+
+/// The joint position next to `q` where the tip is displaced from its pose at `q` by `displacement`
+/// (m, and a rotation vector in rad; base axes): the one that is reached with the least kinetic
+/// energy, step by step. Nothing if it cannot be reached.
+std::optional<JointVector> displaced(const controller::RobotModel& model, const JointVector& q,
+                                     const controller::Vector6& displacement);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,270 @@
+#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/scene/arm_reach.hpp>
+#include <dashpot/apps/scene/scene_parts.hpp>
+#include <dashpot/controller/base/orientation.hpp>
+#include <dashpot/controller/config/config_gains.hpp>
+#include <dashpot/controller/dynamics.hpp>
+
+#include <algorithm>
+
+namespace dashpot::apps {
+namespace {
+
+using controller::Pose;
+using controller::RobotModel;
+using controller::Sign;
+using controller::Units;
+using controller::Vector6;
+using controller::YamlMapping;
+using controller::YamlNode;
+
+constexpr double kLongest = 1e7;  // s
+const Units kTaskUnits = {"m", "m", "m", "rad", "rad", "rad"};
+const Units kWrenchUnits = {"N", "N", "N", "N m", "N m", "N m"};
+
+Pose tip_at(const RobotModel& model, const JointVector& q) {
+  const auto there = controller::evaluate(model, q, JointVector::Zero(q.size()));
+  return {there.p_BT_B, there.R_BT};
+}
+
+Pose moved(const Pose& pose, const Vector6& displacement) {
+  return {pose.position + displacement.head<3>(),
+          controller::quaternion(Eigen::Vector3d(displacement.tail<3>())).toRotationMatrix() *
+              pose.rotation};
+}
+
+/// Throws unless the joints may be at q, which stands under `key`.
+void check_limits(const YamlMapping& keys, std::string_view key, const JointVector& q,
+                  const Units& positions, const Scene& scene) {
+  const controller::Limits& limits = scene.arm->config.settings.limits;
+  for (int i = 0; i < scene.dof(); ++i) {
+    if (q[i] >= limits.position_lower[i] && q[i] <= limits.position_upper[i]) continue;
+    throw keys.error(key, "joint " + std::to_string(i + 1) + " would be at " +
+                              std::to_string(q[i]) + " " + positions[static_cast<std::size_t>(i)] +
+                              ", outside its limits");
+  }
+}
+
+/// Throws if the arm would start inside the wall.
+void check_wall(const YamlMapping& keys, std::string_view key, const Scene& scene) {
+  const auto& wall = scene.arm->options.wall;
+  if (!wall) return;
+  const Eigen::Vector3d tip = sim::Arm(scene.arm->robot).tip_pose(scene.start).position;
+  const double depth = wall->normal.normalized().dot(wall->point - tip);
+  if (depth > 0) {
+    throw keys.error(key, "puts the tip " + format_number(depth, 3) + " m inside the wall");
+  }
+}
+
+std::string out_of_reach(const Vector6& by) {
+  return "is out of the arm's reach, by " + format_number(by.head<3>().norm(), 3) + " m and " +
+         format_number(by.tail<3>().norm(), 3) + " rad";
+}
+
+/// Throws unless the arm can bring its tip where a Cartesian set-point holds it.
+void check_reach(const YamlMapping& keys, const controller::Setpoint& setpoint,
+                 const Scene& scene) {
+  if (setpoint.mode != controller::Mode::kCartesian) return;
+  TipGoal goal{setpoint.tip_pose};
+  for (int i = 0; i < 6; ++i) {
+    goal.held[i] = setpoint.gains.directions[static_cast<std::size_t>(i)] ? 1 : 0;
+  }
+  if (setpoint.gains.frame == controller::Frame::kTool) goal.R = setpoint.tip_pose.rotation;
+  const controller::Config& config = scene.arm->config;
+  const Vector6 by = out_of_reach_by(config.model, config.settings.limits, goal, scene.rest);
+  const char* key = keys.has("tip_displacement") ? "tip_displacement" : "mode";
+  if (!by.isZero(0)) throw keys.error(key, out_of_reach(by));
+}
+
+void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& scene) {
+  static constexpr std::array<std::string_view, 4> kKeys = {"position", "joint_displacement",
+                                                            "tip_displacement", "outside_limits"};
+  const YamlMapping keys = scenario.mapping("start", kKeys);
+  read_switch(keys, "outside_limits", scene.outside_limits);
+  require(keys, "position", scenario, "start");
+  read_numbers(keys, "position", positions, Sign::kAny, scene.rest);
+  scene.start = scene.rest;
+  if (keys.has("joint_displacement") && keys.has("tip_displacement")) {
+    throw keys.error("tip_displacement", "stands beside joint_displacement; one of them is enough");
+  }
+  if (keys.has("joint_displacement")) {
+    JointVector displacement = scene.rest;
+    read_numbers(keys, "joint_displacement", positions, Sign::kAny, displacement);
+    scene.start += displacement;
+  }
+  if (keys.has("tip_displacement")) {
+    Eigen::VectorXd displacement = Eigen::VectorXd::Zero(6);
+    read_numbers(keys, "tip_displacement", kTaskUnits, Sign::kAny, displacement);
+    const auto q = displaced(scene.arm->config.model, scene.rest, displacement);
+    if (!q) {
+      const TipGoal goal{moved(tip_at(scene.arm->config.model, scene.rest), displacement)};
+      throw keys.error(
+          "tip_displacement",
+          out_of_reach(out_of_reach_by(scene.arm->config.model, scene.arm->config.settings.limits,
+                                       goal, scene.rest)));
+    }
+    scene.start = *q;
+  }
+  const char* moved_by = keys.has("tip_displacement")     ? "tip_displacement"
+                         : keys.has("joint_displacement") ? "joint_displacement"
+                                                          : "position";
+  if (scene.outside_limits) {
+    const controller::Limits& limits = scene.arm->config.settings.limits;
+    scene.rest = scene.start.cwiseMax(limits.position_lower).cwiseMin(limits.position_upper);
+  }
+  check_limits(keys, "position", scene.rest, positions, scene);
+  if (!scene.outside_limits) check_limits(keys, moved_by, scene.start, positions, scene);
+  check_wall(keys, moved_by, scene);
+}
+
+void read_system_start(const YamlMapping& scenario, const Units& positions, Scene& scene) {
+  static constexpr std::array<std::string_view, 2> kKeys = {"position", "velocity"};
+  const YamlMapping keys = scenario.mapping("start", kKeys);
+  scene.start = scene.rest;
+  read_numbers(keys, "position", positions, Sign::kAny, scene.start);
+  read_numbers(keys, "velocity", Units(positions.size(), "m/s"), Sign::kAny, scene.velocity);
+}
+
+/// When a push begins and ends.
+template <class Value>
+sim::Piece<Value> read_times(const YamlMapping& keys, const YamlMapping& scenario) {
+  sim::Piece<Value> piece;
+  require(keys, "begin", scenario, "pushes");
+  require(keys, "end", scenario, "pushes");
+  read_number(keys, "begin", "s", Sign::kNotNegative, piece.begin);
+  read_number(keys, "end", "s", Sign::kPositive, piece.end);
+  if (piece.end <= piece.begin) throw keys.error("end", "is not after begin");
+  return piece;
+}
+
+void read_arm_pushes(const YamlMapping& scenario, Scene& scene) {
+  static constexpr std::array<std::string_view, 3> kKeys = {"begin", "end", "wrench"};
+  for (const YamlMapping& keys : mappings(scenario, "pushes", kKeys)) {
+    auto piece = read_times<sim::Vector6>(keys, scenario);
+    require(keys, "wrench", scenario, "pushes");
+    read_numbers(keys, "wrench", kWrenchUnits, Sign::kAny, piece.value);
+    scene.arm->options.wrenches.push_back(piece);
+  }
+}
+
+void read_system_pushes(const YamlMapping& scenario, const Units& positions, Scene& scene) {
+  static constexpr std::array<std::string_view, 3> kKeys = {"begin", "end", "force"};
+  for (const YamlMapping& keys : mappings(scenario, "pushes", kKeys)) {
+    auto piece = read_times<JointVector>(keys, scenario);
+    require(keys, "force", scenario, "pushes");
+    piece.value = JointVector::Zero(scene.dof());
+    read_numbers(keys, "force", Units(positions.size(), "N"), Sign::kAny, piece.value);
+    scene.matrices->forces.push_back(piece);
+  }
+}
+
+/// The set-point that holds the arm where it starts, with the gains of the file.
+controller::Setpoint first_setpoint(const Scene& scene) {
+  controller::Setpoint setpoint = scene.arm->config.settings.initial;
+  setpoint.joint_position = scene.rest;
+  setpoint.tip_pose = tip_at(scene.arm->config.model, scene.rest);
+  return setpoint;
+}
+
+void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scene) {
+  static constexpr std::array<std::string_view, 6> kKeys = {
+      "at", "mode", "joint_position", "tip_displacement", "wrench", "gains"};
+  static constexpr std::array<std::pair<std::string_view, controller::Mode>, 2> kModes = {
+      {{"joint", controller::Mode::kJoint}, {"cartesian", controller::Mode::kCartesian}}};
+  const RobotModel& model = scene.arm->config.model;
+  scene.steps.push_back({0, 0, first_setpoint(scene)});
+  const Pose origin = scene.steps.front().setpoint.tip_pose;
+  for (const YamlMapping& keys : mappings(scenario, "steps", kKeys)) {
+    ScenarioStep step = scene.steps.back();
+    require(keys, "at", scenario, "steps");
+    read_number(keys, "at", "s", Sign::kNotNegative, step.at);
+    step.line = keys.line("at");
+    if (step.at < scene.steps.back().at) throw keys.error("at", "is before the step above it");
+    if (step.at > scene.duration) throw keys.error("at", "is after the end of the scenario");
+    controller::Setpoint& setpoint = step.setpoint;
+    read_choice(keys, "mode", kModes, setpoint.mode);
+    read_numbers(keys, "joint_position", positions, Sign::kAny, setpoint.joint_position);
+    if (keys.has("joint_position")) {
+      check_limits(keys, "joint_position", setpoint.joint_position, positions, scene);
+    }
+    if (keys.has("tip_displacement")) {
+      Eigen::VectorXd displacement = Eigen::VectorXd::Zero(6);
+      read_numbers(keys, "tip_displacement", kTaskUnits, Sign::kAny, displacement);
+      setpoint.tip_pose = moved(origin, displacement);
+    }
+    read_numbers(keys, "wrench", kWrenchUnits, Sign::kAny, setpoint.wrench);
+    controller::read_gains(keys, model, controller::GainPairs::kEither, setpoint.gains);
+    check_reach(keys, setpoint, scene);
+    scene.steps.push_back(step);
+  }
+}
+
+}  // namespace
+
+std::vector<YamlMapping> mappings(const YamlMapping& keys, std::string_view key,
+                                  std::span<const std::string_view> known_keys) {
+  const YamlNode* node = keys.find(key);
+  std::vector<YamlMapping> result;
+  if (node == nullptr) return result;
+  if (node->kind != YamlNode::Kind::kSequence) {
+    throw keys.error(key, "a list is wanted, not " + controller::describe(*node));
+  }
+  for (std::size_t i = 0; i < node->items.size(); ++i) {
+    result.emplace_back(node->items[i],
+                        "scenario." + std::string(key) + "[" + std::to_string(i + 1) + "].",
+                        known_keys);
+  }
+  return result;
+}
+
+void require(const YamlMapping& keys, std::string_view key, const YamlMapping& parent,
+             std::string_view name) {
+  if (!keys.has(key)) throw keys.error(key, "missing", parent.line(name));
+}
+
+std::optional<JointVector> displaced(const RobotModel& model, const JointVector& q,
+                                     const Vector6& displacement) {
+  const Pose goal = moved(tip_at(model, q), displacement);
+  JointVector at = q;
+  for (int i = 0; i < 50; ++i) {
+    const auto there = controller::evaluate(model, at, JointVector::Zero(q.size()));
+    Vector6 error;
+    error << goal.position - there.p_BT_B,
+        controller::rotation_vector(
+            Eigen::Quaterniond(Eigen::Matrix3d(goal.rotation * there.R_BT.transpose())));
+    if (!error.allFinite()) return {};
+    if (error.norm() < 1e-12) return at;
+    // With M = L L': dq = L^-T (J L^-T)^+ error.
+    const Eigen::LLT<Eigen::MatrixXd> M(there.M);
+    const Eigen::MatrixXd J_scaled =
+        M.matrixL().solve(Eigen::MatrixXd(there.J).transpose()).transpose();
+    const Eigen::VectorXd step =
+        J_scaled.completeOrthogonalDecomposition().solve(Eigen::VectorXd(error));
+    at += M.matrixU().solve(step);
+  }
+  return {};
+}
+
+void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene) {
+  static constexpr std::array<std::string_view, 6> kKeys = {"duration", "start",  "pushes",
+                                                            "steps",    "faults", "ring_down"};
+  const YamlMapping keys = root.mapping("scenario", kKeys);
+  read_number(keys, "duration", "s", Sign::kPositive, scene.duration);
+  if (scene.duration > kLongest) throw keys.error("duration", "is more than 1e7 s");
+  read_switch(keys, "ring_down", scene.ring_down);
+  scene.rest = scene.velocity = JointVector::Zero(static_cast<Eigen::Index>(positions.size()));
+  if (scene.arm) {
+    read_arm_start(keys, positions, scene);
+    read_arm_pushes(keys, scene);
+    read_steps(keys, positions, scene);
+    read_faults(keys, positions, scene);
+  } else {
+    read_system_start(keys, positions, scene);
+    read_system_pushes(keys, positions, scene);
+    for (const char* key : {"steps", "faults"}) {
+      if (keys.has(key)) throw keys.error(key, "is for robot arms; this scene is a system");
+    }
+  }
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,93 @@
+#include <dashpot/controller/config/config_gains.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
+
+#include <sstream>
+#include <utility>
+
+namespace dashpot::controller {
+namespace {
+
+Units task_units(const char* linear, const char* angular) {
+  return {linear, linear, linear, angular, angular, angular};
+}
+
+/// Damping that suits a default stiffness suits no other, so the two come together; a damping ratio
+/// suits any.
+void require_pair(const YamlMapping& keys) {
+  for (const auto& [key, other] : {std::pair("stiffness", "damping"), {"damping", "stiffness"}}) {
+    if (keys.has(key) && !keys.has(other) && !keys.has("damping_ratio")) {
+      throw keys.error(other, std::string("missing; it goes with ") + key, keys.line(key));
+    }
+  }
+}
+
+/// Of `damping`, read into the matrix, and `damping_ratio`, the one given ends the other.
+template <class Matrix>
+void read_damping(const YamlMapping& keys, const Units& units, Matrix& damping, double& ratio) {
+  read_matrix(keys, "damping", units, damping);
+  if (keys.has("damping")) ratio = 0;
+  if (!keys.has("damping_ratio")) return;
+  if (keys.has("damping")) {
+    throw keys.error("damping_ratio", "stands beside damping, in place of which it is meant");
+  }
+  read_number(keys, "damping_ratio", "", Sign::kPositive, ratio);
+  if (ratio <= kLargestDampingRatio) return;
+  std::ostringstream text;
+  text << "is " << ratio << ", must be at most " << kLargestDampingRatio;
+  throw keys.error("damping_ratio", text.str());
+}
+
+void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
+  static constexpr std::array<std::string_view, 6> kWords = {"x", "y", "z", "rx", "ry", "rz"};
+  const YamlNode* node = task.find("directions");
+  if (node == nullptr) return;
+  if (node->kind != YamlNode::Kind::kSequence) {
+    throw task.error("directions", "a list is wanted, not " + describe(*node));
+  }
+  directions = {};
+  for (std::size_t i = 0; i < node->items.size(); ++i) {
+    const std::string place = "entry " + std::to_string(i + 1);
+    bool& held = directions[find_word(task, "directions", node->items[i], kWords, place)];
+    if (held) throw task.error("directions", place + " is given twice", node->items[i].line);
+    held = true;
+  }
+}
+
+}  // namespace
+
+void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pairs, Gains& gains) {
+  static constexpr std::array<std::string_view, 3> kKeys = {"joint", "task", "null_space"};
+  static constexpr std::array<std::string_view, 2> kPair = {"stiffness", "damping"};
+  static constexpr std::array<std::string_view, 3> kJointKeys = {"stiffness", "damping",
+                                                                 "damping_ratio"};
+  static constexpr std::array<std::string_view, 5> kTaskKeys = {
+      "stiffness", "damping", "damping_ratio", "frame", "directions"};
+  const YamlMapping keys = parent.mapping("gains", kKeys);
+  const auto require = [pairs](const YamlMapping& part) {
+    if (pairs == GainPairs::kTogether) require_pair(part);
+  };
+  const Units stiffness = joint_units(model, "N m/rad", "N/m");
+  const Units damping = joint_units(model, "N m s/rad", "N s/m");
+
+  const YamlMapping joint = keys.mapping("joint", kJointKeys);
+  require(joint);
+  read_matrix(joint, "stiffness", stiffness, gains.joint_stiffness);
+  read_damping(joint, damping, gains.joint_damping, gains.joint_damping_ratio);
+
+  const YamlMapping task = keys.mapping("task", kTaskKeys);
+  require(task);
+  read_matrix(task, "stiffness", task_units("N/m", "N m/rad"), gains.task_stiffness);
+  read_damping(task, task_units("N s/m", "N m s/rad"), gains.task_damping,
+               gains.task_damping_ratio);
+  static constexpr std::array<std::pair<std::string_view, Frame>, 2> kFrames = {
+      {{"base", Frame::kBase}, {"tool", Frame::kTool}}};
+  read_choice(task, "frame", kFrames, gains.frame);
+  read_directions(task, gains.directions);
+
+  const YamlMapping null_space = keys.mapping("null_space", kPair);
+  require(null_space);
+  read_numbers(null_space, "stiffness", stiffness, Sign::kNotNegative, gains.null_stiffness);
+  read_numbers(null_space, "damping", damping, Sign::kNotNegative, gains.null_damping);
+}
+
+}  // namespace dashpot::controller

@@ -1,0 +1,93 @@
+#include <dashpot/controller/config/config_robot.hpp>
+
+#include <Eigen/Geometry>
+
+namespace dashpot::controller {
+namespace {
+
+void read_payload(const YamlMapping& robot, Payload& payload) {
+  static constexpr std::array<std::string_view, 3> kKeys = {"mass", "center", "inertia"};
+  const YamlMapping keys = robot.mapping("payload", kKeys);
+  read_number(keys, "mass", "kg", Sign::kNotNegative, payload.mass);
+  read_vector3(keys, "center", "m", payload.center);
+  read_matrix(keys, "inertia", Units(3, "kg m^2"), payload.inertia);
+}
+
+void read_tool(const YamlMapping& robot, Pose& tool) {
+  using Eigen::AngleAxisd;
+  using Eigen::Vector3d;
+  static constexpr std::array<std::string_view, 2> kKeys = {"position", "rpy"};
+  const YamlMapping keys = robot.mapping("tool", kKeys);
+  Vector3d rpy = Vector3d::Zero();
+  read_vector3(keys, "position", "m", tool.position);
+  read_vector3(keys, "rpy", "rad", rpy);
+  tool.rotation = (AngleAxisd(rpy.z(), Vector3d::UnitZ()) * AngleAxisd(rpy.y(), Vector3d::UnitY()) *
+                   AngleAxisd(rpy.x(), Vector3d::UnitX()))
+                      .toRotationMatrix();
+}
+
+std::string required_text(const YamlMapping& root, const YamlMapping& robot, std::string_view key) {
+  if (!robot.has(key)) throw robot.error(key, "missing", root.line("robot"));
+  std::string text;
+  read_text(robot, key, text);
+  return text;
+}
+
+void read_joint_option(const YamlMapping& robot, std::string_view key, const Units& units,
+                       JointVector& option) {
+  if (!robot.has(key)) return;
+  option.resize(static_cast<Eigen::Index>(units.size()));
+  read_numbers(robot, key, units, Sign::kNotNegative, option);
+}
+
+}  // namespace
+
+Units joint_units(const RobotModel& model, const char* revolute, const char* prismatic) {
+  Units units;
+  for (const Joint& joint : model.joints()) {
+    units.emplace_back(joint.type == JointType::kPrismatic ? prismatic : revolute);
+  }
+  return units;
+}
+
+RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path& directory) try {
+  static constexpr std::array<std::string_view, 10> kKeys = {"urdf",
+                                                             "base",
+                                                             "tip",
+                                                             "gravity",
+                                                             "include_off_chain",
+                                                             "reflected_inertia",
+                                                             "viscous_friction",
+                                                             "coulomb_friction",
+                                                             "payload",
+                                                             "tool"};
+  const YamlMapping keys = root.mapping("robot", kKeys);
+  RobotDescription robot;
+  robot.urdf = directory / required_text(root, keys, "urdf");
+  robot.base = required_text(root, keys, "base");
+  robot.tip = required_text(root, keys, "tip");
+  ModelOptions& options = robot.options;
+  read_vector3(keys, "gravity", "m/s^2", options.gravity);
+  read_switch(keys, "include_off_chain", options.include_off_chain);
+  read_payload(keys, options.payload);
+  read_tool(keys, options.tool);
+
+  // What the joints are is known once there is a model; some inertia makes any model possible.
+  RobotDescription preliminary = robot;
+  const YamlNode* inertia = keys.find("reflected_inertia");
+  if (inertia != nullptr && inertia->items.size() <= kMaxJoints) {
+    preliminary.options.reflected_inertia.setOnes(static_cast<Eigen::Index>(inertia->items.size()));
+  }
+  const RobotModel model = preliminary.model();
+  const Units damping = joint_units(model, "N m s/rad", "N s/m");
+  read_joint_option(keys, "reflected_inertia", joint_units(model, "kg m^2", "kg"),
+                    options.reflected_inertia);
+  read_joint_option(keys, "viscous_friction", damping, options.damping);
+  read_joint_option(keys, "coulomb_friction", joint_units(model, "N m", "N"), options.friction);
+  robot.model();  // throws what is wrong with it
+  return robot;
+} catch (const InvalidModel& error) {
+  throw root.error("robot", error.what());
+}
+
+}  // namespace dashpot::controller

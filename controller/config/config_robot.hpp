@@ -1,0 +1,18 @@
+#pragma once
+// The part of a configuration file under the key `robot`.
+
+#include <dashpot/controller/robot_description.hpp>
+#include <dashpot/controller/yaml/setting_reader.hpp>
+
+#include <filesystem>
+
+namespace dashpot::controller {
+
+/// The robot that `robot` describes; model() of it does not throw. A relative path of its URDF
+/// begins at `directory`. Throws InputError.
+RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path& directory);
+
+/// The unit of a quantity of each joint: `revolute`, or `prismatic` for prismatic joints.
+Units joint_units(const RobotModel& model, const char* revolute, const char* prismatic);
+
+}  // namespace dashpot::controller

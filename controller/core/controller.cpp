@@ -1,0 +1,68 @@
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/core/fixed_core.hpp>
+
+#include <stdexcept>
+#include <utility>
+
+namespace dashpot::controller {
+namespace {
+
+using Make = std::unique_ptr<ControllerCore> (*)(const RobotModel&, const Settings&);
+
+template <int N>
+std::unique_ptr<ControllerCore> make_fixed(const RobotModel& model, const Settings& settings) {
+  return std::make_unique<FixedCore<N>>(model, settings);
+}
+
+template <int... I>
+constexpr std::array<Make, sizeof...(I)> makers(std::integer_sequence<int, I...>) {
+  return {make_fixed<I + 1>...};
+}
+
+}  // namespace
+
+std::unique_ptr<ControllerCore> make_core(const RobotModel& model, const Settings& settings) {
+  static constexpr auto kMakers = makers(std::make_integer_sequence<int, kMaxJoints>());
+  return kMakers.at(static_cast<std::size_t>(model.dof() - 1))(model, settings);
+}
+
+Controller::Controller(const RobotModel& model, const Settings& settings)
+    : core_((validate(settings, model.dof()), make_core(model, settings))) {}
+Controller::~Controller() = default;
+Controller::Controller(Controller&&) noexcept = default;
+Controller& Controller::operator=(Controller&&) noexcept = default;
+
+Status Controller::update(const RobotState& state, const Setpoint& setpoint,
+                          JointVector& torque) noexcept {
+  return core_->update(state, setpoint, torque);
+}
+const Snapshot& Controller::snapshot() const noexcept {
+  return core_->snapshot();
+}
+const Vibration& Controller::vibration() const noexcept {
+  return core_->vibration();
+}
+const SampledVibration* Controller::sampled_vibration() noexcept {
+  SampledAnalysis* sampled = core_->sampled();
+  return sampled == nullptr ? nullptr : sampled->latest();
+}
+void Controller::closed_loop(analysis::System<kMaxJoints>& system) const noexcept {
+  core_->closed_loop(system);
+}
+void Controller::reset() noexcept {
+  core_->reset(JointVector());
+}
+void Controller::reset(const JointVector& torque) noexcept {
+  core_->reset(torque);
+}
+void Controller::release() noexcept {
+  if (core_->snapshot().fault != Status::kOk) core_->release();
+}
+int Controller::joints() const noexcept {
+  return static_cast<int>(core_->settings().limits.torque.size());
+}
+const Settings& Controller::settings() const noexcept {
+  return core_->settings();
+}
+
+}  // namespace dashpot::controller

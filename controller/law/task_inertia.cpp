@@ -1,0 +1,64 @@
+#include <dashpot/controller/law/task_inertia.hpp>
+
+#include <algorithm>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::Matrix3d;
+
+/// diag(base) + R diag(tool) R'
+Matrix3d held(const Eigen::Vector3d& base, const Eigen::Vector3d& tool, const Matrix3d& R) {
+  Matrix3d H = base.asDiagonal();
+  if (!tool.isZero(0)) H += R * tool.asDiagonal() * R.transpose();
+  return H;
+}
+
+/// Mean of the diagonal; 1 if it is zero.
+double mean(double trace) {
+  return trace > 0 ? trace / 3 : 1.0;
+}
+
+}  // namespace
+
+void TaskInertia::compute(const Matrix6& A, const TipImpedance& base, const TipImpedance& tool,
+                          const Matrix3d& R_BT) noexcept {
+  // The blocks of H; it has no others.
+  const Matrix3d H_linear = held(base.held.head<3>(), tool.held.head<3>(), R_BT);
+  const Matrix3d H_angular = held(base.held.tail<3>(), tool.held.tail<3>(), R_BT);
+
+  const Matrix3d A_linear = A.topLeftCorner<3, 3>(), A_angular = A.bottomRightCorner<3, 3>();
+  const double D_linear = mean(A_linear.trace()), D_angular = mean(A_angular.trace());
+  const Matrix3d I = Matrix3d::Identity();
+  Matrix6 G = Matrix6::Zero();
+  G.topLeftCorner<3, 3>() = H_linear * A_linear * H_linear + D_linear * (I - H_linear * H_linear);
+  G.bottomLeftCorner<3, 3>() = H_angular * A.bottomLeftCorner<3, 3>() * H_linear;
+  G.bottomRightCorner<3, 3>() =
+      H_angular * A_angular * H_angular + D_angular * (I - H_angular * H_angular);
+
+  Vector6 D;
+  D << D_linear, D_linear, D_linear, D_angular, D_angular, D_angular;
+  const double least_pivot = 1e-14 * std::min(D_linear, D_angular);
+  SmallCholesky<6> factor;
+  factor.compute(G, least_pivot);
+  Matrix6 L_inverse = factor.inverse_L();
+  double trace = 0;  // of D G^-1
+  for (int k = 0; k < 6; ++k) trace += D[k] * L_inverse.col(k).squaredNorm();
+  regularity_ = 1 / trace;
+  if (nearly_singular()) {
+    const double deficit = 1 - regularity_ / kNearlySingular;
+    G.diagonal() += kNearlySingular * deficit * deficit * D;
+    factor.compute(G, least_pivot);
+    L_inverse = factor.inverse_L();
+  }
+  if (base.held.isOnes(0) && tool.none()) {
+    inertia_.noalias() = L_inverse.transpose() * L_inverse;
+    return;
+  }
+  Matrix6 LH;  // L^-1 H
+  LH.leftCols<3>().noalias() = L_inverse.leftCols<3>() * H_linear;
+  LH.rightCols<3>().noalias() = L_inverse.rightCols<3>() * H_angular;
+  inertia_.noalias() = LH.transpose() * LH;
+}
+
+}  // namespace dashpot::controller

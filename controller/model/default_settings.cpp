@@ -1,0 +1,75 @@
+#include <dashpot/controller/default_settings.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/model/least_inertia.hpp>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace dashpot::controller {
+
+namespace {
+
+double finite_or(double value, double otherwise) {
+  return std::isfinite(value) && value > 0 ? value : otherwise;
+}
+
+/// Velocities at the tip decay no faster than this, 1/s: far from where torque that is held for a
+/// period of 1 ms and arrives one late makes the loop unstable.
+constexpr double kFastestDecay = 200;
+
+}  // namespace
+
+Settings default_settings(const RobotModel& model) {
+  const int n = model.dof();
+  const JointVector none = JointVector::Zero(n);
+  Settings settings;
+  Limits& limits = settings.limits;
+  limits.torque = limits.torque_rate = limits.velocity = limits.damping = none;
+  limits.position_lower = limits.position_upper = none;
+  limits.position_margin = limits.return_velocity = none;
+  limits.external_torque = JointVector::Constant(n, std::numeric_limits<double>::infinity());
+  JointVector middle = none;
+  for (int i = 0; i < n; ++i) {
+    const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
+    limits.torque[i] = finite_or(joint.effort, 100);
+    const bool slides = joint.type == JointType::kPrismatic;
+    limits.torque_rate[i] = 100 * limits.torque[i];
+    if (!slides) limits.torque_rate[i] = std::min(1000.0, limits.torque_rate[i]);
+    limits.velocity[i] = finite_or(joint.velocity, 2);
+    limits.position_lower[i] = joint.lower;
+    limits.position_upper[i] = joint.upper;
+    limits.position_margin[i] =
+        std::min(slides ? 0.02 : 0.1, 0.1 * std::max(joint.upper - joint.lower, 1e-6));
+    limits.return_velocity[i] = slides ? 0.01 : 0.05;
+    const double center = 0.5 * (joint.lower + joint.upper);
+    middle[i] = std::isfinite(center) ? center : 0;
+  }
+  settings.motion.velocity = 0.25 * limits.velocity;
+  settings.motion.acceleration = limits.velocity;
+
+  // Between the inertia of a joint with all others held and with all others free.
+  const Eigen::MatrixXd M = evaluate(model, middle, none).M;
+  const Eigen::MatrixXd M_inverse = M.llt().solve(Eigen::MatrixXd::Identity(n, n));
+  const JointVector inertia = M.diagonal().cwiseQuotient(M_inverse.diagonal()).cwiseSqrt();
+  limits.damping = 20 * inertia;
+
+  constexpr double kOmega = 2 * std::numbers::pi * 1.5;  // rad/s
+  constexpr double kRatio = 0.7;
+  Gains& gains = settings.initial.gains;
+  gains.joint_stiffness = (kOmega * kOmega * inertia).asDiagonal();
+  gains.joint_damping = (2 * kRatio * kOmega * inertia).asDiagonal();
+  const TipInertia least = least_tip_inertia(model, limits.position_lower, limits.position_upper);
+  const double linear = std::min(40.0, kFastestDecay * least.linear);
+  const double angular = std::min(2.0, kFastestDecay * least.angular);
+  gains.task_damping.diagonal() << linear, linear, linear, angular, angular, angular;
+  gains.task_stiffness = 10 * gains.task_damping;
+  gains.null_stiffness = 0.25 * gains.joint_stiffness.diagonal();
+  gains.null_damping = 0.5 * gains.joint_damping.diagonal();
+  settings.initial.joint_position = middle;
+  return settings;
+}
+
+}  // namespace dashpot::controller

@@ -1,0 +1,84 @@
+#include <dashpot/controller/model/rigid_bodies.hpp>
+#include <dashpot/controller/model/urdf_tree.hpp>
+
+#include <Eigen/Eigenvalues>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace dashpot::controller {
+namespace {
+
+constexpr double kRounding = 0.005;  // of published inertias, relative
+
+std::string number(double value) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value);
+  return text.data();
+}
+
+KDL::RigidBodyInertia make_body(double mass, const Eigen::Vector3d& center,
+                                const Eigen::Matrix3d& I) {
+  return KDL::RigidBodyInertia(
+      mass, to_kdl(center),
+      KDL::RotationalInertia(I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)));
+}
+
+}  // namespace
+
+KDL::Vector to_kdl(const Eigen::Vector3d& v) {
+  return KDL::Vector(v.x(), v.y(), v.z());
+}
+
+KDL::Rotation to_kdl(const Eigen::Matrix3d& R) {
+  return {R(0, 0), R(0, 1), R(0, 2), R(1, 0), R(1, 1), R(1, 2), R(2, 0), R(2, 1), R(2, 2)};
+}
+
+KDL::Vector to_kdl(const urdf::Vector3& v) {
+  return {v.x, v.y, v.z};
+}
+
+KDL::Frame to_kdl(const urdf::Pose& pose) {
+  const urdf::Rotation& r = pose.rotation;
+  return {KDL::Rotation::Quaternion(r.x, r.y, r.z, r.w), to_kdl(pose.position)};
+}
+
+std::string body_problem(double mass, const Eigen::Vector3d& center,
+                         const Eigen::Matrix3d& inertia) {
+  if (!std::isfinite(mass)) return "its mass is not a finite number";
+  if (!center.allFinite()) return "its centre of mass is not finite";
+  if (!inertia.allFinite()) return "its inertia is not finite";
+  if (mass < 0) return "its mass is negative, " + number(mass) + " kg";
+  if (!inertia.isApprox(inertia.transpose(), 1e-10)) return "its inertia is not symmetric";
+  const Eigen::Vector3d moments =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
+  if (moments[0] < -kRounding * moments.cwiseAbs().maxCoeff()) {
+    return "its inertia is not positive definite: a principal moment is " + number(moments[0]) +
+           " kg m^2";
+  }
+  if (moments[2] > (moments[0] + moments[1]) * (1 + kRounding)) {
+    return "its inertia breaks the triangle inequality: principal moments " + number(moments[0]) +
+           ", " + number(moments[1]) + ", " + number(moments[2]) + " kg m^2";
+  }
+  return "";
+}
+
+KDL::RigidBodyInertia body_of(const urdf::Link& link, const std::string& name) {
+  if (!link.inertial) return KDL::RigidBodyInertia::Zero();
+  const urdf::Inertial& source = *link.inertial;
+  const KDL::Frame frame = to_kdl(source.origin);
+  Eigen::Matrix3d I;
+  I << source.ixx, source.ixy, source.ixz, source.ixy, source.iyy, source.iyz, source.ixz,
+      source.iyz, source.izz;
+  const std::string problem = body_problem(source.mass, {frame.p.x(), frame.p.y(), frame.p.z()}, I);
+  if (!problem.empty()) refuse(name, "link", link.name, problem);
+  return frame * make_body(source.mass, Eigen::Vector3d::Zero(), I);
+}
+
+KDL::RigidBodyInertia body_of(const Payload& payload, const std::string& name) {
+  const std::string problem = body_problem(payload.mass, payload.center, payload.inertia);
+  if (!problem.empty()) throw InvalidModel(name + ": payload: " + problem);
+  return make_body(payload.mass, payload.center, payload.inertia);
+}
+
+}  // namespace dashpot::controller

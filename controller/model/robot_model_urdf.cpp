@@ -1,0 +1,261 @@
+// A RobotModel from a URDF.
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/model/rigid_bodies.hpp>
+#include <dashpot/controller/model/robot_model_data.hpp>
+#include <dashpot/controller/model/urdf_tree.hpp>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dashpot::controller {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// The joints from `base` to `tip`, fixed ones too.
+std::vector<urdf::JointConstSharedPtr> path_between(const urdf::ModelInterface& tree,
+                                                    const std::string& base, const std::string& tip,
+                                                    const std::string& name) {
+  for (const std::string& link : {base, tip}) {
+    if (!tree.getLink(link)) refuse(name, "link", link, "there is none");
+  }
+  std::vector<urdf::JointConstSharedPtr> path;
+  for (urdf::LinkConstSharedPtr link = tree.getLink(tip); link->name != base;
+       link = tree.getLink(link->parent_joint->parent_link_name)) {
+    if (!link->parent_joint) refuse(name, "link", tip, "not beyond the base, '" + base + "'");
+    path.push_back(link->parent_joint);
+  }
+  std::reverse(path.begin(), path.end());
+  return path;
+}
+
+JointType type_of(const urdf::Joint& joint) {
+  switch (joint.type) {
+    case urdf::Joint::REVOLUTE:
+      return JointType::kRevolute;
+    case urdf::Joint::CONTINUOUS:
+      return JointType::kContinuous;
+    case urdf::Joint::PRISMATIC:
+      return JointType::kPrismatic;
+    default:
+      throw std::invalid_argument(std::string(joint.type == urdf::Joint::PLANAR     ? "planar"
+                                              : joint.type == urdf::Joint::FLOATING ? "floating"
+                                                                                    : "unknown") +
+                                  " joints are not supported");
+  }
+}
+
+/// Throws std::invalid_argument with what is wrong about it.
+Joint read_joint(const urdf::Joint& source) {
+  Joint joint;
+  joint.name = source.name;
+  joint.type = type_of(source);
+  if (source.mimic) {
+    throw std::invalid_argument("mimics joint '" + source.mimic->joint_name +
+                                "', which a serial chain cannot");
+  }
+  const double length = std::hypot(source.axis.x, source.axis.y, source.axis.z);
+  if (!(length > 1e-9) || !std::isfinite(length)) {
+    throw std::invalid_argument("its axis has no direction");
+  }
+  joint.lower = -kInfinity;
+  joint.upper = joint.velocity = joint.effort = kInfinity;
+  if (source.limits) {
+    if (joint.type != JointType::kContinuous) {
+      joint.lower = source.limits->lower;
+      joint.upper = source.limits->upper;
+    }
+    joint.velocity = source.limits->velocity;
+    joint.effort = source.limits->effort;
+  }
+  if (!(joint.lower <= joint.upper)) {
+    throw std::invalid_argument("its lower limit is above its upper one");
+  }
+  if (!(joint.velocity >= 0 && joint.effort >= 0)) {
+    throw std::invalid_argument("a limit of velocity or effort is negative");
+  }
+  if (source.dynamics) {
+    joint.damping = source.dynamics->damping;
+    joint.friction = source.dynamics->friction;
+  }
+  return joint;
+}
+
+/// Sets one property of all joints from an option, if given, and checks it.
+void apply(const JointVector& option, double Joint::*property, const std::string& key,
+           std::vector<Joint>& joints, const std::string& name) {
+  const auto n = static_cast<Eigen::Index>(joints.size());
+  if (option.size() != 0 && option.size() != n) {
+    throw InvalidModel(name + ": " + key + ": has " + std::to_string(option.size()) +
+                       " entries for " + std::to_string(n) + " joints");
+  }
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    double& value = joints[i].*property;
+    if (option.size() != 0) value = option[static_cast<Eigen::Index>(i)];
+    if (value >= 0 && std::isfinite(value)) continue;
+    refuse(name, "joint", joints[i].name, key + " is negative or not a finite number");
+  }
+}
+
+/// Inertia of `link`, and, if wanted, of all that hangs on it but the branch that begins with joint
+/// `next`, at its zero position; in the link's axes. It does not call itself: branches may be
+/// thousands of links long.
+KDL::RigidBodyInertia lump(const urdf::ModelInterface& tree, const std::string& link,
+                           const std::string& next, bool include_off_chain,
+                           const std::string& name) {
+  KDL::RigidBodyInertia sum = KDL::RigidBodyInertia::Zero();
+  std::vector<std::pair<urdf::LinkConstSharedPtr, KDL::Frame>> open;  // with their poses in `link`
+  open.emplace_back(tree.getLink(link), KDL::Frame::Identity());
+  while (!open.empty()) {
+    const auto [at, frame] = open.back();
+    open.pop_back();
+    sum = sum + frame * body_of(*at, name);
+    if (!include_off_chain) break;
+    for (const urdf::JointSharedPtr& joint : at->child_joints) {
+      if (joint->name == next) continue;
+      open.emplace_back(tree.getLink(joint->child_link_name),
+                        frame * to_kdl(joint->parent_to_joint_origin_transform));
+    }
+  }
+  return sum;
+}
+
+/// Rotation from B to the root link's axes.
+KDL::Rotation rotation_of_base(const urdf::ModelInterface& tree, const std::string& base) {
+  KDL::Rotation rotation;
+  for (urdf::LinkConstSharedPtr link = tree.getLink(base); link->parent_joint;
+       link = tree.getLink(link->parent_joint->parent_link_name)) {
+    rotation = to_kdl(link->parent_joint->parent_to_joint_origin_transform).M * rotation;
+  }
+  return rotation;
+}
+
+void check_pose(const Pose& pose, const std::string& name) {
+  const Eigen::Matrix3d& R = pose.rotation;
+  const bool turns = (R.transpose() * R).isIdentity(1e-9) && R.determinant() > 0;
+  if (turns && pose.position.allFinite()) return;
+  throw InvalidModel(name + ": tool: not a rotation and a finite position");
+}
+
+/// Moving joints of the path, in order, with what the options say of them.
+std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& path,
+                               const ModelOptions& options, const std::string& name) {
+  std::vector<Joint> joints;
+  for (const urdf::JointConstSharedPtr& joint : path) {
+    if (joint->type == urdf::Joint::FIXED) continue;
+    try {
+      joints.push_back(read_joint(*joint));
+    } catch (const std::invalid_argument& error) {
+      refuse(name, "joint", joint->name, error.what());
+    }
+  }
+  apply(options.reflected_inertia, &Joint::reflected_inertia, "reflected inertia", joints, name);
+  apply(options.damping, &Joint::damping, "damping", joints, name);
+  apply(options.friction, &Joint::friction, "friction", joints, name);
+  return joints;
+}
+
+KDL::Chain make_chain(const urdf::ModelInterface& tree,
+                      const std::vector<urdf::JointConstSharedPtr>& path,
+                      const std::vector<Joint>& joints, const ModelOptions& options,
+                      const std::string& name) {
+  KDL::Chain chain;
+  KDL::Segment segment;  // being put together; the first, what stands still, is dropped
+  KDL::RigidBodyInertia body = KDL::RigidBodyInertia::Zero();
+  KDL::Frame frame;  // of the last link of the path in that of the segment
+  std::size_t moving = 0;
+  const auto finish = [&] {
+    if (moving == 0) return;
+    segment.setInertia(body);
+    chain.addSegment(segment);
+  };
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const urdf::Joint& joint = *path[i];
+    const KDL::Frame origin = frame * to_kdl(joint.parent_to_joint_origin_transform);
+    const std::string next = i + 1 < path.size() ? path[i + 1]->name : "";
+    const bool moves = joint.type != urdf::Joint::FIXED;
+    if (moves) {
+      finish();
+      const auto type =
+          joint.type == urdf::Joint::PRISMATIC ? KDL::Joint::TransAxis : KDL::Joint::RotAxis;
+      segment = KDL::Segment(joint.name,
+                             KDL::Joint(joint.name, origin.p, origin.M * to_kdl(joint.axis), type,
+                                        1, 0, joints[moving].reflected_inertia),
+                             origin);
+      body = KDL::RigidBodyInertia::Zero();
+      ++moving;
+    }
+    frame = moves ? KDL::Frame::Identity() : origin;
+    if (moving == 0) continue;
+    body = body + frame * lump(tree, joint.child_link_name, next, options.include_off_chain, name);
+  }
+  body = body + frame * body_of(options.payload, name);
+  finish();
+  const KDL::Frame tool(to_kdl(options.tool.rotation), to_kdl(options.tool.position));
+  chain.addSegment(KDL::Segment("tool", KDL::Joint("tool", KDL::Joint::None), frame * tool));
+  return chain;
+}
+
+/// The joint nearest to the tip that nothing resists, as the pivots of M from its last row up tell
+/// at some ordinary position; -1 if there is none.
+int unresisted_joint(const RobotModel& model, double phase) {
+  const int n = model.dof();
+  JointVector q(n);
+  for (int i = 0; i < n; ++i) q[i] = std::sin(phase + 1.7 * i);
+  JointMatrix M = evaluate(model, q, JointVector::Zero(n)).M;
+  const double floor = 1e-13 * M.diagonal().maxCoeff();
+  for (int i = n - 1; i >= 0; --i) {
+    if (!(M(i, i) > floor)) return i;
+    const JointVector column = M.col(i).head(i);
+    M.topLeftCorner(i, i) -= column * column.transpose() / M(i, i);
+  }
+  return -1;
+}
+
+/// Masses are there where they are needed.
+void check_inertia(const RobotModel& model, const std::string& name) {
+  if (unresisted_joint(model, 1.0) < 0) return;
+  const int i = unresisted_joint(model, 2.5);
+  if (i < 0) return;
+  refuse(name, "joint", model.joints()[static_cast<std::size_t>(i)].name,
+         "no inertia resists it: the links it moves lack mass, and it has no reflected inertia");
+}
+
+}  // namespace
+
+RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string& base,
+                                      const std::string& tip, const ModelOptions& options,
+                                      const std::string& name) {
+  const std::shared_ptr<urdf::ModelInterface> tree = read_urdf(text, name);
+  const auto path = path_between(*tree, base, tip, name);
+  std::vector<Joint> joints = read_joints(path, options, name);
+  if (joints.empty()) refuse(name, "link", tip, "no joint moves it against '" + base + "'");
+  if (joints.size() > static_cast<std::size_t>(kMaxJoints)) {
+    refuse(name, "link", tip,
+           std::to_string(joints.size()) + " joints from '" + base + "', more than " +
+               std::to_string(kMaxJoints));
+  }
+  check_pose(options.tool, name);
+  if (!options.gravity.allFinite()) throw InvalidModel(name + ": gravity: not finite");
+
+  auto data = std::make_shared<Data>();
+  data->name = tree->getName();
+  data->base = base;
+  data->tip = tip;
+  data->chain = make_chain(*tree, path, joints, options, name);
+  data->joints = std::move(joints);
+  const KDL::Vector g = rotation_of_base(*tree, base).Inverse(to_kdl(options.gravity));
+  data->gravity = {g.x(), g.y(), g.z()};
+  RobotModel model(std::move(data));
+  check_inertia(model, name);
+  return model;
+}
+
+RobotModel RobotModel::from_urdf_file(const std::string& path, const std::string& base,
+                                      const std::string& tip, const ModelOptions& options) {
+  return from_urdf_text(read_text(path), base, tip, options, path);
+}
+
+}  // namespace dashpot::controller

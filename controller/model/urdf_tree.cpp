@@ -1,0 +1,98 @@
+#include <dashpot/controller/input_error.hpp>
+#include <dashpot/controller/model/urdf_tree.hpp>
+#include <dashpot/controller/robot_model.hpp>
+#include <dashpot/text/read_file.hpp>
+#include <dashpot/text/xml_check.hpp>
+
+#include <console_bridge/console.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <exception>
+#include <map>
+#include <mutex>
+
+namespace dashpot::controller {
+namespace {
+
+/// While it lives, keeps what urdfdom has to say.
+class Messages : public console_bridge::OutputHandler {
+ public:
+  Messages() : previous_(console_bridge::getOutputHandler()) {
+    console_bridge::useOutputHandler(this);
+  }
+  Messages(const Messages&) = delete;
+  Messages& operator=(const Messages&) = delete;
+  ~Messages() override { console_bridge::useOutputHandler(previous_); }
+
+  void log(const std::string& text, console_bridge::LogLevel level, const char* /*file*/,
+           int /*line*/) override {
+    constexpr std::size_t kEnough = 1000;  // bytes; a bad file may cause a message for each line
+    if (level != console_bridge::CONSOLE_BRIDGE_LOG_ERROR || errors_.size() > kEnough) return;
+    errors_ += (errors_.empty() ? "" : "; ") + text;
+  }
+  bool any() const { return !errors_.empty(); }
+  std::string errors() const { return errors_.empty() ? "not a URDF" : errors_; }
+
+ private:
+  console_bridge::OutputHandler* previous_;
+  std::string errors_;
+};
+
+std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::string& name) {
+  static std::mutex one_at_a_time;  // the handler of messages is global
+  const std::lock_guard lock(one_at_a_time);
+  const Messages messages;
+  std::shared_ptr<urdf::ModelInterface> model;
+  try {
+    text::check_xml(text);
+    model = urdf::parseURDF(text);
+  } catch (const std::exception& error) {
+    throw InvalidModel(one_line(name + ": " + error.what()));
+  }
+  // Of a number that it cannot read, urdfdom just says so and goes on.
+  if (!model || messages.any()) throw InvalidModel(one_line(name + ": " + messages.errors()));
+  return model;
+}
+
+void check_tree(const urdf::ModelInterface& model, const std::string& name) {
+  std::map<std::string, std::string> joint_above;  // by link
+  for (const auto& [joint_name, joint] : model.joints_) {
+    const auto [other, is_new] = joint_above.emplace(joint->child_link_name, joint_name);
+    if (is_new) continue;
+    refuse(name, "link", joint->child_link_name,
+           "child of two joints, '" + other->second + "' and '" + joint_name + "'");
+  }
+  std::map<std::string, std::size_t> walk_through;  // by link: which of the walks up came there
+  std::size_t walk = 0;
+  for (const auto& [link_name, link] : model.links_) {
+    ++walk;
+    for (std::string at = link_name; joint_above.count(at) != 0;
+         at = model.joints_.at(joint_above.at(at))->parent_link_name) {
+      const auto [seen, is_new] = walk_through.emplace(at, walk);
+      if (is_new) continue;
+      if (seen->second == walk) refuse(name, "link", link_name, "part of a loop of joints");
+      break;  // an earlier walk came to its end from here
+    }
+  }
+}
+
+}  // namespace
+
+void refuse(const std::string& name, const std::string& kind, const std::string& element,
+            const std::string& reason) {
+  throw InvalidModel(one_line(name + ": " + kind + " '" + element + "': " + reason));
+}
+
+std::shared_ptr<urdf::ModelInterface> read_urdf(const std::string& text, const std::string& name) {
+  std::shared_ptr<urdf::ModelInterface> model = parse(text, name);
+  check_tree(*model, name);
+  return model;
+}
+
+std::string read_text(const std::string& path) try {
+  return text::read_file(path, text::kLargestXml);
+} catch (const std::runtime_error& error) {
+  throw InvalidModel(one_line(path + ": " + error.what()));
+}
+
+}  // namespace dashpot::controller

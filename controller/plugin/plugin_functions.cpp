@@ -1,0 +1,454 @@
+#include <dashpot/controller/config.hpp>
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/latest.hpp>
+#include <dashpot/controller/plugin/plugin_data.hpp>
+#include <dashpot/controller/plugin/plugin_judgement.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <string>
+
+using namespace dashpot::controller;  // NOLINT(google-build-using-namespace): the C functions
+
+namespace {
+
+/// What the other thread wants, as a whole: whichever the real-time thread fetches is complete.
+struct Request {
+  std::uint64_t setpoints = 0;  ///< how many were given so far
+  std::uint64_t gain_changes = 0;
+  std::uint64_t releases = 0;
+  bool on_arrival = false;  ///< the set-point's time is that of the tick that takes it up
+  Setpoint setpoint;        ///< with the gains
+};
+
+/// `time` plus `difference`, ns; past the end of the numbers it goes on from their beginning.
+std::int64_t later(std::int64_t time, std::int64_t difference) noexcept {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(time) +
+                                   static_cast<std::uint64_t>(difference));
+}
+
+}  // namespace
+
+/// One controller, and what its two threads hand each other.
+struct dashpot_controller {  // NOLINT(readability-identifier-naming)
+  explicit dashpot_controller(const Config& config)
+      : joints(config.model.joints()),
+        n(config.model.dof()),
+        settings(config.settings),
+        period(static_cast<std::int64_t>(std::min(1e9 * settings.period, 1e18))),
+        model(config.model),
+        judgement(config.model, config.settings),
+        controller_(config.model, config.settings),
+        setpoint_(settings.initial) {
+    request.setpoint = settings.initial;
+  }
+
+  // For every thread:
+  const std::vector<Joint> joints;
+  const int n;
+  const Settings settings;
+  const std::int64_t period;  ///< ns
+  const RobotModel model;
+  Judgement judgement;
+
+  Latest<Request> requests;      ///< from the other thread to the real-time thread
+  Latest<Snapshot> snapshots;    ///< back
+  Latest<Vibration> vibrations;  ///< likewise
+
+  // Of the other thread:
+  Request request;
+  const SampledVibration* sampled() noexcept { return controller_.sampled_vibration(); }
+
+  // Of the real-time thread:
+  Status update(const dashpot_state* given, const dashpot_setpoint* wanted,
+                JointVector& torque) noexcept;
+  /// Without entries: the last torque acts.
+  void reset(const JointVector& torque) noexcept;
+
+ private:
+  void forget_setpoint() noexcept;
+  /// Puts what the caller and the other thread want into `setpoint_`. False if `wanted` is there,
+  /// but no set-point; the one in force stays then.
+  bool take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept;
+  /// As long as no set-point was given: the springs stay where they are, and are never stale.
+  void stay(std::int64_t now) noexcept;
+
+  Controller controller_;
+  Setpoint setpoint_;            ///< in force
+  bool has_setpoint_ = false;    ///< one was given
+  bool located_ = false;         ///< the controller knows where the robot is
+  std::int64_t time_ = 0;        ///< of the last state, ns
+  std::uint64_t setpoints_ = 0;  ///< of the other thread, taken up so far
+  std::uint64_t gain_changes_ = 0;
+  std::uint64_t releases_ = 0;
+  bool latched_ = false;         ///< a fault was, after the last tick
+  std::int64_t given_time_ = 0;  ///< of the last set-point that the caller gave, as it was given
+  bool forgotten_ = false;       ///< it was, with the release of a fault: it is none any more
+  std::uint64_t published_modes_ = 0;  ///< the tick they belong to
+  dashpot::analysis::Status published_status_ = dashpot::analysis::Status::kOk;
+};
+
+Status dashpot_controller::update(const dashpot_state* given, const dashpot_setpoint* wanted,
+                                  JointVector& torque) noexcept {
+  const RobotState state = to_state(given, n, later(time_, period));
+  time_ = state.time;
+  const bool accepted = take_up(wanted, time_);
+  Status status = controller_.update(state, setpoint_, torque);
+  located_ |= status < Status::kStateNotFinite;
+  const bool latched = controller_.snapshot().fault != Status::kOk;
+  if (latched_ && !latched) forget_setpoint();  // released by a rest
+  latched_ = latched;
+  Snapshot snapshot = controller_.snapshot();
+  if (status < Status::kStateNotFinite) judgement.locate(snapshot.position);
+  if (!accepted) status = worse(status, Status::kSetpointRejected);
+  if (accepted && !has_setpoint_ && status == Status::kSetpointRejected) status = Status::kOk;
+  snapshot.status = status;
+  snapshots.write(snapshot);
+  const Vibration& found = controller_.vibration();
+  if (found.tick != published_modes_ || found.status != published_status_) {
+    published_modes_ = found.tick;
+    published_status_ = found.status;
+    vibrations.write(controller_.vibration());
+  }
+  return status;
+}
+
+void dashpot_controller::reset(const JointVector& torque) noexcept {
+  controller_.reset(torque);
+  take_up(nullptr, time_);  // the gains in it stay
+  forget_setpoint();
+  forgotten_ = latched_ = false;
+  located_ = false;
+  published_modes_ = 0;
+  vibrations.write(controller_.vibration());  // there is none
+}
+
+void dashpot_controller::forget_setpoint() noexcept {
+  forgotten_ = has_setpoint_ && given_time_ != DASHPOT_ON_ARRIVAL;
+  const Gains gains = setpoint_.gains;
+  setpoint_ = settings.initial;
+  setpoint_.gains = gains;
+  has_setpoint_ = false;
+}
+
+bool dashpot_controller::take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept {
+  const std::int64_t last = setpoint_.time;
+  bool accepted = true;
+  if (requests.fetch()) {
+    const Request& latest = requests.value();
+    if (latest.releases != releases_ && controller_.snapshot().fault != Status::kOk) {
+      controller_.release();
+      forget_setpoint();
+      latched_ = false;
+    }
+    releases_ = latest.releases;
+    if (latest.setpoints != setpoints_) {
+      setpoint_ = latest.setpoint;
+      if (latest.on_arrival) setpoint_.time = now;
+      has_setpoint_ = true;
+    } else if (latest.gain_changes != gain_changes_) {
+      setpoint_.gains = latest.setpoint.gains;
+    }
+    setpoints_ = latest.setpoints;
+    gain_changes_ = latest.gain_changes;
+    if (setpoint_.time == last)
+      setpoint_.time = later(last, 1);  // equal times would say that nothing is new
+  }
+  const bool old = wanted != nullptr && forgotten_ && wanted->struct_size == sizeof *wanted &&
+                   wanted->time == given_time_;
+  if (wanted != nullptr && !old) {
+    accepted = to_setpoint(wanted, n, now, setpoint_) == DASHPOT_OK;
+    if (accepted && !has_setpoint_ && setpoint_.time == last) setpoint_.time = later(last, 1);
+    has_setpoint_ |= accepted;
+    if (accepted) {
+      given_time_ = wanted->time;
+      forgotten_ = false;
+    }
+  }
+  if (!has_setpoint_) stay(now);
+  return accepted;
+}
+
+void dashpot_controller::stay(std::int64_t now) noexcept {
+  const Snapshot& snapshot = controller_.snapshot();
+  setpoint_.time = now;
+  setpoint_.mode = settings.initial.mode;
+  // Before the robot is located there is nothing to give: a set-point without entries is rejected,
+  // and the controller holds the robot where it finds it.
+  const bool cartesian = setpoint_.mode == Mode::kCartesian;
+  setpoint_.joint_position.resize(0);
+  setpoint_.tip_pose.rotation.setZero();
+  if (located_ && !cartesian) setpoint_.joint_position = snapshot.setpoint_position;
+  if (located_ && cartesian) setpoint_.tip_pose = snapshot.setpoint_tip;
+}
+
+namespace {
+
+// In storage of fixed size: nothing to allocate, nothing to destroy when a thread ends.
+thread_local std::array<char, 1024> last_error{};
+
+/// Sets what dashpot_last_error says; returns `code`.
+std::int32_t finish(std::int32_t code, const char* text) noexcept {
+  std::snprintf(last_error.data(), last_error.size(), "%s", code == DASHPOT_OK ? "" : text);
+  return code;
+}
+
+std::int32_t finish(std::int32_t code) noexcept {
+  return finish(code, dashpot_status_text(code));
+}
+
+/// Judges gains at q, or, where `q` has no entries, anywhere. DASHPOT_OK or why not.
+std::int32_t judge(dashpot_controller& controller, const Gains& gains, const JointVector& q,
+                   bool again, double* margin) noexcept {
+  Judgement& judgement = controller.judgement;
+  GainJudge::Verdict verdict{0, Mode::kJoint};
+  try {
+    verdict = q.size() == 0 ? judgement.judge_anywhere(gains) : judgement.judge(gains, q, again);
+  } catch (...) {
+    return finish(DASHPOT_UNSTABLE_GAINS, "the gains could not be judged");
+  }
+  if (margin != nullptr) *margin = verdict.margin;
+  if (judgement.enough(verdict)) return finish(DASHPOT_OK);
+  std::array<char, 256> text{};
+  std::snprintf(text.data(), text.size(),
+                "with the %s gains the sampled loop has a gain margin of %.3g %s, "
+                "limits.gain_margin asks for %.3g",
+                verdict.mode == Mode::kJoint ? "joint" : "task", verdict.margin,
+                q.size() == 0 ? "at best, wherever the robot is" : "here", judgement.wanted());
+  return finish(DASHPOT_UNSTABLE_GAINS, text.data());
+}
+
+std::int32_t finish(const SetpointFault& fault) noexcept {
+  std::array<char, 128> text{};
+  std::snprintf(text.data(), text.size(), "%s %s", fault.key, fault.reason);
+  return finish(DASHPOT_WRONG_VALUE, text.data());
+}
+
+/// Puts the gains given into `wanted`. DASHPOT_OK or why they are none.
+std::int32_t read_gains(const dashpot_gains* given, int n, Gains& wanted) noexcept {
+  const std::int32_t problem = to_gains(given, n, wanted);
+  if (problem != DASHPOT_OK) return finish(problem);
+  for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+    const SetpointFault fault = check_gains(wanted, mode, n);
+    if (fault) return finish(fault);
+  }
+  return DASHPOT_OK;
+}
+
+/// Whether there is a struct to write to.
+template <class Struct>
+std::int32_t check_result(const dashpot_controller* controller, const Struct* result) noexcept {
+  if (controller == nullptr || result == nullptr) return DASHPOT_NULL_ARGUMENT;
+  return result->struct_size == sizeof(Struct) ? DASHPOT_OK : DASHPOT_WRONG_STRUCT_SIZE;
+}
+
+}  // namespace
+
+extern "C" {
+
+dashpot_controller* dashpot_create(const char* config_path) {
+  if (config_path == nullptr) {
+    finish(DASHPOT_NULL_ARGUMENT);
+    return nullptr;
+  }
+  try {
+    auto controller = std::make_unique<dashpot_controller>(load_config(config_path));
+    const std::int32_t code =
+        judge(*controller, controller->request.setpoint.gains, JointVector(), true, nullptr);
+    if (code == DASHPOT_OK) return controller.release();
+    finish(code, (std::string(config_path) + ": gains: " + dashpot_last_error()).c_str());
+    return nullptr;
+  } catch (const std::exception& error) {
+    finish(DASHPOT_WRONG_VALUE, error.what());
+  } catch (...) {
+    finish(DASHPOT_WRONG_VALUE, "unknown failure");
+  }
+  return nullptr;
+}
+
+void dashpot_destroy(dashpot_controller* controller) {
+  delete controller;
+}
+
+const char* dashpot_last_error() {
+  return last_error.data();
+}
+
+uint32_t dashpot_joints(const dashpot_controller* controller) {
+  return controller == nullptr ? 0 : static_cast<std::uint32_t>(controller->n);
+}
+
+const char* dashpot_joint_name(const dashpot_controller* controller, uint32_t joint) {
+  return joint < dashpot_joints(controller) ? controller->joints[joint].name.c_str() : nullptr;
+}
+
+double dashpot_period(const dashpot_controller* controller) {
+  return controller == nullptr ? 0 : controller->settings.period;
+}
+
+int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* state,
+                       const dashpot_setpoint* setpoint, dashpot_output* output) {
+  const std::int32_t problem = check_result(controller, output);
+  if (problem != DASHPOT_OK) return problem;
+  if (output->torque == nullptr) return DASHPOT_NULL_ARGUMENT;
+  if (output->joints != dashpot_joints(controller)) return DASHPOT_WRONG_JOINTS;
+  JointVector torque;
+  const Status status = controller->update(state, setpoint, torque);
+  Eigen::Map<Eigen::VectorXd>(output->torque, controller->n) = torque;
+  return static_cast<std::int32_t>(status);
+}
+
+int32_t dashpot_start(dashpot_controller* controller, const double* position,
+                      const double* torque) {
+  if (controller == nullptr || position == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  const JointVector q = Eigen::Map<const Eigen::VectorXd>(position, controller->n);
+  if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
+  const std::int32_t code =
+      judge(*controller, controller->request.setpoint.gains, q, true, nullptr);
+  if (code != DASHPOT_OK) return code;
+  controller->judgement.locate(q);
+  if (torque != nullptr) return finish(dashpot_reset(controller, torque));
+  const bool holds = controller->settings.feed_forward.gravity;
+  const JointVector rest = JointVector::Zero(controller->n);
+  controller->reset(holds ? evaluate(controller->model, q, rest).gravity : rest);
+  return DASHPOT_OK;
+}
+
+int32_t dashpot_release(dashpot_controller* controller) {
+  if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  ++controller->request.releases;
+  controller->requests.write(controller->request);
+  return finish(DASHPOT_OK);
+}
+
+int32_t dashpot_reset(dashpot_controller* controller, const double* torque) {
+  if (controller == nullptr) return DASHPOT_NULL_ARGUMENT;
+  JointVector acting;
+  for (int i = 0; torque != nullptr && i < controller->n; ++i) {
+    if (!std::isfinite(torque[i])) return DASHPOT_WRONG_VALUE;
+  }
+  if (torque != nullptr) acting = Eigen::Map<const Eigen::VectorXd>(torque, controller->n);
+  controller->reset(acting);
+  return DASHPOT_OK;
+}
+
+int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpoint* setpoint) {
+  if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  Request& request = controller->request;
+  Setpoint wanted = request.setpoint;
+  const std::int32_t problem = to_setpoint(setpoint, controller->n, 0, wanted);
+  if (problem != DASHPOT_OK) return finish(problem);
+  const SetpointFault fault = check_setpoint(wanted, controller->settings.limits, true);
+  if (fault) return finish(fault);
+  request.setpoint = wanted;
+  request.on_arrival = setpoint->time == DASHPOT_ON_ARRIVAL;
+  ++request.setpoints;
+  controller->requests.write(request);
+  return finish(DASHPOT_OK);
+}
+
+int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains) {
+  if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  Request& request = controller->request;
+  Gains wanted = request.setpoint.gains;
+  std::int32_t problem = read_gains(gains, controller->n, wanted);
+  JointVector q;
+  controller->judgement.where(q);
+  if (problem == DASHPOT_OK && !same_gains(wanted, request.setpoint.gains)) {
+    problem = judge(*controller, wanted, q, false, nullptr);
+  }
+  if (problem != DASHPOT_OK) return problem;
+  request.setpoint.gains = wanted;
+  ++request.gain_changes;
+  controller->requests.write(request);
+  return finish(DASHPOT_OK);
+}
+
+int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
+                            const double* position, double* margin) {
+  if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  Gains wanted = controller->settings.initial.gains;
+  const std::int32_t problem = read_gains(gains, controller->n, wanted);
+  if (problem != DASHPOT_OK) return problem;
+  JointVector q;
+  if (position != nullptr) {
+    q = Eigen::Map<const Eigen::VectorXd>(position, controller->n);
+  } else if (!controller->judgement.where(q)) {
+    return finish(DASHPOT_NOTHING_YET);
+  }
+  if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
+  return judge(*controller, wanted, q, true, margin);
+}
+
+int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* snapshot) {
+  const std::int32_t problem = check_result(controller, snapshot);
+  if (problem != DASHPOT_OK) return finish(problem);
+  controller->snapshots.fetch();
+  if (controller->snapshots.value().tick == 0) return finish(DASHPOT_NOTHING_YET);
+  to_c(controller->snapshots.value(), *snapshot);
+  return finish(DASHPOT_OK);
+}
+
+int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes) {
+  const std::int32_t problem = check_result(controller, modes);
+  if (problem != DASHPOT_OK) return finish(problem);
+  controller->vibrations.fetch();
+  if (controller->vibrations.value().tick == 0) return finish(DASHPOT_NOTHING_YET);
+  to_c(controller->vibrations.value(), *modes);
+  return finish(DASHPOT_OK);
+}
+
+int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampled_modes* modes) {
+  const std::int32_t problem = check_result(controller, modes);
+  if (problem != DASHPOT_OK) return finish(problem);
+  const SampledVibration* found = controller->sampled();
+  if (found == nullptr) return finish(DASHPOT_NOTHING_YET);
+  to_c(*found, *modes);
+  return finish(DASHPOT_OK);
+}
+
+const char* dashpot_status_text(int32_t status) {
+  switch (status) {
+    case DASHPOT_NULL_ARGUMENT:
+      return "a pointer that has to be there is NULL";
+    case DASHPOT_WRONG_STRUCT_SIZE:
+      return "struct_size is not that of this version of plugin.h";
+    case DASHPOT_WRONG_JOINTS:
+      return "joints is not the robot's number of joints";
+    case DASHPOT_WRONG_VALUE:
+      return "a value is not possible";
+    case DASHPOT_NOTHING_YET:
+      return "nothing to read so far";
+    case DASHPOT_UNSTABLE_GAINS:
+      return "the sampled loop would have less than the gain margin";
+    default:
+      break;
+  }
+  if (status < DASHPOT_OK || status > DASHPOT_NOT_FINITE) return "unknown status";
+  return to_text(static_cast<Status>(status));
+}
+
+const char* dashpot_kind_text(int32_t kind) {
+  if (kind < DASHPOT_UNDERDAMPED || kind > DASHPOT_SOFT) return "unknown kind";
+  return to_text(static_cast<dashpot::analysis::ModeKind>(kind));
+}
+
+const dashpot_plugin* dashpot_plugin_interface(uint32_t version) {
+  static const dashpot_plugin functions = {
+      sizeof(dashpot_plugin), DASHPOT_PLUGIN_VERSION, dashpot_create,
+      dashpot_destroy,        dashpot_last_error,     dashpot_joints,
+      dashpot_joint_name,     dashpot_period,         dashpot_update,
+      dashpot_start,          dashpot_reset,          dashpot_release,
+      dashpot_set_setpoint,   dashpot_set_gains,      dashpot_judge_gains,
+      dashpot_read_snapshot,  dashpot_read_modes,     dashpot_read_sampled_modes,
+      dashpot_status_text,    dashpot_kind_text};
+  return version == DASHPOT_PLUGIN_VERSION ? &functions : nullptr;
+}
+
+}  // extern "C"

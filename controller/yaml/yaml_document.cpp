@@ -1,0 +1,187 @@
+#include <dashpot/controller/input_error.hpp>
+#include <dashpot/controller/yaml/yaml_document.hpp>
+
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <sstream>
+#include <system_error>
+#include <utility>
+
+namespace dashpot::controller {
+namespace {
+
+// yaml-cpp keeps unfinished tokens (about 130 bytes each) and recurses into nested values, so both
+// are limited before it sees the text. A million numbers are well within the limits.
+constexpr std::size_t kLargestText = 64u << 20;
+constexpr std::size_t kMostValues = 4'000'000;
+constexpr int kDeepestNesting = 16;
+
+void check_limits(const std::string& text) {
+  if (text.size() > kLargestText) throw InputError("", "larger than 64 MiB");
+  std::size_t values = 0;
+  int depth = 0;
+  int line = 1;
+  for (const char c : text) {
+    if (c == '\n') ++line;
+    if (c == ',' || c == '[' || c == '{' || c == '\n') ++values;
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') depth = std::max(depth - 1, 0);
+    // Brackets in comments and quoted text count too; hence the wide margin.
+    if (depth > 8 * kDeepestNesting) throw InputError("", "nested too deeply", line);
+  }
+  if (values > kMostValues) throw InputError("", "holds more than 4000000 values");
+}
+
+/// Builds the tree of one document from the parser's events.
+class TreeBuilder : public YAML::EventHandler {
+ public:
+  YamlNode take() { return std::move(root_); }
+
+  void OnDocumentStart(const YAML::Mark& /*mark*/) override {}
+  void OnDocumentEnd() override {}
+
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    YamlNode& node = open(YamlNode::Kind::kNull, mark, anchor);
+    // The mark of a value that is not there is that of what follows: its key's line says more.
+    const YamlNode* parent = open_.size() > 1 ? &open_[open_.size() - 2].node : nullptr;
+    if (parent != nullptr && parent->kind == YamlNode::Kind::kMap &&
+        parent->items.size() % 2 == 1) {
+      node.line = parent->items.back().line;
+    }
+    close();
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                const std::string& value) override {
+    YamlNode& node = open(YamlNode::Kind::kScalar, mark, anchor);
+    node.quoted = tag == "!";
+    node.text = value;
+    count({0, value.size()}, mark.line + 1);
+    close();
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& /*tag*/, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value /*style*/) override {
+    open(YamlNode::Kind::kSequence, mark, anchor);
+  }
+  void OnSequenceEnd() override { close(); }
+  void OnMapStart(const YAML::Mark& mark, const std::string& /*tag*/, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value /*style*/) override {
+    open(YamlNode::Kind::kMap, mark, anchor);
+  }
+  void OnMapEnd() override { close(); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    const auto found = anchored_.find(anchor);
+    if (found == anchored_.end()) throw InputError("", "an alias refers to itself", mark.line + 1);
+    count(found->second.size, mark.line + 1);
+    attach(YamlNode(found->second.node));
+  }
+
+ private:
+  /// Of a node with all that is in it.
+  struct Size {
+    std::size_t values = 0;
+    std::size_t text = 0;  ///< bytes
+  };
+  struct Open {
+    YamlNode node;
+    YAML::anchor_t anchor;
+    Size before;
+  };
+  struct Anchored {
+    YamlNode node;
+    Size size;
+  };
+
+  /// Aliases and what is kept for them count in full: a few lines can stand for any number.
+  void count(const Size& more, int line) {
+    total_.values += more.values;
+    total_.text += more.text;
+    if (total_.values > kMostValues) throw InputError("", "holds more than 4000000 values", line);
+    if (total_.text > kLargestText) throw InputError("", "holds more than 64 MiB of text", line);
+  }
+
+  YamlNode& open(YamlNode::Kind kind, const YAML::Mark& mark, YAML::anchor_t anchor) {
+    if (open_.size() >= kDeepestNesting) throw InputError("", "nested too deeply", mark.line + 1);
+    const Size before = total_;
+    count({1, 0}, mark.line + 1);
+    open_.push_back(
+        {YamlNode{.kind = kind, .line = mark.line + 1, .text = {}, .items = {}}, anchor, before});
+    return open_.back().node;
+  }
+
+  void close() {
+    Open done = std::move(open_.back());
+    open_.pop_back();
+    if (done.anchor != 0) {
+      const Size size{total_.values - done.before.values, total_.text - done.before.text};
+      count(size, done.node.line);
+      anchored_.insert_or_assign(done.anchor, Anchored{done.node, size});
+    }
+    attach(std::move(done.node));
+  }
+
+  void attach(YamlNode&& node) {
+    (open_.empty() ? root_ : open_.back().node.items.emplace_back()) = std::move(node);
+  }
+
+  YamlNode root_;
+  std::vector<Open> open_;
+  std::map<YAML::anchor_t, Anchored> anchored_;
+  Size total_;
+};
+
+}  // namespace
+
+std::string read_file(const std::string& path) {
+  const auto close = [](std::FILE* file) { return file == stdin ? 0 : std::fclose(file); };
+  const std::unique_ptr<std::FILE, decltype(close)> file(
+      path == "-" ? stdin : std::fopen(path.c_str(), "rb"), close);
+  if (!file) throw InputError("", std::string("cannot be opened: ") + std::strerror(errno));
+  std::string text;
+  std::string part(1u << 16, '\0');
+  while (text.size() <= kLargestText) {
+    const std::size_t got = std::fread(part.data(), 1, part.size(), file.get());
+    text.append(part, 0, got);
+    if (got == 0) break;
+  }
+  if (std::ferror(file.get()) != 0) {
+    throw InputError("", std::string("cannot be read: ") + std::strerror(errno));
+  }
+  return text;
+}
+
+std::string read_regular_file(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code none;  // opening it says more
+  const fs::file_status status = fs::status(path, none);
+  if (fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status)) {
+    throw InputError("", "is not a regular file");
+  }
+  return read_file(path);
+}
+
+YamlNode parse_yaml(const std::string& text) {
+  check_limits(text);
+  try {
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    TreeBuilder document;
+    if (!parser.HandleNextDocument(document)) throw InputError("", "is empty");
+    TreeBuilder more;
+    if (parser.HandleNextDocument(more)) {
+      throw InputError("", "holds several documents; give a list instead", more.take().line);
+    }
+    return document.take();
+  } catch (const YAML::Exception& error) {
+    throw InputError("", "is not YAML: " + error.msg, error.mark.line + 1);
+  }
+}
+
+}  // namespace dashpot::controller

@@ -1,0 +1,176 @@
+#include <dashpot/lcmtypes/command/command_values.hpp>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <vector>
+
+namespace dashpot::lcmtypes {
+namespace {
+
+using controller::Gains;
+using controller::JointMatrix;
+using controller::JointVector;
+using controller::Matrix6;
+using controller::Setpoint;
+using Verdict = CommandVerdict;
+
+constexpr std::int32_t kAllParts = 2 * command_t::GIVE_UP - 1;
+constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion
+// Relative to the largest entry; no wider than what the controller accepts
+constexpr double kSymmetryTolerance = 1e-9;
+constexpr double kDefiniteTolerance = 1e-11;
+
+Verdict first_fault(std::initializer_list<Verdict> verdicts) {
+  for (const Verdict verdict : verdicts) {
+    if (verdict != Verdict::kAccepted) return verdict;
+  }
+  return Verdict::kAccepted;
+}
+
+/// Every entry finite and within [least, most].
+template <class Derived>
+Verdict judge_entries(const Eigen::MatrixBase<Derived>& values, double least, double most) {
+  if (!values.allFinite()) return Verdict::kNotFinite;
+  const bool inside = (values.array() >= least && values.array() <= most).all();
+  return inside ? Verdict::kAccepted : Verdict::kOutOfLimits;
+}
+
+/// Also symmetric and positive semidefinite, both to rounding; made symmetric exactly.
+template <class Matrix>
+Verdict judge_gains(Matrix& gains, double most) {
+  const Verdict entries = judge_entries(gains, -most, most);
+  if (entries != Verdict::kAccepted || gains.size() == 0) return entries;
+  const double largest = gains.cwiseAbs().maxCoeff();
+  const double skew = (gains - gains.transpose()).cwiseAbs().maxCoeff();
+  if (skew > kSymmetryTolerance * largest) return Verdict::kIndefinite;
+  gains = (0.5 * (gains + gains.transpose())).eval();
+  const Eigen::SelfAdjointEigenSolver<Matrix> solver(gains, Eigen::EigenvaluesOnly);
+  if (solver.info() != Eigen::Success) return Verdict::kIndefinite;
+  const bool semidefinite = solver.eigenvalues().minCoeff() >= -kDefiniteTolerance * largest;
+  return semidefinite ? Verdict::kAccepted : Verdict::kIndefinite;
+}
+
+JointVector to_vector(const std::vector<double>& values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+JointMatrix to_matrix(const std::vector<std::vector<double>>& rows) {
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  JointMatrix result(n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    result.row(i) = to_vector(rows[static_cast<std::size_t>(i)]).transpose();
+  }
+  return result;
+}
+
+Matrix6 to_matrix(const double (&rows)[6][6]) {
+  return Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(&rows[0][0]);
+}
+
+Verdict copy_mode(const command_t& message, Setpoint& setpoint) {
+  if (message.mode != command_t::JOINT && message.mode != command_t::CARTESIAN) {
+    return Verdict::kUnknown;
+  }
+  setpoint.mode =
+      message.mode == command_t::JOINT ? controller::Mode::kJoint : controller::Mode::kCartesian;
+  return Verdict::kAccepted;
+}
+
+Verdict copy_joint_position(const command_t& message, const CommandLimits& limits,
+                            Setpoint& setpoint) {
+  const JointVector position = to_vector(message.joint_position);
+  if (!position.allFinite()) return Verdict::kNotFinite;
+  const bool inside = (position.array() >= limits.position_lower.array() &&
+                       position.array() <= limits.position_upper.array())
+                          .all();
+  if (!inside) return Verdict::kOutOfLimits;
+  setpoint.joint_position = position;
+  return Verdict::kAccepted;
+}
+
+Verdict copy_tip_pose(const command_t& message, const CommandLimits& limits, Setpoint& setpoint) {
+  const Eigen::Map<const Eigen::Vector3d> position(message.tip_position);
+  const Eigen::Map<const Eigen::Vector4d> wxyz(message.tip_quaternion);
+  if (!position.allFinite() || !wxyz.allFinite()) return Verdict::kNotFinite;
+  // Not stableNorm: an overflow to infinity is out of limits as well.
+  if (!(position.norm() <= limits.reach)) return Verdict::kOutOfLimits;
+  if (!(std::abs(wxyz.norm() - 1) <= kUnitTolerance)) return Verdict::kNotUnit;
+  setpoint.tip_pose.position = position;
+  setpoint.tip_pose.rotation =
+      Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).normalized().toRotationMatrix();
+  return Verdict::kAccepted;
+}
+
+Verdict copy_wrench(const command_t& message, const CommandLimits& limits, Setpoint& setpoint) {
+  setpoint.wrench = Eigen::Map<const controller::Vector6>(message.wrench);
+  return first_fault({judge_entries(setpoint.wrench.head<3>(), -limits.force, limits.force),
+                      judge_entries(setpoint.wrench.tail<3>(), -limits.torque, limits.torque)});
+}
+
+Verdict copy_joint_gains(const command_t& message, const CommandLimits& limits, Gains& gains) {
+  gains.joint_stiffness = to_matrix(message.joint_stiffness);
+  gains.joint_damping = to_matrix(message.joint_damping);
+  return first_fault({judge_gains(gains.joint_stiffness, limits.joint_stiffness),
+                      judge_gains(gains.joint_damping, limits.joint_damping)});
+}
+
+Verdict copy_task_gains(const command_t& message, const CommandLimits& limits, Gains& gains) {
+  if (message.frame != command_t::BASE && message.frame != command_t::TOOL) {
+    return Verdict::kUnknown;
+  }
+  gains.frame =
+      message.frame == command_t::BASE ? controller::Frame::kBase : controller::Frame::kTool;
+  for (std::size_t i = 0; i < gains.directions.size(); ++i) {
+    gains.directions[i] = message.directions[i] != 0;
+  }
+  gains.task_stiffness = to_matrix(message.task_stiffness);
+  gains.task_damping = to_matrix(message.task_damping);
+  return first_fault({judge_gains(gains.task_stiffness, limits.task_stiffness),
+                      judge_gains(gains.task_damping, limits.task_damping)});
+}
+
+Verdict copy_null_gains(const command_t& message, const CommandLimits& limits, Gains& gains) {
+  gains.null_stiffness = to_vector(message.null_stiffness);
+  gains.null_damping = to_vector(message.null_damping);
+  return first_fault({judge_entries(gains.null_stiffness, 0, limits.joint_stiffness),
+                      judge_entries(gains.null_damping, 0, limits.joint_damping)});
+}
+
+}  // namespace
+
+CommandVerdict copy_values(const command_t& message, const CommandLimits& limits,
+                           Command& command) {
+  if (message.n != limits.position_lower.size()) return Verdict::kWrongSize;
+  if (message.parts <= 0 || (message.parts & ~kAllParts) != 0) return Verdict::kUnknown;
+  const auto judge = [&message](std::int32_t part, auto&& copy) {
+    return (message.parts & part) != 0 ? copy() : Verdict::kAccepted;
+  };
+  Setpoint& setpoint = command.setpoint;
+  const Verdict verdict = first_fault({
+      judge(command_t::MODE, [&] { return copy_mode(message, setpoint); }),
+      judge(command_t::JOINT_POSITION,
+            [&] { return copy_joint_position(message, limits, setpoint); }),
+      judge(command_t::TIP_POSE, [&] { return copy_tip_pose(message, limits, setpoint); }),
+      judge(command_t::WRENCH, [&] { return copy_wrench(message, limits, setpoint); }),
+      judge(command_t::JOINT_GAINS,
+            [&] { return copy_joint_gains(message, limits, setpoint.gains); }),
+      judge(command_t::TASK_GAINS,
+            [&] { return copy_task_gains(message, limits, setpoint.gains); }),
+      judge(command_t::NULL_GAINS,
+            [&] { return copy_null_gains(message, limits, setpoint.gains); }),
+  });
+  command.parts |= message.parts;
+  ++command.accepted;
+  for (std::size_t bit = 0; bit < command.set_by.size(); ++bit) {
+    if ((message.parts >> bit & 1) != 0) command.set_by[bit] = command.accepted;
+  }
+  command.utime = message.utime;
+  command.sequence = message.sequence;
+  if ((message.parts & command_t::RELEASE) != 0) command.fault_tick = message.fault_tick;
+  return verdict;
+}
+
+}  // namespace dashpot::lcmtypes

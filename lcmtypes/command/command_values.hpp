@@ -1,0 +1,14 @@
+#pragma once
+#include <dashpot/lcmtypes/command.hpp>
+#include <dashpot/lcmtypes/command_limits.hpp>
+#include <dashpot/lcmtypes/command_t.hpp>
+#include <dashpot/lcmtypes/command_verdict.hpp>
+
+namespace dashpot::lcmtypes {
+
+/// Copies the parts that `message` sets into `command`, if their values are in order: sizes, finite
+/// numbers, unit quaternion, `limits`, positive semidefinite gains. Otherwise `command` is left
+/// half written. Does not look at time and sequence.
+CommandVerdict copy_values(const command_t& message, const CommandLimits& limits, Command& command);
+
+}  // namespace dashpot::lcmtypes

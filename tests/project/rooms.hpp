@@ -1,0 +1,184 @@
+#pragma once
+// The rooms of the house: which folder a source belongs to, and which folders may include which.
+
+#include <algorithm>
+#include <regex>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace dashpot::tests {
+
+/// A folder of sources.
+struct Room {
+  std::string_view folder;  ///< "analysis/spectrum"
+  /// A room may include itself and the rooms of its library that have a lower step.
+  int step = 0;
+  /// Its public headers, without their ends: they stand in the library's own folder.
+  std::vector<std::string_view> doors;
+  /// How the names of other headers that it may include begin; "" is any. Of another library only
+  /// the public headers may be included, unless this is "".
+  std::vector<std::string_view> others;
+
+  /// "analysis"
+  std::string_view library() const { return folder.substr(0, folder.find('/')); }
+  /// Programs, tests and benchmarks are no libraries: they may include anything.
+  bool is_of_library() const { return !others.front().empty(); }
+};
+
+/// Headers of the standard library ("vector") are open to every room.
+inline const std::vector<Room>& rooms() {
+  static constexpr std::string_view kAnalysis = "dashpot/analysis/", kText = "dashpot/text/";
+  static constexpr std::string_view kEigen = "Eigen/";
+  static const std::vector<std::string_view> snapshots = {"dashpot/analysis/types.hpp",
+                                                          "dashpot/controller/types.hpp",
+                                                          "dashpot/controller/snapshot.hpp",
+                                                          "dashpot/controller/latest.hpp",
+                                                          kEigen,
+                                                          "lcm/"};
+  static const std::vector<Room> table = {
+      {"text", 0, {}, {"fcntl.h", "sys/stat.h", "unistd.h"}},
+
+      {"analysis/base", 0, {"types", "status", "work"}, {kEigen}},
+      {"analysis/linalg", 1, {}, {kEigen}},
+      {"analysis/system", 2, {"system", "task_space", "null_damping", "removal"}, {kEigen}},
+      {"analysis/spectrum", 3, {"mode", "spectrum"}, {kEigen}},
+      {"analysis/tracker", 4, {"tracked_spectrum", "mode_tracker"}, {kEigen}},
+      {"analysis/response", 4, {"response", "sensitivity"}, {kEigen}},
+      {"analysis/sampled", 4, {"sampled_loop"}, {kEigen}},
+      {"analysis/identification", 4, {"motion_fit"}, {kEigen}},
+      {"analysis/design",
+       5,
+       {"damping_target", "damping_design", "damping_region", "damping_sampled", "damping_hold",
+        "joint_damping_hold"},
+       {kEigen}},
+
+      {"controller/base",
+       0,
+       {"types", "status", "settings", "snapshot", "latest", "input_error"},
+       {kAnalysis, kText, kEigen}},
+      {"controller/model",
+       1,
+       {"robot_model", "robot_description", "kdl_chain", "dynamics", "default_settings"},
+       {kText, kEigen, "kdl/", "urdf_", "console_bridge/"}},
+      {"controller/yaml", 1, {}, {kEigen, "yaml-cpp/"}},
+      {"controller/motion", 2, {}, {kEigen}},
+      {"controller/law", 3, {}, {kAnalysis, kEigen}},
+      {"controller/safety", 3, {"setpoint_check", "settings_check"}, {kEigen}},
+      {"controller/vibration",
+       4,
+       {},
+       {kAnalysis, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
+      {"controller/core", 5, {"controller", "gain_judge"}, {kAnalysis, kEigen}},
+      {"controller/config", 6, {"config"}, {kEigen}},
+      {"controller/plugin", 7, {"plugin"}, {kAnalysis, kEigen, "stdint.h"}},  // plugin.h is C
+
+      // an independent check of the two above, which shares no mechanics with them:
+      {"sim/base", 0, {"types", "status", "system", "schedule", "invalid_scene"}, {kEigen}},
+      {"sim/dynamics",
+       1,
+       {"robot", "arm", "linear_system"},
+       {kText, kEigen, "urdf_", "console_bridge/"}},
+      {"sim/integrators", 1, {"integrator"}, {kEigen}},
+      {"sim/hardware", 2, {"plant"}, {kEigen}},
+
+      {"lcmtypes/messages",
+       0,
+       {"state_t", "modes_t", "sampled_modes_t", "command_t", "samples", "command_verdict", "bus",
+        "log_file", "message_reader"},
+       snapshots},
+      {"lcmtypes/publish", 1, {"publisher", "sink"}, snapshots},
+      {"lcmtypes/command",
+       1,
+       {"command", "command_limits", "command_filter", "command_receiver"},
+       snapshots},
+
+      {"apps/cli", 0, {}, {""}},
+      {"apps/analyze", 1, {}, {""}},
+      {"apps/inspect", 1, {}, {""}},
+      {"apps/scene", 1, {}, {""}},
+      {"apps/design", 2, {}, {""}},
+      {"apps/loop", 2, {}, {""}},
+      {"apps/run", 3, {}, {""}},
+      {"apps/monitor", 3, {}, {""}},
+      {"apps", 4, {}, {""}},
+
+      {"tests", 0, {}, {""}},
+      {"benchmarks", 0, {}, {""}},
+  };
+  return table;
+}
+
+/// "analysis/base/status.cpp" without its end.
+inline std::string_view without_end(std::string_view path) {
+  return path.substr(0, path.rfind('.'));
+}
+
+/// The room of a file ("analysis/base/status.cpp", "analysis/status.hpp"), or null: there is none.
+inline const Room* room_of(std::string_view path) {
+  const std::size_t slash = std::min(path.rfind('/'), path.size());
+  const std::string_view folder = path.substr(0, slash);
+  const std::string_view stem = without_end(path).substr(std::min(slash + 1, path.size()));
+  const Room* found = nullptr;
+  for (const Room& room : rooms()) {
+    const bool inside = path.size() > room.folder.size() && path.starts_with(room.folder) &&
+                        path[room.folder.size()] == '/';
+    if (inside && (found == nullptr || found->folder.size() < room.folder.size())) found = &room;
+    const bool header = path.ends_with(".hpp") || path.ends_with(".h");
+    if (header && folder == room.library() &&
+        std::find(room.doors.begin(), room.doors.end(), stem) != room.doors.end()) {
+      return &room;
+    }
+  }
+  return found;
+}
+
+/// Whether `header` ("dashpot/analysis/types.hpp") is one that users may include.
+inline bool is_public(std::string_view header) {
+  if (!header.starts_with("dashpot/")) return false;
+  const std::string_view path = header.substr(8);
+  const Room* room = room_of(path);
+  return room != nullptr && room->is_of_library() && std::count(path.begin(), path.end(), '/') == 1;
+}
+
+/// Whether a file of `room` may include `header` ("Eigen/Core").
+inline bool may_include(const Room& room, std::string_view header) {
+  if (header.find_first_of("./") == std::string_view::npos) return true;  // standard library
+  const bool ours = header.starts_with("dashpot/");
+  const Room* other = ours ? room_of(header.substr(8)) : nullptr;
+  if (ours && other == nullptr) return false;
+  if (ours && other->library() == room.library()) {
+    return other == &room || other->step < room.step;
+  }
+  return std::any_of(room.others.begin(), room.others.end(), [&](std::string_view begin) {
+    return begin.empty() || (header.starts_with(begin) && (!ours || is_public(header)));
+  });
+}
+
+/// Every header that the source text includes: "<vector>", "\"types.hpp\"".
+inline std::vector<std::string> includes_of(const std::string& text) {
+  static const std::regex include(R"re(^\s*#\s*include\s*(<[^>]+>|"[^"]+").*)re");
+  std::vector<std::string> found;
+  std::istringstream lines(text);
+  std::smatch match;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find('#') == std::string::npos || !std::regex_match(line, match, include)) continue;
+    found.push_back(match[1].str());
+  }
+  return found;
+}
+
+/// Every include in the source text of the file at `path` that is not allowed there. Headers in
+/// quotes never are: the line <dashpot/...> works in the tree and installed.
+inline std::vector<std::string> forbidden_includes(std::string_view path, const std::string& text) {
+  const Room* room = room_of(path);
+  std::vector<std::string> found = includes_of(text);
+  if (room == nullptr) return found;
+  std::erase_if(found, [room](const std::string& header) {
+    return header[0] == '<' && may_include(*room, header.substr(1, header.size() - 2));
+  });
+  return found;
+}
+
+}  // namespace dashpot::tests
