@@ -11,7 +11,8 @@ namespace dashpot::testing {
 /// Links of half a metre and 1 kg along x, one behind the other, by joints of these URDF types
 /// about (or along) z: from -3 to 3 rad (m) unless continuous, 2 rad/s, 50 N m, Coulomb friction
 /// 0.5 N m.
-inline controller::RobotModel chain_of(const std::vector<std::string>& types) {
+inline controller::RobotModel chain_of(const std::vector<std::string>& types,
+                                       const controller::ModelOptions& options = {}) {
   std::string text = "<robot name='chain'><link name='link0'/>";
   for (std::size_t i = 1; i <= types.size(); ++i) {
     const std::string number = std::to_string(i), before = std::to_string(i - 1);
@@ -25,7 +26,7 @@ inline controller::RobotModel chain_of(const std::vector<std::string>& types) {
         "/><dynamics friction='0.5'/></joint>";
   }
   return controller::RobotModel::from_urdf_text(text + "</robot>", "link0",
-                                                "link" + std::to_string(types.size()));
+                                                "link" + std::to_string(types.size()), options);
 }
 
 }  // namespace dashpot::testing
