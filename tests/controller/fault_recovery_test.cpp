@@ -121,6 +121,26 @@ TEST_F(Recovery, RestsAnewAfterABadState) {
   EXPECT_NEAR(ticks_to_release(), 300, 1);
 }
 
+/// The rest after one fault is none after the next.
+TEST_F(Recovery, RestsAnewAfterEachLawThatOverflows) {
+  settings.watchdog.release_after = 0.3;
+  settings.limits.velocity.setConstant(1e308);
+  settings.limits.tip_velocity = 1e308;
+  make();
+  arm->setpoint.gains = settings.initial.gains;
+  run(1.0);
+  for (int k = 0; k < 2; ++k) {
+    arm->state.velocity[0] = 1e200;  // Coriolis torque overflows
+    for (int tick = 0; tick < 12; ++tick) next();
+    EXPECT_EQ(snapshot().fault, Status::kNotFinite) << k;
+    arm->state.velocity[0] = 0;
+    for (int tick = 0; tick < 290; ++tick) next();
+    EXPECT_EQ(snapshot().fault, Status::kNotFinite) << k;
+    for (int tick = 0; tick < 20; ++tick) next();
+    EXPECT_EQ(snapshot().fault, Status::kOk) << k;
+  }
+}
+
 TEST_F(Recovery, StartsSpringsNoMoreThanThreeTimesASecond) {
   for (const int between : {100, 1100}) {  // ms
     make();
