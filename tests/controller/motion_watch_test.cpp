@@ -236,6 +236,11 @@ TEST_F(Watch, LatchesAStateThatStaysTheSameForTwoFifthsOfTheTime) {
                   [&](int k) { return Pair(-20 * std::min(1.0, k / 300.0), 0); }),
               300);
   }
+  make();  // a torque that stays as it is, since the state has changed last
+  for (int k = 0; k < 500; ++k) {
+    if (k == 10) q[0] += 1e-3;
+    EXPECT_EQ(tick({k < 5 ? 0.0 : -20.0, 0}), Status::kOk) << k;
+  }
   settings.watchdog.feedback = 0;
   make();
   tick();
