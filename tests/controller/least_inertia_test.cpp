@@ -3,22 +3,22 @@
 #include <dashpot/controller/least_inertia.hpp>
 #include <dashpot/tests/support/chains.hpp>
 #include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
-#include <limits>
 #include <numbers>
 
 namespace dashpot::controller {
 namespace {
 
+using testing::kInfinity;
 using testing::near;
 
-constexpr double kTurn = 2 * std::numbers::pi;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kFullTurn = 2 * std::numbers::pi;
 
-JointVector pair(double a, double b) {
+JointVector both(double a, double b) {
   JointVector result(2);
   result << a, b;
   return result;
@@ -28,10 +28,10 @@ class LeastInertia : public ::testing::Test {
  protected:
   /// Of both joints, with the elbow between these angles.
   JointVector of_elbow(double lower, double upper) const {
-    return least_joint_inertia(model, pair(-1, lower), pair(1, upper));
+    return least_joint_inertia(model, both(-1, lower), both(1, upper));
   }
   double tip_of_elbow(double lower, double upper) const {
-    return least_tip_inertia(model, pair(-1, lower), pair(1, upper)).linear;
+    return least_tip_inertia(model, both(-1, lower), both(1, upper)).linear;
   }
   const RobotModel model = testing::chain_of({"continuous", "continuous"});
 };
@@ -40,7 +40,7 @@ TEST_F(LeastInertia, IsAtMostThatOfEveryPosture) {
   const JointVector least = of_elbow(-2, 1);
   EXPECT_GT(least.minCoeff(), 0.005);
   for (double elbow = -2; elbow <= 1; elbow += 0.01) {
-    Eigen::Matrix2d rest = evaluate(model, pair(0, elbow), pair(0, 0)).M;
+    Eigen::Matrix2d rest = evaluate(model, both(0, elbow), both(0, 0)).M;
     rest.diagonal() -= least;
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(rest).eigenvalues()[0], -1e-3);
   }
@@ -50,7 +50,7 @@ TEST_F(LeastInertia, IsAtMostThatOfEveryPosture) {
 TEST_F(LeastInertia, IsThatOfTheRangeAlsoBeyondHalfATurn) {
   ASSERT_GT((of_elbow(-0.5, 0.5) - of_elbow(1, 2)).norm(), 0.01);
   for (const double turns : {-2, -1, 1, 2}) {
-    const double by = turns * kTurn;
+    const double by = turns * kFullTurn;
     EXPECT_TRUE(near(of_elbow(-0.5 + by, 0.5 + by), of_elbow(-0.5, 0.5), 1e-9)) << turns;
     EXPECT_TRUE(near(of_elbow(1 + by, 2 + by), of_elbow(1, 2), 1e-9)) << turns;
     EXPECT_NEAR(tip_of_elbow(1 + by, 2 + by), tip_of_elbow(1, 2), 1e-9) << turns;

@@ -14,9 +14,10 @@ namespace {
 
 using Pair = Joints<2>;
 
-class Watch : public ::testing::Test {
+class WatchedPair : public ::testing::Test {
  protected:
-  Watch() : model(testing::chain_of({"revolute", "revolute"})), settings(default_settings(model)) {
+  WatchedPair()
+      : model(testing::chain_of({"revolute", "revolute"})), settings(default_settings(model)) {
     settings.limits.tip_velocity = 1.5;
     settings.watchdog.feedback = 0;
     robot.M << 2, 0.5, 0.5, 1;
@@ -59,7 +60,7 @@ class Watch : public ::testing::Test {
   bool still = true;
 };
 
-TEST_F(Watch, KeepsToTheLimitsThemselves) {
+TEST_F(WatchedPair, KeepsToTheLimitsThemselves) {
   settings.limits.position_lower = Pair(-1, -2);
   settings.limits.position_upper = Pair(1, 2);
   settings.limits.walls = {{{0, 0, 0.1}, Eigen::Vector3d::UnitZ()},
@@ -90,7 +91,7 @@ TEST_F(Watch, KeepsToTheLimitsThemselves) {
 }
 
 /// r after k ticks of a constant external torque is (1 - 0.9^k) times it.
-TEST_F(Watch, EstimatesExternalTorqueWithATimeConstantOf10Milliseconds) {
+TEST_F(WatchedPair, EstimatesExternalTorqueWithATimeConstantOf10Milliseconds) {
   for (const bool compensates : {true, false}) {  // or else the robot holds its weight itself
     settings.feed_forward.gravity = compensates;
     settings.limits.external_torque = Pair(4, std::numeric_limits<double>::infinity());
@@ -120,7 +121,7 @@ TEST_F(Watch, EstimatesExternalTorqueWithATimeConstantOf10Milliseconds) {
   }
 }
 
-TEST_F(Watch, KnowsNoAccelerationAtTheFirstTick) {
+TEST_F(WatchedPair, KnowsNoAccelerationAtTheFirstTick) {
   settings.limits.external_torque = Pair(4, 4);
   qd = {1, 1};
   EXPECT_EQ(tick(), Status::kOk);
@@ -131,7 +132,7 @@ TEST_F(Watch, KnowsNoAccelerationAtTheFirstTick) {
 }
 
 /// A tick as long as the time constant, or longer, takes the torque as it is.
-TEST_F(Watch, EstimatesNoMoreThanIsThereAfterALongTick) {
+TEST_F(WatchedPair, EstimatesNoMoreThanIsThereAfterALongTick) {
   settings.limits.external_torque = Pair(4, 4);
   tick({3.9, 0});
   EXPECT_EQ(tick({3.9, 0}, 0.1), Status::kOk);
@@ -139,7 +140,7 @@ TEST_F(Watch, EstimatesNoMoreThanIsThereAfterALongTick) {
   EXPECT_EQ(tick({0, 0}, 0.1), Status::kCollision);
 }
 
-TEST_F(Watch, BelievesTheForceThatTheRobotReports) {
+TEST_F(WatchedPair, BelievesTheForceThatTheRobotReports) {
   settings.limits.external_force = 5;
   wrench << 3, 0, -4, 100, 100, 100;
   EXPECT_EQ(tick(), Status::kOk);
@@ -148,7 +149,7 @@ TEST_F(Watch, BelievesTheForceThatTheRobotReports) {
 }
 
 /// Half swings of so many ticks, each faster than the one before by `growth`.
-class Swings : public Watch {
+class GrowingSwings : public WatchedPair {
  protected:
   int ticks(double growth, double first, int half = 5, int most = 5000) {
     return ticks_until(
@@ -161,7 +162,7 @@ class Swings : public Watch {
   }
 };
 
-TEST_F(Swings, LatchOnceTenHaveGrownAndTheyAreLarge) {
+TEST_F(GrowingSwings, LatchOnceTenHaveGrownAndTheyAreLarge) {
   make();
   EXPECT_EQ(ticks(1.021, 0.3), 5 * 10 + 1);  // the first grows from rest
   make();
@@ -173,7 +174,7 @@ TEST_F(Swings, LatchOnceTenHaveGrownAndTheyAreLarge) {
   EXPECT_EQ(ticks(1.05, 0.3, 5, 30), 0);
 }
 
-TEST_F(Swings, CountFromTheLastThatDidNotGrow) {
+TEST_F(GrowingSwings, CountFromTheLastThatDidNotGrow) {
   make();
   const auto swing = [&](double speed) {
     qd[1] = speed;
@@ -188,7 +189,7 @@ TEST_F(Swings, CountFromTheLastThatDidNotGrow) {
   EXPECT_EQ(swing(speed *= -1.03), Status::kInstability);
 }
 
-TEST_F(Watch, LatchesATorqueThatReversesAllTheTime) {
+TEST_F(WatchedPair, LatchesATorqueThatReversesAllTheTime) {
   const double limit = settings.limits.torque[1];
   const auto still_there = [](int) {};
   for (const double share : {0.051, 0.049}) {
@@ -211,7 +212,7 @@ TEST_F(Watch, LatchesATorqueThatReversesAllTheTime) {
             0);
 }
 
-TEST_F(Watch, LatchesAStateThatStaysTheSameForTwoFifthsOfTheTime) {
+TEST_F(WatchedPair, LatchesAStateThatStaysTheSameForTwoFifthsOfTheTime) {
   settings.watchdog.feedback = 0.5;
   const double limit = settings.limits.torque[0];  // 2.5 N m and the friction explain nothing
   const auto same = [](int) {};

@@ -216,18 +216,18 @@ TEST_F(Check, BelievesNoJumpsThatDisagree) {
 
 /// Angles of a continuous joint may come modulo a turn; those of a hinge may not.
 TEST_F(Check, FollowsAContinuousJointAcrossItsWrap) {
-  constexpr double kTurn = 2 * std::numbers::pi;
+  constexpr double kWrap = 2 * std::numbers::pi;
   make();
   double angle = 0;
   for (int k = 0; k < 5000; ++k) {
     angle += 0.0019;
-    state.position[1] = std::remainder(angle, kTurn);
+    state.position[1] = std::remainder(angle, kWrap);
     state.velocity[1] = 1.9;
     ASSERT_EQ(next(), Status::kOk) << k;
     ASSERT_NEAR(check->position()[1], angle, 1e-9);
   }
   make();
-  state.position[0] = kTurn;
+  state.position[0] = kWrap;
   EXPECT_EQ(next(), Status::kStateJump);
 }
 
