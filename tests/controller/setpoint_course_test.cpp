@@ -68,6 +68,38 @@ TEST_F(Course, HasModesAtTheFirstTickAfterAReset) {
   }
 }
 
+/// A controller that was neither reset nor given a set-point holds with the gains of its settings.
+TEST_F(Course, HoldsFromTheFirstTickWithTheGainsOfTheSettings) {
+  arm->controller = Controller(model, settings);
+  arm->setpoint = Setpoint();
+  arm->fresh = false;
+  ticks(520);
+  const double before = snapshot().law_torque[0];
+  arm->state.position[0] += 1e-3;
+  next();
+  const double full = settings.initial.gains.joint_stiffness(0, 0);
+  EXPECT_NEAR(before - snapshot().law_torque[0], 1e-3 * full, 1e-5 * full);
+}
+
+/// After a release velocities are measured again, and no longer smoothed differences.
+TEST_F(Course, BelievesVelocitiesAfterARelease) {
+  settings.watchdog.feedback = 0.5;
+  make();
+  run(1.0);
+  for (int k = 0; k < 100; ++k) {
+    arm->state.position[4] += 5e-4;
+    next();
+  }
+  ASSERT_EQ(snapshot().fault, Status::kStateContradictory);
+  ticks(3000);
+  arm->controller.release();
+  ticks(10);
+  arm->state.velocity[4] = 0.1;
+  arm->state.position[4] += 1e-4;
+  next();
+  EXPECT_EQ(snapshot().velocity[4], 0.1);
+}
+
 /// Springs that start anew grow from nothing, within gain_time.
 TEST_F(Course, SpringsGrowFromZeroAfterAFault) {
   run(1.0);
