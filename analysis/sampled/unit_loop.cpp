@@ -113,6 +113,7 @@ VectorXcd UnitLoop::multipliers() const {
     const MatrixXd rest = Q.rightCols(A.rows() - X.cols());
     A = (rest.transpose() * A * rest).eval();
   }
+  if (A.rows() == 0) return {};  // nothing holds or damps any motion
   const Eigen::EigenSolver<MatrixXd> solver(A, false);
   if (solver.info() != Eigen::Success) {
     throw std::runtime_error("sample_loop: the eigenvalue iteration did not converge");

@@ -202,16 +202,12 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   snapshot_.time = state.time;
   const Status input = state_check_.check(state);
   if (input >= Status::kStateNotFinite) {
-    setpoint_age_ += nanoseconds(settings_.period);
     show_measured(state);
     rest_ = 0;
-    const bool long_ago =
-        !first_ && seconds_between(time_, state.time) > settings_.watchdog.longest_gap;
-    if (long_ago) latch(input);
+    if (!first_ && state_check_.age() > settings_.watchdog.longest_gap) latch(input);
     return ramp(input, torque);
   }
-  double dt = settings_.period;
-  if (!first_) dt = std::max(dt, seconds_between(time_, state.time));
+  const double dt = first_ ? settings_.period : std::max(settings_.period, state_check_.age());
   setpoint_age_ = first_ ? 0 : setpoint_age_ + nanoseconds(dt);
   time_ = state.time;
   q_ = fixed<N>(state_check_.position());

@@ -16,7 +16,6 @@ bool FixedCore<N>::read(const Setpoint& setpoint) noexcept {
   const bool to_come = patience > 0 && seconds_between(time_, setpoint.time) > patience;
   in_order_ = !to_come && !check_setpoint(setpoint, settings_.limits, same);
   if (!in_order_) return false;
-  accepted_.time = setpoint.time;
   setpoint_age_ = nanoseconds(seconds_between(setpoint.time, time_));
   accepted_.joint_position = setpoint.joint_position;
   accepted_.tip_pose = setpoint.tip_pose;

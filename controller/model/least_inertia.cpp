@@ -18,8 +18,11 @@ class Postures {
       : lower_(lower.cwiseMax(-std::numbers::pi)), upper_(upper.cwiseMin(std::numbers::pi)) {
     for (Eigen::Index i = 0; i < lower.size(); ++i) {  // limits that are all beyond half a turn
       if (lower_[i] <= upper_[i]) continue;
-      lower_[i] = std::max(lower[i], upper[i] - 2 * std::numbers::pi);
-      upper_[i] = std::min(upper[i], lower_[i] + 2 * std::numbers::pi);
+      if (lower[i] > 0) {  // the other limit may be infinite
+        upper_[i] = std::min(upper[i], lower[i] + 2 * std::numbers::pi);
+      } else {
+        lower_[i] = std::max(lower[i], upper[i] - 2 * std::numbers::pi);
+      }
     }
   }
 

@@ -95,13 +95,6 @@ class SafetyFilter {
   const Vector& asked() const noexcept { return asked_; }
   /// Returns what the last `apply` or `ramp` put out.
   const Vector& last() const noexcept { return last_; }
-  /// True if a position is outside its limits.
-  bool outside(const Vector& q) const noexcept {
-    for (int i = 0; i < N; ++i) {
-      if (q[i] < lower_[i] || q[i] > upper_[i]) return true;
-    }
-    return false;
-  }
   /// True if repulsion acts at q; it then has this stiffness and damping, N m/rad and N m s/rad.
   bool repels(const Vector& q, bool springs, Vector& stiffness, Vector& damping) const noexcept;
   /// Dampers (n, N m s/rad), each no larger than what the sampled loop bears twice.

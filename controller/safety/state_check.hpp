@@ -42,6 +42,9 @@ class StateCheck {
   /// Returns the last good velocity, n, rad/s: the measured one, or, from a contradiction on until
   /// `trust_velocities`, how fast positions change, smoothed over three ticks.
   const JointVector& velocity() const noexcept { return velocity_; }
+  /// Returns how long before the last state the last good one before it was, s; an interval in
+  /// which the clock went backward counts as a period.
+  double age() const noexcept { return age_; }
   /// Velocities are measured again, after a contradiction.
   void trust_velocities() noexcept { blind_ = false; }
   /// The next state is like the first.
@@ -80,6 +83,7 @@ class StateCheck {
 
   bool timed_ = false;  ///< last_time_ is known
   std::int64_t last_time_ = 0;
+  double age_ = 0;
   Last good_;
   Last doubtful_;         ///< since the last good one
   double agreement_ = 0;  ///< for how long the doubtful ones have agreed with each other, s

@@ -255,6 +255,18 @@ TEST(SampledLoop, LeavesOutTheOnesOfZeroModes) {
   }
 }
 
+/// Every motion drifts, and none is left to have a multiplier.
+TEST(SampledLoop, HasNothingToAnalyseWhereNothingHoldsOrDamps) {
+  Random random(31);
+  System<> system(3);
+  system.mass = random.spd(3);
+  const Spectrum<> spectrum = analyze(system);
+  ASSERT_EQ(spectrum.zero_modes.basis.cols(), 3);
+  EXPECT_EQ(sample(system, {}).spectral_radius, 0);
+  EXPECT_TRUE(sample(system, {}).others.empty());
+  EXPECT_EQ(gain_margin(system, spectrum, {}, 2), std::numeric_limits<double>::infinity());
+}
+
 /// Held torque that damps a free mass: v += T (-a v), exactly.
 TEST(SampledLoop, DampsAFreeMassStepByStep) {
   SampledLoop loop;

@@ -1,0 +1,99 @@
+// Gains judged on one joint, whose sampled loop is solved by hand.
+#include <dashpot/controller/gain_judge.hpp>
+#include <dashpot/tests/support/chains.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace dashpot::controller {
+namespace {
+
+constexpr double kInertia = 0.02 + 0.25 * 0.25;  // of a link of the chain about its joint, kg m^2
+
+/// A damper c held for T makes v <- (1 - c T / I) v, and with the torque a tick late
+/// v_k+1 = v_k - c T / I v_k-1: stable up to c T / I = 2, and 1.
+class Judge : public ::testing::Test {
+ protected:
+  Judge() : settings(default_settings(model())) {
+    settings.limits.gain_margin = 3;
+    gains = settings.initial.gains;
+    gains.joint_stiffness.setZero();
+    gains.joint_damping.setZero();
+    gains.task_stiffness.setZero();
+    gains.task_damping.setZero();
+    gains.null_stiffness.setZero();
+    gains.null_damping.setZero();
+  }
+  static RobotModel model(double gravity = 0) {
+    ModelOptions options;
+    options.gravity = {gravity, 0, 0};
+    options.friction = options.damping = JointVector::Zero(1);
+    return testing::chain_of({"continuous"}, options);
+  }
+  GainJudge::Verdict judge(double gravity = 0) const {
+    return GainJudge(model(gravity), settings).judge(JointVector::Constant(1, 0.4), gains);
+  }
+
+  Settings settings;
+  Gains gains;
+};
+
+TEST_F(Judge, FindsTheMarginOfADamper) {
+  const double borne = 2 * kInertia / settings.period;
+  for (const double margin : {0.5, 1.5, 2.5}) {
+    gains.joint_damping(0, 0) = borne / margin;
+    EXPECT_NEAR(judge().margin, margin, 1e-3 * margin);
+    EXPECT_EQ(judge().mode, Mode::kJoint);
+    settings.analysis.sampled.delay = 1;
+    EXPECT_NEAR(judge().margin, margin / 2, 1e-3 * margin);
+    settings.analysis.sampled.delay = 0;
+  }
+  gains.joint_damping(0, 0) = borne / 4;
+  EXPECT_EQ(judge().margin, 3);  // enough
+}
+
+/// The tip is on the joint's axis and turns with it.
+TEST_F(Judge, NamesTheModeThatBearsLess) {
+  const double borne = 2 * kInertia / settings.period;
+  gains.joint_damping(0, 0) = borne / 2.5;
+  gains.task_damping(5, 5) = borne / 1.5;
+  EXPECT_NEAR(judge().margin, 1.5, 1e-3);
+  EXPECT_EQ(judge().mode, Mode::kCartesian);
+  gains.joint_damping(0, 0) = borne / 1.2;
+  EXPECT_NEAR(judge().margin, 1.2, 1e-3);
+  EXPECT_EQ(judge().mode, Mode::kJoint);
+}
+
+/// Walls, position limits and what the modes hold besides are no matter of gains.
+TEST_F(Judge, KnowsNoLimits) {
+  const double borne = 2 * kInertia / settings.period;
+  gains.joint_damping(0, 0) = borne / 2.5;
+  settings.limits.walls = {{{0, 0, 1}, Eigen::Vector3d::UnitZ()}};  // the tip is beyond it
+  settings.limits.position_lower[0] = -0.1;
+  settings.limits.position_upper[0] = 0.1;  // and the joint, too
+  EXPECT_NEAR(judge().margin, 2.5, 2.5e-3);
+}
+
+TEST_F(Judge, AcceptsNothingThatIsNoGain) {
+  gains.joint_damping(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(judge().margin, 0);
+}
+
+/// The gravity compensation of a joint that falls away from its top grows by about w^2 (1/2 + 1) T
+/// with a torque that is a tick late, w^2 = m g l / I; what grows by less than 1/s does not count.
+TEST_F(Judge, CountsTheGravityCompensationWhereItGrowsFast) {
+  settings.analysis.sampled.delay = 1;
+  gains.joint_damping(0, 0) = 1e-3;
+  for (const double growth : {0.7, 1.4}) {
+    const double gravity = growth / (1.5 * settings.period) * kInertia / 0.25 / std::cos(0.4);
+    settings.feed_forward.gravity = true;
+    EXPECT_EQ(judge(-gravity).margin, growth < 1 ? 3 : 0) << growth;
+    settings.feed_forward.gravity = false;
+    EXPECT_EQ(judge(-gravity).margin, 3) << growth;
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::controller

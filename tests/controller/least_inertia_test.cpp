@@ -1,0 +1,74 @@
+// The inertia that joints have at least, between limits wherever they are on the circle.
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/model/least_inertia.hpp>
+#include <dashpot/tests/support/chains.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/special_values.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <numbers>
+
+namespace dashpot::controller {
+namespace {
+
+using testing::kInfinity;
+using testing::near;
+
+constexpr double kFullTurn = 2 * std::numbers::pi;
+
+JointVector both(double a, double b) {
+  JointVector result(2);
+  result << a, b;
+  return result;
+}
+
+class LeastInertia : public ::testing::Test {
+ protected:
+  /// Of both joints, with the elbow between these angles.
+  JointVector of_elbow(double lower, double upper) const {
+    return least_joint_inertia(model, both(-1, lower), both(1, upper));
+  }
+  double tip_of_elbow(double lower, double upper) const {
+    return least_tip_inertia(model, both(-1, lower), both(1, upper)).linear;
+  }
+  const RobotModel model = testing::chain_of({"continuous", "continuous"});
+};
+
+TEST_F(LeastInertia, IsAtMostThatOfEveryPosture) {
+  const JointVector least = of_elbow(-2, 1);
+  EXPECT_GT(least.minCoeff(), 0.005);
+  for (double elbow = -2; elbow <= 1; elbow += 0.01) {
+    Eigen::Matrix2d rest = evaluate(model, both(0, elbow), both(0, 0)).M;
+    rest.diagonal() -= least;
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(rest).eigenvalues()[0], -1e-3);
+  }
+}
+
+/// A posture a turn away is the same one.
+TEST_F(LeastInertia, IsThatOfTheRangeAlsoBeyondHalfATurn) {
+  ASSERT_GT((of_elbow(-0.5, 0.5) - of_elbow(1, 2)).norm(), 0.01);
+  for (const double turns : {-2, -1, 1, 2}) {
+    const double by = turns * kFullTurn;
+    EXPECT_TRUE(near(of_elbow(-0.5 + by, 0.5 + by), of_elbow(-0.5, 0.5), 1e-9)) << turns;
+    EXPECT_TRUE(near(of_elbow(1 + by, 2 + by), of_elbow(1, 2), 1e-9)) << turns;
+    EXPECT_NEAR(tip_of_elbow(1 + by, 2 + by), tip_of_elbow(1, 2), 1e-9) << turns;
+  }
+}
+
+/// More than a turn is a turn, and so is no limit.
+TEST_F(LeastInertia, IsThatOfATurnWhereThereIsMore) {
+  const JointVector any = of_elbow(-kInfinity, kInfinity);
+  ASSERT_GT((any - of_elbow(1, 2)).norm(), 0.01);
+  EXPECT_TRUE(near(of_elbow(-20, 20), any, 1e-9));
+  for (const auto& [lower, upper] :
+       {std::pair(4.0, 20.0), {4.0, kInfinity}, {-20.0, -4.0}, {-kInfinity, -4.0}}) {
+    const JointVector found = of_elbow(lower, upper);
+    EXPECT_TRUE(near(found, any, 0.02 * any.maxCoeff())) << lower << ' ' << upper;
+    EXPECT_NEAR(tip_of_elbow(lower, upper), tip_of_elbow(-kInfinity, kInfinity), 0.02);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::controller

@@ -1,0 +1,252 @@
+// The watch by itself, on two joints whose dynamics are given by hand.
+#include <dashpot/controller/safety/motion_watch.hpp>
+#include <dashpot/tests/support/chains.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <optional>
+
+namespace dashpot::controller {
+namespace {
+
+using Pair = Joints<2>;
+
+class WatchedPair : public ::testing::Test {
+ protected:
+  WatchedPair()
+      : model(testing::chain_of({"revolute", "revolute"})), settings(default_settings(model)) {
+    settings.limits.tip_velocity = 1.5;
+    settings.watchdog.feedback = 0;
+    robot.M << 2, 0.5, 0.5, 1;
+    robot.coriolis.setZero();
+    robot.gravity = {7, -3};
+    robot.J.setZero();
+    robot.J.topRows<3>() << 0.5, 0.25, 0, 0.5, 0, 0;
+    robot.Jdot_qd.setZero();
+    robot.p_BT_B = {0.5, 0, 0.2};
+    robot.R_BT.setIdentity();
+  }
+  void make() { watch.emplace(model, settings); }
+  /// A tick at q and qd, and what is then applied: the weight and `excess`.
+  Status tick(const Pair& excess = Pair::Zero(), double dt = 0.001) {
+    if (!watch) make();
+    const Status status = watch->check({dt, q, qd, robot, wrench, still});
+    const Pair weight = settings.feed_forward.gravity ? robot.gravity : Pair(Pair::Zero());
+    watch->applied(weight + excess, excess);
+    return status;
+  }
+  /// Ticks until the status is not kOk any more; `before` is called before each.
+  int ticks_until(Status expected, const std::function<void(int)>& before,
+                  const std::function<Pair(int)>& excess) {
+    for (int k = 1; k <= 5000; ++k) {
+      before(k);
+      const Status status = tick(excess(k));
+      if (status == Status::kOk) continue;
+      EXPECT_EQ(status, expected);
+      return k;
+    }
+    return 0;
+  }
+
+  RobotModel model;
+  Settings settings;
+  std::optional<MotionWatch<2>> watch;
+  Dynamics<2> robot;
+  Vector6 wrench = Vector6::Zero();
+  Pair q{0.3, 0.4}, qd = Pair::Zero();
+  bool still = true;
+};
+
+TEST_F(WatchedPair, KeepsToTheLimitsThemselves) {
+  settings.limits.position_lower = Pair(-1, -2);
+  settings.limits.position_upper = Pair(1, 2);
+  settings.limits.walls = {{{0, 0, 0.1}, Eigen::Vector3d::UnitZ()},
+                           {{0.5, 0, 0}, -Eigen::Vector3d::UnitX()}};  // which the tip touches
+  q = {1, -2};
+  qd = {2, -2};
+  EXPECT_EQ(tick(), Status::kOk);
+  EXPECT_DOUBLE_EQ(watch->tip_speed(), std::sqrt(0.25 + 1));
+  for (const Pair& beyond : {Pair(1.001, 0), Pair(-1.001, 0), Pair(0, 2.001), Pair(0, -2.001)}) {
+    q = beyond;
+    EXPECT_EQ(tick(), Status::kPositionLimit);
+  }
+  q = {0, 0};
+  robot.p_BT_B.x() = 0.501;
+  EXPECT_EQ(tick(), Status::kWall);
+  robot.p_BT_B.x() = 0.5;
+  for (const Pair& fast : {Pair(2.001, 0), Pair(0, -2.001)}) {
+    qd = fast;
+    EXPECT_EQ(tick(), Status::kVelocityLimit);
+  }
+  qd = {0, 2};
+  settings.limits.tip_velocity = std::sqrt(0.25 + 1);
+  make();
+  EXPECT_EQ(tick(), Status::kOk);
+  qd = {2, 2};  // its parts are 1.5 and 1 m/s
+  EXPECT_EQ(tick(), Status::kTipSpeedLimit);
+  EXPECT_DOUBLE_EQ(watch->tip_speed(), std::sqrt(1.5 * 1.5 + 1));
+}
+
+/// r after k ticks of a constant external torque is (1 - 0.9^k) times it.
+TEST_F(WatchedPair, EstimatesExternalTorqueWithATimeConstantOf10Milliseconds) {
+  for (const bool compensates : {true, false}) {  // or else the robot holds its weight itself
+    settings.feed_forward.gravity = compensates;
+    settings.limits.external_torque = Pair(4, std::numeric_limits<double>::infinity());
+    make();
+    for (int k = 0; k < 200; ++k) ASSERT_EQ(tick({3.9, 100}), Status::kOk) << compensates;
+    make();
+    tick({-8, 0});
+    EXPECT_EQ(ticks_until(
+                  Status::kCollision, [](int) {}, [](int) { return Pair(-8, 0); }),
+              7);
+    make();  // Coriolis torque and acceleration count
+    robot.coriolis = {5, 0};
+    for (int k = 0; k < 200; ++k) {
+      qd = {0.002 * k, 0.004 * k};  // 2 and 4 rad/s^2: 4 + 2 = 6 N m
+      ASSERT_EQ(tick({11, 0}), Status::kOk) << k;
+    }
+    const double start = qd[0];
+    EXPECT_EQ(ticks_until(
+                  Status::kCollision,
+                  [&](int k) {
+                    qd = {start - 0.001 * k, qd[1] + 0.004};
+                  },  // -1: 2 for 4
+                  [](int) { return Pair(11, 0); }),
+              11);
+    robot.coriolis.setZero();
+    qd.setZero();
+  }
+}
+
+TEST_F(WatchedPair, KnowsNoAccelerationAtTheFirstTick) {
+  settings.limits.external_torque = Pair(4, 4);
+  qd = {1, 1};
+  EXPECT_EQ(tick(), Status::kOk);
+  EXPECT_EQ(tick(), Status::kOk);
+  watch->reset();
+  qd = {-1, -1};
+  EXPECT_EQ(tick(), Status::kOk);
+}
+
+/// A tick as long as the time constant, or longer, takes the torque as it is.
+TEST_F(WatchedPair, EstimatesNoMoreThanIsThereAfterALongTick) {
+  settings.limits.external_torque = Pair(4, 4);
+  tick({3.9, 0});
+  EXPECT_EQ(tick({3.9, 0}, 0.1), Status::kOk);
+  EXPECT_EQ(tick({4.1, 0}, 0.1), Status::kOk);
+  EXPECT_EQ(tick({0, 0}, 0.1), Status::kCollision);
+}
+
+TEST_F(WatchedPair, BelievesTheForceThatTheRobotReports) {
+  settings.limits.external_force = 5;
+  wrench << 3, 0, -4, 100, 100, 100;
+  EXPECT_EQ(tick(), Status::kOk);
+  wrench[0] = 3.001;
+  EXPECT_EQ(tick(), Status::kCollision);
+}
+
+/// Half swings of so many ticks, each faster than the one before by `growth`.
+class GrowingSwings : public WatchedPair {
+ protected:
+  int ticks(double growth, double first, int half = 5, int most = 5000) {
+    return ticks_until(
+        Status::kInstability,
+        [&](int k) {
+          const int swing = std::min((k - 1) / half, most);
+          qd = {0.01, (swing % 2 == 0 ? 1 : -1) * first * std::pow(growth, swing)};
+        },
+        [](int) { return Pair(Pair::Zero()); });
+  }
+};
+
+TEST_F(GrowingSwings, LatchOnceTenHaveGrownAndTheyAreLarge) {
+  make();
+  EXPECT_EQ(ticks(1.021, 0.3), 5 * 10 + 1);  // the first grows from rest
+  make();
+  EXPECT_EQ(ticks(1.019, 0.3, 5, 95), 0);
+  make();
+  EXPECT_EQ(ticks(1.1, 0.01), 5 * 32 + 1);  // above a tenth of 2 rad/s
+  make();
+  still = false;
+  EXPECT_EQ(ticks(1.05, 0.3, 5, 30), 0);
+}
+
+TEST_F(GrowingSwings, CountFromTheLastThatDidNotGrow) {
+  make();
+  const auto swing = [&](double speed) {
+    qd[1] = speed;
+    Status status = Status::kOk;
+    for (int k = 0; k < 5; ++k) status = worse(status, tick());
+    return status;
+  };
+  double speed = 0.3;
+  for (int k = 0; k < 9; ++k) EXPECT_EQ(swing(speed *= -1.03), Status::kOk);
+  EXPECT_EQ(swing(speed *= -0.99), Status::kOk);  // nine have grown, one has not
+  for (int k = 0; k < 10; ++k) EXPECT_EQ(swing(speed *= -1.03), Status::kOk) << k;
+  EXPECT_EQ(swing(speed *= -1.03), Status::kInstability);
+}
+
+TEST_F(WatchedPair, LatchesATorqueThatReversesAllTheTime) {
+  const double limit = settings.limits.torque[1];
+  const auto still_there = [](int) {};
+  for (const double share : {0.051, 0.049}) {
+    make();
+    const int ticks = ticks_until(Status::kInstability, still_there, [&](int k) {
+      return Pair(0, (k % 2 == 0 ? 1 : -1) * share * limit);
+    });
+    // 1 - (63/64)^k > 0.47 for k = 41; the first torque reverses nothing, and it shows a tick later
+    EXPECT_EQ(ticks, share > 0.05 ? 43 : 0);
+  }
+  make();
+  const int every_other = ticks_until(Status::kInstability, still_there, [&](int k) {
+    return Pair(0, (k / 2 % 2 == 0 ? 1 : -1) * 0.2 * limit);
+  });
+  EXPECT_GT(every_other, 150);
+  EXPECT_LT(every_other, 200);
+  make();
+  EXPECT_EQ(ticks_until(Status::kInstability, still_there,
+                        [&](int k) { return Pair(0, (k / 3 % 2 == 0 ? 1 : -1) * 0.2 * limit); }),
+            0);
+}
+
+TEST_F(WatchedPair, LatchesAStateThatStaysTheSameForTwoFifthsOfTheTime) {
+  settings.watchdog.feedback = 0.5;
+  const double limit = settings.limits.torque[0];  // 2.5 N m and the friction explain nothing
+  const auto same = [](int) {};
+  const auto growing = [&](double share) {
+    return [=](int k) { return Pair(-(share * limit + 0.5) * std::min(1.0, k / 50.0), 0); };
+  };
+  ASSERT_EQ(limit, 50);
+  make();
+  tick();
+  EXPECT_EQ(ticks_until(Status::kStateFrozen, same, growing(0.051)), 200);
+  make();
+  tick();
+  EXPECT_EQ(ticks_until(Status::kStateFrozen, same, growing(0.049)), 0);
+  for (Pair* moves : {&q, &qd}) {  // one bit is enough
+    make();
+    tick();
+    EXPECT_EQ(ticks_until(
+                  Status::kStateFrozen,
+                  [&](int k) {
+                    if (k == 100) (*moves)[1] = std::nextafter((*moves)[1], 1);
+                  },
+                  [&](int k) { return Pair(-20 * std::min(1.0, k / 300.0), 0); }),
+              300);
+  }
+  make();  // a torque that stays as it is, since the state has changed last
+  for (int k = 0; k < 500; ++k) {
+    if (k == 10) q[0] += 1e-3;
+    EXPECT_EQ(tick({k < 5 ? 0.0 : -20.0, 0}), Status::kOk) << k;
+  }
+  settings.watchdog.feedback = 0;
+  make();
+  tick();
+  EXPECT_EQ(ticks_until(Status::kStateFrozen, same, growing(0.2)), 0);
+}
+
+}  // namespace
+}  // namespace dashpot::controller
