@@ -1,6 +1,6 @@
 // The filter of torques by itself, on two joints that differ: every number follows from the
 // equations in safety_filter.hpp.
-#include <dashpot/controller/safety/safety_filter.hpp>
+#include <dashpot/controller/safety/safety_filter_steps.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 
 #include <gtest/gtest.h>
