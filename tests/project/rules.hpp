@@ -30,6 +30,7 @@ inline const std::vector<Layer>& layers() {
        {"dashpot/lcmtypes/", "dashpot/analysis/types.hpp", "dashpot/controller/types.hpp",
         "dashpot/controller/snapshot.hpp", "dashpot/controller/latest.hpp", "Eigen/", "lcm/"}},
       {"apps", {""}},
+      {"examples", {"dashpot/", "stdio.h"}},
       {"tests", {""}},
       {"benchmarks", {""}},
   };
