@@ -22,6 +22,7 @@ sim::RobotParameters believed(const controller::Config& config) {
   parameters.viscous = config.model.joint_values(&Joint::damping);
   parameters.coulomb = config.model.joint_values(&Joint::friction);
   parameters.gravity = options.gravity;
+  parameters.accept_inertias = true;  // the controller's model has judged them
   parameters.payload = {options.payload.mass, options.payload.center, options.payload.inertia};
   return parameters;
 }
