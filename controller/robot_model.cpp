@@ -19,7 +19,7 @@ std::vector<urdf::JointConstSharedPtr> path_between(const urdf::ModelInterface& 
                                                     const std::string& base, const std::string& tip,
                                                     const std::string& name) {
   for (const std::string& link : {base, tip}) {
-    if (!tree.getLink(link)) refuse(name, "link", link, "there is none");
+    if (!tree.getLink(link)) refuse(name, "link", link, "there is none; " + links_near(link, tree));
   }
   std::vector<urdf::JointConstSharedPtr> path;
   for (urdf::LinkConstSharedPtr link = tree.getLink(tip); link->name != base;
