@@ -145,6 +145,7 @@ void add_monitor(CLI::App& program) {
           ->option_text("URL");
   command->add_option("--log", options->log, "LCM log to read instead of a bus")
       ->excludes(url)
+      ->check([](const std::string& path) { return path.empty() ? "names no file" : ""; })
       ->option_text("FILE");
   command
       ->add_option("--speed", options->speed,

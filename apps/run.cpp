@@ -212,7 +212,8 @@ void run(const Options& options) {
   if (report.loop.simulation != sim::Status::kOk) {
     throw std::runtime_error(std::string("the simulation ended at ") +
                              std::to_string(report.simulated_time) +
-                             " s: " + sim::to_text(report.loop.simulation));
+                             " s: " + sim::to_text(report.loop.simulation) +
+                             " (see simulation.integrator in the scene)");
   }
 }
 
