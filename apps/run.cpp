@@ -1,4 +1,5 @@
 #include <dashpot/apps/csv_sink.hpp>
+#include <dashpot/apps/number_list.hpp>
 #include <dashpot/apps/output_file.hpp>
 #include <dashpot/apps/run_report.hpp>
 #include <dashpot/apps/subcommands.hpp>
@@ -10,7 +11,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -227,10 +227,7 @@ void add_run(CLI::App& program) {
       ->required()
       ->option_text("FILE");
   command->add_option("--duration", options->duration, "Instead of that of the scene, s")
-      ->check([](const std::string& text) {
-        const double value = std::strtod(text.c_str(), nullptr);
-        return value >= 1e-6 && value <= 1e7 ? "" : text + " is not in the range 1e-6 to 1e7 s";
-      })
+      ->transform(quantity("s", 1e-6, 1e7, "a time from 1e-6 to 1e7 s"))
       ->option_text("S");
   CLI::Option* real_time =
       command->add_flag("--realtime", options->real_time, "At the robot's pace (default)");

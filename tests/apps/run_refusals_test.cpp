@@ -135,6 +135,7 @@ TEST(Run, NamesBadOptions) {
   };
   expect_error({"--duration", "-1"}, "--duration");
   expect_error({"--duration", "nan"}, "--duration");
+  expect_error({"--duration", "1 m"}, "--duration: a time from 1e-6 to 1e7 s is wanted, not '1 m'");
   expect_error({"--realtime"}, "--realtime");
   expect_error({"--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x");
   expect_error({"--log", "/nonexistent/a.lcm"}, "/nonexistent/a.lcm: cannot write the log");
