@@ -36,6 +36,9 @@ struct ModelOptions {
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< in axes of the URDF's root link, m/s^2
   /// Links that hang off the chain (fingers, cameras) count, rigid at their zero position.
   bool include_off_chain = true;
+  /// Takes the inertia of a link as it is, though no body can have it: negative moments, or one
+  /// that is more than the sum of the others. The mass matrix has to be positive definite still.
+  bool accept_inertias = false;
   JointVector reflected_inertia;  ///< n, kg m^2; none in a URDF
   JointVector damping;            ///< n, N m s/rad
   JointVector friction;           ///< n, N m

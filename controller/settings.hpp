@@ -36,9 +36,11 @@ struct Motion {
   double angular_velocity = 1.5;      ///< rad/s
   double angular_acceleration = 6.0;  ///< rad/s^2
   double smoothing = 0.03;  ///< acceleration of a path changes over this time, s; at least one
-                            ///< period, at most 256
+                            ///< period, at most kMostSmoothing of them
   double gain_time = 0.5;   ///< a change of gains, wrench or mode takes this long, s
 };
+
+inline constexpr double kMostSmoothing = 256;  ///< periods
 
 /// A plane that the tip must not cross, in B's axes. The side to which `normal` points is free.
 struct Wall {

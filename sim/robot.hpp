@@ -38,6 +38,7 @@ struct RobotParameters {
   JointVector coulomb;                   ///< n, N m
   Inertia payload;                       ///< rigid at the tip, in the tip's axes
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< m/s^2, in the axes of the file's root link
+  bool accept_inertias = false;          ///< links may have principal moments below zero
 };
 
 /// A serial chain of 1 to 16 revolute, continuous or prismatic joints from a base link to a tip

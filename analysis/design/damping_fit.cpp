@@ -127,6 +127,9 @@ std::vector<DampingFit::Residual> DampingFit::of_sample(const DampingSample& sam
   SpectrumSolver<> solver(options);
   Spectrum<> spectrum;
   const Status status = solver.solve(system, spectrum);
+  if (status == Status::kOverflow || status == Status::kNotFinite) {
+    throw InvalidSystem("system", to_text(Status::kOverflow));
+  }
   if (status != Status::kOk && status != Status::kUncertified) {
     throw std::runtime_error(to_text(status));
   }

@@ -170,7 +170,10 @@ Spectrum<> analyze(const System<>& system, const SpectrumOptions& options) {
   SpectrumSolver<> solver(options);
   Spectrum<> spectrum;
   const Status status = solver.solve(symmetrized, spectrum);
-  if (status == Status::kOverflow) throw InvalidSystem("system", to_text(status));
+  // The entries are finite: what is not was too large.
+  if (status == Status::kOverflow || status == Status::kNotFinite) {
+    throw InvalidSystem("system", to_text(Status::kOverflow));
+  }
   if (status != Status::kOk && status != Status::kUncertified) {
     throw std::runtime_error(to_text(status));
   }

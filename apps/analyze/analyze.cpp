@@ -3,11 +3,12 @@
 #include <dashpot/apps/analyze/system_file.hpp>
 #include <dashpot/apps/analyze/table_writer.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/number_list.hpp>
 
 #include <unistd.h>
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -62,13 +63,6 @@ void run(const Options& options) try {
   throw error.in_file(options.file);
 }
 
-std::string frequency_problem(const std::string& text) {
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  const bool good = end != text.c_str() && *end == '\0' && std::isfinite(value) && value >= 0;
-  return good ? "" : "a frequency in rad/s is wanted, not '" + text + "'";
-}
-
 /// An option whose value is one of the words in `choices`; `words` lists them for the help text.
 template <class Value>
 void add_choice(CLI::App& command, const std::string& name, const std::string& help,
@@ -98,7 +92,7 @@ void add_analyze(CLI::App& program) {
   command
       ->add_option("--soft-frequency", options->soft_frequency,
                    "Call modes below this many rad/s soft")
-      ->check(CLI::Validator(frequency_problem, ""))
+      ->transform(quantity("rad/s", 0, std::numeric_limits<double>::max(), "a frequency in rad/s"))
       ->option_text("W (1e-06)");
   add_choice(*command, "--residual", "Precision of the residuals behind the error bounds",
              "automatic|working|extended (automatic)",

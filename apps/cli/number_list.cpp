@@ -1,40 +1,88 @@
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/controller/input_error.hpp>
+#include <dashpot/controller/yaml/quantity.hpp>
 
-#include <charconv>
-#include <cmath>
+#include <array>
+#include <cstdio>
+#include <limits>
 #include <sstream>
+#include <stdexcept>
 #include <vector>
 
 namespace dashpot::apps {
+namespace {
 
-Eigen::VectorXd parse_numbers(const std::string& option, const std::string& text) {
-  std::vector<double> values;
-  std::istringstream words(text + ",");
-  for (std::string word; std::getline(words, word, ',');) {
-    const auto first = word.find_first_not_of(" +");
-    if (first != std::string::npos) word.erase(0, first);
-    double value = 0;
-    const char* end = word.data() + word.size();
-    const auto [stop, error] = std::from_chars(word.data(), end, value);
-    if (error != std::errc() || stop != end || !std::isfinite(value)) {
-      throw controller::InputError(option, "'" + word + "' is not a finite number");
-    }
-    values.push_back(value);
-  }
-  return Eigen::Map<Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+using controller::InputError;
+using controller::Units;
+
+std::vector<std::string> split(const std::string& text) {
+  std::vector<std::string> words;
+  std::istringstream stream(text + ",");
+  for (std::string word; std::getline(stream, word, ',');) words.push_back(word);
+  return words;
 }
 
-Eigen::VectorXd numbers_per_joint(const std::string& option, const std::string& text,
-                                  Eigen::Index n) {
-  Eigen::VectorXd values = parse_numbers(option, text);
-  if (values.size() != 1 && values.size() != n) {
-    throw controller::InputError(
-        option, std::to_string(values.size()) + " numbers, expected 1 or " + std::to_string(n));
+double parse(const std::string& option, const std::string& word, const std::string& unit) {
+  try {
+    return controller::parse_quantity(word, unit);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(option, error.what());
   }
-  if (values.minCoeff() < 0) throw controller::InputError(option, "a number is negative");
-  if (values.size() == n) return values;
-  return Eigen::VectorXd::Constant(n, values[0]);
+}
+
+}  // namespace
+
+Eigen::VectorXd parse_quantities(const std::string& option, const std::string& text,
+                                 const Units& units) {
+  const std::vector<std::string> words = split(text);
+  if (words.size() != units.size()) {
+    throw InputError(option, std::to_string(words.size()) + " numbers, expected " +
+                                 std::to_string(units.size()));
+  }
+  Eigen::VectorXd values(static_cast<Eigen::Index>(units.size()));
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    values[static_cast<Eigen::Index>(i)] = parse(option, words[i], units[i]);
+  }
+  return values;
+}
+
+Eigen::VectorXd quantities_per_joint(const std::string& option, const std::string& text,
+                                     const Units& units) {
+  const std::size_t given = split(text).size();
+  if (given != 1 && given != units.size()) {
+    throw InputError(
+        option, std::to_string(given) + " numbers, expected 1 or " + std::to_string(units.size()));
+  }
+  std::string all = text;
+  if (given == 1) {
+    for (std::size_t i = 1; i < units.size(); ++i) all += "," + text;
+  }
+  const Eigen::VectorXd values = parse_quantities(option, all, units);
+  if (values.minCoeff() < 0) throw InputError(option, "a number is negative");
+  return values;
+}
+
+CLI::Validator quantity(const std::string& unit, double least, double most,
+                        const std::string& what) {
+  const auto convert = [=](std::string& text) -> std::string {
+    try {
+      const double value = controller::parse_quantity(text, unit);
+      if (value >= least && value <= most) {
+        std::array<char, 40> number{};
+        std::snprintf(number.data(), number.size(), "%.17g", value);
+        text = number.data();
+        return "";
+      }
+    } catch (const std::invalid_argument&) {
+    }  // said below, too
+    return what + " is wanted, not '" + text + "'";
+  };
+  return CLI::Validator(convert, "");
+}
+
+CLI::Validator positive(const std::string& unit, const std::string& what) {
+  using Limits = std::numeric_limits<double>;
+  return quantity(unit, Limits::min(), Limits::max(), what);
 }
 
 }  // namespace dashpot::apps

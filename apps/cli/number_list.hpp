@@ -1,14 +1,28 @@
 #pragma once
+#include <dashpot/controller/yaml/setting_reader.hpp>
+
+#include <CLI/Validators.hpp>
 #include <Eigen/Core>
 #include <string>
 
 namespace dashpot::apps {
 
-/// Numbers between commas, "1,-2.5,0". Throws controller::InputError with `option` as key.
-Eigen::VectorXd parse_numbers(const std::string& option, const std::string& text);
+/// Quantities between commas, "1,-30 deg,0", in SI: one for each of `units`, which is that of a
+/// number without its own (see controller::parse_quantity). Throws controller::InputError with
+/// `option` as key.
+Eigen::VectorXd parse_quantities(const std::string& option, const std::string& text,
+                                 const controller::Units& units);
 
-/// n numbers that are not negative; a single one is that of all joints. Throws likewise.
-Eigen::VectorXd numbers_per_joint(const std::string& option, const std::string& text,
-                                  Eigen::Index n);
+/// The same, none negative; a single one is that of all joints.
+Eigen::VectorXd quantities_per_joint(const std::string& option, const std::string& text,
+                                     const controller::Units& units);
+
+/// Checks that an option is a quantity from `least` to `most`, in the SI unit `unit`, and turns it
+/// into a number without unit, as CLI::Option::transform asks for; `what` says what is wanted.
+CLI::Validator quantity(const std::string& unit, double least, double most,
+                        const std::string& what);
+
+/// The same for any positive quantity.
+CLI::Validator positive(const std::string& unit, const std::string& what);
 
 }  // namespace dashpot::apps

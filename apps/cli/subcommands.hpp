@@ -16,6 +16,10 @@ inline constexpr const char* kExitStatusHelp =
     "else\n"
     "failed.";
 
+/// For that of subcommands that take physical quantities.
+inline constexpr const char* kUnitsHelp =
+    "Numbers are in SI units; a number with another unit is converted: '30 deg', 1ms, 20Nm/rad.\n";
+
 using controller::InputError;
 
 void add_analyze(CLI::App& program);

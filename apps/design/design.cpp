@@ -162,7 +162,8 @@ there already (joint friction, null-space damping). A task_damping is what `befo
 --near stays near. Without a jacobian the damping is designed in joint space. The matrix is always
 positive semidefinite; a mode that cannot have its ratio is named, with the reason. With --period it
 is one that the sampled loop bears with the margin: the ratio is lowered where it has to be, and
-where no ratio will do, the exit status is 1.)";
+where no ratio will do, the exit status is 1.
+)";
 
 }  // namespace
 
@@ -171,7 +172,7 @@ void add_design(CLI::App& program) {
       program.add_subcommand("design", "The damping matrix that gives every mode a damping ratio");
   const auto options = std::make_shared<DesignOptions>();
   add_design_options(*command, *options);
-  command->footer(kHelp);
+  command->footer(std::string(kHelp) + kUnitsHelp);
   command->callback([options] {
     check(*options);
     check_outputs({{"--csv", options->csv}},

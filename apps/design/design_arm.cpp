@@ -1,5 +1,6 @@
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/design/design_arm.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/dynamics.hpp>
 
 #include <Eigen/Core>
@@ -9,47 +10,48 @@ namespace dashpot::apps {
 namespace {
 
 using controller::RobotModel;
+using controller::Units;
 
-/// So many numbers, or nothing if there is no text.
-std::optional<Eigen::VectorXd> numbers(const std::string& option, const std::string& text,
-                                       Eigen::Index count) {
+/// One for each unit, or nothing if there is no text.
+std::optional<Eigen::VectorXd> quantities(const std::string& option, const std::string& text,
+                                          const Units& units) {
   if (text.empty()) return std::nullopt;
-  const Eigen::VectorXd values = parse_numbers(option, text);
-  if (values.size() != count) {
-    throw InputError(option,
-                     std::to_string(values.size()) + " numbers, expected " + std::to_string(count));
-  }
-  return values;
+  return parse_quantities(option, text, units);
 }
 
-/// As numbers_per_joint; nothing if there is no text.
+/// As quantities_per_joint, in the units of revolute and prismatic joints; nothing if there is no
+/// text.
 std::optional<Eigen::VectorXd> per_joint(const std::string& option, const std::string& text,
-                                         Eigen::Index n) {
+                                         const RobotModel& model, const char* revolute,
+                                         const char* prismatic) {
   if (text.empty()) return std::nullopt;
-  return numbers_per_joint(option, text, n);
+  return quantities_per_joint(option, text, controller::joint_units(model, revolute, prismatic));
 }
 
 controller::Payload read_payload(const std::string& text) {
   controller::Payload payload;
   if (text.empty()) return payload;
-  const Eigen::VectorXd values = parse_numbers("--payload", text);
-  if (values.size() != 1 && values.size() != 4) {
-    throw InputError("--payload", "1 or 4 numbers are wanted: mass, or mass and its center");
-  }
+  const bool centered = text.find(',') != std::string::npos;
+  const Eigen::VectorXd values =
+      parse_quantities("--payload", text, centered ? Units{"kg", "m", "m", "m"} : Units{"kg"});
   if (values[0] < 0) throw InputError("--payload", "the mass is negative");
   payload.mass = values[0];
-  if (values.size() == 4) payload.center = values.tail<3>();
+  if (centered) payload.center = values.tail<3>();
   return payload;
 }
 
 RobotModel read_model(const ArmOptions& options) try {
   controller::ModelOptions model;
-  const RobotModel plain = RobotModel::from_urdf_file(options.urdf, options.base, options.tip);
-  const auto inertia = per_joint("--reflected-inertia", options.reflected_inertia, plain.dof());
+  model.accept_inertias = options.accept_inertias;
+  const RobotModel plain =
+      RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
+  const auto inertia =
+      per_joint("--reflected-inertia", options.reflected_inertia, plain, "kg m^2", "kg");
   if (inertia) model.reflected_inertia = *inertia;
   if (options.viscous_friction != "urdf") {
-    model.damping = per_joint("--viscous-friction", options.viscous_friction, plain.dof())
-                        .value_or(Eigen::VectorXd::Zero(plain.dof()));
+    model.damping =
+        per_joint("--viscous-friction", options.viscous_friction, plain, "N m s/rad", "N s/m")
+            .value_or(Eigen::VectorXd::Zero(plain.dof()));
   }
   model.payload = read_payload(options.payload);
   return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
@@ -64,16 +66,21 @@ bool ArmOptions::any() const {
                            &null_damping, &reflected_inertia, &payload}) {
     if (!text->empty()) return true;
   }
-  return false;
+  return accept_inertias;
 }
 
 SystemEntry read_arm(const ArmOptions& options) {
   const RobotModel model = read_model(options);
   const Eigen::Index n = model.dof();
-  const auto stiffness = numbers("--task-stiffness", options.task_stiffness, 6);
+  const auto stiffness = quantities("--task-stiffness", options.task_stiffness,
+                                    {"N/m", "N/m", "N/m", "N m/rad", "N m/rad", "N m/rad"});
   if (!stiffness) throw InputError("--task-stiffness", "is needed with --urdf");
-  const auto damping = numbers("--task-damping", options.task_damping, 6);
-  const controller::JointVector q = numbers("--q", options.q, n).value_or(Eigen::VectorXd::Zero(n));
+  const auto damping =
+      quantities("--task-damping", options.task_damping,
+                 {"N s/m", "N s/m", "N s/m", "N m s/rad", "N m s/rad", "N m s/rad"});
+  const controller::JointVector q =
+      quantities("--q", options.q, controller::joint_units(model, "rad", "m"))
+          .value_or(Eigen::VectorXd::Zero(n));
   const controller::DynamicsResult dynamics =
       controller::evaluate(model, q, controller::JointVector::Zero(n));
   SystemEntry entry;
@@ -85,7 +92,8 @@ SystemEntry read_arm(const ArmOptions& options) {
     entry.friction = friction.asDiagonal();
     entry.impedance.damping = entry.friction;
   }
-  if (const auto null = per_joint("--null-damping", options.null_damping, n)) {
+  if (const auto null =
+          per_joint("--null-damping", options.null_damping, model, "N m s/rad", "N s/m")) {
     entry.add_null_damping(Eigen::MatrixXd(null->asDiagonal()));
   }
   if (damping) entry.impedance.task_damping = Eigen::MatrixXd(damping->asDiagonal());

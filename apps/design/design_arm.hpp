@@ -5,8 +5,8 @@
 
 namespace dashpot::apps {
 
-/// An arm at one configuration, as the options of `dashpot design --urdf` give it; lists of numbers
-/// between commas.
+/// An arm at one configuration, as the options of `dashpot design --urdf` give it; lists of
+/// quantities between commas.
 struct ArmOptions {
   std::string urdf, base, tip;
   std::string q;               ///< n; zeros if empty
@@ -17,6 +17,8 @@ struct ArmOptions {
   std::string null_damping;       ///< of the motions that the task leaves free, N m s/rad
   std::string reflected_inertia;  ///< kg m^2
   std::string payload;            ///< mass at the tip and its center: m, or m,x,y,z; kg, m
+
+  bool accept_inertias = false;  ///< though no body can have them
 
   bool any() const;  ///< whether any option but `urdf` is there
 };

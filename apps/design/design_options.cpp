@@ -1,8 +1,8 @@
 #include <dashpot/apps/design/design_options.hpp>
+#include <dashpot/apps/cli/number_list.hpp>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
-#include <cstdlib>
+#include <limits>
 #include <map>
 
 namespace dashpot::apps {
@@ -10,30 +10,14 @@ namespace {
 
 using analysis::DampingStructure;
 
+constexpr double kLargest = std::numeric_limits<double>::max();
+
 const std::map<std::string, DampingStructure>& structures() {
   static const std::map<std::string, DampingStructure> all = {
       {"full", DampingStructure::kFull},
       {"block", DampingStructure::kBlock},
       {"diagonal", DampingStructure::kDiagonal}};
   return all;
-}
-
-/// Fails for text that is not a number of at least `least`, or above it if `strictly`; `what` says
-/// what is wanted.
-CLI::Validator number(double least, bool strictly, const std::string& what) {
-  return CLI::Validator(
-      [=](const std::string& text) -> std::string {
-        char* end = nullptr;
-        const double value = std::strtod(text.c_str(), &end);
-        const bool good = end != text.c_str() && *end == '\0' && std::isfinite(value) &&
-                          (strictly ? value > least : value >= least);
-        return good ? "" : what + " is wanted, not '" + text + "'";
-      },
-      "");
-}
-
-CLI::Validator positive(const std::string& what) {
-  return number(0, true, what);
 }
 
 void add_arm(CLI::App& command, ArmOptions& arm) {
@@ -54,6 +38,8 @@ void add_arm(CLI::App& command, ArmOptions& arm) {
       "a,b,...|x (0)");
   add("--payload", arm.payload, "Mass at the tip, kg, and its center in the tip's axes, m",
       "m[,x,y,z] (0)");
+  command.add_flag("--accept-inertias", arm.accept_inertias,
+                   "Take inertias of the description that no body can have as they are");
 }
 
 void add_loop(CLI::App& command, DesignOptions& options) {
@@ -61,20 +47,20 @@ void add_loop(CLI::App& command, DesignOptions& options) {
   command
       .add_option("--period", options.period,
                   "Of the control loop: propose only what it bears sampled and held")
-      ->check(positive("a time in s"))
+      ->transform(positive("s", "a time in s"))
       ->option_text("S");
   command.add_option("--delay", loop.delay, "Ticks from a command to its effect, beyond the hold")
       ->check(CLI::Range(0, 100))
       ->option_text("N (0)");
   command.add_option("--cutoff", loop.torque_cutoff, "Of a low-pass on the torque; 0: none")
-      ->check(number(0, false, "a frequency in Hz"))
+      ->transform(quantity("Hz", 0, kLargest, "a frequency in Hz"))
       ->option_text("HZ (0)");
   command.add_flag("--difference-velocity", loop.difference_velocity,
                    "The controller takes velocities from positions");
   command
       .add_option("--margin", options.limit.gain_margin,
                   "Springs and damping may grow by this factor together")
-      ->check(number(1, false, "a factor of at least 1"))
+      ->transform(quantity("", 1, kLargest, "a factor of at least 1"))
       ->option_text("G (2)");
 }
 
@@ -96,7 +82,7 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
   add_arm(command, options.arm);
   command.add_option("--damping-ratio", options.ratio, "The ratio wanted of every mode")
       ->required()
-      ->check(positive("a positive ratio"))
+      ->transform(positive("", "a positive ratio"))
       ->option_text("Z");
   command
       .add_option("--keep-structure", options.structure,
@@ -109,7 +95,7 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
                    "FILE lists configurations: one matrix that raises their smallest ratio");
   command
       .add_option("--largest-ratio", options.largest_ratio, "With --region: no mode may have more")
-      ->check(positive("a positive ratio"))
+      ->transform(positive("", "a positive ratio"))
       ->option_text("R (1 or 1.5 Z)");
   command.add_option("--csv", options.csv, "With --region: write the map of the worst mode there")
       ->option_text("FILE");
@@ -119,7 +105,7 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
   command
       .add_option("--soft-frequency", options.soft_frequency,
                   "Give up the ratio of modes below this many rad/s")
-      ->check(positive("a frequency in rad/s"))
+      ->transform(positive("rad/s", "a frequency in rad/s"))
       ->option_text("W (0.001)");
   command.add_flag("--sensitivity", options.sensitivity,
                    "How frequencies and ratios answer to the entries of the matrices");

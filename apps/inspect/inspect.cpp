@@ -2,6 +2,7 @@
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/text/printable.hpp>
 
@@ -23,49 +24,36 @@ struct Options {
   std::string urdf, base, tip;
   std::string q, qd, gravity, reflected_inertia;
   bool exclude_off_chain = false;
+  bool accept_inertias = false;
   bool json = false;
 };
 
-/// Of joint space; zeros if `text` is empty.
-JointVector joint_list(const std::string& option, const std::string& text, int n) {
-  if (text.empty()) return JointVector::Zero(n);
-  const Eigen::VectorXd values = parse_numbers(option, text);
-  if (values.size() != n) {
-    throw InputError(
-        option, std::to_string(values.size()) + " numbers for " + std::to_string(n) + " joints");
-  }
-  return values;
+/// Of joint space, in the units of revolute and prismatic joints; zeros if `text` is empty.
+JointVector joint_list(const std::string& option, const std::string& text, const RobotModel& model,
+                       const char* revolute, const char* prismatic) {
+  if (text.empty()) return JointVector::Zero(model.dof());
+  return parse_quantities(option, text, controller::joint_units(model, revolute, prismatic));
 }
 
 RobotModel read_model(const Options& options) {
   controller::ModelOptions model;
   model.include_off_chain = !options.exclude_off_chain;
+  model.accept_inertias = options.accept_inertias;
   if (!options.gravity.empty()) {
-    const Eigen::VectorXd gravity = parse_numbers("--gravity", options.gravity);
-    if (gravity.size() != 3) throw InputError("--gravity", "x,y,z is wanted");
-    model.gravity = gravity;
+    model.gravity = parse_quantities("--gravity", options.gravity, controller::Units(3, "m/s^2"));
   }
   try {
     if (!options.reflected_inertia.empty()) {
-      const RobotModel plain = RobotModel::from_urdf_file(options.urdf, options.base, options.tip);
+      const RobotModel plain =
+          RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
       model.reflected_inertia =
-          numbers_per_joint("--reflected-inertia", options.reflected_inertia, plain.dof());
+          quantities_per_joint("--reflected-inertia", options.reflected_inertia,
+                               controller::joint_units(plain, "kg m^2", "kg"));
     }
     return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
   } catch (const controller::InvalidModel& error) {
     throw InputError("", error.what());
   }
-}
-
-std::string to_json(const DynamicsResult& dynamics) {
-  const nlohmann::ordered_json result = {{"mass_matrix", json_rows(dynamics.M)},
-                                         {"coriolis", json_list(dynamics.coriolis)},
-                                         {"gravity", json_list(dynamics.gravity)},
-                                         {"jacobian", json_rows(dynamics.J)},
-                                         {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
-                                         {"tip_position", json_list(dynamics.p_BT_B)},
-                                         {"tip_rotation", json_rows(dynamics.R_BT)}};
-  return result.dump(2) + "\n";
 }
 
 const char* to_text(controller::JointType type) {
@@ -78,6 +66,35 @@ const char* to_text(controller::JointType type) {
       return "prismatic";
   }
   return "";
+}
+
+/// What the file says of the joints; null where it sets no limit.
+nlohmann::ordered_json json_joints(const RobotModel& model) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  const auto limit = [](double value) {
+    return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
+  };
+  for (const Joint& joint : model.joints()) {
+    list.push_back({{"name", text::printable(joint.name)},
+                    {"type", to_text(joint.type)},
+                    {"lower", limit(joint.lower)},
+                    {"upper", limit(joint.upper)},
+                    {"velocity", limit(joint.velocity)},
+                    {"effort", limit(joint.effort)}});
+  }
+  return list;
+}
+
+std::string to_json(const RobotModel& model, const DynamicsResult& dynamics) {
+  const nlohmann::ordered_json result = {{"joints", json_joints(model)},
+                                         {"mass_matrix", json_rows(dynamics.M)},
+                                         {"coriolis", json_list(dynamics.coriolis)},
+                                         {"gravity", json_list(dynamics.gravity)},
+                                         {"jacobian", json_rows(dynamics.J)},
+                                         {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
+                                         {"tip_position", json_list(dynamics.p_BT_B)},
+                                         {"tip_rotation", json_rows(dynamics.R_BT)}};
+  return result.dump(2, ' ', true) + "\n";
 }
 
 std::vector<std::string> numbers(const Eigen::VectorXd& values) {
@@ -169,10 +186,10 @@ std::string to_table(const RobotModel& model, const DynamicsResult& dynamics, co
 
 void run(const Options& options) {
   const RobotModel model = read_model(options);
-  const JointVector q = joint_list("--q", options.q, model.dof());
-  const JointVector qd = joint_list("--qd", options.qd, model.dof());
+  const JointVector q = joint_list("--q", options.q, model, "rad", "m");
+  const JointVector qd = joint_list("--qd", options.qd, model, "rad/s", "m/s");
   const DynamicsResult dynamics = controller::evaluate(model, q, qd);
-  print(options.json ? to_json(dynamics) : to_table(model, dynamics, q, qd));
+  print(options.json ? to_json(model, dynamics) : to_table(model, dynamics, q, qd));
 }
 
 }  // namespace
@@ -198,8 +215,10 @@ void add_inspect(CLI::App& program) {
       "a,b,... (0)");
   command->add_flag("--exclude-off-chain", options->exclude_off_chain,
                     "Leave out links that hang off the chain");
+  command->add_flag("--accept-inertias", options->accept_inertias,
+                    "Take inertias that no body can have as they are");
   command->add_flag("--json", options->json, "Print JSON instead of tables");
-  command->footer(kExitStatusHelp);
+  command->footer(std::string(kUnitsHelp) + "\n" + kExitStatusHelp);
   command->callback([options] { run(*options); });
 }
 

@@ -1,6 +1,7 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/monitor/monitor_view.hpp>
+#include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/text/printable.hpp>
 
@@ -144,15 +145,13 @@ void add_monitor(CLI::App& program) {
                        "this machine")
           ->option_text("URL");
   command->add_option("--log", options->log, "LCM log to read instead of a bus")
+      ->check([](const std::string& path) { return path.empty() ? "names no file" : ""; })
       ->excludes(url)
       ->option_text("FILE");
   command
       ->add_option("--speed", options->speed,
                    "Pace of a log relative to its recording; 0 is as fast as possible")
-      ->check([](const std::string& text) {
-        const double value = std::strtod(text.c_str(), nullptr);
-        return value >= 0 && value <= 1e6 ? "" : text + " is not in the range 0 to 1e6";
-      })
+      ->transform(quantity("", 0, 1e6, "a factor from 0 to 1e6"))
       ->option_text("X (1 on a terminal, otherwise 0)");
   command->footer(
       "Updated in place on a terminal; otherwise one line for each second. Ctrl-C, or the end of\n"

@@ -4,6 +4,7 @@
 #include <dashpot/apps/run/csv_sink.hpp>
 #include <dashpot/apps/run/run_report.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 
 #include <unistd.h>
@@ -11,7 +12,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -213,7 +213,8 @@ void run(const Options& options) {
   if (report.loop.simulation != sim::Status::kOk) {
     throw std::runtime_error(std::string("the simulation ended at ") +
                              std::to_string(report.simulated_time) +
-                             " s: " + sim::to_text(report.loop.simulation));
+                             " s: " + sim::to_text(report.loop.simulation) +
+                             " (see simulation.integrator in the scene)");
   }
 }
 
@@ -227,10 +228,7 @@ void add_run(CLI::App& program) {
       ->required()
       ->option_text("FILE");
   command->add_option("--duration", options->duration, "Instead of that of the scene, s")
-      ->check([](const std::string& text) {
-        const double value = std::strtod(text.c_str(), nullptr);
-        return value >= 1e-6 && value <= 1e7 ? "" : text + " is not in the range 1e-6 to 1e7 s";
-      })
+      ->transform(quantity("s", 1e-6, 1e7, "a time from 1e-6 to 1e7 s"))
       ->option_text("S");
   CLI::Option* real_time =
       command->add_flag("--realtime", options->real_time, "At the robot's pace (default)");

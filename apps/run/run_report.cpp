@@ -207,7 +207,10 @@ std::string energy_text(const sim::EnergyAudit& energy) {
          joule(energy.stored.sum()) + " at the end; in by the drives " +
          joule(energy.by_actuators) + ", by the world " + joule(energy.by_world) + "; lost " +
          joule(energy.dissipated()) + "; unaccounted for " + format_number(energy.imbalance(), 2) +
-         " J" + (doubtful(energy) ? ": the integrator's steps are too long" : "") + "\n";
+         " J" +
+         (doubtful(energy) ? ": the integrator's steps are too long (simulation.integrator.step)"
+                           : "") +
+         "\n";
 }
 
 std::string messages_text(const RunReport& report) {

@@ -22,6 +22,7 @@ sim::RobotParameters believed(const controller::Config& config) {
   parameters.viscous = config.model.joint_values(&Joint::damping);
   parameters.coulomb = config.model.joint_values(&Joint::friction);
   parameters.gravity = options.gravity;
+  parameters.accept_inertias = true;  // the controller's model has judged them
   parameters.payload = {options.payload.mass, options.payload.center, options.payload.inertia};
   return parameters;
 }
@@ -31,6 +32,12 @@ void read_arm(const YamlNode& document, const std::filesystem::path& directory, 
       "robot",    "control",  "gains",    "limits",     "motion",  "feed_forward",
       "watchdog", "analysis", "commands", "simulation", "scenario"};
   const YamlMapping root(document, "", kKeys);
+  if (!root.has("scenario")) {
+    throw InputError("scenario",
+                     "missing: this is a configuration of the controller, for dashpot_create; a "
+                     "scene says besides how it begins, such as scenario: {start: {position: [0, "
+                     "...]}} (sim/scenes/panda.yaml has all keys)");
+  }
   controller::Config config = controller::read_config(document, directory);
   const controller::RobotDescription robot = config.robot;
   const Units positions = controller::joint_units(config.model, "rad", "m");

@@ -88,7 +88,7 @@ void read_limits(const YamlMapping& root, const RobotModel& model, Limits& limit
   read_number(keys, "gain_margin", "", Sign::kPositive, limits.gain_margin);
 }
 
-void read_motion(const YamlMapping& root, const RobotModel& model, Motion& motion) {
+void read_motion(const YamlMapping& root, const RobotModel& model, double period, Motion& motion) {
   static constexpr std::array<std::string_view, 8> kKeys = {
       "velocity",         "acceleration",         "linear_velocity", "linear_acceleration",
       "angular_velocity", "angular_acceleration", "smoothing",       "gain_time"};
@@ -102,6 +102,7 @@ void read_motion(const YamlMapping& root, const RobotModel& model, Motion& motio
   read_number(keys, "angular_velocity", "rad/s", Sign::kPositive, motion.angular_velocity);
   read_number(keys, "angular_acceleration", "rad/s^2", Sign::kPositive,
               motion.angular_acceleration);
+  motion.smoothing = std::min(motion.smoothing, kMostSmoothing * period);  // of fast loops
   read_number(keys, "smoothing", "s", Sign::kPositive, motion.smoothing);
   read_number(keys, "gain_time", "s", Sign::kPositive, motion.gain_time);
 }
@@ -215,7 +216,7 @@ Config read_config(const YamlNode& document, const std::filesystem::path& direct
   read_control(root, settings);
   read_gains(root, model, GainPairs::kTogether, settings.initial.gains);
   read_limits(root, model, settings.limits);
-  read_motion(root, model, settings.motion);
+  read_motion(root, model, settings.period, settings.motion);
   read_feed_forward(root, settings.feed_forward);
   read_watchdog(root, settings.period, settings.watchdog);
   read_analysis(root, settings.analysis);

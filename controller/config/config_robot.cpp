@@ -51,11 +51,12 @@ Units joint_units(const RobotModel& model, const char* revolute, const char* pri
 }
 
 RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path& directory) try {
-  static constexpr std::array<std::string_view, 10> kKeys = {"urdf",
+  static constexpr std::array<std::string_view, 11> kKeys = {"urdf",
                                                              "base",
                                                              "tip",
                                                              "gravity",
                                                              "include_off_chain",
+                                                             "accept_inertias",
                                                              "reflected_inertia",
                                                              "viscous_friction",
                                                              "coulomb_friction",
@@ -69,6 +70,7 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
   ModelOptions& options = robot.options;
   read_vector3(keys, "gravity", "m/s^2", options.gravity);
   read_switch(keys, "include_off_chain", options.include_off_chain);
+  read_switch(keys, "accept_inertias", options.accept_inertias);
   read_payload(keys, options.payload);
   read_tool(keys, options.tool);
 

@@ -2,6 +2,7 @@
 #include <dashpot/controller/model/urdf_tree.hpp>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +11,8 @@ namespace dashpot::controller {
 namespace {
 
 constexpr double kRounding = 0.005;  // of published inertias, relative
+constexpr double kSmallest = 1e-12;  // squared radius of gyration that counts, m^2
+constexpr double kLightest = 1e-6;   // kg
 
 std::string number(double value) {
   std::array<char, 40> text{};
@@ -43,40 +46,52 @@ KDL::Frame to_kdl(const urdf::Pose& pose) {
   return {KDL::Rotation::Quaternion(r.x, r.y, r.z, r.w), to_kdl(pose.position)};
 }
 
-std::string body_problem(double mass, const Eigen::Vector3d& center,
+std::string mass_problem(double mass, const Eigen::Vector3d& center,
                          const Eigen::Matrix3d& inertia) {
   if (!std::isfinite(mass)) return "its mass is not a finite number";
   if (!center.allFinite()) return "its centre of mass is not finite";
   if (!inertia.allFinite()) return "its inertia is not finite";
   if (mass < 0) return "its mass is negative, " + number(mass) + " kg";
+  return "";
+}
+
+std::string inertia_problem(double mass, const Eigen::Matrix3d& inertia) {
   if (!inertia.isApprox(inertia.transpose(), 1e-10)) return "its inertia is not symmetric";
   const Eigen::Vector3d moments =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
-  if (moments[0] < -kRounding * moments.cwiseAbs().maxCoeff()) {
+  const double rounding =
+      kRounding * moments.cwiseAbs().maxCoeff() + kSmallest * std::max(mass, kLightest);
+  if (moments[0] < -rounding) {
     return "its inertia is not positive definite: a principal moment is " + number(moments[0]) +
            " kg m^2";
   }
-  if (moments[2] > (moments[0] + moments[1]) * (1 + kRounding)) {
+  if (moments[2] > moments[0] + moments[1] + rounding) {
     return "its inertia breaks the triangle inequality: principal moments " + number(moments[0]) +
            ", " + number(moments[1]) + ", " + number(moments[2]) + " kg m^2";
   }
   return "";
 }
 
-KDL::RigidBodyInertia body_of(const urdf::Link& link, const std::string& name) {
+KDL::RigidBodyInertia body_of(const urdf::Link& link, bool accept, const std::string& name) {
   if (!link.inertial) return KDL::RigidBodyInertia::Zero();
   const urdf::Inertial& source = *link.inertial;
   const KDL::Frame frame = to_kdl(source.origin);
   Eigen::Matrix3d I;
   I << source.ixx, source.ixy, source.ixz, source.ixy, source.iyy, source.iyz, source.ixz,
       source.iyz, source.izz;
-  const std::string problem = body_problem(source.mass, {frame.p.x(), frame.p.y(), frame.p.z()}, I);
+  const std::string problem = mass_problem(source.mass, {frame.p.x(), frame.p.y(), frame.p.z()}, I);
   if (!problem.empty()) refuse(name, "link", link.name, problem);
+  const std::string doubt = accept ? "" : inertia_problem(source.mass, I);
+  if (!doubt.empty()) {
+    refuse(name, "link", link.name,
+           doubt + "; robot.accept_inertias: true, or --accept-inertias, takes it as it is");
+  }
   return frame * make_body(source.mass, Eigen::Vector3d::Zero(), I);
 }
 
 KDL::RigidBodyInertia body_of(const Payload& payload, const std::string& name) {
-  const std::string problem = body_problem(payload.mass, payload.center, payload.inertia);
+  std::string problem = mass_problem(payload.mass, payload.center, payload.inertia);
+  if (problem.empty()) problem = inertia_problem(payload.mass, payload.inertia);
   if (!problem.empty()) throw InvalidModel(name + ": payload: " + problem);
   return make_body(payload.mass, payload.center, payload.inertia);
 }

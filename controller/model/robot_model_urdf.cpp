@@ -19,7 +19,7 @@ std::vector<urdf::JointConstSharedPtr> path_between(const urdf::ModelInterface& 
                                                     const std::string& base, const std::string& tip,
                                                     const std::string& name) {
   for (const std::string& link : {base, tip}) {
-    if (!tree.getLink(link)) refuse(name, "link", link, "there is none");
+    if (!tree.getLink(link)) refuse(name, "link", link, "there is none; " + links_near(link, tree));
   }
   std::vector<urdf::JointConstSharedPtr> path;
   for (urdf::LinkConstSharedPtr link = tree.getLink(tip); link->name != base;
@@ -103,7 +103,7 @@ void apply(const JointVector& option, double Joint::*property, const std::string
 /// `next`, at its zero position; in the link's axes. It does not call itself: branches may be
 /// thousands of links long.
 KDL::RigidBodyInertia lump(const urdf::ModelInterface& tree, const std::string& link,
-                           const std::string& next, bool include_off_chain,
+                           const std::string& next, const ModelOptions& options,
                            const std::string& name) {
   KDL::RigidBodyInertia sum = KDL::RigidBodyInertia::Zero();
   std::vector<std::pair<urdf::LinkConstSharedPtr, KDL::Frame>> open;  // with their poses in `link`
@@ -111,8 +111,8 @@ KDL::RigidBodyInertia lump(const urdf::ModelInterface& tree, const std::string& 
   while (!open.empty()) {
     const auto [at, frame] = open.back();
     open.pop_back();
-    sum = sum + frame * body_of(*at, name);
-    if (!include_off_chain) break;
+    sum = sum + frame * body_of(*at, options.accept_inertias, name);
+    if (!options.include_off_chain) break;
     for (const urdf::JointSharedPtr& joint : at->child_joints) {
       if (joint->name == next) continue;
       open.emplace_back(tree.getLink(joint->child_link_name),
@@ -189,7 +189,7 @@ KDL::Chain make_chain(const urdf::ModelInterface& tree,
     }
     frame = moves ? KDL::Frame::Identity() : origin;
     if (moving == 0) continue;
-    body = body + frame * lump(tree, joint.child_link_name, next, options.include_off_chain, name);
+    body = body + frame * lump(tree, joint.child_link_name, next, options, name);
   }
   body = body + frame * body_of(options.payload, name);
   finish();

@@ -7,9 +7,13 @@
 #include <console_bridge/console.h>
 #include <urdf_parser/urdf_parser.h>
 
+#include <algorithm>
 #include <exception>
 #include <map>
 #include <mutex>
+#include <numeric>
+#include <utility>
+#include <vector>
 
 namespace dashpot::controller {
 namespace {
@@ -38,7 +42,31 @@ class Messages : public console_bridge::OutputHandler {
   std::string errors_;
 };
 
+/// What makes a text a xacro that was not expanded: an element or an expression of it outside
+/// comments; "" if nothing does. (The name space alone may stay behind in an expanded one.)
+std::string xacro_sign(const std::string& text) {
+  std::size_t at = 0;
+  while ((at = text.find_first_of("<$", at)) != std::string::npos) {
+    if (text.compare(at, 4, "<!--") == 0) {
+      at = text.find("-->", at);
+      if (at == std::string::npos) break;
+    }
+    if (text.compare(at, 7, "<xacro:") == 0) {
+      return text.substr(at, text.find_first_of(" \t\r\n/>", at) - at) + ">";
+    }
+    if (text.compare(at, 2, "${") == 0) return text.substr(at, text.find('}', at) - at) + "}";
+    ++at;
+  }
+  return "";
+}
+
 std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::string& name) {
+  if (const std::string sign = xacro_sign(text); !sign.empty()) {
+    constexpr std::size_t kEnough = 60;
+    throw InvalidModel(one_line(name + ": is a xacro that is not expanded yet (" +
+                                sign.substr(0, kEnough) + "); expand it first: xacro " + name +
+                                " > robot.urdf"));
+  }
   static std::mutex one_at_a_time;  // the handler of messages is global
   const std::lock_guard lock(one_at_a_time);
   const Messages messages;
@@ -76,6 +104,24 @@ void check_tree(const urdf::ModelInterface& model, const std::string& name) {
   }
 }
 
+/// How many letters have to be left out, put in or replaced to make one word of the other; words
+/// are compared by their first 100 bytes.
+std::size_t edits(const std::string& a, const std::string& b) {
+  constexpr std::size_t kLongest = 100;
+  const std::size_t m = std::min(a.size(), kLongest), n = std::min(b.size(), kLongest);
+  std::vector<std::size_t> row(n + 1);  // from the first i letters of a to the first j of b
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= m; ++i) {
+    std::size_t diagonal = row[0]++;
+    for (std::size_t j = 1; j <= n; ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
+    }
+  }
+  return row[n];
+}
+
 }  // namespace
 
 void refuse(const std::string& name, const std::string& kind, const std::string& element,
@@ -87,6 +133,23 @@ std::shared_ptr<urdf::ModelInterface> read_urdf(const std::string& text, const s
   std::shared_ptr<urdf::ModelInterface> model = parse(text, name);
   check_tree(*model, name);
   return model;
+}
+
+std::string links_near(const std::string& name, const urdf::ModelInterface& tree) {
+  constexpr std::size_t kShown = 10, kCompared = 1000;  // enough for a robot; files may have more
+  std::vector<std::pair<std::size_t, std::string>> links;
+  for (const auto& [link, unused] : tree.links_) {
+    if (links.size() == kCompared) break;
+    links.emplace_back(edits(name, link), link);
+  }
+  std::sort(links.begin(), links.end());
+  const std::string count = std::to_string(tree.links_.size());
+  std::string text = tree.links_.size() <= kShown ? "its links are "
+                                                  : "the nearest of its " + count + " links are ";
+  for (std::size_t i = 0; i < std::min(kShown, links.size()); ++i) {
+    text += (i == 0 ? "" : ", ") + links[i].second;
+  }
+  return text;
 }
 
 std::string read_text(const std::string& path) try {

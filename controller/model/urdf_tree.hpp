@@ -16,6 +16,10 @@ namespace dashpot::controller {
 /// not reach the console. `name` stands in front of every message.
 std::shared_ptr<urdf::ModelInterface> read_urdf(const std::string& text, const std::string& name);
 
+/// The links of the tree, those first whose names are nearest to `name`: "its links are a, b", or,
+/// where there are more than ten, "the nearest of its 30 links are ...".
+std::string links_near(const std::string& name, const urdf::ModelInterface& tree);
+
 /// The whole file, which must be a regular one. Throws InvalidModel if it cannot be read.
 std::string read_text(const std::string& path);
 

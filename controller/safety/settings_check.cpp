@@ -7,11 +7,16 @@
 namespace dashpot::controller {
 namespace {
 
+std::string number(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
 [[noreturn]] void fail(const std::string& key, double value, const std::string& unit,
                        const std::string& reason) {
-  std::ostringstream text;
-  text << "is " << value << (unit.empty() ? "" : " ") << unit << ", " << reason;
-  throw InvalidSettings(key, text.str());
+  throw InvalidSettings(key,
+                        "is " + number(value) + (unit.empty() ? "" : " ") + unit + ", " + reason);
 }
 
 void need_positive(const std::string& key, double value, const std::string& unit) {
@@ -51,12 +56,14 @@ void validate(const Motion& motion, double period, int n) {
   need_positive("motion.angular_velocity", motion.angular_velocity, "rad/s");
   need_positive("motion.angular_acceleration", motion.angular_acceleration, "rad/s^2");
   need_not_negative("motion.smoothing", motion.smoothing, "s");
-  if (motion.smoothing > 256 * period) {
-    fail("motion.smoothing", motion.smoothing, "s", "must be at most 256 periods");
+  if (motion.smoothing > kMostSmoothing * period) {
+    fail("motion.smoothing", motion.smoothing, "s",
+         "must be at most 256 periods, " + number(kMostSmoothing * period) + " s");
   }
   need_positive("motion.gain_time", motion.gain_time, "s");
   if (motion.gain_time > 1e6 * period) {
-    fail("motion.gain_time", motion.gain_time, "s", "must be at most 1e6 periods");
+    fail("motion.gain_time", motion.gain_time, "s",
+         "must be at most 1e6 periods, " + number(1e6 * period) + " s");
   }
 }
 

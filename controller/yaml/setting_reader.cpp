@@ -33,13 +33,21 @@ void for_each_entry(const YamlMapping& keys, std::string_view key, const YamlNod
   const bool list = node.kind == YamlNode::Kind::kSequence;
   const bool one_unit =
       std::adjacent_find(units.begin(), units.end(), std::not_equal_to<>()) == units.end();
-  if (list ? node.items.size() != units.size() : !one_unit) {
-    throw keys.error(
-        key,
-        (list ? "has " + std::to_string(node.items.size()) + " entries; " : "is not a list; ") +
-            "a list of " + std::to_string(units.size()) +
-            (one_unit ? ", or one number for all, is wanted" : " is wanted"),
-        node.line);
+  const std::string size = std::to_string(units.size());
+  if (!list && !one_unit) {
+    const auto other = std::find_if(units.begin(), units.end(),
+                                    [&](const std::string& unit) { return unit != units[0]; });
+    throw keys.error(key,
+                     "is not a list, and the unit of entry 1 is " + units[0] + ", that of entry " +
+                         std::to_string(other - units.begin() + 1) + " is " + *other +
+                         "; a list of " + size + " is wanted",
+                     node.line);
+  }
+  if (list && node.items.size() != units.size()) {
+    throw keys.error(key,
+                     "has " + std::to_string(node.items.size()) + " entries; a list of " + size +
+                         (one_unit ? ", or one number for all, is wanted" : " is wanted"),
+                     node.line);
   }
   for (std::size_t i = 0; i < units.size(); ++i) {
     read(list ? node.items[i] : node, i, list ? "entry " + std::to_string(i + 1) : "");

@@ -48,7 +48,8 @@ Pose pose_of(const urdf::Pose& pose, const std::string& where) {
   return result;
 }
 
-void require_physical(const Inertia& body, const std::string& where) {
+/// With `any_inertia` moments may be negative.
+void require_physical(const Inertia& body, const std::string& where, bool any_inertia) {
   require_finite(body.mass, 0, where + ": mass", "kg");
   if (!body.center.allFinite()) fail(where, "the centre of mass is not finite");
   if (!body.about_center.allFinite()) fail(where, "inertia is not finite");
@@ -56,7 +57,9 @@ void require_physical(const Inertia& body, const std::string& where) {
   const Vector3d moments =
       Eigen::SelfAdjointEigenSolver<Matrix3d>(body.about_center, Eigen::EigenvaluesOnly)
           .eigenvalues();
-  if (moments[0] < -1e-9 * moments[2]) {
+  // Rounding: of the largest moment, and of a mass one micrometre from its centre.
+  const double rounding = 1e-9 * moments[2] + 1e-12 * std::max(body.mass, 1e-6);
+  if (!any_inertia && moments[0] < -rounding) {
     std::ostringstream text;
     text << "inertia has the negative principal moment " << moments[0] << " kg m^2";
     fail(where, text.str());
@@ -87,7 +90,8 @@ using Link = urdf::LinkConstSharedPtr;
 
 class Reader {
  public:
-  Reader(const std::string& text, const std::string& name) : name_(name) {
+  Reader(const std::string& text, const std::string& name, bool any_inertia)
+      : name_(name), any_inertia_(any_inertia) {
     ParserMessages messages;
     try {
       text::check_xml(text);
@@ -156,7 +160,7 @@ class Reader {
     body.about_center << read.ixx, read.ixy, read.ixz,  //
         read.ixy, read.iyy, read.iyz,                   //
         read.ixz, read.iyz, read.izz;
-    require_physical(body, where);
+    require_physical(body, where, any_inertia_);
     return pose_of(read.origin, where) * body;
   }
 
@@ -181,6 +185,7 @@ class Reader {
   }
 
   std::string name_;
+  bool any_inertia_;
   urdf::ModelInterfaceSharedPtr model_;
 };
 
@@ -295,7 +300,7 @@ Robot Robot::from_file(const std::string& path, const std::string& base, const s
 
 Robot Robot::from_text(const std::string& urdf, const std::string& base, const std::string& tip,
                        const RobotParameters& parameters, const std::string& name) {
-  const Reader reader(urdf, name);
+  const Reader reader(urdf, name, parameters.accept_inertias);
   const Link base_link = reader.link(base, "base");
   Robot robot;
   robot.tip_ = read_chain(reader, reader.path(base_link, reader.link(tip, "tip")), robot.joints_);
@@ -304,7 +309,7 @@ Robot Robot::from_text(const std::string& urdf, const std::string& base, const s
     fail(name, "the chain from '" + base + "' to '" + tip + "' has " + std::to_string(n) +
                    " moving joints, must have 1 to " + std::to_string(kMaxJoints));
   }
-  require_physical(parameters.payload, "payload");
+  require_physical(parameters.payload, "payload", false);
   Inertia& last = robot.joints_.back().inertia;
   last = last + robot.tip_ * parameters.payload;
   override_with(parameters.armature, &Joint::armature, "armature", "kg m^2", robot.joints_);

@@ -67,6 +67,8 @@ INSTANTIATE_TEST_SUITE_P(
                  "mass: [[1, 2], [2, 1]]\nstiffness: [[1, 0], [0, 1]]\n"},
         BadInput{"MassSingular", "mass: ", "not positive definite",
                  "mass: [[0]]\nstiffness: [[1]]\n"},
+        BadInput{"MassThatOverflows", "system: ", "too large or too small",
+                 "mass: [[1.7e308]]\nstiffness: [[1]]\n"},
         BadInput{"DampingNotSquare", "damping: ", "1 x 2",
                  "mass: [[1]]\nstiffness: [[1]]\ndamping: [[1, 2]]\n"},
         BadInput{"DampingNotSymmetric", "damping: ", "(line 4)",

@@ -83,6 +83,24 @@ TEST(DesignOfThePaper, OutdoesItsDiscussionWithADampingThatIsOne) {
   }
 }
 
+TEST(DesignOfAnArm, TakesUnits) {
+  const std::vector<std::string> options = {"--json", "--damping-ratio", "0.7"};
+  const auto result = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> all = options;
+    all.insert(all.end(), more.begin(), more.end());
+    return parse(run_program(for_panda(all)));
+  };
+  const std::string posture = "0,-45 deg,0,-135 deg,0,90 deg,45 deg";
+  EXPECT_EQ(result({"--q", posture, "--task-stiffness", "2 kN/m,600,2000 N/m,100 Nm/rad,100,100",
+                    "--payload", "500 g,0,0,5 cm", "--period", "1ms", "--cutoff", "0.2 kHz",
+                    "--viscous-friction", "1Nms/rad"}),
+            result({"--q",
+                    "0,-0.7853981633974483,0,-2.356194490192345,0,1.5707963267948966,"
+                    "0.7853981633974483",
+                    "--task-stiffness", "2000,600,2000,100,100,100", "--payload", "0.5,0,0,0.05",
+                    "--period", "0.001", "--cutoff", "200", "--viscous-friction", "1"}));
+}
+
 TEST(DesignOfAnArm, SaysWhatIsMissing) {
   const auto refused = [](const std::vector<std::string>& options, const std::string& reason) {
     const Outcome outcome = run_program(for_panda(options));
@@ -94,6 +112,7 @@ TEST(DesignOfAnArm, SaysWhatIsMissing) {
   refused({"--damping-ratio", "1", "--task-stiffness", "1,2"}, "2 numbers, expected 6");
   refused({"--damping-ratio", "1", "--task-stiffness", "1,1,1,1,1,1", "--q", "1"},
           "1 numbers, expected 7");
+  refused({"--damping-ratio", "1", "--period", "1 kg"}, "--period: a time in s is wanted, not");
   refused({"--damping-ratio", "1", "x.yaml"}, "give a file, or --urdf");
   const Outcome idle = run_program({"design", "x.yaml", "--damping-ratio", "1", "--q", "1"});
   EXPECT_EQ(idle.status, 2);

@@ -255,6 +255,11 @@ INSTANTIATE_TEST_SUITE_P(
             {"--damping-ratio", "1"},
             "mass: [[1]]\njacobian: [[1]]\ntask_damping: [[1]]\nstiffness: [[1]]\n",
             "-: task_stiffness: missing"},
+        Bad{"EntriesThatOverflow",
+            {"--damping-ratio", "0.7"},
+            "mass: [[1e300, 0], [0, 1e300]]\nstiffness: [[1e300, 1e300], [1e300, 1e300]]\n"
+            "damping: [[1e308, 1e308], [1e308, 1e308]]\n",
+            "-: system: the entries are too large or too small to compute with"},
         Bad{"IndefiniteStiffness",
             {"--damping-ratio", "1"},
             "mass: [[1]]\njacobian: [[1]]\ntask_stiffness: [[-1]]\n",

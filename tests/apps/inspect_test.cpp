@@ -28,6 +28,26 @@ Outcome inspect_panda(const Words& more) {
   return inspect(dashpot::testing::arms()[0], more);
 }
 
+constexpr const char* kUnitInertia = "ixx='1' iyy='1' izz='1'";
+
+/// Of one joint about z, `pivot`, of this kind, that moves a link of this inertia.
+Outcome inspect_text(const Scratch& scratch, const std::string& kind, const std::string& inertia,
+                     Words more = {}) {
+  const std::string urdf = scratch.write(
+      "arm.urdf",
+      "<robot name='r'><link name='wall'/><link name='arm'><inertial><mass value='1'/>"
+      "<inertia " +
+          inertia +
+          " ixy='0' ixz='0' iyz='0'/></inertial></link>"
+          "<joint name='pivot' " +
+          kind +
+          "><parent link='wall'/><child link='arm'/>"
+          "<axis xyz='0 0 1'/></joint></robot>");
+  Words words = {"inspect", "--json", "--urdf", urdf, "--base", "wall", "--tip", "arm"};
+  words.insert(words.end(), more.begin(), more.end());
+  return run_program(words);
+}
+
 Rows rows_of(const Eigen::MatrixXd& matrix) {
   Rows rows;
   for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
@@ -40,7 +60,7 @@ Rows rows_of(const Eigen::MatrixXd& matrix) {
 /// Compares the object with KDL's numbers.
 void expect_matches(const Json& result, const controller::DynamicsResult& expected) {
   const auto vector = [](const Eigen::MatrixXd& v) { return rows_of(v.transpose()); };
-  EXPECT_EQ(result.size(), 7u);
+  EXPECT_EQ(result.size(), 8u);
   expect_near(result["mass_matrix"], rows_of(expected.M), 1e-12);
   expect_near({result["coriolis"]}, vector(expected.coriolis), 1e-12);
   expect_near({result["gravity"]}, vector(expected.gravity), 1e-12);
@@ -76,6 +96,51 @@ TEST(Inspect, TakesZerosAndEarthsGravityUnlessToldOtherwise) {
   for (std::size_t i = 0; i < 7; ++i) {
     EXPECT_EQ(upside_down["gravity"][i].get<double>(), -plain["gravity"][i].get<double>());
   }
+}
+
+TEST(Inspect, ListsTheJointsWithTheirLimits) {
+  const Json panda = parse(inspect_panda({"--json"}))["joints"];
+  ASSERT_EQ(panda.size(), 7u);
+  EXPECT_EQ(panda[3], Json({{"name", "panda_joint4"},
+                            {"type", "revolute"},
+                            {"lower", -3.0718},
+                            {"upper", -0.0698},
+                            {"velocity", 2.175},
+                            {"effort", 87}}));
+  const Json lift = parse(inspect({"lift_gripper", "base", "fingertip"}, {"--json"}))["joints"];
+  EXPECT_EQ(lift[0]["type"], "prismatic");
+  EXPECT_EQ(lift[0]["upper"], 0.8);
+  const Scratch scratch;
+  const Json free = parse(inspect_text(scratch, "type='continuous'", kUnitInertia))["joints"];
+  EXPECT_EQ(free, Json({{{"name", "pivot"},
+                         {"type", "continuous"},
+                         {"lower", nullptr},
+                         {"upper", nullptr},
+                         {"velocity", nullptr},
+                         {"effort", nullptr}}}));
+}
+
+TEST(Inspect, TakesUnits) {
+  EXPECT_EQ(parse(inspect_panda(
+                {"--json", "--q", "90 deg,0,-180deg,0,1,0,0", "--qd", "60 rpm,0,0,0,0,0,0"})),
+            parse(inspect_panda({"--json", "--q", "1.5707963267948966,0,-3.141592653589793,0,1,0,0",
+                                 "--qd", "6.283185307179586,0,0,0,0,0,0"})));
+  const dashpot::testing::Arm lift = {"lift_gripper", "base", "fingertip"};
+  EXPECT_EQ(parse(inspect(lift, {"--json", "--q", "25 cm,90 deg,0,0,1 cm"})),
+            parse(inspect(lift, {"--json", "--q", "0.25,1.5707963267948966,0,0,0.01"})));
+  EXPECT_EQ(parse(inspect_panda({"--json", "--reflected-inertia", "500 g m^2"})),
+            parse(inspect_panda({"--json", "--reflected-inertia", "0.5"})));
+}
+
+TEST(Inspect, GoesOnPastAnInertiaThatNoBodyHasIfToldTo) {
+  const Scratch scratch;
+  const std::string broken = "ixx='1' iyy='1' izz='3'";
+  const Outcome refused = inspect_text(scratch, "type='continuous'", broken);
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_THAT(refused.err, HasSubstr("--accept-inertias, takes it as it is"));
+  const Json taken =
+      parse(inspect_text(scratch, "type='continuous'", broken, {"--accept-inertias"}));
+  EXPECT_EQ(taken["mass_matrix"], Json({{3.0}}));
 }
 
 TEST(Inspect, AddsReflectedInertia) {
@@ -119,13 +184,16 @@ void expect_refused(const Outcome& outcome, const std::string& text) {
 }
 
 TEST(Inspect, RefusesNumbersThatDoNotFit) {
-  expect_refused(inspect_panda({"--q", "1,2"}), "--q: 2 numbers for 7 joints");
-  expect_refused(inspect_panda({"--qd", "1,2,3,4,5,6,7,8"}), "--qd: 8 numbers for 7 joints");
-  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,nan"}), "--q: 'nan' is not a finite number");
-  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1e999"}), "--q: '1e999' is not");
-  expect_refused(inspect_panda({"--q", "0,0,0,,0,0,0"}), "--q: '' is not a finite number");
-  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1x"}), "--q: '1x' is not a finite number");
-  expect_refused(inspect_panda({"--gravity", "9.81"}), "--gravity: x,y,z is wanted");
+  expect_refused(inspect_panda({"--q", "1,2"}), "--q: 2 numbers, expected 7");
+  expect_refused(inspect_panda({"--qd", "1,2,3,4,5,6,7,8"}), "--qd: 8 numbers, expected 7");
+  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,nan"}), "--q: is not finite: 'nan'");
+  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1e999"}), "--q: is not finite: '1e999'");
+  expect_refused(inspect_panda({"--q", "0,0,0,,0,0,0"}), "--q: is not a number but ''");
+  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1x"}),
+                 "--q: is not a number but '1x': unknown unit 'x'");
+  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1 m"}),
+                 "--q: has a wrong unit: '1 m'; rad is wanted");
+  expect_refused(inspect_panda({"--gravity", "9.81"}), "--gravity: 1 numbers, expected 3");
   expect_refused(inspect_panda({"--reflected-inertia", "1,2"}),
                  "--reflected-inertia: 2 numbers, expected 1 or 7");
   expect_refused(inspect_panda({"--reflected-inertia", "1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1"}),
@@ -136,8 +204,9 @@ TEST(Inspect, RefusesNumbersThatDoNotFit) {
 
 TEST(Inspect, RefusesFilesAndLinksThatDoNotFit) {
   const auto panda = dashpot::testing::arm_path("panda");
-  expect_refused(inspect({"panda", "panda_link0", "hand"}, {}),
-                 panda + ": link 'hand': there is none");
+  expect_refused(
+      inspect({"panda", "panda_link0", "hand"}, {}),
+      panda + ": link 'hand': there is none; the nearest of its 11 links are panda_hand, ");
   expect_refused(inspect({"panda", "base", "panda_link7"}, {}),
                  panda + ": link 'base': there is none");
   expect_refused(inspect({"panda", "panda_link7", "panda_link0"}, {"--json"}),

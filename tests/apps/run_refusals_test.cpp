@@ -103,6 +103,28 @@ INSTANTIATE_TEST_SUITE_P(
       return std::string(instance.param.name);
     });
 
+TEST(Run, SaysThatAConfigurationIsNoScene) {
+  const std::string path = std::string(DASHPOT_SOURCE_DIR) + "/controller/examples/panda.yaml";
+  const Outcome outcome = run_scene(path);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_THAT(outcome.err, StartsWith("dashpot run: " + path +
+                                      ": scenario: missing: this is a "
+                                      "configuration of the controller, for dashpot_create; "));
+  EXPECT_THAT(outcome.err, HasSubstr("scenario: {start: {position: "));
+}
+
+TEST(Run, NamesTheKeyOfStepsThatAreTooLong) {
+  const Scratch scratch;
+  const std::string path = changed(scratch, "chain3", "scenario:",
+                                   "control: {period: 20 ms}\nsimulation: {integrator: {method: "
+                                   "semi_implicit_euler, step: 20 ms}}\nscenario:");
+  const Outcome outcome = run_scene(path, {"--duration", "500ms"});
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  EXPECT_THAT(outcome.out,
+              HasSubstr("the integrator's steps are too long (simulation.integrator.step)\n"));
+}
+
 TEST(Run, NamesBadOptions) {
   const auto expect_error = [](const std::vector<std::string>& options, const std::string& text) {
     const Outcome outcome = run_scene(scene("ur5"), options);
@@ -113,6 +135,7 @@ TEST(Run, NamesBadOptions) {
   };
   expect_error({"--duration", "-1"}, "--duration");
   expect_error({"--duration", "nan"}, "--duration");
+  expect_error({"--duration", "1 m"}, "--duration: a time from 1e-6 to 1e7 s is wanted, not '1 m'");
   expect_error({"--realtime"}, "--realtime");
   expect_error({"--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x");
   expect_error({"--log", "/nonexistent/a.lcm"}, "/nonexistent/a.lcm: cannot write the log");

@@ -4,12 +4,14 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
 
 namespace dashpot::controller {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -80,7 +82,7 @@ TEST(RobotModelErrors, NameTheFileThatCannotBeRead) {
   EXPECT_EQ(message(missing), missing + ": cannot be read: No such file or directory");
   EXPECT_EQ(message(DASHPOT_SOURCE_DIR), DASHPOT_SOURCE_DIR ": cannot be read: Is a directory");
   const std::string panda = testing::arm_path("panda");
-  EXPECT_EQ(message(panda), panda + ": link 'a': there is none");
+  EXPECT_THAT(message(panda), StartsWith(panda + ": link 'a': there is none; "));
 }
 
 struct Bad {
@@ -204,6 +206,59 @@ TEST(RobotModelErrors, SpareWhatCanExist) {
                     options),
             "no error")
       << "what is left out";
+}
+
+TEST(RobotModelErrors, SpareWhatRoundingMakesOfZero) {
+  EXPECT_EQ(problem(arm(inertial("2", "-1e-35", "0", "0"))), "no error");
+  EXPECT_EQ(problem(arm(inertial("0", "-1e-35", "0", "0") + "<visual/>")),
+            "arm.urdf: joint 'j': no inertia resists it: the links it moves lack mass, and it has "
+            "no reflected inertia");
+  EXPECT_EQ(problem(arm(inertial("2", "-1.9e-12", "0", "0"))), "no error")
+      << "1e-12 m^2 times 2 kg";
+  EXPECT_THAT(problem(arm(inertial("2", "-2.1e-12", "0", "0"))),
+              HasSubstr("a principal moment is -2.1e-12 kg m^2"));
+  EXPECT_EQ(problem(arm(inertial("2", "0", "0", "1.9e-12"))), "no error");
+  EXPECT_THAT(problem(arm(inertial("2", "0", "0", "2.1e-12"))), HasSubstr("triangle inequality"));
+}
+
+TEST(RobotModelErrors, NameWhatAcceptsAnImpossibleInertia) {
+  const std::string broken = arm(inertial("2", "1", "1", "2.1"));
+  EXPECT_THAT(problem(broken), EndsWith("2.1 kg m^2; robot.accept_inertias: true, or "
+                                        "--accept-inertias, takes it as it is"));
+  ModelOptions options;
+  options.accept_inertias = true;
+  EXPECT_EQ(problem(broken, options), "no error");
+  EXPECT_EQ(problem(arm(inertial("2", "-0.1", "1", "1")), options), "no error");
+  EXPECT_THAT(problem(arm(inertial("-2", "1", "1", "1")), options), HasSubstr("mass is negative"));
+  options.payload.inertia(0, 0) = -1;
+  EXPECT_THAT(problem(arm(kGood), options), HasSubstr("payload: its inertia is not positive"));
+}
+
+TEST(RobotModelErrors, ListTheLinksWithTheNearestNamesFirst) {
+  const std::string few = robot("<link name='a'/><link name='arm_link'/><link name='b'>" + kGood +
+                                "</link>" + joint("j", "a", "b") + joint("k", "b", "arm_link"));
+  EXPECT_EQ(problem(few, {}, "a", "arm_lnk"),
+            "arm.urdf: link 'arm_lnk': there is none; its links are arm_link, a, b");
+  testing::RandomRobot random(17);
+  const std::string many = random.chain(12, 0);
+  const std::string message = problem(many, {}, "link0", "lnk12");
+  EXPECT_THAT(message, StartsWith("arm.urdf: link 'lnk12': there is none; the nearest of its "));
+  EXPECT_THAT(message, HasSubstr(" links are link12, link"));
+  EXPECT_EQ(std::count(message.begin(), message.end(), ','), 9) << "ten of them: " << message;
+  const std::string endless(100000, 'x');
+  EXPECT_THAT(problem(few, {}, "a", endless), HasSubstr("..."));
+}
+
+TEST(RobotModelErrors, SayThatAXacroHasToBeExpanded) {
+  const std::string head = "<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>";
+  const std::string rest = kTwoLinks + joint("j", "a", "b") + "</robot>";
+  const std::string how = "); expand it first: xacro arm.urdf > robot.urdf";
+  const std::string start = "arm.urdf: is a xacro that is not expanded yet (";
+  EXPECT_EQ(problem(head + "<xacro:include filename='b.xacro'/>" + rest),
+            start + "<xacro:include>" + how);
+  EXPECT_EQ(problem(arm(inertial("${2 * m}", "1", "1", "1"))), start + "${2 * m}" + how);
+  EXPECT_EQ(problem(head + "<!-- from <xacro:arm/> and ${m} -->" + rest), "no error") << "expanded";
+  EXPECT_THAT(problem(head + "<!-- ${m}" + rest), Not(HasSubstr("xacro arm")));
 }
 
 TEST(RobotModelErrors, CountJoints) {

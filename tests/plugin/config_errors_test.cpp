@@ -152,7 +152,8 @@ INSTANTIATE_TEST_SUITE_P(
                   "(line 2)",
                   "limits: {torque: []}\n"},
         BadConfig{"TaskOfOneNumber",
-                  "gains.task.stiffness: is not a list; a list of 6 is wanted (line 2)",
+                  "gains.task.stiffness: is not a list, and the unit of entry 1 is N/m, that of "
+                  "entry 4 is N m/rad; a list of 6 is wanted (line 2)",
                   "gains: {task: {stiffness: 600, damping: 1}}\n"},
         BadConfig{"TaskTooShort",
                   "gains.task.stiffness: has 3 entries; a list of 6 is wanted (line 2)",

@@ -96,6 +96,26 @@ TEST(Config, TakesTheRateForThePeriod) {
   EXPECT_EQ(load(panda() + "control: {period: 4 ms}\n").settings.period, 0.004);
 }
 
+TEST(Config, FitsDefaultsToThePeriod) {
+  for (const char* period : {"1 us", "20 us", "0.1 ms", "0.5 ms", "1 ms", "20 ms", "1 s"}) {
+    SCOPED_TRACE(period);
+    const Settings settings = load(panda() + "control: {period: " + period + "}\n").settings;
+    EXPECT_EQ(settings.motion.smoothing, std::min(0.03, 256 * settings.period));
+    EXPECT_EQ(settings.watchdog.longest_gap, std::max(0.01, 2.5 * settings.period));
+  }
+}
+
+TEST(Config, TakesAnInertiaThatNoBodyHasIfToldTo) {
+  const Scratch scratch;
+  std::string urdf = text_of(urdf_path("ur5.urdf"));
+  const std::size_t at = urdf.find("izz=\"", urdf.find("upper_arm_link")) + 5;
+  urdf.insert(at, "9");
+  const std::string path = scratch.write("broken.urdf", urdf);
+  const std::string robot = "robot: {urdf: " + path + ", base: base_link, tip: ee_link";
+  EXPECT_THAT(complaint(robot + "}\n"), ::testing::HasSubstr("robot.accept_inertias: true"));
+  EXPECT_EQ(load(robot + ", accept_inertias: true}\n").model.dof(), 6);
+}
+
 TEST(Config, FillsJointMatrices) {
   const Settings one =
       load(panda() + "gains: {joint: {stiffness: 600, damping: 20 Nms/rad}}\n").settings;

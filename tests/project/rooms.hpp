@@ -104,6 +104,7 @@ inline const std::vector<Room>& rooms() {
       {"apps/monitor", 3, {}, {""}},
       {"apps", 4, {}, {""}},
 
+      {"examples", 0, {}, {"dashpot/", "stdio.h"}},
       {"tests", 0, {}, {""}},
       {"benchmarks", 0, {}, {""}},
   };

@@ -93,5 +93,28 @@ TEST(Documents, KeepTheReadmeShort) {
   EXPECT_LE(std::count(readme->text.begin(), readme->text.end(), '\n'), 150);
 }
 
+std::string text_of(const std::string& path) {
+  const File* const file = find_file(path);
+  return file == nullptr ? "" : file->text;
+}
+
+TEST(Examples, TheProgramOfTheReadmeIsTheOneThatIsTested) {
+  const std::string readme = text_of("README.md"), fence = "```cpp\n";
+  const std::size_t begin = readme.find(fence);
+  ASSERT_NE(begin, std::string::npos);
+  const std::size_t code = begin + fence.size();
+  EXPECT_EQ(readme.substr(code, readme.find("```", code) - code),
+            text_of("examples/control_loop.cpp"));
+}
+
+TEST(Examples, AreListedEachInTheirReadme) {
+  for (const File& file : files()) {
+    const bool program = file.has_end(".cpp") || file.has_end(".c") || file.has_end(".py");
+    if (file.directory() != "examples" || !program) continue;
+    const std::string name = file.path.substr(file.path.find('/') + 1);
+    EXPECT_THAT(text_of("examples/README.md"), testing::HasSubstr("\n| [" + name + "](" + name));
+  }
+}
+
 }  // namespace
 }  // namespace dashpot::tests

@@ -206,6 +206,17 @@ TEST(RobotErrors, NameTheFileTheElementAndTheReason) {
                     "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='2' "
                     "ixz='0' iyz='0'/></inertial>"),
             "arm.urdf: link 'b': inertia has the negative principal moment -1 kg m^2");
+  const std::string rounded =
+      "<inertial><mass value='1'/><inertia ixx='-1e-35' iyy='0' izz='0' ixy='0' ixz='0' iyz='0'/>"
+      "<origin xyz='1 0 0'/></inertial>";
+  EXPECT_EQ(refusal(kHinge, rounded), "accepted");
+  RobotParameters any;
+  any.accept_inertias = true;
+  EXPECT_EQ(refusal(kHinge,
+                    "<inertial><mass value='1'/><inertia ixx='-1' iyy='1' izz='1' ixy='0' "
+                    "ixz='0' iyz='0'/></inertial>",
+                    any),
+            "accepted");
   EXPECT_EQ(refusal(kHinge, ""), "arm.urdf: joint 'j': moves no mass and has no armature");
   EXPECT_EQ(refusal(kHinge, kTool, {}, "b",
                     "<joint name='k' type='fixed'><parent link='a'/><child link='b'/></joint>"),

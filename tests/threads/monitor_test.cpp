@@ -214,6 +214,12 @@ TEST(Monitor, TakesALoopThatIsStartedAnewForOne) {
   EXPECT_THAT(summary_of_ticks(ticks), Not(HasSubstr("more than one loop")));
 }
 
+TEST(Monitor, RefusesALogWithoutAName) {
+  const Outcome outcome = run_program({"monitor", "--log", ""});
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--log: names no file"));
+}
+
 TEST(Monitor, SaysWhereALogIsDamagedOrCutOff) {
   const Scratch scratch;
   make_log(scratch, 500);
