@@ -2,6 +2,7 @@
 // time, in closed form. There is no time step.
 #include <cstdio>
 #include <dashpot/analysis/response.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 
 using namespace dashpot::analysis;
 

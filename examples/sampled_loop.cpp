@@ -2,6 +2,7 @@
 // spring and a damper that a computer imitates every 10 ms.
 #include <cstdio>
 #include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 
 using namespace dashpot::analysis;
 

@@ -2,8 +2,8 @@
 #include <dashpot/apps/analyze/report.hpp>
 #include <dashpot/apps/analyze/system_file.hpp>
 #include <dashpot/apps/analyze/table_writer.hpp>
-#include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
 
 #include <unistd.h>
 #include <CLI/CLI.hpp>

@@ -4,6 +4,7 @@
 #include <dashpot/controller/dynamics.hpp>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <optional>
 
 namespace dashpot::apps {
@@ -31,7 +32,11 @@ std::optional<Eigen::VectorXd> per_joint(const std::string& option, const std::s
 controller::Payload read_payload(const std::string& text) {
   controller::Payload payload;
   if (text.empty()) return payload;
-  const bool centered = text.find(',') != std::string::npos;
+  const auto commas = std::count(text.begin(), text.end(), ',');
+  if (commas != 0 && commas != 3) {
+    throw InputError("--payload", std::to_string(commas + 1) + " numbers, expected 1 or 4");
+  }
+  const bool centered = commas == 3;
   const Eigen::VectorXd values =
       parse_quantities("--payload", text, centered ? Units{"kg", "m", "m", "m"} : Units{"kg"});
   if (values[0] < 0) throw InputError("--payload", "the mass is negative");

@@ -1,7 +1,7 @@
+#include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/monitor/monitor_view.hpp>
-#include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/text/printable.hpp>
 

@@ -1,10 +1,10 @@
+#include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/run/csv_sink.hpp>
 #include <dashpot/apps/run/run_report.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
-#include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 
 #include <unistd.h>

@@ -156,7 +156,7 @@ TEST(DesignBesideWhatIsThere, RefusesOptionsThatDoNotFit) {
   };
   refused({"--viscous-friction", "1,2"}, "--viscous-friction: 2 numbers, expected 1 or 7");
   refused({"--reflected-inertia", "-1"}, "--reflected-inertia: a number is negative");
-  refused({"--payload", "1,2"}, "--payload: 1 or 4 numbers");
+  refused({"--payload", "1,2"}, "--payload: 2 numbers, expected 1 or 4");
   refused({"--payload", "-1"}, "--payload: the mass is negative");
   const Outcome idle = run_program({"design", "x.yaml", "--damping-ratio", "1", "--payload", "1"});
   EXPECT_THAT(idle.err, HasSubstr("--urdf: missing"));
