@@ -71,8 +71,7 @@ Status StateCheck::check(const RobotState& state) noexcept {
   timed_ = true;
   last_time_ = state.time;
   good_.age += backward ? period_ : gap;
-  good_.age = 1e-9 * std::round(1e9 * good_.age);  // so that gaps add up exactly
-  age_ = good_.age;
+  age_ = 1e-9 * std::round(1e9 * good_.age);  // so that gaps add up exactly
   doubtful_.age = gap;
 
   Status status = Status::kOk;
