@@ -1,4 +1,6 @@
 #pragma once
+#include <dashpot/analysis/types.hpp>
+
 #include <Eigen/Core>
 
 namespace dashpot::analysis {

@@ -3,6 +3,13 @@
 // largest number of degrees of freedom it can hold, in fixed storage and without any allocation, or
 // kDynamic for storage that is sized at set-up. Actual sizes are set at run time.
 
+#if !defined(EIGEN_MAX_ALIGN_BYTES) || EIGEN_MAX_ALIGN_BYTES != 64 || \
+    !defined(EIGEN_MAX_STATIC_ALIGN_BYTES) || EIGEN_MAX_STATIC_ALIGN_BYTES != 64
+#error \
+    "the libraries lay out Eigen's types otherwise: add -DEIGEN_MAX_ALIGN_BYTES=64 \
+-DEIGEN_MAX_STATIC_ALIGN_BYTES=64, or use the CMake targets or the pkg-config files"
+#endif
+
 #include <Eigen/Core>
 #include <cmath>
 #include <complex>

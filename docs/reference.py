@@ -15,7 +15,7 @@ TO_TREE = "../../../"
 
 
 def page(path):
-    return "index" if path == "README.md" else "md_" + path[:-3].replace("/", "_")
+    return "index" if path == "README.md" else "md_" + path[:-3].replace("/", "_").replace("-", "_")
 
 
 def link(path, text, target):

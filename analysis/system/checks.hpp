@@ -2,6 +2,8 @@
 // Checks of matrices at set-up. Each throws InvalidSystem with the key and a readable reason;
 // entries are counted from 1.
 
+#include <dashpot/analysis/types.hpp>
+
 #include <Eigen/Core>
 #include <stdexcept>
 #include <string>

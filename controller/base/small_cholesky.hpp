@@ -1,4 +1,6 @@
 #pragma once
+#include <dashpot/controller/types.hpp>
+
 #include <Eigen/Core>
 #include <cmath>
 

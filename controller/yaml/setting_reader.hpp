@@ -2,6 +2,7 @@
 // Reads one setting each. Where the key is not there, the value keeps what it holds: its default.
 // Everything wrong is an InputError that names key, entry, value, unit and line.
 
+#include <dashpot/controller/types.hpp>
 #include <dashpot/controller/yaml/yaml_mapping.hpp>
 
 #include <Eigen/Core>
