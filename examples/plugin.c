@@ -20,13 +20,18 @@ int main(int argc, char** argv) {
   int tick;
   uint32_t i;
 
-  arm = argc == 2 ? dashpot_create(argv[1]) : NULL;
+  if (argc != 2) {
+    fprintf(stderr, "usage: plugin CONFIG\n");
+    return 2;
+  }
+  arm = dashpot_create(argv[1]);
   if (arm == NULL) return failed("create");
   if (dashpot_start(arm, position, NULL) != DASHPOT_OK) return failed("start");
   for (tick = 1; tick <= 1000; ++tick) { /* every period, with what the robot reports */
     int32_t status;
     state.time = (int64_t)(1e9 * dashpot_period(arm)) * tick;
     status = dashpot_update(arm, &state, NULL, &output);
+    if (status < DASHPOT_OK) return failed("update"); /* no torque was written: stop the robot */
     if (status != DASHPOT_OK) printf("tick %d: %s\n", tick, dashpot_status_text(status));
   }
   printf("torque, N m:");

@@ -38,10 +38,14 @@ def main(path, config):
     for tick in range(1, 1001):  # every period, with what the robot reports
         state.time = round(1e9 * plugin.dashpot_period(arm)) * tick
         status = plugin.dashpot_update(arm, state, None, output)
+        if status < 0:  # no torque was written: stop the robot
+            sys.exit(plugin.dashpot_status_text(status).decode())
         if status != 0:
             print(f"tick {tick}: {plugin.dashpot_status_text(status).decode()}")
     print("torque, N m:", *(f"{value:.3f}" for value in torque))
     plugin.dashpot_destroy(arm)
 
 
+if len(sys.argv) != 3:
+    sys.exit("usage: plugin.py LIBRARY CONFIG")
 main(*sys.argv[1:])

@@ -11,6 +11,15 @@
 namespace dashpot::controller {
 namespace {
 
+/// Throws InvalidModel unless M is positive definite.
+Eigen::LLT<Eigen::MatrixXd> factored(const Eigen::MatrixXd& M) {
+  Eigen::LLT<Eigen::MatrixXd> llt(M);
+  if (llt.info() == Eigen::Success) return llt;
+  throw InvalidModel(
+      "the mass matrix is not positive definite in some posture: a link has an inertia that no "
+      "body has");
+}
+
 /// A golden-ratio sequence of postures.
 class Postures {
  public:
@@ -50,7 +59,7 @@ TipInertia least_tip_inertia(const RobotModel& model, const JointVector& lower,
   for (int k = 0; k < 64; ++k) {
     const DynamicsResult robot = evaluate(model, postures.next(), JointVector::Zero(model.dof()));
     const Eigen::MatrixXd M = robot.M, J = robot.J;
-    const Eigen::MatrixXd A = J * M.llt().solve(J.transpose());
+    const Eigen::MatrixXd A = J * factored(M).solve(J.transpose());
     mobility_linear = std::max(mobility_linear, A.topLeftCorner<3, 3>().trace());
     mobility_angular = std::max(mobility_angular, A.bottomRightCorner<3, 3>().trace());
   }
@@ -66,13 +75,13 @@ JointVector least_joint_inertia(const RobotModel& model, const JointVector& lowe
   Eigen::VectorXd mobility = Eigen::VectorXd::Zero(n);
   for (int k = 0; k < kPostures; ++k) {
     masses.emplace_back(evaluate(model, postures.next(), JointVector::Zero(n)).M);
-    const Eigen::MatrixXd inverse = masses.back().llt().solve(Eigen::MatrixXd::Identity(n, n));
+    const Eigen::MatrixXd inverse = factored(masses.back()).solve(Eigen::MatrixXd::Identity(n, n));
     mobility = mobility.cwiseMax(inverse.diagonal());
   }
   const Eigen::VectorXd inertia = mobility.cwiseInverse();
   double largest = 1;  // eigenvalue of M^-1 diag(inertia)
   for (const Eigen::MatrixXd& M : masses) {
-    const Eigen::MatrixXd L = M.llt().matrixL();
+    const Eigen::MatrixXd L = factored(M).matrixL();
     const Eigen::MatrixXd half =
         L.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd(inertia.cwiseSqrt().asDiagonal()));
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(half * half.transpose(),

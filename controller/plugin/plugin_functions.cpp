@@ -127,6 +127,7 @@ void dashpot_controller::reset(const JointVector& torque) noexcept {
   located_ = false;
   published_modes_ = 0;
   vibrations.write(controller_.vibration());  // there is none
+  snapshots.write(controller_.snapshot());    // likewise: that of tick 0
 }
 
 void dashpot_controller::forget_setpoint() noexcept {

@@ -70,12 +70,13 @@ class MotionWatch {
 
   bool first_ = true;
   double tip_speed_ = 0;
-  Vector q_, qd_;               ///< of the last tick
-  Vector torque_;               ///< applied since
-  Vector external_;             ///< r
-  Vector excess_;               ///< applied since
-  Vector before_;               ///< excess when the state was last seen to change
-  double same_ = 0;             ///< for how long it has not, s
+  Vector q_, qd_;    ///< of the last tick
+  Vector torque_;    ///< applied since
+  Vector external_;  ///< r
+  Vector excess_;    ///< applied since
+  Vector before_;    ///< excess when the state was last seen to change
+  double same_ = 0;  ///< for how long it has not, s
+  bool frozen_ = false;
   Vector peak_, last_peak_;     ///< of |qd| in this half swing and the last
   std::array<int, N> grown_{};  ///< half swings, one larger than the other
   Vector reversals_;            ///< share of the last ticks
@@ -103,6 +104,7 @@ template <int N>
 void MotionWatch<N>::reset() noexcept {
   first_ = true;
   tip_speed_ = same_ = 0;
+  frozen_ = false;
   for (Vector* vector :
        {&q_, &qd_, &torque_, &external_, &excess_, &before_, &peak_, &last_peak_, &reversals_}) {
     vector->setZero();
@@ -201,15 +203,16 @@ bool MotionWatch<N>::frozen(const Tick& tick) noexcept {
   if (!same) {
     same_ = 0;
     before_ = excess_;
+    frozen_ = false;
     return false;
   }
   same_ += tick.dt;
   if (same_ < frozen_after_) return false;
   for (int i = 0; i < N; ++i) {
     const double change = std::abs(excess_[i] - before_[i]);
-    if (change > 0.05 * torque_limit_[i] + coulomb_[i]) return true;
+    frozen_ |= change > 0.05 * torque_limit_[i] + coulomb_[i];
   }
-  return false;
+  return frozen_;  // until the state changes, also where the torque is as before again
 }
 
 }  // namespace dashpot::controller

@@ -27,10 +27,11 @@ inline double loop_lag(const Settings& settings) noexcept {
 ///   saturate while springs are in force, so that the wrench at the tip keeps its direction. So it
 ///   does where the power x' qd would be above Limits::power.
 /// - f takes away what drives a robot that is about as fast as its limits. With v the largest share
-///   of a velocity limit, of a joint or of the tip, x shrinks evenly by (0.95 - v) / 0.25 for v >
-///   0.7 where it adds energy (x' qd > 0). And from half its limit on, what drives a joint is
-///   bounded so that the torque-rate limit can still take it away in time:
-///     x_i <= min(sqrt(torque_rate_i I_i d), 0.4 I_i d / lag),   d = 0.9 velocity_i - |qd_i|.
+///   of a velocity limit, of a joint or of the tip, x shrinks evenly by (0.9 - v) / 0.25 for v >
+///   0.65 where it adds energy (x' qd > 0). And with u = |qd_i| / velocity_i > 0.5 what drives a
+///   joint is bounded so that the torque-rate limit can still take it away in time:
+///     x_i <= min(sqrt(torque_rate_i I_i d), 0.4 I_i d / lag) + torque_i max(0, 0.65 - u) / 0.15,
+///     d = 0.9 velocity_i - |qd_i|.
 ///   So nothing but the weight drives a joint further that moves at 0.9 of its limit or more, or
 ///   adds energy to a robot whose tip does.
 /// - Near a position limit, with m the margin, g the distance to the limit and y = (m - g) / m

@@ -8,6 +8,8 @@
 namespace dashpot::controller {
 namespace {
 
+constexpr double kFarthest = 1e6;  // rad (m): no joint gets there, and turns cannot be told there
+
 // Of wrong_rate: long enough for the jitter of a loop that is not in real time.
 constexpr int kIntervals = 50;
 constexpr double kFastest = -1.0 / 3, kSlowest = 0.5;  // mean interval / period - 1
@@ -92,6 +94,7 @@ Status StateCheck::check(const RobotState& state) noexcept {
   if (any_continuous_ && good_.any) unwrap(position, good_.position);
   if (!blind_) velocity_ = state.velocity;
   if (good_.any && (relocated || good_.age > longest_gap_)) {
+    if (blind_) velocity_.setZero();  // how fast a jump was means nothing
     forget_motion();
     intervals_ = 0;
     if (gap > longest_gap_) status = Status::kTimeGap;
@@ -140,8 +143,12 @@ bool StateCheck::follows(const Last& last, const RobotState& state) const noexce
   for (Eigen::Index i = 0; i < n_; ++i) {
     const double limit = velocity_limit_[i];
     const double before = last.velocity[i], now = state.velocity[i];
-    double moved = state.position[i] - last.position[i];
-    if (any_continuous_ && continuous_[static_cast<std::size_t>(i)]) moved -= whole_turns(moved);
+    double position = state.position[i];  // as `unwrap` takes it
+    if (std::abs(position) > kFarthest) return false;
+    if (any_continuous_ && continuous_[static_cast<std::size_t>(i)]) {
+      position += whole_turns(last.position[i] - position);
+    }
+    const double moved = position - last.position[i];
     const double apart = std::abs(moved - 0.5 * (before + now) * last.age);
     const double fastest = std::max(std::abs(before), std::abs(now));
     const bool near = std::abs(moved) <= 2 * last.age * limit + 1e-3;

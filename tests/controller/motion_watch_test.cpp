@@ -248,5 +248,20 @@ TEST_F(WatchedPair, LatchesAStateThatStaysTheSameForTwoFifthsOfTheTime) {
   EXPECT_EQ(ticks_until(Status::kStateFrozen, same, growing(0.2)), 0);
 }
 
+/// After a fault the weight alone acts, as before the freeze: that is no sign that it is over.
+TEST_F(WatchedPair, IsFrozenUntilTheStateChanges) {
+  settings.watchdog.feedback = 0.5;
+  make();
+  tick();
+  for (int k = 0; k < 300; ++k) tick({-20, 0});
+  for (int k = 0; k < 1000; ++k) ASSERT_EQ(tick(), Status::kStateFrozen) << k;
+  q[1] = std::nextafter(q[1], 1);
+  EXPECT_EQ(tick(), Status::kOk);
+  for (int k = 0; k < 300; ++k) tick({-20, 0});
+  EXPECT_EQ(tick(), Status::kStateFrozen);
+  watch->reset();
+  EXPECT_EQ(tick(), Status::kOk);
+}
+
 }  // namespace
 }  // namespace dashpot::controller

@@ -231,6 +231,21 @@ TEST_F(Check, FollowsAContinuousJointAcrossItsWrap) {
   EXPECT_EQ(next(), Status::kStateJump);
 }
 
+/// Where whole turns have no exact remainder any number would do.
+TEST_F(Check, TakesNoGarbageForAnAngle) {
+  for (const double garbage : {1.1e6, 1e16, -1e17, 1e20, -1e300}) {
+    for (const double last : {0.0, 0.5}) {
+      make();
+      state.position[1] = last;
+      check->reset();
+      EXPECT_EQ(next(), Status::kOk);
+      state.position[1] = garbage;
+      EXPECT_EQ(next(), Status::kStateJump) << garbage << " after " << last;
+      EXPECT_EQ(check->position()[1], last);
+    }
+  }
+}
+
 TEST_F(Check, IsNewAfterAReset) {
   settings.watchdog.feedback = 0.5;
   make();
