@@ -57,7 +57,7 @@ Eigen::VectorXd quantities_per_joint(const std::string& option, const std::strin
   if (given == 1) {
     for (std::size_t i = 1; i < units.size(); ++i) all += "," + text;
   }
-  const Eigen::VectorXd values = parse_quantities(option, all, units);
+  Eigen::VectorXd values = parse_quantities(option, all, units);
   if (values.minCoeff() < 0) throw InputError(option, "a number is negative");
   return values;
 }

@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/controller/yaml/setting_reader.hpp>
 
-#include <CLI/Validators.hpp>
+#include <CLI/CLI.hpp>
 #include <Eigen/Core>
 #include <string>
 
