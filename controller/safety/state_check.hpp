@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/controller/robot_model.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/status.hpp>
 

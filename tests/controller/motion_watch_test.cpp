@@ -1,4 +1,5 @@
 // The watch by itself, on two joints whose dynamics are given by hand.
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/safety/motion_watch.hpp>
 #include <dashpot/tests/support/chains.hpp>
 

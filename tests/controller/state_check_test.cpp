@@ -1,5 +1,6 @@
 // The check of states by itself: a hinge, a continuous joint and a slide, each as fast as 2 rad/s
 // (m/s).
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/safety/state_check.hpp>
 #include <dashpot/tests/support/chains.hpp>
 #include <dashpot/tests/support/matrices.hpp>
