@@ -3,7 +3,6 @@
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/safety/state_check.hpp>
 #include <dashpot/tests/support/chains.hpp>
-#include <dashpot/tests/support/matrices.hpp>
 
 #include <gtest/gtest.h>
 
@@ -14,8 +13,6 @@
 
 namespace dashpot::controller {
 namespace {
-
-using testing::near;
 
 class Check : public ::testing::Test {
  protected:
