@@ -26,7 +26,7 @@ const char* to_text(ModeKind kind) noexcept;
 enum class SpectrumOrigin {
   kTracked,  ///< the previous one, refined
   kReused,   ///< the previous one: the system has hardly changed
-  kDirect,   ///< solved anew
+  kDirect,   ///< solved directly
 };
 
 /// What follows from a mode's two eigenvalues; Mode has the same numbers.

@@ -2,7 +2,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/tracked_spectrum.hpp>
 #include <dashpot/analysis/tracker/step_prediction.hpp>
-#include <dashpot/analysis/tracker/tracked_certificate.hpp>
+#include <dashpot/analysis/tracker/tracked_enclosure.hpp>
 
 #include <cstdint>
 
@@ -15,9 +15,9 @@ struct TrackerOptions {
   /// more than rounding errors to refine.
   double target_bound = 1e-10;
   /// Evaluations of the basis in one update, before the direct solver is called.
-  int max_passes = 6;
+  int max_iterations = 6;
   /// Relative change of the coefficients up to which the last spectrum is used again, with bounds
-  /// that include the change: see distance() in tracked_certificate.hpp. Negative: never.
+  /// that include the change: see distance() in tracked_enclosure.hpp. Negative: never.
   double reuse_tolerance = 1e-14;
   bool shapes = true;  ///< fill TrackedSpectrum::shapes
 };
@@ -26,7 +26,7 @@ struct TrackerOptions {
 enum class Fallback {
   kStart,         ///< nothing to start from: the first call, other sizes, after a failure
   kNotSymmetric,  ///< damping or stiffness is not symmetric: always solved directly
-  kNotConverged,  ///< max_passes did not reach the target: a jump
+  kNotConverged,  ///< max_iterations did not reach the target: a jump
   kCoincidence,   ///< modes that could not be told apart
 };
 inline constexpr std::size_t kFallbackCount = 4;
@@ -36,13 +36,13 @@ struct TrackerCounters {
   /// They add up to `updates`.
   std::int64_t tracked = 0, reused = 0, direct = 0, failed = 0, unfinished = 0;
   std::array<std::int64_t, kFallbackCount> fallbacks{};  ///< calls of the direct solver
-  /// Of the tracked: damping that the undamped modes decouple, so that strains and velocities are
-  /// followed apart from each other
+  /// Of the tracked: damping that the undamped modes decouple, so that elastic coordinates and
+  /// velocities are followed apart from each other
   std::int64_t proportional = 0;
-  std::int64_t passes = 0;     ///< evaluations of the basis, in all
-  int most_passes = 0;         ///< in one update
-  std::int64_t repairs = 0;    ///< pairs of blocks parted anew
-  std::int64_t predicted = 0;  ///< updates that began with an extrapolated basis
+  std::int64_t iterations = 0;   ///< evaluations of the basis, in all
+  int most_iterations = 0;       ///< in one update
+  std::int64_t separations = 0;  ///< pairs of blocks parted again
+  std::int64_t predicted = 0;    ///< updates that began with an extrapolated basis
   std::int64_t shapes_skipped = 0;
 
   std::int64_t of(Fallback reason) const { return fallbacks[static_cast<std::size_t>(reason)]; }
@@ -67,8 +67,8 @@ class ModeTracker {
 
   /// Fills `out` and returns out.status: kOk or kUncertified if it has modes. Of the system,
   /// damping and mass are read, and stiffness_factor W if it has 1 to n rows: then K = W'W exactly
-  /// and `stiffness` is not read, nor are tails. Otherwise K = stiffness, which has to be positive
-  /// definite to be followed; semidefinite ones are solved directly on each call.
+  /// and `stiffness` is not read, nor are low words. Otherwise K = stiffness, which has to be
+  /// positive definite to be followed; semidefinite ones are solved directly on each call.
   Status update(const System<kMaxDof>& system, TrackedSpectrum& out) noexcept {
     Work work;
     return update(system, out, work);
@@ -78,14 +78,14 @@ class ModeTracker {
   /// could not be followed within the work granted is followed by a later update, if it can be.
   Status update(const System<kMaxDof>& system, TrackedSpectrum& out, Work& work) noexcept;
 
-  /// The next update starts anew; modes that it recognises keep their places.
+  /// The next update starts from scratch; modes that it recognises keep their places.
   void reset() noexcept { has_basis_ = false; }
   /// Forgets the past, but not what was counted: the next update is like the first.
   void forget() noexcept {
-    has_basis_ = has_places_ = false;
+    has_basis_ = has_indices_ = false;
     soft_ = {};
-    certificate_.noise = 0;
-    lineage_ = 0;
+    enclosure_.roundoff_bound = 0;
+    epoch_ = 0;
     look_in_ = 0;
   }
 
@@ -94,47 +94,49 @@ class ModeTracker {
   const TrackerCounters& counters() const noexcept { return counters_; }
 
  private:
-  bool reuse(const StateForm& form, double change, TrackedSpectrum& out) noexcept;
-  bool follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason, Work& work) noexcept;
-  bool refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason, Work& work) noexcept;
-  bool part(const Conflict& conflict, Work& work) noexcept;
-  bool publish(const StateForm& form, double distance, double target, bool fresh,
+  bool reuse(const SymmetricPencil& pencil, double change, TrackedSpectrum& out) noexcept;
+  bool follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Fallback& reason,
+              Work& work) noexcept;
+  bool refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Fallback& reason,
+              Work& work) noexcept;
+  bool separate(const CloseBlocks& close, Work& work) noexcept;
+  bool publish(const SymmetricPencil& pencil, double distance, double target, bool fresh,
                TrackedSpectrum& out) noexcept;
-  Status solve_directly(const System<kMaxDof>& system, const StateForm& form, Fallback reason,
-                        TrackedSpectrum& out, Work& work) noexcept;
+  Status solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil,
+                        Fallback reason, TrackedSpectrum& out, Work& work) noexcept;
   Status give_up(TrackedSpectrum& out) noexcept;
-  bool restart(const StateForm& form, TrackedSpectrum& out, Work& work) noexcept;
-  void publish_direct(const StateForm& form, bool symmetric, TrackedSpectrum& out) noexcept;
+  bool restart(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
+  void publish_direct(const SymmetricPencil& pencil, bool symmetric, TrackedSpectrum& out) noexcept;
 
   TrackerOptions options_;
   TrackerCounters counters_;
 
   // The last spectrum: the basis as it was evaluated, and the step that is still to be taken.
   bool has_basis_ = false;
-  bool evaluated_ = false;   ///< blocks and defect are those of the basis and of last_
-  bool has_places_ = false;  ///< basis_ says which mode is which
-  std::uint64_t lineage_ = 0;
+  bool evaluated_ = false;    ///< blocks and residual are those of the basis and of last_
+  bool has_indices_ = false;  ///< basis_ says which mode is which
+  std::uint64_t epoch_ = 0;
   System<kMaxDof> last_;
   CoefficientSizes sizes_;
-  TrackedBasis basis_;
-  TrackedDefect defect_;
-  TrackedCertificate certificate_;
-  PaddedRows E_;
+  BlockEigenbasis basis_;
+  TrackedResidual residual_;
+  TrackedEnclosure enclosure_;
+  PackedMatrix E_;
   std::array<bool, kMaxDof> soft_{};
   double bound_ = 0;      ///< its largest relative error bound
   TrackedSpectrum kept_;  ///< the last spectrum with bounds that hold for changes up to kept_for_,
   double kept_for_ = -1;  ///< see distance(); none if negative
 
-  PaddedRows step_;  ///< the whole step of this update so far
+  PackedMatrix step_;  ///< the whole step of this update so far
   StepPrediction prediction_;
   bool turned_ = false;  ///< columns were rotated or parted: the step tells nothing
   int look_in_ = 0;      ///< updates until proportional damping is looked for
 
-  PaddedRows velocities_, work_;
+  PackedMatrix velocities_, work_;
   System<kMaxDof> direct_;
   SpectrumSolver<kMaxDof> solver_;
   Spectrum<kMaxDof> spectrum_;
-  TrackedBasis before_;  ///< the basis of the last update
+  BlockEigenbasis before_;  ///< the basis of the last update
 };
 
 }  // namespace dashpot::analysis

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/spectrum/certificate.hpp>
+#include <dashpot/analysis/spectrum/enclosure.hpp>
 #include <dashpot/analysis/spectrum/spectrum_result.hpp>
 #include <dashpot/analysis/work.hpp>
 
@@ -50,8 +50,8 @@ class SpectrumSolver {
 
   SpectrumOptions options_;
   bool damped_ = true;
-  Defect<N> defect_;
-  Certificate<N> certificate_;
+  BasisResidual<N> residual_;
+  BlockEnclosure<N> enclosure_;
   ModalBasis<N> before_step_;
 };
 

@@ -25,13 +25,13 @@ struct System {
   /// and no digit is lost. No rows: not given.
   StiffnessFactor<N> stiffness_factor;
 
-  /// Optional low-order parts: the exact coefficients are damping + damping_tail and
-  /// stiffness + stiffness_tail. They carry what rounding took when the coefficients were formed
-  /// from others, such as K = J' K_C J. Read only if `has_tails`. The proved error bounds rely on
-  /// |tail| <= eps |coefficient| / 2 in every entry, which `validate` does not check.
-  Square<N> damping_tail;
-  Square<N> stiffness_tail;
-  bool has_tails = false;
+  /// Optional low-order parts: the exact coefficients are damping + damping_low and
+  /// stiffness + stiffness_low. They carry what rounding took when the coefficients were formed
+  /// from others, such as K = J' K_C J. Read only if `has_low_words`. The proved error bounds rely
+  /// on |tail| <= eps |coefficient| / 2 in every entry, which `validate` does not check.
+  Square<N> damping_low;
+  Square<N> stiffness_low;
+  bool has_low_words = false;
 
   System() : System(0) {}
   explicit System(Eigen::Index n)

@@ -31,8 +31,8 @@ Eigen::MatrixXd geometric_stiffness(const std::vector<Eigen::MatrixXd>& jacobian
 ///     K = stiffness + J' K_C J + K_G + J' C_C Jdot,     C = damping + J' C_C J.
 /// With nothing but a mass, C = K = 0.
 ///
-/// What rounding takes in forming the products is kept in the system's tails; where all of K comes
-/// from a positive semidefinite K_C = F F' (and a positive semidefinite joint stiffness), the
+/// What rounding takes in forming the products is kept in the system's low words; where all of K
+/// comes from a positive semidefinite K_C = F F' (and a positive semidefinite joint stiffness), the
 /// factor W = F' J (stacked) is kept too.
 ///
 /// mass, damping, stiffness, C_C and K_C have to be symmetric: a difference of at most 1e-10 of the

@@ -12,7 +12,7 @@ namespace dashpot::analysis {
 struct TrackedShapes {
   /// u in joint coordinates, n each, u^H M u = 1, largest entry real and positive. At critical
   /// damping both are the one eigenvector there is. Zero where an eigenvalue is exactly zero: that
-  /// of a strain which no motion changes.
+  /// of an elastic coordinate which no motion changes.
   std::array<ComplexVector<kMaxDof>, 2> u;
   /// u' (2 lambda M + C) u (no conjugation), 1/s: the scale of dual vectors and of sensitivities;
   /// zero at critical damping, and where coefficients are not symmetric
@@ -23,18 +23,25 @@ struct TrackedSpectrum {
   Status status = Status::kNotConverged;  ///< kUncertified: some bound is infinite
   SpectrumOrigin origin = SpectrumOrigin::kDirect;
   int mode_count = 0;
-  /// A mode keeps its place here along a path, as long as `lineage` stays the same: it grows when
-  /// modes cannot be recognised, because there are more or fewer of them, or the stiffness comes
-  /// with a factor where it came without one. After a jump or a failure modes take the places of
-  /// those that they resemble most.
-  std::uint64_t lineage = 0;
+  /// Index i denotes the same physical mode in successive updates while `epoch` is unchanged.
+  /// `epoch` increases when modes can no longer be matched: their number changed, or the stiffness
+  /// switched between factored and unfactored form. After a jump or a failure each mode gets the
+  /// index of the earlier mode that it resembles most.
+  std::uint64_t epoch = 0;
   std::array<ModeNumbers, kMaxDof> modes{};
-  /// Places of the modes by falling sqrt|l1 l2|: the natural frequency where there is one.
-  std::array<int, kMaxDof> by_frequency{};
-  /// Where asked for: of the modes, in the same places.
+  /// Indices of the modes by falling sqrt|l1 l2|, which is the natural frequency where there is
+  /// one.
+  std::array<int, kMaxDof> order{};
+  /// Eigenvectors of mode i, if TrackerOptions::shapes is set.
   std::array<TrackedShapes, kMaxDof> shapes;
   int zero_mode_count = 0;
   std::array<double, kMaxDof> zero_mode_rates{};  ///< eigenvalues of their velocities, 1/s
+
+  /// Returns a positive number that mode `index` keeps for as long as it can be matched. No other
+  /// mode gets it meanwhile; after 2^26 epochs numbers come back.
+  std::int32_t label(int index) const noexcept {
+    return static_cast<std::int32_t>((epoch - 1) % (1u << 26)) * kMaxDof + index + 1;
+  }
 };
 
 }  // namespace dashpot::analysis

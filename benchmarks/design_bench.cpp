@@ -6,9 +6,9 @@
 // of springs in the joints. design/region/n designs one matrix for 32 configurations of n joints on
 // one thread, design/map/n only judges one there; items_per_second counts configurations.
 #include <dashpot/analysis/damping_design.hpp>
-#include <dashpot/analysis/damping_hold.hpp>
 #include <dashpot/analysis/damping_region.hpp>
-#include <dashpot/analysis/joint_damping_hold.hpp>
+#include <dashpot/analysis/joint_ratio_damping.hpp>
+#include <dashpot/analysis/ratio_damping.hpp>
 
 #include <benchmark/benchmark.h>
 
@@ -20,9 +20,9 @@
 
 namespace {
 
-using dashpot::analysis::DampingHold;
 using dashpot::analysis::DampingTarget;
 using dashpot::analysis::kMaxDof;
+using dashpot::analysis::RatioDamping;
 using dashpot::analysis::Square;
 using dashpot::analysis::Status;
 using dashpot::analysis::TaskJacobian;
@@ -60,7 +60,7 @@ enum class Start { kWarm, kCold, kBesideFriction };
 
 void full(benchmark::State& state, Start start) {
   const Path path(state.range(0));
-  DampingHold hold(DampingTarget::constant(kRatio));
+  RatioDamping hold(DampingTarget::constant(kRatio));
   if (start == Start::kBesideFriction) hold.set_friction(Eigen::VectorXd::Ones(state.range(0)));
   hold.set_stiffness(path.stiffness);
   TaskMatrix C_C;
@@ -76,7 +76,7 @@ void full(benchmark::State& state, Start start) {
 
 void joint(benchmark::State& state) {
   const Path path(state.range(0));
-  dashpot::analysis::JointDampingHold hold;
+  dashpot::analysis::JointRatioDamping hold;
   hold.set_target(DampingTarget::constant(kRatio));
   hold.set_stiffness(500 * Eigen::MatrixXd::Identity(state.range(0), state.range(0)));
   Square<kMaxDof> C;

@@ -177,7 +177,7 @@ def backward_error_sentence(results):
 
 
 def passes_table(results):
-    """Of 6 modes: what a proved bound costs as passes are added, against solving directly."""
+    """Of 6 modes: what a proved bound costs as iterations are added, against solving directly."""
     lines = []
     for family in ("light_well", "critical_well", "heavy_well"):
         for method in ["moved_1e-11", "moved_1e-9", "moved_1e-7", "moved_1e-5", "moved_1e-3",
@@ -185,11 +185,11 @@ def passes_table(results):
             row = results.rows.get(f"spectrum_error/{family}/ours_{method}/6")
             if not row:
                 continue
-            passes = f"{row['passes']:4.2f} passes" if "passes" in row else ""
+            iterations = f"{row['iterations']:4.2f} iterations" if "iterations" in row else ""
             if row.get("direct_share", 0) > 0:
-                passes += f", {row['direct_share']:.0%} solved directly"
+                iterations += f", {row['direct_share']:.0%} solved directly"
             lines.append(f"  {family:14} {method:12} {us(microseconds(row)):>5} us  bound "
-                         f"{row['bound']:.1e}  error {row['error']:.1e}  {passes}")
+                         f"{row['bound']:.1e}  error {row['error']:.1e}  {iterations}")
     return lines
 
 
@@ -310,7 +310,7 @@ def main():
     print(text)
     print("Spectra, worst backward error (and time):")
     print("\n".join(backward_error_table(results)))
-    print("\nSpectra of 6 modes, time against proved bound as passes are added (relative change since")
+    print("\nSpectra of 6 modes, time against proved bound as iterations are added (relative change since")
     print("the last spectrum), and solved directly with residuals of growing precision:")
     print("\n".join(passes_table(results)))
     print("\nSimulation, the fastest to an accuracy (and how much slower the rival is):")

@@ -23,9 +23,9 @@ class ControllerCore;
 ///       ...                                      // send `torque`, whatever the status
 ///     }
 ///
-/// Read in this order: robot_model.hpp, dynamics.hpp, motion/setpoint_path.hpp, law/gain_path.hpp,
-/// law/held_damping.hpp, law/impedance_law.hpp, safety/safety_filter.hpp, vibration/vibration.hpp,
-/// and core/fixed_core.hpp, which calls them.
+/// Read in this order: robot_model.hpp, dynamics.hpp, motion/reference.hpp, law/gain_blend.hpp,
+/// law/designed_damping.hpp, law/impedance_law.hpp, safety/safety_filter.hpp,
+/// vibration/vibration.hpp, and core/fixed_core.hpp, which calls them.
 ///
 /// One thread at a time may use a Controller; `Latest` (latest.hpp) hands set-points to the thread
 /// of `update` and snapshots from it.

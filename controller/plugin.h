@@ -62,7 +62,7 @@ enum {
   DASHPOT_SETPOINT_STALE = 6,    /* the set-point is old: hold */
   DASHPOT_SETPOINT_LOST = 7,     /* the set-point is very old: damp */
   DASHPOT_FAULT_LATCHED = 8,     /* a fault is over, but was not released: damp */
-  DASHPOT_TOO_MANY_RESTARTS = 9, /* springs started anew too often: damp */
+  DASHPOT_TOO_MANY_RESTARTS = 9, /* springs started again too often: damp */
   DASHPOT_TIME_GAP = 10,         /* the last good state is too long ago: damp */
   DASHPOT_WRONG_RATE = 11,       /* the loop runs at another rate than the configured one: damp */
   DASHPOT_COLLISION = 12,        /* an external torque or force above its threshold: damp */
@@ -76,7 +76,7 @@ enum {
                                        the positions say */
   DASHPOT_STATE_NOT_FINITE = 20,    /* NaN or infinity in position or velocity: ramp */
   DASHPOT_STATE_WRONG_SIZE = 21,    /* the state is missing or has not n joints: ramp */
-  DASHPOT_STATE_JUMP = 22,          /* farther from the last state than the robot can move: ramp */
+  DASHPOT_STATE_JUMP = 22,          /* further from the last state than the robot can move: ramp */
   DASHPOT_TIME_BACKWARD = 23,       /* the state's time is at or before the last one: ramp */
   DASHPOT_NOT_FINITE = 24,          /* the torque would not be finite: ramp */
 
@@ -104,7 +104,7 @@ enum {
 enum {
   DASHPOT_TRACKED = 0, /* the modes before, refined */
   DASHPOT_REUSED = 1,  /* the modes before: nothing that matters has changed */
-  DASHPOT_DIRECT = 2   /* solved anew */
+  DASHPOT_DIRECT = 2   /* solved directly */
 };
 
 /* As dashpot_setpoint.time: given at the tick that takes it up. */
@@ -131,7 +131,7 @@ typedef struct dashpot_setpoint {
                                    time of the last one for the same */
   int32_t mode;                 /* DASHPOT_MODE_JOINT or DASHPOT_MODE_CARTESIAN */
   const double* joint_position; /* n, rad: the goal of the joint mode, and there wanted; otherwise
-                                   the rest posture, or NULL: the one there is */
+                                   the posture, or NULL: the one there is */
   const double* tip_position;   /* 3, of T in B, m: wanted in the Cartesian mode, else not used */
   const double* tip_rotation;   /* 3 x 3, turns T's axes into B's; likewise */
   const double* wrench;         /* 6, that the tip is to exert besides, N and N m; NULL: zero */
@@ -149,7 +149,7 @@ typedef struct dashpot_gains {
                                         that every mode of the task has this damping ratio, in place
                                         of task_damping; 0: C_C is task_damping. task_damping alone
                                         makes it 0, and does not go with one above 0. */
-  const double* null_stiffness;      /* n, not negative, N m/rad, toward the rest posture */
+  const double* null_stiffness;      /* n, not negative, N m/rad, toward the posture */
   const double* null_damping;        /* n, not negative, N m s/rad */
   const int32_t* frame;              /* in whose axes the 6 x 6 are: DASHPOT_FRAME_BASE or _TOOL */
   const uint8_t* directions;         /* 6, whether the task holds this direction of `frame` */
@@ -172,20 +172,21 @@ typedef struct dashpot_snapshot {
   uint32_t joints;   /* n */
   int64_t time;      /* of the state, ns */
   uint64_t tick;     /* counts from 1 */
-  uint64_t restarts; /* how often the springs started afresh, the first time included */
+  uint64_t restarts; /* how often the springs restarted, the first time included */
   int32_t status;    /* DASHPOT_OK, ... */
   int32_t fault;     /* the status that latched; DASHPOT_OK: none */
   int32_t mode;      /* DASHPOT_MODE_JOINT or DASHPOT_MODE_CARTESIAN */
   int32_t reserved;  /* 0 */
-  double position[DASHPOT_MAX_JOINTS];            /* rad */
-  double velocity[DASHPOT_MAX_JOINTS];            /* rad/s */
-  double torque[DASHPOT_MAX_JOINTS];              /* N m */
-  double tip_position[3];                         /* of T in B, m */
-  double tip_rotation[9];                         /* 3 x 3, turns T's axes into B's */
-  double goal_joint_position[DASHPOT_MAX_JOINTS]; /* where the springs are fixed just now, rad */
-  double goal_tip_position[3];                    /* m */
-  double goal_tip_rotation[9];                    /* 3 x 3 */
-  double law_torque[DASHPOT_MAX_JOINTS];          /* what the law asked for, before limits, N m */
+  double position[DASHPOT_MAX_JOINTS]; /* rad */
+  double velocity[DASHPOT_MAX_JOINTS]; /* rad/s */
+  double torque[DASHPOT_MAX_JOINTS];   /* N m */
+  double tip_position[3];              /* of T in B, m */
+  double tip_rotation[9];              /* 3 x 3, turns T's axes into B's */
+  double
+      reference_joint_position[DASHPOT_MAX_JOINTS]; /* where the springs are fixed just now, rad */
+  double reference_tip_position[3];                 /* m */
+  double reference_tip_rotation[9];                 /* 3 x 3 */
+  double law_torque[DASHPOT_MAX_JOINTS];            /* what the law asked for, before limits, N m */
   double tip_error[6];  /* goal less tip, m, and rotation vector from tip to goal, rad */
   double tip_wrench[6]; /* of Cartesian springs, dampers and feed-forward, N and N m */
 } dashpot_snapshot;
@@ -221,7 +222,7 @@ typedef struct dashpot_modes {
   /* Ticks since the start or the last reset, each of which counts once here, ... */
   uint64_t tracked;    /* the modes before were refined */
   uint64_t reused;     /* the modes before still held within their bounds */
-  uint64_t direct;     /* solved anew */
+  uint64_t direct;     /* solved directly */
   uint64_t unchanged;  /* joints and gains did not move at all: nothing was computed */
   uint64_t no_springs; /* nothing vibrates: nothing was solved */
   uint64_t failed;     /* no modes */
@@ -303,9 +304,9 @@ int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* stat
 int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);
 
 /* On the real-time thread: forgets history, faults and set-point, but not the gains; the next tick
- * holds the robot where it is, as the first one did, and until modes are found anew there are none.
- * The torque-rate limit counts from `torque` (n, N m), which the robot applies now; NULL: from the
- * last one put out, or, before the first tick, from the arm's weight. */
+ * holds the robot where it is, as the first one did, and until modes are found again there are
+ * none. The torque-rate limit counts from `torque` (n, N m), which the robot applies now; NULL:
+ * from the last one put out, or, before the first tick, from the arm's weight. */
 int32_t dashpot_reset(dashpot_controller* controller, const double* torque);
 
 /* On the other thread: the next tick releases a latched fault, unless its cause is still there, and

@@ -19,8 +19,8 @@ struct Joint {
   double upper = 0;              ///< rad; infinity for a continuous joint
   double velocity = 0;           ///< limit, rad/s, not negative; infinity if there is none
   double effort = 0;             ///< limit, N m, not negative; infinity if there is none
-  double damping = 0;            ///< viscous friction, N m s/rad
-  double friction = 0;           ///< Coulomb friction, N m
+  double viscous_friction = 0;   ///< viscous friction, N m s/rad
+  double coulomb_friction = 0;   ///< Coulomb friction, N m
   double reflected_inertia = 0;  ///< of rotor and gear, as seen by the joint, kg m^2 (kg)
 };
 
@@ -40,8 +40,8 @@ struct ModelOptions {
   /// that is more than the sum of the others. The mass matrix has to be positive definite still.
   bool accept_inertias = false;
   JointVector reflected_inertia;  ///< n, kg m^2; none in a URDF
-  JointVector damping;            ///< n, N m s/rad
-  JointVector friction;           ///< n, N m
+  JointVector viscous_friction;   ///< n, N m s/rad
+  JointVector coulomb_friction;   ///< n, N m
   Payload payload;
   Pose tool;  ///< the tool's frame T in the tip link
 };
@@ -59,7 +59,7 @@ class InvalidModel : public std::invalid_argument {
 /// their zero position. T is the tool's frame: the tip link, or ModelOptions::tool in it.
 ///
 /// The chain must be such that the mass matrix is positive definite: massless links are fine as
-/// long as something farther out resists each joint, or a reflected inertia does.
+/// long as something further out resists each joint, or a reflected inertia does.
 class RobotModel {
  public:
   /// Both throw InvalidModel; `name` stands for the file in messages.

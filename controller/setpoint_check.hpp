@@ -18,7 +18,7 @@ SetpointFault check_gains(const Gains& gains, Mode mode, Eigen::Index n) noexcep
 
 /// Whether a controller of an arm can go there: gains as above, and goals that are finite, within
 /// the position limits, at most 1e6 m away, not beyond a wall, and rotations within 1e-6. In mode
-/// kCartesian joint_position may have no entries: then the rest posture stays where it is. With
+/// kCartesian joint_position may have no entries: then the posture stays where it is. With
 /// `known_gains` the gains have passed before and are not checked again.
 SetpointFault check_setpoint(const Setpoint& setpoint, const Limits& limits,
                              bool known_gains = false) noexcept;

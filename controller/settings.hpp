@@ -64,9 +64,9 @@ struct Limits {
   /// vibrate, or push a joint back faster than a tenth of its velocity limit.
   double repulsion = 0.5;
   JointVector return_velocity;  ///< with which a joint outside its limits returns, n, rad/s; 0: not
-  /// The Cartesian springs are drawn out no farther than this, m and rad, however far away the goal
-  /// is: beyond it they pull no harder, and their path waits for the robot (see TipPath). A path
-  /// that is to brake within this is no faster than sqrt(acceleration times it).
+  /// The Cartesian springs are drawn out no further than this, m and rad, however far away the goal
+  /// is: beyond it they pull no harder, and their path waits for the robot (see TipReference). A
+  /// path that is to brake within this is no faster than sqrt(acceleration times it).
   double linear_error = 0.3;
   double angular_error = 1.0;
   /// Of the safe output "damp", n, N m s/rad, positive; less where the sampled loop would not bear

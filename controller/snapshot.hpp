@@ -14,26 +14,26 @@ namespace dashpot::controller {
 struct Snapshot {
   std::int64_t time = 0;       ///< ns, of the state
   std::uint64_t tick = 0;      ///< counted from 1
-  std::uint64_t restarts = 0;  ///< how often the springs started afresh, the first time included
+  std::uint64_t restarts = 0;  ///< how often the springs restarted, the first time included
   Status status = Status::kOk;
-  Status fault = Status::kOk;     ///< that latched, and was not released; kOk: none
-  Mode mode = Mode::kJoint;       ///< of the set-point in force
-  double joint_weight = 0;        ///< share of the joint springs, 0 to 1
-  double task_weight = 0;         ///< share of the Cartesian springs, 0 to 1
-  JointVector position;           ///< q, n, rad
-  JointVector velocity;           ///< qd, n, rad/s
-  JointVector torque;             ///< put out, n, N m
-  JointVector law_torque;         ///< what the law asked for before the limits, n, N m
-  JointVector setpoint_position;  ///< where the joint springs are fixed at this tick; the rest
-                                  ///< posture in mode kCartesian, n, rad
-  JointVector setpoint_velocity;  ///< n, rad/s
-  Pose tip;                       ///< p_BT_B, R_BT
-  Pose setpoint_tip;              ///< where the Cartesian springs are fixed at this tick; the tip's
-                                  ///< own pose while none is in force
-  Vector6 setpoint_twist = Vector6::Zero();  ///< its velocity, m/s and rad/s
-  JointVector joint_error;                   ///< setpoint_position - position, n, rad
-  Vector6 tip_error = Vector6::Zero();       ///< m, and rotation vector from tip to set-point, rad
-  Vector6 tip_wrench = Vector6::Zero();      ///< of the Cartesian springs, dampers and feed-forward
+  Status fault = Status::kOk;      ///< that latched, and was not released; kOk: none
+  Mode mode = Mode::kJoint;        ///< of the set-point in force
+  double joint_weight = 0;         ///< share of the joint springs, 0 to 1
+  double task_weight = 0;          ///< share of the Cartesian springs, 0 to 1
+  JointVector position;            ///< q, n, rad
+  JointVector velocity;            ///< qd, n, rad/s
+  JointVector torque;              ///< put out, n, N m
+  JointVector law_torque;          ///< what the law asked for before the limits, n, N m
+  JointVector reference_position;  ///< where the joint springs are fixed at this tick; the rest
+                                   ///< posture in mode kCartesian, n, rad
+  JointVector reference_velocity;  ///< n, rad/s
+  Pose tip;                        ///< p_BT_B, R_BT
+  Pose reference_tip;  ///< where the Cartesian springs are fixed at this tick; the tip's
+                       ///< own pose while none is in force
+  Vector6 reference_twist = Vector6::Zero();  ///< its velocity, m/s and rad/s
+  JointVector joint_error;                    ///< reference_position - position, n, rad
+  Vector6 tip_error = Vector6::Zero();        ///< m, and rotation vector from tip to set-point, rad
+  Vector6 tip_wrench = Vector6::Zero();  ///< of the Cartesian springs, dampers and feed-forward
 };
 
 /// One vibration mode of the closed loop; the terms are those of analysis::Mode.
@@ -57,14 +57,15 @@ struct VibrationCounters {
   // ... each of which counts once here, ...
   std::uint64_t tracked = 0;     ///< the modes before were refined
   std::uint64_t reused = 0;      ///< the modes before still hold within bounds that say so
-  std::uint64_t direct = 0;      ///< solved anew
+  std::uint64_t direct = 0;      ///< solved directly
   std::uint64_t unchanged = 0;   ///< joints and gains did not move at all: nothing was computed
   std::uint64_t no_springs = 0;  ///< nothing vibrates: nothing was solved
   std::uint64_t failed = 0;      ///< no modes: Vibration::status says why
   std::uint64_t missed = 0;      ///< the background thread was busy with an earlier one
   // ... and what some of them could leave out.
   std::uint64_t no_zero_modes = 0;  ///< springs hold every motion: nothing to keep apart
-  /// Of the tracked: the undamped modes decouple the damping, and strains are followed alone
+  /// Of the tracked: the undamped modes decouple the damping, and elastic coordinates are followed
+  /// alone
   std::uint64_t proportional = 0;
   std::uint64_t no_wrench = 0;  ///< K_G is on, but there is no external wrench
   std::uint64_t no_shapes = 0;  ///< nobody asks for shapes

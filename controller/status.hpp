@@ -34,7 +34,7 @@ enum class Status : std::uint8_t {
   kSetpointLost,   ///< older than the second time-out: damp
   // The state cannot go on like this: damp, and the fault latches:
   kFaultLatched,        ///< none of the following any more, but one was and was not released
-  kTooManyRestarts,     ///< springs started anew more than three times within about a second
+  kTooManyRestarts,     ///< springs started again more than three times within about a second
   kTimeGap,             ///< more than the longest gap since the last tick
   kWrongRate,           ///< ticks come at less than 2/3 or more than 3/2 of the configured rate
   kCollision,           ///< an external torque or force above its threshold
@@ -48,7 +48,7 @@ enum class Status : std::uint8_t {
   // The state cannot be trusted: ramp:
   kStateNotFinite,  ///< NaN or infinity
   kStateWrongSize,  ///< not n entries
-  kStateJump,       ///< a position or velocity farther from the last than the robot can move
+  kStateJump,       ///< a position or velocity further from the last than the robot can move
   kTimeBackward,    ///< time stamp at or before that of the last tick
   kNotFinite,       ///< the law gave a NaN or infinity
 };

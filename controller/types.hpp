@@ -41,7 +41,7 @@ struct RobotState {
 /// Where the springs are fixed.
 enum class Mode : std::uint8_t {
   kJoint,      ///< to a joint position
-  kCartesian,  ///< to a pose of the tip; a redundant arm also to a rest posture
+  kCartesian,  ///< to a pose of the tip; a redundant arm also to a posture
 };
 
 /// In whose axes K_C, C_C and `directions` are given.
@@ -63,14 +63,14 @@ struct Gains {
   double joint_damping_ratio = 0;
   Matrix6 task_stiffness = Matrix6::Zero();  ///< K_C, N/m, N/rad and N m/rad
   Matrix6 task_damping = Matrix6::Zero();    ///< C_C, N s/m, N s/rad and N m s/rad
-  /// Damping ratio that every mode of K_C is to have, 0 < ratio <= 2: C_C is then designed anew at
-  /// every tick (see HeldDamping) and task_damping is not used. 0: C_C is task_damping.
+  /// Damping ratio that every mode of K_C is to have, 0 < ratio <= 2: C_C is then designed again at
+  /// every tick (see DesignedDamping) and task_damping is not used. 0: C_C is task_damping.
   double task_damping_ratio = 0;
   Frame frame = Frame::kBase;
   /// Task directions that the controller holds, in the axes of `frame`; the rest are as free as
   /// the self-motion of a redundant arm.
   std::array<bool, 6> directions{true, true, true, true, true, true};
-  JointVector null_stiffness;  ///< n, N m/rad, toward the rest posture, within the free motions
+  JointVector null_stiffness;  ///< n, N m/rad, toward the posture, within the free motions
   JointVector null_damping;    ///< n, N m s/rad, within the free motions
 };
 
@@ -79,7 +79,7 @@ struct Gains {
 struct Setpoint {
   std::int64_t time = 0;  ///< ns, when it was given, on the clock of RobotState::time
   Mode mode = Mode::kJoint;
-  JointVector joint_position;        ///< goal of mode kJoint; rest posture of mode kCartesian
+  JointVector joint_position;        ///< goal of mode kJoint; posture of mode kCartesian
   Pose tip_pose;                     ///< goal of mode kCartesian
   Vector6 wrench = Vector6::Zero();  ///< that the tip is to exert besides, N and N m
   Gains gains;

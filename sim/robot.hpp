@@ -26,16 +26,16 @@ struct Joint {
   double upper = 0;
   double effort = 0;    ///< largest torque, N m or N; infinite if there is none
   double velocity = 0;  ///< largest velocity, rad/s or m/s; for information, nothing enforces it
-  double armature = 0;  ///< reflected inertia of the drive, kg m^2 or kg
-  double viscous = 0;   ///< friction, N m s/rad or N s/m
-  double coulomb = 0;   ///< friction, N m or N
+  double reflected_inertia = 0;  ///< reflected inertia of the drive, kg m^2 or kg
+  double viscous_friction = 0;   ///< friction, N m s/rad or N s/m
+  double coulomb_friction = 0;   ///< friction, N m or N
 };
 
 /// What the file does not know, or what is to override it. An empty vector: as in the file.
 struct RobotParameters {
-  JointVector armature;                  ///< n, kg m^2; files have none, so empty is zero
-  JointVector viscous;                   ///< n, N m s/rad
-  JointVector coulomb;                   ///< n, N m
+  JointVector reflected_inertia;         ///< n, kg m^2; files have none, so empty is zero
+  JointVector viscous_friction;          ///< n, N m s/rad
+  JointVector coulomb_friction;          ///< n, N m
   Inertia payload;                       ///< rigid at the tip, in the tip's axes
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< m/s^2, in the axes of the file's root link
   bool accept_inertias = false;          ///< links may have principal moments below zero

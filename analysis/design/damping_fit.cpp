@@ -121,7 +121,7 @@ std::vector<DampingFit::Residual> DampingFit::of_sample(const DampingSample& sam
   System<> system = sample.system;
   const MatrixXd C = sample.map * X * sample.map.transpose();
   system.damping += 0.5 * (C + C.transpose());
-  system.has_tails = false;
+  system.has_low_words = false;
   SpectrumOptions options;
   options.residual = SpectrumOptions::Residual::kWorking;
   SpectrumSolver<> solver(options);

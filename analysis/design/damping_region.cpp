@@ -71,7 +71,7 @@ RegionDesign evaluate(const std::vector<DampingSample>& samples, const DampingFi
     System<> system = samples[i].system;
     const MatrixXd C = samples[i].map * damping * samples[i].map.transpose();
     system.damping += 0.5 * (C + C.transpose());
-    system.has_tails = false;
+    system.has_low_words = false;
     design.samples[i] = read(analyze(system), options.target);
   });
   double smallest = std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-#include <dashpot/analysis/sampled/unit_loop.hpp>
+#include <dashpot/analysis/sampled/sampled_data_model.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
 
@@ -17,9 +17,9 @@ using Eigen::VectorXcd;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Largest |z| with |log z| >= slowest.
-double radius(const UnitLoop& loop, double slowest) {
+double radius(const SampledDataModel& loop, double slowest) {
   double result = 0;
-  for (const Complex z : loop.multipliers()) {
+  for (const Complex z : loop.discrete_eigenvalues()) {
     if (slowest > 0 && z != 0.0 && modulus(std::log(z)) < slowest) continue;
     result = std::max(result, modulus(z));
   }
@@ -30,7 +30,8 @@ double radius(const UnitLoop& loop, double slowest) {
 /// the continuous one to a zero of
 ///     lambda^2 + lambda D + G + h(lambda) (K - G + lambda e^(-lambda/2 if differenced) (C - D)),
 /// h = e^(-lambda (d + 1/2)) times the filter.
-Complex delayed(const UnitLoop& loop, Complex lambda, const VectorXcd& u, const VectorXcd& y) {
+Complex delayed(const SampledDataModel& loop, Complex lambda, const VectorXcd& u,
+                const VectorXcd& y) {
   Complex h = std::exp(-lambda * (loop.delay + 0.5));
   h *= loop.filter_gain / (1.0 - (1 - loop.filter_gain) * std::exp(-lambda));
   const Complex v = lambda * (loop.difference ? std::exp(-0.5 * lambda) : Complex(1));
@@ -109,7 +110,7 @@ SampledMode to_mode(std::array<Complex, 2> z, double period) {
 
 template <int N>
 std::vector<Wanted> list_wanted(const System<N>& system, const Spectrum<N>& spectrum,
-                                const UnitLoop& loop, double T) {
+                                const SampledDataModel& loop, double T) {
   const Eigen::LLT<MatrixXd> mass{MatrixXd(system.mass)};
   const auto unit = [&](const ComplexVector<N>& u) -> VectorXcd {
     VectorXcd w(u.size());
@@ -133,7 +134,7 @@ std::vector<Wanted> list_wanted(const System<N>& system, const Spectrum<N>& spec
   }
   std::sort(rates.begin(), rates.end(),
             [](double a, double b) { return std::abs(a) > std::abs(b); });
-  const Index r = loop.zero_modes.cols(), damped = 2 * r - loop.motions_of_one().cols();
+  const Index r = loop.zero_modes.cols(), damped = 2 * r - loop.unit_motions().cols();
   rates.resize(std::min(rates.size(), static_cast<std::size_t>(damped)));
   for (const double rate : rates) wanted.push_back({{rate, rate}});
   return wanted;
@@ -144,8 +145,8 @@ std::vector<Wanted> list_wanted(const System<N>& system, const Spectrum<N>& spec
 template <int N>
 SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum,
                             const SampledLoop& loop) {
-  const UnitLoop unit(system, spectrum, loop);
-  const VectorXcd z = unit.multipliers();
+  const SampledDataModel unit(system, spectrum, loop);
+  const VectorXcd z = unit.discrete_eigenvalues();
   std::vector<Wanted> wanted = list_wanted(system, spectrum, unit, loop.period);
   SampledSpectrum result;
   result.spectral_radius = z.size() > 0 ? z.cwiseAbs().maxCoeff() : 0;
@@ -185,9 +186,9 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
                    double most, double slowest) {
-  const UnitLoop unit(system, spectrum, loop);
+  const SampledDataModel unit(system, spectrum, loop);
   const auto stable = [&](double factor) {
-    UnitLoop scaled = unit;
+    SampledDataModel scaled = unit;
     scaled.K *= factor;
     scaled.C = unit.D + factor * (unit.C - unit.D);
     return radius(scaled, slowest * loop.period) < 1;

@@ -21,7 +21,7 @@ struct SampledLoop {
 
 /// A mode as it is with the loop closed once a tick.
 struct SampledMode {
-  std::array<Complex, 2> multipliers{};  ///< z: a complex pair or two real ones
+  std::array<Complex, 2> discrete_eigenvalues{};  ///< z: a complex pair or two real ones
   std::array<Complex, 2> eigenvalues{};  ///< log(z) / T, 1/s: a complex pair or two real ones
   double natural_frequency = 0;          ///< rad/s; NaN if the eigenvalues' product is negative
   double damping_ratio = 0;

@@ -22,13 +22,13 @@ struct BlockRoot : Root {
 };
 
 template <int N>
-class Reader {
+class ModeExtractor {
  public:
-  Reader(const System<N>& system, const Defect<N>& defect, const Certificate<N>& certificate,
-         double soft_frequency, Spectrum<N>& spectrum)
+  ModeExtractor(const System<N>& system, const BasisResidual<N>& residual,
+                const BlockEnclosure<N>& enclosure, double soft_frequency, Spectrum<N>& spectrum)
       : system_(system),
-        defect_(defect),
-        certificate_(certificate),
+        residual_(residual),
+        enclosure_(enclosure),
         basis_(spectrum.basis),
         spectrum_(spectrum),
         soft_frequency_(soft_frequency),
@@ -61,8 +61,8 @@ class Reader {
   ComplexVector<N> shape(int i, bool left, StateVector<N>& re, StateVector<N>& im) const;
 
   const System<N>& system_;
-  const Defect<N>& defect_;
-  const Certificate<N>& certificate_;
+  const BasisResidual<N>& residual_;
+  const BlockEnclosure<N>& enclosure_;
   const ModalBasis<N>& basis_;
   Spectrum<N>& spectrum_;
   double soft_frequency_, M_norm_, C_norm_, K_norm_;
@@ -72,18 +72,18 @@ class Reader {
   int root_count_ = 0;
 };
 
-/// Whether the certificate speaks of this block by itself.
+/// Whether the enclosure speaks of this block by itself.
 template <int N>
-bool Reader<N>::alone(int block) const {
+bool ModeExtractor<N>::alone(int block) const {
   int members = 0;
   for (int k = 0; k < basis_.blocks.size(); ++k) {
-    if (certificate_.group[k] == certificate_.group[block]) ++members;
+    if (enclosure_.group[k] == enclosure_.group[block]) ++members;
   }
   return members == 1;
 }
 
 template <int N>
-void Reader<N>::list_roots() {
+void ModeExtractor<N>::list_roots() {
   if constexpr (N == kDynamic) roots_.resize(static_cast<std::size_t>(basis_.U.cols()));
   root_count_ = 0;
   for (int k = 0; k < basis_.blocks.size(); ++k) {
@@ -101,7 +101,7 @@ void Reader<N>::list_roots() {
     }
     // Backward error of the block's own QR iteration, generously.
     const double radius =
-        certificate_.radius[k] + (b.size > 2 ? 64 * b.size : 8) * b.size * kUnit * Lambda.norm();
+        enclosure_.radius[k] + (b.size > 2 ? 64 * b.size : 8) * b.size * kUnit * Lambda.norm();
     for (int e = 0; e < b.size; ++e) {
       BlockRoot& r = root(root_count_++);
       r = BlockRoot{};
@@ -115,10 +115,10 @@ void Reader<N>::list_roots() {
 
 /// Where discs of one group meet, all that is known is how many eigenvalues their union holds.
 template <int N>
-void Reader<N>::bound_roots() {
+void ModeExtractor<N>::bound_roots() {
   StateVector<N> total(root_count_);
   const auto meet = [&](int j, int k) {
-    return certificate_.group[root(j).block] == certificate_.group[root(k).block] &&
+    return enclosure_.group[root(j).block] == enclosure_.group[root(k).block] &&
            modulus(root(j).value - root(k).value) <= root(j).bound + root(k).bound;
   };
   for (int i = 0; i < root_count_; ++i) {
@@ -147,7 +147,7 @@ void Reader<N>::bound_roots() {
 }
 
 template <int N>
-void Reader<N>::take_zero_rates() {
+void ModeExtractor<N>::take_zero_rates() {
   const int r = spectrum_.zero_modes.count;
   spectrum_.zero_mode_rates = Vector<N>::Zero(r);
   int found = 0;
@@ -164,7 +164,7 @@ void Reader<N>::take_zero_rates() {
       if (root(i).used || root(i).value.imag() != 0) continue;
       const Block& b = basis_.blocks[root(i).block];
       if (b.size != 1) continue;
-      const auto momentum = defect_.MU.col(b.first);
+      const auto momentum = residual_.MU.col(b.first);
       const double kinetic = basis_.U.col(b.first).dot(momentum);
       const bool negative = basis_.weight(b.first, b.first) < 0;
       const double share =
@@ -186,7 +186,7 @@ void Reader<N>::take_zero_rates() {
 /// other real ones by the likeness of their shapes, one of each sign type where the system is
 /// symmetric.
 template <int N>
-void Reader<N>::pair_roots() {
+void ModeExtractor<N>::pair_roots() {
   for (int i = 0; i < root_count_; ++i) {
     if (root(i).used || root(i).partner >= 0) continue;
     for (int j = i + 1; j < root_count_; ++j) {
@@ -206,10 +206,10 @@ void Reader<N>::pair_roots() {
   const auto likeness = [&](int i, int j) {
     const Eigen::Index ci = basis_.blocks[root(i).block].first;
     const Eigen::Index cj = basis_.blocks[root(j).block].first;
-    const double overlap = basis_.U.col(ci).dot(defect_.MU.col(cj));
+    const double overlap = basis_.U.col(ci).dot(residual_.MU.col(cj));
     const double score =
         overlap * overlap /
-        (basis_.U.col(ci).dot(defect_.MU.col(ci)) * basis_.U.col(cj).dot(defect_.MU.col(cj)));
+        (basis_.U.col(ci).dot(residual_.MU.col(ci)) * basis_.U.col(cj).dot(residual_.MU.col(cj)));
     return basis_.weight(ci, ci) * basis_.weight(cj, cj) < 0 ? score + 2 : score;
   };
   State<N> scores(root_count_, root_count_);
@@ -232,13 +232,13 @@ void Reader<N>::pair_roots() {
 }
 
 template <int N>
-Invariants Reader<N>::invariants(int i, int j) const {
+Invariants ModeExtractor<N>::invariants(int i, int j) const {
   const Block& block = basis_.blocks[root(i).block];
   Invariants v = root_invariants(root(i), root(j));
   if (root(i).block == root(j).block && block.size == 2) {
     const auto L = basis_.Lambda.block(block.first, block.first, 2, 2);
     const Invariants of_block =
-        block_invariants(L(0, 0), L(0, 1), L(1, 0), L(1, 1), certificate_.radius[root(i).block]);
+        block_invariants(L(0, 0), L(0, 1), L(1, 0), L(1, 1), enclosure_.radius[root(i).block]);
     if (alone(root(i).block)) return of_block;
     // In a group with other blocks only the discs are known.
     v.sum = of_block.sum;
@@ -249,7 +249,7 @@ Invariants Reader<N>::invariants(int i, int j) const {
 }
 
 template <int N>
-void Reader<N>::write_numbers(int i, int j, Mode<N>& mode) const {
+void ModeExtractor<N>::write_numbers(int i, int j, Mode<N>& mode) const {
   const ModeNumbers numbers = mode_numbers(root(i), root(j), invariants(i, j), soft_frequency_);
   mode.eigenvalues = numbers.eigenvalues;
   mode.natural_frequency = numbers.natural_frequency;
@@ -264,7 +264,8 @@ void Reader<N>::write_numbers(int i, int j, Mode<N>& mode) const {
 /// Eigenvector of root i in joint coordinates, and its coefficients (re, im) in the block's
 /// columns.
 template <int N>
-ComplexVector<N> Reader<N>::shape(int i, bool left, StateVector<N>& re, StateVector<N>& im) const {
+ComplexVector<N> ModeExtractor<N>::shape(int i, bool left, StateVector<N>& re,
+                                         StateVector<N>& im) const {
   const Block& b = basis_.blocks[root(i).block];
   const Complex mu = root(i).value;
   const auto& matrix = left ? basis_.Gamma : basis_.Lambda;
@@ -306,7 +307,7 @@ ComplexVector<N> Reader<N>::shape(int i, bool left, StateVector<N>& re, StateVec
   if (left) {
     energy = x.dot(system_.mass * x) + y.dot(system_.mass * y);
   } else {
-    const auto momenta = defect_.MU.middleCols(b.first, b.size);
+    const auto momenta = residual_.MU.middleCols(b.first, b.size);
     energy = x.dot(momenta.lazyProduct(re)) + y.dot(momenta.lazyProduct(im));
   }
   const double norm = std::sqrt(energy);
@@ -324,7 +325,7 @@ ComplexVector<N> Reader<N>::shape(int i, bool left, StateVector<N>& re, StateVec
 }
 
 template <int N>
-void Reader<N>::write_shapes(int i, int j, Mode<N>& mode) const {
+void ModeExtractor<N>::write_shapes(int i, int j, Mode<N>& mode) const {
   mode.backward_error = mode.condition = 0;
   const std::array<int, 2> which =
       root(i).value == mode.eigenvalues[0] ? std::array<int, 2>{i, j} : std::array<int, 2>{j, i};
@@ -352,8 +353,8 @@ void Reader<N>::write_shapes(int i, int j, Mode<N>& mode) const {
       }
       return x;
     };
-    const ComplexVector<N> Mu = combine(defect_.MU), Cu = combine(defect_.CU),
-                           Ku = combine(defect_.KU);
+    const ComplexVector<N> Mu = combine(residual_.MU), Cu = combine(residual_.CU),
+                           Ku = combine(residual_.KU);
     const double size = std::norm(mu) * M_norm_ + modulus(mu) * C_norm_ + K_norm_;
     const double u_norm = mode.shapes[k].norm(), y_norm = mode.left_shapes[k].norm();
     const double residual = (mu * mu * Mu + mu * Cu + Ku).norm();
@@ -366,7 +367,7 @@ void Reader<N>::write_shapes(int i, int j, Mode<N>& mode) const {
 }
 
 template <int N>
-void Reader<N>::write_modes() {
+void ModeExtractor<N>::write_modes() {
   int count = 0;
   for (int i = 0; i < root_count_; ++i) count += !root(i).used && root(i).partner > i ? 1 : 0;
   spectrum_.modes.resize(count);  // two roots of 2n each: n at most
@@ -396,9 +397,10 @@ void Reader<N>::write_modes() {
 }  // namespace
 
 template <int N>
-void read_modes(const System<N>& system, const Defect<N>& defect, const Certificate<N>& certificate,
-                double soft_frequency, Spectrum<N>& spectrum) noexcept {
-  Reader<N>(system, defect, certificate, soft_frequency, spectrum).read();
+void read_modes(const System<N>& system, const BasisResidual<N>& residual,
+                const BlockEnclosure<N>& enclosure, double soft_frequency,
+                Spectrum<N>& spectrum) noexcept {
+  ModeExtractor<N>(system, residual, enclosure, soft_frequency, spectrum).read();
 }
 
 template <int N>
@@ -415,10 +417,10 @@ Quality worst_quality(const Spectrum<N>& spectrum) noexcept {
   return worst;
 }
 
-template void read_modes(const System<kDynamic>&, const Defect<kDynamic>&,
-                         const Certificate<kDynamic>&, double, Spectrum<kDynamic>&) noexcept;
-template void read_modes(const System<kMaxDof>&, const Defect<kMaxDof>&,
-                         const Certificate<kMaxDof>&, double, Spectrum<kMaxDof>&) noexcept;
+template void read_modes(const System<kDynamic>&, const BasisResidual<kDynamic>&,
+                         const BlockEnclosure<kDynamic>&, double, Spectrum<kDynamic>&) noexcept;
+template void read_modes(const System<kMaxDof>&, const BasisResidual<kMaxDof>&,
+                         const BlockEnclosure<kMaxDof>&, double, Spectrum<kMaxDof>&) noexcept;
 template Quality worst_quality(const Spectrum<kDynamic>&) noexcept;
 template Quality worst_quality(const Spectrum<kMaxDof>&) noexcept;
 

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/spectrum/certificate.hpp>
+#include <dashpot/analysis/spectrum/enclosure.hpp>
 #include <dashpot/analysis/spectrum/spectrum_result.hpp>
 
 namespace dashpot::analysis {
@@ -9,8 +9,9 @@ namespace dashpot::analysis {
 /// which is the natural frequency where there is one. `soft_frequency` in rad/s.
 /// Fills spectrum.modes and zero_mode_rates from spectrum.basis and zero_modes.
 template <int N>
-void read_modes(const System<N>& system, const Defect<N>& defect, const Certificate<N>& certificate,
-                double soft_frequency, Spectrum<N>& spectrum) noexcept;
+void read_modes(const System<N>& system, const BasisResidual<N>& residual,
+                const BlockEnclosure<N>& enclosure, double soft_frequency,
+                Spectrum<N>& spectrum) noexcept;
 
 /// How good a spectrum is, at its worst mode.
 struct Quality {

@@ -137,12 +137,12 @@ double block_separation(const State<N>& Lambda, const Block& a, const Block& b) 
 }
 
 template <int N>
-void newton_step(const Defect<N>& defect, ModalBasis<N>& basis) noexcept {
+void newton_step(const BasisResidual<N>& residual, ModalBasis<N>& basis) noexcept {
   const Eigen::Index states = basis.U.cols();
   State<N> X = State<N>::Zero(states, states), right, x;
   // F from the whole Gram matrix: then U F = 0 holds to rounding, which keeps U (I + X) and its
   // velocities consistent even where blocks are nearly parallel.
-  State<N> F = -defect.W, gram = defect.gram;
+  State<N> F = -residual.W, gram = residual.gram;
   solve_in_place(gram, F, std::numeric_limits<double>::min());
   for (const Block& bi : basis.blocks) {
     const auto A = basis.Lambda.block(bi.first, bi.first, bi.size, bi.size);
@@ -160,7 +160,7 @@ void newton_step(const Defect<N>& defect, ModalBasis<N>& basis) noexcept {
   basis.U += (basis.U * X).eval();
   for (const Block& b : basis.blocks) {
     if (b.zero_mode && b.size == 2 && basis.Lambda(b.first + 1, b.first + 1) != 0) {
-      basis.Lambda(b.first + 1, b.first + 1) += defect.F(b.first + 1, b.first + 1);
+      basis.Lambda(b.first + 1, b.first + 1) += residual.F(b.first + 1, b.first + 1);
     }
   }
 }
@@ -171,8 +171,8 @@ template double block_separation<kMaxDof>(const State<kMaxDof>&, const Block&,
                                           const Block&) noexcept;
 template std::int64_t sylvester_work(const BlockList<kDynamic>&) noexcept;
 template std::int64_t sylvester_work(const BlockList<kMaxDof>&) noexcept;
-template void newton_step(const Defect<kDynamic>&, ModalBasis<kDynamic>&) noexcept;
-template void newton_step(const Defect<kMaxDof>&, ModalBasis<kMaxDof>&) noexcept;
+template void newton_step(const BasisResidual<kDynamic>&, ModalBasis<kDynamic>&) noexcept;
+template void newton_step(const BasisResidual<kMaxDof>&, ModalBasis<kMaxDof>&) noexcept;
 template double solve_sylvester<kDynamic>(const Eigen::Ref<const State<kDynamic>>&,
                                           const Eigen::Ref<const State<kDynamic>>&,
                                           const State<kDynamic>&, State<kDynamic>&) noexcept;

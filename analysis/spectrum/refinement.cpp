@@ -108,29 +108,30 @@ WideDoubleDouble<N> times_blocks_extended(Left&& X, const ModalBasis<N>& basis) 
 /// In double-double arithmetic, rounded once at the end: the residual
 /// R = K U + C U Lambda + M U Lambda^2, and the Gram matrix Y' (C U + M U Lambda) + (Y Gamma)' M U.
 template <int N>
-void evaluate_extended(const System<N>& system, const ModalBasis<N>& basis, Defect<N>& defect) {
+void evaluate_extended(const System<N>& system, const ModalBasis<N>& basis,
+                       BasisResidual<N>& residual) {
   const Eigen::Index n = system.dof();
   WideDoubleDouble<N> V = times_blocks_extended<N>(basis.U, basis);
   WideDoubleDouble<N> A = times_blocks_extended<N>(V, basis);
   WideDoubleDouble<N> momentum(n), tested(n);
   for (Eigen::Index j = 0; j < 2 * n; ++j) {
     for (Eigen::Index i = 0; i < n; ++i) {
-      DotAccumulator residual, p, t;
+      DotAccumulator row, p, t;
       for (Eigen::Index k = 0; k < n; ++k) {
         const double u = basis.U(k, j);
-        residual.add(u, system.stiffness(i, k));
-        residual.add(V(k, j), system.damping(i, k));
-        residual.add(A(k, j), system.mass(i, k));
+        row.add(u, system.stiffness(i, k));
+        row.add(V(k, j), system.damping(i, k));
+        row.add(A(k, j), system.mass(i, k));
         p.add(u, system.mass(i, k));
         t.add(u, system.damping(i, k));
         t.add(V(k, j), system.mass(i, k));
-        if (system.has_tails) {
-          residual.add(u, system.stiffness_tail(i, k));
-          residual.add(V(k, j), system.damping_tail(i, k));
-          t.add(u, system.damping_tail(i, k));
+        if (system.has_low_words) {
+          row.add(u, system.stiffness_low(i, k));
+          row.add(V(k, j), system.damping_low(i, k));
+          t.add(u, system.damping_low(i, k));
         }
       }
-      defect.R(i, j) = residual.value().high;
+      residual.R(i, j) = row.value().high;
       momentum(i, j) = p.value();
       tested(i, j) = t.value();
     }
@@ -140,20 +141,20 @@ void evaluate_extended(const System<N>& system, const ModalBasis<N>& basis, Defe
       DotAccumulator sum;
       for (Eigen::Index k = 0; k < n; ++k) {
         sum.add(tested(k, j), basis.Y(k, i));
-        sum.add(momentum(k, j), defect.YG(k, i));
+        sum.add(momentum(k, j), residual.YG(k, i));
       }
-      defect.gram(i, j) = sum.value().high;
+      residual.gram(i, j) = sum.value().high;
     }
   }
 }
 
 /// Left basis dual to the right one: the inverse of [C U + M U Lambda; M U].
 template <int N>
-void dual_basis(const Defect<N>& defect, ModalBasis<N>& basis) {
+void dual_basis(const BasisResidual<N>& residual, ModalBasis<N>& basis) {
   const Eigen::Index n = basis.U.rows();
   State<N> B(2 * n, 2 * n), inverse = State<N>::Identity(2 * n, 2 * n);
-  B.topRows(n) = defect.CU + defect.MV;
-  B.bottomRows(n) = defect.MU;
+  B.topRows(n) = residual.CU + residual.MV;
+  B.bottomRows(n) = residual.MU;
   solve_in_place(B, inverse, std::numeric_limits<double>::min());
   basis.Y = inverse.leftCols(n).transpose();
   basis.Gamma = basis.Lambda.transpose();
@@ -206,7 +207,7 @@ void invert_blocks(const State<N>& gram, ModalBasis<N>& basis) {
 /// one. Uses |M_kl| <= s_k s_l with s_k = sqrt(M_kk), so that graded masses stay graded.
 template <int N>
 void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& basis,
-                 Defect<N>& defect) {
+                 BasisResidual<N>& residual) {
   const Eigen::Index n = system.dof(), states = 2 * n;
   const Vector<N> s = system.mass.diagonal().cwiseSqrt();
   double c = 0;
@@ -218,18 +219,18 @@ void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& ba
   StateVector<N> u(states), v(states), y(states), yg(states);
   for (Eigen::Index j = 0; j < states; ++j) {
     u[j] = s.cwiseProduct(basis.U.col(j)).norm();
-    v[j] = s.cwiseProduct(defect.V.col(j)).norm();
+    v[j] = s.cwiseProduct(residual.V.col(j)).norm();
     y[j] = s.cwiseProduct(basis.Y.col(j)).norm();
-    yg[j] = s.cwiseProduct(defect.YG.col(j)).norm();
+    yg[j] = s.cwiseProduct(residual.YG.col(j)).norm();
   }
   int widest = 1;
   for (const Block& b : basis.blocks) widest = std::max(widest, b.size);
   const auto dn = static_cast<double>(n);
   const double terms = (2 * dn + 16) * dn * kUnit;
   const double gamma = extended ? 8 * terms * kUnit : terms;
-  State<N>& E = defect.E;
-  State<N>& error = defect.F_error;  // used as workspace here
-  E = defect.gram;
+  State<N>& E = residual.E;
+  State<N>& error = residual.F_error;  // used as workspace here
+  E = residual.gram;
   error.resize(states, states);
   for (Eigen::Index j = 0; j < states; ++j) {
     for (Eigen::Index i = 0; i < states; ++i) {
@@ -248,31 +249,31 @@ void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& ba
 /// Returns the largest column sum of E.
 template <int N>
 double evaluate_products(const System<N>& system, bool extended, ModalBasis<N>& basis,
-                         Defect<N>& defect) {
-  times_blocks<N>(basis.Y, basis.Gamma, basis.blocks, defect.YG);
-  defect.YT = basis.Y.transpose();
-  defect.R.resize(basis.U.rows(), basis.U.cols());
-  defect.gram.resize(basis.U.cols(), basis.U.cols());
+                         BasisResidual<N>& residual) {
+  times_blocks<N>(basis.Y, basis.Gamma, basis.blocks, residual.YG);
+  residual.YT = basis.Y.transpose();
+  residual.R.resize(basis.U.rows(), basis.U.cols());
+  residual.gram.resize(basis.U.cols(), basis.U.cols());
   if (extended) {
-    evaluate_extended<N>(system, basis, defect);
+    evaluate_extended<N>(system, basis, residual);
   } else {
-    const Wide<N> tested = defect.CU + defect.MV;
-    multiply(defect.YT, tested, defect.gram);
-    const State<N> YGT = defect.YG.transpose();
-    multiply(YGT, defect.MU, defect.E);
-    defect.gram += defect.E;
-    times_blocks<N>(tested, basis.Lambda, basis.blocks, defect.R);
-    defect.R += defect.KU;
+    const Wide<N> tested = residual.CU + residual.MV;
+    multiply(residual.YT, tested, residual.gram);
+    const State<N> YGT = residual.YG.transpose();
+    multiply(YGT, residual.MU, residual.E);
+    residual.gram += residual.E;
+    times_blocks<N>(tested, basis.Lambda, basis.blocks, residual.R);
+    residual.R += residual.KU;
   }
-  invert_blocks<N>(defect.gram, basis);
-  gram_defect<N>(system, extended, basis, defect);
-  return defect.E.colwise().sum().maxCoeff();
+  invert_blocks<N>(residual.gram, basis);
+  gram_defect<N>(system, extended, basis, residual);
+  return residual.E.colwise().sum().maxCoeff();
 }
 
 /// Entrywise bound on the error of the computed residual R.
 template <int N>
 void bound_residual(const System<N>& system, bool extended, const ModalBasis<N>& basis,
-                    Defect<N>& defect) {
+                    BasisResidual<N>& residual) {
   int widest = 1;
   for (const Block& b : basis.blocks) widest = std::max(widest, b.size);
   const State<N> Lambda_size = basis.Lambda.cwiseAbs();
@@ -282,18 +283,18 @@ void bound_residual(const System<N>& system, bool extended, const ModalBasis<N>&
   times_blocks<N>(size_V, Lambda_size, basis.blocks, size_A);
   Wide<N> part;
   Square<N> size = system.stiffness.cwiseAbs();
-  multiply(size, size_U, defect.R_size);
+  multiply(size, size_U, residual.R_size);
   size = system.damping.cwiseAbs();
   multiply(size, size_V, part);
-  defect.R_size += part;
+  residual.R_size += part;
   size = system.mass.cwiseAbs();
   multiply(size, size_A, part);
-  defect.R_size += part;
+  residual.R_size += part;
   const auto dn = static_cast<double>(system.dof());
-  const double terms = 3 * dn + 2 * widest + (system.has_tails ? 6 : 4);
+  const double terms = 3 * dn + 2 * widest + (system.has_low_words ? 6 : 4);
   const double gamma = extended ? 8 * terms * kUnit * kUnit : terms * kUnit;
   // The second term is the rounding of R itself, and of the product Y' R.
-  defect.R_size = gamma * defect.R_size + (dn + 2 * widest + 4) * kUnit * defect.R.cwiseAbs();
+  residual.R_size = gamma * residual.R_size + (dn + 2 * widest + 4) * kUnit * residual.R.cwiseAbs();
 }
 
 /// Whether no product that matters can underflow or overflow, extended ones included: the bounds
@@ -315,8 +316,8 @@ bool in_range(const System<N>& system, const ModalBasis<N>& basis) {
 }  // namespace
 
 template <int N>
-void evaluate_defect(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
-                     Defect<N>& defect, Work& work) noexcept {
+void evaluate_residual(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
+                       BasisResidual<N>& residual, Work& work) noexcept {
   const std::int64_t products_work = cubed(system.dof(), extended ? kExtendedWork : kProductsWork);
   const std::int64_t inverse_work = cubed(system.dof(), kInverseWork);
   if (!work.take(cubed(system.dof(), kDefectWork) + products_work +
@@ -324,63 +325,63 @@ void evaluate_defect(const System<N>& system, bool symmetric, bool extended, Mod
     return;
   }
   if (system.dof() == 0) {
-    defect = Defect<N>{};
+    residual = BasisResidual<N>{};
     basis.Y = basis.U;
     basis.Gamma = basis.weight = basis.Lambda;
     return;
   }
-  times_blocks<N>(basis.U, basis.Lambda, basis.blocks, defect.V);
-  multiply(system.mass, basis.U, defect.MU);
-  multiply(system.damping, basis.U, defect.CU);
-  multiply(system.stiffness, basis.U, defect.KU);
-  times_blocks<N>(defect.MU, basis.Lambda, basis.blocks, defect.MV);
+  times_blocks<N>(basis.U, basis.Lambda, basis.blocks, residual.V);
+  multiply(system.mass, basis.U, residual.MU);
+  multiply(system.damping, basis.U, residual.CU);
+  multiply(system.stiffness, basis.U, residual.KU);
+  times_blocks<N>(residual.MU, basis.Lambda, basis.blocks, residual.MV);
   if (symmetric) {
     basis.Y = basis.U;
     basis.Gamma = basis.Lambda;
   } else {
-    dual_basis<N>(defect, basis);
+    dual_basis<N>(residual, basis);
   }
-  double contraction = evaluate_products<N>(system, extended, basis, defect);
+  double contraction = evaluate_products<N>(system, extended, basis, residual);
   if (symmetric && !(contraction < kOrthogonal)) {
     if (!work.take(inverse_work + 2 * products_work)) return;
-    orthogonalize_left<N>(defect.gram, basis);
-    const double dual_contraction = evaluate_products<N>(system, extended, basis, defect);
+    orthogonalize_left<N>(residual.gram, basis);
+    const double dual_contraction = evaluate_products<N>(system, extended, basis, residual);
     if (dual_contraction < contraction) {
       contraction = dual_contraction;
     } else {
       basis.Y = basis.U;
       basis.Gamma = basis.Lambda;
-      contraction = evaluate_products<N>(system, extended, basis, defect);
+      contraction = evaluate_products<N>(system, extended, basis, residual);
     }
   }
-  multiply(defect.YT, defect.R, defect.W);
-  defect.F = -defect.W;
+  multiply(residual.YT, residual.R, residual.W);
+  residual.F = -residual.W;
   if (!(contraction < kNearlyOrthogonal) || !in_range(system, basis)) {
     // Far from orthogonal, the basis needs all of the Gram matrix, and proves nothing. Nor do
     // numbers whose products leave the range of doubles.
-    State<N> gram = defect.gram;
-    solve_in_place(gram, defect.F, std::numeric_limits<double>::min());
-    defect.F_error.setConstant(std::numeric_limits<double>::infinity());
+    State<N> gram = residual.gram;
+    solve_in_place(gram, residual.F, std::numeric_limits<double>::min());
+    residual.F_error.setConstant(std::numeric_limits<double>::infinity());
     return;
   }
   // |F* - F| <= |weight| |error of Y'R|, then the Gram matrix's distance from block form.
-  weigh<N>(basis.weight, basis.blocks, defect.F);
-  bound_residual<N>(system, extended, basis, defect);
-  defect.YT = defect.YT.cwiseAbs();
-  multiply(defect.YT, defect.R_size, defect.F_error);
+  weigh<N>(basis.weight, basis.blocks, residual.F);
+  bound_residual<N>(system, extended, basis, residual);
+  residual.YT = residual.YT.cwiseAbs();
+  multiply(residual.YT, residual.R_size, residual.F_error);
   const State<N> weight_size = basis.weight.cwiseAbs();
-  weigh<N>(weight_size, basis.blocks, defect.F_error);
-  const StateVector<N> E_rows = defect.E.rowwise().maxCoeff();
-  for (Eigen::Index j = 0; j < defect.F.cols(); ++j) {
+  weigh<N>(weight_size, basis.blocks, residual.F_error);
+  const StateVector<N> E_rows = residual.E.rowwise().maxCoeff();
+  for (Eigen::Index j = 0; j < residual.F.cols(); ++j) {
     const double column =
-        (defect.F.col(j).cwiseAbs() + defect.F_error.col(j)).sum() / (1 - contraction);
-    defect.F_error.col(j) = (1 + 1e-10) * (defect.F_error.col(j) + E_rows * column);
+        (residual.F.col(j).cwiseAbs() + residual.F_error.col(j)).sum() / (1 - contraction);
+    residual.F_error.col(j) = (1 + 1e-10) * (residual.F_error.col(j) + E_rows * column);
   }
 }
 
-template void evaluate_defect(const System<kDynamic>&, bool, bool, ModalBasis<kDynamic>&,
-                              Defect<kDynamic>&, Work&) noexcept;
-template void evaluate_defect(const System<kMaxDof>&, bool, bool, ModalBasis<kMaxDof>&,
-                              Defect<kMaxDof>&, Work&) noexcept;
+template void evaluate_residual(const System<kDynamic>&, bool, bool, ModalBasis<kDynamic>&,
+                                BasisResidual<kDynamic>&, Work&) noexcept;
+template void evaluate_residual(const System<kMaxDof>&, bool, bool, ModalBasis<kMaxDof>&,
+                                BasisResidual<kMaxDof>&, Work&) noexcept;
 
 }  // namespace dashpot::analysis

@@ -9,7 +9,7 @@ namespace dashpot::analysis {
 /// similar to the state matrix Lambda + F*, and entrywise |F* - F| <= F_error: a proved bound that
 /// includes every rounding error made in computing F.
 template <int N = kDynamic>
-struct Defect {
+struct BasisResidual {
   State<N> F;          ///< 2n x 2n, 1/s
   State<N> F_error;    ///< 2n x 2n, 1/s; infinite if the basis is too ill conditioned to say, or if
                        ///< frequencies leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120
@@ -20,27 +20,27 @@ struct Defect {
   State<N> gram, E, W, YT;
 };
 
-/// Evaluates the defect of (basis.U, basis.Lambda) for the original coefficients, and sets the
+/// Evaluates the residual of (basis.U, basis.Lambda) for the original coefficients, and sets the
 /// basis's left part and weight. With `extended`, the residual M U Lambda^2 + C U Lambda + K U is
-/// accumulated in double-double arithmetic, tails included, and so is the Gram matrix. If `work`
-/// does not grant it, the result has no meaning.
+/// accumulated in double-double arithmetic, low words included, and so is the Gram matrix. If
+/// `work` does not grant it, the result has no meaning.
 template <int N>
-void evaluate_defect(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
-                     Defect<N>& defect, Work& work) noexcept;
+void evaluate_residual(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
+                       BasisResidual<N>& residual, Work& work) noexcept;
 template <int N>
-void evaluate_defect(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
-                     Defect<N>& defect) noexcept {
+void evaluate_residual(const System<N>& system, bool symmetric, bool extended, ModalBasis<N>& basis,
+                       BasisResidual<N>& residual) noexcept {
   Work work;
-  evaluate_defect<N>(system, symmetric, extended, basis, defect, work);
+  evaluate_residual<N>(system, symmetric, extended, basis, residual, work);
 }
 
 /// One Newton step on the whole basis: U <- U (I + X), where the blocks of X off the diagonal solve
 /// the Sylvester equations  Lambda_i X_ij - X_ij Lambda_j = -F_ij. (Its other half, Lambda <-
-/// Lambda + the diagonal blocks of F, is done by `certify`, but for the decay rates of zero modes.)
+/// Lambda + the diagonal blocks of F, is done by `enclose`, but for the decay rates of zero modes.)
 /// Converges quadratically; pairs of blocks with (nearly) common eigenvalues are left alone.
 /// (Dongarra, Moler, Wilkinson 1983; Davies, Modi 1986; Ogita, Aishima 2018.)
 template <int N>
-void newton_step(const Defect<N>& defect, ModalBasis<N>& basis) noexcept;
+void newton_step(const BasisResidual<N>& residual, ModalBasis<N>& basis) noexcept;
 
 /// Solves A X - X B = C for X (k x l), A (k x k), B (l x l), and returns a lower bound of the
 /// separation of A and B (the smallest singular value of X -> A X - X B, Frobenius); X is zero and

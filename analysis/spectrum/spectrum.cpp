@@ -38,7 +38,7 @@ std::int64_t form_work(Eigen::Index n) {
   return cubed(n, 260) + 6000;
 }
 
-/// Work of certify and read_modes; blocks of more than two columns have an iteration of their own.
+/// Work of enclose and read_modes; blocks of more than two columns have an iteration of their own.
 template <int N>
 std::int64_t reading_work(Eigen::Index n, const BlockList<N>& blocks) {
   std::int64_t units = squared(n, 1500) + cubed(n, 20) + sylvester_work(blocks);
@@ -138,10 +138,10 @@ void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out, Work& 
   Quality previous{kInfinity, kInfinity};
   bool restored = false;
   for (int evaluation = 1;; ++evaluation) {
-    evaluate_defect<N>(system, out.symmetric, out.extended, out.basis, defect_, work);
+    evaluate_residual<N>(system, out.symmetric, out.extended, out.basis, residual_, work);
     if (!work.take(reading_work<N>(system.dof(), out.basis.blocks))) return;
-    certify<N>(defect_, out.basis, certificate_);
-    read_modes<N>(system, defect_, certificate_, options_.soft_frequency, out);
+    enclose<N>(residual_, out.basis, enclosure_);
+    read_modes<N>(system, residual_, enclosure_, options_.soft_frequency, out);
     const Quality quality = worst_quality(out);
     if (good(out) || restored || evaluation == kMaxEvaluations) return;
     if (quality.bound > 2 * previous.bound) {  // the step did harm: back, and be done
@@ -154,12 +154,12 @@ void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out, Work& 
     // Where rounding errors of the residual are all there is to see, a step would only add to them.
     const bool noise = !out.extended && (quality.bound > kHopeless ||
                                          (quality.backward_error <= kTargetBackwardError &&
-                                          defect_.F.norm() <= defect_.F_error.norm()));
+                                          residual_.F.norm() <= residual_.F_error.norm()));
     if (!better || noise) return;
     previous = quality;
     if (!work.take(step_work<N>(system.dof(), out.basis.blocks))) return;
     before_step_ = out.basis;
-    newton_step<N>(defect_, out.basis);
+    newton_step<N>(residual_, out.basis);
   }
 }
 

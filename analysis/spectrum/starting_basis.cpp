@@ -12,7 +12,7 @@ constexpr double kEps = std::numeric_limits<double>::epsilon();
 /// Two eigenvalues of one mode this close together (relative) count as nearly critical.
 constexpr double kCluster = 0.02;
 /// A cluster is parted into eigenvectors if their matrix has a condition number below this.
-constexpr double kPartable = 100;
+constexpr double kSeparable = 100;
 /// Shift of a subspace iteration off the middle of its cluster, relative.
 constexpr double kNudge = 1e-3;
 
@@ -30,10 +30,10 @@ struct Item {
 };
 
 template <int N>
-class Builder {
+class BasisFromEigenvectors {
  public:
-  Builder(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes, double cluster,
-          ModalBasis<N>& basis, Work& work)
+  BasisFromEigenvectors(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes, double cluster,
+                        ModalBasis<N>& basis, Work& work)
       : form_(form),
         work_(work),
         cluster_(cluster),
@@ -109,7 +109,7 @@ class Builder {
 
 /// Appends a block; p holds its position columns in the leading coordinates of the form.
 template <int N>
-void Builder<N>::append(const State<N>& p, const State<N>& Lambda, bool zero_mode) {
+void BasisFromEigenvectors<N>::append(const State<N>& p, const State<N>& Lambda, bool zero_mode) {
   const Eigen::Index size = p.cols();
   basis_.U.middleCols(next_column_, size).noalias() =
       zero_modes_.coordinates.leftCols(p.rows()).lazyProduct(p);
@@ -119,27 +119,27 @@ void Builder<N>::append(const State<N>& p, const State<N>& Lambda, bool zero_mod
 }
 
 template <int N>
-void Builder<N>::append_real(const State<N>& p, double value) {
+void BasisFromEigenvectors<N>::append_real(const State<N>& p, double value) {
   append(p, State<N>::Constant(1, 1, value));
 }
 
 /// (re + i im) exp((a + i b) t): columns re, im move with [a b; -b a].
 template <int N>
-void Builder<N>::append_pair(const State<N>& re_im, Complex value) {
+void BasisFromEigenvectors<N>::append_pair(const State<N>& re_im, Complex value) {
   State<N> Lambda(2, 2);
   Lambda << value.real(), value.imag(), -value.imag(), value.real();
   append(re_im, Lambda);
 }
 
 template <int N>
-void Builder<N>::write_proportional() {
+void BasisFromEigenvectors<N>::write_proportional() {
   for (Eigen::Index i = 0; i < m_; ++i) {
     const double d = form_.damping(i, i), kappa = zero_modes_.stiffness_values[i];
     const double discriminant = 0.25 * d * d - kappa;
     const double root = std::sqrt(std::abs(discriminant));
     State<N> p = State<N>::Zero(m_, 2);
     if (2 * root <= kCluster * std::max(std::abs(d), std::sqrt(std::abs(kappa)))) {
-      // Critical, nearly: coordinates of strain and kinetic energy, [0 w; -w -d].
+      // Critical, nearly: coordinates of elastic coordinate and kinetic energy, [0 w; -w -d].
       const double omega = frequency(i);
       State<N> Lambda(2, 2);
       Lambda << 0, omega, -omega, -d;
@@ -160,7 +160,7 @@ void Builder<N>::write_proportional() {
 }
 
 template <int N>
-void Builder<N>::write_free_zeros() {
+void BasisFromEigenvectors<N>::write_free_zeros() {
   for (int i = 0; i < form_.free_zeros; ++i) {
     State<N> p = State<N>::Zero(n_, 2), Lambda(2, 2);
     p(c_ + i, 0) = 1;
@@ -172,7 +172,7 @@ void Builder<N>::write_free_zeros() {
 /// Positions of coupled zero modes whose velocities went into other blocks: constant motions that
 /// complete what the two-column blocks span.
 template <int N>
-void Builder<N>::write_leftover_zeros() {
+void BasisFromEigenvectors<N>::write_leftover_zeros() {
   const Eigen::Index missing = 2 * n_ - next_column_;
   if (missing <= 0) return;
   const Eigen::Index z = c_ - m_;
@@ -190,7 +190,7 @@ void Builder<N>::write_leftover_zeros() {
 }
 
 template <int N>
-void Builder<N>::form_state_matrix() {
+void BasisFromEigenvectors<N>::form_state_matrix() {
   A_.setZero(m_ + c_, m_ + c_);
   for (Eigen::Index i = 0; i < m_; ++i) {
     const double omega = frequency(i);
@@ -209,7 +209,7 @@ void Builder<N>::form_state_matrix() {
 
 /// Eigenvalues, and their clusters: connected components of "near each other".
 template <int N>
-bool Builder<N>::find_items() {
+bool BasisFromEigenvectors<N>::find_items() {
   const Eigen::Index size = A_.rows();
   ComplexStateVector<N> values(size);
   if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(size));
@@ -237,13 +237,14 @@ bool Builder<N>::find_items() {
 /// True if a system of this size may be solved for one vector; `factor` is 1, or 2 for complex
 /// numbers.
 template <int N>
-bool Builder<N>::grants_inverse_iteration(Eigen::Index size, std::int64_t factor) const {
+bool BasisFromEigenvectors<N>::grants_inverse_iteration(Eigen::Index size,
+                                                        std::int64_t factor) const {
   return work_.take(factor * (cubed(size, 2) + squared(size, 24) + 60 * size) + 2500);
 }
 
 /// Eigenvector of A to a real eigenvalue.
 template <int N>
-StateVector<N> Builder<N>::state_vector(double value) const {
+StateVector<N> BasisFromEigenvectors<N>::state_vector(double value) const {
   StateVector<N> z = StateVector<N>::Ones(A_.rows());
   for (int k = 0; k < 3 && grants_inverse_iteration(A_.rows(), 1); ++k) {
     State<N> shifted = A_;
@@ -256,14 +257,14 @@ StateVector<N> Builder<N>::state_vector(double value) const {
 
 /// Of the real eigenvalues, marks those whose motion is mostly that of a coupled zero mode.
 template <int N>
-void Builder<N>::mark_zero_rates() {
+void BasisFromEigenvectors<N>::mark_zero_rates() {
   if (form_.coupled_zeros == 0) return;
   StateVector<N> score = StateVector<N>::Constant(item_count_, -1);  // -1: not eligible
   for (int i = 0; i < item_count_; ++i) {
     if (item(i).value.imag() != 0) continue;
     const StateVector<N> z = state_vector(item(i).value.real());
     const double kinetic = z.tail(c_).squaredNorm();  // of a total energy of 1
-    // Velocities of zero modes have more kinetic than strain energy.
+    // Velocities of zero modes have more kinetic than elastic coordinate energy.
     score[i] = z.tail(c_ - m_).squaredNorm() / kinetic + (kinetic > 0.5 ? 1 : 0);
   }
   for (int wanted = form_.coupled_zeros; wanted > 0; --wanted) {
@@ -276,7 +277,7 @@ void Builder<N>::mark_zero_rates() {
 
 /// Writes the cluster whose first item this is.
 template <int N>
-void Builder<N>::write_cluster_of(int first) {
+void BasisFromEigenvectors<N>::write_cluster_of(int first) {
   const int cluster = item(first).cluster;
   int members = 0;
   Eigen::Index size = 0;
@@ -312,7 +313,7 @@ void Builder<N>::write_cluster_of(int first) {
 /// One step of inverse iteration, u <- Q(value)^-1 u normalised, and a second if the first met an
 /// unlucky start: Q is singular to rounding, so that a good step grows u by about 1 / (eps |Q|).
 template <int N>
-void Builder<N>::write_single(Complex value) {
+void BasisFromEigenvectors<N>::write_single(Complex value) {
   const auto D = form_.damping.topLeftCorner(c_, c_);
   const auto Kp = form_.stiffness.topLeftCorner(c_, c_);
   const double size = std::norm(value) + modulus(value) * D_norm_ + K_norm_;
@@ -355,7 +356,7 @@ void Builder<N>::write_single(Complex value) {
 /// columns are p0, the zero modes' part of v, and p1 = s / omega in the coordinates of the nonzero
 /// modes: Lambda = [0 1; 0 rate] gives the second column the velocity p0 + rate p1 = v.
 template <int N>
-void Builder<N>::write_zero_rate(double rate) {
+void BasisFromEigenvectors<N>::write_zero_rate(double rate) {
   const StateVector<N> z = state_vector(rate);
   if (std::abs(rate) <= 8 * kEps * A_norm_) rate = 0;
   const double size = z.tail(c_ - m_).norm();
@@ -368,13 +369,14 @@ void Builder<N>::write_zero_rate(double rate) {
   append(p, Lambda, true);
 }
 
-/// Position columns of the invariant columns S = (strain, velocity) with A S = S Lambda.
+/// Position columns of the invariant columns S = (elastic coordinate, velocity) with A S = S
+/// Lambda.
 template <int N>
-State<N> Builder<N>::positions(const State<N>& S, const State<N>& Lambda) const {
+State<N> BasisFromEigenvectors<N>::positions(const State<N>& S, const State<N>& Lambda) const {
   State<N> p(c_, S.cols());
   for (Eigen::Index i = 0; i < m_; ++i) p.row(i) = S.row(i) / frequency(i);
   if (c_ > m_) {
-    // Zero modes have no strain: their position is the velocity times Lambda^-1.
+    // Zero modes have no elastic coordinate: their position is the velocity times Lambda^-1.
     State<N> transposed = Lambda.transpose();
     State<N> rows = S.bottomRows(c_ - m_).transpose();
     solve_in_place(transposed, rows, kEps * Lambda.norm());
@@ -387,7 +389,8 @@ State<N> Builder<N>::positions(const State<N>& S, const State<N>& Lambda) const 
 /// conjugate), by subspace iteration with a real shift near the real axis and a conjugate pair of
 /// shifts elsewhere.
 template <int N>
-State<N> Builder<N>::invariant_subspace(Complex mean, bool near_axis, Eigen::Index size) const {
+State<N> BasisFromEigenvectors<N>::invariant_subspace(Complex mean, bool near_axis,
+                                                      Eigen::Index size) const {
   const Eigen::Index states = A_.rows();
   // Off the eigenvalues by far more than rounding: at a defective one, what the eigenvector grows
   // by would otherwise bury the rest of its subspace.
@@ -421,7 +424,8 @@ State<N> Builder<N>::invariant_subspace(Complex mean, bool near_axis, Eigen::Ind
 /// Writes a cluster whose eigenvalues coincide to rounding without being defective: any orthonormal
 /// directions serve as its vectors.
 template <int N>
-bool Builder<N>::write_coinciding(const State<N>& S, const State<N>& small, Complex mean) {
+bool BasisFromEigenvectors<N>::write_coinciding(const State<N>& S, const State<N>& small,
+                                                Complex mean) {
   const Eigen::Index size = small.rows();
   const double a = mean.real(), b = mean.imag();
   State<N> J = small;
@@ -457,7 +461,7 @@ bool Builder<N>::write_coinciding(const State<N>& S, const State<N>& small, Comp
 
 /// Writes a cluster as single eigenvalues if their vectors are well apart.
 template <int N>
-bool Builder<N>::write_parted(const State<N>& S, const State<N>& small, int cluster) {
+bool BasisFromEigenvectors<N>::write_parted(const State<N>& S, const State<N>& small, int cluster) {
   const Eigen::Index size = small.rows();
   State<N> W(size, size);
   ComplexState<N> shifted;  // once: it is filled with zeros first
@@ -477,7 +481,7 @@ bool Builder<N>::write_parted(const State<N>& S, const State<N>& small, int clus
   }
   State<N> factor = W, inverse = State<N>::Identity(size, size);
   solve_in_place(factor, inverse, std::numeric_limits<double>::min());
-  if (!(W.norm() * inverse.norm() < kPartable)) return false;
+  if (!(W.norm() * inverse.norm() < kSeparable)) return false;
   const State<N> Lambda = inverse * small * W;
   column = 0;
   for (int i = 0; i < item_count_; ++i) {
@@ -495,7 +499,7 @@ bool Builder<N>::write_parted(const State<N>& S, const State<N>& small, int clus
 template <int N>
 Status build_starting_basis(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes,
                             double cluster, ModalBasis<N>& basis, Work& work) noexcept {
-  return Builder<N>(form, zero_modes, cluster, basis, work).build();
+  return BasisFromEigenvectors<N>(form, zero_modes, cluster, basis, work).build();
 }
 
 template Status build_starting_basis(const EnergyForm<kDynamic>&, const ZeroModes<kDynamic>&,

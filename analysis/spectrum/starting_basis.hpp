@@ -8,7 +8,8 @@ namespace dashpot::analysis {
 
 /// Fills U, Lambda and blocks of `basis` from an energy form: eigenvalues by QR iteration on
 ///
-///     A = [0 G; -G' -D]   (time derivative of [strain-energy coordinates; velocities]),
+///     A = [0 G; -G' -D]   (time derivative of [elastic coordinate-energy coordinates;
+///     velocities]),
 ///
 /// which holds every eigenvalue but the r zeros of the zero modes' positions, then vectors by
 /// inverse iteration on lambda^2 + lambda D + Kp. Eigenvalues that lie too close together for their

@@ -56,8 +56,8 @@ void check_symmetric(const std::string& key, const Eigen::MatrixXd& matrix) {
                                to_text(matrix(j, i)));
 }
 
-void check_tail(const std::string& key, const Eigen::MatrixXd& matrix,
-                const Eigen::MatrixXd& tail) {
+void check_low_word(const std::string& key, const Eigen::MatrixXd& matrix,
+                    const Eigen::MatrixXd& tail) {
   const double unit = std::numeric_limits<double>::epsilon();
   for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
     for (Eigen::Index j = 0; j < matrix.cols(); ++j) {

@@ -33,7 +33,8 @@ void check_finite(const std::string& key, const Eigen::MatrixXd& matrix);
 /// "is not symmetric: entry (1,2) is 3, entry (2,1) is 4", for the two that differ most
 void check_symmetric(const std::string& key, const Eigen::MatrixXd& matrix);
 /// "entry (1,2) is more than a rounding error of the coefficient": error bounds of working
-/// precision count on tails no larger than one rounding of the coefficient.
-void check_tail(const std::string& key, const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& tail);
+/// precision count on low words no larger than one rounding of the coefficient.
+void check_low_word(const std::string& key, const Eigen::MatrixXd& matrix,
+                    const Eigen::MatrixXd& tail);
 
 }  // namespace dashpot::analysis

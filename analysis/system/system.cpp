@@ -12,13 +12,13 @@ void check_optional_parts(const System<>& system) {
     check_size("stiffness_factor", system.stiffness_factor, system.stiffness_factor.rows(), n);
     check_finite("stiffness_factor", system.stiffness_factor);
   }
-  if (system.has_tails) {
-    check_size("damping_tail", system.damping_tail, n, n);
-    check_size("stiffness_tail", system.stiffness_tail, n, n);
-    check_finite("damping_tail", system.damping_tail);
-    check_finite("stiffness_tail", system.stiffness_tail);
-    check_tail("damping_tail", system.damping, system.damping_tail);
-    check_tail("stiffness_tail", system.stiffness, system.stiffness_tail);
+  if (system.has_low_words) {
+    check_size("damping_low", system.damping_low, n, n);
+    check_size("stiffness_low", system.stiffness_low, n, n);
+    check_finite("damping_low", system.damping_low);
+    check_finite("stiffness_low", system.stiffness_low);
+    check_low_word("damping_low", system.damping, system.damping_low);
+    check_low_word("stiffness_low", system.stiffness, system.stiffness_low);
   }
 }
 

@@ -262,10 +262,10 @@ System<> to_joint_space(const TaskImpedance& impedance) {
   system.damping = sum.damping.high;
   system.stiffness = sum.stiffness.high;
   system.stiffness_factor = sum.factor.rows();
-  system.has_tails = !sum.damping.low.isZero(0.0) || !sum.stiffness.low.isZero(0.0);
-  if (system.has_tails) {
-    system.damping_tail = sum.damping.low;
-    system.stiffness_tail = sum.stiffness.low;
+  system.has_low_words = !sum.damping.low.isZero(0.0) || !sum.stiffness.low.isZero(0.0);
+  if (system.has_low_words) {
+    system.damping_low = sum.damping.low;
+    system.stiffness_low = sum.stiffness.low;
   }
   validate(system);
   return system;

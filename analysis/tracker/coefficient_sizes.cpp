@@ -22,14 +22,14 @@ double square(double x) {
 /// The largest |A_ij| inverse_i inverse_j of a symmetric matrix, n x n: from its upper triangle,
 /// read in fours where a column has them.
 double largest_entry(const double* A, int n, const std::array<double, kMaxDof>& inverse) {
-  Lanes largest{};
+  Vec4d largest{};
   double rest = 0;
   for (int j = 0; j < n; ++j) {
     const double* const column = A + j * n;
     const double factor = inverse[at(j)];
     int i = 0;
     for (; i <= j && i + 4 <= n; i += 4) {
-      const Lanes entry = magnitude(load(column + i) * load(&inverse[at(i)])) * factor;
+      const Vec4d entry = magnitude(load(column + i) * load(&inverse[at(i)])) * factor;
       largest = entry > largest ? entry : largest;
     }
     for (; i <= j; ++i) rest = std::max(rest, std::abs(column[i]) * inverse[at(i)] * factor);
@@ -39,42 +39,42 @@ double largest_entry(const double* A, int n, const std::array<double, kMaxDof>& 
 
 }  // namespace
 
-CoefficientSizes coefficient_sizes(const StateForm& form) noexcept {
-  const int n = form.joints;
+CoefficientSizes coefficient_sizes(const SymmetricPencil& pencil) noexcept {
+  const int n = pencil.joints;
   CoefficientSizes sizes;
   std::array<double, kMaxDof> inverse{};
   double smallest = kInfinity, largest = 0;
   for (int k = 0; k < n; ++k) {
-    const double diagonal = form.M[k + k * n];
+    const double diagonal = pencil.M[k + k * n];
     smallest = std::min(smallest, diagonal);
     largest = std::max(largest, diagonal);
     sizes.s[at(k)] = std::sqrt(diagonal);
     inverse[at(k)] = 1 / sizes.s[at(k)];
   }
-  const double mass = largest_entry(form.M, n, inverse),
-               damping = largest_entry(form.C, n, inverse);
-  const double stiffness = form.factored ? 0 : largest_entry(form.W, n, inverse);
-  for (int j = 0; form.factored && j < n; ++j) {
+  const double mass = largest_entry(pencil.M, n, inverse),
+               damping = largest_entry(pencil.C, n, inverse);
+  const double stiffness = pencil.factored ? 0 : largest_entry(pencil.W, n, inverse);
+  for (int j = 0; pencil.factored && j < n; ++j) {
     double W = 0;
-    for (int i = 0; i < form.strains; ++i) W += square(form.W[i + j * form.strains]);
-    sizes.strain[at(j)] = std::sqrt(W);
+    for (int i = 0; i < pencil.rank; ++i) W += square(pencil.W[i + j * pencil.rank]);
+    sizes.elastic[at(j)] = std::sqrt(W);
   }
   sizes.mass = kSlack * mass;
   sizes.damping = kSlack * damping;
   sizes.stiffness = kSlack * std::sqrt(stiffness);
-  if (!form.factored) {
-    for (int k = 0; k < n; ++k) sizes.strain[at(k)] = sizes.stiffness * sizes.s[at(k)];
+  if (!pencil.factored) {
+    for (int k = 0; k < n; ++k) sizes.elastic[at(k)] = sizes.stiffness * sizes.s[at(k)];
   }
   const double rate = sizes.damping + sizes.stiffness;
   sizes.in_range = smallest > 1e-120 && largest < 1e120 && rate < 1e60;
   return sizes;
 }
 
-double distance(const StateForm& form, const StateForm& other, const CoefficientSizes& sizes,
-                double limit) noexcept {
-  const int n = form.joints;
+double distance(const SymmetricPencil& pencil, const SymmetricPencil& other,
+                const CoefficientSizes& sizes, double limit) noexcept {
+  const int n = pencil.joints;
   for (int k = 0; k < n * n; k += n + 1) {  // mostly, a glance at the diagonal is enough
-    if (std::abs(form.M[k] - other.M[k]) > 2 * limit * sizes.mass * form.M[k]) return kInfinity;
+    if (std::abs(pencil.M[k] - other.M[k]) > 2 * limit * sizes.mass * pencil.M[k]) return kInfinity;
   }
   double mass = 0, damping = 0, stiffness = 0;
   std::array<double, kMaxDof> inverse{};
@@ -84,18 +84,19 @@ double distance(const StateForm& form, const StateForm& other, const Coefficient
     for (int i = 0; i <= j; ++i) {
       const int k = i + j * n;
       const double unit = inverse[at(i)] * inverse[at(j)];
-      mass = std::max(mass, std::abs(form.M[k] - other.M[k]) * unit);
-      damping = std::max(damping, std::abs(form.C[k] - other.C[k]) * unit);
-      if (!form.factored) stiffness = std::max(stiffness, std::abs(form.W[k] - other.W[k]) * unit);
+      mass = std::max(mass, std::abs(pencil.M[k] - other.M[k]) * unit);
+      damping = std::max(damping, std::abs(pencil.C[k] - other.C[k]) * unit);
+      if (!pencil.factored)
+        stiffness = std::max(stiffness, std::abs(pencil.W[k] - other.W[k]) * unit);
     }
     double W = 0;
-    for (int i = 0; form.factored && i < form.strains; ++i) {
-      W += square(form.W[i + j * form.strains] - other.W[i + j * form.strains]);
+    for (int i = 0; pencil.factored && i < pencil.rank; ++i) {
+      W += square(pencil.W[i + j * pencil.rank] - other.W[i + j * pencil.rank]);
     }
     if (!(W < kInfinity)) return kInfinity;  // a factor is not known to be finite
-    if (W > 0) stiffness = std::max(stiffness, std::sqrt(W) / sizes.strain[at(j)]);
+    if (W > 0) stiffness = std::max(stiffness, std::sqrt(W) / sizes.elastic[at(j)]);
   }
-  if (!form.factored && stiffness > 0) stiffness /= square(sizes.stiffness);
+  if (!pencil.factored && stiffness > 0) stiffness /= square(sizes.stiffness);
   if (damping > 0) damping /= sizes.damping;
   return kSlack * std::max({mass / sizes.mass, damping, stiffness});
 }

@@ -1,23 +1,23 @@
 #pragma once
-#include <dashpot/analysis/tracker/tracked_basis.hpp>
+#include <dashpot/analysis/tracker/block_eigenbasis.hpp>
 
 namespace dashpot::analysis {
 
 /// Sizes of the coefficients, for bounds of rounding errors and of small changes: with
 /// s_k = sqrt(M_kk), entrywise |M| <= mass s s', |C| <= damping s s' and |K| <= stiffness^2 s s'
-/// (without a factor), and columns of W are no longer than strain(k).
+/// (without a factor), and columns of W are no longer than elastic coordinate(k).
 struct CoefficientSizes {
-  std::array<double, kMaxDof> s{}, strain{};
+  std::array<double, kMaxDof> s{}, elastic{};
   double mass = 0, damping = 0, stiffness = 0;
   bool in_range = false;  ///< no product that matters can underflow or overflow
 };
-CoefficientSizes coefficient_sizes(const StateForm& form) noexcept;
+CoefficientSizes coefficient_sizes(const SymmetricPencil& pencil) noexcept;
 
 /// How far two systems of the same sizes differ: the least d with |M - M'| <= d mass s s',
 /// |C - C'| <= d damping s s', and likewise for K or the columns of W. Entries of the symmetric
 /// matrices are finite, and their upper triangles are read. Infinite if W is not finite, and as
 /// soon as the distance is seen to exceed `limit`.
-double distance(const StateForm& form, const StateForm& other, const CoefficientSizes& sizes,
-                double limit) noexcept;
+double distance(const SymmetricPencil& pencil, const SymmetricPencil& other,
+                const CoefficientSizes& sizes, double limit) noexcept;
 
 }  // namespace dashpot::analysis

@@ -1,7 +1,7 @@
 #include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/analysis/tracker/cluster_separation.hpp>
 #include <dashpot/analysis/tracker/tracked_modes.hpp>
-#include <dashpot/analysis/tracker/tracked_parting.hpp>
 #include <dashpot/analysis/tracker/tracked_start.hpp>
 
 #include <algorithm>
@@ -20,8 +20,8 @@ constexpr double kConverged = 1e-11;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A change of the coefficients that none is as small as.
 constexpr double kNothing = -1;
-/// A proportional basis stays one as long as no more than this of strains and velocities mixes:
-/// what eigenvectors then lack, to its square.
+/// A proportional basis stays one as long as no more than this of elastic coordinates and
+/// velocities mixes: what eigenvectors then lack, to its square.
 constexpr double kLeastMixing = 1e-9;
 /// Times the step squared: a step mixes as much by itself.
 constexpr double kStepMixing = 4;
@@ -51,16 +51,16 @@ bool is_symmetric(const Square<kMaxDof>& matrix) {
 }
 
 /// Work of evaluating a basis, and of the step that follows.
-std::int64_t pass_work(const TrackedBasis& basis) {
+std::int64_t iteration_work(const BlockEigenbasis& basis) {
   return cubed(basis.columns(), 16) + squared(basis.columns(), 60);
 }
 
-/// Work of the certificate, the modes and their shapes, of n joints.
+/// Work of the enclosure, the modes and their shapes, of n joints.
 std::int64_t publishing_work(int n) {
   return squared(n, 900) + 6000;
 }
 
-/// Work of a basis from a direct solution, with its modes in the places of the last one's.
+/// Work of a basis from a direct solution, with its modes matched to the last ones.
 std::int64_t restart_work(int n) {
   return cubed(n, 360) + publishing_work(n);
 }
@@ -81,20 +81,20 @@ void form_stiffness(System<kMaxDof>& system) {
   const auto& W = system.stiffness_factor;
   const Eigen::Index n = system.dof();
   system.stiffness.resize(n, n);
-  system.stiffness_tail.resize(n, n);
-  system.damping_tail.setZero(n, n);
+  system.stiffness_low.resize(n, n);
+  system.damping_low.setZero(n, n);
   for (Eigen::Index j = 0; j < n; ++j) {
     for (Eigen::Index i = 0; i <= j; ++i) {
       DotAccumulator sum;
       for (Eigen::Index k = 0; k < W.rows(); ++k) sum.add(W(k, i), W(k, j));
       system.stiffness(i, j) = system.stiffness(j, i) = sum.value().high;
-      system.stiffness_tail(i, j) = system.stiffness_tail(j, i) = sum.value().low;
+      system.stiffness_low(i, j) = system.stiffness_low(j, i) = sum.value().low;
     }
   }
-  system.has_tails = true;
+  system.has_low_words = true;
 }
 
-void copy(const PaddedRows& from, int columns, PaddedRows& to) {
+void copy(const PackedMatrix& from, int columns, PackedMatrix& to) {
   to.width = from.width;
   std::copy_n(from.items.begin(), columns * from.width, to.items.begin());
 }
@@ -104,10 +104,10 @@ void copy(const TrackedSpectrum& from, int n, bool shapes, TrackedSpectrum& to) 
   to.status = from.status;
   to.origin = from.origin;
   to.mode_count = from.mode_count;
-  to.lineage = from.lineage;
+  to.epoch = from.epoch;
   to.zero_mode_count = from.zero_mode_count;
   to.zero_mode_rates = from.zero_mode_rates;
-  to.by_frequency = from.by_frequency;
+  to.order = from.order;
   std::copy_n(from.modes.begin(), from.mode_count, to.modes.begin());
   for (int i = 0; shapes && i < from.mode_count; ++i) {
     const TrackedShapes& source = from.shapes[at(i)];
@@ -121,12 +121,12 @@ void copy(const TrackedSpectrum& from, int n, bool shapes, TrackedSpectrum& to) 
 }
 
 /// Whether all coefficients agree to the last bit.
-bool identical(const StateForm& a, const StateForm& b) {
+bool identical(const SymmetricPencil& a, const SymmetricPencil& b) {
   const auto same = [](const double* x, const double* y, int count) {
     return std::memcmp(x, y, static_cast<std::size_t>(count) * sizeof(double)) == 0;
   };
   const int n = a.joints;
-  return same(a.M, b.M, n * n) && same(a.C, b.C, n * n) && same(a.W, b.W, a.strains * n);
+  return same(a.M, b.M, n * n) && same(a.C, b.C, n * n) && same(a.W, b.W, a.rank * n);
 }
 
 /// The largest error bound of a mode, relative to its eigenvalues; at critical damping of its
@@ -154,7 +154,7 @@ ModeTracker::ModeTracker(const TrackerOptions& options)
       }()) {
   if (!(options.soft_frequency >= 0)) throw std::invalid_argument("soft_frequency: is negative");
   if (!(options.target_bound > 0)) throw std::invalid_argument("target_bound: is not positive");
-  if (options.max_passes < 1) throw std::invalid_argument("max_passes: is not positive");
+  if (options.max_iterations < 1) throw std::invalid_argument("max_iterations: is not positive");
 }
 
 Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
@@ -165,23 +165,23 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
     out.mode_count = out.zero_mode_count = 0;
     return out.status = Status::kWrongSize;
   }
-  const StateForm form = state_form(system);
-  const StateForm last = state_form(last_);
-  const bool alike = has_basis_ && last.joints == form.joints && last.strains == form.strains &&
-                     last.factored == form.factored;
-  if (alike && evaluated_ && identical(form, last) && reuse(form, 0, out)) return out.status;
+  const SymmetricPencil pencil = symmetric_pencil(system);
+  const SymmetricPencil last = symmetric_pencil(last_);
+  const bool alike = has_basis_ && last.joints == pencil.joints && last.rank == pencil.rank &&
+                     last.factored == pencil.factored;
+  if (alike && evaluated_ && identical(pencil, last) && reuse(pencil, 0, out)) return out.status;
   const bool symmetric = is_symmetric(system.mass) && is_symmetric(system.damping) &&
-                         (form.factored || is_symmetric(system.stiffness));
-  if (!symmetric) return solve_directly(system, form, Fallback::kNotSymmetric, out, work);
+                         (pencil.factored || is_symmetric(system.stiffness));
+  if (!symmetric) return solve_directly(system, pencil, Fallback::kNotSymmetric, out, work);
   Fallback reason = Fallback::kStart;
   if (alike) {
-    const double change = distance(form, last, sizes_, options_.reuse_tolerance);
-    if (evaluated_ && reuse(form, change, out)) return out.status;
-    if (follow(form, out, reason, work)) {
+    const double change = distance(pencil, last, sizes_, options_.reuse_tolerance);
+    if (evaluated_ && reuse(pencil, change, out)) return out.status;
+    if (follow(pencil, out, reason, work)) {
       evaluated_ = true;
       last_.mass = system.mass;
       last_.damping = system.damping;
-      if (form.factored) {
+      if (pencil.factored) {
         last_.stiffness_factor = system.stiffness_factor;
       } else {
         last_.stiffness = system.stiffness;
@@ -191,22 +191,22 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
     evaluated_ = false;
     if (work.over()) return give_up(out);  // the next update goes on from the last basis
   }
-  return solve_directly(system, form, reason, out, work);
+  return solve_directly(system, pencil, reason, out, work);
 }
 
 /// Certifies the basis and reads its modes; false if a relative bound exceeds `target` or nothing
 /// is proved. The system is at this `distance` from the one that the basis was evaluated for;
 /// `fresh` if it was so just now.
-bool ModeTracker::publish(const StateForm& form, double distance, double target, bool fresh,
+bool ModeTracker::publish(const SymmetricPencil& pencil, double distance, double target, bool fresh,
                           TrackedSpectrum& out) noexcept {
-  certify(form, sizes_, distance, basis_, defect_, certificate_);
+  enclose(pencil, sizes_, distance, basis_, residual_, enclosure_);
   std::array<bool, kMaxDof> soft = soft_;
-  read_numbers(basis_, certificate_, options_.soft_frequency, soft, out);
+  read_numbers(basis_, enclosure_, options_.soft_frequency, soft, out);
   const double worst = worst_bound(out);
   if (!(worst <= target) || out.status != Status::kOk) return false;
   soft_ = soft;
   if (fresh) kept_for_ = kNothing;
-  out.lineage = lineage_;
+  out.epoch = epoch_;
   out.origin = fresh ? SpectrumOrigin::kTracked : SpectrumOrigin::kReused;
   if (fresh) bound_ = worst;
   if (!options_.shapes) {
@@ -214,34 +214,35 @@ bool ModeTracker::publish(const StateForm& form, double distance, double target,
     return true;
   }
   if (fresh) stepped_velocities(basis_, E_, velocities_);
-  read_shapes(form, basis_, E_, velocities_, work_, out);
+  read_shapes(pencil, basis_, E_, velocities_, work_, out);
   return true;
 }
 
 /// With the bounds that were proved when it was first used again, if the system has not changed
 /// more than these allow for; else proves them for all that may be reused, or at least for this
 /// one.
-bool ModeTracker::reuse(const StateForm& form, double change, TrackedSpectrum& out) noexcept {
+bool ModeTracker::reuse(const SymmetricPencil& pencil, double change,
+                        TrackedSpectrum& out) noexcept {
   const double tolerance = options_.reuse_tolerance;
   if (!(change <= tolerance)) return false;
   if (!(change <= kept_for_)) {
     const double target = std::max(options_.target_bound, 2 * bound_);
     kept_for_ = change > 0 ? tolerance : 0;
-    if (!publish(form, kept_for_, target, false, kept_)) {
+    if (!publish(pencil, kept_for_, target, false, kept_)) {
       kept_for_ = kNothing;
-      if (!(change > 0) || !publish(form, change, target, false, out)) return false;
+      if (!(change > 0) || !publish(pencil, change, target, false, out)) return false;
       ++counters_.reused;
       return true;
     }
   } else if (!options_.shapes) {
     ++counters_.shapes_skipped;
   }
-  copy(kept_, form.joints, options_.shapes, out);
+  copy(kept_, pencil.joints, options_.shapes, out);
   ++counters_.reused;
   return true;
 }
 
-bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& reason,
+bool ModeTracker::follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Fallback& reason,
                          Work& work) noexcept {
   const int columns = basis_.columns(), width = basis_.Z.width;
   before_.modes = basis_.modes;
@@ -255,15 +256,15 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
   } else {
     set_zero(width, columns, step_);
   }
-  PlaneAngles angles;
+  HyperbolicAngles angles;
   const bool pure =
-      --look_in_ <= 0 && !basis_.proportional && has_pure_planes(defect_, basis_, angles);
+      --look_in_ <= 0 && !basis_.proportional && decouples_damping(residual_, basis_, angles);
   if (look_in_ <= 0) look_in_ = kLookEvery;
   take_step(E_, basis_);
-  turned_ = !basis_.proportional &&
-            ((pure && make_proportional(angles, basis_)) || balance(defect_, kBalanced, basis_));
-  sizes_ = coefficient_sizes(form);
-  if (!refine(form, out, reason, work)) {
+  turned_ = !basis_.proportional && ((pure && make_proportional(angles, basis_)) ||
+                                     rotate_hyperbolically(residual_, kBalanced, basis_));
+  sizes_ = coefficient_sizes(pencil);
+  if (!refine(pencil, out, reason, work)) {
     copy(before_.Z, columns, basis_.Z);  // the last one that was right still names the modes
     basis_.proportional = before_.proportional;
     set_zero(width, columns, E_);
@@ -280,52 +281,53 @@ bool ModeTracker::follow(const StateForm& form, TrackedSpectrum& out, Fallback& 
 }
 
 /// Newton's method from the basis as it is. Leaves the last step to be taken.
-bool ModeTracker::refine(const StateForm& form, TrackedSpectrum& out, Fallback& reason,
+bool ModeTracker::refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Fallback& reason,
                          Work& work) noexcept {
   const int columns = basis_.columns();
   reason = Fallback::kNotConverged;
-  for (int pass = 1; pass <= options_.max_passes; ++pass) {
-    if (!work.take(pass_work(basis_))) return false;
-    ++counters_.passes;
-    counters_.most_passes = std::max(counters_.most_passes, pass);
-    evaluate(form, basis_, defect_);
+  for (int pass = 1; pass <= options_.max_iterations; ++pass) {
+    if (!work.take(iteration_work(basis_))) return false;
+    ++counters_.iterations;
+    counters_.most_iterations = std::max(counters_.most_iterations, pass);
+    evaluate(pencil, basis_, residual_);
     double size = 0;
-    const Conflict conflict = newton_step(basis_, defect_, certificate_.noise, E_, size);
+    const CloseBlocks close = newton_step(basis_, residual_, enclosure_.roundoff_bound, E_, size);
     add(E_, columns, step_);
     if (!(size < 1)) return false;
     const double mixed = kLeastMixing + kStepMixing * size * size;
-    basis_.proportional = basis_.proportional && pass < kPurePasses && mixing(basis_, E_) <= mixed;
-    if (!conflict && size <= kLastStep && work.take(publishing_work(form.joints)) &&
-        publish(form, 0, size <= kConverged ? kInfinity : options_.target_bound, true, out)) {
+    basis_.proportional =
+        basis_.proportional && pass < kPurePasses && coupling_norm(basis_, E_) <= mixed;
+    if (!close && size <= kLastStep && work.take(publishing_work(pencil.joints)) &&
+        publish(pencil, 0, size <= kConverged ? kInfinity : options_.target_bound, true, out)) {
       return true;
     }
-    if (pass < options_.max_passes) take_step(E_, basis_);
-    if (!conflict) continue;
+    if (pass < options_.max_iterations) take_step(E_, basis_);
+    if (!close) continue;
     reason = Fallback::kCoincidence;
     turned_ = true;
-    if (!part(conflict, work)) return false;
-    basis_.proportional = basis_.proportional && mixing(basis_, basis_.Z) == 0;
-    ++counters_.repairs;
+    if (!separate(close, work)) return false;
+    basis_.proportional = basis_.proportional && coupling_norm(basis_, basis_.Z) == 0;
+    ++counters_.separations;
   }
   return false;
 }
 
-bool ModeTracker::part(const Conflict& conflict, Work& work) noexcept {
+bool ModeTracker::separate(const CloseBlocks& close, Work& work) noexcept {
   if (!work.take(kPartingWork)) return false;
-  if (conflict.first >= basis_.modes) return part_zero_modes(defect_, basis_);
-  return part_coinciding(defect_, basis_, work) || part_blocks(defect_, conflict, basis_);
+  if (close.first >= basis_.modes) return separate_zero_modes(residual_, basis_);
+  return separate_coinciding(residual_, basis_, work) || separate_blocks(residual_, close, basis_);
 }
 
-Status ModeTracker::solve_directly(const System<kMaxDof>& system, const StateForm& form,
+Status ModeTracker::solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil,
                                    Fallback reason, TrackedSpectrum& out, Work& work) noexcept {
   ++counters_.fallbacks[static_cast<std::size_t>(reason)];
   direct_ = system;
-  direct_.has_tails = false;
-  if (!form.factored) direct_.stiffness_factor.resize(0, form.joints);
-  if (form.factored) form_stiffness(direct_);
-  const StateForm last = state_form(last_);
-  has_places_ = has_places_ && last.joints == form.joints && last.strains == form.strains &&
-                last.factored == form.factored;
+  direct_.has_low_words = false;
+  if (!pencil.factored) direct_.stiffness_factor.resize(0, pencil.joints);
+  if (pencil.factored) form_stiffness(direct_);
+  const SymmetricPencil last = symmetric_pencil(last_);
+  has_indices_ = has_indices_ && last.joints == pencil.joints && last.rank == pencil.rank &&
+                 last.factored == pencil.factored;
   has_basis_ = false;
   prediction_.pause();
   last_ = direct_;
@@ -338,15 +340,15 @@ Status ModeTracker::solve_directly(const System<kMaxDof>& system, const StateFor
     out.mode_count = out.zero_mode_count = 0;
     return out.status;
   }
-  if (!work.take(restart_work(form.joints))) return give_up(out);
+  if (!work.take(restart_work(pencil.joints))) return give_up(out);
   const bool followed =
-      reason != Fallback::kNotSymmetric && form.joints > 0 && restart(form, out, work);
+      reason != Fallback::kNotSymmetric && pencil.joints > 0 && restart(pencil, out, work);
   if (work.over()) return give_up(out);
   ++counters_.direct;
   if (followed) {
     out.origin = SpectrumOrigin::kDirect;
   } else {
-    publish_direct(form, reason != Fallback::kNotSymmetric, out);
+    publish_direct(pencil, reason != Fallback::kNotSymmetric, out);
   }
   return out.status;
 }
@@ -358,56 +360,57 @@ Status ModeTracker::give_up(TrackedSpectrum& out) noexcept {
 }
 
 /// Makes the direct solution the basis to follow from now on.
-bool ModeTracker::restart(const StateForm& form, TrackedSpectrum& out, Work& work) noexcept {
+bool ModeTracker::restart(const SymmetricPencil& pencil, TrackedSpectrum& out,
+                          Work& work) noexcept {
   before_ = basis_;
-  if (!start_basis(form, spectrum_, basis_)) {
+  if (!start_basis(pencil, spectrum_, basis_)) {
     basis_ = before_;
     return false;
   }
-  evaluate(form, basis_, defect_);
-  if (part_coinciding(defect_, basis_, work)) evaluate(form, basis_, defect_);
-  PlaneAngles angles;
-  if (!has_pure_planes(defect_, basis_, angles) || !make_proportional(angles, basis_)) {
-    balance(defect_, 0, basis_);
+  evaluate(pencil, basis_, residual_);
+  if (separate_coinciding(residual_, basis_, work)) evaluate(pencil, basis_, residual_);
+  HyperbolicAngles angles;
+  if (!decouples_damping(residual_, basis_, angles) || !make_proportional(angles, basis_)) {
+    rotate_hyperbolically(residual_, 0, basis_);
   }
-  has_places_ = has_places_ && before_.modes == basis_.modes;
-  if (has_places_) keep_places(form, before_, basis_);
-  sizes_ = coefficient_sizes(form);
+  has_indices_ = has_indices_ && before_.modes == basis_.modes;
+  if (has_indices_) match_modes(pencil, before_, basis_);
+  sizes_ = coefficient_sizes(pencil);
   prediction_.forget(basis_.Z.width, basis_.columns());
   set_zero(basis_.Z.width, basis_.columns(), step_);
-  if (!has_places_) {
-    evaluate(form, basis_, defect_);
-    certify(form, sizes_, 0, basis_, defect_, certificate_);
+  if (!has_indices_) {
+    evaluate(pencil, basis_, residual_);
+    enclose(pencil, sizes_, 0, basis_, residual_, enclosure_);
     soft_ = {};
-    read_numbers(basis_, certificate_, 0, soft_, out);
-    std::array<int, kMaxDof> place{};
-    for (int i = 0; i < basis_.modes; ++i) place[at(out.by_frequency[at(i)])] = i;
-    move_modes(place, basis_);
+    read_numbers(basis_, enclosure_, 0, soft_, out);
+    std::array<int, kMaxDof> index{};
+    for (int i = 0; i < basis_.modes; ++i) index[at(out.order[at(i)])] = i;
+    permute_modes(index, basis_);
     soft_ = {};
-    has_places_ = true;
-    ++lineage_;
+    has_indices_ = true;
+    ++epoch_;
   }
   Fallback unused{};
-  has_basis_ = evaluated_ = refine(form, out, unused, work);
+  has_basis_ = evaluated_ = refine(pencil, out, unused, work);
   return has_basis_;
 }
 
-/// The direct solution as it is, in the places of the modes that were found last.
-void ModeTracker::publish_direct(const StateForm& form, bool symmetric,
+/// Publishes the direct solution as it is, with the indices of the modes that were found last.
+void ModeTracker::publish_direct(const SymmetricPencil& pencil, bool symmetric,
                                  TrackedSpectrum& out) noexcept {
-  std::array<int, kMaxDof> place{};
-  if (!has_places_ || !find_places(form, basis_, spectrum_, place)) {
-    ++lineage_;
-    for (int i = 0; i < kMaxDof; ++i) place[at(i)] = i;
+  std::array<int, kMaxDof> index{};
+  if (!has_indices_ || !match_shapes(pencil, basis_, spectrum_, index)) {
+    ++epoch_;
+    for (int i = 0; i < kMaxDof; ++i) index[at(i)] = i;
   }
-  keep_planes(form, spectrum_, place, basis_);
-  has_places_ = true;
+  set_planes(pencil, spectrum_, index, basis_);
+  has_indices_ = true;
   out.status = spectrum_.status;  // not that of an attempt to follow
-  out.lineage = lineage_;
+  out.epoch = epoch_;
   out.mode_count = spectrum_.modes.size();
   for (int i = 0; i < out.mode_count; ++i) {
     const Mode<kMaxDof>& mode = spectrum_.modes[i];
-    ModeNumbers& numbers = out.modes[at(place[at(i)])];
+    ModeNumbers& numbers = out.modes[at(index[at(i)])];
     numbers.eigenvalues = mode.eigenvalues;
     numbers.natural_frequency = mode.natural_frequency;
     numbers.damping_ratio = mode.damping_ratio;
@@ -417,7 +420,7 @@ void ModeTracker::publish_direct(const StateForm& form, bool symmetric,
     numbers.natural_frequency_bound = mode.natural_frequency_bound;
     numbers.damping_ratio_bound = mode.damping_ratio_bound;
     if (!options_.shapes) continue;
-    TrackedShapes& shapes = out.shapes[at(place[at(i)])];
+    TrackedShapes& shapes = out.shapes[at(index[at(i)])];
     shapes.u = mode.shapes;
     shapes.slope = {};
     for (std::size_t k = 0; symmetric && k < 2; ++k) {

@@ -14,15 +14,15 @@ std::size_t at(int i) {
 
 }  // namespace
 
-void StepPrediction::learn(const PaddedRows& step, int rows) noexcept {
+void StepPrediction::learn(const PackedMatrix& step, int rows) noexcept {
   const int size = rows * step.width;
-  for (PaddedRows* known : {&next_, &step_, &change_, &curve_}) known->width = step.width;
-  Lanes by_nothing{}, by_step{}, by_change{}, by_curve{};
+  for (PackedMatrix* known : {&next_, &step_, &change_, &curve_}) known->width = step.width;
+  Vec4d by_nothing{}, by_step{}, by_change{}, by_curve{};
   for (int k = 0; k < size; k += 4) {
-    const Lanes now = load(&step.items[at(k)]);
-    const Lanes change = now - load(&step_.items[at(k)]);
-    const Lanes curve = change - load(&change_.items[at(k)]);
-    const Lanes rest = curve - load(&curve_.items[at(k)]);
+    const Vec4d now = load(&step.items[at(k)]);
+    const Vec4d change = now - load(&step_.items[at(k)]);
+    const Vec4d curve = change - load(&change_.items[at(k)]);
+    const Vec4d rest = curve - load(&curve_.items[at(k)]);
     by_nothing += now * now;
     by_step += change * change;
     by_change += curve * curve;
@@ -44,7 +44,7 @@ void StepPrediction::learn(const PaddedRows& step, int rows) noexcept {
 }
 
 void StepPrediction::forget(int width, int rows) noexcept {
-  for (PaddedRows* known : {&step_, &change_, &curve_}) set_zero(width, rows, *known);
+  for (PackedMatrix* known : {&step_, &change_, &curve_}) set_zero(width, rows, *known);
   ready_ = false;
 }
 

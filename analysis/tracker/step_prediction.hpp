@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/linalg/padded_rows.hpp>
+#include <dashpot/analysis/linalg/packed_matrix.hpp>
 
 namespace dashpot::analysis {
 
@@ -10,18 +10,18 @@ class StepPrediction {
  public:
   /// What is expected next, if anything: E of Z <- Z (I + E).
   bool ready() const noexcept { return ready_; }
-  const PaddedRows& next() const noexcept { return next_; }
+  const PackedMatrix& next() const noexcept { return next_; }
 
   /// Of an update's whole step, with this many rows.
-  void learn(const PaddedRows& step, int rows) noexcept;
+  void learn(const PackedMatrix& step, int rows) noexcept;
   /// The last steps tell nothing of the next one: the columns have turned.
   void forget(int width, int rows) noexcept;
   /// Expects nothing until something is learnt.
   void pause() noexcept { ready_ = false; }
 
  private:
-  PaddedRows step_, change_, curve_;  ///< the last step, and its differences from those before
-  PaddedRows next_;
+  PackedMatrix step_, change_, curve_;  ///< the last step, and its differences from those before
+  PackedMatrix next_;
   bool ready_ = false;
 };
 

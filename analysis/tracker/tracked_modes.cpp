@@ -1,6 +1,6 @@
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
-#include <dashpot/analysis/spectrum/certificate.hpp>
+#include <dashpot/analysis/spectrum/enclosure.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
 #include <dashpot/analysis/tracker/tracked_modes.hpp>
 
@@ -27,7 +27,7 @@ struct RootList {
 
 /// Two roots for each mode, in the order of the modes, then one for each zero mode; with the radius
 /// of the disc of each.
-void list_roots(const TrackedBasis& basis, const TrackedCertificate& certificate, RootList& roots) {
+void list_roots(const BlockEigenbasis& basis, const TrackedEnclosure& enclosure, RootList& roots) {
   roots.size = basis.columns();
   for (int i = 0; i < basis.modes; ++i) {
     const double l00 = basis.l00[at(i)], l01 = basis.l01[at(i)], l10 = basis.l10[at(i)],
@@ -35,7 +35,7 @@ void list_roots(const TrackedBasis& basis, const TrackedCertificate& certificate
     std::array<Complex, 2> values;
     eigenvalues_2x2(l00, l01, l10, l11, values[0], values[1]);
     const double norm = std::sqrt(l00 * l00 + l01 * l01 + l10 * l10 + l11 * l11);
-    const double radius = certificate.radius[at(i)] + 16 * kUnit * norm;
+    const double radius = enclosure.radius[at(i)] + 16 * kUnit * norm;
     const bool conjugate = values[0].imag() != 0;
     for (int e = 0; e < 2; ++e) {
       roots.block[at(2 * i + e)] = i;
@@ -46,13 +46,13 @@ void list_roots(const TrackedBasis& basis, const TrackedCertificate& certificate
   }
   for (int k = 0; k < basis.zeros; ++k) {
     roots.block[at(2 * basis.modes + k)] = basis.modes + k;
-    roots[2 * basis.modes + k] = {basis.rate[at(k)], certificate.radius[at(basis.modes + k)]};
+    roots[2 * basis.modes + k] = {basis.rate[at(k)], enclosure.radius[at(basis.modes + k)]};
   }
 }
 
 /// Bound for root i where its disc may meet others of its group: all that is known then is how many
 /// eigenvalues the union of the discs holds, so that the bound is the sum of their diameters.
-double bound_in_group(const RootList& roots, const TrackedCertificate& certificate, int i) {
+double bound_in_group(const RootList& roots, const TrackedEnclosure& enclosure, int i) {
   std::array<bool, 2 * kMaxDof> inside{};
   inside[at(i)] = true;
   double total = 2 * roots[i].bound;
@@ -61,7 +61,7 @@ double bound_in_group(const RootList& roots, const TrackedCertificate& certifica
     grown = false;
     for (int j = 0; j < roots.size; ++j) {
       if (inside[at(j)] ||
-          certificate.group[at(roots.block[at(i)])] != certificate.group[at(roots.block[at(j)])]) {
+          enclosure.group[at(roots.block[at(i)])] != enclosure.group[at(roots.block[at(j)])]) {
         continue;
       }
       for (int k = 0; k < roots.size && !inside[at(j)]; ++k) {
@@ -77,7 +77,7 @@ double bound_in_group(const RootList& roots, const TrackedCertificate& certifica
 }
 
 /// Eigenvector of a mode's block: (Lambda - mu) w = 0 from the row that says more.
-std::array<Complex, 2> block_vector(const TrackedBasis& basis, int i, const Complex& mu) {
+std::array<Complex, 2> block_vector(const BlockEigenbasis& basis, int i, const Complex& mu) {
   const double l01 = basis.l01[at(i)], l10 = basis.l10[at(i)];
   const Complex p = basis.l00[at(i)] - mu, s = basis.l11[at(i)] - mu;
   std::array<Complex, 2> w;
@@ -96,8 +96,8 @@ struct VectorGroup {
 };
 
 /// Lambda, and so w, is that of the basis before the step E.
-void set_vector(const TrackedBasis& basis, const PaddedRows& E, int i, const Complex& mu, int lane,
-                VectorGroup& group) {
+void set_vector(const BlockEigenbasis& basis, const PackedMatrix& E, int i, const Complex& mu,
+                int lane, VectorGroup& group) {
   const int j = basis.modes + i;
   const std::array<Complex, 2> w = block_vector(basis, i, mu);
   group.mu[at(lane)] = mu;
@@ -105,32 +105,33 @@ void set_vector(const TrackedBasis& basis, const PaddedRows& E, int i, const Com
   group.w1[at(lane)] = w[1] - (E(j, i) * w[0] + E(j, j) * w[1]);
 }
 
-/// Largest velocity times root of the energy, below which a vector of unit strain does not move.
+/// Largest velocity times root of the energy, below which a vector of unit elastic coordinate does
+/// not move.
 constexpr double kNoMotion = 1e-290;
 
 /// u = V w of unit kinetic energy u^H M u, its largest entry real and positive, for `lanes` modes
 /// from `first` on.
-void write_shapes(const TrackedBasis& basis, const PaddedRows& velocities,
-                  const PaddedRows& momenta, int first, int lanes, std::size_t which,
+void write_shapes(const BlockEigenbasis& basis, const PackedMatrix& velocities,
+                  const PackedMatrix& momenta, int first, int lanes, std::size_t which,
                   const VectorGroup& group, std::array<TrackedShapes, kMaxDof>& out) {
   const int n = basis.modes + basis.zeros;
   const auto gather = [](const std::array<Complex, 4>& from, bool imaginary) {
-    Lanes result;
+    Vec4d result;
     for (int l = 0; l < 4; ++l) result[l] = imaginary ? from[at(l)].imag() : from[at(l)].real();
     return result;
   };
-  const Lanes a = gather(group.w0, false), b = gather(group.w0, true);
-  const Lanes c = gather(group.w1, false), d = gather(group.w1, true);
-  std::array<Lanes, kMaxDof> x, y;
-  Lanes energy{}, largest{}, x_largest{}, y_largest{};
+  const Vec4d a = gather(group.w0, false), b = gather(group.w0, true);
+  const Vec4d c = gather(group.w1, false), d = gather(group.w1, true);
+  std::array<Vec4d, kMaxDof> x, y;
+  Vec4d energy{}, largest{}, x_largest{}, y_largest{};
   for (int k = 0; k < n; ++k) {
-    const Lanes v = load(velocities.row(k) + first);
-    const Lanes w = load(velocities.row(k) + basis.modes + first);
-    const Lanes p = load(momenta.row(k) + first);
-    const Lanes q = load(momenta.row(k) + basis.modes + first);
-    const Lanes re = v * a + w * c, im = v * b + w * d;
+    const Vec4d v = load(velocities.row(k) + first);
+    const Vec4d w = load(velocities.row(k) + basis.modes + first);
+    const Vec4d p = load(momenta.row(k) + first);
+    const Vec4d q = load(momenta.row(k) + basis.modes + first);
+    const Vec4d re = v * a + w * c, im = v * b + w * d;
     energy += re * (p * a + q * c) + im * (p * b + q * d);
-    const Lanes size = re * re + im * im;
+    const Vec4d size = re * re + im * im;
     const auto larger = size > largest;
     largest = larger ? size : largest;
     x_largest = larger ? re : x_largest;
@@ -164,32 +165,32 @@ void sort_by_frequency(TrackedSpectrum& out) noexcept {
     const auto& values = out.modes[at(i)].eigenvalues;
     key[at(i)] = modulus(values[0]) * modulus(values[1]);
     int position = i;
-    for (; position > 0 && key[at(out.by_frequency[at(position - 1)])] < key[at(i)]; --position) {
-      out.by_frequency[at(position)] = out.by_frequency[at(position - 1)];
+    for (; position > 0 && key[at(out.order[at(position - 1)])] < key[at(i)]; --position) {
+      out.order[at(position)] = out.order[at(position - 1)];
     }
-    out.by_frequency[at(position)] = i;
+    out.order[at(position)] = i;
   }
 }
 
-void read_numbers(const TrackedBasis& basis, const TrackedCertificate& certificate,
+void read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosure,
                   double soft_frequency, std::array<bool, kMaxDof>& soft,
                   TrackedSpectrum& out) noexcept {
   RootList roots;
-  list_roots(basis, certificate, roots);
+  list_roots(basis, enclosure, roots);
   out.mode_count = basis.modes;
   out.status = Status::kOk;
   for (int i = 0; i < basis.modes; ++i) {
     Root first = roots[2 * i], second = roots[2 * i + 1];
     const bool apart = modulus(first.value - second.value) > first.bound + second.bound;
-    if (!certificate.alone[at(i)] || !apart) {
-      first.bound = bound_in_group(roots, certificate, 2 * i);
-      second.bound = bound_in_group(roots, certificate, 2 * i + 1);
+    if (!enclosure.alone[at(i)] || !apart) {
+      first.bound = bound_in_group(roots, enclosure, 2 * i);
+      second.bound = bound_in_group(roots, enclosure, 2 * i + 1);
     }
     first.bound += 2 * kUnit * modulus(first.value);
     second.bound += 2 * kUnit * modulus(second.value);
     Invariants invariants = block_invariants(basis.l00[at(i)], basis.l01[at(i)], basis.l10[at(i)],
-                                             basis.l11[at(i)], certificate.radius[at(i)]);
-    if (!certificate.alone[at(i)]) {
+                                             basis.l11[at(i)], enclosure.radius[at(i)]);
+    if (!enclosure.alone[at(i)]) {
       const Invariants of_roots = root_invariants(first, second);
       invariants.sum_error = of_roots.sum_error;
       invariants.product_error = of_roots.product_error;
@@ -205,10 +206,11 @@ void read_numbers(const TrackedBasis& basis, const TrackedCertificate& certifica
   sort_by_frequency(out);
 }
 
-void read_shapes(const StateForm& form, const TrackedBasis& basis, const PaddedRows& E,
-                 const PaddedRows& velocities, PaddedRows& momenta, TrackedSpectrum& out) noexcept {
+void read_shapes(const SymmetricPencil& pencil, const BlockEigenbasis& basis, const PackedMatrix& E,
+                 const PackedMatrix& velocities, PackedMatrix& momenta,
+                 TrackedSpectrum& out) noexcept {
   momenta.width = basis.Z.width;
-  padded_multiply(momenta.width)({form.M, 1, form.joints}, form.joints, form.joints,
+  padded_multiply(momenta.width)({pencil.M, 1, pencil.joints}, pencil.joints, pencil.joints,
                                  velocities.row(0), nullptr, 1, momenta.row(0), momenta.width);
   for (int first = 0; first < basis.modes; first += 4) {
     const int lanes = std::min(4, basis.modes - first);

@@ -1,20 +1,21 @@
 #pragma once
 #include <dashpot/analysis/tracked_spectrum.hpp>
-#include <dashpot/analysis/tracker/tracked_certificate.hpp>
+#include <dashpot/analysis/tracker/tracked_enclosure.hpp>
 
 namespace dashpot::analysis {
 
 /// Reads eigenvalues, frequencies, ratios, kinds and bounds off a certified basis, and sorts them.
 /// `soft` says of each mode whether it was soft before, and is brought up to date.
-void read_numbers(const TrackedBasis& basis, const TrackedCertificate& certificate,
+void read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosure,
                   double soft_frequency, std::array<bool, kMaxDof>& soft,
                   TrackedSpectrum& out) noexcept;
 
-/// Fills out.by_frequency.
+/// Fills out.order.
 void sort_by_frequency(TrackedSpectrum& out) noexcept;
 
 /// Eigenvectors from the velocity rows V (n) of Z (I + E); M V goes to `momenta`.
-void read_shapes(const StateForm& form, const TrackedBasis& basis, const PaddedRows& E,
-                 const PaddedRows& velocities, PaddedRows& momenta, TrackedSpectrum& out) noexcept;
+void read_shapes(const SymmetricPencil& pencil, const BlockEigenbasis& basis, const PackedMatrix& E,
+                 const PackedMatrix& velocities, PackedMatrix& momenta,
+                 TrackedSpectrum& out) noexcept;
 
 }  // namespace dashpot::analysis

@@ -22,11 +22,11 @@ std::size_t at(int i) {
 
 using Column = std::array<double, kMaxWidth>;
 
-/// The two inner products of states: strains' plus or minus velocities'.
+/// The two inner products of states: elastic coordinates' plus or minus velocities'.
 struct Products {
-  double strains = 0, velocities = 0;
-  double indefinite() const { return strains - velocities; }
-  double energy() const { return strains + velocities; }
+  double elastic = 0, velocities = 0;
+  double indefinite() const { return elastic - velocities; }
+  double energy() const { return elastic + velocities; }
 };
 
 double weighted(const double* matrix, int n, const double* x, const double* y) {
@@ -37,27 +37,27 @@ double weighted(const double* matrix, int n, const double* x, const double* y) {
   return sum;
 }
 
-Products products(const StateForm& form, const Column& x, const Column& y) {
-  const int p = form.strains;
+Products products(const SymmetricPencil& pencil, const Column& x, const Column& y) {
+  const int p = pencil.rank;
   Products result;
-  if (form.factored) {
-    for (int k = 0; k < p; ++k) result.strains += x[at(k)] * y[at(k)];
+  if (pencil.factored) {
+    for (int k = 0; k < p; ++k) result.elastic += x[at(k)] * y[at(k)];
   } else {
-    result.strains = weighted(form.W, p, x.data(), y.data());
+    result.elastic = weighted(pencil.W, p, x.data(), y.data());
   }
-  result.velocities = weighted(form.M, form.joints, x.data() + p, y.data() + p);
+  result.velocities = weighted(pencil.M, pencil.joints, x.data() + p, y.data() + p);
   return result;
 }
 
 /// The state with position u and velocity v.
 template <typename Position, typename Velocity>
-Column state(const StateForm& form, const Position& u, const Velocity& v) {
-  const int n = form.joints, p = form.strains;
+Column state(const SymmetricPencil& pencil, const Position& u, const Velocity& v) {
+  const int n = pencil.joints, p = pencil.rank;
   Column x{};
   for (int k = 0; k < n; ++k) {
     x[at(p + k)] = v[k];
-    if (!form.factored) x[at(k)] = u[k];
-    for (int i = 0; form.factored && i < p; ++i) x[at(i)] += form.W[i + k * p] * u[k];
+    if (!pencil.factored) x[at(k)] = u[k];
+    for (int i = 0; pencil.factored && i < p; ++i) x[at(i)] += pencil.W[i + k * p] * u[k];
   }
   return x;
 }
@@ -75,8 +75,9 @@ struct Plane {
 using Planes = std::array<Plane, kMaxDof>;
 
 /// Orthonormal columns of the plane that x and y span; false unless it has both sign types.
-bool make_plane(const StateForm& form, const Column& x, const Column& y, Plane& plane) {
-  const Products xx = products(form, x, x), xy = products(form, x, y), yy = products(form, y, y);
+bool make_plane(const SymmetricPencil& pencil, const Column& x, const Column& y, Plane& plane) {
+  const Products xx = products(pencil, x, x), xy = products(pencil, x, y),
+                 yy = products(pencil, y, y);
   const double a = xx.indefinite() / xx.energy(), c = yy.indefinite() / yy.energy();
   const double x_scale = 1 / std::sqrt(xx.energy()), y_scale = 1 / std::sqrt(yy.energy());
   const double b = xy.indefinite() * x_scale * y_scale;
@@ -92,17 +93,17 @@ bool make_plane(const StateForm& form, const Column& x, const Column& y, Plane& 
 }
 
 /// Collects the columns of a basis by what they are.
-class Starter {
+class BasisFromSpectrum {
  public:
-  Starter(const StateForm& form, const ModalBasis<kMaxDof>& source)
-      : form_(form), source_(source) {}
+  BasisFromSpectrum(const SymmetricPencil& pencil, const ModalBasis<kMaxDof>& source)
+      : form_(pencil), source_(source) {}
 
-  bool run(TrackedBasis& basis) {
+  bool run(BlockEigenbasis& basis) {
     for (const Block& block : source_.blocks) {
       if (!take(block)) return false;
     }
-    if (!pair_reals() || !add_strains()) return false;
-    if (plane_count_ != form_.strains || zero_count_ != form_.zeros()) return false;
+    if (!pair_reals() || !add_elastic_coordinates()) return false;
+    if (plane_count_ != form_.rank || zero_count_ != form_.zeros()) return false;
     write(basis);
     return true;
   }
@@ -116,23 +117,23 @@ class Starter {
   }
   bool take(const Block& block);
   bool pair_reals();
-  bool add_strains();
-  void write(TrackedBasis& basis) const;
+  bool add_elastic_coordinates();
+  void write(BlockEigenbasis& basis) const;
 
   bool add_plane(const Plane& plane) {
-    if (plane_count_ == form_.strains) return false;
+    if (plane_count_ == form_.rank) return false;
     planes_[at(plane_count_++)] = plane;
     return true;
   }
 
-  const StateForm& form_;
+  const SymmetricPencil& form_;
   const ModalBasis<kMaxDof>& source_;
   Planes planes_;
   std::array<Column, kMaxWidth> plus_, minus_, zeros_;  ///< of unit length
   int plane_count_ = 0, plus_count_ = 0, minus_count_ = 0, zero_count_ = 0;
 };
 
-bool Starter::take(const Block& block) {
+bool BasisFromSpectrum::take(const Block& block) {
   if (block.zero_mode) {
     if (block.size == 2) minus_[at(minus_count_++)] = column(block.first + 1);
   } else if (block.size == 2) {
@@ -153,7 +154,7 @@ bool Starter::take(const Block& block) {
 /// Each real eigenvalue of type + goes with one of type - whose shape is like its own, the likest
 /// two first, as in the direct solution (modes.cpp); those of type - that are left over are
 /// velocities of zero modes.
-bool Starter::pair_reals() {
+bool BasisFromSpectrum::pair_reals() {
   if (plus_count_ > minus_count_) return false;
   while (plus_count_ > 0) {
     double best = -1;
@@ -183,13 +184,13 @@ bool Starter::pair_reals() {
   return true;
 }
 
-/// Strains that no mode moves any more become modes again, of frequency zero.
-bool Starter::add_strains() {
-  while (plane_count_ < form_.strains) {
+/// Elastic coordinates that no mode moves any more become modes again, of frequency zero.
+bool BasisFromSpectrum::add_elastic_coordinates() {
+  while (plane_count_ < form_.rank) {
     if (!form_.factored || zero_count_ == 0) return false;
     Column best{};
     double largest = 0;
-    for (int k = 0; k < form_.strains; ++k) {
+    for (int k = 0; k < form_.rank; ++k) {
       Column x{};
       x[at(k)] = 1;
       for (int i = 0; i < plane_count_; ++i) {
@@ -209,13 +210,13 @@ bool Starter::add_strains() {
 }
 
 /// A basis of the planes of `count` modes, with room for `zeros` columns of zero modes.
-void write_planes(const StateForm& form, const Planes& planes, int count, int zeros,
-                  TrackedBasis& basis) {
-  basis = TrackedBasis{};
+void write_planes(const SymmetricPencil& pencil, const Planes& planes, int count, int zeros,
+                  BlockEigenbasis& basis) {
+  basis = BlockEigenbasis{};
   basis.modes = count;
   basis.zeros = zeros;
-  basis.Z.width = padded_width(basis.modes, basis.zeros);
-  for (int row = 0; row < form.states(); ++row) {
+  basis.Z.width = packed_width(basis.modes, basis.zeros);
+  for (int row = 0; row < pencil.states(); ++row) {
     for (int i = 0; i < count; ++i) {
       basis.Z(row, i) = planes[at(i)].first[at(row)];
       basis.Z(row, count + i) = planes[at(i)].second[at(row)];
@@ -223,7 +224,7 @@ void write_planes(const StateForm& form, const Planes& planes, int count, int ze
   }
 }
 
-void Starter::write(TrackedBasis& basis) const {
+void BasisFromSpectrum::write(BlockEigenbasis& basis) const {
   write_planes(form_, planes_, plane_count_, form_.zeros(), basis);
   for (int row = 0; row < form_.states(); ++row) {
     for (int k = 0; k < basis.zeros; ++k) {
@@ -233,61 +234,62 @@ void Starter::write(TrackedBasis& basis) const {
 }
 
 /// The plane of a mode, orthonormal in the energy metric.
-Plane energy_plane(const StateForm& form, const Column& x, const Column& y) {
-  const double x_size = std::sqrt(products(form, x, x).energy());
+Plane energy_plane(const SymmetricPencil& pencil, const Column& x, const Column& y) {
+  const double x_size = std::sqrt(products(pencil, x, x).energy());
   Plane plane;
   plane.first = combination(1 / x_size, x, 0, x);
-  plane.second = combination(1, y, -products(form, plane.first, y).energy(), plane.first);
-  const double y_size = std::sqrt(products(form, plane.second, plane.second).energy());
+  plane.second = combination(1, y, -products(pencil, plane.first, y).energy(), plane.first);
+  const double y_size = std::sqrt(products(pencil, plane.second, plane.second).energy());
   plane.second = combination(y_size > 0 ? 1 / y_size : 0, plane.second, 0, y);
   return plane;
 }
 
-Plane plane_of(const StateForm& form, const TrackedBasis& basis, int i) {
+Plane plane_of(const SymmetricPencil& pencil, const BlockEigenbasis& basis, int i) {
   Column x{}, y{};
-  for (int row = 0; row < form.states(); ++row) {
+  for (int row = 0; row < pencil.states(); ++row) {
     x[at(row)] = basis.Z(row, i);
     y[at(row)] = basis.Z(row, basis.modes + i);
   }
-  return energy_plane(form, x, y);
+  return energy_plane(pencil, x, y);
 }
 
-Plane plane_of(const StateForm& form, const Mode<kMaxDof>& mode) {
+Plane plane_of(const SymmetricPencil& pencil, const Mode<kMaxDof>& mode) {
   const auto& u = mode.shapes[0];
   const Complex lambda = mode.eigenvalues[0];
   const ComplexVector<kMaxDof> v = lambda * u;
   if (lambda.imag() != 0) {
-    return energy_plane(form, state(form, u.real(), v.real()), state(form, u.imag(), v.imag()));
+    return energy_plane(pencil, state(pencil, u.real(), v.real()),
+                        state(pencil, u.imag(), v.imag()));
   }
   const auto zero = ComplexVector<kMaxDof>::Zero(u.size()).real().eval();
-  return energy_plane(form, state(form, u.real(), zero), state(form, zero, u.real()));
+  return energy_plane(pencil, state(pencil, u.real(), zero), state(pencil, zero, u.real()));
 }
 
 /// The energy metric times x.
-Column energy_image(const StateForm& form, const Column& x) {
-  const int n = form.joints, p = form.strains;
+Column energy_image(const SymmetricPencil& pencil, const Column& x) {
+  const int n = pencil.joints, p = pencil.rank;
   Column image{};
   const auto multiply = [](const double* matrix, int size, const double* v, double* out) {
     for (int j = 0; j < size; ++j) {
       for (int i = 0; i < size; ++i) out[i] += matrix[i + j * size] * v[j];
     }
   };
-  multiply(form.M, n, x.data() + p, image.data() + p);
-  if (form.factored) {
+  multiply(pencil.M, n, x.data() + p, image.data() + p);
+  if (pencil.factored) {
     std::copy_n(x.begin(), p, image.begin());
   } else {
-    multiply(form.W, p, x.data(), image.data());
+    multiply(pencil.W, p, x.data(), image.data());
   }
   return image;
 }
 
 /// Of plane a, and of the energy metric times plane b.
-double overlap(const StateForm& form, const Plane& a, const Plane& image) {
+double overlap(const SymmetricPencil& pencil, const Plane& a, const Plane& image) {
   double sum = 0;
   for (const Column* x : {&a.first, &a.second}) {
     for (const Column* y : {&image.first, &image.second}) {
       double product = 0;
-      for (int k = 0; k < form.states(); ++k) product += (*x)[at(k)] * (*y)[at(k)];
+      for (int k = 0; k < pencil.states(); ++k) product += (*x)[at(k)] * (*y)[at(k)];
       sum += product * product;
     }
   }
@@ -295,40 +297,40 @@ double overlap(const StateForm& form, const Plane& a, const Plane& image) {
 }
 
 template <typename NewPlane>
-std::array<int, kMaxDof> best_places(const StateForm& form, const TrackedBasis& before, int count,
-                                     const NewPlane& new_plane) {
+std::array<int, kMaxDof> best_places(const SymmetricPencil& pencil, const BlockEigenbasis& before,
+                                     int count, const NewPlane& new_plane) {
   Scores scores{};
   Planes images;  // once, as each is compared with every new plane
   for (int j = 0; j < count; ++j) {
-    const Plane old = plane_of(form, before, j);
-    images[at(j)] = {energy_image(form, old.first), energy_image(form, old.second)};
+    const Plane old = plane_of(pencil, before, j);
+    images[at(j)] = {energy_image(pencil, old.first), energy_image(pencil, old.second)};
   }
   for (int i = 0; i < count; ++i) {
     const Plane plane = new_plane(i);
-    for (int j = 0; j < count; ++j) scores[at(i)][at(j)] = overlap(form, plane, images[at(j)]);
+    for (int j = 0; j < count; ++j) scores[at(i)][at(j)] = overlap(pencil, plane, images[at(j)]);
   }
   return assign(scores, count);
 }
 
-/// v' M v of the columns of block i, and between the two; strain energies differ from these by
-/// Z' S Z = Sigma.
+/// v' M v of the columns of block i, and between the two; elastic coordinate energies differ from
+/// these by Z' S Z = Sigma.
 struct Kinetic {
   double first = 0, second = 0, mixed = 0;
 };
 
-Kinetic kinetic_energies(const TrackedBasis& basis, const TrackedDefect& defect, int i) {
+Kinetic kinetic_energies(const BlockEigenbasis& basis, const TrackedResidual& residual, int i) {
   const int m = basis.modes;
   Kinetic sum;
   for (int k = m; k < basis.columns(); ++k) {
-    sum.first -= basis.Z(k, i) * defect.MV(k, i);
-    sum.second -= basis.Z(k, m + i) * defect.MV(k, m + i);
-    sum.mixed -= basis.Z(k, i) * defect.MV(k, m + i);
+    sum.first -= basis.Z(k, i) * residual.MV(k, i);
+    sum.second -= basis.Z(k, m + i) * residual.MV(k, m + i);
+    sum.mixed -= basis.Z(k, i) * residual.MV(k, m + i);
   }
   return sum;
 }
 
 /// Hyperbolic rotation of the two columns of mode i.
-void rotate_block(double angle, int i, TrackedBasis& basis) {
+void rotate_block(double angle, int i, BlockEigenbasis& basis) {
   const double c = std::cosh(angle), s = std::sinh(angle);
   for (int row = 0; row < basis.columns(); ++row) {
     const double x = basis.Z(row, i), y = basis.Z(row, basis.modes + i);
@@ -339,51 +341,53 @@ void rotate_block(double angle, int i, TrackedBasis& basis) {
 
 }  // namespace
 
-bool start_basis(const StateForm& form, const Spectrum<kMaxDof>& spectrum,
-                 TrackedBasis& basis) noexcept {
-  return Starter(form, spectrum.basis).run(basis);
+bool start_basis(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum,
+                 BlockEigenbasis& basis) noexcept {
+  return BasisFromSpectrum(pencil, spectrum.basis).run(basis);
 }
 
-void keep_places(const StateForm& form, const TrackedBasis& before, TrackedBasis& basis) noexcept {
-  const auto place =
-      best_places(form, before, basis.modes, [&](int i) { return plane_of(form, basis, i); });
-  move_modes(place, basis);
+void match_modes(const SymmetricPencil& pencil, const BlockEigenbasis& before,
+                 BlockEigenbasis& basis) noexcept {
+  const auto index =
+      best_places(pencil, before, basis.modes, [&](int i) { return plane_of(pencil, basis, i); });
+  permute_modes(index, basis);
 }
 
-void move_modes(const std::array<int, kMaxDof>& place, TrackedBasis& basis) noexcept {
-  const PaddedRows Z = basis.Z;
+void permute_modes(const std::array<int, kMaxDof>& index, BlockEigenbasis& basis) noexcept {
+  const PackedMatrix Z = basis.Z;
   for (int row = 0; row < basis.columns(); ++row) {
     for (int i = 0; i < basis.modes; ++i) {
-      basis.Z(row, place[at(i)]) = Z(row, i);
-      basis.Z(row, basis.modes + place[at(i)]) = Z(row, basis.modes + i);
+      basis.Z(row, index[at(i)]) = Z(row, i);
+      basis.Z(row, basis.modes + index[at(i)]) = Z(row, basis.modes + i);
     }
   }
 }
 
-bool find_places(const StateForm& form, const TrackedBasis& before,
-                 const Spectrum<kMaxDof>& spectrum, std::array<int, kMaxDof>& place) noexcept {
+bool match_shapes(const SymmetricPencil& pencil, const BlockEigenbasis& before,
+                  const Spectrum<kMaxDof>& spectrum, std::array<int, kMaxDof>& index) noexcept {
   const int count = spectrum.modes.size();
-  for (int i = 0; i < count; ++i) place[at(i)] = i;
+  for (int i = 0; i < count; ++i) index[at(i)] = i;
   if (count != before.modes) return false;
-  place =
-      best_places(form, before, count, [&](int i) { return plane_of(form, spectrum.modes[i]); });
+  index = best_places(pencil, before, count,
+                      [&](int i) { return plane_of(pencil, spectrum.modes[i]); });
   return true;
 }
 
-void keep_planes(const StateForm& form, const Spectrum<kMaxDof>& spectrum,
-                 const std::array<int, kMaxDof>& place, TrackedBasis& basis) noexcept {
+void set_planes(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum,
+                const std::array<int, kMaxDof>& index, BlockEigenbasis& basis) noexcept {
   const int count = spectrum.modes.size();
   Planes planes;
-  for (int k = 0; k < count; ++k) planes[at(place[at(k)])] = plane_of(form, spectrum.modes[k]);
+  for (int k = 0; k < count; ++k) planes[at(index[at(k)])] = plane_of(pencil, spectrum.modes[k]);
   // Nonsymmetric damping and rounding errors can make modes of zero modes: there are more of them
   // than rows of W then, and no room for zero modes as well.
-  write_planes(form, planes, count, 0, basis);
+  write_planes(pencil, planes, count, 0, basis);
 }
 
-bool balance(const TrackedDefect& defect, double tolerance, TrackedBasis& basis) noexcept {
+bool rotate_hyperbolically(const TrackedResidual& residual, double tolerance,
+                           BlockEigenbasis& basis) noexcept {
   bool any = false;
   for (int i = 0; i < basis.modes; ++i) {
-    const Kinetic kinetic = kinetic_energies(basis, defect, i);
+    const Kinetic kinetic = kinetic_energies(basis, residual, i);
     // In the energy metric: 2 first + 1, 2 second - 1, 2 mixed.
     const double tangent = -2 * kinetic.mixed / (kinetic.first + kinetic.second);
     if (!(std::abs(tangent) > tolerance) || !(std::abs(tangent) < 1)) continue;
@@ -393,11 +397,12 @@ bool balance(const TrackedDefect& defect, double tolerance, TrackedBasis& basis)
   return any;
 }
 
-bool has_pure_planes(const TrackedDefect& defect, const TrackedBasis& basis,
-                     PlaneAngles& angles) noexcept {
+bool decouples_damping(const TrackedResidual& residual, const BlockEigenbasis& basis,
+                       HyperbolicAngles& angles) noexcept {
   for (int i = 0; i < basis.modes; ++i) {
-    const auto [first, second, mixed] = kinetic_energies(basis, defect, i);
-    // Kinetic energies of parallel velocities, strain energies of parallel strains.
+    const auto [first, second, mixed] = kinetic_energies(basis, residual, i);
+    // Kinetic energies of parallel velocities, elastic coordinate energies of parallel elastic
+    // coordinates.
     const double squared = mixed * mixed, limit = kParallel * (1 + first) * second;
     if (!(std::abs(first * second - squared) <= limit)) return false;
     if (!(std::abs((1 + first) * (second - 1) - squared) <= limit)) return false;
@@ -406,16 +411,16 @@ bool has_pure_planes(const TrackedDefect& defect, const TrackedBasis& basis,
   return true;
 }
 
-bool make_proportional(const PlaneAngles& angles, TrackedBasis& basis) noexcept {
+bool make_proportional(const HyperbolicAngles& angles, BlockEigenbasis& basis) noexcept {
   const int m = basis.modes, columns = basis.columns();
-  TrackedBasis pure = basis;
+  BlockEigenbasis pure = basis;
   for (int i = 0; i < m; ++i) rotate_block(angles[at(i)], i, pure);
   for (int column = 0; column < columns; ++column) {
-    const bool strain = column < m;
+    const bool elastic = column < m;
     double stays = 0, goes = 0;
     for (int row = 0; row < columns; ++row) {
       double& entry = pure.Z(row, column);
-      const bool kept = (row < m) == strain;
+      const bool kept = (row < m) == elastic;
       double& largest = kept ? stays : goes;
       if (!(std::abs(entry) <= largest)) largest = std::abs(entry);
       if (!kept) entry = 0;

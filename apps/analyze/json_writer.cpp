@@ -83,12 +83,12 @@ Json to_value(const Report& report) {
                  {"symmetric", spectrum.symmetric},
                  {"proportional", spectrum.proportional},
                  {"extended", spectrum.extended},
-                 {"constraint_matrix", rows(report.removal.constraint_matrix)},
-                 {"eliminated", report.removal.eliminated},
+                 {"constraint_matrix", rows(report.elimination.constraint_matrix)},
+                 {"eliminated", report.elimination.eliminated},
                  {"reduced",
-                  {{"mass", rows(report.removal.mass)},
-                   {"damping", rows(report.removal.damping)},
-                   {"stiffness", rows(report.removal.stiffness)}}}};
+                  {{"mass", rows(report.elimination.mass)},
+                   {"damping", rows(report.elimination.damping)},
+                   {"stiffness", rows(report.elimination.stiffness)}}}};
   if (report.response) result["response"] = to_value(*report.response);
   return result;
 }

@@ -1,6 +1,6 @@
 #pragma once
-#include <dashpot/analysis/removal.hpp>
 #include <dashpot/analysis/response.hpp>
+#include <dashpot/analysis/rigid_body_elimination.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/apps/analyze/system_file.hpp>
 
@@ -20,7 +20,7 @@ struct ReportedResponse {
 struct Report {
   Eigen::Index dof = 0;
   analysis::Spectrum<> spectrum;
-  analysis::Removal removal;  ///< the paper's reduction, for reading beside it
+  analysis::RigidBodyElimination elimination;  ///< the paper's reduction, for reading beside it
   std::optional<ReportedResponse> response;
   std::vector<std::string> notes;  ///< what the reader may not expect, a sentence each
 };

@@ -108,8 +108,8 @@ class Writer {
             format_number(spectrum.coupling, 2) +
             (spectrum.coupled ? ", solved together.\n" : ", independent.\n");
     out_ += "  The constraint matrix (--json) eliminates";
-    for (std::size_t i = 0; i < report.removal.eliminated.size(); ++i) {
-      out_ += (i == 0 ? " " : ", ") + joint_name(report.removal.eliminated[i]);
+    for (std::size_t i = 0; i < report.elimination.eliminated.size(); ++i) {
+      out_ += (i == 0 ? " " : ", ") + joint_name(report.elimination.eliminated[i]);
     }
     out_ += ".\n";
   }

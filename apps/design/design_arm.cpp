@@ -92,7 +92,7 @@ SystemEntry read_arm(const ArmOptions& options) {
   entry.impedance.mass = dynamics.M;
   entry.impedance.jacobian = dynamics.J;
   entry.impedance.task_stiffness = Eigen::MatrixXd(stiffness->asDiagonal());
-  const Eigen::VectorXd friction = model.joint_values(&controller::Joint::damping);
+  const Eigen::VectorXd friction = model.joint_values(&controller::Joint::viscous_friction);
   if (!friction.isZero(0)) {
     entry.friction = friction.asDiagonal();
     entry.impedance.damping = entry.friction;

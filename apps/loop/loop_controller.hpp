@@ -60,6 +60,6 @@ class PluginLibrary {
 };
 
 /// Nobody controls the masses of a system: zero torque, and the modes that its matrices have.
-std::unique_ptr<LoopController> make_spectator(const MatrixSystem& system, double period);
+std::unique_ptr<LoopController> make_null_controller(const MatrixSystem& system, double period);
 
 }  // namespace dashpot::apps

@@ -27,10 +27,10 @@ void fill(const dashpot_snapshot& from, controller::Snapshot& to) noexcept {
   to.velocity = vector(from.velocity, n);
   to.torque = vector(from.torque, n);
   to.law_torque = vector(from.law_torque, n);
-  to.setpoint_position = vector(from.goal_joint_position, n);
-  to.joint_error = to.setpoint_position - to.position;
+  to.reference_position = vector(from.reference_joint_position, n);
+  to.joint_error = to.reference_position - to.position;
   to.tip = pose(from.tip_position, from.tip_rotation);
-  to.setpoint_tip = pose(from.goal_tip_position, from.goal_tip_rotation);
+  to.reference_tip = pose(from.reference_tip_position, from.reference_tip_rotation);
   to.tip_error = Eigen::Map<const controller::Vector6>(from.tip_error);
   to.tip_wrench = Eigen::Map<const controller::Vector6>(from.tip_wrench);
 }

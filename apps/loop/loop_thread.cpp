@@ -203,7 +203,7 @@ void LoopThread::note(const dashpot_snapshot& snapshot) noexcept {
   }
   record_.joint = true;
   for (std::uint32_t i = 0; i < snapshot.joints; ++i) {
-    const double error = std::abs(snapshot.goal_joint_position[i] - snapshot.position[i]);
+    const double error = std::abs(snapshot.reference_joint_position[i] - snapshot.position[i]);
     record_.joint_error = std::max(record_.joint_error, error);
   }
 }

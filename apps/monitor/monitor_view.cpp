@@ -43,10 +43,10 @@ std::string kind_text(std::int8_t kind) {
   return analysis::to_text(static_cast<analysis::ModeKind>(kind));
 }
 
-std::string solver_text(std::int8_t solved_by) {
-  switch (solved_by) {
+std::string solver_text(std::int8_t origin) {
+  switch (origin) {
     case modes_t::DIRECT:
-      return "solved anew";
+      return "solved directly";
     case modes_t::TRACKED:
       return "tracked";
     case modes_t::REUSED:
@@ -206,7 +206,7 @@ std::string MonitorView::joints() const {
   table.add_column(Align::kRight, {"torque", "N m"});
   for (std::size_t i = 0; i < static_cast<std::size_t>(state.n); ++i) {
     table.add_row({joint_name(static_cast<Eigen::Index>(i)), fixed(state.joint_position[i], 4),
-                   fixed(state.joint_position_goal[i], 4), fixed(state.joint_velocity[i], 4),
+                   fixed(state.reference_joint_position[i], 4), fixed(state.joint_velocity[i], 4),
                    fixed(state.joint_torque[i], 3)});
   }
   return table.text();
@@ -216,7 +216,7 @@ std::string MonitorView::modes_table() const {
   const modes_t& modes = *modes_;
   std::string out = "  " + count(modes.num_modes, "mode") + ", " +
                     count(modes.zero_modes, "zero mode") + " at tick " +
-                    std::to_string(modes.tick) + ", " + solver_text(modes.solved_by) + ": " +
+                    std::to_string(modes.tick) + ", " + solver_text(modes.origin) + ": " +
                     analysis::to_text(static_cast<analysis::Status>(modes.status)) + "\n\n";
   TextTable table;
   table.add_column(Align::kRight, {"mode", ""});

@@ -1,4 +1,4 @@
-#include <dashpot/analysis/motion_fit.hpp>
+#include <dashpot/analysis/mode_identification.hpp>
 #include <dashpot/apps/loop/closed_loop.hpp>
 #include <dashpot/apps/run/ring_down.hpp>
 #include <dashpot/apps/run/sampled_modes.hpp>
@@ -88,7 +88,7 @@ double distance(const Eigenvalues& wanted, const Eigenvalues& other) {
 /// Pairs modes whose eigenvalues are nearest to each other, the best pair first; a mode that has
 /// none within kFarthest of itself stays alone.
 std::vector<RingDownMode> match(const dashpot_modes& predicted,
-                                std::vector<analysis::FittedMode> fitted) {
+                                std::vector<analysis::IdentifiedMode> fitted) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   std::vector<RingDownMode> result(predicted.count);
   for (std::uint32_t i = 0; i < predicted.count; ++i) {
@@ -115,7 +115,7 @@ std::vector<RingDownMode> match(const dashpot_modes& predicted,
   return result;
 }
 
-/// What the modes become in the sampled loop; a mode that moves farther than kFarthest has no
+/// What the modes become in the sampled loop; a mode that moves further than kFarthest has no
 /// counterpart there that could be told from others.
 void add_sampled(const Scene& scene, RingDown& ring_down) {
   const SampledModes modes = sampled_modes(scene);
@@ -153,9 +153,9 @@ std::optional<RingDown> measure_ring_down(const Scene& scene,
     motion->recording.velocity -= rest->recording.velocity;
     recordings.push_back(std::move(motion->recording));
   }
-  analysis::MotionFitOptions options;
+  analysis::IdentificationOptions options;
   options.period = every * scene.plant.period;
-  const analysis::MotionFit fit = analysis::fit_motion(recordings, options);
+  const analysis::IdentifiedModes fit = analysis::identify_modes(recordings, options);
   RingDown result;
   result.modes = match(rest->modes, fit.modes);
   result.releases = scene.dof();

@@ -187,7 +187,7 @@ void run(const Options& options) {
   }
   const auto make_controller = [&] {
     return plugin ? plugin->create(scene.path, scene.dof())
-                  : make_spectator(*scene.matrices, scene.plant.period);
+                  : make_null_controller(*scene.matrices, scene.plant.period);
   };
   if (plugin) check_steps(scene, *plugin);
 

@@ -169,7 +169,7 @@ std::string solved_text(const dashpot_modes& first, const dashpot_modes& last) {
   add(&dashpot_modes::tracked, "tracked");
   add(&dashpot_modes::reused, "reused");
   add(&dashpot_modes::unchanged, "unchanged");
-  add(&dashpot_modes::direct, "solved anew");
+  add(&dashpot_modes::direct, "solved directly");
   add(&dashpot_modes::no_springs, "without springs");
   add(&dashpot_modes::failed, "failed");
   add(&dashpot_modes::missed, "missed");

@@ -42,7 +42,8 @@ SampledModes sampled_modes(const Scene& scene) {
   loop.delay = scene.plant.delay;
   loop.torque_cutoff = scene.plant.torque_cutoff;
   loop.difference_velocity = scene.plant.difference_velocity;
-  loop.friction = Eigen::VectorXd(model.joint_values(&controller::Joint::damping)).asDiagonal();
+  loop.friction =
+      Eigen::VectorXd(model.joint_values(&controller::Joint::viscous_friction)).asDiagonal();
   if (scene.arm->config.settings.feed_forward.gravity) {
     loop.gravity_gradient = controller::gravity_gradient(model, scene.rest);
   }

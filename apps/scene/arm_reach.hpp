@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/motion/setpoint_path.hpp>
+#include <dashpot/controller/motion/reference.hpp>
 #include <dashpot/controller/settings.hpp>
 
 #include <Eigen/Cholesky>

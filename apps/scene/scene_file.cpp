@@ -18,9 +18,9 @@ using controller::YamlNode;
 sim::RobotParameters believed(const controller::Config& config) {
   const controller::ModelOptions& options = config.robot.options;
   sim::RobotParameters parameters;
-  parameters.armature = config.model.joint_values(&Joint::reflected_inertia);
-  parameters.viscous = config.model.joint_values(&Joint::damping);
-  parameters.coulomb = config.model.joint_values(&Joint::friction);
+  parameters.reflected_inertia = config.model.joint_values(&Joint::reflected_inertia);
+  parameters.viscous_friction = config.model.joint_values(&Joint::viscous_friction);
+  parameters.coulomb_friction = config.model.joint_values(&Joint::coulomb_friction);
   parameters.gravity = options.gravity;
   parameters.accept_inertias = true;  // the controller's model has judged them
   parameters.payload = {options.payload.mass, options.payload.center, options.payload.inertia};

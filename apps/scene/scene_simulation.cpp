@@ -93,11 +93,11 @@ void read_robot(const YamlMapping& simulation, const Units& positions, ArmSimula
   const YamlMapping keys = simulation.mapping("robot", kKeys);
   sim::RobotParameters& parameters = arm.parameters;
   read_joint_option(keys, "reflected_inertia", joint_units(positions, "kg m^2", "kg"),
-                    Sign::kNotNegative, parameters.armature);
+                    Sign::kNotNegative, parameters.reflected_inertia);
   read_joint_option(keys, "viscous_friction", joint_units(positions, "N m s/rad", "N s/m"),
-                    Sign::kNotNegative, parameters.viscous);
+                    Sign::kNotNegative, parameters.viscous_friction);
   read_joint_option(keys, "coulomb_friction", joint_units(positions, "N m", "N"),
-                    Sign::kNotNegative, parameters.coulomb);
+                    Sign::kNotNegative, parameters.coulomb_friction);
   read_number(keys, "friction_velocity", "rad/s", Sign::kPositive, arm.options.friction_velocity);
   static constexpr std::array<std::string_view, 3> kPayload = {"mass", "center", "inertia"};
   const YamlMapping payload = keys.mapping("payload", kPayload);

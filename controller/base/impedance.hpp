@@ -3,14 +3,14 @@
 
 namespace dashpot::controller {
 
-/// Springs and dampers at the tip, and how much of each direction is held (0 to 1), in the axes of
-/// one frame.
+/// Springs and dampers at the tip, and how much of each direction is selected (0 to 1), in the axes
+/// of one frame.
 struct TipImpedance {
   Matrix6 stiffness = Matrix6::Zero();
   Matrix6 damping = Matrix6::Zero();
-  Vector6 held = Vector6::Zero();
+  Vector6 selected = Vector6::Zero();
 
-  bool none() const noexcept { return (held.array() == 0).all(); }
+  bool none() const noexcept { return (selected.array() == 0).all(); }
 };
 
 /// Springs and dampers of every mode and frame at once: those not in force are zero. Weighted means
@@ -23,13 +23,13 @@ struct Impedance {
   TipImpedance tool;  ///< in T's
   Joints<N> null_stiffness = Joints<N>::Zero();
   Joints<N> null_damping = Joints<N>::Zero();
-  double damping_ratio = 0;        ///< that HeldDamping gives the tip's springs, beside `damping`
+  double damping_ratio = 0;  ///< that DesignedDamping gives the tip's springs, beside `damping`
   double joint_damping_ratio = 0;  ///< the same of the joints' springs, beside `joint_damping`
   double joint_weight = 0;         ///< share of the joint springs
   double task_weight = 0;          ///< share of the Cartesian springs
 
-  /// What a valid set-point asks for. Directions that are not held have no springs and dampers. The
-  /// null space is empty unless there are more joints than directions held.
+  /// What a valid set-point asks for. Directions that are not selected have no springs and dampers.
+  /// The null space is empty unless there are more joints than directions selected.
   static Impedance of(const Setpoint& setpoint) noexcept;
 
   /// Whether there is anything to do in the null space.
@@ -59,22 +59,22 @@ Impedance<N> Impedance<N>::of(const Setpoint& setpoint) noexcept {
   }
   result.task_weight = 1;
   TipImpedance& tip = gains.frame == Frame::kBase ? result.base : result.tool;
-  int held = 0;
+  int selected = 0;
   for (int i = 0; i < 6; ++i) {
     const bool hold = gains.directions[static_cast<std::size_t>(i)];
-    tip.held[i] = hold ? 1 : 0;
-    held += hold ? 1 : 0;
+    tip.selected[i] = hold ? 1 : 0;
+    selected += hold ? 1 : 0;
   }
-  const auto in_held_directions = [&](const Matrix6& A) -> Matrix6 {
-    return tip.held.asDiagonal() * (0.5 * (A + A.transpose())) * tip.held.asDiagonal();
+  const auto in_selected_directions = [&](const Matrix6& A) -> Matrix6 {
+    return tip.selected.asDiagonal() * (0.5 * (A + A.transpose())) * tip.selected.asDiagonal();
   };
-  tip.stiffness = in_held_directions(gains.task_stiffness);
+  tip.stiffness = in_selected_directions(gains.task_stiffness);
   if (gains.task_damping_ratio > 0) {
     result.damping_ratio = gains.task_damping_ratio;
   } else {
-    tip.damping = in_held_directions(gains.task_damping);
+    tip.damping = in_selected_directions(gains.task_damping);
   }
-  if (N > held) {
+  if (N > selected) {
     if (gains.null_stiffness.size() == N) result.null_stiffness = fixed<N>(gains.null_stiffness);
     if (gains.null_damping.size() == N) result.null_damping = fixed<N>(gains.null_damping);
   }
@@ -111,7 +111,7 @@ Impedance<N> blend(const Impedance<N>& a, const Impedance<N>& b, double s) noexc
   for (const auto tip : {&Impedance<N>::base, &Impedance<N>::tool}) {
     mix((a.*tip).stiffness, (b.*tip).stiffness, (c.*tip).stiffness);
     mix((a.*tip).damping, (b.*tip).damping, (c.*tip).damping);
-    mix((a.*tip).held, (b.*tip).held, (c.*tip).held);
+    mix((a.*tip).selected, (b.*tip).selected, (c.*tip).selected);
   }
   mix(a.null_stiffness, b.null_stiffness, c.null_stiffness);
   mix(a.null_damping, b.null_damping, c.null_damping);

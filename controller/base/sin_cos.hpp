@@ -1,7 +1,7 @@
 #pragma once
 // Sine and cosine of four angles at once.
 
-#include <dashpot/controller/base/lanes.hpp>
+#include <dashpot/controller/base/joint_pack.hpp>
 
 #include <cmath>
 #include <cstdint>
@@ -12,31 +12,31 @@ namespace dashpot::controller {
 ///
 /// Reduced to r = angle - k pi/2, |r| <= pi/4, where pi/2 comes in parts of 33 bits, so that k
 /// times a part is exact up to |k| = 2^20; then the polynomials of fdlibm (k_sin.c, k_cos.c).
-inline void sin_cos(const Four& angle, Four& sine, Four& cosine) noexcept {
+inline void sin_cos(const Vec4d& angle, Vec4d& sine, Vec4d& cosine) noexcept {
   using Bits = std::int64_t __attribute__((vector_size(32)));
   constexpr double kLargest = 1e6;
   constexpr double kToInteger = 0x1.8p52;  // adding it rounds; the integer is in its lowest bits
   constexpr double kPart1 = 0x1.921fb544p0, kPart2 = 0x1.0b4611a6p-34, kPart3 = 0x1.3198a2e0p-69,
                    kPart4 = 0x1.b839a252049c1p-104;
 
-  const Four shifted = angle * 0x1.45f306dc9c883p-1 + kToInteger;  // 2/pi
-  const Four k = shifted - kToInteger;
-  const Four high = angle - k * kPart1;  // exact
-  const Four low = k * kPart2;           // exact
-  const Four difference = high - low;
-  const Four lost = (high - difference) - low;
-  const Four r = difference + (lost - (k * kPart3 + k * kPart4));
-  const Four z = r * r;
-  const Four s =
+  const Vec4d shifted = angle * 0x1.45f306dc9c883p-1 + kToInteger;  // 2/pi
+  const Vec4d k = shifted - kToInteger;
+  const Vec4d high = angle - k * kPart1;  // exact
+  const Vec4d low = k * kPart2;           // exact
+  const Vec4d difference = high - low;
+  const Vec4d lost = (high - difference) - low;
+  const Vec4d r = difference + (lost - (k * kPart3 + k * kPart4));
+  const Vec4d z = r * r;
+  const Vec4d s =
       r + r * z *
               (-1.66666666666666324348e-01 +
                z * (8.33333333332248946124e-03 +
                     z * (-1.98412698298579493134e-04 +
                          z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 +
                                                                 z * 1.58969099521155010221e-10)))));
-  const Four half = 0.5 * z;
-  const Four w = 1.0 - half;
-  const Four c =
+  const Vec4d half = 0.5 * z;
+  const Vec4d w = 1.0 - half;
+  const Vec4d c =
       w +
       (((1.0 - w) - half) +
        z * z *

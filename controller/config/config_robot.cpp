@@ -84,8 +84,9 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
   const Units damping = joint_units(model, "N m s/rad", "N s/m");
   read_joint_option(keys, "reflected_inertia", joint_units(model, "kg m^2", "kg"),
                     options.reflected_inertia);
-  read_joint_option(keys, "viscous_friction", damping, options.damping);
-  read_joint_option(keys, "coulomb_friction", joint_units(model, "N m", "N"), options.friction);
+  read_joint_option(keys, "viscous_friction", damping, options.viscous_friction);
+  read_joint_option(keys, "coulomb_friction", joint_units(model, "N m", "N"),
+                    options.coulomb_friction);
   robot.model();  // throws what is wrong with it
   return robot;
 } catch (const InvalidModel& error) {

@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/controller/core/controller_core.hpp>
-#include <dashpot/controller/law/held_damping.hpp>
+#include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/law/impedance_law.hpp>
 #include <dashpot/controller/model/least_inertia.hpp>
 #include <dashpot/controller/safety/motion_watch.hpp>
@@ -17,8 +17,8 @@ namespace dashpot::controller {
 
 /// The controller's core for N joints, known at compile time. One tick, in `update`:
 ///     state -> StateCheck -> DynamicsKernel -> MotionWatch -> set-point, paths and gains
-///           -> HeldDamping -> ImpedanceLaw -> SafetyFilter -> torque;   and with these gains ->
-///           LoopSystem -> VibrationAnalysis
+///           -> DesignedDamping -> ImpedanceLaw -> SafetyFilter -> torque;   and with these gains
+///           -> LoopSystem -> VibrationAnalysis
 template <int N>
 class FixedCore final : public ControllerCore {
  public:
@@ -36,14 +36,14 @@ class FixedCore final : public ControllerCore {
   static constexpr double kMostRestarts = 3;
 
   /// Takes over a set-point that is new and in order. Whether the one given is in order.
-  bool read(const Setpoint& setpoint) noexcept;
+  bool accept_setpoint(const Setpoint& setpoint) noexcept;
   /// Springs that are to grow from zero start where the robot is.
   void start_new_springs() noexcept;
   /// The way to the accepted set-point; paths whose springs are not in force start where the robot
   /// is.
-  void aim() noexcept;
+  void update_goal() noexcept;
   /// Springs where the robot is, gains growing from zero.
-  void start_afresh() noexcept;
+  void restart_springs() noexcept;
   /// Latches and releases faults. Returns kOk if the state allows springs, or kFaultLatched or
   /// worse.
   Status watch_motion(Status input, double dt) noexcept;
@@ -53,37 +53,37 @@ class FixedCore final : public ControllerCore {
   /// Whether the set-point is fresh: kOk, kSetpointStale or kSetpointLost.
   Status setpoint_age_status() const noexcept;
   /// Moves gains and set-points on by one period, and gives the law's torque.
-  Vector act(bool hold) noexcept;
+  Vector impedance_torque(bool hold) noexcept;
   /// The safe output without springs.
-  Vector damp() noexcept;
-  double tip_path_speed() const noexcept;
+  Vector damping_torque() noexcept;
+  double tip_reference_speed() const noexcept;
   /// True if no path moves that springs are fixed on.
-  bool paths_still() const noexcept;
+  bool references_still() const noexcept;
   /// Whole ns, which add up without rounding errors.
   static double nanoseconds(double seconds) noexcept { return std::round(1e9 * seconds); }
   void show_measured(const RobotState& state) noexcept;
   /// The safe output without a state.
   Status ramp(Status status, JointVector& torque) noexcept;
   Status finish(Status status, const Vector& tau, JointVector& torque) noexcept;
-  void describe() noexcept;
+  void fill_snapshot() noexcept;
   void analyse() noexcept;
   /// Hands the closed loop to the analysis of the sampled loop.
   void hand_over() noexcept;
   /// Whether the closed loop is that of the last analysis, exactly.
-  bool looks_the_same(bool with_wrench, bool with_velocity) noexcept;
+  bool loop_unchanged(bool with_wrench, bool with_velocity) noexcept;
   Impedance<N> damper() const noexcept;
   Impedance<N> impedance() const noexcept;
 
   DynamicsKernel<N> kernel_;
   StateCheck state_check_;
-  SpringPaths<N> paths_;
-  GainPath<N> gains_;
-  HeldDamping<N> held_;
+  SpringReferences<N> references_;
+  GainBlend<N> gains_;
+  DesignedDamping<N> designed_;
   Ramp<Vector6> wrench_;
   ImpedanceLaw<N> law_;
   SafetyFilter<N> filter_;
   MotionWatch<N> motion_watch_;
-  SpringReach reach_;
+  ErrorClamp clamp_;
   Vector damping_;           ///< of the safe output "damp", N m s/rad
   Vector viscous_friction_;  ///< of the robot, N m s/rad
   Vector turn_;              ///< 2 pi for a continuous joint, else 0
@@ -114,8 +114,8 @@ class FixedCore final : public ControllerCore {
   bool in_order_ = true;
 
   bool first_ = true;           ///< there was no good state yet
-  bool afresh_ = true;          ///< springs start afresh when they are next in force
-  bool damping_only_ = true;    ///< the last torque was that of `damp`
+  bool restart_ = true;         ///< springs restart when they are next in force
+  bool damping_only_ = true;    ///< the last torque was that of `damping_torque`
   Status fault_ = Status::kOk;  ///< that latched
   double rest_ = 0;             ///< for how long the robot has been at rest since, s
   double restarts_ = 0;         ///< of the last second or so
@@ -127,27 +127,28 @@ FixedCore<N>::FixedCore(const RobotModel& model, const Settings& settings)
     : ControllerCore(model, settings),
       kernel_(model),
       state_check_(model, settings),
-      paths_([&] {
+      references_([&] {
         const Motion& motion = settings.motion;
         const double T = settings.period;
         const int window = static_cast<int>(std::lround(motion.smoothing / T));
         const JointNorm<N> joints{fixed<N>(motion.velocity), fixed<N>(motion.acceleration)};
         const TwistNorm twist{motion.linear_velocity, motion.angular_velocity,
                               motion.linear_acceleration, motion.angular_acceleration};
-        return SpringPaths<N>{JointPath<N>(joints, T, window), JointPath<N>(joints, T, window),
-                              TipPath(twist, T, window)};
+        return SpringReferences<N>{JointReference<N>(joints, T, window),
+                                   JointReference<N>(joints, T, window),
+                                   TipReference(twist, T, window)};
       }()),
       gains_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
-      held_(settings.subtract_friction ? fixed<N>(model.joint_values(&Joint::damping))
-                                       : Vector(Vector::Zero())),
+      designed_(settings.subtract_friction ? fixed<N>(model.joint_values(&Joint::viscous_friction))
+                                           : Vector(Vector::Zero())),
       wrench_(static_cast<int>(std::lround(settings.motion.gain_time / settings.period))),
       law_(model, settings.feed_forward),
       filter_(settings, fixed<N>(least_joint_inertia(model, settings.limits.position_lower,
                                                      settings.limits.position_upper))),
       motion_watch_(model, settings),
-      reach_{settings.limits.linear_error, settings.limits.angular_error},
+      clamp_{settings.limits.linear_error, settings.limits.angular_error},
       damping_(filter_.borne(fixed<N>(settings.limits.damping))),
-      viscous_friction_(fixed<N>(model.joint_values(&Joint::damping))) {
+      viscous_friction_(fixed<N>(model.joint_values(&Joint::viscous_friction))) {
   for (int i = 0; i < N; ++i) {
     const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
     turn_[i] = joint.type == JointType::kContinuous ? 2 * std::numbers::pi : 0;
@@ -173,12 +174,12 @@ void FixedCore<N>::reset(const JointVector& torque) noexcept {
   snapshot_ = Snapshot();
   for (JointVector* vector :
        {&snapshot_.position, &snapshot_.velocity, &snapshot_.torque, &snapshot_.law_torque,
-        &snapshot_.setpoint_position, &snapshot_.setpoint_velocity, &snapshot_.joint_error}) {
+        &snapshot_.reference_position, &snapshot_.reference_velocity, &snapshot_.joint_error}) {
     vector->setZero(N);
   }
   external_wrench_.setZero();
   vibration_.reset(N);
-  held_.reset();
+  designed_.reset();
   loop_.reset();
   analysed_.any = false;
   if (sampled_) sampled_->reset();
@@ -189,7 +190,7 @@ void FixedCore<N>::release() noexcept {
   fault_ = Status::kOk;
   rest_ = 0;
   state_check_.trust_velocities();
-  afresh_ = damping_only_ = true;
+  restart_ = damping_only_ = true;
   accepted_.wrench = settings_.initial.wrench;
   accepted_.joint_position = settings_.initial.joint_position;
   from_user_ = false;  // springs start where the robot is, with the gains in force
@@ -220,12 +221,13 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   first_ = false;
 
   Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
-  if (!read(setpoint)) status = worse(status, Status::kSetpointRejected);
+  if (!accept_setpoint(setpoint)) status = worse(status, Status::kSetpointRejected);
   status = worse(status, setpoint_age_status());
   // A reflex that has lost its sensor protects nobody.
   const bool blind = !wrench_known && std::isfinite(settings_.limits.external_force);
   status = worse(status, watch_motion(blind ? worse(input, Status::kCollision) : input, dt));
-  Vector tau = status >= Status::kSetpointLost ? damp() : act(status == Status::kSetpointStale);
+  Vector tau = status >= Status::kSetpointLost ? damping_torque()
+                                               : impedance_torque(status == Status::kSetpointStale);
   const bool returns = fault_ == Status::kPositionLimit;
   status = worse(
       status,
@@ -236,14 +238,14 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   } else {
     ramp_ticks_ = 0;
   }
-  describe();
+  fill_snapshot();
   return finish(status, tau, torque);
 }
 
 template <int N>
 Status FixedCore<N>::watch_motion(Status input, double dt) noexcept {
   restarts_ = std::max(0.0, restarts_ - dt);
-  const bool still = paths_still();
+  const bool still = references_still();
   const Status motion = motion_watch_.check({dt, q_, qd_, robot_, external_wrench_, still});
   Status now = worse(input, motion);
   if (restarts_ > kMostRestarts) now = worse(now, Status::kTooManyRestarts);
@@ -259,7 +261,7 @@ Status FixedCore<N>::watch_motion(Status input, double dt) noexcept {
 template <int N>
 void FixedCore<N>::latch(Status fault) noexcept {
   if (fault_ == Status::kOk) fault_ = fault;
-  afresh_ = true;
+  restart_ = true;
 }
 
 template <int N>
@@ -275,9 +277,9 @@ bool FixedCore<N>::rested(double dt) noexcept {
 }
 
 template <int N>
-Joints<N> FixedCore<N>::damp() noexcept {
+Joints<N> FixedCore<N>::damping_torque() noexcept {
   if (!damping_only_ || ramp_ticks_ > 0) filter_.begin_anew();
-  afresh_ = damping_only_ = true;
+  restart_ = damping_only_ = true;
   Vector tau = Vector::Zero();
   if (settings_.feed_forward.gravity) add<N>(robot_.gravity, tau);
   if (fault_ == Status::kStateFrozen) return tau;  // the velocity means nothing
@@ -313,7 +315,7 @@ Status FixedCore<N>::finish(Status status, const Vector& tau, JointVector& torqu
 }
 
 template <int N>
-void FixedCore<N>::describe() noexcept {
+void FixedCore<N>::fill_snapshot() noexcept {
   const Impedance<N>& impedance = gains_.now();
   const bool springs = !damping_only_;
   snapshot_.mode = accepted_.mode;
@@ -324,23 +326,25 @@ void FixedCore<N>::describe() noexcept {
   copy<N>(filter_.asked(), snapshot_.law_torque);
   snapshot_.tip = {robot_.p_BT_B, robot_.R_BT};
   if (snapshot_.joint_weight > 0 || snapshot_.task_weight > 0) {
-    const JointPath<N>& path = accepted_.mode == Mode::kJoint ? paths_.joint : paths_.rest;
-    copy<N>(path.position(), snapshot_.setpoint_position);
-    copy<N>(path.velocity(), snapshot_.setpoint_velocity);
+    const JointReference<N>& path =
+        accepted_.mode == Mode::kJoint ? references_.joint : references_.posture;
+    copy<N>(path.position(), snapshot_.reference_position);
+    copy<N>(path.velocity(), snapshot_.reference_velocity);
   } else {
-    copy<N>(q_, snapshot_.setpoint_position);
-    copy<N>(Vector::Zero(), snapshot_.setpoint_velocity);
+    copy<N>(q_, snapshot_.reference_position);
+    copy<N>(Vector::Zero(), snapshot_.reference_velocity);
   }
   for (int i = 0; i < N; ++i) {
-    snapshot_.joint_error[i] = snapshot_.setpoint_position[i] - q_[i];
+    snapshot_.joint_error[i] = snapshot_.reference_position[i] - q_[i];
   }
   if (snapshot_.task_weight > 0) {
-    snapshot_.setpoint_tip = {paths_.tip.position(), paths_.tip.rotation().toRotationMatrix()};
-    snapshot_.setpoint_twist = paths_.tip.velocity();
+    snapshot_.reference_tip = {references_.tip.position(),
+                               references_.tip.rotation().toRotationMatrix()};
+    snapshot_.reference_twist = references_.tip.velocity();
     snapshot_.tip_error = law_.tip_error();
   } else {
-    snapshot_.setpoint_tip = snapshot_.tip;
-    snapshot_.setpoint_twist.setZero();
+    snapshot_.reference_tip = snapshot_.tip;
+    snapshot_.reference_twist.setZero();
     snapshot_.tip_error.setZero();
   }
   snapshot_.tip_wrench = springs ? law_.tip_wrench() : Vector6(Vector6::Zero());

@@ -11,7 +11,7 @@ void FixedCore<N>::analyse() noexcept {
   const bool with_wrench = terms.geometric_stiffness && !external_wrench_.isZero(0);
   bool with_velocity = false;
   for (int i = 0; i < N && terms.jacobian_rate; ++i) with_velocity |= qd_[i] != 0;
-  if (looks_the_same(with_wrench, with_velocity)) {
+  if (loop_unchanged(with_wrench, with_velocity)) {
     vibration_.repeat(time_, snapshot_.tick);
     return;
   }
@@ -32,7 +32,7 @@ void FixedCore<N>::analyse() noexcept {
 }
 
 template <int N>
-bool FixedCore<N>::looks_the_same(bool with_wrench, bool with_velocity) noexcept {
+bool FixedCore<N>::loop_unchanged(bool with_wrench, bool with_velocity) noexcept {
   const Vector6 wrench = with_wrench ? external_wrench_ : Vector6(Vector6::Zero());
   const Vector qd = with_velocity ? qd_ : Vector(Vector::Zero());
   bool same = analysed_.any && analysed_.damping_only == damping_only_ &&
@@ -67,7 +67,7 @@ Impedance<N> FixedCore<N>::damper() const noexcept {
 /// Springs and dampers in force, the repulsion of position limits included.
 template <int N>
 Impedance<N> FixedCore<N>::impedance() const noexcept {
-  Impedance<N> all = damping_only_ ? damper() : held_.now(gains_.now());
+  Impedance<N> all = damping_only_ ? damper() : designed_.now(gains_.now());
   Vector stiffness, damping;
   if (!filter_.repels(q_, !damping_only_, stiffness, damping)) return all;
   for (int i = 0; i < N; ++i) {

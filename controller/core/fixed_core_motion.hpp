@@ -6,7 +6,7 @@
 namespace dashpot::controller {
 
 template <int N>
-bool FixedCore<N>::read(const Setpoint& setpoint) noexcept {
+bool FixedCore<N>::accept_setpoint(const Setpoint& setpoint) noexcept {
   if (looked_at_any_ && setpoint.time == looked_at_) return in_order_;
   looked_at_any_ = true;
   looked_at_ = setpoint.time;
@@ -25,9 +25,9 @@ bool FixedCore<N>::read(const Setpoint& setpoint) noexcept {
     accepted_.mode = setpoint.mode;
     accepted_.gains = setpoint.gains;
     gains_.set_target(Impedance<N>::of(accepted_));
-    if (!afresh_) start_new_springs();
+    if (!restart_) start_new_springs();
   }
-  if (!afresh_) aim();
+  if (!restart_) update_goal();
   return true;
 }
 
@@ -36,29 +36,31 @@ void FixedCore<N>::start_new_springs() noexcept {
   const Impedance<N>&now = gains_.now(), &then = gains_.target();
   for (int i = 0; i < N; ++i) {
     if (now.joint_stiffness(i, i) == 0 && then.joint_stiffness(i, i) > 0) {
-      paths_.joint.relocate(i, q_[i]);
+      references_.joint.relocate(i, q_[i]);
     }
-    if (now.null_stiffness[i] == 0 && then.null_stiffness[i] > 0) paths_.rest.relocate(i, q_[i]);
+    if (now.null_stiffness[i] == 0 && then.null_stiffness[i] > 0)
+      references_.posture.relocate(i, q_[i]);
   }
   const Eigen::Quaterniond tip(robot_.R_BT);
   Vector6 e;
-  e << paths_.tip.position() - robot_.p_BT_B, short_turn(paths_.tip.rotation() * tip.conjugate());
+  e << references_.tip.position() - robot_.p_BT_B,
+      short_turn(references_.tip.rotation() * tip.conjugate());
   const Vector6 left =
       without_new_springs(e, now.base, now.tool, then.base, then.tool, robot_.R_BT);
   if (left == e) return;
-  paths_.tip.relocate(robot_.p_BT_B + left.head<3>(), quaternion(left.tail<3>()) * tip);
+  references_.tip.relocate(robot_.p_BT_B + left.head<3>(), quaternion(left.tail<3>()) * tip);
 }
 
 template <int N>
-void FixedCore<N>::aim() noexcept {
+void FixedCore<N>::update_goal() noexcept {
   const bool joint = accepted_.mode == Mode::kJoint;
-  if (joint && gains_.now().joint_weight == 0) paths_.joint.start(q_);
+  if (joint && gains_.now().joint_weight == 0) references_.joint.start(q_);
   if (!joint && gains_.now().task_weight == 0) {
-    paths_.rest.start(q_);
-    paths_.tip.start(robot_.p_BT_B, Eigen::Quaterniond(robot_.R_BT).normalized());
+    references_.posture.start(q_);
+    references_.tip.start(robot_.p_BT_B, Eigen::Quaterniond(robot_.R_BT).normalized());
     law_.reset();
   }
-  const Vector& from = joint ? paths_.joint.position() : paths_.rest.position();
+  const Vector& from = joint ? references_.joint.position() : references_.posture.position();
   goal_ = from;
   if (accepted_.joint_position.size() == N) {
     goal_ = fixed<N>(accepted_.joint_position);
@@ -70,11 +72,11 @@ void FixedCore<N>::aim() noexcept {
 }
 
 template <int N>
-void FixedCore<N>::start_afresh() noexcept {
+void FixedCore<N>::restart_springs() noexcept {
   const Impedance<N> target = Impedance<N>::of(accepted_);
   Impedance<N> none;
-  none.base.held = target.base.held;
-  none.tool.held = target.tool.held;
+  none.base.selected = target.base.selected;
+  none.tool.selected = target.tool.selected;
   none.damping_ratio = target.damping_ratio;  // of springs that grow from zero
   none.joint_damping_ratio = target.joint_damping_ratio;
   gains_.start(none);
@@ -84,22 +86,22 @@ void FixedCore<N>::start_afresh() noexcept {
     copy<N>(q_, accepted_.joint_position);
     accepted_.tip_pose = {robot_.p_BT_B, robot_.R_BT};
   }
-  aim();
+  update_goal();
   filter_.begin_anew();
-  afresh_ = false;
+  restart_ = false;
   ++snapshot_.restarts;
   if (snapshot_.restarts > 1) ++restarts_;
 }
 
 template <int N>
-bool FixedCore<N>::paths_still() const noexcept {
+bool FixedCore<N>::references_still() const noexcept {
   const auto at_rest = [](const auto& velocity) {
     bool rest = true;
     for (Eigen::Index i = 0; i < velocity.size(); ++i) rest &= velocity[i] == 0;
     return rest;
   };
-  return at_rest(paths_.joint.velocity()) && at_rest(paths_.rest.velocity()) &&
-         at_rest(paths_.tip.velocity());
+  return at_rest(references_.joint.velocity()) && at_rest(references_.posture.velocity()) &&
+         at_rest(references_.tip.velocity());
 }
 
 template <int N>
@@ -111,24 +113,24 @@ Status FixedCore<N>::setpoint_age_status() const noexcept {
   return Status::kOk;
 }
 
-/// The share of its speed limits at which the tip's path takes no joint beyond kPathShare of its
-/// velocity limit where the robot is.
+/// The share of its speed limits at which the tip's path takes no joint beyond kReferenceShare of
+/// its velocity limit where the robot is.
 template <int N>
-double FixedCore<N>::tip_path_speed() const noexcept {
-  constexpr double kPathShare = 0.4;  // what is left is for vibrations and the null space
-  const double speed = paths_.tip.speed();
+double FixedCore<N>::tip_reference_speed() const noexcept {
+  constexpr double kReferenceShare = 0.4;  // what is left is for vibrations and the null space
+  const double speed = references_.tip.speed();
   if (speed == 0) return 1;
-  const Vector qd = law_.null_space().joint_velocity(paths_.tip.point_velocity());
+  const Vector qd = law_.null_space().joint_velocity(references_.tip.point_velocity());
   double share = 0;
   for (int i = 0; i < N; ++i) {
     share = std::max(share, std::abs(qd[i]) / settings_.limits.velocity[i]);
   }
-  return share > kPathShare * speed ? kPathShare * speed / share : 1;
+  return share > kReferenceShare * speed ? kReferenceShare * speed / share : 1;
 }
 
 template <int N>
-Joints<N> FixedCore<N>::act(bool hold) noexcept {
-  if (afresh_) start_afresh();
+Joints<N> FixedCore<N>::impedance_torque(bool hold) noexcept {
+  if (restart_) restart_springs();
   damping_only_ = false;
   gains_.step();
   const Vector6 wrench = hold ? Vector6(Vector6::Zero()) : accepted_.wrench;
@@ -136,28 +138,29 @@ Joints<N> FixedCore<N>::act(bool hold) noexcept {
   wrench_.step();
 
   // Of two modes in force, the one that fades away stays where it is.
-  const Impedance<N>& impedance = held_.update(gains_, robot_);
+  const Impedance<N>& impedance = designed_.update(gains_, robot_);
   const bool joint = accepted_.mode == Mode::kJoint;
   if (impedance.joint_weight > 0) {
     if (joint && !hold) {
-      paths_.joint.step(goal_);
+      references_.joint.step(goal_);
     } else {
-      paths_.joint.halt();
+      references_.joint.halt();
     }
   }
   if (impedance.task_weight > 0) {
     if (!joint && !hold) {
       const Eigen::Quaterniond tip(robot_.R_BT);
-      paths_.tip.step(accepted_.tip_pose.position, goal_rotation_,
-                      {robot_.p_BT_B, tip, robot_.R_BT, impedance.base, impedance.tool, reach_},
-                      tip_path_speed());
-      paths_.rest.step(goal_);
+      references_.tip.step(
+          accepted_.tip_pose.position, goal_rotation_,
+          {robot_.p_BT_B, tip, robot_.R_BT, impedance.base, impedance.tool, clamp_},
+          tip_reference_speed());
+      references_.posture.step(goal_);
     } else {
-      paths_.tip.halt();
-      paths_.rest.halt();
+      references_.tip.halt();
+      references_.posture.halt();
     }
   }
-  return law_.torque(robot_, q_, qd_, impedance, paths_, wrench_.now(), reach_);
+  return law_.torque(robot_, q_, qd_, impedance, references_, wrench_.now(), clamp_);
 }
 
 }  // namespace dashpot::controller

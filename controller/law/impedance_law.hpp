@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/law/null_space.hpp>
-#include <dashpot/controller/motion/setpoint_path.hpp>
+#include <dashpot/controller/motion/reference.hpp>
 #include <dashpot/controller/settings.hpp>
 
 #include <limits>
@@ -10,10 +10,10 @@ namespace dashpot::controller {
 
 /// The paths on which the springs are fixed.
 template <int N>
-struct SpringPaths {
-  JointPath<N> joint;  ///< of mode kJoint: q_d
-  JointPath<N> rest;   ///< rest posture of a redundant arm: q_0
-  TipPath tip;         ///< of mode kCartesian: p_d, R_d and twist V_d
+struct SpringReferences {
+  JointReference<N> joint;    ///< of mode kJoint: q_d
+  JointReference<N> posture;  ///< posture of a redundant arm: q_0
+  TipReference tip;           ///< of mode kCartesian: p_d, R_d and twist V_d
 };
 
 /// Joint torque of springs and dampers, between robot and set-point, and of the feed-forward:
@@ -34,7 +34,7 @@ struct SpringPaths {
 /// the loop would not be symmetric. It counts fully while it is small: s = 1 / sqrt(1 + (|J# e| /
 /// 0.3 rad)^2). Every term of the last column can be left out, see FeedForward.
 ///
-/// K_C acts on e as far as the springs reach (see SpringReach): a tip that is farther away is
+/// K_C acts on e as far as the springs clamp (see ErrorClamp): a tip that is further away is
 /// pulled no harder.
 ///
 /// The torque is bounded wherever the arm is: J' is, and so are N (see NullSpace) and e; nothing is
@@ -46,13 +46,13 @@ class ImpedanceLaw {
 
   ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward)
       : feed_forward_(feed_forward),
-        viscous_friction_(fixed<N>(model.joint_values(&Joint::damping))),
-        coulomb_friction_(fixed<N>(model.joint_values(&Joint::friction))) {}
+        viscous_friction_(fixed<N>(model.joint_values(&Joint::viscous_friction))),
+        coulomb_friction_(fixed<N>(model.joint_values(&Joint::coulomb_friction))) {}
 
   /// `wrench`: f, which J' takes to the joints only if FeedForward::wrench is on.
   Vector torque(const Dynamics<N>& robot, const Vector& q, const Vector& qd,
-                const Impedance<N>& impedance, const SpringPaths<N>& paths, const Vector6& wrench,
-                const SpringReach& reach = kEndless) noexcept;
+                const Impedance<N>& impedance, const SpringReferences<N>& references,
+                const Vector6& wrench, const ErrorClamp& clamp = kEndless) noexcept;
 
   /// Orientation errors start from the short way round.
   void reset() noexcept { orientation_.reset(); }
@@ -64,12 +64,12 @@ class ImpedanceLaw {
   const NullSpace<N>& null_space() const noexcept { return null_space_; }
 
  private:
-  static constexpr SpringReach kEndless{std::numeric_limits<double>::infinity(),
-                                        std::numeric_limits<double>::infinity()};
+  static constexpr ErrorClamp kEndless{std::numeric_limits<double>::infinity(),
+                                       std::numeric_limits<double>::infinity()};
 
   /// K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d
   Vector6 task_wrench(const Dynamics<N>& robot, const Vector& qd, const Impedance<N>& impedance,
-                      const TipPath& path, const SpringReach& reach) noexcept;
+                      const TipReference& path, const ErrorClamp& clamp) noexcept;
   /// s J# e
   Vector posture_share() const noexcept;
   void add_friction(const Vector& velocity, Vector& tau) const noexcept;
@@ -97,43 +97,44 @@ inline Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R,
 
 template <int N>
 Joints<N> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q, const Vector& qd,
-                                  const Impedance<N>& impedance, const SpringPaths<N>& paths,
-                                  const Vector6& wrench, const SpringReach& reach) noexcept {
+                                  const Impedance<N>& impedance,
+                                  const SpringReferences<N>& references, const Vector6& wrench,
+                                  const ErrorClamp& clamp) noexcept {
   Vector tau = Vector::Zero();
-  Vector path_velocity = Vector::Zero();  // qd_f
+  Vector reference_velocity = Vector::Zero();  // qd_f
   e_.setZero();
   F_.setZero();
   if (impedance.joint_weight > 0) {
-    const JointPath<N>& path = paths.joint;
+    const JointReference<N>& path = references.joint;
     add_product<N>(impedance.joint_stiffness, difference<N>(path.position(), q), tau);
     add_product<N>(impedance.joint_damping, difference<N>(path.velocity(), qd), tau);
     if (feed_forward_.acceleration) {
       add_product<N>(robot.M, path.acceleration(), tau, impedance.joint_weight);
     }
-    add<N>(path.velocity(), path_velocity, impedance.joint_weight);
+    add<N>(path.velocity(), reference_velocity, impedance.joint_weight);
   }
   if (impedance.task_weight > 0) {
     const bool null_space = impedance.null_space();
-    const bool moves = (paths.tip.point_velocity().array() != 0).any();
+    const bool moves = (references.tip.point_velocity().array() != 0).any();
     if (null_space || moves || feed_forward_.acceleration || feed_forward_.friction) {
       null_space_.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
     }
-    F_ = task_wrench(robot, qd, impedance, paths.tip, reach);
+    F_ = task_wrench(robot, qd, impedance, references.tip, clamp);
     if (null_space) {
-      Vector dq = difference<N>(paths.rest.position(), q);
+      Vector dq = difference<N>(references.posture.position(), q);
       dq -= posture_share();
-      const Vector dqd = difference<N>(paths.rest.velocity(), qd);
+      const Vector dqd = difference<N>(references.posture.velocity(), qd);
       add<N>(null_space_.spring(impedance.null_stiffness, dq), tau);
       add<N>(null_space_.damper(impedance.null_damping, dqd), tau);
     }
     if (feed_forward_.friction) {
-      add<N>(null_space_.joint_velocity(paths.tip.velocity()), path_velocity,
+      add<N>(null_space_.joint_velocity(references.tip.velocity()), reference_velocity,
              impedance.task_weight);
     }
   }
   if (feed_forward_.wrench) F_ += wrench;
   add_torque<N>(robot.J, F_, tau);
-  if (feed_forward_.friction) add_friction(path_velocity, tau);
+  if (feed_forward_.friction) add_friction(reference_velocity, tau);
   if (feed_forward_.coriolis) add<N>(robot.coriolis, tau);
   if (feed_forward_.gravity) add<N>(robot.gravity, tau);
   return tau;
@@ -141,18 +142,18 @@ Joints<N> ImpedanceLaw<N>::torque(const Dynamics<N>& robot, const Vector& q, con
 
 template <int N>
 Vector6 ImpedanceLaw<N>::task_wrench(const Dynamics<N>& robot, const Vector& qd,
-                                     const Impedance<N>& impedance, const TipPath& path,
-                                     const SpringReach& reach) noexcept {
+                                     const Impedance<N>& impedance, const TipReference& path,
+                                     const ErrorClamp& clamp) noexcept {
   e_.head<3>() = path.position() - robot.p_BT_B;
   e_.tail<3>() = orientation_.update(path.rotation(), Eigen::Quaterniond(robot.R_BT));
-  const Vector6 drawn_out = reach.shortened(e_, impedance.base, impedance.tool, robot.R_BT);
+  const Vector6 clamped = clamp.clamped(e_, impedance.base, impedance.tool, robot.R_BT);
   const Vector6 velocity_error = path.velocity() - twist<N>(robot.J, qd);
   Vector6 F = Vector6::Zero();
   if (!impedance.base.none()) {
-    F += impedance.base.stiffness * drawn_out + impedance.base.damping * velocity_error;
+    F += impedance.base.stiffness * clamped + impedance.base.damping * velocity_error;
   }
   if (!impedance.tool.none()) {
-    F += in_tool_axes(impedance.tool.stiffness, robot.R_BT, drawn_out) +
+    F += in_tool_axes(impedance.tool.stiffness, robot.R_BT, clamped) +
          in_tool_axes(impedance.tool.damping, robot.R_BT, velocity_error);
   }
   if (feed_forward_.acceleration) {

@@ -1,4 +1,4 @@
-#include <dashpot/controller/base/lanes.hpp>
+#include <dashpot/controller/base/joint_pack.hpp>
 #include <dashpot/controller/base/sin_cos.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
@@ -44,34 +44,34 @@ void set_joint(Rows& rows, int i, const Eigen::MatrixBase<Derived>& values) {
 
 template <int G, class Rows>
 Lanes3<G> load3(const Rows& rows, std::size_t first = 0) {
-  return {Lanes<G>::load(rows[first].data()), Lanes<G>::load(rows[first + 1].data()),
-          Lanes<G>::load(rows[first + 2].data())};
+  return {JointPack<G>::load(rows[first].data()), JointPack<G>::load(rows[first + 1].data()),
+          JointPack<G>::load(rows[first + 2].data())};
 }
 
 template <int G, class Rows>
 LanesSymmetric<G> load_symmetric(const Rows& rows) {
-  return {Lanes<G>::load(rows[0].data()), Lanes<G>::load(rows[1].data()),
-          Lanes<G>::load(rows[2].data()), Lanes<G>::load(rows[3].data()),
-          Lanes<G>::load(rows[4].data()), Lanes<G>::load(rows[5].data())};
+  return {JointPack<G>::load(rows[0].data()), JointPack<G>::load(rows[1].data()),
+          JointPack<G>::load(rows[2].data()), JointPack<G>::load(rows[3].data()),
+          JointPack<G>::load(rows[4].data()), JointPack<G>::load(rows[5].data())};
 }
 
 template <int N>
-Lanes<kGroups<N>> load(const Eigen::Matrix<double, N, 1>& values) {
-  Lanes<kGroups<N>> result{};
+JointPack<kGroups<N>> load(const Eigen::Matrix<double, N, 1>& values) {
+  JointPack<kGroups<N>> result{};
   __builtin_memcpy(&result, values.data(), N * sizeof(double));
   return result;
 }
 
 /// One column for each joint, of x, y, z and an unused entry, turned into rows.
 template <int G>
-Lanes3<G> to_lanes(const Four (&columns)[4 * G]) {
+Lanes3<G> to_lanes(const Vec4d (&columns)[4 * G]) {
   Lanes3<G> result;
   for (int g = 0; g < G; ++g) {
-    const Four* c = columns + 4 * g;
-    const Four xy01 = __builtin_shufflevector(c[0], c[1], 0, 4, 1, 5);
-    const Four xy23 = __builtin_shufflevector(c[2], c[3], 0, 4, 1, 5);
-    const Four z01 = __builtin_shufflevector(c[0], c[1], 2, 6, 2, 6);
-    const Four z23 = __builtin_shufflevector(c[2], c[3], 2, 6, 2, 6);
+    const Vec4d* c = columns + 4 * g;
+    const Vec4d xy01 = __builtin_shufflevector(c[0], c[1], 0, 4, 1, 5);
+    const Vec4d xy23 = __builtin_shufflevector(c[2], c[3], 0, 4, 1, 5);
+    const Vec4d z01 = __builtin_shufflevector(c[0], c[1], 2, 6, 2, 6);
+    const Vec4d z23 = __builtin_shufflevector(c[2], c[3], 2, 6, 2, 6);
     result.x.group[g] = __builtin_shufflevector(xy01, xy23, 0, 1, 4, 5);
     result.y.group[g] = __builtin_shufflevector(xy01, xy23, 2, 3, 6, 7);
     result.z.group[g] = __builtin_shufflevector(z01, z23, 0, 1, 4, 5);
@@ -83,21 +83,21 @@ Lanes3<G> to_lanes(const Four (&columns)[4 * G]) {
 /// turns by `angle` about its z axis besides. The products along the chain, which have to wait for
 /// one another, take a register for each column.
 template <int N, class Rows>
-Lanes33<kGroups<N>> link_rotations(const Rows& rotation, const Lanes<kGroups<N>>& angle) {
+Lanes33<kGroups<N>> link_rotations(const Rows& rotation, const JointPack<kGroups<N>>& angle) {
   constexpr int G = kGroups<N>;
-  Lanes<G> sine, cosine;
+  JointPack<G> sine, cosine;
   for (int g = 0; g < G; ++g) sin_cos(angle.group[g], sine.group[g], cosine.group[g]);
   const Lanes3<G> x_0 = load3<G>(rotation, 0), y_0 = load3<G>(rotation, 3);
   const Lanes3<G> x_1 = cosine * x_0 + sine * y_0, y_1 = cosine * y_0 - sine * x_0;
   alignas(32) double turned[6][kLanes<N>];
-  const Lanes<G>* entries[] = {&x_1.x, &x_1.y, &x_1.z, &y_1.x, &y_1.y, &y_1.z};
+  const JointPack<G>* entries[] = {&x_1.x, &x_1.y, &x_1.z, &y_1.x, &y_1.y, &y_1.z};
   for (std::size_t k = 0; k < 6; ++k) entries[k]->store(turned[k]);
 
-  Four x_axes[4 * G] = {}, y_axes[4 * G] = {}, z_axes[4 * G] = {};
-  Four x{1, 0, 0, 0}, y{0, 1, 0, 0}, z{0, 0, 1, 0};
+  Vec4d x_axes[4 * G] = {}, y_axes[4 * G] = {}, z_axes[4 * G] = {};
+  Vec4d x{1, 0, 0, 0}, y{0, 1, 0, 0}, z{0, 0, 1, 0};
   for (std::size_t i = 0; i < N; ++i) {
-    const Four new_x = x * turned[0][i] + y * turned[1][i] + z * turned[2][i];
-    const Four new_y = x * turned[3][i] + y * turned[4][i] + z * turned[5][i];
+    const Vec4d new_x = x * turned[0][i] + y * turned[1][i] + z * turned[2][i];
+    const Vec4d new_y = x * turned[3][i] + y * turned[4][i] + z * turned[5][i];
     z = x * rotation[6][i] + y * rotation[7][i] + z * rotation[8][i];
     x_axes[i] = x = new_x;
     y_axes[i] = y = new_y;
@@ -111,7 +111,7 @@ template <int N>
 void write_J_M(const Lanes3<kGroups<N>>& J_linear, const Lanes3<kGroups<N>>& J_angular,
                const Lanes3<kGroups<N>>& force, const Lanes3<kGroups<N>>& moment,
                Dynamics<N>& result) {
-  using L = Lanes<kGroups<N>>;
+  using L = JointPack<kGroups<N>>;
   const L* J[] = {&J_linear.x, &J_linear.y, &J_linear.z, &J_angular.x, &J_angular.y, &J_angular.z};
   const L* wrench[] = {&force.x, &force.y, &force.z, &moment.x, &moment.y, &moment.z};
   alignas(32) double J_rows[6][kLanes<N>], wrench_rows[6][kLanes<N>];
@@ -123,7 +123,7 @@ void write_J_M(const Lanes3<kGroups<N>>& J_linear, const Lanes3<kGroups<N>>& J_a
     for (int k = 0; k < 6; ++k) result.J(k, i) = J_rows[k][i];
     alignas(32) double column[kLanes<N>];
     for (int g = 0; g <= i / 4; ++g) {
-      Four entries{};
+      Vec4d entries{};
       for (int k = 0; k < 6; ++k) entries += J[k]->group[g] * wrench_rows[k][i];
       __builtin_memcpy(column + 4 * g, &entries, sizeof(entries));
     }
@@ -132,7 +132,7 @@ void write_J_M(const Lanes3<kGroups<N>>& J_linear, const Lanes3<kGroups<N>>& J_a
 }
 
 template <int N>
-void store(const Lanes<kGroups<N>>& source, Eigen::Matrix<double, N, 1>& target) {
+void store(const JointPack<kGroups<N>>& source, Eigen::Matrix<double, N, 1>& target) {
   __builtin_memcpy(target.data(), &source, N * sizeof(double));
 }
 
@@ -208,7 +208,7 @@ void DynamicsKernel<N>::evaluate(const Eigen::Matrix<double, N, 1>& q_in,
                                  const Eigen::Matrix<double, N, 1>& qd_in,
                                  Dynamics<N>& result) const noexcept {
   constexpr int G = kGroups<N>;
-  using L = Lanes<G>;
+  using L = JointPack<G>;
   using L3 = Lanes3<G>;
   const L q = load<N>(q_in), qd = load<N>(qd_in);
   const L revolute = L::load(revolute_.data()), prismatic = L::load(prismatic_.data());

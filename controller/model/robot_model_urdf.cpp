@@ -77,8 +77,8 @@ Joint read_joint(const urdf::Joint& source) {
     throw std::invalid_argument("a limit of velocity or effort is negative");
   }
   if (source.dynamics) {
-    joint.damping = source.dynamics->damping;
-    joint.friction = source.dynamics->friction;
+    joint.viscous_friction = source.dynamics->damping;
+    joint.coulomb_friction = source.dynamics->friction;
   }
   return joint;
 }
@@ -152,8 +152,8 @@ std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& pat
     }
   }
   apply(options.reflected_inertia, &Joint::reflected_inertia, "reflected inertia", joints, name);
-  apply(options.damping, &Joint::damping, "damping", joints, name);
-  apply(options.friction, &Joint::friction, "friction", joints, name);
+  apply(options.viscous_friction, &Joint::viscous_friction, "damping", joints, name);
+  apply(options.coulomb_friction, &Joint::coulomb_friction, "friction", joints, name);
   return joints;
 }
 

@@ -165,9 +165,9 @@ void to_c(const Snapshot& snapshot, dashpot_snapshot& out) noexcept {
   put(snapshot.position, out.position);
   put(snapshot.velocity, out.velocity);
   put(snapshot.torque, out.torque);
-  put(snapshot.setpoint_position, out.goal_joint_position);
+  put(snapshot.reference_position, out.reference_joint_position);
   put(snapshot.tip, out.tip_position, out.tip_rotation);
-  put(snapshot.setpoint_tip, out.goal_tip_position, out.goal_tip_rotation);
+  put(snapshot.reference_tip, out.reference_tip_position, out.reference_tip_rotation);
   put(snapshot.law_torque, out.law_torque);
   put(snapshot.tip_error, out.tip_error);
   put(snapshot.tip_wrench, out.tip_wrench);

@@ -185,8 +185,8 @@ void dashpot_controller::stay(std::int64_t now) noexcept {
   const bool cartesian = setpoint_.mode == Mode::kCartesian;
   setpoint_.joint_position.resize(0);
   setpoint_.tip_pose.rotation.setZero();
-  if (located_ && !cartesian) setpoint_.joint_position = snapshot.setpoint_position;
-  if (located_ && cartesian) setpoint_.tip_pose = snapshot.setpoint_tip;
+  if (located_ && !cartesian) setpoint_.joint_position = snapshot.reference_position;
+  if (located_ && cartesian) setpoint_.tip_pose = snapshot.reference_tip;
 }
 
 namespace {

@@ -33,7 +33,7 @@ class Judgement {
   }
 
   /// Judges gains that have passed check_gains, at q. Unless it is to be done `again`, those that
-  /// were accepted last, no joint farther than 0.1 rad from q, pass. Throws if there is no memory.
+  /// were accepted last, no joint further than 0.1 rad from q, pass. Throws if there is no memory.
   GainJudge::Verdict judge(const Gains& gains, const JointVector& q, bool again) {
     const std::lock_guard lock(mutex_);
     const bool known =

@@ -88,7 +88,7 @@ MotionWatch<N>::MotionWatch(const RobotModel& model, const Settings& settings) n
       velocity_limit_(fixed<N>(settings.limits.velocity)),
       lower_(fixed<N>(settings.limits.position_lower)),
       upper_(fixed<N>(settings.limits.position_upper)),
-      coulomb_(fixed<N>(model.joint_values(&Joint::friction))),
+      coulomb_(fixed<N>(model.joint_values(&Joint::coulomb_friction))),
       external_limit_(fixed<N>(settings.limits.external_torque)),
       gravity_(settings.feed_forward.gravity),
       external_force_(settings.limits.external_force),

@@ -49,7 +49,7 @@ inline double loop_lag(const Settings& settings) noexcept {
 ///
 /// I_i is least_joint_inertia, lag is loop_lag: delays make all this weaker, not unstable.
 ///
-/// Where springs end or start anew, what the last torque has beyond the new one fades evenly: in
+/// Where springs end or start again, what the last torque has beyond the new one fades evenly: in
 /// all joints alike, in the least time in which no joint's rate limit has to act on it. Otherwise
 /// joints with little torque would let go first, and turn the wrench that the tip exerts.
 template <int N>

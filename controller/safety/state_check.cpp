@@ -13,7 +13,7 @@ constexpr double kFarthest = 1e6;  // rad (m): no joint gets there, and turns ca
 // Of wrong_rate: long enough for the jitter of a loop that is not in real time.
 constexpr int kIntervals = 50;
 constexpr double kFastest = -1.0 / 3, kSlowest = 0.5;  // mean interval / period - 1
-// Of contradictory: in half a second a joint at a hundredth of its usual speed moves farther than
+// Of contradictory: in half a second a joint at a hundredth of its usual speed moves further than
 // the tolerance, and no filter of velocities lags behind for so long.
 constexpr double kUnexplained = 0.3;       // of what was travelled
 constexpr double kAngleTolerance = 0.02;   // rad

@@ -109,7 +109,7 @@ void closed_loop(const Dynamics<N>& robot, const Joints<N>& qd, const Impedance<
     for (int i = 0; i < N * N; ++i) extra.data()[i] += K_G.data()[i];
   }
 
-  system.has_tails = false;
+  system.has_low_words = false;
   system.mass.resize(N, N);
   system.damping.resize(N, N);
   system.stiffness.resize(N, N);

@@ -46,18 +46,18 @@ class LoopSystem {
 
 /// Number of directions held, for a robot that holds each wholly or not at all, in one frame; else
 /// -1.
-inline int directions_held(const TipImpedance& base, const TipImpedance& tool) noexcept {
+inline int selected_directions(const TipImpedance& base, const TipImpedance& tool) noexcept {
   if (!base.none() && !tool.none()) return -1;
-  int held = 0;
+  int count = 0;
   for (const TipImpedance* tip : {&base, &tool}) {
     for (int i = 0; i < 6; ++i) {
-      if (tip->held[i] == 1)
-        ++held;
-      else if (tip->held[i] != 0)
+      if (tip->selected[i] == 1)
+        ++count;
+      else if (tip->selected[i] != 0)
         return -1;
     }
   }
-  return held;
+  return count;
 }
 
 /// C += J' A J, the upper triangle.
@@ -163,9 +163,9 @@ bool LoopSystem<N>::add_free_motions(const Impedance<N>& impedance, const NullSp
 template <int N>
 void LoopSystem<N>::add_null_space(const Impedance<N>& impedance, const NullSpace<N>& null_space,
                                    JointSquare<N>& C) noexcept {
-  const int held = directions_held(impedance.base, impedance.tool);
-  if (held >= 0 && held < N && !null_space.inertia().nearly_singular() &&
-      add_free_motions(impedance, null_space, N - held, C)) {
+  const int selected = selected_directions(impedance.base, impedance.tool);
+  if (selected >= 0 && selected < N && !null_space.inertia().nearly_singular() &&
+      add_free_motions(impedance, null_space, N - selected, C)) {
     return;
   }
   dimension_ = 0;
@@ -214,7 +214,7 @@ void LoopSystem<N>::form(const Dynamics<N>& robot, const Impedance<N>& impedance
   whole |= rows_.size() == N && impedance.joint_weight == 0 && !impedance.null_space();
   if (rows_.size() >= N && !whole) rows_.triangularize();
 
-  system.has_tails = false;
+  system.has_low_words = false;
   system.mass.resize(N, N);
   system.damping.resize(N, N);
   system.stiffness_factor.resize(rows_.size(), N);

@@ -24,7 +24,7 @@ analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& sett
   loop.delay = sampled.delay;
   loop.torque_cutoff = sampled.cutoff;
   loop.difference_velocity = sampled.difference_velocity;
-  loop.friction = Eigen::VectorXd(model.joint_values(&Joint::damping)).asDiagonal();
+  loop.friction = Eigen::VectorXd(model.joint_values(&Joint::viscous_friction)).asDiagonal();
   return loop;
 }
 

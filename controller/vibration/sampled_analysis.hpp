@@ -40,7 +40,7 @@ class SampledAnalysis {
   SampledAnalysis& operator=(const SampledAnalysis&) = delete;
 
   /// Whether it is time for the next task: once the gains have grown, and then at each interval.
-  /// Ticks count from 1, and begin anew after `reset`.
+  /// Ticks count from 1, and begin again after `reset`.
   bool due(std::uint64_t tick) const noexcept { return tick >= next_; }
   /// To be filled in, and then handed over.
   Task& task() noexcept { return tasks_.slot(); }

@@ -70,13 +70,13 @@ void VibrationAnalysis::try_within_tick(const VibrationTask& given) noexcept {
 }
 
 bool VibrationAnalysis::worth_trying(const VibrationTask& given) noexcept {
-  const bool anew = given.restarts != tried_restarts_;
-  if (!anew && given.springs && !thread_->solver.follows() && wait_ > 0) {
+  const bool again = given.restarts != tried_restarts_;
+  if (!again && given.springs && !thread_->solver.follows() && wait_ > 0) {
     --wait_;
     return false;
   }
   tried_restarts_ = given.restarts;
-  from_thread_ = from_thread_ && !anew;
+  from_thread_ = from_thread_ && !again;
   return true;
 }
 

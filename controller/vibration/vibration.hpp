@@ -34,7 +34,7 @@ class VibrationAnalysis {
   /// Of the ticks that the caller knows to need less.
   VibrationCounters& counters() noexcept { return counters_; }
   void update() noexcept;
-  /// The next update is to be solved anew: what real eigenvalues form a mode depends on the way
+  /// The next update is to be solved directly: what real eigenvalues form a mode depends on the way
   /// there, and should not on that of the gains.
   void restart() noexcept { ++restarts_; }
   /// Instead of `task` and `update`, for a tick whose closed loop is exactly that of the last one.

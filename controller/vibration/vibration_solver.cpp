@@ -80,13 +80,11 @@ void VibrationSolver::publish_modes(Vibration& result) const noexcept {
   result.origin = spectrum_.origin;
   result.zero_modes = spectrum_.zero_mode_count;
   result.count = spectrum_.mode_count;
-  // Labels of modes that cannot be recognised any more come back after 2^26 such losses.
-  const std::uint64_t family = (spectrum_.lineage - 1) % (1u << 26);
   for (int i = 0; i < result.count; ++i) {
-    const int place = spectrum_.by_frequency[at(i)];
-    const analysis::ModeNumbers& from = spectrum_.modes[at(place)];
+    const int index = spectrum_.order[at(i)];
+    const analysis::ModeNumbers& from = spectrum_.modes[at(index)];
     VibrationMode& to = result.modes[at(i)];
-    to.label = static_cast<std::int32_t>(family * kMaxJoints) + place + 1;
+    to.label = spectrum_.label(index);
     to.kind = from.kind;
     to.eigenvalues = from.eigenvalues;
     to.natural_frequency = from.natural_frequency;
@@ -95,7 +93,7 @@ void VibrationSolver::publish_modes(Vibration& result) const noexcept {
     to.error_bound = from.error_bound;
     to.natural_frequency_bound = from.natural_frequency_bound;
     to.damping_ratio_bound = from.damping_ratio_bound;
-    if (shapes_) to.shape = spectrum_.shapes[at(place)].u[0];
+    if (shapes_) to.shape = spectrum_.shapes[at(index)].u[0];
   }
 }
 

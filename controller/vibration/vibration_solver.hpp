@@ -13,8 +13,9 @@ struct VibrationTask {
   analysis::System<kMaxJoints> system;  ///< the closed loop; see LoopSystem
   bool springs = true;                  ///< there is a stiffness at all
   std::uint64_t number = 0;             ///< of tasks so far, this one included
-  std::uint64_t restarts = 0;  ///< of tasks so far that were to be solved anew, this one included
-  std::uint64_t resets = 0;    ///< results of before a reset are not wanted
+  std::uint64_t restarts =
+      0;                     ///< of tasks so far that were to be solved directly, this one included
+  std::uint64_t resets = 0;  ///< results of before a reset are not wanted
   VibrationCounters counters;  ///< those of the ticks that were not even tasks, or in part
 };
 

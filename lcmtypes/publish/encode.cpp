@@ -46,17 +46,9 @@ static_assert(sizeof(state_t::verdicts) == kCommandVerdicts * sizeof(std::int64_
 static_assert(static_cast<int>(controller::Mode::kJoint) == state_t::JOINT);
 static_assert(static_cast<int>(controller::Mode::kCartesian) == state_t::CARTESIAN);
 
-std::int8_t solved_by(analysis::SpectrumOrigin origin) {
-  switch (origin) {
-    case analysis::SpectrumOrigin::kTracked:
-      return modes_t::TRACKED;
-    case analysis::SpectrumOrigin::kReused:
-      return modes_t::REUSED;
-    case analysis::SpectrumOrigin::kDirect:
-      break;
-  }
-  return modes_t::DIRECT;
-}
+static_assert(static_cast<int>(analysis::SpectrumOrigin::kTracked) == modes_t::TRACKED);
+static_assert(static_cast<int>(analysis::SpectrumOrigin::kReused) == modes_t::REUSED);
+static_assert(static_cast<int>(analysis::SpectrumOrigin::kDirect) == modes_t::DIRECT);
 
 void resize_modes(std::size_t count, modes_t& message) {
   for (auto* list : {&message.natural_frequency, &message.damping_ratio, &message.damped_frequency,
@@ -127,11 +119,11 @@ void fill(const StateSample& sample, state_t& message) {
   copy_to(snapshot.velocity, n, message.joint_velocity);
   copy_to(snapshot.torque, n, message.joint_torque);
   copy_to(snapshot.law_torque, n, message.law_torque);
-  copy_to(snapshot.setpoint_position, n, message.joint_position_goal);
+  copy_to(snapshot.reference_position, n, message.reference_joint_position);
   copy_to(snapshot.tip.position, message.tip_position);
   write_quaternion(snapshot.tip.rotation, message.tip_quaternion);
-  copy_to(snapshot.setpoint_tip.position, message.tip_position_goal);
-  write_quaternion(snapshot.setpoint_tip.rotation, message.tip_quaternion_goal);
+  copy_to(snapshot.reference_tip.position, message.reference_tip_position);
+  write_quaternion(snapshot.reference_tip.rotation, message.reference_tip_quaternion);
   copy_to(snapshot.tip_error, message.tip_error);
   copy_to(snapshot.tip_wrench, message.tip_wrench);
 
@@ -149,7 +141,7 @@ void fill(const ModesSample& sample, modes_t& message) {
   message.num_modes = static_cast<std::int32_t>(count);
   message.utime = sample.utime;
   message.tick = static_cast<std::int64_t>(vibration.tick);
-  message.solved_by = solved_by(vibration.origin);
+  message.origin = static_cast<std::int8_t>(vibration.origin);
   message.status = static_cast<std::int8_t>(vibration.status);
   copy_to(vibration.position, n, message.joint_position);
   message.zero_modes = vibration.zero_modes;

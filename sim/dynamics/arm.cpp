@@ -60,8 +60,10 @@ Arm::Arm(const Robot& robot, const ArmOptions& options)
     return std::any_of(robot_.joints().begin(), robot_.joints().end(),
                        [&](const Joint& joint) { return joint.*member != 0; });
   };
-  if (options.viscous_friction && any(&Joint::viscous)) forces_.push_back(&add_viscous_friction);
-  if (options.coulomb_friction && any(&Joint::coulomb)) forces_.push_back(&add_coulomb_friction);
+  if (options.viscous_friction && any(&Joint::viscous_friction))
+    forces_.push_back(&add_viscous_friction);
+  if (options.coulomb_friction && any(&Joint::coulomb_friction))
+    forces_.push_back(&add_coulomb_friction);
   if (options.stops) forces_.push_back(&add_stops);
   if (options.wall) {
     options_.wall->normal.normalize();
@@ -99,7 +101,8 @@ void Arm::rates(const StateVector& y, StateVector& y_dot) noexcept {
 void Arm::add_viscous_friction(Arm& arm, const Sums& sums) noexcept {
   double loss = 0;
   for (int i = 0; i < arm.dof(); ++i) {
-    const double friction = arm.robot_.joints()[static_cast<std::size_t>(i)].viscous * sums.qd[i];
+    const double friction =
+        arm.robot_.joints()[static_cast<std::size_t>(i)].viscous_friction * sums.qd[i];
     sums.tau[i] -= friction;
     loss += friction * sums.qd[i];
   }
@@ -110,7 +113,7 @@ void Arm::add_coulomb_friction(Arm& arm, const Sums& sums) noexcept {
   const double scale = 1 / arm.options_.friction_velocity;
   double loss = 0;
   for (int i = 0; i < arm.dof(); ++i) {
-    const double coulomb = arm.robot_.joints()[static_cast<std::size_t>(i)].coulomb;
+    const double coulomb = arm.robot_.joints()[static_cast<std::size_t>(i)].coulomb_friction;
     const double friction = coulomb * std::tanh(scale * sums.qd[i]);
     sums.tau[i] -= friction;
     loss += friction * sums.qd[i];

@@ -119,7 +119,7 @@ void ArticulatedBody::accelerations(const double* tau, double* qdd) noexcept {
   for (int i = n - 1; i >= 0; --i) {
     Body& body = bodies_[static_cast<std::size_t>(i)];
     body.reaction.noalias() = body.inertia * body.axis;
-    body.gain = 1 / (body.axis.dot(body.reaction) + joints[i].armature);
+    body.gain = 1 / (body.axis.dot(body.reaction) + joints[i].reflected_inertia);
     body.excess = tau[i] - body.axis.dot(body.bias);
     if (i == 0) break;
     Body& parent = (&body)[-1];
@@ -171,9 +171,9 @@ double ArticulatedBody::kinetic_energy() const noexcept {
     const Vector3d omega = body.velocity.tail<3>();
     const Vector3d v = Vector3d(body.velocity.head<3>()) + omega.cross(body.center);
     const Vector3d local = body.rotation.transpose() * omega;
-    energy +=
-        0.5 * (joint.inertia.mass * v.squaredNorm() +
-               local.dot(joint.inertia.about_center * local) + joint.armature * qd_[i] * qd_[i]);
+    energy += 0.5 * (joint.inertia.mass * v.squaredNorm() +
+                     local.dot(joint.inertia.about_center * local) +
+                     joint.reflected_inertia * qd_[i] * qd_[i]);
   }
   return energy;
 }

@@ -59,7 +59,7 @@ class ArticulatedBody {
     Matrix6 inertia;   // I, then articulated
     Vector6 bias;      // p: force that keeps the acceleration zero, then articulated
     Vector6 reaction;  // U = I S
-    double gain;       // 1 / (S' I S + armature)
+    double gain;       // 1 / (S' I S + reflected_inertia)
     double excess;     // u: generalized force that is left to accelerate the joint
   };
 

@@ -211,12 +211,13 @@ Joint Reader::joint(const urdf::Joint& read) const {
   if (!(result.effort > 0)) fail(where, "limit effort is negative");
   if (!(result.velocity > 0)) fail(where, "limit velocity is negative");
   if (read.dynamics) {
-    result.viscous = read.dynamics->damping;
-    result.coulomb = read.dynamics->friction;
+    result.viscous_friction = read.dynamics->damping;
+    result.coulomb_friction = read.dynamics->friction;
   }
-  require_finite(result.viscous, 0, where + ": dynamics damping",
+  require_finite(result.viscous_friction, 0, where + ": dynamics damping",
                  prismatic ? "N s/m" : "N m s/rad");
-  require_finite(result.coulomb, 0, where + ": dynamics friction", prismatic ? "N" : "N m");
+  require_finite(result.coulomb_friction, 0, where + ": dynamics friction",
+                 prismatic ? "N" : "N m");
   return result;
 }
 
@@ -279,8 +280,8 @@ void require_inertia(const std::vector<Joint>& joints, const std::string& name) 
     mass += joint->inertia.mass;
     moment += joint->inertia.about_center.trace() +
               joint->inertia.mass * joint->inertia.center.squaredNorm();
-    if (joint->armature == 0 && mass == 0 && (joint->prismatic || moment == 0)) {
-      fail(name + ": joint '" + joint->name + "'", "moves no mass and has no armature");
+    if (joint->reflected_inertia == 0 && mass == 0 && (joint->prismatic || moment == 0)) {
+      fail(name + ": joint '" + joint->name + "'", "moves no mass and has no reflected_inertia");
     }
   }
 }
@@ -312,10 +313,12 @@ Robot Robot::from_text(const std::string& urdf, const std::string& base, const s
   require_physical(parameters.payload, "payload", false);
   Inertia& last = robot.joints_.back().inertia;
   last = last + robot.tip_ * parameters.payload;
-  override_with(parameters.armature, &Joint::armature, "armature", "kg m^2", robot.joints_);
-  override_with(parameters.viscous, &Joint::viscous, "viscous friction", "N m s/rad",
+  override_with(parameters.reflected_inertia, &Joint::reflected_inertia, "reflected_inertia",
+                "kg m^2", robot.joints_);
+  override_with(parameters.viscous_friction, &Joint::viscous_friction, "viscous friction",
+                "N m s/rad", robot.joints_);
+  override_with(parameters.coulomb_friction, &Joint::coulomb_friction, "Coulomb friction", "N m",
                 robot.joints_);
-  override_with(parameters.coulomb, &Joint::coulomb, "Coulomb friction", "N m", robot.joints_);
   require_inertia(robot.joints_, name);
 
   if (!parameters.gravity.allFinite()) fail("gravity", "is not finite");

@@ -1,6 +1,6 @@
 // A solver of fixed capacity never touches the heap, and finds what the dynamic one finds.
-#include <dashpot/analysis/damping_hold.hpp>
 #include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/analysis/ratio_damping.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
@@ -203,7 +203,7 @@ TEST(Allocation, DoesNotHappenWhereTheLoopHoldsADampingRatio) {
     const Square<kMaxDof> M = arm.mass;
     const TaskJacobian<kMaxDof> J = *arm.jacobian;
     const TaskMatrix K_C = *arm.task_stiffness;
-    DampingHold hold;
+    RatioDamping hold;
     TaskMatrix C_C;
     Status status = Status::kNotFinite;
     EXPECT_EQ(allocations_of([&] {

@@ -132,7 +132,7 @@ TEST(DesignNearAStart, ReachesTheTargetAndStaysThere) {
     const auto size = [&unit](const MatrixXd& A) {
       return MatrixXd(unit.asDiagonal() * A * unit.asDiagonal()).norm();
     };
-    // No farther from the start than the closed form is.
+    // No further from the start than the closed form is.
     EXPECT_LE(size(design.damping - symmetric), size(exact - symmetric));
     const DampingDesign same = design_damping(arm, target, DampingStructure::kFull, exact);
     EXPECT_TRUE(near(same.damping, exact, 1e-8 * exact.norm()));

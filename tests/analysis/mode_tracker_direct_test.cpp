@@ -27,7 +27,7 @@ TEST(ModeTracker, KeepsThePlacesOfModesThatItSolvesDirectly) {
     system.damping.diagonal().setConstant(0.1);
     if (degrees > 0) system.damping(0, 1) = 1e-3, system.damping(1, 0) = -1e-3;
     ASSERT_EQ(tracked.update(system), Status::kOk);
-    EXPECT_EQ(tracked.spectrum->lineage, 1);
+    EXPECT_EQ(tracked.spectrum->epoch, 1);
     EXPECT_NEAR(tracked.mode(0).natural_frequency, 20, 1e-3) << degrees;
     EXPECT_NEAR(tracked.mode(1).natural_frequency, 10, 1e-3) << degrees;
     for (int i = 0; degrees > 0 && i < 2; ++i) {
@@ -36,7 +36,7 @@ TEST(ModeTracker, KeepsThePlacesOfModesThatItSolvesDirectly) {
   }
 }
 
-/// A spring that no motion strains has an eigenvalue of zero, and no shape.
+/// A spring that no motion elastic coordinates has an eigenvalue of zero, and no shape.
 TEST(ModeTracker, HasNoShapeWhereNothingMoves) {
   for (const double coupling : {0.0, 0.05}) {
     System<kMaxDof> system(2);

@@ -46,7 +46,7 @@ TEST_P(TrackedFamily, IsEnclosedAtEveryStep) {
     }
     const TrackerCounters& counters = tracker->counters();
     EXPECT_EQ(counters.tracked + counters.reused + counters.direct, kSteps);
-    EXPECT_LE(counters.most_passes, options.max_passes);
+    EXPECT_LE(counters.most_iterations, options.max_iterations);
   }
 }
 

@@ -117,7 +117,7 @@ TEST(ModeTracker, SortsByFallingFrequency) {
     std::array<bool, 6> seen{};
     double last = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < 6; ++k) {
-      const int place = tracked.spectrum->by_frequency[k];
+      const int place = tracked.spectrum->order[k];
       seen[static_cast<std::size_t>(place)] = true;
       EXPECT_LE(tracked.mode(place).natural_frequency, last);
       last = tracked.mode(place).natural_frequency;
@@ -276,21 +276,21 @@ TEST(ModeTracker, RefusesOptionsThatMeanNothing) {
   options.target_bound = 0;
   EXPECT_THROW(ModeTracker{options}, std::invalid_argument);
   options = {};
-  options.max_passes = 0;
+  options.max_iterations = 0;
   EXPECT_THROW(ModeTracker{options}, std::invalid_argument);
   options = {};
   options.soft_frequency = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(ModeTracker{options}, std::invalid_argument);
 }
 
-TEST(TrackedCertificate, OfAPerturbedBasisStillEncloses) {
+TEST(TrackedEnclosure, OfAPerturbedBasisStillEncloses) {
   Random random(4005);
   int proved = 0;
   for (int trial = 0; trial < 600; ++trial) {
     const int n = random.integer(2, 7), rows = trial % 2 == 0 ? n - 1 : 0;
     System<kMaxDof> system = random_fixed_system(random, n, random.log_uniform(0.1, 30));
     if (rows > 0) system.stiffness_factor = 10 * random.matrix(rows, n);
-    const StateForm form = state_form(system);
+    const SymmetricPencil pencil = symmetric_pencil(system);
     // An orthonormal basis of the space, from the true eigenvectors disturbed: found by a tracker
     // of a system that lies nearby.
     System<kMaxDof> nearby = system;
@@ -299,14 +299,14 @@ TEST(TrackedCertificate, OfAPerturbedBasisStillEncloses) {
     nearby.damping += size * random.spd(n);
     TrackerOptions options;
     options.target_bound = 1;
-    options.max_passes = 1;
+    options.max_iterations = 1;
     Tracked tracked(options);
     tracked.update(nearby);
     const Status status = tracked.update(system);
     if (status != Status::kOk) continue;
     ++proved;
     expect_enclosed(system, *tracked.spectrum);
-    EXPECT_EQ(form.zeros(), rows > 0 ? 1 : 0);
+    EXPECT_EQ(pencil.zeros(), rows > 0 ? 1 : 0);
   }
   EXPECT_GE(proved, 500);
 }

@@ -1,5 +1,5 @@
-// Random walks through the systems of 1 to 16 coordinates: every bound encloses the truth, passes
-// stay within their cap, and the direct solver agrees.
+// Random walks through the systems of 1 to 16 coordinates: every bound encloses the truth,
+// iterations stay within their cap, and the direct solver agrees.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/true_spectrum.hpp>
@@ -101,17 +101,17 @@ TEST_P(RandomWalk, IsFollowedWithinItsBounds) {
     }
   }
   const TrackerCounters& counters = tracker->counters();
-  EXPECT_LE(counters.most_passes, TrackerOptions{}.max_passes);
+  EXPECT_LE(counters.most_iterations, TrackerOptions{}.max_iterations);
   EXPECT_EQ(counters.tracked + counters.reused + counters.direct + counters.failed,
             counters.updates);
-  // Followed, not solved anew; and the bounds are worth something.
+  // Followed, not solved directly; and the bounds are worth something.
   EXPECT_GE(static_cast<double>(counters.tracked), 0.98 * static_cast<double>(counters.updates))
       << counters.of(Fallback::kNotConverged) << " not converged, "
       << counters.of(Fallback::kCoincidence) << " coincidences, " << counters.of(Fallback::kStart)
       << " starts";
   EXPECT_LE(tightest, 1);
-  RecordProperty("passes", std::to_string(counters.passes));
-  RecordProperty("repairs", std::to_string(counters.repairs));
+  RecordProperty("iterations", std::to_string(counters.iterations));
+  RecordProperty("separations", std::to_string(counters.separations));
   RecordProperty("widest", std::to_string(widest));
 }
 

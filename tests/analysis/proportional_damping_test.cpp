@@ -1,5 +1,5 @@
-// Paths on which the undamped modes decouple the damping, and onto and off such paths: strains and
-// velocities are then followed apart from each other, and nothing else may change.
+// Paths on which the undamped modes decouple the damping, and onto and off such paths: elastic
+// coordinates and velocities are then followed apart from each other, and nothing else may change.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -83,7 +83,7 @@ TEST_P(ProportionalPath, IsFollowedWithStrainsAndVelocitiesApart) {
   }
   EXPECT_EQ(tracked.counters().tracked, 399);
   EXPECT_EQ(tracked.counters().proportional, 399);
-  EXPECT_LE(tracked.counters().passes, full ? 800 : 450);
+  EXPECT_LE(tracked.counters().iterations, full ? 800 : 450);
 }
 
 INSTANTIATE_TEST_SUITE_P(Ratios, ProportionalPath,
@@ -105,7 +105,7 @@ TEST(ProportionalRoad, IsFoundWhenItBegins) {
       if (step % 10 == 0) expect_enclosed(system, *tracked.spectrum);
     }
     EXPECT_EQ(tracked.counters().direct, 1);
-    EXPECT_EQ(tracked.spectrum->lineage, 1U);
+    EXPECT_EQ(tracked.spectrum->epoch, 1U);
     EXPECT_GE(tracked.counters().proportional, 130);  // looked for each 64 updates
   }
 }
@@ -127,7 +127,7 @@ TEST(ProportionalRoad, IsLeftWhenItEnds) {
 
 TEST(ProportionalRoad, IsNotMistakenForDampingOfOneModeMore) {
   // A damper that couples the modes by less than the bound of what may be left out still counts in
-  // the certificate.
+  // the enclosure.
   Tracked tracked;
   for (int step = 0; step < 200; ++step) {
     System<kMaxDof> system = arm(1e-3 * step, 0.3, false);
@@ -153,7 +153,7 @@ TEST(ProportionalRoad, SurvivesModesThatCross) {
     ASSERT_EQ(tracked.update(system), Status::kOk) << "step " << step;
     if (step % 50 == 0) expect_enclosed(system, *tracked.spectrum);
   }
-  EXPECT_EQ(tracked.spectrum->lineage, 1U);
+  EXPECT_EQ(tracked.spectrum->epoch, 1U);
   EXPECT_GE(tracked.counters().proportional, 1500);
 }
 

@@ -1,6 +1,7 @@
-// The defect of a basis and its bound, the Sylvester solver's separation, and Newton's convergence.
+// The residual of a basis and its bound, the Sylvester solver's separation, and Newton's
+// convergence.
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/analysis/spectrum/certificate.hpp>
+#include <dashpot/analysis/spectrum/enclosure.hpp>
 #include <dashpot/analysis/spectrum/refinement.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -42,7 +43,7 @@ LongMatrix true_defect(const System<>& system, const ModalBasis<>& basis) {
   return Z.fullPivLu().solve(right);
 }
 
-TEST(Defect, IsWithinItsErrorOfTheTrueOne) {
+TEST(BasisResidual, IsWithinItsErrorOfTheTrueOne) {
   Random random(901);
   for (int trial = 0; trial < 60; ++trial) {
     const bool symmetric = trial % 2 == 0;
@@ -51,14 +52,14 @@ TEST(Defect, IsWithinItsErrorOfTheTrueOne) {
     ModalBasis<> basis = analyze(system).basis;
     const double perturbation = trial % 5 == 0 ? 0 : random.log_uniform(1e-14, 1e-3);
     basis.U += perturbation * random.matrix(basis.U.rows(), basis.U.cols());
-    Defect<> defect, working;
-    evaluate_defect<kDynamic>(system, symmetric, false, basis, working);
-    evaluate_defect<kDynamic>(system, symmetric, extended, basis, defect);
+    BasisResidual<> residual, working;
+    evaluate_residual<kDynamic>(system, symmetric, false, basis, working);
+    evaluate_residual<kDynamic>(system, symmetric, extended, basis, residual);
     const MatrixXd error =
-        (true_defect(system, basis) - defect.F.cast<long double>()).cwiseAbs().cast<double>();
-    ASSERT_TRUE(defect.F_error.allFinite());
+        (true_defect(system, basis) - residual.F.cast<long double>()).cwiseAbs().cast<double>();
+    ASSERT_TRUE(residual.F_error.allFinite());
     // Long double rounds 2048 times finer than double, and does so in the truth too.
-    MatrixXd bound = defect.F_error;
+    MatrixXd bound = residual.F_error;
     if (extended) bound += working.F_error / 500;
     for (Eigen::Index j = 0; j < error.cols(); ++j) {
       for (Eigen::Index i = 0; i < error.rows(); ++i) {
@@ -67,12 +68,12 @@ TEST(Defect, IsWithinItsErrorOfTheTrueOne) {
     }
     // Not so wide as to be of no use.
     if (perturbation < 1e-10) {
-      EXPECT_LE(defect.F_error.norm(), 1e-8 * basis.Lambda.norm());
+      EXPECT_LE(residual.F_error.norm(), 1e-8 * basis.Lambda.norm());
     }
   }
 }
 
-TEST(Defect, OfADegenerateBasisIsUnbounded) {
+TEST(BasisResidual, OfADegenerateBasisIsUnbounded) {
   Random random(902);
   const System<> system = random_system(random, 3, true);
   ModalBasis<> basis = analyze(system).basis;
@@ -80,9 +81,9 @@ TEST(Defect, OfADegenerateBasisIsUnbounded) {
   basis.Lambda.col(2).setZero();
   basis.Lambda.row(2).setZero();
   basis.Lambda(2, 2) = basis.Lambda(0, 0);
-  Defect<> defect;
-  evaluate_defect<kDynamic>(system, true, false, basis, defect);
-  EXPECT_FALSE((defect.F_error.array() < 1).all());
+  BasisResidual<> residual;
+  evaluate_residual<kDynamic>(system, true, false, basis, residual);
+  EXPECT_FALSE((residual.F_error.array() < 1).all());
 }
 
 /// Smallest singular value of X -> A X - X B.
@@ -134,12 +135,12 @@ TEST(Sylvester, HasNoSolutionWhereEigenvaluesAreCommon) {
 }
 
 /// Largest block of F off the diagonal, over |Lambda|.
-double coupling_of(const Defect<>& defect, const ModalBasis<>& basis) {
+double coupling_of(const BasisResidual<>& residual, const ModalBasis<>& basis) {
   double largest = 0;
   for (const Block& a : basis.blocks) {
     for (const Block& b : basis.blocks) {
       if (a.first == b.first) continue;
-      largest = std::max(largest, defect.F.block(a.first, b.first, a.size, b.size).norm());
+      largest = std::max(largest, residual.F.block(a.first, b.first, a.size, b.size).norm());
     }
   }
   return largest / basis.Lambda.norm();
@@ -151,14 +152,14 @@ TEST(NewtonStep, ConvergesQuadratically) {
     const System<> system = random_system(random, 5, symmetric);
     ModalBasis<> basis = analyze(system).basis;
     basis.U += 1e-4 * basis.U.norm() * random.matrix(5, 10) / 10;
-    Defect<> defect;
-    Certificate<> certificate;
+    BasisResidual<> residual;
+    BlockEnclosure<> enclosure;
     std::vector<double> sizes;
     for (int step = 0; step < 4; ++step) {
-      evaluate_defect<kDynamic>(system, symmetric, true, basis, defect);
-      sizes.push_back(coupling_of(defect, basis));
-      certify<kDynamic>(defect, basis, certificate);
-      newton_step<kDynamic>(defect, basis);
+      evaluate_residual<kDynamic>(system, symmetric, true, basis, residual);
+      sizes.push_back(coupling_of(residual, basis));
+      enclose<kDynamic>(residual, basis, enclosure);
+      newton_step<kDynamic>(residual, basis);
     }
     EXPECT_GT(sizes[0], 1e-6);
     EXPECT_LE(sizes[1], 1e3 * sizes[0] * sizes[0]) << sizes[0];

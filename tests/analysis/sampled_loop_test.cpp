@@ -43,7 +43,7 @@ std::vector<Complex> all_multipliers(const SampledSpectrum& sampled) {
   std::vector<Complex> all = sampled.others;
   all.insert(all.end(), sampled.zero_modes.begin(), sampled.zero_modes.end());
   for (const SampledMode& mode : sampled.modes) {
-    all.insert(all.end(), mode.multipliers.begin(), mode.multipliers.end());
+    all.insert(all.end(), mode.discrete_eigenvalues.begin(), mode.discrete_eigenvalues.end());
   }
   return all;
 }
@@ -255,7 +255,7 @@ TEST(SampledLoop, LeavesOutTheOnesOfZeroModes) {
   }
 }
 
-/// Every motion drifts, and none is left to have a multiplier.
+/// Every motion drifts, and none is left to have a discrete eigenvalue.
 TEST(SampledLoop, HasNothingToAnalyseWhereNothingHoldsOrDamps) {
   Random random(31);
   System<> system(3);

@@ -1,6 +1,6 @@
 // The two printed examples of the source paper: to 1e-12 and 1e-10 of values computed with 50
 // digits, and to the printed digits.
-#include <dashpot/analysis/removal.hpp>
+#include <dashpot/analysis/rigid_body_elimination.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/paper_examples.hpp>
@@ -74,11 +74,12 @@ void expect_dual(const System<>& system, const DualEigenvectors& dual, double to
 }
 
 System<> reduced(const System<>& system, const Spectrum<>& spectrum) {
-  const Removal removal = remove_successively(system, spectrum.zero_modes, Pivot::kLast);
-  System<> result(removal.mass.rows());
-  result.mass = removal.mass;
-  result.damping = removal.damping;
-  result.stiffness = removal.stiffness;
+  const RigidBodyElimination elimination =
+      eliminate_successively(system, spectrum.zero_modes, Pivot::kLast);
+  System<> result(elimination.mass.rows());
+  result.mass = elimination.mass;
+  result.damping = elimination.damping;
+  result.stiffness = elimination.stiffness;
   return result;
 }
 
@@ -184,7 +185,7 @@ TEST(PaperBaxter, HasTheModesOfTable4) {
 TEST(PaperBaxter, StaysTheSameWithoutFactorAndTails) {
   System<> system = to_joint_space(testing::paper_baxter());
   system.stiffness_factor.resize(0, 7);
-  system.has_tails = false;
+  system.has_low_words = false;
   const Spectrum<> spectrum = analyze(system);
   EXPECT_EQ(spectrum.zero_modes.count, 2);
   expect_modes(spectrum, kBaxter, 1e-10);

@@ -97,12 +97,12 @@ TEST(Validate, ChecksTheOptionalParts) {
   system.stiffness_factor = MatrixXd::Zero(2, 4);
   EXPECT_EQ(refusal(system), "stiffness_factor: is 2 x 4, expected 2 x 3");
   system = proper_system();
-  system.has_tails = true;
-  EXPECT_EQ(refusal(system), "damping_tail: is 0 x 0, expected 3 x 3");
-  system.damping_tail = system.stiffness_tail = MatrixXd::Zero(3, 3);
+  system.has_low_words = true;
+  EXPECT_EQ(refusal(system), "damping_low: is 0 x 0, expected 3 x 3");
+  system.damping_low = system.stiffness_low = MatrixXd::Zero(3, 3);
   EXPECT_EQ(refusal(system), "");
-  system.stiffness_tail(0, 1) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(refusal(system), "stiffness_tail: entry (1,2) is not a finite number");
+  system.stiffness_low(0, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(refusal(system), "stiffness_low: entry (1,2) is not a finite number");
 }
 
 }  // namespace

@@ -61,8 +61,8 @@ TEST(ToJointSpace, TailsHoldWhatRoundingTook) {
   impedance.jacobian = J;
   impedance.task_stiffness = K;
   const System<> system = to_joint_space(impedance);
-  ASSERT_TRUE(system.has_tails);
-  EXPECT_FALSE(system.stiffness_tail.isZero(0.0));
+  ASSERT_TRUE(system.has_low_words);
+  EXPECT_FALSE(system.stiffness_low.isZero(0.0));
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
       Wide exact = 0;
@@ -72,7 +72,7 @@ TEST(ToJointSpace, TailsHoldWhatRoundingTook) {
         }
       }
       const double high = system.stiffness(i, j);
-      const double low = system.stiffness_tail(i, j);
+      const double low = system.stiffness_low(i, j);
       EXPECT_TRUE(integer(high, 90) + integer(low, 90) == exact) << i << " " << j;
       EXPECT_LE(std::abs(low), std::numeric_limits<double>::epsilon() * std::abs(high));
     }
@@ -85,8 +85,8 @@ TEST(ToJointSpace, IsExactlySymmetric) {
   impedance.stiffness = random.spd(7);
   const System<> system = to_joint_space(impedance);
   EXPECT_TRUE(system.symmetric());
-  EXPECT_EQ(system.stiffness_tail, system.stiffness_tail.transpose());
-  EXPECT_EQ(system.damping_tail, system.damping_tail.transpose());
+  EXPECT_EQ(system.stiffness_low, system.stiffness_low.transpose());
+  EXPECT_EQ(system.damping_low, system.damping_low.transpose());
 }
 
 TEST(ToJointSpace, AddsJointSpaceAndTaskSpaceParts) {
@@ -106,7 +106,7 @@ TEST(ToJointSpace, OfAMassAloneHasNeitherDampingNorStiffness) {
   const System<> system = to_joint_space(impedance);
   EXPECT_TRUE(system.damping.isZero(0.0));
   EXPECT_TRUE(system.stiffness.isZero(0.0));
-  EXPECT_FALSE(system.has_tails);
+  EXPECT_FALSE(system.has_low_words);
 }
 
 TEST(ToJointSpace, OfJointSpaceMatricesTakesThemAsTheyAre) {
@@ -117,7 +117,7 @@ TEST(ToJointSpace, OfJointSpaceMatricesTakesThemAsTheyAre) {
   const System<> system = to_joint_space(impedance);
   EXPECT_EQ(system.damping, *impedance.damping);
   EXPECT_EQ(system.stiffness, *impedance.stiffness);
-  EXPECT_FALSE(system.has_tails);
+  EXPECT_FALSE(system.has_low_words);
 }
 
 TEST(ToJointSpace, AveragesRoundingInSymmetryAway) {

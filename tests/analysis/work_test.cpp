@@ -99,7 +99,7 @@ TEST(Work, OfTheTrackerIsAllOrNothing) {
   ASSERT_EQ(tracker->update(system, *spectrum, unlimited), Status::kOk);
   EXPECT_GT(unlimited.done(), 400'000);
   EXPECT_TRUE(tracker->follows());
-  EXPECT_EQ(spectrum->lineage, before->lineage);
+  EXPECT_EQ(spectrum->epoch, before->epoch);
   for (std::size_t i = 0; i < 7; ++i) {
     EXPECT_NEAR(spectrum->modes[i].natural_frequency, 2 * before->modes[i].natural_frequency,
                 1e-9 * before->modes[i].natural_frequency);
@@ -133,8 +133,8 @@ TEST(Work, LeavesWhatCanBeFollowedToALaterUpdate) {
     EXPECT_EQ(spectrum->origin, SpectrumOrigin::kTracked);
     ASSERT_EQ(SpectrumSolver<kMaxDof>().solve(system, *exact), Status::kOk);
     for (int i = 0; i < 12; ++i) {
-      const ModeNumbers& mode = spectrum->modes[static_cast<std::size_t>(
-          spectrum->by_frequency[static_cast<std::size_t>(i)])];
+      const ModeNumbers& mode =
+          spectrum->modes[static_cast<std::size_t>(spectrum->order[static_cast<std::size_t>(i)])];
       EXPECT_LE(std::abs(mode.eigenvalues[0] - exact->modes[i].eigenvalues[0]),
                 mode.error_bound + exact->modes[i].error_bound);
     }

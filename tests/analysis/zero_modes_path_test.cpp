@@ -62,7 +62,7 @@ TEST_P(SeveralZeroModes, AreFollowed) {
     }
   }
   EXPECT_EQ(tracker.counters().direct, 1);
-  EXPECT_LE(tracker.counters().passes, 1300);
+  EXPECT_LE(tracker.counters().iterations, 1300);
 }
 
 INSTANTIATE_TEST_SUITE_P(Arms, SeveralZeroModes,

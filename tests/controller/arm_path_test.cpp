@@ -55,7 +55,7 @@ TEST(ArmPath, OfSixJointsPassesASingularityBetweenTwoTicks) {
     ASSERT_EQ(tracker->update(loop.at(q), *spectrum), analysis::Status::kOk);
   }
   EXPECT_EQ(tracker->counters().direct, 1);
-  EXPECT_LE(tracker->counters().most_passes, 4);
+  EXPECT_LE(tracker->counters().most_iterations, 4);
 }
 
 }  // namespace

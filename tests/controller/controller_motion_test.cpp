@@ -84,7 +84,7 @@ TEST_F(Motion, JointStepArrives) {
   arm.setpoint.joint_position[3] += 0.5;
   expect_smooth(6.0);
   EXPECT_TRUE(near(arm.state.position, arm.setpoint.joint_position, 1e-3));
-  EXPECT_EQ(arm.controller.snapshot().setpoint_position, arm.setpoint.joint_position);
+  EXPECT_EQ(arm.controller.snapshot().reference_position, arm.setpoint.joint_position);
 }
 
 TEST_F(Motion, PoseStepArrives) {
@@ -95,7 +95,7 @@ TEST_F(Motion, PoseStepArrives) {
   expect_smooth(6.0);
   EXPECT_TRUE(near(arm.tip().position, arm.setpoint.tip_pose.position, 2e-3));
   EXPECT_TRUE(near(arm.tip().rotation, arm.setpoint.tip_pose.rotation, 1e-2));
-  EXPECT_EQ(arm.controller.snapshot().setpoint_tip.position, arm.setpoint.tip_pose.position);
+  EXPECT_EQ(arm.controller.snapshot().reference_tip.position, arm.setpoint.tip_pose.position);
 }
 
 TEST_F(Motion, AWrenchIsExertedAgainstAWall) {

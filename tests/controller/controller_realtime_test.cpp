@@ -42,7 +42,7 @@ TEST(Realtime, UpdateNeverAllocates) {
   EXPECT_GT(controller.snapshot().tick + 1, 0u);
 }
 
-/// With the spectrum in every tick, followed and solved anew, and on a thread.
+/// With the spectrum in every tick, followed and solved directly, and on a thread.
 TEST(Realtime, AnalysisNeverAllocates) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
   const RobotModel model = panda_model();

@@ -29,7 +29,7 @@ class Judge : public ::testing::Test {
   static RobotModel model(double gravity = 0) {
     ModelOptions options;
     options.gravity = {gravity, 0, 0};
-    options.friction = options.damping = JointVector::Zero(1);
+    options.coulomb_friction = options.viscous_friction = JointVector::Zero(1);
     return testing::chain_of({"continuous"}, options);
   }
   GainJudge::Verdict judge(double gravity = 0) const {

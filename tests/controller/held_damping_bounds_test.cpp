@@ -1,5 +1,5 @@
 // Damping designed at every tick is semidefinite and bounded, whatever it is designed for.
-#include <dashpot/controller/law/held_damping.hpp>
+#include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>
@@ -22,7 +22,7 @@ using testing::LedArm;
 using testing::plain_settings;
 using testing::smooth_panda;
 
-TEST(HeldDamping, IsSemidefiniteWhateverChanges) {
+TEST(DesignedDamping, IsSemidefiniteWhateverChanges) {
   const RobotModel model = smooth_panda();
   LedArm led(model, plain_settings(model, Mode::kCartesian));
   testing::Random random(20210606);
@@ -53,7 +53,7 @@ TEST(HeldDamping, IsSemidefiniteWhateverChanges) {
 
 /// Stretched, the arm loses a direction: the damping in the joints stays what the frequencies
 /// allow, and so does the torque.
-TEST(HeldDamping, IsBoundedThroughASingularity) {
+TEST(DesignedDamping, IsBoundedThroughASingularity) {
   const RobotModel model = smooth_panda();
   Settings settings = plain_settings(model, Mode::kCartesian);
   LedArm led(model, settings);
@@ -88,7 +88,7 @@ TEST(HeldDamping, IsBoundedThroughASingularity) {
   EXPECT_LT(step, 5);
 }
 
-TEST(HeldDamping, NeverAllocates) {
+TEST(DesignedDamping, NeverAllocates) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
   const RobotModel model = smooth_panda();
   LedArm led(model, plain_settings(model, Mode::kCartesian));
@@ -106,7 +106,7 @@ TEST(HeldDamping, NeverAllocates) {
   EXPECT_EQ(count, 0);
 }
 
-TEST(HeldDamping, KeepsTheLastDesignWhereThereIsNone) {
+TEST(DesignedDamping, KeepsTheLastDesignWhereThereIsNone) {
   TaskDamper damper;
   damper.set(Matrix6(100 * Matrix6::Identity()), 0.7, {});
   analysis::Square<kMaxJoints> M = Eigen::MatrixXd::Identity(7, 7), broken = M;
@@ -132,7 +132,7 @@ TEST(HeldDamping, KeepsTheLastDesignWhereThereIsNone) {
   EXPECT_NEAR(damper.damping()(5, 5), 0, 1e-3);
 }
 
-TEST(HeldDamping, IsBoundedHoweverSingularTheJacobian) {
+TEST(DesignedDamping, IsBoundedHoweverSingularTheJacobian) {
   TaskDamper damper;
   const double K = 2000, ratio = 0.7;
   damper.set(Matrix6(K * Matrix6::Identity()), ratio, {});
@@ -151,7 +151,7 @@ TEST(HeldDamping, IsBoundedHoweverSingularTheJacobian) {
 }
 
 // Rounding may leave a mass matrix singular, and springs a little indefinite: both have a design.
-TEST(HeldDamping, IsDesignedForWhatRoundingMadeSingular) {
+TEST(DesignedDamping, IsDesignedForWhatRoundingMadeSingular) {
   const JointMatrix singular{{1.0, 1.0}, {1.0, 1.0}};
   JointMatrix K_q{{100.0, 100.0}, {100.0, 100.0}};
   for (const double indefinite : {0.0, -5e-9}) {
@@ -184,7 +184,7 @@ TEST(HeldDamping, IsDesignedForWhatRoundingMadeSingular) {
   }
 }
 
-TEST(HeldDamping, RefusesWhatIsNoRatio) {
+TEST(DesignedDamping, RefusesWhatIsNoRatio) {
   const RobotModel model = smooth_panda();
   const Settings settings = plain_settings(model, Mode::kCartesian);
   for (const double wrong : {-1e-9, 2.0001, std::numeric_limits<double>::infinity(),

@@ -1,5 +1,5 @@
 // Damping ratios held beside friction in the joints, and in the joint mode.
-#include <dashpot/controller/law/held_damping.hpp>
+#include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>
@@ -17,8 +17,8 @@ namespace {
 /// An arm whose every joint has this viscous friction, N m s/rad.
 RobotModel rubbing(const testing::Arm& arm, double friction) {
   ModelOptions options;
-  options.damping = Eigen::VectorXd::Constant(testing::arm_model(arm).dof(), friction);
-  options.reflected_inertia = Eigen::VectorXd::Constant(options.damping.size(), 0.1);
+  options.viscous_friction = Eigen::VectorXd::Constant(testing::arm_model(arm).dof(), friction);
+  options.reflected_inertia = Eigen::VectorXd::Constant(options.viscous_friction.size(), 0.1);
   return testing::arm_model(arm, options);
 }
 
@@ -89,7 +89,7 @@ TEST(HeldBesideFriction, IsSemidefiniteWhereFrictionIsTooMuch) {
   EXPECT_EQ(led.controller.vibration().counters.failed, 0u);
 }
 
-TEST(HeldInJoints, HoldsTheRatioAlongAPathOfEveryArm) {
+TEST(DesignedInJoints, HoldsTheRatioAlongAPathOfEveryArm) {
   for (const testing::Arm& arm : testing::arms()) {
     for (const double friction : {0.0, 0.5}) {
       const RobotModel model = rubbing(arm, friction);
@@ -100,7 +100,7 @@ TEST(HeldInJoints, HoldsTheRatioAlongAPathOfEveryArm) {
 }
 
 /// Springs that grow from zero have their ratio from the start.
-TEST(HeldInJoints, HoldsTheRatioWhileTheSpringsGrow) {
+TEST(DesignedInJoints, HoldsTheRatioWhileTheSpringsGrow) {
   const RobotModel model = rubbing(testing::arms()[0], 0);
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
     Settings settings = rubbing_settings(model, mode);
@@ -115,7 +115,7 @@ TEST(HeldInJoints, HoldsTheRatioWhileTheSpringsGrow) {
   }
 }
 
-TEST(HeldInJoints, IsInTheTorque) {
+TEST(DesignedInJoints, IsInTheTorque) {
   const RobotModel model = rubbing(testing::arms()[0], 0.5);
   Led led(model, rubbing_settings(model, Mode::kJoint));
   led.swing(0.3);
@@ -132,7 +132,7 @@ TEST(HeldInJoints, IsInTheTorque) {
 }
 
 // From one mode to the other and back: friction is taken off once, not twice.
-TEST(HeldInJoints, ChangesModesWithoutLosingDamping) {
+TEST(DesignedInJoints, ChangesModesWithoutLosingDamping) {
   const RobotModel model = rubbing(testing::arms()[0], 0.5);
   Led led(model, rubbing_settings(model, Mode::kJoint));
   double least = 1e9;
@@ -150,7 +150,7 @@ TEST(HeldInJoints, ChangesModesWithoutLosingDamping) {
   EXPECT_LT(worst_ratio(led.controller.vibration()), 1e-6);
 }
 
-TEST(HeldInJoints, NeverAllocates) {
+TEST(DesignedInJoints, NeverAllocates) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
   for (const double friction : {0.0, 0.5, 30.0}) {
     const RobotModel model = rubbing(testing::arms()[0], friction);
@@ -168,7 +168,7 @@ TEST(HeldInJoints, NeverAllocates) {
   }
 }
 
-TEST(HeldInJoints, RefusesWhatIsNoRatio) {
+TEST(DesignedInJoints, RefusesWhatIsNoRatio) {
   const RobotModel model = rubbing(testing::arms()[0], 0);
   for (const double wrong : {-1e-9, 2.0001, std::nan("")}) {
     Settings settings = rubbing_settings(model, Mode::kJoint);

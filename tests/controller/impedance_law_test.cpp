@@ -45,7 +45,7 @@ struct Case {
   Joints<N> q, qd;
   Dynamics<N> robot;
   DynamicsResult kdl;
-  SpringPaths<N> paths;
+  SpringReferences<N> references;
   Vector3d p_d;
   Quaterniond R_d;
 
@@ -54,37 +54,37 @@ struct Case {
         q(random.vector(N)),
         qd(0.5 * random.vector(N)),
         kdl(testing::by_kdl(model, q, qd)),
-        paths{JointPath<N>({Joints<N>::Ones(), Joints<N>::Ones()}, 1e-3, 10),
-              JointPath<N>({Joints<N>::Ones(), Joints<N>::Ones()}, 1e-3, 10),
-              TipPath(TwistNorm{}, 1e-3, 10)} {
+        references{JointReference<N>({Joints<N>::Ones(), Joints<N>::Ones()}, 1e-3, 10),
+                   JointReference<N>({Joints<N>::Ones(), Joints<N>::Ones()}, 1e-3, 10),
+                   TipReference(TwistNorm{}, 1e-3, 10)} {
     DynamicsKernel<N>(model).evaluate(q, qd, robot);
     p_d = robot.p_BT_B + 0.05 * Vector3d(random.vector(3));
     R_d = quaternion(0.3 * random.vector(3)) * Quaterniond(robot.R_BT);
-    paths.joint.start(q + Joints<N>(0.1 * random.vector(N)));
-    paths.rest.start(q + Joints<N>(0.1 * random.vector(N)));
-    paths.tip.start(p_d, R_d);
+    references.joint.start(q + Joints<N>(0.1 * random.vector(N)));
+    references.posture.start(q + Joints<N>(0.1 * random.vector(N)));
+    references.tip.start(p_d, R_d);
     for (int k = 0; k < 40; ++k) {  // in motion, so that velocities and accelerations matter
-      paths.joint.step(Joints<N>(Joints<N>::Constant(1)));
-      paths.rest.step(Joints<N>(Joints<N>::Constant(-1)));
-      paths.tip.step(p_d + Vector3d::Ones(), R_d * quaternion(Vector3d(0.1, 1, 0.3)));
+      references.joint.step(Joints<N>(Joints<N>::Constant(1)));
+      references.posture.step(Joints<N>(Joints<N>::Constant(-1)));
+      references.tip.step(p_d + Vector3d::Ones(), R_d * quaternion(Vector3d(0.1, 1, 0.3)));
     }
   }
   Joints<N> torque(const Impedance<N>& impedance, const FeedForward& parts, const Vector6& wrench) {
     ImpedanceLaw<N> law(model, parts);
-    return law.torque(robot, q, qd, impedance, paths, wrench);
+    return law.torque(robot, q, qd, impedance, references, wrench);
   }
   Vector6 tip_error() const {
     Vector6 e;
     const Eigen::AngleAxisd turn(
-        Eigen::Matrix3d(paths.tip.rotation().toRotationMatrix() * kdl.R_BT.transpose()));
-    e << paths.tip.position() - kdl.p_BT_B, turn.angle() * turn.axis();
+        Eigen::Matrix3d(references.tip.rotation().toRotationMatrix() * kdl.R_BT.transpose()));
+    e << references.tip.position() - kdl.p_BT_B, turn.angle() * turn.axis();
     return e;
   }
   VectorXd friction(const VectorXd& v) const {
     VectorXd result(N);
     for (int i = 0; i < N; ++i) {
       const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
-      result[i] = joint.damping * v[i] + joint.friction * std::tanh(v[i] / 0.01);
+      result[i] = joint.viscous_friction * v[i] + joint.coulomb_friction * std::tanh(v[i] / 0.01);
     }
     return result;
   }
@@ -92,8 +92,8 @@ struct Case {
 
 RobotModel rough_chain(Random& random, int n) {
   ModelOptions options;
-  options.damping = random.vector(n).cwiseAbs();
-  options.friction = random.vector(n).cwiseAbs();
+  options.viscous_friction = random.vector(n).cwiseAbs();
+  options.coulomb_friction = random.vector(n).cwiseAbs();
   return RobotModel::from_urdf_text(testing::RandomRobot(random.engine()()).chain(n, 0.2), "link0",
                                     "tip", options);
 }
@@ -105,7 +105,7 @@ void expect_joint_law(Random& random) {
   setpoint.gains = random_gains(random, N);
   const auto impedance = Impedance<N>::of(setpoint);
   const Vector6 f = random.vector(6);
-  const JointPath<N>& path = one.paths.joint;
+  const JointReference<N>& path = one.references.joint;
   const VectorXd springs = setpoint.gains.joint_stiffness * (path.position() - one.q) +
                            setpoint.gains.joint_damping * (path.velocity() - one.qd);
   const double size = 1e-11 * (1 + springs.norm() + one.kdl.M.norm());
@@ -154,12 +154,12 @@ void expect_task_law(const RobotModel& model, Random& random) {
                        (S * turn.transpose()).transpose() * S;
   const MatrixXd C_C = S.transpose() * (S * turn.transpose()) * gains.task_damping *
                        (S * turn.transpose()).transpose() * S;
-  const TipPath& path = one.paths.tip;
+  const TipReference& path = one.references.tip;
   VectorXd tau = J.transpose() * (K_C * one.tip_error() + C_C * (path.velocity() - J * one.qd));
   if (N > held) {
     const MatrixXd projector =
         MatrixXd::Identity(N, N) - M.inverse() * JS.transpose() * A.inverse() * JS;
-    const JointPath<N>& rest = one.paths.rest;
+    const JointReference<N>& rest = one.references.posture;
     VectorXd share = M.inverse() * JS.transpose() * A.inverse() * S * one.tip_error();
     share /= std::sqrt(1 + share.squaredNorm() / 0.09);
     tau += projector.transpose() * gains.null_stiffness.asDiagonal() *
@@ -224,17 +224,17 @@ TEST(Law, FeedsForwardEachModeByItsWeight) {
 
     const VectorXd acceleration =
         one.torque(impedance, {false, false, false, true, false}, f) - plain;
-    const VectorXd of_joints = one.kdl.M * one.paths.joint.acceleration();
+    const VectorXd of_joints = one.kdl.M * one.references.joint.acceleration();
     const VectorXd of_tip =
-        one.kdl.J.transpose() * null_space.inertia().wrench(one.paths.tip.acceleration());
+        one.kdl.J.transpose() * null_space.inertia().wrench(one.references.tip.acceleration());
     const VectorXd expected = (1 - s) * of_joints + s * of_tip;
     ASSERT_GT(of_joints.norm(), 1e-2);
     ASSERT_GT(of_tip.norm(), 1e-2);
     EXPECT_TRUE(near(acceleration, expected, 1e-9 * (1 + plain.norm())));
 
     const VectorXd friction = one.torque(impedance, {false, false, true, false, false}, f) - plain;
-    const VectorXd velocity = (1 - s) * one.paths.joint.velocity() +
-                              s * null_space.joint_velocity(one.paths.tip.velocity());
+    const VectorXd velocity = (1 - s) * one.references.joint.velocity() +
+                              s * null_space.joint_velocity(one.references.tip.velocity());
     EXPECT_TRUE(near(friction, one.friction(velocity), 1e-9 * (1 + plain.norm())));
   }
 }
@@ -253,15 +253,15 @@ TEST(Law, StiffnessOfTheClosedLoopIsTheDerivativeOfItsTorque) {
     if (k % 3 == 2) impedance = blend(joint, impedance, 0.3);
     // At rest on all springs
     one.qd.setZero();
-    one.paths.joint.start(one.q);
-    one.paths.rest.start(one.q);
-    one.paths.tip.start(one.robot.p_BT_B, Quaterniond(one.robot.R_BT));
+    one.references.joint.start(one.q);
+    one.references.posture.start(one.q);
+    one.references.tip.start(one.robot.p_BT_B, Quaterniond(one.robot.R_BT));
     ImpedanceLaw<7> law(one.model, kNone);
     const DynamicsKernel<7> kernel(one.model);
     const auto torque = [&](const Joints<7>& q, const Joints<7>& qd) -> Joints<7> {
       Dynamics<7> robot;
       kernel.evaluate(q, qd, robot);
-      return law.torque(robot, q, qd, impedance, one.paths, Vector6::Zero());
+      return law.torque(robot, q, qd, impedance, one.references, Vector6::Zero());
     };
     MatrixXd K(7, 7), C(7, 7);
     constexpr double kStep = 1e-5;

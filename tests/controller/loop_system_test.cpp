@@ -45,13 +45,13 @@ struct Loop {
     nearly_singular = null_space.inertia().nearly_singular();
     analysis::System<kMaxJoints> plain, system;
     for (analysis::System<kMaxJoints>* one : {&plain, &system}) {  // of what was there before
-      one->has_tails = true;
+      one->has_low_words = true;
       one->stiffness_factor.setOnes(3, 2);
     }
     closed_loop<N>(robot, Joints<N>::Zero(), impedance, null_space, friction, TaskTerms{},
                    Vector6::Zero(), plain);
     factored.form(robot, impedance, null_space, friction, system);
-    EXPECT_FALSE(plain.has_tails || system.has_tails);
+    EXPECT_FALSE(plain.has_low_words || system.has_low_words);
     EXPECT_EQ(system.stiffness_factor.cols(), N);
     EXPECT_TRUE(near(system.mass, plain.mass, 0));
     EXPECT_EQ(system.damping, system.damping.transpose());
@@ -94,7 +94,7 @@ int expect_tip_springs(Random& random) {
       Gains& gains = setpoint.gains;
       const Eigen::Index free = std::max(0, N - held);
       EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held + free);
-      for (int k = 0; k < 3; ++k) {  // a little farther each time: the free motions are followed
+      for (int k = 0; k < 3; ++k) {  // a little further each time: the free motions are followed
         loop.move_to(loop.q + Joints<N>(0.02 * random.vector(N)));
         EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held + free);
       }
@@ -174,21 +174,21 @@ TEST(LoopSystem, HasTheSpringsOfTwoModesAndFramesAtOnce) {
 
 TEST(DirectionsHeld, CountsThoseOfOneFrame) {
   TipImpedance base, tool;
-  EXPECT_EQ(directions_held(base, tool), 0);
+  EXPECT_EQ(selected_directions(base, tool), 0);
   for (TipImpedance* one : {&base, &tool}) {
     for (int i = 0; i < 6; ++i) {
-      one->held.setZero();
-      one->held[i] = 1;
-      EXPECT_EQ(directions_held(base, tool), 1);
-      one->held[5 - i] = 0.5;  // while gains change
-      EXPECT_EQ(directions_held(base, tool), -1);
+      one->selected.setZero();
+      one->selected[i] = 1;
+      EXPECT_EQ(selected_directions(base, tool), 1);
+      one->selected[5 - i] = 0.5;  // while gains change
+      EXPECT_EQ(selected_directions(base, tool), -1);
     }
-    one->held.setOnes();
-    EXPECT_EQ(directions_held(base, tool), 6);
-    one->held.setZero();
+    one->selected.setOnes();
+    EXPECT_EQ(selected_directions(base, tool), 6);
+    one->selected.setZero();
   }
-  base.held[0] = tool.held[0] = 1;
-  EXPECT_EQ(directions_held(base, tool), -1);
+  base.selected[0] = tool.selected[0] = 1;
+  EXPECT_EQ(selected_directions(base, tool), -1);
 }
 
 }  // namespace

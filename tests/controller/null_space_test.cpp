@@ -1,5 +1,5 @@
 #include <dashpot/controller/dynamics.hpp>
-#include <dashpot/controller/law/gain_path.hpp>
+#include <dashpot/controller/law/gain_blend.hpp>
 #include <dashpot/controller/law/null_space.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/matrices.hpp>
@@ -21,7 +21,7 @@ using testing::Random;
 class NullSpaceOfPanda : public ::testing::Test {
  protected:
   NullSpaceOfPanda() : model(testing::arm_model(testing::arms()[0])), kernel(model) {
-    held.held.setOnes();
+    held.selected.setOnes();
   }
   void at(const Joints<7>& q) {
     kernel.evaluate(q, Joints<7>::Zero(), robot);
@@ -63,8 +63,8 @@ TEST_F(NullSpaceOfPanda, HeldDirectionsAreExactForEverySubset) {
   for (int k = 0; k < 500; ++k) {
     const bool in_tool = k % 2 == 0;
     TipImpedance& one = in_tool ? tool : held;
-    (in_tool ? held : tool).held.setZero();
-    for (int i = 0; i < 6; ++i) one.held[i] = random.integer(0, 1);
+    (in_tool ? held : tool).selected.setZero();
+    for (int i = 0; i < 6; ++i) one.selected[i] = random.integer(0, 1);
     at(random.vector(7));
     if (null_space.inertia().regularity() < TaskInertia::kNearlySingular) continue;
     const Joints<7> tau = null_space.spring(Joints<7>::Ones(), random.vector(7));
@@ -73,7 +73,7 @@ TEST_F(NullSpaceOfPanda, HeldDirectionsAreExactForEverySubset) {
       acceleration.head<3>() = (robot.R_BT.transpose() * acceleration.head<3>()).eval();
       acceleration.tail<3>() = (robot.R_BT.transpose() * acceleration.tail<3>()).eval();
     }
-    EXPECT_LT(one.held.cwiseProduct(acceleration).norm(), 1e-9);
+    EXPECT_LT(one.selected.cwiseProduct(acceleration).norm(), 1e-9);
   }
 }
 
@@ -120,10 +120,11 @@ TEST_F(NullSpaceOfPanda, TorqueKeepsItsBoundAndTurnsSmoothlyThroughTheStretchedA
 TEST_F(NullSpaceOfPanda, EigenvaluesOfTheProjectorAreBetweenZeroAndOneEverywhere) {
   Random random(334);
   for (int k = 0; k < 500; ++k) {
-    for (int i = 0; i < 6; ++i) held.held[i] = random.uniform(0, 1);  // half held, while blending
-    for (int i = 0; i < 6; ++i) tool.held[i] = (1 - held.held[i]) * random.uniform(0, 1);
-    held.held *= 0.5;
-    tool.held *= 0.5;
+    for (int i = 0; i < 6; ++i)
+      held.selected[i] = random.uniform(0, 1);  // half held, while blending
+    for (int i = 0; i < 6; ++i) tool.selected[i] = (1 - held.selected[i]) * random.uniform(0, 1);
+    held.selected *= 0.5;
+    tool.selected *= 0.5;
     at(k % 2 == 0 ? Joints<7>(random.vector(7)) : stretched(random.log_uniform(1e-9, 1)));
     MatrixXd N(7, 7);
     for (int i = 0; i < 7; ++i) N.col(i) = null_space.projected_velocity(Joints<7>::Unit(i));
@@ -151,10 +152,10 @@ double least_eigenvalue(const MatrixXd& A) {
   return Eigen::SelfAdjointEigenSolver<MatrixXd>(A).eigenvalues().minCoeff() / (1 + A.norm());
 }
 
-TEST(GainPath, StaysPositiveSemidefiniteAndArrives) {
+TEST(GainBlend, StaysPositiveSemidefiniteAndArrives) {
   Random random(336);
   constexpr int kTicks = 50;
-  GainPath<7> path(kTicks);
+  GainBlend<7> path(kTicks);
   path.start(Impedance<7>{});
   Impedance<7> target;
   for (int change = 0; change < 60; ++change) {
@@ -194,7 +195,7 @@ TEST(GainPath, StaysPositiveSemidefiniteAndArrives) {
   }
 }
 
-TEST(GainPath, FollowsTargetsThatComeEveryTick) {
+TEST(GainBlend, FollowsTargetsThatComeEveryTick) {
   Ramp<Vector6> path(100);
   path.start(Vector6::Zero());
   for (int k = 0; k < 1000; ++k) {

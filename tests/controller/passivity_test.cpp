@@ -35,14 +35,14 @@ class Swing {
     impedance_ = Impedance<7>::of(setpoint);
     const Joints<7> home = fixed<7>(testing::panda_ready());
     DynamicsKernel<7>(model_).evaluate(home, Joints<7>::Zero(), robot_);
-    paths_.joint.start(home);
-    paths_.tip.start(robot_.p_BT_B, Eigen::Quaterniond(robot_.R_BT));
+    references_.joint.start(home);
+    references_.tip.start(robot_.p_BT_B, Eigen::Quaterniond(robot_.R_BT));
   }
 
   /// Kinetic, and of the springs, J.
   double energy() {
     torque(at);
-    const Joints<7> e = paths_.joint.position() - at.q;
+    const Joints<7> e = references_.joint.position() - at.q;
     const double springs = 0.5 * e.dot(impedance_.joint_stiffness * e) +
                            0.5 * law_.tip_error().dot(impedance_.base.stiffness * law_.tip_error());
     return springs + 0.5 * at.qd.dot(robot_.M * at.qd);
@@ -62,7 +62,7 @@ class Swing {
   }
   Joints<7> torque(const JointState& there) {
     kernel_.evaluate(there.q, there.qd, robot_);
-    return law_.torque(robot_, there.q, there.qd, impedance_, paths_, Vector6::Zero());
+    return law_.torque(robot_, there.q, there.qd, impedance_, references_, Vector6::Zero());
   }
   JointState rate(const JointState& there) {
     const Joints<7> tau = torque(there);
@@ -73,9 +73,10 @@ class Swing {
   DynamicsKernel<7> kernel_{model_};
   ImpedanceLaw<7> law_;
   Impedance<7> impedance_;
-  SpringPaths<7> paths_{JointPath<7>({Joints<7>::Ones(), Joints<7>::Ones()}, 1e-3, 1),
-                        JointPath<7>({Joints<7>::Ones(), Joints<7>::Ones()}, 1e-3, 1),
-                        TipPath(TwistNorm{}, 1e-3, 1)};
+  SpringReferences<7> references_{
+      JointReference<7>({Joints<7>::Ones(), Joints<7>::Ones()}, 1e-3, 1),
+      JointReference<7>({Joints<7>::Ones(), Joints<7>::Ones()}, 1e-3, 1),
+      TipReference(TwistNorm{}, 1e-3, 1)};
   Dynamics<7> robot_;
 
  public:

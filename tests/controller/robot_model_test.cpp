@@ -87,11 +87,11 @@ TEST(RobotModel, AddsReflectedInertiaToTheDiagonalAlone) {
 
 TEST(RobotModel, PutsFrictionFromTheOptionsInPlaceOfTheFiles) {
   ModelOptions options;
-  options.damping = JointVector::LinSpaced(7, 1, 7);
-  options.friction = JointVector::LinSpaced(7, 0.1, 0.7);
+  options.viscous_friction = JointVector::LinSpaced(7, 1, 7);
+  options.coulomb_friction = JointVector::LinSpaced(7, 0.1, 0.7);
   const RobotModel model = testing::arm_model(testing::arms()[0], options);
-  EXPECT_EQ(model.joint_values(&Joint::damping), options.damping);
-  EXPECT_EQ(model.joint_values(&Joint::friction), options.friction);
+  EXPECT_EQ(model.joint_values(&Joint::viscous_friction), options.viscous_friction);
+  EXPECT_EQ(model.joint_values(&Joint::coulomb_friction), options.coulomb_friction);
   EXPECT_TRUE(same(model, testing::arm_model(testing::arms()[0])));  // friction is no dynamics
 }
 

@@ -100,7 +100,7 @@ TEST_F(Course, BelievesVelocitiesAfterARelease) {
   EXPECT_EQ(snapshot().velocity[4], 0.1);
 }
 
-/// Springs that start anew grow from nothing, within gain_time.
+/// Springs that start again grow from nothing, within gain_time.
 TEST_F(Course, SpringsGrowFromZeroAfterAFault) {
   run(1.0);
   ASSERT_EQ(snapshot().joint_weight, 1);
@@ -134,8 +134,8 @@ TEST_F(Course, ShowsNoErrorOfATipThatIsNotHeld) {
   ticks(600);
   ASSERT_EQ(snapshot().task_weight, 0);
   EXPECT_EQ(snapshot().tip_error, Vector6(Vector6::Zero()));
-  EXPECT_EQ(snapshot().setpoint_twist, Vector6(Vector6::Zero()));
-  EXPECT_EQ(snapshot().setpoint_tip.position, snapshot().tip.position);
+  EXPECT_EQ(snapshot().reference_twist, Vector6(Vector6::Zero()));
+  EXPECT_EQ(snapshot().reference_tip.position, snapshot().tip.position);
 }
 
 /// The path of the tip is as fast as it may be where the joints are not.
@@ -146,37 +146,37 @@ TEST_F(Course, TheTipGoesAsFastAsItMay) {
   double fastest = 0;
   for (int k = 0; k < 1500; ++k) {
     next();
-    fastest = std::max(fastest, snapshot().setpoint_twist.norm());
+    fastest = std::max(fastest, snapshot().reference_twist.norm());
   }
   EXPECT_NEAR(fastest, settings.motion.linear_velocity, 0.01 * settings.motion.linear_velocity);
 }
 
-/// In the Cartesian mode, too, the rest posture moves toward its goal, and stays with a set-point
+/// In the Cartesian mode, too, the posture moves toward its goal, and stays with a set-point
 /// that names none or is stale.
 TEST_F(Course, TheRestPostureStaysWhereNobodyWantsAnother) {
   make_cartesian();
-  const JointVector start = snapshot().setpoint_position;
+  const JointVector start = snapshot().reference_position;
   arm->setpoint.joint_position[0] += 1;
   ticks(600);
-  EXPECT_GT(snapshot().setpoint_position[0] - start[0], 0.05);
-  EXPECT_GT(snapshot().setpoint_velocity[0], 0.1);
+  EXPECT_GT(snapshot().reference_position[0] - start[0], 0.05);
+  EXPECT_GT(snapshot().reference_velocity[0], 0.1);
   arm->setpoint.joint_position.resize(0);
   ticks(600);
-  const JointVector there = snapshot().setpoint_position;
+  const JointVector there = snapshot().reference_position;
   EXPECT_LT(there[0] - start[0], 0.9);
-  EXPECT_NEAR(snapshot().setpoint_velocity.norm(), 0, 1e-9);
+  EXPECT_NEAR(snapshot().reference_velocity.norm(), 0, 1e-9);
   ticks(300);
-  EXPECT_TRUE(near(snapshot().setpoint_position, there, 1e-9));
+  EXPECT_TRUE(near(snapshot().reference_position, there, 1e-9));
   arm->setpoint.joint_position = start;
   arm->setpoint.joint_position[0] -= 1;
   ticks(300);
-  ASSERT_GT(snapshot().setpoint_velocity.norm(), 0.1);
+  ASSERT_GT(snapshot().reference_velocity.norm(), 0.1);
   arm->fresh = false;
   ticks(501);  // now it is stale
   ASSERT_EQ(snapshot().status, Status::kSetpointStale);
   ticks(600);
-  EXPECT_EQ(snapshot().setpoint_velocity.norm(), 0);
-  EXPECT_GT((snapshot().setpoint_position - arm->setpoint.joint_position).norm(), 0.1);
+  EXPECT_EQ(snapshot().reference_velocity.norm(), 0);
+  EXPECT_GT((snapshot().reference_position - arm->setpoint.joint_position).norm(), 0.1);
 }
 
 }  // namespace

@@ -69,9 +69,9 @@ TEST_F(Safety, HoldsWithAStaleSetpointThenDampsAndRecovers) {
       EXPECT_EQ(snapshot().status, Status::kSetpointStale);
     }
   }
-  EXPECT_EQ(snapshot().setpoint_velocity.norm(), 0.0);
+  EXPECT_EQ(snapshot().reference_velocity.norm(), 0.0);
   EXPECT_EQ(snapshot().joint_weight, 1.0);
-  const JointVector held = snapshot().setpoint_position;
+  const JointVector held = snapshot().reference_position;
   EXPECT_LT(held[0], arm->setpoint.joint_position[0] - 0.1);  // stopped on the way
   for (int k = 0; k < 302; ++k) arm->step();
   EXPECT_EQ(snapshot().status, Status::kSetpointLost);
@@ -131,8 +131,8 @@ class OutOfReach : public Safety {
     home = arm->setpoint.tip_pose;
   }
   /// Distance from the tip to where its springs are fixed.
-  double drawn_out() const {
-    return (snapshot().setpoint_tip.position - snapshot().tip.position).norm();
+  double clamped() const {
+    return (snapshot().reference_tip.position - snapshot().tip.position).norm();
   }
   Pose home;
 };
@@ -142,17 +142,17 @@ TEST_F(OutOfReach, SpringsAreDrawnOutNoFartherThanTheirReach) {
   double largest = 0;
   for (int k = 0; k < 5000; ++k) {
     next();  // something keeps the robot where it is
-    largest = std::max(largest, drawn_out());
+    largest = std::max(largest, clamped());
   }
   EXPECT_LT(largest, 0.2 + 1e-9);
-  EXPECT_NEAR(drawn_out(), 0.2, 1e-6);  // it pulls as hard as it may
-  EXPECT_TRUE(snapshot().setpoint_twist.isZero(1e-6));
+  EXPECT_NEAR(clamped(), 0.2, 1e-6);  // it pulls as hard as it may
+  EXPECT_TRUE(snapshot().reference_twist.isZero(1e-6));
   const double pull = settings.initial.gains.task_stiffness(1, 1) * 0.2;
   EXPECT_NEAR(snapshot().tip_wrench[1], pull, 1e-3 * pull);
-  // Pushed farther away at once, it is pulled no harder.
+  // Pushed further away at once, it is pulled no harder.
   arm->state.position[0] -= 0.004;
   EXPECT_LE(next(), Status::kTorqueLimited);
-  EXPECT_GT(drawn_out(), 0.201);
+  EXPECT_GT(clamped(), 0.201);
   EXPECT_LT(snapshot().tip_wrench.head<3>().norm(), pull * (1 + 1e-3));
 }
 
@@ -161,8 +161,8 @@ TEST_F(OutOfReach, AGoalThatComesBackIsFollowedAtOnce) {
   for (int k = 0; k < 5000; ++k) next();
   arm->setpoint.tip_pose = home;
   for (int k = 0; k < 1200; ++k) next();  // 0.2 m, and not the way of 5 s
-  EXPECT_TRUE(near(snapshot().setpoint_tip.position, home.position, 1e-9));
-  EXPECT_TRUE(snapshot().setpoint_twist.isZero(1e-9));
+  EXPECT_TRUE(near(snapshot().reference_tip.position, home.position, 1e-9));
+  EXPECT_TRUE(snapshot().reference_twist.isZero(1e-9));
 }
 
 TEST_F(OutOfReach, ADirectionWithoutSpringsDrawsNothingOut) {
@@ -171,7 +171,7 @@ TEST_F(OutOfReach, ADirectionWithoutSpringsDrawsNothingOut) {
   arm->setpoint.tip_pose.position.x() += 0.05;
   arm->setpoint.tip_pose.position.z() += 5;
   for (int k = 0; k < 40000; ++k) next();
-  EXPECT_NEAR(snapshot().setpoint_tip.position.x(), home.position.x() + 0.05, 1e-9);
+  EXPECT_NEAR(snapshot().reference_tip.position.x(), home.position.x() + 0.05, 1e-9);
 }
 
 TEST_F(Safety, JointSpringsThatGrowFromZeroStartWhereTheRobotIs) {
@@ -184,12 +184,12 @@ TEST_F(Safety, JointSpringsThatGrowFromZeroStartWhereTheRobotIs) {
   run(1.0);
   const JointVector there = arm->state.position;
   ASSERT_GT((there - arm->setpoint.joint_position).norm(), 0.1);
-  EXPECT_TRUE(near(snapshot().setpoint_position, arm->setpoint.joint_position, 1e-12));
+  EXPECT_TRUE(near(snapshot().reference_position, arm->setpoint.joint_position, 1e-12));
   arm->setpoint.gains = settings.initial.gains;
   arm->setpoint.gains.joint_stiffness.row(0).setZero();  // joint 1 stays without
   arm->setpoint.gains.joint_stiffness.col(0).setZero();
   arm->step();
-  const JointVector at = snapshot().setpoint_position;
+  const JointVector at = snapshot().reference_position;
   EXPECT_TRUE(near(at.tail(6), there.tail(6), 1e-3));
   EXPECT_NEAR(at[0], arm->setpoint.joint_position[0], 1e-12);
   arm->setpoint.gains = settings.initial.gains;
@@ -214,7 +214,7 @@ TEST_F(Safety, TaskSpringsThatGrowFromZeroStartWhereTheTipIs) {
     ASSERT_GT((there.position - home.position).norm(), 0.03);
     arm->setpoint.gains = settings.initial.gains;
     arm->step();
-    const Eigen::Vector3d off = snapshot().setpoint_tip.position - there.position;
+    const Eigen::Vector3d off = snapshot().reference_tip.position - there.position;
     const Eigen::Vector3d in_frame =
         frame == Frame::kTool ? Eigen::Vector3d(there.rotation.transpose() * off) : off;
     EXPECT_NEAR(in_frame.z(), 0, 1e-3);

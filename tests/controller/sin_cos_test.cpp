@@ -23,8 +23,8 @@ double ulps(double computed, long double exact) {
 }
 
 /// The worst of sine and cosine, each of four angles in its own lane.
-double error(const Four& angles) {
-  Four sine, cosine;
+double error(const Vec4d& angles) {
+  Vec4d sine, cosine;
   sin_cos(angles, sine, cosine);
   double worst = 0;
   for (int i = 0; i < 4; ++i) {
@@ -39,7 +39,7 @@ TEST(SinCos, AreExactToTwoUnitsInTheLastPlace) {
   double worst = 0;
   for (int i = 0; i < 200000; ++i) {
     const double size = random.log_uniform(1e-8, 9e5);
-    Four angles;
+    Vec4d angles;
     for (int k = 0; k < 4; ++k) angles[k] = random.uniform(-size, size);
     worst = std::max(worst, error(angles));
   }
@@ -52,7 +52,7 @@ TEST(SinCos, AreExactNearMultiplesOfAQuarterTurn) {
   for (int k = -5000; k <= 5000; ++k) {
     double angle = static_cast<double>(k * 1.57079632679489661923132169163975144L);
     for (int step = 0; step < 4; ++step) {
-      worst = std::max(worst, error(Four{angle, -angle, angle + 1e-9, 0.5 * angle}));
+      worst = std::max(worst, error(Vec4d{angle, -angle, angle + 1e-9, 0.5 * angle}));
       angle = std::nextafter(angle, 1e9);
     }
   }
@@ -60,8 +60,8 @@ TEST(SinCos, AreExactNearMultiplesOfAQuarterTurn) {
 }
 
 TEST(SinCos, OfZeroAreExact) {
-  Four sine, cosine;
-  sin_cos(Four{0.0, -0.0, 0.0, 0.0}, sine, cosine);
+  Vec4d sine, cosine;
+  sin_cos(Vec4d{0.0, -0.0, 0.0, 0.0}, sine, cosine);
   for (int i = 0; i < 4; ++i) {
     EXPECT_EQ(sine[i], 0);
     EXPECT_EQ(cosine[i], 1);
@@ -69,10 +69,10 @@ TEST(SinCos, OfZeroAreExact) {
 }
 
 TEST(SinCos, OfHugeAnglesAreThoseOfTheLibraryAndNeighboursDoNotCare) {
-  const Four angles = {1e7, 0.5, -1e300, 1e6};
+  const Vec4d angles = {1e7, 0.5, -1e300, 1e6};
   EXPECT_LT(error(angles), 2);
-  Four sine, cosine;
-  sin_cos(Four{kInfinity, 0.5, -kInfinity, std::nan("")}, sine, cosine);
+  Vec4d sine, cosine;
+  sin_cos(Vec4d{kInfinity, 0.5, -kInfinity, std::nan("")}, sine, cosine);
   for (const int i : {0, 2, 3}) {
     EXPECT_TRUE(std::isnan(sine[i])) << i;
     EXPECT_TRUE(std::isnan(cosine[i])) << i;

@@ -1,5 +1,5 @@
 // Moving average, ramp and one step of a path, each against its definition.
-#include <dashpot/controller/law/gain_path.hpp>
+#include <dashpot/controller/law/gain_blend.hpp>
 #include <dashpot/controller/motion/smooth_motion.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>

@@ -51,13 +51,13 @@ class Check : public ::testing::Test {
 /// 2 |v| t + 0.001 rad from the last good state, t seconds ago, however many bad ones came since.
 TEST_F(Check, CountsAnOutageInTimeAndNotInTicks) {
   for (const int ticks : {0, 1, 3, 8}) {
-    for (const double farther : {-1e-6, 1e-6}) {
+    for (const double further : {-1e-6, 1e-6}) {
       for (const int joint : {0, 1, 2}) {
         make();
         for (int k = 0; k < ticks; ++k) EXPECT_EQ(bad(9.0 / ticks), Status::kStateNotFinite);
         const double t = ticks == 0 ? 0.001 : 0.010;
-        state.position[joint] = 2 * t * 2 + 0.001 + farther;
-        EXPECT_EQ(next(), farther > 0 ? Status::kStateJump : Status::kOk) << ticks;
+        state.position[joint] = 2 * t * 2 + 0.001 + further;
+        EXPECT_EQ(next(), further > 0 ? Status::kStateJump : Status::kOk) << ticks;
         EXPECT_DOUBLE_EQ(check->age(), t);
       }
     }
@@ -87,7 +87,7 @@ TEST_F(Check, TellsAGapFromAShortInterruptionToTheNanosecond) {
   for (int k = 1; k <= 50; ++k) {
     EXPECT_EQ(next(10), k < 50 ? Status::kOk : Status::kWrongRate) << k;
   }
-  make();  // but a longer one begins anew
+  make();  // but a longer one begins again
   for (int k = 1; k < 50; ++k) EXPECT_EQ(next(10), Status::kOk);
   EXPECT_EQ(next(11), Status::kTimeGap);
   EXPECT_EQ(next(10), Status::kOk);

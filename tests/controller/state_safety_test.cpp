@@ -132,7 +132,7 @@ TEST_F(Safety, GoesOnAfterBadStatesWhileMoving) {
     next();
   }
   const JointVector before = arm->torque;
-  for (int k = 0; k < 8; ++k) {  // 12 mrad: farther than a state a tick old could be
+  for (int k = 0; k < 8; ++k) {  // 12 mrad: further than a state a tick old could be
     move();
     const RobotState good = arm->state;
     arm->state.position[2] = std::nan("");

@@ -51,7 +51,7 @@ std::vector<LongComplex> textbook_eigenvalues(const RobotModel& model, const Set
     K += N.transpose() * gains.null_stiffness.asDiagonal() * N;
     C += N.transpose() * gains.null_damping.asDiagonal() * N;
   }
-  const Eigen::VectorXd friction = model.joint_values(&Joint::damping);
+  const Eigen::VectorXd friction = model.joint_values(&Joint::viscous_friction);
   C += friction.asDiagonal();
   return eigenvalues_of(M, C, K);
 }

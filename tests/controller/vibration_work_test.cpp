@@ -49,7 +49,7 @@ TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {
   EXPECT_EQ(led.modes().origin, SpectrumOrigin::kTracked);
 }
 
-/// One that was to be solved anew may be missed; the next one then is.
+/// One that was to be solved directly may be missed; the next one then is.
 TEST(VibrationSolver, SolvesAnewAfterATaskThatItMissed) {
   VibrationSolver solver(Analysis{});
   Vibration result;

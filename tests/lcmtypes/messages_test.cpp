@@ -71,12 +71,14 @@ TEST(StateMessage, SaysWhatTheSampleSays) {
     EXPECT_THAT(message.joint_velocity, ElementsAreArray(list(snapshot.velocity)));
     EXPECT_THAT(message.joint_torque, ElementsAreArray(list(snapshot.torque)));
     EXPECT_THAT(message.law_torque, ElementsAreArray(list(snapshot.law_torque)));
-    EXPECT_THAT(message.joint_position_goal, ElementsAreArray(list(snapshot.setpoint_position)));
+    EXPECT_THAT(message.reference_joint_position,
+                ElementsAreArray(list(snapshot.reference_position)));
     EXPECT_THAT(message.tip_position, ElementsAreArray(list(snapshot.tip.position)));
-    EXPECT_THAT(message.tip_position_goal, ElementsAreArray(list(snapshot.setpoint_tip.position)));
+    EXPECT_THAT(message.reference_tip_position,
+                ElementsAreArray(list(snapshot.reference_tip.position)));
     EXPECT_TRUE(rotation_of(message.tip_quaternion).isApprox(snapshot.tip.rotation, 1e-14));
-    EXPECT_TRUE(
-        rotation_of(message.tip_quaternion_goal).isApprox(snapshot.setpoint_tip.rotation, 1e-14));
+    EXPECT_TRUE(rotation_of(message.reference_tip_quaternion)
+                    .isApprox(snapshot.reference_tip.rotation, 1e-14));
     EXPECT_GE(message.tip_quaternion[0], 0);
     EXPECT_THAT(message.tip_error, ElementsAreArray(list(snapshot.tip_error)));
     EXPECT_THAT(message.tip_wrench, ElementsAreArray(list(snapshot.tip_wrench)));
@@ -149,7 +151,7 @@ TEST(ModesMessage, SaysWhatTheSampleSays) {
     EXPECT_EQ(message.zero_modes, vibration.zero_modes);
     EXPECT_EQ(message.utime, sample.utime);
     EXPECT_EQ(message.tick, static_cast<std::int64_t>(vibration.tick));
-    EXPECT_EQ(message.solved_by,
+    EXPECT_EQ(message.origin,
               vibration.origin == analysis::SpectrumOrigin::kTracked  ? modes_t::TRACKED
               : vibration.origin == analysis::SpectrumOrigin::kReused ? modes_t::REUSED
                                                                       : modes_t::DIRECT);

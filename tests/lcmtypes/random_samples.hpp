@@ -36,11 +36,11 @@ inline StateSample random_state(Random& random, int n) {
   snapshot.status = static_cast<controller::Status>(random.integer(0, 13));
   snapshot.mode = static_cast<controller::Mode>(random.integer(0, 1));
   for (auto* vector : {&snapshot.position, &snapshot.velocity, &snapshot.torque,
-                       &snapshot.law_torque, &snapshot.setpoint_position}) {
+                       &snapshot.law_torque, &snapshot.reference_position}) {
     *vector = random.vector(n);
   }
   snapshot.tip = random_pose(random);
-  snapshot.setpoint_tip = random_pose(random);
+  snapshot.reference_tip = random_pose(random);
   snapshot.tip_error = random.vector(6);
   snapshot.tip_wrench = random.vector(6);
   snapshot.fault = static_cast<controller::Status>(random.integer(0, 13));

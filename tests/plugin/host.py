@@ -44,8 +44,8 @@ class Snapshot(c.Structure):
                 ("position", c.c_double * MAX_JOINTS),
                 ("velocity", c.c_double * MAX_JOINTS), ("torque", c.c_double * MAX_JOINTS),
                 ("tip_position", c.c_double * 3), ("tip_rotation", c.c_double * 9),
-                ("goal_joint_position", c.c_double * MAX_JOINTS),
-                ("goal_tip_position", c.c_double * 3), ("goal_tip_rotation", c.c_double * 9),
+                ("reference_joint_position", c.c_double * MAX_JOINTS),
+                ("reference_tip_position", c.c_double * 3), ("reference_tip_rotation", c.c_double * 9),
                 ("law_torque", c.c_double * MAX_JOINTS), ("tip_error", c.c_double * 6),
                 ("tip_wrench", c.c_double * 6)]
 

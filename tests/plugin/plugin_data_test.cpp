@@ -216,10 +216,10 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
   snapshot.status = Status::kSetpointStale;
   snapshot.mode = Mode::kCartesian;
   for (JointVector* values : {&snapshot.position, &snapshot.velocity, &snapshot.torque,
-                              &snapshot.law_torque, &snapshot.setpoint_position}) {
+                              &snapshot.law_torque, &snapshot.reference_position}) {
     *values = numbers.vector(3);
   }
-  for (Pose* pose : {&snapshot.tip, &snapshot.setpoint_tip}) {
+  for (Pose* pose : {&snapshot.tip, &snapshot.reference_tip}) {
     pose->position = numbers.vector(3);
     pose->rotation = numbers.vector(9).reshaped(3, 3);
   }
@@ -239,11 +239,12 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
   EXPECT_EQ(seen(out.velocity, DASHPOT_MAX_JOINTS), padded(snapshot.velocity));
   EXPECT_EQ(seen(out.torque, DASHPOT_MAX_JOINTS), padded(snapshot.torque));
   EXPECT_EQ(seen(out.law_torque, DASHPOT_MAX_JOINTS), padded(snapshot.law_torque));
-  EXPECT_EQ(seen(out.goal_joint_position, DASHPOT_MAX_JOINTS), padded(snapshot.setpoint_position));
+  EXPECT_EQ(seen(out.reference_joint_position, DASHPOT_MAX_JOINTS),
+            padded(snapshot.reference_position));
   EXPECT_EQ(seen(out.tip_position, 3), snapshot.tip.position);
   EXPECT_EQ(seen_square(out.tip_rotation, 3), snapshot.tip.rotation);
-  EXPECT_EQ(seen(out.goal_tip_position, 3), snapshot.setpoint_tip.position);
-  EXPECT_EQ(seen_square(out.goal_tip_rotation, 3), snapshot.setpoint_tip.rotation);
+  EXPECT_EQ(seen(out.reference_tip_position, 3), snapshot.reference_tip.position);
+  EXPECT_EQ(seen_square(out.reference_tip_rotation, 3), snapshot.reference_tip.rotation);
   EXPECT_EQ(seen(out.tip_error, 6), snapshot.tip_error);
   EXPECT_EQ(seen(out.tip_wrench, 6), snapshot.tip_wrench);
 }

@@ -53,7 +53,8 @@ TEST(Rooms, IncludeWhatIsOnALowerStep) {
   EXPECT_TRUE(may_file_include("analysis/spectrum/modes.cpp", "dashpot/analysis/system.hpp"));
   EXPECT_TRUE(may_file_include("analysis/spectrum/modes.cpp", "dashpot/analysis/mode.hpp"));
   EXPECT_TRUE(may_file_include("analysis/mode.hpp", "dashpot/analysis/types.hpp"));
-  EXPECT_TRUE(may_file_include("controller/law/held_damping.hpp", "dashpot/controller/types.hpp"));
+  EXPECT_TRUE(
+      may_file_include("controller/law/designed_damping.hpp", "dashpot/controller/types.hpp"));
   EXPECT_TRUE(may_file_include("apps/main.cpp", "dashpot/apps/run/run_report.hpp"));
 }
 
@@ -61,7 +62,8 @@ TEST(Rooms, IncludeNothingOnTheirOwnStepOrAbove) {
   EXPECT_FALSE(may_file_include("analysis/mode.hpp", "dashpot/analysis/tracked_spectrum.hpp"));
   EXPECT_FALSE(may_file_include("analysis/linalg/lu.hpp", "dashpot/analysis/system.hpp"));
   EXPECT_FALSE(may_file_include("analysis/base/status.cpp", "dashpot/analysis/linalg/lu.hpp"));
-  EXPECT_FALSE(may_file_include("analysis/response.hpp", "dashpot/analysis/sampled/unit_loop.hpp"));
+  EXPECT_FALSE(
+      may_file_include("analysis/response.hpp", "dashpot/analysis/sampled/sampled_data_model.hpp"));
   EXPECT_FALSE(may_file_include("controller/law/impedance_law.hpp",
                                 "dashpot/controller/safety/motion_watch.hpp"));
   EXPECT_FALSE(may_file_include("apps/cli/terminal.cpp", "dashpot/apps/run/run_report.hpp"));
@@ -69,7 +71,7 @@ TEST(Rooms, IncludeNothingOnTheirOwnStepOrAbove) {
 }
 
 TEST(Rooms, IncludeOnlyWhatTheyMayOfOthers) {
-  EXPECT_TRUE(may_file_include("controller/law/x.hpp", "dashpot/analysis/damping_hold.hpp"));
+  EXPECT_TRUE(may_file_include("controller/law/x.hpp", "dashpot/analysis/ratio_damping.hpp"));
   EXPECT_FALSE(may_file_include("controller/law/x.hpp", "dashpot/analysis/linalg/lu.hpp"));
   EXPECT_FALSE(may_file_include("controller/law/x.hpp", "dashpot/sim/plant.hpp"));
   EXPECT_FALSE(may_file_include("controller/law/x.hpp", "kdl/chain.hpp"));

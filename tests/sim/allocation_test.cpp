@@ -71,8 +71,8 @@ TEST(Allocation, DoesNotHappenInAStepOfAnArm) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
   const testing::ChainFile file = testing::panda_file();
   RobotParameters parameters;
-  parameters.armature = JointVector::Constant(7, 0.2);
-  parameters.coulomb = JointVector::Constant(7, 0.3);
+  parameters.reflected_inertia = JointVector::Constant(7, 0.2);
+  parameters.coulomb_friction = JointVector::Constant(7, 0.3);
   const JointVector home = joints({0, -0.7, 0.2, -2.3, 0, 1.5, 0.7});
   ArmOptions options;
   options.stops = Contact{1000, 5};

@@ -218,9 +218,9 @@ struct Scene {
   Scene(const testing::ChainFile& file, testing::Random& random) {
     const Robot robot = testing::robot_of(file);
     const int n = robot.dof();
-    parameters.armature = JointVector::Constant(n, 0.1);
-    parameters.viscous = random.vector(n).cwiseAbs();
-    parameters.coulomb = random.vector(n).cwiseAbs();
+    parameters.reflected_inertia = JointVector::Constant(n, 0.1);
+    parameters.viscous_friction = random.vector(n).cwiseAbs();
+    parameters.coulomb_friction = random.vector(n).cwiseAbs();
     options.friction_velocity = 0.05;
     options.stops = Contact{2000, 20};
     q = JointVector(n);

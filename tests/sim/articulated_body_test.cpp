@@ -87,7 +87,7 @@ TEST_P(Dynamics, AddArmatureToTheDiagonalOfTheMassMatrix) {
   Random random(704);
   const int n = testing::robot_of(file()).dof();
   RobotParameters parameters;
-  parameters.armature = random.vector(n).cwiseAbs();
+  parameters.reflected_inertia = random.vector(n).cwiseAbs();
   const Robot robot = testing::robot_of(file(), parameters);
   ArticulatedBody bodies(robot);
   KdlReference reference(file(), robot.gravity());
@@ -97,7 +97,7 @@ TEST_P(Dynamics, AddArmatureToTheDiagonalOfTheMassMatrix) {
     bodies.move_to(q.data(), qd.data());
     bodies.accelerations(tau.data(), qdd.data());
     Terms is = reference.at(q, qd);
-    is.M.diagonal() += parameters.armature;
+    is.M.diagonal() += parameters.reflected_inertia;
     const VectorXd left = is.M * qdd + is.coriolis + is.gravity;
     EXPECT_TRUE(near(left, tau, 1e-11 * size_of(is, qdd, tau)));
     EXPECT_NEAR(bodies.kinetic_energy(), 0.5 * qd.dot(is.M * qd), 1e-12 * bodies.kinetic_energy());
@@ -160,7 +160,7 @@ TEST_P(Dynamics, UndoWhatTheModelOfTheControllerAsksFor) {
   options.payload.inertia = testing::RandomRobot(random.engine()()).inertia(1.5, 0.05);
   RobotParameters parameters;
   parameters.gravity = options.gravity;
-  parameters.armature = options.reflected_inertia;
+  parameters.reflected_inertia = options.reflected_inertia;
   parameters.payload = {1.5, options.payload.center, options.payload.inertia};
   const controller::RobotModel model =
       controller::RobotModel::from_urdf_text(file().urdf, file().base, file().tip, options);

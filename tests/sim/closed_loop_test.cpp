@@ -37,7 +37,7 @@ class ClosedLoop : public ::testing::TestWithParam<testing::Arm> {
       if ((robot.gravity.cwiseAbs().array() < 0.6 * limit.array()).all()) return q;
     }
   }
-  /// Springs toward the rest posture besides, where there is a self-motion.
+  /// Springs toward the posture besides, where there is a self-motion.
   void hold_posture(const JointVector& q, controller::Gains& gains) {
     if (twin.dof() == 6) return;
     const double softness = self_motion(twin, q).squaredNorm();

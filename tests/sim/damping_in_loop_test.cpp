@@ -36,7 +36,7 @@ double growth(const analysis::System<>& system, const analysis::SampledLoop& loo
   scaled.stiffness = K;
   scaled.damping = C + D;
   scaled.stiffness_factor.resize(0, n);
-  scaled.has_tails = false;
+  scaled.has_low_words = false;
   const double radius = sample_loop(scaled, analyze(scaled), loop).spectral_radius;
   const double wanted = 200 + 12 / std::abs(std::log(radius));
   const int ticks = static_cast<int>(std::min(wanted, 50000.0));

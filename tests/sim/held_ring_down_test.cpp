@@ -48,12 +48,12 @@ std::vector<double> seen_ratios(const TwinModels& twin, const controller::Settin
     arm.emplace(twin, settings, q0, dq);
     recordings.push_back(arm->record(q0, 300));
   }
-  analysis::MotionFitOptions options;
+  analysis::IdentificationOptions options;
   options.period = settings.period;
   options.mass = arm->closed_loop.mass;
-  const analysis::MotionFit fit = fit_motion(recordings, options);
+  const analysis::IdentifiedModes fit = identify_modes(recordings, options);
   std::vector<double> ratios;
-  for (const analysis::FittedMode& mode : fit.modes) {
+  for (const analysis::IdentifiedMode& mode : fit.modes) {
     if (mode.natural_frequency > slowest) ratios.push_back(mode.damping_ratio);
   }
   return ratios;
@@ -120,8 +120,8 @@ TEST_P(HeldRingDownOf, JointsBesideFrictionHasTheRatio) {
   TwinModels twin(GetParam());
   controller::ModelOptions options;
   sim::RobotParameters parameters;
-  options.reflected_inertia = parameters.armature = JointVector::Constant(twin.dof(), 0.1);
-  options.damping = parameters.viscous = JointVector::Constant(twin.dof(), 1.5);
+  options.reflected_inertia = parameters.reflected_inertia = JointVector::Constant(twin.dof(), 0.1);
+  options.viscous_friction = parameters.viscous_friction = JointVector::Constant(twin.dof(), 1.5);
   twin.model = arm_model(GetParam(), options);
   twin.robot = sim::Robot::from_file(testing::arm_path(GetParam().file), GetParam().base,
                                      GetParam().tip, parameters);

@@ -94,7 +94,7 @@ TEST(DoublePendulum, KeepsItsEnergyWhileItTumbles) {
 TEST(Momentum, AboutTheVerticalIsKept) {
   const testing::ChainFile file = testing::panda_file();
   RobotParameters parameters;
-  parameters.viscous = JointVector::Zero(7);
+  parameters.viscous_friction = JointVector::Zero(7);
   Arm arm(testing::robot_of(file, parameters));
   testing::KdlReference reference(file, {0, 0, -9.81});
   const auto momentum = [&](const Plant& plant) {

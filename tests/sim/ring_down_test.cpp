@@ -33,7 +33,7 @@ struct Worst {
 };
 
 /// The fitted mode nearest to an eigenvalue.
-const analysis::FittedMode& nearest(const analysis::MotionFit& fit, Complex eigenvalue) {
+const analysis::IdentifiedMode& nearest(const analysis::IdentifiedModes& fit, Complex eigenvalue) {
   return *std::min_element(fit.modes.begin(), fit.modes.end(), [&](const auto& a, const auto& b) {
     return std::abs(a.eigenvalues[0] - eigenvalue) < std::abs(b.eigenvalues[0] - eigenvalue);
   });
@@ -81,10 +81,10 @@ struct Scene {
       recordings.push_back(arm->record(q0, ticks, every, 40));
       ASSERT_EQ(arm->worst, controller::Status::kOk) << to_text(arm->worst);
     }
-    analysis::MotionFitOptions fit_options;
+    analysis::IdentificationOptions fit_options;
     fit_options.period = every * loop.period;
     fit_options.mass = arm->closed_loop.mass;
-    const analysis::MotionFit fit = fit_motion(recordings, fit_options);
+    const analysis::IdentifiedModes fit = identify_modes(recordings, fit_options);
     EXPECT_LT(fit.residual, 1e-3);
 
     analysis::Spectrum<controller::kMaxJoints> spectrum;
@@ -103,7 +103,7 @@ struct Scene {
       const double omega = sampled ? image.natural_frequency : mode.natural_frequency;
       const double ratio = sampled ? image.damping_ratio : mode.damping_ratio;
       const Complex wanted = sampled ? image.eigenvalues[0] : mode.eigenvalues[0];
-      const analysis::FittedMode& seen = nearest(fit, wanted);
+      const analysis::IdentifiedMode& seen = nearest(fit, wanted);
       worst.add(std::abs(seen.natural_frequency / omega - 1), std::abs(seen.damping_ratio - ratio));
       const double most = sampled ? 1e-4 : 0.005;
       EXPECT_LT(std::abs(seen.natural_frequency / omega - 1), most) << seen.natural_frequency;

@@ -136,9 +136,9 @@ TEST(Robot, ReadsLimitsAndFriction) {
   EXPECT_EQ(elbow.upper, -0.0698);
   EXPECT_EQ(elbow.effort, 87);
   EXPECT_EQ(elbow.velocity, 2.175);
-  EXPECT_EQ(elbow.viscous, 0.003);
-  EXPECT_EQ(elbow.coulomb, 0);
-  EXPECT_EQ(elbow.armature, 0);
+  EXPECT_EQ(elbow.viscous_friction, 0.003);
+  EXPECT_EQ(elbow.coulomb_friction, 0);
+  EXPECT_EQ(elbow.reflected_inertia, 0);
   const Joint hinge = testing::pendulum(1).joints()[0];
   EXPECT_EQ(hinge.lower, -std::numeric_limits<double>::infinity());
   EXPECT_EQ(hinge.upper, std::numeric_limits<double>::infinity());
@@ -147,13 +147,13 @@ TEST(Robot, ReadsLimitsAndFriction) {
 
 TEST(Robot, TakesParametersInsteadOfTheFile) {
   RobotParameters parameters;
-  parameters.armature = JointVector::LinSpaced(7, 1, 7);
-  parameters.viscous = JointVector::LinSpaced(7, 11, 17);
-  parameters.coulomb = JointVector::LinSpaced(7, 21, 27);
+  parameters.reflected_inertia = JointVector::LinSpaced(7, 1, 7);
+  parameters.viscous_friction = JointVector::LinSpaced(7, 11, 17);
+  parameters.coulomb_friction = JointVector::LinSpaced(7, 21, 27);
   const Robot panda = testing::robot_of(testing::panda_file(), parameters);
-  EXPECT_EQ(panda.joints()[4].armature, 5);
-  EXPECT_EQ(panda.joints()[4].viscous, 15);
-  EXPECT_EQ(panda.joints()[4].coulomb, 25);
+  EXPECT_EQ(panda.joints()[4].reflected_inertia, 5);
+  EXPECT_EQ(panda.joints()[4].viscous_friction, 15);
+  EXPECT_EQ(panda.joints()[4].coulomb_friction, 25);
 }
 
 // ---------------------------------------------------------------------------------------- errors
@@ -217,7 +217,7 @@ TEST(RobotErrors, NameTheFileTheElementAndTheReason) {
                     "ixz='0' iyz='0'/></inertial>",
                     any),
             "accepted");
-  EXPECT_EQ(refusal(kHinge, ""), "arm.urdf: joint 'j': moves no mass and has no armature");
+  EXPECT_EQ(refusal(kHinge, ""), "arm.urdf: joint 'j': moves no mass and has no reflected_inertia");
   EXPECT_EQ(refusal(kHinge, kTool, {}, "b",
                     "<joint name='k' type='fixed'><parent link='a'/><child link='b'/></joint>"),
             "arm.urdf: link 'b' is the child of two joints");
@@ -236,10 +236,11 @@ TEST(RobotErrors, NameTheFileTheElementAndTheReason) {
 
 TEST(RobotErrors, NameTheParameter) {
   RobotParameters parameters;
-  parameters.armature = testing::joints({1, 2});
-  EXPECT_EQ(refusal(kHinge, kTool, parameters), "armature: has 2 entries, the chain has 1 joints");
+  parameters.reflected_inertia = testing::joints({1, 2});
+  EXPECT_EQ(refusal(kHinge, kTool, parameters),
+            "reflected_inertia: has 2 entries, the chain has 1 joints");
   parameters = {};
-  parameters.viscous = testing::joints({-1});
+  parameters.viscous_friction = testing::joints({-1});
   EXPECT_EQ(refusal(kHinge, kTool, parameters),
             "viscous friction of joint 'j': is -1 N m s/rad, must be finite and not negative");
   parameters = {};

@@ -23,8 +23,8 @@ inline sim::JointVector joints(std::initializer_list<double> values) {
 inline sim::Robot slider(const Eigen::Vector3d& gravity, double viscous = 0, double coulomb = 0) {
   sim::RobotParameters parameters;
   parameters.gravity = gravity;
-  parameters.viscous = joints({viscous});
-  parameters.coulomb = joints({coulomb});
+  parameters.viscous_friction = joints({viscous});
+  parameters.coulomb_friction = joints({coulomb});
   return sim::Robot::from_text(
       "<robot name='slider'><link name='a'/><link name='b'><inertial><mass value='2'/>"
       "<inertia ixx='0.1' iyy='0.1' izz='0.1' ixy='0' ixz='0' iyz='0'/></inertial></link>"

@@ -24,9 +24,9 @@ void print(const char* arm, const GainScales& scales, const TrackerCounters& c, 
       static_cast<long long>(c.of(Fallback::kStart)),
       static_cast<long long>(c.of(Fallback::kNotConverged)),
       static_cast<long long>(c.of(Fallback::kCoincidence)),
-      static_cast<double>(c.passes) / static_cast<double>(c.updates), c.most_passes,
-      static_cast<long long>(c.repairs), all.tightest, all.widest, w.separated, w.lost, w.foreseen,
-      w.finer, w.paired_anew, w.veered, w.unexplained, w.largest_change);
+      static_cast<double>(c.iterations) / static_cast<double>(c.updates), c.most_iterations,
+      static_cast<long long>(c.separations), all.tightest, all.widest, w.separated, w.lost,
+      w.foreseen, w.finer, w.paired_anew, w.veered, w.unexplained, w.largest_change);
 }
 
 template <int N>
@@ -60,7 +60,7 @@ int main(int argc, char** argv) {
       "Damping and null space: multiples of the default gains. Modes: identity decided by the "
       "eigenvalues,\nlost; damping ratio from tick to tick within bounds and derivative, or so "
       "with "
-      "finer steps,\nreal eigenvalues paired anew, veered within a tick, unexplained, largest "
+      "finer steps,\nreal eigenvalues paired again, veered within a tick, unexplained, largest "
       "change.\n"
       "arm          damp null |  ticks track. dir.  | start jump coin | pass most part | err/ "
       "widest  |"

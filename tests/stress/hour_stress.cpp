@@ -24,7 +24,7 @@ constexpr int kStepsOfAPeriod = 4;
 /// relative to the largest kinetic energy.
 bool keeps_energy(const char* name, sim::Method method, double step, double seconds, double most) {
   sim::RobotParameters parameters;
-  parameters.viscous = parameters.coulomb = sim::JointVector::Zero(7);
+  parameters.viscous_friction = parameters.coulomb_friction = sim::JointVector::Zero(7);
   sim::Arm arm(sim::Robot::from_file(DASHPOT_SOURCE_DIR "/sim/models/panda.urdf", "panda_link0",
                                      "panda_hand_tcp", parameters));
   sim::PlantOptions options;

@@ -97,8 +97,8 @@ inline std::string robot_yaml(const TestArm& arm) {
 
 inline sim::Robot simulated_robot(const TestArm& arm) {
   sim::RobotParameters parameters;
-  parameters.armature.setConstant(static_cast<Eigen::Index>(arm.start.size()),
-                                  arm.reflected_inertia);
+  parameters.reflected_inertia.setConstant(static_cast<Eigen::Index>(arm.start.size()),
+                                           arm.reflected_inertia);
   return sim::Robot::from_file(std::string(DASHPOT_SOURCE_DIR "/sim/models/") + arm.file + ".urdf",
                                arm.base, arm.tip, parameters);
 }

@@ -24,8 +24,8 @@ struct Kind {
 const std::map<std::string, std::function<void(Kind&)>>& kinds() {
   static const std::map<std::string, std::function<void(Kind&)>> all = {
       {"bare", [](Kind&) {}},
-      {"viscous", [](Kind& k) { k.parameters.viscous.setConstant(7, 0.5); }},
-      {"coulomb", [](Kind& k) { k.parameters.coulomb.setConstant(7, 0.1); }},
+      {"viscous", [](Kind& k) { k.parameters.viscous_friction.setConstant(7, 0.5); }},
+      {"coulomb", [](Kind& k) { k.parameters.coulomb_friction.setConstant(7, 0.1); }},
       {"stops",
        [](Kind& k) {
          k.arm.stops = Contact{2000, 20};
@@ -52,8 +52,8 @@ int main(int argc, char** argv) {
     return argc == 1 ? 0 : 2;
   }
   Kind kind;
-  kind.parameters.viscous = JointVector::Zero(7);
-  kind.parameters.coulomb = JointVector::Zero(7);
+  kind.parameters.viscous_friction = JointVector::Zero(7);
+  kind.parameters.coulomb_friction = JointVector::Zero(7);
   kinds().at(argv[1])(kind);
   Arm arm(Robot::from_file(DASHPOT_SOURCE_DIR "/sim/models/panda.urdf", "panda_link0",
                            "panda_hand_tcp", kind.parameters),

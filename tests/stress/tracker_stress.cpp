@@ -39,9 +39,9 @@ void add(const TrackerCounters& from, TrackerCounters& to) {
   to.reused += from.reused;
   to.direct += from.direct;
   to.failed += from.failed;
-  to.passes += from.passes;
-  to.repairs += from.repairs;
-  to.most_passes = std::max(to.most_passes, from.most_passes);
+  to.iterations += from.iterations;
+  to.separations += from.separations;
+  to.most_iterations = std::max(to.most_iterations, from.most_iterations);
   for (std::size_t k = 0; k < kFallbackCount; ++k) to.fallbacks[k] += from.fallbacks[k];
 }
 
@@ -99,9 +99,9 @@ void print(const std::string& name, const Tally& t) {
       static_cast<long long>(c.failed), static_cast<long long>(c.of(Fallback::kStart)),
       static_cast<long long>(c.of(Fallback::kNotConverged)),
       static_cast<long long>(c.of(Fallback::kCoincidence)),
-      static_cast<double>(c.passes) /
+      static_cast<double>(c.iterations) /
           static_cast<double>(std::max<std::int64_t>(1, c.tracked + c.direct)),
-      c.most_passes, static_cast<long long>(c.repairs), t.tightest, t.widest);
+      c.most_iterations, static_cast<long long>(c.separations), t.tightest, t.widest);
   if (t.unproved > 0) std::printf(", %ld steps without a bound", t.unproved);
   if (t.outside > 0) std::printf(", %ld OUTSIDE", t.outside);
   std::printf("\n");

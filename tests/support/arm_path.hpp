@@ -52,7 +52,7 @@ class ArmLoop {
  public:
   ArmLoop(const controller::RobotModel& model, const GainScales& scales)
       : kernel_(model),
-        friction_(controller::fixed<N>(model.joint_values(&controller::Joint::damping))) {
+        friction_(controller::fixed<N>(model.joint_values(&controller::Joint::viscous_friction))) {
     controller::Setpoint setpoint = controller::default_settings(model).initial;
     setpoint.mode = controller::Mode::kCartesian;
     setpoint.gains.task_damping *= scales.damping;
@@ -154,7 +154,7 @@ class WatchedArm {
 template <int N>
 void WatchedArm<N>::compare(const ArmLoop<N>& loop_before, double t) {
   using analysis::ModeKind;
-  if (now_.mode_count != before_.mode_count || now_.lineage != before_.lineage) return;
+  if (now_.mode_count != before_.mode_count || now_.epoch != before_.epoch) return;
   for (int i = 0; i < now_.mode_count; ++i) {
     const analysis::ModeNumbers &was = before_.modes[at(i)], &is = now_.modes[at(i)];
     if (!std::isfinite(is.error_bound)) ++watch_.bounds_missing;

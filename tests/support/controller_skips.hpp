@@ -186,9 +186,9 @@ inline void compare_modes(LedPair& pair, SkipTally& tally) {
     if (has_modes(pair.lean()) != has_modes(pair.full())) tally.fail();
     return;
   }
-  const auto& anew = pair.lean_anew();
-  if (anew.status == analysis::Status::kOk) {
-    compare_bounded(plain_modes(pair.lean()), {anew.modes.begin(), anew.modes.end()},
+  const auto& again = pair.lean_anew();
+  if (again.status == analysis::Status::kOk) {
+    compare_bounded(plain_modes(pair.lean()), {again.modes.begin(), again.modes.end()},
                     pair.lean().zero_modes, kSameModes, tally);
   }
   compare_bounded(plain_modes(pair.lean()), plain_modes(pair.full()), pair.full().zero_modes,

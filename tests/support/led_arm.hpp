@@ -14,7 +14,7 @@ namespace dashpot::testing {
 /// An arm without friction.
 inline controller::RobotModel smooth_arm(const Arm& arm) {
   controller::ModelOptions options;
-  options.damping = Eigen::VectorXd::Zero(arm_model(arm).dof());
+  options.viscous_friction = Eigen::VectorXd::Zero(arm_model(arm).dof());
   return arm_model(arm, options);
 }
 

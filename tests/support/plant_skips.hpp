@@ -38,9 +38,9 @@ inline std::vector<PlantSkip> plant_skips() {
     all.push_back({{what}, std::move(with), allowed});
   };
   add("no viscous friction", kSameMotion,
-      [](PlantScene& s) { s.parameters.viscous.setConstant(7, 1e-18); });
+      [](PlantScene& s) { s.parameters.viscous_friction.setConstant(7, 1e-18); });
   add("no Coulomb friction", kSameMotion,
-      [](PlantScene& s) { s.parameters.coulomb.setConstant(7, 1e-18); });
+      [](PlantScene& s) { s.parameters.coulomb_friction.setConstant(7, 1e-18); });
   add("no stops", 0, [](PlantScene& s) { s.arm.stops = Contact{2000, 20}; });
   add("no wall", 0, [](PlantScene& s) {
     s.arm.wall = sim::Wall{};
@@ -76,7 +76,7 @@ inline void run_skip(std::uint64_t seed, PlantSkip& skip) {
         Method::kModifiedMidpoint, Method::kCashKarp, Method::kDormandPrince,
         Method::kDormandPrince8, Method::kImplicitMidpoint, Method::kRosenbrock}) {
     PlantScene lean;
-    lean.parameters.viscous = lean.parameters.coulomb = sim::JointVector::Zero(7);
+    lean.parameters.viscous_friction = lean.parameters.coulomb_friction = sim::JointVector::Zero(7);
     lean.plant.integrator.method = method;
     PlantScene full = lean;
     skip.with(full);
@@ -107,7 +107,7 @@ inline void run_skip(std::uint64_t seed, PlantSkip& skip) {
 
 /// A Panda that falls onto a wall below its tip, moved by adaptive steps: those of order 5 begin
 /// with the rates that the step before ended with, unless a contact changed; those of order 8
-/// evaluate them anew.
+/// evaluate them again.
 inline void run_contact_skip(std::uint64_t seed, SkipTally& tally) {
   constexpr int kTicks = 300;
   constexpr double kAllowed = 1e-7;  // rad and rad/s, of a tolerance of 1e-10 a step
@@ -116,7 +116,7 @@ inline void run_contact_skip(std::uint64_t seed, SkipTally& tally) {
   q << 0, -0.5, 0, -2.0, 0, 1.571, 0.785;
   for (double& angle : q) angle += dice.uniform(-0.2, 0.2);
   PlantScene scene;
-  scene.parameters.viscous.setConstant(7, 1.0);
+  scene.parameters.viscous_friction.setConstant(7, 1.0);
   const sim::Robot robot = sim::Robot::from_file(DASHPOT_SOURCE_DIR "/sim/models/panda.urdf",
                                                  "panda_link0", "panda_hand_tcp", scene.parameters);
   scene.arm.wall = sim::Wall{};

@@ -1,7 +1,7 @@
 #pragma once
 // Random impedance-controlled arms, tame and ill-conditioned, for tests of damping designs.
 
-#include <dashpot/analysis/damping_hold.hpp>
+#include <dashpot/analysis/ratio_damping.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/random.hpp>
 

@@ -2,7 +2,7 @@
 // The real controller and the simulator's arm, which share no code, in one loop; and what it takes
 // to displace the arm and let it go.
 
-#include <dashpot/analysis/motion_fit.hpp>
+#include <dashpot/analysis/mode_identification.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -34,9 +34,10 @@ struct TwinModels {
     controller::ModelOptions options;
     options.reflected_inertia.setConstant(model.dof(), kReflectedInertia);
     sim::RobotParameters parameters;
-    parameters.armature = options.reflected_inertia;
+    parameters.reflected_inertia = options.reflected_inertia;
     if (!friction) {
-      options.damping = parameters.viscous = controller::JointVector::Zero(model.dof());
+      options.viscous_friction = parameters.viscous_friction =
+          controller::JointVector::Zero(model.dof());
     }
     model = arm_model(arm, options);
     robot = sim::Robot::from_file(arm_path(arm.file), arm.base, arm.tip, parameters);
@@ -44,7 +45,7 @@ struct TwinModels {
 
   int dof() const { return model.dof(); }
   Eigen::MatrixXd friction() const {
-    return Eigen::VectorXd(model.joint_values(&controller::Joint::damping)).asDiagonal();
+    return Eigen::VectorXd(model.joint_values(&controller::Joint::viscous_friction)).asDiagonal();
   }
   /// dg/dq, n x n, by central differences: good to 1e-9.
   Eigen::MatrixXd gravity_gradient(const controller::JointVector& q) const {

@@ -53,7 +53,7 @@ class TrackerSkips {
 
   SkipTally reuse{"spectrum reused within a tolerance"};
   SkipTally shapes{"no shapes: values only"};
-  SkipTally extrapolation{"passes saved by extrapolation"};
+  SkipTally extrapolation{"iterations saved by extrapolation"};
   SkipTally direct{"followed, not solved directly"};
   std::vector<const SkipTally*> tallies() const {
     return {&reuse, &shapes, &extrapolation, &direct};

@@ -281,7 +281,8 @@ TEST(CommandReceiver, LetsGoOfASilentSender) {
   EXPECT_EQ(receiver.fetch_tally().accepted(), 1);
 }
 
-// A sender that starts again begins its sequence anew; it counts once its predecessor is forgotten.
+// A sender that starts again begins its sequence again; it counts once its predecessor is
+// forgotten.
 TEST(CommandReceiver, OutlivesItsSenders) {
   // A port of this process alone, so that tests may run side by side.
   const std::string url =

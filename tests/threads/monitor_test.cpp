@@ -35,7 +35,7 @@ lcmtypes::StateSample state_at(int tick) {
   snapshot.mode = controller::Mode::kCartesian;
   snapshot.status = tick % 10 == 0 ? controller::Status::kTorqueLimited : controller::Status::kOk;
   for (auto* vector : {&snapshot.position, &snapshot.velocity, &snapshot.torque,
-                       &snapshot.law_torque, &snapshot.setpoint_position}) {
+                       &snapshot.law_torque, &snapshot.reference_position}) {
     *vector = controller::JointVector::LinSpaced(7, 0.1, 0.7);
   }
   snapshot.tip_error << 0.003, 0.004, 0, 0, 0, 0.01;
@@ -117,7 +117,7 @@ TEST(Monitor, EndsALogWithASummary) {
   EXPECT_THAT(outcome.out, HasSubstr("  ok: 1800 states\n"));
   EXPECT_THAT(outcome.out, HasSubstr(": 200 states\n"));
   EXPECT_THAT(outcome.out, HasSubstr("2 overruns, longest 45.6 us; largest tip error 5.00 mm\n"));
-  EXPECT_THAT(outcome.out, HasSubstr("2 modes, 1 zero mode at tick 2000, solved anew: ok\n"));
+  EXPECT_THAT(outcome.out, HasSubstr("2 modes, 1 zero mode at tick 2000, solved directly: ok\n"));
   const std::string last = lines_of(outcome.out).back();
   EXPECT_THAT(last, AllOf(HasSubstr("2   9.76100"), HasSubstr("overdamped"), HasSubstr("2.5e-13"),
                           HasSubstr("q2 - 0.50 q6")));

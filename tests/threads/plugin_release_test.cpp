@@ -18,7 +18,7 @@ class PluginRelease : public ::testing::Test {
   /// Whether the springs have moved, some time later.
   bool follows(const dashpot_setpoint* setpoint = nullptr, int ticks = 300) {
     for (int tick = 0; tick < ticks; ++tick) EXPECT_LT(host.tick(setpoint), DASHPOT_SETPOINT_LOST);
-    return std::abs(host.snapshot().goal_joint_position[0] - host.position[0]) > 0.01;
+    return std::abs(host.snapshot().reference_joint_position[0] - host.position[0]) > 0.01;
   }
   /// A pause that latches, with this set-point.
   void pause(const dashpot_setpoint* setpoint = nullptr) {

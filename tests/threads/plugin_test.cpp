@@ -135,8 +135,8 @@ TEST(Plugin, IsTheController) {
   EXPECT_EQ(Map<const Eigen::Vector3d>(snapshot.tip_position), controller.snapshot().tip.position);
   EXPECT_EQ((Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(snapshot.tip_rotation)),
             controller.snapshot().tip.rotation);
-  EXPECT_EQ(Map<const VectorXd>(snapshot.goal_joint_position, 7),
-            controller.snapshot().setpoint_position);
+  EXPECT_EQ(Map<const VectorXd>(snapshot.reference_joint_position, 7),
+            controller.snapshot().reference_position);
 
   const dashpot_modes modes = host.modes();
   const controller::Vibration& vibration = controller.vibration();
@@ -191,7 +191,7 @@ TEST(Plugin, GoesToASetpointFromTheOtherThreadsSide) {
     simulate(config.model, host);
   }
   for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(host.position[i], goal[i], 2e-2);
-  EXPECT_EQ(host.snapshot().goal_joint_position[0], goal[0]);
+  EXPECT_EQ(host.snapshot().reference_joint_position[0], goal[0]);
 }
 
 TEST(Plugin, GoesToAPose) {
@@ -238,12 +238,12 @@ TEST(Plugin, IsResetToHoldWhereTheRobotIs) {
   goal[1] += 0.5;
   const dashpot_setpoint setpoint = host.joint_setpoint(goal);
   for (int tick = 0; tick < 100; ++tick) host.tick(&setpoint);
-  ASSERT_GT(std::abs(host.snapshot().goal_joint_position[1] - panda_posture()[1]), 1e-4);
+  ASSERT_GT(std::abs(host.snapshot().reference_joint_position[1] - panda_posture()[1]), 1e-4);
   const std::vector<double> acting = host.torque;
   host.time -= 500'000'000;  // forgotten as well
   ASSERT_EQ(plugin().reset(host.controller.get(), acting.data()), DASHPOT_OK);
   ASSERT_LE(host.tick(), DASHPOT_TORQUE_LIMITED);
-  EXPECT_EQ(Map<const VectorXd>(host.snapshot().goal_joint_position, 7),
+  EXPECT_EQ(Map<const VectorXd>(host.snapshot().reference_joint_position, 7),
             joint_vector(panda_posture()));
   const VectorXd limit = 0.001 * load(panda()).settings.limits.torque_rate;
   EXPECT_TRUE(((joint_vector(host.torque) - joint_vector(acting)).cwiseAbs().array() <=
@@ -253,7 +253,7 @@ TEST(Plugin, IsResetToHoldWhereTheRobotIs) {
   const std::vector<double> before = host.torque;
   ASSERT_EQ(plugin().reset(host.controller.get(), nullptr), DASHPOT_OK);
   host.tick();
-  EXPECT_EQ(Map<const VectorXd>(host.snapshot().goal_joint_position, 7),
+  EXPECT_EQ(Map<const VectorXd>(host.snapshot().reference_joint_position, 7),
             joint_vector(panda_posture()));
   // Without a torque that acts, from the last one.
   EXPECT_TRUE(((joint_vector(host.torque) - joint_vector(before)).cwiseAbs().array() <=

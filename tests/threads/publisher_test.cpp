@@ -68,7 +68,7 @@ StateSample state_at(std::int64_t tick) {
   sample.snapshot.tick = static_cast<std::uint64_t>(tick);
   for (auto* vector :
        {&sample.snapshot.position, &sample.snapshot.velocity, &sample.snapshot.torque,
-        &sample.snapshot.law_torque, &sample.snapshot.setpoint_position}) {
+        &sample.snapshot.law_torque, &sample.snapshot.reference_position}) {
     *vector = controller::JointVector::Constant(7, static_cast<double>(tick));
   }
   return sample;

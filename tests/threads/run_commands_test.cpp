@@ -22,7 +22,7 @@ command_t joint_command(const state_t& state, double first_joint, std::int64_t s
   command.sequence = sequence;
   command.parts = int{command_t::MODE} + int{command_t::JOINT_POSITION};
   command.mode = command_t::JOINT;
-  command.joint_position = state.joint_position_goal;
+  command.joint_position = state.reference_joint_position;
   command.joint_position[0] = first_joint;
   command.tip_quaternion[0] = 1;
   const auto n = static_cast<std::size_t>(state.n);
@@ -64,7 +64,7 @@ TEST(RunWithCommands, TakesGoodCommandsAndKeepsTheLastOne) {
   // Nobody sends any more, and the robot goes where it was told, without a complaint.
   EXPECT_TRUE(listener.until([&] {
     return listener.state.mode == state_t::JOINT &&
-           std::abs(listener.state.joint_position_goal[0] - 0.1) < 1e-9;
+           std::abs(listener.state.reference_joint_position[0] - 0.1) < 1e-9;
   }));
   const std::int64_t tick = listener.state.tick;
   EXPECT_TRUE(listener.until([&] { return listener.state.tick > tick + 2500; }));
@@ -142,8 +142,8 @@ TEST(RunWithCommands, ObeysOneSenderAtATime) {
   EXPECT_EQ(listener.state.commander, 0);
   send(kOther, -0.1, 1, 0);
   ASSERT_TRUE(listener.until([&] { return listener.state.commander == kOther; }));
-  EXPECT_TRUE(
-      listener.until([&] { return std::abs(listener.state.joint_position_goal[0] + 0.1) < 1e-9; }));
+  EXPECT_TRUE(listener.until(
+      [&] { return std::abs(listener.state.reference_joint_position[0] + 0.1) < 1e-9; }));
   run.send(SIGTERM);
   EXPECT_EQ(run.finish(), 0);
   const Json commands = Json::parse(run.output())["commands"];
@@ -241,7 +241,7 @@ TEST(RunWithCommands, IsReleasedFromAFaultThatIsNamed) {
   listener.bus().publish(lcmtypes::kCommandChannel, &goal);
   EXPECT_TRUE(listener.until([&] {
     return listener.state.mode == state_t::JOINT &&
-           std::abs(listener.state.joint_position_goal[0] - where[0] - 0.05) < 1e-9;
+           std::abs(listener.state.reference_joint_position[0] - where[0] - 0.05) < 1e-9;
   }));
   run.send(SIGTERM);
   EXPECT_EQ(run.finish(), 0);

@@ -76,7 +76,8 @@ TEST(SampledAnalysis, FindsWhatTheAnalysisOfThatLoopFinds) {
     drives.delay = 2;
     drives.torque_cutoff = 40;
     drives.difference_velocity = difference;
-    drives.friction = Eigen::VectorXd(arm.model.joint_values(&Joint::damping)).asDiagonal();
+    drives.friction =
+        Eigen::VectorXd(arm.model.joint_values(&Joint::viscous_friction)).asDiagonal();
     drives.gravity_gradient = gravity_gradient(arm.model, arm.state.position);
     const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, drives);
     ASSERT_EQ(static_cast<std::size_t>(found->count), sampled.modes.size());

@@ -1,0 +1,154 @@
+#include <dashpot/analysis/rigid_body_elimination.hpp>
+#include <dashpot/analysis/system/checks.hpp>
+
+#include <Eigen/Cholesky>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Coefficients with the stiffness factor, all in the coordinates that are left.
+struct Reduced {
+  MatrixXd mass;
+  MatrixXd damping;
+  MatrixXd stiffness;
+  MatrixXd stiffness_factor;  ///< no rows: not given
+};
+
+/// S' A S, exactly symmetric if A is.
+MatrixXd congruence(const MatrixXd& S, const MatrixXd& A) {
+  MatrixXd product = S.transpose() * A * S;
+  if (A == A.transpose()) product = (0.5 * (product + product.transpose())).eval();
+  return product;
+}
+
+Reduced reduce(const Reduced& system, const MatrixXd& S) {
+  return {congruence(S, system.mass), congruence(S, system.damping),
+          congruence(S, system.stiffness), system.stiffness_factor * S};
+}
+
+void check(const System<>& system, const ZeroModes<>& zero_modes) {
+  if (zero_modes.basis.rows() != system.dof() || zero_modes.basis.cols() != zero_modes.count) {
+    throw std::invalid_argument("elimination: the zero modes are not those of the system");
+  }
+  if (zero_modes.count > 0) check_symmetric("stiffness", system.stiffness);
+}
+
+/// The elimination so far: nothing removed yet.
+RigidBodyElimination nothing_removed(const System<>& system) {
+  RigidBodyElimination elimination;
+  elimination.constraint_matrix = MatrixXd::Identity(system.dof(), system.dof());
+  return elimination;
+}
+
+/// Index among the coordinates left of the one to eliminate, for s = M u.
+Index choose_pivot(const VectorXd& s, Pivot pivot) {
+  Index largest = 0;
+  const double scale = s.cwiseAbs().maxCoeff(&largest);
+  if (pivot == Pivot::kLargest) return largest;
+  const Index last = s.size() - 1;
+  if (std::abs(s(last)) <= 16 * std::numeric_limits<double>::epsilon() * scale) {
+    throw std::domain_error(
+        "elimination: the zero mode does not move the last coordinate, which therefore cannot be "
+        "eliminated; use the largest pivot");
+  }
+  return last;
+}
+
+/// Appends the step that removes the null vector u of the current reduced system with mass `mass`
+/// (Eqs. 8-13), and returns its matrix: an identity with a row put in that gives the eliminated
+/// coordinate from the others.
+MatrixXd append_step(const MatrixXd& mass, const VectorXd& u, Pivot pivot,
+                     RigidBodyElimination& elimination) {
+  const Index n = u.size();
+  const VectorXd s = mass * u;
+  const Index i = choose_pivot(s, pivot);
+  MatrixXd step = MatrixXd::Zero(n, n - 1);
+  for (Index j = 0; j < n - 1; ++j) {
+    const Index kept = j < i ? j : j + 1;
+    step(kept, j) = 1;
+    step(i, j) = -s(kept) / s(i);
+  }
+
+  std::vector<int> left(static_cast<std::size_t>(elimination.constraint_matrix.rows()));
+  std::iota(left.begin(), left.end(), 0);
+  for (const int index : elimination.eliminated)
+    left.erase(std::find(left.begin(), left.end(), index));
+  elimination.eliminated.push_back(left[static_cast<std::size_t>(i)]);
+  elimination.steps.push_back(step);
+  elimination.constraint_matrix = elimination.constraint_matrix * step;
+  return step;
+}
+
+/// S* x = (S' M S)^-1 S' M x, where reduced_mass = S' M S.
+MatrixXd pseudo_inverse_times(const MatrixXd& S, const MatrixXd& mass, const MatrixXd& reduced_mass,
+                              const MatrixXd& x) {
+  if (x.cols() == 0) return MatrixXd(S.cols(), 0);
+  return reduced_mass.llt().solve(S.transpose() * (mass * x));
+}
+
+/// The last `count` right singular vectors of the mass-normalised stiffness, as M-orthonormal null
+/// vectors of the stiffness.
+MatrixXd null_vectors(const Reduced& system, Index count) {
+  const Eigen::LLT<MatrixXd> cholesky(system.mass);
+  const bool factored = system.stiffness_factor.rows() > 0;
+  const MatrixXd& rows = factored ? system.stiffness_factor : system.stiffness;
+  MatrixXd normalized = cholesky.matrixL().solve(rows.transpose()).transpose();
+  if (!factored) normalized = cholesky.matrixL().solve(normalized).eval();
+  const Eigen::JacobiSVD<MatrixXd> svd(normalized, Eigen::ComputeFullV);
+  return cholesky.matrixU().solve(svd.matrixV().rightCols(count));
+}
+
+}  // namespace
+
+RigidBodyElimination eliminate_successively(const System<>& system, const ZeroModes<>& zero_modes,
+                                            Pivot pivot) {
+  check(system, zero_modes);
+  RigidBodyElimination elimination = nothing_removed(system);
+  Reduced current{system.mass, system.damping, system.stiffness, system.stiffness_factor};
+  MatrixXd guides = zero_modes.basis;  // columns not yet removed, in the current coordinates
+  while (guides.cols() > 0) {
+    const MatrixXd null_space = null_vectors(current, guides.cols());
+    const VectorXd u = null_space * (null_space.transpose() * (current.mass * guides.col(0)));
+    const MatrixXd step = append_step(current.mass, u, pivot, elimination);
+    Reduced next = reduce(current, step);
+    guides =
+        pseudo_inverse_times(step, current.mass, next.mass, guides.rightCols(guides.cols() - 1));
+    current = std::move(next);
+  }
+  elimination.mass = current.mass;
+  elimination.damping = current.damping;
+  elimination.stiffness = current.stiffness;
+  return elimination;
+}
+
+RigidBodyElimination eliminate_abbreviated(const System<>& system, const ZeroModes<>& zero_modes,
+                                           Pivot pivot) {
+  check(system, zero_modes);
+  RigidBodyElimination elimination = nothing_removed(system);
+  MatrixXd mass = system.mass;
+  MatrixXd remaining = zero_modes.basis;
+  while (remaining.cols() > 0) {
+    const MatrixXd step = append_step(mass, remaining.col(0), pivot, elimination);
+    const MatrixXd reduced_mass = congruence(step, mass);
+    remaining =
+        pseudo_inverse_times(step, mass, reduced_mass, remaining.rightCols(remaining.cols() - 1));
+    mass = reduced_mass;
+  }
+  elimination.mass = congruence(elimination.constraint_matrix, system.mass);
+  elimination.damping = congruence(elimination.constraint_matrix, system.damping);
+  elimination.stiffness = congruence(elimination.constraint_matrix, system.stiffness);
+  return elimination;
+}
+
+}  // namespace dashpot::analysis

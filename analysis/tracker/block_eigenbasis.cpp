@@ -1,0 +1,349 @@
+#include <dashpot/analysis/tracker/block_eigenbasis.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::analysis {
+namespace {
+
+/// A step as large as this does not say what it seems to.
+constexpr double kSmallStep = 0.3;
+/// Between zero modes, whose couplings and rates are often small together: they are better parted
+/// all at once.
+constexpr double kSmallZeroStep = 1e-3;
+/// Up to this size it does no harm if it comes of rounding errors.
+constexpr double kTinyStep = 1e-6;
+
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+void clear_padding(const BlockEigenbasis& basis, int rows, PackedMatrix& X) {
+  for (int i = 0; i < rows; ++i) {
+    for (int j = basis.columns(); j < X.width; ++j) X(i, j) = 0;
+  }
+}
+
+/// X(row, column), X(row + 1, column + 1), ...: four entries, of which `count` exist.
+Vec4d diagonal(const PackedMatrix& X, int row, int column, int count, double otherwise) {
+  Vec4d lanes;
+  for (int k = 0; k < 4; ++k) lanes[k] = k < count ? X(row + k, column + k) : otherwise;
+  return lanes;
+}
+
+void set_blocks(const PackedMatrix& N, const PackedMatrix& T, BlockEigenbasis& basis) {
+  const int m = basis.modes;
+  for (int i = 0; i < m; i += 4) {
+    const int k = m + i, count = std::min(4, m - i);
+    const Vec4d n00 = diagonal(N, i, i, count, 1), n01 = diagonal(N, i, k, count, 0),
+                n10 = diagonal(N, k, i, count, 0), n11 = diagonal(N, k, k, count, 1);
+    const Vec4d t00 = diagonal(T, i, i, count, 0), t01 = diagonal(T, i, k, count, 0),
+                t10 = diagonal(T, k, i, count, 0), t11 = diagonal(T, k, k, count, 0);
+    const Vec4d inverse = 1 / (n00 * n11 - n01 * n10);
+    store(&basis.l00[at(i)], inverse * (n11 * t00 - n01 * t10));
+    store(&basis.l01[at(i)], inverse * (n11 * t01 - n01 * t11));
+    store(&basis.l10[at(i)], inverse * (n00 * t10 - n10 * t00));
+    store(&basis.l11[at(i)], inverse * (n00 * t11 - n10 * t01));
+  }
+  for (int k = 0; k < basis.zeros; ++k) {
+    basis.rate[at(k)] = T(2 * m + k, 2 * m + k) / N(2 * m + k, 2 * m + k);
+  }
+}
+
+/// G = T - N Lambda, in the place of T. Lambda is zero in the lanes beyond the last mode, and so
+/// they write back what they read.
+void subtract_blocks(const BlockEigenbasis& basis, const PackedMatrix& N, PackedMatrix& G) {
+  const int m = basis.modes;
+  for (int i = 0; i < basis.columns(); ++i) {
+    const double* const n = N.row(i);
+    double* const g = G.row(i);
+    std::array<Vec4d, kMaxDof / 4> first, second;
+    for (int j = 0; j < m; j += 4) {
+      const Vec4d n0 = load(n + j), n1 = load(n + m + j);
+      first[at(j / 4)] =
+          load(g + j) - (n0 * load(&basis.l00[at(j)]) + n1 * load(&basis.l10[at(j)]));
+      second[at(j / 4)] =
+          load(g + m + j) - (n0 * load(&basis.l01[at(j)]) + n1 * load(&basis.l11[at(j)]));
+    }
+    for (int j = 0; j < m; j += 4) store(g + j, first[at(j / 4)]);
+    for (int j = 0; j < m; j += 4) store(g + m + j, second[at(j / 4)]);
+    for (int k = 0; k < basis.zeros; ++k) g[2 * m + k] -= n[2 * m + k] * basis.rate[at(k)];
+  }
+}
+
+void take_diagonal(const BlockEigenbasis& basis, PackedMatrix& G,
+                   BlockEigenbasis::Entries& squares) {
+  for (int i = 0; i < basis.modes; ++i) {
+    squares[at(i)] = 0;
+    for (const int row : {i, basis.modes + i}) {
+      for (const int column : {i, basis.modes + i}) {
+        squares[at(i)] += G(row, column) * G(row, column);
+        G(row, column) = 0;
+      }
+    }
+  }
+}
+
+/// E between mode i and all others: with p the characteristic polynomial of B = Lambda_j,
+/// p(A) X = A Q - Q adj(B) solves A X - X B = Q (Cayley-Hamilton).
+void solve_row(const BlockEigenbasis& basis, const PackedMatrix& G, int i, PackedMatrix& E) {
+  const int m = basis.modes;
+  const double a = basis.l00[at(i)], b = basis.l01[at(i)], c = basis.l10[at(i)],
+               d = basis.l11[at(i)];
+  std::array<std::array<Vec4d, kMaxDof / 4>, 4> X;
+  for (int j = 0; j < m; j += 4) {
+    const Vec4d e = load(&basis.l00[at(j)]), f = load(&basis.l01[at(j)]),
+                g = load(&basis.l10[at(j)]), h = load(&basis.l11[at(j)]);
+    const Vec4d q00 = -load(G.row(i) + j), q01 = -load(G.row(i) + m + j),
+                q10 = load(G.row(m + i) + j), q11 = load(G.row(m + i) + m + j);
+    const Vec4d trace = e + h, determinant = e * h - f * g;
+    const Vec4d across = (a + d) - trace;
+    const Vec4d p00 = a * (a - trace) + (b * c + determinant);
+    const Vec4d p11 = d * (d - trace) + (b * c + determinant);
+    const Vec4d p01 = b * across, p10 = c * across;
+    const Vec4d inverse = 1 / (p00 * p11 - p01 * p10);
+    const Vec4d r00 = a * q00 + b * q10 - (q00 * h - q01 * g);
+    const Vec4d r01 = a * q01 + b * q11 - (q01 * e - q00 * f);
+    const Vec4d r10 = c * q00 + d * q10 - (q10 * h - q11 * g);
+    const Vec4d r11 = c * q01 + d * q11 - (q11 * e - q10 * f);
+    X[0][at(j / 4)] = inverse * (p11 * r00 - p01 * r10);
+    X[1][at(j / 4)] = inverse * (p11 * r01 - p01 * r11);
+    X[2][at(j / 4)] = inverse * (p00 * r10 - p10 * r00);
+    X[3][at(j / 4)] = inverse * (p00 * r11 - p10 * r01);
+  }
+  // What lanes beyond the last mode hold is overwritten by the next part of the row.
+  for (int j = 0; j < m; j += 4) {
+    store(E.row(i) + j, X[0][at(j / 4)]);
+    store(E.row(m + i) + j, X[2][at(j / 4)]);
+  }
+  for (int j = 0; j < m; j += 4) {
+    store(E.row(i) + m + j, X[1][at(j / 4)]);
+    store(E.row(m + i) + m + j, X[3][at(j / 4)]);
+  }
+}
+
+/// E between mode i and zero mode k, both ways, and between zero modes.
+void solve_zeros(const BlockEigenbasis& basis, const PackedMatrix& G, PackedMatrix& E) {
+  const int m = basis.modes;
+  for (int k = 0; k < basis.zeros; ++k) {
+    const int column = 2 * m + k;
+    const double x = basis.rate[at(k)];
+    for (int i = 0; i < m; ++i) {
+      const double a = basis.l00[at(i)] - x, b = basis.l01[at(i)], c = basis.l10[at(i)],
+                   d = basis.l11[at(i)] - x;
+      const double inverse = 1 / (a * d - b * c);
+      const double q0 = -G(i, column), q1 = G(m + i, column);
+      E(i, column) = inverse * (d * q0 - b * q1);
+      E(m + i, column) = inverse * (a * q1 - c * q0);
+      const double w0 = G(column, i), w1 = G(column, m + i);  // x e - e Lambda_i = w
+      E(column, i) = -inverse * (w0 * d - w1 * c);
+      E(column, m + i) = -inverse * (w1 * a - w0 * b);
+    }
+    for (int l = 0; l < basis.zeros; ++l) {
+      E(column, 2 * m + l) = G(column, 2 * m + l) / (x - basis.rate[at(l)]);
+    }
+  }
+}
+
+template <typename Visit>
+void visit_block(const BlockEigenbasis& basis, int i, int j, const Visit& visit) {
+  visit(basis.first(i), basis.first(j));
+  if (j < basis.modes) visit(basis.first(i), basis.second(j));
+  if (i < basis.modes) {
+    visit(basis.second(i), basis.first(j));
+    if (j < basis.modes) visit(basis.second(i), basis.second(j));
+  }
+}
+
+double block_norm(const BlockEigenbasis& basis, const PackedMatrix& X, int i, int j) {
+  double sum = 0;
+  visit_block(basis, i, j, [&](int row, int column) { sum += X(row, column) * X(row, column); });
+  return std::sqrt(sum);
+}
+
+/// E_ij = -Sigma_i R_ij / 2: the columns stay orthonormal, and are not told apart.
+void only_orthonormalize(const BlockEigenbasis& basis, const PackedMatrix& R, int i, int j,
+                         PackedMatrix& E) {
+  visit_block(basis, i, j, [&](int row, int column) {
+    E(row, column) = row < basis.modes ? -0.5 * R(row, column) : 0.5 * R(row, column);
+  });
+}
+
+double squared_norm(const BlockEigenbasis& basis, const PackedMatrix& X) {
+  Vec4d squares{};
+  for (int i = 0; i < basis.columns(); ++i) {
+    for (int j = 0; j < X.width; j += 4) squares += load(X.row(i) + j) * load(X.row(i) + j);
+  }
+  return sum(squares);
+}
+
+/// Couplings between zero modes that come of what the rest of the step, to its square, lets them
+/// have of the modes' damping: they go away with it.
+double zeros_disturbance(const BlockEigenbasis& basis, const PackedMatrix& E) {
+  if (basis.zeros < 2) return 0;
+  double rates = 0, among_zeros = 0;
+  for (const BlockEigenbasis::Entries* l : {&basis.l00, &basis.l01, &basis.l10, &basis.l11}) {
+    for (int i = 0; i < basis.modes; ++i) rates += (*l)[at(i)] * (*l)[at(i)];
+  }
+  for (int i = 2 * basis.modes; i < basis.columns(); ++i) {
+    for (int j = 2 * basis.modes; j < basis.columns(); ++j) among_zeros += E(i, j) * E(i, j);
+  }
+  return std::sqrt(rates) * std::max(0.0, squared_norm(basis, E) - among_zeros);
+}
+
+/// R = Z' S Z (Sigma is not yet subtracted) and G = Z' B Z, with S Z = [Z_s or K Z_s; -M V] and
+/// B Z = [W V; W' Z_s + C V].
+void multiply_mixed(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
+                    TrackedResidual& residual) {
+  const int n = pencil.joints, p = pencil.rank, states = pencil.states(), width = basis.Z.width;
+  const auto multiply = [product = padded_multiply(width), width](
+                            const Strided& A, int rows, int inner, const double* X,
+                            const double* start, double sign,
+                            double* out) { product(A, rows, inner, X, start, sign, out, width); };
+  const double *const elastic = basis.Z.row(0), *const velocity = basis.Z.row(p);
+  multiply({pencil.M, 1, n}, n, n, velocity, nullptr, -1, residual.MV.row(p));
+  multiply({pencil.W, 1, p}, p, n, velocity, nullptr, 1, residual.image.row(0));
+  multiply({pencil.W, p, 1}, n, p, elastic, nullptr, 1, residual.image.row(p));
+  if (pencil.factored) {
+    std::copy(elastic, velocity, residual.MV.row(0));
+  } else {
+    std::copy(residual.image.row(p), residual.image.row(p + n), residual.MV.row(0));
+  }
+  multiply({pencil.C, 1, n}, n, n, velocity, residual.image.row(p), 1, residual.image.row(p));
+  const Strided transposed{basis.Z.row(0), 1, width};
+  multiply(transposed, basis.columns(), states, residual.MV.row(0), nullptr, 1, residual.R.row(0));
+  multiply(transposed, basis.columns(), states, residual.image.row(0), nullptr, 1,
+           residual.G.row(0));
+}
+
+/// The same of a proportional basis, with Z_s (p columns) and V (n columns):
+///     R = diag(Z_s' Z_s or Z_s' K Z_s, -V' M V),     G = [0, Z_s' W V; its transpose, V' C V].
+void multiply_pure(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
+                   TrackedResidual& residual) {
+  const int n = pencil.joints, p = pencil.rank, m = basis.modes, width = basis.Z.width;
+  const PaddedMultiply elastic = padded_multiply(m), velocities = padded_multiply(n);
+  const double *const Z_s = basis.Z.row(0), *const V = basis.Z.row(p) + m;
+  const Strided Z_sT{Z_s, 1, width}, V_T{V, 1, width};
+  for (PackedMatrix* rows : {&residual.R, &residual.G, &residual.MV}) {
+    set_zero(width, basis.columns(), *rows);
+  }
+  velocities({pencil.M, 1, n}, n, n, V, nullptr, -1, residual.MV.row(p) + m, width);
+  velocities({pencil.W, 1, p}, p, n, V, nullptr, 1, residual.image.row(0) + m, width);
+  velocities({pencil.C, 1, n}, n, n, V, nullptr, 1, residual.image.row(p) + m, width);
+  if (!pencil.factored) elastic({pencil.W, 1, p}, p, p, Z_s, nullptr, 1, residual.MV.row(0), width);
+  const double* const KZ_s = pencil.factored ? Z_s : residual.MV.row(0);
+  elastic(Z_sT, m, p, KZ_s, nullptr, 1, residual.R.row(0), width);
+  velocities(V_T, n, n, residual.MV.row(p) + m, nullptr, 1, residual.R.row(m) + m, width);
+  velocities(Z_sT, m, p, residual.image.row(0) + m, nullptr, 1, residual.G.row(0) + m, width);
+  velocities(V_T, n, n, residual.image.row(p) + m, nullptr, 1, residual.G.row(m) + m, width);
+  for (int i = 0; i < m; ++i) {
+    for (int j = m; j < basis.columns(); ++j) residual.G(j, i) = residual.G(i, j);
+  }
+}
+
+}  // namespace
+
+SymmetricPencil symmetric_pencil(const System<kMaxDof>& system) noexcept {
+  SymmetricPencil pencil;
+  pencil.joints = static_cast<int>(system.dof());
+  const auto rows = static_cast<int>(system.stiffness_factor.rows());
+  pencil.factored = rows > 0 && rows <= pencil.joints;
+  pencil.rank = pencil.factored ? rows : pencil.joints;
+  pencil.M = system.mass.data();
+  pencil.C = system.damping.data();
+  pencil.W = pencil.factored ? system.stiffness_factor.data() : system.stiffness.data();
+  return pencil;
+}
+
+void evaluate(const SymmetricPencil& pencil, BlockEigenbasis& basis,
+              TrackedResidual& residual) noexcept {
+  for (PackedMatrix* rows : {&residual.R, &residual.G, &residual.MV, &residual.image}) {
+    rows->width = basis.Z.width;
+  }
+  if (basis.proportional) {
+    multiply_pure(pencil, basis, residual);
+  } else {
+    multiply_mixed(pencil, basis, residual);
+  }
+  set_blocks(residual.R, residual.G, basis);
+  subtract_blocks(basis, residual.R, residual.G);
+  for (int i = 0; i < basis.columns(); ++i) residual.R(i, i) -= i < basis.modes ? 1 : -1;
+  take_diagonal(basis, residual.G, residual.diagonal);
+}
+
+CloseBlocks newton_step(const BlockEigenbasis& basis, const TrackedResidual& residual,
+                        double roundoff_bound, PackedMatrix& E, double& size) noexcept {
+  E.width = basis.Z.width;
+  for (int i = 0; i < basis.modes; ++i) solve_row(basis, residual.G, i, E);
+  if (basis.zeros > 0) solve_zeros(basis, residual.G, E);
+  for (int i = 0; i < basis.blocks(); ++i) only_orthonormalize(basis, residual.R, i, i, E);
+  clear_padding(basis, basis.columns(), E);
+  size = std::sqrt(squared_norm(basis, E));
+  CloseBlocks close;
+  if (size < kTinyStep) return close;
+  const double zeros_roundoff_bound = roundoff_bound + zeros_disturbance(basis, E);
+  double worst = 0;
+  bool left_out = false;
+  for (int i = 0; i < basis.blocks(); ++i) {
+    for (int j = 0; j < i; ++j) {
+      const double step = std::max(block_norm(basis, E, i, j), block_norm(basis, E, j, i));
+      if (step < kTinyStep) continue;
+      const bool zeros = j >= basis.modes;
+      const double small = zeros ? kSmallZeroStep : kSmallStep,
+                   least = zeros ? zeros_roundoff_bound : roundoff_bound;
+      const double coupling =
+          std::max(block_norm(basis, residual.G, i, j), block_norm(basis, residual.G, j, i));
+      if (coupling > roundoff_bound && step < small) continue;
+      only_orthonormalize(basis, residual.R, i, j, E);
+      only_orthonormalize(basis, residual.R, j, i, E);
+      left_out = true;
+      if (coupling <= least || coupling < worst) continue;
+      worst = coupling;
+      close = {j, i};
+    }
+  }
+  if (left_out) size = std::sqrt(squared_norm(basis, E));
+  return close;
+}
+
+int packed_width(int modes, int zeros) noexcept {
+  const int lanes = modes + (modes + zeros + 3) / 4 * 4;
+  return (std::max(2 * modes + zeros, lanes) + 3) / 4 * 4;
+}
+
+double coupling_norm(const BlockEigenbasis& basis, const PackedMatrix& E) noexcept {
+  double squares = 0;
+  for (int i = 0; i < basis.modes; ++i) {
+    for (int j = basis.modes; j < basis.columns(); ++j) {
+      squares += E(i, j) * E(i, j) + E(j, i) * E(j, i);
+    }
+  }
+  return std::sqrt(squares);
+}
+
+void take_step(const PackedMatrix& E, BlockEigenbasis& basis) noexcept {
+  const int width = basis.Z.width, columns = basis.columns(), m = basis.modes;
+  double* const Z = basis.Z.row(0);
+  if (!basis.proportional) {
+    padded_multiply(width)({Z, width, 1}, columns, columns, E.row(0), Z, 1, Z, width);
+    return;
+  }
+  const int n = m + basis.zeros;
+  double* const V = basis.Z.row(m) + m;
+  padded_multiply(m)({Z, width, 1}, m, m, E.row(0), Z, 1, Z, width);
+  for (int i = 0; i < m; ++i) {  // fours of columns reach beyond the elastic coordinates'
+    for (int j = m; j < (m + 3) / 4 * 4; ++j) basis.Z(i, j) = 0;
+  }
+  padded_multiply(n)({V, width, 1}, n, n, E.row(m) + m, V, 1, V, width);
+}
+
+void stepped_velocities(const BlockEigenbasis& basis, const PackedMatrix& E,
+                        PackedMatrix& out) noexcept {
+  const int width = out.width = basis.Z.width, n = basis.modes + basis.zeros;
+  const int first = basis.proportional ? basis.modes : 0;  // columns that hold velocities
+  const double* const V = basis.Z.row(basis.modes);
+  padded_multiply(width)({V + first, width, 1}, n, basis.columns() - first, E.row(first), V, 1,
+                         out.row(0), width);
+}
+
+}  // namespace dashpot::analysis

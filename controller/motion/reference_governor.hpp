@@ -1,0 +1,89 @@
+#pragma once
+#include <dashpot/controller/base/impedance.hpp>
+
+#include <Eigen/Geometry>
+#include <numbers>
+
+namespace dashpot::controller {
+
+/// Which directions of a frame have springs: 1 or 0, of a positive semidefinite K, whose row is
+/// zero where its diagonal entry is.
+inline Vector6 sprung(const Matrix6& K) noexcept {
+  Vector6 result;
+  for (int i = 0; i < 6; ++i) result[i] = K(i, i) > 0 ? 1 : 0;
+  return result;
+}
+
+/// diag(R, R) diag(mask) diag(R, R)' a: of the vector a in B's axes, what lies in the directions
+/// `mask` of the frame with the axes R.
+inline Vector6 part_along(const Vector6& mask, const Eigen::Matrix3d& R,
+                          const Vector6& a) noexcept {
+  Vector6 result;
+  result.head<3>() = R * mask.head<3>().cwiseProduct(R.transpose() * a.head<3>());
+  result.tail<3>() = R * mask.tail<3>().cwiseProduct(R.transpose() * a.tail<3>());
+  return result;
+}
+
+/// Limits the deflection of the tip's springs: e (m, and rad as a rotation vector) becomes
+///     e - (1 - min(1, r / |e_s|)) e_s,
+/// linear and angular part each by itself, e_s being what lies in directions that have springs and
+/// r the limit. Less deflection is less energy: e' K e becomes no larger where K does not couple
+/// the two parts.
+struct ErrorClamp {
+  double linear = 0;   ///< m
+  double angular = 0;  ///< rad
+
+  Vector6 clamped(const Vector6& e, const TipImpedance& base, const TipImpedance& tool,
+                  const Eigen::Matrix3d& R_BT) const noexcept {
+    if (e.head<3>().norm() <= linear && e.tail<3>().norm() <= angular) return e;
+    Vector6 e_s = e;  // while springs pass from one frame to the other: all of it
+    if (tool.none()) {
+      e_s = part_along(sprung(base.stiffness), Eigen::Matrix3d::Identity(), e);
+    } else if (base.none()) {
+      e_s = part_along(sprung(tool.stiffness), R_BT, e);
+    }
+    const double far = e_s.head<3>().norm(), turned = e_s.tail<3>().norm();
+    Vector6 result = e;
+    if (far > linear) result.head<3>() -= (1 - linear / far) * e_s.head<3>();
+    if (turned > angular) result.tail<3>() -= (1 - angular / turned) * e_s.tail<3>();
+    return result;
+  }
+};
+
+/// Keeps the tip's reference within the error clamp: where the tip is, and the springs between it
+/// and the reference.
+struct ReferenceGovernor {
+  const Eigen::Vector3d& position;
+  const Eigen::Quaterniond& rotation;
+  const Eigen::Matrix3d& R_BT;  ///< of `rotation`
+  const TipImpedance& base;
+  const TipImpedance& tool;
+  const ErrorClamp& clamp;
+
+  Vector6 clamped(const Vector6& e) const noexcept { return clamp.clamped(e, base, tool, R_BT); }
+  /// True if a pose is within the clamp, by a bound that costs little: the angle between two unit
+  /// quaternions is at most pi sqrt(1 - (their product)^2).
+  bool near(const Eigen::Vector3d& p, const Eigen::Quaterniond& q) const noexcept {
+    const double cosine = q.dot(rotation);
+    return (p - position).squaredNorm() <= clamp.linear * clamp.linear &&
+           std::numbers::pi * std::numbers::pi * (1 - cosine * cosine) <=
+               clamp.angular * clamp.angular;
+  }
+};
+
+/// Of the deflection e of springs that change from `now` to `then`: what is left once those that
+/// grow from nothing start at rest.
+inline Vector6 without_new_springs(const Vector6& e, const TipImpedance& now_base,
+                                   const TipImpedance& now_tool, const TipImpedance& then_base,
+                                   const TipImpedance& then_tool,
+                                   const Eigen::Matrix3d& R_BT) noexcept {
+  const bool in_tool = !then_tool.none();
+  const Matrix6 now =
+      in_tool ? Matrix6(now_tool.stiffness + turned(now_base.stiffness, R_BT.transpose()))
+              : Matrix6(now_base.stiffness + turned(now_tool.stiffness, R_BT));
+  const Vector6 then = sprung(in_tool ? then_tool.stiffness : then_base.stiffness);
+  const Vector6 fresh = then.cwiseProduct(Vector6::Ones() - sprung(now));
+  return e - part_along(fresh, in_tool ? R_BT : Eigen::Matrix3d::Identity(), e);
+}
+
+}  // namespace dashpot::controller

@@ -1,0 +1,300 @@
+// RigidBodyElimination of zero modes: the paper's printed matrices, and the invariants of any
+// elimination.
+#include <dashpot/analysis/rigid_body_elimination.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/paper_examples.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::as_printed;
+using testing::near;
+
+using Method = RigidBodyElimination (*)(const System<>&, const ZeroModes<>&, Pivot);
+
+/// `first` vectors projected to the null space of the stiffness and made M-orthonormal in turn.
+ZeroModes<> zero_modes_from(const System<>& system, const MatrixXd& first) {
+  const Eigen::JacobiSVD<MatrixXd> svd(system.stiffness, Eigen::ComputeFullV);
+  const MatrixXd null_space = svd.matrixV().rightCols(first.cols());
+  ZeroModes<> zero_modes;
+  zero_modes.count = static_cast<int>(first.cols());
+  zero_modes.basis = null_space * (null_space.transpose() * first);
+  for (int k = 0; k < zero_modes.count; ++k) {
+    auto u = zero_modes.basis.col(k);
+    for (int j = 0; j < k; ++j) {
+      const VectorXd earlier = zero_modes.basis.col(j);
+      u -= earlier * earlier.dot(system.mass * u);
+    }
+    u /= std::sqrt(u.dot(system.mass * u));
+  }
+  return zero_modes;
+}
+
+ZeroModes<> chain_zero_modes() {
+  return zero_modes_from(testing::paper_chain(), MatrixXd::Ones(3, 1));
+}
+
+/// The vectors printed as U_r, of which S0 depends on the first.
+ZeroModes<> baxter_zero_modes(const System<>& system) {
+  MatrixXd printed(7, 2);
+  printed << 0.1988, -0.06389, 0, 0, -0.4589, 0.3744, 0, 0, 0.3825, -0.6587, 0, 0, 0.1478, 2.952;
+  return zero_modes_from(system, printed);
+}
+
+class BothRemovals : public ::testing::TestWithParam<Method> {
+ protected:
+  static RigidBodyElimination remove(const System<>& system, const ZeroModes<>& zero_modes,
+                                     Pivot pivot) {
+    return GetParam()(system, zero_modes, pivot);
+  }
+  static RigidBodyElimination remove_from_baxter() {
+    const System<> system = to_joint_space(testing::paper_baxter());
+    return remove(system, baxter_zero_modes(system), Pivot::kLast);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(RigidBodyElimination, BothRemovals,
+                         ::testing::Values(&eliminate_successively, &eliminate_abbreviated),
+                         [](const auto& instance) {
+                           return instance.param == &eliminate_successively ? "Successive"
+                                                                            : "Abbreviated";
+                         });
+
+TEST_P(BothRemovals, PaperEq40ConstraintMatrixOfTheChain) {
+  const RigidBodyElimination elimination =
+      remove(testing::paper_chain(), chain_zero_modes(), Pivot::kLast);
+  EXPECT_TRUE(near(elimination.constraint_matrix,
+                   (MatrixXd(3, 2) << 1, 0, 0, 1, -1.6, -0.4).finished(), 1e-14));
+  EXPECT_EQ(elimination.eliminated, std::vector<int>{2});
+}
+
+TEST_P(BothRemovals, PaperEq42ReducedMatricesOfTheChain) {
+  const RigidBodyElimination elimination =
+      remove(testing::paper_chain(), chain_zero_modes(), Pivot::kLast);
+  EXPECT_TRUE(near(elimination.mass, (MatrixXd(2, 2) << 20.8, 3.2, 3.2, 2.8).finished(), 1e-13));
+  EXPECT_TRUE(
+      near(elimination.damping, (MatrixXd(2, 2) << 133.8, 40.2, 40.2, 55.8).finished(), 1e-12));
+  EXPECT_TRUE(
+      near(elimination.stiffness, (MatrixXd(2, 2) << 21264, 4656, 4656, 4524).finished(), 1e-10));
+}
+
+TEST_P(BothRemovals, PaperEq62FirstConstraintMatrixOfTheArm) {
+  const RigidBodyElimination elimination = remove_from_baxter();
+  ASSERT_EQ(elimination.steps.size(), 2u);
+  const MatrixXd& S0 = elimination.steps[0];
+  EXPECT_TRUE(near(S0.topRows(6), MatrixXd::Identity(6, 6), 0));
+  EXPECT_TRUE(as_printed(S0.bottomRows(1), {{"-17.0", "3.12", "11.5", "1.86", "-6.3", "1.94"}}));
+  EXPECT_TRUE(
+      as_printed(S0.bottomRows(1), {{"-17.04", "3.118", "11.45", "1.86", "-6.304", "1.94"}}));
+}
+
+TEST_P(BothRemovals, PaperEq63SecondConstraintMatrixOfTheArm) {
+  const MatrixXd S1 = remove_from_baxter().steps[1];
+  EXPECT_TRUE(near(S1.topRows(5), MatrixXd::Identity(5, 5), 0));
+  EXPECT_TRUE(as_printed(S1.bottomRows(1), {{"22.4", "-1.93", "-14.1", "-0.813", "9.48"}}));
+}
+
+TEST_P(BothRemovals, PaperEq60FullConstraintMatrixOfTheArm) {
+  const RigidBodyElimination elimination = remove_from_baxter();
+  EXPECT_TRUE(near(elimination.constraint_matrix.topRows(5), MatrixXd::Identity(5, 5), 0));
+  EXPECT_TRUE(as_printed(elimination.constraint_matrix.bottomRows(2),
+                         {{"22.36", "-1.925", "-14.08", "-0.8126", "9.478"},
+                          {"26.43", "-0.6264", "-15.93", "0.2800", "12.12"}}));
+}
+
+// Which null vector is removed first is known from four printed digits only: hence three units, and
+// the fifth digit of C'(1,3) (-4.6863) and of an eigenvalue of K' (67.585) is out of reach.
+TEST_P(BothRemovals, PaperAppendix3MatricesOfTheFirstReducedSpace) {
+  const System<> system = to_joint_space(testing::paper_baxter());
+  const MatrixXd S0 = remove_from_baxter().steps[0];
+  EXPECT_TRUE(as_printed(S0.transpose() * system.mass * S0,
+                         {{"21.97", "-3.269", "-17.02", "-1.677", "6.208", "-1.508"},
+                          {"-3.269", "9.030", "2.916", "5.617", "-0.3513", "3.232"},
+                          {"-17.02", "2.916", "18.14", "1.478", "-2.502", "1.509"},
+                          {"-1.677", "5.617", "1.478", "4.876", "-0.1245", "2.482"},
+                          {"6.208", "-0.3513", "-2.502", "-0.1245", "3.393", "-0.1605"},
+                          {"-1.508", "3.232", "1.509", "2.482", "-0.1605", "2.490"}},
+                         3));
+  EXPECT_TRUE(as_printed(S0.transpose() * system.damping * S0,
+                         {{"7.278", "0.04066", "-4.686", "0.4868", "-0.2475", "0.4265"},
+                          {"0.04066", "2.790", "0.08515", "2.219", "0.02553", "1.501"},
+                          {"-4.686", "0.08515", "7.609", "-0.3215", "1.269", "-0.3146"},
+                          {"0.4868", "2.219", "-0.3215", "2.031", "-0.0185", "1.594"},
+                          {"-0.2475", "0.02553", "1.269", "-0.0185", "0.2768", "-0.0241"},
+                          {"0.4265", "1.501", "-0.3146", "1.594", "-0.0241", "1.512"}},
+                         3));
+  EXPECT_TRUE(as_printed(S0.transpose() * system.stiffness * S0,
+                         {{"192.6", "4.599", "74.80", "12.11", "41.52", "8.577"},
+                          {"4.599", "70.99", "7.915", "51.17", "2.473", "20.48"},
+                          {"74.80", "7.915", "110.9", "8.951", "35.93", "6.848"},
+                          {"12.11", "51.17", "8.951", "47.85", "3.638", "27.04"},
+                          {"41.52", "2.473", "35.93", "3.638", "13.73", "2.699"},
+                          {"8.577", "20.48", "6.848", "27.04", "2.699", "21.32"}},
+                         3));
+}
+
+TEST_P(BothRemovals, PaperAppendix3MatricesOfTheSecondReducedSpace) {
+  const RigidBodyElimination elimination = remove_from_baxter();
+  EXPECT_TRUE(as_printed(elimination.mass, {{"1200", "-35.30", "-746.4", "9.815", "516.2"},
+                                            {"-35.30", "5.813", "22.01", "2.106", "-14.85"},
+                                            {"-746.4", "22.01", "469.6", "-6.214", "-318.4"},
+                                            {"9.815", "2.106", "-6.214", "2.485", "4.357"},
+                                            {"516.2", "-14.85", "-318.4", "4.357", "224.08"}}));
+  EXPECT_TRUE(as_printed(elimination.damping, {{"782.6", "-32.31", "-494.04", "8.318", "323.7"},
+                                               {"-32.31", "2.612", "20.55", "0.2951", "-13.29"},
+                                               {"-494.04", "20.55", "316.4", "-5.216", "-203.2"},
+                                               {"8.318", "0.2951", "-5.216", "0.4382", "3.467"},
+                                               {"323.7", "-13.29", "-203.2", "3.467", "135.6"}}));
+  EXPECT_TRUE(
+      as_printed(elimination.stiffness, {{"11240.5", "-472.08", "-6609.2", "222.44", "4703"},
+                                         {"-472.08", "71.17", "284.5", "15.82", "-197.7"},
+                                         {"-6609.2", "284.5", "4148.1", "-133.4", "-2783.8"},
+                                         {"222.44", "15.82", "-133.4", "17.98", "93.54"},
+                                         {"4703", "-197.7", "-2783.8", "93.54", "1980.5"}}));
+}
+
+TEST_P(BothRemovals, PaperEigenvaluesOfTheReducedStiffnesses) {
+  const System<> system = to_joint_space(testing::paper_baxter());
+  const RigidBodyElimination elimination = remove_from_baxter();
+  const MatrixXd& S0 = elimination.steps[0];
+  const auto eigenvalues = [](const MatrixXd& K) -> MatrixXd {
+    return Eigen::SelfAdjointEigenSolver<MatrixXd>(K).eigenvalues().reverse().transpose();
+  };
+  EXPECT_TRUE(as_printed(eigenvalues(S0.transpose() * system.stiffness * S0),
+                         {{"252.55", "120.22", "67.58", "16.587", "0.5843", "0.0000"}}));
+  EXPECT_TRUE(as_printed(eigenvalues(elimination.stiffness),
+                         {{"17186", "197.01", "63.79", "10.023", "0.8841"}}));
+}
+
+// ------------------------------------------------------------------------ any system, any pivot
+
+/// n coordinates, r zero modes, given with a factor or without.
+System<> random_system(testing::Random& random, int n, int r, bool factored) {
+  System<> system(n);
+  const MatrixXd W = random.matrix(n - r, n);
+  system.mass = random.spd(n);
+  system.damping = random.spd(n);
+  system.stiffness = 100 * W.transpose() * W;
+  system.stiffness = (0.5 * (system.stiffness + system.stiffness.transpose())).eval();
+  if (factored) system.stiffness_factor = 10 * W;
+  return system;
+}
+
+double condition(const MatrixXd& matrix) {
+  const VectorXd values = Eigen::JacobiSVD<MatrixXd>(matrix).singularValues();
+  return values(0) / values(values.size() - 1);
+}
+
+TEST(RigidBodyElimination, BothMethodsAgree) {
+  testing::Random random(11);
+  for (int i = 0; i < 200; ++i) {
+    const int n = random.integer(1, 8);
+    const int r = random.integer(0, std::min(3, n - 1));
+    const System<> system = random_system(random, n, r, i % 2 == 0);
+    const ZeroModes<> zero_modes = zero_modes_from(system, random.matrix(n, r));
+    for (const Pivot pivot : {Pivot::kLast, Pivot::kLargest}) {
+      const RigidBodyElimination one = eliminate_successively(system, zero_modes, pivot);
+      const RigidBodyElimination other = eliminate_abbreviated(system, zero_modes, pivot);
+      ASSERT_EQ(one.eliminated, other.eliminated);
+      const MatrixXd& S = other.constraint_matrix;
+      const double slack = 1e-13 * std::pow(condition(S), 2) * condition(system.mass);
+      ASSERT_LT(slack, 1e-2);
+      EXPECT_TRUE(near(one.constraint_matrix, S, slack * S.norm()));
+      EXPECT_TRUE(near(one.mass, other.mass, slack * other.mass.norm()));
+      EXPECT_TRUE(near(one.damping, other.damping, slack * other.damping.norm()));
+      EXPECT_TRUE(
+          near(one.stiffness, other.stiffness, slack * system.stiffness.norm() * S.squaredNorm()));
+    }
+  }
+}
+
+TEST_P(BothRemovals, LeaveTheNonzeroFrequenciesAlone) {
+  testing::Random random(12);
+  for (int i = 0; i < 50; ++i) {
+    const int n = random.integer(2, 7);
+    const int r = random.integer(1, std::min(3, n - 1));
+    const System<> system = random_system(random, n, r, false);
+    const ZeroModes<> zero_modes = zero_modes_from(system, random.matrix(n, r));
+    const RigidBodyElimination elimination = remove(system, zero_modes, Pivot::kLargest);
+    const VectorXd all =
+        Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(system.stiffness, system.mass)
+            .eigenvalues();
+    const VectorXd kept =
+        Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(elimination.stiffness, elimination.mass)
+            .eigenvalues();
+    EXPECT_TRUE(near(kept, all.tail(n - r), 1e-10 * all(n - 1)));
+  }
+}
+
+TEST_P(BothRemovals, KeepMotionsOrthogonalToEveryZeroMode) {
+  testing::Random random(13);
+  const System<> system = random_system(random, 6, 2, true);
+  const ZeroModes<> zero_modes = zero_modes_from(system, random.matrix(6, 2));
+  const RigidBodyElimination elimination = remove(system, zero_modes, Pivot::kLargest);
+  const MatrixXd overlap =
+      zero_modes.basis.transpose() * system.mass * elimination.constraint_matrix;
+  EXPECT_TRUE(near(overlap, MatrixXd::Zero(2, 4), 1e-13));
+  EXPECT_TRUE(near(elimination.constraint_matrix, elimination.steps[0] * elimination.steps[1], 0));
+}
+
+TEST_P(BothRemovals, DependOnTheZeroModesTogetherOnly) {
+  testing::Random random(14);
+  const System<> system = random_system(random, 6, 3, false);
+  const MatrixXd some = random.matrix(6, 3);
+  const RigidBodyElimination one = remove(system, zero_modes_from(system, some), Pivot::kLast);
+  const RigidBodyElimination other =
+      remove(system, zero_modes_from(system, some * random.matrix(3, 3)), Pivot::kLast);
+  EXPECT_TRUE(near(one.constraint_matrix, other.constraint_matrix, 1e-11));
+  EXPECT_FALSE(near(one.steps[0], other.steps[0], 1e-3));
+}
+
+TEST_P(BothRemovals, EliminateTheCoordinateThatMovesMost) {
+  System<> chain = testing::paper_chain();
+  EXPECT_EQ(remove(chain, chain_zero_modes(), Pivot::kLargest).eliminated, std::vector<int>{0});
+  chain.mass.diagonal() << 2, 8, 5;
+  EXPECT_EQ(remove(chain, zero_modes_from(chain, MatrixXd::Ones(3, 1)), Pivot::kLargest).eliminated,
+            std::vector<int>{1});
+}
+
+TEST_P(BothRemovals, OfEveryCoordinateLeaveNothing) {
+  const System<> free(3);
+  const ZeroModes<> zero_modes =
+      zero_modes_from(free, MatrixXd::Identity(3, 3).rowwise().reverse());
+  const RigidBodyElimination elimination = remove(free, zero_modes, Pivot::kLargest);
+  EXPECT_EQ(elimination.eliminated, (std::vector<int>{2, 1, 0}));
+  EXPECT_EQ(elimination.mass.size(), 0);
+}
+
+TEST_P(BothRemovals, WithoutZeroModesChangeNothing) {
+  testing::Random random(15);
+  const System<> system = random_system(random, 4, 0, false);
+  const RigidBodyElimination elimination =
+      remove(system, zero_modes_from(system, MatrixXd(4, 0)), Pivot::kLargest);
+  EXPECT_TRUE(near(elimination.constraint_matrix, MatrixXd::Identity(4, 4), 0));
+  EXPECT_TRUE(near(elimination.stiffness, system.stiffness, 0));
+  EXPECT_TRUE(elimination.steps.empty());
+}
+
+TEST_P(BothRemovals, RefuseToDivideByACoordinateThatDoesNotMove) {
+  System<> system(2);
+  system.stiffness(1, 1) = 1;
+  const ZeroModes<> zero_modes = zero_modes_from(system, MatrixXd::Identity(2, 1));
+  EXPECT_THROW(remove(system, zero_modes, Pivot::kLast), std::domain_error);
+  EXPECT_EQ(remove(system, zero_modes, Pivot::kLargest).eliminated, std::vector<int>{0});
+}
+
+TEST_P(BothRemovals, RefuseZeroModesOfAnotherSystem) {
+  EXPECT_THROW(remove(System<>(2), chain_zero_modes(), Pivot::kLast), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
