@@ -54,7 +54,7 @@ RobotModel read_model(const ArmOptions& options) try {
       per_joint("--reflected-inertia", options.reflected_inertia, plain, "kg m^2", "kg");
   if (inertia) model.reflected_inertia = *inertia;
   if (options.viscous_friction != "urdf") {
-    model.damping =
+    model.viscous_friction =
         per_joint("--viscous-friction", options.viscous_friction, plain, "N m s/rad", "N s/m")
             .value_or(Eigen::VectorXd::Zero(plain.dof()));
   }

@@ -10,19 +10,19 @@
 
 namespace dashpot::apps {
 
-/// Where the tip is to be, in what directions: `held` (1 or 0 each) in the axes R.
+/// Where the tip is to be, in what directions: `selected` (1 or 0 each) in the axes R.
 struct TipGoal {
   controller::Pose pose;
-  controller::Vector6 held = controller::Vector6::Ones();
+  controller::Vector6 selected = controller::Vector6::Ones();
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
 
-  /// What is missing at `tip`, in the held directions: m, and a rotation vector in rad; base axes.
+  /// What is missing at `tip`, in the selected directions: m, and a rotation vector in rad; base axes.
   controller::Vector6 miss(const controller::DynamicsResult& tip) const {
     controller::Vector6 error;
     error << pose.position - tip.p_BT_B,
         controller::short_turn(
             Eigen::Quaterniond(Eigen::Matrix3d(pose.rotation * tip.R_BT.transpose())));
-    return controller::part_along(held, R, error);
+    return controller::part_along(selected, R, error);
   }
 };
 
@@ -41,7 +41,7 @@ inline controller::Vector6 descend(const controller::RobotModel& model,
   for (int step = 0; step < kSteps && miss.norm() > kExact && damping < 1e6; ++step) {
     Eigen::MatrixXd J(6, n);
     for (Eigen::Index j = 0; j < n; ++j) {
-      J.col(j) = controller::part_along(goal.held, goal.R, robot.J.col(j));
+      J.col(j) = controller::part_along(goal.selected, goal.R, robot.J.col(j));
     }
     const Eigen::VectorXd downhill = J.transpose() * miss;
     for (Eigen::Index j = 0; j < n; ++j) {

@@ -67,7 +67,7 @@ void check_reach(const YamlMapping& keys, const controller::Setpoint& setpoint,
   if (setpoint.mode != controller::Mode::kCartesian) return;
   TipGoal goal{setpoint.tip_pose};
   for (int i = 0; i < 6; ++i) {
-    goal.held[i] = setpoint.gains.directions[static_cast<std::size_t>(i)] ? 1 : 0;
+    goal.selected[i] = setpoint.gains.directions[static_cast<std::size_t>(i)] ? 1 : 0;
   }
   if (setpoint.gains.frame == controller::Frame::kTool) goal.R = setpoint.tip_pose.rotation;
   const controller::Config& config = scene.arm->config;

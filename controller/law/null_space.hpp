@@ -3,17 +3,17 @@
 
 namespace dashpot::controller {
 
-/// The motions that leave the held directions of the tip alone.
+/// The motions that leave the selected directions of the tip alone.
 ///
 /// In energy coordinates y = L' qd (M = L L', so |y|^2 / 2 is the kinetic energy) the tip moves by
-/// Jh y, Jh = J L^-T. The null space of the held directions H has the projector
+/// Jh y, Jh = J L^-T. The null space of the selected directions H has the projector
 ///     P = I - Jh' H G^-1 H Jh,        G as in TaskInertia,
 /// and N = L^-T P L' projects joint velocities, N' joint torques.
 ///
 /// Away from singularities P is orthogonal, N is the dynamically consistent
-/// I - M^-1 J' (J M^-1 J')^-1 J, and a torque N' t does not accelerate the held directions:
+/// I - M^-1 J' (J M^-1 J')^-1 J, and a torque N' t does not accelerate the selected directions:
 /// H J M^-1 N' t = 0. Near one P fades smoothly into a projector of higher rank, and nowhere does
-/// anything blow up: G is at least Jh Jh' in the held directions, so the eigenvalues of P are
+/// anything blow up: G is at least Jh Jh' in the selected directions, so the eigenvalues of P are
 /// within [0, 1], and for any stiffness k and deflection dq the torque N' k N dq is at most
 ///     cond(M) max(k) |dq|.
 template <int N>

@@ -8,7 +8,7 @@ namespace {
 using Eigen::Matrix3d;
 
 /// diag(base) + R diag(tool) R'
-Matrix3d held(const Eigen::Vector3d& base, const Eigen::Vector3d& tool, const Matrix3d& R) {
+Matrix3d selected(const Eigen::Vector3d& base, const Eigen::Vector3d& tool, const Matrix3d& R) {
   Matrix3d H = base.asDiagonal();
   if (!tool.isZero(0)) H += R * tool.asDiagonal() * R.transpose();
   return H;
@@ -24,8 +24,8 @@ double mean(double trace) {
 void TaskInertia::compute(const Matrix6& A, const TipImpedance& base, const TipImpedance& tool,
                           const Matrix3d& R_BT) noexcept {
   // The blocks of H; it has no others.
-  const Matrix3d H_linear = held(base.held.head<3>(), tool.held.head<3>(), R_BT);
-  const Matrix3d H_angular = held(base.held.tail<3>(), tool.held.tail<3>(), R_BT);
+  const Matrix3d H_linear = selected(base.selected.head<3>(), tool.selected.head<3>(), R_BT);
+  const Matrix3d H_angular = selected(base.selected.tail<3>(), tool.selected.tail<3>(), R_BT);
 
   const Matrix3d A_linear = A.topLeftCorner<3, 3>(), A_angular = A.bottomRightCorner<3, 3>();
   const double D_linear = mean(A_linear.trace()), D_angular = mean(A_angular.trace());
@@ -51,7 +51,7 @@ void TaskInertia::compute(const Matrix6& A, const TipImpedance& base, const TipI
     factor.compute(G, least_pivot);
     L_inverse = factor.inverse_L();
   }
-  if (base.held.isOnes(0) && tool.none()) {
+  if (base.selected.isOnes(0) && tool.none()) {
     inertia_.noalias() = L_inverse.transpose() * L_inverse;
     return;
   }

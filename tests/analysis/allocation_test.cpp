@@ -2,95 +2,23 @@
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/ratio_damping.hpp>
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/tests/support/count_allocations.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cerrno>
-#include <cstdlib>
 #include <memory>
-
-// Sanitizers bring their own malloc: there nothing is counted, and the test says so.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define DASHPOT_COUNTS_ALLOCATIONS 0
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
-    __has_feature(memory_sanitizer)
-#define DASHPOT_COUNTS_ALLOCATIONS 0
-#endif
-#endif
-#if !defined(DASHPOT_COUNTS_ALLOCATIONS) && defined(__GLIBC__)
-#define DASHPOT_COUNTS_ALLOCATIONS 1
-#elif !defined(DASHPOT_COUNTS_ALLOCATIONS)
-#define DASHPOT_COUNTS_ALLOCATIONS 0
-#endif
-
-namespace {
-// Only what the thread that has the flag on allocates is counted.
-constinit thread_local bool counting = false;
-constinit thread_local int allocations = 0;
-
-[[maybe_unused]] void note_allocation() {
-  if (counting) ++allocations;  // a breakpoint here shows who allocates
-}
-}  // namespace
-
-#if DASHPOT_COUNTS_ALLOCATIONS
-// The program's own malloc and relatives, on top of glibc's; operator new and Eigen call them.
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* block, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-
-void* malloc(std::size_t size) noexcept {
-  note_allocation();
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) noexcept {
-  note_allocation();
-  return __libc_calloc(count, size);
-}
-void* realloc(void* block, std::size_t size) noexcept {
-  note_allocation();
-  return __libc_realloc(block, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
-  note_allocation();
-  return __libc_memalign(alignment, size);
-}
-void* memalign(std::size_t alignment, std::size_t size) noexcept {
-  note_allocation();
-  return __libc_memalign(alignment, size);
-}
-int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
-  note_allocation();
-  *block = __libc_memalign(alignment, size);
-  return *block != nullptr ? 0 : ENOMEM;
-}
-}
-#endif
 
 namespace dashpot::analysis {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using testing::allocations_of;
 using testing::Random;
 using testing::symmetrized;
-
-/// Allocations of this thread while `act` runs.
-template <class Act>
-int allocations_of(const Act& act) {
-  allocations = 0;
-  counting = true;
-  act();
-  counting = false;
-  return allocations;
-}
 
 struct Named {
   std::string name;

@@ -183,7 +183,7 @@ TEST(TipReference, ArrivesFromEveryDetour) {
 TipImpedance all_sprung() {
   TipImpedance base;
   base.stiffness.setIdentity();
-  base.held.setOnes();
+  base.selected.setOnes();
   return base;
 }
 

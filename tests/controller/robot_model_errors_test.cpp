@@ -277,9 +277,9 @@ TEST(RobotModelErrors, NameTheOption) {
             "arm.urdf: reflected inertia: has 2 entries for 1 joints");
   EXPECT_EQ(with([](ModelOptions& o) { o.reflected_inertia = -JointVector::Ones(1); }),
             "arm.urdf: joint 'j': reflected inertia is negative or not a finite number");
-  EXPECT_EQ(with([](ModelOptions& o) { o.damping = JointVector::Constant(1, kNaN); }),
+  EXPECT_EQ(with([](ModelOptions& o) { o.viscous_friction = JointVector::Constant(1, kNaN); }),
             "arm.urdf: joint 'j': damping is negative or not a finite number");
-  EXPECT_EQ(with([](ModelOptions& o) { o.friction = -JointVector::Ones(1); }),
+  EXPECT_EQ(with([](ModelOptions& o) { o.coulomb_friction = -JointVector::Ones(1); }),
             "arm.urdf: joint 'j': friction is negative or not a finite number");
   EXPECT_EQ(with([](ModelOptions& o) { o.gravity.x() = kNaN; }), "arm.urdf: gravity: not finite");
   EXPECT_EQ(with([](ModelOptions& o) { o.payload.mass = -1; }),

@@ -47,8 +47,8 @@ TEST(RobotModel, TakesJointsFromTheFile) {
   EXPECT_EQ(elbow.upper, -0.0698);
   EXPECT_EQ(elbow.velocity, 2.175);
   EXPECT_EQ(elbow.effort, 87);
-  EXPECT_EQ(elbow.damping, 0.003);
-  EXPECT_EQ(elbow.friction, 0);
+  EXPECT_EQ(elbow.viscous_friction, 0.003);
+  EXPECT_EQ(elbow.coulomb_friction, 0);
   EXPECT_EQ(elbow.reflected_inertia, 0);
   EXPECT_THAT(model.joint_values(&Joint::effort), ElementsAre(87, 87, 87, 87, 12, 12, 12));
   EXPECT_EQ(model.gravity(), Eigen::Vector3d(0, 0, -9.81));

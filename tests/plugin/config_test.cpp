@@ -269,8 +269,8 @@ TEST(Config, GivesTheRobotReflectedInertiaAndFriction) {
                       "coulomb_friction: 2 Nm"));
   const MatrixXd difference = mass_matrix(heavy) - mass_matrix(plain);
   EXPECT_TRUE(difference.isApprox(MatrixXd(VectorXd::LinSpaced(7, 1, 7).asDiagonal()), 1e-13));
-  EXPECT_EQ(heavy.model.joints()[3].damping, 0.5);
-  EXPECT_EQ(heavy.model.joints()[3].friction, 2);
+  EXPECT_EQ(heavy.model.joints()[3].viscous_friction, 0.5);
+  EXPECT_EQ(heavy.model.joints()[3].coulomb_friction, 2);
   EXPECT_EQ(load(panda_with("reflected_inertia: 0.1")).model.joints()[6].reflected_inertia, 0.1);
 }
 
