@@ -4,20 +4,22 @@
 
 namespace dashpot::analysis {
 
-/// The damping ratio wanted of a mode, as a smooth function of its undamped natural frequency:
+/// The damping ratio wanted of a mode, a smooth function of the mode's undamped natural frequency:
 ///
 ///     ratio(omega) = high_ratio + (low_ratio - high_ratio) / (1 + (omega / corner)^2).
 ///
-/// It goes by frequency and not by a mode's number, so that nothing jumps where modes cross.
+/// The ratio depends on the frequency and not on a mode's number, so that nothing jumps where modes
+/// cross.
 struct DampingTarget {
   double low_ratio = 0.7;   ///< zeta of slow modes; not negative
   double high_ratio = 0.7;  ///< zeta of fast modes; not negative
   double corner = 1;        ///< rad/s, where the ratio is half-way; positive
-  /// Modes slower than this (rad/s) are soft: next to a singularity the hand cannot follow the
-  /// spring, and their ratio is given up so that the damping matrix stays bounded. Positive.
+  /// Modes slower than this (rad/s) are soft. Next to a singularity the hand cannot follow the
+  /// spring. The ratio of soft modes is given up so that the damping matrix stays bounded.
+  /// Positive.
   double soft_frequency = 1e-3;
 
-  /// One ratio for all modes.
+  /// Returns a target with one ratio for all modes.
   static DampingTarget constant(double zeta) {
     DampingTarget target;
     target.low_ratio = target.high_ratio = zeta;
@@ -29,17 +31,17 @@ struct DampingTarget {
     return high_ratio + (low_ratio - high_ratio) / (1 + x * x);
   }
 
-  /// d ratio / d omega, s
+  /// Returns d ratio / d omega, s.
   double slope(double omega) const noexcept {
     const double x = omega / corner, sum = 1 + x * x;
     return -2 * (low_ratio - high_ratio) * x / (corner * sum * sum);
   }
 
-  /// The damper that acts through a spring of unit stiffness on a mode of frequency omega:
+  /// Returns the damper that acts through a spring of unit stiffness on a mode of frequency omega:
   /// c = 2 ratio / omega (s) for omega >= soft (a soft frequency, normally `soft_frequency`). Below
-  /// it c = 2 ratio x (35 - 42 x + 15 x^2) / (8 soft) with x = (omega / soft)^2, which meets
-  /// 1 / omega with two derivatives, is smooth in omega^2, falls to zero with omega, and never
-  /// exceeds kPeak 2 ratio / soft.
+  /// it c = 2 ratio x (35 - 42 x + 15 x^2) / (8 soft) with x = (omega / soft)^2. This meets 1 /
+  /// omega with two derivatives, is smooth in omega^2, falls to zero with omega, and never exceeds
+  /// kPeak 2 ratio / soft.
   double damper(double omega, double soft) const noexcept {
     if (omega >= soft) return 2 * ratio(omega) / omega;
     const double x = (omega / soft) * (omega / soft);
@@ -47,8 +49,8 @@ struct DampingTarget {
   }
   static constexpr double kPeak = 1.1413;
 
-  /// Frequencies below this (rad/s) are soft beside a largest one of `fastest`, where rounding
-  /// takes over.
+  /// Returns the frequency (rad/s) below which modes are soft if the largest frequency is
+  /// `fastest`: `soft_frequency`, or the frequency where rounding takes over if that is larger.
   double soft_limit(double fastest) const noexcept {
     return std::max(soft_frequency, 1e-14 * fastest);
   }
@@ -57,7 +59,7 @@ struct DampingTarget {
 /// Entries of the damping matrix that may differ from zero.
 enum class DampingStructure {
   kFull,
-  kBlock,  ///< the first three directions apart from the rest: translation and rotation
+  kBlock,  ///< two blocks: the first three directions (translation) and the others (rotation)
   kDiagonal,
 };
 

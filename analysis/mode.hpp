@@ -8,7 +8,8 @@
 
 namespace dashpot::analysis {
 
-/// Decided by the proved bounds; by the numbers as they are where no bound could be proved.
+/// Kind of a mode. The proved bounds decide it, or the computed numbers alone where no bound could
+/// be proved.
 enum class ModeKind {
   kUnderdamped,  ///< a complex pair, 0 < zeta < 1
   kCritical,     ///< a double real eigenvalue, as far as the error bound can tell
@@ -19,17 +20,17 @@ enum class ModeKind {
                  ///< cannot be told from zero: its damping ratio means nothing
 };
 
-/// "underdamped", "critical", ...
+/// Returns "underdamped", "critical", ...
 const char* to_text(ModeKind kind) noexcept;
 
 /// Where a spectrum comes from.
 enum class SpectrumOrigin {
-  kTracked,  ///< the previous one, refined
-  kReused,   ///< the previous one: the system has hardly changed
+  kTracked,  ///< the previous spectrum, refined
+  kReused,   ///< the previous spectrum, because the system has hardly changed
   kDirect,   ///< solved directly
 };
 
-/// What follows from a mode's two eigenvalues; Mode has the same numbers.
+/// The numbers that follow from a mode's two eigenvalues; Mode has the same.
 struct ModeNumbers {
   /// A complex pair (positive imaginary part first) or two real ones (nearer zero first), 1/s
   std::array<Complex, 2> eigenvalues{};
@@ -57,7 +58,7 @@ struct Mode {
   double damped_frequency = 0;
   ModeKind kind = ModeKind::kUnderdamped;
   /// Right eigenvectors u of the two eigenvalues in joint coordinates, n each, u^H M u = 1, largest
-  /// entry real and positive. At critical damping both are the one eigenvector there is.
+  /// entry real and positive. At critical damping both are the only eigenvector.
   std::array<ComplexVector<N>, 2> shapes;
   /// Left eigenvectors y, y^T (lambda^2 M + lambda C + K) = 0; equal to `shapes` if symmetric.
   std::array<ComplexVector<N>, 2> left_shapes;
@@ -68,9 +69,10 @@ struct Mode {
   /// Condition number of the worse eigenvalue in the same measure (Tisseur 2000); infinite at
   /// critical damping
   double condition = 0;
-  /// Proved bounds of |computed - true|; infinite if none could be proved, and where frequencies
-  /// leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120, because underflow is not counted there.
-  /// Of either eigenvalue, 1/s (of the two nearest each other):
+  /// Proved bounds of |computed - true|; infinite if none could be proved. They are also infinite
+  /// where frequencies leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120, because underflow is
+  /// not counted there.
+  /// Of either eigenvalue, 1/s (of the computed and the true one nearest each other):
   double error_bound = std::numeric_limits<double>::infinity();
   double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
   double damping_ratio_bound = std::numeric_limits<double>::infinity();

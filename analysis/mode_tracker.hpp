@@ -9,15 +9,15 @@
 namespace dashpot::analysis {
 
 struct TrackerOptions {
-  /// Modes are called soft from below this natural frequency until above twice it, rad/s.
+  /// A mode becomes soft below this natural frequency and stays soft up to twice it, rad/s.
   double soft_frequency = 1e-6;
-  /// Wanted: error bound / (|lambda_1| + |lambda_2|). What lies above is refined while there is
-  /// more than rounding errors to refine.
+  /// Wanted: error bound / (|lambda_1| + |lambda_2|). A mode with a larger value is refined while
+  /// there is more than rounding errors to refine.
   double target_bound = 1e-10;
-  /// Evaluations of the basis in one update, before the direct solver is called.
+  /// Largest number of evaluations of the basis in one update, before the direct solver is called.
   int max_iterations = 6;
   /// Relative change of the coefficients up to which the last spectrum is used again, with bounds
-  /// that include the change: see distance() in tracked_enclosure.hpp. Negative: never.
+  /// that include the change: see distance() in coefficient_sizes.hpp. Negative: never.
   double reuse_tolerance = 1e-14;
   bool shapes = true;  ///< fill TrackedSpectrum::shapes
 };
@@ -33,15 +33,15 @@ inline constexpr std::size_t kFallbackCount = 4;
 
 struct TrackerCounters {
   std::int64_t updates = 0;
-  /// They add up to `updates`.
+  /// These counts add up to `updates`.
   std::int64_t tracked = 0, reused = 0, direct = 0, failed = 0, unfinished = 0;
   std::array<std::int64_t, kFallbackCount> fallbacks{};  ///< calls of the direct solver
-  /// Of the tracked: damping that the undamped modes decouple, so that elastic coordinates and
-  /// velocities are followed apart from each other
+  /// Tracked updates with damping that the undamped modes decouple, so that elastic coordinates and
+  /// velocities are followed separately.
   std::int64_t proportional = 0;
-  std::int64_t iterations = 0;   ///< evaluations of the basis, in all
+  std::int64_t iterations = 0;   ///< evaluations of the basis, in total
   int most_iterations = 0;       ///< in one update
-  std::int64_t separations = 0;  ///< pairs of blocks parted again
+  std::int64_t separations = 0;  ///< pairs of blocks separated again
   std::int64_t predicted = 0;    ///< updates that began with an extrapolated basis
   std::int64_t shapes_skipped = 0;
 
@@ -57,30 +57,31 @@ struct TrackerCounters {
 ///       if (tracker.update(system, spectrum) == Status::kOk) use(spectrum.modes);
 ///     }
 ///
-/// The basis of the last call is refined by Newton's method, and every number is published with a
-/// bound that holds for the coefficients as given, rounding errors included. What cannot be
-/// followed is solved directly (SpectrumSolver), in bounded time.
+/// Newton's method refines the basis of the last call. Every number is published with a bound that
+/// holds for the coefficients as given, rounding errors included. A system that cannot be followed
+/// is solved directly (SpectrumSolver), in bounded time.
 class ModeTracker {
  public:
   /// Throws std::invalid_argument for options that are not positive numbers.
   explicit ModeTracker(const TrackerOptions& options = {});
 
-  /// Fills `out` and returns out.status: kOk or kUncertified if it has modes. Of the system,
-  /// damping and mass are read, and stiffness_factor W if it has 1 to n rows: then K = W'W exactly
-  /// and `stiffness` is not read, nor are low words. Otherwise K = stiffness, which has to be
-  /// positive definite to be followed; semidefinite ones are solved directly on each call.
+  /// Fills `out` and returns out.status: kOk or kUncertified if it has modes. Damping and mass are
+  /// read. stiffness_factor W is read if it has 1 to n rows: then K = W'W exactly, and neither
+  /// `stiffness` nor low words are read. Otherwise K = stiffness, which has to be positive definite
+  /// to be followed; a semidefinite K is solved directly on each call.
   Status update(const System<kMaxDof>& system, TrackedSpectrum& out) noexcept {
     Work work;
     return update(system, out, work);
   }
-  /// The same, with no more work than is granted. If that is not enough, the status is kUnfinished
-  /// and there are no modes; an update that is granted more then finds them, in their places. What
-  /// could not be followed within the work granted is followed by a later update, if it can be.
+  /// Does the same with no more work than `work` grants. If that is not enough, the status is
+  /// kUnfinished and there are no modes. An update that is granted more then finds the modes, with
+  /// the same indices. What could not be followed within the work granted is followed by a later
+  /// update, if possible.
   Status update(const System<kMaxDof>& system, TrackedSpectrum& out, Work& work) noexcept;
 
-  /// The next update starts from scratch; modes that it recognises keep their places.
+  /// Makes the next update start from scratch. Modes that it recognises keep their indices.
   void reset() noexcept { has_basis_ = false; }
-  /// Forgets the past, but not what was counted: the next update is like the first.
+  /// Forgets everything but the counters: the next update is like the first.
   void forget() noexcept {
     has_basis_ = has_indices_ = false;
     soft_ = {};
@@ -89,7 +90,7 @@ class ModeTracker {
     look_in_ = 0;
   }
 
-  /// True if the next update starts from the last one, and need not be solved directly.
+  /// True if the next update starts from the last one and need not be solved directly.
   bool follows() const noexcept { return has_basis_; }
   const TrackerCounters& counters() const noexcept { return counters_; }
 
@@ -113,8 +114,8 @@ class ModeTracker {
 
   // The last spectrum: the basis as it was evaluated, and the step that is still to be taken.
   bool has_basis_ = false;
-  bool evaluated_ = false;    ///< blocks and residual are those of the basis and of last_
-  bool has_indices_ = false;  ///< basis_ says which mode is which
+  bool evaluated_ = false;    ///< blocks and residual belong to the basis and to last_
+  bool has_indices_ = false;  ///< the columns of basis_ say which mode has which index
   std::uint64_t epoch_ = 0;
   System<kMaxDof> last_;
   CoefficientSizes sizes_;
@@ -123,13 +124,13 @@ class ModeTracker {
   TrackedEnclosure enclosure_;
   PackedMatrix E_;
   std::array<bool, kMaxDof> soft_{};
-  double bound_ = 0;      ///< its largest relative error bound
+  double bound_ = 0;      ///< largest relative error bound of the last spectrum
   TrackedSpectrum kept_;  ///< the last spectrum with bounds that hold for changes up to kept_for_,
   double kept_for_ = -1;  ///< see distance(); none if negative
 
   PackedMatrix step_;  ///< the whole step of this update so far
   StepPrediction prediction_;
-  bool turned_ = false;  ///< columns were rotated or parted: the step tells nothing
+  bool turned_ = false;  ///< columns were rotated or separated, so the step tells nothing
   int look_in_ = 0;      ///< updates until proportional damping is looked for
 
   PackedMatrix velocities_, work_;

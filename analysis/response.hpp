@@ -14,42 +14,44 @@ struct Motion {
   Eigen::VectorXd zero_mode_velocity;  ///< n
 };
 
-/// Closed-form responses of a linear system from its modal basis: no time stepping, so any time can
-/// be asked for at the same cost and accuracy. Responses superpose: add what you need.
+/// Computes closed-form responses of a linear system from its modal basis. Any time costs the same
+/// and is equally accurate, because there is no time stepping. Responses superpose: add what you
+/// need.
 ///
 /// Each block of the basis moves as exp(Lambda t): decaying cosines and sines for a complex pair, a
 /// smooth divided-difference form at critical damping, b0 + (1 - exp(-a t)) b1 / a for a zero mode
 /// (paper, Eq. 24) and b0 + b1 t if undamped (Eq. 26).
 ///
-/// Times are in s and finite; those of forced responses are not negative. Positions, velocities and
+/// Times are in s and finite; times of forced responses are not negative. Positions, velocities and
 /// forces have n entries. Anything else throws std::invalid_argument.
 class Response {
  public:
-  /// Keeps copies of what it needs from both. The spectrum has to be that of the system, and hold
+  /// Copies what it needs of both arguments. The spectrum has to belong to the system and have
   /// modes (its status is kOk or kUncertified); throws std::invalid_argument otherwise.
   Response(const System<>& system, const Spectrum<>& spectrum);
 
-  /// Free response to q(0), q'(0) (paper, Eqs. 24, 26, 32).
+  /// Returns the free response to q(0), q'(0) (paper, Eqs. 24, 26, 32).
   Motion free(const Eigen::VectorXd& position, const Eigen::VectorXd& velocity, double time) const;
-  /// Response from rest to a generalized impulse at t = 0 (N s or N m s), for t >= 0 (paper, Eq.
-  /// 49).
+  /// Returns the response from rest to a generalized impulse at t = 0 (N s or N m s), for t >= 0
+  /// (paper, Eq. 49).
   Motion impulse(const Eigen::VectorXd& impulse, double time) const;
-  /// Response from rest to a generalized force that is constant from t = 0 on.
+  /// Returns the response from rest to a generalized force that is constant from t = 0 on.
   Motion step(const Eigen::VectorXd& force, double time) const;
-  /// Response from rest to  cosine cos(omega t) + sine sin(omega t)  from t = 0 on, omega in rad/s;
-  /// exact at resonance too.
+  /// Returns the response from rest to  cosine cos(omega t) + sine sin(omega t)  from t = 0 on,
+  /// omega in rad/s. It is exact at resonance too.
   Motion harmonic(const Eigen::VectorXd& cosine, const Eigen::VectorXd& sine, double omega,
                   double time) const;
 
-  /// Response from (q(0), q'(0)) to a force sampled at 0, h, 2h, ... (columns of `forces`, n x s)
-  /// and linear in between (first-order hold), exact between samples; times in rising order within
-  /// [0, (s-1) h].
+  /// Returns the response from (q(0), q'(0)) to a force sampled at 0, h, 2h, ... (columns of
+  /// `forces`, n x s) and linear in between (first-order hold). It is exact between samples. The
+  /// times are in rising order within [0, (s-1) h].
   std::vector<Motion> sampled(const Eigen::VectorXd& position, const Eigen::VectorXd& velocity,
                               const Eigen::MatrixXd& forces, double h,
                               const std::vector<double>& times) const;
 
-  /// Receptance  H(omega) = (K + i omega C - omega^2 M)^-1, n x n, by modal superposition.
-  /// Where i omega is an eigenvalue exactly, the entries that this mode reaches are infinite.
+  /// Returns the receptance  H(omega) = (K + i omega C - omega^2 M)^-1, n x n, by modal
+  /// superposition. Where i omega is an eigenvalue exactly, the entries that this mode reaches are
+  /// infinite.
   Eigen::MatrixXcd receptance(double omega) const;
 
  private:

@@ -4,36 +4,39 @@
 
 namespace dashpot::analysis {
 
-/// The modes of  M q'' + C q' + K q = 0  where C and K act through a computer. The robot
+/// Computes the modes of  M q'' + C q' + K q = 0  where C and K act through a computer. The robot
 ///     M q'' + D q' + G q = f
-/// moves under a torque f that is held from tick k to tick k + 1, and the controller commands
+/// moves under a torque f that is held from tick k to tick k + 1. The controller commands
 ///     u_k = (G - K) q_k - (C - D) v_k,   v_k = q'_k, or (q_k - q_k-1) / T if differenced,
 ///     f_k = f_k-1 + (1 - exp(-2 pi f_c T)) (u_k-d - f_k-1),   or u_k-d without a filter.
-/// The state x = (q, q', [v], u_k-d .. u_k-1, [f]) goes from tick to tick as x_k+1 = A x_k,
-/// exactly: the robot's part of A is a matrix exponential. Its eigenvalues z are given as lambda =
-/// log(z) / T, which compare with the continuous ones. To first order in omega T the hold acts like
-/// a delay of T/2: natural_frequency grows by the factor 1 + zeta omega t and the damping ratio
-/// falls by (1 - 2 zeta^2) omega t / 2, with t = (d + 1/2) T and the lag of the filter.
+/// The state x = (q, q', [v], u_k-d .. u_k-1, [f]) goes from tick to tick as x_k+1 = A x_k. This is
+/// exact, because the robot's part of A is a matrix exponential. The eigenvalues z of A are given
+/// as lambda = log(z) / T, which compare with the continuous eigenvalues. To first order in omega T
+/// the hold acts like a delay of T/2: natural_frequency grows by the factor 1 + zeta omega t and
+/// the damping ratio falls by (1 - 2 zeta^2) omega t / 2, with t = (d + 1/2) T plus the lag of the
+/// filter.
 ///
-/// Every mode of `spectrum`, which has to be that of `system`, gets the z nearest to its
-/// eigenvalues, moved by the loop's delays to first order, nearest pairs first; that is meaningful
+/// `spectrum` has to be the spectrum of `system`. Each of its modes gets the z nearest to its
+/// eigenvalues, moved by the loop's delays to first order, nearest pairs first. That is meaningful
 /// while omega T stays well below 1. A z that is real and negative counts as one with an imaginary
 /// part of pi / T.
 ///
-/// For a lower rate than the tick's: allocates, and solves one dense eigenproblem of up to
-/// (4 + d) n rows. Throws std::invalid_argument for matrices of other sizes or entries that are not
-/// finite, a period that is not positive, a negative delay or cutoff, and a spectrum without modes
-/// because of its status; std::runtime_error if the eigenvalue iteration does not converge.
+/// Call it at a lower rate than the tick's, because it allocates, and solves one dense eigenproblem
+/// of up to (4 + d) n rows. Throws std::invalid_argument for matrices of other sizes or entries
+/// that are not finite, a period that is not positive, a negative delay or cutoff, and a spectrum
+/// without modes because of its status. Throws std::runtime_error if the eigenvalue iteration does
+/// not converge.
 template <int N>
 SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum,
                             const SampledLoop& loop);
 
-/// The factor by which K and the controller's damping C - D may grow together before the loop
-/// becomes unstable, to six digits: the first boundary above 1, searched in steps of a quarter;
-/// infinite if there is none up to `most`. Where the loop is unstable as it is: the first boundary
-/// below 1, zero if there is none down to 1e-3. Motions with |log z| / T below `slowest`, rad/s, do
-/// not count: a self-motion that the held gravity compensation feeds is no vibration. Some tens of
-/// eigenproblems. Throws like sample_loop.
+/// Returns the factor by which K and the controller's damping C - D may grow together before the
+/// loop becomes unstable, to six digits. It is the first boundary above 1, searched in steps of a
+/// quarter, or infinity if there is none up to `most`. Where the loop is unstable as it is, the
+/// result is the first boundary below 1, or zero if there is none down to 1e-3. Motions with
+/// |log z| / T below `slowest`, rad/s, do not count, because a self-motion that the held gravity
+/// compensation feeds is no vibration. The search takes some tens of eigenproblems. Throws like
+/// sample_loop.
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
                    double most = 1e6, double slowest = 0);

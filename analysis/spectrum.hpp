@@ -8,8 +8,9 @@ namespace dashpot::analysis {
 struct SpectrumOptions {
   /// Modes with a natural frequency below this are called soft, rad/s.
   double soft_frequency = 1e-6;
-  /// Precision of the residuals: working, or twice that (kExtended), or kAutomatic: first working,
-  /// then extended for all modes if for one of them the proved bound exceeds `target_bound` times
+  /// Precision of the residuals: working precision (kWorking), twice that (kExtended), or
+  /// kAutomatic. kAutomatic evaluates in working precision first. It then evaluates all modes in
+  /// extended precision if for one of them the proved bound exceeds `target_bound` times
   /// |lambda_1| + |lambda_2|, the backward error exceeds 2e-14, or only the bound decides the kind
   /// (critical; undamped in spite of damping).
   enum class Residual { kAutomatic, kWorking, kExtended } residual = Residual::kAutomatic;
@@ -19,33 +20,36 @@ struct SpectrumOptions {
 /// State matrix A = [0 I; -M^-1 K  -M^-1 C] in the coordinates (q, q') and its dual eigenvectors
 /// (paper, Eqs. 29-31): A X = X diag(lambda), Y^T A = diag(lambda) Y^T, Y^T X = I.
 struct DualEigenvectors {
-  Eigen::VectorXcd eigenvalues;  ///< 2m: of the nonzero modes, pairs in the order of the modes
+  Eigen::VectorXcd eigenvalues;  ///< 2m, of the nonzero modes: pairs in the order of the modes
   Eigen::MatrixXcd right;        ///< X, 2n x 2m
   Eigen::MatrixXcd left;         ///< Y, 2n x 2m; infinite where eigenvalues are defective
 };
 
-/// Dual eigenvectors of the nonzero modes. Scaled so that right columns have unit length.
+/// Returns the dual eigenvectors of the nonzero modes, scaled so that right columns have unit
+/// length.
 DualEigenvectors dual_eigenvectors(const System<>& system, const Spectrum<>& spectrum);
 
-/// Computes spectra of systems of up to N coordinates, all in storage of its own.
+/// Computes spectra of systems of up to N coordinates, in storage of its own.
 template <int N = kDynamic>
 class SpectrumSolver {
  public:
   explicit SpectrumSolver(SpectrumOptions options = {}) : options_(options) {}
 
-  /// Analyses `system` into `out`, and returns out.status. The work is bounded (see
-  /// hessenberg_eigenvalues; three bases at most, 6 refinement steps each); for a fixed N there is
+  /// Analyses `system` into `out` and returns out.status. The work is bounded (see
+  /// hessenberg_eigenvalues; three bases at most, 6 refinement steps each). For a fixed N there is
   /// no allocation. On a status other than kOk and kUncertified `out` has no modes.
   Status solve(const System<N>& system, Spectrum<N>& out) noexcept {
     Work work;
     return solve(system, out, work);
   }
-  /// The same, with no more work than is granted: kUnfinished if that is not enough.
+  /// Does the same with no more work than `work` grants; the status is kUnfinished if that is not
+  /// enough.
   Status solve(const System<N>& system, Spectrum<N>& out, Work& work) noexcept;
 
  private:
   bool good(const Spectrum<N>& spectrum) const noexcept;
-  /// Evaluates, certifies and reads the modes; improves the basis while that helps.
+  /// Evaluates the basis, bounds its errors and reads the modes; improves the basis while that
+  /// helps.
   void refine(const System<N>& system, Spectrum<N>& out, Work& work) noexcept;
 
   SpectrumOptions options_;
@@ -55,8 +59,9 @@ class SpectrumSolver {
   ModalBasis<N> before_step_;
 };
 
-/// The one obvious call: validates the system (throws InvalidSystem), solves it, and returns the
-/// spectrum; its status is kOk or kUncertified. Throws std::runtime_error if the solver fails.
+/// Validates the system (throws InvalidSystem), solves it, and returns the spectrum, whose status
+/// is kOk or kUncertified. This is the function to start with. Throws std::runtime_error if the
+/// solver fails.
 Spectrum<> analyze(const System<>& system, const SpectrumOptions& options = {});
 
 }  // namespace dashpot::analysis

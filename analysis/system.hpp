@@ -13,7 +13,7 @@ using StiffnessFactor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Ei
 ///
 /// M is symmetric positive definite, C and K are square. SI units: for joint coordinates in rad,
 /// M in kg m^2, C in N m s/rad, K in N m/rad. C and K are symmetric for an ordinary mechanical
-/// system; where they are not (`symmetric()` is false) the general problem is solved.
+/// system. Where they are not (`symmetric()` is false), the general problem is solved.
 template <int N = kDynamic>
 struct System {
   Square<N> mass;
@@ -21,14 +21,15 @@ struct System {
   Square<N> stiffness;
 
   /// Optional factor W (rows x n) with stiffness = W'W. With it, the zero modes and small
-  /// frequencies are found from the singular values of W L^-T (M = L L'), where nothing is squared
-  /// and no digit is lost. No rows: not given.
+  /// frequencies are found from the singular values of W L^-T (M = L L'), and no digit is lost
+  /// because nothing is squared. No rows: not given.
   StiffnessFactor<N> stiffness_factor;
 
-  /// Optional low-order parts: the exact coefficients are damping + damping_low and
-  /// stiffness + stiffness_low. They carry what rounding took when the coefficients were formed
-  /// from others, such as K = J' K_C J. Read only if `has_low_words`. The proved error bounds rely
-  /// on |tail| <= eps |coefficient| / 2 in every entry, which `validate` does not check.
+  /// Optional low words: the exact coefficients are damping + damping_low and
+  /// stiffness + stiffness_low. They hold the rounding errors made when the coefficients were
+  /// formed from others, such as K = J' K_C J. They are read only if `has_low_words`. The proved
+  /// error bounds rely on |low word| <= eps |coefficient| / 2 in every entry, which `validate` does
+  /// not check.
   Square<N> damping_low;
   Square<N> stiffness_low;
   bool has_low_words = false;
@@ -40,16 +41,16 @@ struct System {
         stiffness(Square<N>::Zero(n, n)),
         stiffness_factor(0, n) {}
 
-  /// n
+  /// Returns n.
   Eigen::Index dof() const { return mass.rows(); }
-  /// Whether damping and stiffness equal their transposes exactly.
+  /// True if damping and stiffness equal their transposes exactly.
   bool symmetric() const {
     return damping == damping.transpose() && stiffness == stiffness.transpose();
   }
 };
 
 /// Throws InvalidSystem unless the coefficients are square, of one size and finite, and the mass is
-/// symmetric positive definite. n = 0 is a proper system without modes.
+/// symmetric positive definite. n = 0 is a valid system without modes.
 void validate(const System<>& system);
 
 }  // namespace dashpot::analysis

@@ -6,8 +6,8 @@
 
 namespace dashpot::analysis {
 
-/// An impedance given in task space, in joint space, or in both (the parts add up; each optional).
-/// n joints, m task directions (a twist is linear first, then angular). SI units.
+/// An impedance given in task space, in joint space, or in both; the parts add up, and each is
+/// optional. n joints, m task directions (a twist is linear first, then angular). SI units.
 struct TaskImpedance {
   Eigen::MatrixXd mass;                           ///< M, n x n
   std::optional<Eigen::MatrixXd> damping;         ///< n x n, joint space
@@ -22,26 +22,27 @@ struct TaskImpedance {
   std::optional<Eigen::VectorXd> wrench;
 };
 
-/// K_G of Eq. 55, n x n; symmetric for the linear rows of J, in general not for the angular ones.
-/// Each derivative has as many rows as the wrench has entries, and n columns.
+/// Returns K_G of Eq. 55, n x n. It is symmetric for the linear rows of J, in general not for the
+/// angular rows. Each derivative has as many rows as the wrench has entries, and n columns.
 Eigen::MatrixXd geometric_stiffness(const std::vector<Eigen::MatrixXd>& jacobian_derivatives,
                                     const Eigen::VectorXd& wrench);
 
-/// Joint-space system of an impedance (paper, Eqs. 55 and 56):
+/// Returns the joint-space system of an impedance (paper, Eqs. 55 and 56):
 ///     K = stiffness + J' K_C J + K_G + J' C_C Jdot,     C = damping + J' C_C J.
 /// With nothing but a mass, C = K = 0.
 ///
-/// What rounding takes in forming the products is kept in the system's low words; where all of K
-/// comes from a positive semidefinite K_C = F F' (and a positive semidefinite joint stiffness), the
-/// factor W = F' J (stacked) is kept too.
+/// The rounding errors of forming the products are kept in the system's low words. The factor
+/// W = F' J (stacked) is kept too where all of K comes from a positive semidefinite K_C = F F' (and
+/// a positive semidefinite joint stiffness).
 ///
 /// mass, damping, stiffness, C_C and K_C have to be symmetric: a difference of at most 1e-10 of the
-/// largest entry is averaged away, more is an error. K_G is made symmetric where it is so within
-/// that measure. So the result is not symmetric only through Jdot and a K_G of angular directions.
+/// largest entry is averaged away, a larger one is an error. K_G is made symmetric where it is
+/// symmetric within that tolerance. So only Jdot and a K_G of angular directions can make the
+/// result nonsymmetric.
 ///
-/// The jacobian needs task_damping or task_stiffness, and these need it; jacobian_rate needs
-/// task_damping; wrench and jacobian_derivatives need each other. Throws InvalidSystem, with the
-/// member's name as key and the reason.
+/// The jacobian needs task_damping or task_stiffness, and these need the jacobian; jacobian_rate
+/// needs task_damping; wrench and jacobian_derivatives need each other. Throws InvalidSystem, with
+/// the member's name as key and the reason.
 System<> to_joint_space(const TaskImpedance& impedance);
 
 }  // namespace dashpot::analysis

@@ -7,12 +7,12 @@
 
 namespace dashpot::analysis {
 
-/// Eigenvectors of a mode's two eigenvalues. Left ones are the same where coefficients are
+/// Eigenvectors of a mode's two eigenvalues. Left eigenvectors are the same where coefficients are
 /// symmetric.
 struct TrackedShapes {
   /// u in joint coordinates, n each, u^H M u = 1, largest entry real and positive. At critical
-  /// damping both are the one eigenvector there is. Zero where an eigenvalue is exactly zero: that
-  /// of an elastic coordinate which no motion changes.
+  /// damping both are the only eigenvector. Zero where an eigenvalue is exactly zero, which is the
+  /// eigenvalue of an elastic coordinate that no motion changes.
   std::array<ComplexVector<kMaxDof>, 2> u;
   /// u' (2 lambda M + C) u (no conjugation), 1/s: the scale of dual vectors and of sensitivities;
   /// zero at critical damping, and where coefficients are not symmetric
@@ -29,7 +29,7 @@ struct TrackedSpectrum {
   /// index of the earlier mode that it resembles most.
   std::uint64_t epoch = 0;
   std::array<ModeNumbers, kMaxDof> modes{};
-  /// Indices of the modes by falling sqrt|l1 l2|, which is the natural frequency where there is
+  /// Indices of the modes by falling sqrt|l1 l2|, which is the natural frequency of a mode that has
   /// one.
   std::array<int, kMaxDof> order{};
   /// Eigenvectors of mode i, if TrackerOptions::shapes is set.
@@ -38,7 +38,7 @@ struct TrackedSpectrum {
   std::array<double, kMaxDof> zero_mode_rates{};  ///< eigenvalues of their velocities, 1/s
 
   /// Returns a positive number that mode `index` keeps for as long as it can be matched. No other
-  /// mode gets it meanwhile; after 2^26 epochs numbers come back.
+  /// mode gets this number meanwhile. After 2^26 epochs numbers repeat.
   std::int32_t label(int index) const noexcept {
     return static_cast<std::int32_t>((epoch - 1) % (1u << 26)) * kMaxDof + index + 1;
   }

@@ -1,7 +1,7 @@
 #pragma once
 // Matrix types of the analysis. The template parameter N of every type and class is a capacity: the
-// largest number of degrees of freedom it can hold, in fixed storage and without any allocation, or
-// kDynamic for storage that is sized at set-up. Actual sizes are set at run time.
+// largest number of degrees of freedom that it can hold in fixed storage, without any allocation.
+// N = kDynamic means storage that is sized at set-up. Actual sizes are set at run time.
 
 #if !defined(EIGEN_MAX_ALIGN_BYTES) || EIGEN_MAX_ALIGN_BYTES != 64 || \
     !defined(EIGEN_MAX_STATIC_ALIGN_BYTES) || EIGEN_MAX_STATIC_ALIGN_BYTES != 64
@@ -28,12 +28,13 @@ inline constexpr int kTwice = N == kDynamic ? kDynamic : 2 * N;
 
 using Complex = std::complex<double>;
 
-/// |z| without the care for overflow that makes std::abs slow; eigenvalues are nowhere near it.
+/// Returns |z| without the care for overflow that makes std::abs slow, because eigenvalues are
+/// nowhere near overflow.
 inline double modulus(const Complex& z) noexcept {
   return std::sqrt(z.real() * z.real() + z.imag() * z.imag());
 }
 
-/// Capacity for arms: enough for every robot the controller takes.
+/// Capacity for arms, enough for every robot that the controller takes.
 inline constexpr int kMaxDof = 16;
 
 /// k x k, k <= n

@@ -4,7 +4,7 @@
 
 namespace dashpot::analysis {
 
-/// Counts the work of an analysis and says when it has had its share. It counts units, not time, so
+/// Counts the work of an analysis and says when its share is used up. It counts units, not time, so
 /// that one input ends at one point on every computer and in every run. A unit is about one
 /// instruction of a build for any x86-64 processor (./run realtime compares them).
 ///
@@ -15,13 +15,13 @@ class Work {
 
   explicit Work(std::int64_t limit = kUnlimited) noexcept : limit_(limit), left_(limit) {}
 
-  /// True if `units` more may be done, which then count. Once they may not, no more ever may.
+  /// True if `units` more may be done; they then count. Once the answer is false, it stays false.
   bool take(std::int64_t units) noexcept {
     over_ = over_ || units > left_;
     if (!over_) left_ -= units;
     return !over_;
   }
-  /// True if something had to be left undone.
+  /// True if some work was refused.
   bool over() const noexcept { return over_; }
   std::int64_t done() const noexcept { return limit_ - left_; }
 
@@ -30,7 +30,7 @@ class Work {
   bool over_ = false;
 };
 
-/// `factor` times x cubed, or squared.
+/// Returns `factor` times x cubed, or squared.
 constexpr std::int64_t cubed(std::int64_t x, std::int64_t factor) noexcept {
   return factor * x * x * x;
 }

@@ -18,7 +18,7 @@ struct Wall {
   Contact contact{1e4, 50};                           ///< N/m, N s/m
 };
 
-/// What acts on the arm beside gravity and torque. What is off or zero costs nothing.
+/// Forces on the arm in addition to gravity and torque. A force that is off or zero costs nothing.
 struct ArmOptions {
   bool viscous_friction = true;  ///< with the coefficients of the robot
   bool coulomb_friction = true;  ///< likewise: -coulomb tanh(qd / friction_velocity)
@@ -39,7 +39,7 @@ class Arm : public System {
 
   const Robot& robot() const noexcept { return robot_; }
   Pose tip_pose(const JointVector& q) noexcept;
-  /// Linear and angular velocity of the tip, m/s and rad/s, in the base's axes.
+  /// Returns the linear and angular velocity of the tip, m/s and rad/s, in the base's axes.
   Vector6 tip_twist(const JointVector& q, const JointVector& qd) noexcept;
 
   double begin_segment(double t) noexcept override;

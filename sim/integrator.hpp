@@ -14,39 +14,39 @@ enum class Method : std::uint8_t {
   kRungeKutta4,        ///< order 4, 4 evaluations; stable on the axes for omega h < 2.8
   kVelocityVerlet,     ///< order 2, 1 evaluation; as stable as kSemiImplicitEuler where damping is
                        ///< small
-  kModifiedMidpoint,  ///< order 2, 3 evaluations; for errors of a percent of what is damped: stable
-                      ///< there in longer steps than kRungeKutta4, evaluation by evaluation
+  kModifiedMidpoint,  ///< order 2, 3 evaluations; for errors of a percent in damped motions: stable
+                      ///< there in longer steps than kRungeKutta4, for equal numbers of evaluations
   kCashKarp,          ///< order 5 with an error estimate of order 4, 6 evaluations; damps well in
                       ///< long steps
   kDormandPrince,     ///< order 5 with an error estimate of order 4, 6 evaluations
   kDormandPrince8,    ///< order 8 with an error estimate of orders 5 and 3, 12 evaluations
   kImplicitMidpoint,  ///< order 2, symplectic, stable for any stiffness; 2n + 4 or so evaluations
-  kRosenbrock,  ///< RODAS3: order 3 with an estimate of order 2, damps the stiffest (L-stable)
-                ///< 2n + 3 evaluations, nothing to iterate
+  kRosenbrock,        ///< RODAS3: order 3 with an estimate of order 2, damps the stiffest motions
+                      ///< (L-stable); 2n + 3 evaluations, nothing to iterate
 };
 
 struct IntegratorOptions {
   Method method = Method::kRungeKutta4;
   double max_step = 0.001;  ///< s; a segment is cut into equal steps no longer than this
-  /// Methods with an error estimate: step size from it, up to max_step, and steps end where a
-  /// contact begins or ends. Otherwise contacts begin and end within a step, or with implicit
-  /// methods at the end of one.
+  /// True: the step size follows from the error estimate of the method, which has to have one, up
+  /// to max_step, and steps end where a contact begins or ends. False: contacts begin and end
+  /// within a step, or with implicit methods at the end of a step.
   bool adaptive = false;
   double absolute_tolerance = 1e-10;  ///< of a step, adaptive: rad, rad/s (m, m/s)
   double relative_tolerance = 1e-8;
-  int max_steps = 100000;  ///< in one segment, rejected ones too, adaptive
+  int max_steps = 100000;  ///< in one segment, including rejected steps, adaptive
 };
 
-/// Whether a method has an error estimate, which IntegratorOptions::adaptive needs.
+/// True if a method has an error estimate, which IntegratorOptions::adaptive needs.
 bool estimates_error(Method method) noexcept;
 
-/// Moves a system through a segment of time (system.hpp). Allocates nothing.
+/// Moves a system through a segment of time (system.hpp), without allocating.
 class Integrator {
  public:
   /// Throws InvalidScene.
   explicit Integrator(const IntegratorOptions& options = {});
 
-  /// y(t) becomes y(t + duration). Unless the status is kOk, y is left somewhere on the way.
+  /// Replaces y(t) by y(t + duration). Unless the status is kOk, y is left somewhere on the way.
   Status advance(System& system, double duration, StateVector& y) noexcept;
 
  private:
@@ -68,16 +68,16 @@ class Integrator {
   double weighted_size(const StateVector& x) const noexcept;
   double first_step(System& system) noexcept;
 
-  /// rates_[0] := y' at y_, unless it is known.
+  /// Computes rates_[0], y' at y_, unless it is known.
   void begin_step(System& system) noexcept;
-  /// y_ := next_
+  /// Sets y_ to next_.
   void end_step() noexcept;
 
-  /// (d qdd, d work') / d (q, qd) at y_ by differences; rates_[0] is y' there.
+  /// Computes (d qdd, d work') / d (q, qd) at y_ by differences; rates_[0] is y' at y_.
   void differentiate(System& system) noexcept;
   /// Factors s 1 - J, J = dy'/dy.
   bool factor(double s) noexcept;
-  /// x := (s 1 - J)^-1 x
+  /// Replaces x by (s 1 - J)^-1 x.
   void solve(double s, StateVector& x) const noexcept;
 
   using JacobianMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor,
@@ -91,7 +91,7 @@ class Integrator {
   std::array<StateVector, 12> rates_;     // y' at the stages, the first at y_
   int rates_at_next_ = 0;                 // index of y' at next_, if a step finds it; 0: none
   bool start_known_ = false;              // rates_[0] is y' at y_
-  bool jacobian_known_ = false;           // jacobian_ is that at y_
+  bool jacobian_known_ = false;           // jacobian_ belongs to y_
   JacobianMatrix jacobian_;
   JointMatrix reduced_;
   Eigen::PartialPivLU<JointMatrix> factors_;

@@ -10,8 +10,8 @@ namespace dashpot::sim {
 /// Masses on springs and dampers: M qdd + C qd + K q = tau + f(t).
 class LinearSystem : public System {
  public:
-  /// M symmetric positive definite (kg, kg m^2), C n x n (N s/m, ...), K symmetric (N/m, ...),
-  /// f as pieces of n entries. Throws InvalidScene.
+  /// Takes M symmetric positive definite (kg, kg m^2), C n x n (N s/m, ...), K symmetric (N/m,
+  /// ...), and f as pieces of n entries. Throws InvalidScene.
   LinearSystem(const Eigen::MatrixXd& mass, const Eigen::MatrixXd& damping,
                const Eigen::MatrixXd& stiffness,
                const std::vector<Piece<JointVector>>& forces = {});

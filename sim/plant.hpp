@@ -10,28 +10,28 @@
 
 namespace dashpot::sim {
 
-/// What goes wrong with the feedback from `begin` until just before `end`, s. What is zero, empty
-/// or false stays right.
+/// A fault of the feedback from `begin` until just before `end`, s. Members that are zero, empty or
+/// false have no effect.
 struct SensorFault {
   double begin = 0;
   double end = std::numeric_limits<double>::infinity();
   JointVector position_offset;    ///< n, rad; added to the positions, before they are differenced
   JointVector velocity_factor;    ///< n; the velocities are multiplied by it
-  bool frozen = false;            ///< positions and velocities stay what was shown before `begin`
-  bool not_a_number = false;      ///< all positions
+  bool frozen = false;            ///< positions and velocities stay as shown before `begin`
+  bool not_a_number = false;      ///< all positions are NaN
   std::int64_t clock_offset = 0;  ///< ns, added to the time stamp
 };
 
-/// What lies between controller and mechanism. What is off (zero or empty) costs nothing.
+/// The parts between controller and mechanism. A part that is off (zero or empty) costs nothing.
 struct PlantOptions {
   double period = 0.001;  ///< of the control loop, s
   IntegratorOptions integrator;
 
-  // From command to torque, in this order; vectors have n entries, or none for off.
+  // From command to torque, in this order. Vectors have n entries, or no entries for off.
   JointVector torque_limit;  ///< N m; infinity for a joint without one
   int delay = 0;             ///< ticks from a command to its effect, beyond the hold
-  /// Of a first-order low-pass, Hz: torque += (1 - exp(-2 pi f T)) (command - torque) once a tick
-  /// of T s, which is the exact filter of a held input at the tick's end.
+  /// Cutoff frequency of a first-order low-pass, Hz: torque += (1 - exp(-2 pi f T)) (command -
+  /// torque) once a tick of T s, which is the exact filter of a held input at the tick's end.
   double torque_cutoff = 0;
   JointVector initial_torque;  ///< n, N m; in the delay and the filter at the start; empty: zero
 
@@ -44,7 +44,7 @@ struct PlantOptions {
   std::vector<SensorFault> faults;
 };
 
-/// What the sensors show at a tick.
+/// The sensor readings of a tick.
 struct Measurement {
   std::int64_t time = 0;  ///< since the start, ns
   JointVector position;   ///< rad or m
@@ -64,7 +64,8 @@ struct EnergyAudit {
 
   double work_in() const noexcept { return by_actuators + by_world; }
   double dissipated() const noexcept { return viscous_heat + friction_heat + contact_heat; }
-  /// Energy from nowhere: zero but for the error of the integrator, of its order.
+  /// Returns the energy that came from nowhere: zero except for the error of the integrator, which
+  /// is of the integrator's order.
   double imbalance() const noexcept {
     return stored.sum() - initial.sum() - work_in() + dissipated();
   }
@@ -74,7 +75,7 @@ struct EnergyAudit {
 ///     Plant plant(arm, options, q, qd);
 ///     while (...) plant.step(torque_for(plant.measured()));
 /// The same calls give the same bits. step() allocates nothing. The system must outlive the plant,
-/// and no two plants may share one.
+/// and no two plants may share a system.
 class Plant {
  public:
   /// Starts at rest if qd is empty. Throws InvalidScene.
@@ -83,10 +84,11 @@ class Plant {
   Plant(const Plant&) = delete;
   Plant& operator=(const Plant&) = delete;
 
-  /// One period with the torque commanded now, N m. Unless the status is kOk, nothing has changed.
+  /// Moves through one period with the torque commanded now, N m. Unless the status is kOk, nothing
+  /// has changed.
   Status step(const JointVector& command) noexcept;
-  /// One period in which a hand or a brake, and not the torque, brings the robot to position q with
-  /// velocity qd, n entries each. The energy counts as the world's work.
+  /// Moves through one period in which a hand or a brake, and not the torque, brings the robot to
+  /// position q with velocity qd, n entries each. The energy counts as the world's work.
   void carry(const JointVector& q, const JointVector& qd) noexcept;
 
   const Measurement& measured() const noexcept { return measured_; }
@@ -94,15 +96,15 @@ class Plant {
   // The truth, which a controller does not get to see:
   JointVector position() const { return y_.head(system_->dof()); }
   JointVector velocity() const { return y_.segment(system_->dof(), system_->dof()); }
-  /// Held by the drives in the last period, N m.
+  /// Returns the torque that the drives held in the last period, N m.
   const JointVector& torque() const noexcept { return torque_; }
   std::int64_t ticks() const noexcept { return ticks_; }
-  /// s
+  /// Returns the time since the start, s.
   double time() const noexcept { return static_cast<double>(ticks_) * options_.period; }
   EnergyAudit audit() const noexcept;
 
  private:
-  /// A part of the way from command to torque or from motion to measurement.
+  /// A stage on the way from command to torque or from motion to measurement.
   using Stage = void (*)(Plant& plant) noexcept;
   static void limit(Plant& plant) noexcept;
   static void delay(Plant& plant) noexcept;

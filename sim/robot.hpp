@@ -8,15 +8,15 @@
 
 namespace dashpot::sim {
 
-/// Thrown at set-up; one line that names the file, the element and the reason.
+/// Thrown at set-up; the message is one line that names the file, the element and the reason.
 class InvalidRobot : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
 };
 
 /// One joint with the rigid body that it moves. The body's frame stands on the joint with its z
-/// axis along the joint's axis; the frame of the parent is that of the joint before it, or the base
-/// link.
+/// axis along the joint's axis. The parent's frame is the body's frame of the previous joint, or
+/// the frame of the base link.
 struct Joint {
   std::string name;
   bool prismatic = false;
@@ -26,12 +26,13 @@ struct Joint {
   double upper = 0;
   double effort = 0;    ///< largest torque, N m or N; infinite if there is none
   double velocity = 0;  ///< largest velocity, rad/s or m/s; for information, nothing enforces it
-  double reflected_inertia = 0;  ///< reflected inertia of the drive, kg m^2 or kg
-  double viscous_friction = 0;   ///< friction, N m s/rad or N s/m
-  double coulomb_friction = 0;   ///< friction, N m or N
+  double reflected_inertia = 0;  ///< of the drive, kg m^2 or kg
+  double viscous_friction = 0;   ///< coefficient, N m s/rad or N s/m
+  double coulomb_friction = 0;   ///< torque or force, N m or N
 };
 
-/// What the file does not know, or what is to override it. An empty vector: as in the file.
+/// Values that the file does not have, or that override its values. An empty vector: as in the
+/// file.
 struct RobotParameters {
   JointVector reflected_inertia;         ///< n, kg m^2; files have none, so empty is zero
   JointVector viscous_friction;          ///< n, N m s/rad
@@ -42,24 +43,24 @@ struct RobotParameters {
 };
 
 /// A serial chain of 1 to 16 revolute, continuous or prismatic joints from a base link to a tip
-/// link. Immutable. The base link stands still. Fixed joints are merged; links that hang off the
-/// chain count, rigid at their zero position; links between the root and the base only turn
+/// link. It is immutable. The base link stands still. Fixed joints are merged. Links that hang off
+/// the chain count, rigid at their zero position. Links between the root and the base only turn
 /// gravity.
 class Robot {
  public:
   /// Reads a URDF file. Throws InvalidRobot.
   static Robot from_file(const std::string& path, const std::string& base, const std::string& tip,
                          const RobotParameters& parameters = {});
-  /// The same from a URDF text; `name` stands for the file in messages.
+  /// Reads a URDF text in the same way; `name` stands for the file in messages.
   static Robot from_text(const std::string& urdf, const std::string& base, const std::string& tip,
                          const RobotParameters& parameters = {}, const std::string& name = "urdf");
 
-  /// n
+  /// Returns n.
   int dof() const noexcept { return static_cast<int>(joints_.size()); }
   const std::vector<Joint>& joints() const noexcept { return joints_; }
-  /// Of the tip link in the last joint's body.
+  /// Returns the pose of the tip link in the frame of the last joint's body.
   const Pose& tip() const noexcept { return tip_; }
-  /// m/s^2, in the axes of the base link.
+  /// Returns the gravity, m/s^2, in the axes of the base link.
   const Eigen::Vector3d& gravity() const noexcept { return gravity_; }
 
  private:

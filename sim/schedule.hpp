@@ -14,7 +14,8 @@ struct Piece {
   Value value;
 };
 
-/// A sum of pieces, as a function of time that is constant between its edges. Empty: zero for ever.
+/// A sum of pieces, as a function of time that is constant between its edges. If empty, it is
+/// always zero.
 template <class Value>
 class Schedule {
  public:
@@ -22,7 +23,7 @@ class Schedule {
   /// `zero` is the value where no piece acts. Pieces may overlap.
   Schedule(const std::vector<Piece<Value>>& pieces, const Value& zero) {
     for (const Piece<Value>& piece : pieces) {
-      if (!(piece.begin < piece.end)) continue;  // acts never
+      if (!(piece.begin < piece.end)) continue;  // never acts
       edges_.push_back(piece.begin);
       edges_.push_back(piece.end);
     }
@@ -37,9 +38,9 @@ class Schedule {
   }
 
   bool empty() const noexcept { return edges_.empty(); }
-  /// From time t on, until next_edge(t).
+  /// Returns the value from time t on, until next_edge(t).
   const Value& at(double t) const noexcept { return values_[edges_up_to(t)]; }
-  /// The first edge after t, s; infinity if there is none.
+  /// Returns the first edge after t, s, or infinity if there is none.
   double next_edge(double t) const noexcept {
     const std::size_t i = edges_up_to(t);
     return i < edges_.size() ? edges_[i] : std::numeric_limits<double>::infinity();

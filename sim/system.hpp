@@ -15,11 +15,11 @@ enum WorkChannel : int {
   kWorkChannels
 };
 
-/// What an integrator moves: position (n), velocity (n), and the work channels.
+/// The state that an integrator moves: position (n), velocity (n), and the work channels.
 using StateVector =
     Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxJoints + kWorkChannels, 1>;
 
-/// J
+/// Stored energies, J.
 struct StoredEnergy {
   double kinetic = 0;
   double gravity = 0;
@@ -30,7 +30,7 @@ struct StoredEnergy {
 /// The modes of all contacts, two bits each.
 using ContactModes = std::uint64_t;
 
-/// Something that moves: y' = f(y) with y = (q, qd, work), where nothing but y changes within a
+/// A moving mechanism: y' = f(y) with y = (q, qd, work), where nothing but y changes within a
 /// segment of time. Segments end where the torque or an external force jumps.
 class System {
  public:
@@ -38,22 +38,22 @@ class System {
   System& operator=(const System&) = delete;
   virtual ~System() = default;
 
-  /// n
+  /// Returns n.
   int dof() const noexcept { return static_cast<int>(torque_.size()); }
-  /// Held until the next call; n, N m.
+  /// Sets the torque, which is held until the next call; n, N m.
   void set_torque(const JointVector& torque) noexcept { torque_ = torque; }
 
-  /// A segment begins at t (s): external forces are those of this time. Returns when the next of
-  /// them jumps, infinity if none does.
+  /// Begins a segment at t (s), with the external forces of this time. Returns the time at which
+  /// the next of them jumps, or infinity if none does.
   virtual double begin_segment(double t) noexcept = 0;
-  /// y' at y; both have 2n + kWorkChannels entries.
+  /// Computes y' at y; both have 2n + kWorkChannels entries.
   virtual void rates(const StateVector& y, StateVector& y_dot) noexcept = 0;
   virtual StoredEnergy stored_energy(const StateVector& y) noexcept = 0;
 
-  /// Whether rates() is only piecewise smooth, with pieces that contact_modes() tells apart.
+  /// True if rates() is only piecewise smooth, with pieces that contact_modes() tells apart.
   virtual bool has_contacts() const noexcept { return false; }
   virtual ContactModes contact_modes(const StateVector&) noexcept { return 0; }
-  /// Until thaw(), contacts keep these modes whatever y, and rates() is smooth.
+  /// Makes contacts keep these modes, whatever y is, until thaw(), so that rates() is smooth.
   virtual void freeze(ContactModes) noexcept {}
   virtual void thaw() noexcept {}
 

@@ -25,7 +25,7 @@ using JointMatrix =
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-/// Where a frame stands in another: position in m, rotation matrix.
+/// Position of a frame in another in m, and its rotation matrix.
 struct Pose {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();

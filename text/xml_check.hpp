@@ -9,15 +9,15 @@ inline constexpr std::size_t kLargestXml = 16u << 20;
 
 /// Throws std::runtime_error with the reason and the line unless `text` is XML that a parser may
 /// see. TinyXML, which urdfdom uses, calls itself for each level of nesting, so that a deep file
-/// overflows the stack; so do the destructors of its tree and, for long chains of links, those of
-/// urdfdom's (160 KiB for 2000 links). It also reads on beyond quotes, tags and the end of the text
-/// after some malformed bytes and references. Therefore this reader counts and checks first,
-/// without recursion, in one pass:
+/// overflows the stack. The destructors of its tree do so as well, and, for long chains of links,
+/// the destructors of urdfdom's tree (160 KiB for 2000 links). TinyXML also reads on beyond quotes,
+/// tags and the end of the text after some malformed bytes and references. Therefore this reader
+/// counts and checks first, without recursion, in one pass:
 ///   - at most 16 MiB, 64 elements nested, 200000 elements, 64 attributes of one element;
 ///   - at most 2000 elements called link, and as many called joint;
 ///   - tags that match, quoted attributes, no document type with declarations of its own;
 ///   - UTF-8 without control characters, outside of comments.
-/// Whether the elements mean anything is not its business.
+/// It does not check whether the elements mean anything.
 void check_xml(std::string_view text);
 
 }  // namespace dashpot::text

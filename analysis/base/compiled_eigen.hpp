@@ -3,8 +3,9 @@
 
 #include <Eigen/Dense>
 
-/// What many files use of Eigen, compiled once (compiled_eigen.cpp) instead of in every file.
-/// Precompiled for the libraries and the tests, so no file has to include it. Not for users.
+/// Parts of Eigen that many files use, compiled once (compiled_eigen.cpp) instead of in every file.
+/// This header is precompiled for the libraries and the tests, so no file has to include it. It is
+/// not for users.
 #ifndef DASHPOT_COMPILED_HERE
 #define DASHPOT_COMPILED_HERE extern
 #endif

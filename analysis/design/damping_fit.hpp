@@ -16,9 +16,9 @@ struct DampingSample {
   Eigen::MatrixXd map;
 };
 
-/// The system of `impedance` without its task damping (joint damping counts as there already), and
-/// its map. Throws InvalidSystem as to_joint_space does, and for what a design cannot count in: a
-/// jacobian_rate, or a jacobian without task stiffness.
+/// Returns the system of `impedance` without its task damping, and its map. Joint damping counts as
+/// damping given already. Throws InvalidSystem as to_joint_space does, and for what a design cannot
+/// include: a jacobian_rate, or a jacobian without task stiffness.
 DampingSample damping_sample(const TaskImpedance& impedance);
 
 /// Bounds on the entries of X (k x k each), infinite ones allowed.
@@ -27,19 +27,19 @@ struct EntryBounds {
   Eigen::MatrixXd upper;
 };
 
-/// The ratios a mode may have: at least `level` times its target, and at most `ceiling`; without a
-/// ceiling exactly `level` times its target. Soft modes may have any.
+/// The ratios that a mode may have: at least `level` times its target and at most `ceiling`;
+/// without a ceiling exactly `level` times its target. Soft modes may have any ratio.
 struct RatioGoal {
   DampingTarget target;
   double level = 1;
   std::optional<double> ceiling;
 };
 
-/// Where a search has ended.
+/// Result of a search.
 struct FitResult {
-  Eigen::MatrixXd damping;  ///< X, positive semidefinite by construction, of the structure
-  double violation = 0;     ///< largest distance of a ratio, or relative one of an entry, from what
-                            ///< the goal and the bounds allow
+  Eigen::MatrixXd damping;  ///< X, positive semidefinite by construction, in the structure
+  double violation = 0;     ///< largest distance of a ratio, or relative distance of an entry, from
+                            ///< what the goal and the bounds allow
 };
 
 /// Searches damping matrices of a structure by the exact sensitivities of the ratios, over one
@@ -47,24 +47,27 @@ struct FitResult {
 ///
 /// X = S R R' S, with S the diagonal of the start's square-rooted entries and R lower triangular
 /// (block by block), so that every iterate is positive semidefinite. The squared violations are
-/// minimised over R by Levenberg and Marquardt's method: the steps are those of Newton's method of
-/// least norm along d ratio / dR where a solution exists, and the search then ends at one near its
-/// start, with errors of rounding. Otherwise it ends where the sum of squares is stationary; it is
-/// a local search. The result does not depend on the number of threads.
+/// minimised over R by Levenberg and Marquardt's method.
+///
+/// Where a solution exists, the steps are the least-norm steps of Newton's method along
+/// d ratio / dR, and the search ends at a solution near its start, with errors of rounding.
+/// Otherwise it ends where the sum of squares is stationary, because it is a local search. The
+/// result does not depend on the number of threads.
 class DampingFit {
  public:
-  /// Keeps references: the samples have to outlive it. `threads` 0: one for each processor.
+  /// Keeps references: the samples have to outlive this object. `threads` 0: one for each
+  /// processor.
   DampingFit(const std::vector<DampingSample>& samples, DampingStructure structure,
              EntryBounds bounds = {}, int threads = 1);
 
-  /// `start` is positive semidefinite, k x k; entries outside the structure are dropped. Throws
-  /// std::runtime_error if a spectrum cannot be computed.
+  /// Searches from `start`, which is positive semidefinite, k x k; its entries outside the
+  /// structure are dropped. Throws std::runtime_error if a spectrum cannot be computed.
   FitResult search(const Eigen::MatrixXd& start, const RatioGoal& goal) const;
 
-  /// X with zeros outside the structure; still positive semidefinite.
+  /// Returns X with zeros outside the structure, which is still positive semidefinite.
   Eigen::MatrixXd within_structure(const Eigen::MatrixXd& X) const;
 
-  /// Violation of `goal` and the bounds by X, as it is.
+  /// Returns the violation of `goal` and the bounds by X, which is not changed.
   double violation(const Eigen::MatrixXd& X, const RatioGoal& goal) const;
 
  private:
@@ -86,8 +89,8 @@ class DampingFit {
   int threads_;
 };
 
-/// Calls act(i) for i = 0 .. count-1 on so many threads (0: one for each processor), and returns
-/// when all are done. The first exception by i is thrown again.
+/// Calls act(i) for i = 0 .. count-1 on this many threads (0: one for each processor), and returns
+/// when all calls are done. The first exception by i is thrown again.
 void for_each_in_parallel(std::size_t count, int threads,
                           const std::function<void(std::size_t)>& act);
 

@@ -5,20 +5,21 @@
 
 namespace dashpot::analysis {
 
-/// The damping that is missing, in modal coordinates, at up to 16 modes: with the damping G that is
-/// there (k x k, mass-normalised modal coordinates: V' L^-1 D L^-T V) and the frequencies omega
-/// (k),
+/// Computes the missing damping in modal coordinates, for up to 16 modes. With the damping G given
+/// already (k x k, mass-normalised modal coordinates: V' L^-1 D L^-T V) and the frequencies omega
+/// (k) it is
 ///     R = S [T]+ S,    S = diag(1 / omega),    T = diag(2 zeta omega) - G,
-/// where [T]+ is the PSD matrix nearest to T in the Frobenius norm: T itself if it is semidefinite.
+/// where [T]+ is the PSD matrix nearest to T in the Frobenius norm: T itself if T is semidefinite.
 /// Soft modes have a smaller S, so that G = 0 gives R = diag(target.damper(omega)).
 ///
-/// If some G_ii is above 2 zeta omega_i, T is not semidefinite, and the couplings G_ij of mode i
-/// count by w_i w_j only, w = 1 - (1 - 2 zeta omega_i / G_ii)^3: without that R_ij would grow like
-/// 1 / omega_i where it vanishes at a singularity, and with it the torque along a moving
-/// set-point. With it |R_ij| omega_i <= 6 zeta sqrt(G_ii / G_jj) for a vanishing mode j.
+/// If some G_ii is above 2 zeta omega_i, T is not semidefinite. The couplings G_ij of mode i then
+/// count by w_i w_j only, w = 1 - (1 - 2 zeta omega_i / G_ii)^3. Without this factor R_ij would
+/// grow like 1 / omega_i where omega_i vanishes at a singularity, and so would the torque along a
+/// moving set-point. With it |R_ij| omega_i <= 6 zeta sqrt(G_ii / G_jj) for a vanishing mode j.
 ///
-/// G is read and overwritten by R. kNotConverged cannot be excluded, but was never seen. Nothing
-/// allocates or throws. `overdone` says whether T had to be changed: what is there is too much.
+/// G is read and overwritten by R. `overdone` is set to true if T had to be changed, because the
+/// damping given already is too much. kNotConverged cannot be excluded, but was never seen. Nothing
+/// allocates or throws.
 Status missing_damping(const Vector<kMaxDof>& omega, const DampingTarget& target, double soft,
                        Square<kMaxDof>& G, bool& overdone) noexcept;
 

@@ -9,8 +9,8 @@ namespace dashpot::analysis {
 /// score(i, j) of giving place j to item i
 using Scores = std::array<std::array<double, kMaxDof>, kMaxDof>;
 
-/// The place of each of `count` items, one to one, with the largest sum of scores (Hungarian
-/// method, shortest augmenting paths; at most count^3 steps). Scores are finite.
+/// Returns the place of each of `count` items, one to one, with the largest sum of scores
+/// (Hungarian method, shortest augmenting paths; at most count^3 steps). Scores are finite.
 inline std::array<int, kMaxDof> assign(const Scores& score, int count) noexcept {
   constexpr std::size_t kSize = kMaxDof + 1;
   // Items and places count from 1; place 0 holds the item that is being placed.

@@ -1,13 +1,13 @@
 #pragma once
-// Double-double arithmetic: a number held as the unevaluated sum of two doubles, about 32 decimal
-// digits, with the range of a double. It serves where a result of working precision is not enough:
-// residuals, and products whose rounding errors are to be kept.
+// Double-double arithmetic: a number kept as the unevaluated sum of two doubles, about 32 decimal
+// digits, with the range of a double. It is used where a result of working precision is not enough:
+// for residuals, and for products whose rounding errors are to be kept.
 //
 // Error bounds, u = 2^-53 (Joldes, Muller, Popescu, ACM TOMS 44(2), 2017): sum 3 u^2, product with
 // a double 2 u^2, product 4 u^2, relative, barring overflow and underflow (below about 1e-290).
-// Rounding to nearest is assumed: never compile this with -ffast-math. Where the compiler contracts
-// products and sums (gcc by itself, as far as a product has no other use), hand two_sum only
-// numbers that are not products in the same expression; use two_product for those.
+// Never compile this with -ffast-math, because rounding to nearest is assumed. Some compilers
+// contract products and sums (gcc by itself, as far as a product has no other use). Therefore do
+// not pass two_sum a product of the same expression; use two_product instead.
 
 #include <cmath>
 
@@ -17,7 +17,7 @@
 
 namespace dashpot::analysis {
 
-/// The number high + low, where high is that sum rounded to a double.
+/// The number high + low, where high is the sum rounded to a double.
 struct DoubleDouble {
   double high = 0;
   double low = 0;
@@ -29,7 +29,7 @@ struct DoubleDouble {
   constexpr bool operator==(const DoubleDouble&) const = default;
 };
 
-/// a + b exactly, for any a and b (Knuth).
+/// Returns a + b exactly, for any a and b (Knuth).
 constexpr DoubleDouble two_sum(double a, double b) {
   const double sum = a + b;
   const double b_part = sum - a;
@@ -37,13 +37,13 @@ constexpr DoubleDouble two_sum(double a, double b) {
   return {sum, (a - a_part) + (b - b_part)};
 }
 
-/// a + b exactly, if |a| >= |b| or a = 0 (Dekker).
+/// Returns a + b exactly, if |a| >= |b| or a = 0 (Dekker).
 constexpr DoubleDouble quick_two_sum(double a, double b) {
   const double sum = a + b;
   return {sum, b - (sum - a)};
 }
 
-/// a b exactly.
+/// Returns a b exactly.
 inline DoubleDouble two_product(double a, double b) {
   const double product = a * b;
   return {product, std::fma(a, b, -product)};

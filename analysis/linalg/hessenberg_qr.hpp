@@ -8,8 +8,8 @@
 
 namespace dashpot::analysis {
 
-/// Similarity to upper Hessenberg form by Householder reflections, in place; entries below the
-/// first subdiagonal are set to zero. (Golub and Van Loan, Matrix Computations, 4th ed.,
+/// Reduces A to upper Hessenberg form by a similarity of Householder reflections, in place. Entries
+/// below the first subdiagonal are set to zero. (Golub and Van Loan, Matrix Computations, 4th ed.,
 /// Algorithm 7.4.2.)
 template <typename Matrix>
 void reduce_to_hessenberg(Matrix& A) noexcept {
@@ -51,7 +51,7 @@ void reduce_to_hessenberg(Matrix& A) noexcept {
   }
 }
 
-/// The two eigenvalues of [a b; c d], the pair exactly conjugate or exactly real.
+/// Computes the two eigenvalues of [a b; c d]. The pair is exactly conjugate or exactly real.
 inline void eigenvalues_2x2(double a, double b, double c, double d, Complex& first,
                             Complex& second) noexcept {
   const double half_difference = 0.5 * (a - d);
@@ -68,11 +68,11 @@ inline void eigenvalues_2x2(double a, double b, double c, double d, Complex& fir
   }
 }
 
-/// Eigenvalues of an upper Hessenberg matrix by the implicit double-shift QR iteration of Francis;
-/// `H` is destroyed. Only the active window is touched, since no vectors are wanted. At most 40
-/// sweeps per row of H in all, and 160 more (a cluster of nearly defective eigenvalues may need
-/// them all by itself); returns false if that is not enough, or more than `work` grants. (Golub and
-/// Van Loan, 4th ed., Algorithm 7.5.2.)
+/// Computes the eigenvalues of an upper Hessenberg matrix by the implicit double-shift QR iteration
+/// of Francis; `H` is destroyed. Only the active window is changed, because no vectors are wanted.
+/// It takes at most 40 sweeps per row of H in total, and 160 more, because a cluster of nearly
+/// defective eigenvalues may need them all by itself. Returns false if these are not enough, or are
+/// more than `work` grants. (Golub and Van Loan, 4th ed., Algorithm 7.5.2.)
 template <typename Matrix>
 bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues, Work& work) noexcept {
   constexpr double kEps = std::numeric_limits<double>::epsilon();
@@ -111,8 +111,8 @@ bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues, Work& work) noexcep
     const std::int64_t window = high - low + 1;
     if (!work.take(squared(window, 38) + 160 * window)) return false;
     // Shifts: eigenvalues of the trailing block [a b; c d], or, where progress stalls, of
-    // d I + size [0.75 -0.4375; 1 0.75]. Kept as a, d and bc: in a cluster of eigenvalues their
-    // trace and determinant would cancel against entries of H.
+    // d I + size [0.75 -0.4375; 1 0.75]. They are kept as a, d and bc, because in a cluster of
+    // eigenvalues their trace and determinant would cancel against entries of H.
     double a = H(high - 1, high - 1), d = H(high, high);
     double bc = H(high - 1, high) * H(high, high - 1);
     if (sweeps % 10 == 0) {

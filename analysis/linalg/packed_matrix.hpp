@@ -7,7 +7,7 @@ namespace dashpot::analysis {
 /// Four doubles that the compiler keeps in one register, or in two.
 using Vec4d = double __attribute__((vector_size(32)));
 
-/// Four doubles from or to anywhere.
+/// Copies four doubles from or to any address.
 inline Vec4d load(const double* from) noexcept {
   Vec4d lanes;
   std::memcpy(&lanes, from, sizeof lanes);
@@ -25,11 +25,11 @@ inline double sum(const Vec4d& x) noexcept {
   return (x[0] + x[1]) + (x[2] + x[3]);
 }
 
-/// Longest row, in doubles: the eigenvectors of 16 joints.
+/// Longest row, in doubles: an eigenvector matrix of 16 joints has this many columns.
 inline constexpr int kMaxWidth = 32;
 
 /// A matrix of at most 32 x 32, stored by rows of `width` doubles: its columns, padded to a
-/// multiple of four. What stands in the padding is finite and means nothing.
+/// multiple of four. The padding holds finite numbers without meaning.
 struct PackedMatrix {
   alignas(64) std::array<double, kMaxWidth * kMaxWidth> items{};
   int width = 4;
@@ -40,9 +40,9 @@ struct PackedMatrix {
   const double& operator()(int i, int j) const { return row(i)[j]; }
 };
 
-/// X(i, j) = 0 for `rows` rows of this width.
+/// Sets X(i, j) = 0 in `rows` rows of this width.
 void set_zero(int width, int rows, PackedMatrix& X) noexcept;
-/// X += Y, of `rows` rows.
+/// Adds Y, of `rows` rows, to X.
 void add(const PackedMatrix& Y, int rows, PackedMatrix& X) noexcept;
 
 /// A matrix whose entry (i, k) is data[i * row_step + k * column_step].
@@ -51,14 +51,15 @@ struct Strided {
   int row_step, column_step;
 };
 
-/// out = sign (start + A X): `rows` rows, of A with `inner` columns. Rows of X, start and out lie
-/// `stride` doubles apart. `start` may be null, for zero. `out` may hold A or start, row by row,
-/// but not X.
+/// Computes out = sign (start + A X) for `rows` rows, of A with `inner` columns. Rows of X, start
+/// and out lie `stride` doubles apart. `start` may be null, for zero. `out` may hold A or start,
+/// row by row, but not X.
 using PaddedMultiply = void (*)(const Strided& A, int rows, int inner, const double* X,
                                 const double* start, double sign, double* out, int stride) noexcept;
 
-/// The multiplication for this number of columns, rounded up to a multiple of 4, at most kMaxWidth;
-/// compiled for each by itself, so that rows of the result stay in registers.
+/// Returns the multiplication for this number of columns, rounded up to a multiple of 4, at most
+/// kMaxWidth. It is compiled for each width by itself, so that rows of the result stay in
+/// registers.
 PaddedMultiply padded_multiply(int columns) noexcept;
 
 }  // namespace dashpot::analysis

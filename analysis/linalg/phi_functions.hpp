@@ -3,7 +3,7 @@
 
 namespace dashpot::analysis {
 
-/// The functions of which every response of a linear system is made, for k = 0, 1, 2:
+/// Returns phi_k(z), the functions that make up every response of a linear system, for k = 0, 1, 2:
 ///     phi_0(z) = e^z,   phi_1(z) = (e^z - 1) / z,   phi_2(z) = (e^z - 1 - z) / z^2,
 /// without the cancellation of these formulas near z = 0, where phi_k(0) = 1/k!.
 ///
@@ -11,17 +11,17 @@ namespace dashpot::analysis {
 ///     x(t) = phi_0(A t) x0 + t phi_1(A t) g0 + t^2 phi_2(A t) g1.
 Complex phi(int k, Complex z);
 
-/// phi_k((A - i omega I) t) for one diagonal block A (1/s) of a modal basis, t in s, omega in
-/// rad/s.
+/// Returns phi_k((A - i omega I) t) for one diagonal block A (1/s) of a modal basis, t in s, omega
+/// in rad/s.
 ///
-/// For one row or two, the rounding errors are those of the rounded eigenvalues times t, relative
-/// to the size of the result, from |A t| = 1e-12 to 1e6 and beyond: nothing is squared repeatedly.
-/// It does not matter whether the eigenvalues of a 2 x 2 block are a complex pair, two real ones or
-/// a double one, or whether one of them is zero. Larger blocks go through a matrix exponential.
+/// For one row or two, the rounding errors relative to the size of the result are the errors of the
+/// rounded eigenvalues times t, from |A t| = 1e-12 to 1e6 and beyond, because nothing is squared
+/// repeatedly. The eigenvalues of a 2 x 2 block may be a complex pair, two real ones or a double
+/// one, and one of them may be zero. Larger blocks go through a matrix exponential.
 Eigen::MatrixXcd phi(int k, const Eigen::MatrixXd& A, double t, double omega = 0);
 
-/// Eigenvalues mean +- sqrt(discriminant) of a real 2 x 2 matrix, to working precision each
-/// wherever the entries determine them so.
+/// Eigenvalues mean +- sqrt(discriminant) of a real 2 x 2 matrix. Each has working precision
+/// wherever the entries determine it so well.
 struct EigenvaluePair {
   double mean = 0;
   double discriminant = 0;  ///< negative for a complex pair

@@ -6,9 +6,10 @@
 
 namespace dashpot::analysis {
 
-/// F (n x n, lower triangular) with K = F F' for a symmetric positive semidefinite K of which the
-/// lower triangle is read. A pivot that cannot be told from zero ends its column, the rest of which
-/// then has to be zero too. False, with F half done, unless K is semidefinite to rounding.
+/// Computes F (n x n, lower triangular) with K = F F' for a symmetric positive semidefinite K, of
+/// which the lower triangle is read. A pivot that cannot be told from zero ends its column; the
+/// rest of the column then has to be zero too. Returns false, with F incomplete, unless K is
+/// semidefinite to rounding.
 template <class Matrix>
 bool semidefinite_cholesky(const Matrix& K, Matrix& F) noexcept {
   const Eigen::Index n = K.rows();

@@ -10,7 +10,7 @@ namespace dashpot::analysis {
 // Dense kernels for the small matrices of one robot, where a blocked library kernel spends its time
 // on set-up. All take max-size or dynamic Eigen matrices, allocate nothing, and cannot fail.
 
-/// A size that decides pivots: cheap, and within a factor of sqrt(2) of the modulus.
+/// Returns a size that decides pivots. It is cheap, and within a factor of sqrt(2) of the modulus.
 inline double magnitude(double x) noexcept {
   return std::abs(x);
 }
@@ -18,7 +18,7 @@ inline double magnitude(const Complex& x) noexcept {
   return std::abs(x.real()) + std::abs(x.imag());
 }
 
-/// Products without the checks for infinities that the standard asks of complex ones.
+/// Multiplies without the checks for infinities that the standard demands for complex numbers.
 inline double product(double a, double b) noexcept {
   return a * b;
 }
@@ -43,8 +43,8 @@ void subtract_multiple(Scalar* y, const Scalar* x, Scalar factor, Eigen::Index b
 }
 
 /// Solves A X = B in place (X overwrites B, A is destroyed) by Gaussian elimination with partial
-/// pivoting. A pivot smaller than `least_pivot` is replaced by it, so that inverse iteration may
-/// hand over a singular A.
+/// pivoting. A pivot smaller than `least_pivot` is replaced by it, because inverse iteration may
+/// pass a singular A.
 template <typename Matrix, typename Rhs>
 void solve_in_place(Matrix& A, Rhs& B, double least_pivot) noexcept {
   using Scalar = typename Matrix::Scalar;
@@ -92,7 +92,7 @@ void orthonormalize(Matrix& S) noexcept {
   }
 }
 
-/// Index of the coordinate axis farthest from what the orthonormal columns of S span.
+/// Returns the index of the coordinate axis farthest from the span of the orthonormal columns of S.
 template <typename Matrix>
 Eigen::Index farthest_axis(const Matrix& S) noexcept {
   Eigen::Index farthest = 0;
@@ -105,8 +105,8 @@ Eigen::Index farthest_axis(const Matrix& S) noexcept {
 
 namespace detail {
 
-/// Columns of A B for A with a number of rows known to the compiler, which then keeps a column of
-/// the result in registers.
+/// Multiplies A B where the number of rows of A is known to the compiler, which then keeps a column
+/// of the result in registers.
 template <int Rows>
 void multiply_rows(const double* A, Eigen::Index A_stride, Eigen::Index inner, const double* B,
                    Eigen::Index B_stride, Eigen::Index columns, double* out,
@@ -134,7 +134,7 @@ inline constexpr auto kMultiplyRows =
 
 }  // namespace detail
 
-/// out = A B for column-major matrices; out must not be A or B, and is resized.
+/// Computes out = A B for column-major matrices; out must not be A or B, and is resized.
 template <typename Left, typename Right, typename Out>
 void multiply(const Left& A, const Right& B, Out& out) noexcept {
   out.resize(A.rows(), B.cols());

@@ -7,19 +7,20 @@
 
 namespace dashpot::analysis {
 
-/// What lies between the springs and dampers of a controller and the joints.
+/// The parts between the springs and dampers of a controller and the joints.
 struct SampledLoop {
   double period = 0.001;             ///< T, of the control loop, s
   int delay = 0;                     ///< d, ticks from a command to its effect, beyond the hold
   double torque_cutoff = 0;          ///< f_c, of the torque's first-order low-pass, Hz; 0: none
-  bool difference_velocity = false;  ///< the controller takes (q_k - q_k-1) / T for q'
+  bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / T as q'
   /// D, n x n, N m s/rad: the part of the damping that the joints supply. Empty: none.
   Eigen::MatrixXd friction = {};
-  /// G = dg/dq, n x n, N m/rad: of the gravity that the controller compensates. Empty: none.
+  /// G = dg/dq, n x n, N m/rad: gradient of the gravity that the controller compensates. Empty:
+  /// none.
   Eigen::MatrixXd gravity_gradient = {};
 };
 
-/// A mode as it is with the loop closed once a tick.
+/// A mode of the loop that is closed once a tick.
 struct SampledMode {
   std::array<Complex, 2> discrete_eigenvalues{};  ///< z: a complex pair or two real ones
   std::array<Complex, 2> eigenvalues{};  ///< log(z) / T, 1/s: a complex pair or two real ones
@@ -30,11 +31,11 @@ struct SampledMode {
 };
 
 struct SampledSpectrum {
-  std::vector<SampledMode> modes;   ///< in the places of the continuous modes they come from
+  std::vector<SampledMode> modes;   ///< with the indices of the continuous modes they come from
   std::vector<Complex> zero_modes;  ///< z of the velocities along the zero modes that are damped
   std::vector<Complex> others;      ///< z of the loop's own memory: delay, filter, last position
-  /// Largest |z| of all but the zero modes' z = 1: of their positions, and of the velocities along
-  /// them that nothing damps. Below 1 the loop is stable.
+  /// Largest |z| except for z = 1 of the zero modes: of their positions, and of the velocities
+  /// along them that nothing damps. The loop is stable if it is below 1.
   double spectral_radius = 0;
 
   bool stable() const noexcept { return spectral_radius < 1; }

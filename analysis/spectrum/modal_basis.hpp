@@ -11,11 +11,12 @@ namespace dashpot::analysis {
 struct Block {
   int first = 0;
   int size = 0;
-  /// A zero-mode block has two columns and Lambda = [0 1; 0 -a]: position and velocity of a zero
-  /// mode, whose velocity decays with rate a; or one column and Lambda = 0, a position only, if the
-  /// velocity belongs to another block. Other blocks have nonzero eigenvalues: 1 column for a real
-  /// one, 2 for a complex pair or for a pair of real ones that (nearly) coincide, more where
-  /// eigenvalues of different modes coincide so closely that no well-conditioned basis parts them.
+  /// True for a zero-mode block. It has two columns and Lambda = [0 1; 0 -a], the position and
+  /// velocity of a zero mode whose velocity decays with rate a. Or it has one column and
+  /// Lambda = 0, a position only, if the velocity belongs to another block. Other blocks have
+  /// nonzero eigenvalues: 1 column for a real one, 2 for a complex pair or for a pair of real ones
+  /// that (nearly) coincide. They have more columns where eigenvalues of different modes coincide
+  /// so closely that no well-conditioned basis separates them.
   bool zero_mode = false;
 };
 
@@ -44,13 +45,14 @@ class BlockList {
   int size_ = 0;
 };
 
-/// A real basis of the 2n-dimensional state space (q, q') in which the system falls apart into
-/// small blocks: with U (n x 2n) and the block-diagonal Lambda (2n x 2n),
+/// A real basis of the 2n-dimensional state space (q, q') in which the system is block diagonal
+/// with small blocks. With U (n x 2n) and the block-diagonal Lambda (2n x 2n),
 ///
 ///     M U Lambda^2 + C U Lambda + K U = 0,
 ///
 /// so that q(t) = U exp(Lambda t) xi and q'(t) = U Lambda exp(Lambda t) xi solve the free system
-/// for every xi (2n). It stays well conditioned where eigenvectors do not exist (critical damping).
+/// for every xi (2n). The basis stays well conditioned where eigenvectors do not exist (critical
+/// damping).
 ///
 /// The left basis (Y, Gamma) does the same for the transposed system. With Z = [U; U Lambda],
 /// Z_left = [Y; Y Gamma] and B = [C M; M 0], Z_left' B Z is block diagonal with inverse `weight`.
@@ -69,15 +71,15 @@ struct ModalBasis {
   BlockList<N> blocks;
 };
 
-/// Coordinates xi (2n) of the state (position, velocity), refined once so that
+/// Returns the coordinates xi (2n) of the state (position, velocity), refined once so that
 /// U xi = position and U Lambda xi = velocity to rounding.
 template <int N>
 StateVector<N> coordinates(const ModalBasis<N>& basis, const Square<N>& mass,
                            const Square<N>& damping, const Vector<N>& position,
                            const Vector<N>& velocity);
 
-/// weight Y' f: what a generalized force f (N m) adds to xi', and the jump of xi that a generalized
-/// impulse f (N m s) gives.
+/// Returns weight Y' f, which a generalized force f (N m) adds to xi'. It is also the jump of xi
+/// that a generalized impulse f (N m s) gives.
 template <int N>
 StateVector<N> drive(const ModalBasis<N>& basis, const Vector<N>& f);
 

@@ -16,8 +16,8 @@ struct Invariants {
   double discriminant_error = std::numeric_limits<double>::infinity();
 };
 
-/// Of the block L = [l00 l01; l10 l11] (1/s), known to be within `rho` (Frobenius norm) of the
-/// exact one.
+/// Returns the invariants of the block L = [l00 l01; l10 l11] (1/s), which is known to be within
+/// `rho` (Frobenius norm) of the exact one.
 Invariants block_invariants(double l00, double l01, double l10, double l11, double rho) noexcept;
 
 /// An eigenvalue and a bound of its error, 1/s.
@@ -26,11 +26,11 @@ struct Root {
   double bound = std::numeric_limits<double>::infinity();
 };
 
-/// Of two eigenvalues of which no more is known.
+/// Returns the invariants of two eigenvalues of which no more is known.
 Invariants root_invariants(const Root& a, const Root& b) noexcept;
 
-/// `first` has the positive imaginary part if the two are complex. Modes below `soft_frequency`
-/// (rad/s) are called soft.
+/// Returns the numbers of a mode. `first` has the positive imaginary part if the two eigenvalues
+/// are complex. Modes below `soft_frequency` (rad/s) are called soft.
 ModeNumbers mode_numbers(const Root& first, const Root& second, const Invariants& invariants,
                          double soft_frequency) noexcept;
 

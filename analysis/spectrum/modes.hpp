@@ -4,16 +4,16 @@
 
 namespace dashpot::analysis {
 
-/// Reads the modes off a certified basis: eigenvalues and shapes of every block, pairs of real
-/// eigenvalues, frequencies, ratios, kinds, bounds, backward errors; sorted by falling sqrt|l1 l2|,
-/// which is the natural frequency where there is one. `soft_frequency` in rad/s.
-/// Fills spectrum.modes and zero_mode_rates from spectrum.basis and zero_modes.
+/// Reads the modes from a basis with proved bounds: eigenvalues and shapes of every block, pairs of
+/// real eigenvalues, frequencies, ratios, kinds, bounds, backward errors. Fills spectrum.modes and
+/// zero_mode_rates from spectrum.basis and zero_modes. The modes are sorted by falling sqrt|l1 l2|,
+/// which is the natural frequency of a mode that has one. `soft_frequency` in rad/s.
 template <int N>
 void read_modes(const System<N>& system, const BasisResidual<N>& residual,
                 const BlockEnclosure<N>& enclosure, double soft_frequency,
                 Spectrum<N>& spectrum) noexcept;
 
-/// How good a spectrum is, at its worst mode.
+/// Quality of a spectrum, at its worst mode.
 struct Quality {
   double bound = 0;  ///< error bound / (|lambda_1| + |lambda_2|); infinite if one is missing
   double backward_error = 0;

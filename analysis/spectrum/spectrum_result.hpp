@@ -6,7 +6,7 @@
 
 namespace dashpot::analysis {
 
-/// Everything the analysis knows of one system.
+/// All results of the analysis of one system.
 template <int N = kDynamic>
 struct Spectrum {
   Status status = Status::kOk;
@@ -21,12 +21,12 @@ struct Spectrum {
                         ///< mass-normalised coordinates (Frobenius)
 
   ZeroModes<N> zero_modes;
-  /// n - r modes by falling natural frequency, or sqrt|l1 l2| where that is NaN; more than n - r
-  /// where zero modes' velocities form complex pairs
+  /// n - r modes by falling natural frequency, or by sqrt|l1 l2| where the frequency is NaN; more
+  /// than n - r where zero modes' velocities form complex pairs
   ModeList<N> modes;
   /// Eigenvalues -a of the r zero modes' velocities, 1/s: zero if nothing damps them, positive if
-  /// they grow (no mode says so then), NaN if they are not real and so are among the modes. They
-  /// come without a proved bound.
+  /// they grow (no mode says so then), NaN if they are not real and therefore are among the modes.
+  /// They have no proved bound.
   Vector<N> zero_mode_rates;
   ModalBasis<N> basis;
 };

@@ -6,21 +6,22 @@
 
 namespace dashpot::analysis {
 
-/// Fills U, Lambda and blocks of `basis` from an energy form: eigenvalues by QR iteration on
+/// Fills U, Lambda and blocks of `basis` from an energy form. The eigenvalues are found by QR
+/// iteration on
 ///
-///     A = [0 G; -G' -D]   (time derivative of [elastic coordinate-energy coordinates;
-///     velocities]),
+///     A = [0 G; -G' -D]   (time derivative of [elastic coordinates; velocities]),
 ///
-/// which holds every eigenvalue but the r zeros of the zero modes' positions, then vectors by
-/// inverse iteration on lambda^2 + lambda D + Kp. Eigenvalues that lie too close together for their
-/// vectors to be told apart (critical damping, coinciding modes) share a block, found by subspace
-/// iteration. Proportional damping needs neither: its modes are written down.
+/// which has every eigenvalue except the r zeros of the zero modes' positions. The vectors are then
+/// found by inverse iteration on lambda^2 + lambda D + Kp. Eigenvalues share a block, found by
+/// subspace iteration, if they are too close together to tell their vectors apart (critical
+/// damping, coinciding modes). Proportional damping needs neither iteration, because its modes are
+/// known in closed form.
 ///
 /// The result is accurate to about eps |A|; `refine` finishes it against the original coefficients.
 ///
 /// Eigenvalues within the relative distance `cluster` of each other share a block unless their
-/// vectors are well apart: more is slower and safer, and from 2 on one block holds them all.
-/// Returns kUnfinished, and no basis, if `work` does not grant enough.
+/// vectors are well apart. A larger `cluster` is slower and safer, and from 2 on one block holds
+/// all eigenvalues. Returns kUnfinished, and no basis, if `work` does not grant enough.
 template <int N>
 Status build_starting_basis(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes,
                             double cluster, ModalBasis<N>& basis, Work& work) noexcept;

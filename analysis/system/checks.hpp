@@ -11,7 +11,7 @@
 
 namespace dashpot::analysis {
 
-/// Thrown at set-up for a system that is not a proper one; `key` names the part ("mass", ...).
+/// Thrown at set-up for an invalid system; `key` names the part ("mass", ...).
 class InvalidSystem : public std::invalid_argument {
  public:
   InvalidSystem(std::string key, const std::string& reason)
@@ -22,18 +22,18 @@ class InvalidSystem : public std::invalid_argument {
   std::string key_;
 };
 
-/// Entries of a matrix and its transpose may differ by this much of the largest entry.
+/// Largest difference of a matrix from its transpose, relative to the largest entry.
 inline constexpr double kSymmetryTolerance = 1e-10;
 
-/// "is 3 x 2, expected 3 x 3"
+/// Throws "is 3 x 2, expected 3 x 3".
 void check_size(const std::string& key, const Eigen::MatrixXd& matrix, Eigen::Index rows,
                 Eigen::Index cols);
-/// "entry (2,3) is not a finite number"
+/// Throws "entry (2,3) is not a finite number".
 void check_finite(const std::string& key, const Eigen::MatrixXd& matrix);
-/// "is not symmetric: entry (1,2) is 3, entry (2,1) is 4", for the two that differ most
+/// Throws "is not symmetric: entry (1,2) is 3, entry (2,1) is 4", for the two that differ most.
 void check_symmetric(const std::string& key, const Eigen::MatrixXd& matrix);
-/// "entry (1,2) is more than a rounding error of the coefficient": error bounds of working
-/// precision count on low words no larger than one rounding of the coefficient.
+/// Throws "entry (1,2) is more than a rounding error of the coefficient", because error bounds of
+/// working precision rely on low words no larger than one rounding of the coefficient.
 void check_low_word(const std::string& key, const Eigen::MatrixXd& matrix,
                     const Eigen::MatrixXd& tail);
 

@@ -3,24 +3,25 @@
 
 namespace dashpot::analysis {
 
-/// Foresees the step by which a basis changes from one update to the next, from its last three: by
-/// that polynomial which would have foreseen the last one best, of degree 2, 1, 0, or no step at
-/// all.
+/// Extrapolates the step by which a basis changes from one update to the next, from the last three
+/// steps. Of the polynomials of degree 0, 1 and 2 it uses the one that would have predicted the
+/// last step best. It predicts no step if none of them would have predicted it well.
 class StepPrediction {
  public:
-  /// What is expected next, if anything: E of Z <- Z (I + E).
+  /// True if next() holds a prediction: E of Z <- Z (I + E).
   bool ready() const noexcept { return ready_; }
   const PackedMatrix& next() const noexcept { return next_; }
 
-  /// Of an update's whole step, with this many rows.
+  /// Learns the whole step of an update, which has this many rows.
   void learn(const PackedMatrix& step, int rows) noexcept;
-  /// The last steps tell nothing of the next one: the columns have turned.
+  /// Forgets the last steps, which tell nothing of the next one because the columns have been
+  /// rotated.
   void forget(int width, int rows) noexcept;
-  /// Expects nothing until something is learnt.
+  /// Predicts nothing until the next step is learnt.
   void pause() noexcept { ready_ = false; }
 
  private:
-  PackedMatrix step_, change_, curve_;  ///< the last step, and its differences from those before
+  PackedMatrix step_, change_, curve_;  ///< the last step, and its differences from earlier steps
   PackedMatrix next_;
   bool ready_ = false;
 };

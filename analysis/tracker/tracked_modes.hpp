@@ -4,8 +4,8 @@
 
 namespace dashpot::analysis {
 
-/// Reads eigenvalues, frequencies, ratios, kinds and bounds off a certified basis, and sorts them.
-/// `soft` says of each mode whether it was soft before, and is brought up to date.
+/// Reads eigenvalues, frequencies, ratios, kinds and bounds from a basis with proved bounds, and
+/// sorts them. `soft` says for each mode whether it was soft before, and is updated.
 void read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosure,
                   double soft_frequency, std::array<bool, kMaxDof>& soft,
                   TrackedSpectrum& out) noexcept;
@@ -13,7 +13,7 @@ void read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosur
 /// Fills out.order.
 void sort_by_frequency(TrackedSpectrum& out) noexcept;
 
-/// Eigenvectors from the velocity rows V (n) of Z (I + E); M V goes to `momenta`.
+/// Computes eigenvectors from the velocity rows V (n) of Z (I + E), and writes M V to `momenta`.
 void read_shapes(const SymmetricPencil& pencil, const BlockEigenbasis& basis, const PackedMatrix& E,
                  const PackedMatrix& velocities, PackedMatrix& momenta,
                  TrackedSpectrum& out) noexcept;
