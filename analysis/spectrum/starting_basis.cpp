@@ -139,7 +139,7 @@ void BasisFromEigenvectors<N>::write_proportional() {
     const double root = std::sqrt(std::abs(discriminant));
     State<N> p = State<N>::Zero(m_, 2);
     if (2 * root <= kCluster * std::max(std::abs(d), std::sqrt(std::abs(kappa)))) {
-      // Critical, nearly: coordinates of elastic coordinate and kinetic energy, [0 w; -w -d].
+      // Critical, nearly: coordinates of elastic and kinetic energy, [0 w; -w -d].
       const double omega = frequency(i);
       State<N> Lambda(2, 2);
       Lambda << 0, omega, -omega, -d;
@@ -264,7 +264,7 @@ void BasisFromEigenvectors<N>::mark_zero_rates() {
     if (item(i).value.imag() != 0) continue;
     const StateVector<N> z = state_vector(item(i).value.real());
     const double kinetic = z.tail(c_).squaredNorm();  // of a total energy of 1
-    // Velocities of zero modes have more kinetic than elastic coordinate energy.
+    // Velocities of zero modes have more kinetic than elastic energy.
     score[i] = z.tail(c_ - m_).squaredNorm() / kinetic + (kinetic > 0.5 ? 1 : 0);
   }
   for (int wanted = form_.coupled_zeros; wanted > 0; --wanted) {

@@ -42,7 +42,7 @@ struct BlockSizes {
 
 /// Errors of N and G, entrywise, with the vectors a, b, m (one entry a column of Z) and a factor
 /// gamma:   |N error| <= gamma (a a' + m m'),   |Z' B Z error| <= gamma (a b' + b a' + c m m').
-/// a is the size of a column's elastic coordinates, b of what its velocities elastic coordinate, m
+/// a is the size of a column's elastic coordinates, b of the elastic rates W v of its velocities, m
 /// of its momenta.
 class ErrorSizes {
  public:

@@ -105,7 +105,7 @@ void set_vector(const BlockEigenbasis& basis, const PackedMatrix& E, int i, cons
   group.w1[at(lane)] = w[1] - (E(j, i) * w[0] + E(j, j) * w[1]);
 }
 
-/// Largest velocity times root of the energy, below which a vector of unit elastic coordinate does
+/// Largest velocity times root of the energy, below which a vector of unit elastic energy does
 /// not move.
 constexpr double kNoMotion = 1e-290;
 

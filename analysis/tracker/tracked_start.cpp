@@ -312,7 +312,7 @@ std::array<int, kMaxDof> best_places(const SymmetricPencil& pencil, const BlockE
   return assign(scores, count);
 }
 
-/// v' M v of the columns of block i, and between the two; elastic coordinate energies differ from
+/// v' M v of the columns of block i, and between the two; elastic energies differ from
 /// these by Z' S Z = Sigma.
 struct Kinetic {
   double first = 0, second = 0, mixed = 0;
@@ -401,7 +401,7 @@ bool decouples_damping(const TrackedResidual& residual, const BlockEigenbasis& b
                        HyperbolicAngles& angles) noexcept {
   for (int i = 0; i < basis.modes; ++i) {
     const auto [first, second, mixed] = kinetic_energies(basis, residual, i);
-    // Kinetic energies of parallel velocities, elastic coordinate energies of parallel elastic
+    // Kinetic energies of parallel velocities, elastic energies of parallel elastic
     // coordinates.
     const double squared = mixed * mixed, limit = kParallel * (1 + first) * second;
     if (!(std::abs(first * second - squared) <= limit)) return false;

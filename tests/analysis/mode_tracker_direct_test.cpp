@@ -36,7 +36,7 @@ TEST(ModeTracker, KeepsThePlacesOfModesThatItSolvesDirectly) {
   }
 }
 
-/// A spring that no motion elastic coordinates has an eigenvalue of zero, and no shape.
+/// A spring that no motion extends has an eigenvalue of zero, and no shape.
 TEST(ModeTracker, HasNoShapeWhereNothingMoves) {
   for (const double coupling : {0.0, 0.05}) {
     System<kMaxDof> system(2);

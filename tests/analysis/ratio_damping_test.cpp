@@ -52,11 +52,11 @@ TEST(RatioDamping, MatchesTheDesignOfSetUpTime) {
     const DampingTarget target =
         i % 2 == 0 ? DampingTarget::constant(random.log_uniform(0.01, 2)) : falling_target();
     RatioDamping hold(target);
-    ASSERT_EQ(hold.set_stiffness(padded_jacobian(*arm.task_stiffness)), Status::kOk);
+    ASSERT_EQ(hold.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
     TaskMatrix C_C;
     ASSERT_EQ(update(hold, arm, C_C), Status::kOk);
     EXPECT_EQ(C_C, TaskMatrix(C_C.transpose()));
-    const MatrixXd expected = padded_jacobian(design_damping(arm, target).damping);
+    const MatrixXd expected = padded(design_damping(arm, target).damping);
     const double error = (C_C - expected).norm() / expected.norm();
     worst = std::max(worst, error);
     ASSERT_LE(error, 1e-10) << "system " << i << ", n = " << n << ", m = " << m;
@@ -72,7 +72,7 @@ TEST(RatioDamping, GivesTheModesTheirRatios) {
     TaskImpedance arm =
         random_arm(random, n, m, random.log_uniform(1, 1e4), random.log_uniform(1, 1e4));
     RatioDamping hold(DampingTarget::constant(0.7));
-    ASSERT_EQ(hold.set_stiffness(padded_jacobian(*arm.task_stiffness)), Status::kOk);
+    ASSERT_EQ(hold.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
     TaskMatrix C_C;
     ASSERT_EQ(update(hold, arm, C_C), Status::kOk);
     arm.task_damping = C_C.topLeftCorner(m, m);
@@ -200,7 +200,7 @@ TEST(RatioDamping, ConvergesOnAnythingFinite) {
     if (i % 5 == 0) J.row(2).setZero();
     if (i % 7 == 0) J = J.col(0) * random.matrix(1, n);
     RatioDamping hold(DampingTarget::constant(0.7));
-    ASSERT_EQ(hold.set_stiffness(padded_jacobian(*arm.task_stiffness)), Status::kOk);
+    ASSERT_EQ(hold.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
     TaskMatrix C_C = TaskMatrix::Zero();
     const Status status = update(hold, arm, C_C);
     ASSERT_TRUE(status == Status::kOk || (arm.mass.llt().info() != Eigen::Success))

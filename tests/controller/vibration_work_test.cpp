@@ -49,6 +49,23 @@ TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {
   EXPECT_EQ(led.modes().origin, SpectrumOrigin::kTracked);
 }
 
+// A robot that is damped at the same spot before and after a reset: nothing changed, and yet there
+// is nothing to repeat.
+TEST(VibrationInTheTick, RepeatsNothingFromBeforeAReset) {
+  const RobotModel model = panda_model();
+  Settings settings = in_mode(unlimited_settings(model), Mode::kJoint);
+  settings.limits.position_upper[3] = -2.5;  // the robot stands outside
+  settings.limits.return_velocity.setZero();
+  LedArm led(model, settings, kSmallSwing);
+  for (int k = 0; k < 5; ++k) ASSERT_EQ(led.tick(), Status::kPositionLimit);
+  EXPECT_EQ(led.modes().counters.no_springs, 1U);
+  EXPECT_EQ(led.modes().counters.unchanged, 4U);
+  led.controller.reset();
+  ASSERT_EQ(led.tick(), Status::kPositionLimit);
+  EXPECT_EQ(led.modes().counters.no_springs, 1U);
+  EXPECT_EQ(led.modes().counters.unchanged, 0U);
+}
+
 /// One that was to be solved directly may be missed; the next one then is.
 TEST(VibrationSolver, SolvesAnewAfterATaskThatItMissed) {
   VibrationSolver solver(Analysis{});
