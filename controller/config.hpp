@@ -8,22 +8,22 @@
 
 namespace dashpot::controller {
 
-/// What a configuration file says. Its keys, with units and defaults, stand in
-/// controller/examples/panda.yaml.
+/// Contents of a configuration file. controller/examples/panda.yaml has all keys with their units
+/// and defaults.
 struct Config {
   RobotDescription robot;
   RobotModel model;
   Settings settings;
 };
 
-/// Reads a YAML file. The path of the URDF in it is relative to the file's directory. The keys
-/// `commands`, `simulation` and `scenario` are left alone: they are for `dashpot run`. Throws
-/// InputError, which names file, key and line, for an unknown, duplicate or missing key, a wrong
-/// unit, size or sign, a number that is not finite, gains that are not symmetric positive
-/// semidefinite, and whatever is wrong with the URDF.
+/// Reads a configuration from a YAML file. The path of the URDF in it is relative to the directory
+/// of the YAML file. The keys `commands`, `simulation` and `scenario` are ignored, because they are
+/// for `dashpot run`. Throws InputError, which names file, key and line, for an unknown, duplicate
+/// or missing key, a wrong unit, size or sign, a number that is not finite, gains that are not
+/// symmetric positive semidefinite, and any error in the URDF.
 Config load_config(const std::string& path);
-/// Likewise for a file that is parsed already. A relative path of the URDF begins at `directory`;
-/// errors do not name the file.
+/// Reads a configuration from a parsed YAML file, as load_config does. A relative path of the URDF
+/// begins at `directory`. Errors do not name the file.
 Config read_config(const YamlNode& document, const std::filesystem::path& directory);
 
 }  // namespace dashpot::controller

@@ -11,8 +11,8 @@ namespace dashpot::controller {
 
 class ControllerCore;
 
-/// Impedance controller for one arm: from measured state and set-point to joint torque, once a
-/// tick.
+/// Impedance controller for one arm. Once a tick it computes the joint torque from the measured
+/// state and the set-point.
 ///
 ///     const auto model = RobotModel::from_urdf_file("panda.urdf", "panda_link0", "panda_hand");
 ///     Controller controller(model, default_settings(model));
@@ -31,7 +31,7 @@ class ControllerCore;
 /// of `update` and snapshots from it.
 class Controller {
  public:
-  /// Throws InvalidSettings with key, value and unit. The model is copied.
+  /// Copies the model. Throws InvalidSettings with key, value and unit.
   Controller(const RobotModel& model, const Settings& settings);
   ~Controller();
   Controller(Controller&&) noexcept;
@@ -39,34 +39,34 @@ class Controller {
   Controller(const Controller&) = delete;
   Controller& operator=(const Controller&) = delete;
 
-  /// One tick: sets `torque` (n, N m) to what the robot is to apply until the next one; with every
-  /// status it is safe to send (see Status). Bounded work; no allocation, lock, exception or system
-  /// call.
+  /// Does one tick: sets `torque` (n, N m) to the torque that the robot is to apply until the next
+  /// tick. The torque is safe to send with every status (see Status). The work is bounded, without
+  /// allocation, lock, exception or system call.
   Status update(const RobotState& state, const Setpoint& setpoint, JointVector& torque) noexcept;
 
-  /// Of the last tick.
+  /// Returns what the last tick measured and put out.
   const Snapshot& snapshot() const noexcept;
-  /// Of the last tick that analysed, every Analysis::every of them.
+  /// Returns the modes of the last tick that was analysed; one in Analysis::every ticks is.
   const Vibration& vibration() const noexcept;
-  /// The latest that the analysis of the sampled loop (Analysis::Sampled) has found; null as long
-  /// as there is nothing since the last reset. For one thread, always the same, which may be
-  /// another than that of `update`; the result is good until its next call.
+  /// Returns the latest result of the analysis of the sampled loop (Analysis::Sampled); null as
+  /// long as there is none since the last reset. One thread, always the same, may call this; it may
+  /// be another thread than the one that calls `update`. The result is valid until the next call.
   const SampledVibration* sampled_vibration() noexcept;
-  /// The closed loop at the last tick, linearised where its springs are at rest, in joint
-  /// coordinates (vibration/closed_loop.hpp): mass, damping, stiffness and its factor. Not to be
-  /// called before the first good state.
+  /// Sets `system` to the closed loop at the last tick, linearised where its springs are at rest,
+  /// in joint coordinates (vibration/closed_loop.hpp): mass, damping, stiffness and its factor.
+  /// Must not be called before the first good state.
   void closed_loop(analysis::System<kMaxJoints>& system) const noexcept;
 
-  /// Forgets everything, faults too: the next tick is like the first, and holds the robot where it
-  /// is. The torque-rate limit counts from the last torque; if there was none yet, from the weight
-  /// of the arm at that tick.
+  /// Forgets everything, faults as well: the next tick is like the first, and keeps the robot where
+  /// it is. The torque-rate limit counts from the last torque, or, if there was none yet, from the
+  /// weight of the arm at the next tick.
   void reset() noexcept;
-  /// The same, but the torque-rate limit counts from `torque` (n, N m), which the robot applies
-  /// now.
+  /// Resets likewise, but the torque-rate limit counts from `torque` (n, N m), the torque that the
+  /// robot applies now.
   void reset(const JointVector& torque) noexcept;
-  /// Releases a latched fault (see Status): unless its cause is still there, the next tick's
-  /// springs start where the robot is, with the gains in force, and hold it there until there is
-  /// another set-point. Nothing happens without a fault.
+  /// Releases a latched fault (see Status), unless the cause of the fault is still present. From
+  /// the next tick on the springs start where the robot is, with the gains in force, and keep it
+  /// there until there is another set-point. Does nothing if there is no fault.
   void release() noexcept;
 
   int joints() const noexcept;  ///< n

@@ -5,8 +5,9 @@
 
 namespace dashpot::controller {
 
-/// Terms of  M(q) qdd + coriolis + gravity = torque + J' wrench  at one state, and where the tip
-/// is. For n joints; N is n, known at compile time, or at most kMaxJoints (see DynamicsResult).
+/// Terms of  M(q) qdd + coriolis + gravity = torque + J' wrench  at one state, and the pose of the
+/// tip. N is the number of joints n, known at compile time; DynamicsResult is for n chosen at run
+/// time.
 template <int N>
 struct Dynamics {
   Eigen::Matrix<double, N, N> M;         ///< n x n, kg m^2; symmetric positive definite
@@ -18,7 +19,7 @@ struct Dynamics {
   Eigen::Matrix3d R_BT;
 };
 
-/// The same with n chosen at run time, in fixed storage.
+/// The same terms with n, at most kMaxJoints, chosen at run time, in fixed storage.
 struct DynamicsResult {
   JointMatrix M;                                                               ///< n x n
   JointVector coriolis;                                                        ///< n
@@ -49,8 +50,8 @@ class DynamicsKernel {
   /// Throws std::invalid_argument unless the model has N joints.
   explicit DynamicsKernel(const RobotModel& model);
 
-  /// q in rad (m), qd in rad/s (m/s). Allocates nothing; what is not finite in q or qd makes the
-  /// result so.
+  /// Sets `result` at q, rad (m), and qd, rad/s (m/s). Allocates nothing. If q or qd is not finite,
+  /// neither is the result.
   void evaluate(const Eigen::Matrix<double, N, 1>& q, const Eigen::Matrix<double, N, 1>& qd,
                 Dynamics<N>& result) const noexcept;
 
@@ -66,9 +67,9 @@ class DynamicsKernel {
   alignas(64) std::array<Row, 3> first_moment_;  ///< mass times centre of mass, kg m
   alignas(64) std::array<Row, 6> inertia_;       ///< about p_i: xx yy zz xy xz yz, kg m^2
   alignas(64) Row mass_;                         ///< kg
-  alignas(64) Row carried_mass_;                 ///< of link i and all beyond it, kg
+  alignas(64) Row carried_mass_;                 ///< of link i and all links beyond it, kg
   alignas(64) Row revolute_;                     ///< 1, or 0 for a prismatic joint
-  alignas(64) Row prismatic_;                    ///< the other way round
+  alignas(64) Row prismatic_;                    ///< 1, or 0 for a revolute joint
   Eigen::Matrix<double, N, 1> reflected_inertia_;
   Eigen::Vector3d first_joint_;  ///< p_1 in B at q = 0, m
   Eigen::Vector3d first_slide_;  ///< axis of joint 1 in B if prismatic, else 0
@@ -76,8 +77,8 @@ class DynamicsKernel {
   Eigen::Vector3d gravity_;      ///< in B, m/s^2
 };
 
-/// For set-up and tests: chooses the kernel at each call. Throws std::invalid_argument unless q and
-/// qd have n entries.
+/// Returns the terms at q and qd. For set-up and tests, because it chooses the kernel at each call.
+/// Throws std::invalid_argument unless q and qd have n entries.
 DynamicsResult evaluate(const RobotModel& model, const JointVector& q, const JointVector& qd);
 
 extern template class DynamicsKernel<1>;

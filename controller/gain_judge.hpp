@@ -5,28 +5,30 @@
 
 namespace dashpot::controller {
 
-/// Tells before they are taken whether gains leave the loop, as it is sampled, held, delayed and
-/// filtered (Analysis::Sampled), the margin of Limits::gain_margin: at one posture at rest, in both
-/// modes, by analysis::gain_margin. Motions slower than 1 rad/s do not count: those that the held
-/// gravity compensation feeds along motions without springs grow that slowly.
+/// Computes, before gains are accepted, whether they leave the sampled loop the margin of
+/// Limits::gain_margin. The loop has a zero-order hold, delay and filters (Analysis::Sampled). The
+/// margin is that of analysis::gain_margin at one posture at rest, in both modes. Motions slower
+/// than 1 rad/s do not count, because gravity compensation with a zero-order hold feeds motions
+/// without springs, which then grow that slowly; all gains would be refused.
 ///
-/// For a lower rate than the tick's: allocates, and takes milliseconds, or tenths of a second with
-/// a long delay and many joints.
+/// Not for the real-time thread, because it allocates, and takes milliseconds, or tenths of a
+/// second with a long delay and many joints.
 class GainJudge {
  public:
   struct Verdict {
     double margin;  ///< of the worse mode; at most Limits::gain_margin, which is enough
-    Mode mode;      ///< the worse one
+    Mode mode;      ///< the worse mode
   };
 
   /// The settings have to be valid.
   GainJudge(const RobotModel& model, const Settings& settings);
 
-  /// `q`: n, rad. The gains have passed check_gains in both modes. Zero where the loop could not be
-  /// analysed.
+  /// Judges gains at the posture `q` (n, rad). The gains must have passed check_gains in both
+  /// modes. The margin is zero if the loop could not be analysed.
   Verdict judge(const JointVector& q, const Gains& gains);
-  /// Where nobody knows yet where the robot is: the best verdict of kPostures postures, spread over
-  /// the position limits. Gains that none of them bears are wrong anywhere.
+  /// Judges gains while the posture is not known yet. Returns the best verdict of kPostures
+  /// postures spread over the position limits: gains without margin at any of them are taken to
+  /// be wrong everywhere.
   Verdict judge_anywhere(const Gains& gains);
   static constexpr int kPostures = 8;
 
@@ -38,7 +40,7 @@ class GainJudge {
   double wanted_;
   bool gravity_;
   analysis::SampledLoop loop_;
-  Controller controller_;  ///< takes the gains at once, wherever the robot is
+  Controller controller_;  ///< takes gains at once, at any posture
   std::int64_t time_ = 0;
 };
 

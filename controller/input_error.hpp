@@ -8,8 +8,8 @@
 
 namespace dashpot::controller {
 
-/// Returns `text` as one line that a terminal shows and does nothing else with: white space becomes
-/// blanks, other control characters become escapes, and what is too long to be read is cut off.
+/// Returns `text` as one line that is safe to show in a terminal: white space becomes blanks, other
+/// control characters become escapes, and a text that is too long to be read is cut off.
 inline std::string one_line(std::string text) {
   constexpr std::size_t kLongest = 2000;  // bytes: names in files may have millions
   if (text.size() > kLongest) text.replace(kLongest, std::string::npos, "...");
@@ -18,15 +18,15 @@ inline std::string one_line(std::string text) {
   return text::printable(text);
 }
 
-/// Something in a file that the user wrote is wrong; said in one line. The program ends with
-/// status 2. what() is "FILE: KEY: reason (line N)", without the parts that are not known.
+/// Says in one line what is wrong in a file that the user wrote. The program ends with status 2.
+/// what() is "FILE: KEY: reason (line N)", without the parts that are not known.
 class InputError : public std::runtime_error {
  public:
   /// `line` counts from 1; 0 if not known.
   InputError(std::string key, std::string reason, int line = 0)
       : InputError("", std::move(key), std::move(reason), line) {}
 
-  /// The same error with the file's name in front.
+  /// Returns the same error with the file's name in front.
   InputError in_file(const std::string& file) const { return {file, key_, reason_, line_}; }
 
  private:

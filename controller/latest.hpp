@@ -5,11 +5,12 @@
 
 namespace dashpot::controller {
 
-/// Hands the latest value from one writing thread to one reading thread. Neither ever waits,
-/// allocates or sees half a value; values that the reader does not fetch in time are skipped.
+/// Hands the latest value from one writing thread to one reading thread. Neither thread ever waits,
+/// allocates or sees half a value. Values that the reader does not fetch in time are skipped.
 ///
-/// Of three slots one belongs to the writer, one to the reader, and the third changes hands: the
-/// writer exchanges its own for it after writing, the reader before reading if it is fresh.
+/// There are three slots: one belongs to the writer, one to the reader, and the third is shared.
+/// The writer exchanges its slot for the shared one after writing. The reader exchanges its slot
+/// for the shared one before reading, if the shared one is fresh.
 template <class Value>
 class Latest {
  public:
@@ -17,27 +18,29 @@ class Latest {
   Latest(const Latest&) = delete;
   Latest& operator=(const Latest&) = delete;
 
-  /// Of the writing thread.
+  /// Copies `value` and publishes it. For the writing thread.
   void write(const Value& value) noexcept {
     slot() = value;
     publish();
   }
-  /// Of the writing thread: where the next value is written in place, over an old one, ...
+  /// Returns the slot in which the next value is written in place, over an old one. For the writing
+  /// thread.
   Value& slot() noexcept { return slots_[writer_]; }
-  /// ... and then handed over.
+  /// Hands over the value in slot(). For the writing thread.
   void publish() noexcept {
     writer_ =
         shared_.exchange(static_cast<std::uint8_t>(writer_ | kFresh), std::memory_order_acq_rel) &
         kIndex;
   }
 
-  /// Of the reading thread: fetches the latest value; whether it is one that was not seen before.
+  /// Fetches the latest value. Returns true if it was not fetched before. For the reading thread.
   bool fetch() noexcept {
     if ((shared_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
     reader_ = shared_.exchange(reader_, std::memory_order_acq_rel) & kIndex;
     return true;
   }
-  /// Of the reading thread: the value last fetched; a default one before the first.
+  /// Returns the value fetched last; a default value before the first fetch. For the reading
+  /// thread.
   const Value& value() const noexcept { return slots_[reader_]; }
 
  private:

@@ -6,7 +6,7 @@
  *   ... every millisecond:
  *   dashpot_state state = {sizeof state, n, time_ns, q, qd, NULL};
  *   dashpot_output output = {sizeof output, n, torque};
- *   int32_t status = dashpot_update(c, &state, NULL, &output);   (holds still)
+ *   int32_t status = dashpot_update(c, &state, NULL, &output);   (stays where it is)
  *   ... send torque, whatever the status
  *
  * Link with libdashpot_plugin.so, or load it and ask it for dashpot_plugin_interface.
@@ -16,17 +16,18 @@
  * row. Frames: B is the base link, T the tip or the tool's frame. Twists and wrenches have the
  * linear part first, are taken at T's origin, in B's axes.
  *
- * Threads. One thread, the real-time one, calls dashpot_update and dashpot_reset. One other thread
- * at a time calls dashpot_set_setpoint, dashpot_set_gains and dashpot_release, and one, which may
- * be the real-time thread, dashpot_read_snapshot, dashpot_read_modes and
- * dashpot_read_sampled_modes; none of these ever waits for the real-time thread or makes it wait.
- * dashpot_start is called before the loop begins. The remaining functions may be called by any
- * thread; dashpot_destroy only once no other call is under way. Controllers are independent of each
- * other. dashpot_update and dashpot_reset leave nothing for dashpot_last_error; of the others, the
- * first call in a thread may allocate that thread's text.
+ * Threads. One thread, the real-time thread, calls dashpot_update and dashpot_reset. One other
+ * thread at a time, "the other thread" below, calls dashpot_set_setpoint, dashpot_set_gains and
+ * dashpot_release. One thread, always the same, calls dashpot_read_snapshot, dashpot_read_modes and
+ * dashpot_read_sampled_modes; it may be the real-time thread. None of these calls ever waits for
+ * the real-time thread or makes it wait. dashpot_start is called before the loop begins. Any thread
+ * may call the remaining functions, but dashpot_destroy only once no other call is under way.
+ * Controllers are independent of each other. dashpot_update and dashpot_reset never change the text
+ * of dashpot_last_error; of the other functions, the first call in a thread may allocate that
+ * thread's text.
  *
- * Every struct begins with struct_size, which the caller sets to sizeof of that struct; a function
- * refuses any other value. No exception leaves the library. */
+ * Every struct begins with struct_size, which the caller sets to the sizeof of the struct; a
+ * function refuses any other value. No exception leaves the library. */
 
 /* NOLINTBEGIN(readability-identifier-naming,modernize-use-using,modernize-deprecated-headers) */
 #include <stdint.h>
@@ -35,34 +36,44 @@
 extern "C" {
 #endif
 
-/* Grows whenever a function or struct changes; a library serves the versions it knows. */
+/* Version of this interface. It increases whenever a function or struct changes. A library
+ * serves the versions that it knows. */
 #define DASHPOT_PLUGIN_VERSION 5u
+/* Largest n. */
 #define DASHPOT_MAX_JOINTS 16
 
+/* A controller of one robot; dashpot_create returns it. */
 typedef struct dashpot_controller dashpot_controller;
 
-/* What functions return. Zero and above: the status of a tick, with the torque that it comes with.
+/* What functions return.
+ *
+ * Zero and above: the status of a tick. If several conditions hold, the most severe, the last in
+ * this list, is returned. Each status comes with one output:
  *   hold: the springs stop where they are, whatever the set-point says.
- *   damp: no springs: joint damping, and the weight of the arm where the controller compensates it.
+ *   damp: there are no springs, only joint damping, and the weight of the arm where the controller
+ *         compensates it.
  *   ramp: the last good torque goes to zero within 0.1 s, or as fast as limits.torque_rate allows.
  * Where damp and ramp take torque away, it fades evenly, in all joints alike.
- * Faults latch: after any "damp" but DASHPOT_SETPOINT_LOST, and after a "ramp" of more than
+ *
+ * Faults latch. After any "damp" but DASHPOT_SETPOINT_LOST, and after a "ramp" longer than
  * watchdog.longest_gap, the arm stays damped, with its weight held, and the status is at least
- * DASHPOT_FAULT_LATCHED, until dashpot_release or dashpot_reset, or, where the configuration has
- * watchdog.release_after, until the arm has been at rest for that long. dashpot_snapshot.fault
- * names the fault. Springs then start where the robot is. docs/safety.md has each fault in full.
- * Below zero: a call that was refused and did nothing. */
+ * DASHPOT_FAULT_LATCHED. dashpot_snapshot.fault names the fault. This ends with dashpot_release or
+ * dashpot_reset, or, if the configuration sets watchdog.release_after, once the arm has been at
+ * rest for that long. Springs then start where the robot is. docs/safety.md describes each fault.
+ *
+ * Below zero: the call was refused and did nothing. */
 enum {
   DASHPOT_OK = 0,
   DASHPOT_TORQUE_LIMITED = 1,    /* a limit of torque, torque rate, power or speed is at work */
   DASHPOT_NEAR_JOINT_LIMIT = 2,  /* a joint is pushed back from a position limit that is near */
-  DASHPOT_WRENCH_NOT_FINITE = 3, /* NaN or infinity in the external wrench: the last one stays */
+  DASHPOT_WRENCH_NOT_FINITE = 3, /* NaN or infinity in the external wrench; the last finite one
+                                    stays in force */
   DASHPOT_SETPOINT_REJECTED = 4, /* the set-point is not possible; the last good one stays */
   DASHPOT_WEIGHT_NOT_HELD = 5,   /* the weight needs more than a torque limit: the arm sinks */
   DASHPOT_SETPOINT_STALE = 6,    /* the set-point is old: hold */
   DASHPOT_SETPOINT_LOST = 7,     /* the set-point is very old: damp */
   DASHPOT_FAULT_LATCHED = 8,     /* a fault is over, but was not released: damp */
-  DASHPOT_TOO_MANY_RESTARTS = 9, /* springs started again too often: damp */
+  DASHPOT_TOO_MANY_RESTARTS = 9, /* the springs restarted too often: damp */
   DASHPOT_TIME_GAP = 10,         /* the last good state is too long ago: damp */
   DASHPOT_WRONG_RATE = 11,       /* the loop runs at another rate than the configured one: damp */
   DASHPOT_COLLISION = 12,        /* an external torque or force above its threshold: damp */
@@ -72,25 +83,28 @@ enum {
   DASHPOT_WALL = 16,             /* the tip is beyond a wall of limits.walls: damp */
   DASHPOT_POSITION_LIMIT = 17,   /* a joint is outside its position limits: damp; slow return */
   DASHPOT_STATE_FROZEN = 18,     /* the state never changes though the torque does: weight alone */
-  DASHPOT_STATE_CONTRADICTORY = 19, /* positions do not move as the velocities say: damp, by what
-                                       the positions say */
+  DASHPOT_STATE_CONTRADICTORY = 19, /* positions do not move as the velocities say: damp, with
+                                       velocities from the positions */
   DASHPOT_STATE_NOT_FINITE = 20,    /* NaN or infinity in position or velocity: ramp */
-  DASHPOT_STATE_WRONG_SIZE = 21,    /* the state is missing or has not n joints: ramp */
+  DASHPOT_STATE_WRONG_SIZE = 21,    /* the state is missing or does not have n joints: ramp */
   DASHPOT_STATE_JUMP = 22,          /* further from the last state than the robot can move: ramp */
   DASHPOT_TIME_BACKWARD = 23,       /* the state's time is at or before the last one: ramp */
   DASHPOT_NOT_FINITE = 24,          /* the torque would not be finite: ramp */
 
-  DASHPOT_NULL_ARGUMENT = -1,     /* a pointer that has to be there is NULL */
-  DASHPOT_WRONG_STRUCT_SIZE = -2, /* struct_size is not that of this version */
-  DASHPOT_WRONG_JOINTS = -3,      /* joints is not n */
-  DASHPOT_WRONG_VALUE = -4,       /* not finite, not semidefinite, out of reach, ... */
-  DASHPOT_NOTHING_YET = -5,       /* nothing to read so far */
+  DASHPOT_NULL_ARGUMENT = -1,     /* a required pointer is NULL */
+  DASHPOT_WRONG_STRUCT_SIZE = -2, /* struct_size is not the size of the struct in this version */
+  DASHPOT_WRONG_JOINTS = -3,      /* the member `joints` is not n */
+  DASHPOT_WRONG_VALUE = -4,       /* a value is not finite, not semidefinite, beyond a limit, ... */
+  DASHPOT_NOTHING_YET = -5,       /* there is nothing to read so far */
   DASHPOT_UNSTABLE_GAINS = -6     /* the sampled loop would have less than limits.gain_margin */
 };
 
+/* Where the springs are fixed: to a joint position, or to a pose of the tip. */
 enum { DASHPOT_MODE_JOINT = 0, DASHPOT_MODE_CARTESIAN = 1 };
+/* In whose axes the gains of the task are given: B's or T's. */
 enum { DASHPOT_FRAME_BASE = 0, DASHPOT_FRAME_TOOL = 1 };
 
+/* How a mode moves; docs/concepts.md has the terms. */
 enum {
   DASHPOT_UNDERDAMPED = 0,
   DASHPOT_CRITICAL = 1,
@@ -102,12 +116,12 @@ enum {
 
 /* Where modes come from. */
 enum {
-  DASHPOT_TRACKED = 0, /* the modes before, refined */
-  DASHPOT_REUSED = 1,  /* the modes before: nothing that matters has changed */
-  DASHPOT_DIRECT = 2   /* solved directly */
+  DASHPOT_TRACKED = 0, /* the last modes were refined */
+  DASHPOT_REUSED = 1,  /* the last modes stay: nothing that matters has changed */
+  DASHPOT_DIRECT = 2   /* the modes were solved directly */
 };
 
-/* As dashpot_setpoint.time: given at the tick that takes it up. */
+/* Value of dashpot_setpoint.time: the set-point counts as given at the tick that takes it up. */
 #define DASHPOT_ON_ARRIVAL INT64_MIN
 
 /* What the robot reports at the beginning of a tick. */
@@ -117,27 +131,32 @@ typedef struct dashpot_state {
   int64_t time;                  /* ns, of any clock that does not run backward */
   const double* position;        /* n, rad */
   const double* velocity;        /* n, rad/s */
-  const double* external_wrench; /* 6, that the world exerts on the tip, N and N m; NULL: zero. For
-                                    the analysis and limits.external_force: with that, one that is
-                                    not finite is a collision; else no torque depends on it. */
+  const double* external_wrench; /* 6, wrench that the world exerts on the tip, N and N m; NULL:
+                                    zero. Only the analysis and limits.external_force use it. With
+                                    limits.external_force, a wrench that is not finite is a
+                                    collision; otherwise no torque depends on the wrench. */
 } dashpot_state;
 
-/* Where to go; the controller gets there smoothly. */
+/* Where the robot is to go; the controller moves there smoothly. */
 typedef struct dashpot_setpoint {
   uint32_t struct_size;
   uint32_t joints;              /* n */
-  int64_t time;                 /* ns, when it was given, on the clock of dashpot_state, or
-                                   DASHPOT_ON_ARRIVAL; dashpot_update takes a set-point with the
-                                   time of the last one for the same */
+  int64_t time;                 /* ns, when the set-point was given, on the clock of dashpot_state,
+                                   or DASHPOT_ON_ARRIVAL. dashpot_update takes a set-point with
+                                   the time of the last one for the same set-point. */
   int32_t mode;                 /* DASHPOT_MODE_JOINT or DASHPOT_MODE_CARTESIAN */
-  const double* joint_position; /* n, rad: the goal of the joint mode, and there wanted; otherwise
-                                   the posture, or NULL: the one there is */
-  const double* tip_position;   /* 3, of T in B, m: wanted in the Cartesian mode, else not used */
-  const double* tip_rotation;   /* 3 x 3, turns T's axes into B's; likewise */
-  const double* wrench;         /* 6, that the tip is to exert besides, N and N m; NULL: zero */
+  const double* joint_position; /* n, rad. Joint mode: the goal, required. Cartesian mode: the
+                                   posture of the null-space springs, or NULL to keep the current
+                                   one. */
+  const double* tip_position;   /* 3, of T in B, m. Cartesian mode: the goal, required. Joint mode:
+                                   not used. */
+  const double* tip_rotation;   /* 3 x 3, turns T's axes into B's; required as tip_position is */
+  const double* wrench;         /* 6, wrench that the tip exerts in addition, N and N m; NULL:
+                                   zero */
 } dashpot_setpoint;
 
-/* Springs and dampers. Matrices are symmetric positive semidefinite. What is NULL stays. */
+/* Springs and dampers. Matrices are symmetric positive semidefinite. A member that is NULL keeps
+ * its current value. */
 typedef struct dashpot_gains {
   uint32_t struct_size;
   uint32_t joints;                   /* n */
@@ -145,28 +164,29 @@ typedef struct dashpot_gains {
   const double* joint_damping;       /* n x n, N m s/rad */
   const double* task_stiffness;      /* 6 x 6, N/m, N/rad and N m/rad */
   const double* task_damping;        /* 6 x 6, N s/m, N s/rad and N m s/rad */
-  const double* task_damping_ratio;  /* 1, from 0 to 2: above 0, C_C is designed at every tick so
-                                        that every mode of the task has this damping ratio, in place
-                                        of task_damping; 0: C_C is task_damping. task_damping alone
-                                        makes it 0, and does not go with one above 0. */
+  const double* task_damping_ratio;  /* 1, from 0 to 2. Above 0, C_C is designed at every tick so
+                                        that every mode of the task has this damping ratio, and
+                                        task_damping has to be NULL. 0: C_C is task_damping.
+                                        task_damping without a ratio sets the ratio to 0. */
   const double* null_stiffness;      /* n, not negative, N m/rad, toward the posture */
   const double* null_damping;        /* n, not negative, N m s/rad */
-  const int32_t* frame;              /* in whose axes the 6 x 6 are: DASHPOT_FRAME_BASE or _TOOL */
-  const uint8_t* directions;         /* 6, whether the task holds this direction of `frame` */
-  const double* joint_damping_ratio; /* 1, from 0 to 2: what task_damping_ratio is to the task, for
-                                        the modes of the joint mode and joint_damping */
+  const int32_t* frame;              /* axes of the 6 x 6: DASHPOT_FRAME_BASE or _TOOL */
+  const uint8_t* directions;         /* 6, not zero: the task has springs and dampers in this
+                                        direction of `frame` */
+  const double* joint_damping_ratio; /* 1, from 0 to 2: the same for joint_damping and the modes of
+                                        the joint mode */
 } dashpot_gains;
 
-/* What the robot's joints are to exert. */
+/* The torque that the robot's joints are to exert. */
 typedef struct dashpot_output {
   uint32_t struct_size;
   uint32_t joints; /* n */
-  double* torque;  /* n, written, N m */
+  double* torque;  /* n, N m; dashpot_update writes the n numbers it points to */
 } dashpot_output;
 
-/* One tick, seen from outside. Entries from n on are zero. With a status whose output is "ramp",
- * position and velocity are those given, where they are numbers; tip, goals, law_torque, tip_error
- * and tip_wrench are those of the last good state. */
+/* What one tick measured and put out. Entries from n on are zero. With a status whose output is
+ * "ramp", position and velocity are the given ones where they are numbers; tip, reference,
+ * law_torque, tip_error and tip_wrench belong to the last good state. */
 typedef struct dashpot_snapshot {
   uint32_t struct_size;
   uint32_t joints;   /* n */
@@ -174,7 +194,7 @@ typedef struct dashpot_snapshot {
   uint64_t tick;     /* counts from 1 */
   uint64_t restarts; /* how often the springs restarted, the first time included */
   int32_t status;    /* DASHPOT_OK, ... */
-  int32_t fault;     /* the status that latched; DASHPOT_OK: none */
+  int32_t fault;     /* the latched fault, as a status; DASHPOT_OK: none */
   int32_t mode;      /* DASHPOT_MODE_JOINT or DASHPOT_MODE_CARTESIAN */
   int32_t reserved;  /* 0 */
   double position[DASHPOT_MAX_JOINTS]; /* rad */
@@ -182,167 +202,185 @@ typedef struct dashpot_snapshot {
   double torque[DASHPOT_MAX_JOINTS];   /* N m */
   double tip_position[3];              /* of T in B, m */
   double tip_rotation[9];              /* 3 x 3, turns T's axes into B's */
-  double
-      reference_joint_position[DASHPOT_MAX_JOINTS]; /* where the springs are fixed just now, rad */
-  double reference_tip_position[3];                 /* m */
-  double reference_tip_rotation[9];                 /* 3 x 3 */
-  double law_torque[DASHPOT_MAX_JOINTS];            /* what the law asked for, before limits, N m */
-  double tip_error[6];  /* goal less tip, m, and rotation vector from tip to goal, rad */
-  double tip_wrench[6]; /* of Cartesian springs, dampers and feed-forward, N and N m */
+  /* Where the joint springs are fixed just now; in the Cartesian mode the posture; rad. */
+  double reference_joint_position[DASHPOT_MAX_JOINTS];
+  double reference_tip_position[3];      /* where the Cartesian springs are fixed just now, m */
+  double reference_tip_rotation[9];      /* 3 x 3, likewise */
+  double law_torque[DASHPOT_MAX_JOINTS]; /* torque of the impedance law before the limits, N m */
+  double tip_error[6];  /* from tip to reference: difference of positions, m, and rotation
+                           vector, rad */
+  double tip_wrench[6]; /* wrench of Cartesian springs, dampers and feed-forward, N and N m */
 } dashpot_snapshot;
 
-/* A vibration mode; docs/concepts.md says what the numbers mean. A bound says how far the
- * number can be wrong; it is infinite if none could be proved. */
+/* A vibration mode; docs/concepts.md explains the numbers. A bound is proved: the number differs
+ * from the true one by at most this. It is infinite if none could be proved. */
 typedef struct dashpot_mode {
   double natural_frequency;              /* rad/s; NaN if there is none */
   double natural_frequency_bound;        /* rad/s */
-  double damping_ratio;                  /* above 1 if overdamped */
-  double damping_ratio_bound;            /* */
+  double damping_ratio;                  /* no unit; above 1 if overdamped */
+  double damping_ratio_bound;            /* no unit */
   double damped_frequency;               /* rad/s */
   double eigenvalues[2][2];              /* real and imaginary part, 1/s */
   double eigenvalue_bound;               /* 1/s */
   int32_t kind;                          /* DASHPOT_UNDERDAMPED, ... */
-  int32_t label;                         /* stays with this mode as long as it can be followed */
-  double shape_real[DASHPOT_MAX_JOINTS]; /* how far each joint moves, u^H M u = 1; zero if the
-                                            configuration asks for no shapes */
-  double shape_imag[DASHPOT_MAX_JOINTS];
+  int32_t label;                         /* a mode keeps it as long as it can be followed */
+  double shape_real[DASHPOT_MAX_JOINTS]; /* real part of u: how far each joint moves, u^H M u = 1;
+                                            zero if the configuration asks for no shapes */
+  double shape_imag[DASHPOT_MAX_JOINTS]; /* imaginary part of u */
 } dashpot_mode;
 
 /* The modes at one tick, by falling natural frequency. */
 typedef struct dashpot_modes {
   uint32_t struct_size;
   uint32_t joints;                     /* n */
-  int64_t time;                        /* of the state that they belong to, ns */
-  uint64_t tick;                       /* likewise */
-  double position[DASHPOT_MAX_JOINTS]; /* likewise, rad */
+  int64_t time;                        /* of the state that the modes belong to, ns */
+  uint64_t tick;                       /* of that state */
+  double position[DASHPOT_MAX_JOINTS]; /* of that state, rad */
   int32_t status;                      /* 0: all numbers have a proved bound */
-  uint32_t zero_modes;                 /* motions that no spring resists */
-  uint32_t count;                      /* of the modes */
+  uint32_t zero_modes;                 /* number of motions that no spring resists */
+  uint32_t count;                      /* number of modes */
   int32_t origin;                      /* DASHPOT_TRACKED, ... */
-  /* Ticks since the start or the last reset, each of which counts once here, ... */
-  uint64_t tracked;    /* the modes before were refined */
-  uint64_t reused;     /* the modes before still held within their bounds */
-  uint64_t direct;     /* solved directly */
-  uint64_t unchanged;  /* joints and gains did not move at all: nothing was computed */
-  uint64_t no_springs; /* nothing vibrates: nothing was solved */
-  uint64_t failed;     /* no modes */
+  /* Numbers of ticks since the start or the last reset. Each tick counts once in these: */
+  uint64_t tracked;    /* the last modes were refined */
+  uint64_t reused;     /* the last modes were still right within their bounds */
+  uint64_t direct;     /* the modes were solved directly */
+  uint64_t unchanged;  /* joints and gains did not move at all, so nothing was computed */
+  uint64_t no_springs; /* nothing vibrates, so nothing was solved */
+  uint64_t failed;     /* there are no modes */
   uint64_t missed;     /* the background thread was busy */
-  /* ... and what some of them could leave out. */
-  uint64_t no_zero_modes; /* springs hold every motion */
-  uint64_t proportional;  /* the undamped modes decouple the damping, by design or for want of it */
+  /* What some of these ticks could leave out: */
+  uint64_t no_zero_modes; /* springs resist every motion, so no zero modes were kept apart */
+  uint64_t proportional;  /* the undamped modes decouple the damping: ratio damping, or none */
   uint64_t no_wrench;     /* geometric_stiffness is on, but there is no external wrench */
-  uint64_t no_shapes;     /* nobody asks for shapes */
+  uint64_t no_shapes;     /* the configuration asks for no shapes */
   uint64_t at_rest;       /* jacobian_rate is on, but the robot stands still */
   dashpot_mode modes[DASHPOT_MAX_JOINTS];
 } dashpot_modes;
 
-/* A mode of the continuous loop, and what becomes of it because the torque is held over a tick,
- * delayed and filtered. */
+/* A mode of the continuous loop, and the same mode in the loop as it runs, with the torque held
+ * over a period (zero-order hold), delayed and filtered. */
 typedef struct dashpot_sampled_mode {
-  double continuous_frequency; /* natural, rad/s */
-  double continuous_ratio;     /* */
-  double natural_frequency;    /* rad/s; NaN if there is none */
-  double damping_ratio;        /* */
-  double damped_frequency;     /* rad/s */
+  double continuous_frequency; /* natural frequency of the continuous loop, rad/s */
+  double continuous_ratio;     /* damping ratio of the continuous loop, no unit */
+  double natural_frequency;    /* of the sampled loop, rad/s; NaN if there is none */
+  double damping_ratio;        /* of the sampled loop, no unit */
+  double damped_frequency;     /* of the sampled loop, rad/s */
   int32_t kind;                /* DASHPOT_UNDERDAMPED, ... */
   int32_t reserved;            /* 0 */
 } dashpot_sampled_mode;
 
-/* The sampled loop at one tick, now and then, if the configuration asks for it
- * (analysis: sampled: interval). */
+/* The sampled loop at one tick. A thread analyses it at the interval that the configuration sets
+ * (analysis.sampled.interval). */
 typedef struct dashpot_sampled_modes {
   uint32_t struct_size;
   uint32_t joints;                     /* n */
-  int64_t time;                        /* of the state that they belong to, ns */
-  uint64_t tick;                       /* likewise */
-  double position[DASHPOT_MAX_JOINTS]; /* likewise, rad */
-  double spectral_radius;              /* the loop is stable below 1 */
-  double gain_margin; /* all gains can grow by this factor before it is unstable; infinity: any */
+  int64_t time;                        /* of the state that the modes belong to, ns */
+  uint64_t tick;                       /* of that state */
+  double position[DASHPOT_MAX_JOINTS]; /* of that state, rad */
+  double spectral_radius;              /* largest |z| of the loop, which is stable below 1 */
+  double gain_margin; /* all gains can grow by this factor before the loop is unstable; infinity:
+                         by any factor */
   int32_t status;     /* 0: all modes were found */
-  uint32_t count;     /* of the modes, by falling continuous_frequency */
+  uint32_t count;     /* number of modes, by falling continuous_frequency */
   dashpot_sampled_mode modes[DASHPOT_MAX_JOINTS];
 } dashpot_sampled_modes;
 
-/* Reads a YAML file (see controller/examples/panda.yaml) and the URDF that it names. NULL on
- * failure: dashpot_last_error says why, in one line with file, key and line. Gains that
- * dashpot_set_gains would refuse are a failure. */
+/* Creates a controller from a YAML file (see controller/examples/panda.yaml) and the URDF that the
+ * file names. Returns NULL on failure; dashpot_last_error then says why, in one line with file, key
+ * and line. Gains that dashpot_set_gains would refuse are a failure. */
 dashpot_controller* dashpot_create(const char* config_path);
 
-/* NULL is fine. */
+/* Destroys a controller. Does nothing if `controller` is NULL. */
 void dashpot_destroy(dashpot_controller* controller);
 
-/* What the last call of dashpot_create, dashpot_start, dashpot_set_setpoint, dashpot_set_gains,
- * dashpot_judge_gains, dashpot_release, dashpot_read_snapshot, ..._modes or ..._sampled_modes in
- * this thread had to complain of, in one line; "" if nothing. Valid until the next such call in
- * this thread. */
+/* Returns a one-line description of the last error in this thread; "" if the last call succeeded.
+ * Calls that count are dashpot_create, dashpot_start, dashpot_set_setpoint, dashpot_set_gains,
+ * dashpot_judge_gains, dashpot_release, dashpot_read_snapshot, ..._modes and ..._sampled_modes. The
+ * text is valid until the next of these calls in this thread. */
 const char* dashpot_last_error(void);
 
-/* n; 0 if `controller` is NULL */
+/* Returns n; 0 if `controller` is NULL. */
 uint32_t dashpot_joints(const dashpot_controller* controller);
-/* Of joint 0 to n - 1, from the base to the tip, as in the URDF; NULL if there is no such joint.
- * Valid until dashpot_destroy. */
+/* Returns the name in the URDF of joint 0 to n - 1, counted from the base to the tip; NULL if there
+ * is no such joint. The text is valid until dashpot_destroy. */
 const char* dashpot_joint_name(const dashpot_controller* controller, uint32_t joint);
-/* Of the loop, s; 0 if `controller` is NULL */
+/* Returns the period of the loop, s; 0 if `controller` is NULL. */
 double dashpot_period(const dashpot_controller* controller);
 
-/* One tick, on the real-time thread: takes bounded time, allocates nothing, waits for nothing.
- * `setpoint` NULL: the latest of dashpot_set_setpoint; the last one if there is no new one; until
- * there is one at all, the robot is held where it is. Use one of the two ways, not both. New gains
- * count from the next set-point that is new, by its time, or NULL.
- * Returns a status, or a negative code: then `output` is not written, and the host has to bring
- * the robot to a stop. A state that is NULL or wrong is no refusal: it gives a torque and a
- * status. A set-point that is wrong is rejected, and the last one stays. */
+/* Does one tick on the real-time thread: takes the state and the set-point, and writes the torque.
+ * Takes bounded time, allocates nothing and waits for nothing.
+ *
+ * If `setpoint` is NULL, the tick takes up the latest set-point of dashpot_set_setpoint; if there
+ * is no new one, the last set-point stays in force. As long as there is none at all, the robot
+ * stays where it is. Give set-points either here or to dashpot_set_setpoint, not both. New gains
+ * take effect at the next tick whose set-point is NULL or new by its time.
+ *
+ * Returns a status, or a negative code. With a negative code `output` is not written, and the host
+ * has to bring the robot to a stop. A state that is NULL or wrong is not refused: it gives a torque
+ * and a status. A wrong set-point is rejected, and the last one stays in force. */
 int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* state,
                        const dashpot_setpoint* setpoint, dashpot_output* output);
 
-/* Before the loop begins, with the robot at rest at `position` (n, rad): judges the gains of the
- * configuration there, as dashpot_set_gains does, and then does what dashpot_reset does, but that
- * `torque` NULL stands for the arm's weight there (zero where the robot compensates it). Takes some
- * milliseconds and allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error says more.
- * A loop that never called it starts from the weight too, but with gains that nobody judged at its
- * posture. */
+/* Prepares the loop before it begins, with the robot at rest at `position` (n, rad). Judges the
+ * gains of the configuration at `position` as dashpot_set_gains does, and then resets as
+ * dashpot_reset does. `torque` (n, N m) is the torque that the robot applies now; NULL stands for
+ * the arm's weight at `position` (zero where the robot compensates it). Takes some milliseconds and
+ * allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error then says more.
+ * A loop without this call starts from the weight as well, but with gains that were not judged at
+ * its posture. */
 int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);
 
-/* On the real-time thread: forgets history, faults and set-point, but not the gains; the next tick
- * holds the robot where it is, as the first one did, and until modes are found again there are
- * none. The torque-rate limit counts from `torque` (n, N m), which the robot applies now; NULL:
- * from the last one put out, or, before the first tick, from the arm's weight. */
+/* Forgets history, faults and set-point, but not the gains. Called on the real-time thread. The
+ * next tick keeps the robot where it is, as the first one did. There are no modes until they are
+ * found again. The torque-rate limit counts from `torque` (n, N m), the torque that the robot
+ * applies now. If `torque` is NULL, the limit counts from the last torque put out, or, before the
+ * first tick, from the arm's weight. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_reset(dashpot_controller* controller, const double* torque);
 
-/* On the other thread: the next tick releases a latched fault, unless its cause is still there, and
- * holds the robot where it is until there is another set-point. Without a fault it does nothing. */
+/* Releases a latched fault at the next tick, unless the cause of the fault is still present. Called
+ * on the other thread. The robot then stays where it is until there is another set-point. Does
+ * nothing if there is no fault. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_release(dashpot_controller* controller);
 
-/* On the other thread. The next tick takes it up; of several, the latest. dashpot_set_gains refuses
- * gains (DASHPOT_UNSTABLE_GAINS) with which the loop as it is sampled, at the posture of the latest
- * tick, would have less than limits.gain_margin: in either mode, with the delay and the filters of
- * analysis.sampled. Before dashpot_start and the first tick, it refuses those that have it at none
- * of eight postures spread over the position limits. A motion that needs more than 6 s to swing or
- * to grow e-fold does not count. It judges gains that are new, which takes some milliseconds and
- * allocates. */
+/* Sets the set-point that the next tick takes up; of several, the latest. Called on the other
+ * thread. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpoint* setpoint);
+
+/* Sets the gains that the next tick takes up; of several, the latest. Called on the other thread.
+ * Returns DASHPOT_OK or a negative code.
+ *
+ * Gains that are new are judged, which takes some milliseconds and allocates. Gains are refused
+ * (DASHPOT_UNSTABLE_GAINS) if the sampled loop, with the delay and the filters of analysis.sampled,
+ * would have less than limits.gain_margin in either mode at the posture of the latest tick. Before
+ * dashpot_start and the first tick, gains are refused if they have this margin at none of eight
+ * postures spread over the position limits. A motion that needs more than 6 s to swing or to grow
+ * e-fold does not count. */
 int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains);
 
-/* On any thread, for instance the one that receives gains: judges them as dashpot_set_gains would,
- * at `position` (n, rad; NULL: at the posture of the latest tick, if there was one), and sets
- * `margin` (NULL: not wanted) to the factor by which they could grow, or to limits.gain_margin if
- * it is more. What is NULL in `gains` is that of the configuration. What it has accepted last
- * dashpot_set_gains does not judge again, within 0.1 rad of that posture. */
+/* Judges gains as dashpot_set_gains does, without setting them. May be called on any thread, for
+ * instance on one that receives gains. The posture is `position` (n, rad), or, if `position` is
+ * NULL, the posture of the latest tick; DASHPOT_NOTHING_YET if there was no tick. Sets `margin`,
+ * unless it is NULL, to the factor by which the gains could grow, at most limits.gain_margin. A
+ * member of `gains` that is NULL stands for the gain of the configuration. dashpot_set_gains does
+ * not judge the gains that were accepted last again within 0.1 rad of the posture where they were
+ * judged. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
                             const double* position, double* margin);
 
-/* On the other thread: the latest finished tick, the latest modes, and the latest of the sampled
- * loop. The caller sets struct_size, the rest is written. */
+/* Read the latest finished tick, the latest modes, and the latest analysis of the sampled loop.
+ * Called on one thread, always the same. The caller sets struct_size; the functions write the other
+ * members. They return DASHPOT_OK or a negative code, DASHPOT_NOTHING_YET if there is nothing to
+ * read so far. */
 int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* snapshot);
 int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes);
 int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampled_modes* modes);
 
-/* A short English text for what a function returned ("torque limited"), and for the kind of a mode
- * ("underdamped"). Never NULL. */
+/* Return a short English text for what a function returned ("torque limited"), and for the kind of
+ * a mode ("underdamped"); never NULL. */
 const char* dashpot_status_text(int32_t status);
 const char* dashpot_kind_text(int32_t kind);
 
-/* All of the above, for hosts that load the library at run time. */
+/* All functions above, for hosts that load the library at run time. */
 typedef struct dashpot_plugin {
   uint32_t struct_size;
   uint32_t version; /* DASHPOT_PLUGIN_VERSION */
@@ -367,7 +405,8 @@ typedef struct dashpot_plugin {
   const char* (*kind_text)(int32_t);
 } dashpot_plugin;
 
-/* NULL if the library does not know this version. The struct lives as long as the library. */
+/* Returns the functions of this version of the interface; NULL if the library does not know it. The
+ * struct lives as long as the library. */
 const dashpot_plugin* dashpot_plugin_interface(uint32_t version);
 
 #ifdef __cplusplus

@@ -5,13 +5,13 @@
 
 namespace dashpot::controller {
 
-/// What makes a RobotModel, or another program's model of the same robot.
+/// What a RobotModel is made from, or another program's model of the same robot.
 struct RobotDescription {
   std::string urdf;  ///< path
   std::string base, tip;
   ModelOptions options;
 
-  /// Throws InvalidModel.
+  /// Returns the model. Throws InvalidModel.
   RobotModel model() const { return RobotModel::from_urdf_file(urdf, base, tip, options); }
 };
 

@@ -11,7 +11,7 @@ namespace dashpot::controller {
 
 enum class JointType : std::uint8_t { kRevolute, kContinuous, kPrismatic };
 
-/// What a URDF says of a joint. For a prismatic joint read m for rad and N for N m.
+/// Properties of a joint in a URDF. For a prismatic joint read m for rad and N for N m.
 struct Joint {
   std::string name;
   JointType type = JointType::kRevolute;
@@ -24,22 +24,23 @@ struct Joint {
   double reflected_inertia = 0;  ///< of rotor and gear, as seen by the joint, kg m^2 (kg)
 };
 
-/// A body held at the tip, in the axes of the tip link.
+/// A body that the tip carries, in the axes of the tip link.
 struct Payload {
   double mass = 0;                                    ///< kg
   Eigen::Vector3d center = Eigen::Vector3d::Zero();   ///< of mass, from the tip link's origin, m
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre of mass, kg m^2
 };
 
-/// What a URDF does not say, or says wrong. A vector without entries leaves what the URDF says.
+/// What a URDF does not say, or says wrong. A vector without entries keeps the URDF's values.
 struct ModelOptions {
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< in axes of the URDF's root link, m/s^2
-  /// Links that hang off the chain (fingers, cameras) count, rigid at their zero position.
+  /// Whether links off the chain (fingers, cameras) count, rigid at their zero position.
   bool include_off_chain = true;
-  /// Takes the inertia of a link as it is, though no body can have it: negative moments, or one
-  /// that is more than the sum of the others. The mass matrix has to be positive definite still.
+  /// Whether inertias of links are accepted though no body can have them: with negative moments, or
+  /// with one moment above the sum of the others. The mass matrix has to be positive definite even
+  /// so.
   bool accept_inertias = false;
-  JointVector reflected_inertia;  ///< n, kg m^2; none in a URDF
+  JointVector reflected_inertia;  ///< n, kg m^2; a URDF has none
   JointVector viscous_friction;   ///< n, N m s/rad
   JointVector coulomb_friction;   ///< n, N m
   Payload payload;
@@ -55,36 +56,36 @@ class InvalidModel : public std::invalid_argument {
 /// A serial chain of 1 to 16 revolute, continuous or prismatic joints between two links of a URDF.
 /// Fixed joints are merged into the link before them. Immutable; a copy shares the data.
 ///
-/// B is the base link, which stands still wherever it is in the file's tree: joints above it keep
-/// their zero position. T is the tool's frame: the tip link, or ModelOptions::tool in it.
+/// B is the base link, which stands still wherever it is in the file's tree, because joints above
+/// it keep their zero position. T is the tool's frame: the tip link, or ModelOptions::tool in it.
 ///
-/// The chain must be such that the mass matrix is positive definite: massless links are fine as
-/// long as something further out resists each joint, or a reflected inertia does.
+/// The mass matrix must be positive definite. Massless links are fine as long as each joint has a
+/// reflected inertia or moves a mass further out.
 class RobotModel {
  public:
-  /// Both throw InvalidModel; `name` stands for the file in messages.
+  /// Both read a model and throw InvalidModel; `name` stands for the file in messages.
   static RobotModel from_urdf_file(const std::string& path, const std::string& base,
                                    const std::string& tip, const ModelOptions& options = {});
   static RobotModel from_urdf_text(const std::string& text, const std::string& base,
                                    const std::string& tip, const ModelOptions& options = {},
                                    const std::string& name = "URDF");
 
-  /// Of the robot, as the URDF has it.
+  /// Returns the robot's name in the URDF.
   const std::string& name() const noexcept;
   const std::string& base() const noexcept;
   const std::string& tip() const noexcept;
 
-  /// n, from 1 to kMaxJoints
+  /// Returns n, from 1 to kMaxJoints.
   int dof() const noexcept;
-  /// n, from the base to the tip
+  /// Returns the n joints, from the base to the tip.
   const std::vector<Joint>& joints() const noexcept;
-  /// n: one property of all joints, `joint_values(&Joint::effort)`.
+  /// Returns one property of all n joints, as in `joint_values(&Joint::effort)`.
   JointVector joint_values(double Joint::*property) const;
 
-  /// In B's axes, m/s^2
+  /// Returns the acceleration of gravity in B's axes, m/s^2.
   const Eigen::Vector3d& gravity() const noexcept;
 
-  /// What the model is made of; kdl_chain.hpp shows its KDL::Chain.
+  /// Data of the model; kdl_chain.hpp returns its KDL::Chain.
   struct Data;
   const Data& data() const noexcept { return *data_; }
 

@@ -6,17 +6,18 @@
 
 namespace dashpot::controller {
 
-/// What is added to the springs and dampers. Each that is off costs nothing.
+/// Terms that are added to springs and dampers. A term that is off costs nothing.
 struct FeedForward {
   bool gravity = true;  ///< off where the robot compensates gravity itself
-  /// C(q, qd) qd, as measured. With it the loop is M qdd + D qd + K e = external torque, that of
-  /// the modes, at any speed; but its energy then changes by -qd' (D - 1/2 dM/dt) qd, so that it is
-  /// passive only as long as D - 1/2 dM/dt is positive semidefinite. Without it the change is
-  /// -qd' D qd: passive at any speed, see docs/energy.md.
+  /// C(q, qd) qd, at the measured state. With it the loop is M qdd + D qd + K e = external torque
+  /// at any speed, the loop whose modes are analysed. But the energy of the loop then changes by
+  /// -qd' (D - 1/2 dM/dt) qd, so that the loop is passive only as long as D - 1/2 dM/dt is positive
+  /// semidefinite. Without this term the energy changes by -qd' D qd, and the loop is passive at
+  /// any speed; see docs/energy.md.
   bool coriolis = true;
   bool friction = false;     ///< the model's viscous and Coulomb friction, at the velocity of the
-                             ///< moving set-point: it adds no feedback
-  bool acceleration = true;  ///< M times the acceleration of the moving set-point
+                             ///< reference, so that it adds no feedback
+  bool acceleration = true;  ///< M times the acceleration of the reference
   bool wrench = true;        ///< J' times the wrench of the set-point
 };
 
@@ -26,18 +27,18 @@ struct TaskTerms {
   bool jacobian_rate = false;        ///< J' C_C Jdot, in the analysis
 };
 
-/// How fast set-points and gains may move. The path to a new set-point accelerates at these limits
-/// and brakes at half of them.
+/// Limits of how fast references and gains change. On the way to a new set-point the reference
+/// accelerates at these limits and brakes at half of them.
 struct Motion {
-  JointVector velocity;               ///< of the joint set-point, n, rad/s, positive
+  JointVector velocity;               ///< of the joint reference, n, rad/s, positive
   JointVector acceleration;           ///< n, rad/s^2, positive
-  double linear_velocity = 0.5;       ///< of the tip, m/s
+  double linear_velocity = 0.5;       ///< of the tip reference, m/s
   double linear_acceleration = 2.0;   ///< m/s^2
   double angular_velocity = 1.5;      ///< rad/s
   double angular_acceleration = 6.0;  ///< rad/s^2
-  double smoothing = 0.03;  ///< acceleration of a path changes over this time, s; at least one
-                            ///< period, at most kMostSmoothing of them
-  double gain_time = 0.5;   ///< a change of gains, wrench or mode takes this long, s
+  double smoothing = 0.03;  ///< time over which the reference's acceleration changes, s; from 1
+                            ///< to kMostSmoothing periods
+  double gain_time = 0.5;   ///< duration of a change of gains, wrench or mode, s
 };
 
 inline constexpr double kMostSmoothing = 256;  ///< periods
@@ -51,7 +52,7 @@ struct Wall {
   double distance(const Eigen::Vector3d& p) const noexcept { return normal.dot(p - point); }
 };
 
-/// Bounds that the torque and the robot keep to. See SafetyFilter and MotionWatch, which hold them.
+/// Limits of torque and motion. SafetyFilter and MotionWatch enforce them.
 struct Limits {
   JointVector torque;           ///< n, N m, positive
   JointVector torque_rate;      ///< n, N m/s, positive
@@ -60,42 +61,46 @@ struct Limits {
   JointVector position_lower;   ///< n, rad; -infinity if there is none
   JointVector position_upper;   ///< n, rad; infinity if there is none
   JointVector position_margin;  ///< repulsion begins this far before a position limit, n, rad
-  /// Its torque at the limit, as a fraction of the torque limit; less where that would make it
-  /// vibrate, or push a joint back faster than a tenth of its velocity limit.
+  /// Torque of the repulsion at the position limit, as a fraction of the torque limit. It is less
+  /// where this torque would make the joint vibrate, or push it back faster than a tenth of its
+  /// velocity limit.
   double repulsion = 0.5;
-  JointVector return_velocity;  ///< with which a joint outside its limits returns, n, rad/s; 0: not
-  /// The Cartesian springs are drawn out no further than this, m and rad, however far away the goal
-  /// is: beyond it they pull no harder, and their path waits for the robot (see TipReference). A
-  /// path that is to brake within this is no faster than sqrt(acceleration times it).
+  JointVector return_velocity;  ///< of a joint outside its limits, n, rad/s; 0: it does not return
+  /// Error clamp: the Cartesian springs are extended no further than this, m and rad, however far
+  /// away the goal is. Beyond it they pull no harder, and the reference waits for the robot (see
+  /// TipReference). A reference that is to brake within the clamp is no faster than
+  /// sqrt(acceleration * clamp).
   double linear_error = 0.3;
   double angular_error = 1.0;
-  /// Of the safe output "damp", n, N m s/rad, positive; less where the sampled loop would not bear
-  /// it.
+  /// Joint damping of the safe output "damp", n, N m s/rad, positive; it is less where the sampled
+  /// loop would be unstable with it.
   JointVector damping;
-  /// Most power of all that exceeds the weight, W; infinity: any. More is scaled down evenly.
+  /// Largest power of the torque in excess of the weight, W; infinity: any. A larger power is
+  /// scaled down, in all joints alike.
   double power = std::numeric_limits<double>::infinity();
-  /// External torque of a joint (n, N m) that counts as a collision; infinity: none does. It is
-  /// estimated from the motion, and so contains the friction that the model does not know.
+  /// External torque of a joint (n, N m) that counts as a collision; infinity: none does. The
+  /// torque is estimated from the motion, and so contains friction that the model does not know.
   JointVector external_torque;
-  /// The same of the force in RobotState::external_wrench, N.
+  /// Force in RobotState::external_wrench that counts as a collision, N; infinity: none does.
   double external_force = std::numeric_limits<double>::infinity();
   std::vector<Wall> walls;  ///< at most kMaxWalls
-  /// Gains are refused if the sampled loop is unstable with them grown by this factor or less; 1
-  /// accepts all. See GainJudge.
+  /// Gains are refused if the sampled loop would be unstable with all gains multiplied by this
+  /// factor or by a smaller one; 1 accepts all gains. See GainJudge.
   double gain_margin = 2;
 };
 
 inline constexpr std::size_t kMaxWalls = 8;
 
-/// When input is too old to act on.
+/// Times after which input is too old to act on.
 struct Watchdog {
-  double setpoint_hold = 0.5;  ///< a set-point older than this: hold, s; 0: never
-  double setpoint_damp = 2.0;  ///< older than this: damp, s; 0: never
-  double longest_gap = 0.01;   ///< between two good states, s; a longer one is a fault
-  /// States are checked against each other over about so long, s: positions against velocities, and
-  /// for two fifths of it whether they change at all; 0: not
+  double setpoint_hold = 0.5;  ///< age of a set-point from which on the output is hold, s; 0: never
+  double setpoint_damp = 2.0;  ///< age from which on the output is damp, s; 0: never
+  double longest_gap = 0.01;   ///< longest time between two good states, s; a longer gap is a fault
+  /// Time over which states are checked against each other, s; 0: no check. Positions are compared
+  /// with velocities over about this time. Whether states change at all is checked over two fifths
+  /// of it.
   double feedback = 0.5;
-  double release_after = 0;  ///< faults are released after a rest of so long, s; 0: never
+  double release_after = 0;  ///< time at rest after which faults are released, s; 0: never
 };
 
 /// The vibration analysis beside the law.
@@ -103,44 +108,47 @@ struct Analysis {
   enum class Where : std::uint8_t {
     kOff,
     kInline,      ///< within the tick
-    kBackground,  ///< on a thread of its own, one tick later or when it gets round to it
+    kBackground,  ///< on a thread of its own, one tick later or when the thread has time
   } where = Where::kInline;
   int every = 1;  ///< ticks between two analyses, at least 1
-  /// Of a period that the analysis within a tick may take, above 0 and at most 1: what needs more
-  /// goes on on a thread of its own, and says so (analysis::Status::kUnfinished). It is counted,
-  /// not timed: kWorkPerSecond units of analysis::Work are a second, as ./run bench has it: 5.05 us
-  /// for a tick of 7 joints with 130,000 instructions. And so that ticks are even, it is at most
-  /// kEvenWork (n / 7)^3 share / 10 % for n joints, about ten ticks in which modes are followed.
+  /// Share of a period that the analysis within a tick may take, above 0 and at most 1. A task that
+  /// needs more continues on a thread of its own, and the status is analysis::Status::kUnfinished
+  /// meanwhile. Work is counted, not timed: kWorkPerSecond units of analysis::Work are a second, as
+  /// measured by ./run bench: 5.05 us for a tick of 7 joints with 130,000 instructions. So that
+  /// ticks are even, the work is at most kEvenWork (n / 7)^3 share / 10 % for n joints, the work of
+  /// about ten ticks in which modes are followed.
   double share = 0.1;
   static constexpr double kWorkPerSecond = 2.5e10;
   static constexpr double kEvenWork = 1e6;
   double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
-  bool shapes = true;                      ///< with eigenvectors
+  bool shapes = true;                      ///< whether eigenvectors are computed
 
-  /// The modes of the loop as it runs, beside the continuous ones; see SampledAnalysis.
+  /// Analysis of the sampled loop, beside the continuous one; see SampledAnalysis.
   struct Sampled {
-    double interval = 0;               ///< between two analyses, s; 0: none
-    int delay = 0;                     ///< ticks from a torque to its effect, beyond the hold
+    double interval = 0;               ///< time between two analyses, s; 0: no analysis
+    int delay = 0;                     ///< ticks from a torque to its effect, beyond the
+                                       ///< zero-order hold
     double cutoff = 0;                 ///< of the drives' first-order low-pass, Hz; 0: none
     bool difference_velocity = false;  ///< the robot reports (q_k - q_k-1) / period for velocity
   } sampled;
 };
 
-/// Everything that is set once. Defaults stand here; those that depend on the robot are filled in
-/// by `default_settings`.
+/// Everything that is set once. Defaults stand here; `default_settings` fills in the defaults that
+/// depend on the robot.
 struct Settings {
   double period = 0.001;  ///< of the control loop, s
   FeedForward feed_forward;
   TaskTerms task_terms;
-  /// Whether the joints' viscous friction, as the model has it, is taken off the damping that holds
-  /// a ratio. Only where it is measured: if the robot has less, its modes have less than the ratio.
+  /// Whether the joints' viscous friction in the model is subtracted from damping that is designed
+  /// for a ratio. Only for friction that was measured, because modes have less than the ratio if
+  /// the robot has less friction.
   bool subtract_friction = false;
   Motion motion;
   Limits limits;
   Watchdog watchdog;
   Analysis analysis;
-  Setpoint initial;  ///< mode and gains from the start; its positions are ignored: the
-                     ///< controller starts by holding where the robot is
+  Setpoint initial;  ///< mode and gains at the start; its positions are ignored, because the
+                     ///< controller starts by keeping the robot where it is
 };
 
 }  // namespace dashpot::controller

@@ -11,30 +11,30 @@ namespace dashpot::controller {
 /// Torque and torque-rate limits hold for all of them. Where damp and ramp take torque away, it
 /// fades evenly: in all joints alike, as slowly as the slowest torque-rate limit makes it.
 ///
-/// Faults latch. A status whose safe output is "damp" (but kSetpointLost), and "ramp" for longer
-/// than Watchdog::longest_gap, leave a fault behind: the arm is damped, with its weight held, until
-/// Controller::release or reset, or, if Watchdog::release_after says so, until it has been at rest
-/// for that long. Meanwhile the status is kFaultLatched or worse, and Snapshot::fault names the
-/// fault. After that, and after a lost set-point, the springs start where the robot is, with gains
-/// that grow from zero within Motion::gain_time; Snapshot::restarts counts these. After a ramp of
-/// at most Watchdog::longest_gap the controller goes on where it was.
+/// Faults latch. A status whose safe output is "damp" (but kSetpointLost), or "ramp" for longer
+/// than Watchdog::longest_gap, leaves a fault behind: the arm stays damped, with its weight held,
+/// the status is kFaultLatched or worse, and Snapshot::fault names the fault. This ends with
+/// Controller::release or reset, or, if Watchdog::release_after is set, once the arm has been at
+/// rest for that long. Then, as after a lost set-point, the springs start where the robot is, with
+/// gains that grow from zero within Motion::gain_time; Snapshot::restarts counts these restarts.
+/// After a ramp of at most Watchdog::longest_gap the controller continues where it was.
 enum class Status : std::uint8_t {
   kOk,
-  // The torque is as asked for, as far as it goes:
+  // The torque is the wanted one as far as possible:
   kTorqueLimited,    ///< a limit of torque, torque rate, power or speed is at work
   kNearJointLimit,   ///< a joint is within the margin of a position limit; its repulsion is at work
-  kWrenchNotFinite,  ///< NaN or infinity in RobotState::external_wrench; the last finite one stays
-                     ///< in force, in the analysis, which alone uses it
-  kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, a rotation that is
-                      ///< none, an unreachable joint position or a time to come; the last good one
-                      ///< stays in force
-  kWeightNotHeld,     ///< the weight of the arm needs more than a torque limit: it sinks
+  kWrenchNotFinite,  ///< NaN or infinity in RobotState::external_wrench; the last finite wrench
+                     ///< stays in force in the analysis, which alone uses it
+  kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, a matrix that is no
+                      ///< rotation, an unreachable joint position or a time in the future; the last
+                      ///< good set-point stays in force
+  kWeightNotHeld,     ///< the weight of the arm needs more than a torque limit: the arm sinks
   // The set-point is too old:
   kSetpointStale,  ///< older than the first time-out: hold
   kSetpointLost,   ///< older than the second time-out: damp
   // The state cannot go on like this: damp, and the fault latches:
-  kFaultLatched,        ///< none of the following any more, but one was and was not released
-  kTooManyRestarts,     ///< springs started again more than three times within about a second
+  kFaultLatched,        ///< none of the following is present, but one was and was not released
+  kTooManyRestarts,     ///< the springs restarted more than three times within about a second
   kTimeGap,             ///< more than the longest gap since the last tick
   kWrongRate,           ///< ticks come at less than 2/3 or more than 3/2 of the configured rate
   kCollision,           ///< an external torque or force above its threshold
@@ -53,17 +53,18 @@ enum class Status : std::uint8_t {
   kNotFinite,       ///< the law gave a NaN or infinity
 };
 
-/// The more severe one, which stands last.
+/// Returns the more severe of two statuses, the last one in the list above.
 inline Status worse(Status a, Status b) noexcept {
   return a < b ? b : a;
 }
 
-/// True for what latches as soon as it happens; what leads to "ramp" latches after a while.
+/// Returns true if a status latches as soon as it happens. A status whose output is "ramp" latches
+/// only after Watchdog::longest_gap.
 inline bool latches(Status status) noexcept {
   return status > Status::kFaultLatched && status < Status::kStateNotFinite;
 }
 
-/// Returns "ok", "torque limited", ...: a short English text.
+/// Returns a short English text: "ok", "torque limited", ...
 const char* to_text(Status status) noexcept;
 
 }  // namespace dashpot::controller

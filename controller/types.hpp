@@ -1,5 +1,5 @@
 #pragma once
-// Plain data that goes into and out of the controller. Frames: B is the base link, T the tip (the
+// Plain data, input and output of the controller. Frames: B is the base link, T the tip (the
 // tool's frame). p_BT_B is the position of T in B, expressed in B's axes; R_BT turns T's axes into
 // B's. Twists and wrenches have the linear part first, are taken at the tip, in B's axes.
 
@@ -11,17 +11,18 @@
 
 namespace dashpot::controller {
 
-/// The longest chain the controller takes.
+/// Largest number of joints of the controller.
 inline constexpr int kMaxJoints = analysis::kMaxDof;
 
-/// n: one entry a joint, from the base to the tip; rad (m for a prismatic joint), rad/s, N m, ...
+/// n entries, one for each joint, from the base to the tip; rad (m for a prismatic joint), rad/s,
+/// N m, ...
 using JointVector = analysis::Vector<kMaxJoints>;
 /// n x n
 using JointMatrix = analysis::Square<kMaxJoints>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-/// Where a frame stands in the base link: p_BT_B in m, and R_BT.
+/// Position and orientation of a frame in the base link: p_BT_B in m, and R_BT.
 struct Pose {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
@@ -32,9 +33,10 @@ struct RobotState {
   std::int64_t time = 0;  ///< ns, of any clock that does not run backward
   JointVector position;   ///< rad or m
   JointVector velocity;   ///< rad/s or m/s
-  /// That the world exerts on the tip, N and N m; known or estimated. K_G uses it, in the
-  /// analysis, and Limits::external_force: with that, a wrench that is not finite is a collision;
-  /// else it is reported (Status::kWrenchNotFinite), and changes no torque.
+  /// Wrench that the world exerts on the tip, N and N m; known or estimated. Only K_G in the
+  /// analysis and Limits::external_force use it. With Limits::external_force, a wrench that is not
+  /// finite is a collision. Otherwise such a wrench is reported (Status::kWrenchNotFinite) and
+  /// changes no torque.
   Vector6 external_wrench = Vector6::Zero();
 };
 
@@ -47,8 +49,9 @@ enum class Mode : std::uint8_t {
 /// In whose axes K_C, C_C and `directions` are given.
 enum class Frame : std::uint8_t { kBase, kTool };
 
-/// Modes slower than this have no damping ratio worth the name, rad/s: a swing takes a minute. The
-/// analysis calls them soft unless it is set otherwise, and a ratio that is held lets go of them.
+/// Natural frequency below which a damping ratio means nothing, rad/s, because one swing takes a
+/// minute. The analysis calls slower modes soft unless it is set otherwise, and ratio damping gives
+/// them less than their ratio.
 inline constexpr double kSoftFrequency = 0.1;
 
 /// The largest damping ratio that can be asked for.
@@ -58,8 +61,8 @@ inline constexpr double kLargestDampingRatio = 2;
 struct Gains {
   JointMatrix joint_stiffness;  ///< n x n, N m/rad, of mode kJoint
   JointMatrix joint_damping;    ///< n x n, N m s/rad, of mode kJoint
-  /// Damping ratio that every mode of mode kJoint is to have, 0 < ratio <= 2, in place of
-  /// joint_damping; 0: joint_damping acts.
+  /// Damping ratio that every mode of mode kJoint is to have, 0 < ratio <= 2: the damping is then
+  /// designed at every tick, and joint_damping is not used. 0: joint_damping acts.
   double joint_damping_ratio = 0;
   Matrix6 task_stiffness = Matrix6::Zero();  ///< K_C, N/m, N/rad and N m/rad
   Matrix6 task_damping = Matrix6::Zero();    ///< C_C, N s/m, N s/rad and N m s/rad
@@ -67,21 +70,21 @@ struct Gains {
   /// every tick (see DesignedDamping) and task_damping is not used. 0: C_C is task_damping.
   double task_damping_ratio = 0;
   Frame frame = Frame::kBase;
-  /// Task directions that the controller holds, in the axes of `frame`; the rest are as free as
-  /// the self-motion of a redundant arm.
+  /// Selected directions: the task directions with springs and dampers, in the axes of `frame`. The
+  /// others are as free as the self-motion of a redundant arm.
   std::array<bool, 6> directions{true, true, true, true, true, true};
   JointVector null_stiffness;  ///< n, N m/rad, toward the posture, within the free motions
   JointVector null_damping;    ///< n, N m s/rad, within the free motions
 };
 
-/// What the user wants. It may change at any tick; the controller goes there smoothly. It is read
-/// when its time differs from that of the last one.
+/// What the user wants. It may change at any tick; the controller moves there smoothly. A set-point
+/// is read if its time differs from the time of the last set-point.
 struct Setpoint {
   std::int64_t time = 0;  ///< ns, when it was given, on the clock of RobotState::time
   Mode mode = Mode::kJoint;
   JointVector joint_position;        ///< goal of mode kJoint; posture of mode kCartesian
   Pose tip_pose;                     ///< goal of mode kCartesian
-  Vector6 wrench = Vector6::Zero();  ///< that the tip is to exert besides, N and N m
+  Vector6 wrench = Vector6::Zero();  ///< that the tip exerts in addition, N and N m
   Gains gains;
 };
 

@@ -6,24 +6,25 @@
 
 namespace dashpot::lcmtypes {
 
-/// Everything that the accepted commands have set so far, so that no part is lost when two arrive
-/// within one tick.
+/// Everything that the accepted commands have set so far. It is accumulated, so that no part is
+/// lost if two commands arrive within one tick.
 struct Command {
-  std::int64_t utime = 0;     ///< of the last accepted one, us since 1970-01-01 UTC
-  std::int64_t sequence = 0;  ///< likewise
+  std::int64_t utime = 0;     ///< of the last accepted command, us since 1970-01-01 UTC
+  std::int64_t sequence = 0;  ///< of the last accepted command
   std::int32_t parts = 0;     ///< sum of command_t::MODE, ... that were ever set
-  std::int64_t accepted = 0;  ///< commands so far
-  /// For each bit of `parts`, which accepted command set it last, counted from 1.
+  std::int64_t accepted = 0;  ///< number of accepted commands so far
+  /// For each bit of `parts`, the number of the accepted command that set it last, counted from 1.
   std::array<std::int64_t, 9> set_by{};
   std::int64_t fault_tick = 0;    ///< of part RELEASE: the fault to release, by its tick
-  controller::Setpoint setpoint;  ///< only these parts of it have a meaning; not its time
+  controller::Setpoint setpoint;  ///< only the parts set so far mean anything; its time does not
 };
 
-/// True if a command later than the `after`-th accepted one has set `part` (command_t::MODE, ...).
+/// Returns true if a command later than the `after`-th accepted one has set `part`
+/// (command_t::MODE, ...).
 bool has_set(const Command& command, std::int32_t part, std::int64_t after) noexcept;
 
 /// Copies the parts that were set by commands later than the `after`-th accepted one into
-/// `setpoint`, and leaves the others and its time alone.
+/// `setpoint`, and does not change its other parts and its time.
 void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t after = 0) noexcept;
 
 }  // namespace dashpot::lcmtypes

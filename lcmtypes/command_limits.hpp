@@ -5,23 +5,23 @@
 
 namespace dashpot::lcmtypes {
 
-/// What a command may ask for. Position limits are the robot's; the other defaults are wide enough
-/// for any arm of human size.
+/// Limits of what a command may ask for. Position limits are the robot's; the other defaults are
+/// wide enough for any arm of human size.
 struct CommandLimits {
   controller::JointVector position_lower;  ///< n, rad
   controller::JointVector position_upper;  ///< n, rad
-  double reach = 3;                        ///< of the tip from the origin of the base link, m
+  double reach = 3;                        ///< distance of the tip from the base link's origin, m
   double force = 200;                      ///< each entry of the wrench, N
   double torque = 50;                      ///< N m
   double joint_stiffness = 20000;          ///< each entry, also in the null space, N m/rad
   double joint_damping = 2000;             ///< N m s/rad
   double task_stiffness = 50000;           ///< each entry, N/m, N/rad, N m/rad
   double task_damping = 5000;              ///< N s/m, N s/rad, N m s/rad
-  std::int64_t oldest = 500'000;           ///< a command may be this old when it arrives, us
+  std::int64_t oldest = 500'000;           ///< largest age of a command when it arrives, us
   std::int64_t furthest = 100'000;         ///< its time may be this far ahead of the receiver's, us
   std::int64_t silence = 1'000'000;        ///< a sender silent for longer no longer commands, us
-  double most_per_second = 2000;           ///< accepted commands; more are dropped
-  double burst = 50;                       ///< of which so many may come at once
+  double most_per_second = 2000;           ///< accepted commands a second; more are dropped
+  double burst = 50;                       ///< number of these that may come at once
 };
 
 }  // namespace dashpot::lcmtypes

@@ -12,12 +12,12 @@
 
 namespace dashpot::lcmtypes {
 
-/// Takes commands from a bus on a thread of its own, and keeps the last good state of affairs for
-/// the real-time thread. Whatever else arrives, or if nothing does, only counters change.
+/// Receives commands from a bus on a thread of its own, and keeps what the accepted ones have set
+/// for the real-time thread. Any other message changes only counters.
 class CommandReceiver {
  public:
-  /// Handles all messages of `bus` from now on: nobody else may. `take` is called on the
-  /// receiver's thread. Throws std::invalid_argument for bad limits, std::runtime_error if it
+  /// Handles all messages of `bus` from now on; nobody else may handle them. `take` is called on
+  /// the receiver's thread. Throws std::invalid_argument for bad limits, std::runtime_error if it
   /// cannot subscribe.
   CommandReceiver(std::shared_ptr<lcm::LCM> bus, const CommandLimits& limits,
                   CommandTaker take = {});
@@ -25,30 +25,31 @@ class CommandReceiver {
   CommandReceiver(const CommandReceiver&) = delete;
   CommandReceiver& operator=(const CommandReceiver&) = delete;
 
-  // Real-time thread only; none of these ever waits.
-  /// Whether commands were accepted since the last call; then `command()` says what they have set
-  /// so far.
+  // For the real-time thread only; none of these functions ever waits.
+  /// Returns true if commands were accepted since the last call; `command()` then returns what all
+  /// accepted commands have set so far.
   bool fetch() noexcept { return newest_.fetch(); }
   const Command& command() const noexcept { return newest_.value(); }
-  /// What became of the commands that have arrived.
+  /// Fetches and returns the verdicts of the commands that have arrived.
   const CommandTally& fetch_tally() noexcept {
     tallies_.fetch();
     return tallies_.value();
   }
-  /// The fault that commands may release from now on, by the tick at which it latched; 0: none.
+  /// Sets the fault that commands may release from now on, by the tick at which it latched; 0:
+  /// none.
   void set_fault_tick(std::int64_t tick) noexcept {
     fault_tick_.store(tick, std::memory_order_relaxed);
   }
 
-  // Other threads; the receiver's own may have to wait meanwhile.
+  // For other threads; the receiver's thread may have to wait meanwhile.
   CommandTally tally() const;
-  /// Why the last command that was refused was refused, in one line; "" if none was.
+  /// Returns why the last refused command was refused, in one line; "" if none was refused.
   std::string last_reason() const;
 
  private:
   struct Subscription;
   void run();
-  /// Shows the filter's tally to the other threads.
+  /// Copies the filter's tally for the other threads.
   void show_tally();
 
   std::shared_ptr<lcm::LCM> bus_;

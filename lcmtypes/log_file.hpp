@@ -10,30 +10,30 @@
 namespace dashpot::lcmtypes {
 
 /// Reads the file format of LCM logs: events, each with a sync word, a number, a time, the lengths
-/// of its channel's name and of its data, and these two, big-endian. LCM's own reader believes the
-/// lengths and crashes where they are false; this one compares them with what is left of the file,
-/// and keeps data in memory only up to kMaxMessageSize. After damage it goes on with the next sync
-/// word. Every byte is read once, so the time it takes grows with the size of the file alone.
+/// of channel name and data, the channel name and the data, big-endian. LCM's own reader trusts the
+/// lengths and crashes where they are wrong. This reader compares them with the remaining size of
+/// the file, and keeps data in memory only up to kMaxMessageSize. After damage it continues at the
+/// next sync word. Every byte is read once, so reading takes time in proportion to the file's size.
 class LogFile {
  public:
   struct Event {
     std::int64_t utime = 0;  ///< us since 1970-01-01 UTC
     std::string channel;
     std::uint64_t size = 0;          ///< of the data, bytes
-    std::vector<std::uint8_t> data;  ///< as long as that, or empty if it is more than is looked at
+    std::vector<std::uint8_t> data;  ///< `size` bytes, or empty if there are too many to be kept
   };
   /// What is wrong with the log.
   struct Damage {
-    std::int64_t places = 0;           ///< how many are damaged
-    std::uint64_t first = 0;           ///< offset of the first one, bytes
+    std::int64_t places = 0;           ///< number of damaged places
+    std::uint64_t first = 0;           ///< offset of the first damaged place, bytes
     std::uint64_t skipped = 0;         ///< bytes that belong to no event that was read
     std::optional<std::uint64_t> cut;  ///< offset of the event that the end of the file cuts off
   };
 
-  /// Throws std::runtime_error that names the file and the reason.
+  /// Opens a log. Throws std::runtime_error that names the file and the reason.
   explicit LogFile(const std::string& path);
 
-  /// Reads the next event; false at the end of the file.
+  /// Reads the next event. Returns false at the end of the file.
   bool read();
   const Event& event() const noexcept { return event_; }
   const Damage& damage() const noexcept { return damage_; }
@@ -41,13 +41,13 @@ class LogFile {
  private:
   enum class Found { kEvent, kDamage, kCut };
 
-  /// Reads up to the end of the next sync word; false at the end of the file.
+  /// Reads up to the end of the next sync word. Returns false at the end of the file.
   bool find_sync();
-  /// What follows a sync word.
+  /// Reads the part of an event after its sync word.
   Found read_event();
   bool take(void* bytes, std::size_t count);
   bool skip(std::uint64_t count);
-  /// Whether the file has so many bytes more; true for a pipe.
+  /// Returns true if the file has `count` more bytes, and for a pipe.
   bool may_hold(std::uint64_t count);
   void note_damage(std::uint64_t begin, std::uint64_t end);
 
@@ -59,7 +59,7 @@ class LogFile {
   Damage damage_;
 };
 
-/// What is wrong with a log: "cut off in the event at byte 1234"; "" if nothing is.
+/// Returns what is wrong with a log: "cut off in the event at byte 1234"; "" if nothing is wrong.
 std::string describe(const LogFile::Damage& damage);
 
 }  // namespace dashpot::lcmtypes

@@ -14,18 +14,18 @@
 
 namespace dashpot::lcmtypes {
 
-/// Takes what a controller publishes, from a bus or from a log, and hands on what is well-formed.
+/// Functions that get the well-formed messages of a controller, from a bus or from a log.
 struct MessageHandlers {
   std::function<void(const state_t&)> on_state;
   std::function<void(const modes_t&)> on_modes;
   std::function<void(const sampled_modes_t&)> on_sampled_modes;
   std::int64_t malformed = 0;  ///< messages on our channels that were not handed on
 
-  /// Decodes and hands on; other channels are ignored.
+  /// Decodes a message and hands it on. Ignores other channels.
   void take(std::string_view channel, const void* data, std::size_t size);
 };
 
-/// A live bus. `handlers` must outlive it.
+/// Reads messages from a live bus. `handlers` must outlive it.
 class BusReader {
  public:
   BusReader(std::shared_ptr<lcm::LCM> bus, MessageHandlers& handlers);
@@ -33,7 +33,7 @@ class BusReader {
   BusReader(const BusReader&) = delete;
   BusReader& operator=(const BusReader&) = delete;
 
-  /// Handles one message, or gives up after so many milliseconds. Returns false if the bus is at
+  /// Handles one message, or gives up after `milliseconds`. Returns false if the bus is at
   /// its end (a file:// log, or broken).
   bool wait(int milliseconds);
 
@@ -43,20 +43,21 @@ class BusReader {
   std::unique_ptr<Subscriptions> subscriptions_;
 };
 
-/// A log written by make_log_sink or lcm-logger. `handlers` must outlive it.
+/// Reads messages from a log written by make_log_sink or lcm-logger. `handlers` must outlive it.
 class LogReader {
  public:
-  /// Throws std::runtime_error that names the file and the reason.
+  /// Opens a log. Throws std::runtime_error that names the file and the reason.
   LogReader(const std::string& path, MessageHandlers& handlers)
       : file_(path), handlers_(handlers) {}
 
-  /// Reads the next event; false at the end of the log.
+  /// Reads the next event. Returns false at the end of the log.
   bool read() { return file_.read(); }
-  /// Time of the event read last, us since 1970-01-01 UTC.
+  /// Returns the time of the event read last, us since 1970-01-01 UTC.
   std::int64_t utime() const { return file_.event().utime; }
-  /// Hands that event on.
+  /// Hands on the event read last.
   void handle();
-  /// What was found wrong with the log so far, "" if nothing: see describe(LogFile::Damage).
+  /// Returns what was found wrong with the log so far; "" if nothing. See
+  /// describe(LogFile::Damage).
   std::string damage() const { return describe(file_.damage()); }
 
  private:

@@ -21,31 +21,32 @@ struct PublisherOptions {
   double modes_heartbeat = 1;     ///< unchanged modes are repeated this often, s
   double modes_tolerance = 1e-6;  ///< changes up to this do not count: of a joint, rad (m); of a
                                   ///< frequency or ratio, relative
-  std::size_t queue = 1024;       ///< states that may wait
-  std::size_t modes_queue = 64;   ///< modes that may wait
+  std::size_t queue = 1024;       ///< number of states that may wait
+  std::size_t modes_queue = 64;   ///< number of modes that may wait
   std::chrono::microseconds poll{1000};  ///< how often the thread looks for new samples
 };
 
-/// How many messages went out since the start, each counted once however many sinks it went to.
+/// Numbers of messages since the start. A message counts once, however many sinks it goes to.
 struct PublisherCounters {
   std::int64_t states = 0;
   std::int64_t modes = 0;
   std::int64_t modes_skipped = 0;   ///< not new
   std::int64_t states_dropped = 0;  ///< no room in the queue
-  std::int64_t modes_dropped = 0;   ///< likewise; the latest of them goes out all the same
+  std::int64_t modes_dropped =
+      0;  ///< no room in the queue; the latest of them is sent all the same
   std::int64_t sampled_modes = 0;
-  std::int64_t send_errors = 0;  ///< of any sink
+  std::int64_t send_errors = 0;  ///< of all sinks
 };
 
-/// Publishes what the real-time thread offers: every `state_every`-th state, and modes when the
-/// configuration, their number, kind, label, frequency or ratio has changed. Those of the sampled
-/// loop come seldom: the latest is published. `offer` is for one
-/// thread and never waits, allocates or calls the system. The rest happens in a thread of its own
-/// after `start()`; a simulation that is faster than real time calls `publish_pending()` instead.
+/// Publishes what the real-time thread offers: every `state_every`-th state, and modes if the
+/// configuration or the modes' number, kind, label, frequency or ratio has changed. Of the modes of
+/// the sampled loop, which come seldom, the latest are published. One thread calls `offer`, which
+/// never waits, allocates or calls the system. After `start()` a thread of its own publishes; a
+/// simulation that is faster than real time calls `publish_pending()` instead.
 class Publisher {
  public:
-  /// Each message is encoded once and goes to every sink. Throws std::invalid_argument for options
-  /// out of range.
+  /// Sends each message, which is encoded once, to every sink. Throws std::invalid_argument for
+  /// options out of range.
   explicit Publisher(std::vector<std::unique_ptr<Sink>> sinks, PublisherOptions options = {});
   ~Publisher() { stop(); }
   Publisher(const Publisher&) = delete;
@@ -55,22 +56,23 @@ class Publisher {
   void offer(const ModesSample& sample) noexcept;
   void offer(const SampledModesSample& sample) noexcept;
 
-  /// Starts the thread; to be called once.
+  /// Starts the thread. May be called once.
   void start();
-  /// Ends the thread, if there is one, and publishes what is still waiting.
+  /// Ends the thread, if there is one, and publishes all samples that wait.
   void stop();
-  /// Publishes what is waiting, on the caller's thread. Not between `start()` and `stop()`.
+  /// Publishes all samples that wait, on the caller's thread. Must not be called between `start()`
+  /// and `stop()`.
   void publish_pending();
 
   PublisherCounters counters() const noexcept;
 
  private:
   struct NumberedModes {
-    std::uint64_t number = 0;  ///< of those offered, from 1
+    std::uint64_t number = 0;  ///< of the modes offered, counted from 1
     ModesSample sample;
   };
   void run();
-  /// Unless later ones went out already.
+  /// Publishes modes unless later ones were published already.
   void publish(const NumberedModes& modes);
   template <class Message>
   void send(const char* channel, const Message& message);
@@ -82,7 +84,7 @@ class Publisher {
   // Between the two threads
   SampleQueue<StateSample> states_;
   SampleQueue<NumberedModes> modes_;
-  controller::Latest<NumberedModes> overflow_;  ///< the latest that found no room
+  controller::Latest<NumberedModes> overflow_;  ///< the latest modes that found no room
   controller::Latest<SampledModesSample> sampled_;
   std::atomic<bool> stop_{false};
   std::atomic<std::int64_t> states_sent_{0};
@@ -93,10 +95,10 @@ class Publisher {
 
   // The real-time thread's
   int ticks_until_state_ = 0;
-  NumberedModes offered_modes_;  ///< the last
+  NumberedModes offered_modes_;  ///< offered last
 
   // The publishing thread's
-  ModesSample published_modes_;  ///< without joints before the first
+  ModesSample published_modes_;  ///< published last; without joints before the first
   std::uint64_t published_number_ = 0;
   state_t state_message_;
   modes_t modes_message_;

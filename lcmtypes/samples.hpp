@@ -1,5 +1,5 @@
 #pragma once
-// What the real-time thread hands over to be published: plain data, no memory of its own.
+// Data that the real-time thread hands over to be published: plain data without memory on the heap.
 
 #include <dashpot/controller/snapshot.hpp>
 #include <dashpot/lcmtypes/command_verdict.hpp>
@@ -8,12 +8,12 @@
 
 namespace dashpot::lcmtypes {
 
-/// How well the loop keeps time, and what became of the commands it was sent.
+/// How well the loop keeps time, and the verdicts of the commands that were sent to it.
 struct LoopHealth {
   std::int32_t tick_time = 0;          ///< computing time of the previous tick, ns
   std::int32_t longest_tick_time = 0;  ///< since the start, ns
   std::int64_t overruns = 0;           ///< ticks that ended after their period
-  std::int64_t fault_tick = 0;         ///< when the fault of the snapshot latched; 0: there is none
+  std::int64_t fault_tick = 0;         ///< tick at which the snapshot's fault latched; 0: none
   CommandTally commands;
 };
 
@@ -26,11 +26,11 @@ struct StateSample {
 
 /// The modes at one configuration.
 struct ModesSample {
-  std::int64_t utime = 0;  ///< beginning of the tick they belong to, us since 1970-01-01 UTC
+  std::int64_t utime = 0;  ///< beginning of the modes' tick, us since 1970-01-01 UTC
   controller::Vibration vibration;
 };
 
-/// What becomes of them in the loop as it is sampled.
+/// The modes of the sampled loop.
 struct SampledModesSample {
   std::int64_t utime = 0;  ///< as in ModesSample
   controller::SampledVibration vibration;
