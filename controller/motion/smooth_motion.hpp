@@ -50,7 +50,7 @@ struct Step {
   bool arrives = false;  ///< a period at this velocity ends at the goal
 };
 
-/// Returns the next velocity of a point that moves at velocity v and has its goal at distance d:
+/// Returns the next velocity of a point that moves at velocity v, d being goal minus position:
 ///     v + (c - v) / max(1, effort(c - v) / T),
 /// where T is the period. c leads straight to the goal and can brake for it at half the
 /// acceleration limit in a whole number k of periods: with b = 1/2 / effort(d), braking as a
