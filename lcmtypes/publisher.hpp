@@ -32,8 +32,7 @@ struct PublisherCounters {
   std::int64_t modes = 0;
   std::int64_t modes_skipped = 0;   ///< not new
   std::int64_t states_dropped = 0;  ///< no room in the queue
-  std::int64_t modes_dropped =
-      0;  ///< no room in the queue; the latest of them is sent all the same
+  std::int64_t modes_dropped = 0;   ///< no room in the queue; the latest goes out all the same
   std::int64_t sampled_modes = 0;
   std::int64_t send_errors = 0;  ///< of all sinks
 };

@@ -13,26 +13,27 @@ struct TipImpedance {
   bool none() const noexcept { return (selected.array() == 0).all(); }
 };
 
-/// Springs and dampers of every mode and frame at once: those not in force are zero. Weighted means
-/// of two impedances are impedances, and their matrices stay positive semidefinite.
+/// Springs and dampers of every mode and frame at once; springs and dampers not in force are zero.
+/// Weighted means of two impedances are impedances, and their matrices stay positive semidefinite.
 template <int N>
 struct Impedance {
   JointSquare<N> joint_stiffness = JointSquare<N>::Zero();
   JointSquare<N> joint_damping = JointSquare<N>::Zero();
   TipImpedance base;  ///< in B's axes
-  TipImpedance tool;  ///< in T's
+  TipImpedance tool;  ///< in T's axes
   Joints<N> null_stiffness = Joints<N>::Zero();
   Joints<N> null_damping = Joints<N>::Zero();
-  double damping_ratio = 0;  ///< that DesignedDamping gives the tip's springs, beside `damping`
-  double joint_damping_ratio = 0;  ///< the same of the joints' springs, beside `joint_damping`
+  double damping_ratio = 0;  ///< ratio that is designed for the tip's springs, beside `damping`
+  double joint_damping_ratio = 0;  ///< for the joints' springs, beside `joint_damping`
   double joint_weight = 0;         ///< share of the joint springs
   double task_weight = 0;          ///< share of the Cartesian springs
 
-  /// What a valid set-point asks for. Directions that are not selected have no springs and dampers.
-  /// The null space is empty unless there are more joints than directions selected.
+  /// Returns the impedance that a valid set-point asks for. Directions that are not selected have
+  /// no springs and dampers. There are no null-space springs and dampers unless there are more
+  /// joints than selected directions.
   static Impedance of(const Setpoint& setpoint) noexcept;
 
-  /// Whether there is anything to do in the null space.
+  /// Returns true if there are springs or dampers in the null space.
   bool null_space() const noexcept {
     bool any = false;
     for (int i = 0; i < N; ++i) any |= null_stiffness[i] != 0 || null_damping[i] != 0;
@@ -81,7 +82,7 @@ Impedance<N> Impedance<N>::of(const Setpoint& setpoint) noexcept {
   return result;
 }
 
-/// K in the tool's axes, turned into B's: diag(R, R) K diag(R, R)'.
+/// Returns diag(R, R) K diag(R, R)': K in the tool's axes, turned into B's axes.
 inline Matrix6 turned(const Matrix6& K, const Eigen::Matrix3d& R) noexcept {
   Matrix6 result;
   for (int i = 0; i < 6; i += 3) {
@@ -92,7 +93,7 @@ inline Matrix6 turned(const Matrix6& K, const Eigen::Matrix3d& R) noexcept {
   return result;
 }
 
-/// a + s (b - a) for 0 <= s <= 1, exactly b for s = 1.
+/// Returns a + s (b - a) for 0 <= s <= 1, exactly b for s = 1.
 inline Vector6 blend(const Vector6& a, const Vector6& b, double s) noexcept {
   return (1 - s) * a + s * b;
 }

@@ -16,7 +16,7 @@ using JointSquare = Eigen::Matrix<double, N, N>;
 template <int N>
 using Jacobian = Eigen::Matrix<double, 6, N>;
 
-/// Column j of a Jacobian.
+/// Returns column j of a Jacobian.
 template <int N>
 Eigen::Map<const Vector6> column(const Jacobian<N>& J, int j) noexcept {
   return Eigen::Map<const Vector6>(J.data() + 6 * j);
@@ -26,7 +26,7 @@ Eigen::Map<Vector6> column(Jacobian<N>& J, int j) noexcept {
   return Eigen::Map<Vector6>(J.data() + 6 * j);
 }
 
-/// J qd
+/// Returns J qd.
 template <int N>
 Vector6 twist(const Jacobian<N>& J, const Joints<N>& qd) noexcept {
   Vector6 V = Vector6::Zero();
@@ -56,7 +56,7 @@ void add(const Joints<N>& x, Joints<N>& y, double factor = 1) noexcept {
   for (int i = 0; i < N; ++i) y[i] += factor * x[i];
 }
 
-/// a - b
+/// Returns a - b.
 template <int N>
 Joints<N> difference(const Joints<N>& a, const Joints<N>& b) noexcept {
   Joints<N> result;
@@ -64,15 +64,15 @@ Joints<N> difference(const Joints<N>& a, const Joints<N>& b) noexcept {
   return result;
 }
 
-/// Whether all are finite.
+/// Returns true if all entries are finite.
 template <int N>
 bool finite(const Joints<N>& x) noexcept {
-  double sum = 0;  // becomes NaN with the first that is not
+  double sum = 0;  // becomes NaN with the first entry that is not finite
   for (int i = 0; i < N; ++i) sum += 0 * x[i];
   return sum == 0;
 }
 
-/// From and to the type of interfaces; `from` has N entries.
+/// Convert from and to the type of interfaces; `from` has N entries.
 template <int N>
 Joints<N> fixed(const JointVector& from) noexcept {
   Joints<N> to;

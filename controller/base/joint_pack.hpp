@@ -1,7 +1,6 @@
 #pragma once
-// One number for each joint of a chain, four joints to a register: what a sum over the chain does
-// not order, the processor does for four joints at once. JointPack beyond the last joint are
-// padding.
+// One number for each joint of a chain, four joints to a register. The processor computes for four
+// joints at once, except in sums along the chain. Numbers beyond the last joint are padding.
 
 #include <array>
 
@@ -12,10 +11,10 @@ namespace dashpot::controller {
 
 using Vec4d = double __attribute__((vector_size(32)));
 
-/// Registers for N joints.
+/// Number of registers for N joints.
 template <int N>
 inline constexpr int kGroups = (N + 3) / 4;
-/// JointPack of these registers.
+/// Number of joints, with padding, in these registers.
 template <int N>
 inline constexpr int kLanes = 4 * kGroups<N>;
 
@@ -58,7 +57,7 @@ struct JointPack {
   }
 };
 
-/// The same number for every joint.
+/// Returns the same number for every joint.
 template <int G>
 JointPack<G> all(double value) {
   JointPack<G> result;
@@ -66,7 +65,7 @@ JointPack<G> all(double value) {
   return result;
 }
 
-/// Joint i gets x of joint i + 1, the last one 0.
+/// Returns for joint i the x of joint i + 1, and 0 for the last entry.
 template <int G>
 JointPack<G> of_next(const JointPack<G>& x) {
   JointPack<G> result;
@@ -77,7 +76,7 @@ JointPack<G> of_next(const JointPack<G>& x) {
   return result;
 }
 
-/// Joint i gets x of joint i - 1, the first one 0.
+/// Returns for joint i the x of joint i - 1, and 0 for the first joint.
 template <int G>
 JointPack<G> of_previous(const JointPack<G>& x) {
   JointPack<G> result;
@@ -88,7 +87,7 @@ JointPack<G> of_previous(const JointPack<G>& x) {
   return result;
 }
 
-/// Joint i gets x_0 + ... + x_i.
+/// Returns for joint i the sum x_0 + ... + x_i.
 template <int G>
 JointPack<G> sum_outward(const JointPack<G>& x) {
   JointPack<G> result;
@@ -103,7 +102,7 @@ JointPack<G> sum_outward(const JointPack<G>& x) {
   return result;
 }
 
-/// Joint i gets x_i + ... + x_last.
+/// Returns for joint i the sum x_i + ... + x_last.
 template <int G>
 JointPack<G> sum_inward(const JointPack<G>& x) {
   JointPack<G> result;
@@ -189,7 +188,7 @@ struct Lanes33 {
   }
 };
 
-/// R S R'
+/// Returns R S R'.
 template <int G>
 LanesSymmetric<G> turned(const Lanes33<G>& R, const LanesSymmetric<G>& S) {
   const Lanes3<G> x = S.xx * R.x + S.xy * R.y + S.xz * R.z;  // columns of R S
@@ -200,8 +199,8 @@ LanesSymmetric<G> turned(const Lanes33<G>& R, const LanesSymmetric<G>& S) {
           x.x * R.x.z + y.x * R.y.z + z.x * R.z.z, x.y * R.x.z + y.y * R.y.z + z.y * R.z.z};
 }
 
-/// 2 (a.b) 1 - a b' - b a': what shifting a body by b adds to its inertia, with its first moment
-/// plus half of mass times b in a.
+/// Returns 2 (a.b) 1 - a b' - b a', the change of a body's inertia when the body is shifted by b; a
+/// is the body's first moment plus half of its mass times b.
 template <int G>
 LanesSymmetric<G> shift_term(const Lanes3<G>& a, const Lanes3<G>& b) {
   const JointPack<G> x = a.x * b.x, y = a.y * b.y, z = a.z * b.z;

@@ -7,16 +7,16 @@
 
 namespace dashpot::controller {
 
-/// Rotation vector of a unit quaternion (log map), rad. Its length is in [0, 2 pi]: the sign of q
-/// says which way round, and a q with w >= 0 gives the shorter one, at most pi. With w = cos(a/2),
-/// |v| = sin(a/2) the vector is a v / |v|.
+/// Returns the rotation vector of a unit quaternion (log map), rad. Its length is in [0, 2 pi]. The
+/// sign of q says which way round it turns; a q with w >= 0 gives the shorter way, at most pi. With
+/// w = cos(a/2), |v| = sin(a/2) the vector is a v / |v|.
 inline Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& q) noexcept {
   const double sine = q.vec().norm();
   if (sine < 1e-9) return q.vec() * (q.w() < 0 ? -2.0 : 2.0);  // error below 1e-18 relative
   return q.vec() * (2 * std::atan2(sine, q.w()) / sine);
 }
 
-/// The quaternion of a rotation vector (exp map).
+/// Returns the quaternion of a rotation vector (exp map).
 inline Eigen::Quaterniond quaternion(const Eigen::Vector3d& rotation_vector) noexcept {
   const double half = 0.5 * rotation_vector.norm();
   // sin(h) / h by its series where the quotient has no digits left; the next term is below 1e-18.
@@ -27,8 +27,8 @@ inline Eigen::Quaterniond quaternion(const Eigen::Vector3d& rotation_vector) noe
   return q;
 }
 
-/// Angle by which R differs from a rotation, as the largest entry of |R'R - I|; infinite for a
-/// reflection and for what is not finite.
+/// Returns the angle by which R differs from a rotation, as the largest entry of |R'R - I|;
+/// infinity if R is a reflection or not finite.
 inline double rotation_defect(const Eigen::Matrix3d& R) noexcept {
   const double defect =
       (R.transpose() * R - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff<Eigen::PropagateNaN>();
@@ -41,12 +41,13 @@ inline double rotation_defect(const Eigen::Matrix3d& R) noexcept {
 /// so that K_rot e is the torque toward the goal and K_rot is in N m/rad. (Controllers that take
 /// the vector part of a quaternion instead have half that stiffness.)
 ///
-/// The shortest rotation jumps from pi to -pi where the tip is half a turn from its goal. This one
-/// goes on beyond pi instead: of the two rotation vectors of a quaternion, q and -q, it takes the
-/// one that continues the last. Past 3/4 of a whole turn it gives up and takes the short way.
+/// The shortest rotation jumps from pi to -pi where the tip is half a turn from its goal. This
+/// error continues beyond pi instead: of the rotation vectors of the two quaternions q and -q, it
+/// takes the one that continues the last error. Past 3/4 of a whole turn it takes the short way
+/// again.
 class OrientationError {
  public:
-  /// Both unit quaternions.
+  /// Returns the error between two unit quaternions.
   Eigen::Vector3d update(const Eigen::Quaterniond& goal, const Eigen::Quaterniond& tip) noexcept {
     Eigen::Quaterniond error = goal * tip.conjugate();
     if (error.dot(last_) < 0) error.coeffs() = -error.coeffs();
@@ -54,7 +55,7 @@ class OrientationError {
     last_ = error;
     return rotation_vector(error);
   }
-  /// The next error is the short way round, at most pi.
+  /// Makes the next error the short way round, at most pi.
   void reset() noexcept { last_ = Eigen::Quaterniond::Identity(); }
 
  private:

@@ -6,9 +6,9 @@
 
 namespace dashpot::controller {
 
-/// A = L L' for a symmetric positive definite A of fixed small size, of which the lower triangle is
-/// read. Pivots below `least_pivot` are raised to it, so that the factor is finite for every
-/// finite A.
+/// Cholesky factorisation A = L L' of a symmetric positive definite A of fixed small size, of which
+/// the lower triangle is read. Pivots below `least_pivot` are raised to `least_pivot`, so that the
+/// factor is finite for every finite A.
 template <int N>
 class SmallCholesky {
  public:
@@ -30,7 +30,7 @@ class SmallCholesky {
     }
   }
 
-  /// i >= j
+  /// Returns L_ij for i >= j.
   double L(int i, int j) const noexcept { return L_(i, j); }
   double per_diagonal(int i) const noexcept { return per_diagonal_[i]; }
 
@@ -67,7 +67,7 @@ class SmallCholesky {
       for (int j = i + 1; j < N; ++j) x[i] += L_(j, i) * x[j];
     }
   }
-  /// L^-1
+  /// Returns L^-1.
   Eigen::Matrix<double, N, N> inverse_L() const noexcept {
     Eigen::Matrix<double, N, N> X = Eigen::Matrix<double, N, N>::Zero();
     for (int k = 0; k < N; ++k) {

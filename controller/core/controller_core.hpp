@@ -7,7 +7,7 @@
 
 namespace dashpot::controller {
 
-/// What Controller does, for any number of joints.
+/// Implementation of Controller for any number of joints.
 class ControllerCore {
  public:
   virtual ~ControllerCore() = default;
@@ -22,7 +22,7 @@ class ControllerCore {
 
   const Snapshot& snapshot() const noexcept { return snapshot_; }
   const Vibration& vibration() const noexcept { return vibration_.result(); }
-  /// Null unless Analysis::Sampled asks for it.
+  /// Returns the analysis of the sampled loop; null unless Analysis::Sampled asks for it.
   SampledAnalysis* sampled() noexcept { return sampled_.get(); }
   const Settings& settings() const noexcept { return settings_; }
 
@@ -40,7 +40,7 @@ class ControllerCore {
   std::unique_ptr<SampledAnalysis> sampled_;
 };
 
-/// The core for the model's number of joints. The settings are valid.
+/// Returns the core for the model's number of joints. The settings must be valid.
 std::unique_ptr<ControllerCore> make_core(const RobotModel& model, const Settings& settings);
 
 }  // namespace dashpot::controller

@@ -6,28 +6,30 @@
 
 namespace dashpot::controller {
 
-/// The damping C_C with which every mode of the task stiffness K_C has one damping ratio, for a
-/// mass M (n x n) and Jacobian J (6 x n) that come again at every tick; see analysis::RatioDamping.
+/// Designs the damping C_C with which every mode of the task stiffness K_C has one damping ratio,
+/// for a mass M (n x n) and Jacobian J (6 x n) that are new at every tick; see
+/// analysis::RatioDamping.
 ///
-/// Always symmetric, positive semidefinite to rounding, and bounded: the joint damping J' C_C J is
-/// at most 2 ratio omega M for the fastest mode, and next to a singularity C_C itself at most
-/// 2.3 ratio |K_C| / kSoftFrequency. Modes below kSoftFrequency get less than their ratio. Should
-/// there be no design (a mass or stiffness matrix that is none), the last one stays; the first is
-/// zero.
+/// C_C is symmetric, positive semidefinite to rounding, and bounded. The joint damping J' C_C J is
+/// at most 2 ratio omega M for the fastest mode, and next to a singularity C_C itself is at most
+/// 2.3 ratio |K_C| / kSoftFrequency. Modes below kSoftFrequency get less than their ratio. If there
+/// is no design, because a mass or stiffness matrix is not valid, the last C_C stays; the first C_C
+/// is zero.
 class TaskDamper {
  public:
   static constexpr double kSoftFrequency = controller::kSoftFrequency;
 
   /// Forgets the last design.
   void reset() noexcept { C_C_.setZero(); }
-  /// The rounding error of a semidefinite K_C may make it slightly indefinite. `friction` is the
-  /// viscous friction of the joints (n, N m s/rad), which is taken off; none if it has no entries.
+  /// Sets the stiffness, which rounding errors may make slightly indefinite, and the ratio.
+  /// `friction` is the viscous friction of the joints (n, N m s/rad), which is subtracted from the
+  /// damping; without entries there is none.
   void set(const Matrix6& K_C, double ratio, const JointVector& friction) noexcept;
-  /// `M`, of which the lower triangle is read, is made positive definite where rounding prevents
-  /// it.
+  /// Designs C_C for this tick. Reads the lower triangle of `M`, and makes `M` positive definite
+  /// if rounding errors have made it indefinite.
   void update(analysis::Square<kMaxJoints>& M,
               const analysis::TaskJacobian<kMaxJoints>& J) noexcept;
-  /// C_C in the axes of K_C and J.
+  /// Returns C_C in the axes of K_C and J.
   const Matrix6& damping() const noexcept { return C_C_; }
 
  private:
@@ -35,8 +37,8 @@ class TaskDamper {
   Matrix6 C_C_ = Matrix6::Zero();
 };
 
-/// The damping C_q with which every mode of the joint springs K_q has one damping ratio; the rest
-/// is as for TaskDamper. See analysis::JointRatioDamping.
+/// Designs the damping C_q with which every mode of the joint springs K_q has one damping ratio, as
+/// TaskDamper does for the task. See analysis::JointRatioDamping.
 class JointDamper {
  public:
   void reset(int n) noexcept { C_q_.setZero(n, n); }
@@ -49,21 +51,21 @@ class JointDamper {
   JointMatrix C_q_;
 };
 
-/// Springs and dampers in force: those of the gain path, and, as far as they have a damping ratio,
-/// the C_C and C_q that give it to the springs of tip and joints where the robot is. Ratio and
-/// stiffness are those of the path, so that the damping changes as smoothly as they do. What the
-/// viscous friction given damps already is taken off; of two modes in force, each takes off its
-/// share. Damping in the null space comes on top.
+/// Springs and dampers in force: the blended gains, and, as far as these have a damping ratio, the
+/// C_C and C_q that give this ratio to the springs of tip and joints at the robot's posture. Ratio
+/// and stiffness are the blended ones, so that the damping changes as smoothly as they do. The
+/// given viscous friction is subtracted; if two modes are in force, each subtracts its share.
+/// Damping in the null space is added.
 template <int N>
 class DesignedDamping {
  public:
-  /// `viscous_friction`: of the robot, n, N m s/rad.
+  /// `viscous_friction` is the friction of the robot's joints, n, N m s/rad.
   explicit DesignedDamping(const Joints<N>& viscous_friction) noexcept
       : friction_(viscous_friction) {
     for (int i = 0; i < N; ++i) rubs_ |= viscous_friction[i] > 0;
   }
 
-  /// Of this tick; valid until the next one.
+  /// Designs the damping of this tick. Returns springs and dampers, valid until the next tick.
   const Impedance<N>& update(const GainBlend<N>& gains, const Dynamics<N>& robot) noexcept {
     const Impedance<N>& given = gains.now();
     const bool tip = given.damping_ratio > 0 && given.task_weight > 0;
@@ -84,18 +86,20 @@ class DesignedDamping {
     if (joints) design_joints(given, robot);
     return now(given);
   }
-  /// The same again; `given` is that of the gain path.
+  /// Returns springs and dampers of this tick again; `given` are the blended gains.
   const Impedance<N>& now(const Impedance<N>& given) const noexcept {
     return tip_ || joints_ ? in_force_ : given;
   }
   void reset() noexcept { tip_ = joints_ = false; }
 
  private:
-  /// Only while gains change, and so K_C is new at every tick anyway.
+  /// Returns true if springs in both frames are in force. They are only while gains change, so that
+  /// K_C is new at every tick anyway.
   static bool two_frames(const Impedance<N>& given) noexcept {
     return !given.base.none() && !given.tool.none();
   }
-  /// Springs in the tool's axes alone keep them: their matrix then does not change as it turns.
+  /// Returns true if all springs are in the tool's axes. C_C is then designed in these axes,
+  /// because there K_C does not change as the tool turns.
   static bool in_tool(const Impedance<N>& given) noexcept { return given.base.none(); }
 
   JointVector friction(double share) const noexcept {
@@ -125,7 +129,7 @@ class DesignedDamping {
   }
 
   void design_joints(const Impedance<N>& given, const Dynamics<N>& robot) noexcept {
-    if (tip_) read_mass(robot);  // of which the tip's design may have changed rounding
+    if (tip_) read_mass(robot);  // again, because the tip's design may have changed M_
     joint_damper_.update(M_);
     const JointMatrix& C_q = joint_damper_.damping();
     for (int i = 0; i < N * N; ++i) {
@@ -152,7 +156,7 @@ class DesignedDamping {
   }
 
   Joints<N> friction_;
-  bool rubs_ = false;                  ///< whether there is any
+  bool rubs_ = false;                  ///< whether there is viscous friction
   bool tip_ = false, joints_ = false;  ///< whose damping is designed
   std::uint64_t changes_ = 0;
   Impedance<N> in_force_;

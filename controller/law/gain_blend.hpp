@@ -5,20 +5,20 @@
 
 namespace dashpot::controller {
 
-/// Straight way from one value to another in a given time:  now = (1 - s) from + s to, s growing
-/// evenly from 0 to 1. Every value on it is a weighted mean of the two, so matrices stay positive
-/// semidefinite, and a torque linear in them changes at a bounded rate.
+/// Linear blend from one value to another in a given time:  now = (1 - s) from + s to, where s
+/// grows evenly from 0 to 1. Every value is a weighted mean of the two, so that matrices stay
+/// positive semidefinite, and a torque linear in them changes at a bounded rate.
 ///
-/// A new target sets out from the value of the moment and takes the full time again. Targets that
-/// come every tick are so followed with a lag of about that time; a way that starts gently would
-/// never get going then.
+/// A new target starts a blend from the present value that takes the full time again. Targets that
+/// come every tick are so followed with a lag of about this time. The blend does not start slowly,
+/// because it would then never get going with such targets.
 template <class Value>
 class Ramp {
  public:
-  /// `ticks`: how many steps a change takes, at least 1.
+  /// `ticks` is the number of steps that a change takes, at least 1.
   explicit Ramp(int ticks) noexcept : step_(1.0 / std::max(1, ticks)) {}
 
-  /// At rest at `value`.
+  /// Sets the value and the target to `value`.
   void start(const Value& value) noexcept {
     from_ = to_ = now_ = value;
     s_ = 1;
@@ -38,7 +38,7 @@ class Ramp {
 
   const Value& now() const noexcept { return now_; }
   const Value& target() const noexcept { return to_; }
-  /// How often the value changed so far.
+  /// Returns how often the value has changed so far.
   std::uint64_t changes() const noexcept { return changes_; }
 
  private:

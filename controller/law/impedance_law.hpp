@@ -8,7 +8,7 @@
 
 namespace dashpot::controller {
 
-/// The paths on which the springs are fixed.
+/// References of all springs.
 template <int N>
 struct SpringReferences {
   JointReference<N> joint;    ///< of mode kJoint: q_d
@@ -16,7 +16,8 @@ struct SpringReferences {
   TipReference tip;           ///< of mode kCartesian: p_d, R_d and twist V_d
 };
 
-/// Joint torque of springs and dampers, between robot and set-point, and of the feed-forward:
+/// Computes the joint torque of springs and dampers between robot and reference, and of the
+/// feed-forward:
 ///
 ///     tau = K_q (q_d - q) + C_q (qd_d - qd) + w_q M qdd_d           joint impedance
 ///         + J' (K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d + f)     Cartesian impedance, wrench
@@ -24,21 +25,22 @@ struct SpringReferences {
 ///         + friction(qd_f) + coriolis + gravity                     the robot
 ///
 /// e = (p_d - p, rotation vector of R_d R'), in B's axes at the tip: linear, then angular. K_C is
-/// the sum of the stiffness given in B's axes and R K_T R' of that given in the tool's, and so is
-/// C_C. w_q and w_C are the shares of the two modes, 0 or 1 except while the mode changes; K_q and
-/// C_q, K_C and C_C, K_0 and C_0 contain them. Lambda = (J M^-1 J')^-1 in the held directions, N
-/// and J# = M^-1 J' Lambda are those of TaskInertia and NullSpace. f is the commanded wrench. qd_f
-/// = w_q qd_d + w_C (joint velocity that takes the tip along V_d), and friction_i(v) = damping_i v
-/// + friction_i tanh(v / 0.01 rad/s). J# e is the part of q_0 - q that a deflection of the tip
-/// explains: without it, deflections of the tip would drive the self-motion, and the stiffness of
-/// the loop would not be symmetric. It counts fully while it is small: s = 1 / sqrt(1 + (|J# e| /
-/// 0.3 rad)^2). Every term of the last column can be left out, see FeedForward.
+/// the sum of the stiffness given in B's axes and R K_T R' for the stiffness K_T given in the
+/// tool's axes, and C_C likewise. w_q and w_C are the shares of the two modes, 0 or 1 except while
+/// the mode changes; K_q and C_q, K_C and C_C, K_0 and C_0 contain them. Lambda = (J M^-1 J')^-1 in
+/// the selected directions (see TaskInertia); N and J# = M^-1 J' Lambda are explained in NullSpace.
+/// f is the commanded wrench. qd_f = w_q qd_d + w_C (joint velocity that takes the tip along V_d),
+/// and friction_i(v) = damping_i v + friction_i tanh(v / 0.01 rad/s). J# e is the part of q_0 - q
+/// that a deflection of the tip explains. It is subtracted, because otherwise deflections of the
+/// tip would drive the self-motion, and the stiffness of the loop would not be symmetric. It counts
+/// fully while it is small: s = 1 / sqrt(1 + (|J# e| / 0.3 rad)^2). Every term of the last column
+/// can be left out, see FeedForward.
 ///
-/// K_C acts on e as far as the springs clamp (see ErrorClamp): a tip that is further away is
-/// pulled no harder.
+/// K_C acts on e within the error clamp (see ErrorClamp): a tip that is further away is pulled no
+/// harder.
 ///
-/// The torque is bounded wherever the arm is: J' is, and so are N (see NullSpace) and e; nothing is
-/// divided by what vanishes at a singularity but Lambda, which is damped there.
+/// The torque is bounded wherever the arm is, because J', N (see NullSpace) and e are bounded. Only
+/// Lambda is divided by something that vanishes at a singularity, and it is damped there.
 template <int N>
 class ImpedanceLaw {
  public:
@@ -49,16 +51,16 @@ class ImpedanceLaw {
         viscous_friction_(fixed<N>(model.joint_values(&Joint::viscous_friction))),
         coulomb_friction_(fixed<N>(model.joint_values(&Joint::coulomb_friction))) {}
 
-  /// `wrench`: f, which J' takes to the joints only if FeedForward::wrench is on.
+  /// Returns the joint torque. `wrench` is f, which counts only if FeedForward::wrench is on.
   Vector torque(const Dynamics<N>& robot, const Vector& q, const Vector& qd,
                 const Impedance<N>& impedance, const SpringReferences<N>& references,
                 const Vector6& wrench, const ErrorClamp& clamp = kEndless) noexcept;
 
-  /// Orientation errors start from the short way round.
+  /// Forgets the last orientation error: the next one is the short way round.
   void reset() noexcept { orientation_.reset(); }
 
-  /// Of the last torque: e, what J' turned into the Cartesian part, and the null space, which is up
-  /// to date if the impedance has one.
+  /// Return terms of the last torque: e, the wrench of its Cartesian part, and the null space,
+  /// which is up to date if the impedance has null-space springs or dampers.
   const Vector6& tip_error() const noexcept { return e_; }
   const Vector6& tip_wrench() const noexcept { return F_; }
   const NullSpace<N>& null_space() const noexcept { return null_space_; }
@@ -83,7 +85,7 @@ class ImpedanceLaw {
   Vector6 F_ = Vector6::Zero();
 };
 
-/// K_T in the tool's axes times a vector in B's axes: R K_T R' a.
+/// Returns R K_T R' a: K_T in the tool's axes times a vector in B's axes.
 inline Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R,
                             const Vector6& a) noexcept {
   Vector6 local, result;
@@ -175,7 +177,7 @@ Joints<N> ImpedanceLaw<N>::posture_share() const noexcept {
 
 template <int N>
 void ImpedanceLaw<N>::add_friction(const Vector& velocity, Vector& tau) const noexcept {
-  constexpr double kRise = 0.01;  // rad/s; Coulomb friction changes sign smoothly over this
+  constexpr double kRise = 0.01;  // rad/s; over this Coulomb friction changes sign smoothly
   for (int i = 0; i < N; ++i) {
     tau[i] +=
         viscous_friction_[i] * velocity[i] + coulomb_friction_[i] * std::tanh(velocity[i] / kRise);

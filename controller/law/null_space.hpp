@@ -3,7 +3,7 @@
 
 namespace dashpot::controller {
 
-/// The motions that leave the selected directions of the tip alone.
+/// The motions that do not move the tip in its selected directions.
 ///
 /// In energy coordinates y = L' qd (M = L L', so |y|^2 / 2 is the kinetic energy) the tip moves by
 /// Jh y, Jh = J L^-T. The null space of the selected directions H has the projector
@@ -12,8 +12,8 @@ namespace dashpot::controller {
 ///
 /// Away from singularities P is orthogonal, N is the dynamically consistent
 /// I - M^-1 J' (J M^-1 J')^-1 J, and a torque N' t does not accelerate the selected directions:
-/// H J M^-1 N' t = 0. Near one P fades smoothly into a projector of higher rank, and nowhere does
-/// anything blow up: G is at least Jh Jh' in the selected directions, so the eigenvalues of P are
+/// H J M^-1 N' t = 0. Near a singularity P fades smoothly into a projector of higher rank. P is
+/// bounded everywhere: G is at least Jh Jh' in the selected directions, so the eigenvalues of P are
 /// within [0, 1], and for any stiffness k and deflection dq the torque N' k N dq is at most
 ///     cond(M) max(k) |dq|.
 template <int N>
@@ -22,7 +22,7 @@ class NullSpace {
   void compute(const JointSquare<N>& M, const Jacobian<N>& J, const TipImpedance& base,
                const TipImpedance& tool, const Eigen::Matrix3d& R_BT) noexcept;
 
-  /// N' K_0 dq with K_0 = diag(k): torque of springs k (n) for the deflection dq.
+  /// Returns N' K_0 dq with K_0 = diag(k): the torque of springs k (n) for the deflection dq.
   Joints<N> spring(const Joints<N>& k, Joints<N> dq) const noexcept {
     for (int i = 0; i < N; ++i) dq[i] *= k[i];
     mass_.solve_L(dq);
@@ -30,19 +30,19 @@ class NullSpace {
     mass_.multiply_L(dq);
     return dq;
   }
-  /// N' C_0 N dqd with C_0 = diag(c): torque of dampers c (n) for the velocity dqd.
+  /// Returns N' C_0 N dqd with C_0 = diag(c): the torque of dampers c (n) for the velocity dqd.
   Joints<N> damper(const Joints<N>& c, const Joints<N>& dqd) const noexcept {
     return spring(c, projected_velocity(dqd));
   }
-  /// N dq
+  /// Returns N dq.
   Joints<N> projected_velocity(Joints<N> dq) const noexcept {
     mass_.multiply_LT(dq);
     project(dq);
     mass_.solve_LT(dq);
     return dq;
   }
-  /// Joint velocity of least kinetic energy with which the tip moves at `twist` in the held
-  /// directions: M^-1 J' H G^-1 H V.
+  /// Returns M^-1 J' H G^-1 H V: the joint velocity of least kinetic energy with which the tip
+  /// moves at `twist` in the selected directions.
   Joints<N> joint_velocity(const Vector6& twist) const noexcept {
     Joints<N> y = Joints<N>::Zero();
     add_torque<N>(Jh_, inertia_.wrench(twist), y);
@@ -50,9 +50,9 @@ class NullSpace {
     return y;
   }
   const TaskInertia& inertia() const noexcept { return inertia_; }
-  /// L
+  /// Returns L.
   const SmallCholesky<N>& mass() const noexcept { return mass_; }
-  /// y <- P y
+  /// Replaces y by P y.
   void project(Joints<N>& y) const noexcept {
     const Vector6 f = inertia_.wrench(twist<N>(Jh_, y));
     add_torque<N>(Jh_, -f, y);

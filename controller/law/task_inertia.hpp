@@ -4,32 +4,33 @@
 
 namespace dashpot::controller {
 
-/// Inertia of the tip in the directions that are held.
+/// Inertia of the tip in the selected directions.
 ///
-/// From A = J M^-1 J' (6 x 6) and H (6 x 6), the held directions:
+/// From A = J M^-1 J' (6 x 6) and H (6 x 6), the selected directions, it computes
 ///     G = H A H + (I - H^2) D + l D.
-/// H is a projector, or on its way between two while gains change: then directions are held in
-/// part, which the second term makes smooth. D weighs metres against radians: in each block the
-/// mean of A's diagonal. H G^-1 H is the inertia (J M^-1 J')^-1 in the held directions.
+/// H is a projector, or a blend of two while gains change. Directions are then selected in part,
+/// which the second term makes smooth. D weighs metres against radians: in each block it is the
+/// mean of A's diagonal. H G^-1 H is the inertia (J M^-1 J')^-1 in the selected directions.
 ///
 /// l is zero unless the arm is nearly singular, so that G^-1 is exact elsewhere and stays bounded
-/// here: with w = 1 / trace(D G^-1) before, which is between 1/6 and 1 times the smallest
-/// eigenvalue of G relative to D,
+/// near a singularity. With w = 1 / trace(D G^-1) for l = 0, which is between 1/6 and 1 times the
+/// smallest eigenvalue of G relative to D,
 ///     l = w_0 (1 - w / w_0)^2  for w < w_0.
 class TaskInertia {
  public:
   /// w_0
   static constexpr double kNearlySingular = 1e-3;
 
-  /// `A`: J M^-1 J', in B's axes.
+  /// Computes the inertia; `A` is J M^-1 J' in B's axes.
   void compute(const Matrix6& A, const TipImpedance& base, const TipImpedance& tool,
                const Eigen::Matrix3d& R_BT) noexcept;
 
-  /// H G^-1 H a: wrench that gives the tip the acceleration a in the held directions.
+  /// Returns H G^-1 H a: the wrench that gives the tip the acceleration a in the selected
+  /// directions.
   Vector6 wrench(const Vector6& acceleration) const noexcept { return inertia_ * acceleration; }
-  /// w
+  /// Returns w.
   double regularity() const noexcept { return regularity_; }
-  /// l > 0
+  /// Returns true if l > 0.
   bool nearly_singular() const noexcept { return !(regularity_ >= kNearlySingular); }
 
  private:

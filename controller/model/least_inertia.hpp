@@ -3,14 +3,14 @@
 
 namespace dashpot::controller {
 
-/// What the tip weighs in the direction in which it weighs least.
+/// Inertia of the tip in the direction in which it is least.
 struct TipInertia {
   double linear;   ///< kg
   double angular;  ///< kg m^2
 };
 
-/// Returns the least over 64 postures spread evenly between the position limits (n, rad; where
-/// there is none, half a turn).
+/// Returns the least inertia of the tip over 64 postures spread evenly between the position limits
+/// (n, rad; half a turn where there is none).
 TipInertia least_tip_inertia(const RobotModel& model, const JointVector& lower,
                              const JointVector& upper);
 

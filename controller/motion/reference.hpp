@@ -6,9 +6,10 @@
 
 namespace dashpot::controller {
 
-/// Where the joint springs are fixed while the set-point moves. From rest the way is straight in
-/// joint space and all joints arrive together; velocity and acceleration keep to their limits, the
-/// acceleration is continuous, and the path ends exactly at its goal.
+/// Reference of the joint springs: the joint position at which they are fixed just now. From rest
+/// it moves along a straight line in joint space, and all joints arrive together. Velocity and
+/// acceleration keep to their limits, the acceleration is continuous, and the reference ends
+/// exactly at its goal.
 template <int N>
 class JointReference {
  public:
@@ -19,14 +20,14 @@ class JointReference {
     start(Vector::Zero());
   }
 
-  /// At rest at `position`.
+  /// Places the reference at rest at `position`.
   void start(const Vector& position) noexcept {
     point_ = position_ = position;
     velocity_.setZero();
     smoothing_.reset();
   }
 
-  /// One period toward `goal`.
+  /// Moves one period toward `goal`.
   void step(const Vector& goal) noexcept {
     const Step<N> step = approach<N>(difference<N>(goal, point_), velocity_, norm_, period_);
     velocity_ = step.velocity;
@@ -38,13 +39,13 @@ class JointReference {
     smooth();
   }
 
-  /// Coordinate i goes on from `position`, with the velocity it has.
+  /// Moves coordinate i to `position` and keeps its velocity.
   void relocate(int i, double position) noexcept {
     point_[i] += position - position_[i];
     position_[i] = position;
   }
 
-  /// One period in which the path brakes, or stays where it is.
+  /// Brakes for one period, or stays at rest.
   void halt() noexcept {
     velocity_ = approach<N>(Vector::Zero(), velocity_, norm_, period_).velocity;
     add<N>(velocity_, point_, period_);
@@ -70,22 +71,24 @@ class JointReference {
   Vector position_;
 };
 
-/// The rotation vector of a unit quaternion, the short way round.
+/// Returns the rotation vector of a unit quaternion, the short way round.
 inline Eigen::Vector3d short_turn(Eigen::Quaterniond turn) noexcept {
   if (turn.w() < 0) turn.coeffs() = -turn.coeffs();
   return rotation_vector(turn);
 }
 
-/// Where the Cartesian springs are fixed while the set-point moves. From rest the tip goes along a
-/// straight line and turns about one axis, the short way round, and both arrive together.
+/// Reference of the Cartesian springs: the pose at which they are fixed just now. From rest it
+/// moves along a straight line and turns about one axis, the short way round, and both arrive
+/// together.
 ///
-/// The smoothed orientation is exp(offset) times the one before smoothing, and its angular velocity
-/// the average of those before. That is exact while the axis of rotation stands still; where a new
-/// goal changes it on the way, the two differ by a fraction |offset| (rad) of the angular velocity.
+/// The smoothed orientation is exp(offset) times the orientation before smoothing, and its angular
+/// velocity is the average of the angular velocities before smoothing. That is exact while the axis
+/// of rotation stands still. Where a new goal changes the axis in motion, the two differ by a
+/// fraction |offset| (rad) of the angular velocity.
 ///
 /// A ReferenceGovernor keeps the reference within the error clamp of the tip. With d the difference
-/// from reference to goal and e that from tip to reference (m, and rad as a rotation vector), the
-/// reference moves along
+/// from reference to goal and e the difference from tip to reference (m, and rad as a rotation
+/// vector), the reference moves along
 ///     ErrorClamp::clamped(e + d) - e.
 /// So it brakes for the edge of the clamp as for a goal, moves along with a robot that cannot
 /// follow or is led away, and returns from there: nothing winds up.
@@ -94,7 +97,7 @@ class TipReference {
   TipReference(const TwistNorm& norm, double period, int smoothing) noexcept
       : norm_(norm), period_(period), smoothing_(smoothing) {}
 
-  /// At rest.
+  /// Places the reference at rest at a pose.
   void start(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation) noexcept {
     point_ = position_ = position;
     point_rotation_ = rotation_ = rotation;
@@ -102,7 +105,7 @@ class TipReference {
     smoothing_.reset();
   }
 
-  /// From here on, with the velocity it has.
+  /// Moves the reference to a pose and keeps its velocity.
   void relocate(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation) noexcept {
     point_ += position - position_;
     position_ = position;
@@ -120,7 +123,7 @@ class TipReference {
             const ReferenceGovernor& governor, double share = 1) noexcept {
     const Vector6 d = way_to(position, rotation);
     if (governor.near(position, rotation)) return go(position, rotation, d, true, share);
-    Vector6 e;  // of the path before smoothing
+    Vector6 e;  // of the reference before smoothing
     e << point_ - governor.position, short_turn(point_rotation_ * governor.rotation.conjugate());
     const Vector6 goal = e + d;
     const Vector6 within = governor.clamped(goal);
@@ -128,7 +131,7 @@ class TipReference {
     go(position, rotation, within - e, false, share);
   }
 
-  /// One period in which the path brakes, or stays where it is.
+  /// Brakes for one period, or stays at rest.
   void halt() noexcept {
     velocity_ = approach<6>(Vector6::Zero(), velocity_, norm_, period_).velocity;
     advance();
@@ -151,7 +154,7 @@ class TipReference {
     if (d.tail<3>().norm() < 1e-14) d.tail<3>().setZero();  // rounding of the product
     return d;
   }
-  /// One period along the way `d`, which `ends` at the goal given or before it.
+  /// Moves one period along the difference `d`, which `ends` at the given goal or before it.
   void go(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation, const Vector6& d,
           bool ends, double share) noexcept {
     const Step<6> step = approach<6>(d, velocity_, norm_, period_, share);

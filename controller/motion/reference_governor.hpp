@@ -6,16 +6,16 @@
 
 namespace dashpot::controller {
 
-/// Which directions of a frame have springs: 1 or 0, of a positive semidefinite K, whose row is
-/// zero where its diagonal entry is.
+/// Returns which directions of a frame have springs, 1 or 0 for each. K is positive semidefinite,
+/// so that a row is zero if its diagonal entry is.
 inline Vector6 sprung(const Matrix6& K) noexcept {
   Vector6 result;
   for (int i = 0; i < 6; ++i) result[i] = K(i, i) > 0 ? 1 : 0;
   return result;
 }
 
-/// diag(R, R) diag(mask) diag(R, R)' a: of the vector a in B's axes, what lies in the directions
-/// `mask` of the frame with the axes R.
+/// Returns diag(R, R) diag(mask) diag(R, R)' a, the part of the vector a (in B's axes) in the
+/// directions `mask` of the frame with the axes R.
 inline Vector6 part_along(const Vector6& mask, const Eigen::Matrix3d& R,
                           const Vector6& a) noexcept {
   Vector6 result;
@@ -26,9 +26,9 @@ inline Vector6 part_along(const Vector6& mask, const Eigen::Matrix3d& R,
 
 /// Limits the deflection of the tip's springs: e (m, and rad as a rotation vector) becomes
 ///     e - (1 - min(1, r / |e_s|)) e_s,
-/// linear and angular part each by itself, e_s being what lies in directions that have springs and
-/// r the limit. Less deflection is less energy: e' K e becomes no larger where K does not couple
-/// the two parts.
+/// linear and angular part each by itself. e_s is the part of e in directions that have springs,
+/// and r is the limit. Less deflection is less energy: e' K e becomes no larger if K does not
+/// couple the two parts.
 struct ErrorClamp {
   double linear = 0;   ///< m
   double angular = 0;  ///< rad
@@ -36,7 +36,7 @@ struct ErrorClamp {
   Vector6 clamped(const Vector6& e, const TipImpedance& base, const TipImpedance& tool,
                   const Eigen::Matrix3d& R_BT) const noexcept {
     if (e.head<3>().norm() <= linear && e.tail<3>().norm() <= angular) return e;
-    Vector6 e_s = e;  // while springs pass from one frame to the other: all of it
+    Vector6 e_s = e;  // all of e while springs blend from one frame to the other
     if (tool.none()) {
       e_s = part_along(sprung(base.stiffness), Eigen::Matrix3d::Identity(), e);
     } else if (base.none()) {
@@ -50,8 +50,8 @@ struct ErrorClamp {
   }
 };
 
-/// Keeps the tip's reference within the error clamp: where the tip is, and the springs between it
-/// and the reference.
+/// Keeps the tip's reference within the error clamp. It knows the pose of the tip, and the springs
+/// between tip and reference.
 struct ReferenceGovernor {
   const Eigen::Vector3d& position;
   const Eigen::Quaterniond& rotation;
@@ -61,8 +61,8 @@ struct ReferenceGovernor {
   const ErrorClamp& clamp;
 
   Vector6 clamped(const Vector6& e) const noexcept { return clamp.clamped(e, base, tool, R_BT); }
-  /// True if a pose is within the clamp, by a bound that costs little: the angle between two unit
-  /// quaternions is at most pi sqrt(1 - (their product)^2).
+  /// Returns true if a cheap bound shows that a pose is within the clamp: the angle between two
+  /// unit quaternions is at most pi sqrt(1 - (their product)^2).
   bool near(const Eigen::Vector3d& p, const Eigen::Quaterniond& q) const noexcept {
     const double cosine = q.dot(rotation);
     return (p - position).squaredNorm() <= clamp.linear * clamp.linear &&
@@ -71,8 +71,8 @@ struct ReferenceGovernor {
   }
 };
 
-/// Of the deflection e of springs that change from `now` to `then`: what is left once those that
-/// grow from nothing start at rest.
+/// Returns the deflection e of springs that change from `now` to `then` without its part in the
+/// directions of new springs, so that springs that grow from zero start without deflection.
 inline Vector6 without_new_springs(const Vector6& e, const TipImpedance& now_base,
                                    const TipImpedance& now_tool, const TipImpedance& then_base,
                                    const TipImpedance& then_tool,

@@ -7,11 +7,11 @@
 
 namespace dashpot::controller {
 
-/// Longest smoothing of a path, in ticks.
+/// Longest smoothing of a reference, in ticks.
 inline constexpr int kMaxSmoothing = 256;
 
-/// Limits of each coordinate by itself: speed(v) = max |v_i| / velocity_i, effort(a) likewise with
-/// the acceleration limits. Both are norms, and 1 at the limit.
+/// Limits of each coordinate by itself. speed(v) is max |v_i| / velocity_i, and effort(a) likewise
+/// with the acceleration limits. Both are norms, and 1 at the limit.
 template <int N>
 struct JointNorm {
   Joints<N> velocity;      ///< limits, rad/s
@@ -28,7 +28,7 @@ struct JointNorm {
   }
 };
 
-/// Limits of a twist's linear and angular part: speed(V) = max(|v| / v_max, |w| / w_max).
+/// Limits of the linear and the angular part of a twist: speed(V) = max(|v| / v_max, |w| / w_max).
 struct TwistNorm {
   double linear_velocity = 1;       ///< limits, m/s
   double angular_velocity = 1;      ///< rad/s
@@ -50,18 +50,19 @@ struct Step {
   bool arrives = false;  ///< a period at this velocity ends at the goal
 };
 
-/// Next velocity of a point that moves at velocity v, with the way d before it to its goal:
+/// Returns the next velocity of a point that moves at velocity v, d being goal minus position:
 ///     v + (c - v) / max(1, effort(c - v) / T),
-/// T the period. c leads straight to the goal and can brake for it at half the acceleration limit
-/// in a whole number k of periods: with b = 1/2 / effort(d), braking as a fraction of d per s^2,
+/// where T is the period. c leads straight to the goal and can brake for it at half the
+/// acceleration limit in a whole number k of periods: with b = 1/2 / effort(d), braking as a
+/// fraction of d per s^2,
 ///     c = d min(1 / speed(d), 1/(k T) + (k - 1)/2 b T),  k = ceil((sqrt(1 + 8 / (b T^2)) - 1) /
 ///     2).
 ///
 /// The result is a weighted mean of v and c, so its speed stays at most 1, and it differs from v by
 /// an effort of at most T. Once it equals c, the next c is shorter by b T d: the point brakes and
-/// its last period ends at the goal. `share` (0 to 1) of the speed limit counts: with less of it
-/// the point slows down as far as the acceleration limit allows. It catches up with c, because
-/// braking at half the limit c changes no faster than v can, in whatever direction the point comes.
+/// its last period ends at the goal. `share` (0 to 1) scales the speed limit: if it decreases, the
+/// point slows down as far as the acceleration limit allows. v catches up with c, because c brakes
+/// at half the limit and so changes no faster than v can, from whatever direction the point comes.
 /// The goal may move.
 template <int D, class Norm>
 Step<D> approach(const Joints<D>& d, const Joints<D>& v, const Norm& norm, double T,
@@ -88,9 +89,9 @@ Step<D> approach(const Joints<D>& d, const Joints<D>& v, const Norm& norm, doubl
 }
 
 /// Moving average of the last W velocities. It keeps every bound on velocity and acceleration and
-/// makes the acceleration continuous: it changes by at most 2 / W of its limit in a period. The
-/// averaged motion is the position that was averaged plus `offset`; W periods after the end of a
-/// motion the offset is exactly zero.
+/// makes the acceleration continuous, because in a period the acceleration changes by at most 2 / W
+/// of its limit. The smoothed position is the position before smoothing plus `offset`. W periods
+/// after the end of a motion the offset is exactly zero.
 template <int D>
 class Smoothing {
  public:
@@ -125,7 +126,7 @@ class Smoothing {
       velocity_[i] = sum_[i] * share;
       offset_[i] += (velocity_[i] - velocity[i]) * T;
     }
-    if (still_ == window_) {  // sheds what rounding has left over
+    if (still_ == window_) {  // removes accumulated rounding errors
       sum_.setZero();
       velocity_.setZero();
       offset_.setZero();

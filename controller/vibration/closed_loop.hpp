@@ -9,8 +9,8 @@
 
 namespace dashpot::controller {
 
-/// Jdot (6 x n) at joint velocity qd: with j and k counted from the base, v and w the linear and
-/// angular rows of J,
+/// Returns Jdot (6 x n) at joint velocity qd: with j and k counted from the base, v and w the
+/// linear and angular rows of J,
 ///     dJ_j/dq_k = (w_k x v_j, w_k x w_j) for k <= j,  (w_j x v_k, 0) for k > j.
 template <int N>
 Jacobian<N> jacobian_rate(const Jacobian<N>& J, const Joints<N>& qd) noexcept {
@@ -28,7 +28,7 @@ Jacobian<N> jacobian_rate(const Jacobian<N>& J, const Joints<N>& qd) noexcept {
   return rate;
 }
 
-/// K_G = [(dJ/dq_1)' f ... (dJ/dq_n)' f], n x n, for the wrench f in B's axes.
+/// Returns K_G = [(dJ/dq_1)' f ... (dJ/dq_n)' f], n x n, for the wrench f in B's axes.
 template <int N>
 JointSquare<N> geometric_stiffness(const Jacobian<N>& J, const Vector6& f) noexcept {
   JointSquare<N> K_G;
@@ -68,13 +68,13 @@ void add_projected(const JointSquare<N>& P, const Joints<N>& k, JointSquare<N>& 
   }
 }
 
-/// The robot with the springs and dampers of an impedance, M q'' + C q' + K q = f, linearised where
-/// the springs are at rest (e = 0, q = q_d, q = q_0) and N stands still:
+/// Sets `system` to the robot with the springs and dampers of an impedance, M q'' + C q' + K q = f,
+/// linearised where the springs are at rest (e = 0, q = q_d, q = q_0) and N stands still:
 ///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot]  [+ K_G(external wrench)]
 ///     C = C_q + J' C_C J + N' C_0 N + viscous friction of the joints.
-/// The terms in brackets are there if TaskTerms asks for them; K is symmetric and has its factor W
-/// if none is. The feed-forward has no part in it: it depends on the set-point, not on the state,
-/// but for Coriolis and gravity, which cancel those of the robot.
+/// TaskTerms says which terms in brackets are included. If none is, K is symmetric and has its
+/// factor W. The feed-forward does not appear, because it depends on the set-point, not on the
+/// state, except for Coriolis and gravity, which cancel the robot's Coriolis and gravity torques.
 template <int N>
 void closed_loop(const Dynamics<N>& robot, const Joints<N>& qd, const Impedance<N>& impedance,
                  const NullSpace<N>& null_space, const Joints<N>& viscous_friction,
@@ -83,7 +83,7 @@ void closed_loop(const Dynamics<N>& robot, const Joints<N>& qd, const Impedance<
   const Jacobian<N>& J = robot.J;
   const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
   const Matrix6 C_C = impedance.base.damping + turned(impedance.tool.damping, robot.R_BT);
-  JointSquare<N> K_N = JointSquare<N>::Zero();  // what is not in the tip's springs
+  JointSquare<N> K_N = JointSquare<N>::Zero();  // all stiffness but the tip's springs
   JointSquare<N> C = impedance.joint_damping;
   JointSquare<N> projector = JointSquare<N>::Zero();
   if (impedance.null_space()) {
@@ -124,7 +124,7 @@ void closed_loop(const Dynamics<N>& robot, const Joints<N>& qd, const Impedance<
     system.stiffness_factor.resize(0, N);
     return;
   }
-  // Without joint springs the factor of K_N is that of K_0 times the projector: no digit is lost.
+  // Without joint springs the factor of K_N is sqrt(K_0) times the projector: no digit is lost.
   const bool plain = impedance.joint_weight == 0;
   const JointSquare<N> W_N = plain ? projector : semidefinite_factor<N>(K_N);
   const Matrix6 W_C = semidefinite_factor<6>(K_C);

@@ -8,23 +8,24 @@ namespace dashpot::controller {
 /// M, C and a factor W of K = W' W with at most n rows that moves as smoothly as the robot does. K
 /// itself is not formed, and nothing is squared.
 ///
-/// W stacks, as far as they are there,
+/// W stacks the rows of the springs that there are:
 ///     F' J              K_C = F F' in the axes in which it is given, J turned into them,
 ///     G' (L Q)'         the null space: with M = L L', Q (n x r) spans the free motions in energy
 ///                       coordinates, G G' = Q' L^-1 K_0 L^-T Q,
 ///     H'                K_q = H H'.
-/// As many rows as joints, or more, are turned into the one upper triangle with W' W = K, but for
-/// those of the tip alone where these are as many. Q is that of the last tick, projected. Where the
-/// arm is nearly singular or gains change between two sets of held directions, N has no such Q, and
-/// sqrt(K_0) N stands for the null space.
+/// If there are as many rows as joints, or more, they are replaced by the upper triangle with
+/// W' W = K; exactly n rows of the tip's springs alone are not. Q is computed by projecting the Q
+/// of the last tick. Where the arm is nearly singular or gains change between two sets of selected
+/// directions, N has no such Q, and sqrt(K_0) N takes the place of the null space's rows.
 template <int N>
 class LoopSystem {
  public:
   /// Forgets the last tick.
   void reset() noexcept { dimension_ = 0; }
 
-  /// Fills mass, damping and stiffness_factor of `system`, which has as many rows as there are
-  /// modes. `null_space` is that of the robot if the impedance has one.
+  /// Fills mass, damping and stiffness_factor of `system`. The factor has as many rows as there are
+  /// modes. `null_space` is the robot's null space; it is used only if the impedance has null-space
+  /// springs or dampers.
   void form(const Dynamics<N>& robot, const Impedance<N>& impedance, const NullSpace<N>& null_space,
             const Joints<N>& viscous_friction, analysis::System<kMaxJoints>& system) noexcept;
 
@@ -41,11 +42,11 @@ class LoopSystem {
   SpringFactor<6> base_, tool_;
   SpringFactor<N> joint_;
   std::array<Joints<N>, N> Q_;
-  int dimension_ = 0;  ///< r of Q; 0: none
+  int dimension_ = 0;  ///< r of Q; 0: there is no Q
 };
 
-/// Number of directions held, for a robot that holds each wholly or not at all, in one frame; else
-/// -1.
+/// Returns the number of selected directions, if each is selected wholly or not at all, and all in
+/// one frame; otherwise -1.
 inline int selected_directions(const TipImpedance& base, const TipImpedance& tool) noexcept {
   if (!base.none() && !tool.none()) return -1;
   int count = 0;
@@ -97,7 +98,7 @@ bool LoopSystem<N>::follow_free_motions(const NullSpace<N>& null_space, int r) n
     }
     if (dimension_ == r) return true;
   }
-  // Anew: of the unit vectors always the one of which most is left.
+  // Start again: choose the unit vectors with the largest remaining projections, one by one.
   dimension_ = 0;
   std::array<Joints<N>, N> candidates;
   for (int j = 0; j < N; ++j) {

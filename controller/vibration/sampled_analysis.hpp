@@ -10,22 +10,22 @@
 
 namespace dashpot::controller {
 
-/// dg/dq (n x n, N m/rad) of the gravity torque g(q), by central differences, good to 1e-9
-/// relative. Allocates.
+/// Returns dg/dq (n x n, N m/rad) of the gravity torque g(q), by central differences, with a
+/// relative error of 1e-9. Allocates.
 Eigen::MatrixXd gravity_gradient(const RobotModel& model, const JointVector& q);
 
-/// The loop as the settings describe it, without gravity.
+/// Returns the sampled loop that the settings describe, without gravity.
 analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& settings);
 
-/// Finds, now and then and on a thread of its own, what becomes of the modes because the torque is
-/// held over a tick, delayed and filtered: analysis::sample_loop, and analysis::gain_margin. That
-/// takes milliseconds and allocates.
+/// Finds, at intervals and on a thread of its own, the modes of the loop with its torque held over
+/// a period (zero-order hold), delayed and filtered, by analysis::sample_loop and
+/// analysis::gain_margin. The thread is needed because this takes milliseconds and allocates.
 ///
-/// The real-time thread calls `due`, `task`, `hand_over` and `reset`; one other thread, always the
-/// same, `latest`. None of these waits, allocates or calls the system.
+/// The real-time thread calls `due`, `task`, `hand_over` and `reset`. One other thread, always the
+/// same, calls `latest`. None of these functions waits, allocates or calls the system.
 class SampledAnalysis {
  public:
-  /// A closed loop as Controller::closed_loop gives it.
+  /// A closed loop, as Controller::closed_loop sets it.
   struct Task {
     std::int64_t time = 0;
     std::uint64_t tick = 0;
@@ -39,16 +39,16 @@ class SampledAnalysis {
   SampledAnalysis(const SampledAnalysis&) = delete;
   SampledAnalysis& operator=(const SampledAnalysis&) = delete;
 
-  /// Whether it is time for the next task: once the gains have grown, and then at each interval.
-  /// Ticks count from 1, and begin again after `reset`.
+  /// Returns true if it is time for the next task: once the gains have grown, and then at each
+  /// interval. Ticks count from 1, and begin again after `reset`.
   bool due(std::uint64_t tick) const noexcept { return tick >= next_; }
-  /// To be filled in, and then handed over.
+  /// Returns the task that the caller fills in, and then hands over.
   Task& task() noexcept { return tasks_.slot(); }
   void hand_over() noexcept;
   void reset() noexcept;
 
-  /// The latest result; null as long as there is none since the last `reset`. Good until the next
-  /// call.
+  /// Returns the latest result; null as long as there is none since the last `reset`. The result is
+  /// valid until the next call.
   const SampledVibration* latest() noexcept;
 
  private:
@@ -56,12 +56,12 @@ class SampledAnalysis {
   void solve(const Task& task, SampledVibration& result);
 
   RobotModel model_;
-  bool gravity_;  ///< is compensated
+  bool gravity_;  ///< whether gravity is compensated
   std::uint64_t interval_;
   std::uint64_t first_;  ///< tick
   std::uint64_t next_;
-  std::atomic<std::uint64_t> resets_{1};  ///< so that a result that is none does not fit
-  analysis::SampledLoop loop_;            ///< the thread's
+  std::atomic<std::uint64_t> resets_{1};  ///< from 1, so that an empty result never matches
+  analysis::SampledLoop loop_;            ///< of the thread
   Latest<Task> tasks_;
   Latest<SampledVibration> results_;
   std::atomic<bool> stop_{false};

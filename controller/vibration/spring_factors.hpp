@@ -9,8 +9,9 @@
 
 namespace dashpot::controller {
 
-/// W with W' W = A for a symmetric positive semidefinite A; as many rows as A, the last ones zero
-/// if A has less than full rank. Cholesky factorisation, largest pivot first.
+/// Returns W with W' W = A for a symmetric positive semidefinite A, by Cholesky factorisation with
+/// the largest pivot first. W has as many rows as A; the last rows are zero if A has less than full
+/// rank.
 template <int N>
 JointSquare<N> semidefinite_factor(JointSquare<N> A) noexcept {
   JointSquare<N> W = JointSquare<N>::Zero();
@@ -32,7 +33,7 @@ JointSquare<N> semidefinite_factor(JointSquare<N> A) noexcept {
   return W;
 }
 
-/// a' b
+/// Returns a' b.
 template <int N>
 double product(const Joints<N>& a, const Joints<N>& b) noexcept {
   double sum = 0;
@@ -46,8 +47,8 @@ void remove_component(const Joints<N>& q, Joints<N>& y) noexcept {
   add<N>(q, y, -product<N>(q, y));
 }
 
-/// Makes y orthogonal to the `count` orthonormal vectors Q, and of length 1. False if no more than
-/// `least` of it is left.
+/// Makes y orthogonal to the `count` orthonormal vectors Q, and of length 1. Returns false if the
+/// orthogonal part of y is no longer than `least`.
 template <int N>
 bool orthonormalize(const Joints<N>* Q, int count, double least, Joints<N>& y) noexcept {
   for (int pass = 0; pass < 2 && count > 0; ++pass) {
@@ -59,8 +60,8 @@ bool orthonormalize(const Joints<N>* Q, int count, double least, Joints<N>& y) n
   return true;
 }
 
-/// Replaces the lower triangle of the r x r matrix A by its Cholesky factor. False if it is not
-/// positive definite beyond rounding.
+/// Replaces the lower triangle of the r x r matrix A by its Cholesky factor. Returns false if A is
+/// not positive definite beyond rounding.
 template <int N>
 bool lower_cholesky(int r, JointSquare<N>& A) noexcept {
   double trace = 0;
@@ -114,24 +115,24 @@ class SpringFactor {
   int rows_ = 0;
 };
 
-/// Rows of n numbers, to be stacked and made fewer.
+/// Stacked rows of n numbers, which can be reduced to n rows.
 template <int N>
 class FactorRows {
  public:
-  static constexpr int kMost = 2 * N + 12;  ///< of the tip in two frames, the null space, joints
+  static constexpr int kMost = 2 * N + 12;  ///< rows of the tip in two frames, null space, joints
 
   int size() const noexcept { return size_; }
   void clear() noexcept { size_ = 0; }
   void grow(int rows) noexcept { size_ += rows; }
-  /// Entry of row i past the last one.
+  /// Returns entry j of row i past the last row.
   double& at(int i, int j) noexcept { return column(j)[size_ + i]; }
-  /// Entry of row i.
+  /// Returns entry j of row i.
   double at_row(int i, int j) const noexcept {
     return items_[place(j) + static_cast<std::size_t>(i)];
   }
 
-  /// W <- R, upper triangular with R' R = W' W and no negative diagonal entry (Householder). At
-  /// least n rows become n.
+  /// Replaces W by R, upper triangular with R' R = W' W and no negative diagonal entry, by
+  /// Householder reflections. There must be at least n rows; they become n rows.
   void triangularize() noexcept {
     for (int k = 0; k < N; ++k) {
       double* const x = column(k);

@@ -9,8 +9,8 @@
 namespace dashpot::controller {
 
 /// A thread that solves the latest task. The real-time thread hands tasks over and fetches results
-/// without waiting, locking or calling the system; so nobody wakes this thread: it looks for tasks
-/// every 200 us, or every 2 ms if there was none for some time.
+/// without waiting, locking or calling the system. So nobody wakes this thread, and it looks for
+/// tasks every 200 us, or every 2 ms if there was none for some time.
 class VibrationThread {
  public:
   struct Result {
@@ -24,15 +24,15 @@ class VibrationThread {
   VibrationThread& operator=(const VibrationThread&) = delete;
 
   Latest<VibrationTask> tasks;  ///< from the real-time thread
-  Latest<Result> results;       ///< back
-  /// Of this thread from a task's publication to its result's; before and after, while there is no
-  /// other task, the real-time thread may use it.
+  Latest<Result> results;       ///< to the real-time thread
+  /// Belongs to this thread from the publication of a task to the publication of its result. While
+  /// there is no task, the real-time thread may use it.
   VibrationSolver solver;
 
  private:
   void run() noexcept;
 
-  std::mutex mutex_;  ///< of what follows; the real-time thread has nothing to do with it
+  std::mutex mutex_;  ///< guards stop_; the real-time thread does not use it
   std::condition_variable stopped_;
   bool stop_ = false;
   std::thread thread_;  ///< the last member: it uses the others
