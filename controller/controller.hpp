@@ -43,6 +43,9 @@ class Controller {
   /// status it is safe to send (see Status). Bounded work; no allocation, lock, exception or system
   /// call.
   Status update(const RobotState& state, const Setpoint& setpoint, JointVector& torque) noexcept;
+  /// The same without a set-point: the last one stays, or, before the first, the robot where it was
+  /// found.
+  Status update(const RobotState& state, JointVector& torque) noexcept;
 
   /// Of the last tick.
   const Snapshot& snapshot() const noexcept;
