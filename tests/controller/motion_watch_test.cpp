@@ -146,8 +146,8 @@ TEST_F(WatchedPair, EstimatesWithTheMeanOfWhatWasAppliedMeanwhile) {
   settings.limits.external_torque = Pair(4, 4);
   tick();
   const auto also = [&](const Pair& excess) { watch->applied(robot.gravity + excess, excess); };
-  also({-6, 0});
   also({-3, 0});
+  also({-6, 0});
   EXPECT_EQ(tick({0, 0}, 0.1), Status::kOk);  // -3 of 4
   also({-9, 0});
   EXPECT_EQ(tick({0, 0}, 0.1), Status::kCollision);  // -4.5
