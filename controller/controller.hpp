@@ -43,6 +43,9 @@ class Controller {
   /// tick. The torque is safe to send with every status (see Status). The work is bounded, without
   /// allocation, lock, exception or system call.
   Status update(const RobotState& state, const Setpoint& setpoint, JointVector& torque) noexcept;
+  /// The same without a set-point: the last one stays, or, before the first, the robot where it was
+  /// found.
+  Status update(const RobotState& state, JointVector& torque) noexcept;
 
   /// Returns what the last tick measured and put out.
   const Snapshot& snapshot() const noexcept;

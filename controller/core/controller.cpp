@@ -34,7 +34,10 @@ Controller& Controller::operator=(Controller&&) noexcept = default;
 
 Status Controller::update(const RobotState& state, const Setpoint& setpoint,
                           JointVector& torque) noexcept {
-  return core_->update(state, setpoint, torque);
+  return core_->update(state, &setpoint, torque);
+}
+Status Controller::update(const RobotState& state, JointVector& torque) noexcept {
+  return core_->update(state, nullptr, torque);
 }
 const Snapshot& Controller::snapshot() const noexcept {
   return core_->snapshot();

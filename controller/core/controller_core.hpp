@@ -14,7 +14,8 @@ class ControllerCore {
   ControllerCore(const ControllerCore&) = delete;
   ControllerCore& operator=(const ControllerCore&) = delete;
 
-  virtual Status update(const RobotState& state, const Setpoint& setpoint,
+  /// `setpoint`: null if there is none; the last one stays then.
+  virtual Status update(const RobotState& state, const Setpoint* setpoint,
                         JointVector& torque) noexcept = 0;
   virtual void reset(const JointVector& torque) noexcept = 0;
   virtual void release() noexcept = 0;

@@ -26,7 +26,7 @@ class FixedCore final : public ControllerCore {
 
   FixedCore(const RobotModel& model, const Settings& settings);
 
-  Status update(const RobotState& state, const Setpoint& setpoint,
+  Status update(const RobotState& state, const Setpoint* setpoint,
                 JointVector& torque) noexcept override;
   void reset(const JointVector& torque) noexcept override;
   void release() noexcept override;
@@ -56,6 +56,10 @@ class FixedCore final : public ControllerCore {
   Vector impedance_torque(bool hold) noexcept;
   /// The safe output without springs.
   Vector damping_torque() noexcept;
+  /// What is compensated here of the gravity torque, at the last good state.
+  Vector weight() const noexcept {
+    return settings_.feed_forward.gravity ? robot_.gravity : Vector(Vector::Zero());
+  }
   double tip_reference_speed() const noexcept;
   /// True if no path moves that springs are fixed on.
   bool references_still() const noexcept;
@@ -197,7 +201,7 @@ void FixedCore<N>::release() noexcept {
 }
 
 template <int N>
-Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
+Status FixedCore<N>::update(const RobotState& state, const Setpoint* setpoint,
                             JointVector& torque) noexcept {
   ++snapshot_.tick;
   snapshot_.time = state.time;
@@ -216,12 +220,14 @@ Status FixedCore<N>::update(const RobotState& state, const Setpoint& setpoint,
   const bool wrench_known = state.external_wrench.allFinite();
   if (wrench_known) external_wrench_ = state.external_wrench;
   kernel_.evaluate(q_, qd_, robot_);
-  const Vector weight = settings_.feed_forward.gravity ? robot_.gravity : Vector(Vector::Zero());
+  const Vector weight = this->weight();
   filter_.assume(weight);
   first_ = false;
 
   Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
-  if (!accept_setpoint(setpoint)) status = worse(status, Status::kSetpointRejected);
+  if (setpoint != nullptr && !accept_setpoint(*setpoint)) {
+    status = worse(status, Status::kSetpointRejected);
+  }
   status = worse(status, setpoint_age_status());
   // A reflex that has lost its sensor protects nobody.
   const bool blind = !wrench_known && std::isfinite(settings_.limits.external_force);
@@ -298,7 +304,9 @@ void FixedCore<N>::show_measured(const RobotState& state) noexcept {
 template <int N>
 Status FixedCore<N>::ramp(Status status, JointVector& torque) noexcept {
   if (++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap) latch(status);
-  return finish(status, filter_.ramp(), torque);
+  const Vector tau = filter_.ramp();
+  if (!first_) motion_watch_.applied(tau, difference<N>(tau, weight()));
+  return finish(status, tau, torque);
 }
 
 template <int N>

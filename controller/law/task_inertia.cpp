@@ -23,18 +23,23 @@ double mean(double trace) {
 
 void TaskInertia::compute(const Matrix6& A, const TipImpedance& base, const TipImpedance& tool,
                           const Matrix3d& R_BT) noexcept {
-  // The blocks of H; it has no others.
-  const Matrix3d H_linear = selected(base.selected.head<3>(), tool.selected.head<3>(), R_BT);
-  const Matrix3d H_angular = selected(base.selected.tail<3>(), tool.selected.tail<3>(), R_BT);
-
+  const bool all_selected = base.selected.isOnes(0) && tool.none();  // H = I, as almost always
   const Matrix3d A_linear = A.topLeftCorner<3, 3>(), A_angular = A.bottomRightCorner<3, 3>();
   const double D_linear = mean(A_linear.trace()), D_angular = mean(A_angular.trace());
-  const Matrix3d I = Matrix3d::Identity();
-  Matrix6 G = Matrix6::Zero();
-  G.topLeftCorner<3, 3>() = H_linear * A_linear * H_linear + D_linear * (I - H_linear * H_linear);
-  G.bottomLeftCorner<3, 3>() = H_angular * A.bottomLeftCorner<3, 3>() * H_linear;
-  G.bottomRightCorner<3, 3>() =
-      H_angular * A_angular * H_angular + D_angular * (I - H_angular * H_angular);
+  Matrix3d H_linear, H_angular;  // the blocks of H; it has no others
+  Matrix6 G;
+  if (all_selected) {
+    G = A;
+  } else {
+    H_linear = selected(base.selected.head<3>(), tool.selected.head<3>(), R_BT);
+    H_angular = selected(base.selected.tail<3>(), tool.selected.tail<3>(), R_BT);
+    const Matrix3d I = Matrix3d::Identity();
+    G.setZero();
+    G.topLeftCorner<3, 3>() = H_linear * A_linear * H_linear + D_linear * (I - H_linear * H_linear);
+    G.bottomLeftCorner<3, 3>() = H_angular * A.bottomLeftCorner<3, 3>() * H_linear;
+    G.bottomRightCorner<3, 3>() =
+        H_angular * A_angular * H_angular + D_angular * (I - H_angular * H_angular);
+  }
 
   Vector6 D;
   D << D_linear, D_linear, D_linear, D_angular, D_angular, D_angular;
@@ -51,7 +56,7 @@ void TaskInertia::compute(const Matrix6& A, const TipImpedance& base, const TipI
     factor.compute(G, least_pivot);
     L_inverse = factor.inverse_L();
   }
-  if (base.selected.isOnes(0) && tool.none()) {
+  if (all_selected) {
     inertia_.noalias() = L_inverse.transpose() * L_inverse;
     return;
   }

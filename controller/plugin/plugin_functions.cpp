@@ -76,8 +76,9 @@ struct dashpot_controller {  // NOLINT(readability-identifier-naming)
   /// Puts what the caller and the other thread want into `setpoint_`. False if `wanted` is there,
   /// but no set-point; the one in force stays then.
   bool take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept;
-  /// As long as no set-point was given: the springs stay where they are, and are never stale.
-  void stay(std::int64_t now) noexcept;
+  /// As long as no set-point was given: makes one with which the springs stay where they are, and
+  /// are never stale. False if there is none: before the robot is located, or where it must not be.
+  bool stay(std::int64_t now) noexcept;
 
   Controller controller_;
   Setpoint setpoint_;            ///< in force
@@ -99,7 +100,9 @@ Status dashpot_controller::update(const dashpot_state* given, const dashpot_setp
   const RobotState state = to_state(given, n, later(time_, period));
   time_ = state.time;
   const bool accepted = take_up(wanted, time_);
-  Status status = controller_.update(state, setpoint_, torque);
+  const bool any = has_setpoint_ || stay(time_);
+  Status status =
+      any ? controller_.update(state, setpoint_, torque) : controller_.update(state, torque);
   located_ |= status < Status::kStateNotFinite;
   const bool latched = controller_.snapshot().fault != Status::kOk;
   if (latched_ && !latched) forget_setpoint();  // released by a rest
@@ -107,7 +110,6 @@ Status dashpot_controller::update(const dashpot_state* given, const dashpot_setp
   Snapshot snapshot = controller_.snapshot();
   if (status < Status::kStateNotFinite) judgement.locate(snapshot.position);
   if (!accepted) status = worse(status, Status::kSetpointRejected);
-  if (accepted && !has_setpoint_ && status == Status::kSetpointRejected) status = Status::kOk;
   snapshot.status = status;
   snapshots.write(snapshot);
   const Vibration& found = controller_.vibration();
@@ -172,21 +174,21 @@ bool dashpot_controller::take_up(const dashpot_setpoint* wanted, std::int64_t no
       forgotten_ = false;
     }
   }
-  if (!has_setpoint_) stay(now);
   return accepted;
 }
 
-void dashpot_controller::stay(std::int64_t now) noexcept {
+bool dashpot_controller::stay(std::int64_t now) noexcept {
+  if (!located_) return false;
   const Snapshot& snapshot = controller_.snapshot();
   setpoint_.time = now;
   setpoint_.mode = settings.initial.mode;
-  // Before the robot is located there is nothing to give: a set-point without entries is rejected,
-  // and the controller holds the robot where it finds it.
-  const bool cartesian = setpoint_.mode == Mode::kCartesian;
-  setpoint_.joint_position.resize(0);
-  setpoint_.tip_pose.rotation.setZero();
-  if (located_ && !cartesian) setpoint_.joint_position = snapshot.reference_position;
-  if (located_ && cartesian) setpoint_.tip_pose = snapshot.reference_tip;
+  if (setpoint_.mode == Mode::kCartesian) {
+    setpoint_.joint_position.resize(0);
+    setpoint_.tip_pose = snapshot.reference_tip;
+  } else {
+    setpoint_.joint_position = snapshot.reference_position;
+  }
+  return !check_setpoint(setpoint_, settings.limits, true);
 }
 
 namespace {

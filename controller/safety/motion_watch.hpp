@@ -11,12 +11,12 @@
 namespace dashpot::controller {
 
 /// Notices what an arm must not go on with: see the statuses that latch. Each tick is given to
-/// `check`, and the torque that comes of it to `applied`.
+/// `check`, if its state is good, and the torque that comes of it to `applied` in any case.
 ///
 /// - kCollision: the external torque r, estimated with a time constant of 10 ms from
 ///       r <- r + T / 10 ms (M (qd - last qd) / T + coriolis + gravity - tau - r),
-///   tau being what was applied meanwhile, or the force at the tip that the robot reports, is above
-///   its threshold. Without a threshold for a joint nothing is computed.
+///   tau being the mean of what was applied meanwhile, or the force at the tip that the robot
+///   reports, is above its threshold. Without a threshold for a joint nothing is computed.
 /// - kInstability: a joint swings to and fro with a velocity that grows by 2 % or more with each of
 ///   ten half swings, to more than a tenth of its limit, while the springs stand still; or the
 ///   torque beyond the weight reverses, at more than a twentieth of its limit, in every tick for 40
@@ -71,7 +71,8 @@ class MotionWatch {
   bool first_ = true;
   double tip_speed_ = 0;
   Vector q_, qd_;    ///< of the last tick
-  Vector torque_;    ///< applied since
+  Vector torque_;    ///< applied since, the mean
+  int torques_ = 0;  ///< how many
   Vector external_;  ///< r
   Vector excess_;    ///< applied since
   Vector before_;    ///< excess when the state was last seen to change
@@ -103,6 +104,7 @@ MotionWatch<N>::MotionWatch(const RobotModel& model, const Settings& settings) n
 template <int N>
 void MotionWatch<N>::reset() noexcept {
   first_ = true;
+  torques_ = 0;
   tip_speed_ = same_ = 0;
   frozen_ = false;
   for (Vector* vector :
@@ -134,6 +136,7 @@ Status MotionWatch<N>::check(const Tick& tick) noexcept {
   if (outside) status = Status::kPositionLimit;
   if (frozen(tick)) status = Status::kStateFrozen;
   first_ = false;
+  torques_ = 0;
   q_ = tick.q;
   qd_ = tick.qd;
   return status;
@@ -147,7 +150,11 @@ void MotionWatch<N>::applied(const Vector& torque, const Vector& excess) noexcep
         std::min(std::abs(excess[i]), std::abs(excess_[i])) > 0.05 * torque_limit_[i];
     reversals_[i] += ((reversed ? 1 : 0) - reversals_[i]) / 64;
   }
-  torque_ = torque;
+  if (++torques_ == 1) {
+    torque_ = torque;
+  } else {
+    add<N>(difference<N>(torque, torque_), torque_, 1.0 / torques_);
+  }
   excess_ = excess;
 }
 

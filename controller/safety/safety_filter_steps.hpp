@@ -72,10 +72,16 @@ Status SafetyFilter<N>::apply(const Motion& motion, const Vector& weight, Vector
 
 template <int N>
 Status SafetyFilter<N>::repel(const Motion& motion, Vector& excess, Vector& repulsion) noexcept {
+  repulsion.setZero();
+  bool any_near = false;
+  for (int i = 0; i < N; ++i) any_near |= nearer(i, motion.q[i]).distance < margin_[i];
+  if (!any_near) {  // as almost always
+    returning_ = 0;
+    return Status::kOk;
+  }
   Status status = Status::kOk;
   bool any_outside = false;
   for (int i = 0; i < N; ++i) {
-    repulsion[i] = 0;
     const Near near = nearer(i, motion.q[i]);
     if (!(near.distance < margin_[i])) continue;
     const double toward = near.toward, rate = toward * motion.qd[i];

@@ -90,9 +90,13 @@ Status StateCheck::check(const RobotState& state) noexcept {
   if (backward || status != Status::kStateJump) doubtful_.any = false;
   if (status != Status::kOk) return status;
 
-  JointVector position = state.position;
-  if (any_continuous_ && good_.any) unwrap(position, good_.position);
-  if (!blind_) velocity_ = state.velocity;
+  const bool unwraps = any_continuous_ && good_.any;
+  JointVector unwrapped;
+  if (unwraps) {
+    unwrapped = state.position;
+    unwrap(unwrapped, good_.position);
+  }
+  const JointVector& position = unwraps ? unwrapped : state.position;
   if (good_.any && (relocated || good_.age > longest_gap_)) {
     if (blind_) velocity_.setZero();  // how fast a jump was means nothing
     forget_motion();
@@ -111,6 +115,7 @@ Status StateCheck::check(const RobotState& state) noexcept {
 Status StateCheck::compare(const JointVector& position, const JointVector& velocity,
                            double gap) noexcept {
   const bool contradicts = contradictory(position, velocity);
+  if (contradicts && !blind_) velocity_ = velocity;
   blind_ |= contradicts;
   const bool wrong = !contradicts && wrong_rate(gap);
   if (blind_) velocity_ += ((position - good_.position) / good_.age - velocity_) / 3;

@@ -42,7 +42,7 @@ class StateCheck {
   const JointVector& position() const noexcept { return good_.position; }
   /// Returns the last good velocity, n, rad/s: the measured one, or, from a contradiction on until
   /// `trust_velocities`, how fast positions change, smoothed over three ticks.
-  const JointVector& velocity() const noexcept { return velocity_; }
+  const JointVector& velocity() const noexcept { return blind_ ? velocity_ : good_.velocity; }
   /// Returns how long before the last state the last good one before it was, s; an interval in
   /// which the clock went backward counts as a period.
   double age() const noexcept { return age_; }
@@ -89,7 +89,7 @@ class StateCheck {
   Last doubtful_;         ///< since the last good one
   double agreement_ = 0;  ///< for how long the doubtful ones have agreed with each other, s
 
-  JointVector velocity_;
+  JointVector velocity_;     ///< from positions, while blind_
   bool blind_ = false;       ///< the measured velocities contradicted the positions
   int intervals_ = 0;        ///< between ticks that `wrong_rate` has seen, at most kIntervals
   double excess_ = 0;        ///< mean of interval / period - 1

@@ -209,6 +209,17 @@ TEST_F(Recovery, AForceThatIsNoNumberIsACollisionWhereForcesAreWatched) {
   }
 }
 
+/// Held by something else while the torque ramps down and its mean is 4.5 % less than the weight.
+TEST_F(Recovery, EstimatesACollisionWithTheTorqueOfARamp) {
+  for (const double share : {0.04, 0.05}) {
+    settings.limits.external_torque.setConstant(share * gravity().cwiseAbs().maxCoeff());
+    make();
+    run(1.0);
+    for (int k = 0; k < 9; ++k) EXPECT_EQ(bad(), Status::kStateNotFinite);
+    EXPECT_EQ(next() == Status::kCollision, share < 0.045) << share;
+  }
+}
+
 /// A robot that holds its own weight has no external torque where it does.
 TEST_F(Recovery, TheWeightIsNoCollisionWhereTheRobotHoldsIt) {
   settings.feed_forward.gravity = false;

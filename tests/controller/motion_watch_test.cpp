@@ -141,6 +141,19 @@ TEST_F(WatchedPair, EstimatesNoMoreThanIsThereAfterALongTick) {
   EXPECT_EQ(tick({0, 0}, 0.1), Status::kCollision);
 }
 
+/// Between two good states several torques may have been put out.
+TEST_F(WatchedPair, EstimatesWithTheMeanOfWhatWasAppliedMeanwhile) {
+  settings.limits.external_torque = Pair(4, 4);
+  tick();
+  const auto also = [&](const Pair& excess) { watch->applied(robot.gravity + excess, excess); };
+  also({-3, 0});
+  also({-6, 0});
+  EXPECT_EQ(tick({0, 0}, 0.1), Status::kOk);  // -3 of 4
+  also({-9, 0});
+  EXPECT_EQ(tick({0, 0}, 0.1), Status::kCollision);  // -4.5
+  EXPECT_EQ(tick({0, 0}, 0.1), Status::kOk);         // all that is over
+}
+
 TEST_F(WatchedPair, BelievesTheForceThatTheRobotReports) {
   settings.limits.external_force = 5;
   wrench << 3, 0, -4, 100, 100, 100;

@@ -176,6 +176,16 @@ INSTANTIATE_TEST_SUITE_P(Modes, PluginHolds,
                                            "control: {mode: cartesian}\n"),
                          name_of);
 
+/// Not even at the first tick, before it is known where the springs are to stay.
+TEST(Plugin, HidesNoStatusWithoutASetpoint) {
+  for (const std::string mode : {"", "control: {mode: cartesian}\n"}) {
+    std::vector<double> posture = panda_posture();
+    posture[3] = -0.1;  // 0.03 rad from its limit
+    Host host(create(panda() + mode), posture);
+    for (int k = 0; k < 3; ++k) EXPECT_EQ(host.tick(), DASHPOT_NEAR_JOINT_LIMIT) << mode << k;
+  }
+}
+
 TEST(Plugin, GoesToASetpointFromTheOtherThreadsSide) {
   const Config config = load(panda());
   Host host = held_panda();
