@@ -172,7 +172,7 @@ void add_design(CLI::App& program) {
       program.add_subcommand("design", "The damping matrix that gives every mode a damping ratio");
   const auto options = std::make_shared<DesignOptions>();
   add_design_options(*command, *options);
-  command->footer(std::string(kHelp) + kUnitsHelp);
+  command->footer(std::string(kHelp) + kUnitsHelp + "\n" + kExitStatusHelp);
   command->callback([options] {
     check(*options);
     check_outputs({{"--csv", options->csv}},

@@ -155,7 +155,8 @@ void add_monitor(CLI::App& program) {
       ->option_text("X (1 on a terminal, otherwise 0)");
   command->footer(
       "Updated in place on a terminal; otherwise one line for each second. Ctrl-C, or the end of\n"
-      "the log, ends it with a summary.");
+      "the log, ends it with a summary.\n" +
+      std::string(kExitStatusHelp));
   command->callback([options] { run(*options); });
 }
 

@@ -113,8 +113,13 @@ TEST(Program, ExplainsItself) {
 }
 
 TEST(Program, ExplainsItsExitStatusEverywhere) {
-  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
-           {"--help"}, {"analyze", "--help"}, {"inspect", "--help"}}) {
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"--help"},
+                                             {"analyze", "--help"},
+                                             {"inspect", "--help"},
+                                             {"design", "--help"},
+                                             {"run", "--help"},
+                                             {"monitor", "--help"}}) {
     EXPECT_THAT(table(run_program(arguments)), HasSubstr("\nExit status: 0 if "));
   }
 }

@@ -155,6 +155,14 @@ TEST_P(SafetyScene, RunsToItsEndAndAccountsForItsEnergy) {
   EXPECT_GT(result["greatest"]["joint_speed_share"].get<double>(), 0);
 }
 
+/// Feedback that freezes at rest shows when the torque changes, and in motion at once.
+TEST(Faults, FrozenFeedbackIsSeen) {
+  const Json rest = run_json(scene("safety/frozen_at_rest"), {})["status"];
+  EXPECT_GE(rest.value("state frozen, holding the weight", 0), 1) << rest;
+  const Json motion = run_json(scene("safety/frozen_feedback"), {})["status"];
+  EXPECT_GE(motion.value("position and velocity contradict each other, damping", 0), 1) << motion;
+}
+
 INSTANTIATE_TEST_SUITE_P(Scenes, SafetyScene, ::testing::ValuesIn(safety_scenes()));
 
 }  // namespace
