@@ -21,9 +21,9 @@ namespace dashpot::controller {
 ///   ten half swings, to more than a tenth of its limit, while the springs stand still; or the
 ///   torque beyond the weight reverses, at more than a twentieth of its limit, in every tick for 40
 ///   ticks, or in every other tick for 180.
-/// - kStateFrozen: position and velocity stay the same to the last bit for 0.4 Watchdog::feedback,
-/// while
-///   that torque changes by a twentieth of its limit more than Coulomb friction explains.
+/// - kStateFrozen: position and velocity stay the same to the last bit for 0.4 times
+///   Watchdog::feedback, while that torque changes by a twentieth of its limit more than Coulomb
+///   friction explains.
 template <int N>
 class MotionWatch {
  public:
