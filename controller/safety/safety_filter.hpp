@@ -43,9 +43,9 @@ inline double loop_lag(const Settings& settings) noexcept {
 ///   So a joint that it pushes back is no faster than a tenth of its velocity limit. F_i counts
 ///   only while springs are in force.
 /// - Outside a position limit no spring acts. If the joint `returns`, the torque is that of a
-/// damper
-///   that moves inward: r_i = c_i (return_velocity_i z - qd_i), |r_i| <= F_i, z growing from 0 to 1
-///   within a second. Otherwise z = 0.
+///   damper that moves inward:
+///     r_i = c_i (return_velocity_i z - qd_i), |r_i| <= F_i, z growing from 0 to 1 within a second.
+///   Otherwise z = 0.
 ///
 /// I_i is least_joint_inertia, lag is loop_lag: delays make all this weaker, not unstable.
 ///
