@@ -20,11 +20,22 @@ Eigen::LLT<Eigen::MatrixXd> factored(const Eigen::MatrixXd& M) {
       "body has");
 }
 
-/// A golden-ratio sequence of postures.
+/// Postures spread evenly between the limits of all joints at once, by the sequence of Roberts
+/// (2018): joint i advances by phi^-(i + 1) of its range, phi^(n + 1) = phi + 1. One step for all
+/// joints would keep the postures on a curve.
 class Postures {
  public:
   Postures(const JointVector& lower, const JointVector& upper)
-      : lower_(lower.cwiseMax(-std::numbers::pi)), upper_(upper.cwiseMin(std::numbers::pi)) {
+      : lower_(lower.cwiseMax(-std::numbers::pi)),
+        upper_(upper.cwiseMin(std::numbers::pi)),
+        step_(lower.size()),
+        share_(Eigen::VectorXd::Zero(lower.size())) {
+    double phi = 1.5;
+    const double root = 1.0 / static_cast<double>(lower.size() + 1);
+    for (int k = 0; k < 60; ++k) phi = std::pow(phi + 1, root);  // contracts by at least 1/3
+    for (Eigen::Index i = 0; i < step_.size(); ++i) {
+      step_[i] = std::pow(phi, -static_cast<double>(i + 1));
+    }
     for (Eigen::Index i = 0; i < lower.size(); ++i) {  // limits that are all beyond half a turn
       if (lower_[i] <= upper_[i]) continue;
       if (lower[i] > 0) {  // the other limit may be infinite
@@ -36,18 +47,14 @@ class Postures {
   }
 
   JointVector next() {
-    JointVector q = lower_;
-    for (Eigen::Index i = 0; i < q.size(); ++i) {
-      share_ += 0.6180339887498949;
-      share_ -= std::floor(share_);
-      q[i] += share_ * (upper_[i] - lower_[i]);
-    }
-    return q;
+    share_ += step_;
+    share_ -= share_.array().floor().matrix().eval();
+    return lower_ + share_.cwiseProduct(upper_ - lower_);
   }
 
  private:
-  JointVector lower_, upper_;
-  double share_ = 0;  // in [0, 1)
+  JointVector lower_, upper_, step_;
+  JointVector share_;  // in [0, 1)
 };
 
 }  // namespace
@@ -68,7 +75,7 @@ TipInertia least_tip_inertia(const RobotModel& model, const JointVector& lower,
 
 JointVector least_joint_inertia(const RobotModel& model, const JointVector& lower,
                                 const JointVector& upper) {
-  constexpr int kPostures = 256;
+  constexpr int kPostures = 1024;
   const int n = model.dof();
   Postures postures(lower, upper);
   std::vector<Eigen::MatrixXd> masses;

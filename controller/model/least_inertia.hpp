@@ -15,7 +15,7 @@ TipInertia least_tip_inertia(const RobotModel& model, const JointVector& lower,
                              const JointVector& upper);
 
 /// Returns inertias I (n, kg m^2) that the joints have independently of each other: M - diag(I) is
-/// positive semidefinite at 256 postures spread evenly between the position limits. I is a common
+/// positive semidefinite at 1024 postures spread evenly between the position limits. I is a common
 /// fraction of the least 1 / (M^-1)_ii, what joint i resists with while all others are free.
 ///
 /// Dampers c_i = g I_i on any number of joints at once have eigenvalues of at most g in M^-1 C, so
