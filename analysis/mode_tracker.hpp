@@ -41,7 +41,7 @@ struct TrackerCounters {
   std::int64_t proportional = 0;
   std::int64_t iterations = 0;   ///< evaluations of the basis, in total
   int most_iterations = 0;       ///< in one update
-  std::int64_t separations = 0;  ///< pairs of blocks separated again
+  std::int64_t separations = 0;  ///< pairs of blocks that were separated
   std::int64_t predicted = 0;    ///< updates that began with an extrapolated basis
   std::int64_t shapes_skipped = 0;
 
@@ -62,7 +62,8 @@ struct TrackerCounters {
 /// is solved directly (SpectrumSolver), in bounded time.
 class ModeTracker {
  public:
-  /// Throws std::invalid_argument for options that are not positive numbers.
+  /// Throws std::invalid_argument for a negative soft_frequency, and for a target_bound or
+  /// max_iterations that is not positive.
   explicit ModeTracker(const TrackerOptions& options = {});
 
   /// Fills `out` and returns out.status: kOk or kUncertified if it has modes. Damping and mass are

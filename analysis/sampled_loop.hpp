@@ -34,9 +34,9 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
 /// loop becomes unstable, to six digits. It is the first boundary above 1, searched in steps of a
 /// quarter, or infinity if there is none up to `most`. Where the loop is unstable as it is, the
 /// result is the first boundary below 1, or zero if there is none down to 1e-3. Motions with
-/// |log z| / T below `slowest`, rad/s, do not count, because a self-motion that the held gravity
-/// compensation feeds is no vibration. The search takes some tens of eigenproblems. Throws like
-/// sample_loop.
+/// |log z| / T below `slowest`, rad/s, do not count, because a self-motion fed by gravity
+/// compensation with a zero-order hold is no vibration. The search takes some tens of
+/// eigenproblems. Throws like sample_loop.
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
                    double most = 1e6, double slowest = 0);

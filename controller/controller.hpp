@@ -43,8 +43,8 @@ class Controller {
   /// tick. The torque is safe to send with every status (see Status). The work is bounded, without
   /// allocation, lock, exception or system call.
   Status update(const RobotState& state, const Setpoint& setpoint, JointVector& torque) noexcept;
-  /// The same without a set-point: the last one stays, or, before the first, the robot where it was
-  /// found.
+  /// Does one tick without a set-point: the last one stays in force, or, before the first, the
+  /// springs where the robot was found. It grows old as any other (Watchdog::setpoint_hold, ...).
   Status update(const RobotState& state, JointVector& torque) noexcept;
 
   /// Returns what the last tick measured and put out.

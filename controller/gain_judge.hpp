@@ -8,15 +8,16 @@ namespace dashpot::controller {
 /// Computes, before gains are accepted, whether they leave the sampled loop the margin of
 /// Limits::gain_margin. The loop has a zero-order hold, delay and filters (Analysis::Sampled). The
 /// margin is that of analysis::gain_margin at one posture at rest, in both modes. Motions slower
-/// than 1 rad/s do not count, because gravity compensation with a zero-order hold feeds motions
-/// without springs, which then grow that slowly; all gains would be refused.
+/// than 1 rad/s do not count. Gravity compensation with a zero-order hold feeds motions without
+/// springs, which then grow that slowly, so that otherwise all gains would be refused.
 ///
 /// Not for the real-time thread, because it allocates, and takes milliseconds, or tenths of a
 /// second with a long delay and many joints.
 class GainJudge {
  public:
   struct Verdict {
-    double margin;  ///< of the worse mode; at most Limits::gain_margin, which is enough
+    double margin;  ///< of the worse mode; at most Limits::gain_margin, which is enough; below 1
+                    ///< if the loop is unstable, 0 if it could not be analysed
     Mode mode;      ///< the worse mode
   };
 
@@ -24,7 +25,7 @@ class GainJudge {
   GainJudge(const RobotModel& model, const Settings& settings);
 
   /// Judges gains at the posture `q` (n, rad). The gains must have passed check_gains in both
-  /// modes. The margin is zero if the loop could not be analysed.
+  /// modes.
   Verdict judge(const JointVector& q, const Gains& gains);
   /// Judges gains while the posture is not known yet. Returns the best verdict of kPostures
   /// postures spread over the position limits: gains without margin at any of them are taken to

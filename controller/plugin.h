@@ -48,18 +48,20 @@ typedef struct dashpot_controller dashpot_controller;
 /* What functions return.
  *
  * Zero and above: the status of a tick. If several conditions hold, the most severe, the last in
- * this list, is returned. Each status comes with one output:
- *   hold: the springs stop where they are, whatever the set-point says.
+ * this list, is returned. Before DASHPOT_SETPOINT_STALE the torque is that of the springs, dampers
+ * and feed-forward, within the limits. From there on each status names its output:
+ *   hold: the springs stop where they are, whatever the set-point says; no commanded wrench.
  *   damp: there are no springs, only joint damping, and the weight of the arm where the controller
  *         compensates it.
  *   ramp: the last good torque goes to zero within 0.1 s, or as fast as limits.torque_rate allows.
  * Where damp and ramp take torque away, it fades evenly, in all joints alike.
  *
- * Faults latch. After any "damp" but DASHPOT_SETPOINT_LOST, and after a "ramp" longer than
- * watchdog.longest_gap, the arm stays damped, with its weight held, and the status is at least
- * DASHPOT_FAULT_LATCHED. dashpot_snapshot.fault names the fault. This ends with dashpot_release or
- * dashpot_reset, or, if the configuration sets watchdog.release_after, once the arm has been at
- * rest for that long. Springs then start where the robot is. docs/safety.md describes each fault.
+ * Faults latch. After any "damp" but DASHPOT_SETPOINT_LOST, after DASHPOT_STATE_FROZEN, and after a
+ * "ramp" longer than watchdog.longest_gap, the arm stays damped, with its weight held (after
+ * DASHPOT_STATE_FROZEN: without damping), and the status is at least DASHPOT_FAULT_LATCHED.
+ * dashpot_snapshot.fault names the fault. This ends with dashpot_release or dashpot_reset, or, if
+ * the configuration sets watchdog.release_after, once the arm has been at rest for that long.
+ * Springs then start where the robot is. docs/safety.md describes each fault.
  *
  * Below zero: the call was refused and did nothing. */
 enum {
@@ -67,14 +69,14 @@ enum {
   DASHPOT_TORQUE_LIMITED = 1,    /* a limit of torque, torque rate, power or speed is at work */
   DASHPOT_NEAR_JOINT_LIMIT = 2,  /* a joint is pushed back from a position limit that is near */
   DASHPOT_WRENCH_NOT_FINITE = 3, /* NaN or infinity in the external wrench; the last finite one
-                                    stays in force */
+                                    stays in force. With limits.external_force: a collision */
   DASHPOT_SETPOINT_REJECTED = 4, /* the set-point is not possible; the last good one stays */
   DASHPOT_WEIGHT_NOT_HELD = 5,   /* the weight needs more than a torque limit: the arm sinks */
   DASHPOT_SETPOINT_STALE = 6,    /* the set-point is old: hold */
   DASHPOT_SETPOINT_LOST = 7,     /* the set-point is very old: damp */
   DASHPOT_FAULT_LATCHED = 8,     /* a fault is over, but was not released: damp */
   DASHPOT_TOO_MANY_RESTARTS = 9, /* the springs restarted too often: damp */
-  DASHPOT_TIME_GAP = 10,         /* the last good state is too long ago: damp */
+  DASHPOT_TIME_GAP = 10,         /* more than watchdog.longest_gap since the last state: damp */
   DASHPOT_WRONG_RATE = 11,       /* the loop runs at another rate than the configured one: damp */
   DASHPOT_COLLISION = 12,        /* an external torque or force above its threshold: damp */
   DASHPOT_INSTABILITY = 13,      /* a vibration grows, or the torque reverses all the time: damp */
@@ -86,7 +88,7 @@ enum {
   DASHPOT_STATE_CONTRADICTORY = 19, /* positions do not move as the velocities say: damp, with
                                        velocities from the positions */
   DASHPOT_STATE_NOT_FINITE = 20,    /* NaN or infinity in position or velocity: ramp */
-  DASHPOT_STATE_WRONG_SIZE = 21,    /* the state is missing or does not have n joints: ramp */
+  DASHPOT_STATE_WRONG_SIZE = 21,    /* the state is missing or not one of n joints: ramp */
   DASHPOT_STATE_JUMP = 22,          /* further from the last state than the robot can move: ramp */
   DASHPOT_TIME_BACKWARD = 23,       /* the state's time is at or before the last one: ramp */
   DASHPOT_NOT_FINITE = 24,          /* the torque would not be finite: ramp */
@@ -147,7 +149,7 @@ typedef struct dashpot_setpoint {
   int32_t mode;                 /* DASHPOT_MODE_JOINT or DASHPOT_MODE_CARTESIAN */
   const double* joint_position; /* n, rad. Joint mode: the goal, required. Cartesian mode: the
                                    posture of the null-space springs, or NULL to keep the current
-                                   one. */
+                                   one, which is where the robot is when this mode begins. */
   const double* tip_position;   /* 3, of T in B, m. Cartesian mode: the goal, required. Joint mode:
                                    not used. */
   const double* tip_rotation;   /* 3 x 3, turns T's axes into B's; required as tip_position is */
@@ -171,8 +173,8 @@ typedef struct dashpot_gains {
   const double* null_stiffness;      /* n, not negative, N m/rad, toward the posture */
   const double* null_damping;        /* n, not negative, N m s/rad */
   const int32_t* frame;              /* axes of the 6 x 6: DASHPOT_FRAME_BASE or _TOOL */
-  const uint8_t* directions;         /* 6, not zero: the task has springs and dampers in this
-                                        direction of `frame` */
+  const uint8_t* directions;         /* 6; an entry that is not zero gives the task springs and
+                                        dampers in this direction of `frame` */
   const double* joint_damping_ratio; /* 1, from 0 to 2: the same for joint_damping and the modes of
                                         the joint mode */
 } dashpot_gains;
@@ -202,11 +204,14 @@ typedef struct dashpot_snapshot {
   double torque[DASHPOT_MAX_JOINTS];   /* N m */
   double tip_position[3];              /* of T in B, m */
   double tip_rotation[9];              /* 3 x 3, turns T's axes into B's */
-  /* Where the joint springs are fixed just now; in the Cartesian mode the posture; rad. */
+  /* Where the joint springs are fixed just now; in the Cartesian mode the posture; rad. While no
+   * springs are in force, `position`. */
   double reference_joint_position[DASHPOT_MAX_JOINTS];
-  double reference_tip_position[3];      /* where the Cartesian springs are fixed just now, m */
+  /* Where the Cartesian springs are fixed just now, m; while none are in force, where T is. */
+  double reference_tip_position[3];
   double reference_tip_rotation[9];      /* 3 x 3, likewise */
-  double law_torque[DASHPOT_MAX_JOINTS]; /* torque of the impedance law before the limits, N m */
+  double law_torque[DASHPOT_MAX_JOINTS]; /* torque of the impedance law, or of "damp", before the
+                                            limits, N m */
   double tip_error[6];  /* from tip to reference: difference of positions, m, and rotation
                            vector, rad */
   double tip_wrench[6]; /* wrench of Cartesian springs, dampers and feed-forward, N and N m */
@@ -240,7 +245,8 @@ typedef struct dashpot_modes {
   uint32_t zero_modes;                 /* number of motions that no spring resists */
   uint32_t count;                      /* number of modes */
   int32_t origin;                      /* DASHPOT_TRACKED, ... */
-  /* Numbers of ticks since the start or the last reset. Each tick counts once in these: */
+  /* Numbers of ticks since the start or the last reset. Each tick that is to be analysed
+   * (analysis.every) counts once in these: */
   uint64_t tracked;    /* the last modes were refined */
   uint64_t reused;     /* the last modes were still right within their bounds */
   uint64_t direct;     /* the modes were solved directly */
@@ -279,7 +285,8 @@ typedef struct dashpot_sampled_modes {
   double position[DASHPOT_MAX_JOINTS]; /* of that state, rad */
   double spectral_radius;              /* largest |z| of the loop, which is stable below 1 */
   double gain_margin; /* all gains can grow by this factor before the loop is unstable; infinity:
-                         by any factor */
+                         by any factor; below 1: the loop is unstable. Unlike in dashpot_set_gains
+                         slow motions count. NaN, as spectral_radius, if the analysis failed. */
   int32_t status;     /* 0: all modes were found */
   uint32_t count;     /* number of modes, by falling continuous_frequency */
   dashpot_sampled_mode modes[DASHPOT_MAX_JOINTS];
@@ -316,18 +323,19 @@ double dashpot_period(const dashpot_controller* controller);
  * take effect at the next tick whose set-point is NULL or new by its time.
  *
  * Returns a status, or a negative code. With a negative code `output` is not written, and the host
- * has to bring the robot to a stop. A state that is NULL or wrong is not refused: it gives a torque
- * and a status. A wrong set-point is rejected, and the last one stays in force. */
+ * has to bring the robot to a stop. A state that is NULL or wrong, also in its struct_size, is not
+ * refused: it gives a torque and a status. A wrong set-point is rejected, and the last one stays in
+ * force. */
 int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* state,
                        const dashpot_setpoint* setpoint, dashpot_output* output);
 
 /* Prepares the loop before it begins, with the robot at rest at `position` (n, rad). Judges the
- * gains of the configuration at `position` as dashpot_set_gains does, and then resets as
- * dashpot_reset does. `torque` (n, N m) is the torque that the robot applies now; NULL stands for
- * the arm's weight at `position` (zero where the robot compensates it). Takes some milliseconds and
- * allocates. Returns DASHPOT_OK or a negative code; dashpot_last_error then says more.
- * A loop without this call starts from the weight as well, but with gains that were not judged at
- * its posture. */
+ * gains, those of dashpot_set_gains or else of the configuration, at `position` as
+ * dashpot_set_gains does, and then resets as dashpot_reset does. `torque` (n, N m) is the torque
+ * that the robot applies now; NULL stands for the arm's weight at `position` (zero where the robot
+ * compensates it). Takes some milliseconds and allocates. Returns DASHPOT_OK or a negative code;
+ * dashpot_last_error then says more. A loop without this call starts from the weight as well, but
+ * with gains that were not judged at its posture. */
 int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);
 
 /* Forgets history, faults and set-point, but not the gains. Called on the real-time thread. The
@@ -351,26 +359,27 @@ int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpo
  *
  * Gains that are new are judged, which takes some milliseconds and allocates. Gains are refused
  * (DASHPOT_UNSTABLE_GAINS) if the sampled loop, with the delay and the filters of analysis.sampled,
- * would have less than limits.gain_margin in either mode at the posture of the latest tick. Before
- * dashpot_start and the first tick, gains are refused if they have this margin at none of eight
- * postures spread over the position limits. A motion that needs more than 6 s to swing or to grow
- * e-fold does not count. */
+ * would have less than limits.gain_margin in either mode at the latest posture: that of the latest
+ * tick with a good state, or of dashpot_start. As long as there was neither, gains are refused if
+ * they have this margin at none of eight postures spread over the position limits. Motions slower
+ * than 1 rad/s do not count: those that need more than 6 s to swing, or a second to grow e-fold. */
 int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains);
 
 /* Judges gains as dashpot_set_gains does, without setting them. May be called on any thread, for
  * instance on one that receives gains. The posture is `position` (n, rad), or, if `position` is
- * NULL, the posture of the latest tick; DASHPOT_NOTHING_YET if there was no tick. Sets `margin`,
- * unless it is NULL, to the factor by which the gains could grow, at most limits.gain_margin. A
- * member of `gains` that is NULL stands for the gain of the configuration. dashpot_set_gains does
- * not judge the gains that were accepted last again within 0.1 rad of the posture where they were
- * judged. Returns DASHPOT_OK or a negative code. */
+ * NULL, the latest posture, as above; DASHPOT_NOTHING_YET if there is none. Sets `margin`,
+ * unless it is NULL, to the factor by which the gains could grow, at most limits.gain_margin; it is
+ * below 1 if the loop is unstable, and zero if it could not be analysed. A member of `gains` that
+ * is NULL stands for the gain of the configuration. Gains that were accepted last within 0.1 rad of
+ * the latest posture are not judged again by dashpot_set_gains. Returns DASHPOT_OK or a negative
+ * code. */
 int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
                             const double* position, double* margin);
 
 /* Read the latest finished tick, the latest modes, and the latest analysis of the sampled loop.
  * Called on one thread, always the same. The caller sets struct_size; the functions write the other
  * members. They return DASHPOT_OK or a negative code, DASHPOT_NOTHING_YET if there is nothing to
- * read so far. */
+ * read since the start or the last reset. */
 int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* snapshot);
 int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes);
 int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampled_modes* modes);

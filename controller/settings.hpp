@@ -36,8 +36,8 @@ struct Motion {
   double linear_acceleration = 2.0;   ///< m/s^2
   double angular_velocity = 1.5;      ///< rad/s
   double angular_acceleration = 6.0;  ///< rad/s^2
-  double smoothing = 0.03;  ///< time over which the reference's acceleration changes, s; from 1
-                            ///< to kMostSmoothing periods
+  double smoothing = 0.03;  ///< time over which the reference's acceleration changes, s; at most
+                            ///< kMostSmoothing periods; less than a period counts as one
   double gain_time = 0.5;   ///< duration of a change of gains, wrench or mode, s
 };
 
@@ -84,8 +84,9 @@ struct Limits {
   /// Force in RobotState::external_wrench that counts as a collision, N; infinity: none does.
   double external_force = std::numeric_limits<double>::infinity();
   std::vector<Wall> walls;  ///< at most kMaxWalls
-  /// Gains are refused if the sampled loop would be unstable with all gains multiplied by this
-  /// factor or by a smaller one; 1 accepts all gains. See GainJudge.
+  /// Hosts refuse gains with which the sampled loop would be unstable, or would become so with all
+  /// gains multiplied by a factor of up to this; 1 accepts all gains. See GainJudge. Controller
+  /// itself takes any gains.
   double gain_margin = 2;
 };
 
@@ -116,7 +117,7 @@ struct Analysis {
   /// meanwhile. Work is counted, not timed: kWorkPerSecond units of analysis::Work are a second, as
   /// measured by ./run bench: 5.05 us for a tick of 7 joints with 130,000 instructions. So that
   /// ticks are even, the work is at most kEvenWork (n / 7)^3 share / 10 % for n joints, the work of
-  /// about ten ticks in which modes are followed.
+  /// about ten ticks in which modes are followed; for fewer than 7 joints it is that of 7.
   double share = 0.1;
   static constexpr double kWorkPerSecond = 2.5e10;
   static constexpr double kEvenWork = 1e6;

@@ -23,9 +23,10 @@ struct Snapshot {
   JointVector position;            ///< q, n, rad
   JointVector velocity;            ///< qd, n, rad/s
   JointVector torque;              ///< put out, n, N m
-  JointVector law_torque;          ///< of the impedance law, before the limits, n, N m
+  JointVector law_torque;          ///< of the law, or of "damp", before the limits, n, N m
   JointVector reference_position;  ///< where the joint springs are fixed at this tick; the posture
-                                   ///< in mode kCartesian, n, rad
+                                   ///< in mode kCartesian; position while there are no springs, n,
+                                   ///< rad
   JointVector reference_velocity;  ///< n, rad/s
   Pose tip;                        ///< p_BT_B, R_BT
   Pose reference_tip;  ///< where the Cartesian springs are fixed at this tick; the tip's
@@ -55,7 +56,7 @@ struct VibrationMode {
 
 /// What the analysis did since the start or the last reset, as numbers of ticks.
 struct VibrationCounters {
-  // Each tick counts once in these:
+  // Each tick that is to be analysed counts once in these:
   std::uint64_t tracked = 0;     ///< the last modes were refined
   std::uint64_t reused = 0;      ///< the last modes are still right within their bounds
   std::uint64_t direct = 0;      ///< the modes were solved directly

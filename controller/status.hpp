@@ -4,7 +4,7 @@
 namespace dashpot::controller {
 
 /// Result of one tick. If several conditions hold, the most severe, the last in this list, is
-/// returned. Each comes with a documented safe output:
+/// returned. From kSetpointStale on each comes with a safe output:
 ///   hold:  the springs stop where they are, whatever the set-point says; no commanded wrench.
 ///   damp:  no springs: joint damping, and the arm's weight where the controller compensates it.
 ///   ramp:  the last good torque goes to zero within 0.1 s.
@@ -12,22 +12,23 @@ namespace dashpot::controller {
 /// fades evenly: in all joints alike, as slowly as the slowest torque-rate limit makes it.
 ///
 /// Faults latch. A status whose safe output is "damp" (but kSetpointLost), or "ramp" for longer
-/// than Watchdog::longest_gap, leaves a fault behind: the arm stays damped, with its weight held,
-/// the status is kFaultLatched or worse, and Snapshot::fault names the fault. This ends with
-/// Controller::release or reset, or, if Watchdog::release_after is set, once the arm has been at
-/// rest for that long. Then, as after a lost set-point, the springs start where the robot is, with
-/// gains that grow from zero within Motion::gain_time; Snapshot::restarts counts these restarts.
-/// After a ramp of at most Watchdog::longest_gap the controller continues where it was.
+/// than Watchdog::longest_gap, leaves a fault behind: the arm stays damped, with its weight held
+/// (after kStateFrozen: without damping), the status is kFaultLatched or worse, and Snapshot::fault
+/// names the fault. This ends with Controller::release or reset, or, if Watchdog::release_after is
+/// set, once the arm has been at rest for that long. Then, as after a lost set-point, the springs
+/// start where the robot is, with gains that grow from zero within Motion::gain_time;
+/// Snapshot::restarts counts these restarts. After a ramp of at most Watchdog::longest_gap the
+/// controller continues where it was.
 enum class Status : std::uint8_t {
   kOk,
   // The torque is the wanted one as far as possible:
   kTorqueLimited,    ///< a limit of torque, torque rate, power or speed is at work
   kNearJointLimit,   ///< a joint is within the margin of a position limit; its repulsion is at work
   kWrenchNotFinite,  ///< NaN or infinity in RobotState::external_wrench; the last finite wrench
-                     ///< stays in force in the analysis, which alone uses it
+                     ///< stays in force in the analysis. With Limits::external_force: kCollision
   kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, a matrix that is no
-                      ///< rotation, an unreachable joint position or a time in the future; the last
-                      ///< good set-point stays in force
+                      ///< rotation, a goal beyond a limit or wall, or a time further ahead than
+                      ///< the first time-out; the last good set-point stays in force
   kWeightNotHeld,     ///< the weight of the arm needs more than a torque limit: the arm sinks
   // The set-point is too old:
   kSetpointStale,  ///< older than the first time-out: hold
@@ -38,7 +39,7 @@ enum class Status : std::uint8_t {
   kTimeGap,             ///< more than the longest gap since the last tick
   kWrongRate,           ///< ticks come at less than 2/3 or more than 3/2 of the configured rate
   kCollision,           ///< an external torque or force above its threshold
-  kInstability,         ///< a vibration that grows, or a torque that reverses in every other tick
+  kInstability,         ///< a vibration that grows, or a torque that reverses in every tick or two
   kTipSpeedLimit,       ///< the tip moves faster than its limit
   kVelocityLimit,       ///< a joint moves faster than its limit
   kWall,                ///< the tip is beyond a wall that it must not cross

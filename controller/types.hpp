@@ -66,8 +66,8 @@ struct Gains {
   double joint_damping_ratio = 0;
   Matrix6 task_stiffness = Matrix6::Zero();  ///< K_C, N/m, N/rad and N m/rad
   Matrix6 task_damping = Matrix6::Zero();    ///< C_C, N s/m, N s/rad and N m s/rad
-  /// Damping ratio that every mode of K_C is to have, 0 < ratio <= 2: C_C is then designed again at
-  /// every tick (see DesignedDamping) and task_damping is not used. 0: C_C is task_damping.
+  /// Damping ratio that every mode of K_C is to have, 0 < ratio <= 2: C_C is then designed at every
+  /// tick (see DesignedDamping), and task_damping is not used. 0: C_C is task_damping.
   double task_damping_ratio = 0;
   Frame frame = Frame::kBase;
   /// Selected directions: the task directions with springs and dampers, in the axes of `frame`. The

@@ -1,5 +1,5 @@
 // Two masses of 1 kg on springs that become stiffer from call to call: the tracker refines the
-// modes of the last call, and every mode keeps its place.
+// modes of the last call, and every mode keeps its index.
 #include <cstdio>
 #include <dashpot/analysis/mode_tracker.hpp>
 

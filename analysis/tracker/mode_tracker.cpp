@@ -31,7 +31,7 @@ constexpr int kPurePasses = 4;
 constexpr int kLookEvery = 64;
 /// Blocks are balanced again when their columns lean this much towards each other.
 constexpr double kBalanced = 0.6;
-/// Units of Work of parting two blocks.
+/// Units of Work of separating two blocks.
 constexpr std::int64_t kPartingWork = 60'000;
 
 std::size_t at(int i) {
@@ -76,7 +76,7 @@ bool sizes_agree(const System<kMaxDof>& system) {
          (factored ? system.stiffness_factor.cols() == n : is_square(system.stiffness));
 }
 
-/// K = W'W with about 32 digits: the stiffness and its tail.
+/// K = W'W with about 32 digits: the stiffness and its low word.
 void form_stiffness(System<kMaxDof>& system) {
   const auto& W = system.stiffness_factor;
   const Eigen::Index n = system.dof();
@@ -194,9 +194,9 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
   return solve_directly(system, pencil, reason, out, work);
 }
 
-/// Certifies the basis and reads its modes; false if a relative bound exceeds `target` or nothing
-/// is proved. The system is at this `distance` from the one that the basis was evaluated for;
-/// `fresh` if it was so just now.
+/// Bounds the errors of the basis and reads its modes; false if a relative bound exceeds `target`
+/// or nothing is proved. The system is at this `distance` from the one that the basis was evaluated
+/// for; `fresh` if it was so just now.
 bool ModeTracker::publish(const SymmetricPencil& pencil, double distance, double target, bool fresh,
                           TrackedSpectrum& out) noexcept {
   enclose(pencil, sizes_, distance, basis_, residual_, enclosure_);

@@ -16,7 +16,7 @@
 namespace dashpot::controller {
 
 /// The controller's core for N joints, known at compile time. One tick, in `update`:
-///     state -> StateCheck -> DynamicsKernel -> MotionWatch -> set-point, paths and gains
+///     state -> StateCheck -> DynamicsKernel -> MotionWatch -> set-point, references, gains
 ///           -> DesignedDamping -> ImpedanceLaw -> SafetyFilter -> torque;   and with these gains
 ///           -> LoopSystem -> VibrationAnalysis
 template <int N>
@@ -39,10 +39,10 @@ class FixedCore final : public ControllerCore {
   bool accept_setpoint(const Setpoint& setpoint) noexcept;
   /// Springs that are to grow from zero start where the robot is.
   void start_new_springs() noexcept;
-  /// The way to the accepted set-point; paths whose springs are not in force start where the robot
-  /// is.
+  /// Sets the goal of the accepted set-point. References whose springs are not in force start where
+  /// the robot is.
   void update_goal() noexcept;
-  /// Springs where the robot is, gains growing from zero.
+  /// Starts the springs where the robot is, with gains that grow from zero.
   void restart_springs() noexcept;
   /// Latches and releases faults. Returns kOk if the state allows springs, or kFaultLatched or
   /// worse.
@@ -52,7 +52,7 @@ class FixedCore final : public ControllerCore {
   void latch(Status fault) noexcept;
   /// Whether the set-point is fresh: kOk, kSetpointStale or kSetpointLost.
   Status setpoint_age_status() const noexcept;
-  /// Moves gains and set-points on by one period, and gives the law's torque.
+  /// Moves gains and references on by one period, and returns the law's torque.
   Vector impedance_torque(bool hold) noexcept;
   /// The safe output without springs.
   Vector damping_torque() noexcept;
@@ -61,7 +61,7 @@ class FixedCore final : public ControllerCore {
     return settings_.feed_forward.gravity ? robot_.gravity : Vector(Vector::Zero());
   }
   double tip_reference_speed() const noexcept;
-  /// True if no path moves that springs are fixed on.
+  /// True if all references are at rest.
   bool references_still() const noexcept;
   /// Whole ns, which add up without rounding errors.
   static double nanoseconds(double seconds) noexcept { return std::round(1e9 * seconds); }

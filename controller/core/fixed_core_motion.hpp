@@ -113,8 +113,8 @@ Status FixedCore<N>::setpoint_age_status() const noexcept {
   return Status::kOk;
 }
 
-/// The share of its speed limits at which the tip's path takes no joint beyond kReferenceShare of
-/// its velocity limit where the robot is.
+/// Returns the share of its speed limits at which the tip's reference takes no joint beyond
+/// kReferenceShare of the joint's velocity limit where the robot is.
 template <int N>
 double FixedCore<N>::tip_reference_speed() const noexcept {
   constexpr double kReferenceShare = 0.4;  // what is left is for vibrations and the null space

@@ -30,11 +30,11 @@ struct SpringReferences {
 /// the mode changes; K_q and C_q, K_C and C_C, K_0 and C_0 contain them. Lambda = (J M^-1 J')^-1 in
 /// the selected directions (see TaskInertia); N and J# = M^-1 J' Lambda are explained in NullSpace.
 /// f is the commanded wrench. qd_f = w_q qd_d + w_C (joint velocity that takes the tip along V_d),
-/// and friction_i(v) = damping_i v + friction_i tanh(v / 0.01 rad/s). J# e is the part of q_0 - q
-/// that a deflection of the tip explains. It is subtracted, because otherwise deflections of the
-/// tip would drive the self-motion, and the stiffness of the loop would not be symmetric. It counts
-/// fully while it is small: s = 1 / sqrt(1 + (|J# e| / 0.3 rad)^2). Every term of the last column
-/// can be left out, see FeedForward.
+/// and friction_i(v) = viscous_friction_i v + coulomb_friction_i tanh(v / 0.01 rad/s). J# e is the
+/// part of q_0 - q that a deflection of the tip explains. It is subtracted, because otherwise
+/// deflections of the tip would drive the self-motion, and the stiffness of the loop would not be
+/// symmetric. It counts fully while it is small: s = 1 / sqrt(1 + (|J# e| / 0.3 rad)^2). Every term
+/// of the last column can be left out, see FeedForward.
 ///
 /// K_C acts on e within the error clamp (see ErrorClamp): a tip that is further away is pulled no
 /// harder.

@@ -14,7 +14,7 @@ class Judgement {
   Judgement(const RobotModel& model, const Settings& settings)
       : joints_(model.dof()), wanted_(settings.limits.gain_margin), judge_(model, settings) {}
 
-  /// Of one thread: where the robot is now (n, rad).
+  /// Sets where the robot is now (n, rad). For one thread.
   void locate(const JointVector& q) noexcept {
     for (int i = 0; i < joints_; ++i) {
       const auto at = static_cast<std::size_t>(i);
@@ -22,7 +22,8 @@ class Judgement {
     }
     located_.store(true, std::memory_order_release);
   }
-  /// Sets `q` to where the robot is, each joint within the last tick or two; false if nobody knows.
+  /// Sets `q` to where the robot was in its last good state or two, joint by joint; false if
+  /// that is not known.
   bool where(JointVector& q) const noexcept {
     if (!located_.load(std::memory_order_acquire)) return false;
     q.resize(joints_);

@@ -40,8 +40,7 @@ class MotionWatch {
     const Vector6& external_wrench;
     bool still;  ///< the springs stand still
   };
-  /// Returns kOk or the worst of the statuses kCollision to kStateFrozen that holds now, but for
-  /// kStateContradictory.
+  /// Returns kOk, or the worst of the statuses kCollision to kStateFrozen that holds now.
   Status check(const Tick& tick) noexcept;
   /// `excess`: of the torque over the weight.
   void applied(const Vector& torque, const Vector& excess) noexcept;

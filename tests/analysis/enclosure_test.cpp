@@ -27,7 +27,7 @@ System<> random_system(Random& random, int n) {
   return system;
 }
 
-/// The modes of the spectrum's basis as it stands, certified.
+/// The modes of the spectrum's basis as it stands, with proved bounds.
 void certify_as_is(const System<>& system, bool extended, Spectrum<>& spectrum,
                    BlockEnclosure<>& enclosure) {
   BasisResidual<> residual;

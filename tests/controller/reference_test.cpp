@@ -187,7 +187,7 @@ TipImpedance all_sprung() {
   return base;
 }
 
-// Tied to a tip that stands still, the path ends where the springs may clamp, and turns back there.
+// With a tip that stands still the reference ends at the error clamp, and turns back there.
 TEST(TipReference, GoesNoFartherThanItsTether) {
   Random random(314);
   const TwistNorm limits{0.5, 1.5, 2.0, 6.0};
@@ -298,7 +298,7 @@ TEST(Paths, AreAtRestWhereTheyAreStarted) {
   }
 }
 
-// What is near is within clamp, up to half a turn; beyond twice the clamp over pi it may be denied.
+// What is near is within the clamp, up to half a turn; beyond 2 / pi of it that may be denied.
 TEST(ReferenceGovernor, SeesWhatIsNearUpToHalfATurn) {
   Random random(316);
   const TipImpedance base = all_sprung(), none;
@@ -323,7 +323,7 @@ TEST(ReferenceGovernor, SeesWhatIsNearUpToHalfATurn) {
   }
 }
 
-// Up to the clamp a deflection is as it was, to the last bit; beyond it the way is its direction's,
+// Up to the clamp a deflection is as it was, to the last bit; beyond it, it keeps its direction,
 // also where the rotation vector is longer than half a turn.
 TEST(ErrorClamp, EndsExactlyAtItsReach) {
   Random random(317);

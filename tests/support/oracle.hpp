@@ -60,7 +60,7 @@ struct SpectrumCase {
   int n = 0;
   /// Zero modes: the exact dimension of the null space of the stored stiffness.
   int r = 0;
-  /// What the family promises (criticality, residual, coincidence) holds for the stored doubles.
+  /// What the family promises (criticality, defect, coincidence) holds for the stored doubles.
   bool exact = false;
   /// Decided exactly; rounding can make a singular damping slightly indefinite.
   bool damping_semidefinite = false;
