@@ -57,8 +57,8 @@ typedef struct dashpot_controller dashpot_controller;
  * Where damp and ramp take torque away, it fades evenly, in all joints alike.
  *
  * Faults latch. After any "damp" but DASHPOT_SETPOINT_LOST, after DASHPOT_STATE_FROZEN, and after a
- * "ramp" longer than watchdog.longest_gap, the arm stays damped, with its weight held (after
- * DASHPOT_STATE_FROZEN: without damping), and the status is at least DASHPOT_FAULT_LATCHED.
+ * "ramp" longer than watchdog.longest_gap, the arm stays damped, with its weight held (without
+ * damping as long as the state is frozen), and the status is at least DASHPOT_FAULT_LATCHED.
  * dashpot_snapshot.fault names the fault. This ends with dashpot_release or dashpot_reset, or, if
  * the configuration sets watchdog.release_after, once the arm has been at rest for that long.
  * Springs then start where the robot is. docs/safety.md describes each fault.

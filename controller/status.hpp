@@ -13,12 +13,12 @@ namespace dashpot::controller {
 ///
 /// Faults latch. A status whose safe output is "damp" (but kSetpointLost), or "ramp" for longer
 /// than Watchdog::longest_gap, leaves a fault behind: the arm stays damped, with its weight held
-/// (after kStateFrozen: without damping), the status is kFaultLatched or worse, and Snapshot::fault
-/// names the fault. This ends with Controller::release or reset, or, if Watchdog::release_after is
-/// set, once the arm has been at rest for that long. Then, as after a lost set-point, the springs
-/// start where the robot is, with gains that grow from zero within Motion::gain_time;
-/// Snapshot::restarts counts these restarts. After a ramp of at most Watchdog::longest_gap the
-/// controller continues where it was.
+/// (without damping as long as the state is frozen), the status is kFaultLatched or worse, and
+/// Snapshot::fault names the fault. This ends with Controller::release or reset, or, if
+/// Watchdog::release_after is set, once the arm has been at rest for that long. Then, as after a
+/// lost set-point, the springs start where the robot is, with gains that grow from zero within
+/// Motion::gain_time; Snapshot::restarts counts these restarts. After a ramp of at most
+/// Watchdog::longest_gap the controller continues where it was.
 enum class Status : std::uint8_t {
   kOk,
   // The torque is the wanted one as far as possible:

@@ -288,7 +288,7 @@ Joints<N> FixedCore<N>::damping_torque() noexcept {
   restart_ = damping_only_ = true;
   Vector tau = Vector::Zero();
   if (settings_.feed_forward.gravity) add<N>(robot_.gravity, tau);
-  if (fault_ == Status::kStateFrozen) return tau;  // the velocity means nothing
+  if (motion_watch_.sees_frozen()) return tau;  // the velocity means nothing
   for (int i = 0; i < N; ++i) tau[i] -= damping_[i] * qd_[i];
   return tau;
 }

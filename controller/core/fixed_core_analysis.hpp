@@ -59,7 +59,7 @@ void FixedCore<N>::hand_over() noexcept {
 template <int N>
 Impedance<N> FixedCore<N>::damper() const noexcept {
   Impedance<N> result;
-  if (fault_ == Status::kStateFrozen) return result;
+  if (motion_watch_.sees_frozen()) return result;
   for (int i = 0; i < N; ++i) result.joint_damping(i, i) = damping_[i];
   return result;
 }

@@ -45,6 +45,8 @@ class MotionWatch {
   /// `excess`: of the torque over the weight.
   void applied(const Vector& torque, const Vector& excess) noexcept;
 
+  /// True as long as the state is frozen, so that its velocity means nothing.
+  bool sees_frozen() const noexcept { return frozen_; }
   /// Returns the tip's speed at the last tick, m/s.
   double tip_speed() const noexcept { return tip_speed_; }
 

@@ -201,9 +201,17 @@ TEST_F(Safety, AStateThatNeverChangesWhileTheTorqueDoesLatches) {
   }
   EXPECT_EQ(snapshot().fault, Status::kStateFrozen);
   EXPECT_LT(ticks, 1500);
-  arm->state.velocity[1] = 1;  // means nothing
   for (int k = 0; k < 300; ++k) next();
   EXPECT_TRUE(near(arm->torque, gravity(), 1e-6));
+  // Feedback that is back damps, although the fault is not released.
+  for (int k = 0; k < 300; ++k) {
+    arm->state.velocity[1] = 0.3;
+    arm->state.position[1] += 1e-3 * arm->state.velocity[1];
+    next();
+    ASSERT_EQ(snapshot().fault, Status::kStateFrozen);
+  }
+  const JointVector damping = arm->torque - gravity();
+  EXPECT_LT(damping[1], -0.1 * settings.limits.damping[1]);
 }
 
 TEST_F(Safety, ALoopAtAnotherRateLatches) {
