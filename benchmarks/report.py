@@ -22,13 +22,22 @@ TIMES = ("real_time", "cpu_time")
 NANOSECONDS = {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9}
 
 
+def plain(row):
+    """A row that was timed call by call: its time is the median, its name the one it was given."""
+    if "median_us" not in row:
+        return row
+    per_unit = 1e3 / NANOSECONDS[row["time_unit"]]
+    return {**row, "name": re.sub(r"/(iterations:\d+|manual_time)", "", row["name"]),
+            "real_time": row["median_us"] * per_unit, "cpu_time": row["median_us"] * per_unit}
+
+
 def merge(parts):
     """One row for each name: times are medians, `spread` is (longest - shortest) / median."""
     repeated = collections.defaultdict(list)
     for part in parts:
         for row in part["benchmarks"]:
             if row.get("run_type") != "aggregate":
-                repeated[row["name"]].append(row)
+                repeated[plain(row)["name"]].append(plain(row))
     rows = []
     for name, runs in repeated.items():
         times = sorted(run.get("cpu_time", 0) for run in runs)
@@ -106,7 +115,14 @@ def headline(results):
                    [("dynamics/kdl/7", "KDL"), ("dynamics/pinocchio/7", "Pinocchio")]),
         comparison(results, "tick: Cartesian law, safety", "tick/cartesian/7", []),
         comparison(results, "tick: with modes and snapshot", "tick/full/7", []),
-        comparison(results, "tick: with a damping ratio held", "tick/design/7", []),
+        comparison(results, "tick: with ratio damping", "tick/design/7", []),
+        comparison(results, "tick: with modes, once in a millisecond", "tick/paced/7", []),
+        comparison(results, "tick: with modes, caches cold", "tick/evicted/7", []),
+        comparison(results, "spectrum of 6 modes, tracked, once in a millisecond",
+                   "spectrum/paced/6", [("spectrum/eigen_paced/6", "Eigen"),
+                                        ("spectrum/lapack_paced/6", "LAPACK")]),
+        comparison(results, "spectrum of 6 modes, tracked, caches cold", "spectrum/evicted/6",
+                   [("spectrum/eigen_evicted/6", "Eigen"), ("spectrum/lapack_evicted/6", "LAPACK")]),
     ]
     for gains in GAINS:
         for accuracy in (1e-3, 1e-6, 1e-9):

@@ -4,15 +4,15 @@
 // swings, and its state is a new one at every tick. `tick/full` has the spectrum of each as well,
 // with shapes, and the snapshot; `tick/design` besides holds a damping ratio; `_values_only`
 // without shapes; `_background` hands it to a thread;
-// `_percentiles` times a million ticks one by one.
+// `_percentiles` times a million ticks one by one. `tick/paced` and `tick/evicted` are `tick/full`
+// at the pace of 1 kHz, and after 64 MB of other data have passed through the caches.
+#include <dashpot/benchmarks/one_by_one.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
 
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -21,6 +21,7 @@
 namespace {
 
 using namespace dashpot::controller;  // NOLINT(google-build-using-namespace)
+using dashpot::benchmarks::time_one_by_one;
 
 constexpr std::size_t kStates = 2048;  // one swing; its end meets its beginning
 constexpr double kPeriod = 0.001;
@@ -118,28 +119,23 @@ void tick(benchmark::State& bench, Mode mode, const Analysis& analysis, double r
   bench.counters["tracked"] = static_cast<double>(counters.tracked - before.tracked);
 }
 
-/// Each of the ticks timed by itself: percentiles in us. What else the machine does is in them.
-void percentiles(benchmark::State& bench, Mode mode, const Analysis& analysis) {
-  using Clock = std::chrono::steady_clock;
-  Loop loop(static_cast<int>(bench.range(0)), mode, analysis);
+/// Each of the ticks timed by itself, after `prepare`.
+template <class Prepare>
+void one_by_one(benchmark::State& bench, const Analysis& analysis) {
+  Loop loop(static_cast<int>(bench.range(0)), Mode::kCartesian, analysis);
   const std::uint64_t direct = loop.vibration().counters.direct;
-  std::vector<double> times(static_cast<std::size_t>(bench.max_iterations));
-  std::size_t k = 0;
-  for (auto _ : bench) {
-    const Clock::time_point start = Clock::now();
-    loop.step();
-    times[k] = std::chrono::duration<double, std::micro>(Clock::now() - start).count();
-    bench.SetIterationTime(1e-6 * times[k++]);
-  }
-  std::sort(times.begin(), times.end());
-  const auto at = [&](double share) {
-    return times[static_cast<std::size_t>(share * static_cast<double>(times.size() - 1))];
-  };
-  bench.counters["median_us"] = at(0.5);
-  bench.counters["p99_us"] = at(0.99);
-  bench.counters["p99.9_us"] = at(0.999);
-  bench.counters["max_us"] = at(1);
+  time_one_by_one(bench, Prepare(), [&] { loop.step(); });
   bench.counters["direct"] = static_cast<double>(loop.vibration().counters.direct - direct);
+}
+
+template <class Prepare>
+void add_one_by_one(const std::string& name, const Analysis& analysis, int ticks) {
+  benchmark::RegisterBenchmark(
+      name.c_str(), [=](benchmark::State& bench) { one_by_one<Prepare>(bench, analysis); })
+      ->Arg(7)
+      ->Iterations(ticks)
+      ->UseManualTime()
+      ->Unit(benchmark::kMicrosecond);
 }
 
 void add(const std::string& name, Mode mode, Analysis analysis, std::initializer_list<int> joints,
@@ -168,13 +164,9 @@ int main(int argc, char** argv) {
   add("tick/full_joint", Mode::kJoint, every_tick, {6, 7, 14});
   add("tick/full_values_only", Mode::kCartesian, values_only, {6, 7, 14});
   add("tick/full_background", Mode::kCartesian, background, {6, 7, 14});
-  benchmark::RegisterBenchmark(
-      "tick/full_percentiles",
-      [=](benchmark::State& bench) { percentiles(bench, Mode::kCartesian, every_tick); })
-      ->Arg(7)
-      ->Iterations(1'000'000)
-      ->UseManualTime()
-      ->Unit(benchmark::kMicrosecond);
+  add_one_by_one<dashpot::benchmarks::AtOnce>("tick/full_percentiles", every_tick, 1'000'000);
+  add_one_by_one<dashpot::benchmarks::Paced>("tick/paced", every_tick, 2000);
+  add_one_by_one<dashpot::benchmarks::Evicted>("tick/evicted", every_tick, 200);
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
   return 0;

@@ -7,7 +7,11 @@
 // 12 x 12 state matrices of the same path, which are formed outside the clock. `tracked_full` and
 // `eigen_full` (of run-time size) have n joints and n modes. `backward_error` is the worst along
 // the path, of every kRivalSteps-th system. `unproved` is what a hostile system takes.
+// `paced` and `evicted`, beside `eigen_...` and `lapack_...`, are timed call by call: one in a
+// millisecond, and after 64 MB of other data have passed through the caches. What a loop has just
+// written, the coefficients or the state matrix, is near the processor.
 #include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/benchmarks/one_by_one.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 
 #include <benchmark/benchmark.h>
@@ -17,6 +21,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <random>
 #include <string>
@@ -25,6 +30,7 @@
 namespace {
 
 using namespace dashpot::analysis;  // NOLINT: a program's own file
+using dashpot::benchmarks::time_one_by_one;
 using dashpot::testing::panda_impedance;
 using dashpot::testing::swing;
 using Eigen::MatrixXd;
@@ -316,6 +322,73 @@ void add(const std::string& name, Function function) {
   benchmark::RegisterBenchmark(name.c_str(), function)->Unit(benchmark::kMicrosecond);
 }
 
+/// A solver that is called once for each system of a path.
+struct Caller {
+  std::function<void()> fetch_input;
+  std::function<void()> solve;
+};
+
+Caller tracker_caller() {
+  struct Tracked {
+    ModeTracker tracker;
+    TrackedSpectrum spectrum;
+    Sweep sweep{panda_path(0.1)};
+    System<kMaxDof> system;
+  };
+  const auto tracked = std::make_shared<Tracked>();
+  const auto next = [tracked] { tracked->system = tracked->sweep.next(); };
+  const auto solve = [tracked] { tracked->tracker.update(tracked->system, tracked->spectrum); };
+  for (int step = 0; step < 10; ++step) {
+    next();
+    solve();
+  }
+  return {next, solve};
+}
+
+/// `solve(solver, matrix)` finds the spectrum of a state matrix.
+template <class Solver, class Matrix, class Solve>
+Caller rival_caller(const Solve& solve) {
+  struct Rival {
+    std::vector<StateMatrix> matrices = RivalPath(panda_path(0.1)).matrices;
+    Matrix A;
+    Solver solver{12};
+    std::size_t next = 0;
+  };
+  const auto rival = std::allocate_shared<Rival>(Eigen::aligned_allocator<Rival>());
+  return {[rival] { rival->A = rival->matrices[rival->next++ % rival->matrices.size()].A; },
+          [rival, solve] { solve(rival->solver, rival->A); }};
+}
+
+template <class Prepare>
+void add_one_by_one(const std::string& name, int calls, const std::function<Caller()>& make) {
+  benchmark::RegisterBenchmark(name.c_str(),
+                               [=](benchmark::State& state) {
+                                 const Caller caller = make();
+                                 Prepare prepare;
+                                 const auto before = [&] {
+                                   prepare();
+                                   caller.fetch_input();
+                                 };
+                                 time_one_by_one(state, before, caller.solve);
+                               })
+      ->Iterations(calls)
+      ->UseManualTime()
+      ->Unit(benchmark::kMicrosecond);
+}
+
+template <class Prepare>
+void add_cold(const std::string& how, int calls) {
+  using Matrix = Eigen::Matrix<double, 12, 12>;
+  add_one_by_one<Prepare>("spectrum/" + how + "/6", calls, tracker_caller);
+  add_one_by_one<Prepare>("spectrum/eigen_" + how + "/6", calls, [] {
+    return rival_caller<Eigen::EigenSolver<Matrix>, Matrix>(
+        [](Eigen::EigenSolver<Matrix>& solver, const Matrix& A) { solver.compute(A, true); });
+  });
+  add_one_by_one<Prepare>("spectrum/lapack_" + how + "/6", calls, [] {
+    return rival_caller<Dgeev, MatrixXd>([](Dgeev& solver, const MatrixXd& A) { solver.solve(A); });
+  });
+}
+
 void add_full(int n) {
   const std::string size = "/" + std::to_string(n);
   add("spectrum/tracked_full" + size,
@@ -351,6 +424,8 @@ int main(int argc, char** argv) {
     add("spectrum/unproved/" + std::to_string(n),
         [=](benchmark::State& state) { unproved(state, n); });
   }
+  add_cold<dashpot::benchmarks::Paced>("paced", 2000);
+  add_cold<dashpot::benchmarks::Evicted>("evicted", 200);
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
   return 0;
