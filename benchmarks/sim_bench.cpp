@@ -26,11 +26,8 @@ struct Stepper {
   const char* name;
   Method method;
 };
-constexpr std::array<Stepper, 9> kSteppers = {{{"semi_implicit_euler", Method::kSemiImplicitEuler},
+constexpr std::array<Stepper, 6> kSteppers = {{{"semi_implicit_euler", Method::kSemiImplicitEuler},
                                                {"rk4", Method::kRungeKutta4},
-                                               {"velocity_verlet", Method::kVelocityVerlet},
-                                               {"modified_midpoint", Method::kModifiedMidpoint},
-                                               {"cash_karp", Method::kCashKarp},
                                                {"dormand_prince", Method::kDormandPrince},
                                                {"dormand_prince_8", Method::kDormandPrince8},
                                                {"implicit_midpoint", Method::kImplicitMidpoint},

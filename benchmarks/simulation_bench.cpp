@@ -205,9 +205,6 @@ void add_fixed(const std::string& gains, double gain, int steps) {
   for (const auto& [name, method] :
        {std::pair("semi_implicit_euler", sim::Method::kSemiImplicitEuler),
         {"rk4", sim::Method::kRungeKutta4},
-        {"velocity_verlet", sim::Method::kVelocityVerlet},
-        {"modified_midpoint", sim::Method::kModifiedMidpoint},
-        {"cash_karp", sim::Method::kCashKarp},
         {"dormand_prince", sim::Method::kDormandPrince},
         {"dormand_prince_8", sim::Method::kDormandPrince8},
         {"implicit_midpoint", sim::Method::kImplicitMidpoint},
@@ -232,8 +229,7 @@ void add_fixed(const std::string& gains, double gain, int steps) {
 
 void add_adaptive(const std::string& gains, double gain, double tolerance) {
   const std::string end = "/" + text(tolerance);
-  for (const auto& [name, method] : {std::pair("cash_karp", sim::Method::kCashKarp),
-                                     {"dormand_prince", sim::Method::kDormandPrince},
+  for (const auto& [name, method] : {std::pair("dormand_prince", sim::Method::kDormandPrince),
                                      {"dormand_prince_8", sim::Method::kDormandPrince8},
                                      {"rosenbrock", sim::Method::kRosenbrock}}) {
     if (method == sim::Method::kRosenbrock && tolerance < 1e-6) continue;  // takes long

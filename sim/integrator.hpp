@@ -12,17 +12,11 @@ namespace dashpot::sim {
 enum class Method : std::uint8_t {
   kSemiImplicitEuler,  ///< order 1, symplectic: qd += h qdd(q, qd), then q += h qd; 1 evaluation
   kRungeKutta4,        ///< order 4, 4 evaluations; stable on the axes for omega h < 2.8
-  kVelocityVerlet,     ///< order 2, 1 evaluation; as stable as kSemiImplicitEuler where damping is
-                       ///< small
-  kModifiedMidpoint,  ///< order 2, 3 evaluations; for errors of a percent in damped motions: stable
-                      ///< there in longer steps than kRungeKutta4, for equal numbers of evaluations
-  kCashKarp,          ///< order 5 with an error estimate of order 4, 6 evaluations; damps well in
-                      ///< long steps
-  kDormandPrince,     ///< order 5 with an error estimate of order 4, 6 evaluations
-  kDormandPrince8,    ///< order 8 with an error estimate of orders 5 and 3, 12 evaluations
-  kImplicitMidpoint,  ///< order 2, symplectic, stable for any stiffness; 2n + 4 or so evaluations
-  kRosenbrock,        ///< RODAS3: order 3 with an estimate of order 2, damps the stiffest motions
-                      ///< (L-stable); 2n + 3 evaluations, nothing to iterate
+  kDormandPrince,      ///< order 5 with an error estimate of order 4, 6 evaluations
+  kDormandPrince8,     ///< order 8 with an error estimate of orders 5 and 3, 12 evaluations
+  kImplicitMidpoint,   ///< order 2, symplectic, stable for any stiffness; 2n + 4 or so evaluations
+  kRosenbrock,         ///< RODAS3: order 3 with an estimate of order 2, damps the stiffest motions
+                       ///< (L-stable); 2n + 3 evaluations, nothing to iterate
 };
 
 struct IntegratorOptions {
@@ -53,9 +47,6 @@ class Integrator {
   using StepFunction = Status (Integrator::*)(System& system, double h) noexcept;
   Status semi_implicit_euler(System& system, double h) noexcept;
   Status runge_kutta_4(System& system, double h) noexcept;
-  Status velocity_verlet(System& system, double h) noexcept;
-  Status modified_midpoint(System& system, double h) noexcept;
-  Status cash_karp(System& system, double h) noexcept;
   Status dormand_prince(System& system, double h) noexcept;
   Status dormand_prince_8(System& system, double h) noexcept;
   Status implicit_midpoint(System& system, double h) noexcept;

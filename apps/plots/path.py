@@ -82,15 +82,15 @@ def main():
     file_text = json.dumps(places)
     designs = dashpot("design", "-", "--damping-ratio", str(RATIO), text=file_text)
     region = dashpot("design", "-", "--damping-ratio", str(RATIO), "--region", text=file_text)
-    held = [(min(r), max(r)) for r in ([mode["damping_ratio"] for mode in one["modes"]]
-                                       for one in designs)]
+    designed = [(min(r), max(r)) for r in ([mode["damping_ratio"] for mode in one["modes"]]
+                                           for one in designs)]
     kept = list(ranges(places, designs[0]["task_damping"]))
     one = list(ranges(places, region["task_damping"]))
     length = sum(value * value for value in WAY) ** 0.5
     print("           damping of the start   one for the way       designed at each place")
     print("  way, m   ratios                 ratios                ratios")
     with open(directory + "/path.txt", "w", encoding="ascii") as file:
-        for k, row in enumerate(zip(kept, one, held)):
+        for k, row in enumerate(zip(kept, one, designed)):
             way = length * k / (POINTS - 1)
             print(f"  {way:.3f}   " + "   ".join(f"{low:7.4f} to {high:7.4f}" for low, high in row))
             file.write(f"{way} " + " ".join(f"{low} {high}" for low, high in row) + "\n")

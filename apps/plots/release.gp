@@ -1,5 +1,5 @@
 # Draws three releases, one above the other: gnuplot -e "dir='build/demo'" release.gp
-# dir/c1.txt, c2.txt and held.txt hold time (s), simulated and predicted displacement (mm).
+# dir/c1.txt, c2.txt and ratio_damping.txt hold time (s), simulated and predicted displacement (mm).
 
 set style line 1 lc rgb '#1f5fa8' lw 2
 set style line 2 lc rgb '#d95f02' lw 2 dt (6, 6)
@@ -27,7 +27,7 @@ do for [kind in 'svg png'] {
        '' using 1:3 with lines ls 2 title 'predicted by the modes'
   set xlabel 'time, s'
   set title 'C designed at every tick: damping ratio 0.7'
-  plot dir.'/held.txt' using 1:2 with lines ls 1 title 'simulated', \
+  plot dir.'/ratio_damping.txt' using 1:2 with lines ls 1 title 'simulated', \
        '' using 1:3 with lines ls 2 title 'predicted by the modes'
   unset multiplot
   unset output

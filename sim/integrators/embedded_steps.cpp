@@ -5,29 +5,6 @@
 
 namespace dashpot::sim {
 
-/// J. R. Cash, A. H. Karp, ACM Trans. Math. Software 16 (1990), the pair of orders 5 and 4.
-Status Integrator::cash_karp(System& system, double h) noexcept {
-  auto& k = rates_;
-  begin_step(system);
-  stage_ = y_ + h * (1.0 / 5 * k[0]);
-  system.rates(stage_, k[1]);
-  stage_ = y_ + h * (3.0 / 40 * k[0] + 9.0 / 40 * k[1]);
-  system.rates(stage_, k[2]);
-  stage_ = y_ + h * (3.0 / 10 * k[0] - 9.0 / 10 * k[1] + 6.0 / 5 * k[2]);
-  system.rates(stage_, k[3]);
-  stage_ = y_ + h * (-11.0 / 54 * k[0] + 5.0 / 2 * k[1] - 70.0 / 27 * k[2] + 35.0 / 27 * k[3]);
-  system.rates(stage_, k[4]);
-  stage_ = y_ + h * (1631.0 / 55296 * k[0] + 175.0 / 512 * k[1] + 575.0 / 13824 * k[2] +
-                     44275.0 / 110592 * k[3] + 253.0 / 4096 * k[4]);
-  system.rates(stage_, k[5]);
-  next_ =
-      y_ + h * (37.0 / 378 * k[0] + 250.0 / 621 * k[2] + 125.0 / 594 * k[3] + 512.0 / 1771 * k[5]);
-  if (!options_.adaptive) return Status::kOk;
-  error_ = h * (-277.0 / 64512 * k[0] + 6925.0 / 370944 * k[2] - 6925.0 / 202752 * k[3] -
-                277.0 / 14336 * k[4] + 277.0 / 7084 * k[5]);
-  return Status::kOk;
-}
-
 /// J. R. Dormand, P. J. Prince, J. Comp. Appl. Math. 6 (1980), RK5(4)7M.
 Status Integrator::dormand_prince(System& system, double h) noexcept {
   auto& k = rates_;

@@ -23,8 +23,8 @@ bool is_implicit(Method method) noexcept {
 }  // namespace
 
 bool estimates_error(Method method) noexcept {
-  return method == Method::kCashKarp || method == Method::kDormandPrince ||
-         method == Method::kDormandPrince8 || method == Method::kRosenbrock;
+  return method == Method::kDormandPrince || method == Method::kDormandPrince8 ||
+         method == Method::kRosenbrock;
 }
 
 Integrator::Integrator(const IntegratorOptions& options) : options_(options) {
@@ -43,16 +43,6 @@ Integrator::Integrator(const IntegratorOptions& options) : options_(options) {
       break;
     case Method::kRungeKutta4:
       step_ = &Integrator::runge_kutta_4;
-      break;
-    case Method::kVelocityVerlet:
-      step_ = &Integrator::velocity_verlet;
-      break;
-    case Method::kModifiedMidpoint:
-      step_ = &Integrator::modified_midpoint;
-      break;
-    case Method::kCashKarp:
-      step_ = &Integrator::cash_karp;
-      exponent_ = -1.0 / 5;
       break;
     case Method::kDormandPrince:
       step_ = &Integrator::dormand_prince;
@@ -206,32 +196,6 @@ Status Integrator::semi_implicit_euler(System& system, double h) noexcept {
   begin_step(system);
   next_ = y_ + h * rates_[0];
   next_.head(n) = y_.head(n) + h * next_.segment(n, n);
-  return Status::kOk;
-}
-
-/// With a_k = qdd(q_k, v_k + h a_{k-1}), found where the velocity is not known better yet:
-/// q_{k+1} = q_k + h v_k + (h^2 / 2) a_k,  v_{k+1} = v_k + (h / 2) (a_k + a_{k+1}).
-Status Integrator::velocity_verlet(System& system, double h) noexcept {
-  const Eigen::Index n = dof_of(y_);
-  begin_step(system);
-  stage_ = y_ + h * rates_[0];
-  stage_.head(n) += (h * h / 2) * rates_[0].segment(n, n);
-  system.rates(stage_, rates_[1]);
-  next_ = y_ + (h / 2) * (rates_[0] + rates_[1]);
-  next_.head(n) = stage_.head(n);
-  rates_[1].head(n) = next_.segment(n, n);
-  rates_at_next_ = 1;
-  return Status::kOk;
-}
-
-/// W. B. Gragg, SIAM J. Numer. Anal. 2 (1965): two midpoint steps of h / 2 and his smoothing.
-Status Integrator::modified_midpoint(System& system, double h) noexcept {
-  begin_step(system);
-  stage_ = y_ + (h / 2) * rates_[0];
-  system.rates(stage_, rates_[1]);
-  stage_ = y_ + h * rates_[1];
-  system.rates(stage_, rates_[2]);
-  next_ = y_ + (h / 4) * (rates_[0] + 2 * rates_[1] + rates_[2]);
   return Status::kOk;
 }
 

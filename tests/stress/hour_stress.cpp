@@ -81,7 +81,7 @@ bool keeps_modes(double seconds) {
   std::printf(
       "modes, %ld rounds of 2 s, %lld updates, %lld solved directly: %d out of place or out of "
       "their bounds, farthest %.1e relative\n",
-      rounds, static_cast<long long>(counters.updates), static_cast<long long>(counters.direct),
+      rounds, static_cast<long long>(counters.updates()), static_cast<long long>(counters.direct),
       exchanged, farthest);
   return exchanged == 0;
 }
@@ -92,7 +92,6 @@ int main(int argc, char** argv) {
   const double seconds = argc > 1 ? std::atof(argv[1]) : 3600;
   bool good = keeps_energy("rk4", sim::Method::kRungeKutta4, 1e-3, seconds, 1e-6);
   good &= keeps_energy("dormand_prince_8", sim::Method::kDormandPrince8, 5e-3, seconds, 1e-8);
-  good &= keeps_energy("velocity_verlet", sim::Method::kVelocityVerlet, 1e-3, seconds, 0.02);
   good &= keeps_modes(seconds);
   return good ? 0 : 1;
 }

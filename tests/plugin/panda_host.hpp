@@ -29,7 +29,7 @@ inline void simulate(const controller::RobotModel& model, Host& host, double per
 }
 
 /// A Panda whose joints bear their gravity already.
-inline Host held_panda(const std::string& settings = "") {
+inline Host panda_host(const std::string& settings = "") {
   Host host(create(panda() + settings), panda_posture());
   const auto model = load(panda() + settings).model;
   const controller::JointVector q = joint_vector(panda_posture());

@@ -70,7 +70,7 @@ struct Range {
   }
 };
 
-TEST(HeldRingDown, KeepsTheRatioOnAWayOnWhichAConstantDampingDrifts) {
+TEST(RatioDampingRingDown, KeepsTheRatioOnAWayOnWhichAConstantDampingDrifts) {
   const TwinModels twin(testing::arms()[0], false);
   JointVector start(7);
   start << 0, -0.785, 0, -2.356, 0, 1.571, 0.785;
@@ -84,27 +84,27 @@ TEST(HeldRingDown, KeepsTheRatioOnAWayOnWhichAConstantDampingDrifts) {
   at_start.jacobian = robot.J;
   at_start.task_stiffness = gains.task_stiffness;
   const auto design = analysis::design_damping(at_start, analysis::DampingTarget::constant(kRatio));
-  controller::Gains constant = gains, held = gains;
+  controller::Gains constant = gains, designed = gains;
   constant.task_damping = design.damping;
-  held.task_damping_ratio = kRatio;
-  Range of_held, of_constant;
-  std::printf("  way, m   ratios held        with the damping of the start\n");
+  designed.task_damping_ratio = kRatio;
+  Range of_designed, of_constant;
+  std::printf("  way, m   ratios designed    with the damping of the start\n");
   const auto postures = straight_way(twin, start, way, 6);
   for (std::size_t k = 0; k < postures.size(); ++k) {
     const auto with = [&](const controller::Gains& chosen) {
       const auto settings = release_settings(twin, chosen, 1e-3);
       return seen_ratios(twin, settings, postures[k], 2);
     };
-    const std::vector<double> kept = with(held), drifted = with(constant);
+    const std::vector<double> kept = with(designed), drifted = with(constant);
     ASSERT_EQ(kept.size(), 6U);
     for (const double ratio : kept) EXPECT_NEAR(ratio, kRatio, 0.01) << "point " << k;
-    Range here_held, here_constant;
-    here_held.add(kept);
+    Range here_designed, here_constant;
+    here_designed.add(kept);
     here_constant.add(drifted);
     std::printf("  %.3f    %.4f to %.4f   %.4f to %.4f\n",
-                0.2 * way.norm() * static_cast<double>(k), here_held.least, here_held.most,
+                0.2 * way.norm() * static_cast<double>(k), here_designed.least, here_designed.most,
                 here_constant.least, here_constant.most);
-    of_held.add(kept);
+    of_designed.add(kept);
     of_constant.add(drifted);
   }
   EXPECT_LT(of_constant.least, 0.6);
@@ -112,11 +112,11 @@ TEST(HeldRingDown, KeepsTheRatioOnAWayOnWhichAConstantDampingDrifts) {
 }
 
 /// The controller knows the friction that the simulated joints have.
-class HeldRingDownOf : public ::testing::TestWithParam<testing::Arm> {};
-INSTANTIATE_TEST_SUITE_P(Arms, HeldRingDownOf, ::testing::ValuesIn(testing::arms()),
+class RatioDampingRingDownOf : public ::testing::TestWithParam<testing::Arm> {};
+INSTANTIATE_TEST_SUITE_P(Arms, RatioDampingRingDownOf, ::testing::ValuesIn(testing::arms()),
                          [](const auto& instance) { return std::string(instance.param.file); });
 
-TEST_P(HeldRingDownOf, JointsBesideFrictionHasTheRatio) {
+TEST_P(RatioDampingRingDownOf, JointsBesideFrictionHasTheRatio) {
   TwinModels twin(GetParam());
   controller::ModelOptions options;
   sim::RobotParameters parameters;
