@@ -7,7 +7,6 @@
 // one thread, design/map/n only judges one there; items_per_second counts configurations.
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_region.hpp>
-#include <dashpot/analysis/joint_ratio_damping.hpp>
 #include <dashpot/analysis/ratio_damping.hpp>
 
 #include <benchmark/benchmark.h>
@@ -60,14 +59,14 @@ enum class Start { kWarm, kCold, kBesideFriction };
 
 void full(benchmark::State& state, Start start) {
   const Path path(state.range(0));
-  RatioDamping hold(DampingTarget::constant(kRatio));
-  if (start == Start::kBesideFriction) hold.set_friction(Eigen::VectorXd::Ones(state.range(0)));
-  hold.set_stiffness(path.stiffness);
+  RatioDamping damper(DampingTarget::constant(kRatio));
+  if (start == Start::kBesideFriction) damper.set_friction(Eigen::VectorXd::Ones(state.range(0)));
+  damper.set_stiffness(path.stiffness);
   TaskMatrix C_C;
   std::size_t tick = 0;
   for (auto _ : state) {
-    if (start == Start::kCold) hold.set_stiffness(path.stiffness);
-    const Status status = hold.update<kMaxDof>(path.mass[tick], path.jacobian[tick], C_C);
+    if (start == Start::kCold) damper.set_stiffness(path.stiffness);
+    const Status status = damper.update(path.mass[tick], path.jacobian[tick], C_C);
     if (status != Status::kOk) state.SkipWithError("no damping found");
     benchmark::DoNotOptimize(C_C.data());
     tick = (tick + 1) % path.mass.size();
@@ -76,13 +75,13 @@ void full(benchmark::State& state, Start start) {
 
 void joint(benchmark::State& state) {
   const Path path(state.range(0));
-  dashpot::analysis::JointRatioDamping hold;
-  hold.set_target(DampingTarget::constant(kRatio));
-  hold.set_stiffness(500 * Eigen::MatrixXd::Identity(state.range(0), state.range(0)));
-  Square<kMaxDof> C;
+  dashpot::analysis::RatioDamping damper;
+  damper.set_target(DampingTarget::constant(kRatio));
+  damper.set_stiffness(500 * Eigen::MatrixXd::Identity(state.range(0), state.range(0)));
+  Square<kMaxDof> C(state.range(0), state.range(0));
   std::size_t tick = 0;
   for (auto _ : state) {
-    if (hold.update(path.mass[tick], C) != Status::kOk) state.SkipWithError("no damping found");
+    if (damper.update(path.mass[tick], C) != Status::kOk) state.SkipWithError("no damping found");
     benchmark::DoNotOptimize(C.data());
     tick = (tick + 1) % path.mass.size();
   }

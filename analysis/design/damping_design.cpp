@@ -149,11 +149,16 @@ const char* to_text(DampingMiss::Reason reason) noexcept {
 }
 
 TaskImpedance with_damping(const TaskImpedance& impedance, const MatrixXd& damping) {
+  const Index n = impedance.mass.rows();
   TaskImpedance result = impedance;
   if (impedance.jacobian) {
     result.task_damping = damping;
   } else {
     result.damping = impedance.damping ? MatrixXd(*impedance.damping + damping) : damping;
+    if (impedance.damping) {
+      if (result.damping_error.rows() == 0) result.damping_error.setZero(n, n);
+      result.damping_error += kEps * result.damping->cwiseAbs();
+    }
   }
   return result;
 }

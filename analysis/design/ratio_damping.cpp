@@ -2,279 +2,281 @@
 #include <dashpot/analysis/linalg/semidefinite_cholesky.hpp>
 #include <dashpot/analysis/ratio_damping.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 namespace dashpot::analysis {
 namespace {
 
-using PairedRow = RatioDamping::PairedRow;
-using PairedRows = RatioDamping::PairedRows;
+using Eigen::Index;
+using ConstMatrix = RatioDamping::ConstMatrix;
 
-constexpr std::size_t kDirections = kTaskDirections;
-constexpr std::size_t kLanes = 4;
 /// Cosines between columns below this are squared by the sweep that has seen them.
 constexpr double kConverged = 1e-8;
 constexpr int kMaxSweeps = 16;
 /// After so many updates the rotations restart, before their rounding errors add up.
 constexpr int kFreshStart = 256;
 
-double& entry(PairedRow& row, std::size_t column) {
-  return column < 3 ? row.left[column] : row.right[column - 3];
+/// Lanes for the left partners of `half` pairs of columns, and as many for the right ones.
+constexpr Index lanes(Index half) {
+  return half <= 4 ? 4 : 8;
 }
 
-template <std::size_t Joints>
-using LowerTriangle = std::array<std::array<double, Joints>, Joints>;  // by columns
-
-/// L and the rows of L^-1 J' F for n = Joints; false unless M is positive definite.
-template <std::size_t Joints>
-bool scaled_rows(const double* M, Eigen::Index stride, const double* J, const PairedRows& F,
-                 LowerTriangle<Joints>& L, std::array<PairedRow, Joints>& A) noexcept {
-  for (std::size_t j = 0; j < Joints; ++j) {
-    const double* const column = M + static_cast<Eigen::Index>(j) * stride;
-    for (std::size_t i = j; i < Joints; ++i) L[j][i] = column[i];
-  }
-  for (std::size_t j = 0; j < Joints; ++j) {
-    PairedRow row{};
-    for (std::size_t k = 0; k < kDirections; ++k) {
-      const double factor = J[k + j * kDirections];
-      for (std::size_t l = 0; l < kLanes; ++l) {
-        row.left[l] += factor * F[k].left[l];
-        row.right[l] += factor * F[k].right[l];
-      }
-    }
-    A[j] = row;
-  }
-  for (std::size_t j = 0; j < Joints; ++j) {
-    if (!(L[j][j] > 0)) return false;
-    const double inverse = 1 / std::sqrt(L[j][j]);
-    for (std::size_t i = j; i < Joints; ++i) L[j][i] *= inverse;
-    for (std::size_t k = j + 1; k < Joints; ++k) {
-      for (std::size_t i = k; i < Joints; ++i) L[k][i] -= L[j][i] * L[j][k];
-    }
-    for (std::size_t l = 0; l < kLanes; ++l) {
-      A[j].left[l] *= inverse;
-      A[j].right[l] *= inverse;
-    }
-    for (std::size_t i = j + 1; i < Joints; ++i) {
-      for (std::size_t l = 0; l < kLanes; ++l) {
-        A[i].left[l] -= L[j][i] * A[j].left[l];
-        A[i].right[l] -= L[j][i] * A[j].right[l];
-      }
-    }
-  }
-  return true;
+/// Where column c of 2 half columns stands in a row: the first half are left partners.
+constexpr Index place(Index c, Index half) {
+  return c < half ? c : lanes(half) + c - half;
 }
 
-/// Turns the columns of each pair by their angle, and moves on to the next three pairs of a round
-/// robin: the first column stays, the others go round.
-template <std::size_t Rows>
-void turn(const std::array<double, kLanes>& c, const std::array<double, kLanes>& s,
-          std::array<PairedRow, Rows>& rows) noexcept {
-  for (PairedRow& row : rows) {
-    std::array<double, kLanes> l, r;
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      l[k] = c[k] * row.left[k] - s[k] * row.right[k];
-      r[k] = s[k] * row.left[k] + c[k] * row.right[k];
-    }
-    row.left = {l[0], r[0], l[1], 0};
-    row.right = {r[1], r[2], l[2], 0};
-  }
-}
+struct Problem {
+  const ConstMatrix& M;
+  const double* J;  ///< k x n; none: the identity
+  Index stride;     ///< of its columns
+  const double* d;  ///< n; none: no friction
+  Index k;
+  double* B;              ///< F, then F U: k rows
+  Vector<kMaxDof> omega;  ///< k
+  Square<kMaxDof> G;      ///< (L^-T A)' diag(d) L^-T A for the turned A; with friction only
+};
 
-/// One sweep over all 15 pairs of columns of A, with B turned alike. Returns the square of the
-/// largest cosine between two columns that it met.
-template <std::size_t Joints>
-double sweep(std::array<PairedRow, Joints>& A, PairedRows& B) noexcept {
-  std::array<double, kLanes> worst{};
-  for (std::size_t round = 0; round + 1 < kDirections; ++round) {
-    std::array<double, kLanes> left{}, right{}, dot{}, c, s;
-    for (const PairedRow& row : A) {
-      for (std::size_t k = 0; k < kLanes; ++k) {
-        left[k] += row.left[k] * row.left[k];
-        right[k] += row.right[k] * row.right[k];
-        dot[k] += row.left[k] * row.right[k];
+/// Decomposes F' J L^-T for up to 2 Half springs. Matrices of as many columns stand row by row.
+template <int Half>
+class Decomposition {
+ public:
+  explicit Decomposition(Problem& problem) noexcept : p_(problem), n_(problem.M.rows()) {}
+
+  Status run() noexcept {
+    if (!scale()) return Status::kMassNotPositiveDefinite;
+    double worst = 1;
+    for (int count = 0; !(worst <= kConverged * kConverged); ++count) {
+      if (count == kMaxSweeps) return Status::kNotConverged;
+      worst = sweep();
+    }
+    measure();
+    if (p_.d != nullptr) project_friction();
+    return Status::kOk;
+  }
+
+ private:
+  static constexpr Index kLanes = lanes(Half), kWidth = 2 * kLanes;
+  using Lanes = std::array<double, kLanes>;
+
+  double* row(Index i) noexcept { return &A_[static_cast<std::size_t>(i * kWidth)]; }
+  double& L(Index i, Index j) noexcept { return L_[static_cast<std::size_t>(j * n_ + i)]; }
+
+  /// L and A = L^-1 J' F; false unless M is positive definite.
+  bool scale() noexcept {
+    for (Index j = 0; j < n_; ++j) {
+      for (Index i = j; i < n_; ++i) L(i, j) = p_.M(i, j);
+      double* const a = row(j);
+      std::fill_n(a, kWidth, 0.0);
+      if (p_.J == nullptr) std::copy_n(p_.B + j * kWidth, kWidth, a);
+      for (Index r = 0; p_.J != nullptr && r < p_.k; ++r) {
+        const double factor = p_.J[r + j * p_.stride];
+        for (Index l = 0; l < kWidth; ++l) a[l] += factor * p_.B[r * kWidth + l];
       }
     }
+    for (Index j = 0; j < n_; ++j) {
+      if (!(L(j, j) > 0)) return false;
+      const double inverse = 1 / std::sqrt(L(j, j));
+      for (Index i = j; i < n_; ++i) L(i, j) *= inverse;
+      for (Index c = j + 1; c < n_; ++c) {
+        for (Index i = c; i < n_; ++i) L(i, c) -= L(i, j) * L(c, j);
+      }
+      double* const a = row(j);
+      for (Index l = 0; l < kWidth; ++l) a[l] *= inverse;
+      for (Index i = j + 1; i < n_; ++i) {
+        for (Index l = 0; l < kWidth; ++l) row(i)[l] -= L(i, j) * a[l];
+      }
+    }
+    return true;
+  }
+
+  /// Turns the columns of each pair by their angle, and moves on to the next pairs of a round
+  /// robin: the first column stays, the others go round.
+  static void turn(const Lanes& c, const Lanes& s, double* rows, Index count) noexcept {
+    for (double* a = rows; a != rows + count * kWidth; a += kWidth) {
+      Lanes l, r;
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        l[i] = c[i] * a[i] - s[i] * a[kLanes + i];
+        r[i] = s[i] * a[i] + c[i] * a[kLanes + i];
+      }
+      a[0] = l[0];
+      if constexpr (Half > 1) a[1] = r[0];
+      for (std::size_t i = 1; i + 1 < Half; ++i) a[i + 1] = l[i];
+      for (std::size_t i = 1; i < Half; ++i) a[kLanes + i - 1] = r[i];
+      a[kLanes + Half - 1] = Half > 1 ? l[Half - 1] : r[0];
+    }
+  }
+
+  /// One sweep over all pairs of columns of A, with B turned alike. Returns the square of the
+  /// largest cosine between two columns that it met.
+  double sweep() noexcept {
     constexpr double kTiny = std::numeric_limits<double>::min();
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      const double square = dot[k] * dot[k], cosine = square / (left[k] * right[k] + kTiny);
-      worst[k] = cosine > worst[k] ? cosine : worst[k];
-      // tan of the smaller angle, free of cancellation
-      const double half = 0.5 * (right[k] - left[k]);
-      const double size = std::abs(half) + std::sqrt(half * half + square) + kTiny;
-      const double t = dot[k] / std::copysign(size, half);
-      c[k] = 1 / std::sqrt(1 + t * t);
-      s[k] = c[k] * t;
+    double most = 0;
+    for (int round = 0; round < 2 * Half - 1; ++round) {
+      Lanes left{}, right{}, dot{}, c, s;
+      for (const double* a = row(0); a != row(n_); a += kWidth) {
+        for (std::size_t i = 0; i < kLanes; ++i) {
+          left[i] += a[i] * a[i];
+          right[i] += a[kLanes + i] * a[kLanes + i];
+          dot[i] += a[i] * a[kLanes + i];
+        }
+      }
+      Lanes cosine;
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        const double square = dot[i] * dot[i];
+        cosine[i] = square / (left[i] * right[i] + kTiny);
+        // tan of the smaller angle, free of cancellation
+        const double half = 0.5 * (right[i] - left[i]);
+        const double size = std::abs(half) + std::sqrt(half * half + square) + kTiny;
+        const double t = dot[i] / std::copysign(size, half);
+        c[i] = 1 / std::sqrt(1 + t * t);
+        s[i] = c[i] * t;
+      }
+      for (const double value : cosine) most = std::max(most, value);
+      turn(c, s, row(0), n_);
+      turn(c, s, p_.B, p_.k);
     }
-    turn(c, s, A);
-    turn(c, s, B);
+    return most;
   }
-  return std::max(std::max(worst[0], worst[1]), worst[2]);
-}
 
-/// (L^-T A)' diag(d) L^-T A, of which the upper triangle is computed; A is overwritten by L^-T A.
-template <std::size_t Joints>
-void task_friction(const LowerTriangle<Joints>& L, const double* d,
-                   std::array<PairedRow, Joints>& A, TaskMatrix& G) noexcept {
-  G.setZero();
-  for (std::size_t i = Joints; i-- > 0;) {
-    PairedRow row = A[i];
-    for (std::size_t k = i + 1; k < Joints; ++k) {
-      for (std::size_t l = 0; l < kLanes; ++l) {
-        row.left[l] -= L[i][k] * A[k].left[l];
-        row.right[l] -= L[i][k] * A[k].right[l];
+  void measure() noexcept {
+    std::array<double, kWidth> squares{};
+    for (Index i = 0; i < n_; ++i) {
+      for (std::size_t l = 0; l < kWidth; ++l) squares[l] += row(i)[l] * row(i)[l];
+    }
+    p_.omega.resize(p_.k);
+    for (Index i = 0; i < p_.k; ++i) {
+      p_.omega[i] = std::sqrt(squares[static_cast<std::size_t>(place(i, Half))]);
+    }
+  }
+
+  /// G; A becomes L^-T A.
+  void project_friction() noexcept {
+    p_.G.setZero(p_.k, p_.k);
+    for (Index i = n_; i-- > 0;) {
+      double* const a = row(i);
+      for (Index r = i + 1; r < n_; ++r) {
+        for (Index l = 0; l < kWidth; ++l) a[l] -= L(r, i) * row(r)[l];
+      }
+      for (Index l = 0; l < kWidth; ++l) a[l] /= L(i, i);
+      for (Index c = 0; c < p_.k; ++c) {
+        const double scaled = p_.d[i] * a[place(c, Half)];
+        for (Index r = 0; r <= c; ++r) p_.G(r, c) += scaled * a[place(r, Half)];
       }
     }
-    for (std::size_t l = 0; l < kLanes; ++l) {
-      row.left[l] /= L[i][i];
-      row.right[l] /= L[i][i];
-    }
-    A[i] = row;
-    for (std::size_t q = 0; q < kDirections; ++q) {
-      const double scaled = d[i] * entry(row, q);
-      for (std::size_t p = 0; p <= q; ++p) {
-        G(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(q)) += scaled * entry(row, p);
-      }
+  }
+
+  Problem& p_;
+  Index n_;
+  alignas(64) std::array<double, kMaxDof * kWidth> A_;
+  std::array<double, kMaxDof * kMaxDof> L_;
+};
+
+template <int Half>
+Status decompose(Problem& problem) noexcept {
+  return Decomposition<Half>(problem).run();
+}
+
+Status decompose(Problem& problem, Index half) noexcept {
+  constexpr std::array<Status (*)(Problem&) noexcept, kMaxDof / 2> kOfHalf = {
+      decompose<1>, decompose<2>, decompose<3>, decompose<4>,
+      decompose<5>, decompose<6>, decompose<7>, decompose<8>};
+  return kOfHalf[static_cast<std::size_t>(half - 1)](problem);
+}
+
+/// G / (omega_i omega_j); zero where a frequency is.
+void normalize(Problem& problem) noexcept {
+  for (Index j = 0; j < problem.k; ++j) {
+    for (Index i = 0; i <= j; ++i) {
+      const double size = problem.omega[i] * problem.omega[j];
+      problem.G(i, j) = problem.G(j, i) = size > 0 ? problem.G(i, j) / size : 0;
     }
   }
 }
 
-/// Sweeps until the columns are orthogonal; their lengths are the frequencies. With friction d (n),
-/// also G = (L^-T A)' diag(d) L^-T A of these columns.
-template <std::size_t Joints>
-Status frequencies(const double* M, Eigen::Index stride, const double* J, const double* d,
-                   PairedRows& B, std::array<double, kDirections>& omega, TaskMatrix& G) noexcept {
-  std::array<PairedRow, Joints> A;
-  LowerTriangle<Joints> L;
-  if (!scaled_rows<Joints>(M, stride, J, B, L, A)) return Status::kMassNotPositiveDefinite;
-  double worst = 1;
-  for (int count = 0; !(worst <= kConverged * kConverged); ++count) {
-    if (count == kMaxSweeps) return Status::kNotConverged;
-    worst = sweep(A, B);
-  }
-  PairedRow squares{};
-  for (const PairedRow& row : A) {
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      squares.left[k] += row.left[k] * row.left[k];
-      squares.right[k] += row.right[k] * row.right[k];
+/// B R B' of k rows each; without R, B diag(c) B'.
+void congruence(const Problem& problem, const Square<kMaxDof>* R, const Vector<kMaxDof>& c,
+                Eigen::Ref<Eigen::MatrixXd>& out) noexcept {
+  const Index half = (problem.k + 1) / 2, width = 2 * lanes(half);
+  for (Index j = 0; j < problem.k; ++j) {
+    const double* const b = problem.B + j * width;
+    alignas(64) std::array<double, kMaxDof> scaled{};
+    for (Index l = 0; l < problem.k; ++l) {
+      double sum = R == nullptr ? c[l] * b[place(l, half)] : 0;
+      for (Index i = 0; R != nullptr && i < problem.k; ++i) sum += (*R)(l, i) * b[place(i, half)];
+      scaled[static_cast<std::size_t>(place(l, half))] = sum;
     }
-  }
-  for (std::size_t i = 0; i < kDirections; ++i) omega[i] = std::sqrt(entry(squares, i));
-  if (d != nullptr) task_friction<Joints>(L, d, A, G);
-  return Status::kOk;
-}
-
-using Frequencies = Status (*)(const double*, Eigen::Index, const double*, const double*,
-                               PairedRows&, std::array<double, kDirections>&, TaskMatrix&) noexcept;
-
-template <std::size_t... I>
-constexpr std::array<Frequencies, sizeof...(I)> frequencies_table(std::index_sequence<I...>) {
-  return {frequencies<I + 1>...};
-}
-
-constexpr auto kFrequencies = frequencies_table(std::make_index_sequence<kMaxDof>());
-
-/// B R B' for what friction, with its G, leaves to do.
-Status damping_beside_friction(const PairedRows& B, const std::array<double, kDirections>& omega,
-                               const DampingTarget& target, double soft, const TaskMatrix& G,
-                               TaskMatrix& out, bool& overdone) noexcept {
-  Vector<kMaxDof> frequencies(kTaskDirections);
-  Square<kMaxDof> R(kTaskDirections, kTaskDirections);
-  TaskMatrix rows;
-  for (Eigen::Index j = 0; j < kTaskDirections; ++j) {
-    frequencies[j] = omega[static_cast<std::size_t>(j)];
-    for (Eigen::Index i = 0; i <= j; ++i) {
-      const double size = omega[static_cast<std::size_t>(i)] * omega[static_cast<std::size_t>(j)];
-      R(i, j) = R(j, i) = size > 0 ? G(i, j) / size : 0;
-    }
-    PairedRow row = B[static_cast<std::size_t>(j)];
-    for (std::size_t k = 0; k < kDirections; ++k) {
-      rows(j, static_cast<Eigen::Index>(k)) = entry(row, k);
-    }
-  }
-  const Status status = missing_damping(frequencies, target, soft, R, overdone);
-  if (status != Status::kOk) return status;
-  const TaskMatrix half = rows.lazyProduct(TaskMatrix(R));
-  const TaskMatrix whole = half.lazyProduct(rows.transpose());
-  out = 0.5 * (whole + whole.transpose());
-  return Status::kOk;
-}
-
-/// B diag(weight) B', of which one half is computed.
-void weighted_square(const PairedRows& B, const std::array<double, kDirections>& weight,
-                     TaskMatrix& out) noexcept {
-  PairedRow w{};
-  for (std::size_t k = 0; k < kDirections; ++k) entry(w, k) = weight[k];
-  for (std::size_t j = 0; j < kDirections; ++j) {
-    PairedRow scaled;
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      scaled.left[k] = w.left[k] * B[j].left[k];
-      scaled.right[k] = w.right[k] * B[j].right[k];
-    }
-    for (std::size_t i = 0; i <= j; ++i) {
-      std::array<double, kLanes> sum;
-      for (std::size_t k = 0; k < kLanes; ++k) {
-        sum[k] = scaled.left[k] * B[i].left[k] + scaled.right[k] * B[i].right[k];
-      }
-      const double value = (sum[0] + sum[1]) + sum[2];
-      out(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = value;
-      out(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(i)) = value;
+    for (Index i = 0; i <= j; ++i) {
+      const double* const a = problem.B + i * width;
+      double sum = 0;
+      for (Index l = 0; l < width; ++l) sum += a[l] * scaled[static_cast<std::size_t>(l)];
+      out(i, j) = out(j, i) = sum;
     }
   }
 }
 
 }  // namespace
 
-Status RatioDamping::set_stiffness(const TaskMatrix& K_C) noexcept {
-  if (!K_C.allFinite()) return Status::kNotFinite;
-  TaskMatrix F;
-  if (!semidefinite_cholesky(K_C, F)) return Status::kStiffnessIndefinite;
-  for (std::size_t i = 0; i < kDirections; ++i) {
-    for (std::size_t j = 0; j < kDirections; ++j) {
-      entry(factor_[i], j) = F(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+Status RatioDamping::set_stiffness(const ConstMatrix& K) noexcept {
+  const Index k = K.rows(), half = (k + 1) / 2, width = 2 * lanes(half);
+  if (k == 0 || k > kMaxDof || K.cols() != k) return Status::kWrongSize;
+  if (!K.allFinite()) return Status::kNotFinite;
+  Square<kMaxDof> F;
+  if (!semidefinite_cholesky(K, F)) return Status::kStiffnessIndefinite;
+  factor_.fill(0);
+  for (Index i = 0; i < k; ++i) {
+    for (Index j = 0; j <= i; ++j) {
+      factor_[static_cast<std::size_t>(i * width + place(j, half))] = F(i, j);
     }
   }
   rotated_ = factor_;
+  springs_ = k;
   updates_ = 0;
   return Status::kOk;
 }
 
-template <int N>
-Status RatioDamping::update(const Square<N>& M, const TaskJacobian<N>& J,
-                            TaskMatrix& C_C) noexcept {
-  const Eigen::Index n = M.rows();
-  if (n == 0 || n > kMaxDof || M.cols() != n || J.cols() != n) return Status::kWrongSize;
-  const bool friction = friction_.size() > 0;
-  if (friction && friction_.size() != n) return Status::kWrongSize;
-  PairedRows B = updates_ < kFreshStart ? rotated_ : factor_;
-  std::array<double, kDirections> omega, weight;
-  TaskMatrix G;
-  Status status = kFrequencies[static_cast<std::size_t>(n - 1)](
-      M.data(), M.outerStride(), J.data(), friction ? friction_.data() : nullptr, B, omega, G);
-  if (status != Status::kOk) return status;
-  double fastest = 0;
-  for (const double value : omega) {
-    if (!std::isfinite(value)) return Status::kNotFinite;
-    fastest = std::max(fastest, value);
-  }
-  const double soft = target_.soft_limit(fastest);
-  overdone_ = false;
-  if (friction) {
-    status = damping_beside_friction(B, omega, target_, soft, G, C_C, overdone_);
-    if (status != Status::kOk) return status;
-  } else {
-    for (std::size_t i = 0; i < kDirections; ++i) weight[i] = target_.damper(omega[i], soft);
-    weighted_square(B, weight, C_C);
-  }
-  updates_ = updates_ < kFreshStart ? updates_ + 1 : 0;
-  rotated_ = B;
-  frequencies_ = omega;
-  return Status::kOk;
+Status RatioDamping::update(const ConstMatrix& M, const ConstMatrix& J,
+                            Eigen::Ref<Eigen::MatrixXd> C) noexcept {
+  if (J.rows() != springs_ || J.cols() != M.rows()) return Status::kWrongSize;
+  return design(M, J.data(), J.outerStride(), C);
 }
 
-template Status RatioDamping::update<kMaxDof>(const Square<kMaxDof>&, const TaskJacobian<kMaxDof>&,
-                                              TaskMatrix&) noexcept;
+Status RatioDamping::update(const ConstMatrix& M, Eigen::Ref<Eigen::MatrixXd> C) noexcept {
+  if (M.rows() != springs_) return Status::kWrongSize;
+  return design(M, nullptr, 0, C);
+}
+
+Status RatioDamping::design(const ConstMatrix& M, const double* J, Index stride,
+                            Eigen::Ref<Eigen::MatrixXd>& C) noexcept {
+  const Index n = M.rows(), k = springs_, half = (k + 1) / 2;
+  if (n == 0 || n > kMaxDof || M.cols() != n || k == 0) return Status::kWrongSize;
+  if (C.rows() != k || C.cols() != k) return Status::kWrongSize;
+  const bool friction = friction_.size() > 0;
+  if (friction && friction_.size() != n) return Status::kWrongSize;
+  alignas(64) Factor B;
+  const Factor& start = updates_ < kFreshStart ? rotated_ : factor_;
+  std::copy_n(start.begin(), k * 2 * lanes(half), B.begin());
+  Problem problem{M, J, stride, friction ? friction_.data() : nullptr, k, B.data(), {}, {}};
+  Status status = decompose(problem, half);
+  if (status != Status::kOk) return status;
+  if (!problem.omega.allFinite()) return Status::kNotFinite;
+  const double soft = target_.soft_limit(problem.omega.maxCoeff());
+  bool overdone = false;
+  Vector<kMaxDof> weight(k);
+  if (friction) {
+    normalize(problem);
+    status = missing_damping(problem.omega, target_, soft, problem.G, overdone);
+    if (status != Status::kOk) return status;
+  } else {
+    for (Index i = 0; i < k; ++i) weight[i] = target_.damper(problem.omega[i], soft);
+  }
+  congruence(problem, friction ? &problem.G : nullptr, weight, C);
+  overdone_ = overdone;
+  updates_ = updates_ < kFreshStart ? updates_ + 1 : 0;
+  std::copy_n(B.begin(), k * 2 * lanes(half), rotated_.begin());
+  return Status::kOk;
+}
 
 }  // namespace dashpot::analysis

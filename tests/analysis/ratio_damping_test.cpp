@@ -30,8 +30,8 @@ TaskJacobian<kMaxDof> padded_jacobian(const MatrixXd& J) {
   return result;
 }
 
-Status update(RatioDamping& hold, const TaskImpedance& arm, TaskMatrix& C_C) {
-  return hold.update<kMaxDof>(arm.mass, padded_jacobian(*arm.jacobian), C_C);
+Status update(RatioDamping& damper, const TaskImpedance& arm, TaskMatrix& C_C) {
+  return damper.update(arm.mass, padded_jacobian(*arm.jacobian), C_C);
 }
 
 DampingTarget falling_target() {
@@ -51,10 +51,10 @@ TEST(RatioDamping, MatchesTheDesignOfSetUpTime) {
         random_arm(random, n, m, random.log_uniform(1, 1e4), random.log_uniform(1, 1e4));
     const DampingTarget target =
         i % 2 == 0 ? DampingTarget::constant(random.log_uniform(0.01, 2)) : falling_target();
-    RatioDamping hold(target);
-    ASSERT_EQ(hold.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
+    RatioDamping damper(target);
+    ASSERT_EQ(damper.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
     TaskMatrix C_C;
-    ASSERT_EQ(update(hold, arm, C_C), Status::kOk);
+    ASSERT_EQ(update(damper, arm, C_C), Status::kOk);
     EXPECT_EQ(C_C, TaskMatrix(C_C.transpose()));
     const MatrixXd expected = padded(design_damping(arm, target).damping);
     const double error = (C_C - expected).norm() / expected.norm();
@@ -71,10 +71,10 @@ TEST(RatioDamping, GivesTheModesTheirRatios) {
     const int n = random.integer(1, 9), m = random.integer(1, std::min(n, 6));
     TaskImpedance arm =
         random_arm(random, n, m, random.log_uniform(1, 1e4), random.log_uniform(1, 1e4));
-    RatioDamping hold(DampingTarget::constant(0.7));
-    ASSERT_EQ(hold.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
+    RatioDamping damper(DampingTarget::constant(0.7));
+    ASSERT_EQ(damper.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
     TaskMatrix C_C;
-    ASSERT_EQ(update(hold, arm, C_C), Status::kOk);
+    ASSERT_EQ(update(damper, arm, C_C), Status::kOk);
     arm.task_damping = C_C.topLeftCorner(m, m);
     const Spectrum<> spectrum = analyze(to_joint_space(arm));
     ASSERT_EQ(spectrum.modes.size(), m);
@@ -128,13 +128,13 @@ TEST(RatioDamping, IsBoundedAndSmoothThroughASingularity) {
       Eigen::SelfAdjointEigenSolver<MatrixXd>(*arm.task_stiffness).eigenvalues()[5];
   const double bound = 1.4 * DampingTarget::kPeak * stiffest / target.soft_frequency;
   const auto largest_change = [&](double step) {
-    RatioDamping hold(target);
-    EXPECT_EQ(hold.set_stiffness(*arm.task_stiffness), Status::kOk);
+    RatioDamping damper(target);
+    EXPECT_EQ(damper.set_stiffness(*arm.task_stiffness), Status::kOk);
     TaskMatrix C_C, before;
     double change = 0;
     bool first = true;
     for (double phase = -0.02; phase <= 0.02; phase += step) {
-      EXPECT_EQ(update(hold, on_path(arm, swing, phase), C_C), Status::kOk);
+      EXPECT_EQ(update(damper, on_path(arm, swing, phase), C_C), Status::kOk);
       EXPECT_LE(C_C.operatorNorm(), bound);
       EXPECT_EQ(negative_eigenvalues(C_C).size(), 0);
       if (!first) change = std::max(change, (C_C - before).norm());
@@ -154,8 +154,8 @@ TEST(RatioDamping, IsSmoothThroughACrossing) {
   Square<kMaxDof> M = Square<kMaxDof>::Identity(6, 6);
   TaskJacobian<kMaxDof> J = TaskJacobian<kMaxDof>::Identity(6, 6);
   TaskMatrix K = TaskMatrix(Eigen::Matrix<double, 6, 1>(100, 100, 400, 9, 25, 49).asDiagonal());
-  RatioDamping hold(falling_target());
-  ASSERT_EQ(hold.set_stiffness(K), Status::kOk);
+  RatioDamping damper(falling_target());
+  ASSERT_EQ(damper.set_stiffness(K), Status::kOk);
   TaskMatrix C_C, before;
   double change = 0;
   for (int i = -1000; i <= 1000; ++i) {
@@ -163,7 +163,7 @@ TEST(RatioDamping, IsSmoothThroughACrossing) {
     M(0, 0) = 1 + t;  // the two coincide at t = 0, and veer by the coupling
     M(1, 1) = 1 - t;
     M(0, 1) = M(1, 0) = 1e-7;
-    ASSERT_EQ(hold.update<kMaxDof>(M, J, C_C), Status::kOk);
+    ASSERT_EQ(damper.update(M, J, C_C), Status::kOk);
     if (i > -1000) change = std::max(change, (C_C - before).norm());
     before = C_C;
   }
@@ -176,16 +176,16 @@ TEST(RatioDamping, DoesNotDriftOverManyTicks) {
   const TaskJacobian<kMaxDof> J = *arm.jacobian;
   const TaskJacobian<kMaxDof> swing = 0.2 * random.matrix(6, 7);
   const Square<kMaxDof> M = arm.mass;
-  RatioDamping hold(DampingTarget::constant(0.7));
-  ASSERT_EQ(hold.set_stiffness(*arm.task_stiffness), Status::kOk);
+  RatioDamping damper(DampingTarget::constant(0.7));
+  ASSERT_EQ(damper.set_stiffness(*arm.task_stiffness), Status::kOk);
   TaskMatrix first, C_C;
-  ASSERT_EQ(hold.update<kMaxDof>(M, J, first), Status::kOk);
+  ASSERT_EQ(damper.update(M, J, first), Status::kOk);
   TaskJacobian<kMaxDof> moved = J;
   for (int tick = 0; tick < 100000; ++tick) {
     moved = J + std::sin(0.1 * tick) * swing;
-    hold.update<kMaxDof>(M, moved, C_C);
+    damper.update(M, moved, C_C);
   }
-  ASSERT_EQ(hold.update<kMaxDof>(M, J, C_C), Status::kOk);
+  ASSERT_EQ(damper.update(M, J, C_C), Status::kOk);
   EXPECT_TRUE(near(C_C, first, 1e-11 * first.norm()));
 }
 
@@ -199,10 +199,10 @@ TEST(RatioDamping, ConvergesOnAnythingFinite) {
     if (i % 3 == 0) J.row(3) = J.row(1);
     if (i % 5 == 0) J.row(2).setZero();
     if (i % 7 == 0) J = J.col(0) * random.matrix(1, n);
-    RatioDamping hold(DampingTarget::constant(0.7));
-    ASSERT_EQ(hold.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
+    RatioDamping damper(DampingTarget::constant(0.7));
+    ASSERT_EQ(damper.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
     TaskMatrix C_C = TaskMatrix::Zero();
-    const Status status = update(hold, arm, C_C);
+    const Status status = update(damper, arm, C_C);
     ASSERT_TRUE(status == Status::kOk || (arm.mass.llt().info() != Eigen::Success))
         << to_text(status) << ", system " << i;
     ASSERT_TRUE(C_C.allFinite());
@@ -213,34 +213,34 @@ TEST(RatioDamping, ConvergesOnAnythingFinite) {
 TEST(RatioDamping, SaysWhatIsWrongAndKeepsTheDampingBefore) {
   Random random(7107);
   const TaskImpedance arm = random_arm(random, 5, 6);
-  RatioDamping hold(DampingTarget::constant(0.7));
-  ASSERT_EQ(hold.set_stiffness(*arm.task_stiffness), Status::kOk);
+  RatioDamping damper(DampingTarget::constant(0.7));
+  ASSERT_EQ(damper.set_stiffness(*arm.task_stiffness), Status::kOk);
   TaskMatrix C_C, before;
-  ASSERT_EQ(update(hold, arm, C_C), Status::kOk);
+  ASSERT_EQ(update(damper, arm, C_C), Status::kOk);
   before = C_C;
   TaskImpedance bad = arm;
   bad.mass(4, 4) = -1;
-  EXPECT_EQ(update(hold, bad, C_C), Status::kMassNotPositiveDefinite);
+  EXPECT_EQ(update(damper, bad, C_C), Status::kMassNotPositiveDefinite);
   bad = arm;
   (*bad.jacobian)(0, 1) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(update(hold, bad, C_C), Status::kNotFinite);
+  EXPECT_EQ(update(damper, bad, C_C), Status::kNotFinite);
   (*bad.jacobian)(0, 1) = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(update(hold, bad, C_C), Status::kNotFinite);
+  EXPECT_EQ(update(damper, bad, C_C), Status::kNotFinite);
   bad = arm;
   bad.mass = random.spd(4);
-  EXPECT_EQ(update(hold, bad, C_C), Status::kWrongSize);
+  EXPECT_EQ(update(damper, bad, C_C), Status::kWrongSize);
   TaskMatrix K = *arm.task_stiffness;
   K(3, 3) = -1;
-  EXPECT_EQ(hold.set_stiffness(K), Status::kStiffnessIndefinite);
+  EXPECT_EQ(damper.set_stiffness(K), Status::kStiffnessIndefinite);
   K = *arm.task_stiffness;
   K.row(2).setZero();  // a zero pivot beside entries that are not
   K.col(2).setZero();
   K(2, 4) = K(4, 2) = 5;
-  EXPECT_EQ(hold.set_stiffness(K), Status::kStiffnessIndefinite);
+  EXPECT_EQ(damper.set_stiffness(K), Status::kStiffnessIndefinite);
   K(2, 4) = K(4, 2) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(hold.set_stiffness(K), Status::kNotFinite);
+  EXPECT_EQ(damper.set_stiffness(K), Status::kNotFinite);
   EXPECT_EQ(C_C, before);
-  ASSERT_EQ(update(hold, arm, C_C), Status::kOk);
+  ASSERT_EQ(update(damper, arm, C_C), Status::kOk);
   EXPECT_TRUE(near(C_C, before, 1e-12 * before.norm()));
 }
 

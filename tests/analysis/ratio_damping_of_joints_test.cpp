@@ -1,0 +1,176 @@
+// The design of joint damping in the control loop, and what friction leaves to do, beside the
+// design of set-up time, which is another algorithm in another precision.
+#include <dashpot/analysis/damping_design.hpp>
+#include <dashpot/analysis/ratio_damping.hpp>
+#include <dashpot/tests/support/count_allocations.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random_arms.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+
+#include <cstdio>
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::graded;
+using testing::near;
+using testing::padded;
+using testing::Random;
+using Matrix = Square<kMaxDof>;
+
+TaskImpedance random_joints(Random& random, int n) {
+  TaskImpedance arm;
+  arm.mass = graded(random, n, 3, random.log_uniform(1, 1e4));
+  arm.stiffness = graded(random, n, 3000, random.log_uniform(1, 1e4));
+  return arm;
+}
+
+RatioDamping damper_of(const TaskImpedance& arm, double ratio) {
+  RatioDamping damper;
+  damper.set_target(DampingTarget::constant(ratio));
+  EXPECT_EQ(damper.set_stiffness(Matrix(*arm.stiffness)), Status::kOk);
+  if (arm.damping) damper.set_friction(Vector<kMaxDof>(arm.damping->diagonal()));
+  return damper;
+}
+
+/// To rounding.
+void expect_semidefinite(const MatrixXd& C) {
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(C, Eigen::EigenvaluesOnly);
+  EXPECT_GE(eigen.eigenvalues()[0], -1e-12 * (1e-3 + C.norm()));
+}
+
+TEST(RatioDampingOfJoints, MatchesTheDesignOfSetUpTime) {
+  Random random(7301);
+  double worst = 0;
+  int overdone = 0, beside = 0;
+  for (int i = 0; i < 600; ++i) {
+    const int n = random.integer(1, kMaxDof);
+    TaskImpedance arm = random_joints(random, n);
+    if (i % 3 > 0) arm.damping = testing::random_friction(random, n, random.log_uniform(0.1, 300));
+    const double ratio = random.log_uniform(0.1, 2);
+    const DampingDesign design = design_damping(arm, DampingTarget::constant(ratio));
+    RatioDamping damper = damper_of(arm, ratio);
+    Matrix C(n, n);
+    ASSERT_EQ(damper.update(Matrix(arm.mass), C), Status::kOk);
+    EXPECT_EQ(C, Matrix(C.transpose()));
+    EXPECT_EQ(damper.overdone(), design.indefinite_by < 0);
+    if (arm.damping) ++(damper.overdone() ? overdone : beside);
+    const double error = (MatrixXd(C) - design.damping).norm() / (1e-3 + design.damping.norm());
+    expect_semidefinite(C);
+    if (damper.overdone()) continue;
+    worst = std::max(worst, error);
+    ASSERT_LE(error, 1e-9) << "system " << i << ", n = " << n;
+  }
+  std::printf("largest relative difference %.2g; friction overdid it %d times, not %d\n", worst,
+              overdone, beside);
+  EXPECT_GT(overdone, 50);
+  EXPECT_GT(beside, 50);
+}
+
+TEST(RatioDampingOfJoints, StartedFromTheLastConfigurationMatchesAColdStart) {
+  Random random(7302);
+  TaskImpedance arm = random_joints(random, 7);
+  arm.damping = testing::random_friction(random, 7, 2);
+  const MatrixXd swing = random.matrix(7, 7);
+  RatioDamping warm = damper_of(arm, 0.7);
+  for (int k = 0; k < 600; ++k) {
+    const MatrixXd R = MatrixXd::Identity(7, 7) + 0.3 * std::sin(0.01 * k) * swing;
+    const Matrix M = R * arm.mass * R.transpose();
+    RatioDamping cold = damper_of(arm, 0.7);
+    Matrix from_warm(7, 7), from_cold(7, 7);
+    ASSERT_EQ(warm.update(M, from_warm), Status::kOk);
+    ASSERT_EQ(cold.update(M, from_cold), Status::kOk);
+    EXPECT_TRUE(near(MatrixXd(from_warm), MatrixXd(from_cold), 1e-11 * from_cold.norm()));
+  }
+}
+
+TEST(RatioDampingOfJoints, LeavesJointsWithoutSpringsFree) {
+  TaskImpedance arm;
+  arm.mass = VectorXd{{2, 1, 1}}.asDiagonal();
+  arm.stiffness = VectorXd{{200, 0, 25}}.asDiagonal();
+  arm.damping = VectorXd{{1, 1, 1}}.asDiagonal();
+  RatioDamping damper = damper_of(arm, 0.5);
+  Matrix C(3, 3);
+  ASSERT_EQ(damper.update(Matrix(arm.mass), C), Status::kOk);
+  EXPECT_TRUE(near(MatrixXd(C), MatrixXd(VectorXd{{19, 0, 4}}.asDiagonal()), 1e-12));
+  EXPECT_FALSE(damper.overdone());
+}
+
+TEST(RatioDampingOfJoints, SaysWhatIsWrongAndKeepsTheDampingBefore) {
+  Random random(7303);
+  const TaskImpedance arm = random_joints(random, 4);
+  RatioDamping damper = damper_of(arm, 0.7);
+  Matrix C(4, 4), small(3, 3);
+  ASSERT_EQ(damper.update(Matrix(arm.mass), C), Status::kOk);
+  const Matrix good = C;
+  Matrix broken = arm.mass;
+  broken(2, 2) = -1;
+  EXPECT_EQ(damper.update(broken, C), Status::kMassNotPositiveDefinite);
+  EXPECT_EQ(damper.update(Matrix(Matrix::Identity(3, 3)), C), Status::kWrongSize);
+  EXPECT_EQ(damper.update(Matrix(arm.mass), small), Status::kWrongSize);
+  EXPECT_EQ(damper.set_stiffness(Matrix(2, 3)), Status::kWrongSize);
+  Matrix indefinite = *arm.stiffness;
+  indefinite(1, 1) = -1;
+  EXPECT_EQ(damper.set_stiffness(indefinite), Status::kStiffnessIndefinite);
+  indefinite(1, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(damper.set_stiffness(indefinite), Status::kNotFinite);
+  damper.set_friction(VectorXd::Ones(3));
+  EXPECT_EQ(damper.update(Matrix(arm.mass), C), Status::kWrongSize);
+  EXPECT_EQ(C, good);
+}
+
+TEST(RatioDampingOfJoints, NeverAllocates) {
+  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
+  Random random(7304);
+  for (const double friction : {0.0, 1.0, 1000.0}) {  // the last one overdoes it
+    TaskImpedance arm = random_joints(random, kMaxDof);
+    arm.damping = friction * MatrixXd::Identity(kMaxDof, kMaxDof);
+    RatioDamping damper = damper_of(arm, 0.7);
+    const Matrix M = arm.mass;
+    Matrix C(kMaxDof, kMaxDof);
+    EXPECT_EQ(testing::allocations_of([&] { damper.update(M, C); }), 0);
+    EXPECT_EQ(damper.overdone(), friction > 100);
+  }
+}
+
+// As many joints as directions: nothing couples, and both are exact unless friction is too much.
+TEST(RatioDampingBesideFriction, MatchesTheDesignOfSetUpTime) {
+  Random random(7305);
+  double worst = 0;
+  int overdone = 0;
+  for (int i = 0; i < 600; ++i) {
+    const int n = random.integer(1, 6);
+    TaskImpedance arm = testing::random_arm(random, n, n);
+    arm.damping = testing::random_friction(random, n, random.log_uniform(0.01, 100));
+    const DampingTarget target = DampingTarget::constant(random.log_uniform(0.1, 2));
+    const DampingDesign design = design_damping(arm, target);
+    RatioDamping damper(target);
+    damper.set_friction(Vector<kMaxDof>(arm.damping->diagonal()));
+    ASSERT_EQ(damper.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
+    TaskJacobian<kMaxDof> J = TaskJacobian<kMaxDof>::Zero(6, n);
+    J.topRows(n) = *arm.jacobian;
+    TaskMatrix C_C;
+    ASSERT_EQ(damper.update(arm.mass, J, C_C), Status::kOk);
+    EXPECT_EQ(C_C, TaskMatrix(C_C.transpose()));
+    EXPECT_EQ(damper.overdone(), design.indefinite_by < 0);
+    overdone += damper.overdone() ? 1 : 0;
+    const double error =
+        (MatrixXd(C_C) - padded(design.damping)).norm() / (1e-3 + design.damping.norm());
+    expect_semidefinite(C_C);
+    if (damper.overdone()) continue;
+    worst = std::max(worst, error);
+    ASSERT_LE(error, 1e-9) << "system " << i << ", n = " << n;
+  }
+  std::printf("largest relative difference %.2g; friction overdid it %d times\n", worst, overdone);
+  EXPECT_GT(overdone, 100);
+  EXPECT_LT(overdone, 500);
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
