@@ -27,23 +27,20 @@ enum class Pivot {
   kLast,     ///< the last remaining coordinate, as in the paper's printed examples
 };
 
-// Both methods give the same S, which depends on the zero modes together and on the coordinates
-// eliminated. S0, S1, ... also depend on the order of the columns of zero_modes.basis: step k
-// eliminates the k-th column, freed from the columns before it. Of the zero modes only count and
-// basis are read. The columns need not be M-orthonormal. The stiffness has to be symmetric.
-//
-// Both throw std::invalid_argument if the basis does not fit the system, and std::domain_error if
-// Pivot::kLast meets a coordinate that the zero mode does not move (s_i = 0 to rounding).
-
-/// Eliminates one zero mode after the other, and finds each again as a null vector of the current
-/// reduced stiffness (paper, "Successive elimination"). While the reduced stiffness has several
-/// null vectors, the one nearest to the next column of the basis is taken.
-RigidBodyElimination eliminate_successively(const System<>& system, const ZeroModes<>& zero_modes,
-                                            Pivot pivot = Pivot::kLargest);
-
-/// Eliminates all zero modes from the one basis, and carries each along with the consistent
-/// pseudo-inverse S* = (S' M S)^-1 S' M (paper, Eq. 61, "Abbreviated elimination").
-RigidBodyElimination eliminate_abbreviated(const System<>& system, const ZeroModes<>& zero_modes,
-                                           Pivot pivot = Pivot::kLargest);
+/// Eliminates the zero modes one after the other. Each is carried along into the reduced
+/// coordinates with the consistent pseudo-inverse S* = (S' M S)^-1 S' M (paper, Eq. 61,
+/// "Abbreviated elimination"), so that the zero modes are found once, and as exactly as in
+/// `zero_modes`. The paper's "Successive elimination", which finds each again from the reduced
+/// stiffness, gives the same S.
+///
+/// S depends on the zero modes together and on the coordinates eliminated. S0, S1, ... also depend
+/// on the order of the columns of zero_modes.basis: step k eliminates the k-th column, freed from
+/// the columns before it. Of the zero modes only count and basis are read. The columns need not be
+/// M-orthonormal. The stiffness has to be symmetric.
+///
+/// Throws std::invalid_argument if the basis does not fit the system, and std::domain_error if
+/// Pivot::kLast meets a coordinate that the zero mode does not move (s_i = 0 to rounding).
+RigidBodyElimination eliminate_zero_modes(const System<>& system, const ZeroModes<>& zero_modes,
+                                          Pivot pivot = Pivot::kLargest);
 
 }  // namespace dashpot::analysis

@@ -26,13 +26,20 @@ struct System {
   StiffnessFactor<N> stiffness_factor;
 
   /// Optional low words: the exact coefficients are damping + damping_low and
-  /// stiffness + stiffness_low. They hold the rounding errors made when the coefficients were
-  /// formed from others, such as K = J' K_C J. They are read only if `has_low_words`. The proved
-  /// error bounds rely on |low word| <= eps |coefficient| / 2 in every entry, which `validate` does
-  /// not check.
+  /// stiffness + stiffness_low, and a stiffness factor is rounded. They hold the rounding errors
+  /// made when the coefficients were formed from others, such as K = J' K_C J. They are read only
+  /// if `has_low_words`. The proved error bounds rely on |low word| <= eps |coefficient| in every
+  /// entry.
   Square<N> damping_low;
   Square<N> stiffness_low;
   bool has_low_words = false;
+
+  /// Optional entrywise bounds of |true coefficient - given coefficient|, low words included, none
+  /// negative. No rows: exact. The proved bounds of a spectrum hold for every system within them,
+  /// symmetric or not. ModeTracker does not read them.
+  Square<N> mass_error;
+  Square<N> damping_error;
+  Square<N> stiffness_error;
 
   System() : System(0) {}
   explicit System(Eigen::Index n)

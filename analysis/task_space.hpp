@@ -20,6 +20,9 @@ struct TaskImpedance {
   /// equilibrium: add K_G = [(dJ/dq_1)' f ... (dJ/dq_n)' f] to K (Eq. 55)
   std::vector<Eigen::MatrixXd> jacobian_derivatives;
   std::optional<Eigen::VectorXd> wrench;
+  /// Entrywise bounds of |true - given| mass and damping, n x n, for what the caller rounded. No
+  /// rows: exact.
+  Eigen::MatrixXd mass_error, damping_error;
 };
 
 /// Returns K_G of Eq. 55, n x n. It is symmetric for the linear rows of J, in general not for the
@@ -31,14 +34,15 @@ Eigen::MatrixXd geometric_stiffness(const std::vector<Eigen::MatrixXd>& jacobian
 ///     K = stiffness + J' K_C J + K_G + J' C_C Jdot,     C = damping + J' C_C J.
 /// With nothing but a mass, C = K = 0.
 ///
-/// The rounding errors of forming the products are kept in the system's low words. The factor
-/// W = F' J (stacked) is kept too where all of K comes from a positive semidefinite K_C = F F' (and
-/// a positive semidefinite joint stiffness).
+/// The rounding errors of forming the products are kept in the system's low words, and what these
+/// cannot hold is bounded in its errors. The factor W = F' J (stacked) is kept too where all of K
+/// comes from a positive semidefinite K_C = F F' (and a positive semidefinite joint stiffness).
 ///
-/// mass, damping, stiffness, C_C and K_C have to be symmetric: a difference of at most 1e-10 of the
-/// largest entry is averaged away, a larger one is an error. K_G is made symmetric where it is
-/// symmetric within that tolerance. So only Jdot and a K_G of angular directions can make the
-/// result nonsymmetric.
+/// mass, damping, stiffness, C_C and K_C have to be symmetric: a difference of more than 1e-10 of
+/// the largest entry is an error. A smaller one is averaged, and counts in the system's errors, so
+/// that proved bounds hold for the matrix as given and for the symmetric ones that it may stand
+/// for. K_G is made symmetric likewise where it is symmetric within that tolerance. So only Jdot
+/// and a K_G of angular directions can make the result nonsymmetric.
 ///
 /// The jacobian needs task_damping or task_stiffness, and these need the jacobian; jacobian_rate
 /// needs task_damping; wrench and jacobian_derivatives need each other. Throws InvalidSystem, with

@@ -69,4 +69,23 @@ void check_low_word(const std::string& key, const Eigen::MatrixXd& matrix,
   }
 }
 
+void check_error(const std::string& key, const Eigen::MatrixXd& error, Eigen::Index n) {
+  if (error.rows() == 0) return;
+  check_size(key, error, n, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      if (!(error(i, j) >= 0))
+        throw InvalidSystem(key, entry_text(i, j) + " is negative or not a number");
+    }
+  }
+}
+
+void make_symmetric(Eigen::MatrixXd& matrix, Eigen::MatrixXd& error) {
+  if (matrix == matrix.transpose()) return;
+  const Eigen::MatrixXd mean = 0.5 * matrix + 0.5 * matrix.transpose();
+  if (error.rows() == 0) error.setZero(matrix.rows(), matrix.cols());
+  error += (1 + 1e-10) * (mean - matrix).cwiseAbs();
+  matrix = mean;
+}
+
 }  // namespace dashpot::analysis

@@ -36,5 +36,13 @@ void check_symmetric(const std::string& key, const Eigen::MatrixXd& matrix);
 /// working precision rely on low words no larger than one rounding of the coefficient.
 void check_low_word(const std::string& key, const Eigen::MatrixXd& matrix,
                     const Eigen::MatrixXd& tail);
+/// Throws unless `error` has no rows, or is n x n of entries of at least zero: "entry
+/// (1,2) is negative or not a number". An infinite entry says that nothing is known.
+void check_error(const std::string& key, const Eigen::MatrixXd& error, Eigen::Index n);
+
+/// Replaces a matrix that is symmetric within the tolerance by its symmetric part, and adds the
+/// change to `error` (no rows: zero), entrywise, because either of two entries that differ may be
+/// the true one.
+void make_symmetric(Eigen::MatrixXd& matrix, Eigen::MatrixXd& error);
 
 }  // namespace dashpot::analysis

@@ -2,7 +2,6 @@
 #include <dashpot/analysis/system/checks.hpp>
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -17,24 +16,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Coefficients with the stiffness factor, all in the coordinates that are left.
-struct Reduced {
-  MatrixXd mass;
-  MatrixXd damping;
-  MatrixXd stiffness;
-  MatrixXd stiffness_factor;  ///< no rows: not given
-};
-
 /// S' A S, exactly symmetric if A is.
 MatrixXd congruence(const MatrixXd& S, const MatrixXd& A) {
   MatrixXd product = S.transpose() * A * S;
   if (A == A.transpose()) product = (0.5 * (product + product.transpose())).eval();
   return product;
-}
-
-Reduced reduce(const Reduced& system, const MatrixXd& S) {
-  return {congruence(S, system.mass), congruence(S, system.damping),
-          congruence(S, system.stiffness), system.stiffness_factor * S};
 }
 
 void check(const System<>& system, const ZeroModes<>& zero_modes) {
@@ -97,43 +83,10 @@ MatrixXd pseudo_inverse_times(const MatrixXd& S, const MatrixXd& mass, const Mat
   return reduced_mass.llt().solve(S.transpose() * (mass * x));
 }
 
-/// The last `count` right singular vectors of the mass-normalised stiffness, as M-orthonormal null
-/// vectors of the stiffness.
-MatrixXd null_vectors(const Reduced& system, Index count) {
-  const Eigen::LLT<MatrixXd> cholesky(system.mass);
-  const bool factored = system.stiffness_factor.rows() > 0;
-  const MatrixXd& rows = factored ? system.stiffness_factor : system.stiffness;
-  MatrixXd normalized = cholesky.matrixL().solve(rows.transpose()).transpose();
-  if (!factored) normalized = cholesky.matrixL().solve(normalized).eval();
-  const Eigen::JacobiSVD<MatrixXd> svd(normalized, Eigen::ComputeFullV);
-  return cholesky.matrixU().solve(svd.matrixV().rightCols(count));
-}
-
 }  // namespace
 
-RigidBodyElimination eliminate_successively(const System<>& system, const ZeroModes<>& zero_modes,
-                                            Pivot pivot) {
-  check(system, zero_modes);
-  RigidBodyElimination elimination = nothing_removed(system);
-  Reduced current{system.mass, system.damping, system.stiffness, system.stiffness_factor};
-  MatrixXd guides = zero_modes.basis;  // columns not yet removed, in the current coordinates
-  while (guides.cols() > 0) {
-    const MatrixXd null_space = null_vectors(current, guides.cols());
-    const VectorXd u = null_space * (null_space.transpose() * (current.mass * guides.col(0)));
-    const MatrixXd step = append_step(current.mass, u, pivot, elimination);
-    Reduced next = reduce(current, step);
-    guides =
-        pseudo_inverse_times(step, current.mass, next.mass, guides.rightCols(guides.cols() - 1));
-    current = std::move(next);
-  }
-  elimination.mass = current.mass;
-  elimination.damping = current.damping;
-  elimination.stiffness = current.stiffness;
-  return elimination;
-}
-
-RigidBodyElimination eliminate_abbreviated(const System<>& system, const ZeroModes<>& zero_modes,
-                                           Pivot pivot) {
+RigidBodyElimination eliminate_zero_modes(const System<>& system, const ZeroModes<>& zero_modes,
+                                          Pivot pivot) {
   check(system, zero_modes);
   RigidBodyElimination elimination = nothing_removed(system);
   MatrixXd mass = system.mass;

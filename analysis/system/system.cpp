@@ -20,6 +20,9 @@ void check_optional_parts(const System<>& system) {
     check_low_word("damping_low", system.damping, system.damping_low);
     check_low_word("stiffness_low", system.stiffness, system.stiffness_low);
   }
+  check_error("mass_error", system.mass_error, n);
+  check_error("damping_error", system.damping_error, n);
+  check_error("stiffness_error", system.stiffness_error, n);
 }
 
 }  // namespace

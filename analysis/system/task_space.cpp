@@ -12,15 +12,28 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// A matrix of double-doubles: high + low.
+/// Bound of the relative error of one operation on double-doubles (3 u^2 of a sum, 2 u^2 of a
+/// product with a double), enough for the rounding errors of the bounds as well.
+constexpr double kOperation =
+    std::numeric_limits<double>::epsilon() * std::numeric_limits<double>::epsilon();
+
+/// A matrix of double-doubles, high + low, that lacks at most `error` in every entry.
 struct ExtendedMatrix {
   MatrixXd high;
   MatrixXd low;
+  MatrixXd error;
 
   ExtendedMatrix(Index rows, Index cols)
-      : high(MatrixXd::Zero(rows, cols)), low(MatrixXd::Zero(rows, cols)) {}
-  explicit ExtendedMatrix(const MatrixXd& value)
-      : high(value), low(MatrixXd::Zero(value.rows(), value.cols())) {}
+      : high(MatrixXd::Zero(rows, cols)), low(high), error(high) {}
+  /// A symmetric matrix: the symmetric part of `value`, with the rest as error.
+  ExtendedMatrix(const std::string& key, const MatrixXd& value, Index size)
+      : ExtendedMatrix(size, size) {
+    check_size(key, value, size, size);
+    check_finite(key, value);
+    check_symmetric(key, value);
+    high = value;
+    make_symmetric(high, error);
+  }
 
   DoubleDouble get(Index i, Index j) const { return {high(i, j), low(i, j)}; }
   void set(Index i, Index j, const DoubleDouble& value) {
@@ -31,11 +44,18 @@ struct ExtendedMatrix {
     for (Index j = 0; j < high.cols(); ++j) {
       for (Index i = 0; i < high.rows(); ++i) set(i, j, get(i, j) + other.get(i, j));
     }
+    error += other.error + kOperation * high.cwiseAbs();
+  }
+  /// Adds an error, none if it has no rows.
+  void add_error(const std::string& key, const MatrixXd& more) {
+    check_error(key, more, high.rows());
+    if (more.rows() > 0) error += more;
   }
 };
 
-/// left' middle right, with about 32 digits.
-ExtendedMatrix sandwich(const MatrixXd& left, const MatrixXd& middle, const MatrixXd& right) {
+/// left' middle right, with about 32 digits; `middle` has no low words.
+ExtendedMatrix sandwich(const MatrixXd& left, const ExtendedMatrix& factor, const MatrixXd& right) {
+  const MatrixXd& middle = factor.high;
   ExtendedMatrix inner(middle.rows(), right.cols());
   for (Index i = 0; i < inner.high.rows(); ++i) {
     for (Index j = 0; j < inner.high.cols(); ++j) {
@@ -52,11 +72,15 @@ ExtendedMatrix sandwich(const MatrixXd& left, const MatrixXd& middle, const Matr
       product.set(i, j, sum.value());
     }
   }
+  const auto operations = static_cast<double>(middle.cols() + left.rows());
+  const MatrixXd error = operations * kOperation * middle.cwiseAbs() + factor.error;
+  const MatrixXd inner_error = error * right.cwiseAbs();
+  product.error = left.cwiseAbs().transpose() * inner_error;
   return product;
 }
 
 /// J' A J for a symmetric A: exactly symmetric.
-ExtendedMatrix congruence(const MatrixXd& jacobian, const MatrixXd& middle) {
+ExtendedMatrix congruence(const MatrixXd& jacobian, const ExtendedMatrix& middle) {
   ExtendedMatrix product = sandwich(jacobian, middle, jacobian);
   for (Index i = 0; i < product.high.rows(); ++i) {
     for (Index j = 0; j < i; ++j) product.set(i, j, product.get(j, i));
@@ -74,6 +98,8 @@ ExtendedMatrix extended_geometric_stiffness(const std::vector<MatrixXd>& derivat
       DotAccumulator sum;
       for (Index j = 0; j < wrench.size(); ++j) sum.add(derivative(j, i), wrench(j));
       result.set(i, k, sum.value());
+      result.error(i, k) = static_cast<double>(wrench.size()) * kOperation *
+                           derivative.col(i).cwiseAbs().dot(wrench.cwiseAbs());
     }
   }
   return result;
@@ -87,18 +113,14 @@ void average_if_symmetric(ExtendedMatrix& matrix) {
   for (Index i = 0; i < matrix.high.rows(); ++i) {
     for (Index j = 0; j < i; ++j) {
       const DoubleDouble mean = (matrix.get(i, j) + matrix.get(j, i)) * 0.5;
+      const double half = 0.5 * std::abs((matrix.get(i, j) - matrix.get(j, i)).high);
+      for (double* error : {&matrix.error(i, j), &matrix.error(j, i)}) {
+        *error += (1 + 1e-10) * half + kOperation * std::abs(mean.high);
+      }
       matrix.set(i, j, mean);
       matrix.set(j, i, mean);
     }
   }
-}
-
-/// The size x size matrix under this key, checked and made exactly symmetric.
-MatrixXd symmetric_part(const std::string& key, const MatrixXd& matrix, Index size) {
-  check_size(key, matrix, size, size);
-  check_finite(key, matrix);
-  check_symmetric(key, matrix);
-  return 0.5 * matrix + 0.5 * matrix.transpose();
 }
 
 /// F' (size x size) with matrix = F F', or nothing if the matrix is not positive semidefinite to
@@ -206,12 +228,13 @@ struct Assembly {
 void add_joint_space(const TaskImpedance& impedance, Assembly& sum) {
   const Index n = impedance.mass.rows();
   if (impedance.damping) {
-    sum.damping.add(ExtendedMatrix(symmetric_part("damping", *impedance.damping, n)));
+    sum.damping.add(ExtendedMatrix("damping", *impedance.damping, n));
+    sum.damping.add_error("damping_error", impedance.damping_error);
   }
   if (impedance.stiffness) {
-    const MatrixXd stiffness = symmetric_part("stiffness", *impedance.stiffness, n);
-    sum.stiffness.add(ExtendedMatrix(stiffness));
-    sum.factor.append(factor_transposed(stiffness));
+    const ExtendedMatrix stiffness("stiffness", *impedance.stiffness, n);
+    sum.stiffness.add(stiffness);
+    sum.factor.append(factor_transposed(stiffness.high));
   }
 }
 
@@ -219,13 +242,13 @@ void add_task_space(const TaskImpedance& impedance, Assembly& sum) {
   if (!impedance.jacobian) return;
   const MatrixXd& J = *impedance.jacobian;
   if (impedance.task_stiffness) {
-    const MatrixXd K = symmetric_part("task_stiffness", *impedance.task_stiffness, J.rows());
+    const ExtendedMatrix K("task_stiffness", *impedance.task_stiffness, J.rows());
     sum.stiffness.add(congruence(J, K));
-    const std::optional<MatrixXd> root = factor_transposed(K);
+    const std::optional<MatrixXd> root = factor_transposed(K.high);
     sum.factor.append(root ? std::optional<MatrixXd>(*root * J) : std::nullopt);
   }
   if (impedance.task_damping) {
-    const MatrixXd C = symmetric_part("task_damping", *impedance.task_damping, J.rows());
+    const ExtendedMatrix C("task_damping", *impedance.task_damping, J.rows());
     sum.damping.add(congruence(J, C));
     if (impedance.jacobian_rate) {
       sum.stiffness.add(sandwich(J, C, *impedance.jacobian_rate));
@@ -248,7 +271,10 @@ MatrixXd geometric_stiffness(const std::vector<MatrixXd>& jacobian_derivatives,
 System<> to_joint_space(const TaskImpedance& impedance) {
   const Index n = impedance.mass.rows();
   System<> system(n);
-  system.mass = symmetric_part("mass", impedance.mass, n);
+  ExtendedMatrix mass("mass", impedance.mass, n);
+  mass.add_error("mass_error", impedance.mass_error);
+  system.mass = mass.high;
+  system.mass_error = mass.error;
   check_members(impedance);
 
   Assembly sum(n);
@@ -260,9 +286,13 @@ System<> to_joint_space(const TaskImpedance& impedance) {
   }
 
   system.damping = sum.damping.high;
+  system.damping_error = sum.damping.error;
   system.stiffness = sum.stiffness.high;
+  system.stiffness_error = sum.stiffness.error;
   system.stiffness_factor = sum.factor.rows();
-  system.has_low_words = !sum.damping.low.isZero(0.0) || !sum.stiffness.low.isZero(0.0);
+  // With a factor, which is rounded, the low words also say that the stiffness is not.
+  system.has_low_words = !sum.damping.low.isZero(0.0) || !sum.stiffness.low.isZero(0.0) ||
+                         system.stiffness_factor.rows() > 0;
   if (system.has_low_words) {
     system.damping_low = sum.damping.low;
     system.stiffness_low = sum.stiffness.low;

@@ -14,10 +14,10 @@ namespace {
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 /// Squared frequencies this far apart or less are right to half their digits straight from K.
 constexpr double kWellScaled = 1e-8;
-/// A correction of the null space (tangents of angles) up to which it is small enough to be one,
-/// and below which the next one would be rounding.
+/// A correction of the null space (tangents of angles) up to which it is small enough to be one.
 constexpr double kCorrection = 0.1;
-constexpr double kSettled = 1e-8;
+/// Corrections, each smaller than the one before by about the first one, until that is rounding.
+constexpr int kCorrections = 16;
 
 template <int N>
 void sort_by_magnitude(Square<N>& P, Vector<N>& values) {
@@ -105,18 +105,22 @@ double from_stiffness(const System<N>& system, const Square<N>& L, Square<N>& P,
 /// A factor or the eigenvectors of K leave errors of eps kappa_1 / kappa_i along the i-th mode, by
 /// which damping that leaves the zero modes alone would seem to couple them. Newton steps
 /// P0 -= P1 X, X = diag(kappa)^-1 T1' K T0, [T1 T0] = L^-T P, with K T0 in double-double
-/// arithmetic.
+/// arithmetic, low words included.
 template <int N>
-void polish_null_space(const Square<N>& K, const Square<N>& L, const Vector<N>& kappa,
+void polish_null_space(const System<N>& system, const Square<N>& L, const Vector<N>& kappa,
                        Eigen::Index count, Square<N>& P) {
-  const Eigen::Index n = K.rows(), m = n - count;
-  for (int step = 0; step < 2; ++step) {
+  const Eigen::Index n = system.dof(), m = n - count;
+  double first = 0;
+  for (int step = 0; step < kCorrections; ++step) {
     const Square<N> T = L.template triangularView<Eigen::Lower>().transpose().solve(P);
     Square<N> residual(n, count);
     for (Eigen::Index j = 0; j < count; ++j) {
       for (Eigen::Index i = 0; i < n; ++i) {
         DotAccumulator sum;
-        for (Eigen::Index k = 0; k < n; ++k) sum.add(K(i, k), T(k, m + j));
+        for (Eigen::Index k = 0; k < n; ++k) {
+          sum.add(system.stiffness(i, k), T(k, m + j));
+          if (system.has_low_words) sum.add(system.stiffness_low(i, k), T(k, m + j));
+        }
         residual(i, j) = sum.value().high;
       }
     }
@@ -130,7 +134,8 @@ void polish_null_space(const Square<N>& K, const Square<N>& L, const Vector<N>& 
     orthonormalize(columns);
     P.leftCols(m) = columns.rightCols(m);
     P.rightCols(count) = columns.leftCols(count);
-    if (size < kSettled) return;
+    if (step == 0) first = size;
+    if (!(first * size > kEps)) return;
   }
 }
 
@@ -165,9 +170,11 @@ ZeroModes<N> find_zero_modes(const System<N>& system, const Square<N>& L) noexce
       kappa[i] = 0;
     }
   }
-  if (0 < result.count && result.count < n && system.stiffness_factor.rows() == 0 &&
+  // A factor without low words is the exact one, and the stiffness formed from it is rounded.
+  const bool exact = system.stiffness_factor.rows() == 0 || system.has_low_words;
+  if (0 < result.count && result.count < n && exact &&
       system.stiffness == system.stiffness.transpose()) {
-    polish_null_space<N>(system.stiffness, L, kappa, result.count, P);
+    polish_null_space<N>(system, L, kappa, result.count, P);
   }
   result.stiffness_values = kappa;
   result.coordinates = L.template triangularView<Eigen::Lower>().transpose().solve(P);

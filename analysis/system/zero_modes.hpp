@@ -31,8 +31,8 @@ struct ZeroModes {
 /// eigenvalues, and the floor is the root of n eps times the largest frequency. If the smallest
 /// frequency is that small, a positive semidefinite K is factored first, with its rank decided on K
 /// scaled to a unit diagonal, so that neither graded masses nor graded stiffnesses hide a mode. The
-/// zero modes of a symmetric K are then refined with residuals in double-double arithmetic, to the
-/// accuracy that a factor gives.
+/// zero modes of a symmetric K are then refined with residuals in double-double arithmetic, unless
+/// there is a factor without low words, because K is only rounded then.
 template <int N>
 ZeroModes<N> find_zero_modes(const System<N>& system, const Square<N>& L) noexcept;
 

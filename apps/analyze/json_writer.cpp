@@ -68,27 +68,29 @@ Json to_value(const ReportedResponse& response) {
 Json to_value(const Report& report) {
   const analysis::Spectrum<>& spectrum = report.spectrum;
   const analysis::ZeroModes<>& zero_modes = spectrum.zero_modes;
-  Json result = {{"status", analysis::to_text(spectrum.status)},
-                 {"notes", report.notes},
-                 {"dof", report.dof},
-                 {"modes", modes(spectrum)},
-                 {"zero_modes", rows(zero_modes.basis.transpose())},
-                 {"zero_mode_rates", list(spectrum.zero_mode_rates.head(zero_modes.count))},
-                 {"rank_gap",
-                  {{"floor", zero_modes.floor},
-                   {"smallest_kept", zero_modes.smallest_kept},
-                   {"largest_dropped", zero_modes.largest_dropped}}},
-                 {"coupling", spectrum.coupling},
-                 {"coupled", spectrum.coupled},
-                 {"symmetric", spectrum.symmetric},
-                 {"proportional", spectrum.proportional},
-                 {"extended", spectrum.extended},
-                 {"constraint_matrix", rows(report.elimination.constraint_matrix)},
-                 {"eliminated", report.elimination.eliminated},
-                 {"reduced",
-                  {{"mass", rows(report.elimination.mass)},
-                   {"damping", rows(report.elimination.damping)},
-                   {"stiffness", rows(report.elimination.stiffness)}}}};
+  Json result = {
+      {"status", analysis::to_text(spectrum.status)},
+      {"notes", report.notes},
+      {"dof", report.dof},
+      {"modes", modes(spectrum)},
+      {"zero_modes", rows(zero_modes.basis.transpose())},
+      {"zero_mode_rates", list(spectrum.zero_mode_rates.head(zero_modes.count))},
+      {"zero_mode_rates_bound", list(spectrum.zero_mode_rates_bound.head(zero_modes.count))},
+      {"rank_gap",
+       {{"floor", zero_modes.floor},
+        {"smallest_kept", zero_modes.smallest_kept},
+        {"largest_dropped", zero_modes.largest_dropped}}},
+      {"coupling", spectrum.coupling},
+      {"coupled", spectrum.coupled},
+      {"symmetric", spectrum.symmetric},
+      {"proportional", spectrum.proportional},
+      {"extended", spectrum.extended},
+      {"constraint_matrix", rows(report.elimination.constraint_matrix)},
+      {"eliminated", report.elimination.eliminated},
+      {"reduced",
+       {{"mass", rows(report.elimination.mass)},
+        {"damping", rows(report.elimination.damping)},
+        {"stiffness", rows(report.elimination.stiffness)}}}};
   if (report.response) result["response"] = to_value(*report.response);
   return result;
 }

@@ -70,7 +70,7 @@ Report make_report(const SystemEntry& entry, const analysis::System<>& system,
   Report report;
   report.dof = system.dof();
   report.spectrum = analysis::analyze(system, options);
-  report.elimination = analysis::eliminate_successively(system, report.spectrum.zero_modes, pivot);
+  report.elimination = analysis::eliminate_zero_modes(system, report.spectrum.zero_modes, pivot);
   if (entry.times) report.response = respond(entry, system, report.spectrum);
   report.notes = notes_on(entry, system, report.spectrum);
   return report;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <array>
+#include <limits>
 #include <string_view>
 #include <utility>
 
@@ -58,6 +59,16 @@ std::optional<Eigen::VectorXd> per_joint(const YamlMapping& keys, std::string_vi
   return result;
 }
 
+constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+
+/// sum += more, which is right within more_error; what is not known of the sum goes to `error`.
+void add(const Eigen::MatrixXd& more, const Eigen::MatrixXd& more_error, Eigen::MatrixXd& sum,
+         Eigen::MatrixXd& error) {
+  sum += more;
+  if (error.rows() == 0) error.setZero(sum.rows(), sum.cols());
+  error += more_error + kEpsilon * sum.cwiseAbs();
+}
+
 /// What is there besides the matrices given: inertia of drives and of a point mass at the origin of
 /// the task, and damping in the null space.
 void read_additions(const YamlMapping& keys, SystemEntry& entry) {
@@ -66,7 +77,7 @@ void read_additions(const YamlMapping& keys, SystemEntry& entry) {
   if (impedance.damping) entry.friction = *impedance.damping;
   const bool square = impedance.mass.cols() == n;
   if (const auto inertia = per_joint(keys, "reflected_inertia", n); inertia && square) {
-    impedance.mass.diagonal() += *inertia;
+    add(inertia->asDiagonal(), Eigen::MatrixXd::Zero(n, n), impedance.mass, impedance.mass_error);
   }
   if (const YamlNode* node = keys.find("payload")) {
     const double payload = keys.quantity("payload", *node, "kg", "");
@@ -75,7 +86,11 @@ void read_additions(const YamlMapping& keys, SystemEntry& entry) {
     if (!J || J->rows() != 6 || J->cols() != n) {
       throw keys.error("payload", "needs a jacobian of six rows");
     }
-    if (square) impedance.mass += payload * J->topRows(3).transpose() * J->topRows(3);
+    if (square) {
+      const Eigen::MatrixXd J_v = J->topRows(3), size = J_v.cwiseAbs();
+      add(payload * J_v.transpose() * J_v, 4 * kEpsilon * payload * size.transpose() * size,
+          impedance.mass, impedance.mass_error);
+    }
   }
   if (const auto damping = per_joint(keys, "null_damping", n)) {
     if (!impedance.jacobian || !impedance.task_stiffness) {
@@ -165,8 +180,10 @@ void SystemEntry::add_null_damping(const Eigen::MatrixXd& D) {
       (impedance.damping && (impedance.damping->rows() != n || impedance.damping->cols() != n))) {
     return;
   }
-  const Eigen::MatrixXd added = analysis::null_space_damping(impedance.mass, *J, *K_C, D);
-  impedance.damping = impedance.damping ? Eigen::MatrixXd(*impedance.damping + added) : added;
+  const analysis::NullSpaceDamping more =
+      analysis::null_space_damping(impedance.mass, *J, *K_C, D, impedance.mass_error);
+  if (!impedance.damping) impedance.damping = Eigen::MatrixXd::Zero(n, n);
+  add(more.damping, more.error, *impedance.damping, impedance.damping_error);
 }
 
 InputError SystemEntry::error(const analysis::InvalidSystem& cause) const {

@@ -74,8 +74,7 @@ class Writer {
                      format_number(mode.natural_frequency / (2 * std::numbers::pi), 6),
                      format_number(mode.damping_ratio, 6), analysis::to_text(mode.kind),
                      format_number(mode.eigenvalues[0].real(), 6), second_eigenvalue(mode),
-                     std::isfinite(mode.error_bound) ? format_number(mode.error_bound, 2) : "none",
-                     format_number(mode.backward_error, 2)});
+                     format_bound(mode.error_bound), format_number(mode.backward_error, 2)});
       shapes.add_row({number, format_shape(mode.shapes[0], kWidth - 10)});
     }
     out_ += '\n' + table.text() + '\n' + shapes.text();
@@ -86,11 +85,13 @@ class Writer {
     const analysis::ZeroModes<>& zero = spectrum.zero_modes;
     if (zero.count > 0) {
       TextTable table;
-      table.add_column(Align::kRight, {"zero mode"});
-      table.add_column(Align::kRight, {"velocity decays, 1/s"});
-      table.add_column(Align::kLeft, {kShapeHeading});
+      table.add_column(Align::kRight, {"", "zero mode"});
+      table.add_column(Align::kRight, {"velocity", "decays, 1/s"});
+      table.add_column(Align::kRight, {"error <", "1/s"});
+      table.add_column(Align::kLeft, {"", kShapeHeading});
       for (int i = 0; i < zero.count; ++i) {
         table.add_row({std::to_string(i + 1), format_number(-spectrum.zero_mode_rates[i], 6),
+                       format_bound(spectrum.zero_mode_rates_bound[i]),
                        format_shape(zero.basis.col(i).cast<analysis::Complex>(), kWidth - 40)});
       }
       out_ += '\n' + table.text();

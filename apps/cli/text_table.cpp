@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cfenv>
 #include <cmath>
 #include <cstdio>
 #include <utility>
@@ -66,6 +67,15 @@ std::string format_number(double value, int digits) {
   std::snprintf(buffer.data(), buffer.size(), "%#.*g", digits, value);
   std::string text = buffer.data();
   if (text.back() == '.') text.pop_back();
+  return text;
+}
+
+std::string format_bound(double bound) {
+  if (!std::isfinite(bound)) return "none";
+  const int rounding = std::fegetround();
+  std::fesetround(FE_UPWARD);
+  std::string text = format_number(bound, 2);
+  std::fesetround(rounding);
   return text;
 }
 

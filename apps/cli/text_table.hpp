@@ -25,6 +25,9 @@ class TextTable {
 /// `value` with so many significant digits; "-" if it is NaN.
 std::string format_number(double value, int digits);
 
+/// An upper bound with two significant digits, rounded up; "none" if it is infinite or NaN.
+std::string format_bound(double bound);
+
 /// Numbers of one column with as many decimals as give the largest so many significant digits; what
 /// rounds to zero is "0".
 std::vector<std::string> format_column(const std::vector<double>& values, int digits);

@@ -101,6 +101,17 @@ TEST(Validate, ChecksTheOptionalParts) {
   EXPECT_EQ(refusal(system), "damping_low: is 0 x 0, expected 3 x 3");
   system.damping_low = system.stiffness_low = MatrixXd::Zero(3, 3);
   EXPECT_EQ(refusal(system), "");
+  system.mass_error = MatrixXd::Zero(2, 3);
+  EXPECT_EQ(refusal(system), "mass_error: is 2 x 3, expected 3 x 3");
+  system.mass_error = MatrixXd::Constant(3, 3, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(refusal(system), "");
+  system.stiffness_error = system.damping_error = MatrixXd::Zero(3, 3);
+  system.stiffness_error(1, 2) = -1e-300;
+  EXPECT_EQ(refusal(system), "stiffness_error: entry (2,3) is negative or not a number");
+  system.damping_error(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(refusal(system), "damping_error: entry (1,1) is negative or not a number");
+  system.damping_error.resize(0, 0);
+  system.stiffness_error.resize(0, 0);
   system.stiffness_low(0, 1) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(refusal(system), "stiffness_low: entry (1,2) is not a finite number");
 }

@@ -117,7 +117,8 @@ TEST(ToJointSpace, OfJointSpaceMatricesTakesThemAsTheyAre) {
   const System<> system = to_joint_space(impedance);
   EXPECT_EQ(system.damping, *impedance.damping);
   EXPECT_EQ(system.stiffness, *impedance.stiffness);
-  EXPECT_FALSE(system.has_low_words);
+  EXPECT_TRUE(system.damping_low.isZero(0.0));
+  EXPECT_TRUE(system.stiffness_low.isZero(0.0));
 }
 
 TEST(ToJointSpace, AveragesRoundingInSymmetryAway) {

@@ -1,5 +1,6 @@
 // Which motions store no potential energy, and how safe that decision is.
 #include <dashpot/analysis/system/zero_modes.hpp>
+#include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>
@@ -121,8 +122,9 @@ TEST(ZeroModes, SeeThroughGradedMassesAndStiffnesses) {
   }
 }
 
-TEST(ZeroModes, FromTheStiffnessAloneAreAsExactAlongSoftMotionsAsAlongStiffOnes) {
+TEST(ZeroModes, OfAStiffnessThatIsGivenAreAsExactAlongSoftMotionsAsAlongStiffOnes) {
   // K = W'W exactly, of integers and powers of two: rows of W over six decades, masses over three.
+  // The factor that to_joint_space makes of it is rounded.
   const int n = 12, rank = 9;
   for (const std::uint64_t seed : {407u, 408u, 409u, 410u}) {
     Random random(seed);
@@ -141,13 +143,31 @@ TEST(ZeroModes, FromTheStiffnessAloneAreAsExactAlongSoftMotionsAsAlongStiffOnes)
     system.stiffness = W.transpose() * W;
     ASSERT_EQ(W.cast<long double>().transpose() * W.cast<long double>(),
               system.stiffness.cast<long double>());
-    const ZeroModes<> found = zero_modes_of(system);
-    ASSERT_EQ(found.count, n - rank);
-    for (int i = 0; i < rank; ++i) {
-      const double size = W.row(i).cwiseAbs().dot(found.basis.cwiseAbs().rowwise().maxCoeff());
-      EXPECT_LE((W.row(i) * found.basis).norm(), 1e-11 * size) << "row " << i + 1 << " of W";
+    TaskImpedance joints, task;
+    joints.mass = task.mass = system.mass;
+    joints.stiffness = task.task_stiffness = system.stiffness;
+    task.jacobian = MatrixXd::Identity(n, n);
+    for (const System<>& given : {system, to_joint_space(joints), to_joint_space(task)}) {
+      const ZeroModes<> found = zero_modes_of(given);
+      ASSERT_EQ(found.count, n - rank);
+      for (int i = 0; i < rank; ++i) {
+        const double size = W.row(i).cwiseAbs().dot(found.basis.cwiseAbs().rowwise().maxCoeff());
+        EXPECT_LE((W.row(i) * found.basis).norm(), 1e-12 * size) << "row " << i + 1 << " of W";
+      }
     }
   }
+}
+
+TEST(ZeroModes, OfAnExactFactorAreNotThoseOfTheRoundedStiffness) {
+  // W W' is graded over 2^20, and W'W does not fit into doubles.
+  Random random(411);
+  const MatrixXd W = VectorXd{{1, 0x1p-20}}.asDiagonal() * random.matrix(2, 3);
+  System<> system(3);
+  system.stiffness_factor = W;
+  system.stiffness = symmetrized(W.transpose() * W);
+  const ZeroModes<> found = zero_modes_of(system);
+  ASSERT_EQ(found.count, 1);
+  EXPECT_LE(std::abs(W.row(1).dot(found.basis.col(0))), 1e-8 * W.row(1).norm());
 }
 
 TEST(ZeroModes, KeepNegativeStiffness) {

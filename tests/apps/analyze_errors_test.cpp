@@ -8,10 +8,10 @@
 namespace dashpot::tests {
 namespace {
 
-using testing::EndsWith;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::StartsWith;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
 
 void expect_refused(const Outcome& outcome, const std::string& start, const std::string& reason) {
   EXPECT_EQ(outcome.status, 2);

@@ -1,5 +1,5 @@
 // The table that `dashpot analyze` prints for people, and the program's other manners.
-#include <dashpot/tests/apps/run_program.hpp>
+#include <dashpot/tests/apps/json_result.hpp>
 
 #include <gmock/gmock.h>
 
@@ -8,12 +8,12 @@
 namespace dashpot::tests {
 namespace {
 
-using testing::AllOf;
-using testing::ContainsRegex;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::Not;
-using testing::StartsWith;
+using ::testing::AllOf;
+using ::testing::ContainsRegex;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
 
 std::string table(const Outcome& outcome) {
   EXPECT_EQ(outcome.status, 0) << outcome.err;
@@ -140,6 +140,36 @@ TEST(Program, FailsIfItCannotWrite) {
   const Outcome outcome = run_program({"analyze", example("chain3.yaml")}, "", "/dev/full");
   EXPECT_EQ(outcome.status, 1);
   EXPECT_EQ(outcome.err, "dashpot analyze: cannot write to standard output\n");
+}
+
+/// The second number from the end of each line of an underdamped mode.
+std::vector<double> column_of_bounds(const std::string& text) {
+  std::vector<double> bounds;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.find("underdamped") == std::string::npos) continue;
+    std::istringstream words(line);
+    std::vector<std::string> all;
+    for (std::string word; words >> word;) all.push_back(word);
+    bounds.push_back(std::stod(all.at(all.size() - 2)));
+  }
+  return bounds;
+}
+
+TEST(AnalyzeTable, RoundsBoundsUp) {
+  std::string systems;
+  for (int i = 1; i <= 60; ++i) {
+    systems += "- {mass: [[2, 1], [1, 3]], damping: [[0.1, 0], [0, 0.2]], stiffness: [[" +
+               std::to_string(4 + i) + ", 1], [1, 7]]}\n";
+  }
+  const std::vector<double> printed = column_of_bounds(table(analyze_text(systems)));
+  const Json exact = analyze_json(systems);
+  ASSERT_EQ(printed.size(), 120u);
+  for (std::size_t i = 0; i < printed.size(); ++i) {
+    const double bound = exact[i / 2]["modes"][i % 2]["error_bound"];
+    EXPECT_GE(printed[i], bound);
+    EXPECT_LE(printed[i], 1.1 * bound);
+  }
 }
 
 }  // namespace

@@ -134,7 +134,7 @@ TEST(Analyze, ReportsTheDampingThatCouplesZeroModesAndVibrations) {
   const double root = -0.5698402909980532;
   expect_near({result["zero_mode_rates"]}, {{root}}, 1e-13);
   expect_near({of_modes(result, "natural_frequency")}, {{std::sqrt(-1 / root)}}, 1e-13);
-  EXPECT_THAT(result["notes"][0].get<std::string>(), testing::HasSubstr("couples"));
+  EXPECT_THAT(result["notes"][0].get<std::string>(), ::testing::HasSubstr("couples"));
 }
 
 TEST(Analyze, WritesNumbersSoThatTheyReadBackTheSame) {

@@ -75,10 +75,10 @@ INSTANTIATE_TEST_SUITE_P(
                  "joint_displacement: [0.02",
                  "scenario.start.joint_displacement: has 6 entries; a list of 7, or one number for "
                  "all, is wanted (line 21)"},
-        BadScene{"UnknownMethod", "panda", "method: rk4", "method: rk5",
-                 "simulation.integrator.method: semi_implicit_euler, rk4, velocity_verlet, "
-                 "modified_midpoint, cash_karp, dormand_prince, dormand_prince_8, "
-                 "implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 25)"},
+        BadScene{
+            "UnknownMethod", "panda", "method: rk4", "method: rk5",
+            "simulation.integrator.method: semi_implicit_euler, rk4, dormand_prince, "
+            "dormand_prince_8, implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 25)"},
         BadScene{"FaultThatDoesNothing", "ur5", "  steps:", "  faults: [{begin: 1 s}]\n  steps:",
                  "scenario.faults[1].begin: is of a fault that does nothing (line 21)"},
         BadScene{"FaultThatEndsFirst", "ur5",

@@ -36,7 +36,7 @@ TEST_P(EveryScene, RunsWithoutAnOverrunAndAccountsForItsEnergy) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          ::testing::Values("panda", "panda_release_c1", "panda_release_c2",
-                                           "panda_release_held", "iiwa14", "ur5", "baxter_left",
+                                           "panda_release_ratio_damping", "iiwa14", "ur5", "baxter_left",
                                            "chain3"));
 
 TEST(Scenes, AreAllTested) {
@@ -128,7 +128,7 @@ TEST(Run, ShowsTheReleasesOfThePaper) {
 }
 
 TEST(Run, HoldsADampingRatioWhereverTheArmIs) {
-  const Json result = run_json(scene("panda_release_held"), {"--duration", "2"});
+  const Json result = run_json(scene("panda_release_ratio_damping"), {"--duration", "2"});
   for (const char* when : {"start", "end"}) {
     ASSERT_EQ(result["modes"][when].size(), 6U);
     for (const Json& mode : result["modes"][when]) {

@@ -1,0 +1,153 @@
+// Damping of the null space, against 33 digits.
+#include <dashpot/analysis/null_damping.hpp>
+#include <dashpot/tests/support/quad_spectrum.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/systems.hpp>
+
+#include <gtest/gtest.h>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::Quad;
+using testing::QuadComplex;
+using testing::QuadMatrix;
+using testing::Random;
+
+QuadMatrix quad(const MatrixXd& A) {
+  QuadMatrix result(static_cast<std::size_t>(A.rows()),
+                    std::vector<QuadComplex>(static_cast<std::size_t>(A.cols())));
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    for (Eigen::Index j = 0; j < A.cols(); ++j) {
+      result[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] = testing::to_quad(A(i, j));
+    }
+  }
+  return result;
+}
+
+QuadMatrix times(const QuadMatrix& A, const QuadMatrix& B) {
+  QuadMatrix C(A.size(), std::vector<QuadComplex>(B[0].size()));
+  for (std::size_t i = 0; i < A.size(); ++i) {
+    for (std::size_t j = 0; j < B[0].size(); ++j) {
+      for (std::size_t k = 0; k < B.size(); ++k) C[i][j] = C[i][j] + A[i][k] * B[k][j];
+    }
+  }
+  return C;
+}
+
+QuadMatrix transposed(const QuadMatrix& A) {
+  QuadMatrix T(A[0].size(), std::vector<QuadComplex>(A.size()));
+  for (std::size_t i = 0; i < A.size(); ++i) {
+    for (std::size_t j = 0; j < A[0].size(); ++j) T[j][i] = A[i][j];
+  }
+  return T;
+}
+
+QuadMatrix inverse(QuadMatrix A) {
+  QuadMatrix B = quad(
+      MatrixXd::Identity(static_cast<Eigen::Index>(A.size()), static_cast<Eigen::Index>(A.size())));
+  testing::solve(A, B);
+  return B;
+}
+
+/// N' D N with N = I - M^-1 J' (J M^-1 J')^-1 J.
+QuadMatrix exact_null_space_damping(const MatrixXd& M, const MatrixXd& J, const MatrixXd& D) {
+  const QuadMatrix JT = transposed(quad(J)), MJ = times(inverse(quad(M)), JT);
+  const QuadMatrix held = times(times(MJ, inverse(times(quad(J), MJ))), quad(J));
+  QuadMatrix N = quad(MatrixXd::Identity(M.rows(), M.rows()));
+  for (std::size_t i = 0; i < N.size(); ++i) {
+    for (std::size_t j = 0; j < N.size(); ++j) N[i][j] = N[i][j] - held[i][j];
+  }
+  return times(times(transposed(N), quad(D)), N);
+}
+
+double worst_share(const QuadMatrix& exact, const NullSpaceDamping& found) {
+  double worst = 0;
+  for (Eigen::Index i = 0; i < found.damping.rows(); ++i) {
+    for (Eigen::Index j = 0; j < found.damping.cols(); ++j) {
+      const Quad truth = exact[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)].re;
+      const double error =
+          std::abs(static_cast<double>(truth - static_cast<Quad>(found.damping(i, j))));
+      if (error > 0) worst = std::max(worst, error / found.error(i, j));
+    }
+  }
+  return worst;
+}
+
+TEST(NullSpaceDamping, IsWithinItsError) {
+  Random random(2105);
+  double worst = 0;
+  int tight = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const int n = random.integer(2, 7), m = random.integer(1, n - 1);
+    VectorXd scale(n);
+    const double grade = trial % 2 == 0 ? 1 : 1e3;
+    for (double& s : scale) s = random.log_uniform(1 / grade, grade);
+    const MatrixXd M =
+        testing::symmetrized(scale.asDiagonal() * random.spd(n) * scale.asDiagonal());
+    const MatrixXd J = random.matrix(m, n);
+    VectorXd stiffness(m), D(n);
+    for (double& k : stiffness) k = random.log_uniform(1, 10 * grade);
+    for (double& d : D) d = random.uniform(0, 10);
+    const NullSpaceDamping found = null_space_damping(M, J, stiffness.asDiagonal(), D.asDiagonal());
+    const double share = worst_share(exact_null_space_damping(M, J, D.asDiagonal()), found);
+    EXPECT_LE(share, 1) << "n " << n << ", m " << m << ", trial " << trial;
+    worst = std::max(worst, share);
+    tight += found.error.norm() <= 1e-11 * found.damping.norm() ? 1 : 0;
+  }
+  EXPECT_GT(tight, 80);
+  EXPECT_GT(worst, 0.005);
+}
+
+TEST(NullSpaceDamping, CountsTheErrorOfTheMass) {
+  Random random(2106);
+  double worst = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const int n = random.integer(2, 5), m = random.integer(1, n - 1);
+    const MatrixXd M = random.spd(n), J = random.matrix(m, n);
+    const MatrixXd error = random.log_uniform(1e-12, 1e-6) * random.spd(n).cwiseAbs();
+    const MatrixXd D = random.vector(n).cwiseAbs().asDiagonal();
+    MatrixXd truth = M;
+    for (Eigen::Index j = 0; j < n; ++j) {
+      for (Eigen::Index i = 0; i <= j; ++i) {
+        truth(i, j) += (random.integer(0, 1) == 0 ? 0.999 : -0.999) * error(i, j);
+        truth(j, i) = truth(i, j);
+      }
+    }
+    const NullSpaceDamping found = null_space_damping(M, J, MatrixXd::Identity(m, m), D, error);
+    if (!found.error.allFinite()) continue;
+    const double share = worst_share(exact_null_space_damping(truth, J, D), found);
+    EXPECT_LE(share, 1);
+    worst = std::max(worst, share);
+  }
+  EXPECT_GT(worst, 1e-6);
+}
+
+TEST(NullSpaceDamping, TakesRoundedZerosOfTheSpringsForZeros) {
+  // K_C has one direction, whose matrix is rounded: that of the others was held too, by springs of
+  // 1e-8 of its stiffness.
+  Random random(2107);
+  for (int trial = 0; trial < 50; ++trial) {
+    const VectorXd direction = random.vector(3);
+    const MatrixXd K_C = 1e3 * direction * direction.transpose();
+    const MatrixXd M = random.spd(4), J = random.matrix(3, 4), D = MatrixXd::Identity(4, 4);
+    const NullSpaceDamping found = null_space_damping(M, J, K_C, D);
+    const MatrixXd one = direction.transpose() * J;
+    const double share = worst_share(exact_null_space_damping(M, one, D), found);
+    EXPECT_LE(share, 1);
+    EXPECT_LE(found.error.norm(), 1e-9 * found.damping.norm());
+  }
+}
+
+TEST(NullSpaceDamping, HasNoBoundWhereSpringsNearlyVanish) {
+  MatrixXd J(2, 3);
+  J << 1, 0, 0, 1, 1.7e-15, 0;  // is the second joint held?
+  const NullSpaceDamping found = null_space_damping(
+      MatrixXd::Identity(3, 3), J, MatrixXd::Identity(2, 2), MatrixXd::Identity(3, 3));
+  EXPECT_FALSE(found.error.allFinite());
+}
+
+}  // namespace
+}  // namespace dashpot::analysis

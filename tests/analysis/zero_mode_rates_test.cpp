@@ -1,0 +1,102 @@
+// The rates at which velocities along zero modes decay lie within their bounds.
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/task_space.hpp>
+#include <dashpot/tests/support/quad_spectrum.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/systems.hpp>
+
+#include <gtest/gtest.h>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using testing::Quad;
+using testing::QuadComplex;
+using testing::Random;
+
+/// Masses in a row, springs between them: the zero mode is (1, ..., 1).
+System<> free_chain(Random& random, int n) {
+  System<> chain(n);
+  for (int i = 0; i < n; ++i) chain.mass(i, i) = random.integer(1, 9);
+  for (int i = 0; i + 1 < n; ++i) {
+    const double k = random.integer(1, 1 << 20);
+    chain.stiffness.block<2, 2>(i, i) += (Eigen::Matrix2d() << k, -k, -k, k).finished();
+  }
+  return chain;
+}
+
+TEST(ZeroModeRates, OfDampingThatLeavesThemAloneAreWithinTheirBounds) {
+  Random random(2201);
+  for (const auto residual :
+       {SpectrumOptions::Residual::kWorking, SpectrumOptions::Residual::kExtended}) {
+    double largest = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+      System<> chain = free_chain(random, random.integer(1, 6));
+      // Proportional to the mass: every motion of the chain as a whole decays at this rate.
+      const double rate = std::ldexp(random.integer(1, 1 << 20), random.integer(-30, 0));
+      chain.damping = rate * chain.mass;
+      SpectrumOptions options;
+      options.residual = residual;
+      const Spectrum<> spectrum = analyze(chain, options);
+      ASSERT_EQ(spectrum.zero_modes.count, 1);
+      const double bound = spectrum.zero_mode_rates_bound[0];
+      const double error = std::abs(spectrum.zero_mode_rates[0] + rate);
+      EXPECT_LE(error, bound) << "trial " << trial;
+      largest = std::max(largest, error / bound);
+    }
+    EXPECT_GT(largest, residual == SpectrumOptions::Residual::kWorking ? 1e-6 : 1e-3);
+  }
+}
+
+TEST(ZeroModeRates, OfDampingThatCouplesThemAreWithinTheirBounds) {
+  Random random(2202);
+  double largest = 0;
+  int real = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const int n = random.integer(2, 5);
+    System<> chain = free_chain(random, n);
+    chain.damping(0, 0) = random.log_uniform(1e-3, 1e2);
+    const Spectrum<> spectrum = analyze(chain);
+    ASSERT_EQ(spectrum.zero_modes.count, 1);
+    if (std::isnan(spectrum.zero_mode_rates[0])) continue;
+    ++real;
+    std::vector<QuadComplex> all = {{Quad(spectrum.zero_mode_rates[0]), 0}, {Quad(0), Quad(1e-30)}};
+    for (const Mode<>& mode : spectrum.modes) {
+      for (const Complex& value : mode.eigenvalues) all.push_back(testing::to_quad(value));
+    }
+    const QuadComplex truth = testing::refine_eigenvalues(chain, all)[0];
+    const auto error = static_cast<double>(std::sqrt(
+        static_cast<double>((truth - QuadComplex{Quad(spectrum.zero_mode_rates[0]), 0}).norm())));
+    EXPECT_LE(error, spectrum.zero_mode_rates_bound[0]) << "trial " << trial;
+    largest = std::max(largest, error / spectrum.zero_mode_rates_bound[0]);
+  }
+  EXPECT_GT(real, 50);
+  EXPECT_GT(largest, 1e-6);
+}
+
+TEST(ZeroModeRates, CountWhatTheStiffnessLacks) {
+  // k instead of 0 makes -a of the rate -a +- sqrt(a^2 - 4 k)) / 2, or a frequency where a = 0.
+  for (const double a : {0.0, 1e-3, 1.0}) {
+    System<> joint(1);
+    joint.damping(0, 0) = a;
+    joint.stiffness_error = MatrixXd::Constant(1, 1, 1e-10);
+    const Spectrum<> spectrum = analyze(joint);
+    ASSERT_EQ(spectrum.zero_modes.count, 1);
+    const std::complex<double> root = std::sqrt(std::complex<double>(a * a / 4 - 1e-10));
+    EXPECT_LE(std::abs(-a / 2 - root - spectrum.zero_mode_rates[0]),
+              spectrum.zero_mode_rates_bound[0])
+        << a;
+    EXPECT_LE(spectrum.zero_mode_rates_bound[0], a == 0 ? 1e-4 : 1e-8 / a) << a;
+  }
+}
+
+TEST(ZeroModeRates, ThatAreNotRealHaveNoBound) {
+  System<> system(2);
+  system.damping << 1, 1, -1, 1;
+  const Spectrum<> spectrum = analyze(system);
+  for (const double bound : spectrum.zero_mode_rates_bound) EXPECT_EQ(bound, testing::kInfinity);
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
