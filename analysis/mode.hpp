@@ -30,23 +30,8 @@ enum class SpectrumOrigin {
   kDirect,   ///< solved directly
 };
 
-/// The numbers that follow from a mode's two eigenvalues; Mode has the same.
+/// The numbers that follow from a mode's two eigenvalues.
 struct ModeNumbers {
-  /// A complex pair (positive imaginary part first) or two real ones (nearer zero first), 1/s
-  std::array<Complex, 2> eigenvalues{};
-  double natural_frequency = 0;  ///< rad/s; NaN if the eigenvalues' product is negative
-  double damping_ratio = 0;
-  double damped_frequency = 0;  ///< rad/s
-  ModeKind kind = ModeKind::kUnderdamped;
-  /// Proved bounds of |computed - true|; infinite if none could be proved
-  double error_bound = std::numeric_limits<double>::infinity();  ///< of either eigenvalue, 1/s
-  double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
-  double damping_ratio_bound = std::numeric_limits<double>::infinity();
-};
-
-/// One vibration mode: a pair of eigenvalues of  (lambda^2 M + lambda C + K) u = 0.
-template <int N = kDynamic>
-struct Mode {
   /// A complex pair (positive imaginary part first) or two real ones (slower, nearer zero, first),
   /// 1/s
   std::array<Complex, 2> eigenvalues{};
@@ -57,6 +42,18 @@ struct Mode {
   /// Imaginary part of the first eigenvalue, rad/s; zero if real
   double damped_frequency = 0;
   ModeKind kind = ModeKind::kUnderdamped;
+  /// Proved bounds of |computed - true|; infinite if none could be proved. They are also infinite
+  /// where frequencies leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120, because underflow is
+  /// not counted there.
+  /// Of either eigenvalue, 1/s (of the computed and the true one nearest each other):
+  double error_bound = std::numeric_limits<double>::infinity();
+  double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
+  double damping_ratio_bound = std::numeric_limits<double>::infinity();
+};
+
+/// One vibration mode: a pair of eigenvalues of  (lambda^2 M + lambda C + K) u = 0.
+template <int N = kDynamic>
+struct Mode : ModeNumbers {
   /// Right eigenvectors u of the two eigenvalues in joint coordinates, n each, u^H M u = 1, largest
   /// entry real and positive. At critical damping both are the only eigenvector.
   std::array<ComplexVector<N>, 2> shapes;
@@ -69,13 +66,8 @@ struct Mode {
   /// Condition number of the worse eigenvalue in the same measure (Tisseur 2000); infinite at
   /// critical damping
   double condition = 0;
-  /// Proved bounds of |computed - true|; infinite if none could be proved. They are also infinite
-  /// where frequencies leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120, because underflow is
-  /// not counted there.
-  /// Of either eigenvalue, 1/s (of the computed and the true one nearest each other):
-  double error_bound = std::numeric_limits<double>::infinity();
-  double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
-  double damping_ratio_bound = std::numeric_limits<double>::infinity();
+  /// Columns of ModalBasis::U that span the mode's plane; equal if it shares a larger block.
+  std::array<int, 2> columns{};
 };
 
 /// A list of at most N modes that allocates only when N is kDynamic.

@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/tracked_spectrum.hpp>
-#include <dashpot/analysis/tracker/step_prediction.hpp>
+#include <dashpot/analysis/tracker/basis_extrapolation.hpp>
 #include <dashpot/analysis/tracker/tracked_enclosure.hpp>
 
 #include <cstdint>
@@ -16,36 +16,15 @@ struct TrackerOptions {
   double target_bound = 1e-10;
   /// Largest number of evaluations of the basis in one update, before the direct solver is called.
   int max_iterations = 6;
-  /// Relative change of the coefficients up to which the last spectrum is used again, with bounds
-  /// that include the change: see distance() in coefficient_sizes.hpp. Negative: never.
-  double reuse_tolerance = 1e-14;
   bool shapes = true;  ///< fill TrackedSpectrum::shapes
 };
 
-/// Why the direct solver was called.
-enum class Fallback {
-  kStart,         ///< nothing to start from: the first call, other sizes, after a failure
-  kNotSymmetric,  ///< damping or stiffness is not symmetric: always solved directly
-  kNotConverged,  ///< max_iterations did not reach the target: a jump
-  kCoincidence,   ///< modes that could not be told apart
-};
-inline constexpr std::size_t kFallbackCount = 4;
-
+/// Numbers of updates by how they ended, and what they took.
 struct TrackerCounters {
-  std::int64_t updates = 0;
-  /// These counts add up to `updates`.
   std::int64_t tracked = 0, reused = 0, direct = 0, failed = 0, unfinished = 0;
-  std::array<std::int64_t, kFallbackCount> fallbacks{};  ///< calls of the direct solver
-  /// Tracked updates with damping that the undamped modes decouple, so that elastic coordinates and
-  /// velocities are followed separately.
-  std::int64_t proportional = 0;
-  std::int64_t iterations = 0;   ///< evaluations of the basis, in total
-  int most_iterations = 0;       ///< in one update
-  std::int64_t separations = 0;  ///< pairs of blocks that were separated
-  std::int64_t predicted = 0;    ///< updates that began with an extrapolated basis
-  std::int64_t shapes_skipped = 0;
+  std::int64_t iterations = 0;  ///< evaluations of the basis, in total
 
-  std::int64_t of(Fallback reason) const { return fallbacks[static_cast<std::size_t>(reason)]; }
+  std::int64_t updates() const { return tracked + reused + direct + failed + unfinished; }
 };
 
 /// Follows the damped spectrum of a system that changes little from call to call, such as an arm
@@ -59,7 +38,8 @@ struct TrackerCounters {
 ///
 /// Newton's method refines the basis of the last call. Every number is published with a bound that
 /// holds for the coefficients as given, rounding errors included. A system that cannot be followed
-/// is solved directly (SpectrumSolver), in bounded time.
+/// is solved directly (SpectrumSolver), in bounded time. A system that equals the last one to the
+/// last bit has the modes of the last one, which are published again.
 class ModeTracker {
  public:
   /// Throws std::invalid_argument for a negative soft_frequency, and for a target_bound or
@@ -81,64 +61,58 @@ class ModeTracker {
   Status update(const System<kMaxDof>& system, TrackedSpectrum& out, Work& work) noexcept;
 
   /// Makes the next update start from scratch. Modes that it recognises keep their indices.
-  void reset() noexcept { has_basis_ = false; }
+  void reset() noexcept {
+    if (state_ != State::kEmpty) state_ = State::kMatching;
+  }
   /// Forgets everything but the counters: the next update is like the first.
   void forget() noexcept {
-    has_basis_ = has_indices_ = false;
+    state_ = State::kEmpty;
     soft_ = {};
     enclosure_.roundoff_bound = 0;
     epoch_ = 0;
-    look_in_ = 0;
   }
 
   /// True if the next update starts from the last one and need not be solved directly.
-  bool follows() const noexcept { return has_basis_; }
+  bool follows() const noexcept { return state_ >= State::kFollowing; }
   const TrackerCounters& counters() const noexcept { return counters_; }
 
  private:
-  bool reuse(const SymmetricPencil& pencil, double change, TrackedSpectrum& out) noexcept;
-  bool follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Fallback& reason,
-              Work& work) noexcept;
-  bool refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Fallback& reason,
-              Work& work) noexcept;
+  /// What the basis serves for.
+  enum class State {
+    kEmpty,      ///< there is none
+    kMatching,   ///< its columns say which mode has which index
+    kFollowing,  ///< and Newton's method starts from it
+    kCurrent,    ///< and it is the solution for last_, as E_ and enclosure_ are
+    kKept,       ///< and kept_ is its spectrum
+  };
+
+  bool follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
+  bool refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
   bool separate(const CloseBlocks& close, Work& work) noexcept;
-  bool publish(const SymmetricPencil& pencil, double distance, double target, bool fresh,
-               TrackedSpectrum& out) noexcept;
-  Status solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil,
-                        Fallback reason, TrackedSpectrum& out, Work& work) noexcept;
-  Status give_up(TrackedSpectrum& out) noexcept;
+  void publish(const SymmetricPencil& pencil, SpectrumOrigin origin, TrackedSpectrum& out) noexcept;
+  void solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil, bool symmetric,
+                      TrackedSpectrum& out, Work& work) noexcept;
   bool restart(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
   void publish_direct(const SymmetricPencil& pencil, bool symmetric, TrackedSpectrum& out) noexcept;
+  std::array<int, kMaxDof> match(const SymmetricPencil& pencil,
+                                 const BlockEigenbasis& before) noexcept;
 
   TrackerOptions options_;
   TrackerCounters counters_;
 
-  // The last spectrum: the basis as it was evaluated, and the step that is still to be taken.
-  bool has_basis_ = false;
-  bool evaluated_ = false;    ///< blocks and residual belong to the basis and to last_
-  bool has_indices_ = false;  ///< the columns of basis_ say which mode has which index
+  State state_ = State::kEmpty;
   std::uint64_t epoch_ = 0;
   System<kMaxDof> last_;
-  CoefficientSizes sizes_;
   BlockEigenbasis basis_;
+  PackedMatrix E_;  ///< the last step of basis_, which its blocks do not know of
   TrackedResidual residual_;
   TrackedEnclosure enclosure_;
-  PackedMatrix E_;
   std::array<bool, kMaxDof> soft_{};
-  double bound_ = 0;      ///< largest relative error bound of the last spectrum
-  TrackedSpectrum kept_;  ///< the last spectrum with bounds that hold for changes up to kept_for_,
-  double kept_for_ = -1;  ///< see distance(); none if negative
-
-  PackedMatrix step_;  ///< the whole step of this update so far
-  StepPrediction prediction_;
-  bool turned_ = false;  ///< columns were rotated or separated, so the step tells nothing
-  int look_in_ = 0;      ///< updates until proportional damping is looked for
-
-  PackedMatrix velocities_, work_;
-  System<kMaxDof> direct_;
+  BasisExtrapolation extrapolation_;
+  PackedMatrix momenta_;
+  TrackedSpectrum kept_;
   SpectrumSolver<kMaxDof> solver_;
   Spectrum<kMaxDof> spectrum_;
-  BlockEigenbasis before_;  ///< the basis of the last update
 };
 
 }  // namespace dashpot::analysis

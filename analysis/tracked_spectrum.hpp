@@ -20,7 +20,9 @@ struct TrackedShapes {
 };
 
 struct TrackedSpectrum {
-  Status status = Status::kNotConverged;  ///< kUncertified: some bound is infinite
+  /// kUncertified: some error_bound is infinite. The bounds of a mode's frequency and ratio are
+  /// infinite without that where an eigenvalue cannot be told from zero.
+  Status status = Status::kNotConverged;
   SpectrumOrigin origin = SpectrumOrigin::kDirect;
   int mode_count = 0;
   /// Index i denotes the same physical mode in successive updates while `epoch` is unchanged.

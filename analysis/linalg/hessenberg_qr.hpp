@@ -3,6 +3,7 @@
 #include <dashpot/analysis/work.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -66,6 +67,16 @@ inline void eigenvalues_2x2(double a, double b, double c, double d, Complex& fir
     first = Complex(d + half_difference, root);
     second = std::conj(first);
   }
+}
+
+/// Returns an eigenvector of [a b; c d], from the row of [a b; c d] - value that says more.
+inline std::array<Complex, 2> eigenvector_2x2(double a, double b, double c, double d,
+                                              const Complex& value) noexcept {
+  const Complex p = a - value, s = d - value;
+  const bool upper = std::norm(p) + b * b >= std::norm(s) + c * c;
+  const std::array<Complex, 2> w =
+      upper ? std::array<Complex, 2>{b, -p} : std::array{-s, Complex(c)};
+  return w[0] == 0.0 && w[1] == 0.0 ? std::array<Complex, 2>{1, 0} : w;
 }
 
 /// Computes the eigenvalues of an upper Hessenberg matrix by the implicit double-shift QR iteration

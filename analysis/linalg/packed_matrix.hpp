@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <cmath>
 #include <cstring>
 
 namespace dashpot::analysis {
@@ -19,6 +20,14 @@ inline void store(double* to, const Vec4d& lanes) noexcept {
 
 inline Vec4d magnitude(const Vec4d& x) noexcept {
   return x < Vec4d{} ? -x : x;
+}
+
+inline double square_root(double x) noexcept {
+  return std::sqrt(x);
+}
+inline Vec4d square_root(Vec4d x) noexcept {
+  for (int lane = 0; lane < 4; ++lane) x[lane] = std::sqrt(x[lane]);
+  return x;
 }
 
 inline double sum(const Vec4d& x) noexcept {
@@ -42,8 +51,8 @@ struct PackedMatrix {
 
 /// Sets X(i, j) = 0 in `rows` rows of this width.
 void set_zero(int width, int rows, PackedMatrix& X) noexcept;
-/// Adds Y, of `rows` rows, to X.
-void add(const PackedMatrix& Y, int rows, PackedMatrix& X) noexcept;
+/// Copies X, of `rows` rows.
+void copy(const PackedMatrix& X, int rows, PackedMatrix& out) noexcept;
 
 /// A matrix whose entry (i, k) is data[i * row_step + k * column_step].
 struct Strided {

@@ -10,8 +10,8 @@ namespace dashpot::analysis {
 /// which the lower triangle is read. A pivot that cannot be told from zero ends its column; the
 /// rest of the column then has to be zero too. Returns false, with F incomplete, unless K is
 /// semidefinite to rounding.
-template <class Matrix>
-bool semidefinite_cholesky(const Matrix& K, Matrix& F) noexcept {
+template <class Symmetric, class Matrix>
+bool semidefinite_cholesky(const Symmetric& K, Matrix& F) noexcept {
   const Eigen::Index n = K.rows();
   F.setZero(n, n);
   for (Eigen::Index j = 0; j < n; ++j) {

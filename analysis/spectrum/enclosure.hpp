@@ -1,5 +1,10 @@
 #pragma once
+#include <dashpot/analysis/spectrum/mode_numbers.hpp>
 #include <dashpot/analysis/spectrum/refinement.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace dashpot::analysis {
 
@@ -15,16 +20,85 @@ struct BlockEnclosure {
   /// For each block: its group, named by the index of one of its blocks. Blocks that cannot be
   /// separated from each other form a group and share a radius.
   Eigen::Matrix<int, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1> group;
+
+  /// Makes each of `count` blocks a group of which nothing is proved.
+  void reset(int count) {
+    radius.setConstant(count, std::numeric_limits<double>::infinity());
+    group.resize(count);
+    for (int i = 0; i < count; ++i) group[i] = i;
+  }
+  /// True if the block is a group by itself.
+  bool alone(int block) const { return (group.array() == group[block]).count() == 1; }
 };
 
-/// Adds the diagonal blocks of F to Lambda, and bounds the remaining error.
+/// What is known of the perturbation F of a block-diagonal matrix Lambda. Matrices have a row and a
+/// column for each block. Frobenius norms belong to columns scaled as the caller likes, 1/s.
+template <class Matrix, class Vector>
+struct PerturbationBounds {
+  const Matrix& coupling2;   ///< off the diagonal: bounds of the squared norms of blocks of F
+  const Matrix& separation;  ///< off the diagonal: lower bounds of sep(Lambda_i, Lambda_j)
+  const Vector& own;         ///< bounds of the norms of the diagonal blocks of F
+};
+
+/// Finds the radius of each block, in an enclosure that was reset.
 ///
 /// Stewart (SIAM Review 15(4), 1973): a matrix [A11+E11 E12; E21 A22+E22] with
 /// delta = sep(A11, A22) - |E11| - |E22| > 0 and 4 |E12| |E21| < delta^2 has an invariant subspace
 /// on which it acts as A11 + E11 + E12 P with |P| <= 2 |E21| / delta. Here A11 is a block, or a
-/// group of blocks with close eigenvalues, and the E are |F| + F_error, in columns scaled to unit
-/// weight. The condition then holds for every t E, 0 <= t <= 1, too. As t grows, the eigenvalues of
-/// a group never meet the other eigenvalues, and so no eigenvalue counts for two groups.
+/// group of blocks with close eigenvalues, and the E are parts of F. The condition then holds for
+/// every t E, 0 <= t <= 1, too. As t grows, the eigenvalues of a group never meet the other
+/// eigenvalues, and so no eigenvalue counts for two groups.
+template <int N, class Matrix, class Vector>
+void prove(const PerturbationBounds<Matrix, Vector>& bounds,
+           BlockEnclosure<N>& enclosure) noexcept {
+  constexpr double kSlack = 1 + 1e-10;  // for rounding errors of the bounds themselves
+  const auto count = static_cast<int>(enclosure.group.size());
+  double everything2 = 0, largest = 0;  // F as a whole stands for E22
+  for (int i = 0; i < count; ++i) {
+    largest = std::max(largest, bounds.own[i]);
+    for (int j = 0; j < count; ++j) everything2 += i == j ? 0 : bounds.coupling2(i, j);
+  }
+  const double everything = kSlack * (std::sqrt(everything2) + largest);
+  for (int i = 0; i < count; ++i) {
+    for (bool proved = enclosure.group[i] != i; !proved;) {
+      double own = 0, inner2 = 0, right2 = 0, left2 = 0;
+      double separation = std::numeric_limits<double>::infinity();
+      int nearest = -1;
+      for (int j = 0; j < count; ++j) {
+        if (enclosure.group[j] != i) continue;
+        own = std::max(own, bounds.own[j]);
+        for (int k = 0; k < count; ++k) {
+          if (k == j) continue;
+          if (enclosure.group[k] == i) {
+            inner2 += bounds.coupling2(j, k);
+            continue;
+          }
+          right2 += bounds.coupling2(j, k);
+          left2 += bounds.coupling2(k, j);
+          const double apart = std::max(0.0, bounds.separation(j, k));  // 0 if not a number
+          if (apart < separation || nearest < 0) separation = apart, nearest = k;
+        }
+      }
+      const double inner = kSlack * (own + std::sqrt(inner2));
+      const double product = std::sqrt(right2) * std::sqrt(left2);
+      const double delta = separation - inner - everything;
+      if (nearest < 0 || (delta > 0 && 4 * kSlack * product < delta * delta)) {
+        const double radius = nearest < 0 ? inner : kSlack * (inner + 2 * product / delta);
+        for (int j = 0; j < count; ++j) {
+          if (enclosure.group[j] == i && radius >= 0) enclosure.radius[j] = radius;
+        }
+        proved = true;
+        continue;
+      }
+      const int absorbed = enclosure.group[nearest];
+      for (int j = 0; j < count; ++j) {
+        if (enclosure.group[j] == absorbed) enclosure.group[j] = i;
+      }
+    }
+  }
+}
+
+/// Adds the diagonal blocks of F to Lambda, and bounds the remaining error.
 template <int N>
 void enclose(const BasisResidual<N>& residual, ModalBasis<N>& basis,
              BlockEnclosure<N>& enclosure) noexcept;
@@ -35,5 +109,43 @@ void enclose(const BasisResidual<N>& residual, ModalBasis<N>& basis,
 /// norm.
 double disc_radius(const Complex* eigenvalues, int count, int which, double block_norm,
                    double radius) noexcept;
+
+/// An eigenvalue of a block.
+struct BlockRoot : Root {
+  int block = 0;
+  double radius = 0;  ///< of its disc, 1/s
+  int united = 0;     ///< a root whose disc is in the same union
+};
+
+/// Sets the bound of each of `count` roots. Where discs of one group meet, all that is known is how
+/// many eigenvalues their union holds: the bound is then the distance of the farthest point of the
+/// union. `groups` holds the group of each block.
+template <class BlockRoots, class Groups>
+void bound_roots(BlockRoots* roots, int count, const Groups& groups) noexcept {
+  bool any = false;
+  for (int i = 0; i < count; ++i) {
+    BlockRoot& root = roots[i];
+    root.united = i;
+    root.bound = root.radius;
+    for (int j = 0; j < i; ++j) {
+      const BlockRoot& other = roots[j];
+      if (groups[root.block] != groups[other.block] || root.united == other.united) continue;
+      if (modulus(root.value - other.value) > root.radius + other.radius) continue;
+      any = true;
+      const int from = root.united, to = other.united;
+      for (int k = 0; k <= i; ++k) {
+        if (roots[k].united == from) roots[k].united = to;
+      }
+    }
+  }
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; any && j < count; ++j) {
+      if (roots[i].united != roots[j].united) continue;
+      const double farthest = modulus(roots[i].value - roots[j].value) + roots[j].radius;
+      roots[i].bound = std::max(roots[i].bound, farthest);
+    }
+    roots[i].bound += std::numeric_limits<double>::epsilon() * modulus(roots[i].value);
+  }
+}
 
 }  // namespace dashpot::analysis

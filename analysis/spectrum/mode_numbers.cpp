@@ -95,4 +95,11 @@ ModeNumbers mode_numbers(const Root& first, const Root& second, const Invariants
   return mode;
 }
 
+double relative_bound(const ModeNumbers& mode) noexcept {
+  const double size = modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]);
+  const double bound =
+      mode.kind == ModeKind::kCritical ? mode.natural_frequency_bound : mode.error_bound;
+  return std::isfinite(bound) ? bound / size : kInfinity;
+}
+
 }  // namespace dashpot::analysis

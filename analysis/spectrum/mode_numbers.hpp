@@ -34,4 +34,8 @@ Invariants root_invariants(const Root& a, const Root& b) noexcept;
 ModeNumbers mode_numbers(const Root& first, const Root& second, const Invariants& invariants,
                          double soft_frequency) noexcept;
 
+/// Returns error bound / (|lambda_1| + |lambda_2|), infinite if there is none. At critical damping
+/// it is the bound of the frequency, because eigenvalues are worth half the digits there.
+double relative_bound(const ModeNumbers& mode) noexcept;
+
 }  // namespace dashpot::analysis

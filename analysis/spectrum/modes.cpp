@@ -14,9 +14,7 @@ constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-/// One eigenvalue of a block, with what is proved about it.
-struct BlockRoot : Root {
-  int block = 0;
+struct PairedRoot : BlockRoot {
   int partner = -1;   ///< index of the other root of its mode
   bool used = false;  ///< of a zero mode
 };
@@ -38,25 +36,22 @@ class ModeExtractor {
 
   void read() {
     list_roots();
-    bound_roots();
+    bound_roots(roots_.data(), root_count_, enclosure_.group);
     take_zero_rates();
     pair_roots();
     write_modes();
   }
 
  private:
-  BlockRoot& root(int i) { return roots_[static_cast<std::size_t>(i)]; }
-  const BlockRoot& root(int i) const { return roots_[static_cast<std::size_t>(i)]; }
-  bool alone(int block) const;
+  PairedRoot& root(int i) { return roots_[static_cast<std::size_t>(i)]; }
+  const PairedRoot& root(int i) const { return roots_[static_cast<std::size_t>(i)]; }
 
   void list_roots();
-  void bound_roots();
   void take_zero_rates();
   void pair_roots();
   void write_modes();
 
   Invariants invariants(int i, int j) const;
-  void write_numbers(int i, int j, Mode<N>& mode) const;
   void write_shapes(int i, int j, Mode<N>& mode) const;
   ComplexVector<N> shape(int i, bool left, StateVector<N>& re, StateVector<N>& im) const;
 
@@ -66,21 +61,11 @@ class ModeExtractor {
   const ModalBasis<N>& basis_;
   Spectrum<N>& spectrum_;
   double soft_frequency_, M_norm_, C_norm_, K_norm_;
-  std::conditional_t<N == kDynamic, std::vector<BlockRoot>,
-                     std::array<BlockRoot, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
+  std::conditional_t<N == kDynamic, std::vector<PairedRoot>,
+                     std::array<PairedRoot, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
       roots_;
   int root_count_ = 0;
 };
-
-/// Whether the enclosure speaks of this block by itself.
-template <int N>
-bool ModeExtractor<N>::alone(int block) const {
-  int members = 0;
-  for (int k = 0; k < basis_.blocks.size(); ++k) {
-    if (enclosure_.group[k] == enclosure_.group[block]) ++members;
-  }
-  return members == 1;
-}
 
 template <int N>
 void ModeExtractor<N>::list_roots() {
@@ -99,62 +84,37 @@ void ModeExtractor<N>::list_roots() {
       reduce_to_hessenberg(H);
       if (!hessenberg_eigenvalues(H, values.data())) values.setConstant(kNan);
     }
-    // Backward error of the block's own QR iteration, generously.
-    const double radius =
-        enclosure_.radius[k] + (b.size > 2 ? 64 * b.size : 8) * b.size * kUnit * Lambda.norm();
+    // Backward error of the block's own QR iteration, generously. Those of zero modes are
+    // triangular.
+    const double factor = b.zero_mode ? 0 : b.size > 2 ? 64 * b.size : 8;
+    const double radius = enclosure_.radius[k] + factor * b.size * kUnit * Lambda.norm();
     for (int e = 0; e < b.size; ++e) {
-      BlockRoot& r = root(root_count_++);
-      r = BlockRoot{};
+      PairedRoot& r = root(root_count_++);
+      r = PairedRoot{};
       r.value = values[e];
       r.block = k;
       r.used = b.zero_mode;  // of no mode, but its disc may hold the eigenvalue of another
-      r.bound = disc_radius(values.data(), b.size, e, Lambda.norm(), radius);
+      r.radius = disc_radius(values.data(), b.size, e, Lambda.norm(), radius);
     }
   }
-}
-
-/// Where discs of one group meet, all that is known is how many eigenvalues their union holds.
-template <int N>
-void ModeExtractor<N>::bound_roots() {
-  StateVector<N> total(root_count_);
-  const auto meet = [&](int j, int k) {
-    return enclosure_.group[root(j).block] == enclosure_.group[root(k).block] &&
-           modulus(root(j).value - root(k).value) <= root(j).bound + root(k).bound;
-  };
-  for (int i = 0; i < root_count_; ++i) {
-    // Grow the set of discs that hang together with disc i; each of it is looked at once.
-    using Indices = Eigen::Matrix<int, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1>;
-    Indices inside = Indices::Zero(root_count_), set(root_count_);
-    int size = 0;
-    inside[i] = 1;
-    set[size++] = i;
-    for (int next = 0; next < size; ++next) {
-      for (int j = 0; j < root_count_; ++j) {
-        if (inside[j] != 0 || !meet(j, set[next])) continue;
-        inside[j] = 1;
-        set[size++] = j;
-      }
-    }
-    total[i] = root(i).bound;
-    if (size == 1) continue;
-    total[i] = 0;
-    for (int j = 0; j < root_count_; ++j) {
-      if (inside[j] != 0) total[i] += 2 * root(j).bound;
-    }
-  }
-  for (int i = 0; i < root_count_; ++i)
-    root(i).bound = total[i] + 2 * kUnit * modulus(root(i).value);
 }
 
 template <int N>
 void ModeExtractor<N>::take_zero_rates() {
   const int r = spectrum_.zero_modes.count;
   spectrum_.zero_mode_rates = Vector<N>::Zero(r);
+  spectrum_.zero_mode_rates_bound = Vector<N>::Constant(r, kInfinity);
   int found = 0;
-  for (const Block& b : basis_.blocks) {
-    if (b.zero_mode && b.size == 2 && found < r) {
-      spectrum_.zero_mode_rates[found++] = basis_.Lambda(b.first + 1, b.first + 1);
-    }
+  for (int i = 0; i + 1 < root_count_ && found < r; ++i) {
+    const Block& b = basis_.blocks[root(i).block];
+    if (!b.zero_mode || b.size != 2) continue;
+    // Of the block's two eigenvalues, 0 and the rate, the one that is nearer to the rate.
+    const double rate = basis_.Lambda(b.first + 1, b.first + 1);
+    const double away = modulus(root(i).value - rate), next = modulus(root(i + 1).value - rate);
+    spectrum_.zero_mode_rates[found] = rate;
+    spectrum_.zero_mode_rates_bound[found++] =
+        next < away ? root(i + 1).bound + next : root(i).bound + away;
+    ++i;
   }
   // The rest are real eigenvalues whose motion is mostly along the zero modes.
   for (; found < r; ++found) {
@@ -179,6 +139,7 @@ void ModeExtractor<N>::take_zero_rates() {
     }
     root(chosen).used = true;
     spectrum_.zero_mode_rates[found] = root(chosen).value.real();
+    spectrum_.zero_mode_rates_bound[found] = root(chosen).bound;
   }
 }
 
@@ -239,26 +200,13 @@ Invariants ModeExtractor<N>::invariants(int i, int j) const {
     const auto L = basis_.Lambda.block(block.first, block.first, 2, 2);
     const Invariants of_block =
         block_invariants(L(0, 0), L(0, 1), L(1, 0), L(1, 1), enclosure_.radius[root(i).block]);
-    if (alone(root(i).block)) return of_block;
+    if (enclosure_.alone(root(i).block)) return of_block;
     // In a group with other blocks only the discs are known.
     v.sum = of_block.sum;
     v.product = of_block.product;
     v.discriminant = of_block.discriminant;
   }
   return v;
-}
-
-template <int N>
-void ModeExtractor<N>::write_numbers(int i, int j, Mode<N>& mode) const {
-  const ModeNumbers numbers = mode_numbers(root(i), root(j), invariants(i, j), soft_frequency_);
-  mode.eigenvalues = numbers.eigenvalues;
-  mode.natural_frequency = numbers.natural_frequency;
-  mode.damping_ratio = numbers.damping_ratio;
-  mode.damped_frequency = numbers.damped_frequency;
-  mode.kind = numbers.kind;
-  mode.error_bound = numbers.error_bound;
-  mode.natural_frequency_bound = numbers.natural_frequency_bound;
-  mode.damping_ratio_bound = numbers.damping_ratio_bound;
 }
 
 /// Eigenvector of root i in joint coordinates, and its coefficients (re, im) in the block's
@@ -274,14 +222,8 @@ ComplexVector<N> ModeExtractor<N>::shape(int i, bool left, StateVector<N>& re,
   if (b.size == 1) {
     w[0] = 1;
   } else if (b.size == 2) {
-    // (L - mu) w = 0 from the row that says more.
-    const Complex p = L(0, 0) - mu, s = L(1, 1) - mu;
-    if (std::norm(p) + L(0, 1) * L(0, 1) >= std::norm(s) + L(1, 0) * L(1, 0)) {
-      w << L(0, 1), -p;
-    } else {
-      w << -s, L(1, 0);
-    }
-    if (w.squaredNorm() == 0) w << 1, 0;
+    const auto vector = eigenvector_2x2(L(0, 0), L(0, 1), L(1, 0), L(1, 1), mu);
+    w << vector[0], vector[1];
   } else {
     // Inverse iteration, kept where it grows most: near a defective eigenvalue a further step may
     // well be worse (Wilkinson 1979).
@@ -389,8 +331,12 @@ void ModeExtractor<N>::write_modes() {
     const int i = order[k], j = root(i).partner;
     const bool upper_first = root(i).value.imag() >= 0;
     Mode<N>& mode = spectrum_.modes[k];
-    write_numbers(upper_first ? i : j, upper_first ? j : i, mode);
-    write_shapes(upper_first ? i : j, upper_first ? j : i, mode);
+    const int first = upper_first ? i : j, second = upper_first ? j : i;
+    static_cast<ModeNumbers&>(mode) =
+        mode_numbers(root(first), root(second), invariants(first, second), soft_frequency_);
+    const Block &a = basis_.blocks[root(i).block], &b = basis_.blocks[root(j).block];
+    mode.columns = {a.first, a.first == b.first && a.size == 2 ? a.first + 1 : b.first};
+    write_shapes(first, second, mode);
   }
 }
 
@@ -407,11 +353,7 @@ template <int N>
 Quality worst_quality(const Spectrum<N>& spectrum) noexcept {
   Quality worst;
   for (const Mode<N>& mode : spectrum.modes) {
-    // At critical damping the eigenvalues are worth half the digits of their sum and product.
-    const double size = modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]);
-    const double bound =
-        mode.kind == ModeKind::kCritical ? mode.natural_frequency_bound : mode.error_bound;
-    worst.bound = std::max(worst.bound, std::isfinite(bound) ? bound / size : kInfinity);
+    worst.bound = std::max(worst.bound, relative_bound(mode));
     worst.backward_error = std::max(worst.backward_error, mode.backward_error);
   }
   return worst;

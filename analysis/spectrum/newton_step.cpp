@@ -1,4 +1,5 @@
 // Newton's step of refinement.hpp, and the Sylvester equations that it solves.
+#include <dashpot/analysis/linalg/block_sylvester.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/refinement.hpp>
 
@@ -9,35 +10,18 @@ namespace {
 
 constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
 
-/// Lower bound of sep(A, B) for B of 2 x 2 and A of 1 x 1 or 2 x 2: the smallest singular value of
-/// p(A), with p the characteristic polynomial of B, over |A - tr(B) / 2|_F + |B - tr(B) / 2|_F.
+template <typename Matrix>
+Block2<double> block2(const Matrix& A) {
+  return {A(0, 0), A(0, 1), A(1, 0), A(1, 1)};
+}
+
+/// Lower bound of sep(A, B) for B of 2 x 2 and A of 1 x 1 or 2 x 2.
 template <typename Left, typename Right>
 double small_separation(const Left& A, const Right& B) noexcept {
-  const double b00 = B(0, 0), b01 = B(0, 1), b10 = B(1, 0), b11 = B(1, 1);
-  const double trace = b00 + b11, determinant = b00 * b11 - b01 * b10;
-  const double half = 0.5 * trace;
-  const double B2 = b00 * b00 + b01 * b01 + b10 * b10 + b11 * b11;
-  const double half_B =
-      std::sqrt((b00 - half) * (b00 - half) + b01 * b01 + b10 * b10 + (b11 - half) * (b11 - half));
-  double least = 0, half_A = 0, A2 = 0;
-  if (A.rows() == 1) {
-    const double x = A(0, 0);
-    least = std::abs(x * x - trace * x + determinant);
-    half_A = std::abs(x - half);
-    A2 = x * x;
-  } else {
-    const double a00 = A(0, 0), a01 = A(0, 1), a10 = A(1, 0), a11 = A(1, 1);
-    A2 = a00 * a00 + a01 * a01 + a10 * a10 + a11 * a11;
-    half_A = std::sqrt((a00 - half) * (a00 - half) + a01 * a01 + a10 * a10 +
-                       (a11 - half) * (a11 - half));
-    const double p00 = a00 * a00 + a01 * a10 - trace * a00 + determinant;
-    const double p11 = a11 * a11 + a01 * a10 - trace * a11 + determinant;
-    const double p01 = (a00 + a11 - trace) * a01, p10 = (a00 + a11 - trace) * a10;
-    const double norm = std::sqrt(p00 * p00 + p01 * p01 + p10 * p10 + p11 * p11);
-    least = norm > 0 ? std::abs(p00 * p11 - p01 * p10) / norm : 0;  // <= smallest singular value
-  }
-  least -= 16 * kUnit * (A2 + std::abs(trace) * std::sqrt(A2) + B2);  // rounding errors of p
-  return least > 0 ? least / (half_A + half_B) : 0;
+  const MeasuredBlock<double> two(block2(B));
+  const double least =
+      A.rows() == 1 ? separation(A(0, 0), two) : separation(MeasuredBlock<double>(block2(A)), two);
+  return least > 0 ? least : 0;  // 0 if not a number
 }
 
 }  // namespace
@@ -47,19 +31,18 @@ double solve_sylvester(const Eigen::Ref<const State<N>>& A, const Eigen::Ref<con
                        const State<N>& C, State<N>& X) noexcept {
   const Eigen::Index k = A.rows(), l = B.rows();
   if (k <= 2 && l == 2) {
-    // By Cayley-Hamilton, p(A) X = A C + C B - tr(B) C with p the characteristic polynomial of B.
-    const double trace = B(0, 0) + B(1, 1);
-    const double determinant = B(0, 0) * B(1, 1) - B(0, 1) * B(1, 0);
+    X.setZero(k, l);
     const double separation = small_separation(A, B);
-    if (!(separation > 0)) {
-      X.setZero(k, l);
-      return 0;
+    if (!(separation > 0)) return 0;
+    if (k == 1) {  // X (x - B) = C
+      const double x = A(0, 0);
+      const double p = (x - B(0, 0)) * (x - B(1, 1)) - B(0, 1) * B(1, 0);
+      X << (C(0, 0) * (x - B(1, 1)) + C(0, 1) * B(1, 0)) / p,
+          (C(0, 1) * (x - B(0, 0)) + C(0, 0) * B(0, 1)) / p;
+    } else {
+      const Block2<double> x = analysis::solve_sylvester(block2(A), block2(B), block2(C));
+      X << x.a, x.b, x.c, x.d;
     }
-    State<N> p = A * A - trace * A;
-    p.diagonal().array() += determinant;
-    State<N> right = A * C + C * B - trace * C;
-    solve_in_place(p, right, std::numeric_limits<double>::min());
-    X = right;
     return separation;
   }
   if (k == 1 && l == 1) {

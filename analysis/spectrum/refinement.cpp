@@ -203,6 +203,18 @@ void invert_blocks(const State<N>& gram, ModalBasis<N>& basis) {
   }
 }
 
+/// Largest |A_ij| / (s_i s_j); zero if A has no rows.
+template <int N>
+double relative_size(const Square<N>& A, const Vector<N>& s) {
+  double largest = 0;
+  for (Eigen::Index j = 0; j < A.cols(); ++j) {
+    for (Eigen::Index i = 0; i < A.rows(); ++i) {
+      largest = std::max(largest, std::abs(A(i, j)) / (s[i] * s[j]));
+    }
+  }
+  return largest;
+}
+
 /// Entrywise bound on |weight G* - I|, where G* is the exact Gram matrix and `gram` the computed
 /// one. Uses |M_kl| <= s_k s_l with s_k = sqrt(M_kk), so that graded masses stay graded.
 template <int N>
@@ -210,12 +222,7 @@ void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& ba
                  BasisResidual<N>& residual) {
   const Eigen::Index n = system.dof(), states = 2 * n;
   const Vector<N> s = system.mass.diagonal().cwiseSqrt();
-  double c = 0;
-  for (Eigen::Index j = 0; j < n; ++j) {
-    for (Eigen::Index i = 0; i < n; ++i) {
-      c = std::max(c, std::abs(system.damping(i, j)) / (s[i] * s[j]));
-    }
-  }
+  const double c = relative_size<N>(system.damping, s);
   StateVector<N> u(states), v(states), y(states), yg(states);
   for (Eigen::Index j = 0; j < states; ++j) {
     u[j] = s.cwiseProduct(basis.U.col(j)).norm();
@@ -228,6 +235,9 @@ void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& ba
   const auto dn = static_cast<double>(n);
   const double terms = (2 * dn + 16) * dn * kUnit;
   const double gamma = extended ? 8 * terms * kUnit : terms;
+  // Sums over n entries are no longer than sqrt(n) times their norms, twice.
+  const double M_error = dn * relative_size<N>(system.mass_error, s);
+  const double C_error = dn * relative_size<N>(system.damping_error, s);
   State<N>& E = residual.E;
   State<N>& error = residual.F_error;  // used as workspace here
   E = residual.gram;
@@ -235,6 +245,7 @@ void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& ba
   for (Eigen::Index j = 0; j < states; ++j) {
     for (Eigen::Index i = 0; i < states; ++i) {
       error(i, j) = gamma * (y[i] * (c * u[j] + v[j]) + yg[i] * u[j]) +
+                    y[i] * (C_error * u[j] + M_error * v[j]) + yg[i] * M_error * u[j] +
                     (8 + 2 * widest) * kUnit * std::abs(E(i, j));
     }
   }
@@ -295,6 +306,14 @@ void bound_residual(const System<N>& system, bool extended, const ModalBasis<N>&
   const double gamma = extended ? 8 * terms * kUnit * kUnit : terms * kUnit;
   // The second term is the rounding of R itself, and of the product Y' R.
   residual.R_size = gamma * residual.R_size + (dn + 2 * widest + 4) * kUnit * residual.R.cwiseAbs();
+  const auto add = [&](const Square<N>& error, const Wide<N>& factor) {
+    if (error.rows() == 0) return;
+    multiply(error, factor, part);
+    residual.R_size += part;
+  };
+  add(system.stiffness_error, size_U);
+  add(system.damping_error, size_V);
+  add(system.mass_error, size_A);
 }
 
 /// Whether no product that matters can underflow or overflow, extended ones included: the bounds

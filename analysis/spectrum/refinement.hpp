@@ -7,7 +7,7 @@ namespace dashpot::analysis {
 
 /// The residual of a nearly invariant basis. In exact arithmetic the system is similar to the state
 /// matrix Lambda + F*, and entrywise |F* - F| <= F_error: a proved bound that includes every
-/// rounding error made in computing F.
+/// rounding error made in computing F, and the errors that the system gives for its coefficients.
 template <int N = kDynamic>
 struct BasisResidual {
   State<N> F;        ///< 2n x 2n, 1/s

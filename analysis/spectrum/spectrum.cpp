@@ -165,8 +165,8 @@ void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out, Work& 
 
 Spectrum<> analyze(const System<>& system, const SpectrumOptions& options) {
   validate(system);
-  System<> symmetrized = system;  // the mass is symmetric to rounding by now
-  symmetrized.mass = 0.5 * (system.mass + system.mass.transpose());
+  System<> symmetrized = system;
+  make_symmetric(symmetrized.mass, symmetrized.mass_error);
   SpectrumSolver<> solver(options);
   Spectrum<> spectrum;
   const Status status = solver.solve(symmetrized, spectrum);

@@ -26,8 +26,11 @@ struct Spectrum {
   ModeList<N> modes;
   /// Eigenvalues -a of the r zero modes' velocities, 1/s: zero if nothing damps them, positive if
   /// they grow (no mode says so then), NaN if they are not real and therefore are among the modes.
-  /// They have no proved bound.
   Vector<N> zero_mode_rates;
+  /// Proved bounds of |computed - true| for each of zero_mode_rates, 1/s; infinite if none could be
+  /// proved. Where no damping acts they are the root of what the stiffness's rounding errors leave
+  /// of a frequency.
+  Vector<N> zero_mode_rates_bound;
   ModalBasis<N> basis;
 };
 

@@ -12,9 +12,7 @@ constexpr double kEps = std::numeric_limits<double>::epsilon();
 /// Two eigenvalues of one mode this close together (relative) count as nearly critical.
 constexpr double kCluster = 0.02;
 /// A cluster is parted into eigenvectors if their matrix has a condition number below this.
-constexpr double kSeparable = 100;
-/// Shift of a subspace iteration off the middle of its cluster, relative.
-constexpr double kNudge = 1e-3;
+constexpr double kSeparable = 1e4;
 
 template <int N>
 using ComplexState =
@@ -392,9 +390,6 @@ template <int N>
 State<N> BasisFromEigenvectors<N>::invariant_subspace(Complex mean, bool near_axis,
                                                       Eigen::Index size) const {
   const Eigen::Index states = A_.rows();
-  // Off the eigenvalues by far more than rounding: at a defective one, what the eigenvector grows
-  // by would otherwise bury the rest of its subspace.
-  mean += kNudge * modulus(mean);
   State<N> shift;
   if (near_axis) {
     shift = A_;

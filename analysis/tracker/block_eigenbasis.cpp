@@ -60,10 +60,9 @@ void subtract_blocks(const BlockEigenbasis& basis, const PackedMatrix& N, Packed
     std::array<Vec4d, kMaxDof / 4> first, second;
     for (int j = 0; j < m; j += 4) {
       const Vec4d n0 = load(n + j), n1 = load(n + m + j);
-      first[at(j / 4)] =
-          load(g + j) - (n0 * load(&basis.l00[at(j)]) + n1 * load(&basis.l10[at(j)]));
-      second[at(j / 4)] =
-          load(g + m + j) - (n0 * load(&basis.l01[at(j)]) + n1 * load(&basis.l11[at(j)]));
+      const Block2<Vec4d> L = basis.blocks_from(j);
+      first[at(j / 4)] = load(g + j) - (n0 * L.a + n1 * L.c);
+      second[at(j / 4)] = load(g + m + j) - (n0 * L.b + n1 * L.d);
     }
     for (int j = 0; j < m; j += 4) store(g + j, first[at(j / 4)]);
     for (int j = 0; j < m; j += 4) store(g + m + j, second[at(j / 4)]);
@@ -84,41 +83,25 @@ void take_diagonal(const BlockEigenbasis& basis, PackedMatrix& G,
   }
 }
 
-/// E between mode i and all others: with p the characteristic polynomial of B = Lambda_j,
-/// p(A) X = A Q - Q adj(B) solves A X - X B = Q (Cayley-Hamilton).
+/// E between mode i and all others.
 void solve_row(const BlockEigenbasis& basis, const PackedMatrix& G, int i, PackedMatrix& E) {
   const int m = basis.modes;
-  const double a = basis.l00[at(i)], b = basis.l01[at(i)], c = basis.l10[at(i)],
-               d = basis.l11[at(i)];
-  std::array<std::array<Vec4d, kMaxDof / 4>, 4> X;
+  const Block2<double> A = basis.block(i);
+  std::array<Block2<Vec4d>, kMaxDof / 4> X;
   for (int j = 0; j < m; j += 4) {
-    const Vec4d e = load(&basis.l00[at(j)]), f = load(&basis.l01[at(j)]),
-                g = load(&basis.l10[at(j)]), h = load(&basis.l11[at(j)]);
-    const Vec4d q00 = -load(G.row(i) + j), q01 = -load(G.row(i) + m + j),
-                q10 = load(G.row(m + i) + j), q11 = load(G.row(m + i) + m + j);
-    const Vec4d trace = e + h, determinant = e * h - f * g;
-    const Vec4d across = (a + d) - trace;
-    const Vec4d p00 = a * (a - trace) + (b * c + determinant);
-    const Vec4d p11 = d * (d - trace) + (b * c + determinant);
-    const Vec4d p01 = b * across, p10 = c * across;
-    const Vec4d inverse = 1 / (p00 * p11 - p01 * p10);
-    const Vec4d r00 = a * q00 + b * q10 - (q00 * h - q01 * g);
-    const Vec4d r01 = a * q01 + b * q11 - (q01 * e - q00 * f);
-    const Vec4d r10 = c * q00 + d * q10 - (q10 * h - q11 * g);
-    const Vec4d r11 = c * q01 + d * q11 - (q11 * e - q10 * f);
-    X[0][at(j / 4)] = inverse * (p11 * r00 - p01 * r10);
-    X[1][at(j / 4)] = inverse * (p11 * r01 - p01 * r11);
-    X[2][at(j / 4)] = inverse * (p00 * r10 - p10 * r00);
-    X[3][at(j / 4)] = inverse * (p00 * r11 - p10 * r01);
+    const Block2<Vec4d> B = basis.blocks_from(j);
+    const Block2<Vec4d> Q{-load(G.row(i) + j), -load(G.row(i) + m + j), load(G.row(m + i) + j),
+                          load(G.row(m + i) + m + j)};
+    X[at(j / 4)] = solve_sylvester(A, B, Q);
   }
   // What lanes beyond the last mode hold is overwritten by the next part of the row.
   for (int j = 0; j < m; j += 4) {
-    store(E.row(i) + j, X[0][at(j / 4)]);
-    store(E.row(m + i) + j, X[2][at(j / 4)]);
+    store(E.row(i) + j, X[at(j / 4)].a);
+    store(E.row(m + i) + j, X[at(j / 4)].c);
   }
   for (int j = 0; j < m; j += 4) {
-    store(E.row(i) + m + j, X[1][at(j / 4)]);
-    store(E.row(m + i) + m + j, X[3][at(j / 4)]);
+    store(E.row(i) + m + j, X[at(j / 4)].b);
+    store(E.row(m + i) + m + j, X[at(j / 4)].d);
   }
 }
 
@@ -129,8 +112,8 @@ void solve_zeros(const BlockEigenbasis& basis, const PackedMatrix& G, PackedMatr
     const int column = 2 * m + k;
     const double x = basis.rate[at(k)];
     for (int i = 0; i < m; ++i) {
-      const double a = basis.l00[at(i)] - x, b = basis.l01[at(i)], c = basis.l10[at(i)],
-                   d = basis.l11[at(i)] - x;
+      auto [a, b, c, d] = basis.block(i);
+      a -= x, d -= x;
       const double inverse = 1 / (a * d - b * c);
       const double q0 = -G(i, column), q1 = G(m + i, column);
       E(i, column) = inverse * (d * q0 - b * q1);
@@ -182,9 +165,7 @@ double squared_norm(const BlockEigenbasis& basis, const PackedMatrix& X) {
 double zeros_disturbance(const BlockEigenbasis& basis, const PackedMatrix& E) {
   if (basis.zeros < 2) return 0;
   double rates = 0, among_zeros = 0;
-  for (const BlockEigenbasis::Entries* l : {&basis.l00, &basis.l01, &basis.l10, &basis.l11}) {
-    for (int i = 0; i < basis.modes; ++i) rates += (*l)[at(i)] * (*l)[at(i)];
-  }
+  for (int i = 0; i < basis.modes; ++i) rates += basis.block(i).squared_norm();
   for (int i = 2 * basis.modes; i < basis.columns(); ++i) {
     for (int j = 2 * basis.modes; j < basis.columns(); ++j) among_zeros += E(i, j) * E(i, j);
   }
@@ -193,52 +174,45 @@ double zeros_disturbance(const BlockEigenbasis& basis, const PackedMatrix& E) {
 
 /// R = Z' S Z (Sigma is not yet subtracted) and G = Z' B Z, with S Z = [Z_s or K Z_s; -M V] and
 /// B Z = [W V; W' Z_s + C V].
-void multiply_mixed(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
-                    TrackedResidual& residual) {
+void multiply(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
+              TrackedResidual& residual) {
   const int n = pencil.joints, p = pencil.rank, states = pencil.states(), width = basis.Z.width;
-  const auto multiply = [product = padded_multiply(width), width](
-                            const Strided& A, int rows, int inner, const double* X,
-                            const double* start, double sign,
-                            double* out) { product(A, rows, inner, X, start, sign, out, width); };
+  const auto product = [multiplication = padded_multiply(width), width](
+                           const Strided& A, int rows, int inner, const double* X,
+                           const double* start, double sign, double* out) {
+    multiplication(A, rows, inner, X, start, sign, out, width);
+  };
   const double *const elastic = basis.Z.row(0), *const velocity = basis.Z.row(p);
-  multiply({pencil.M, 1, n}, n, n, velocity, nullptr, -1, residual.MV.row(p));
-  multiply({pencil.W, 1, p}, p, n, velocity, nullptr, 1, residual.image.row(0));
-  multiply({pencil.W, p, 1}, n, p, elastic, nullptr, 1, residual.image.row(p));
+  product({pencil.M, 1, n}, n, n, velocity, nullptr, -1, residual.MV.row(p));
+  product({pencil.W, 1, p}, p, n, velocity, nullptr, 1, residual.image.row(0));
+  product({pencil.W, p, 1}, n, p, elastic, nullptr, 1, residual.image.row(p));
   if (pencil.factored) {
     std::copy(elastic, velocity, residual.MV.row(0));
   } else {
     std::copy(residual.image.row(p), residual.image.row(p + n), residual.MV.row(0));
   }
-  multiply({pencil.C, 1, n}, n, n, velocity, residual.image.row(p), 1, residual.image.row(p));
+  product({pencil.C, 1, n}, n, n, velocity, residual.image.row(p), 1, residual.image.row(p));
   const Strided transposed{basis.Z.row(0), 1, width};
-  multiply(transposed, basis.columns(), states, residual.MV.row(0), nullptr, 1, residual.R.row(0));
-  multiply(transposed, basis.columns(), states, residual.image.row(0), nullptr, 1,
-           residual.G.row(0));
+  product(transposed, basis.columns(), states, residual.MV.row(0), nullptr, 1, residual.R.row(0));
+  product(transposed, basis.columns(), states, residual.image.row(0), nullptr, 1,
+          residual.G.row(0));
 }
 
-/// The same of a proportional basis, with Z_s (p columns) and V (n columns):
-///     R = diag(Z_s' Z_s or Z_s' K Z_s, -V' M V),     G = [0, Z_s' W V; its transpose, V' C V].
-void multiply_pure(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
-                   TrackedResidual& residual) {
-  const int n = pencil.joints, p = pencil.rank, m = basis.modes, width = basis.Z.width;
-  const PaddedMultiply elastic = padded_multiply(m), velocities = padded_multiply(n);
-  const double *const Z_s = basis.Z.row(0), *const V = basis.Z.row(p) + m;
-  const Strided Z_sT{Z_s, 1, width}, V_T{V, 1, width};
-  for (PackedMatrix* rows : {&residual.R, &residual.G, &residual.MV}) {
-    set_zero(width, basis.columns(), *rows);
+/// v' M v of the columns of block i, and between the two; elastic energies differ from
+/// these by Z' S Z = Sigma.
+struct Kinetic {
+  double first = 0, second = 0, mixed = 0;
+};
+
+Kinetic kinetic_energies(const BlockEigenbasis& basis, const TrackedResidual& residual, int i) {
+  const int m = basis.modes;
+  Kinetic sum;
+  for (int k = m; k < basis.columns(); ++k) {
+    sum.first -= basis.Z(k, i) * residual.MV(k, i);
+    sum.second -= basis.Z(k, m + i) * residual.MV(k, m + i);
+    sum.mixed -= basis.Z(k, i) * residual.MV(k, m + i);
   }
-  velocities({pencil.M, 1, n}, n, n, V, nullptr, -1, residual.MV.row(p) + m, width);
-  velocities({pencil.W, 1, p}, p, n, V, nullptr, 1, residual.image.row(0) + m, width);
-  velocities({pencil.C, 1, n}, n, n, V, nullptr, 1, residual.image.row(p) + m, width);
-  if (!pencil.factored) elastic({pencil.W, 1, p}, p, p, Z_s, nullptr, 1, residual.MV.row(0), width);
-  const double* const KZ_s = pencil.factored ? Z_s : residual.MV.row(0);
-  elastic(Z_sT, m, p, KZ_s, nullptr, 1, residual.R.row(0), width);
-  velocities(V_T, n, n, residual.MV.row(p) + m, nullptr, 1, residual.R.row(m) + m, width);
-  velocities(Z_sT, m, p, residual.image.row(0) + m, nullptr, 1, residual.G.row(0) + m, width);
-  velocities(V_T, n, n, residual.image.row(p) + m, nullptr, 1, residual.G.row(m) + m, width);
-  for (int i = 0; i < m; ++i) {
-    for (int j = m; j < basis.columns(); ++j) residual.G(j, i) = residual.G(i, j);
-  }
+  return sum;
 }
 
 }  // namespace
@@ -260,11 +234,7 @@ void evaluate(const SymmetricPencil& pencil, BlockEigenbasis& basis,
   for (PackedMatrix* rows : {&residual.R, &residual.G, &residual.MV, &residual.image}) {
     rows->width = basis.Z.width;
   }
-  if (basis.proportional) {
-    multiply_pure(pencil, basis, residual);
-  } else {
-    multiply_mixed(pencil, basis, residual);
-  }
+  multiply(pencil, basis, residual);
   set_blocks(residual.R, residual.G, basis);
   subtract_blocks(basis, residual.R, residual.G);
   for (int i = 0; i < basis.columns(); ++i) residual.R(i, i) -= i < basis.modes ? 1 : -1;
@@ -311,39 +281,29 @@ int packed_width(int modes, int zeros) noexcept {
   return (std::max(2 * modes + zeros, lanes) + 3) / 4 * 4;
 }
 
-double coupling_norm(const BlockEigenbasis& basis, const PackedMatrix& E) noexcept {
-  double squares = 0;
+void take_step(const PackedMatrix& E, BlockEigenbasis& basis) noexcept {
+  const int width = basis.Z.width, columns = basis.columns();
+  double* const Z = basis.Z.row(0);
+  padded_multiply(width)({Z, width, 1}, columns, columns, E.row(0), Z, 1, Z, width);
+}
+
+bool rotate_hyperbolically(const TrackedResidual& residual, double tolerance,
+                           BlockEigenbasis& basis) noexcept {
+  bool any = false;
   for (int i = 0; i < basis.modes; ++i) {
-    for (int j = basis.modes; j < basis.columns(); ++j) {
-      squares += E(i, j) * E(i, j) + E(j, i) * E(j, i);
+    const Kinetic kinetic = kinetic_energies(basis, residual, i);
+    // In the energy metric: 2 first + 1, 2 second - 1, 2 mixed.
+    const double tangent = -2 * kinetic.mixed / (kinetic.first + kinetic.second);
+    if (!(std::abs(tangent) > tolerance) || !(std::abs(tangent) < 1)) continue;
+    any = true;
+    const double angle = 0.5 * std::atanh(tangent), c = std::cosh(angle), s = std::sinh(angle);
+    for (int row = 0; row < basis.columns(); ++row) {
+      const double x = basis.Z(row, i), y = basis.Z(row, basis.modes + i);
+      basis.Z(row, i) = c * x + s * y;
+      basis.Z(row, basis.modes + i) = s * x + c * y;
     }
   }
-  return std::sqrt(squares);
-}
-
-void take_step(const PackedMatrix& E, BlockEigenbasis& basis) noexcept {
-  const int width = basis.Z.width, columns = basis.columns(), m = basis.modes;
-  double* const Z = basis.Z.row(0);
-  if (!basis.proportional) {
-    padded_multiply(width)({Z, width, 1}, columns, columns, E.row(0), Z, 1, Z, width);
-    return;
-  }
-  const int n = m + basis.zeros;
-  double* const V = basis.Z.row(m) + m;
-  padded_multiply(m)({Z, width, 1}, m, m, E.row(0), Z, 1, Z, width);
-  for (int i = 0; i < m; ++i) {  // fours of columns reach beyond the elastic coordinates'
-    for (int j = m; j < (m + 3) / 4 * 4; ++j) basis.Z(i, j) = 0;
-  }
-  padded_multiply(n)({V, width, 1}, n, n, E.row(m) + m, V, 1, V, width);
-}
-
-void stepped_velocities(const BlockEigenbasis& basis, const PackedMatrix& E,
-                        PackedMatrix& out) noexcept {
-  const int width = out.width = basis.Z.width, n = basis.modes + basis.zeros;
-  const int first = basis.proportional ? basis.modes : 0;  // columns that hold velocities
-  const double* const V = basis.Z.row(basis.modes);
-  padded_multiply(width)({V + first, width, 1}, n, basis.columns() - first, E.row(first), V, 1,
-                         out.row(0), width);
+  return any;
 }
 
 }  // namespace dashpot::analysis

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/analysis/linalg/block_sylvester.hpp>
 #include <dashpot/analysis/linalg/packed_matrix.hpp>
 #include <dashpot/analysis/system.hpp>
 
@@ -42,9 +43,6 @@ struct BlockEigenbasis {
   int modes = 0;                           ///< p
   int zeros = 0;                           ///< n - p
   PackedMatrix Z;  ///< n + p rows and columns: elastic coordinates, then velocities
-  /// True if the undamped modes decouple the damping. First columns then have elastic coordinates
-  /// only and all others velocities only, to the last bit, and they stay so.
-  bool proportional = false;
   /// Lambda of mode i is [l00 l01; l10 l11](i), 1/s.
   Entries l00{}, l01{}, l10{}, l11{};
   Entries rate{};  ///< of the zero modes, 1/s
@@ -54,6 +52,15 @@ struct BlockEigenbasis {
   /// Columns of block i: a mode's first and second, or the one column of a zero mode twice.
   int first(int i) const { return i < modes ? i : modes + i; }
   int second(int i) const { return modes + i; }
+  /// Block of mode i, and of modes i to i + 3.
+  Block2<double> block(int i) const {
+    const auto k = static_cast<std::size_t>(i);
+    return {l00[k], l01[k], l10[k], l11[k]};
+  }
+  Block2<Vec4d> blocks_from(int i) const {
+    const auto k = static_cast<std::size_t>(i);
+    return {load(&l00[k]), load(&l01[k]), load(&l10[k]), load(&l11[k])};
+  }
 };
 
 /// The residual of a basis: S^-1 B Z = Z (Lambda + F) exactly, with
@@ -67,9 +74,7 @@ struct TrackedResidual {
   PackedMatrix image;  ///< B Z
 };
 
-/// Sets the blocks of Lambda to N_ii^-1 (Z' B Z)_ii, and then evaluates the residual. For a
-/// proportional basis Z = [Z_s 0; 0 V], only W V and C V and their products with Z_s and V are
-/// computed.
+/// Sets the blocks of Lambda to N_ii^-1 (Z' B Z)_ii, and then evaluates the residual.
 void evaluate(const SymmetricPencil& pencil, BlockEigenbasis& basis,
               TrackedResidual& residual) noexcept;
 
@@ -88,17 +93,15 @@ struct CloseBlocks {
 CloseBlocks newton_step(const BlockEigenbasis& basis, const TrackedResidual& residual,
                         double roundoff_bound, PackedMatrix& E, double& size) noexcept;
 
-/// Returns how much a step E mixes elastic coordinates into velocities and velocities into elastic
-/// coordinates: the Frobenius norm of the entries of E (or of Z) between first columns and others.
-double coupling_norm(const BlockEigenbasis& basis, const PackedMatrix& E) noexcept;
-
-/// Computes Z <- Z (I + E). A proportional basis stays proportional, because the entries of E that
-/// coupling_norm measures are left out.
+/// Computes Z <- Z (I + E).
 void take_step(const PackedMatrix& E, BlockEigenbasis& basis) noexcept;
 
-/// Computes the velocity rows (n) of Z (I + E).
-void stepped_velocities(const BlockEigenbasis& basis, const PackedMatrix& E,
-                        PackedMatrix& out) noexcept;
+/// Rotates each block hyperbolically so that its two columns become orthogonal in the energy metric
+/// diag(I, M) as well, which keeps the basis as well conditioned as it can be. Blocks that are
+/// orthogonal to `tolerance` already are left alone. Returns true if any block was rotated. The
+/// residual belongs to this basis, at least nearly.
+bool rotate_hyperbolically(const TrackedResidual& residual, double tolerance,
+                           BlockEigenbasis& basis) noexcept;
 
 /// Returns the width of the rows of a basis: its columns, and room for entries that groups of four
 /// modes write beyond them.

@@ -3,6 +3,7 @@
 #include <dashpot/analysis/tracker/cluster_separation.hpp>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -11,63 +12,90 @@ namespace {
 
 /// Squared lengths in the metric below this, relative to Euclidean ones, count as zero.
 constexpr double kNeutral = 1e-4;
+/// Blocks whose trace and determinant agree to this, relative to their size, coincide.
+constexpr double kCoinciding = 1e-10;
+/// What is smaller than this, relative to the rest, has no direction.
+constexpr double kNothing = 1e-8;
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
-using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
+/// k x l, k and l <= 2 kMaxDof
+using Cluster = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxWidth, kMaxWidth>;
+using ClusterSolver = Eigen::SelfAdjointEigenSolver<Cluster>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;
 using ComplexSmall = Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
 using ComplexSmallVector = Eigen::Matrix<Complex, Eigen::Dynamic, 1, 0, 4, 1>;
 
-/// The system in the columns of two blocks: N (metric) and T, eigenvalues of N^-1 T.
-struct SmallProblem {
-  std::array<int, 4> columns{};
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+/// The system in some columns of a basis: N = Z' S Z and T = Z' B Z.
+struct Projection {
+  std::array<int, kMaxWidth> columns{};
   int size = 0;
-  Small N, T, B;
+  Cluster N, T;
+
+  void add(int column) { columns[at(size++)] = column; }
+};
+
+void project(const BlockEigenbasis& basis, const TrackedResidual& residual,
+             Projection& projection) {
+  const int m = basis.modes, size = projection.size;
+  projection.N.resize(size, size);
+  projection.T.resize(size, size);
+  for (int i = 0; i < size; ++i) {
+    const int row = projection.columns[at(i)];
+    const auto N = [&](int j) {
+      return residual.R(row, j) + (row == j ? (row < m ? 1.0 : -1.0) : 0.0);
+    };
+    for (int j = 0; j < size; ++j) {
+      const int column = projection.columns[at(j)];
+      double T = residual.G(row, column);
+      if (column >= 2 * m) {
+        T += N(column) * basis.rate[at(column - 2 * m)];
+      } else {
+        const bool first = column < m;
+        const int mode = first ? column : column - m;
+        T += N(mode) * (first ? basis.l00[at(mode)] : basis.l01[at(mode)]) +
+             N(m + mode) * (first ? basis.l10[at(mode)] : basis.l11[at(mode)]);
+      }
+      projection.N(i, j) = N(column);
+      projection.T(i, j) = T;
+    }
+  }
+}
+
+/// Replaces the projection's columns Z of the basis by Z X.
+void turn_columns(const Projection& projection, const Cluster& X, BlockEigenbasis& basis) {
+  for (int row = 0; row < basis.columns(); ++row) {
+    std::array<double, kMaxWidth> z{};
+    for (int j = 0; j < projection.size; ++j) z[at(j)] = basis.Z(row, projection.columns[at(j)]);
+    for (int j = 0; j < projection.size; ++j) {
+      double sum = 0;
+      for (int k = 0; k < projection.size; ++k) sum += z[at(k)] * X(k, j);
+      basis.Z(row, projection.columns[at(j)]) = sum;
+    }
+  }
+}
+
+/// Two blocks: eigenvalues of B = N^-1 T.
+struct SmallProblem : Projection {
+  Cluster B;
   std::array<Complex, 4> values{};
 };
 
-void add_columns(const BlockEigenbasis& basis, int block, SmallProblem& problem) {
-  problem.columns[static_cast<std::size_t>(problem.size++)] = basis.first(block);
-  if (block < basis.modes) {
-    problem.columns[static_cast<std::size_t>(problem.size++)] = basis.second(block);
-  }
-}
-
-/// (N Lambda)(row, column)
-double times_block(const BlockEigenbasis& basis, const TrackedResidual& residual, int row,
-                   int column) {
-  const auto N = [&](int j) {
-    return residual.R(row, j) + (row == j ? (row < basis.modes ? 1.0 : -1.0) : 0.0);
-  };
-  const int m = basis.modes;
-  if (column >= 2 * m) return N(column) * basis.rate[static_cast<std::size_t>(column - 2 * m)];
-  const int i = column % m;
-  const auto k = static_cast<std::size_t>(i);
-  return column < m ? N(i) * basis.l00[k] + N(m + i) * basis.l10[k]
-                    : N(i) * basis.l01[k] + N(m + i) * basis.l11[k];
-}
-
 bool pose(const TrackedResidual& residual, const CloseBlocks& close, const BlockEigenbasis& basis,
           SmallProblem& problem) {
-  add_columns(basis, close.first, problem);
-  add_columns(basis, close.second, problem);
-  const int size = problem.size;
-  problem.N.resize(size, size);
-  problem.T.resize(size, size);
-  for (int i = 0; i < size; ++i) {
-    const int row = problem.columns[static_cast<std::size_t>(i)];
-    for (int j = 0; j < size; ++j) {
-      const int column = problem.columns[static_cast<std::size_t>(j)];
-      problem.N(i, j) =
-          residual.R(row, column) + (row == column ? (row < basis.modes ? 1 : -1) : 0);
-      problem.T(i, j) = residual.G(row, column) + times_block(basis, residual, row, column);
-    }
+  for (const int block : {close.first, close.second}) {
+    problem.add(basis.first(block));
+    if (block < basis.modes) problem.add(basis.second(block));
   }
-  Small N = problem.N;
+  project(basis, residual, problem);
+  Cluster N = problem.N;
   problem.B = problem.T;
   solve_in_place(N, problem.B, std::numeric_limits<double>::min());
   if (!problem.B.allFinite()) return false;
-  Small H = problem.B;
+  Cluster H = problem.B;
   reduce_to_hessenberg(H);
   return hessenberg_eigenvalues(H, problem.values.data());
 }
@@ -85,9 +113,9 @@ ComplexSmallVector eigenvector(const SmallProblem& problem, const Complex& value
 }
 
 /// Columns of both sign types that span what x and y span, or of type - alone if there is no y.
-bool normalize(const SmallProblem& problem, const Small& vectors, Small& out) {
-  const Small gram = vectors.transpose() * problem.N * vectors;
-  const Eigen::SelfAdjointEigenSolver<Small> eigen(gram);
+bool normalize(const SmallProblem& problem, const Cluster& vectors, Cluster& out) {
+  const Cluster gram = vectors.transpose() * problem.N * vectors;
+  const ClusterSolver eigen(gram);
   const auto& lengths = eigen.eigenvalues();
   const Eigen::Index last = lengths.size() - 1;
   if (!(lengths[0] < -kNeutral)) return false;
@@ -103,15 +131,15 @@ bool normalize(const SmallProblem& problem, const Small& vectors, Small& out) {
 }
 
 /// What is orthogonal to X, in the metric.
-bool complement(const SmallProblem& problem, const Small& X, Small& out) {
-  Small signs = X.transpose() * problem.N * X;  // nearly diag(1, -1) or -1
+bool complement(const SmallProblem& problem, const Cluster& X, Cluster& out) {
+  Cluster signs = X.transpose() * problem.N * X;  // nearly diag(1, -1) or -1
   for (Eigen::Index i = 0; i < signs.rows(); ++i) {
     for (Eigen::Index j = 0; j < signs.cols(); ++j) {
       signs(i, j) = i != j ? 0 : signs(i, i) > 0 ? 1 : -1;
     }
   }
-  const Small projector =
-      Small::Identity(problem.size, problem.size) - X * signs * X.transpose() * problem.N;
+  const Cluster projector =
+      Cluster::Identity(problem.size, problem.size) - X * signs * X.transpose() * problem.N;
   return normalize(problem, projector, out);
 }
 
@@ -123,7 +151,7 @@ struct Choice {
 
 Choice choose(const SmallProblem& problem) {
   const int size = problem.size;
-  const auto value = [&](int i) { return problem.values[static_cast<std::size_t>(i)]; };
+  const auto value = [&](int i) { return problem.values[at(i)]; };
   Choice pair, rest;
   double nearest = std::numeric_limits<double>::infinity();
   const bool any_complex = [&] {
@@ -135,13 +163,12 @@ Choice choose(const SmallProblem& problem) {
   std::array<double, 4> sign{};
   for (int i = 0; i < size && !any_complex; ++i) {
     const SmallVector x = eigenvector(problem, value(i)).real();
-    sign[static_cast<std::size_t>(i)] = x.dot(problem.N * x);
+    sign[at(i)] = x.dot(problem.N * x);
   }
   for (int i = 0; i < size; ++i) {
     for (int j = i + 1; j < size; ++j) {
-      const bool fits =
-          any_complex ? value(i).imag() != 0 && value(i) == std::conj(value(j))
-                      : sign[static_cast<std::size_t>(i)] * sign[static_cast<std::size_t>(j)] < 0;
+      const bool fits = any_complex ? value(i).imag() != 0 && value(i) == std::conj(value(j))
+                                    : sign[at(i)] * sign[at(j)] < 0;
       const double gap = modulus(value(i) - value(j));
       if (fits && gap < nearest) nearest = gap, pair = {i, j};
     }
@@ -156,10 +183,10 @@ Choice choose(const SmallProblem& problem) {
 }
 
 /// The columns of the chosen eigenvalues.
-bool solve_chosen(const SmallProblem& problem, const Choice& choice, Small& out) {
-  const auto value = [&](int i) { return problem.values[static_cast<std::size_t>(i)]; };
+bool solve_chosen(const SmallProblem& problem, const Choice& choice, Cluster& out) {
+  const auto value = [&](int i) { return problem.values[at(i)]; };
   const ComplexSmallVector x = eigenvector(problem, value(choice.first));
-  Small vectors(problem.size, choice.second < 0 ? 1 : 2);
+  Cluster vectors(problem.size, choice.second < 0 ? 1 : 2);
   vectors.col(0) = x.real();
   out.resize(problem.size, vectors.cols());
   if (choice.second >= 0) {
@@ -172,6 +199,67 @@ bool solve_chosen(const SmallProblem& problem, const Choice& choice, Small& out)
   return vectors.allFinite() && normalize(problem, vectors, out);
 }
 
+bool coincide(const BlockEigenbasis& basis, int i, int j) {
+  const Block2<double> a = basis.block(i), b = basis.block(j);
+  const double size = std::max(std::abs(a.trace()), std::sqrt(std::abs(a.determinant())));
+  return std::abs(a.trace() - b.trace()) <= kCoinciding * size &&
+         std::abs(a.determinant() - b.determinant()) <= kCoinciding * size * size;
+}
+
+/// The energy metric in the columns of a projection: N, with the sign of kinetic energies turned.
+Cluster energy_metric(const BlockEigenbasis& basis, const TrackedResidual& residual,
+                      const Projection& shared) {
+  Cluster energy = shared.N;
+  for (int i = 0; i < shared.size; ++i) {
+    for (int j = 0; j < shared.size; ++j) {
+      for (int k = basis.modes; k < basis.columns(); ++k) {
+        energy(i, j) -=
+            2 * basis.Z(k, shared.columns[at(i)]) * residual.MV(k, shared.columns[at(j)]);
+      }
+    }
+  }
+  return energy;
+}
+
+/// X with X' N X = diag(I, -I) and X' energy X diagonal, columns of type + first.
+bool orthonormal_columns(const Projection& shared, const Cluster& energy, Cluster& X) {
+  const int k = shared.size / 2;
+  const ClusterSolver energies(energy);
+  if (!(energies.eigenvalues()[0] > kNothing * energies.eigenvalues()[2 * k - 1])) return false;
+  X = energies.eigenvectors();
+  for (int j = 0; j < 2 * k; ++j) X.col(j) /= std::sqrt(energies.eigenvalues()[j]);
+  const Cluster metric = X.transpose() * shared.N * X;
+  const ClusterSolver types(metric);
+  const auto& lengths = types.eigenvalues();
+  if (!(lengths[k - 1] < -kNothing) || !(lengths[k] > kNothing)) return false;
+  const Cluster rotated = X * types.eigenvectors();
+  for (int j = 0; j < k; ++j) {
+    X.col(j) = rotated.col(k + j) / std::sqrt(lengths[k + j]);
+    X.col(k + j) = rotated.col(j) / std::sqrt(-lengths[j]);
+  }
+  return true;
+}
+
+/// Pairs them: with T = [A B; B' D], A is made diagonal, and B by rotating the columns of type -.
+/// Of coinciding modes Lambda^2 - 2 a Lambda + w^2 = 0, so that D is diagonal then, too.
+bool pair_columns(const Projection& shared, Cluster& X) {
+  const int k = shared.size / 2;
+  Cluster T = X.transpose() * shared.T * X;
+  const Cluster A = T.topLeftCorner(k, k);
+  const ClusterSolver elastic(A);
+  Cluster rotated = X.leftCols(k) * elastic.eigenvectors();
+  X.leftCols(k) = rotated;
+  Cluster Q = T.bottomLeftCorner(k, k) * elastic.eigenvectors();
+  const double size = Q.norm();
+  for (int j = 0; j < k; ++j) {
+    if (!(Q.col(j).norm() > kNothing * size)) return false;
+  }
+  orthonormalize(Q);
+  rotated = X.rightCols(k) * Q;
+  X.rightCols(k) = rotated;
+  return X.allFinite();
+}
+
 }  // namespace
 
 bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
@@ -180,9 +268,9 @@ bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
   if (!pose(residual, close, basis, problem)) return false;
   const Choice choice = choose(problem);
   if (choice.first < 0) return false;
-  Small X;
+  Cluster X;
   if (!solve_chosen(problem, choice, X)) return false;
-  Small Y(problem.size, problem.size - X.cols());
+  Cluster Y(problem.size, problem.size - X.cols());
   if (!complement(problem, X, Y)) return false;
   // In the order of the columns: the first of the two blocks is a mode unless both are zero
   // modes.
@@ -192,19 +280,44 @@ bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
     const double share = X.topRows(split).squaredNorm() / X.squaredNorm();
     X_first = share >= Y.topRows(split).squaredNorm() / Y.squaredNorm();
   }
-  Small columns(problem.size, problem.size);
+  Cluster columns(problem.size, problem.size);
   columns << (X_first ? X : Y), (X_first ? Y : X);
-  for (int row = 0; row < basis.columns(); ++row) {
-    std::array<double, 4> z{};
-    for (std::size_t j = 0; j < 4 && static_cast<int>(j) < problem.size; ++j) {
-      z[j] = basis.Z(row, problem.columns[j]);
+  turn_columns(problem, columns, basis);
+  return true;
+}
+
+bool separate_coinciding(const TrackedResidual& residual, BlockEigenbasis& basis,
+                         Work& work) noexcept {
+  std::array<bool, kMaxDof> done{};
+  bool any = false;
+  for (int i = 0; i < basis.modes; ++i) {
+    Projection shared;
+    for (int j = i; j < basis.modes; ++j) {
+      if (done[at(j)] || !coincide(basis, i, j)) continue;
+      done[at(j)] = true;
+      shared.add(j);
     }
-    for (int j = 0; j < problem.size; ++j) {
-      double sum = 0;
-      for (int k = 0; k < problem.size; ++k) sum += columns(k, j) * z[static_cast<std::size_t>(k)];
-      basis.Z(row, problem.columns[static_cast<std::size_t>(j)]) = sum;
-    }
+    const int modes = shared.size;
+    if (modes < 2) continue;
+    if (!work.take(cubed(2 * modes, 60) + squared(2 * modes, 300))) return any;
+    for (int j = 0; j < modes; ++j) shared.add(basis.modes + shared.columns[at(j)]);
+    project(basis, residual, shared);
+    Cluster X;
+    if (!orthonormal_columns(shared, energy_metric(basis, residual, shared), X)) continue;
+    if (!pair_columns(shared, X)) continue;
+    turn_columns(shared, X, basis);
+    any = true;
   }
+  return any;
+}
+
+bool separate_zero_modes(const TrackedResidual& residual, BlockEigenbasis& basis) noexcept {
+  Projection zeros;
+  for (int k = 0; k < basis.zeros; ++k) zeros.add(2 * basis.modes + k);
+  project(basis, residual, zeros);
+  const ClusterSolver rates(zeros.T);  // reads one triangle: T is symmetric but for rounding errors
+  if (!rates.eigenvectors().allFinite()) return false;
+  turn_columns(zeros, rates.eigenvectors(), basis);
   return true;
 }
 

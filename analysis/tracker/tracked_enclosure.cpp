@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <type_traits>
-#include <utility>
 
 namespace dashpot::analysis {
 namespace {
@@ -25,93 +23,137 @@ T square(const T& x) {
   return x * x;
 }
 
-double square_root(double x) {
-  return std::sqrt(x);
-}
-Vec4d square_root(Vec4d x) {
-  for (int lane = 0; lane < 4; ++lane) x[lane] = std::sqrt(x[lane]);
-  return x;
+/// Sizes of the coefficients, for bounds of rounding errors. With
+/// s_k = sqrt(M_kk), entrywise |M| <= mass s s', |C| <= damping s s' and |K| <= stiffness^2 s s'
+/// (without a factor). Column k of W is no longer than elastic[k].
+struct CoefficientSizes {
+  std::array<double, kMaxDof> s{}, elastic{};
+  double mass = 0, damping = 0, stiffness = 0;
+  bool in_range = false;  ///< masses and rates are not too large or too small
+};
+
+/// The largest |A_ij| inverse_i inverse_j of a symmetric matrix, n x n: from its upper triangle,
+/// read in fours where a column has them.
+double largest_entry(const double* A, int n, const std::array<double, kMaxDof>& inverse) {
+  Vec4d largest{};
+  double rest = 0;
+  for (int j = 0; j < n; ++j) {
+    const double* const column = A + j * n;
+    const double factor = inverse[at(j)];
+    int i = 0;
+    for (; i <= j && i + 4 <= n; i += 4) {
+      const Vec4d entry = magnitude(load(column + i) * load(&inverse[at(i)])) * factor;
+      largest = entry > largest ? entry : largest;
+    }
+    for (; i <= j; ++i) rest = std::max(rest, std::abs(column[i]) * inverse[at(i)] * factor);
+  }
+  return std::max({rest, largest[0], largest[1], largest[2], largest[3]});
 }
 
-/// What bounds the errors of a set of blocks, of one, or of one in each lane.
-template <typename T>
-struct BlockSizes {
-  T a, b, m;         ///< see ErrorSizes
-  T a_rate, m_rate;  ///< a and m times |Lambda_i|
-};
+CoefficientSizes coefficient_sizes(const SymmetricPencil& pencil) {
+  const int n = pencil.joints;
+  CoefficientSizes sizes;
+  std::array<double, kMaxDof> inverse{};
+  double smallest = kInfinity, largest = 0;
+  for (int k = 0; k < n; ++k) {
+    const double diagonal = pencil.M[k + k * n];
+    smallest = std::min(smallest, diagonal);
+    largest = std::max(largest, diagonal);
+    sizes.s[at(k)] = std::sqrt(diagonal);
+    inverse[at(k)] = 1 / sizes.s[at(k)];
+  }
+  const double mass = largest_entry(pencil.M, n, inverse),
+               damping = largest_entry(pencil.C, n, inverse);
+  const double stiffness = pencil.factored ? 0 : largest_entry(pencil.W, n, inverse);
+  for (int j = 0; pencil.factored && j < n; ++j) {
+    double W = 0;
+    for (int i = 0; i < pencil.rank; ++i) W += square(pencil.W[i + j * pencil.rank]);
+    sizes.elastic[at(j)] = std::sqrt(W);
+  }
+  sizes.mass = kSlack * mass;
+  sizes.damping = kSlack * damping;
+  sizes.stiffness = kSlack * std::sqrt(stiffness);
+  if (!pencil.factored) {
+    for (int k = 0; k < n; ++k) sizes.elastic[at(k)] = sizes.stiffness * sizes.s[at(k)];
+  }
+  const double rate = sizes.damping + sizes.stiffness;
+  sizes.in_range = smallest > 1e-120 && largest < 1e120 && rate < 1e60;
+  return sizes;
+}
+
+/// One number for each block, read in fours.
+using Blocks = BlockEigenbasis::Entries;
 
 /// Errors of N and G, entrywise, with the vectors a, b, m (one entry a column of Z) and a factor
 /// gamma:   |N error| <= gamma (a a' + m m'),   |Z' B Z error| <= gamma (a b' + b a' + c m m').
 /// a is the size of a column's elastic coordinates, b of the elastic rates W v of its velocities, m
-/// of its momenta.
+/// of its momenta. They are kept for each block, with a and m times |Lambda_i|.
 class ErrorSizes {
  public:
-  ErrorSizes(const SymmetricPencil& pencil, const CoefficientSizes& sizes, double distance,
+  ErrorSizes(const SymmetricPencil& pencil, const CoefficientSizes& sizes,
              const BlockEigenbasis& basis)
       // Two nested sums of p + n terms each, and the subtraction of N Lambda.
-      : gamma((2 * pencil.states() + 16) * kUnit + distance), c(sizes.damping / sizes.mass) {
-    Columns a2, b, m;
-    read_columns(pencil, sizes, basis, a2, b, m);
-    const auto set = [&](int i, int first, int second, const auto& rate) {
-      const auto two = [&](const Columns& x, bool squared) {
-        const Vec4d y = load(&x[at(first)]), z = load(&x[at(second)]);
+      : gamma_((2 * pencil.states() + 16) * kUnit), c_(sizes.damping / sizes.mass) {
+    Columns a2, b_columns, m_columns;
+    read_columns(pencil, sizes, basis, a2, b_columns, m_columns);
+    const auto set = [&](int i, int first, int second, double both, const Vec4d& rate) {
+      const auto norm = [&](const Columns& x, bool squared) {
+        const Vec4d y = load(&x[at(first)]), z = both * load(&x[at(second)]);
         return square_root(squared ? y + z : y * y + z * z);
       };
-      const Vec4d a_i = two(a2, true), m_i = two(m, false);
+      const Vec4d a_i = norm(a2, true), m_i = norm(m_columns, false);
       store(&a_[at(i)], a_i);
-      store(&b_[at(i)], two(b, false));
+      store(&b_[at(i)], norm(b_columns, false));
       store(&m_[at(i)], m_i);
       store(&a_rate_[at(i)], a_i * rate);
       store(&m_rate_[at(i)], m_i * rate);
     };
     for (int i = 0; i < basis.modes; i += 4) {
-      const auto square_of = [i](const BlockEigenbasis::Entries& l) {
-        return load(&l[at(i)]) * load(&l[at(i)]);
-      };
-      set(i, i, basis.modes + i,
-          square_root(square_of(basis.l00) + square_of(basis.l01) + square_of(basis.l10) +
-                      square_of(basis.l11)));
+      set(i, i, basis.modes + i, 1, square_root(basis.blocks_from(i).squared_norm()));
     }
-    for (int k = 0; k < basis.zeros; ++k) {
-      const std::size_t i = at(basis.modes + k), column = at(2 * basis.modes + k);
-      const double rate = std::abs(basis.rate[at(k)]);
-      a_[i] = std::sqrt(a2[column]);
-      b_[i] = b[column];
-      m_[i] = m[column];
-      a_rate_[i] = a_[i] * rate;
-      m_rate_[i] = m_[i] * rate;
+    for (int k = 0; k < basis.zeros; k += 4) {
+      const int column = 2 * basis.modes + k;
+      set(basis.modes + k, column, column, 0, magnitude(load(&basis.rate[at(k)])));
     }
-    all = {norm(a_, basis), norm(b_, basis), norm(m_, basis), norm(a_rate_, basis),
-           norm(m_rate_, basis)};
+    const auto norm = [&](const Blocks& x) {
+      double squares = 0;
+      for (int i = 0; i < basis.blocks(); ++i) squares += square(x[at(i)]);
+      return std::sqrt(squares);
+    };
+    all_a_ = norm(a_);
+    all_b_ = norm(b_);
+    all_m_ = norm(m_);
+    all_a_rate_ = norm(a_rate_);
+    all_m_rate_ = norm(m_rate_);
   }
 
-  template <typename T>
-  BlockSizes<T> of(int i) const {
-    if constexpr (std::is_same_v<T, double>) {
-      const std::size_t k = at(i);
-      return {a_[k], b_[k], m_[k], a_rate_[k], m_rate_[k]};
-    } else {
-      const auto four = [i](const Blocks& x) { return load(&x[at(i)]); };
-      return {four(a_), four(b_), four(m_), four(a_rate_), four(m_rate_)};
-    }
+  /// Bounds of the errors of blocks (i, j) to (i, j + 3) of G.
+  Vec4d of_G(int i, int j) const {
+    const std::size_t k = at(i);
+    return gamma_ * (a_[k] * (four(b_, j) + four(a_rate_, j)) + b_[k] * four(a_, j) +
+                     m_[k] * (c_ * four(m_, j) + four(m_rate_, j)));
   }
-
-  double gamma, c;
-  BlockSizes<double> all{};  ///< of all columns
+  /// Of block columns j to j + 3 of G.
+  Vec4d of_columns(int j) const {
+    return gamma_ * (all_a_ * (four(b_, j) + four(a_rate_, j)) + all_b_ * four(a_, j) +
+                     all_m_ * (c_ * four(m_, j) + four(m_rate_, j)));
+  }
+  /// Of all of G, of block row i of N, and of all of N.
+  double of_G() const {
+    return gamma_ * (all_a_ * (2 * all_b_ + all_a_rate_) + all_m_ * (c_ * all_m_ + all_m_rate_));
+  }
+  double of_N(int i) const { return gamma_ * (a_[at(i)] * all_a_ + m_[at(i)] * all_m_); }
+  double of_N() const { return gamma_ * (all_a_ * all_a_ + all_m_ * all_m_); }
 
  private:
   using Columns = std::array<double, kMaxWidth + 4>;
-  using Blocks = std::array<double, kMaxDof + 4>;
-
+  static Vec4d four(const Blocks& x, int j) { return load(&x[at(j)]); }
   static void read_columns(const SymmetricPencil& pencil, const CoefficientSizes& sizes,
                            const BlockEigenbasis& basis, Columns& a2, Columns& b, Columns& m);
-  static double norm(const Blocks& x, const BlockEigenbasis& basis) {
-    double squares = 0;
-    for (int i = 0; i < basis.blocks(); ++i) squares += square(x[at(i)]);
-    return std::sqrt(squares);
-  }
 
+  double gamma_, c_;
   Blocks a_, b_, m_, a_rate_, m_rate_;
+  double all_a_, all_b_, all_m_, all_a_rate_, all_m_rate_;  ///< of all columns
 };
 
 /// a^2, b and m of each column.
@@ -142,259 +184,98 @@ void ErrorSizes::read_columns(const SymmetricPencil& pencil, const CoefficientSi
   }
 }
 
-/// Lower bounds of sep(Lambda_i, Lambda_j), the smallest singular value of X -> Lambda_i X - X
-/// Lambda_j, for all pairs of blocks. With p the characteristic polynomial of B, and A X - X B = Q,
-/// p(A) X = (A - t/2) Q + Q (B - t/2), t = tr B, so that sep >= s_min(p(A)) / (|A - t/2| + |B -
-/// t/2|).
-class Separations {
- public:
-  explicit Separations(const BlockEigenbasis& basis) : basis_(basis) {
-    for (int i = 0; i < basis.modes; i += 4) {
-      const std::size_t k = at(i);
-      const Vec4d a = load(&basis.l00[k]), b = load(&basis.l01[k]), c = load(&basis.l10[k]),
-                  d = load(&basis.l11[k]);
-      const Vec4d cross = b * b + c * c;
-      store(&trace_[k], a + d);
-      store(&determinant_[k], a * d - b * c);
-      store(&traceless_[k], square_root(0.5 * square(a - d) + cross));
-      store(&size2_[k], a * a + d * d + cross);
-    }
-  }
-
-  /// Of modes i to i + 3 from block j.
-  Vec4d of_four(int i, int j) const {
-    const std::size_t k = at(i);
-    if (j >= basis_.modes) {
-      const double x = basis_.rate[at(j - basis_.modes)];
-      const Vec4d trace = load(&trace_[k]);
-      const Vec4d least = magnitude(x * x - trace * x + load(&determinant_[k])) -
-                          64 * kUnit * (x * x + trace * trace + load(&size2_[k]));
-      return least / (kSlack * (magnitude(x - 0.5 * trace) + load(&traceless_[k])));
-    }
-    const Vec4d a = load(&basis_.l00[k]), b = load(&basis_.l01[k]), c = load(&basis_.l10[k]),
-                d = load(&basis_.l11[k]);
-    const double trace = trace_[at(j)];
-    const Vec4d across = load(&trace_[k]) - trace, product = b * c + determinant_[at(j)];
-    const Vec4d p00 = a * (a - trace) + product, p11 = d * (d - trace) + product;
-    const Vec4d p01 = b * across, p10 = c * across;
-    // s_min = |det p| / s_max, s_max at most the sum of all entries, less p's rounding errors.
-    const Vec4d sum = magnitude(p00) + magnitude(p01) + magnitude(p10) + magnitude(p11);
-    const Vec4d rounding = 64 * kUnit * (load(&size2_[k]) + trace * trace + size2_[at(j)]);
-    const Vec4d halves = load(&traceless_[k]) + traceless_[at(j)] + 0.7072 * magnitude(across);
-    const Vec4d least = magnitude(p00 * p11 - p01 * p10) - rounding * sum;
-    return least / (kSlack * sum * halves);
-  }
-
-  double between(int i, int j) const {
-    if (i >= basis_.modes && j >= basis_.modes) {
-      return std::abs(basis_.rate[at(i - basis_.modes)] - basis_.rate[at(j - basis_.modes)]);
-    }
-    if (i >= basis_.modes) std::swap(i, j);
-    return of_four(i / 4 * 4, j)[i % 4];
-  }
-
-  /// Of modes i to i + 3, each from all other blocks; zero if that is not a number.
-  Vec4d from_rest(int i) const {
-    Vec4d least = Vec4d{} + kInfinity;
-    for (int j = 0; j < basis_.blocks(); ++j) {
-      Vec4d apart = of_four(i, j);
-      apart = apart > 0 ? apart : Vec4d{};
-      if (j >= i && j < i + 4 && j < basis_.modes) apart[j - i] = kInfinity;
-      least = apart < least ? apart : least;
-    }
-    return least;
-  }
-
- private:
-  const BlockEigenbasis& basis_;
-  BlockEigenbasis::Entries trace_, determinant_, traceless_, size2_;
+/// A number for each pair of blocks.
+struct BlockTable {
+  std::array<Blocks, kMaxDof> rows;
+  double operator()(int i, int j) const { return rows[at(i)][at(j)]; }
 };
 
-/// Of G for one set of blocks (or one block in each lane) and the rest: squared norms of its
-/// square, of its rows beside that and of its columns above and below.
-template <typename T>
-struct SetSquares {
-  T inner, right, left;
-  T R;  ///< of its rows of R
-};
-
-class StewartBound {
- public:
-  StewartBound(const SymmetricPencil& pencil, const CoefficientSizes& sizes, double distance,
-               const BlockEigenbasis& basis, const TrackedResidual& residual)
-      : basis_(basis),
-        residual_(residual),
-        sizes_(pencil, sizes, distance, basis),
-        separations_(basis) {
-    sum_squares();
-    const BlockSizes<double>& e = sizes_.all;
-    R_norm_ = std::sqrt(R_total_) + sizes_.gamma * (square(e.a) + square(e.m));
-    G_error_ =
-        sizes_.gamma * (2 * e.a * e.b + sizes_.c * square(e.m) + e.a * e.a_rate + e.m * e.m_rate);
-    F_norm_ = kSlack * (std::sqrt(G_total_) + G_error_) / (1 - R_norm_);
-  }
-
-  double roundoff_bound() const { return G_error_; }
-  bool provable() const { return R_norm_ < kNearlyOrthonormal && F_norm_ < kInfinity; }
-
-  /// Radii of the blocks of modes i to i + 3, negative where one cannot be separated.
-  Vec4d mode_radii(int i) const {
-    const auto two = [&](const Columns& squares) {
-      return load(&squares[at(i)]) + load(&squares[at(basis_.modes + i)]);
-    };
-    return radius<Vec4d>(
-        sizes_.of<Vec4d>(i),
-        {load(&residual_.diagonal[at(i)]), two(G_rows_), two(G_columns_), two(R_rows_)},
-        separations_.from_rest(i));
-  }
-
-  /// Grows the group of block i until it can be separated, and writes its radius.
-  void prove_group(int i, TrackedEnclosure& enclosure) const;
-
- private:
-  void sum_squares();
-
-  /// Stewart's bound from norms of F, which are those of G and of what the Gram matrix and rounding
-  /// errors add; negative if the set cannot be separated.
-  template <typename T>
-  T radius(const BlockSizes<T>& set, const SetSquares<T>& squares, const T& separated) const {
-    const BlockSizes<double>& e = sizes_.all;
-    const double gamma = sizes_.gamma, c = sizes_.c;
-    const T both = set.a * e.b + set.b * e.a + c * set.m * e.m;
-    const T rows = gamma * (both + set.a * e.a_rate + set.m * e.m_rate);
-    const T columns = gamma * (both + e.a * set.a_rate + e.m * set.m_rate);
-    const T own =
-        gamma * (2 * set.a * set.b + c * set.m * set.m + set.a * set.a_rate + set.m * set.m_rate);
-    const T R = square_root(squares.R) + gamma * (set.a * e.a + set.m * e.m);
-    const T left = kSlack * (square_root(squares.left + squares.inner) + columns) / (1 - R_norm_);
-    const T right = kSlack * (square_root(squares.right) + rows + R * F_norm_);
-    const T inner = kSlack * (square_root(squares.inner) + own + R * left);
-    const T delta = separated - inner - F_norm_, product = right * left;
-    const T found = kSlack * (inner + 2 * product / delta);
-    const T apart = 4 * product < delta * delta ? found : T{} - 1;
-    return delta > 0 ? apart : T{} - 1;
-  }
-
-  const BlockEigenbasis& basis_;
-  const TrackedResidual& residual_;
-  ErrorSizes sizes_;
-  Separations separations_;
-  using Columns = std::array<double, kMaxWidth + 4>;
-  Columns G_rows_, G_columns_, R_rows_;  ///< squared norms
-  double G_total_ = 0, R_total_ = 0, G_error_ = 0, R_norm_ = 0, F_norm_ = 0;
-};
-
-/// Squared norms of the rows and columns of G (without diagonal blocks), and of the rows of
-/// Sigma - N.
-void StewartBound::sum_squares() {
-  const int columns = basis_.columns(), width = basis_.Z.width;
-  for (int j = 0; j < width; j += 4) {
-    Vec4d squares{};
-    for (int i = 0; i < columns; ++i) squares += square(load(residual_.G.row(i) + j));
-    store(&G_columns_[at(j)], squares);
-  }
-  Vec4d R_total{}, G_total{};
-  for (int i = 0; i < columns; ++i) {
-    Vec4d G_sum{}, R_sum{};
-    for (int j = 0; j < width; j += 4) {
-      G_sum += square(load(residual_.G.row(i) + j));
-      R_sum += square(load(residual_.R.row(i) + j));
+/// Lower bounds of sep(Lambda_i, Lambda_j).
+void find_separations(const BlockEigenbasis& basis, BlockTable& table) {
+  const int m = basis.modes, blocks = basis.blocks();
+  for (int j = 0; j < m; j += 4) {
+    const MeasuredBlock<Vec4d> four(basis.blocks_from(j));
+    for (int i = 0; i < m; ++i) {
+      store(&table.rows[at(i)][at(j)], separation(MeasuredBlock<double>(basis.block(i)), four));
     }
-    G_rows_[at(i)] = sum(G_sum);
-    R_rows_[at(i)] = sum(R_sum);
-    G_total += G_sum;
-    R_total += R_sum;
+    for (int i = m; i < blocks; ++i) {
+      store(&table.rows[at(i)][at(j)], separation(basis.rate[at(i - m)], four));
+    }
   }
-  G_total_ = sum(G_total);
-  R_total_ = sum(R_total);
-  for (int i = 0; i < basis_.modes; ++i) G_total_ += residual_.diagonal[at(i)];
+  for (int j = m; j < blocks; ++j) {
+    for (int i = 0; i < m; ++i) table.rows[at(i)][at(j)] = table(j, i);
+    for (int i = m; i < blocks; ++i) {
+      table.rows[at(i)][at(j)] = std::abs(basis.rate[at(i - m)] - basis.rate[at(j - m)]);
+    }
+  }
 }
 
-void StewartBound::prove_group(int i, TrackedEnclosure& enclosure) const {
-  const int blocks = basis_.blocks();
-  const auto inside = [&](int block) { return enclosure.group[at(block)] == i; };
-  std::array<int, kMaxWidth> owner{};
-  for (int block = 0; block < blocks; ++block) {
-    owner[at(basis_.first(block))] = owner[at(basis_.second(block))] = block;
+/// Whether no product that matters can underflow or overflow.
+bool in_range(const CoefficientSizes& sizes, const BlockEigenbasis& basis) {
+  bool slow = false;
+  for (int i = 0; i < basis.modes; ++i) {
+    const auto [a, b, c, d] = basis.block(i);
+    const double rate = std::abs(a) + std::abs(b) + std::abs(c) + std::abs(d);
+    slow |= rate != 0 && !(rate > 1e-60);
   }
-  for (;;) {
-    double separated = kInfinity;
-    int nearest = -1;
-    SetSquares<double> G{0, 0, 0, 0};
-    BlockSizes<double> set{0, 0, 0, 0, 0};
-    for (int j = 0; j < blocks; ++j) {
-      if (!inside(j)) continue;
-      if (j < basis_.modes) G.inner += residual_.diagonal[at(j)];
-      const auto block = sizes_.of<double>(j);
-      set.a += square(block.a);
-      set.b += square(block.b);
-      set.m += square(block.m);
-      set.a_rate += square(block.a_rate);
-      set.m_rate += square(block.m_rate);
-      for (int k = 0; k < blocks; ++k) {
-        if (inside(k)) continue;
-        const double apart = std::max(0.0, separations_.between(j, k));
-        if (apart < separated || nearest < 0) separated = apart, nearest = k;
-      }
-    }
-    for (int row = 0; row < basis_.columns(); ++row) {
-      const bool row_inside = inside(owner[at(row)]);
-      if (row_inside) G.R += R_rows_[at(row)];
-      for (int column = 0; column < basis_.columns(); ++column) {
-        const bool column_inside = inside(owner[at(column)]);
-        const double g = square(residual_.G(row, column));
-        if (row_inside) (column_inside ? G.inner : G.right) += g;
-        if (!row_inside && column_inside) G.left += g;
-      }
-    }
-    for (double* size : {&set.a, &set.b, &set.m, &set.a_rate, &set.m_rate}) {
-      *size = std::sqrt(*size);
-    }
-    const double found = radius(set, G, separated);
-    if (found >= 0 || nearest < 0) {
-      for (int j = 0; j < blocks; ++j) {
-        if (inside(j)) enclosure.radius[at(j)] = found >= 0 ? found : kInfinity;
-      }
-      return;
-    }
-    const int absorbed = enclosure.group[at(nearest)];
-    for (int j = 0; j < blocks; ++j) {
-      if (enclosure.group[at(j)] == absorbed) enclosure.group[at(j)] = i;
-    }
-  }
+  return sizes.in_range && !slow;
+}
+
+/// Squared norms of the blocks (i, 0) to (i, blocks) of X.
+void row_squares(const BlockEigenbasis& basis, const PackedMatrix& X, int i, Blocks& out) {
+  const int m = basis.modes;
+  const double *const first = X.row(basis.first(i)), *const second = X.row(basis.second(i));
+  const auto squares = [&](int column) {
+    const Vec4d upper = square(load(first + column));
+    return i < m ? upper + square(load(second + column)) : upper;
+  };
+  for (int j = 0; j < m; j += 4) store(&out[at(j)], squares(j) + squares(m + j));
+  for (int k = 0; k < basis.zeros; k += 4) store(&out[at(m + k)], squares(2 * m + k));
 }
 
 }  // namespace
 
-void enclose(const SymmetricPencil& pencil, const CoefficientSizes& sizes, double distance,
-             const BlockEigenbasis& basis, const TrackedResidual& residual,
-             TrackedEnclosure& enclosure) noexcept {
+void enclose(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
+             const TrackedResidual& residual, TrackedEnclosure& enclosure) noexcept {
+  const CoefficientSizes sizes = coefficient_sizes(pencil);
+  const ErrorSizes errors(pencil, sizes, basis);
   const int blocks = basis.blocks();
+  enclosure.reset(blocks);
+  enclosure.roundoff_bound = errors.of_G();
+  BlockTable coupling, separations;
+  Blocks R_rows{}, G_columns{}, own;
+  double R_total = 0;
   for (int i = 0; i < blocks; ++i) {
-    enclosure.group[at(i)] = i;
-    enclosure.radius[at(i)] = kInfinity;
-  }
-  const StewartBound prover(pencil, sizes, distance, basis, residual);
-  enclosure.roundoff_bound = prover.roundoff_bound();
-  if (sizes.in_range && prover.provable()) {
-    std::array<double, kMaxDof> radii;
-    for (int i = 0; i < basis.modes; i += 4) store(&radii[at(i)], prover.mode_radii(i));
-    for (int i = 0; i < basis.modes; ++i) {
-      if (enclosure.group[at(i)] != i) continue;
-      if (radii[at(i)] >= 0) {
-        enclosure.radius[at(i)] = radii[at(i)];
-      } else {
-        prover.prove_group(i, enclosure);
-      }
+    Blocks R;
+    row_squares(basis, residual.R, i, R);
+    for (int j = 0; j < blocks; ++j) R_rows[at(i)] += R[at(j)];
+    R_total += R_rows[at(i)];
+    Blocks& G = coupling.rows[at(i)];
+    row_squares(basis, residual.G, i, G);
+    if (i < basis.modes) G[at(i)] = residual.diagonal[at(i)];
+    for (int j = 0; j < blocks; j += 4) {
+      store(&G_columns[at(j)], load(&G_columns[at(j)]) + load(&G[at(j)]));
     }
   }
-  for (int i = 0; i < blocks; ++i) {
-    int members = 0;
-    for (int j = 0; j < blocks; ++j) {
-      members += enclosure.group[at(j)] == enclosure.group[at(i)] ? 1 : 0;
-    }
-    enclosure.alone[at(i)] = members == 1;
+  const double R_norm = std::sqrt(R_total) + errors.of_N();
+  if (!in_range(sizes, basis) || !(R_norm < kNearlyOrthonormal)) return;
+  // F = Sigma (G - R F), and so |F| <= |G| / (1 - |R|) for each column.
+  for (int j = 0; j < blocks; j += 4) {
+    const Vec4d columns = square_root(load(&G_columns[at(j)])) + errors.of_columns(j);
+    store(&G_columns[at(j)], kSlack * columns / (1 - R_norm));
   }
+  for (int i = 0; i < blocks; ++i) {
+    const double R = std::sqrt(R_rows[at(i)]) + errors.of_N(i);
+    Blocks& row = coupling.rows[at(i)];
+    for (int j = 0; j < blocks; j += 4) {
+      const Vec4d F = kSlack * (square_root(load(&row[at(j)])) + errors.of_G(i, j) +
+                                R * load(&G_columns[at(j)]));
+      if (i >= j && i < j + 4) own[at(i)] = F[i - j];
+      store(&row[at(j)], square(F));
+    }
+  }
+  find_separations(basis, separations);
+  prove(PerturbationBounds<BlockTable, Blocks>{coupling, separations, own}, enclosure);
 }
 
 }  // namespace dashpot::analysis

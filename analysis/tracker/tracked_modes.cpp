@@ -16,78 +16,32 @@ std::size_t at(int i) {
   return static_cast<std::size_t>(i);
 }
 
-struct RootList {
-  std::array<Root, 2 * kMaxDof> items;
-  std::array<int, 2 * kMaxDof> block{};
-  int size = 0;
-
-  Root& operator[](int i) { return items[at(i)]; }
-  const Root& operator[](int i) const { return items[at(i)]; }
-};
+using Roots = std::array<BlockRoot, 2 * kMaxDof>;
 
 /// Two roots for each mode, in the order of the modes, then one for each zero mode; with the radius
 /// of the disc of each.
-void list_roots(const BlockEigenbasis& basis, const TrackedEnclosure& enclosure, RootList& roots) {
-  roots.size = basis.columns();
+void list_roots(const BlockEigenbasis& basis, const TrackedEnclosure& enclosure, Roots& roots) {
   for (int i = 0; i < basis.modes; ++i) {
-    const double l00 = basis.l00[at(i)], l01 = basis.l01[at(i)], l10 = basis.l10[at(i)],
-                 l11 = basis.l11[at(i)];
+    const Block2<double> L = basis.block(i);
     std::array<Complex, 2> values;
-    eigenvalues_2x2(l00, l01, l10, l11, values[0], values[1]);
-    const double norm = std::sqrt(l00 * l00 + l01 * l01 + l10 * l10 + l11 * l11);
-    const double radius = enclosure.radius[at(i)] + 16 * kUnit * norm;
+    eigenvalues_2x2(L.a, L.b, L.c, L.d, values[0], values[1]);
+    const double norm = std::sqrt(L.squared_norm());
+    const double radius = enclosure.radius[i] + 16 * kUnit * norm;
     const bool conjugate = values[0].imag() != 0;
     for (int e = 0; e < 2; ++e) {
-      roots.block[at(2 * i + e)] = i;
-      roots[2 * i + e] = {values[at(e)], e == 1 && conjugate
-                                             ? roots[2 * i].bound
-                                             : disc_radius(values.data(), 2, e, norm, radius)};
+      BlockRoot& root = roots[at(2 * i + e)];
+      root.value = values[at(e)];
+      root.block = i;
+      root.radius = e == 1 && conjugate ? roots[at(2 * i)].radius
+                                        : disc_radius(values.data(), 2, e, norm, radius);
     }
   }
   for (int k = 0; k < basis.zeros; ++k) {
-    roots.block[at(2 * basis.modes + k)] = basis.modes + k;
-    roots[2 * basis.modes + k] = {basis.rate[at(k)], enclosure.radius[at(basis.modes + k)]};
+    BlockRoot& root = roots[at(2 * basis.modes + k)];
+    root.value = basis.rate[at(k)];
+    root.block = basis.modes + k;
+    root.radius = enclosure.radius[basis.modes + k];
   }
-}
-
-/// Bound for root i where its disc may meet others of its group: all that is known then is how many
-/// eigenvalues the union of the discs holds, so that the bound is the sum of their diameters.
-double bound_in_group(const RootList& roots, const TrackedEnclosure& enclosure, int i) {
-  std::array<bool, 2 * kMaxDof> inside{};
-  inside[at(i)] = true;
-  double total = 2 * roots[i].bound;
-  bool several = false;
-  for (bool grown = true; grown;) {
-    grown = false;
-    for (int j = 0; j < roots.size; ++j) {
-      if (inside[at(j)] ||
-          enclosure.group[at(roots.block[at(i)])] != enclosure.group[at(roots.block[at(j)])]) {
-        continue;
-      }
-      for (int k = 0; k < roots.size && !inside[at(j)]; ++k) {
-        if (!inside[at(k)]) continue;
-        if (!(modulus(roots[j].value - roots[k].value) > roots[j].bound + roots[k].bound)) {
-          inside[at(j)] = grown = several = true;
-          total += 2 * roots[j].bound;
-        }
-      }
-    }
-  }
-  return several ? total : roots[i].bound;
-}
-
-/// Eigenvector of a mode's block: (Lambda - mu) w = 0 from the row that says more.
-std::array<Complex, 2> block_vector(const BlockEigenbasis& basis, int i, const Complex& mu) {
-  const double l01 = basis.l01[at(i)], l10 = basis.l10[at(i)];
-  const Complex p = basis.l00[at(i)] - mu, s = basis.l11[at(i)] - mu;
-  std::array<Complex, 2> w;
-  if (std::norm(p) + l01 * l01 >= std::norm(s) + l10 * l10) {
-    w = {l01, -p};
-  } else {
-    w = {-s, l10};
-  }
-  if (w[0] == 0.0 && w[1] == 0.0) w = {1, 0};
-  return w;
 }
 
 /// What a group of four modes needs for one eigenvector each: w, and the eigenvalues mu.
@@ -99,7 +53,8 @@ struct VectorGroup {
 void set_vector(const BlockEigenbasis& basis, const PackedMatrix& E, int i, const Complex& mu,
                 int lane, VectorGroup& group) {
   const int j = basis.modes + i;
-  const std::array<Complex, 2> w = block_vector(basis, i, mu);
+  const auto [a, b, c, d] = basis.block(i);
+  const std::array<Complex, 2> w = eigenvector_2x2(a, b, c, d, mu);
   group.mu[at(lane)] = mu;
   group.w0[at(lane)] = w[0] - (E(i, i) * w[0] + E(i, j) * w[1]);
   group.w1[at(lane)] = w[1] - (E(j, i) * w[0] + E(j, j) * w[1]);
@@ -111,9 +66,9 @@ constexpr double kNoMotion = 1e-290;
 
 /// u = V w of unit kinetic energy u^H M u, its largest entry real and positive, for `lanes` modes
 /// from `first` on.
-void write_shapes(const BlockEigenbasis& basis, const PackedMatrix& velocities,
-                  const PackedMatrix& momenta, int first, int lanes, std::size_t which,
-                  const VectorGroup& group, std::array<TrackedShapes, kMaxDof>& out) {
+void write_shapes(const BlockEigenbasis& basis, const PackedMatrix& momenta, int first, int lanes,
+                  std::size_t which, const VectorGroup& group,
+                  std::array<TrackedShapes, kMaxDof>& out) {
   const int n = basis.modes + basis.zeros;
   const auto gather = [](const std::array<Complex, 4>& from, bool imaginary) {
     Vec4d result;
@@ -125,8 +80,8 @@ void write_shapes(const BlockEigenbasis& basis, const PackedMatrix& velocities,
   std::array<Vec4d, kMaxDof> x, y;
   Vec4d energy{}, largest{}, x_largest{}, y_largest{};
   for (int k = 0; k < n; ++k) {
-    const Vec4d v = load(velocities.row(k) + first);
-    const Vec4d w = load(velocities.row(k) + basis.modes + first);
+    const Vec4d v = load(basis.Z.row(basis.modes + k) + first);
+    const Vec4d w = load(basis.Z.row(basis.modes + k) + basis.modes + first);
     const Vec4d p = load(momenta.row(k) + first);
     const Vec4d q = load(momenta.row(k) + basis.modes + first);
     const Vec4d re = v * a + w * c, im = v * b + w * d;
@@ -175,22 +130,16 @@ void sort_by_frequency(TrackedSpectrum& out) noexcept {
 void read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosure,
                   double soft_frequency, std::array<bool, kMaxDof>& soft,
                   TrackedSpectrum& out) noexcept {
-  RootList roots;
+  Roots roots;
   list_roots(basis, enclosure, roots);
+  bound_roots(roots.data(), basis.columns(), enclosure.group);
   out.mode_count = basis.modes;
   out.status = Status::kOk;
   for (int i = 0; i < basis.modes; ++i) {
-    Root first = roots[2 * i], second = roots[2 * i + 1];
-    const bool apart = modulus(first.value - second.value) > first.bound + second.bound;
-    if (!enclosure.alone[at(i)] || !apart) {
-      first.bound = bound_in_group(roots, enclosure, 2 * i);
-      second.bound = bound_in_group(roots, enclosure, 2 * i + 1);
-    }
-    first.bound += 2 * kUnit * modulus(first.value);
-    second.bound += 2 * kUnit * modulus(second.value);
-    Invariants invariants = block_invariants(basis.l00[at(i)], basis.l01[at(i)], basis.l10[at(i)],
-                                             basis.l11[at(i)], enclosure.radius[at(i)]);
-    if (!enclosure.alone[at(i)]) {
+    const BlockRoot &first = roots[at(2 * i)], &second = roots[at(2 * i + 1)];
+    const auto [a, b, c, d] = basis.block(i);
+    Invariants invariants = block_invariants(a, b, c, d, enclosure.radius[i]);
+    if (!enclosure.alone(i)) {
       const Invariants of_roots = root_invariants(first, second);
       invariants.sum_error = of_roots.sum_error;
       invariants.product_error = of_roots.product_error;
@@ -207,11 +156,11 @@ void read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosur
 }
 
 void read_shapes(const SymmetricPencil& pencil, const BlockEigenbasis& basis, const PackedMatrix& E,
-                 const PackedMatrix& velocities, PackedMatrix& momenta,
-                 TrackedSpectrum& out) noexcept {
+                 PackedMatrix& momenta, TrackedSpectrum& out) noexcept {
   momenta.width = basis.Z.width;
   padded_multiply(momenta.width)({pencil.M, 1, pencil.joints}, pencil.joints, pencil.joints,
-                                 velocities.row(0), nullptr, 1, momenta.row(0), momenta.width);
+                                 basis.Z.row(pencil.rank), nullptr, 1, momenta.row(0),
+                                 momenta.width);
   for (int first = 0; first < basis.modes; first += 4) {
     const int lanes = std::min(4, basis.modes - first);
     VectorGroup group{};
@@ -222,7 +171,7 @@ void read_shapes(const SymmetricPencil& pencil, const BlockEigenbasis& basis, co
         set_vector(basis, E, first + lane, values[which], lane, group);
         any_real |= values[0].imag() == 0;
       }
-      write_shapes(basis, velocities, momenta, first, lanes, which, group, out.shapes);
+      write_shapes(basis, momenta, first, lanes, which, group, out.shapes);
     };
     vectors(0);
     if (any_real) vectors(1);

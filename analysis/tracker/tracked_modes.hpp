@@ -13,9 +13,9 @@ void read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosur
 /// Fills out.order.
 void sort_by_frequency(TrackedSpectrum& out) noexcept;
 
-/// Computes eigenvectors from the velocity rows V (n) of Z (I + E), and writes M V to `momenta`.
+/// Computes eigenvectors from a basis whose last step was E. Its blocks belong to the basis before
+/// that step. Writes M V to `momenta`, with the velocity rows V (n) of the basis.
 void read_shapes(const SymmetricPencil& pencil, const BlockEigenbasis& basis, const PackedMatrix& E,
-                 const PackedMatrix& velocities, PackedMatrix& momenta,
-                 TrackedSpectrum& out) noexcept;
+                 PackedMatrix& momenta, TrackedSpectrum& out) noexcept;
 
 }  // namespace dashpot::analysis

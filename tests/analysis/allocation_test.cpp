@@ -129,15 +129,15 @@ TEST(Allocation, DoesNotHappenWhereTheLoopHoldsADampingRatio) {
   for (int n = 1; n <= kMaxDof; ++n) {
     const TaskImpedance arm = testing::random_arm(random, n, 6);
     const Square<kMaxDof> M = arm.mass;
-    const TaskJacobian<kMaxDof> J = *arm.jacobian;
+    const TaskJacobian<kMaxDof> J = *arm.jacobian, bad = J / 0.0;
     const TaskMatrix K_C = *arm.task_stiffness;
-    RatioDamping hold;
+    RatioDamping damper;
     TaskMatrix C_C;
     Status status = Status::kNotFinite;
     EXPECT_EQ(allocations_of([&] {
-                hold.set_stiffness(K_C);
-                status = hold.update<kMaxDof>(M, J, C_C);
-                hold.update<kMaxDof>(M, J / 0.0, C_C);
+                damper.set_stiffness(K_C);
+                status = damper.update(M, J, C_C);
+                damper.update(M, bad, C_C);
               }),
               0)
         << "n = " << n;

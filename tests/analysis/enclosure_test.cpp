@@ -72,6 +72,21 @@ Enclosed expect_enclosed(const System<>& system, const Spectrum<>& spectrum) {
   return seen;
 }
 
+TEST(RootBounds, AreTheFarthestPointsOfUnionsOfDiscs) {
+  // Discs of one group: three that hang together, a fourth apart; and one of another group.
+  const std::array<double, 5> values = {0, 1, 1.5, 9, 1.2}, radii = {0.6, 0.6, 0.1, 0.5, 3};
+  const std::array<int, 5> groups = {0, 0, 0, 0, 4};
+  const std::array<double, 5> bounds = {1.6, 1.6, 2.1, 0.5, 3};
+  std::array<BlockRoot, 5> roots;
+  for (std::size_t i = 0; i < 5; ++i) {
+    roots[i].value = values[i];
+    roots[i].radius = radii[i];
+    roots[i].block = static_cast<int>(i);
+  }
+  bound_roots(roots.data(), 5, groups);
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_NEAR(roots[i].bound, bounds[i], 1e-14) << i;
+}
+
 TEST(BlockEnclosure, OfAPerturbedBasisStillEncloses) {
   Random random(1001);
   for (const double perturbation : {1e-13, 1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1}) {
@@ -255,7 +270,7 @@ TEST(DiscRadius, IsNoLargerThanItsInequalityAsks) {
                                         Complex(-2, 0)};
     constexpr double kNorm = 3;
     const double d = disc_radius(values.data(), 4, 1, kNorm, radius) / 1.05;
-    const double norm = kNorm + 2 * std::abs(values[1]);
+    const double norm = kNorm + std::abs(values[1]);
     double product = 1;
     for (const Complex& value : values) {
       product *= std::max(d, 0.5 * std::abs(values[1] - value)) / (norm + d);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -99,6 +100,55 @@ TEST(ModeTracker, HasRoomForModesThatDampingMakesOfZeroModes) {
     }
   }
   EXPECT_GT(found, 3);
+}
+
+/// C = d A with a large d: slow eigenvalues are near those of -A^-1 K / d, that is -2 / d and
+/// -10 / (3 d), and fast ones near those of -d A.
+TEST(ModeTracker, KeepsTheSlowEigenvaluesOfHeavilyOverdampedModes) {
+  for (const double d : {1e4, 1e5, 1e8}) {
+    SCOPED_TRACE(d);
+    System<kMaxDof> system(2);
+    system.stiffness << 2, 1, 1, 3;
+    Tracked tracked;
+    for (int call = 0; call < 3; ++call) {
+      const double damping = d * (1 + 1e-6 * call);
+      system.damping << damping, 0.5 * damping, 0.5 * damping, damping;
+      ASSERT_EQ(tracked.update(system), Status::kOk);
+      std::array<double, 2> slow{};
+      for (int i = 0; i < 2; ++i) {
+        const ModeNumbers& mode = tracked.mode(i);
+        slow[static_cast<std::size_t>(i)] = -mode.eigenvalues[0].real() * damping;
+        EXPECT_EQ(mode.kind, ModeKind::kOverdamped);
+        EXPECT_LE(mode.natural_frequency_bound, 1e-6 * mode.natural_frequency);
+        EXPECT_LE(mode.damping_ratio_bound, 1e-6 * mode.damping_ratio);
+        const double product = (mode.eigenvalues[0] * mode.eigenvalues[1]).real();
+        EXPECT_NEAR(mode.natural_frequency, std::sqrt(product), 1e-6);
+      }
+      std::sort(slow.begin(), slow.end());
+      EXPECT_NEAR(slow[0], 2, 1e-6);
+      EXPECT_NEAR(slow[1], 10.0 / 3, 1e-6);
+    }
+  }
+}
+
+/// Underflow is not counted below 1e-60 rad/s.
+TEST(ModeTracker, ProvesNothingOfVibrationsThatAreTooSlow) {
+  for (const double frequency : {1e-50, 1e-65, 1e-150}) {
+    SCOPED_TRACE(frequency);
+    System<kMaxDof> system(2);
+    system.stiffness_factor.resize(2, 2);
+    TrackerOptions options;
+    options.soft_frequency = 0;
+    Tracked tracked(options);
+    for (int call = 0; call < 3; ++call) {
+      system.stiffness_factor << frequency, 0, 0, 3 * frequency * (1 + 1e-5 * call);
+      const Status status = tracked.update(system);
+      ASSERT_EQ(status, frequency > 1e-60 ? Status::kOk : Status::kUncertified);
+      for (int i = 0; i < tracked.spectrum->mode_count; ++i) {
+        EXPECT_EQ(std::isfinite(tracked.mode(i).error_bound), frequency > 1e-60) << call;
+      }
+    }
+  }
 }
 
 TEST(ModeTracker, SolvesASingularStiffnessWithoutFactorDirectly) {

@@ -57,8 +57,7 @@ struct Follower : testing::Tracked {
 void expect_followed(const TrackerCounters& counters) {
   EXPECT_EQ(counters.direct, 1);
   EXPECT_EQ(counters.failed, 0);
-  EXPECT_EQ(counters.tracked + counters.reused, counters.updates - 1);
-  EXPECT_LE(counters.most_iterations, TrackerOptions{}.max_iterations);
+  EXPECT_EQ(counters.tracked + counters.reused, counters.updates() - 1);
 }
 
 TEST(TrackedPath, ThroughCriticalDampingIsSmooth) {
@@ -189,9 +188,6 @@ TEST(TrackedPath, RealEigenvaluesOfTwoModesMeetAndPartAgain) {
       return system_of(MatrixXd::Identity(2, 2), C, K);
     });
     EXPECT_GE(follower.counters().tracked, 3990);
-    if (coupling == 0.01 || coupling == 0.3) {
-      EXPECT_GE(follower.counters().separations, 1);
-    }
   }
 }
 
@@ -216,31 +212,32 @@ TEST(TrackedPath, ModesThatStayEqualAreReportedEqual) {
   }
 }
 
+/// A system that stands still has the numbers and shapes of the update before, to the last bit.
 TEST(TrackedPath, FrozenInputIsReused) {
-  const System<kMaxDof> system = exchange(0.2, 0.5);
   Follower follower;
-  follower.follow(100, 10, [&](double) { return system; });
-  EXPECT_EQ(follower.counters().reused, 100);
+  follower.follow(10, 1, [&](double t) { return exchange(0.1 + 0.01 * t, 0.5); });
+  const TrackedSpectrum moving = *follower.spectrum;
+  EXPECT_EQ(moving.origin, SpectrumOrigin::kTracked);
+  follower.follow(100, 10, [&](double) { return exchange(0.11, 0.5); });
+  EXPECT_EQ(follower.counters().reused, 101);
   EXPECT_EQ(follower.counters().direct, 1);
   EXPECT_EQ(follower.spectrum->origin, SpectrumOrigin::kReused);
-}
-
-TEST(TrackedPath, NearlyFrozenInputIsReusedWithinABoundThatSaysSo) {
-  Random random(3004);
-  TrackerOptions options;
-  options.reuse_tolerance = 1e-8;
-  options.target_bound = 1e-4;
-  Follower follower(options);
-  const System<kMaxDof> base = exchange(0.2, 0.5);
-  follower.follow(200, 1, [&](double) {
-    System<kMaxDof> system = base;
-    system.stiffness(0, 0) *= 1 + random.uniform(-1e-9, 1e-9);
-    system.mass(1, 1) *= 1 + random.uniform(-1e-9, 1e-9);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const ModeNumbers &was = moving.modes[i], &is = follower.spectrum->modes[i];
+    EXPECT_EQ(is.eigenvalues, was.eigenvalues);
+    EXPECT_EQ(is.error_bound, was.error_bound);
+    EXPECT_EQ(is.damping_ratio_bound, was.damping_ratio_bound);
+    EXPECT_EQ(follower.spectrum->shapes[i].u[0], moving.shapes[i].u[0]);
+    EXPECT_EQ(follower.spectrum->shapes[i].slope, moving.shapes[i].slope);
+  }
+  // A change of the last bit of one coefficient is a change.
+  follower.follow(1, 1, [&](double) {
+    System<kMaxDof> system = exchange(0.11, 0.5);
+    system.damping(1, 1) = std::nextafter(system.damping(1, 1), 1);
     return system;
   });
-  EXPECT_EQ(follower.counters().reused, 200);
-  EXPECT_GT(follower.mode(0).error_bound, 1e-11);
-  EXPECT_LT(follower.mode(0).error_bound, 1e-5);
+  EXPECT_EQ(follower.counters().reused, 102);
+  EXPECT_EQ(follower.counters().tracked, 11);
 }
 
 TEST(TrackedPath, JumpsAreSolvedAnew) {
@@ -250,8 +247,6 @@ TEST(TrackedPath, JumpsAreSolvedAnew) {
     return system_of(random.spd(6), 3 * random.spd(6), 100 * random.spd(6));
   });
   EXPECT_GE(follower.counters().direct, 30);
-  EXPECT_EQ(follower.counters().of(Fallback::kStart), 1);
-  EXPECT_LE(follower.counters().most_iterations, TrackerOptions{}.max_iterations);
 }
 
 TEST(TrackedPath, KeepsPlacesWhereAJumpIsSolvedAnew) {
@@ -372,10 +367,7 @@ TEST(TrackedPath, GoesThroughAStretchedSingularityAndBack) {
     EXPECT_LT(smallest, 0.05);
     EXPECT_EQ(follower.spectrum->mode_count, 2);
     EXPECT_EQ(follower.spectrum->zero_mode_count, 1);
-    EXPECT_GE(follower.counters().tracked, 3990)
-        << follower.counters().of(Fallback::kNotConverged) << " not converged, "
-        << follower.counters().of(Fallback::kCoincidence) << " coincidences, "
-        << follower.counters().of(Fallback::kStart) << " starts";
+    EXPECT_GE(follower.counters().tracked, 3990);
   }
 }
 
@@ -394,7 +386,6 @@ TEST(TrackedPath, OfAPandaArmIsFollowedAtAnyDamping) {
         3000, 25, [&](double t) { return testing::panda_impedance(testing::swing(3 * t), ratio); });
     EXPECT_EQ(follower.spectrum->mode_count, 6);
     EXPECT_LE(follower.counters().direct, 5);
-    EXPECT_LE(follower.counters().most_iterations, TrackerOptions{}.max_iterations);
     if (ratio < 1) {
       expect_followed(follower.counters());
       EXPECT_LT(follower.largest_jump, 0.5);

@@ -75,7 +75,7 @@ void expect_dual(const System<>& system, const DualEigenvectors& dual, double to
 
 System<> reduced(const System<>& system, const Spectrum<>& spectrum) {
   const RigidBodyElimination elimination =
-      eliminate_successively(system, spectrum.zero_modes, Pivot::kLast);
+      eliminate_zero_modes(system, spectrum.zero_modes, Pivot::kLast);
   System<> result(elimination.mass.rows());
   result.mass = elimination.mass;
   result.damping = elimination.damping;

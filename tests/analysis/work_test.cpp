@@ -106,8 +106,7 @@ TEST(Work, OfTheTrackerIsAllOrNothing) {
   }
   const TrackerCounters& counters = tracker->counters();
   EXPECT_EQ(counters.unfinished, 2);
-  EXPECT_EQ(counters.updates, counters.tracked + counters.reused + counters.direct +
-                                  counters.failed + counters.unfinished);
+  EXPECT_EQ(counters.updates(), 4);
 }
 
 /// An update that ends before it has followed the modes loses nothing: neither what the next one

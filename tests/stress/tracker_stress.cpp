@@ -40,18 +40,13 @@ void add(const TrackerCounters& from, TrackerCounters& to) {
   to.direct += from.direct;
   to.failed += from.failed;
   to.iterations += from.iterations;
-  to.separations += from.separations;
-  to.most_iterations = std::max(to.most_iterations, from.most_iterations);
-  for (std::size_t k = 0; k < kFallbackCount; ++k) to.fallbacks[k] += from.fallbacks[k];
 }
 
 /// One path, made and followed with `seed`.
 void follow(const PathFamily& family, std::uint64_t seed, int steps, Tally& tally) {
   Dice dice(seed);
   const SystemPath path = family.make(dice);
-  TrackerOptions options;
-  if (dice.uniform(0, 1) < 0.5) options.reuse_tolerance = dice.log_uniform(1e-15, 1e-9);
-  const auto tracker = std::make_unique<ModeTracker>(options);
+  const auto tracker = std::make_unique<ModeTracker>();
   const auto spectrum = std::make_unique<TrackedSpectrum>();
   for (int step = 0; step < steps; ++step) {
     const double t = static_cast<double>(step) / (kStepsOfAPath - 1);
@@ -85,23 +80,19 @@ void follow(const PathFamily& family, std::uint64_t seed, int steps, Tally& tall
 }
 
 void print_head() {
-  std::printf("%-17s %7s %6s %7s %6s %6s %6s | %6s %6s %6s | %5s %4s %6s | %8s %8s\n", "family",
-              "steps", "digits", "tracked", "reused", "direct", "failed", "start", "jump", "coinc.",
-              "pass", "most", "parted", "err/bnd", "widest");
+  std::printf("%-17s %7s %6s %7s %6s %6s %6s | %5s | %8s %8s\n", "family", "steps", "digits",
+              "tracked", "reused", "direct", "failed", "pass", "err/bnd", "widest");
 }
 
 void print(const std::string& name, const Tally& t) {
   const TrackerCounters& c = t.counters;
-  std::printf(
-      "%-17s %7ld %6ld %7lld %6lld %6lld %6lld | %6lld %6lld %6lld | %5.2f %4d %6lld | %8.2g %8.1e",
-      name.c_str(), t.steps, t.precise, static_cast<long long>(c.tracked),
-      static_cast<long long>(c.reused), static_cast<long long>(c.direct),
-      static_cast<long long>(c.failed), static_cast<long long>(c.of(Fallback::kStart)),
-      static_cast<long long>(c.of(Fallback::kNotConverged)),
-      static_cast<long long>(c.of(Fallback::kCoincidence)),
-      static_cast<double>(c.iterations) /
-          static_cast<double>(std::max<std::int64_t>(1, c.tracked + c.direct)),
-      c.most_iterations, static_cast<long long>(c.separations), t.tightest, t.widest);
+  std::printf("%-17s %7ld %6ld %7lld %6lld %6lld %6lld | %5.2f | %8.2g %8.1e", name.c_str(),
+              t.steps, t.precise, static_cast<long long>(c.tracked),
+              static_cast<long long>(c.reused), static_cast<long long>(c.direct),
+              static_cast<long long>(c.failed),
+              static_cast<double>(c.iterations) /
+                  static_cast<double>(std::max<std::int64_t>(1, c.tracked + c.direct)),
+              t.tightest, t.widest);
   if (t.unproved > 0) std::printf(", %ld steps without a bound", t.unproved);
   if (t.outside > 0) std::printf(", %ld OUTSIDE", t.outside);
   std::printf("\n");

@@ -14,61 +14,55 @@ inline bool has_modes(analysis::Status status) {
   return status == analysis::Status::kOk || status == analysis::Status::kUncertified;
 }
 
-/// Follows a path five times: with everything computed at each step, without shapes, reusing what
-/// hardly changed, from a start one step before (nothing to extrapolate), and solved directly.
+/// Follows a path four times: each system once, without shapes, each system twice, and solved
+/// directly.
 class TrackerSkips {
  public:
   /// A new path.
-  void start(double reuse_tolerance) {
-    full_ = tracker(-1, true);
-    plain_ = tracker(-1, false);
-    reusing_ = tracker(reuse_tolerance, true);
-    fresh_.reset();
+  void start() {
+    full_ = tracker(true);
+    plain_ = tracker(false);
+    twice_ = tracker(true);
   }
 
   void step(const TrackedSystem& system) {
-    const std::int64_t predicted = full_->counters().predicted;
-    if (!has_modes(full_->update(system, *modes_))) return;
+    const bool solved = has_modes(full_->update(system, *modes_));
+    const bool again = has_modes(twice_->update(system, *other_));
+    if (!solved) return;
     const PlainModes modes = plain_modes(*modes_);
     const int zeros = modes_->zero_mode_count;
+    if (again && has_modes(twice_->update(system, *other_))) {
+      if (other_->origin == analysis::SpectrumOrigin::kReused) ++reuse.left_out;
+      compare_bits(plain_modes(*other_), modes, reuse);
+    } else {
+      reuse.fail();
+    }
     if (has_modes(plain_->update(system, *other_))) {
       compare_bits(plain_modes(*other_), modes, shapes);
     } else {
       shapes.fail();
     }
     ++shapes.left_out;
-    if (has_modes(reusing_->update(system, *other_))) {
-      compare_bounded(plain_modes(*other_), modes, zeros, 0, reuse);
-      if (other_->origin == analysis::SpectrumOrigin::kReused) ++reuse.left_out;
-    }
-    if (fresh_ && has_modes(fresh_->update(system, *other_)) && fresh_->counters().predicted == 0) {
-      compare_bounded(modes, plain_modes(*other_), zeros, 0, extrapolation);
-      extrapolation.left_out += full_->counters().predicted - predicted;
-    }
-    fresh_ = tracker(-1, true);
-    if (!has_modes(fresh_->update(system, *other_))) return;
+    const auto fresh = tracker(true);
+    if (!has_modes(fresh->update(system, *other_))) return;
     compare_bounded(modes, plain_modes(*other_), zeros, 0, direct);
     if (modes_->origin == analysis::SpectrumOrigin::kTracked) ++direct.left_out;
   }
 
-  SkipTally reuse{"spectrum reused within a tolerance"};
+  SkipTally reuse{"spectrum of the same system published again"};
   SkipTally shapes{"no shapes: values only"};
-  SkipTally extrapolation{"iterations saved by extrapolation"};
   SkipTally direct{"followed, not solved directly"};
-  std::vector<const SkipTally*> tallies() const {
-    return {&reuse, &shapes, &extrapolation, &direct};
-  }
+  std::vector<const SkipTally*> tallies() const { return {&reuse, &shapes, &direct}; }
 
  private:
   using Tracker = std::unique_ptr<analysis::ModeTracker>;
-  static Tracker tracker(double reuse_tolerance, bool shapes) {
+  static Tracker tracker(bool shapes) {
     analysis::TrackerOptions options;
-    options.reuse_tolerance = reuse_tolerance;
     options.shapes = shapes;
     return std::make_unique<analysis::ModeTracker>(options);
   }
 
-  Tracker full_, plain_, reusing_, fresh_;
+  Tracker full_, plain_, twice_;
   std::unique_ptr<analysis::TrackedSpectrum> modes_ = std::make_unique<analysis::TrackedSpectrum>(),
                                              other_ = std::make_unique<analysis::TrackedSpectrum>();
 };

@@ -1,0 +1,253 @@
+// Each term of the bounds of eigenvalues, frequencies and ratios, in a case that is not enclosed
+// without it.
+#include <dashpot/analysis/spectrum/enclosure.hpp>
+#include <dashpot/analysis/spectrum/mode_numbers.hpp>
+#include <dashpot/analysis/spectrum/modes.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/systems.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <numbers>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::Matrix2d;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::LongComplex;
+using testing::LongMatrix;
+using testing::Random;
+
+// ------------------------------------------------------------------- from a block to eigenvalues
+
+TEST(ModeNumberTerms, DiscsOfAPairThatMeets) {
+  // [g/2 N; e -g/2] with e = -share g^2 / (4 N): the eigenvalues meet at 0 for share = 1.
+  const double gap = 1e-3, N = 1;
+  const std::array<Complex, 3> values{gap / 2, -gap / 2, 1};
+  for (const double share : {0.5, 0.9, 1.0}) {
+    const double disc = disc_radius(values.data(), 2, 0, N, share * gap * gap / (4 * N));
+    EXPECT_GE(disc, gap / 2 * (1 - std::sqrt(1 - share))) << share;
+    EXPECT_LE(disc, 0.51 * share * gap) << share;
+    // With a third eigenvalue, by the other road.
+    const double wider = disc_radius(values.data(), 3, 0, N, share * gap * gap / (4 * N));
+    EXPECT_GE(wider, gap / 2 * (1 - std::sqrt(1 - share))) << share;
+    EXPECT_LE(wider, 1.1 * share * gap) << share;
+  }
+}
+
+TEST(ModeNumberTerms, DiscsOfJordanBlocks) {
+  // The eigenvalues of a Jordan block with e in its corner are the k-th roots of e.
+  for (const int size : {2, 3, 4, 6}) {
+    const Eigen::ArrayXcd values = Eigen::ArrayXcd::Zero(size);
+    for (const double e : {1e-12, 1e-6, 1e-3}) {
+      const double disc = disc_radius(values.data(), size, 0, 1, e), root = std::pow(e, 1.0 / size);
+      EXPECT_GE(disc, root) << size;
+      EXPECT_LE(disc, 1.1 * root * (1 + root)) << size;
+    }
+  }
+}
+
+/// Modes of a basis of one block for each list of columns, with given radii and groups.
+Spectrum<> modes_of(const System<>& system, const MatrixXd& Lambda, const MatrixXd& U,
+                    const std::vector<int>& sizes, const BlockEnclosure<>& enclosure) {
+  Spectrum<> spectrum;
+  spectrum.basis.U = U;
+  spectrum.basis.Lambda = Lambda;
+  int first = 0;
+  for (const int size : sizes) {
+    spectrum.basis.blocks.push_back({first, size, false});
+    first += size;
+  }
+  BasisResidual<> residual;
+  evaluate_residual<kDynamic>(system, false, false, spectrum.basis, residual);
+  read_modes<kDynamic>(system, residual, enclosure, 0, spectrum);
+  return spectrum;
+}
+
+TEST(ModeNumberTerms, DiscsThatMeetCountAsOne) {
+  // Discs of 0.1 around -1 and -1.19, one group: both eigenvalues may be at -1.29.
+  const System<> system = testing::system_from(
+      MatrixXd::Identity(1, 1), MatrixXd::Constant(1, 1, 2.19), MatrixXd::Constant(1, 1, 1.19));
+  for (const bool grouped : {true, false}) {
+    BlockEnclosure<> enclosure;
+    enclosure.radius = VectorXd::Constant(2, 0.1);
+    enclosure.group = Eigen::Vector2i(0, grouped ? 0 : 1);
+    const Spectrum<> spectrum = modes_of(system, Eigen::Vector2d(-1, -1.19).asDiagonal(),
+                                         MatrixXd::Ones(1, 2), {1, 1}, enclosure);
+    ASSERT_EQ(spectrum.modes.size(), 1);
+    if (grouped) {
+      EXPECT_GE(spectrum.modes[0].error_bound, 0.29 - 1e-12);
+    } else {
+      EXPECT_NEAR(spectrum.modes[0].error_bound, 0.1, 1e-12);
+    }
+  }
+}
+
+TEST(ModeNumberTerms, RoundingErrorsOfEigenvaluesOfABlock) {
+  Random random(2405);
+  std::array<double, 2> largest{};
+  for (int trial = 0; trial < 300; ++trial) {
+    const int n = trial % 2 == 0 ? 1 : random.integer(2, 4);
+    System<> system =
+        testing::system_from(MatrixXd::Identity(n, n), random.matrix(n, n), random.spd(n) * 4);
+    if (trial % 4 == 0) {  // nearly critical: the discriminant cancels
+      const double away = random.log_uniform(1e-12, 1e-3);
+      system.damping(0, 0) = 2 * std::sqrt(system.stiffness(0, 0)) * (1 + away);
+    }
+    MatrixXd A(2 * n, 2 * n);
+    A << MatrixXd::Zero(n, n), MatrixXd::Identity(n, n), -system.stiffness, -system.damping;
+    MatrixXd U(n, 2 * n);
+    U << MatrixXd::Identity(n, n), MatrixXd::Zero(n, n);
+    BlockEnclosure<> enclosure;
+    enclosure.radius = VectorXd::Zero(1);
+    enclosure.group = Eigen::VectorXi::Zero(1);
+    const Spectrum<> spectrum = modes_of(system, A, U, {2 * n}, enclosure);
+    const std::vector<LongComplex> truth = testing::true_eigenvalues(system);
+    for (const Mode<>& mode : spectrum.modes) {
+      for (const Complex& value : mode.eigenvalues) {
+        long double error = std::numeric_limits<long double>::infinity();
+        for (const LongComplex& z : truth)
+          error = std::min(error, std::abs(z - LongComplex(value)));
+        EXPECT_LE(error, mode.error_bound) << "trial " << trial;
+        double& worst = largest[n == 1 ? 0 : 1];
+        worst = std::max(worst, static_cast<double>(error) / mode.error_bound);
+      }
+    }
+  }
+  EXPECT_GT(largest[0], 0.005);
+  EXPECT_GT(largest[1], 1e-6);
+}
+
+// ------------------------------------------------------------------------ from eigenvalues to
+// modes
+
+/// Sum, product and discriminant of the eigenvalues of a matrix.
+std::array<long double, 3> exact_invariants(const LongMatrix& L) {
+  const long double sum = L(0, 0) + L(1, 1), half = (L(0, 0) - L(1, 1)) / 2;
+  return {sum, L(0, 0) * L(1, 1) - L(0, 1) * L(1, 0), half * half + L(0, 1) * L(1, 0)};
+}
+
+/// Largest share of each error that a matrix at the distance rho from L takes.
+std::array<double, 3> shares(const Matrix2d& L, const Matrix2d& direction, double rho) {
+  const LongMatrix change = direction.cast<long double>() / direction.cast<long double>().norm();
+  const auto exact =
+      exact_invariants(L.cast<long double>() + static_cast<long double>(rho) * change);
+  const Invariants v = block_invariants(L(0, 0), L(0, 1), L(1, 0), L(1, 1), rho);
+  return {static_cast<double>(std::abs(exact[0] - v.sum)) / v.sum_error,
+          static_cast<double>(std::abs(exact[1] - v.product)) / v.product_error,
+          static_cast<double>(std::abs(exact[2] - v.discriminant)) / v.discriminant_error};
+}
+
+TEST(ModeNumberTerms, InvariantsOfABlockAreWithinTheirErrors) {
+  Random random(2406);
+  std::array<double, 3> attained{}, quadratic{}, rounding{};
+  const auto take = [](std::array<double, 3>& worst, const std::array<double, 3>& seen) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_LE(seen[k], 1 + 1e-12) << k;
+      worst[k] = std::max(worst[k], seen[k]);
+    }
+  };
+  const Matrix2d identity = Matrix2d::Identity();
+  for (int trial = 0; trial < 500; ++trial) {
+    const Matrix2d L = random.matrix(2, 2);
+    Matrix2d adjugate;  // transposed: the gradient of the determinant
+    adjugate << L(1, 1), -L(1, 0), -L(0, 1), L(0, 0);
+    Matrix2d traceless = L.transpose() - 0.5 * L.trace() * identity;
+    const double rho = random.log_uniform(1e-6, 1e-3);
+    take(attained, shares(L, identity, rho));
+    take(attained, shares(L, adjugate, rho));
+    take(attained, shares(L, traceless, rho));
+    take(rounding, shares(L, L, 0));
+    take(rounding, shares(1e3 * identity + L, L, 0));
+  }
+  for (const double share : attained) EXPECT_GT(share, 0.99);
+  // Rounding errors are some of the four or eight that are allowed.
+  for (const double share : rounding) EXPECT_GT(share, 0.02);
+  Matrix2d swap;
+  swap << 0, 1, 1, 0;
+  take(quadratic, shares(Matrix2d::Zero(), identity, 0.1));
+  take(quadratic, shares(Matrix2d::Zero(), swap, 0.1));
+  for (const double share : quadratic) EXPECT_GT(share, 0.99);
+}
+
+TEST(ModeNumberTerms, InvariantsOfTwoRootsAreWithinTheirErrors) {
+  Random random(2407);
+  std::array<double, 3> attained{}, rounding{};
+  for (int trial = 0; trial < 2000; ++trial) {
+    const bool exact = trial % 2 == 0;
+    // Real ones, or a pair whose second root is the conjugate.
+    const bool real = random.integer(0, 1) == 0;
+    Root a, b;
+    a.value = Complex(random.uniform(-2, 2), real ? 0 : random.uniform(0.1, 2));
+    b.value = real ? Complex(random.uniform(-2, 2)) : std::conj(a.value);
+    a.bound = exact ? 0 : random.log_uniform(1e-6, 0.5);
+    b.bound = exact ? 0 : real ? random.log_uniform(1e-6, 0.5) : a.bound;
+    const Invariants v = root_invariants(a, b);
+    for (int turn = 0; turn < 16; ++turn) {
+      const long double angle = std::numbers::pi_v<long double> * turn / 8;
+      const auto moved = [](const Root& root, long double by) {
+        return LongComplex(root.value) +
+               static_cast<long double>(root.bound) * std::polar(1.0L, by);
+      };
+      const LongComplex p = moved(a, real ? (turn % 2) * std::numbers::pi_v<long double> : angle);
+      const LongComplex q =
+          real ? moved(b, (turn / 2 % 2) * std::numbers::pi_v<long double>) : std::conj(p);
+      const LongComplex half = (p - q) / 2.0L;
+      const std::array<long double, 3> errors = {std::abs((p + q).real() - v.sum),
+                                                 std::abs((p * q).real() - v.product),
+                                                 std::abs((half * half).real() - v.discriminant)};
+      const std::array<double, 3> bounds = {v.sum_error, v.product_error, v.discriminant_error};
+      for (std::size_t k = 0; k < 3; ++k) {
+        EXPECT_LE(errors[k], static_cast<long double>(bounds[k]) * (1 + 1e-12L)) << k;
+        double& worst = (exact ? rounding : attained)[k];
+        if (errors[k] > 0) worst = std::max(worst, static_cast<double>(errors[k]) / bounds[k]);
+      }
+    }
+  }
+  for (const double share : attained) EXPECT_GT(share, 0.99);
+  for (const double share : rounding) EXPECT_GT(share, 0.05);
+}
+
+TEST(ModeNumberTerms, FrequencyAndRatioAreWithinTheirBounds) {
+  Random random(2408);
+  double omega_share = 0, zeta_share = 0, rounding = 0, zeta_rounding = 0;
+  for (int trial = 0; trial < 4000; ++trial) {
+    const bool exact = trial % 2 == 0;
+    Invariants v;
+    v.product = random.log_uniform(1e-3, 1e3);
+    v.sum = random.uniform(-2, 2) * std::sqrt(v.product);
+    v.discriminant = v.sum * v.sum / 4 - v.product;
+    v.sum_error = exact ? 0 : random.uniform(0, 0.5) * std::abs(v.sum);
+    v.product_error = exact ? 0 : random.uniform(0, 0.99) * v.product;
+    v.discriminant_error = 0;
+    const ModeNumbers mode = mode_numbers({{-1, 1}, 0}, {{-1, -1}, 0}, v, 0);
+    for (const int side : {-1, 1}) {
+      for (const int other : {-1, 1}) {
+        const long double product =
+            static_cast<long double>(v.product) + side * static_cast<long double>(v.product_error);
+        const long double sum =
+            static_cast<long double>(v.sum) + other * static_cast<long double>(v.sum_error);
+        const long double omega = std::sqrt(product), zeta = -sum / (2 * omega);
+        const auto omega_error = static_cast<double>(std::abs(omega - mode.natural_frequency));
+        const auto zeta_error = static_cast<double>(std::abs(zeta - mode.damping_ratio));
+        EXPECT_LE(omega_error, mode.natural_frequency_bound);
+        EXPECT_LE(zeta_error, mode.damping_ratio_bound);
+        double& worst_omega = exact ? rounding : omega_share;
+        double& worst_zeta = exact ? zeta_rounding : zeta_share;
+        worst_omega = std::max(worst_omega, omega_error / mode.natural_frequency_bound);
+        worst_zeta = std::max(worst_zeta, zeta_error / mode.damping_ratio_bound);
+      }
+    }
+  }
+  EXPECT_GT(omega_share, 0.999);
+  EXPECT_GT(zeta_share, 0.999);
+  EXPECT_GT(rounding, 0.1);
+  EXPECT_GT(zeta_rounding, 0.05);
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
