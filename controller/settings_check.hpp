@@ -7,8 +7,8 @@
 
 namespace dashpot::controller {
 
-/// Thrown at set-up; `key` names the setting, such as "limits.torque" or
-/// "initial.gains.task_stiffness".
+/// Thrown at set-up; `key` is the setting's key in a configuration file, such as "limits.torque",
+/// or for gains the member, such as "initial.gains.task_stiffness".
 class InvalidSettings : public std::invalid_argument {
  public:
   InvalidSettings(std::string key, const std::string& reason)

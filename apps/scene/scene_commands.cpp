@@ -5,14 +5,15 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::Sign;
+using controller::kNotNegative;
+using controller::kPositive;
 using controller::YamlMapping;
 
 /// Reads a time into `microseconds`.
 void read_microseconds(const YamlMapping& keys, const char* key, std::int64_t& microseconds) {
   constexpr double kLongestTime = 3600;  // s
   double seconds = 1e-6 * static_cast<double>(microseconds);
-  read_number(keys, key, "s", Sign::kPositive, seconds);
+  read_number(keys, key, "s", kPositive, seconds);
   if (seconds > kLongestTime) throw keys.error(key, "is more than an hour");
   microseconds = std::llround(1e6 * seconds);
 }
@@ -24,17 +25,17 @@ void read_commands(const YamlMapping& root, lcmtypes::CommandLimits& limits) {
       "reach",        "force",  "torque",   "joint_stiffness", "joint_damping",   "task_stiffness",
       "task_damping", "oldest", "furthest", "silence",         "most_per_second", "burst"};
   const YamlMapping keys = root.mapping("commands", kKeys);
-  read_number(keys, "reach", "m", Sign::kPositive, limits.reach);
-  read_number(keys, "force", "N", Sign::kNotNegative, limits.force);
-  read_number(keys, "torque", "N m", Sign::kNotNegative, limits.torque);
-  read_number(keys, "joint_stiffness", "N m/rad", Sign::kNotNegative, limits.joint_stiffness);
-  read_number(keys, "joint_damping", "N m s/rad", Sign::kNotNegative, limits.joint_damping);
-  read_number(keys, "task_stiffness", "N/m", Sign::kNotNegative, limits.task_stiffness);
-  read_number(keys, "task_damping", "N s/m", Sign::kNotNegative, limits.task_damping);
+  read_number(keys, "reach", "m", kPositive, limits.reach);
+  read_number(keys, "force", "N", kNotNegative, limits.force);
+  read_number(keys, "torque", "N m", kNotNegative, limits.torque);
+  read_number(keys, "joint_stiffness", "N m/rad", kNotNegative, limits.joint_stiffness);
+  read_number(keys, "joint_damping", "N m s/rad", kNotNegative, limits.joint_damping);
+  read_number(keys, "task_stiffness", "N/m", kNotNegative, limits.task_stiffness);
+  read_number(keys, "task_damping", "N s/m", kNotNegative, limits.task_damping);
   read_microseconds(keys, "oldest", limits.oldest);
   read_microseconds(keys, "furthest", limits.furthest);
   read_microseconds(keys, "silence", limits.silence);
-  read_number(keys, "most_per_second", "", Sign::kPositive, limits.most_per_second);
+  read_number(keys, "most_per_second", "", kPositive, limits.most_per_second);
   int burst = static_cast<int>(limits.burst);
   read_count(keys, "burst", 1, burst);
   limits.burst = burst;

@@ -5,7 +5,9 @@
 namespace dashpot::apps {
 namespace {
 
-using controller::Sign;
+using controller::kAnyNumber;
+using controller::kNotNegative;
+using controller::kPositive;
 using controller::Units;
 using controller::YamlMapping;
 
@@ -14,17 +16,17 @@ bool read_sensor_fault(const YamlMapping& keys, const Units& positions, sim::Sen
   const auto n = static_cast<Eigen::Index>(positions.size());
   if (keys.has("position_offset")) {
     fault.position_offset = JointVector::Zero(n);
-    read_numbers(keys, "position_offset", positions, Sign::kAny, fault.position_offset);
+    read_numbers(keys, "position_offset", positions, kAnyNumber, fault.position_offset);
   }
   if (keys.has("velocity_factor")) {
     fault.velocity_factor = JointVector::Ones(n);
-    read_numbers(keys, "velocity_factor", Units(positions.size()), Sign::kAny,
+    read_numbers(keys, "velocity_factor", Units(positions.size()), kAnyNumber,
                  fault.velocity_factor);
   }
   read_switch(keys, "frozen", fault.frozen);
   read_switch(keys, "not_a_number", fault.not_a_number);
   double clock_offset = 0;
-  read_number(keys, "clock_offset", "s", Sign::kAny, clock_offset);
+  read_number(keys, "clock_offset", "s", kAnyNumber, clock_offset);
   if (std::abs(clock_offset) > 1e6) throw keys.error("clock_offset", "is more than 1e6 s");
   fault.clock_offset = std::llround(1e9 * clock_offset);
   return fault.position_offset.size() > 0 || fault.velocity_factor.size() > 0 || fault.frozen ||
@@ -44,7 +46,7 @@ bool read_loop_fault(const YamlMapping& keys, const Units& positions, LoopFault&
       throw keys.error("moved_by", "goes with a pause that has an end");
     }
     fault.moved_by = JointVector::Zero(static_cast<Eigen::Index>(positions.size()));
-    read_numbers(keys, "moved_by", positions, Sign::kAny, fault.moved_by);
+    read_numbers(keys, "moved_by", positions, kAnyNumber, fault.moved_by);
   }
   if (pause) fault.every = 0;
   return fault.every != 1;
@@ -59,8 +61,8 @@ void read_faults(const YamlMapping& scenario, const Units& positions, Scene& sce
   for (const YamlMapping& keys : mappings(scenario, "faults", kKeys)) {
     require(keys, "begin", scenario, "faults");
     sim::SensorFault sensors;
-    read_number(keys, "begin", "s", Sign::kNotNegative, sensors.begin);
-    read_number(keys, "end", "s", Sign::kPositive, sensors.end);
+    read_number(keys, "begin", "s", kNotNegative, sensors.begin);
+    read_number(keys, "end", "s", kPositive, sensors.end);
     if (sensors.end <= sensors.begin) throw keys.error("end", "is not after begin");
     LoopFault loop{sensors.begin, sensors.end, 1, {}};
     const bool wrong_sensors = read_sensor_fault(keys, positions, sensors);

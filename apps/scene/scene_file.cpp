@@ -8,7 +8,7 @@ namespace dashpot::apps {
 namespace {
 
 using controller::Joint;
-using controller::Sign;
+using controller::kPositive;
 using controller::Units;
 using controller::YamlMapping;
 using controller::YamlNode;
@@ -77,8 +77,7 @@ void read_system(const YamlNode& document, Scene& scene) {
       throw system.error(key, "a square matrix of 1 to 16 rows is wanted, all three of one size");
     }
   }
-  read_number(root.mapping("control", kControl), "period", "s", Sign::kPositive,
-              scene.plant.period);
+  read_number(root.mapping("control", kControl), "period", "s", kPositive, scene.plant.period);
   const Units positions(static_cast<std::size_t>(matrices.mass.rows()), "m");
   read_simulation(root, positions, scene.plant, nullptr);
   read_scenario(root, positions, scene);

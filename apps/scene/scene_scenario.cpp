@@ -10,9 +10,11 @@
 namespace dashpot::apps {
 namespace {
 
+using controller::kAnyNumber;
+using controller::kNotNegative;
+using controller::kPositive;
 using controller::Pose;
 using controller::RobotModel;
-using controller::Sign;
 using controller::Units;
 using controller::Vector6;
 using controller::YamlMapping;
@@ -82,19 +84,19 @@ void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& 
   const YamlMapping keys = scenario.mapping("start", kKeys);
   read_switch(keys, "outside_limits", scene.outside_limits);
   require(keys, "position", scenario, "start");
-  read_numbers(keys, "position", positions, Sign::kAny, scene.rest);
+  read_numbers(keys, "position", positions, kAnyNumber, scene.rest);
   scene.start = scene.rest;
   if (keys.has("joint_displacement") && keys.has("tip_displacement")) {
     throw keys.error("tip_displacement", "stands beside joint_displacement; one of them is enough");
   }
   if (keys.has("joint_displacement")) {
     JointVector displacement = scene.rest;
-    read_numbers(keys, "joint_displacement", positions, Sign::kAny, displacement);
+    read_numbers(keys, "joint_displacement", positions, kAnyNumber, displacement);
     scene.start += displacement;
   }
   if (keys.has("tip_displacement")) {
     Eigen::VectorXd displacement = Eigen::VectorXd::Zero(6);
-    read_numbers(keys, "tip_displacement", kTaskUnits, Sign::kAny, displacement);
+    read_numbers(keys, "tip_displacement", kTaskUnits, kAnyNumber, displacement);
     const auto q = displaced(scene.arm->config.model, scene.rest, displacement);
     if (!q) {
       const TipGoal goal{moved(tip_at(scene.arm->config.model, scene.rest), displacement)};
@@ -121,8 +123,8 @@ void read_system_start(const YamlMapping& scenario, const Units& positions, Scen
   static constexpr std::array<std::string_view, 2> kKeys = {"position", "velocity"};
   const YamlMapping keys = scenario.mapping("start", kKeys);
   scene.start = scene.rest;
-  read_numbers(keys, "position", positions, Sign::kAny, scene.start);
-  read_numbers(keys, "velocity", Units(positions.size(), "m/s"), Sign::kAny, scene.velocity);
+  read_numbers(keys, "position", positions, kAnyNumber, scene.start);
+  read_numbers(keys, "velocity", Units(positions.size(), "m/s"), kAnyNumber, scene.velocity);
 }
 
 /// When a push begins and ends.
@@ -131,8 +133,8 @@ sim::Piece<Value> read_times(const YamlMapping& keys, const YamlMapping& scenari
   sim::Piece<Value> piece;
   require(keys, "begin", scenario, "pushes");
   require(keys, "end", scenario, "pushes");
-  read_number(keys, "begin", "s", Sign::kNotNegative, piece.begin);
-  read_number(keys, "end", "s", Sign::kPositive, piece.end);
+  read_number(keys, "begin", "s", kNotNegative, piece.begin);
+  read_number(keys, "end", "s", kPositive, piece.end);
   if (piece.end <= piece.begin) throw keys.error("end", "is not after begin");
   return piece;
 }
@@ -142,7 +144,7 @@ void read_arm_pushes(const YamlMapping& scenario, Scene& scene) {
   for (const YamlMapping& keys : mappings(scenario, "pushes", kKeys)) {
     auto piece = read_times<sim::Vector6>(keys, scenario);
     require(keys, "wrench", scenario, "pushes");
-    read_numbers(keys, "wrench", kWrenchUnits, Sign::kAny, piece.value);
+    read_numbers(keys, "wrench", kWrenchUnits, kAnyNumber, piece.value);
     scene.arm->options.wrenches.push_back(piece);
   }
 }
@@ -153,7 +155,7 @@ void read_system_pushes(const YamlMapping& scenario, const Units& positions, Sce
     auto piece = read_times<JointVector>(keys, scenario);
     require(keys, "force", scenario, "pushes");
     piece.value = JointVector::Zero(scene.dof());
-    read_numbers(keys, "force", Units(positions.size(), "N"), Sign::kAny, piece.value);
+    read_numbers(keys, "force", Units(positions.size(), "N"), kAnyNumber, piece.value);
     scene.matrices->forces.push_back(piece);
   }
 }
@@ -177,22 +179,22 @@ void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scen
   for (const YamlMapping& keys : mappings(scenario, "steps", kKeys)) {
     ScenarioStep step = scene.steps.back();
     require(keys, "at", scenario, "steps");
-    read_number(keys, "at", "s", Sign::kNotNegative, step.at);
+    read_number(keys, "at", "s", kNotNegative, step.at);
     step.line = keys.line("at");
     if (step.at < scene.steps.back().at) throw keys.error("at", "is before the step above it");
     if (step.at > scene.duration) throw keys.error("at", "is after the end of the scenario");
     controller::Setpoint& setpoint = step.setpoint;
     read_choice(keys, "mode", kModes, setpoint.mode);
-    read_numbers(keys, "joint_position", positions, Sign::kAny, setpoint.joint_position);
+    read_numbers(keys, "joint_position", positions, kAnyNumber, setpoint.joint_position);
     if (keys.has("joint_position")) {
       check_limits(keys, "joint_position", setpoint.joint_position, positions, scene);
     }
     if (keys.has("tip_displacement")) {
       Eigen::VectorXd displacement = Eigen::VectorXd::Zero(6);
-      read_numbers(keys, "tip_displacement", kTaskUnits, Sign::kAny, displacement);
+      read_numbers(keys, "tip_displacement", kTaskUnits, kAnyNumber, displacement);
       setpoint.tip_pose = moved(origin, displacement);
     }
-    read_numbers(keys, "wrench", kWrenchUnits, Sign::kAny, setpoint.wrench);
+    read_numbers(keys, "wrench", kWrenchUnits, kAnyNumber, setpoint.wrench);
     controller::read_gains(keys, model, controller::GainPairs::kEither, setpoint.gains);
     check_reach(keys, setpoint, scene);
     scene.steps.push_back(step);
@@ -249,7 +251,7 @@ void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene
   static constexpr std::array<std::string_view, 6> kKeys = {"duration", "start",  "pushes",
                                                             "steps",    "faults", "ring_down"};
   const YamlMapping keys = root.mapping("scenario", kKeys);
-  read_number(keys, "duration", "s", Sign::kPositive, scene.duration);
+  read_number(keys, "duration", "s", kPositive, scene.duration);
   if (scene.duration > kLongest) throw keys.error("duration", "is more than 1e7 s");
   read_switch(keys, "ring_down", scene.ring_down);
   scene.rest = scene.velocity = JointVector::Zero(static_cast<Eigen::Index>(positions.size()));

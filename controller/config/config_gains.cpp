@@ -1,7 +1,6 @@
 #include <dashpot/controller/config/config_gains.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 
-#include <sstream>
 #include <utility>
 
 namespace dashpot::controller {
@@ -30,11 +29,7 @@ void read_damping(const YamlMapping& keys, const Units& units, Matrix& damping, 
   if (keys.has("damping")) {
     throw keys.error("damping_ratio", "stands beside damping, in place of which it is meant");
   }
-  read_number(keys, "damping_ratio", "", Sign::kPositive, ratio);
-  if (ratio <= kLargestDampingRatio) return;
-  std::ostringstream text;
-  text << "is " << ratio << ", must be at most " << kLargestDampingRatio;
-  throw keys.error("damping_ratio", text.str());
+  read_number(keys, "damping_ratio", "", {0, false, kLargestDampingRatio}, ratio);
 }
 
 void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
@@ -86,8 +81,8 @@ void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pa
 
   const YamlMapping null_space = keys.mapping("null_space", kPair);
   require(null_space);
-  read_numbers(null_space, "stiffness", stiffness, Sign::kNotNegative, gains.null_stiffness);
-  read_numbers(null_space, "damping", damping, Sign::kNotNegative, gains.null_damping);
+  read_numbers(null_space, "stiffness", stiffness, kNotNegative, gains.null_stiffness);
+  read_numbers(null_space, "damping", damping, kNotNegative, gains.null_damping);
 }
 
 }  // namespace dashpot::controller

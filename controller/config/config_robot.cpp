@@ -8,7 +8,7 @@ namespace {
 void read_payload(const YamlMapping& robot, Payload& payload) {
   static constexpr std::array<std::string_view, 3> kKeys = {"mass", "center", "inertia"};
   const YamlMapping keys = robot.mapping("payload", kKeys);
-  read_number(keys, "mass", "kg", Sign::kNotNegative, payload.mass);
+  read_number(keys, "mass", "kg", kNotNegative, payload.mass);
   read_vector3(keys, "center", "m", payload.center);
   read_matrix(keys, "inertia", Units(3, "kg m^2"), payload.inertia);
 }
@@ -37,7 +37,7 @@ void read_joint_option(const YamlMapping& robot, std::string_view key, const Uni
                        JointVector& option) {
   if (!robot.has(key)) return;
   option.resize(static_cast<Eigen::Index>(units.size()));
-  read_numbers(robot, key, units, Sign::kNotNegative, option);
+  read_numbers(robot, key, units, kNotNegative, option);
 }
 
 }  // namespace

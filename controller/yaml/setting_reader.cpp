@@ -15,13 +15,11 @@ std::string to_text(double value) {
 }
 
 double number(const YamlMapping& keys, std::string_view key, const YamlNode& node,
-              const std::string& unit, Sign sign, const std::string& place) {
+              const std::string& unit, const Range& range, double none, const std::string& place) {
+  if (!std::isnan(none) && node.text == "none") return none;
   const double value = keys.quantity(key, node, unit, place);
-  if (value > 0 || sign == Sign::kAny || (value == 0 && sign == Sign::kNotNegative)) return value;
-  throw keys.error(key,
-                   (place.empty() ? "" : place + " ") + "is " + to_text(value) +
-                       (unit.empty() ? "" : " " + unit) + ", " +
-                       (sign == Sign::kPositive ? "not positive" : "negative"),
+  if (range.has(value)) return value;
+  throw keys.error(key, (place.empty() ? "" : place + " ") + complaint(range, value, unit),
                    node.line);
 }
 
@@ -83,29 +81,18 @@ void read_count(const YamlMapping& keys, std::string_view key, int lowest, int& 
   value = static_cast<int>(number);
 }
 
-void read_number(const YamlMapping& keys, std::string_view key, const std::string& unit, Sign sign,
-                 double& value) {
+void read_number(const YamlMapping& keys, std::string_view key, const std::string& unit,
+                 const Range& range, double& value, double none) {
   const YamlNode* node = keys.find(key);
-  if (node != nullptr) value = number(keys, key, *node, unit, sign, "");
+  if (node != nullptr) value = number(keys, key, *node, unit, range, none, "");
 }
 
-void read_numbers(const YamlMapping& keys, std::string_view key, const Units& units, Sign sign,
-                  Eigen::Ref<Eigen::VectorXd> value) {
+void read_numbers(const YamlMapping& keys, std::string_view key, const Units& units,
+                  const Range& range, Eigen::Ref<Eigen::VectorXd> value, double none) {
   const YamlNode* node = keys.find(key);
   if (node == nullptr) return;
   const auto read = [&](const YamlNode& item, std::size_t i, const std::string& place) {
-    value[static_cast<Eigen::Index>(i)] = number(keys, key, item, units[i], sign, place);
-  };
-  for_each_entry(keys, key, *node, units, read);
-}
-
-void read_numbers_or_none(const YamlMapping& keys, std::string_view key, const Units& units,
-                          double none, Eigen::Ref<Eigen::VectorXd> value) {
-  const YamlNode* node = keys.find(key);
-  if (node == nullptr) return;
-  const auto read = [&](const YamlNode& item, std::size_t i, const std::string& place) {
-    value[static_cast<Eigen::Index>(i)] =
-        item.text == "none" ? none : keys.quantity(key, item, units[i], place);
+    value[static_cast<Eigen::Index>(i)] = number(keys, key, item, units[i], range, none, place);
   };
   for_each_entry(keys, key, *node, units, read);
 }
@@ -117,7 +104,7 @@ void read_vector3(const YamlMapping& keys, std::string_view key, const std::stri
   if (node->kind != YamlNode::Kind::kSequence) {
     throw keys.error(key, "a list of 3 numbers is wanted, not " + describe(*node));
   }
-  read_numbers(keys, key, {unit, unit, unit}, Sign::kAny, value);
+  read_numbers(keys, key, {unit, unit, unit}, kAnyNumber, value);
 }
 
 void read_matrix(const YamlMapping& keys, std::string_view key, const Units& units,
@@ -128,7 +115,7 @@ void read_matrix(const YamlMapping& keys, std::string_view key, const Units& uni
                     node->items[0].kind == YamlNode::Kind::kSequence;
   if (!rows) {
     Eigen::VectorXd diagonal(value.rows());
-    read_numbers(keys, key, units, Sign::kAny, diagonal);
+    read_numbers(keys, key, units, kAnyNumber, diagonal);
     value = diagonal.asDiagonal();
     return;
   }

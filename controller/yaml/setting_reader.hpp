@@ -2,11 +2,13 @@
 // Reads one setting each. Where the key is not there, the value keeps what it holds: its default.
 // Everything wrong is an InputError that names key, entry, value, unit and line.
 
+#include <dashpot/controller/base/range.hpp>
 #include <dashpot/controller/types.hpp>
 #include <dashpot/controller/yaml/yaml_mapping.hpp>
 
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,8 +16,7 @@
 
 namespace dashpot::controller {
 
-/// What a number may be.
-enum class Sign { kAny, kNotNegative, kPositive };
+inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
 
 /// SI units, one for each entry of a vector.
 using Units = std::vector<std::string>;
@@ -26,15 +27,12 @@ void read_text(const YamlMapping& keys, std::string_view key, std::string& value
 void read_switch(const YamlMapping& keys, std::string_view key, bool& value);
 /// A whole number from `lowest` to a million.
 void read_count(const YamlMapping& keys, std::string_view key, int lowest, int& value);
-void read_number(const YamlMapping& keys, std::string_view key, const std::string& unit, Sign sign,
-                 double& value);
-
-/// units.size() entries: a list of numbers, or one number for all if they have the same unit.
-void read_numbers(const YamlMapping& keys, std::string_view key, const Units& units, Sign sign,
-                  Eigen::Ref<Eigen::VectorXd> value);
-/// As above, of any sign; an entry may be the word none, and is then `none`.
-void read_numbers_or_none(const YamlMapping& keys, std::string_view key, const Units& units,
-                          double none, Eigen::Ref<Eigen::VectorXd> value);
+/// A number in the range, or, unless `none` is NaN, the word none, which stands for it.
+void read_number(const YamlMapping& keys, std::string_view key, const std::string& unit,
+                 const Range& range, double& value, double none = kNoNone);
+/// units.size() such entries: a list, or one for all if they have the same unit.
+void read_numbers(const YamlMapping& keys, std::string_view key, const Units& units,
+                  const Range& range, Eigen::Ref<Eigen::VectorXd> value, double none = kNoNone);
 
 /// A list of three numbers in one unit.
 void read_vector3(const YamlMapping& keys, std::string_view key, const std::string& unit,

@@ -135,8 +135,7 @@ INSTANTIATE_TEST_SUITE_P(
                   "analysis: {every: 0}\n"},
         BadConfig{"MoreThanAPeriod", "analysis.share: is 1.5, must be at most 1 (line 2)",
                   "analysis: {share: 1.5}\n"},
-        BadConfig{"LongDelay",
-                  "analysis.sampled.delay: is 21 ticks, has to be between 0 and 20 (line 2)",
+        BadConfig{"LongDelay", "analysis.sampled.delay: is 21 ticks, must be at most 20 (line 2)",
                   "analysis: {sampled: {delay: 21}}\n"}),
     name_of);
 

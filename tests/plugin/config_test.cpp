@@ -1,4 +1,5 @@
 // What a configuration file says is what the controller gets.
+#include <dashpot/controller/base/settings_table.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/plugin/config_file.hpp>
@@ -10,6 +11,9 @@
 #include <limits>
 #include <numbers>
 #include <regex>
+#include <sstream>
+#include <type_traits>
+#include <vector>
 
 namespace dashpot::tests {
 namespace {
@@ -23,6 +27,8 @@ using Eigen::Matrix3d;
 using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 using testing::kInfinity;
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -41,17 +47,35 @@ MatrixXd mass_matrix(const Config& config, double q = 0.3) {
   return controller::evaluate(config.model, position, velocity).M;
 }
 
+/// Every setting of the table as text.
+std::vector<std::pair<std::string, std::string>> texts_of(const Settings& settings) {
+  std::vector<std::pair<std::string, std::string>> texts;
+  controller::for_each_setting(settings,
+                               [&](const controller::Setting& setting, const auto& value) {
+                                 std::ostringstream text;
+                                 text.precision(17);
+                                 if constexpr (std::is_enum_v<std::decay_t<decltype(value)>>) {
+                                   text << static_cast<int>(value);
+                                 } else {
+                                   text << value;
+                                 }
+                                 texts.emplace_back(setting.key, text.str());
+                               });
+  return texts;
+}
+
+/// Keys of the table under which two settings differ.
+std::vector<std::string> differences(const Settings& a, const Settings& b) {
+  std::vector<std::string> keys;
+  const auto texts = texts_of(a), others = texts_of(b);
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    if (texts[i] != others[i]) keys.push_back(texts[i].first);
+  }
+  return keys;
+}
+
 void expect_same(const Settings& a, const Settings& b) {
-  EXPECT_EQ(a.period, b.period);
-  EXPECT_EQ(a.limits.torque, b.limits.torque);
-  EXPECT_EQ(a.limits.torque_rate, b.limits.torque_rate);
-  EXPECT_EQ(a.limits.velocity, b.limits.velocity);
-  EXPECT_EQ(a.limits.position_lower, b.limits.position_lower);
-  EXPECT_EQ(a.limits.position_upper, b.limits.position_upper);
-  EXPECT_EQ(a.limits.damping, b.limits.damping);
-  EXPECT_EQ(a.motion.velocity, b.motion.velocity);
-  EXPECT_EQ(a.motion.acceleration, b.motion.acceleration);
-  EXPECT_EQ(a.initial.mode, b.initial.mode);
+  EXPECT_THAT(differences(a, b), IsEmpty());
   EXPECT_EQ(a.initial.gains.joint_stiffness, b.initial.gains.joint_stiffness);
   EXPECT_EQ(a.initial.gains.joint_damping, b.initial.gains.joint_damping);
   EXPECT_EQ(a.initial.gains.task_stiffness, b.initial.gains.task_stiffness);
@@ -256,6 +280,17 @@ TEST(Config, FillsTheRest) {
   EXPECT_TRUE(all.analysis.sampled.difference_velocity);
 }
 
+TEST(Config, TakesNoneForALimitThatMayBeLeftOut) {
+  const controller::Limits limits =
+      load(panda() + "limits: {power: none, external_force: none, external_torque: none}\n")
+          .settings.limits;
+  EXPECT_EQ(limits.power, kInfinity);
+  EXPECT_EQ(limits.external_force, kInfinity);
+  EXPECT_EQ(limits.external_torque, VectorXd::Constant(7, kInfinity));
+  EXPECT_EQ(complaint(panda() + "limits: {tip_velocity: none}\n"),
+            "limits.tip_velocity: is not a number but 'none' (line 2)");
+}
+
 /// The Panda's first line, with more keys.
 std::string panda_with(const std::string& keys) {
   std::string text = panda();
@@ -344,42 +379,15 @@ TEST(ConfigExample, Loads) {
   EXPECT_EQ(settings.limits.velocity, config.model.joint_values(&controller::Joint::velocity));
 }
 
-/// The values of keys whose default is the same for all robots are those defaults.
+/// Where the example's comment says no other default, its value is the default.
 TEST(ConfigExample, ShowsDefaults) {
-  const Settings shown = controller::load_config(kExample).settings;
-  const Settings none;
-  EXPECT_EQ(shown.period, none.period);
-  EXPECT_EQ(shown.task_terms.geometric_stiffness, none.task_terms.geometric_stiffness);
-  EXPECT_EQ(shown.task_terms.jacobian_rate, none.task_terms.jacobian_rate);
-  EXPECT_EQ(shown.initial.gains.frame, none.initial.gains.frame);
-  EXPECT_EQ(shown.initial.gains.directions, none.initial.gains.directions);
-  EXPECT_EQ(shown.limits.position_margin, VectorXd::Constant(7, 0.1));
-  EXPECT_EQ(shown.limits.return_velocity, VectorXd::Constant(7, 0.05));
-  EXPECT_EQ(shown.limits.tip_velocity, none.limits.tip_velocity);
-  EXPECT_EQ(shown.limits.power, none.limits.power);
-  EXPECT_EQ(shown.limits.gain_margin, none.limits.gain_margin);
-  EXPECT_EQ(shown.watchdog.feedback, none.watchdog.feedback);
-  EXPECT_EQ(shown.watchdog.release_after, none.watchdog.release_after);
-  EXPECT_EQ(shown.limits.repulsion, none.limits.repulsion);
-  EXPECT_EQ(shown.motion.linear_velocity, none.motion.linear_velocity);
-  EXPECT_EQ(shown.motion.linear_acceleration, none.motion.linear_acceleration);
-  EXPECT_EQ(shown.motion.angular_velocity, none.motion.angular_velocity);
-  EXPECT_EQ(shown.motion.angular_acceleration, none.motion.angular_acceleration);
-  EXPECT_EQ(shown.motion.smoothing, none.motion.smoothing);
-  EXPECT_EQ(shown.motion.gain_time, none.motion.gain_time);
-  EXPECT_EQ(shown.feed_forward.gravity, none.feed_forward.gravity);
-  EXPECT_EQ(shown.feed_forward.coriolis, none.feed_forward.coriolis);
-  EXPECT_EQ(shown.feed_forward.friction, none.feed_forward.friction);
-  EXPECT_EQ(shown.feed_forward.acceleration, none.feed_forward.acceleration);
-  EXPECT_EQ(shown.feed_forward.wrench, none.feed_forward.wrench);
-  EXPECT_EQ(shown.watchdog.setpoint_hold, none.watchdog.setpoint_hold);
-  EXPECT_EQ(shown.watchdog.setpoint_damp, none.watchdog.setpoint_damp);
-  EXPECT_EQ(shown.watchdog.longest_gap, none.watchdog.longest_gap);
-  EXPECT_EQ(shown.analysis.where, none.analysis.where);
-  EXPECT_EQ(shown.analysis.every, none.analysis.every);
-  EXPECT_EQ(shown.analysis.share, none.analysis.share);
-  EXPECT_EQ(shown.analysis.soft_frequency, none.analysis.soft_frequency);
-  EXPECT_EQ(shown.analysis.shapes, none.analysis.shapes);
+  const Config config = controller::load_config(kExample);
+  const Settings none = controller::default_settings(config.model);
+  EXPECT_THAT(differences(config.settings, none),
+              ElementsAre("control.mode", "limits.position_lower", "limits.position_upper",
+                          "limits.damping", "motion.velocity", "motion.acceleration"));
+  EXPECT_EQ(config.settings.initial.gains.frame, none.initial.gains.frame);
+  EXPECT_EQ(config.settings.initial.gains.directions, none.initial.gains.directions);
 }
 
 /// Every key that the reader says it knows stands in the example.

@@ -1,0 +1,88 @@
+#pragma once
+#include <dashpot/controller/base/range.hpp>
+#include <dashpot/controller/settings.hpp>
+
+#include <limits>
+
+namespace dashpot::controller {
+
+/// One setting: its key in a configuration file, its unit, and what it may be.
+struct Setting {
+  const char* key;
+  const char* unit = "";
+  const char* prismatic = "";  ///< unit of the entry of a prismatic joint
+  Range range = kAnyNumber;
+  double none =
+      std::numeric_limits<double>::quiet_NaN();  ///< infinity that the word none stands for
+};
+
+/// Calls visit(setting, member) for every setting but the gains and the walls. `Settings_` is
+/// Settings or const Settings. Members are double, int, bool, JointVector (n entries), Mode and
+/// Analysis::Where.
+template <class Settings_, class Visitor>
+void for_each_setting(Settings_& settings, Visitor&& visit) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  visit(Setting{"control.period", "s", "", kPositive}, settings.period);
+  visit(Setting{"control.mode"}, settings.initial.mode);
+  visit(Setting{"control.geometric_stiffness"}, settings.task_terms.geometric_stiffness);
+  visit(Setting{"control.jacobian_rate"}, settings.task_terms.jacobian_rate);
+  visit(Setting{"control.subtract_friction"}, settings.subtract_friction);
+
+  auto& limits = settings.limits;
+  visit(Setting{"limits.torque", "N m", "N", kPositive}, limits.torque);
+  visit(Setting{"limits.torque_rate", "N m/s", "N/s", kPositive}, limits.torque_rate);
+  visit(Setting{"limits.velocity", "rad/s", "m/s", kPositive}, limits.velocity);
+  visit(Setting{"limits.tip_velocity", "m/s", "", kPositive}, limits.tip_velocity);
+  visit(Setting{"limits.position_lower", "rad", "m", kAnyNumber, -kInfinity},
+        limits.position_lower);
+  visit(Setting{"limits.position_upper", "rad", "m", kAnyNumber, kInfinity}, limits.position_upper);
+  visit(Setting{"limits.position_margin", "rad", "m", kPositive}, limits.position_margin);
+  visit(Setting{"limits.repulsion", "", "", {0, true, 1}}, limits.repulsion);
+  visit(Setting{"limits.return_velocity", "rad/s", "m/s", kNotNegative}, limits.return_velocity);
+  visit(Setting{"limits.linear_error", "m", "", kPositive}, limits.linear_error);
+  visit(Setting{"limits.angular_error", "rad", "", kPositive}, limits.angular_error);
+  visit(Setting{"limits.damping", "N m s/rad", "N s/m", kPositive}, limits.damping);
+  visit(Setting{"limits.power", "W", "", kPositive, kInfinity}, limits.power);
+  visit(Setting{"limits.external_torque", "N m", "N", kPositive, kInfinity},
+        limits.external_torque);
+  visit(Setting{"limits.external_force", "N", "", kPositive, kInfinity}, limits.external_force);
+  visit(Setting{"limits.gain_margin", "", "", {1, true, 1000}}, limits.gain_margin);
+
+  auto& motion = settings.motion;
+  visit(Setting{"motion.velocity", "rad/s", "m/s", kPositive}, motion.velocity);
+  visit(Setting{"motion.acceleration", "rad/s^2", "m/s^2", kPositive}, motion.acceleration);
+  visit(Setting{"motion.linear_velocity", "m/s", "", kPositive}, motion.linear_velocity);
+  visit(Setting{"motion.linear_acceleration", "m/s^2", "", kPositive}, motion.linear_acceleration);
+  visit(Setting{"motion.angular_velocity", "rad/s", "", kPositive}, motion.angular_velocity);
+  visit(Setting{"motion.angular_acceleration", "rad/s^2", "", kPositive},
+        motion.angular_acceleration);
+  visit(Setting{"motion.smoothing", "s", "", kNotNegative}, motion.smoothing);
+  visit(Setting{"motion.gain_time", "s", "", kPositive}, motion.gain_time);
+
+  auto& feed_forward = settings.feed_forward;
+  visit(Setting{"feed_forward.gravity"}, feed_forward.gravity);
+  visit(Setting{"feed_forward.coriolis"}, feed_forward.coriolis);
+  visit(Setting{"feed_forward.friction"}, feed_forward.friction);
+  visit(Setting{"feed_forward.acceleration"}, feed_forward.acceleration);
+  visit(Setting{"feed_forward.wrench"}, feed_forward.wrench);
+
+  auto& watchdog = settings.watchdog;
+  visit(Setting{"watchdog.setpoint_hold", "s", "", kNotNegative}, watchdog.setpoint_hold);
+  visit(Setting{"watchdog.setpoint_damp", "s", "", kNotNegative}, watchdog.setpoint_damp);
+  visit(Setting{"watchdog.longest_gap", "s", "", kPositive}, watchdog.longest_gap);
+  visit(Setting{"watchdog.feedback", "s", "", kNotNegative}, watchdog.feedback);
+  visit(Setting{"watchdog.release_after", "s", "", kNotNegative}, watchdog.release_after);
+
+  auto& analysis = settings.analysis;
+  visit(Setting{"analysis.where"}, analysis.where);
+  visit(Setting{"analysis.every", "ticks", "", {1}}, analysis.every);
+  visit(Setting{"analysis.share", "", "", {0, false, 1}}, analysis.share);
+  visit(Setting{"analysis.soft_frequency", "rad/s", "", kNotNegative}, analysis.soft_frequency);
+  visit(Setting{"analysis.shapes"}, analysis.shapes);
+  visit(Setting{"analysis.sampled.interval", "s", "", kNotNegative}, analysis.sampled.interval);
+  visit(Setting{"analysis.sampled.delay", "ticks", "", {0, true, 20}}, analysis.sampled.delay);
+  visit(Setting{"analysis.sampled.cutoff", "Hz", "", kNotNegative}, analysis.sampled.cutoff);
+  visit(Setting{"analysis.sampled.difference_velocity"}, analysis.sampled.difference_velocity);
+}
+
+}  // namespace dashpot::controller
