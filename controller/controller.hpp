@@ -25,7 +25,7 @@ class ControllerCore;
 ///
 /// Read in this order: robot_model.hpp, dynamics.hpp, motion/reference.hpp, law/gain_blend.hpp,
 /// law/designed_damping.hpp, law/impedance_law.hpp, safety/safety_filter.hpp,
-/// vibration/vibration.hpp, and core/fixed_core.hpp, which calls them.
+/// vibration/vibration.hpp, and core/controller_core.hpp, which calls them.
 ///
 /// One thread at a time may use a Controller; `Latest` (latest.hpp) hands set-points to the thread
 /// of `update` and snapshots from it.

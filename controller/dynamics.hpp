@@ -6,31 +6,19 @@
 namespace dashpot::controller {
 
 /// Terms of  M(q) qdd + coriolis + gravity = torque + J' wrench  at one state, and the pose of the
-/// tip. N is the number of joints n, known at compile time; DynamicsResult is for n chosen at run
-/// time.
-template <int N>
-struct Dynamics {
-  Eigen::Matrix<double, N, N> M;         ///< n x n, kg m^2; symmetric positive definite
-  Eigen::Matrix<double, N, 1> coriolis;  ///< n, C(q, qd) qd, N m
-  Eigen::Matrix<double, N, 1> gravity;   ///< n, gradient of the potential energy, N m
-  Eigen::Matrix<double, 6, N> J;         ///< 6 x n, tip's twist = J qd: linear, angular; B's axes
-  Vector6 Jdot_qd;                       ///< tip's acceleration at qdd = 0, m/s^2 and rad/s^2
-  Eigen::Vector3d p_BT_B;                ///< m
-  Eigen::Matrix3d R_BT;
-};
-
-/// The same terms with n, at most kMaxJoints, chosen at run time, in fixed storage.
+/// tip.
 struct DynamicsResult {
-  JointMatrix M;                                                               ///< n x n
-  JointVector coriolis;                                                        ///< n
-  JointVector gravity;                                                         ///< n
-  Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxJoints> J;  ///< 6 x n
-  Vector6 Jdot_qd;
-  Eigen::Vector3d p_BT_B;
+  JointMatrix M;           ///< n x n, kg m^2; symmetric positive definite
+  JointVector coriolis;    ///< n, C(q, qd) qd, N m
+  JointVector gravity;     ///< n, gradient of the potential energy, N m
+  Jacobian J;              ///< 6 x n, tip's twist = J qd: linear, angular; B's axes
+  Vector6 Jdot_qd;         ///< tip's acceleration at qdd = 0, m/s^2 and rad/s^2
+  Eigen::Vector3d p_BT_B;  ///< m
   Eigen::Matrix3d R_BT;
 };
 
-/// Computes all of Dynamics<N> in one pass over a chain of N joints, N from 1 to kMaxJoints.
+/// Computes all of DynamicsResult on one way outward and one way inward along a chain of n joints,
+/// four joints at a time.
 ///
 /// Every vector is in B's axes. Link i has its frame at joint i, with the joint's axis as its z;
 /// p_i is its origin, R_i its rotation, z_i the axis, and e_i leads from p_i to p_i+1, and from the
@@ -44,58 +32,41 @@ struct DynamicsResult {
 /// I_i z_i [h_i x z_i] about p_i, so
 ///     M_ki = J_k . (that wrench, taken at the tip), k <= i,        gravity_i = -F_i . g
 /// See R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6.
-template <int N>
 class DynamicsKernel {
  public:
-  /// Throws std::invalid_argument unless the model has N joints.
   explicit DynamicsKernel(const RobotModel& model);
 
-  /// Sets `result` at q, rad (m), and qd, rad/s (m/s). Allocates nothing. If q or qd is not finite,
-  /// neither is the result.
-  void evaluate(const Eigen::Matrix<double, N, 1>& q, const Eigen::Matrix<double, N, 1>& qd,
-                Dynamics<N>& result) const noexcept;
+  /// Sets `result` at q (n), rad (m), and qd (n), rad/s (m/s). Allocates nothing. If q or qd is not
+  /// finite, neither is the result.
+  void evaluate(const JointVector& q, const JointVector& qd, DynamicsResult& result) const noexcept;
 
  private:
-  static constexpr int kPadded = (N + 3) / 4 * 4;
-  /// One number for each joint, and padding of zeros.
-  using Row = std::array<double, kPadded>;
+  /// One number for each of four joints; zeros beyond the last joint.
+  using Four = std::array<double, 4>;
+  /// Four links, each in its own axes.
+  struct Links {
+    std::array<Four, 9> rotation;      ///< from link i to link i - 1 at q = 0, by columns
+    std::array<Four, 3> offset;        ///< e_i at q = 0, m
+    std::array<Four, 3> next_slide;    ///< axis of joint i + 1 if prismatic, else 0
+    std::array<Four, 3> first_moment;  ///< mass times centre of mass, kg m
+    std::array<Four, 6> inertia;       ///< about p_i: xx yy zz xy xz yz, kg m^2
+    Four mass;                         ///< kg
+    Four carried_mass;                 ///< of link i and all links beyond it, kg
+    Four revolute;                     ///< 1, or 0 for a prismatic joint
+    Four prismatic;                    ///< 1, or 0 for a revolute joint
+  };
 
-  // For link i, in its own axes.
-  alignas(64) std::array<Row, 9> rotation_;      ///< from link i to link i - 1 at q = 0, by columns
-  alignas(64) std::array<Row, 3> offset_;        ///< e_i at q = 0, m
-  alignas(64) std::array<Row, 3> next_slide_;    ///< axis of joint i + 1 if prismatic, else 0
-  alignas(64) std::array<Row, 3> first_moment_;  ///< mass times centre of mass, kg m
-  alignas(64) std::array<Row, 6> inertia_;       ///< about p_i: xx yy zz xy xz yz, kg m^2
-  alignas(64) Row mass_;                         ///< kg
-  alignas(64) Row carried_mass_;                 ///< of link i and all links beyond it, kg
-  alignas(64) Row revolute_;                     ///< 1, or 0 for a prismatic joint
-  alignas(64) Row prismatic_;                    ///< 1, or 0 for a revolute joint
-  Eigen::Matrix<double, N, 1> reflected_inertia_;
+  int n_;
+  alignas(64) std::array<Links, kMaxJoints / 4> links_{};
+  JointVector reflected_inertia_;
   Eigen::Vector3d first_joint_;  ///< p_1 in B at q = 0, m
   Eigen::Vector3d first_slide_;  ///< axis of joint 1 in B if prismatic, else 0
   Eigen::Matrix3d tool_;         ///< rotation from T to the last link
   Eigen::Vector3d gravity_;      ///< in B, m/s^2
 };
 
-/// Returns the terms at q and qd. For set-up and tests, because it chooses the kernel at each call.
+/// Returns the terms at q and qd. For set-up and tests, because it makes a kernel at each call.
 /// Throws std::invalid_argument unless q and qd have n entries.
 DynamicsResult evaluate(const RobotModel& model, const JointVector& q, const JointVector& qd);
-
-extern template class DynamicsKernel<1>;
-extern template class DynamicsKernel<2>;
-extern template class DynamicsKernel<3>;
-extern template class DynamicsKernel<4>;
-extern template class DynamicsKernel<5>;
-extern template class DynamicsKernel<6>;
-extern template class DynamicsKernel<7>;
-extern template class DynamicsKernel<8>;
-extern template class DynamicsKernel<9>;
-extern template class DynamicsKernel<10>;
-extern template class DynamicsKernel<11>;
-extern template class DynamicsKernel<12>;
-extern template class DynamicsKernel<13>;
-extern template class DynamicsKernel<14>;
-extern template class DynamicsKernel<15>;
-extern template class DynamicsKernel<16>;
 
 }  // namespace dashpot::controller

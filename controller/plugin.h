@@ -38,7 +38,7 @@ extern "C" {
 
 /* Version of this interface. It increases whenever a function or struct changes. A library
  * serves the versions that it knows. */
-#define DASHPOT_PLUGIN_VERSION 5u
+#define DASHPOT_PLUGIN_VERSION 6u
 /* Largest n. */
 #define DASHPOT_MAX_JOINTS 16
 
@@ -256,7 +256,6 @@ typedef struct dashpot_modes {
   uint64_t missed;     /* the background thread was busy */
   /* What some of these ticks could leave out: */
   uint64_t no_zero_modes; /* springs resist every motion, so no zero modes were kept apart */
-  uint64_t proportional;  /* the undamped modes decouple the damping: ratio damping, or none */
   uint64_t no_wrench;     /* geometric_stiffness is on, but there is no external wrench */
   uint64_t no_shapes;     /* the configuration asks for no shapes */
   uint64_t at_rest;       /* jacobian_rate is on, but the robot stands still */

@@ -25,7 +25,11 @@ SetpointFault check_gains(const Gains& gains, Mode mode, Eigen::Index n) noexcep
 SetpointFault check_setpoint(const Setpoint& setpoint, const Limits& limits,
                              bool known_gains = false) noexcept;
 
-/// True if sizes and entries are equal. The gains must not contain NaN.
-bool same_gains(const Gains& a, const Gains& b) noexcept;
+/// Returns true if sizes and entries of the gains of a mode are equal. They must not contain NaN.
+bool same_gains(const Gains& a, const Gains& b, Mode mode) noexcept;
+/// Returns true if this is so for both modes.
+inline bool same_gains(const Gains& a, const Gains& b) noexcept {
+  return same_gains(a, b, Mode::kJoint) && same_gains(a, b, Mode::kCartesian);
+}
 
 }  // namespace dashpot::controller

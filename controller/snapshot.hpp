@@ -66,12 +66,9 @@ struct VibrationCounters {
   std::uint64_t missed = 0;      ///< the background thread was busy with an earlier task
   // What some of these ticks could leave out:
   std::uint64_t no_zero_modes = 0;  ///< springs resist every motion: no zero modes to keep apart
-  /// Of the tracked ticks: the undamped modes decouple the damping, and only the elastic
-  /// coordinates are followed.
-  std::uint64_t proportional = 0;
-  std::uint64_t no_wrench = 0;  ///< K_G is on, but there is no external wrench
-  std::uint64_t no_shapes = 0;  ///< the settings ask for no shapes
-  std::uint64_t at_rest = 0;    ///< J' C_C Jdot is on, but the robot stands still
+  std::uint64_t no_wrench = 0;      ///< K_G is on, but there is no external wrench
+  std::uint64_t no_shapes = 0;      ///< the settings ask for no shapes
+  std::uint64_t at_rest = 0;        ///< J' C_C Jdot is on, but the robot stands still
 };
 
 /// Vibration modes of the robot with the springs and dampers of one tick.

@@ -19,6 +19,8 @@ inline constexpr int kMaxJoints = analysis::kMaxDof;
 using JointVector = analysis::Vector<kMaxJoints>;
 /// n x n
 using JointMatrix = analysis::Square<kMaxJoints>;
+/// 6 x n: the tip's twist is J qd
+using Jacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxJoints>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 

@@ -1,33 +1,9 @@
 #include <dashpot/controller/controller.hpp>
-#include <dashpot/controller/core/fixed_core.hpp>
-
-#include <stdexcept>
-#include <utility>
+#include <dashpot/controller/core/controller_core.hpp>
 
 namespace dashpot::controller {
-namespace {
-
-using Make = std::unique_ptr<ControllerCore> (*)(const RobotModel&, const Settings&);
-
-template <int N>
-std::unique_ptr<ControllerCore> make_fixed(const RobotModel& model, const Settings& settings) {
-  return std::make_unique<FixedCore<N>>(model, settings);
-}
-
-template <int... I>
-constexpr std::array<Make, sizeof...(I)> makers(std::integer_sequence<int, I...>) {
-  return {make_fixed<I + 1>...};
-}
-
-}  // namespace
-
-std::unique_ptr<ControllerCore> make_core(const RobotModel& model, const Settings& settings) {
-  static constexpr auto kMakers = makers(std::make_integer_sequence<int, kMaxJoints>());
-  return kMakers.at(static_cast<std::size_t>(model.dof() - 1))(model, settings);
-}
-
 Controller::Controller(const RobotModel& model, const Settings& settings)
-    : core_((validate(settings, model.dof()), make_core(model, settings))) {}
+    : core_((validate(settings, model.dof()), std::make_unique<ControllerCore>(model, settings))) {}
 Controller::~Controller() = default;
 Controller::Controller(Controller&&) noexcept = default;
 Controller& Controller::operator=(Controller&&) noexcept = default;

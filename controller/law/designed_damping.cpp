@@ -1,50 +1,98 @@
 #include <dashpot/controller/law/designed_damping.hpp>
 
 namespace dashpot::controller {
-
 namespace {
 
-analysis::DampingTarget target_of(double ratio) noexcept {
-  analysis::DampingTarget target = analysis::DampingTarget::constant(ratio);
-  target.soft_frequency = TaskDamper::kSoftFrequency;
-  return target;
-}
-
-void make_definite(analysis::Square<kMaxJoints>& M) noexcept {
-  const double least = 1e-14 * M.trace();
-  for (Eigen::Index i = 0; i < M.rows(); ++i) M(i, i) += least;
+/// Returns true if all springs are in the tool's axes. C_C is then designed in these axes, because
+/// there K_C does not change as the tool turns.
+bool in_tool(const Impedance& given) noexcept {
+  return given.base.none();
 }
 
 }  // namespace
 
-void TaskDamper::set(const Matrix6& K_C, double ratio, const JointVector& friction) noexcept {
-  hold_.set_target(target_of(ratio));
-  hold_.set_friction(friction);
-  if (hold_.set_stiffness(K_C) == analysis::Status::kOk) return;
+void RatioDamper::set(const JointMatrix& K, double ratio, const JointVector& friction) noexcept {
+  analysis::DampingTarget target = analysis::DampingTarget::constant(ratio);
+  target.soft_frequency = kSoftFrequency;
+  design_.set_target(target);
+  design_.set_friction(friction);
+  if (design_.set_stiffness(K) == analysis::Status::kOk) return;
   // As much as check_gains lets pass. A slow mode more, and a soft one.
-  Matrix6 raised = K_C;
-  raised.diagonal().array() += 2e-10 * K_C.cwiseAbs().maxCoeff();
-  hold_.set_stiffness(raised);
+  JointMatrix raised = K;
+  raised.diagonal().array() += 2e-10 * K.cwiseAbs().maxCoeff();
+  design_.set_stiffness(raised);
 }
 
-void TaskDamper::update(analysis::Square<kMaxJoints>& M,
-                        const analysis::TaskJacobian<kMaxJoints>& J) noexcept {
-  make_definite(M);
-  hold_.update<kMaxJoints>(M, J, C_C_);
+void RatioDamper::update(const JointMatrix& M, const Jacobian* J) noexcept {
+  definite_ = M;
+  definite_.diagonal().array() += 1e-14 * M.trace();
+  if (J == nullptr) {
+    design_.update(definite_, C_);
+  } else {
+    design_.update(definite_, *J, C_);
+  }
 }
 
-void JointDamper::set(const JointMatrix& K_q, double ratio, const JointVector& friction) noexcept {
-  hold_.set_target(target_of(ratio));
-  hold_.set_friction(friction);
-  if (hold_.set_stiffness(K_q) == analysis::Status::kOk) return;
-  JointMatrix raised = K_q;
-  raised.diagonal().array() += 2e-10 * K_q.cwiseAbs().maxCoeff();
-  hold_.set_stiffness(raised);
+DesignedDamping::DesignedDamping(const JointVector& viscous_friction)
+    : joint_damper_(static_cast<int>(viscous_friction.size())),
+      in_force_(static_cast<int>(viscous_friction.size())) {
+  if ((viscous_friction.array() > 0).any()) friction_ = viscous_friction;
 }
 
-void JointDamper::update(JointMatrix& M) noexcept {
-  make_definite(M);
-  hold_.update(M, C_q_);
+const Impedance& DesignedDamping::update(const GainBlend& gains,
+                                         const DynamicsResult& robot) noexcept {
+  const Impedance& given = gains.now();
+  const bool tip = given.damping_ratio > 0 && given.task_weight > 0;
+  const bool joints = given.joint_damping_ratio > 0 && given.joint_weight > 0;
+  if ((tip && !tip_) || (joints && !joints_) || gains.changes() != changes_) {
+    if (tip || joints) in_force_ = given;
+    if (!tip_) tip_damper_.reset();
+    if (!joints_) joint_damper_.reset();
+    if (tip) set_tip(given, robot);
+    if (joints) {
+      joint_damper_.set(given.joint_stiffness, given.joint_damping_ratio,
+                        friction(given.joint_weight));
+    }
+  }
+  tip_ = tip;
+  joints_ = joints;
+  changes_ = gains.changes();
+  if (tip) design_tip(given, robot);
+  if (joints) {
+    joint_damper_.update(robot.M, nullptr);
+    in_force_.joint_damping = given.joint_damping + joint_damper_.damping();
+  }
+  return now(given);
+}
+
+JointVector DesignedDamping::friction(double share) const noexcept {
+  JointVector result = friction_;
+  for (double& value : result) value *= share;
+  return result;
+}
+
+void DesignedDamping::set_tip(const Impedance& given, const DynamicsResult& robot) noexcept {
+  // Springs in both frames are in force only while gains change, so that K_C is new at every tick.
+  const Matrix6 &K_B = given.base.stiffness, &K_T = given.tool.stiffness;
+  const Matrix6 K_C = in_tool(given)       ? K_T
+                      : !given.tool.none() ? Matrix6(K_B + turned(K_T, robot.R_BT))
+                                           : K_B;
+  tip_damper_.set(K_C, given.damping_ratio, friction(given.task_weight));
+}
+
+void DesignedDamping::design_tip(const Impedance& given, const DynamicsResult& robot) noexcept {
+  if (!in_tool(given)) {
+    tip_damper_.update(robot.M, &robot.J);
+    in_force_.base.damping = given.base.damping + tip_damper_.damping();
+    return;
+  }
+  J_.resize(6, robot.J.cols());
+  for (Eigen::Index j = 0; j < J_.cols(); ++j) {
+    J_.col(j).head<3>() = robot.R_BT.transpose() * robot.J.col(j).head<3>();
+    J_.col(j).tail<3>() = robot.R_BT.transpose() * robot.J.col(j).tail<3>();
+  }
+  tip_damper_.update(robot.M, &J_);
+  in_force_.tool.damping = given.tool.damping + tip_damper_.damping();
 }
 
 }  // namespace dashpot::controller

@@ -16,7 +16,8 @@ template <class Value>
 class Ramp {
  public:
   /// `ticks` is the number of steps that a change takes, at least 1.
-  explicit Ramp(int ticks) noexcept : step_(1.0 / std::max(1, ticks)) {}
+  Ramp(int ticks, const Value& start) noexcept
+      : step_(1.0 / std::max(1, ticks)), now_(start), from_(start), to_(start) {}
 
   /// Sets the value and the target to `value`.
   void start(const Value& value) noexcept {
@@ -45,12 +46,11 @@ class Ramp {
   double step_;
   double s_ = 1;
   std::uint64_t changes_ = 0;
-  Value from_{};
-  Value to_{};
-  Value now_{};
+  Value now_;
+  Value from_;
+  Value to_;
 };
 
-template <int N>
-using GainBlend = Ramp<Impedance<N>>;
+using GainBlend = Ramp<Impedance>;
 
 }  // namespace dashpot::controller

@@ -14,6 +14,16 @@ Matrix3d selected(const Eigen::Vector3d& base, const Eigen::Vector3d& tool, cons
   return H;
 }
 
+/// Returns L^-T, column by column: L_ii x_i = e_i - sum of L_ij x_j, j < i.
+Matrix6 inverse_transpose(const SmallCholesky& factor) {
+  Matrix6 X = Matrix6::Identity();
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < i; ++j) X.col(i) -= factor.L(i, j) * X.col(j);
+    X.col(i) *= factor.per_diagonal(i);
+  }
+  return X;
+}
+
 /// Mean of the diagonal; 1 if it is zero.
 double mean(double trace) {
   return trace > 0 ? trace / 3 : 1.0;
@@ -44,25 +54,24 @@ void TaskInertia::compute(const Matrix6& A, const TipImpedance& base, const TipI
   Vector6 D;
   D << D_linear, D_linear, D_linear, D_angular, D_angular, D_angular;
   const double least_pivot = 1e-14 * std::min(D_linear, D_angular);
-  SmallCholesky<6> factor;
-  factor.compute(G, least_pivot);
-  Matrix6 L_inverse = factor.inverse_L();
+  factor_.compute(G, least_pivot);
+  Matrix6 X = inverse_transpose(factor_);
   double trace = 0;  // of D G^-1
-  for (int k = 0; k < 6; ++k) trace += D[k] * L_inverse.col(k).squaredNorm();
+  for (int k = 0; k < 6; ++k) trace += D[k] * X.row(k).squaredNorm();
   regularity_ = 1 / trace;
   if (nearly_singular()) {
     const double deficit = 1 - regularity_ / kNearlySingular;
     G.diagonal() += kNearlySingular * deficit * deficit * D;
-    factor.compute(G, least_pivot);
-    L_inverse = factor.inverse_L();
+    factor_.compute(G, least_pivot);
+    X = inverse_transpose(factor_);
   }
   if (all_selected) {
-    inertia_.noalias() = L_inverse.transpose() * L_inverse;
+    inertia_.noalias() = X * X.transpose();
     return;
   }
   Matrix6 LH;  // L^-1 H
-  LH.leftCols<3>().noalias() = L_inverse.leftCols<3>() * H_linear;
-  LH.rightCols<3>().noalias() = L_inverse.rightCols<3>() * H_angular;
+  LH.leftCols<3>().noalias() = X.topRows<3>().transpose() * H_linear;
+  LH.rightCols<3>().noalias() = X.bottomRows<3>().transpose() * H_angular;
   inertia_.noalias() = LH.transpose() * LH;
 }
 

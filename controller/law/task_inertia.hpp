@@ -36,6 +36,7 @@ class TaskInertia {
  private:
   Matrix6 inertia_ = Matrix6::Zero();  ///< H G^-1 H
   double regularity_ = 1;
+  SmallCholesky factor_;  ///< of G
 };
 
 }  // namespace dashpot::controller

@@ -4,8 +4,8 @@
 #include <dashpot/controller/kdl_chain.hpp>
 
 #include <Eigen/Geometry>
+#include <array>
 #include <string>
-#include <utility>
 
 namespace dashpot::controller {
 namespace {
@@ -33,263 +33,229 @@ Eigen::Matrix3d with_z(const Eigen::Vector3d& axis) {
   return R;
 }
 
-/// Puts the entries of `values`, by columns, at joint i of the rows.
+/// Puts the entries of `values`, by columns, at the place of joint i in the rows of its four.
 template <class Rows, class Derived>
 void set_joint(Rows& rows, int i, const Eigen::MatrixBase<Derived>& values) {
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
-    rows[k][static_cast<std::size_t>(i)] = values(at % values.rows(), at / values.rows());
+    rows[k][static_cast<std::size_t>(i % 4)] = values(at % values.rows(), at / values.rows());
   }
 }
 
-template <int G, class Rows>
-Lanes3<G> load3(const Rows& rows, std::size_t first = 0) {
-  return {JointPack<G>::load(rows[first].data()), JointPack<G>::load(rows[first + 1].data()),
-          JointPack<G>::load(rows[first + 2].data())};
+using Four = std::array<double, 4>;
+
+Lanes3 load3(const Four* rows) {
+  return {load(rows[0].data()), load(rows[1].data()), load(rows[2].data())};
 }
 
-template <int G, class Rows>
-LanesSymmetric<G> load_symmetric(const Rows& rows) {
-  return {JointPack<G>::load(rows[0].data()), JointPack<G>::load(rows[1].data()),
-          JointPack<G>::load(rows[2].data()), JointPack<G>::load(rows[3].data()),
-          JointPack<G>::load(rows[4].data()), JointPack<G>::load(rows[5].data())};
-}
-
-template <int N>
-JointPack<kGroups<N>> load(const Eigen::Matrix<double, N, 1>& values) {
-  JointPack<kGroups<N>> result{};
-  __builtin_memcpy(&result, values.data(), N * sizeof(double));
-  return result;
-}
-
-/// One column for each joint, of x, y, z and an unused entry, turned into rows.
-template <int G>
-Lanes3<G> to_lanes(const Vec4d (&columns)[4 * G]) {
-  Lanes3<G> result;
-  for (int g = 0; g < G; ++g) {
-    const Vec4d* c = columns + 4 * g;
+/// Rotations R of four links, by columns: `rotation` is that from link i to link i - 1 at q = 0,
+/// and link i turns by `angle` about its z axis besides. `last` are the columns of the link before
+/// the four, and then of the fourth. The products along the chain, which have to wait for one
+/// another, take a register for each column.
+Lanes33 link_rotations(const std::array<Four, 9>& rotation, const Vec4d& angle, Vec4d (&last)[3]) {
+  Vec4d sine, cosine;
+  sin_cos(angle, sine, cosine);
+  const Lanes3 x_0 = load3(&rotation[0]), y_0 = load3(&rotation[3]);
+  const Lanes3 x_1 = cosine * x_0 + sine * y_0, y_1 = cosine * y_0 - sine * x_0;
+  Vec4d columns[3][4];  // of each link
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Vec4d x = last[0] * x_1.x[i] + last[1] * x_1.y[i] + last[2] * x_1.z[i];
+    const Vec4d y = last[0] * y_1.x[i] + last[1] * y_1.y[i] + last[2] * y_1.z[i];
+    last[2] = last[0] * rotation[6][i] + last[1] * rotation[7][i] + last[2] * rotation[8][i];
+    last[0] = x;
+    last[1] = y;
+    for (std::size_t k = 0; k < 3; ++k) columns[k][i] = last[k];
+  }
+  Lanes33 R;
+  Lanes3* const axes[] = {&R.x, &R.y, &R.z};
+  for (std::size_t k = 0; k < 3; ++k) {  // x, y, z and an unused entry of four links become rows
+    const Vec4d* c = columns[k];
     const Vec4d xy01 = __builtin_shufflevector(c[0], c[1], 0, 4, 1, 5);
     const Vec4d xy23 = __builtin_shufflevector(c[2], c[3], 0, 4, 1, 5);
     const Vec4d z01 = __builtin_shufflevector(c[0], c[1], 2, 6, 2, 6);
     const Vec4d z23 = __builtin_shufflevector(c[2], c[3], 2, 6, 2, 6);
-    result.x.group[g] = __builtin_shufflevector(xy01, xy23, 0, 1, 4, 5);
-    result.y.group[g] = __builtin_shufflevector(xy01, xy23, 2, 3, 6, 7);
-    result.z.group[g] = __builtin_shufflevector(z01, z23, 0, 1, 4, 5);
+    axes[k]->x = __builtin_shufflevector(xy01, xy23, 0, 1, 4, 5);
+    axes[k]->y = __builtin_shufflevector(xy01, xy23, 2, 3, 6, 7);
+    axes[k]->z = __builtin_shufflevector(z01, z23, 0, 1, 4, 5);
   }
-  return result;
+  return R;
 }
 
-/// R_i for all links: `rotation` is that from link i to link i - 1 at q = 0, by columns, and link i
-/// turns by `angle` about its z axis besides. The products along the chain, which have to wait for
-/// one another, take a register for each column.
-template <int N, class Rows>
-Lanes33<kGroups<N>> link_rotations(const Rows& rotation, const JointPack<kGroups<N>>& angle) {
-  constexpr int G = kGroups<N>;
-  JointPack<G> sine, cosine;
-  for (int g = 0; g < G; ++g) sin_cos(angle.group[g], sine.group[g], cosine.group[g]);
-  const Lanes3<G> x_0 = load3<G>(rotation, 0), y_0 = load3<G>(rotation, 3);
-  const Lanes3<G> x_1 = cosine * x_0 + sine * y_0, y_1 = cosine * y_0 - sine * x_0;
-  alignas(32) double turned[6][kLanes<N>];
-  const JointPack<G>* entries[] = {&x_1.x, &x_1.y, &x_1.z, &y_1.x, &y_1.y, &y_1.z};
-  for (std::size_t k = 0; k < 6; ++k) entries[k]->store(turned[k]);
+/// What the way outward tells of four links.
+struct MovingLinks {
+  Lanes33 R;
+  Lanes3 e, p, w, wd, a;
 
-  Vec4d x_axes[4 * G] = {}, y_axes[4 * G] = {}, z_axes[4 * G] = {};
-  Vec4d x{1, 0, 0, 0}, y{0, 1, 0, 0}, z{0, 0, 1, 0};
-  for (std::size_t i = 0; i < N; ++i) {
-    const Vec4d new_x = x * turned[0][i] + y * turned[1][i] + z * turned[2][i];
-    const Vec4d new_y = x * turned[3][i] + y * turned[4][i] + z * turned[5][i];
-    z = x * rotation[6][i] + y * rotation[7][i] + z * rotation[8][i];
-    x_axes[i] = x = new_x;
-    y_axes[i] = y = new_y;
-    z_axes[i] = z;
-  }
-  return {to_lanes<G>(x_axes), to_lanes<G>(y_axes), to_lanes<G>(z_axes)};
+  /// Returns the bias acceleration of points at r from the links' origins.
+  Lanes3 acceleration(const Lanes3& r) const { return cross(wd, r) + cross(w, cross(w, r)); }
+};
+
+/// One number for each of all joints, and zeros beyond.
+using Row = std::array<double, kMaxJoints + 4>;
+/// J, or the wrenches at the tip of unit accelerations: linear x, y, z, angular x, y, z.
+using Rows6 = std::array<Row, 6>;
+
+void store6(const Lanes3& linear, const Lanes3& angular, std::size_t group, Rows6& rows) {
+  const Vec4d* const from[] = {&linear.x, &linear.y, &linear.z, &angular.x, &angular.y, &angular.z};
+  for (std::size_t k = 0; k < 6; ++k) store(*from[k], &rows[k][group]);
 }
 
-/// J, and M_ki = J_k . (force, moment)_i for k <= i, mirrored; the wrench is taken at the tip.
-template <int N>
-void write_J_M(const Lanes3<kGroups<N>>& J_linear, const Lanes3<kGroups<N>>& J_angular,
-               const Lanes3<kGroups<N>>& force, const Lanes3<kGroups<N>>& moment,
-               Dynamics<N>& result) {
-  using L = JointPack<kGroups<N>>;
-  const L* J[] = {&J_linear.x, &J_linear.y, &J_linear.z, &J_angular.x, &J_angular.y, &J_angular.z};
-  const L* wrench[] = {&force.x, &force.y, &force.z, &moment.x, &moment.y, &moment.z};
-  alignas(32) double J_rows[6][kLanes<N>], wrench_rows[6][kLanes<N>];
-  for (std::size_t k = 0; k < 6; ++k) {
-    J[k]->store(J_rows[k]);
-    wrench[k]->store(wrench_rows[k]);
-  }
-  for (int i = 0; i < N; ++i) {
-    for (int k = 0; k < 6; ++k) result.J(k, i) = J_rows[k][i];
-    alignas(32) double column[kLanes<N>];
-    for (int g = 0; g <= i / 4; ++g) {
+/// J, and M_ki = J_k . wrench_i for k <= i, mirrored.
+void write_J_M(const Rows6& J, const Rows6& wrench, int n, DynamicsResult& result) {
+  result.J.resize(6, n);
+  result.M.resize(n, n);
+  double* const M = result.M.data();
+  for (int i = 0; i < n; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    for (std::size_t k = 0; k < 6; ++k) result.J.data()[6 * at + k] = J[k][at];
+    Row column;
+    for (std::size_t g = 0; g <= at; g += 4) {
       Vec4d entries{};
-      for (int k = 0; k < 6; ++k) entries += J[k]->group[g] * wrench_rows[k][i];
-      __builtin_memcpy(column + 4 * g, &entries, sizeof(entries));
+      for (std::size_t k = 0; k < 6; ++k) entries += load(&J[k][g]) * wrench[k][at];
+      store(entries, &column[g]);
     }
-    for (int k = 0; k <= i; ++k) result.M(k, i) = result.M(i, k) = column[k];
+    for (int k = 0; k <= i; ++k) M[k + n * i] = M[i + n * k] = column[static_cast<std::size_t>(k)];
   }
 }
 
-template <int N>
-void store(const JointPack<kGroups<N>>& source, Eigen::Matrix<double, N, 1>& target) {
-  __builtin_memcpy(target.data(), &source, N * sizeof(double));
-}
-
-/// v of joint i.
-template <int G>
-Eigen::Vector3d of_joint(const Lanes3<G>& v, int i) {
-  return {v.x.group[i / 4][i % 4], v.y.group[i / 4][i % 4], v.z.group[i / 4][i % 4]};
+/// v of joint i of four.
+Eigen::Vector3d of_joint(const Lanes3& v, int i) {
+  return {v.x[i], v.y[i], v.z[i]};
 }
 
 }  // namespace
 
-template <int N>
-DynamicsKernel<N>::DynamicsKernel(const RobotModel& model)
-    : rotation_{},
-      offset_{},
-      next_slide_{},
-      first_moment_{},
-      inertia_{},
-      mass_{},
-      carried_mass_{},
-      revolute_{},
-      prismatic_{},
+DynamicsKernel::DynamicsKernel(const RobotModel& model)
+    : n_(model.dof()),
+      reflected_inertia_(model.joint_values(&Joint::reflected_inertia)),
       gravity_(model.gravity()) {
-  if (model.dof() != N) {
-    throw std::invalid_argument("DynamicsKernel<" + std::to_string(N) + ">: the model has " +
-                                std::to_string(model.dof()) + " joints");
-  }
-  reflected_inertia_ = model.joint_values(&Joint::reflected_inertia);
   const KDL::Chain& chain = kdl_chain(model);
 
   Eigen::Isometry3d link = Eigen::Isometry3d::Identity();  // KDL's link i - 1 in our link i - 1
-  for (int i = 0; i < N; ++i) {
-    const auto row = static_cast<std::size_t>(i);
+  for (int i = 0; i < n_; ++i) {
+    Links& links = links_[static_cast<std::size_t>(i) / 4];
+    const auto lane = static_cast<std::size_t>(i) % 4;
     const KDL::Segment& segment = chain.getSegment(static_cast<unsigned>(i));
     const bool prismatic = segment.getJoint().getType() == KDL::Joint::TransAxis;
-    revolute_[row] = prismatic ? 0 : 1;
-    prismatic_[row] = prismatic ? 1 : 0;
+    links.revolute[lane] = prismatic ? 0 : 1;
+    links.prismatic[lane] = prismatic ? 1 : 0;
 
     Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();  // our link i in KDL's link i - 1
     frame.linear() = with_z(to_eigen(segment.getJoint().JointAxis()));
     frame.translation() = to_eigen(segment.getJoint().JointOrigin());
     const Eigen::Isometry3d to_previous = link * frame;
-    set_joint(rotation_, i, to_previous.linear());
+    set_joint(links.rotation, i, to_previous.linear());
     if (i == 0) {
       first_joint_ = to_previous.translation();
-      first_slide_ = prismatic_[row] * to_previous.linear().col(2);
+      first_slide_ = links.prismatic[lane] * to_previous.linear().col(2);
     } else {
-      set_joint(offset_, i - 1, to_previous.translation());
-      set_joint(next_slide_, i - 1, prismatic_[row] * to_previous.linear().col(2));
+      Links& before = links_[static_cast<std::size_t>(i - 1) / 4];
+      set_joint(before.offset, i - 1, to_previous.translation());
+      set_joint(before.next_slide, i - 1, links.prismatic[lane] * to_previous.linear().col(2));
     }
     link = frame.inverse() * to_eigen(segment.pose(0));
 
     KDL::RigidBodyInertia body = segment.getInertia();
-    mass_[row] = body.getMass();
+    links.mass[lane] = body.getMass();
     const Eigen::Vector3d center = link * to_eigen(body.getCOG());
-    set_joint(first_moment_, i, body.getMass() * center);
+    set_joint(links.first_moment, i, body.getMass() * center);
     const KDL::RotationalInertia about_center = body.RefPoint(body.getCOG()).getRotationalInertia();
     const Eigen::Matrix3d I = link.linear() * Eigen::Map<const Eigen::Matrix3d>(about_center.data) *
                                   link.linear().transpose() +
                               body.getMass() * (center.squaredNorm() * Eigen::Matrix3d::Identity() -
                                                 center * center.transpose());
-    set_joint(inertia_, i, Vector6{{I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}});
+    set_joint(links.inertia, i, Vector6{{I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}});
   }
-  const Eigen::Isometry3d tip = link * to_eigen(chain.getSegment(N).pose(0));
-  set_joint(offset_, N - 1, tip.translation());
+  const Eigen::Isometry3d tip =
+      link * to_eigen(chain.getSegment(static_cast<unsigned>(n_)).pose(0));
+  set_joint(links_[static_cast<std::size_t>(n_ - 1) / 4].offset, n_ - 1, tip.translation());
   tool_ = tip.linear();
   double carried = 0;
-  for (std::size_t i = N; i-- > 0;) carried_mass_[i] = carried += mass_[i];
+  for (auto i = static_cast<std::size_t>(n_); i-- > 0;) {
+    links_[i / 4].carried_mass[i % 4] = carried += links_[i / 4].mass[i % 4];
+  }
 }
 
-template <int N>
-void DynamicsKernel<N>::evaluate(const Eigen::Matrix<double, N, 1>& q_in,
-                                 const Eigen::Matrix<double, N, 1>& qd_in,
-                                 Dynamics<N>& result) const noexcept {
-  constexpr int G = kGroups<N>;
-  using L = JointPack<G>;
-  using L3 = Lanes3<G>;
-  const L q = load<N>(q_in), qd = load<N>(qd_in);
-  const L revolute = L::load(revolute_.data()), prismatic = L::load(prismatic_.data());
+void DynamicsKernel::evaluate(const JointVector& q_in, const JointVector& qd_in,
+                              DynamicsResult& result) const noexcept {
+  const auto last = static_cast<std::size_t>(n_ - 1) / 4 * 4;  // the last four
+  const int end = (n_ - 1) % 4;                                // the last joint of them
+  Row q{}, qd{};
+  for (int i = 0; i < n_; ++i) {
+    q[static_cast<std::size_t>(i)] = q_in[i];
+    qd[static_cast<std::size_t>(i)] = qd_in[i];
+  }
 
-  const Lanes33<G> R = link_rotations<N>(rotation_, revolute * q);
-
-  // Positions from the first joint's origin, and the Jacobian at the tip.
-  const L3 e = R * (load3<G>(offset_) + of_next(q) * load3<G>(next_slide_));
-  const L3 p_next = sum_outward(e);
-  const L3 p = of_previous(p_next);
-  const Eigen::Vector3d tip = of_joint(p_next, N - 1);
-  const L3 to_tip = {all<G>(tip.x()) - p.x, all<G>(tip.y()) - p.y, all<G>(tip.z()) - p.z};
-  const L3 J_angular = revolute * R.z;
-  const L3 J_linear = cross(J_angular, to_tip) + prismatic * R.z;
-
-  // Outward: velocities and bias accelerations.
-  const L3 w = sum_outward(qd * J_angular);
-  const L3 swing = cross(w, qd * R.z);
-  const L3 wd = sum_outward(revolute * swing);
-  const auto acceleration = [&](const L3& r) { return cross(wd, r) + cross(w, cross(w, r)); };
-  const L3 e_bias = acceleration(e);
-  const L3 a = sum_outward(of_previous(e_bias) + (2 * prismatic) * swing);
-  const L3 a_tip = a + e_bias;
-
-  // Inward: forces and moments.
-  const L mass = L::load(mass_.data());
-  const L3 h_link = R * load3<G>(first_moment_);
-  const LanesSymmetric<G> I_link = turned(R, load_symmetric<G>(inertia_));
-  const L3 f = sum_inward(acceleration(h_link) + mass * a);
-  const L3 n =
-      sum_inward(I_link * wd + cross(w, I_link * w) + cross(h_link, a) + cross(e, of_next(f)));
-  const L coriolis = dot(J_angular, n) + prismatic * dot(R.z, f);
-
-  // Inward: what each joint carries.
-  const L carried = L::load(carried_mass_.data()), beyond = of_next(carried);
-  const L3 h = sum_inward(h_link + beyond * e);
-  const LanesSymmetric<G> I = sum_inward(I_link + shift_term(of_next(h) + (0.5 * beyond) * e, e));
-  const L3 F = cross(J_angular, h) + (prismatic * carried) * R.z;
-  const L3 moment = I * J_angular + cross(h, prismatic * R.z) + cross(F, to_tip);
-  const L gravity = -(gravity_.x() * F.x + gravity_.y() * F.y + gravity_.z() * F.z);
-
-  write_J_M<N>(J_linear, J_angular, F, moment, result);
-  result.M.diagonal() += reflected_inertia_;
-  store<N>(coriolis, result.coriolis);
-  store<N>(gravity, result.gravity);
-  result.Jdot_qd << of_joint(a_tip, N - 1), of_joint(wd, N - 1);
+  // Outward: rotations, positions from the first joint's origin, velocities, bias accelerations.
+  MovingLinks moving[kMaxJoints / 4];
+  Vec4d axes[3] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+  Lanes3 p_next{}, w{}, wd{}, a{}, e_bias{};  // of the four joints before
+  for (std::size_t g = 0; g <= last; g += 4) {
+    const Links& links = links_[g / 4];
+    MovingLinks& m = moving[g / 4];
+    const Vec4d revolute = load(links.revolute.data()), prismatic = load(links.prismatic.data());
+    m.R = link_rotations(links.rotation, revolute * load(&q[g]), axes);
+    m.e = m.R * (load3(&links.offset[0]) + load(&q[g + 1]) * load3(&links.next_slide[0]));
+    const Lanes3 p_before = p_next, bias_before = e_bias, slope = load(&qd[g]) * m.R.z;
+    p_next = sum_outward(m.e, p_before);
+    m.p = of_previous(p_next, p_before);
+    m.w = w = sum_outward(revolute * slope, w);
+    const Lanes3 swing = cross(w, slope);
+    m.wd = wd = sum_outward(revolute * swing, wd);
+    e_bias = m.acceleration(m.e);
+    m.a = a = sum_outward(of_previous(e_bias, bias_before) + (2 * prismatic) * swing, a);
+  }
+  const Eigen::Vector3d tip = of_joint(p_next, end);
+  result.Jdot_qd << of_joint(a, end) + of_joint(e_bias, end), of_joint(wd, end);
   result.p_BT_B = first_joint_ + q_in[0] * first_slide_ + tip;
+  const Lanes33& R_end = moving[last / 4].R;
   Eigen::Matrix3d R_last;
-  R_last << of_joint(R.x, N - 1), of_joint(R.y, N - 1), of_joint(R.z, N - 1);
+  R_last << of_joint(R_end.x, end), of_joint(R_end.y, end), of_joint(R_end.z, end);
   result.R_BT.noalias() = R_last * tool_;
+
+  // Inward: forces and moments, what each joint carries, and the Jacobian at the tip.
+  Rows6 J, wrench;
+  Row coriolis, gravity;
+  Lanes3 f{}, n{}, h{};  // of the four joints beyond
+  LanesSymmetric I{};
+  Vec4d carried{};
+  for (std::size_t g = last + 4; g > 0;) {
+    g -= 4;
+    const Links& links = links_[g / 4];
+    const MovingLinks& m = moving[g / 4];
+    const Lanes3 f_beyond = f, h_beyond = h;
+    const Vec4d beyond = of_next(load(links.carried_mass.data()), carried);
+    carried = load(links.carried_mass.data());
+    const Lanes3 J_angular = load(links.revolute.data()) * m.R.z;
+    const Lanes3 slide = load(links.prismatic.data()) * m.R.z;
+    const Lanes3 h_link = m.R * load3(&links.first_moment[0]);
+    const Lanes3 squares = load3(&links.inertia[0]), products = load3(&links.inertia[3]);
+    const LanesSymmetric I_link =
+        turned(m.R, {squares.x, squares.y, squares.z, products.x, products.y, products.z});
+    f = sum_inward(m.acceleration(h_link) + load(links.mass.data()) * m.a, f_beyond);
+    n = sum_inward(I_link * m.wd + cross(m.w, I_link * m.w) + cross(h_link, m.a) +
+                       cross(m.e, of_next(f, f_beyond)),
+                   n);
+    store(dot(J_angular, n) + dot(slide, f), &coriolis[g]);
+    h = sum_inward(h_link + beyond * m.e, h_beyond);
+    I = sum_inward(I_link + shift_term(of_next(h, h_beyond) + (0.5 * beyond) * m.e, m.e), I);
+
+    const Vec4d one{1, 1, 1, 1};
+    const Lanes3 to_tip = Lanes3{tip.x() * one, tip.y() * one, tip.z() * one} - m.p;
+    const Lanes3 F = cross(J_angular, h) + carried * slide;
+    store6(cross(J_angular, to_tip) + slide, J_angular, g, J);
+    store6(F, I * J_angular + cross(h, slide) + cross(F, to_tip), g, wrench);
+    store(-(gravity_.x() * F.x + gravity_.y() * F.y + gravity_.z() * F.z), &gravity[g]);
+  }
+  write_J_M(J, wrench, n_, result);
+  result.coriolis.resize(n_);
+  result.gravity.resize(n_);
+  for (int i = 0; i < n_; ++i) {
+    result.M(i, i) += reflected_inertia_[i];
+    result.coriolis[i] = coriolis[static_cast<std::size_t>(i)];
+    result.gravity[i] = gravity[static_cast<std::size_t>(i)];
+  }
 }
-
-template class DynamicsKernel<1>;
-template class DynamicsKernel<2>;
-template class DynamicsKernel<3>;
-template class DynamicsKernel<4>;
-template class DynamicsKernel<5>;
-template class DynamicsKernel<6>;
-template class DynamicsKernel<7>;
-template class DynamicsKernel<8>;
-template class DynamicsKernel<9>;
-template class DynamicsKernel<10>;
-template class DynamicsKernel<11>;
-template class DynamicsKernel<12>;
-template class DynamicsKernel<13>;
-template class DynamicsKernel<14>;
-template class DynamicsKernel<15>;
-template class DynamicsKernel<16>;
-
-namespace {
-
-template <int N>
-void evaluate_fixed(const RobotModel& model, const JointVector& q, const JointVector& qd,
-                    DynamicsResult& result) {
-  Dynamics<N> fixed;
-  DynamicsKernel<N>(model).evaluate(q, qd, fixed);
-  result = {fixed.M,       fixed.coriolis, fixed.gravity, fixed.J,
-            fixed.Jdot_qd, fixed.p_BT_B,   fixed.R_BT};
-}
-
-}  // namespace
 
 DynamicsResult evaluate(const RobotModel& model, const JointVector& q, const JointVector& qd) {
   const int n = model.dof();
@@ -297,10 +263,7 @@ DynamicsResult evaluate(const RobotModel& model, const JointVector& q, const Joi
     throw std::invalid_argument("evaluate: q and qd need " + std::to_string(n) + " entries each");
   }
   DynamicsResult result;
-  [&]<int... I>(std::integer_sequence<int, I...>) {
-    (void)((n == I + 1 && (evaluate_fixed<I + 1>(model, q, qd, result), true)) || ...);
-  }
-  (std::make_integer_sequence<int, kMaxJoints>{});
+  DynamicsKernel(model).evaluate(q, qd, result);
   return result;
 }
 

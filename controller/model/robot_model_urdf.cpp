@@ -1,5 +1,6 @@
 // A RobotModel from a URDF.
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/kdl_chain.hpp>
 #include <dashpot/controller/model/rigid_bodies.hpp>
 #include <dashpot/controller/model/robot_model_data.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
@@ -205,7 +206,12 @@ int unresisted_joint(const RobotModel& model, double phase) {
   JointVector q(n);
   for (int i = 0; i < n; ++i) q[i] = std::sin(phase + 1.7 * i);
   JointMatrix M = evaluate(model, q, JointVector::Zero(n)).M;
-  const double floor = 1e-13 * M.diagonal().maxCoeff();
+  double scale = M.diagonal().maxCoeff();  // of what rounds
+  for (const KDL::Segment& segment : kdl_chain(model).segments) {
+    const KDL::RigidBodyInertia& body = segment.getInertia();
+    scale = std::max(scale, body.getMass() * KDL::dot(body.getCOG(), body.getCOG()));
+  }
+  const double floor = 1e-13 * scale;
   for (int i = n - 1; i >= 0; --i) {
     if (!(M(i, i) > floor)) return i;
     const JointVector column = M.col(i).head(i);

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/controller/base/joint_algebra.hpp>
+#include <dashpot/controller/types.hpp>
 
 #include <algorithm>
 #include <array>
@@ -12,18 +12,19 @@ inline constexpr int kMaxSmoothing = 256;
 
 /// Limits of each coordinate by itself. speed(v) is max |v_i| / velocity_i, and effort(a) likewise
 /// with the acceleration limits. Both are norms, and 1 at the limit.
-template <int N>
 struct JointNorm {
-  Joints<N> velocity;      ///< limits, rad/s
-  Joints<N> acceleration;  ///< rad/s^2
+  JointVector velocity;      ///< limits, n, rad/s
+  JointVector acceleration;  ///< n, rad/s^2
 
-  double speed(const Joints<N>& v) const noexcept { return largest(v, velocity); }
-  double effort(const Joints<N>& a) const noexcept { return largest(a, acceleration); }
+  double speed(const JointVector& v) const noexcept { return largest(v, velocity); }
+  double effort(const JointVector& a) const noexcept { return largest(a, acceleration); }
 
  private:
-  static double largest(const Joints<N>& x, const Joints<N>& limit) noexcept {
+  static double largest(const JointVector& x, const JointVector& limit) noexcept {
     double result = 0;
-    for (int i = 0; i < N; ++i) result = std::max(result, std::abs(x[i]) / limit[i]);
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      result = std::max(result, std::abs(x[i]) / limit[i]);
+    }
     return result;
   }
 };
@@ -44,13 +45,7 @@ struct TwistNorm {
   }
 };
 
-template <int D>
-struct Step {
-  Joints<D> velocity;
-  bool arrives = false;  ///< a period at this velocity ends at the goal
-};
-
-/// Returns the next velocity of a point that moves at velocity v, d being goal minus position:
+/// Replaces the velocity v of a point by the next one, d being goal minus position:
 ///     v + (c - v) / max(1, effort(c - v) / T),
 /// where T is the period. c leads straight to the goal and can brake for it at half the
 /// acceleration limit in a whole number k of periods: with b = 1/2 / effort(d), braking as a
@@ -64,9 +59,10 @@ struct Step {
 /// point slows down as far as the acceleration limit allows. v catches up with c, because c brakes
 /// at half the limit and so changes no faster than v can, from whatever direction the point comes.
 /// The goal may move.
-template <int D, class Norm>
-Step<D> approach(const Joints<D>& d, const Joints<D>& v, const Norm& norm, double T,
-                 double share = 1) noexcept {
+///
+/// Returns true if a period at the next velocity ends at the goal.
+template <class Vector, class Norm>
+bool approach(const Vector& d, Vector& v, const Norm& norm, double T, double share = 1) noexcept {
   double rate = 0;  // c = rate d
   bool last = true;
   const double effort = norm.effort(d);
@@ -76,33 +72,34 @@ Step<D> approach(const Joints<D>& d, const Joints<D>& v, const Norm& norm, doubl
     last = k == 1;
     rate = std::min(share / norm.speed(d), (last ? 1 : 1 / k + 0.5 * (k - 1) * bTT) / T);
   }
-  Joints<D> change;  // c - v
-  for (int i = 0; i < D; ++i) change[i] = rate * d[i] - v[i];
+  Vector change(d.size());  // c - v
+  for (Eigen::Index i = 0; i < d.size(); ++i) change[i] = rate * d[i] - v[i];
   const double size = norm.effort(change);
-  Step<D> step;
-  step.arrives = size <= T && last;
-  const double part = size <= T ? 1 : T / size;
-  for (int i = 0; i < D; ++i) {
-    step.velocity[i] = size <= T ? rate * d[i] : v[i] + part * change[i];
+  for (Eigen::Index i = 0; i < d.size(); ++i) {
+    v[i] = size <= T ? rate * d[i] : v[i] + T / size * change[i];
   }
-  return step;
+  return size <= T && last;
 }
 
 /// Moving average of the last W velocities. It keeps every bound on velocity and acceleration and
 /// makes the acceleration continuous, because in a period the acceleration changes by at most 2 / W
 /// of its limit. The smoothed position is the position before smoothing plus `offset`. W periods
 /// after the end of a motion the offset is exactly zero.
-template <int D>
+template <class Vector>
 class Smoothing {
  public:
-  using Vector = Joints<D>;
-
-  explicit Smoothing(int window) noexcept : window_(std::clamp(window, 1, kMaxSmoothing)) {
+  /// `n`: entries of the vectors.
+  Smoothing(int window, int n) noexcept
+      : window_(std::clamp(window, 1, kMaxSmoothing)),
+        sum_(Vector::Zero(n)),
+        velocity_(sum_),
+        acceleration_(sum_),
+        offset_(sum_) {
     reset();
   }
 
   void reset() noexcept {
-    std::fill_n(history_.begin(), window_, Vector::Zero());
+    std::fill_n(history_.begin(), window_ * sum_.size(), 0.0);
     sum_.setZero();
     velocity_.setZero();
     acceleration_.setZero();
@@ -112,13 +109,12 @@ class Smoothing {
   }
 
   void step(const Vector& velocity, double T) noexcept {
-    Vector& oldest = history_[static_cast<std::size_t>(next_)];
+    double* const oldest = history_.data() + next_ * sum_.size();
     next_ = next_ + 1 == window_ ? 0 : next_ + 1;
     bool moves = false;
-    for (int i = 0; i < D; ++i) moves |= velocity[i] != 0;
-    still_ = moves ? 0 : std::min(still_ + 1, window_);
     const double share = 1.0 / window_;
-    for (int i = 0; i < D; ++i) {
+    for (Eigen::Index i = 0; i < velocity.size(); ++i) {
+      moves |= velocity[i] != 0;
       const double change = velocity[i] - oldest[i];
       acceleration_[i] = change * share / T;
       sum_[i] += change;
@@ -126,6 +122,7 @@ class Smoothing {
       velocity_[i] = sum_[i] * share;
       offset_[i] += (velocity_[i] - velocity[i]) * T;
     }
+    still_ = moves ? 0 : std::min(still_ + 1, window_);
     if (still_ == window_) {  // removes accumulated rounding errors
       sum_.setZero();
       velocity_.setZero();
@@ -133,6 +130,8 @@ class Smoothing {
     }
   }
 
+  /// Returns true if all of the last W velocities were zero.
+  bool still() const noexcept { return still_ == window_; }
   const Vector& velocity() const noexcept { return velocity_; }
   const Vector& acceleration() const noexcept { return acceleration_; }
   const Vector& offset() const noexcept { return offset_; }
@@ -145,7 +144,8 @@ class Smoothing {
   Vector velocity_;
   Vector acceleration_;
   Vector offset_;
-  std::array<Vector, kMaxSmoothing> history_;
+  std::array<double, static_cast<std::size_t>(kMaxSmoothing* Vector::MaxSizeAtCompileTime)>
+      history_;
 };
 
 }  // namespace dashpot::controller

@@ -193,7 +193,6 @@ void to_c(const Vibration& vibration, dashpot_modes& out) noexcept {
   out.failed = counters.failed;
   out.missed = counters.missed;
   out.no_zero_modes = counters.no_zero_modes;
-  out.proportional = counters.proportional;
   out.no_wrench = counters.no_wrench;
   out.no_shapes = counters.no_shapes;
   out.at_rest = counters.at_rest;

@@ -107,11 +107,11 @@ Status dashpot_controller::update(const dashpot_state* given, const dashpot_setp
   const bool latched = controller_.snapshot().fault != Status::kOk;
   if (latched_ && !latched) forget_setpoint();  // released by a rest
   latched_ = latched;
-  Snapshot snapshot = controller_.snapshot();
-  if (status < Status::kStateNotFinite) judgement.locate(snapshot.position);
+  if (status < Status::kStateNotFinite) judgement.locate(controller_.snapshot().position);
   if (!accepted) status = worse(status, Status::kSetpointRejected);
-  snapshot.status = status;
-  snapshots.write(snapshot);
+  snapshots.slot() = controller_.snapshot();
+  snapshots.slot().status = status;
+  snapshots.publish();
   const Vibration& found = controller_.vibration();
   if (found.tick != published_modes_ || found.status != published_status_) {
     published_modes_ = found.tick;

@@ -1,21 +1,14 @@
 #pragma once
-#include <dashpot/controller/base/joint_algebra.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/status.hpp>
 
-#include <algorithm>
-#include <cmath>
-#include <numbers>
+#include <array>
 
 namespace dashpot::controller {
 
 /// Returns how late torque acts on what was measured, s: a tick, those of the delay, and the lags
 /// of the drives' low-pass and of a differenced velocity.
-inline double loop_lag(const Settings& settings) noexcept {
-  const Analysis::Sampled& loop = settings.analysis.sampled;
-  const double filter = loop.cutoff > 0 ? 1 / (2 * std::numbers::pi * loop.cutoff) : 0;
-  return settings.period * (1 + loop.delay + (loop.difference_velocity ? 0.5 : 0)) + filter;
-}
+double loop_lag(const Settings& settings) noexcept;
 
 /// The last stop of every torque. With w the weight (the gravity torque that the controller
 /// compensates, n) the torque is
@@ -52,33 +45,26 @@ inline double loop_lag(const Settings& settings) noexcept {
 /// Where springs end or start again, what the last torque has beyond the new one fades evenly: in
 /// all joints alike, in the least time in which no joint's rate limit has to act on it. Otherwise
 /// joints with little torque would let go first, and turn the wrench that the tip exerts.
-template <int N>
 class SafetyFilter {
  public:
-  using Vector = Joints<N>;
-
   /// What the robot does at this tick.
   struct Motion {
-    const Vector& q;
-    const Vector& qd;
+    const JointVector& q;
+    const JointVector& qd;
     double tip_speed;  ///< m/s
     bool springs;      ///< are in force, and so are those of the repulsion
     bool returns;      ///< joints outside their limits are to return
   };
 
   /// `inertia`: I, n, kg m^2.
-  SafetyFilter(const Settings& settings, const Vector& inertia) noexcept;
+  SafetyFilter(const Settings& settings, const JointVector& inertia) noexcept;
 
   /// Forgets the past. The next torque continues the last one.
   void restart() noexcept;
   /// Forgets the past; `torque` is what acts now.
-  void reset(const Vector& torque) noexcept {
-    for (int i = 0; i < N; ++i) last_[i] = std::clamp(torque[i], -torque_[i], torque_[i]);
-    known_ = true;
-    restart();
-  }
+  void reset(const JointVector& torque) noexcept;
   /// As long as nothing is known of the torque that acts: it is the weight.
-  void assume(const Vector& weight) noexcept {
+  void assume(const JointVector& weight) noexcept {
     if (!known_) reset(weight);
   }
   /// The next torque to be applied does not continue the last: the difference fades evenly.
@@ -86,77 +72,82 @@ class SafetyFilter {
 
   /// Makes a torque safe, in place. Returns kOk, kTorqueLimited, kNearJointLimit, kWeightNotHeld,
   /// or kNotFinite, and then sets what `ramp` gives.
-  Status apply(const Motion& motion, const Vector& weight, Vector& tau) noexcept;
+  Status apply(const Motion& motion, const JointVector& weight, JointVector& tau) noexcept;
 
   /// Where nothing is known: the last torque goes evenly to zero within 0.1 s, or as fast as the
   /// rate limits allow.
-  Vector ramp() noexcept;
+  void ramp(JointVector& tau) noexcept;
 
   /// Returns what the last `apply` was given, before the limits.
-  const Vector& asked() const noexcept { return asked_; }
+  const JointVector& asked() const noexcept { return asked_; }
   /// Returns what the last `apply` or `ramp` put out.
-  const Vector& last() const noexcept { return last_; }
-  /// True if repulsion acts at q; it then has this stiffness and damping, N m/rad and N m s/rad.
-  bool repels(const Vector& q, bool springs, Vector& stiffness, Vector& damping) const noexcept;
+  const JointVector& last() const noexcept { return last_; }
+  /// True if repulsion acts at q.
+  bool repels(const JointVector& q) const noexcept;
+  /// Adds the stiffness and damping of the repulsion at q, N m/rad and N m s/rad.
+  void add_repulsion(const JointVector& q, bool springs, JointMatrix& stiffness,
+                     JointMatrix& damping) const noexcept;
   /// Dampers (n, N m s/rad), each no larger than what the sampled loop bears twice.
-  Vector borne(Vector damping) const noexcept {
-    for (int i = 0; i < N; ++i) damping[i] = std::min(damping[i], 2.5 * damper_[i]);
-    return damping;
-  }
+  JointVector borne(JointVector damping) const noexcept;
 
  private:
-  static constexpr double kRampTime = 0.1;    // s
-  static constexpr double kLeastRoom = 0.05;  // of a torque limit
-  static constexpr double kReturnRise = 1;    // s
-  static constexpr double kFull = 0.9;        // of a velocity limit: nothing drives further
-  static constexpr double kFirst = 0.5;       // from here on the drive is bounded ...
-  static constexpr double kWholly = 0.65;     // ... and from here on to what can be taken away
+  /// What is known of a joint; first what every tick reads.
+  struct Bounds {
+    double lower, upper;   ///< limits, rad
+    double margin;         ///< rad
+    double per_velocity;   ///< 1 / velocity, s/rad
+    double torque;         ///< limit, N m
+    double torque_step;    ///< limit of its change in one tick, N m
+    double left = 0;       ///< of the torque before `begin_anew`, N m
+    double ramp_step = 0;  ///< N m
+    double velocity;       ///< limit, rad/s
+    double return_velocity;
+    double damper;     ///< c
+    double repulsion;  ///< F
+    double toward;     ///< E
+    double late;       ///< torque_rate I, of f
 
-  /// Distance to the nearer limit, and the sign of the way to it.
-  struct Near {
-    double distance;
-    double toward;
+    /// Distance to the nearer limit, and the sign of the way to it.
+    struct Near {
+      double distance;
+      double toward;
+    };
+    Near nearer(double q) const noexcept {
+      const double below = q - lower, above = upper - q;
+      return below < above ? Near{below, -1} : Near{above, 1};
+    }
   };
-  Near nearer(int i, double q) const noexcept {
-    const double below = q - lower_[i], above = upper_[i] - q;
-    return below < above ? Near{below, -1} : Near{above, 1};
+
+  Bounds& joint(Eigen::Index i) noexcept { return joints_[static_cast<std::size_t>(i)]; }
+  const Bounds& joint(Eigen::Index i) const noexcept {
+    return joints_[static_cast<std::size_t>(i)];
   }
   /// Sets `repulsion`, and bounds the `excess` toward limits.
-  Status repel(const Motion& motion, Vector& excess, Vector& repulsion) noexcept;
+  Status repel(const Motion& motion, JointVector& excess, JointVector& repulsion) noexcept;
   /// Bounds what drives a robot that moves with the share `fastest` of a velocity limit. True if
   /// that changed anything.
-  bool hold_back(const Vector& qd, double fastest, Vector& excess) const noexcept;
+  bool hold_back(const JointVector& qd, double fastest, JointVector& excess) const noexcept;
   /// Scales `excess` for the limits of power and of torque beyond `base`. True if it did.
-  bool shrink(const Vector& qd, const Vector& base, Vector& excess) const noexcept;
-  bool fade(Vector& tau) noexcept;
-  bool limit(Vector& tau) noexcept;
+  bool shrink(const JointVector& qd, const JointVector& base, JointVector& excess) const noexcept;
+  /// Adds to the finite `tau` what is left of the torque before `begin_anew`. True if anything is.
+  bool fade(JointVector& tau) noexcept;
+  /// Bounds the finite `tau` and its change, and remembers it. True if that changed it.
+  bool limit(JointVector& tau) noexcept;
 
-  Vector torque_;       ///< limits, N m
-  Vector torque_step_;  ///< limits of its change in one tick, N m
-  Vector velocity_;     ///< limits, rad/s
-  Vector lower_;        ///< limits, rad
-  Vector upper_;
-  Vector margin_;
-  Vector return_velocity_;
-  Vector damper_;        ///< c
-  Vector repulsion_;     ///< F
-  Vector toward_;        ///< E
-  Vector late_;          ///< torque_rate I, of f
-  Vector per_velocity_;  ///< s/rad
+  Eigen::Index n_;
   double per_tip_velocity_;
   double power_;
   double ramp_share_;     ///< of the torque, in one tick
   double return_step_;    ///< of z
   double returning_ = 0;  ///< z
-  Vector last_ = Vector::Zero();
-  Vector asked_ = Vector::Zero();
   bool known_ = false;
   bool ramping_ = false;
-  Vector ramp_step_ = Vector::Zero();
   bool anew_ = true;
-  Vector left_ = Vector::Zero();  ///< of the torque before `begin_anew`, N m
-  double share_ = 0;              ///< of it that is still there
-  double share_step_ = 1;         ///< in one tick
+  double share_ = 0;       ///< of Joint::left that is still there
+  double share_step_ = 1;  ///< in one tick
+  JointVector last_;
+  JointVector asked_;
+  alignas(64) std::array<Bounds, kMaxJoints> joints_;
 };
 
 }  // namespace dashpot::controller

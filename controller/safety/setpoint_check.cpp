@@ -124,10 +124,12 @@ SetpointFault check_setpoint(const Setpoint& setpoint, const Limits& limits,
   return check_gains(setpoint.gains, setpoint.mode, limits.torque.size());
 }
 
-bool same_gains(const Gains& a, const Gains& b) noexcept {
+bool same_gains(const Gains& a, const Gains& b, Mode mode) noexcept {
+  if (mode == Mode::kJoint) {
+    return same(a.joint_stiffness, b.joint_stiffness) && same(a.joint_damping, b.joint_damping) &&
+           a.joint_damping_ratio == b.joint_damping_ratio;
+  }
   return a.frame == b.frame && a.directions == b.directions &&
-         same(a.joint_stiffness, b.joint_stiffness) && same(a.joint_damping, b.joint_damping) &&
-         a.joint_damping_ratio == b.joint_damping_ratio &&
          same(a.task_stiffness, b.task_stiffness) && same(a.task_damping, b.task_damping) &&
          a.task_damping_ratio == b.task_damping_ratio && same(a.null_stiffness, b.null_stiffness) &&
          same(a.null_damping, b.null_damping);

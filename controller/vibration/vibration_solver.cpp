@@ -25,8 +25,6 @@ VibrationSolver::VibrationSolver(const Analysis& settings)
 void VibrationSolver::reset() noexcept {
   tracker_.forget();
   counters_ = {};
-  skipped_ = static_cast<std::uint64_t>(tracker_.counters().shapes_skipped);
-  proportional_ = static_cast<std::uint64_t>(tracker_.counters().proportional);
   solved_ = restarted_ = 0;
 }
 
@@ -46,9 +44,6 @@ bool VibrationSolver::solve(const VibrationTask& task, Vibration& result,
   counters_.missed += task.number - solved_ - 1;
   solved_ = task.number;
   if (task.springs) {
-    const analysis::TrackerCounters& counters = tracker_.counters();
-    counters_.no_shapes = static_cast<std::uint64_t>(counters.shapes_skipped) - skipped_;
-    counters_.proportional = static_cast<std::uint64_t>(counters.proportional) - proportional_;
     publish_modes(result);
     const bool found =
         result.status == analysis::Status::kOk || result.status == analysis::Status::kUncertified;
@@ -60,6 +55,7 @@ bool VibrationSolver::solve(const VibrationTask& task, Vibration& result,
          : result.origin == SpectrumOrigin::kReused ? counters_.reused
                                                     : counters_.direct);
       if (result.zero_modes == 0) ++counters_.no_zero_modes;
+      if (!shapes_) ++counters_.no_shapes;
     }
   } else {
     result.status = analysis::Status::kOk;

@@ -42,8 +42,6 @@ class VibrationSolver {
   analysis::TrackedSpectrum spectrum_;
   VibrationCounters counters_;
   std::uint64_t solved_ = 0, restarted_ = 0, resets_ = 0;  ///< numbers of the last task
-  /// Counters of the tracker at the last reset: shapes left out, updates of proportional damping.
-  std::uint64_t skipped_ = 0, proportional_ = 0;
 };
 
 }  // namespace dashpot::controller

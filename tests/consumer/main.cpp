@@ -18,7 +18,6 @@ using dashpot::analysis::System;
 
 /// A pendulum of 2 kg, 0.5 m long, held out level; its dynamics from the library's kernel.
 bool model_works() {
-  using dashpot::controller::Dynamics;
   using dashpot::controller::DynamicsKernel;
   const auto model = dashpot::controller::RobotModel::from_urdf_text(
       "<robot name='pendulum'><link name='wall'/><link name='arm'><inertial>"
@@ -26,9 +25,9 @@ bool model_works() {
       "izz='0'/></inertial></link><joint name='pivot' type='continuous'><parent link='wall'/>"
       "<child link='arm'/><axis xyz='0 1 0'/></joint></robot>",
       "wall", "arm");
-  const DynamicsKernel<1> kernel(model);
-  const Eigen::Matrix<double, 1, 1> zero = Eigen::Matrix<double, 1, 1>::Zero();
-  Dynamics<1> result;
+  const DynamicsKernel kernel(model);
+  const dashpot::controller::JointVector zero = dashpot::controller::JointVector::Zero(1);
+  dashpot::controller::DynamicsResult result;
   kernel.evaluate(zero, zero, result);
   std::printf("consumer: %.4f kg m^2, %.4f N m\n", result.M(0, 0), result.gravity[0]);
   return std::abs(result.M(0, 0) - 0.5) < 1e-14 && std::abs(result.gravity[0] + 9.81) < 1e-13 &&

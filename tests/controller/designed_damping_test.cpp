@@ -88,37 +88,8 @@ TEST(DesignedDamping, HoldsTheRatioAlongAPathOfEveryArm) {
   }
 }
 
-/// One ratio for all modes means that the undamped ones decouple the damping.
-TEST(DesignedDamping, IsFollowedAsProportional) {
-  const RobotModel model = smooth_panda();
-  Settings settings = plain_settings(model, Mode::kCartesian);
-  LedArm led(model, settings);
-  led.settle();
-  const VibrationCounters before = led.modes().counters;
-  for (int k = 1; k <= 200; ++k) {
-    led.swing(1e-3 * k);
-    led.tick();
-  }
-  const VibrationCounters held = led.modes().counters;
-  EXPECT_GE(held.tracked - before.tracked, 195U);
-  EXPECT_EQ(held.proportional - before.proportional, held.tracked - before.tracked);
-  settings.initial.gains.task_damping_ratio = 0;
-  settings.initial.gains.task_damping = controller::Vector6(22.5, 23.5, 45, 2, 12, 1).asDiagonal();
-  LedArm other(model, settings);
-  other.settle();
-  for (int k = 1; k <= 200; ++k) {
-    other.swing(1e-3 * k);
-    other.tick();
-  }
-  EXPECT_EQ(other.modes().counters.proportional, 0U);
-  led.controller.reset();
-  led.tick();
-  EXPECT_EQ(led.modes().counters.proportional, 0U);
-}
-
 TEST(DesignedDamping, LosesNoModesOfALongChain) {
-  // Seen to lose modes that are near each other: as long as elastic coordinates and velocities are
-  // kept apart, a step leaves some of their mixing to the next.
+  // Modes that are near each other were lost once.
   testing::RandomRobot random(20210001);
   const RobotModel model = RobotModel::from_urdf_text(random.chain(14, 0), "link0", "tip");
   Settings settings = unlimited_settings(model);
@@ -135,7 +106,6 @@ TEST(DesignedDamping, LosesNoModesOfALongChain) {
     ASSERT_EQ(led.modes().status, analysis::Status::kOk);
   }
   EXPECT_EQ(led.modes().counters.direct - before.direct, 0U);
-  EXPECT_GE(led.modes().counters.proportional - before.proportional, 1000U);
 }
 
 TEST(DesignedDamping, LeavesFreeDirectionsAndTheNullSpaceAlone) {

@@ -6,33 +6,27 @@
 
 #include <gtest/gtest.h>
 
-#include <utility>
-
 namespace dashpot::controller {
 namespace {
 
 using testing::allocations_of;
 
-template <int N>
-void expect_none(testing::Random& random) {
+void expect_none(testing::Random& random, int n) {
   const RobotModel model = RobotModel::from_urdf_text(
-      testing::RandomRobot(random.engine()()).chain(N, 0.3), "link0", "tip");
-  const DynamicsKernel<N> kernel(model);
-  const Eigen::Matrix<double, N, 1> q = random.vector(N), qd = random.vector(N);
-  Dynamics<N> result;
+      testing::RandomRobot(random.engine()()).chain(n, 0.3), "link0", "tip");
+  const DynamicsKernel kernel(model);
+  const JointVector q = random.vector(n), qd = random.vector(n);
+  DynamicsResult result;
   static_assert(noexcept(kernel.evaluate(q, qd, result)));
-  EXPECT_EQ(allocations_of([&] { kernel.evaluate(q, qd, result); }), 0) << N;
-  EXPECT_EQ(allocations_of([&] { kernel.evaluate(1e9 * q, qd, result); }), 0) << N;
+  EXPECT_EQ(allocations_of([&] { kernel.evaluate(q, qd, result); }), 0) << n;
+  EXPECT_EQ(allocations_of([&] { kernel.evaluate(1e9 * q, qd, result); }), 0) << n;
 }
 
 TEST(DynamicsAllocation, DoesNotHappen) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
   EXPECT_GE(allocations_of([] { ::operator delete(::operator new(100)); }), 1);
   testing::Random random(751);
-  [&]<int... I>(std::integer_sequence<int, I...>) {
-    (expect_none<I + 1>(random), ...);
-  }
-  (std::make_integer_sequence<int, kMaxJoints>{});
+  for (int n = 1; n <= kMaxJoints; ++n) expect_none(random, n);
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/QR>
-#include <memory>
+#include <limits>
 
 namespace dashpot::controller {
 namespace {
@@ -25,6 +25,8 @@ using testing::Random;
 
 constexpr FeedForward kNone{false, false, false, false, false};
 constexpr FeedForward kAll{true, true, true, true, true};
+constexpr ErrorClamp kEndless{std::numeric_limits<double>::infinity(),
+                              std::numeric_limits<double>::infinity()};
 
 /// Gains of every kind, symmetric positive semidefinite.
 Gains random_gains(Random& random, int n) {
@@ -39,39 +41,40 @@ Gains random_gains(Random& random, int n) {
 }
 
 /// One arm, its law, and the same by hand.
-template <int N>
 struct Case {
   RobotModel model;
-  Joints<N> q, qd;
-  Dynamics<N> robot;
+  int n;
+  JointVector q, qd;
+  DynamicsResult robot;
   DynamicsResult kdl;
-  SpringReferences<N> references;
+  SpringReferences references;
   Vector3d p_d;
   Quaterniond R_d;
 
   Case(const RobotModel& robot_model, Random& random)
       : model(robot_model),
-        q(random.vector(N)),
-        qd(0.5 * random.vector(N)),
+        n(model.dof()),
+        q(random.vector(n)),
+        qd(0.5 * random.vector(n)),
         kdl(testing::by_kdl(model, q, qd)),
-        references{JointReference<N>({Joints<N>::Ones(), Joints<N>::Ones()}, 1e-3, 10),
-                   JointReference<N>({Joints<N>::Ones(), Joints<N>::Ones()}, 1e-3, 10),
-                   TipReference(TwistNorm{}, 1e-3, 10)} {
-    DynamicsKernel<N>(model).evaluate(q, qd, robot);
+        references({JointVector::Ones(n), JointVector::Ones(n), 1, 1, 1, 1, 0.01, 0}, 1e-3) {
+    DynamicsKernel(model).evaluate(q, qd, robot);
     p_d = robot.p_BT_B + 0.05 * Vector3d(random.vector(3));
     R_d = quaternion(0.3 * random.vector(3)) * Quaterniond(robot.R_BT);
-    references.joint.start(q + Joints<N>(0.1 * random.vector(N)));
-    references.posture.start(q + Joints<N>(0.1 * random.vector(N)));
+    references.joint.start(q + JointVector(0.1 * random.vector(n)));
+    references.posture.start(q + JointVector(0.1 * random.vector(n)));
     references.tip.start(p_d, R_d);
     for (int k = 0; k < 40; ++k) {  // in motion, so that velocities and accelerations matter
-      references.joint.step(Joints<N>(Joints<N>::Constant(1)));
-      references.posture.step(Joints<N>(Joints<N>::Constant(-1)));
+      references.joint.step(JointVector::Constant(n, 1));
+      references.posture.step(JointVector::Constant(n, -1));
       references.tip.step(p_d + Vector3d::Ones(), R_d * quaternion(Vector3d(0.1, 1, 0.3)));
     }
   }
-  Joints<N> torque(const Impedance<N>& impedance, const FeedForward& parts, const Vector6& wrench) {
-    ImpedanceLaw<N> law(model, parts);
-    return law.torque(robot, q, qd, impedance, references, wrench);
+  JointVector torque(const Impedance& impedance, const FeedForward& parts, const Vector6& wrench) {
+    ImpedanceLaw law(model, parts);
+    JointVector tau;
+    law.torque(robot, q, qd, impedance, references, wrench, kEndless, tau);
+    return tau;
   }
   Vector6 tip_error() const {
     Vector6 e;
@@ -81,8 +84,8 @@ struct Case {
     return e;
   }
   VectorXd friction(const VectorXd& v) const {
-    VectorXd result(N);
-    for (int i = 0; i < N; ++i) {
+    VectorXd result(n);
+    for (int i = 0; i < n; ++i) {
       const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
       result[i] = joint.viscous_friction * v[i] + joint.coulomb_friction * std::tanh(v[i] / 0.01);
     }
@@ -98,14 +101,13 @@ RobotModel rough_chain(Random& random, int n) {
                                     "tip", options);
 }
 
-template <int N>
-void expect_joint_law(Random& random) {
-  Case<N> one(rough_chain(random, N), random);
+void expect_joint_law(Random& random, int n) {
+  Case one(rough_chain(random, n), random);
   Setpoint setpoint;
-  setpoint.gains = random_gains(random, N);
-  const auto impedance = Impedance<N>::of(setpoint);
+  setpoint.gains = random_gains(random, n);
+  const Impedance impedance(setpoint, n);
   const Vector6 f = random.vector(6);
-  const JointReference<N>& path = one.references.joint;
+  const JointReference& path = one.references.joint;
   const VectorXd springs = setpoint.gains.joint_stiffness * (path.position() - one.q) +
                            setpoint.gains.joint_damping * (path.velocity() - one.qd);
   const double size = 1e-11 * (1 + springs.norm() + one.kdl.M.norm());
@@ -118,25 +120,23 @@ void expect_joint_law(Random& random) {
 TEST(JointImpedance, IsItsEquation) {
   Random random(321);
   for (int k = 0; k < 20; ++k) {
-    expect_joint_law<1>(random);
-    expect_joint_law<7>(random);
-    expect_joint_law<16>(random);
+    for (const int n : {1, 7, 16}) expect_joint_law(random, n);
   }
 }
 
 /// Cartesian law for any directions and frame, with the Moore-Penrose form of the projector.
-template <int N>
 void expect_task_law(const RobotModel& model, Random& random) {
-  Case<N> one(model, random);
+  Case one(model, random);
+  const int n = one.n;
   Setpoint setpoint;
   setpoint.mode = Mode::kCartesian;
-  setpoint.gains = random_gains(random, N);
+  setpoint.gains = random_gains(random, n);
   Gains& gains = setpoint.gains;
   gains.frame = random.integer(0, 1) == 0 ? Frame::kBase : Frame::kTool;
   int held = 0;
   for (bool& direction : gains.directions) held += direction = random.integer(0, 4) > 0;
   if (held == 0) return;
-  const auto impedance = Impedance<N>::of(setpoint);
+  const Impedance impedance(setpoint, n);
 
   // Rows of held directions: S takes a twist in B's axes to their components.
   MatrixXd turn = MatrixXd::Identity(6, 6);
@@ -156,10 +156,10 @@ void expect_task_law(const RobotModel& model, Random& random) {
                        (S * turn.transpose()).transpose() * S;
   const TipReference& path = one.references.tip;
   VectorXd tau = J.transpose() * (K_C * one.tip_error() + C_C * (path.velocity() - J * one.qd));
-  if (N > held) {
+  if (n > held) {
     const MatrixXd projector =
-        MatrixXd::Identity(N, N) - M.inverse() * JS.transpose() * A.inverse() * JS;
-    const JointReference<N>& rest = one.references.posture;
+        MatrixXd::Identity(n, n) - M.inverse() * JS.transpose() * A.inverse() * JS;
+    const JointReference& rest = one.references.posture;
     VectorXd share = M.inverse() * JS.transpose() * A.inverse() * S * one.tip_error();
     share /= std::sqrt(1 + share.squaredNorm() / 0.09);
     tau += projector.transpose() * gains.null_stiffness.asDiagonal() *
@@ -180,24 +180,24 @@ void expect_task_law(const RobotModel& model, Random& random) {
 TEST(CartesianImpedance, IsItsEquation) {
   Random random(322);
   for (int k = 0; k < 100; ++k) {
-    expect_task_law<7>(testing::arm_model(testing::arms()[0]), random);
-    expect_task_law<6>(testing::arm_model(testing::arms()[2]), random);
-    expect_task_law<9>(rough_chain(random, 9), random);
-    expect_task_law<14>(rough_chain(random, 14), random);
+    expect_task_law(testing::arm_model(testing::arms()[0]), random);
+    expect_task_law(testing::arm_model(testing::arms()[2]), random);
+    expect_task_law(rough_chain(random, 9), random);
+    expect_task_law(rough_chain(random, 14), random);
   }
 }
 
 TEST(Law, SumsTheModesByTheirWeights) {
   Random random(323);
   for (int k = 0; k < 50; ++k) {
-    Case<7> one(testing::arm_model(testing::arms()[1]), random);
+    Case one(testing::arm_model(testing::arms()[1]), random);
     Setpoint setpoint;
     setpoint.gains = random_gains(random, 7);
     setpoint.gains.null_stiffness.setZero();
     setpoint.gains.null_damping.setZero();
-    const auto joint = Impedance<7>::of(setpoint);
+    const auto joint = Impedance(setpoint, 7);
     setpoint.mode = Mode::kCartesian;
-    const auto task = Impedance<7>::of(setpoint);
+    const auto task = Impedance(setpoint, 7);
     const double s = random.uniform(0, 1);
     const Vector6 f = Vector6::Zero();
     const VectorXd expected =
@@ -210,16 +210,16 @@ TEST(Law, SumsTheModesByTheirWeights) {
 TEST(Law, FeedsForwardEachModeByItsWeight) {
   Random random(327);
   for (int k = 0; k < 50; ++k) {
-    Case<7> one(rough_chain(random, 7), random);
+    Case one(rough_chain(random, 7), random);
     Setpoint setpoint;
     setpoint.gains = random_gains(random, 7);
-    const auto joint = Impedance<7>::of(setpoint);
+    const auto joint = Impedance(setpoint, 7);
     setpoint.mode = Mode::kCartesian;
     const double s = random.uniform(0.1, 0.9);
-    const auto impedance = blend(joint, Impedance<7>::of(setpoint), s);
+    const auto impedance = blend(joint, Impedance(setpoint, 7), s);
     const Vector6 f = Vector6::Zero();
     const VectorXd plain = one.torque(impedance, kNone, f);
-    NullSpace<7> null_space;  // of directions that are held in part
+    NullSpace null_space;  // of directions that are held in part
     null_space.compute(one.robot.M, one.robot.J, impedance.base, impedance.tool, one.robot.R_BT);
 
     const VectorXd acceleration =
@@ -242,13 +242,13 @@ TEST(Law, FeedsForwardEachModeByItsWeight) {
 TEST(Law, StiffnessOfTheClosedLoopIsTheDerivativeOfItsTorque) {
   Random random(324);
   for (int k = 0; k < 30; ++k) {
-    Case<7> one(testing::arm_model(testing::arms()[0]), random);
+    Case one(testing::arm_model(testing::arms()[0]), random);
     Setpoint setpoint;
     setpoint.gains = random_gains(random, 7);
-    const auto joint = Impedance<7>::of(setpoint);
+    const auto joint = Impedance(setpoint, 7);
     setpoint.mode = Mode::kCartesian;
     setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
-    auto impedance = Impedance<7>::of(setpoint);
+    auto impedance = Impedance(setpoint, 7);
     if (k % 3 == 1) impedance = joint;
     if (k % 3 == 2) impedance = blend(joint, impedance, 0.3);
     // At rest on all springs
@@ -256,24 +256,26 @@ TEST(Law, StiffnessOfTheClosedLoopIsTheDerivativeOfItsTorque) {
     one.references.joint.start(one.q);
     one.references.posture.start(one.q);
     one.references.tip.start(one.robot.p_BT_B, Quaterniond(one.robot.R_BT));
-    ImpedanceLaw<7> law(one.model, kNone);
-    const DynamicsKernel<7> kernel(one.model);
-    const auto torque = [&](const Joints<7>& q, const Joints<7>& qd) -> Joints<7> {
-      Dynamics<7> robot;
+    ImpedanceLaw law(one.model, kNone);
+    const DynamicsKernel kernel(one.model);
+    const auto torque = [&](const JointVector& q, const JointVector& qd) {
+      DynamicsResult robot;
+      JointVector tau;
       kernel.evaluate(q, qd, robot);
-      return law.torque(robot, q, qd, impedance, one.references, Vector6::Zero());
+      law.torque(robot, q, qd, impedance, one.references, Vector6::Zero(), kEndless, tau);
+      return tau;
     };
     MatrixXd K(7, 7), C(7, 7);
     constexpr double kStep = 1e-5;
     for (int i = 0; i < 7; ++i) {
-      const Joints<7> d = kStep * Joints<7>::Unit(i), z = Joints<7>::Zero();
+      const JointVector d = kStep * JointVector::Unit(7, i), z = JointVector::Zero(7);
       K.col(i) = -(torque(one.q + d, z) - torque(one.q - d, z)) / (2 * kStep);
       C.col(i) = -(torque(one.q, d) - torque(one.q, -d)) / (2 * kStep);
     }
     torque(one.q, one.qd);
     analysis::System<kMaxJoints> system;
-    controller::closed_loop<7>(one.robot, one.qd, impedance, law.null_space(), Joints<7>::Zero(),
-                               TaskTerms{}, Vector6::Zero(), system);
+    controller::closed_loop(one.robot, one.qd, impedance, law.null_space(), JointVector::Zero(7),
+                            TaskTerms{}, Vector6::Zero(), system);
     EXPECT_TRUE(system.symmetric());
     EXPECT_TRUE(near(system.mass, one.kdl.M, 1e-12));
     EXPECT_TRUE(near(system.damping, C, 1e-6 * C.norm()));
@@ -287,49 +289,48 @@ TEST(ClosedLoop, RateAndGeometricStiffnessAreDerivatives) {
   Random random(325);
   for (int k = 0; k < 20; ++k) {
     const RobotModel model = rough_chain(random, 7);
-    const Joints<7> q = random.vector(7), qd = random.vector(7);
-    const DynamicsKernel<7> kernel(model);
-    const auto jacobian = [&](const Joints<7>& at) {
-      Dynamics<7> robot;
+    const JointVector q = random.vector(7), qd = random.vector(7);
+    const DynamicsKernel kernel(model);
+    const auto jacobian = [&](const JointVector& at) {
+      DynamicsResult robot;
       kernel.evaluate(at, qd, robot);
       return robot.J;
     };
     constexpr double kStep = 1e-5;
-    const Jacobian<7> J = jacobian(q);
+    const Jacobian J = jacobian(q);
     const MatrixXd rate = (jacobian(q + kStep * qd) - jacobian(q - kStep * qd)) / (2 * kStep);
-    EXPECT_TRUE(near(jacobian_rate<7>(J, qd), rate, 1e-7));
+    EXPECT_TRUE(near(jacobian_rate(J, qd), rate, 1e-7));
     const Vector6 f = random.vector(6);
     MatrixXd K_G(7, 7);
     for (int i = 0; i < 7; ++i) {
-      const Joints<7> d = kStep * Joints<7>::Unit(i);
+      const JointVector d = kStep * JointVector::Unit(7, i);
       K_G.col(i) = (jacobian(q + d) - jacobian(q - d)).transpose() * f / (2 * kStep);
     }
-    EXPECT_TRUE(near(geometric_stiffness<7>(J, f), K_G, 1e-7));
+    EXPECT_TRUE(near(geometric_stiffness(J, f), K_G, 1e-7));
   }
 }
 
 TEST(ClosedLoop, AddsOptionalTermsAndFriction) {
   Random random(326);
-  Case<7> one(rough_chain(random, 7), random);
+  Case one(rough_chain(random, 7), random);
   Setpoint setpoint;
   setpoint.mode = Mode::kCartesian;
   setpoint.gains = random_gains(random, 7);
-  const auto impedance = Impedance<7>::of(setpoint);
-  NullSpace<7> null_space;
+  const auto impedance = Impedance(setpoint, 7);
+  NullSpace null_space;
   null_space.compute(one.robot.M, one.robot.J, impedance.base, impedance.tool, one.robot.R_BT);
-  const Joints<7> friction = random.vector(7).cwiseAbs();
+  const JointVector friction = random.vector(7).cwiseAbs();
   const Vector6 f = random.vector(6);
   const auto system_with = [&](TaskTerms terms) {
     analysis::System<kMaxJoints> system;
-    controller::closed_loop<7>(one.robot, one.qd, impedance, null_space, friction, terms, f,
-                               system);
+    controller::closed_loop(one.robot, one.qd, impedance, null_space, friction, terms, f, system);
     return system;
   };
   const auto plain = system_with({false, false}), both = system_with({true, true});
   const MatrixXd J = one.robot.J;
   const MatrixXd extra =
-      J.transpose() * setpoint.gains.task_damping * jacobian_rate<7>(one.robot.J, one.qd) +
-      geometric_stiffness<7>(one.robot.J, f);
+      J.transpose() * setpoint.gains.task_damping * jacobian_rate(one.robot.J, one.qd) +
+      geometric_stiffness(one.robot.J, f);
   EXPECT_TRUE(near(both.stiffness - plain.stiffness, extra, 1e-9));
   EXPECT_EQ(both.stiffness_factor.rows(), 0);
   EXPECT_EQ(plain.stiffness_factor.rows(), 13);

@@ -22,25 +22,25 @@ using testing::near;
 using testing::Random;
 
 /// One robot in one posture, and its loop with whatever springs.
-template <int N>
 struct Loop {
   RobotModel model;
-  Joints<N> q, friction;
-  Dynamics<N> robot;
-  LoopSystem<N> factored;
+  int n;
+  JointVector q, friction;
+  DynamicsResult robot;
+  LoopSystem factored;
   bool nearly_singular = false;  // when last asked
 
   Loop(const RobotModel& robot_model, Random& random)
-      : model(robot_model), friction(random.vector(N).cwiseAbs()) {
-    move_to(random.vector(N));
+      : model(robot_model), n(model.dof()), friction(random.vector(n).cwiseAbs()) {
+    move_to(random.vector(n));
   }
-  void move_to(const Joints<N>& there) {
+  void move_to(const JointVector& there) {
     q = there;
-    DynamicsKernel<N>(model).evaluate(q, Joints<N>::Zero(), robot);
+    DynamicsKernel(model).evaluate(q, JointVector::Zero(n), robot);
   }
   /// Expects the same M, C and K of both forms; returns the number of rows of the factor.
-  Eigen::Index expect_agreement(const Impedance<N>& impedance) {
-    NullSpace<N> null_space;
+  Eigen::Index expect_agreement(const Impedance& impedance) {
+    NullSpace null_space;
     null_space.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
     nearly_singular = null_space.inertia().nearly_singular();
     analysis::System<kMaxJoints> plain, system;
@@ -48,11 +48,11 @@ struct Loop {
       one->has_low_words = true;
       one->stiffness_factor.setOnes(3, 2);
     }
-    closed_loop<N>(robot, Joints<N>::Zero(), impedance, null_space, friction, TaskTerms{},
-                   Vector6::Zero(), plain);
+    closed_loop(robot, JointVector::Zero(n), impedance, null_space, friction, TaskTerms{},
+                Vector6::Zero(), plain);
     factored.form(robot, impedance, null_space, friction, system);
     EXPECT_FALSE(plain.has_low_words || system.has_low_words);
-    EXPECT_EQ(system.stiffness_factor.cols(), N);
+    EXPECT_EQ(system.stiffness_factor.cols(), n);
     EXPECT_TRUE(near(system.mass, plain.mass, 0));
     EXPECT_EQ(system.damping, system.damping.transpose());
     EXPECT_TRUE(near(system.damping, plain.damping, 1e-9 * (1 + plain.damping.norm())));
@@ -82,41 +82,40 @@ Setpoint tip_setpoint(Random& random, int n, Frame frame, int held) {
 }
 
 /// Returns in how many of twelve cases the null space could be told by itself.
-template <int N>
-int expect_tip_springs(Random& random) {
+int expect_tip_springs(Random& random, int n) {
   int regular = 0;
-  Loop<N> loop(RobotModel::from_urdf_text(testing::RandomRobot(random.engine()()).chain(N, 0.2),
-                                          "link0", "tip", {}),
-               random);
+  Loop loop(RobotModel::from_urdf_text(testing::RandomRobot(random.engine()()).chain(n, 0.2),
+                                       "link0", "tip", {}),
+            random);
   for (const Frame frame : {Frame::kBase, Frame::kTool}) {
     for (int held = 1; held <= 6; ++held) {
-      Setpoint setpoint = tip_setpoint(random, N, frame, held);
+      Setpoint setpoint = tip_setpoint(random, n, frame, held);
       Gains& gains = setpoint.gains;
-      const Eigen::Index free = std::max(0, N - held);
-      EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held + free);
+      const Eigen::Index free = std::max(0, n - held);
+      EXPECT_EQ(loop.expect_agreement(Impedance(setpoint, n)), held + free);
       for (int k = 0; k < 3; ++k) {  // a little further each time: the free motions are followed
-        loop.move_to(loop.q + Joints<N>(0.02 * random.vector(N)));
-        EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held + free);
+        loop.move_to(loop.q + JointVector(0.02 * random.vector(n)));
+        EXPECT_EQ(loop.expect_agreement(Impedance(setpoint, n)), held + free);
       }
       if (loop.nearly_singular) continue;  // has a row for each joint instead
       ++regular;
       // Null-space springs in a single joint are not definite in all of the null space; dampers
       // alone give no rows; nor does nothing at all.
-      for (int i = 0; i < N && free > 1; ++i) {
-        gains.null_stiffness = 30 * JointVector::Unit(N, i);
-        EXPECT_GE(loop.expect_agreement(Impedance<N>::of(setpoint)), held);
+      for (int i = 0; i < n && free > 1; ++i) {
+        gains.null_stiffness = 30 * JointVector::Unit(n, i);
+        EXPECT_GE(loop.expect_agreement(Impedance(setpoint, n)), held);
       }
-      gains.null_stiffness.setOnes(N);
+      gains.null_stiffness.setOnes(n);
       const Matrix6 task_stiffness = gains.task_stiffness;
       gains.task_stiffness.setZero();
-      EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), free);
+      EXPECT_EQ(loop.expect_agreement(Impedance(setpoint, n)), free);
       gains.task_stiffness = task_stiffness;
-      gains.null_stiffness.setZero(N);
-      EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held);
-      gains.null_damping.setZero(N);
-      EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), held);
+      gains.null_stiffness.setZero(n);
+      EXPECT_EQ(loop.expect_agreement(Impedance(setpoint, n)), held);
+      gains.null_damping.setZero(n);
+      EXPECT_EQ(loop.expect_agreement(Impedance(setpoint, n)), held);
       gains.task_stiffness.setZero();
-      EXPECT_EQ(loop.expect_agreement(Impedance<N>::of(setpoint)), 0);
+      EXPECT_EQ(loop.expect_agreement(Impedance(setpoint, n)), 0);
     }
   }
   return regular;
@@ -126,49 +125,47 @@ TEST(LoopSystem, HasTheTipSpringsAndAsManyRowsAsTheyHold) {
   Random random(361);
   int regular = 0;
   for (int k = 0; k < 5; ++k) {
-    regular += expect_tip_springs<6>(random);
-    regular += expect_tip_springs<7>(random);
-    regular += expect_tip_springs<9>(random);
+    for (const int n : {6, 7, 9}) regular += expect_tip_springs(random, n);
   }
   EXPECT_GE(regular, 150);  // of 180
 }
 
 TEST(LoopSystem, HasTheJointSprings) {
   Random random(362);
-  Loop<7> loop(testing::arm_model(testing::arms()[0]), random);
+  Loop loop(testing::arm_model(testing::arms()[0]), random);
   Setpoint setpoint;
   for (int k = 0; k < 20; ++k) {
     setpoint.gains.joint_stiffness = 100 * random.spd(7);
     setpoint.gains.joint_damping = 10 * random.spd(7);
-    EXPECT_EQ(loop.expect_agreement(Impedance<7>::of(setpoint)), 7);
+    EXPECT_EQ(loop.expect_agreement(Impedance(setpoint, 7)), 7);
     const int rank = k % 7;
     const MatrixXd thin = random.matrix(7, rank);
     setpoint.gains.joint_stiffness = thin * thin.transpose();
-    EXPECT_EQ(loop.expect_agreement(Impedance<7>::of(setpoint)), rank);
+    EXPECT_EQ(loop.expect_agreement(Impedance(setpoint, 7)), rank);
   }
 }
 
 TEST(LoopSystem, HasTheSpringsOfTwoModesAndFramesAtOnce) {
   Random random(363);
   for (int k = 0; k < 20; ++k) {
-    Loop<7> loop(testing::arm_model(testing::arms()[1]), random);
+    Loop loop(testing::arm_model(testing::arms()[1]), random);
     Setpoint joint;
     joint.gains.joint_stiffness = 100 * random.spd(7);
     joint.gains.joint_damping = 10 * random.spd(7);
-    const auto base = Impedance<7>::of(tip_setpoint(random, 7, Frame::kBase, random.integer(1, 6)));
-    const auto tool = Impedance<7>::of(tip_setpoint(random, 7, Frame::kTool, random.integer(1, 6)));
+    const Impedance base(tip_setpoint(random, 7, Frame::kBase, random.integer(1, 6)), 7);
+    const Impedance tool(tip_setpoint(random, 7, Frame::kTool, random.integer(1, 6)), 7);
     const double s = random.uniform(0.1, 0.9);
-    EXPECT_EQ(loop.expect_agreement(blend(Impedance<7>::of(joint), base, s)), 7);
-    EXPECT_EQ(loop.expect_agreement(blend(tool, Impedance<7>::of(joint), s)), 7);
+    EXPECT_EQ(loop.expect_agreement(blend(Impedance(joint, 7), base, s)), 7);
+    EXPECT_EQ(loop.expect_agreement(blend(tool, Impedance(joint, 7), s)), 7);
     EXPECT_EQ(loop.expect_agreement(blend(base, tool, s)), 7);
     EXPECT_EQ(loop.expect_agreement(tool), 7);
     // Of a direction in either frame, with dampers alone in the null space
     Setpoint one = tip_setpoint(random, 7, Frame::kBase, 1);
     one.gains.null_stiffness.setZero();
-    const auto in_base = Impedance<7>::of(one);
+    const auto in_base = Impedance(one, 7);
     one.gains.frame = Frame::kTool;
-    EXPECT_EQ(loop.expect_agreement(blend(in_base, Impedance<7>::of(one), s)), 2);
-    EXPECT_EQ(loop.expect_agreement(blend(Impedance<7>::of(joint), in_base, s)), 7);
+    EXPECT_EQ(loop.expect_agreement(blend(in_base, Impedance(one, 7), s)), 2);
+    EXPECT_EQ(loop.expect_agreement(blend(Impedance(joint, 7), in_base, s)), 7);
   }
 }
 

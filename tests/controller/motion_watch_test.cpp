@@ -13,7 +13,7 @@
 namespace dashpot::controller {
 namespace {
 
-using Pair = Joints<2>;
+using Pair = Eigen::Vector2d;
 
 class WatchedPair : public ::testing::Test {
  protected:
@@ -21,10 +21,10 @@ class WatchedPair : public ::testing::Test {
       : model(testing::chain_of({"revolute", "revolute"})), settings(default_settings(model)) {
     settings.limits.tip_velocity = 1.5;
     settings.watchdog.feedback = 0;
-    robot.M << 2, 0.5, 0.5, 1;
-    robot.coriolis.setZero();
-    robot.gravity = {7, -3};
-    robot.J.setZero();
+    robot.M = Eigen::Matrix2d{{2, 0.5}, {0.5, 1}};
+    robot.coriolis = Pair::Zero();
+    robot.gravity = Pair(7, -3);
+    robot.J.setZero(6, 2);
     robot.J.topRows<3>() << 0.5, 0.25, 0, 0.5, 0, 0;
     robot.Jdot_qd.setZero();
     robot.p_BT_B = {0.5, 0, 0.2};
@@ -35,8 +35,8 @@ class WatchedPair : public ::testing::Test {
   Status tick(const Pair& excess = Pair::Zero(), double dt = 0.001) {
     if (!watch) make();
     const Status status = watch->check({dt, q, qd, robot, wrench, still});
-    const Pair weight = settings.feed_forward.gravity ? robot.gravity : Pair(Pair::Zero());
-    watch->applied(weight + excess, excess);
+    const Pair weight = settings.feed_forward.gravity ? Pair(robot.gravity) : Pair(Pair::Zero());
+    watch->applied(weight + excess, weight);
     return status;
   }
   /// Ticks until the status is not kOk any more; `before` is called before each.
@@ -54,8 +54,8 @@ class WatchedPair : public ::testing::Test {
 
   RobotModel model;
   Settings settings;
-  std::optional<MotionWatch<2>> watch;
-  Dynamics<2> robot;
+  std::optional<MotionWatch> watch;
+  DynamicsResult robot;
   Vector6 wrench = Vector6::Zero();
   Pair q{0.3, 0.4}, qd = Pair::Zero();
   bool still = true;
@@ -104,7 +104,7 @@ TEST_F(WatchedPair, EstimatesExternalTorqueWithATimeConstantOf10Milliseconds) {
                   Status::kCollision, [](int) {}, [](int) { return Pair(-8, 0); }),
               7);
     make();  // Coriolis torque and acceleration count
-    robot.coriolis = {5, 0};
+    robot.coriolis = Pair(5, 0);
     for (int k = 0; k < 200; ++k) {
       qd = {0.002 * k, 0.004 * k};  // 2 and 4 rad/s^2: 4 + 2 = 6 N m
       ASSERT_EQ(tick({11, 0}), Status::kOk) << k;
@@ -145,7 +145,9 @@ TEST_F(WatchedPair, EstimatesNoMoreThanIsThereAfterALongTick) {
 TEST_F(WatchedPair, EstimatesWithTheMeanOfWhatWasAppliedMeanwhile) {
   settings.limits.external_torque = Pair(4, 4);
   tick();
-  const auto also = [&](const Pair& excess) { watch->applied(robot.gravity + excess, excess); };
+  const auto also = [&](const Pair& excess) {
+    watch->applied(robot.gravity + excess, robot.gravity);
+  };
   also({-3, 0});
   also({-6, 0});
   EXPECT_EQ(tick({0, 0}, 0.1), Status::kOk);  // -3 of 4

@@ -23,20 +23,20 @@ class NullSpaceOfPanda : public ::testing::Test {
   NullSpaceOfPanda() : model(testing::arm_model(testing::arms()[0])), kernel(model) {
     held.selected.setOnes();
   }
-  void at(const Joints<7>& q) {
-    kernel.evaluate(q, Joints<7>::Zero(), robot);
+  void at(const JointVector& q) {
+    kernel.evaluate(q, JointVector::Zero(7), robot);
     null_space.compute(robot.M, robot.J, held, tool, robot.R_BT);
   }
   /// Stretched out: joints 2, 4 and 6 at zero align the elbow with the rest.
-  static Joints<7> stretched(double bend) {
-    return Joints<7>{{0.3, bend, 0.1, -bend, 0.2, bend, 0.4}};
+  static JointVector stretched(double bend) {
+    return JointVector{{0.3, bend, 0.1, -bend, 0.2, bend, 0.4}};
   }
 
   RobotModel model;
-  DynamicsKernel<7> kernel;
-  Dynamics<7> robot;
+  DynamicsKernel kernel;
+  DynamicsResult robot;
   TipImpedance held, tool;
-  NullSpace<7> null_space;
+  NullSpace null_space;
 };
 
 TEST_F(NullSpaceOfPanda, DoesNotAccelerateTheTip) {
@@ -46,8 +46,8 @@ TEST_F(NullSpaceOfPanda, DoesNotAccelerateTheTip) {
     at(random.vector(7));
     if (null_space.inertia().regularity() < TaskInertia::kNearlySingular) continue;
     ++regular;
-    const Joints<7> k0 = 30 * random.vector(7).cwiseAbs();
-    for (const Joints<7>& tau :
+    const JointVector k0 = 30 * random.vector(7).cwiseAbs();
+    for (const JointVector& tau :
          {null_space.spring(k0, random.vector(7)), null_space.damper(k0, random.vector(7))}) {
       const Vector6 acceleration = robot.J * robot.M.llt().solve(tau);
       EXPECT_LT(acceleration.norm(), 1e-9 * robot.M.llt().solve(tau).norm());
@@ -67,7 +67,7 @@ TEST_F(NullSpaceOfPanda, HeldDirectionsAreExactForEverySubset) {
     for (int i = 0; i < 6; ++i) one.selected[i] = random.integer(0, 1);
     at(random.vector(7));
     if (null_space.inertia().regularity() < TaskInertia::kNearlySingular) continue;
-    const Joints<7> tau = null_space.spring(Joints<7>::Ones(), random.vector(7));
+    const JointVector tau = null_space.spring(JointVector::Ones(7), random.vector(7));
     Vector6 acceleration = robot.J * robot.M.llt().solve(tau);
     if (in_tool) {
       acceleration.head<3>() = (robot.R_BT.transpose() * acceleration.head<3>()).eval();
@@ -100,12 +100,12 @@ TEST_F(NullSpaceOfPanda, TorqueKeepsItsBoundAndTurnsSmoothlyThroughTheStretchedA
     }
     return worst;
   }();
-  const Joints<7> k0{{30, 25, 20, 15, 10, 5, 2}}, dq{{0.3, -0.2, 0.5, 0.4, -0.3, 0.2, 0.6}};
-  Joints<7> last;
+  const JointVector k0{{30, 25, 20, 15, 10, 5, 2}}, dq{{0.3, -0.2, 0.5, 0.4, -0.3, 0.2, 0.6}};
+  JointVector last;
   double least = 1, largest_step = 0;
   for (int step = -50000; step <= 50000; ++step) {
     at(stretched(1e-5 * step));
-    const Joints<7> spring = null_space.spring(k0, dq), damper = null_space.damper(k0, dq);
+    const JointVector spring = null_space.spring(k0, dq), damper = null_space.damper(k0, dq);
     ASSERT_LE(spring.norm(), std::sqrt(cond) * 30 * dq.norm());
     ASSERT_LE(damper.norm(), cond * 30 * dq.norm());
     ASSERT_GE(dq.dot(damper), 0);
@@ -125,9 +125,9 @@ TEST_F(NullSpaceOfPanda, EigenvaluesOfTheProjectorAreBetweenZeroAndOneEverywhere
     for (int i = 0; i < 6; ++i) tool.selected[i] = (1 - held.selected[i]) * random.uniform(0, 1);
     held.selected *= 0.5;
     tool.selected *= 0.5;
-    at(k % 2 == 0 ? Joints<7>(random.vector(7)) : stretched(random.log_uniform(1e-9, 1)));
+    at(k % 2 == 0 ? JointVector(random.vector(7)) : stretched(random.log_uniform(1e-9, 1)));
     MatrixXd N(7, 7);
-    for (int i = 0; i < 7; ++i) N.col(i) = null_space.projected_velocity(Joints<7>::Unit(i));
+    for (int i = 0; i < 7; ++i) N.col(i) = null_space.projected_velocity(JointVector::Unit(7, i));
     const MatrixXd L = MatrixXd(robot.M).llt().matrixL();
     const MatrixXd P = L.transpose() * N * L.transpose().inverse();
     EXPECT_TRUE(near(P, P.transpose(), 1e-10));
@@ -141,9 +141,9 @@ TEST_F(NullSpaceOfPanda, SpringPullsDownhill) {
   Random random(335);
   for (int k = 0; k < 500; ++k) {
     at(random.vector(7));
-    const Joints<7> k0 = 30 * random.vector(7).cwiseAbs(), dq = random.vector(7);
+    const JointVector k0 = 30 * random.vector(7).cwiseAbs(), dq = random.vector(7);
     // What the spring does on its own: qdd = M^-1 N' K_0 dq, along which dq' K_0 dq falls.
-    const Joints<7> acceleration = robot.M.llt().solve(null_space.spring(k0, dq));
+    const JointVector acceleration = robot.M.llt().solve(null_space.spring(k0, dq));
     EXPECT_GE(acceleration.dot(k0.cwiseProduct(dq)), -1e-10);
   }
 }
@@ -155,9 +155,8 @@ double least_eigenvalue(const MatrixXd& A) {
 TEST(GainBlend, StaysPositiveSemidefiniteAndArrives) {
   Random random(336);
   constexpr int kTicks = 50;
-  GainBlend<7> path(kTicks);
-  path.start(Impedance<7>{});
-  Impedance<7> target;
+  GainBlend path(kTicks, Impedance(7));
+  Impedance target(7);
   for (int change = 0; change < 60; ++change) {
     Setpoint setpoint;
     setpoint.mode = random.integer(0, 1) == 0 ? Mode::kJoint : Mode::kCartesian;
@@ -169,14 +168,14 @@ TEST(GainBlend, StaysPositiveSemidefiniteAndArrives) {
     gains.task_damping = random.spd(6);
     gains.frame = random.integer(0, 1) == 0 ? Frame::kBase : Frame::kTool;
     gains.null_stiffness = gains.null_damping = random.vector(7).cwiseAbs();
-    target = Impedance<7>::of(setpoint);
-    const Impedance<7> from = path.now();
+    target = Impedance(setpoint, 7);
+    const Impedance from = path.now();
     path.set_target(target);
     const int ticks = random.integer(1, 2 * kTicks);
-    Impedance<7> last = from;
+    Impedance last = from;
     for (int k = 0; k < ticks; ++k) {
       path.step();
-      const Impedance<7>& now = path.now();
+      const Impedance& now = path.now();
       for (const MatrixXd& A : {MatrixXd(now.joint_stiffness), MatrixXd(now.joint_damping),
                                 MatrixXd(now.base.stiffness), MatrixXd(now.tool.stiffness),
                                 MatrixXd(now.base.damping), MatrixXd(now.tool.damping)}) {
@@ -196,8 +195,7 @@ TEST(GainBlend, StaysPositiveSemidefiniteAndArrives) {
 }
 
 TEST(GainBlend, FollowsTargetsThatComeEveryTick) {
-  Ramp<Vector6> path(100);
-  path.start(Vector6::Zero());
+  Ramp<Vector6> path(100, Vector6::Zero());
   for (int k = 0; k < 1000; ++k) {
     path.set_target(Vector6::Constant(1 + 1e-9 * k));
     path.step();

@@ -9,14 +9,17 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <limits>
 
 namespace dashpot::controller {
 namespace {
 
 using testing::Random;
 
+constexpr double kNoClamp = std::numeric_limits<double>::infinity();
+
 struct JointState {
-  Joints<7> q, qd;
+  JointVector q, qd;
 };
 
 /// A Panda under the law, with springs at rest that stand still.
@@ -32,9 +35,9 @@ class Swing {
     setpoint.gains.task_stiffness.diagonal() << 300, 500, 200, 20, 20, 20;
     setpoint.gains.null_stiffness.setZero();
     setpoint.gains.null_damping.setZero();
-    impedance_ = Impedance<7>::of(setpoint);
-    const Joints<7> home = fixed<7>(testing::panda_ready());
-    DynamicsKernel<7>(model_).evaluate(home, Joints<7>::Zero(), robot_);
+    impedance_ = Impedance(setpoint, 7);
+    const JointVector home = (testing::panda_ready());
+    DynamicsKernel(model_).evaluate(home, JointVector::Zero(7), robot_);
     references_.joint.start(home);
     references_.tip.start(robot_.p_BT_B, Eigen::Quaterniond(robot_.R_BT));
   }
@@ -42,7 +45,7 @@ class Swing {
   /// Kinetic, and of the springs, J.
   double energy() {
     torque(at);
-    const Joints<7> e = references_.joint.position() - at.q;
+    const JointVector e = references_.joint.position() - at.q;
     const double springs = 0.5 * e.dot(impedance_.joint_stiffness * e) +
                            0.5 * law_.tip_error().dot(impedance_.base.stiffness * law_.tip_error());
     return springs + 0.5 * at.qd.dot(robot_.M * at.qd);
@@ -60,24 +63,25 @@ class Swing {
   JointState moved(const JointState& rate, double h) const {
     return {at.q + h * rate.q, at.qd + h * rate.qd};
   }
-  Joints<7> torque(const JointState& there) {
+  JointVector torque(const JointState& there) {
     kernel_.evaluate(there.q, there.qd, robot_);
-    return law_.torque(robot_, there.q, there.qd, impedance_, references_, Vector6::Zero());
+    JointVector tau;
+    law_.torque(robot_, there.q, there.qd, impedance_, references_, Vector6::Zero(),
+                {kNoClamp, kNoClamp}, tau);
+    return tau;
   }
   JointState rate(const JointState& there) {
-    const Joints<7> tau = torque(there);
+    const JointVector tau = torque(there);
     return {there.qd, robot_.M.llt().solve(tau - robot_.coriolis - robot_.gravity)};
   }
 
   RobotModel model_ = testing::arm_model(testing::arms()[0]);
-  DynamicsKernel<7> kernel_{model_};
-  ImpedanceLaw<7> law_;
-  Impedance<7> impedance_;
-  SpringReferences<7> references_{
-      JointReference<7>({Joints<7>::Ones(), Joints<7>::Ones()}, 1e-3, 1),
-      JointReference<7>({Joints<7>::Ones(), Joints<7>::Ones()}, 1e-3, 1),
-      TipReference(TwistNorm{}, 1e-3, 1)};
-  Dynamics<7> robot_;
+  DynamicsKernel kernel_{model_};
+  ImpedanceLaw law_;
+  Impedance impedance_{7};
+  SpringReferences references_{{JointVector::Ones(7), JointVector::Ones(7), 1, 1, 1, 1, 1e-3, 0},
+                               1e-3};
+  DynamicsResult robot_;
 
  public:
   JointState at;
@@ -85,7 +89,7 @@ class Swing {
 
 /// Largest and smallest energy of half a second at speed, relative to that at the start.
 std::pair<double, double> range_of_energy(Mode mode, bool coriolis, Random& random) {
-  const Joints<7> q = fixed<7>(testing::panda_ready()) + Joints<7>(0.2 * random.vector(7));
+  const JointVector q = (testing::panda_ready()) + JointVector(0.2 * random.vector(7));
   Swing swing(mode, coriolis, {q, 3 * random.vector(7)});
   const double start = swing.energy();
   std::pair<double, double> range(1, 1);

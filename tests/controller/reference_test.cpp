@@ -21,23 +21,22 @@ using testing::random_rotation;
 constexpr double kPeriod = 0.001;
 constexpr int kWindow = 30;
 
-JointNorm<3> joint_limits() {
-  return {Joints<3>(1.0, 0.5, 2.0), Joints<3>(4.0, 5.0, 3.0)};
+JointNorm joint_limits() {
+  return {Vector3d(1.0, 0.5, 2.0), Vector3d(4.0, 5.0, 3.0)};
 }
 
 /// Largest velocity, acceleration and change of acceleration of a path, as shares of their limits,
 /// from its positions alone.
-template <int N>
 struct Watch {
-  JointNorm<N> norm;
-  std::vector<Joints<N>> positions = {};
+  JointNorm norm;
+  std::vector<JointVector> positions = {};
   double speed = 0, effort = 0, jerk = 0, inconsistency = 0;
-  Joints<N> v = Joints<N>::Zero(), a = Joints<N>::Zero();
+  JointVector v = JointVector::Zero(3), a = JointVector::Zero(3);
 
-  void see(const JointReference<N>& path) {
+  void see(const JointReference& path) {
     if (!positions.empty()) {
-      const Joints<N> v_now = (path.position() - positions.back()) / kPeriod;
-      const Joints<N> a_now = (v_now - v) / kPeriod;
+      const JointVector v_now = (path.position() - positions.back()) / kPeriod;
+      const JointVector a_now = (v_now - v) / kPeriod;
       speed = std::max(speed, norm.speed(v_now));
       effort = std::max(effort, norm.effort(a_now));
       jerk = std::max(jerk, norm.effort(a_now - a) / (2.0 / kWindow));
@@ -57,10 +56,10 @@ struct Watch {
 };
 
 TEST(JointReference, GoesStraightFromRestAndArrivesExactly) {
-  JointReference<3> path(joint_limits(), kPeriod, kWindow);
-  const Joints<3> start(0.1, -0.2, 0.3), goal(1.1, 0.7, -1.3);
+  JointReference path(joint_limits(), kPeriod, kWindow);
+  const Vector3d start(0.1, -0.2, 0.3), goal(1.1, 0.7, -1.3);
   path.start(start);
-  Watch<3> watch{joint_limits()};
+  Watch watch{joint_limits()};
   watch.see(path);
   int ticks = 0;
   while (path.position() != goal && ticks < 10000) {
@@ -69,7 +68,7 @@ TEST(JointReference, GoesStraightFromRestAndArrivesExactly) {
     ++ticks;
   }
   ASSERT_EQ(path.position(), goal);
-  EXPECT_EQ(path.velocity(), Joints<3>::Zero());
+  EXPECT_EQ(path.velocity(), JointVector::Zero(3));
   watch.expect_within_limits();
   EXPECT_GT(watch.speed, 0.99);  // no slower than it may be
   EXPECT_GT(watch.effort, 0.99);
@@ -78,7 +77,7 @@ TEST(JointReference, GoesStraightFromRestAndArrivesExactly) {
   const double speed = 0.5 / 0.9, effort = 3.0 / 1.6, smoothing = kWindow * kPeriod;
   EXPECT_NEAR(ticks * kPeriod, 1 / speed + 0.5 * speed * (1 / effort + 2 / effort) + smoothing,
               2.5 * kPeriod);
-  for (const Joints<3>& p : watch.positions) {
+  for (const JointVector& p : watch.positions) {
     const double share = (p - start).dot(goal - start) / (goal - start).squaredNorm();
     EXPECT_TRUE(near(p, start + share * (goal - start), 1e-12));
     EXPECT_LE(share, 1 + 1e-12);  // no overshoot
@@ -88,10 +87,10 @@ TEST(JointReference, GoesStraightFromRestAndArrivesExactly) {
 TEST(JointReference, KeepsItsLimitsWhateverTheGoalsAndArrives) {
   Random random(311);
   for (int trial = 0; trial < 100; ++trial) {
-    JointReference<3> path(joint_limits(), kPeriod, kWindow);
-    Watch<3> watch{joint_limits()};
+    JointReference path(joint_limits(), kPeriod, kWindow);
+    Watch watch{joint_limits()};
     watch.see(path);
-    Joints<3> goal = Joints<3>::Zero();
+    JointVector goal = JointVector::Zero(3);
     for (int k = 0; k < 3000; ++k) {
       if (random.integer(0, 99) < (trial % 3 == 0 ? 100 : 1)) {  // every tick, or now and then
         goal = random.log_uniform(1e-6, 2.0) * random.vector(3);
@@ -112,12 +111,12 @@ TEST(JointReference, KeepsItsLimitsWhateverTheGoalsAndArrives) {
 }
 
 TEST(JointReference, HaltStopsWithinTheBrakingTime) {
-  JointReference<3> path(joint_limits(), kPeriod, kWindow);
-  for (int k = 0; k < 400; ++k) path.step(Joints<3>(5, 5, 5));
+  JointReference path(joint_limits(), kPeriod, kWindow);
+  for (int k = 0; k < 400; ++k) path.step(Vector3d(5, 5, 5));
   EXPECT_GT(path.velocity().norm(), 0.1);
   for (int k = 0; k < 400; ++k) path.halt();
-  const Joints<3> stop = path.position();
-  EXPECT_EQ(path.velocity(), Joints<3>::Zero());
+  const JointVector stop = path.position();
+  EXPECT_EQ(path.velocity(), JointVector::Zero(3));
   path.halt();
   EXPECT_EQ(path.position(), stop);
 }
@@ -188,7 +187,7 @@ TipImpedance all_sprung() {
 }
 
 // With a tip that stands still the reference ends at the error clamp, and turns back there.
-TEST(TipReference, GoesNoFartherThanItsTether) {
+TEST(TipReference, GoesNoFartherThanTheErrorClamp) {
   Random random(314);
   const TwistNorm limits{0.5, 1.5, 2.0, 6.0};
   const ErrorClamp clamp{0.2, 0.6};
@@ -263,12 +262,12 @@ TEST(TipReference, GoesOnFromWhereItIsMovedToWhileItMovesAndTurns) {
 }
 
 TEST(JointReference, GoesOnFromWhereItIsMovedToWhileItMoves) {
-  JointReference<3> path(joint_limits(), kPeriod, kWindow);
-  const Joints<3> goal(1, -1, 2);
+  JointReference path(joint_limits(), kPeriod, kWindow);
+  const Vector3d goal(1, -1, 2);
   for (int k = 0; k < 60; ++k) path.step(goal);
-  const Joints<3> before = path.position(), velocity = path.velocity();
+  const JointVector before = path.position(), velocity = path.velocity();
   path.relocate(1, 0.7);
-  EXPECT_EQ(path.position(), Joints<3>(before[0], 0.7, before[2]));
+  EXPECT_EQ(path.position(), Vector3d(before[0], 0.7, before[2]));
   EXPECT_EQ(path.velocity(), velocity);
   path.step(goal);
   EXPECT_NEAR(path.position()[1], 0.7 + kPeriod * path.velocity()[1], 1e-12);
@@ -279,9 +278,10 @@ TEST(JointReference, GoesOnFromWhereItIsMovedToWhileItMoves) {
 // Started again in motion, a path is at rest and keeps nothing of before.
 TEST(Paths, AreAtRestWhereTheyAreStarted) {
   TipReference tip({0.5, 1.5, 2.0, 6.0}, kPeriod, kWindow);
-  JointReference<3> joints(joint_limits(), kPeriod, kWindow);
+  JointReference joints(joint_limits(), kPeriod, kWindow);
   const Quaterniond turned = quaternion(Vector3d(0.3, -1, 0.5));
-  for (int k = 0; k < 60; ++k) tip.step(Vector3d::Ones(), turned), joints.step(Joints<3>::Ones());
+  for (int k = 0; k < 60; ++k)
+    tip.step(Vector3d::Ones(), turned), joints.step(JointVector::Ones(3));
   const Vector3d p(0.4, 0.5, -0.6);
   tip.start(p, turned);
   joints.start(p);
@@ -325,7 +325,7 @@ TEST(ReferenceGovernor, SeesWhatIsNearUpToHalfATurn) {
 
 // Up to the clamp a deflection is as it was, to the last bit; beyond it, it keeps its direction,
 // also where the rotation vector is longer than half a turn.
-TEST(ErrorClamp, EndsExactlyAtItsReach) {
+TEST(ErrorClamp, LimitsExactlyAtItsEnd) {
   Random random(317);
   const TipImpedance base = all_sprung(), none;
   const Eigen::Matrix3d R = random_rotation(random).toRotationMatrix();

@@ -1,6 +1,6 @@
 // The filter of torques by itself, on two joints that differ: every number follows from the
 // equations in safety_filter.hpp.
-#include <dashpot/controller/safety/safety_filter_steps.hpp>
+#include <dashpot/controller/safety/safety_filter.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace dashpot::controller {
 namespace {
 
 using testing::near;
-using Pair = Joints<2>;
+using Pair = Eigen::Vector2d;
 
 /// Joint 1 is heavy: its repulsion and its way to the limit are bounded by its torque. Joint 2 is
 /// light: they are bounded by what the sampled loop bears.
@@ -31,21 +31,27 @@ class Filter : public ::testing::Test {
     settings.limits.position_margin = pair(0.125, 0.25);
     settings.limits.return_velocity = pair(0.05, 0.1);
   }
-  SafetyFilter<2> make() const { return {settings, inertia}; }
+  SafetyFilter make() const { return {settings, inertia}; }
   /// What the filter makes of `tau`.
-  Status apply(SafetyFilter<2>& filter, const Pair& tau) {
+  Status apply(SafetyFilter& filter, const Pair& tau) {
     out = tau;
     return filter.apply({q, qd, tip_speed, springs, returns}, weight, out);
   }
   Status apply(const Pair& tau) {
-    SafetyFilter<2> filter = make();
+    SafetyFilter filter = make();
     return apply(filter, tau);
+  }
+
+  JointVector ramp(SafetyFilter& filter) {
+    filter.ramp(out);
+    return out;
   }
 
   Settings settings;
   const Pair inertia{0.5, 1e-4};
   const Pair damper{200, 0.04};  // c; F is 20 and 0.012 N m, E is 40 and 5 N m
-  Pair q = Pair::Zero(), qd = Pair::Zero(), weight = Pair::Zero(), out;
+  Pair q = Pair::Zero(), qd = Pair::Zero(), weight = Pair::Zero();
+  JointVector out;
   double tip_speed = 0;
   bool springs = true, returns = false;
 };
@@ -130,7 +136,7 @@ TEST_F(Filter, BoundsWhatDrivesAJointThatIsFast) {
   EXPECT_EQ(apply({-300, 9}), Status::kOk);  // it brakes
   settings.limits.torque[0] = 40;
   settings.limits.torque_rate.setConstant(1000);
-  SafetyFilter<2> filter = make();
+  SafetyFilter filter = make();
   for (int k = 0; k < 50; ++k) EXPECT_EQ(apply(filter, {39, 9}), Status::kTorqueLimited);
   EXPECT_TRUE(near(out, Pair(std::sqrt(1000 * 0.5 * (1.8 - 1.2)) + 40 * more, 9), 1e-9));
   settings.limits.torque_rate.setConstant(1e6);
@@ -179,7 +185,7 @@ TEST_F(Filter, ReturnsFromOutsideWithATorqueThatGrowsWithinASecond) {
     q = {side * 1.01, 0};
     qd.setZero();
     returns = true;
-    SafetyFilter<2> filter = make();
+    SafetyFilter filter = make();
     EXPECT_EQ(apply(filter, {side * 30, 0}), Status::kPositionLimit);
     EXPECT_NEAR(out[0], 0, 1e-12);  // no spring, and not yet a return
     for (int k = 0; k < 500; ++k) apply(filter, {0, 0});
@@ -217,32 +223,32 @@ TEST_F(Filter, ReturnsFromOutsideWithATorqueThatGrowsWithinASecond) {
 }
 
 TEST_F(Filter, RampsToZeroIn100Ticks) {
-  SafetyFilter<2> filter = make();
-  filter.reset({30, -5});
+  SafetyFilter filter = make();
+  filter.reset(Pair(30, -5));
   for (int k = 1; k <= 100; ++k) {
-    EXPECT_TRUE(near(filter.ramp(), (1 - 0.01 * k) * Pair(30, -5), 1e-9)) << k;
+    EXPECT_TRUE(near(ramp(filter), (1 - 0.01 * k) * Pair(30, -5), 1e-9)) << k;
   }
   EXPECT_EQ(filter.last(), Pair(0, 0));
-  EXPECT_EQ(filter.ramp(), Pair(0, 0));
+  EXPECT_EQ(ramp(filter), Pair(0, 0));
 }
 
 /// A ramp goes by the torque at its own beginning, not at that of the ramp before.
 TEST_F(Filter, RampsAnewAfterAGoodTick) {
-  SafetyFilter<2> filter = make();
-  filter.reset({3, 0.5});
-  filter.ramp();
+  SafetyFilter filter = make();
+  filter.reset(Pair(3, 0.5));
+  ramp(filter);
   ASSERT_EQ(apply(filter, {30, -5}), Status::kOk);
-  for (int k = 1; k <= 50; ++k) filter.ramp();
+  for (int k = 1; k <= 50; ++k) ramp(filter);
   EXPECT_TRUE(near(filter.last(), Pair(15, -2.5), 1e-9));
-  filter.reset({20, 4});
-  filter.ramp();
+  filter.reset(Pair(20, 4));
+  ramp(filter);
   EXPECT_TRUE(near(filter.last(), Pair(19.8, 3.96), 1e-9));
 }
 
 TEST_F(Filter, RampsDownWhatIsNotANumber) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  SafetyFilter<2> filter = make();
-  filter.reset({30, -5});
+  SafetyFilter filter = make();
+  filter.reset(Pair(30, -5));
   EXPECT_EQ(apply(filter, {0, nan}), Status::kNotFinite);
   EXPECT_TRUE(near(out, 0.99 * Pair(30, -5), 1e-9));
   EXPECT_EQ(apply(filter, {nan, 0}), Status::kNotFinite);
@@ -254,19 +260,19 @@ TEST_F(Filter, RampsDownWhatIsNotANumber) {
 TEST_F(Filter, AssumesTheWeightWhereNothingIsKnown) {
   settings.limits.torque_rate.setConstant(1000);
   weight = {15, -3};
-  SafetyFilter<2> filter = make();
+  SafetyFilter filter = make();
   filter.assume(weight);
   EXPECT_EQ(apply(filter, weight), Status::kOk);
   EXPECT_EQ(out, weight);
-  filter.assume({20, -3});  // it is known by now
+  filter.assume(Pair(20, -3));  // it is known by now
   EXPECT_EQ(filter.last(), weight);
   filter = make();
-  EXPECT_EQ(filter.ramp(), Pair(0, 0));
+  EXPECT_EQ(ramp(filter), Pair(0, 0));
   filter.assume(weight);
   EXPECT_EQ(apply(filter, weight), Status::kTorqueLimited);
   EXPECT_TRUE(near(out, Pair(1, -0.2), 1e-9));
   filter = make();
-  filter.reset({50, -20});  // no more than the limits
+  filter.reset(Pair(50, -20));  // no more than the limits
   EXPECT_EQ(filter.last(), Pair(40, -10));
 }
 
@@ -274,8 +280,8 @@ TEST_F(Filter, AssumesTheWeightWhereNothingIsKnown) {
 /// allows.
 TEST_F(Filter, FadesEvenly) {
   settings.limits.torque_rate = Pair(1000, 500);
-  SafetyFilter<2> filter = make();
-  filter.reset({20, 4});
+  SafetyFilter filter = make();
+  filter.reset(Pair(20, 4));
   for (int k = 1; k <= 20; ++k) {
     EXPECT_EQ(apply(filter, {0, 0}), k < 20 ? Status::kTorqueLimited : Status::kOk);
     EXPECT_TRUE(near(out, (1 - 0.05 * k) * Pair(20, 4), 1e-9)) << k;
@@ -288,7 +294,7 @@ TEST_F(Filter, FadesEvenly) {
   }
   springs = true;
   // Without a new beginning each joint changes as fast as it may.
-  filter.reset({0, 0});
+  filter.reset(Pair(0, 0));
   apply(filter, {0, 0});
   EXPECT_EQ(apply(filter, {4, -4}), Status::kTorqueLimited);
   EXPECT_TRUE(near(out, Pair(1, -0.5), 1e-9));
@@ -296,25 +302,27 @@ TEST_F(Filter, FadesEvenly) {
   EXPECT_TRUE(near(out, Pair(0.5, -1), 1e-9));
 }
 
+/// What it adds to matrices that are there already.
 TEST_F(Filter, TellsTheModesOfItsRepulsion) {
-  const SafetyFilter<2> filter = make();
-  Pair stiffness, damping;
-  EXPECT_FALSE(filter.repels({0.875, -1.75}, true, stiffness, damping));
-  EXPECT_EQ(stiffness, Pair(0, 0));
-  EXPECT_EQ(damping, Pair(0, 0));
-  EXPECT_TRUE(filter.repels({0.9375, 0}, true, stiffness, damping));
-  EXPECT_TRUE(near(stiffness, Pair(2 * 20 * 0.5 / 0.125, 0), 1e-9));
-  EXPECT_TRUE(near(damping, Pair(100, 0), 1e-9));
-  EXPECT_TRUE(filter.repels({0, -1.9375}, false, stiffness, damping));
-  EXPECT_EQ(stiffness, Pair(0, 0));
-  EXPECT_TRUE(near(damping, Pair(0, 0.03), 1e-9));
-  EXPECT_TRUE(filter.repels({1, -2.1}, true, stiffness, damping));
-  EXPECT_TRUE(near(stiffness, Pair(320, 0), 1e-9));  // outside no spring acts
-  EXPECT_TRUE(near(damping, damper, 1e-9));
+  const SafetyFilter filter = make();
+  const auto expect = [&](const Pair& where, bool with_springs, const Pair& stiffness,
+                          const Pair& damping) {
+    JointMatrix K = JointMatrix::Constant(2, 2, 5), C = JointMatrix::Constant(2, 2, 3);
+    filter.add_repulsion(where, with_springs, K, C);
+    EXPECT_TRUE(
+        near(K - JointMatrix::Constant(2, 2, 5), Eigen::Matrix2d(stiffness.asDiagonal()), 1e-9));
+    EXPECT_TRUE(
+        near(C - JointMatrix::Constant(2, 2, 3), Eigen::Matrix2d(damping.asDiagonal()), 1e-9));
+    EXPECT_EQ(filter.repels(where), damping != Pair(0, 0));
+  };
+  expect({0.875, -1.75}, true, {0, 0}, {0, 0});
+  expect({0.9375, 0}, true, {2 * 20 * 0.5 / 0.125, 0}, {100, 0});
+  expect({0, -1.9375}, false, {0, 0}, {0, 0.03});
+  expect({1, -2.1}, true, {320, 0}, damper);  // outside no spring acts
 }
 
 TEST_F(Filter, KnowsWhatDampingTheLoopBears) {
-  EXPECT_TRUE(near(make().borne({30, 30}), Pair(30, 2.5 * 0.04), 1e-12));
+  EXPECT_TRUE(near(make().borne(Pair(30, 30)), Pair(30, 2.5 * 0.04), 1e-12));
 }
 
 }  // namespace

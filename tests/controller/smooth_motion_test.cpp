@@ -21,18 +21,18 @@ TEST(Smoothing, IsTheMeanOfTheLastVelocities) {
   Random random(351);
   for (const int asked : {-1, 0, 1, 2, 7, 256, 1000}) {
     const int window = std::clamp(asked, 1, 256);
-    Smoothing<3> smoothing(asked);
+    Smoothing<JointVector> smoothing(asked, 3);
     for (int again = 0; again < 2; ++again) {  // and after a reset in motion
       if (again == 1) smoothing.reset();
       EXPECT_TRUE(smoothing.velocity().isZero(0));
       EXPECT_TRUE(smoothing.acceleration().isZero(0));
       EXPECT_TRUE(smoothing.offset().isZero(0));
-      std::vector<Joints<3>> v(static_cast<std::size_t>(window), Joints<3>::Zero());
-      Joints<3> mean_before = Joints<3>::Zero(), offset = Joints<3>::Zero();
+      std::vector<JointVector> v(static_cast<std::size_t>(window), JointVector::Zero(3));
+      JointVector mean_before = JointVector::Zero(3), offset = JointVector::Zero(3);
       for (int k = 0; k < 3 * window; ++k) {
         v.emplace_back(random.vector(3));
         smoothing.step(v.back(), kTick);
-        Joints<3> mean = Joints<3>::Zero();
+        JointVector mean = JointVector::Zero(3);
         for (auto one = v.end() - window; one != v.end(); ++one) mean += *one / window;
         offset += (mean - v.back()) * kTick;
         EXPECT_TRUE(near(smoothing.velocity(), mean, 1e-13));
@@ -42,31 +42,31 @@ TEST(Smoothing, IsTheMeanOfTheLastVelocities) {
       }
       for (int k = 0; k < window; ++k) {
         EXPECT_FALSE(smoothing.velocity().isZero(0));
-        smoothing.step(Joints<3>::Zero(), kTick);
+        smoothing.step(JointVector::Zero(3), kTick);
       }
       EXPECT_TRUE(smoothing.velocity().isZero(0));
       EXPECT_TRUE(smoothing.offset().isZero(0));
-      smoothing.step(Joints<3>::Ones(), kTick);  // still in motion when it is reset
+      smoothing.step(JointVector::Ones(3), kTick);  // still in motion when it is reset
     }
   }
 }
 
 TEST(Smoothing, MovesAsLongAsOneCoordinateDoes) {
   for (int i = 0; i < 3; ++i) {
-    Smoothing<3> smoothing(10);
-    for (int k = 0; k < 30; ++k) smoothing.step(Joints<3>::Unit(i), kTick);
-    EXPECT_TRUE(near(smoothing.velocity(), Joints<3>::Unit(i), 1e-12));
+    Smoothing<JointVector> smoothing(10, 3);
+    for (int k = 0; k < 30; ++k) smoothing.step(JointVector::Unit(3, i), kTick);
+    EXPECT_TRUE(near(smoothing.velocity(), JointVector::Unit(3, i), 1e-12));
   }
 }
 
 // At rest all rounding is gone: what comes then is what comes of a new one, to the last bit.
 TEST(Smoothing, KeepsNothingOfAMotionThatHasEnded) {
   Random random(352);
-  Smoothing<3> used(10), fresh(10);
+  Smoothing<JointVector> used(10, 3), fresh(10, 3);
   for (int k = 0; k < 1000; ++k) used.step(random.vector(3), kTick);
-  for (int k = 0; k < 10; ++k) used.step(Joints<3>::Zero(), kTick);
+  for (int k = 0; k < 10; ++k) used.step(JointVector::Zero(3), kTick);
   for (int k = 0; k < 30; ++k) {
-    const Joints<3> v = random.vector(3);
+    const JointVector v = random.vector(3);
     used.step(v, kTick);
     fresh.step(v, kTick);
     EXPECT_EQ(used.velocity(), fresh.velocity());
@@ -75,7 +75,7 @@ TEST(Smoothing, KeepsNothingOfAMotionThatHasEnded) {
 }
 
 TEST(Ramp, SetsOutFromWhereItIs) {
-  Ramp<Vector6> ramp(10);
+  Ramp<Vector6> ramp(10, Vector6::Zero());
   const Vector6 zero = Vector6::Zero(), one = Vector6::Ones();
   ramp.start(zero);
   ramp.set_target(one);
@@ -97,7 +97,7 @@ TEST(Ramp, SetsOutFromWhereItIs) {
 TEST(Ramp, TakesItsTicksEvenlyAndEndsExactly) {
   for (const int ticks : {-3, 0, 1, 2, 3, 10, 77, 1000}) {
     const int length = std::max(1, ticks);
-    Ramp<Vector6> ramp(ticks);
+    Ramp<Vector6> ramp(ticks, Vector6::Zero());
     const Vector6 from = Vector6::Constant(0.3), to = Vector6::Constant(-1.7);
     ramp.start(from);
     const auto changes = ramp.changes();
@@ -124,11 +124,18 @@ TEST(Ramp, TakesItsTicksEvenlyAndEndsExactly) {
 }
 
 /// Norm of the one coordinate's limits: velocity 2, acceleration 5.
-JointNorm<1> one_joint() {
-  return {Joints<1>(2.0), Joints<1>(5.0)};
+JointNorm one_joint() {
+  return {JointVector::Constant(1, 2.0), JointVector::Constant(1, 5.0)};
 }
-Step<1> one_step(double d, double v) {
-  return approach<1>(Joints<1>(d), Joints<1>(v), one_joint(), kTick);
+struct Step {
+  double velocity;
+  bool arrives;
+};
+Step one_step(double d, double v) {
+  JointVector velocity = JointVector::Constant(1, v);
+  const bool arrives =
+      approach<JointVector>(JointVector::Constant(1, d), velocity, one_joint(), kTick);
+  return {velocity[0], arrives};
 }
 
 TEST(Approach, EndsWithinATickWhereItCan) {
@@ -136,9 +143,9 @@ TEST(Approach, EndsWithinATickWhereItCan) {
   // T^2/2
   const double farthest = 0.5 * 5 * kTick * kTick;
   for (const double share : {-0.999, 0.5, 0.999}) {
-    const Step<1> step = one_step(share * farthest, 0);
+    const auto step = one_step(share * farthest, 0);
     EXPECT_TRUE(step.arrives) << share;
-    EXPECT_DOUBLE_EQ(step.velocity[0], share * farthest / kTick);
+    EXPECT_DOUBLE_EQ(step.velocity, share * farthest / kTick);
   }
   for (const double share : {-1.001, 1.001, 3.0}) {
     EXPECT_FALSE(one_step(share * farthest, 0).arrives) << share;
@@ -149,16 +156,16 @@ TEST(Approach, EndsWithinATickWhereItCan) {
 }
 
 TEST(Approach, SpeedsUpAtItsLimitAndBrakesAtHalfOfIt) {
-  EXPECT_DOUBLE_EQ(one_step(100, 0).velocity[0], 5 * kTick);
-  EXPECT_DOUBLE_EQ(one_step(-100, 0).velocity[0], -5 * kTick);
-  EXPECT_DOUBLE_EQ(one_step(100, 2).velocity[0], 2);
-  EXPECT_NEAR(one_step(-100, 2).velocity[0], 2 - 5 * kTick, 1e-15);
+  EXPECT_DOUBLE_EQ(one_step(100, 0).velocity, 5 * kTick);
+  EXPECT_DOUBLE_EQ(one_step(-100, 0).velocity, -5 * kTick);
+  EXPECT_DOUBLE_EQ(one_step(100, 2).velocity, 2);
+  EXPECT_NEAR(one_step(-100, 2).velocity, 2 - 5 * kTick, 1e-15);
   // With k periods to go it has slowed down to k times what it may brake in one.
   const double braking = 0.5 * 5 * kTick;
   for (const int k : {1, 2, 3, 10, 100}) {
     const double d = braking * kTick * k * (k + 1) / 2;
-    const Step<1> step = one_step(d * (1 - 1e-12), braking * (k + 1));
-    EXPECT_NEAR(step.velocity[0], braking * k, 1e-9);
+    const auto step = one_step(d * (1 - 1e-12), braking * (k + 1));
+    EXPECT_NEAR(step.velocity, braking * k, 1e-9);
     EXPECT_EQ(step.arrives, k == 1);
   }
 }
@@ -182,9 +189,9 @@ TEST(TwistNorm, TakesTheLargerShareOfItsTwoParts) {
 }
 
 TEST(JointNorm, TakesTheLargestShare) {
-  const JointNorm<3> norm{Joints<3>(1, 2, 4), Joints<3>(10, 10, 1)};
-  EXPECT_DOUBLE_EQ(norm.speed(Joints<3>(0.5, -3, 4)), 1.5);
-  EXPECT_DOUBLE_EQ(norm.effort(Joints<3>(0.5, -3, 4)), 4);
+  const JointNorm norm{Eigen::Vector3d(1, 2, 4), Eigen::Vector3d(10, 10, 1)};
+  EXPECT_DOUBLE_EQ(norm.speed(Eigen::Vector3d(0.5, -3, 4)), 1.5);
+  EXPECT_DOUBLE_EQ(norm.effort(Eigen::Vector3d(0.5, -3, 4)), 4);
 }
 
 }  // namespace

@@ -24,47 +24,42 @@ MatrixXd of_rank(Random& random, int n, int rank) {
   return root * root.transpose();
 }
 
-template <int N>
-void expect_small_cholesky(Random& random) {
-  const Eigen::Matrix<double, N, N> A = random.spd(N);
+void expect_small_cholesky(Random& random, int n) {
+  const MatrixXd A = random.spd(n);
   const MatrixXd L = A.llt().matrixL();
-  SmallCholesky<N> factor;
+  SmallCholesky factor;
   factor.compute(A, 1e-14);
-  for (int i = 0; i < N; ++i) {
+  for (int i = 0; i < n; ++i) {
     for (int j = 0; j <= i; ++j) EXPECT_NEAR(factor.L(i, j), L(i, j), 1e-14);
     EXPECT_NEAR(factor.per_diagonal(i), 1 / L(i, i), 1e-13 / L(i, i));
   }
-  const Eigen::Matrix<double, N, 1> x = random.vector(N);
+  const VectorXd x = random.vector(n);
   const auto expect = [&](const auto& act, const VectorXd& wanted) {
-    Eigen::Matrix<double, N, 1> y = x;
-    act(y);
+    VectorXd y = x;
+    act(y.data());
     EXPECT_TRUE(near(y, wanted, 1e-12 * (1 + wanted.norm())));
   };
-  expect([&](auto& y) { factor.solve_L(y); }, L.triangularView<Eigen::Lower>().solve(x));
-  expect([&](auto& y) { factor.solve_LT(y); },
+  expect([&](double* y) { factor.solve_L(y); }, L.triangularView<Eigen::Lower>().solve(x));
+  expect([&](double* y) { factor.solve_LT(y); },
          L.transpose().triangularView<Eigen::Upper>().solve(x));
-  expect([&](auto& y) { factor.multiply_L(y); }, L * x);
-  expect([&](auto& y) { factor.multiply_LT(y); }, L.transpose() * x);
-  EXPECT_TRUE(near(factor.inverse_L() * L, MatrixXd::Identity(N, N), 1e-12));
+  expect([&](double* y) { factor.multiply_L(y); }, L * x);
+  expect([&](double* y) { factor.multiply_LT(y); }, L.transpose() * x);
 }
 
 TEST(SmallCholesky, IsTheFactorAndItsInverse) {
   Random random(341);
   for (int k = 0; k < 20; ++k) {
-    expect_small_cholesky<1>(random);
-    expect_small_cholesky<2>(random);
-    expect_small_cholesky<6>(random);
-    expect_small_cholesky<9>(random);
+    for (const int n : {1, 2, 6, 9, 16}) expect_small_cholesky(random, n);
   }
 }
 
 TEST(SmallCholesky, RaisesPivotsThatAreTooSmall) {
-  SmallCholesky<3> factor;
-  factor.compute(Eigen::Vector3d(4, 1e-6, -1).asDiagonal(), 1e-4);
+  SmallCholesky factor;
+  factor.compute(Eigen::Matrix3d(Eigen::Vector3d(4, 1e-6, -1).asDiagonal()), 1e-4);
   EXPECT_DOUBLE_EQ(factor.L(0, 0), 2);
   EXPECT_DOUBLE_EQ(factor.L(1, 1), 1e-2);
   EXPECT_DOUBLE_EQ(factor.L(2, 2), 1e-2);
-  factor.compute(Eigen::Vector3d(1.01e-4, 0.99e-4, 1).asDiagonal(), 1e-4);
+  factor.compute(Eigen::Matrix3d(Eigen::Vector3d(1.01e-4, 0.99e-4, 1).asDiagonal()), 1e-4);
   EXPECT_DOUBLE_EQ(factor.L(0, 0), std::sqrt(1.01e-4));
   EXPECT_DOUBLE_EQ(factor.L(1, 1), 1e-2);
 }
@@ -74,7 +69,7 @@ TEST(SemidefiniteFactor, HasAsManyRowsAsTheRankLargestPivotFirst) {
   for (int rank = 0; rank <= 6; ++rank) {
     for (int k = 0; k < 20; ++k) {
       const Matrix6 A = of_rank(random, 6, rank);
-      const Matrix6 W = semidefinite_factor<6>(A);
+      const Matrix6 W = semidefinite_factor(A);
       EXPECT_TRUE(near(W.transpose() * W, A, 1e-13 * (1 + A.norm())));
       const auto full = Eigen::FullPivLU<MatrixXd>(A).rank();  // of the random integers
       EXPECT_TRUE(W.bottomRows(6 - full).isZero(0)) << A;
@@ -89,7 +84,7 @@ TEST(SemidefiniteFactor, LeavesOutWhatIsBelowRounding) {
   // Left out up to 3 eps of the largest: 6.7e-16
   for (const auto& [small, rows] : {std::pair(5e-16, 1), std::pair(9e-16, 2)}) {
     const Eigen::Matrix3d A = Eigen::Vector3d(1, 0, small).asDiagonal();
-    const Eigen::Matrix3d W = semidefinite_factor<3>(A);
+    const Eigen::Matrix3d W = semidefinite_factor(A);
     EXPECT_EQ((W.rowwise().norm().array() > 0).count(), rows) << small;
   }
 }
@@ -98,25 +93,24 @@ TEST(LowerCholesky, RefusesWhatIsNotDefiniteBeyondRounding) {
   Random random(343);
   for (int r = 1; r <= 6; ++r) {
     const MatrixXd A = random.spd(r);
-    Matrix6 L = Matrix6::Constant(7);
+    JointMatrix L = Matrix6::Constant(7);
     L.topLeftCorner(r, r) = A;
-    ASSERT_TRUE(lower_cholesky<6>(r, L));
+    ASSERT_TRUE(lower_cholesky(L, r));
     const MatrixXd lower = L.topLeftCorner(r, r).triangularView<Eigen::Lower>();
     EXPECT_TRUE(near(lower * lower.transpose(), A, 1e-14));
     if (r < 6) {
       EXPECT_TRUE((L.bottomRows(6 - r).array() == 7).all());
     }
-    Matrix6 thin = Matrix6::Zero();
-    thin.topLeftCorner(r, r) = of_rank(random, r, r - 1);
-    EXPECT_FALSE(lower_cholesky<6>(r, thin));
+    JointMatrix thin = of_rank(random, r, r - 1);
+    EXPECT_FALSE(lower_cholesky(thin, r));
   }
   // At 16 n eps of the trace, wherever the small one is: 7.105e-15 of it for n = 2
   for (const auto& [share, definite] : {std::pair(6.97e-15, false), std::pair(7.25e-15, true)}) {
     for (const double size : {0.01, 1.0, 4.0}) {
-      Eigen::Matrix2d A = Eigen::Vector2d(size, share * size).asDiagonal();
-      EXPECT_EQ(lower_cholesky<2>(2, A), definite) << share;
+      JointMatrix A = Eigen::Vector2d(size, share * size).asDiagonal();
+      EXPECT_EQ(lower_cholesky(A, 2), definite) << share;
       A = Eigen::Vector2d(share * size, size).asDiagonal();
-      EXPECT_EQ(lower_cholesky<2>(2, A), definite) << share;
+      EXPECT_EQ(lower_cholesky(A, 2), definite) << share;
     }
   }
 }
@@ -124,30 +118,30 @@ TEST(LowerCholesky, RefusesWhatIsNotDefiniteBeyondRounding) {
 TEST(Orthonormalize, TellsWhatIsLeftOfAVector) {
   Random random(344);
   for (int k = 0; k < 100; ++k) {
-    std::array<Joints<5>, 3> Q;
+    std::array<JointVector, 3> Q;
     for (int i = 0; i < 3; ++i) {
-      Joints<5>& y = Q[static_cast<std::size_t>(i)];
+      JointVector& y = Q[static_cast<std::size_t>(i)];
       y = random.vector(5);
-      ASSERT_TRUE(orthonormalize<5>(Q.data(), i, 1e-3, y));
+      ASSERT_TRUE(orthonormalize(Q.data(), i, 1e-3, y));
       for (int j = 0; j <= i; ++j) {
         EXPECT_NEAR(Q[static_cast<std::size_t>(j)].dot(y), i == j ? 1 : 0, 1e-15);
       }
     }
     // Of a vector next to their span little is left, but that is orthogonal to all its digits.
-    Joints<5> beside = random.vector(5);
-    ASSERT_TRUE(orthonormalize<5>(Q.data(), 3, 1e-3, beside));
-    Joints<5> y = Q[0] - 2 * Q[1] + Q[2] + 1e-6 * beside;
-    Joints<5> same = y;
-    EXPECT_FALSE(orthonormalize<5>(Q.data(), 3, 1.01e-6, same));
-    ASSERT_TRUE(orthonormalize<5>(Q.data(), 3, 0.99e-6, y));
-    for (const Joints<5>& q : Q) EXPECT_NEAR(q.dot(y), 0, 1e-15);
+    JointVector beside = random.vector(5);
+    ASSERT_TRUE(orthonormalize(Q.data(), 3, 1e-3, beside));
+    JointVector y = Q[0] - 2 * Q[1] + Q[2] + 1e-6 * beside;
+    JointVector same = y;
+    EXPECT_FALSE(orthonormalize(Q.data(), 3, 1.01e-6, same));
+    ASSERT_TRUE(orthonormalize(Q.data(), 3, 0.99e-6, y));
+    for (const JointVector& q : Q) EXPECT_NEAR(q.dot(y), 0, 1e-15);
     EXPECT_TRUE(near(y, beside, 1e-9));
   }
 }
 
 TEST(SpringFactor, FollowsItsMatrix) {
   Random random(345);
-  SpringFactor<6> factor;
+  SpringFactor factor;
   EXPECT_EQ(factor.rows(), 0);
   const Matrix6 whole = random.spd(6);
   Matrix6 other = whole;  // in the last entry alone
@@ -157,7 +151,7 @@ TEST(SpringFactor, FollowsItsMatrix) {
        {Matrix6(Matrix6::Zero()), along(5), along(0), whole, other, Matrix6(of_rank(random, 6, 2)),
         Matrix6(of_rank(random, 6, 2)), whole, Matrix6(Matrix6::Zero())}) {
     for (int again = 0; again < 2; ++again) {
-      factor.update(K);
+      factor.update(K.data(), 6);
       const MatrixXd W = factor.matrix().topRows(factor.rows());
       EXPECT_TRUE(near(W.transpose() * W, K, 1e-13 * (1 + K.norm())));
       EXPECT_EQ(factor.rows(), Eigen::FullPivLU<MatrixXd>(K).rank());
@@ -170,7 +164,7 @@ TEST(SpringFactor, FollowsItsMatrix) {
 
 TEST(FactorRows, BecomeATriangleWithTheSameProduct) {
   Random random(346);
-  FactorRows<4> rows;
+  FactorRows rows;
   EXPECT_EQ(rows.size(), 0);
   for (int k = 0; k < 100; ++k) {
     rows.clear();
@@ -190,7 +184,7 @@ TEST(FactorRows, BecomeATriangleWithTheSameProduct) {
     for (int i = 0; i < all; ++i) {
       for (int j = 0; j < 4; ++j) EXPECT_EQ(rows.at_row(i, j), W(i, j));
     }
-    rows.triangularize();
+    rows.triangularize(4);
     ASSERT_EQ(rows.size(), 4);
     MatrixXd R(4, 4);
     for (int i = 0; i < 4; ++i) {
@@ -205,13 +199,13 @@ TEST(FactorRows, BecomeATriangleWithTheSameProduct) {
 // A column that is one entry and next to nothing else turns without cancellation.
 TEST(FactorRows, KeepTheirDigitsWhereATriangleIsAlmostThere) {
   for (const double head : {0.5, -0.5, 2.0, -2.0}) {
-    FactorRows<2> rows;
+    FactorRows rows;
     const Eigen::Matrix<double, 3, 2> W{{head, 3.0}, {1e-12, 2.0}, {1e-12, -1.0}};
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 2; ++j) rows.at(i, j) = W(i, j);
     }
     rows.grow(3);
-    rows.triangularize();
+    rows.triangularize(2);
     EXPECT_DOUBLE_EQ(rows.at_row(0, 0), std::abs(head));
     EXPECT_NEAR(rows.at_row(0, 1), std::copysign(3.0, head), 1e-11);
     EXPECT_NEAR(rows.at_row(1, 1), std::sqrt(5), 1e-11);

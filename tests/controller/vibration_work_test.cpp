@@ -36,16 +36,10 @@ TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {
   for (int i = 0; i < after.count; ++i) {
     EXPECT_EQ(after.modes[at(i)].eigenvalues, before.modes[at(i)].eigenvalues);
   }
-  // The smallest motion that there is: the bounds grow to include it.
+  // The smallest motion that there is matters.
   led.state.position[3] = std::nextafter(led.state.position[3], 0.0);
   led.tick();
   EXPECT_EQ(led.modes().counters.unchanged, after.counters.unchanged);
-  EXPECT_EQ(led.modes().counters.reused, before.counters.reused + 1);
-  EXPECT_EQ(led.modes().origin, SpectrumOrigin::kReused);
-  EXPECT_GE(led.modes().modes[0].error_bound, before.modes[0].error_bound);
-  // And one that matters.
-  led.state.position[3] += 1e-4;
-  led.tick();
   EXPECT_EQ(led.modes().origin, SpectrumOrigin::kTracked);
 }
 

@@ -66,8 +66,7 @@ class Modes(c.Structure):
                 ("origin", c.c_int32), ("tracked", c.c_uint64), ("reused", c.c_uint64),
                 ("direct", c.c_uint64), ("unchanged", c.c_uint64), ("no_springs", c.c_uint64),
                 ("failed", c.c_uint64), ("missed", c.c_uint64), ("no_zero_modes", c.c_uint64),
-                ("proportional", c.c_uint64), ("no_wrench", c.c_uint64),
-                ("no_shapes", c.c_uint64), ("at_rest", c.c_uint64),
+                ("no_wrench", c.c_uint64), ("no_shapes", c.c_uint64), ("at_rest", c.c_uint64),
                 ("modes", Mode * MAX_JOINTS)]
 
 
@@ -116,8 +115,8 @@ def load(path):
     library.dashpot_plugin_interface.restype = c.POINTER(Plugin)
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
-    plugin = library.dashpot_plugin_interface(5).contents
-    assert plugin.version == 5 and plugin.struct_size == c.sizeof(Plugin)
+    plugin = library.dashpot_plugin_interface(6).contents
+    assert plugin.version == 6 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
 

@@ -261,9 +261,9 @@ TEST(ToC, ModesHaveAllThatIsInThem) {
   vibration.count = 2;
   VibrationCounters& counters = vibration.counters;
   const std::vector<std::uint64_t*> fields = {
-      &counters.tracked,      &counters.reused,    &counters.direct,    &counters.unchanged,
-      &counters.no_springs,   &counters.failed,    &counters.missed,    &counters.no_zero_modes,
-      &counters.proportional, &counters.no_wrench, &counters.no_shapes, &counters.at_rest};
+      &counters.tracked,    &counters.reused,    &counters.direct, &counters.unchanged,
+      &counters.no_springs, &counters.failed,    &counters.missed, &counters.no_zero_modes,
+      &counters.no_wrench,  &counters.no_shapes, &counters.at_rest};
   for (std::uint64_t* field : fields) *field = numbers.count();
   for (std::size_t i = 0; i < 2; ++i) {
     VibrationMode& mode = vibration.modes[i];
@@ -291,8 +291,8 @@ TEST(ToC, ModesHaveAllThatIsInThem) {
   EXPECT_EQ(out.zero_modes, 1u);
   ASSERT_EQ(out.count, 2u);
   const std::vector<std::uint64_t> counted = {
-      out.tracked, out.reused,        out.direct,       out.unchanged, out.no_springs, out.failed,
-      out.missed,  out.no_zero_modes, out.proportional, out.no_wrench, out.no_shapes,  out.at_rest};
+      out.tracked, out.reused,        out.direct,    out.unchanged, out.no_springs, out.failed,
+      out.missed,  out.no_zero_modes, out.no_wrench, out.no_shapes, out.at_rest};
   for (std::size_t i = 0; i < fields.size(); ++i) EXPECT_EQ(counted[i], *fields[i]) << i;
   for (std::size_t i = 0; i < 2; ++i) {
     const VibrationMode& from = vibration.modes[i];

@@ -46,36 +46,35 @@ struct GainScales {
   double damping = 1, null_space = 1;
 };
 
-/// The closed loop of an arm of N joints in the form in which the controller follows it.
-template <int N>
+/// The closed loop of an arm in the form in which the controller follows it.
 class ArmLoop {
  public:
   ArmLoop(const controller::RobotModel& model, const GainScales& scales)
       : kernel_(model),
-        friction_(controller::fixed<N>(model.joint_values(&controller::Joint::viscous_friction))) {
+        friction_(model.joint_values(&controller::Joint::viscous_friction)),
+        impedance_(model.dof()) {
     controller::Setpoint setpoint = controller::default_settings(model).initial;
     setpoint.mode = controller::Mode::kCartesian;
     setpoint.gains.task_damping *= scales.damping;
     setpoint.gains.null_stiffness *= scales.null_space;
     setpoint.gains.null_damping *= scales.damping * scales.null_space;
-    impedance_ = controller::Impedance<N>::of(setpoint);
+    impedance_ = controller::Impedance(setpoint, model.dof());
   }
 
   const analysis::System<analysis::kMaxDof>& at(const controller::JointVector& q) {
-    const controller::Joints<N> rest = controller::Joints<N>::Zero();
-    kernel_.evaluate(controller::fixed<N>(q), rest, robot_);
+    kernel_.evaluate(q, controller::JointVector::Zero(q.size()), robot_);
     null_space_.compute(robot_.M, robot_.J, impedance_.base, impedance_.tool, robot_.R_BT);
     loop_.form(robot_, impedance_, null_space_, friction_, system_);
     return system_;
   }
 
  private:
-  controller::DynamicsKernel<N> kernel_;
-  controller::Joints<N> friction_;
-  controller::Impedance<N> impedance_;
-  controller::NullSpace<N> null_space_;
-  controller::LoopSystem<N> loop_;
-  controller::Dynamics<N> robot_;
+  controller::DynamicsKernel kernel_;
+  controller::JointVector friction_;
+  controller::Impedance impedance_;
+  controller::NullSpace null_space_;
+  controller::LoopSystem loop_;
+  controller::DynamicsResult robot_;
   analysis::System<analysis::kMaxDof> system_;
 };
 
@@ -94,7 +93,6 @@ struct ModeWatch {
 };
 
 /// Follows the modes of one arm and compares each tick with the one before.
-template <int N>
 class WatchedArm {
  public:
   using System = analysis::System<analysis::kMaxDof>;
@@ -106,7 +104,7 @@ class WatchedArm {
   void step(double t) {
     before_ = now_;
     before_system_ = system_;
-    const ArmLoop<N> loop_before = loop_;
+    const ArmLoop loop_before = loop_;
     *tracker_before_ = tracker_;
     advance(t);
     if (ticks_++ > 0) compare(loop_before, t);
@@ -131,16 +129,16 @@ class WatchedArm {
     tracker_.update(system_, now_);
   }
 
-  void compare(const ArmLoop<N>& loop_before, double t);
+  void compare(const ArmLoop& loop_before, double t);
   /// Another place that holds what this mode was, as far as its eigenvalues tell.
   bool given_away(int i, bool& separated) const;
   /// Damping ratio within the bounds of both spectra and the change that their derivative foresees.
   bool foreseen(int i, const analysis::TrackedSpectrum& from, const System& from_system,
                 const analysis::TrackedSpectrum& to, const System& to_system) const;
-  bool explained_by_finer_steps(int i, const ArmLoop<N>& loop_before, double t);
+  bool explained_by_finer_steps(int i, const ArmLoop& loop_before, double t);
 
   std::string name_;
-  ArmLoop<N> loop_;
+  ArmLoop loop_;
   analysis::ModeTracker tracker_;
   std::unique_ptr<analysis::ModeTracker> tracker_before_ =
       std::make_unique<analysis::ModeTracker>(options());
@@ -151,8 +149,7 @@ class WatchedArm {
   long ticks_ = 0;
 };
 
-template <int N>
-void WatchedArm<N>::compare(const ArmLoop<N>& loop_before, double t) {
+inline void WatchedArm::compare(const ArmLoop& loop_before, double t) {
   using analysis::ModeKind;
   if (now_.mode_count != before_.mode_count || now_.epoch != before_.epoch) return;
   for (int i = 0; i < now_.mode_count; ++i) {
@@ -184,8 +181,7 @@ void WatchedArm<N>::compare(const ArmLoop<N>& loop_before, double t) {
   }
 }
 
-template <int N>
-bool WatchedArm<N>::given_away(int i, bool& separated) const {
+inline bool WatchedArm::given_away(int i, bool& separated) const {
   const analysis::Complex was = before_.modes[at(i)].eigenvalues[0];
   double nearest = 1e300, second = 1e300;
   int place = -1;
@@ -204,10 +200,9 @@ bool WatchedArm<N>::given_away(int i, bool& separated) const {
   return separated && place != i;
 }
 
-template <int N>
-bool WatchedArm<N>::foreseen(int i, const analysis::TrackedSpectrum& from,
-                             const System& from_system, const analysis::TrackedSpectrum& to,
-                             const System& to_system) const {
+inline bool WatchedArm::foreseen(int i, const analysis::TrackedSpectrum& from,
+                                 const System& from_system, const analysis::TrackedSpectrum& to,
+                                 const System& to_system) const {
   using Matrix = Eigen::MatrixXd;
   const Matrix M = to_system.mass - from_system.mass, C = to_system.damping - from_system.damping;
   const Matrix W = to_system.stiffness_factor, V = from_system.stiffness_factor;
@@ -229,10 +224,9 @@ bool WatchedArm<N>::foreseen(int i, const analysis::TrackedSpectrum& from,
   return std::abs(is.damping_ratio - predicted) <= bounds + 0.2 * rate + 1e-6;
 }
 
-template <int N>
-bool WatchedArm<N>::explained_by_finer_steps(int i, const ArmLoop<N>& loop_before, double t) {
+inline bool WatchedArm::explained_by_finer_steps(int i, const ArmLoop& loop_before, double t) {
   for (const int parts : {16, 256, 4096}) {
-    ArmLoop<N> loop = loop_before;
+    ArmLoop loop = loop_before;
     const auto tracker = std::make_unique<analysis::ModeTracker>(*tracker_before_);
     const auto from = std::make_unique<analysis::TrackedSpectrum>(before_);
     const auto to = std::make_unique<analysis::TrackedSpectrum>(before_);

@@ -1,5 +1,5 @@
 // The C interface with arguments that it refuses, or takes for a fault of the robot.
-#include <dashpot/tests/plugin/held_panda.hpp>
+#include <dashpot/tests/plugin/panda_host.hpp>
 
 #include <gmock/gmock.h>
 
@@ -134,7 +134,7 @@ TEST(PluginRefuses, ToReadBeforeTheFirstTick) {
 
 /// A wrong state is no refusal: torque ramps down to zero, and the controller recovers.
 TEST(Plugin, IsSafeWithoutAState) {
-  Host host = held_panda("watchdog: {feedback: 0}\n");  // the arm stays where it is
+  Host host = panda_host("watchdog: {feedback: 0}\n");  // the arm stays where it is
   for (int tick = 0; tick < 200; ++tick) ASSERT_EQ(host.tick(), DASHPOT_OK);
   ASSERT_GT(joint_vector(host.torque).norm(), 1);
   dashpot_state wrong_size = host.state();
@@ -163,7 +163,7 @@ TEST(Plugin, IsSafeWithoutAState) {
 }
 
 TEST(Plugin, ReportsAnExternalWrenchThatIsNotFinite) {
-  Host host = held_panda();
+  Host host = panda_host();
   ASSERT_EQ(host.tick(), DASHPOT_OK);
   const std::array<double, 6> wrench = {0, 0, std::numeric_limits<double>::quiet_NaN(), 0, 0, 0};
   host.time += 1'000'000;
@@ -177,7 +177,7 @@ TEST(Plugin, ReportsAnExternalWrenchThatIsNotFinite) {
 }
 
 TEST(Plugin, SurvivesAnyTime) {
-  Host host = held_panda();
+  Host host = panda_host();
   for (const std::int64_t time : {std::int64_t{0}, std::numeric_limits<std::int64_t>::max(),
                                   std::numeric_limits<std::int64_t>::min(), std::int64_t{5}}) {
     const dashpot_setpoint setpoint = host.joint_setpoint(panda_posture(), time);
@@ -193,7 +193,7 @@ TEST(Plugin, SurvivesAnyTime) {
 }
 
 TEST(Plugin, RejectsAWrongSetpointOfATick) {
-  Host host = held_panda();
+  Host host = panda_host();
   ASSERT_EQ(host.tick(), DASHPOT_OK);
   dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
   setpoint.struct_size = 0;

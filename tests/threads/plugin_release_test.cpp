@@ -1,5 +1,5 @@
 // What is left of set-points and gains when a fault is released.
-#include <dashpot/tests/plugin/held_panda.hpp>
+#include <dashpot/tests/plugin/panda_host.hpp>
 
 #include <cmath>
 
@@ -10,7 +10,7 @@ namespace {
 class PluginRelease : public ::testing::Test {
  protected:
   explicit PluginRelease(const std::string& watchdog = "")
-      : host(held_panda("watchdog: {feedback: 0" + watchdog + "}\nlimits: {gain_margin: 1}\n")),
+      : host(panda_host("watchdog: {feedback: 0" + watchdog + "}\nlimits: {gain_margin: 1}\n")),
         elsewhere(panda_posture()) {
     elsewhere[0] += 0.3;
   }

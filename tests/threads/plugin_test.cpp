@@ -1,6 +1,6 @@
 // The C interface, driven as a host does that loads the library at run time.
 #include <dashpot/controller/controller.hpp>
-#include <dashpot/tests/plugin/held_panda.hpp>
+#include <dashpot/tests/plugin/panda_host.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
 
@@ -158,7 +158,7 @@ class PluginHolds : public ::testing::TestWithParam<const char*> {};
 /// Without any set-point the arm stays where it was found, far beyond the watchdog's times.
 TEST_P(PluginHolds, StillWithoutASetpoint) {
   const Config config = load(panda() + GetParam());
-  Host host = held_panda(GetParam());
+  Host host = panda_host(GetParam());
   for (int tick = 0; tick < 3000; ++tick) {
     ASSERT_EQ(host.tick(), DASHPOT_OK) << "tick " << tick;
     simulate(config.model, host);
@@ -188,7 +188,7 @@ TEST(Plugin, HidesNoStatusWithoutASetpoint) {
 
 TEST(Plugin, GoesToASetpointFromTheOtherThreadsSide) {
   const Config config = load(panda());
-  Host host = held_panda();
+  Host host = panda_host();
   std::vector<double> goal = panda_posture();
   goal[0] += 0.3;
   goal[3] -= 0.2;
@@ -206,7 +206,7 @@ TEST(Plugin, GoesToASetpointFromTheOtherThreadsSide) {
 
 TEST(Plugin, GoesToAPose) {
   const Config config = load(panda() + kCartesian);
-  Host host = held_panda(kCartesian);
+  Host host = panda_host(kCartesian);
   ASSERT_EQ(host.tick(), DASHPOT_OK);
   const dashpot_snapshot start = host.snapshot();
   const std::array<double, 3> goal = {start.tip_position[0] + 0.05, start.tip_position[1],
@@ -225,7 +225,7 @@ TEST(Plugin, GoesToAPose) {
 }
 
 TEST(Plugin, WatchesTheAgeOfSetpoints) {
-  Host host = held_panda();
+  Host host = panda_host();
   const dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
   ASSERT_EQ(host.tick(&setpoint), DASHPOT_OK);
   int stale = 0;
@@ -341,7 +341,7 @@ TEST(Plugin, RefusesGainsThatTheSampledLoopDoesNotBear) {
 /// Of the ticks before a reset nothing is left to read.
 TEST(Plugin, HasNoModesAfterAReset) {
   for (const char* where : {"inline", "background"}) {
-    Host host = held_panda("analysis: {where: " + std::string(where) + "}\n");
+    Host host = panda_host("analysis: {where: " + std::string(where) + "}\n");
     dashpot_controller* const arm = host.controller.get();
     dashpot_modes modes{};
     modes.struct_size = sizeof modes;

@@ -1,5 +1,5 @@
 // The C interface in real time: no allocation, two threads, several arms.
-#include <dashpot/tests/plugin/held_panda.hpp>
+#include <dashpot/tests/plugin/panda_host.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>
 
 #include <gmock/gmock.h>

@@ -62,7 +62,7 @@ double worst_ratio(Led& led, int modes) {
 }
 
 // The friction is among what the published modes count, so that they are the judge.
-TEST(HeldBesideFriction, TakesOffWhatFrictionDampsAlready) {
+TEST(RatioDampingBesideFriction, TakesOffWhatFrictionDampsAlready) {
   for (const testing::Arm& arm : testing::arms()) {
     for (const Frame frame : {Frame::kBase, Frame::kTool}) {
       const RobotModel model = rubbing(arm, 0.3);
@@ -77,7 +77,7 @@ TEST(HeldBesideFriction, TakesOffWhatFrictionDampsAlready) {
   }
 }
 
-TEST(HeldBesideFriction, IsSemidefiniteWhereFrictionIsTooMuch) {
+TEST(RatioDampingBesideFriction, IsSemidefiniteWhereFrictionIsTooMuch) {
   const RobotModel model = rubbing(testing::arms()[0], 30);
   Led led(model, rubbing_settings(model, Mode::kCartesian));
   for (int k = 1; k <= 50; ++k) {

@@ -107,47 +107,47 @@ TEST(DesignedDamping, NeverAllocates) {
 }
 
 TEST(DesignedDamping, KeepsTheLastDesignWhereThereIsNone) {
-  TaskDamper damper;
-  damper.set(Matrix6(100 * Matrix6::Identity()), 0.7, {});
-  analysis::Square<kMaxJoints> M = Eigen::MatrixXd::Identity(7, 7), broken = M;
-  analysis::TaskJacobian<kMaxJoints> J = Eigen::MatrixXd::Identity(6, 7);
+  RatioDamper damper(6);
+  damper.set(100 * Matrix6::Identity(), 0.7, {});
+  JointMatrix M = Eigen::MatrixXd::Identity(7, 7), broken = M;
+  Jacobian J = Eigen::MatrixXd::Identity(6, 7);
   broken(3, 3) = -1;
-  damper.update(broken, J);
+  damper.update(broken, &J);
   EXPECT_EQ(damper.damping(), Matrix6::Zero());
-  damper.update(M, J);
+  damper.update(M, &J);
   const Matrix6 good = damper.damping();
   EXPECT_TRUE(
       testing::near(Eigen::MatrixXd(good), Eigen::MatrixXd(14 * Matrix6::Identity()), 1e-9));
   for (const double wrong : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
     broken = M;
     broken(3, 3) = wrong;
-    damper.update(broken, J);
+    damper.update(broken, &J);
     EXPECT_EQ(damper.damping(), good);
   }
   // A stiffness that rounding has made indefinite, as far as check_gains lets it pass, is taken.
   Matrix6 flat = Vector6(100, 100, 100, 100, 100, -5e-9).asDiagonal();
   damper.set(flat, 0.35, {});
-  damper.update(M, J);
+  damper.update(M, &J);
   EXPECT_NEAR(damper.damping()(0, 0), 7, 1e-6);
   EXPECT_NEAR(damper.damping()(5, 5), 0, 1e-3);
 }
 
 TEST(DesignedDamping, IsBoundedHoweverSingularTheJacobian) {
-  TaskDamper damper;
+  RatioDamper damper(6);
   const double K = 2000, ratio = 0.7;
-  damper.set(Matrix6(K * Matrix6::Identity()), ratio, {});
+  damper.set(K * Matrix6::Identity(), ratio, {});
   double largest = 0;
   for (int k = 0; k < 200; ++k) {
-    analysis::Square<kMaxJoints> M = Eigen::MatrixXd::Identity(7, 7);
-    analysis::TaskJacobian<kMaxJoints> J = Eigen::MatrixXd::Identity(6, 7);
+    JointMatrix M = Eigen::MatrixXd::Identity(7, 7);
+    Jacobian J = Eigen::MatrixXd::Identity(6, 7);
     J.row(2) *= std::pow(10, -0.1 * k);  // its frequency falls from 45 to 4e-19 rad/s
-    damper.update(M, J);
+    damper.update(M, &J);
     const Matrix6& C_C = damper.damping();
     EXPECT_GE(Eigen::SelfAdjointEigenSolver<Matrix6>(C_C).eigenvalues()[0], -1e-9);
     largest = std::max(largest, C_C(2, 2));
   }
-  EXPECT_LT(largest, 2.3 * ratio * K / TaskDamper::kSoftFrequency);
-  EXPECT_GT(largest, 1.9 * ratio * K / TaskDamper::kSoftFrequency);
+  EXPECT_LT(largest, 2.3 * ratio * K / kSoftFrequency);
+  EXPECT_GT(largest, 1.9 * ratio * K / kSoftFrequency);
 }
 
 // Rounding may leave a mass matrix singular, and springs a little indefinite: both have a design.
@@ -156,11 +156,9 @@ TEST(DesignedDamping, IsDesignedForWhatRoundingMadeSingular) {
   JointMatrix K_q{{100.0, 100.0}, {100.0, 100.0}};
   for (const double indefinite : {0.0, -5e-9}) {
     K_q(1, 1) = 100 + indefinite;
-    JointDamper joints;
-    joints.reset(2);
+    RatioDamper joints(2);
     joints.set(K_q, 0.7, JointVector());
-    JointMatrix M = singular;
-    joints.update(M);
+    joints.update(singular, nullptr);
     const Eigen::MatrixXd C_q = joints.damping();
     ASSERT_TRUE(C_q.allFinite());
     // Along (1, 1), with mass 2 and stiffness 200 in the one direction that there is
@@ -169,17 +167,16 @@ TEST(DesignedDamping, IsDesignedForWhatRoundingMadeSingular) {
 
     Matrix6 K_C = Matrix6::Zero();
     K_C.topLeftCorner<2, 2>() = K_q;
-    analysis::TaskJacobian<kMaxJoints> J = analysis::TaskJacobian<kMaxJoints>::Zero(6, 2);
+    Jacobian J = Jacobian::Zero(6, 2);
     J.topRows<2>().setIdentity();
-    TaskDamper tip;
+    RatioDamper tip(6);
     tip.set(K_C, 0.7, JointVector());
-    analysis::Square<kMaxJoints> mass = singular;
-    tip.update(mass, J);
+    tip.update(singular, &J);
     ASSERT_TRUE(tip.damping().allFinite());
     EXPECT_NEAR(tip.damping().trace(), 2 * 0.7 * std::sqrt(200.0 / 2) * 2, 0.01);
     tip.reset();
     EXPECT_TRUE(tip.damping().isZero(0));
-    joints.reset(2);
+    joints.reset();
     EXPECT_TRUE(joints.damping().isZero(0));
   }
 }

@@ -1,45 +1,46 @@
-#pragma once
-// FixedCore: from the set-point to the law's torque.
+// ControllerCore: from the set-point to the law's torque.
+#include <dashpot/controller/core/controller_core.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
 
-#include <dashpot/controller/core/fixed_core.hpp>
+#include <algorithm>
+#include <cmath>
 
 namespace dashpot::controller {
 
-template <int N>
-bool FixedCore<N>::accept_setpoint(const Setpoint& setpoint) noexcept {
-  if (looked_at_any_ && setpoint.time == looked_at_) return in_order_;
-  looked_at_any_ = true;
-  looked_at_ = setpoint.time;
-  const bool same = setpoint.mode == accepted_.mode && same_gains(setpoint.gains, accepted_.gains);
+bool ControllerCore::accept_setpoint(const Setpoint& setpoint) noexcept {
+  if (look_ && look_->time == setpoint.time) return look_->in_order;
+  const bool same =
+      setpoint.mode == accepted_.mode && same_gains(setpoint.gains, accepted_.gains, setpoint.mode);
   const double hold = settings_.watchdog.setpoint_hold;
   const double patience = hold > 0 ? hold : settings_.watchdog.setpoint_damp;
   const bool to_come = patience > 0 && seconds_between(time_, setpoint.time) > patience;
-  in_order_ = !to_come && !check_setpoint(setpoint, settings_.limits, same);
-  if (!in_order_) return false;
-  setpoint_age_ = nanoseconds(seconds_between(setpoint.time, time_));
+  look_ = {setpoint.time, !to_come && !check_setpoint(setpoint, settings_.limits, same)};
+  if (!look_->in_order) return false;
+  setpoint_age_ = std::round(1e9 * seconds_between(setpoint.time, time_));
   accepted_.joint_position = setpoint.joint_position;
   accepted_.tip_pose = setpoint.tip_pose;
   accepted_.wrench = setpoint.wrench;
   from_user_ = true;
+  const bool in_force = springs_ == Springs::kInForce;
   if (!same) {
     accepted_.mode = setpoint.mode;
     accepted_.gains = setpoint.gains;
-    gains_.set_target(Impedance<N>::of(accepted_));
-    if (!restart_) start_new_springs();
+    gains_.set_target(Impedance(accepted_, n_));
+    if (in_force) start_new_springs();
   }
-  if (!restart_) update_goal();
+  if (in_force) update_goal();
   return true;
 }
 
-template <int N>
-void FixedCore<N>::start_new_springs() noexcept {
-  const Impedance<N>&now = gains_.now(), &then = gains_.target();
-  for (int i = 0; i < N; ++i) {
+void ControllerCore::start_new_springs() noexcept {
+  const Impedance &now = gains_.now(), &then = gains_.target();
+  for (int i = 0; i < n_; ++i) {
     if (now.joint_stiffness(i, i) == 0 && then.joint_stiffness(i, i) > 0) {
       references_.joint.relocate(i, q_[i]);
     }
-    if (now.null_stiffness[i] == 0 && then.null_stiffness[i] > 0)
+    if (now.null_stiffness[i] == 0 && then.null_stiffness[i] > 0) {
       references_.posture.relocate(i, q_[i]);
+    }
   }
   const Eigen::Quaterniond tip(robot_.R_BT);
   Vector6 e;
@@ -51,8 +52,7 @@ void FixedCore<N>::start_new_springs() noexcept {
   references_.tip.relocate(robot_.p_BT_B + left.head<3>(), quaternion(left.tail<3>()) * tip);
 }
 
-template <int N>
-void FixedCore<N>::update_goal() noexcept {
+void ControllerCore::update_goal() noexcept {
   const bool joint = accepted_.mode == Mode::kJoint;
   if (joint && gains_.now().joint_weight == 0) references_.joint.start(q_);
   if (!joint && gains_.now().task_weight == 0) {
@@ -60,21 +60,21 @@ void FixedCore<N>::update_goal() noexcept {
     references_.tip.start(robot_.p_BT_B, Eigen::Quaterniond(robot_.R_BT).normalized());
     law_.reset();
   }
-  const Vector& from = joint ? references_.joint.position() : references_.posture.position();
-  goal_ = from;
-  if (accepted_.joint_position.size() == N) {
-    goal_ = fixed<N>(accepted_.joint_position);
-    for (int i = 0; i < N; ++i) {  // a continuous joint goes the short way
+  const JointVector& from = joint ? references_.joint.position() : references_.posture.position();
+  if (accepted_.joint_position.size() != n_) {
+    goal_ = from;
+  } else {
+    goal_ = accepted_.joint_position;
+    for (int i = 0; i < n_; ++i) {  // a continuous joint goes the short way
       if (turn_[i] > 0) goal_[i] += turn_[i] * std::nearbyint((from[i] - goal_[i]) / turn_[i]);
     }
   }
   goal_rotation_ = Eigen::Quaterniond(accepted_.tip_pose.rotation).normalized();
 }
 
-template <int N>
-void FixedCore<N>::restart_springs() noexcept {
-  const Impedance<N> target = Impedance<N>::of(accepted_);
-  Impedance<N> none;
+void ControllerCore::restart_springs() noexcept {
+  const Impedance target(accepted_, n_);
+  Impedance none(n_);
   none.base.selected = target.base.selected;
   none.tool.selected = target.tool.selected;
   none.damping_ratio = target.damping_ratio;  // of springs that grow from zero
@@ -83,62 +83,44 @@ void FixedCore<N>::restart_springs() noexcept {
   gains_.set_target(target);
   wrench_.start(Vector6::Zero());
   if (!from_user_) {
-    copy<N>(q_, accepted_.joint_position);
+    accepted_.joint_position = q_;
     accepted_.tip_pose = {robot_.p_BT_B, robot_.R_BT};
   }
   update_goal();
   filter_.begin_anew();
-  restart_ = false;
   ++snapshot_.restarts;
   if (snapshot_.restarts > 1) ++restarts_;
 }
 
-template <int N>
-bool FixedCore<N>::references_still() const noexcept {
-  const auto at_rest = [](const auto& velocity) {
-    bool rest = true;
-    for (Eigen::Index i = 0; i < velocity.size(); ++i) rest &= velocity[i] == 0;
-    return rest;
-  };
-  return at_rest(references_.joint.velocity()) && at_rest(references_.posture.velocity()) &&
-         at_rest(references_.tip.velocity());
+bool ControllerCore::references_still() const noexcept {
+  return references_.joint.velocity().isZero(0) && references_.posture.velocity().isZero(0) &&
+         references_.tip.velocity().isZero(0);
 }
 
-template <int N>
-Status FixedCore<N>::setpoint_age_status() const noexcept {
-  const double age = 1e-9 * setpoint_age_;
-  const Watchdog& limit = settings_.watchdog;
-  if (limit.setpoint_damp > 0 && age > limit.setpoint_damp) return Status::kSetpointLost;
-  if (limit.setpoint_hold > 0 && age > limit.setpoint_hold) return Status::kSetpointStale;
-  return Status::kOk;
-}
-
-/// Returns the share of its speed limits at which the tip's reference takes no joint beyond
-/// kReferenceShare of the joint's velocity limit where the robot is.
-template <int N>
-double FixedCore<N>::tip_reference_speed() const noexcept {
-  constexpr double kReferenceShare = 0.4;  // what is left is for vibrations and the null space
+double ControllerCore::tip_reference_speed() const noexcept {
+  // Of a joint's velocity limit where the robot is; what is left is for vibrations and the null
+  // space.
+  constexpr double kReferenceShare = 0.4;
   const double speed = references_.tip.speed();
   if (speed == 0) return 1;
-  const Vector qd = law_.null_space().joint_velocity(references_.tip.point_velocity());
+  const JointVector qd = law_.null_space().joint_velocity(references_.tip.point_velocity());
   double share = 0;
-  for (int i = 0; i < N; ++i) {
+  for (int i = 0; i < n_; ++i) {
     share = std::max(share, std::abs(qd[i]) / settings_.limits.velocity[i]);
   }
   return share > kReferenceShare * speed ? kReferenceShare * speed / share : 1;
 }
 
-template <int N>
-Joints<N> FixedCore<N>::impedance_torque(bool hold) noexcept {
-  if (restart_) restart_springs();
-  damping_only_ = false;
+void ControllerCore::impedance_torque(bool hold, JointVector& tau) noexcept {
+  if (springs_ != Springs::kInForce) restart_springs();
+  springs_ = Springs::kInForce;
   gains_.step();
   const Vector6 wrench = hold ? Vector6(Vector6::Zero()) : accepted_.wrench;
   if (wrench != wrench_.target()) wrench_.set_target(wrench);
   wrench_.step();
 
   // Of two modes in force, the one that fades away stays where it is.
-  const Impedance<N>& impedance = designed_.update(gains_, robot_);
+  const Impedance& impedance = designed_.update(gains_, robot_);
   const bool joint = accepted_.mode == Mode::kJoint;
   if (impedance.joint_weight > 0) {
     if (joint && !hold) {
@@ -160,7 +142,7 @@ Joints<N> FixedCore<N>::impedance_torque(bool hold) noexcept {
       references_.posture.halt();
     }
   }
-  return law_.torque(robot_, q_, qd_, impedance, references_, wrench_.now(), clamp_);
+  law_.torque(robot_, q_, qd_, impedance, references_, wrench_.now(), clamp_, tau);
 }
 
 }  // namespace dashpot::controller

@@ -1,0 +1,138 @@
+#include <dashpot/controller/base/joint_algebra.hpp>
+#include <dashpot/controller/safety/motion_watch.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::controller {
+
+MotionWatch::MotionWatch(const RobotModel& model, const Settings& settings) noexcept
+    : n_(model.dof()),
+      gravity_(settings.feed_forward.gravity),
+      external_force_(settings.limits.external_force),
+      tip_limit_(settings.limits.tip_velocity),
+      frozen_after_(0.4 * settings.watchdog.feedback),
+      wall_count_(std::min(settings.limits.walls.size(), kMaxWalls)) {
+  const Limits& limits = settings.limits;
+  const JointVector coulomb = model.joint_values(&Joint::coulomb_friction);
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    joint(i) = {limits.position_lower[i],
+                limits.position_upper[i],
+                limits.velocity[i],
+                limits.torque[i],
+                coulomb[i],
+                limits.external_torque[i]};
+    estimates_ |= std::isfinite(limits.external_torque[i]);
+  }
+  std::copy_n(limits.walls.begin(), wall_count_, walls_.begin());
+}
+
+void MotionWatch::reset() noexcept {
+  first_ = true;
+  frozen_ = false;
+  torques_ = 0;
+  tip_speed_ = same_ = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const Record& r = joint(i);
+    joint(i) = {r.lower, r.upper, r.velocity_limit, r.torque_limit, r.coulomb, r.external_limit};
+  }
+}
+
+Status MotionWatch::check(const Tick& tick) noexcept {
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();
+  bool fast = false, outside = false, unstable = false;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    Record& joint = this->joint(i);
+    v += tick.qd[i] * tick.robot.J.col(i).head<3>();
+    fast |= std::abs(tick.qd[i]) > joint.velocity_limit;
+    outside |= tick.q[i] < joint.lower || tick.q[i] > joint.upper;
+    unstable |= joint.grows(tick.qd[i], tick.still);
+    unstable |= joint.reversals > 0.47;
+  }
+  const double largest = v.cwiseAbs().maxCoeff();  // whose square may overflow
+  tip_speed_ = largest > 0 ? largest * (v / largest).norm() : 0;
+  Status status = Status::kOk;
+  if (collides(tick)) status = Status::kCollision;
+  if (unstable) status = Status::kInstability;
+  if (tip_speed_ > tip_limit_) status = Status::kTipSpeedLimit;
+  if (fast) status = Status::kVelocityLimit;
+  for (std::size_t k = 0; k < wall_count_; ++k) {
+    if (walls_[k].distance(tick.robot.p_BT_B) < 0) status = Status::kWall;
+  }
+  if (outside) status = Status::kPositionLimit;
+  if (frozen(tick)) status = Status::kStateFrozen;
+  first_ = false;
+  torques_ = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    joint(i).q = tick.q[i];
+    joint(i).qd = tick.qd[i];
+  }
+  return status;
+}
+
+void MotionWatch::applied(const JointVector& torque, const JointVector& weight) noexcept {
+  ++torques_;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    Record& joint = this->joint(i);
+    const double excess = torque[i] - weight[i];
+    const bool reversed =
+        excess * joint.excess < 0 &&
+        std::min(std::abs(excess), std::abs(joint.excess)) > 0.05 * joint.torque_limit;
+    joint.reversals += ((reversed ? 1 : 0) - joint.reversals) / 64;
+    joint.excess = excess;
+    joint.torque = torques_ == 1 ? torque[i] : joint.torque + (torque[i] - joint.torque) / torques_;
+  }
+}
+
+bool MotionWatch::collides(const Tick& tick) noexcept {
+  if (tick.external_wrench.head<3>().norm() > external_force_) return true;
+  if (!estimates_ || first_) return false;
+  constexpr double kTimeConstant = 0.01;                  // s
+  JointVector change(n_), force = JointVector::Zero(n_);  // M qdd
+  for (Eigen::Index i = 0; i < n_; ++i) change[i] = tick.qd[i] - joint(i).qd;
+  add_product(tick.robot.M, change, force, 1 / tick.dt);
+  bool found = false;
+  const double share = std::min(1.0, tick.dt / kTimeConstant);
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    Record& joint = this->joint(i);
+    const double weight = gravity_ ? tick.robot.gravity[i] : 0;  // or the robot holds it itself
+    const double now = force[i] + tick.robot.coriolis[i] + weight - joint.torque;
+    joint.external += share * (now - joint.external);
+    found |= std::abs(joint.external) > joint.external_limit;
+  }
+  return found;
+}
+
+bool MotionWatch::Record::grows(double now, bool still) noexcept {
+  constexpr int kHalfSwings = 10;
+  constexpr double kGrowth = 1.02, kLarge = 0.1;  // of the velocity limit
+  if (now * qd < 0) {
+    const bool larger = peak > kGrowth * last_peak && peak > 1e-6;
+    grown = larger && still ? grown + 1 : 0;
+    last_peak = peak;
+    peak = 0;
+  }
+  peak = std::max(peak, std::abs(now));
+  return grown >= kHalfSwings && peak > kLarge * velocity_limit;
+}
+
+bool MotionWatch::frozen(const Tick& tick) noexcept {
+  bool same = !first_ && frozen_after_ > 0;
+  for (Eigen::Index i = 0; i < n_ && same; ++i) {
+    same = tick.q[i] == joint(i).q && tick.qd[i] == joint(i).qd;
+  }
+  if (!same) {
+    same_ = 0;
+    frozen_ = false;
+    for (Eigen::Index i = 0; i < n_; ++i) joint(i).before = joint(i).excess;
+    return false;
+  }
+  same_ += tick.dt;
+  for (Eigen::Index i = 0; i < n_ && same_ >= frozen_after_; ++i) {
+    const double change = std::abs(joint(i).excess - joint(i).before);
+    frozen_ |= change > 0.05 * joint(i).torque_limit + joint(i).coulomb;
+  }
+  return frozen_;  // until the state changes, also where the torque is as before again
+}
+
+}  // namespace dashpot::controller
