@@ -12,7 +12,6 @@
 #include <array>
 #include <memory>
 #include <string>
-#include <utility>
 #include <vector>
 
 #ifdef DASHPOT_HAVE_PINOCCHIO
@@ -26,7 +25,6 @@
 
 namespace {
 
-using dashpot::controller::Dynamics;
 using dashpot::controller::DynamicsKernel;
 using dashpot::controller::DynamicsResult;
 using dashpot::controller::JointVector;
@@ -68,25 +66,21 @@ double difference(const A& a, const B& b) {
   return (a - b).cwiseAbs().maxCoeff() / b.cwiseAbs().maxCoeff();
 }
 
-template <int N>
-double largest_difference(const Dynamics<N>& a, const DynamicsResult& b) {
+double largest_difference(const DynamicsResult& a, const DynamicsResult& b) {
   return std::max({difference(a.M, b.M), difference(a.coriolis, b.coriolis),
                    difference(a.gravity, b.gravity), difference(a.J, b.J),
                    difference(a.Jdot_qd, b.Jdot_qd), difference(a.p_BT_B, b.p_BT_B),
                    difference(a.R_BT, b.R_BT)});
 }
 
-template <int N>
-void dashpot_kernel(benchmark::State& state) {
-  const RobotModel model = model_of(N);
-  const DynamicsKernel<N> kernel(model);
-  using Vector = Eigen::Matrix<double, N, 1>;
-  std::vector<std::pair<Vector, Vector>> inputs;
-  for (const State& one : states(N)) inputs.emplace_back(one.q, one.qd);
-  Dynamics<N> result;
+void dashpot_kernel(benchmark::State& state, int n) {
+  const RobotModel model = model_of(n);
+  const DynamicsKernel kernel(model);
+  const std::vector<State> inputs = states(n);
+  DynamicsResult result;
   std::size_t i = 0;
   for (auto _ : state) {
-    kernel.evaluate(inputs[i].first, inputs[i].second, result);
+    kernel.evaluate(inputs[i].q, inputs[i].qd, result);
     benchmark::DoNotOptimize(&result);
     benchmark::ClobberMemory();
     i = (i + 1) % kStates;
@@ -141,24 +135,19 @@ void pinocchio_terms(benchmark::State& state) {
 }
 #endif
 
-template <int N>
-void add() {
-  const std::string n = std::to_string(N);
-  benchmark::RegisterBenchmark(("dynamics/dashpot/" + n).c_str(), dashpot_kernel<N>)
+void add(int n) {
+  const std::string joints = std::to_string(n);
+  benchmark::RegisterBenchmark(("dynamics/dashpot/" + joints).c_str(), dashpot_kernel, n)
       ->Unit(benchmark::kMicrosecond);
-  benchmark::RegisterBenchmark(("dynamics/kdl/" + n).c_str(), [](benchmark::State& state) {
-    kdl(state, N);
-  })->Unit(benchmark::kMicrosecond);
+  benchmark::RegisterBenchmark(("dynamics/kdl/" + joints).c_str(), kdl, n)
+      ->Unit(benchmark::kMicrosecond);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
-  [&]<int... I>(std::integer_sequence<int, I...>) {
-    (add<I + 2>(), ...);
-  }
-  (std::make_integer_sequence<int, 15>{});
+  for (int n = 2; n <= 16; ++n) add(n);
 #ifdef DASHPOT_HAVE_PINOCCHIO
   benchmark::RegisterBenchmark("dynamics/pinocchio/7", pinocchio_terms)
       ->Unit(benchmark::kMicrosecond);

@@ -66,7 +66,9 @@ def is_too_short(row):
 
 class Results:
     def __init__(self, merged):
-        rows = [r for r in merged["benchmarks"] if not r.get("error_occurred")]
+        self.footprints = [r for r in merged["benchmarks"] if r["name"].startswith("footprint/")]
+        rows = [r for r in merged["benchmarks"]
+                if not r.get("error_occurred") and r not in self.footprints]
         self.too_short = [r["name"] for r in rows if is_too_short(r)]
         self.rows = {r["name"]: r for r in rows if not is_too_short(r)}
 
@@ -124,18 +126,6 @@ def headline(results):
         comparison(results, "spectrum of 6 modes, tracked, caches cold", "spectrum/evicted/6",
                    [("spectrum/eigen_evicted/6", "Eigen"), ("spectrum/lapack_evicted/6", "LAPACK")]),
     ]
-    for gains in GAINS:
-        for accuracy in (1e-3, 1e-6, 1e-9):
-            mine = results.fastest(gains, "ours", accuracy)
-            rivals = [(results.fastest(gains, whose, accuracy), whose)
-                      for whose in ("odeint", "mujoco")]
-            rivals = [(found[1], f"{whose} {found[2].split('/')[0]}")
-                      for found, whose in rivals if found]
-            if mine and rivals:
-                best = min(rivals)
-                rows.append([f"1 s of a released arm, {gains}, to {accuracy:.0e} rad "
-                             f"({mine[2].split('/')[0]})", us(mine[1]), us(best[0]), best[1],
-                             f"{best[0] / mine[1]:.2g}"])
     return [row for row in rows if row]
 
 
@@ -155,6 +145,19 @@ def markdown(rows, context):
              "|---|---|---|---|---|"]
     lines += ["| " + " | ".join(row) + " |" for row in rows]
     return "\n".join(lines) + "\n"
+
+
+def footprint_table(results):
+    """Of ticks of 7 joints; of that with modes by folders as well."""
+    lines = ["Lines of 64 bytes that a tick of 7 joints touches, counted by callgrind:", "",
+             "| | instructions | lines of code | lines of data |", "|---|---|---|---|"]
+    for row in results.footprints:
+        lines.append(f"| {row['name'].removeprefix('footprint/')} | {row['instructions']} | "
+                     f"{row['code_lines']} | {row['data_lines']} |")
+        if row["name"] == "footprint/tick/full/7":
+            lines += [f"| - {part} | {counts['instructions']} | {counts['code_lines']} | "
+                      f"{counts['data_lines']} |" for part, counts in row["parts"].items()]
+    return "\n".join(lines) + "\n" if results.footprints else ""
 
 
 SPECTRA = [("from nothing", "direct", "eigen", "lapack"),
@@ -319,8 +322,8 @@ def main():
     results = Results(merged)
     text = markdown(headline(results), merged["context"])
     errors = backward_error_sentence(results)
-    if errors:
-        text += "\n" + errors
+    for more in (footprint_table(results), errors):
+        text += "\n" + more if more else ""
     (directory / "headline.md").write_text(text)
     write_plot_data(results, directory)
     print(text)

@@ -5,13 +5,15 @@
 // with shapes, and the snapshot; `tick/design` besides holds a damping ratio; `_values_only`
 // without shapes; `_background` hands it to a thread;
 // `_percentiles` times a million ticks one by one. `tick/paced` and `tick/evicted` are `tick/full`
-// at the pace of 1 kHz, and after 64 MB of other data have passed through the caches.
+// at the pace of 1 kHz, and after 64 MB of other data have passed through the caches. `footprint`
+// is there under callgrind alone: a tick of each of these, see footprint.py.
 #include <dashpot/benchmarks/one_by_one.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
 
 #include <benchmark/benchmark.h>
+#include <valgrind/callgrind.h>
 
 #include <cmath>
 #include <numbers>
@@ -138,6 +140,19 @@ void add_one_by_one(const std::string& name, const Analysis& analysis, int ticks
       ->Unit(benchmark::kMicrosecond);
 }
 
+/// Lets callgrind watch one tick, with caches that are empty at first.
+void add_footprint(const std::string& name, Mode mode, const Analysis& analysis, double ratio = 0) {
+  benchmark::RegisterBenchmark(("footprint/" + name).c_str(), [=](benchmark::State& bench) {
+    Loop loop(7, mode, analysis, ratio);
+    for (auto _ : bench) {
+      CALLGRIND_START_INSTRUMENTATION;
+      loop.step();
+      CALLGRIND_STOP_INSTRUMENTATION;
+    }
+    CALLGRIND_DUMP_STATS_AT(name.c_str());
+  })->Iterations(1);
+}
+
 void add(const std::string& name, Mode mode, Analysis analysis, std::initializer_list<int> joints,
          double ratio = 0) {
   for (const int n : joints) {
@@ -167,6 +182,12 @@ int main(int argc, char** argv) {
   add_one_by_one<dashpot::benchmarks::AtOnce>("tick/full_percentiles", every_tick, 1'000'000);
   add_one_by_one<dashpot::benchmarks::Paced>("tick/paced", every_tick, 2000);
   add_one_by_one<dashpot::benchmarks::Evicted>("tick/evicted", every_tick, 200);
+  if (RUNNING_ON_VALGRIND != 0) {
+    add_footprint("tick/joint/7", Mode::kJoint, off);
+    add_footprint("tick/cartesian/7", Mode::kCartesian, off);
+    add_footprint("tick/full/7", Mode::kCartesian, every_tick);
+    add_footprint("tick/design/7", Mode::kCartesian, every_tick, 0.7);
+  }
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
   return 0;
