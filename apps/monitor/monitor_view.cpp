@@ -227,11 +227,10 @@ std::string MonitorView::modes_table() const {
   table.add_column(Align::kRight, {"error <", "rad/s"});
   table.add_column(Align::kLeft, {"shape", ""});
   for (std::size_t i = 0; i < static_cast<std::size_t>(modes.num_modes); ++i) {
-    const double bound = modes.natural_frequency_bound[i];
     table.add_row({std::to_string(modes.label[i]), format_number(modes.natural_frequency[i], 6),
                    format_number(modes.natural_frequency[i] / (2 * std::numbers::pi), 6),
                    format_number(modes.damping_ratio[i], 6), kind_text(modes.kind[i]),
-                   std::isfinite(bound) ? format_number(bound, 2) : "none",
+                   format_bound(modes.natural_frequency_bound[i]),
                    format_shape(shape_of(modes, i), 36)});
   }
   return out + table.text();

@@ -74,11 +74,10 @@ std::string modes_table(const dashpot_modes& modes) {
   table.add_column(Align::kRight, {"error <", "rad/s"});
   table.add_column(Align::kLeft, {"", "shape"});
   for (const dashpot_mode& mode : list(modes)) {
-    const double bound = mode.natural_frequency_bound;
     table.add_row({std::to_string(mode.label), format_number(mode.natural_frequency, 6),
                    format_number(mode.natural_frequency / (2 * std::numbers::pi), 6),
                    format_number(mode.damping_ratio, 6), kind_text(mode),
-                   std::isfinite(bound) ? format_number(bound, 2) : "none",
+                   format_bound(mode.natural_frequency_bound),
                    format_shape(shape_of(modes, mode), kShapeWidth)});
   }
   return table.text();
@@ -173,9 +172,6 @@ std::string solved_text(const dashpot_modes& first, const dashpot_modes& last) {
   add(&dashpot_modes::no_springs, "without springs");
   add(&dashpot_modes::failed, "failed");
   add(&dashpot_modes::missed, "missed");
-  if (last.proportional > first.proportional) {
-    out += "; damping proportional in " + std::to_string(last.proportional - first.proportional);
-  }
   return out + "\n";
 }
 
@@ -247,7 +243,6 @@ Json solved_json(const dashpot_modes& first, const dashpot_modes& last) {
   return {{"tracked", last.tracked - first.tracked},
           {"reused", last.reused - first.reused},
           {"direct", last.direct - first.direct},
-          {"proportional", last.proportional - first.proportional},
           {"unchanged", last.unchanged - first.unchanged},
           {"no_springs", last.no_springs - first.no_springs},
           {"failed", last.failed - first.failed},

@@ -53,8 +53,7 @@ inline const std::vector<Room>& rooms() {
       {"analysis/identification", 4, {"mode_identification"}, {kEigen}},
       {"analysis/design",
        5,
-       {"damping_target", "damping_design", "damping_region", "damping_sampled", "ratio_damping",
-        "joint_ratio_damping"},
+       {"damping_target", "damping_design", "damping_region", "damping_sampled", "ratio_damping"},
        {kEigen}},
 
       {"controller/base",

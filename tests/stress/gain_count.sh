@@ -10,7 +10,7 @@ program=$1 folder=$2 trials=${3:-2000} status=0
 count() { # JOINTS ARG...: instructions of each tick, one a line
   rm -f "$folder"/gains.out*
   valgrind -q --tool=callgrind --callgrind-out-file="$folder/gains.out" \
-    --toggle-collect="dashpot::controller::FixedCore<$1>::update(*" \
+    --toggle-collect="dashpot::controller::ControllerCore::update(*" \
     --dump-before=end_of_tick "$program" "$@" >"$folder/gains.said"
   for ((i = 1; ; ++i)); do
     [[ -e $folder/gains.out.$i ]] || break

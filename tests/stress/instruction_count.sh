@@ -11,7 +11,7 @@ program=$1 folder=$2 ticks=1000 skip=20 status=0 settled=0 followed=0
 for kind in joint cartesian blend modes still lost; do
   rm -f "$folder"/ticks.out*
   valgrind -q --tool=callgrind --callgrind-out-file="$folder/ticks.out" \
-    --toggle-collect='dashpot::controller::FixedCore<7>::update(*' \
+    --toggle-collect='dashpot::controller::ControllerCore::update(*' \
     --dump-before=end_of_tick "$program" "$kind" $((ticks + skip))
   # One file a tick, with its total; the first ticks start the springs.
   read -r least median most < <(

@@ -35,7 +35,7 @@ bool spectra(long steps, std::uint64_t seed) {
       const std::uint64_t path_seed = 1'000'003 * seed + static_cast<std::uint64_t>(step);
       Dice dice(path_seed);
       const SystemPath path = family.make(dice);
-      tracked.start(dice.uniform(0, 1) < 0.5 ? 1e-14 : dice.log_uniform(1e-15, 1e-9));
+      tracked.start();
       for (int k = 0; k < kStepsOfAPath && step < each; ++k, ++step) {
         const TrackedSystem system = path(static_cast<double>(k) / (kStepsOfAPath - 1));
         tracked.step(system);
