@@ -48,6 +48,15 @@ std::int64_t reading_work(Eigen::Index n, const BlockList<N>& blocks) {
   return units;
 }
 
+/// Whether rates are numbers whose products neither overflow nor underflow.
+template <int N>
+bool computable(const EnergyForm<N>& form) {
+  constexpr double kSlowest = 1e-100;  // rad/s
+  if (!form.damping.allFinite() || !form.stiffness.allFinite()) return false;
+  const double rate = form.damping.cwiseAbs().sum() + std::sqrt(form.stiffness.cwiseAbs().sum());
+  return rate == 0 || rate >= kSlowest;
+}
+
 /// Work of a Newton step.
 template <int N>
 std::int64_t step_work(Eigen::Index n, const BlockList<N>& blocks) {
@@ -73,9 +82,7 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work&
     return out.status = Status::kOverflow;
   }
   const EnergyForm<N> form = to_energy_form<N>(system, out.zero_modes);
-  if (!form.damping.allFinite() || !form.stiffness.allFinite()) {
-    return out.status = Status::kOverflow;
-  }
+  if (!computable(form)) return out.status = Status::kOverflow;
   damped_ = !system.damping.isZero(0);
   out.symmetric = form.symmetric;
   out.proportional = form.proportional;

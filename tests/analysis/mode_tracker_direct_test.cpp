@@ -133,7 +133,7 @@ TEST(ModeTracker, KeepsTheSlowEigenvaluesOfHeavilyOverdampedModes) {
 
 /// Underflow is not counted below 1e-60 rad/s.
 TEST(ModeTracker, ProvesNothingOfVibrationsThatAreTooSlow) {
-  for (const double frequency : {1e-50, 1e-65, 1e-150}) {
+  for (const double frequency : {1e-50, 1e-65, 1e-90}) {
     SCOPED_TRACE(frequency);
     System<kMaxDof> system(2);
     system.stiffness_factor.resize(2, 2);
