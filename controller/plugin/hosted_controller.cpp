@@ -1,0 +1,126 @@
+#include <dashpot/controller/plugin/hosted_controller.hpp>
+#include <dashpot/controller/plugin/plugin_data.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
+
+#include <algorithm>
+
+namespace dashpot::controller {
+namespace {
+
+/// `time` plus `difference`, ns; past the end of the numbers it goes on from their beginning.
+std::int64_t later(std::int64_t time, std::int64_t difference) noexcept {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(time) +
+                                   static_cast<std::uint64_t>(difference));
+}
+
+}  // namespace
+
+HostedController::HostedController(const Config& config)
+    : joints(config.model.joints()),
+      n(config.model.dof()),
+      settings(config.settings),
+      period(static_cast<std::int64_t>(std::min(1e9 * settings.period, 1e18))),
+      model(config.model),
+      judgement(config.model, config.settings),
+      controller_(config.model, config.settings),
+      setpoint_(settings.initial) {
+  request.setpoint = settings.initial;
+}
+
+Status HostedController::update(const dashpot_state* given, const dashpot_setpoint* wanted,
+                                JointVector& torque) noexcept {
+  const RobotState state = to_state(given, n, later(time_, period));
+  time_ = state.time;
+  const bool accepted = take_up(wanted, time_);
+  const bool any = has_setpoint_ || stay(time_);
+  Status status =
+      any ? controller_.update(state, setpoint_, torque) : controller_.update(state, torque);
+  located_ |= status < Status::kStateNotFinite;
+  const bool latched = controller_.snapshot().fault != Status::kOk;
+  if (latched_ && !latched) forget_setpoint();  // released by a rest
+  latched_ = latched;
+  if (status < Status::kStateNotFinite) judgement.locate(controller_.snapshot().position);
+  if (!accepted) status = worse(status, Status::kSetpointRejected);
+  snapshots.slot() = controller_.snapshot();
+  snapshots.slot().status = status;
+  snapshots.publish();
+  const Vibration& found = controller_.vibration();
+  if (found.tick != published_modes_ || found.status != published_status_) {
+    published_modes_ = found.tick;
+    published_status_ = found.status;
+    vibrations.write(controller_.vibration());
+  }
+  return status;
+}
+
+void HostedController::reset(const JointVector& torque) noexcept {
+  controller_.reset(torque);
+  take_up(nullptr, time_);  // the gains in it stay
+  forget_setpoint();
+  forgotten_ = latched_ = false;
+  located_ = false;
+  published_modes_ = 0;
+  vibrations.write(controller_.vibration());  // there is none
+  snapshots.write(controller_.snapshot());    // likewise: that of tick 0
+}
+
+void HostedController::forget_setpoint() noexcept {
+  forgotten_ = has_setpoint_ && given_time_ != DASHPOT_ON_ARRIVAL;
+  const Gains gains = setpoint_.gains;
+  setpoint_ = settings.initial;
+  setpoint_.gains = gains;
+  has_setpoint_ = false;
+}
+
+bool HostedController::take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept {
+  const std::int64_t last = setpoint_.time;
+  bool accepted = true;
+  if (requests.fetch()) {
+    const Request& latest = requests.value();
+    if (latest.releases != releases_ && controller_.snapshot().fault != Status::kOk) {
+      controller_.release();
+      forget_setpoint();
+      latched_ = false;
+    }
+    releases_ = latest.releases;
+    if (latest.setpoints != setpoints_) {
+      setpoint_ = latest.setpoint;
+      if (latest.on_arrival) setpoint_.time = now;
+      has_setpoint_ = true;
+    } else if (latest.gain_changes != gain_changes_) {
+      setpoint_.gains = latest.setpoint.gains;
+    }
+    setpoints_ = latest.setpoints;
+    gain_changes_ = latest.gain_changes;
+    if (setpoint_.time == last)
+      setpoint_.time = later(last, 1);  // equal times would say that nothing is new
+  }
+  const bool old = wanted != nullptr && forgotten_ && wanted->struct_size == sizeof *wanted &&
+                   wanted->time == given_time_;
+  if (wanted != nullptr && !old) {
+    accepted = to_setpoint(wanted, n, now, setpoint_) == DASHPOT_OK;
+    if (accepted && !has_setpoint_ && setpoint_.time == last) setpoint_.time = later(last, 1);
+    has_setpoint_ |= accepted;
+    if (accepted) {
+      given_time_ = wanted->time;
+      forgotten_ = false;
+    }
+  }
+  return accepted;
+}
+
+bool HostedController::stay(std::int64_t now) noexcept {
+  if (!located_) return false;
+  const Snapshot& snapshot = controller_.snapshot();
+  setpoint_.time = now;
+  setpoint_.mode = settings.initial.mode;
+  if (setpoint_.mode == Mode::kCartesian) {
+    setpoint_.joint_position.resize(0);
+    setpoint_.tip_pose = snapshot.reference_tip;
+  } else {
+    setpoint_.joint_position = snapshot.reference_position;
+  }
+  return !check_setpoint(setpoint_, settings.limits, true);
+}
+
+}  // namespace dashpot::controller

@@ -1,0 +1,72 @@
+#pragma once
+#include <dashpot/controller/plugin.h>
+#include <dashpot/controller/config.hpp>
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/latest.hpp>
+#include <dashpot/controller/plugin/plugin_judgement.hpp>
+
+#include <cstdint>
+#include <vector>
+
+namespace dashpot::controller {
+
+/// What the other thread wants, as a whole: whichever the real-time thread fetches is complete.
+struct Request {
+  std::uint64_t setpoints = 0;  ///< how many were given so far
+  std::uint64_t gain_changes = 0;
+  std::uint64_t releases = 0;
+  bool on_arrival = false;  ///< the set-point's time is that of the tick that takes it up
+  Setpoint setpoint;        ///< with the gains
+};
+
+/// One controller, and what its two threads hand each other.
+struct HostedController {
+  explicit HostedController(const Config& config);
+
+  // For every thread:
+  const std::vector<Joint> joints;
+  const int n;
+  const Settings settings;
+  const std::int64_t period;  ///< ns
+  const RobotModel model;
+  Judgement judgement;
+
+  Latest<Request> requests;      ///< from the other thread to the real-time thread
+  Latest<Snapshot> snapshots;    ///< back
+  Latest<Vibration> vibrations;  ///< likewise
+
+  // Of the other thread:
+  Request request;
+  const SampledVibration* sampled() noexcept { return controller_.sampled_vibration(); }
+
+  // Of the real-time thread:
+  Status update(const dashpot_state* given, const dashpot_setpoint* wanted,
+                JointVector& torque) noexcept;
+  /// Without entries: the last torque acts.
+  void reset(const JointVector& torque) noexcept;
+
+ private:
+  void forget_setpoint() noexcept;
+  /// Puts what the caller and the other thread want into `setpoint_`. False if `wanted` is there,
+  /// but no set-point; the one in force stays then.
+  bool take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept;
+  /// As long as no set-point was given: makes one with which the springs stay where they are, and
+  /// are never stale. False if there is none: before the robot is located, or where it must not be.
+  bool stay(std::int64_t now) noexcept;
+
+  Controller controller_;
+  Setpoint setpoint_;            ///< in force
+  bool has_setpoint_ = false;    ///< one was given
+  bool located_ = false;         ///< the controller knows where the robot is
+  std::int64_t time_ = 0;        ///< of the last state, ns
+  std::uint64_t setpoints_ = 0;  ///< of the other thread, taken up so far
+  std::uint64_t gain_changes_ = 0;
+  std::uint64_t releases_ = 0;
+  bool latched_ = false;         ///< a fault was, after the last tick
+  std::int64_t given_time_ = 0;  ///< of the last set-point that the caller gave, as it was given
+  bool forgotten_ = false;       ///< it was, with the release of a fault: it is none any more
+  std::uint64_t published_modes_ = 0;  ///< the tick they belong to
+  analysis::Status published_status_ = analysis::Status::kOk;
+};
+
+}  // namespace dashpot::controller
