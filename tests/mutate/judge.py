@@ -27,8 +27,9 @@ def list_tests(build):
     tests = []
     for entry in json.loads(text)["tests"]:
         command = entry.get("command")
-        if not command or not os.path.exists(command[0]):  # not built
-            continue
+        if not command or not all(os.path.exists(part) for part in command
+                                  if part == command[0] or part.startswith(str(build))):
+            continue  # not built
         folder = {p["name"]: p["value"] for p in entry["properties"]}["WORKING_DIRECTORY"]
         chosen = [a.split("=", 1)[1] for a in command if a.startswith("--gtest_filter=")]
         tests.append(Test(entry["name"], command, folder, chosen[0] if chosen else ""))
