@@ -1,6 +1,7 @@
 // How a damping design for a region grows with the number of configurations
-// (growth/configurations/N, one thread) and shrinks with that of threads (growth/threads/T, 32
-// configurations). Growth with joints and modes is that of the other programs.
+// (growth/configurations/N, one thread; growth/region/N, all threads, once) and shrinks with that
+// of threads (growth/threads/T, 32 configurations). Growth with joints and modes is that of the
+// other programs.
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 
@@ -40,6 +41,13 @@ int main(int argc, char** argv) {
         ("growth/configurations/" + std::to_string(configurations)).c_str(),
         [=](benchmark::State& s) { design(s, configurations, 1); })
         ->Unit(benchmark::kMillisecond);
+  }
+  for (const int configurations : {1000, 10000}) {
+    benchmark::RegisterBenchmark(("growth/region/" + std::to_string(configurations)).c_str(),
+                                 [=](benchmark::State& s) { design(s, configurations, 0); })
+        ->Unit(benchmark::kSecond)
+        ->UseRealTime()
+        ->Iterations(1);
   }
   for (const int threads : {1, 2, 4}) {
     benchmark::RegisterBenchmark(("growth/threads/" + std::to_string(threads)).c_str(),

@@ -185,13 +185,11 @@ MatrixXd DampingFit::within_structure(const MatrixXd& X) const {
   return result;
 }
 
-double DampingFit::violation(const MatrixXd& X, const RatioGoal& goal) const {
-  auto all = of_all(X, goal);
-  add_bounds(X, X.diagonal().cwiseMax(1e-6 * X.diagonal().maxCoeff()).cwiseSqrt(), all.front());
+double DampingFit::excess(const MatrixXd& X) const {
+  std::vector<Residual> residuals;
+  add_bounds(X, X.diagonal().cwiseMax(1e-6 * X.diagonal().maxCoeff()).cwiseSqrt(), residuals);
   double worst = 0;
-  for (const auto& residuals : all) {
-    for (const Residual& residual : residuals) worst = std::max(worst, std::abs(residual.value));
-  }
+  for (const Residual& residual : residuals) worst = std::max(worst, std::abs(residual.value));
   return worst;
 }
 

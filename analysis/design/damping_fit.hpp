@@ -67,8 +67,9 @@ class DampingFit {
   /// Returns X with zeros outside the structure, which is still positive semidefinite.
   Eigen::MatrixXd within_structure(const Eigen::MatrixXd& X) const;
 
-  /// Returns the violation of `goal` and the bounds by X, which is not changed.
-  double violation(const Eigen::MatrixXd& X, const RatioGoal& goal) const;
+  /// Returns by how much an entry of X exceeds its bounds, relative to the square roots of its two
+  /// diagonal entries.
+  double excess(const Eigen::MatrixXd& X) const;
 
  private:
   struct Residual {

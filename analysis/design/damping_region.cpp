@@ -13,12 +13,18 @@ namespace {
 
 using Eigen::MatrixXd;
 
-constexpr double kLevelStep = 1e-3;
+constexpr double kLevelStep = 5e-4;
+/// A configuration that misses the level by less need not join the search.
+constexpr double kLevelMissed = 2e-4;
 /// A search that comes as near as this to its goal has reached it.
 constexpr double kMet = 1e-7;
 /// Configurations whose exact design is tried, about; and how often one is scaled down.
 constexpr std::size_t kStarts = 8;
 constexpr int kScalings = 12;
+/// Configurations that a search begins with, that join it at a time, and how often some may join.
+constexpr std::size_t kFirst = 32;
+constexpr std::size_t kJoining = 8;
+constexpr int kRounds = 40;
 
 std::vector<DampingSample> samples_of(const std::vector<TaskImpedance>& configurations,
                                       int threads) {
@@ -62,6 +68,19 @@ RegionSample read(const Spectrum<>& spectrum, const DampingTarget& target) {
   return result;
 }
 
+/// Smallest ratio relative to its target; 1 where none counts.
+double level_of(const RegionSample& sample) {
+  return sample.worst_mode < 0 || !(sample.wanted > 0) ? 1 : sample.damping_ratio / sample.wanted;
+}
+
+double largest_ratio(const RegionDesign& design) {
+  double largest = 0;
+  for (const RegionSample& sample : design.samples) {
+    largest = std::max(largest, sample.largest_ratio);
+  }
+  return largest;
+}
+
 RegionDesign evaluate(const std::vector<DampingSample>& samples, const DampingFit& fit,
                       const MatrixXd& damping, const RegionOptions& options) {
   RegionDesign design;
@@ -78,14 +97,14 @@ RegionDesign evaluate(const std::vector<DampingSample>& samples, const DampingFi
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const RegionSample& sample = design.samples[i];
     if (sample.worst_mode < 0 || !(sample.wanted > 0)) continue;
-    const double level = sample.damping_ratio / sample.wanted;
-    if (level < smallest) {
-      smallest = level;
+    if (level_of(sample) < smallest) {
+      smallest = level_of(sample);
       design.worst_sample = static_cast<int>(i);
     }
   }
   design.level = std::min(1.0, smallest);
-  design.violation = fit.violation(damping, {options.target, 0, ceiling_of(options)});
+  design.violation =
+      std::max({0.0, largest_ratio(design) - ceiling_of(options), fit.excess(damping)});
   return design;
 }
 
@@ -121,26 +140,20 @@ void offer(MatrixXd damping, const std::vector<DampingSample>& samples, const Da
       if (design.level > best.level) best = {damping, design.level};
       return;
     }
-    double largest = ceiling;
-    for (const RegionSample& sample : design.samples) {
-      largest = std::max(largest, sample.largest_ratio);
-    }
-    damping *= std::min(0.9, ceiling / largest);
+    damping *= std::min(0.9, ceiling / largest_ratio(design));
   }
 }
 
-}  // namespace
-
-RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
-                           const RegionOptions& options) {
+/// Seeks the largest level of all these configurations, at most `high`, from starts of its own and
+/// the one given (no entries: none).
+Candidate search_level(const std::vector<TaskImpedance>& configurations, const MatrixXd& given,
+                       double high, const RegionOptions& options,
+                       const std::function<void(double)>& tell) {
   const double ceiling = ceiling_of(options);
-  const auto tell = [&options](double done) {
-    if (options.progress) options.progress(done);
-  };
-  tell(0);
   const std::vector<DampingSample> samples = samples_of(configurations, options.threads);
   const DampingFit fit(samples, options.structure, options.bounds, options.threads);
-  const std::vector<MatrixXd> starts = starts_of(configurations, options);
+  std::vector<MatrixXd> starts = starts_of(configurations, options);
+  if (given.size() > 0) starts.insert(starts.begin(), given);
   Candidate best;
   for (const MatrixXd& start : starts) offer(start, samples, fit, options, best);
   // Towards the level from where the last search has ended, and from the best so far.
@@ -153,9 +166,8 @@ RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
     }
     return false;
   };
-  double high = 1;
-  if (!reach(1)) {
-    const double halvings = std::log2(1 / kLevelStep);
+  if (!reach(high)) {
+    const double halvings = std::log2(high / kLevelStep);
     while (high - std::max(0.0, best.level) > kLevelStep) {
       const double low = std::max(0.0, best.level);
       tell(std::clamp(1 - std::log2((high - low) / kLevelStep) / halvings, 0.0, 1.0));
@@ -163,8 +175,62 @@ RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
       if (!reach(level)) high = level;
     }
   }
+  if (best.level < 0) best.damping = last;
+  return best;
+}
+
+/// Adds those configurations to `members` that `design` treats worst: with a smaller level than
+/// `level` or a ratio above the ceiling. False if there is none.
+bool join(const RegionDesign& design, double level, double ceiling,
+          std::vector<std::size_t>& members) {
+  std::vector<std::pair<double, std::size_t>> worst;
+  for (std::size_t i = 0; i < design.samples.size(); ++i) {
+    const RegionSample& sample = design.samples[i];
+    const double missed = level - level_of(sample), over = sample.largest_ratio - ceiling;
+    if (missed <= kLevelMissed && over <= kMet) continue;
+    if (std::find(members.begin(), members.end(), i) == members.end()) {
+      worst.emplace_back(-std::max(missed, over), i);
+    }
+  }
+  std::sort(worst.begin(), worst.end());
+  worst.resize(std::min(worst.size(), kJoining));
+  for (const auto& [badness, i] : worst) members.push_back(i);
+  return !worst.empty();
+}
+
+}  // namespace
+
+RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
+                           const RegionOptions& options) {
+  const double ceiling = ceiling_of(options);
+  double told = 0;
+  const auto tell = [&](double done) {
+    told = std::max(told, done);
+    if (options.progress) options.progress(told);
+  };
+  tell(0);
+  const std::vector<DampingSample> samples = samples_of(configurations, options.threads);
+  const DampingFit fit(samples, options.structure, options.bounds, options.threads);
+  std::vector<std::size_t> members;
+  const std::size_t first = std::min(kFirst, configurations.size());
+  for (std::size_t i = 0; i < first; ++i) members.push_back(i * configurations.size() / first);
+  Candidate candidate{MatrixXd(), 1}, best;
+  RegionDesign design;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<TaskImpedance> chosen;
+    for (const std::size_t i : members) chosen.push_back(configurations[i]);
+    candidate = search_level(chosen, candidate.damping, std::max(0.0, candidate.level), options,
+                             [&](double done) { tell(0.9 * (round + done) / (round + 1.0)); });
+    design = evaluate(samples, fit, candidate.damping, options);
+    if (design.violation <= kMet && design.level > best.level)
+      best = {design.damping, design.level};
+    if (best.level >= candidate.level - kLevelMissed) break;
+    if (!join(design, candidate.level, ceiling, members)) break;
+  }
+  if (best.level < 0) offer(candidate.damping, samples, fit, options, best);
   tell(1);
-  return evaluate(samples, fit, best.level >= 0 ? best.damping : last, options);
+  if (best.level >= 0) design = evaluate(samples, fit, best.damping, options);
+  return design;
 }
 
 RegionDesign evaluate_region(const std::vector<TaskImpedance>& configurations,

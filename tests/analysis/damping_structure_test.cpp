@@ -248,6 +248,29 @@ TEST(RegionDesign, RaisesTheWorstRatioAndMapsIt) {
   EXPECT_GT(design.level, others);
 }
 
+TEST(RegionDesign, FindsTheFewOfManyThatBind) {
+  Random random(7312);
+  std::vector<TaskImpedance> region = path_of_configurations(random, 150);
+  region[101].mass *= 2.5;  // a payload, not among those that the search begins with
+  region[37].mass *= 0.4;
+  RegionOptions options;
+  options.target = DampingTarget::constant(0.7);
+  const RegionDesign design = design_region(region, options);
+  EXPECT_LE(design.violation, 2e-7);
+  const RegionDesign again = evaluate_region(region, design.damping, options);
+  EXPECT_EQ(again.level, design.level);
+  EXPECT_EQ(again.violation, design.violation);
+  // No lower than of the worst alone, which is as high as the level of all can be.
+  std::vector<TaskImpedance> worst = {region[101], region[37]};
+  for (std::size_t i = 0; i < region.size() && worst.size() < 30; ++i) {
+    const RegionSample& sample = design.samples[i];
+    if (sample.damping_ratio < (design.level + 0.05) * 0.7) worst.push_back(region[i]);
+  }
+  const double alone = design_region(worst, options).level;
+  std::printf("level %.4f; of %zu alone %.4f\n", design.level, worst.size(), alone);
+  EXPECT_GE(design.level, alone - 5e-3);
+}
+
 TEST(RegionDesign, DoesNotDependOnTheNumberOfThreads) {
   Random random(7308);
   const std::vector<TaskImpedance> region = path_of_configurations(random, 5);
