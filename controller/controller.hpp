@@ -27,8 +27,8 @@ class ControllerCore;
 /// law/designed_damping.hpp, law/impedance_law.hpp, safety/safety_filter.hpp,
 /// vibration/vibration.hpp, and core/controller_core.hpp, which calls them.
 ///
-/// One thread at a time may use a Controller; `Latest` (latest.hpp) hands set-points to the thread
-/// of `update` and snapshots from it.
+/// One thread at a time may use a Controller, also its const functions; `Latest` (latest.hpp)
+/// hands set-points to the thread of `update` and snapshots from it.
 class Controller {
  public:
   /// Copies the model. Throws InvalidSettings with key, value and unit.

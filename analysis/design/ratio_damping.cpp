@@ -61,7 +61,7 @@ class Decomposition {
   static constexpr Index kLanes = lanes(Half), kWidth = 2 * kLanes;
   using Lanes = std::array<double, kLanes>;
 
-  double* row(Index i) noexcept { return &A_[static_cast<std::size_t>(i * kWidth)]; }
+  double* row(Index i) noexcept { return A_.data() + i * kWidth; }
   double& L(Index i, Index j) noexcept { return L_[static_cast<std::size_t>(j * n_ + i)]; }
 
   /// L and A = L^-1 J' F; false unless M is positive definite.

@@ -64,7 +64,7 @@ class ControllerCore {
   void update_goal() noexcept;
   /// Starts the springs where the robot is, with gains that grow from zero.
   void restart_springs() noexcept;
-  /// Returns true if all references are at rest.
+  /// Returns true if all references in force are at rest.
   bool references_still() const noexcept;
   /// Whether the set-point is fresh: kOk, kSetpointStale or kSetpointLost.
   Status setpoint_age_status() const noexcept;

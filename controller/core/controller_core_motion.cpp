@@ -93,8 +93,10 @@ void ControllerCore::restart_springs() noexcept {
 }
 
 bool ControllerCore::references_still() const noexcept {
-  return references_.joint.velocity().isZero(0) && references_.posture.velocity().isZero(0) &&
-         references_.tip.velocity().isZero(0);
+  const Impedance& impedance = gains_.now();  // a reference that is not in force stays as it was
+  return (impedance.joint_weight == 0 || references_.joint.velocity().isZero(0)) &&
+         (impedance.task_weight == 0 ||
+          (references_.posture.velocity().isZero(0) && references_.tip.velocity().isZero(0)));
 }
 
 double ControllerCore::tip_reference_speed() const noexcept {

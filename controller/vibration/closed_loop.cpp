@@ -1,6 +1,7 @@
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/spring_factors.hpp>
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 namespace dashpot::controller {

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <set>
 #include <string>
+#include <vector>
 
 namespace dashpot::controller {
 namespace {
@@ -245,6 +246,51 @@ TEST_F(Safety, AReleasedFaultStartsWhereTheRobotIs) {
   arm->controller.release();  // nothing to release
   EXPECT_EQ(next(), Status::kOk);
   EXPECT_EQ(snapshot().restarts, 2u);
+}
+
+TEST_F(Safety, AReleaseForgetsTheCommandedWrench) {
+  settings.initial.mode = Mode::kCartesian;
+  settings.watchdog.feedback = 0;  // something keeps the robot where it is
+  make();
+  run(1.0);
+  arm->setpoint.wrench[1] = 5;
+  for (int k = 0; k < 1000; ++k) next();
+  EXPECT_NEAR(snapshot().tip_wrench[1], 5, 0.1);
+  arm->state.time += 1'000'000'000;
+  EXPECT_EQ(tick(), Status::kTimeGap);
+  arm->controller.release();
+  for (int k = 0; k < 1000; ++k) {  // without a set-point
+    arm->state.time += 1'000'000;
+    EXPECT_LT(arm->controller.update(arm->state, arm->torque), Status::kSetpointRejected);
+    EXPECT_LT(snapshot().tip_wrench.norm(), 0.1);
+  }
+}
+
+/// With isotropic springs the frame of the gains makes no difference, also while springs grow.
+TEST_F(Safety, SpringsGrowAlikeInBothFrames) {
+  std::vector<JointVector> in_base;
+  for (const Frame frame : {Frame::kBase, Frame::kTool}) {
+    settings.initial.mode = Mode::kCartesian;
+    settings.watchdog.feedback = 0;
+    Gains& gains = settings.initial.gains;
+    gains.frame = frame;
+    gains.task_stiffness = Vector6(400, 400, 400, 30, 30, 30).asDiagonal();
+    gains.task_damping = Vector6(20, 20, 20, 2, 2, 2).asDiagonal();
+    gains.null_stiffness.setConstant(7, 20);
+    make();
+    next();
+    arm->state.position[0] += 5e-4;
+    arm->state.position[3] -= 5e-4;
+    for (std::size_t k = 0; k < 300; ++k) {
+      EXPECT_LT(next(), Status::kSetpointRejected);
+      if (frame == Frame::kBase) {
+        in_base.push_back(arm->torque);
+      } else {
+        EXPECT_TRUE(near(arm->torque, in_base[k], 1e-9)) << k;
+      }
+    }
+  }
+  EXPECT_GT((in_base.back() - gravity()).norm(), 0.05);
 }
 
 TEST_F(Safety, ARestReleasesWhereItIsWanted) {

@@ -67,6 +67,8 @@ TEST_F(WatchedPair, KeepsToTheLimitsThemselves) {
   settings.limits.walls = {{{0, 0, 0.1}, Eigen::Vector3d::UnitZ()},
                            {{0.5, 0, 0}, -Eigen::Vector3d::UnitX()}};  // which the tip touches
   q = {1, -2};
+  EXPECT_EQ(tick(), Status::kOk);
+  EXPECT_EQ(watch->tip_speed(), 0);
   qd = {2, -2};
   EXPECT_EQ(tick(), Status::kOk);
   EXPECT_DOUBLE_EQ(watch->tip_speed(), std::sqrt(0.25 + 1));

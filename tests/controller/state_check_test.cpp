@@ -113,6 +113,15 @@ TEST_F(Check, NoticesALoopAtAnotherRate) {
   }
 }
 
+TEST_F(Check, JudgesTheRateAnewAfterAGap) {
+  make();
+  for (int k = 0; k < 100; ++k) EXPECT_EQ(next(1.2), Status::kOk);
+  EXPECT_EQ(next(1000), Status::kTimeGap);
+  for (int k = 1; k <= 60; ++k) {
+    EXPECT_EQ(next(2), k < 50 ? Status::kOk : Status::kWrongRate) << k;
+  }
+}
+
 /// With all velocities zero, what is unexplained is all that was travelled, u, and u > tolerance +
 /// 0.3 u is noticed. Of what was, 1 - T / 0.5 s is left a tick later.
 TEST_F(Check, NoticesPositionsThatMoveOtherwiseThanTheVelocitiesSay) {

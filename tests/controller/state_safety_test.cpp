@@ -237,13 +237,11 @@ TEST_F(Safety, ALoopAtAnotherRateLatches) {
   EXPECT_EQ(snapshot().fault, Status::kOk);
 }
 
-/// Swings that grow while nothing is asked for.
-TEST_F(Safety, AVibrationThatGrowsLatchesAndOneThatDoesNotDoesNot) {
-  for (const double growth : {1.0, -1.0}) {
-    make();
-    run(1.0);
-    double q = arm->state.position[4];
-    const double center = q, start = growth > 0 ? 0.02 : 1.0;
+class Swings : public Safety {
+ protected:
+  /// The fault after swings of joint 5 that grow (growth 1) or decay (-1).
+  Status swing(double growth) {
+    const double center = arm->state.position[4], start = growth > 0 ? 0.02 : 1.0;
     for (int k = 0; k < 1500 && snapshot().fault == Status::kOk; ++k) {
       const double t = 1e-3 * k, w = 40;
       const double speed = start * std::exp(growth * 3 * t);
@@ -251,9 +249,31 @@ TEST_F(Safety, AVibrationThatGrowsLatchesAndOneThatDoesNotDoesNot) {
       arm->state.velocity[4] = speed * std::cos(w * t);
       next();
     }
-    EXPECT_EQ(snapshot().fault, growth > 0 ? Status::kInstability : Status::kOk);
+    return snapshot().fault;
+  }
+};
+
+TEST_F(Swings, LatchIfTheyGrowAsLongAsNothingIsAskedFor) {
+  for (const double growth : {1.0, -1.0}) {
+    make();
+    run(1.0);
+    EXPECT_EQ(swing(growth), growth > 0 ? Status::kInstability : Status::kOk);
     EXPECT_LT(std::abs(arm->state.velocity[4]), 1.5);
   }
+}
+
+/// A reference that lost its springs while it moved does not count as moving.
+TEST_F(Swings, LatchIfTheyGrowAfterAChangeOfMode) {
+  settings.motion.gain_time = 0.002;
+  make();
+  run(1.0);
+  arm->setpoint.joint_position[0] += 1;
+  for (int k = 0; k < 300; ++k) arm->step();
+  EXPECT_GT(snapshot().reference_velocity.norm(), 0.1);
+  arm->setpoint.mode = Mode::kCartesian;
+  arm->setpoint.tip_pose = arm->tip();
+  for (int k = 0; k < 3000; ++k) arm->step();
+  EXPECT_EQ(swing(1), Status::kInstability);
 }
 
 TEST_F(Safety, AWallIsNotCrossed) {

@@ -117,6 +117,7 @@ TEST(SampledAnalysis, LooksAtTheLoopOnceInAnInterval) {
     const SampledVibration* found = arm.wait_for(last);
     ASSERT_NE(found, nullptr);
     EXPECT_EQ(found->tick % 50, 2U);
+    EXPECT_EQ(found->time, static_cast<std::int64_t>(1'000'000 * found->tick));
     last = found->tick;
   }
 }
