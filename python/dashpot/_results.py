@@ -119,10 +119,11 @@ def make_modes(found: dict[str, Any]) -> Modes:
 
 def to_numbers(name: str, given: npt.ArrayLike, dimensions: int) -> Array:
     """Returns `given` as an array of floats of its own; raises Error if it is none."""
-    if np.iscomplexobj(given):
-        raise Error(f"{name}: real numbers are wanted")
     try:
-        numbers = np.array(given, dtype=np.float64)
+        raw = np.asarray(given)
+        if raw.dtype.kind == "c":
+            raise ValueError("real numbers are wanted")
+        numbers = np.array(raw, dtype=np.float64)
     except (TypeError, ValueError) as problem:
         raise Error(f"{name}: {problem}") from None
     if numbers.ndim != dimensions:
