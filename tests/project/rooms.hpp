@@ -72,6 +72,7 @@ inline const std::vector<Room>& rooms() {
        4,
        {},
        {kAnalysis, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
+      {"controller/audit", 4, {"audit"}, {kAnalysis, kEigen}},
       {"controller/core", 5, {"controller", "gain_judge"}, {kAnalysis, kEigen}},
       {"controller/config", 6, {"config"}, {kEigen}},
       {"controller/plugin", 7, {"plugin"}, {kAnalysis, kEigen, "stdint.h"}},  // plugin.h is C
