@@ -1,9 +1,13 @@
 #pragma once
+#include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/controller/robot_model.hpp>
+#include <dashpot/analysis/task_space.hpp>
+#include <dashpot/controller/base/impedance.hpp>
+#include <dashpot/controller/dynamics.hpp>
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <vector>
 
@@ -12,8 +16,9 @@ namespace dashpot::controller {
 /// The gains of a controller and the loop that they act in, as its documentation states them.
 struct AuditOptions {
   Mode mode = Mode::kCartesian;  ///< which of the gains act
-  /// Stiffness and damping as stated. The ratios and `directions` in it are not read; matrices and
-  /// vectors without entries count as zero.
+  /// Stiffness and damping as stated. The ratios and `directions` in it are not read: a direction
+  /// of the task without stiffness and damping is free. Joint matrices and null-space vectors
+  /// without entries count as zero.
   Gains gains;
   /// True if the controller takes the vector part of the error's quaternion, which is half of the
   /// rotation vector, for its rotational error. The springs then act with half of the stated
@@ -39,8 +44,9 @@ struct PostureNumbers {
   /// Real part of the fastest eigenvalue of the continuous loop: of the eigenvalues with the
   /// smallest real part, 1/s; negative in a damped loop.
   double fastest_pole = std::numeric_limits<double>::quiet_NaN();
-  /// Factor by which stiffness and damping may grow together, see analysis::gain_margin; infinite
-  /// if no factor up to 1e6 is too much; NaN without a period.
+  /// Factor by which stiffness and damping may grow together, see analysis::gain_margin; motions
+  /// slower than the soft frequency do not count. Infinite if a factor of 1e6 is not too much; NaN
+  /// without a period, and where the eigenvalue iteration fails.
   double gain_margin = std::numeric_limits<double>::quiet_NaN();
   int zero_modes = 0;     ///< motions that no spring resists, soft ones included
   bool singular = false;  ///< there are more zero modes than joints beyond the task's directions
@@ -91,7 +97,7 @@ struct DampingSuggestion {
 /// at rest, where the springs are at rest. M has the reflected inertia and the payload of the
 /// model, and viscous friction is the model's. Gravity is taken to be compensated exactly.
 ///
-/// An Audit has work space of its own: a thread needs its own copy.
+/// An Audit does not change: several threads may use one at once.
 class Audit {
  public:
   /// Throws std::invalid_argument, with the member's name and the reason, for gains of another
@@ -102,27 +108,40 @@ class Audit {
   const RobotModel& model() const noexcept { return model_; }
   const AuditOptions& options() const noexcept { return options_; }
 
-  /// Computes the three numbers at q (n, rad) in double precision, without proved bounds: the
-  /// eigenvalues alone, which is some tens of times as fast as audit(). Throws
-  /// std::invalid_argument unless q has n finite entries.
-  PostureNumbers numbers(const JointVector& q);
+  /// Computes the three numbers at q (n, rad) from the eigenvalues alone, in double precision and
+  /// without proved bounds. Postures near a singularity and postures without an oscillating mode
+  /// are left to audit(), which is slower. Throws std::invalid_argument unless q has n finite
+  /// entries.
+  PostureNumbers numbers(const JointVector& q) const;
 
   /// Computes modes and numbers at q with proved bounds. Throws like numbers(), and
   /// std::runtime_error if the eigenvalue iteration fails.
-  PostureAudit audit(const JointVector& q);
+  PostureAudit audit(const JointVector& q) const;
 
   /// Returns the numbers of the postures `first` .. `first + count - 1` of the sequence `seed`,
   /// see sample_posture. They depend on nothing else: neither on the call's share of the postures
   /// nor on earlier calls.
-  std::vector<PostureNumbers> sample(std::uint64_t seed, std::int64_t first, std::int64_t count);
+  std::vector<PostureNumbers> sample(std::uint64_t seed, std::int64_t first,
+                                     std::int64_t count) const;
 
   /// Designs damping for the stiffness at q, with `ratio` for every mode. Throws
-  /// std::invalid_argument for a ratio that is not positive, and for a stiffness of zero.
+  /// std::invalid_argument for a ratio that is not positive.
   DampingSuggestion suggest(const JointVector& q, double ratio) const;
 
  private:
+  DynamicsResult evaluate(const JointVector& q) const;
+  /// Returns the springs and dampers that act at a posture.
+  Impedance impedance_at(const DynamicsResult& robot) const;
+  /// Returns the same as matrices of an impedance whose errors are counted.
+  analysis::TaskImpedance task_impedance(const DynamicsResult& robot) const;
+
   RobotModel model_;
   AuditOptions options_;
+  DynamicsKernel kernel_;
+  JointVector friction_;
+  Impedance impedance_;  ///< in 1/s^2 and 1/s with inertia_blocks
+  analysis::SampledLoop loop_;
+  int springs_ = 0;  ///< modes where no posture is singular
 };
 
 /// Returns posture `index` (from 0) of the sequence `seed`, spread evenly between the position
@@ -130,14 +149,10 @@ class Audit {
 /// Roberts (2018), moved by an offset that depends on the seed.
 JointVector sample_posture(const RobotModel& model, std::uint64_t seed, std::int64_t index);
 
-/// Summarizes the first postures of the sequence `seed` by their `numbers`, in the order of the
-/// sequence. The numbers in the result are those of Audit::audit, with proved bounds; `numbers`
-/// only decide at which postures.
-WorkspaceAudit summarize(Audit& audit, std::uint64_t seed,
-                         const std::vector<PostureNumbers>& numbers);
-
-/// Does the same for a list of postures.
-WorkspaceAudit summarize(Audit& audit, const std::vector<JointVector>& postures,
-                         const std::vector<PostureNumbers>& numbers);
+/// Summarizes postures by their `numbers`; posture(i) returns the i-th posture. The numbers in the
+/// result are those of Audit::audit, with proved bounds, so that `numbers` only decide at which
+/// postures.
+WorkspaceAudit summarize(const Audit& audit, const std::vector<PostureNumbers>& numbers,
+                         const std::function<JointVector(std::int64_t)>& posture);
 
 }  // namespace dashpot::controller
