@@ -9,6 +9,8 @@ from importlib.metadata import version as _version
 
 from ._analysis import (DampingDesign, Gradients, Miss, Response, SampledModes, Sensitivities,
                         design_damping, modes, receptance, response, sampled_modes, sensitivities)
+from ._audit import (Audit, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit,
+                     audit)
 from ._controller import (Controller, Setpoint, Snapshot, Status, TrackedModes,
                           TrackedSampledModes)
 from ._core import Error
@@ -17,7 +19,9 @@ from ._results import Modes
 from ._robot import ClosedLoop, Robot, closed_loop
 
 __version__ = _version("dashpot")
-__all__ = ["ClosedLoop", "Controller", "DampingDesign", "Error", "Gradients", "Miss", "Modes",
-           "Response", "Robot", "SampledModes", "Sensitivities", "Setpoint", "Snapshot", "Status",
-           "TrackedModes", "TrackedSampledModes", "closed_loop", "design_damping", "modes",
-           "read_log", "receptance", "response", "sampled_modes", "sensitivities"]
+__all__ = ["Audit", "ClosedLoop", "Controller", "DampingDesign", "DampingSuggestion",
+           "Distribution", "Error", "Gradients", "Miss", "Modes", "PostureAudit", "Response",
+           "Robot", "SampledModes", "Sensitivities", "Setpoint", "Snapshot", "Status",
+           "TrackedModes", "TrackedSampledModes", "WorkspaceAudit", "audit", "closed_loop",
+           "design_damping", "modes", "read_log", "receptance", "response", "sampled_modes",
+           "sensitivities"]

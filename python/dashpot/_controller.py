@@ -53,7 +53,7 @@ class Status(enum.IntEnum):
 
     @property
     def text(self) -> str:
-        """A short English text: "torque limited"."""
+        """A short English text."""
         return _core.status_text(int(self))
 
 

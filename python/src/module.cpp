@@ -38,4 +38,5 @@ NB_MODULE(_core, m) {
   add_robot(m);
   add_controller(m);
   add_log(m);
+  add_audit(m);
 }
