@@ -248,7 +248,7 @@ class Controller:
     def start(self, q: npt.ArrayLike, torque: npt.ArrayLike | None = None) -> None:
         """Prepares the loop with the robot at rest at q (n, rad), where it applies `torque` (n, N m;
         None: its weight). Raises Error for gains with too small a gain margin there."""
-        self._core.start(_column(to_numbers("q", q, 1)), _column(to_vector("torque", torque)))
+        self._core.start(to_numbers("q", q, 1).reshape(-1, 1), _column(to_vector("torque", torque)))
 
     def reset(self, torque: npt.ArrayLike | None = None) -> None:
         """Forgets history, faults and set-point, but not the gains. The torque-rate limit counts
