@@ -107,6 +107,7 @@ inline const std::vector<Room>& rooms() {
       {"apps/monitor", 3, {}, {""}},
       {"apps", 4, {}, {""}},
 
+      {"python", 0, {}, {""}},
       {"examples", 0, {}, {"dashpot/", "stdio.h"}},
       {"tests", 0, {}, {""}},
       {"benchmarks", 0, {}, {""}},
