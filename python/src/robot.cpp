@@ -150,10 +150,11 @@ Robot make_robot(const std::string& urdf, const std::string& name, const std::st
   return Robot(RobotModel::from_urdf_text(urdf, base, tip, options, name));
 }
 
-Gains make_gains(const Robot& robot, OptionalMatrix joint_stiffness, OptionalMatrix joint_damping,
-                 double joint_damping_ratio, OptionalMatrix task_stiffness,
-                 OptionalMatrix task_damping, double task_damping_ratio,
-                 OptionalVector null_stiffness, OptionalVector null_damping, bool tool_frame,
+Gains make_gains(const Robot& robot, const OptionalMatrix& joint_stiffness,
+                 const OptionalMatrix& joint_damping, double joint_damping_ratio,
+                 const OptionalMatrix& task_stiffness, const OptionalMatrix& task_damping,
+                 double task_damping_ratio, const OptionalVector& null_stiffness,
+                 const OptionalVector& null_damping, bool tool_frame,
                  const std::vector<bool>& directions) {
   const Eigen::Index n = robot.model.dof();
   const auto check = [](const char* key, const auto& given, Eigen::Index rows, Eigen::Index cols) {
