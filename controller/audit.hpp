@@ -88,7 +88,8 @@ struct DampingSuggestion {
   /// Damping that gives every mode the ratio at one posture, see analysis::design_damping: 6 x 6 in
   /// the axes of AuditOptions::gains.frame, or n x n in mode kJoint. Positive semidefinite.
   Eigen::MatrixXd damping;
-  /// Diagonal of the diagonal damping matrix whose ratios come nearest; 6, or n in mode kJoint.
+  /// Diagonal of `damping`, which makes the nearest diagonal matrix (Frobenius norm); 6, or n in
+  /// mode kJoint.
   Eigen::VectorXd diagonal;
   double smallest_ratio = 0, diagonal_smallest_ratio = 0;  ///< what these give at the posture
 };

@@ -108,7 +108,7 @@ std::string suggestion_table(const AuditTask& task, const AuditReport& report) {
   TextTable table;
   std::vector<std::vector<std::string>> columns;
   for (Eigen::Index j = 0; j < found.damping.cols(); ++j) {
-    table.add_column(Align::kPoint, {""});
+    table.add_column(Align::kPoint, {});
     const Eigen::VectorXd column = found.damping.col(j);
     columns.push_back(format_column({column.begin(), column.end()}, 6));
   }

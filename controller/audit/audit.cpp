@@ -317,17 +317,19 @@ DampingSuggestion Audit::suggest(const JointVector& q, double ratio) const {
   analysis::TaskImpedance impedance = task_impedance(evaluate(q));
   impedance.task_damping.reset();
   if (!impedance.jacobian) impedance.damping = MatrixXd(friction_.asDiagonal());
-  const auto smallest_ratio = [&](const analysis::DampingDesign& design) {
+  const analysis::DampingDesign full = analysis::design_damping(impedance, target);
+  const Eigen::VectorXd diagonal = full.damping.diagonal();
+  const auto smallest_ratio = [&](const MatrixXd& damping) {
     PostureAudit posture;
-    posture.spectrum = design.spectrum;
+    analysis::SpectrumOptions options;
+    options.soft_frequency = options_.soft_frequency;
+    posture.spectrum = analysis::analyze(
+        analysis::to_joint_space(analysis::with_damping(impedance, damping)), options);
     read_spectrum(posture);
     return posture.numbers.smallest_ratio;
   };
-  const analysis::DampingDesign full = analysis::design_damping(impedance, target);
-  const analysis::DampingDesign diagonal =
-      analysis::design_damping(impedance, target, analysis::DampingStructure::kDiagonal);
-  return {ratio, full.damping, diagonal.damping.diagonal(), smallest_ratio(full),
-          smallest_ratio(diagonal)};
+  return {ratio, full.damping, diagonal, smallest_ratio(full.damping),
+          smallest_ratio(MatrixXd(diagonal.asDiagonal()))};
 }
 
 }  // namespace dashpot::controller
