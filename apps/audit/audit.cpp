@@ -53,7 +53,6 @@ class Workers {
       : postures_(postures), numbers_(static_cast<std::size_t>(postures.count)) {}
 
   std::vector<PostureNumbers> run(int jobs) {
-    const StopSignal stop;
     const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
     const unsigned threads = jobs > 0 ? static_cast<unsigned>(jobs) : processors;
     std::vector<std::exception_ptr> errors(threads);
@@ -93,6 +92,7 @@ class Workers {
     }
   }
 
+  StopSignal stop_;  // first, because room for many postures takes a while
   const Postures& postures_;
   std::vector<PostureNumbers> numbers_;
   std::atomic<std::int64_t> next_{0};

@@ -291,7 +291,7 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
   add("--q", arm.q, "Joint positions, rad or m", "a,b,... (middle of the limits)");
   add("--postures", options.postures, "YAML file with a list of postures", "FILE");
   command.add_option("--samples", options.samples, "Postures spread over the position limits")
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{100'000'000}))
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{10'000'000}))
       ->option_text("N");
   command.add_option("--seed", options.seed, "Of the samples")->option_text("S (1)");
   command.add_option("--spread", options.spread, "Samples no further than this from --q")
