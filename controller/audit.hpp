@@ -35,6 +35,8 @@ struct AuditOptions {
   double cutoff = 0;                 ///< of a first-order low-pass on the torque, Hz; 0: none
   bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / period as velocity
   double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
+  /// Range of sampled postures, n, rad; without entries the position limits of the model.
+  JointVector lower, upper;
 };
 
 /// What a posture does to the gains, in three numbers.
@@ -86,7 +88,8 @@ struct DampingSuggestion {
   /// Damping that gives every mode the ratio at one posture, see analysis::design_damping: 6 x 6 in
   /// the axes of AuditOptions::gains.frame, or n x n in mode kJoint. Positive semidefinite.
   Eigen::MatrixXd damping;
-  /// Diagonal of the diagonal damping matrix whose ratios come nearest; 6, or n in mode kJoint.
+  /// Diagonal of `damping`, which makes the nearest diagonal matrix (Frobenius norm); 6, or n in
+  /// mode kJoint.
   Eigen::VectorXd diagonal;
   double smallest_ratio = 0, diagonal_smallest_ratio = 0;  ///< what these give at the posture
 };
@@ -100,9 +103,9 @@ struct DampingSuggestion {
 /// An Audit does not change: several threads may use one at once.
 class Audit {
  public:
-  /// Throws std::invalid_argument, with the member's name and the reason, for gains of another
-  /// size, or that are not finite or not symmetric, for stiffness that is not positive
-  /// semidefinite, and for a loop that analysis::gain_margin refuses.
+  /// Throws std::invalid_argument, with the member's name and the reason, for gains and ranges of
+  /// another size, or gains that are not finite or not symmetric, for stiffness that is not
+  /// positive semidefinite, and for a loop that analysis::gain_margin refuses.
   Audit(const RobotModel& model, const AuditOptions& options);
 
   const RobotModel& model() const noexcept { return model_; }
@@ -118,9 +121,13 @@ class Audit {
   /// std::runtime_error if the eigenvalue iteration fails.
   PostureAudit audit(const JointVector& q) const;
 
-  /// Returns the numbers of the postures `first` .. `first + count - 1` of the sequence `seed`,
-  /// see sample_posture. They depend on nothing else: neither on the call's share of the postures
-  /// nor on earlier calls.
+  /// Returns posture `index` (from 0) of the sequence `seed`. It is spread evenly over the range of
+  /// all joints at once, at most half a turn each way, by the quasi-random sequence of Roberts
+  /// (2018), moved by an offset that depends on the seed.
+  JointVector posture(std::uint64_t seed, std::int64_t index) const;
+
+  /// Returns the numbers of the postures `first` .. `first + count - 1` of the sequence `seed`.
+  /// They depend on nothing else: neither on the call's share of the postures nor on earlier calls.
   std::vector<PostureNumbers> sample(std::uint64_t seed, std::int64_t first,
                                      std::int64_t count) const;
 
@@ -143,11 +150,6 @@ class Audit {
   analysis::SampledLoop loop_;
   int springs_ = 0;  ///< modes where no posture is singular
 };
-
-/// Returns posture `index` (from 0) of the sequence `seed`, spread evenly between the position
-/// limits of all joints at once, at most half a turn each way. It is the quasi-random sequence of
-/// Roberts (2018), moved by an offset that depends on the seed.
-JointVector sample_posture(const RobotModel& model, std::uint64_t seed, std::int64_t index);
 
 /// Summarizes postures by their `numbers`; posture(i) returns the i-th posture. The numbers in the
 /// result are those of Audit::audit, with proved bounds, so that `numbers` only decide at which

@@ -183,6 +183,11 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
   require(options.delay >= 0, "delay: must not be negative, ticks");
   require(std::isfinite(options.cutoff) && options.cutoff >= 0,
           "cutoff: must be finite and not negative, Hz");
+  if (options.lower.size() == 0) options_.lower = model.joint_values(&Joint::lower);
+  if (options.upper.size() == 0) options_.upper = model.joint_values(&Joint::upper);
+  require(options_.lower.size() == n && options_.upper.size() == n &&
+              (options_.lower.array() <= options_.upper.array()).all(),
+          "lower, upper: need n entries, none of lower above that of upper");
   loop_.period = options.period;
   loop_.delay = options.delay;
   loop_.torque_cutoff = options.cutoff;
@@ -293,10 +298,13 @@ PostureAudit Audit::audit(const JointVector& q) const {
   return result;
 }
 
+JointVector Audit::posture(std::uint64_t seed, std::int64_t index) const {
+  return PostureSequence(options_.lower, options_.upper, seed).at(index);
+}
+
 std::vector<PostureNumbers> Audit::sample(std::uint64_t seed, std::int64_t first,
                                           std::int64_t count) const {
-  const PostureSequence postures(model_.joint_values(&Joint::lower),
-                                 model_.joint_values(&Joint::upper), seed);
+  const PostureSequence postures(options_.lower, options_.upper, seed);
   std::vector<PostureNumbers> result(static_cast<std::size_t>(count));
   for (PostureNumbers& one : result) one = numbers(postures.at(first++));
   return result;
@@ -309,22 +317,19 @@ DampingSuggestion Audit::suggest(const JointVector& q, double ratio) const {
   analysis::TaskImpedance impedance = task_impedance(evaluate(q));
   impedance.task_damping.reset();
   if (!impedance.jacobian) impedance.damping = MatrixXd(friction_.asDiagonal());
-  const auto smallest_ratio = [&](const analysis::DampingDesign& design) {
+  const analysis::DampingDesign full = analysis::design_damping(impedance, target);
+  const Eigen::VectorXd diagonal = full.damping.diagonal();
+  const auto smallest_ratio = [&](const MatrixXd& damping) {
     PostureAudit posture;
-    posture.spectrum = design.spectrum;
+    analysis::SpectrumOptions options;
+    options.soft_frequency = options_.soft_frequency;
+    posture.spectrum = analysis::analyze(
+        analysis::to_joint_space(analysis::with_damping(impedance, damping)), options);
     read_spectrum(posture);
     return posture.numbers.smallest_ratio;
   };
-  const analysis::DampingDesign full = analysis::design_damping(impedance, target);
-  const analysis::DampingDesign diagonal =
-      analysis::design_damping(impedance, target, analysis::DampingStructure::kDiagonal);
-  return {ratio, full.damping, diagonal.damping.diagonal(), smallest_ratio(full),
-          smallest_ratio(diagonal)};
-}
-
-JointVector sample_posture(const RobotModel& model, std::uint64_t seed, std::int64_t index) {
-  return PostureSequence(model.joint_values(&Joint::lower), model.joint_values(&Joint::upper), seed)
-      .at(index);
+  return {ratio, full.damping, diagonal, smallest_ratio(full.damping),
+          smallest_ratio(MatrixXd(diagonal.asDiagonal()))};
 }
 
 }  // namespace dashpot::controller

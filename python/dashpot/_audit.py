@@ -70,7 +70,7 @@ class DampingSuggestion(Result):
     damping: Array
     """6 x 6 in the axes of the gains' frame, or n x n for joint springs."""
     diagonal: Array
-    """Diagonal of the diagonal matrix whose ratios come nearest."""
+    """Diagonal of `damping`, which makes the nearest diagonal matrix."""
     smallest_ratio: float
     diagonal_smallest_ratio: float
 
@@ -150,13 +150,15 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           inertia_blocks: bool = False, period: float = 0, delay: int = 0, cutoff: float = 0,
           difference_velocity: bool = False, soft_frequency: float = 0.1,
           damping_ratio: float | None = None, samples: int = 0, seed: int = 0,
+          lower: npt.ArrayLike | None = None, upper: npt.ArrayLike | None = None,
           postures: npt.ArrayLike | None = None,
           executor: concurrent.futures.Executor | None = None) -> Audit:
     """Returns what gains really do on a robot, as their documentation states them.
 
     At posture q (n, rad): its modes, smallest damping ratio, fastest pole and gain margin. Over
-    `samples` postures, spread evenly between the position limits by a sequence of number `seed`, or
-    over `postures` (s x n, rad): the distributions of these numbers. With a `damping_ratio`: damping
+    `samples` postures, spread evenly by a sequence of number `seed` between `lower` and `upper` (n,
+    rad; by default the position limits), or over `postures` (s x n, rad): the distributions of these
+    numbers. With a `damping_ratio`: damping
     that gives every mode this ratio at q.
 
     Gains are those of `closed_loop`; `damping_factor` F stands for a damping of F sqrt(K), entry by
@@ -185,11 +187,14 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
              _damping(joint_stiffness, joint_damping, factor_of[1], "joint_damping"), 0.0,
              stiffness, damping, 0.0, to_vector("null_stiffness", null_stiffness),
              to_vector("null_damping", null_damping), is_tool(frame), [True] * 6)
-    task = _Task(robot, gains, at_tip,
-                 {"half_quaternion": half_quaternion, "inertia_blocks": inertia_blocks,
-                  "period": float(period), "delay": delay, "cutoff": float(cutoff),
-                  "difference_velocity": difference_velocity,
-                  "soft_frequency": float(soft_frequency)})
+    options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": inertia_blocks,
+                               "period": float(period), "delay": delay, "cutoff": float(cutoff),
+                               "difference_velocity": difference_velocity,
+                               "soft_frequency": float(soft_frequency)}
+    for name, values in (("lower", lower), ("upper", upper)):
+        if values is not None:
+            options[name] = to_numbers(name, values, 1)
+    task = _Task(robot, gains, at_tip, options)
     given = None if postures is None else to_numbers("postures", postures, 2)
     samples = samples if given is None else len(given)
     posture = workspace = suggestion = None

@@ -35,6 +35,12 @@ RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool c
   options.cutoff = nb::cast<double>(given["cutoff"]);
   options.difference_velocity = nb::cast<bool>(given["difference_velocity"]);
   options.soft_frequency = nb::cast<double>(given["soft_frequency"]);
+  if (given.contains("lower")) {
+    options.lower = robot.joint_vector("lower", nb::cast<Eigen::VectorXd>(given["lower"]));
+  }
+  if (given.contains("upper")) {
+    options.upper = robot.joint_vector("upper", nb::cast<Eigen::VectorXd>(given["upper"]));
+  }
   return {robot, Audit(robot.model, options)};
 }
 
@@ -93,7 +99,7 @@ nb::dict summarize(const RobotAudit& all, const Table& table, std::uint64_t seed
     const nb::gil_scoped_release release;
     found = controller::summarize(all.audit, from_table(table), [&](std::int64_t i) -> JointVector {
       if (postures) return postures->row(i).transpose();
-      return controller::sample_posture(all.robot.model, seed, i);
+      return all.audit.posture(seed, i);
     });
   }
   nb::dict result;

@@ -58,6 +58,9 @@ def test_postures_may_be_given(panda):
     found = dashpot.audit(panda, **GAINS, postures=postures).workspace
     ratios = [dashpot.audit(panda, q, **GAINS).posture.smallest_ratio for q in postures[:300:10]]
     assert found.samples == 300 and found.smallest_ratio.worst <= min(ratios)
+    narrow = dict(lower=np.array(HOME) - 0.01, upper=np.array(HOME) + 0.01)
+    near = dashpot.audit(panda, **GAINS, samples=100, **narrow).workspace.smallest_ratio
+    assert np.all(np.abs(near.worst_q - HOME) <= 0.01) and near.p95 - near.worst < 0.05
     assert any(np.array_equal(found.smallest_ratio.worst_q, q) for q in postures)
 
 

@@ -103,6 +103,7 @@ inline const std::vector<Room>& rooms() {
       {"apps/scene", 1, {}, {""}},
       {"apps/design", 2, {}, {""}},
       {"apps/loop", 2, {}, {""}},
+      {"apps/audit", 3, {}, {""}},
       {"apps/run", 3, {}, {""}},
       {"apps/monitor", 3, {}, {""}},
       {"apps", 4, {}, {""}},
