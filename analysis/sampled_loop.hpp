@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/analysis/elastic_form.hpp>
 #include <dashpot/analysis/sampled/sampled_spectrum.hpp>
 #include <dashpot/analysis/spectrum/spectrum_result.hpp>
 
@@ -35,10 +36,15 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
 /// quarter, or infinity if there is none up to `most`. Where the loop is unstable as it is, the
 /// result is the first boundary below 1, or zero if there is none down to 1e-3. Motions with
 /// |log z| / T below `slowest`, rad/s, do not count, because a self-motion fed by gravity
-/// compensation with a zero-order hold is no vibration. The search takes some tens of
+/// compensation with a zero-order hold is no vibration. The search takes ten to some tens of
 /// eigenproblems. Throws like sample_loop.
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
                    double most = 1e6, double slowest = 0);
+
+/// Returns the same from an elastic form, without a spectrum.
+template <int N>
+double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double most = 1e6,
+                   double slowest = 0);
 
 }  // namespace dashpot::analysis

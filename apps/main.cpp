@@ -31,6 +31,7 @@ int run(int argc, char** argv) {
   add_inspect(program);
   add_monitor(program);
   add_design(program);
+  add_audit(program);
   add_run(program);
 
   const auto name = [&program] {

@@ -1,8 +1,8 @@
+#include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/analysis/linalg/phi_functions.hpp>
 #include <dashpot/analysis/sampled/sampled_data_model.hpp>
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <cmath>
@@ -30,14 +30,23 @@ MatrixXd checked(const MatrixXd& A, Index n, const char* name) {
 
 }  // namespace
 
-template <int N>
-SampledDataModel::SampledDataModel(const System<N>& system, const Spectrum<N>& spectrum,
-                                   const SampledLoop& loop)
-    : n(system.dof()), delay(loop.delay), difference(loop.difference_velocity) {
+void SampledDataModel::set_loop(const SampledLoop& loop) {
   require(std::isfinite(loop.period) && loop.period > 0, "period has to be positive, s");
   require(loop.delay >= 0, "delay must not be negative, ticks");
   require(std::isfinite(loop.torque_cutoff) && loop.torque_cutoff >= 0,
           "torque_cutoff must be finite and not negative, Hz");
+  delay = loop.delay;
+  difference = loop.difference_velocity;
+  if (loop.torque_cutoff > 0) {
+    filter_gain = -std::expm1(-2 * std::numbers::pi * loop.torque_cutoff * loop.period);
+  }
+}
+
+template <int N>
+SampledDataModel::SampledDataModel(const System<N>& system, const Spectrum<N>& spectrum,
+                                   const SampledLoop& loop)
+    : n(system.dof()) {
+  set_loop(loop);
   require(spectrum.status == Status::kOk || spectrum.status == Status::kUncertified,
           std::string("the spectrum failed: ") + to_text(spectrum.status));
   require(spectrum.zero_modes.basis.rows() == n, "the spectrum has another size");
@@ -53,32 +62,68 @@ SampledDataModel::SampledDataModel(const System<N>& system, const Spectrum<N>& s
   D = T * unit(checked(loop.friction, n, "friction"));
   G = T * T * unit(checked(loop.gravity_gradient, n, "gravity_gradient"));
   zero_modes = mass.matrixU() * MatrixXd(spectrum.zero_modes.basis);
-  if (loop.torque_cutoff > 0) {
-    filter_gain = -std::expm1(-2 * std::numbers::pi * loop.torque_cutoff * T);
-  }
+  integrate();
 }
 
-MatrixXd SampledDataModel::transition() const {
-  const Index rows = 2 * n + memory();
-  const MatrixXd state = MatrixXd::Identity(rows, rows);
-  const auto part = [&](Index at) { return state.middleRows(at, n); };
-  const Index v = difference ? 2 * n : n, queue = difference ? 3 * n : 2 * n;
-  const Index filter = queue + n * delay;
+template <int N>
+SampledDataModel::SampledDataModel(const ElasticForm<N>& form, const SampledLoop& loop)
+    : n(form.coordinates.rows()) {
+  set_loop(loop);
+  const Index m = form.modes();
+  const bool plain = loop.friction.isZero(0) && loop.gravity_gradient.isZero(0);
+  if (plain && form.free_zero_modes) n = m;
+  const auto unit = [&](const MatrixXd& A) -> MatrixXd {
+    if (plain) return MatrixXd::Zero(n, n);
+    const MatrixXd given = checked(A, n, "friction and gravity_gradient");
+    return form.coordinates.transpose() * given * form.coordinates;
+  };
+  const double T = loop.period;
+  C = T * form.damping.topLeftCorner(n, n);
+  K = MatrixXd::Zero(n, n);
+  K.topLeftCorner(m, m).noalias() = T * T * form.root.lazyProduct(form.root.transpose());
+  D = T * unit(loop.friction);
+  G = T * T * unit(loop.gravity_gradient);
+  zero_modes = MatrixXd::Identity(n, n).rightCols(n - m);
+  integrate();
+}
 
-  const MatrixXd command = (G - K) * part(0) - (C - D) * part(v);
-  MatrixXd torque = delay > 0 ? MatrixXd(part(queue)) : command;
-  if (filtered()) torque = filter_gain * torque + (1 - filter_gain) * part(filter);
+void SampledDataModel::integrate() {
+  motion_ = MatrixXd::Zero(2 * n, 3 * n);
+  if (D.isZero(0) && G.isZero(0)) {  // masses alone
+    const MatrixXd unit = MatrixXd::Identity(n, n);
+    motion_ << unit, unit, 0.5 * unit, MatrixXd::Zero(n, n), unit, unit;
+    return;
+  }
   // d/dt (y, y', f) = rate (y, y', f)
   MatrixXd rate = MatrixXd::Zero(3 * n, 3 * n);
   rate.block(0, n, n, n).setIdentity();
   rate.middleRows(n, n) << -G, -D, MatrixXd::Identity(n, n);
-  const MatrixXd motion = phi(0, rate, 1).real();
-  MatrixXd A(rows, rows);
-  A.topRows(2 * n) = motion.topLeftCorner(2 * n, 2 * n) * state.topRows(2 * n) +
-                     motion.topRightCorner(2 * n, n) * torque;
-  if (difference) A.middleRows(v, n) = A.topRows(n) - part(0);
+  motion_ = phi(0, rate, 1).real().topRows(2 * n);
+}
+
+MatrixXd SampledDataModel::transition(double factor) const {
+  const Index rows = 2 * n + memory();
+  const Index v = difference ? 2 * n : n, queue = difference ? 3 * n : 2 * n;
+  const Index filter = queue + n * delay;
+
+  MatrixXd command = MatrixXd::Zero(n, rows);
+  command.leftCols(n) = G - factor * K;
+  command.middleCols(v, n) -= factor * (C - D);
+  MatrixXd torque = command;
+  if (delay > 0) torque.setZero(), torque.middleCols(queue, n).setIdentity();
+  if (filtered()) {
+    torque *= filter_gain;
+    torque.middleCols(filter, n).diagonal().array() += 1 - filter_gain;
+  }
+  MatrixXd A = MatrixXd::Zero(rows, rows);
+  A.topRows(2 * n).noalias() = motion_.rightCols(n) * torque;
+  A.topLeftCorner(2 * n, 2 * n) += motion_.leftCols(2 * n);
+  if (difference) {
+    A.middleRows(v, n) = A.topRows(n);
+    A.block(v, 0, n, n).diagonal().array() -= 1;
+  }
   if (delay > 0) {
-    A.middleRows(queue, n * (delay - 1)) = state.middleRows(queue + n, n * (delay - 1));
+    A.block(queue, queue + n, n * (delay - 1), n * (delay - 1)).setIdentity();
     A.middleRows(queue + n * (delay - 1), n) = command;
   }
   if (filtered()) A.middleRows(filter, n) = torque;
@@ -106,25 +151,37 @@ MatrixXd SampledDataModel::unit_motions() const {
   return X;
 }
 
+MatrixXd SampledDataModel::other_motions() const {
+  const MatrixXd X = unit_motions();
+  if (X.cols() == 0) return MatrixXd(X.rows(), 0);
+  const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(X).householderQ();
+  return Q.rightCols(X.rows() - X.cols());
+}
+
 VectorXcd SampledDataModel::discrete_eigenvalues() const {
   if (n == 0) return {};
   MatrixXd A = transition();
-  if (const MatrixXd X = unit_motions(); X.cols() > 0) {
-    const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(X).householderQ();
-    const MatrixXd rest = Q.rightCols(A.rows() - X.cols());
+  if (zero_modes.cols() > 0) {
+    const MatrixXd rest = other_motions();
     A = (rest.transpose() * A * rest).eval();
   }
-  if (A.rows() == 0) return {};  // nothing holds or damps any motion
-  const Eigen::EigenSolver<MatrixXd> solver(A, false);
-  if (solver.info() != Eigen::Success) {
+  return eigenvalues_of(A);
+}
+
+VectorXcd eigenvalues_of(MatrixXd& A) {
+  VectorXcd result(A.rows());
+  reduce_to_hessenberg(A);
+  if (!A.allFinite() || !hessenberg_eigenvalues(A, result.data())) {
     throw std::runtime_error("sample_loop: the eigenvalue iteration did not converge");
   }
-  return solver.eigenvalues();
+  return result;
 }
 
 template SampledDataModel::SampledDataModel(const System<kDynamic>&, const Spectrum<kDynamic>&,
                                             const SampledLoop&);
 template SampledDataModel::SampledDataModel(const System<kMaxDof>&, const Spectrum<kMaxDof>&,
                                             const SampledLoop&);
+template SampledDataModel::SampledDataModel(const ElasticForm<kDynamic>&, const SampledLoop&);
+template SampledDataModel::SampledDataModel(const ElasticForm<kMaxDof>&, const SampledLoop&);
 
 }  // namespace dashpot::analysis

@@ -1,12 +1,14 @@
 #pragma once
 // One tick of a sampled loop as a matrix.
 
+#include <dashpot/analysis/elastic_form.hpp>
 #include <dashpot/analysis/sampled/sampled_spectrum.hpp>
 #include <dashpot/analysis/spectrum/spectrum_result.hpp>
 
 namespace dashpot::analysis {
 
-/// The loop in coordinates y = L' q (M = L L'), with ticks as the unit of time: mass 1, period 1.
+/// The loop in coordinates y = L' q (M = L L'), or in those of an elastic form, with ticks as the
+/// unit of time: mass 1, period 1.
 struct SampledDataModel {
   Eigen::Index n = 0;
   Eigen::MatrixXd C, K, D, G;  ///< n x n
@@ -18,22 +20,44 @@ struct SampledDataModel {
   /// Throws std::invalid_argument as sample_loop does.
   template <int N>
   SampledDataModel(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop);
+  /// Leaves the zero modes out if nothing moves them. Throws likewise.
+  template <int N>
+  SampledDataModel(const ElasticForm<N>& form, const SampledLoop& loop);
 
   bool filtered() const { return filter_gain < 1; }
   /// Returns the number of rows of the state in addition to y and y'.
   Eigen::Index memory() const { return n * (delay + (filtered() ? 1 : 0) + (difference ? 1 : 0)); }
-  /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f]); see sample_loop.
-  Eigen::MatrixXd transition() const;
+  /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f]), with `factor` times K and C - D;
+  /// see sample_loop.
+  Eigen::MatrixXd transition(double factor = 1) const;
   /// Returns a basis of the states along the zero modes that A does not change or only lets drift:
   /// positions, with the compensated gravity in the memory, and velocities that nothing damps.
   Eigen::MatrixXd unit_motions() const;
+  /// Returns an orthonormal basis of what unit_motions() leaves of the states; no columns if
+  /// unit_motions() has none.
+  Eigen::MatrixXd other_motions() const;
   /// Returns all eigenvalues of A except those of unit_motions(). Throws std::runtime_error.
   Eigen::VectorXcd discrete_eigenvalues() const;
+
+ private:
+  /// Checks the loop, throws std::invalid_argument, and sets what depends on it alone.
+  void set_loop(const SampledLoop& loop);
+  /// Sets `motion_`.
+  void integrate();
+
+  /// (y, y') after a tick from (y, y', torque), 2n x 3n.
+  Eigen::MatrixXd motion_;
 };
+
+/// Returns the eigenvalues of A, which is destroyed. Throws std::runtime_error.
+Eigen::VectorXcd eigenvalues_of(Eigen::MatrixXd& A);
 
 extern template SampledDataModel::SampledDataModel(const System<kDynamic>&,
                                                    const Spectrum<kDynamic>&, const SampledLoop&);
 extern template SampledDataModel::SampledDataModel(const System<kMaxDof>&, const Spectrum<kMaxDof>&,
                                                    const SampledLoop&);
+extern template SampledDataModel::SampledDataModel(const ElasticForm<kDynamic>&,
+                                                   const SampledLoop&);
+extern template SampledDataModel::SampledDataModel(const ElasticForm<kMaxDof>&, const SampledLoop&);
 
 }  // namespace dashpot::analysis

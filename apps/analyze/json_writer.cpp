@@ -128,6 +128,10 @@ Json report_json(const Report& report) {
   return to_value(report);
 }
 
+Json modes_json(const analysis::Spectrum<>& spectrum) {
+  return modes(spectrum);
+}
+
 std::string json_text(const Json& document) {
   std::string text;
   write(document, "", text);

@@ -14,6 +14,9 @@ std::string to_json(const std::vector<Report>& reports, bool as_list);
 /// One report as a JSON object.
 nlohmann::ordered_json report_json(const Report& report);
 
+/// The modes of a spectrum as a JSON list.
+nlohmann::ordered_json modes_json(const analysis::Spectrum<>& spectrum);
+
 /// The text of a document: objects take a line for each item, numbers and matrices stay on one.
 std::string json_text(const nlohmann::ordered_json& document);
 

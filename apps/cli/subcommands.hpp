@@ -26,6 +26,7 @@ void add_analyze(CLI::App& program);
 void add_inspect(CLI::App& program);
 void add_monitor(CLI::App& program);
 void add_design(CLI::App& program);
+void add_audit(CLI::App& program);
 void add_run(CLI::App& program);
 
 /// Writes all of `text` to standard output, what could steer a terminal as escapes (files and

@@ -4,6 +4,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 #include <csignal>
+#include <cstdio>
 #include <sstream>
 
 namespace dashpot::apps {
@@ -37,6 +38,18 @@ bool StopSignal::given() {
 
 bool on_terminal() {
   return isatty(STDOUT_FILENO) != 0;
+}
+
+void show_progress(double done) {
+  constexpr std::size_t kWidth = 40;
+  if (isatty(STDERR_FILENO) == 0) return;
+  const auto filled = static_cast<std::size_t>(kWidth * done);
+  const std::string bar = std::string(filled, '#') + std::string(kWidth - filled, ' ');
+  if (done < 1) {
+    std::fprintf(stderr, "\r[%s] %3.0f %%", bar.c_str(), 100 * done);
+  } else {
+    std::fputs("\r\033[K", stderr);
+  }
 }
 
 // Second screen, cursor hidden, long lines cut off instead of wrapped; and back.

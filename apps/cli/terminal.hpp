@@ -14,6 +14,10 @@ class StopSignal {
 /// Whether standard output is a terminal.
 bool on_terminal();
 
+/// Shows on the last line of a terminal how much is done, from 0 to 1, which clears the line again.
+/// Does nothing where standard error is no terminal.
+void show_progress(double done);
+
 /// The whole terminal for a text that is drawn again and again in its place; what was there before
 /// comes back at the end.
 class FullScreen {

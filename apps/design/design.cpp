@@ -2,12 +2,12 @@
 #include <dashpot/apps/analyze/system_file.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_options.hpp>
 #include <dashpot/apps/design/design_report.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
 
-#include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <memory>
@@ -87,11 +87,6 @@ DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) t
   throw entry.error(error);
 }
 
-/// Says on the last line of a terminal how much is done.
-void show_progress(double done) {
-  std::fprintf(stderr, done < 1 ? "\r%3.0f %%" : "\r     \r", 100 * done);
-}
-
 RegionReport report_on_region(const SystemFile& file, const DesignOptions& options) {
   if (file.entries.empty()) throw InputError("", "lists no configurations");
   std::vector<analysis::TaskImpedance> configurations;
@@ -117,7 +112,7 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
   region.structure = options.damping_structure();
   region.ceiling = options.largest_ratio;
   region.threads = options.threads;
-  if (isatty(STDERR_FILENO) != 0) region.progress = show_progress;
+  region.progress = show_progress;
   try {
     return {key_of(configurations[0]), options.ratio,
             analysis::design_region(configurations, region)};

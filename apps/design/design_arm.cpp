@@ -45,6 +45,8 @@ controller::Payload read_payload(const std::string& text) {
   return payload;
 }
 
+}  // namespace
+
 RobotModel read_model(const ArmOptions& options) try {
   controller::ModelOptions model;
   model.accept_inertias = options.accept_inertias;
@@ -63,8 +65,6 @@ RobotModel read_model(const ArmOptions& options) try {
 } catch (const controller::InvalidModel& error) {
   throw InputError("", error.what());
 }
-
-}  // namespace
 
 bool ArmOptions::any() const {
   for (const auto* text : {&base, &tip, &q, &task_stiffness, &task_damping, &viscous_friction,

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/controller/robot_model.hpp>
 
 #include <string>
 
@@ -22,6 +23,9 @@ struct ArmOptions {
 
   bool any() const;  ///< whether any option but `urdf` is there
 };
+
+/// The arm with its payload, reflected inertia, and the friction that counts. Throws InputError.
+controller::RobotModel read_model(const ArmOptions& options);
 
 /// The arm with its springs, as a file would give it: mass, jacobian (6 x n, base-aligned axes at
 /// the tip), task_stiffness, task_damping, and damping with what friction and null space add.

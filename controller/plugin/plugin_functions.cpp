@@ -1,5 +1,7 @@
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/plugin/hosted_controller.hpp>
+#include <dashpot/controller/plugin/plugin_create.hpp>
 #include <dashpot/controller/plugin/plugin_data.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
@@ -78,6 +80,14 @@ std::int32_t check_result(const dashpot_controller* controller, const Struct* re
 
 }  // namespace
 
+dashpot_controller* dashpot::controller::create_controller(const Config& config) {
+  auto controller = std::make_unique<dashpot_controller>(config);
+  const std::int32_t code =
+      judge(*controller, controller->request.setpoint.gains, JointVector(), true, nullptr);
+  if (code != DASHPOT_OK) throw InputError("gains", dashpot_last_error());
+  return controller.release();
+}
+
 extern "C" {
 
 dashpot_controller* dashpot_create(const char* config_path) {
@@ -86,12 +96,14 @@ dashpot_controller* dashpot_create(const char* config_path) {
     return nullptr;
   }
   try {
-    auto controller = std::make_unique<dashpot_controller>(load_config(config_path));
-    const std::int32_t code =
-        judge(*controller, controller->request.setpoint.gains, JointVector(), true, nullptr);
-    if (code == DASHPOT_OK) return controller.release();
-    finish(code, (std::string(config_path) + ": gains: " + dashpot_last_error()).c_str());
-    return nullptr;
+    const Config config = load_config(config_path);
+    try {
+      dashpot_controller* const controller = create_controller(config);
+      finish(DASHPOT_OK);
+      return controller;
+    } catch (const InputError& error) {
+      throw error.in_file(config_path);
+    }
   } catch (const std::exception& error) {
     finish(DASHPOT_WRONG_VALUE, error.what());
   } catch (...) {

@@ -46,7 +46,7 @@ inline const std::vector<Room>& rooms() {
        2,
        {"system", "task_space", "null_damping", "rigid_body_elimination"},
        {kEigen}},
-      {"analysis/spectrum", 3, {"mode", "spectrum"}, {kEigen}},
+      {"analysis/spectrum", 3, {"mode", "spectrum", "elastic_form"}, {kEigen}},
       {"analysis/tracker", 4, {"tracked_spectrum", "mode_tracker"}, {kEigen}},
       {"analysis/response", 4, {"response", "sensitivity"}, {kEigen}},
       {"analysis/sampled", 4, {"sampled_loop"}, {kEigen}},
@@ -73,6 +73,7 @@ inline const std::vector<Room>& rooms() {
        {},
        {kAnalysis, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
       {"controller/core", 5, {"controller", "gain_judge"}, {kAnalysis, kEigen}},
+      {"controller/audit", 5, {"audit"}, {kAnalysis, kEigen}},
       {"controller/config", 6, {"config"}, {kEigen}},
       {"controller/plugin", 7, {"plugin"}, {kAnalysis, kEigen, "stdint.h"}},  // plugin.h is C
 
@@ -102,10 +103,12 @@ inline const std::vector<Room>& rooms() {
       {"apps/scene", 1, {}, {""}},
       {"apps/design", 2, {}, {""}},
       {"apps/loop", 2, {}, {""}},
+      {"apps/audit", 3, {}, {""}},
       {"apps/run", 3, {}, {""}},
       {"apps/monitor", 3, {}, {""}},
       {"apps", 4, {}, {""}},
 
+      {"python", 0, {}, {""}},
       {"examples", 0, {}, {"dashpot/", "stdio.h"}},
       {"tests", 0, {}, {""}},
       {"benchmarks", 0, {}, {""}},

@@ -1,0 +1,175 @@
+#include <dashpot/analysis/system.hpp>
+#include <dashpot/apps/audit/audit_writer.hpp>
+#include <dashpot/apps/cli/output_file.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace dashpot::apps {
+namespace {
+
+using controller::Audit;
+using controller::JointVector;
+using controller::PostureNumbers;
+
+constexpr std::int64_t kChunk = 64;  // postures that a thread takes at a time
+
+/// The postures of a task, by number.
+struct Postures {
+  const AuditTask& task;
+  const Audit& audit;
+  std::uint64_t seed;
+  std::int64_t count;
+
+  JointVector at(std::int64_t i) const {
+    if (task.postures.empty()) return audit.posture(seed, i);
+    return task.postures[static_cast<std::size_t>(i)];
+  }
+  std::vector<PostureNumbers> numbers(std::int64_t first, std::int64_t size) const {
+    if (task.postures.empty()) return audit.sample(seed, first, size);
+    std::vector<PostureNumbers> result;
+    for (std::int64_t i = first; i < first + size; ++i) result.push_back(audit.numbers(at(i)));
+    return result;
+  }
+};
+
+/// The numbers of all postures in order, or of the first ones if the user stops it. Chunks are
+/// handed out in order, so that what is done when the threads end has no gap.
+class Workers {
+ public:
+  explicit Workers(const Postures& postures)
+      : postures_(postures), numbers_(static_cast<std::size_t>(postures.count)) {}
+
+  std::vector<PostureNumbers> run(int jobs) {
+    const unsigned processors = std::max(1U, std::thread::hardware_concurrency());
+    const unsigned threads = jobs > 0 ? static_cast<unsigned>(jobs) : processors;
+    std::vector<std::exception_ptr> errors(threads);
+    std::vector<std::thread> pool;
+    for (unsigned i = 0; i < threads; ++i) {
+      pool.emplace_back([this, &error = errors[i], first = i == 0] { work(first, error); });
+    }
+    for (std::thread& thread : pool) thread.join();
+    show_progress(1);
+    for (const std::exception_ptr& error : errors) {
+      if (error) std::rethrow_exception(error);
+    }
+    numbers_.resize(static_cast<std::size_t>(std::min(next_.load(), postures_.count)));
+    return std::move(numbers_);
+  }
+
+ private:
+  /// `shows`: whether this thread shows the progress.
+  void work(bool shows, std::exception_ptr& error) {
+    using Clock = std::chrono::steady_clock;
+    Clock::time_point shown = Clock::now();
+    try {
+      while (!stopped_ && !StopSignal::given()) {
+        const std::int64_t first = next_.fetch_add(kChunk);
+        if (first >= postures_.count) return;
+        const std::int64_t size = std::min(kChunk, postures_.count - first);
+        const std::vector<PostureNumbers> found = postures_.numbers(first, size);
+        std::copy(found.begin(), found.end(), numbers_.begin() + first);
+        if (!shows || Clock::now() - shown < std::chrono::milliseconds(100)) continue;
+        shown = Clock::now();
+        show_progress(
+            std::min(0.999, static_cast<double>(next_) / static_cast<double>(postures_.count)));
+      }
+    } catch (...) {
+      error = std::current_exception();
+      stopped_ = true;
+    }
+  }
+
+  StopSignal stop_;  // first, because room for many postures takes a while
+  const Postures& postures_;
+  std::vector<PostureNumbers> numbers_;
+  std::atomic<std::int64_t> next_{0};
+  std::atomic<bool> stopped_{false};
+};
+
+void write_csv(OutputFile file, const std::string& path, const Postures& postures,
+               const std::vector<PostureNumbers>& numbers) {
+  std::string text = csv_heading(postures.task.model.dof());
+  bool written = true;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto index = static_cast<std::int64_t>(i);
+    text += csv_line(index, postures.at(index), numbers[i]);
+    if (text.size() < 100'000 && i + 1 < numbers.size()) continue;
+    written = written && std::fwrite(text.data(), 1, text.size(), file.get()) == text.size();
+    text.clear();
+  }
+  if (std::fclose(file.release()) != 0 || !written) {
+    throw std::runtime_error("--csv: " + path + ": cannot write");
+  }
+}
+
+void suggest(const Audit& audit, const AuditTask& task, AuditReport& report) {
+  try {
+    report.suggestion = audit.suggest(task.q, task.wanted_ratio);
+  } catch (const std::exception& error) {  // such as a stiffness of zero
+    report.no_suggestion = error.what();
+  }
+}
+
+/// `csv` may be null.
+void run(const AuditCommand& command, OutputFile csv) try {
+  const AuditTask task = read_task(command);
+  const Audit audit(task.model, task.options);
+  AuditReport report;
+  report.posture = audit.audit(task.q);
+  suggest(audit, task, report);
+  const std::int64_t listed = static_cast<std::int64_t>(task.postures.size());
+  const Postures postures{task, audit, command.seed, listed > 0 ? listed : command.samples};
+  if (postures.count > 0) {
+    const std::vector<PostureNumbers> numbers = Workers(postures).run(command.jobs);
+    report.interrupted = static_cast<std::int64_t>(numbers.size()) < postures.count;
+    report.workspace = controller::summarize(
+        audit, numbers, [&postures](std::int64_t i) { return postures.at(i); });
+    if (csv) write_csv(std::move(csv), command.csv, postures, numbers);
+    if (!command.plot.empty()) draw_audit(command.plot, task, numbers);
+  }
+  print(command.json ? audit_json(task, report) : audit_table(task, report));
+} catch (const std::invalid_argument& error) {
+  throw InputError("", error.what());
+}
+
+constexpr const char* kHelp =
+    R"(The modes of  M q'' + C q' + K q = 0  with gains as a controller states them, where the ratio
+that they were meant to give is F/2 for a damping of F sqrt(stiffness). Damping, pole and margin are
+given at one posture, with proved bounds, and over many. A quaternion's vector part is half of the
+rotation vector, so that half-quaternion halves the rotational stiffness, not the damping. Ctrl-C
+ends the sampling with what is done.
+)";
+
+}  // namespace
+
+void add_audit(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("audit", "What the gains of a controller really do on an arm");
+  const auto options = std::make_shared<AuditCommand>();
+  add_audit_options(*command, *options);
+  command->footer(std::string(kHelp) + kUnitsHelp + "\n" + kExitStatusHelp);
+  command->callback([options] {
+    check_outputs({{"--csv", options->csv}, {"--plot", options->plot}},
+                  {{"--urdf", options->arm.urdf},
+                   {"--gains", options->gains},
+                   {"--postures", options->postures}});
+    OutputFile csv(nullptr, std::fclose);
+    if (!options->csv.empty()) csv = open_output("--csv", options->csv);
+    run(*options, std::move(csv));
+  });
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,311 @@
+#include <dashpot/apps/audit/audit_options.hpp>
+#include <dashpot/apps/audit/presets.hpp>
+#include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/controller/config/config_gains.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/yaml/yaml_document.hpp>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dashpot::apps {
+namespace {
+
+using controller::AuditOptions;
+using controller::JointVector;
+using controller::Mode;
+using controller::RobotModel;
+using controller::Units;
+
+const Units kStiffness = {"N/m", "N/m", "N/m", "N m/rad", "N m/rad", "N m/rad"};
+const Units kDamping = {"N s/m", "N s/m", "N s/m", "N m s/rad", "N m s/rad", "N m s/rad"};
+
+std::vector<std::string> preset_names() {
+  std::vector<std::string> names;
+  for (const GainPreset& preset : kPresets) names.emplace_back(preset.name);
+  return names;
+}
+
+/// Sets the gains of a preset; all but the damping, which follows from the factor.
+void take_preset(const std::string& name, AuditOptions& audit) {
+  const GainPreset& preset = *std::find_if(kPresets.begin(), kPresets.end(),
+                                           [&](const auto& one) { return one.name == name; });
+  controller::Vector6 diagonal;
+  diagonal << preset.translation, preset.translation, preset.translation, preset.rotation,
+      preset.rotation, preset.rotation;
+  audit.gains.task_stiffness = diagonal.asDiagonal();
+  audit.half_quaternion = preset.half_quaternion;
+  audit.inertia_blocks = preset.inertia_blocks;
+}
+
+/// Sets the gains that stand in a configuration file.
+void read_gains_file(const std::string& path, const RobotModel& model, AuditOptions& audit) try {
+  static constexpr std::array<std::string_view, 11> kKeys = {
+      "robot",    "control",  "gains",    "limits",     "motion",  "feed_forward",
+      "watchdog", "analysis", "commands", "simulation", "scenario"};
+  const controller::YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
+  const controller::YamlMapping root(document, "", kKeys);
+  if (!root.has("gains")) throw InputError("gains", "missing");
+  controller::Gains& gains = audit.gains;
+  const int n = model.dof();
+  gains.joint_stiffness.setZero(n, n);
+  gains.joint_damping.setZero(n, n);
+  gains.null_stiffness.setZero(n);
+  gains.null_damping.setZero(n);
+  controller::read_gains(root, model, controller::GainPairs::kEither, gains);
+  if (gains.joint_damping_ratio > 0 || gains.task_damping_ratio > 0) {
+    throw InputError("gains",
+                     "damping_ratio asks for damping that follows the posture; an audit "
+                     "needs damping");
+  }
+} catch (const InputError& error) {
+  throw error.in_file(path);
+}
+
+/// Returns F sqrt(K), entry by entry.
+template <class Matrix>
+Matrix factor_damping(const std::string& option, double factor, const Matrix& K) {
+  if (K.size() > 0 && K.minCoeff() < 0) {
+    throw InputError(option, "needs a stiffness without negative entries");
+  }
+  return factor * K.cwiseSqrt();
+}
+
+void read_options_gains(const AuditCommand& command, const RobotModel& model, AuditOptions& audit) {
+  controller::Gains& gains = audit.gains;
+  const auto joints = [&](const char* option, const std::string& text, const char* revolute,
+                          const char* prismatic) -> JointVector {
+    return quantities_per_joint(option, text, controller::joint_units(model, revolute, prismatic));
+  };
+  if (!command.stiffness.empty()) {
+    gains.task_stiffness =
+        parse_quantities("--stiffness", command.stiffness, kStiffness).asDiagonal();
+  }
+  if (!command.damping.empty()) {
+    gains.task_damping = parse_quantities("--damping", command.damping, kDamping).asDiagonal();
+  }
+  if (!command.joint_stiffness.empty()) {
+    audit.mode = Mode::kJoint;
+    gains.joint_stiffness =
+        joints("--joint-stiffness", command.joint_stiffness, "N m/rad", "N/m").asDiagonal();
+  }
+  if (!command.joint_damping.empty()) {
+    gains.joint_damping =
+        joints("--joint-damping", command.joint_damping, "N m s/rad", "N s/m").asDiagonal();
+  }
+  if (!command.null_stiffness.empty()) {
+    gains.null_stiffness = joints("--null-stiffness", command.null_stiffness, "N m/rad", "N/m");
+  }
+  if (!command.null_damping.empty()) {
+    gains.null_damping = joints("--null-damping", command.null_damping, "N m s/rad", "N s/m");
+  }
+}
+
+void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptions& audit,
+                double& intended_ratio) {
+  std::optional<double> factor = command.damping_factor;
+  if (!command.preset.empty()) {
+    take_preset(command.preset, audit);
+    if (!factor) factor = kPresetFactor;
+  }
+  if (!command.gains.empty()) read_gains_file(command.gains, model, audit);
+  read_options_gains(command, model, audit);
+  if (command.mode == "joint") audit.mode = Mode::kJoint;
+  if (!command.rotation.empty()) audit.half_quaternion = command.rotation == "half-quaternion";
+  if (command.frame == "tool") audit.gains.frame = controller::Frame::kTool;
+  if (!factor) return;
+  controller::Gains& gains = audit.gains;
+  intended_ratio = *factor / 2;
+  gains.task_damping = factor_damping("--damping-factor", *factor, gains.task_stiffness);
+  gains.joint_damping = factor_damping("--damping-factor", *factor, gains.joint_stiffness);
+}
+
+/// The postures in a file: a list of lists, rad or m.
+std::vector<JointVector> read_postures(const std::string& path, int n) try {
+  const controller::YamlNode document = controller::parse_yaml(controller::read_file(path));
+  if (document.kind != controller::YamlNode::Kind::kSequence || document.items.empty()) {
+    throw InputError("", "a list of postures is wanted, each a list of joint positions");
+  }
+  std::vector<JointVector> postures;
+  for (const controller::YamlNode& item : document.items) {
+    controller::YamlNode holder;  // a mapping, which reads lists of numbers
+    controller::YamlNode key;
+    key.kind = controller::YamlNode::Kind::kScalar;
+    key.text = "posture";
+    holder.kind = controller::YamlNode::Kind::kMap;
+    holder.line = item.line;
+    holder.items = {key, item};
+    static constexpr std::array<std::string_view, 1> kKeys = {"posture"};
+    const controller::YamlMapping mapping(holder, "[" + std::to_string(postures.size()) + "].",
+                                          kKeys);
+    const Eigen::VectorXd q = *mapping.vector("posture");
+    if (q.size() != n) {
+      throw mapping.error("posture",
+                          std::to_string(q.size()) + " numbers, expected " + std::to_string(n));
+    }
+    postures.emplace_back(q);
+  }
+  return postures;
+} catch (const InputError& error) {
+  throw error.in_file(path);
+}
+
+/// The middle of the limits; zero where there are none.
+JointVector middle(const RobotModel& model) {
+  JointVector q(model.dof());
+  for (int i = 0; i < model.dof(); ++i) {
+    const controller::Joint& joint = model.joints()[static_cast<std::size_t>(i)];
+    const double sum = joint.lower + joint.upper;
+    q[i] = std::isfinite(sum) ? 0.5 * sum : 0;
+  }
+  return q;
+}
+
+void read_range(const AuditCommand& command, AuditTask& task) {
+  if (!command.spread) return;
+  const JointVector lower = task.model.joint_values(&controller::Joint::lower);
+  const JointVector upper = task.model.joint_values(&controller::Joint::upper);
+  task.options.lower = lower.cwiseMax((task.q.array() - *command.spread).matrix());
+  task.options.upper = upper.cwiseMin((task.q.array() + *command.spread).matrix());
+  if ((task.options.lower.array() > task.options.upper.array()).any()) {
+    throw InputError("--q", "is outside the position limits by more than --spread");
+  }
+}
+
+void check(const AuditCommand& command) {
+  const bool joint = !command.joint_stiffness.empty();
+  const int sources = (command.preset.empty() ? 0 : 1) + (command.gains.empty() ? 0 : 1) +
+                      (command.stiffness.empty() ? 0 : 1) + (joint ? 1 : 0);
+  if (sources != 1) {
+    throw InputError("--stiffness",
+                     "give one of --stiffness, --joint-stiffness, --gains and "
+                     "--preset");
+  }
+  if (!command.stiffness.empty() && command.damping.empty() == !command.damping_factor) {
+    throw InputError("--damping", "give --damping or --damping-factor");
+  }
+  if (joint && command.joint_damping.empty() == !command.damping_factor) {
+    throw InputError("--joint-damping", "give --joint-damping or --damping-factor");
+  }
+  if (!command.damping.empty() && command.stiffness.empty()) {
+    throw InputError("--damping", "goes with --stiffness");
+  }
+  if (!command.joint_damping.empty() && !joint) {
+    throw InputError("--joint-damping", "goes with --joint-stiffness");
+  }
+  if (!command.mode.empty() && command.gains.empty()) {
+    throw InputError("--mode", "goes with --gains");
+  }
+  if (command.samples > 0 && !command.postures.empty()) {
+    throw InputError("--postures", "does not go with --samples");
+  }
+  if (command.spread && command.samples == 0) throw InputError("--spread", "needs --samples");
+  const bool loop = command.delay > 0 || command.cutoff > 0 || command.difference_velocity;
+  if (command.period == 0 && loop) {
+    throw InputError("--period", "missing; --delay, --cutoff and --difference-velocity need it");
+  }
+  const bool many = command.samples > 0 || !command.postures.empty();
+  for (const auto& [option, path] : {std::pair("--csv", &command.csv), {"--plot", &command.plot}}) {
+    if (!path->empty() && !many) throw InputError(option, "needs --samples or --postures");
+  }
+  const auto ends = [&](const char* end) { return command.plot.ends_with(end); };
+  if (!command.plot.empty() && !ends(".svg") && !ends(".png")) {
+    throw InputError("--plot", command.plot + ": has to end with .svg or .png");
+  }
+}
+
+}  // namespace
+
+AuditTask read_task(const AuditCommand& command) {
+  check(command);
+  ArmOptions arm = command.arm;
+  AuditTask task{read_model(arm), {}, std::numeric_limits<double>::quiet_NaN(), 0, {}, {}};
+  AuditOptions& audit = task.options;
+  read_gains(command, task.model, audit, task.intended_ratio);
+  audit.period = command.no_margin ? 0 : command.period;
+  audit.delay = command.delay;
+  audit.cutoff = command.cutoff;
+  audit.difference_velocity = command.difference_velocity;
+  const double intended = std::isnan(task.intended_ratio) ? 0.7 : task.intended_ratio;
+  task.wanted_ratio = command.damping_ratio.value_or(intended);
+  task.q = arm.q.empty() ? middle(task.model)
+                         : JointVector(parse_quantities(
+                               "--q", arm.q, controller::joint_units(task.model, "rad", "m")));
+  if (!command.postures.empty()) task.postures = read_postures(command.postures, task.model.dof());
+  read_range(command, task);
+  return task;
+}
+
+void add_audit_options(CLI::App& command, AuditCommand& options) {
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  const auto add = [&](const char* name, std::string& text, const char* help, const char* words) {
+    return command.add_option(name, text, help)->option_text(words);
+  };
+  ArmOptions& arm = options.arm;
+  add("--urdf", arm.urdf, "Robot description", "FILE")->required();
+  add("--base", arm.base, "Link that stands still", "LINK")->required();
+  add("--tip", arm.tip, "Link at the end of the chain", "LINK")->required();
+  add("--preset", options.preset, "Default gains of a public controller", "NAME")
+      ->check(CLI::IsMember(preset_names()));
+  add("--stiffness", options.stiffness, "Diagonal, N/m and N m/rad", "x,y,z,rx,ry,rz");
+  add("--damping", options.damping, "Diagonal, N s/m and N m s/rad", "x,y,z,rx,ry,rz");
+  command.add_option("--damping-factor", options.damping_factor, "Damping is F sqrt(stiffness)")
+      ->transform(positive("", "a positive factor"))
+      ->option_text("F");
+  add("--joint-stiffness", options.joint_stiffness, "Instead: of the joints, N m/rad", "a,b,...|x");
+  add("--joint-damping", options.joint_damping, "Of the joints, N m s/rad", "a,b,...|x");
+  add("--gains", options.gains, "YAML file with the key gains, as of the controller", "FILE");
+  add("--mode", options.mode, "Of --gains", "cartesian|joint (cartesian)")
+      ->check(CLI::IsMember({"cartesian", "joint"}));
+  add("--rotation", options.rotation, "What the rotational stiffness acts on",
+      "vector|half-quaternion (vector)")
+      ->check(CLI::IsMember({"vector", "half-quaternion"}));
+  add("--frame", options.frame, "Axes of the gains", "base|tool (base)")
+      ->check(CLI::IsMember({"base", "tool"}));
+  add("--null-stiffness", options.null_stiffness, "Of the motions that the task leaves free",
+      "a,b,...|x (0)");
+  add("--null-damping", options.null_damping, "Of the same", "a,b,...|x (0)");
+  add("--viscous-friction", arm.viscous_friction, "In the joints, N m s/rad; urdf: the file's",
+      "a,b,...|x|urdf (0)");
+  add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
+      "a,b,...|x (0)");
+  add("--payload", arm.payload, "Mass at the tip, kg, and its center in the tip's axes, m",
+      "m[,x,y,z] (0)");
+  command.add_flag("--accept-inertias", arm.accept_inertias,
+                   "Take inertias of the description that no body can have as they are");
+  command.add_option("--period", options.period, "Of the control loop: computes the gain margin")
+      ->transform(positive("s", "a time in s"))
+      ->option_text("S");
+  command
+      .add_option("--delay", options.delay, "Ticks from a command to its effect, beyond the hold")
+      ->check(CLI::Range(0, 100))
+      ->option_text("N (0)");
+  command.add_option("--cutoff", options.cutoff, "Of a low-pass on the torque; 0: none")
+      ->transform(quantity("Hz", 0, kLargest, "a frequency in Hz"))
+      ->option_text("HZ (0)");
+  command.add_flag("--difference-velocity", options.difference_velocity,
+                   "The controller takes velocities from positions");
+  command.add_flag("--no-margin", options.no_margin, "Leave the gain margin out");
+  add("--q", arm.q, "Joint positions, rad or m", "a,b,... (middle of the limits)");
+  add("--postures", options.postures, "YAML file with a list of postures", "FILE");
+  command.add_option("--samples", options.samples, "Postures spread over the position limits")
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{10'000'000}))
+      ->option_text("N");
+  command.add_option("--seed", options.seed, "Of the samples")->option_text("S (1)");
+  command.add_option("--spread", options.spread, "Samples no further than this from --q")
+      ->transform(positive("rad", "an angle in rad"))
+      ->option_text("R");
+  command.add_option("--damping-ratio", options.damping_ratio, "Wanted of the suggested damping")
+      ->transform(positive("", "a positive ratio"))
+      ->option_text("Z (F/2, or 0.7)");
+  command.add_option("--jobs", options.jobs, "Threads; 0: one for each processor")
+      ->check(CLI::Range(0, 1024))
+      ->option_text("N (0)");
+  add("--csv", options.csv, "Write a line for each posture there", "FILE");
+  add("--plot", options.plot, "Draw the ratios there, with gnuplot", "FILE.svg|FILE.png");
+  command.add_flag("--json", options.json, "Print JSON instead of tables");
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,52 @@
+#pragma once
+#include <dashpot/apps/design/design_arm.hpp>
+#include <dashpot/controller/audit.hpp>
+
+#include <CLI/App.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// The command line of `dashpot audit`, as text where the robot has to be known first.
+struct AuditCommand {
+  ArmOptions arm;  ///< but for the task's stiffness and damping
+  std::string preset, gains, mode;
+  std::string stiffness, damping;              ///< 6 each
+  std::string joint_stiffness, joint_damping;  ///< n each, or one number
+  std::string null_stiffness, null_damping;    ///< the same
+  std::optional<double> damping_factor;
+  std::string rotation, frame;
+  double period = 0, cutoff = 0;  ///< s, Hz
+  int delay = 0;                  ///< ticks
+  bool difference_velocity = false, no_margin = false;
+  std::string postures;  ///< a file
+  std::int64_t samples = 0;
+  std::uint64_t seed = 1;
+  std::optional<double> spread;         ///< rad
+  std::optional<double> damping_ratio;  ///< wanted of the suggestion
+  int jobs = 0;                         ///< 0: one for each processor
+  std::string csv, plot;
+  bool json = false;
+};
+
+/// What is to be audited.
+struct AuditTask {
+  controller::RobotModel model;
+  controller::AuditOptions options;
+  /// The ratio that the gains were meant to give, F/2; NaN if they do not say.
+  double intended_ratio;
+  double wanted_ratio;  ///< of the suggestion
+  controller::JointVector q;
+  std::vector<controller::JointVector> postures;  ///< of the file; empty if there is none
+};
+
+/// Adds the options to the subcommand; they are written to `options`.
+void add_audit_options(CLI::App& command, AuditCommand& options);
+
+/// Throws InputError for options that do not go together, and for what is wrong in one of them.
+AuditTask read_task(const AuditCommand& options);
+
+}  // namespace dashpot::apps

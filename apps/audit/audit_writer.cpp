@@ -1,0 +1,192 @@
+#include <dashpot/apps/analyze/json_writer.hpp>
+#include <dashpot/apps/audit/audit_writer.hpp>
+#include <dashpot/apps/cli/matrix_json.hpp>
+#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/text/printable.hpp>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace dashpot::apps {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Align = TextTable::Align;
+
+Json to_json(const controller::Distribution& found) {
+  return {{"median", found.median},
+          {"p05", found.p05},
+          {"p95", found.p95},
+          {"worst", found.worst},
+          {"worst_q", found.worst_q.size() > 0 ? json_list(found.worst_q) : Json()},
+          {"bound", found.bound}};
+}
+
+std::string joined(const Eigen::VectorXd& values, int digits) {
+  std::string text;
+  for (const double value : values) {
+    text += (text.empty() ? "" : ", ") + format_number(value, digits);
+  }
+  return text;
+}
+
+std::string margin_text(double margin) {
+  return std::isinf(margin) ? "above 1e6" : format_number(margin, 4);
+}
+
+std::string modes_table(const AuditTask& task, const analysis::Spectrum<>& spectrum) {
+  TextTable table;
+  table.add_column(Align::kRight, {"", "mode"});
+  table.add_column(Align::kPoint, {"natural", "rad/s"});
+  table.add_column(Align::kPoint, {"damping", "ratio"});
+  table.add_column(Align::kPoint, {"", "meant"});
+  table.add_column(Align::kLeft, {"", "kind"});
+  table.add_column(Align::kPoint, {"fastest", "1/s"});
+  for (int i = 0; i < spectrum.modes.size(); ++i) {
+    const analysis::Mode<>& mode = spectrum.modes[i];
+    const double fastest = std::min(mode.eigenvalues[0].real(), mode.eigenvalues[1].real());
+    table.add_row({std::to_string(i + 1), format_number(mode.natural_frequency, 6),
+                   format_number(mode.damping_ratio, 6), format_number(task.intended_ratio, 3),
+                   analysis::to_text(mode.kind), format_number(fastest, 6)});
+  }
+  return table.text();
+}
+
+std::string posture_table(const AuditTask& task, const controller::PostureAudit& posture) {
+  const controller::PostureNumbers& numbers = posture.numbers;
+  std::string text = "At q = " + joined(posture.q, 5) + "\n" + modes_table(task, posture.spectrum) +
+                     "\n  Smallest ratio " + format_number(numbers.smallest_ratio, 6);
+  if (!std::isnan(task.intended_ratio)) {
+    text += " where " + format_number(task.intended_ratio, 3) + " was meant";
+  }
+  text += "; fastest pole " + format_number(numbers.fastest_pole, 6) + " 1/s.\n";
+  if (task.options.period > 0) {
+    text += "  Gain margin " + margin_text(numbers.gain_margin) + " with a period of " +
+            format_number(task.options.period, 3) + " s: " +
+            (numbers.gain_margin < 1 ? "the sampled loop is unstable.\n"
+                                     : "stiffness and damping may grow by it together.\n");
+  }
+  text += "  Zero modes: " + std::to_string(numbers.zero_modes) + ".";
+  if (numbers.singular) text += " The posture is singular: a direction of the task has no spring.";
+  return text + "\n";
+}
+
+std::string workspace_table(const AuditTask& task, const AuditReport& report) {
+  const controller::WorkspaceAudit& found = *report.workspace;
+  TextTable table;
+  table.add_column(Align::kLeft, {""});
+  for (const char* name : {"median", "5 %", "95 %", "worst"}) {
+    table.add_column(Align::kPoint, {name});
+  }
+  table.add_column(Align::kLeft, {"worst at q ="});
+  const auto add = [&](const char* name, const controller::Distribution& row) {
+    const auto text = [](double value) {
+      return std::isinf(value) ? std::string("above 1e6") : format_number(value, 4);
+    };
+    table.add_row({name, text(row.median), text(row.p05), text(row.p95), text(row.worst),
+                   joined(row.worst_q, 3)});
+  };
+  add("smallest ratio", found.smallest_ratio);
+  add("fastest pole, 1/s", found.fastest_pole);
+  if (task.options.period > 0) add("gain margin", found.gain_margin);
+  return "\nOver " + std::to_string(found.samples) + " postures, " +
+         std::to_string(found.singular) + " of them singular" +
+         (report.interrupted ? " (interrupted: no more were done)" : "") + "\n" + table.text() +
+         "\n  Proved bounds: " + format_bound(found.smallest_ratio.bound) + " of the ratios, " +
+         format_bound(found.fastest_pole.bound) + " 1/s of the poles shown.\n";
+}
+
+std::string suggestion_table(const AuditTask& task, const AuditReport& report) {
+  const std::string ratio = format_number(task.wanted_ratio, 3);
+  if (!report.no_suggestion.empty()) {
+    return "\nNo damping is suggested: " + text::printable(report.no_suggestion) + "\n";
+  }
+  const controller::DampingSuggestion& found = report.suggestion;
+  std::string text = "\nDamping for a ratio of " + ratio + " at q; smallest ratio with it " +
+                     format_number(found.smallest_ratio, 4) + "\n";
+  TextTable table;
+  std::vector<std::vector<std::string>> columns;
+  for (Eigen::Index j = 0; j < found.damping.cols(); ++j) {
+    table.add_column(Align::kPoint, {});
+    const Eigen::VectorXd column = found.damping.col(j);
+    columns.push_back(format_column({column.begin(), column.end()}, 6));
+  }
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    std::vector<std::string> row;
+    for (const auto& column : columns) row.push_back(column[i]);
+    table.add_row(row);
+  }
+  return text + table.text() + "\n  Nearest diagonal: " + joined(found.diagonal, 4) +
+         "; smallest ratio with it " + format_number(found.diagonal_smallest_ratio, 4) + "\n";
+}
+
+std::string shortest(double value) {
+  if (!std::isfinite(value)) return std::isinf(value) ? (value > 0 ? "inf" : "-inf") : "";
+  std::array<char, 40> buffer{};
+  std::snprintf(buffer.data(), buffer.size(), "%.17g", value);
+  return buffer.data();
+}
+
+}  // namespace
+
+std::string audit_json(const AuditTask& task, const AuditReport& report) {
+  const controller::PostureNumbers& numbers = report.posture.numbers;
+  Json result = {{"intended_ratio", task.intended_ratio},
+                 {"posture",
+                  {{"q", json_list(report.posture.q)},
+                   {"modes", modes_json(report.posture.spectrum)},
+                   {"smallest_ratio", numbers.smallest_ratio},
+                   {"smallest_ratio_bound", report.posture.smallest_ratio_bound},
+                   {"fastest_pole", numbers.fastest_pole},
+                   {"fastest_pole_bound", report.posture.fastest_pole_bound},
+                   {"gain_margin", numbers.gain_margin},
+                   {"zero_modes", numbers.zero_modes},
+                   {"singular", numbers.singular}}}};
+  if (report.workspace) {
+    result["workspace"] = {{"samples", report.workspace->samples},
+                           {"singular", report.workspace->singular},
+                           {"interrupted", report.interrupted},
+                           {"smallest_ratio", to_json(report.workspace->smallest_ratio)},
+                           {"fastest_pole", to_json(report.workspace->fastest_pole)},
+                           {"gain_margin", to_json(report.workspace->gain_margin)}};
+  }
+  result["suggestion"] = Json();
+  if (report.no_suggestion.empty()) {
+    const bool joint = task.options.mode == controller::Mode::kJoint;
+    result["suggestion"] = {
+        {"damping_ratio", task.wanted_ratio},
+        {joint ? "damping" : "task_damping", json_rows(report.suggestion.damping)},
+        {"smallest_ratio", report.suggestion.smallest_ratio},
+        {"diagonal", json_list(report.suggestion.diagonal)},
+        {"diagonal_smallest_ratio", report.suggestion.diagonal_smallest_ratio}};
+  }
+  return json_text(result);
+}
+
+std::string audit_table(const AuditTask& task, const AuditReport& report) {
+  const controller::RobotModel& model = task.model;
+  std::string text = text::printable(model.name()) + ": " + std::to_string(model.dof()) +
+                     (model.dof() == 1 ? " joint" : " joints") + " from " +
+                     text::printable(model.base()) + " to " + text::printable(model.tip()) + "\n\n";
+  text += posture_table(task, report.posture);
+  if (report.workspace) text += workspace_table(task, report);
+  return text + suggestion_table(task, report);
+}
+
+std::string csv_heading(int n) {
+  std::string text = "posture";
+  for (int i = 1; i <= n; ++i) text += ",q" + std::to_string(i);
+  return text + ",smallest_ratio,fastest_pole,gain_margin,zero_modes,singular\n";
+}
+
+std::string csv_line(std::int64_t i, const controller::JointVector& q,
+                     const controller::PostureNumbers& numbers) {
+  std::string text = std::to_string(i);
+  for (const double value : q) text += "," + shortest(value);
+  return text + "," + shortest(numbers.smallest_ratio) + "," + shortest(numbers.fastest_pole) +
+         "," + shortest(numbers.gain_margin) + "," + std::to_string(numbers.zero_modes) + "," +
+         (numbers.singular ? "1" : "0") + "\n";
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,39 @@
+#pragma once
+// The gains that public controllers have before a user changes them.
+
+#include <array>
+#include <string_view>
+
+namespace dashpot::apps {
+
+/// Default gains of a Cartesian impedance controller whose documentation calls them critically
+/// damped: D = 2 sqrt(K). What a controller adds in the null space is left out.
+struct GainPreset {
+  std::string_view name;
+  double translation;    ///< N/m, or 1/s^2 with `inertia_blocks`
+  double rotation;       ///< N m/rad, or 1/s^2
+  bool half_quaternion;  ///< the rotational error is the vector part of a quaternion
+  bool inertia_blocks;   ///< gains are multiplied by the tip's inertia
+};
+
+inline constexpr double kPresetFactor = 2;
+
+inline constexpr std::array<GainPreset, 7> kPresets = {{
+    // libfranka, examples/cartesian_impedance_control.cpp
+    {"libfranka", 150, 10, true, false},
+    // franka_ros, franka_example_controllers/cfg/compliance_param.cfg
+    {"franka_ros", 200, 20, true, false},
+    // panda-py, src/controllers/cartesian_impedance.cpp
+    {"panda_py", 600, 30, true, false},
+    // utiasDSL/crisp_controllers, parameters of the Cartesian controller
+    {"crisp", 500, 30, false, false},
+    // matthias-mayr/Cartesian-Impedance-Controller, default stiffness; error as an angle and axis
+    {"cartesian_impedance_controller", 200, 20, false, false},
+    // TimSchneider42/franky, defaults of CartesianImpedanceMotion
+    {"franky", 1200, 80, false, false},
+    // UT-Austin-RPL/deoxys_control, deoxys/config/osc-pose-controller.yml, without its
+    // residual_mass_vec; the law is in deoxys/franka-interface/src/controllers/osc_impedance.cpp
+    {"deoxys", 150, 250, true, true},
+}};
+
+}  // namespace dashpot::apps

@@ -1,0 +1,160 @@
+#pragma once
+#include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/task_space.hpp>
+#include <dashpot/controller/base/impedance.hpp>
+#include <dashpot/controller/dynamics.hpp>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <vector>
+
+namespace dashpot::controller {
+
+/// The gains of a controller and the loop that they act in, as its documentation states them.
+struct AuditOptions {
+  Mode mode = Mode::kCartesian;  ///< which of the gains act
+  /// Stiffness and damping as stated. The ratios and `directions` in it are not read: a direction
+  /// of the task without stiffness and damping is free. Joint matrices and null-space vectors
+  /// without entries count as zero.
+  Gains gains;
+  /// True if the controller takes the vector part of the error's quaternion, which is half of the
+  /// rotation vector, for its rotational error. The springs then act with half of the stated
+  /// rotational stiffness; the dampers act as stated.
+  bool half_quaternion = false;
+  /// True for operational-space controllers that multiply gains by the tip's inertia, for
+  /// translation and rotation apart: the wrench is blkdiag(L_v, L_w) (K_C e + C_C v) with
+  /// L_v = (J_v M^-1 J_v')^-1, L_w likewise. Stiffness is then in 1/s^2, damping in 1/s, and each
+  /// has one number for the three translations and one for the three rotations.
+  bool inertia_blocks = false;
+  /// Period of the control loop, s; zero: no gain margin is computed.
+  double period = 0;
+  int delay = 0;                     ///< ticks from a torque to its effect, beyond the hold
+  double cutoff = 0;                 ///< of a first-order low-pass on the torque, Hz; 0: none
+  bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / period as velocity
+  double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
+  /// Range of sampled postures, n, rad; without entries the position limits of the model.
+  JointVector lower, upper;
+};
+
+/// What a posture does to the gains, in three numbers.
+struct PostureNumbers {
+  /// Smallest damping ratio of the modes that are not soft. NaN if there is none.
+  double smallest_ratio = std::numeric_limits<double>::quiet_NaN();
+  /// Real part of the fastest eigenvalue of the continuous loop: of the eigenvalues with the
+  /// smallest real part, 1/s; negative in a damped loop.
+  double fastest_pole = std::numeric_limits<double>::quiet_NaN();
+  /// Factor by which stiffness and damping may grow together, see analysis::gain_margin; motions
+  /// slower than the soft frequency do not count. Infinite if a factor of 1e6 is not too much; NaN
+  /// without a period, and where the eigenvalue iteration fails.
+  double gain_margin = std::numeric_limits<double>::quiet_NaN();
+  int zero_modes = 0;     ///< motions that no spring resists, soft ones included
+  bool singular = false;  ///< there are more zero modes than joints beyond the task's directions
+};
+
+/// A posture in full.
+struct PostureAudit {
+  JointVector q;                    ///< n, rad (m)
+  PostureNumbers numbers;           ///< read from `spectrum`
+  double smallest_ratio_bound = 0;  ///< proved bound of |computed - true|
+  double fastest_pole_bound = 0;    ///< the same, 1/s
+  analysis::Spectrum<> spectrum;    ///< as from analysis::analyze
+};
+
+/// How one number is distributed over postures. Each entry is the number at one of the postures
+/// (nearest rank), so that it can be looked at there.
+struct Distribution {
+  double median = 0, p05 = 0, p95 = 0;
+  double worst = 0;     ///< least ratio, fastest pole or least margin
+  JointVector worst_q;  ///< n, rad (m); no entries if no posture has the number
+  /// Largest of the proved bounds of the four entries; NaN for the gain margin, which has none.
+  double bound = 0;
+};
+
+/// Many postures in short. Postures without a number (NaN) do not count in its distribution.
+struct WorkspaceAudit {
+  std::int64_t samples = 0;
+  std::int64_t singular = 0;
+  Distribution smallest_ratio;
+  Distribution fastest_pole;  ///< 1/s
+  Distribution gain_margin;   ///< entries are NaN without a period
+};
+
+/// Damping matrices for the stiffness of an audit.
+struct DampingSuggestion {
+  double ratio = 0;  ///< the ratio wanted
+  /// Damping that gives every mode the ratio at one posture, see analysis::design_damping: 6 x 6 in
+  /// the axes of AuditOptions::gains.frame, or n x n in mode kJoint. Positive semidefinite.
+  Eigen::MatrixXd damping;
+  /// Diagonal of `damping`, which makes the nearest diagonal matrix (Frobenius norm); 6, or n in
+  /// mode kJoint.
+  Eigen::VectorXd diagonal;
+  double smallest_ratio = 0, diagonal_smallest_ratio = 0;  ///< what these give at the posture
+};
+
+/// Finds what gains really do on an arm: the modes of  M q'' + C q' + K q = 0  with
+///     mode kCartesian: K = J' K_C J + N' K_0 N,  C = J' C_C J + N' C_0 N + viscous friction,
+///     mode kJoint:     K = K_q,                  C = C_q + viscous friction,
+/// at rest, where the springs are at rest. M has the reflected inertia and the payload of the
+/// model, and viscous friction is the model's. Gravity is taken to be compensated exactly.
+///
+/// An Audit does not change: several threads may use one at once.
+class Audit {
+ public:
+  /// Throws std::invalid_argument, with the member's name and the reason, for gains and ranges of
+  /// another size, or gains that are not finite or not symmetric, for stiffness that is not
+  /// positive semidefinite, and for a loop that analysis::gain_margin refuses.
+  Audit(const RobotModel& model, const AuditOptions& options);
+
+  const RobotModel& model() const noexcept { return model_; }
+  const AuditOptions& options() const noexcept { return options_; }
+
+  /// Computes the three numbers at q (n, rad) from the eigenvalues alone, in double precision and
+  /// without proved bounds. Postures near a singularity and postures without an oscillating mode
+  /// are left to audit(), which is slower. Throws std::invalid_argument unless q has n finite
+  /// entries.
+  PostureNumbers numbers(const JointVector& q) const;
+
+  /// Computes modes and numbers at q with proved bounds. Throws like numbers(), and
+  /// std::runtime_error if the eigenvalue iteration fails.
+  PostureAudit audit(const JointVector& q) const;
+
+  /// Returns posture `index` (from 0) of the sequence `seed`. It is spread evenly over the range of
+  /// all joints at once, at most half a turn each way, by the quasi-random sequence of Roberts
+  /// (2018), moved by an offset that depends on the seed.
+  JointVector posture(std::uint64_t seed, std::int64_t index) const;
+
+  /// Returns the numbers of the postures `first` .. `first + count - 1` of the sequence `seed`.
+  /// They depend on nothing else: neither on the call's share of the postures nor on earlier calls.
+  std::vector<PostureNumbers> sample(std::uint64_t seed, std::int64_t first,
+                                     std::int64_t count) const;
+
+  /// Designs damping for the stiffness at q, with `ratio` for every mode. Throws
+  /// std::invalid_argument for a ratio that is not positive.
+  DampingSuggestion suggest(const JointVector& q, double ratio) const;
+
+ private:
+  DynamicsResult evaluate(const JointVector& q) const;
+  /// Returns the springs and dampers that act at a posture.
+  Impedance impedance_at(const DynamicsResult& robot) const;
+  /// Returns the same as matrices of an impedance whose errors are counted.
+  analysis::TaskImpedance task_impedance(const DynamicsResult& robot) const;
+
+  RobotModel model_;
+  AuditOptions options_;
+  DynamicsKernel kernel_;
+  JointVector friction_;
+  Impedance impedance_;  ///< in 1/s^2 and 1/s with inertia_blocks
+  analysis::SampledLoop loop_;
+  int springs_ = 0;  ///< modes where no posture is singular
+};
+
+/// Summarizes postures by their `numbers`; posture(i) returns the i-th posture. The numbers in the
+/// result are those of Audit::audit, with proved bounds, so that `numbers` only decide at which
+/// postures.
+WorkspaceAudit summarize(const Audit& audit, const std::vector<PostureNumbers>& numbers,
+                         const std::function<JointVector(std::int64_t)>& posture);
+
+}  // namespace dashpot::controller

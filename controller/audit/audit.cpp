@@ -1,0 +1,335 @@
+#include <dashpot/analysis/damping_design.hpp>
+#include <dashpot/analysis/elastic_form.hpp>
+#include <dashpot/analysis/null_damping.hpp>
+#include <dashpot/controller/audit.hpp>
+#include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/vibration/loop_system.hpp>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+/// A real part of this share of the fastest eigenvalue cannot be told from zero.
+constexpr double kRounding = 1e-12;
+
+void require(bool condition, const std::string& message) {
+  if (!condition) throw std::invalid_argument(message);
+}
+
+/// Returns the symmetric part of a gain matrix, which may be empty, after checking it.
+MatrixXd checked_matrix(const std::string& name, const MatrixXd& given, Index n) {
+  if (given.size() == 0) return MatrixXd::Zero(n, n);
+  require(given.rows() == n && given.cols() == n,
+          name + ": is " + std::to_string(given.rows()) + " x " + std::to_string(given.cols()) +
+              ", expected " + std::to_string(n) + " x " + std::to_string(n));
+  require(given.allFinite(), name + ": has an entry that is not a finite number");
+  require((given - given.transpose()).cwiseAbs().maxCoeff() <= 1e-10 * given.cwiseAbs().maxCoeff(),
+          name + ": is not symmetric");
+  return 0.5 * (given + given.transpose());
+}
+
+/// Returns the rank of a stiffness. Throws unless it is positive semidefinite.
+int checked_rank(const std::string& name, const MatrixXd& stiffness) {
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(stiffness, Eigen::EigenvaluesOnly);
+  const double rounding = 1e-12 * solver.eigenvalues().cwiseAbs().maxCoeff();
+  require(solver.eigenvalues().minCoeff() >= -rounding, name + ": is not positive semidefinite");
+  return static_cast<int>((solver.eigenvalues().array() > rounding).count());
+}
+
+JointVector checked_vector(const std::string& name, const JointVector& given, Index n) {
+  if (given.size() == 0) return JointVector::Zero(n);
+  require(given.size() == n, name + ": has " + std::to_string(given.size()) +
+                                 " entries, expected " + std::to_string(n));
+  require(given.allFinite(), name + ": has an entry that is not a finite number");
+  return given;
+}
+
+/// Throws unless A = diag(a I, b I).
+void require_two_numbers(const std::string& name, const Matrix6& A) {
+  Vector6 diagonal;
+  diagonal << A(0, 0), A(0, 0), A(0, 0), A(3, 3), A(3, 3), A(3, 3);
+  require(A == Matrix6(diagonal.asDiagonal()),
+          name + ": needs one number for translation and one for rotation with inertia_blocks");
+}
+
+/// The springs and dampers as stated, in force.
+Impedance stated_impedance(const AuditOptions& options, int n) {
+  const Gains& gains = options.gains;
+  Setpoint setpoint;
+  setpoint.mode = options.mode;
+  setpoint.gains = gains;
+  Gains& checked = setpoint.gains;
+  checked.joint_damping_ratio = checked.task_damping_ratio = 0;
+  checked.joint_stiffness = checked_matrix("joint_stiffness", gains.joint_stiffness, n);
+  checked.joint_damping = checked_matrix("joint_damping", gains.joint_damping, n);
+  checked.task_stiffness = checked_matrix("task_stiffness", gains.task_stiffness, 6);
+  checked.task_damping = checked_matrix("task_damping", gains.task_damping, 6);
+  checked.null_stiffness = checked_vector("null_stiffness", gains.null_stiffness, n);
+  checked.null_damping = checked_vector("null_damping", gains.null_damping, n);
+  require(checked.null_stiffness.minCoeff() >= 0, "null_stiffness: has a negative entry");
+  if (options.inertia_blocks) {
+    require_two_numbers("task_stiffness", checked.task_stiffness);
+    require_two_numbers("task_damping", checked.task_damping);
+  }
+  if (options.half_quaternion) {
+    const Vector6 share = (Vector6() << 1, 1, 1, 0.5, 0.5, 0.5).finished();
+    const Vector6 root = share.cwiseSqrt();  // both sides of a K with coupling
+    checked.task_stiffness = root.asDiagonal() * checked.task_stiffness * root.asDiagonal();
+  }
+  for (Index i = 0; i < 6; ++i) {
+    checked.directions[static_cast<std::size_t>(i)] =
+        !checked.task_stiffness.row(i).isZero(0) || !checked.task_damping.row(i).isZero(0);
+  }
+  return Impedance(setpoint, n);
+}
+
+/// A number and how far it is from the true one at most.
+struct Bounded {
+  double value = kNan, bound = 0;
+};
+
+/// Returns the smallest of numbers with bounds: the true one lies between the smallest lower and
+/// the smallest upper end.
+Bounded smallest(const std::vector<Bounded>& numbers) {
+  double value = kInfinity, low = kInfinity, high = kInfinity;
+  for (const Bounded& number : numbers) {
+    value = std::min(value, number.value);
+    low = std::min(low, number.value - number.bound);
+    high = std::min(high, number.value + number.bound);
+  }
+  if (numbers.empty()) return {};
+  return {value, std::max(value - low, high - value)};
+}
+
+/// Sets the numbers of the continuous loop, and their bounds.
+void read_spectrum(PostureAudit& result) {
+  const analysis::Spectrum<>& spectrum = result.spectrum;
+  std::vector<Bounded> ratios, poles;
+  result.numbers.zero_modes = spectrum.zero_modes.count;
+  for (const analysis::Mode<>& mode : spectrum.modes) {
+    for (const analysis::Complex& value : mode.eigenvalues) {
+      poles.push_back({value.real(), mode.error_bound});
+    }
+    if (mode.kind == analysis::ModeKind::kSoft) {
+      ++result.numbers.zero_modes;
+    } else if (!std::isnan(mode.damping_ratio)) {
+      ratios.push_back({mode.damping_ratio, mode.damping_ratio_bound});
+    }
+  }
+  for (Index i = 0; i < spectrum.zero_mode_rates.size(); ++i) {
+    const double rate = spectrum.zero_mode_rates[i];
+    if (!std::isnan(rate)) poles.push_back({rate, spectrum.zero_mode_rates_bound[i]});
+  }
+  const Bounded ratio = smallest(ratios), pole = smallest(poles);
+  result.numbers.smallest_ratio = ratio.value;
+  result.smallest_ratio_bound = ratio.bound;
+  result.numbers.fastest_pole = pole.value;
+  result.fastest_pole_bound = pole.bound;
+}
+
+/// Sets smallest ratio and fastest pole from eigenvalues of a loop whose springs are stiff in all
+/// directions. Returns false if they do not tell the ratio: modes of real eigenvalues need to be
+/// paired.
+bool read_eigenvalues(const Eigen::Ref<const Eigen::VectorXcd>& values, double soft_frequency,
+                      PostureNumbers& result) {
+  double ratio = kInfinity, fastest = kInfinity, slowest = -kInfinity;
+  for (const analysis::Complex& value : values) {
+    fastest = std::min(fastest, value.real());
+    if (value.imag() == 0) slowest = std::max(slowest, value.real());
+    const double frequency = analysis::modulus(value);
+    if (value.imag() > 0 && frequency >= soft_frequency) {
+      ratio = std::min(ratio, -value.real() / frequency);
+    }
+  }
+  result.smallest_ratio = ratio;
+  result.fastest_pole = fastest;
+  return ratio < kInfinity && slowest <= kRounding * std::abs(fastest);
+}
+
+}  // namespace
+
+Audit::Audit(const RobotModel& model, const AuditOptions& options)
+    : model_(model),
+      options_(options),
+      kernel_(model),
+      friction_(model.joint_values(&Joint::viscous_friction)),
+      impedance_(stated_impedance(options, model.dof())) {
+  const int n = model.dof();
+  if (options.mode == Mode::kJoint) {
+    springs_ = checked_rank("joint_stiffness", impedance_.joint_stiffness);
+  } else {
+    const TipImpedance& tip =
+        options.gains.frame == Frame::kBase ? impedance_.base : impedance_.tool;
+    const int selected = static_cast<int>(tip.selected.sum());
+    springs_ = std::min(n, checked_rank("task_stiffness", tip.stiffness));
+    springs_ += std::min(std::max(0, n - selected),
+                         static_cast<int>((impedance_.null_stiffness.array() > 0).count()));
+  }
+  require(std::isfinite(options.soft_frequency) && options.soft_frequency > 0,
+          "soft_frequency: has to be positive, rad/s");
+  require(std::isfinite(options.period) && options.period >= 0,
+          "period: must be finite and not negative, s");
+  require(options.delay >= 0, "delay: must not be negative, ticks");
+  require(std::isfinite(options.cutoff) && options.cutoff >= 0,
+          "cutoff: must be finite and not negative, Hz");
+  if (options.lower.size() == 0) options_.lower = model.joint_values(&Joint::lower);
+  if (options.upper.size() == 0) options_.upper = model.joint_values(&Joint::upper);
+  require(options_.lower.size() == n && options_.upper.size() == n &&
+              (options_.lower.array() <= options_.upper.array()).all(),
+          "lower, upper: need n entries, none of lower above that of upper");
+  loop_.period = options.period;
+  loop_.delay = options.delay;
+  loop_.torque_cutoff = options.cutoff;
+  loop_.difference_velocity = options.difference_velocity;
+  if (!friction_.isZero(0)) loop_.friction = friction_.asDiagonal();
+}
+
+DynamicsResult Audit::evaluate(const JointVector& q) const {
+  require(q.size() == model_.dof(), "q: has " + std::to_string(q.size()) + " entries, expected " +
+                                        std::to_string(model_.dof()));
+  require(q.allFinite(), "q: has an entry that is not a finite number");
+  DynamicsResult robot;
+  kernel_.evaluate(q, JointVector::Zero(q.size()), robot);
+  return robot;
+}
+
+Impedance Audit::impedance_at(const DynamicsResult& robot) const {
+  Impedance result = impedance_;
+  if (!options_.inertia_blocks) return result;
+  const Eigen::LLT<MatrixXd> mass{MatrixXd(robot.M)};
+  for (TipImpedance* tip : {&result.base, &result.tool}) {
+    for (int at = 0; at < 6; at += 3) {
+      const MatrixXd J = robot.J.middleRows<3>(at);
+      const Eigen::Matrix3d mobility = J * mass.solve(J.transpose());
+      Eigen::Matrix3d inertia = mobility.inverse();
+      if (tip == &result.tool) inertia = robot.R_BT.transpose() * inertia * robot.R_BT;
+      inertia = (0.5 * (inertia + inertia.transpose())).eval();
+      tip->stiffness.block<3, 3>(at, at) = tip->stiffness(at, at) * inertia;
+      tip->damping.block<3, 3>(at, at) = tip->damping(at, at) * inertia;
+    }
+  }
+  return result;
+}
+
+PostureNumbers Audit::numbers(const JointVector& q) const {
+  const DynamicsResult robot = evaluate(q);
+  const Impedance impedance = impedance_at(robot);
+  NullSpace null_space;
+  if (impedance.null_space()) {
+    null_space.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
+  }
+  LoopSystem loop;
+  analysis::System<kMaxJoints> system;
+  loop.form(robot, impedance, null_space, friction_, system);
+  analysis::ElasticForm<kMaxJoints> form;
+  Eigen::Matrix<analysis::Complex, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxJoints, 1> values;
+  PostureNumbers result;
+  const bool clear = analysis::to_elastic_form(system, form) == analysis::Status::kOk &&
+                     form.slowest > options_.soft_frequency && form.modes() == springs_ &&
+                     analysis::elastic_eigenvalues(form, values) == analysis::Status::kOk &&
+                     read_eigenvalues(values, options_.soft_frequency, result);
+  if (!clear) return audit(q).numbers;
+  result.zero_modes = model_.dof() - springs_;
+  if (options_.period > 0) try {
+      result.gain_margin = analysis::gain_margin(form, loop_, 1e6, options_.soft_frequency);
+    } catch (const std::runtime_error&) {
+      result.gain_margin = kNan;
+    }
+  return result;
+}
+
+analysis::TaskImpedance Audit::task_impedance(const DynamicsResult& robot) const {
+  const Impedance impedance = impedance_at(robot);
+  analysis::TaskImpedance result;
+  result.mass = robot.M;
+  const int n = model_.dof();
+  if (options_.mode == Mode::kJoint) {
+    result.stiffness = impedance.joint_stiffness;
+    result.damping = impedance.joint_damping + JointMatrix(friction_.asDiagonal());
+    return result;
+  }
+  const bool tool = options_.gains.frame == Frame::kTool;
+  result.jacobian = robot.J;
+  if (tool) {
+    result.jacobian->topRows<3>() = robot.R_BT.transpose() * robot.J.topRows<3>();
+    result.jacobian->bottomRows<3>() = robot.R_BT.transpose() * robot.J.bottomRows<3>();
+  }
+  result.task_stiffness = (tool ? impedance.tool : impedance.base).stiffness;
+  result.task_damping = (tool ? impedance.tool : impedance.base).damping;
+  result.damping = MatrixXd(friction_.asDiagonal());
+  if (!impedance.null_space() || n == 0) return result;
+  const auto projected = [&](const JointVector& gains) {
+    return analysis::null_space_damping(result.mass, *result.jacobian, *result.task_stiffness,
+                                        MatrixXd(gains.asDiagonal()));
+  };
+  const analysis::NullSpaceDamping damping = projected(impedance.null_damping);
+  *result.damping += damping.damping;
+  result.damping_error = damping.error;
+  if (!impedance.null_stiffness.isZero(0)) {
+    result.stiffness = projected(impedance.null_stiffness).damping;
+  }
+  return result;
+}
+
+PostureAudit Audit::audit(const JointVector& q) const {
+  const analysis::System<> system = analysis::to_joint_space(task_impedance(evaluate(q)));
+  PostureAudit result;
+  result.q = q;
+  analysis::SpectrumOptions options;
+  options.soft_frequency = options_.soft_frequency;
+  result.spectrum = analysis::analyze(system, options);
+  read_spectrum(result);
+  result.numbers.singular = result.numbers.zero_modes > model_.dof() - springs_;
+  if (options_.period > 0) {
+    result.numbers.gain_margin =
+        analysis::gain_margin(system, result.spectrum, loop_, 1e6, options_.soft_frequency);
+  }
+  return result;
+}
+
+JointVector Audit::posture(std::uint64_t seed, std::int64_t index) const {
+  return PostureSequence(options_.lower, options_.upper, seed).at(index);
+}
+
+std::vector<PostureNumbers> Audit::sample(std::uint64_t seed, std::int64_t first,
+                                          std::int64_t count) const {
+  const PostureSequence postures(options_.lower, options_.upper, seed);
+  std::vector<PostureNumbers> result(static_cast<std::size_t>(count));
+  for (PostureNumbers& one : result) one = numbers(postures.at(first++));
+  return result;
+}
+
+DampingSuggestion Audit::suggest(const JointVector& q, double ratio) const {
+  require(std::isfinite(ratio) && ratio > 0, "ratio: has to be positive");
+  analysis::DampingTarget target = analysis::DampingTarget::constant(ratio);
+  target.soft_frequency = options_.soft_frequency;
+  analysis::TaskImpedance impedance = task_impedance(evaluate(q));
+  impedance.task_damping.reset();
+  if (!impedance.jacobian) impedance.damping = MatrixXd(friction_.asDiagonal());
+  const analysis::DampingDesign full = analysis::design_damping(impedance, target);
+  const Eigen::VectorXd diagonal = full.damping.diagonal();
+  const auto smallest_ratio = [&](const MatrixXd& damping) {
+    PostureAudit posture;
+    analysis::SpectrumOptions options;
+    options.soft_frequency = options_.soft_frequency;
+    posture.spectrum = analysis::analyze(
+        analysis::to_joint_space(analysis::with_damping(impedance, damping)), options);
+    read_spectrum(posture);
+    return posture.numbers.smallest_ratio;
+  };
+  return {ratio, full.damping, diagonal, smallest_ratio(full.damping),
+          smallest_ratio(MatrixXd(diagonal.asDiagonal()))};
+}
+
+}  // namespace dashpot::controller

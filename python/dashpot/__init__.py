@@ -1,0 +1,27 @@
+"""Vibration modes of impedance-controlled robot arms, with proved bounds, and the controller.
+
+Units are SI. The base link is B, the tip or tool frame is T; twists and wrenches have the linear
+part first, are taken at T's origin, in B's axes. Results cannot be changed and can be pickled.
+Everything that Dashpot refuses is a dashpot.Error, a ValueError with the program's message.
+"""
+
+from importlib.metadata import version as _version
+
+from ._analysis import (DampingDesign, Gradients, Miss, Response, SampledModes, Sensitivities,
+                        design_damping, modes, receptance, response, sampled_modes, sensitivities)
+from ._audit import (Audit, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit,
+                     audit)
+from ._controller import (Controller, Setpoint, Snapshot, Status, TrackedModes,
+                          TrackedSampledModes)
+from ._core import Error
+from ._log import read_log
+from ._results import Modes
+from ._robot import ClosedLoop, Robot, closed_loop
+
+__version__ = _version("dashpot")
+__all__ = ["Audit", "ClosedLoop", "Controller", "DampingDesign", "DampingSuggestion",
+           "Distribution", "Error", "Gradients", "Miss", "Modes", "PostureAudit", "Response",
+           "Robot", "SampledModes", "Sensitivities", "Setpoint", "Snapshot", "Status",
+           "TrackedModes", "TrackedSampledModes", "WorkspaceAudit", "audit", "closed_loop",
+           "design_damping", "modes", "read_log", "receptance", "response", "sampled_modes",
+           "sensitivities"]

@@ -1,0 +1,234 @@
+"""Systems given by matrices: modes, responses, sensitivities, the sampled loop, damping design."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._results import (Array, ComplexArray, Modes, Result, TextArray, make_modes, stack, to_matrix,
+                       to_numbers, to_vector)
+
+
+def _impedance(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
+               jacobian: npt.ArrayLike | None, task_damping: npt.ArrayLike | None,
+               task_stiffness: npt.ArrayLike | None) -> _core.Impedance:
+    return _core.Impedance(to_numbers("mass", M, 2), to_matrix("damping", C),
+                           to_matrix("stiffness", K), to_matrix("jacobian", jacobian),
+                           to_matrix("task_damping", task_damping),
+                           to_matrix("task_stiffness", task_stiffness))
+
+
+def modes(M: npt.ArrayLike, C: npt.ArrayLike | None = None, K: npt.ArrayLike | None = None, *,
+          jacobian: npt.ArrayLike | None = None, task_damping: npt.ArrayLike | None = None,
+          task_stiffness: npt.ArrayLike | None = None, soft_frequency: float = 1e-6) -> Modes:
+    """Returns the vibration modes of M q'' + C q' + K q = 0, with proved bounds.
+
+    M, C and K are symmetric n x n matrices in SI units, and M is positive definite. With a jacobian
+    J (m x n), J' C_C J and J' K_C J are added to C and K, where C_C is `task_damping` and K_C is
+    `task_stiffness` (m x m). Modes slower than `soft_frequency` (rad/s) are called soft.
+
+    Raises Error for matrices of the wrong size, that are not symmetric, or not finite, and for a
+    mass that is not positive definite.
+    """
+    impedance = _impedance(M, C, K, jacobian, task_damping, task_stiffness)
+    return make_modes(_core.modes(impedance, soft_frequency))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Response(Result):
+    """Motion of a system at t times: position and velocity of its n coordinates, and the parts of
+    them along the zero modes."""
+
+    times: Array
+    """t, s."""
+    position: Array
+    """t x n."""
+    velocity: Array
+    """t x n."""
+    zero_mode_position: Array
+    """t x n."""
+    zero_mode_velocity: Array
+    """t x n."""
+
+
+def response(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
+             times: npt.ArrayLike, *, initial_position: npt.ArrayLike | None = None,
+             initial_velocity: npt.ArrayLike | None = None, impulse: npt.ArrayLike | None = None,
+             force: npt.ArrayLike | None = None) -> Response:
+    """Returns the motion of M q'' + C q' + K q = f, in closed form.
+
+    It starts at t = 0 from `initial_position` and `initial_velocity` (n each, zero by default), and
+    feels `impulse` (n, N s or N m s) at t = 0 and `force` (n, N or N m) from t = 0 on. Raises Error
+    as `modes` does, and for other sizes and times below zero.
+    """
+    return Response(**_core.response(
+        _impedance(M, C, K, None, None, None), to_numbers("times", times, 1),
+        to_vector("initial_position", initial_position),
+        to_vector("initial_velocity", initial_velocity), to_vector("impulse", impulse),
+        to_vector("force", force)))
+
+
+def receptance(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None,
+               omega: float) -> ComplexArray:
+    """Returns H = (K + i omega C - omega^2 M)^-1 (n x n) at omega (rad/s), from the modes."""
+    return np.asarray(_core.receptance(_impedance(M, C, K, None, None, None), omega))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Gradients(Result):
+    """Derivatives of m modes by the entries of one coefficient A: G[i] changes mode i by
+    sum(G[i] * dA)."""
+
+    natural_frequency: Array
+    """m x n x n, rad/s for each unit of A."""
+    damping_ratio: Array
+    """m x n x n."""
+    eigenvalues: ComplexArray
+    """m x 2 x n x n, 1/s; infinite or NaN at critical damping."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Sensitivities(Result):
+    """Exact first-order sensitivities of modes."""
+
+    modes: Modes
+    mass: Gradients
+    damping: Gradients
+    stiffness: Gradients
+    regular: npt.NDArray[np.bool_]
+    """m; False where another mode is so near that gradients hold only for smaller changes."""
+
+
+def sensitivities(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None
+                  ) -> Sensitivities:
+    """Returns how frequency, ratio and eigenvalues of each mode change with the entries of M, C and
+    K. Raises Error as `modes` does."""
+    found = _core.sensitivities(_impedance(M, C, K, None, None, None))
+    n = len(np.atleast_1d(np.asarray(M)))
+
+    def gradients(coefficient: str) -> Gradients:
+        given = found[coefficient]
+        return Gradients(stack(given["natural_frequency"], (n, n)),
+                         stack(given["damping_ratio"], (n, n)),
+                         stack(given["eigenvalues"], (2, n, n), complex))
+
+    return Sensitivities(make_modes(found["modes"]), gradients("mass"), gradients("damping"),
+                         gradients("stiffness"), np.array(found["regular"], dtype=bool))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class SampledModes(Result):
+    """Modes of a loop that a computer closes once a period, each beside the continuous mode that it
+    comes from."""
+
+    natural_frequency: Array
+    """m, rad/s; NaN if there is none."""
+    damping_ratio: Array
+    damped_frequency: Array
+    """m, rad/s."""
+    eigenvalues: ComplexArray
+    """m x 2, log(z) / period, 1/s."""
+    discrete_eigenvalues: ComplexArray
+    """m x 2, z: eigenvalues of the map from tick to tick."""
+    kind: TextArray
+    zero_modes: ComplexArray
+    """z of the velocities along the zero modes that are damped."""
+    others: ComplexArray
+    """z of the loop's own memory: delay, filter, last position."""
+    spectral_radius: float
+    """Largest |z|: the loop is stable below 1."""
+    gain_margin: float
+    """Stiffness and the controller's damping can grow by this factor before the loop is unstable."""
+    continuous: Modes
+
+
+def _make_sampled(found: dict[str, Any]) -> SampledModes:
+    return SampledModes(**{**found, "kind": np.array(found["kind"], dtype=np.str_),
+                           "continuous": make_modes(found["continuous"])})
+
+
+def sampled_modes(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None, *,
+                  period: float, delay: int = 0, torque_cutoff: float = 0,
+                  difference_velocity: bool = False, friction: npt.ArrayLike | None = None,
+                  gravity_gradient: npt.ArrayLike | None = None) -> SampledModes:
+    """Returns the modes of the loop as it is sampled: the torque -K q - C q' is computed once a
+    `period` (s), acts `delay` ticks later, is held until the next tick, and passes a first-order
+    low-pass of `torque_cutoff` (Hz; 0: none). With `difference_velocity` the controller takes
+    (q_k - q_k-1) / period for q'. `friction` (n x n) is the part of C that the joints supply, and
+    `gravity_gradient` (n x n) the gradient of the gravity that the controller compensates.
+
+    Raises Error as `modes` does, and for a period that is not positive.
+    """
+    loop = _core.SampledLoop(period, delay, torque_cutoff, difference_velocity,
+                             to_matrix("friction", friction),
+                             to_matrix("gravity_gradient", gravity_gradient))
+    return _make_sampled(_core.sampled_modes(_impedance(M, C, K, None, None, None), loop))
+
+
+@dataclasses.dataclass(frozen=True)
+class Miss:
+    """A mode that misses the ratio wanted."""
+
+    mode: int
+    """Index in the modes, from 0."""
+    natural_frequency: float
+    wanted: float
+    obtained: float
+    reason: str
+    """soft, overdone, structure, coupling or loop."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class DampingDesign(Result):
+    """A positive semidefinite damping matrix and the modes that it gives."""
+
+    damping: Array
+    """C_C (m x m) where the stiffness is given in task space, otherwise C (n x n)."""
+    modes: Modes
+    misses: tuple[Miss, ...]
+    """Empty if every mode has its ratio."""
+    indefinite_by: float
+    """Most negative eigenvalue of the exact answer where `misses` are overdone, 1/s; else zero."""
+    sampled: SampledModes | None = None
+    """Of the sampled loop, if a period was given."""
+    level: float = 1
+    """Share of the ratios wanted that the sampled loop bears."""
+    kept: bool = True
+    """False if no damping keeps the gain margin; the design is not to be used then."""
+
+
+def design_damping(M: npt.ArrayLike, K: npt.ArrayLike | None = None, *, damping_ratio: float = 0.7,
+                   jacobian: npt.ArrayLike | None = None,
+                   task_stiffness: npt.ArrayLike | None = None,
+                   damping: npt.ArrayLike | None = None, structure: str = "full",
+                   start: npt.ArrayLike | None = None, high_ratio: float | None = None,
+                   corner: float = 1, soft_frequency: float = 1e-3, period: float | None = None,
+                   delay: int = 0, torque_cutoff: float = 0, gain_margin: float = 2
+                   ) -> DampingDesign:
+    """Returns the damping with which every mode has `damping_ratio`.
+
+    The springs are `task_stiffness` K_C (m x m) at `jacobian` J (m x n), or K (n x n) alone. The
+    design is added to `damping` (n x n), which is there already. With `high_ratio` the ratio changes
+    with the frequency, from `damping_ratio` of slow modes to `high_ratio` of fast ones, half-way at
+    `corner` (rad/s). `structure` is full, block or diagonal; with `start` the result is near that
+    matrix. Modes below `soft_frequency` (rad/s) get less. With a `period` (s) the loop is the one of
+    `sampled_modes` and keeps `gain_margin`.
+
+    Raises Error as `modes` does.
+    """
+    high = damping_ratio if high_ratio is None else high_ratio
+    loop = None
+    if period is not None:
+        loop = _core.SampledLoop(period, delay, torque_cutoff, False, None, None)
+    found = _core.design_damping(_impedance(M, damping, K, jacobian, None, task_stiffness),
+                                 damping_ratio, high, corner, soft_frequency, structure,
+                                 to_matrix("start", start), loop, gain_margin)
+    found["modes"] = make_modes(found["modes"])
+    found["misses"] = tuple(Miss(*miss) for miss in found["misses"])
+    if "sampled" in found:
+        found["sampled"] = _make_sampled(found["sampled"])
+    return DampingDesign(**found)

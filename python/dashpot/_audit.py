@@ -1,0 +1,211 @@
+"""What gains really do on an arm, at one posture and at many."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import dataclasses
+import os
+from typing import Any, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import Error
+from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers, to_vector
+from ._robot import DIRECTIONS, Robot, is_tool, selected
+
+_CHUNK = 256  # postures
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class PostureAudit(Result):
+    """A posture in full. Numbers with a bound are proved to be that near the true ones."""
+
+    q: Array
+    """n, rad."""
+    modes: Modes
+    smallest_ratio: float
+    """Smallest damping ratio of the modes that are not soft; NaN if there is none."""
+    fastest_pole: float
+    """Real part of the fastest eigenvalue of the continuous loop, 1/s; negative if damped."""
+    gain_margin: float
+    """Factor by which stiffness and damping may grow together; NaN without a period."""
+    singular: bool
+    smallest_ratio_bound: float
+    fastest_pole_bound: float
+    """1/s."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Distribution(Result):
+    """How one number is distributed over postures; each entry is the number at one of them."""
+
+    median: float
+    p05: float
+    p95: float
+    worst: float
+    worst_q: Array
+    """n, rad, the posture of the worst; no entries if no posture has the number."""
+    bound: float
+    """Largest proved bound of the four entries; NaN for the gain margin."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class WorkspaceAudit(Result):
+    """Many postures in short."""
+
+    samples: int
+    singular: int
+    smallest_ratio: Distribution
+    fastest_pole: Distribution
+    """1/s."""
+    gain_margin: Distribution
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class DampingSuggestion(Result):
+    """Damping that gives every mode the ratio wanted at one posture."""
+
+    damping: Array
+    """6 x 6 in the axes of the gains' frame, or n x n for joint springs."""
+    diagonal: Array
+    """Diagonal of `damping`, which makes the nearest diagonal matrix."""
+    smallest_ratio: float
+    diagonal_smallest_ratio: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Audit(Result):
+    """What `audit` found; None where it was not asked."""
+
+    posture: PostureAudit | None
+    workspace: WorkspaceAudit | None
+    suggestion: DampingSuggestion | None
+
+
+class _Task:
+    """An audit that other threads and processes take chunks of."""
+
+    def __init__(self, robot: Robot, gains: tuple[Any, ...], at_tip: bool,
+                 options: dict[str, Any]) -> None:
+        self._arguments = (robot, gains, at_tip, options)
+        self.core = _core.Audit(robot._core, _core.Gains(robot._core, *gains), at_tip, options)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _Task, self._arguments
+
+    def sample(self, seed: int, first: int, count: int) -> Array:
+        return self.core.sample(seed, first, count)
+
+    def numbers(self, postures: Array) -> Array:
+        return self.core.numbers(postures)
+
+
+def _map_chunks(task: _Task, samples: int, seed: int, postures: Array | None,
+                executor: concurrent.futures.Executor) -> Array:
+    """Returns the numbers of all postures in their order, whoever finds them and when."""
+    firsts = range(0, samples, _CHUNK)
+    if postures is None:
+        chunks = [executor.submit(task.sample, seed, first, min(_CHUNK, samples - first))
+                  for first in firsts]
+    else:
+        chunks = [executor.submit(task.numbers, postures[first:first + _CHUNK])
+                  for first in firsts]
+    return np.concatenate([chunk.result() for chunk in chunks])
+
+
+def _workspace(task: _Task, samples: int, seed: int, postures: Array | None,
+               executor: concurrent.futures.Executor | None) -> WorkspaceAudit:
+    if executor is None:
+        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as threads:
+            numbers = _map_chunks(task, samples, seed, postures, threads)
+    else:
+        numbers = _map_chunks(task, samples, seed, postures, executor)
+    found = task.core.summarize(numbers, seed, postures)
+    return WorkspaceAudit(found["samples"], found["singular"],
+                          *(Distribution(**found[name])
+                            for name in ("smallest_ratio", "fastest_pole", "gain_margin")))
+
+
+def _damping(stiffness: npt.ArrayLike | None, damping: npt.ArrayLike | None,
+             factor: float | None, name: str) -> Array | None:
+    """Returns the damping given, or factor times the root of each entry of the stiffness."""
+    if factor is None:
+        return to_gain(name, damping)
+    if damping is not None:
+        raise Error(f"damping_factor: {name} is given as well")
+    matrix = to_gain("stiffness", stiffness)
+    if matrix is None or (matrix < 0).any():
+        raise Error("damping_factor: has no meaning without a stiffness of entries of at least zero")
+    return factor * np.sqrt(matrix)
+
+
+def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
+          task_stiffness: npt.ArrayLike | None = None, task_damping: npt.ArrayLike | None = None,
+          damping_factor: float | None = None, null_stiffness: npt.ArrayLike | None = None,
+          null_damping: npt.ArrayLike | None = None, joint_stiffness: npt.ArrayLike | None = None,
+          joint_damping: npt.ArrayLike | None = None, frame: str = "base",
+          directions: Sequence[str] = DIRECTIONS, half_quaternion: bool = False,
+          inertia_blocks: bool = False, period: float = 0, delay: int = 0, cutoff: float = 0,
+          difference_velocity: bool = False, soft_frequency: float = 0.1,
+          damping_ratio: float | None = None, samples: int = 0, seed: int = 0,
+          lower: npt.ArrayLike | None = None, upper: npt.ArrayLike | None = None,
+          postures: npt.ArrayLike | None = None,
+          executor: concurrent.futures.Executor | None = None) -> Audit:
+    """Returns what gains really do on a robot, as their documentation states them.
+
+    At posture q (n, rad): its modes, smallest damping ratio, fastest pole and gain margin. Over
+    `samples` postures, spread evenly by a sequence of number `seed` between `lower` and `upper` (n,
+    rad; by default the position limits), or over `postures` (s x n, rad): the distributions of these
+    numbers. With a `damping_ratio`: damping
+    that gives every mode this ratio at q.
+
+    Gains are those of `closed_loop`; `damping_factor` F stands for a damping of F sqrt(K), entry by
+    entry. With `half_quaternion` the controller takes half of the rotation vector for its error,
+    with `inertia_blocks` it multiplies gains by the tip's inertia, for translation and rotation
+    apart. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
+    (Hz; 0: none), and `difference_velocity`. Modes below `soft_frequency` (rad/s) are soft.
+
+    An `executor` of concurrent.futures maps over chunks of postures, by default one of threads. The
+    results are the same to the last bit whatever executor and however many workers.
+
+    Raises Error for gains that are not symmetric positive semidefinite, or of another size.
+    """
+    at_tip = joint_stiffness is None and joint_damping is None
+    if not at_tip and not (task_stiffness is None and task_damping is None):
+        raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
+    factor_of = (damping_factor, None) if at_tip else (None, damping_factor)
+    chosen = selected(directions)
+    stiffness = to_gain("task_stiffness", task_stiffness)
+    damping = _damping(task_stiffness, task_damping, factor_of[0], "task_damping")
+    if at_tip and not all(chosen):
+        keep = np.outer(chosen, chosen)
+        stiffness = None if stiffness is None else stiffness * keep
+        damping = None if damping is None else damping * keep
+    gains = (to_gain("joint_stiffness", joint_stiffness),
+             _damping(joint_stiffness, joint_damping, factor_of[1], "joint_damping"), 0.0,
+             stiffness, damping, 0.0, to_vector("null_stiffness", null_stiffness),
+             to_vector("null_damping", null_damping), is_tool(frame), [True] * 6)
+    options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": inertia_blocks,
+                               "period": float(period), "delay": delay, "cutoff": float(cutoff),
+                               "difference_velocity": difference_velocity,
+                               "soft_frequency": float(soft_frequency)}
+    for name, values in (("lower", lower), ("upper", upper)):
+        if values is not None:
+            options[name] = to_numbers(name, values, 1)
+    task = _Task(robot, gains, at_tip, options)
+    given = None if postures is None else to_numbers("postures", postures, 2)
+    samples = samples if given is None else len(given)
+    posture = workspace = suggestion = None
+    if q is not None:
+        at = to_numbers("q", q, 1)
+        found = task.core.posture(at)
+        posture = PostureAudit(**{**found, "modes": make_modes(found["modes"])})
+        if damping_ratio is not None:
+            suggestion = DampingSuggestion(**task.core.suggest(at, damping_ratio))
+    elif damping_ratio is not None:
+        raise Error("damping_ratio: is wanted at a posture, but q is missing")
+    if samples > 0:
+        workspace = _workspace(task, samples, seed, given, executor)
+    return Audit(posture, workspace, suggestion)

@@ -1,0 +1,342 @@
+"""The impedance controller."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import json
+import math
+import numbers
+import os
+from collections.abc import Mapping
+from typing import Any, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import Error
+from ._results import (Array, ComplexArray, IntArray, Result, TextArray, stack, table, to_gain,
+                       to_numbers, to_vector)
+from ._robot import is_cartesian, is_tool, selected
+
+
+class Status(enum.IntEnum):
+    """Result of one tick; of several the most severe, which stands last. From SETPOINT_STALE on the
+    torque is a safe one instead of the springs'; docs/safety.md describes each."""
+
+    OK = 0
+    TORQUE_LIMITED = 1
+    NEAR_JOINT_LIMIT = 2
+    WRENCH_NOT_FINITE = 3
+    SETPOINT_REJECTED = 4
+    WEIGHT_NOT_HELD = 5
+    SETPOINT_STALE = 6
+    SETPOINT_LOST = 7
+    FAULT_LATCHED = 8
+    TOO_MANY_RESTARTS = 9
+    TIME_GAP = 10
+    WRONG_RATE = 11
+    COLLISION = 12
+    INSTABILITY = 13
+    TIP_SPEED_LIMIT = 14
+    VELOCITY_LIMIT = 15
+    WALL = 16
+    POSITION_LIMIT = 17
+    STATE_FROZEN = 18
+    STATE_CONTRADICTORY = 19
+    STATE_NOT_FINITE = 20
+    STATE_WRONG_SIZE = 21
+    STATE_JUMP = 22
+    TIME_BACKWARD = 23
+    NOT_FINITE = 24
+
+    @property
+    def text(self) -> str:
+        """A short English text."""
+        return _core.status_text(int(self))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Setpoint(Result):
+    """Where the robot is to go; the controller moves there smoothly."""
+
+    joint_position: npt.ArrayLike | None = None
+    """n, rad. Mode joint: the goal. Mode cartesian: the posture of the null-space springs; None
+    keeps the one in force."""
+    tip_pose: npt.ArrayLike | None = None
+    """4 x 4, goal of mode cartesian."""
+    wrench: npt.ArrayLike | None = None
+    """6, that the tip exerts in addition, N and N m; None: zero."""
+    mode: str | None = None
+    """joint or cartesian; None: cartesian if there is a tip_pose."""
+    time: float | None = None
+    """When it was given, as in Controller.update; None: at the tick that takes it up."""
+
+    def __post_init__(self) -> None:
+        for name, dimensions in (("joint_position", 1), ("tip_pose", 2), ("wrench", 1)):
+            given = getattr(self, name)
+            if given is not None:
+                object.__setattr__(self, name, to_numbers(name, given, dimensions))
+        if self.mode is None:
+            object.__setattr__(self, "mode", "joint" if self.tip_pose is None else "cartesian")
+        super().__post_init__()
+
+    def _parts(self) -> tuple[Any, ...]:
+        time = None if self.time is None else nanoseconds(self.time)
+        return (is_cartesian(str(self.mode)), _column(self.joint_position), self.tip_pose,
+                _column(self.wrench), time)
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Snapshot(Result):
+    """What one tick measured and put out."""
+
+    time: int
+    """ns, of the state."""
+    tick: int
+    """Counted from 1."""
+    restarts: int
+    """How often the springs restarted, the first time included."""
+    status: Status
+    fault: Status
+    """The latched fault; OK: none."""
+    mode: str
+    position: Array
+    """n, rad."""
+    velocity: Array
+    """n, rad/s."""
+    torque: Array
+    """n, N m."""
+    law_torque: Array
+    """n, N m, before the limits."""
+    reference_joint_position: Array
+    """n, rad, where the joint springs are fixed; in mode cartesian the posture."""
+    tip_pose: Array
+    """4 x 4."""
+    reference_tip_pose: Array
+    """4 x 4, where the Cartesian springs are fixed."""
+    tip_error: Array
+    """6, from tip to reference: m, and rotation vector, rad."""
+    tip_wrench: Array
+    """6, of the Cartesian springs, dampers and feed-forward, N and N m."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class TrackedModes(Result):
+    """The modes at one tick, by falling natural frequency; terms and bounds as in Modes."""
+
+    natural_frequency: Array
+    damping_ratio: Array
+    damped_frequency: Array
+    eigenvalues: ComplexArray
+    kind: TextArray
+    error_bound: Array
+    natural_frequency_bound: Array
+    damping_ratio_bound: Array
+    shapes: ComplexArray
+    """m x n; zero if the configuration asks for no shapes."""
+    label: IntArray
+    """m; a mode keeps its label as long as it can be followed."""
+    zero_modes: int
+    """Number of motions that no spring resists."""
+    time: int
+    """ns, of the state that the modes belong to."""
+    tick: int
+    position: Array
+    """n, of that state, rad."""
+    status: str
+    origin: str
+    """tracked, reused or direct."""
+    counters: dict[str, int]
+    """Numbers of ticks by what the analysis did, see controller/plugin.h."""
+
+    def __len__(self) -> int:
+        return len(self.natural_frequency)
+
+    def __repr__(self) -> str:
+        head = (f"TrackedModes at tick {self.tick}: {len(self)}, zero modes: {self.zero_modes}, "
+                f"status: {self.status}\n")
+        return head + table({"label": self.label.tolist(),
+                             "rad/s": self.natural_frequency.tolist(),
+                             "ratio": self.damping_ratio.tolist(),
+                             "1/s within": self.error_bound.tolist(), "kind": self.kind.tolist()})
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class TrackedSampledModes(Result):
+    """The modes of the sampled loop at one tick, by falling continuous frequency; terms as in
+    SampledModes."""
+
+    natural_frequency: Array
+    damping_ratio: Array
+    damped_frequency: Array
+    kind: TextArray
+    continuous_frequency: Array
+    continuous_ratio: Array
+    spectral_radius: float
+    gain_margin: float
+    time: int
+    tick: int
+    position: Array
+    status: str
+
+
+def nanoseconds(time: float) -> int:
+    """Returns a time in ns, given as an integer number of ns or as seconds in a float."""
+    if isinstance(time, numbers.Integral):
+        return int(time)
+    if not math.isfinite(time):
+        raise Error("time: is not a finite number")
+    return round(1e9 * time)
+
+
+def _column(values: npt.ArrayLike | None) -> Array | None:
+    return None if values is None else np.asarray(values, dtype=np.float64).reshape(-1, 1)
+
+
+class Controller:
+    """Impedance controller of one arm with n joints, the same that a host loads as plugin.
+
+    One thread calls `update` and `reset`, others may call the rest. Call `start` before the loop, so
+    that gains are judged where the robot is:
+
+        controller = dashpot.Controller("controller/examples/panda.yaml")
+        controller.start(q)
+        for tick in range(1000):  # every period, with what the robot reports
+            torque, status = controller.update(tick * controller.period, q, qd)
+    """
+
+    def __init__(self, config: str | os.PathLike[str] | Mapping[str, Any]) -> None:
+        """Takes the path of a configuration file, or its contents as a dict, in which a relative
+        path of a URDF begins at the working directory. controller/examples/panda.yaml has all keys.
+
+        Raises Error that names key and reason, also for gains with too small a gain margin.
+        """
+        if isinstance(config, Mapping):
+            text = json.dumps(config, default=_plain)
+            self._core = _core.Controller.from_text(text, os.getcwd())
+        else:
+            self._core = _core.Controller.from_file(os.fspath(config))
+        self.joints: int = self._core.joints
+        """n."""
+        self.joint_names: tuple[str, ...] = tuple(self._core.joint_names())
+        """n, from the base to the tip."""
+        self.period: float = self._core.period
+        """Of the loop, s."""
+
+    def __repr__(self) -> str:
+        return f"Controller({self.joints} joints, {self.period} s)"
+
+    def update(self, time: float, q: npt.ArrayLike, qd: npt.ArrayLike,
+               setpoint: Setpoint | None = None, *,
+               external_wrench: npt.ArrayLike | None = None) -> tuple[Array, Status]:
+        """Does one tick: takes the state, and returns the torque (n, N m) and the status.
+
+        `time` is of the state, on any clock that does not run backward: seconds as a float, or
+        nanoseconds as an integer. q and qd (n, rad and rad/s) are measured. Without a set-point the
+        last one stays in force. `external_wrench` (6) is what the world exerts on the tip. The
+        torque is safe to send with every status; a state that is no good gives a status, not an
+        exception.
+        """
+        torque, status = self._core.update(
+            nanoseconds(time), np.asarray(q, dtype=np.float64), np.asarray(qd, dtype=np.float64),
+            None if setpoint is None else setpoint._parts(),
+            None if external_wrench is None else np.asarray(external_wrench, dtype=np.float64))
+        return torque, Status(status)
+
+    def start(self, q: npt.ArrayLike, torque: npt.ArrayLike | None = None) -> None:
+        """Prepares the loop with the robot at rest at q (n, rad), where it applies `torque` (n, N m;
+        None: its weight). Raises Error for gains with too small a gain margin there."""
+        self._core.start(to_numbers("q", q, 1).reshape(-1, 1), _column(to_vector("torque", torque)))
+
+    def reset(self, torque: npt.ArrayLike | None = None) -> None:
+        """Forgets history, faults and set-point, but not the gains. The torque-rate limit counts
+        from `torque` (n, N m; None: the last one)."""
+        self._core.reset(_column(to_vector("torque", torque)))
+
+    def release(self) -> None:
+        """Releases a latched fault at the next tick, unless its cause is still present."""
+        self._core.release()
+
+    def set_setpoint(self, setpoint: Setpoint | None = None, **parts: Any) -> None:
+        """Sets the set-point that the next tick takes up: a Setpoint, or what makes one. Raises
+        Error for one that is not possible."""
+        wanted = Setpoint(**parts) if setpoint is None else setpoint
+        self._core.set_setpoint(*wanted._parts())
+
+    def set_gains(self, *, joint_stiffness: npt.ArrayLike | None = None,
+                  joint_damping: npt.ArrayLike | None = None,
+                  joint_damping_ratio: float | None = None,
+                  task_stiffness: npt.ArrayLike | None = None,
+                  task_damping: npt.ArrayLike | None = None,
+                  task_damping_ratio: float | None = None,
+                  null_stiffness: npt.ArrayLike | None = None,
+                  null_damping: npt.ArrayLike | None = None, frame: str | None = None,
+                  directions: Sequence[str] | None = None) -> None:
+        """Sets gains that the next tick takes up; None keeps one as it is. Matrices (n x n, 6 x 6)
+        may be given as their diagonals, null_stiffness and null_damping have n entries. Raises Error
+        for gains that are not possible, or leave the sampled loop too small a gain margin."""
+        given = {key: value for key, value in locals().items() if key != "self"}
+        self._core.set_gains(_gains(given))
+
+    def judge_gains(self, position: npt.ArrayLike | None = None, **gains: Any) -> float:
+        """Returns the gain margin of the sampled loop at `position` (n, rad; None: the latest) with
+        gains as in set_gains, those of the configuration by default: at most limits.gain_margin,
+        below 1 if the loop is unstable."""
+        return self._core.judge_gains(_column(to_vector("position", position)), _gains(gains))
+
+    def snapshot(self) -> Snapshot | None:
+        """Returns what the latest tick measured and put out; None before the first."""
+        found = self._core.snapshot()
+        if found is None:
+            return None
+        return Snapshot(**{**found, "status": Status(found["status"]),
+                           "fault": Status(found["fault"])})
+
+    def modes(self) -> TrackedModes | None:
+        """Returns the modes of the latest tick that was analysed; None as long as there are none."""
+        found = self._core.modes()
+        if found is None:
+            return None
+        return TrackedModes(**{**found, "kind": np.array(found["kind"], dtype=np.str_),
+                               "label": np.array(found["label"], dtype=np.int64),
+                               "shapes": stack(found["shapes"], found["position"].shape, complex)})
+
+    def sampled_modes(self) -> TrackedSampledModes | None:
+        """Returns the latest analysis of the sampled loop (analysis.sampled.interval); None as long
+        as there is none."""
+        found = self._core.sampled_modes()
+        if found is None:
+            return None
+        return TrackedSampledModes(**{**found, "kind": np.array(found["kind"], dtype=np.str_)})
+
+
+def _gains(given: dict[str, Any]) -> dict[str, Any]:
+    """Returns gains as C++ reads them."""
+    result: dict[str, Any] = {}
+    for key, value in given.items():
+        if value is None:
+            continue
+        if key == "frame":
+            result["tool_frame"] = is_tool(value)
+        elif key == "directions":
+            result[key] = selected(value)
+        elif key.endswith("_ratio"):
+            result[key] = np.array([[float(value)]])
+        elif key.startswith("null_"):
+            result[key] = _column(to_numbers(key, value, 1))
+        elif key in ("joint_stiffness", "joint_damping", "task_stiffness", "task_damping"):
+            result[key] = to_gain(key, value)
+        else:
+            raise TypeError(f"unknown gain '{key}'")
+    return result
+
+
+def _plain(value: object) -> object:
+    """Returns numpy's arrays and numbers as lists and numbers."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    raise Error(f"config: {type(value).__name__} is neither a number, a text, a list nor a dict")

@@ -1,0 +1,220 @@
+"""The robot from its URDF, and its closed loop with springs and dampers."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import Any, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import Error
+from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers, to_vector
+
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+
+
+class Robot:
+    """A serial chain of n moving joints between two links of a URDF. It cannot be changed, and can
+    be pickled.
+
+    Vectors are in the axes of the base link, twists and wrenches linear part first, at the tip. For
+    a prismatic joint read m for rad and N for N m.
+    """
+
+    joint_names: tuple[str, ...]
+    """n, from the base to the tip."""
+    lower: Array
+    """n, position limits, rad; -infinity for a continuous joint."""
+    upper: Array
+    velocity: Array
+    """n, velocity limits, rad/s; infinite if there is none."""
+    effort: Array
+    """n, torque limits, N m; infinite if there is none."""
+    viscous_friction: Array
+    """n, N m s/rad."""
+    coulomb_friction: Array
+    """n, N m."""
+    reflected_inertia: Array
+    """n, of rotors and gears, kg m^2."""
+
+    def __init__(self, urdf: str, base: str, tip: str, *, file: str = "URDF",
+                 **options: Any) -> None:
+        """Reads the text of a URDF; `file` stands for it in messages. See from_urdf."""
+        self._arguments = (urdf, base, tip, file, options)
+        self._core = _core.Robot(urdf, file, base, tip, options)
+        self.joint_names = tuple(self._core.joint_names())
+        for name, values in self._core.joint_properties().items():
+            values.flags.writeable = False
+            setattr(self, name, values)
+
+    @classmethod
+    def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str, *,
+                  gravity: npt.ArrayLike | None = None, include_off_chain: bool = True,
+                  accept_inertias: bool = False, reflected_inertia: npt.ArrayLike | None = None,
+                  viscous_friction: npt.ArrayLike | None = None,
+                  coulomb_friction: npt.ArrayLike | None = None, payload_mass: float = 0,
+                  payload_center: npt.ArrayLike = (0, 0, 0),
+                  payload_inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)),
+                  tool: npt.ArrayLike | None = None) -> Robot:
+        """Reads the chain from link `base` to link `tip` of the URDF at `path`.
+
+        `gravity` (3, m/s^2) is in the axes of the file's root link, by default 9.81 along -z.
+        Fingers and other links off the chain count as rigid at their zero position unless
+        `include_off_chain` is False. `accept_inertias` takes inertias that no body can have.
+        `reflected_inertia` (n, kg m^2), `viscous_friction` (n, N m s/rad) and `coulomb_friction`
+        (n, N m) replace the URDF's. A payload at the tip has `payload_mass` (kg), `payload_center`
+        (3, m, in the tip link) and `payload_inertia` (3 x 3, kg m^2, about that centre). `tool` is
+        the pose (4 x 4) of the tool's frame in the tip link; the tip is then this frame.
+
+        Raises Error that names file, joint or link and reason.
+        """
+        options: dict[str, Any] = {"include_off_chain": include_off_chain,
+                                   "accept_inertias": accept_inertias,
+                                   "payload_mass": float(payload_mass),
+                                   "payload_center": _sized("payload_center", payload_center, (3,)),
+                                   "payload_inertia": _sized("payload_inertia", payload_inertia,
+                                                             (3, 3))}
+        if gravity is not None:
+            options["gravity"] = _sized("gravity", gravity, (3,))
+        for name, values in (("reflected_inertia", reflected_inertia),
+                             ("viscous_friction", viscous_friction),
+                             ("coulomb_friction", coulomb_friction)):
+            if values is not None:
+                options[name] = to_numbers(name, values, 1)
+        if tool is not None:
+            pose = _sized("tool", tool, (4, 4))
+            options["tool_position"] = pose[:3, 3].copy()
+            options["tool_rotation"] = pose[:3, :3].copy()
+        file = os.fspath(path)
+        return cls(_core.read_urdf(file), base, tip, file=file, **options)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _make_robot, self._arguments
+
+    def __repr__(self) -> str:
+        _, base, tip, file, _ = self._arguments
+        return f"Robot({self.name}: {len(self)} joints from {base} to {tip}, {file})"
+
+    def __len__(self) -> int:
+        """Returns n."""
+        return len(self.joint_names)
+
+    @property
+    def name(self) -> str:
+        """The robot's name in the URDF."""
+        return self._core.name
+
+    def pose(self, q: npt.ArrayLike) -> Array:
+        """Returns the pose of the tip at q (n, rad): 4 x 4, from the tip's axes into the base's."""
+        return self._core.pose(_joint_values("q", q))
+
+    def mass(self, q: npt.ArrayLike) -> Array:
+        """Returns the mass matrix at q (n, rad): n x n, kg m^2."""
+        return self._core.mass(_joint_values("q", q))
+
+    def gravity(self, q: npt.ArrayLike) -> Array:
+        """Returns the gradient of the potential energy at q (n, rad): n, N m, the torque that holds
+        the arm."""
+        return self._core.gravity(_joint_values("q", q))
+
+    def coriolis(self, q: npt.ArrayLike, qd: npt.ArrayLike) -> Array:
+        """Returns C(q, qd) qd: n, N m."""
+        return self._core.coriolis(_joint_values("q", q), _joint_values("qd", qd))
+
+    def jacobian(self, q: npt.ArrayLike) -> Array:
+        """Returns J at q (n, rad): 6 x n, the tip's twist is J qd, linear rows first."""
+        return self._core.jacobian(_joint_values("q", q))
+
+    def jacobian_dot_qd(self, q: npt.ArrayLike, qd: npt.ArrayLike) -> Array:
+        """Returns dJ/dt qd: 6, the tip's acceleration without joint accelerations."""
+        return self._core.jacobian_dot_qd(_joint_values("q", q), _joint_values("qd", qd))
+
+
+def _make_robot(urdf: str, base: str, tip: str, file: str, options: dict[str, Any]) -> Robot:
+    return Robot(urdf, base, tip, file=file, **options)
+
+
+def _joint_values(name: str, values: npt.ArrayLike) -> Array:
+    return to_numbers(name, values, 1)
+
+
+def _sized(name: str, given: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
+    numbers = to_numbers(name, given, len(shape))
+    if numbers.shape != shape:
+        raise Error(f"{name}: is {' x '.join(map(str, numbers.shape))}, "
+                    f"expected {' x '.join(map(str, shape))}")
+    return numbers
+
+
+def selected(directions: Sequence[str]) -> list[bool]:
+    """Returns which of the six directions are named."""
+    for direction in directions:
+        if direction not in DIRECTIONS:
+            raise Error(f"directions: '{direction}' is none of {', '.join(DIRECTIONS)}")
+    return [direction in directions for direction in DIRECTIONS]
+
+
+def is_tool(frame: str) -> bool:
+    """Returns whether the frame of gains is the tool's."""
+    if frame not in ("base", "tool"):
+        raise Error(f"frame: '{frame}' is none of base, tool")
+    return frame == "tool"
+
+
+def is_cartesian(mode: str) -> bool:
+    """Returns whether springs are fixed to a pose of the tip."""
+    if mode not in ("joint", "cartesian"):
+        raise Error(f"mode: '{mode}' is none of joint, cartesian")
+    return mode == "cartesian"
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ClosedLoop(Result):
+    """The robot with springs and dampers, M q'' + C q' + K q = f, where its springs are at rest."""
+
+    mass: Array
+    """M, n x n, kg m^2."""
+    damping: Array
+    """C, n x n, N m s/rad, the joints' viscous friction included."""
+    stiffness: Array
+    """K, n x n, N m/rad; not symmetric with an external wrench."""
+    modes: Modes
+
+
+def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike | None = None,
+                task_damping: npt.ArrayLike | None = None, task_damping_ratio: float = 0,
+                null_stiffness: npt.ArrayLike | None = None,
+                null_damping: npt.ArrayLike | None = None,
+                joint_stiffness: npt.ArrayLike | None = None,
+                joint_damping: npt.ArrayLike | None = None, joint_damping_ratio: float = 0,
+                frame: str = "base", directions: Sequence[str] = DIRECTIONS,
+                external_wrench: npt.ArrayLike | None = None,
+                soft_frequency: float = 0.1) -> ClosedLoop:
+    """Returns the loop that Dashpot's controller closes around the robot at rest at q (n, rad).
+
+    Matrices are symmetric positive semidefinite, and may be given as their diagonals. With
+    `joint_stiffness` or `joint_damping` (n x n) springs are fixed to a joint position, otherwise to
+    a pose of the tip, with `task_stiffness` K_C and `task_damping` C_C (6 x 6, in the axes of
+    `frame`, base or tool). In the motions that the selected `directions` leave free act
+    `null_stiffness` and `null_damping` (n each). A damping ratio above 0 has the damping designed
+    for it. An `external_wrench` (6, of the world on the tip) adds its geometric stiffness.
+
+    Raises Error for a posture or gains that the controller would refuse.
+    """
+    at_tip = joint_stiffness is None and joint_damping is None and joint_damping_ratio == 0
+    if not at_tip and not (task_stiffness is None and task_damping is None):
+        raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
+    gains = _core.Gains(robot._core, to_gain("joint_stiffness", joint_stiffness),
+                        to_gain("joint_damping", joint_damping), joint_damping_ratio,
+                        to_gain("task_stiffness", task_stiffness),
+                        to_gain("task_damping", task_damping), task_damping_ratio,
+                        to_vector("null_stiffness", null_stiffness),
+                        to_vector("null_damping", null_damping), is_tool(frame),
+                        selected(directions))
+    found = _core.closed_loop(robot._core, _joint_values("q", q), gains, at_tip,
+                              to_vector("external_wrench", external_wrench), soft_frequency)
+    return ClosedLoop(found["mass"], found["damping"], found["stiffness"],
+                      make_modes(found["modes"]))

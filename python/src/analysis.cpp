@@ -1,0 +1,241 @@
+// Modes, responses, sensitivities, and the sampled loop, of a system given by matrices.
+
+#include <dashpot/analysis/response.hpp>
+#include <dashpot/analysis/sensitivity.hpp>
+#include <dashpot/python/src/analysis.hpp>
+
+namespace dashpot::python {
+
+using analysis::Mode;
+using analysis::ModeGradient;
+using analysis::ModeSensitivity;
+using analysis::Motion;
+using analysis::SampledLoop;
+using analysis::SampledMode;
+using analysis::Spectrum;
+using analysis::System;
+using analysis::TaskImpedance;
+
+nb::dict modes_of(const Spectrum<>& spectrum) {
+  const auto& modes = spectrum.modes;
+  const auto column = [&](auto member) {
+    return to_column(modes, [=](const Mode<>& mode) { return mode.*member; });
+  };
+  nb::dict result;
+  result["natural_frequency"] = column(&Mode<>::natural_frequency);
+  result["damping_ratio"] = column(&Mode<>::damping_ratio);
+  result["damped_frequency"] = column(&Mode<>::damped_frequency);
+  result["eigenvalues"] = to_pairs(modes, [](const Mode<>& mode) { return mode.eigenvalues; });
+  result["kind"] = to_list(modes, [](const Mode<>& mode) { return to_text(mode.kind); });
+  result["error_bound"] = column(&Mode<>::error_bound);
+  result["natural_frequency_bound"] = column(&Mode<>::natural_frequency_bound);
+  result["damping_ratio_bound"] = column(&Mode<>::damping_ratio_bound);
+  result["backward_error"] = column(&Mode<>::backward_error);
+  result["condition"] = column(&Mode<>::condition);
+  result["shapes"] = to_list(modes, [](const Mode<>& mode) { return to_array(mode.shapes[0]); });
+  result["zero_modes"] = to_array(spectrum.zero_modes.basis.transpose());
+  result["zero_mode_rates"] = to_array(spectrum.zero_mode_rates);
+  result["coupling"] = spectrum.coupling;
+  result["status"] = to_text(spectrum.status);
+  return result;
+}
+
+nb::dict sampled_modes_of(const analysis::SampledSpectrum& sampled) {
+  const auto& modes = sampled.modes;
+  const auto column = [&](auto member) {
+    return to_column(modes, [=](const SampledMode& mode) { return mode.*member; });
+  };
+  const auto same = [](const analysis::Complex& z) { return z; };
+  nb::dict result;
+  result["natural_frequency"] = column(&SampledMode::natural_frequency);
+  result["damping_ratio"] = column(&SampledMode::damping_ratio);
+  result["damped_frequency"] = column(&SampledMode::damped_frequency);
+  result["eigenvalues"] = to_pairs(modes, [](const SampledMode& mode) { return mode.eigenvalues; });
+  result["discrete_eigenvalues"] =
+      to_pairs(modes, [](const SampledMode& mode) { return mode.discrete_eigenvalues; });
+  result["kind"] = to_list(modes, [](const SampledMode& mode) { return to_text(mode.kind); });
+  result["zero_modes"] = to_column(sampled.zero_modes, same);
+  result["others"] = to_column(sampled.others, same);
+  result["spectral_radius"] = sampled.spectral_radius;
+  return result;
+}
+
+namespace {
+
+/// A system and its spectrum, computed without the interpreter's lock.
+struct Solved {
+  System<> system;
+  Spectrum<> spectrum;
+
+  Solved(const TaskImpedance& impedance, double soft_frequency)
+      : system(analysis::to_joint_space(impedance)) {
+    analysis::SpectrumOptions options;
+    options.soft_frequency = soft_frequency;
+    spectrum = analysis::analyze(system, options);
+  }
+};
+
+TaskImpedance make_impedance(Eigen::MatrixXd mass, OptionalMatrix damping, OptionalMatrix stiffness,
+                             OptionalMatrix jacobian, OptionalMatrix task_damping,
+                             OptionalMatrix task_stiffness) {
+  TaskImpedance impedance;
+  impedance.mass = std::move(mass);
+  impedance.damping = std::move(damping);
+  impedance.stiffness = std::move(stiffness);
+  impedance.jacobian = std::move(jacobian);
+  impedance.task_damping = std::move(task_damping);
+  impedance.task_stiffness = std::move(task_stiffness);
+  return impedance;
+}
+
+nb::dict find_modes(const TaskImpedance& impedance, double soft_frequency) {
+  std::optional<Solved> solved;
+  {
+    const nb::gil_scoped_release release;
+    solved.emplace(impedance, soft_frequency);
+  }
+  return modes_of(solved->spectrum);
+}
+
+/// The sum of the motions that the causes given make at one time.
+struct Causes {
+  OptionalVector position, velocity, impulse, force;
+
+  Motion motion(const analysis::Response& response, Eigen::Index n, double time) const {
+    const Eigen::VectorXd zero = Eigen::VectorXd::Zero(n);
+    Motion sum = response.free(position.value_or(zero), velocity.value_or(zero), time);
+    if (impulse) add(sum, response.impulse(*impulse, time));
+    if (force) add(sum, response.step(*force, time));
+    return sum;
+  }
+
+ private:
+  static void add(Motion& sum, const Motion& part) {
+    sum.position += part.position;
+    sum.velocity += part.velocity;
+    sum.zero_mode_position += part.zero_mode_position;
+    sum.zero_mode_velocity += part.zero_mode_velocity;
+  }
+};
+
+nb::dict respond(const TaskImpedance& impedance, const Eigen::VectorXd& times,
+                 OptionalVector position, OptionalVector velocity, OptionalVector impulse,
+                 OptionalVector force) {
+  const Causes causes{std::move(position), std::move(velocity), std::move(impulse),
+                      std::move(force)};
+  const Eigen::Index n = impedance.mass.rows();
+  Eigen::MatrixXd q(times.size(), n), qd(times.size(), n), zero(times.size(), n),
+      zero_rate(times.size(), n);
+  {
+    const nb::gil_scoped_release release;
+    const Solved solved(impedance, analysis::SpectrumOptions().soft_frequency);
+    const analysis::Response response(solved.system, solved.spectrum);
+    for (Eigen::Index i = 0; i < times.size(); ++i) {
+      const Motion motion = causes.motion(response, n, times[i]);
+      q.row(i) = motion.position;
+      qd.row(i) = motion.velocity;
+      zero.row(i) = motion.zero_mode_position;
+      zero_rate.row(i) = motion.zero_mode_velocity;
+    }
+  }
+  nb::dict result;
+  result["times"] = to_array(times);
+  result["position"] = to_array(q);
+  result["velocity"] = to_array(qd);
+  result["zero_mode_position"] = to_array(zero);
+  result["zero_mode_velocity"] = to_array(zero_rate);
+  return result;
+}
+
+nb::object receptance(const TaskImpedance& impedance, double omega) {
+  Eigen::MatrixXcd H;
+  {
+    const nb::gil_scoped_release release;
+    const Solved solved(impedance, analysis::SpectrumOptions().soft_frequency);
+    H = analysis::Response(solved.system, solved.spectrum).receptance(omega);
+  }
+  return nb::cast(std::move(H));
+}
+
+nb::dict gradients(const std::vector<ModeSensitivity>& modes,
+                   ModeGradient ModeSensitivity::*coefficient) {
+  nb::dict result;
+  result["natural_frequency"] = to_list(modes, [=](const ModeSensitivity& mode) {
+    return to_array((mode.*coefficient).natural_frequency);
+  });
+  result["damping_ratio"] = to_list(modes, [=](const ModeSensitivity& mode) {
+    return to_array((mode.*coefficient).damping_ratio);
+  });
+  result["eigenvalues"] = to_list(modes, [=](const ModeSensitivity& mode) {
+    const auto& two = (mode.*coefficient).eigenvalues;
+    return nb::make_tuple(to_array(two[0]), to_array(two[1]));
+  });
+  return result;
+}
+
+nb::dict find_sensitivities(const TaskImpedance& impedance) {
+  std::optional<Solved> solved;
+  std::vector<ModeSensitivity> found;
+  {
+    const nb::gil_scoped_release release;
+    solved.emplace(impedance, analysis::SpectrumOptions().soft_frequency);
+    found = analysis::sensitivities(solved->system, solved->spectrum);
+  }
+  nb::dict result;
+  result["modes"] = modes_of(solved->spectrum);
+  result["mass"] = gradients(found, &ModeSensitivity::mass);
+  result["damping"] = gradients(found, &ModeSensitivity::damping);
+  result["stiffness"] = gradients(found, &ModeSensitivity::stiffness);
+  result["regular"] =
+      to_list(found, [](const ModeSensitivity& mode) { return nb::bool_(mode.regular); });
+  return result;
+}
+
+SampledLoop make_loop(double period, int delay, double torque_cutoff, bool difference_velocity,
+                      const OptionalMatrix& friction, const OptionalMatrix& gravity_gradient) {
+  SampledLoop loop;
+  loop.period = period;
+  loop.delay = delay;
+  loop.torque_cutoff = torque_cutoff;
+  loop.difference_velocity = difference_velocity;
+  if (friction) loop.friction = *friction;
+  if (gravity_gradient) loop.gravity_gradient = *gravity_gradient;
+  return loop;
+}
+
+nb::dict find_sampled_modes(const TaskImpedance& impedance, const SampledLoop& loop) {
+  std::optional<Solved> solved;
+  analysis::SampledSpectrum sampled;
+  double margin = 0;
+  {
+    const nb::gil_scoped_release release;
+    solved.emplace(impedance, analysis::SpectrumOptions().soft_frequency);
+    sampled = analysis::sample_loop(solved->system, solved->spectrum, loop);
+    margin = analysis::gain_margin(solved->system, solved->spectrum, loop);
+  }
+  nb::dict result = sampled_modes_of(sampled);
+  result["gain_margin"] = margin;
+  result["continuous"] = modes_of(solved->spectrum);
+  return result;
+}
+
+}  // namespace
+
+void add_analysis(nb::module_& m) {
+  nb::class_<TaskImpedance>(m, "Impedance", "analysis::TaskImpedance")
+      .def(nb::new_(&make_impedance), nb::arg("mass"), nb::arg("damping").none(),
+           nb::arg("stiffness").none(), nb::arg("jacobian").none(), nb::arg("task_damping").none(),
+           nb::arg("task_stiffness").none());
+  nb::class_<SampledLoop>(m, "SampledLoop", "analysis::SampledLoop")
+      .def(nb::new_(&make_loop), nb::arg("period"), nb::arg("delay"), nb::arg("torque_cutoff"),
+           nb::arg("difference_velocity"), nb::arg("friction").none(),
+           nb::arg("gravity_gradient").none());
+  m.def("modes", &find_modes, nb::arg("impedance"), nb::arg("soft_frequency"));
+  m.def("response", &respond, nb::arg("impedance"), nb::arg("times"), nb::arg("position").none(),
+        nb::arg("velocity").none(), nb::arg("impulse").none(), nb::arg("force").none());
+  m.def("receptance", &receptance, nb::arg("impedance"), nb::arg("omega"));
+  m.def("sensitivities", &find_sensitivities, nb::arg("impedance"));
+  m.def("sampled_modes", &find_sampled_modes, nb::arg("impedance"), nb::arg("loop"));
+}
+
+}  // namespace dashpot::python

@@ -1,0 +1,160 @@
+// What gains really do on an arm, at one posture and at many.
+
+#include <dashpot/controller/audit.hpp>
+#include <dashpot/python/src/analysis.hpp>
+#include <dashpot/python/src/robot.hpp>
+
+namespace dashpot::python {
+namespace {
+
+using controller::Audit;
+using controller::AuditOptions;
+using controller::Distribution;
+using controller::JointVector;
+using controller::PostureAudit;
+using controller::PostureNumbers;
+
+/// Numbers of postures by rows: smallest ratio, fastest pole, gain margin, zero modes, singular.
+using Table = Eigen::Matrix<double, Eigen::Dynamic, 5>;
+
+/// An audit with the robot that checks postures.
+struct RobotAudit {
+  Robot robot;
+  Audit audit;
+};
+
+RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool cartesian,
+                      const nb::dict& given) {
+  AuditOptions options;
+  options.mode = cartesian ? controller::Mode::kCartesian : controller::Mode::kJoint;
+  options.gains = gains;
+  options.half_quaternion = nb::cast<bool>(given["half_quaternion"]);
+  options.inertia_blocks = nb::cast<bool>(given["inertia_blocks"]);
+  options.period = nb::cast<double>(given["period"]);
+  options.delay = nb::cast<int>(given["delay"]);
+  options.cutoff = nb::cast<double>(given["cutoff"]);
+  options.difference_velocity = nb::cast<bool>(given["difference_velocity"]);
+  options.soft_frequency = nb::cast<double>(given["soft_frequency"]);
+  if (given.contains("lower")) {
+    options.lower = robot.joint_vector("lower", nb::cast<Eigen::VectorXd>(given["lower"]));
+  }
+  if (given.contains("upper")) {
+    options.upper = robot.joint_vector("upper", nb::cast<Eigen::VectorXd>(given["upper"]));
+  }
+  return {robot, Audit(robot.model, options)};
+}
+
+Table to_table(const std::vector<PostureNumbers>& numbers) {
+  Table table(static_cast<Eigen::Index>(numbers.size()), 5);
+  Eigen::Index i = 0;
+  for (const PostureNumbers& one : numbers) {
+    table.row(i++) << one.smallest_ratio, one.fastest_pole, one.gain_margin, one.zero_modes,
+        one.singular ? 1 : 0;
+  }
+  return table;
+}
+
+std::vector<PostureNumbers> from_table(const Table& table) {
+  std::vector<PostureNumbers> numbers;
+  for (const auto& row : table.rowwise()) {
+    PostureNumbers& one = numbers.emplace_back();
+    one.smallest_ratio = row[0];
+    one.fastest_pole = row[1];
+    one.gain_margin = row[2];
+    one.zero_modes = static_cast<int>(row[3]);
+    one.singular = row[4] != 0;
+  }
+  return numbers;
+}
+
+/// The numbers of postures of a sequence.
+Table sample(const RobotAudit& all, std::uint64_t seed, std::int64_t first, std::int64_t count) {
+  return to_table(all.audit.sample(seed, first, count));
+}
+
+/// The numbers of postures that are given by rows.
+Table numbers_at(const RobotAudit& all, const Eigen::MatrixXd& postures) {
+  std::vector<PostureNumbers> numbers;
+  for (Eigen::Index i = 0; i < postures.rows(); ++i) {
+    numbers.push_back(all.audit.numbers(all.robot.joint_vector("postures", postures.row(i))));
+  }
+  return to_table(numbers);
+}
+
+nb::dict to_dict(const Distribution& found) {
+  nb::dict result;
+  result["median"] = found.median;
+  result["p05"] = found.p05;
+  result["p95"] = found.p95;
+  result["worst"] = found.worst;
+  result["worst_q"] = to_array(found.worst_q);
+  result["bound"] = found.bound;
+  return result;
+}
+
+nb::dict summarize(const RobotAudit& all, const Table& table, std::uint64_t seed,
+                   const OptionalMatrix& postures) {
+  controller::WorkspaceAudit found;
+  {
+    const nb::gil_scoped_release release;
+    found = controller::summarize(all.audit, from_table(table), [&](std::int64_t i) -> JointVector {
+      if (postures) return postures->row(i).transpose();
+      return all.audit.posture(seed, i);
+    });
+  }
+  nb::dict result;
+  result["samples"] = found.samples;
+  result["singular"] = found.singular;
+  result["smallest_ratio"] = to_dict(found.smallest_ratio);
+  result["fastest_pole"] = to_dict(found.fastest_pole);
+  result["gain_margin"] = to_dict(found.gain_margin);
+  return result;
+}
+
+nb::dict posture(const RobotAudit& all, const Eigen::VectorXd& q) {
+  PostureAudit found;
+  {
+    const nb::gil_scoped_release release;
+    found = all.audit.audit(all.robot.joint_vector("q", q));
+  }
+  nb::dict result;
+  result["q"] = to_array(found.q);
+  result["modes"] = modes_of(found.spectrum);
+  result["smallest_ratio"] = found.numbers.smallest_ratio;
+  result["fastest_pole"] = found.numbers.fastest_pole;
+  result["gain_margin"] = found.numbers.gain_margin;
+  result["singular"] = found.numbers.singular;
+  result["smallest_ratio_bound"] = found.smallest_ratio_bound;
+  result["fastest_pole_bound"] = found.fastest_pole_bound;
+  return result;
+}
+
+nb::dict suggest(const RobotAudit& all, const Eigen::VectorXd& q, double ratio) {
+  controller::DampingSuggestion found;
+  {
+    const nb::gil_scoped_release release;
+    found = all.audit.suggest(all.robot.joint_vector("q", q), ratio);
+  }
+  nb::dict result;
+  result["damping"] = to_array(found.damping);
+  result["diagonal"] = to_array(found.diagonal);
+  result["smallest_ratio"] = found.smallest_ratio;
+  result["diagonal_smallest_ratio"] = found.diagonal_smallest_ratio;
+  return result;
+}
+
+}  // namespace
+
+void add_audit(nb::module_& m) {
+  const auto unlocked = nb::call_guard<nb::gil_scoped_release>();
+  nb::class_<RobotAudit>(m, "Audit", "controller::Audit")
+      .def(nb::new_(&make_audit), nb::arg("robot"), nb::arg("gains"), nb::arg("cartesian"),
+           nb::arg("options"))
+      .def("sample", &sample, unlocked)
+      .def("numbers", &numbers_at, unlocked)
+      .def("summarize", &summarize, nb::arg("table"), nb::arg("seed"), nb::arg("postures").none())
+      .def("posture", &posture)
+      .def("suggest", &suggest);
+}
+
+}  // namespace dashpot::python

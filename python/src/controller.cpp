@@ -1,0 +1,259 @@
+// The controller behind the plugin's C functions, so that Python drives what other hosts load.
+
+#include <dashpot/controller/plugin/plugin_create.hpp>
+#include <dashpot/python/src/controller_results.hpp>
+
+#include <array>
+#include <memory>
+#include <mutex>
+#include <tuple>
+
+namespace dashpot::python {
+namespace {
+
+/// A controller. Calls that take long run without the interpreter's lock; these mutexes keep such
+/// calls of several threads apart, as plugin.h asks for. The remaining calls hold the lock.
+class Host {
+ public:
+  explicit Host(dashpot_controller* controller) : controller_(controller) {}
+
+  dashpot_controller* get() const { return controller_.get(); }
+  std::size_t joints() const { return dashpot_joints(get()); }
+
+  std::mutex loop;   ///< of update, start and reset
+  std::mutex other;  ///< of set_setpoint, set_gains and release
+
+ private:
+  struct Destroy {
+    void operator()(dashpot_controller* one) const { dashpot_destroy(one); }
+  };
+  std::unique_ptr<dashpot_controller, Destroy> controller_;
+};
+
+void check(std::int32_t code) {
+  if (code < DASHPOT_OK) throw std::invalid_argument(dashpot_last_error());
+}
+
+/// Without lines: the text was made from a dict.
+void forget_lines(controller::YamlNode& node) {
+  node.line = 0;
+  for (controller::YamlNode& item : node.items) forget_lines(item);
+}
+
+std::unique_ptr<Host> from_text(const std::string& text, const std::string& directory) {
+  controller::YamlNode document = controller::parse_yaml(text);
+  forget_lines(document);
+  return std::make_unique<Host>(create_controller(controller::read_config(document, directory)));
+}
+
+std::unique_ptr<Host> from_file(const std::string& path) {
+  dashpot_controller* const controller = dashpot_create(path.c_str());
+  if (controller == nullptr) throw std::invalid_argument(dashpot_last_error());
+  return std::make_unique<Host>(controller);
+}
+
+/// Entries of a set-point or of gains, which have to live until the call is over.
+class Numbers {
+ public:
+  /// Returns the entries by rows; null if nothing is given. Throws InvalidSystem for another size.
+  const double* add(const char* name, const OptionalMatrix& given, Eigen::Index rows,
+                    Eigen::Index cols) {
+    if (!given) return nullptr;
+    analysis::check_size(name, *given, rows, cols);
+    std::vector<double>& row_major = kept_.emplace_back();
+    for (const auto& row : given->rowwise())
+      row_major.insert(row_major.end(), row.begin(), row.end());
+    return row_major.data();
+  }
+
+ private:
+  std::vector<std::vector<double>> kept_;
+};
+
+/// A set-point of the C interface, with what it points to.
+class SetpointData {
+ public:
+  SetpointData(const Host& host, bool cartesian, const OptionalMatrix& joint_position,
+               const OptionalMatrix& tip_pose, const OptionalMatrix& wrench,
+               std::optional<std::int64_t> time) {
+    const auto n = static_cast<Eigen::Index>(host.joints());
+    given.struct_size = sizeof given;
+    given.joints = static_cast<std::uint32_t>(n);
+    given.time = time.value_or(DASHPOT_ON_ARRIVAL);
+    given.mode = cartesian ? DASHPOT_MODE_CARTESIAN : DASHPOT_MODE_JOINT;
+    given.joint_position = numbers_.add("joint_position", joint_position, n, 1);
+    if (tip_pose) {
+      analysis::check_size("tip_pose", *tip_pose, 4, 4);
+      given.tip_position = numbers_.add("", tip_pose->topRightCorner(3, 1), 3, 1);
+      given.tip_rotation = numbers_.add("", tip_pose->topLeftCorner(3, 3), 3, 3);
+    }
+    given.wrench = numbers_.add("wrench", wrench, 6, 1);
+  }
+
+  dashpot_setpoint given{};
+
+ private:
+  Numbers numbers_;
+};
+
+using OptionalSetpoint = std::optional<
+    std::tuple<bool, OptionalMatrix, OptionalMatrix, OptionalMatrix, std::optional<std::int64_t>>>;
+
+/// Gains of the C interface, with what they point to.
+class GainsData {
+ public:
+  GainsData(const Host& host, const nb::dict& keys) : n_(static_cast<Eigen::Index>(host.joints())) {
+    given.struct_size = sizeof given;
+    given.joints = static_cast<std::uint32_t>(n_);
+    given.joint_stiffness = matrix(keys, "joint_stiffness", n_, n_);
+    given.joint_damping = matrix(keys, "joint_damping", n_, n_);
+    given.joint_damping_ratio = matrix(keys, "joint_damping_ratio", 1, 1);
+    given.task_stiffness = matrix(keys, "task_stiffness", 6, 6);
+    given.task_damping = matrix(keys, "task_damping", 6, 6);
+    given.task_damping_ratio = matrix(keys, "task_damping_ratio", 1, 1);
+    given.null_stiffness = matrix(keys, "null_stiffness", n_, 1);
+    given.null_damping = matrix(keys, "null_damping", n_, 1);
+    if (keys.contains("tool_frame")) {
+      frame_ = nb::cast<bool>(keys["tool_frame"]) ? DASHPOT_FRAME_TOOL : DASHPOT_FRAME_BASE;
+      given.frame = &frame_;
+    }
+    if (keys.contains("directions")) {
+      const auto selected = nb::cast<std::vector<bool>>(keys["directions"]);
+      if (selected.size() != directions_.size()) {
+        throw std::invalid_argument("directions: six are wanted");
+      }
+      for (std::size_t i = 0; i < selected.size(); ++i) directions_[i] = selected[i] ? 1 : 0;
+      given.directions = directions_.data();
+    }
+  }
+  GainsData(const GainsData&) = delete;
+  GainsData& operator=(const GainsData&) = delete;
+
+  dashpot_gains given{};
+
+ private:
+  const double* matrix(const nb::dict& keys, const char* key, Eigen::Index rows,
+                       Eigen::Index cols) {
+    if (!keys.contains(key)) return nullptr;
+    return numbers_.add(key, nb::cast<Eigen::MatrixXd>(keys[key]), rows, cols);
+  }
+
+  Eigen::Index n_;
+  Numbers numbers_;
+  std::int32_t frame_ = 0;
+  std::array<std::uint8_t, 6> directions_{};
+};
+
+nb::tuple update(Host& host, std::int64_t time, const Eigen::VectorXd& q, const Eigen::VectorXd& qd,
+                 const OptionalSetpoint& wanted, const OptionalVector& wrench) {
+  if (wrench && wrench->size() != 6) {
+    throw std::invalid_argument("external_wrench: six numbers are wanted");
+  }
+  const bool fits = q.size() == qd.size();  // an arm that stops for it is safer than an exception
+  const dashpot_state state{sizeof state, static_cast<std::uint32_t>(fits ? q.size() : 0),
+                            time,         q.data(),
+                            qd.data(),    wrench ? wrench->data() : nullptr};
+  std::optional<SetpointData> setpoint;
+  if (wanted) {
+    std::apply([&](const auto&... parts) { setpoint.emplace(host, parts...); }, *wanted);
+  }
+  Eigen::VectorXd torque = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(host.joints()));
+  dashpot_output output{sizeof output, dashpot_joints(host.get()), torque.data()};
+  std::int32_t status = 0;
+  {
+    const nb::gil_scoped_release release;
+    const std::lock_guard lock(host.loop);
+    status = dashpot_update(host.get(), &state, setpoint ? &setpoint->given : nullptr, &output);
+  }
+  if (status < DASHPOT_OK) throw std::invalid_argument(dashpot_status_text(status));
+  return nb::make_tuple(torque, status);
+}
+
+void start(Host& host, const Eigen::MatrixXd& q, const OptionalMatrix& torque) {
+  const auto n = static_cast<Eigen::Index>(host.joints());
+  Numbers numbers;
+  const double* const position = numbers.add("q", q, n, 1);
+  const double* const acting = numbers.add("torque", torque, n, 1);
+  const nb::gil_scoped_release release;
+  const std::scoped_lock lock(host.loop, host.other);
+  check(dashpot_start(host.get(), position, acting));
+}
+
+void reset(Host& host, const OptionalMatrix& torque) {
+  Numbers numbers;
+  const double* const acting =
+      numbers.add("torque", torque, static_cast<Eigen::Index>(host.joints()), 1);
+  const nb::gil_scoped_release release;
+  const std::lock_guard lock(host.loop);
+  const std::int32_t code = dashpot_reset(host.get(), acting);
+  if (code < DASHPOT_OK) {
+    throw std::invalid_argument("torque: " + std::string(dashpot_status_text(code)));
+  }
+}
+
+void set_setpoint(Host& host, bool cartesian, const OptionalMatrix& joint_position,
+                  const OptionalMatrix& tip_pose, const OptionalMatrix& wrench,
+                  std::optional<std::int64_t> time) {
+  const SetpointData setpoint(host, cartesian, joint_position, tip_pose, wrench, time);
+  const nb::gil_scoped_release release;
+  const std::lock_guard lock(host.other);
+  check(dashpot_set_setpoint(host.get(), &setpoint.given));
+}
+
+void set_gains(Host& host, const nb::dict& keys) {
+  const GainsData gains(host, keys);
+  const nb::gil_scoped_release release;
+  const std::lock_guard lock(host.other);
+  check(dashpot_set_gains(host.get(), &gains.given));
+}
+
+double judge_gains(Host& host, const OptionalMatrix& position, const nb::dict& keys) {
+  const GainsData gains(host, keys);
+  Numbers numbers;
+  const double* const at =
+      numbers.add("position", position, static_cast<Eigen::Index>(host.joints()), 1);
+  const nb::gil_scoped_release release;
+  double margin = 0;
+  const std::int32_t code = dashpot_judge_gains(host.get(), &gains.given, at, &margin);
+  if (code != DASHPOT_UNSTABLE_GAINS) check(code);
+  return margin;
+}
+
+void release(Host& host) {
+  const nb::gil_scoped_release no_lock;
+  const std::lock_guard lock(host.other);
+  check(dashpot_release(host.get()));
+}
+
+}  // namespace
+
+void add_controller(nb::module_& m) {
+  m.def("status_text", [](int status) { return dashpot_status_text(status); });
+  nb::class_<Host>(m, "Controller", "dashpot_controller of controller/plugin.h")
+      .def_static("from_text", &from_text, nb::call_guard<nb::gil_scoped_release>())
+      .def_static("from_file", &from_file, nb::call_guard<nb::gil_scoped_release>())
+      .def_prop_ro("joints", &Host::joints)
+      .def("joint_names",
+           [](const Host& host) {
+             nb::list names;
+             for (std::uint32_t i = 0; i < host.joints(); ++i) {
+               names.append(dashpot_joint_name(host.get(), i));
+             }
+             return names;
+           })
+      .def_prop_ro("period", [](const Host& host) { return dashpot_period(host.get()); })
+      .def("update", &update, nb::arg("time"), nb::arg("q"), nb::arg("qd"),
+           nb::arg("setpoint").none(), nb::arg("external_wrench").none())
+      .def("start", &start, nb::arg("q"), nb::arg("torque").none())
+      .def("reset", &reset, nb::arg("torque").none())
+      .def("set_setpoint", &set_setpoint, nb::arg("cartesian"), nb::arg("joint_position").none(),
+           nb::arg("tip_pose").none(), nb::arg("wrench").none(), nb::arg("time").none())
+      .def("set_gains", &set_gains, nb::arg("gains"))
+      .def("judge_gains", &judge_gains, nb::arg("position").none(), nb::arg("gains"))
+      .def("release", &release)
+      .def("snapshot", [](const Host& host) { return snapshot_of(host.get()); })
+      .def("modes", [](const Host& host) { return modes_of(host.get()); })
+      .def("sampled_modes", [](const Host& host) { return sampled_modes_of(host.get()); });
+}
+
+}  // namespace dashpot::python

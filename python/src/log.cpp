@@ -1,0 +1,229 @@
+// LCM logs as arrays.
+
+#include <dashpot/lcmtypes/bus.hpp>
+#include <dashpot/lcmtypes/log_file.hpp>
+#include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/python/src/convert.hpp>
+
+#include <nanobind/ndarray.h>
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <type_traits>
+
+namespace dashpot::python {
+namespace {
+
+using lcmtypes::LogFile;
+
+/// The number that an array of arrays of numbers is made of, and how deep it lies.
+template <class Value>
+struct Numbers {
+  using Type = Value;
+  static constexpr std::size_t kDepth = 0;
+};
+template <class Value, std::size_t size>
+struct Numbers<Value[size]> : Numbers<Value> {  // NOLINT: as lcm-gen writes them
+  static constexpr std::size_t kDepth = 1 + Numbers<Value>::kDepth;
+};
+template <class Value>
+struct Numbers<std::vector<Value>> : Numbers<Value> {
+  static constexpr std::size_t kDepth = 1 + Numbers<Value>::kDepth;
+};
+
+/// Enlarges shape[depth], shape[depth + 1], ... to what `value` needs.
+template <std::size_t depth, class Shape, class Value>
+void grow(Shape& shape, const Value& value) {
+  if constexpr (Numbers<Value>::kDepth > 0) {
+    shape[depth] = std::max(shape[depth], std::size(value));
+    for (const auto& item : value) grow<depth + 1>(shape, item);
+  }
+}
+
+/// Writes `value`, whose sizes are at most shape[depth], shape[depth + 1], ..., to its place.
+template <std::size_t depth, class Number, class Shape, class Value>
+void write(Number* place, const Shape& shape, const Value& value) {
+  if constexpr (Numbers<Value>::kDepth == 0) {
+    *place = static_cast<Number>(value);
+  } else {
+    std::size_t step = 1;
+    for (std::size_t i = depth + 1; i < shape.size(); ++i) step *= shape[i];
+    for (const auto& item : value) {
+      write<depth + 1>(place, shape, item);
+      place += step;
+    }
+  }
+}
+
+/// Fields of messages as arrays whose first index counts the messages.
+template <class Message>
+class Columns {
+ public:
+  explicit Columns(const std::vector<Message>& messages) : messages_(messages) {}
+
+  /// Adds a field. Where sizes differ, what is missing is NaN, or -1 in arrays of integers.
+  template <class Field>
+  Columns& operator()(const char* name, Field Message::*field) {
+    constexpr bool kReal = std::is_floating_point_v<typename Numbers<Field>::Type>;
+    using Number = std::conditional_t<kReal, double, std::int64_t>;
+    std::array<std::size_t, 1 + Numbers<Field>::kDepth> shape{messages_.size()};
+    for (const Message& message : messages_) grow<1>(shape, message.*field);
+    constexpr Number kMissing = kReal ? std::numeric_limits<Number>::quiet_NaN() : Number(-1);
+    std::size_t step = 1;  // from message to message
+    for (std::size_t i = 1; i < shape.size(); ++i) step *= shape[i];
+    auto numbers = std::make_unique<std::vector<Number>>(shape[0] * step, kMissing);
+    for (std::size_t i = 0; i < messages_.size(); ++i) {
+      write<1>(numbers->data() + i * step, shape, messages_[i].*field);
+    }
+    Number* const data = numbers->data();
+    const nb::capsule owner(numbers.release(), [](void* kept) noexcept {
+      delete static_cast<std::vector<Number>*>(kept);
+    });
+    result_[name] =
+        nb::cast(nb::ndarray<nb::numpy, Number>(data, shape.size(), shape.data(), owner));
+    return *this;
+  }
+
+  nb::dict result() const { return result_; }
+
+ private:
+  const std::vector<Message>& messages_;
+  nb::dict result_;
+};
+
+nb::dict columns_of(const std::vector<state_t>& messages) {
+  using M = state_t;
+  return Columns(messages)("utime", &M::utime)("tick", &M::tick)("restarts", &M::restarts)(
+             "mode", &M::mode)("status", &M::status)("fault", &M::fault)(
+             "fault_tick", &M::fault_tick)("joint_position", &M::joint_position)(
+             "joint_velocity", &M::joint_velocity)("joint_torque", &M::joint_torque)(
+             "law_torque", &M::law_torque)("reference_joint_position",
+                                           &M::reference_joint_position)(
+             "tip_position", &M::tip_position)("tip_quaternion", &M::tip_quaternion)(
+             "reference_tip_position", &M::reference_tip_position)(
+             "reference_tip_quaternion", &M::reference_tip_quaternion)("tip_error", &M::tip_error)(
+             "tip_wrench", &M::tip_wrench)("tick_time", &M::tick_time)(
+             "longest_tick_time", &M::longest_tick_time)("overruns", &M::overruns)(
+             "states_dropped", &M::states_dropped)("verdicts", &M::verdicts)(
+             "last_refusal", &M::last_refusal)("last_refusal_utime", &M::last_refusal_utime)(
+             "last_refused_sender", &M::last_refused_sender)("commander", &M::commander)(
+             "commands_accepted", &M::commands_accepted)("commands_rejected", &M::commands_rejected)
+      .result();
+}
+
+nb::dict columns_of(const std::vector<modes_t>& messages) {
+  using M = modes_t;
+  return Columns(messages)("num_modes", &M::num_modes)("utime", &M::utime)("tick", &M::tick)(
+             "sequence", &M::sequence)("origin", &M::origin)("status", &M::status)(
+             "joint_position", &M::joint_position)("zero_modes", &M::zero_modes)(
+             "label", &M::label)("eigenvalue_real", &M::eigenvalue_real)(
+             "eigenvalue_imag", &M::eigenvalue_imag)("natural_frequency", &M::natural_frequency)(
+             "damping_ratio", &M::damping_ratio)("damped_frequency", &M::damped_frequency)(
+             "kind", &M::kind)("eigenvalue_bound", &M::eigenvalue_bound)(
+             "natural_frequency_bound", &M::natural_frequency_bound)(
+             "damping_ratio_bound", &M::damping_ratio_bound)("shape_real", &M::shape_real)(
+             "shape_imag", &M::shape_imag)
+      .result();
+}
+
+nb::dict columns_of(const std::vector<sampled_modes_t>& messages) {
+  using M = sampled_modes_t;
+  return Columns(messages)("num_modes", &M::num_modes)("utime", &M::utime)("tick", &M::tick)(
+             "sequence", &M::sequence)("status", &M::status)("joint_position", &M::joint_position)(
+             "spectral_radius", &M::spectral_radius)("gain_margin", &M::gain_margin)(
+             "continuous_frequency", &M::continuous_frequency)(
+             "continuous_ratio", &M::continuous_ratio)("natural_frequency", &M::natural_frequency)(
+             "damping_ratio", &M::damping_ratio)("damped_frequency", &M::damped_frequency)("kind",
+                                                                                           &M::kind)
+      .result();
+}
+
+nb::dict columns_of(const std::vector<command_t>& messages) {
+  using M = command_t;
+  return Columns(messages)("sender", &M::sender)("utime", &M::utime)("sequence", &M::sequence)(
+             "parts", &M::parts)("mode", &M::mode)("joint_position", &M::joint_position)(
+             "tip_position", &M::tip_position)("tip_quaternion", &M::tip_quaternion)(
+             "wrench", &M::wrench)("joint_stiffness", &M::joint_stiffness)(
+             "joint_damping", &M::joint_damping)("frame", &M::frame)("directions", &M::directions)(
+             "task_stiffness", &M::task_stiffness)("task_damping", &M::task_damping)(
+             "null_stiffness", &M::null_stiffness)("null_damping", &M::null_damping)("fault_tick",
+                                                                                     &M::fault_tick)
+      .result();
+}
+
+/// The events of one channel: decoded if they are Dashpot's.
+struct Channel {
+  std::vector<std::int64_t> utime;  ///< of the events
+  std::vector<state_t> states;
+  std::vector<modes_t> modes;
+  std::vector<sampled_modes_t> sampled_modes;
+  std::vector<command_t> commands;
+  std::int64_t malformed = 0;
+};
+
+template <class Message>
+void take(const LogFile::Event& event, Channel& channel, std::vector<Message>& messages) {
+  Message message;
+  if (lcmtypes::decode(event.data.data(), event.data.size(), message)) {
+    channel.utime.push_back(event.utime);
+    messages.push_back(std::move(message));
+  } else {
+    ++channel.malformed;
+  }
+}
+
+void take(const LogFile::Event& event, Channel& channel) {
+  if (event.channel == lcmtypes::kStateChannel) return take(event, channel, channel.states);
+  if (event.channel == lcmtypes::kModesChannel) return take(event, channel, channel.modes);
+  if (event.channel == lcmtypes::kSampledModesChannel) {
+    return take(event, channel, channel.sampled_modes);
+  }
+  if (event.channel == lcmtypes::kCommandChannel) return take(event, channel, channel.commands);
+  channel.utime.push_back(event.utime);  // of other programs
+}
+
+nb::dict entries_of(const std::string& name, const Channel& channel) {
+  nb::dict result;
+  if (name == lcmtypes::kStateChannel) result = columns_of(channel.states);
+  if (name == lcmtypes::kModesChannel) result = columns_of(channel.modes);
+  if (name == lcmtypes::kSampledModesChannel) result = columns_of(channel.sampled_modes);
+  if (name == lcmtypes::kCommandChannel) result = columns_of(channel.commands);
+  using Times = Eigen::Matrix<std::int64_t, Eigen::Dynamic, 1>;
+  result["log_utime"] = nb::cast(Times(Eigen::Map<const Times>(
+      channel.utime.data(), static_cast<Eigen::Index>(channel.utime.size()))));
+  return result;
+}
+
+/// Returns the channels, the numbers of messages that could not be decoded, and what is wrong with
+/// the log ("" if nothing is).
+nb::tuple read_log(const std::string& path) {
+  std::map<std::string, Channel> channels;
+  std::string damage;
+  try {
+    const nb::gil_scoped_release release;
+    LogFile file(path);
+    while (file.read()) take(file.event(), channels[file.event().channel]);
+    damage = describe(file.damage());
+  } catch (const std::runtime_error& error) {  // no such file
+    throw std::invalid_argument(error.what());
+  }
+  nb::dict result, malformed;
+  for (const auto& [name, channel] : channels) {
+    result[name.c_str()] = entries_of(name, channel);
+    if (channel.malformed > 0) malformed[name.c_str()] = channel.malformed;
+  }
+  return nb::make_tuple(result, malformed, damage);
+}
+
+}  // namespace
+
+void add_log(nb::module_& m) {
+  m.def("read_log", &read_log, nb::arg("path"));
+}
+
+}  // namespace dashpot::python

@@ -1,0 +1,237 @@
+// The robot's dynamics, and its closed loop with springs and dampers.
+
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/model/urdf_tree.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
+#include <dashpot/python/src/analysis.hpp>
+#include <dashpot/python/src/robot.hpp>
+
+#include <cmath>
+
+namespace dashpot::python {
+
+using controller::Controller;
+using controller::DynamicsResult;
+using controller::Gains;
+using controller::Joint;
+using controller::JointVector;
+using controller::RobotModel;
+using controller::Settings;
+
+JointVector Robot::joint_vector(const char* name, const Eigen::VectorXd& values) const {
+  if (values.size() != model.dof()) {
+    throw std::invalid_argument(std::string(name) + ": has " + std::to_string(values.size()) +
+                                " entries, the robot has " + std::to_string(model.dof()) +
+                                " joints");
+  }
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    if (std::isfinite(values[i])) continue;
+    throw std::invalid_argument(std::string(name) + ": entry " + std::to_string(i + 1) +
+                                " is not a finite number");
+  }
+  return values;
+}
+
+namespace {
+
+DynamicsResult dynamics(const Robot& robot, const Eigen::VectorXd& q, const OptionalVector& qd) {
+  DynamicsResult result;
+  const JointVector position = robot.joint_vector("q", q);
+  const JointVector rest = JointVector::Zero(robot.model.dof());
+  robot.kernel.evaluate(position, qd ? robot.joint_vector("qd", *qd) : rest, result);
+  return result;
+}
+
+Eigen::MatrixXd pose(const Robot& robot, const Eigen::VectorXd& q) {
+  const DynamicsResult at = dynamics(robot, q, {});
+  Eigen::MatrixXd T_BT = Eigen::MatrixXd::Identity(4, 4);
+  T_BT.topLeftCorner(3, 3) = at.R_BT;
+  T_BT.topRightCorner(3, 1) = at.p_BT_B;
+  return T_BT;
+}
+
+/// Of a controller whose closed loop has the gains of its first set-point from the next tick on,
+/// wherever the robot is.
+Settings settings_for(const RobotModel& model, bool geometric_stiffness) {
+  constexpr double kFar = 1e5;  // rad
+  Settings settings = controller::default_settings(model);
+  settings.motion.gain_time = settings.period;
+  settings.analysis.where = controller::Analysis::Where::kOff;
+  settings.limits.position_lower.setConstant(-kFar);
+  settings.limits.position_upper.setConstant(kFar);
+  settings.task_terms.geometric_stiffness = geometric_stiffness;
+  return settings;
+}
+
+analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, const Gains& gains,
+                                  controller::Mode mode, const OptionalVector& wrench) {
+  const controller::SetpointFault fault = check_gains(gains, mode, robot.model.dof());
+  if (fault) throw std::invalid_argument(std::string(fault.key) + " " + fault.reason);
+  Controller loop(robot.model, settings_for(robot.model, wrench.has_value()));
+  const DynamicsResult there = dynamics(robot, q, {});
+  controller::RobotState state;
+  state.position = q;
+  state.velocity = JointVector::Zero(q.size());
+  if (wrench) state.external_wrench = *wrench;
+  controller::Setpoint setpoint;
+  setpoint.mode = mode;
+  setpoint.joint_position = q;
+  setpoint.tip_pose = {there.p_BT_B, there.R_BT};
+  setpoint.gains = gains;
+  JointVector torque;
+  for (int tick = 1; tick <= 3; ++tick) {
+    state.time = setpoint.time = tick * 1'000'000;
+    const controller::Status status = loop.update(state, setpoint, torque);
+    if (status == controller::Status::kSetpointRejected ||
+        status > controller::Status::kWeightNotHeld) {
+      throw std::invalid_argument(std::string("closed loop: ") + to_text(status));
+    }
+  }
+  analysis::System<controller::kMaxJoints> system;
+  loop.closed_loop(system);
+  analysis::System<> result(q.size());
+  result.mass = system.mass;
+  result.damping = system.damping;
+  result.stiffness = system.stiffness;
+  result.stiffness_factor = system.stiffness_factor;
+  return result;
+}
+
+nb::dict closed_loop(const Robot& robot, const Eigen::VectorXd& q, const Gains& gains,
+                     bool cartesian, const OptionalVector& wrench, double soft_frequency) {
+  analysis::System<> system;
+  analysis::Spectrum<> spectrum;
+  {
+    const nb::gil_scoped_release release;
+    if (wrench && (wrench->size() != 6 || !wrench->allFinite())) {
+      throw std::invalid_argument("external_wrench: six finite numbers are wanted");
+    }
+    const auto mode = cartesian ? controller::Mode::kCartesian : controller::Mode::kJoint;
+    system = closed_loop_at(robot, robot.joint_vector("q", q), gains, mode, wrench);
+    analysis::SpectrumOptions options;
+    options.soft_frequency = soft_frequency;
+    spectrum = analysis::analyze(system, options);
+  }
+  nb::dict result;
+  result["mass"] = to_array(system.mass);
+  result["damping"] = to_array(system.damping);
+  result["stiffness"] = to_array(system.stiffness);
+  result["modes"] = modes_of(spectrum);
+  return result;
+}
+
+Robot make_robot(const std::string& urdf, const std::string& name, const std::string& base,
+                 const std::string& tip, const nb::dict& given) {
+  controller::ModelOptions options;
+  const auto read = [&](const char* key, auto& value) {
+    using Value = std::remove_reference_t<decltype(value)>;
+    if (given.contains(key)) value = nb::cast<Value>(given[key]);
+  };
+  const auto read_vector = [&](const char* key, JointVector& value) {
+    if (!given.contains(key)) return;
+    const auto numbers = nb::cast<Eigen::VectorXd>(given[key]);
+    if (numbers.size() > controller::kMaxJoints) {
+      throw std::invalid_argument(std::string(key) + ": has more than 16 entries");
+    }
+    value = numbers;
+  };
+  read("gravity", options.gravity);
+  read("include_off_chain", options.include_off_chain);
+  read("accept_inertias", options.accept_inertias);
+  read_vector("reflected_inertia", options.reflected_inertia);
+  read_vector("viscous_friction", options.viscous_friction);
+  read_vector("coulomb_friction", options.coulomb_friction);
+  read("payload_mass", options.payload.mass);
+  read("payload_center", options.payload.center);
+  read("payload_inertia", options.payload.inertia);
+  read("tool_position", options.tool.position);
+  read("tool_rotation", options.tool.rotation);
+  return Robot(RobotModel::from_urdf_text(urdf, base, tip, options, name));
+}
+
+Gains make_gains(const Robot& robot, const OptionalMatrix& joint_stiffness,
+                 const OptionalMatrix& joint_damping, double joint_damping_ratio,
+                 const OptionalMatrix& task_stiffness, const OptionalMatrix& task_damping,
+                 double task_damping_ratio, const OptionalVector& null_stiffness,
+                 const OptionalVector& null_damping, bool tool_frame,
+                 const std::vector<bool>& directions) {
+  const Eigen::Index n = robot.model.dof();
+  const auto check = [](const char* key, const auto& given, Eigen::Index rows, Eigen::Index cols) {
+    if (given) analysis::check_size(key, *given, rows, cols);
+  };
+  check("joint_stiffness", joint_stiffness, n, n);
+  check("joint_damping", joint_damping, n, n);
+  check("task_stiffness", task_stiffness, 6, 6);
+  check("task_damping", task_damping, 6, 6);
+  check("null_stiffness", null_stiffness, n, 1);
+  check("null_damping", null_damping, n, 1);
+  if (directions.size() != 6) throw std::invalid_argument("directions: six are wanted");
+  const Eigen::MatrixXd none = Eigen::MatrixXd::Zero(n, n);
+  const Eigen::VectorXd none_each = Eigen::VectorXd::Zero(n);
+  Gains gains;
+  gains.joint_stiffness = joint_stiffness.value_or(none);
+  gains.joint_damping = joint_damping.value_or(none);
+  gains.joint_damping_ratio = joint_damping_ratio;
+  if (task_stiffness) gains.task_stiffness = *task_stiffness;
+  if (task_damping) gains.task_damping = *task_damping;
+  gains.task_damping_ratio = task_damping_ratio;
+  gains.null_stiffness = null_stiffness.value_or(none_each);
+  gains.null_damping = null_damping.value_or(none_each);
+  gains.frame = tool_frame ? controller::Frame::kTool : controller::Frame::kBase;
+  std::copy(directions.begin(), directions.end(), gains.directions.begin());
+  return gains;
+}
+
+nb::dict joint_properties(const Robot& robot) {
+  const auto values = [&](double Joint::*property) {
+    return to_array(robot.model.joint_values(property));
+  };
+  nb::dict result;
+  result["lower"] = values(&Joint::lower);
+  result["upper"] = values(&Joint::upper);
+  result["velocity"] = values(&Joint::velocity);
+  result["effort"] = values(&Joint::effort);
+  result["viscous_friction"] = values(&Joint::viscous_friction);
+  result["coulomb_friction"] = values(&Joint::coulomb_friction);
+  result["reflected_inertia"] = values(&Joint::reflected_inertia);
+  return result;
+}
+
+}  // namespace
+
+void add_robot(nb::module_& m) {
+  using Vector = Eigen::VectorXd;
+  m.def("read_urdf", &controller::read_text, nb::arg("path"));
+  nb::class_<Robot>(m, "Robot", "controller::RobotModel with its DynamicsKernel")
+      .def(nb::new_(&make_robot), nb::arg("urdf"), nb::arg("name"), nb::arg("base"), nb::arg("tip"),
+           nb::arg("options"))
+      .def_prop_ro("name", [](const Robot& robot) { return robot.model.name(); })
+      .def("joint_names",
+           [](const Robot& robot) {
+             return to_list(robot.model.joints(), [](const Joint& joint) { return joint.name; });
+           })
+      .def("joint_properties", &joint_properties)
+      .def("pose", &pose)
+      .def("mass",
+           [](const Robot& robot, const Vector& q) { return to_array(dynamics(robot, q, {}).M); })
+      .def("gravity", [](const Robot& robot,
+                         const Vector& q) { return to_array(dynamics(robot, q, {}).gravity); })
+      .def("jacobian",
+           [](const Robot& robot, const Vector& q) { return to_array(dynamics(robot, q, {}).J); })
+      .def("coriolis", [](const Robot& robot, const Vector& q,
+                          const Vector& qd) { return to_array(dynamics(robot, q, qd).coriolis); })
+      .def("jacobian_dot_qd", [](const Robot& robot, const Vector& q, const Vector& qd) {
+        return to_array(dynamics(robot, q, qd).Jdot_qd);
+      });
+  nb::class_<Gains>(m, "Gains", "controller::Gains")
+      .def(nb::new_(&make_gains), nb::arg("robot"), nb::arg("joint_stiffness").none(),
+           nb::arg("joint_damping").none(), nb::arg("joint_damping_ratio"),
+           nb::arg("task_stiffness").none(), nb::arg("task_damping").none(),
+           nb::arg("task_damping_ratio"), nb::arg("null_stiffness").none(),
+           nb::arg("null_damping").none(), nb::arg("tool_frame"), nb::arg("directions"));
+  m.def("closed_loop", &closed_loop, nb::arg("robot"), nb::arg("q"), nb::arg("gains"),
+        nb::arg("cartesian"), nb::arg("external_wrench").none(), nb::arg("soft_frequency"));
+}
+
+}  // namespace dashpot::python

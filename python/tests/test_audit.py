@@ -1,0 +1,86 @@
+"""Audits against the closed loop, and against themselves with other executors."""
+
+import concurrent.futures
+import multiprocessing
+
+import numpy as np
+import pytest
+
+import dashpot
+from conftest import HOME
+
+GAINS = dict(task_stiffness=[200, 200, 200, 20, 20, 20], damping_factor=2.0)
+
+
+def test_a_posture_has_the_modes_of_the_closed_loop(panda):
+    found = dashpot.audit(panda, HOME, **GAINS, period=0.001, damping_ratio=0.7)
+    loop = dashpot.closed_loop(panda, HOME, task_stiffness=GAINS["task_stiffness"],
+                               task_damping=2 * np.sqrt(GAINS["task_stiffness"]))
+    posture = found.posture
+    np.testing.assert_allclose(posture.modes.natural_frequency, loop.modes.natural_frequency,
+                               rtol=1e-9)
+    firm = posture.modes.kind != "soft"
+    assert posture.smallest_ratio == posture.modes.damping_ratio[firm].min()
+    fastest = np.linalg.eigvals(np.block(
+        [[np.zeros((7, 7)), np.eye(7)],
+         [-np.linalg.solve(loop.mass, loop.stiffness), -np.linalg.solve(loop.mass, loop.damping)]]))
+    assert posture.fastest_pole == pytest.approx(fastest.real.min(), rel=1e-9)
+    assert 1 < posture.gain_margin < 1e6
+    damped = dashpot.audit(panda, HOME, task_stiffness=GAINS["task_stiffness"],
+                           task_damping=found.suggestion.damping).posture
+    assert damped.smallest_ratio == pytest.approx(0.7, abs=0.01)
+    assert found.workspace is None
+
+
+def test_workspaces_are_the_same_with_any_executor(panda):
+    spawn = multiprocessing.get_context("spawn")
+    with (concurrent.futures.ThreadPoolExecutor(1) as one,
+          concurrent.futures.ThreadPoolExecutor(5) as five,
+          concurrent.futures.ProcessPoolExecutor(2, mp_context=spawn) as processes):
+        found = [dashpot.audit(panda, **GAINS, samples=700, seed=3, executor=executor).workspace
+                 for executor in (None, one, five, processes)]
+    for other in found[1:]:
+        for name in ("smallest_ratio", "fastest_pole", "gain_margin"):
+            for field, value in vars(getattr(found[0], name)).items():
+                np.testing.assert_array_equal(getattr(getattr(other, name), field), value)
+    ratio = found[0].smallest_ratio
+    assert found[0].samples == 700
+    assert ratio.worst <= ratio.p05 <= ratio.median <= ratio.p95
+    again = dashpot.audit(panda, ratio.worst_q, **GAINS).posture
+    assert again.smallest_ratio == ratio.worst
+    other = dashpot.audit(panda, **GAINS, samples=700, seed=4).workspace
+    assert other.smallest_ratio.median != ratio.median
+
+
+def test_postures_may_be_given(panda):
+    rng = np.random.default_rng(5)
+    postures = rng.uniform(panda.lower, panda.upper, (300, 7))
+    found = dashpot.audit(panda, **GAINS, postures=postures).workspace
+    ratios = [dashpot.audit(panda, q, **GAINS).posture.smallest_ratio for q in postures[:300:10]]
+    assert found.samples == 300 and found.smallest_ratio.worst <= min(ratios)
+    narrow = dict(lower=np.array(HOME) - 0.01, upper=np.array(HOME) + 0.01)
+    near = dashpot.audit(panda, **GAINS, samples=100, **narrow).workspace.smallest_ratio
+    assert np.all(np.abs(near.worst_q - HOME) <= 0.01) and near.p95 - near.worst < 0.05
+    assert any(np.array_equal(found.smallest_ratio.worst_q, q) for q in postures)
+
+
+def test_half_quaternions_halve_the_rotational_springs(panda):
+    half = dashpot.audit(panda, HOME, task_stiffness=[200] * 3 + [20] * 3, task_damping=[30] * 6,
+                         half_quaternion=True).posture
+    whole = dashpot.audit(panda, HOME, task_stiffness=[200] * 3 + [10] * 3,
+                          task_damping=[30] * 6).posture
+    np.testing.assert_allclose(half.modes.eigenvalues, whole.modes.eigenvalues, rtol=1e-12)
+
+
+@pytest.mark.parametrize("given, message", [
+    (dict(task_stiffness=np.eye(5)), "task_stiffness: is 5 x 5, expected 6 x 6"),
+    (dict(task_stiffness=[-1, 0, 0, 0, 0, 0]), "task_stiffness: is not positive semidefinite"),
+    (dict(damping_factor=2.0), "damping_factor"),
+    (dict(task_stiffness=[1] * 6, joint_stiffness=[1] * 7), "not both"),
+    (dict(task_stiffness=[1] * 6, damping_ratio=0.7), "damping_ratio: .*q is missing"),
+    (dict(task_stiffness=[1] * 6, postures=[[1, 2]]), "postures: has 2 entries"),
+    (dict(task_stiffness=[1] * 6, q=[1, 2]), "q: has 2 entries"),
+])
+def test_bad_input_gives_the_programs_messages(panda, given, message):
+    with pytest.raises(dashpot.Error, match=message):
+        dashpot.audit(panda, **given)

@@ -1,0 +1,232 @@
+"""The controller against the plugin that other hosts load, through ctypes."""
+
+import ctypes
+import re
+import threading
+
+import numpy as np
+import pytest
+
+import dashpot
+from conftest import HOME, ROOT
+
+STIFFNESS, DAMPING = (600.0, 600, 600, 600, 100, 100, 20), (20.0, 50, 8, 30, 5, 5, 1)
+EXAMPLE = ROOT / "controller/examples/panda.yaml"
+
+
+class Plugin:
+    """The C interface, as far as it is needed here."""
+
+    class State(ctypes.Structure):
+        _fields_ = [("struct_size", ctypes.c_uint32), ("joints", ctypes.c_uint32),
+                    ("time", ctypes.c_int64), ("position", ctypes.c_void_p),
+                    ("velocity", ctypes.c_void_p), ("external_wrench", ctypes.c_void_p)]
+
+    class Output(ctypes.Structure):
+        _fields_ = [("struct_size", ctypes.c_uint32), ("joints", ctypes.c_uint32),
+                    ("torque", ctypes.c_void_p)]
+
+    def __init__(self, path, config):
+        self.library = ctypes.CDLL(str(path))
+        self.library.dashpot_create.restype = ctypes.c_void_p
+        self.arm = ctypes.c_void_p(self.library.dashpot_create(str(config).encode()))
+        assert self.arm
+
+    def start(self, q):
+        q = np.array(q, dtype=float)
+        assert self.library.dashpot_start(self.arm, ctypes.c_void_p(q.ctypes.data), None) == 0
+
+    def update(self, time, q, qd):
+        q, qd, torque = np.array(q, dtype=float), np.array(qd, dtype=float), np.zeros(len(q))
+        state = self.State(ctypes.sizeof(self.State), len(q), time, q.ctypes.data, qd.ctypes.data,
+                           None)
+        output = self.Output(ctypes.sizeof(self.Output), len(q), torque.ctypes.data)
+        status = self.library.dashpot_update(self.arm, ctypes.byref(state), None,
+                                             ctypes.byref(output))
+        return torque, status
+
+
+def swing(tick):
+    """A state of an arm that swings a little."""
+    t = tick * 0.001
+    return (np.array(HOME) + 0.01 * (1 - np.cos(3 * t)), 0.03 * np.sin(3 * t) * np.ones(7))
+
+
+def test_ticks_are_those_of_the_plugin(plugin):
+    ours, theirs = dashpot.Controller(EXAMPLE), Plugin(plugin, EXAMPLE)
+    ours.start(HOME)
+    theirs.start(HOME)
+    for tick in range(1, 300):
+        q, qd = swing(tick)
+        torque, status = ours.update(tick * 1_000_000, q, qd)
+        expected, code = theirs.update(tick * 1_000_000, q, qd)
+        assert status == code
+        # The wheel is compiled for older processors, which round elsewhere.
+        np.testing.assert_allclose(torque, expected, rtol=1e-8, atol=1e-8)
+    found = ours.snapshot()
+    assert found.tick == 299 and found.status == status == dashpot.Status.OK
+    np.testing.assert_array_equal(found.torque, torque)
+    np.testing.assert_array_equal(found.position, q)
+
+
+def test_statuses_are_those_of_the_header():
+    header = (ROOT / "controller/plugin.h").read_text()
+    statuses = header[:header.index("NULL_ARGUMENT = ")]
+    listed = {name: int(code) for name, code in re.findall(r"  DASHPOT_(\w+) = (\d+),", statuses)}
+    assert {status.name: int(status) for status in dashpot.Status} == listed
+    assert dashpot.Status.TORQUE_LIMITED.text == "torque, torque rate, power or speed limited"
+
+
+def test_a_dict_is_as_good_as_a_file(config, panda):
+    config["gains"] = {"joint": {"stiffness": np.array(STIFFNESS), "damping": DAMPING}}
+    config["motion"] = {"gain_time": 0.001}
+    config["robot"]["gravity"] = (0, 0, np.float64(-9.81))
+    controller = dashpot.Controller(config)
+    assert controller.joints == 7 and controller.period == 0.001
+    assert controller.joint_names == panda.joint_names
+    controller.start(HOME)
+    for tick in range(3):
+        torque, status = controller.update(tick * controller.period, HOME, np.zeros(7))
+        np.testing.assert_allclose(torque, panda.gravity(HOME), atol=1e-6)
+        assert status is dashpot.Status.OK
+    modes = controller.modes()
+    closed = dashpot.closed_loop(panda, HOME, joint_stiffness=STIFFNESS, joint_damping=DAMPING)
+    np.testing.assert_allclose(modes.natural_frequency, closed.modes.natural_frequency, rtol=1e-9)
+    np.testing.assert_allclose(modes.damping_ratio, closed.modes.damping_ratio, rtol=1e-9)
+    assert modes.shapes.shape == (7, 7) and modes.tick == 3 and "rad/s" in repr(modes)
+
+
+@pytest.mark.parametrize("change, message", [
+    ({"limit": {}}, "limit: unknown key"),
+    ({"control": {"period": -1}}, "control.period"),
+    ({"control": {"period": "1 kg"}}, "control.period"),
+    ({"gains": {"joint": {"stiffness": 1e6, "damping": 1}}}, "gains: .*gain margin"),
+    ({"limits": {"torque": float("nan")}}, "limits.torque"),
+    ({"limits": {"torque": object()}}, "object is neither"),
+    ({"robot": {"urdf": "missing.urdf", "base": "a", "tip": "b"}}, "missing.urdf.*No such file"),
+])
+def test_bad_configurations_give_the_programs_messages(config, change, message):
+    with pytest.raises(dashpot.Error, match=message) as error:
+        dashpot.Controller({**config, **change})
+    assert "line" not in str(error.value)
+
+
+def test_a_missing_file_is_named():
+    with pytest.raises(dashpot.Error, match="no-such-file.yaml: cannot be opened"):
+        dashpot.Controller("no-such-file.yaml")
+
+
+def test_setpoints_and_gains_are_followed(config):
+    controller = dashpot.Controller(config)
+    assert controller.snapshot() is None and controller.modes() is None
+    controller.start(HOME)
+    goal = np.array(HOME) + [0.1, 0, 0, 0, 0, 0, 0]
+    controller.set_setpoint(joint_position=goal)
+    controller.set_gains(joint_stiffness=STIFFNESS, joint_damping=DAMPING)
+    for tick in range(400):
+        controller.update(tick * controller.period, *swing(tick))
+    found = controller.snapshot()
+    assert found.status is dashpot.Status.OK
+    assert 0.01 < found.reference_joint_position[0] < 0.11
+    controller.reset()
+    torque, _ = controller.update(1.0, HOME, np.zeros(7), dashpot.Setpoint(joint_position=goal))
+    assert controller.snapshot().tick == 1
+    assert 0 < controller.judge_gains(HOME, joint_stiffness=STIFFNESS) <= 2
+
+
+def test_poses_are_goals_too(config, panda):
+    config["control"] = {"mode": "cartesian"}
+    controller = dashpot.Controller(config)
+    controller.start(HOME)
+    goal = panda.pose(HOME)
+    goal[0, 3] += 0.05
+    for tick in range(200):
+        setpoint = dashpot.Setpoint(tip_pose=goal, time=tick * 0.001)
+        torque, status = controller.update(tick * 0.001, HOME, np.zeros(7), setpoint)
+        assert status is dashpot.Status.OK
+    found = controller.snapshot()
+    assert found.mode == "cartesian" and found.tip_error[0] > 0.001
+    np.testing.assert_allclose(found.tip_pose, panda.pose(HOME), atol=1e-12)
+
+
+def test_what_is_not_possible_is_refused_or_gives_a_status(config):
+    controller = dashpot.Controller(config)
+    for bad, message in [(dict(joint_stiffness=[-1] * 7), "joint_stiffness"),
+                         (dict(joint_stiffness=np.eye(3)), "is 3 x 3, expected 7 x 7"),
+                         (dict(joint_stiffness=[1e7] * 7, joint_damping=[1] * 7), "gain margin")]:
+        with pytest.raises(dashpot.Error, match=message):
+            controller.set_gains(**bad)
+    for bad, message in [(dict(joint_position=[9] * 7), "joint_position"),
+                         (dict(joint_position=[0, 0]), "is 2 x 1, expected 7 x 1"),
+                         (dict(tip_pose=np.zeros((4, 4))), "rotation"),
+                         (dict(joint_position=HOME, mode="fly"), "mode: 'fly'")]:
+        with pytest.raises(dashpot.Error, match=message):
+            controller.set_setpoint(**bad)
+    with pytest.raises(TypeError):
+        controller.set_gains(stiffness=1)
+    with pytest.raises(dashpot.Error, match="time"):
+        controller.update(float("nan"), HOME, np.zeros(7))
+    controller.update(0.0, HOME, np.zeros(7))
+    for q, status in [(np.full(7, np.nan), "STATE_NOT_FINITE"), (np.zeros(3), "STATE_WRONG_SIZE")]:
+        torque, found = controller.update(0.001, q, np.zeros(7))
+        assert found is dashpot.Status[status] and torque.shape == (7,) and np.isfinite(torque).all()
+
+
+def test_faults_latch_until_they_are_released(config):
+    controller = dashpot.Controller(config)
+    controller.start(HOME)
+    for tick in range(3):
+        controller.update(tick * 0.001, HOME, np.zeros(7))
+    _, status = controller.update(1.0, HOME, np.zeros(7))
+    assert status is dashpot.Status.TIME_GAP and controller.snapshot().fault is status
+    _, status = controller.update(1.001, HOME, np.zeros(7))
+    assert status is dashpot.Status.FAULT_LATCHED
+    controller.release()
+    _, status = controller.update(1.002, HOME, np.zeros(7))
+    assert status in (dashpot.Status.OK, dashpot.Status.TORQUE_LIMITED)
+
+
+def test_the_sampled_loop_is_analysed_beside(config):
+    config["analysis"] = {"sampled": {"interval": "2 ms"}}
+    controller = dashpot.Controller(config)
+    controller.start(HOME)
+    waiting = threading.Event()
+    for tick in range(2000):
+        controller.update(tick * 0.001, *swing(tick))
+        waiting.wait(0.001)
+        found = controller.sampled_modes()
+        if found is not None:
+            break
+    assert found.spectral_radius < 1 and len(found.natural_frequency) == 7
+    np.testing.assert_allclose(found.continuous_frequency, controller.modes().natural_frequency,
+                               rtol=1e-2)
+
+
+def test_gains_may_come_from_another_thread(config):
+    controller = dashpot.Controller(config)
+    controller.start(HOME)
+    stop, problems = threading.Event(), []
+
+    def change():
+        stiffness = 0
+        while not stop.is_set():
+            stiffness = (stiffness + 1) % 100
+            try:
+                controller.set_gains(joint_stiffness=np.add(STIFFNESS, stiffness / 10),
+                                     joint_damping=DAMPING)
+                controller.set_setpoint(joint_position=HOME)
+                controller.modes()
+                controller.snapshot()
+            except Exception as error:  # noqa: BLE001
+                problems.append(error)
+
+    thread = threading.Thread(target=change)
+    thread.start()
+    try:
+        for tick in range(3000):  # faster than a real loop, so that set-points may come late
+            torque, status = controller.update(tick * 0.001, *swing(tick))
+            assert np.isfinite(torque).all() and status <= dashpot.Status.SETPOINT_LOST, status
+    finally:
+        stop.set()
+        thread.join()
+    assert not problems

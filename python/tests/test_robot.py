@@ -1,0 +1,136 @@
+"""The robot against `dashpot inspect`, which has tests against KDL, and finite differences."""
+
+import json
+import pickle
+import subprocess
+
+import numpy as np
+import pytest
+
+import dashpot
+from conftest import HOME, ROOT
+
+QD = (0.1, -0.2, 0.3, 0.4, -0.5, 0.6, -0.7)
+TASK = dict(task_stiffness=[200, 200, 200, 20, 20, 20],
+            task_damping=[28.3, 28.3, 28.3, 8.94, 8.94, 8.94])
+
+
+def text(values):
+    return ",".join(map(str, values))
+
+
+def test_dynamics_are_those_of_the_program(program, panda):
+    printed = json.loads(subprocess.check_output(
+        [program, "inspect", "--urdf", ROOT / "sim/models/panda.urdf", "--base", "panda_link0",
+         "--tip", "panda_hand_tcp", "--q", text(HOME), "--qd", text(QD), "--json"]))
+    close = dict(rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(panda.mass(HOME), printed["mass_matrix"], **close)
+    np.testing.assert_allclose(panda.gravity(HOME), printed["gravity"], **close)
+    np.testing.assert_allclose(panda.coriolis(HOME, QD), printed["coriolis"], **close)
+    np.testing.assert_allclose(panda.jacobian(HOME), printed["jacobian"], **close)
+    np.testing.assert_allclose(panda.jacobian_dot_qd(HOME, QD), printed["jacobian_dot_qd"], **close)
+    np.testing.assert_allclose(panda.pose(HOME)[:3, 3], printed["tip_position"], **close)
+    np.testing.assert_allclose(panda.pose(HOME)[:3, :3], printed["tip_rotation"], **close)
+    assert panda.joint_names == tuple(joint["name"] for joint in printed["joints"])
+    np.testing.assert_array_equal(panda.upper, [joint["upper"] for joint in printed["joints"]])
+    assert len(panda) == 7 and panda.name == "panda"
+
+
+def test_terms_belong_together(panda):
+    step, q, qd = 1e-6, np.array(HOME), np.array(QD)
+    J = panda.jacobian(q)
+    for i in range(7):
+        move = step * np.eye(7)[i]
+        T = (panda.pose(q + move) - panda.pose(q - move)) / (2 * step)
+        np.testing.assert_allclose(T[:3, 3], J[:3, i], atol=1e-9)
+        turning = T[:3, :3] @ panda.pose(q)[:3, :3].T
+        np.testing.assert_allclose([turning[2, 1], turning[0, 2], turning[1, 0]], J[3:, i],
+                                   atol=1e-9)
+    rate = (panda.jacobian(q + step * qd) - panda.jacobian(q - step * qd)) / (2 * step)
+    np.testing.assert_allclose(rate @ qd, panda.jacobian_dot_qd(q, qd), atol=1e-8)
+    M_rate = (panda.mass(q + step * qd) - panda.mass(q - step * qd)) / (2 * step)
+    assert qd @ panda.coriolis(q, qd) == pytest.approx(qd @ M_rate @ qd / 2, rel=1e-6)
+
+
+def test_a_robot_survives_pickling(panda):
+    heavy = dashpot.Robot.from_urdf(ROOT / "sim/models/panda.urdf", "panda_link0",
+                                    "panda_hand_tcp", payload_mass=2, payload_center=[0, 0, 0.05],
+                                    reflected_inertia=[0.1] * 7, gravity=[0, 0, -1.6])
+    again = pickle.loads(pickle.dumps(heavy))
+    np.testing.assert_array_equal(again.mass(HOME), heavy.mass(HOME))
+    np.testing.assert_array_equal(again.gravity(HOME), heavy.gravity(HOME))
+    assert np.linalg.norm(heavy.mass(HOME) - panda.mass(HOME)) > 0.1
+    assert repr(again) == repr(heavy)
+    with pytest.raises(ValueError):
+        again.upper[0] = 9
+
+
+def test_a_tool_moves_the_tip(panda):
+    tool = np.eye(4)
+    tool[:3, 3] = [0, 0, 0.1]
+    long = dashpot.Robot.from_urdf(ROOT / "sim/models/panda.urdf", "panda_link0", "panda_hand_tcp",
+                                   tool=tool)
+    np.testing.assert_allclose(long.pose(HOME), panda.pose(HOME) @ tool, atol=1e-12)
+
+
+def test_bad_input_gives_the_programs_messages(panda, tmp_path):
+    with pytest.raises(dashpot.Error, match="no-such-file.urdf: .*No such file"):
+        dashpot.Robot.from_urdf("no-such-file.urdf", "a", "b")
+    with pytest.raises(dashpot.Error, match="panda.urdf: .*'hand'"):
+        dashpot.Robot.from_urdf(ROOT / "sim/models/panda.urdf", "panda_link0", "hand")
+    bad = tmp_path / "bad.urdf"
+    bad.write_text("<robot")
+    with pytest.raises(dashpot.Error, match="bad.urdf"):
+        dashpot.Robot.from_urdf(bad, "a", "b")
+    with pytest.raises(dashpot.Error, match="q: has 2 entries, the robot has 7 joints"):
+        panda.mass([1, 2])
+    with pytest.raises(dashpot.Error, match="q: entry 3 is not a finite number"):
+        panda.pose([0, 0, np.nan, 0, 0, 0, 0])
+    with pytest.raises(dashpot.Error, match="q: a list of numbers is wanted"):
+        panda.gravity(np.zeros((7, 1)))
+    with pytest.raises(dashpot.Error, match="gravity: is 2, expected 3"):
+        dashpot.Robot.from_urdf(ROOT / "sim/models/panda.urdf", "panda_link0", "panda_hand_tcp",
+                                gravity=[0, 1])
+
+
+def test_the_closed_loop_is_made_of_springs_and_dampers(panda):
+    found = dashpot.closed_loop(panda, HOME, **TASK)
+    J = panda.jacobian(HOME)
+    np.testing.assert_allclose(found.mass, panda.mass(HOME), atol=1e-12)
+    np.testing.assert_allclose(found.stiffness, J.T @ np.diag(TASK["task_stiffness"]) @ J,
+                               atol=1e-10)
+    np.testing.assert_allclose(
+        found.damping, J.T @ np.diag(TASK["task_damping"]) @ J + np.diag(panda.viscous_friction),
+        atol=1e-10)
+    joint = dashpot.closed_loop(panda, HOME, joint_stiffness=[50.0] * 7, joint_damping=np.eye(7))
+    np.testing.assert_allclose(joint.stiffness, 50 * np.eye(7), atol=1e-12)
+    held = dashpot.closed_loop(panda, HOME, task_stiffness=TASK["task_stiffness"],
+                               task_damping_ratio=0.7)
+    np.testing.assert_allclose(held.modes.damping_ratio[:6], 0.7, atol=0.05)  # and friction
+    N = np.eye(7) - np.linalg.solve(panda.mass(HOME), J.T) @ np.linalg.solve(
+        J @ np.linalg.solve(panda.mass(HOME), J.T), J)
+    posture = dashpot.closed_loop(panda, HOME, **TASK, null_stiffness=[5.0] * 7)
+    np.testing.assert_allclose(posture.stiffness - found.stiffness, 5 * N.T @ N, atol=1e-9)
+
+
+def test_the_closed_loops_modes_are_those_of_the_program(program, panda):
+    printed = json.loads(subprocess.check_output(
+        [program, "design", "--urdf", ROOT / "sim/models/panda.urdf", "--base", "panda_link0",
+         "--tip", "panda_hand_tcp", "--q", text(HOME), "--task-stiffness",
+         text(TASK["task_stiffness"]), "--task-damping", text(TASK["task_damping"]),
+         "--damping-ratio", "0.7", "--json"]))
+    found = dashpot.closed_loop(panda, HOME, **TASK).modes
+    before = [mode["natural_frequency"] for mode in printed["before"]["modes"]]
+    np.testing.assert_allclose(found.natural_frequency[:6], before[:6], rtol=2e-3)  # no friction
+
+
+def test_a_closed_loop_that_cannot_be_is_refused(panda):
+    for given, message in [
+            (dict(task_stiffness=np.eye(5)), "task_stiffness: is 5 x 5, expected 6 x 6"),
+            (dict(task_stiffness=[-1, 0, 0, 0, 0, 0]), "task_stiffness"),
+            (dict(task_stiffness=[1] * 6, joint_stiffness=[1] * 7), "not both"),
+            (dict(task_stiffness=[1] * 6, frame="world"), "frame: 'world'"),
+            (dict(task_stiffness=[1] * 6, directions=["w"]), "directions: 'w'"),
+            (dict(task_stiffness=[1] * 6, external_wrench=[1, 2]), "external_wrench")]:
+        with pytest.raises(dashpot.Error, match=message):
+            dashpot.closed_loop(panda, HOME, **given)

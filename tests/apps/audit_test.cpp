@@ -1,0 +1,202 @@
+// `dashpot audit`: what a user sees, and what is refused.
+#include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/support/arms.hpp>
+
+#include <cstdlib>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::string kAuditHome = "0,-45 deg,0,-135 deg,0,90 deg,45 deg";
+
+std::vector<std::string> audit_panda(std::vector<std::string> options) {
+  options.insert(options.begin(), {"audit", "--urdf", testing::arm_path("panda"), "--base",
+                                   "panda_link0", "--tip", "panda_hand_tcp"});
+  return options;
+}
+
+Json audit_json(std::vector<std::string> options) {
+  options.insert(options.end(), {"--q", kAuditHome, "--json"});
+  return parse(run_program(audit_panda(options)));
+}
+
+/// Ratios of the oscillating modes at the home posture of the Panda with the defaults of public
+/// controllers, to two digits, and the fastest pole, computed by a general eigensolver in Python.
+struct Published {
+  const char* preset;
+  Numbers ratios;
+  double fastest;  // 1/s; 0: not known
+};
+
+TEST(Audit, ReproducesWhatIsKnownOfPublicControllers) {
+  const std::vector<Published> all = {{"libfranka", {0.39, 0.45, 0.51}, -956},
+                                      {"cartesian_impedance_controller", {0.34, 0.45, 0.50}, -1351},
+                                      {"franky", {0.37, 0.45, 0.51}, 0},
+                                      {"deoxys", {0.25, 0.42, 1.0}, 0}};
+  for (const Published& one : all) {
+    const Json found = audit_json({"--preset", one.preset});
+    EXPECT_EQ(found["intended_ratio"], 1);
+    Numbers ratios = of_modes(found["posture"], "damping_ratio");
+    std::sort(ratios.begin(), ratios.end());
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_NEAR(ratios[i], one.ratios[i], 0.0051) << one.preset;
+    }
+    EXPECT_NEAR(found["posture"]["smallest_ratio"].get<double>(), ratios[0], 1e-12);
+    if (one.fastest != 0) {
+      EXPECT_NEAR(found["posture"]["fastest_pole"].get<double>(), one.fastest, 0.5);
+    }
+  }
+}
+
+TEST(Audit, HasTheModesOfDesign) {
+  const Json found = audit_json(
+      {"--stiffness", "200,200,200,20,20,20", "--damping", "30,30,30,9,9,9", "--period", "1ms"});
+  std::vector<std::string> design = {"design",
+                                     "--urdf",
+                                     testing::arm_path("panda"),
+                                     "--base",
+                                     "panda_link0",
+                                     "--tip",
+                                     "panda_hand_tcp",
+                                     "--q",
+                                     kAuditHome,
+                                     "--task-stiffness",
+                                     "200,200,200,20,20,20",
+                                     "--task-damping",
+                                     "30,30,30,9,9,9",
+                                     "--damping-ratio",
+                                     "0.7",
+                                     "--viscous-friction",
+                                     "0",
+                                     "--json"};
+  const Json known = parse(run_program(design));
+  EXPECT_EQ(found["posture"]["modes"], known["before"]["modes"]);
+  expect_near(found["suggestion"]["task_damping"].get<Rows>(), known["task_damping"].get<Rows>(),
+              1e-9);
+  EXPECT_TRUE(found["intended_ratio"].is_null());
+  EXPECT_GT(found["posture"]["gain_margin"].get<double>(), 1);
+}
+
+TEST(Audit, HalvesTheRotationalStiffnessOfAHalfQuaternion) {
+  const Json half = audit_json({"--stiffness", "200,200,200,20,20,20", "--damping",
+                                "30,30,30,9,9,9", "--rotation", "half-quaternion"});
+  const Json halved =
+      audit_json({"--stiffness", "200,200,200,10,10,10", "--damping", "30,30,30,9,9,9"});
+  EXPECT_NEAR(half["posture"]["smallest_ratio"].get<double>(),
+              halved["posture"]["smallest_ratio"].get<double>(), 1e-12);
+}
+
+TEST(Audit, DependsNotOnTheNumberOfThreads) {
+  std::vector<std::string> options = {"--preset", "crisp",  "--samples", "500",    "--period",
+                                      "1 ms",     "--seed", "3",         "--jobs", "1"};
+  const Json one = audit_json(options);
+  options.back() = "2";
+  const Json two = audit_json(options);
+  EXPECT_EQ(one, two);
+  EXPECT_EQ(one["workspace"]["samples"], 500);
+  EXPECT_FALSE(one["workspace"]["interrupted"].get<bool>());
+  const Json& ratio = one["workspace"]["smallest_ratio"];
+  EXPECT_LE(ratio["worst"].get<double>(), ratio["p05"].get<double>());
+  EXPECT_LT(ratio["p05"].get<double>(), ratio["median"].get<double>());
+  EXPECT_LT(ratio["median"].get<double>(), ratio["p95"].get<double>());
+  options[5] = "2 ms";
+  EXPECT_NE(audit_json(options)["workspace"], two["workspace"]);
+}
+
+TEST(Audit, WritesALineForEachListedPosture) {
+  const Scratch scratch;
+  const std::string list =
+      scratch.write("list.yaml", "- [0, -0.7, 0, -2.3, 0, 1.5, 0.7]\n- [0, 0, 0, -2, 0, 2, 0]\n");
+  const std::string csv = scratch.path("out.csv");
+  const Json found = audit_json({"--preset", "franky", "--postures", list, "--csv", csv});
+  EXPECT_EQ(found["workspace"]["samples"], 2);
+  const std::string text = scratch.read("out.csv");
+  EXPECT_EQ(count_lines(text), 3);
+  EXPECT_THAT(text, HasSubstr("posture,q1,q2,q3,q4,q5,q6,q7,smallest_ratio"));
+  EXPECT_THAT(text, HasSubstr("\n1,0,0,0,-2,0,2,0,0."));
+}
+
+TEST(Audit, TakesGainsFromAConfiguration) {
+  const Scratch scratch;
+  const std::string gains = scratch.write("gains.yaml",
+                                          "gains: {task: {stiffness: [200, 200, 200, 20, 20, 20], "
+                                          "damping: [30, 30, 30, 9, 9, 9]}}\n");
+  const Json given = audit_json({"--gains", gains});
+  const Json stated =
+      audit_json({"--stiffness", "200,200,200,20,20,20", "--damping", "30,30,30,9,9,9"});
+  EXPECT_EQ(given, stated);
+}
+
+TEST(Audit, TakesGainsOfTheJoints) {
+  const Json found = audit_json({"--joint-stiffness", "600", "--damping-factor", "2"});
+  EXPECT_EQ(found["posture"]["modes"].size(), 7U);
+  EXPECT_EQ(found["suggestion"]["diagonal"].size(), 7U);
+}
+
+TEST(Audit, DrawsTheRatios) {
+  if (std::system("command -v gnuplot >/dev/null") != 0) GTEST_SKIP() << "there is no gnuplot";
+  const Scratch scratch;
+  const std::string file = scratch.path("it's.svg");
+  audit_json({"--preset", "crisp", "--samples", "200", "--period", "1ms", "--plot", file});
+  const std::string drawn = scratch.read("it's.svg");
+  EXPECT_THAT(drawn, HasSubstr("<svg"));
+  EXPECT_THAT(drawn, HasSubstr("meant: 1.00"));
+  EXPECT_THAT(drawn, HasSubstr("gain margin"));
+}
+
+TEST(Audit, PrintsTables) {
+  const Outcome outcome =
+      run_program(audit_panda({"--q", kAuditHome, "--preset", "libfranka", "--samples", "100"}));
+  EXPECT_EQ(outcome.status, 0);
+  for (const char* words :
+       {"Smallest ratio 0.394072 where 1.00 was meant; fastest pole -955.854 1/s",
+        "Over 100 postures", "Nearest diagonal", "Zero modes: 1."}) {
+    EXPECT_THAT(outcome.out, HasSubstr(words));
+  }
+  EXPECT_THAT(outcome.err, ::testing::IsEmpty());
+}
+
+TEST(Audit, RefusesInOneLineThatNamesTheOption) {
+  const Scratch scratch;
+  const std::string short_list = scratch.write("list.yaml", "- [0, 0]\n");
+  const std::vector<std::pair<std::vector<std::string>, std::string>> all = {
+      {{}, "--stiffness: give one of"},
+      {{"--preset", "unknown"}, "--preset: unknown not in"},
+      {{"--preset", "crisp", "--stiffness", "1,1,1,1,1,1"}, "--stiffness: give one of"},
+      {{"--stiffness", "1,1,1"}, "--damping: give --damping or --damping-factor"},
+      {{"--stiffness", "1,1,1", "--damping-factor", "2"}, "--stiffness: 3 numbers, expected 6"},
+      {{"--stiffness", "1,1,1,1,1,-1", "--damping", "1,1,1,1,1,1"},
+       "task_stiffness: is not positive semidefinite"},
+      {{"--preset", "crisp", "--delay", "1"}, "--period: missing"},
+      {{"--preset", "crisp", "--q", "1,2"}, "--q: 2 numbers, expected 7"},
+      {{"--preset", "crisp", "--postures", short_list}, "[0].posture: 2 numbers, expected 7"},
+      {{"--preset", "crisp", "--spread", "1"}, "--spread: needs --samples"},
+      {{"--preset", "crisp", "--csv", "x.csv"}, "--csv: needs --samples or --postures"},
+      {{"--preset", "crisp", "--samples", "2", "--plot", "x.pdf"}, "--plot: x.pdf: has to end"},
+      {{"--preset", "crisp", "--samples", "0"}, "--samples"},
+      {{"--gains", scratch.path("none.yaml")}, "none.yaml"},
+  };
+  for (const auto& [options, words] : all) {
+    const Outcome outcome = run_program(audit_panda(options));
+    EXPECT_EQ(outcome.status, 2) << words;
+    EXPECT_EQ(outcome.out, "") << words;
+    EXPECT_EQ(count_lines(outcome.err), 1) << words;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+  }
+}
+
+TEST(AuditTable, IsPrintedForEachPreset) {
+  const Scratch scratch;
+  const std::string line = "cd " DASHPOT_SOURCE_DIR
+                           " && python3 apps/plots/audit.py " DASHPOT_PROGRAM " 50 >" +
+                           scratch.path("out") + " 2>&1";
+  ASSERT_EQ(std::system(line.c_str()), 0) << scratch.read("out");
+  const std::string text = scratch.read("out");
+  EXPECT_EQ(count_lines(text), 9);
+  EXPECT_THAT(text, HasSubstr("| `libfranka` | 1 | 0.394, 0.455, 0.512 |"));
+}
+
+}  // namespace
+}  // namespace dashpot::tests

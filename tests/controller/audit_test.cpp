@@ -1,0 +1,319 @@
+// What gains do on an arm: against the companion matrix in long double, a loop stepped tick by
+// tick, and closed forms.
+#include <dashpot/controller/audit.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/chains.hpp>
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <stdexcept>
+
+namespace dashpot::controller {
+namespace {
+
+using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+
+const Vector6 kTranslationFirst = (Vector6() << 200, 200, 200, 20, 20, 20).finished();
+
+RobotModel audited_panda(double friction = 0) {
+  ModelOptions options;
+  options.viscous_friction = JointVector::Constant(7, friction);
+  return RobotModel::from_urdf_file(std::string(DASHPOT_SOURCE_DIR) + "/sim/models/panda.urdf",
+                                    "panda_link0", "panda_hand_tcp", options);
+}
+
+JointVector home() {
+  constexpr double kQuarter = 0.78539816339744831;
+  JointVector q(7);
+  q << 0, -kQuarter, 0, -3 * kQuarter, 0, 2 * kQuarter, kQuarter;
+  return q;
+}
+
+AuditOptions stated(const Vector6& stiffness, double factor) {
+  AuditOptions options;
+  options.gains.task_stiffness = stiffness.asDiagonal();
+  options.gains.task_damping = Vector6(factor * stiffness.cwiseSqrt()).asDiagonal();
+  return options;
+}
+
+/// The closed loop of task gains as matrices, in long double.
+struct Loop {
+  LongMatrix M, C, K;
+};
+
+Loop loop_at(const RobotModel& model, const JointVector& q, const Matrix6& stiffness,
+             const Matrix6& damping) {
+  const DynamicsResult robot = evaluate(model, q, JointVector::Zero(q.size()));
+  const LongMatrix J = Eigen::MatrixXd(robot.J).cast<long double>();
+  Loop loop;
+  loop.M = Eigen::MatrixXd(robot.M).cast<long double>();
+  loop.K = J.transpose() * Eigen::MatrixXd(stiffness).cast<long double>() * J;
+  loop.C = J.transpose() * Eigen::MatrixXd(damping).cast<long double>() * J;
+  loop.C.diagonal() +=
+      Eigen::VectorXd(model.joint_values(&Joint::viscous_friction)).cast<long double>();
+  return loop;
+}
+
+/// Smallest ratio of the complex eigenvalues, and the smallest real part.
+PostureNumbers numbers_of(const Loop& loop) {
+  const Eigen::Index n = loop.M.rows();
+  LongMatrix A = LongMatrix::Zero(2 * n, 2 * n);
+  A.topRightCorner(n, n).setIdentity();
+  const Eigen::PartialPivLU<LongMatrix> mass(loop.M);
+  A.bottomLeftCorner(n, n) = -mass.solve(loop.K);
+  A.bottomRightCorner(n, n) = -mass.solve(loop.C);
+  const Eigen::EigenSolver<LongMatrix> solver(A, false);
+  PostureNumbers numbers;
+  numbers.smallest_ratio = numbers.fastest_pole = std::numeric_limits<double>::infinity();
+  for (const std::complex<long double> value : solver.eigenvalues()) {
+    numbers.fastest_pole = std::min(numbers.fastest_pole, static_cast<double>(value.real()));
+    if (std::abs(value) < 0.1L || std::abs(value.imag()) < 1e-6L * std::abs(value)) continue;
+    numbers.smallest_ratio =
+        std::min(numbers.smallest_ratio, static_cast<double>(-value.real() / std::abs(value)));
+  }
+  return numbers;
+}
+
+TEST(Audit, AgreesWithTheCompanionMatrixOverTheWorkspace) {
+  for (const double friction : {0.0, 0.5}) {
+    const RobotModel model = audited_panda(friction);
+    AuditOptions options = stated(kTranslationFirst, 2);
+    options.half_quaternion = true;
+    const Audit audit(model, options);
+    Matrix6 stiffness = options.gains.task_stiffness;
+    stiffness.bottomRightCorner<3, 3>() *= 0.5;
+    const std::vector<PostureNumbers> found = audit.sample(7, 0, 200);
+    for (std::int64_t i = 0; i < 200; ++i) {
+      const PostureNumbers& one = found[static_cast<std::size_t>(i)];
+      if (one.singular) continue;
+      const PostureNumbers expected =
+          numbers_of(loop_at(model, audit.posture(7, i), stiffness, options.gains.task_damping));
+      EXPECT_NEAR(one.smallest_ratio, expected.smallest_ratio, 1e-9) << i;
+      EXPECT_NEAR(one.fastest_pole, expected.fastest_pole, 1e-9 * std::abs(expected.fastest_pole));
+    }
+  }
+}
+
+TEST(Audit, ProvesBoundsThatHold) {
+  const RobotModel model = audited_panda();
+  const AuditOptions options = stated(kTranslationFirst, 2);
+  const PostureAudit found = Audit(model, options).audit(home());
+  const PostureNumbers expected =
+      numbers_of(loop_at(model, home(), options.gains.task_stiffness, options.gains.task_damping));
+  EXPECT_LT(found.smallest_ratio_bound, 1e-10);
+  EXPECT_LT(found.fastest_pole_bound, 1e-8);
+  EXPECT_NEAR(found.numbers.smallest_ratio, expected.smallest_ratio, found.smallest_ratio_bound);
+  EXPECT_NEAR(found.numbers.fastest_pole, expected.fastest_pole, found.fastest_pole_bound + 1e-9);
+  EXPECT_EQ(found.numbers.zero_modes, 1);
+}
+
+/// F = blkdiag(L_v, L_w) (K e + D v) turns with neither frame nor order of the joints.
+TEST(Audit, ScalesGainsByTheInertiaOfTheTip) {
+  const RobotModel model = audited_panda();
+  AuditOptions options = stated((Vector6() << 150, 150, 150, 250, 250, 250).finished(), 2);
+  options.inertia_blocks = true;
+  const DynamicsResult robot = evaluate(model, home(), JointVector::Zero(7));
+  const Eigen::MatrixXd mobility =
+      robot.J * Eigen::MatrixXd(robot.M).inverse() * robot.J.transpose();
+  Matrix6 inertia = Matrix6::Zero();
+  inertia.topLeftCorner<3, 3>() = Eigen::Matrix3d(mobility.topLeftCorner<3, 3>()).inverse();
+  inertia.bottomRightCorner<3, 3>() = Eigen::Matrix3d(mobility.bottomRightCorner<3, 3>()).inverse();
+  const Matrix6 K = options.gains.task_stiffness, C = options.gains.task_damping;
+  const PostureNumbers expected = numbers_of(loop_at(model, home(), K * inertia, C * inertia));
+  for (const Frame frame : {Frame::kBase, Frame::kTool}) {
+    options.gains.frame = frame;
+    const PostureNumbers found = Audit(model, options).numbers(home());
+    EXPECT_NEAR(found.smallest_ratio, expected.smallest_ratio, 1e-9);
+    EXPECT_NEAR(found.fastest_pole, expected.fastest_pole, 1e-9 * std::abs(expected.fastest_pole));
+  }
+}
+
+/// Runs the sampled loop with `factor` times the gains, and returns the largest deflection of the
+/// last ticks over that of those before.
+double growth(const Loop& loop, const AuditOptions& options, double factor) {
+  const Eigen::Index n = loop.M.rows();
+  const Eigen::MatrixXd M = loop.M.cast<double>(), K = factor * loop.K.cast<double>(),
+                        C = factor * loop.C.cast<double>();
+  const Eigen::LLT<Eigen::MatrixXd> mass(M);
+  const double T = options.period;
+  const double gain = options.cutoff > 0 ? -std::expm1(-2 * M_PI * options.cutoff * T) : 1;
+  const Eigen::VectorXd start = Eigen::VectorXd::LinSpaced(n, 1, 2);
+  Eigen::VectorXd q = start, velocity = Eigen::VectorXd::Zero(n), before = q;
+  Eigen::VectorXd filtered = Eigen::VectorXd::Zero(n);
+  std::vector<Eigen::VectorXd> queue(static_cast<std::size_t>(options.delay),
+                                     Eigen::VectorXd::Zero(n));
+  double early = 0, late = 0;
+  constexpr int kTicks = 40000;
+  for (int tick = 0; tick < kTicks; ++tick) {
+    const Eigen::VectorXd used =
+        options.difference_velocity ? Eigen::VectorXd((q - before) / T) : velocity;
+    queue.push_back(-K * q - C * used);
+    filtered += gain * (queue.front() - filtered);
+    queue.erase(queue.begin());
+    const Eigen::VectorXd acceleration = mass.solve(filtered);
+    before = q;
+    q += T * velocity + 0.5 * T * T * acceleration;
+    velocity += T * acceleration;
+    const double size = (K * q).norm() + T * (K * velocity).norm();
+    if (tick >= kTicks / 2 && tick < 3 * kTicks / 4) early = std::max(early, size);
+    if (tick >= 3 * kTicks / 4) late = std::max(late, size);
+    if (!(size < 1e200)) return std::numeric_limits<double>::infinity();
+  }
+  return late / early;
+}
+
+TEST(Audit, FindsTheMarginAtWhichASampledLoopStartsToGrow) {
+  const RobotModel model = audited_panda();
+  AuditOptions options = stated(kTranslationFirst, 2);
+  options.period = 0.0005;
+  for (const bool slow : {false, true}) {
+    options.delay = slow ? 1 : 0;
+    options.cutoff = slow ? 300 : 0;
+    options.difference_velocity = slow;
+    const Audit audit(model, options);
+    const double margin = audit.numbers(home()).gain_margin;
+    const Loop loop =
+        loop_at(model, home(), options.gains.task_stiffness, options.gains.task_damping);
+    EXPECT_LT(growth(loop, options, 0.995 * margin), 1) << margin;
+    EXPECT_GT(growth(loop, options, 1.005 * margin), 1) << margin;
+    EXPECT_NEAR(audit.audit(home()).numbers.gain_margin, margin, 1e-6 * margin);
+  }
+}
+
+/// A damper c held for T makes v <- (1 - c T / I) v: stable up to c T / I = 2.
+TEST(Audit, FindsPoleAndMarginOfOneJoint) {
+  constexpr double kInertia = 0.02 + 0.25 * 0.25;  // of a link of the chain, kg m^2
+  ModelOptions model;
+  model.viscous_friction = model.coulomb_friction = JointVector::Zero(1);
+  AuditOptions options;
+  options.mode = Mode::kJoint;
+  options.gains.joint_stiffness = JointMatrix::Constant(1, 1, 1e-3);
+  options.gains.joint_damping = JointMatrix::Constant(1, 1, 10);
+  options.period = 0.001;
+  options.soft_frequency = 1e-3;
+  const PostureNumbers found =
+      Audit(testing::chain_of({"continuous"}, model), options).numbers(JointVector::Zero(1));
+  EXPECT_NEAR(found.fastest_pole, -10 / kInertia, 1e-3);
+  EXPECT_NEAR(found.gain_margin, 2 * kInertia / (10 * options.period), 1e-3);
+  EXPECT_NEAR(found.smallest_ratio, 10 / (2 * std::sqrt(1e-3 * kInertia)), 1e-3);
+  EXPECT_EQ(found.zero_modes, 0);
+}
+
+TEST(Audit, CountsSpringsInTheNullSpace) {
+  const RobotModel model = audited_panda();
+  AuditOptions options = stated(kTranslationFirst, 2);
+  options.gains.null_stiffness = JointVector::Constant(7, 5);
+  options.gains.null_damping = JointVector::Constant(7, 2);
+  const Audit audit(model, options);
+  const PostureNumbers fast = audit.numbers(home());
+  const PostureAudit proved = audit.audit(home());
+  EXPECT_EQ(fast.zero_modes, 0);
+  EXPECT_EQ(proved.spectrum.modes.size(), 7);
+  EXPECT_NEAR(fast.smallest_ratio, proved.numbers.smallest_ratio, 1e-9);
+  EXPECT_NEAR(fast.fastest_pole, proved.numbers.fastest_pole, 1e-6);
+  options.gains.null_stiffness = {};
+  EXPECT_EQ(Audit(model, options).numbers(home()).zero_modes, 1);
+}
+
+TEST(Audit, NamesASingularPosture) {
+  JointVector stretched = home();
+  stretched[1] = stretched[3] = stretched[5] = 0;
+  const Audit audit(audited_panda(), stated(kTranslationFirst, 2));
+  EXPECT_TRUE(audit.numbers(stretched).singular);
+  EXPECT_FALSE(audit.numbers(home()).singular);
+  EXPECT_GT(audit.numbers(stretched).zero_modes, 1);
+}
+
+TEST(Audit, DrawsPosturesByNumberAlone) {
+  const Audit audit(audited_panda(), stated(kTranslationFirst, 2));
+  const std::vector<PostureNumbers> all = audit.sample(3, 0, 90);
+  const std::vector<PostureNumbers> part = audit.sample(3, 40, 10);
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    EXPECT_EQ(part[i].smallest_ratio, all[40 + i].smallest_ratio);
+    EXPECT_EQ(part[i].fastest_pole, all[40 + i].fastest_pole);
+  }
+  EXPECT_NE(audit.posture(3, 0), audit.posture(4, 0));
+  const JointVector lower = audit.options().lower, upper = audit.options().upper;
+  for (std::int64_t i = 0; i < 90; ++i) {
+    EXPECT_TRUE((audit.posture(3, i).array() >= lower.array()).all());
+    EXPECT_TRUE((audit.posture(3, i).array() <= upper.array()).all());
+  }
+}
+
+TEST(Audit, SummarizesByNearestRank) {
+  const Audit audit(audited_panda(), stated(kTranslationFirst, 2));
+  const std::vector<PostureNumbers> all = audit.sample(5, 0, 101);
+  const WorkspaceAudit found =
+      summarize(audit, all, [&](std::int64_t i) { return audit.posture(5, i); });
+  std::vector<double> ratios, poles;
+  for (const PostureNumbers& one : all) {
+    ratios.push_back(one.smallest_ratio);
+    poles.push_back(one.fastest_pole);
+  }
+  std::sort(ratios.begin(), ratios.end());
+  std::sort(poles.begin(), poles.end());
+  EXPECT_EQ(found.samples, 101);
+  EXPECT_NEAR(found.smallest_ratio.median, ratios[50], 1e-9);
+  EXPECT_NEAR(found.smallest_ratio.p05, ratios[5], 1e-9);
+  EXPECT_NEAR(found.smallest_ratio.p95, ratios[95], 1e-9);
+  EXPECT_NEAR(found.smallest_ratio.worst, ratios[0], 1e-9);
+  EXPECT_NEAR(found.fastest_pole.worst, poles[0], 1e-6);
+  EXPECT_NEAR(audit.numbers(found.smallest_ratio.worst_q).smallest_ratio, ratios[0], 1e-9);
+  EXPECT_TRUE(std::isnan(found.gain_margin.median));
+}
+
+TEST(Audit, SuggestsDampingThatGivesTheRatio) {
+  AuditOptions options = stated(kTranslationFirst, 2);
+  const DampingSuggestion found = Audit(audited_panda(), options).suggest(home(), 0.6);
+  options.gains.task_damping = found.damping;
+  const PostureAudit with = Audit(audited_panda(), options).audit(home());
+  for (const analysis::Mode<>& mode : with.spectrum.modes) {
+    EXPECT_NEAR(mode.damping_ratio, 0.6, 1e-8);
+  }
+  EXPECT_EQ(found.diagonal, Eigen::VectorXd(found.damping.diagonal()));
+  options.gains.task_damping = Matrix6(found.diagonal.asDiagonal());
+  EXPECT_NEAR(Audit(audited_panda(), options).audit(home()).numbers.smallest_ratio,
+              found.diagonal_smallest_ratio, 1e-9);
+}
+
+void expect_refusal(const AuditOptions& options, const std::string& words) {
+  try {
+    const Audit audit(audited_panda(), options);
+    FAIL() << "not refused: " << words;
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr(words));
+  }
+}
+
+TEST(Audit, RefusesGainsThatCannotBe) {
+  const AuditOptions good = stated(kTranslationFirst, 2);
+  AuditOptions bad = good;
+  bad.gains.task_stiffness(0, 0) = -1;
+  expect_refusal(bad, "task_stiffness: is not positive semidefinite");
+  bad = good;
+  bad.gains.task_damping(0, 1) = 1;
+  expect_refusal(bad, "task_damping: is not symmetric");
+  bad = good;
+  bad.gains.task_damping(2, 2) = std::numeric_limits<double>::quiet_NaN();
+  expect_refusal(bad, "task_damping: has an entry that is not a finite number");
+  bad = good;
+  bad.gains.null_stiffness = JointVector::Zero(6);
+  expect_refusal(bad, "null_stiffness: has 6 entries, expected 7");
+  bad = good;
+  bad.gains.task_stiffness(1, 1) = 3;
+  bad.inertia_blocks = true;
+  expect_refusal(bad, "task_stiffness: needs one number for translation");
+  bad = good;
+  bad.period = -1;
+  expect_refusal(bad, "period");
+  EXPECT_THROW(Audit(audited_panda(), good).numbers(JointVector::Zero(6)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dashpot::controller
