@@ -19,6 +19,40 @@ struct PairedRoot : BlockRoot {
   bool used = false;  ///< of a zero mode
 };
 
+/// A vector in the columns of a block.
+template <int N>
+class BlockVector {
+ public:
+  explicit BlockVector(const Block& block)
+      : first_(block.first), re_(StateVector<N>::Zero(block.size)), im_(re_) {}
+  void set(Eigen::Index i, const Complex& value) {
+    re_[i] = value.real();
+    im_[i] = value.imag();
+  }
+  /// Entry `row` of the combination of these columns of X.
+  Complex combine(const Wide<N>& X, Eigen::Index row) const {
+    double re = 0, im = 0;
+    for (Eigen::Index i = 0; i < re_.size(); ++i) {
+      re += X(row, first_ + i) * re_[i];
+      im += X(row, first_ + i) * im_[i];
+    }
+    return {re, im};
+  }
+
+ private:
+  Eigen::Index first_;
+  StateVector<N> re_, im_;
+};
+
+/// Scales u, of this kinetic energy u^H M u, to 1, with its largest entry real and positive.
+template <int N>
+void normalize(double energy, ComplexVector<N>& u) {
+  Complex largest = 0;
+  for (const Complex& entry : u) largest = std::norm(entry) > std::norm(largest) ? entry : largest;
+  const Complex factor = std::conj(largest) / (modulus(largest) * std::sqrt(energy));
+  for (Complex& entry : u) entry = product(entry, factor);
+}
+
 template <int N>
 class ModeExtractor {
  public:
@@ -53,7 +87,9 @@ class ModeExtractor {
 
   Invariants invariants(int i, int j) const;
   void write_shapes(int i, int j, Mode<N>& mode) const;
-  ComplexVector<N> shape(int i, bool left, StateVector<N>& re, StateVector<N>& im) const;
+  void write_shape(int i, std::size_t k, Mode<N>& mode) const;
+  BlockVector<N> eigenvector(int i, const State<N>& matrix) const;
+  ComplexVector<N> left_shape(int i) const;
 
   const System<N>& system_;
   const BasisResidual<N>& residual_;
@@ -209,24 +245,24 @@ Invariants ModeExtractor<N>::invariants(int i, int j) const {
   return v;
 }
 
-/// Eigenvector of root i in joint coordinates, and its coefficients (re, im) in the block's
-/// columns.
+/// Eigenvector of a block (of `matrix`, Lambda or Gamma) to the eigenvalue of root i.
 template <int N>
-ComplexVector<N> ModeExtractor<N>::shape(int i, bool left, StateVector<N>& re,
-                                         StateVector<N>& im) const {
+BlockVector<N> ModeExtractor<N>::eigenvector(int i, const State<N>& matrix) const {
   const Block& b = basis_.blocks[root(i).block];
   const Complex mu = root(i).value;
-  const auto& matrix = left ? basis_.Gamma : basis_.Lambda;
-  const State<N> L = matrix.block(b.first, b.first, b.size, b.size);
-  ComplexVector<kTwice<N>> w(b.size);
+  BlockVector<N> w(b);
   if (b.size == 1) {
-    w[0] = 1;
+    w.set(0, 1);
   } else if (b.size == 2) {
-    const auto vector = eigenvector_2x2(L(0, 0), L(0, 1), L(1, 0), L(1, 1), mu);
-    w << vector[0], vector[1];
+    const Eigen::Index k = b.first;
+    const auto vector =
+        eigenvector_2x2(matrix(k, k), matrix(k, k + 1), matrix(k + 1, k), matrix(k + 1, k + 1), mu);
+    w.set(0, vector[0]);
+    w.set(1, vector[1]);
   } else {
     // Inverse iteration, kept where it grows most: near a defective eigenvalue a further step may
     // well be worse (Wilkinson 1979).
+    const State<N> L = matrix.block(b.first, b.first, b.size, b.size);
     ComplexVector<kTwice<N>> x = ComplexVector<kTwice<N>>::Ones(b.size);
     double best = 0;
     Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, kTwice<N>, kTwice<N>> shifted;
@@ -236,75 +272,65 @@ ComplexVector<N> ModeExtractor<N>::shape(int i, bool left, StateVector<N>& re,
       solve_in_place(shifted, x, kUnit * L.norm());
       const double growth = x.stableNorm();
       x /= growth;
-      if (growth > best) best = growth, w = x;
+      if (!(growth > best)) continue;
+      best = growth;
+      for (int j = 0; j < b.size; ++j) w.set(j, x[j]);
     }
   }
-  const auto& U = left ? basis_.Y : basis_.U;
-  const auto columns = U.middleCols(b.first, b.size);
-  re = w.real();
-  im = w.imag();
-  const Vector<N> x = columns.lazyProduct(re), y = columns.lazyProduct(im);
-  // Unit kinetic energy; largest entry real and positive.
-  double energy = 0;
-  if (left) {
-    energy = x.dot(system_.mass * x) + y.dot(system_.mass * y);
-  } else {
-    const auto momenta = residual_.MU.middleCols(b.first, b.size);
-    energy = x.dot(momenta.lazyProduct(re)) + y.dot(momenta.lazyProduct(im));
+  return w;
+}
+
+/// Left eigenvector of root i in joint coordinates.
+template <int N>
+ComplexVector<N> ModeExtractor<N>::left_shape(int i) const {
+  const BlockVector<N> w = eigenvector(i, basis_.Gamma);
+  ComplexVector<N> y(basis_.Y.rows());
+  for (Eigen::Index row = 0; row < y.size(); ++row) y[row] = w.combine(basis_.Y, row);
+  const Vector<N> re = y.real(), im = y.imag();
+  normalize<N>(re.dot(system_.mass * re) + im.dot(system_.mass * im), y);
+  return y;
+}
+
+/// Writes the eigenvectors of root i as number k of the mode, and counts its errors. These do not
+/// depend on lengths, and so the sums are those of vectors as they come.
+template <int N>
+void ModeExtractor<N>::write_shape(int i, std::size_t k, Mode<N>& mode) const {
+  const Complex mu = root(i).value;
+  const BlockVector<N> w = eigenvector(i, basis_.Lambda);
+  ComplexVector<N>&u = mode.shapes[k], &y = mode.left_shapes[k];
+  u.resize(basis_.U.rows());
+  if (!spectrum_.symmetric) y = left_shape(i);
+  double energy = 0, length2 = 0, residual2 = 0;
+  Complex slope = 0;
+  for (Eigen::Index row = 0; row < u.size(); ++row) {
+    const Complex x = w.combine(basis_.U, row), Mx = w.combine(residual_.MU, row),
+                  Cx = w.combine(residual_.CU, row), Kx = w.combine(residual_.KU, row);
+    energy += x.real() * Mx.real() + x.imag() * Mx.imag();
+    length2 += std::norm(x);
+    residual2 += std::norm(product(mu, product(mu, Mx) + Cx) + Kx);
+    slope += product(spectrum_.symmetric ? x : y[row], product(2.0 * mu, Mx) + Cx);
+    u[row] = x;
   }
-  const double norm = std::sqrt(energy);
-  Eigen::Index largest = 0;
-  (x.cwiseAbs2() + y.cwiseAbs2()).maxCoeff(&largest);
-  const Complex pivot(x[largest], y[largest]);
-  const Complex factor = std::conj(pivot) / (modulus(pivot) * norm);
-  ComplexVector<N> u(x.size());
-  u.real() = factor.real() * x - factor.imag() * y;
-  u.imag() = factor.real() * y + factor.imag() * x;
-  w *= factor;
-  re = w.real();
-  im = w.imag();
-  return u;
+  const double length = std::sqrt(length2), left = spectrum_.symmetric ? length : y.norm();
+  const double size = std::norm(mu) * M_norm_ + modulus(mu) * C_norm_ + K_norm_;
+  const double backward_error = std::sqrt(residual2) / (size * length);
+  mode.backward_error =
+      std::max(mode.backward_error, backward_error >= 0 ? backward_error : kInfinity);
+  mode.condition = std::max(mode.condition, left * length * size / (modulus(mu) * modulus(slope)));
+  normalize<N>(energy, u);
+  if (spectrum_.symmetric) y = u;
 }
 
 template <int N>
 void ModeExtractor<N>::write_shapes(int i, int j, Mode<N>& mode) const {
   mode.backward_error = mode.condition = 0;
-  const std::array<int, 2> which =
-      root(i).value == mode.eigenvalues[0] ? std::array<int, 2>{i, j} : std::array<int, 2>{j, i};
-  for (std::size_t k = 0; k < 2; ++k) {
-    if (k == 1 && mode.eigenvalues[0].imag() != 0) {
-      mode.shapes[1] = mode.shapes[0].conjugate();
-      mode.left_shapes[1] = mode.left_shapes[0].conjugate();
-      break;
-    }
-    StateVector<N> re, im, unused_re, unused_im;
-    mode.shapes[k] = shape(which[k], false, re, im);
-    mode.left_shapes[k] =
-        spectrum_.symmetric ? mode.shapes[k] : shape(which[k], true, unused_re, unused_im);
-    const Block& b = basis_.blocks[root(which[k]).block];
-    const Complex mu = root(which[k]).value;
-    const auto combine = [&](const Wide<N>& X) {
-      ComplexVector<N> x(X.rows());
-      for (Eigen::Index row = 0; row < X.rows(); ++row) {
-        double real = 0, imag = 0;
-        for (Eigen::Index l = 0; l < b.size; ++l) {
-          real += X(row, b.first + l) * re[l];
-          imag += X(row, b.first + l) * im[l];
-        }
-        x[row] = Complex(real, imag);
-      }
-      return x;
-    };
-    const ComplexVector<N> Mu = combine(residual_.MU), Cu = combine(residual_.CU),
-                           Ku = combine(residual_.KU);
-    const double size = std::norm(mu) * M_norm_ + modulus(mu) * C_norm_ + K_norm_;
-    const double u_norm = mode.shapes[k].norm(), y_norm = mode.left_shapes[k].norm();
-    const double residual = (mu * mu * Mu + mu * Cu + Ku).norm();
-    const double slope = std::abs((mode.left_shapes[k].transpose() * (2.0 * mu * Mu + Cu)).value());
-    const double backward_error = residual / (size * u_norm);
-    mode.backward_error =
-        std::max(mode.backward_error, backward_error >= 0 ? backward_error : kInfinity);
-    mode.condition = std::max(mode.condition, y_norm * u_norm * size / (modulus(mu) * slope));
+  const bool in_order = root(i).value == mode.eigenvalues[0];
+  write_shape(in_order ? i : j, 0, mode);
+  if (mode.eigenvalues[0].imag() == 0) {
+    write_shape(in_order ? j : i, 1, mode);
+  } else {
+    mode.shapes[1] = mode.shapes[0].conjugate();
+    mode.left_shapes[1] = mode.left_shapes[0].conjugate();
   }
 }
 

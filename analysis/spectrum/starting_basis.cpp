@@ -97,6 +97,8 @@ class BasisFromEigenvectors {
   Eigen::Index n_, m_, c_;
   State<N> A_;
   double A_norm_ = 0, D_norm_ = 0, K_norm_ = 0;
+  /// Workspace of write_single; here, because it is filled with zeros first.
+  Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, N, N> shifted_;
   std::conditional_t<N == kDynamic, std::vector<Item>,
                      std::array<Item, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
       items_;
@@ -329,9 +331,9 @@ void BasisFromEigenvectors<N>::write_single(Complex value) {
     append_real(u, value.real());
     return;
   }
-  using ComplexSquare = Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, N, N>;
   ComplexVector<N> u = ComplexVector<N>::Ones(c_);
-  ComplexSquare Q(c_, c_);  // once: it is filled with zeros first
+  auto& Q = shifted_;
+  Q.resize(c_, c_);
   for (int k = 0; k < 3 && grants_inverse_iteration(c_, 2); ++k) {
     for (Eigen::Index j = 0; j < c_; ++j) {
       for (Eigen::Index i = 0; i < c_; ++i) {
