@@ -1,6 +1,6 @@
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
-#include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
+#include <dashpot/analysis/spectrum/mode_shapes.hpp>
 #include <dashpot/analysis/spectrum/modes.hpp>
 
 #include <algorithm>
@@ -19,54 +19,17 @@ struct PairedRoot : BlockRoot {
   bool used = false;  ///< of a zero mode
 };
 
-/// A vector in the columns of a block.
-template <int N>
-class BlockVector {
- public:
-  explicit BlockVector(const Block& block)
-      : first_(block.first), re_(StateVector<N>::Zero(block.size)), im_(re_) {}
-  void set(Eigen::Index i, const Complex& value) {
-    re_[i] = value.real();
-    im_[i] = value.imag();
-  }
-  /// Entry `row` of the combination of these columns of X.
-  Complex combine(const Wide<N>& X, Eigen::Index row) const {
-    double re = 0, im = 0;
-    for (Eigen::Index i = 0; i < re_.size(); ++i) {
-      re += X(row, first_ + i) * re_[i];
-      im += X(row, first_ + i) * im_[i];
-    }
-    return {re, im};
-  }
-
- private:
-  Eigen::Index first_;
-  StateVector<N> re_, im_;
-};
-
-/// Scales u, of this kinetic energy u^H M u, to 1, with its largest entry real and positive.
-template <int N>
-void normalize(double energy, ComplexVector<N>& u) {
-  Complex largest = 0;
-  for (const Complex& entry : u) largest = std::norm(entry) > std::norm(largest) ? entry : largest;
-  const Complex factor = std::conj(largest) / (modulus(largest) * std::sqrt(energy));
-  for (Complex& entry : u) entry = product(entry, factor);
-}
-
 template <int N>
 class ModeExtractor {
  public:
   ModeExtractor(const System<N>& system, const BasisResidual<N>& residual,
                 const BlockEnclosure<N>& enclosure, double soft_frequency, Spectrum<N>& spectrum)
-      : system_(system),
-        residual_(residual),
+      : residual_(residual),
         enclosure_(enclosure),
         basis_(spectrum.basis),
         spectrum_(spectrum),
-        soft_frequency_(soft_frequency),
-        M_norm_(system.mass.norm()),
-        C_norm_(system.damping.norm()),
-        K_norm_(system.stiffness.norm()) {}
+        shapes_(system, residual, spectrum.basis, spectrum.symmetric),
+        soft_frequency_(soft_frequency) {}
 
   void read() {
     list_roots();
@@ -87,16 +50,13 @@ class ModeExtractor {
 
   Invariants invariants(int i, int j) const;
   void write_shapes(int i, int j, Mode<N>& mode) const;
-  void write_shape(int i, std::size_t k, Mode<N>& mode) const;
-  BlockVector<N> eigenvector(int i, const State<N>& matrix) const;
-  ComplexVector<N> left_shape(int i) const;
 
-  const System<N>& system_;
   const BasisResidual<N>& residual_;
   const BlockEnclosure<N>& enclosure_;
   const ModalBasis<N>& basis_;
   Spectrum<N>& spectrum_;
-  double soft_frequency_, M_norm_, C_norm_, K_norm_;
+  ModeShapes<N> shapes_;
+  double soft_frequency_;
   std::conditional_t<N == kDynamic, std::vector<PairedRoot>,
                      std::array<PairedRoot, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
       roots_;
@@ -245,89 +205,16 @@ Invariants ModeExtractor<N>::invariants(int i, int j) const {
   return v;
 }
 
-/// Eigenvector of a block (of `matrix`, Lambda or Gamma) to the eigenvalue of root i.
-template <int N>
-BlockVector<N> ModeExtractor<N>::eigenvector(int i, const State<N>& matrix) const {
-  const Block& b = basis_.blocks[root(i).block];
-  const Complex mu = root(i).value;
-  BlockVector<N> w(b);
-  if (b.size == 1) {
-    w.set(0, 1);
-  } else if (b.size == 2) {
-    const Eigen::Index k = b.first;
-    const auto vector =
-        eigenvector_2x2(matrix(k, k), matrix(k, k + 1), matrix(k + 1, k), matrix(k + 1, k + 1), mu);
-    w.set(0, vector[0]);
-    w.set(1, vector[1]);
-  } else {
-    // Inverse iteration, kept where it grows most: near a defective eigenvalue a further step may
-    // well be worse (Wilkinson 1979).
-    const State<N> L = matrix.block(b.first, b.first, b.size, b.size);
-    ComplexVector<kTwice<N>> x = ComplexVector<kTwice<N>>::Ones(b.size);
-    double best = 0;
-    Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, kTwice<N>, kTwice<N>> shifted;
-    for (int k = 0; k < 3; ++k) {
-      shifted = L.template cast<Complex>();
-      shifted.diagonal().array() -= mu;
-      solve_in_place(shifted, x, kUnit * L.norm());
-      const double growth = x.stableNorm();
-      x /= growth;
-      if (!(growth > best)) continue;
-      best = growth;
-      for (int j = 0; j < b.size; ++j) w.set(j, x[j]);
-    }
-  }
-  return w;
-}
-
-/// Left eigenvector of root i in joint coordinates.
-template <int N>
-ComplexVector<N> ModeExtractor<N>::left_shape(int i) const {
-  const BlockVector<N> w = eigenvector(i, basis_.Gamma);
-  ComplexVector<N> y(basis_.Y.rows());
-  for (Eigen::Index row = 0; row < y.size(); ++row) y[row] = w.combine(basis_.Y, row);
-  const Vector<N> re = y.real(), im = y.imag();
-  normalize<N>(re.dot(system_.mass * re) + im.dot(system_.mass * im), y);
-  return y;
-}
-
-/// Writes the eigenvectors of root i as number k of the mode, and counts its errors. These do not
-/// depend on lengths, and so the sums are those of vectors as they come.
-template <int N>
-void ModeExtractor<N>::write_shape(int i, std::size_t k, Mode<N>& mode) const {
-  const Complex mu = root(i).value;
-  const BlockVector<N> w = eigenvector(i, basis_.Lambda);
-  ComplexVector<N>&u = mode.shapes[k], &y = mode.left_shapes[k];
-  u.resize(basis_.U.rows());
-  if (!spectrum_.symmetric) y = left_shape(i);
-  double energy = 0, length2 = 0, residual2 = 0;
-  Complex slope = 0;
-  for (Eigen::Index row = 0; row < u.size(); ++row) {
-    const Complex x = w.combine(basis_.U, row), Mx = w.combine(residual_.MU, row),
-                  Cx = w.combine(residual_.CU, row), Kx = w.combine(residual_.KU, row);
-    energy += x.real() * Mx.real() + x.imag() * Mx.imag();
-    length2 += std::norm(x);
-    residual2 += std::norm(product(mu, product(mu, Mx) + Cx) + Kx);
-    slope += product(spectrum_.symmetric ? x : y[row], product(2.0 * mu, Mx) + Cx);
-    u[row] = x;
-  }
-  const double length = std::sqrt(length2), left = spectrum_.symmetric ? length : y.norm();
-  const double size = std::norm(mu) * M_norm_ + modulus(mu) * C_norm_ + K_norm_;
-  const double backward_error = std::sqrt(residual2) / (size * length);
-  mode.backward_error =
-      std::max(mode.backward_error, backward_error >= 0 ? backward_error : kInfinity);
-  mode.condition = std::max(mode.condition, left * length * size / (modulus(mu) * modulus(slope)));
-  normalize<N>(energy, u);
-  if (spectrum_.symmetric) y = u;
-}
-
 template <int N>
 void ModeExtractor<N>::write_shapes(int i, int j, Mode<N>& mode) const {
   mode.backward_error = mode.condition = 0;
   const bool in_order = root(i).value == mode.eigenvalues[0];
-  write_shape(in_order ? i : j, 0, mode);
+  const auto write_shape = [&](int k, std::size_t which) {
+    shapes_.write(basis_.blocks[root(k).block], root(k).value, which, mode);
+  };
+  write_shape(in_order ? i : j, 0);
   if (mode.eigenvalues[0].imag() == 0) {
-    write_shape(in_order ? j : i, 1, mode);
+    write_shape(in_order ? j : i, 1);
   } else {
     mode.shapes[1] = mode.shapes[0].conjugate();
     mode.left_shapes[1] = mode.left_shapes[0].conjugate();
