@@ -48,8 +48,8 @@ WideDoubleDouble<N> times_blocks_extended(Left&& X, const ModalBasis<N>& basis) 
 }  // namespace
 
 template <int N>
-void evaluate_extended(const System<N>& system, const ModalBasis<N>& basis,
-                       BasisResidual<N>& residual) noexcept {
+void evaluate_extended(const System<N>& system, const ModalBasis<N>& basis, const Wide<N>& YG,
+                       Wide<N>& R, State<N>& gram) noexcept {
   const Eigen::Index n = system.dof();
   WideDoubleDouble<N> V = times_blocks_extended<N>(basis.U, basis);
   WideDoubleDouble<N> A = times_blocks_extended<N>(V, basis);
@@ -71,7 +71,7 @@ void evaluate_extended(const System<N>& system, const ModalBasis<N>& basis,
           t.add(u, system.damping_low(i, k));
         }
       }
-      residual.R(i, j) = row.value().high;
+      R(i, j) = row.value().high;
       momentum(i, j) = p.value();
       tested(i, j) = t.value();
     }
@@ -81,16 +81,16 @@ void evaluate_extended(const System<N>& system, const ModalBasis<N>& basis,
       DotAccumulator sum;
       for (Eigen::Index k = 0; k < n; ++k) {
         sum.add(tested(k, j), basis.Y(k, i));
-        sum.add(momentum(k, j), residual.YG(k, i));
+        sum.add(momentum(k, j), YG(k, i));
       }
-      residual.gram(i, j) = sum.value().high;
+      gram(i, j) = sum.value().high;
     }
   }
 }
 
 template void evaluate_extended(const System<kDynamic>&, const ModalBasis<kDynamic>&,
-                                BasisResidual<kDynamic>&) noexcept;
+                                const Wide<kDynamic>&, Wide<kDynamic>&, State<kDynamic>&) noexcept;
 template void evaluate_extended(const System<kMaxDof>&, const ModalBasis<kMaxDof>&,
-                                BasisResidual<kMaxDof>&) noexcept;
+                                const Wide<kMaxDof>&, Wide<kMaxDof>&, State<kMaxDof>&) noexcept;
 
 }  // namespace dashpot::analysis

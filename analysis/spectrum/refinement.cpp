@@ -186,7 +186,7 @@ double evaluate_products(const System<N>& system, bool extended, ModalBasis<N>& 
   residual.R.resize(basis.U.rows(), basis.U.cols());
   residual.gram.resize(basis.U.cols(), basis.U.cols());
   if (extended) {
-    evaluate_extended<N>(system, basis, residual);
+    evaluate_extended<N>(system, basis, residual.YG, residual.R, residual.gram);
   } else {
     const Wide<N> tested = residual.CU + residual.MV;
     multiply(residual.YT, tested, residual.gram);
