@@ -46,10 +46,10 @@ class ModeTracker {
   /// max_iterations that is not positive.
   explicit ModeTracker(const TrackerOptions& options = {});
 
-  /// Fills `out` and returns out.status: kOk or kUncertified if it has modes. Damping and mass are
-  /// read. stiffness_factor W is read if it has 1 to n rows: then K = W'W exactly, and neither
-  /// `stiffness` nor low words are read. Otherwise K = stiffness, which has to be positive definite
-  /// to be followed; a semidefinite K is solved directly on each call.
+  /// Fills `out` and returns out.status: kOk or kUncertified if it has modes. stiffness_factor W is
+  /// read if it has 1 to n rows: then K = W'W exactly, and neither `stiffness` nor low words are
+  /// read. Otherwise K = stiffness. Two kinds of systems are solved directly on each call: those
+  /// with neither factor nor positive definite K, and those with errors, which the bounds count.
   Status update(const System<kMaxDof>& system, TrackedSpectrum& out) noexcept {
     Work work;
     return update(system, out, work);

@@ -36,7 +36,7 @@ struct System {
 
   /// Optional entrywise bounds of |true coefficient - given coefficient|, low words included, none
   /// negative. No rows: exact. The proved bounds of a spectrum hold for every system within them,
-  /// symmetric or not. ModeTracker does not read them.
+  /// symmetric or not. Where one is not zero, ModeTracker solves directly on each call.
   Square<N> mass_error;
   Square<N> damping_error;
   Square<N> stiffness_error;

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/analysis/linalg/packed_matrix.hpp>
 #include <dashpot/analysis/types.hpp>
 
 #include <array>
@@ -40,6 +41,12 @@ template <typename Scalar>
 void subtract_multiple(Scalar* y, const Scalar* x, Scalar factor, Eigen::Index begin,
                        Eigen::Index end) noexcept {
   for (Eigen::Index i = begin; i < end; ++i) y[i] -= product(x[i], factor);
+}
+
+/// True if no entry is infinite or not a number. (Eigen's allFinite looks at one after the other.)
+template <typename Matrix>
+bool is_finite(const Matrix& X) noexcept {
+  return (0 * X.array()).sum() == 0;
 }
 
 /// Solves A X = B in place (X overwrites B, A is destroyed) by Gaussian elimination with partial
@@ -106,18 +113,24 @@ Eigen::Index farthest_axis(const Matrix& S) noexcept {
 namespace detail {
 
 /// Multiplies A B where the number of rows of A is known to the compiler, which then keeps a column
-/// of the result in registers.
+/// of the result in registers: in fours, as far as they go.
 template <int Rows>
 void multiply_rows(const double* A, Eigen::Index A_stride, Eigen::Index inner, const double* B,
                    Eigen::Index B_stride, Eigen::Index columns, double* out,
                    Eigen::Index out_stride) noexcept {
+  constexpr std::size_t kFours = Rows / 4, kRest = Rows % 4;
   for (Eigen::Index j = 0; j < columns; ++j) {
-    std::array<double, Rows> sum{};
+    std::array<Vec4d, kFours> sum{};
+    std::array<double, kRest> rest{};
     for (Eigen::Index k = 0; k < inner; ++k) {
       const double b = B[k + j * B_stride];
-      for (int i = 0; i < Rows; ++i) sum[static_cast<std::size_t>(i)] += A[i + k * A_stride] * b;
+      const double* const a = A + k * A_stride;
+      for (std::size_t i = 0; i < kFours; ++i) sum[i] += load(a + 4 * i) * b;
+      for (std::size_t i = 0; i < kRest; ++i) rest[i] += a[4 * kFours + i] * b;
     }
-    for (int i = 0; i < Rows; ++i) out[i + j * out_stride] = sum[static_cast<std::size_t>(i)];
+    double* const column = out + j * out_stride;
+    for (std::size_t i = 0; i < kFours; ++i) store(column + 4 * i, sum[i]);
+    for (std::size_t i = 0; i < kRest; ++i) column[4 * kFours + i] = rest[i];
   }
 }
 

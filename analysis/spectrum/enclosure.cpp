@@ -1,3 +1,4 @@
+#include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/enclosure.hpp>
 
 #include <algorithm>
@@ -24,8 +25,8 @@ void enclose(const BasisResidual<N>& residual, ModalBasis<N>& basis,
   const auto& blocks = basis.blocks;
   const int count = blocks.size();
   enclosure.reset(count);
-  if (!residual.F.allFinite()) return;
-  const bool provable = residual.F_error.allFinite();
+  if (!is_finite(residual.F)) return;
+  const bool provable = is_finite(residual.F_error);
   State<N> coupling2 = State<N>::Zero(count, count), separation = coupling2;
   StateVector<N> own(count), moved(count);
   for (int j = 0; j < count; ++j) {

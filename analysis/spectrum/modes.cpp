@@ -1,6 +1,6 @@
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
-#include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
+#include <dashpot/analysis/spectrum/mode_shapes.hpp>
 #include <dashpot/analysis/spectrum/modes.hpp>
 
 #include <algorithm>
@@ -24,15 +24,12 @@ class ModeExtractor {
  public:
   ModeExtractor(const System<N>& system, const BasisResidual<N>& residual,
                 const BlockEnclosure<N>& enclosure, double soft_frequency, Spectrum<N>& spectrum)
-      : system_(system),
-        residual_(residual),
+      : residual_(residual),
         enclosure_(enclosure),
         basis_(spectrum.basis),
         spectrum_(spectrum),
-        soft_frequency_(soft_frequency),
-        M_norm_(system.mass.norm()),
-        C_norm_(system.damping.norm()),
-        K_norm_(system.stiffness.norm()) {}
+        shapes_(system, residual, spectrum.basis, spectrum.symmetric),
+        soft_frequency_(soft_frequency) {}
 
   void read() {
     list_roots();
@@ -53,14 +50,13 @@ class ModeExtractor {
 
   Invariants invariants(int i, int j) const;
   void write_shapes(int i, int j, Mode<N>& mode) const;
-  ComplexVector<N> shape(int i, bool left, StateVector<N>& re, StateVector<N>& im) const;
 
-  const System<N>& system_;
   const BasisResidual<N>& residual_;
   const BlockEnclosure<N>& enclosure_;
   const ModalBasis<N>& basis_;
   Spectrum<N>& spectrum_;
-  double soft_frequency_, M_norm_, C_norm_, K_norm_;
+  ModeShapes<N> shapes_;
+  double soft_frequency_;
   std::conditional_t<N == kDynamic, std::vector<PairedRoot>,
                      std::array<PairedRoot, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
       roots_;
@@ -209,102 +205,19 @@ Invariants ModeExtractor<N>::invariants(int i, int j) const {
   return v;
 }
 
-/// Eigenvector of root i in joint coordinates, and its coefficients (re, im) in the block's
-/// columns.
-template <int N>
-ComplexVector<N> ModeExtractor<N>::shape(int i, bool left, StateVector<N>& re,
-                                         StateVector<N>& im) const {
-  const Block& b = basis_.blocks[root(i).block];
-  const Complex mu = root(i).value;
-  const auto& matrix = left ? basis_.Gamma : basis_.Lambda;
-  const State<N> L = matrix.block(b.first, b.first, b.size, b.size);
-  ComplexVector<kTwice<N>> w(b.size);
-  if (b.size == 1) {
-    w[0] = 1;
-  } else if (b.size == 2) {
-    const auto vector = eigenvector_2x2(L(0, 0), L(0, 1), L(1, 0), L(1, 1), mu);
-    w << vector[0], vector[1];
-  } else {
-    // Inverse iteration, kept where it grows most: near a defective eigenvalue a further step may
-    // well be worse (Wilkinson 1979).
-    ComplexVector<kTwice<N>> x = ComplexVector<kTwice<N>>::Ones(b.size);
-    double best = 0;
-    Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, kTwice<N>, kTwice<N>> shifted;
-    for (int k = 0; k < 3; ++k) {
-      shifted = L.template cast<Complex>();
-      shifted.diagonal().array() -= mu;
-      solve_in_place(shifted, x, kUnit * L.norm());
-      const double growth = x.stableNorm();
-      x /= growth;
-      if (growth > best) best = growth, w = x;
-    }
-  }
-  const auto& U = left ? basis_.Y : basis_.U;
-  const auto columns = U.middleCols(b.first, b.size);
-  re = w.real();
-  im = w.imag();
-  const Vector<N> x = columns.lazyProduct(re), y = columns.lazyProduct(im);
-  // Unit kinetic energy; largest entry real and positive.
-  double energy = 0;
-  if (left) {
-    energy = x.dot(system_.mass * x) + y.dot(system_.mass * y);
-  } else {
-    const auto momenta = residual_.MU.middleCols(b.first, b.size);
-    energy = x.dot(momenta.lazyProduct(re)) + y.dot(momenta.lazyProduct(im));
-  }
-  const double norm = std::sqrt(energy);
-  Eigen::Index largest = 0;
-  (x.cwiseAbs2() + y.cwiseAbs2()).maxCoeff(&largest);
-  const Complex pivot(x[largest], y[largest]);
-  const Complex factor = std::conj(pivot) / (modulus(pivot) * norm);
-  ComplexVector<N> u(x.size());
-  u.real() = factor.real() * x - factor.imag() * y;
-  u.imag() = factor.real() * y + factor.imag() * x;
-  w *= factor;
-  re = w.real();
-  im = w.imag();
-  return u;
-}
-
 template <int N>
 void ModeExtractor<N>::write_shapes(int i, int j, Mode<N>& mode) const {
   mode.backward_error = mode.condition = 0;
-  const std::array<int, 2> which =
-      root(i).value == mode.eigenvalues[0] ? std::array<int, 2>{i, j} : std::array<int, 2>{j, i};
-  for (std::size_t k = 0; k < 2; ++k) {
-    if (k == 1 && mode.eigenvalues[0].imag() != 0) {
-      mode.shapes[1] = mode.shapes[0].conjugate();
-      mode.left_shapes[1] = mode.left_shapes[0].conjugate();
-      break;
-    }
-    StateVector<N> re, im, unused_re, unused_im;
-    mode.shapes[k] = shape(which[k], false, re, im);
-    mode.left_shapes[k] =
-        spectrum_.symmetric ? mode.shapes[k] : shape(which[k], true, unused_re, unused_im);
-    const Block& b = basis_.blocks[root(which[k]).block];
-    const Complex mu = root(which[k]).value;
-    const auto combine = [&](const Wide<N>& X) {
-      ComplexVector<N> x(X.rows());
-      for (Eigen::Index row = 0; row < X.rows(); ++row) {
-        double real = 0, imag = 0;
-        for (Eigen::Index l = 0; l < b.size; ++l) {
-          real += X(row, b.first + l) * re[l];
-          imag += X(row, b.first + l) * im[l];
-        }
-        x[row] = Complex(real, imag);
-      }
-      return x;
-    };
-    const ComplexVector<N> Mu = combine(residual_.MU), Cu = combine(residual_.CU),
-                           Ku = combine(residual_.KU);
-    const double size = std::norm(mu) * M_norm_ + modulus(mu) * C_norm_ + K_norm_;
-    const double u_norm = mode.shapes[k].norm(), y_norm = mode.left_shapes[k].norm();
-    const double residual = (mu * mu * Mu + mu * Cu + Ku).norm();
-    const double slope = std::abs((mode.left_shapes[k].transpose() * (2.0 * mu * Mu + Cu)).value());
-    const double backward_error = residual / (size * u_norm);
-    mode.backward_error =
-        std::max(mode.backward_error, backward_error >= 0 ? backward_error : kInfinity);
-    mode.condition = std::max(mode.condition, y_norm * u_norm * size / (modulus(mu) * slope));
+  const bool in_order = root(i).value == mode.eigenvalues[0];
+  const auto write_shape = [&](int k, std::size_t which) {
+    shapes_.write(basis_.blocks[root(k).block], root(k).value, which, mode);
+  };
+  write_shape(in_order ? i : j, 0);
+  if (mode.eigenvalues[0].imag() == 0) {
+    write_shape(in_order ? j : i, 1);
+  } else {
+    mode.shapes[1] = mode.shapes[0].conjugate();
+    mode.left_shapes[1] = mode.left_shapes[0].conjugate();
   }
 }
 

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/spectrum/modes.hpp>
 #include <dashpot/analysis/spectrum/starting_basis.hpp>
@@ -27,7 +28,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 template <int N>
 Status check(const System<N>& system) {
-  if (!system.mass.allFinite() || !system.damping.allFinite() || !system.stiffness.allFinite()) {
+  if (!is_finite(system.mass) || !is_finite(system.damping) || !is_finite(system.stiffness)) {
     return Status::kNotFinite;
   }
   return system.mass == system.mass.transpose() ? Status::kOk : Status::kNotSymmetric;
@@ -52,7 +53,7 @@ std::int64_t reading_work(Eigen::Index n, const BlockList<N>& blocks) {
 template <int N>
 bool computable(const EnergyForm<N>& form) {
   constexpr double kSlowest = 1e-100;  // rad/s
-  if (!form.damping.allFinite() || !form.stiffness.allFinite()) return false;
+  if (!is_finite(form.damping) || !is_finite(form.stiffness)) return false;
   const double rate = form.damping.cwiseAbs().sum() + std::sqrt(form.stiffness.cwiseAbs().sum());
   return rate == 0 || rate >= kSlowest;
 }
@@ -78,7 +79,7 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work&
   }
   const Square<N> L = system.dof() > 0 ? Square<N>(cholesky.matrixL()) : Square<N>(0, 0);
   out.zero_modes = find_zero_modes<N>(system, L);
-  if (!std::isfinite(out.zero_modes.floor) || !out.zero_modes.coordinates.allFinite()) {
+  if (!std::isfinite(out.zero_modes.floor) || !is_finite(out.zero_modes.coordinates)) {
     return out.status = Status::kOverflow;
   }
   const EnergyForm<N> form = to_energy_form<N>(system, out.zero_modes);
@@ -104,7 +105,7 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work&
       out.modes.resize(0);
       return out.status = Status::kUnfinished;
     }
-    if (!out.basis.Lambda.allFinite() || !out.basis.U.allFinite()) {
+    if (!is_finite(out.basis.Lambda) || !is_finite(out.basis.U)) {
       out.modes.resize(0);
       return out.status = Status::kOverflow;
     }

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 
 namespace dashpot::analysis {
@@ -66,23 +67,41 @@ bool sizes_agree(const System<kMaxDof>& system) {
   const auto is_square = [n](const auto& matrix) {
     return matrix.rows() == n && matrix.cols() == n;
   };
-  return is_square(system.mass) && is_square(system.damping) &&
+  const auto is_bound = [&](const auto& matrix) { return matrix.size() == 0 || is_square(matrix); };
+  return is_square(system.mass) && is_square(system.damping) && is_bound(system.mass_error) &&
+         is_bound(system.damping_error) && is_bound(system.stiffness_error) &&
          (factored ? system.stiffness_factor.cols() == n : is_square(system.stiffness));
 }
 
-/// K = W'W with about 32 digits: the stiffness and its low word.
+/// Whether coefficients are given with errors, which the bounds of a tracked basis do not count.
+bool has_errors(const System<kMaxDof>& system) {
+  return !system.mass_error.isZero(0) || !system.damping_error.isZero(0) ||
+         !system.stiffness_error.isZero(0);
+}
+
+/// K = W'W with about 32 digits: the stiffness, its low word, and what these lack as an error.
 void form_stiffness(System<kMaxDof>& system) {
   const auto& W = system.stiffness_factor;
   const Eigen::Index n = system.dof();
+  // Products are exact, sums within 3 u^2 of partial sums no longer than those of absolute values.
+  constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
+  const double loss = 4 * static_cast<double>(W.rows()) * kUnit * kUnit;
+  if (system.stiffness_error.size() == 0) system.stiffness_error.setZero(n, n);
   system.stiffness.resize(n, n);
   system.stiffness_low.resize(n, n);
   system.damping_low.setZero(n, n);
   for (Eigen::Index j = 0; j < n; ++j) {
     for (Eigen::Index i = 0; i <= j; ++i) {
       DotAccumulator sum;
-      for (Eigen::Index k = 0; k < W.rows(); ++k) sum.add(W(k, i), W(k, j));
+      double size = 0;
+      for (Eigen::Index k = 0; k < W.rows(); ++k) {
+        sum.add(W(k, i), W(k, j));
+        size += std::abs(W(k, i) * W(k, j));
+      }
       system.stiffness(i, j) = system.stiffness(j, i) = sum.value().high;
       system.stiffness_low(i, j) = system.stiffness_low(j, i) = sum.value().low;
+      system.stiffness_error(i, j) += loss * size;
+      if (i != j) system.stiffness_error(j, i) += loss * size;
     }
   }
   system.has_low_words = true;
@@ -142,7 +161,8 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
   }
   const SymmetricPencil pencil = symmetric_pencil(system), last = symmetric_pencil(last_);
   if (!same_form(pencil, last)) state_ = State::kEmpty;
-  if (state_ >= State::kCurrent && identical(pencil, last)) {
+  const bool exact = !has_errors(system);
+  if (exact && state_ >= State::kCurrent && identical(pencil, last)) {
     if (state_ == State::kCurrent) {
       read_numbers(basis_, enclosure_, options_.soft_frequency, soft_, kept_);
       publish(pencil, SpectrumOrigin::kReused, kept_);
@@ -154,7 +174,7 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
   }
   const bool symmetric = is_symmetric(system.mass) && is_symmetric(system.damping) &&
                          (pencil.factored || is_symmetric(system.stiffness));
-  if (symmetric && follows() && follow(pencil, out, work)) {
+  if (symmetric && exact && follows() && follow(pencil, out, work)) {
     last_.mass = system.mass;
     last_.damping = system.damping;
     if (pencil.factored) {
@@ -247,7 +267,7 @@ void ModeTracker::solve_directly(const System<kMaxDof>& system, const SymmetricP
   }
   out.status = solver_.solve(last_, spectrum_, work);
   if (!has_modes(out.status) || !work.take(restart_work(pencil.joints))) return;
-  if (!symmetric || pencil.joints == 0 || !restart(pencil, out, work)) {
+  if (!symmetric || has_errors(system) || pencil.joints == 0 || !restart(pencil, out, work)) {
     publish_direct(pencil, symmetric, out);
   }
 }

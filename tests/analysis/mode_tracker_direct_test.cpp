@@ -1,4 +1,5 @@
 // Systems that the tracker does not follow, but solves directly, and modes without a motion.
+#include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/tracked.hpp>
 
@@ -12,6 +13,7 @@
 namespace dashpot::analysis {
 namespace {
 
+using testing::Random;
 using testing::Tracked;
 
 /// The modes turn into each other's places within 90 degrees; each solution is compared with the
@@ -163,6 +165,90 @@ TEST(ModeTracker, SolvesASingularStiffnessWithoutFactorDirectly) {
     EXPECT_EQ(tracked.spectrum->zero_mode_count, 1);
     EXPECT_NEAR(tracked.mode(0).natural_frequency, std::sqrt(8.0), 1e-14);
   }
+}
+
+/// Bounds hold for every system within the errors, on a system's first call and on later ones,
+/// whether coefficients change or are the same to the last bit.
+TEST(ModeTracker, CountsTheErrorsOfCoefficients) {
+  Random random(2310);
+  for (const int which : {0, 1, 2}) {
+    for (const bool factored : {false, true}) {
+      SCOPED_TRACE(std::to_string(which) + (factored ? " with factor" : ""));
+      System<kMaxDof> system(3);
+      const Eigen::MatrixXd W = 20 * random.matrix(3, 3) + 50 * Eigen::MatrixXd::Identity(3, 3);
+      system.mass = random.spd(3);
+      system.damping = 5 * random.spd(3);
+      system.stiffness = W.transpose() * W;
+      system.stiffness = (0.5 * (system.stiffness + system.stiffness.transpose())).eval();
+      if (factored) system.stiffness_factor = W;
+      Tracked tracked;
+      ASSERT_EQ(tracked.update(system), Status::kOk);  // so that there is a basis to follow
+      System<kMaxDof> other = system;
+      const auto disturb = [](const Square<kMaxDof>& given, Square<kMaxDof>& error,
+                              Square<kMaxDof>& truth) {
+        error = 1e-6 * given.cwiseAbs();
+        truth = given + 0.99e-6 * given;
+      };
+      if (which == 0) disturb(system.mass, system.mass_error, other.mass);
+      if (which == 1) disturb(system.damping, system.damping_error, other.damping);
+      if (which == 2) disturb(system.stiffness, system.stiffness_error, other.stiffness);
+      other.stiffness_factor.resize(0, 3);
+      Tracked truth;
+      ASSERT_EQ(truth.update(other), Status::kOk);
+      for (int call = 0; call < 3; ++call) {
+        if (call == 2) system.damping(0, 0) *= 1 + 1e-12;
+        ASSERT_EQ(tracked.update(system), Status::kOk);
+        EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kDirect);
+        double most = 0;
+        for (int i = 0; i < 3; ++i) {
+          const ModeNumbers &mode =
+                                tracked.mode(tracked.spectrum->order[static_cast<std::size_t>(i)]),
+                            &exact = truth.mode(truth.spectrum->order[static_cast<std::size_t>(i)]);
+          const double moved = std::abs(mode.eigenvalues[0] - exact.eigenvalues[0]);
+          EXPECT_LE(moved, mode.error_bound + exact.error_bound) << call;
+          most = std::max(most, moved / mode.error_bound);
+        }
+        EXPECT_GT(most, 1e-3) << "bounds without meaning";
+      }
+    }
+  }
+  System<kMaxDof> wrong(3);
+  wrong.mass_error = Eigen::MatrixXd::Ones(2, 2);
+  EXPECT_EQ(Tracked().update(wrong), Status::kWrongSize);
+}
+
+/// What W'W loses beyond double-doubles is in the bounds of a direct solution: these are wider than
+/// those of the rounded K and its low word.
+TEST(ModeTracker, CountsWhatTheProductOfItsFactorLacks) {
+  System<kMaxDof> system(2);
+  system.stiffness_factor.resize(2, 2);
+  system.stiffness_factor << 1.1, 1.3, 0, 1e-10;
+  system.damping << 1e-12, 1e-13, -1e-13, 2e-12;  // not symmetric, and so never followed
+  TrackerOptions options;
+  options.soft_frequency = 0;
+  Tracked tracked(options);
+  ASSERT_EQ(tracked.update(system), Status::kOk);
+  ASSERT_EQ(tracked.spectrum->mode_count, 2);
+  System<kMaxDof> rounded = system;
+  rounded.damping_low.setZero(2, 2);
+  rounded.stiffness_low.setZero(2, 2);
+  rounded.has_low_words = true;
+  const auto& W = system.stiffness_factor;
+  for (const auto& [i, j] : {std::pair{0, 0}, {0, 1}, {1, 0}, {1, 1}}) {
+    DotAccumulator sum;
+    for (int k = 0; k < 2; ++k) sum.add(W(k, std::min(i, j)), W(k, std::max(i, j)));
+    rounded.stiffness(i, j) = sum.value().high;
+    rounded.stiffness_low(i, j) = sum.value().low;
+  }
+  SpectrumOptions direct;
+  direct.soft_frequency = 0;
+  SpectrumSolver<kMaxDof> solver(direct);
+  const auto spectrum = std::make_unique<Spectrum<kMaxDof>>();
+  ASSERT_EQ(solver.solve(rounded, *spectrum), Status::kOk);
+  ASSERT_TRUE(spectrum->extended);
+  const ModeNumbers& slow = tracked.mode(tracked.spectrum->order[1]);
+  EXPECT_EQ(slow.eigenvalues[0], spectrum->modes[1].eigenvalues[0]);
+  EXPECT_GT(slow.error_bound, 1.01 * spectrum->modes[1].error_bound);
 }
 
 }  // namespace

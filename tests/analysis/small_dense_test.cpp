@@ -19,6 +19,30 @@ using testing::Random;
 
 constexpr double kTiny = std::numeric_limits<double>::min();
 
+TEST(Multiply, AgreesWithEigen) {
+  Random random(804);
+  for (int n = 0; n <= 2 * kMaxDof + 1; ++n) {
+    const MatrixXd A = random.matrix(n, 5), B = random.matrix(5, 7);
+    MatrixXd out;
+    multiply(A, B, out);
+    EXPECT_TRUE(near(out, A * B, 1e-14)) << "n = " << n;
+  }
+}
+
+TEST(IsFinite, LooksAtEveryEntry) {
+  for (const double value :
+       {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
+        std::numeric_limits<double>::quiet_NaN()}) {
+    for (Eigen::Index i = 0; i < 15; ++i) {
+      MatrixXd X = MatrixXd::Constant(5, 3, std::numeric_limits<double>::max());
+      EXPECT_TRUE(is_finite(X));
+      X(i) = value;
+      EXPECT_FALSE(is_finite(X)) << i;
+    }
+  }
+  EXPECT_TRUE(is_finite(MatrixXd(0, 0)));
+}
+
 TEST(SolveInPlace, AgreesWithEigen) {
   Random random(801);
   for (int n = 0; n <= 20; ++n) {

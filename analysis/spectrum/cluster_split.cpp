@@ -1,0 +1,144 @@
+#include <dashpot/analysis/linalg/small_dense.hpp>
+#include <dashpot/analysis/spectrum/cluster_split.hpp>
+
+#include <cmath>
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+/// A cluster is split into eigenvectors if their matrix has a condition number below this.
+constexpr double kSeparable = 1e4;
+/// Eigenvalues this close together (relative) coincide.
+constexpr double kCoinciding = 1e-13;
+
+/// Adds blocks of `step` columns for as many columns as `split` has.
+template <int N>
+void add_blocks(int step, SplitCluster<N>& split) {
+  for (int k = 0; k < split.columns.cols(); k += step) split.blocks.push_back({k, step, false});
+}
+
+/// Eigenvalues that coincide; false if they do not, or are defective.
+template <int N>
+bool split_coinciding(const State<N>& small, Complex mean, SplitCluster<N>& split) {
+  const Eigen::Index size = small.rows();
+  const double a = mean.real(), b = mean.imag(), tolerance = kCoinciding * modulus(mean);
+  State<N> J = small;
+  J.diagonal().array() -= a;
+  if (b == 0) {
+    if (J.norm() > tolerance) return false;
+    split.columns.setIdentity(size, size);
+    split.Lambda = a * split.columns;
+    add_blocks(1, split);
+    return true;
+  }
+  // J = (small - a) / b has J^2 = -1: directions (e, -J e) move with [a b; -b a].
+  J /= b;
+  State<N> J2 = J * J;
+  J2.diagonal().array() += 1;
+  if (J2.norm() * b > tolerance) return false;
+  State<N> done(size, 0);
+  split.columns.resize(size, size);
+  split.Lambda = a * State<N>::Identity(size, size);
+  for (Eigen::Index k = 0; k < size; k += 2) {
+    const Eigen::Index farthest = farthest_axis(done);
+    done.conservativeResize(size, k + 2);
+    done.col(k) = StateVector<N>::Unit(size, farthest);
+    done.col(k + 1) = J * done.col(k);
+    orthonormalize(done);
+    split.columns.col(k) = done.col(k);
+    split.columns.col(k + 1) = -(J * done.col(k));
+    split.Lambda(k, k + 1) = b;
+    split.Lambda(k + 1, k) = -b;
+  }
+  add_blocks(2, split);
+  return true;
+}
+
+/// Single eigenvalues; false unless their vectors are well apart.
+template <int N>
+bool split_apart(const State<N>& small, const ComplexStateVector<N>& values,
+                 SplitCluster<N>& split) {
+  const Eigen::Index size = small.rows();
+  State<N>& W = split.columns;
+  W.resize(size, size);
+  Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kTwice<N>, kTwice<N>>
+      shifted;  // once: it is filled with zeros first
+  int column = 0;
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    ComplexStateVector<N> w = ComplexStateVector<N>::Ones(size);
+    for (Eigen::Index k = 0; k < size; ++k) w[k] += 0.1 * static_cast<double>(k * (i + 1));
+    for (int k = 0; k < 3; ++k) {
+      shifted = small.template cast<Complex>();
+      shifted.diagonal().array() -= values[i];
+      solve_in_place(shifted, w, kEps * small.norm());
+      w /= w.stableNorm();
+    }
+    const int step = values[i].imag() > 0 ? 2 : 1;
+    split.blocks.push_back({column, step, false});
+    W.col(column) = w.real();
+    if (step == 2) W.col(column + 1) = w.imag();
+    column += step;
+  }
+  State<N> factor = W, inverse = State<N>::Identity(size, size);
+  solve_in_place(factor, inverse, std::numeric_limits<double>::min());
+  split.Lambda = inverse * small * W;
+  return W.norm() * inverse.norm() < kSeparable;
+}
+
+}  // namespace
+
+template <int N>
+State<N> invariant_subspace(const State<N>& A, Complex mean, bool near_axis, Eigen::Index size,
+                            int steps, Work& work) noexcept {
+  const Eigen::Index states = A.rows();
+  State<N> shift;
+  if (near_axis) {
+    shift = A;
+    shift.diagonal().array() -= mean.real();
+  } else {
+    shift.noalias() = A * A;
+    shift -= 2 * mean.real() * A;
+    shift.diagonal().array() += std::norm(mean);
+  }
+  State<N> S(states, size);
+  for (Eigen::Index j = 0; j < size; ++j) {
+    for (Eigen::Index i = 0; i < states; ++i) {
+      S(i, j) = std::cos(static_cast<double>((i + 1) * (2 * j + 3)));  // any full-rank start
+    }
+  }
+  const std::int64_t step_work = cubed(states, 2) + squared(states, 20) +
+                                 size * (squared(states, 5) + 18 * size * states + 200);
+  for (int k = 0; k < steps && work.take(step_work); ++k) {
+    State<N> factor = shift;
+    solve_in_place(factor, S, kEps * shift.norm());
+    orthonormalize(S);
+  }
+  return S;
+}
+
+template <int N>
+SplitCluster<N> split_cluster(const State<N>& small, const ComplexStateVector<N>& values,
+                              Complex mean) noexcept {
+  SplitCluster<N> split;
+  if (split_coinciding<N>(small, mean, split) || split_apart<N>(small, values, split)) return split;
+  split.columns.setIdentity(small.rows(), small.cols());
+  split.Lambda = small;
+  split.blocks.clear();
+  add_blocks(static_cast<int>(small.cols()), split);
+  return split;
+}
+
+template State<kDynamic> invariant_subspace<kDynamic>(const State<kDynamic>&, Complex, bool,
+                                                      Eigen::Index, int, Work&) noexcept;
+template State<kMaxDof> invariant_subspace<kMaxDof>(const State<kMaxDof>&, Complex, bool,
+                                                    Eigen::Index, int, Work&) noexcept;
+template SplitCluster<kDynamic> split_cluster<kDynamic>(const State<kDynamic>&,
+                                                        const ComplexStateVector<kDynamic>&,
+                                                        Complex) noexcept;
+template SplitCluster<kMaxDof> split_cluster<kMaxDof>(const State<kMaxDof>&,
+                                                      const ComplexStateVector<kMaxDof>&,
+                                                      Complex) noexcept;
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,101 @@
+#include <dashpot/analysis/linalg/hessenberg_qr.hpp>
+#include <dashpot/analysis/spectrum/cluster_split.hpp>
+#include <dashpot/analysis/spectrum/core_eigenvalues.hpp>
+
+#include <cmath>
+#include <limits>
+
+namespace dashpot::analysis {
+namespace {
+
+constexpr double kEps = std::numeric_limits<double>::epsilon();
+
+}  // namespace
+
+template <int N>
+CoreEigenvalues<N>::CoreEigenvalues(const EnergyForm<N>& form,
+                                    const ZeroModes<N>& zero_modes) noexcept
+    : coupled_zeros_(form.coupled_zeros), m_(form.modes), c_(form.core()) {
+  A_.setZero(m_ + c_, m_ + c_);
+  for (Eigen::Index i = 0; i < m_; ++i) {
+    const double omega = std::sqrt(std::abs(zero_modes.stiffness_values[i]));
+    A_(i, m_ + i) = omega;
+    if (form.symmetric) {
+      A_(m_ + i, i) = -std::copysign(omega, zero_modes.stiffness_values[i]);
+    } else {
+      A_.col(i).tail(c_) = -form.stiffness.col(i).head(c_) / omega;
+    }
+  }
+  A_.bottomRightCorner(c_, c_) = -form.damping.topLeftCorner(c_, c_);
+  A_norm_ = A_.norm();
+}
+
+/// Eigenvalues, and their clusters: connected components of "near each other".
+template <int N>
+bool CoreEigenvalues<N>::find_items(double cluster, Work& work) noexcept {
+  const Eigen::Index size = A_.rows();
+  ComplexStateVector<N> values(size);
+  if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(size));
+  if (!work.take(cubed(size, 9) + squared(size, 20))) return false;
+  State<N> H = A_;
+  reduce_to_hessenberg(H);
+  if (!hessenberg_eigenvalues(H, values.data(), work)) return false;
+  size_ = 0;
+  for (const Complex& value : values) {
+    if (value.imag() < 0) continue;
+    const int i = size_++;
+    item(i) = {value, i, false};
+    for (int j = 0; j < i; ++j) {
+      const double larger = std::max(modulus(value), modulus(item(j).value));
+      if (modulus(value - item(j).value) > cluster * larger) continue;
+      const int from = item(i).cluster, to = item(j).cluster;
+      for (int k = 0; k <= i; ++k) {
+        if (item(k).cluster == from) item(k).cluster = to;
+      }
+    }
+  }
+  return true;
+}
+
+/// Eigenvector of A to a real eigenvalue.
+template <int N>
+StateVector<N> CoreEigenvalues<N>::vector(double value, Work& work) const noexcept {
+  State<N> shifted;
+  return inverse_iteration(shifted, A_.rows(), kEps * A_norm_,
+                           std::numeric_limits<double>::infinity(), work, [&] {
+                             shifted = A_;
+                             shifted.diagonal().array() -= value;
+                           });
+}
+
+/// Of the real eigenvalues, marks those whose motion is mostly that of a coupled zero mode.
+template <int N>
+void CoreEigenvalues<N>::mark_zero_rates(Work& work) noexcept {
+  if (coupled_zeros_ == 0) return;
+  StateVector<N> score = StateVector<N>::Constant(size_, -1);  // -1: not eligible
+  for (int i = 0; i < size_; ++i) {
+    if (item(i).value.imag() != 0) continue;
+    const StateVector<N> z = vector(item(i).value.real(), work);
+    const double kinetic = z.tail(c_).squaredNorm();  // of a total energy of 1
+    // Velocities of zero modes have more kinetic than elastic energy.
+    score[i] = z.tail(c_ - m_).squaredNorm() / kinetic + (kinetic > 0.5 ? 1 : 0);
+  }
+  for (int wanted = coupled_zeros_; wanted > 0; --wanted) {
+    Eigen::Index best = 0;
+    if (score.maxCoeff(&best) < 0) return;
+    item(static_cast<int>(best)).zero_rate = true;
+    score[best] = -1;
+  }
+}
+
+template <int N>
+bool CoreEigenvalues<N>::find(double cluster, Work& work) noexcept {
+  if (!find_items(cluster, work)) return false;
+  mark_zero_rates(work);
+  return true;
+}
+
+template class CoreEigenvalues<kDynamic>;
+template class CoreEigenvalues<kMaxDof>;
+
+}  // namespace dashpot::analysis

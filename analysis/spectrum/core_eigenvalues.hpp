@@ -1,0 +1,78 @@
+#pragma once
+#include <dashpot/analysis/linalg/small_dense.hpp>
+#include <dashpot/analysis/system/energy_form.hpp>
+#include <dashpot/analysis/work.hpp>
+
+#include <array>
+#include <type_traits>
+#include <vector>
+
+namespace dashpot::analysis {
+
+/// Inverse iteration u <- Q^-1 u, normalised, from a vector of n ones. `form` sets Q, which is
+/// singular to rounding, so that a good step grows u by about 1 / (eps |Q|). It ends with a step
+/// that grows u by more than `good`, after three steps, or where `work` does.
+template <typename Matrix, typename Form>
+auto inverse_iteration(Matrix& Q, Eigen::Index n, double least_pivot, double good, Work& work,
+                       const Form& form) {
+  using Scalar = typename Matrix::Scalar;
+  constexpr int kFactor = std::is_same_v<Scalar, Complex> ? 2 : 1;
+  Eigen::Matrix<Scalar, Eigen::Dynamic, 1, Eigen::ColMajor, Matrix::MaxRowsAtCompileTime, 1> u(n);
+  u.setOnes();
+  for (int k = 0; k < 3; ++k) {
+    if (!work.take(kFactor * (cubed(n, 2) + squared(n, 24) + 60 * n) + 2500)) break;
+    form();
+    solve_in_place(Q, u, least_pivot);
+    const double growth = u.norm();
+    u /= growth;
+    if (growth > good) break;
+  }
+  return u;
+}
+
+/// An eigenvalue of the core; a complex pair is represented by its upper half.
+struct CoreEigenvalue {
+  Complex value;
+  int cluster = 0;         ///< shared by eigenvalues that are close together
+  bool zero_rate = false;  ///< the velocity of a coupled zero mode
+};
+
+/// Eigenvalues of the core of an energy form: the nonzero modes, and the zero modes that the
+/// damping couples to them.
+template <int N>
+class CoreEigenvalues {
+ public:
+  /// Forms A = [0 G; -G' -D], the time derivative of [elastic coordinates; velocities].
+  CoreEigenvalues(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes) noexcept;
+
+  /// Finds the eigenvalues by QR iteration, and their clusters: those within the relative distance
+  /// `cluster` of each other, directly or by way of others. Returns false if the iteration fails or
+  /// `work` does not grant it.
+  bool find(double cluster, Work& work) noexcept;
+
+  int size() const { return size_; }
+  const CoreEigenvalue& operator[](int i) const { return items_[static_cast<std::size_t>(i)]; }
+
+  const State<N>& matrix() const { return A_; }
+  double norm() const { return A_norm_; }  ///< of A, Frobenius
+
+  /// Returns the eigenvector of A to a real eigenvalue, of unit length.
+  StateVector<N> vector(double value, Work& work) const noexcept;
+
+ private:
+  CoreEigenvalue& item(int i) { return items_[static_cast<std::size_t>(i)]; }
+  bool find_items(double cluster, Work& work) noexcept;
+  void mark_zero_rates(Work& work) noexcept;
+
+  int coupled_zeros_;
+  Eigen::Index m_, c_;
+  State<N> A_;
+  double A_norm_ = 0;
+  std::conditional_t<
+      N == kDynamic, std::vector<CoreEigenvalue>,
+      std::array<CoreEigenvalue, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
+      items_;
+  int size_ = 0;
+};
+
+}  // namespace dashpot::analysis
