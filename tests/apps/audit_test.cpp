@@ -33,7 +33,6 @@ struct Published {
 TEST(Audit, ReproducesWhatIsKnownOfPublicControllers) {
   const std::vector<Published> all = {{"libfranka", {0.39, 0.45, 0.51}, -956},
                                       {"cartesian_impedance_controller", {0.34, 0.45, 0.50}, -1351},
-                                      {"franky", {0.37, 0.45, 0.51}, 0},
                                       {"deoxys", {0.25, 0.42, 1.0}, 0}};
   for (const Published& one : all) {
     const Json found = audit_json({"--preset", one.preset});

@@ -17,7 +17,7 @@
 namespace dashpot::controller {
 namespace {
 
-using LongMatrix = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
+using LongRows = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
 
 const Vector6 kTranslationFirst = (Vector6() << 200, 200, 200, 20, 20, 20).finished();
 
@@ -43,15 +43,15 @@ AuditOptions stated(const Vector6& stiffness, double factor) {
 }
 
 /// The closed loop of task gains as matrices, in long double.
-struct Loop {
-  LongMatrix M, C, K;
+struct TaskLoop {
+  LongRows M, C, K;
 };
 
-Loop loop_at(const RobotModel& model, const JointVector& q, const Matrix6& stiffness,
-             const Matrix6& damping) {
+TaskLoop loop_at(const RobotModel& model, const JointVector& q, const Matrix6& stiffness,
+                 const Matrix6& damping) {
   const DynamicsResult robot = evaluate(model, q, JointVector::Zero(q.size()));
-  const LongMatrix J = Eigen::MatrixXd(robot.J).cast<long double>();
-  Loop loop;
+  const LongRows J = Eigen::MatrixXd(robot.J).cast<long double>();
+  TaskLoop loop;
   loop.M = Eigen::MatrixXd(robot.M).cast<long double>();
   loop.K = J.transpose() * Eigen::MatrixXd(stiffness).cast<long double>() * J;
   loop.C = J.transpose() * Eigen::MatrixXd(damping).cast<long double>() * J;
@@ -61,14 +61,14 @@ Loop loop_at(const RobotModel& model, const JointVector& q, const Matrix6& stiff
 }
 
 /// Smallest ratio of the complex eigenvalues, and the smallest real part.
-PostureNumbers numbers_of(const Loop& loop) {
+PostureNumbers numbers_of(const TaskLoop& loop) {
   const Eigen::Index n = loop.M.rows();
-  LongMatrix A = LongMatrix::Zero(2 * n, 2 * n);
+  LongRows A = LongRows::Zero(2 * n, 2 * n);
   A.topRightCorner(n, n).setIdentity();
-  const Eigen::PartialPivLU<LongMatrix> mass(loop.M);
+  const Eigen::PartialPivLU<LongRows> mass(loop.M);
   A.bottomLeftCorner(n, n) = -mass.solve(loop.K);
   A.bottomRightCorner(n, n) = -mass.solve(loop.C);
-  const Eigen::EigenSolver<LongMatrix> solver(A, false);
+  const Eigen::EigenSolver<LongRows> solver(A, false);
   PostureNumbers numbers;
   numbers.smallest_ratio = numbers.fastest_pole = std::numeric_limits<double>::infinity();
   for (const std::complex<long double> value : solver.eigenvalues()) {
@@ -136,7 +136,7 @@ TEST(Audit, ScalesGainsByTheInertiaOfTheTip) {
 
 /// Runs the sampled loop with `factor` times the gains, and returns the largest deflection of the
 /// last ticks over that of those before.
-double growth(const Loop& loop, const AuditOptions& options, double factor) {
+double growth(const TaskLoop& loop, const AuditOptions& options, double factor) {
   const Eigen::Index n = loop.M.rows();
   const Eigen::MatrixXd M = loop.M.cast<double>(), K = factor * loop.K.cast<double>(),
                         C = factor * loop.C.cast<double>();
@@ -178,7 +178,7 @@ TEST(Audit, FindsTheMarginAtWhichASampledLoopStartsToGrow) {
     options.difference_velocity = slow;
     const Audit audit(model, options);
     const double margin = audit.numbers(home()).gain_margin;
-    const Loop loop =
+    const TaskLoop loop =
         loop_at(model, home(), options.gains.task_stiffness, options.gains.task_damping);
     EXPECT_LT(growth(loop, options, 0.995 * margin), 1) << margin;
     EXPECT_GT(growth(loop, options, 1.005 * margin), 1) << margin;
