@@ -107,6 +107,15 @@ def test_the_closed_loop_is_made_of_springs_and_dampers(panda):
     held = dashpot.closed_loop(panda, HOME, task_stiffness=TASK["task_stiffness"],
                                task_damping_ratio=0.7)
     np.testing.assert_allclose(held.modes.damping_ratio[:6], 0.7, atol=0.05)  # and friction
+    R = np.kron(np.eye(2), panda.pose(HOME)[:3, :3])
+    tool = dashpot.closed_loop(panda, HOME, **TASK, frame="tool")
+    np.testing.assert_allclose(
+        tool.stiffness, J.T @ R @ np.diag(TASK["task_stiffness"]) @ R.T @ J, atol=1e-9)
+    position = dashpot.closed_loop(panda, HOME, **TASK, directions=["x", "y", "z"])
+    np.testing.assert_allclose(position.stiffness, 200 * J[:3].T @ J[:3], atol=1e-9)
+    assert len(position.modes) == 3 and len(position.modes.zero_modes) == 4
+    pushed = dashpot.closed_loop(panda, HOME, **TASK, external_wrench=[0, 0, -50, 0, 0, 0])
+    assert np.abs(pushed.stiffness - found.stiffness).max() > 1
     N = np.eye(7) - np.linalg.solve(panda.mass(HOME), J.T) @ np.linalg.solve(
         J @ np.linalg.solve(panda.mass(HOME), J.T), J)
     posture = dashpot.closed_loop(panda, HOME, **TASK, null_stiffness=[5.0] * 7)
