@@ -36,8 +36,8 @@ TEST_P(EveryScene, RunsWithoutAnOverrunAndAccountsForItsEnergy) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          ::testing::Values("panda", "panda_release_c1", "panda_release_c2",
-                                           "panda_release_ratio_damping", "iiwa14", "ur5", "baxter_left",
-                                           "chain3"));
+                                           "panda_release_ratio_damping", "iiwa14", "ur5",
+                                           "baxter_left", "chain3"));
 
 TEST(Scenes, AreAllTested) {
   std::size_t files = 0;
