@@ -205,17 +205,25 @@ TEST(Audit, FindsPoleAndMarginOfOneJoint) {
   EXPECT_EQ(found.zero_modes, 0);
 }
 
+/// With springs and dampers that are the same for all joints, the self-motion z (J z = 0) has
+/// omega^2 = k z'z / z'Mz and the ratio c z'z / (2 omega z'Mz).
 TEST(Audit, CountsSpringsInTheNullSpace) {
+  constexpr double kSpring = 5, kDamper = 0.1;
   const RobotModel model = audited_panda();
   AuditOptions options = stated(kTranslationFirst, 2);
-  options.gains.null_stiffness = JointVector::Constant(7, 5);
-  options.gains.null_damping = JointVector::Constant(7, 2);
+  options.gains.null_stiffness = JointVector::Constant(7, kSpring);
+  options.gains.null_damping = JointVector::Constant(7, kDamper);
   const Audit audit(model, options);
   const PostureNumbers fast = audit.numbers(home());
   const PostureAudit proved = audit.audit(home());
   EXPECT_EQ(fast.zero_modes, 0);
   EXPECT_EQ(proved.spectrum.modes.size(), 7);
-  EXPECT_NEAR(fast.smallest_ratio, proved.numbers.smallest_ratio, 1e-9);
+  const DynamicsResult robot = evaluate(model, home(), JointVector::Zero(7));
+  const Eigen::VectorXd z = Eigen::FullPivLU<Eigen::MatrixXd>(robot.J).kernel().col(0);
+  const double per_mass = z.squaredNorm() / z.dot(Eigen::MatrixXd(robot.M) * z);
+  const double ratio = 0.5 * kDamper * std::sqrt(per_mass / kSpring);
+  EXPECT_NEAR(fast.smallest_ratio, ratio, 1e-9);
+  EXPECT_NEAR(proved.numbers.smallest_ratio, ratio, 1e-9);
   EXPECT_NEAR(fast.fastest_pole, proved.numbers.fastest_pole, 1e-6);
   options.gains.null_stiffness = {};
   EXPECT_EQ(Audit(model, options).numbers(home()).zero_modes, 1);
