@@ -68,6 +68,7 @@ def test_a_robot_survives_pickling(panda):
 def test_a_tool_moves_the_tip(panda):
     tool = np.eye(4)
     tool[:3, 3] = [0, 0, 0.1]
+    tool[1:3, 1:3] = [[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]]
     long = dashpot.Robot.from_urdf(ROOT / "sim/models/panda.urdf", "panda_link0", "panda_hand_tcp",
                                    tool=tool)
     np.testing.assert_allclose(long.pose(HOME), panda.pose(HOME) @ tool, atol=1e-12)
