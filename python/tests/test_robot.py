@@ -65,6 +65,16 @@ def test_a_robot_survives_pickling(panda):
         again.upper[0] = 9
 
 
+def test_a_payload_weighs(panda):
+    arm = (ROOT / "sim/models/panda.urdf", "panda_link0", "panda_hand_tcp")
+    held = np.eye(4)
+    held[:3, 3] = [0, 0, 0.05]
+    heavy = dashpot.Robot.from_urdf(*arm, payload_mass=2, payload_center=[0, 0, 0.05])
+    lift = dashpot.Robot.from_urdf(*arm, tool=held).jacobian(HOME)[2]
+    np.testing.assert_allclose(heavy.gravity(HOME) - panda.gravity(HOME), 2 * 9.81 * lift,
+                               atol=1e-9)
+
+
 def test_a_tool_moves_the_tip(panda):
     tool = np.eye(4)
     tool[:3, 3] = [0, 0, 0.1]
