@@ -65,9 +65,20 @@ def test_a_robot_survives_pickling(panda):
         again.upper[0] = 9
 
 
+def test_a_payload_weighs(panda):
+    arm = (ROOT / "sim/models/panda.urdf", "panda_link0", "panda_hand_tcp")
+    held = np.eye(4)
+    held[:3, 3] = [0, 0, 0.05]
+    heavy = dashpot.Robot.from_urdf(*arm, payload_mass=2, payload_center=[0, 0, 0.05])
+    lift = dashpot.Robot.from_urdf(*arm, tool=held).jacobian(HOME)[2]
+    np.testing.assert_allclose(heavy.gravity(HOME) - panda.gravity(HOME), 2 * 9.81 * lift,
+                               atol=1e-9)
+
+
 def test_a_tool_moves_the_tip(panda):
     tool = np.eye(4)
     tool[:3, 3] = [0, 0, 0.1]
+    tool[1:3, 1:3] = [[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]]
     long = dashpot.Robot.from_urdf(ROOT / "sim/models/panda.urdf", "panda_link0", "panda_hand_tcp",
                                    tool=tool)
     np.testing.assert_allclose(long.pose(HOME), panda.pose(HOME) @ tool, atol=1e-12)
@@ -107,10 +118,12 @@ def test_the_closed_loop_is_made_of_springs_and_dampers(panda):
     held = dashpot.closed_loop(panda, HOME, task_stiffness=TASK["task_stiffness"],
                                task_damping_ratio=0.7)
     np.testing.assert_allclose(held.modes.damping_ratio[:6], 0.7, atol=0.05)  # and friction
-    R = np.kron(np.eye(2), panda.pose(HOME)[:3, :3])
-    tool = dashpot.closed_loop(panda, HOME, **TASK, frame="tool")
+    q = np.array(HOME) + 0.3  # where the axes of the tool are not those of the base
+    R = np.kron(np.eye(2), panda.pose(q)[:3, :3])
+    K = np.diag([2000.0, 600, 100, 10, 20, 30])
+    tool = dashpot.closed_loop(panda, q, task_stiffness=K, frame="tool")
     np.testing.assert_allclose(
-        tool.stiffness, J.T @ R @ np.diag(TASK["task_stiffness"]) @ R.T @ J, atol=1e-9)
+        tool.stiffness, panda.jacobian(q).T @ R @ K @ R.T @ panda.jacobian(q), atol=1e-9)
     position = dashpot.closed_loop(panda, HOME, **TASK, directions=["x", "y", "z"])
     np.testing.assert_allclose(position.stiffness, 200 * J[:3].T @ J[:3], atol=1e-9)
     assert len(position.modes) == 3 and len(position.modes.zero_modes) == 4
