@@ -251,6 +251,7 @@ TEST_F(Safety, AReleasedFaultStartsWhereTheRobotIs) {
 TEST_F(Safety, AReleaseForgetsTheCommandedWrench) {
   settings.initial.mode = Mode::kCartesian;
   settings.watchdog.feedback = 0;  // something keeps the robot where it is
+  settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
   make();
   run(1.0);
   arm->setpoint.wrench[1] = 5;
