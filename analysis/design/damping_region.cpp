@@ -218,6 +218,7 @@ RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
   RegionDesign design;
   for (int round = 0; round < kRounds; ++round) {
     std::vector<TaskImpedance> chosen;
+    chosen.reserve(members.size());
     for (const std::size_t i : members) chosen.push_back(configurations[i]);
     candidate = search_level(chosen, candidate.damping, std::max(0.0, candidate.level), options,
                              [&](double done) { tell(0.9 * (round + done) / (round + 1.0)); });
