@@ -12,6 +12,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Extended = long double;
+/// Of numbers that were double before.
+constexpr Extended kRounding = static_cast<Extended>(std::numeric_limits<double>::epsilon());
 using Matrix = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
 using Values = Eigen::Matrix<Extended, Eigen::Dynamic, 1>;
 
@@ -38,8 +40,7 @@ SpringFactor spring_factor(const MatrixXd& K_C) {
       Matrix(unscale.asDiagonal() * K.cast<Extended>() * unscale.asDiagonal()));
   // Entries of K_C are rounded, so that eigenvalues of this size are taken for zero.
   const Values& values = eigen.eigenvalues();
-  Extended rounding = 16 * static_cast<Extended>(m) * std::numeric_limits<double>::epsilon() *
-                      values.cwiseAbs().maxCoeff();
+  Extended rounding = 16 * static_cast<Extended>(m) * kRounding * values.cwiseAbs().maxCoeff();
   if (K_error.rows() > 0) {
     rounding += (unscale.asDiagonal() * K_error.cast<Extended>() * unscale.asDiagonal()).norm();
   }
@@ -68,8 +69,7 @@ NullSpaceDamping null_space_damping(MatrixXd M, const MatrixXd& J, const MatrixX
     omega = svd.singularValues();
     U = svd.matrixU();
   }
-  const Extended floor = static_cast<Extended>(std::max(n, J.rows())) *
-                         std::numeric_limits<double>::epsilon() *
+  const Extended floor = static_cast<Extended>(std::max(n, J.rows())) * kRounding *
                          (omega.size() > 0 ? omega[0] : Extended(0));
   const Index rank = (omega.array() > floor).count();
   const Matrix V = U.leftCols(rank), L = cholesky.matrixL();
