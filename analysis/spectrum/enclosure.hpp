@@ -52,10 +52,11 @@ template <int N, class Matrix, class Vector>
 void prove(const PerturbationBounds<Matrix, Vector>& bounds,
            BlockEnclosure<N>& enclosure) noexcept {
   constexpr double kSlack = 1 + 1e-10;  // for rounding errors of the bounds themselves
+  const auto own_of = [&bounds](int i) { return bounds.own.data()[i]; };
   const auto count = static_cast<int>(enclosure.group.size());
   double everything2 = 0, largest = 0;  // F as a whole stands for E22
   for (int i = 0; i < count; ++i) {
-    largest = std::max(largest, bounds.own[i]);
+    largest = std::max(largest, own_of(i));
     for (int j = 0; j < count; ++j) everything2 += i == j ? 0 : bounds.coupling2(i, j);
   }
   const double everything = kSlack * (std::sqrt(everything2) + largest);
@@ -66,7 +67,7 @@ void prove(const PerturbationBounds<Matrix, Vector>& bounds,
       int nearest = -1;
       for (int j = 0; j < count; ++j) {
         if (enclosure.group[j] != i) continue;
-        own = std::max(own, bounds.own[j]);
+        own = std::max(own, own_of(j));
         for (int k = 0; k < count; ++k) {
           if (k == j) continue;
           if (enclosure.group[k] == i) {
