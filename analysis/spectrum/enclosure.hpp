@@ -130,7 +130,8 @@ void bound_roots(BlockRoots* roots, int count, const Groups& groups) noexcept {
     root.bound = root.radius;
     for (int j = 0; j < i; ++j) {
       const BlockRoot& other = roots[j];
-      if (groups[root.block] != groups[other.block] || root.united == other.united) continue;
+      if (groups.data()[root.block] != groups.data()[other.block] || root.united == other.united)
+        continue;
       if (modulus(root.value - other.value) > root.radius + other.radius) continue;
       any = true;
       const int from = root.united, to = other.united;

@@ -137,9 +137,11 @@ std::array<double, 3> shares(const Matrix2d& L, const Matrix2d& direction, doubl
   const auto exact =
       exact_invariants(L.cast<long double>() + static_cast<long double>(rho) * change);
   const Invariants v = block_invariants(L(0, 0), L(0, 1), L(1, 0), L(1, 1), rho);
-  return {static_cast<double>(std::abs(exact[0] - v.sum)) / v.sum_error,
-          static_cast<double>(std::abs(exact[1] - v.product)) / v.product_error,
-          static_cast<double>(std::abs(exact[2] - v.discriminant)) / v.discriminant_error};
+  return {static_cast<double>(std::abs(exact[0] - static_cast<long double>(v.sum))) / v.sum_error,
+          static_cast<double>(std::abs(exact[1] - static_cast<long double>(v.product))) /
+              v.product_error,
+          static_cast<double>(std::abs(exact[2] - static_cast<long double>(v.discriminant))) /
+              v.discriminant_error};
 }
 
 TEST(ModeNumberTerms, InvariantsOfABlockAreWithinTheirErrors) {
@@ -197,9 +199,10 @@ TEST(ModeNumberTerms, InvariantsOfTwoRootsAreWithinTheirErrors) {
       const LongComplex q =
           real ? moved(b, (turn / 2 % 2) * std::numbers::pi_v<long double>) : std::conj(p);
       const LongComplex half = (p - q) / 2.0L;
-      const std::array<long double, 3> errors = {std::abs((p + q).real() - v.sum),
-                                                 std::abs((p * q).real() - v.product),
-                                                 std::abs((half * half).real() - v.discriminant)};
+      const std::array<long double, 3> errors = {
+          std::abs((p + q).real() - static_cast<long double>(v.sum)),
+          std::abs((p * q).real() - static_cast<long double>(v.product)),
+          std::abs((half * half).real() - static_cast<long double>(v.discriminant))};
       const std::array<double, 3> bounds = {v.sum_error, v.product_error, v.discriminant_error};
       for (std::size_t k = 0; k < 3; ++k) {
         EXPECT_LE(errors[k], static_cast<long double>(bounds[k]) * (1 + 1e-12L)) << k;
@@ -232,8 +235,10 @@ TEST(ModeNumberTerms, FrequencyAndRatioAreWithinTheirBounds) {
         const long double sum =
             static_cast<long double>(v.sum) + other * static_cast<long double>(v.sum_error);
         const long double omega = std::sqrt(product), zeta = -sum / (2 * omega);
-        const auto omega_error = static_cast<double>(std::abs(omega - mode.natural_frequency));
-        const auto zeta_error = static_cast<double>(std::abs(zeta - mode.damping_ratio));
+        const auto omega_error =
+            static_cast<double>(std::abs(omega - static_cast<long double>(mode.natural_frequency)));
+        const auto zeta_error =
+            static_cast<double>(std::abs(zeta - static_cast<long double>(mode.damping_ratio)));
         EXPECT_LE(omega_error, mode.natural_frequency_bound);
         EXPECT_LE(zeta_error, mode.damping_ratio_bound);
         double& worst_omega = exact ? rounding : omega_share;

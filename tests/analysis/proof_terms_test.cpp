@@ -137,13 +137,14 @@ TEST(ProofTerms, RadiiAreThoseOfTheTheorem) {
       const long double inner = E(i, i);
       const long double right = std::sqrt(E.row(i).squaredNorm() - inner * inner);
       const long double left = std::sqrt(E.col(i).squaredNorm() - inner * inner);
-      long double separation = testing::kInfinity;
+      long double separation = std::numeric_limits<long double>::infinity();
       for (int j = 0; j < states; ++j) {
         if (j == i) continue;
-        separation = std::min<long double>(separation, std::abs(Lambda[i] - Lambda[j]));
+        separation =
+            std::min(separation, static_cast<long double>(std::abs(Lambda[i] - Lambda[j])));
       }
       const long double exact = inner + 2 * right * left / (separation - inner - everything);
-      EXPECT_NEAR(static_cast<double>(all.enclosure.radius[i] / exact), 1 + 1e-9, 1e-9)
+      EXPECT_NEAR(all.enclosure.radius[i] / static_cast<double>(exact), 1 + 1e-9, 1e-9)
           << "block " << i;
     }
   }
@@ -180,8 +181,10 @@ TEST(ProofTerms, AreSafeFromTheirOwnRoundingErrors) {
     enclose<kDynamic>(all.residual, all.basis, all.enclosure);
     if ((all.enclosure.group.array() == all.enclosure.group[0]).count() > 1) continue;
     ++alone;
-    const long double e = coupling, large = all.residual.F(1, 2);
-    const long double exact_delta = gap - std::sqrt(large * large + 2 * e * e);
+    const long double e = static_cast<long double>(coupling),
+                      large = static_cast<long double>(all.residual.F(1, 2));
+    const long double exact_delta =
+        static_cast<long double>(gap) - std::sqrt(large * large + 2 * e * e);
     EXPECT_GE(static_cast<long double>(all.enclosure.radius[0]), 2 * e * e / exact_delta)
         << "trial " << trial;
   }
