@@ -24,6 +24,7 @@ const Units kDamping = {"N s/m", "N s/m", "N s/m", "N m s/rad", "N m s/rad", "N 
 
 std::vector<std::string> preset_names() {
   std::vector<std::string> names;
+  names.reserve(kPresets.size());
   for (const GainPreset& preset : kPresets) names.emplace_back(preset.name);
   return names;
 }

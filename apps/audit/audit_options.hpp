@@ -47,6 +47,6 @@ struct AuditTask {
 void add_audit_options(CLI::App& command, AuditCommand& options);
 
 /// Throws InputError for options that do not go together, and for what is wrong in one of them.
-AuditTask read_task(const AuditCommand& options);
+AuditTask read_task(const AuditCommand& command);
 
 }  // namespace dashpot::apps

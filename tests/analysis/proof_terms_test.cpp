@@ -8,6 +8,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
+#include <limits>
 
 namespace dashpot::analysis {
 namespace {
