@@ -20,8 +20,8 @@ nb::object pose(const double* position, const double* rotation) {
 }
 
 /// The first `count` entries of an array.
-template <class Item, std::size_t size>
-std::vector<Item> first(const Item (&items)[size], std::uint32_t count) {  // NOLINT: of C
+template <class Item, std::size_t Size>
+std::vector<Item> first(const Item (&items)[Size], std::uint32_t count) {  // NOLINT: of C
   return {items, items + count};
 }
 

@@ -27,8 +27,8 @@ struct Numbers {
   using Type = Value;
   static constexpr std::size_t kDepth = 0;
 };
-template <class Value, std::size_t size>
-struct Numbers<Value[size]> : Numbers<Value> {  // NOLINT: as lcm-gen writes them
+template <class Value, std::size_t Size>
+struct Numbers<Value[Size]> : Numbers<Value> {  // NOLINT: as lcm-gen writes them
   static constexpr std::size_t kDepth = 1 + Numbers<Value>::kDepth;
 };
 template <class Value>
@@ -36,25 +36,25 @@ struct Numbers<std::vector<Value>> : Numbers<Value> {
   static constexpr std::size_t kDepth = 1 + Numbers<Value>::kDepth;
 };
 
-/// Enlarges shape[depth], shape[depth + 1], ... to what `value` needs.
-template <std::size_t depth, class Shape, class Value>
+/// Enlarges shape[Depth], shape[Depth + 1], ... to what `value` needs.
+template <std::size_t Depth, class Shape, class Value>
 void grow(Shape& shape, const Value& value) {
   if constexpr (Numbers<Value>::kDepth > 0) {
-    shape[depth] = std::max(shape[depth], std::size(value));
-    for (const auto& item : value) grow<depth + 1>(shape, item);
+    shape[Depth] = std::max(shape[Depth], std::size(value));
+    for (const auto& item : value) grow<Depth + 1>(shape, item);
   }
 }
 
-/// Writes `value`, whose sizes are at most shape[depth], shape[depth + 1], ..., to its place.
-template <std::size_t depth, class Number, class Shape, class Value>
+/// Writes `value`, whose sizes are at most shape[Depth], shape[Depth + 1], ..., to its place.
+template <std::size_t Depth, class Number, class Shape, class Value>
 void write(Number* place, const Shape& shape, const Value& value) {
   if constexpr (Numbers<Value>::kDepth == 0) {
-    *place = static_cast<Number>(value);
+    *place = static_cast<Number>(value);  // NOLINT(bugprone-signed-char-misuse): a number
   } else {
     std::size_t step = 1;
-    for (std::size_t i = depth + 1; i < shape.size(); ++i) step *= shape[i];
+    for (std::size_t i = Depth + 1; i < shape.size(); ++i) step *= shape[i];
     for (const auto& item : value) {
-      write<depth + 1>(place, shape, item);
+      write<Depth + 1>(place, shape, item);
       place += step;
     }
   }

@@ -16,7 +16,7 @@ using dashpot::testing::Random;
 double higher_frequency(Quad m00, Quad m01, Quad m11, Quad k0, Quad k1) {
   const Quad det = m00 * m11 - m01 * m01, sum = k0 * m11 + k1 * m00;
   const Quad discriminant = sum * sum - 4 * det * k0 * k1;
-  Quad root = std::sqrt(static_cast<double>(discriminant));
+  auto root = static_cast<Quad>(std::sqrt(static_cast<double>(discriminant)));
   root = (root + discriminant / root) / 2;  // Newton's method: 30 digits
   return std::sqrt(static_cast<double>((sum + root) / (2 * det)));
 }
