@@ -114,6 +114,7 @@ std::string suggestion_table(const AuditTask& task, const AuditReport& report) {
   }
   for (std::size_t i = 0; i < columns.size(); ++i) {
     std::vector<std::string> row;
+    row.reserve(columns.size());
     for (const auto& column : columns) row.push_back(column[i]);
     table.add_row(row);
   }

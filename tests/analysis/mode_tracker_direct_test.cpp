@@ -1,5 +1,4 @@
 // Systems that the tracker does not follow, but solves directly, and modes without a motion.
-#include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/tracked.hpp>
 
@@ -215,40 +214,6 @@ TEST(ModeTracker, CountsTheErrorsOfCoefficients) {
   System<kMaxDof> wrong(3);
   wrong.mass_error = Eigen::MatrixXd::Ones(2, 2);
   EXPECT_EQ(Tracked().update(wrong), Status::kWrongSize);
-}
-
-/// What W'W loses beyond double-doubles is in the bounds of a direct solution: these are wider than
-/// those of the rounded K and its low word.
-TEST(ModeTracker, CountsWhatTheProductOfItsFactorLacks) {
-  System<kMaxDof> system(2);
-  system.stiffness_factor.resize(2, 2);
-  system.stiffness_factor << 1.1, 1.3, 0, 1e-10;
-  system.damping << 1e-12, 1e-13, -1e-13, 2e-12;  // not symmetric, and so never followed
-  TrackerOptions options;
-  options.soft_frequency = 0;
-  Tracked tracked(options);
-  ASSERT_EQ(tracked.update(system), Status::kOk);
-  ASSERT_EQ(tracked.spectrum->mode_count, 2);
-  System<kMaxDof> rounded = system;
-  rounded.damping_low.setZero(2, 2);
-  rounded.stiffness_low.setZero(2, 2);
-  rounded.has_low_words = true;
-  const auto& W = system.stiffness_factor;
-  for (const auto& [i, j] : {std::pair{0, 0}, {0, 1}, {1, 0}, {1, 1}}) {
-    DotAccumulator sum;
-    for (int k = 0; k < 2; ++k) sum.add(W(k, std::min(i, j)), W(k, std::max(i, j)));
-    rounded.stiffness(i, j) = sum.value().high;
-    rounded.stiffness_low(i, j) = sum.value().low;
-  }
-  SpectrumOptions direct;
-  direct.soft_frequency = 0;
-  SpectrumSolver<kMaxDof> solver(direct);
-  const auto spectrum = std::make_unique<Spectrum<kMaxDof>>();
-  ASSERT_EQ(solver.solve(rounded, *spectrum), Status::kOk);
-  ASSERT_TRUE(spectrum->extended);
-  const ModeNumbers& slow = tracked.mode(tracked.spectrum->order[1]);
-  EXPECT_EQ(slow.eigenvalues[0], spectrum->modes[1].eigenvalues[0]);
-  EXPECT_GT(slow.error_bound, 1.01 * spectrum->modes[1].error_bound);
 }
 
 }  // namespace
