@@ -16,11 +16,11 @@ struct Setting {
       std::numeric_limits<double>::quiet_NaN();  ///< infinity that the word none stands for
 };
 
-/// Calls visit(setting, member) for every setting but the gains and the walls. `Settings_` is
+/// Calls visit(setting, member) for every setting but the gains and the walls. `Struct` is
 /// Settings or const Settings. Members are double, int, bool, JointVector (n entries), Mode and
 /// Analysis::Where.
-template <class Settings_, class Visitor>
-void for_each_setting(Settings_& settings, Visitor&& visit) {
+template <class Struct, class Visitor>
+void for_each_setting(Struct& settings, Visitor&& visit) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   visit(Setting{"control.period", "s", "", kPositive}, settings.period);
   visit(Setting{"control.mode"}, settings.initial.mode);
