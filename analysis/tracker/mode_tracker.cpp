@@ -1,4 +1,3 @@
-#include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/tracker/cluster_separation.hpp>
 #include <dashpot/analysis/tracker/tracked_modes.hpp>
@@ -77,34 +76,6 @@ bool sizes_agree(const System<kMaxDof>& system) {
 bool has_errors(const System<kMaxDof>& system) {
   return !system.mass_error.isZero(0) || !system.damping_error.isZero(0) ||
          !system.stiffness_error.isZero(0);
-}
-
-/// K = W'W with about 32 digits: the stiffness, its low word, and what these lack as an error.
-void form_stiffness(System<kMaxDof>& system) {
-  const auto& W = system.stiffness_factor;
-  const Eigen::Index n = system.dof();
-  // Products are exact, sums within 3 u^2 of partial sums no longer than those of absolute values.
-  constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
-  const double loss = 4 * static_cast<double>(W.rows()) * kUnit * kUnit;
-  if (system.stiffness_error.size() == 0) system.stiffness_error.setZero(n, n);
-  system.stiffness.resize(n, n);
-  system.stiffness_low.resize(n, n);
-  system.damping_low.setZero(n, n);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    for (Eigen::Index i = 0; i <= j; ++i) {
-      DotAccumulator sum;
-      double size = 0;
-      for (Eigen::Index k = 0; k < W.rows(); ++k) {
-        sum.add(W(k, i), W(k, j));
-        size += std::abs(W(k, i) * W(k, j));
-      }
-      system.stiffness(i, j) = system.stiffness(j, i) = sum.value().high;
-      system.stiffness_low(i, j) = system.stiffness_low(j, i) = sum.value().low;
-      system.stiffness_error(i, j) += loss * size;
-      if (i != j) system.stiffness_error(j, i) += loss * size;
-    }
-  }
-  system.has_low_words = true;
 }
 
 /// Whether all coefficients, of the same form, agree to the last bit.

@@ -1,6 +1,8 @@
+#include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/analysis/tracker/tracked_start.hpp>
 
 #include <cmath>
+#include <limits>
 
 namespace dashpot::analysis {
 namespace {
@@ -199,6 +201,33 @@ double overlap(const Plane& a, const Plane& image) {
 }
 
 }  // namespace
+
+void form_stiffness(System<kMaxDof>& system) noexcept {
+  const auto& W = system.stiffness_factor;
+  const Eigen::Index n = system.dof();
+  // Products are exact, sums within 3 u^2 of partial sums no longer than those of absolute values.
+  constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
+  const double loss = 4 * static_cast<double>(W.rows()) * kUnit * kUnit;
+  if (system.stiffness_error.size() == 0) system.stiffness_error.setZero(n, n);
+  system.stiffness.resize(n, n);
+  system.stiffness_low.resize(n, n);
+  system.damping_low.setZero(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i <= j; ++i) {
+      DotAccumulator sum;
+      double size = 0;
+      for (Eigen::Index k = 0; k < W.rows(); ++k) {
+        sum.add(W(k, i), W(k, j));
+        size += std::abs(W(k, i) * W(k, j));
+      }
+      system.stiffness(i, j) = system.stiffness(j, i) = sum.value().high;
+      system.stiffness_low(i, j) = system.stiffness_low(j, i) = sum.value().low;
+      system.stiffness_error(i, j) += loss * size;
+      if (i != j) system.stiffness_error(j, i) += loss * size;
+    }
+  }
+  system.has_low_words = true;
+}
 
 bool start_basis(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum,
                  BlockEigenbasis& basis) noexcept {

@@ -4,6 +4,10 @@
 
 namespace dashpot::analysis {
 
+/// Sets K = W'W of the factor with about 32 digits, as stiffness and its low word, and adds what
+/// these lack at most to stiffness_error.
+void form_stiffness(System<kMaxDof>& system) noexcept;
+
 /// Builds a tracked basis from the basis of a direct solution: columns (W u, u Lambda), made
 /// orthonormal in the indefinite metric mode by mode, in the order of the modes of `spectrum`.
 /// Where a mode lost its stiffness (a singular arm), its elastic coordinate is added, with a zero

@@ -2,6 +2,7 @@
 // matrices that are symmetric to 1e-10.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
+#include <dashpot/analysis/tracker/tracked_start.hpp>
 #include <dashpot/tests/support/quad_spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/special_values.hpp>
@@ -55,6 +56,34 @@ TaskImpedance cancelling(Random& random, int bits) {
   *impedance.task_stiffness << 0, static_cast<double>(c), static_cast<double>(c),
       static_cast<double>(d);
   return impedance;
+}
+
+TEST(CoefficientErrors, CountWhatTheProductOfAFactorLacks) {
+  Random random(2105);
+  double share = 0;
+  for (int trial = 0; trial < 400; ++trial) {
+    System<kMaxDof> system(random.integer(2, 6));
+    const Eigen::Index n = system.dof();
+    system.stiffness_factor.resize(random.integer(1, 6), n);
+    auto& W = system.stiffness_factor;
+    for (double& entry : W.reshaped()) entry = random.uniform(-1, 1);
+    W.col(n - 1) *= 1e8;  // graded, and its product with the first column cancels
+    W(0, n - 1) -= W.col(0).dot(W.col(n - 1)) / W(0, 0);
+    form_stiffness(system);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j < n; ++j) {
+        Quad lacking = -static_cast<Quad>(system.stiffness(i, j)) -
+                       static_cast<Quad>(system.stiffness_low(i, j));
+        for (Eigen::Index k = 0; k < W.rows(); ++k) {
+          lacking += static_cast<Quad>(W(k, i)) * static_cast<Quad>(W(k, j));
+        }
+        const double lost = std::abs(as_double(lacking));
+        EXPECT_LE(lost, system.stiffness_error(i, j)) << "trial " << trial;
+        if (lost > 0) share = std::max(share, lost / system.stiffness_error(i, j));
+      }
+    }
+  }
+  EXPECT_GT(share, 0.01);
 }
 
 TEST(CoefficientErrors, CountWhatCancelsBeyondDoubleDoubles) {
