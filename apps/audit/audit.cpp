@@ -123,10 +123,11 @@ void suggest(const Audit& audit, const AuditTask& task, AuditReport& report) {
   }
 }
 
-/// `csv` may be null.
-void run(const AuditCommand& command, OutputFile csv) try {
+void run(const AuditCommand& command) try {
   const AuditTask task = read_task(command);
   const Audit audit(task.model, task.options);
+  OutputFile csv(nullptr, std::fclose);
+  if (!command.csv.empty()) csv = open_output("--csv", command.csv);
   AuditReport report;
   report.posture = audit.audit(task.q);
   suggest(audit, task, report);
@@ -166,9 +167,7 @@ void add_audit(CLI::App& program) {
                   {{"--urdf", options->arm.urdf},
                    {"--gains", options->gains},
                    {"--postures", options->postures}});
-    OutputFile csv(nullptr, std::fclose);
-    if (!options->csv.empty()) csv = open_output("--csv", options->csv);
-    run(*options, std::move(csv));
+    run(*options);
   });
 }
 

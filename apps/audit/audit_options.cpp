@@ -203,8 +203,9 @@ void check(const AuditCommand& command) {
     throw InputError("--postures", "does not go with --samples");
   }
   if (command.spread && command.samples == 0) throw InputError("--spread", "needs --samples");
-  const bool loop = command.delay > 0 || command.cutoff > 0 || command.difference_velocity;
-  if (command.period == 0 && loop) {
+  const analysis::SampledLoop& loop = command.loop;
+  if (command.period == 0 &&
+      (loop.delay > 0 || loop.torque_cutoff > 0 || loop.difference_velocity)) {
     throw InputError("--period", "missing; --delay, --cutoff and --difference-velocity need it");
   }
   const bool many = command.samples > 0 || !command.postures.empty();
@@ -226,9 +227,9 @@ AuditTask read_task(const AuditCommand& command) {
   AuditOptions& audit = task.options;
   read_gains(command, task.model, audit, task.intended_ratio);
   audit.period = command.no_margin ? 0 : command.period;
-  audit.delay = command.delay;
-  audit.cutoff = command.cutoff;
-  audit.difference_velocity = command.difference_velocity;
+  audit.delay = command.loop.delay;
+  audit.cutoff = command.loop.torque_cutoff;
+  audit.difference_velocity = command.loop.difference_velocity;
   const double intended = std::isnan(task.intended_ratio) ? 0.7 : task.intended_ratio;
   task.wanted_ratio = command.damping_ratio.value_or(intended);
   task.q = arm.q.empty() ? middle(task.model)
@@ -240,7 +241,6 @@ AuditTask read_task(const AuditCommand& command) {
 }
 
 void add_audit_options(CLI::App& command, AuditCommand& options) {
-  constexpr double kLargest = std::numeric_limits<double>::max();
   const auto add = [&](const char* name, std::string& text, const char* help, const char* words) {
     return command.add_option(name, text, help)->option_text(words);
   };
@@ -268,26 +268,11 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
   add("--null-stiffness", options.null_stiffness, "Of the motions that the task leaves free",
       "a,b,...|x (0)");
   add("--null-damping", options.null_damping, "Of the same", "a,b,...|x (0)");
-  add("--viscous-friction", arm.viscous_friction, "In the joints, N m s/rad; urdf: the file's",
-      "a,b,...|x|urdf (0)");
-  add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
-      "a,b,...|x (0)");
-  add("--payload", arm.payload, "Mass at the tip, kg, and its center in the tip's axes, m",
-      "m[,x,y,z] (0)");
-  command.add_flag("--accept-inertias", arm.accept_inertias,
-                   "Take inertias of the description that no body can have as they are");
+  add_model_options(command, arm);
   command.add_option("--period", options.period, "Of the control loop: computes the gain margin")
       ->transform(positive("s", "a time in s"))
       ->option_text("S");
-  command
-      .add_option("--delay", options.delay, "Ticks from a command to its effect, beyond the hold")
-      ->check(CLI::Range(0, 100))
-      ->option_text("N (0)");
-  command.add_option("--cutoff", options.cutoff, "Of a low-pass on the torque; 0: none")
-      ->transform(quantity("Hz", 0, kLargest, "a frequency in Hz"))
-      ->option_text("HZ (0)");
-  command.add_flag("--difference-velocity", options.difference_velocity,
-                   "The controller takes velocities from positions");
+  add_loop_options(command, options.loop);
   command.add_flag("--no-margin", options.no_margin, "Leave the gain margin out");
   add("--q", arm.q, "Joint positions, rad or m", "a,b,... (middle of the limits)");
   add("--postures", options.postures, "YAML file with a list of postures", "FILE");

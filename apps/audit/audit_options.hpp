@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/apps/design/design_arm.hpp>
+#include <dashpot/apps/design/design_options.hpp>
 #include <dashpot/controller/audit.hpp>
 
 #include <CLI/App.hpp>
@@ -19,9 +19,9 @@ struct AuditCommand {
   std::string null_stiffness, null_damping;    ///< the same
   std::optional<double> damping_factor;
   std::string rotation, frame;
-  double period = 0, cutoff = 0;  ///< s, Hz
-  int delay = 0;                  ///< ticks
-  bool difference_velocity = false, no_margin = false;
+  double period = 0;           ///< s
+  analysis::SampledLoop loop;  ///< but for the period
+  bool no_margin = false;
   std::string postures;  ///< a file
   std::int64_t samples = 0;
   std::uint64_t seed = 1;

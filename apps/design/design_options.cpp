@@ -30,16 +30,9 @@ void add_arm(CLI::App& command, ArmOptions& arm) {
   add("--q", arm.q, "Joint positions, rad or m", "a,b,... (0)");
   add("--task-stiffness", arm.task_stiffness, "Diagonal of it, N/m and N m/rad", "x,y,z,rx,ry,rz");
   add("--task-damping", arm.task_damping, "Diagonal of the one before", "x,y,z,rx,ry,rz");
-  add("--viscous-friction", arm.viscous_friction, "In the joints, N m s/rad; urdf: the file's",
-      "a,b,...|x|urdf (0)");
+  add_model_options(command, arm);
   add("--null-damping", arm.null_damping, "Of the motions that the task leaves free, N m s/rad",
       "a,b,...|x (0)");
-  add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
-      "a,b,...|x (0)");
-  add("--payload", arm.payload, "Mass at the tip, kg, and its center in the tip's axes, m",
-      "m[,x,y,z] (0)");
-  command.add_flag("--accept-inertias", arm.accept_inertias,
-                   "Take inertias of the description that no body can have as they are");
 }
 
 void add_loop(CLI::App& command, DesignOptions& options) {
@@ -49,14 +42,7 @@ void add_loop(CLI::App& command, DesignOptions& options) {
                   "Of the control loop: propose only what it bears sampled and held")
       ->transform(positive("s", "a time in s"))
       ->option_text("S");
-  command.add_option("--delay", loop.delay, "Ticks from a command to its effect, beyond the hold")
-      ->check(CLI::Range(0, 100))
-      ->option_text("N (0)");
-  command.add_option("--cutoff", loop.torque_cutoff, "Of a low-pass on the torque; 0: none")
-      ->transform(quantity("Hz", 0, kLargest, "a frequency in Hz"))
-      ->option_text("HZ (0)");
-  command.add_flag("--difference-velocity", loop.difference_velocity,
-                   "The controller takes velocities from positions");
+  add_loop_options(command, loop);
   command
       .add_option("--margin", options.limit.gain_margin,
                   "Springs and damping may grow by this factor together")
@@ -65,6 +51,31 @@ void add_loop(CLI::App& command, DesignOptions& options) {
 }
 
 }  // namespace
+
+void add_model_options(CLI::App& command, ArmOptions& arm) {
+  const auto add = [&](const char* name, std::string& text, const char* help, const char* words) {
+    command.add_option(name, text, help)->option_text(words);
+  };
+  add("--viscous-friction", arm.viscous_friction, "In the joints, N m s/rad; urdf: the file's",
+      "a,b,...|x|urdf (0)");
+  add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
+      "a,b,...|x (0)");
+  add("--payload", arm.payload, "Mass at the tip, kg, and its center in the tip's axes, m",
+      "m[,x,y,z] (0)");
+  command.add_flag("--accept-inertias", arm.accept_inertias,
+                   "Take inertias of the description that no body can have as they are");
+}
+
+void add_loop_options(CLI::App& command, analysis::SampledLoop& loop) {
+  command.add_option("--delay", loop.delay, "Ticks from a command to its effect, beyond the hold")
+      ->check(CLI::Range(0, 100))
+      ->option_text("N (0)");
+  command.add_option("--cutoff", loop.torque_cutoff, "Of a low-pass on the torque; 0: none")
+      ->transform(quantity("Hz", 0, kLargest, "a frequency in Hz"))
+      ->option_text("HZ (0)");
+  command.add_flag("--difference-velocity", loop.difference_velocity,
+                   "The controller takes velocities from positions");
+}
 
 DampingStructure DesignOptions::damping_structure() const {
   return structures().at(structure);

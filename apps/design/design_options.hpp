@@ -29,6 +29,12 @@ struct DesignOptions {
   analysis::DampingTarget target() const;
 };
 
+/// Adds the options of the arm's inertia and friction: reflected inertia, payload and so on.
+void add_model_options(CLI::App& command, ArmOptions& arm);
+
+/// Adds those of the loop but for its period: delay, low-pass, differenced velocity.
+void add_loop_options(CLI::App& command, analysis::SampledLoop& loop);
+
 /// Adds the options to the subcommand; they are written to `options`.
 void add_design_options(CLI::App& command, DesignOptions& options);
 

@@ -3,6 +3,7 @@
 #include <dashpot/tests/support/arms.hpp>
 
 #include <cstdlib>
+#include <filesystem>
 
 namespace dashpot::tests {
 namespace {
@@ -172,7 +173,8 @@ TEST(Audit, RefusesInOneLineThatNamesTheOption) {
       {{"--preset", "crisp", "--q", "1,2"}, "--q: 2 numbers, expected 7"},
       {{"--preset", "crisp", "--postures", short_list}, "[0].posture: 2 numbers, expected 7"},
       {{"--preset", "crisp", "--spread", "1"}, "--spread: needs --samples"},
-      {{"--preset", "crisp", "--csv", "x.csv"}, "--csv: needs --samples or --postures"},
+      {{"--preset", "crisp", "--csv", scratch.path("x.csv")},
+       "--csv: needs --samples or --postures"},
       {{"--preset", "crisp", "--samples", "2", "--plot", "x.pdf"}, "--plot: x.pdf: has to end"},
       {{"--preset", "crisp", "--samples", "0"}, "--samples"},
       {{"--gains", scratch.path("none.yaml")}, "none.yaml"},
@@ -184,6 +186,7 @@ TEST(Audit, RefusesInOneLineThatNamesTheOption) {
     EXPECT_EQ(count_lines(outcome.err), 1) << words;
     EXPECT_THAT(outcome.err, HasSubstr(words));
   }
+  EXPECT_FALSE(std::filesystem::exists(scratch.path("x.csv")));
 }
 
 TEST(AuditTable, IsPrintedForEachPreset) {
