@@ -69,4 +69,8 @@ struct HostedController {
   analysis::Status published_status_ = analysis::Status::kOk;
 };
 
+/// Returns a controller as dashpot_create does, from a configuration that was read before. Throws
+/// InputError, with the key `gains`, for gains that dashpot_set_gains would refuse.
+dashpot_controller* create_controller(const Config& config);
+
 }  // namespace dashpot::controller

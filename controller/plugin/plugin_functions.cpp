@@ -1,7 +1,6 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/plugin/hosted_controller.hpp>
-#include <dashpot/controller/plugin/plugin_create.hpp>
 #include <dashpot/controller/plugin/plugin_data.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 

@@ -1,6 +1,6 @@
 // The controller behind the plugin's C functions, so that Python drives what other hosts load.
 
-#include <dashpot/controller/plugin/plugin_create.hpp>
+#include <dashpot/controller/plugin/hosted_controller.hpp>
 #include <dashpot/python/src/controller_results.hpp>
 
 #include <array>
