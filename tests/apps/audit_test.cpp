@@ -2,6 +2,7 @@
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 
@@ -131,7 +132,11 @@ TEST(Audit, TakesGainsFromAConfiguration) {
 
 TEST(Audit, TakesGainsOfTheJoints) {
   const Json found = audit_json({"--joint-stiffness", "600", "--damping-factor", "2"});
-  EXPECT_EQ(found["posture"]["modes"].size(), 7U);
+  ASSERT_EQ(found["posture"]["modes"].size(), 7U);
+  for (const Json& mode : found["posture"]["modes"]) {  // K = k I and C = c I: ratio = omega c / 2k
+    EXPECT_NEAR(mode["damping_ratio"].get<double>(),
+                mode["natural_frequency"].get<double>() / std::sqrt(600), 1e-9);
+  }
   EXPECT_EQ(found["suggestion"]["diagonal"].size(), 7U);
 }
 
