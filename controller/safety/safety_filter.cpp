@@ -89,11 +89,12 @@ Status SafetyFilter::apply(const Motion& motion, const JointVector& weight,
     if (std::abs(weight[i]) > joint(i).torque) status = worse(status, Status::kWeightNotHeld);
     base[i] = std::clamp(base[i] + weight[i], -joint(i).torque, joint(i).torque);
   }
+  if (anew_) take_over(base, weight);
   // Dampers alone oppose each joint's motion: they are clipped one by one, and lose nothing
   // elsewhere.
   if (motion.springs) limited |= shrink(motion.qd, base, excess);
+  if (fading_) limited |= fade(motion.qd, base, excess);
   for (Eigen::Index i = 0; i < n_; ++i) tau[i] = base[i] + excess[i];
-  limited |= fade(tau);
   limited |= limit(tau);
   return limited ? worse(status, Status::kTorqueLimited) : status;
 }
@@ -189,20 +190,37 @@ void SafetyFilter::ramp(JointVector& tau) noexcept {
   limit(tau);
 }
 
-bool SafetyFilter::fade(JointVector& tau) noexcept {
-  if (anew_) {
-    double ticks = 1;
-    for (Eigen::Index i = 0; i < n_; ++i) {
-      joint(i).left = last_[i] - std::clamp(tau[i], -joint(i).torque, joint(i).torque);
-      ticks = std::max(ticks, std::abs(joint(i).left) / joint(i).torque_step);
-    }
-    share_step_ = 1 / ticks;
-    share_ = 1;
-    anew_ = false;
+void SafetyFilter::take_over(const JointVector& base, const JointVector& weight) noexcept {
+  anew_ = false;
+  fading_ = true;
+  fade_ticks_ = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double excess = last_[i] - std::clamp(weight[i], -joint(i).torque, joint(i).torque);
+    const double repulsion = base[i] - weight[i];
+    joint(i).acting = excess - std::clamp(repulsion, std::min(excess, 0.0), std::max(excess, 0.0));
   }
-  share_ = share_ > 1.5 * share_step_ ? share_ - share_step_ : 0;
-  if (share_ == 0) return false;
-  for (Eigen::Index i = 0; i < n_; ++i) tau[i] += share_ * joint(i).left;
+}
+
+bool SafetyFilter::fade(const JointVector& qd, const JointVector& base,
+                        JointVector& excess) noexcept {
+  double ticks = 1;
+  const auto way = [&](Eigen::Index i) {
+    const Bounds& bounds = joint(i);
+    return std::clamp(excess[i], -bounds.torque - base[i], bounds.torque - base[i]) - bounds.acting;
+  };
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    ticks = std::max(ticks, std::abs(way(i)) / joint(i).torque_step);
+  }
+  if (fade_ticks_ == 0) fade_ticks_ = ticks;
+  fading_ = ticks > 1 && fade_ticks_ > 1.5;
+  if (!fading_) return false;
+  fade_ticks_ -= 1;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    Bounds& bounds = joint(i);
+    const bool drives = bounds.acting * qd[i] > 0 && std::abs(qd[i]) * bounds.per_velocity >= 1;
+    excess[i] = bounds.acting +=
+        drives ? std::clamp(way(i), -bounds.torque_step, bounds.torque_step) : way(i) / ticks;
+  }
   return true;
 }
 

@@ -42,9 +42,11 @@ double loop_lag(const Settings& settings) noexcept;
 ///
 /// I_i is least_joint_inertia, lag is loop_lag: delays make all this weaker, not unstable.
 ///
-/// Where springs end or start again, what the last torque has beyond the new one fades evenly: in
-/// all joints alike, in the least time in which no joint's rate limit has to act on it. Otherwise
-/// joints with little torque would let go first, and turn the wrench that the tip exerts.
+/// Where springs end or start again, x goes from what acts to what is asked for evenly: by the same
+/// share of the way in all joints, the largest in which no joint's rate limit has to act on it.
+/// Otherwise joints with little torque would let go first, and turn the wrench that the tip exerts.
+/// It takes as many ticks as the joint with the longest way needed at first. The repulsion does not
+/// wait for it, nor does what drives a joint that is faster than its limit.
 class SafetyFilter {
  public:
   /// What the robot does at this tick.
@@ -98,7 +100,7 @@ class SafetyFilter {
     double per_velocity;   ///< 1 / velocity, s/rad
     double torque;         ///< limit, N m
     double torque_step;    ///< limit of its change in one tick, N m
-    double left = 0;       ///< of the torque before `begin_anew`, N m
+    double acting = 0;     ///< x of the last torque, while it fades, N m
     double ramp_step = 0;  ///< N m
     double velocity;       ///< limit, rad/s
     double return_velocity;
@@ -129,8 +131,13 @@ class SafetyFilter {
   bool hold_back(const JointVector& qd, double fastest, JointVector& excess) const noexcept;
   /// Scales `excess` for the limits of power and of torque beyond `base`. True if it did.
   bool shrink(const JointVector& qd, const JointVector& base, JointVector& excess) const noexcept;
-  /// Adds to the finite `tau` what is left of the torque before `begin_anew`. True if anything is.
-  bool fade(JointVector& tau) noexcept;
+  /// Splits the last torque into `weight`, the repulsion in `base` as far as it acted already, and
+  /// what fades.
+  void take_over(const JointVector& base, const JointVector& weight) noexcept;
+  /// Moves from the excess that acts toward `excess`, within the torque limits beyond `base`, and
+  /// returns it there. True if there is a way
+  /// left.
+  bool fade(const JointVector& qd, const JointVector& base, JointVector& excess) noexcept;
   /// Bounds the finite `tau` and its change, and remembers it. True if that changed it.
   bool limit(JointVector& tau) noexcept;
 
@@ -143,8 +150,8 @@ class SafetyFilter {
   bool known_ = false;
   bool ramping_ = false;
   bool anew_ = true;
-  double share_ = 0;       ///< of Joint::left that is still there
-  double share_step_ = 1;  ///< in one tick
+  bool fading_ = false;
+  double fade_ticks_ = 0;  ///< for how many more, 0 before the first
   JointVector last_;
   JointVector asked_;
   alignas(64) std::array<Bounds, kMaxJoints> joints_;

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
+#include <string>
 
 namespace dashpot::controller {
 namespace {
@@ -300,6 +302,60 @@ TEST_F(Filter, FadesEvenly) {
   EXPECT_TRUE(near(out, Pair(1, -0.5), 1e-9));
   apply(filter, {0.5, -4});
   EXPECT_TRUE(near(out, Pair(0.5, -1), 1e-9));
+}
+
+/// However what is asked for changes while the torque fades, each torque goes toward it.
+TEST_F(Filter, FadesTowardWhatIsAskedForNow) {
+  settings.limits.torque_rate = Pair(1000, 500);
+  SafetyFilter filter = make();
+  filter.reset(Pair(20, 4));
+  const std::uint64_t seed = ::testing::UnitTest::GetInstance()->random_seed() + 1;
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937_64 engine(seed);
+  std::uniform_real_distribution<double> uniform(-60, 60);
+  Pair asked(0, 0);
+  springs = false;  // which would shrink what is asked for
+  for (int k = 0; k < 2000; ++k) {
+    if (k % 50 == 0) filter.begin_anew();
+    if (k % 7 == 0) asked = Pair(uniform(engine), uniform(engine) / 4);
+    const JointVector last = filter.last();
+    apply(filter, asked);
+    for (int i = 0; i < 2; ++i) {
+      EXPECT_LE(out[i], std::max(last[i], asked[i]) + 1e-12) << k;
+      EXPECT_GE(out[i], std::min(last[i], asked[i]) - 1e-12) << k;
+    }
+  }
+}
+
+/// What drives a joint that is too fast waits for no other joint.
+TEST_F(Filter, LetsGoAtOnceOfAJointThatIsTooFast) {
+  settings.limits.torque_rate = Pair(1000, 500);
+  SafetyFilter filter = make();
+  filter.reset(Pair(20, 4));
+  qd = {1.5, 3};
+  springs = false;
+  apply(filter, {0, 0});
+  EXPECT_TRUE(near(out, Pair(19, 3.5), 1e-9));
+  qd = {1.5, -3};  // is braked
+  apply(filter, {0, 0});
+  EXPECT_TRUE(near(out, Pair(18, 3.5 * 18 / 19), 1e-9));
+}
+
+/// Springs end while the repulsion brakes a joint that moves in from its limit. The end of the
+/// repulsion is no reason to drive the joint on.
+TEST_F(Filter, DrivesNoJointOnWhenItLeavesALimit) {
+  settings.limits.torque_rate = Pair(1000, 1000);
+  weight = {5, 0};
+  SafetyFilter filter = make();
+  filter.reset(weight);
+  qd = {-1, 0};
+  springs = false;
+  for (int k = 0; k < 300; ++k) {
+    q = {0.9 - 0.001 * k, 0};  // leaves the margin of 0.125 after 25 ticks
+    apply(filter, weight - 2 * qd);
+    EXPECT_GE(out[0], weight[0]) << k;
+  }
+  EXPECT_EQ(out[0], 7);
 }
 
 /// What it adds to matrices that are there already.
