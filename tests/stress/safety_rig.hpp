@@ -97,8 +97,9 @@ class Rig {
     plant.faults = options.faults;
     plant_.emplace(body_, plant, start, options.velocity);
     torque_ = plant.initial_torque;
-    last_given_ = last_excess_ = JointVector::Zero(start.size());
-    over_ = allowed_ = last_given_;
+    last_given_ = torque_;
+    last_excess_ = JointVector::Zero(start.size());
+    over_ = allowed_ = last_excess_;
     first_tip_ = body_.tip_pose(start).position;
     if (options.told_weight) plugin.reset(controller_.get(), torque_.data());
   }
@@ -275,14 +276,16 @@ inline void Rig::watch() {
     const double share = std::abs(qd[i]) / limit.velocity[i];
     fastest = std::max(fastest, share);
     // Too fast: the torque may go on as long as its rate limit takes to bring the slowest down.
-    if (share <= 1.05) {
+    if (share <= 1.05 || every == 0) {  // who is not called drives nothing
       over_[i] = 0;
     } else {
       if (over_[i] == 0) {
         allowed_[i] = 0.005 + last_excess_.cwiseAbs().cwiseQuotient(limit.torque_rate).maxCoeff();
       }
       over_[i] += period();
-      if (over_[i] > allowed_[i] && excess[i] * qd[i] > 0 &&
+      const double change = std::copysign(1, qd[i]) * (plant_->torque()[i] - last_given_[i]);
+      const bool ends = change < -0.999 * limit.torque_rate[i] * period();  // as fast as it may
+      if (over_[i] > allowed_[i] && !ends && excess[i] * qd[i] > 0 &&
           std::abs(excess[i]) > 0.02 * limit.torque[i]) {
         seen.driven += period();
       }
@@ -298,6 +301,7 @@ inline void Rig::watch() {
     }
   }
   last_excess_ = excess;
+  last_given_ = plant_->torque();
   seen.speed_share = std::max(seen.speed_share, fastest);
   seen.tip_speed = std::max(seen.tip_speed, body_.tip_twist(q, qd).head<3>().norm());
   seen.kinetic_energy = std::max(seen.kinetic_energy, plant_->audit().stored.kinetic);

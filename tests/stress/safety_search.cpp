@@ -1,5 +1,5 @@
-// Looks for the start, gains, goals, pushes and gaps that make an arm fastest, or give it the most
-// kinetic energy, under the plugin:
+// Looks for the start, gains, goals, pushes and gaps that make an arm fastest, give it the most
+// kinetic energy, or drive a joint on longest while it is too fast, under the plugin:
 //     safety_search [EVALUATIONS [SEED [PLUGIN]]]
 // Cross-entropy method (R. Rubinstein, 1999): samples of a normal distribution for each parameter,
 // whose mean and width follow the best of them. The same arguments give the same result.
@@ -181,7 +181,7 @@ Found search(const PluginFile& plugin, const TestArm& arm, double Measures::*obj
 void report(const PluginFile& plugin, const TestArm& arm, const Found& found, const char* what) {
   std::printf("%s, %s:", arm.name, what);
   if (found.values.size() == 0) {
-    std::printf(" nothing moved\n");
+    std::printf(" none found\n");
     return;
   }
   const Attack attack(arm, found.values);
@@ -207,6 +207,8 @@ int main(int argc, char** argv) try {
     report(plugin, arm, search(plugin, arm, &Measures::speed_share, evaluations, seed), "fastest");
     report(plugin, arm, search(plugin, arm, &Measures::kinetic_energy, evaluations, seed),
            "most energy");
+    report(plugin, arm, search(plugin, arm, &Measures::driven, evaluations, seed),
+           "driven longest");
   }
   return 0;
 } catch (const std::exception& error) {
