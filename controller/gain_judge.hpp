@@ -1,7 +1,6 @@
 #pragma once
 #include <dashpot/analysis/sampled_loop.hpp>
-#include <dashpot/controller/controller.hpp>
-#include <dashpot/controller/robot_model.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 
 namespace dashpot::controller {
 
@@ -41,8 +40,7 @@ class GainJudge {
   double wanted_;
   bool gravity_;
   analysis::SampledLoop loop_;
-  Controller controller_;  ///< takes gains at once, at any posture
-  std::int64_t time_ = 0;
+  PostureLoop posture_loop_;
 };
 
 }  // namespace dashpot::controller

@@ -38,7 +38,7 @@ extern "C" {
 
 /* Version of this interface. It increases whenever a function or struct changes. A library
  * serves the versions that it knows. */
-#define DASHPOT_PLUGIN_VERSION 6u
+#define DASHPOT_PLUGIN_VERSION 7u
 /* Largest n. */
 #define DASHPOT_MAX_JOINTS 16
 
@@ -291,18 +291,51 @@ typedef struct dashpot_sampled_modes {
   dashpot_sampled_mode modes[DASHPOT_MAX_JOINTS];
 } dashpot_sampled_modes;
 
+/* Terms of the robot's equation of motion  M(q) q'' + coriolis + gravity = torque + J' wrench, and
+ * where the tip is. */
+typedef struct dashpot_dynamics {
+  uint32_t struct_size;
+  uint32_t joints;                                      /* n */
+  double mass[DASHPOT_MAX_JOINTS * DASHPOT_MAX_JOINTS]; /* M, n x n, kg m^2, in the first n n
+                                                           entries */
+  double coriolis[DASHPOT_MAX_JOINTS];                  /* C(q, q') q', N m */
+  double gravity[DASHPOT_MAX_JOINTS];                   /* gradient of the potential energy, N m */
+  double jacobian[6 * DASHPOT_MAX_JOINTS];              /* J, 6 x n: the tip's twist is J q' */
+  double jacobian_dot_qd[6]; /* J' q', the tip's acceleration at q'' = 0, m/s^2 and
+                                rad/s^2 */
+  double tip_position[3];    /* of T in B, m */
+  double tip_rotation[9];    /* 3 x 3, turns T's axes into B's */
+} dashpot_dynamics;
+
+/* The closed loop at one posture, linearised where its springs are at rest, in joint coordinates:
+ * M q'' + C q' + K q = f. */
+typedef struct dashpot_closed_loop {
+  uint32_t struct_size;
+  uint32_t joints;                                           /* n */
+  double mass[DASHPOT_MAX_JOINTS * DASHPOT_MAX_JOINTS];      /* n x n, kg m^2, in the first n n
+                                                                entries */
+  double damping[DASHPOT_MAX_JOINTS * DASHPOT_MAX_JOINTS];   /* likewise, N m s/rad */
+  double stiffness[DASHPOT_MAX_JOINTS * DASHPOT_MAX_JOINTS]; /* likewise, N m/rad */
+} dashpot_closed_loop;
+
 /* Creates a controller from a YAML file (see controller/examples/panda.yaml) and the URDF that the
  * file names. Returns NULL on failure; dashpot_last_error then says why, in one line with file, key
  * and line. Gains that dashpot_set_gains would refuse are a failure. */
 dashpot_controller* dashpot_create(const char* config_path);
 
+/* Creates a controller from the text of such a file. A relative path of the URDF begins at
+ * `directory`, or, if that is NULL, at the working directory. Otherwise as dashpot_create. */
+dashpot_controller* dashpot_create_from_text(const char* text, const char* directory);
+
 /* Destroys a controller. Does nothing if `controller` is NULL. */
 void dashpot_destroy(dashpot_controller* controller);
 
 /* Returns a one-line description of the last error in this thread; "" if the last call succeeded.
- * Calls that count are dashpot_create, dashpot_start, dashpot_set_setpoint, dashpot_set_gains,
- * dashpot_judge_gains, dashpot_release, dashpot_read_snapshot, ..._modes and ..._sampled_modes. The
- * text is valid until the next of these calls in this thread. */
+ * Calls that count are dashpot_create, ..._create_from_text, dashpot_start, dashpot_set_setpoint,
+ * dashpot_set_gains, dashpot_judge_gains, dashpot_evaluate, dashpot_analyze, dashpot_release,
+ * dashpot_read_snapshot,
+ * ..._modes and ..._sampled_modes. The text is valid until the next of these calls in this thread.
+ */
 const char* dashpot_last_error(void);
 
 /* Returns n; 0 if `controller` is NULL. */
@@ -375,6 +408,23 @@ int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* g
 int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
                             const double* position, double* margin);
 
+/* Sets the members of `dynamics` at `position` (n, rad) and `velocity` (n, rad/s; NULL: at rest).
+ * The caller sets struct_size. May be called on any thread, also beside a running loop; allocates
+ * nothing. Returns DASHPOT_OK or a negative code. */
+int32_t dashpot_evaluate(const dashpot_controller* controller, const double* position,
+                         const double* velocity, dashpot_dynamics* dynamics);
+
+/* Finds the closed loop and its modes at `position` (n, rad), with the robot at rest there, in
+ * `mode` (DASHPOT_MODE_JOINT, ...), as a loop would publish them: no loop has to run. A member of
+ * `gains` that is NULL, or all if `gains` is NULL, stands for the gain of the configuration. `loop`
+ * or `modes` may be NULL; the caller sets the struct_size of the other. The modes are solved
+ * directly (`tick`, `time` and the counters are 0). Position limits and their repulsion do not
+ * count. May be called on any thread, also beside a running loop; takes some milliseconds
+ * and allocates. Returns DASHPOT_OK or a negative code. */
+int32_t dashpot_analyze(const dashpot_controller* controller, const double* position, int32_t mode,
+                        const dashpot_gains* gains, dashpot_closed_loop* loop,
+                        dashpot_modes* modes);
+
 /* Read the latest finished tick, the latest modes, and the latest analysis of the sampled loop.
  * Called on one thread, always the same. The caller sets struct_size; the functions write the other
  * members. They return DASHPOT_OK or a negative code, DASHPOT_NOTHING_YET if there is nothing to
@@ -393,6 +443,7 @@ typedef struct dashpot_plugin {
   uint32_t struct_size;
   uint32_t version; /* DASHPOT_PLUGIN_VERSION */
   dashpot_controller* (*create)(const char*);
+  dashpot_controller* (*create_from_text)(const char*, const char*);
   void (*destroy)(dashpot_controller*);
   const char* (*last_error)(void); /* NOLINT(modernize-redundant-void-arg): C needs it */
   uint32_t (*joints)(const dashpot_controller*);
@@ -406,6 +457,9 @@ typedef struct dashpot_plugin {
   int32_t (*set_setpoint)(dashpot_controller*, const dashpot_setpoint*);
   int32_t (*set_gains)(dashpot_controller*, const dashpot_gains*);
   int32_t (*judge_gains)(dashpot_controller*, const dashpot_gains*, const double*, double*);
+  int32_t (*evaluate)(const dashpot_controller*, const double*, const double*, dashpot_dynamics*);
+  int32_t (*analyze)(const dashpot_controller*, const double*, int32_t, const dashpot_gains*,
+                     dashpot_closed_loop*, dashpot_modes*);
   int32_t (*read_snapshot)(dashpot_controller*, dashpot_snapshot*);
   int32_t (*read_modes)(dashpot_controller*, dashpot_modes*);
   int32_t (*read_sampled_modes)(dashpot_controller*, dashpot_sampled_modes*);

@@ -1,5 +1,4 @@
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 
@@ -17,16 +16,8 @@ constexpr double kSlowest = 1;  // rad/s
 constexpr std::array<double, kMaxJoints> kPrimes{2,  3,  5,  7,  11, 13, 17, 19,
                                                  23, 29, 31, 37, 41, 43, 47, 53};
 
-/// Those of a controller whose closed loop has the gains of a set-point from the second tick on,
-/// wherever the robot is.
+/// Those of the loop that is judged.
 Settings judging(Settings settings) {
-  constexpr double kFar = 1e5;  // rad: set-points at the robot are within it
-  settings.motion.gain_time = settings.period;
-  settings.analysis.where = Analysis::Where::kOff;
-  settings.analysis.sampled.interval = 0;
-  settings.limits.position_lower.setConstant(-kFar);
-  settings.limits.position_upper.setConstant(kFar);
-  settings.limits.walls.clear();
   settings.task_terms = {};
   return settings;
 }
@@ -40,7 +31,7 @@ GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
       wanted_(settings.limits.gain_margin),
       gravity_(settings.feed_forward.gravity),
       loop_(sampled_loop(model, settings)),
-      controller_(model, judging(settings)) {}
+      posture_loop_(model, judging(settings)) {}
 
 GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
   Verdict worst{std::numeric_limits<double>::infinity(), Mode::kJoint};
@@ -74,27 +65,8 @@ GainJudge::Verdict GainJudge::judge_anywhere(const Gains& gains) {
 }
 
 double GainJudge::margin(const JointVector& q, const Gains& gains, Mode mode) try {
-  const JointVector rest = JointVector::Zero(q.size());
-  const DynamicsResult there = evaluate(model_, q, rest);
-  controller_.reset();
-  RobotState state;
-  state.position = q;
-  state.velocity = rest;
-  Setpoint setpoint;
-  setpoint.mode = mode;
-  setpoint.joint_position = q;
-  setpoint.tip_pose = {there.p_BT_B, there.R_BT};
-  setpoint.gains = gains;
-  const auto period = static_cast<std::int64_t>(std::ceil(1e9 * controller_.settings().period));
-  JointVector torque;
-  for (int tick = 0; tick < 3; ++tick) {
-    time_ += period;
-    state.time = setpoint.time = time_;
-    const Status status = controller_.update(state, setpoint, torque);
-    if (status == Status::kSetpointRejected || status > Status::kWeightNotHeld) return 0;
-  }
   analysis::System<kMaxJoints> system;
-  controller_.closed_loop(system);
+  if (posture_loop_.closed_loop(q, gains, mode, system) != Status::kOk) return 0;
   analysis::SpectrumSolver<kMaxJoints> solver;
   analysis::Spectrum<kMaxJoints> spectrum;
   const analysis::Status solved = solver.solve(system, spectrum);

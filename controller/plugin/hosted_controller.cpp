@@ -1,5 +1,6 @@
 #include <dashpot/controller/plugin/hosted_controller.hpp>
 #include <dashpot/controller/plugin/plugin_data.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
 #include <algorithm>
@@ -21,10 +22,23 @@ HostedController::HostedController(const Config& config)
       settings(config.settings),
       period(static_cast<std::int64_t>(std::min(1e9 * settings.period, 1e18))),
       model(config.model),
+      kernel(config.model),
       judgement(config.model, config.settings),
       controller_(config.model, config.settings),
       setpoint_(settings.initial) {
   request.setpoint = settings.initial;
+}
+
+Status HostedController::at_posture(const JointVector& q, const Gains& gains, Mode mode,
+                                    VibrationTask& task, Vibration& found) const {
+  PostureLoop loop(model, settings);
+  const Status status = loop.closed_loop(q, gains, mode, task.system);
+  if (status != Status::kOk) return status;
+  task.position = q;
+  task.number = 1;
+  VibrationSolver(settings.analysis).solve(task, found);
+  found.counters = {};
+  return Status::kOk;
 }
 
 Status HostedController::update(const dashpot_state* given, const dashpot_setpoint* wanted,

@@ -2,8 +2,10 @@
 #include <dashpot/controller/plugin.h>
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/latest.hpp>
 #include <dashpot/controller/plugin/plugin_judgement.hpp>
+#include <dashpot/controller/vibration/vibration_solver.hpp>
 
 #include <cstdint>
 #include <vector>
@@ -29,7 +31,12 @@ struct HostedController {
   const Settings settings;
   const std::int64_t period;  ///< ns
   const RobotModel model;
+  const DynamicsKernel kernel;
   Judgement judgement;
+  /// Finds the closed loop of gains at a posture at rest, and its modes. Returns kOk, or the status
+  /// of a controller that cannot be there. Throws what allocation does.
+  Status at_posture(const JointVector& q, const Gains& gains, Mode mode, VibrationTask& task,
+                    Vibration& found) const;
 
   Latest<Request> requests;      ///< from the other thread to the real-time thread
   Latest<Snapshot> snapshots;    ///< back

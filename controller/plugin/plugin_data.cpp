@@ -26,6 +26,12 @@ void put(const Pose& from, double* position, double* rotation) noexcept {
   Eigen::Map<RowMajor3>(rotation, 3, 3) = from.rotation;
 }
 
+/// Row by row.
+template <class Matrix>
+void put_rows(const Matrix& from, double* to) noexcept {
+  Eigen::Map<RowMajor>(to, from.rows(), from.cols()) = from;
+}
+
 template <class Struct>
 std::int32_t check(const Struct* given, int n) noexcept {
   if (given == nullptr) return DASHPOT_NULL_ARGUMENT;
@@ -150,6 +156,27 @@ std::int32_t to_gains(const dashpot_gains* given, int n, Gains& gains) noexcept 
     for (std::size_t i = 0; i < 6; ++i) gains.directions[i] = given->directions[i] != 0;
   }
   return DASHPOT_OK;
+}
+
+void to_c(const DynamicsResult& dynamics, dashpot_dynamics& out) noexcept {
+  out = {};
+  out.struct_size = sizeof out;
+  out.joints = static_cast<std::uint32_t>(dynamics.gravity.size());
+  put_rows(dynamics.M, out.mass);
+  put(dynamics.coriolis, out.coriolis);
+  put(dynamics.gravity, out.gravity);
+  put_rows(dynamics.J, out.jacobian);
+  put(dynamics.Jdot_qd, out.jacobian_dot_qd);
+  put({dynamics.p_BT_B, dynamics.R_BT}, out.tip_position, out.tip_rotation);
+}
+
+void to_c(const analysis::System<kMaxJoints>& system, dashpot_closed_loop& out) noexcept {
+  out = {};
+  out.struct_size = sizeof out;
+  out.joints = static_cast<std::uint32_t>(system.mass.rows());
+  put_rows(system.mass, out.mass);
+  put_rows(system.damping, out.damping);
+  put_rows(system.stiffness, out.stiffness);
 }
 
 void to_c(const Snapshot& snapshot, dashpot_snapshot& out) noexcept {

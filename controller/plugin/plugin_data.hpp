@@ -2,6 +2,8 @@
 // From the C structs of plugin.h to the controller's types and back. Nothing here allocates.
 
 #include <dashpot/controller/plugin.h>
+#include <dashpot/analysis/system.hpp>
+#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/snapshot.hpp>
 
 namespace dashpot::controller {
@@ -19,6 +21,8 @@ std::int32_t to_setpoint(const dashpot_setpoint* given, int n, std::int64_t now,
 /// numbers are possible is not checked.
 std::int32_t to_gains(const dashpot_gains* given, int n, Gains& gains) noexcept;
 
+void to_c(const DynamicsResult& dynamics, dashpot_dynamics& out) noexcept;
+void to_c(const analysis::System<kMaxJoints>& system, dashpot_closed_loop& out) noexcept;
 void to_c(const Snapshot& snapshot, dashpot_snapshot& out) noexcept;
 void to_c(const Vibration& vibration, dashpot_modes& out) noexcept;
 void to_c(const SampledVibration& vibration, dashpot_sampled_modes& out) noexcept;

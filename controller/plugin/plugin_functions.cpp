@@ -70,6 +70,28 @@ std::int32_t read_gains(const dashpot_gains* given, int n, Gains& wanted) noexce
   return DASHPOT_OK;
 }
 
+/// The controller that `make` makes. Null, and the error is set, where it throws.
+template <class Make>
+dashpot_controller* make_controller(const Make& make) noexcept try {
+  dashpot_controller* const controller = make();
+  finish(DASHPOT_OK);
+  return controller;
+} catch (const std::exception& error) {
+  finish(DASHPOT_WRONG_VALUE, error.what());
+  return nullptr;
+} catch (...) {
+  finish(DASHPOT_WRONG_VALUE, "unknown failure");
+  return nullptr;
+}
+
+/// Reads `position`, if it is n finite numbers.
+std::int32_t read_joints(const dashpot_controller* controller, const double* given,
+                         JointVector& values) noexcept {
+  if (controller == nullptr || given == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
+  values = Eigen::Map<const Eigen::VectorXd>(given, controller->n);
+  return values.allFinite() ? DASHPOT_OK : finish(DASHPOT_WRONG_VALUE);
+}
+
 /// Whether there is a struct to write to.
 template <class Struct>
 std::int32_t check_result(const dashpot_controller* controller, const Struct* result) noexcept {
@@ -94,21 +116,23 @@ dashpot_controller* dashpot_create(const char* config_path) {
     finish(DASHPOT_NULL_ARGUMENT);
     return nullptr;
   }
-  try {
-    const Config config = load_config(config_path);
+  return make_controller([&] {
     try {
-      dashpot_controller* const controller = create_controller(config);
-      finish(DASHPOT_OK);
-      return controller;
+      return create_controller(load_config(config_path));
     } catch (const InputError& error) {
       throw error.in_file(config_path);
     }
-  } catch (const std::exception& error) {
-    finish(DASHPOT_WRONG_VALUE, error.what());
-  } catch (...) {
-    finish(DASHPOT_WRONG_VALUE, "unknown failure");
+  });
+}
+
+dashpot_controller* dashpot_create_from_text(const char* text, const char* directory) {
+  if (text == nullptr) {
+    finish(DASHPOT_NULL_ARGUMENT);
+    return nullptr;
   }
-  return nullptr;
+  return make_controller([&] {
+    return create_controller(read_config(parse_yaml(text), directory == nullptr ? "" : directory));
+  });
 }
 
 void dashpot_destroy(dashpot_controller* controller) {
@@ -225,6 +249,50 @@ int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains*
   return judge(*controller, wanted, q, true, margin);
 }
 
+int32_t dashpot_evaluate(const dashpot_controller* controller, const double* position,
+                         const double* velocity, dashpot_dynamics* dynamics) {
+  std::int32_t problem = check_result(controller, dynamics);
+  if (problem != DASHPOT_OK) return finish(problem);
+  JointVector q, qd = JointVector::Zero(controller->n);
+  problem = read_joints(controller, position, q);
+  if (problem == DASHPOT_OK && velocity != nullptr) problem = read_joints(controller, velocity, qd);
+  if (problem != DASHPOT_OK) return problem;
+  DynamicsResult at;
+  controller->kernel.evaluate(q, qd, at);
+  to_c(at, *dynamics);
+  return finish(DASHPOT_OK);
+}
+
+int32_t dashpot_analyze(const dashpot_controller* controller, const double* position, int32_t mode,
+                        const dashpot_gains* gains, dashpot_closed_loop* loop,
+                        dashpot_modes* modes) {
+  JointVector q;
+  std::int32_t problem = read_joints(controller, position, q);
+  if (problem != DASHPOT_OK) return problem;
+  if (loop != nullptr) problem = check_result(controller, loop);
+  if (modes != nullptr && problem == DASHPOT_OK) problem = check_result(controller, modes);
+  if (problem != DASHPOT_OK) return finish(problem);
+  if (mode != DASHPOT_MODE_JOINT && mode != DASHPOT_MODE_CARTESIAN) {
+    return finish(DASHPOT_WRONG_VALUE);
+  }
+  Gains wanted = controller->settings.initial.gains;
+  if (gains != nullptr) problem = read_gains(gains, controller->n, wanted);
+  if (problem != DASHPOT_OK) return problem;
+  try {
+    VibrationTask task;
+    Vibration found;
+    const Status status = controller->at_posture(q, wanted, static_cast<Mode>(mode), task, found);
+    if (status != Status::kOk) return finish(DASHPOT_WRONG_VALUE, to_text(status));
+    if (loop != nullptr) to_c(task.system, *loop);
+    if (modes != nullptr) to_c(found, *modes);
+    return finish(DASHPOT_OK);
+  } catch (const std::exception& error) {
+    return finish(DASHPOT_WRONG_VALUE, error.what());
+  } catch (...) {
+    return finish(DASHPOT_WRONG_VALUE, "unknown failure");
+  }
+}
+
 int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* snapshot) {
   const std::int32_t problem = check_result(controller, snapshot);
   if (problem != DASHPOT_OK) return finish(problem);
@@ -280,13 +348,14 @@ const char* dashpot_kind_text(int32_t kind) {
 
 const dashpot_plugin* dashpot_plugin_interface(uint32_t version) {
   static const dashpot_plugin functions = {
-      sizeof(dashpot_plugin), DASHPOT_PLUGIN_VERSION, dashpot_create,
-      dashpot_destroy,        dashpot_last_error,     dashpot_joints,
-      dashpot_joint_name,     dashpot_period,         dashpot_update,
-      dashpot_start,          dashpot_reset,          dashpot_release,
-      dashpot_set_setpoint,   dashpot_set_gains,      dashpot_judge_gains,
-      dashpot_read_snapshot,  dashpot_read_modes,     dashpot_read_sampled_modes,
-      dashpot_status_text,    dashpot_kind_text};
+      sizeof(dashpot_plugin),   DASHPOT_PLUGIN_VERSION, dashpot_create,
+      dashpot_create_from_text, dashpot_destroy,        dashpot_last_error,
+      dashpot_joints,           dashpot_joint_name,     dashpot_period,
+      dashpot_update,           dashpot_start,          dashpot_reset,
+      dashpot_release,          dashpot_set_setpoint,   dashpot_set_gains,
+      dashpot_judge_gains,      dashpot_evaluate,       dashpot_analyze,
+      dashpot_read_snapshot,    dashpot_read_modes,     dashpot_read_sampled_modes,
+      dashpot_status_text,      dashpot_kind_text};
   return version == DASHPOT_PLUGIN_VERSION ? &functions : nullptr;
 }
 

@@ -1,8 +1,8 @@
 // The robot's dynamics, and its closed loop with springs and dampers.
 
-#include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/python/src/analysis.hpp>
 #include <dashpot/python/src/robot.hpp>
@@ -11,7 +11,6 @@
 
 namespace dashpot::python {
 
-using controller::Controller;
 using controller::DynamicsResult;
 using controller::Gains;
 using controller::Joint;
@@ -51,45 +50,19 @@ Eigen::MatrixXd pose(const Robot& robot, const Eigen::VectorXd& q) {
   return T_BT;
 }
 
-/// Of a controller whose closed loop has the gains of its first set-point from the next tick on,
-/// wherever the robot is.
-Settings settings_for(const RobotModel& model, bool geometric_stiffness) {
-  constexpr double kFar = 1e5;  // rad
-  Settings settings = controller::default_settings(model);
-  settings.motion.gain_time = settings.period;
-  settings.analysis.where = controller::Analysis::Where::kOff;
-  settings.limits.position_lower.setConstant(-kFar);
-  settings.limits.position_upper.setConstant(kFar);
-  settings.task_terms.geometric_stiffness = geometric_stiffness;
-  return settings;
-}
-
 analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, const Gains& gains,
                                   controller::Mode mode, const OptionalVector& wrench) {
   const controller::SetpointFault fault = check_gains(gains, mode, robot.model.dof());
   if (fault) throw std::invalid_argument(std::string(fault.key) + " " + fault.reason);
-  Controller loop(robot.model, settings_for(robot.model, wrench.has_value()));
-  const DynamicsResult there = dynamics(robot, q, {});
-  controller::RobotState state;
-  state.position = q;
-  state.velocity = JointVector::Zero(q.size());
-  if (wrench) state.external_wrench = *wrench;
-  controller::Setpoint setpoint;
-  setpoint.mode = mode;
-  setpoint.joint_position = q;
-  setpoint.tip_pose = {there.p_BT_B, there.R_BT};
-  setpoint.gains = gains;
-  JointVector torque;
-  for (int tick = 1; tick <= 3; ++tick) {
-    state.time = setpoint.time = tick * 1'000'000;
-    const controller::Status status = loop.update(state, setpoint, torque);
-    if (status == controller::Status::kSetpointRejected ||
-        status > controller::Status::kWeightNotHeld) {
-      throw std::invalid_argument(std::string("closed loop: ") + to_text(status));
-    }
-  }
+  Settings settings = controller::default_settings(robot.model);
+  settings.task_terms.geometric_stiffness = wrench.has_value();
+  controller::PostureLoop loop(robot.model, settings);
   analysis::System<controller::kMaxJoints> system;
-  loop.closed_loop(system);
+  const controller::Status status = loop.closed_loop(
+      q, gains, mode, system, wrench.value_or(Eigen::VectorXd(Eigen::VectorXd::Zero(6))));
+  if (status != controller::Status::kOk) {
+    throw std::invalid_argument(std::string("closed loop: ") + to_text(status));
+  }
   analysis::System<> result(q.size());
   result.mass = system.mass;
   result.damping = system.damping;

@@ -83,12 +83,27 @@ class SampledModes(c.Structure):
                 ("status", c.c_int32), ("count", c.c_uint32), ("modes", SampledMode * MAX_JOINTS)]
 
 
+class Dynamics(c.Structure):
+    _fields_ = [("struct_size", c.c_uint32), ("joints", c.c_uint32),
+                ("mass", c.c_double * MAX_JOINTS ** 2), ("coriolis", c.c_double * MAX_JOINTS),
+                ("gravity", c.c_double * MAX_JOINTS), ("jacobian", c.c_double * (6 * MAX_JOINTS)),
+                ("jacobian_dot_qd", c.c_double * 6), ("tip_position", c.c_double * 3),
+                ("tip_rotation", c.c_double * 9)]
+
+
+class ClosedLoop(c.Structure):
+    _fields_ = [("struct_size", c.c_uint32), ("joints", c.c_uint32),
+                ("mass", c.c_double * MAX_JOINTS ** 2), ("damping", c.c_double * MAX_JOINTS ** 2),
+                ("stiffness", c.c_double * MAX_JOINTS ** 2)]
+
+
 Handle = c.c_void_p
 
 
 class Plugin(c.Structure):
     _fields_ = [("struct_size", c.c_uint32), ("version", c.c_uint32),
                 ("create", c.CFUNCTYPE(Handle, c.c_char_p)),
+                ("create_from_text", c.CFUNCTYPE(Handle, c.c_char_p, c.c_char_p)),
                 ("destroy", c.CFUNCTYPE(None, Handle)),
                 ("last_error", c.CFUNCTYPE(c.c_char_p)),
                 ("joints", c.CFUNCTYPE(c.c_uint32, Handle)),
@@ -103,6 +118,9 @@ class Plugin(c.Structure):
                 ("set_gains", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Gains))),
                 ("judge_gains", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Gains), Doubles,
                                             Doubles)),
+                ("evaluate", c.CFUNCTYPE(c.c_int32, Handle, Doubles, Doubles, c.POINTER(Dynamics))),
+                ("analyze", c.CFUNCTYPE(c.c_int32, Handle, Doubles, c.c_int32, c.POINTER(Gains),
+                                        c.POINTER(ClosedLoop), c.POINTER(Modes))),
                 ("read_snapshot", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Snapshot))),
                 ("read_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Modes))),
                 ("read_sampled_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(SampledModes))),
@@ -115,8 +133,8 @@ def load(path):
     library.dashpot_plugin_interface.restype = c.POINTER(Plugin)
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
-    plugin = library.dashpot_plugin_interface(6).contents
-    assert plugin.version == 6 and plugin.struct_size == c.sizeof(Plugin)
+    plugin = library.dashpot_plugin_interface(7).contents
+    assert plugin.version == 7 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
 
@@ -179,6 +197,19 @@ def main(library, config):
     expect(plugin, plugin.set_setpoint(arm, goal))
     run(450)
     before = product_of_frequencies()
+
+    # Of all eigenvalues the product is det K / det M, whatever the damping.
+    loop = ClosedLoop(struct_size=c.sizeof(ClosedLoop))
+    here = Modes(struct_size=c.sizeof(Modes))
+    expect(plugin, plugin.analyze(arm, position, 0, None, loop, here))
+    first = math.prod(here.modes[i].natural_frequency for i in range(n))
+    stiffness = math.prod(loop.stiffness[i * (n + 1)] for i in range(n))
+    assert abs(before / first * (stiffness / 50 ** n) ** 0.5 - 1) < 1e-9
+    weight = Dynamics(struct_size=c.sizeof(Dynamics))
+    expect(plugin, plugin.evaluate(arm, position, None, weight))
+    assert list(weight.mass[:n * n]) == list(loop.mass[:n * n])
+    assert all(abs(weight.gravity[i] - torque[i]) < 1e-9 for i in range(n))
+
     set_stiffness(400)
     for _ in range(3):
         expect(plugin, plugin.set_setpoint(arm, goal))

@@ -72,7 +72,7 @@ inline const std::vector<Room>& rooms() {
        4,
        {},
        {kAnalysis, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
-      {"controller/core", 5, {"controller", "gain_judge"}, {kAnalysis, kEigen}},
+      {"controller/core", 5, {"controller", "gain_judge", "posture_loop"}, {kAnalysis, kEigen}},
       {"controller/audit", 5, {"audit"}, {kAnalysis, kEigen}},
       {"controller/config", 6, {"config"}, {kEigen}},
       {"controller/plugin", 7, {"plugin"}, {kAnalysis, kEigen, "stdint.h"}},  // plugin.h is C

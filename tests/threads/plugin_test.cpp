@@ -38,7 +38,8 @@ TEST(Plugin, ShowsItsFunctionsAndNothingElse) {
     names.insert(name);
   }
   EXPECT_THAT(names, ::testing::UnorderedElementsAre(
-                         "dashpot_create", "dashpot_destroy", "dashpot_last_error",
+                         "dashpot_create", "dashpot_create_from_text", "dashpot_evaluate",
+                         "dashpot_analyze", "dashpot_destroy", "dashpot_last_error",
                          "dashpot_joints", "dashpot_joint_name", "dashpot_period", "dashpot_update",
                          "dashpot_start", "dashpot_reset", "dashpot_release", "dashpot_judge_gains",
                          "dashpot_set_setpoint", "dashpot_set_gains", "dashpot_read_snapshot",
