@@ -309,7 +309,8 @@ TEST_F(Filter, FadesTowardWhatIsAskedForNow) {
   settings.limits.torque_rate = Pair(1000, 500);
   SafetyFilter filter = make();
   filter.reset(Pair(20, 4));
-  const std::uint64_t seed = ::testing::UnitTest::GetInstance()->random_seed() + 1;
+  const auto seed =
+      static_cast<std::uint64_t>(::testing::UnitTest::GetInstance()->random_seed()) + 1;
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937_64 engine(seed);
   std::uniform_real_distribution<double> uniform(-60, 60);
