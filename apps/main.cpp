@@ -33,6 +33,8 @@ int run(int argc, char** argv) {
   add_design(program);
   add_audit(program);
   add_run(program);
+  add_drive(program);
+  add_fake_driver(program);
 
   const auto name = [&program] {
     const auto chosen = program.get_subcommands();

@@ -28,6 +28,8 @@ void add_monitor(CLI::App& program);
 void add_design(CLI::App& program);
 void add_audit(CLI::App& program);
 void add_run(CLI::App& program);
+void add_drive(CLI::App& program);
+void add_fake_driver(CLI::App& program);
 
 /// Writes all of `text` to standard output, what could steer a terminal as escapes (files and
 /// messages hold names that others chose). Throws std::runtime_error if that fails.

@@ -1,6 +1,5 @@
 #include <dashpot/apps/loop/closed_loop.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
-#include <dashpot/controller/setpoint_check.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -27,12 +26,19 @@ double guidance_time(const Scene& scene) {
   return std::max(kShortestWay, 1.875 * way.cwiseQuotient(speed).maxCoeff());
 }
 
+/// Ticks between two repetitions of a set-point.
+std::int64_t repetition(const Scene& scene) {
+  return std::max<std::int64_t>(1, std::llround(kRepeat / scene.plant.period));
+}
+
 }  // namespace
 
 ClosedLoop::ClosedLoop(const Scene& scene, LoopController& controller)
-    : scene_(scene), controller_(controller), mechanism_(make_mechanism(scene)) {
+    : scene_(scene),
+      controller_(controller),
+      mechanism_(make_mechanism(scene)),
+      goal_(controller, repetition(scene)) {
   torque_ = JointVector::Zero(scene.dof());
-  repeat_every_ = std::max<std::int64_t>(1, std::llround(kRepeat / scene.plant.period));
   sim::PlantOptions options = scene.plant;
   if (scene.arm) {
     begin();
@@ -46,13 +52,13 @@ ClosedLoop::ClosedLoop(const Scene& scene, LoopController& controller)
 }
 
 void ClosedLoop::begin() {
-  setpoint_ = accepted_ = scene_.steps.front().setpoint;
-  gains_ = setpoint_.gains;
+  const controller::Setpoint& first = scene_.steps.front().setpoint;
   std::string reason;
   if (controller_.start(scene_.outside_limits ? scene_.start : scene_.rest, reason) != DASHPOT_OK ||
-      controller_.set_gains(gains_, reason) != DASHPOT_OK) {
+      controller_.set_gains(first.gains, reason) != DASHPOT_OK) {
     throw InputError("scenario.start", "the controller refuses it: " + reason);
   }
+  goal_.begin(first);
 }
 
 void ClosedLoop::guide(const JointVector& from, const JointVector& to, double duration,
@@ -73,8 +79,8 @@ void ClosedLoop::guide(const JointVector& from, const JointVector& to, double du
         way == 0 ? JointVector(0 * from)
                  : JointVector((slope / (static_cast<double>(way) * period)) * (to - from));
     const std::int64_t time = std::llround(kNanoseconds * period * static_cast<double>(i - ticks));
-    if (i % repeat_every_ == 0) setpoint_.time = time;
-    const std::int32_t status = controller_.update(time, q, qd, &setpoint_, torque_);
+    const std::int32_t status = controller_.update(time, q, qd, goal_.told(time), torque_);
+    goal_.note_status(status);
     if (status >= DASHPOT_SETPOINT_REJECTED && !scene_.outside_limits) {
       throw InputError("scenario.start", "the controller reports status " + std::to_string(status));
     }
@@ -94,15 +100,9 @@ std::int32_t ClosedLoop::control() noexcept {
   const std::int64_t tick = ticks_++;
   if (fault != nullptr && (fault->every == 0 || tick % fault->every != 0)) return status_;
   const sim::Measurement& measured = plant_->measured();
-  if (news_) setpoint_.time = measured.time;
-  const bool told = scene_.arm && in_force_;
   status_ = controller_.update(measured.time, measured.position, measured.velocity,
-                               told ? &setpoint_ : nullptr, torque_);
-  // What was rejected shows in the status, once; then what was held before goes on.
-  const bool rejected = told && news_ && status_ == DASHPOT_SETPOINT_REJECTED;
-  if (rejected) setpoint_ = accepted_;
-  if (told && news_ && !rejected) accepted_ = setpoint_;
-  news_ = rejected;
+                               scene_.arm ? goal_.told(measured.time) : nullptr, torque_);
+  goal_.note_status(status_);
   if (status_ < 0) torque_.setZero();  // a refused call leaves the robot to its host
   return status_;
 }
@@ -139,48 +139,11 @@ void ClosedLoop::carry(const LoopFault& fault) noexcept {
 void ClosedLoop::follow_scenario() noexcept {
   if (!scene_.arm) return;
   const auto& steps = scene_.steps;
-  if (ticks_ % repeat_every_ == 0) news_ = true;
   while (next_step_ < steps.size() && steps[next_step_].at <= plant_->time()) {
-    hold(steps[next_step_++].setpoint);
+    goal_.hold(steps[next_step_++].setpoint);
     due_steps_.store(next_step_, std::memory_order_release);
   }
   if (!leave_gains_) follow_gains();
-  // New gains count with a set-point that is read again.
-  const std::int64_t changes = gain_changes_.load(std::memory_order_acquire);
-  if (changes != gain_changes_seen_) news_ = true;
-  gain_changes_seen_ = changes;
-}
-
-void ClosedLoop::hold(const controller::Setpoint& setpoint) noexcept {
-  setpoint_ = setpoint;
-  in_force_ = news_ = true;
-}
-
-void ClosedLoop::note_fault(bool latched) noexcept {
-  if (latched) in_force_ = false;
-  if (faulted_ && !latched && !released_.exchange(false, std::memory_order_acquire)) {
-    in_force_ = news_ = true;
-  }
-  faulted_ = latched;
-}
-
-std::int32_t ClosedLoop::change_gains(const std::function<void(controller::Gains&)>& change,
-                                      std::string& reason) {
-  const std::lock_guard lock(mutex_);
-  controller::Gains wanted = gains_;
-  change(wanted);
-  if (controller::same_gains(wanted, gains_)) return DASHPOT_OK;
-  const std::int32_t code = controller_.set_gains(wanted, reason);
-  if (code != DASHPOT_OK) return code;
-  gains_ = wanted;
-  gain_changes_.fetch_add(1, std::memory_order_release);
-  return code;
-}
-
-void ClosedLoop::release() {
-  const std::lock_guard lock(mutex_);
-  released_.store(true, std::memory_order_release);  // first, so that no tick takes it for its own
-  controller_.release();
 }
 
 void ClosedLoop::follow_gains() {
@@ -189,7 +152,7 @@ void ClosedLoop::follow_gains() {
   followed_steps_ = due;
   const controller::Gains& wanted = scene_.steps[due - 1].setpoint.gains;
   const auto change = [&wanted](controller::Gains& gains) { gains = wanted; };
-  if (change_gains(change, refusal_) != DASHPOT_OK) ++refused_steps_;
+  if (goal_.change_gains(change, refusal_) != DASHPOT_OK) ++refused_steps_;
 }
 
 }  // namespace dashpot::apps

@@ -1,11 +1,9 @@
 #pragma once
-#include <dashpot/apps/loop/loop_controller.hpp>
+#include <dashpot/apps/loop/loop_goal.hpp>
 #include <dashpot/apps/scene/scene.hpp>
 
 #include <atomic>
 #include <cstdint>
-#include <functional>
-#include <mutex>
 #include <optional>
 #include <string>
 
@@ -44,23 +42,10 @@ class ClosedLoop {
   std::int32_t control() noexcept;
   /// The robot's part: one period under that torque.
   sim::Status move() noexcept;
-  /// Goes there from the next tick on; the scenario's steps to come still take their turn. The
-  /// gains of `setpoint` do not count.
-  void hold(const controller::Setpoint& setpoint) noexcept;
-  /// What the controller was told to hold last.
-  const controller::Setpoint& setpoint() const noexcept { return setpoint_; }
-  /// After a tick: whether a fault is latched. Meanwhile nothing is held. Whoever releases it finds
-  /// the robot held where it is until there is news; if the controller has let go of the fault by
-  /// itself, what was held before goes on.
-  void note_fault(bool latched) noexcept;
+  /// What the scenario, or a command in its place, wants.
+  LoopGoal& goal() noexcept { return goal_; }
 
-  // Other threads, which may have to wait for each other:
-  /// Changes the gains in force; DASHPOT_OK, or the code of the controller's refusal, with its
-  /// reason in one line.
-  std::int32_t change_gains(const std::function<void(controller::Gains&)>& change,
-                            std::string& reason);
-  /// Releases a latched fault at the next tick.
-  void release();
+  // Another thread:
   /// From now on follow_scenario() leaves the gains of the scenario's steps to follow_gains().
   /// Before the loop begins.
   void leave_gains() noexcept { leave_gains_ = true; }
@@ -85,31 +70,20 @@ class ClosedLoop {
   std::unique_ptr<sim::System> mechanism_;
   sim::Arm* arm_ = nullptr;  // the mechanism, if it is one
   std::optional<sim::Plant> plant_;
+  LoopGoal goal_;
   bool leave_gains_ = false;
 
   // The loop's own:
   JointVector torque_;
-  controller::Setpoint setpoint_;
-  controller::Setpoint accepted_;  ///< the last that the controller did not reject
-  bool in_force_ = true;           ///< of setpoint_
-  bool news_ = true;               ///< setpoint_ is to be read again
-  bool faulted_ = false;           ///< a fault was latched after the last tick
   std::size_t next_step_ = 0;
-  std::int64_t repeat_every_ = 1;  // ticks
-  std::int64_t ticks_ = 0;         // since the start
+  std::int64_t ticks_ = 0;  // since the start
   std::int32_t status_ = DASHPOT_OK;
   const LoopFault* hand_ = nullptr;  // the fault in which a hand has taken the robot,
   JointVector taken_at_;             // and where
   Extremes extremes_;
 
   // Between the threads:
-  std::atomic<std::size_t> due_steps_{0};      ///< steps whose time has come
-  std::atomic<std::int64_t> gain_changes_{0};  ///< so far
-  std::atomic<bool> released_{false};          ///< somebody asked for the release of the fault
-  std::int64_t gain_changes_seen_ = 0;         ///< by the loop
-
-  std::mutex mutex_;  ///< of what follows, and of the controller's functions for other threads
-  controller::Gains gains_;
+  std::atomic<std::size_t> due_steps_{0};  ///< steps whose time has come
 
   // Of the thread that follows the scenario's gains:
   std::size_t followed_steps_ = 0;

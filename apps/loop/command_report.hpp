@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/apps/loop/loop_thread.hpp>
+#include <dashpot/apps/loop/loop_journal.hpp>
 #include <dashpot/lcmtypes/command_verdict.hpp>
 
 #include <nlohmann/json_fwd.hpp>

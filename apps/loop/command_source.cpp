@@ -8,7 +8,7 @@ namespace {
 using lcmtypes::Command;
 
 /// The receiver's part of a command that is in order: false if the controller refuses its gains.
-bool carry_out(const Command& command, ClosedLoop& loop, std::string& reason) {
+bool carry_out(const Command& command, LoopGoal& goal, std::string& reason) {
   const std::int64_t before = command.accepted - 1;
   const auto change = [&command, before](controller::Gains& gains) {
     controller::Setpoint changed;
@@ -16,18 +16,18 @@ bool carry_out(const Command& command, ClosedLoop& loop, std::string& reason) {
     lcmtypes::apply(command, changed, before);
     gains = changed.gains;
   };
-  if (loop.change_gains(change, reason) != DASHPOT_OK) return false;
-  if (lcmtypes::has_set(command, command_t::RELEASE, before)) loop.release();
+  if (goal.change_gains(change, reason) != DASHPOT_OK) return false;
+  if (lcmtypes::has_set(command, command_t::RELEASE, before)) goal.release();
   return true;
 }
 
 }  // namespace
 
 CommandSource::CommandSource(std::shared_ptr<lcm::LCM> bus, const lcmtypes::CommandLimits& limits,
-                             ClosedLoop& loop)
-    : loop_(loop),
-      receiver_(std::move(bus), limits, [&loop](const Command& command, std::string& reason) {
-        return carry_out(command, loop, reason);
+                             LoopGoal& goal)
+    : goal_(goal),
+      receiver_(std::move(bus), limits, [&goal](const Command& command, std::string& reason) {
+        return carry_out(command, goal, reason);
       }) {}
 
 bool CommandSource::take() noexcept {
@@ -42,9 +42,9 @@ bool CommandSource::take() noexcept {
     taken_ = taken_ || ((kGoals & part) != 0 && lcmtypes::has_set(command, part, before));
   }
   if (taken_) {
-    controller::Setpoint setpoint = loop_.setpoint();
+    controller::Setpoint setpoint = goal_.setpoint();
     lcmtypes::apply(command, setpoint, before);
-    loop_.hold(setpoint);
+    goal_.hold(setpoint);
   }
   return lcmtypes::has_set(command, command_t::RELEASE, before);
 }

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/apps/loop/closed_loop.hpp>
+#include <dashpot/apps/loop/loop_goal.hpp>
 #include <dashpot/lcmtypes/command_receiver.hpp>
 
 #include <cstdint>
@@ -8,14 +8,14 @@
 
 namespace dashpot::apps {
 
-/// Takes commands for a closed loop from a bus. Gains and releases go to the controller on the
+/// Takes commands for a loop from a bus. Gains and releases go to the controller on the
 /// receiver's thread, because gains are judged, which may take milliseconds; what it refuses is
 /// refused whole. The rest goes to the loop's thread.
 class CommandSource {
  public:
-  /// `loop` must outlive it. Otherwise as CommandReceiver.
+  /// `goal` must outlive it. Otherwise as CommandReceiver.
   CommandSource(std::shared_ptr<lcm::LCM> bus, const lcmtypes::CommandLimits& limits,
-                ClosedLoop& loop);
+                LoopGoal& goal);
 
   // The loop's thread; none of these ever waits.
   /// Before a tick: tells the loop where to go. True if a fault is released with this tick.
@@ -31,7 +31,7 @@ class CommandSource {
   std::string last_reason() const { return receiver_.last_reason(); }
 
  private:
-  ClosedLoop& loop_;
+  LoopGoal& goal_;
   std::int64_t commands_ = 0;  ///< accepted ones that the loop was told
   bool taken_ = false;
   lcmtypes::CommandReceiver receiver_;

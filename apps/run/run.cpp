@@ -124,7 +124,7 @@ RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
   RunReport report;
   report.pace = options.fast ? Pace::kFast : Pace::kRealTime;
   std::optional<CommandSource> commands;
-  if (options.commands) commands.emplace(bus, scene.commands, loop);
+  if (options.commands) commands.emplace(bus, scene.commands, loop.goal());
   lcmtypes::Publisher publisher(make_sinks(options, bus));
   if (!options.fast) publisher.start();
   const double period = scene.plant.period;

@@ -13,6 +13,10 @@ using controller::Units;
 using controller::YamlMapping;
 using controller::YamlNode;
 
+constexpr std::array<std::string_view, 11> kArmKeys = {
+    "robot",    "control",  "gains",    "limits",     "motion",  "feed_forward",
+    "watchdog", "analysis", "commands", "simulation", "scenario"};
+
 /// What the controller believes of the robot, which is true unless `simulation.robot` says
 /// otherwise.
 sim::RobotParameters believed(const controller::Config& config) {
@@ -27,11 +31,16 @@ sim::RobotParameters believed(const controller::Config& config) {
   return parameters;
 }
 
+lcmtypes::CommandLimits command_limits(const YamlMapping& root, const controller::Config& config) {
+  lcmtypes::CommandLimits limits;
+  limits.position_lower = config.settings.limits.position_lower;
+  limits.position_upper = config.settings.limits.position_upper;
+  read_commands(root, limits);
+  return limits;
+}
+
 void read_arm(const YamlNode& document, const std::filesystem::path& directory, Scene& scene) {
-  static constexpr std::array<std::string_view, 11> kKeys = {
-      "robot",    "control",  "gains",    "limits",     "motion",  "feed_forward",
-      "watchdog", "analysis", "commands", "simulation", "scenario"};
-  const YamlMapping root(document, "", kKeys);
+  const YamlMapping root(document, "", kArmKeys);
   if (!root.has("scenario")) {
     throw InputError("scenario",
                      "missing: this is a configuration of the controller, for dashpot_create; a "
@@ -43,9 +52,7 @@ void read_arm(const YamlNode& document, const std::filesystem::path& directory, 
   const Units positions = controller::joint_units(config.model, "rad", "m");
   ArmSimulation simulation{believed(config), {}};
   scene.plant.period = config.settings.period;
-  scene.commands.position_lower = config.settings.limits.position_lower;
-  scene.commands.position_upper = config.settings.limits.position_upper;
-  read_commands(root, scene.commands);
+  scene.commands = command_limits(root, config);
   read_simulation(root, positions, scene.plant, &simulation);
   try {
     scene.arm.emplace(ControlledArm{
@@ -111,6 +118,17 @@ Scene load_scene(const std::string& path) try {
   }
   check(scene);
   return scene;
+} catch (const InputError& error) {
+  throw error.in_file(path);
+}
+
+CommandedConfig load_commanded_config(const std::string& path) try {
+  const YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
+  controller::Config config =
+      controller::read_config(document, std::filesystem::path(path).parent_path());
+  const lcmtypes::CommandLimits limits =
+      command_limits(YamlMapping(document, "", kArmKeys), config);
+  return {std::move(config), limits};
 } catch (const InputError& error) {
   throw error.in_file(path);
 }

@@ -11,6 +11,15 @@ namespace dashpot::apps {
 /// sim/scenes has examples with all keys. Throws InputError.
 Scene load_scene(const std::string& path);
 
+/// A configuration of the controller, and what may be commanded over a bus: all that a loop with a
+/// robot needs.
+struct CommandedConfig {
+  controller::Config config;
+  lcmtypes::CommandLimits commands;
+};
+/// Reads it from a configuration file or a scene, whose other keys are ignored. Throws InputError.
+CommandedConfig load_commanded_config(const std::string& path);
+
 /// The mechanism of the scene.
 std::unique_ptr<sim::System> make_mechanism(const Scene& scene);
 

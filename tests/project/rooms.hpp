@@ -96,6 +96,11 @@ inline const std::vector<Room>& rooms() {
        1,
        {"command", "command_limits", "command_filter", "command_receiver"},
        snapshots},
+      {"lcmtypes/drivers",
+       1,
+       {"driver", "lcmt_iiwa_command", "lcmt_iiwa_status", "lcmt_panda_command",
+        "lcmt_panda_status"},
+       snapshots},
 
       {"apps/cli", 0, {}, {""}},
       {"apps/analyze", 1, {}, {""}},
@@ -105,6 +110,8 @@ inline const std::vector<Room>& rooms() {
       {"apps/loop", 2, {}, {""}},
       {"apps/audit", 3, {}, {""}},
       {"apps/run", 3, {}, {""}},
+      {"apps/drive", 3, {}, {""}},
+      {"apps/fake_driver", 3, {}, {""}},
       {"apps/monitor", 3, {}, {""}},
       {"apps", 4, {}, {""}},
 

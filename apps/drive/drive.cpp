@@ -1,0 +1,230 @@
+#include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/output_file.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/drive/drive_report.hpp>
+#include <dashpot/apps/loop/privileges.hpp>
+#include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/lcmtypes/bus.hpp>
+#include <dashpot/lcmtypes/publisher.hpp>
+#include <dashpot/lcmtypes/sink.hpp>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <lcm/lcm-cpp.hpp>
+#include <memory>
+#include <optional>
+#include <utility>
+
+namespace dashpot::apps {
+namespace {
+
+struct DriveOptions {
+  std::string config, url, log, plugin;
+  std::optional<double> duration;
+  bool iiwa = false;
+  bool panda = false;
+  bool dry_run = false;
+  bool commands = false;
+  bool json = false;
+};
+
+std::int64_t utime_now() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
+
+/// Puts what arrives on the driver's channels aside: of several statuses the newest.
+class Inbox {
+ public:
+  Inbox(lcm::LCM& bus, lcmtypes::DriverKind driver, DriveSession& session)
+      : driver_(driver), session_(session) {
+    const lcmtypes::DriverProfile& profile = lcmtypes::profile_of(driver);
+    bus.subscribe(profile.status_channel, &Inbox::take_status, this);
+    bus.subscribe(profile.command_channel, &Inbox::take_command, this);
+  }
+
+  std::optional<lcmtypes::DriverStatus> newest;
+  std::int64_t arrived = 0;  ///< us since 1970-01-01 UTC
+
+ private:
+  void take_status(const lcm::ReceiveBuffer* buffer, const std::string&) {
+    lcmtypes::DriverStatus status;
+    if (!decode(driver_, buffer->data, buffer->data_size, status)) {
+      ++session_.record.unreadable;
+      return;
+    }
+    if (newest) {
+      ++session_.record.overtaken;
+      if (status.utime <= newest->utime) return;  // reordered: the one before is newer
+    }
+    newest = std::move(status);
+    arrived = buffer->recv_utime;
+  }
+  void take_command(const lcm::ReceiveBuffer* buffer, const std::string&) {
+    session_.hear_command(buffer->data, buffer->data_size);
+  }
+
+  lcmtypes::DriverKind driver_;
+  DriveSession& session_;
+};
+
+/// Answers statuses until the user, or the time, or a refusal ends it. Returns why it ended.
+std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::DriverKind driver,
+                     DriveSession& session) {
+  constexpr int kWait = 50;       // ms
+  constexpr double kSilence = 2;  // s without a status, before the user is told
+  const lcmtypes::DriverProfile& profile = lcmtypes::profile_of(driver);
+  Inbox inbox(bus, driver, session);
+  lcmtypes::DriverCommand command;
+  std::vector<std::uint8_t> bytes;
+  std::int64_t heard = utime_now(), began = 0;
+  bool told = false;
+  while (!StopSignal::given()) {
+    if (began > 0 && options.duration &&
+        1e-6 * static_cast<double>(utime_now() - began) >= *options.duration) {
+      return "ended after its time";
+    }
+    const int handled = bus.handleTimeout(kWait);
+    if (handled < 0) throw std::runtime_error("the LCM bus failed");
+    if (handled == 0) {
+      if (!told && 1e-6 * static_cast<double>(utime_now() - heard) > kSilence) {
+        print_error(std::string("no status on ") + profile.status_channel + " for 2 s");
+        told = true;
+      }
+      continue;
+    }
+    while (bus.handleTimeout(0) > 0) {
+    }
+    if (!inbox.newest) continue;
+    const std::int64_t now = utime_now();
+    heard = now;
+    told = false;
+    const lcmtypes::DriverStatus status = std::move(*inbox.newest);
+    inbox.newest.reset();
+    const bool answers =
+        session.take(status, 1e-6 * static_cast<double>(now - inbox.arrived), now, command);
+    if (began == 0 && session.running()) {
+      began = now;
+      std::fprintf(
+          stderr, "%s\n",
+          options.dry_run ? "watching; nothing is commanded" : "the arm is held where it is");
+    }
+    if (answers) {
+      encode(driver, command, bytes);
+      const int failed =
+          bus.publish(profile.command_channel, bytes.data(), static_cast<unsigned>(bytes.size()));
+      if (failed != 0) throw std::runtime_error("a command could not be sent");
+      session.note_sent(bytes, 1e-6 * static_cast<double>(utime_now() - inbox.arrived));
+    }
+    const std::string warning = session.warning();
+    if (!warning.empty()) print_error(warning);
+  }
+  return "ended by the user";
+}
+
+std::vector<std::unique_ptr<lcmtypes::Sink>> drive_sinks(const DriveOptions& options,
+                                                         const std::shared_ptr<lcm::LCM>& bus) {
+  std::vector<std::unique_ptr<lcmtypes::Sink>> sinks;
+  sinks.push_back(lcmtypes::make_bus_sink(bus));
+  try {
+    if (!options.log.empty()) sinks.push_back(lcmtypes::make_log_sink(options.log));
+  } catch (const std::runtime_error& error) {
+    throw InputError("--log", error.what());
+  }
+  return sinks;
+}
+
+std::shared_ptr<lcm::LCM> drive_bus(const DriveOptions& options) try {
+  return lcmtypes::open_bus(options.url);
+} catch (const std::runtime_error& error) {
+  throw InputError("--lcm-url", error.what());
+}
+
+void drive(const DriveOptions& options) {
+  if (options.iiwa == options.panda) throw InputError("--iiwa, --panda", "one of them is wanted");
+  const auto driver = options.iiwa ? lcmtypes::DriverKind::kIiwa : lcmtypes::DriverKind::kPanda;
+  const CommandedConfig file = load_commanded_config(options.config);
+  check_outputs({{"--log", options.log}}, {{"the configuration", options.config},
+                                           {"--plugin", options.plugin},
+                                           {"the robot description", file.config.robot.urdf}});
+  const PluginLibrary plugin(options.plugin);
+  const auto controller = plugin.create(options.config, file.config.model.dof());
+  constexpr double kRepeat = 0.1;  // s between two repetitions of a set-point
+  LoopGoal goal(*controller,
+                std::max<std::int64_t>(1, std::llround(kRepeat / file.config.settings.period)));
+  const std::shared_ptr<lcm::LCM> bus = drive_bus(options);
+  std::optional<CommandSource> commands;
+  if (options.commands) commands.emplace(drive_bus(options), file.commands, goal);
+  lcmtypes::Publisher publisher(drive_sinks(options, bus));
+  LoopJournal journal(*controller, goal, publisher, commands ? &*commands : nullptr,
+                      LoopJournal::Pace::kRealTime);
+  DriveReport report;
+  DriveSession session(file.config, *controller, goal, journal, {driver, options.dry_run});
+  const StopSignal stop;
+  lock_memory();
+  publisher.start();
+  schedule_ahead_of_others();
+  std::exception_ptr failure;
+  try {
+    report.ended = converse(options, *bus, driver, session);
+  } catch (const InputError& error) {
+    if (!session.running()) throw;
+    report.ended = error.what();
+    failure = std::current_exception();
+  } catch (const std::exception& error) {
+    report.ended = error.what();
+    failure = std::current_exception();
+  }
+  publisher.stop();
+  report.config = options.config;
+  report.driver = driver;
+  report.dry_run = options.dry_run;
+  report.running = session.running();
+  report.drive = session.record;
+  report.loop = journal.record;
+  report.messages = publisher.counters();
+  if (commands) report.commands = {commands->tally(), commands->last_reason()};
+  print(options.json ? to_json(report) : to_table(report));
+  if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace
+
+void add_drive(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("drive", "Drives a real arm through its public LCM driver");
+  const auto options = std::make_shared<DriveOptions>();
+  command
+      ->add_option("config", options->config,
+                   "Configuration file of the controller: controller/examples has some")
+      ->required()
+      ->option_text("FILE");
+  CLI::Option* iiwa = command->add_flag("--iiwa", options->iiwa, "By drake-iiwa-driver");
+  command->add_flag("--panda", options->panda, "By drake-franka-driver")->excludes(iiwa);
+  command->add_flag("--dry-run", options->dry_run,
+                    "Computes and publishes everything, and commands nothing");
+  command->add_flag("--commands", options->commands,
+                    "Take commands from the bus; without it none are taken");
+  command->add_option("--duration", options->duration, "Ends after this time, s")
+      ->transform(quantity("s", 1e-3, 1e7, "a time from 1e-3 to 1e7 s"))
+      ->option_text("S");
+  command
+      ->add_option("--lcm-url", options->url,
+                   "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine")
+      ->option_text("URL");
+  command->add_option("--log", options->log, "LCM log to write")->option_text("FILE");
+  command->add_option("--plugin", options->plugin, "Controller to load instead of Dashpot's own")
+      ->option_text("FILE");
+  command->add_flag("--json", options->json, "End with one JSON object instead of a table");
+  command->footer(
+      "Read docs/drive.md first; begin with --dry-run. Ctrl-C ends it: the driver then "
+      "does what it does\nwithout commands.\n" +
+      std::string(kExitStatusHelp));
+  command->callback([options] { drive(*options); });
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,28 @@
+#pragma once
+#include <dashpot/apps/drive/drive_session.hpp>
+#include <dashpot/apps/loop/command_report.hpp>
+
+#include <optional>
+#include <string>
+
+namespace dashpot::apps {
+
+/// What `dashpot drive` has to tell at its end.
+struct DriveReport {
+  std::string config;  ///< the file
+  lcmtypes::DriverKind driver = lcmtypes::DriverKind::kIiwa;
+  bool dry_run = false;
+  bool running = false;  ///< the conversation has begun
+  std::string ended;     ///< why, in one line
+  DriveRecord drive;
+  LoopRecord loop;
+  lcmtypes::PublisherCounters messages;
+  std::optional<CommandReport> commands;  ///< if any were to be taken
+};
+
+/// For people: lines, each ended by a newline.
+std::string to_table(const DriveReport& report);
+/// One JSON object. docs/drive.md lists the keys.
+std::string to_json(const DriveReport& report);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,237 @@
+#include <dashpot/apps/drive/drive_session.hpp>
+#include <dashpot/controller/dynamics.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace dashpot::apps {
+namespace {
+
+using lcmtypes::DriverCommand;
+using lcmtypes::DriverKind;
+using lcmtypes::DriverStatus;
+
+constexpr std::int64_t kWatch = 300'000;  // us of statuses before the start
+constexpr std::size_t kFewest = 20;       // of them
+constexpr double kPeriodTolerance = 0.2;  // of the period
+constexpr double kOldest = 2;             // periods that a status may be old
+constexpr double kNearLimit = 0.8;        // of an external torque with which the driver stops
+constexpr std::size_t kRemembered = 64;   // commands sent
+constexpr std::size_t kMostLatencies = 1 << 24;
+
+std::string number(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.4g", value);
+  return text.data();
+}
+
+bool finite(const DriverStatus& status) {
+  return status.position.allFinite() && status.velocity.allFinite();
+}
+
+/// Throws unless the controller knows the loop that this driver closes.
+void check_loop(const controller::Settings& settings, DriverKind driver) {
+  const controller::Analysis::Sampled& loop = settings.analysis.sampled;
+  if (settings.feed_forward.gravity) {
+    throw InputError("feed_forward.gravity",
+                     "must be false: the driver compensates gravity, which would act twice");
+  }
+  if (loop.delay < 1) {
+    throw InputError("analysis.sampled.delay",
+                     "must be at least 1: a command acts a period after its status at the soonest");
+  }
+  if (driver == DriverKind::kIiwa && !loop.difference_velocity) {
+    throw InputError("analysis.sampled.difference_velocity",
+                     "must be true: velocities are differenced here, because those of the driver "
+                     "went through its low-pass of 40 Hz");
+  }
+  if (driver == DriverKind::kPanda && !(loop.cutoff > 0)) {
+    throw InputError("analysis.sampled.cutoff",
+                     "must be that of the driver's low-pass on torques (--low_pass_freq), 30 Hz "
+                     "unless it is set");
+  }
+}
+
+}  // namespace
+
+DriveSession::DriveSession(const controller::Config& config, LoopController& controller,
+                           LoopGoal& goal, LoopJournal& journal, const Options& options)
+    : config_(config),
+      controller_(controller),
+      goal_(goal),
+      journal_(journal),
+      options_(options),
+      profile_(lcmtypes::profile_of(options.driver)),
+      n_(config.model.dof()) {
+  check_loop(config.settings, options.driver);
+  torque_ = record.external = JointVector::Zero(n_);
+}
+
+bool DriveSession::stopped_by_itself(const DriverStatus& status) const noexcept {
+  // libfranka's modes: 3 guiding, 4 reflex, 5 stopped by the user, 6 recovers
+  return options_.driver == DriverKind::kPanda && status.robot_mode >= 3 && status.robot_mode <= 6;
+}
+
+bool DriveSession::take(const DriverStatus& status, double age, std::int64_t utime,
+                        DriverCommand& command) {
+  ++record.statuses;
+  if (status.position.size() != n_ || status.velocity.size() != n_) {
+    if (running_) {
+      ++record.unreadable;
+      return false;
+    }
+    throw InputError("robot", "has " + std::to_string(n_) +
+                                  " joints from base to tip, the driver " +
+                                  std::to_string(status.position.size()));
+  }
+  if (status.utime < 0) return false;  // the iiwa's clock is not known yet
+  if (last_ > 0 && status.utime <= last_) {
+    ++record.repeated;
+    return false;
+  }
+  const std::int64_t interval = last_ > 0 ? status.utime - last_ : 0;
+  last_ = status.utime;
+  if (stopped_by_itself(status)) {
+    ++record.stopped;
+    if (record.stopped == 1) {
+      warning_ = "the robot has stopped by itself (robot_mode " +
+                 std::to_string(status.robot_mode) + "): not answered";
+    }
+    first_ = 0;
+    intervals_.clear();
+    last_position_ = status.position;
+    return false;
+  }
+  if (!running_) {
+    if (interval > 0 && first_ > 0) intervals_.push_back(interval);
+    watch(status);
+    if (!running_) return false;
+  } else {
+    const double periods = 1e-6 * static_cast<double>(interval) / config_.settings.period;
+    record.lost += std::max<std::int64_t>(0, std::llround(periods) - 1);
+  }
+  if (age > kOldest * config_.settings.period) {
+    ++record.late;
+    return false;
+  }
+  note_external(status);
+
+  journal_.begin_tick();
+  JointVector velocity = status.velocity;
+  if (config_.settings.analysis.sampled.difference_velocity && interval > 0) {
+    velocity = (status.position - last_position_) / (1e-6 * static_cast<double>(interval));
+  }
+  last_position_ = status.position;
+  const std::int64_t time = 1000 * status.utime;
+  timespec begin{}, end{};
+  clock_gettime(CLOCK_MONOTONIC, &begin);
+  const std::int32_t code =
+      controller_.update(time, status.position, velocity, goal_.told(time), torque_);
+  clock_gettime(CLOCK_MONOTONIC, &end);
+  goal_.note_status(code);
+  if (code < 0) torque_.setZero();  // a refused call: nothing beyond the driver's gravity
+  const std::int64_t took =
+      (end.tv_sec - begin.tv_sec) * 1'000'000'000LL + end.tv_nsec - begin.tv_nsec;
+  journal_.note_tick(utime, code,
+                     static_cast<std::int32_t>(
+                         std::min<std::int64_t>(took, std::numeric_limits<std::int32_t>::max())));
+  journal_.end_tick();
+  if (options_.dry_run) {  // somebody else moves the arm as he likes: that is no fault of this loop
+    if (journal_.record.fault != DASHPOT_OK) goal_.release();
+    return false;
+  }
+  command.utime = utime;
+  // In KUKA's mode with springs of its own these would pull to an older position.
+  command.position = options_.driver == DriverKind::kIiwa ? status.position : JointVector();
+  command.torque = torque_;
+  return true;
+}
+
+/// Begins once enough was seen. What is not in order is said after the time it takes to be sure.
+void DriveSession::watch(const DriverStatus& status) {
+  if (first_ == 0) first_ = status.utime;
+  last_position_ = status.position;
+  const bool enough = status.utime - first_ >= kWatch && intervals_.size() >= kFewest;
+  if (!enough) return;
+  if (!finite(status)) {
+    throw InputError("", "the driver's status has positions or velocities that are no numbers");
+  }
+  if (foreign_ && !options_.dry_run) {
+    throw InputError("", std::string("somebody else commands on ") + profile_.command_channel +
+                             ": end that program first");
+  }
+  check_period();
+  begin(status);
+}
+
+void DriveSession::check_period() {
+  std::vector<std::int64_t> sorted = intervals_;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  record.period = 1e-6 * static_cast<double>(*middle);
+  const double wanted = config_.settings.period;
+  if (std::abs(record.period - wanted) > kPeriodTolerance * wanted) {
+    throw InputError("control.period", "is " + number(1e3 * wanted) +
+                                           " ms, but the driver's statuses come every " +
+                                           number(1e3 * record.period) + " ms");
+  }
+}
+
+void DriveSession::begin(const DriverStatus& status) {
+  std::string reason;
+  if (controller_.start(status.position, reason) != DASHPOT_OK) {
+    throw InputError("gains", "the controller refuses to start here: " + reason);
+  }
+  controller::Setpoint setpoint = config_.settings.initial;
+  setpoint.joint_position = status.position;
+  const auto there = controller::evaluate(config_.model, status.position, JointVector::Zero(n_));
+  setpoint.tip_pose = {there.p_BT_B, there.R_BT};
+  setpoint.wrench.setZero();
+  goal_.begin(setpoint);
+  running_ = true;
+}
+
+void DriveSession::note_external(const DriverStatus& status) {
+  if (status.external.size() != n_ || !status.external.allFinite()) return;
+  record.external = record.external.cwiseMax(status.external.cwiseAbs());
+  for (int i = 0; i < n_ && !warned_external_; ++i) {
+    if (static_cast<std::size_t>(i) >= profile_.external_torque.size()) break;
+    const double limit = profile_.external_torque[static_cast<std::size_t>(i)];
+    if (std::abs(status.external[i]) < kNearLimit * limit) continue;
+    warned_external_ = true;
+    warning_ = "joint " + std::to_string(i + 1) + ": external torque " +
+               number(status.external[i]) + " N m; the driver stops at " + number(limit) + " N m";
+  }
+}
+
+void DriveSession::hear_command(const void* data, std::size_t size) {
+  const auto* bytes = static_cast<const std::uint8_t*>(data);
+  for (const std::vector<std::uint8_t>& own : sent_) {
+    if (own.size() == size && std::equal(own.begin(), own.end(), bytes)) return;
+  }
+  foreign_ = true;
+  if (running_ && !options_.dry_run) {
+    throw std::runtime_error(std::string("somebody else commands on ") + profile_.command_channel +
+                             ": nothing more is sent");
+  }
+}
+
+void DriveSession::note_sent(const std::vector<std::uint8_t>& bytes, double latency) {
+  ++record.commands;
+  sent_.push_back(bytes);
+  if (sent_.size() > kRemembered) sent_.pop_front();
+  if (record.latencies.size() < kMostLatencies) {
+    record.latencies.push_back(static_cast<std::int32_t>(std::clamp(1e6 * latency, 0.0, 1e9)));
+  }
+}
+
+std::string DriveSession::warning() {
+  return std::exchange(warning_, std::string());
+}
+
+}  // namespace dashpot::apps

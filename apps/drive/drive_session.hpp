@@ -1,0 +1,89 @@
+#pragma once
+#include <dashpot/apps/loop/loop_journal.hpp>
+#include <dashpot/controller/config.hpp>
+#include <dashpot/lcmtypes/driver.hpp>
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// What was seen of a driver.
+struct DriveRecord {
+  std::int64_t statuses = 0;    ///< that arrived and could be read
+  std::int64_t unreadable = 0;  ///< messages on the status channel that are no status of this arm
+  std::int64_t repeated = 0;    ///< statuses no newer than one before: not answered
+  std::int64_t overtaken = 0;   ///< statuses with a newer one behind them: not answered
+  std::int64_t late = 0;        ///< statuses older than two periods: not answered
+  std::int64_t lost = 0;        ///< periods without a status between two of them
+  std::int64_t stopped = 0;     ///< statuses of a robot that has stopped by itself: not answered
+  std::int64_t commands = 0;    ///< sent
+  double period = 0;            ///< measured before the start, s
+  JointVector external;         ///< greatest external torque of each joint, N m
+  std::vector<std::int32_t> latencies;  ///< from a status's arrival to the command, us
+};
+
+/// The conversation with a driver: for each status at most one command. Refuses to begin unless
+/// everything is in order, and does nothing by itself: the driver is the clock.
+///
+/// Before the first command, statuses are watched for 0.3 s. Then the springs start where the robot
+/// is. A status that is repeated, out of order, or older than two periods is not answered; after a
+/// gap longer than watchdog.longest_gap the controller latches a fault. A driver whose robot has
+/// stopped by itself is not answered until it goes on.
+class DriveSession {
+ public:
+  struct Options {
+    lcmtypes::DriverKind driver = lcmtypes::DriverKind::kIiwa;
+    bool dry_run = false;  ///< computes and publishes everything, and commands nothing
+  };
+
+  /// All must outlive it. Throws InputError, which names the key, if the configuration is not one
+  /// for this driver's loop.
+  DriveSession(const controller::Config& config, LoopController& controller, LoopGoal& goal,
+               LoopJournal& journal, const Options& options);
+
+  /// Takes a status that arrived `age` s ago, at the time `utime`, us since 1970-01-01 UTC. Returns
+  /// true if `command` is to be sent. Throws InputError if the conversation must not begin.
+  bool take(const lcmtypes::DriverStatus& status, double age, std::int64_t utime,
+            lcmtypes::DriverCommand& command);
+  /// A command on the driver's channel. Throws std::runtime_error if it is somebody else's, unless
+  /// nothing is commanded here.
+  void hear_command(const void* data, std::size_t size);
+  /// What was sent, so that it is known when it is heard.
+  void note_sent(const std::vector<std::uint8_t>& bytes, double latency);
+
+  bool running() const noexcept { return running_; }
+  /// In one line what the user should know at once; "" if there is nothing new.
+  std::string warning();
+
+  DriveRecord record;
+
+ private:
+  void watch(const lcmtypes::DriverStatus& status);
+  void begin(const lcmtypes::DriverStatus& status);
+  void check_period();
+  void note_external(const lcmtypes::DriverStatus& status);
+  bool stopped_by_itself(const lcmtypes::DriverStatus& status) const noexcept;
+
+  const controller::Config& config_;
+  LoopController& controller_;
+  LoopGoal& goal_;
+  LoopJournal& journal_;
+  Options options_;
+  const lcmtypes::DriverProfile& profile_;
+  int n_;
+  bool running_ = false;
+  bool foreign_ = false;                 ///< somebody else's command was heard
+  std::int64_t first_ = 0, last_ = 0;    ///< utime of the statuses
+  std::vector<std::int64_t> intervals_;  ///< before the start, us
+  JointVector last_position_;
+  JointVector torque_;
+  std::deque<std::vector<std::uint8_t>> sent_;  ///< the last ones
+  std::string warning_;
+  bool warned_external_ = false;
+};
+
+}  // namespace dashpot::apps

@@ -1,0 +1,62 @@
+#pragma once
+#include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/lcmtypes/driver.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace dashpot::apps {
+
+/// A simulated arm behind a driver's messages, as the public drivers behave where torques are
+/// commanded: their filters, what they do without commands, and what they die of.
+///
+/// iiwa (`--torque_only`): without a command for 0.05 s, and before the first, a PD controller of
+/// 1000 N m/rad and 50 N m s/rad holds the position of that moment; torques count again with the
+/// next command, without blending. Velocities are differences through a low-pass of 40 Hz. utime is
+/// -1 for the first 200 statuses. It dies of a command within 0.25 s of the first status, and of
+/// arrays of another length.
+///
+/// Panda (`--control_mode torque`): a command whose utime is more than 0.1 s in the past or the
+/// future does not count; without one that counts, joints are damped. Torques pass a rate limit of
+/// 1000 N m/s and a low-pass of 30 Hz. It dies of anything but seven torques, no positions, and
+/// control mode 4.
+///
+/// The driver compensates gravity, so that the scene's robot has none.
+class FakeDriver {
+ public:
+  /// `scene` has to outlive it. Throws InputError.
+  FakeDriver(const Scene& scene, lcmtypes::DriverKind kind);
+
+  double period() const noexcept { return scene_.plant.period; }
+  /// Takes a command that arrived at `utime`, us since 1970-01-01 UTC. Throws std::runtime_error
+  /// with what the driver dies of.
+  void take(const void* data, std::size_t size, std::int64_t utime);
+  /// Moves the robot by one period, with the time at its end.
+  void step(std::int64_t utime);
+  /// What the driver reports now.
+  lcmtypes::DriverStatus status(std::int64_t utime) const;
+
+  double time() const noexcept { return plant_->time(); }
+  std::int64_t statuses() const noexcept { return statuses_; }
+  std::int64_t commands() const noexcept { return commands_; }
+  /// Periods in which no command counted.
+  std::int64_t uncommanded() const noexcept { return uncommanded_; }
+
+ private:
+  JointVector torque(std::int64_t utime);
+
+  const Scene& scene_;
+  lcmtypes::DriverKind kind_;
+  std::unique_ptr<sim::System> mechanism_;
+  std::optional<sim::Plant> plant_;
+  std::optional<lcmtypes::DriverCommand> command_;
+  std::int64_t arrived_ = 0;              ///< of the command, us
+  std::int64_t first_ = 0;                ///< utime of the first status
+  std::optional<JointVector> held_;       ///< the position that the PD holds
+  JointVector last_torque_;               ///< before the plant's low-pass
+  JointVector last_position_, velocity_;  ///< through the iiwa's low-pass
+  std::int64_t statuses_ = 0, commands_ = 0, uncommanded_ = 0;
+};
+
+}  // namespace dashpot::apps

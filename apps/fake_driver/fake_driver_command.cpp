@@ -1,0 +1,157 @@
+#include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/fake_driver/fake_driver.hpp>
+#include <dashpot/lcmtypes/bus.hpp>
+
+#include <CLI/CLI.hpp>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <lcm/lcm-cpp.hpp>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+
+namespace dashpot::apps {
+namespace {
+
+enum class Trouble { kNone, kStall, kDie, kNotANumber, kRepeat, kReorder, kUserStop };
+
+struct FakeOptions {
+  std::string scene, url;
+  std::optional<double> duration;
+  bool iiwa = false;
+  bool panda = false;
+  Trouble trouble = Trouble::kNone;
+  double from = 1, lasts = 0.1;  // s
+};
+
+std::int64_t fake_utime() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
+
+/// What arrives on the command channel.
+struct CommandInbox {
+  FakeDriver& driver;
+  void take(const lcm::ReceiveBuffer* buffer, const std::string&) {
+    driver.take(buffer->data, buffer->data_size, buffer->recv_utime);
+  }
+};
+
+/// Publishes a status, or what the trouble makes of it.
+class StatusOutlet {
+ public:
+  StatusOutlet(lcm::LCM& bus, lcmtypes::DriverKind kind, const FakeOptions& options)
+      : bus_(bus), kind_(kind), options_(options) {}
+
+  void publish(lcmtypes::DriverStatus status, double time) {
+    const bool troubled = time >= options_.from && time < options_.from + options_.lasts;
+    const Trouble now = troubled ? options_.trouble : Trouble::kNone;
+    if (now == Trouble::kStall) return;
+    if (now == Trouble::kUserStop) status.robot_mode = 5;
+    if (now == Trouble::kNotANumber) {
+      status.position.setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+    if (now == Trouble::kReorder && !kept_) {  // the next one goes first
+      kept_ = status;
+      return;
+    }
+    send(status);
+    if (now == Trouble::kRepeat) send(status);
+    if (kept_) send(*kept_);
+    kept_.reset();
+  }
+
+ private:
+  void send(const lcmtypes::DriverStatus& status) {
+    encode(kind_, status, bytes_);
+    bus_.publish(lcmtypes::profile_of(kind_).status_channel, bytes_.data(),
+                 static_cast<unsigned>(bytes_.size()));
+  }
+
+  lcm::LCM& bus_;
+  lcmtypes::DriverKind kind_;
+  const FakeOptions& options_;
+  std::optional<lcmtypes::DriverStatus> kept_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+void fake_driver(const FakeOptions& options) {
+  constexpr std::int64_t kNanoseconds = 1'000'000'000;
+  if (options.iiwa == options.panda) throw InputError("--iiwa, --panda", "one of them is wanted");
+  const auto kind = options.iiwa ? lcmtypes::DriverKind::kIiwa : lcmtypes::DriverKind::kPanda;
+  const Scene scene = load_scene(options.scene);
+  FakeDriver driver(scene, kind);
+  std::shared_ptr<lcm::LCM> bus;
+  try {
+    bus = lcmtypes::open_bus(options.url);
+  } catch (const std::runtime_error& error) {
+    throw InputError("--lcm-url", error.what());
+  }
+  CommandInbox inbox{driver};
+  bus->subscribe(lcmtypes::profile_of(kind).command_channel, &CommandInbox::take, &inbox);
+  StatusOutlet outlet(*bus, kind, options);
+  const StopSignal stop;
+  const std::int64_t period = std::llround(1e9 * driver.period());
+  timespec deadline{};
+  clock_gettime(CLOCK_MONOTONIC, &deadline);
+  while (!StopSignal::given() && !(options.duration && driver.time() >= *options.duration)) {
+    const std::int64_t next = deadline.tv_nsec + period;
+    deadline.tv_sec += next / kNanoseconds;
+    deadline.tv_nsec = next % kNanoseconds;
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) == EINTR) {
+    }
+    while (bus->handleTimeout(0) > 0) {
+    }
+    if (options.trouble == Trouble::kDie && driver.time() >= options.from) {
+      throw std::runtime_error("died, as asked for");
+    }
+    const std::int64_t now = fake_utime();
+    driver.step(now);
+    outlet.publish(driver.status(now), driver.time());
+  }
+  print("statuses: " + std::to_string(driver.statuses()) +
+        ", commands: " + std::to_string(driver.commands()) +
+        ", periods in which none counted: " + std::to_string(driver.uncommanded()) + "\n");
+}
+
+}  // namespace
+
+void add_fake_driver(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "fake-driver", "A simulated arm behind the messages of a public LCM driver");
+  const auto options = std::make_shared<FakeOptions>();
+  command->add_option("scene", options->scene, "Scene file: sim/scenes/drivers has examples")
+      ->required()
+      ->option_text("FILE");
+  CLI::Option* iiwa = command->add_flag("--iiwa", options->iiwa, "As drake-iiwa-driver");
+  command->add_flag("--panda", options->panda, "As drake-franka-driver")->excludes(iiwa);
+  command
+      ->add_option("--lcm-url", options->url,
+                   "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine")
+      ->option_text("URL");
+  command->add_option("--duration", options->duration, "Ends after this time, s")
+      ->transform(quantity("s", 1e-3, 1e7, "a time from 1e-3 to 1e7 s"))
+      ->option_text("S");
+  const std::map<std::string, Trouble> troubles = {
+      {"stall", Trouble::kStall},     {"die", Trouble::kDie},
+      {"nan", Trouble::kNotANumber},  {"repeat", Trouble::kRepeat},
+      {"reorder", Trouble::kReorder}, {"user-stop", Trouble::kUserStop}};
+  command->add_option("--trouble", options->trouble, "What goes wrong")
+      ->transform(CLI::CheckedTransformer(troubles))
+      ->option_text("stall|die|nan|repeat|reorder|user-stop");
+  command->add_option("--from", options->from, "When it begins, s (1)")
+      ->transform(quantity("s", 0, 1e7, "a time from 0 to 1e7 s"))
+      ->option_text("S");
+  command->add_option("--lasts", options->lasts, "How long it lasts, s (0.1)")
+      ->transform(quantity("s", 0, 1e7, "a time from 0 to 1e7 s"))
+      ->option_text("S");
+  command->footer("Ctrl-C ends it.\n" + std::string(kExitStatusHelp));
+  command->callback([options] { fake_driver(*options); });
+}
+
+}  // namespace dashpot::apps

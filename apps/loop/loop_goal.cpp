@@ -1,0 +1,62 @@
+#include <dashpot/apps/loop/loop_goal.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
+
+namespace dashpot::apps {
+
+void LoopGoal::begin(const controller::Setpoint& setpoint) {
+  setpoint_ = accepted_ = setpoint;
+  gains_ = setpoint.gains;
+  in_force_ = news_ = true;
+}
+
+const controller::Setpoint* LoopGoal::told(std::int64_t time) noexcept {
+  // New gains count with a set-point that is read again.
+  const std::int64_t changes = gain_changes_.load(std::memory_order_acquire);
+  if (ticks_++ % repeat_every_ == 0 || changes != gain_changes_seen_) news_ = true;
+  gain_changes_seen_ = changes;
+  if (news_) setpoint_.time = time;
+  told_ = in_force_;
+  return told_ ? &setpoint_ : nullptr;
+}
+
+void LoopGoal::note_status(std::int32_t status) noexcept {
+  // What was rejected shows in the status, once; then what was held before goes on.
+  const bool rejected = told_ && news_ && status == DASHPOT_SETPOINT_REJECTED;
+  if (rejected) setpoint_ = accepted_;
+  if (told_ && news_ && !rejected) accepted_ = setpoint_;
+  news_ = rejected;
+}
+
+void LoopGoal::hold(const controller::Setpoint& setpoint) noexcept {
+  setpoint_ = setpoint;
+  in_force_ = news_ = true;
+}
+
+void LoopGoal::note_fault(bool latched) noexcept {
+  if (latched) in_force_ = false;
+  if (faulted_ && !latched && !released_.exchange(false, std::memory_order_acquire)) {
+    in_force_ = news_ = true;
+  }
+  faulted_ = latched;
+}
+
+std::int32_t LoopGoal::change_gains(const std::function<void(controller::Gains&)>& change,
+                                    std::string& reason) {
+  const std::lock_guard lock(mutex_);
+  controller::Gains wanted = gains_;
+  change(wanted);
+  if (controller::same_gains(wanted, gains_)) return DASHPOT_OK;
+  const std::int32_t code = controller_.set_gains(wanted, reason);
+  if (code != DASHPOT_OK) return code;
+  gains_ = wanted;
+  gain_changes_.fetch_add(1, std::memory_order_release);
+  return code;
+}
+
+void LoopGoal::release() {
+  const std::lock_guard lock(mutex_);
+  released_.store(true, std::memory_order_release);  // first, so that no tick takes it for its own
+  controller_.release();
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,68 @@
+#pragma once
+#include <dashpot/apps/loop/loop_controller.hpp>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+
+namespace dashpot::apps {
+
+/// What a loop is to do: the set-point that it holds, which is repeated so that it does not go
+/// stale, and the gains in force. Between the loop's thread and those that command it.
+class LoopGoal {
+ public:
+  /// The controller must outlive it. The set-point is repeated once in so many ticks.
+  LoopGoal(LoopController& controller, std::int64_t repeat_every)
+      : controller_(controller), repeat_every_(repeat_every) {}
+
+  // Before the loop begins:
+  /// Holds `setpoint`, with the gains in it, which the controller has taken already.
+  void begin(const controller::Setpoint& setpoint);
+
+  // The loop's thread:
+  /// Before a tick at `time`, ns: what the controller is told; null: nothing.
+  const controller::Setpoint* told(std::int64_t time) noexcept;
+  /// After that tick.
+  void note_status(std::int32_t status) noexcept;
+  /// Goes there from the next tick on. The gains of `setpoint` do not count.
+  void hold(const controller::Setpoint& setpoint) noexcept;
+  /// What the controller was told to hold last.
+  const controller::Setpoint& setpoint() const noexcept { return setpoint_; }
+  /// After a tick: whether a fault is latched. Meanwhile nothing is held. Whoever releases it finds
+  /// the robot held where it is until there is news; if the controller has let go of the fault by
+  /// itself, what was held before goes on.
+  void note_fault(bool latched) noexcept;
+
+  // Other threads, which may have to wait for each other:
+  /// Changes the gains in force; DASHPOT_OK, or the code of the controller's refusal, with its
+  /// reason in one line.
+  std::int32_t change_gains(const std::function<void(controller::Gains&)>& change,
+                            std::string& reason);
+  /// Releases a latched fault at the next tick.
+  void release();
+
+ private:
+  LoopController& controller_;
+  std::int64_t repeat_every_;
+
+  // The loop's own:
+  controller::Setpoint setpoint_;
+  controller::Setpoint accepted_;  ///< the last that the controller did not reject
+  bool in_force_ = false;          ///< of setpoint_
+  bool news_ = true;               ///< setpoint_ is to be read again
+  bool told_ = false;              ///< the controller was told of it in this tick
+  bool faulted_ = false;           ///< a fault was latched after the last tick
+  std::int64_t ticks_ = 0;
+  std::int64_t gain_changes_seen_ = 0;
+
+  // Between the threads:
+  std::atomic<std::int64_t> gain_changes_{0};  ///< so far
+  std::atomic<bool> released_{false};          ///< somebody asked for the release of the fault
+
+  std::mutex mutex_;  ///< of what follows, and of the controller's functions for other threads
+  controller::Gains gains_;
+};
+
+}  // namespace dashpot::apps
