@@ -89,8 +89,8 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
       return "ended after its time";
     }
     const int handled = bus.handleTimeout(kWait);
-    if (handled < 0) throw std::runtime_error("the LCM bus failed");
-    if (handled == 0) {
+    if (handled < 0 && !StopSignal::given()) throw std::runtime_error("the LCM bus failed");
+    if (handled <= 0) {
       if (!told && 1e-6 * static_cast<double>(utime_now() - heard) > kSilence) {
         print_error(std::string("no status on ") + profile.status_channel + " for 2 s");
         told = true;
@@ -98,6 +98,10 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
       continue;
     }
     while (bus.handleTimeout(0) > 0) {
+    }
+    if (session.rivalled()) {
+      throw std::runtime_error(std::string("somebody else commands on ") + profile.command_channel +
+                               ": nothing more is sent");
     }
     if (!inbox.newest) continue;
     const std::int64_t now = utime_now();

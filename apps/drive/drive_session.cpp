@@ -104,7 +104,6 @@ bool DriveSession::take(const DriverStatus& status, double age, std::int64_t uti
     }
     first_ = 0;
     intervals_.clear();
-    last_position_ = status.position;
     return false;
   }
   if (!running_) {
@@ -126,7 +125,7 @@ bool DriveSession::take(const DriverStatus& status, double age, std::int64_t uti
   if (config_.settings.analysis.sampled.difference_velocity && interval > 0) {
     velocity = (status.position - last_position_) / (1e-6 * static_cast<double>(interval));
   }
-  last_position_ = status.position;
+  if (status.position.allFinite()) last_position_ = status.position;
   const std::int64_t time = 1000 * status.utime;
   timespec begin{}, end{};
   clock_gettime(CLOCK_MONOTONIC, &begin);
@@ -147,7 +146,7 @@ bool DriveSession::take(const DriverStatus& status, double age, std::int64_t uti
   }
   command.utime = utime;
   // In KUKA's mode with springs of its own these would pull to an older position.
-  command.position = options_.driver == DriverKind::kIiwa ? status.position : JointVector();
+  command.position = options_.driver == DriverKind::kIiwa ? last_position_ : JointVector();
   command.torque = torque_;
   return true;
 }
@@ -209,16 +208,16 @@ void DriveSession::note_external(const DriverStatus& status) {
   }
 }
 
-void DriveSession::hear_command(const void* data, std::size_t size) {
+void DriveSession::hear_command(const void* data, std::size_t size) noexcept {
   const auto* bytes = static_cast<const std::uint8_t*>(data);
   for (const std::vector<std::uint8_t>& own : sent_) {
     if (own.size() == size && std::equal(own.begin(), own.end(), bytes)) return;
   }
   foreign_ = true;
-  if (running_ && !options_.dry_run) {
-    throw std::runtime_error(std::string("somebody else commands on ") + profile_.command_channel +
-                             ": nothing more is sent");
-  }
+}
+
+bool DriveSession::rivalled() const noexcept {
+  return running_ && foreign_ && !options_.dry_run;
 }
 
 void DriveSession::note_sent(const std::vector<std::uint8_t>& bytes, double latency) {

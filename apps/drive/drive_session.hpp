@@ -49,9 +49,10 @@ class DriveSession {
   /// true if `command` is to be sent. Throws InputError if the conversation must not begin.
   bool take(const lcmtypes::DriverStatus& status, double age, std::int64_t utime,
             lcmtypes::DriverCommand& command);
-  /// A command on the driver's channel. Throws std::runtime_error if it is somebody else's, unless
-  /// nothing is commanded here.
-  void hear_command(const void* data, std::size_t size);
+  /// Notes a command on the driver's channel. Nothing throws: LCM calls it.
+  void hear_command(const void* data, std::size_t size) noexcept;
+  /// True if somebody else commands beside this session, which must then end.
+  bool rivalled() const noexcept;
   /// What was sent, so that it is known when it is heard.
   void note_sent(const std::vector<std::uint8_t>& bytes, double latency);
 

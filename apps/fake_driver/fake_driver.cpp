@@ -13,7 +13,6 @@ namespace {
 using lcmtypes::DriverCommand;
 using lcmtypes::DriverKind;
 
-constexpr double kSecond = 1e6;              // us
 constexpr std::int64_t kEarliest = 250'000;  // us from the first status to a command (iiwa)
 constexpr std::int64_t kSilence = 50'000;    // us without a command (iiwa)
 constexpr std::int64_t kExpiry = 100'000;    // us of a command's utime (Panda)
@@ -44,7 +43,7 @@ FakeDriver::FakeDriver(const Scene& scene, DriverKind kind) : scene_(scene), kin
   velocity_ = last_torque_ = JointVector::Zero(scene.dof());
 }
 
-void FakeDriver::take(const void* data, std::size_t size, std::int64_t utime) {
+void FakeDriver::take(const void* data, std::size_t size, std::int64_t utime, std::int64_t wall) {
   DriverCommand command;
   const bool iiwa = kind_ == DriverKind::kIiwa;
   if (!decode(kind_, data, size, command)) throw std::runtime_error("a command cannot be read");
@@ -56,12 +55,16 @@ void FakeDriver::take(const void* data, std::size_t size, std::int64_t utime) {
                              " torques and " + std::to_string(command.position.size()) +
                              " positions");
   }
+  if (!command.torque.allFinite() || !command.position.allFinite()) {
+    throw std::runtime_error("a command has a number that is none");
+  }
   if (!iiwa && command.control_mode != 4) {
     throw std::runtime_error("a command expects control mode " +
                              std::to_string(command.control_mode));
   }
   command_ = command;
   arrived_ = utime;
+  written_ = utime - (wall - command.utime);
   ++commands_;
 }
 
@@ -78,7 +81,7 @@ JointVector FakeDriver::torque(std::int64_t utime) {
     return kHoldStiffness * (*held_ - q) - kHoldDamping * qd;
   }
   JointVector wanted = JointVector::Zero(7);
-  if (command_ && std::abs(utime - command_->utime) <= kExpiry) {
+  if (command_ && std::abs(utime - written_) <= kExpiry) {
     wanted = command_->torque;
   } else {
     ++uncommanded_;

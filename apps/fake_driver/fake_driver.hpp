@@ -29,9 +29,9 @@ class FakeDriver {
   FakeDriver(const Scene& scene, lcmtypes::DriverKind kind);
 
   double period() const noexcept { return scene_.plant.period; }
-  /// Takes a command that arrived at `utime`, us since 1970-01-01 UTC. Throws std::runtime_error
-  /// with what the driver dies of.
-  void take(const void* data, std::size_t size, std::int64_t utime);
+  /// Takes a command that arrived at `utime` of the robot's clock and `wall` of the computer's, us.
+  /// Throws std::runtime_error with what the driver dies of.
+  void take(const void* data, std::size_t size, std::int64_t utime, std::int64_t wall);
   /// Moves the robot by one period, with the time at its end.
   void step(std::int64_t utime);
   /// What the driver reports now.
@@ -51,7 +51,8 @@ class FakeDriver {
   std::unique_ptr<sim::System> mechanism_;
   std::optional<sim::Plant> plant_;
   std::optional<lcmtypes::DriverCommand> command_;
-  std::int64_t arrived_ = 0;              ///< of the command, us
+  std::int64_t arrived_ = 0;              ///< when the command did, us
+  std::int64_t written_ = 0;              ///< its utime on the clock of the robot, us
   std::int64_t first_ = 0;                ///< utime of the first status
   std::optional<JointVector> held_;       ///< the position that the PD holds
   JointVector last_torque_;               ///< before the plant's low-pass

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <exception>
 #include <lcm/lcm-cpp.hpp>
 #include <limits>
 #include <map>
@@ -25,6 +26,7 @@ struct FakeOptions {
   std::optional<double> duration;
   bool iiwa = false;
   bool panda = false;
+  bool lock_step = false;
   Trouble trouble = Trouble::kNone;
   double from = 1, lasts = 0.1;  // s
 };
@@ -37,9 +39,36 @@ std::int64_t fake_utime() {
 /// What arrives on the command channel.
 struct CommandInbox {
   FakeDriver& driver;
-  void take(const lcm::ReceiveBuffer* buffer, const std::string&) {
-    driver.take(buffer->data, buffer->data_size, buffer->recv_utime);
+  std::int64_t now = 0;        ///< us
+  std::exception_ptr failure;  ///< LCM, which is C, must not see it
+  void take(const lcm::ReceiveBuffer* buffer, const std::string&) noexcept {
+    try {
+      driver.take(buffer->data, buffer->data_size, now, buffer->recv_utime);
+    } catch (...) {
+      failure = std::current_exception();
+    }
   }
+};
+
+/// The robot's clock.
+class Pace {
+ public:
+  explicit Pace(double period) : period_(std::llround(1e9 * period)) {
+    clock_gettime(CLOCK_MONOTONIC, &deadline_);
+  }
+  /// Until the next period.
+  void wait() {
+    constexpr std::int64_t kNanoseconds = 1'000'000'000;
+    const std::int64_t next = deadline_.tv_nsec + period_;
+    deadline_.tv_sec += next / kNanoseconds;
+    deadline_.tv_nsec = next % kNanoseconds;
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline_, nullptr) == EINTR) {
+    }
+  }
+
+ private:
+  std::int64_t period_;  ///< ns
+  timespec deadline_{};
 };
 
 /// Publishes a status, or what the trouble makes of it.
@@ -48,22 +77,24 @@ class StatusOutlet {
   StatusOutlet(lcm::LCM& bus, lcmtypes::DriverKind kind, const FakeOptions& options)
       : bus_(bus), kind_(kind), options_(options) {}
 
-  void publish(lcmtypes::DriverStatus status, double time) {
+  /// Returns true if anything was published.
+  bool publish(lcmtypes::DriverStatus status, double time) {
     const bool troubled = time >= options_.from && time < options_.from + options_.lasts;
     const Trouble now = troubled ? options_.trouble : Trouble::kNone;
-    if (now == Trouble::kStall) return;
+    if (now == Trouble::kStall) return false;
     if (now == Trouble::kUserStop) status.robot_mode = 5;
     if (now == Trouble::kNotANumber) {
       status.position.setConstant(std::numeric_limits<double>::quiet_NaN());
     }
     if (now == Trouble::kReorder && !kept_) {  // the next one goes first
       kept_ = status;
-      return;
+      return false;
     }
     send(status);
     if (now == Trouble::kRepeat) send(status);
     if (kept_) send(*kept_);
     kept_.reset();
+    return true;
   }
 
  private:
@@ -81,7 +112,7 @@ class StatusOutlet {
 };
 
 void fake_driver(const FakeOptions& options) {
-  constexpr std::int64_t kNanoseconds = 1'000'000'000;
+  constexpr int kTry = 10, kPatience = 100;  // ms, and tries
   if (options.iiwa == options.panda) throw InputError("--iiwa, --panda", "one of them is wanted");
   const auto kind = options.iiwa ? lcmtypes::DriverKind::kIiwa : lcmtypes::DriverKind::kPanda;
   const Scene scene = load_scene(options.scene);
@@ -92,27 +123,33 @@ void fake_driver(const FakeOptions& options) {
   } catch (const std::runtime_error& error) {
     throw InputError("--lcm-url", error.what());
   }
-  CommandInbox inbox{driver};
+  CommandInbox inbox{driver, 0, nullptr};
   bus->subscribe(lcmtypes::profile_of(kind).command_channel, &CommandInbox::take, &inbox);
   StatusOutlet outlet(*bus, kind, options);
   const StopSignal stop;
-  const std::int64_t period = std::llround(1e9 * driver.period());
-  timespec deadline{};
-  clock_gettime(CLOCK_MONOTONIC, &deadline);
+  const std::int64_t start = fake_utime();
+  Pace pace(driver.period());
+  int patience = kPatience;
   while (!StopSignal::given() && !(options.duration && driver.time() >= *options.duration)) {
-    const std::int64_t next = deadline.tv_nsec + period;
-    deadline.tv_sec += next / kNanoseconds;
-    deadline.tv_nsec = next % kNanoseconds;
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) == EINTR) {
-    }
+    const bool in_step = options.lock_step && driver.commands() > 0;
+    if (!in_step) pace.wait();
     while (bus->handleTimeout(0) > 0) {
     }
+    if (inbox.failure) std::rethrow_exception(inbox.failure);
     if (options.trouble == Trouble::kDie && driver.time() >= options.from) {
       throw std::runtime_error("died, as asked for");
     }
-    const std::int64_t now = fake_utime();
-    driver.step(now);
-    outlet.publish(driver.status(now), driver.time());
+    // In lock-step a period takes as long as its answer: the clock is that of the simulation.
+    const auto simulated = static_cast<std::int64_t>(std::llround(1e6 * driver.time()));
+    inbox.now = options.lock_step ? start + simulated : fake_utime();
+    driver.step(inbox.now);
+    const std::int64_t answered = driver.commands();
+    if (!outlet.publish(driver.status(inbox.now), driver.time()) || !in_step) continue;
+    for (int tries = 0; tries < patience && driver.commands() == answered; ++tries) {
+      bus->handleTimeout(kTry);
+      if (StopSignal::given()) break;
+    }
+    patience = driver.commands() == answered ? 1 : kPatience;  // who is silent may stay so
   }
   print("statuses: " + std::to_string(driver.statuses()) +
         ", commands: " + std::to_string(driver.commands()) +
@@ -134,6 +171,9 @@ void add_fake_driver(CLI::App& program) {
       ->add_option("--lcm-url", options->url,
                    "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine")
       ->option_text("URL");
+  command->add_flag("--lock-step", options->lock_step,
+                    "After the first command, each period waits for its answer, for a second at "
+                    "most, whatever the clock says");
   command->add_option("--duration", options->duration, "Ends after this time, s")
       ->transform(quantity("s", 1e-3, 1e7, "a time from 1e-3 to 1e7 s"))
       ->option_text("S");

@@ -1,0 +1,344 @@
+// `dashpot drive` with `dashpot fake-driver`: what it answers, what it refuses, and what becomes of
+// a driver's troubles.
+#include <dashpot/lcmtypes/command_t.hpp>
+#include <dashpot/lcmtypes/driver.hpp>
+#include <dashpot/tests/apps/scene_run.hpp>
+#include <dashpot/tests/threads/live_run.hpp>
+
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <cmath>
+#include <thread>
+
+namespace dashpot::tests {
+namespace {
+
+using lcmtypes::DriverKind;
+using ::testing::HasSubstr;
+
+std::string configuration(const std::string& name) {
+  return std::string(DASHPOT_SOURCE_DIR) + "/controller/examples/" + name + "_drive.yaml";
+}
+
+struct Arm {
+  const char* name;    ///< of its files
+  const char* option;  ///< "--iiwa"
+  DriverKind kind;
+};
+constexpr Arm kIiwa = {"iiwa14", "--iiwa", DriverKind::kIiwa};
+constexpr Arm kPanda = {"panda", "--panda", DriverKind::kPanda};
+
+void PrintTo(const Arm& arm, std::ostream* out) {
+  *out << arm.name;
+}
+
+/// The configuration of an arm, with parts of its text replaced.
+std::string changed_configuration(const Scratch& scratch, const Arm& arm,
+                                  const std::vector<std::pair<std::string, std::string>>& changes) {
+  std::string text = text_of(configuration(arm.name));
+  const auto replace = [&text](const std::string& from, const std::string& to) {
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+  };
+  replace("../../sim", std::string(DASHPOT_SOURCE_DIR) + "/sim");
+  for (const auto& [from, to] : changes) replace(from, to);
+  return scratch.write("drive.yaml", text);
+}
+
+class Drive : public ::testing::TestWithParam<Arm> {
+ protected:
+  std::vector<std::string> driver(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> words = {"fake-driver", scene(std::string("drivers/") + arm.name),
+                                      arm.option,    "--lcm-url",
+                                      url,           "--lock-step"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  std::vector<std::string> drive(const std::string& config,
+                                 const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> words = {"drive", config, arm.option, "--json", "--lcm-url", url};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  /// Drives the arm while its driver is in trouble; what drive says at its end.
+  Json troubled(const std::vector<std::string>& trouble) {
+    Listener listener(url);
+    Running fake(driver(trouble));
+    Running driving(drive(configuration(arm.name)));
+    seen = listener.until([&] { return listener.states > 100; });
+    if (!seen) return {};
+    // The simulated time of the driver.
+    listener.until([&] { return listener.state.utime == 0 || listener.states > 1200; });
+    state = listener.state;
+    driving.send(SIGTERM);
+    driving.finish();
+    fake.send(SIGTERM);
+    fake_status = fake.finish();
+    fake_said = fake.complaints();
+    return Json::parse(driving.output());
+  }
+
+  Arm arm = GetParam();
+  std::string url = own_url();
+  bool seen = false;
+  int fake_status = 0;
+  std::string fake_said;
+  state_t state{};
+};
+
+command_t command_for(const state_t& state, std::int32_t parts, std::int64_t sequence) {
+  command_t command{};
+  command.n = state.n;
+  command.sender = 7;
+  command.utime = utime();
+  command.sequence = sequence;
+  command.parts = parts;
+  command.mode = command_t::JOINT;
+  command.joint_position = state.reference_joint_position;
+  command.tip_quaternion[0] = 1;
+  const auto n = static_cast<std::size_t>(state.n);
+  command.joint_stiffness.assign(n, std::vector<double>(n));
+  command.joint_damping = command.joint_stiffness;
+  command.null_stiffness.assign(n, 0);
+  command.null_damping.assign(n, 0);
+  return command;
+}
+
+TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
+  const Scratch scratch;
+  const std::string config = changed_configuration(
+      scratch, arm, {{"analysis:", "commands: {silence: 30 s, oldest: 20 s}\nanalysis:"}});
+  Listener listener(url);
+  Running fake(driver());
+  Running driving(drive(config, {"--commands"}));
+  double first = -1;
+  const bool heard = listener.until([&] {
+    if (first < 0 && listener.states > 0) {
+      first = 0;
+      for (const double torque : listener.state.joint_torque) {
+        first = std::max(first, std::abs(torque));
+      }
+    }
+    return listener.states > 100;
+  });
+  if (!heard) GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  EXPECT_LT(first, 0.01);  // N m
+  const double start = listener.state.joint_position[0];
+  command_t command =
+      command_for(listener.state, int{command_t::MODE} + int{command_t::JOINT_POSITION}, 1);
+  command.joint_position[0] += 0.1;
+  listener.bus().publish(lcmtypes::kCommandChannel, &command);
+  EXPECT_TRUE(listener.until([&] {
+    return std::abs(listener.state.joint_position[0] - start - 0.1) < 2e-3 &&
+           std::abs(listener.state.joint_velocity[0]) < 2e-3 &&
+           std::abs(listener.state.reference_joint_position[0] - start - 0.1) < 1e-9;
+  })) << listener.state.joint_position[0] - start;
+  driving.send(SIGTERM);
+  EXPECT_EQ(driving.finish(), 0) << driving.complaints();
+  fake.send(SIGTERM);
+  EXPECT_EQ(fake.finish(), 0) << fake.complaints();
+  const Json result = Json::parse(driving.output());
+  EXPECT_EQ(result["driver"], std::string(arm.option).substr(2));
+  EXPECT_EQ(result["commands_sent"], result["ticks"]);
+  EXPECT_EQ(result["faults"], 0);
+  EXPECT_NEAR(result["period"].get<double>(), 1e-3, 1e-4);
+  EXPECT_EQ(result["commands"]["accepted"], 1);
+  EXPECT_EQ(result["modes"].size(), 7u);
+}
+
+TEST_P(Drive, CommandsNothingInADryRun) {
+  Listener listener(url);
+  Running fake(driver());
+  Running driving(drive(configuration(arm.name), {"--dry-run"}));
+  if (!listener.until([&] { return listener.states > 100 && listener.modes_messages > 0; })) {
+    GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  }
+  EXPECT_EQ(listener.modes.num_modes, 7);
+  driving.send(SIGTERM);
+  EXPECT_EQ(driving.finish(), 0);
+  fake.send(SIGTERM);
+  EXPECT_EQ(fake.finish(), 0);
+  EXPECT_THAT(fake.output(), HasSubstr("commands: 0,"));
+  EXPECT_EQ(Json::parse(driving.output())["commands_sent"], 0);
+}
+
+TEST_P(Drive, RefusesALoopThatIsNotTheDrivers) {
+  const Scratch scratch;
+  const bool iiwa = arm.kind == DriverKind::kIiwa;
+  const auto refusal = [&](const std::string& from, const std::string& to) {
+    const Outcome outcome = run_program(drive(changed_configuration(scratch, arm, {{from, to}})));
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_EQ(outcome.out, "");
+    return outcome.err;
+  };
+  EXPECT_THAT(refusal("gravity: false", "gravity: true"),
+              HasSubstr("feed_forward.gravity: must be false"));
+  EXPECT_THAT(refusal("delay: 1", "delay: 0"), HasSubstr("analysis.sampled.delay: must be"));
+  EXPECT_THAT(refusal(iiwa ? ", difference_velocity: true" : ", cutoff: 30 Hz", ""),
+              HasSubstr(iiwa ? "difference_velocity: must be true" : "cutoff: must be that of"));
+  // Dampers that the wrist does not bear are refused before the first torque.
+  EXPECT_THAT(refusal(iiwa ? "1.5, 0.7, 0.15]" : "0.6, 0.6, 0.2]", "20, 10, 4]"),
+              HasSubstr("gain margin"));
+}
+
+TEST_P(Drive, RefusesADriverOfAnotherPeriod) {
+  const Scratch scratch;
+  Running fake(driver());
+  const Outcome outcome =
+      run_program(drive(changed_configuration(scratch, arm, {{"period: 1 ms", "period: 2 ms"}}),
+                        {"--duration", "0.1"}));
+  EXPECT_EQ(outcome.status, 2) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("control.period: is 2 ms, but the driver's statuses come"));
+}
+
+/// Publishes commands of somebody else until `driving` complains, for three seconds at most.
+void command_as_well(const Arm& arm, const std::string& url, const Running& driving) {
+  const auto bus = lcmtypes::open_bus(url);
+  std::vector<std::uint8_t> bytes;
+  lcmtypes::DriverCommand command;
+  command.torque = controller::JointVector::Zero(7);
+  if (arm.kind == DriverKind::kIiwa) command.position = command.torque;
+  for (int k = 0; k < 600; ++k) {
+    command.utime = utime();
+    encode(arm.kind, command, bytes);
+    bus->publish(lcmtypes::profile_of(arm.kind).command_channel, bytes.data(),
+                 static_cast<unsigned>(bytes.size()));
+    usleep(5000);
+    if (driving.complaints().find("somebody else") != std::string::npos) return;
+  }
+}
+
+TEST_P(Drive, RefusesToBeASecondCommander) {
+  // The fake driver would die of commands this early: its statuses are sent by another program.
+  Running driving(drive(configuration(arm.name)));
+  const auto bus = lcmtypes::open_bus(url);
+  std::vector<std::uint8_t> bytes;
+  std::atomic<bool> done = false;
+  std::thread statuses([&] {
+    lcmtypes::DriverStatus status;
+    status.position = status.velocity = controller::JointVector::Zero(7);
+    status.position[3] = -1.5;
+    status.position[5] = 1.5;
+    for (status.utime = 1'000'000; !done; status.utime += 1000) {
+      encode(arm.kind, status, bytes);
+      bus->publish(lcmtypes::profile_of(arm.kind).status_channel, bytes.data(),
+                   static_cast<unsigned>(bytes.size()));
+      usleep(1000);
+    }
+  });
+  command_as_well(arm, url, driving);
+  done = true;
+  statuses.join();
+  driving.send(SIGTERM);
+  const int status = driving.finish();
+  if (driving.complaints().find("no status") != std::string::npos) {
+    GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  }
+  EXPECT_EQ(status, 2);
+  EXPECT_THAT(driving.complaints(), HasSubstr("somebody else commands on"));
+  EXPECT_EQ(driving.output(), "");
+}
+
+TEST_P(Drive, StopsCommandingWhenSomebodyElseBegins) {
+  Listener listener(url);
+  Running fake(driver());
+  Running driving(drive(configuration(arm.name)));
+  if (!listener.until([&] { return listener.states > 100; })) {
+    GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  }
+  command_as_well(arm, url, driving);
+  EXPECT_EQ(driving.finish(), 1);
+  EXPECT_THAT(driving.complaints(), HasSubstr("nothing more is sent"));
+  EXPECT_THAT(Json::parse(driving.output())["ended"].get<std::string>(),
+              HasSubstr("somebody else commands on"));
+}
+
+TEST_P(Drive, LatchesAfterAGap) {
+  const Json result = troubled({"--trouble", "stall", "--from", "0.8", "--lasts", "0.1"});
+  if (!seen) GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  EXPECT_EQ(result["faults"], 1);
+  EXPECT_EQ(result["fault"]["status"], "gap between states, damping") << result.dump(2);
+  EXPECT_GE(result["statuses"]["lost"].get<int>(), 90);
+}
+
+/// What is sent stays finite: the fake driver dies of anything else.
+TEST_P(Drive, SendsNumbersToADriverThatReportsNone) {
+  const Json result = troubled({"--trouble", "nan", "--from", "0.8", "--lasts", "0.1"});
+  if (!seen) GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  EXPECT_EQ(fake_status, 0) << fake_said;
+  EXPECT_GE(result["tick_statuses"]["state not finite, torque ramped down"].get<int>(), 50);
+  EXPECT_EQ(result["faults"], 1);
+}
+
+TEST_P(Drive, AnswersNoStatusTwice) {
+  const Json result = troubled({"--trouble", "repeat", "--from", "0.8", "--lasts", "0.2"});
+  if (!seen) GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  EXPECT_GE(result["statuses"]["repeated"].get<int>() + result["statuses"]["overtaken"].get<int>(),
+            100);
+  EXPECT_EQ(result["commands_sent"], result["ticks"]);
+  EXPECT_EQ(fake_status, 0) << fake_said;
+}
+
+INSTANTIATE_TEST_SUITE_P(Arms, Drive, ::testing::Values(kIiwa, kPanda), [](const auto& given) {
+  return std::string(given.param.option).substr(2);
+});
+
+TEST(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
+  const std::string url = own_url();
+  Listener listener(url);
+  Running fake({"fake-driver", scene("drivers/panda"), "--panda", "--lcm-url", url, "--lock-step",
+                "--trouble", "user-stop", "--from", "0.8", "--lasts", "0.1"});
+  Running driving({"drive", configuration("panda"), "--panda", "--json", "--lcm-url", url});
+  if (!listener.until([&] { return listener.states > 100; })) {
+    GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  }
+  EXPECT_TRUE(listener.until([&] { return listener.state.fault != 0; }));
+  driving.send(SIGTERM);
+  EXPECT_EQ(driving.finish(), 0);
+  const Json result = Json::parse(driving.output());
+  EXPECT_GE(result["statuses"]["of_stopped_robot"].get<int>(), 50);
+  EXPECT_EQ(result["fault"]["status"], "gap between states, damping");
+  EXPECT_THAT(driving.complaints(), HasSubstr("the robot has stopped by itself (robot_mode 5)"));
+}
+
+TEST(FakeDriver, DiesAsTheDriverDoes) {
+  const std::string url = own_url();
+  for (const Arm& arm : {kIiwa, kPanda}) {
+    Listener listener(url);
+    Running fake({"fake-driver", scene(std::string("drivers/") + arm.name), arm.option, "--lcm-url",
+                  url, "--duration", "10"});
+    lcmtypes::DriverCommand command;
+    command.torque = controller::JointVector::Zero(6);
+    std::vector<std::uint8_t> bytes;
+    encode(arm.kind, command, bytes);
+    for (int k = 0; k < 500 && fake.complaints().empty(); ++k) {
+      listener.bus().publish(lcmtypes::profile_of(arm.kind).command_channel, bytes.data(),
+                             static_cast<unsigned>(bytes.size()));
+      listener.until(
+          [&, end = Clock::now() + std::chrono::milliseconds(10)] { return Clock::now() > end; });
+    }
+    fake.send(SIGTERM);
+    EXPECT_EQ(fake.finish(), 1);
+    EXPECT_THAT(
+        fake.complaints(),
+        HasSubstr(arm.kind == DriverKind::kIiwa ? "a command came within 0.25 s of the first status"
+                                                : "a command has 6 torques and 0 positions"));
+  }
+}
+
+TEST(FakeDriver, RefusesWhatItCannotBe) {
+  const Outcome weighty =
+      run_program({"fake-driver", scene("panda_release_c2"), "--panda", "--duration", "0.1"});
+  EXPECT_EQ(weighty.status, 2);
+  EXPECT_THAT(weighty.err, HasSubstr("robot.gravity: must be [0, 0, 0]"));
+  const Outcome both = run_program({"fake-driver", scene("drivers/panda"), "--panda", "--iiwa"});
+  EXPECT_EQ(both.status, 2);
+  const Outcome none = run_program({"fake-driver", scene("drivers/panda")});
+  EXPECT_EQ(none.status, 2);
+  EXPECT_THAT(none.err, HasSubstr("one of them is wanted"));
+}
+
+}  // namespace
+}  // namespace dashpot::tests
