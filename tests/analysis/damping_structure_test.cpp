@@ -312,6 +312,7 @@ TEST(RegionDesign, IsTheSameWhereverConfigurationsAreJudged) {
   region[51].mass *= 2.5;
   RegionOptions options;
   options.target = DampingTarget::constant(0.7);
+  options.structure = DampingStructure::kDiagonal;
   const RegionDesign design = design_region(region, options);
   for (const std::size_t size : {9U, 70U}) {
     RegionSource source;
