@@ -83,13 +83,14 @@ class Audit(Result):
 
 def _workspace(task: Task, samples: int, seed: int, postures: Array | None,
                executor: concurrent.futures.Executor | None) -> WorkspaceAudit:
-    with workers(executor) as found_workers:
+    with workers(executor) as pool:
+        chunks: list[Any]
         if postures is None:
             chunks = [(task.sample, (seed, first, count)) for first, count in chunks_of(samples)]
         else:
             chunks = [(task.numbers, (postures[first:first + count],))
                       for first, count in chunks_of(samples)]
-        numbers = np.concatenate(collect(found_workers, chunks, samples))
+        numbers = np.concatenate(collect(pool, chunks, samples))
     found = task.core.summarize(numbers, seed, postures)
     return WorkspaceAudit(found["samples"], found["singular"],
                           *(Distribution(**found[name])

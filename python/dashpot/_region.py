@@ -69,10 +69,10 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     samples = samples if given is None else len(given)
     if samples < 1:
         raise Error("samples: a region without postures")
-    with workers(executor) as found_workers:
+    with workers(executor) as pool:
         def ask_all(question: Any) -> list[Any]:
             *asked, members = question
-            return collect(found_workers, [
+            return collect(pool, [
                 (task.judge, ((*asked, [i for i in members if first <= i < first + count]), seed,
                               first, count, None if given is None else given[first:first + count]))
                 for first, count in chunks_of(samples)], samples)
