@@ -1,5 +1,7 @@
 #include <dashpot/apps/audit/posture_files.hpp>
+#include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/yaml/yaml_document.hpp>
+#include <dashpot/controller/yaml/yaml_mapping.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 
 #include <array>
