@@ -72,8 +72,9 @@ DampingDesign design_damping(const TaskImpedance& impedance, const DampingTarget
 /// positive semidefinite matrix that the user likes), or both. A search along the sensitivities
 /// (DampingFit) does this, because there is no closed form. It starts from `start`, or from the
 /// part of the exact answer inside the structure, and ends at a solution near its start. If it
-/// finds none, the sum of the squared differences of ratios is (locally) least, and `misses` names
-/// the modes.
+/// finds none, `misses` names the modes. With a `start` the sum of the squared differences of
+/// ratios is then (locally) least. Without one the smallest ratio, relative to its target, is
+/// (locally) largest, and no smaller than with the part of the exact answer inside the structure.
 DampingDesign design_damping(const TaskImpedance& impedance, const DampingTarget& target,
                              DampingStructure structure,
                              const std::optional<Eigen::MatrixXd>& start = {});

@@ -1,8 +1,12 @@
 #pragma once
 #include <dashpot/analysis/design/damping_fit.hpp>
 
+#include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace dashpot::analysis {
@@ -56,6 +60,48 @@ struct RegionDesign {
 /// named), and std::invalid_argument for invalid options.
 RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
                            const RegionOptions& options);
+
+/// What is asked about one damping matrix: which configurations does it treat worst?
+struct RegionQuestion {
+  Eigen::MatrixXd damping;
+  DampingTarget target;
+  double level = 0;                  ///< that no configuration should miss
+  double ceiling = 0;                ///< that no ratio should exceed
+  std::vector<std::size_t> members;  ///< configurations that are searched over already
+};
+
+/// The answer for some configurations, in short. It does not grow with their number.
+struct RegionVerdict {
+  /// Smallest ratio relative to its target; infinite if no mode counts.
+  double level = std::numeric_limits<double>::infinity();
+  double largest_ratio = 0;
+  std::int64_t worst_sample = -1;  ///< configuration with the smallest ratio
+  /// The few configurations outside `members` that come off worst, worst first: minus the distance
+  /// by which one misses the level or exceeds the ceiling, and its number.
+  std::vector<std::pair<double, std::size_t>> binding;
+
+  /// Joins the answer for other configurations. The order of joining does not matter.
+  void add(const RegionVerdict& other);
+};
+
+/// Answers for the configurations with the numbers first, first + 1, ..., on the calling thread.
+/// Throws as design_region does.
+RegionVerdict judge_region(const std::vector<TaskImpedance>& configurations, std::size_t first,
+                           const RegionQuestion& question);
+
+/// Configurations that lie elsewhere, such as in other processes.
+struct RegionSource {
+  RegionSource() = default;  // so that a list of configurations is none of these
+  std::size_t count = 0;
+  /// Returns one configuration; called for the few that are searched over.
+  std::function<TaskImpedance(std::size_t)> configuration;
+  /// Answers for all configurations; the joined answers of judge_region for their parts.
+  std::function<RegionVerdict(const RegionQuestion&)> judge;
+};
+
+/// As above, for configurations that are judged where they lie. The design is the same to the last
+/// bit, however they are divided; its `samples` are left empty.
+RegionDesign design_region(const RegionSource& source, const RegionOptions& options);
 
 /// Returns the map of the worst mode for a given damping matrix, which is not changed.
 RegionDesign evaluate_region(const std::vector<TaskImpedance>& configurations,

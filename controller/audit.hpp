@@ -131,6 +131,10 @@ class Audit {
   std::vector<PostureNumbers> sample(std::uint64_t seed, std::int64_t first,
                                      std::int64_t count) const;
 
+  /// Returns the system at q that damping is designed for: with the springs, the null space's
+  /// dampers and the friction, without the dampers of task or joints. Throws like numbers().
+  analysis::TaskImpedance undamped(const JointVector& q) const;
+
   /// Designs damping for the stiffness at q, with `ratio` for every mode. Throws
   /// std::invalid_argument for a ratio that is not positive.
   DampingSuggestion suggest(const JointVector& q, double ratio) const;

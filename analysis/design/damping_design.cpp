@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -23,6 +24,8 @@ using Values = Eigen::Matrix<Extended, Eigen::Dynamic, 1>;
 
 /// Ratios nearer to their target than this reach it.
 constexpr double kReached = 1e-9;
+/// Steps in which a level is sought, and how near a search has to come to one.
+constexpr double kRatioStep = 5e-4, kRatioSlack = 1e-7;
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 MatrixXd symmetric_part(const MatrixXd& A) {
@@ -130,6 +133,53 @@ void evaluate(const TaskImpedance& impedance, const DampingTarget& target, Dampi
   design.misses = find_misses(design.spectrum, target, reason);
 }
 
+/// The modes of a design that are not soft, in short.
+struct Extremes {
+  double level = 1;    ///< smallest ratio relative to its target, at most 1
+  double largest = 0;  ///< ratio
+};
+
+Extremes extremes_of(const DampingDesign& design, const DampingTarget& target) {
+  const auto& modes = design.spectrum.modes;
+  const double soft = target.soft_limit(modes.empty() ? 0 : modes[0].natural_frequency);
+  Extremes result;
+  for (const Mode<>& mode : modes) {
+    const double wanted = target.ratio(mode.natural_frequency);
+    if (!(mode.natural_frequency >= soft) || !(wanted > 0)) continue;
+    result.level = std::min(result.level, mode.damping_ratio / wanted);
+    result.largest = std::max(result.largest, mode.damping_ratio);
+  }
+  return result;
+}
+
+/// Improves a design whose structure allows no exact answer until its smallest ratio, relative to
+/// its target, is (locally) largest. It is no smaller than with the part of `exact` inside the
+/// structure. Ratios exceed their target by no more than half, or than what the better of these two
+/// needs.
+void raise_smallest_ratio(const TaskImpedance& impedance, const DampingTarget& target,
+                          const DampingFit& fit, const MatrixXd& exact, DampingDesign& design) {
+  const auto offer = [&](const MatrixXd& damping) {
+    DampingDesign other;
+    other.damping = damping;
+    evaluate(impedance, target, other);
+    const double reached = extremes_of(other, target).level;
+    if (reached > extremes_of(design, target).level) design = std::move(other);
+    return reached;
+  };
+  offer(fit.within_structure(exact));
+  const double ceiling = std::max(1.5 * std::max(target.low_ratio, target.high_ratio),
+                                  extremes_of(design, target).largest);
+  double high = 1;
+  for (;;) {
+    const double low = std::max(0.0, extremes_of(design, target).level);
+    if (high - low <= kRatioStep) return;
+    const double level = 0.5 * (low + high);
+    if (offer(fit.search(design.damping, {target, level, ceiling}).damping) < level - kRatioSlack) {
+      high = level;
+    }
+  }
+}
+
 }  // namespace
 
 const char* to_text(DampingMiss::Reason reason) noexcept {
@@ -229,8 +279,12 @@ DampingDesign design_damping(const TaskImpedance& impedance, const DampingTarget
     from = design_damping(impedance, target).damping;
   }
   DampingDesign design;
-  design.damping = DampingFit(samples, structure).search(from, {target, 1, {}}).damping;
+  const DampingFit fit(samples, structure);
+  design.damping = fit.search(from, {target, 1, {}}).damping;
   evaluate(impedance, target, design);
+  if (!start && worst_miss(design.misses) > 0) {
+    raise_smallest_ratio(impedance, target, fit, from, design);
+  }
   for (DampingMiss& miss : design.misses) {
     if (miss.reason != DampingMiss::Reason::kSoft) miss.reason = DampingMiss::Reason::kStructure;
   }

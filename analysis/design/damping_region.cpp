@@ -73,38 +73,64 @@ double level_of(const RegionSample& sample) {
   return sample.worst_mode < 0 || !(sample.wanted > 0) ? 1 : sample.damping_ratio / sample.wanted;
 }
 
-double largest_ratio(const RegionDesign& design) {
-  double largest = 0;
-  for (const RegionSample& sample : design.samples) {
-    largest = std::max(largest, sample.largest_ratio);
-  }
-  return largest;
+RegionSample read(const DampingSample& sample, const MatrixXd& damping,
+                  const DampingTarget& target) {
+  System<> system = sample.system;
+  const MatrixXd C = sample.map * damping * sample.map.transpose();
+  system.damping += 0.5 * (C + C.transpose());
+  system.has_low_words = false;
+  return read(analyze(system), target);
 }
 
-RegionDesign evaluate(const std::vector<DampingSample>& samples, const DampingFit& fit,
-                      const MatrixXd& damping, const RegionOptions& options) {
-  RegionDesign design;
-  design.damping = damping;
-  design.samples.resize(samples.size());
+std::vector<RegionSample> read_all(const std::vector<DampingSample>& samples,
+                                   const MatrixXd& damping, const RegionOptions& options) {
+  std::vector<RegionSample> found(samples.size());
   for_each_in_parallel(samples.size(), options.threads, [&](std::size_t i) {
-    System<> system = samples[i].system;
-    const MatrixXd C = samples[i].map * damping * samples[i].map.transpose();
-    system.damping += 0.5 * (C + C.transpose());
-    system.has_low_words = false;
-    design.samples[i] = read(analyze(system), options.target);
+    found[i] = read(samples[i], damping, options.target);
   });
-  double smallest = std::numeric_limits<double>::infinity();
+  return found;
+}
+
+/// The worst first; of equal ones that with the lower number, wherever they were judged.
+void keep_worst(RegionVerdict& verdict) {
+  std::sort(verdict.binding.begin(), verdict.binding.end());
+  verdict.binding.resize(std::min(verdict.binding.size(), kJoining));
+}
+
+RegionVerdict verdict_of(const std::vector<RegionSample>& samples, std::size_t first,
+                         const RegionQuestion& question) {
+  RegionVerdict verdict;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const RegionSample& sample = design.samples[i];
-    if (sample.worst_mode < 0 || !(sample.wanted > 0)) continue;
-    if (level_of(sample) < smallest) {
-      smallest = level_of(sample);
-      design.worst_sample = static_cast<int>(i);
+    const RegionSample& sample = samples[i];
+    const std::size_t number = first + i;
+    verdict.largest_ratio = std::max(verdict.largest_ratio, sample.largest_ratio);
+    const bool counts = sample.worst_mode >= 0 && sample.wanted > 0;
+    if (counts && level_of(sample) < verdict.level) {
+      verdict.level = level_of(sample);
+      verdict.worst_sample = static_cast<std::int64_t>(number);
+    }
+    const double missed = question.level - level_of(sample);
+    const double over = sample.largest_ratio - question.ceiling;
+    if (missed <= kLevelMissed && over <= kMet) continue;
+    const std::vector<std::size_t>& members = question.members;
+    if (std::find(members.begin(), members.end(), number) == members.end()) {
+      verdict.binding.emplace_back(-std::max(missed, over), number);
     }
   }
-  design.level = std::min(1.0, smallest);
-  design.violation =
-      std::max({0.0, largest_ratio(design) - ceiling_of(options), fit.excess(damping)});
+  keep_worst(verdict);
+  return verdict;
+}
+
+/// What all configurations say of one damping matrix.
+using Judge = std::function<RegionVerdict(const MatrixXd&)>;
+
+RegionDesign design_of(const MatrixXd& damping, const RegionVerdict& verdict, const DampingFit& fit,
+                       double ceiling) {
+  RegionDesign design;
+  design.damping = damping;
+  design.level = std::min(1.0, verdict.level);
+  design.violation = std::max({0.0, verdict.largest_ratio - ceiling, fit.excess(damping)});
+  design.worst_sample = static_cast<int>(verdict.worst_sample);
   return design;
 }
 
@@ -130,17 +156,17 @@ struct Candidate {
 };
 
 /// Keeps the better one of `best` and `damping`, the latter scaled down until it is allowed.
-void offer(MatrixXd damping, const std::vector<DampingSample>& samples, const DampingFit& fit,
-           const RegionOptions& options, Candidate& best) {
+void offer(MatrixXd damping, const Judge& judge, const DampingFit& fit, double ceiling,
+           Candidate& best) {
   damping = fit.within_structure(damping);
-  const double ceiling = ceiling_of(options);
   for (int k = 0; k < kScalings; ++k) {
-    const RegionDesign design = evaluate(samples, fit, damping, options);
+    const RegionVerdict verdict = judge(damping);
+    const RegionDesign design = design_of(damping, verdict, fit, ceiling);
     if (design.violation <= kMet) {
       if (design.level > best.level) best = {damping, design.level};
       return;
     }
-    damping *= std::min(0.9, ceiling / largest_ratio(design));
+    damping *= std::min(0.9, ceiling / verdict.largest_ratio);
   }
 }
 
@@ -152,16 +178,19 @@ Candidate search_level(const std::vector<TaskImpedance>& configurations, const M
   const double ceiling = ceiling_of(options);
   const std::vector<DampingSample> samples = samples_of(configurations, options.threads);
   const DampingFit fit(samples, options.structure, options.bounds, options.threads);
+  const Judge judge = [&](const MatrixXd& damping) {
+    return verdict_of(read_all(samples, damping, options), 0, {damping, options.target, 0, 0, {}});
+  };
   std::vector<MatrixXd> starts = starts_of(configurations, options);
   if (given.size() > 0) starts.insert(starts.begin(), given);
   Candidate best;
-  for (const MatrixXd& start : starts) offer(start, samples, fit, options, best);
+  for (const MatrixXd& start : starts) offer(start, judge, fit, ceiling, best);
   // Towards the level from where the last search has ended, and from the best so far.
   MatrixXd last = starts.front();
   const auto reach = [&](double level) {
     for (const MatrixXd& start : {last, best.level >= 0 ? best.damping : starts.back()}) {
       last = fit.search(start, {options.target, level, ceiling}).damping;
-      offer(last, samples, fit, options, best);
+      offer(last, judge, fit, ceiling, best);
       if (best.level >= level - kMet) return true;
     }
     return false;
@@ -179,66 +208,94 @@ Candidate search_level(const std::vector<TaskImpedance>& configurations, const M
   return best;
 }
 
-/// Adds those configurations to `members` that `design` treats worst: with a smaller level than
-/// `level` or a ratio above the ceiling. False if there is none.
-bool join(const RegionDesign& design, double level, double ceiling,
-          std::vector<std::size_t>& members) {
-  std::vector<std::pair<double, std::size_t>> worst;
-  for (std::size_t i = 0; i < design.samples.size(); ++i) {
-    const RegionSample& sample = design.samples[i];
-    const double missed = level - level_of(sample), over = sample.largest_ratio - ceiling;
-    if (missed <= kLevelMissed && over <= kMet) continue;
-    if (std::find(members.begin(), members.end(), i) == members.end()) {
-      worst.emplace_back(-std::max(missed, over), i);
-    }
-  }
-  std::sort(worst.begin(), worst.end());
-  worst.resize(std::min(worst.size(), kJoining));
-  for (const auto& [badness, i] : worst) members.push_back(i);
-  return !worst.empty();
-}
-
 }  // namespace
 
-RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
-                           const RegionOptions& options) {
+void RegionVerdict::add(const RegionVerdict& other) {
+  const bool earlier = other.level == level && other.worst_sample >= 0 &&
+                       (worst_sample < 0 || other.worst_sample < worst_sample);
+  if (other.level < level || earlier) worst_sample = other.worst_sample;
+  level = std::min(level, other.level);
+  largest_ratio = std::max(largest_ratio, other.largest_ratio);
+  binding.insert(binding.end(), other.binding.begin(), other.binding.end());
+  keep_worst(*this);
+}
+
+RegionVerdict judge_region(const std::vector<TaskImpedance>& configurations, std::size_t first,
+                           const RegionQuestion& question) {
+  std::vector<RegionSample> samples;
+  samples.reserve(configurations.size());
+  for (const TaskImpedance& one : configurations) {
+    samples.push_back(read(damping_sample(one), question.damping, question.target));
+  }
+  return verdict_of(samples, first, question);
+}
+
+RegionDesign design_region(const RegionSource& source, const RegionOptions& options) {
   const double ceiling = ceiling_of(options);
+  if (source.count == 0) throw std::invalid_argument("damping: a region without configurations");
   double told = 0;
   const auto tell = [&](double done) {
     told = std::max(told, done);
     if (options.progress) options.progress(told);
   };
   tell(0);
-  const std::vector<DampingSample> samples = samples_of(configurations, options.threads);
-  const DampingFit fit(samples, options.structure, options.bounds, options.threads);
   std::vector<std::size_t> members;
-  const std::size_t first = std::min(kFirst, configurations.size());
-  for (std::size_t i = 0; i < first; ++i) members.push_back(i * configurations.size() / first);
+  const std::size_t first = std::min(kFirst, source.count);
+  for (std::size_t i = 0; i < first; ++i) members.push_back(i * source.count / first);
+  const std::vector<DampingSample> one = {damping_sample(source.configuration(0))};
+  const DampingFit fit(one, options.structure, options.bounds, options.threads);  // for the limits
+  std::vector<TaskImpedance> chosen;
   Candidate candidate{MatrixXd(), 1}, best;
   RegionDesign design;
   for (int round = 0; round < kRounds; ++round) {
-    std::vector<TaskImpedance> chosen;
-    chosen.reserve(members.size());
-    for (const std::size_t i : members) chosen.push_back(configurations[i]);
+    while (chosen.size() < members.size()) {
+      chosen.push_back(source.configuration(members[chosen.size()]));
+    }
     candidate = search_level(chosen, candidate.damping, std::max(0.0, candidate.level), options,
                              [&](double done) { tell(0.9 * (round + done) / (round + 1.0)); });
-    design = evaluate(samples, fit, candidate.damping, options);
-    if (design.violation <= kMet && design.level > best.level)
+    const RegionVerdict verdict =
+        source.judge({candidate.damping, options.target, candidate.level, ceiling, members});
+    design = design_of(candidate.damping, verdict, fit, ceiling);
+    if (design.violation <= kMet && design.level > best.level) {
       best = {design.damping, design.level};
-    if (best.level >= candidate.level - kLevelMissed) break;
-    if (!join(design, candidate.level, ceiling, members)) break;
+    }
+    if (best.level >= candidate.level - kLevelMissed || verdict.binding.empty()) break;
+    for (const auto& [badness, number] : verdict.binding) members.push_back(number);
   }
-  if (best.level < 0) offer(candidate.damping, samples, fit, options, best);
+  const Judge judge = [&](const MatrixXd& damping) {
+    return source.judge({damping, options.target, 0, ceiling, members});
+  };
+  if (best.level < 0) offer(candidate.damping, judge, fit, ceiling, best);
   tell(1);
-  if (best.level >= 0) design = evaluate(samples, fit, best.damping, options);
+  if (best.level >= 0 && best.damping != design.damping) {
+    design = design_of(best.damping, judge(best.damping), fit, ceiling);
+  }
   return design;
 }
 
 RegionDesign evaluate_region(const std::vector<TaskImpedance>& configurations,
                              const MatrixXd& damping, const RegionOptions& options) {
   const std::vector<DampingSample> samples = samples_of(configurations, options.threads);
-  return evaluate(samples, DampingFit(samples, options.structure, options.bounds, options.threads),
-                  damping, options);
+  std::vector<RegionSample> map = read_all(samples, damping, options);
+  const RegionVerdict verdict = verdict_of(map, 0, {damping, options.target, 0, 0, {}});
+  RegionDesign design = design_of(
+      damping, verdict, DampingFit(samples, options.structure, options.bounds, options.threads),
+      ceiling_of(options));
+  design.samples = std::move(map);
+  return design;
+}
+
+RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
+                           const RegionOptions& options) {
+  ceiling_of(options);  // is judged first
+  const std::vector<DampingSample> samples = samples_of(configurations, options.threads);
+  RegionSource source;
+  source.count = configurations.size();
+  source.configuration = [&](std::size_t i) { return configurations[i]; };
+  source.judge = [&](const RegionQuestion& question) {
+    return verdict_of(read_all(samples, question.damping, options), 0, question);
+  };
+  return evaluate_region(configurations, design_region(source, options).damping, options);
 }
 
 }  // namespace dashpot::analysis

@@ -166,7 +166,8 @@ void add_audit(CLI::App& program) {
     check_outputs({{"--csv", options->csv}, {"--plot", options->plot}},
                   {{"--urdf", options->arm.urdf},
                    {"--gains", options->gains},
-                   {"--postures", options->postures}});
+                   {"--postures", options->postures},
+                   {"--log", options->log}});
     run(*options);
   });
 }

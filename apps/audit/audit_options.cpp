@@ -1,4 +1,5 @@
 #include <dashpot/apps/audit/audit_options.hpp>
+#include <dashpot/apps/audit/posture_files.hpp>
 #include <dashpot/apps/audit/presets.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/controller/config/config_gains.hpp>
@@ -123,36 +124,6 @@ void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptio
   gains.joint_damping = factor_damping("--damping-factor", *factor, gains.joint_stiffness);
 }
 
-/// The postures in a file: a list of lists, rad or m.
-std::vector<JointVector> read_postures(const std::string& path, int n) try {
-  const controller::YamlNode document = controller::parse_yaml(controller::read_file(path));
-  if (document.kind != controller::YamlNode::Kind::kSequence || document.items.empty()) {
-    throw InputError("", "a list of postures is wanted, each a list of joint positions");
-  }
-  std::vector<JointVector> postures;
-  for (const controller::YamlNode& item : document.items) {
-    controller::YamlNode holder;  // a mapping, which reads lists of numbers
-    controller::YamlNode key;
-    key.kind = controller::YamlNode::Kind::kScalar;
-    key.text = "posture";
-    holder.kind = controller::YamlNode::Kind::kMap;
-    holder.line = item.line;
-    holder.items = {key, item};
-    static constexpr std::array<std::string_view, 1> kKeys = {"posture"};
-    const controller::YamlMapping mapping(holder, "[" + std::to_string(postures.size()) + "].",
-                                          kKeys);
-    const Eigen::VectorXd q = *mapping.vector("posture");
-    if (q.size() != n) {
-      throw mapping.error("posture",
-                          std::to_string(q.size()) + " numbers, expected " + std::to_string(n));
-    }
-    postures.emplace_back(q);
-  }
-  return postures;
-} catch (const InputError& error) {
-  throw error.in_file(path);
-}
-
 /// The middle of the limits; zero where there are none.
 JointVector middle(const RobotModel& model) {
   JointVector q(model.dof());
@@ -199,8 +170,12 @@ void check(const AuditCommand& command) {
   if (!command.mode.empty() && command.gains.empty()) {
     throw InputError("--mode", "goes with --gains");
   }
-  if (command.samples > 0 && !command.postures.empty()) {
-    throw InputError("--postures", "does not go with --samples");
+  const auto& list = command.postures;
+  const auto& log = command.log;
+  if ((command.samples > 0 ? 1 : 0) + (list.empty() ? 0 : 1) + (log.empty() ? 0 : 1) > 1) {
+    throw InputError(list.empty() ? "--log" : "--postures",
+                     list.empty() || log.empty() ? "does not go with --samples"
+                                                 : "does not go with --samples or --log");
   }
   if (command.spread && command.samples == 0) throw InputError("--spread", "needs --samples");
   const analysis::SampledLoop& loop = command.loop;
@@ -208,9 +183,9 @@ void check(const AuditCommand& command) {
       (loop.delay > 0 || loop.torque_cutoff > 0 || loop.difference_velocity)) {
     throw InputError("--period", "missing; --delay, --cutoff and --difference-velocity need it");
   }
-  const bool many = command.samples > 0 || !command.postures.empty();
+  const bool many = command.samples > 0 || !list.empty() || !log.empty();
   for (const auto& [option, path] : {std::pair("--csv", &command.csv), {"--plot", &command.plot}}) {
-    if (!path->empty() && !many) throw InputError(option, "needs --samples or --postures");
+    if (!path->empty() && !many) throw InputError(option, "needs --samples, --postures or --log");
   }
   const auto ends = [&](const char* end) { return command.plot.ends_with(end); };
   if (!command.plot.empty() && !ends(".svg") && !ends(".png")) {
@@ -236,6 +211,9 @@ AuditTask read_task(const AuditCommand& command) {
                          : JointVector(parse_quantities(
                                "--q", arm.q, controller::joint_units(task.model, "rad", "m")));
   if (!command.postures.empty()) task.postures = read_postures(command.postures, task.model.dof());
+  if (!command.log.empty()) {
+    task.postures = read_log_postures(command.log, task.model.dof(), command.log_step);
+  }
   read_range(command, task);
   return task;
 }
@@ -276,6 +254,10 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
   command.add_flag("--no-margin", options.no_margin, "Leave the gain margin out");
   add("--q", arm.q, "Joint positions, rad or m", "a,b,... (middle of the limits)");
   add("--postures", options.postures, "YAML file with a list of postures", "FILE");
+  add("--log", options.log, "LCM log whose measured postures count", "FILE");
+  command.add_option("--log-step", options.log_step, "Movement of a joint between two of these")
+      ->transform(positive("rad", "an angle in rad"))
+      ->option_text("R (0.01)");
   command.add_option("--samples", options.samples, "Postures spread over the position limits")
       ->check(CLI::Range(std::int64_t{1}, std::int64_t{10'000'000}))
       ->option_text("N");

@@ -22,7 +22,9 @@ struct AuditCommand {
   double period = 0;           ///< s
   analysis::SampledLoop loop;  ///< but for the period
   bool no_margin = false;
-  std::string postures;  ///< a file
+  std::string postures;    ///< a file
+  std::string log;         ///< an LCM log
+  double log_step = 0.01;  ///< rad or m, between two postures of the log
   std::int64_t samples = 0;
   std::uint64_t seed = 1;
   std::optional<double> spread;         ///< rad
@@ -40,7 +42,7 @@ struct AuditTask {
   double intended_ratio;
   double wanted_ratio;  ///< of the suggestion
   controller::JointVector q;
-  std::vector<controller::JointVector> postures;  ///< of the file; empty if there is none
+  std::vector<controller::JointVector> postures;  ///< of the file or log; empty if there is none
 };
 
 /// Adds the options to the subcommand; they are written to `options`.

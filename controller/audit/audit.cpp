@@ -310,13 +310,18 @@ std::vector<PostureNumbers> Audit::sample(std::uint64_t seed, std::int64_t first
   return result;
 }
 
+analysis::TaskImpedance Audit::undamped(const JointVector& q) const {
+  analysis::TaskImpedance impedance = task_impedance(evaluate(q));
+  impedance.task_damping.reset();
+  if (!impedance.jacobian) impedance.damping = MatrixXd(friction_.asDiagonal());
+  return impedance;
+}
+
 DampingSuggestion Audit::suggest(const JointVector& q, double ratio) const {
   require(std::isfinite(ratio) && ratio > 0, "ratio: has to be positive");
   analysis::DampingTarget target = analysis::DampingTarget::constant(ratio);
   target.soft_frequency = options_.soft_frequency;
-  analysis::TaskImpedance impedance = task_impedance(evaluate(q));
-  impedance.task_damping.reset();
-  if (!impedance.jacobian) impedance.damping = MatrixXd(friction_.asDiagonal());
+  const analysis::TaskImpedance impedance = undamped(q);
   const analysis::DampingDesign full = analysis::design_damping(impedance, target);
   const Eigen::VectorXd diagonal = full.damping.diagonal();
   const auto smallest_ratio = [&](const MatrixXd& damping) {

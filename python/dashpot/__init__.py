@@ -15,13 +15,14 @@ from ._controller import (Controller, Setpoint, Snapshot, Status, TrackedModes,
                           TrackedSampledModes)
 from ._core import Error
 from ._log import read_log
+from ._region import RegionDesign, design_region
 from ._results import Modes
 from ._robot import ClosedLoop, Robot, closed_loop
 
 __version__ = _version("dashpot")
 __all__ = ["Audit", "ClosedLoop", "Controller", "DampingDesign", "DampingSuggestion",
-           "Distribution", "Error", "Gradients", "Miss", "Modes", "PostureAudit", "Response",
-           "Robot", "SampledModes", "Sensitivities", "Setpoint", "Snapshot", "Status",
+           "Distribution", "Error", "Gradients", "Miss", "Modes", "PostureAudit", "RegionDesign",
+           "Response", "Robot", "SampledModes", "Sensitivities", "Setpoint", "Snapshot", "Status",
            "TrackedModes", "TrackedSampledModes", "WorkspaceAudit", "audit", "closed_loop",
-           "design_damping", "modes", "read_log", "receptance", "response", "sampled_modes",
-           "sensitivities"]
+           "design_damping", "design_region", "modes", "read_log", "receptance", "response",
+           "sampled_modes", "sensitivities"]

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
-import os
 from typing import Any, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _core
 from ._core import Error
 from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers, to_vector
 from ._robot import DIRECTIONS, Robot, is_tool, selected
-
-_CHUNK = 256  # postures
+from ._workers import Task, chunks_of, collect, workers
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -84,44 +81,16 @@ class Audit(Result):
     suggestion: DampingSuggestion | None
 
 
-class _Task:
-    """An audit that other threads and processes take chunks of."""
-
-    def __init__(self, robot: Robot, gains: tuple[Any, ...], at_tip: bool,
-                 options: dict[str, Any]) -> None:
-        self._arguments = (robot, gains, at_tip, options)
-        self.core = _core.Audit(robot._core, _core.Gains(robot._core, *gains), at_tip, options)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _Task, self._arguments
-
-    def sample(self, seed: int, first: int, count: int) -> Array:
-        return self.core.sample(seed, first, count)
-
-    def numbers(self, postures: Array) -> Array:
-        return self.core.numbers(postures)
-
-
-def _map_chunks(task: _Task, samples: int, seed: int, postures: Array | None,
-                executor: concurrent.futures.Executor) -> Array:
-    """Returns the numbers of all postures in their order, whoever finds them and when."""
-    firsts = range(0, samples, _CHUNK)
-    if postures is None:
-        chunks = [executor.submit(task.sample, seed, first, min(_CHUNK, samples - first))
-                  for first in firsts]
-    else:
-        chunks = [executor.submit(task.numbers, postures[first:first + _CHUNK])
-                  for first in firsts]
-    return np.concatenate([chunk.result() for chunk in chunks])
-
-
-def _workspace(task: _Task, samples: int, seed: int, postures: Array | None,
+def _workspace(task: Task, samples: int, seed: int, postures: Array | None,
                executor: concurrent.futures.Executor | None) -> WorkspaceAudit:
-    if executor is None:
-        with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as threads:
-            numbers = _map_chunks(task, samples, seed, postures, threads)
-    else:
-        numbers = _map_chunks(task, samples, seed, postures, executor)
+    with workers(executor) as pool:
+        chunks: list[Any]
+        if postures is None:
+            chunks = [(task.sample, (seed, first, count)) for first, count in chunks_of(samples)]
+        else:
+            chunks = [(task.numbers, (postures[first:first + count],))
+                      for first, count in chunks_of(samples)]
+        numbers = np.concatenate(collect(pool, chunks, samples))
     found = task.core.summarize(numbers, seed, postures)
     return WorkspaceAudit(found["samples"], found["singular"],
                           *(Distribution(**found[name])
@@ -170,7 +139,9 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     An `executor` of concurrent.futures maps over chunks of postures, by default one of threads. The
     results are the same to the last bit whatever executor and however many workers.
 
-    Raises Error for gains that are not symmetric positive semidefinite, or of another size.
+    Raises Error for gains that are not symmetric positive semidefinite, or of another size. Raises
+    concurrent.futures.BrokenExecutor, which says how many postures were done, if a worker dies and
+    its executor does not start the work again.
     """
     at_tip = joint_stiffness is None and joint_damping is None
     if not at_tip and not (task_stiffness is None and task_damping is None):
@@ -194,7 +165,7 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     for name, values in (("lower", lower), ("upper", upper)):
         if values is not None:
             options[name] = to_numbers(name, values, 1)
-    task = _Task(robot, gains, at_tip, options)
+    task = Task(robot, gains, at_tip, options)
     given = None if postures is None else to_numbers("postures", postures, 2)
     samples = samples if given is None else len(given)
     posture = workspace = suggestion = None

@@ -1,11 +1,15 @@
 """The C++ functions (python/src), for type checkers."""
 
-from typing import Any
+from typing import Any, Callable
 
 import numpy as np
 import numpy.typing as npt
 
 _Array = npt.NDArray[np.float64]
+# damping, ratio wanted, level, ceiling, members
+_Question = tuple[_Array, float, float, float, list[int]]
+# level, largest ratio, worst sample, those that bind
+_Verdict = tuple[float, float, int, list[tuple[float, int]]]
 
 class Error(ValueError): ...
 
@@ -90,3 +94,8 @@ class Audit:
     def summarize(self, table: _Array, seed: int, postures: _Array | None) -> dict[str, Any]: ...
     def posture(self, q: _Array, /) -> dict[str, Any]: ...
     def suggest(self, q: _Array, ratio: float, /) -> dict[str, Any]: ...
+    def judge(self, question: _Question, seed: int, first: int, count: int,
+              postures: _Array | None) -> _Verdict: ...
+    def design_region(self, count: int, seed: int, postures: _Array | None, ratio: float,
+                      structure: str, largest_ratio: float | None,
+                      ask_all: Callable[[_Question], list[_Verdict]]) -> dict[str, Any]: ...

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/analysis/damping_target.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/python/src/convert.hpp>
@@ -9,5 +10,8 @@ namespace dashpot::python {
 nb::dict modes_of(const analysis::Spectrum<>& spectrum);
 /// Returns the entries of dashpot.SampledModes but for the gain margin and the continuous modes.
 nb::dict sampled_modes_of(const analysis::SampledSpectrum& sampled);
+
+/// Returns the structure of a name; throws std::invalid_argument for another name.
+analysis::DampingStructure structure_of(const std::string& name);
 
 }  // namespace dashpot::python

@@ -1,8 +1,14 @@
-// What gains really do on an arm, at one posture and at many.
+// What gains really do on an arm, at one posture and at many; one damping for many postures.
 
+#include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/python/src/analysis.hpp>
 #include <dashpot/python/src/robot.hpp>
+
+#include <nanobind/stl/function.h>
+#include <nanobind/stl/pair.h>
+
+#include <functional>
 
 namespace dashpot::python {
 namespace {
@@ -143,6 +149,85 @@ nb::dict suggest(const RobotAudit& all, const Eigen::VectorXd& q, double ratio) 
   return result;
 }
 
+/// Postures first .. first + count - 1 of a sequence, or of those given by rows.
+JointVector posture_of(const RobotAudit& all, std::uint64_t seed, const OptionalMatrix& postures,
+                       std::int64_t index) {
+  if (!postures) return all.audit.posture(seed, index);
+  return all.robot.joint_vector("postures", postures->row(index));
+}
+
+/// A question that other processes are asked: damping, ratio wanted, level, ceiling, members.
+using Question = std::tuple<Eigen::MatrixXd, double, double, double, std::vector<std::size_t>>;
+/// Their answer: level, largest ratio, worst sample, those that bind.
+using Verdict =
+    std::tuple<double, double, std::int64_t, std::vector<std::pair<double, std::size_t>>>;
+
+analysis::DampingTarget target_of(const RobotAudit& all, double ratio) {
+  analysis::DampingTarget target = analysis::DampingTarget::constant(ratio);
+  target.soft_frequency = all.audit.options().soft_frequency;
+  return target;
+}
+
+/// Judges `count` postures, the first of which is number `first` of the region. With `postures` by
+/// rows these are just the rows that are judged.
+Verdict judge(const RobotAudit& all, const Question& asked, std::uint64_t seed, std::int64_t first,
+              std::int64_t count, const OptionalMatrix& postures) {
+  std::vector<analysis::TaskImpedance> configurations;
+  for (std::int64_t i = 0; i < count; ++i) {
+    configurations.push_back(
+        all.audit.undamped(posture_of(all, seed, postures, postures ? i : first + i)));
+  }
+  const auto& [damping, ratio, level, ceiling, members] = asked;
+  const analysis::RegionVerdict found =
+      analysis::judge_region(configurations, static_cast<std::size_t>(first),
+                             {damping, target_of(all, ratio), level, ceiling, members});
+  return {found.level, found.largest_ratio, found.worst_sample, found.binding};
+}
+
+/// Asks all parts of a region, in Python.
+using AskAll = std::function<std::vector<Verdict>(const Question&)>;
+
+nb::dict design_region(const RobotAudit& all, std::int64_t count, std::uint64_t seed,
+                       const OptionalMatrix& postures, double ratio, const std::string& structure,
+                       const std::optional<double>& largest_ratio, const AskAll& ask_all) {
+  analysis::RegionOptions options;
+  options.target = target_of(all, ratio);
+  options.structure = structure_of(structure);
+  options.ceiling = largest_ratio;
+  analysis::RegionSource source;
+  source.count = static_cast<std::size_t>(count);
+  source.configuration = [&](std::size_t i) {
+    return all.audit.undamped(posture_of(all, seed, postures, static_cast<std::int64_t>(i)));
+  };
+  source.judge = [&](const analysis::RegionQuestion& question) {
+    const nb::gil_scoped_acquire locked;
+    analysis::RegionVerdict verdict;
+    for (const auto& [level, largest, worst, binding] :
+         ask_all({question.damping, ratio, question.level, question.ceiling, question.members})) {
+      analysis::RegionVerdict part;
+      part.level = level;
+      part.largest_ratio = largest;
+      part.worst_sample = worst;
+      part.binding = binding;
+      verdict.add(part);
+    }
+    return verdict;
+  };
+  analysis::RegionDesign found;
+  {
+    const nb::gil_scoped_release release;
+    found = analysis::design_region(source, options);
+  }
+  nb::dict result;
+  result["damping"] = to_array(found.damping);
+  result["level"] = found.level;
+  result["violation"] = found.violation;
+  const JointVector worst =
+      found.worst_sample < 0 ? JointVector() : posture_of(all, seed, postures, found.worst_sample);
+  result["worst_q"] = to_array(worst);
+  return result;
+}
+
 }  // namespace
 
 void add_audit(nb::module_& m) {
@@ -154,7 +239,12 @@ void add_audit(nb::module_& m) {
       .def("numbers", &numbers_at, unlocked)
       .def("summarize", &summarize, nb::arg("table"), nb::arg("seed"), nb::arg("postures").none())
       .def("posture", &posture)
-      .def("suggest", &suggest);
+      .def("suggest", &suggest)
+      .def("judge", &judge, unlocked, nb::arg("question"), nb::arg("seed"), nb::arg("first"),
+           nb::arg("count"), nb::arg("postures").none())
+      .def("design_region", &design_region, nb::arg("count"), nb::arg("seed"),
+           nb::arg("postures").none(), nb::arg("ratio"), nb::arg("structure"),
+           nb::arg("largest_ratio").none(), nb::arg("ask_all"));
 }
 
 }  // namespace dashpot::python

@@ -6,19 +6,20 @@
 #include <array>
 
 namespace dashpot::python {
+
+analysis::DampingStructure structure_of(const std::string& name) {
+  if (name == "full") return analysis::DampingStructure::kFull;
+  if (name == "block") return analysis::DampingStructure::kBlock;
+  if (name == "diagonal") return analysis::DampingStructure::kDiagonal;
+  throw std::invalid_argument("structure: '" + name + "' is none of full, block and diagonal");
+}
+
 namespace {
 
 using analysis::DampingDesign;
 using analysis::DampingMiss;
 using analysis::DampingStructure;
 using analysis::DampingTarget;
-
-DampingStructure structure_of(const std::string& name) {
-  if (name == "full") return DampingStructure::kFull;
-  if (name == "block") return DampingStructure::kBlock;
-  if (name == "diagonal") return DampingStructure::kDiagonal;
-  throw std::invalid_argument("structure: '" + name + "' is none of full, block and diagonal");
-}
 
 nb::dict entries_of(const DampingDesign& design) {
   nb::dict result;

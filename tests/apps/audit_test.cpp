@@ -119,6 +119,29 @@ TEST(Audit, WritesALineForEachListedPosture) {
   EXPECT_THAT(text, HasSubstr("\n1,0,0,0,-2,0,2,0,0."));
 }
 
+TEST(Audit, TakesThePosturesOfALog) {
+  const Scratch scratch;
+  const std::string log = scratch.path("run.lcm"), csv = scratch.path("out.csv");
+  const Outcome run =
+      run_program({"run", std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes/panda_release_c2.yaml",
+                   "--fast", "--duration", "0.3", "--log", log});
+  ASSERT_EQ(run.status, 0) << run.err;
+  const auto samples = [&](const std::string& step) {
+    const Json found =
+        audit_json({"--preset", "crisp", "--log", log, "--log-step", step, "--csv", csv});
+    return found["workspace"]["samples"].get<int>();
+  };
+  EXPECT_EQ(samples("1"), 1);  // the first one alone
+  const int many = samples("0.001");
+  EXPECT_GT(many, 4);
+  EXPECT_LT(samples("0.004"), many);
+  EXPECT_THAT(scratch.read("out.csv"), HasSubstr("\n0,"));
+  EXPECT_THAT(run_program({"audit", "--urdf", testing::arm_path("ur5"), "--base", "base_link",
+                           "--tip", "ee_link", "--preset", "crisp", "--log", log})
+                  .err,
+              HasSubstr("its states have 7 joints, expected 6"));
+}
+
 TEST(Audit, TakesGainsFromAConfiguration) {
   const Scratch scratch;
   const std::string gains = scratch.write("gains.yaml",

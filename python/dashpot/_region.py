@@ -1,0 +1,81 @@
+"""One damping matrix for many postures."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import dataclasses
+from typing import Any
+
+import numpy.typing as npt
+
+from ._core import Error
+from ._results import Array, Result, to_gain, to_numbers, to_vector
+from ._robot import Robot, is_tool
+from ._workers import Task, chunks_of, collect, workers
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class RegionDesign(Result):
+    """One positive semidefinite damping matrix, and the worst that it does."""
+
+    damping: Array
+    """6 x 6 in the axes of the gains' frame, or n x n for joint springs."""
+    level: float
+    """Smallest ratio over all postures, relative to the ratio wanted, at most 1."""
+    violation: float
+    """By how much a ratio exceeds the largest one allowed."""
+    worst_q: Array
+    """n, rad, the posture of the smallest ratio; no entries if no posture has a ratio."""
+
+
+def design_region(robot: Robot, *, damping_ratio: float = 0.7,
+                  task_stiffness: npt.ArrayLike | None = None,
+                  joint_stiffness: npt.ArrayLike | None = None,
+                  null_stiffness: npt.ArrayLike | None = None,
+                  null_damping: npt.ArrayLike | None = None, frame: str = "base",
+                  half_quaternion: bool = False, structure: str = "full",
+                  largest_ratio: float | None = None, soft_frequency: float = 0.1,
+                  samples: int = 0, seed: int = 0, lower: npt.ArrayLike | None = None,
+                  upper: npt.ArrayLike | None = None, postures: npt.ArrayLike | None = None,
+                  executor: concurrent.futures.Executor | None = None) -> RegionDesign:
+    """Returns one constant damping matrix for many postures, as `dashpot design --region` does.
+
+    It seeks the largest level such that every mode at every posture has at least level times
+    `damping_ratio`, and none more than `largest_ratio` (by default 1, or 1.5 times the ratio wanted
+    if that is more). Postures, springs and null-space gains are those of `audit`; `structure` is
+    full, block or diagonal. Modes below `soft_frequency` (rad/s) do not count.
+
+    Only postures that bind are searched over. An `executor` of concurrent.futures judges all of
+    them in chunks, where the workers are, and only the few that come off worst come back. The result
+    is the same to the last bit whatever executor and however many workers.
+
+    Raises Error and BrokenExecutor as `audit` does, and Error without postures.
+    """
+    if (task_stiffness is None) == (joint_stiffness is None):
+        raise Error("task_stiffness: give one of task_stiffness and joint_stiffness")
+    gains = (to_gain("joint_stiffness", joint_stiffness), None, 0.0,
+             to_gain("task_stiffness", task_stiffness), None, 0.0,
+             to_vector("null_stiffness", null_stiffness), to_vector("null_damping", null_damping),
+             is_tool(frame), [True] * 6)
+    options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": False,
+                               "period": 0.0, "delay": 0, "cutoff": 0.0,
+                               "difference_velocity": False,
+                               "soft_frequency": float(soft_frequency)}
+    for name, values in (("lower", lower), ("upper", upper)):
+        if values is not None:
+            options[name] = to_numbers(name, values, 1)
+    task = Task(robot, gains, task_stiffness is not None, options)
+    given = None if postures is None else to_numbers("postures", postures, 2)
+    samples = samples if given is None else len(given)
+    if samples < 1:
+        raise Error("samples: a region without postures")
+    with workers(executor) as pool:
+        def ask_all(question: Any) -> list[Any]:
+            *asked, members = question
+            return collect(pool, [
+                (task.judge, ((*asked, [i for i in members if first <= i < first + count]), seed,
+                              first, count, None if given is None else given[first:first + count]))
+                for first, count in chunks_of(samples)], samples)
+
+        return RegionDesign(**task.core.design_region(samples, seed, given, float(damping_ratio),
+                                                      structure, largest_ratio, ask_all))
