@@ -24,7 +24,7 @@ namespace {
 using HttpClock = std::chrono::steady_clock;
 
 constexpr std::size_t kConnectionMemory = 32768;
-constexpr int kBacklog = 16;
+constexpr int kBacklog = 256;  // a browser whose connection does not fit waits for a second
 
 /// What the browser is told with every answer: nothing from elsewhere, nothing kept, no frame.
 constexpr std::array<std::pair<const char*, const char*>, 6> kHeaders = {{

@@ -209,7 +209,7 @@ function fillPlaces() {
 }
 let askedFor = '';
 async function askResponse() {
-  if (!page.setup || !page.frame || !page.connected || document.hidden) return;
+  if (!page.setup || !page.frame || !page.frame.messages || !page.connected || document.hidden) return;
   if (!page.setup.arm) {
     page.responseNote = 'start with --config to see the response';
     return;
@@ -400,6 +400,7 @@ function draw(now) {
     text('time_text', `${replay.time.toFixed(2)} s`);
   }
   page.poles = map.draw(poles(), measured(), wanted, page.chosen);
+  page.origin = map.origin;
   const T = period();
   drawCircle($('circle'), sampledPoles(frame.sampled, T));
   sampledNumbers(T);

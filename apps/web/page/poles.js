@@ -29,6 +29,7 @@ export class PoleMap {
     const least = Math.min(10 ** Math.floor(Math.log10(Math.min(...sizes))), most / 10);
     const unstable = poles.some((p) => p.re > 0);
     const x0 = unstable ? w * 0.6 : w - 34, y0 = h / 2;
+    this.origin = [x0, y0];
     const R = Math.min(x0 - 12, h / 2 - 16);
     const from = Math.max(least / 2, most * 1e-6);
     const radius = (r) => R * Math.log1p(r / from) / Math.log1p(most / from);
