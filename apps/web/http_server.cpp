@@ -175,6 +175,7 @@ MHD_Result HttpServer::Parts::open_stream(MHD_Connection* connection) {
   if (streams.size() >= kMostStreams) {
     return queue_answer(connection, refusal(503, "too many pages are open"));
   }
+  if (streams.empty()) event = nullptr;  // of a page that is long gone
   Stream& stream = streams.emplace_back();
   stream.parts = this;
   stream.connection = connection;

@@ -44,6 +44,7 @@ class Browser:
         self.session = self.call('Target.attachToTarget', targetId=target, flatten=True)['sessionId']
         for domain in ('Runtime', 'Page', 'Log', 'Network'):
             self.call(f'{domain}.enable')
+        self.call('Emulation.setScrollbarsHidden', hidden=True)
         self.size(width, height, scale, mobile)
 
     def __enter__(self):

@@ -66,6 +66,7 @@ const time = () => (page.setup.live ? (page.frame.utime - page.start) * 1e-6 : r
 
 function append(t, frame) {
   if (series.time.length && t <= series.time[series.time.length - 1]) return;
+  if (frame.utime && t - series.time[series.time.length - 1] > 1) append(t - 1e-3, {});  // a gap
   series.time.push(t);
   series.tick.push(frame.state ? frame.state.tick_time * 1e-3 : null);
   series.status.push(frame.state ? frame.state.status : 0);
@@ -162,15 +163,15 @@ async function pump() {
     then = now;
     if (replay.at === replay.time && page.connected) continue;
     const wanted = replay.time;
-    try {
-      const frame = await get(`/frame?t=${wanted.toFixed(6)}`);
-      replay.at = wanted;
-      link(true, page.setup.damage ? `log: ${page.setup.damage}` : 'log');
-      take(frame);
-    } catch {
+    const frame = await get(`/frame?t=${wanted.toFixed(6)}`).catch(() => null);
+    if (!frame) {
       link(false, 'connection lost; trying again');
       await new Promise((done) => setTimeout(done, 700));
+      continue;
     }
+    replay.at = wanted;
+    link(true, page.setup.damage ? `log: ${page.setup.damage}` : 'log');
+    take(frame);
   }
 }
 function setPlaying(on) {
@@ -410,10 +411,10 @@ function draw(now) {
   const t = time(), span = page.setup.live ? [Math.max(t - kMinute, series.time[0] || 0), Math.max(t, 1)] : [0, page.setup.duration || 1];
   const marks = (page.setup.identified || []);
   drawModes($('frequency'), series, 'natural_frequency', 'natural frequency, rad/s', t,
-    marks.map((m) => ({level: m.natural_frequency, text: 'measured'})), span, page.chosen);
+    marks.map((m, i) => ({level: m.natural_frequency, text: i ? '' : 'measured'})), span, page.chosen);
   drawModes($('ratio'), series, 'damping_ratio', 'damping ratio', t, [
     ...(wanted ? [{level: wanted, text: `wanted ${wanted}`}] : []),
-    ...marks.map((m) => ({level: m.damping_ratio, text: 'measured'}))], span, page.chosen);
+    ...marks.map((m, i) => ({level: m.damping_ratio, text: i ? '' : 'measured'}))], span, page.chosen);
   drawTicks($('ticks'), series, t, span, T);
   drawResponse($('magnitude'), $('phase'), page.response, page.responseNote || 'waiting for a posture');
   text('response_note', !page.response ? '' : sameGains() ? 'at this posture' : "of the configuration's gains; the loop's are others");

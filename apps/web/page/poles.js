@@ -11,9 +11,9 @@ export class PoleMap {
   }
   forget() { this.trails = []; }
   note(t, poles) {
-    const last = this.trails[this.trails.length - 1];
-    if (last && (t < last.t || t > last.t + kTrail)) this.forget();
-    if (!last || t > last.t) this.trails.push({t, poles});
+    const last = this.trails.length ? this.trails[this.trails.length - 1].t : -Infinity;
+    if (t < last || t > last + kTrail) this.forget();  // a leap, or back in time
+    if (t !== last) this.trails.push({t, poles});
     while (this.trails[0].t < t - kTrail) this.trails.shift();
   }
 
@@ -28,9 +28,9 @@ export class PoleMap {
     const most = 10 ** (Math.ceil(Math.log10(Math.max(...sizes)) * 4 + 0.4) / 4);
     const least = Math.min(10 ** Math.floor(Math.log10(Math.min(...sizes))), most / 10);
     const unstable = poles.some((p) => p.re > 0);
-    const x0 = unstable ? w * 0.6 : w - 34, y0 = h / 2;
+    const x0 = unstable ? w * 0.6 : w - 34, y0 = h - 22;  // the lower half is the mirror image
     this.origin = [x0, y0];
-    const R = Math.min(x0 - 12, h / 2 - 16);
+    const R = Math.min(x0 - 30, y0 - 22);
     const from = Math.max(least / 2, most * 1e-6);
     const radius = (r) => R * Math.log1p(r / from) / Math.log1p(most / from);
     const place = (re, im) => {
@@ -40,7 +40,7 @@ export class PoleMap {
     this.grid(c, w, h, x0, y0, R, radius, least, most, wanted);
     c.save();
     c.beginPath();
-    c.rect(0, 0, w, h);
+    c.rect(0, 0, w, y0 + 8);
     c.clip();
     this.paths(c, place);
     for (const p of identified) {
@@ -84,7 +84,7 @@ export class PoleMap {
       for (const m of [1, 2, 5]) {
         if (m * d > most * 1.001) break;
         c.beginPath();
-        c.arc(x0, y0, radius(m * d), Math.PI / 2, 3 * Math.PI / 2);
+        c.arc(x0, y0, radius(m * d), Math.PI, 2 * Math.PI);
         c.stroke();
         c.textAlign = 'left';
         if (radius(m * d) > 16 && (m === 1 || R > 260)) c.fillText(tickText(m * d), x0 + 4, y0 - radius(m * d) + 4);
@@ -92,7 +92,7 @@ export class PoleMap {
     }
     for (const ratio of [0.1, 0.3, 0.5, 0.7, 0.9]) {
       const a = Math.acos(ratio);
-      for (const s of [-1, 1]) line(c, x0, y0, x0 - R * ratio, y0 + s * R * Math.sin(a));
+      line(c, x0, y0, x0 - R * ratio, y0 - R * Math.sin(a));
       c.textAlign = 'right';
       c.fillText(ratio, x0 - R * ratio - 4, y0 - R * Math.sin(a) - 2);
     }
@@ -100,15 +100,15 @@ export class PoleMap {
       c.strokeStyle = colour('accent');
       c.setLineDash([5, 4]);
       const a = Math.acos(wanted);
-      for (const s of [-1, 1]) line(c, x0, y0, x0 - R * wanted, y0 + s * R * Math.sin(a));
+      line(c, x0, y0, x0 - R * wanted, y0 - R * Math.sin(a));
       c.setLineDash([]);
     }
     c.strokeStyle = colour('soft');
     line(c, 4, y0, w - 4, y0);
-    line(c, x0, 4, x0, h - 4);
+    line(c, x0, 4, x0, y0 + 6);
     c.textAlign = 'left';
     c.fillText('Im', x0 + 4, 12);
-    c.fillText('Re', 6, y0 - 5);
+    c.fillText('Re', 4, y0 + 14);
   }
 
   paths(c, place) {
