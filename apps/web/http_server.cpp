@@ -95,6 +95,7 @@ struct HttpServer::Parts {
   std::list<Stream> streams;
   std::shared_ptr<const std::string> event;
   std::uint64_t number = 0;
+  bool closing = false;
 
   HttpAnswer judge(MHD_Connection* connection, std::string_view method) const;
   MHD_Result answer(MHD_Connection* connection, const std::string& path, std::string_view method);
@@ -204,6 +205,7 @@ MHD_Result HttpServer::Parts::open_stream(MHD_Connection* connection) {
 
 ssize_t HttpServer::Parts::feed(Stream& stream, char* buffer, std::size_t most) {
   if (!stream.event || stream.sent == stream.event->size()) {
+    if (closing) return MHD_CONTENT_READER_END_OF_STREAM;
     if (!event || stream.number == number) {  // wait for the next
       stream.suspended = true;
       MHD_suspend_connection(stream.connection);
@@ -304,6 +306,7 @@ HttpServer::HttpServer(int port, HttpContent content) : parts_(std::make_unique<
 }
 
 HttpServer::~HttpServer() {
+  parts_->closing = true;  // so that nothing is suspended again: the daemon could not stop
   for (Parts::Stream& stream : parts_->streams) {
     if (stream.suspended) MHD_resume_connection(stream.connection);
     stream.suspended = false;

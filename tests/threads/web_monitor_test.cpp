@@ -199,6 +199,16 @@ TEST(WebMonitor, ServesPagesBesideThousandsOfConnections) {
   EXPECT_THAT(page.hear("data: "), HasSubstr("data: "));  // it was not cut off
 }
 
+TEST(WebMonitor, EndsWithPagesOpen) {
+  Site site({"--lcm-url", own_url()});
+  const Connection page(site.port);
+  page.say("GET /stream HTTP/1.1\r\n" + site.host() + "\r\n");
+  ASSERT_THAT(page.hear("data: "), HasSubstr("data: "));
+  site.monitor().send(SIGTERM);
+  EXPECT_EQ(site.monitor().finish(), 0) << site.monitor().complaints();
+  EXPECT_EQ(site.monitor().complaints(), "");
+}
+
 TEST(WebMonitor, OpensAFewStreamsOnly) {
   const Site site({"--lcm-url", own_url()});
   std::vector<Connection> pages;

@@ -70,7 +70,8 @@ class Site:
     def stop(self):
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
-        self.process.wait()
+        if self.process.wait() != 0:
+            raise RuntimeError(f'the monitor ended with status {self.process.returncode}')
         self.process.stdout.close()
 
 

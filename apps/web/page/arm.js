@@ -101,7 +101,7 @@ export class ArmView {
       }
       c.stroke();
       const there = at(shape.phase);
-      this.body(c, project, there, false, modeColour(shape.label));
+      this.body(c, project, there, false, typeof shape.label === 'number' ? modeColour(shape.label) : colour('accent'));
       tip = there.tip;
     } else {
       this.body(c, project, rest, false);

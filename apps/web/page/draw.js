@@ -14,7 +14,7 @@ export function slotOf(label) {
   if (!slots.has(label)) slots.set(label, slots.size);
   return slots.get(label);
 }
-export const modeColour = (label) => kPalette[theme()][slotOf(label) % 7];
+export const modeColour = (label) => typeof label === 'string' ? colour('ink') : kPalette[theme()][slotOf(label) % 7];
 const kDashes = [[], [7, 4], [2, 3], [9, 3, 2, 3]];
 export const modeDash = (label) => kDashes[Math.floor(slotOf(label) / 7) % 4];
 
