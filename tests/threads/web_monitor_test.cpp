@@ -10,6 +10,7 @@
 #include <sys/socket.h>
 
 #include <fstream>
+#include <limits>
 #include <thread>
 
 namespace dashpot::tests {
@@ -246,7 +247,7 @@ TEST(WebMonitor, ShowsALogAtAnyTime) {
   lcmtypes::LogReader reader(log, handlers);
   int checked = 0;
   std::optional<std::int64_t> first;
-  double smallest = INFINITY;
+  double smallest = std::numeric_limits<double>::infinity();
   while (reader.read()) {
     if (!first) first = reader.utime();
     reader.handle();

@@ -4,6 +4,7 @@ Where the package `mcap` of PyPI is installed, it reads the file as well.
 """
 import json
 import os
+import socket
 import struct
 import subprocess
 import sys
@@ -88,6 +89,15 @@ with tempfile.TemporaryDirectory() as folder:
     subprocess.run([program, 'export', log, '--mcap', mcap, '--csv', csv], check=True)
     with open(mcap, 'rb') as file:
         count = check(file.read(), csv)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:  # as PlotJuggler does
+        listener.bind(('127.0.0.1', 0))
+        listener.settimeout(20)
+        sender = subprocess.Popen([program, 'monitor', '--log', log, '--speed', '2', '--plotjuggler',
+                                   str(listener.getsockname()[1])], stdout=subprocess.DEVNULL)
+        heard = json.loads(listener.recv(65536))
+        assert heard['timestamp'] >= 0 and heard['DASHPOT_STATE']['n'] == 6, heard
+        sender.terminate()
+        sender.wait()
     try:
         from mcap.reader import make_reader
     except ImportError:
