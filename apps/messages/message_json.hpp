@@ -15,7 +15,8 @@ nlohmann::ordered_json message_json(const modes_t& message);
 nlohmann::ordered_json message_json(const sampled_modes_t& message);
 
 /// Returns the JSON schema (draft 7) of an object that message_json returned: every key with its
-/// type; a number may be null.
+/// type. Readers of MCAP want one type for each key, so a number that is not finite, which is null,
+/// is not told by the schema.
 nlohmann::ordered_json json_schema(const nlohmann::ordered_json& example, const std::string& title);
 
 }  // namespace dashpot::apps
