@@ -30,6 +30,7 @@ int run(int argc, char** argv) {
   add_analyze(program);
   add_inspect(program);
   add_monitor(program);
+  add_export(program);
   add_design(program);
   add_audit(program);
   add_run(program);

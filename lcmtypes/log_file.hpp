@@ -36,6 +36,10 @@ class LogFile {
   /// Reads the next event. Returns false at the end of the file.
   bool read();
   const Event& event() const noexcept { return event_; }
+  /// Returns where the sync word of the event read last begins, bytes.
+  std::uint64_t offset() const noexcept { return offset_; }
+  /// Goes on reading at `offset`, which offset() gave. Does nothing for a pipe.
+  void seek(std::uint64_t offset);
   const Damage& damage() const noexcept { return damage_; }
 
  private:
@@ -54,6 +58,7 @@ class LogFile {
   std::string path_;
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_;
   std::uint64_t at_ = 0;          ///< offset of the next byte
+  std::uint64_t offset_ = 0;      ///< of the event read last
   std::uint64_t known_size_ = 0;  ///< of the file, which may grow, bytes
   Event event_;
   Damage damage_;

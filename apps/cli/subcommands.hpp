@@ -25,6 +25,7 @@ using controller::InputError;
 void add_analyze(CLI::App& program);
 void add_inspect(CLI::App& program);
 void add_monitor(CLI::App& program);
+void add_export(CLI::App& program);
 void add_design(CLI::App& program);
 void add_audit(CLI::App& program);
 void add_run(CLI::App& program);

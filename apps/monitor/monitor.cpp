@@ -2,6 +2,8 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/monitor/monitor_view.hpp>
+#include <dashpot/apps/monitor/plotjuggler.hpp>
+#include <dashpot/apps/monitor/web_monitor.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/text/printable.hpp>
 
@@ -25,6 +27,10 @@ struct Options {
   std::string url;
   std::string log;
   std::optional<double> speed;
+  std::optional<int> web;
+  std::string config;
+  std::string identified;
+  std::optional<int> plotjuggler;
 };
 
 constexpr std::chrono::milliseconds kRedraw{100};
@@ -117,11 +123,23 @@ void watch_bus(const Options& options, MonitorView& view, lcmtypes::MessageHandl
 
 void run(const Options& options) {
   const StopSignal stop;
+  if (options.web) {
+    serve_monitor({*options.web, options.url, options.log, options.config, options.identified});
+    return;
+  }
   MonitorView view;
   lcmtypes::MessageHandlers handlers;
-  handlers.on_state = [&view](const state_t& message) { view.take(message); };
-  handlers.on_modes = [&view](const modes_t& message) { view.take(message); };
-  handlers.on_sampled_modes = [&view](const sampled_modes_t& message) { view.take(message); };
+  std::optional<PlotJuggler> other;
+  if (options.plotjuggler) other.emplace(*options.plotjuggler);
+  const auto take = [&](const char* channel, const auto& message) {
+    view.take(message);
+    if (other) other->send(channel, message);
+  };
+  handlers.on_state = [&](const state_t& message) { take("DASHPOT_STATE", message); };
+  handlers.on_modes = [&](const modes_t& message) { take("DASHPOT_MODES", message); };
+  handlers.on_sampled_modes = [&](const sampled_modes_t& message) {
+    take("DASHPOT_SAMPLED_MODES", message);
+  };
   std::string damage;
   if (!options.log.empty()) {
     damage = watch_log(options, view, handlers);
@@ -153,6 +171,31 @@ void add_monitor(CLI::App& program) {
                    "Pace of a log relative to its recording; 0 is as fast as possible")
       ->transform(quantity("", 0, 1e6, "a factor from 0 to 1e6"))
       ->option_text("X (1 on a terminal, otherwise 0)");
+  CLI::Option* plotjuggler =
+      command
+          ->add_option("--plotjuggler", options->plotjuggler,
+                       "Send each message as JSON over UDP to this port of 127.0.0.1 besides")
+          ->expected(0, 1)
+          ->default_str(std::to_string(PlotJuggler::kPort))
+          ->check(CLI::Range(1, 65535))
+          ->option_text("[PORT] (" + std::to_string(PlotJuggler::kPort) + ")");
+  CLI::Option* web =
+      command
+          ->add_option("--web", options->web,
+                       "Serve a page at http://127.0.0.1:PORT/ instead; 0 is any free port")
+          ->expected(0, 1)
+          ->default_str(std::to_string(kWebPort))
+          ->check(CLI::Range(0, 65535))
+          ->excludes(plotjuggler)
+          ->option_text("[PORT] (" + std::to_string(kWebPort) + ")");
+  command->add_option("--config", options->config, "Configuration of the arm that the page draws")
+      ->needs(web)
+      ->option_text("FILE");
+  command
+      ->add_option("--identified", options->identified,
+                   "Measured modes to lay over: JSON of `dashpot identify --json`")
+      ->needs(web)
+      ->option_text("FILE");
   command->footer(
       "Updated in place on a terminal; otherwise one line for each second. Ctrl-C, or the end of\n"
       "the log, ends it with a summary.\n" +

@@ -45,6 +45,7 @@ bool LogFile::read() {
     const Found found = read_event();
     if (found == Found::kEvent) {
       note_damage(begin, start);
+      offset_ = start;
       return true;
     }
     // Either the file ends too early, or the length is false: then there is another sync word.
@@ -54,6 +55,10 @@ bool LogFile::read() {
   note_damage(begin, unfinished.value_or(at_));
   if (unfinished) damage_.cut = unfinished;
   return false;
+}
+
+void LogFile::seek(std::uint64_t offset) {
+  if (fseeko(file_.get(), static_cast<off_t>(offset), SEEK_SET) == 0) at_ = offset;
 }
 
 bool LogFile::find_sync() {

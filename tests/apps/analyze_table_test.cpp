@@ -119,6 +119,7 @@ TEST(Program, ExplainsItsExitStatusEverywhere) {
                                              {"inspect", "--help"},
                                              {"design", "--help"},
                                              {"run", "--help"},
+                                             {"export", "--help"},
                                              {"monitor", "--help"}}) {
     EXPECT_THAT(table(run_program(arguments)), HasSubstr("\nExit status: 0 if "));
   }

@@ -1,0 +1,22 @@
+#pragma once
+#include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/lcmtypes/sampled_modes_t.hpp>
+#include <dashpot/lcmtypes/state_t.hpp>
+
+#include <nlohmann/json.hpp>
+
+namespace dashpot::apps {
+
+/// Returns a message as a JSON object with the fields of its .lcm file by their names, in their
+/// units. Enumerations have a text beside their number ("status_text"). What is NaN or infinite
+/// becomes null in the text.
+nlohmann::ordered_json message_json(const state_t& message);
+nlohmann::ordered_json message_json(const modes_t& message);
+nlohmann::ordered_json message_json(const sampled_modes_t& message);
+
+/// Returns the JSON schema (draft 7) of an object that message_json returned: every key with its
+/// type. Readers of MCAP want one type for each key, so a number that is not finite, which is null,
+/// is not told by the schema.
+nlohmann::ordered_json json_schema(const nlohmann::ordered_json& example, const std::string& title);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,42 @@
+#pragma once
+#include <dashpot/controller/config.hpp>
+#include <dashpot/lcmtypes/modes_t.hpp>
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// What a page needs to know of the arm beyond the messages.
+class ArmView {
+ public:
+  explicit ArmView(const std::string& config) : config_(controller::load_config(config)) {}
+
+  int dof() const { return config_.model.dof(); }
+  double period() const { return config_.settings.period; }
+
+  /// Returns the chain for the page's kinematics: {"name", "joints": [{"name", "prismatic",
+  /// "lower", "upper", "origin", "axis", "frame"}], "tip"}. With T_0 = I,
+  ///     T_i = T_i-1 [Rot(axis, q_i), origin] frame      (prismatic: [I, origin + q_i axis] frame)
+  /// is the frame of link i in B, and T_n tip that of the tip. Frames are rows of 4 x 4.
+  nlohmann::ordered_json chain() const;
+
+  /// Returns the damping ratio that the configuration asks for in a mode (JOINT, CARTESIAN), 0 if
+  /// it asks for none.
+  double wanted_ratio(int mode) const;
+
+  /// Returns the receptance with the gains of the configuration at a posture, by
+  /// analysis::Response:
+  /// {"omega" rad/s, "magnitude" and "phase" rad (rad/(N m) at "joint/I" with I from 0; m/N or
+  /// rad/(N m) at "tip/D" with D from 0 to 5), "unit", "zero_modes" (a row of n for each),
+  /// "natural_frequency", "damping_ratio"}. Throws std::invalid_argument for another `place`, and
+  /// std::runtime_error if there is no response there.
+  nlohmann::ordered_json response(const std::vector<double>& position, int mode,
+                                  const std::string& place) const;
+
+ private:
+  controller::Config config_;
+};
+
+}  // namespace dashpot::apps

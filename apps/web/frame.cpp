@@ -1,0 +1,71 @@
+#include <dashpot/analysis/mode.hpp>
+#include <dashpot/analysis/status.hpp>
+#include <dashpot/apps/messages/message_json.hpp>
+#include <dashpot/apps/web/frame.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::apps {
+namespace {
+
+using FrameJson = nlohmann::ordered_json;
+
+template <class T>
+FrameJson or_null(const std::optional<T>& value) {
+  return value ? FrameJson(*value) : FrameJson();
+}
+
+bool has_modes(std::int8_t status) {
+  const auto of = static_cast<analysis::Status>(status);
+  return of == analysis::Status::kOk || of == analysis::Status::kUncertified;
+}
+
+}  // namespace
+
+void Alarms::take(const state_t& message) {
+  if (message.fault != 0 && message.fault_tick != fault_tick_) ++faults;
+  fault_tick_ = message.fault != 0 ? message.fault_tick : 0;
+}
+
+void Alarms::take(const modes_t& message) {
+  if (!has_modes(message.status)) ++modes_lost;
+  bool bounded = true;
+  for (std::size_t i = 0; i < message.damping_ratio.size(); ++i) {
+    bounded = bounded && std::isfinite(message.eigenvalue_bound[i]);
+    const double ratio = message.damping_ratio[i];
+    const auto kind = static_cast<analysis::ModeKind>(message.kind[i]);
+    if (kind == analysis::ModeKind::kSoft || !std::isfinite(ratio)) continue;
+    if (smallest_ratio && ratio >= *smallest_ratio) continue;
+    smallest_ratio = ratio;
+    worst_utime = message.utime;
+    worst_posture = message.joint_position;
+  }
+  if (!bounded) ++bounds_lost;
+}
+
+void Alarms::take(const sampled_modes_t& message) {
+  if (!has_modes(message.status) || std::isnan(message.gain_margin)) return;
+  smallest_margin = std::min(smallest_margin.value_or(message.gain_margin), message.gain_margin);
+}
+
+FrameJson Frame::json() const {
+  FrameJson document{{"utime", utime}, {"messages", messages}};
+  document["state"] = state ? message_json(*state) : FrameJson();
+  document["modes"] = modes ? message_json(*modes) : FrameJson();
+  document["sampled"] = sampled ? message_json(*sampled) : FrameJson();
+  document["alarms"] = {{"smallest_ratio", or_null(alarms.smallest_ratio)},
+                        {"worst_utime", alarms.worst_utime},
+                        {"worst_posture", alarms.worst_posture},
+                        {"smallest_margin", or_null(alarms.smallest_margin)},
+                        {"bounds_lost", alarms.bounds_lost},
+                        {"modes_lost", alarms.modes_lost},
+                        {"faults", alarms.faults}};
+  return document;
+}
+
+std::string line_of(const FrameJson& document) {
+  return document.dump(-1, ' ', false, FrameJson::error_handler_t::replace);
+}
+
+}  // namespace dashpot::apps
