@@ -202,7 +202,7 @@ TEST(Audit, RefusesInOneLineThatNamesTheOption) {
       {{"--preset", "crisp", "--postures", short_list}, "[0].posture: 2 numbers, expected 7"},
       {{"--preset", "crisp", "--spread", "1"}, "--spread: needs --samples"},
       {{"--preset", "crisp", "--csv", scratch.path("x.csv")},
-       "--csv: needs --samples or --postures"},
+       "--csv: needs --samples, --postures or --log"},
       {{"--preset", "crisp", "--samples", "2", "--plot", "x.pdf"}, "--plot: x.pdf: has to end"},
       {{"--preset", "crisp", "--samples", "0"}, "--samples"},
       {{"--gains", scratch.path("none.yaml")}, "none.yaml"},
