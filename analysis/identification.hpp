@@ -1,0 +1,96 @@
+#pragma once
+#include <dashpot/analysis/types.hpp>
+
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace dashpot::analysis {
+
+/// A recorded motion: some channels of an arm at some times.
+struct MotionRecord {
+  Eigen::VectorXd time;    ///< N, s, strictly rising; need not be evenly spaced
+  Eigen::MatrixXd output;  ///< channels x N, in any units; NaN where a sample is missing
+};
+
+struct IdentifyOptions {
+  int max_order = 0;  ///< of the models tried: eigenvalues; 0: 2 for each channel, within 12 and 32
+  bool refine = true;  ///< on the samples as they are; false: a first estimate, fast
+};
+
+/// A mode that records show. Standard deviations (std) are those of the estimate.
+struct MeasuredMode {
+  std::array<Complex, 2>
+      eigenvalues{};             ///< a pair or two real ones, 1/s; one real one is there twice
+  double natural_frequency = 0;  ///< rad/s, square root of the eigenvalues' product
+  double natural_frequency_std = std::numeric_limits<double>::infinity();  ///< rad/s
+  double damping_ratio = 0;
+  double damping_ratio_std = std::numeric_limits<double>::infinity();
+  double covariance = 0;  ///< of natural frequency and damping ratio, rad/s
+  Eigen::VectorXcd
+      shape;             ///< of the first eigenvalue: channels, unit length, largest entry positive
+  double stability = 0;  ///< share of the models of higher order that show it too, 0 to 1
+  double energy = 0;     ///< its share of the motion: of the squares of all channels, each in units
+                         ///< of its own root mean square
+  std::string reason;    ///< why it is rejected; empty if it is not
+};
+
+/// An eigenvalue of a model of some order, for stabilisation tables and pictures.
+struct ModelPole {
+  int order = 0;
+  double natural_frequency = 0;  ///< rad/s
+  double damping_ratio = 0;
+  bool stable = false;  ///< the model of one order less has it, too: frequency within 1 %, ratio
+                        ///< within 0.02, shapes alike (modal assurance criterion above 0.95)
+};
+
+/// What records say about an arm's modes.
+struct Identification {
+  std::vector<MeasuredMode> modes;     ///< by rising natural frequency
+  std::vector<MeasuredMode> rejected;  ///< what was found and is not believed, with reasons
+  std::vector<ModelPole> poles;
+  int order = 0;          ///< of the model chosen, eigenvalues
+  Eigen::VectorXd noise;  ///< of each channel: standard deviation of what the model leaves over
+  double whiteness = 1;   ///< factor on variances, above 1 where what is left over is not white
+  double explained = 0;   ///< share of the squares of the motion that the model explains, 0 to 1
+};
+
+/// Identifies the modes of free decays: all records begin after whatever moved the arm, near one
+/// equilibrium, and end before it is moved again.
+///
+/// Models of rising order come from the eigensystem realization algorithm (Juang and Pappa 1985) on
+/// means of stretches of samples, all records side by side. Each is refined to the maximum of the
+/// likelihood, and the Bayesian information criterion (Schwarz 1978) chooses among them. The model
+/// chosen is refined on the samples as they are, at the times at which they were taken; what it
+/// leaves over is searched for more. So neither gaps nor uneven time steps matter, and heavily
+/// damped modes are as good as the record allows.
+///
+/// The standard deviations are those of maximum likelihood (inverse of Fisher's information, with
+/// the noise that the model leaves over), enlarged where the rest is not white, and where four
+/// records or more differ by more than they say (jackknife).
+///
+/// Throws std::invalid_argument for records without channels, of different channels, with fewer
+/// than 20 samples, with times that do not rise or are not finite, channels that are missing or
+/// constant throughout.
+Identification identify_decays(const std::vector<MotionRecord>& records,
+                               const IdentifyOptions& options = {});
+
+/// A part of a record in which an arm moves freely.
+struct FreeDecay {
+  Eigen::Index from = 0, to = 0;  ///< samples from `from`, before `to`
+  std::string reason;             ///< why it is of no use; empty if it is
+};
+
+/// Finds free decays: stretches that begin with a push, a release or the end of a step, in which
+/// the motion then fades. Each begins as early as a sum of decays explains it as well as its later
+/// part, and ends where the next begins, or a while after it is lost in noise.
+///
+/// `free` says for each sample whether nothing is known to move the arm; empty: nothing is known.
+/// Throws std::invalid_argument as identify_decays.
+std::vector<FreeDecay> find_decays(const MotionRecord& record, const std::vector<bool>& free = {});
+
+/// The samples of a record from `from`, before `to`.
+MotionRecord part_of(const MotionRecord& record, Eigen::Index from, Eigen::Index to);
+
+}  // namespace dashpot::analysis

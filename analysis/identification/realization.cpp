@@ -1,0 +1,62 @@
+#include <dashpot/analysis/identification/realization.hpp>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::analysis {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+Realization::Realization(const std::vector<MatrixXd>& sequences, double step, Index channels,
+                         Index max_rows)
+    : step_(step), channels_(channels), block_(sequences.front().rows()) {
+  Index shortest = sequences.front().cols();
+  for (const MatrixXd& sequence : sequences) shortest = std::min(shortest, sequence.cols());
+  const Index blocks = std::clamp<Index>(max_rows / block_, 2, std::max<Index>(2, shortest / 2));
+  Index columns = 0;
+  for (const MatrixXd& sequence : sequences) {
+    columns += std::max<Index>(0, sequence.cols() - blocks + 1);
+  }
+  MatrixXd hankel(columns, blocks * block_);  // transposed
+  Index at = 0;
+  for (const MatrixXd& sequence : sequences) {
+    for (Index k = 0; k + blocks <= sequence.cols(); ++k, ++at) {
+      for (Index b = 0; b < blocks; ++b) {
+        hankel.row(at).segment(b * block_, block_) = sequence.col(k + b).transpose();
+      }
+    }
+  }
+  if (hankel.rows() > hankel.cols()) {
+    const Eigen::HouseholderQR<MatrixXd> qr(hankel);
+    hankel = qr.matrixQR().topRows(hankel.cols()).triangularView<Eigen::Upper>();
+  }
+  const Eigen::BDCSVD<MatrixXd> svd(hankel, Eigen::ComputeThinV);
+  const auto& sizes = svd.singularValues();
+  Index rank = 0;
+  while (rank < sizes.size() && sizes[rank] > 1e-14 * sizes[0]) ++rank;
+  rank = std::min(rank, (blocks - 1) * block_);
+  basis_ = svd.matrixV().leftCols(rank) * sizes.head(rank).cwiseSqrt().asDiagonal();
+}
+
+std::vector<RealizedPole> Realization::poles(int order) const {
+  const MatrixXd observability = basis_.leftCols(order);
+  const Index rows = observability.rows() - block_;
+  const MatrixXd A =
+      observability.topRows(rows).colPivHouseholderQr().solve(observability.bottomRows(rows));
+  const Eigen::EigenSolver<MatrixXd> solver(A);
+  std::vector<RealizedPole> result;
+  if (solver.info() != Eigen::Success) return result;
+  for (Index i = 0; i < order; ++i) {
+    const Complex z = solver.eigenvalues()[i];
+    if (z.imag() < 0 || (z.imag() == 0 && z.real() <= 0)) continue;
+    const Eigen::VectorXcd shape = observability.topRows(channels_) * solver.eigenvectors().col(i);
+    result.push_back({std::log(z) / step_, shape.normalized()});
+  }
+  return result;
+}
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,36 @@
+#pragma once
+#include <dashpot/analysis/types.hpp>
+
+#include <vector>
+
+namespace dashpot::analysis {
+
+/// An eigenvalue of a realization; of a pair the one with positive imaginary part only.
+struct RealizedPole {
+  Complex eigenvalue;      ///< 1/s
+  Eigen::VectorXcd shape;  ///< channels, unit length
+};
+
+/// Models x(k+1) = A x(k), y(k) = C x(k) of rising order for sequences that are sums of decays: the
+/// eigensystem realization algorithm (Juang and Pappa 1985), with A from the shift within the
+/// observability matrix that the left singular vectors of the block Hankel matrix are. Of
+/// correlations it is covariance-driven stochastic subspace identification (Peeters and De Roeck
+/// 1999).
+class Realization {
+ public:
+  /// `sequences`: rows x samples each, evenly spaced by `step` (s). The first `channels` rows give
+  /// the shapes. The Hankel matrix gets at most `max_rows` rows.
+  Realization(const std::vector<Eigen::MatrixXd>& sequences, double step, Eigen::Index channels,
+              Eigen::Index max_rows);
+
+  int max_order() const { return static_cast<int>(basis_.cols()); }
+  /// Without those that no sum of decays has: eigenvalues of A that are negative or zero.
+  std::vector<RealizedPole> poles(int order) const;
+
+ private:
+  double step_;
+  Eigen::Index channels_, block_;
+  Eigen::MatrixXd basis_;  ///< singular vectors times roots of singular values, rows x orders
+};
+
+}  // namespace dashpot::analysis

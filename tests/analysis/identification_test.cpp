@@ -1,0 +1,266 @@
+#include <dashpot/analysis/identification.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/released_springs.hpp>
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <vector>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::Draws;
+using ::testing::HasSubstr;
+using testing::sensed;
+using testing::Sensors;
+using testing::SprungArm;
+
+/// A decay of known modes: two coupled channels, at uneven times if `jitter`.
+struct KnownDecay {
+  double w1 = 9, z1 = 0.12, w2 = 14, z2 = 0.55;
+
+  MotionRecord record(double noise, double jitter, Draws& draw, double phase = 0) const {
+    constexpr int kSamples = 1200;
+    MotionRecord record{VectorXd(kSamples), MatrixXd(2, kSamples)};
+    for (int i = 0; i < kSamples; ++i) {
+      const double t = 0.002 * (i + jitter * draw(-0.4, 0.4));
+      record.time[i] = t;
+      const double x = std::exp(-z1 * w1 * t) * std::cos(w1 * std::sqrt(1 - z1 * z1) * t + phase);
+      const double y = std::exp(-z2 * w2 * t) * std::cos(w2 * std::sqrt(1 - z2 * z2) * t - phase);
+      record.output(0, i) = 0.3 + 0.02 * x + 0.01 * y + noise * draw.normal();
+      record.output(1, i) = -1 + 0.01 * x - 0.02 * y + noise * draw.normal();
+    }
+    return record;
+  }
+
+  void expect_in(const Identification& found, double deviations) const {
+    ASSERT_EQ(found.modes.size(), 2U);
+    const std::array<double, 2> w{w1, w2}, z{z1, z2};
+    for (std::size_t k = 0; k < 2; ++k) {
+      const MeasuredMode& mode = found.modes[k];
+      EXPECT_NEAR(mode.natural_frequency, w[k], deviations * mode.natural_frequency_std);
+      EXPECT_NEAR(mode.damping_ratio, z[k], deviations * mode.damping_ratio_std);
+      EXPECT_LT(mode.natural_frequency_std, 1e-3 * w[k]);
+    }
+    // In phase and out of phase, by construction.
+    EXPECT_NEAR(found.modes[0].shape[1].real() / found.modes[0].shape[0].real(), 0.5, 0.01);
+    EXPECT_NEAR(found.modes[1].shape[0].real() / found.modes[1].shape[1].real(), -0.5, 0.01);
+  }
+};
+
+TEST(IdentifyDecays, FindsKnownModesWithinTheirDeviations) {
+  Draws draw(11);
+  const KnownDecay decay;
+  decay.expect_in(identify_decays({decay.record(1e-5, 0, draw)}), 3.5);
+}
+
+TEST(IdentifyDecays, TakesTimesAsTheyAre) {
+  Draws draw(12);
+  const KnownDecay decay;
+  decay.expect_in(identify_decays({decay.record(1e-5, 1, draw)}), 3.5);
+}
+
+TEST(IdentifyDecays, BridgesMissingSamplesOfEachChannel) {
+  Draws draw(13);
+  const KnownDecay decay;
+  MotionRecord record = decay.record(1e-5, 0, draw);
+  for (double& y : record.output.reshaped()) {
+    if (draw(0, 1) < 0.1) y = std::numeric_limits<double>::quiet_NaN();
+  }
+  record.output.block(0, 300, 1, 60).setConstant(std::numeric_limits<double>::quiet_NaN());
+  decay.expect_in(identify_decays({record}), 3.5);
+}
+
+TEST(IdentifyDecays, SharesShapesAmongRecordsOfOnePosture) {
+  Draws draw(14);
+  const KnownDecay decay;
+  const MotionRecord one = decay.record(1e-5, 0, draw), two = decay.record(1e-5, 0, draw, 1);
+  const Identification alone = identify_decays({one}), both = identify_decays({one, two});
+  decay.expect_in(both, 3.5);
+  EXPECT_LT(both.modes[0].natural_frequency_std, 0.9 * alone.modes[0].natural_frequency_std);
+}
+
+TEST(IdentifyDecays, CountsANoisyRecordLess) {
+  Draws draw(15);
+  const KnownDecay decay;
+  const MotionRecord good = decay.record(1e-5, 0, draw), bad = decay.record(1e-3, 0, draw, 1);
+  const Identification alone = identify_decays({good}), both = identify_decays({good, bad});
+  decay.expect_in(both, 3.5);
+  EXPECT_LT(both.modes[0].natural_frequency_std, 1.2 * alone.modes[0].natural_frequency_std);
+}
+
+TEST(IdentifyDecays, IntervalsHoldTheTruthAsOftenAsTheySay) {
+  const KnownDecay decay;
+  int inside = 0, all = 0;
+  for (std::uint64_t seed = 100; seed < 160; ++seed) {
+    Draws draw(seed);
+    const Identification found = identify_decays({decay.record(2e-4, 0, draw)});
+    ASSERT_GE(found.modes.size(), 2U) << "seed " << seed;
+    const MeasuredMode& mode = found.modes[0];
+    inside += std::abs(mode.natural_frequency - decay.w1) < 1.96 * mode.natural_frequency_std;
+    inside += std::abs(mode.damping_ratio - decay.z1) < 1.96 * mode.damping_ratio_std;
+    all += 2;
+  }
+  EXPECT_GE(inside, 0.87 * all);
+  EXPECT_LT(inside, all);
+}
+
+TEST(IdentifyDecays, FindsAnOverdampedModeByItsTwoDecays) {
+  Draws draw(16);
+  MotionRecord record{VectorXd(1500), MatrixXd(2, 1500)};
+  for (int i = 0; i < 1500; ++i) {
+    const double t = 0.001 * i;
+    record.time[i] = t;
+    const double x = 0.02 * std::exp(-4 * t) - 0.01 * std::exp(-16 * t);
+    record.output(0, i) = x + 1e-6 * draw.normal();
+    record.output(1, i) = -2 * x + 1e-6 * draw.normal();
+  }
+  const Identification found = identify_decays({record});
+  ASSERT_EQ(found.modes.size(), 1U);
+  EXPECT_NEAR(found.modes[0].natural_frequency, 8, 0.01);
+  EXPECT_NEAR(found.modes[0].damping_ratio, 1.25, 0.002);
+}
+
+TEST(IdentifyDecays, RejectsSumsOfEigenvaluesAsNoModes) {
+  Draws draw(17);
+  const KnownDecay decay;
+  MotionRecord record = decay.record(1e-6, 0, draw);
+  for (Index i = 0; i < record.time.size(); ++i) {
+    const double x = (record.output(0, i) - 0.3) / 0.02;
+    record.output(0, i) += 2e-4 * x * x;  // as geometry does it
+  }
+  const Identification found = identify_decays({record});
+  EXPECT_EQ(found.modes.size(), 2U);
+  int sums = 0;
+  for (const MeasuredMode& mode : found.rejected) {
+    sums += mode.reason.find("sum of two eigenvalues") != std::string::npos;
+  }
+  EXPECT_GE(sums, 1);
+}
+
+TEST(IdentifyDecays, FindsTheModesOfArms) {
+  for (std::size_t which = 0; which < 4; ++which) {
+    Draws draw(20 + which);
+    const SprungArm arm(which, draw, 0.05, 0.4);
+    std::vector<MotionRecord> records;
+    for (int r = 0; r < 3; ++r) {
+      VectorXd start(arm.system.mass.rows());
+      for (double& q : start) q = 0.02 * draw.normal();
+      records.push_back(sensed(arm, start, 1500, 0.001, {}, draw));
+    }
+    const Identification found = identify_decays(records);
+    for (const Mode<>& mode : arm.modes) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const MeasuredMode& one : found.modes) {
+        nearest = std::min(nearest, std::abs(one.eigenvalues[0] - mode.eigenvalues[0]));
+      }
+      EXPECT_LT(nearest, 0.005 * mode.natural_frequency)
+          << testing::arms()[which].file << ", " << mode.natural_frequency << " rad/s, seed "
+          << 20 + which;
+    }
+    EXPECT_EQ(static_cast<int>(found.modes.size()), static_cast<int>(arm.modes.size()));
+  }
+}
+
+TEST(IdentifyDecays, RefusesWhatIsNoRecord) {
+  Draws draw(18);
+  const MotionRecord good = KnownDecay().record(1e-5, 0, draw);
+  const auto message = [](const std::vector<MotionRecord>& records) -> std::string {
+    try {
+      identify_decays(records);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  EXPECT_THAT(message({}), HasSubstr("no record"));
+  MotionRecord bad = good;
+  bad.time[7] = bad.time[6];
+  EXPECT_THAT(message({good, bad}), HasSubstr("record 2: time does not rise"));
+  bad = good;
+  bad.output.row(1).setConstant(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_THAT(message({bad}), HasSubstr("channel 2 has 0 samples"));
+  bad = good;
+  bad.output(0, 5) = std::numeric_limits<double>::infinity();
+  EXPECT_THAT(message({bad}), HasSubstr("infinite"));
+  EXPECT_THAT(message({part_of(good, 0, 19)}), HasSubstr("19 samples"));
+  bad = good;
+  bad.output.conservativeResize(1, Eigen::NoChange);
+  EXPECT_THAT(message({good, bad}), HasSubstr("as many channels"));
+  bad = good;
+  bad.output.setConstant(0.5);
+  EXPECT_NE(message({bad}), "none");
+}
+
+/// Rest, a push of 40 ms, a decay, rest, a step and its decay, at two places.
+MotionRecord pushed(const KnownDecay& decay, Draws& draw) {
+  constexpr double kStep = 0.002;
+  constexpr int kSamples = 4000;
+  MotionRecord record{VectorXd(kSamples), MatrixXd::Zero(2, kSamples)};
+  std::array<double, 2> x{}, v{};
+  for (int i = 0; i < kSamples; ++i) {
+    const double t = i * kStep;
+    record.time[i] = t;
+    const double force = t >= 1 && t < 1.04 ? 10 : 0, goal = t >= 5 ? 0.02 : 0;
+    const std::array<double, 2> w{decay.w1, decay.w2}, z{decay.z1, decay.z2};
+    for (int part = 0; part < 50; ++part) {
+      for (std::size_t k = 0; k < 2; ++k) {
+        const double a =
+            (k == 0 ? force : -force) - 2 * z[k] * w[k] * v[k] - w[k] * w[k] * (x[k] - goal);
+        v[k] += kStep / 50 * a;
+        x[k] += kStep / 50 * v[k];
+      }
+    }
+    record.output(0, i) = x[0] + 0.5 * x[1] + 1e-5 * draw.normal();
+    record.output(1, i) = 0.5 * x[0] - x[1] + 1e-5 * draw.normal();
+  }
+  return record;
+}
+
+TEST(FindDecays, BeginsAfterThePushAndAtTheStep) {
+  Draws draw(30);
+  const KnownDecay decay;
+  const MotionRecord record = pushed(decay, draw);
+  const std::vector<FreeDecay> found = find_decays(record);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].reason, "");
+  EXPECT_GE(record.time[found[0].from], 1.036);
+  EXPECT_LT(record.time[found[0].from], 1.3);
+  EXPECT_GE(record.time[found[1].from], 4.996);
+  EXPECT_LT(record.time[found[1].from], 5.3);
+  std::vector<MotionRecord> records;
+  for (const FreeDecay& one : found) records.push_back(part_of(record, one.from, one.to));
+  const Identification modes = identify_decays(records);
+  ASSERT_EQ(modes.modes.size(), 2U);
+  EXPECT_NEAR(modes.modes[0].natural_frequency, decay.w1, 0.005 * decay.w1);
+  EXPECT_NEAR(modes.modes[1].damping_ratio, decay.z2, 0.01);
+}
+
+TEST(FindDecays, KeepsToWhatIsFree) {
+  Draws draw(31);
+  const MotionRecord record = pushed(KnownDecay(), draw);
+  std::vector<bool> free(static_cast<std::size_t>(record.time.size()), true);
+  for (Index i = 0; i < record.time.size(); ++i) {
+    free[static_cast<std::size_t>(i)] = record.time[i] < 4.9 || record.time[i] > 5.4;
+  }
+  const std::vector<FreeDecay> found = find_decays(record, free);
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_GE(record.time[found[1].from], 5.4);
+}
+
+TEST(FindDecays, FindsNothingInRest) {
+  Draws draw(32);
+  MotionRecord record{VectorXd::LinSpaced(3000, 0, 3), MatrixXd(2, 3000)};
+  for (double& y : record.output.reshaped()) y = 1e-5 * draw.normal();
+  for (const FreeDecay& decay : find_decays(record)) EXPECT_NE(decay.reason, "");
+}
+
+}  // namespace
+}  // namespace dashpot::analysis

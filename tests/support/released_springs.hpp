@@ -1,0 +1,115 @@
+#pragma once
+// Free decays of arms on springs, with what sensors do to them, and their true modes.
+
+#include <dashpot/analysis/identification.hpp>
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/tests/support/arms.hpp>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace dashpot::testing {
+
+/// Random numbers from a seed.
+class Draws {
+ public:
+  explicit Draws(std::uint64_t seed) : engine_(seed) {}
+  double operator()(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(engine_);
+  }
+  double normal() { return std::normal_distribution<double>()(engine_); }
+
+ private:
+  std::mt19937_64 engine_;
+};
+
+/// An arm near an equilibrium, with springs and dampers in its joints, linearized.
+struct SprungArm {
+  analysis::System<> system;
+  std::vector<analysis::Mode<>> modes;  ///< true ones
+
+  /// Some arm at some posture with springs that give frequencies of an impedance-controlled arm;
+  /// each undamped mode gets a ratio within `least_ratio` and `largest_ratio`, and dampers in the
+  /// joints couple them.
+  SprungArm(std::size_t which, Draws& draw, double least_ratio, double largest_ratio) {
+    const controller::RobotModel model = arm_model(arms()[which % arms().size()]);
+    const int n = model.dof();
+    controller::JointVector q(n);
+    for (int i = 0; i < n; ++i) q[i] = draw(-1.5, 1.5);
+    const auto at = evaluate(model, q, controller::JointVector::Zero(n));
+    Eigen::MatrixXd M = at.M;
+    M.diagonal().array() += 0.1;  // of the drives
+    Eigen::VectorXd springs(n);
+    for (int i = 0; i < n; ++i) springs[i] = M(i, i) * std::pow(draw(8, 40), 2);
+    const Eigen::MatrixXd K = springs.asDiagonal();
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> undamped(K, M);
+    const Eigen::MatrixXd U = undamped.eigenvectors();
+    Eigen::VectorXd damping(n);
+    for (int i = 0; i < n; ++i) {
+      damping[i] = 2 * draw(least_ratio, largest_ratio) * std::sqrt(undamped.eigenvalues()[i]);
+    }
+    const Eigen::MatrixXd D = M * U * damping.asDiagonal() * U.transpose() * M;
+    Eigen::MatrixXd C = D;
+    C.diagonal() *= 1.1;
+    system = analysis::System<>(n);
+    system.mass = M;
+    system.damping = (C + C.transpose()) / 2;
+    system.stiffness = K;
+    const auto spectrum = analysis::analyze(system);
+    for (const auto& mode : spectrum.modes) modes.push_back(mode);
+  }
+
+  /// How it moves from `position` at rest, n x samples `period` (s) apart.
+  Eigen::MatrixXd release(const Eigen::VectorXd& position, int samples, double period) const {
+    const Eigen::Index n = position.size();
+    Eigen::MatrixXd A = Eigen::MatrixXd::Zero(2 * n, 2 * n);
+    A.topRightCorner(n, n).setIdentity();
+    A.bottomLeftCorner(n, n) = -system.mass.llt().solve(system.stiffness);
+    A.bottomRightCorner(n, n) = -system.mass.llt().solve(system.damping);
+    const Eigen::EigenSolver<Eigen::MatrixXd> solver(A);
+    Eigen::VectorXcd start = Eigen::VectorXcd::Zero(2 * n);
+    start.head(n) = position.cast<analysis::Complex>();
+    const Eigen::VectorXcd weights = solver.eigenvectors().lu().solve(start);
+    Eigen::MatrixXd motion(n, samples);
+    for (int i = 0; i < samples; ++i) {
+      const Eigen::VectorXcd turned = (solver.eigenvalues() * (i * period)).array().exp();
+      motion.col(i) = (solver.eigenvectors().topRows(n) * turned.cwiseProduct(weights)).real();
+    }
+    return motion;
+  }
+};
+
+/// What sensors make of a motion.
+struct Sensors {
+  double noise = 1e-5;    ///< rad, standard deviation
+  double resolution = 0;  ///< rad; 0: none
+  double missing = 0.02;  ///< share of the samples, of all channels together
+  double jitter = 0;      ///< of the times, relative to the period
+};
+
+inline analysis::MotionRecord sensed(const SprungArm& arm, const Eigen::VectorXd& position,
+                                     int samples, double period, const Sensors& sensors,
+                                     Draws& draw) {
+  const Eigen::MatrixXd motion = arm.release(position, samples, period);
+  analysis::MotionRecord record{Eigen::VectorXd(samples), motion};
+  for (int i = 0; i < samples; ++i) {
+    record.time[i] = i * period;
+    const bool missing = draw(0, 1) < sensors.missing;
+    for (Eigen::Index c = 0; c < motion.rows(); ++c) {
+      double& y = record.output(c, i);
+      y += sensors.noise * draw.normal();
+      if (sensors.resolution > 0) y = std::round(y / sensors.resolution) * sensors.resolution;
+      if (missing) y = std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+  return record;
+}
+
+}  // namespace dashpot::testing
