@@ -14,6 +14,7 @@ from ._audit import (Audit, DampingSuggestion, Distribution, PostureAudit, Works
 from ._controller import (Controller, Setpoint, Snapshot, Status, TrackedModes,
                           TrackedSampledModes)
 from ._core import Error
+from ._identification import Identification, MeasuredModes, identify
 from ._log import read_log
 from ._region import RegionDesign, design_region
 from ._results import Modes
@@ -21,8 +22,8 @@ from ._robot import ClosedLoop, Robot, closed_loop
 
 __version__ = _version("dashpot")
 __all__ = ["Audit", "ClosedLoop", "Controller", "DampingDesign", "DampingSuggestion",
-           "Distribution", "Error", "Gradients", "Miss", "Modes", "PostureAudit", "RegionDesign",
+           "Distribution", "Error", "Gradients", "Identification", "MeasuredModes", "Miss", "Modes", "PostureAudit", "RegionDesign",
            "Response", "Robot", "SampledModes", "Sensitivities", "Setpoint", "Snapshot", "Status",
            "TrackedModes", "TrackedSampledModes", "WorkspaceAudit", "audit", "closed_loop",
-           "design_damping", "design_region", "modes", "read_log", "receptance", "response",
+           "design_damping", "design_region", "identify", "modes", "read_log", "receptance", "response",
            "sampled_modes", "sensitivities"]

@@ -31,6 +31,7 @@ void add_robot(nb::module_& m);
 void add_controller(nb::module_& m);
 void add_log(nb::module_& m);
 void add_audit(nb::module_& m);
+void add_identification(nb::module_& m);
 
 /// Returns a numpy array with the entries of a matrix or vector of any storage.
 template <class Derived>

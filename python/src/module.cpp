@@ -40,4 +40,5 @@ NB_MODULE(_core, m) {
   add_controller(m);
   add_log(m);
   add_audit(m);
+  add_identification(m);
 }

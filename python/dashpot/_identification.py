@@ -1,0 +1,107 @@
+"""Modes from recorded motion."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import Error
+from ._results import Array, ComplexArray, Result, TextArray, stack, table, to_numbers
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class MeasuredModes(Result):
+    """m modes that records show, by rising natural frequency. Standard deviations (std) are those
+    of the estimates."""
+
+    natural_frequency: Array
+    """m, rad/s."""
+    natural_frequency_std: Array
+    """m, rad/s; infinite where it is not determined."""
+    damping_ratio: Array
+    """m."""
+    damping_ratio_std: Array
+    """m; infinite where it is not determined."""
+    eigenvalues: ComplexArray
+    """m x 2, 1/s."""
+    shapes: ComplexArray
+    """m x channels, unit length, largest entry real and positive."""
+    stability: Array
+    """m, share of the models of higher order that show the mode too, 0 to 1."""
+    energy: Array
+    """m, its share of the motion."""
+    reason: TextArray
+    """m, why it is rejected; empty if it is not."""
+
+    def __len__(self) -> int:
+        return len(self.natural_frequency)
+
+    def __repr__(self) -> str:
+        if len(self) == 0:
+            return "no modes"
+        return table({"rad/s": list(map(float, self.natural_frequency)),
+                      "std": [f"{value:.2g}" for value in self.natural_frequency_std],
+                      "ratio": list(map(float, self.damping_ratio)),
+                      "std ": [f"{value:.2g}" for value in self.damping_ratio_std]})
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Identification(Result):
+    """What records say about an arm's modes."""
+
+    modes: MeasuredModes
+    rejected: MeasuredModes
+    """What was found and is not believed, with reasons."""
+    decays: list[tuple[int, float, float]]
+    """The free decays that were used: number of the record, begin and end, s."""
+    noise: Array
+    """Of each channel, standard deviation of what the model leaves over."""
+    whiteness: float
+    """Factor on variances, above 1 where what is left over is not white."""
+    explained: float
+    """Share of the squares of the motion that the model explains."""
+    order: int
+    """Eigenvalues of the model."""
+
+
+def _measured(found: dict[str, Any], channels: int) -> MeasuredModes:
+    shapes = stack(found.pop("shapes"), (channels,), complex)
+    return MeasuredModes(shapes=shapes, reason=np.array(found.pop("reason"), dtype=np.str_),
+                         **found)
+
+
+def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike],
+             y: npt.ArrayLike | Sequence[npt.ArrayLike], *, find: bool = True,
+             max_order: int = 0) -> Identification:
+    """Returns the modes of free decays.
+
+    `t` has the times (N, s, rising, not necessarily even) and `y` the channels (N x channels, or N
+    for one channel) of a record; NaN is a sample that is missing. Lists of such arrays are several
+    records at one posture. Free decays, after a push, a release or a step, are found in them;
+    with find=False each record is one. `max_order` bounds the order of the models tried (0: 2 for
+    each channel, at least 12).
+
+    Raises Error for arrays of the wrong size, times that do not rise, fewer than 20 samples, and
+    where nothing moves freely.
+    """
+    many = isinstance(t, (list, tuple)) and len(t) > 0 and np.ndim(t[0]) > 0
+    times = list(t) if many else [t]  # type: ignore[arg-type]
+    outputs = list(y) if many else [y]  # type: ignore[arg-type]
+    if len(times) != len(outputs):
+        raise Error(f"identify: {len(times)} arrays of times, {len(outputs)} of channels")
+    values = []
+    for output in outputs:
+        array = np.asarray(output, dtype=float)
+        if array.ndim == 1:
+            array = array[:, np.newaxis]
+        if array.ndim != 2:
+            raise Error(f"y: has {array.ndim} dimensions, expected samples x channels")
+        values.append(np.ascontiguousarray(array.T))
+    found = _core.identify([to_numbers("t", time, 1) for time in times], values, find, max_order)
+    channels = values[0].shape[0]
+    return Identification(modes=_measured(found.pop("modes"), channels),
+                          rejected=_measured(found.pop("rejected"), channels), **found)

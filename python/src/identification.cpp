@@ -1,0 +1,75 @@
+// Modes from recorded motion.
+
+#include <dashpot/analysis/identification.hpp>
+#include <dashpot/python/src/convert.hpp>
+
+namespace dashpot::python {
+
+using analysis::FreeDecay;
+using analysis::Identification;
+using analysis::MeasuredMode;
+using analysis::MotionRecord;
+
+namespace {
+
+nb::dict modes_of(const std::vector<MeasuredMode>& modes) {
+  const auto column = [&](auto member) {
+    return to_column(modes, [=](const MeasuredMode& mode) { return mode.*member; });
+  };
+  nb::dict result;
+  result["natural_frequency"] = column(&MeasuredMode::natural_frequency);
+  result["natural_frequency_std"] = column(&MeasuredMode::natural_frequency_std);
+  result["damping_ratio"] = column(&MeasuredMode::damping_ratio);
+  result["damping_ratio_std"] = column(&MeasuredMode::damping_ratio_std);
+  result["eigenvalues"] =
+      to_pairs(modes, [](const MeasuredMode& mode) { return mode.eigenvalues; });
+  result["shapes"] = to_list(modes, [](const MeasuredMode& mode) { return to_array(mode.shape); });
+  result["stability"] = column(&MeasuredMode::stability);
+  result["energy"] = column(&MeasuredMode::energy);
+  result["reason"] = to_list(modes, [](const MeasuredMode& mode) { return mode.reason; });
+  return result;
+}
+
+/// `outputs`: channels x samples each.
+nb::dict identify(const std::vector<Eigen::VectorXd>& times,
+                  const std::vector<Eigen::MatrixXd>& outputs, bool find, int max_order) {
+  std::vector<MotionRecord> records;
+  std::vector<std::array<double, 3>> decays;  // number of the record, begin and end
+  Identification found;
+  {
+    const nb::gil_scoped_release release;
+    for (std::size_t r = 0; r < times.size(); ++r) {
+      const MotionRecord record{times[r], outputs[r]};
+      std::vector<FreeDecay> pieces{{0, record.time.size(), {}}};
+      if (find) pieces = find_decays(record);
+      for (const FreeDecay& piece : pieces) {
+        if (!piece.reason.empty()) continue;
+        records.push_back(part_of(record, piece.from, piece.to));
+        decays.push_back(
+            {static_cast<double>(r), record.time[piece.from], record.time[piece.to - 1]});
+      }
+    }
+    if (records.empty()) throw std::invalid_argument("identify: no free decay was found");
+    found = identify_decays(records, {.max_order = max_order});
+  }
+  nb::dict result;
+  result["modes"] = modes_of(found.modes);
+  result["rejected"] = modes_of(found.rejected);
+  result["decays"] = to_list(decays, [](const std::array<double, 3>& decay) {
+    return nb::make_tuple(static_cast<int>(decay[0]), decay[1], decay[2]);
+  });
+  result["noise"] = to_array(found.noise);
+  result["whiteness"] = found.whiteness;
+  result["explained"] = found.explained;
+  result["order"] = found.order;
+  return result;
+}
+
+}  // namespace
+
+void add_identification(nb::module_& m) {
+  m.def("identify", &identify, nb::arg("times"), nb::arg("outputs"), nb::arg("find"),
+        nb::arg("max_order"));
+}
+
+}  // namespace dashpot::python

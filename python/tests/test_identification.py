@@ -1,0 +1,69 @@
+"""Modes from recorded motion, against the modes that made it."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import dashpot
+
+
+def decay(rng, phase=0.0):
+    t = 0.002 * np.arange(1200)
+    y = np.full((1200, 2), [0.3, -1.0])
+    for w, z, shape in ((9, 0.12, [0.02, 0.01]), (14, 0.55, [0.01, -0.02])):
+        wave = np.exp(-z * w * t) * np.cos(w * np.sqrt(1 - z * z) * t + phase)
+        y += wave[:, np.newaxis] * shape
+    return t, y + 1e-5 * rng.standard_normal(y.shape)
+
+
+def check(found):
+    modes = found.modes
+    assert len(modes) == 2
+    assert np.all(np.abs(modes.natural_frequency - [9, 14]) < 4 * modes.natural_frequency_std)
+    assert np.all(np.abs(modes.damping_ratio - [0.12, 0.55]) < 4 * modes.damping_ratio_std)
+    assert np.all(modes.natural_frequency_std < 0.02)
+    assert np.allclose(modes.shapes[0], np.array([2, 1]) / np.sqrt(5), atol=0.01)
+
+
+def test_finds_the_modes_of_a_decay():
+    t, y = decay(np.random.default_rng(1))
+    found = dashpot.identify(t, y, find=False)
+    check(found)
+    assert found.explained > 0.9999
+    assert found.noise == pytest.approx([1e-5, 1e-5], rel=0.1)
+    again = pickle.loads(pickle.dumps(found))
+    assert np.array_equal(again.modes.natural_frequency, found.modes.natural_frequency)
+    assert not again.modes.shapes.flags.writeable
+    assert "rad/s" in repr(found.modes)
+
+
+def test_takes_several_records_with_missing_samples():
+    rng = np.random.default_rng(2)
+    records = [decay(rng), decay(rng, 1.0)]
+    for _, y in records:
+        y[rng.random(y.shape) < 0.02] = np.nan
+    check(dashpot.identify([t for t, _ in records], [y for _, y in records], find=False))
+
+
+def test_finds_decays_in_a_record():
+    rng = np.random.default_rng(3)
+    _, y = decay(rng)
+    still = np.full((500, 2), y[0]) + 1e-5 * rng.standard_normal((500, 2))
+    found = dashpot.identify(0.002 * np.arange(1700), np.vstack([still, y]))
+    check(found)
+    (record, begin, end), = found.decays
+    assert record == 0 and 0.99 < begin < 1.3 and end > 2
+
+
+@pytest.mark.parametrize("t, y, message", [
+    ([0, 1], [0, 1], "2 samples"),
+    (np.zeros(30), np.zeros(30), "time does not rise"),
+    (np.arange(30), np.zeros((30, 1, 1)), "3 dimensions"),
+    ([np.arange(30)], [], "1 arrays of times"),
+    (np.arange(30), np.full(30, np.inf), "infinite"),
+    (np.arange(40), np.zeros(30), "as many channels"),
+])
+def test_refuses(t, y, message):
+    with pytest.raises(dashpot.Error, match=message):
+        dashpot.identify(t, y, find=False)
