@@ -1,6 +1,7 @@
 #include <dashpot/apps/audit/audit_options.hpp>
 #include <dashpot/apps/audit/posture_files.hpp>
 #include <dashpot/apps/audit/presets.hpp>
+#include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/controller/config/config_gains.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
@@ -187,10 +188,7 @@ void check(const AuditCommand& command) {
   for (const auto& [option, path] : {std::pair("--csv", &command.csv), {"--plot", &command.plot}}) {
     if (!path->empty() && !many) throw InputError(option, "needs --samples, --postures or --log");
   }
-  const auto ends = [&](const char* end) { return command.plot.ends_with(end); };
-  if (!command.plot.empty() && !ends(".svg") && !ends(".png")) {
-    throw InputError("--plot", command.plot + ": has to end with .svg or .png");
-  }
+  if (!command.plot.empty()) check_plot_name(command.plot);
 }
 
 }  // namespace

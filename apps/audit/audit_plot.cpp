@@ -1,25 +1,15 @@
 #include <dashpot/apps/audit/audit_writer.hpp>
+#include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
-#include <cstdio>
-#include <memory>
 #include <sstream>
-#include <stdexcept>
 
 namespace dashpot::apps {
 namespace {
 
 using Numbers = std::vector<controller::PostureNumbers>;
-
-/// Text between single quotes for gnuplot.
-std::string quoted(const std::string& text) {
-  std::string result = "'";
-  for (const char c : text) result += c == '\'' ? "''" : std::string(1, c);
-  return result + "'";
-}
 
 /// The share of the postures, in %, in each of equal classes of the smallest ratio, as lines for
 /// gnuplot: middle of the class, share.
@@ -61,8 +51,7 @@ std::string script(const std::string& path, const AuditTask& task, const Numbers
   }
   const std::string points = margins(numbers);
   std::ostringstream out;
-  out << "set terminal " << (path.ends_with(".svg") ? "svg size 900," : "png size 900,")
-      << (points.empty() ? 420 : 760) << "\nset output " << quoted(path) << "\n$ratios << EOD\n"
+  out << plot_heading(path, 900, points.empty() ? 420 : 760) << "$ratios << EOD\n"
       << histogram(numbers, most, kClasses) << "EOD\nset xrange [0:" << most
       << "]\nset style fill solid 0.7\nset boxwidth " << most / kClasses
       << "\nset key top right\nset xlabel 'smallest damping ratio of a posture'\n"
@@ -87,16 +76,7 @@ std::string script(const std::string& path, const AuditTask& task, const Numbers
 }  // namespace
 
 void draw_audit(const std::string& path, const AuditTask& task, const Numbers& numbers) {
-  const std::string text = script(path, task, numbers);
-  const auto before = std::signal(SIGPIPE, SIG_IGN);  // gnuplot may not be there
-  std::FILE* gnuplot = popen("gnuplot 2>/dev/null", "w");
-  if (gnuplot == nullptr) throw std::runtime_error("--plot: cannot start gnuplot");
-  const bool written = std::fwrite(text.data(), 1, text.size(), gnuplot) == text.size();
-  const int status = pclose(gnuplot);
-  std::signal(SIGPIPE, before);
-  if (!written || status != 0) {
-    throw std::runtime_error("--plot: " + path + ": gnuplot is missing or cannot draw it");
-  }
+  run_gnuplot(path, script(path, task, numbers));
 }
 
 }  // namespace dashpot::apps
