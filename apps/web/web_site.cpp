@@ -64,7 +64,8 @@ HttpAnswer WebSite::response(const std::map<std::string, std::string>& query) {
   const Frame frame = frame_at(query);
   if (!frame.state && !frame.modes) return complaint(404, "there is no posture yet");
   const auto& posture = frame.state ? frame.state->joint_position : frame.modes->joint_position;
-  const int mode = frame.state ? frame.state->mode : state_t::CARTESIAN;
+  const bool joint = frame.state && frame.state->mode == state_t::JOINT;
+  const int mode = joint ? state_t::JOINT : state_t::CARTESIAN;
   try {
     return json_answer(arm_->response(posture, mode, value_of(query, "at")));
   } catch (const std::invalid_argument& error) {
