@@ -1,0 +1,72 @@
+#pragma once
+#include <dashpot/analysis/identification.hpp>
+#include <dashpot/apps/identify/motion_file.hpp>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// A mode that a configuration predicts for the loop as it runs: sampled, delayed and filtered.
+struct PredictedMode {
+  double natural_frequency = 0;  ///< rad/s
+  double damping_ratio = 0;
+  Eigen::VectorXcd shape;  ///< joints
+  /// The measured mode that it is, by number in Identification::modes; -1: none.
+  int measured = -1;
+  double likeness = 0;  ///< of the shapes, modal assurance criterion, 0 to 1
+};
+
+/// A free decay in one of the files.
+struct DecayReport {
+  std::string file;
+  double from = 0, to = 0;  ///< s, of the file's time
+  int posture = -1;         ///< number of PostureReport; -1: of no use
+  std::string reason;       ///< why it is of no use
+};
+
+/// What decays at one posture say.
+struct PostureReport {
+  Eigen::VectorXd rest;  ///< means of the channels where the decays end
+  int decays = 0;
+  analysis::Identification found;
+  std::vector<PredictedMode> predicted;
+};
+
+/// By how much an arm differs from its model.
+struct ModelCorrection {
+  double payload = 0;                 ///< mass added at the payload's centre, kg
+  Eigen::VectorXd reflected_inertia;  ///< added, n, kg m^2; empty: none
+  Eigen::VectorXd friction;           ///< viscous, added, n, N m s/rad; empty: none
+  double delay = 0;                   ///< added, ticks
+};
+
+/// A parameter that was calibrated.
+struct CalibratedParameter {
+  std::string name, unit;
+  double before = 0, value = 0, std = 0;
+  bool determined = false;  ///< the records narrow it down
+};
+
+struct Calibration {
+  std::vector<CalibratedParameter> parameters;
+  ModelCorrection correction;
+  double misfit_before = 0, misfit = 0;  ///< root mean square of the differences, in deviations
+  int numbers = 0;                       ///< frequencies and ratios that were explained
+  std::vector<std::string> warnings;     ///< what the records cannot tell apart
+};
+
+struct IdentifyReport {
+  std::vector<MotionChannel> channels;  ///< those that are used
+  std::vector<DecayReport> decays;
+  std::vector<PostureReport> postures;  ///< by falling number of decays
+  std::vector<std::string> notes;
+  bool against = false;
+  std::optional<Calibration> calibration;
+};
+
+std::string identify_table(const IdentifyReport& report);
+std::string identify_json(const IdentifyReport& report);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,51 @@
+#pragma once
+#include <dashpot/apps/identify/identify_writer.hpp>
+#include <dashpot/controller/config.hpp>
+
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// What a configuration predicts for the loop as it runs, with an arm that differs from its model.
+class LoopPrediction {
+ public:
+  /// Reads the configuration. The channels have to be all joint positions, "q1" ... in any order,
+  /// or as many as there are joints. Throws InputError.
+  LoopPrediction(const std::string& config, const std::vector<MotionChannel>& channels);
+
+  int dof() const { return config_.model.dof(); }
+
+  /// The modes with the channels at `rest`: of the loop sampled, delayed and filtered as the
+  /// configuration says (analysis.sampled), by falling frequency. The gains are those of the
+  /// configuration, with the model that the controller has; the arm moves as `correction` says.
+  std::vector<PredictedMode> predict(const Eigen::VectorXd& rest,
+                                     const ModelCorrection& correction) const;
+
+  /// Writes the configuration with the correction in it, without its comments. Throws InputError.
+  void write(const std::string& path, const ModelCorrection& correction) const;
+
+  const controller::Config& config() const { return config_; }
+
+ private:
+  std::vector<PredictedMode> predict_with_delay(const controller::JointVector& q,
+                                                const ModelCorrection& correction, int delay) const;
+
+  std::string path_;
+  controller::Config config_;
+  std::vector<Eigen::Index> joint_;  ///< of each channel
+};
+
+/// Gives each prediction the measured mode that it is: the nearest in frequency, ratio and shape,
+/// nearest pairs first.
+void match(const std::vector<analysis::MeasuredMode>& measured,
+           std::vector<PredictedMode>& predicted);
+
+/// Which change of the parameters called `names` ("payload,reflected_inertia,friction,delay")
+/// explains the differences best: least squares of what was measured at all postures, each number
+/// in units of its deviation, within bounds (no mass, inertia, friction or delay below zero).
+/// Updates the predictions. Throws InputError for other names.
+Calibration calibrate(const LoopPrediction& loop, const std::string& names,
+                      std::vector<PostureReport>& postures);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,249 @@
+// `dashpot identify`: what a user sees, and what is refused.
+#include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/support/arms.hpp>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A file with a decay of 9 rad/s at 0.12 and one of 14 rad/s at 0.55 in two channels, after half a
+/// second of rest.
+std::string decay_csv(const std::string& heading, double angle, double time = 1) {
+  std::string text = heading + "\n";
+  std::uint64_t state = 7;  // of noise, about even, that every machine makes alike
+  const auto noise = [&state] {
+    state = state * 6364136223846793005U + 1442695040888963407U;
+    return (static_cast<double>(state >> 33) / 2147483648.0 - 0.5) * 3e-5;
+  };
+  for (int i = 0; i < 1200; ++i) {
+    const double t = 0.002 * i - 0.5;
+    const auto wave = [t](double w, double z) {
+      return t < 0 ? 1 : std::exp(-z * w * t) * std::cos(w * std::sqrt(1 - z * z) * t);
+    };
+    const double x = 0.02 * wave(9, 0.12), y = 0.02 * wave(14, 0.55);
+    std::array<char, 200> line{};
+    std::snprintf(line.data(), line.size(), "%.6f,%.9f,%.9f\n", time * (t + 0.5),
+                  angle * (x + y / 2 + noise()), angle * (x / 2 - y + noise()));
+    text += line.data();
+  }
+  return text;
+}
+
+Json identify(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "identify");
+  arguments.push_back("--json");
+  return parse(run_program(arguments));
+}
+
+void expect_known_modes(const Json& found) {
+  ASSERT_EQ(found["modes"].size(), 2U) << found.dump();
+  const std::array<double, 2> w{9, 14}, z{0.12, 0.55};
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Json& mode = found["modes"][k];
+    EXPECT_NEAR(mode["natural_frequency"].get<double>(), w[k], 0.002 * w[k]);
+    EXPECT_NEAR(mode["damping_ratio"].get<double>(), z[k], 0.003);
+    EXPECT_LT(mode["natural_frequency_std"].get<double>(), 0.002 * w[k]);
+    EXPECT_GT(mode["damping_ratio_std"].get<double>(), 0);
+    EXPECT_EQ(mode["shape"].size(), 2U);
+    EXPECT_GE(mode["stability"].get<double>(), 0.5);
+  }
+}
+
+TEST(Identify, FindsTheDecayInAFile) {
+  const Scratch scratch;
+  const std::string file = scratch.write("decay.csv", decay_csv("time [s],q1 [rad],q2 [rad]", 1));
+  const Json found = identify({file});
+  expect_known_modes(found);
+  EXPECT_GE(found["records"][0]["from"].get<double>(), 0.49);
+  EXPECT_LT(found["records"][0]["from"].get<double>(), 0.8);
+  expect_known_modes(identify({file, "--from", "0.51", "--to", "2.4"}));
+  const Outcome table = run_program({"identify", file});
+  EXPECT_EQ(table.status, 0);
+  EXPECT_THAT(table.out, HasSubstr("1 free decay of 2 channels at 1 posture"));
+  EXPECT_THAT(table.out, HasSubstr("q1 + 0.50 q2"));
+}
+
+TEST(Identify, TakesUnitsAndSeparatorsAsPeopleWriteThem) {
+  const Scratch scratch;
+  const double degree = 57.29577951308232;
+  std::string semicolons = decay_csv("\"t_ms\",q1 (deg),\"q2_deg\"", degree, 1000);
+  for (char& c : semicolons) c = c == ',' ? ';' : c;
+  std::string dos = "\xEF\xBB\xBF# a comment\r\n";
+  for (const char c : decay_csv("timestamp,q1,q2", 1))
+    dos += c == '\n' ? "\r\n" : std::string(1, c);
+  const std::string first = scratch.write("a.csv", semicolons),
+                    second = scratch.write("b.csv", dos);
+  expect_known_modes(identify({first}));
+  expect_known_modes(identify({second}));
+  const Json both = identify({second, second});
+  EXPECT_EQ(both["records"].size(), 2U);
+  EXPECT_EQ(both["postures"].size(), 1U);
+}
+
+TEST(Identify, LeavesOutWhatIsMissingOrTwiceAndSaysSo) {
+  const Scratch scratch;
+  std::string text = decay_csv("time [s],q1 [rad],q2 [rad],note", 1), with_holes;
+  int line = 0;
+  for (std::size_t at = 0; at < text.size(); ++line) {
+    const auto end = text.find('\n', at);
+    std::string row = text.substr(at, end - at);
+    at = end + 1;
+    if (line > 0) row += ",";
+    if (line % 50 == 7) row = row.substr(0, row.find(',')) + ",,nan,";
+    with_holes += row + "\n";
+    if (line == 300) with_holes += row + "\n0.1,1,2,3\n";  // twice, and back in time
+  }
+  const Json found = identify({scratch.write("a.csv", with_holes), "--channels", "q1,q2"});
+  expect_known_modes(found);
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("1 samples left out, because another has the same"));
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("time runs backwards"));
+}
+
+TEST(Identify, RefusesInOneLineThatNamesFileLineAndColumn) {
+  const Scratch scratch;
+  const std::string good = decay_csv("time [s],q1 [rad],q2 [rad]", 1);
+  int number = 0;
+  const auto file = [&](const std::string& text) {
+    return scratch.write("bad" + std::to_string(number++) + ".csv", text);
+  };
+  const std::vector<std::pair<std::vector<std::string>, std::string>> all = {
+      {{file("")}, "is empty"},
+      {{file("time,q1\n")}, "0 samples, need 20"},
+      {{file("time,time,q1\n1,2,3\n")}, "two columns of time"},
+      {{file("a,b\n1,2\n")}, "line 1: no column of time"},
+      {{file("time\n1\n")}, "no column but the time"},
+      {{file("time [kg],q1\n1,2\n")}, "unknown unit 'kg'"},
+      {{file("time,q1 [furlong]\n1,2\n")}, "column 2 (q1): unknown unit 'furlong'"},
+      {{file("time,q1\n1,2\n2\n")}, "line 3: not 2 columns"},
+      {{file("time,q1\n1,2,3\n")}, "line 2: not 2 columns"},
+      {{file("time,q1\n1,2\n2,x\n")}, "line 3, q1: 'x' is no number"},
+      {{file("time,q1\nnan,2\n")}, "line 2: no time"},
+      {{file(std::string("\x7f"
+                         "ELF\0\0\1",
+                         7))},
+       "no column of time"},
+      {{file(good), "--channels", "q9"}, "no channel 'q9'; there are q1, q2"},
+      {{file(good), "--channels", "q1,q1"}, "'q1' twice"},
+      {{file(good), "--from", "7"}, "0 samples from --from to --to"},
+      {{file("time,x\n" + good.substr(good.find('\n') + 1, 3000))}, "columns"},
+      {{file(good), file(decay_csv("time,q1,q3", 1))}, "its channels differ"},
+      {{file(good), "--calibrate", "payload"}, "--against"},
+      {{file(good), "--plot", "x.pdf"}, "--plot: x.pdf: has to end"},
+      {{scratch.path("none.csv")}, "none.csv"},
+      {{scratch.path("")}, "cannot be read"},
+  };
+  for (auto [arguments, words] : all) {
+    arguments.insert(arguments.begin(), "identify");
+    const Outcome outcome = run_program(arguments);
+    EXPECT_EQ(outcome.status, 2) << words;
+    EXPECT_EQ(outcome.out, "") << words;
+    EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(words));
+  }
+}
+
+/// Releases of an iiwa with a payload and drives that its controller does not know of.
+class HiddenArm {
+ public:
+  static std::string number(double value) {
+    std::array<char, 40> text{};
+    std::snprintf(text.data(), text.size(), "%.17g", value);
+    return text.data();
+  }
+
+  /// Its configuration, with what is known or all of it.
+  static std::string config(const std::string& mass, const std::string& inertia) {
+    return "{robot: {urdf: " + testing::arm_path("iiwa14") +
+           ", base: iiwa_link_0, tip: iiwa_link_ee_kuka, reflected_inertia: " + inertia +
+           ", payload: {mass: " + mass +
+           "}}, control: {mode: joint}, gains: {joint: {stiffness: [800, 800, 500, 500, 200, 100, "
+           "50], damping: [20, 25, 10, 12, 3, 2, 0.5]}}";
+  }
+
+  /// Logs of a push each at three postures.
+  explicit HiddenArm(const Scratch& scratch) {
+    const std::vector<std::string> postures = {"[0, 0.5, 0, -1.4, 0, 1, 0]",
+                                               "[-0.5, 0.3, -0.4, -1.6, 1, 1.2, 0.5]",
+                                               "[1, 0.2, -0.9, -1.1, 0.3, 1.5, -0.5]"};
+    int n = 0;
+    for (const std::string& posture : postures) {
+      for (const char* wrench : {"[25, -20, 15, 3, 2, -2]", "[-15, 25, 20, -2, 3, 3]"}) {
+        const std::string name = std::to_string(n++);
+        const std::string scene = scratch.write(
+            "scene" + name + ".yaml",
+            config("0", "[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1]") +
+                ", simulation: {robot: {payload: {mass: 1.5}, reflected_inertia: [0.13, 0.12, "
+                "0.11, 0.1, 0.09, 0.08, 0.05]}, sensors: {position_noise: 1e-5 rad}}, scenario: "
+                "{duration: 3.5, start: {position: " +
+                posture + "}, pushes: [{begin: 1.5, end: 1.52, wrench: " + wrench + "}]}}");
+        logs.push_back(scratch.path(name + ".lcm"));
+        const Outcome outcome = run_program({"run", scene, "--fast", "--log", logs.back()});
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+      }
+    }
+  }
+
+  std::vector<std::string> logs;
+};
+
+TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
+  const Scratch scratch;
+  HiddenArm arm(scratch);
+  const std::string inertia = "[0.13, 0.12, 0.11, 0.1, 0.09, 0.08, 0.05]";
+  const std::string truth = scratch.write("truth.yaml", HiddenArm::config("1.5", inertia) + "}");
+  const std::string guess = scratch.write("guess.yaml", HiddenArm::config("0", inertia) + "}");
+  const std::string output = scratch.path("found.yaml");
+  std::vector<std::string> arguments = arm.logs;
+  arguments.insert(arguments.end(), {"--from", "1.53", "--against", truth});
+  const Json known = identify(arguments);
+  EXPECT_EQ(known["postures"].size(), 3U);
+  int near = 0;
+  for (const Json& posture : known["postures"]) {
+    for (const Json& difference : posture["difference"]) {
+      const std::size_t i = difference["predicted"];
+      const double w = posture["predicted"][i]["natural_frequency"];
+      near += std::abs(difference["natural_frequency"].get<double>()) < 0.01 * w;
+    }
+  }
+  EXPECT_GE(near, 12) << "of 21 modes";
+
+  arguments.back() = guess;
+  arguments.insert(arguments.end(), {"--calibrate", "payload", "--output", output});
+  const Json found = identify(arguments);
+  const Json& payload = found["calibration"]["parameters"][0];
+  EXPECT_EQ(payload["name"], "payload");
+  EXPECT_NEAR(payload["value"].get<double>(), 1.5, 0.05);
+  EXPECT_TRUE(payload["determined"].get<bool>());
+  EXPECT_LT(found["calibration"]["misfit"].get<double>(),
+            0.2 * found["calibration"]["misfit_before"].get<double>());
+  // What it wrote is a configuration, with the payload in it.
+  arguments.resize(arguments.size() - 4);
+  arguments.back() = output;
+  arguments.insert(arguments.end(), {"--calibrate", "payload"});
+  EXPECT_NEAR(identify(arguments)["calibration"]["parameters"][0]["before"].get<double>(),
+              payload["value"].get<double>(), 1e-6);
+}
+
+TEST(Identify, SaysWhatRecordsCannotTellApart) {
+  const Scratch scratch;
+  HiddenArm arm(scratch);
+  const std::string guess = scratch.write(
+      "guess.yaml", HiddenArm::config("0", "[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1]") + "}");
+  const Json found = identify({arm.logs[0], "--from", "1.53", "--against", guess, "--calibrate",
+                               "payload,reflected_inertia,friction,delay"});
+  EXPECT_FALSE(found["calibration"]["warnings"].empty());
+  const Outcome wrong =
+      run_program({"identify", arm.logs[0], "--against", guess, "--calibrate", "payload,colour"});
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("'colour' is none of payload"));
+}
+
+}  // namespace
+}  // namespace dashpot::tests
