@@ -28,6 +28,8 @@ struct DriverStatus {
   std::int64_t utime = 0;            ///< us; -1: the iiwa's clock is not known yet
   controller::JointVector position;  ///< measured, rad
   controller::JointVector velocity;  ///< rad/s
+  /// iiwa: where the driver commands the joints to be, rad; taken as measured where it is empty.
+  controller::JointVector commanded;
   controller::JointVector torque;    ///< measured, N m
   controller::JointVector external;  ///< external torque as the driver gives it, N m
   int robot_mode = 0;                ///< Panda: 5: stopped by the user, 6: recovers

@@ -145,7 +145,7 @@ bool DriveSession::take(const DriverStatus& status, double age, std::int64_t uti
     return false;
   }
   command.utime = utime;
-  // In KUKA's mode with springs of its own these would pull to an older position.
+  // The message wants one; it is what the driver itself commands with --torque_only.
   command.position = options_.driver == DriverKind::kIiwa ? last_position_ : JointVector();
   command.torque = torque_;
   return true;
@@ -153,7 +153,14 @@ bool DriveSession::take(const DriverStatus& status, double age, std::int64_t uti
 
 /// Begins once enough was seen. What is not in order is said after the time it takes to be sure.
 void DriveSession::watch(const DriverStatus& status) {
-  if (first_ == 0) first_ = status.utime;
+  if (first_ == 0) {
+    first_ = status.utime;
+    first_position_ = status.position;
+    first_commanded_ = status.commanded;
+    moved_ = recommanded_ = false;
+  }
+  moved_ = moved_ || status.position != first_position_;
+  recommanded_ = recommanded_ || status.commanded != first_commanded_;
   last_position_ = status.position;
   const bool enough = status.utime - first_ >= kWatch && intervals_.size() >= kFewest;
   if (!enough) return;
@@ -165,7 +172,22 @@ void DriveSession::watch(const DriverStatus& status) {
                              ": end that program first");
   }
   check_period();
+  check_springs();
   begin(status);
+}
+
+/// With --torque_only the driver commands each position that it measures. With springs of KUKA's it
+/// commands the one where they are fixed.
+void DriveSession::check_springs() {
+  const bool known = first_commanded_.allFinite() && !first_commanded_.isZero(0);
+  if (options_.driver != DriverKind::kIiwa || !known || !moved_ || recommanded_) return;
+  const std::string reason =
+      "the driver commands one fixed position while the arm's measured one changes: KUKA's mode "
+      "Torque, whose own springs no mode counts, or no torque is taken yet; use the mode "
+      "TorqueOnly "
+      "and --torque_only";
+  if (!options_.dry_run) throw InputError("", reason);
+  warning_ = reason;
 }
 
 void DriveSession::check_period() {

@@ -66,6 +66,7 @@ class DriveSession {
   void watch(const lcmtypes::DriverStatus& status);
   void begin(const lcmtypes::DriverStatus& status);
   void check_period();
+  void check_springs();
   void note_external(const lcmtypes::DriverStatus& status);
   bool stopped_by_itself(const lcmtypes::DriverStatus& status) const noexcept;
 
@@ -80,6 +81,9 @@ class DriveSession {
   bool foreign_ = false;                 ///< somebody else's command was heard
   std::int64_t first_ = 0, last_ = 0;    ///< utime of the statuses
   std::vector<std::int64_t> intervals_;  ///< before the start, us
+  JointVector first_position_, first_commanded_;
+  bool moved_ = false;        ///< the measured position has changed since first_position_
+  bool recommanded_ = false;  ///< the driver has commanded another position
   JointVector last_position_;
   JointVector torque_;
   std::deque<std::vector<std::uint8_t>> sent_;  ///< the last ones

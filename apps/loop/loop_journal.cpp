@@ -1,5 +1,5 @@
 #include <dashpot/apps/loop/loop_journal.hpp>
-#include <dashpot/apps/loop/loop_samples.hpp>
+#include <dashpot/lcmtypes/plugin_samples.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -68,7 +68,7 @@ void LoopJournal::publish(std::int64_t utime) noexcept {
   record.restarts = snapshot.restarts - first_restarts_;
   note_fault(snapshot);
   state_.utime = utime;
-  fill(snapshot, state_.snapshot);
+  lcmtypes::fill(snapshot, state_.snapshot);
   publisher_.offer(state_);
   bool publish_now = record.ticks % kPublishEvery == 0;
   const dashpot_modes* modes = controller_.new_modes();
@@ -77,7 +77,7 @@ void LoopJournal::publish(std::int64_t utime) noexcept {
     record.last_modes = *modes;
     // They may belong to an earlier tick.
     modes_.utime = utime - (snapshot.time - modes->time) / 1000;
-    fill(*modes, modes_);
+    lcmtypes::fill(*modes, modes_);
     publisher_.offer(modes_);
     publish_now = true;
   }
@@ -92,7 +92,7 @@ void LoopJournal::publish_sampled(std::int64_t utime, std::int64_t time) noexcep
   const dashpot_sampled_modes* modes = controller_.new_sampled_modes();
   if (modes == nullptr || modes->time < 0) return;  // of the hand's guidance
   sampled_.utime = utime - (time - modes->time) / 1000;
-  fill(*modes, sampled_);
+  lcmtypes::fill(*modes, sampled_);
   publisher_.offer(sampled_);
 }
 

@@ -96,6 +96,7 @@ bool decode(DriverKind kind, const void* data, std::size_t size, DriverStatus& s
     status.utime = message.utime;
     status.position = joints(message.joint_position_measured);
     status.velocity = joints(message.joint_velocity_estimated);
+    status.commanded = joints(message.joint_position_commanded);
     status.torque = joints(message.joint_torque_measured);
     status.external = joints(message.joint_torque_external);
     return true;
@@ -155,7 +156,8 @@ void encode(DriverKind kind, const DriverStatus& status, std::vector<std::uint8_
     message.num_joints = static_cast<std::int32_t>(q.size());
     message.joint_position_measured = list(q);
     message.joint_velocity_estimated = list(status.velocity, q);
-    message.joint_position_commanded = message.joint_position_ipo = list(q);
+    message.joint_position_commanded = list(status.commanded.size() > 0 ? status.commanded : q);
+    message.joint_position_ipo = list(q);
     message.joint_torque_measured = list(status.torque, q);
     message.joint_torque_commanded = zeros;
     message.joint_torque_external = list(status.external, q);

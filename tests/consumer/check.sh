@@ -36,6 +36,11 @@ examples() { # as examples/README.md says, for the plainest processor
   cc -std=c99 "$shared/examples/plugin.c" "${flags[@]}" -o "$dir/plugin"
   (cd "$shared" && python3 "$tests/examples/check.py" "$tests/examples/plugin_c.txt" "$dir/plugin" \
     controller/examples/panda.yaml)
+  read -ra flags <<<"$(pkg-config --cflags --libs dashpot-publisher)"
+  cc -std=c99 "$shared/examples/publisher.c" "${flags[@]}" -o "$dir/publisher"
+  (cd "$shared" && LCM_DEFAULT_URL="file://$dir/arm.lcm?mode=w" python3 "$tests/examples/check.py" \
+    "$tests/examples/publisher_c.txt" "$dir/publisher" controller/examples/panda.yaml)
+  grep -aq DASHPOT_MODES "$dir/arm.lcm" || fail "publisher.c published nothing"
 }
 
 program() { # finds its plugin, and what is installed beside it

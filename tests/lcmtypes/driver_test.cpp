@@ -48,7 +48,8 @@ bool decodes(DriverKind kind, const DriverBytes& bytes, Message& message) {
 DriverStatus random_status(testing::Random& random, int n) {
   DriverStatus status;
   status.utime = 123456789;
-  for (JointVector* part : {&status.position, &status.velocity, &status.torque, &status.external}) {
+  for (JointVector* part :
+       {&status.position, &status.velocity, &status.commanded, &status.torque, &status.external}) {
     *part = some(random, n);
   }
   status.robot_mode = 5;
@@ -68,6 +69,7 @@ TEST(Driver, GivesBackWhatWasEncoded) {
       EXPECT_EQ(back.utime, status.utime);
       EXPECT_EQ(back.position, status.position);
       EXPECT_EQ(back.velocity, status.velocity);
+      EXPECT_EQ(back.commanded, kind == DriverKind::kIiwa ? status.commanded : JointVector());
       EXPECT_EQ(back.torque, status.torque);
       EXPECT_EQ(back.external, status.external);
       EXPECT_EQ(back.robot_mode, kind == DriverKind::kPanda ? 5 : 0);

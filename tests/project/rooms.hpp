@@ -37,6 +37,8 @@ inline const std::vector<Room>& rooms() {
                                                           "dashpot/controller/latest.hpp",
                                                           kEigen,
                                                           "lcm/"};
+  static const std::vector<std::string_view> plugin_hosts = {
+      "dashpot/controller/plugin.h", "dashpot/controller/snapshot.hpp", kEigen};
   static const std::vector<Room> table = {
       {"text", 0, {}, {"fcntl.h", "sys/stat.h", "unistd.h"}},
 
@@ -96,6 +98,7 @@ inline const std::vector<Room>& rooms() {
        1,
        {"command", "command_limits", "command_filter", "command_receiver"},
        snapshots},
+      {"lcmtypes/plugin", 2, {"plugin_samples", "plugin_publisher"}, plugin_hosts},
       {"lcmtypes/drivers",
        1,
        {"driver", "lcmt_iiwa_command", "lcmt_iiwa_status", "lcmt_panda_command",

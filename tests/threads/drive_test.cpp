@@ -210,27 +210,46 @@ void command_as_well(const Arm& arm, const std::string& url, const Running& driv
   }
 }
 
+/// Statuses of an arm that nobody simulates, every millisecond: it trembles about one posture.
+class TremblingArm {
+ public:
+  /// With `fixed`, the driver commands that posture; otherwise what it measures.
+  TremblingArm(const Arm& arm, const std::string& url, double tremble, bool fixed)
+      : thread_([this, arm, url, tremble, fixed] {
+          const auto bus = lcmtypes::open_bus(url);
+          std::vector<std::uint8_t> bytes;
+          controller::JointVector posture = controller::JointVector::Zero(7);
+          posture[1] = 0.5;
+          posture[3] = -1.4;
+          posture[5] = 1;
+          lcmtypes::DriverStatus status;
+          status.velocity = controller::JointVector::Zero(7);
+          if (fixed) status.commanded = posture;
+          for (status.utime = 1'000'000; !done_; status.utime += 1000) {
+            status.position = posture.array() + (status.utime % 2000 == 0 ? tremble : -tremble);
+            encode(arm.kind, status, bytes);
+            bus->publish(lcmtypes::profile_of(arm.kind).status_channel, bytes.data(),
+                         static_cast<unsigned>(bytes.size()));
+            usleep(1000);
+          }
+        }) {}
+  ~TremblingArm() {
+    done_ = true;
+    thread_.join();
+  }
+
+ private:
+  std::atomic<bool> done_ = false;
+  std::thread thread_;
+};
+
 TEST_P(Drive, RefusesToBeASecondCommander) {
   // The fake driver would die of commands this early: its statuses are sent by another program.
   Running driving(drive(configuration(arm.name)));
-  const auto bus = lcmtypes::open_bus(url);
-  std::vector<std::uint8_t> bytes;
-  std::atomic<bool> done = false;
-  std::thread statuses([&] {
-    lcmtypes::DriverStatus status;
-    status.position = status.velocity = controller::JointVector::Zero(7);
-    status.position[3] = -1.5;
-    status.position[5] = 1.5;
-    for (status.utime = 1'000'000; !done; status.utime += 1000) {
-      encode(arm.kind, status, bytes);
-      bus->publish(lcmtypes::profile_of(arm.kind).status_channel, bytes.data(),
-                   static_cast<unsigned>(bytes.size()));
-      usleep(1000);
-    }
-  });
-  command_as_well(arm, url, driving);
-  done = true;
-  statuses.join();
+  {
+    const TremblingArm trembling(arm, url, 0, false);
+    command_as_well(arm, url, driving);
+  }
   driving.send(SIGTERM);
   const int status = driving.finish();
   if (driving.complaints().find("no status") != std::string::npos) {
@@ -284,6 +303,61 @@ TEST_P(Drive, AnswersNoStatusTwice) {
 INSTANTIATE_TEST_SUITE_P(Arms, Drive, ::testing::Values(kIiwa, kPanda), [](const auto& given) {
   return std::string(given.param.option).substr(2);
 });
+
+/// What drive says when it has begun or ended, with a driver that commands one posture or what it
+/// measures.
+std::string first_words(const std::string& url, bool fixed, const std::string& option,
+                        int& status) {
+  Running driving({"drive", configuration("iiwa14"), "--iiwa", "--lcm-url", url, option});
+  {
+    const TremblingArm trembling(kIiwa, url, 1e-6, fixed);
+    for (int k = 0; k < 1000 && driving.complaints().empty(); ++k) usleep(10'000);
+    usleep(100'000);
+  }
+  driving.send(SIGTERM);
+  status = driving.finish();
+  return driving.complaints();
+}
+
+/// Gains that Drake's iiwa bears at 1 ms, rings with at 5 ms, and does not bear with more damping
+/// of the wrist. No driver runs: they are judged before the first status.
+TEST(DriveOfAnIiwa, JudgesGainsForThePeriod) {
+  const Scratch scratch;
+  const auto judge = [&](const std::string& period, const std::string& wrist, int status) {
+    const std::string config = changed_configuration(
+        scratch, kIiwa,
+        {{"period: 1 ms", "period: " + period},
+         {"[150, 150, 100, 100, 40, 20, 8]", "[600, 600, 600, 400, 100, 50, 10]"},
+         {"[20, 20, 10, 10, 1.5, 0.7, 0.15]", "[60, 60, 50, 40, " + wrist + "]"}});
+    Running driving({"drive", config, "--iiwa", "--lcm-url", own_url()});
+    for (int k = 0; k < 1000 && driving.complaints().empty(); ++k) usleep(10'000);
+    driving.send(SIGTERM);
+    EXPECT_EQ(driving.finish(), status) << period << ", " << wrist;
+    return driving.complaints();
+  };
+  EXPECT_THAT(judge("1 ms", "5, 1, 0.1", 0), HasSubstr("no status on IIWA_STATUS"));
+  const auto refused = HasSubstr("the sampled loop has a gain margin of 0.");
+  EXPECT_THAT(judge("5 ms", "5, 1, 0.1", 2), refused);
+  EXPECT_THAT(judge("1 ms", "20, 10, 4", 2), refused);
+}
+
+TEST(DriveOfAnIiwa, RefusesSpringsOfKukas) {
+  int status = 0;
+  const std::string springs = first_words(own_url(), true, "--json", status);
+  if (springs.find("no status") != std::string::npos) {
+    GTEST_SKIP() << "multicast does not work on this machine";
+  }
+  EXPECT_EQ(status, 2);
+  EXPECT_THAT(springs, HasSubstr("KUKA's mode Torque"));
+  EXPECT_THAT(springs, ::testing::Not(HasSubstr("the arm is held")));
+  const std::string watched = first_words(own_url(), true, "--dry-run", status);
+  EXPECT_EQ(status, 0);
+  EXPECT_THAT(watched, HasSubstr("KUKA's mode Torque"));
+  const std::string none = first_words(own_url(), false, "--json", status);
+  EXPECT_EQ(status, 0);
+  EXPECT_THAT(none, HasSubstr("the arm is held where it is"));
+  EXPECT_THAT(none, ::testing::Not(HasSubstr("KUKA's mode Torque")));
+}
 
 TEST(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
   const std::string url = own_url();

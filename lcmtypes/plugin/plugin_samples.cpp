@@ -1,6 +1,6 @@
-#include <dashpot/apps/loop/loop_samples.hpp>
+#include <dashpot/lcmtypes/plugin_samples.hpp>
 
-namespace dashpot::apps {
+namespace dashpot::lcmtypes {
 namespace {
 
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
@@ -35,7 +35,7 @@ void fill(const dashpot_snapshot& from, controller::Snapshot& to) noexcept {
   to.tip_wrench = Eigen::Map<const controller::Vector6>(from.tip_wrench);
 }
 
-void fill(const dashpot_modes& from, lcmtypes::ModesSample& to) noexcept {
+void fill(const dashpot_modes& from, ModesSample& to) noexcept {
   controller::Vibration& vibration = to.vibration;
   vibration.time = from.time;
   vibration.tick = from.tick;
@@ -64,7 +64,7 @@ void fill(const dashpot_modes& from, lcmtypes::ModesSample& to) noexcept {
   }
 }
 
-void fill(const dashpot_sampled_modes& from, lcmtypes::SampledModesSample& to) noexcept {
+void fill(const dashpot_sampled_modes& from, SampledModesSample& to) noexcept {
   controller::SampledVibration& vibration = to.vibration;
   vibration.time = from.time;
   vibration.tick = from.tick;
@@ -84,4 +84,4 @@ void fill(const dashpot_sampled_modes& from, lcmtypes::SampledModesSample& to) n
   }
 }
 
-}  // namespace dashpot::apps
+}  // namespace dashpot::lcmtypes
