@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/analysis/motion_record.hpp>
 #include <dashpot/analysis/types.hpp>
 
 #include <array>
@@ -7,12 +8,6 @@
 #include <vector>
 
 namespace dashpot::analysis {
-
-/// A recorded motion: some channels of an arm at some times.
-struct MotionRecord {
-  Eigen::VectorXd time;    ///< N, s, strictly rising; need not be evenly spaced
-  Eigen::MatrixXd output;  ///< channels x N, in any units; NaN where a sample is missing
-};
 
 struct IdentifyOptions {
   int max_order = 0;  ///< of the models tried: eigenvalues; 0: 2 for each channel, within 12 and 32
@@ -89,8 +84,5 @@ struct FreeDecay {
 /// `free` says for each sample whether nothing is known to move the arm; empty: nothing is known.
 /// Throws std::invalid_argument as identify_decays.
 std::vector<FreeDecay> find_decays(const MotionRecord& record, const std::vector<bool>& free = {});
-
-/// The samples of a record from `from`, before `to`.
-MotionRecord part_of(const MotionRecord& record, Eigen::Index from, Eigen::Index to);
 
 }  // namespace dashpot::analysis

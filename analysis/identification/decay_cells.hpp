@@ -1,12 +1,9 @@
 #pragma once
-#include <dashpot/analysis/identification.hpp>
+#include <dashpot/analysis/motion_record.hpp>
 
 #include <optional>
 
 namespace dashpot::analysis {
-
-/// Throws std::invalid_argument as identify_decays says.
-void check_records(const std::vector<MotionRecord>& records);
 
 /// A first estimate of each channel's noise, from fifth differences of neighbouring samples, which
 /// leave little of a slow motion. Too large where samples are far apart.

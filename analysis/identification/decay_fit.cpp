@@ -1,4 +1,6 @@
+#include <dashpot/analysis/identification/decay_columns.hpp>
 #include <dashpot/analysis/identification/decay_fit.hpp>
+#include <dashpot/analysis/identification/decay_scales.hpp>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -6,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 
 namespace dashpot::analysis {
 namespace {
@@ -18,121 +19,6 @@ using Eigen::VectorXd;
 /// Of one more parameter, in the criterion: between Akaike's 2, which takes noise for modes, and
 /// Schwarz's logarithm of the number of samples, about 9, which lets weak modes spoil strong ones.
 constexpr double kPenalty = 4;
-
-/// The motions of a factor in all records, samples x 2 or x 1, and their derivatives by `first`,
-/// `second` and the scales of all records but the reference.
-struct FactorColumns {
-  MatrixXd value;
-  std::vector<MatrixXd> derivative;
-};
-
-/// (cos x - sin x / x) / (2 x^2) for x^2 = y, with the sign that makes it -1/6 at y = 0.
-double third_difference(double y) {
-  double sum = 0, term = 1.0 / 6;  // k / (2k + 1)! (-y)^(k-1), k = 1
-  for (int k = 1; k < 12; ++k) {
-    sum -= term;
-    term *= -y * (k + 1) / k / ((2.0 * k + 2) * (2.0 * k + 3));
-  }
-  return sum;
-}
-
-/// e^{-a t/2} times cos(d t), sin(d t) / d and the derivative of the latter by D, where D = d^2 =
-/// b - a^2/4 has either sign.
-struct DampedWaves {
-  double cosine, sine, sine_by_d;
-};
-
-DampedWaves damped_waves(double a, double D, double t) {
-  const double y = D * t * t;
-  DampedWaves wave{};
-  const double fade = std::exp(-a * t / 2);
-  if (std::abs(y) < 0.5) {
-    const double x = std::sqrt(std::abs(y));
-    const bool turns = y >= 0;
-    wave.cosine = fade * (turns ? std::cos(x) : std::cosh(x));
-    wave.sine = fade * t * (x < 1e-4 ? 1 - y / 6 : (turns ? std::sin(x) : std::sinh(x)) / x);
-    wave.sine_by_d = fade * t * t * t * third_difference(y);
-    return wave;
-  }
-  if (D > 0) {
-    const double d = std::sqrt(D);
-    wave.cosine = fade * std::cos(d * t);
-    wave.sine = fade * std::sin(d * t) / d;
-  } else {
-    const double d = std::sqrt(-D);
-    const double slow = std::exp((d - a / 2) * t), fast = std::exp((-d - a / 2) * t);
-    wave.cosine = (slow + fast) / 2;
-    wave.sine = (slow - fast) / (2 * d);
-  }
-  wave.sine_by_d = (t * wave.cosine - wave.sine) / (2 * D);
-  return wave;
-}
-
-FactorColumns columns_of(const DecayFactor& factor, const DecayPart& part, bool derivatives) {
-  const Index N = samples_of(part), width = factor.parameters();
-  FactorColumns columns{MatrixXd(N, width), {}};
-  const std::size_t records = part.time.size();
-  if (derivatives) {
-    columns.derivative.assign(static_cast<std::size_t>(width) * records, MatrixXd::Zero(N, width));
-  }
-  const double w = std::exp(factor.first), zeta = factor.second;
-  const double a = 2 * zeta * w, D = w * w * (1 - zeta * zeta);
-  Index at = 0;
-  std::size_t next = static_cast<std::size_t>(width);
-  for (std::size_t r = 0; r < records; ++r) {
-    const VectorXd& time = part.time[r];
-    const bool scaled = r != factor.reference;
-    const auto [alpha, beta] = factor.scale[r];
-    for (Index i = 0; i < time.size(); ++i, ++at) {
-      const double t = time[i];
-      if (!factor.pair) {
-        const double x = std::exp(factor.first * t);
-        columns.value(at, 0) = alpha * x;
-        if (!derivatives) continue;
-        columns.derivative[0](at, 0) = alpha * t * x;
-        if (scaled) columns.derivative[next](at, 0) = x;
-        continue;
-      }
-      const auto [c, s, s_by_d] = damped_waves(a, D, t);
-      // x = (c, w s) and x' / w.
-      const double turn = 1 - zeta * zeta;
-      const std::array<double, 2> x{c, w * s};
-      const std::array<double, 2> rate{-zeta * x[0] - turn * x[1], x[0] - zeta * x[1]};
-      for (Index k : {0, 1}) {
-        const auto j = static_cast<std::size_t>(k);
-        columns.value(at, k) = alpha * x[j] + beta * rate[j];
-        if (derivatives && scaled) {
-          columns.derivative[next](at, k) = x[j];
-          columns.derivative[next + 1](at, k) = rate[j];
-        }
-      }
-      if (!derivatives) continue;
-      const double c_by_a = -t / 2 * c + a * t / 4 * s, c_by_b = -t / 2 * s;
-      const double s_by_a = -t / 2 * s - a / 2 * s_by_d, s_by_b = s_by_d;
-      const std::array<double, 2> by_first{c_by_a * a + c_by_b * 2 * w * w,
-                                           w * (s + s_by_a * a + s_by_b * 2 * w * w)};
-      const std::array<double, 2> by_second{c_by_a * 2 * w, w * s_by_a * 2 * w};
-      columns.derivative[0](at, 0) =
-          alpha * by_first[0] + beta * (-zeta * by_first[0] - turn * by_first[1]);
-      columns.derivative[0](at, 1) =
-          alpha * by_first[1] + beta * (by_first[0] - zeta * by_first[1]);
-      columns.derivative[1](at, 0) =
-          alpha * by_second[0] +
-          beta * (-zeta * by_second[0] - turn * by_second[1] - x[0] + 2 * zeta * x[1]);
-      columns.derivative[1](at, 1) =
-          alpha * by_second[1] + beta * (by_second[0] - zeta * by_second[1] - x[1]);
-    }
-    if (scaled) next += static_cast<std::size_t>(width);
-  }
-  return columns;
-}
-
-/// Columns of the factors alone.
-Index factor_width(const std::vector<DecayFactor>& factors) {
-  Index width = 0;
-  for (const DecayFactor& factor : factors) width += factor.parameters();
-  return width;
-}
 
 /// The least-squares problem at some factors.
 class Evaluation {
@@ -258,70 +144,6 @@ std::vector<DecayFactor> moved(const std::vector<DecayFactor>& factors, const Ve
   return result;
 }
 
-/// Gives factors the scales that fit best the amplitudes that each record has by itself.
-void find_scales(const DecayData& data, const VectorXd& noise, std::vector<DecayFactor>& factors) {
-  const bool known = std::all_of(
-      factors.begin(), factors.end(),
-      [&data](const DecayFactor& factor) { return factor.scale.size() == data.records; });
-  if (known) return;
-  for (DecayFactor& factor : factors) factor.scale.assign(data.records, {1, 0});
-  if (data.records == 1) return;
-  const Index eigen = factor_width(factors);
-  std::vector<MatrixXd> amplitudes(data.records, MatrixXd::Zero(eigen, data.channels));
-  for (const DecayPart& part : data.parts) {
-    Index from = 0;
-    for (std::size_t r = 0; r < data.records; ++r) {
-      const Index N = part.time[r].size();
-      MatrixXd basis(N, eigen + 1);
-      DecayPart alone{{part.time[r]}, part.output.middleRows(from, N), part.channels};
-      from += N;
-      if (N == 0) continue;
-      Index at = 0;
-      for (DecayFactor factor : factors) {
-        factor.scale = {{1, 0}};
-        factor.reference = 0;
-        basis.middleCols(at, factor.parameters()) = columns_of(factor, alone, false).value;
-        at += factor.parameters();
-      }
-      basis.col(at).setOnes();
-      const VectorXd size = basis.colwise().norm().transpose().cwiseMax(1e-300);
-      basis *= size.cwiseInverse().asDiagonal();
-      const MatrixXd all =
-          size.cwiseInverse().asDiagonal() * basis.colPivHouseholderQr().solve(alone.output);
-      for (std::size_t c = 0; c < part.channels.size(); ++c) {
-        amplitudes[r].col(part.channels[c]) =
-            all.col(static_cast<Index>(c)).head(eigen) / noise[part.channels[c]];
-      }
-    }
-  }
-  Index at = 0;
-  for (DecayFactor& factor : factors) {
-    const int width = factor.parameters();
-    const auto of = [&](std::size_t r) { return amplitudes[r].middleRows(at, width); };
-    for (std::size_t r = 0; r < data.records; ++r) {
-      if (of(r).norm() > of(factor.reference).norm()) factor.reference = r;
-    }
-    const MatrixXd reference = of(factor.reference);
-    MatrixXd columns(reference.size(), width);
-    columns.col(0) = reference.reshaped();
-    if (factor.pair) {  // x' / omega for x = (c, w s) times the amplitudes
-      const double zeta = factor.second;
-      MatrixXd rate(2, reference.cols());
-      rate.row(0) = -zeta * reference.row(0) + reference.row(1);
-      rate.row(1) = -(1 - zeta * zeta) * reference.row(0) - zeta * reference.row(1);
-      columns.col(1) = rate.reshaped();
-    }
-    const auto qr = columns.colPivHouseholderQr();
-    for (std::size_t r = 0; r < data.records; ++r) {
-      if (r == factor.reference) continue;
-      const MatrixXd wanted = of(r);
-      const VectorXd scale = qr.solve(wanted.reshaped());
-      factor.scale[r] = {scale[0], factor.pair ? scale[1] : 0};
-    }
-    at += width;
-  }
-}
-
 /// Whether a step stays among motions that a record can show.
 bool makes_sense(const std::vector<DecayFactor>& factors, double longest) {
   return std::all_of(factors.begin(), factors.end(), [longest](const DecayFactor& factor) {
@@ -401,65 +223,6 @@ double variance_growth(const Evaluation& evaluation, const DecayData& data) {
 }
 
 }  // namespace
-
-std::array<Complex, 2> DecayFactor::eigenvalues() const {
-  if (!pair) return {first, first};
-  const double w = std::exp(first), a = second * w;
-  const double D = w * w * (1 - second * second);
-  if (D >= 0) return {Complex(-a, std::sqrt(D)), Complex(-a, -std::sqrt(D))};
-  const double far = -(a + std::copysign(std::sqrt(-D), a));
-  return {far, w * w / far};
-}
-
-DecayFactor DecayFactor::of_pair(Complex eigenvalue) {
-  const double w = modulus(eigenvalue);
-  return {true, std::log(w), -eigenvalue.real() / w};
-}
-
-DecayData::DecayData(const std::vector<MotionRecord>& all)
-    : channels(all.front().output.rows()), records(all.size()) {
-  std::map<std::vector<bool>, std::vector<Index>> alike;  // channels with the same samples
-  for (Index c = 0; c < channels; ++c) {
-    std::vector<bool> there;
-    for (const MotionRecord& record : all) {
-      for (const double y : record.output.row(c)) there.push_back(std::isfinite(y));
-    }
-    alike[std::move(there)].push_back(c);
-  }
-  for (const auto& [there, members] : alike) {
-    DecayPart part{
-        {},
-        MatrixXd(std::count(there.begin(), there.end(), true), static_cast<Index>(members.size())),
-        members};
-    Index row = 0;
-    std::size_t sample = 0;
-    for (const MotionRecord& record : all) {
-      std::vector<double> times;
-      for (Index i = 0; i < record.time.size(); ++i) {
-        if (!there[sample++]) continue;
-        times.push_back(record.time[i] - record.time[0]);
-        for (std::size_t c = 0; c < members.size(); ++c) {
-          part.output(row, static_cast<Index>(c)) = record.output(members[c], i);
-        }
-        ++row;
-      }
-      part.time.emplace_back(VectorXd::Map(times.data(), static_cast<Index>(times.size())));
-    }
-    parts.push_back(std::move(part));
-  }
-  motion.setZero(channels);
-  for (const DecayPart& part : parts) {
-    for (std::size_t c = 0; c < part.channels.size(); ++c) {
-      const auto y = part.output.col(static_cast<Index>(c));
-      const double mean = y.mean();
-      motion[part.channels[c]] = std::sqrt((y.array() - mean).square().mean());
-    }
-  }
-}
-
-double DecayData::least_noise(Index channel) const {
-  return std::max(kLinear * motion[channel], 1e-300);
-}
 
 DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start,
                     const VectorXd& noise, int max_iterations, double hopeless) {

@@ -1,54 +1,10 @@
 #pragma once
-#include <dashpot/analysis/identification.hpp>
+#include <dashpot/analysis/identification/decay_data.hpp>
 
-#include <array>
 #include <limits>
 #include <vector>
 
 namespace dashpot::analysis {
-
-/// A factor of the characteristic polynomial of decays, s^2 + 2 zeta omega s + omega^2, underdamped
-/// or not, or s - lambda, and how strongly and in which phase each record has it.
-struct DecayFactor {
-  bool pair = true;
-  double first = 0;   ///< log(omega), omega in rad/s; or lambda, 1/s
-  double second = 0;  ///< zeta; not used by a single lambda
-  /// In record r the motion x(t) of the reference record is scale[r][0] x + scale[r][1] x' / omega,
-  /// or scale[r][0] x for a single lambda: one shape for all records. Empty: not known yet.
-  std::vector<std::array<double, 2>> scale = {};
-  std::size_t reference = 0;
-
-  int parameters() const { return pair ? 2 : 1; }
-  /// 1/s; the same one twice where there is one.
-  std::array<Complex, 2> eigenvalues() const;
-
-  static DecayFactor of_pair(Complex eigenvalue);  ///< and its conjugate
-  static DecayFactor of_single(double eigenvalue) { return {false, eigenvalue, 0}; }
-};
-
-/// What records say for channels that have samples at the same times.
-struct DecayPart {
-  std::vector<Eigen::VectorXd> time;   ///< of each record, s, from its beginning
-  Eigen::MatrixXd output;              ///< samples of all records, one after the other, x channels
-  std::vector<Eigen::Index> channels;  ///< which of the records' channels
-};
-
-/// Decays in the form in which they are fitted, the missing samples left out.
-struct DecayData {
-  std::vector<DecayPart> parts;
-  Eigen::Index channels = 0;
-  std::size_t records = 0;
-  /// Of each channel, standard deviation: no noise is taken to be less than kLinear of it.
-  Eigen::VectorXd motion;
-
-  /// To which share of itself the motion of an arm is linear, at best. What is smaller is not
-  /// looked for in it.
-  static constexpr double kLinear = 1e-4;
-
-  double least_noise(Eigen::Index channel) const;
-
-  explicit DecayData(const std::vector<MotionRecord>& all);
-};
 
 /// A sum of decays about constants that fits data best.
 struct DecayFit {
@@ -74,11 +30,6 @@ struct DecayFit {
 DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start,
                     const Eigen::VectorXd& noise, int max_iterations,
                     double hopeless = std::numeric_limits<double>::infinity());
-
-/// Samples of a part.
-inline Eigen::Index samples_of(const DecayPart& part) {
-  return part.output.rows();
-}
 
 /// What a fit's criterion counts for its parameters.
 double parameter_penalty(const DecayFit& fit, const DecayData& data);

@@ -194,10 +194,6 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
 
 }  // namespace
 
-MotionRecord part_of(const MotionRecord& record, Index from, Index to) {
-  return {record.time.segment(from, to - from), record.output.middleCols(from, to - from)};
-}
-
 std::vector<FreeDecay> find_decays(const MotionRecord& record, const std::vector<bool>& free) {
   const Index N = record.time.size();
   if (!free.empty() && free.size() != static_cast<std::size_t>(N)) {

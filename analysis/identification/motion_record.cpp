@@ -1,0 +1,47 @@
+#include <dashpot/analysis/motion_record.hpp>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::Index;
+
+void require(bool condition, const std::string& message) {
+  if (!condition) throw std::invalid_argument("identify: " + message);
+}
+
+}  // namespace
+
+MotionRecord part_of(const MotionRecord& record, Index from, Index to) {
+  return {record.time.segment(from, to - from), record.output.middleCols(from, to - from)};
+}
+
+void check_records(const std::vector<MotionRecord>& records) {
+  require(!records.empty(), "there is no record");
+  const Index channels = records.front().output.rows();
+  require(channels > 0, "there is no channel");
+  for (std::size_t r = 0; r < records.size(); ++r) {
+    const auto& [time, output] = records[r];
+    const std::string name = "record " + std::to_string(r + 1) + ": ";
+    require(output.rows() == channels && output.cols() == time.size(),
+            name + "output has to be channels x samples, with as many channels as others");
+    require(time.size() >= 20, name + std::to_string(time.size()) + " samples, need 20 or more");
+    require(time.allFinite(), name + "a time is not finite");
+    for (Index i = 1; i < time.size(); ++i)
+      require(time[i] > time[i - 1], name + "time does not rise");
+    for (Index c = 0; c < channels; ++c) {
+      Index samples = 0;
+      for (const double y : output.row(c)) {
+        samples += std::isfinite(y);
+        require(!std::isinf(y), name + "a sample is infinite");
+      }
+      require(samples >= 10, name + "channel " + std::to_string(c + 1) + " has " +
+                                 std::to_string(samples) + " samples, need 10 or more");
+    }
+  }
+}
+
+}  // namespace dashpot::analysis
