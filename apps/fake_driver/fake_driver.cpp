@@ -25,6 +25,7 @@ constexpr std::array<double, 7> kDamping = {37.5, 50, 37.5, 25, 5, 3.75, 2.5};  
 
 sim::PlantOptions plant_options(const Scene& scene, DriverKind kind) {
   sim::PlantOptions options = scene.plant;
+  options.delay = std::max(options.delay, 1);
   if (kind == DriverKind::kPanda) options.torque_cutoff = kTorqueCutoff;
   return options;
 }

@@ -9,7 +9,8 @@
 namespace dashpot::apps {
 
 /// A simulated arm behind a driver's messages, as the public drivers behave where torques are
-/// commanded: their filters, what they do without commands, and what they die of.
+/// commanded: their filters, what they do without commands, and what they die of. A command acts a
+/// period after its status, or later if the scene's `delay` says so.
 ///
 /// iiwa (`--torque_only`): without a command for 0.05 s, and before the first, a PD controller of
 /// 1000 N m/rad and 50 N m s/rad holds the position of that moment; torques count again with the

@@ -2,11 +2,13 @@
 // a driver's troubles.
 #include <dashpot/lcmtypes/command_t.hpp>
 #include <dashpot/lcmtypes/driver.hpp>
+#include <dashpot/lcmtypes/log_file.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/threads/live_run.hpp>
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <thread>
@@ -106,13 +108,25 @@ command_t command_for(const state_t& state, std::int32_t parts, std::int64_t seq
   return command;
 }
 
+std::vector<state_t> states_of(const std::string& path) {
+  std::vector<state_t> states;
+  lcmtypes::LogFile log(path);
+  while (log.read()) {
+    if (log.event().channel != lcmtypes::kStateChannel) continue;
+    states.emplace_back();
+    states.back().decode(log.event().data.data(), 0, static_cast<int>(log.event().size));
+  }
+  return states;
+}
+
 TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
   const Scratch scratch;
   const std::string config = changed_configuration(
       scratch, arm, {{"analysis:", "commands: {silence: 30 s, oldest: 20 s}\nanalysis:"}});
   Listener listener(url);
   Running fake(driver());
-  Running driving(drive(config, {"--commands"}));
+  const std::string log = scratch.path("drive.lcm");
+  Running driving(drive(config, {"--commands", "--log", log}));
   double first = -1;
   const bool heard = listener.until([&] {
     if (first < 0 && listener.states > 0) {
@@ -146,6 +160,15 @@ TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
   EXPECT_NEAR(result["period"].get<double>(), 1e-3, 1e-4);
   EXPECT_EQ(result["commands"]["accepted"], 1);
   EXPECT_EQ(result["modes"].size(), 7u);
+  // The first torque acts a period after its status.
+  const std::vector<state_t> states = states_of(log);
+  const auto pushed = std::find_if(states.begin(), states.end(),
+                                   [](const state_t& state) { return state.joint_torque[0] != 0; });
+  ASSERT_GT(states.end() - pushed, 2);
+  // The driver waits at least 10 ms for an answer: none is missing here.
+  if (pushed[2].utime - pushed->utime > 10'000) return;
+  EXPECT_EQ(pushed[1].joint_position[0], pushed->joint_position[0]);
+  EXPECT_NE(pushed[2].joint_position[0], pushed->joint_position[0]);
 }
 
 TEST_P(Drive, CommandsNothingInADryRun) {
