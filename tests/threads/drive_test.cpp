@@ -163,7 +163,7 @@ TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
   // The first torque acts a period after its status.
   const std::vector<state_t> states = states_of(log);
   const auto pushed = std::find_if(states.begin(), states.end(),
-                                   [](const state_t& state) { return state.joint_torque[0] != 0; });
+                                   [](const state_t& one) { return one.joint_torque[0] != 0; });
   ASSERT_GT(states.end() - pushed, 2);
   // The driver waits at least 10 ms for an answer: none is missing here.
   if (pushed[2].utime - pushed->utime > 10'000) return;
