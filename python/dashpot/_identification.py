@@ -89,8 +89,8 @@ def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike],
     where nothing moves freely.
     """
     many = isinstance(t, (list, tuple)) and len(t) > 0 and np.ndim(t[0]) > 0
-    times = list(t) if many else [t]  # type: ignore[arg-type]
-    outputs = list(y) if many else [y]  # type: ignore[arg-type]
+    times: list[Any] = list(t) if many else [t]  # type: ignore[arg-type]
+    outputs: list[Any] = list(y) if many else [y]  # type: ignore[arg-type]
     if len(times) != len(outputs):
         raise Error(f"identify: {len(times)} arrays of times, {len(outputs)} of channels")
     values = []

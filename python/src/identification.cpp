@@ -40,6 +40,7 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
     const nb::gil_scoped_release release;
     for (std::size_t r = 0; r < times.size(); ++r) {
       const MotionRecord record{times[r], outputs[r]};
+      analysis::check_records({record});
       std::vector<FreeDecay> pieces{{0, record.time.size(), {}}};
       if (find) pieces = find_decays(record);
       for (const FreeDecay& piece : pieces) {

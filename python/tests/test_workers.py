@@ -97,7 +97,7 @@ def test_a_worker_that_dies_is_told(panda):
     deadly = Deadly()
     try:
         with pytest.raises(concurrent.futures.BrokenExecutor,
-                           match=r"a worker died: 512 of 2000 postures were done, .* 1488 remain"):
+                           match=r"a worker died: \d+ of 2000 postures were done, .* \d+ remain"):
             dashpot.audit(panda, **GAINS, samples=2000, executor=deadly)
     finally:
         deadly.pool.shutdown()
