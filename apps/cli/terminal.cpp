@@ -3,6 +3,7 @@
 
 #include <sys/ioctl.h>
 #include <unistd.h>
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <sstream>
@@ -10,10 +11,11 @@
 namespace dashpot::apps {
 namespace {
 
-volatile std::sig_atomic_t stop_given = 0;
+std::atomic<bool> stop_given = false;  // other threads read it
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler writes it");
 
 void note_stop(int /*signal*/) {
-  stop_given = 1;
+  stop_given = true;
 }
 
 /// Rows of the terminal.
@@ -33,7 +35,7 @@ StopSignal::StopSignal() {
 }
 
 bool StopSignal::given() {
-  return stop_given != 0;
+  return stop_given;
 }
 
 bool on_terminal() {

@@ -10,6 +10,7 @@
 #include <dashpot/lcmtypes/sink.hpp>
 
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -89,7 +90,9 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
       return "ended after its time";
     }
     const int handled = bus.handleTimeout(kWait);
-    if (handled < 0 && !StopSignal::given()) throw std::runtime_error("the LCM bus failed");
+    // A signal may interrupt it before the program has noticed the signal.
+    if (handled < 0 && errno != EINTR && !StopSignal::given())
+      throw std::runtime_error("the LCM bus failed");
     if (handled <= 0) {
       if (!told && 1e-6 * static_cast<double>(utime_now() - heard) > kSilence) {
         print_error(std::string("no status on ") + profile.status_channel + " for 2 s");
