@@ -108,8 +108,7 @@ VectorXd first_noise(const std::vector<MotionRecord>& records) {
   return noise;
 }
 
-DecayCells::DecayCells(const std::vector<MotionRecord>& motions, const VectorXd& sample_noise,
-                       std::optional<double> wanted) {
+DecayCells::DecayCells(const std::vector<MotionRecord>& motions, const VectorXd& sample_noise) {
   const double fine = typical_step(motions);
   std::vector<MatrixXd> grids, gaps;
   std::vector<Index> lengths;
@@ -118,10 +117,7 @@ DecayCells::DecayCells(const std::vector<MotionRecord>& motions, const VectorXd&
     gaps.emplace_back();
     grids.push_back(on_grid(motion, fine, &gaps.back()));
     ends_.push_back(end_of(grids.back()));
-    Index length = audible(grids.back(), sample_noise);
-    if (wanted) {
-      length = std::min(grids.back().cols(), static_cast<Index>(std::lround(*wanted / fine)));
-    }
+    const Index length = audible(grids.back(), sample_noise);
     lengths.push_back(std::max<Index>(2, length));
     longest = std::max(longest, lengths.back());
   }

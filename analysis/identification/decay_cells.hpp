@@ -1,8 +1,6 @@
 #pragma once
 #include <dashpot/analysis/motion_record.hpp>
 
-#include <optional>
-
 namespace dashpot::analysis {
 
 /// A first estimate of each channel's noise, from fifth differences of neighbouring samples, which
@@ -21,9 +19,8 @@ Eigen::MatrixXd on_grid(const MotionRecord& record, double step, Eigen::MatrixXd
 /// decays stays one, with the same eigenvalues, and the noise falls.
 class DecayCells {
  public:
-  /// Up to where the motion is lost in `noise`, or the first `duration` (s) if that is given.
-  DecayCells(const std::vector<MotionRecord>& motions, const Eigen::VectorXd& noise,
-             std::optional<double> duration);
+  /// Up to where the motion is lost in `sample_noise`.
+  DecayCells(const std::vector<MotionRecord>& motions, const Eigen::VectorXd& sample_noise);
 
   std::vector<MotionRecord> records;  ///< in the channels' units; NaN in long gaps
   Eigen::VectorXd noise;              ///< of a cell

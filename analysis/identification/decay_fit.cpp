@@ -310,7 +310,7 @@ std::vector<MatrixXd> factor_motion(const DecayData& data, const DecayFit& fit,
       amplitude.col(static_cast<Index>(c)) =
           fit.amplitudes.col(part.channels[c]).segment(first, which.parameters());
     }
-    result.push_back(columns_of(which, part, false).value * amplitude);
+    result.emplace_back(columns_of(which, part, false).value * amplitude);
   }
   return result;
 }

@@ -158,6 +158,7 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
                    Index to) {
   FreeDecay decay{peak, to, {}};
   std::vector<Index> starts;
+  starts.reserve(12);
   for (int k = 0; k < 6; ++k) starts.push_back(from + (peak - from) * k / 6);
   for (const double share : {0.0, 0.02, 0.05, 0.1, 0.2, 0.3}) {
     starts.push_back(peak + static_cast<Index>(share * static_cast<double>(to - peak)));

@@ -39,7 +39,7 @@ double sample_count(const DecayData& data) {
 ModelSearch::ModelSearch(const std::vector<MotionRecord>& records, int max_order, bool refine)
     : data(records) {
   const VectorXd noise = first_noise(records);
-  const DecayCells cells(records, noise, {});
+  const DecayCells cells(records, noise);
   const Index channels = data.channels;
   const Realization realization(cells.weighted(), cells.step, channels, 300);
   const int wanted =
