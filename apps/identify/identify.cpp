@@ -75,6 +75,7 @@ class Task {
     const MotionFile file = read_motion_file(path);
     const std::vector<Index> chosen = chosen_channels(file.channels, command_.channels);
     std::vector<MotionChannel> channels;
+    channels.reserve(chosen.size());
     for (const Index i : chosen) channels.push_back(file.channels[static_cast<std::size_t>(i)]);
     if (report_.channels.empty()) {
       report_.channels = channels;
@@ -149,7 +150,7 @@ class Task {
 
   void identify() {
     if (decays_.empty())
-      report_.notes.push_back("no free decay was found: nothing moves by itself");
+      report_.notes.emplace_back("no free decay was found: nothing moves by itself");
     analysis::IdentifyOptions options;
     options.max_order = command_.order;
     for (const std::vector<std::size_t>& group : by_posture()) {

@@ -327,6 +327,7 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
   for (Index i = 0; i < p; ++i) before[i] = parameters.list[static_cast<std::size_t>(i)].before;
   const auto predict = [&](const VectorXd& values) {
     std::vector<std::vector<PredictedMode>> all;
+    all.reserve(postures.size());
     for (const PostureReport& posture : postures) {
       all.push_back(loop.predict(posture.rest, parameters.correction(values, n)));
     }
