@@ -24,7 +24,7 @@ namespace dashpot::apps {
 namespace {
 
 struct DriveOptions {
-  std::string config, url, log, plugin;
+  std::string config, url, log, plugin, excite;
   std::optional<double> duration;
   bool iiwa = false;
   bool panda = false;
@@ -158,11 +158,16 @@ void drive(const DriveOptions& options) {
   check_outputs({{"--log", options.log}}, {{"the configuration", options.config},
                                            {"--plugin", options.plugin},
                                            {"the robot description", file.config.robot.urdf}});
+  std::optional<Excitation> excitation;
+  if (!options.excite.empty()) {
+    excitation = read_excitation(options.excite, file.config.settings);
+  }
   const PluginLibrary plugin(options.plugin);
   const auto controller = plugin.create(options.config, file.config.model.dof());
   constexpr double kRepeat = 0.1;  // s between two repetitions of a set-point
   LoopGoal goal(*controller,
                 std::max<std::int64_t>(1, std::llround(kRepeat / file.config.settings.period)));
+  if (excitation) goal.excite(*excitation);
   const std::shared_ptr<lcm::LCM> bus = drive_bus(options);
   std::optional<CommandSource> commands;
   if (options.commands) commands.emplace(drive_bus(options), file.commands, goal);
@@ -224,6 +229,7 @@ void add_drive(CLI::App& program) {
                    "Bus; otherwise that of LCM_DEFAULT_URL, or multicast within this machine")
       ->option_text("URL");
   command->add_option("--log", options->log, "LCM log to write")->option_text("FILE");
+  command->add_option("--excite", options->excite, kExciteHelp)->option_text("SPEC");
   command->add_option("--plugin", options->plugin, "Controller to load instead of Dashpot's own")
       ->option_text("FILE");
   command->add_flag("--json", options->json, "End with one JSON object instead of a table");

@@ -265,7 +265,9 @@ MotionFile read_log(const std::string& path) {
     if (!rows.add(1e-6 * static_cast<double>(state.utime), values.data(), values.size())) return;
     const bool joint = state.mode == state_t::JOINT;
     reference.assign(state.reference_joint_position.begin(), state.reference_joint_position.end());
-    if (!joint) {
+    if (joint) {  // where the wrench is feed-forward alone, such as an excitation
+      reference.insert(reference.end(), state.tip_wrench, state.tip_wrench + 6);
+    } else {
       reference.insert(reference.end(), state.reference_tip_position,
                        state.reference_tip_position + 3);
       reference.insert(reference.end(), state.reference_tip_quaternion,

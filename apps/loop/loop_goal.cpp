@@ -14,9 +14,19 @@ const controller::Setpoint* LoopGoal::told(std::int64_t time) noexcept {
   const std::int64_t changes = gain_changes_.load(std::memory_order_acquire);
   if (ticks_++ % repeat_every_ == 0 || changes != gain_changes_seen_) news_ = true;
   gain_changes_seen_ = changes;
+  controller::Vector6 wrench = setpoint_.wrench;
+  if (excitation_) {
+    if (!excited_since_) excited_since_ = time;
+    wrench += excitation_->wrench(1e-9 * static_cast<double>(time - *excited_since_));
+    if (wrench != excited_.wrench) news_ = true;
+  }
   if (news_) setpoint_.time = time;
   told_ = in_force_;
-  return told_ ? &setpoint_ : nullptr;
+  if (!told_) return nullptr;
+  if (!excitation_) return &setpoint_;
+  if (news_) excited_ = setpoint_;
+  excited_.wrench = wrench;
+  return &excited_;
 }
 
 void LoopGoal::note_status(std::int32_t status) noexcept {
@@ -33,7 +43,10 @@ void LoopGoal::hold(const controller::Setpoint& setpoint) noexcept {
 }
 
 void LoopGoal::note_fault(bool latched) noexcept {
-  if (latched) in_force_ = false;
+  if (latched) {
+    in_force_ = false;
+    excitation_.reset();
+  }
   if (faulted_ && !latched && !released_.exchange(false, std::memory_order_acquire)) {
     in_force_ = news_ = true;
   }

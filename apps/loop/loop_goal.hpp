@@ -1,10 +1,12 @@
 #pragma once
+#include <dashpot/apps/loop/excitation.hpp>
 #include <dashpot/apps/loop/loop_controller.hpp>
 
 #include <atomic>
 #include <cstdint>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
 
 namespace dashpot::apps {
@@ -20,6 +22,10 @@ class LoopGoal {
   // Before the loop begins:
   /// Holds `setpoint`, with the gains in it, which the controller has taken already.
   void begin(const controller::Setpoint& setpoint);
+
+  /// Adds this wrench to that of what is held. Its time begins with the next tick; a fault ends it
+  /// for good.
+  void excite(const Excitation& excitation) noexcept { excitation_ = excitation; }
 
   // The loop's thread:
   /// Before a tick at `time`, ns: what the controller is told; null: nothing.
@@ -49,11 +55,14 @@ class LoopGoal {
 
   // The loop's own:
   controller::Setpoint setpoint_;
-  controller::Setpoint accepted_;  ///< the last that the controller did not reject
-  bool in_force_ = false;          ///< of setpoint_
-  bool news_ = true;               ///< setpoint_ is to be read again
-  bool told_ = false;              ///< the controller was told of it in this tick
-  bool faulted_ = false;           ///< a fault was latched after the last tick
+  controller::Setpoint excited_;  ///< setpoint_ with the wrench of excitation_
+  std::optional<Excitation> excitation_;
+  std::optional<std::int64_t> excited_since_;  ///< ns
+  controller::Setpoint accepted_;              ///< the last that the controller did not reject
+  bool in_force_ = false;                      ///< of setpoint_
+  bool news_ = true;                           ///< setpoint_ is to be read again
+  bool told_ = false;                          ///< the controller was told of it in this tick
+  bool faulted_ = false;                       ///< a fault was latched after the last tick
   std::int64_t ticks_ = 0;
   std::int64_t gain_changes_seen_ = 0;
 

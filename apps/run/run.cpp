@@ -23,7 +23,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 struct Options {
-  std::string scene, url, log, csv, plugin;
+  std::string scene, url, log, csv, plugin, excite;
   std::optional<double> duration;
   bool fast = false;
   bool real_time = false;  // which it is unless `fast`
@@ -179,6 +179,13 @@ void run(const Options& options) {
   if (options.commands && !scene.arm) {
     throw InputError("--commands", "has nothing to command: the scene is a system of matrices");
   }
+  if (!options.excite.empty() && !scene.arm) {
+    throw InputError("--excite", "has nothing to excite: the scene is a system of matrices");
+  }
+  std::optional<Excitation> excitation;
+  if (!options.excite.empty()) {
+    excitation = read_excitation(options.excite, scene.arm->config.settings);
+  }
   if (options.duration) scene.duration = *options.duration;
   std::optional<PluginLibrary> plugin;
   if (scene.arm) plugin.emplace(options.plugin);
@@ -193,6 +200,7 @@ void run(const Options& options) {
 
   const auto controller = make_controller();
   ClosedLoop loop(scene, *controller);
+  if (excitation) loop.goal().excite(*excitation);
   const StopSignal stop;
   RunReport report = run_loop(options, scene, loop, open_bus(options));
   report.scene = options.scene;
@@ -243,6 +251,7 @@ void add_run(CLI::App& program) {
       ->option_text("URL");
   command->add_option("--log", options->log, "LCM log to write")->option_text("FILE");
   command->add_option("--csv", options->csv, "Table of the states to write")->option_text("FILE");
+  command->add_option("--excite", options->excite, kExciteHelp)->option_text("SPEC");
   command->add_option("--plugin", options->plugin, "Controller to load instead of Dashpot's own")
       ->option_text("FILE");
   command->add_flag("--ring-down", options->ring_down,

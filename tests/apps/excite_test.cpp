@@ -1,0 +1,151 @@
+// `dashpot run --excite`: the wrench that acts, what is refused, and what a fault leaves of it.
+#include <dashpot/lcmtypes/message_reader.hpp>
+#include <dashpot/tests/apps/scene_run.hpp>
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A calm scene whose springs are at the joints, so that the tip's wrench is that of the
+/// excitation.
+std::string calm_scene(const Scratch& scratch, const std::string& more = "") {
+  return scratch.write("scene.yaml",
+                       R"(
+robot: {urdf: )" + std::string(DASHPOT_SOURCE_DIR) +
+                           R"(/sim/models/panda.urdf, base: panda_link0, tip: panda_hand_tcp}
+control: {mode: joint}
+motion: {gain_time: 10 ms}
+)" + more + R"(
+scenario:
+  duration: 3 s
+  start: {position: [0, -45 deg, 0, -135 deg, 0, 90 deg, 45 deg]}
+)");
+}
+
+std::vector<state_t> states_of(const std::string& path, const std::vector<std::string>& options) {
+  const Scratch scratch;
+  std::vector<std::string> words = {"--log", scratch.path("log")};
+  words.insert(words.end(), options.begin(), options.end());
+  const Outcome outcome = run_scene(path, words);
+  EXPECT_EQ(outcome.status, 0) << outcome.err;
+  std::vector<state_t> states;
+  lcmtypes::MessageHandlers handlers;
+  handlers.on_state = [&](const state_t& state) { states.push_back(state); };
+  lcmtypes::LogReader log(scratch.path("log"), handlers);
+  while (log.read()) log.handle();
+  return states;
+}
+
+TEST(Excite, PulsesActWhenTheyShould) {
+  const Scratch scratch;
+  const auto states = states_of(
+      calm_scene(scratch),
+      {"--excite", "pulse,direction=z,force=-5 N,duration=0.1,at=0.5,every=800 ms,count=2"});
+  ASSERT_EQ(states.size(), 3000u);
+  const auto force = [&](std::size_t ms) { return states[ms].tip_wrench[2]; };
+  for (const std::size_t ms : {0, 499, 615, 1000, 1299, 1415, 2100, 2500, 2999}) {
+    EXPECT_EQ(force(ms), 0) << ms;
+  }
+  for (const std::size_t ms : {515, 599, 1315, 1399}) EXPECT_EQ(force(ms), -5) << ms;
+  EXPECT_LT(force(505), 0);  // over gain_time
+  EXPECT_GT(force(505), -5);
+  for (const int other : {0, 1, 3, 4, 5}) EXPECT_EQ(states[550].tip_wrench[other], 0) << other;
+  double before = 0, after = 0;
+  for (std::size_t i = 0; i < 7; ++i) {
+    before = std::max(before, std::abs(states[499].joint_velocity[i]));
+    after = std::max(after, std::abs(states[620].joint_velocity[i]));
+  }
+  EXPECT_GT(after, 1e-3 + 10 * before);  // rad/s
+  EXPECT_EQ(states.back().fault, 0);
+}
+
+TEST(Excite, AChirpSweepsItsFrequencies) {
+  const Scratch scratch;
+  const auto states =
+      states_of(calm_scene(scratch),
+                {"--excite", "chirp,direction=ry,torque=1,from=1,to=9,duration=2,at=0.5"});
+  ASSERT_EQ(states.size(), 3000u);
+  const auto crossings = [&](std::size_t begin, std::size_t end) {
+    int count = 0;
+    for (std::size_t i = begin + 1; i < end; ++i) {
+      if (states[i - 1].tip_wrench[4] < 0 && states[i].tip_wrench[4] >= 0) ++count;
+    }
+    return count;
+  };
+  EXPECT_EQ(crossings(0, 500), 0);
+  EXPECT_NEAR(crossings(500, 1500), 3, 1);   // 1 to 5 Hz in 1 s
+  EXPECT_NEAR(crossings(1500, 2500), 7, 1);  // 5 to 9 Hz in 1 s
+  double greatest = 0;
+  for (const state_t& state : states) greatest = std::max(greatest, std::abs(state.tip_wrench[4]));
+  EXPECT_LE(greatest, 1);
+  EXPECT_GT(greatest, 0.8);
+  EXPECT_EQ(states.back().tip_wrench[4], 0);
+}
+
+// The sensors show no numbers for 50 ms at 1 s, which latches; the controller releases the fault.
+TEST(Excite, EndsForGoodAtAFault) {
+  const Scratch scratch;
+  const std::string path = calm_scene(scratch, "watchdog: {release_after: 0.2 s}");
+  const std::string text =
+      text_of(path) + "  faults: [{begin: 1 s, end: 1.05 s, not_a_number: true}]\n";
+  const auto states =
+      states_of(scratch.write("fault.yaml", text),
+                {"--excite", "pulse,direction=z,force=2,duration=0.1,at=0.3,every=0.2,count=20"});
+  ASSERT_EQ(states.size(), 3000u);
+  EXPECT_EQ(states[1040].fault, states[1040].status);
+  EXPECT_NE(states[1040].fault, 0);
+  EXPECT_EQ(states[2900].fault, 0);  // the controller has let go of it
+  // Until 1.05 s nothing is measured, and the state shows the last that was.
+  for (std::size_t i = 1055; i < states.size(); ++i) ASSERT_EQ(states[i].tip_wrench[2], 0) << i;
+  EXPECT_EQ(states[380].tip_wrench[2], 2);
+}
+
+TEST(Excite, RefusesWhatIsTooMuch) {
+  const Scratch scratch;
+  const std::string path = calm_scene(scratch);
+  const auto said = [&](const std::string& words) {
+    const Outcome outcome = run_scene(path, {"--duration", "0.01", "--excite", words});
+    EXPECT_EQ(outcome.status, outcome.err.empty() ? 0 : 2) << words;
+    return outcome.err;
+  };
+  EXPECT_EQ(said("pulse,direction=z,force=20,duration=0.5"), "");
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"pulse,direction=z,force=21,duration=0.5", "force has to be from -20 to 20 N"},
+      {"pulse,direction=rz,torque=-3.1,duration=0.5", "torque has to be from -3 to 3 N m"},
+      {"pulse,direction=z,torque=1,duration=0.5", "a pulse needs force"},
+      {"pulse,direction=z,force=1 kg,duration=0.5", "force has a wrong unit"},
+      {"pulse,direction=w,force=1,duration=0.5", "direction is x, y, z, rx, ry or rz, not 'w'"},
+      {"pulse,force=1,duration=0.5", "a pulse needs direction"},
+      {"pulse,direction=z,force=1", "a pulse needs duration"},
+      {"pulse,direction=z,force=1,duration=0.5,to=3", "'to' is no key of a pulse"},
+      {"pulse,direction=z,force=1,force=2,duration=0.5", "force is given twice"},
+      {"pulse,direction", "KEY=VALUE is wanted, not 'direction'"},
+      {"pulse,direction=z,force=1,duration=0.5,every=0.4,count=2", "every has to be from 0.5"},
+      {"pulse,direction=z,force=1,duration=0.5,count=2", "a pulse needs every"},
+      {"pulse,direction=z,force=1,duration=0.5,every=300,count=3", "has to end within 600 s"},
+      {"pulse,direction=z,force=1,duration=5 ms", "duration is below motion.gain_time, 0.01 s"},
+      {"chirp,direction=z,force=1,duration=5,from=1,to=20",
+       "frequencies above 15.92 Hz do not get through motion.gain_time"},
+      {"chirp,direction=z,force=1,duration=5,from=1", "a chirp needs to"},
+      {"shake,direction=z", "pulse or chirp is wanted, not 'shake'"}};
+  for (const auto& [words, reason] : cases) EXPECT_THAT(said(words), HasSubstr(reason)) << words;
+  const Outcome deaf = run_scene(calm_scene(scratch, "feed_forward: {wrench: false}"),
+                                 {"--excite", "pulse,direction=z,force=1,duration=0.5"});
+  EXPECT_EQ(deaf.status, 2);
+  EXPECT_THAT(deaf.err, HasSubstr("--excite: needs feed_forward.wrench: true"));
+  const Outcome masses =
+      run_scene(scene("chain3"), {"--excite", "pulse,direction=z,force=1,duration=0.5"});
+  EXPECT_EQ(masses.status, 2);
+  EXPECT_THAT(masses.err, HasSubstr("--excite: has nothing to excite"));
+}
+
+}  // namespace
+}  // namespace dashpot::tests
