@@ -1,5 +1,6 @@
 #pragma once
-#include <Eigen/Core>
+#include <dashpot/analysis/types.hpp>
+
 #include <vector>
 
 namespace dashpot::analysis {
