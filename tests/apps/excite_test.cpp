@@ -51,10 +51,10 @@ TEST(Excite, PulsesActWhenTheyShould) {
       {"--excite", "pulse,direction=z,force=-5 N,duration=0.1,at=0.5,every=800 ms,count=2"});
   ASSERT_EQ(states.size(), 3000u);
   const auto force = [&](std::size_t ms) { return states[ms].tip_wrench[2]; };
-  for (const std::size_t ms : {0, 499, 615, 1000, 1299, 1415, 2100, 2500, 2999}) {
+  for (const std::size_t ms : {0u, 499u, 615u, 1000u, 1299u, 1415u, 2100u, 2500u, 2999u}) {
     EXPECT_EQ(force(ms), 0) << ms;
   }
-  for (const std::size_t ms : {515, 599, 1315, 1399}) EXPECT_EQ(force(ms), -5) << ms;
+  for (const std::size_t ms : {515u, 599u, 1315u, 1399u}) EXPECT_EQ(force(ms), -5) << ms;
   EXPECT_LT(force(505), 0);  // over gain_time
   EXPECT_GT(force(505), -5);
   for (const int other : {0, 1, 3, 4, 5}) EXPECT_EQ(states[550].tip_wrench[other], 0) << other;
