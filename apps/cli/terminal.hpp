@@ -3,8 +3,8 @@
 
 namespace dashpot::apps {
 
-/// From its construction on, the first Ctrl-C (SIGINT) and the first SIGTERM do not end the program
-/// but are noted.
+/// From its construction on, the first SIGINT (Ctrl-C), SIGTERM or SIGHUP does not end the program
+/// but is noted.
 class StopSignal {
  public:
   StopSignal();

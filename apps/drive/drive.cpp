@@ -13,6 +13,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <lcm/lcm-cpp.hpp>
@@ -73,7 +74,8 @@ class Inbox {
   DriveSession& session_;
 };
 
-/// Answers statuses until the user, or the time, or a refusal ends it. Returns why it ended.
+/// Answers statuses until the user, or the time, or a refusal ends it. In the first two cases the
+/// torque fades before that. Returns why it ended.
 std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::DriverKind driver,
                      DriveSession& session) {
   constexpr int kWait = 50;       // ms
@@ -82,19 +84,30 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
   Inbox inbox(bus, driver, session);
   lcmtypes::DriverCommand command;
   std::vector<std::uint8_t> bytes;
-  std::int64_t heard = utime_now(), began = 0;
+  using Clock = std::chrono::steady_clock;  // whatever becomes of the computer's time of day
+  const auto since = [](Clock::time_point then) {
+    return std::chrono::duration<double>(Clock::now() - then).count();  // s
+  };
+  Clock::time_point heard = Clock::now(), began, asked;
+  std::string why;  // it ends
   bool told = false;
-  while (!StopSignal::given()) {
-    if (began > 0 && options.duration &&
-        1e-6 * static_cast<double>(utime_now() - began) >= *options.duration) {
-      return "ended after its time";
+  while (!session.ended()) {
+    if (why.empty() && StopSignal::given()) why = "ended by the user";
+    if (why.empty() && session.running() && options.duration && since(began) >= *options.duration) {
+      why = "ended after its time";
+    }
+    if (!why.empty()) {
+      if (!session.running() || options.dry_run) return why;
+      if (asked == Clock::time_point()) asked = Clock::now();
+      if (since(asked) > session.fade_time() + 1) return why + ", without the driver";
+      session.end();
     }
     const int handled = bus.handleTimeout(kWait);
     // A signal may interrupt it before the program has noticed the signal.
     if (handled < 0 && errno != EINTR && !StopSignal::given())
       throw std::runtime_error("the LCM bus failed");
     if (handled <= 0) {
-      if (!told && 1e-6 * static_cast<double>(utime_now() - heard) > kSilence) {
+      if (!told && since(heard) > kSilence) {
         print_error(std::string("no status on ") + profile.status_channel + " for 2 s");
         told = true;
       }
@@ -108,14 +121,15 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
     }
     if (!inbox.newest) continue;
     const std::int64_t now = utime_now();
-    heard = now;
+    heard = Clock::now();
     told = false;
+    const bool ran = session.running();
     const lcmtypes::DriverStatus status = std::move(*inbox.newest);
     inbox.newest.reset();
     const bool answers =
         session.take(status, 1e-6 * static_cast<double>(now - inbox.arrived), now, command);
-    if (began == 0 && session.running()) {
-      began = now;
+    if (!ran && session.running()) {
+      began = Clock::now();
       std::fprintf(
           stderr, "%s\n",
           options.dry_run ? "watching; nothing is commanded" : "the arm is held where it is");
@@ -130,7 +144,7 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
     const std::string warning = session.warning();
     if (!warning.empty()) print_error(warning);
   }
-  return "ended by the user";
+  return why;
 }
 
 std::vector<std::unique_ptr<lcmtypes::Sink>> drive_sinks(const DriveOptions& options,
@@ -177,6 +191,7 @@ void drive(const DriveOptions& options) {
   DriveReport report;
   DriveSession session(file.config, *controller, goal, journal, {driver, options.dry_run});
   const StopSignal stop;
+  std::signal(SIGPIPE, SIG_IGN);  // who stops reading must not end the loop in the middle
   lock_memory();
   publisher.start();
   schedule_ahead_of_others();
@@ -202,6 +217,10 @@ void drive(const DriveOptions& options) {
   if (commands) report.commands = {commands->tally(), commands->last_reason()};
   print(options.json ? to_json(report) : to_table(report));
   if (failure) std::rethrow_exception(failure);
+  if (report.messages.send_errors > 0 && !options.log.empty()) {
+    throw std::runtime_error(std::to_string(report.messages.send_errors) +
+                             " messages could not be sent or written");
+  }
 }
 
 }  // namespace
@@ -234,8 +253,8 @@ void add_drive(CLI::App& program) {
       ->option_text("FILE");
   command->add_flag("--json", options->json, "End with one JSON object instead of a table");
   command->footer(
-      "Read docs/drive.md first; begin with --dry-run. Ctrl-C ends it: the driver then "
-      "does what it does\nwithout commands.\n" +
+      "Read docs/drive.md first; begin with --dry-run. Ctrl-C ends it: the torque "
+      "fades, and the driver then does\nwhat it does without commands.\n" +
       std::string(kExitStatusHelp));
   command->callback([options] { drive(*options); });
 }

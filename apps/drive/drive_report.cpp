@@ -4,7 +4,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -14,11 +13,15 @@ namespace {
 
 using DriveJson = nlohmann::ordered_json;
 
-/// The latency at and below which this share of them lies, us.
-double latency_at(const std::vector<std::int32_t>& sorted, double share) {
-  if (sorted.empty()) return 0;
-  const auto last = static_cast<double>(sorted.size() - 1);
-  return sorted[static_cast<std::size_t>(std::lround(share * last))];
+/// The latency at and below which this share of the commands lies, us.
+double latency_at(const DriveRecord& drive, double share) {
+  const std::int64_t wanted = std::llround(share * static_cast<double>(drive.commands));
+  std::int64_t count = 0;
+  for (std::size_t us = 0; us + 1 < drive.latencies.size(); ++us) {
+    count += drive.latencies[us];
+    if (count >= wanted) return static_cast<double>(us);
+  }
+  return drive.longest_latency;
 }
 
 std::string line(const char* format, auto... values) {
@@ -39,22 +42,20 @@ long long n(std::int64_t count) {
 
 std::string to_table(const DriveReport& report) {
   const DriveRecord& drive = report.drive;
-  std::vector<std::int32_t> sorted = drive.latencies;
-  std::sort(sorted.begin(), sorted.end());
   std::string text = std::string(lcmtypes::profile_of(report.driver).name) + ", " + report.config +
                      (report.dry_run ? ", dry run: nothing was commanded" : "") + "\n";
   text += "  " + report.ended + "\n";
   text += line(
       "statuses: %lld, of them unreadable %lld, repeated %lld, overtaken %lld, late %lld, "
-      "of a stopped robot %lld; periods without one %lld",
+      "of a stopped robot %lld, after a pause %lld; periods without one %lld",
       n(drive.statuses), n(drive.unreadable), n(drive.repeated), n(drive.overtaken), n(drive.late),
-      n(drive.stopped), n(drive.lost));
+      n(drive.stopped), n(drive.awaited), n(drive.lost));
   if (!report.running) return text + "  the loop did not begin\n";
   text += line("period of the driver %.4g ms; commands sent: %lld", 1e3 * drive.period,
                n(drive.commands));
-  if (!sorted.empty()) {
+  if (drive.commands > 0) {
     text += line("from status to command: median %.0f us, 99.9 %% %.0f us, longest %.0f us",
-                 latency_at(sorted, 0.5), latency_at(sorted, 0.999), latency_at(sorted, 1));
+                 latency_at(drive, 0.5), latency_at(drive, 0.999), drive.longest_latency);
   }
   text += line("ticks: %lld; springs restarted %lld times, faults %lld", n(report.loop.ticks),
                n(static_cast<std::int64_t>(report.loop.restarts)), n(report.loop.faults));
@@ -71,8 +72,6 @@ std::string to_table(const DriveReport& report) {
 
 std::string to_json(const DriveReport& report) {
   const DriveRecord& drive = report.drive;
-  std::vector<std::int32_t> sorted = drive.latencies;
-  std::sort(sorted.begin(), sorted.end());
   DriveJson json;
   json["driver"] = lcmtypes::profile_of(report.driver).name;
   json["config"] = report.config;
@@ -83,11 +82,11 @@ std::string to_json(const DriveReport& report) {
   json["statuses"] = {{"received", drive.statuses}, {"unreadable", drive.unreadable},
                       {"repeated", drive.repeated}, {"overtaken", drive.overtaken},
                       {"late", drive.late},         {"of_stopped_robot", drive.stopped},
-                      {"lost", drive.lost}};
+                      {"awaited", drive.awaited},   {"lost", drive.lost}};
   json["commands_sent"] = drive.commands;
-  json["latency"] = {{"median", 1e-6 * latency_at(sorted, 0.5)},
-                     {"p999", 1e-6 * latency_at(sorted, 0.999)},
-                     {"longest", 1e-6 * latency_at(sorted, 1)}};
+  json["latency"] = {{"median", 1e-6 * latency_at(drive, 0.5)},
+                     {"p999", 1e-6 * latency_at(drive, 0.999)},
+                     {"longest", 1e-6 * drive.longest_latency}};
   json["ticks"] = report.loop.ticks;
   json["restarts"] = report.loop.restarts;
   json["faults"] = report.loop.faults;

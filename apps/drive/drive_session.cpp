@@ -22,7 +22,9 @@ constexpr double kPeriodTolerance = 0.2;  // of the period
 constexpr double kOldest = 2;             // periods that a status may be old
 constexpr double kNearLimit = 0.8;        // of an external torque with which the driver stops
 constexpr std::size_t kRemembered = 64;   // commands sent
-constexpr std::size_t kMostLatencies = 1 << 24;
+constexpr double kFade = 0.2;             // s from the springs to no torque, at least
+// us: what comes later is no time of a clock, and nanoseconds would not fit.
+constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max() / 2000;
 
 std::string number(double value) {
   std::array<char, 32> text{};
@@ -70,6 +72,9 @@ DriveSession::DriveSession(const controller::Config& config, LoopController& con
       n_(config.model.dof()) {
   check_loop(config.settings, options.driver);
   torque_ = record.external = JointVector::Zero(n_);
+  const controller::Limits& limits = config.settings.limits;
+  const double slowest = limits.torque.cwiseQuotient(limits.torque_rate).maxCoeff();
+  fade_ = std::llround(1e6 * std::max(kFade, slowest));
 }
 
 bool DriveSession::stopped_by_itself(const DriverStatus& status) const noexcept {
@@ -80,8 +85,9 @@ bool DriveSession::stopped_by_itself(const DriverStatus& status) const noexcept 
 bool DriveSession::take(const DriverStatus& status, double age, std::int64_t utime,
                         DriverCommand& command) {
   ++record.statuses;
-  if (status.position.size() != n_ || status.velocity.size() != n_) {
-    if (running_) {
+  const bool possible = status.utime <= kLatest;
+  if (!possible || status.position.size() != n_ || status.velocity.size() != n_) {
+    if (running_ || !possible) {
       ++record.unreadable;
       return false;
     }
@@ -89,13 +95,18 @@ bool DriveSession::take(const DriverStatus& status, double age, std::int64_t uti
                                   " joints from base to tip, the driver " +
                                   std::to_string(status.position.size()));
   }
-  if (status.utime < 0) return false;  // the iiwa's clock is not known yet
+  if (status.utime < 0) {  // the iiwa's clock is not known yet
+    restarted_ = running_;
+    return false;
+  }
   if (last_ > 0 && status.utime <= last_) {
-    ++record.repeated;
+    note_repeated(status);
     return false;
   }
   const std::int64_t interval = last_ > 0 ? status.utime - last_ : 0;
   last_ = status.utime;
+  repeated_ = 0;
+  const bool late = age > kOldest * config_.settings.period;
   if (stopped_by_itself(status)) {
     ++record.stopped;
     if (record.stopped == 1) {
@@ -108,13 +119,19 @@ bool DriveSession::take(const DriverStatus& status, double age, std::int64_t uti
   }
   if (!running_) {
     if (interval > 0 && first_ > 0) intervals_.push_back(interval);
-    watch(status);
+    watch(status, late);
     if (!running_) return false;
   } else {
     const double periods = 1e-6 * static_cast<double>(interval) / config_.settings.period;
     record.lost += std::max<std::int64_t>(0, std::llround(periods) - 1);
   }
-  if (age > kOldest * config_.settings.period) {
+  if (restarted_ || interval > kWatch) quiet_until_ = status.utime + kWatch;
+  restarted_ = false;
+  if (status.utime < quiet_until_) {  // the driver may be another one, which a command would end
+    ++record.awaited;
+    return false;
+  }
+  if (late) {
     ++record.late;
     return false;
   }
@@ -122,10 +139,14 @@ bool DriveSession::take(const DriverStatus& status, double age, std::int64_t uti
 
   journal_.begin_tick();
   JointVector velocity = status.velocity;
-  if (config_.settings.analysis.sampled.difference_velocity && interval > 0) {
-    velocity = (status.position - last_position_) / (1e-6 * static_cast<double>(interval));
+  if (config_.settings.analysis.sampled.difference_velocity && measured_at_ < status.utime) {
+    velocity = (status.position - last_position_) /
+               (1e-6 * static_cast<double>(status.utime - measured_at_));
   }
-  if (status.position.allFinite()) last_position_ = status.position;
+  if (status.position.allFinite()) {
+    last_position_ = status.position;
+    measured_at_ = status.utime;
+  }
   const std::int64_t time = 1000 * status.utime;
   timespec begin{}, end{};
   clock_gettime(CLOCK_MONOTONIC, &begin);
@@ -140,19 +161,46 @@ bool DriveSession::take(const DriverStatus& status, double age, std::int64_t uti
                      static_cast<std::int32_t>(
                          std::min<std::int64_t>(took, std::numeric_limits<std::int32_t>::max())));
   journal_.end_tick();
+  fade(status.utime);
   if (options_.dry_run) {  // somebody else moves the arm as he likes: that is no fault of this loop
     if (journal_.record.fault != DASHPOT_OK) goal_.release();
     return false;
   }
-  command.utime = utime;
+  if (journal_.record.faults > faults_) {
+    warning_ =
+        "a fault has latched, the arm is damped: " +
+        std::string(controller::to_text(static_cast<controller::Status>(journal_.record.fault)));
+  }
+  faults_ = journal_.record.faults;
+  // On the driver's clock, by which the Panda's driver lets a command expire.
+  command.utime = status.utime;
   // The message wants one; it is what the driver itself commands with --torque_only.
   command.position = options_.driver == DriverKind::kIiwa ? last_position_ : JointVector();
   command.torque = torque_;
   return true;
 }
 
+/// A clock that went back would leave every status unanswered, without a word.
+void DriveSession::note_repeated(const DriverStatus& status) {
+  ++record.repeated;
+  if (1e-6 * static_cast<double>(last_ - status.utime) < 1e-6 * kWatch) return;
+  if (static_cast<double>(++repeated_) * config_.settings.period < 1e-6 * kWatch) return;
+  throw std::runtime_error("the driver's clock has gone back by " +
+                           number(1e-6 * static_cast<double>(last_ - status.utime)) +
+                           " s: nothing more is sent");
+}
+
+/// Scales the torque to zero from the moment the end was asked for.
+void DriveSession::fade(std::int64_t utime) {
+  if (!ending_) return;
+  if (!fading_since_) fading_since_ = utime;
+  const double share = 1 - static_cast<double>(utime - *fading_since_) / static_cast<double>(fade_);
+  torque_ *= std::clamp(share, 0.0, 1.0);
+  ended_ = share <= 0;
+}
+
 /// Begins once enough was seen. What is not in order is said after the time it takes to be sure.
-void DriveSession::watch(const DriverStatus& status) {
+void DriveSession::watch(const DriverStatus& status, bool late) {
   if (first_ == 0) {
     first_ = status.utime;
     first_position_ = status.position;
@@ -162,7 +210,8 @@ void DriveSession::watch(const DriverStatus& status) {
   moved_ = moved_ || status.position != first_position_;
   recommanded_ = recommanded_ || status.commanded != first_commanded_;
   last_position_ = status.position;
-  const bool enough = status.utime - first_ >= kWatch && intervals_.size() >= kFewest;
+  measured_at_ = status.utime;
+  const bool enough = status.utime - first_ >= kWatch && intervals_.size() >= kFewest && !late;
   if (!enough) return;
   if (!finite(status)) {
     throw InputError("", "the driver's status has positions or velocities that are no numbers");
@@ -246,9 +295,10 @@ void DriveSession::note_sent(const std::vector<std::uint8_t>& bytes, double late
   ++record.commands;
   sent_.push_back(bytes);
   if (sent_.size() > kRemembered) sent_.pop_front();
-  if (record.latencies.size() < kMostLatencies) {
-    record.latencies.push_back(static_cast<std::int32_t>(std::clamp(1e6 * latency, 0.0, 1e9)));
-  }
+  const double us = std::clamp(1e6 * latency, 0.0, 1e9);
+  const auto last = static_cast<double>(record.latencies.size() - 1);
+  ++record.latencies[static_cast<std::size_t>(std::min(us, last))];
+  record.longest_latency = std::max(record.longest_latency, us);
 }
 
 std::string DriveSession::warning() {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,12 +19,16 @@ struct DriveRecord {
   std::int64_t repeated = 0;    ///< statuses no newer than one before: not answered
   std::int64_t overtaken = 0;   ///< statuses with a newer one behind them: not answered
   std::int64_t late = 0;        ///< statuses older than two periods: not answered
+  std::int64_t awaited = 0;     ///< statuses after a pause of the driver: not answered
   std::int64_t lost = 0;        ///< periods without a status between two of them
   std::int64_t stopped = 0;     ///< statuses of a robot that has stopped by itself: not answered
   std::int64_t commands = 0;    ///< sent
   double period = 0;            ///< measured before the start, s
   JointVector external;         ///< greatest external torque of each joint, N m
-  std::vector<std::int32_t> latencies;  ///< from a status's arrival to the command, us
+  /// Commands by the time from a status's arrival to the command, us; the last: longer ones. It
+  /// does not grow, because that would take the loop milliseconds after an hour.
+  std::vector<std::int64_t> latencies = std::vector<std::int64_t>(20'000);
+  double longest_latency = 0;  ///< us
 };
 
 /// The conversation with a driver: for each status at most one command. Refuses to begin unless
@@ -32,7 +37,8 @@ struct DriveRecord {
 /// Before the first command, statuses are watched for 0.3 s. Then the springs start where the robot
 /// is. A status that is repeated, out of order, or older than two periods is not answered; after a
 /// gap longer than watchdog.longest_gap the controller latches a fault. A driver whose robot has
-/// stopped by itself is not answered until it goes on.
+/// stopped by itself is not answered until it goes on, and one that paused for 0.3 s, or whose
+/// clock is not known any more, only after 0.3 s of statuses: it may have been restarted.
 class DriveSession {
  public:
   struct Options {
@@ -46,7 +52,8 @@ class DriveSession {
                LoopJournal& journal, const Options& options);
 
   /// Takes a status that arrived `age` s ago, at the time `utime`, us since 1970-01-01 UTC. Returns
-  /// true if `command` is to be sent. Throws InputError if the conversation must not begin.
+  /// true if `command` is to be sent. Throws InputError if the conversation must not begin, and
+  /// std::runtime_error if it must not go on.
   bool take(const lcmtypes::DriverStatus& status, double age, std::int64_t utime,
             lcmtypes::DriverCommand& command);
   /// Notes a command on the driver's channel. Nothing throws: LCM calls it.
@@ -56,6 +63,12 @@ class DriveSession {
   /// What was sent, so that it is known when it is heard.
   void note_sent(const std::vector<std::uint8_t>& bytes, double latency);
 
+  /// From now on the torque fades, and is zero when it has ended.
+  void end() noexcept { ending_ = true; }
+  bool ended() const noexcept { return ended_; }
+  /// How long the torque fades, s.
+  double fade_time() const noexcept { return 1e-6 * static_cast<double>(fade_); }
+
   bool running() const noexcept { return running_; }
   /// In one line what the user should know at once; "" if there is nothing new.
   std::string warning();
@@ -63,7 +76,9 @@ class DriveSession {
   DriveRecord record;
 
  private:
-  void watch(const lcmtypes::DriverStatus& status);
+  void note_repeated(const lcmtypes::DriverStatus& status);
+  void fade(std::int64_t utime);
+  void watch(const lcmtypes::DriverStatus& status, bool late);
   void begin(const lcmtypes::DriverStatus& status);
   void check_period();
   void check_springs();
@@ -85,6 +100,14 @@ class DriveSession {
   bool moved_ = false;        ///< the measured position has changed since first_position_
   bool recommanded_ = false;  ///< the driver has commanded another position
   JointVector last_position_;
+  std::int64_t measured_at_ = 0;  ///< utime of last_position_
+  std::int64_t repeated_ = 0;     ///< old statuses since the last new one
+  bool restarted_ = false;        ///< the driver's clock was not known while this ran
+  std::int64_t quiet_until_ = 0;  ///< utime of the first status to be answered again
+  bool ending_ = false, ended_ = false;
+  std::int64_t fade_;  ///< us
+  std::optional<std::int64_t> fading_since_;
+  std::int64_t faults_ = 0;  ///< that the user was told of
   JointVector torque_;
   std::deque<std::vector<std::uint8_t>> sent_;  ///< the last ones
   std::string warning_;

@@ -44,7 +44,7 @@ FakeDriver::FakeDriver(const Scene& scene, DriverKind kind) : scene_(scene), kin
   velocity_ = last_torque_ = JointVector::Zero(scene.dof());
 }
 
-void FakeDriver::take(const void* data, std::size_t size, std::int64_t utime, std::int64_t wall) {
+void FakeDriver::take(const void* data, std::size_t size, std::int64_t utime) {
   DriverCommand command;
   const bool iiwa = kind_ == DriverKind::kIiwa;
   if (!decode(kind_, data, size, command)) throw std::runtime_error("a command cannot be read");
@@ -65,7 +65,6 @@ void FakeDriver::take(const void* data, std::size_t size, std::int64_t utime, st
   }
   command_ = command;
   arrived_ = utime;
-  written_ = utime - (wall - command.utime);
   ++commands_;
 }
 
@@ -82,7 +81,7 @@ JointVector FakeDriver::torque(std::int64_t utime) {
     return kHoldStiffness * (*held_ - q) - kHoldDamping * qd;
   }
   JointVector wanted = JointVector::Zero(7);
-  if (command_ && std::abs(utime - written_) <= kExpiry) {
+  if (command_ && std::abs(utime - command_->utime) <= kExpiry) {
     wanted = command_->torque;
   } else {
     ++uncommanded_;

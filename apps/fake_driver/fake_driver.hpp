@@ -30,9 +30,9 @@ class FakeDriver {
   FakeDriver(const Scene& scene, lcmtypes::DriverKind kind);
 
   double period() const noexcept { return scene_.plant.period; }
-  /// Takes a command that arrived at `utime` of the robot's clock and `wall` of the computer's, us.
+  /// Takes a command that arrived at `utime` of the driver's clock, us.
   /// Throws std::runtime_error with what the driver dies of.
-  void take(const void* data, std::size_t size, std::int64_t utime, std::int64_t wall);
+  void take(const void* data, std::size_t size, std::int64_t utime);
   /// Moves the robot by one period, with the time at its end.
   void step(std::int64_t utime);
   /// What the driver reports now.
@@ -53,7 +53,6 @@ class FakeDriver {
   std::optional<sim::Plant> plant_;
   std::optional<lcmtypes::DriverCommand> command_;
   std::int64_t arrived_ = 0;              ///< when the command did, us
-  std::int64_t written_ = 0;              ///< its utime on the clock of the robot, us
   std::int64_t first_ = 0;                ///< utime of the first status
   std::optional<JointVector> held_;       ///< the position that the PD holds
   JointVector last_torque_;               ///< before the plant's low-pass

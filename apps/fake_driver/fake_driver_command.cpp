@@ -43,7 +43,7 @@ struct CommandInbox {
   std::exception_ptr failure;  ///< LCM, which is C, must not see it
   void take(const lcm::ReceiveBuffer* buffer, const std::string&) noexcept {
     try {
-      driver.take(buffer->data, buffer->data_size, now, buffer->recv_utime);
+      driver.take(buffer->data, buffer->data_size, now);
     } catch (...) {
       failure = std::current_exception();
     }

@@ -1,10 +1,7 @@
 // `dashpot drive` with `dashpot fake-driver`: what it answers, what it refuses, and what becomes of
 // a driver's troubles.
 #include <dashpot/lcmtypes/command_t.hpp>
-#include <dashpot/lcmtypes/driver.hpp>
-#include <dashpot/lcmtypes/log_file.hpp>
-#include <dashpot/tests/apps/scene_run.hpp>
-#include <dashpot/tests/threads/live_run.hpp>
+#include <dashpot/tests/threads/drive_arms.hpp>
 
 #include <gmock/gmock.h>
 
@@ -16,38 +13,7 @@
 namespace dashpot::tests {
 namespace {
 
-using lcmtypes::DriverKind;
 using ::testing::HasSubstr;
-
-std::string configuration(const std::string& name) {
-  return std::string(DASHPOT_SOURCE_DIR) + "/controller/examples/" + name + "_drive.yaml";
-}
-
-struct Arm {
-  const char* name;    ///< of its files
-  const char* option;  ///< "--iiwa"
-  DriverKind kind;
-};
-constexpr Arm kIiwa = {"iiwa14", "--iiwa", DriverKind::kIiwa};
-constexpr Arm kPanda = {"panda", "--panda", DriverKind::kPanda};
-
-void PrintTo(const Arm& arm, std::ostream* out) {
-  *out << arm.name;
-}
-
-/// The configuration of an arm, with parts of its text replaced.
-std::string changed_configuration(const Scratch& scratch, const Arm& arm,
-                                  const std::vector<std::pair<std::string, std::string>>& changes) {
-  std::string text = text_of(configuration(arm.name));
-  const auto replace = [&text](const std::string& from, const std::string& to) {
-    const std::size_t at = text.find(from);
-    ASSERT_NE(at, std::string::npos) << from;
-    text.replace(at, from.size(), to);
-  };
-  replace("../../sim", std::string(DASHPOT_SOURCE_DIR) + "/sim");
-  for (const auto& [from, to] : changes) replace(from, to);
-  return scratch.write("drive.yaml", text);
-}
 
 class Drive : public ::testing::TestWithParam<Arm> {
  protected:
@@ -72,7 +38,7 @@ class Drive : public ::testing::TestWithParam<Arm> {
     seen = listener.until([&] { return listener.states > 100; });
     if (!seen) return {};
     // The simulated time of the driver.
-    listener.until([&] { return listener.state.utime == 0 || listener.states > 1200; });
+    listener.until([&] { return listener.state.utime == 0 || listener.states > 6000; });
     state = listener.state;
     driving.send(SIGTERM);
     driving.finish();
@@ -106,17 +72,6 @@ command_t command_for(const state_t& state, std::int32_t parts, std::int64_t seq
   command.null_stiffness.assign(n, 0);
   command.null_damping.assign(n, 0);
   return command;
-}
-
-std::vector<state_t> states_of(const std::string& path) {
-  std::vector<state_t> states;
-  lcmtypes::LogFile log(path);
-  while (log.read()) {
-    if (log.event().channel != lcmtypes::kStateChannel) continue;
-    states.emplace_back();
-    states.back().decode(log.event().data.data(), 0, static_cast<int>(log.event().size));
-  }
-  return states;
 }
 
 TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
@@ -298,7 +253,7 @@ TEST_P(Drive, StopsCommandingWhenSomebodyElseBegins) {
 }
 
 TEST_P(Drive, LatchesAfterAGap) {
-  const Json result = troubled({"--trouble", "stall", "--from", "0.8", "--lasts", "0.1"});
+  const Json result = troubled({"--trouble", "stall", "--from", "3", "--lasts", "0.1"});
   if (!seen) GTEST_SKIP() << "multicast does not work on this machine: " << url;
   EXPECT_EQ(result["faults"], 1);
   EXPECT_EQ(result["fault"]["status"], "gap between states, damping") << result.dump(2);
@@ -307,7 +262,7 @@ TEST_P(Drive, LatchesAfterAGap) {
 
 /// What is sent stays finite: the fake driver dies of anything else.
 TEST_P(Drive, SendsNumbersToADriverThatReportsNone) {
-  const Json result = troubled({"--trouble", "nan", "--from", "0.8", "--lasts", "0.1"});
+  const Json result = troubled({"--trouble", "nan", "--from", "3", "--lasts", "0.1"});
   if (!seen) GTEST_SKIP() << "multicast does not work on this machine: " << url;
   EXPECT_EQ(fake_status, 0) << fake_said;
   EXPECT_GE(result["tick_statuses"]["state not finite, torque ramped down"].get<int>(), 50);
@@ -315,7 +270,7 @@ TEST_P(Drive, SendsNumbersToADriverThatReportsNone) {
 }
 
 TEST_P(Drive, AnswersNoStatusTwice) {
-  const Json result = troubled({"--trouble", "repeat", "--from", "0.8", "--lasts", "0.2"});
+  const Json result = troubled({"--trouble", "repeat", "--from", "3", "--lasts", "0.2"});
   if (!seen) GTEST_SKIP() << "multicast does not work on this machine: " << url;
   EXPECT_GE(result["statuses"]["repeated"].get<int>() + result["statuses"]["overtaken"].get<int>(),
             100);

@@ -1,0 +1,227 @@
+// What `dashpot drive` sends to a driver whose statuses are written by hand: at its end, after a
+// pause, and when statuses are not what they should be.
+#include <dashpot/tests/threads/drive_arms.hpp>
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dashpot::tests {
+namespace {
+
+using controller::JointVector;
+using lcmtypes::DriverCommand;
+using lcmtypes::DriverKind;
+using lcmtypes::DriverStatus;
+using ::testing::HasSubstr;
+
+constexpr double kRate = 500;  // N m/s, of the configurations
+
+/// A driver without an arm: each status is what the test says, and is followed by its answer.
+class StatusWriter {
+ public:
+  StatusWriter(const Arm& arm, const std::string& url)
+      : kind_(arm.kind), bus_(lcmtypes::open_bus(url)) {
+    bus_->subscribe(lcmtypes::profile_of(kind_).command_channel, &StatusWriter::take, this);
+    next.utime = 1'000'000;  // by a clock of its own
+    next.position = next.velocity = JointVector::Zero(7);
+    next.position << 0, -0.8, 0, -2.4, 0, 1.6, 0.8;
+    next.robot_mode = 2;
+  }
+
+  /// The next status, a millisecond after the last one. Returns true if a command came within
+  /// `patience`, ms.
+  bool step(int patience) {
+    next.utime += 1000;
+    return send(next, patience);
+  }
+  bool send(const DriverStatus& status, int patience) {
+    encode(kind_, status, bytes_);
+    bus_->publish(lcmtypes::profile_of(kind_).status_channel, bytes_.data(),
+                  static_cast<unsigned>(bytes_.size()));
+    const std::size_t before = commands.size();
+    const auto end = Clock::now() + std::chrono::milliseconds(patience);
+    while (commands.size() == before && Clock::now() < end) bus_->handleTimeout(1);
+    return commands.size() > before;
+  }
+  /// Statuses at 1 kHz until one is answered; false after ten seconds.
+  bool until_answered() {
+    const auto end = Clock::now() + std::chrono::seconds(10);
+    while (!step(1)) {
+      if (Clock::now() > end) return false;
+    }
+    return true;
+  }
+  /// Statuses that may be answered late, or on a busy machine not at all.
+  void steps(int count) {
+    for (int k = 0; k < count; ++k) step(100);
+  }
+
+  DriverStatus next;
+  std::vector<DriverCommand> commands;
+
+ private:
+  void take(const lcm::ReceiveBuffer* buffer, const std::string&) {
+    commands.emplace_back();
+    if (!decode(kind_, buffer->data, buffer->data_size, commands.back())) commands.pop_back();
+  }
+
+  DriverKind kind_;
+  std::shared_ptr<lcm::LCM> bus_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+class DriveStatuses : public ::testing::TestWithParam<Arm> {
+ protected:
+  void SetUp() override {
+    if (!writer.until_answered()) GTEST_SKIP() << "multicast does not work on this machine";
+  }
+  double greatest_torque() const { return writer.commands.back().torque.cwiseAbs().maxCoeff(); }
+
+  Arm arm = GetParam();
+  std::string url = own_url();
+  Scratch scratch;
+  std::string log = scratch.path("drive.lcm");
+  Running driving{
+      {"drive", configuration(arm.name), arm.option, "--json", "--lcm-url", url, "--log", log}};
+  StatusWriter writer{arm, url};
+};
+
+TEST_P(DriveStatuses, TheTorqueFadesBeforeTheEnd) {
+  for (int k = 0; k < 200; ++k) {  // pushed away slowly: the springs pull
+    writer.next.position[0] += 2e-4;
+    writer.next.velocity[0] = 0.2;
+    writer.step(100);
+  }
+  writer.next.velocity.setZero();
+  writer.steps(200);
+  const double pull = greatest_torque();
+  EXPECT_GT(pull, 1);  // N m
+  writer.commands.clear();
+  driving.send(arm.kind == DriverKind::kIiwa ? SIGTERM : SIGHUP);
+  for (int silent = 0; silent < 20;) silent = writer.step(20) ? 0 : silent + 1;
+  EXPECT_EQ(driving.finish(), 0) << driving.complaints();
+  EXPECT_EQ(Json::parse(driving.output())["ended"], "ended by the user");
+  ASSERT_GT(writer.commands.size(), 50u);
+  double before = pull;
+  std::int64_t then = writer.commands.front().utime - 1000;
+  for (const DriverCommand& command : writer.commands) {
+    const double now = command.torque.cwiseAbs().maxCoeff();
+    EXPECT_LE(now, before + 0.05);
+    EXPECT_LE(std::abs(now - before),
+              kRate * 1e-6 * static_cast<double>(command.utime - then) + 1e-9);
+    before = now;
+    then = command.utime;
+  }
+  EXPECT_EQ(before, 0);  // this is what the driver holds until the command expires
+}
+
+/// The Panda's driver lets a command expire by its own clock.
+TEST_P(DriveStatuses, ACommandHasTheTimeOfItsStatus) {
+  ASSERT_TRUE(writer.until_answered());
+  EXPECT_EQ(writer.commands.back().utime, writer.next.utime);
+}
+
+TEST_P(DriveStatuses, ADriverThatWasRestartedIsNotAnsweredAtOnce) {
+  writer.steps(20);
+  writer.commands.clear();
+  if (arm.kind == DriverKind::kIiwa) {
+    const DriverStatus last = writer.next;
+    writer.next.utime = -1;
+    for (int k = 0; k < 200; ++k) writer.send(writer.next, 1);
+    writer.next.utime = last.utime + 200'000;
+  } else {
+    writer.next.utime += 400'000;
+  }
+  const std::int64_t began = writer.next.utime + 1000;
+  writer.next.position[0] += 0.05;
+  ASSERT_TRUE(writer.until_answered());
+  EXPECT_GE(writer.commands.front().utime - began, 300'000);
+  writer.steps(20);
+  EXPECT_LT(greatest_torque(), 1e-9);  // the springs have ended, and the arm is at rest
+  driving.send(SIGTERM);
+  while (writer.step(20)) {
+  }
+  driving.finish();
+  const Json result = Json::parse(driving.output());
+  EXPECT_EQ(result["fault"]["status"], "gap between states, damping");
+  EXPECT_GE(result["statuses"]["awaited"].get<int>(), 100);
+  EXPECT_THAT(driving.complaints(), HasSubstr("a fault has latched, the arm is damped: gap"));
+}
+
+TEST_P(DriveStatuses, AClockThatGoesBackEndsIt) {
+  writer.steps(20);
+  writer.commands.clear();
+  writer.next.utime -= 900'000;
+  for (int k = 0; k < 2000; ++k) {
+    writer.step(1);
+    if (driving.complaints().find("clock") != std::string::npos) break;
+  }
+  EXPECT_EQ(writer.commands.size(), 0u);
+  EXPECT_EQ(driving.finish(), 1);
+  EXPECT_THAT(driving.complaints(), HasSubstr("the driver's clock has gone back by 0."));
+}
+
+/// Neither is answered nor believed, and the next one is as if there had been none.
+TEST_P(DriveStatuses, OthersThanOfThisArmAreNotAnswered) {
+  writer.steps(20);
+  writer.commands.clear();
+  DriverStatus other = writer.next;
+  other.utime = std::numeric_limits<std::int64_t>::max();
+  EXPECT_FALSE(writer.send(other, 50));
+  for (const int joints : {1, 6, 8, 16}) {
+    other.utime = writer.next.utime + 500;
+    other.position = other.velocity = JointVector::Zero(joints);
+    EXPECT_FALSE(writer.send(other, 50)) << joints;
+  }
+  ASSERT_TRUE(writer.until_answered());
+  EXPECT_EQ(writer.commands.back().torque.size(), 7);
+  driving.send(SIGTERM);
+  while (writer.step(20)) {
+  }
+  EXPECT_EQ(driving.finish(), 0);
+  const Json result = Json::parse(driving.output());
+  EXPECT_EQ(result["statuses"]["unreadable"], 5);
+  EXPECT_EQ(result["faults"], 0);
+}
+
+/// As the iiwa's are differenced here: over the time that has passed since the last position.
+TEST_P(DriveStatuses, VelocitiesAfterPositionsThatAreNoNumbers) {
+  const double velocity = 0.1;  // rad/s
+  const auto move = [&](int count) {
+    for (int k = 0; k < count; ++k) {
+      writer.next.position[0] += 1e-3 * velocity;
+      writer.next.velocity[0] = velocity;
+      writer.step(100);
+    }
+  };
+  move(50);
+  const DriverStatus good = writer.next;
+  for (int k = 0; k < 8; ++k) {
+    writer.next.position.setConstant(std::numeric_limits<double>::quiet_NaN());
+    writer.step(100);
+  }
+  writer.next.position = good.position;
+  writer.next.position[0] += 8e-3 * velocity;
+  move(50);
+  driving.send(SIGTERM);
+  while (writer.step(20)) {
+  }
+  driving.finish();
+  double fastest = 0;
+  for (const state_t& state : states_of(log)) {
+    fastest = std::max(fastest, std::abs(state.joint_velocity[0]));
+  }
+  EXPECT_GT(fastest, 0.9 * velocity);
+  EXPECT_LT(fastest, 1.1 * velocity);
+}
+
+INSTANTIATE_TEST_SUITE_P(Arms, DriveStatuses, ::testing::Values(kIiwa, kPanda),
+                         [](const auto& given) {
+                           return std::string(given.param.option).substr(2);
+                         });
+
+}  // namespace
+}  // namespace dashpot::tests
