@@ -35,7 +35,7 @@ class StatusWriter {
     next.robot_mode = 2;
   }
 
-  /// The next status, a millisecond after the last one. Returns true if a command came within
+  /// The next status, a millisecond after the last one. Returns true if its command came within
   /// `patience`, ms.
   bool step(int patience) {
     next.utime += 1000;
@@ -45,10 +45,12 @@ class StatusWriter {
     encode(kind_, status, bytes_);
     bus_->publish(lcmtypes::profile_of(kind_).status_channel, bytes_.data(),
                   static_cast<unsigned>(bytes_.size()));
-    const std::size_t before = commands.size();
     const auto end = Clock::now() + std::chrono::milliseconds(patience);
-    while (commands.size() == before && Clock::now() < end) bus_->handleTimeout(1);
-    return commands.size() > before;
+    const auto answered = [&] {
+      return !commands.empty() && commands.back().utime == status.utime;
+    };
+    while (!answered() && Clock::now() < end) bus_->handleTimeout(1);
+    return answered();
   }
   /// Statuses at 1 kHz until one is answered; false after ten seconds.
   bool until_answered() {
@@ -57,6 +59,12 @@ class StatusWriter {
       if (Clock::now() > end) return false;
     }
     return true;
+  }
+  /// Forgets the commands, those to come for statuses before too.
+  void forget() {
+    while (bus_->handleTimeout(100) > 0) {
+    }
+    commands.clear();
   }
   /// Statuses that may be answered late, or on a busy machine not at all.
   void steps(int count) {
@@ -103,7 +111,7 @@ TEST_P(DriveStatuses, TheTorqueFadesBeforeTheEnd) {
   writer.steps(200);
   const double pull = greatest_torque();
   EXPECT_GT(pull, 1);  // N m
-  writer.commands.clear();
+  writer.forget();
   driving.send(arm.kind == DriverKind::kIiwa ? SIGTERM : SIGHUP);
   for (int silent = 0; silent < 20;) silent = writer.step(20) ? 0 : silent + 1;
   EXPECT_EQ(driving.finish(), 0) << driving.complaints();
@@ -133,7 +141,7 @@ TEST_P(DriveStatuses, ACommandHasTheTimeOfItsStatus) {
 
 TEST_P(DriveStatuses, ADriverThatWasRestartedIsNotAnsweredAtOnce) {
   writer.steps(20);
-  writer.commands.clear();
+  writer.forget();
   if (arm.kind == DriverKind::kIiwa) {
     const DriverStatus last = writer.next;
     writer.next.utime = -1;
@@ -160,12 +168,13 @@ TEST_P(DriveStatuses, ADriverThatWasRestartedIsNotAnsweredAtOnce) {
 
 TEST_P(DriveStatuses, AClockThatGoesBackEndsIt) {
   writer.steps(20);
-  writer.commands.clear();
+  writer.forget();
   writer.next.utime -= 900'000;
   for (int k = 0; k < 2000; ++k) {
     writer.step(1);
     if (driving.complaints().find("clock") != std::string::npos) break;
   }
+  driving.send(SIGTERM);  // for the case that it goes on
   EXPECT_EQ(writer.commands.size(), 0u);
   EXPECT_EQ(driving.finish(), 1);
   EXPECT_THAT(driving.complaints(), HasSubstr("the driver's clock has gone back by 0."));
@@ -174,7 +183,7 @@ TEST_P(DriveStatuses, AClockThatGoesBackEndsIt) {
 /// Neither is answered nor believed, and the next one is as if there had been none.
 TEST_P(DriveStatuses, OthersThanOfThisArmAreNotAnswered) {
   writer.steps(20);
-  writer.commands.clear();
+  writer.forget();
   DriverStatus other = writer.next;
   other.utime = std::numeric_limits<std::int64_t>::max();
   EXPECT_FALSE(writer.send(other, 50));
