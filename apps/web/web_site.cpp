@@ -65,7 +65,7 @@ HttpAnswer WebSite::response(const std::map<std::string, std::string>& query) {
   if (!frame.state && !frame.modes) return complaint(404, "there is no posture yet");
   const auto& posture = frame.state ? frame.state->joint_position : frame.modes->joint_position;
   const bool joint = frame.state && frame.state->mode == state_t::JOINT;
-  const int mode = joint ? state_t::JOINT : state_t::CARTESIAN;
+  const auto mode = joint ? state_t::JOINT : state_t::CARTESIAN;
   try {
     return json_answer(arm_->response(posture, mode, value_of(query, "at")));
   } catch (const std::invalid_argument& error) {
