@@ -94,7 +94,7 @@ export function drawTicks(canvas, series, now, shown, period) {
   let high = 1;
   for (const v of series.tick) high = Math.max(high, v || 0);
   const over = period && high > 0.5e6 * period ? `, period ${tickText(1e6 * period)} µs` : '';
-  const {toX, toY} = axes(frame, shown, [0, high * 1.1], `tick, µs${over}; strip: status, orange where it is not ok; time, s`);
+  const {toX, toY} = axes(frame, shown, [0, high * 1.1], `tick, µs${over}; strip: status, orange if not ok; time, s`);
   c.save();
   c.beginPath();
   c.rect(kLeft, 0, w - kLeft - kRight, h);
