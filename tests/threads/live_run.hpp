@@ -39,13 +39,18 @@ class Running {
     if (child_ > 0) kill(child_, SIGKILL), waitpid(child_, nullptr, 0);
   }
 
-  void send(int signal) const { kill(child_, signal); }
+  void send(int signal) const {
+    if (child_ > 0) kill(child_, signal);
+  }
+  /// Whether it has ended; its exit status is kept.
+  bool ended(int options = WNOHANG) {
+    if (child_ > 0 && waitpid(child_, &status_, options) == child_) child_ = 0;
+    return child_ == 0;
+  }
   /// Waits for the end; the exit status.
   int finish() {
-    int status = 0;
-    waitpid(child_, &status, 0);
-    child_ = 0;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    ended(0);
+    return WIFEXITED(status_) ? WEXITSTATUS(status_) : 128 + WTERMSIG(status_);
   }
   std::string out() const { return scratch_.path("out"); }
   std::string err() const { return scratch_.path("err"); }
@@ -55,6 +60,7 @@ class Running {
  private:
   Scratch scratch_;
   pid_t child_ = 0;
+  int status_ = 0;
 };
 
 /// What comes over a bus.
