@@ -10,8 +10,10 @@
 namespace dashpot::analysis {
 
 struct IdentifyOptions {
-  int max_order = 0;  ///< of the models tried: eigenvalues; 0: 2 for each channel, within 12 and 32
-  bool refine = true;  ///< on the samples as they are; false: a first estimate, fast
+  /// Of the models tried: eigenvalues. 0: of decays 2 for each channel, within 12 and 32; of
+  /// ambient motion 4 for each channel and 4 more, at most 40.
+  int max_order = 0;
+  bool refine = true;  ///< of decays: on the samples as they are; false: a first estimate, fast
 };
 
 /// A mode that records show. Standard deviations (std) are those of the estimate.
@@ -56,20 +58,40 @@ struct Identification {
 ///
 /// Models of rising order come from the eigensystem realization algorithm (Juang and Pappa 1985) on
 /// means of stretches of samples, all records side by side. Each is refined to the maximum of the
-/// likelihood, and the Bayesian information criterion (Schwarz 1978) chooses among them. The model
-/// chosen is refined on the samples as they are, at the times at which they were taken; what it
-/// leaves over is searched for more. So neither gaps nor uneven time steps matter, and heavily
-/// damped modes are as good as the record allows.
+/// likelihood, with one shape of each mode for all records and a noise of each channel in each
+/// record, and an information criterion (Akaike 1974, with 4 for each parameter) chooses among
+/// them. The model chosen is refined on the samples as they are, at the times at which they were
+/// taken; what it leaves over is searched for more. So neither gaps nor uneven time steps matter,
+/// and heavily damped modes are as good as the record allows.
 ///
 /// The standard deviations are those of maximum likelihood (inverse of Fisher's information, with
-/// the noise that the model leaves over), enlarged where the rest is not white, and where four
-/// records or more differ by more than they say (jackknife).
+/// the noise that the model leaves over), enlarged where the rest is not white, and by what the
+/// next larger model thinks otherwise.
 ///
 /// Throws std::invalid_argument for records without channels, of different channels, with fewer
 /// than 20 samples, with times that do not rise or are not finite, channels that are missing or
 /// constant throughout.
 Identification identify_decays(const std::vector<MotionRecord>& records,
                                const IdentifyOptions& options = {});
+
+/// Identifies the modes of motion under forces that nobody measured: ambient vibration, a hand, a
+/// process. The forces have to be many, small and irregular; what they prefer, as the steps of a
+/// walk, is found as modes too. A steady hum that stands out is taken away and is among the
+/// rejected. A minute or more is needed: errors fall with the square root of the time.
+///
+/// Covariance-driven stochastic subspace identification (Peeters and De Roeck 1999): the
+/// correlations of the channels are sums of decays with the arm's eigenvalues. They are taken of
+/// means of samples, as many as the motion's band allows, without the lag zero, where the sensors'
+/// noise is. The order is the one with which each half of the record says most about the other
+/// half's correlations. The standard deviations are the jackknife's, over 20 parts of the record.
+///
+/// `energy` is a share of the squares of the correlations, `explained` what the model of one half
+/// says about the other, `noise` the sensors' as the differences of samples show it. Gaps are
+/// bridged by straight lines and should be few.
+///
+/// Throws std::invalid_argument as identify_decays, and for records that are too short.
+Identification identify_ambient(const std::vector<MotionRecord>& records,
+                                const IdentifyOptions& options = {});
 
 /// A part of a record in which an arm moves freely.
 struct FreeDecay {

@@ -2,6 +2,7 @@
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/identify/identify_plot.hpp>
 #include <dashpot/apps/identify/identify_writer.hpp>
 #include <dashpot/apps/identify/loop_prediction.hpp>
@@ -21,25 +22,29 @@ using Eigen::Index;
 
 /// Rest positions that are closer belong to one posture, rad or m.
 constexpr double kSamePosture = 0.02;
+/// Shorter parts of ambient motion are left out, s.
+constexpr double kShortest = 10;
+constexpr double kMoment = 0.1;  // s
 
 struct IdentifyCommand {
   std::vector<std::string> files;
   std::string channels, against, calibrate, output, plot;
   std::optional<double> from, to;
   int order = 0;
+  bool ambient = false;
   bool json = false;
 };
 
-/// A decay with what was measured in it.
-struct Decay {
+/// A part of a file with what was measured in it.
+struct Part {
   MotionRecord record;
   Eigen::VectorXd rest;
-  std::size_t report = 0;  ///< its place in IdentifyReport::decays
+  std::size_t report = 0;  ///< its place in IdentifyReport::parts
 };
 
-/// Means of the last tenth.
-Eigen::VectorXd rest_of(const MotionRecord& record) {
-  const Index N = record.time.size(), last = std::max<Index>(1, N / 10);
+/// Means of the last samples.
+Eigen::VectorXd rest_of(const MotionRecord& record, Index last) {
+  const Index N = record.time.size();
   Eigen::VectorXd rest(record.output.rows());
   for (Index c = 0; c < rest.size(); ++c) {
     double sum = 0;
@@ -58,6 +63,7 @@ class Task {
   explicit Task(const IdentifyCommand& command) : command_(command) {}
 
   IdentifyReport run() {
+    report_.ambient = command_.ambient;
     for (const std::string& file : command_.files) {
       try {
         read(file);
@@ -104,37 +110,71 @@ class Task {
           path, std::to_string(last - first) + " samples from --from to --to, need 20 or more");
     }
     const std::string name = std::filesystem::path(path).filename();
+    if (command_.ambient) {
+      add_ambient(all, first, last, file.free, name);
+      return;
+    }
     if (command_.from || command_.to) {  // the user says what is free
-      add({part_of(all, first, last), {}, 0}, name);
+      add(part_of(all, first, last), name);
       return;
     }
     for (const analysis::FreeDecay& found : analysis::find_decays(all, file.free)) {
       const double from = all.time[found.from], to = all.time[std::max(found.from, found.to - 1)];
       if (found.reason.empty()) {
-        add({part_of(all, found.from, found.to), {}, 0}, name);
+        add(part_of(all, found.from, found.to), name);
       } else {
-        report_.decays.push_back({name, from, to, -1, found.reason});
+        report_.parts.push_back({name, from, to, -1, found.reason});
       }
     }
   }
 
-  void add(Decay decay, const std::string& file) {
-    decay.rest = rest_of(decay.record);
-    decay.report = report_.decays.size();
-    const Eigen::VectorXd& time = decay.record.time;
-    report_.decays.push_back({file, time[0], time[time.size() - 1], -1, {}});
-    decays_.push_back(std::move(decay));
+  /// The stretches in which the loop itself moves nothing. A limit that is touched for a moment
+  /// does not end one.
+  void add_ambient(const MotionRecord& all, Index first, Index last, const std::vector<bool>& free,
+                   const std::string& file) {
+    double too_short = 0;  // s
+    const auto take = [&](Index from, Index to) {
+      const double length = all.time[to - 1] - all.time[from];
+      if (length < kShortest) {
+        too_short += length;
+      } else {
+        add(part_of(all, from, to), file);
+      }
+    };
+    Index from = first, to = first;  // of the present stretch
+    for (Index i = first; i < last; ++i) {
+      if (!free.empty() && !free[static_cast<std::size_t>(i)]) continue;
+      if (to > from && all.time[i] - all.time[to - 1] > kMoment) {
+        take(from, to);
+        to = from = i;
+      }
+      if (to == from) from = i;
+      to = i + 1;
+    }
+    if (to > from) take(from, to);
+    if (too_short > 0) {
+      report_.notes.push_back(file + ": " + format_number(too_short, 3) +
+                              " s left out, in stretches shorter than 10 s");
+    }
   }
 
-  /// Decays by posture, most of them first.
+  void add(MotionRecord record, const std::string& file) {
+    const Index N = record.time.size();
+    const Index last = command_.ambient ? N : std::max<Index>(1, N / 10);
+    report_.parts.push_back({file, record.time[0], record.time[N - 1], -1, {}});
+    Eigen::VectorXd rest = rest_of(record, last);
+    parts_.push_back({std::move(record), std::move(rest), report_.parts.size() - 1});
+  }
+
+  /// Parts by posture, most of them first.
   std::vector<std::vector<std::size_t>> by_posture() const {
     std::vector<std::vector<std::size_t>> groups;
     const bool positions =
         report_.channels.front().unit == "rad" || report_.channels.front().unit == "m";
-    for (std::size_t i = 0; i < decays_.size(); ++i) {
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
       const auto near = [&](const std::vector<std::size_t>& group) {
         return !positions ||
-               (decays_[group.front()].rest - decays_[i].rest).cwiseAbs().maxCoeff() < kSamePosture;
+               (parts_[group.front()].rest - parts_[i].rest).cwiseAbs().maxCoeff() < kSamePosture;
       };
       const auto group = std::find_if(groups.begin(), groups.end(), near);
       if (group != groups.end()) {
@@ -149,27 +189,31 @@ class Task {
   }
 
   void identify() {
-    if (decays_.empty())
-      report_.notes.emplace_back("no free decay was found: nothing moves by itself");
+    if (parts_.empty()) {
+      report_.notes.emplace_back(command_.ambient
+                                     ? "no part is long enough"
+                                     : "no free decay was found: nothing moves by itself");
+    }
     analysis::IdentifyOptions options;
     options.max_order = command_.order;
     for (const std::vector<std::size_t>& group : by_posture()) {
       PostureReport posture;
       std::vector<MotionRecord> records;
-      posture.rest = Eigen::VectorXd::Zero(decays_.front().rest.size());
+      posture.rest = Eigen::VectorXd::Zero(parts_.front().rest.size());
       for (const std::size_t i : group) {
-        records.push_back(decays_[i].record);
-        posture.rest += decays_[i].rest / static_cast<double>(group.size());
+        records.push_back(parts_[i].record);
+        posture.rest += parts_[i].rest / static_cast<double>(group.size());
       }
-      posture.decays = static_cast<int>(group.size());
+      posture.parts = static_cast<int>(group.size());
       try {
-        posture.found = analysis::identify_decays(records, options);
+        posture.found = command_.ambient ? analysis::identify_ambient(records, options)
+                                         : analysis::identify_decays(records, options);
       } catch (const std::invalid_argument& error) {
-        for (const std::size_t i : group) report_.decays[decays_[i].report].reason = error.what();
+        for (const std::size_t i : group) report_.parts[parts_[i].report].reason = error.what();
         continue;
       }
       for (const std::size_t i : group) {
-        report_.decays[decays_[i].report].posture = static_cast<int>(report_.postures.size());
+        report_.parts[parts_[i].report].posture = static_cast<int>(report_.postures.size());
       }
       report_.postures.push_back(std::move(posture));
     }
@@ -189,13 +233,14 @@ class Task {
 
   const IdentifyCommand& command_;
   IdentifyReport report_;
-  std::vector<Decay> decays_;
+  std::vector<Part> parts_;
 };
 
 constexpr const char* kHelp =
     R"(FILE is an LCM log of `dashpot run` or `dashpot drive`, or a CSV file with a line of names and
 units ("time [s], q1 [rad], ..."). Several files are one experiment. Free decays, after a push, a
-release or a step, are found unless --from or --to says where one is.
+release or a step, are found unless --from or --to says where one is. With --ambient the motion is
+that of an arm which many small unknown forces shake for a minute or more.
 )";
 
 }  // namespace
@@ -209,14 +254,18 @@ void add_identify(CLI::App& program) {
       ->add_option("--channels", options->channels,
                    "Columns to use, by name; without it all positions, or else all velocities")
       ->option_text("NAME,...");
-  command->add_option("--from", options->from, "Begin of a free decay, s of the file's time")
+  command->add_flag("--ambient", options->ambient,
+                    "The arm is shaken all the time by forces that nobody measured");
+  command
+      ->add_option("--from", options->from,
+                   "Begin of a free decay, or of what is used, s of the file's time")
       ->option_text("S");
   command->add_option("--to", options->to, "End of it, s")->option_text("S");
   command
       ->add_option(
           "--order", options->order,
           "Largest order of the models tried, eigenvalues; 0: 2 for each channel, at least "
-          "12")
+          "12; with --ambient 4 for each channel and 4")
       ->check(CLI::Range(0, 60));
   CLI::Option* against =
       command

@@ -223,7 +223,7 @@ Json posture_json(const PostureReport& posture, bool against) {
     }
   }
   json["rest"] = json_list(posture.rest);
-  json["decays"] = posture.decays;
+  json["parts"] = posture.parts;
   json["order"] = posture.found.order;
   json["noise"] = json_list(posture.found.noise);
   json["whiteness"] = posture.found.whiteness;
@@ -237,24 +237,26 @@ std::string identify_table(const IdentifyReport& report) {
   std::string text;
   for (const std::string& note : report.notes) text += "Note: " + note + "\n";
   std::size_t useful = 0;
-  for (const DecayReport& decay : report.decays) useful += decay.posture >= 0;
-  text += count(useful, "free decay") + " of " + count(report.channels.size(), "channel") + " at " +
+  for (const PartReport& part : report.parts) useful += part.posture >= 0;
+  text += count(useful, report.ambient ? "ambient record" : "free decay") + " of " +
+          count(report.channels.size(), "channel") + " at " +
           count(report.postures.size(), "posture") + "\n";
-  for (const DecayReport& decay : report.decays) {
+  for (const PartReport& part : report.parts) {
     text +=
-        "  " + decay.file + ": " + format_number(decay.from, 6) + " to " +
-        format_number(decay.to, 6) + " s" +
-        (decay.posture >= 0
-             ? (report.postures.size() > 1 ? ", posture " + std::to_string(decay.posture + 1) : "")
-             : ", left out: " + decay.reason) +
+        "  " + part.file + ": " + format_number(part.from, 6) + " to " + format_number(part.to, 6) +
+        " s" +
+        (part.posture >= 0
+             ? (report.postures.size() > 1 ? ", posture " + std::to_string(part.posture + 1) : "")
+             : ", left out: " + part.reason) +
         "\n";
   }
   for (std::size_t k = 0; k < report.postures.size(); ++k) {
     const PostureReport& posture = report.postures[k];
     text += "\n" + (report.postures.size() > 1 ? "Posture " + std::to_string(k + 1) + ": " : "") +
             count(posture.found.modes.size(), "mode") + " from " +
-            count(static_cast<std::size_t>(posture.decays), "decay") + "; the model explains " +
-            format_number(100 * posture.found.explained, 6) + " % of the motion\n" +
+            count(static_cast<std::size_t>(posture.parts), report.ambient ? "record" : "decay") +
+            "; the model explains " + format_number(100 * posture.found.explained, 6) +
+            " % of the " + (report.ambient ? "correlations" : "motion") + "\n" +
             modes_table(posture, report.channels);
     if (!posture.found.rejected.empty()) text += "\n" + rejected_table(posture.found.rejected);
     if (report.against) text += "\n" + against_table(posture);
@@ -271,12 +273,12 @@ std::string identify_json(const IdentifyReport& report) {
     json["channels"].push_back({{"name", channel.name}, {"unit", channel.unit}});
   }
   json["records"] = Json::array();
-  for (const DecayReport& decay : report.decays) {
-    Json entry{{"file", decay.file}, {"from", decay.from}, {"to", decay.to}};
-    if (decay.posture >= 0) {
-      entry["posture"] = decay.posture;
+  for (const PartReport& part : report.parts) {
+    Json entry{{"file", part.file}, {"from", part.from}, {"to", part.to}};
+    if (part.posture >= 0) {
+      entry["posture"] = part.posture;
     } else {
-      entry["reason"] = decay.reason;
+      entry["reason"] = part.reason;
     }
     json["records"].push_back(std::move(entry));
   }

@@ -18,18 +18,18 @@ struct PredictedMode {
   double likeness = 0;  ///< of the shapes, modal assurance criterion, 0 to 1
 };
 
-/// A free decay in one of the files.
-struct DecayReport {
+/// A free decay, or a stretch of ambient motion, in one of the files.
+struct PartReport {
   std::string file;
   double from = 0, to = 0;  ///< s, of the file's time
   int posture = -1;         ///< number of PostureReport; -1: of no use
   std::string reason;       ///< why it is of no use
 };
 
-/// What decays at one posture say.
+/// What the parts at one posture say.
 struct PostureReport {
-  Eigen::VectorXd rest;  ///< means of the channels where the decays end
-  int decays = 0;
+  Eigen::VectorXd rest;  ///< means of the channels where decays end, or of all ambient motion
+  int parts = 0;
   analysis::Identification found;
   std::vector<PredictedMode> predicted;
 };
@@ -59,8 +59,9 @@ struct Calibration {
 
 struct IdentifyReport {
   std::vector<MotionChannel> channels;  ///< those that are used
-  std::vector<DecayReport> decays;
-  std::vector<PostureReport> postures;  ///< by falling number of decays
+  bool ambient = false;
+  std::vector<PartReport> parts;
+  std::vector<PostureReport> postures;  ///< by falling number of parts
   std::vector<std::string> notes;
   bool against = false;
   std::optional<Calibration> calibration;

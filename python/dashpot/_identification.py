@@ -56,14 +56,15 @@ class Identification(Result):
     modes: MeasuredModes
     rejected: MeasuredModes
     """What was found and is not believed, with reasons."""
-    decays: list[tuple[int, float, float]]
-    """The free decays that were used: number of the record, begin and end, s."""
+    parts: list[tuple[int, float, float]]
+    """The parts that were used: number of the record, begin and end, s."""
     noise: Array
     """Of each channel, standard deviation of what the model leaves over."""
     whiteness: float
     """Factor on variances, above 1 where what is left over is not white."""
     explained: float
-    """Share of the squares of the motion that the model explains."""
+    """Share of the squares of the motion that the model explains; with ambient=True of the
+    correlations of one half of the records by the other half's model."""
     order: int
     """Eigenvalues of the model."""
 
@@ -76,17 +77,20 @@ def _measured(found: dict[str, Any], channels: int) -> MeasuredModes:
 
 def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike],
              y: npt.ArrayLike | Sequence[npt.ArrayLike], *, find: bool = True,
-             max_order: int = 0) -> Identification:
-    """Returns the modes of free decays.
+             ambient: bool = False, max_order: int = 0) -> Identification:
+    """Returns the modes that records of motion show: of free decays, or of ambient motion.
 
     `t` has the times (N, s, rising, not necessarily even) and `y` the channels (N x channels, or N
     for one channel) of a record; NaN is a sample that is missing. Lists of such arrays are several
     records at one posture. Free decays, after a push, a release or a step, are found in them;
-    with find=False each record is one. `max_order` bounds the order of the models tried (0: 2 for
-    each channel, at least 12).
+    with find=False each record is one. With ambient=True the records are those of an arm that
+    many small, irregular forces shake, which nobody measured, for a minute or more (covariance-
+    driven stochastic subspace identification, Peeters and De Roeck 1999). `max_order` bounds the
+    order of the models tried (0: 2 for each channel, at least 12; of ambient motion 4 for each
+    channel and 4 more, at most 40).
 
-    Raises Error for arrays of the wrong size, times that do not rise, fewer than 20 samples, and
-    where nothing moves freely.
+    Raises Error for arrays of the wrong size, times that do not rise, fewer than 20 samples, where
+    nothing moves freely, and for ambient motion that is too short.
     """
     many = isinstance(t, (list, tuple)) and len(t) > 0 and np.ndim(t[0]) > 0
     times: list[Any] = list(t) if many else [t]  # type: ignore[arg-type]
@@ -101,7 +105,8 @@ def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike],
         if array.ndim != 2:
             raise Error(f"y: has {array.ndim} dimensions, expected samples x channels")
         values.append(np.ascontiguousarray(array.T))
-    found = _core.identify([to_numbers("t", time, 1) for time in times], values, find, max_order)
+    found = _core.identify([to_numbers("t", time, 1) for time in times], values, find, ambient,
+                           max_order)
     channels = values[0].shape[0]
     return Identification(modes=_measured(found.pop("modes"), channels),
                           rejected=_measured(found.pop("rejected"), channels), **found)

@@ -32,9 +32,10 @@ nb::dict modes_of(const std::vector<MeasuredMode>& modes) {
 
 /// `outputs`: channels x samples each.
 nb::dict identify(const std::vector<Eigen::VectorXd>& times,
-                  const std::vector<Eigen::MatrixXd>& outputs, bool find, int max_order) {
+                  const std::vector<Eigen::MatrixXd>& outputs, bool find, bool ambient,
+                  int max_order) {
   std::vector<MotionRecord> records;
-  std::vector<std::array<double, 3>> decays;  // number of the record, begin and end
+  std::vector<std::array<double, 3>> parts;  // number of the record, begin and end
   Identification found;
   {
     const nb::gil_scoped_release release;
@@ -42,22 +43,23 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
       const MotionRecord record{times[r], outputs[r]};
       analysis::check_records({record});
       std::vector<FreeDecay> pieces{{0, record.time.size(), {}}};
-      if (find) pieces = find_decays(record);
+      if (find && !ambient) pieces = find_decays(record);
       for (const FreeDecay& piece : pieces) {
         if (!piece.reason.empty()) continue;
         records.push_back(part_of(record, piece.from, piece.to));
-        decays.push_back(
+        parts.push_back(
             {static_cast<double>(r), record.time[piece.from], record.time[piece.to - 1]});
       }
     }
     if (records.empty()) throw std::invalid_argument("identify: no free decay was found");
-    found = identify_decays(records, {.max_order = max_order});
+    found = ambient ? identify_ambient(records, {.max_order = max_order})
+                    : identify_decays(records, {.max_order = max_order});
   }
   nb::dict result;
   result["modes"] = modes_of(found.modes);
   result["rejected"] = modes_of(found.rejected);
-  result["decays"] = to_list(decays, [](const std::array<double, 3>& decay) {
-    return nb::make_tuple(static_cast<int>(decay[0]), decay[1], decay[2]);
+  result["parts"] = to_list(parts, [](const std::array<double, 3>& part) {
+    return nb::make_tuple(static_cast<int>(part[0]), part[1], part[2]);
   });
   result["noise"] = to_array(found.noise);
   result["whiteness"] = found.whiteness;
@@ -70,7 +72,7 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
 
 void add_identification(nb::module_& m) {
   m.def("identify", &identify, nb::arg("times"), nb::arg("outputs"), nb::arg("find"),
-        nb::arg("max_order"));
+        nb::arg("ambient"), nb::arg("max_order"));
 }
 
 }  // namespace dashpot::python

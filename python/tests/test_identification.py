@@ -52,8 +52,39 @@ def test_finds_decays_in_a_record():
     still = np.full((500, 2), y[0]) + 1e-5 * rng.standard_normal((500, 2))
     found = dashpot.identify(0.002 * np.arange(1700), np.vstack([still, y]))
     check(found)
-    (record, begin, end), = found.decays
+    (record, begin, end), = found.parts
     assert record == 0 and 0.99 < begin < 1.3 and end > 2
+
+
+def shaken(rng, seconds):
+    """Two oscillators under white forces, 100 Hz."""
+    steps = 100 * seconds
+    y = np.zeros((steps, 2))
+    for w, z, shape in ((9, 0.12, [1, 0.5]), (14, 0.3, [1.5, -3])):
+        A = np.array([[0, 1], [-w * w, -2 * z * w]])
+        values, vectors = np.linalg.eig(A)
+        over = (vectors * np.exp(0.01 * values) @ np.linalg.inv(vectors)).real
+        x, wave = np.zeros(2), np.empty(steps)
+        pushes = rng.standard_normal((steps, 2)) * [0, 0.3]
+        for k in range(steps):
+            x = over @ x + pushes[k]
+            wave[k] = x[0]
+        y += wave[:, np.newaxis] * shape
+    return 0.01 * np.arange(steps), y + 1e-5 * rng.standard_normal(y.shape)
+
+
+def test_finds_the_modes_of_ambient_motion():
+    rng = np.random.default_rng(4)
+    t, y = shaken(rng, 300)
+    found = dashpot.identify(t, y, ambient=True)
+    modes = found.modes
+    assert len(modes) == 2
+    assert np.all(np.abs(modes.natural_frequency - [9, 14]) < 4 * modes.natural_frequency_std)
+    assert np.all(np.abs(modes.damping_ratio - [0.12, 0.3]) < 4 * modes.damping_ratio_std)
+    assert np.all(modes.natural_frequency_std < [0.2, 0.4])
+    assert found.parts == [(0, 0.0, pytest.approx(299.99))]
+    with pytest.raises(dashpot.Error, match="takes a longer record"):
+        dashpot.identify(t[:300], y[:300], ambient=True)
 
 
 @pytest.mark.parametrize("t, y, message", [

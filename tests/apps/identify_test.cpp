@@ -1,6 +1,7 @@
 // `dashpot identify`: what a user sees, and what is refused.
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/released_springs.hpp>
 
 #include <array>
 #include <cmath>
@@ -68,6 +69,60 @@ TEST(Identify, FindsTheDecayInAFile) {
   EXPECT_EQ(table.status, 0);
   EXPECT_THAT(table.out, HasSubstr("1 free decay of 2 channels at 1 posture"));
   EXPECT_THAT(table.out, HasSubstr("q1 + 0.50 q2"));
+}
+
+/// Five minutes of two oscillators, 9 rad/s at 0.12 and 14 rad/s at 0.3, under random pushes at 100
+/// Hz.
+std::string shaken_csv() {
+  std::string text = "time [s],q1 [rad],q2 [rad]\n";
+  testing::Draws draw(3);
+  struct Oscillator {
+    double w, z, x = 0, v = 0;
+    void step(double push) {  // exactly
+      const double t = 0.01, d = w * std::sqrt(1 - z * z), b = (v + z * w * x) / d;
+      const double fade = std::exp(-z * w * t), c = std::cos(d * t), s = std::sin(d * t);
+      const double next = fade * (x * c + b * s);
+      v = fade * ((b * c - x * s) * d) - z * w * next + push;
+      x = next;
+    }
+  };
+  Oscillator first{9, 0.12}, second{14, 0.3};
+  for (int i = 0; i < 30000; ++i) {
+    first.step(0.01 * draw.normal());
+    second.step(0.03 * draw.normal());
+    std::array<char, 200> line{};
+    std::snprintf(line.data(), line.size(), "%.3f,%.9f,%.9f\n", 0.01 * i,
+                  0.3 + first.x + second.x / 2 + 1e-5 * draw.normal(),
+                  first.x / 2 - second.x + 1e-5 * draw.normal());
+    text += line.data();
+  }
+  return text;
+}
+
+TEST(Identify, FindsModesOfAmbientMotion) {
+  const Scratch scratch;
+  const std::string file = scratch.write("shaken.csv", shaken_csv());
+  const Json found = identify({file, "--ambient"});
+  ASSERT_EQ(found["modes"].size(), 2U) << found.dump();
+  const std::array<double, 2> w{9, 14}, z{0.12, 0.3};
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Json& mode = found["modes"][k];
+    const double w_std = mode["natural_frequency_std"], z_std = mode["damping_ratio_std"];
+    EXPECT_LT(std::abs(mode["natural_frequency"].get<double>() - w[k]), 4 * w_std);
+    EXPECT_LT(std::abs(mode["damping_ratio"].get<double>() - z[k]), 4 * z_std);
+    EXPECT_LT(w_std, 0.05 * w[k]);
+    EXPECT_LT(z_std, 0.05);
+  }
+  EXPECT_NEAR(found["rest"][0].get<double>(), 0.3, 0.01);
+  EXPECT_NEAR(found["records"][0]["to"].get<double>(), 299.99, 1e-6);
+  const Outcome part = run_program({"identify", file, "--ambient", "--from", "30", "--to", "290"});
+  EXPECT_EQ(part.status, 0);
+  EXPECT_THAT(part.out, HasSubstr("1 ambient record of 2 channels at 1 posture"));
+  EXPECT_THAT(part.out, HasSubstr("shaken.csv: 30.0000 to 290.000 s"));
+  EXPECT_THAT(part.out, HasSubstr("2 modes from 1 record"));
+  const Outcome none = run_program({"identify", file, "--ambient", "--to", "5"});
+  EXPECT_EQ(none.status, 0);
+  EXPECT_THAT(none.out, HasSubstr("5.00 s left out, in stretches shorter than 10 s"));
 }
 
 TEST(Identify, TakesUnitsAndSeparatorsAsPeopleWriteThem) {

@@ -66,14 +66,20 @@ struct SprungArm {
     for (const auto& mode : spectrum.modes) modes.push_back(mode);
   }
 
-  /// How it moves from `position` at rest, n x samples `period` (s) apart.
-  Eigen::MatrixXd release(const Eigen::VectorXd& position, int samples, double period) const {
-    const Eigen::Index n = position.size();
+  /// d/dt of [q; q'].
+  Eigen::MatrixXd state_matrix() const {
+    const Eigen::Index n = system.mass.rows();
     Eigen::MatrixXd A = Eigen::MatrixXd::Zero(2 * n, 2 * n);
     A.topRightCorner(n, n).setIdentity();
     A.bottomLeftCorner(n, n) = -system.mass.llt().solve(system.stiffness);
     A.bottomRightCorner(n, n) = -system.mass.llt().solve(system.damping);
-    const Eigen::EigenSolver<Eigen::MatrixXd> solver(A);
+    return A;
+  }
+
+  /// How it moves from `position` at rest, n x samples `period` (s) apart.
+  Eigen::MatrixXd release(const Eigen::VectorXd& position, int samples, double period) const {
+    const Eigen::Index n = position.size();
+    const Eigen::EigenSolver<Eigen::MatrixXd> solver(state_matrix());
     Eigen::VectorXcd start = Eigen::VectorXcd::Zero(2 * n);
     start.head(n) = position.cast<analysis::Complex>();
     const Eigen::VectorXcd weights = solver.eigenvectors().lu().solve(start);
@@ -81,6 +87,29 @@ struct SprungArm {
     for (int i = 0; i < samples; ++i) {
       const Eigen::VectorXcd turned = (solver.eigenvalues() * (i * period)).array().exp();
       motion.col(i) = (solver.eigenvectors().topRows(n) * turned.cwiseProduct(weights)).real();
+    }
+    return motion;
+  }
+
+  /// How it moves under random torques that change each `period` (s), whose spread in each joint is
+  /// what turns the joint's inertia at `strength` (rad/s^2): n x samples.
+  Eigen::MatrixXd shake(double strength, int samples, double period, Draws& draw) const {
+    const Eigen::Index n = system.mass.rows();
+    const Eigen::MatrixXd A = state_matrix();
+    const Eigen::EigenSolver<Eigen::MatrixXd> solver(A);
+    const Eigen::VectorXcd over = (solver.eigenvalues() * period).array().exp();
+    const Eigen::MatrixXcd inverse = solver.eigenvectors().inverse();
+    const Eigen::MatrixXd P = (solver.eigenvectors() * over.asDiagonal() * inverse).real();
+    Eigen::MatrixXd B = Eigen::MatrixXd::Zero(2 * n, n);
+    B.bottomRows(n) = system.mass.inverse() * system.mass.diagonal().asDiagonal() * strength;
+    const Eigen::MatrixXd G =
+        A.partialPivLu().solve((P - Eigen::MatrixXd::Identity(2 * n, 2 * n)) * B);
+    Eigen::MatrixXd motion(n, samples);
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(2 * n), torque(n);
+    for (int i = -static_cast<int>(3 / period); i < samples; ++i) {  // 3 s to forget the rest
+      for (double& t : torque) t = draw.normal();
+      x = P * x + G * torque;
+      if (i >= 0) motion.col(i) = x.head(n);
     }
     return motion;
   }
@@ -94,10 +123,9 @@ struct Sensors {
   double jitter = 0;      ///< of the times, relative to the period
 };
 
-inline analysis::MotionRecord sensed(const SprungArm& arm, const Eigen::VectorXd& position,
-                                     int samples, double period, const Sensors& sensors,
-                                     Draws& draw) {
-  const Eigen::MatrixXd motion = arm.release(position, samples, period);
+inline analysis::MotionRecord sensed(const Eigen::MatrixXd& motion, double period,
+                                     const Sensors& sensors, Draws& draw) {
+  const auto samples = static_cast<int>(motion.cols());
   analysis::MotionRecord record{Eigen::VectorXd(samples), motion};
   for (int i = 0; i < samples; ++i) {
     record.time[i] = i * period;
@@ -110,6 +138,12 @@ inline analysis::MotionRecord sensed(const SprungArm& arm, const Eigen::VectorXd
     }
   }
   return record;
+}
+
+inline analysis::MotionRecord sensed(const SprungArm& arm, const Eigen::VectorXd& position,
+                                     int samples, double period, const Sensors& sensors,
+                                     Draws& draw) {
+  return sensed(arm.release(position, samples, period), period, sensors, draw);
 }
 
 }  // namespace dashpot::testing
