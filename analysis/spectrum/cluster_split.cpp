@@ -1,6 +1,7 @@
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/cluster_split.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -10,6 +11,8 @@ namespace {
 constexpr double kEps = std::numeric_limits<double>::epsilon();
 /// A cluster is split into eigenvectors if their matrix has a condition number below this.
 constexpr double kSeparable = 1e4;
+/// Below this the planes of pairs are not looked for.
+constexpr double kWellApart = 100;
 /// Eigenvalues this close together (relative) coincide.
 constexpr double kCoinciding = 1e-13;
 
@@ -56,10 +59,20 @@ bool split_coinciding(const State<N>& small, Complex mean, SplitCluster<N>& spli
   return true;
 }
 
-/// Single eigenvalues; false unless their vectors are well apart.
+/// Sets Lambda from the columns, and returns their condition number.
 template <int N>
-bool split_apart(const State<N>& small, const ComplexStateVector<N>& values,
-                 SplitCluster<N>& split) {
+double condition(const State<N>& small, SplitCluster<N>& split) {
+  const State<N>& W = split.columns;
+  State<N> factor = W, inverse = State<N>::Identity(W.rows(), W.rows());
+  solve_in_place(factor, inverse, std::numeric_limits<double>::min());
+  split.Lambda = inverse * small * W;
+  return W.norm() * inverse.norm();
+}
+
+/// Single eigenvalues; returns the condition number of their vectors.
+template <int N>
+double split_apart(const State<N>& small, const ComplexStateVector<N>& values,
+                   SplitCluster<N>& split) {
   const Eigen::Index size = small.rows();
   State<N>& W = split.columns;
   W.resize(size, size);
@@ -81,10 +94,56 @@ bool split_apart(const State<N>& small, const ComplexStateVector<N>& values,
     if (step == 2) W.col(column + 1) = w.imag();
     column += step;
   }
-  State<N> factor = W, inverse = State<N>::Identity(size, size);
-  solve_in_place(factor, inverse, std::numeric_limits<double>::min());
-  split.Lambda = inverse * small * W;
-  return W.norm() * inverse.norm() < kSeparable;
+  return condition(small, split);
+}
+
+/// Planes of two eigenvalues: conjugate ones, and of the real ones the outermost, the next within,
+/// and so on. Returns the condition number of the planes; infinite if a value is left over. Around
+/// a critically damped frequency a, where (small - a)^2 is small, these are the modes: their planes
+/// are well apart even where the two vectors in each are not.
+template <int N>
+double split_pairs(const State<N>& small, const ComplexStateVector<N>& values, double a,
+                   SplitCluster<N>& split) {
+  const Eigen::Index size = small.rows();
+  StateVector<N> real(size), sum(size), product(size);  // of the values less a
+  Eigen::Index reals = 0, pairs = 0;
+  for (const Complex& value : values) {
+    const double x = value.real() - a;
+    if (value.imag() == 0) {
+      real[reals++] = x;
+    } else {
+      sum[pairs] = 2 * x;
+      product[pairs++] = x * x + value.imag() * value.imag();
+    }
+  }
+  if (reals % 2 != 0) return std::numeric_limits<double>::infinity();
+  std::sort(real.data(), real.data() + reals);
+  for (Eigen::Index i = 0; 2 * i < reals; ++i) {
+    sum[pairs] = real[i] + real[reals - 1 - i];
+    product[pairs++] = real[i] * real[reals - 1 - i];
+  }
+  State<N> J = small;
+  J.diagonal().array() -= a;
+  const State<N> J2 = J * J;
+  split.columns.resize(size, size);
+  split.blocks.clear();
+  for (Eigen::Index k = 0; k < pairs; ++k) {
+    State<N> plane(size, 2);
+    for (Eigen::Index i = 0; i < size; ++i) {
+      const auto angle = static_cast<double>((i + 1) * (2 * k + 3));  // any start
+      plane.row(i) << std::cos(angle), std::sin(angle);
+    }
+    for (int step = 0; step < 3; ++step) {
+      State<N> shifted = J2 - sum[k] * J;
+      shifted.diagonal().array() += product[k];
+      const double least_pivot = kEps * shifted.norm();
+      solve_in_place(shifted, plane, least_pivot);
+      orthonormalize(plane);
+    }
+    split.columns.middleCols(2 * k, 2) = plane;
+  }
+  add_blocks(2, split);
+  return condition(small, split);
 }
 
 }  // namespace
@@ -122,7 +181,13 @@ template <int N>
 SplitCluster<N> split_cluster(const State<N>& small, const ComplexStateVector<N>& values,
                               Complex mean) noexcept {
   SplitCluster<N> split;
-  if (split_coinciding<N>(small, mean, split) || split_apart<N>(small, values, split)) return split;
+  if (split_coinciding<N>(small, mean, split)) return split;
+  const double apart = split_apart<N>(small, values, split);
+  if (apart < kWellApart) return split;
+  SplitCluster<N> planes;
+  const double paired = split_pairs<N>(small, values, mean.real(), planes);
+  if (paired < apart && paired < kSeparable) return planes;
+  if (apart < kSeparable) return split;
   split.columns.setIdentity(small.rows(), small.cols());
   split.Lambda = small;
   split.blocks.clear();

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -9,8 +10,9 @@ namespace dashpot::analysis {
 namespace {
 
 constexpr double kEps = std::numeric_limits<double>::epsilon();
-/// Undamped frequencies whose squares differ by less than this (relative) are rotated together.
-constexpr double kEqualFrequency = 1e-10;
+/// Undamped frequencies are equal, and rotated together, if their squares differ by no more than
+/// rounding errors, and these are within limits (relative).
+constexpr double kLeastEqual = 1e-13, kMostEqual = 1e-10;
 
 /// Replaces coordinates [first, first + size) by their combinations with the columns of R.
 template <int N>
@@ -27,12 +29,13 @@ void rotate(Eigen::Index first, const Square<N>& R, ZeroModes<N>& zero_modes, En
 template <int N>
 void rotate_equal_frequencies(ZeroModes<N>& zero_modes, EnergyForm<N>& form) {
   const auto& kappa = zero_modes.stiffness_values;
+  const double largest = form.modes > 0 ? std::abs(kappa[0]) : 0;
+  const double rounding = 8 * static_cast<double>(kappa.size()) * kEps * largest;
   for (Eigen::Index first = 0; first < form.modes;) {
     Eigen::Index end = first + 1;
-    while (end < form.modes &&
-           std::abs(kappa[end] - kappa[end - 1]) <= kEqualFrequency * std::abs(kappa[first])) {
-      ++end;
-    }
+    const double size = std::abs(kappa[first]);
+    const double equal = std::clamp(rounding, kLeastEqual * size, kMostEqual * size);
+    while (end < form.modes && std::abs(kappa[end] - kappa[end - 1]) <= equal) ++end;
     if (end - first > 1) {
       const Square<N> block = form.damping.block(first, first, end - first, end - first);
       const Eigen::SelfAdjointEigenSolver<Square<N>> eigen(block);

@@ -1,12 +1,16 @@
 // Many modes near critical damping at one frequency: how impedance controllers are often tuned, and
 // the hardest clusters of eigenvalues there are, since each mode is nearly defective by itself.
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/tests/support/quad_spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
 #include <random>
+#include <vector>
 
 namespace dashpot::analysis {
 namespace {
@@ -37,6 +41,43 @@ TEST(NearCriticalCluster, IsSolvedHoweverWeaklyItsModesAreCoupled) {
             EXPECT_LT(modulus(value + 1.0), 10 * std::sqrt(coupling) + 1e-5);
           }
           EXPECT_LT(mode.backward_error, 1e-11);
+        }
+      }
+    }
+  }
+}
+
+/// Its modes are a root of the coupling apart, far more than the bounds.
+TEST(NearCriticalCluster, HasABoundForEachMode) {
+  constexpr unsigned kSeed = 7002;
+  SCOPED_TRACE("seed " + std::to_string(kSeed));
+  RecordProperty("seed", kSeed);
+  std::mt19937_64 generator(kSeed);
+  for (const double coupling : {1e-11, 1e-10, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3}) {
+    for (Eigen::Index n = 2; n <= 7; ++n) {
+      SCOPED_TRACE("coupling " + std::to_string(coupling) + ", n " + std::to_string(n));
+      System<> system(n);
+      system.damping = 2 * system.mass + coupling * symmetric_noise(n, generator);
+      system.stiffness = system.mass + coupling * symmetric_noise(n, generator);
+      const Spectrum<> spectrum = analyze(system);
+      ASSERT_EQ(spectrum.modes.size(), n);
+      std::vector<testing::QuadComplex> truth;
+      for (const Mode<>& mode : spectrum.modes) {
+        EXPECT_LT(mode.error_bound, 0.03 * std::sqrt(coupling));
+        EXPECT_NE(mode.kind, ModeKind::kCritical);
+        for (const Complex& value : mode.eigenvalues) {
+          const double step = 1e-12 * static_cast<double>(truth.size() + 1);
+          truth.push_back(testing::to_quad(value + Complex(step, 0.7 * step)));
+        }
+      }
+      truth = testing::refine_eigenvalues(system, truth);
+      for (const Mode<>& mode : spectrum.modes) {
+        for (const Complex& value : mode.eigenvalues) {
+          testing::Quad nearest = 1;
+          for (const testing::QuadComplex& true_one : truth) {
+            nearest = std::min(nearest, (true_one - testing::to_quad(value)).norm());
+          }
+          EXPECT_LE(std::sqrt(static_cast<double>(nearest)), mode.error_bound);
         }
       }
     }
