@@ -55,7 +55,7 @@ inline const std::vector<Room>& rooms() {
       {"analysis/identification",
        4,
        {"identification", "motion_record", "mode_identification"},
-       {kEigen}},
+       {kEigen, "unsupported/Eigen/FFT"}},
       {"analysis/design",
        5,
        {"damping_target", "damping_design", "damping_region", "damping_sampled", "ratio_damping"},
