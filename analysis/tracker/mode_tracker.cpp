@@ -16,6 +16,11 @@ namespace {
 constexpr double kLastStep = 1e-7;
 /// Below this, nothing but rounding errors is left to improve.
 constexpr double kConverged = 1e-9;
+/// Steps this small that do not get smaller are rounding errors: modes near each other can be told
+/// apart no better.
+constexpr double kStalled = 1e-3;
+/// What is worse then is solved directly.
+constexpr double kStalledBound = 1e-6;
 /// Relative bound from which on the slow eigenvalue of a mode is buried by a fast one, and the
 /// ratio from which on the two are far apart.
 constexpr double kBuried = 1e-6, kFarApart = 1e-6;
@@ -181,6 +186,7 @@ bool ModeTracker::follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Wo
 
 /// Newton's method from the basis as it is, until its modes can be published.
 bool ModeTracker::refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept {
+  double last_size = 1;
   for (int iteration = 1; iteration <= options_.max_iterations; ++iteration) {
     if (!work.take(iteration_work(basis_))) return false;
     ++counters_.iterations;
@@ -188,11 +194,13 @@ bool ModeTracker::refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Wo
     double size = 0;
     const CloseBlocks close = newton_step(basis_, residual_, enclosure_.roundoff_bound, E_, size);
     if (!(size < 1)) return false;
+    const bool stalled = size < kStalled && size > last_size / 2;
+    last_size = size;
     bool good = false;
-    if (!close && size <= kLastStep && work.take(publishing_work(pencil.joints))) {
+    if (!close && (size <= kLastStep || stalled) && work.take(publishing_work(pencil.joints))) {
       enclose(pencil, basis_, residual_, enclosure_);
       read_numbers(basis_, enclosure_, options_.soft_frequency, soft_, out);
-      const bool converged = size <= kConverged;
+      const bool converged = size <= kConverged || (stalled && worst_bound(out) <= kStalledBound);
       const bool buried =
           std::any_of(out.modes.begin(), out.modes.begin() + out.mode_count,
                       [this](const auto& m) { return is_buried(m, options_.soft_frequency); });

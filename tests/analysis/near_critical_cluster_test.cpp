@@ -1,5 +1,6 @@
 // Many modes near critical damping at one frequency: how impedance controllers are often tuned, and
 // the hardest clusters of eigenvalues there are, since each mode is nearly defective by itself.
+#include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/quad_spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -80,6 +81,35 @@ TEST(NearCriticalCluster, HasABoundForEachMode) {
           EXPECT_LE(std::sqrt(static_cast<double>(nearest)), mode.error_bound);
         }
       }
+    }
+  }
+}
+
+/// What changes is far below what Newton's method can tell apart in the basis.
+TEST(NearCriticalCluster, IsFollowed) {
+  constexpr unsigned kSeed = 7003;
+  SCOPED_TRACE("seed " + std::to_string(kSeed));
+  RecordProperty("seed", kSeed);
+  std::mt19937_64 generator(kSeed);
+  for (const double coupling : {1e-9, 1e-8, 1e-7, 1e-6, 1e-4}) {
+    for (Eigen::Index n = 2; n <= 7; ++n) {
+      SCOPED_TRACE("coupling " + std::to_string(coupling) + ", n " + std::to_string(n));
+      const Eigen::MatrixXd C1 = symmetric_noise(n, generator), C2 = symmetric_noise(n, generator);
+      const Eigen::MatrixXd K1 = symmetric_noise(n, generator), K2 = symmetric_noise(n, generator);
+      ModeTracker tracker;
+      TrackedSpectrum spectrum;
+      for (int k = 0; k < 200; ++k) {
+        const double c = std::cos(1e-3 * k), s = std::sin(1e-3 * k);
+        System<kMaxDof> system(n);
+        system.damping = 2 * system.mass + coupling * (c * C1 + s * C2);
+        system.stiffness = system.mass + coupling * (c * K1 + s * K2);
+        ASSERT_EQ(tracker.update(system, spectrum), Status::kOk);
+        for (int i = 0; i < spectrum.mode_count; ++i) {
+          EXPECT_LT(spectrum.modes[static_cast<std::size_t>(i)].error_bound,
+                    0.1 * std::sqrt(coupling));
+        }
+      }
+      EXPECT_LE(tracker.counters().direct, 3);
     }
   }
 }
