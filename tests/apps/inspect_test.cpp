@@ -71,7 +71,7 @@ void expect_matches(const Json& result, const controller::DynamicsResult& expect
 }
 
 TEST(Inspect, PrintsWhatKdlComputesForEachArm) {
-  for (const auto& arm : dashpot::testing::arms()) {
+  for (const auto& arm : dashpot::testing::all_arms()) {
     SCOPED_TRACE(arm.file);
     const controller::RobotModel model = dashpot::testing::arm_model(arm);
     const bool six = model.dof() == 6;

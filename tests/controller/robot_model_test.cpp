@@ -69,8 +69,8 @@ TEST(RobotModel, GivesAContinuousJointNoLimits) {
   EXPECT_EQ(joint.effort, kInfinity);
 }
 
-TEST(RobotModel, ReadsAllFourArms) {
-  for (const auto& arm : testing::arms()) {
+TEST(RobotModel, ReadsEveryArm) {
+  for (const auto& arm : testing::all_arms()) {
     EXPECT_EQ(testing::arm_model(arm).dof(), std::string(arm.file) == "ur5" ? 6 : 7) << arm.file;
   }
 }

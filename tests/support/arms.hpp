@@ -1,5 +1,5 @@
 #pragma once
-// The four arms of sim/models.
+// The arms of sim/models.
 
 #include <dashpot/controller/robot_model.hpp>
 
@@ -14,6 +14,7 @@ struct Arm {
   const char* tip;
 };
 
+/// The four on which most tests are run.
 inline const std::vector<Arm>& arms() {
   static const std::vector<Arm> all = {
       {"panda", "panda_link0", "panda_hand_tcp"},
@@ -21,6 +22,16 @@ inline const std::vector<Arm>& arms() {
       {"ur5", "base_link", "ee_link"},
       {"baxter_left", "left_arm_mount", "left_gripper"},
   };
+  return all;
+}
+
+/// These and the others, for tests of the models themselves.
+inline std::vector<Arm> all_arms() {
+  std::vector<Arm> all = arms();
+  all.insert(all.end(), {{"iiwa7", "iiwa_link_0", "iiwa_link_ee_kuka"},
+                         {"fr3", "fr3_link0", "fr3_hand_tcp"},
+                         {"gen3", "base_link", "end_effector_link"},
+                         {"xarm7", "link_base", "link_eef"}});
   return all;
 }
 

@@ -26,6 +26,8 @@ struct Arm {
 };
 inline constexpr Arm kIiwa = {"iiwa14", "--iiwa", lcmtypes::DriverKind::kIiwa};
 inline constexpr Arm kPanda = {"panda", "--panda", lcmtypes::DriverKind::kPanda};
+inline constexpr Arm kIiwa7 = {"iiwa7", "--iiwa", lcmtypes::DriverKind::kIiwa};
+inline constexpr Arm kFr3 = {"fr3", "--panda", lcmtypes::DriverKind::kPanda};
 
 inline void PrintTo(const Arm& arm, std::ostream* out) {
   *out << arm.name;

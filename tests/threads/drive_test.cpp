@@ -47,6 +47,8 @@ class Drive : public ::testing::TestWithParam<Arm> {
     fake_said = fake.complaints();
     return Json::parse(driving.output());
   }
+  /// Holds the arm, and moves it where it is told.
+  void hold_and_move();
 
   Arm arm = GetParam();
   std::string url = own_url();
@@ -74,7 +76,7 @@ command_t command_for(const state_t& state, std::int32_t parts, std::int64_t seq
   return command;
 }
 
-TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
+void Drive::hold_and_move() {
   const Scratch scratch;
   const std::string config = changed_configuration(
       scratch, arm, {{"analysis:", "commands: {silence: 30 s, oldest: 20 s}\nanalysis:"}});
@@ -125,6 +127,18 @@ TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
   EXPECT_EQ(pushed[1].joint_position[0], pushed->joint_position[0]);
   EXPECT_NE(pushed[2].joint_position[0], pushed->joint_position[0]);
 }
+
+TEST_P(Drive, HoldsTheArmAndMovesItWhereItIsTold) {
+  hold_and_move();
+}
+
+/// Other arms behind the same drivers.
+class DriveToo : public Drive {};
+TEST_P(DriveToo, HoldsTheArmAndMovesItWhereItIsTold) {
+  hold_and_move();
+}
+INSTANTIATE_TEST_SUITE_P(Arms, DriveToo, ::testing::Values(kIiwa7, kFr3),
+                         [](const auto& given) { return std::string(given.param.name); });
 
 TEST_P(Drive, CommandsNothingInADryRun) {
   Listener listener(url);
