@@ -18,6 +18,8 @@ using Eigen::VectorXd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kFewest = 0.8;  // share of the parts that must have a mode
+/// Of 20 parts: Student's 95 % quantile over that of the normal distribution.
+constexpr double kStudent = 2.09 / 1.96;
 
 /// The motion of each pole at all lags: rows are channels by lags, a pair has two columns.
 MatrixXd columns_of(const std::vector<RealizedPole>& poles, Index channels, Index lags,
@@ -62,17 +64,13 @@ double left_over(const Realization& model, int order, const Correlations& own,
   return sum;
 }
 
-Realization realize(const Correlations& correlations, double step) {
-  const Index channels = correlations[0].rows();
-  return {correlations, step, channels, correlations[0].cols() / 2 * channels};
-}
-
 /// The order with which each half of the segments says most about the other; `left` gets the share
 /// of the squares that it does not say.
 int order_of(const AmbientCorrelations& data, int largest, double& left) {
   const Correlations even = data.mean([](std::size_t s) { return s % 2 == 0; });
   const Correlations odd = data.mean([](std::size_t s) { return s % 2 == 1; });
-  const Realization of_even = realize(even, data.step), of_odd = realize(odd, data.step);
+  const Realization of_even(even, data.step, data.delays);
+  const Realization of_odd(odd, data.step, data.delays);
   const Index lags = even[0].cols();
   const double all = squares(even, 0, lags) + squares(odd, 0, lags);
   int best = 1;
@@ -92,7 +90,7 @@ double jackknife(const std::vector<double>& values) {
   const auto count = static_cast<double>(values.size());
   for (const double value : values) mean += value / count;
   for (const double value : values) sum += (value - mean) * (value - mean);
-  return std::sqrt((count - 1) / count * sum);
+  return kStudent * std::sqrt((count - 1) / count * sum);
 }
 
 /// A mode of a pole, with the deviations that the poles without each segment show.
@@ -152,7 +150,7 @@ Identification identify_ambient(const std::vector<MotionRecord>& records,
   result.explained = 1 - left;
 
   const Correlations all = data.mean([](std::size_t) { return true; });
-  const Realization model = realize(all, data.step);
+  const Realization model(all, data.step, data.delays);
   std::vector<std::vector<RealizedPole>> by_order;
   for (int order = 1; order <= std::min(largest, model.max_order()); ++order) {
     by_order.push_back(model.poles(order));
@@ -161,7 +159,8 @@ Identification identify_ambient(const std::vector<MotionRecord>& records,
   std::vector<std::vector<RealizedPole>> without;
   for (std::size_t s = 0; s < data.parts.size(); ++s) {
     without.push_back(
-        realize(data.mean([s](std::size_t k) { return k != s; }), data.step).poles(result.order));
+        Realization(data.mean([s](std::size_t k) { return k != s; }), data.step, data.delays)
+            .poles(result.order));
   }
 
   const auto& poles = by_order[static_cast<std::size_t>(result.order) - 1];

@@ -20,7 +20,7 @@ using Eigen::VectorXd;
 
 constexpr Index kParts = 20;         // the standard deviations are theirs
 constexpr Index kMostRows = 300;     // of the Hankel matrix
-constexpr Index kMostLags = 200;     // correlations looked at
+constexpr Index kMostLags = 600;     // correlations looked at
 constexpr double kVelocity = 0.98;   // share of the velocities' squares within the band
 constexpr double kCellsPerHalf = 3;  // cells in half a period of the end of the band
 constexpr double kAudible = 2.5;     // standard errors of a correlation that is used
@@ -73,6 +73,23 @@ MatrixXd cells_of(const MatrixXd& grid, Index cell, const VectorXd& sizes) {
   }
   const VectorXd mean = cells.rowwise().mean();
   return sizes.cwiseInverse().asDiagonal() * (cells.colwise() - mean);
+}
+
+/// At most `count` rising delays below `reach`: all, or half of them dense, for what is fast, and
+/// pairs ever further apart.
+std::vector<Index> delays_to(Index reach, Index count) {
+  const Index dense = reach > count ? count / 2 : reach, pairs = (count - dense) / 2;
+  std::vector<Index> delays;
+  for (Index k = 0; k < dense; ++k) delays.push_back(k);
+  if (dense == reach) return delays;
+  const double growth = static_cast<double>(reach - 1) / static_cast<double>(dense);
+  for (Index k = 1; k <= pairs; ++k) {
+    const double share = static_cast<double>(k) / static_cast<double>(pairs);
+    const auto far = static_cast<Index>(static_cast<double>(dense) * std::pow(growth, share));
+    delays.push_back(std::max(delays.back() + 1, far - 1));
+    delays.push_back(delays.back() + 1);
+  }
+  return delays;
 }
 
 Correlations correlations_of(const MatrixXd& cells, Index lags) {
@@ -152,8 +169,9 @@ void AmbientCorrelations::shorten(Index lags) {
     for (const MatrixXd& m : spread) error += m.col(k).sum() / (count * (count - 1));
     if (squares(all, k, 1) > kAudible * kAudible * error) last = k;
   }
-  const Index channels = all[0].rows();
-  const Index used = 2 * std::max<Index>(4, std::min({(last + 1) / 2, kMostRows / channels}));
+  delays =
+      delays_to(std::max<Index>(4, (last + 1) / 2), std::max<Index>(8, kMostRows / all[0].rows()));
+  const Index used = 2 * delays.back() + 1;
   for (Correlations& part : parts) {
     for (MatrixXd& m : part) m.conservativeResize(Eigen::NoChange, std::min(lags, used));
   }

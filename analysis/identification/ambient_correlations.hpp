@@ -34,11 +34,12 @@ class AmbientCorrelations {
   }
 
   std::vector<Correlations> parts;
-  Eigen::VectorXd sizes;         ///< of the channels, in units of which the correlations are
-  Eigen::VectorXd noise;         ///< of the channels' samples
-  double step = 0;               ///< between lags, s
-  double duration = 0;           ///< of the longest record, s
-  std::vector<SteadyLine> hums;  ///< taken away from the records before
+  Eigen::VectorXd sizes;             ///< of the channels, in units of which the correlations are
+  Eigen::VectorXd noise;             ///< of the channels' samples
+  double step = 0;                   ///< between lags, s
+  std::vector<Eigen::Index> delays;  ///< of the rows and columns of their Hankel matrix, steps
+  double duration = 0;               ///< of the longest record, s
+  std::vector<SteadyLine> hums;      ///< taken away from the records before
 
  private:
   void shorten(Eigen::Index lags);

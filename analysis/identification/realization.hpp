@@ -19,17 +19,24 @@ struct RealizedPole {
 class Realization {
  public:
   /// `sequences`: rows x samples each, evenly spaced by `step` (s). The first `channels` rows give
-  /// the shapes. The Hankel matrix gets at most `max_rows` rows.
+  /// the shapes. The Hankel matrix gets at most `max_rows` rows, and all samples.
   Realization(const std::vector<Eigen::MatrixXd>& sequences, double step, Eigen::Index channels,
               Eigen::Index max_rows);
+  /// The block of the Hankel matrix in row i and column j is the sample `delays[i] + delays[j]`, of
+  /// rising delays, of which some follow each other.
+  Realization(const std::vector<Eigen::MatrixXd>& sequences, double step,
+              const std::vector<Eigen::Index>& delays);
 
   int max_order() const { return static_cast<int>(basis_.cols()); }
   /// Without those that no sum of decays has: eigenvalues of A that are negative or zero.
   std::vector<RealizedPole> poles(int order) const;
 
  private:
+  void take_basis(Eigen::MatrixXd hankel);  // transposed
+
   double step_;
   Eigen::Index channels_, block_;
+  std::vector<Eigen::Index> delays_;  ///< of the blocks of rows
   Eigen::MatrixXd basis_;  ///< singular vectors times roots of singular values, rows x orders
 };
 
