@@ -12,12 +12,21 @@ void draw_identification(const std::string& path, const IdentifyReport& report) 
   if (report.postures.empty()) throw std::runtime_error("--plot: there is nothing to draw");
   const PostureReport& posture = report.postures.front();
   constexpr double kHertz = 1 / (2 * std::numbers::pi);
-  double most = 1;
+  // What was measured fills the picture; what is predicted far from it is left out.
+  double most = 0, largest_ratio = 1;
   for (const analysis::MeasuredMode& mode : posture.found.modes) {
-    most = std::max(most, 1.5 * kHertz * mode.natural_frequency);
+    most = std::max(most, 2 * kHertz * mode.natural_frequency);
   }
   for (const PredictedMode& mode : posture.predicted) {
-    most = std::max(most, 1.2 * kHertz * mode.natural_frequency);
+    if (posture.found.modes.empty()) most = std::max(most, 1.2 * kHertz * mode.natural_frequency);
+  }
+  if (most == 0) most = 10;
+  for (const analysis::MeasuredMode& mode : posture.found.modes) {
+    largest_ratio = std::max(largest_ratio, 1.1 * mode.damping_ratio);
+  }
+  for (const PredictedMode& mode : posture.predicted) {
+    if (kHertz * mode.natural_frequency > most) continue;
+    largest_ratio = std::max(largest_ratio, 1.1 * mode.damping_ratio);
   }
   std::ostringstream out;
   out << plot_heading(path, 900, 800) << "set multiplot layout 2,1\nset xrange [0:" << most
@@ -51,7 +60,8 @@ void draw_identification(const std::string& path, const IdentifyReport& report) 
       << "plot $all using 1:2 with points pt 6 ps 0.6 lc rgb '#999999' title 'pole', "
       << "$stable using 1:2 with points pt 7 ps 0.7 lc rgb '#1f77b4' title 'stable', "
       << "1/0 with lines lc rgb '#bbbbbb' title 'mode'\n"
-      << "set xlabel 'natural frequency, Hz'\nset ylabel 'damping ratio'\nset yrange [0:*]\n"
+      << "set xlabel 'natural frequency, Hz'\nset ylabel 'damping ratio'\nset yrange [0:"
+      << largest_ratio << "]\n"
       << "plot $measured using 1:2:3:4 with xyerrorbars pt 7 ps 0.7 lw 1.5 lc rgb '#1f77b4' title "
          "'measured, 95 %'";
   if (report.against) {

@@ -145,15 +145,18 @@ TEST(IdentifyDecays, RejectsSumsOfEigenvaluesAsNoModes) {
   EXPECT_GE(sums, 1);
 }
 
-TEST(IdentifyDecays, FindsTheModesOfArms) {
-  for (std::size_t which = 0; which < 4; ++which) {
+/// Three releases of each of the first `count` arms, whose motion `sense` (of arm, position and
+/// draws) records.
+template <typename Sense>
+void expect_modes_of_arms(std::size_t count, const Sense& sense) {
+  for (std::size_t which = 0; which < count; ++which) {
     Draws draw(20 + which);
     const SprungArm arm(which, draw, 0.05, 0.4);
     std::vector<MotionRecord> records;
     for (int r = 0; r < 3; ++r) {
       VectorXd start(arm.system.mass.rows());
       for (double& q : start) q = 0.02 * draw.normal();
-      records.push_back(sensed(arm, start, 1500, 0.001, {}, draw));
+      records.push_back(sense(arm, start, draw));
     }
     const Identification found = identify_decays(records);
     for (const Mode<>& mode : arm.modes) {
@@ -167,6 +170,24 @@ TEST(IdentifyDecays, FindsTheModesOfArms) {
     }
     EXPECT_EQ(static_cast<int>(found.modes.size()), static_cast<int>(arm.modes.size()));
   }
+}
+
+TEST(IdentifyDecays, FindsTheModesOfArms) {
+  expect_modes_of_arms(4, [](const SprungArm& arm, const VectorXd& start, Draws& draw) {
+    return sensed(arm, start, 1500, 0.001, {}, draw);
+  });
+}
+
+TEST(IdentifyDecays, FindsTheModesOfArmsInTorquesOfTwelveBits) {
+  expect_modes_of_arms(1, [](const SprungArm& arm, const VectorXd& start, Draws& draw) {
+    VectorXd limits = VectorXd::Constant(start.size(), 87);  // N m
+    limits.tail(3).setConstant(12);
+    testing::Sensors bits;
+    bits.noise = 0;
+    bits.resolution = 1.0 / 2048;  // of the limits
+    const Eigen::MatrixXd torque = arm.system.stiffness * arm.release(start, 1500, 0.001);
+    return sensed(limits.cwiseInverse().asDiagonal() * torque, 0.001, bits, draw);
+  });
 }
 
 TEST(IdentifyDecays, RefusesWhatIsNoRecord) {
