@@ -18,6 +18,7 @@ enum class ModeKind {
   kUnstable,     ///< an eigenvalue with positive real part, beyond its error bound
   kSoft,         ///< below SpectrumOptions::soft_frequency, or no frequency because an eigenvalue
                  ///< cannot be told from zero: its damping ratio means nothing
+  kAlternating,  ///< of a sampled loop: it changes its sign with every tick
 };
 
 /// Returns "underdamped", "critical", ...

@@ -19,8 +19,7 @@ namespace dashpot::analysis {
 ///
 /// `spectrum` has to be the spectrum of `system`. Each of its modes gets the z nearest to its
 /// eigenvalues, moved by the loop's delays to first order, nearest pairs first. That is meaningful
-/// while omega T stays well below 1. A z that is real and negative counts as one with an imaginary
-/// part of pi / T.
+/// while omega T stays well below 1.
 ///
 /// Call it at a lower rate than the tick's, because it allocates, and solves one dense eigenproblem
 /// of up to (4 + d) n rows. Throws std::invalid_argument for matrices of other sizes or entries

@@ -113,7 +113,8 @@ enum {
   DASHPOT_OVERDAMPED = 2,
   DASHPOT_UNDAMPED = 3,
   DASHPOT_UNSTABLE = 4,
-  DASHPOT_SOFT = 5
+  DASHPOT_SOFT = 5,
+  DASHPOT_ALTERNATING = 6 /* of the sampled loop: it changes its sign with every tick */
 };
 
 /* Where modes come from. */

@@ -170,7 +170,27 @@ struct Wanted {
   bool done = false;
 };
 
+bool alternates(Complex z) {
+  return z.imag() == 0 && z.real() < 0;
+}
+
+/// The mode of two real z, of which the first is negative and no smaller than the second if this is
+/// negative too.
+SampledMode to_alternating(const std::array<Complex, 2>& z, double period) {
+  const Complex lambda = std::log(z[0]) / period;
+  const double w = modulus(lambda);
+  const bool grows = lambda.real() > 0;
+  return {z,
+          {lambda, std::log(z[1]) / period},
+          w,
+          -lambda.real() / w,
+          lambda.imag(),
+          grows ? ModeKind::kUnstable : ModeKind::kAlternating};
+}
+
 SampledMode to_mode(std::array<Complex, 2> z, double period) {
+  if (alternates(z[1]) && !(alternates(z[0]) && z[0].real() < z[1].real())) std::swap(z[0], z[1]);
+  if (alternates(z[0])) return to_alternating(z, period);
   if (z[1].imag() == 0 && modulus(std::log(z[0])) > modulus(std::log(z[1]))) std::swap(z[0], z[1]);
   const Root first{std::log(z[0]) / period, kInfinity};
   const Root second{z[0].imag() != 0 ? std::conj(first.value) : std::log(z[1]) / period, kInfinity};

@@ -20,10 +20,12 @@ struct SampledLoop {
   Eigen::MatrixXd gravity_gradient = {};
 };
 
-/// A mode of the loop that is closed once a tick.
+/// A mode of the loop that is closed once a tick. One with a z that is real and negative
+/// alternates: its frequency and ratio are those of the larger such z alone, with an imaginary part
+/// of pi / T.
 struct SampledMode {
   std::array<Complex, 2> discrete_eigenvalues{};  ///< z: a complex pair or two real ones
-  std::array<Complex, 2> eigenvalues{};  ///< log(z) / T, 1/s: a complex pair or two real ones
+  std::array<Complex, 2> eigenvalues{};  ///< log(z) / T, 1/s: a complex pair, or of two real z
   double natural_frequency = 0;          ///< rad/s; NaN if the eigenvalues' product is negative
   double damping_ratio = 0;
   double damped_frequency = 0;  ///< rad/s

@@ -16,6 +16,8 @@ const char* to_text(ModeKind kind) noexcept {
       return "unstable";
     case ModeKind::kSoft:
       return "soft";
+    case ModeKind::kAlternating:
+      return "alternating";
   }
   return "unknown";
 }

@@ -74,6 +74,7 @@ static_assert(DASHPOT_OVERDAMPED == static_cast<int>(analysis::ModeKind::kOverda
 static_assert(DASHPOT_UNDAMPED == static_cast<int>(analysis::ModeKind::kUndamped));
 static_assert(DASHPOT_UNSTABLE == static_cast<int>(analysis::ModeKind::kUnstable));
 static_assert(DASHPOT_SOFT == static_cast<int>(analysis::ModeKind::kSoft));
+static_assert(DASHPOT_ALTERNATING == static_cast<int>(analysis::ModeKind::kAlternating));
 static_assert(DASHPOT_TRACKED == static_cast<int>(analysis::SpectrumOrigin::kTracked));
 static_assert(DASHPOT_REUSED == static_cast<int>(analysis::SpectrumOrigin::kReused));
 static_assert(DASHPOT_DIRECT == static_cast<int>(analysis::SpectrumOrigin::kDirect));

@@ -27,6 +27,7 @@ static_assert(static_cast<int>(ModeKind::kOverdamped) == modes_t::OVERDAMPED);
 static_assert(static_cast<int>(ModeKind::kUndamped) == modes_t::UNDAMPED);
 static_assert(static_cast<int>(ModeKind::kUnstable) == modes_t::UNSTABLE);
 static_assert(static_cast<int>(ModeKind::kSoft) == modes_t::SOFT);
+static_assert(static_cast<int>(ModeKind::kAlternating) == sampled_modes_t::ALTERNATING);
 static_assert(static_cast<int>(CommandVerdict::kMalformed) == state_t::MALFORMED);
 static_assert(static_cast<int>(CommandVerdict::kWrongSize) == state_t::WRONG_SIZE);
 static_assert(static_cast<int>(CommandVerdict::kUnknown) == state_t::UNKNOWN);

@@ -135,6 +135,8 @@ class SampledModes(Result):
     discrete_eigenvalues: ComplexArray
     """m x 2, z: eigenvalues of the map from tick to tick."""
     kind: TextArray
+    """m of underdamped, critical, overdamped, undamped, unstable, soft, or alternating: one with a
+    negative z changes its sign with every tick."""
     zero_modes: ComplexArray
     """z of the velocities along the zero modes that are damped."""
     others: ComplexArray

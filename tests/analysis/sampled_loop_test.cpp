@@ -205,6 +205,40 @@ TEST(SampledLoop, FollowsAnOverdampedMode) {
   EXPECT_NEAR(mode.eigenvalues[1].real(), -196.9, 0.1);  // -194.9, faster by its square times T/2
 }
 
+/// More damping than the hold bears: the matrix from tick to tick has two rows, and a negative z.
+TEST(SampledLoop, SaysWhatAlternates) {
+  SampledLoop loop;
+  const double T = loop.period, K = 100;
+  for (const double C : {1400.0, 1990.0, 2100.0}) {
+    const SampledMode mode = sample(one_joint(1, C, K), loop).modes.at(0);
+    const double trace = 2 - K * T * T / 2 - C * T;
+    const double determinant = (1 - K * T * T / 2) * (1 - C * T) + (T - C * T * T / 2) * K * T;
+    const double root = std::sqrt(trace * trace / 4 - determinant);
+    const double z = trace / 2 - root;
+    ASSERT_LT(z, 0);
+    EXPECT_EQ(mode.kind, z < -1 ? ModeKind::kUnstable : ModeKind::kAlternating) << C;
+    EXPECT_EQ(mode.damped_frequency, std::numbers::pi / T);
+    EXPECT_NEAR(mode.eigenvalues[0].real(), std::log(-z) / T, 1e-9 / T);
+    EXPECT_NEAR(mode.discrete_eigenvalues[1].real(), trace / 2 + root, 1e-12);
+    EXPECT_NEAR(mode.natural_frequency, modulus(mode.eigenvalues[0]), 1e-9);
+    EXPECT_NEAR(mode.damping_ratio, -std::log(-z) / T / mode.natural_frequency, 1e-9);
+  }
+  const SampledMode calm = sample(one_joint(1, 900, K), loop).modes.at(0);
+  EXPECT_EQ(calm.kind, ModeKind::kOverdamped);
+}
+
+/// Of two negative z the larger is the mode's.
+TEST(SampledLoop, AlternatesAtTheSlowerOfTwoNegativeEigenvalues) {
+  SampledLoop loop;
+  loop.period = 1;
+  // z^2 - (2 - C - K/2) z + 1 - C + K/2 = (z + 0.2) (z + 0.5)
+  const SampledMode mode = sample(one_joint(1, 1.8, 1.8), loop).modes.at(0);
+  EXPECT_NEAR(mode.discrete_eigenvalues[0].real(), -0.5, 1e-12);
+  EXPECT_NEAR(mode.discrete_eigenvalues[1].real(), -0.2, 1e-12);
+  EXPECT_EQ(mode.kind, ModeKind::kAlternating);
+  EXPECT_NEAR(mode.damping_ratio * mode.natural_frequency, std::log(2), 1e-12);
+}
+
 TEST(SampledLoop, IsTheSameInFixedStorage) {
   Random random(170);
   const System<> system = random_system(random, 6);
