@@ -86,8 +86,8 @@ Identification identify_decays(const std::vector<MotionRecord>& records,
 /// half's correlations. The standard deviations are the jackknife's, over 20 parts of the record.
 ///
 /// `energy` is a share of the squares of the correlations, `explained` what the model of one half
-/// says about the other, `noise` the sensors' as the differences of samples show it. Gaps are
-/// bridged by straight lines and should be few.
+/// says about the other, `noise` the sensors' as the differences of samples show it. Gaps of up
+/// to twenty samples are bridged by straight lines; longer ones part a record.
 ///
 /// Throws std::invalid_argument as identify_decays, and for records that are too short.
 Identification identify_ambient(const std::vector<MotionRecord>& records,

@@ -17,7 +17,8 @@ using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kFewest = 0.8;  // share of the parts that must have a mode
+constexpr double kFewest = 0.8;        // share of the parts that must have a mode
+constexpr double kLeastRatio = 0.001;  // of what decays
 /// Of 20 parts: Student's 95 % quantile over that of the normal distribution.
 constexpr double kStudent = 2.09 / 1.96;
 
@@ -129,6 +130,9 @@ MeasuredMode to_mode(const RealizedPole& pole,
   }
   const double w = mode.natural_frequency_std / mode.natural_frequency, z = jackknife(ratios);
   mode.covariance = mode.natural_frequency * (std::pow(jackknife(sums), 2) - w * w - z * z) / 2;
+  if (mode.damping_ratio + 2 * mode.damping_ratio_std < kLeastRatio) {
+    mode.reason = "it does not decay: something moves at this frequency";
+  }
   return mode;
 }
 

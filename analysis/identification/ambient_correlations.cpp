@@ -25,6 +25,8 @@ constexpr double kVelocity = 0.98;   // share of the velocities' squares within 
 constexpr double kCellsPerHalf = 3;  // cells in half a period of the end of the band
 constexpr double kAudible = 2.5;     // standard errors of a correlation that is used
 constexpr Index kLargestWindow = 4096;
+constexpr double kLongGap = 20;         // samples
+constexpr double kLeastMotion = 1e-10;  // of a channel, relative to its mean
 
 /// Below it lies nearly all that the channels' velocities do beyond noise, rad/s (Welch 1967).
 double band_of(const std::vector<MatrixXd>& grids, double step, const VectorXd& noise) {
@@ -63,6 +65,39 @@ double band_of(const std::vector<MatrixXd>& grids, double step, const VectorXd& 
     band = std::max(band, w * static_cast<double>(end - sum.begin()));
   }
   return std::max(band, w);
+}
+
+/// The records without their long gaps, and without pieces much shorter than a part.
+std::vector<MotionRecord> unbroken(const std::vector<MotionRecord>& records, double sample) {
+  std::vector<MotionRecord> pieces;
+  Index samples = 0;
+  for (const MotionRecord& record : records) {
+    const auto take = [&](Index from, Index to) {
+      if (to > from) pieces.push_back(part_of(record, from, to)), samples += to - from;
+    };
+    Index from = 0, last = -1;  // sample with all channels
+    for (Index i = 0; i < record.time.size(); ++i) {
+      if (!record.output.col(i).allFinite()) continue;
+      if (last < 0) from = i;
+      if (last >= 0 && record.time[i] - record.time[last] > kLongGap * sample) {
+        take(from, last + 1);
+        from = i;
+      }
+      last = i;
+    }
+    take(from, last + 1);
+  }
+  const Index least = std::max<Index>(20, samples / (2 * kParts));
+  std::erase_if(pieces, [least](const MotionRecord& piece) { return piece.time.size() < least; });
+  return pieces;
+}
+
+void require_length(bool enough, Index length) {
+  if (enough) return;
+  throw std::invalid_argument(
+      "identify: motion under unknown forces takes a longer record to show anything: " +
+      std::to_string(length * kParts) + " samples at its pace, need " +
+      std::to_string(24 * kParts));
 }
 
 /// Means of `cell` samples each, about the record's mean, in units of the channels' `sizes`.
@@ -115,7 +150,7 @@ AmbientCorrelations::AmbientCorrelations(const std::vector<MotionRecord>& record
   noise = first_noise(records);
   std::vector<MatrixXd> grids;
   Index samples = 0, shortest = std::numeric_limits<Index>::max();
-  for (const MotionRecord& record : records) {
+  for (const MotionRecord& record : unbroken(records, sample)) {
     grids.push_back(on_grid(record, sample));
     for (SteadyLine& line : take_steady_lines(grids.back(), sample)) {
       hums.push_back(std::move(line));
@@ -125,25 +160,23 @@ AmbientCorrelations::AmbientCorrelations(const std::vector<MotionRecord>& record
     const auto& time = record.time;
     duration = std::max(duration, time[time.size() - 1] - time[0]);
   }
+  require_length(!grids.empty(), 0);
   const auto cell = std::max<Index>(
       1, static_cast<Index>(std::numbers::pi / (kCellsPerHalf * band_of(grids, sample, noise)) /
                             sample));
   step = static_cast<double>(cell) * sample;
   sizes = VectorXd::Zero(grids[0].rows());
+  VectorXd least = VectorXd::Constant(sizes.size(), 1e-300);
   for (const MatrixXd& grid : grids) {
     const VectorXd mean = grid.rowwise().mean();
     sizes += (grid.colwise() - mean).rowwise().squaredNorm();
+    least = least.cwiseMax(kLeastMotion * mean.cwiseAbs());
   }
-  sizes = (sizes / static_cast<double>(samples)).cwiseSqrt().cwiseMax(1e-300);
+  sizes = (sizes / static_cast<double>(samples)).cwiseSqrt().cwiseMax(least);
 
   const Index length = std::min(samples / kParts, shortest) / cell;
   const Index lags = std::min(length / 3, kMostLags);
-  if (lags < 8) {
-    throw std::invalid_argument(
-        "identify: motion under unknown forces takes a longer record to show anything: " +
-        std::to_string(length * kParts) + " samples at its pace, need " +
-        std::to_string(24 * kParts));
-  }
+  require_length(lags >= 8, length);
   for (const MatrixXd& grid : grids) {
     const MatrixXd cells = cells_of(grid, cell, sizes);
     for (Index at = 0; at + length <= cells.cols(); at += length) {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <vector>
@@ -183,6 +184,44 @@ TEST(IdentifyAmbient, AnArmThatRingsIsNotTakenForAHum) {
   for (const MeasuredMode& mode : result.rejected) {
     EXPECT_THAT(mode.reason, ::testing::Not(HasSubstr("hum"))) << mode.natural_frequency;
   }
+}
+
+TEST(IdentifyAmbient, LongGapsPartARecord) {
+  ShakenArm shaken(1);
+  MotionRecord record = sensed(shaken.motion, kPeriod, noise_of(1e-5), shaken.draw);
+  const Identification whole = identify_ambient({record});
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  record.output.middleCols(10000, 8000).setConstant(kNan);
+  record.output.row(3).segment(40000, 3000).setConstant(kNan);
+  Comparison all;
+  const Identification found = identify_ambient({record});
+  all.add(shaken.arm.modes, found);
+  EXPECT_EQ(all.false_ones, 0);
+  EXPECT_GE(found.modes.size(), whole.modes.size() - 1);
+}
+
+/// As a joint that nothing moves.
+TEST(IdentifyAmbient, AConstantChannelSaysNothing) {
+  ShakenArm shaken(1);
+  MotionRecord record = sensed(shaken.motion, kPeriod, noise_of(1e-5), shaken.draw);
+  const Identification without = identify_ambient({record});
+  record.output.conservativeResize(record.output.rows() + 1, Eigen::NoChange);
+  record.output.bottomRows(1).setConstant(0.3);
+  const Identification with = identify_ambient({record});
+  EXPECT_GE(with.modes.size(), without.modes.size() - 1);
+  for (const MeasuredMode& mode : with.modes) {
+    EXPECT_LT(std::abs(mode.shape[mode.shape.size() - 1]), 1e-6);
+  }
+}
+
+TEST(IdentifyAmbient, WhatOnlyHumsHasNoMode) {
+  Draws draw(6);
+  MatrixXd motion(1, 30000);
+  for (Eigen::Index i = 0; i < motion.cols(); ++i) {
+    motion(0, i) = std::sin(0.05 * static_cast<double>(i));
+  }
+  EXPECT_THAT(identify_ambient({sensed(motion, 0.01, noise_of(1e-5), draw)}).modes,
+              ::testing::IsEmpty());
 }
 
 TEST(IdentifyAmbient, SaysWhatIsTooShort) {
