@@ -46,6 +46,7 @@ MatrixXd amplitudes_of(const MatrixXd& columns, const Correlations& correlations
   for (std::size_t j = 0; j < correlations.size(); ++j) {
     right.col(static_cast<Index>(j)) = correlations[j].reshaped();
   }
+  if (columns.cols() == 0) return {0, right.cols()};  // for which Eigen has no decomposition
   return columns.colPivHouseholderQr().solve(right);
 }
 
@@ -149,12 +150,13 @@ Identification identify_ambient(const std::vector<MotionRecord>& records,
   const int largest = options.max_order > 0 ? options.max_order : std::min(4 * channels + 4, 40);
   Identification result;
   result.noise = data.noise;
-  double left = 0;
-  result.order = order_of(data, largest, left);
-  result.explained = 1 - left;
-
   const Correlations all = data.mean([](std::size_t) { return true; });
   const Realization model(all, data.step, data.delays);
+  if (model.max_order() < 1) throw std::invalid_argument("identify: nothing moves");
+  double left = 0;
+  result.order = order_of(data, std::min(largest, model.max_order()), left);
+  result.explained = 1 - left;
+
   std::vector<std::vector<RealizedPole>> by_order;
   for (int order = 1; order <= std::min(largest, model.max_order()); ++order) {
     by_order.push_back(model.poles(order));

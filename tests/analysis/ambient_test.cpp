@@ -192,6 +192,7 @@ TEST(IdentifyAmbient, LongGapsPartARecord) {
   const Identification whole = identify_ambient({record});
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   record.output.middleCols(10000, 8000).setConstant(kNan);
+  record.output.rightCols(42000).array() += 0.3;  // moved meanwhile
   record.output.row(3).segment(40000, 3000).setConstant(kNan);
   Comparison all;
   const Identification found = identify_ambient({record});
@@ -212,6 +213,7 @@ TEST(IdentifyAmbient, AConstantChannelSaysNothing) {
   for (const MeasuredMode& mode : with.modes) {
     EXPECT_LT(std::abs(mode.shape[mode.shape.size() - 1]), 1e-6);
   }
+  for (const MeasuredMode& mode : with.rejected) EXPECT_GT(mode.natural_frequency, 0.01);
 }
 
 TEST(IdentifyAmbient, WhatOnlyHumsHasNoMode) {
@@ -222,6 +224,21 @@ TEST(IdentifyAmbient, WhatOnlyHumsHasNoMode) {
   }
   EXPECT_THAT(identify_ambient({sensed(motion, 0.01, noise_of(1e-5), draw)}).modes,
               ::testing::IsEmpty());
+}
+
+TEST(IdentifyAmbient, NoiseHasNoModes) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    Draws draw(seed);
+    MatrixXd motion(2, 20000);
+    for (auto& y : motion.row(0)) y = draw.normal();
+    motion.row(1).setConstant(0.3);
+    const MotionRecord record = sensed(motion, 0.01, noise_of(0), draw);
+    EXPECT_THAT(identify_ambient({record}).modes, ::testing::IsEmpty()) << "seed " << seed;
+  }
+  Draws draw(1);
+  EXPECT_THROW(
+      identify_ambient({sensed(MatrixXd::Constant(2, 20000, 0.3), 0.01, noise_of(0), draw)}),
+      std::invalid_argument);
 }
 
 TEST(IdentifyAmbient, SaysWhatIsTooShort) {
