@@ -1,5 +1,5 @@
 #pragma once
-#include <Eigen/Core>
+#include <dashpot/analysis/types.hpp>
 
 #include <vector>
 
