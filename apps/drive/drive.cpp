@@ -3,6 +3,7 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/drive/drive_report.hpp>
+#include <dashpot/apps/identify/identify.hpp>
 #include <dashpot/apps/loop/privileges.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
@@ -215,6 +216,9 @@ void drive(const DriveOptions& options) {
   report.loop = journal.record;
   report.messages = publisher.counters();
   if (commands) report.commands = {commands->tally(), commands->last_reason()};
+  if (excitation && !options.log.empty() && report.loop.ticks > 0) {
+    report.identified = identify_log(options.log, options.config);
+  }
   print(options.json ? to_json(report) : to_table(report));
   if (failure) std::rethrow_exception(failure);
   if (report.messages.send_errors > 0 && !options.log.empty()) {

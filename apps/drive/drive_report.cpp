@@ -67,6 +67,7 @@ std::string to_table(const DriveReport& report) {
   text += commands_text(report.commands, report.loop.commands_refused);
   text += line("messages: %lld states, %lld modes, %lld sampled modes", n(report.messages.states),
                n(report.messages.modes), n(report.messages.sampled_modes));
+  if (report.identified) text += "\n" + identify_table(*report.identified);
   return text;
 }
 
@@ -109,6 +110,7 @@ std::string to_json(const DriveReport& report) {
   json["messages"] = {{"states", report.messages.states},
                       {"modes", report.messages.modes},
                       {"sampled_modes", report.messages.sampled_modes}};
+  if (report.identified) json["identified"] = identify_json(*report.identified);
   return json.dump(2, ' ', false, DriveJson::error_handler_t::replace) + "\n";
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/apps/drive/drive_session.hpp>
+#include <dashpot/apps/identify/identify_writer.hpp>
 #include <dashpot/apps/loop/command_report.hpp>
 
 #include <optional>
@@ -17,7 +18,8 @@ struct DriveReport {
   DriveRecord drive;
   LoopRecord loop;
   lcmtypes::PublisherCounters messages;
-  std::optional<CommandReport> commands;  ///< if any were to be taken
+  std::optional<CommandReport> commands;     ///< if any were to be taken
+  std::optional<IdentifyReport> identified;  ///< what followed an excitation
 };
 
 /// For people: lines, each ended by a newline.

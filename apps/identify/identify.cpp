@@ -1,8 +1,10 @@
+#include <dashpot/apps/analyze/json_writer.hpp>
 #include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/identify/identify.hpp>
 #include <dashpot/apps/identify/identify_plot.hpp>
 #include <dashpot/apps/identify/identify_writer.hpp>
 #include <dashpot/apps/identify/loop_prediction.hpp>
@@ -12,6 +14,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 
 namespace dashpot::apps {
@@ -245,6 +248,19 @@ that of an arm which many small unknown forces shake for a minute or more.
 
 }  // namespace
 
+IdentifyReport identify_log(const std::string& log, const std::string& config) {
+  IdentifyCommand command;
+  command.files = {log};
+  command.against = config;
+  try {
+    return Task(command).run();
+  } catch (const std::exception& error) {
+    IdentifyReport report;
+    report.notes.push_back(std::string("no modes are identified: ") + error.what());
+    return report;
+  }
+}
+
 void add_identify(CLI::App& program) {
   CLI::App* command =
       program.add_subcommand("identify", "The modes that an arm really has, from recorded motion");
@@ -296,7 +312,7 @@ void add_identify(CLI::App& program) {
     if (!options->plot.empty()) check_plot_name(options->plot);
     const IdentifyReport report = Task(*options).run();
     if (!options->plot.empty()) draw_identification(options->plot, report);
-    print(options->json ? identify_json(report) : identify_table(report));
+    print(options->json ? json_text(identify_json(report)) : identify_table(report));
   });
 }
 

@@ -265,7 +265,7 @@ std::string identify_table(const IdentifyReport& report) {
   return text;
 }
 
-std::string identify_json(const IdentifyReport& report) {
+nlohmann::ordered_json identify_json(const IdentifyReport& report) {
   Json json = report.postures.empty() ? Json{{"modes", Json::array()}, {"rejected", Json::array()}}
                                       : posture_json(report.postures.front(), report.against);
   json["channels"] = Json::array();
@@ -297,7 +297,7 @@ std::string identify_json(const IdentifyReport& report) {
   }
   if (report.calibration) json["calibration"] = calibration_json(*report.calibration);
   json["notes"] = report.notes;
-  return json_text(json);
+  return json;
 }
 
 }  // namespace dashpot::apps

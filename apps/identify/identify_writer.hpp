@@ -2,6 +2,7 @@
 #include <dashpot/analysis/identification.hpp>
 #include <dashpot/apps/identify/motion_file.hpp>
 
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -68,6 +69,6 @@ struct IdentifyReport {
 };
 
 std::string identify_table(const IdentifyReport& report);
-std::string identify_json(const IdentifyReport& report);
+nlohmann::ordered_json identify_json(const IdentifyReport& report);
 
 }  // namespace dashpot::apps

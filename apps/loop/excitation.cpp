@@ -98,7 +98,7 @@ void expect_through(const Excitation& excitation, const controller::Settings& se
 }  // namespace
 
 const char* const kExciteHelp =
-    R"(Let a wrench at the tip make the arm vibrate a little, for `dashpot identify`:
+    R"(Let a wrench at the tip make the arm vibrate a little; with --log its modes are identified:
 pulse,direction=z,force=5,duration=0.5,at=1,every=3,count=5 or
 chirp,direction=rx,torque=1,from=0.1,to=5,duration=20,at=1)";
 

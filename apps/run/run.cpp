@@ -2,6 +2,7 @@
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/identify/identify.hpp>
 #include <dashpot/apps/run/csv_sink.hpp>
 #include <dashpot/apps/run/run_report.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
@@ -212,6 +213,9 @@ void run(const Options& options) {
   if ((scene.ring_down || options.ring_down) && !report.interrupted) {
     report.ring_down = measure_ring_down(scene, make_controller, StopSignal::given);
     report.interrupted = !report.ring_down;
+  }
+  if (excitation && !options.log.empty()) {
+    report.identified = identify_log(options.log, options.scene);
   }
   print(options.json ? to_json(report) : to_table(report));
   if (report.messages.send_errors > 0 && !(options.log.empty() && options.csv.empty())) {

@@ -301,6 +301,7 @@ std::string to_table(const RunReport& report) {
            ring_down_table(*report.ring_down);
     out += stability_text(*report.ring_down);
   }
+  if (report.identified) out += "\n" + identify_table(*report.identified);
   return out;
 }
 
@@ -354,6 +355,7 @@ std::string to_json(const RunReport& report) {
       {"commands", commands_json(report.commands, loop.commands_refused)},
       {"faults", loop.faults},
       {"fault", fault_json(loop)}};
+  if (report.identified) result["identified"] = identify_json(*report.identified);
   if (report.ring_down) result["ring_down"] = ring_down_json(*report.ring_down);
   return json_text(result);
 }

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/apps/identify/identify_writer.hpp>
 #include <dashpot/apps/loop/command_report.hpp>
 #include <dashpot/apps/loop/loop_thread.hpp>
 #include <dashpot/apps/run/ring_down.hpp>
@@ -22,7 +23,8 @@ struct RunReport {
   sim::EnergyAudit energy;
   Extremes extremes;
   lcmtypes::PublisherCounters messages;
-  std::optional<CommandReport> commands;  ///< if any were to be taken
+  std::optional<CommandReport> commands;     ///< if any were to be taken
+  std::optional<IdentifyReport> identified;  ///< what followed an excitation
   std::optional<RingDown> ring_down;
 };
 

@@ -3,6 +3,7 @@
 #include <dashpot/tests/apps/scene_run.hpp>
 
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -106,6 +107,32 @@ TEST(Excite, EndsForGoodAtAFault) {
   // Until 1.05 s nothing is measured, and the state shows the last that was.
   for (std::size_t i = 1055; i < states.size(); ++i) ASSERT_EQ(states[i].tip_wrench[2], 0) << i;
   EXPECT_EQ(states[380].tip_wrench[2], 2);
+}
+
+TEST(Excite, IdentifiesWhatFollows) {
+  const Scratch scratch;
+  const std::string path = calm_scene(scratch);
+  const Outcome outcome = run_scene(path, {"--json", "--log", scratch.path("log"), "--excite",
+                                           "pulse,direction=z,force=-2,duration=0.1,at=0.2"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto identified = nlohmann::json::parse(outcome.out).at("identified");
+  EXPECT_EQ(identified.at("postures").at(0).at("parts"), 1);
+  int close = 0;
+  for (const auto& difference : identified.at("difference")) {
+    const auto& mode = identified.at("modes").at(difference.at("measured").get<std::size_t>());
+    const double relative = difference.at("natural_frequency").get<double>() /
+                            mode.at("natural_frequency").get<double>();
+    const double of_ratio = difference.at("damping_ratio").get<double>();
+    close += std::abs(relative) < 0.01 && std::abs(of_ratio) < 0.01 &&
+             difference.at("likeness").get<double>() > 0.9;
+  }
+  EXPECT_GE(close, 1) << identified.dump(1);
+
+  const Outcome too_short = run_scene(path, {"--duration", "0.01", "--log", scratch.path("log"),
+                                             "--excite", "pulse,direction=z,force=1,duration=0.5"});
+  EXPECT_EQ(too_short.status, 0) << too_short.err;
+  EXPECT_THAT(too_short.out, HasSubstr("Note: no modes are identified: "));
+  EXPECT_THAT(too_short.out, HasSubstr("10 samples"));
 }
 
 TEST(Excite, RefusesWhatIsTooMuch) {
