@@ -128,7 +128,7 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
     const lcmtypes::DriverStatus status = std::move(*inbox.newest);
     inbox.newest.reset();
     const bool answers =
-        session.take(status, 1e-6 * static_cast<double>(now - inbox.arrived), now, command);
+        session.take(status, 1e-6 * static_cast<double>(now - inbox.arrived), command);
     if (!ran && session.running()) {
       began = Clock::now();
       std::fprintf(

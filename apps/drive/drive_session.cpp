@@ -82,8 +82,7 @@ bool DriveSession::stopped_by_itself(const DriverStatus& status) const noexcept 
   return options_.driver == DriverKind::kPanda && status.robot_mode >= 3 && status.robot_mode <= 6;
 }
 
-bool DriveSession::take(const DriverStatus& status, double age, std::int64_t utime,
-                        DriverCommand& command) {
+bool DriveSession::take(const DriverStatus& status, double age, DriverCommand& command) {
   ++record.statuses;
   const bool possible = status.utime <= kLatest;
   if (!possible || status.position.size() != n_ || status.velocity.size() != n_) {
@@ -157,7 +156,7 @@ bool DriveSession::take(const DriverStatus& status, double age, std::int64_t uti
   if (code < 0) torque_.setZero();  // a refused call: nothing beyond the driver's gravity
   const std::int64_t took =
       (end.tv_sec - begin.tv_sec) * 1'000'000'000LL + end.tv_nsec - begin.tv_nsec;
-  journal_.note_tick(utime, code,
+  journal_.note_tick(status.utime, code,
                      static_cast<std::int32_t>(
                          std::min<std::int64_t>(took, std::numeric_limits<std::int32_t>::max())));
   journal_.end_tick();
@@ -226,15 +225,16 @@ void DriveSession::watch(const DriverStatus& status, bool late) {
 }
 
 /// With --torque_only the driver commands each position that it measures. With springs of KUKA's it
-/// commands the one where they are fixed.
+/// commands the one where they are fixed. Commands then lead them with the arm, so that they only
+/// damp; the configuration has to say how much.
 void DriveSession::check_springs() {
+  if (!config_.settings.environment.joint_damping.isZero(0)) return;
   const bool known = first_commanded_.allFinite() && !first_commanded_.isZero(0);
   if (options_.driver != DriverKind::kIiwa || !known || !moved_ || recommanded_) return;
   const std::string reason =
       "the driver commands one fixed position while the arm's measured one changes: KUKA's mode "
-      "Torque, whose own springs no mode counts, or no torque is taken yet; use the mode "
-      "TorqueOnly "
-      "and --torque_only";
+      "Torque, or no torque is taken yet; use the mode TorqueOnly and --torque_only, or say in "
+      "environment.joint_damping how KUKA's springs damp the arm";
   if (!options_.dry_run) throw InputError("", reason);
   warning_ = reason;
 }

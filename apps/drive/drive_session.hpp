@@ -51,11 +51,10 @@ class DriveSession {
   DriveSession(const controller::Config& config, LoopController& controller, LoopGoal& goal,
                LoopJournal& journal, const Options& options);
 
-  /// Takes a status that arrived `age` s ago, at the time `utime`, us since 1970-01-01 UTC. Returns
+  /// Takes a status that arrived `age` s ago. Returns
   /// true if `command` is to be sent. Throws InputError if the conversation must not begin, and
   /// std::runtime_error if it must not go on.
-  bool take(const lcmtypes::DriverStatus& status, double age, std::int64_t utime,
-            lcmtypes::DriverCommand& command);
+  bool take(const lcmtypes::DriverStatus& status, double age, lcmtypes::DriverCommand& command);
   /// Notes a command on the driver's channel. Nothing throws: LCM calls it.
   void hear_command(const void* data, std::size_t size) noexcept;
   /// True if somebody else commands beside this session, which must then end.

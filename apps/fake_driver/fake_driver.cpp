@@ -40,7 +40,7 @@ FakeDriver::FakeDriver(const Scene& scene, DriverKind kind) : scene_(scene), kin
   }
   mechanism_ = make_mechanism(scene);
   plant_.emplace(*mechanism_, plant_options(scene, kind), scene.start, scene.velocity);
-  last_position_ = scene.start;
+  last_position_ = spring_rest_ = scene.start;
   velocity_ = last_torque_ = JointVector::Zero(scene.dof());
 }
 
@@ -63,6 +63,7 @@ void FakeDriver::take(const void* data, std::size_t size, std::int64_t utime) {
     throw std::runtime_error("a command expects control mode " +
                              std::to_string(command.control_mode));
   }
+  if (iiwa && command_) spring_rest_ = command_->position;
   command_ = command;
   arrived_ = utime;
   ++commands_;
@@ -72,11 +73,18 @@ JointVector FakeDriver::torque(std::int64_t utime) {
   const JointVector& q = plant_->measured().position;
   const JointVector qd = plant_->measured().velocity;
   if (kind_ == DriverKind::kIiwa) {
-    if (command_ && utime - arrived_ <= kSilence) {
+    const bool counts = command_ && utime - arrived_ <= kSilence;
+    if (!counts) ++uncommanded_;
+    if (has_springs()) {
+      const controller::Environment& own = scene_.arm->config.settings.environment;
+      const JointVector pull =
+          own.joint_stiffness.cwiseProduct(spring_rest_ - q) - own.joint_damping.cwiseProduct(qd);
+      return counts ? JointVector(command_->torque + pull) : pull;
+    }
+    if (counts) {
       held_.reset();
       return command_->torque;
     }
-    ++uncommanded_;
     if (!held_) held_ = q;
     return kHoldStiffness * (*held_ - q) - kHoldDamping * qd;
   }
@@ -92,6 +100,12 @@ JointVector FakeDriver::torque(std::int64_t utime) {
     last_torque_[i] += std::clamp(wanted[i] - last_torque_[i], -step, step);
   }
   return last_torque_;
+}
+
+bool FakeDriver::has_springs() const noexcept {
+  const controller::Environment& own = scene_.arm->config.settings.environment;
+  return kind_ == DriverKind::kIiwa &&
+         !(own.joint_stiffness.isZero(0) && own.joint_damping.isZero(0));
 }
 
 void FakeDriver::step(std::int64_t utime) {
@@ -112,6 +126,7 @@ lcmtypes::DriverStatus FakeDriver::status(std::int64_t utime) const {
   const bool iiwa = kind_ == DriverKind::kIiwa;
   status.utime = iiwa && statuses_ <= kWithoutClock ? -1 : utime;
   status.position = plant_->measured().position;
+  if (has_springs()) status.commanded = spring_rest_;
   status.velocity = iiwa ? velocity_ : plant_->measured().velocity;
   status.torque = plant_->torque();
   status.external = JointVector::Zero(7);

@@ -18,6 +18,9 @@ namespace dashpot::apps {
 /// -1 for the first 200 statuses. It dies of a command within 0.25 s of the first status, and of
 /// arrays of another length.
 ///
+/// With `environment.joint_stiffness` or `joint_damping` in its scene, the iiwa is in KUKA's mode
+/// Torque: these springs pull to the position commanded a period before, at first where it is.
+///
 /// Panda (`--control_mode torque`): a command whose utime is more than 0.1 s in the past or the
 /// future does not count; without one that counts, joints are damped. Torques pass a rate limit of
 /// 1000 N m/s and a low-pass of 30 Hz. It dies of anything but seven torques, no positions, and
@@ -46,6 +49,7 @@ class FakeDriver {
 
  private:
   JointVector torque(std::int64_t utime);
+  bool has_springs() const noexcept;
 
   const Scene& scene_;
   lcmtypes::DriverKind kind_;
@@ -55,6 +59,7 @@ class FakeDriver {
   std::int64_t arrived_ = 0;              ///< when the command did, us
   std::int64_t first_ = 0;                ///< utime of the first status
   std::optional<JointVector> held_;       ///< the position that the PD holds
+  JointVector spring_rest_;               ///< to which springs of KUKA's pull
   JointVector last_torque_;               ///< before the plant's low-pass
   JointVector last_position_, velocity_;  ///< through the iiwa's low-pass
   std::int64_t statuses_ = 0, commands_ = 0, uncommanded_ = 0;

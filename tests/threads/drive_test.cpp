@@ -352,6 +352,47 @@ TEST(DriveOfAnIiwa, RefusesSpringsOfKukas) {
   EXPECT_THAT(none, ::testing::Not(HasSubstr("KUKA's mode Torque")));
 }
 
+/// Springs of KUKA's that commands lead to where the arm is hold nothing, and damp.
+TEST(DriveOfAnIiwa, CountsWhatSpringsOfKukasDamp) {
+  // So small that the simulated loop, whose springs act from period to period, bears them.
+  const std::string springs = "[1000, 1000, 1000, 500, 100, 20, 5]";  // N m/rad
+  const std::string dampers = "[4, 4, 2, 2, 0.3, 0.1, 0.01]";         // N m s/rad
+  const std::string in_all = "[5, 5, 3, 2.5, 0.4, 0.12, 0.015]";      // and a period's lag
+  const Scratch scratch;
+  std::string robot = text_of(scene("drivers/iiwa14"));
+  robot.replace(robot.find("../.."), 5, std::string(DASHPOT_SOURCE_DIR) + "/sim");
+  robot = scratch.write("robot.yaml", robot + "environment: {joint_stiffness: " + springs +
+                                          ", joint_damping: " + dampers + "}\n");
+  // A command acts a period after its status.
+  const std::string config = changed_configuration(
+      scratch, kIiwa,
+      {{"analysis:",
+        "motion: {gain_time: 10 ms}\nenvironment: {joint_damping: " + in_all + "}\nanalysis:"}});
+  const std::string url = own_url();
+  Running fake({"fake-driver", robot, "--iiwa", "--lcm-url", url, "--lock-step"});
+  Running driving({"drive", config, "--iiwa", "--json", "--lcm-url", url, "--log",
+                   scratch.path("log"), "--excite", "pulse,direction=y,force=5,duration=0.1,at=0.2",
+                   "--duration", "1.5"});
+  const int status = driving.finish();
+  fake.send(SIGTERM);
+  fake.finish();
+  if (driving.complaints().find("no status") != std::string::npos) {
+    GTEST_SKIP() << "multicast does not work on this machine";
+  }
+  ASSERT_EQ(status, 0) << driving.complaints();
+  const Json result = Json::parse(driving.output());
+  const Json found = result["identified"];
+  // Another program may have had the processor too long for a decay to be whole.
+  if (result["statuses"]["lost"].get<int>() > 0) return;
+  EXPECT_GE(found["difference"].size(), 2u) << found.dump(1);
+  for (const Json& one : found["difference"]) {
+    const Json& mode = found["modes"][one["measured"].get<std::size_t>()];
+    const double frequency = mode["natural_frequency"];
+    EXPECT_LT(std::abs(one["natural_frequency"].get<double>()), 0.01 * frequency) << one;
+    EXPECT_LT(std::abs(one["damping_ratio"].get<double>()), 0.01) << one;
+  }
+}
+
 TEST(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
   const std::string url = own_url();
   Listener listener(url);
