@@ -3,10 +3,18 @@
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/yaml/yaml_document.hpp>
 
+#include <array>
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace dashpot::controller {
+
+/// Sections of a configuration file. What stands under the last three is for the program that runs
+/// the controller.
+inline constexpr std::array<std::string_view, 12> kConfigSections = {
+    "robot",        "control",  "environment", "gains",    "limits",     "motion",
+    "feed_forward", "watchdog", "analysis",    "commands", "simulation", "scenario"};
 
 /// Contents of a configuration file. controller/examples/panda.yaml has all keys with their units
 /// and defaults.

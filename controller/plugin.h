@@ -257,7 +257,7 @@ typedef struct dashpot_modes {
   uint64_t missed;     /* the background thread was busy */
   /* What some of these ticks could leave out: */
   uint64_t no_zero_modes; /* springs resist every motion, so no zero modes were kept apart */
-  uint64_t no_wrench;     /* geometric_stiffness is on, but there is no external wrench */
+  uint64_t no_wrench;     /* control.load is on, but there is no external wrench */
   uint64_t no_shapes;     /* the configuration asks for no shapes */
   uint64_t at_rest;       /* jacobian_rate is on, but the robot stands still */
   dashpot_mode modes[DASHPOT_MAX_JOINTS];

@@ -21,10 +21,34 @@ struct FeedForward {
   bool wrench = true;        ///< J' times the wrench of the set-point
 };
 
+/// How the wrench f that the world exerts on the tip, RobotState::external_wrench, moves with the
+/// arm, for the analysis. closed_loop.hpp says which stiffness each of them adds.
+enum class Load : std::uint8_t {
+  kIgnored,       ///< the springs are at rest
+  kBaseWrench,    ///< f is constant in B's axes: a weight at the tip, a steady push
+  kToolWrench,    ///< f is constant in T's axes: a grinder, a jet
+  kJointTorques,  ///< J' f is constant: torques at the joints
+};
+
 /// Terms of the task-space law that most controllers leave out.
 struct TaskTerms {
-  bool geometric_stiffness = false;  ///< K_G, from RobotState::external_wrench, in the analysis
-  bool jacobian_rate = false;        ///< J' C_C Jdot, in the analysis
+  Load load = Load::kIgnored;
+  bool jacobian_rate = false;  ///< J' C_C Jdot, in the analysis
+};
+
+/// Springs and dampers that act on the arm beside those of the controller: of a contact, of a
+/// cable, of the drives. They are counted in the modes. Damping that is designed for a ratio and
+/// GainJudge do not know of them. Entries are not negative.
+struct Environment {
+  Vector6 tip_stiffness = Vector6::Zero();  ///< in B's axes, N/m, N m/rad
+  Vector6 tip_damping = Vector6::Zero();    ///< N s/m, N m s/rad
+  JointVector joint_stiffness;              ///< n, N m/rad
+  JointVector joint_damping;                ///< n, N m s/rad
+
+  bool none() const noexcept {
+    return tip_stiffness.isZero(0) && tip_damping.isZero(0) && joint_stiffness.isZero(0) &&
+           joint_damping.isZero(0);
+  }
 };
 
 /// Limits of how fast references and gains change. On the way to a new set-point the reference
@@ -140,6 +164,7 @@ struct Settings {
   double period = 0.001;  ///< of the control loop, s
   FeedForward feed_forward;
   TaskTerms task_terms;
+  Environment environment;
   /// Whether the joints' viscous friction in the model is subtracted from damping that is designed
   /// for a ratio. Only for friction that was measured, because modes have less than the ratio if
   /// the robot has less friction.

@@ -66,7 +66,7 @@ struct VibrationCounters {
   std::uint64_t missed = 0;      ///< the background thread was busy with an earlier task
   // What some of these ticks could leave out:
   std::uint64_t no_zero_modes = 0;  ///< springs resist every motion: no zero modes to keep apart
-  std::uint64_t no_wrench = 0;      ///< K_G is on, but there is no external wrench
+  std::uint64_t no_wrench = 0;      ///< a load is on, but no external wrench
   std::uint64_t no_shapes = 0;      ///< the settings ask for no shapes
   std::uint64_t at_rest = 0;        ///< J' C_C Jdot is on, but the robot stands still
 };

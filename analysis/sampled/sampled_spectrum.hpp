@@ -15,8 +15,8 @@ struct SampledLoop {
   bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / T as q'
   /// D, n x n, N m s/rad: the part of the damping that the joints supply. Empty: none.
   Eigen::MatrixXd friction = {};
-  /// G = dg/dq, n x n, N m/rad: gradient of the gravity that the controller compensates. Empty:
-  /// none.
+  /// G, n x n, N m/rad: the stiffness of the robot without its controller, such as dg/dq, the
+  /// gradient of the gravity that the controller compensates. Empty: none.
   Eigen::MatrixXd gravity_gradient = {};
 };
 

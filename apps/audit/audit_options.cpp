@@ -3,6 +3,7 @@
 #include <dashpot/apps/audit/presets.hpp>
 #include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/controller/config.hpp>
 #include <dashpot/controller/config/config_gains.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/yaml/yaml_document.hpp>
@@ -45,11 +46,8 @@ void take_preset(const std::string& name, AuditOptions& audit) {
 
 /// Sets the gains that stand in a configuration file.
 void read_gains_file(const std::string& path, const RobotModel& model, AuditOptions& audit) try {
-  static constexpr std::array<std::string_view, 11> kKeys = {
-      "robot",    "control",  "gains",    "limits",     "motion",  "feed_forward",
-      "watchdog", "analysis", "commands", "simulation", "scenario"};
   const controller::YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
-  const controller::YamlMapping root(document, "", kKeys);
+  const controller::YamlMapping root(document, "", controller::kConfigSections);
   if (!root.has("gains")) throw InputError("gains", "missing");
   controller::Gains& gains = audit.gains;
   const int n = model.dof();

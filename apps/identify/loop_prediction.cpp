@@ -112,8 +112,9 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
                      std::string("no prediction at this posture: ") + controller::to_text(status));
   }
   const controller::RobotModel arm = corrected(config_, correction).model();
+  const auto at = controller::evaluate(arm, q, JointVector::Zero(q.size()));
   analysis::System<> system(q.size());
-  system.mass = controller::evaluate(arm, q, JointVector::Zero(q.size())).M;
+  system.mass = at.M;
   system.damping = believed.damping;
   system.stiffness = believed.stiffness;
   system.stiffness_factor = believed.stiffness_factor;
@@ -121,9 +122,13 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
   sampled.delay = delay;
   system.damping += sampled.friction;
   system.damping.diagonal() -= joint_friction(config_);
+  const controller::PassivePart outside = controller::passive_part(
+      at.J, settings.environment, controller::JointMatrix::Zero(q.size(), q.size()));
+  sampled.friction += outside.damping;
+  sampled.gravity_gradient = outside.stiffness;
   if (settings.feed_forward.gravity) {
     const MatrixXd gravity = controller::gravity_gradient(arm, q);
-    sampled.gravity_gradient = gravity;
+    sampled.gravity_gradient += gravity;
     if (correction.payload != 0) {  // whose weight nobody holds
       const MatrixXd added = gravity - controller::gravity_gradient(config_.model, q);
       system.stiffness += (added + added.transpose()) / 2;

@@ -13,9 +13,6 @@ using controller::Units;
 using controller::YamlMapping;
 using controller::YamlNode;
 
-constexpr std::array<std::string_view, 11> kArmKeys = {
-    "robot",    "control",  "gains",    "limits",     "motion",  "feed_forward",
-    "watchdog", "analysis", "commands", "simulation", "scenario"};
 
 /// What the controller believes of the robot, which is true unless `simulation.robot` says
 /// otherwise.
@@ -40,7 +37,7 @@ lcmtypes::CommandLimits command_limits(const YamlMapping& root, const controller
 }
 
 void read_arm(const YamlNode& document, const std::filesystem::path& directory, Scene& scene) {
-  const YamlMapping root(document, "", kArmKeys);
+  const YamlMapping root(document, "", controller::kConfigSections);
   if (!root.has("scenario")) {
     throw InputError("scenario",
                      "missing: this is a configuration of the controller, for dashpot_create; a "
@@ -127,7 +124,7 @@ CommandedConfig load_commanded_config(const std::string& path) try {
   controller::Config config =
       controller::read_config(document, std::filesystem::path(path).parent_path());
   const lcmtypes::CommandLimits limits =
-      command_limits(YamlMapping(document, "", kArmKeys), config);
+      command_limits(YamlMapping(document, "", controller::kConfigSections), config);
   return {std::move(config), limits};
 } catch (const InputError& error) {
   throw error.in_file(path);

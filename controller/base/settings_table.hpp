@@ -10,23 +10,34 @@ namespace dashpot::controller {
 struct Setting {
   const char* key;
   const char* unit = "";
-  const char* prismatic = "";  ///< unit of the entry of a prismatic joint
+  const char* prismatic =
+      "";  ///< unit of the entry of a prismatic joint, or of a rotation of the tip
   Range range = kAnyNumber;
   double none =
       std::numeric_limits<double>::quiet_NaN();  ///< infinity that the word none stands for
 };
 
 /// Calls visit(setting, member) for every setting but the gains and the walls. `Struct` is
-/// Settings or const Settings. Members are double, int, bool, JointVector (n entries), Mode and
-/// Analysis::Where.
+/// Settings or const Settings. Members are double, int, bool, JointVector (n entries), Vector6 (of
+/// the tip), Mode, Load and Analysis::Where.
 template <class Struct, class Visitor>
 void for_each_setting(Struct& settings, Visitor&& visit) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   visit(Setting{"control.period", "s", "", kPositive}, settings.period);
   visit(Setting{"control.mode"}, settings.initial.mode);
-  visit(Setting{"control.geometric_stiffness"}, settings.task_terms.geometric_stiffness);
+  visit(Setting{"control.load"}, settings.task_terms.load);
   visit(Setting{"control.jacobian_rate"}, settings.task_terms.jacobian_rate);
   visit(Setting{"control.subtract_friction"}, settings.subtract_friction);
+
+  auto& environment = settings.environment;
+  visit(Setting{"environment.tip_stiffness", "N/m", "N m/rad", kNotNegative},
+        environment.tip_stiffness);
+  visit(Setting{"environment.tip_damping", "N s/m", "N m s/rad", kNotNegative},
+        environment.tip_damping);
+  visit(Setting{"environment.joint_stiffness", "N m/rad", "N/m", kNotNegative},
+        environment.joint_stiffness);
+  visit(Setting{"environment.joint_damping", "N m s/rad", "N s/m", kNotNegative},
+        environment.joint_damping);
 
   auto& limits = settings.limits;
   visit(Setting{"limits.torque", "N m", "N", kPositive}, limits.torque);

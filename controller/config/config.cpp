@@ -82,6 +82,22 @@ class SettingsReader {
          {"background", Analysis::Where::kBackground}}};
     read_choice(keys, key, kPlaces, value);
   }
+  static void read(const YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
+                   Load& value) {
+    static constexpr std::array<std::pair<std::string_view, Load>, 4> kLoads = {
+        {{"ignored", Load::kIgnored},
+         {"base_wrench", Load::kBaseWrench},
+         {"tool_wrench", Load::kToolWrench},
+         {"joint_torques", Load::kJointTorques}}};
+    read_choice(keys, key, kLoads, value);
+  }
+  static void read(const YamlMapping& keys, std::string_view key, const Setting& setting,
+                   Vector6& value) {
+    const std::string& linear = setting.unit;
+    const std::string& angular = setting.prismatic;
+    read_numbers(keys, key, {linear, linear, linear, angular, angular, angular}, setting.range,
+                 value, setting.none);
+  }
   void read(const YamlMapping& keys, std::string_view key, const Setting& setting,
             JointVector& value) const {
     const Units units = joint_units(model_, setting.unit, setting.prismatic);
@@ -182,11 +198,7 @@ void check(const Settings& settings, int n, const YamlNode& document) {
 }  // namespace
 
 Config read_config(const YamlNode& document, const std::filesystem::path& directory) {
-  // What stands under the last three is for the program that runs the controller.
-  static constexpr std::array<std::string_view, 11> kKeys = {
-      "robot",    "control",  "gains",    "limits",     "motion",  "feed_forward",
-      "watchdog", "analysis", "commands", "simulation", "scenario"};
-  const YamlMapping root(document, "", kKeys);
+  const YamlMapping root(document, "", kConfigSections);
   const RobotDescription robot = read_robot(root, directory);
   const RobotModel model = robot.model();
   Settings settings = default_settings(model);

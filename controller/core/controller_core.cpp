@@ -45,6 +45,7 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
       qd_(turn_),
       weight_(turn_),
       goal_(turn_),
+      outside_(!settings.environment.none()),
       combined_(n_) {
   if (settings.analysis.sampled.interval > 0) {
     sampled_ = std::make_unique<SampledAnalysis>(model, settings);
@@ -255,13 +256,13 @@ void ControllerCore::fill_snapshot() noexcept {
 
 void ControllerCore::analyse() noexcept {
   const TaskTerms& terms = settings_.task_terms;
-  const bool with_wrench = terms.geometric_stiffness && !external_wrench_.isZero(0);
+  const bool with_wrench = terms.load != Load::kIgnored && !external_wrench_.isZero(0);
   const bool with_velocity = terms.jacobian_rate && !qd_.isZero(0);
   if (loop_unchanged(with_wrench, with_velocity)) {
     vibration_.repeat(time_, snapshot_.tick);
     return;
   }
-  if (terms.geometric_stiffness && !with_wrench) ++vibration_.counters().no_wrench;
+  if (terms.load != Load::kIgnored && !with_wrench) ++vibration_.counters().no_wrench;
   if (terms.jacobian_rate && !with_velocity) ++vibration_.counters().at_rest;
   VibrationTask& task = vibration_.task();
   task.time = time_;
@@ -280,7 +281,7 @@ void ControllerCore::analyse() noexcept {
 bool ControllerCore::loop_unchanged(bool with_wrench, bool with_velocity) noexcept {
   Analysed now{springs_ != Springs::kOff, false, gains_.changes(), q_, {}, Vector6::Zero()};
   if (with_velocity) now.qd = qd_;
-  if (with_wrench) now.wrench = external_wrench_;
+  if (with_wrench) now.wrench = external_wrench_ + wrench_.now();
   bool same = false, settled = false;
   if (analysed_) {
     now.gains_moved = analysed_->gain_changes != now.gain_changes;
@@ -300,23 +301,41 @@ void ControllerCore::hand_over() noexcept {
   task.tick = snapshot_.tick;
   task.position = snapshot_.position;
   closed_loop(task.system);
+  JointMatrix load = JointMatrix::Zero(n_, n_);
+  if (settings_.task_terms.load != Load::kIgnored) {
+    load = stiffness_of_load(robot_.J, settings_.task_terms.load, external_wrench_);
+  }
+  task.passive = passive_part(robot_.J, settings_.environment, load);
   sampled_->hand_over();
 }
 
 const Impedance& ControllerCore::impedance() noexcept {
   const bool springs = springs_ != Springs::kOff, repels = filter_.repels(q_);
-  if (springs && !repels) return designed_.now(gains_.now());
+  if (springs && !repels && !outside_) return designed_.now(gains_.now());
   combined_ = springs ? designed_.now(gains_.now()) : Impedance(n_);
   if (!springs && !motion_watch_.sees_frozen()) combined_.joint_damping.diagonal() = damping_;
-  if (!repels) return combined_;
-  filter_.add_repulsion(q_, springs, combined_.joint_stiffness, combined_.joint_damping);
-  combined_.joint_weight = 1;  // there are joint springs
+  if (repels) {
+    filter_.add_repulsion(q_, springs, combined_.joint_stiffness, combined_.joint_damping);
+    combined_.joint_weight = 1;  // there are joint springs
+  }
+  if (outside_) add_environment(settings_.environment, combined_);
   return combined_;
 }
 
 void ControllerCore::closed_loop(analysis::System<kMaxJoints>& system) noexcept {
-  controller::closed_loop(robot_, qd_, impedance(), law_.null_space(), viscous_friction_,
-                          settings_.task_terms, external_wrench_, system);
+  const TaskTerms& terms = settings_.task_terms;
+  JointMatrix load;
+  StiffnessTerms more{terms.jacobian_rate};
+  if (terms.load != Load::kIgnored && !external_wrench_.isZero(0)) {
+    const bool springs = springs_ != Springs::kOff;
+    const bool pushes = springs && settings_.feed_forward.wrench;
+    const TipWrenches wrenches{external_wrench_, pushes ? wrench_.now() : Vector6::Zero().eval()};
+    load =
+        stiffness_under_load(robot_, springs ? gains_.now() : Impedance(n_), terms.load, wrenches);
+    more.load = &load;
+  }
+  controller::closed_loop(robot_, qd_, impedance(), law_.null_space(), viscous_friction_, more,
+                          system);
 }
 
 }  // namespace dashpot::controller

@@ -132,6 +132,7 @@ class ControllerCore {
   bool from_user_ = false;    ///< or else it is Settings::initial, where the robot started
   std::optional<Look> look_;  ///< none yet
   std::optional<Analysed> analysed_;
+  bool outside_;        ///< whether there is an environment
   Impedance combined_;  ///< of `impedance`
 
   bool first_ = true;  ///< there was no good state yet

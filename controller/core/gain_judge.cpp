@@ -19,6 +19,9 @@ constexpr std::array<double, kMaxJoints> kPrimes{2,  3,  5,  7,  11, 13, 17, 19,
 /// Those of the loop that is judged.
 Settings judging(Settings settings) {
   settings.task_terms = {};
+  settings.environment.tip_stiffness = settings.environment.tip_damping = Vector6::Zero();
+  settings.environment.joint_stiffness = settings.environment.joint_damping =
+      JointVector::Zero(settings.limits.torque.size());
   return settings;
 }
 

@@ -26,6 +26,7 @@ Settings default_settings(const RobotModel& model) {
   const int n = model.dof();
   const JointVector none = JointVector::Zero(n);
   Settings settings;
+  settings.environment.joint_stiffness = settings.environment.joint_damping = none;
   Limits& limits = settings.limits;
   limits.torque = limits.torque_rate = limits.velocity = limits.damping = none;
   limits.position_lower = limits.position_upper = none;

@@ -39,6 +39,11 @@ class RangeCheck {
       check(setting, std::string(setting.key) + "[" + std::to_string(i) + "]", values[i]);
     }
   }
+  void operator()(const Setting& setting, const Vector6& values) const {
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      check(setting, std::string(setting.key) + "[" + std::to_string(i) + "]", values[i]);
+    }
+  }
   template <class Choice>
   void operator()(const Setting& /*setting*/, Choice /*value*/) const {}
 

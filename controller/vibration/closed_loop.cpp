@@ -1,6 +1,7 @@
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/spring_factors.hpp>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 
@@ -8,7 +9,10 @@ namespace dashpot::controller {
 namespace {
 
 using Eigen::Index;
+using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+constexpr double kLargestAngle = 2;  // rad
 
 /// K += J1' A J2
 void add_congruence(const Jacobian& J1, const Matrix6& A, const Jacobian& J2,
@@ -17,6 +21,33 @@ void add_congruence(const Jacobian& J1, const Matrix6& A, const Jacobian& J2,
     const Vector6 column_j = A * J2.col(j);
     for (Index i = 0; i < K.rows(); ++i) K(i, j) += J1.col(i).dot(column_j);
   }
+}
+
+/// The e with K e = F; zero in directions without springs.
+Vector6 deflection(const Matrix6& K, const Vector6& F) noexcept {
+  constexpr double kNothing = 1e-10;
+  Vector6 scale;  // metres and radians have springs of their own size
+  for (Index i = 0; i < 6; ++i) scale[i] = K(i, i) > 0 ? 1 / std::sqrt(K(i, i)) : 0;
+  const Matrix6 unit = scale.asDiagonal() * K * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6> solved(unit);
+  if (solved.info() != Eigen::Success) return Vector6::Zero();
+  Vector6 parts = solved.eigenvectors().transpose() * scale.cwiseProduct(F);
+  for (Index i = 0; i < 6; ++i) {
+    const double k = solved.eigenvalues()[i];
+    parts[i] = k > kNothing ? parts[i] / k : 0;
+  }
+  return scale.cwiseProduct(solved.eigenvectors() * parts);
+}
+
+/// A with de = -A w, for the rotation vector e of R_d R' while R turns with w: the inverse of the
+/// right Jacobian of the rotations.
+Matrix3d derivative_of_error(const Vector3d& e) noexcept {
+  const double a = e.norm();
+  const double c =
+      a < 1e-2 ? 1.0 / 12 + a * a / 720 : 1 / (a * a) - (1 + std::cos(a)) / (2 * a * std::sin(a));
+  Matrix3d cross;
+  cross << 0, -e.z(), e.y(), e.z(), 0, -e.x(), -e.y(), e.x(), 0;
+  return Matrix3d::Identity() + 0.5 * cross + c * cross * cross;
 }
 
 }  // namespace
@@ -49,6 +80,70 @@ JointMatrix geometric_stiffness(const Jacobian& J, const Vector6& f) noexcept {
   return K_G;
 }
 
+JointMatrix stiffness_of_load(const Jacobian& J, Load load, const Vector6& f) noexcept {
+  if (load == Load::kJointTorques) return JointMatrix::Zero(J.cols(), J.cols());
+  JointMatrix K = -geometric_stiffness(J, f);
+  if (load == Load::kToolWrench) {
+    for (Index k = 0; k < J.cols(); ++k) {
+      Vector6 turned_by_k;  // minus the change of f
+      turned_by_k.head<3>() = f.head<3>().cross(J.col(k).tail<3>());
+      turned_by_k.tail<3>() = f.tail<3>().cross(J.col(k).tail<3>());
+      for (Index j = 0; j < J.cols(); ++j) K(j, k) += J.col(j).dot(turned_by_k);
+    }
+  }
+  return K;
+}
+
+JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& impedance, Load load,
+                                 const TipWrenches& wrenches) noexcept {
+  const Jacobian& J = robot.J;
+  const Matrix6& K_B = impedance.base.stiffness;
+  const Matrix6 K_T = turned(impedance.tool.stiffness, robot.R_BT);
+  const Matrix6 K_C = K_B + K_T;
+  const Vector6 F = -impedance.task_weight * (wrenches.world + wrenches.commanded);
+  Vector6 e = deflection(K_C, F);
+  const double angle = e.tail<3>().norm();
+  if (angle > kLargestAngle) e.tail<3>() *= kLargestAngle / angle;
+  const Matrix3d A = derivative_of_error(e.tail<3>());
+  const Vector6 F_T = K_T * e;
+
+  JointMatrix K =
+      stiffness_of_load(J, load, wrenches.world) - geometric_stiffness(J, F + wrenches.commanded);
+  for (Index k = 0; k < J.cols(); ++k) {
+    const Vector3d w = J.col(k).tail<3>();
+    Vector6 moved = Vector6::Zero(), turned_by_k;
+    moved.tail<3>() = A * w - w;
+    turned_by_k.head<3>() = e.head<3>().cross(w);
+    turned_by_k.tail<3>() = e.tail<3>().cross(w);
+    Vector6 more = K_C * moved - K_T * turned_by_k;
+    more.head<3>() += F_T.head<3>().cross(w);
+    more.tail<3>() += F_T.tail<3>().cross(w);
+    for (Index j = 0; j < J.cols(); ++j) K(j, k) += J.col(j).dot(more);
+  }
+  return K;
+}
+
+void add_environment(const Environment& environment, Impedance& impedance) noexcept {
+  if (!environment.tip_stiffness.isZero(0) || !environment.tip_damping.isZero(0)) {
+    impedance.task_weight = 1;  // there are springs or dampers at the tip
+    impedance.base.stiffness.diagonal() += environment.tip_stiffness;
+    impedance.base.damping.diagonal() += environment.tip_damping;
+  }
+  if (!environment.joint_stiffness.isZero(0)) impedance.joint_weight = 1;
+  impedance.joint_stiffness.diagonal() += environment.joint_stiffness;
+  impedance.joint_damping.diagonal() += environment.joint_damping;
+}
+
+PassivePart passive_part(const Jacobian& J, const Environment& environment,
+                         const JointMatrix& load_stiffness) noexcept {
+  PassivePart part{load_stiffness, JointMatrix::Zero(J.cols(), J.cols())};
+  add_congruence(J, environment.tip_stiffness.asDiagonal(), J, part.stiffness);
+  add_congruence(J, environment.tip_damping.asDiagonal(), J, part.damping);
+  part.stiffness.diagonal() += environment.joint_stiffness;
+  part.damping.diagonal() += environment.joint_damping;
+  return part;
+}
+
 void null_projector(const NullSpace& null_space, JointMatrix& P) noexcept {
   for (Index j = 0; j < P.cols(); ++j) {
     const JointVector column = null_space.projected_velocity(JointVector::Unit(P.rows(), j));
@@ -66,8 +161,7 @@ void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) n
 
 void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Impedance& impedance,
                  const NullSpace& null_space, const JointVector& viscous_friction,
-                 const TaskTerms& terms, const Vector6& external_wrench,
-                 analysis::System<kMaxJoints>& system) noexcept {
+                 const StiffnessTerms& terms, analysis::System<kMaxJoints>& system) noexcept {
   const Jacobian& J = robot.J;
   const Index n = J.cols();
   const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
@@ -86,7 +180,7 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
   for (Index i = 0; i < n; ++i) C(i, i) += viscous_friction[i];
 
   JointMatrix extra = JointMatrix::Zero(n, n);
-  if (terms.geometric_stiffness) extra = geometric_stiffness(J, external_wrench);
+  if (terms.load != nullptr) extra = *terms.load;
   if (terms.jacobian_rate) add_congruence(J, C_C, jacobian_rate(J, qd), extra);
 
   system.has_low_words = false;
@@ -99,7 +193,7 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
       system.stiffness(i, j) = 0.5 * (K(i, j) + K(j, i)) + extra(i, j);
     }
   }
-  if (terms.jacobian_rate || terms.geometric_stiffness) {
+  if (terms.jacobian_rate || terms.load != nullptr) {
     system.stiffness_factor.resize(0, n);
     return;
   }

@@ -11,8 +11,53 @@ namespace dashpot::controller {
 ///     dJ_j/dq_k = (w_k x v_j, w_k x w_j) for k <= j,  (w_j x v_k, 0) for k > j.
 Jacobian jacobian_rate(const Jacobian& J, const JointVector& qd) noexcept;
 
-/// Returns K_G = [(dJ/dq_1)' f ... (dJ/dq_n)' f], n x n, for the wrench f in B's axes.
+/// Returns K_G(f) = [(dJ/dq_1)' f ... (dJ/dq_n)' f], n x n, for the wrench f in B's axes: how the
+/// joint torques J' f change with q where f stays.
 JointMatrix geometric_stiffness(const Jacobian& J, const Vector6& f) noexcept;
+
+/// The wrenches at the tip, in B's axes, that do not come from springs, N and N m.
+struct TipWrenches {
+  Vector6 world = Vector6::Zero();      ///< f, which the world exerts
+  Vector6 commanded = Vector6::Zero();  ///< f_c, the feed-forward
+};
+
+/// Returns the stiffness of the load itself, n x n: minus the change of its joint torques with q,
+///     -K_G(f)                         base_wrench: f is constant in B's axes
+///     -K_G(f) + J' ([f_l x]; [f_m x]) J_w   tool_wrench: f turns with the tip, J_w = rows 4 to 6
+///     of J 0                               joint_torques: J' f is constant.
+JointMatrix stiffness_of_load(const Jacobian& J, Load load, const Vector6& f) noexcept;
+
+/// Returns what a load adds to the stiffness J' K_C J of springs at rest, n x n, where the springs
+/// of `impedance` hold it: they carry F = -w_C (f + f_c) at the error e with K_C e = F, and
+///     -d(J' (F + f_c) + load)/dq - J' K_C J = J' (S - K_C J) - K_G(F + f_c) + stiffness_of_load,
+///     S = K_B (J_v; A J_w) + K_T (J_v; A J_w) + (([F_l x]; [F_m x]) - K_T ([e_l x]; [e_m x])) J_w.
+/// K_B is given in B's axes, K_T in the tool's and turned into B's, the wrench F in the second line
+/// is that of K_T. A = I + [e_m x]/2 + (1/a^2 - (1 + cos a)/(2 a sin a)) [e_m x]^2, a = |e_m|, is
+/// the derivative of the rotation vector. So a constant wrench of the world and the springs that
+/// hold it cancel up to e, whereas constant joint torques leave +K_G(f), the term of the paper.
+///
+/// Springs of joints and of the null space carry none of F, and K_C has to hold all of it. A
+/// deflection of more than 2 rad counts as one of 2 rad.
+JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& impedance, Load load,
+                                 const TipWrenches& wrenches) noexcept;
+
+/// Adds an environment's springs and dampers to those of an impedance.
+void add_environment(const Environment& environment, Impedance& impedance) noexcept;
+
+/// Stiffness and damping that the robot has without its controller, n x n each.
+struct PassivePart {
+  JointMatrix stiffness, damping;
+};
+
+/// Returns those of an environment, and of a load that adds `load_stiffness`.
+PassivePart passive_part(const Jacobian& J, const Environment& environment,
+                         const JointMatrix& load_stiffness) noexcept;
+
+/// Terms of the stiffness that most analyses leave out.
+struct StiffnessTerms {
+  bool jacobian_rate = false;         ///< J' C_C Jdot
+  const JointMatrix* load = nullptr;  ///< of stiffness_under_load, n x n
+};
 
 /// Sets P to N, which projects joint velocities on the null space.
 void null_projector(const NullSpace& null_space, JointMatrix& P) noexcept;
@@ -22,14 +67,13 @@ void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) n
 
 /// Sets `system` to the robot with the springs and dampers of an impedance, M q'' + C q' + K q = f,
 /// linearised where the springs are at rest (e = 0, q = q_d, q = q_0) and N stands still:
-///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot]  [+ K_G(external wrench)]
+///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot]  [+ that of a load]
 ///     C = C_q + J' C_C J + N' C_0 N + viscous friction of the joints.
-/// TaskTerms says which terms in brackets are included. If none is, K is symmetric and has its
+/// `terms` says which terms in brackets are included. If none is, K is symmetric and has its
 /// factor W. The feed-forward does not appear, because it depends on the set-point, not on the
 /// state, except for Coriolis and gravity, which cancel the robot's Coriolis and gravity torques.
 void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Impedance& impedance,
                  const NullSpace& null_space, const JointVector& viscous_friction,
-                 const TaskTerms& terms, const Vector6& external_wrench,
-                 analysis::System<kMaxJoints>& system) noexcept;
+                 const StiffnessTerms& terms, analysis::System<kMaxJoints>& system) noexcept;
 
 }  // namespace dashpot::controller

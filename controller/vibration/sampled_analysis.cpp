@@ -111,10 +111,13 @@ void SampledAnalysis::solve(const Task& task, SampledVibration& result) {
   system.stiffness_factor = task.system.stiffness_factor;
   const analysis::Spectrum<> continuous = analysis::analyze(system);
   result.status = continuous.status;
-  if (gravity_) loop_.gravity_gradient = gravity_gradient(model_, task.position);
-  const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, loop_);
+  analysis::SampledLoop loop = loop_;
+  loop.friction += task.passive.damping;
+  loop.gravity_gradient = task.passive.stiffness;
+  if (gravity_) loop.gravity_gradient += gravity_gradient(model_, task.position);
+  const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, loop);
   result.spectral_radius = sampled.spectral_radius;
-  result.gain_margin = analysis::gain_margin(system, continuous, loop_);
+  result.gain_margin = analysis::gain_margin(system, continuous, loop);
   result.count = static_cast<int>(sampled.modes.size());
   for (std::size_t i = 0; i < sampled.modes.size(); ++i) {
     const analysis::SampledMode& from = sampled.modes[i];

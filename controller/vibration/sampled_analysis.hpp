@@ -4,6 +4,7 @@
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/snapshot.hpp>
+#include <dashpot/controller/vibration/closed_loop.hpp>
 
 #include <atomic>
 #include <thread>
@@ -32,6 +33,7 @@ class SampledAnalysis {
     std::uint64_t resets = 0;  ///< filled in by `hand_over`
     JointVector position;
     analysis::System<kMaxJoints> system;
+    PassivePart passive;  ///< of what the world adds
   };
 
   SampledAnalysis(const RobotModel& model, const Settings& settings);

@@ -14,6 +14,7 @@ from ._core import Error
 from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers, to_vector
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+LOADS = ("base_wrench", "tool_wrench", "joint_torques")
 
 
 class Robot:
@@ -191,7 +192,7 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
                 joint_stiffness: npt.ArrayLike | None = None,
                 joint_damping: npt.ArrayLike | None = None, joint_damping_ratio: float = 0,
                 frame: str = "base", directions: Sequence[str] = DIRECTIONS,
-                external_wrench: npt.ArrayLike | None = None,
+                external_wrench: npt.ArrayLike | None = None, load: str = "base_wrench",
                 soft_frequency: float = 0.1) -> ClosedLoop:
     """Returns the loop that Dashpot's controller closes around the robot at rest at q (n, rad).
 
@@ -200,10 +201,15 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     a pose of the tip, with `task_stiffness` K_C and `task_damping` C_C (6 x 6, in the axes of
     `frame`, base or tool). In the motions that the selected `directions` leave free act
     `null_stiffness` and `null_damping` (n each). A damping ratio above 0 has the damping designed
-    for it. An `external_wrench` (6, of the world on the tip) adds its geometric stiffness.
+    for it. The springs hold an `external_wrench` (6, of the world on the tip, in
+    the base's axes) at q; `load` says how it moves with the arm, which adds stiffness: base_wrench,
+    tool_wrench (it turns with the tip), joint_torques (its joint torques are constant).
 
     Raises Error for a posture or gains that the controller would refuse.
     """
+    if load not in LOADS:
+        raise Error(f"load: {load!r} is none of {', '.join(LOADS)}")
+    kind = 0 if external_wrench is None else 1 + LOADS.index(load)
     at_tip = joint_stiffness is None and joint_damping is None and joint_damping_ratio == 0
     if not at_tip and not (task_stiffness is None and task_damping is None):
         raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
@@ -215,6 +221,6 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
                         to_vector("null_damping", null_damping), is_tool(frame),
                         selected(directions))
     found = _core.closed_loop(robot._core, _joint_values("q", q), gains, at_tip,
-                              to_vector("external_wrench", external_wrench), soft_frequency)
+                              to_vector("external_wrench", external_wrench), kind, soft_frequency)
     return ClosedLoop(found["mass"], found["damping"], found["stiffness"],
                       make_modes(found["modes"]))

@@ -51,11 +51,12 @@ Eigen::MatrixXd pose(const Robot& robot, const Eigen::VectorXd& q) {
 }
 
 analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, const Gains& gains,
-                                  controller::Mode mode, const OptionalVector& wrench) {
+                                  controller::Mode mode, const OptionalVector& wrench,
+                                  controller::Load load) {
   const controller::SetpointFault fault = check_gains(gains, mode, robot.model.dof());
   if (fault) throw std::invalid_argument(std::string(fault.key) + " " + fault.reason);
   Settings settings = controller::default_settings(robot.model);
-  settings.task_terms.geometric_stiffness = wrench.has_value();
+  settings.task_terms.load = load;
   controller::PostureLoop loop(robot.model, settings);
   analysis::System<controller::kMaxJoints> system;
   const controller::Status status = loop.closed_loop(
@@ -72,7 +73,8 @@ analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, cons
 }
 
 nb::dict closed_loop(const Robot& robot, const Eigen::VectorXd& q, const Gains& gains,
-                     bool cartesian, const OptionalVector& wrench, double soft_frequency) {
+                     bool cartesian, const OptionalVector& wrench, int load,
+                     double soft_frequency) {
   analysis::System<> system;
   analysis::Spectrum<> spectrum;
   {
@@ -81,7 +83,8 @@ nb::dict closed_loop(const Robot& robot, const Eigen::VectorXd& q, const Gains& 
       throw std::invalid_argument("external_wrench: six finite numbers are wanted");
     }
     const auto mode = cartesian ? controller::Mode::kCartesian : controller::Mode::kJoint;
-    system = closed_loop_at(robot, robot.joint_vector("q", q), gains, mode, wrench);
+    system = closed_loop_at(robot, robot.joint_vector("q", q), gains, mode, wrench,
+                            static_cast<controller::Load>(load));
     analysis::SpectrumOptions options;
     options.soft_frequency = soft_frequency;
     spectrum = analysis::analyze(system, options);
@@ -204,7 +207,8 @@ void add_robot(nb::module_& m) {
            nb::arg("task_damping_ratio"), nb::arg("null_stiffness").none(),
            nb::arg("null_damping").none(), nb::arg("tool_frame"), nb::arg("directions"));
   m.def("closed_loop", &closed_loop, nb::arg("robot"), nb::arg("q"), nb::arg("gains"),
-        nb::arg("cartesian"), nb::arg("external_wrench").none(), nb::arg("soft_frequency"));
+        nb::arg("cartesian"), nb::arg("external_wrench").none(), nb::arg("load"),
+        nb::arg("soft_frequency"));
 }
 
 }  // namespace dashpot::python

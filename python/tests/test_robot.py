@@ -127,8 +127,14 @@ def test_the_closed_loop_is_made_of_springs_and_dampers(panda):
     position = dashpot.closed_loop(panda, HOME, **TASK, directions=["x", "y", "z"])
     np.testing.assert_allclose(position.stiffness, 200 * J[:3].T @ J[:3], atol=1e-9)
     assert len(position.modes) == 3 and len(position.modes.zero_modes) == 4
-    pushed = dashpot.closed_loop(panda, HOME, **TASK, external_wrench=[0, 0, -50, 0, 0, 0])
-    assert np.abs(pushed.stiffness - found.stiffness).max() > 1
+    force = dict(external_wrench=[0, 0, -50, 0, 0, 0])
+    weight = dashpot.closed_loop(panda, HOME, **TASK, **force)
+    np.testing.assert_allclose(weight.stiffness, found.stiffness, atol=1e-9)
+    torques = dashpot.closed_loop(panda, HOME, **TASK, **force, load="joint_torques")
+    assert np.abs(torques.stiffness - found.stiffness).max() > 1
+    turning = dashpot.closed_loop(panda, HOME, **TASK, **force, load="tool_wrench")
+    across = np.cross(J[3:].T, force["external_wrench"][:3]).T  # of the turned force, minus
+    np.testing.assert_allclose(turning.stiffness - found.stiffness, -J[:3].T @ across, atol=1e-9)
     N = np.eye(7) - np.linalg.solve(panda.mass(HOME), J.T) @ np.linalg.solve(
         J @ np.linalg.solve(panda.mass(HOME), J.T), J)
     posture = dashpot.closed_loop(panda, HOME, **TASK, null_stiffness=[5.0] * 7)
@@ -153,6 +159,7 @@ def test_a_closed_loop_that_cannot_be_is_refused(panda):
             (dict(task_stiffness=[1] * 6, joint_stiffness=[1] * 7), "not both"),
             (dict(task_stiffness=[1] * 6, frame="world"), "frame: 'world'"),
             (dict(task_stiffness=[1] * 6, directions=["w"]), "directions: 'w'"),
-            (dict(task_stiffness=[1] * 6, external_wrench=[1, 2]), "external_wrench")]:
+            (dict(task_stiffness=[1] * 6, external_wrench=[1, 2]), "external_wrench"),
+            (dict(task_stiffness=[1] * 6, external_wrench=[1] * 6, load="x"), "load: 'x'")]:
         with pytest.raises(dashpot.Error, match=message):
             dashpot.closed_loop(panda, HOME, **given)

@@ -275,7 +275,7 @@ TEST(Law, StiffnessOfTheClosedLoopIsTheDerivativeOfItsTorque) {
     torque(one.q, one.qd);
     analysis::System<kMaxJoints> system;
     controller::closed_loop(one.robot, one.qd, impedance, law.null_space(), JointVector::Zero(7),
-                            TaskTerms{}, Vector6::Zero(), system);
+                            {}, system);
     EXPECT_TRUE(system.symmetric());
     EXPECT_TRUE(near(system.mass, one.kdl.M, 1e-12));
     EXPECT_TRUE(near(system.damping, C, 1e-6 * C.norm()));
@@ -321,16 +321,16 @@ TEST(ClosedLoop, AddsOptionalTermsAndFriction) {
   null_space.compute(one.robot.M, one.robot.J, impedance.base, impedance.tool, one.robot.R_BT);
   const JointVector friction = random.vector(7).cwiseAbs();
   const Vector6 f = random.vector(6);
-  const auto system_with = [&](TaskTerms terms) {
+  const auto system_with = [&](const StiffnessTerms& terms) {
     analysis::System<kMaxJoints> system;
-    controller::closed_loop(one.robot, one.qd, impedance, null_space, friction, terms, f, system);
+    controller::closed_loop(one.robot, one.qd, impedance, null_space, friction, terms, system);
     return system;
   };
-  const auto plain = system_with({false, false}), both = system_with({true, true});
+  const JointMatrix load = stiffness_under_load(one.robot, impedance, Load::kToolWrench, {f, f});
+  const auto plain = system_with({}), both = system_with({true, &load});
   const MatrixXd J = one.robot.J;
   const MatrixXd extra =
-      J.transpose() * setpoint.gains.task_damping * jacobian_rate(one.robot.J, one.qd) +
-      geometric_stiffness(one.robot.J, f);
+      J.transpose() * setpoint.gains.task_damping * jacobian_rate(one.robot.J, one.qd) + load;
   EXPECT_TRUE(near(both.stiffness - plain.stiffness, extra, 1e-9));
   EXPECT_EQ(both.stiffness_factor.rows(), 0);
   EXPECT_EQ(plain.stiffness_factor.rows(), 13);

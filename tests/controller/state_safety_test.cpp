@@ -336,7 +336,7 @@ TEST_F(Safety, ShowsWhatIsMeasuredWhileTheTorqueIsRampedDown) {
 }
 
 TEST_F(Safety, AnExternalWrenchThatIsNotFiniteIsReportedAndChangesNothing) {
-  settings.task_terms.geometric_stiffness = true;
+  settings.task_terms.load = Load::kJointTorques;
   settings.analysis.where = Analysis::Where::kInline;
   settings.analysis.share = 1;  // all within the tick
   settings.initial.mode = Mode::kCartesian;

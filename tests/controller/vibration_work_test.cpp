@@ -189,7 +189,7 @@ TEST(VibrationInTheTick, TellsZeroModesFromVibrations) {
 TEST(VibrationInTheTick, LeavesOutTermsThatAreZero) {
   const RobotModel model = panda_model();
   Settings settings = unlimited_settings(model);
-  settings.task_terms = {true, true};
+  settings.task_terms = {Load::kBaseWrench, true};
   LedArm led(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
   led.settle();
   const auto swing = [&](int from) {
@@ -217,7 +217,7 @@ TEST(VibrationInTheTick, NeverTouchesTheTorque) {
   const RobotModel model = panda_model();
   Settings settings = testing::HostileTicks::everything_on(model);
   settings.analysis.every = 1;
-  settings.task_terms = {true, false};
+  settings.task_terms = {Load::kToolWrench, false};
   Controller with(model, settings);
   settings.analysis.where = Analysis::Where::kOff;
   Controller without(model, settings);

@@ -219,7 +219,9 @@ TEST(Config, FillsLimits) {
 TEST(Config, FillsTheRest) {
   const Settings all =
       load(panda() +
-           "control: {geometric_stiffness: true, jacobian_rate: true, subtract_friction: true}\n"
+           "control: {load: tool_wrench, jacobian_rate: true, subtract_friction: true}\n"
+           "environment: {tip_stiffness: [1, 2, 3, 4, 5, 6], tip_damping: [1 N s/mm, 0, 0, 0, 0, 7],\n"
+           "  joint_stiffness: 8, joint_damping: [1, 2, 3, 4, 5, 6, 7]}\n"
            "motion: {velocity: 1, acceleration: 180 deg/s^2, linear_velocity: 100 mm/s,\n"
            "  linear_acceleration: 1, angular_velocity: 2, angular_acceleration: 3, smoothing: 20 "
            "ms,\n"
@@ -237,7 +239,11 @@ TEST(Config, FillsTheRest) {
            "  shapes: false,\n"
            "  sampled: {interval: 500 ms, delay: 2, cutoff: 30 Hz, difference_velocity: true}}\n")
           .settings;
-  EXPECT_TRUE(all.task_terms.geometric_stiffness);
+  EXPECT_EQ(all.task_terms.load, controller::Load::kToolWrench);
+  EXPECT_EQ(all.environment.tip_stiffness, VectorXd::LinSpaced(6, 1, 6));
+  EXPECT_EQ(all.environment.tip_damping, (controller::Vector6{1000, 0, 0, 0, 0, 7}));
+  EXPECT_EQ(all.environment.joint_stiffness, VectorXd::Constant(7, 8));
+  EXPECT_EQ(all.environment.joint_damping, VectorXd::LinSpaced(7, 1, 7));
   EXPECT_TRUE(all.task_terms.jacobian_rate);
   EXPECT_TRUE(all.subtract_friction);
   EXPECT_EQ(all.motion.velocity, VectorXd::Ones(7));

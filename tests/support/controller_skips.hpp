@@ -216,7 +216,7 @@ inline std::vector<TermSkip> term_skips() {
   std::vector<TermSkip> all;
   all.push_back({{"K_G without a wrench"},
                  [](Settings& a, Settings& b) {
-                   a.task_terms.geometric_stiffness = b.task_terms.geometric_stiffness = true;
+                   a.task_terms.load = b.task_terms.load = controller::Load::kJointTorques;
                  },
                  nothing,
                  [](RobotState& state, Setpoint&) { state.external_wrench[2] = kTiny; },

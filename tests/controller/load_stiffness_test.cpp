@@ -1,0 +1,183 @@
+// The stiffness of an arm that holds a load: against differences of the law's torque and the
+// load's. The simulated counterpart is tests/sim/loaded_modes_test.cpp.
+#include <dashpot/controller/law/impedance_law.hpp>
+#include <dashpot/controller/vibration/closed_loop.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <limits>
+#include <string>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Quaterniond;
+using testing::near;
+using testing::Random;
+
+constexpr ErrorClamp kUnclamped{std::numeric_limits<double>::infinity(),
+                                std::numeric_limits<double>::infinity()};
+
+/// An arm whose springs hold a wrench of the world at q.
+struct HeldLoad {
+  RobotModel model = testing::arm_model(testing::arms()[0]);
+  JointVector q, rest = JointVector::Zero(7);
+  DynamicsResult robot;
+  Impedance impedance{7};
+  TipWrenches wrenches;
+  SpringReferences references{{JointVector::Ones(7), JointVector::Ones(7), 1, 1, 1, 1, 0.01, 0},
+                              1e-3};
+
+  explicit HeldLoad(Random& random) : q(random.vector(7)), robot(at(q)) {
+    wrenches.world << 20 * random.vector(3), 2 * random.vector(3);
+    wrenches.commanded << 10 * random.vector(3), random.vector(3);
+  }
+  DynamicsResult at(const JointVector& there) const {
+    DynamicsResult result;
+    DynamicsKernel(model).evaluate(there, rest, result);
+    return result;
+  }
+  /// Puts the springs' rest to where they hold the load.
+  void hold() {
+    const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
+    Vector6 e = Vector6::Zero();
+    if (impedance.task_weight > 0) {
+      e = -impedance.task_weight *
+          Eigen::FullPivLU<Matrix6>(K_C).solve(wrenches.world + wrenches.commanded);
+    }
+    references.joint.start(q);
+    references.posture.start(q);
+    references.tip.start(robot.p_BT_B + e.head<3>(),
+                         quaternion(Eigen::Vector3d(e.tail<3>())) * Quaterniond(robot.R_BT));
+  }
+  /// Of springs, feed-forward and world.
+  JointVector torque(ImpedanceLaw& law, Load load, const JointVector& there) const {
+    const DynamicsResult now = at(there);
+    JointVector tau;
+    law.torque(now, there, rest, impedance, references, wrenches.commanded, kUnclamped, tau);
+    Vector6 f = wrenches.world;
+    if (load == Load::kToolWrench) {
+      const Eigen::Matrix3d turn = now.R_BT * robot.R_BT.transpose();
+      f << turn * wrenches.world.head<3>(), turn * wrenches.world.tail<3>();
+    }
+    const Jacobian& J = load == Load::kJointTorques ? robot.J : now.J;
+    return tau + JointVector(J.transpose() * f);
+  }
+};
+
+Gains springs(Random& random) {
+  Gains gains;
+  gains.joint_stiffness = 100 * random.spd(7);
+  gains.joint_damping = MatrixXd::Zero(7, 7);
+  gains.task_stiffness = 300 * random.spd(6);
+  gains.task_damping = Matrix6::Zero();
+  gains.null_stiffness = gains.null_damping = JointVector::Zero(7);
+  return gains;
+}
+
+TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
+  Random random(411);
+  std::printf("seed 411\n");
+  for (int k = 0; k < 48; ++k) {
+    HeldLoad held(random);
+    Setpoint setpoint;
+    setpoint.gains = springs(random);
+    const Impedance joint(setpoint, 7);
+    setpoint.mode = Mode::kCartesian;
+    setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
+    const Impedance tip(setpoint, 7);
+    held.impedance = k % 4 < 2 ? tip : k % 8 < 4 ? joint : blend(joint, tip, 0.4);
+    held.hold();
+    ImpedanceLaw law(held.model, {false, false, false, false, true});
+    for (const Load load : {Load::kBaseWrench, Load::kToolWrench, Load::kJointTorques}) {
+      SCOPED_TRACE(std::to_string(k) + ", load " + std::to_string(static_cast<int>(load)));
+      constexpr double kStep = 1e-5;
+      MatrixXd K(7, 7);
+      for (int i = 0; i < 7; ++i) {
+        const JointVector d = kStep * JointVector::Unit(7, i);
+        K.col(i) =
+            (held.torque(law, load, held.q - d) - held.torque(law, load, held.q + d)) / (2 * kStep);
+      }
+      const JointMatrix added =
+          stiffness_under_load(held.robot, held.impedance, load, held.wrenches);
+      analysis::System<kMaxJoints> system;
+      closed_loop(held.robot, held.rest, held.impedance, law.null_space(), held.rest,
+                  {false, &added}, system);
+      EXPECT_TRUE(near(system.stiffness, K, 1e-7 * K.norm()));
+      EXPECT_GT(added.norm(), 1e-3 * K.norm()) << "else it shows nothing";
+    }
+  }
+}
+
+/// A dead weight at the tip and translational springs that hold it are as without the weight.
+TEST(LoadStiffness, IsNoneOfAWeightOnSpringsOfTranslation) {
+  Random random(412);
+  HeldLoad held(random);
+  held.wrenches.world << 0, 0, -70, 0, 0, 0;
+  held.wrenches.commanded.setZero();
+  held.impedance.task_weight = 1;
+  held.impedance.base.stiffness.diagonal() << 2000, 1500, 1000, 50, 60, 70;
+  EXPECT_LT(
+      stiffness_under_load(held.robot, held.impedance, Load::kBaseWrench, held.wrenches).norm(),
+      1e-10);
+  const JointMatrix paper =
+      stiffness_under_load(held.robot, held.impedance, Load::kJointTorques, held.wrenches);
+  EXPECT_TRUE(near(paper, geometric_stiffness(held.robot.J, held.wrenches.world), 1e-10));
+  EXPECT_GT(paper.norm(), 10);
+}
+
+/// Directions without springs carry nothing, and a deflection without bound counts as a bounded
+/// one.
+TEST(LoadStiffness, IsFiniteWhereSpringsCannotHoldTheLoad) {
+  Random random(413);
+  HeldLoad held(random);
+  held.wrenches.world << 0, 0, 0, 1e6, -1e6, 1e6;
+  held.impedance.task_weight = 1;
+  held.impedance.base.stiffness.diagonal() << 2000, 0, 1000, 50, 1e-9, 0;
+  for (const Load load : {Load::kBaseWrench, Load::kToolWrench, Load::kJointTorques}) {
+    const JointMatrix K = stiffness_under_load(held.robot, held.impedance, load, held.wrenches);
+    EXPECT_TRUE(K.allFinite());
+    EXPECT_LT(K.norm(), 1e9);
+  }
+}
+
+TEST(LoadStiffness, AnEnvironmentAddsItsSpringsAndDampers) {
+  Random random(414);
+  HeldLoad held(random);
+  Environment environment;
+  environment.tip_stiffness << 100, 200, 300, 4, 5, 6;
+  environment.tip_damping << 1, 2, 3, 0.4, 0.5, 0.6;
+  environment.joint_stiffness = JointVector::LinSpaced(7, 1, 7);
+  environment.joint_damping = JointVector::LinSpaced(7, 0.1, 0.7);
+  Setpoint setpoint;
+  setpoint.gains = springs(random);
+  NullSpace null_space;
+  for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+    setpoint.mode = mode;
+    Impedance impedance(setpoint, 7);
+    analysis::System<kMaxJoints> before, after;
+    closed_loop(held.robot, held.rest, impedance, null_space, held.rest, {}, before);
+    add_environment(environment, impedance);
+    closed_loop(held.robot, held.rest, impedance, null_space, held.rest, {}, after);
+    const MatrixXd J = held.robot.J;
+    MatrixXd K = J.transpose() * environment.tip_stiffness.asDiagonal() * J;
+    MatrixXd C = J.transpose() * environment.tip_damping.asDiagonal() * J;
+    K.diagonal() += environment.joint_stiffness;
+    C.diagonal() += environment.joint_damping;
+    EXPECT_TRUE(near(after.stiffness - before.stiffness, K, 1e-9));
+    EXPECT_TRUE(near(after.damping - before.damping, C, 1e-9));
+    EXPECT_TRUE(
+        near(after.stiffness_factor.transpose() * after.stiffness_factor, after.stiffness, 1e-9));
+    const PassivePart part = passive_part(held.robot.J, environment, JointMatrix::Zero(7, 7));
+    EXPECT_TRUE(near(part.stiffness, K, 1e-10));
+    EXPECT_TRUE(near(part.damping, C, 1e-10));
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::controller
