@@ -162,7 +162,7 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   for (int n = 2; n <= 16; ++n) add(n);
 #ifdef DASHPOT_HAVE_PINOCCHIO
-  benchmark::AddCustomContext("pinocchio", PINOCCHIO_VERSION);
+  benchmark::AddCustomContext("Pinocchio", PINOCCHIO_VERSION);
   for (int n = 2; n <= 16; ++n) add_pinocchio(n);
 #endif
   benchmark::RunSpecifiedBenchmarks();
