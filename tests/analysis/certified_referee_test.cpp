@@ -215,7 +215,8 @@ long double wanted_radius(const std::vector<const Published*>& all) {
 
 /// `expected`: how many eigenvalues there are but those at zero. Status kUncertified may claim
 /// fewer.
-void judge(const Published& ours, Status status, const CertifiedEigenvalues& truth, int expected) {
+void expect_met(const Published& ours, Status status, const CertifiedEigenvalues& truth,
+                int expected) {
   ASSERT_TRUE(status == Status::kOk || status == Status::kUncertified) << to_text(status);
   EXPECT_LE(ours.claimed(), expected);
   EXPECT_TRUE(status == Status::kUncertified || (ours.claimed() == expected && ours.unproved == 0));
@@ -263,11 +264,11 @@ TEST_P(CertifiedReferee, EveryDiscMeetsABallOfItsOwn) {
       ASSERT_GT(truth.bits, 0) << "Arb proves nothing";
       {
         SCOPED_TRACE("direct");
-        judge(of_direct, solved, truth, 2 * n - direct.zero_modes.count);
+        expect_met(of_direct, solved, truth, 2 * n - direct.zero_modes.count);
       }
       {
         SCOPED_TRACE("tracked");
-        judge(of_tracked, followed, truth, 2 * n - 2 * tracked->zero_mode_count);
+        expect_met(of_tracked, followed, truth, 2 * n - 2 * tracked->zero_mode_count);
       }
       if (HasFailure()) return;
       const bool proved = solved == Status::kOk && followed == Status::kOk;
