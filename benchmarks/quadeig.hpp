@@ -14,6 +14,15 @@
 
 namespace dashpot::bench {
 
+/// The work space that dggev3 asks for with n rows. With less, LAPACK 3.11 writes beyond it.
+inline Eigen::VectorXd qz_work_space(Eigen::Index n) {
+  const auto rows = static_cast<lapack_int>(n);
+  double size = 0;
+  LAPACKE_dggev3_work(LAPACK_COL_MAJOR, 'V', 'V', rows, nullptr, rows, nullptr, rows, nullptr,
+                      nullptr, nullptr, nullptr, rows, nullptr, rows, &size, -1);
+  return Eigen::VectorXd(static_cast<Eigen::Index>(size));
+}
+
 /// [C -I; K 0] x = -l [M 0; 0 I] x in these coordinates: rows of M times Q_M' (M P = Q_M R), those
 /// of K times Q_K', of which only the first `rank` are not zero.
 class Quadeig {
@@ -21,7 +30,7 @@ class Quadeig {
   using Matrix = Eigen::MatrixXd;
   using Vector = Eigen::VectorXd;
 
-  explicit Quadeig(Eigen::Index n) : n_(n), work_(2 * n * 40 + 64) {}
+  explicit Quadeig(Eigen::Index n) : n_(n), work_(qz_work_space(2 * n)) {}
 
   /// The eigenvalues, 2n; vectors are computed, too, as rivals do.
   std::vector<std::complex<double>> solve(const analysis::System<>& system) {

@@ -223,13 +223,14 @@ void dggev(benchmark::State& state, const Problem& problem, bool blocked) {
   B.bottomRightCorner(m, m) = system.mass;
   const auto n = static_cast<lapack_int>(2 * m);
   MatrixXd a = A, b = B, left(n, n), right(n, n);
-  VectorXd re(n), im(n), beta(n), work(40 * n + 64);
+  VectorXd re(n), im(n), beta(n), work = dashpot::bench::qz_work_space(n);
+  const auto size = static_cast<lapack_int>(work.size());
   const auto solve = blocked ? LAPACKE_dggev3_work : LAPACKE_dggev_work;
   for (auto _ : state) {
     a = A;
     b = B;
     solve(LAPACK_COL_MAJOR, 'V', 'V', n, a.data(), n, b.data(), n, re.data(), im.data(),
-          beta.data(), left.data(), n, right.data(), n, work.data(), 40 * n + 64);
+          beta.data(), left.data(), n, right.data(), n, work.data(), size);
     benchmark::ClobberMemory();
   }
   report(state, problem, values_of(re, im, beta));
