@@ -40,7 +40,8 @@ def spectra(rows, microseconds):
 def dynamics(rows, microseconds):
     """Of 7 joints: all terms, and each of Pinocchio's functions, beside all of ours."""
     ours = rows.get("dynamics/dashpot/7")
-    names = [name for name in rows if re.fullmatch(r"dynamics/\w+/7", name)]
+    names = sorted((name for name in rows if re.fullmatch(r"dynamics/\w+/7", name)),
+                   key=lambda name: microseconds(rows[name]))
     return [f"  {name.split('/')[1]:30} {microseconds(rows[name]):9.4g} us  "
             f"{ratio(rows[name], ours, microseconds)}" for name in names] if ours else []
 
