@@ -1,7 +1,8 @@
 // M, C(q, qd) qd, gravity torque, J, Jdot qd and the tip's pose at one state: Dashpot's kernel
-// beside KDL's solvers for the same, and Pinocchio's where it is installed, on the same chain. 7
-// joints are the Panda; other numbers are random chains of revolute joints. The largest difference
-// from KDL, relative to the largest entry of each term, is printed beside each time.
+// beside KDL's solvers for the same, and Pinocchio's where its headers are found, on the same
+// chain; each of Pinocchio's functions by itself, too. 7 joints are the Panda; other numbers are
+// random chains of revolute joints. The largest difference from KDL, relative to the largest entry
+// of each term, is printed beside each time.
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
@@ -15,12 +16,7 @@
 #include <vector>
 
 #ifdef DASHPOT_HAVE_PINOCCHIO
-#include <pinocchio/algorithm/crba.hpp>
-#include <pinocchio/algorithm/frames.hpp>
-#include <pinocchio/algorithm/jacobian.hpp>
-#include <pinocchio/algorithm/kinematics.hpp>
-#include <pinocchio/algorithm/rnea.hpp>
-#include <pinocchio/parsers/urdf.hpp>
+#include <dashpot/benchmarks/pinocchio_chain.hpp>
 #endif
 
 namespace {
@@ -107,31 +103,48 @@ void kdl(benchmark::State& state, int n) {
 }
 
 #ifdef DASHPOT_HAVE_PINOCCHIO
-void pinocchio_terms(benchmark::State& state) {
-  pinocchio::Model model;
-  pinocchio::urdf::buildModel(DASHPOT_SOURCE_DIR "/sim/models/panda.urdf", model);
-  pinocchio::Data data(model);
-  const auto tip = model.getFrameId("panda_hand_tcp");
-  std::vector<std::pair<Eigen::VectorXd, Eigen::VectorXd>> inputs;
-  for (const State& one : states(7)) inputs.emplace_back(one.q, one.qd);
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(7);
-  Eigen::MatrixXd J = Eigen::MatrixXd::Zero(6, 7);
+using dashpot::bench::PinocchioChain;
+using Eigen::VectorXd;
+
+/// Times `call(chain, q, qd)`.
+template <class Call>
+void pinocchio_call(benchmark::State& state, int n, Call call) {
+  const RobotModel model = model_of(n);
+  PinocchioChain chain(model);
+  std::vector<std::pair<VectorXd, VectorXd>> inputs;
+  for (const State& one : states(n)) inputs.emplace_back(one.q, one.qd);
   std::size_t i = 0;
   for (auto _ : state) {
-    const auto& [q, qd] = inputs[i];
-    pinocchio::crba(model, data, q);
-    pinocchio::nonLinearEffects(model, data, q, qd);
-    pinocchio::computeGeneralizedGravity(model, data, q);
-    pinocchio::computeJointJacobians(model, data, q);
-    pinocchio::forwardKinematics(model, data, q, qd, zero);
-    pinocchio::updateFramePlacement(model, data, tip);
-    pinocchio::getFrameJacobian(model, data, tip, pinocchio::LOCAL_WORLD_ALIGNED, J);
-    auto bias =
-        pinocchio::getFrameClassicalAcceleration(model, data, tip, pinocchio::LOCAL_WORLD_ALIGNED);
-    benchmark::DoNotOptimize(&bias);
+    call(chain, inputs[i].first, inputs[i].second);
     benchmark::ClobberMemory();
     i = (i + 1) % kStates;
   }
+  KdlDynamics kdl(model);
+  double worst = 0;
+  for (const auto& [q, qd] : inputs) {
+    chain.all(q, qd);
+    kdl.solve(q, qd);
+    worst = std::max(worst, largest_difference(chain.result(), kdl.result()));
+  }
+  state.counters["difference"] = worst;
+}
+
+void add_pinocchio(int n) {
+  const auto add = [n](const std::string& what, auto call) {
+    const std::string name = "dynamics/pinocchio" + what + "/" + std::to_string(n);
+    benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
+      pinocchio_call(state, n, call);
+    })->Unit(benchmark::kMicrosecond);
+  };
+  add("", [](auto& chain, auto& q, auto& qd) { chain.all(q, qd); });
+  if (n != 7) return;
+  add("_mass", [](auto& chain, auto& q, auto&) { chain.mass(q); });
+  add("_bias", [](auto& chain, auto& q, auto& qd) { chain.bias(q, qd); });
+  add("_gravity", [](auto& chain, auto& q, auto&) { chain.gravity(q); });
+  add("_jacobian", [](auto& chain, auto& q, auto&) { chain.jacobian(q); });
+  add("_jacobian_rate", [](auto& chain, auto& q, auto& qd) { chain.jacobian_rate(q, qd); });
+  add("_bias_acceleration", [](auto& chain, auto& q, auto& qd) { chain.bias_acceleration(q, qd); });
+  add("_pose", [](auto& chain, auto& q, auto&) { chain.pose(q); });
 }
 #endif
 
@@ -149,8 +162,8 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   for (int n = 2; n <= 16; ++n) add(n);
 #ifdef DASHPOT_HAVE_PINOCCHIO
-  benchmark::RegisterBenchmark("dynamics/pinocchio/7", pinocchio_terms)
-      ->Unit(benchmark::kMicrosecond);
+  benchmark::AddCustomContext("Pinocchio", PINOCCHIO_VERSION);
+  for (int n = 2; n <= 16; ++n) add_pinocchio(n);
 #endif
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();

@@ -95,7 +95,7 @@ class MujocoPanda {
   /// Adds J' w of the law's wrench w at the tip.
   static void push_tip(const mjModel* model, mjData* data) {
     const MujocoPanda& self = *active();
-    const int body = model->nbody - 1;
+    const int body = static_cast<int>(model->nbody) - 1;
     using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
     const Eigen::Matrix3d R = Eigen::Map<const RowMajor3>(data->xmat + 9 * body);
     const sim::Pose& tip = self.law_.robot().tip();

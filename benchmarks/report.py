@@ -15,7 +15,8 @@ import re
 import statistics
 import sys
 
-ACCURACIES = [10.0**-k for k in range(3, 10)]  # rad
+import rivals
+
 ROOT = pathlib.Path(__file__).parent.parent
 GAINS = {"soft": "1e2", "ordinary": "1e3", "stiff": "1e5"}
 TIMES = ("real_time", "cpu_time")
@@ -212,22 +213,6 @@ def passes_table(results):
     return lines
 
 
-def accuracy_table(results):
-    """Of every accuracy, ours and the fastest rival."""
-    lines = []
-    for gains in GAINS:
-        for accuracy in ACCURACIES:
-            found = {whose: results.fastest(gains, whose, accuracy)
-                     for whose in ("ours", "odeint", "mujoco")}
-            if not found["ours"] or not found["odeint"]:
-                continue
-            text = "  ".join(f"{whose} {f[1]:7.0f} us ({f[2]})"
-                             for whose, f in found.items() if f)
-            ratio = min(f[1] for w, f in found.items() if f and w != "ours") / found["ours"][1]
-            lines.append(f"  {gains:8} {accuracy:.0e} rad  {ratio:5.2f}x  {text}")
-    return lines
-
-
 def exponents(results):
     """Time = c n^p, by least squares of the logarithms."""
     families = collections.defaultdict(list)
@@ -317,7 +302,8 @@ def main():
     directory = pathlib.Path(sys.argv[1])
     names = sorted(glob.glob(str(directory / "parts" / "*.json")))
     # A program of which a filter leaves nothing writes nothing.
-    merged = merge([json.load(open(name)) for name in names if pathlib.Path(name).stat().st_size])
+    parts = [json.load(open(name)) for name in names if pathlib.Path(name).stat().st_size]
+    merged = merge(parts)
     (directory / "results.json").write_text(json.dumps(merged, indent=1))
     results = Results(merged)
     text = markdown(headline(results), merged["context"])
@@ -332,8 +318,12 @@ def main():
     print("\nSpectra of 6 modes, time against proved bound as iterations are added (relative change since")
     print("the last spectrum), and solved directly with residuals of growing precision:")
     print("\n".join(passes_table(results)))
+    print(f"\nRivals: {rivals.versions(parts)}. Those of 6 modes beside ours, solved directly:")
+    print("\n".join(rivals.spectra(results.rows, microseconds)))
+    print("\nDynamics of 7 joints, all terms unless named, beside all of ours:")
+    print("\n".join(rivals.dynamics(results.rows, microseconds)))
     print("\nSimulation, the fastest to an accuracy (and how much slower the rival is):")
-    print("\n".join(accuracy_table(results)))
+    print("\n".join(rivals.simulations(results, GAINS)))
     print("\nGrowth with the number of joints, modes, configurations, threads:")
     print("\n".join(exponents(results)))
     if results.too_short:

@@ -244,13 +244,21 @@ void add_adaptive(const std::string& gains, double gain, double tolerance) {
   rival("bulirsch_stoer", bulirsch_stoer(tolerance));
 }
 
+#ifdef DASHPOT_MUJOCO_NAME  // another MuJoCo than that of simulation_bench, which has all the rest
+constexpr bool kOnlyMujoco = true;
+#else
+constexpr bool kOnlyMujoco = false;
+#define DASHPOT_MUJOCO_NAME "mujoco"
+#endif
+
 #ifdef DASHPOT_HAVE_MUJOCO
 void add_mujoco(const std::string& gains, double gain, int steps) {
   for (const auto& [name, kind] :
        {std::pair("euler", mjINT_EULER), {"rk4", mjINT_RK4}, {"implicit", mjINT_IMPLICIT}}) {
     const auto panda = std::make_shared<bench::MujocoPanda>(gain, kind, kEnd / steps);
     const Solve solve = [panda, steps](ReleasedPanda& ours) { return panda->run(ours, steps); };
-    add(gains, gain, "mujoco/" + std::string(name) + "/" + std::to_string(steps), solve);
+    add(gains, gain, DASHPOT_MUJOCO_NAME "/" + std::string(name) + "/" + std::to_string(steps),
+        solve);
   }
 }
 #endif
@@ -260,14 +268,19 @@ void add_mujoco(const std::string& gains, double gain, int steps) {
 int main(int argc, char** argv) {  // NOLINT(bugprone-exception-escape): of set-up
   for (const auto& [name, gain] : {std::pair("soft", 1e2), {"ordinary", 1e3}, {"stiff", 1e5}}) {
     for (const int steps : kSteps) {
-      add_fixed(name, gain, steps);
+      if (!kOnlyMujoco) add_fixed(name, gain, steps);
 #ifdef DASHPOT_HAVE_MUJOCO
       add_mujoco(name, gain, steps);
 #endif
     }
-    for (const double tolerance : kTolerances) add_adaptive(name, gain, tolerance);
+    for (const double tolerance : kTolerances) {
+      if (!kOnlyMujoco) add_adaptive(name, gain, tolerance);
+    }
   }
   benchmark::Initialize(&argc, argv);
+#ifdef DASHPOT_HAVE_MUJOCO
+  benchmark::AddCustomContext(DASHPOT_MUJOCO_NAME, mj_versionString());
+#endif
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
   return 0;

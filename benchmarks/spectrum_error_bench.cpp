@@ -4,10 +4,17 @@
 //     shapes), ours_reused (the same system again): {M, C, K} to modes, with proved bounds
 //   ours_working, ours_extended: directly, with residuals in working precision or in twice that
 //   ours_moved_1e-K: tracked from a system that differs by 1e-K; `iterations` grow with the change
-//   eigen, eigen_values, dgeev (both sides), dgeev_values, dggev: from the 2m x 2m matrices, which
-//     are formed outside the clock
+//   eigen, eigen_values, dgeev (both sides), dgeev_values, dggev, dggev3: from the 2m x 2m
+//   matrices,
+//     which are formed outside the clock
+//   quadeig: from {M, C, K}, scaled and deflated, with right vectors
+//   arb_BITS: from {M, C, K} to eigenvalues that FLINT/Arb proves with this precision
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/benchmarks/quadeig.hpp>
+#ifdef DASHPOT_HAVE_ARB
+#include <dashpot/tests/support/certified_spectrum.hpp>
+#endif
 #include <dashpot/tests/support/quad_spectrum.hpp>
 
 #include <benchmark/benchmark.h>
@@ -206,7 +213,7 @@ void dgeev(benchmark::State& state, const Problem& problem, bool vectors) {
 }
 
 /// [0 I; -K -C] x = l [I 0; 0 M] x
-void dggev(benchmark::State& state, const Problem& problem) {
+void dggev(benchmark::State& state, const Problem& problem, bool blocked) {
   const System<>& system = problem.system;
   const Eigen::Index m = system.dof();
   MatrixXd A = MatrixXd::Zero(2 * m, 2 * m), B = MatrixXd::Identity(2 * m, 2 * m);
@@ -216,17 +223,48 @@ void dggev(benchmark::State& state, const Problem& problem) {
   B.bottomRightCorner(m, m) = system.mass;
   const auto n = static_cast<lapack_int>(2 * m);
   MatrixXd a = A, b = B, left(n, n), right(n, n);
-  VectorXd re(n), im(n), beta(n), work(32 * n);
+  VectorXd re(n), im(n), beta(n), work = dashpot::bench::qz_work_space(n);
+  const auto size = static_cast<lapack_int>(work.size());
+  const auto solve = blocked ? LAPACKE_dggev3_work : LAPACKE_dggev_work;
   for (auto _ : state) {
     a = A;
     b = B;
-    LAPACKE_dggev_work(LAPACK_COL_MAJOR, 'V', 'V', n, a.data(), n, b.data(), n, re.data(),
-                       im.data(), beta.data(), left.data(), n, right.data(), n, work.data(),
-                       32 * n);
+    solve(LAPACK_COL_MAJOR, 'V', 'V', n, a.data(), n, b.data(), n, re.data(), im.data(),
+          beta.data(), left.data(), n, right.data(), n, work.data(), size);
     benchmark::ClobberMemory();
   }
   report(state, problem, values_of(re, im, beta));
 }
+
+void quadeig(benchmark::State& state, const Problem& problem) {
+  dashpot::bench::Quadeig solver(problem.system.dof());
+  Values values;
+  for (auto _ : state) {
+    values = solver.solve(problem.system);
+    benchmark::ClobberMemory();
+  }
+  report(state, problem, values);
+}
+
+#ifdef DASHPOT_HAVE_ARB
+void arb(benchmark::State& state, const Problem& problem, int bits) {
+  dashpot::testing::CertifiedEigenvalues found;
+  for (auto _ : state) {
+    found = dashpot::testing::certify_eigenvalues(problem.system, bits);
+    benchmark::ClobberMemory();
+  }
+  if (found.bits == 0) return state.SkipWithError("nothing is proved with so few bits");
+  Values values;
+  double bound = 0;
+  for (std::size_t i = 0; i < found.center.size(); ++i) {
+    const auto [x, y] = found.center[i];
+    values.emplace_back(static_cast<double>(x), static_cast<double>(y));
+    bound = std::max(bound, static_cast<double>(found.radius[i]) / std::abs(values.back()));
+  }
+  report(state, problem, values);
+  state.counters["bound"] = bound;
+}
+#endif
 
 void add_problem(const Family& family, int m) {
   // Made by the first benchmark that runs.
@@ -268,13 +306,33 @@ void add_problem(const Family& family, int m) {
   add("eigen_values", [](auto& state, const Problem& p) { eigen(state, p, false); });
   add("dgeev", [](auto& state, const Problem& p) { dgeev(state, p, true); });
   add("dgeev_values", [](auto& state, const Problem& p) { dgeev(state, p, false); });
-  add("dggev", dggev);
+  add("dggev", [](auto& state, const Problem& p) { dggev(state, p, false); });
+  add("dggev3", [](auto& state, const Problem& p) { dggev(state, p, true); });
+  add("quadeig", quadeig);
+#ifdef DASHPOT_HAVE_ARB
+  for (const int bits : {64, 128}) {
+    if (m > 10) continue;  // 10 modes take 10 ms
+    add("arb_" + std::to_string(bits), [=](auto& state, const Problem& p) { arb(state, p, bits); });
+  }
+#endif
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
+  const auto context = [](const char* what, std::initializer_list<int> version) {
+    std::string text;
+    for (const int part : version) text += (text.empty() ? "" : ".") + std::to_string(part);
+    benchmark::AddCustomContext(what, text);
+  };
+  lapack_int major = 0, minor = 0, patch = 0;
+  LAPACKE_ilaver(&major, &minor, &patch);
+  context("LAPACK", {major, minor, patch});
+  context("Eigen", {EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION});
+#ifdef DASHPOT_HAVE_ARB
+  benchmark::AddCustomContext("Arb", ARB_VERSION);
+#endif
   for (const bool badly_scaled : {false, true}) {
     for (const auto& [name, ratio] :
          {std::pair<std::string, double>{"light", 0.05}, {"critical", 1}, {"heavy", 20}}) {

@@ -1,0 +1,118 @@
+#pragma once
+// Eigenvalues of (l^2 M + l C + K) u = 0 in balls that FLINT/Arb proves to hold them: an enclosure
+// by another library, another algorithm and another arithmetic than ours.
+#include <dashpot/analysis/system.hpp>
+#include <dashpot/tests/support/enclosure.hpp>
+
+#include <acb_mat.h>
+
+#include <limits>
+#include <vector>
+
+namespace dashpot::testing {
+
+/// rows x columns balls, all zero.
+class BallMatrix {
+ public:
+  BallMatrix(Eigen::Index rows, Eigen::Index columns) { acb_mat_init(balls_, rows, columns); }
+  explicit BallMatrix(const Eigen::MatrixXd& A) : BallMatrix(A.rows(), A.cols()) {
+    for (Eigen::Index i = 0; i < A.rows(); ++i) {
+      for (Eigen::Index j = 0; j < A.cols(); ++j) acb_set_d(at(i, j), A(i, j));
+    }
+  }
+  BallMatrix(const BallMatrix&) = delete;
+  BallMatrix& operator=(const BallMatrix&) = delete;
+  ~BallMatrix() { acb_mat_clear(balls_); }
+
+  acb_ptr at(Eigen::Index i, Eigen::Index j) { return acb_mat_entry_ptr(balls_, i, j); }
+  acb_mat_struct* get() { return balls_; }
+
+ private:
+  acb_mat_t balls_;
+};
+
+/// Eigenvalue i lies within radius[i] of a number that rounds to center[i], one to one.
+struct CertifiedEigenvalues {
+  std::vector<Point<long double>> center;
+  std::vector<long double> radius;
+  int bits = 0;  ///< of the arithmetic; 0: nothing could be proved
+
+  /// Bounds of |eigenvalue i - center[i]|.
+  std::vector<long double> slack() const {
+    std::vector<long double> all = radius;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      all[i] += std::numeric_limits<long double>::epsilon() * distance(center[i], {});
+    }
+    return all;
+  }
+  long double widest() const {
+    return radius.empty() ? 0 : *std::max_element(radius.begin(), radius.end());
+  }
+};
+
+/// State matrix [0 I; -M^-1 K  -M^-1 C] (2n rows). With a factor W (p x n) it is
+/// [0 W; -M^-1 W'  -M^-1 C] (p + n rows), which has n - p eigenvalues at zero less. Low words and
+/// errors of the system are not read.
+template <int N>
+void set_state_matrix(const analysis::System<N>& system, slong bits, BallMatrix& A) {
+  const Eigen::Index n = system.dof(), p = A.get()->r - n;
+  const bool factored = system.stiffness_factor.rows() > 0;
+  const Eigen::MatrixXd W =
+      factored ? Eigen::MatrixXd(system.stiffness_factor) : Eigen::MatrixXd::Identity(n, n);
+  Eigen::MatrixXd KC(n, p + n);
+  KC.leftCols(p) = factored ? Eigen::MatrixXd(W.transpose()) : Eigen::MatrixXd(system.stiffness);
+  KC.rightCols(n) = system.damping;
+  BallMatrix M{Eigen::MatrixXd(system.mass)}, right{KC}, solution(n, p + n);
+  acb_mat_solve(solution.get(), M.get(), right.get(), bits);
+  for (Eigen::Index j = 0; j < p + n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) acb_neg(A.at(p + i, j), solution.at(i, j));
+    for (Eigen::Index i = 0; i < p && j >= p; ++i) acb_set_d(A.at(i, j), W(i, j - p));
+  }
+}
+
+/// Eigenvalues as arithmetic with `bits` encloses them. Those that it cannot tell apart share a
+/// ball, as often as there are eigenvalues in it.
+template <int N>
+CertifiedEigenvalues certify_eigenvalues(const analysis::System<N>& system, int bits) {
+  const Eigen::Index n = system.dof(), rows = system.stiffness_factor.rows();
+  const Eigen::Index size = n + (rows > 0 ? rows : n);
+  BallMatrix A(size, size), vectors(size, size), approximate(1, size), proved(1, size);
+  set_state_matrix(system, bits, A);
+  acb_mat_approx_eig_qr(approximate.at(0, 0), nullptr, vectors.get(), A.get(), nullptr, 0, bits);
+  CertifiedEigenvalues result;
+  const bool found = acb_mat_eig_multiple(proved.at(0, 0), A.get(), approximate.at(0, 0),
+                                          vectors.get(), bits) != 0;
+  if (!found) return result;
+  result.bits = bits;
+  arf_t part;
+  arf_init(part);
+  const auto center_of = [&](const arb_t ball) {
+    const double high = arf_get_d(arb_midref(ball), ARF_RND_NEAR);
+    arf_set_d(part, high);
+    arf_sub(part, arb_midref(ball), part, ARF_PREC_EXACT, ARF_RND_NEAR);
+    return static_cast<long double>(high) + static_cast<long double>(arf_get_d(part, ARF_RND_NEAR));
+  };
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const acb_ptr ball = proved.at(0, i);
+    const Point<long double> z{center_of(acb_realref(ball)), center_of(acb_imagref(ball))};
+    acb_get_rad_ubound_arf(part, ball, MAG_BITS);
+    result.center.push_back(z);
+    result.radius.push_back(static_cast<long double>(arf_get_d(part, ARF_RND_UP)));
+  }
+  arf_clear(part);
+  return result;
+}
+
+/// The same with as many bits, 128 to 1024, as it takes to have no radius above `wanted`.
+template <int N>
+CertifiedEigenvalues certify_within(const analysis::System<N>& system, long double wanted) {
+  constexpr int kMostBits = 1024;
+  CertifiedEigenvalues result;
+  for (int bits = 128; bits <= kMostBits; bits *= 2) {
+    result = certify_eigenvalues(system, bits);
+    if (result.bits > 0 && result.widest() <= wanted) break;
+  }
+  return result;
+}
+
+}  // namespace dashpot::testing
