@@ -3,6 +3,7 @@
 #include <dashpot/apps/scene/scene_parts.hpp>
 #include <dashpot/controller/base/orientation.hpp>
 #include <dashpot/controller/config/config_gains.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/dynamics.hpp>
 
 #include <algorithm>
@@ -79,12 +80,14 @@ void check_reach(const YamlMapping& keys, const controller::Setpoint& setpoint,
 }
 
 void read_arm_start(const YamlMapping& scenario, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 4> kKeys = {"position", "joint_displacement",
-                                                            "tip_displacement", "outside_limits"};
+  static constexpr std::array<std::string_view, 5> kKeys = {
+      "position", "velocity", "joint_displacement", "tip_displacement", "outside_limits"};
   const YamlMapping keys = scenario.mapping("start", kKeys);
   read_switch(keys, "outside_limits", scene.outside_limits);
   require(keys, "position", scenario, "start");
   read_numbers(keys, "position", positions, kAnyNumber, scene.rest);
+  read_numbers(keys, "velocity", controller::joint_units(scene.arm->config.model, "rad/s", "m/s"),
+               kAnyNumber, scene.velocity);
   scene.start = scene.rest;
   if (keys.has("joint_displacement") && keys.has("tip_displacement")) {
     throw keys.error("tip_displacement", "stands beside joint_displacement; one of them is enough");

@@ -1,10 +1,16 @@
 // `dashpot run` in fast motion: a whole robot, its controller as a plugin, and what is written.
+#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
+#include <dashpot/tests/support/arms.hpp>
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <numbers>
+#include <sstream>
 
 namespace dashpot::tests {
 namespace {
@@ -36,8 +42,9 @@ TEST_P(EveryScene, RunsWithoutAnOverrunAndAccountsForItsEnergy) {
 
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          ::testing::Values("panda", "panda_release_c1", "panda_release_c2",
-                                           "panda_release_ratio_damping", "iiwa14", "ur5",
-                                           "baxter_left", "chain3"));
+                                           "panda_release_ratio_damping", "panda_push_free",
+                                           "panda_push_held", "iiwa14", "ur5", "baxter_left",
+                                           "chain3"));
 
 TEST(Scenes, AreAllTested) {
   std::size_t files = 0;
@@ -45,7 +52,7 @@ TEST(Scenes, AreAllTested) {
        std::filesystem::directory_iterator(std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes")) {
     files += entry.path().extension() == ".yaml" ? 1 : 0;
   }
-  EXPECT_EQ(files, 8U);  // those of EveryScene
+  EXPECT_EQ(files, 10U);  // those of EveryScene
 }
 
 /// Every key that the reader says it knows stands in the example.
@@ -125,6 +132,36 @@ TEST(Run, ShowsTheReleasesOfThePaper) {
   };
   expect_close(slow_modes("panda_release_c1"), {{20.25, 0.0255}, {10.98, 0.0316}, {9.755, 0.0294}});
   expect_close(slow_modes("panda_release_c2"), {{20.23, 0.2235}, {11.17, 0.2288}, {10.95, 0.2032}});
+}
+
+// A struck arm drifts along its zero mode u by (u' M v) / (u' C u), unless springs hold its
+// posture.
+TEST(Run, LeavesAStruckArmWhereItsZeroModePredicts) {
+  const auto rest_of = [](const std::string& name) {
+    const Scratch scratch;
+    run_json(scene(name), {"--csv", scratch.path("csv")});
+    const std::string text = scratch.read("csv");
+    std::istringstream last(text.substr(text.rfind('\n', text.size() - 2) + 1));
+    Eigen::VectorXd q(7);
+    char comma = 0;
+    double time = 0;
+    last >> time;
+    for (double& angle : q) last >> comma >> angle;
+    return q;
+  };
+  const controller::RobotModel model = testing::panda_model();
+  constexpr double kTurn = std::numbers::pi;
+  const controller::JointVector start{{0, -kTurn / 4, 0, -3 * kTurn / 4, 0, kTurn / 2, kTurn / 4}};
+  const Eigen::VectorXd velocity{
+      {-0.455365, -0.00391, 0.258639, -0.00732, 0.281305, 0.013353, -0.274535}};
+  const auto robot = evaluate(model, start, controller::JointVector::Zero(7));
+  const Eigen::MatrixXd J = robot.J, M = robot.M;
+  const Eigen::VectorXd u = J.fullPivLu().kernel().col(0);
+  const Eigen::VectorXd predicted = u * (u.dot(M * velocity) / (0.5 * u.squaredNorm()));
+  const Eigen::VectorXd free = rest_of("panda_push_free") - start;
+  EXPECT_GT(predicted.norm(), 0.15);
+  EXPECT_LT((free - predicted).norm(), 0.03 * predicted.norm()) << free.transpose();
+  EXPECT_LT((rest_of("panda_push_held") - start).norm(), 1e-6);
 }
 
 TEST(Run, HoldsADampingRatioWhereverTheArmIs) {

@@ -34,7 +34,7 @@ INSTANTIATE_TEST_SUITE_P(
     Keys, ConfigRefuses,
     ::testing::Values(
         BadConfig{"UnknownGroup",
-                  "gain: unknown key; the keys are robot, control, gains, limits, motion, "
+                  "gain: unknown key; the keys are robot, control, environment, gains, limits, motion, "
                   "feed_forward, watchdog, analysis, commands, simulation, scenario (line 2)",
                   "gain: {}\n"},
         BadConfig{"UnknownKey",
