@@ -25,10 +25,11 @@ struct TaskImpedance {
   Eigen::MatrixXd mass_error, damping_error;
 };
 
-/// Returns K_G of Eq. 55, n x n. It belongs to K where J' f of the wrench f is held by constant joint
-/// torques. A constant wrench of the world at the tip has a term of its own that cancels it; the
-/// controller's stiffness_under_load has the terms of other loads. K_G is symmetric for the linear rows of J, in general not for the
-/// angular rows. Each derivative has as many rows as the wrench has entries, and n columns.
+/// Returns K_G of Eq. 55, n x n. It belongs to K where J' f of the wrench f is held by constant
+/// joint torques. A constant wrench of the world at the tip has a term of its own that cancels it;
+/// the controller's stiffness_under_load has the terms of other loads. K_G is symmetric for the
+/// linear rows of J, in general not for the angular rows. Each derivative has as many rows as the
+/// wrench has entries, and n columns.
 Eigen::MatrixXd geometric_stiffness(const std::vector<Eigen::MatrixXd>& jacobian_derivatives,
                                     const Eigen::VectorXd& wrench);
 

@@ -16,9 +16,9 @@ class PostureLoop {
 
   /// Sets `system` to M q'' + C q' + K q = f at the posture `q` (n, rad), in joint coordinates:
   /// mass, damping, stiffness and its factor, as Controller::closed_loop. The gains must have
-  /// passed check_gains in this mode. The springs hold `external_wrench` (6, in B's axes, N and N m)
-  /// there, which matters with TaskTerms::load only. Returns kOk, or the status of a controller that cannot be
-  /// there, and then leaves `system` as it is.
+  /// passed check_gains in this mode. The springs hold `external_wrench` (6, in B's axes, N and N
+  /// m) there, which matters with TaskTerms::load only. Returns kOk, or the status of a controller
+  /// that cannot be there, and then leaves `system` as it is.
   Status closed_loop(const JointVector& q, const Gains& gains, Mode mode,
                      analysis::System<kMaxJoints>& system,
                      const Vector6& external_wrench = Vector6::Zero());

@@ -33,10 +33,11 @@ std::string name_of(const ::testing::TestParamInfo<BadConfig>& info) {
 INSTANTIATE_TEST_SUITE_P(
     Keys, ConfigRefuses,
     ::testing::Values(
-        BadConfig{"UnknownGroup",
-                  "gain: unknown key; the keys are robot, control, environment, gains, limits, motion, "
-                  "feed_forward, watchdog, analysis, commands, simulation, scenario (line 2)",
-                  "gain: {}\n"},
+        BadConfig{
+            "UnknownGroup",
+            "gain: unknown key; the keys are robot, control, environment, gains, limits, motion, "
+            "feed_forward, watchdog, analysis, commands, simulation, scenario (line 2)",
+            "gain: {}\n"},
         BadConfig{"UnknownKey",
                   "gains.joint.stifness: unknown key; the keys are stiffness, damping, "
                   "damping_ratio (line 4)",

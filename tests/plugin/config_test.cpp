@@ -220,7 +220,8 @@ TEST(Config, FillsTheRest) {
   const Settings all =
       load(panda() +
            "control: {load: tool_wrench, jacobian_rate: true, subtract_friction: true}\n"
-           "environment: {tip_stiffness: [1, 2, 3, 4, 5, 6], tip_damping: [1 N s/mm, 0, 0, 0, 0, 7],\n"
+           "environment: {tip_stiffness: [1, 2, 3, 4, 5, 6], tip_damping: [1 N s/mm, 0, 0, 0, 0, "
+           "7],\n"
            "  joint_stiffness: 8, joint_damping: [1, 2, 3, 4, 5, 6, 7]}\n"
            "motion: {velocity: 1, acceleration: 180 deg/s^2, linear_velocity: 100 mm/s,\n"
            "  linear_acceleration: 1, angular_velocity: 2, angular_acceleration: 3, smoothing: 20 "
