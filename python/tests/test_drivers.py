@@ -1,6 +1,7 @@
 """`dashpot drive` against Drake: its messages, and arms that it simulates behind them."""
 import importlib
 import os
+import re
 import signal
 import subprocess
 import time
@@ -27,8 +28,8 @@ def test_drake_has_the_same_members(name):
     assert all(f" {member}" in text for member in message.__slots__)
 
 
-# Model, base, posture in rad, the driver's low-pass on torques in Hz; the gains of the example, and
-# the friction of the description.
+# Model, base, posture in rad, the driver's low-pass on torques in Hz; the stiffness of the example, a
+# damping, and the friction of the description.
 ARMS = {
     "iiwa": ("iiwa14", "iiwa_link_0", np.deg2rad([0, 30, 0, -80, 0, 60, 0]), 0,
              [150, 150, 100, 100, 40, 20, 8], [20, 20, 10, 10, 1.5, 0.7, 0.15], 0.5),
@@ -111,8 +112,12 @@ def test_modes_are_those_of_drakes_arm(kind, program, tmp_path):
     from drake_arm import DrakeArm, eigenvalues
     model, base, start, cutoff, stiffness, damping, friction = ARMS[kind]
     config, log, says = (tmp_path / name for name in ("drive.yaml", "drive.lcm", "says"))
-    # The clock of commands is that of the wall, which the simulation does not keep to.
-    config.write_text((ROOT / f"controller/examples/{model}_drive.yaml").read_text()
+    # Constant damping, and the friction that Drake's arm has. The clock of commands is that of the
+    # wall, which the simulation does not keep to.
+    text = (ROOT / f"controller/examples/{model}_drive.yaml").read_text()
+    text, constant = re.subn("damping_ratio: 0.8", f"damping: {damping}", text)
+    assert constant == 1
+    config.write_text(re.sub(" *viscous_friction: .*\n", "", text)
                       .replace("../../sim", str(ROOT / "sim"))
                       .replace("analysis:", "commands: {silence: 30 s, oldest: 20 s}\nanalysis:"))
     url = f"udpm://239.255.76.67:{20000 + os.getpid() % 20000}?ttl=0"

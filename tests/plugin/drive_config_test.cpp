@@ -108,7 +108,8 @@ TEST_P(DesignedDriveConfigs, DampEveryModeWhereverTheArmIs) {
 
 INSTANTIATE_TEST_SUITE_P(Arms, DriveConfigs, ::testing::Values(kIiwa14, kIiwa7, kPanda, kFr3),
                          config_name);
-INSTANTIATE_TEST_SUITE_P(Arms, DesignedDriveConfigs, ::testing::Values(kIiwa7, kFr3), config_name);
+INSTANTIATE_TEST_SUITE_P(Arms, DesignedDriveConfigs,
+                         ::testing::Values(kIiwa14, kIiwa7, kPanda, kFr3), config_name);
 
 /// libfranka, rate_limiting.h: the FR3's limits of velocity at a position.
 TEST(DriveConfig, HoldsTheLimitsOfVelocityThatAnFr3HasAtItsPosition) {
