@@ -114,6 +114,10 @@ class StatusOutlet {
 void fake_driver(const FakeOptions& options) {
   constexpr int kTry = 10, kPatience = 100;  // ms, and tries
   if (options.iiwa == options.panda) throw InputError("--iiwa, --panda", "one of them is wanted");
+  if (options.iiwa && options.trouble == Trouble::kUserStop) {
+    throw InputError("--trouble",
+                     "user-stop is for --panda: an iiwa's status says nothing of a stop");
+  }
   const auto kind = options.iiwa ? lcmtypes::DriverKind::kIiwa : lcmtypes::DriverKind::kPanda;
   const Scene scene = load_scene(options.scene);
   FakeDriver driver(scene, kind);
@@ -181,13 +185,17 @@ void add_fake_driver(CLI::App& program) {
       {"stall", Trouble::kStall},     {"die", Trouble::kDie},
       {"nan", Trouble::kNotANumber},  {"repeat", Trouble::kRepeat},
       {"reorder", Trouble::kReorder}, {"user-stop", Trouble::kUserStop}};
-  command->add_option("--trouble", options->trouble, "What goes wrong")
-      ->transform(CLI::CheckedTransformer(troubles))
-      ->option_text("stall|die|nan|repeat|reorder|user-stop");
+  CLI::Option* trouble = command
+                             ->add_option("--trouble", options->trouble,
+                                          "What goes wrong; user-stop with --panda only")
+                             ->transform(CLI::CheckedTransformer(troubles))
+                             ->option_text("stall|die|nan|repeat|reorder|user-stop");
   command->add_option("--from", options->from, "When it begins, s (1)")
+      ->needs(trouble)
       ->transform(quantity("s", 0, 1e7, "a time from 0 to 1e7 s"))
       ->option_text("S");
   command->add_option("--lasts", options->lasts, "How long it lasts, s (0.1)")
+      ->needs(trouble)
       ->transform(quantity("s", 0, 1e7, "a time from 0 to 1e7 s"))
       ->option_text("S");
   command->footer("Ctrl-C ends it.\n" + std::string(kExitStatusHelp));

@@ -445,6 +445,14 @@ TEST(FakeDriver, RefusesWhatItCannotBe) {
   const Outcome none = run_program({"fake-driver", scene("drivers/panda")});
   EXPECT_EQ(none.status, 2);
   EXPECT_THAT(none.err, HasSubstr("one of them is wanted"));
+  const Outcome stopped =
+      run_program({"fake-driver", scene("drivers/iiwa14"), "--iiwa", "--trouble", "user-stop"});
+  EXPECT_EQ(stopped.status, 2);
+  EXPECT_THAT(stopped.err, HasSubstr("user-stop is for --panda"));
+  const Outcome when =
+      run_program({"fake-driver", scene("drivers/panda"), "--panda", "--from", "1"});
+  EXPECT_EQ(when.status, 2);
+  EXPECT_THAT(when.err, HasSubstr("--trouble"));
 }
 
 }  // namespace
