@@ -38,7 +38,7 @@ extern "C" {
 
 /* Version of this interface. It increases whenever a function or struct changes. A library
  * serves the versions that it knows. */
-#define DASHPOT_PLUGIN_VERSION 7u
+#define DASHPOT_PLUGIN_VERSION 8u
 /* Largest n. */
 #define DASHPOT_MAX_JOINTS 16
 
@@ -178,6 +178,8 @@ typedef struct dashpot_gains {
                                         dampers in this direction of `frame` */
   const double* joint_damping_ratio; /* 1, from 0 to 2: the same for joint_damping and the modes of
                                         the joint mode */
+  const double* null_damping_ratio;  /* 1, from 0 to 2: the same for null_damping and the motions
+                                        that the task leaves free, with null_stiffness */
 } dashpot_gains;
 
 /* The torque that the robot's joints are to exert. */

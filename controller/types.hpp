@@ -77,6 +77,10 @@ struct Gains {
   std::array<bool, 6> directions{true, true, true, true, true, true};
   JointVector null_stiffness;  ///< n, N m/rad, toward the posture, within the free motions
   JointVector null_damping;    ///< n, N m s/rad, within the free motions
+  /// Damping ratio that the free motions are to have with null_stiffness, 0 < ratio <= 2: their
+  /// damping is then designed at every tick (see NullSpace::ratio_damping), and null_damping is not
+  /// used. 0: null_damping acts.
+  double null_damping_ratio = 0;
 };
 
 /// What the user wants. It may change at any tick; the controller moves there smoothly. A set-point

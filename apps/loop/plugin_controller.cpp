@@ -93,13 +93,19 @@ class PluginController : public LoopController {
       for (std::size_t i = 0; i < 6; ++i) directions[i] = from.directions[i] ? 1 : 0;
     }
     dashpot_gains gains(std::uint32_t n) const noexcept {
-      return {
-          sizeof(dashpot_gains),     n,
-          joint_stiffness.data(),    given.joint_damping_ratio > 0 ? nullptr : joint_damping.data(),
-          task_stiffness.data(),     given.task_damping_ratio > 0 ? nullptr : task_damping.data(),
-          &given.task_damping_ratio, given.null_stiffness.data(),
-          given.null_damping.data(), &frame,
-          directions.data(),         &given.joint_damping_ratio};
+      return {sizeof(dashpot_gains),
+              n,
+              joint_stiffness.data(),
+              given.joint_damping_ratio > 0 ? nullptr : joint_damping.data(),
+              task_stiffness.data(),
+              given.task_damping_ratio > 0 ? nullptr : task_damping.data(),
+              &given.task_damping_ratio,
+              given.null_stiffness.data(),
+              given.null_damping_ratio > 0 ? nullptr : given.null_damping.data(),
+              &frame,
+              directions.data(),
+              &given.joint_damping_ratio,
+              &given.null_damping_ratio};
     }
 
     const controller::Gains& given;

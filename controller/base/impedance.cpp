@@ -35,7 +35,10 @@ Impedance::Impedance(const Setpoint& setpoint, int n) noexcept : Impedance(n) {
   if (damping_ratio == 0) tip.damping = in_selected_directions(gains.task_damping);
   if (n > tip.selected.sum()) {
     if (gains.null_stiffness.size() == n) null_stiffness = gains.null_stiffness;
-    if (gains.null_damping.size() == n) null_damping = gains.null_damping;
+    null_damping_ratio = gains.null_damping_ratio;
+    if (gains.null_damping.size() == n && null_damping_ratio == 0) {
+      null_damping = gains.null_damping;
+    }
   }
 }
 
@@ -70,7 +73,8 @@ Impedance blend(const Impedance& a, const Impedance& b, double s) noexcept {
     }
   };
   for (const auto number : {&Impedance::joint_weight, &Impedance::task_weight,
-                            &Impedance::damping_ratio, &Impedance::joint_damping_ratio}) {
+                            &Impedance::damping_ratio, &Impedance::joint_damping_ratio,
+                            &Impedance::null_damping_ratio}) {
     c.*number = r * a.*number + s * b.*number;
   }
   for (const auto tip : {&Impedance::base, &Impedance::tool}) {

@@ -20,6 +20,7 @@ struct Impedance {
   double task_weight = 0;          ///< share of the Cartesian springs
   double damping_ratio = 0;        ///< designed for the tip's springs, beside `damping`
   double joint_damping_ratio = 0;  ///< for the joints' springs, beside `joint_damping`
+  double null_damping_ratio = 0;   ///< for the null space's springs, beside `null_damping`
   TipImpedance base;               ///< in B's axes
   TipImpedance tool;               ///< in T's axes
   JointVector null_stiffness;

@@ -20,10 +20,8 @@ void require_pair(const YamlMapping& keys) {
   }
 }
 
-/// Of `damping`, read into the matrix, and `damping_ratio`, the one given ends the other.
-template <class Matrix>
-void read_damping(const YamlMapping& keys, const Units& units, Matrix& damping, double& ratio) {
-  read_matrix(keys, "damping", units, damping);
+/// Of `damping`, which was read already, and `damping_ratio`, the one given ends the other.
+void read_ratio(const YamlMapping& keys, double& ratio) {
   if (keys.has("damping")) ratio = 0;
   if (!keys.has("damping_ratio")) return;
   if (keys.has("damping")) {
@@ -52,7 +50,6 @@ void read_directions(const YamlMapping& task, std::array<bool, 6>& directions) {
 
 void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pairs, Gains& gains) {
   static constexpr std::array<std::string_view, 3> kKeys = {"joint", "task", "null_space"};
-  static constexpr std::array<std::string_view, 2> kPair = {"stiffness", "damping"};
   static constexpr std::array<std::string_view, 3> kJointKeys = {"stiffness", "damping",
                                                                  "damping_ratio"};
   static constexpr std::array<std::string_view, 5> kTaskKeys = {
@@ -67,22 +64,24 @@ void read_gains(const YamlMapping& parent, const RobotModel& model, GainPairs pa
   const YamlMapping joint = keys.mapping("joint", kJointKeys);
   require(joint);
   read_matrix(joint, "stiffness", stiffness, gains.joint_stiffness);
-  read_damping(joint, damping, gains.joint_damping, gains.joint_damping_ratio);
+  read_matrix(joint, "damping", damping, gains.joint_damping);
+  read_ratio(joint, gains.joint_damping_ratio);
 
   const YamlMapping task = keys.mapping("task", kTaskKeys);
   require(task);
   read_matrix(task, "stiffness", task_units("N/m", "N m/rad"), gains.task_stiffness);
-  read_damping(task, task_units("N s/m", "N m s/rad"), gains.task_damping,
-               gains.task_damping_ratio);
+  read_matrix(task, "damping", task_units("N s/m", "N m s/rad"), gains.task_damping);
+  read_ratio(task, gains.task_damping_ratio);
   static constexpr std::array<std::pair<std::string_view, Frame>, 2> kFrames = {
       {{"base", Frame::kBase}, {"tool", Frame::kTool}}};
   read_choice(task, "frame", kFrames, gains.frame);
   read_directions(task, gains.directions);
 
-  const YamlMapping null_space = keys.mapping("null_space", kPair);
+  const YamlMapping null_space = keys.mapping("null_space", kJointKeys);
   require(null_space);
   read_numbers(null_space, "stiffness", stiffness, kNotNegative, gains.null_stiffness);
   read_numbers(null_space, "damping", damping, kNotNegative, gains.null_damping);
+  read_ratio(null_space, gains.null_damping_ratio);
 }
 
 }  // namespace dashpot::controller

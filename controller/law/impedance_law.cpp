@@ -51,6 +51,11 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
       const JointVector dqd = difference(references.posture.velocity(), qd);
       add(null_space_.spring(impedance.null_stiffness, dq), tau);
       add(null_space_.damper(impedance.null_damping, dqd), tau);
+      if (impedance.null_damping_ratio > 0) {
+        const JointMatrix D =
+            null_space_.ratio_damping(impedance.null_damping_ratio, impedance.null_stiffness);
+        add(null_space_.damper(D, dqd), tau);
+      }
     }
     if (feed_forward_.friction) {
       add(null_space_.joint_velocity(references.tip.velocity()), reference_velocity,

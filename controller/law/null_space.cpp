@@ -1,6 +1,15 @@
+#include <dashpot/controller/base/symmetric_root.hpp>
 #include <dashpot/controller/law/null_space.hpp>
 
+#include <array>
+#include <cmath>
+
 namespace dashpot::controller {
+namespace {
+
+constexpr double kRounding = 1e-9;
+
+}  // namespace
 
 void NullSpace::compute(const JointMatrix& M, const Jacobian& J, const TipImpedance& base,
                         const TipImpedance& tool, const Eigen::Matrix3d& R_BT) noexcept {
@@ -33,6 +42,60 @@ JointVector NullSpace::projected_velocity(const JointVector& dq) const noexcept 
   project(y);
   mass_.solve_LT(y.data());
   return y;
+}
+
+JointMatrix NullSpace::ratio_damping(double ratio, const JointVector& k) const noexcept {
+  JointMatrix D(k.size(), k.size());
+  if (damp_one_motion(ratio, k, D)) return D;
+  const Eigen::Index n = k.size();
+  std::array<JointVector, kMaxJoints> velocity;  // columns of L^-T P
+  for (Eigen::Index j = 0; j < n; ++j) {
+    JointVector& y = velocity[static_cast<std::size_t>(j)];
+    y.setZero(n);
+    y[j] = 1;
+    project(y);
+    mass_.solve_LT(y.data());
+    for (Eigen::Index i = 0; i <= j; ++i) {
+      const JointVector& x = velocity[static_cast<std::size_t>(i)];
+      double sum = 0;
+      for (Eigen::Index l = 0; l < n; ++l) sum += k[l] * x[l] * y[l];
+      D(i, j) = D(j, i) = sum;
+    }
+  }
+  return symmetric_root(D, 2 * ratio);
+}
+
+bool NullSpace::damp_one_motion(double ratio, const JointVector& k, JointMatrix& D) const noexcept {
+  const Eigen::Index n = k.size();
+  double trace = 0, most = 0;  // of P's diagonal
+  Eigen::Index best = 0;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const Vector6 column = Jh_.col(j);
+    const double entry = 1 - column.dot(inertia_.wrench(column));
+    trace += entry;
+    if (entry > most) most = entry, best = j;
+  }
+  if (!(std::abs(trace - 1) < kRounding)) return false;
+  JointVector y = JointVector::Unit(n, best);
+  project(y);
+  if (!(std::abs(product(y, y) - most) < kRounding)) return false;  // P is no projector
+  JointVector velocity = y;
+  mass_.solve_LT(velocity.data());
+  double stiffness = 0;
+  for (Eigen::Index i = 0; i < n; ++i) stiffness += k[i] * velocity[i] * velocity[i];
+  const double rate = 2 * ratio * std::sqrt(stiffness / most) / most;
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) D(i, j) = rate * y[i] * y[j];
+  }
+  return true;
+}
+
+JointVector NullSpace::damper(const JointMatrix& D, const JointVector& dqd) const noexcept {
+  JointVector y = dqd, result = JointVector::Zero(dqd.size());
+  mass_.multiply_LT(y.data());
+  add_product(D, y, result);
+  mass_.multiply_L(result.data());
+  return result;
 }
 
 JointVector NullSpace::joint_velocity(const Vector6& twist) const noexcept {

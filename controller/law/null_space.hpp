@@ -28,6 +28,13 @@ class NullSpace {
   JointVector damper(const JointVector& c, const JointVector& dqd) const noexcept {
     return spring(c, projected_velocity(dqd));
   }
+  /// Returns D = 2 ratio (P L^-1 K_0 L^-T P)^1/2, n x n, 1/s, symmetric, positive semidefinite: the
+  /// damping in energy coordinates with which every free motion has the ratio on the springs k (n).
+  /// Next to a singularity it fades as the root of what P leaves of the springs, so that there the
+  /// ratio stays as well.
+  JointMatrix ratio_damping(double ratio, const JointVector& k) const noexcept;
+  /// Returns L D L' dqd: the torque of dampers D in energy coordinates for the velocity dqd.
+  JointVector damper(const JointMatrix& D, const JointVector& dqd) const noexcept;
   /// Returns N dq.
   JointVector projected_velocity(const JointVector& dq) const noexcept;
   /// Returns M^-1 J' H G^-1 H V: the joint velocity of least kinetic energy with which the tip
@@ -42,6 +49,9 @@ class NullSpace {
   }
 
  private:
+  /// Sets D of ratio_damping if P is a projector on one motion; returns false if not.
+  bool damp_one_motion(double ratio, const JointVector& k, JointMatrix& D) const noexcept;
+
   TaskInertia inertia_;
   SmallCholesky mass_;
   Jacobian Jh_;

@@ -139,11 +139,13 @@ std::int32_t to_gains(const dashpot_gains* given, int n, Gains& gains) noexcept 
     return DASHPOT_WRONG_VALUE;
   }
   if (!ratio_fits(given->task_damping, given->task_damping_ratio) ||
-      !ratio_fits(given->joint_damping, given->joint_damping_ratio)) {
+      !ratio_fits(given->joint_damping, given->joint_damping_ratio) ||
+      !ratio_fits(given->null_damping, given->null_damping_ratio)) {
     return DASHPOT_WRONG_VALUE;
   }
   take_ratio(given->task_damping, given->task_damping_ratio, gains.task_damping_ratio);
   take_ratio(given->joint_damping, given->joint_damping_ratio, gains.joint_damping_ratio);
+  take_ratio(given->null_damping, given->null_damping_ratio, gains.null_damping_ratio);
   if (given->joint_stiffness != nullptr) gains.joint_stiffness = square(given->joint_stiffness, n);
   if (given->joint_damping != nullptr) gains.joint_damping = square(given->joint_damping, n);
   if (given->task_stiffness != nullptr) gains.task_stiffness = square(given->task_stiffness, 6);

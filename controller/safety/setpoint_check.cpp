@@ -90,6 +90,7 @@ SetpointFault check_gains(const Gains& gains, Mode mode, Eigen::Index n) noexcep
   if (!is_ratio(gains.task_damping_ratio)) return {"task_damping_ratio", kNoRatio};
   if ((reason = vector_fault(gains.null_stiffness, n))) return {"null_stiffness", reason};
   if ((reason = vector_fault(gains.null_damping, n))) return {"null_damping", reason};
+  if (!is_ratio(gains.null_damping_ratio)) return {"null_damping_ratio", kNoRatio};
   if (gains.frame != Frame::kBase && gains.frame != Frame::kTool) return {"frame", "is unknown"};
   return {};
 }
@@ -132,7 +133,7 @@ bool same_gains(const Gains& a, const Gains& b, Mode mode) noexcept {
   return a.frame == b.frame && a.directions == b.directions &&
          same(a.task_stiffness, b.task_stiffness) && same(a.task_damping, b.task_damping) &&
          a.task_damping_ratio == b.task_damping_ratio && same(a.null_stiffness, b.null_stiffness) &&
-         same(a.null_damping, b.null_damping);
+         same(a.null_damping, b.null_damping) && a.null_damping_ratio == b.null_damping_ratio;
 }
 
 }  // namespace dashpot::controller

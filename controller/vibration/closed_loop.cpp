@@ -159,6 +159,17 @@ void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) n
   }
 }
 
+void add_null_damping(const Impedance& impedance, const NullSpace& null_space,
+                      JointMatrix& C) noexcept {
+  if (impedance.null_damping_ratio == 0) return;
+  const JointMatrix D =
+      null_space.ratio_damping(impedance.null_damping_ratio, impedance.null_stiffness);
+  for (Index j = 0; j < C.cols(); ++j) {
+    const JointVector column = null_space.damper(D, JointVector::Unit(C.rows(), j));
+    for (Index i = 0; i < C.rows(); ++i) C(i, j) += column[i];
+  }
+}
+
 void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Impedance& impedance,
                  const NullSpace& null_space, const JointVector& viscous_friction,
                  const StiffnessTerms& terms, analysis::System<kMaxJoints>& system) noexcept {
@@ -173,6 +184,7 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
     null_projector(null_space, projector);
     add_projected(projector, impedance.null_stiffness, K_N);
     add_projected(projector, impedance.null_damping, C);
+    add_null_damping(impedance, null_space, C);
   }
   JointMatrix K = K_N;
   add_congruence(J, K_C, J, K);

@@ -62,6 +62,10 @@ struct StiffnessTerms {
 /// Sets P to N, which projects joint velocities on the null space.
 void null_projector(const NullSpace& null_space, JointMatrix& P) noexcept;
 
+/// C += L D L' with the D of the null space's ratio, see NullSpace::ratio_damping.
+void add_null_damping(const Impedance& impedance, const NullSpace& null_space,
+                      JointMatrix& C) noexcept;
+
 /// K += P' diag(k) P
 void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) noexcept;
 

@@ -107,6 +107,15 @@ bool LoopSystem::add_free_motions(const Impedance& impedance, const NullSpace& n
       }
     }
   }
+  if (impedance.null_damping_ratio > 0) {
+    const JointMatrix designed =
+        null_space.ratio_damping(impedance.null_damping_ratio, impedance.null_stiffness);
+    for (int k = 0; k < r; ++k) {
+      JointVector y = JointVector::Zero(n_);
+      add_product(designed, Q_[static_cast<std::size_t>(k)], y);
+      for (int l = 0; l <= k; ++l) D(k, l) += product(Q_[static_cast<std::size_t>(l)], y);
+    }
+  }
   if (springs && !lower_cholesky(K, r)) return false;
   for (int k = 0; k < r; ++k) {
     for (int j = 0; j < n_; ++j) {
@@ -139,6 +148,7 @@ void LoopSystem::add_null_space(const Impedance& impedance, const NullSpace& nul
     }
   }
   add_projected(projector, impedance.null_damping, C);
+  add_null_damping(impedance, null_space, C);
   if (any(impedance.null_stiffness)) rows_.grow(n_);
 }
 

@@ -32,6 +32,7 @@ void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t 
   if (has(command_t::NULL_GAINS)) {
     setpoint.gains.null_stiffness = from.gains.null_stiffness;
     setpoint.gains.null_damping = from.gains.null_damping;
+    setpoint.gains.null_damping_ratio = from.gains.null_damping_ratio;
   }
 }
 

@@ -113,7 +113,8 @@ def _damping(stiffness: npt.ArrayLike | None, damping: npt.ArrayLike | None,
 def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           task_stiffness: npt.ArrayLike | None = None, task_damping: npt.ArrayLike | None = None,
           damping_factor: float | None = None, null_stiffness: npt.ArrayLike | None = None,
-          null_damping: npt.ArrayLike | None = None, joint_stiffness: npt.ArrayLike | None = None,
+          null_damping: npt.ArrayLike | None = None, null_projector: str = "dynamic",
+          joint_stiffness: npt.ArrayLike | None = None,
           joint_damping: npt.ArrayLike | None = None, frame: str = "base",
           directions: Sequence[str] = DIRECTIONS, half_quaternion: bool = False,
           inertia_blocks: bool = False, period: float = 0, delay: int = 0, cutoff: float = 0,
@@ -133,7 +134,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     Gains are those of `closed_loop`; `damping_factor` F stands for a damping of F sqrt(K), entry by
     entry. With `half_quaternion` the controller takes half of the rotation vector for its error,
     with `inertia_blocks` it multiplies gains by the tip's inertia, for translation and rotation
-    apart. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
+    apart, with a `null_projector` of "kinematic" instead of "dynamic" null-space gains act through
+    I - J^+ J. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
     (Hz; 0: none), and `difference_velocity`. Modes below `soft_frequency` (rad/s) are soft.
 
     An `executor` of concurrent.futures maps over chunks of postures, by default one of threads. The
@@ -143,6 +145,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     concurrent.futures.BrokenExecutor, which says how many postures were done, if a worker dies and
     its executor does not start the work again.
     """
+    if null_projector not in ("dynamic", "kinematic"):
+        raise Error(f"null_projector: {null_projector!r} is none of dynamic, kinematic")
     at_tip = joint_stiffness is None and joint_damping is None
     if not at_tip and not (task_stiffness is None and task_damping is None):
         raise Error("joint_stiffness: springs are fixed to a joint position or to a pose, not both")
@@ -157,8 +161,9 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     gains = (to_gain("joint_stiffness", joint_stiffness),
              _damping(joint_stiffness, joint_damping, factor_of[1], "joint_damping"), 0.0,
              stiffness, damping, 0.0, to_vector("null_stiffness", null_stiffness),
-             to_vector("null_damping", null_damping), is_tool(frame), [True] * 6)
+             to_vector("null_damping", null_damping), 0.0, is_tool(frame), [True] * 6)
     options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": inertia_blocks,
+                               "kinematic_null_space": null_projector == "kinematic",
                                "period": float(period), "delay": delay, "cutoff": float(cutoff),
                                "difference_velocity": difference_velocity,
                                "soft_frequency": float(soft_frequency)}

@@ -272,7 +272,8 @@ class Controller:
                   task_damping: npt.ArrayLike | None = None,
                   task_damping_ratio: float | None = None,
                   null_stiffness: npt.ArrayLike | None = None,
-                  null_damping: npt.ArrayLike | None = None, frame: str | None = None,
+                  null_damping: npt.ArrayLike | None = None,
+                  null_damping_ratio: float | None = None, frame: str | None = None,
                   directions: Sequence[str] | None = None) -> None:
         """Sets gains that the next tick takes up; None keeps one as it is. Matrices (n x n, 6 x 6)
         may be given as their diagonals, null_stiffness and null_damping have n entries. Raises Error

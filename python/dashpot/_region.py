@@ -56,8 +56,9 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     gains = (to_gain("joint_stiffness", joint_stiffness), None, 0.0,
              to_gain("task_stiffness", task_stiffness), None, 0.0,
              to_vector("null_stiffness", null_stiffness), to_vector("null_damping", null_damping),
-             is_tool(frame), [True] * 6)
+             0.0, is_tool(frame), [True] * 6)
     options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": False,
+                               "kinematic_null_space": False,
                                "period": 0.0, "delay": 0, "cutoff": 0.0,
                                "difference_velocity": False,
                                "soft_frequency": float(soft_frequency)}

@@ -188,7 +188,7 @@ class ClosedLoop(Result):
 def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike | None = None,
                 task_damping: npt.ArrayLike | None = None, task_damping_ratio: float = 0,
                 null_stiffness: npt.ArrayLike | None = None,
-                null_damping: npt.ArrayLike | None = None,
+                null_damping: npt.ArrayLike | None = None, null_damping_ratio: float = 0,
                 joint_stiffness: npt.ArrayLike | None = None,
                 joint_damping: npt.ArrayLike | None = None, joint_damping_ratio: float = 0,
                 frame: str = "base", directions: Sequence[str] = DIRECTIONS,
@@ -218,8 +218,8 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
                         to_gain("task_stiffness", task_stiffness),
                         to_gain("task_damping", task_damping), task_damping_ratio,
                         to_vector("null_stiffness", null_stiffness),
-                        to_vector("null_damping", null_damping), is_tool(frame),
-                        selected(directions))
+                        to_vector("null_damping", null_damping), null_damping_ratio,
+                        is_tool(frame), selected(directions))
     found = _core.closed_loop(robot._core, _joint_values("q", q), gains, at_tip,
                               to_vector("external_wrench", external_wrench), kind, soft_frequency)
     return ClosedLoop(found["mass"], found["damping"], found["stiffness"],

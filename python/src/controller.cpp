@@ -113,6 +113,7 @@ class GainsData {
     given.task_damping_ratio = matrix(keys, "task_damping_ratio", 1, 1);
     given.null_stiffness = matrix(keys, "null_stiffness", n_, 1);
     given.null_damping = matrix(keys, "null_damping", n_, 1);
+    given.null_damping_ratio = matrix(keys, "null_damping_ratio", 1, 1);
     if (keys.contains("tool_frame")) {
       frame_ = nb::cast<bool>(keys["tool_frame"]) ? DASHPOT_FRAME_TOOL : DASHPOT_FRAME_BASE;
       given.frame = &frame_;

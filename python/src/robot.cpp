@@ -130,7 +130,7 @@ Gains make_gains(const Robot& robot, const OptionalMatrix& joint_stiffness,
                  const OptionalMatrix& joint_damping, double joint_damping_ratio,
                  const OptionalMatrix& task_stiffness, const OptionalMatrix& task_damping,
                  double task_damping_ratio, const OptionalVector& null_stiffness,
-                 const OptionalVector& null_damping, bool tool_frame,
+                 const OptionalVector& null_damping, double null_damping_ratio, bool tool_frame,
                  const std::vector<bool>& directions) {
   const Eigen::Index n = robot.model.dof();
   const auto check = [](const char* key, const auto& given, Eigen::Index rows, Eigen::Index cols) {
@@ -154,6 +154,7 @@ Gains make_gains(const Robot& robot, const OptionalMatrix& joint_stiffness,
   gains.task_damping_ratio = task_damping_ratio;
   gains.null_stiffness = null_stiffness.value_or(none_each);
   gains.null_damping = null_damping.value_or(none_each);
+  gains.null_damping_ratio = null_damping_ratio;
   gains.frame = tool_frame ? controller::Frame::kTool : controller::Frame::kBase;
   std::copy(directions.begin(), directions.end(), gains.directions.begin());
   return gains;
@@ -205,7 +206,8 @@ void add_robot(nb::module_& m) {
            nb::arg("joint_damping").none(), nb::arg("joint_damping_ratio"),
            nb::arg("task_stiffness").none(), nb::arg("task_damping").none(),
            nb::arg("task_damping_ratio"), nb::arg("null_stiffness").none(),
-           nb::arg("null_damping").none(), nb::arg("tool_frame"), nb::arg("directions"));
+           nb::arg("null_damping").none(), nb::arg("null_damping_ratio"), nb::arg("tool_frame"),
+           nb::arg("directions"));
   m.def("closed_loop", &closed_loop, nb::arg("robot"), nb::arg("q"), nb::arg("gains"),
         nb::arg("cartesian"), nb::arg("external_wrench").none(), nb::arg("load"),
         nb::arg("soft_frequency"));

@@ -77,6 +77,7 @@ Setpoint tip_setpoint(Random& random, int n, Frame frame, int held) {
   gains.task_damping = 10 * random.spd(6);
   gains.null_stiffness = 20 * random.vector(n).cwiseAbs();
   gains.null_damping = 2 * random.vector(n).cwiseAbs();
+  gains.null_damping_ratio = held % 2 == 0 ? 0.6 : 0;
   return setpoint;
 }
 

@@ -137,6 +137,32 @@ TEST_F(NullSpaceOfPanda, EigenvaluesOfTheProjectorAreBetweenZeroAndOneEverywhere
   }
 }
 
+/// In coordinates z of the free motions (J Z z = 0) the springs' modes are those of Z' K_0 Z and
+/// Z' M Z: with one free motion, and with more.
+TEST_F(NullSpaceOfPanda, DampsFreeMotionsWithTheRatio) {
+  Random random(77);
+  for (int k = 0; k < 200; ++k) {
+    held.selected.setOnes();
+    if (k % 2 == 1) held.selected[k % 6] = held.selected[(k + 2) % 6] = 0;
+    at(random.vector(7));
+    if (null_space.inertia().nearly_singular()) continue;
+    const JointVector k0 = 30 * random.vector(7).cwiseAbs();
+    const JointMatrix D = null_space.ratio_damping(0.6, k0);
+    MatrixXd C(7, 7);
+    for (int j = 0; j < 7; ++j) C.col(j) = null_space.damper(D, JointVector::Unit(7, j));
+    const MatrixXd M = robot.M, J = held.selected.asDiagonal() * robot.J;
+    const MatrixXd Z = Eigen::FullPivLU<MatrixXd>(J).kernel();
+    const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> modes(
+        Z.transpose() * k0.asDiagonal() * Z, Z.transpose() * M * Z);
+    const MatrixXd shapes = Z * modes.eigenvectors();
+    const MatrixXd wanted = (1.2 * modes.eigenvalues().cwiseSqrt()).asDiagonal();
+    ASSERT_EQ(Z.cols(), k % 2 == 1 ? 3 : 1);
+    EXPECT_TRUE(near(shapes.transpose() * C * shapes, wanted, 1e-6 * wanted.norm()));
+    EXPECT_LT((J * M.llt().solve(C)).norm(), 1e-6 * M.llt().solve(C).norm());
+    EXPECT_LT((C - C.transpose()).norm(), 1e-12 * C.norm());
+  }
+}
+
 TEST_F(NullSpaceOfPanda, SpringPullsDownhill) {
   Random random(335);
   for (int k = 0; k < 500; ++k) {

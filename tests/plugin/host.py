@@ -30,7 +30,7 @@ class Gains(c.Structure):
                 ("task_damping_ratio", Doubles),
                 ("null_stiffness", Doubles), ("null_damping", Doubles),
                 ("frame", c.POINTER(c.c_int32)), ("directions", c.POINTER(c.c_uint8)),
-                ("joint_damping_ratio", Doubles)]
+                ("joint_damping_ratio", Doubles), ("null_damping_ratio", Doubles)]
 
 
 class Output(c.Structure):

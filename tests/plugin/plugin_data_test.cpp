@@ -205,6 +205,15 @@ TEST(FromC, ADampingRatioStandsInPlaceOfADamping) {
   EXPECT_EQ(gains.joint_damping_ratio, 0);
   EXPECT_EQ(set(damping.data(), &ratio, none, none), DASHPOT_WRONG_VALUE);
   EXPECT_EQ(set(none, none, damping.data(), &ratio), DASHPOT_WRONG_VALUE);
+  dashpot_gains given = no_gains();
+  given.null_damping_ratio = &ratio;
+  EXPECT_EQ(to_gains(&given, 2, gains), DASHPOT_OK);
+  EXPECT_EQ(gains.null_damping_ratio, 0.7);
+  given.null_damping = damping.data();
+  EXPECT_EQ(to_gains(&given, 2, gains), DASHPOT_WRONG_VALUE);
+  given.null_damping_ratio = none;
+  EXPECT_EQ(to_gains(&given, 2, gains), DASHPOT_OK);
+  EXPECT_EQ(gains.null_damping_ratio, 0);
 }
 
 TEST(ToC, ASnapshotHasAllThatIsInIt) {

@@ -246,6 +246,7 @@ class Bench {
       gains.task_damping = C;
       gains.null_stiffness.setConstant(n, power(c.null_stiffness));
       gains.null_damping.setConstant(n, power(c.null_damping));
+      gains.null_damping_ratio = 0;
     } else {
       gains.joint_stiffness = K;
       gains.joint_damping = C;

@@ -1,0 +1,72 @@
+#include <dashpot/controller/base/symmetric_root.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace dashpot::controller {
+namespace {
+
+constexpr int kMostSweeps = 12;
+/// Entries beside the diagonal below this share of the largest entry are rounding.
+constexpr double kNothing = 1e-15;
+
+/// Turns rows a and b by the angle of c and s.
+void turn(std::array<double, kMaxJoints>& a, std::array<double, kMaxJoints>& b, double c, double s,
+          std::size_t n) noexcept {
+  for (std::size_t i = 0; i < n; ++i) {
+    const double x = a[i], y = b[i];
+    a[i] = c * x - s * y;
+    b[i] = s * x + c * y;
+  }
+}
+
+}  // namespace
+
+JointMatrix symmetric_root(const JointMatrix& A, double factor) noexcept {
+  const auto n = static_cast<std::size_t>(A.rows());
+  std::array<std::array<double, kMaxJoints>, kMaxJoints> B, V{};  // A, and eigenvectors by rows
+  double largest = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    V[i][i] = 1;
+    for (std::size_t j = 0; j <= i; ++j) {
+      B[i][j] = B[j][i] = A(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      largest = std::max(largest, std::abs(B[i][j]));
+    }
+  }
+  bool turned = true;
+  for (int sweep = 0; sweep < kMostSweeps && turned; ++sweep) {
+    turned = false;
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = i + 1; j < n; ++j) {
+        if (!(std::abs(B[i][j]) > kNothing * largest)) continue;
+        turned = true;
+        const double half = 0.5 * (B[j][j] - B[i][i]);
+        const double t =
+            B[i][j] / (half + std::copysign(std::sqrt(half * half + B[i][j] * B[i][j]), half));
+        const double c = 1 / std::sqrt(1 + t * t), s = c * t;
+        turn(B[i], B[j], c, s, n);
+        for (std::size_t k = 0; k < n; ++k) {
+          const double x = B[k][i], y = B[k][j];
+          B[k][i] = c * x - s * y;
+          B[k][j] = s * x + c * y;
+        }
+        turn(V[i], V[j], c, s, n);
+      }
+    }
+  }
+  JointMatrix root = JointMatrix::Zero(A.rows(), A.rows());
+  for (std::size_t k = 0; k < n; ++k) {
+    const double value = factor * std::sqrt(std::max(0.0, B[k][k]));
+    if (value == 0) continue;
+    for (std::size_t j = 0; j < n; ++j) {
+      const double scaled = value * V[k][j];
+      for (std::size_t i = 0; i < n; ++i) {
+        root(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) += scaled * V[k][i];
+      }
+    }
+  }
+  return root;
+}
+
+}  // namespace dashpot::controller
