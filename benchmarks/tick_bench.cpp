@@ -89,7 +89,14 @@ class Loop {
   }
   static Settings settings_for(const RobotModel& model, const Analysis& analysis, double ratio) {
     Settings settings = default_settings(model);
-    settings.initial.gains.task_damping_ratio = ratio;
+    Gains& gains = settings.initial.gains;
+    gains.task_damping_ratio = ratio;
+    if (ratio == 0) {  // constant damping
+      gains.joint_damping_ratio = gains.null_damping_ratio = 0;
+      gains.joint_damping = 0.1 * gains.joint_stiffness;
+      gains.task_damping = 0.1 * gains.task_stiffness;
+      gains.null_damping = 0.1 * gains.null_stiffness;
+    }
     settings.analysis = analysis;
     settings.feed_forward.friction = true;
     settings.limits.torque *= 1e3;  // so that no limit is at work

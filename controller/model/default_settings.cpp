@@ -16,8 +16,10 @@ double finite_or(double value, double otherwise) {
   return std::isfinite(value) && value > 0 ? value : otherwise;
 }
 
-/// Velocities at the tip decay no faster than this, 1/s: far from where torque that is held for a
-/// period of 1 ms and arrives one late makes the loop unstable.
+constexpr double kRatio = 0.7;
+
+/// The damping of modes at the tip lets their velocities decay no faster than this, 1/s: far from
+/// where torque that is held for a period of 1 ms and arrives one late makes the loop unstable.
 constexpr double kFastestDecay = 200;
 
 }  // namespace
@@ -58,17 +60,19 @@ Settings default_settings(const RobotModel& model) {
   limits.damping = 20 * inertia;
 
   constexpr double kOmega = 2 * std::numbers::pi * 1.5;  // rad/s
-  constexpr double kRatio = 0.7;
   Gains& gains = settings.initial.gains;
   gains.joint_stiffness = (kOmega * kOmega * inertia).asDiagonal();
-  gains.joint_damping = (2 * kRatio * kOmega * inertia).asDiagonal();
+  gains.joint_damping = JointMatrix::Zero(n, n);
+  // A damper 2 ratio omega m is the fastest for the fastest mode, whose omega^2 is at most
+  // k_v / m_v + k_w / m_w: half for translation, half for rotation.
+  constexpr double kFastest = kFastestDecay / (2 * kRatio);  // rad/s
   const TipInertia least = least_tip_inertia(model, limits.position_lower, limits.position_upper);
-  const double linear = std::min(40.0, kFastestDecay * least.linear);
-  const double angular = std::min(2.0, kFastestDecay * least.angular);
-  gains.task_damping.diagonal() << linear, linear, linear, angular, angular, angular;
-  gains.task_stiffness = 10 * gains.task_damping;
+  const double linear = std::min(400.0, 0.5 * kFastest * kFastest * least.linear);
+  const double angular = std::min(20.0, 0.5 * kFastest * kFastest * least.angular);
+  gains.task_stiffness.diagonal() << linear, linear, linear, angular, angular, angular;
   gains.null_stiffness = 0.25 * gains.joint_stiffness.diagonal();
-  gains.null_damping = 0.5 * gains.joint_damping.diagonal();
+  gains.null_damping = none;
+  gains.joint_damping_ratio = gains.task_damping_ratio = gains.null_damping_ratio = kRatio;
   settings.initial.joint_position = middle;
   return settings;
 }

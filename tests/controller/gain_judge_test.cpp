@@ -1,6 +1,7 @@
 // Gains judged on one joint, whose sampled loop is solved by hand.
 #include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/tests/support/chains.hpp>
+#include <dashpot/tests/support/constant_damping.hpp>
 
 #include <gtest/gtest.h>
 
@@ -16,7 +17,7 @@ constexpr double kInertia = 0.02 + 0.25 * 0.25;  // of a link of the chain about
 /// v_k+1 = v_k - c T / I v_k-1: stable up to c T / I = 2, and 1.
 class Judge : public ::testing::Test {
  protected:
-  Judge() : settings(default_settings(model())) {
+  Judge() : settings(testing::constant_damping(model())) {
     settings.limits.gain_margin = 3;
     gains = settings.initial.gains;
     gains.joint_stiffness.setZero();

@@ -2,6 +2,7 @@
 // motion, without drives and sampling.
 #include <dashpot/controller/law/impedance_law.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/constant_damping.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/simulated_arm.hpp>
 
@@ -29,7 +30,7 @@ class Swing {
       : law_(model_, FeedForward{true, coriolis, false, true, false}), at(start) {
     Setpoint setpoint;
     setpoint.mode = mode;
-    setpoint.gains = default_settings(model_).initial.gains;
+    setpoint.gains = testing::constant_damping(model_).initial.gains;
     setpoint.gains.joint_damping.setZero();
     setpoint.gains.task_damping.setZero();
     setpoint.gains.task_stiffness.diagonal() << 300, 500, 200, 20, 20, 20;

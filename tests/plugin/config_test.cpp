@@ -81,6 +81,9 @@ void expect_same(const Settings& a, const Settings& b) {
   EXPECT_EQ(a.initial.gains.task_stiffness, b.initial.gains.task_stiffness);
   EXPECT_EQ(a.initial.gains.task_damping, b.initial.gains.task_damping);
   EXPECT_EQ(a.initial.gains.directions, b.initial.gains.directions);
+  EXPECT_EQ(a.initial.gains.joint_damping_ratio, b.initial.gains.joint_damping_ratio);
+  EXPECT_EQ(a.initial.gains.task_damping_ratio, b.initial.gains.task_damping_ratio);
+  EXPECT_EQ(a.initial.gains.null_damping_ratio, b.initial.gains.null_damping_ratio);
 }
 
 TEST(Config, NeedsARobotOnly) {
@@ -167,9 +170,20 @@ TEST(Config, TakesADampingRatioOfTheJoints) {
   const auto gains = [](const std::string& joint) {
     return load(panda() + "gains: {joint: {" + joint + "}}\n").settings.initial.gains;
   };
-  EXPECT_EQ(gains("").joint_damping_ratio, 0);
-  EXPECT_EQ(gains("stiffness: 300, damping_ratio: 0.7").joint_damping_ratio, 0.7);
-  EXPECT_EQ(gains("stiffness: 300, damping_ratio: 0.7").task_damping_ratio, 0);
+  EXPECT_EQ(gains("").joint_damping_ratio, 0.7);
+  EXPECT_EQ(gains("stiffness: 300, damping: 9").joint_damping_ratio, 0);
+  EXPECT_EQ(gains("stiffness: 300, damping_ratio: 0.8").joint_damping_ratio, 0.8);
+  EXPECT_EQ(gains("stiffness: 300, damping_ratio: 0.8").task_damping_ratio, 0.7);
+}
+
+TEST(Config, TakesADampingRatioOfTheNullSpace) {
+  const auto gains = [](const std::string& null_space) {
+    return load(panda() + "gains: {null_space: {" + null_space + "}}\n").settings.initial.gains;
+  };
+  EXPECT_EQ(gains("").null_damping_ratio, 0.7);
+  EXPECT_EQ(gains("stiffness: 3, damping: 1").null_damping_ratio, 0);
+  EXPECT_EQ(gains("stiffness: 3, damping_ratio: 0.8").null_damping_ratio, 0.8);
+  EXPECT_EQ(gains("stiffness: 3, damping_ratio: 0.8").null_stiffness, VectorXd::Constant(7, 3));
 }
 
 TEST(Config, FillsTheTask) {
@@ -194,8 +208,10 @@ TEST(Config, ADampingRatioStandsForTheDampingOfTheTask) {
   const auto gains = [](const std::string& task) {
     return load(panda() + "gains: {task: {" + task + "}}\n").settings.initial.gains;
   };
-  EXPECT_EQ(gains("").task_damping_ratio, 0);
-  EXPECT_EQ(gains("damping_ratio: 0.7").task_damping_ratio, 0.7);
+  EXPECT_EQ(gains("").task_damping_ratio, 0.7);
+  EXPECT_EQ(gains("stiffness: [9, 8, 7, 6, 5, 4], damping: [1, 1, 1, 1, 1, 1]").task_damping_ratio,
+            0);
+  EXPECT_EQ(gains("damping_ratio: 0.6").task_damping_ratio, 0.6);
   const auto both = gains("stiffness: [9, 8, 7, 6, 5, 4], damping_ratio: 2");
   EXPECT_EQ(both.task_damping_ratio, 2);
   EXPECT_EQ(both.task_stiffness(0, 0), 9);

@@ -1,6 +1,7 @@
 // Which gains are judged again, and which are known to be good.
 #include <dashpot/controller/plugin/plugin_judgement.hpp>
 #include <dashpot/tests/support/chains.hpp>
+#include <dashpot/tests/support/constant_damping.hpp>
 
 #include <gtest/gtest.h>
 
@@ -15,7 +16,8 @@ namespace {
 class Judging : public ::testing::Test {
  protected:
   Judging()
-      : model(testing::chain_of({"continuous", "continuous"})), settings(default_settings(model)) {}
+      : model(testing::chain_of({"continuous", "continuous"})),
+        settings(testing::constant_damping(model)) {}
   void make() { judgement.emplace(model, settings); }
   static JointVector at(double elbow) { return JointVector(Eigen::Vector2d(0.3, elbow)); }
   Gains gains(double damper) const {

@@ -8,6 +8,7 @@
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/vibration/loop_system.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/constant_damping.hpp>
 
 #include <cmath>
 #include <memory>
@@ -53,7 +54,7 @@ class ArmLoop {
       : kernel_(model),
         friction_(model.joint_values(&controller::Joint::viscous_friction)),
         impedance_(model.dof()) {
-    controller::Setpoint setpoint = controller::default_settings(model).initial;
+    controller::Setpoint setpoint = constant_damping(model).initial;
     setpoint.mode = controller::Mode::kCartesian;
     setpoint.gains.task_damping *= scales.damping;
     setpoint.gains.null_stiffness *= scales.null_space;

@@ -4,6 +4,7 @@
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/tests/support/constant_damping.hpp>
 #include <dashpot/tests/support/hostile_ticks.hpp>
 #include <dashpot/tests/support/skip_tally.hpp>
 
@@ -267,7 +268,7 @@ inline std::vector<TermSkip> term_skips() {
 
 /// Runs one for this many ticks.
 inline void run_skip(const controller::RobotModel& model, int ticks, TermSkip& skip) {
-  controller::Settings lean = controller::default_settings(model), full = lean;
+  controller::Settings lean = constant_damping(model), full = lean;
   skip.settings(lean, full);
   LedPair pair(model, lean, full);
   for (int k = 0; k < ticks; ++k) {

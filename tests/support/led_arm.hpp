@@ -5,6 +5,7 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/constant_damping.hpp>
 
 #include <cmath>
 #include <numbers>
@@ -24,7 +25,7 @@ inline controller::RobotModel smooth_panda() {
 
 /// Settings in which no limit or watchdog interferes.
 inline controller::Settings unlimited_settings(const controller::RobotModel& model) {
-  controller::Settings settings = controller::default_settings(model);
+  controller::Settings settings = constant_damping(model);
   settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
   settings.watchdog.feedback = 0;
   settings.analysis.share = 1;

@@ -4,6 +4,7 @@
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/tests/support/constant_damping.hpp>
 
 #include <Eigen/Cholesky>
 #include <string>
@@ -12,7 +13,7 @@ namespace dashpot::testing {
 
 /// Settings of the Panda in which nothing but what a test asks for interferes.
 inline controller::Settings quiet_settings(const controller::RobotModel& model) {
-  controller::Settings settings = controller::default_settings(model);
+  controller::Settings settings = constant_damping(model);
   settings.analysis.where = controller::Analysis::Where::kOff;
   settings.watchdog.feedback = 0;  // many tests put the arm where they want it
   return settings;
