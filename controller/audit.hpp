@@ -34,6 +34,10 @@ struct AuditOptions {
   int delay = 0;                     ///< ticks from a torque to its effect, beyond the hold
   double cutoff = 0;                 ///< of a first-order low-pass on the torque, Hz; 0: none
   bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / period as velocity
+  /// True if the null space's springs and dampers act through the projector N = I - J^+ J of the
+  /// pseudo-inverse, as many controllers have it. It ignores the inertia, so that they act on the
+  /// tip as well. False: through the dynamically consistent one, see NullSpace.
+  bool kinematic_null_space = false;
   double soft_frequency = kSoftFrequency;  ///< modes below this are called soft, rad/s
   /// Range of sampled postures, n, rad; without entries the position limits of the model.
   JointVector lower, upper;
@@ -141,6 +145,7 @@ class Audit {
 
  private:
   DynamicsResult evaluate(const JointVector& q) const;
+  bool kinematic() const noexcept { return options_.kinematic_null_space; }
   /// Returns the springs and dampers that act at a posture.
   Impedance impedance_at(const DynamicsResult& robot) const;
   /// Returns the same as matrices of an impedance whose errors are counted.

@@ -32,8 +32,9 @@ std::vector<std::string> preset_names() {
   return names;
 }
 
-/// Sets the gains of a preset; all but the damping, which follows from the factor.
-void take_preset(const std::string& name, AuditOptions& audit) {
+/// Sets the gains of a preset for n joints; all but the task's damping, which follows from the
+/// factor.
+void take_preset(const std::string& name, int n, AuditOptions& audit) {
   const GainPreset& preset = *std::find_if(kPresets.begin(), kPresets.end(),
                                            [&](const auto& one) { return one.name == name; });
   controller::Vector6 diagonal;
@@ -42,6 +43,9 @@ void take_preset(const std::string& name, AuditOptions& audit) {
   audit.gains.task_stiffness = diagonal.asDiagonal();
   audit.half_quaternion = preset.half_quaternion;
   audit.inertia_blocks = preset.inertia_blocks;
+  audit.gains.null_stiffness.setConstant(n, preset.null_space);
+  audit.gains.null_damping.setConstant(n, kPresetFactor * std::sqrt(preset.null_space));
+  audit.kinematic_null_space = true;
 }
 
 /// Sets the gains that stand in a configuration file.
@@ -56,7 +60,8 @@ void read_gains_file(const std::string& path, const RobotModel& model, AuditOpti
   gains.null_stiffness.setZero(n);
   gains.null_damping.setZero(n);
   controller::read_gains(root, model, controller::GainPairs::kEither, gains);
-  if (gains.joint_damping_ratio > 0 || gains.task_damping_ratio > 0) {
+  if (gains.joint_damping_ratio > 0 || gains.task_damping_ratio > 0 ||
+      gains.null_damping_ratio > 0) {
     throw InputError("gains",
                      "damping_ratio asks for damping that follows the posture; an audit "
                      "needs damping");
@@ -108,13 +113,16 @@ void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptio
                 double& intended_ratio) {
   std::optional<double> factor = command.damping_factor;
   if (!command.preset.empty()) {
-    take_preset(command.preset, audit);
+    take_preset(command.preset, model.dof(), audit);
     if (!factor) factor = kPresetFactor;
   }
   if (!command.gains.empty()) read_gains_file(command.gains, model, audit);
   read_options_gains(command, model, audit);
   if (command.mode == "joint") audit.mode = Mode::kJoint;
   if (!command.rotation.empty()) audit.half_quaternion = command.rotation == "half-quaternion";
+  if (!command.null_projector.empty()) {
+    audit.kinematic_null_space = command.null_projector == "kinematic";
+  }
   if (command.frame == "tool") audit.gains.frame = controller::Frame::kTool;
   if (!factor) return;
   controller::Gains& gains = audit.gains;
@@ -242,6 +250,9 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
   add("--null-stiffness", options.null_stiffness, "Of the motions that the task leaves free",
       "a,b,...|x (0)");
   add("--null-damping", options.null_damping, "Of the same", "a,b,...|x (0)");
+  add("--null-projector", options.null_projector, "Through which they act",
+      "dynamic|kinematic (dynamic)")
+      ->check(CLI::IsMember({"dynamic", "kinematic"}));
   add_model_options(command, arm);
   command.add_option("--period", options.period, "Of the control loop: computes the gain margin")
       ->transform(positive("s", "a time in s"))

@@ -7,11 +7,13 @@
 namespace dashpot::apps {
 
 /// Default gains of a Cartesian impedance controller whose documentation calls them critically
-/// damped: D = 2 sqrt(K). What a controller adds in the null space is left out.
+/// damped: D = 2 sqrt(K), in the null space as well. There they act through the projector of the
+/// pseudo-inverse.
 struct GainPreset {
   std::string_view name;
   double translation;    ///< N/m, or 1/s^2 with `inertia_blocks`
   double rotation;       ///< N m/rad, or 1/s^2
+  double null_space;     ///< of each joint, N m/rad
   bool half_quaternion;  ///< the rotational error is the vector part of a quaternion
   bool inertia_blocks;   ///< gains are multiplied by the tip's inertia
 };
@@ -20,20 +22,20 @@ inline constexpr double kPresetFactor = 2;
 
 inline constexpr std::array<GainPreset, 7> kPresets = {{
     // libfranka, examples/cartesian_impedance_control.cpp
-    {"libfranka", 150, 10, true, false},
+    {"libfranka", 150, 10, 0, true, false},
     // franka_ros, franka_example_controllers/cfg/compliance_param.cfg
-    {"franka_ros", 200, 20, true, false},
+    {"franka_ros", 200, 20, 0, true, false},
     // panda-py, src/controllers/cartesian_impedance.cpp
-    {"panda_py", 600, 30, true, false},
+    {"panda_py", 600, 30, 0.5, true, false},
     // utiasDSL/crisp_controllers, parameters of the Cartesian controller
-    {"crisp", 500, 30, false, false},
+    {"crisp", 500, 30, 1, false, false},
     // matthias-mayr/Cartesian-Impedance-Controller, default stiffness; error as an angle and axis
-    {"cartesian_impedance_controller", 200, 20, false, false},
+    {"cartesian_impedance_controller", 200, 20, 0, false, false},
     // TimSchneider42/franky, defaults of CartesianImpedanceMotion
-    {"franky", 1200, 80, false, false},
+    {"franky", 1200, 80, 10, false, false},
     // UT-Austin-RPL/deoxys_control, deoxys/config/osc-pose-controller.yml, without its
     // residual_mass_vec; the law is in deoxys/franka-interface/src/controllers/osc_impedance.cpp
-    {"deoxys", 150, 250, true, true},
+    {"deoxys", 150, 250, 0, true, true},
 }};
 
 }  // namespace dashpot::apps

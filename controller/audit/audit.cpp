@@ -2,7 +2,9 @@
 #include <dashpot/analysis/elastic_form.hpp>
 #include <dashpot/analysis/null_damping.hpp>
 #include <dashpot/controller/audit.hpp>
+#include <dashpot/controller/audit/stated_gains.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/loop_system.hpp>
 
 #include <Eigen/Eigenvalues>
@@ -10,7 +12,6 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <string>
 
 namespace dashpot::controller {
 namespace {
@@ -22,77 +23,6 @@ constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A real part of this share of the fastest eigenvalue cannot be told from zero.
 constexpr double kRounding = 1e-12;
-
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::invalid_argument(message);
-}
-
-/// Returns the symmetric part of a gain matrix, which may be empty, after checking it.
-MatrixXd checked_matrix(const std::string& name, const MatrixXd& given, Index n) {
-  if (given.size() == 0) return MatrixXd::Zero(n, n);
-  require(given.rows() == n && given.cols() == n,
-          name + ": is " + std::to_string(given.rows()) + " x " + std::to_string(given.cols()) +
-              ", expected " + std::to_string(n) + " x " + std::to_string(n));
-  require(given.allFinite(), name + ": has an entry that is not a finite number");
-  require((given - given.transpose()).cwiseAbs().maxCoeff() <= 1e-10 * given.cwiseAbs().maxCoeff(),
-          name + ": is not symmetric");
-  return 0.5 * (given + given.transpose());
-}
-
-/// Returns the rank of a stiffness. Throws unless it is positive semidefinite.
-int checked_rank(const std::string& name, const MatrixXd& stiffness) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(stiffness, Eigen::EigenvaluesOnly);
-  const double rounding = 1e-12 * solver.eigenvalues().cwiseAbs().maxCoeff();
-  require(solver.eigenvalues().minCoeff() >= -rounding, name + ": is not positive semidefinite");
-  return static_cast<int>((solver.eigenvalues().array() > rounding).count());
-}
-
-JointVector checked_vector(const std::string& name, const JointVector& given, Index n) {
-  if (given.size() == 0) return JointVector::Zero(n);
-  require(given.size() == n, name + ": has " + std::to_string(given.size()) +
-                                 " entries, expected " + std::to_string(n));
-  require(given.allFinite(), name + ": has an entry that is not a finite number");
-  return given;
-}
-
-/// Throws unless A = diag(a I, b I).
-void require_two_numbers(const std::string& name, const Matrix6& A) {
-  Vector6 diagonal;
-  diagonal << A(0, 0), A(0, 0), A(0, 0), A(3, 3), A(3, 3), A(3, 3);
-  require(A == Matrix6(diagonal.asDiagonal()),
-          name + ": needs one number for translation and one for rotation with inertia_blocks");
-}
-
-/// The springs and dampers as stated, in force.
-Impedance stated_impedance(const AuditOptions& options, int n) {
-  const Gains& gains = options.gains;
-  Setpoint setpoint;
-  setpoint.mode = options.mode;
-  setpoint.gains = gains;
-  Gains& checked = setpoint.gains;
-  checked.joint_damping_ratio = checked.task_damping_ratio = 0;
-  checked.joint_stiffness = checked_matrix("joint_stiffness", gains.joint_stiffness, n);
-  checked.joint_damping = checked_matrix("joint_damping", gains.joint_damping, n);
-  checked.task_stiffness = checked_matrix("task_stiffness", gains.task_stiffness, 6);
-  checked.task_damping = checked_matrix("task_damping", gains.task_damping, 6);
-  checked.null_stiffness = checked_vector("null_stiffness", gains.null_stiffness, n);
-  checked.null_damping = checked_vector("null_damping", gains.null_damping, n);
-  require(checked.null_stiffness.minCoeff() >= 0, "null_stiffness: has a negative entry");
-  if (options.inertia_blocks) {
-    require_two_numbers("task_stiffness", checked.task_stiffness);
-    require_two_numbers("task_damping", checked.task_damping);
-  }
-  if (options.half_quaternion) {
-    const Vector6 share = (Vector6() << 1, 1, 1, 0.5, 0.5, 0.5).finished();
-    const Vector6 root = share.cwiseSqrt();  // both sides of a K with coupling
-    checked.task_stiffness = root.asDiagonal() * checked.task_stiffness * root.asDiagonal();
-  }
-  for (Index i = 0; i < 6; ++i) {
-    checked.directions[static_cast<std::size_t>(i)] =
-        !checked.task_stiffness.row(i).isZero(0) || !checked.task_damping.row(i).isZero(0);
-  }
-  return Impedance(setpoint, n);
-}
 
 /// A number and how far it is from the true one at most.
 struct Bounded {
@@ -155,6 +85,18 @@ bool read_eigenvalues(const Eigen::Ref<const Eigen::VectorXcd>& values, double s
   result.smallest_ratio = ratio;
   result.fastest_pole = fastest;
   return ratio < kInfinity && slowest <= kRounding * std::abs(fastest);
+}
+
+/// Makes joint springs and dampers of the null space's.
+void take_into_joints(const NullSpace& null_space, Impedance& impedance) {
+  const Index n = impedance.null_stiffness.size();
+  JointMatrix projector(n, n);
+  null_projector(null_space, projector);
+  add_projected(projector, impedance.null_stiffness, impedance.joint_stiffness);
+  add_projected(projector, impedance.null_damping, impedance.joint_damping);
+  if (!impedance.null_stiffness.isZero(0)) impedance.joint_weight = 1;
+  impedance.null_stiffness.setZero();
+  impedance.null_damping.setZero();
 }
 
 }  // namespace
@@ -224,9 +166,14 @@ Impedance Audit::impedance_at(const DynamicsResult& robot) const {
 
 PostureNumbers Audit::numbers(const JointVector& q) const {
   const DynamicsResult robot = evaluate(q);
-  const Impedance impedance = impedance_at(robot);
+  Impedance impedance = impedance_at(robot);
   NullSpace null_space;
-  if (impedance.null_space()) {
+  if (kinematic() && impedance.null_space()) {
+    null_space.compute(JointMatrix::Identity(model_.dof(), model_.dof()), robot.J, impedance.base,
+                       impedance.tool, robot.R_BT);
+    if (null_space.inertia().nearly_singular()) return audit(q).numbers;
+    take_into_joints(null_space, impedance);
+  } else if (impedance.null_space()) {
     null_space.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
   }
   LoopSystem loop;
@@ -270,7 +217,8 @@ analysis::TaskImpedance Audit::task_impedance(const DynamicsResult& robot) const
   result.damping = MatrixXd(friction_.asDiagonal());
   if (!impedance.null_space() || n == 0) return result;
   const auto projected = [&](const JointVector& gains) {
-    return analysis::null_space_damping(result.mass, *result.jacobian, *result.task_stiffness,
+    return analysis::null_space_damping(kinematic() ? MatrixXd::Identity(n, n) : result.mass,
+                                        *result.jacobian, *result.task_stiffness,
                                         MatrixXd(gains.asDiagonal()));
   };
   const analysis::NullSpaceDamping damping = projected(impedance.null_damping);

@@ -36,6 +36,7 @@ RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool c
   options.gains = gains;
   options.half_quaternion = nb::cast<bool>(given["half_quaternion"]);
   options.inertia_blocks = nb::cast<bool>(given["inertia_blocks"]);
+  options.kinematic_null_space = nb::cast<bool>(given["kinematic_null_space"]);
   options.period = nb::cast<double>(given["period"]);
   options.delay = nb::cast<int>(given["delay"]);
   options.cutoff = nb::cast<double>(given["cutoff"]);

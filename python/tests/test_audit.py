@@ -32,6 +32,28 @@ def test_a_posture_has_the_modes_of_the_closed_loop(panda):
     assert found.workspace is None
 
 
+def test_a_kinematic_null_space_acts_through_the_pseudo_inverse(panda):
+    for q in (HOME, [0.3, -0.4, 0.8, -1.9, 0.2, 2.1, -0.5]):
+        M, J = panda.mass(q), panda.jacobian(q)
+        N = np.eye(7) - np.linalg.pinv(J) @ J
+        K_C = np.diag(GAINS["task_stiffness"])
+        K = J.T @ K_C @ J + N.T @ (10.0 * N)
+        C = J.T @ (2 * np.sqrt(K_C)) @ J + N.T @ (6.0 * N) + 0.003 * np.eye(7)  # the URDF's friction
+        values = np.linalg.eigvals(np.block([[np.zeros((7, 7)), np.eye(7)],
+                                             [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]))
+        swings = values[values.imag > 0]
+        null_space = dict(null_stiffness=[10.0] * 7, null_damping=[6.0] * 7)
+        found = dashpot.audit(panda, q, **GAINS, **null_space, null_projector="kinematic",
+                              postures=[q])
+        for fastest, ratio in ((found.posture.fastest_pole, found.posture.smallest_ratio),
+                               (found.workspace.fastest_pole.worst,
+                                found.workspace.smallest_ratio.worst)):
+            assert fastest == pytest.approx(values.real.min(), rel=1e-9)
+            assert ratio == pytest.approx((-swings.real / abs(swings)).min(), abs=1e-9)
+        other = dashpot.audit(panda, q, **GAINS, **null_space).posture
+        assert abs(other.fastest_pole / values.real.min() - 1) > 1e-3
+
+
 def test_workspaces_are_the_same_with_any_executor(panda):
     spawn = multiprocessing.get_context("spawn")
     with (concurrent.futures.ThreadPoolExecutor(1) as one,
@@ -80,6 +102,7 @@ def test_half_quaternions_halve_the_rotational_springs(panda):
     (dict(task_stiffness=[1] * 6, damping_ratio=0.7), "damping_ratio: .*q is missing"),
     (dict(task_stiffness=[1] * 6, postures=[[1, 2]]), "postures: has 2 entries"),
     (dict(task_stiffness=[1] * 6, q=[1, 2]), "q: has 2 entries"),
+    (dict(task_stiffness=[1] * 6, null_projector="both"), "null_projector: 'both'"),
 ])
 def test_bad_input_gives_the_programs_messages(panda, given, message):
     with pytest.raises(dashpot.Error, match=message):

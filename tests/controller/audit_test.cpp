@@ -229,6 +229,28 @@ TEST(Audit, CountsSpringsInTheNullSpace) {
   EXPECT_EQ(Audit(model, options).numbers(home()).zero_modes, 1);
 }
 
+TEST(Audit, TakesTheProjectorOfThePseudoInverse) {
+  const RobotModel model = audited_panda();
+  AuditOptions options = stated(kTranslationFirst, 2);
+  options.gains.null_stiffness = JointVector::Constant(7, 10);
+  options.gains.null_damping = JointVector::Constant(7, 6);
+  options.kinematic_null_space = true;
+  const Audit audit(model, options);
+  for (int k = 0; k < 50; ++k) {
+    const JointVector q = audit.posture(1, k);
+    TaskLoop loop = loop_at(model, q, options.gains.task_stiffness, options.gains.task_damping);
+    const Eigen::MatrixXd J = evaluate(model, q, JointVector::Zero(7)).J;
+    const LongRows z = Eigen::FullPivLU<LongRows>(J.cast<long double>()).kernel();
+    const LongRows N = z * z.transpose() / z.squaredNorm();
+    loop.K += 10 * N, loop.C += 6 * N;
+    const PostureNumbers wanted = numbers_of(loop);
+    for (const PostureNumbers& found : {audit.numbers(q), audit.audit(q).numbers}) {
+      EXPECT_NEAR(found.fastest_pole, wanted.fastest_pole, 1e-9 * std::abs(wanted.fastest_pole));
+      EXPECT_NEAR(found.smallest_ratio, wanted.smallest_ratio, 1e-8);
+    }
+  }
+}
+
 TEST(Audit, NamesASingularPosture) {
   JointVector stretched = home();
   stretched[1] = stretched[3] = stretched[5] = 0;

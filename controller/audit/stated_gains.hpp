@@ -1,0 +1,19 @@
+#pragma once
+#include <dashpot/controller/audit.hpp>
+
+#include <string>
+
+namespace dashpot::controller {
+
+/// Throws std::invalid_argument with the message unless the condition holds.
+void require(bool condition, const std::string& message);
+
+/// Returns the rank of a stiffness (k x k). Throws std::invalid_argument, with its name, unless it
+/// is positive semidefinite.
+int checked_rank(const std::string& name, const Eigen::MatrixXd& stiffness);
+
+/// Returns the springs and dampers as stated, in force, for n joints. Throws std::invalid_argument,
+/// with the member's name and the reason.
+Impedance stated_impedance(const AuditOptions& options, int n);
+
+}  // namespace dashpot::controller
