@@ -11,6 +11,8 @@ _Question = tuple[_Array, float, float, float, list[int]]
 # level, largest ratio, worst sample, those that bind
 _Verdict = tuple[float, float, int, list[tuple[float, int]]]
 
+__build__: str
+
 class Error(ValueError): ...
 
 class Impedance:
@@ -53,7 +55,8 @@ class Gains:
     def __init__(self, robot: Robot, joint_stiffness: _Array | None, joint_damping: _Array | None,
                  joint_damping_ratio: float, task_stiffness: _Array | None,
                  task_damping: _Array | None, task_damping_ratio: float,
-                 null_stiffness: _Array | None, null_damping: _Array | None, tool_frame: bool,
+                 null_stiffness: _Array | None, null_damping: _Array | None,
+                 null_damping_ratio: float, tool_frame: bool,
                  directions: list[bool]) -> None: ...
 
 def closed_loop(robot: Robot, q: _Array, gains: Gains, cartesian: bool,
