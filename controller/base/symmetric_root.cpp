@@ -10,6 +10,9 @@ namespace {
 constexpr int kMostSweeps = 12;
 /// Entries beside the diagonal below this share of the largest entry are rounding.
 constexpr double kNothing = 1e-15;
+/// Eigenvalues below this share of it are rounding, whose root would be a hundred million times as
+/// large.
+constexpr double kVanishes = 1e-13;
 
 /// Turns rows a and b by the angle of c and s.
 void turn(std::array<double, kMaxJoints>& a, std::array<double, kMaxJoints>& b, double c, double s,
@@ -57,8 +60,8 @@ JointMatrix symmetric_root(const JointMatrix& A, double factor) noexcept {
   }
   JointMatrix root = JointMatrix::Zero(A.rows(), A.rows());
   for (std::size_t k = 0; k < n; ++k) {
-    const double value = factor * std::sqrt(std::max(0.0, B[k][k]));
-    if (value == 0) continue;
+    if (!(B[k][k] > kVanishes * largest)) continue;
+    const double value = factor * std::sqrt(B[k][k]);
     for (std::size_t j = 0; j < n; ++j) {
       const double scaled = value * V[k][j];
       for (std::size_t i = 0; i < n; ++i) {
