@@ -106,7 +106,9 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
       options_(options),
       kernel_(model),
       friction_(model.joint_values(&Joint::viscous_friction)),
-      impedance_(stated_impedance(options, model.dof())) {
+      impedance_(stated_impedance(options.gains,
+                                  {options.mode, options.half_quaternion, options.inertia_blocks},
+                                  model.dof())) {
   const int n = model.dof();
   if (options.mode == Mode::kJoint) {
     springs_ = checked_rank("joint_stiffness", impedance_.joint_stiffness);

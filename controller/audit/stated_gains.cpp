@@ -51,10 +51,9 @@ int checked_rank(const std::string& name, const MatrixXd& stiffness) {
   return static_cast<int>((solver.eigenvalues().array() > rounding).count());
 }
 
-Impedance stated_impedance(const AuditOptions& options, int n) {
-  const Gains& gains = options.gains;
+Impedance stated_impedance(const Gains& gains, const StatedGains& stated, int n) {
   Setpoint setpoint;
-  setpoint.mode = options.mode;
+  setpoint.mode = stated.mode;
   setpoint.gains = gains;
   Gains& checked = setpoint.gains;
   checked.joint_damping_ratio = checked.task_damping_ratio = checked.null_damping_ratio = 0;
@@ -65,11 +64,11 @@ Impedance stated_impedance(const AuditOptions& options, int n) {
   checked.null_stiffness = checked_vector("null_stiffness", gains.null_stiffness, n);
   checked.null_damping = checked_vector("null_damping", gains.null_damping, n);
   require(checked.null_stiffness.minCoeff() >= 0, "null_stiffness: has a negative entry");
-  if (options.inertia_blocks) {
+  if (stated.inertia_blocks) {
     require_two_numbers("task_stiffness", checked.task_stiffness);
     require_two_numbers("task_damping", checked.task_damping);
   }
-  if (options.half_quaternion) {
+  if (stated.half_quaternion) {
     const Vector6 share = (Vector6() << 1, 1, 1, 0.5, 0.5, 0.5).finished();
     const Vector6 root = share.cwiseSqrt();  // both sides of a K with coupling
     checked.task_stiffness = root.asDiagonal() * checked.task_stiffness * root.asDiagonal();

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/controller/audit.hpp>
+#include <dashpot/controller/base/impedance.hpp>
 
 #include <string>
 
@@ -12,8 +12,14 @@ void require(bool condition, const std::string& message);
 /// is positive semidefinite.
 int checked_rank(const std::string& name, const Eigen::MatrixXd& stiffness);
 
+/// How a controller means its gains, see AuditOptions.
+struct StatedGains {
+  Mode mode;
+  bool half_quaternion, inertia_blocks;
+};
+
 /// Returns the springs and dampers as stated, in force, for n joints. Throws std::invalid_argument,
 /// with the member's name and the reason.
-Impedance stated_impedance(const AuditOptions& options, int n);
+Impedance stated_impedance(const Gains& gains, const StatedGains& stated, int n);
 
 }  // namespace dashpot::controller
