@@ -48,8 +48,8 @@ class ModeTracker {
 
   /// Fills `out` and returns out.status: kOk or kUncertified if it has modes. stiffness_factor W is
   /// read if it has 1 to n rows: then K = W'W exactly, and neither `stiffness` nor low words are
-  /// read. Otherwise K = stiffness. Two kinds of systems are solved directly on each call: those
-  /// with neither factor nor positive definite K, and those with errors, which the bounds count.
+  /// read. Otherwise K = stiffness. C and K need not be symmetric. Systems with errors are solved
+  /// directly on each call, and the bounds count the errors.
   Status update(const System<kMaxDof>& system, TrackedSpectrum& out) noexcept {
     Work work;
     return update(system, out, work);
@@ -89,13 +89,19 @@ class ModeTracker {
   bool follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
   bool refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
   bool separate(const CloseBlocks& close, Work& work) noexcept;
+  bool read(TrackedSpectrum& out) noexcept;
   void publish(const SymmetricPencil& pencil, SpectrumOrigin origin, TrackedSpectrum& out) noexcept;
-  void solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil, bool symmetric,
+  void solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil,
                       TrackedSpectrum& out, Work& work) noexcept;
-  bool restart(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
-  void publish_direct(const SymmetricPencil& pencil, bool symmetric, TrackedSpectrum& out) noexcept;
+  bool restart(const SymmetricPencil& pencil, bool two_sided, TrackedSpectrum& out,
+               Work& work) noexcept;
+  void publish_direct(const SymmetricPencil& pencil, TrackedSpectrum& out) noexcept;
   std::array<int, kMaxDof> match(const SymmetricPencil& pencil,
                                  const BlockEigenbasis& before) noexcept;
+  void forget_past() noexcept {
+    extrapolation_.forget();
+    left_extrapolation_.forget();
+  }
 
   TrackerOptions options_;
   TrackerCounters counters_;
@@ -103,6 +109,7 @@ class ModeTracker {
   State state_ = State::kEmpty;
   std::uint64_t epoch_ = 0;
   System<kMaxDof> last_;
+  bool symmetric_ = false;  ///< the system is, or the last one was
   BlockEigenbasis basis_;
   PackedMatrix E_;  ///< the last step of basis_, which its blocks do not know of
   TrackedResidual residual_;
@@ -113,6 +120,9 @@ class ModeTracker {
   TrackedSpectrum kept_;
   SpectrumSolver<kMaxDof> solver_;
   Spectrum<kMaxDof> spectrum_;
+  // Of two-sided bases
+  BasisExtrapolation left_extrapolation_;
+  double still_floor_ = 0;  ///< frequency below which zero modes were told from others, rad/s
 };
 
 }  // namespace dashpot::analysis

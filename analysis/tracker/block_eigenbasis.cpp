@@ -1,4 +1,5 @@
 #include <dashpot/analysis/tracker/block_eigenbasis.hpp>
+#include <dashpot/analysis/tracker/two_sided_basis.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -234,7 +235,11 @@ void evaluate(const SymmetricPencil& pencil, BlockEigenbasis& basis,
   for (PackedMatrix* rows : {&residual.R, &residual.G, &residual.MV, &residual.image}) {
     rows->width = basis.Z.width;
   }
-  multiply(pencil, basis, residual);
+  if (basis.two_sided) {
+    multiply_two_sided(pencil, basis, residual);
+  } else {
+    multiply(pencil, basis, residual);
+  }
   set_blocks(residual.R, residual.G, basis);
   subtract_blocks(basis, residual.R, residual.G);
   for (int i = 0; i < basis.columns(); ++i) residual.R(i, i) -= i < basis.modes ? 1 : -1;

@@ -14,7 +14,8 @@ namespace dashpot::analysis {
 /// modes' velocities. No rank is decided and nothing is squared. Without a factor (p = n) the
 /// states are (q, v), S = [K 0; 0 -M] and B = [0 K; K C], for a positive definite K.
 ///
-/// The matrices belong to the caller and are not copied; M, C and K are symmetric.
+/// The matrices belong to the caller and are not copied. M, C and K are symmetric; where C or K is
+/// not, the basis is two-sided, and S and B are those of two_sided_basis.hpp.
 struct SymmetricPencil {
   int joints = 0;  ///< n
   int rank = 0;    ///< p
@@ -36,19 +37,25 @@ SymmetricPencil symmetric_pencil(const System<kMaxDof>& system) noexcept;
 /// in which the system is nearly block diagonal, with one real 2 x 2 block for each mode and one
 /// rate for each zero mode: S^-1 B Z = Z Lambda. A block has a complex pair or two real eigenvalues
 /// of opposite sign characteristic. It stays well conditioned where the two meet (critical
-/// damping). The left vectors are S Z. S has as many negative squares as Sigma, so that with a
-/// factor a basis with a proved bound proves M positive definite.
+/// damping). The left vectors are S Z, unless the basis is two-sided. S has as many negative
+/// squares as Sigma, so that with a factor a basis with a proved bound proves M positive definite.
 struct BlockEigenbasis {
   using Entries = std::array<double, 20>;  ///< of up to 16 modes, read in fours
   int modes = 0;                           ///< p
   int zeros = 0;                           ///< n - p
   PackedMatrix Z;  ///< n + p rows and columns: elastic coordinates, then velocities
+  /// The left basis is kept beside the right one, in the rows of Y: see two_sided_basis.hpp.
+  bool two_sided = false;
+  int still = 0;  ///< of `modes`: blocks that are zero modes all the same, the last ones; two-sided
+                  ///< bases without a factor have them
+  PackedMatrix Y;  ///< of the size of Z, if two_sided
   /// Lambda of mode i is [l00 l01; l10 l11](i), 1/s.
   Entries l00{}, l01{}, l10{}, l11{};
   Entries rate{};  ///< of the zero modes, 1/s
 
   int columns() const { return 2 * modes + zeros; }
   int blocks() const { return modes + zeros; }
+  int vibrations() const { return modes - still; }  ///< modes that are published as such
   /// Columns of block i: a mode's first and second, or the one column of a zero mode twice.
   int first(int i) const { return i < modes ? i : modes + i; }
   int second(int i) const { return modes + i; }
@@ -64,7 +71,8 @@ struct BlockEigenbasis {
 };
 
 /// The residual of a basis: S^-1 B Z = Z (Lambda + F) exactly, with
-///     N F = G,     N = Z' S Z,     G = Z' B Z - N Lambda.
+///     N F = G,     N = Z' S Z,     G = Z' B Z - N Lambda,
+/// and Y in the place of Z' where the basis is two-sided.
 struct TrackedResidual {
   PackedMatrix R;  ///< N - Sigma
   PackedMatrix G;  ///< without the diagonal blocks of modes, 1/s

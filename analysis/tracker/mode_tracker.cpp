@@ -1,11 +1,12 @@
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/tracker/cluster_separation.hpp>
+#include <dashpot/analysis/tracker/tracked_input.hpp>
 #include <dashpot/analysis/tracker/tracked_modes.hpp>
 #include <dashpot/analysis/tracker/tracked_start.hpp>
+#include <dashpot/analysis/tracker/two_sided_basis.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <stdexcept>
 
@@ -33,21 +34,10 @@ std::size_t at(int i) {
   return static_cast<std::size_t>(i);
 }
 
-/// Whether the matrix equals its transpose and its entries are finite.
-bool is_symmetric(const Square<kMaxDof>& matrix) {
-  const auto n = static_cast<int>(matrix.rows());
-  const double* const a = matrix.data();
-  bool differs = false;  // comparisons do not wait for each other, as the terms of a sum would
-  for (int j = 0; j < n; ++j) {
-    for (int i = 0; i < j; ++i) differs |= !(a[i + j * n] - a[j + i * n] == 0);
-    differs |= !(0 * a[j + j * n] == 0);
-  }
-  return !differs;
-}
-
 /// Work of evaluating a basis, and of the step that follows.
 std::int64_t iteration_work(const BlockEigenbasis& basis) {
-  return cubed(basis.columns(), 16) + squared(basis.columns(), 60);
+  const std::int64_t left = basis.two_sided ? cubed(basis.columns(), 6) : 0;
+  return cubed(basis.columns(), 16) + squared(basis.columns(), 60) + left;
 }
 
 /// Work of the enclosure, the modes and their shapes, of n joints.
@@ -58,38 +48,6 @@ std::int64_t publishing_work(int n) {
 /// Work of a basis from a direct solution, with its modes matched to the last ones.
 std::int64_t restart_work(int n) {
   return cubed(n, 360) + publishing_work(n);
-}
-
-bool same_form(const SymmetricPencil& a, const SymmetricPencil& b) {
-  return a.joints == b.joints && a.rank == b.rank && a.factored == b.factored;
-}
-
-bool sizes_agree(const System<kMaxDof>& system) {
-  const Eigen::Index n = system.dof();
-  const Eigen::Index rows = system.stiffness_factor.rows();
-  const bool factored = rows > 0 && rows <= n;
-  const auto is_square = [n](const auto& matrix) {
-    return matrix.rows() == n && matrix.cols() == n;
-  };
-  const auto is_bound = [&](const auto& matrix) { return matrix.size() == 0 || is_square(matrix); };
-  return is_square(system.mass) && is_square(system.damping) && is_bound(system.mass_error) &&
-         is_bound(system.damping_error) && is_bound(system.stiffness_error) &&
-         (factored ? system.stiffness_factor.cols() == n : is_square(system.stiffness));
-}
-
-/// Whether coefficients are given with errors, which the bounds of a tracked basis do not count.
-bool has_errors(const System<kMaxDof>& system) {
-  return !system.mass_error.isZero(0) || !system.damping_error.isZero(0) ||
-         !system.stiffness_error.isZero(0);
-}
-
-/// Whether all coefficients, of the same form, agree to the last bit.
-bool identical(const SymmetricPencil& a, const SymmetricPencil& b) {
-  const auto same = [](const double* x, const double* y, int count) {
-    return std::memcmp(x, y, static_cast<std::size_t>(count) * sizeof(double)) == 0;
-  };
-  const int n = a.joints;
-  return same(a.M, b.M, n * n) && same(a.C, b.C, n * n) && same(a.W, b.W, a.rank * n);
 }
 
 bool has_modes(Status status) {
@@ -140,7 +98,7 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
   const bool exact = !has_errors(system);
   if (exact && state_ >= State::kCurrent && identical(pencil, last)) {
     if (state_ == State::kCurrent) {
-      read_numbers(basis_, enclosure_, options_.soft_frequency, soft_, kept_);
+      read(kept_);
       publish(pencil, SpectrumOrigin::kReused, kept_);
       state_ = State::kKept;
     }
@@ -150,7 +108,12 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
   }
   const bool symmetric = is_symmetric(system.mass) && is_symmetric(system.damping) &&
                          (pencil.factored || is_symmetric(system.stiffness));
-  if (symmetric && exact && follows() && follow(pencil, out, work)) {
+  // A basis of one side is dearer to find than to follow: a symmetric system gets it back at once.
+  const bool fits = basis_.two_sided ? (!symmetric || symmetric_) && is_symmetric(system.mass) &&
+                                           is_positive_definite(pencil.M, pencil.joints)
+                                     : symmetric;
+  symmetric_ = symmetric;
+  if (fits && exact && follows() && follow(pencil, out, work)) {
     last_.mass = system.mass;
     last_.damping = system.damping;
     if (pencil.factored) {
@@ -161,7 +124,7 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
     ++counters_.tracked;
     return out.status;
   }
-  if (!work.over()) solve_directly(system, pencil, symmetric, out, work);
+  if (!work.over()) solve_directly(system, pencil, out, work);
   if (work.over()) out.status = Status::kUnfinished;  // what is known serves the next update
   if (!has_modes(out.status)) out.mode_count = out.zero_mode_count = 0;
   ++(work.over()             ? counters_.unfinished
@@ -174,13 +137,18 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
 bool ModeTracker::follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept {
   state_ = State::kFollowing;
   extrapolation_.apply(basis_.columns(), basis_.Z);
-  if (rotate_hyperbolically(residual_, kBalanced, basis_)) extrapolation_.forget();
+  if (basis_.two_sided) left_extrapolation_.apply(basis_.columns(), basis_.Y);
+  if (basis_.two_sided ? balance(pencil, false, basis_)
+                       : rotate_hyperbolically(residual_, kBalanced, basis_)) {
+    forget_past();
+  }
   if (refine(pencil, out, work)) {
     publish(pencil, SpectrumOrigin::kTracked, out);
     return true;
   }
   copy(extrapolation_.last(), basis_.columns(), basis_.Z);
-  extrapolation_.forget();
+  if (basis_.two_sided) copy(left_extrapolation_.last(), basis_.columns(), basis_.Y);
+  forget_past();
   return false;
 }
 
@@ -199,8 +167,11 @@ bool ModeTracker::refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Wo
     bool good = false;
     if (!close && (size <= kLastStep || stalled) && work.take(publishing_work(pencil.joints))) {
       enclose(pencil, basis_, residual_, enclosure_);
-      read_numbers(basis_, enclosure_, options_.soft_frequency, soft_, out);
-      const bool converged = size <= kConverged || (stalled && worst_bound(out) <= kStalledBound);
+      if (!read(out)) return false;
+      // Of a K that is no square, rounding errors are the greater part of a bound after such a
+      // step.
+      const bool converged = size <= (basis_.two_sided ? kLastStep : kConverged) ||
+                             (stalled && worst_bound(out) <= kStalledBound);
       const bool buried =
           std::any_of(out.modes.begin(), out.modes.begin() + out.mode_count,
                       [this](const auto& m) { return is_buried(m, options_.soft_frequency); });
@@ -209,21 +180,29 @@ bool ModeTracker::refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Wo
              (converged || worst_bound(out) <= options_.target_bound);
     }
     take_step(E_, basis_);
+    if (basis_.two_sided) take_left_step(E_, residual_, basis_);
     if (good) {
       state_ = State::kCurrent;
       return true;
     }
     if (!close) continue;
     if (!separate(close, work)) return false;
-    extrapolation_.forget();
+    forget_past();
   }
   return false;
 }
 
 bool ModeTracker::separate(const CloseBlocks& close, Work& work) noexcept {
   if (!work.take(kPartingWork)) return false;
+  if (basis_.two_sided) return separate_two_sided(residual_, close, basis_);
   if (close.first >= basis_.modes) return separate_zero_modes(residual_, basis_);
   return separate_coinciding(residual_, basis_, work) || separate_blocks(residual_, close, basis_);
+}
+
+/// Reads the numbers of basis_; false if what is a zero mode is to be decided again.
+bool ModeTracker::read(TrackedSpectrum& out) noexcept {
+  read_numbers(basis_, enclosure_, options_.soft_frequency, soft_, out);
+  return !basis_.two_sided || part_zero_modes(basis_, still_floor_, out);
 }
 
 /// Completes `out`, which has the numbers of basis_.
@@ -231,11 +210,13 @@ void ModeTracker::publish(const SymmetricPencil& pencil, SpectrumOrigin origin,
                           TrackedSpectrum& out) noexcept {
   out.epoch = epoch_;
   out.origin = origin;
-  if (options_.shapes) read_shapes(pencil, basis_, E_, momenta_, out);
+  if (!options_.shapes) return;
+  read_shapes(pencil, basis_, E_, momenta_, out);
+  if (basis_.two_sided) read_slopes(pencil, symmetric_, out);
 }
 
 void ModeTracker::solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil,
-                                 bool symmetric, TrackedSpectrum& out, Work& work) noexcept {
+                                 TrackedSpectrum& out, Work& work) noexcept {
   reset();
   last_ = system;
   last_.has_low_words = false;
@@ -246,28 +227,36 @@ void ModeTracker::solve_directly(const System<kMaxDof>& system, const SymmetricP
   }
   out.status = solver_.solve(last_, spectrum_, work);
   if (!has_modes(out.status) || !work.take(restart_work(pencil.joints))) return;
-  if (!symmetric || has_errors(system) || pencil.joints == 0 || !restart(pencil, out, work)) {
-    publish_direct(pencil, symmetric, out);
+  // A symmetric K without a factor is the metric of a basis of one side, if it is definite.
+  const bool two_sided =
+      !symmetric_ ||
+      (!pencil.factored && !(spectrum_.zero_modes.stiffness_values.array() > 0).all());
+  if (has_errors(system) || pencil.joints == 0 || !restart(pencil, two_sided, out, work)) {
+    publish_direct(pencil, out);
   }
 }
 
 /// Continues from the direct solution as if it had been followed; false if that is not possible.
-bool ModeTracker::restart(const SymmetricPencil& pencil, TrackedSpectrum& out,
+bool ModeTracker::restart(const SymmetricPencil& pencil, bool two_sided, TrackedSpectrum& out,
                           Work& work) noexcept {
   for (const auto& mode : spectrum_.modes) {
     if (is_buried(mode, options_.soft_frequency)) return false;
   }
   const BlockEigenbasis before = basis_;
-  if (!start_basis(pencil, spectrum_, basis_)) {
+  if (two_sided ? !start_two_sided(pencil, spectrum_, basis_)
+                : !start_basis(pencil, spectrum_, basis_)) {
     basis_ = before;
     return false;
   }
+  still_floor_ = spectrum_.zero_modes.floor;
   evaluate(pencil, basis_, residual_);
-  if (separate_coinciding(residual_, basis_, work)) evaluate(pencil, basis_, residual_);
-  rotate_hyperbolically(residual_, 0, basis_);
+  if (!two_sided) {
+    if (separate_coinciding(residual_, basis_, work)) evaluate(pencil, basis_, residual_);
+    rotate_hyperbolically(residual_, 0, basis_);
+  }
   enclose(pencil, basis_, residual_, enclosure_);  // for its roundoff_bound
   match(pencil, before);
-  extrapolation_.forget();
+  forget_past();
   if (!refine(pencil, out, work)) return false;
   publish(pencil, SpectrumOrigin::kDirect, out);
   return true;
@@ -278,8 +267,15 @@ bool ModeTracker::restart(const SymmetricPencil& pencil, TrackedSpectrum& out,
 std::array<int, kMaxDof> ModeTracker::match(const SymmetricPencil& pencil,
                                             const BlockEigenbasis& before) noexcept {
   std::array<int, kMaxDof> index{};
-  if (state_ == State::kMatching && before.modes == basis_.modes) {
-    index = match_modes(pencil, before, basis_);
+  if (state_ == State::kMatching && before.vibrations() == basis_.vibrations()) {
+    SymmetricPencil metric = pencil;
+    Square<kMaxDof> positions;
+    if (!pencil.factored && (basis_.two_sided || !symmetric_)) {  // K is none then
+      const double rate2 = last_.stiffness.cwiseAbs().maxCoeff() / last_.mass.cwiseAbs().maxCoeff();
+      positions = rate2 * last_.mass;
+      metric.W = positions.data();
+    }
+    index = match_modes(metric, before, basis_);
   } else {
     ++epoch_;
     soft_ = {};
@@ -290,8 +286,7 @@ std::array<int, kMaxDof> ModeTracker::match(const SymmetricPencil& pencil,
 }
 
 /// Publishes the direct solution as it is.
-void ModeTracker::publish_direct(const SymmetricPencil& pencil, bool symmetric,
-                                 TrackedSpectrum& out) noexcept {
+void ModeTracker::publish_direct(const SymmetricPencil& pencil, TrackedSpectrum& out) noexcept {
   const BlockEigenbasis before = basis_;
   set_planes(pencil, spectrum_, basis_);
   const std::array<int, kMaxDof> index = match(pencil, before);
@@ -302,17 +297,9 @@ void ModeTracker::publish_direct(const SymmetricPencil& pencil, bool symmetric,
   for (int i = 0; i < out.mode_count; ++i) {
     const Mode<kMaxDof>& mode = spectrum_.modes[i];
     out.modes[at(index[at(i)])] = static_cast<const ModeNumbers&>(mode);
-    if (!options_.shapes) continue;
-    TrackedShapes& shapes = out.shapes[at(index[at(i)])];
-    shapes.u = mode.shapes;
-    shapes.slope = {};
-    for (std::size_t k = 0; symmetric && k < 2; ++k) {
-      const ComplexVector<kMaxDof> Mu = last_.mass * mode.shapes[k];
-      const ComplexVector<kMaxDof> Cu = last_.damping * mode.shapes[k];
-      shapes.slope[k] =
-          (mode.shapes[k].transpose() * (2.0 * mode.eigenvalues[k] * Mu + Cu)).value();
-    }
+    if (options_.shapes) out.shapes[at(index[at(i)])].u = mode.shapes;
   }
+  if (options_.shapes) read_slopes(pencil, symmetric_, out);
   out.zero_mode_count = spectrum_.zero_modes.count;
   for (int k = 0; k < out.zero_mode_count; ++k) {
     out.zero_mode_rates[at(k)] = spectrum_.zero_mode_rates[k];

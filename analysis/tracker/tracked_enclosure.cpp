@@ -1,4 +1,5 @@
 #include <dashpot/analysis/tracker/tracked_enclosure.hpp>
+#include <dashpot/analysis/tracker/two_sided_errors.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -210,15 +211,15 @@ void find_separations(const BlockEigenbasis& basis, BlockTable& table) {
   }
 }
 
-/// Whether no product that matters can underflow or overflow.
-bool in_range(const CoefficientSizes& sizes, const BlockEigenbasis& basis) {
+/// Whether no product of rates can underflow.
+bool in_range(const BlockEigenbasis& basis) {
   bool slow = false;
   for (int i = 0; i < basis.modes; ++i) {
     const auto [a, b, c, d] = basis.block(i);
     const double rate = std::abs(a) + std::abs(b) + std::abs(c) + std::abs(d);
     slow |= rate != 0 && !(rate > 1e-60);
   }
-  return sizes.in_range && !slow;
+  return !slow;
 }
 
 /// Squared norms of the blocks (i, 0) to (i, blocks) of X.
@@ -233,12 +234,10 @@ void row_squares(const BlockEigenbasis& basis, const PackedMatrix& X, int i, Blo
   for (int k = 0; k < basis.zeros; k += 4) store(&out[at(m + k)], squares(2 * m + k));
 }
 
-}  // namespace
-
-void enclose(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
-             const TrackedResidual& residual, TrackedEnclosure& enclosure) noexcept {
-  const CoefficientSizes sizes = coefficient_sizes(pencil);
-  const ErrorSizes errors(pencil, sizes, basis);
+/// `errors` bounds the rounding errors of the residual.
+template <class Errors>
+void prove_blocks(const BlockEigenbasis& basis, const TrackedResidual& residual,
+                  const Errors& errors, bool coefficients_in_range, TrackedEnclosure& enclosure) {
   const int blocks = basis.blocks();
   enclosure.reset(blocks);
   enclosure.roundoff_bound = errors.of_G();
@@ -258,7 +257,7 @@ void enclose(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
     }
   }
   const double R_norm = std::sqrt(R_total) + errors.of_N();
-  if (!in_range(sizes, basis) || !(R_norm < kNearlyOrthonormal)) return;
+  if (!coefficients_in_range || !in_range(basis) || !(R_norm < kNearlyOrthonormal)) return;
   // F = Sigma (G - R F), and so |F| <= |G| / (1 - |R|) for each column.
   for (int j = 0; j < blocks; j += 4) {
     const Vec4d columns = square_root(load(&G_columns[at(j)])) + errors.of_columns(j);
@@ -276,6 +275,20 @@ void enclose(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
   }
   find_separations(basis, separations);
   prove(PerturbationBounds<BlockTable, Blocks>{coupling, separations, own}, enclosure);
+}
+
+}  // namespace
+
+void enclose(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
+             const TrackedResidual& residual, TrackedEnclosure& enclosure) noexcept {
+  if (basis.two_sided) {
+    const TwoSidedErrors errors(pencil, basis);
+    prove_blocks(basis, residual, errors, errors.in_range(), enclosure);
+    return;
+  }
+  const CoefficientSizes sizes = coefficient_sizes(pencil);
+  const ErrorSizes errors(pencil, sizes, basis);
+  prove_blocks(basis, residual, errors, sizes.in_range, enclosure);
 }
 
 }  // namespace dashpot::analysis

@@ -16,6 +16,9 @@ std::size_t at(int i) {
   return static_cast<std::size_t>(i);
 }
 
+/// Times the squared frequency that told zero modes from others: rounding errors may reach it.
+constexpr double kWellAbove = 4;
+
 using Roots = std::array<BlockRoot, 2 * kMaxDof>;
 
 /// Two roots for each mode, in the order of the modes, then one for each zero mode; with the radius
@@ -153,6 +156,41 @@ void read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosur
   out.zero_mode_count = basis.zeros;
   for (int k = 0; k < basis.zeros; ++k) out.zero_mode_rates[at(k)] = basis.rate[at(k)];
   sort_by_frequency(out);
+}
+
+bool part_zero_modes(const BlockEigenbasis& basis, double floor, TrackedSpectrum& out) noexcept {
+  const double floor2 = floor * floor;
+  for (int i = 0; basis.zeros == 0 && i < basis.modes; ++i) {
+    const double rate2 = std::abs(basis.block(i).determinant());
+    if (i < basis.vibrations() ? !(rate2 > floor2) : !(rate2 <= kWellAbove * floor2)) return false;
+  }
+  if (basis.still == 0) return true;
+  out.mode_count = basis.vibrations();
+  out.zero_mode_count = basis.still;
+  for (int k = 0; k < basis.still; ++k) {
+    out.zero_mode_rates[at(k)] = basis.block(out.mode_count + k).trace();  // and zero
+  }
+  const bool proved =
+      std::all_of(out.modes.begin(), out.modes.begin() + out.mode_count,
+                  [](const ModeNumbers& mode) { return std::isfinite(mode.error_bound); });
+  out.status = proved ? Status::kOk : Status::kUncertified;
+  sort_by_frequency(out);
+  return true;
+}
+
+void read_slopes(const SymmetricPencil& pencil, bool symmetric, TrackedSpectrum& out) noexcept {
+  using Coefficients = Eigen::Map<const Eigen::MatrixXd>;
+  const Coefficients M(pencil.M, pencil.joints, pencil.joints),
+      C(pencil.C, pencil.joints, pencil.joints);
+  for (int i = 0; i < out.mode_count; ++i) {
+    TrackedShapes& shapes = out.shapes[at(i)];
+    shapes.slope = {};
+    for (std::size_t k = 0; symmetric && k < 2; ++k) {
+      const ComplexVector<kMaxDof>& u = shapes.u[k];
+      const ComplexVector<kMaxDof> Mu = M.lazyProduct(u), Cu = C.lazyProduct(u);
+      shapes.slope[k] = (u.transpose() * (2.0 * out.modes[at(i)].eigenvalues[k] * Mu + Cu)).value();
+    }
+  }
 }
 
 void read_shapes(const SymmetricPencil& pencil, const BlockEigenbasis& basis, const PackedMatrix& E,

@@ -254,7 +254,7 @@ void set_planes(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum
 
 std::array<int, kMaxDof> match_modes(const SymmetricPencil& pencil, const BlockEigenbasis& before,
                                      BlockEigenbasis& basis) noexcept {
-  const int count = basis.modes;
+  const int count = basis.vibrations();
   std::array<std::array<double, kMaxDof>, kMaxDof> overlaps{};
   std::array<Plane, kMaxDof> planes;
   for (int i = 0; i < count; ++i) planes[at(i)] = energy_plane(pencil, basis, i);
@@ -264,7 +264,7 @@ std::array<int, kMaxDof> match_modes(const SymmetricPencil& pencil, const BlockE
     for (int i = 0; i < count; ++i) overlaps[at(i)][at(j)] = overlap(planes[at(i)], image);
   }
   std::array<int, kMaxDof> index{};
-  const PackedMatrix Z = basis.Z;
+  const PackedMatrix Z = basis.Z, Y = basis.Y;
   for (int pair = 0; pair < count; ++pair) {
     std::size_t mode = 0, place = 0;
     double most = -1;
@@ -279,6 +279,9 @@ std::array<int, kMaxDof> match_modes(const SymmetricPencil& pencil, const BlockE
     for (int row = 0; row < pencil.states(); ++row) {
       basis.Z(row, basis.first(to)) = Z(row, basis.first(from));
       basis.Z(row, basis.second(to)) = Z(row, basis.second(from));
+      if (!basis.two_sided) continue;
+      basis.Y(basis.first(to), row) = Y(basis.first(from), row);
+      basis.Y(basis.second(to), row) = Y(basis.second(from), row);
     }
   }
   return index;

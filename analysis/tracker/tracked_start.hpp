@@ -24,7 +24,8 @@ void set_planes(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum
 
 /// Matches the modes of `basis` to the modes of `before` that they resemble, the most alike first:
 /// in the overlap of the planes that two modes span (modal assurance criterion in the energy
-/// metric). Mode i of `basis` becomes mode index[i]. Both bases have the same number of modes.
+/// metric). Mode i of `basis` becomes mode index[i]. Both bases have the same number of
+/// vibrations.
 std::array<int, kMaxDof> match_modes(const SymmetricPencil& pencil, const BlockEigenbasis& before,
                                      BlockEigenbasis& basis) noexcept;
 

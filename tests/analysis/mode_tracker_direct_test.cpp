@@ -157,17 +157,23 @@ TEST(ModeTracker, ProvesNothingOfVibrationsThatAreTooSlow) {
   }
 }
 
-TEST(ModeTracker, SolvesASingularStiffnessWithoutFactorDirectly) {
+TEST(ModeTracker, FollowsASingularStiffnessWithoutFactor) {
   System<kMaxDof> system(2);
   system.stiffness << 4, -4, -4, 4;
   system.damping << 0.4, -0.4, -0.4, 0.4;
   Tracked tracked;
   for (int call = 0; call < 3; ++call) {
+    system.damping *= 1 + 0.01 * call;
     EXPECT_EQ(tracked.update(system), Status::kOk);
-    EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kDirect);
+    EXPECT_EQ(tracked.spectrum->origin,
+              call == 0 ? SpectrumOrigin::kDirect : SpectrumOrigin::kTracked);
     ASSERT_EQ(tracked.spectrum->mode_count, 1);
     EXPECT_EQ(tracked.spectrum->zero_mode_count, 1);
+    EXPECT_NEAR(tracked.spectrum->zero_mode_rates[0], 0, 1e-14);
     EXPECT_NEAR(tracked.mode(0).natural_frequency, std::sqrt(8.0), 1e-14);
+    // Symmetric all the same: u'(2 l M + C) u, with u = (1, -1) / sqrt(2).
+    const Complex slope = 2.0 * tracked.mode(0).eigenvalues[0] + 2 * system.damping(0, 0);
+    EXPECT_LE(std::abs(tracked.spectrum->shapes[0].slope[0] - slope), 1e-13);
   }
 }
 

@@ -155,20 +155,6 @@ TEST(ModeTracker, SmallFrequenciesKeepTheirDigitsWithAFactor) {
   EXPECT_NEAR(tracked.mode(1).damping_ratio, 0.05, 1e-12);
 }
 
-TEST(ModeTracker, SolvesNonsymmetricSystemsDirectly) {
-  Random random(4002);
-  System<kMaxDof> system = random_fixed_system(random, 4, 1);
-  system.stiffness(0, 1) += 1;
-  Tracked tracked;
-  for (int call = 1; call <= 3; ++call) {
-    EXPECT_EQ(tracked.update(system), Status::kOk);
-    EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kDirect);
-    EXPECT_EQ(tracked.spectrum->mode_count, 4);
-    EXPECT_EQ(tracked.counters().direct, call);
-    EXPECT_EQ(tracked.counters().iterations, 0);
-  }
-}
-
 TEST(ModeTracker, SaysWhatIsWrongAndRecovers) {
   Random random(4003);
   System<kMaxDof> good = random_fixed_system(random, 4, 1);

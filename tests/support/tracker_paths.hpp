@@ -5,6 +5,7 @@
 #include <dashpot/analysis/system.hpp>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <cmath>
 #include <cstdint>
@@ -259,6 +260,89 @@ inline SystemPath jumping(Dice& dice) {
   };
 }
 
+/// M V A V^-1 of a matrix A of modes: nonsymmetric unless V is orthonormal in M.
+inline TrackedSystem turned_system(const Eigen::MatrixXd& M, const Eigen::MatrixXd& V,
+                                   const Eigen::MatrixXd& C, const Eigen::MatrixXd& K) {
+  const Eigen::MatrixXd inverse = V.inverse();
+  TrackedSystem system(M.rows());
+  system.mass = 0.5 * (M + M.transpose());
+  system.damping = M * V * C * inverse;
+  system.stiffness = M * V * K * inverse;
+  return system;
+}
+
+/// A mass and columns V that turn with t, far from orthonormal.
+struct Skewed {
+  Eigen::MatrixXd M, V, dV;
+
+  Skewed(Dice& dice, int n) : V(dice.congruence(n, 3)), dV(0.3 * dice.matrix(n, n) / std::sqrt(n)) {
+    const Eigen::MatrixXd T = dice.congruence(n, 3);
+    M = T.transpose() * T;
+  }
+  Eigen::MatrixXd columns(double t) const { return V + std::sin(t) * dV; }
+};
+
+/// All modes of a nonsymmetric system through critical damping, each at its own time and pace.
+inline SystemPath skewed_critical(Dice& dice) {
+  const int n = dice.integer(1, 7);
+  const Skewed skewed(dice, n);
+  const Eigen::VectorXd w = 3 * dice.log_vector(n, 30);
+  const Eigen::VectorXd start = 0.2 * dice.log_vector(n, 4), end = 1.1 * dice.log_vector(n, 3);
+  return [=](double t) {
+    const Eigen::VectorXd c = 2 * (start + t * (end - start)).cwiseProduct(w), k = w.cwiseAbs2();
+    return turned_system(skewed.M, skewed.columns(t), c.asDiagonal(), k.asDiagonal());
+  };
+}
+
+/// Modes of a nonsymmetric system that coincide throughout.
+inline SystemPath skewed_coinciding(Dice& dice) {
+  const int n = dice.integer(2, 6), equal = dice.integer(2, n);
+  const Skewed skewed(dice, n);
+  const double zeta = dice.log_uniform(1e-3, 3);
+  Eigen::VectorXd w = 5 * dice.log_vector(n, 10);
+  w.head(equal).setConstant(w[0]);
+  return [=](double t) {
+    const Eigen::VectorXd moved = (1 + 0.3 * t) * w;
+    return turned_system(skewed.M, skewed.columns(t),
+                         2 * zeta * Eigen::MatrixXd(moved.asDiagonal()),
+                         moved.cwiseAbs2().asDiagonal());
+  };
+}
+
+/// K and C that turn and swing at random, far from symmetric. A third has a factor and thereby
+/// zero modes, and damping alone that is not symmetric.
+inline SystemPath skewed_wandering(Dice& dice) {
+  const SystemPath path = wandering(dice);
+  const auto n = path(0).dof();
+  const Eigen::MatrixXd A = dice.matrix(n, n) / std::sqrt(n), B = dice.matrix(n, n) / std::sqrt(n);
+  const double damping = dice.log_uniform(0.01, 10), stiffness = dice.log_uniform(1, 300);
+  return [=](double t) {
+    TrackedSystem system = path(t);
+    system.damping += damping * std::cos(3 * t) * A;
+    if (system.stiffness_factor.rows() == 0) system.stiffness += stiffness * std::cos(2 * t) * B;
+    return system;
+  };
+}
+
+/// Springs in fewer directions than there are coordinates, and a nonsymmetric part in the same
+/// directions, as J' (K J + C dJ/dt) has: one zero mode, or two, and no factor.
+inline SystemPath skewed_singular(Dice& dice) {
+  const int n = dice.integer(2, 7), rows = n - (dice.uniform(0, 1) < 0.8 || n == 2 ? 1 : 2);
+  const Skewed skewed(dice, n);
+  const Eigen::MatrixXd J = dice.matrix(rows, n), dJ = dice.matrix(rows, n);
+  const Eigen::MatrixXd F = dice.matrix(rows, rows);
+  const Eigen::MatrixXd K = 400 * (F * F.transpose() + 0.2 * Eigen::MatrixXd::Identity(rows, rows));
+  const double damping = dice.log_uniform(0.3, 30), free = dice.uniform(0, 1) < 0.5 ? 0 : 0.4;
+  return [=](double t) {
+    const Eigen::MatrixXd now = J + std::sin(2 * t) * dJ, rate = 2 * std::cos(2 * t) * dJ;
+    TrackedSystem system(n);
+    system.mass = 0.5 * (skewed.M + skewed.M.transpose());
+    system.damping = damping * now.transpose() * now + free * system.mass;
+    system.stiffness = now.transpose() * (K * now + damping * rate);
+    return system;
+  };
+}
+
 struct PathFamily {
   std::string name;
   SystemPath (*make)(Dice&);
@@ -278,6 +362,10 @@ inline const std::vector<PathFamily>& path_families() {
       {"wandering", wandering},
       {"frozen", frozen},
       {"jumping", jumping},
+      {"skewed critical", skewed_critical},
+      {"skewed coinciding", skewed_coinciding},
+      {"skewed wandering", skewed_wandering},
+      {"skewed singular", skewed_singular},
   };
   return all;
 }

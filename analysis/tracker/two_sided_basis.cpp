@@ -1,0 +1,144 @@
+#include <dashpot/analysis/tracker/two_sided_basis.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::analysis {
+namespace {
+
+/// Columns of a block are balanced again when they lean this much towards each other, or their
+/// squared lengths are so many times each other.
+constexpr double kLeaning = 0.6, kUneven = 9;
+/// Least rate that balances positions and velocities of a block, relative to the largest one: zero
+/// modes have no frequency of their own.
+constexpr double kLeastRate = 1e-3;
+
+std::size_t at(int i) {
+  return static_cast<std::size_t>(i);
+}
+
+/// Squared lengths of the columns of four blocks, and the products of the two columns.
+struct Lengths {
+  Vec4d first{}, second{}, mixed{};
+
+  void add(const BlockEigenbasis& basis, int row, int i, const Vec4d& weight) {
+    const Vec4d x = load(basis.Z.row(row) + i), y = load(basis.Z.row(row) + basis.modes + i);
+    first += weight * x * x;
+    second += weight * y * y;
+    mixed += weight * x * y;
+  }
+};
+
+/// w^2 of blocks i to i + 3.
+Vec4d squared_rates(const BlockEigenbasis& basis, int i, double least) {
+  const Vec4d rate = magnitude(basis.blocks_from(i).determinant());
+  return rate > least ? rate : Vec4d{} + least;
+}
+
+/// Orthonormal columns by Cholesky's factor R of their products: Z R^-1, and R times the rows of Y
+/// without their signs.
+void orthonormalize_block(double first, double second, double mixed, int i,
+                          BlockEigenbasis& basis) {
+  const double r00 = std::sqrt(first), r01 = mixed / r00, r11 = std::sqrt(second - r01 * r01);
+  if (!(r11 > 0)) return;
+  const int j = basis.modes + i;
+  for (int row = 0; row < basis.columns(); ++row) {
+    const double x = basis.Z(row, i) / r00;
+    basis.Z(row, i) = x;
+    basis.Z(row, j) = (basis.Z(row, j) - r01 * x) / r11;
+    basis.Y(i, row) = r00 * basis.Y(i, row) - r01 * basis.Y(j, row);
+    basis.Y(j, row) *= r11;
+  }
+}
+
+}  // namespace
+
+void multiply_two_sided(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
+                        TrackedResidual& residual) noexcept {
+  const int n = pencil.joints, p = pencil.rank, states = pencil.states(), width = basis.Z.width;
+  const auto product = [multiplication = padded_multiply(width), width](
+                           const Strided& A, int rows, int inner, const double* X,
+                           const double* start, double sign, double* out) {
+    multiplication(A, rows, inner, X, start, sign, out, width);
+  };
+  const double *const position = basis.Z.row(0), *const velocity = basis.Z.row(p);
+  std::copy(position, velocity, residual.MV.row(0));
+  product({pencil.M, 1, n}, n, n, velocity, nullptr, -1, residual.MV.row(p));
+  if (pencil.factored) {
+    product({pencil.W, 1, p}, p, n, velocity, nullptr, 1, residual.image.row(0));
+    product({pencil.W, p, 1}, n, p, position, nullptr, 1, residual.image.row(p));
+  } else {
+    std::copy(velocity, velocity + n * width, residual.image.row(0));
+    product({pencil.W, 1, n}, n, n, position, nullptr, 1, residual.image.row(p));
+  }
+  product({pencil.C, 1, n}, n, n, velocity, residual.image.row(p), 1, residual.image.row(p));
+  const Strided left{basis.Y.row(0), width, 1};
+  product(left, states, states, residual.MV.row(0), nullptr, 1, residual.R.row(0));
+  product(left, states, states, residual.image.row(0), nullptr, 1, residual.G.row(0));
+}
+
+void take_left_step(const PackedMatrix& E, TrackedResidual& residual,
+                    BlockEigenbasis& basis) noexcept {
+  const int m = basis.modes, size = basis.columns(), width = basis.Y.width;
+  PackedMatrix& step = residual.MV;
+  step.width = residual.image.width = width;
+  for (int i = 0; i < size; ++i) {
+    const double *const R = residual.R.row(i), *const e = E.row(i);
+    double* const out = step.row(i);
+    const double row_sign = i < m ? 1 : -1;
+    for (int j = 0; j < m; ++j) out[j] = -R[j] - row_sign * e[j];
+    for (int j = m; j < size; ++j) out[j] = R[j] + row_sign * e[j];
+  }
+  padded_multiply(width)({step.row(0), width, 1}, size, size, basis.Y.row(0), basis.Y.row(0), 1,
+                         residual.image.row(0), width);
+  copy(residual.image, size, basis.Y);
+}
+
+bool balance(const SymmetricPencil& pencil, bool all, BlockEigenbasis& basis) noexcept {
+  const int n = pencil.joints, p = pencil.rank;
+  double largest = 0;
+  for (int i = 0; i < basis.modes; ++i) {
+    largest = std::max(largest, std::abs(basis.block(i).determinant()));
+  }
+  const double least = kLeastRate * kLeastRate * largest;
+  bool any = false;
+  for (int i = 0; i < basis.modes; i += 4) {
+    Lengths elastic, kinetic;
+    for (int k = 0; k < p; ++k) {
+      elastic.add(basis, k, i, Vec4d{} + (pencil.factored ? 1 : pencil.M[k + k * n]));
+    }
+    for (int k = 0; k < n; ++k) kinetic.add(basis, p + k, i, Vec4d{} + pencil.M[k + k * n]);
+    const Vec4d rate = pencil.factored ? Vec4d{} + 1 : squared_rates(basis, i, least);
+    const Vec4d first = rate * elastic.first + kinetic.first,
+                second = rate * elastic.second + kinetic.second,
+                mixed = rate * elastic.mixed + kinetic.mixed;
+    for (int lane = 0; lane < 4 && i + lane < basis.modes; ++lane) {
+      const double x = first[lane], y = second[lane], xy = mixed[lane];
+      const bool even = x < kUneven * y && y < kUneven * x && xy * xy < kLeaning * kLeaning * x * y;
+      if (even && !all) continue;
+      orthonormalize_block(x, y, xy, i + lane, basis);
+      any = true;
+    }
+  }
+  return any;
+}
+
+bool is_positive_definite(const double* M, int n) noexcept {
+  std::array<double, static_cast<std::size_t>(kMaxDof) * kMaxDof> L;  // by rows
+  for (int i = 0; i < n; ++i) {
+    double* const row = &L[at(i * kMaxDof)];
+    double diagonal = M[i + i * n];
+    for (int j = 0; j < i; ++j) {
+      const double* const other = &L[at(j * kMaxDof)];
+      double sum = M[i + j * n];
+      for (int k = 0; k < j; ++k) sum -= row[k] * other[k];
+      row[j] = sum * other[j];  // the inverses of the diagonal are kept
+      diagonal -= row[j] * row[j];
+    }
+    if (!(diagonal > 0)) return false;
+    row[i] = 1 / std::sqrt(diagonal);
+  }
+  return true;
+}
+
+}  // namespace dashpot::analysis

@@ -1,0 +1,263 @@
+// Systems whose damping or stiffness is not symmetric, followed: bounds against 33 digits at every
+// step, labels, shapes, and what ends it.
+#include <dashpot/tests/support/enclosure.hpp>
+#include <dashpot/tests/support/panda_path.hpp>
+#include <dashpot/tests/support/quad_spectrum.hpp>
+#include <dashpot/tests/support/tracked.hpp>
+#include <dashpot/tests/support/tracker_paths.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+namespace dashpot::analysis {
+namespace {
+
+using testing::Dice;
+using testing::panda_impedance;
+using testing::SystemPath;
+using testing::Tracked;
+using Truth = std::vector<testing::Point<long double>>;
+
+/// All eigenvalues with 33 digits, rounded to 19, from the published ones: moved a little, so that
+/// no two are the same and pairs may form.
+Truth truth_of(const System<kMaxDof>& system, const TrackedSpectrum& spectrum) {
+  System<> same(system.dof());
+  same.mass = system.mass;
+  same.damping = system.damping;
+  same.stiffness = system.stiffness;
+  std::vector<testing::QuadComplex> z;
+  const auto start = [&z](Complex value, double unit) {
+    const double angle = 1 + static_cast<double>(z.size());
+    z.push_back(testing::to_quad(value + 1e-7 * unit * std::polar(1.0, angle)));
+  };
+  double size = 0;
+  for (int i = 0; i < spectrum.mode_count; ++i) {
+    for (const Complex& value : spectrum.modes[static_cast<std::size_t>(i)].eigenvalues) {
+      start(value, std::abs(value));
+      size = std::max(size, std::abs(value));
+    }
+  }
+  for (int k = 0; k < spectrum.zero_mode_count; ++k) {
+    start(spectrum.zero_mode_rates[static_cast<std::size_t>(k)], size);
+    start(0, size);
+  }
+  Truth truth;
+  for (const auto& value : testing::refine_eigenvalues(same, z)) {
+    truth.push_back({static_cast<long double>(value.re), static_cast<long double>(value.im)});
+  }
+  return truth;
+}
+
+double backward_error(const System<kMaxDof>& system, const Complex& value,
+                      const ComplexVector<kMaxDof>& u) {
+  const ComplexVector<kMaxDof> residual =
+      value * value * (system.mass * u) + value * (system.damping * u) + system.stiffness * u;
+  const double size = std::norm(value) * system.mass.norm() +
+                      std::abs(value) * system.damping.norm() + system.stiffness.norm();
+  return residual.norm() / (size * u.norm());
+}
+
+/// Follows a path and expects what is published to be true at every step.
+struct Follower : Tracked {
+  void follow(const SystemPath& path, int steps, double length) {
+    for (int step = 0; step < steps && !::testing::Test::HasFailure(); ++step) {
+      SCOPED_TRACE("step " + std::to_string(step));
+      const System<kMaxDof> system = path(length * step / steps);
+      ASSERT_EQ(update(system), Status::kOk);
+      const testing::Verdict verdict =
+          testing::judge_against<long double>(truth_of(system, *spectrum), *spectrum, 1e-18);
+      EXPECT_TRUE(verdict.enclosed) << verdict.what << ", error / bound " << verdict.tightest;
+      EXPECT_TRUE(verdict.proved);
+      tightest = std::max(tightest, verdict.tightest);
+      widest = std::max(widest, verdict.widest);
+      look_at_shapes(system);
+    }
+  }
+  void look_at_shapes(const System<kMaxDof>& system) {
+    std::vector<ComplexVector<kMaxDof>> now;
+    for (int i = 0; i < spectrum->mode_count; ++i) {
+      const TrackedShapes& shapes = spectrum->shapes[static_cast<std::size_t>(i)];
+      for (std::size_t k = 0; k < 2; ++k) {
+        worst_shape =
+            std::max(worst_shape, backward_error(system, mode(i).eigenvalues[k], shapes.u[k]));
+        EXPECT_NEAR((shapes.u[k].adjoint() * system.mass * shapes.u[k]).value().real(), 1, 1e-11);
+        if (!system.symmetric()) EXPECT_EQ(shapes.slope[k], Complex());
+      }
+      now.push_back(shapes.u[0]);
+      if (now.size() > last_shapes.size()) continue;
+      const ComplexVector<kMaxDof> Mu = system.mass * last_shapes[now.size() - 1];
+      least_overlap = std::min(least_overlap, std::abs(now.back().dot(Mu)));
+    }
+    last_shapes = now;
+  }
+  void expect_followed() const {
+    EXPECT_EQ(counters().direct, 1);
+    EXPECT_EQ(counters().tracked, counters().updates() - 1);
+    EXPECT_EQ(spectrum->epoch, 1);
+  }
+
+  std::vector<ComplexVector<kMaxDof>> last_shapes;
+  double tightest = 0, widest = 0, worst_shape = 0, least_overlap = 1;
+};
+
+/// J' f changes with the posture by K_G: column k is the derivative by q_k (paper, Eq. 13).
+Eigen::MatrixXd geometric_stiffness(const Eigen::MatrixXd& J, const Eigen::Vector3d& force) {
+  Eigen::MatrixXd K(7, 7);
+  for (Eigen::Index k = 0; k < 7; ++k) {
+    for (Eigen::Index j = 0; j < 7; ++j) {
+      const Eigen::Index inner = std::min(j, k), outer = std::max(j, k);
+      const Eigen::Vector3d axis = J.col(inner).tail<3>(), lever = J.col(outer).head<3>();
+      K(j, k) = force.dot(axis.cross(lever));
+      if (k > j) K(j, k) += 0.2 * force.norm() * J(3, k) * J(4, j);  // a moment, not symmetric
+    }
+  }
+  return K;
+}
+
+TEST(TwoSidedTracker, FollowsALoadedArm) {
+  for (const double ratio : {0.1, 0.7}) {
+    SCOPED_TRACE(ratio);
+    Follower follower;
+    follower.follow(
+        [ratio](double t) {
+          System<kMaxDof> system = panda_impedance(testing::swing(t), ratio);
+          system.stiffness += geometric_stiffness(testing::panda(testing::swing(t)).jacobian,
+                                                  Eigen::Vector3d(20, -30, 60));
+          system.stiffness.diagonal().array() += 10;
+          system.damping.diagonal().array() += 0.5;
+          system.stiffness_factor.resize(0, 7);
+          return system;
+        },
+        100, 0.1);
+    follower.expect_followed();
+    EXPECT_EQ(follower.spectrum->mode_count, 7);
+    EXPECT_LE(follower.counters().iterations, 120);
+    EXPECT_LE(follower.widest, 1e-9);
+    EXPECT_GE(follower.tightest, 1e-5) << "bounds without meaning";
+    EXPECT_LE(follower.worst_shape, 1e-14);
+    EXPECT_GE(follower.least_overlap, 0.98);
+  }
+}
+
+/// The term J' C_C dJ/dt leaves the springs' directions, and so a zero mode.
+TEST(TwoSidedTracker, FollowsAZeroMode) {
+  Dice dice(523);
+  const SystemPath path = testing::skewed_singular(dice);
+  Follower follower;
+  follower.follow(path, 40, 0.04);
+  follower.expect_followed();
+  EXPECT_EQ(follower.spectrum->zero_mode_count, 1);
+  EXPECT_EQ(follower.spectrum->mode_count, path(0).dof() - 1);
+  EXPECT_LE(follower.widest, 1e-8);
+  EXPECT_LE(follower.worst_shape, 1e-13);
+}
+
+struct Family {
+  SystemPath (*make)(Dice&);
+  int paths, steps;
+  double length, tracked;  ///< least share of updates
+};
+
+TEST(TwoSidedTracker, EnclosesTheTruthOnHardPaths) {
+  const std::vector<Family> families = {{testing::skewed_critical, 4, 100, 1, 0.98},
+                                        {testing::skewed_wandering, 6, 60, 0.4, 0.97},
+                                        {testing::skewed_coinciding, 4, 60, 0.3, 0.9}};
+  for (std::size_t f = 0; f < families.size(); ++f) {
+    const Family& family = families[f];
+    TrackerCounters sum;
+    for (int k = 0; k < family.paths; ++k) {
+      const auto seed = static_cast<std::uint64_t>(1000 * f) + static_cast<std::uint64_t>(k);
+      SCOPED_TRACE("family " + std::to_string(f) + ", seed " + std::to_string(seed));
+      Dice dice(seed);
+      const SystemPath path = family.make(dice);
+      if (path(0).stiffness_factor.rows() > 0) continue;  // K is not what is given, then
+      Follower follower;
+      follower.follow(path, family.steps, family.length);
+      if (path(0).dof() > 1) EXPECT_GT(follower.tightest, 0);
+      sum.tracked += follower.counters().tracked;
+      sum.direct += follower.counters().direct - 1;
+    }
+    EXPECT_GE(static_cast<double>(sum.tracked),
+              family.tracked * static_cast<double>(sum.tracked + sum.direct))
+        << f;
+  }
+}
+
+/// Which way a system is followed changes with its symmetry; indices stay.
+TEST(TwoSidedTracker, KeepsLabelsWhereSymmetryComesAndGoes) {
+  Dice dice(77);
+  const Eigen::MatrixXd T = dice.congruence(3, 3), skew = dice.matrix(3, 3);
+  Tracked tracked;
+  std::array<double, 3> last{};
+  for (int step = 0; step < 90; ++step) {
+    const double t = 0.001 * step;
+    System<kMaxDof> system = testing::classical_system(T, Eigen::Vector3d(10, 10.4 - 8 * t, 25),
+                                                       Eigen::Vector3d(0.1, 0.2, 0.3));
+    if (step / 30 == 1) system.stiffness += 1e-3 * skew;
+    ASSERT_EQ(tracked.update(system), Status::kOk);
+    const bool turned = step % 30 == 0;
+    EXPECT_EQ(tracked.spectrum->origin, turned ? SpectrumOrigin::kDirect : SpectrumOrigin::kTracked)
+        << step;
+    EXPECT_EQ(tracked.spectrum->epoch, 1);
+    EXPECT_EQ(tracked.spectrum->shapes[0].slope[0] == Complex(), step / 30 == 1) << step;
+    for (int i = 0; i < 3; ++i) {
+      const double ratio = tracked.mode(i).damping_ratio;
+      if (step > 0) EXPECT_NEAR(ratio, last[static_cast<std::size_t>(i)], 0.01) << step;
+      last[static_cast<std::size_t>(i)] = ratio;
+    }
+  }
+}
+
+TEST(TwoSidedTracker, StopsWhereThereIsNothingToFollow) {
+  System<kMaxDof> good(2);
+  good.stiffness << 100, 3, -2, 400;
+  good.damping << 0.2, 0.1, -0.1, 0.3;
+  Tracked tracked;
+  const auto becomes = [&](const System<kMaxDof>& system) {
+    EXPECT_EQ(tracked.update(good), Status::kOk);
+    const Status status = tracked.update(system);
+    if (status != Status::kOk) EXPECT_EQ(tracked.spectrum->mode_count, 0);
+    return status;
+  };
+  System<kMaxDof> bad = good;
+  bad.stiffness(0, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(becomes(bad), Status::kNotFinite);
+  bad = good;
+  bad.damping(1, 0) = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(becomes(bad), Status::kNotFinite);
+  bad = good;
+  bad.mass(0, 0) = -1e-3;
+  EXPECT_EQ(becomes(bad), Status::kMassNotPositiveDefinite);
+  bad = good;
+  bad.mass(0, 1) = 1e-9;
+  EXPECT_EQ(becomes(bad), Status::kNotSymmetric);
+  // The mode of 20 rad/s loses its spring: one mode less.
+  bad = good;
+  bad.stiffness.col(0).setZero();
+  EXPECT_EQ(becomes(bad), Status::kOk);
+  EXPECT_EQ(tracked.spectrum->mode_count, 1);
+  EXPECT_EQ(tracked.spectrum->zero_mode_count, 1);
+}
+
+TEST(TwoSidedTracker, DoesNoMoreThanItIsGranted) {
+  System<kMaxDof> system(3);
+  system.stiffness << 100, 3, -2, 1, 400, 5, -7, 2, 900;
+  Tracked tracked;
+  ASSERT_EQ(tracked.update(system), Status::kOk);
+  system.damping(0, 1) = 0.1;
+  Work work;
+  ASSERT_EQ(tracked.tracker->update(system, *tracked.spectrum, work), Status::kOk);
+  ASSERT_EQ(tracked.spectrum->origin, SpectrumOrigin::kTracked);
+  for (const std::int64_t granted : {std::int64_t{1000}, work.done()}) {
+    system.damping(0, 1) *= 1 + 1e-6;
+    Work some(granted);
+    const Status status = tracked.tracker->update(system, *tracked.spectrum, some);
+    EXPECT_EQ(status, granted == 1000 ? Status::kUnfinished : Status::kOk);
+    EXPECT_LE(some.done(), granted);
+  }
+  EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kTracked);  // from the last one before
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
