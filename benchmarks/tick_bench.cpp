@@ -2,7 +2,8 @@
 // and moving set-points. `tick/cartesian` has the null space where the arm is redundant,
 // `tick/joint` is joint impedance. 6 joints are the UR5, 7 the Panda, 14 a random chain. The arm
 // swings, and its state is a new one at every tick. `tick/full` has the spectrum of each as well,
-// with shapes, and the snapshot; `tick/design` besides holds a damping ratio; `_values_only`
+// with shapes, and the snapshot; `tick/design` besides holds a damping ratio;
+// `tick/loaded` has `control.load` and `jacobian_rate` on, under a wrench; `_values_only`
 // without shapes; `_background` hands it to a thread;
 // `_percentiles` times a million ticks one by one. `tick/paced` and `tick/evicted` are `tick/full`
 // at the pace of 1 kHz, and after 64 MB of other data have passed through the caches. `footprint`
@@ -53,12 +54,17 @@ std::vector<RobotState> swing(const JointVector& center) {
   return states;
 }
 
+/// What a loop does besides.
+struct Extra {
+  double ratio = 0;     ///< damping ratio that is held; 0: none
+  bool loaded = false;  ///< a load and `jacobian_rate` are in the modes
+};
+
 /// A controller in the loop with a swinging arm.
 class Loop {
  public:
-  /// `ratio`: damping ratio that is held; 0: none.
-  Loop(int n, Mode mode, const Analysis& analysis, double ratio = 0)
-      : Loop(model_of(n), mode, analysis, ratio) {}
+  Loop(int n, Mode mode, const Analysis& analysis, const Extra& extra = {})
+      : Loop(model_of(n), mode, analysis, extra) {}
 
   Status step() {
     RobotState& state = states_[k_];
@@ -75,28 +81,33 @@ class Loop {
   const Vibration& vibration() const { return controller_.vibration(); }
 
  private:
-  Loop(const RobotModel& model, Mode mode, const Analysis& analysis, double ratio)
-      : controller_(model, settings_for(model, analysis, ratio)) {
+  Loop(const RobotModel& model, Mode mode, const Analysis& analysis, const Extra& extra)
+      : controller_(model, settings_for(model, analysis, extra)) {
     setpoint_ = controller_.settings().initial;
     JointVector center = setpoint_.joint_position;
     if (model.dof() == 7) center << 0, -0.785, 0, -2.356, 0, 1.571, 0.785;
     states_ = swing(center);
+    for (RobotState& state : states_) {
+      if (extra.loaded) state.external_wrench << 20, -10, -30, 0, 1, 0.5;
+    }
     setpoint_.mode = mode;
     setpoint_.joint_position = center;
     const DynamicsResult there = evaluate(model, center, JointVector::Zero(center.size()));
     setpoint_.tip_pose = {there.p_BT_B, there.R_BT};
     for (std::size_t i = 0; i < kStates; ++i) step();
   }
-  static Settings settings_for(const RobotModel& model, const Analysis& analysis, double ratio) {
+  static Settings settings_for(const RobotModel& model, const Analysis& analysis,
+                               const Extra& extra) {
     Settings settings = default_settings(model);
     Gains& gains = settings.initial.gains;
-    gains.task_damping_ratio = ratio;
-    if (ratio == 0) {  // constant damping
+    gains.task_damping_ratio = extra.ratio;
+    if (extra.ratio == 0) {  // constant damping
       gains.joint_damping_ratio = gains.null_damping_ratio = 0;
       gains.joint_damping = 0.1 * gains.joint_stiffness;
       gains.task_damping = 0.1 * gains.task_stiffness;
       gains.null_damping = 0.1 * gains.null_stiffness;
     }
+    if (extra.loaded) settings.task_terms = {Load::kBaseWrench, true};
     settings.analysis = analysis;
     settings.feed_forward.friction = true;
     settings.limits.torque *= 1e3;  // so that no limit is at work
@@ -112,8 +123,8 @@ class Loop {
   std::size_t k_ = 0;
 };
 
-void tick(benchmark::State& bench, Mode mode, const Analysis& analysis, double ratio) {
-  Loop loop(static_cast<int>(bench.range(0)), mode, analysis, ratio);
+void tick(benchmark::State& bench, Mode mode, const Analysis& analysis, const Extra& extra) {
+  Loop loop(static_cast<int>(bench.range(0)), mode, analysis, extra);
   const VibrationCounters before = loop.vibration().counters;
   Status worst = Status::kOk;
   for (auto _ : bench) {
@@ -148,9 +159,10 @@ void add_one_by_one(const std::string& name, const Analysis& analysis, int ticks
 }
 
 /// Lets callgrind watch one tick, with caches that are empty at first.
-void add_footprint(const std::string& name, Mode mode, const Analysis& analysis, double ratio = 0) {
+void add_footprint(const std::string& name, Mode mode, const Analysis& analysis,
+                   const Extra& extra = {}) {
   benchmark::RegisterBenchmark(("footprint/" + name).c_str(), [=](benchmark::State& bench) {
-    Loop loop(7, mode, analysis, ratio);
+    Loop loop(7, mode, analysis, extra);
     for (auto _ : bench) {
       CALLGRIND_START_INSTRUMENTATION;
       loop.step();
@@ -161,10 +173,10 @@ void add_footprint(const std::string& name, Mode mode, const Analysis& analysis,
 }
 
 void add(const std::string& name, Mode mode, Analysis analysis, std::initializer_list<int> joints,
-         double ratio = 0) {
+         const Extra& extra = {}) {
   for (const int n : joints) {
     benchmark::RegisterBenchmark(
-        name.c_str(), [=](benchmark::State& bench) { tick(bench, mode, analysis, ratio); })
+        name.c_str(), [=](benchmark::State& bench) { tick(bench, mode, analysis, extra); })
         ->Arg(n)
         ->Unit(benchmark::kMicrosecond);
   }
@@ -182,7 +194,8 @@ int main(int argc, char** argv) {
   const Analysis background{Analysis::Where::kBackground, 1, 0.1, 0.1, true, {}};
   add("tick/full", Mode::kCartesian, every_tick,
       {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
-  add("tick/design", Mode::kCartesian, every_tick, {6, 7, 14}, 0.7);
+  add("tick/design", Mode::kCartesian, every_tick, {6, 7, 14}, {0.7, false});
+  add("tick/loaded", Mode::kCartesian, every_tick, {7}, {0, true});
   add("tick/full_joint", Mode::kJoint, every_tick, {6, 7, 14});
   add("tick/full_values_only", Mode::kCartesian, values_only, {6, 7, 14});
   add("tick/full_background", Mode::kCartesian, background, {6, 7, 14});
@@ -193,7 +206,7 @@ int main(int argc, char** argv) {
     add_footprint("tick/joint/7", Mode::kJoint, off);
     add_footprint("tick/cartesian/7", Mode::kCartesian, off);
     add_footprint("tick/full/7", Mode::kCartesian, every_tick);
-    add_footprint("tick/design/7", Mode::kCartesian, every_tick, 0.7);
+    add_footprint("tick/design/7", Mode::kCartesian, every_tick, {0.7, false});
   }
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();

@@ -4,11 +4,12 @@
 // `values_only` leaves out the eigenvectors; `reused` sees one system again and again. Beside them,
 // Eigen's fixed-size EigenSolver with right vectors and LAPACK's dgeev with both sides on the
 // 12 x 12 state matrices of the same path, which are formed outside the clock. `tracked_full` and
-// `eigen_full` (of run-time size) have n joints and n modes. `backward_error` is the worst along
-// the path, of every kRivalSteps-th system. `unproved` is what a hostile system takes.
-// `paced` and `evicted`, beside `eigen_...` and `lapack_...`, are timed call by call: one in a
-// millisecond, and after 64 MB of other data have passed through the caches. What a loop has just
-// written, the coefficients or the state matrix, is near the processor.
+// `eigen_full` (of run-time size) have n joints and n modes; `tracked_nonsymmetric` has the same
+// path with a part of K and C that is not symmetric. `backward_error` is the worst along the path,
+// of every kRivalSteps-th system. `unproved` is what a hostile system takes. `paced` and `evicted`,
+// beside `eigen_...` and `lapack_...`, are timed call by call: one in a millisecond, and after 64
+// MB of other data have passed through the caches. What a loop has just written, the coefficients
+// or the state matrix, is near the processor.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/benchmarks/one_by_one.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
@@ -75,6 +76,24 @@ std::vector<System<kMaxDof>> full_path(int n) {
           size[k] * (0.5 * (product + product.transpose()) + floor[k] * MatrixXd::Identity(n, n));
     }
     path.push_back(system);
+  }
+  return path;
+}
+
+/// The same with a stiffness and a damping that are not symmetric: n joints turn the forces of
+/// others by as much as a twentieth of their own.
+std::vector<System<kMaxDof>> nonsymmetric_path(int n) {
+  std::vector<System<kMaxDof>> path = full_path(n);
+  std::mt19937_64 generator(kSeed);
+  std::normal_distribution<double> normal;
+  std::array<MatrixXd, 2> parts;
+  for (MatrixXd& matrix : parts) {
+    matrix = MatrixXd::NullaryExpr(n, n, [&] { return normal(generator); });
+  }
+  for (std::size_t step = 0; step < path.size(); ++step) {
+    const double t = 1e-3 * static_cast<double>(step);
+    path[step].damping += 0.5 * std::cos(3 * t) * parts[0];
+    path[step].stiffness += 50 * std::cos(2 * t) * parts[1];
   }
   return path;
 }
@@ -412,6 +431,10 @@ int main(int argc, char** argv) {
     add("spectrum/path_lapack" + end, [=](auto& state) { lapack(state, panda_path(damping)); });
   }
   for (int n = 2; n <= kMaxDof; ++n) add_full(n);
+  for (const int n : {7, kMaxDof}) {
+    add("spectrum/tracked_nonsymmetric/" + std::to_string(n),
+        [=](benchmark::State& state) { track(state, nonsymmetric_path(n), {}, Input::kMoving); });
+  }
   for (const int n : {7, kMaxDof}) {
     add("spectrum/unproved/" + std::to_string(n),
         [=](benchmark::State& state) { unproved(state, n); });
