@@ -168,10 +168,11 @@ bool ModeTracker::refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Wo
     if (!close && (size <= kLastStep || stalled) && work.take(publishing_work(pencil.joints))) {
       enclose(pencil, basis_, residual_, enclosure_);
       if (!read(out)) return false;
-      // Of a K that is no square, rounding errors are the greater part of a bound after such a
-      // step.
-      const bool converged = size <= (basis_.two_sided ? kLastStep : kConverged) ||
-                             (stalled && worst_bound(out) <= kStalledBound);
+      // Without a factor rounding errors are the greater part of a bound after such a step.
+      const bool last = basis_.two_sided && size <= kLastStep;
+      if (last && worst_bound(out) > kStalledBound) return false;
+      const bool converged =
+          last || size <= kConverged || (stalled && worst_bound(out) <= kStalledBound);
       const bool buried =
           std::any_of(out.modes.begin(), out.modes.begin() + out.mode_count,
                       [this](const auto& m) { return is_buried(m, options_.soft_frequency); });
