@@ -9,7 +9,11 @@
 
 namespace dashpot::testing {
 
+#if __LDBL_MANT_DIG__ == 113  // 64-bit ARM, which has no __float128
+using Quad = long double;
+#else
 __extension__ typedef __float128 Quad;  // NOLINT(modernize-use-using): __extension__ is for this
+#endif
 
 /// What std::complex does not promise for types of its own.
 struct QuadComplex {
