@@ -9,7 +9,7 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-std::string_view folder_of(std::string_view path) {
+std::string_view folder_name(std::string_view path) {
   const Room* room = room_of(path);
   return room == nullptr ? "none" : room->folder;
 }
@@ -20,18 +20,18 @@ bool may_file_include(std::string_view path, std::string_view header) {
 }
 
 TEST(Rooms, HoldTheirFilesAndTheirPublicHeaders) {
-  EXPECT_EQ(folder_of("analysis/base/status.cpp"), "analysis/base");
-  EXPECT_EQ(folder_of("analysis/status.hpp"), "analysis/base");
-  EXPECT_EQ(folder_of("controller/plugin.h"), "controller/plugin");
-  EXPECT_EQ(folder_of("text/printable.hpp"), "text");
-  EXPECT_EQ(folder_of("apps/run/run.cpp"), "apps/run");
-  EXPECT_EQ(folder_of("apps/main.cpp"), "apps");
-  EXPECT_EQ(folder_of("tests/analysis/system_test.cpp"), "tests");
+  EXPECT_EQ(folder_name("analysis/base/status.cpp"), "analysis/base");
+  EXPECT_EQ(folder_name("analysis/status.hpp"), "analysis/base");
+  EXPECT_EQ(folder_name("controller/plugin.h"), "controller/plugin");
+  EXPECT_EQ(folder_name("text/printable.hpp"), "text");
+  EXPECT_EQ(folder_name("apps/run/run.cpp"), "apps/run");
+  EXPECT_EQ(folder_name("apps/main.cpp"), "apps");
+  EXPECT_EQ(folder_name("tests/analysis/system_test.cpp"), "tests");
   // nowhere:
-  EXPECT_EQ(folder_of("analysis/status.cpp"), "none");
-  EXPECT_EQ(folder_of("analysis/secret.hpp"), "none");
-  EXPECT_EQ(folder_of("analysis/unknown/status.cpp"), "none");
-  EXPECT_EQ(folder_of("analysis"), "none");
+  EXPECT_EQ(folder_name("analysis/status.cpp"), "none");
+  EXPECT_EQ(folder_name("analysis/secret.hpp"), "none");
+  EXPECT_EQ(folder_name("analysis/unknown/status.cpp"), "none");
+  EXPECT_EQ(folder_name("analysis"), "none");
 }
 
 TEST(Rooms, ShowTheirPublicHeadersOnly) {
