@@ -251,6 +251,8 @@ DampingDesign design_damping(const TaskImpedance& impedance, const DampingTarget
   evaluate(impedance, target, design);
   const double missed = worst_miss(design.misses);
   if (missed == 0 || design.indefinite_by < 0) return design;
+  const Index k = samples[0].map.cols();
+  if (!DampingFit::fits(1, samples[0].system.dof(), k, DampingStructure::kFull)) return design;
   // Existing damping couples the zero modes, or joints have springs of their own.
   const FitResult fit =
       DampingFit(samples, DampingStructure::kFull).search(design.damping, {target, 1, {}});

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <exception>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -24,6 +25,9 @@ constexpr double kSolved = 1e-12;
 /// A search ends when so many steps together gain less than this part of the sum of squares.
 constexpr int kPatience = 6;
 constexpr double kLittle = 1e-3;
+/// Most bytes of a search, and the parts of them: of all gradients, of one system's sensitivities
+/// for several threads, and of three Hessians.
+constexpr double kMostBytes = 8e8;
 
 /// X = S R R' S as a function of the entries of R.
 struct Factor {
@@ -49,6 +53,11 @@ Factor factor_of(const MatrixXd& X) {
   unit.diagonal().array() += 1e-10;
   factor.R = unit.llt().matrixL();
   return factor;
+}
+
+bool in_structure(Index i, Index j, DampingStructure structure) {
+  return structure == DampingStructure::kFull || i == j ||
+         (structure == DampingStructure::kBlock && (i < 3) == (j < 3));
 }
 
 }  // namespace
@@ -104,15 +113,30 @@ DampingFit::DampingFit(const std::vector<DampingSample>& samples, DampingStructu
       throw std::invalid_argument("damping: the systems differ in their directions");
     }
   }
+  if (!fits(samples.size(), samples.front().system.dof(), k, structure)) {
+    throw std::invalid_argument("damping: a search over " + std::to_string(samples.size()) +
+                                " systems of " + std::to_string(samples.front().system.dof()) +
+                                " coordinates with " + std::to_string(k) +
+                                " directions would take more than 1 GB");
+  }
   for (Index j = 0; j < k; ++j) {
     for (Index i = j; i < k; ++i) {
-      const bool same_block = (i < 3) == (j < 3);
-      if (structure == DampingStructure::kFull || i == j ||
-          (structure == DampingStructure::kBlock && same_block)) {
-        entries_.emplace_back(i, j);
-      }
+      if (in_structure(i, j, structure)) entries_.emplace_back(i, j);
     }
   }
+}
+
+bool DampingFit::fits(std::size_t samples, Index dof, Index directions,
+                      DampingStructure structure) {
+  constexpr double kThreads = 8;
+  const auto n = static_cast<double>(dof), k = static_cast<double>(directions);
+  double entries = 0;
+  for (Index j = 0; j < directions; ++j) {
+    for (Index i = j; i < directions; ++i) entries += in_structure(i, j, structure) ? 1 : 0;
+  }
+  const double numbers =
+      static_cast<double>(samples) * n * k * k + kThreads * 2 * n * n * n + 3 * entries * entries;
+  return numbers * sizeof(double) <= kMostBytes;
 }
 
 std::vector<DampingFit::Residual> DampingFit::of_sample(const DampingSample& sample,

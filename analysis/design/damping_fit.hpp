@@ -2,6 +2,7 @@
 #include <dashpot/analysis/damping_target.hpp>
 #include <dashpot/analysis/task_space.hpp>
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -56,9 +57,14 @@ struct FitResult {
 class DampingFit {
  public:
   /// Keeps references: the samples have to outlive this object. `threads` 0: one for each
-  /// processor.
+  /// processor. Throws std::invalid_argument for a search that `fits` says no to.
   DampingFit(const std::vector<DampingSample>& samples, DampingStructure structure,
              EntryBounds bounds = {}, int threads = 1);
+
+  /// Returns true if a search over so many systems of `dof` coordinates and `directions` takes at
+  /// most about 1 GB: for the gradients of all ratios and for the Hessian.
+  static bool fits(std::size_t samples, Eigen::Index dof, Eigen::Index directions,
+                   DampingStructure structure);
 
   /// Searches from `start`, which is positive semidefinite, k x k; its entries outside the
   /// structure are dropped. Throws std::runtime_error if a spectrum cannot be computed.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace dashpot::analysis {
@@ -25,6 +26,7 @@ constexpr int kScalings = 12;
 constexpr std::size_t kFirst = 32;
 constexpr std::size_t kJoining = 8;
 constexpr int kRounds = 40;
+constexpr std::size_t kMembers = kFirst + kRounds * kJoining;  // at most
 
 std::vector<DampingSample> samples_of(const std::vector<TaskImpedance>& configurations,
                                       int threads) {
@@ -243,6 +245,12 @@ RegionDesign design_region(const RegionSource& source, const RegionOptions& opti
   const std::size_t first = std::min(kFirst, source.count);
   for (std::size_t i = 0; i < first; ++i) members.push_back(i * source.count / first);
   const std::vector<DampingSample> one = {damping_sample(source.configuration(0))};
+  const Eigen::Index n = one[0].system.dof(), k = one[0].map.cols();
+  if (!DampingFit::fits(std::min(kMembers, source.count), n, k, options.structure)) {
+    throw std::invalid_argument("damping: a region of " + std::to_string(source.count) +
+                                " configurations of " + std::to_string(n) + " coordinates and " +
+                                std::to_string(k) + " directions would take more than 1 GB");
+  }
   const DampingFit fit(one, options.structure, options.bounds, options.threads);  // for the limits
   std::vector<TaskImpedance> chosen;
   Candidate candidate{MatrixXd(), 1}, best;
