@@ -12,7 +12,6 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kSlowest = 1;  // rad/s
 constexpr std::array<double, kMaxJoints> kPrimes{2,  3,  5,  7,  11, 13, 17, 19,
                                                  23, 29, 31, 37, 41, 43, 47, 53};
 
@@ -74,7 +73,7 @@ double GainJudge::margin(const JointVector& q, const Gains& gains, Mode mode) tr
   analysis::Spectrum<kMaxJoints> spectrum;
   const analysis::Status solved = solver.solve(system, spectrum);
   if (solved != analysis::Status::kOk && solved != analysis::Status::kUncertified) return 0;
-  return analysis::gain_margin(system, spectrum, loop_, wanted_, kSlowest);
+  return analysis::gain_margin(system, spectrum, loop_, wanted_, kSlowestVibration);
 } catch (const std::exception&) {  // no convergence
   return 0;
 }

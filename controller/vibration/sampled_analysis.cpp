@@ -117,7 +117,7 @@ void SampledAnalysis::solve(const Task& task, SampledVibration& result) {
   if (gravity_) loop.gravity_gradient += gravity_gradient(model_, task.position);
   const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, loop);
   result.spectral_radius = sampled.spectral_radius;
-  result.gain_margin = analysis::gain_margin(system, continuous, loop);
+  result.gain_margin = analysis::gain_margin(system, continuous, loop, 1e6, kSlowestVibration);
   result.count = static_cast<int>(sampled.modes.size());
   for (std::size_t i = 0; i < sampled.modes.size(); ++i) {
     const analysis::SampledMode& from = sampled.modes[i];

@@ -15,6 +15,10 @@ namespace dashpot::controller {
 /// relative error of 1e-9. Allocates.
 Eigen::MatrixXd gravity_gradient(const RobotModel& model, const JointVector& q);
 
+/// Motions slower than this, rad/s, do not count in a gain margin, because a self-motion fed by the
+/// compensation of gravity through a zero-order hold is no vibration.
+inline constexpr double kSlowestVibration = 1;
+
 /// Returns the sampled loop that the settings describe, without gravity.
 analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& settings);
 
