@@ -144,7 +144,14 @@ void run(const DesignOptions& options, OutputFile csv) try {
     return;
   }
   std::vector<DesignReport> reports;
-  for (const SystemEntry& entry : file.entries) reports.push_back(report_on(entry, options));
+  for (const SystemEntry& entry : file.entries) {
+    const bool several = options.period && file.entries.size() > 1;
+    if (several) {
+      show_progress(static_cast<double>(reports.size()) / static_cast<double>(file.entries.size()));
+    }
+    reports.push_back(report_on(entry, options));
+    if (several && reports.size() == file.entries.size()) show_progress(1);
+  }
   print(options.json ? design_json(reports, file.is_list) : design_table(reports, file.is_list));
 } catch (const InputError& error) {
   if (options.file.empty()) throw;
