@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/analysis/system.hpp>
+#include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/settings_check.hpp>
@@ -71,6 +72,17 @@ class Controller {
   /// the next tick on the springs start where the robot is, with the gains in force, and keep it
   /// there until there is another set-point. Does nothing if there is no fault.
   void release() noexcept;
+
+  /// Changes what is attached to the tip link within Motion::gain_time: from the next tick on the
+  /// weight, M and all that follows from them go evenly to their new values. If the tool's frame T
+  /// changes, springs keep their extension: reference and goal stay where they are on the tip link.
+  /// A pose of the tip in a later set-point is one of the new T, also while T is on its way. Stays
+  /// in force in faults and resets; after a reset there is no way left.
+  void attach(const Attachment& attachment) noexcept;
+  /// Sets limits of the tip's speed from the next tick on; where they exceed those of the settings,
+  /// the settings' limits hold. With a lower TipSpeed::limit the tip's reference moves with at most
+  /// 0.6 of it. A tip that is faster just then is a fault. Resets keep them.
+  void limit_tip_speed(const TipSpeed& speed) noexcept;
 
   int joints() const noexcept;  ///< n
   const Settings& settings() const noexcept;

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/controller/robot_model.hpp>
+#include <dashpot/controller/attachment.hpp>
 
 #include <array>
 
@@ -36,6 +36,9 @@ class DynamicsKernel {
  public:
   explicit DynamicsKernel(const RobotModel& model);
 
+  /// From now on this is attached to the tip link. Allocates nothing.
+  void attach(const Attachment& attachment) noexcept;
+
   /// Sets `result` at q (n), rad (m), and qd (n), rad/s (m/s). Allocates nothing. If q or qd is not
   /// finite, neither is the result.
   void evaluate(const JointVector& q, const JointVector& qd, DynamicsResult& result) const noexcept;
@@ -63,6 +66,12 @@ class DynamicsKernel {
   Eigen::Vector3d first_slide_;  ///< axis of joint 1 in B if prismatic, else 0
   Eigen::Matrix3d tool_;         ///< rotation from T to the last link
   Eigen::Vector3d gravity_;      ///< in B, m/s^2
+
+  // The last link with nothing attached, in its own axes:
+  double bare_mass_ = 0;
+  Eigen::Vector3d bare_first_moment_;
+  Eigen::Matrix3d bare_inertia_;  ///< about its origin
+  Pose tip_link_;
 };
 
 /// Returns the terms at q and qd. For set-up and tests, because it makes a kernel at each call.

@@ -23,6 +23,11 @@ class GainJudge {
   /// The settings have to be valid.
   GainJudge(const RobotModel& model, const Settings& settings);
 
+  /// Attaches something else to the tip link.
+  void attach(const Attachment& attachment) noexcept {
+    kernel_.attach(attachment);
+    posture_loop_.attach(attachment);
+  }
   /// Judges gains at the posture `q` (n, rad). The gains must have passed check_gains in both
   /// modes.
   Verdict judge(const JointVector& q, const Gains& gains);
@@ -35,7 +40,7 @@ class GainJudge {
  private:
   double margin(const JointVector& q, const Gains& gains, Mode mode);
 
-  RobotModel model_;
+  DynamicsKernel kernel_;
   JointVector lower_, upper_;  ///< of the positions, rad
   double wanted_;
   bool gravity_;

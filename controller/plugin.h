@@ -17,9 +17,10 @@
  * linear part first, are taken at T's origin, in B's axes.
  *
  * Threads. One thread, the real-time thread, calls dashpot_update and dashpot_reset. One other
- * thread at a time, "the other thread" below, calls dashpot_set_setpoint, dashpot_set_gains and
- * dashpot_release. One thread, always the same, calls dashpot_read_snapshot, dashpot_read_modes and
- * dashpot_read_sampled_modes; it may be the real-time thread. None of these calls ever waits for
+ * thread at a time, "the other thread" below, calls dashpot_set_setpoint, dashpot_set_gains,
+ * dashpot_set_payload, dashpot_limit_tip_speed and dashpot_release. One thread, always the same,
+ * calls dashpot_read_snapshot, dashpot_read_modes and dashpot_read_sampled_modes; it may be the
+ * real-time thread. None of these calls ever waits for
  * the real-time thread or makes it wait. dashpot_start is called before the loop begins. Any thread
  * may call the remaining functions, but dashpot_destroy only once no other call is under way.
  * Controllers are independent of each other. dashpot_update and dashpot_reset never change the text
@@ -182,6 +183,17 @@ typedef struct dashpot_gains {
                                         that the task leaves free, with null_stiffness */
 } dashpot_gains;
 
+/* What the arm carries, in the axes of the tip link, and its tool. */
+typedef struct dashpot_payload {
+  uint32_t struct_size;
+  uint32_t reserved;           /* 0 */
+  double mass;                 /* kg */
+  double center[3];            /* of mass, from the tip link's origin, m */
+  double inertia[9];           /* 3 x 3, about the centre of mass, kg m^2 */
+  const double* tool_position; /* 3, of the tool's frame T in the tip link, m; NULL: as it is */
+  const double* tool_rotation; /* 3 x 3, turns T's axes into the tip link's; NULL: as it is */
+} dashpot_payload;
+
 /* The torque that the robot's joints are to exert. */
 typedef struct dashpot_output {
   uint32_t struct_size;
@@ -218,6 +230,15 @@ typedef struct dashpot_snapshot {
   double tip_error[6];  /* from tip to reference: difference of positions, m, and rotation
                            vector, rad */
   double tip_wrench[6]; /* wrench of Cartesian springs, dampers and feed-forward, N and N m */
+  /* The damping ratios for which the damping of the springs in force is designed; 0: given. */
+  double joint_damping_ratio;
+  double task_damping_ratio;
+  /* What the arm counts with at this tick, on the way to what dashpot_set_payload was told. */
+  double payload_mass;       /* kg */
+  double payload_center[3];  /* from the tip link's origin, in its axes, m */
+  double payload_inertia[9]; /* 3 x 3, about the centre of mass, kg m^2 */
+  double tool_position[3];   /* of T in the tip link, m */
+  double tool_rotation[9];   /* 3 x 3, turns T's axes into the tip link's */
 } dashpot_snapshot;
 
 /* A vibration mode; docs/concepts.md explains the numbers. A bound is proved: the number differs
@@ -335,9 +356,9 @@ void dashpot_destroy(dashpot_controller* controller);
 
 /* Returns a one-line description of the last error in this thread; "" if the last call succeeded.
  * Calls that count are dashpot_create, ..._create_from_text, dashpot_start, dashpot_set_setpoint,
- * dashpot_set_gains, dashpot_judge_gains, dashpot_evaluate, dashpot_analyze, dashpot_release,
- * dashpot_read_snapshot,
- * ..._modes and ..._sampled_modes. The text is valid until the next of these calls in this thread.
+ * dashpot_set_gains, dashpot_judge_gains, dashpot_set_payload, dashpot_limit_tip_speed,
+ * dashpot_evaluate, dashpot_analyze, dashpot_release, dashpot_read_snapshot, ..._modes and
+ * ..._sampled_modes. The text is valid until the next of these calls in this thread.
  */
 const char* dashpot_last_error(void);
 
@@ -411,19 +432,44 @@ int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* g
 int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
                             const double* position, double* margin);
 
-/* Sets the members of `dynamics` at `position` (n, rad) and `velocity` (n, rad/s; NULL: at rest).
- * The caller sets struct_size. May be called on any thread, also beside a running loop; allocates
- * nothing. Returns DASHPOT_OK or a negative code. */
+/* Tells what the arm carries from now on, and where its tool is. Called on the other thread. The
+ * next tick begins to take it up, and within motion.gain_time the weight, the inertia and all that
+ * follows from them have gone evenly to their new values. In a fault the weight that is held
+ * follows as well; dashpot_reset and dashpot_start keep the payload and leave no way to go.
+ *
+ * A new T moves no spring: reference and goal keep their places on the tip link. The pose of a
+ * set-point is one of the T told before it, on the same thread. For dashpot_update that is the T of
+ * a call that an earlier tick has taken up.
+ *
+ * Refused (DASHPOT_WRONG_VALUE) is what no body can be, and a weight that limits.torque does not
+ * hold at the latest posture; and (DASHPOT_UNSTABLE_GAINS) what leaves the gains in force too
+ * little margin, as in dashpot_set_gains. Takes some milliseconds and allocates. Returns DASHPOT_OK
+ * or a negative code. */
+int32_t dashpot_set_payload(dashpot_controller* controller, const dashpot_payload* payload);
+
+/* Limits the tip's speed from the next tick on. Called on the other thread. `linear` (m/s) and
+ * `angular` (rad/s) are those of the reference on its way to a set-point, `limit` (m/s) that of the
+ * tip's origin, beyond which it is a fault. Each is above zero and at most what the configuration
+ * says (motion.linear_velocity, motion.angular_velocity, limits.tip_velocity); infinity stands for
+ * that. With a lower `limit` the reference moves with at most 0.6 of it. A tip that is faster just
+ * then is a fault. Resets keep the limits. Returns DASHPOT_OK or a negative code. */
+int32_t dashpot_limit_tip_speed(dashpot_controller* controller, double linear, double angular,
+                                double limit);
+
+/* Sets the members of `dynamics` at `position` (n, rad) and `velocity` (n, rad/s; NULL: at rest),
+ * with the payload and the tool of the configuration. The caller sets struct_size. May be called on
+ * any thread, also beside a running loop; allocates nothing. Returns DASHPOT_OK or a negative code.
+ */
 int32_t dashpot_evaluate(const dashpot_controller* controller, const double* position,
                          const double* velocity, dashpot_dynamics* dynamics);
 
 /* Finds the closed loop and its modes at `position` (n, rad), with the robot at rest there, in
  * `mode` (DASHPOT_MODE_JOINT, ...), as a loop would publish them: no loop has to run. A member of
- * `gains` that is NULL, or all if `gains` is NULL, stands for the gain of the configuration. `loop`
- * or `modes` may be NULL; the caller sets the struct_size of the other. The modes are solved
- * directly (`tick`, `time` and the counters are 0). Position limits and their repulsion do not
- * count. May be called on any thread, also beside a running loop; takes some milliseconds
- * and allocates. Returns DASHPOT_OK or a negative code. */
+ * `gains` that is NULL, or all if `gains` is NULL, stands for the gain of the configuration.
+ * Payload and tool are those told last. `loop` or `modes` may be NULL; the caller sets the
+ * struct_size of the other. The modes are solved directly (`tick`, `time` and the counters are 0).
+ * Position limits and their repulsion do not count. May be called on any thread, also beside a
+ * running loop; takes some milliseconds and allocates. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_analyze(const dashpot_controller* controller, const double* position, int32_t mode,
                         const dashpot_gains* gains, dashpot_closed_loop* loop,
                         dashpot_modes* modes);
@@ -460,6 +506,8 @@ typedef struct dashpot_plugin {
   int32_t (*set_setpoint)(dashpot_controller*, const dashpot_setpoint*);
   int32_t (*set_gains)(dashpot_controller*, const dashpot_gains*);
   int32_t (*judge_gains)(dashpot_controller*, const dashpot_gains*, const double*, double*);
+  int32_t (*set_payload)(dashpot_controller*, const dashpot_payload*);
+  int32_t (*limit_tip_speed)(dashpot_controller*, double, double, double);
   int32_t (*evaluate)(const dashpot_controller*, const double*, const double*, dashpot_dynamics*);
   int32_t (*analyze)(const dashpot_controller*, const double*, int32_t, const dashpot_gains*,
                      dashpot_closed_loop*, dashpot_modes*);

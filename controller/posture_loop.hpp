@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/controller/controller.hpp>
-#include <dashpot/controller/robot_model.hpp>
+#include <dashpot/controller/dynamics.hpp>
 
 namespace dashpot::controller {
 
@@ -14,6 +14,11 @@ class PostureLoop {
   /// looked at.
   PostureLoop(const RobotModel& model, const Settings& settings);
 
+  /// Attaches something else to the tip link.
+  void attach(const Attachment& attachment) noexcept {
+    kernel_.attach(attachment);
+    controller_.attach(attachment);
+  }
   /// Sets `system` to M q'' + C q' + K q = f at the posture `q` (n, rad), in joint coordinates:
   /// mass, damping, stiffness and its factor, as Controller::closed_loop. The gains must have
   /// passed check_gains in this mode. The springs hold `external_wrench` (6, in B's axes, N and N
@@ -24,7 +29,7 @@ class PostureLoop {
                      const Vector6& external_wrench = Vector6::Zero());
 
  private:
-  RobotModel model_;
+  DynamicsKernel kernel_;
   Controller controller_;  ///< takes gains at once, at any posture
   std::int64_t time_ = 0;  ///< ns
 };

@@ -24,13 +24,6 @@ struct Joint {
   double reflected_inertia = 0;  ///< of rotor and gear, as seen by the joint, kg m^2 (kg)
 };
 
-/// A body that the tip carries, in the axes of the tip link.
-struct Payload {
-  double mass = 0;                                    ///< kg
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();   ///< of mass, from the tip link's origin, m
-  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre of mass, kg m^2
-};
-
 /// What a URDF does not say, or says wrong. A vector without entries keeps the URDF's values.
 struct ModelOptions {
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< in axes of the URDF's root link, m/s^2
@@ -46,6 +39,8 @@ struct ModelOptions {
   Payload payload;
   Pose tool;  ///< the tool's frame T in the tip link
 };
+
+struct Attachment;  // attachment.hpp
 
 /// Thrown at set-up; what() is one line: "arm.urdf: joint 'elbow': mimics another joint".
 class InvalidModel : public std::invalid_argument {
@@ -81,6 +76,13 @@ class RobotModel {
   const std::vector<Joint>& joints() const noexcept;
   /// Returns one property of all n joints, as in `joint_values(&Joint::effort)`.
   JointVector joint_values(double Joint::*property) const;
+
+  /// Returns what is attached to the tip link: ModelOptions::payload and tool, unless `with` put
+  /// something else in their place.
+  const Attachment& attachment() const noexcept;
+  /// Returns the model with something else attached. Throws InvalidModel if a joint has no inertia
+  /// without what was attached before.
+  RobotModel with(const Attachment& attachment) const;
 
   /// Returns the acceleration of gravity in B's axes, m/s^2.
   const Eigen::Vector3d& gravity() const noexcept;

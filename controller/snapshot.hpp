@@ -35,6 +35,10 @@ struct Snapshot {
   JointVector joint_error;                    ///< reference_position - position, n, rad
   Vector6 tip_error = Vector6::Zero();   ///< from tip to reference: m, and rotation vector, rad
   Vector6 tip_wrench = Vector6::Zero();  ///< of the Cartesian springs, dampers and feed-forward
+  /// Damping ratios that the damping of the springs in force is designed for; 0: it is given.
+  double joint_damping_ratio = 0, task_damping_ratio = 0;
+  Payload payload;  ///< in force at this tick, on the way to what Controller::attach was given
+  Pose tool;        ///< likewise: T in the tip link
 };
 
 /// One vibration mode of the closed loop; the terms are those of analysis::Mode.

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <limits>
 
 namespace dashpot::controller {
 
@@ -28,6 +29,21 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 struct Pose {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+};
+
+/// A body that the tip carries, in the axes of the tip link.
+struct Payload {
+  double mass = 0;                                    ///< kg
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();   ///< of mass, from the tip link's origin, m
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about the centre of mass, kg m^2
+};
+
+/// Limits of the tip's speed, below those of the settings; infinity: those of the settings.
+struct TipSpeed {
+  double linear = std::numeric_limits<double>::infinity();   ///< of the tip reference, m/s
+  double angular = std::numeric_limits<double>::infinity();  ///< of the tip reference, rad/s
+  double limit = std::numeric_limits<double>::infinity();    ///< Limits::tip_velocity, m/s
+  bool operator==(const TipSpeed&) const = default;
 };
 
 /// What the robot reports at the beginning of a tick.

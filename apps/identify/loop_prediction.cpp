@@ -127,10 +127,11 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
   sampled.friction += outside.damping;
   sampled.gravity_gradient = outside.stiffness;
   if (settings.feed_forward.gravity) {
-    const MatrixXd gravity = controller::gravity_gradient(arm, q);
+    const MatrixXd gravity = controller::gravity_gradient(controller::DynamicsKernel(arm), q);
     sampled.gravity_gradient += gravity;
     if (correction.payload != 0) {  // whose weight nobody holds
-      const MatrixXd added = gravity - controller::gravity_gradient(config_.model, q);
+      const MatrixXd added =
+          gravity - controller::gravity_gradient(controller::DynamicsKernel(config_.model), q);
       system.stiffness += (added + added.transpose()) / 2;
       system.stiffness_factor.resize(0, q.size());
     }

@@ -37,6 +37,12 @@ void Controller::reset(const JointVector& torque) noexcept {
 void Controller::release() noexcept {
   if (core_->snapshot().fault != Status::kOk) core_->release();
 }
+void Controller::attach(const Attachment& attachment) noexcept {
+  core_->attach(attachment);
+}
+void Controller::limit_tip_speed(const TipSpeed& speed) noexcept {
+  core_->limit_tip_speed(speed);
+}
 int Controller::joints() const noexcept {
   return static_cast<int>(core_->settings().limits.torque.size());
 }

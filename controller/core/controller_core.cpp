@@ -15,6 +15,15 @@ int gain_ticks(const Settings& settings) {
   return static_cast<int>(std::lround(settings.motion.gain_time / settings.period));
 }
 
+/// The arm without payload, or, where that has no inertia, with the one it has.
+RobotModel unloaded(const RobotModel& model) try {
+  Attachment nothing;
+  nothing.tool = model.attachment().tool;
+  return model.attachment().mass > 0 ? model.with(nothing) : model;
+} catch (const InvalidModel&) {
+  return model;
+}
+
 /// Whole ns, which add up without rounding errors.
 double nanoseconds(double seconds) noexcept {
   return std::round(1e9 * seconds);
@@ -31,11 +40,12 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
       motion_watch_(model, settings),
       references_(settings.motion, settings.period),
       gains_(gain_ticks(settings), Impedance(n_)),
+      attachment_(gain_ticks(settings), model.attachment()),
       wrench_(gain_ticks(settings), Vector6::Zero()),
       designed_(settings.subtract_friction ? model.joint_values(&Joint::viscous_friction)
                                            : JointVector(JointVector::Zero(n_))),
       law_(model, settings.feed_forward),
-      filter_(settings, least_joint_inertia(model, settings.limits.position_lower,
+      filter_(settings, least_joint_inertia(unloaded(model), settings.limits.position_lower,
                                             settings.limits.position_upper)),
       clamp_{settings.limits.linear_error, settings.limits.angular_error},
       damping_(filter_.borne(settings.limits.damping)),
@@ -71,6 +81,8 @@ void ControllerCore::reset(const JointVector& torque) noexcept {
   first_ = true;
   ramp_ticks_ = 0;
   restarts_ = 0;
+  attachment_.start(attachment_.target());
+  kernel_.attach(attachment_.now());
   snapshot_ = Snapshot();
   for (JointVector* vector :
        {&snapshot_.position, &snapshot_.velocity, &snapshot_.torque, &snapshot_.law_torque,
@@ -113,6 +125,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   qd_ = state_check_.velocity();
   const bool wrench_known = state.external_wrench.allFinite();
   if (wrench_known) external_wrench_ = state.external_wrench;
+  step_attachment();
   kernel_.evaluate(q_, qd_, robot_);
   if (settings_.feed_forward.gravity) weight_ = robot_.gravity;
   filter_.assume(weight_);
@@ -251,6 +264,10 @@ void ControllerCore::fill_snapshot() noexcept {
     snapshot_.reference_twist.setZero();
     snapshot_.tip_error.setZero();
   }
+  snapshot_.joint_damping_ratio = springs ? impedance.joint_damping_ratio : 0;
+  snapshot_.task_damping_ratio = springs ? impedance.damping_ratio : 0;
+  snapshot_.payload = attachment_.now().payload();
+  snapshot_.tool = attachment_.now().tool;
   snapshot_.tip_wrench = springs ? law_.tip_wrench() : Vector6(Vector6::Zero());
 }
 
@@ -279,7 +296,12 @@ void ControllerCore::analyse() noexcept {
 }
 
 bool ControllerCore::loop_unchanged(bool with_wrench, bool with_velocity) noexcept {
-  Analysed now{springs_ != Springs::kOff, false, gains_.changes(), q_, {}, Vector6::Zero()};
+  Analysed now{springs_ != Springs::kOff,
+               false,
+               gains_.changes() + attachment_.changes(),
+               q_,
+               {},
+               Vector6::Zero()};
   if (with_velocity) now.qd = qd_;
   if (with_wrench) now.wrench = external_wrench_ + wrench_.now();
   bool same = false, settled = false;
@@ -300,6 +322,7 @@ void ControllerCore::hand_over() noexcept {
   task.time = time_;
   task.tick = snapshot_.tick;
   task.position = snapshot_.position;
+  task.attachment = attachment_.now();
   closed_loop(task.system);
   JointMatrix load = JointMatrix::Zero(n_, n_);
   if (settings_.task_terms.load != Load::kIgnored) {

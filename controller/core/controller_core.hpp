@@ -27,6 +27,8 @@ class ControllerCore {
   void reset(const JointVector& torque) noexcept;
   void release() noexcept;
   void closed_loop(analysis::System<kMaxJoints>& system) noexcept;
+  void attach(const Attachment& attachment) noexcept;
+  void limit_tip_speed(const TipSpeed& speed) noexcept;
 
   const Snapshot& snapshot() const noexcept { return snapshot_; }
   const Vibration& vibration() const noexcept { return vibration_.result(); }
@@ -70,6 +72,10 @@ class ControllerCore {
   Status setpoint_age_status() const noexcept;
   /// Returns the share of its speed limits at which the tip's reference takes no joint too fast.
   double tip_reference_speed() const noexcept;
+  /// Moves what is attached on by one period, and the tip's reference with the tool.
+  void step_attachment() noexcept;
+  /// Returns where the accepted set-point wants T, as far as T is on its way to its new place.
+  Pose tip_goal() const noexcept;
   /// Moves gains and references on by one period, and sets the law's torque.
   void impedance_torque(bool hold, JointVector& tau) noexcept;
 
@@ -108,6 +114,7 @@ class ControllerCore {
   MotionWatch motion_watch_;
   SpringReferences references_;
   GainBlend gains_;
+  Ramp<Attachment> attachment_;
   Ramp<Vector6> wrench_;
   DesignedDamping designed_;
   ImpedanceLaw law_;

@@ -72,6 +72,39 @@ void ControllerCore::update_goal() noexcept {
   goal_rotation_ = Eigen::Quaterniond(accepted_.tip_pose.rotation).normalized();
 }
 
+void ControllerCore::attach(const Attachment& attachment) noexcept {
+  if (attachment == attachment_.target()) return;
+  accepted_.tip_pose = carried(accepted_.tip_pose, attachment_.target().tool, attachment.tool);
+  goal_rotation_ = Eigen::Quaterniond(accepted_.tip_pose.rotation).normalized();
+  attachment_.set_target(attachment);
+}
+
+void ControllerCore::step_attachment() noexcept {
+  if (attachment_.still()) return;
+  const Pose before = attachment_.now().tool;
+  attachment_.step();
+  kernel_.attach(attachment_.now());
+  const Pose& tool = attachment_.now().tool;
+  const TipReference& tip = references_.tip;
+  const Pose moved = carried({tip.position(), tip.rotation().toRotationMatrix()}, before, tool);
+  references_.tip.relocate(moved.position, Eigen::Quaterniond(moved.rotation).normalized());
+}
+
+Pose ControllerCore::tip_goal() const noexcept {
+  return carried(accepted_.tip_pose, attachment_.target().tool, attachment_.now().tool);
+}
+
+void ControllerCore::limit_tip_speed(const TipSpeed& speed) noexcept {
+  constexpr double kReferenceShare = 0.6;  // SafetyFilter takes drive away from 0.65 on
+  const Motion& motion = settings_.motion;
+  double linear = std::min(motion.linear_velocity, speed.linear);
+  const double limit = std::min(settings_.limits.tip_velocity, speed.limit);
+  if (limit < settings_.limits.tip_velocity) linear = std::min(linear, kReferenceShare * limit);
+  references_.tip.limit_speed(linear, std::min(motion.angular_velocity, speed.angular));
+  filter_.limit_tip_speed(limit);
+  motion_watch_.limit_tip_speed(limit);
+}
+
 void ControllerCore::restart_springs() noexcept {
   const Impedance target(accepted_, n_);
   Impedance none(n_);
@@ -84,7 +117,8 @@ void ControllerCore::restart_springs() noexcept {
   wrench_.start(Vector6::Zero());
   if (!from_user_) {
     accepted_.joint_position = q_;
-    accepted_.tip_pose = {robot_.p_BT_B, robot_.R_BT};
+    accepted_.tip_pose =
+        carried({robot_.p_BT_B, robot_.R_BT}, attachment_.now().tool, attachment_.target().tool);
   }
   update_goal();
   filter_.begin_anew();
@@ -134,8 +168,10 @@ void ControllerCore::impedance_torque(bool hold, JointVector& tau) noexcept {
   if (impedance.task_weight > 0) {
     if (!joint && !hold) {
       const Eigen::Quaterniond tip(robot_.R_BT);
+      const bool there = attachment_.still();
+      const Pose goal = there ? accepted_.tip_pose : tip_goal();
       references_.tip.step(
-          accepted_.tip_pose.position, goal_rotation_,
+          goal.position, there ? goal_rotation_ : Eigen::Quaterniond(goal.rotation).normalized(),
           {robot_.p_BT_B, tip, robot_.R_BT, impedance.base, impedance.tool, clamp_},
           tip_reference_speed());
       references_.posture.step(goal_);

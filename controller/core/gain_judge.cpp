@@ -27,7 +27,7 @@ Settings judging(Settings settings) {
 }  // namespace
 
 GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
-    : model_(model),
+    : kernel_(model),
       lower_(settings.limits.position_lower),
       upper_(settings.limits.position_upper),
       wanted_(settings.limits.gain_margin),
@@ -38,7 +38,7 @@ GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
 GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
   Verdict worst{std::numeric_limits<double>::infinity(), Mode::kJoint};
   loop_.gravity_gradient = Eigen::MatrixXd();
-  if (gravity_) loop_.gravity_gradient = gravity_gradient(model_, q);
+  if (gravity_) loop_.gravity_gradient = gravity_gradient(kernel_, q);
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
     const double found = margin(q, gains, mode);
     if (found < worst.margin) worst = {found, mode};

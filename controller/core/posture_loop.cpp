@@ -22,7 +22,7 @@ Settings anywhere(Settings settings) {
 }  // namespace
 
 PostureLoop::PostureLoop(const RobotModel& model, const Settings& settings)
-    : model_(model), controller_(model, anywhere(settings)) {}
+    : kernel_(model), controller_(model, anywhere(settings)) {}
 
 Status PostureLoop::closed_loop(const JointVector& q, const Gains& gains, Mode mode,
                                 analysis::System<kMaxJoints>& system,
@@ -31,7 +31,8 @@ Status PostureLoop::closed_loop(const JointVector& q, const Gains& gains, Mode m
   state.position = q;
   state.velocity = JointVector::Zero(q.size());
   state.external_wrench = external_wrench;
-  const DynamicsResult there = evaluate(model_, q, state.velocity);
+  DynamicsResult there;
+  kernel_.evaluate(q, state.velocity, there);
   Setpoint setpoint;
   setpoint.mode = mode;
   setpoint.joint_position = q;

@@ -37,6 +37,7 @@ class Ramp {
     now_ = s_ == 1 ? to_ : blend(from_, to_, s_);
   }
 
+  bool still() const noexcept { return s_ == 1; }
   const Value& now() const noexcept { return now_; }
   const Value& target() const noexcept { return to_; }
   /// Returns how often the value has changed so far.

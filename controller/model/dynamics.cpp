@@ -2,6 +2,7 @@
 #include <dashpot/controller/base/sin_cos.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
+#include <dashpot/controller/model/robot_model_data.hpp>
 
 #include <Eigen/Geometry>
 #include <array>
@@ -40,6 +41,11 @@ void set_joint(Rows& rows, int i, const Eigen::MatrixBase<Derived>& values) {
     const auto at = static_cast<Eigen::Index>(k);
     rows[k][static_cast<std::size_t>(i % 4)] = values(at % values.rows(), at / values.rows());
   }
+}
+
+/// xx yy zz xy xz yz
+Vector6 six(const Eigen::Matrix3d& I) {
+  return Vector6{{I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}};
 }
 
 using Four = std::array<double, 4>;
@@ -155,7 +161,8 @@ DynamicsKernel::DynamicsKernel(const RobotModel& model)
     }
     link = frame.inverse() * to_eigen(segment.pose(0));
 
-    KDL::RigidBodyInertia body = segment.getInertia();
+    const bool end = i == n_ - 1;  // the end comes with what is attached to it
+    KDL::RigidBodyInertia body = end ? model.data().last_body : segment.getInertia();
     links.mass[lane] = body.getMass();
     const Eigen::Vector3d center = link * to_eigen(body.getCOG());
     set_joint(links.first_moment, i, body.getMass() * center);
@@ -164,12 +171,33 @@ DynamicsKernel::DynamicsKernel(const RobotModel& model)
                                   link.linear().transpose() +
                               body.getMass() * (center.squaredNorm() * Eigen::Matrix3d::Identity() -
                                                 center * center.transpose());
-    set_joint(links.inertia, i, Vector6{{I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2)}});
+    set_joint(links.inertia, i, six(I));
+    if (!end) continue;
+    bare_mass_ = body.getMass();
+    bare_first_moment_ = body.getMass() * center;
+    bare_inertia_ = I;
   }
-  const Eigen::Isometry3d tip =
-      link * to_eigen(chain.getSegment(static_cast<unsigned>(n_)).pose(0));
-  set_joint(links_[static_cast<std::size_t>(n_ - 1) / 4].offset, n_ - 1, tip.translation());
-  tool_ = tip.linear();
+  const Eigen::Isometry3d tip = link * to_eigen(model.data().tip_link);
+  tip_link_ = {tip.translation(), tip.linear()};
+  attach(model.attachment());
+}
+
+void DynamicsKernel::attach(const Attachment& given) noexcept {
+  const Eigen::Matrix3d& R = tip_link_.rotation;
+  const Eigen::Vector3d& p = tip_link_.position;
+  // About p_n: I_body + m (|p|^2 1 - p p') + 2 h.p 1 - h p' - p h'
+  const Eigen::Vector3d h = R * given.first_moment;
+  const Eigen::Matrix3d about_origin =
+      R * given.inertia * R.transpose() +
+      (given.mass * p.squaredNorm() + 2 * h.dot(p)) * Eigen::Matrix3d::Identity() -
+      given.mass * p * p.transpose() - h * p.transpose() - p * h.transpose();
+  Links& links = links_[static_cast<std::size_t>(n_ - 1) / 4];
+  const auto lane = static_cast<std::size_t>(n_ - 1) % 4;
+  links.mass[lane] = bare_mass_ + given.mass;
+  set_joint(links.first_moment, n_ - 1, Eigen::Vector3d(bare_first_moment_ + h + given.mass * p));
+  set_joint(links.inertia, n_ - 1, six(bare_inertia_ + about_origin));
+  set_joint(links.offset, n_ - 1, Eigen::Vector3d(p + R * given.tool.position));
+  tool_ = R * given.tool.rotation;
   double carried = 0;
   for (auto i = static_cast<std::size_t>(n_); i-- > 0;) {
     links_[i / 4].carried_mass[i % 4] = carried += links_[i / 4].mass[i % 4];

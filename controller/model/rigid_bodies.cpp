@@ -89,11 +89,4 @@ KDL::RigidBodyInertia body_of(const urdf::Link& link, bool accept, const std::st
   return frame * make_body(source.mass, Eigen::Vector3d::Zero(), I);
 }
 
-KDL::RigidBodyInertia body_of(const Payload& payload, const std::string& name) {
-  std::string problem = mass_problem(payload.mass, payload.center, payload.inertia);
-  if (problem.empty()) problem = inertia_problem(payload.mass, payload.inertia);
-  if (!problem.empty()) throw InvalidModel(name + ": payload: " + problem);
-  return make_body(payload.mass, payload.center, payload.inertia);
-}
-
 }  // namespace dashpot::controller

@@ -32,7 +32,4 @@ std::string inertia_problem(double mass, const Eigen::Matrix3d& inertia);
 /// that no body can have is no error.
 KDL::RigidBodyInertia body_of(const urdf::Link& link, bool accept, const std::string& name);
 
-/// Returns the inertia of a payload, in the axes of the tip link.
-KDL::RigidBodyInertia body_of(const Payload& payload, const std::string& name);
-
 }  // namespace dashpot::controller

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/controller/robot_model.hpp>
+#include <dashpot/controller/attachment.hpp>
 
 #include <kdl/chain.hpp>
 
@@ -11,7 +11,13 @@ struct RobotModel::Data {
   std::string tip;
   std::vector<Joint> joints;
   Eigen::Vector3d gravity;
-  KDL::Chain chain;  ///< as kdl_chain.hpp says
+  KDL::Chain chain;                 ///< as kdl_chain.hpp says
+  KDL::RigidBodyInertia last_body;  ///< of the last joint, without what is attached
+  KDL::Frame tip_link;              ///< in the last joint's segment
+  Attachment attachment;
+
+  /// Puts what is attached into the chain's last two segments.
+  void attach(const Attachment& given);
 };
 
 }  // namespace dashpot::controller

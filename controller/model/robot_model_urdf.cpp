@@ -133,11 +133,10 @@ KDL::Rotation rotation_of_base(const urdf::ModelInterface& tree, const std::stri
   return rotation;
 }
 
-void check_pose(const Pose& pose, const std::string& name) {
-  const Eigen::Matrix3d& R = pose.rotation;
-  const bool turns = (R.transpose() * R).isIdentity(1e-9) && R.determinant() > 0;
-  if (turns && pose.position.allFinite()) return;
-  throw InvalidModel(name + ": tool: not a rotation and a finite position");
+Attachment attached(const ModelOptions& options, const std::string& name) try {
+  return {options.payload, options.tool};
+} catch (const InvalidModel& error) {
+  throw InvalidModel(name + ": " + error.what());
 }
 
 /// Moving joints of the path, in order, with what the options say of them.
@@ -158,11 +157,12 @@ std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& pat
   return joints;
 }
 
-KDL::Chain make_chain(const urdf::ModelInterface& tree,
-                      const std::vector<urdf::JointConstSharedPtr>& path,
-                      const std::vector<Joint>& joints, const ModelOptions& options,
-                      const std::string& name) {
-  KDL::Chain chain;
+/// Sets the chain, with nothing attached to it yet.
+void make_chain(const urdf::ModelInterface& tree,
+                const std::vector<urdf::JointConstSharedPtr>& path,
+                const std::vector<Joint>& joints, const ModelOptions& options,
+                const std::string& name, RobotModel::Data& data) {
+  KDL::Chain& chain = data.chain;
   KDL::Segment segment;  // being put together; the first, what stands still, is dropped
   KDL::RigidBodyInertia body = KDL::RigidBodyInertia::Zero();
   KDL::Frame frame;  // of the last link of the path in that of the segment
@@ -192,11 +192,10 @@ KDL::Chain make_chain(const urdf::ModelInterface& tree,
     if (moving == 0) continue;
     body = body + frame * lump(tree, joint.child_link_name, next, options, name);
   }
-  body = body + frame * body_of(options.payload, name);
   finish();
-  const KDL::Frame tool(to_kdl(options.tool.rotation), to_kdl(options.tool.position));
-  chain.addSegment(KDL::Segment("tool", KDL::Joint("tool", KDL::Joint::None), frame * tool));
-  return chain;
+  chain.addSegment(KDL::Segment());
+  data.last_body = body;
+  data.tip_link = frame;
 }
 
 /// The joint nearest to the tip that nothing resists, as the pivots of M from its last row up tell
@@ -243,19 +242,28 @@ RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string
            std::to_string(joints.size()) + " joints from '" + base + "', more than " +
                std::to_string(kMaxJoints));
   }
-  check_pose(options.tool, name);
+  const Attachment attachment = attached(options, name);
   if (!options.gravity.allFinite()) throw InvalidModel(name + ": gravity: not finite");
 
   auto data = std::make_shared<Data>();
   data->name = tree->getName();
   data->base = base;
   data->tip = tip;
-  data->chain = make_chain(*tree, path, joints, options, name);
+  make_chain(*tree, path, joints, options, name, *data);
+  data->attach(attachment);
   data->joints = std::move(joints);
   const KDL::Vector g = rotation_of_base(*tree, base).Inverse(to_kdl(options.gravity));
   data->gravity = {g.x(), g.y(), g.z()};
   RobotModel model(std::move(data));
   check_inertia(model, name);
+  return model;
+}
+
+RobotModel RobotModel::with(const Attachment& attachment) const {
+  auto data = std::make_shared<Data>(*data_);
+  data->attach(attachment);
+  RobotModel model(std::move(data));
+  check_inertia(model, name());
   return model;
 }
 

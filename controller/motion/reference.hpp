@@ -79,6 +79,11 @@ class TipReference {
             const ReferenceGovernor& governor, double share = 1) noexcept;
   /// Brakes for one period, or stays at rest.
   void halt() noexcept;
+  /// Sets the limits of velocity, m/s and rad/s, both above zero.
+  void limit_speed(double linear, double angular) noexcept {
+    norm_.linear_velocity = linear;
+    norm_.angular_velocity = angular;
+  }
 
   const Eigen::Vector3d& position() const noexcept { return position_; }
   const Eigen::Quaterniond& rotation() const noexcept { return rotation_; }

@@ -25,13 +25,16 @@ HostedController::HostedController(const Config& config)
       kernel(config.model),
       judgement(config.model, config.settings),
       controller_(config.model, config.settings),
-      setpoint_(settings.initial) {
+      setpoint_(settings.initial),
+      tool_(config.model.attachment().tool) {
   request.setpoint = settings.initial;
+  request.attachment = config.model.attachment();
 }
 
 Status HostedController::at_posture(const JointVector& q, const Gains& gains, Mode mode,
                                     VibrationTask& task, Vibration& found) const {
   PostureLoop loop(model, settings);
+  loop.attach(judgement.attached());
   const Status status = loop.closed_loop(q, gains, mode, task.system);
   if (status != Status::kOk) return status;
   task.position = q;
@@ -68,8 +71,8 @@ Status HostedController::update(const dashpot_state* given, const dashpot_setpoi
 }
 
 void HostedController::reset(const JointVector& torque) noexcept {
+  take_up(nullptr, time_);  // the gains in it stay, and what is attached
   controller_.reset(torque);
-  take_up(nullptr, time_);  // the gains in it stay
   forget_setpoint();
   forgotten_ = latched_ = false;
   located_ = false;
@@ -86,11 +89,24 @@ void HostedController::forget_setpoint() noexcept {
   has_setpoint_ = false;
 }
 
+void HostedController::take_up_tip(const Request& latest) noexcept {
+  if (latest.attachments != attachments_) {
+    controller_.attach(latest.attachment);
+    setpoint_.tip_pose = carried(setpoint_.tip_pose, tool_, latest.attachment.tool);
+    tool_ = latest.attachment.tool;
+  }
+  if (latest.tip_speeds != tip_speeds_) controller_.limit_tip_speed(latest.tip_speed);
+  attachments_ = latest.attachments;
+  tip_speeds_ = latest.tip_speeds;
+}
+
 bool HostedController::take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept {
   const std::int64_t last = setpoint_.time;
+  const Pose tool = tool_;  // of a set-point that the caller gives: no tick has told of another
   bool accepted = true;
   if (requests.fetch()) {
     const Request& latest = requests.value();
+    take_up_tip(latest);
     if (latest.releases != releases_ && controller_.snapshot().fault != Status::kOk) {
       controller_.release();
       forget_setpoint();
@@ -114,6 +130,7 @@ bool HostedController::take_up(const dashpot_setpoint* wanted, std::int64_t now)
   if (wanted != nullptr && !old) {
     accepted = to_setpoint(wanted, n, now, setpoint_) == DASHPOT_OK;
     if (accepted && !has_setpoint_ && setpoint_.time == last) setpoint_.time = later(last, 1);
+    if (accepted) setpoint_.tip_pose = carried(setpoint_.tip_pose, tool, tool_);
     has_setpoint_ |= accepted;
     if (accepted) {
       given_time_ = wanted->time;
@@ -130,7 +147,7 @@ bool HostedController::stay(std::int64_t now) noexcept {
   setpoint_.mode = settings.initial.mode;
   if (setpoint_.mode == Mode::kCartesian) {
     setpoint_.joint_position.resize(0);
-    setpoint_.tip_pose = snapshot.reference_tip;
+    setpoint_.tip_pose = carried(snapshot.reference_tip, snapshot.tool, tool_);
   } else {
     setpoint_.joint_position = snapshot.reference_position;
   }

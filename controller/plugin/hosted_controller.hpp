@@ -17,6 +17,10 @@ struct Request {
   std::uint64_t setpoints = 0;  ///< how many were given so far
   std::uint64_t gain_changes = 0;
   std::uint64_t releases = 0;
+  std::uint64_t attachments = 0;
+  std::uint64_t tip_speeds = 0;
+  Attachment attachment;
+  TipSpeed tip_speed;
   bool on_arrival = false;  ///< the set-point's time is that of the tick that takes it up
   Setpoint setpoint;        ///< with the gains
 };
@@ -32,7 +36,7 @@ struct HostedController {
   const std::int64_t period;  ///< ns
   const RobotModel model;
   const DynamicsKernel kernel;
-  Judgement judgement;
+  mutable Judgement judgement;
   /// Finds the closed loop of gains at a posture at rest, and its modes. Returns kOk, or the status
   /// of a controller that cannot be there. Throws what allocation does.
   Status at_posture(const JointVector& q, const Gains& gains, Mode mode, VibrationTask& task,
@@ -54,6 +58,9 @@ struct HostedController {
 
  private:
   void forget_setpoint() noexcept;
+  /// Takes over what is attached, and how fast the tip may be. The set-point in force keeps its
+  /// place on the tip link.
+  void take_up_tip(const Request& latest) noexcept;
   /// Puts what the caller and the other thread want into `setpoint_`. False if `wanted` is there,
   /// but no set-point; the one in force stays then.
   bool take_up(const dashpot_setpoint* wanted, std::int64_t now) noexcept;
@@ -69,6 +76,9 @@ struct HostedController {
   std::uint64_t setpoints_ = 0;  ///< of the other thread, taken up so far
   std::uint64_t gain_changes_ = 0;
   std::uint64_t releases_ = 0;
+  std::uint64_t attachments_ = 0;
+  std::uint64_t tip_speeds_ = 0;
+  Pose tool_;                    ///< T in the tip link, of the set-points
   bool latched_ = false;         ///< a fault was, after the last tick
   std::int64_t given_time_ = 0;  ///< of the last set-point that the caller gave, as it was given
   bool forgotten_ = false;       ///< it was, with the release of a fault: it is none any more
@@ -76,8 +86,20 @@ struct HostedController {
   analysis::Status published_status_ = analysis::Status::kOk;
 };
 
+/// Sets what dashpot_last_error says; returns `code`.
+std::int32_t finish(std::int32_t code, const char* text) noexcept;
+std::int32_t finish(std::int32_t code) noexcept;
+/// Likewise of a verdict found `here`, or wherever the robot may be.
+std::int32_t finish(const Judgement& judgement, const GainJudge::Verdict& verdict,
+                    bool here) noexcept;
+
 /// Returns a controller as dashpot_create does, from a configuration that was read before. Throws
 /// InputError, with the key `gains`, for gains that dashpot_set_gains would refuse.
 dashpot_controller* create_controller(const Config& config);
 
 }  // namespace dashpot::controller
+
+struct dashpot_controller  // NOLINT(readability-identifier-naming): C's
+    : dashpot::controller::HostedController {
+  using HostedController::HostedController;
+};

@@ -201,6 +201,12 @@ void to_c(const Snapshot& snapshot, dashpot_snapshot& out) noexcept {
   put(snapshot.law_torque, out.law_torque);
   put(snapshot.tip_error, out.tip_error);
   put(snapshot.tip_wrench, out.tip_wrench);
+  out.joint_damping_ratio = snapshot.joint_damping_ratio;
+  out.task_damping_ratio = snapshot.task_damping_ratio;
+  out.payload_mass = snapshot.payload.mass;
+  put(snapshot.payload.center, out.payload_center);
+  put_rows(snapshot.payload.inertia, out.payload_inertia);
+  put(snapshot.tool, out.tool_position, out.tool_rotation);
 }
 
 void to_c(const Vibration& vibration, dashpot_modes& out) noexcept {

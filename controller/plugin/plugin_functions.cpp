@@ -13,16 +13,15 @@
 
 using namespace dashpot::controller;  // NOLINT(google-build-using-namespace): the C functions
 
-struct dashpot_controller : HostedController {  // NOLINT(readability-identifier-naming)
-  using HostedController::HostedController;
-};
-
 namespace {
 
 // In storage of fixed size: nothing to allocate, nothing to destroy when a thread ends.
 thread_local std::array<char, 1024> last_error{};
 
-/// Sets what dashpot_last_error says; returns `code`.
+}  // namespace
+
+namespace dashpot::controller {
+
 std::int32_t finish(std::int32_t code, const char* text) noexcept {
   std::snprintf(last_error.data(), last_error.size(), "%s", code == DASHPOT_OK ? "" : text);
   return code;
@@ -31,6 +30,22 @@ std::int32_t finish(std::int32_t code, const char* text) noexcept {
 std::int32_t finish(std::int32_t code) noexcept {
   return finish(code, dashpot_status_text(code));
 }
+
+std::int32_t finish(const Judgement& judgement, const GainJudge::Verdict& verdict,
+                    bool here) noexcept {
+  if (judgement.enough(verdict)) return finish(DASHPOT_OK);
+  std::array<char, 256> text{};
+  std::snprintf(text.data(), text.size(),
+                "with the %s gains the sampled loop has a gain margin of %.3g %s, "
+                "limits.gain_margin asks for %.3g",
+                verdict.mode == Mode::kJoint ? "joint" : "task", verdict.margin,
+                here ? "here" : "at best, wherever the robot is", judgement.wanted());
+  return finish(DASHPOT_UNSTABLE_GAINS, text.data());
+}
+
+}  // namespace dashpot::controller
+
+namespace {
 
 /// Judges gains at q, or, where `q` has no entries, anywhere. DASHPOT_OK or why not.
 std::int32_t judge(dashpot_controller& controller, const Gains& gains, const JointVector& q,
@@ -43,17 +58,10 @@ std::int32_t judge(dashpot_controller& controller, const Gains& gains, const Joi
     return finish(DASHPOT_UNSTABLE_GAINS, "the gains could not be judged");
   }
   if (margin != nullptr) *margin = verdict.margin;
-  if (judgement.enough(verdict)) return finish(DASHPOT_OK);
-  std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(),
-                "with the %s gains the sampled loop has a gain margin of %.3g %s, "
-                "limits.gain_margin asks for %.3g",
-                verdict.mode == Mode::kJoint ? "joint" : "task", verdict.margin,
-                q.size() == 0 ? "at best, wherever the robot is" : "here", judgement.wanted());
-  return finish(DASHPOT_UNSTABLE_GAINS, text.data());
+  return finish(judgement, verdict, q.size() != 0);
 }
 
-std::int32_t finish(const SetpointFault& fault) noexcept {
+std::int32_t refuse(const SetpointFault& fault) noexcept {
   std::array<char, 128> text{};
   std::snprintf(text.data(), text.size(), "%s %s", fault.key, fault.reason);
   return finish(DASHPOT_WRONG_VALUE, text.data());
@@ -65,7 +73,7 @@ std::int32_t read_gains(const dashpot_gains* given, int n, Gains& wanted) noexce
   if (problem != DASHPOT_OK) return finish(problem);
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
     const SetpointFault fault = check_gains(wanted, mode, n);
-    if (fault) return finish(fault);
+    if (fault) return refuse(fault);
   }
   return DASHPOT_OK;
 }
@@ -179,7 +187,11 @@ int32_t dashpot_start(dashpot_controller* controller, const double* position,
   if (torque != nullptr) return finish(dashpot_reset(controller, torque));
   const bool holds = controller->settings.feed_forward.gravity;
   const JointVector rest = JointVector::Zero(controller->n);
-  controller->reset(holds ? evaluate(controller->model, q, rest).gravity : rest);
+  DynamicsKernel kernel = controller->kernel;
+  kernel.attach(controller->request.attachment);
+  DynamicsResult there;
+  kernel.evaluate(q, rest, there);
+  controller->reset(holds ? there.gravity : rest);
   return DASHPOT_OK;
 }
 
@@ -208,7 +220,7 @@ int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpo
   const std::int32_t problem = to_setpoint(setpoint, controller->n, 0, wanted);
   if (problem != DASHPOT_OK) return finish(problem);
   const SetpointFault fault = check_setpoint(wanted, controller->settings.limits, true);
-  if (fault) return finish(fault);
+  if (fault) return refuse(fault);
   request.setpoint = wanted;
   request.on_arrival = setpoint->time == DASHPOT_ON_ARRIVAL;
   ++request.setpoints;
@@ -347,15 +359,31 @@ const char* dashpot_kind_text(int32_t kind) {
 }
 
 const dashpot_plugin* dashpot_plugin_interface(uint32_t version) {
-  static const dashpot_plugin functions = {
-      sizeof(dashpot_plugin),   DASHPOT_PLUGIN_VERSION, dashpot_create,
-      dashpot_create_from_text, dashpot_destroy,        dashpot_last_error,
-      dashpot_joints,           dashpot_joint_name,     dashpot_period,
-      dashpot_update,           dashpot_start,          dashpot_reset,
-      dashpot_release,          dashpot_set_setpoint,   dashpot_set_gains,
-      dashpot_judge_gains,      dashpot_evaluate,       dashpot_analyze,
-      dashpot_read_snapshot,    dashpot_read_modes,     dashpot_read_sampled_modes,
-      dashpot_status_text,      dashpot_kind_text};
+  static const dashpot_plugin functions = {sizeof(dashpot_plugin),
+                                           DASHPOT_PLUGIN_VERSION,
+                                           dashpot_create,
+                                           dashpot_create_from_text,
+                                           dashpot_destroy,
+                                           dashpot_last_error,
+                                           dashpot_joints,
+                                           dashpot_joint_name,
+                                           dashpot_period,
+                                           dashpot_update,
+                                           dashpot_start,
+                                           dashpot_reset,
+                                           dashpot_release,
+                                           dashpot_set_setpoint,
+                                           dashpot_set_gains,
+                                           dashpot_judge_gains,
+                                           dashpot_set_payload,
+                                           dashpot_limit_tip_speed,
+                                           dashpot_evaluate,
+                                           dashpot_analyze,
+                                           dashpot_read_snapshot,
+                                           dashpot_read_modes,
+                                           dashpot_read_sampled_modes,
+                                           dashpot_status_text,
+                                           dashpot_kind_text};
   return version == DASHPOT_PLUGIN_VERSION ? &functions : nullptr;
 }
 

@@ -12,7 +12,10 @@ namespace dashpot::controller {
 class Judgement {
  public:
   Judgement(const RobotModel& model, const Settings& settings)
-      : joints_(model.dof()), wanted_(settings.limits.gain_margin), judge_(model, settings) {}
+      : joints_(model.dof()),
+        wanted_(settings.limits.gain_margin),
+        judge_(model, settings),
+        attached_(model.attachment()) {}
 
   /// Sets where the robot is now (n, rad). For one thread.
   void locate(const JointVector& q) noexcept {
@@ -48,6 +51,16 @@ class Judgement {
     }
     return verdict;
   }
+  /// Judges gains that have passed check_gains with something else attached to the tip link, at q
+  /// or, if that has no entries, anywhere. What is attached stays so if the verdict is enough.
+  GainJudge::Verdict judge(const Gains& gains, const JointVector& q, const Attachment& attachment) {
+    const Attachment before = attached();
+    attach(attachment);
+    const GainJudge::Verdict verdict =
+        q.size() == 0 ? judge_anywhere(gains) : judge(gains, q, true);
+    if (!enough(verdict)) attach(before);
+    return verdict;
+  }
   /// Judges gains that have passed check_gains, as long as nobody knows where the robot is.
   GainJudge::Verdict judge_anywhere(const Gains& gains) {
     const std::lock_guard lock(mutex_);
@@ -57,16 +70,29 @@ class Judgement {
   bool enough(const GainJudge::Verdict& verdict) const noexcept {
     return verdict.margin >= wanted_;
   }
+  /// Returns what is attached to the tip link.
+  Attachment attached() {
+    const std::lock_guard lock(mutex_);
+    return attached_;
+  }
   /// Returns Limits::gain_margin.
   double wanted() const noexcept { return wanted_; }
 
  private:
+  void attach(const Attachment& attachment) {
+    const std::lock_guard lock(mutex_);
+    judge_.attach(attachment);
+    attached_ = attachment;
+    any_ = false;
+  }
+
   const int joints_;
   const double wanted_;
   std::array<std::atomic<double>, kMaxJoints> position_{};
   std::atomic<bool> located_{false};
   std::mutex mutex_;  ///< of what follows
   GainJudge judge_;
+  Attachment attached_;
   bool any_ = false;
   Gains accepted_;
   JointVector accepted_at_;  ///< n, rad

@@ -41,6 +41,8 @@ class MotionWatch {
 
   /// True as long as the state is frozen, so that its velocity means nothing.
   bool sees_frozen() const noexcept { return frozen_; }
+  /// Sets the limit of the tip's speed, m/s.
+  void limit_tip_speed(double limit) noexcept { tip_limit_ = limit; }
   /// Returns the tip's speed at the last tick, m/s.
   double tip_speed() const noexcept { return tip_speed_; }
 

@@ -72,6 +72,9 @@ class SafetyFilter {
   /// The next torque to be applied does not continue the last: the difference fades evenly.
   void begin_anew() noexcept { anew_ = true; }
 
+  /// Sets the limit of the tip's speed, m/s, above zero.
+  void limit_tip_speed(double limit) noexcept { per_tip_velocity_ = 1 / limit; }
+
   /// Makes a torque safe, in place. Returns kOk, kTorqueLimited, kNearJointLimit, kWeightNotHeld,
   /// or kNotFinite, and then sets what `ramp` gives.
   Status apply(const Motion& motion, const JointVector& weight, JointVector& tau) noexcept;

@@ -28,21 +28,22 @@ analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& sett
   return loop;
 }
 
-Eigen::MatrixXd gravity_gradient(const RobotModel& model, const JointVector& q) {
+Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector& q) {
   constexpr double kStep = 1e-5;  // rad
+  DynamicsResult after, before;
   const JointVector none = JointVector::Zero(q.size());
   Eigen::MatrixXd gradient(q.size(), q.size());
   for (Eigen::Index i = 0; i < q.size(); ++i) {
     const JointVector step = kStep * JointVector::Unit(q.size(), i);
-    gradient.col(i) =
-        (evaluate(model, q + step, none).gravity - evaluate(model, q - step, none).gravity) /
-        (2 * kStep);
+    kernel.evaluate(q + step, none, after);
+    kernel.evaluate(q - step, none, before);
+    gradient.col(i) = (after.gravity - before.gravity) / (2 * kStep);
   }
   return gradient;
 }
 
 SampledAnalysis::SampledAnalysis(const RobotModel& model, const Settings& settings)
-    : model_(model),
+    : kernel_(model),
       gravity_(settings.feed_forward.gravity),
       interval_(static_cast<std::uint64_t>(
           std::clamp(std::round(settings.analysis.sampled.interval / settings.period), 1.0, 1e15))),
@@ -114,7 +115,8 @@ void SampledAnalysis::solve(const Task& task, SampledVibration& result) {
   analysis::SampledLoop loop = loop_;
   loop.friction += task.passive.damping;
   loop.gravity_gradient = task.passive.stiffness;
-  if (gravity_) loop.gravity_gradient += gravity_gradient(model_, task.position);
+  kernel_.attach(task.attachment);
+  if (gravity_) loop.gravity_gradient += gravity_gradient(kernel_, task.position);
   const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, loop);
   result.spectral_radius = sampled.spectral_radius;
   result.gain_margin = analysis::gain_margin(system, continuous, loop, 1e6, kSlowestVibration);

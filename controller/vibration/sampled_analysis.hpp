@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/latest.hpp>
-#include <dashpot/controller/robot_model.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/snapshot.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
@@ -13,7 +13,7 @@ namespace dashpot::controller {
 
 /// Returns dg/dq (n x n, N m/rad) of the gravity torque g(q), by central differences, with a
 /// relative error of 1e-9. Allocates.
-Eigen::MatrixXd gravity_gradient(const RobotModel& model, const JointVector& q);
+Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector& q);
 
 /// Motions slower than this, rad/s, do not count in a gain margin, because a self-motion fed by the
 /// compensation of gravity through a zero-order hold is no vibration.
@@ -38,6 +38,7 @@ class SampledAnalysis {
     JointVector position;
     analysis::System<kMaxJoints> system;
     PassivePart passive;  ///< of what the world adds
+    Attachment attachment;
   };
 
   SampledAnalysis(const RobotModel& model, const Settings& settings);
@@ -61,7 +62,7 @@ class SampledAnalysis {
   void run() noexcept;
   void solve(const Task& task, SampledVibration& result);
 
-  RobotModel model_;
+  DynamicsKernel kernel_;
   bool gravity_;  ///< whether gravity is compensated
   std::uint64_t interval_;
   std::uint64_t first_;  ///< tick

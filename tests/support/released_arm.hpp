@@ -132,8 +132,8 @@ inline controller::Settings release_settings(const TwinModels& twin, const contr
   return settings;
 }
 
-/// The controller starts with its springs at rest at q0; then a hand leads the arm smoothly along
-/// q0 + s dq, holds it there, and lets go.
+/// The controller starts with its springs at rest at q0, and what it is `told` is attached; then a
+/// hand leads the arm smoothly along q0 + s dq, holds it there, and lets go.
 class ReleasedArm {
  public:
   controller::Controller controller;
@@ -145,11 +145,13 @@ class ReleasedArm {
 
   ReleasedArm(const TwinModels& twin, const controller::Settings& settings,
               const controller::JointVector& q0, const controller::JointVector& dq,
-              sim::PlantOptions plant_options = {}, sim::ArmOptions arm_options = {})
+              sim::PlantOptions plant_options = {}, sim::ArmOptions arm_options = {},
+              const controller::Attachment* told = nullptr)
       : controller(twin.model, settings), setpoint_(settings.initial) {
     const double T = settings.period;
     const controller::JointVector none = controller::JointVector::Zero(q0.size());
-    const auto robot = evaluate(twin.model, q0, none);
+    const auto robot = evaluate(told ? twin.model.with(*told) : twin.model, q0, none);
+    if (told != nullptr) controller.attach(*told);
     setpoint_.joint_position = q0;
     setpoint_.tip_pose = {robot.p_BT_B, robot.R_BT};
     controller.reset(robot.gravity);

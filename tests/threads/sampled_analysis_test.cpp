@@ -78,7 +78,7 @@ TEST(SampledAnalysis, FindsWhatTheAnalysisOfThatLoopFinds) {
     drives.difference_velocity = difference;
     drives.friction =
         Eigen::VectorXd(arm.model.joint_values(&Joint::viscous_friction)).asDiagonal();
-    drives.gravity_gradient = gravity_gradient(arm.model, arm.state.position);
+    drives.gravity_gradient = gravity_gradient(DynamicsKernel(arm.model), arm.state.position);
     const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, drives);
     ASSERT_EQ(static_cast<std::size_t>(found->count), sampled.modes.size());
     ASSERT_GE(found->count, 6);

@@ -1,0 +1,248 @@
+// Payload and tool that change while the loop runs.
+#include <dashpot/controller/attachment.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/count_allocations.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/simulated_arm.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+
+namespace dashpot::controller {
+namespace {
+
+using testing::Random;
+
+Payload some_payload(double mass = 2) {
+  Payload payload{mass, {0.03, -0.02, 0.07}, Eigen::Matrix3d::Zero()};
+  payload.inertia.diagonal() << 0.004, 0.005, 0.003;
+  return payload;
+}
+
+Pose some_tool() {
+  return {{0.05, -0.03, 0.12},
+          Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix()};
+}
+
+/// A Panda that does not move, whatever its torque.
+struct HeldArm {
+  RobotModel model = testing::panda_model();
+  Settings settings = default_settings(model);
+  std::unique_ptr<Controller> controller;
+  RobotState state;
+  Setpoint setpoint;
+  JointVector torque;
+
+  explicit HeldArm(const Attachment* configured = nullptr) {
+    if (configured != nullptr) model = model.with(*configured);
+    settings.initial.mode = Mode::kCartesian;
+    settings.initial.gains.task_damping_ratio = 0.7;
+    settings.watchdog.feedback = 0;
+    settings.watchdog.setpoint_hold = settings.watchdog.setpoint_damp = 0;
+    controller = std::make_unique<Controller>(model, settings);
+    state.position = testing::panda_ready();
+    state.velocity = JointVector::Zero(7);
+    setpoint = settings.initial;
+    setpoint.joint_position = state.position;
+    setpoint.tip_pose = tip();
+    controller->reset(evaluate(model, state.position, state.velocity).gravity);
+  }
+  Pose tip() const {
+    const auto there = evaluate(model, state.position, state.velocity);
+    return {there.p_BT_B, there.R_BT};
+  }
+  Status tick(int count = 1) {
+    Status worst = Status::kOk;
+    for (int i = 0; i < count; ++i) {
+      state.time += 1'000'000;
+      worst = worse(worst, controller->update(state, setpoint, torque));
+    }
+    return worst;
+  }
+};
+
+TEST(Attachment, OfNoBodyIsRefused) {
+  const auto reason = [](const Payload& payload, const Pose& tool = {}) -> std::string {
+    try {
+      Attachment{payload, tool};
+    } catch (const InvalidModel& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(reason(some_payload()), "");
+  EXPECT_EQ(reason(some_payload(-1)), "payload: its mass is negative, -1 kg");
+  EXPECT_EQ(reason(some_payload(std::nan(""))), "payload: its mass is not a finite number");
+  Payload thin = some_payload();
+  thin.inertia(2, 2) = 0.1;
+  EXPECT_NE(reason(thin).find("triangle inequality"), std::string::npos);
+  Pose wrong;
+  wrong.rotation(0, 0) = -1;
+  EXPECT_EQ(reason(some_payload(), wrong), "tool: not a rotation and a finite position");
+}
+
+TEST(Attachment, MakesTheKernelThatOfTheConfiguredModel) {
+  Random random(1);
+  for (const testing::Arm& arm : testing::arms()) {
+    ModelOptions options;
+    options.payload = some_payload();
+    options.tool = some_tool();
+    const RobotModel bare = testing::arm_model(arm), loaded = testing::arm_model(arm, options);
+    DynamicsKernel changed(bare);
+    changed.attach(Attachment(options.payload, options.tool));
+    for (int k = 0; k < 5; ++k) {
+      const JointVector q = random.vector(bare.dof()), qd = random.vector(bare.dof());
+      const DynamicsResult wanted = evaluate(loaded, q, qd);
+      DynamicsResult found;
+      changed.evaluate(q, qd, found);
+      EXPECT_EQ(found.M, wanted.M);
+      EXPECT_EQ(found.gravity, wanted.gravity);
+      EXPECT_EQ(found.coriolis, wanted.coriolis);
+      EXPECT_EQ(found.J, wanted.J);
+      EXPECT_EQ(found.p_BT_B, wanted.p_BT_B);
+      // The weight of the body is at its centre.
+      const DynamicsResult before = evaluate(bare, q, qd);
+      const Eigen::Vector3d r = before.R_BT * options.payload.center;
+      Vector6 weight;
+      weight << -2 * bare.gravity(), -2 * r.cross(bare.gravity());
+      EXPECT_LT((found.gravity - before.gravity - before.J.transpose() * weight).norm(), 1e-12);
+    }
+  }
+}
+
+TEST(Attachment, InTheLoopGivesTheModesOfTheConfiguredOne) {
+  const Attachment attachment(some_payload(), some_tool());
+  HeldArm told, configured(&attachment);
+  ASSERT_EQ(told.tick(1000), Status::kOk);
+  const Vibration before = told.controller->vibration();
+  told.controller->attach(attachment);
+  told.model = told.model.with(attachment);
+  ASSERT_EQ(told.tick(1000), Status::kOk);
+  ASSERT_EQ(configured.tick(2000), Status::kOk);
+  EXPECT_LT((told.torque - configured.torque).norm(), 1e-9);
+  const Vibration &found = told.controller->vibration(),
+                  &wanted = configured.controller->vibration();
+  ASSERT_EQ(found.count, wanted.count);
+  ASSERT_GE(found.count, 6);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(found.count); ++i) {
+    const double omega = wanted.modes[i].natural_frequency;
+    EXPECT_NEAR(found.modes[i].natural_frequency, omega, 1e-11 * omega);
+    EXPECT_NEAR(found.modes[i].damping_ratio, wanted.modes[i].damping_ratio, 1e-10);
+    const double change = std::abs(before.modes[i].natural_frequency - omega);
+    EXPECT_GT(change, i < 3 ? 0.01 * omega : -1);
+  }
+  EXPECT_NEAR(told.controller->snapshot().payload.mass, 2, 1e-15);
+  EXPECT_LT((told.controller->snapshot().payload.center - some_payload().center).norm(), 1e-15);
+}
+
+TEST(Attachment, ChangesTheTorqueEvenly) {
+  HeldArm arm;
+  ASSERT_EQ(arm.tick(1000), Status::kOk);
+  const JointVector start = arm.torque;
+  const Attachment attachment(some_payload(), {});
+  const JointVector added =
+      evaluate(arm.model.with(attachment), arm.state.position, arm.state.velocity).gravity -
+      evaluate(arm.model, arm.state.position, arm.state.velocity).gravity;
+  arm.controller->attach(attachment);
+  for (int k = 1; k <= 500; ++k) {
+    Status status = Status::kOk;
+    ASSERT_EQ(testing::allocations_of([&] { status = arm.tick(); }), 0);
+    ASSERT_EQ(status, Status::kOk);
+    ASSERT_LT((arm.torque - start - k / 500.0 * added).norm(), 1e-9) << k;
+    ASSERT_NEAR(arm.controller->snapshot().payload.mass, k / 250.0, 1e-12);
+  }
+  arm.tick(10);
+  EXPECT_LT((arm.torque - start - added).norm(), 1e-9);
+}
+
+TEST(Attachment, MovesNoSpringWithTheTool) {
+  HeldArm arm;
+  ASSERT_EQ(arm.tick(1000), Status::kOk);
+  // Springs that are extended, because something pushed the arm.
+  arm.setpoint.tip_pose = arm.controller->snapshot().tip;
+  for (int i = 0; i < 200; ++i) {
+    arm.state.position[1] += 1e-4;
+    arm.state.velocity[1] = 0.1;
+    arm.tick();
+  }
+  arm.state.velocity.setZero();
+  arm.tick(100);
+  ASSERT_EQ(arm.tick(300), Status::kOk);
+  const Snapshot before = arm.controller->snapshot();
+  ASSERT_GT(before.tip_error.head<3>().norm(), 0.005);
+  arm.controller->attach(Attachment({}, some_tool()));
+  Snapshot last = before;
+  for (int k = 0; k < 600; ++k) {
+    arm.tick();
+    const Snapshot& now = arm.controller->snapshot();
+    const Pose on_link = carried(now.reference_tip, now.tool, {});
+    ASSERT_LT((on_link.position - before.reference_tip.position).norm(), 1e-9) << k;
+    ASSERT_LT((on_link.rotation - before.reference_tip.rotation).norm(), 1e-9) << k;
+    ASSERT_LT((now.tip_error.tail<3>() - before.tip_error.tail<3>()).norm(), 1e-9) << k;
+    ASSERT_LT((now.torque - last.torque).cwiseAbs().maxCoeff(), 0.05) << k;
+    last = now;
+  }
+  // From now on a pose is one of the new T: here it is where T is, so that the springs relax.
+  const RobotModel model = arm.model.with(Attachment({}, some_tool()));
+  const auto there = evaluate(model, arm.state.position, arm.state.velocity);
+  arm.setpoint.tip_pose = {there.p_BT_B, there.R_BT};
+  arm.setpoint.time = arm.state.time;
+  arm.tick(1500);
+  EXPECT_LT(arm.controller->snapshot().tip_error.norm(), 1e-9);
+}
+
+TEST(Attachment, FollowsInAFaultAndStaysInAReset) {
+  HeldArm arm;
+  ASSERT_EQ(arm.tick(1000), Status::kOk);
+  arm.state.time += 1'000'000'000;
+  ASSERT_EQ(arm.tick(), Status::kTimeGap);
+  const Attachment attachment(some_payload(), {});
+  const JointVector weight =
+      evaluate(arm.model.with(attachment), arm.state.position, arm.state.velocity).gravity;
+  arm.controller->attach(attachment);
+  EXPECT_EQ(arm.tick(1000), Status::kFaultLatched);
+  EXPECT_LT((arm.torque - weight).norm(), 1e-9);
+  arm.controller->release();
+  EXPECT_LE(arm.tick(1000), Status::kTorqueLimited);
+  EXPECT_LT((arm.torque - weight).norm(), 1e-6);
+  arm.controller->attach(Attachment());
+  arm.tick(100);
+  arm.controller->reset();
+  arm.tick();
+  EXPECT_EQ(arm.controller->snapshot().payload.mass, 0);
+}
+
+TEST(TipSpeed, IsOnlyEverLowered) {
+  testing::SimulatedArm arm(
+      testing::panda_model(),
+      [] {
+        Settings settings = testing::quiet_settings(testing::panda_model());
+        settings.initial.mode = Mode::kCartesian;
+        return settings;
+      }(),
+      testing::panda_ready());
+  const auto fastest = [&](const TipSpeed& speed, double way) {
+    arm.controller.limit_tip_speed(speed);
+    arm.setpoint.tip_pose.position.y() += way;
+    double found = 0;
+    for (int k = 0; k < 1500; ++k) {
+      EXPECT_LT(arm.step(), Status::kSetpointStale);
+      found = std::max(found, arm.controller.snapshot().reference_twist.head<3>().norm());
+    }
+    return found;
+  };
+  const double all = arm.controller.settings().motion.linear_velocity;
+  EXPECT_NEAR(fastest({}, 0.3), all, 1e-3 * all);
+  EXPECT_NEAR(fastest({.linear = 0.1}, -0.1), 0.1, 1e-4);
+  EXPECT_NEAR(fastest({.limit = 0.2}, -0.15), 0.12, 1e-4);
+  EXPECT_NEAR(fastest({.linear = 10 * all}, 0.3), all, 1e-3 * all);
+  arm.controller.limit_tip_speed({.limit = 0.05});
+  for (int k = 0; k < 100; ++k) arm.step();
+  arm.state.velocity[0] = 0.5;  // a blow: the tip is faster than allowed
+  arm.step();
+  EXPECT_EQ(arm.controller.snapshot().fault, Status::kTipSpeedLimit);
+}
+
+}  // namespace
+}  // namespace dashpot::controller

@@ -1,0 +1,172 @@
+// What the plugin is told of the tip: what it carries, and how fast it may be.
+#include <dashpot/tests/plugin/panda_host.hpp>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+dashpot_payload payload(double mass, const double* tool_position = nullptr) {
+  dashpot_payload result{};
+  result.struct_size = sizeof result;
+  result.mass = mass;
+  result.center[2] = 0.05;
+  for (int i = 0; i < 3; ++i) result.inertia[4 * i] = 1e-3 * mass;
+  result.tool_position = tool_position;
+  return result;
+}
+
+TEST(PluginPayload, BlendsIntoTheLoopAndItsModes) {
+  Host host = panda_host(kCartesian),
+       configured = panda_host(
+           kCartesian +
+           "robot: {payload: {mass: 2, center: [0, 0, 0.05], inertia: [0.002, 0.002, 0.002]}}\n");
+  const dashpot_payload two = payload(2);
+  for (int i = 0; i < 600; ++i) host.tick();
+  const double before = host.modes().modes[0].natural_frequency;
+  ASSERT_EQ(plugin().set_payload(host.controller.get(), &two), DASHPOT_OK) << plugin().last_error();
+  for (int i = 0; i < 250; ++i) host.tick();
+  EXPECT_NEAR(host.snapshot().payload_mass, 1, 1e-12);
+  EXPECT_NEAR(host.snapshot().payload_center[2], 0.05, 1e-12);
+  for (int i = 0; i < 800; ++i) host.tick();
+  for (int i = 0; i < 1700; ++i) configured.tick();
+  EXPECT_NEAR(host.snapshot().payload_mass, 2, 1e-12);
+  EXPECT_NEAR(host.snapshot().payload_inertia[0], 0.002, 1e-12);
+  const dashpot_modes found = host.modes(), wanted = configured.modes();
+  ASSERT_EQ(found.count, wanted.count);
+  for (std::uint32_t i = 0; i < found.count; ++i) {
+    EXPECT_NEAR(found.modes[i].natural_frequency, wanted.modes[i].natural_frequency,
+                1e-9 * wanted.modes[i].natural_frequency);
+    EXPECT_NEAR(found.modes[i].damping_ratio, wanted.modes[i].damping_ratio, 1e-8);
+  }
+  EXPECT_GT(std::abs(before - found.modes[0].natural_frequency), 0.01 * before);
+  for (int i = 0; i < 7; ++i) EXPECT_NEAR(host.torque[i], configured.torque[i], 1e-9);
+  // Without a loop as well.
+  dashpot_modes there{};
+  there.struct_size = sizeof there;
+  ASSERT_EQ(plugin().analyze(host.controller.get(), host.position.data(), DASHPOT_MODE_CARTESIAN,
+                             nullptr, nullptr, &there),
+            DASHPOT_OK);
+  EXPECT_NEAR(there.modes[0].natural_frequency, found.modes[0].natural_frequency,
+              1e-6 * found.modes[0].natural_frequency);
+}
+
+TEST(PluginPayload, IsRefusedWithAReason) {
+  Host host = panda_host(kCartesian);
+  host.tick();
+  dashpot_controller* const arm = host.controller.get();
+  EXPECT_EQ(plugin().set_payload(arm, nullptr), DASHPOT_NULL_ARGUMENT);
+  dashpot_payload wrong = payload(1);
+  wrong.struct_size = 8;
+  EXPECT_EQ(plugin().set_payload(arm, &wrong), DASHPOT_WRONG_STRUCT_SIZE);
+  const auto reason = [&](const dashpot_payload& given) {
+    EXPECT_EQ(plugin().set_payload(arm, &given), DASHPOT_WRONG_VALUE);
+    return std::string(plugin().last_error());
+  };
+  EXPECT_THAT(reason(payload(-1)), HasSubstr("its mass is negative, -1 kg"));
+  EXPECT_THAT(reason(payload(std::nan(""))), HasSubstr("not a finite number"));
+  wrong = payload(1);
+  wrong.inertia[0] = 1;
+  EXPECT_THAT(reason(wrong), HasSubstr("triangle inequality"));
+  EXPECT_THAT(reason(payload(30)), HasSubstr("to hold the weight here, limits.torque allows"));
+  for (int i = 0; i < 600; ++i) host.tick();
+  EXPECT_EQ(host.snapshot().payload_mass, 0);
+}
+
+TEST(PluginPayload, IsJudgedWithTheGainsInForce) {
+  // Damping that a heavy wrist bears and a light one does not.
+  const std::string heavy =
+      "robot: {payload: {mass: 3, center: [0, 0, 0.1], inertia: [0.3, 0.3, 0.3]}}\n";
+  Host host = panda_host(
+      heavy +
+      "gains: {joint: {stiffness: [500, 500, 500, 500, 300, 300, 300], damping: [50, 50, 50, "
+      "50, 30, 30, 45]}}\n");
+  ASSERT_NE(host.controller, nullptr) << plugin().last_error();
+  host.tick();
+  const dashpot_payload nothing = payload(0);
+  EXPECT_EQ(plugin().set_payload(host.controller.get(), &nothing), DASHPOT_UNSTABLE_GAINS);
+  EXPECT_THAT(plugin().last_error(), HasSubstr("gain margin"));
+  for (int i = 0; i < 600; ++i) host.tick();
+  EXPECT_NEAR(host.snapshot().payload_mass, 3, 1e-12);
+  // What was refused is forgotten: gains are judged with what the arm carries.
+  double margin = 0;
+  EXPECT_EQ(plugin().judge_gains(host.controller.get(), nullptr, nullptr, &margin),
+            DASHPOT_NULL_ARGUMENT);
+  dashpot_gains same{};
+  same.struct_size = sizeof same;
+  same.joints = 7;
+  EXPECT_EQ(plugin().judge_gains(host.controller.get(), &same, nullptr, &margin), DASHPOT_OK);
+}
+
+TEST(PluginPayload, LeavesTheArmWhereItIsWithANewTool) {
+  Host host = panda_host(kCartesian);
+  host.tick();
+  const dashpot_snapshot start = host.snapshot();
+  dashpot_setpoint goal{};
+  goal.struct_size = sizeof goal;
+  goal.joints = 7;
+  goal.mode = DASHPOT_MODE_CARTESIAN;
+  goal.tip_position = start.tip_position;
+  goal.tip_rotation = start.tip_rotation;
+  goal.time = DASHPOT_ON_ARRIVAL;
+  ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &goal), DASHPOT_OK);
+  for (int i = 0; i < 400; ++i) host.tick();
+  const std::vector<double> torque = host.torque;
+  const double offset[3] = {0, 0.02, 0.1};
+  const dashpot_payload tool = payload(0, offset);
+  ASSERT_EQ(plugin().set_payload(host.controller.get(), &tool), DASHPOT_OK);
+  // The goal given in the same tick is still one of the old T.
+  goal.time = host.time + 1'000'000;
+  host.tick(&goal);
+  for (int i = 0; i < 800; ++i) {
+    host.tick();
+    for (std::size_t k = 0; k < 7; ++k) ASSERT_NEAR(host.torque[k], torque[k], 1e-6) << i;
+  }
+  const dashpot_snapshot end = host.snapshot();
+  EXPECT_NEAR(end.tool_position[2], 0.1, 1e-12);
+  for (double error : end.tip_error) EXPECT_NEAR(error, 0, 1e-9);
+  EXPECT_GT(std::abs(end.tip_position[2] - start.tip_position[2]), 0.05);
+}
+
+TEST(PluginTipSpeed, IsAtMostThatOfTheConfiguration) {
+  Host host = panda_host(kCartesian);
+  dashpot_controller* const arm = host.controller.get();
+  const double any = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(plugin().limit_tip_speed(nullptr, any, any, any), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().limit_tip_speed(arm, 0.1, any, 0.2), DASHPOT_OK);
+  EXPECT_EQ(plugin().limit_tip_speed(arm, 0, any, any), DASHPOT_WRONG_VALUE);
+  EXPECT_EQ(plugin().limit_tip_speed(arm, any, std::nan(""), any), DASHPOT_WRONG_VALUE);
+  EXPECT_EQ(plugin().limit_tip_speed(arm, any, any, 100), DASHPOT_WRONG_VALUE);
+  EXPECT_THAT(plugin().last_error(),
+              HasSubstr("limits.tip_velocity 100: must be above zero and at most"));
+  host.tick();
+  const dashpot_snapshot start = host.snapshot();
+  dashpot_setpoint goal{};
+  goal.struct_size = sizeof goal;
+  goal.joints = 7;
+  goal.mode = DASHPOT_MODE_CARTESIAN;
+  double position[3] = {start.tip_position[0], start.tip_position[1] + 0.2, start.tip_position[2]};
+  goal.tip_position = position;
+  goal.tip_rotation = start.tip_rotation;
+  goal.time = DASHPOT_ON_ARRIVAL;
+  ASSERT_EQ(plugin().set_setpoint(arm, &goal), DASHPOT_OK);
+  double last = start.reference_tip_position[1], fastest = 0;
+  const auto model = load(panda()).model;
+  for (int i = 0; i < 400; ++i) {
+    host.tick();
+    simulate(model, host);
+    const double now = host.snapshot().reference_tip_position[1];
+    fastest = std::max(fastest, 1000 * (now - last));
+    last = now;
+  }
+  EXPECT_NEAR(fastest, 0.1, 1e-4);
+}
+
+}  // namespace
+}  // namespace dashpot::tests
