@@ -29,6 +29,10 @@ struct ArmOptions {
   std::optional<Contact> stops;  ///< at the position limits; N m/rad and N m s/rad (N/m, N s/m)
   std::optional<Wall> wall;
   std::vector<Piece<Vector6>> wrenches;  ///< of the world on the tip, at its origin, in base axes
+  /// Bodies rigid at the tip, in its axes, beside the robot's payload: picked up at `begin`, put
+  /// down at `end`. They come and go with the velocity of the tip, and their energy counts as the
+  /// world's work.
+  std::vector<Piece<Inertia>> loads;
 };
 
 /// A robot arm: M(q) qdd + C(q, qd) qd + g(q) = tau - friction + stops + J' (wall + wrenches).
@@ -43,6 +47,7 @@ class Arm : public System {
   Vector6 tip_twist(const JointVector& q, const JointVector& qd) noexcept;
 
   double begin_segment(double t) noexcept override;
+  double take_loads(double t, const StateVector& y) noexcept override;
   void rates(const StateVector& y, StateVector& y_dot) noexcept override;
   StoredEnergy stored_energy(const StateVector& y) noexcept override;
   bool has_contacts() const noexcept override { return options_.stops || options_.wall; }
@@ -79,6 +84,8 @@ class Arm : public System {
   std::vector<Force> forces_;  // those that this scene has
   Schedule<Vector6> wrenches_;
   Vector6 wrench_ = Vector6::Zero();
+  Schedule<Inertia> loads_;
+  const Inertia* load_ = nullptr;  // carried, of loads_
   bool frozen_ = false;
   ContactModes frozen_modes_ = 0;
 };

@@ -43,7 +43,7 @@ struct RobotParameters {
 };
 
 /// A serial chain of 1 to 16 revolute, continuous or prismatic joints from a base link to a tip
-/// link. It is immutable. The base link stands still. Fixed joints are merged. Links that hang off
+/// link. The base link stands still. Fixed joints are merged. Links that hang off
 /// the chain count, rigid at their zero position. Links between the root and the base only turn
 /// gravity.
 class Robot {
@@ -60,6 +60,8 @@ class Robot {
   const std::vector<Joint>& joints() const noexcept { return joints_; }
   /// Returns the pose of the tip link in the frame of the last joint's body.
   const Pose& tip() const noexcept { return tip_; }
+  /// From now on this body is rigid at the tip, in the tip's axes, beside the payload.
+  void carry(const Inertia& load) noexcept { joints_.back().inertia = last_ + tip_ * load; }
   /// Returns the gravity, m/s^2, in the axes of the base link.
   const Eigen::Vector3d& gravity() const noexcept { return gravity_; }
 
@@ -67,6 +69,7 @@ class Robot {
   Robot() = default;
 
   std::vector<Joint> joints_;
+  Inertia last_;  // of the last body, with the payload
   Pose tip_;
   Eigen::Vector3d gravity_ = Eigen::Vector3d::Zero();
 };

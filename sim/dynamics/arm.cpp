@@ -1,5 +1,6 @@
 #include <dashpot/sim/arm.hpp>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -34,6 +35,19 @@ void validate(const ArmOptions& options) {
     if (!piece.value.allFinite()) fail("wrenches", "a piece is not finite");
     if (!(piece.begin < piece.end)) fail("wrenches", "a piece does not begin before it ends");
   }
+  for (const Piece<Inertia>& piece : options.loads) {
+    const Inertia& load = piece.value;
+    require_not_negative(load.mass, "loads: mass", "kg");
+    if (!load.center.allFinite() || !load.about_center.allFinite()) {
+      fail("loads", "a body is not finite");
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(load.about_center,
+                                                                Eigen::EigenvaluesOnly);
+    if (load.about_center != load.about_center.transpose() || solver.eigenvalues()[0] < 0) {
+      fail("loads", "an inertia is not symmetric positive semidefinite");
+    }
+    if (!(piece.begin < piece.end)) fail("loads", "a piece does not begin before it ends");
+  }
 }
 
 /// How far a joint is beyond the nearer one of its limits, and which way the stop pushes.
@@ -54,7 +68,8 @@ Arm::Arm(const Robot& robot, const ArmOptions& options)
       robot_(robot),
       options_(options),
       bodies_(robot_),
-      wrenches_(options.wrenches, Vector6::Zero()) {
+      wrenches_(options.wrenches, Vector6::Zero()),
+      loads_(options.loads, Inertia()) {
   validate(options);
   const auto any = [&](double Joint::*member) {
     return std::any_of(robot_.joints().begin(), robot_.joints().end(),
@@ -73,9 +88,21 @@ Arm::Arm(const Robot& robot, const ArmOptions& options)
 }
 
 double Arm::begin_segment(double t) noexcept {
-  if (wrenches_.empty()) return std::numeric_limits<double>::infinity();
-  wrench_ = wrenches_.at(t);
-  return wrenches_.next_edge(t);
+  double next = std::numeric_limits<double>::infinity();
+  if (!wrenches_.empty()) {
+    wrench_ = wrenches_.at(t);
+    next = wrenches_.next_edge(t);
+  }
+  if (!loads_.empty()) next = std::min(next, loads_.next_edge(t));
+  return next;
+}
+
+double Arm::take_loads(double t, const StateVector& y) noexcept {
+  if (loads_.empty() || load_ == &loads_.at(t)) return 0;
+  const double before = stored_energy(y).sum();
+  load_ = &loads_.at(t);
+  robot_.carry(*load_);
+  return stored_energy(y).sum() - before;
 }
 
 void Arm::rates(const StateVector& y, StateVector& y_dot) noexcept {

@@ -36,4 +36,8 @@ inline Inertia operator+(const Inertia& a, const Inertia& b) {
               parallel_axes(b.mass, b.center - center)};
 }
 
+inline Inertia& operator+=(Inertia& a, const Inertia& b) {
+  return a = a + b;
+}
+
 }  // namespace dashpot::sim

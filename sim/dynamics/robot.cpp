@@ -313,6 +313,7 @@ Robot Robot::from_text(const std::string& urdf, const std::string& base, const s
   require_physical(parameters.payload, "payload", false);
   Inertia& last = robot.joints_.back().inertia;
   last = last + robot.tip_ * parameters.payload;
+  robot.last_ = last;
   override_with(parameters.reflected_inertia, &Joint::reflected_inertia, "reflected_inertia",
                 "kg m^2", robot.joints_);
   override_with(parameters.viscous_friction, &Joint::viscous_friction, "viscous friction",

@@ -139,6 +139,7 @@ void Plant::carry(const JointVector& q, const JointVector& qd) noexcept {
 Status Plant::move(StateVector& y) noexcept {
   const double end = static_cast<double>(ticks_ + 1) * options_.period;
   for (double t = time(); t < end;) {
+    y[2 * system_->dof() + kByWorld] += system_->take_loads(t, y);
     const double next = std::min(end, system_->begin_segment(t));
     const Status status = integrator_.advance(*system_, next - t, y);
     if (status != Status::kOk) return status;
