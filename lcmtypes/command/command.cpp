@@ -20,6 +20,8 @@ void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t 
   if (has(command_t::JOINT_GAINS)) {
     setpoint.gains.joint_stiffness = from.gains.joint_stiffness;
     setpoint.gains.joint_damping = from.gains.joint_damping;
+  }
+  if (has(command_t::JOINT_GAINS) || has(command_t::JOINT_RATIO)) {
     setpoint.gains.joint_damping_ratio = from.gains.joint_damping_ratio;
   }
   if (has(command_t::TASK_GAINS)) {
@@ -27,6 +29,8 @@ void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t 
     setpoint.gains.directions = from.gains.directions;
     setpoint.gains.task_stiffness = from.gains.task_stiffness;
     setpoint.gains.task_damping = from.gains.task_damping;
+  }
+  if (has(command_t::TASK_GAINS) || has(command_t::TASK_RATIO)) {
     setpoint.gains.task_damping_ratio = from.gains.task_damping_ratio;
   }
   if (has(command_t::NULL_GAINS)) {

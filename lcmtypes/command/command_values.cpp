@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <tuple>
 #include <vector>
 
 namespace dashpot::lcmtypes {
@@ -17,7 +18,7 @@ using controller::Matrix6;
 using controller::Setpoint;
 using Verdict = CommandVerdict;
 
-constexpr std::int32_t kAllParts = 2 * command_t::GIVE_UP - 1;
+constexpr std::int32_t kAllParts = 2 * command_t::TIP_SPEED - 1;
 constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion
 // Relative to the largest entry; no wider than what the controller accepts
 constexpr double kSymmetryTolerance = 1e-9;
@@ -132,6 +133,41 @@ Verdict copy_task_gains(const command_t& message, const CommandLimits& limits, G
                       judge_gains(gains.task_damping, limits.task_damping)});
 }
 
+/// Gains without a ratio end it.
+Verdict copy_ratio(bool given, double value, double most, double& ratio) {
+  ratio = given ? value : 0;
+  if (!given) return Verdict::kAccepted;
+  if (!std::isfinite(value)) return Verdict::kNotFinite;
+  return value > 0 && value <= most ? Verdict::kAccepted : Verdict::kOutOfLimits;
+}
+
+/// That a body can have this inertia is for the controller to judge.
+Verdict copy_payload(const command_t& message, const CommandLimits& limits,
+                     controller::Payload& payload) {
+  using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  payload = {message.payload_mass, Eigen::Map<const Eigen::Vector3d>(message.payload_center),
+             Eigen::Map<const RowMajor3>(&message.payload_inertia[0][0])};
+  if (!payload.inertia.allFinite()) return Verdict::kNotFinite;
+  const Eigen::Matrix<double, 1, 1> mass(payload.mass);
+  return first_fault(
+      {judge_entries(mass, 0, limits.payload),
+       judge_entries(payload.center, -limits.payload_distance, limits.payload_distance)});
+}
+
+Verdict copy_tip_speed(const command_t& message, const CommandLimits& limits,
+                       controller::TipSpeed& speed) {
+  speed = {};
+  for (const auto& [given, most, value] :
+       {std::tuple(message.linear_velocity, limits.linear_velocity, &speed.linear),
+        {message.angular_velocity, limits.angular_velocity, &speed.angular},
+        {message.tip_velocity, limits.tip_velocity, &speed.limit}}) {
+    if (!std::isfinite(given)) return Verdict::kNotFinite;
+    if (given < 0 || given > most) return Verdict::kOutOfLimits;
+    if (given > 0) *value = given;
+  }
+  return Verdict::kAccepted;
+}
+
 Verdict copy_null_gains(const command_t& message, const CommandLimits& limits, Gains& gains) {
   gains.null_stiffness = to_vector(message.null_stiffness);
   gains.null_damping = to_vector(message.null_damping);
@@ -159,6 +195,21 @@ CommandVerdict copy_values(const command_t& message, const CommandLimits& limits
             [&] { return copy_joint_gains(message, limits, setpoint.gains); }),
       judge(command_t::TASK_GAINS,
             [&] { return copy_task_gains(message, limits, setpoint.gains); }),
+      judge(int{command_t::JOINT_GAINS} | int{command_t::JOINT_RATIO},
+            [&] {
+              return copy_ratio((message.parts & command_t::JOINT_RATIO) != 0,
+                                message.joint_damping_ratio, limits.damping_ratio,
+                                setpoint.gains.joint_damping_ratio);
+            }),
+      judge(int{command_t::TASK_GAINS} | int{command_t::TASK_RATIO},
+            [&] {
+              return copy_ratio((message.parts & command_t::TASK_RATIO) != 0,
+                                message.task_damping_ratio, limits.damping_ratio,
+                                setpoint.gains.task_damping_ratio);
+            }),
+      judge(command_t::PAYLOAD, [&] { return copy_payload(message, limits, command.payload); }),
+      judge(command_t::TIP_SPEED,
+            [&] { return copy_tip_speed(message, limits, command.tip_speed); }),
       judge(command_t::NULL_GAINS,
             [&] { return copy_null_gains(message, limits, setpoint.gains); }),
   });

@@ -33,7 +33,7 @@ const char* to_text(CommandVerdict verdict) noexcept {
     case CommandVerdict::kOtherSender:
       return "another sender commands";
     case CommandVerdict::kUnstable:
-      return "gains refused by the controller";
+      return "refused by the controller";
     case CommandVerdict::kNoSuchFault:
       return "releases no fault that is latched";
   }

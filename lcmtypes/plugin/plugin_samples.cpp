@@ -33,6 +33,11 @@ void fill(const dashpot_snapshot& from, controller::Snapshot& to) noexcept {
   to.reference_tip = pose(from.reference_tip_position, from.reference_tip_rotation);
   to.tip_error = Eigen::Map<const controller::Vector6>(from.tip_error);
   to.tip_wrench = Eigen::Map<const controller::Vector6>(from.tip_wrench);
+  to.joint_damping_ratio = from.joint_damping_ratio;
+  to.task_damping_ratio = from.task_damping_ratio;
+  to.payload = {from.payload_mass, Eigen::Map<const Eigen::Vector3d>(from.payload_center),
+                Eigen::Map<const RowMajor3>(from.payload_inertia)};
+  to.tool = pose(from.tool_position, from.tool_rotation);
 }
 
 void fill(const dashpot_modes& from, ModesSample& to) noexcept {

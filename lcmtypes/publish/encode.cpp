@@ -127,6 +127,10 @@ void fill(const StateSample& sample, state_t& message) {
   write_quaternion(snapshot.reference_tip.rotation, message.reference_tip_quaternion);
   copy_to(snapshot.tip_error, message.tip_error);
   copy_to(snapshot.tip_wrench, message.tip_wrench);
+  message.joint_damping_ratio = snapshot.joint_damping_ratio;
+  message.task_damping_ratio = snapshot.task_damping_ratio;
+  message.payload_mass = snapshot.payload.mass;
+  copy_to(snapshot.payload.center, message.payload_center);
 
   message.tick_time = sample.health.tick_time;
   message.longest_tick_time = sample.health.longest_tick_time;

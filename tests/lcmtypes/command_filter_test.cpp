@@ -57,7 +57,40 @@ TEST(CommandFilter, TakesEveryPart) {
         EXPECT_EQ(setpoint.gains.task_damping(i, j), message.task_damping[i][j]);
       }
     }
+    EXPECT_EQ(setpoint.gains.task_damping_ratio, message.task_damping_ratio);
+    EXPECT_EQ(setpoint.gains.joint_damping_ratio, message.joint_damping_ratio);
+    const Command& command = filter.command();
+    EXPECT_EQ(command.payload.mass, message.payload_mass);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(command.payload.center[i], message.payload_center[i]);
+      EXPECT_EQ(command.payload.inertia(i, i), message.payload_inertia[i][i]);
+    }
+    EXPECT_EQ(command.tip_speed.linear, message.linear_velocity);
+    EXPECT_EQ(command.tip_speed.angular, message.angular_velocity);
+    EXPECT_EQ(command.tip_speed.limit, kInfinity);  // 0: the configuration's
   }
+}
+
+TEST(CommandFilter, EndsARatioWithGainsOfTheSamePart) {
+  Random random(925);
+  CommandFilter filter(limits_for(7));
+  command_t message = random_command(random, 7);
+  message.parts = int{command_t::TASK_RATIO} + int{command_t::JOINT_RATIO};
+  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  controller::Setpoint setpoint;
+  setpoint.gains.task_stiffness = random.spd(6);
+  const controller::Matrix6 before = setpoint.gains.task_stiffness;
+  apply(filter.command(), setpoint);
+  EXPECT_EQ(setpoint.gains.task_stiffness, before);
+  EXPECT_EQ(setpoint.gains.task_damping_ratio, message.task_damping_ratio);
+  EXPECT_EQ(setpoint.gains.joint_damping_ratio, message.joint_damping_ratio);
+  message.parts = command_t::TASK_GAINS;
+  ++message.sequence;
+  ++message.utime;
+  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  apply(filter.command(), setpoint, 1);
+  EXPECT_EQ(setpoint.gains.task_damping_ratio, 0);
+  EXPECT_EQ(setpoint.gains.joint_damping_ratio, message.joint_damping_ratio);
 }
 
 TEST(CommandFilter, LeavesAloneWhatNoCommandSet) {
@@ -109,7 +142,8 @@ struct Fault {
 const std::vector<Fault>& faults() {
   static const std::vector<Fault> all = {
       {"no part", Verdict::kUnknown, [](command_t& m) { m.parts = 0; }},
-      {"unknown part", Verdict::kUnknown, [](command_t& m) { m.parts = 512 + 1; }},
+      {"unknown part", Verdict::kUnknown,
+       [](command_t& m) { m.parts = 2 * command_t::TIP_SPEED + 1; }},
       {"all bits", Verdict::kUnknown, [](command_t& m) { m.parts = -1; }},
       {"no sender", Verdict::kNoSender, [](command_t& m) { m.sender = 0; }},
       {"another sender", Verdict::kOtherSender, [](command_t& m) { ++m.sender; }},
@@ -152,6 +186,18 @@ const std::vector<Fault>& faults() {
        [](command_t& m) { m.null_stiffness[0] = -1e-3; }},
       {"null damping too large", Verdict::kOutOfLimits,
        [](command_t& m) { m.null_damping[6] = 2001; }},
+      {"ratio NaN", Verdict::kNotFinite, [](command_t& m) { m.task_damping_ratio = kNaN; }},
+      {"ratio zero", Verdict::kOutOfLimits, [](command_t& m) { m.task_damping_ratio = 0; }},
+      {"ratio too large", Verdict::kOutOfLimits,
+       [](command_t& m) { m.joint_damping_ratio = 2.001; }},
+      {"payload NaN", Verdict::kNotFinite, [](command_t& m) { m.payload_inertia[0][2] = kNaN; }},
+      {"mass NaN", Verdict::kNotFinite, [](command_t& m) { m.payload_mass = kNaN; }},
+      {"mass negative", Verdict::kOutOfLimits, [](command_t& m) { m.payload_mass = -1e-9; }},
+      {"mass too large", Verdict::kOutOfLimits, [](command_t& m) { m.payload_mass = 20.1; }},
+      {"payload far away", Verdict::kOutOfLimits, [](command_t& m) { m.payload_center[1] = -1.1; }},
+      {"speed NaN", Verdict::kNotFinite, [](command_t& m) { m.linear_velocity = kNaN; }},
+      {"speed negative", Verdict::kOutOfLimits, [](command_t& m) { m.angular_velocity = -0.1; }},
+      {"speed too large", Verdict::kOutOfLimits, [](command_t& m) { m.tip_velocity = 10.1; }},
       {"quaternion too long", Verdict::kNotUnit,
        [](command_t& m) {
          for (double& x : m.tip_quaternion) x *= 1.002;

@@ -254,7 +254,7 @@ TEST_F(CommandSenders, TheControllerIsAskedLastAndItsReasonKept) {
   message.parts = command_t::TASK_GAINS;
   message.task_stiffness[0][0] += 100;
   EXPECT_EQ(arrive(filter, message), Verdict::kUnstable);
-  EXPECT_EQ(filter.last_reason(), "gains refused by the controller: a margin of 1.25 is left");
+  EXPECT_EQ(filter.last_reason(), "refused by the controller: a margin of 1.25 is left");
   EXPECT_EQ(filter.command().accepted, 1);
   EXPECT_EQ(filter.command().setpoint.gains.task_stiffness(0, 0), judged[0]);
   EXPECT_EQ(judged.size(), 2U);

@@ -43,6 +43,9 @@ inline StateSample random_state(Random& random, int n) {
   snapshot.reference_tip = random_pose(random);
   snapshot.tip_error = random.vector(6);
   snapshot.tip_wrench = random.vector(6);
+  snapshot.joint_damping_ratio = random.uniform(0, 2);
+  snapshot.task_damping_ratio = random.uniform(0, 2);
+  snapshot.payload = {random.uniform(0, 9), random.vector(3), Eigen::Matrix3d::Identity()};
   snapshot.fault = static_cast<controller::Status>(random.integer(0, 13));
   sample.health = {random.integer(1, 99'999),
                    random.integer(1, 999'999),
@@ -127,7 +130,8 @@ inline command_t random_command(Random& random, int n) {
   message.sender = kSender;
   message.utime = kNow;
   message.sequence = random.integer(1, 1000);
-  message.parts = 127;
+  message.parts = 127 + int{command_t::TASK_RATIO} + int{command_t::JOINT_RATIO} +
+                  int{command_t::PAYLOAD} + int{command_t::TIP_SPEED};
   message.mode = command_t::CARTESIAN;
   const Eigen::VectorXd position = random.vector(n).cwiseMax(-3).cwiseMin(3);
   message.joint_position.assign(position.data(), position.data() + n);
@@ -145,6 +149,13 @@ inline command_t random_command(Random& random, int n) {
   Eigen::Map<RowMajor6>(&message.task_damping[0][0]) = 10 * random.spd(6);
   message.null_stiffness.assign(static_cast<std::size_t>(n), random.uniform(0, 20));
   message.null_damping.assign(static_cast<std::size_t>(n), random.uniform(0, 2));
+  message.task_damping_ratio = random.uniform(0.1, 2);
+  message.joint_damping_ratio = random.uniform(0.1, 2);
+  message.payload_mass = random.uniform(0, 9);
+  Eigen::Map<Eigen::Vector3d>(message.payload_center) = 0.1 * random.vector(3);
+  for (int i = 0; i < 3; ++i) message.payload_inertia[i][i] = random.uniform(0.1, 0.15);
+  message.linear_velocity = random.uniform(0.1, 2);
+  message.angular_velocity = random.uniform(0.1, 2);
   return message;
 }
 
