@@ -7,7 +7,7 @@ namespace {
 
 using lcmtypes::Command;
 
-/// The receiver's part of a command that is in order: false if the controller refuses its gains.
+/// The receiver's part of a command that is in order: false if the controller refuses it.
 bool carry_out(const Command& command, LoopGoal& goal, std::string& reason) {
   const std::int64_t before = command.accepted - 1;
   const auto change = [&command, before](controller::Gains& gains) {
@@ -16,7 +16,12 @@ bool carry_out(const Command& command, LoopGoal& goal, std::string& reason) {
     lcmtypes::apply(command, changed, before);
     gains = changed.gains;
   };
-  if (goal.change_gains(change, reason) != DASHPOT_OK) return false;
+  LoopGoal::Change wanted{change, {}, {}};
+  if (lcmtypes::has_set(command, command_t::PAYLOAD, before)) wanted.payload = command.payload;
+  if (lcmtypes::has_set(command, command_t::TIP_SPEED, before)) {
+    wanted.tip_speed = command.tip_speed;
+  }
+  if (goal.change(wanted, reason) != DASHPOT_OK) return false;
   if (lcmtypes::has_set(command, command_t::RELEASE, before)) goal.release();
   return true;
 }

@@ -35,6 +35,10 @@ class LoopController {
   virtual std::int32_t start(const JointVector& q, std::string& reason) = 0;
   /// The springs and dampers from the next tick on. Returns as start().
   virtual std::int32_t set_gains(const controller::Gains& gains, std::string& reason) = 0;
+  /// What the arm carries from the next tick on; the tool stays. Returns as start().
+  virtual std::int32_t set_payload(const controller::Payload& payload, std::string& reason) = 0;
+  /// How fast the tip may be from the next tick on. Returns as start().
+  virtual std::int32_t limit_tip_speed(const controller::TipSpeed& speed, std::string& reason) = 0;
   /// Whether the controller would go there, with these gains, from q; for one that is in no loop.
   /// Returns as start().
   virtual std::int32_t check(const controller::Setpoint& setpoint, const JointVector& q,

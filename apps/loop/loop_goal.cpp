@@ -3,7 +3,8 @@
 
 namespace dashpot::apps {
 
-void LoopGoal::begin(const controller::Setpoint& setpoint) {
+void LoopGoal::begin(const controller::Setpoint& setpoint, const controller::Payload& payload) {
+  payload_ = payload;
   setpoint_ = accepted_ = setpoint;
   gains_ = setpoint.gains;
   in_force_ = news_ = true;
@@ -55,7 +56,30 @@ void LoopGoal::note_fault(bool latched) noexcept {
 
 std::int32_t LoopGoal::change_gains(const std::function<void(controller::Gains&)>& change,
                                     std::string& reason) {
+  return this->change({change, {}, {}}, reason);
+}
+
+std::int32_t LoopGoal::change(const Change& change, std::string& reason) {
   const std::lock_guard lock(mutex_);
+  std::int32_t code = DASHPOT_OK;
+  // Gains come last, because they are judged with the payload.
+  if (change.payload) code = controller_.set_payload(*change.payload, reason);
+  const bool speed = change.tip_speed && code == DASHPOT_OK;
+  if (speed) code = controller_.limit_tip_speed(*change.tip_speed, reason);
+  if (change.gains && code == DASHPOT_OK) code = set_gains(change.gains, reason);
+  if (code == DASHPOT_OK) {
+    payload_ = change.payload.value_or(payload_);
+    tip_speed_ = change.tip_speed.value_or(tip_speed_);
+    return code;
+  }
+  std::string ignored;
+  if (change.payload) controller_.set_payload(payload_, ignored);
+  if (speed) controller_.limit_tip_speed(tip_speed_, ignored);
+  return code;
+}
+
+std::int32_t LoopGoal::set_gains(const std::function<void(controller::Gains&)>& change,
+                                 std::string& reason) {
   controller::Gains wanted = gains_;
   change(wanted);
   if (controller::same_gains(wanted, gains_)) return DASHPOT_OK;

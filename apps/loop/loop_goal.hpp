@@ -20,8 +20,9 @@ class LoopGoal {
       : controller_(controller), repeat_every_(repeat_every) {}
 
   // Before the loop begins:
-  /// Holds `setpoint`, with the gains in it, which the controller has taken already.
-  void begin(const controller::Setpoint& setpoint);
+  /// Holds `setpoint`, with the gains in it, which the controller has taken already, as it has
+  /// `payload`.
+  void begin(const controller::Setpoint& setpoint, const controller::Payload& payload);
 
   /// Adds this wrench to that of what is held. Its time begins with the next tick; a fault ends it
   /// for good.
@@ -46,10 +47,22 @@ class LoopGoal {
   /// reason in one line.
   std::int32_t change_gains(const std::function<void(controller::Gains&)>& change,
                             std::string& reason);
+  /// What a command or a scenario changes beside where to go; what is not there stays.
+  struct Change {
+    std::function<void(controller::Gains&)> gains;
+    std::optional<controller::Payload> payload;
+    std::optional<controller::TipSpeed> tip_speed;
+  };
+  /// Makes all of a change, or, if the controller refuses some of it, nothing. Otherwise as
+  /// change_gains().
+  std::int32_t change(const Change& change, std::string& reason);
   /// Releases a latched fault at the next tick.
   void release();
 
  private:
+  std::int32_t set_gains(const std::function<void(controller::Gains&)>& change,
+                         std::string& reason);
+
   LoopController& controller_;
   std::int64_t repeat_every_;
 
@@ -72,6 +85,8 @@ class LoopGoal {
 
   std::mutex mutex_;  ///< of what follows, and of the controller's functions for other threads
   controller::Gains gains_;
+  controller::Payload payload_;
+  controller::TipSpeed tip_speed_;
 };
 
 }  // namespace dashpot::apps

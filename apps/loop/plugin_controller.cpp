@@ -66,6 +66,20 @@ class PluginController : public LoopController {
     return explain(plugin_.set_gains(handle_.get(), &wanted), reason);
   }
 
+  std::int32_t set_payload(const controller::Payload& payload, std::string& reason) override {
+    dashpot_payload wanted{};
+    wanted.struct_size = sizeof wanted;
+    wanted.mass = payload.mass;
+    Eigen::Map<Eigen::Vector3d>(wanted.center) = payload.center;
+    Eigen::Map<RowMajor3>(wanted.inertia) = payload.inertia;
+    return explain(plugin_.set_payload(handle_.get(), &wanted), reason);
+  }
+
+  std::int32_t limit_tip_speed(const controller::TipSpeed& speed, std::string& reason) override {
+    return explain(plugin_.limit_tip_speed(handle_.get(), speed.linear, speed.angular, speed.limit),
+                   reason);
+  }
+
   std::int32_t check(const controller::Setpoint& setpoint, const JointVector& q,
                      std::string& reason) override {
     const GainArrays arrays(setpoint.gains);

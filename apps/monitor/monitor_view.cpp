@@ -89,6 +89,20 @@ std::string tick_times(const state_t& state) {
          fixed(1e-3 * state.longest_tick_time, 1) + ")";
 }
 
+/// What the arm carries, and the damping ratios that are held.
+std::string told(const state_t& state) {
+  std::string text = "payload " + format_number(state.payload_mass, 4) + " kg";
+  if (state.payload_mass != 0) {
+    const auto& c = state.payload_center;
+    text += " at (" + fixed(c[0], 3) + ", " + fixed(c[1], 3) + ", " + fixed(c[2], 3) + ") m";
+  }
+  for (const auto& [name, ratio] :
+       {std::pair("joint", state.joint_damping_ratio), {"task", state.task_damping_ratio}}) {
+    if (ratio != 0) text += "; " + std::string(name) + " damping ratio " + format_number(ratio, 3);
+  }
+  return text;
+}
+
 Eigen::VectorXcd shape_of(const modes_t& modes, std::size_t i) {
   Eigen::VectorXcd shape(modes.n);
   for (std::size_t k = 0; k < static_cast<std::size_t>(modes.n); ++k) {
@@ -178,7 +192,7 @@ std::string MonitorView::health() const {
                    std::numbers::pi,
                2) +
          " deg\n";
-  return out;
+  return out + "  " + told(state) + "\n";
 }
 
 std::string MonitorView::commands() const {

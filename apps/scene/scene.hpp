@@ -35,6 +35,7 @@ struct ScenarioStep {
   double at = 0;  ///< s
   int line = 0;   ///< of the file
   controller::Setpoint setpoint;
+  std::optional<controller::Payload> payload;  ///< that the controller is told at this step
 };
 
 /// From `begin` until just before `end`, s, the controller is called in every so many periods only.

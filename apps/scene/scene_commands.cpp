@@ -18,12 +18,24 @@ void read_microseconds(const YamlMapping& keys, const char* key, std::int64_t& m
   microseconds = std::llround(1e6 * seconds);
 }
 
+/// Reads a limit that may be lowered only.
+void read_at_most(const YamlMapping& keys, const char* key, const char* unit, double& limit) {
+  const controller::Range range{0, false, limit};
+  read_number(keys, key, unit, range, limit);
+}
+
 }  // namespace
 
 void read_commands(const YamlMapping& root, lcmtypes::CommandLimits& limits) {
-  static constexpr std::array<std::string_view, 12> kKeys = {
-      "reach",        "force",  "torque",   "joint_stiffness", "joint_damping",   "task_stiffness",
-      "task_damping", "oldest", "furthest", "silence",         "most_per_second", "burst"};
+  static constexpr std::array<std::string_view, 18> kKeys = {"reach",           "force",
+                                                             "torque",          "joint_stiffness",
+                                                             "joint_damping",   "task_stiffness",
+                                                             "task_damping",    "damping_ratio",
+                                                             "payload",         "payload_distance",
+                                                             "linear_velocity", "angular_velocity",
+                                                             "tip_velocity",    "oldest",
+                                                             "furthest",        "silence",
+                                                             "most_per_second", "burst"};
   const YamlMapping keys = root.mapping("commands", kKeys);
   read_number(keys, "reach", "m", kPositive, limits.reach);
   read_number(keys, "force", "N", kNotNegative, limits.force);
@@ -32,6 +44,12 @@ void read_commands(const YamlMapping& root, lcmtypes::CommandLimits& limits) {
   read_number(keys, "joint_damping", "N m s/rad", kNotNegative, limits.joint_damping);
   read_number(keys, "task_stiffness", "N/m", kNotNegative, limits.task_stiffness);
   read_number(keys, "task_damping", "N s/m", kNotNegative, limits.task_damping);
+  read_at_most(keys, "damping_ratio", "", limits.damping_ratio);
+  read_number(keys, "payload", "kg", kNotNegative, limits.payload);
+  read_number(keys, "payload_distance", "m", kNotNegative, limits.payload_distance);
+  read_at_most(keys, "linear_velocity", "m/s", limits.linear_velocity);
+  read_at_most(keys, "angular_velocity", "rad/s", limits.angular_velocity);
+  read_at_most(keys, "tip_velocity", "m/s", limits.tip_velocity);
   read_microseconds(keys, "oldest", limits.oldest);
   read_microseconds(keys, "furthest", limits.furthest);
   read_microseconds(keys, "silence", limits.silence);

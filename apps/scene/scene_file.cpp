@@ -31,6 +31,9 @@ lcmtypes::CommandLimits command_limits(const YamlMapping& root, const controller
   lcmtypes::CommandLimits limits;
   limits.position_lower = config.settings.limits.position_lower;
   limits.position_upper = config.settings.limits.position_upper;
+  limits.linear_velocity = config.settings.motion.linear_velocity;
+  limits.angular_velocity = config.settings.motion.angular_velocity;
+  limits.tip_velocity = config.settings.limits.tip_velocity;
   read_commands(root, limits);
   return limits;
 }

@@ -17,6 +17,15 @@ struct ArmSimulation {
 void read_simulation(const controller::YamlMapping& root, const controller::Units& positions,
                      sim::PlantOptions& plant, ArmSimulation* arm);
 
+/// Reads mass, center and inertia of a body at the tip. Throws InputError.
+template <class Vector3, class Matrix3>
+void read_body(const controller::YamlMapping& keys, double& mass, Vector3& center,
+               Matrix3& inertia) {
+  read_number(keys, "mass", "kg", controller::kNotNegative, mass);
+  read_vector3(keys, "center", "m", center);
+  read_matrix(keys, "inertia", controller::Units(3, "kg m^2"), inertia);
+}
+
 /// Reads `commands`, of an arm. Throws InputError.
 void read_commands(const controller::YamlMapping& root, lcmtypes::CommandLimits& limits);
 

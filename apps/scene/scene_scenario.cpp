@@ -7,6 +7,7 @@
 #include <dashpot/controller/dynamics.hpp>
 
 #include <algorithm>
+#include <limits>
 
 namespace dashpot::apps {
 namespace {
@@ -163,6 +164,23 @@ void read_system_pushes(const YamlMapping& scenario, const Units& positions, Sce
   }
 }
 
+/// Bodies that the arm picks up, and puts down again, beside what it carries all the time.
+void read_loads(const YamlMapping& scenario, Scene& scene) {
+  static constexpr std::array<std::string_view, 5> kKeys = {"begin", "end", "mass", "center",
+                                                            "inertia"};
+  for (const YamlMapping& keys : mappings(scenario, "loads", kKeys)) {
+    sim::Piece<sim::Inertia> piece;
+    piece.end = std::numeric_limits<double>::infinity();
+    require(keys, "begin", scenario, "loads");
+    require(keys, "mass", scenario, "loads");
+    read_number(keys, "begin", "s", kNotNegative, piece.begin);
+    read_number(keys, "end", "s", kPositive, piece.end);
+    if (piece.end <= piece.begin) throw keys.error("end", "is not after begin");
+    read_body(keys, piece.value.mass, piece.value.center, piece.value.about_center);
+    scene.arm->options.loads.push_back(piece);
+  }
+}
+
 /// The set-point that holds the arm where it starts, with the gains of the file.
 controller::Setpoint first_setpoint(const Scene& scene) {
   controller::Setpoint setpoint = scene.arm->config.settings.initial;
@@ -172,15 +190,17 @@ controller::Setpoint first_setpoint(const Scene& scene) {
 }
 
 void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 6> kKeys = {
-      "at", "mode", "joint_position", "tip_displacement", "wrench", "gains"};
+  static constexpr std::array<std::string_view, 7> kKeys = {
+      "at", "mode", "joint_position", "tip_displacement", "wrench", "gains", "payload"};
+  static constexpr std::array<std::string_view, 3> kPayload = {"mass", "center", "inertia"};
   static constexpr std::array<std::pair<std::string_view, controller::Mode>, 2> kModes = {
       {{"joint", controller::Mode::kJoint}, {"cartesian", controller::Mode::kCartesian}}};
   const RobotModel& model = scene.arm->config.model;
-  scene.steps.push_back({0, 0, first_setpoint(scene)});
+  scene.steps.push_back({0, 0, first_setpoint(scene), {}});
   const Pose origin = scene.steps.front().setpoint.tip_pose;
   for (const YamlMapping& keys : mappings(scenario, "steps", kKeys)) {
     ScenarioStep step = scene.steps.back();
+    step.payload.reset();
     require(keys, "at", scenario, "steps");
     read_number(keys, "at", "s", kNotNegative, step.at);
     step.line = keys.line("at");
@@ -199,6 +219,10 @@ void read_steps(const YamlMapping& scenario, const Units& positions, Scene& scen
     }
     read_numbers(keys, "wrench", kWrenchUnits, kAnyNumber, setpoint.wrench);
     controller::read_gains(keys, model, controller::GainPairs::kEither, setpoint.gains);
+    if (keys.has("payload")) {
+      controller::Payload& payload = step.payload.emplace();
+      read_body(keys.mapping("payload", kPayload), payload.mass, payload.center, payload.inertia);
+    }
     check_reach(keys, setpoint, scene);
     scene.steps.push_back(step);
   }
@@ -251,8 +275,8 @@ std::optional<JointVector> displaced(const RobotModel& model, const JointVector&
 }
 
 void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene) {
-  static constexpr std::array<std::string_view, 6> kKeys = {"duration", "start",  "pushes",
-                                                            "steps",    "faults", "ring_down"};
+  static constexpr std::array<std::string_view, 7> kKeys = {
+      "duration", "start", "pushes", "loads", "steps", "faults", "ring_down"};
   const YamlMapping keys = root.mapping("scenario", kKeys);
   read_number(keys, "duration", "s", kPositive, scene.duration);
   if (scene.duration > kLongest) throw keys.error("duration", "is more than 1e7 s");
@@ -261,12 +285,13 @@ void read_scenario(const YamlMapping& root, const Units& positions, Scene& scene
   if (scene.arm) {
     read_arm_start(keys, positions, scene);
     read_arm_pushes(keys, scene);
+    read_loads(keys, scene);
     read_steps(keys, positions, scene);
     read_faults(keys, positions, scene);
   } else {
     read_system_start(keys, positions, scene);
     read_system_pushes(keys, positions, scene);
-    for (const char* key : {"steps", "faults"}) {
+    for (const char* key : {"loads", "steps", "faults"}) {
       if (keys.has(key)) throw keys.error(key, "is for robot arms; this scene is a system");
     }
   }

@@ -99,9 +99,8 @@ void read_robot(const YamlMapping& simulation, const Units& positions, ArmSimula
   read_number(keys, "friction_velocity", "rad/s", kPositive, arm.options.friction_velocity);
   static constexpr std::array<std::string_view, 3> kPayload = {"mass", "center", "inertia"};
   const YamlMapping payload = keys.mapping("payload", kPayload);
-  read_number(payload, "mass", "kg", kNotNegative, parameters.payload.mass);
-  read_vector3(payload, "center", "m", parameters.payload.center);
-  read_matrix(payload, "inertia", Units(3, "kg m^2"), parameters.payload.about_center);
+  read_body(payload, parameters.payload.mass, parameters.payload.center,
+            parameters.payload.about_center);
 }
 
 void read_surroundings(const YamlMapping& simulation, sim::ArmOptions& options) {

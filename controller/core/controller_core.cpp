@@ -15,15 +15,6 @@ int gain_ticks(const Settings& settings) {
   return static_cast<int>(std::lround(settings.motion.gain_time / settings.period));
 }
 
-/// The arm without payload, or, where that has no inertia, with the one it has.
-RobotModel unloaded(const RobotModel& model) try {
-  Attachment nothing;
-  nothing.tool = model.attachment().tool;
-  return model.attachment().mass > 0 ? model.with(nothing) : model;
-} catch (const InvalidModel&) {
-  return model;
-}
-
 /// Whole ns, which add up without rounding errors.
 double nanoseconds(double seconds) noexcept {
   return std::round(1e9 * seconds);
@@ -185,14 +176,6 @@ bool ControllerCore::rested(double dt) noexcept {
     if (std::abs(qd_[i]) > kAtRest * settings_.limits.velocity[i]) rest_ = 0;
   }
   return rest_ >= wanted;
-}
-
-Status ControllerCore::setpoint_age_status() const noexcept {
-  const double age = 1e-9 * setpoint_age_;
-  const Watchdog& limit = settings_.watchdog;
-  if (limit.setpoint_damp > 0 && age > limit.setpoint_damp) return Status::kSetpointLost;
-  if (limit.setpoint_hold > 0 && age > limit.setpoint_hold) return Status::kSetpointStale;
-  return Status::kOk;
 }
 
 void ControllerCore::damping_torque(JointVector& tau) noexcept {

@@ -133,6 +133,14 @@ bool ControllerCore::references_still() const noexcept {
           (references_.posture.velocity().isZero(0) && references_.tip.velocity().isZero(0)));
 }
 
+Status ControllerCore::setpoint_age_status() const noexcept {
+  const double age = 1e-9 * setpoint_age_;
+  const Watchdog& limit = settings_.watchdog;
+  if (limit.setpoint_damp > 0 && age > limit.setpoint_damp) return Status::kSetpointLost;
+  if (limit.setpoint_hold > 0 && age > limit.setpoint_hold) return Status::kSetpointStale;
+  return Status::kOk;
+}
+
 double ControllerCore::tip_reference_speed() const noexcept {
   // Of a joint's velocity limit where the robot is; what is left is for vibrations and the null
   // space.

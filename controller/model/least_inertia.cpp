@@ -1,3 +1,4 @@
+#include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/model/least_inertia.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
@@ -33,6 +34,14 @@ TipInertia least_tip_inertia(const RobotModel& model, const JointVector& lower,
     mobility_angular = std::max(mobility_angular, A.bottomRightCorner<3, 3>().trace());
   }
   return {1 / mobility_linear, 1 / mobility_angular};
+}
+
+RobotModel unloaded(const RobotModel& model) try {
+  Attachment nothing;
+  nothing.tool = model.attachment().tool;
+  return model.attachment().mass > 0 ? model.with(nothing) : model;
+} catch (const InvalidModel&) {
+  return model;
 }
 
 JointVector least_joint_inertia(const RobotModel& model, const JointVector& lower,

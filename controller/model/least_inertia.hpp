@@ -14,6 +14,10 @@ struct TipInertia {
 TipInertia least_tip_inertia(const RobotModel& model, const JointVector& lower,
                              const JointVector& upper);
 
+/// Returns the arm without payload, whose inertia is least, or, where that lacks inertia, the arm
+/// as it is.
+RobotModel unloaded(const RobotModel& model);
+
 /// Returns inertias I (n, kg m^2) that the joints have independently of each other: M - diag(I) is
 /// positive semidefinite at 1024 postures spread evenly between the position limits. I is a common
 /// fraction of the least 1 / (M^-1)_ii, what joint i resists with while all others are free.

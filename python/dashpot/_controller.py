@@ -120,6 +120,18 @@ class Snapshot(Result):
     """6, from tip to reference: m, and rotation vector, rad."""
     tip_wrench: Array
     """6, of the Cartesian springs, dampers and feed-forward, N and N m."""
+    joint_damping_ratio: float
+    """For which the damping of the joint springs in force is designed; 0: it is given."""
+    task_damping_ratio: float
+    """Likewise of the Cartesian springs."""
+    payload_mass: float
+    """kg, with which the arm counts at this tick, on the way to that of set_payload."""
+    payload_center: Array
+    """3, of mass, m, from the tip link's origin in its axes."""
+    payload_inertia: Array
+    """3 x 3, kg m^2, about the centre."""
+    tool: Array
+    """4 x 4, the tool's frame in the tip link."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -280,6 +292,26 @@ class Controller:
         for gains that are not possible, or leave the sampled loop too small a gain margin."""
         given = {key: value for key, value in locals().items() if key != "self"}
         self._core.set_gains(_gains(given))
+
+    def set_payload(self, mass: float, center: npt.ArrayLike = (0, 0, 0),
+                    inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)), *,
+                    tool: npt.ArrayLike | None = None) -> None:
+        """Tells what the arm carries from the next tick on: mass (kg), centre (3, m, in the tip
+        link) and inertia about it (3 x 3, kg m^2), and the pose of the tool in the tip link (4 x 4;
+        None keeps it). Weight and modes follow within motion.gain_time. Raises Error for what no
+        body can be, what the torque limits do not hold, and what leaves the gains too small a
+        margin."""
+        self._core.set_payload(float(mass), to_numbers("center", center, 1).reshape(-1, 1),
+                               to_numbers("inertia", inertia, 2),
+                               None if tool is None else to_numbers("tool", tool, 2))
+
+    def limit_tip_speed(self, *, linear: float | None = None, angular: float | None = None,
+                        limit: float | None = None) -> None:
+        """Limits the tip's speed from the next tick on: of the reference on its way (m/s, rad/s) and
+        of the tip itself, beyond which it is a fault (m/s). None is what the configuration says,
+        which is the most that is allowed. Raises Error for more, and for zero or less."""
+        self._core.limit_tip_speed(*(math.inf if one is None else float(one)
+                                     for one in (linear, angular, limit)))
 
     def judge_gains(self, position: npt.ArrayLike | None = None, **gains: Any) -> float:
         """Returns the gain margin of the sampled loop at `position` (n, rad; None: the latest) with

@@ -3,6 +3,7 @@
 #include <dashpot/controller/plugin/hosted_controller.hpp>
 #include <dashpot/python/src/controller_results.hpp>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <mutex>
@@ -21,7 +22,7 @@ class Host {
   std::size_t joints() const { return dashpot_joints(get()); }
 
   std::mutex loop;   ///< of update, start and reset
-  std::mutex other;  ///< of set_setpoint, set_gains and release
+  std::mutex other;  ///< of set_setpoint, set_gains, set_payload, ...
 
  private:
   struct Destroy {
@@ -220,6 +221,30 @@ double judge_gains(Host& host, const OptionalMatrix& position, const nb::dict& k
   return margin;
 }
 
+void set_payload(Host& host, double mass, const Eigen::MatrixXd& center,
+                 const Eigen::MatrixXd& inertia, const OptionalMatrix& tool) {
+  Numbers numbers;
+  dashpot_payload payload{};
+  payload.struct_size = sizeof payload;
+  payload.mass = mass;
+  std::copy_n(numbers.add("center", center, 3, 1), 3, payload.center);
+  std::copy_n(numbers.add("inertia", inertia, 3, 3), 9, payload.inertia);
+  if (tool) {
+    analysis::check_size("tool", *tool, 4, 4);
+    payload.tool_position = numbers.add("", tool->topRightCorner(3, 1), 3, 1);
+    payload.tool_rotation = numbers.add("", tool->topLeftCorner(3, 3), 3, 3);
+  }
+  const nb::gil_scoped_release release;
+  const std::lock_guard lock(host.other);
+  check(dashpot_set_payload(host.get(), &payload));
+}
+
+void limit_tip_speed(Host& host, double linear, double angular, double limit) {
+  const nb::gil_scoped_release release;
+  const std::lock_guard lock(host.other);
+  check(dashpot_limit_tip_speed(host.get(), linear, angular, limit));
+}
+
 void release(Host& host) {
   const nb::gil_scoped_release no_lock;
   const std::lock_guard lock(host.other);
@@ -251,6 +276,10 @@ void add_controller(nb::module_& m) {
            nb::arg("tip_pose").none(), nb::arg("wrench").none(), nb::arg("time").none())
       .def("set_gains", &set_gains, nb::arg("gains"))
       .def("judge_gains", &judge_gains, nb::arg("position").none(), nb::arg("gains"))
+      .def("set_payload", &set_payload, nb::arg("mass"), nb::arg("center"), nb::arg("inertia"),
+           nb::arg("tool").none())
+      .def("limit_tip_speed", &limit_tip_speed, nb::arg("linear"), nb::arg("angular"),
+           nb::arg("limit"))
       .def("release", &release)
       .def("snapshot", [](const Host& host) { return snapshot_of(host.get()); })
       .def("modes", [](const Host& host) { return modes_of(host.get()); })

@@ -86,6 +86,12 @@ nb::object snapshot_of(dashpot_controller* controller) {
   result["reference_tip_pose"] = pose(found.reference_tip_position, found.reference_tip_rotation);
   result["tip_error"] = to_array(Map(found.tip_error, 6));
   result["tip_wrench"] = to_array(Map(found.tip_wrench, 6));
+  result["joint_damping_ratio"] = found.joint_damping_ratio;
+  result["task_damping_ratio"] = found.task_damping_ratio;
+  result["payload_mass"] = found.payload_mass;
+  result["payload_center"] = to_array(Map(found.payload_center, 3));
+  result["payload_inertia"] = to_array(RotationMap(found.payload_inertia));
+  result["tool"] = pose(found.tool_position, found.tool_rotation);
   return result;
 }
 

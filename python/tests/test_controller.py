@@ -172,6 +172,32 @@ def test_what_is_not_possible_is_refused_or_gives_a_status(config):
         assert found is dashpot.Status[status] and torque.shape == (7,) and np.isfinite(torque).all()
 
 
+def test_payload_and_speed_can_be_told_in_the_loop(config):
+    controller = dashpot.Controller(config)
+    controller.start(HOME)
+    for bad, message in [(dict(mass=-1), "mass is negative"),
+                         (dict(mass=1, inertia=np.diag([1, 0, 0])), "triangle"),
+                         (dict(mass=100), "limits.torque"),
+                         (dict(mass=1, center=[0, 0]), "center"),
+                         (dict(mass=1, tool=np.zeros((4, 4))), "tool")]:
+        with pytest.raises(dashpot.Error, match=message):
+            controller.set_payload(**bad)
+    with pytest.raises(dashpot.Error, match="motion.linear_velocity 9"):
+        controller.limit_tip_speed(linear=9)
+    controller.limit_tip_speed(linear=0.1, limit=0.5)
+    tool = np.eye(4)
+    tool[2, 3] = 0.1
+    controller.update(0.0, HOME, np.zeros(7))
+    controller.set_payload(1.5, [0, 0, 0.05], np.diag([0.002, 0.002, 0.001]), tool=tool)
+    for tick in range(1, 700):
+        controller.update(tick * 0.001, HOME, np.zeros(7))
+    found = controller.snapshot()
+    assert found.payload_mass == pytest.approx(1.5)
+    np.testing.assert_allclose(found.payload_center, [0, 0, 0.05], atol=1e-12)
+    np.testing.assert_allclose(found.payload_inertia, np.diag([0.002, 0.002, 0.001]), atol=1e-12)
+    np.testing.assert_allclose(found.tool, tool, atol=1e-12)
+
+
 def test_faults_latch_until_they_are_released(config):
     controller = dashpot.Controller(config)
     controller.start(HOME)

@@ -69,7 +69,7 @@ TEST(RunCommands, HaveLimitsInTheScene) {
     if (word.ends_with(',')) word.pop_back();
     EXPECT_THAT(given, HasSubstr("\n  " + word + ": "));
   }
-  EXPECT_EQ(keys, 12);
+  EXPECT_EQ(keys, 18);
 }
 
 TEST(MonitorOfCommands, ShowsFaultCommanderAndVerdicts) {

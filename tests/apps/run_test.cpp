@@ -43,8 +43,8 @@ TEST_P(EveryScene, RunsWithoutAnOverrunAndAccountsForItsEnergy) {
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          ::testing::Values("panda", "panda_release_c1", "panda_release_c2",
                                            "panda_release_ratio_damping", "panda_push_free",
-                                           "panda_push_held", "iiwa14", "ur5", "baxter_left",
-                                           "chain3"));
+                                           "panda_push_held", "panda_pick_up", "iiwa14", "ur5",
+                                           "baxter_left", "chain3"));
 
 TEST(Scenes, AreAllTested) {
   std::size_t files = 0;
@@ -52,7 +52,7 @@ TEST(Scenes, AreAllTested) {
        std::filesystem::directory_iterator(std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes")) {
     files += entry.path().extension() == ".yaml" ? 1 : 0;
   }
-  EXPECT_EQ(files, 10U);  // those of EveryScene
+  EXPECT_EQ(files, 11U);  // those of EveryScene
 }
 
 /// Every key that the reader says it knows stands in the example.
@@ -72,6 +72,7 @@ TEST(Scenes, TheExampleShowsEveryKey) {
            {"  start:", "  start:\n    no: 1"},
            {"{begin: 1 s", "{no: 1, begin: 1 s"},
            {"- begin: 5.97 s", "- no: 1\n      begin: 5.97 s"},
+           {"- {begin: 5.6 s", "- {no: 1, begin: 5.6 s"},
            {"- at: 2 s", "- no: 1\n      at: 2 s"}}) {
     const std::string said = run_scene(changed(scratch, "panda", from, to)).err;
     const std::size_t list = said.find("unknown key; the keys are ");

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -22,11 +23,24 @@ dashpot_payload payload(double mass, const double* tool_position = nullptr) {
   return result;
 }
 
+/// A Panda at rest that is configured to carry something.
+Host carrying_host(const std::string& carried, const std::string& settings) {
+  std::string text = panda();
+  text.replace(text.rfind('}'), 1, ", payload: {" + carried + "}}");
+  text += settings;
+  Host host(create(text), panda_posture());
+  const auto model = load(text).model;
+  const controller::JointVector q = joint_vector(panda_posture());
+  const Eigen::VectorXd gravity =
+      controller::evaluate(model, q, controller::JointVector::Zero(7)).gravity;
+  EXPECT_EQ(plugin().reset(host.controller.get(), gravity.data()), DASHPOT_OK);
+  return host;
+}
+
 TEST(PluginPayload, BlendsIntoTheLoopAndItsModes) {
-  Host host = panda_host(kCartesian),
-       configured = panda_host(
-           kCartesian +
-           "robot: {payload: {mass: 2, center: [0, 0, 0.05], inertia: [0.002, 0.002, 0.002]}}\n");
+  Host host = panda_host(kCartesian);
+  Host configured =
+      carrying_host("mass: 2, center: [0, 0, 0.05], inertia: [0.002, 0.002, 0.002]", kCartesian);
   const dashpot_payload two = payload(2);
   for (int i = 0; i < 600; ++i) host.tick();
   const double before = host.modes().modes[0].natural_frequency;
@@ -81,12 +95,10 @@ TEST(PluginPayload, IsRefusedWithAReason) {
 
 TEST(PluginPayload, IsJudgedWithTheGainsInForce) {
   // Damping that a heavy wrist bears and a light one does not.
-  const std::string heavy =
-      "robot: {payload: {mass: 3, center: [0, 0, 0.1], inertia: [0.3, 0.3, 0.3]}}\n";
-  Host host = panda_host(
-      heavy +
-      "gains: {joint: {stiffness: [500, 500, 500, 500, 300, 300, 300], damping: [50, 50, 50, "
-      "50, 30, 30, 45]}}\n");
+  Host host = carrying_host("mass: 3, center: [0, 0, 0.1], inertia: [0.3, 0.3, 0.3]",
+                            "gains: {joint: {stiffness: [500, 500, 500, 500, 300, 300, 300], "
+                            "damping: [50, 50, 50, 50, 30, "
+                            "30, 45]}}\n");
   ASSERT_NE(host.controller, nullptr) << plugin().last_error();
   host.tick();
   const dashpot_payload nothing = payload(0);

@@ -262,7 +262,7 @@ TEST(CommandReceiver, JudgesGainsOnItsOwnThread) {
   ASSERT_TRUE(wait_for(receiver, 1));
   EXPECT_FALSE(receiver.fetch());
   EXPECT_EQ(receiver.fetch_tally().count(Verdict::kUnstable), 1);
-  EXPECT_EQ(receiver.last_reason(), "gains refused by the controller: too little is left");
+  EXPECT_EQ(receiver.last_reason(), "refused by the controller: too little is left");
   ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));
 }
 

@@ -187,8 +187,56 @@ TEST(RunWithCommands, RefusesGainsThatTheSampledLoopDoesNotBear) {
   EXPECT_EQ(run.finish(), 0);
   const Json result = Json::parse(run.output());
   const std::string reason = result["commands"]["last_refusal"]["reason"];
-  EXPECT_THAT(reason, HasSubstr("gains refused by the controller: "));
+  EXPECT_THAT(reason, HasSubstr("refused by the controller: "));
   EXPECT_THAT(reason, HasSubstr("margin"));
+}
+
+TEST(RunWithCommands, HoldsARatioACarriesAPayloadAndLowersTheTipsSpeed) {
+  const std::string url = own_url();
+  Listener listener(url);
+  const Scratch scratch;
+  Running run({"run", patient_scene(scratch, "scenario:", "scenario:"), "--commands", "--lcm-url",
+               url, "--duration", "60", "--json"});
+  if (!listener.until([&] { return listener.states > 100 && listener.modes_messages > 0; })) {
+    GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  }
+  EXPECT_EQ(listener.state.task_damping_ratio, 0);
+  command_t command = joint_command(listener.state, 0, 1);
+  command.parts = int{command_t::TASK_RATIO} + int{command_t::PAYLOAD} + int{command_t::TIP_SPEED};
+  command.task_damping_ratio = 0.6;
+  command.payload_mass = 0.5;
+  command.payload_center[2] = 0.05;
+  command.linear_velocity = 0.1;
+  listener.bus().publish(lcmtypes::kCommandChannel, &command);
+  ASSERT_TRUE(listener.until([&] { return listener.state.commands_accepted == 1; }));
+  ASSERT_TRUE(listener.until([&] {
+    return listener.state.task_damping_ratio == 0.6 && listener.state.payload_mass == 0.5;
+  }));
+  EXPECT_NEAR(listener.state.payload_center[2], 0.05, 1e-12);
+  const std::int64_t told = listener.state.tick;
+  ASSERT_TRUE(listener.until([&] { return listener.modes.tick > told + 10; }));
+  // The scene's springs leave no direction of the tip free: six modes are the task's.
+  int with_ratio = 0;
+  for (const double ratio : listener.modes.damping_ratio) {
+    if (std::abs(ratio - 0.6) < 1e-3) ++with_ratio;
+  }
+  EXPECT_EQ(with_ratio, 6);
+  // A body that cannot be is refused, with the gains beside it.
+  command.parts = int{command_t::TASK_RATIO} + int{command_t::PAYLOAD};
+  command.task_damping_ratio = 0.9;
+  command.payload_inertia[0][0] = 1;
+  command.sequence = 2;
+  command.utime = utime();
+  listener.bus().publish(lcmtypes::kCommandChannel, &command);
+  ASSERT_TRUE(listener.until([&] { return listener.state.verdicts[state_t::UNSTABLE] == 1; }));
+  const std::int64_t refused = listener.state.tick;
+  ASSERT_TRUE(listener.until([&] { return listener.state.tick > refused + 600; }));
+  EXPECT_EQ(listener.state.task_damping_ratio, 0.6);
+  EXPECT_EQ(listener.state.payload_mass, 0.5);
+  run.send(SIGTERM);
+  EXPECT_EQ(run.finish(), 0);
+  EXPECT_THAT(Json::parse(run.output())["commands"]["last_refusal"]["reason"],
+              HasSubstr("refused by the controller: payload: "));
 }
 
 TEST(RunWithCommands, IsReleasedFromAFaultThatIsNamed) {
