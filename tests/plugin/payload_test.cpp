@@ -37,10 +37,16 @@ Host carrying_host(const std::string& carried, const std::string& settings) {
   return host;
 }
 
+/// Gains of its own, because the default ones depend on what is configured.
+const std::string kGains =
+    kCartesian +
+    "gains: {task: {stiffness: [500, 500, 500, 30, 30, 30], damping: [40, 40, 40, 3, 3, 3]}, "
+    "null_space: {stiffness: 10, damping: 2}}\n";
+
 TEST(PluginPayload, BlendsIntoTheLoopAndItsModes) {
-  Host host = panda_host(kCartesian);
+  Host host = panda_host(kGains);
   Host configured =
-      carrying_host("mass: 2, center: [0, 0, 0.05], inertia: [0.002, 0.002, 0.002]", kCartesian);
+      carrying_host("mass: 2, center: [0, 0, 0.05], inertia: [0.002, 0.002, 0.002]", kGains);
   const dashpot_payload two = payload(2);
   for (int i = 0; i < 600; ++i) host.tick();
   const double before = host.modes().modes[0].natural_frequency;
