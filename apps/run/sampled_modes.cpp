@@ -45,7 +45,8 @@ SampledModes sampled_modes(const Scene& scene) {
   loop.friction =
       Eigen::VectorXd(model.joint_values(&controller::Joint::viscous_friction)).asDiagonal();
   if (scene.arm->config.settings.feed_forward.gravity) {
-    loop.gravity_gradient = controller::gravity_gradient(model, scene.rest);
+    loop.gravity_gradient =
+        controller::gravity_gradient(controller::DynamicsKernel(model), scene.rest);
   }
   const analysis::System<> system = loop_at_rest(scene);
   SampledModes result;
