@@ -10,8 +10,8 @@
 namespace dashpot::analysis {
 
 struct IdentifyOptions {
-  /// Of the models tried: eigenvalues. 0: of decays 2 for each channel, within 12 and 32; of
-  /// ambient motion 4 for each channel and 4 more, at most 40.
+  /// Of the models tried: eigenvalues. 0: of decays 2 for each channel, within 12 and 32, with
+  /// inputs 2 more; of ambient motion 4 for each channel and 4 more, at most 40.
   int max_order = 0;
   bool refine = true;  ///< of decays: on the samples as they are; false: a first estimate, fast
 };
@@ -69,10 +69,30 @@ struct Identification {
 /// next larger model thinks otherwise.
 ///
 /// Throws std::invalid_argument for records without channels, of different channels, with fewer
-/// than 20 samples, with times that do not rise or are not finite, channels that are missing or
-/// constant throughout.
+/// than 20 samples, with times that do not rise or are not finite, channels that are missing
+/// throughout, and where nothing moves. A channel that is constant has zeros in the shapes, and no
+/// noise.
 Identification identify_decays(const std::vector<MotionRecord>& records,
                                const IdentifyOptions& options = {});
+
+/// Identifies the modes of motion under forces that were measured, the records' inputs: a chirp, a
+/// pulse, anything that moves the arm about one equilibrium. What was before a record began may go
+/// on in it, and what follows an input at once is no mode.
+///
+/// The model is the one of identify_decays, in which each input makes each mode move as well, with
+/// the same shape, y = constant + direct + sum over modes of what each record's beginning and each
+/// input make of it. Models of rising order come from least squares in the frequency domain with
+/// one denominator (LSCF, Guillaume et al. 2003). The likelihood is that of means of samples, as
+/// many as the band of the motion allows; samples that are missing are interpolated over three
+/// steps at most, and uneven times to even ones. All else is as with identify_decays.
+///
+/// An input that is itself made of the motion, as the torques of a controller are, shows the arm
+/// without the controller, and noise in it shifts the result: use what is put in from outside.
+///
+/// Throws std::invalid_argument as identify_decays, for records without inputs, and where no input
+/// moves.
+Identification identify_excited(const std::vector<MotionRecord>& records,
+                                const IdentifyOptions& options = {});
 
 /// Identifies the modes of motion under forces that nobody measured: ambient vibration, a hand, a
 /// process. The forces have to be many, small and irregular; what they prefer, as the steps of a

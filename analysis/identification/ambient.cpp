@@ -1,6 +1,7 @@
 #include <dashpot/analysis/identification.hpp>
 #include <dashpot/analysis/identification/ambient_correlations.hpp>
 #include <dashpot/analysis/identification/measured_modes.hpp>
+#include <dashpot/analysis/identification/moving_channels.hpp>
 #include <dashpot/analysis/identification/realization.hpp>
 
 #include <Eigen/QR>
@@ -145,7 +146,8 @@ Identification identify_ambient(const std::vector<MotionRecord>& records,
   if (options.max_order < 0 || options.max_order > 60) {
     throw std::invalid_argument("identify: max_order has to be within 0 and 60");
   }
-  const AmbientCorrelations data(records);
+  const MovingChannels moving(records);
+  const AmbientCorrelations data(moving.records);
   const auto channels = static_cast<int>(data.sizes.size());
   const int largest = options.max_order > 0 ? options.max_order : std::min(4 * channels + 4, 40);
   Identification result;
@@ -195,7 +197,7 @@ Identification identify_ambient(const std::vector<MotionRecord>& records,
     mode.reason = "a steady hum, taken away";
     result.rejected.push_back(std::move(mode));
   }
-  return result;
+  return moving.of_all(std::move(result));
 }
 
 }  // namespace dashpot::analysis

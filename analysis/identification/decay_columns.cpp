@@ -52,63 +52,168 @@ DampedWaves damped_waves(double a, double D, double t) {
   return wave;
 }
 
+/// The motion of a factor from a start of its own, x = (c, w s), or (exp, 0) for a single lambda,
+/// and its derivatives by `first` and `second`.
+struct Wave {
+  std::array<double, 2> x{}, by_first{}, by_second{};
+};
+
+Wave wave_at(const DecayFactor& factor, double t) {
+  Wave wave;
+  if (!factor.pair) {
+    wave.x[0] = std::exp(factor.first * t);
+    wave.by_first[0] = t * wave.x[0];
+    return wave;
+  }
+  const double w = std::exp(factor.first), zeta = factor.second;
+  const double a = 2 * zeta * w, D = w * w * (1 - zeta * zeta);
+  const auto [c, s, s_by_d] = damped_waves(a, D, t);
+  wave.x = {c, w * s};
+  const double c_by_a = -t / 2 * c + a * t / 4 * s, c_by_b = -t / 2 * s;
+  const double s_by_a = -t / 2 * s - a / 2 * s_by_d, s_by_b = s_by_d;
+  wave.by_first = {c_by_a * a + c_by_b * 2 * w * w, w * (s + s_by_a * a + s_by_b * 2 * w * w)};
+  wave.by_second = {c_by_a * 2 * w, w * s_by_a * 2 * w};
+  return wave;
+}
+
+/// x' / w of a pair.
+std::array<double, 2> rate_of(const std::array<double, 2>& x, double zeta) {
+  return {-zeta * x[0] - (1 - zeta * zeta) * x[1], x[0] - zeta * x[1]};
+}
+
+/// Adds what a source makes to the columns of a factor.
+class Adder {
+ public:
+  Adder(const DecayFactor& factor, bool derivatives, FactorColumns& columns)
+      : factor_(factor), derivatives_(derivatives), columns_(columns) {}
+
+  void wave(std::size_t source, Index at, const Wave& wave) const {
+    const auto [alpha, beta] = factor_.scale[source];
+    const auto width = static_cast<std::size_t>(factor_.parameters());
+    std::size_t place = width * (1 + source);  // of the scales' derivatives
+    if (source > factor_.reference) place -= width;
+    const bool scaled = derivatives_ && source != factor_.reference;
+    if (!factor_.pair) {
+      columns_.value(at, 0) += alpha * wave.x[0];
+      if (derivatives_) columns_.derivative[0](at, 0) += alpha * wave.by_first[0];
+      if (scaled) columns_.derivative[place](at, 0) += wave.x[0];
+      return;
+    }
+    const double zeta = factor_.second;
+    const std::array<double, 2> rate = rate_of(wave.x, zeta);
+    std::array<double, 2> by_first{}, by_second{};
+    if (derivatives_) {
+      by_first = rate_of(wave.by_first, zeta);
+      by_second = rate_of(wave.by_second, zeta);
+      by_second[0] += -wave.x[0] + 2 * zeta * wave.x[1];
+      by_second[1] -= wave.x[1];
+    }
+    for (Index k : {0, 1}) {
+      const auto j = static_cast<std::size_t>(k);
+      columns_.value(at, k) += alpha * wave.x[j] + beta * rate[j];
+      if (!derivatives_) continue;
+      columns_.derivative[0](at, k) += alpha * wave.by_first[j] + beta * by_first[j];
+      columns_.derivative[1](at, k) += alpha * wave.by_second[j] + beta * by_second[j];
+      if (!scaled) continue;
+      columns_.derivative[place](at, k) += wave.x[j];
+      columns_.derivative[place + 1](at, k) += rate[j];
+    }
+  }
+
+ private:
+  const DecayFactor& factor_;
+  bool derivatives_;
+  FactorColumns& columns_;
+};
+
+/// The mean in each of the `cells` of what an input makes of a factor at rest: the sum over the
+/// values before, each a start of the factor's own.
+std::vector<Wave> forced_waves(const DecayFactor& factor, const DrivenGrid& grid, Index input,
+                               bool derivatives, const std::vector<Index>& cells) {
+  const Wave over = wave_at(factor, grid.step);
+  const double zeta = factor.second, turn = factor.pair ? 1 - zeta * zeta : 0;
+  const auto [c, S] = over.x;
+  const auto [c_first, S_first] = over.by_first;
+  const auto [c_second, S_second] = over.by_second;
+  const double T = -turn * S, T_first = -turn * S_first,
+               T_second = factor.pair ? 2 * zeta * S - turn * S_second : 0;
+  std::vector<Wave> result;
+  result.reserve(cells.size());
+  Wave now, sum;
+  std::size_t next = 0;
+  Index within = 0, cell = 0;
+  for (Index i = 0; i < grid.input.cols() && next < cells.size(); ++i) {
+    for (std::size_t k : {0U, 1U}) {
+      sum.x[k] += now.x[k];
+      if (!derivatives) continue;
+      sum.by_first[k] += now.by_first[k];
+      sum.by_second[k] += now.by_second[k];
+    }
+    if (++within == grid.per_cell) {
+      if (cells[next] == cell) {
+        const double share = 1 / static_cast<double>(grid.per_cell);
+        for (auto* part : {&sum.x, &sum.by_first, &sum.by_second}) {
+          for (double& value : *part) value *= share;
+        }
+        result.push_back(sum);
+        ++next;
+      }
+      sum = {};
+      within = 0;
+      ++cell;
+    }
+    const double x = now.x[0] + grid.step * grid.input(input, i), y = now.x[1];
+    if (derivatives) {
+      const auto [f0, f1] = now.by_first;
+      const auto [s0, s1] = now.by_second;
+      now.by_first = {c * f0 + T * f1 + c_first * x + T_first * y,
+                      S * f0 + c * f1 + S_first * x + c_first * y};
+      now.by_second = {c * s0 + T * s1 + c_second * x + T_second * y,
+                       S * s0 + c * s1 + S_second * x + c_second * y};
+    }
+    now.x = {c * x + T * y, S * x + c * y};
+  }
+  return result;
+}
+
 }  // namespace
 
 FactorColumns columns_of(const DecayFactor& factor, const DecayPart& part, bool derivatives) {
   const Index N = samples_of(part), width = factor.parameters();
-  FactorColumns columns{MatrixXd(N, width), {}};
+  FactorColumns columns{MatrixXd::Zero(N, width), {}};
   const std::size_t records = part.time.size();
+  const std::size_t sources = records + static_cast<std::size_t>(part.inputs());
   if (derivatives) {
-    columns.derivative.assign(static_cast<std::size_t>(width) * records, MatrixXd::Zero(N, width));
+    columns.derivative.assign(static_cast<std::size_t>(width) * sources, MatrixXd::Zero(N, width));
   }
-  const double w = std::exp(factor.first), zeta = factor.second;
-  const double a = 2 * zeta * w, D = w * w * (1 - zeta * zeta);
-  Index at = 0;
-  std::size_t next = static_cast<std::size_t>(width);
+  const Adder add(factor, derivatives, columns);
+  Index from = 0;
   for (std::size_t r = 0; r < records; ++r) {
-    const VectorXd& time = part.time[r];
-    const bool scaled = r != factor.reference;
-    const auto [alpha, beta] = factor.scale[r];
-    for (Index i = 0; i < time.size(); ++i, ++at) {
-      const double t = time[i];
-      if (!factor.pair) {
-        const double x = std::exp(factor.first * t);
-        columns.value(at, 0) = alpha * x;
-        if (!derivatives) continue;
-        columns.derivative[0](at, 0) = alpha * t * x;
-        if (scaled) columns.derivative[next](at, 0) = x;
-        continue;
-      }
-      const auto [c, s, s_by_d] = damped_waves(a, D, t);
-      // x = (c, w s) and x' / w.
-      const double turn = 1 - zeta * zeta;
-      const std::array<double, 2> x{c, w * s};
-      const std::array<double, 2> rate{-zeta * x[0] - turn * x[1], x[0] - zeta * x[1]};
-      for (Index k : {0, 1}) {
-        const auto j = static_cast<std::size_t>(k);
-        columns.value(at, k) = alpha * x[j] + beta * rate[j];
-        if (derivatives && scaled) {
-          columns.derivative[next](at, k) = x[j];
-          columns.derivative[next + 1](at, k) = rate[j];
-        }
-      }
-      if (!derivatives) continue;
-      const double c_by_a = -t / 2 * c + a * t / 4 * s, c_by_b = -t / 2 * s;
-      const double s_by_a = -t / 2 * s - a / 2 * s_by_d, s_by_b = s_by_d;
-      const std::array<double, 2> by_first{c_by_a * a + c_by_b * 2 * w * w,
-                                           w * (s + s_by_a * a + s_by_b * 2 * w * w)};
-      const std::array<double, 2> by_second{c_by_a * 2 * w, w * s_by_a * 2 * w};
-      columns.derivative[0](at, 0) =
-          alpha * by_first[0] + beta * (-zeta * by_first[0] - turn * by_first[1]);
-      columns.derivative[0](at, 1) =
-          alpha * by_first[1] + beta * (by_first[0] - zeta * by_first[1]);
-      columns.derivative[1](at, 0) =
-          alpha * by_second[0] +
-          beta * (-zeta * by_second[0] - turn * by_second[1] - x[0] + 2 * zeta * x[1]);
-      columns.derivative[1](at, 1) =
-          alpha * by_second[1] + beta * (by_second[0] - zeta * by_second[1] - x[1]);
+    for (Index i = 0; i < part.time[r].size(); ++i) {
+      add.wave(r, from + i, wave_at(factor, part.time[r][i]));
     }
-    if (scaled) next += static_cast<std::size_t>(width);
+    for (Index j = 0; j < part.inputs(); ++j) {
+      const std::vector<Wave> forced =
+          forced_waves(factor, (*part.driven)[r], j, derivatives, part.cells[r]);
+      const std::size_t source = records + static_cast<std::size_t>(j);
+      for (std::size_t i = 0; i < forced.size(); ++i) {
+        add.wave(source, from + static_cast<Index>(i), forced[i]);
+      }
+    }
+    from += part.time[r].size();
+  }
+  return columns;
+}
+
+MatrixXd direct_columns(const DecayPart& part) {
+  MatrixXd columns(samples_of(part), part.inputs());
+  if (part.inputs() == 0) return columns;
+  Index at = 0;
+  for (std::size_t r = 0; r < part.time.size(); ++r) {
+    const auto& [input, step, per_cell] = (*part.driven)[r];
+    for (const Index cell : part.cells[r]) {
+      columns.row(at++) = input.middleCols(cell * per_cell, per_cell).rowwise().mean().transpose();
+    }
   }
   return columns;
 }

@@ -24,8 +24,11 @@ DecayFactor DecayFactor::of_pair(Complex eigenvalue) {
   return {true, std::log(w), -eigenvalue.real() / w};
 }
 
-DecayData::DecayData(const std::vector<MotionRecord>& all)
-    : channels(all.front().output.rows()), records(all.size()) {
+DecayData::DecayData(const std::vector<MotionRecord>& all,
+                     std::shared_ptr<const std::vector<DrivenGrid>> driven)
+    : channels(all.front().output.rows()),
+      records(all.size()),
+      inputs(driven ? static_cast<std::size_t>(driven->front().input.rows()) : 0) {
   std::map<std::vector<bool>, std::vector<Index>> alike;  // channels with the same samples
   for (Index c = 0; c < channels; ++c) {
     std::vector<bool> there;
@@ -39,19 +42,23 @@ DecayData::DecayData(const std::vector<MotionRecord>& all)
         {},
         MatrixXd(std::count(there.begin(), there.end(), true), static_cast<Index>(members.size())),
         members};
+    part.driven = driven;
     Index row = 0;
     std::size_t sample = 0;
     for (const MotionRecord& record : all) {
       std::vector<double> times;
+      std::vector<Index> cells;
       for (Index i = 0; i < record.time.size(); ++i) {
         if (!there[sample++]) continue;
         times.push_back(record.time[i] - record.time[0]);
+        cells.push_back(i);
         for (std::size_t c = 0; c < members.size(); ++c) {
           part.output(row, static_cast<Index>(c)) = record.output(members[c], i);
         }
         ++row;
       }
       part.time.emplace_back(VectorXd::Map(times.data(), static_cast<Index>(times.size())));
+      if (driven) part.cells.push_back(std::move(cells));
     }
     parts.push_back(std::move(part));
   }

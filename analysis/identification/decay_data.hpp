@@ -3,6 +3,7 @@
 #include <dashpot/analysis/types.hpp>
 
 #include <array>
+#include <memory>
 #include <vector>
 
 namespace dashpot::analysis {
@@ -13,8 +14,10 @@ struct DecayFactor {
   bool pair = true;
   double first = 0;   ///< log(omega), omega in rad/s; or lambda, 1/s
   double second = 0;  ///< zeta; not used by a single lambda
-  /// In record r the motion x(t) of the reference record is scale[r][0] x + scale[r][1] x' / omega,
-  /// or scale[r][0] x for a single lambda: one shape for all records. Empty: not known yet.
+  /// A factor moves in each record because of what was before, and, where there are inputs, because
+  /// of each input: these are its sources, the records first. Where the reference source makes the
+  /// motion x(t), source s makes scale[s][0] x + scale[s][1] x' / omega, or scale[s][0] x for a
+  /// single lambda: one shape for all. Empty: not known yet.
   std::vector<std::array<double, 2>> scale = {};
   std::size_t reference = 0;
 
@@ -26,11 +29,24 @@ struct DecayFactor {
   static DecayFactor of_single(double eigenvalue) { return {false, eigenvalue, 0}; }
 };
 
+/// What moved a record, on an even grid whose points are fitted in cells.
+struct DrivenGrid {
+  Eigen::MatrixXd input;  ///< inputs x points; each value holds until the next
+  double step = 0;        ///< s
+  Eigen::Index per_cell = 1;
+};
+
 /// What records say for channels that have samples at the same times.
 struct DecayPart {
   std::vector<Eigen::VectorXd> time;   ///< of each record, s, from its beginning
   Eigen::MatrixXd output;              ///< samples of all records, one after the other, x channels
   std::vector<Eigen::Index> channels;  ///< which of the records' channels
+  /// With inputs: of each record the numbers of the cells that the samples are means of, and what
+  /// moved it.
+  std::vector<std::vector<Eigen::Index>> cells = {};
+  std::shared_ptr<const std::vector<DrivenGrid>> driven = {};
+
+  Eigen::Index inputs() const { return driven ? driven->front().input.rows() : 0; }
 };
 
 /// Decays in the form in which they are fitted, the missing samples left out.
@@ -38,6 +54,7 @@ struct DecayData {
   std::vector<DecayPart> parts;
   Eigen::Index channels = 0;
   std::size_t records = 0;
+  std::size_t inputs = 0;
   /// Of each channel, standard deviation: no noise is taken to be less than kLinear of it.
   Eigen::VectorXd motion;
 
@@ -47,7 +64,11 @@ struct DecayData {
 
   double least_noise(Eigen::Index channel) const;
 
-  explicit DecayData(const std::vector<MotionRecord>& all);
+  std::size_t sources() const { return records + inputs; }
+
+  /// With `driven`, the samples are means of cells of its grids, and begin with them.
+  explicit DecayData(const std::vector<MotionRecord>& all,
+                     std::shared_ptr<const std::vector<DrivenGrid>> driven = {});
 };
 
 /// Samples of a part.

@@ -29,8 +29,8 @@ class Evaluation {
         count(squares),
         record_noise_(record_noise) {
     const Index eigen = factor_width(factors);
-    const Index width = eigen + static_cast<Index>(data.records);
-    const Index p = eigen * static_cast<Index>(data.records);
+    const Index width = eigen + static_cast<Index>(data.sources());
+    const Index p = eigen * static_cast<Index>(data.sources());
     if (derivatives) normal.setZero(p, p), gradient.setZero(p);
     amplitudes.setZero(width, data.channels);
     for (const DecayPart& part : data.parts) add(part, factors, noise, derivatives);
@@ -66,6 +66,7 @@ class Evaluation {
       basis.col(at++).segment(from, time.size()).setOnes();
       from += time.size();
     }
+    basis.rightCols(part.inputs()) = direct_columns(part);
     VectorXd weight(N);  // of the records
     from = 0;
     for (std::size_t r = 0; r < part.time.size(); ++r) {
@@ -234,8 +235,8 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
   fit.record_noise.setOnes(records);
   find_scales(data, noise, fit.factors);
   const Index eigen = factor_width(start);
-  const auto nonlinear = static_cast<double>(eigen) * static_cast<double>(data.records);
-  const auto linear = static_cast<double>(eigen) + static_cast<double>(data.records);
+  const auto nonlinear = static_cast<double>(eigen) * static_cast<double>(data.sources());
+  const auto linear = static_cast<double>(eigen) + static_cast<double>(data.sources());
   const auto channels = static_cast<double>(data.channels);
   constexpr int kRounds = 5;
   for (int round = 0; round < kRounds; ++round) {
@@ -294,8 +295,8 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
 
 double parameter_penalty(const DecayFit& fit, const DecayData& data) {
   const auto eigen = static_cast<double>(factor_width(fit.factors));
-  const auto records = static_cast<double>(data.records);
-  return kPenalty * (eigen * records + (eigen + records) * static_cast<double>(data.channels));
+  const auto sources = static_cast<double>(data.sources());
+  return kPenalty * (eigen * sources + (eigen + sources) * static_cast<double>(data.channels));
 }
 
 std::vector<MatrixXd> factor_motion(const DecayData& data, const DecayFit& fit,
@@ -328,6 +329,12 @@ std::vector<MatrixXd> left_over(const DecayData& data, const DecayFit& fit) {
       }
       from += time.size();
       ++record;
+    }
+    if (part.inputs() > 0) {
+      const MatrixXd direct = direct_columns(part) * fit.amplitudes.bottomRows(part.inputs());
+      for (std::size_t c = 0; c < part.channels.size(); ++c) {
+        rest.col(static_cast<Index>(c)) -= direct.col(part.channels[c]);
+      }
     }
     result.push_back(std::move(rest));
   }

@@ -10,8 +10,8 @@ namespace dashpot::analysis {
 struct DecayFit {
   std::vector<DecayFactor> factors;
   Eigen::MatrixXd covariance;  ///< of the factors' `first` and `second`, in their order
-  /// Columns of the model (two for each pair, one for a single, then a constant for each record) x
-  /// channels.
+  /// Columns of the model (two for each pair, one for a single, then a constant for each record and
+  /// each input itself) x channels.
   Eigen::MatrixXd amplitudes;
   Eigen::VectorXd noise;  ///< of each channel, standard deviation of what is left over
   /// Of each record, relative to `noise`: what is large is less linear, and counts less.

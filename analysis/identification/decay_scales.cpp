@@ -11,46 +11,64 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 void find_scales(const DecayData& data, const VectorXd& noise, std::vector<DecayFactor>& factors) {
-  const bool known = std::all_of(
-      factors.begin(), factors.end(),
-      [&data](const DecayFactor& factor) { return factor.scale.size() == data.records; });
+  const std::size_t sources = data.sources();
+  const bool known =
+      std::all_of(factors.begin(), factors.end(),
+                  [sources](const DecayFactor& factor) { return factor.scale.size() == sources; });
   if (known) return;
-  for (DecayFactor& factor : factors) factor.scale.assign(data.records, {1, 0});
-  if (data.records == 1) return;
+  if (sources == 1) {
+    for (DecayFactor& factor : factors) factor.scale.assign(1, {1, 0});
+    return;
+  }
+  // What each source makes of each factor, by itself.
   const Index eigen = factor_width(factors);
-  std::vector<MatrixXd> amplitudes(data.records, MatrixXd::Zero(eigen, data.channels));
+  const auto blocks = static_cast<Index>(sources);
+  std::vector<MatrixXd> amplitudes(sources, MatrixXd::Zero(eigen, data.channels));
+  MatrixXd size = MatrixXd::Zero(eigen, blocks);  // squares of the columns
   for (const DecayPart& part : data.parts) {
-    Index from = 0;
-    for (std::size_t r = 0; r < data.records; ++r) {
-      const Index N = part.time[r].size();
-      MatrixXd basis(N, eigen + 1);
-      DecayPart alone{{part.time[r]}, part.output.middleRows(from, N), part.channels};
-      from += N;
-      if (N == 0) continue;
-      Index at = 0;
+    const Index N = samples_of(part);
+    MatrixXd basis = MatrixXd::Zero(N, eigen * blocks + blocks);
+    Index at = 0;
+    for (std::size_t s = 0; s < sources; ++s) {
       for (DecayFactor factor : factors) {
-        factor.scale = {{1, 0}};
-        factor.reference = 0;
-        basis.middleCols(at, factor.parameters()) = columns_of(factor, alone, false).value;
+        factor.scale.assign(sources, {0, 0});
+        factor.scale[s] = {1, 0};
+        factor.reference = s;
+        basis.middleCols(at, factor.parameters()) = columns_of(factor, part, false).value;
         at += factor.parameters();
       }
-      basis.col(at).setOnes();
-      const VectorXd size = basis.colwise().norm().transpose().cwiseMax(1e-300);
-      basis *= size.cwiseInverse().asDiagonal();
-      const MatrixXd all =
-          size.cwiseInverse().asDiagonal() * basis.colPivHouseholderQr().solve(alone.output);
+    }
+    Index from = 0;
+    for (const VectorXd& time : part.time) {
+      basis.col(at++).segment(from, time.size()).setOnes();
+      from += time.size();
+    }
+    basis.rightCols(part.inputs()) = direct_columns(part);
+    const VectorXd norm = basis.colwise().norm().transpose().cwiseMax(1e-300);
+    basis *= norm.cwiseInverse().asDiagonal();
+    const MatrixXd all =
+        norm.cwiseInverse().asDiagonal() * basis.colPivHouseholderQr().solve(part.output);
+    for (std::size_t s = 0; s < sources; ++s) {
+      const Index first = static_cast<Index>(s) * eigen;
+      size.col(static_cast<Index>(s)) += norm.segment(first, eigen).cwiseAbs2();
       for (std::size_t c = 0; c < part.channels.size(); ++c) {
-        amplitudes[r].col(part.channels[c]) =
-            all.col(static_cast<Index>(c)).head(eigen) / noise[part.channels[c]];
+        amplitudes[s].col(part.channels[c]) =
+            all.col(static_cast<Index>(c)).segment(first, eigen) / noise[part.channels[c]];
       }
     }
   }
   Index at = 0;
   for (DecayFactor& factor : factors) {
     const int width = factor.parameters();
-    const auto of = [&](std::size_t r) { return amplitudes[r].middleRows(at, width); };
-    for (std::size_t r = 0; r < data.records; ++r) {
-      if (of(r).norm() > of(factor.reference).norm()) factor.reference = r;
+    const auto of = [&](std::size_t s) { return amplitudes[s].middleRows(at, width); };
+    const auto motion = [&](std::size_t s) {
+      const auto squares = size.col(static_cast<Index>(s)).segment(at, width);
+      return (squares.cwiseSqrt().asDiagonal() * of(s)).norm();
+    };
+    factor.scale.assign(sources, {1, 0});
+    factor.reference = 0;
+    for (std::size_t s = 1; s < sources; ++s) {
+      if (motion(s) > motion(factor.reference)) factor.reference = s;
     }
     const MatrixXd reference = of(factor.reference);
     MatrixXd columns(reference.size(), width);
@@ -63,11 +81,11 @@ void find_scales(const DecayData& data, const VectorXd& noise, std::vector<Decay
       columns.col(1) = rate.reshaped();
     }
     const auto qr = columns.colPivHouseholderQr();
-    for (std::size_t r = 0; r < data.records; ++r) {
-      if (r == factor.reference) continue;
-      const MatrixXd wanted = of(r);
+    for (std::size_t s = 0; s < sources; ++s) {
+      if (s == factor.reference) continue;
+      const MatrixXd wanted = of(s);
       const VectorXd scale = qr.solve(wanted.reshaped());
-      factor.scale[r] = {scale[0], factor.pair ? scale[1] : 0};
+      factor.scale[s] = {scale[0], factor.pair ? scale[1] : 0};
     }
     at += width;
   }

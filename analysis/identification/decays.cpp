@@ -1,6 +1,8 @@
 #include <dashpot/analysis/identification.hpp>
+#include <dashpot/analysis/identification/decay_columns.hpp>
 #include <dashpot/analysis/identification/measured_modes.hpp>
 #include <dashpot/analysis/identification/model_search.hpp>
+#include <dashpot/analysis/identification/moving_channels.hpp>
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -93,13 +95,11 @@ void doubt_order(const DecayFit& fit, const DecayFit& larger, std::vector<Measur
   }
 }
 
-}  // namespace
-
-Identification identify_decays(const std::vector<MotionRecord>& records,
-                               const IdentifyOptions& options) {
-  check_records(records);
+void check_order(const IdentifyOptions& options) {
   require(options.max_order >= 0 && options.max_order <= 60, "max_order has to be within 0 and 60");
-  const ModelSearch search(records, options.max_order, options.refine);
+}
+
+Identification describe(const ModelSearch& search, const std::vector<MotionRecord>& records) {
   Identification result;
   result.noise = search.fit.noise;
   result.whiteness = search.fit.whiteness;
@@ -114,15 +114,15 @@ Identification identify_decays(const std::vector<MotionRecord>& records,
     }
   }
   double duration = 0, step = kInfinity;
+  const Index constants = factor_width(search.fit.factors);
   for (std::size_t r = 0; r < records.size(); ++r) {
-    const auto& [time, output] = records[r];
-    const double length = time[time.size() - 1] - time[0];
+    const MotionRecord& record = records[r];
+    const double length = record.time[record.time.size() - 1] - record.time[0];
     duration = std::max(duration, length);
-    step = std::min(step, length / static_cast<double>(time.size() - 1));
-    const auto constant = search.fit.amplitudes.row(search.fit.amplitudes.rows() -
-                                                    static_cast<Index>(records.size() - r));
+    step = std::min(step, length / static_cast<double>(record.time.size() - 1));
+    const auto constant = search.fit.amplitudes.row(constants + static_cast<Index>(r));
     for (Index c = 0; c < scale.size(); ++c) {
-      for (const double y : output.row(c)) {
+      for (const double y : record.output.row(c)) {
         if (std::isfinite(y)) scale[c] += (y - constant[c]) * (y - constant[c]);
       }
     }
@@ -140,6 +140,27 @@ Identification identify_decays(const std::vector<MotionRecord>& records,
   result.order = static_cast<int>(at);
   judge(std::move(modes), duration, step, result);
   return result;
+}
+
+}  // namespace
+
+Identification identify_decays(const std::vector<MotionRecord>& records,
+                               const IdentifyOptions& options) {
+  check_records(records);
+  check_order(options);
+  const MovingChannels moving(records);
+  return moving.of_all(
+      describe(ModelSearch(moving.records, options.max_order, options.refine), moving.records));
+}
+
+Identification identify_excited(const std::vector<MotionRecord>& records,
+                                const IdentifyOptions& options) {
+  check_records(records);
+  check_order(options);
+  require(records.front().input.rows() > 0, "the records have no inputs");
+  const MovingChannels moving(records);
+  const ExcitedCells cells(moving.records);
+  return moving.of_all(describe(ModelSearch(cells, options.max_order), cells.records));
 }
 
 }  // namespace dashpot::analysis

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/identification/common_denominator.hpp>
 #include <dashpot/analysis/identification/model_search.hpp>
 
 #include <algorithm>
@@ -28,6 +29,25 @@ std::vector<DecayFactor> factors_of(const std::vector<RealizedPole>& poles, doub
   return factors;
 }
 
+/// Poles of what is left over, of the whole and of the beginning, where fast decays are.
+std::vector<std::vector<RealizedPole>> rest_poles(const std::vector<MatrixXd>& rest, double step,
+                                                  Index channels) {
+  std::vector<std::vector<RealizedPole>> result;
+  for (const Index part : {1, 8}) {
+    std::vector<MatrixXd> beginning;
+    for (const MatrixXd& record : rest) {
+      const Index columns = record.cols() / part;
+      if (columns >= 10) beginning.emplace_back(record.leftCols(columns));
+    }
+    if (beginning.empty()) continue;
+    const Realization realization(beginning, step, channels, 100);
+    for (int n = 1; n <= std::min(2, realization.max_order()); ++n) {
+      result.push_back(realization.poles(n));
+    }
+  }
+  return result;
+}
+
 double sample_count(const DecayData& data) {
   double count = 0;
   for (const DecayPart& part : data.parts) count += static_cast<double>(part.output.size());
@@ -54,18 +74,56 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& records, int max_order
       pole.shape = pole.shape.cwiseProduct(noise.cast<Complex>()).normalized();
     }
   }
-  data = DecayData(cells.records);
-  choose_order(cells);
+  cells_ = cells.records;
+  duration_ = cells.duration;
+  poles_of_rest_ = [step = cells.step, channels](const std::vector<MatrixXd>& rest) {
+    return rest_poles(rest, step, channels);
+  };
+  data = DecayData(cells_);
+  choose_order(cells.noise);
   if (!refine) return;
-  for (int k = 0; k < 6 && add_from_rest(cells); ++k) continue;
-  while (drop_one()) continue;
-  untangle(cells);
+  improve();
 
   data = DecayData(records);
   fit = fit_decays(data, fit.factors, fit.noise / cells.noise_factor(), 30);
   if (larger) larger = fit_decays(data, larger->factors, fit.noise, 30);
   if (larger && larger->criterion < fit.criterion) fit = std::move(*larger), larger.reset();
-  // Of one that fits no better nothing is learnt.
+  forget_useless_larger();
+}
+
+ModelSearch::ModelSearch(const ExcitedCells& cells, int max_order)
+    : data(cells.records, cells.driven),
+      cells_(cells.records),
+      duration_(cells.duration),
+      most_added_(3),
+      iterations_(15) {
+  const int most = max_order > 0
+                       ? max_order
+                       : static_cast<int>(std::clamp<Index>(2 * data.channels + 2, 12, 32));
+  by_order = common_denominator_poles(cells.bridged, cells.step, most, cells.highest);
+  for (std::vector<RealizedPole>& poles : by_order) {
+    for (RealizedPole& pole : poles) {
+      pole.shape = pole.shape.cwiseProduct(cells.noise.cast<Complex>()).normalized();
+    }
+  }
+  poles_of_rest_ = [&cells](const std::vector<MatrixXd>& rest) {
+    std::vector<MotionRecord> records = cells.bridged;
+    for (std::size_t r = 0; r < records.size(); ++r) records[r].output = rest[r];
+    return common_denominator_poles(records, cells.step, 2, cells.highest);
+  };
+  choose_order(cells.noise);
+  improve();
+  forget_useless_larger();
+}
+
+void ModelSearch::improve() {
+  for (int k = 0; k < most_added_ && add_from_rest(); ++k) continue;
+  while (drop_one()) continue;
+  untangle();
+}
+
+/// Of a larger model that fits no better nothing is learnt.
+void ModelSearch::forget_useless_larger() {
   const double gained = larger ? larger->criterion - fit.criterion : 0;
   if (larger && (!larger->covariance.allFinite() ||
                  gained > parameter_penalty(*larger, data) - parameter_penalty(fit, data))) {
@@ -73,13 +131,13 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& records, int max_order
   }
 }
 
-void ModelSearch::choose_order(const DecayCells& cells) {
+void ModelSearch::choose_order(const VectorXd& noise) {
   std::optional<DecayFit> best;
   int worse = 0;
   for (std::size_t n = 0; n < by_order.size() && worse < 6; ++n) {
-    const std::vector<DecayFactor> factors = factors_of(by_order[n], cells.duration);
+    const std::vector<DecayFactor> factors = factors_of(by_order[n], duration_);
     if (factors.empty()) continue;
-    DecayFit there = fit_decays(data, factors, cells.noise, 12);
+    DecayFit there = fit_decays(data, factors, noise, 12);
     ++worse;
     if (best && there.criterion >= best->criterion) continue;
     best = std::move(there);
@@ -94,7 +152,7 @@ bool ModelSearch::change(const std::vector<DecayFactor>& factors) {
   // In units of its own noise the present model leaves over one for each sample.
   const double samples = sample_count(data);
   const double width = 40 * static_cast<double>(data.channels * fit.amplitudes.rows());
-  DecayFit there = fit_decays(data, factors, fit.noise, 40, samples + width);
+  DecayFit there = fit_decays(data, factors, fit.noise, iterations_, samples + width);
   if (there.criterion < fit.criterion) {
     fit = std::move(there);
     larger.reset();
@@ -106,10 +164,9 @@ bool ModelSearch::change(const std::vector<DecayFactor>& factors) {
   return false;
 }
 
-/// What is left over, of the whole and of the beginning, where fast decays are, has these.
-std::vector<DecayFactor> ModelSearch::candidates(const DecayCells& cells) const {
+std::vector<DecayFactor> ModelSearch::candidates() const {
   std::vector<MatrixXd> rest;
-  for (const MotionRecord& record : cells.records) {
+  for (const MotionRecord& record : cells_) {
     rest.emplace_back(MatrixXd::Zero(record.output.rows(), record.output.cols()));
   }
   const auto over = left_over(data, fit);
@@ -119,36 +176,27 @@ std::vector<DecayFactor> ModelSearch::candidates(const DecayCells& cells) const 
       Index at = 0;
       for (std::size_t r = 0; r < rest.size(); ++r) {
         for (Index i = 0; i < rest[r].cols(); ++i) {
-          if (!std::isfinite(cells.records[r].output(channel, i))) continue;
+          if (!std::isfinite(cells_[r].output(channel, i))) continue;
           rest[r](channel, i) = over[k](at++, static_cast<Index>(c)) / fit.noise[channel];
         }
       }
     }
   }
   std::vector<DecayFactor> result;
-  for (const Index part : {1, 8}) {
-    std::vector<MatrixXd> beginning;
-    for (const MatrixXd& record : rest) {
-      const Index columns = record.cols() / part;
-      if (columns >= 10) beginning.emplace_back(record.leftCols(columns));
-    }
-    if (beginning.empty()) continue;
-    const Realization realization(beginning, cells.step, data.channels, 100);
-    for (int n = 1; n <= std::min(2, realization.max_order()); ++n) {
-      for (const DecayFactor& factor : factors_of(realization.poles(n), cells.duration)) {
-        const bool known = std::any_of(result.begin(), result.end(), [&](const DecayFactor& other) {
-          const Complex a = factor.eigenvalues()[0], b = other.eigenvalues()[0];
-          return factor.pair == other.pair && std::abs(a - b) < 0.1 * std::abs(a);
-        });
-        if (!known) result.push_back(factor);
-      }
+  for (const std::vector<RealizedPole>& poles : poles_of_rest_(rest)) {
+    for (const DecayFactor& factor : factors_of(poles, duration_)) {
+      const bool known = std::any_of(result.begin(), result.end(), [&](const DecayFactor& other) {
+        const Complex a = factor.eigenvalues()[0], b = other.eigenvalues()[0];
+        return factor.pair == other.pair && std::abs(a - b) < 0.1 * std::abs(a);
+      });
+      if (!known) result.push_back(factor);
     }
   }
   return result;
 }
 
-bool ModelSearch::add_from_rest(const DecayCells& cells) {
-  for (const DecayFactor& factor : candidates(cells)) {
+bool ModelSearch::add_from_rest() {
+  for (const DecayFactor& factor : candidates()) {
     std::vector<DecayFactor> factors = fit.factors;
     factors.push_back(factor);
     if (change(factors)) return true;
@@ -180,7 +228,7 @@ bool ModelSearch::drop_one() {
 }
 
 /// Factors that cancel against each other are where a search got lost: begins again without them.
-void ModelSearch::untangle(const DecayCells& cells) {
+void ModelSearch::untangle() {
   constexpr double kCancels = 30;
   std::vector<DecayFactor> kept;
   double all = 0;
@@ -206,7 +254,7 @@ void ModelSearch::untangle(const DecayCells& cells) {
   DecayFit before = fit;
   std::optional<DecayFit> larger_before = larger;
   fit = fit_decays(data, kept, before.noise, 40);
-  for (int k = 0; k < 8 && add_from_rest(cells); ++k) continue;
+  for (int k = 0; k < 8 && add_from_rest(); ++k) continue;
   while (drop_one()) continue;
   if (fit.criterion < before.criterion) return;
   fit = std::move(before);

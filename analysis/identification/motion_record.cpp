@@ -16,7 +16,10 @@ void require(bool condition, const std::string& message) {
 }  // namespace
 
 MotionRecord part_of(const MotionRecord& record, Index from, Index to) {
-  return {record.time.segment(from, to - from), record.output.middleCols(from, to - from)};
+  MotionRecord part{record.time.segment(from, to - from),
+                    record.output.middleCols(from, to - from)};
+  if (record.input.size() > 0) part.input = record.input.middleCols(from, to - from);
+  return part;
 }
 
 void check_records(const std::vector<MotionRecord>& records) {
@@ -24,12 +27,16 @@ void check_records(const std::vector<MotionRecord>& records) {
   const Index channels = records.front().output.rows();
   require(channels > 0, "there is no channel");
   for (std::size_t r = 0; r < records.size(); ++r) {
-    const auto& [time, output] = records[r];
+    const auto& [time, output, input] = records[r];
     const std::string name = "record " + std::to_string(r + 1) + ": ";
     require(output.rows() == channels && output.cols() == time.size(),
             name + "output has to be channels x samples, with as many channels as others");
     require(time.size() >= 20, name + std::to_string(time.size()) + " samples, need 20 or more");
     require(time.allFinite(), name + "a time is not finite");
+    require(input.size() == 0 || input.cols() == time.size(),
+            name + "input has to be inputs x samples");
+    require(input.rows() == records.front().input.rows() && input.allFinite(),
+            name + "its inputs are not finite, or not as many as others");
     for (Index i = 1; i < time.size(); ++i)
       require(time[i] > time[i - 1], name + "time does not rise");
     for (Index c = 0; c < channels; ++c) {

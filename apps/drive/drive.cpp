@@ -217,7 +217,9 @@ void drive(const DriveOptions& options) {
   report.messages = publisher.counters();
   if (commands) report.commands = {commands->tally(), commands->last_reason()};
   if (excitation && !options.log.empty() && report.loop.ticks > 0) {
-    report.identified = identify_log(options.log, options.config);
+    const LogExcitation told{excitation->chirp,
+                             [asked = *excitation](double time) { return asked.wrench(time); }};
+    report.identified = identify_log(options.log, options.config, told);
   }
   print(options.json ? to_json(report) : to_table(report));
   if (failure) std::rethrow_exception(failure);

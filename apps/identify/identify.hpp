@@ -1,12 +1,38 @@
 #pragma once
 #include <dashpot/apps/identify/identify_writer.hpp>
+#include <dashpot/controller/types.hpp>
 
+#include <functional>
+#include <optional>
 #include <string>
+#include <vector>
 
 namespace dashpot::apps {
 
-/// The modes of the free decays in an LCM log, beside those that a configuration predicts. Where
-/// that fails, a note in the report says why.
-IdentifyReport identify_log(const std::string& log, const std::string& config);
+/// What a loop was told to add to the tip's wrench while it made a log.
+struct LogExcitation {
+  bool chirp = false;
+  std::function<controller::Vector6(double)> wrench;  ///< at a time from the first tick, s
+};
+
+/// What `dashpot identify` is asked for.
+struct IdentifyCommand {
+  std::vector<std::string> files;
+  std::string channels, inputs, against, calibrate, output, plot;
+  std::optional<double> from, to;
+  int order = 0;
+  bool ambient = false;
+  bool excited = false;
+  bool json = false;
+  std::optional<LogExcitation> excitation = {};
+};
+
+/// Throws controller::InputError.
+IdentifyReport identify_files(const IdentifyCommand& command);
+
+/// The modes that an LCM log shows of an arm that was excited, beside those that a configuration
+/// predicts. Where that fails, a note in the report says why.
+IdentifyReport identify_log(const std::string& log, const std::string& config,
+                            const LogExcitation& excitation);
 
 }  // namespace dashpot::apps

@@ -58,6 +58,12 @@ std::string shape_text(const Eigen::VectorXcd& shape, const std::vector<MotionCh
   return text;
 }
 
+std::string kind_text(MotionKind kind) {
+  return kind == MotionKind::kDecays    ? "free decay"
+         : kind == MotionKind::kExcited ? "excited record"
+                                        : "ambient record";
+}
+
 std::string hertz(const MeasuredMode& mode) {
   return format_number(mode.natural_frequency / (2 * std::numbers::pi), 4);
 }
@@ -238,7 +244,7 @@ std::string identify_table(const IdentifyReport& report) {
   for (const std::string& note : report.notes) text += "Note: " + note + "\n";
   std::size_t useful = 0;
   for (const PartReport& part : report.parts) useful += part.posture >= 0;
-  text += count(useful, report.ambient ? "ambient record" : "free decay") + " of " +
+  text += count(useful, kind_text(report.kind)) + " of " +
           count(report.channels.size(), "channel") + " at " +
           count(report.postures.size(), "posture") + "\n";
   for (const PartReport& part : report.parts) {
@@ -254,10 +260,11 @@ std::string identify_table(const IdentifyReport& report) {
     const PostureReport& posture = report.postures[k];
     text += "\n" + (report.postures.size() > 1 ? "Posture " + std::to_string(k + 1) + ": " : "") +
             count(posture.found.modes.size(), "mode") + " from " +
-            count(static_cast<std::size_t>(posture.parts), report.ambient ? "record" : "decay") +
+            count(static_cast<std::size_t>(posture.parts),
+                  report.kind == MotionKind::kDecays ? "decay" : "record") +
             "; the model explains " + format_number(100 * posture.found.explained, 6) +
-            " % of the " + (report.ambient ? "correlations" : "motion") + "\n" +
-            modes_table(posture, report.channels);
+            " % of the " + (report.kind == MotionKind::kAmbient ? "correlations" : "motion") +
+            "\n" + modes_table(posture, report.channels);
     if (!posture.found.rejected.empty()) text += "\n" + rejected_table(posture.found.rejected);
     if (report.against) text += "\n" + against_table(posture);
   }

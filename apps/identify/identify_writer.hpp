@@ -58,9 +58,12 @@ struct Calibration {
   std::vector<std::string> warnings;     ///< what the records cannot tell apart
 };
 
+/// What the parts of the files are.
+enum class MotionKind { kDecays, kExcited, kAmbient };
+
 struct IdentifyReport {
   std::vector<MotionChannel> channels;  ///< those that are used
-  bool ambient = false;
+  MotionKind kind = MotionKind::kDecays;
   std::vector<PartReport> parts;
   std::vector<PostureReport> postures;  ///< by falling number of parts
   std::vector<std::string> notes;

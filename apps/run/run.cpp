@@ -215,7 +215,9 @@ void run(const Options& options) {
     report.interrupted = !report.ring_down;
   }
   if (excitation && !options.log.empty()) {
-    report.identified = identify_log(options.log, options.scene);
+    const LogExcitation told{excitation->chirp,
+                             [asked = *excitation](double time) { return asked.wrench(time); }};
+    report.identified = identify_log(options.log, options.scene, told);
   }
   print(options.json ? to_json(report) : to_table(report));
   if (report.messages.send_errors > 0 && !(options.log.empty() && options.csv.empty())) {

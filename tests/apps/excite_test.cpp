@@ -135,6 +135,26 @@ TEST(Excite, IdentifiesWhatFollows) {
   EXPECT_THAT(too_short.out, HasSubstr("10 samples"));
 }
 
+TEST(Excite, IdentifiesWhatAChirpMoves) {
+  const Scratch scratch;
+  const Outcome outcome = run_scene(
+      calm_scene(scratch), {"--json", "--duration", "6", "--log", scratch.path("log"), "--excite",
+                            "chirp,direction=z,force=1,from=0.3,to=8,duration=5,at=0.6"});
+  ASSERT_EQ(outcome.status, 0) << outcome.err;
+  const auto identified = nlohmann::json::parse(outcome.out).at("identified");
+  ASSERT_EQ(identified.at("postures").size(), 1U) << identified.dump(1);
+  EXPECT_GT(identified.at("explained").get<double>(), 0.999);
+  int close = 0;
+  for (const auto& difference : identified.at("difference")) {
+    const auto& mode = identified.at("modes").at(difference.at("measured").get<std::size_t>());
+    const double relative = difference.at("natural_frequency").get<double>() /
+                            mode.at("natural_frequency").get<double>();
+    close +=
+        std::abs(relative) < 0.01 && std::abs(difference.at("damping_ratio").get<double>()) < 0.01;
+  }
+  EXPECT_GE(close, 1) << identified.dump(1);
+}
+
 TEST(Excite, RefusesWhatIsTooMuch) {
   const Scratch scratch;
   const std::string path = calm_scene(scratch);

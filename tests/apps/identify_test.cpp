@@ -142,6 +142,67 @@ TEST(Identify, TakesUnitsAndSeparatorsAsPeopleWriteThem) {
   EXPECT_EQ(both["postures"].size(), 1U);
 }
 
+TEST(Identify, TakesFilesAsRecordersWriteThem) {
+  const Scratch scratch;
+  std::string columns = "# a recorder\n# " + decay_csv("time q_0 q_1", 1), european,
+              stamps = decay_csv("timestamp,q[0],q[1],q_d_0,tau_J_0,mode,", 1, 1e6);
+  for (char& c : columns) c = c == ',' ? ' ' : c;
+  for (const char c : decay_csv("Time,q1 (rad),q2 (rad)", 1)) {
+    european += c == ',' ? ';' : c == '.' ? ',' : c;
+  }
+  std::size_t line = 0;
+  for (std::size_t at = 0; (at = stamps.find('\n', at)) != std::string::npos; ++line) {
+    const std::string more = line == 0 ? "" : ",0.7,0,kMove,";
+    stamps.insert(at, more);
+    at += more.size() + 1;
+  }
+  expect_known_modes(identify({scratch.write("a.txt", columns)}));
+  expect_known_modes(identify({scratch.write("b.csv", european)}));
+  const Json found = identify({scratch.write("c.csv", stamps)});
+  expect_known_modes(found);
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("timestamp is taken to be in us"));
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("as they hold text: mode"));
+  const Outcome bare = run_program({"identify", scratch.write("d.csv", "0,1\n1,2\n")});
+  EXPECT_EQ(bare.status, 2);
+  EXPECT_THAT(bare.err, HasSubstr("d.csv: line 1: numbers, where a line of names"));
+}
+
+/// Eight seconds of an oscillator of 9 rad/s at 0.12 under a force of 0.3 to 5 Hz at 200 Hz.
+TEST(Identify, TakesInputsFromColumns) {
+  const Scratch scratch;
+  std::string text = "time [s],q1 [rad],q2 [rad],force [N]\n";
+  testing::Draws draw(8);
+  double x = 0, v = 0;
+  for (int i = 0; i < 1600; ++i) {
+    const double t = 0.005 * i, u = std::sin(6.283185307179586 * t * (0.3 + 0.29 * t));
+    std::array<char, 200> line{};
+    std::snprintf(line.data(), line.size(), "%.4f,%.9f,0.5,%.9f\n", t, x + 1e-5 * draw.normal(),
+                  10 * u);
+    text += line.data();
+    for (int part = 0; part < 50; ++part) {
+      v += 0.0001 * (u - 2 * 0.12 * 9 * v - 81 * x);
+      x += 0.0001 * v;
+    }
+  }
+  const std::string file = scratch.write("driven.csv", text);
+  const Json found = identify({file, "--inputs", "force"});
+  ASSERT_EQ(found["modes"].size(), 1U) << found.dump();
+  EXPECT_NEAR(found["modes"][0]["natural_frequency"].get<double>(), 9, 0.01);
+  EXPECT_NEAR(found["modes"][0]["damping_ratio"].get<double>(), 0.12, 0.001);
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("q2 never moves"));
+  const Outcome table = run_program({"identify", file, "--inputs", "force"});
+  EXPECT_THAT(table.out, HasSubstr("1 excited record of 2 channels at 1 posture"));
+  for (const auto& [arguments, words] :
+       std::vector<std::pair<std::vector<std::string>, std::string>>{
+           {{"--inputs", "torque"}, "--inputs: no channel 'torque'; there are q1"},
+           {{"--inputs", "q1", "--channels", "q1,q2"}, "'q1' is among --inputs"},
+           {{"--excited"}, "--excited: needs --inputs"}}) {
+    std::vector<std::string> all{"identify", file};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    EXPECT_THAT(run_program(all).err, HasSubstr(words));
+  }
+}
+
 TEST(Identify, LeavesOutWhatIsMissingOrTwiceAndSaysSo) {
   const Scratch scratch;
   std::string text = decay_csv("time [s],q1 [rad],q2 [rad],note", 1), with_holes;

@@ -5,7 +5,8 @@
 // its joints, and RELEASES (1) records of 1.5 s at 1 kHz from 0.02 rad, with noise of 1e-5 rad and
 // 2 % of the samples missing. Modes with less than 5 % of the energy do not count. With 0 releases,
 // random torques shake the arm by about 0.01 rad for two minutes, sampled at 500 Hz, and all modes
-// count. VERBOSE shows each.
+// count. With -1 a chirp of torques, 0.3 to 12 Hz in 10 s at 1 kHz, moves it by about 0.02 rad, and
+// is measured; with -2 there are two records with torques in two directions. VERBOSE shows each.
 #include <dashpot/analysis/identification.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
 
@@ -13,6 +14,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <numbers>
 #include <vector>
 
 namespace {
@@ -34,6 +36,28 @@ double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
+/// A record of a chirp, with `inputs` inputs of which it has number `r`.
+dashpot::analysis::MotionRecord excited(const SprungArm& arm, int r, int inputs, Draws& draw,
+                                        std::vector<double>& shares) {
+  constexpr int kSamples = 10'000;
+  constexpr double kPeriod = 0.001, kFrom = 0.3, kTo = 12;  // s, Hz
+  Eigen::VectorXd u(kSamples), shape(arm.system.mass.rows());
+  for (int i = 0; i < kSamples; ++i) {
+    const double t = i * kPeriod;
+    const double cycles = t * (kFrom + (kTo - kFrom) * t / (2 * kSamples * kPeriod));
+    u[i] = std::sin(2 * std::numbers::pi * cycles);
+  }
+  for (Eigen::Index i = 0; i < shape.size(); ++i) {
+    shape[i] = arm.system.mass(i, i) * draw.normal();
+  }
+  Eigen::MatrixXd motion = arm.drive(shape, u, kPeriod, shares);
+  const double size = 0.02 / motion.cwiseAbs().maxCoeff();
+  auto record = sensed(motion * size, kPeriod, {}, draw);
+  record.input.setZero(inputs, kSamples);
+  record.input.row(r) = u.transpose();
+  return record;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -51,6 +75,15 @@ int main(int argc, char** argv) {
     Eigen::VectorXd start(arm.system.mass.rows());
     for (double& q : start) q = 0.02 * draw.normal();
     std::vector<dashpot::analysis::MotionRecord> records;
+    std::vector<double> shares;
+    for (int r = 0; r < -releases; ++r) {
+      std::vector<double> of_record;
+      records.push_back(excited(arm, r, -releases, draw, of_record));
+      for (std::size_t i = 0; i < of_record.size(); ++i) {
+        if (r == 0) shares.push_back(0);
+        shares[i] += of_record[i] / -releases;
+      }
+    }
     for (int r = 0; r < releases; ++r) {
       if (r > 0) {
         for (double& q : start) q = 0.02 * draw.normal();
@@ -62,8 +95,9 @@ int main(int argc, char** argv) {
       records.push_back(sensed(arm.shake(60, 60'000, 0.002, draw), 0.002, {}, draw));
     }
     try {
-      result = releases == 0 ? dashpot::analysis::identify_ambient(records)
-                             : dashpot::analysis::identify_decays(records);
+      result = releases == 0  ? dashpot::analysis::identify_ambient(records)
+               : releases < 0 ? dashpot::analysis::identify_excited(records)
+                              : dashpot::analysis::identify_decays(records);
     } catch (const std::exception& error) {
       std::printf("case %ld: %s\n", k, error.what());
       continue;
@@ -87,10 +121,13 @@ int main(int argc, char** argv) {
     }
     // Of the energy of the release, which is in the springs.
     std::vector<bool> used(result.modes.size());
-    for (const auto& mode : arm.modes) {
+    for (std::size_t number = 0; number < arm.modes.size(); ++number) {
+      const auto& mode = arm.modes[number];
       const auto& M = arm.system.mass;
       const Eigen::VectorXcd u = mode.shapes[0];
-      const double share = releases == 0 ? 1 : std::norm(u.dot(M * start)) / (start.dot(M * start));
+      const double share = releases == 0  ? 1
+                           : releases < 0 ? shares[number]
+                                          : std::norm(u.dot(M * start)) / (start.dot(M * start));
       std::size_t nearest = result.modes.size();
       double distance = (releases == 0 ? 0.2 : 0.1) * mode.natural_frequency;
       for (std::size_t i = 0; i < result.modes.size(); ++i) {

@@ -113,6 +113,38 @@ struct SprungArm {
     }
     return motion;
   }
+
+  /// How it moves from rest under torques `shape` u, each value of u held for `period` (s): n x
+  /// samples. `shares`: of each mode in the motion, whose squares are weighted by the mass.
+  Eigen::MatrixXd drive(const Eigen::VectorXd& shape, const Eigen::VectorXd& u, double period,
+                        std::vector<double>& shares) const {
+    const Eigen::Index n = system.mass.rows();
+    const Eigen::EigenSolver<Eigen::MatrixXd> solver(state_matrix());
+    const Eigen::VectorXcd& values = solver.eigenvalues();
+    const Eigen::VectorXcd over = (values * period).array().exp();
+    Eigen::VectorXcd start = Eigen::VectorXcd::Zero(2 * n);
+    start.tail(n) = system.mass.llt().solve(shape).cast<analysis::Complex>();
+    const Eigen::VectorXcd push =
+        solver.eigenvectors().lu().solve(start).array() * (over.array() - 1) / values.array();
+    const Eigen::MatrixXcd shapes = solver.eigenvectors().topRows(n);
+    Eigen::MatrixXd motion(n, u.size());
+    Eigen::VectorXcd x = Eigen::VectorXcd::Zero(2 * n);
+    Eigen::VectorXd squares = Eigen::VectorXd::Zero(2 * n);
+    for (Eigen::Index i = 0; i < u.size(); ++i) {
+      motion.col(i) = (shapes * x).real();
+      squares += x.cwiseAbs2();
+      x = over.cwiseProduct(x) + push * u[i];
+    }
+    const double all = (system.mass.llt().matrixU() * motion).squaredNorm();
+    shares.clear();
+    for (const auto& mode : modes) {
+      Eigen::Index nearest = 0;
+      (values.array() - mode.eigenvalues[0]).abs().minCoeff(&nearest);
+      const Eigen::VectorXcd v = shapes.col(nearest);
+      shares.push_back(2 * squares[nearest] * v.dot(system.mass * v).real() / all);
+    }
+    return motion;
+  }
 };
 
 /// What sensors make of a motion.

@@ -1,0 +1,23 @@
+#pragma once
+#include <dashpot/analysis/identification.hpp>
+
+#include <vector>
+
+namespace dashpot::analysis {
+
+/// Records without the channels that are constant in all of them, which say nothing.
+struct MovingChannels {
+  /// Throws std::invalid_argument if there is none.
+  explicit MovingChannels(const std::vector<MotionRecord>& all);
+
+  /// Gives the shapes and the noise of all channels their places; zero for constant ones.
+  Identification of_all(Identification found) const;
+
+  std::vector<MotionRecord> records;
+  std::vector<Eigen::Index> channels;  ///< which of all
+
+ private:
+  Eigen::Index count_;
+};
+
+}  // namespace dashpot::analysis

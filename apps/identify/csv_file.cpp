@@ -1,0 +1,301 @@
+#include <dashpot/apps/identify/motion_rows.hpp>
+#include <dashpot/controller/yaml/quantity.hpp>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+
+namespace dashpot::apps {
+
+std::string_view trimmed(std::string_view text) {
+  const auto begin = text.find_first_not_of(" \t\r");
+  if (begin == std::string_view::npos) return {};
+  text = text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') {
+    return trimmed(text.substr(1, text.size() - 2));
+  }
+  return text;
+}
+
+std::string lower(std::string_view text) {
+  std::string result(text);
+  for (char& c : result) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return result;
+}
+
+namespace {
+
+using controller::InputError;
+
+constexpr std::size_t kMostColumns = 1000;
+constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
+/// A column by its heading.
+struct Column {
+  std::string name, unit;
+  double factor = 1;  ///< to SI
+  bool time = false;
+  bool guessed = false;  ///< the time's unit
+  bool text = false;     ///< not numbers
+};
+
+struct Conversion {
+  std::string unit;
+  double factor;
+};
+
+/// The SI unit that `unit` converts to.
+std::optional<Conversion> to_si(const std::string& unit) {
+  if (unit == "ns") return Conversion{"s", 1e-9};
+  for (const char* si : {"s", "rad", "m", "rad/s", "m/s", "N m", "N"}) {
+    try {
+      return Conversion{si, controller::parse_quantity("1 " + unit, si)};
+    } catch (const std::invalid_argument&) {
+      continue;
+    }
+  }
+  return std::nullopt;
+}
+
+/// What a name without a unit is measured in, by the letters it begins with.
+std::string usual_unit(const std::string& name) {
+  const std::string letters = name.substr(0, name.find_first_of("0123456789_.[( "));
+  const auto is_any = [&letters](std::initializer_list<const char*> names) {
+    return std::find(names.begin(), names.end(), letters) != names.end();
+  };
+  if (is_any({"q", "position", "pos", "angle"})) return "rad";
+  if (is_any({"qd", "dq", "v", "vel", "velocity"})) return "rad/s";
+  if (is_any({"tau", "torque", "effort"})) return "N m";
+  return "";
+}
+
+Column read_heading(std::string_view cell, std::size_t number) {
+  const std::string_view text = trimmed(cell);
+  Column column;
+  std::string unit;
+  const auto open = text.find_last_of("[(");
+  const bool index = open != std::string_view::npos && open + 1 < text.size() &&
+                     text.find_first_not_of("0123456789", open + 1) == text.size() - 1;
+  if (!index && open != std::string_view::npos && (text.back() == ']' || text.back() == ')')) {
+    column.name = trimmed(text.substr(0, open));
+    unit = trimmed(text.substr(open + 1, text.size() - open - 2));
+    if (unit == "1" || unit == "-") unit.clear();
+    if (!unit.empty() && !to_si(unit)) {
+      throw InputError("", "column " + std::to_string(number) + " (" + column.name +
+                               "): unknown unit '" + unit + "'");
+    }
+  } else {
+    column.name = text;
+    const auto bar = text.rfind('_');
+    if (bar != std::string_view::npos && to_si(std::string(text.substr(bar + 1)))) {
+      column.name = text.substr(0, bar);
+      unit = text.substr(bar + 1);
+    }
+  }
+  if (column.name.empty()) {
+    throw InputError("", "column " + std::to_string(number) + " has no name");
+  }
+  const std::string name = lower(column.name);
+  for (const char* one : {"t", "time", "timestamp", "time_stamp", "stamp", "utime"}) {
+    column.time = column.time || name == one;
+  }
+  if (unit.empty()) {
+    column.guessed = column.time && name != "utime";
+    unit = column.time ? (name == "utime" ? "us" : "s") : usual_unit(name);
+  }
+  if (!unit.empty()) {
+    const Conversion conversion = *to_si(unit);
+    column.unit = conversion.unit;
+    column.factor = conversion.factor;
+  }
+  if (column.time && column.unit != "s") {
+    throw InputError("", "column " + std::to_string(number) + " (" + column.name + "): in " + unit +
+                             ", a time is wanted in s, ms, us or ns");
+  }
+  return column;
+}
+
+double read_cell(std::string_view cell, const Column& column, std::size_t line) {
+  std::string_view text = trimmed(cell);
+  if (text.empty()) return kMissing;
+  if (text.front() == '+') text.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc::result_out_of_range) value = kMissing;
+  if ((error != std::errc{} && error != std::errc::result_out_of_range) ||
+      end != text.data() + text.size()) {
+    throw InputError("", "line " + std::to_string(line) + ", " + column.name + ": '" +
+                             std::string(text.substr(0, 40)) + "' is no number");
+  }
+  return std::isfinite(value) ? value * column.factor : kMissing;
+}
+
+/// The cells of a line between `separator`s; between spaces, as many as there are.
+std::vector<std::string_view> cells_of(std::string_view row, char separator) {
+  std::vector<std::string_view> cells;
+  if (separator == ' ') row = trimmed(row);
+  while (cells.size() <= kMostColumns) {
+    const auto next = std::min(row.find(separator), row.size());
+    cells.push_back(row.substr(0, next));
+    if (next == row.size()) break;
+    row.remove_prefix(next + 1);
+    if (separator == ' ') row.remove_prefix(std::min(row.find_first_not_of(' '), row.size()));
+  }
+  return cells;
+}
+
+char separator_of(std::string_view row) {
+  for (const char candidate : {';', '\t', ','}) {
+    if (row.find(candidate) != std::string_view::npos) return candidate;
+  }
+  // "time [s]" is one name.
+  const bool words = row.find_first_of("[(\"") == std::string_view::npos;
+  return words && trimmed(row).find(' ') != std::string_view::npos ? ' ' : ',';
+}
+
+bool is_number(std::string_view cell) {
+  cell = trimmed(cell);
+  double value = 0;
+  return !cell.empty() &&
+         std::from_chars(cell.data(), cell.data() + cell.size(), value).ec == std::errc{};
+}
+
+class CsvReader {
+ public:
+  MotionFile read(std::string_view rest) {
+    if (rest.substr(0, 3) == "\xEF\xBB\xBF") rest.remove_prefix(3);
+    for (line_ = 1; !rest.empty(); ++line_) {
+      const auto end = std::min(rest.find('\n'), rest.size());
+      const std::string_view row = rest.substr(0, end);
+      rest.remove_prefix(std::min(end + 1, rest.size()));
+      const std::string_view words = trimmed(row);
+      if (words.empty()) continue;
+      const auto name = words.find_first_not_of("#%/ \t");
+      if (name != 0) {
+        if (name != std::string_view::npos) comment_ = words.substr(name);
+        continue;
+      }
+      if (!columns_.empty()) {
+        read_row(row);
+      } else if (is_number(cells_of(row, separator_of(row)).front())) {
+        // Numbers at once: the names are in the comment before, or nowhere.
+        if (comment_.empty()) fail("numbers, where a line of names with units is wanted first");
+        read_names(comment_);
+        read_row(row);
+      } else {
+        read_names(row);
+      }
+    }
+    if (columns_.empty() && !comment_.empty()) read_names(comment_);
+    if (columns_.empty()) throw InputError("", "is empty");
+    rows_.finish();
+    scale_time();
+    return std::move(file_);
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw InputError("", "line " + std::to_string(line_) + ": " + what);
+  }
+
+  void read_names(std::string_view row) {
+    separator_ = separator_of(row);
+    std::vector<std::string_view> cells = cells_of(row, separator_);
+    if (cells.size() > kMostColumns) throw InputError("", "more than 1000 columns");
+    if (cells.size() > 1 && trimmed(cells.back()).empty()) cells.pop_back();
+    for (const std::string_view cell : cells) {
+      columns_.push_back(read_heading(cell, columns_.size() + 1));
+    }
+    const auto times = std::count_if(columns_.begin(), columns_.end(),
+                                     [](const Column& column) { return column.time; });
+    if (times > 1) throw InputError("", "two columns of time");
+    if (times == 0) fail("no column of time (t, time, timestamp, stamp or utime)");
+    if (columns_.size() == 1) throw InputError("", "no column but the time");
+  }
+
+  void read_row(std::string_view row) {
+    std::vector<std::string_view> cells = cells_of(row, separator_);
+    if (cells.size() == columns_.size() + 1 && trimmed(cells.back()).empty()) cells.pop_back();
+    if (cells.size() != columns_.size()) {
+      fail("not " + std::to_string(columns_.size()) + " columns, as the names have, but " +
+           std::to_string(cells.size()));
+    }
+    if (file_.channels.empty()) note_channels(cells);
+    double at = kMissing;
+    values_.clear();
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      const Column& column = columns_[i];
+      if (column.text) continue;
+      std::string_view cell = cells[i];
+      std::string point;
+      if (separator_ != ',' && cell.find(',') != std::string_view::npos) {
+        point = cell;
+        point[point.find(',')] = '.';
+        cell = point;
+      }
+      const double value = read_cell(cell, column, line_);
+      if (column.time) {
+        at = value;
+      } else {
+        values_.push_back(value);
+      }
+    }
+    if (std::isnan(at)) fail("no time");
+    rows_.add(at, values_.data(), values_.size());
+  }
+
+  /// The channels, without those whose first cell is text.
+  void note_channels(const std::vector<std::string_view>& cells) {
+    std::string left_out;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      Column& column = columns_[i];
+      const std::string_view cell = trimmed(cells[i]);
+      const bool letters = !cell.empty() && ((cell[0] >= 'A' && cell[0] <= 'Z') ||
+                                             (cell[0] >= 'a' && cell[0] <= 'z'));
+      const std::string word = lower(cell);
+      column.text = !column.time && letters && word != "nan" && word != "inf" && word != "infinity";
+      if (column.text) left_out += (left_out.empty() ? "" : ", ") + column.name;
+      if (!column.time && !column.text) file_.channels.push_back({column.name, column.unit});
+    }
+    if (!left_out.empty()) file_.notes.push_back("left out, as they hold text: " + left_out);
+    if (file_.channels.empty()) throw InputError("", "no column of numbers but the time");
+  }
+
+  /// A time without a unit whose steps are no seconds is in ms, us or ns.
+  void scale_time() {
+    const auto column =
+        std::find_if(columns_.begin(), columns_.end(), [](const Column& one) { return one.time; });
+    if (!column->guessed) return;
+    constexpr double kLongest = 0.06;  // s
+    const double step =
+        file_.time[file_.time.size() - 1] / static_cast<double>(file_.time.size() - 1);
+    for (const auto& [unit, factor] :
+         {std::pair("ms", 1e-3), std::pair("us", 1e-6), std::pair("ns", 1e-9)}) {
+      if (step < 0.5) return;
+      if (step * factor > kLongest) continue;
+      file_.time *= factor;
+      file_.notes.push_back(column->name + " is taken to be in " + unit +
+                            ", by its steps: give its unit if it is not");
+      return;
+    }
+  }
+
+  MotionFile file_;
+  Rows rows_{file_};
+  std::vector<Column> columns_;
+  std::vector<double> values_;
+  std::string_view comment_;  ///< the last one
+  char separator_ = ',';
+  std::size_t line_ = 1;
+};
+
+}  // namespace
+
+MotionFile read_csv(std::string_view text) {
+  return CsvReader().read(text);
+}
+
+}  // namespace dashpot::apps
