@@ -1,13 +1,16 @@
 // Each term of the radii that are proved for a tracked basis: where it is attained, and the value
-// of all of them together against the formula in long double.
+// of all of them together against the formula in long double; and what becomes of the radii.
 #include <dashpot/analysis/tracker/tracked_enclosure.hpp>
+#include <dashpot/analysis/tracker/tracked_modes.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/special_values.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <complex>
 #include <vector>
 
 namespace dashpot::analysis {
@@ -231,6 +234,68 @@ TEST(TrackedProofTerms, NothingIsProvedBeyondTheRangeOfNumbers) {
     made.prove();
     EXPECT_EQ(made.enclosure.radius[0], kInfinity) << mass << ", " << stiffness;
   }
+}
+
+/// The modes of blocks [a b; c d] with these radii and groups.
+TrackedSpectrum modes_of(const std::vector<std::array<double, 4>>& blocks, double radius,
+                         bool alone, double soft_frequency, std::array<bool, kMaxDof>& soft) {
+  BlockEigenbasis basis;
+  basis.modes = static_cast<int>(blocks.size());
+  TrackedEnclosure enclosure;
+  enclosure.reset(basis.modes);
+  enclosure.radius.setConstant(radius);
+  if (!alone) enclosure.group.setZero();
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    basis.l00[i] = blocks[i][0], basis.l01[i] = blocks[i][1];
+    basis.l10[i] = blocks[i][2], basis.l11[i] = blocks[i][3];
+  }
+  TrackedSpectrum spectrum;
+  read_numbers(basis, enclosure, soft_frequency, soft, spectrum);
+  return spectrum;
+}
+
+TEST(TrackedProofTerms, RoundingErrorsOfEigenvaluesOfABlock) {
+  Random random(2502);
+  for (int trial = 0; trial < 300; ++trial) {  // near critical damping, where they are largest
+    const double a = random.uniform(-2, -1), d = random.uniform(-2, -1), b = random.uniform(1, 2);
+    const double c = -0.25 * (a - d) * (a - d) / b * (1 + random.log_uniform(1e-16, 1e-8));
+    std::array<bool, kMaxDof> soft{};
+    const TrackedSpectrum spectrum = modes_of({{a, b, c, d}}, 0, true, 0, soft);
+    const Long half = (static_cast<Long>(a) - d) / 2;
+    const std::complex<Long> root =
+        std::sqrt(std::complex<Long>(half * half + static_cast<Long>(b) * static_cast<Long>(c), 0));
+    const std::complex<Long> mean = (static_cast<Long>(a) + d) / 2;
+    for (const Complex& value : spectrum.modes[0].eigenvalues) {
+      const std::complex<Long> z(value);
+      const Long error = std::min(std::abs(z - mean - root), std::abs(z - mean + root));
+      EXPECT_LE(error, static_cast<Long>(spectrum.modes[0].error_bound)) << "trial " << trial;
+    }
+  }
+}
+
+TEST(TrackedProofTerms, FrequenciesOfAGroupAreThoseOfTheUnionOfItsDiscs) {
+  // Two modes of one group 1.5 radii apart: either eigenvalue may be 2.5 radii away.
+  constexpr double kRadius = 1e-3;
+  for (const bool alone : {true, false}) {
+    std::array<bool, kMaxDof> soft{};
+    const TrackedSpectrum spectrum =
+        modes_of({{-0.1, 10, -10, -0.1}, {-0.1, 10 + 1.5 * kRadius, -10 - 1.5 * kRadius, -0.1}},
+                 kRadius, alone, 0, soft);
+    EXPECT_EQ(spectrum.modes[0].natural_frequency_bound > 2.4 * kRadius, !alone);
+    EXPECT_EQ(spectrum.modes[0].error_bound > 3 * kRadius, !alone);  // 2.4 are a disc
+  }
+}
+
+TEST(TrackedProofTerms, ASoftModeStaysSoftUpToTwiceTheFrequency) {
+  std::array<bool, kMaxDof> soft{};
+  const auto kind_at = [&soft](double omega) {
+    return modes_of({{-0.1, omega, -omega, -0.1}}, 1e-9, true, 1, soft).modes[0].kind;
+  };
+  EXPECT_EQ(kind_at(1.5), ModeKind::kUnderdamped);
+  EXPECT_EQ(kind_at(0.9), ModeKind::kSoft);
+  EXPECT_EQ(kind_at(1.5), ModeKind::kSoft);
+  EXPECT_EQ(kind_at(2.1), ModeKind::kUnderdamped);
+  EXPECT_EQ(kind_at(1.5), ModeKind::kUnderdamped);
 }
 
 }  // namespace
