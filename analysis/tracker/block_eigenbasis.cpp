@@ -1,5 +1,4 @@
 #include <dashpot/analysis/tracker/block_eigenbasis.hpp>
-#include <dashpot/analysis/tracker/two_sided_basis.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -197,6 +196,31 @@ void multiply(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
   product(transposed, basis.columns(), states, residual.MV.row(0), nullptr, 1, residual.R.row(0));
   product(transposed, basis.columns(), states, residual.image.row(0), nullptr, 1,
           residual.G.row(0));
+}
+
+/// R = Y S Z and G = Y B Z of a two-sided basis (two_sided_basis.hpp).
+void multiply_two_sided(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
+                        TrackedResidual& residual) {
+  const int n = pencil.joints, p = pencil.rank, states = pencil.states(), width = basis.Z.width;
+  const auto product = [multiplication = padded_multiply(width), width](
+                           const Strided& A, int rows, int inner, const double* X,
+                           const double* start, double sign, double* out) {
+    multiplication(A, rows, inner, X, start, sign, out, width);
+  };
+  const double *const position = basis.Z.row(0), *const velocity = basis.Z.row(p);
+  std::copy(position, velocity, residual.MV.row(0));
+  product({pencil.M, 1, n}, n, n, velocity, nullptr, -1, residual.MV.row(p));
+  if (pencil.factored) {
+    product({pencil.W, 1, p}, p, n, velocity, nullptr, 1, residual.image.row(0));
+    product({pencil.W, p, 1}, n, p, position, nullptr, 1, residual.image.row(p));
+  } else {
+    std::copy(velocity, velocity + n * width, residual.image.row(0));
+    product({pencil.W, 1, n}, n, n, position, nullptr, 1, residual.image.row(p));
+  }
+  product({pencil.C, 1, n}, n, n, velocity, residual.image.row(p), 1, residual.image.row(p));
+  const Strided left{basis.Y.row(0), width, 1};
+  product(left, states, states, residual.MV.row(0), nullptr, 1, residual.R.row(0));
+  product(left, states, states, residual.image.row(0), nullptr, 1, residual.G.row(0));
 }
 
 /// v' M v of the columns of block i, and between the two; elastic energies differ from

@@ -17,10 +17,6 @@ namespace dashpot::analysis {
 // There are as many blocks as joints without a factor; zero modes are the last of them then, with
 // an eigenvalue of zero to rounding.
 
-/// Writes N = Y S Z and T = Y B Z into R and G of the residual, and -M V and B Z.
-void multiply_two_sided(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
-                        TrackedResidual& residual) noexcept;
-
 /// Computes Y <- Sigma (I - Sigma R - E) Sigma Y, which goes with Z <- Z (I + E) of the same
 /// Newton step: Y S Z = Sigma then holds to second order. Overwrites MV and image of the residual.
 void take_left_step(const PackedMatrix& E, TrackedResidual& residual,
