@@ -191,7 +191,7 @@ TEST(RunWithCommands, RefusesGainsThatTheSampledLoopDoesNotBear) {
   EXPECT_THAT(reason, HasSubstr("margin"));
 }
 
-TEST(RunWithCommands, HoldsARatioACarriesAPayloadAndLowersTheTipsSpeed) {
+TEST(RunWithCommands, HoldsARatioCarriesAPayloadAndLowersTheTipsSpeed) {
   const std::string url = own_url();
   Listener listener(url);
   const Scratch scratch;
