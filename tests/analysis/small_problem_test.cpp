@@ -162,7 +162,9 @@ TEST(SmallProblem, DesignsForALongDelay) {
     const SampledDamping found = design_damping(impedance, DampingTarget::constant(1), limit);
     EXPECT_TRUE(found.kept);
     EXPECT_GE(found.gain_margin, 2) << delay;
-    if (found.level < 1) EXPECT_NEAR(found.gain_margin, 2, 1e-4) << delay;
+    if (found.level < 1) {
+      EXPECT_NEAR(found.gain_margin, 2, 1e-4) << delay;
+    }
     EXPECT_TRUE(found.sampled.stable());
     const SampledDataModel model(found.design.system, found.design.spectrum, limit.loop);
     EXPECT_EQ(model.inner(), 20);
