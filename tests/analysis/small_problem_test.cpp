@@ -147,7 +147,7 @@ TEST(SmallProblem, HasTheEigenvaluesOfTheDenseOne) {
   EXPECT_LE(refused, 8);
 }
 
-/// 10 joints, 6 directions, 100 ticks: 1,220 rows. The dense problem of this delay would take
+/// 10 joints, 6 directions, 100 ticks: 1,020 rows. The dense problem of this delay would take
 /// minutes.
 TEST(SmallProblem, DesignsForALongDelay) {
   Random random(40);
