@@ -19,14 +19,17 @@ using testing::near;
 using testing::Random;
 using testing::RandomRobot;
 
-constexpr double kStep = 1e-4;
-/// Of differences over kStep, relative to quantities of order one.
+constexpr double kDifferenceStep = 1e-4;
+/// Of differences over kDifferenceStep, relative to quantities of order one.
 constexpr double kDifference = 1e-6;
 
 /// (f(x + h) - f(x - h)) / 2h by fourth order.
 template <class Function>
 auto derivative(const Function& f) {
-  return ((8 * (f(kStep) - f(-kStep)) - (f(2 * kStep) - f(-2 * kStep))) / (12 * kStep)).eval();
+  return ((8 * (f(kDifferenceStep) - f(-kDifferenceStep)) -
+           (f(2 * kDifferenceStep) - f(-2 * kDifferenceStep))) /
+          (12 * kDifferenceStep))
+      .eval();
 }
 
 std::vector<RobotModel> models() {
