@@ -1,3 +1,4 @@
+#include <dashpot/apps/identify/motion_file.hpp>
 #include <dashpot/apps/identify/motion_rows.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/text/read_file.hpp>

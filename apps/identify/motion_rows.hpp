@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/apps/identify/motion_file.hpp>
+#include <dashpot/apps/identify/recorded_motion.hpp>
 #include <dashpot/controller/input_error.hpp>
 
 #include <string_view>

@@ -24,6 +24,7 @@ robot: {urdf: )" + std::string(DASHPOT_SOURCE_DIR) +
                            R"(/sim/models/panda.urdf, base: panda_link0, tip: panda_hand_tcp}
 control: {mode: joint}
 motion: {gain_time: 10 ms}
+gains: {joint: {stiffness: [600, 600, 600, 600, 100, 100, 20], damping: [20, 50, 8, 30, 5, 5, 1]}}
 )" + more + R"(
 scenario:
   duration: 3 s

@@ -40,8 +40,8 @@ INSTANTIATE_TEST_SUITE_P(
     Scenes, RunRefuses,
     ::testing::Values(
         BadScene{"UnknownKey", "ur5", "duration:", "duratoin:",
-                 "scenario.duratoin: unknown key; the keys are duration, start, pushes, steps, "
-                 "faults, ring_down (line 17)"},
+                 "scenario.duratoin: unknown key; the keys are duration, start, pushes, loads, "
+                 "steps, faults, ring_down (line 17)"},
         BadScene{"WrongUnit", "ur5", "duration: 6 s", "duration: 6 kg",
                  "scenario.duration: has a wrong unit: '6 kg'; s is wanted (line 17)"},
         BadScene{"NegativeDuration", "ur5", "duration: 6 s", "duration: -6 s",
@@ -54,7 +54,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"StepOutOfReach", "panda", "[5 cm, 5 cm, -5 cm, 0, 0, 20 deg]",
                  "[5 cm, 1.5 m, -5 cm, 0, 0, 20 deg]",
                  "scenario.steps[1].tip_displacement: is out of the arm's reach, by @ m and @ rad "
-                 "(line 68)"},
+                 "(line 71)"},
         BadScene{"OutOfLimits", "panda", "position: [0, -45 deg", "position: [0, -145 deg",
                  "scenario.start.position: joint 2 would be at -2.530727 rad, outside its limits "
                  "(line 58)"},
@@ -68,7 +68,7 @@ INSTANTIATE_TEST_SUITE_P(
                  "limits (line 26)"},
         BadScene{"IndefiniteDamping", "panda", "damping: [20 N s/m, 20", "damping: [-20 N s/m, 20",
                  "scenario.steps: the controller refuses this: task_damping is not positive "
-                 "semidefinite (line 69)"},
+                 "semidefinite (line 72)"},
         BadScene{"EndBeforeBegin", "iiwa14", "end: 1.6 s", "end: 1.4 s",
                  "scenario.pushes[1].end: is not after begin (line 23)"},
         BadScene{"WrongLength", "iiwa14", "joint_displacement: [0.02, 0.02",

@@ -33,6 +33,12 @@ class Gains(c.Structure):
                 ("joint_damping_ratio", Doubles), ("null_damping_ratio", Doubles)]
 
 
+class Payload(c.Structure):
+    _fields_ = [("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("mass", c.c_double),
+                ("center", c.c_double * 3), ("inertia", c.c_double * 9),
+                ("tool_position", Doubles), ("tool_rotation", Doubles)]
+
+
 class Output(c.Structure):
     _fields_ = [("struct_size", c.c_uint32), ("joints", c.c_uint32), ("torque", Doubles)]
 
@@ -47,7 +53,11 @@ class Snapshot(c.Structure):
                 ("reference_joint_position", c.c_double * MAX_JOINTS),
                 ("reference_tip_position", c.c_double * 3), ("reference_tip_rotation", c.c_double * 9),
                 ("law_torque", c.c_double * MAX_JOINTS), ("tip_error", c.c_double * 6),
-                ("tip_wrench", c.c_double * 6)]
+                ("tip_wrench", c.c_double * 6),
+                ("joint_damping_ratio", c.c_double), ("task_damping_ratio", c.c_double),
+                ("payload_mass", c.c_double), ("payload_center", c.c_double * 3),
+                ("payload_inertia", c.c_double * 9), ("tool_position", c.c_double * 3),
+                ("tool_rotation", c.c_double * 9)]
 
 
 class Mode(c.Structure):
@@ -118,6 +128,9 @@ class Plugin(c.Structure):
                 ("set_gains", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Gains))),
                 ("judge_gains", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Gains), Doubles,
                                             Doubles)),
+                ("set_payload", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Payload))),
+                ("limit_tip_speed", c.CFUNCTYPE(c.c_int32, Handle, c.c_double, c.c_double,
+                                                c.c_double)),
                 ("evaluate", c.CFUNCTYPE(c.c_int32, Handle, Doubles, Doubles, c.POINTER(Dynamics))),
                 ("analyze", c.CFUNCTYPE(c.c_int32, Handle, Doubles, c.c_int32, c.POINTER(Gains),
                                         c.POINTER(ClosedLoop), c.POINTER(Modes))),
@@ -133,8 +146,8 @@ def load(path):
     library.dashpot_plugin_interface.restype = c.POINTER(Plugin)
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
-    plugin = library.dashpot_plugin_interface(7).contents
-    assert plugin.version == 7 and plugin.struct_size == c.sizeof(Plugin)
+    plugin = library.dashpot_plugin_interface(8).contents
+    assert plugin.version == 8 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
 

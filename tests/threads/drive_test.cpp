@@ -320,7 +320,7 @@ TEST(DriveOfAnIiwa, JudgesGainsForThePeriod) {
         scratch, kIiwa,
         {{"period: 1 ms", "period: " + period},
          {"[150, 150, 100, 100, 40, 20, 8]", "[600, 600, 600, 400, 100, 50, 10]"},
-         {"[20, 20, 10, 10, 1.5, 0.7, 0.15]", "[60, 60, 50, 40, " + wrist + "]"}});
+         {"damping_ratio: 0.8", "damping: [60, 60, 50, 40, " + wrist + "]"}});
     Running driving({"drive", config, "--iiwa", "--lcm-url", own_url()});
     const auto waits = [&] { return driving.complaints().find("no status") != std::string::npos; };
     while (!waits() && !driving.ended()) usleep(10'000);
@@ -366,7 +366,8 @@ TEST(DriveOfAnIiwa, CountsWhatSpringsOfKukasDamp) {
   // A command acts a period after its status.
   const std::string config = changed_configuration(
       scratch, kIiwa,
-      {{"analysis:",
+      {{"damping_ratio: 0.8", "damping: [20, 20, 10, 10, 1.5, 0.7, 0.15]"},  // so that it rings
+       {"analysis:",
         "motion: {gain_time: 10 ms}\nenvironment: {joint_damping: " + in_all + "}\nanalysis:"}});
   const std::string url = own_url();
   Running fake({"fake-driver", robot, "--iiwa", "--lcm-url", url, "--lock-step"});

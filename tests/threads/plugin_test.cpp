@@ -37,14 +37,15 @@ TEST(Plugin, ShowsItsFunctionsAndNothingElse) {
     words >> address >> type >> name;
     names.insert(name);
   }
-  EXPECT_THAT(names, ::testing::UnorderedElementsAre(
-                         "dashpot_create", "dashpot_create_from_text", "dashpot_evaluate",
-                         "dashpot_analyze", "dashpot_destroy", "dashpot_last_error",
-                         "dashpot_joints", "dashpot_joint_name", "dashpot_period", "dashpot_update",
-                         "dashpot_start", "dashpot_reset", "dashpot_release", "dashpot_judge_gains",
-                         "dashpot_set_setpoint", "dashpot_set_gains", "dashpot_read_snapshot",
-                         "dashpot_read_modes", "dashpot_read_sampled_modes", "dashpot_status_text",
-                         "dashpot_kind_text", "dashpot_plugin_interface"));
+  EXPECT_THAT(names,
+              ::testing::UnorderedElementsAre(
+                  "dashpot_create", "dashpot_create_from_text", "dashpot_evaluate",
+                  "dashpot_analyze", "dashpot_destroy", "dashpot_last_error", "dashpot_joints",
+                  "dashpot_joint_name", "dashpot_period", "dashpot_update", "dashpot_start",
+                  "dashpot_reset", "dashpot_release", "dashpot_judge_gains", "dashpot_set_setpoint",
+                  "dashpot_set_gains", "dashpot_read_snapshot", "dashpot_read_modes",
+                  "dashpot_read_sampled_modes", "dashpot_status_text", "dashpot_kind_text",
+                  "dashpot_plugin_interface", "dashpot_set_payload", "dashpot_limit_tip_speed"));
 }
 
 TEST(Plugin, KnowsItsVersionOnly) {

@@ -1,0 +1,31 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// One channel of a recorded motion.
+struct MotionChannel {
+  std::string name;
+  std::string unit;  ///< SI: rad, m, rad/s, m/s, N m, N; empty if the file does not say
+};
+
+/// A recorded motion.
+struct MotionFile {
+  std::vector<MotionChannel> channels;
+  Eigen::VectorXd time;    ///< s, strictly rising, from the first sample
+  Eigen::MatrixXd values;  ///< channels x samples, SI; NaN where a sample is missing
+  /// For each sample whether the controller was well and kept its reference and its wrench; empty
+  /// for CSV files.
+  std::vector<bool> free;
+  std::vector<bool> rests;  ///< the same, whatever the wrench does
+  /// Of a log whose springs are at the joints throughout: the tip's wrench is that of an excitation
+  /// alone, and in channels wrench_x ... wrench_rz.
+  bool wrench = false;
+  std::vector<std::string> notes;  ///< what was guessed or left out
+  int duplicates = 0;              ///< samples left out because another has the same time
+  int out_of_order = 0;  ///< samples left out because their time is before that of the one before
+};
+
+}  // namespace dashpot::apps
