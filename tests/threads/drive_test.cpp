@@ -366,7 +366,8 @@ TEST(DriveOfAnIiwa, CountsWhatSpringsOfKukasDamp) {
   // A command acts a period after its status.
   const std::string config = changed_configuration(
       scratch, kIiwa,
-      {{"damping_ratio: 0.8", "damping: [20, 20, 10, 10, 1.5, 0.7, 0.15]"},  // so that it rings
+      {{"damping_ratio: 0.8", "damping: [20, 20, 10, 10, 1.5, 0.7, 0.15]"},   // so that it rings
+       {"viscous_friction: 0 N m s/rad", "viscous_friction: 0.5 N m s/rad"},  // the simulated arm's
        {"analysis:",
         "motion: {gain_time: 10 ms}\nenvironment: {joint_damping: " + in_all + "}\nanalysis:"}});
   const std::string url = own_url();

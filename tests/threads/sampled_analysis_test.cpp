@@ -89,8 +89,9 @@ TEST(SampledAnalysis, FindsWhatTheAnalysisOfThatLoopFinds) {
       const analysis::SampledMode& wanted = sampled.modes[i];
       const auto& origin = continuous.modes[static_cast<int>(i)];
       EXPECT_EQ(mode.kind, wanted.kind);
-      EXPECT_DOUBLE_EQ(mode.continuous_frequency, origin.natural_frequency);
-      EXPECT_DOUBLE_EQ(mode.continuous_ratio, origin.damping_ratio);
+      EXPECT_NEAR(mode.continuous_frequency, origin.natural_frequency,
+                  1e-12 * origin.natural_frequency);
+      EXPECT_NEAR(mode.continuous_ratio, origin.damping_ratio, 1e-12);
       EXPECT_NEAR(mode.natural_frequency, wanted.natural_frequency,
                   1e-9 * origin.natural_frequency);
       EXPECT_NEAR(mode.damping_ratio, wanted.damping_ratio, 1e-9 * origin.natural_frequency);
