@@ -22,8 +22,7 @@ namespace dashpot::analysis {
 /// while omega T stays well below 1.
 ///
 /// Call it at a lower rate than the tick's, because it allocates, and solves one dense eigenproblem
-/// of up to 120 rows, or, for more waiting commands, one of 2 + d rows or so for each joint, and
-/// then the nonlinear one of the inner state (docs/theory.md). Throws std::invalid_argument for matrices of other sizes or entries
+/// of up to (4 + d) n rows. Throws std::invalid_argument for matrices of other sizes or entries
 /// that are not finite, a period that is not positive, a negative delay or cutoff, and a spectrum
 /// without modes because of its status. Throws std::runtime_error if the eigenvalue iteration does
 /// not converge.
@@ -32,14 +31,12 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
                             const SampledLoop& loop);
 
 /// Returns the factor by which K and the controller's damping C - D may grow together before the
-/// loop becomes unstable, to six digits. What SampledLoop::memory puts out grows with them. It is
-/// the first boundary above 1, or infinity if there is none up to `most`. Where the loop is
-/// unstable as it is, the result is the first boundary below 1, or zero if there is none down to
-/// 1e-3. Motions with |log z| / T below `slowest`, rad/s, do not count, because a self-motion fed
-/// by gravity compensation with a zero-order hold is no vibration; nor do motions with |log z|
-/// below 1e-6 (1e-4 with states of SampledLoop::memory). The
-/// search takes about a hundred eigenproblems of at most n rows, whatever the delay. Throws like
-/// sample_loop.
+/// loop becomes unstable, to six digits. It is the first boundary above 1, searched in steps of a
+/// quarter, or infinity if there is none up to `most`. Where the loop is unstable as it is, the
+/// result is the first boundary below 1, or zero if there is none down to 1e-3. Motions with
+/// |log z| / T below `slowest`, rad/s, do not count, because a self-motion fed by gravity
+/// compensation with a zero-order hold is no vibration. The search takes ten to some tens of
+/// eigenproblems. Throws like sample_loop.
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
                    double most = 1e6, double slowest = 0);

@@ -62,7 +62,7 @@ SampledDataModel::SampledDataModel(const System<N>& system, const Spectrum<N>& s
   D = T * unit(checked(loop.friction, n, "friction"));
   G = T * T * unit(checked(loop.gravity_gradient, n, "gravity_gradient"));
   zero_modes = mass.matrixU() * MatrixXd(spectrum.zero_modes.basis);
-  assemble(loop, mass.matrixU().solve(MatrixXd::Identity(n, n)));
+  integrate();
 }
 
 template <int N>
@@ -70,8 +70,7 @@ SampledDataModel::SampledDataModel(const ElasticForm<N>& form, const SampledLoop
     : n(form.coordinates.rows()) {
   set_loop(loop);
   const Index m = form.modes();
-  const bool plain =
-      loop.friction.isZero(0) && loop.gravity_gradient.isZero(0) && loop.memory.state.size() == 0;
+  const bool plain = loop.friction.isZero(0) && loop.gravity_gradient.isZero(0);
   if (plain && form.free_zero_modes) n = m;
   const auto unit = [&](const MatrixXd& A) -> MatrixXd {
     if (plain) return MatrixXd::Zero(n, n);
@@ -85,115 +84,44 @@ SampledDataModel::SampledDataModel(const ElasticForm<N>& form, const SampledLoop
   D = T * unit(loop.friction);
   G = T * T * unit(loop.gravity_gradient);
   zero_modes = MatrixXd::Identity(n, n).rightCols(n - m);
-  assemble(loop, form.coordinates.leftCols(n));
+  integrate();
 }
 
-void SampledDataModel::assemble(Index states) {
-  const Index v = difference ? 2 * n : n, p = (difference ? 3 : 2) * n + states;
-  MatrixXd motion = MatrixXd::Zero(2 * n, 3 * n);  // the change of (y, y') from (y, y', f)
-  const MatrixXd unit = MatrixXd::Identity(n, n);
+void SampledDataModel::integrate() {
+  motion_ = MatrixXd::Zero(2 * n, 3 * n);
   if (D.isZero(0) && G.isZero(0)) {  // masses alone
-    motion.middleCols(n, n).topRows(n) = unit;
-    motion.rightCols(n) << 0.5 * unit, unit;
-  } else {
-    // d/dt (y, y', f) = rate (y, y', f)
-    MatrixXd rate = MatrixXd::Zero(3 * n, 3 * n);
-    rate.block(0, n, n, n).setIdentity();
-    rate.middleRows(n, n) << -G, -D, unit;
-    motion = (rate * phi(1, rate, 1).real()).topRows(2 * n);
+    const MatrixXd unit = MatrixXd::Identity(n, n);
+    motion_ << unit, unit, 0.5 * unit, MatrixXd::Zero(n, n), unit, unit;
+    return;
   }
-  change = MatrixXd::Zero(p, p);
-  change.topLeftCorner(2 * n, 2 * n) = motion.leftCols(2 * n);
-  input = MatrixXd::Zero(p, n);
-  input.topRows(2 * n) = motion.rightCols(n);
-  if (difference) {
-    change.middleRows(v, n) = change.topRows(n);
-    change.block(v, v, n, n) -= unit;
-    input.middleRows(v, n) = input.topRows(n);
-  }
-  uncontrolled = MatrixXd::Zero(n, p);
-  uncontrolled.leftCols(n) = G;
-  gain = MatrixXd::Zero(n, p);
-  gain.leftCols(n) = K;
-  gain.middleCols(v, n) += C - D;
-}
-
-void SampledDataModel::assemble(const SampledLoop& loop, const MatrixXd& coordinates) {
-  const ControllerMemory& memory = loop.memory;
-  const Index m = memory.state.rows(), joints = coordinates.rows(), v = difference ? 2 * n : n;
-  assemble(m);
-  if (m == 0) return;
-  const bool sizes = memory.state.cols() == m && memory.position.rows() == m &&
-                     memory.position.cols() == joints && memory.velocity.rows() == m &&
-                     memory.velocity.cols() == joints && memory.output.rows() == joints &&
-                     memory.output.cols() == m;
-  require(sizes, "memory has matrices of other sizes");
-  require(memory.state.allFinite() && memory.position.allFinite() && memory.velocity.allFinite() &&
-              memory.output.allFinite(),
-          "memory is not finite");
-  const double T = loop.period;
-  change.bottomRightCorner(m, m) = memory.state - MatrixXd::Identity(m, m);
-  const MatrixXd position = memory.position * coordinates;
-  const MatrixXd velocity = memory.velocity * coordinates / T;
-  change.bottomRows(m).leftCols(n) = position;
-  change.bottomRows(m).middleCols(v, n) += velocity;
-  gain.rightCols(m) = T * T * coordinates.transpose() * memory.output;
-  const double negligible = 1e-10 * (position.norm() + velocity.norm());
-  if ((position * zero_modes).norm() + (velocity * zero_modes).norm() > negligible) {
-    zero_modes.resize(n, 0);
-  }
-}
-
-SampledDataModel SampledDataModel::along(const Eigen::VectorXd& direction) const {
-  const auto part = [&](const MatrixXd& A) -> MatrixXd {
-    return direction.transpose() * A * direction;
-  };
-  SampledDataModel result;
-  result.n = 1;
-  result.C = part(C), result.K = part(K), result.D = part(D), result.G = part(G);
-  result.zero_modes.resize(1, 0);
-  result.delay = delay;
-  result.filter_gain = filter_gain;
-  result.difference = difference;
-  result.assemble(0);
-  return result;
-}
-
-void SampledDataModel::set_gravity(const MatrixXd& gravity) {
-  SampledDataModel light;
-  light.n = n, light.C = C, light.K = K, light.D = D, light.G = G = gravity;
-  light.difference = difference;
-  light.assemble(0);
-  const Index p = light.inner();
-  change.topLeftCorner(p, p) = light.change;
-  input.topRows(p) = light.input;
-  uncontrolled.leftCols(n) = G;
-}
-
-bool SampledDataModel::masses_alone() const {
-  return inner() == (difference ? 3 : 2) * n && D.isZero(0) && G.isZero(0);
-}
-
-Complex SampledDataModel::log_actuation(Complex zeta) const {
-  const Complex wait = -static_cast<double>(delay) * zeta;
-  if (!filtered()) return wait;
-  return wait + std::log(filter_gain / (1.0 - (1 - filter_gain) * std::exp(-zeta)));
+  // d/dt (y, y', f) = rate (y, y', f)
+  MatrixXd rate = MatrixXd::Zero(3 * n, 3 * n);
+  rate.block(0, n, n, n).setIdentity();
+  rate.middleRows(n, n) << -G, -D, MatrixXd::Identity(n, n);
+  motion_ = phi(0, rate, 1).real().topRows(2 * n);
 }
 
 MatrixXd SampledDataModel::transition(double factor) const {
-  const Index p = inner(), size = rows(), queue = p, filter = queue + n * delay;
-  MatrixXd command = MatrixXd::Zero(n, size);
-  command.leftCols(p) = uncontrolled - factor * gain;
+  const Index rows = 2 * n + memory();
+  const Index v = difference ? 2 * n : n, queue = difference ? 3 * n : 2 * n;
+  const Index filter = queue + n * delay;
+
+  MatrixXd command = MatrixXd::Zero(n, rows);
+  command.leftCols(n) = G - factor * K;
+  command.middleCols(v, n) -= factor * (C - D);
   MatrixXd torque = command;
   if (delay > 0) torque.setZero(), torque.middleCols(queue, n).setIdentity();
   if (filtered()) {
     torque *= filter_gain;
     torque.middleCols(filter, n).diagonal().array() += 1 - filter_gain;
   }
-  MatrixXd A = MatrixXd::Zero(size, size);
-  A.topRows(p).noalias() = input * torque;
-  A.topLeftCorner(p, p) += change;
-  A.topLeftCorner(p, p).diagonal().array() += 1;
+  MatrixXd A = MatrixXd::Zero(rows, rows);
+  A.topRows(2 * n).noalias() = motion_.rightCols(n) * torque;
+  A.topLeftCorner(2 * n, 2 * n) += motion_.leftCols(2 * n);
+  if (difference) {
+    A.middleRows(v, n) = A.topRows(n);
+    A.block(v, 0, n, n).diagonal().array() -= 1;
+  }
   if (delay > 0) {
     A.block(queue, queue + n, n * (delay - 1), n * (delay - 1)).setIdentity();
     A.middleRows(queue + n * (delay - 1), n) = command;
@@ -204,7 +132,7 @@ MatrixXd SampledDataModel::transition(double factor) const {
 
 MatrixXd SampledDataModel::unit_motions() const {
   const Index r = zero_modes.cols();
-  if (r == 0) return MatrixXd(rows(), 0);
+  if (r == 0) return MatrixXd(2 * n + memory(), 0);
   MatrixXd forces(3 * n, r);
   forces << C * zero_modes, D * zero_modes, G * zero_modes;
   const Eigen::JacobiSVD<MatrixXd, Eigen::FullPivHouseholderQRPreconditioner> svd(
@@ -212,9 +140,9 @@ MatrixXd SampledDataModel::unit_motions() const {
   const double negligible = 1e-10 * (C.norm() + D.norm() + G.norm());
   Index undamped = 0;
   while (undamped < r && svd.singularValues()[r - 1 - undamped] <= negligible) ++undamped;
-  MatrixXd X = MatrixXd::Zero(rows(), r + undamped);
+  MatrixXd X = MatrixXd::Zero(2 * n + memory(), r + undamped);
   X.topLeftCorner(n, r) = zero_modes;
-  for (Index at = inner(); at < X.rows(); at += n) {
+  for (Index at = difference ? 3 * n : 2 * n; at < X.rows(); at += n) {
     X.block(at, 0, n, r) = G * zero_modes;
   }
   const MatrixXd drifts = zero_modes * svd.matrixV().rightCols(undamped);

@@ -7,17 +7,6 @@
 
 namespace dashpot::analysis {
 
-/// Linear states w (m) of a controller besides its springs and dampers, such as integrals of an
-/// error, stepped once a tick:
-///     w_k+1 = state w_k + position q_k + velocity v_k,   and  -output w_k  is added to the
-///     command.
-struct ControllerMemory {
-  Eigen::MatrixXd state;     ///< m x m
-  Eigen::MatrixXd position;  ///< m x n
-  Eigen::MatrixXd velocity;  ///< m x n
-  Eigen::MatrixXd output;    ///< n x m, part of the gains that gain_margin lets grow
-};
-
 /// The parts between the springs and dampers of a controller and the joints.
 struct SampledLoop {
   double period = 0.001;             ///< T, of the control loop, s
@@ -29,7 +18,6 @@ struct SampledLoop {
   /// G, n x n, N m/rad: the stiffness of the robot without its controller, such as dg/dq, the
   /// gradient of the gravity that the controller compensates. Empty: none.
   Eigen::MatrixXd gravity_gradient = {};
-  ControllerMemory memory = {};  ///< m = 0: none
 };
 
 /// A mode of the loop that is closed once a tick. One with a z that is real and negative
@@ -47,8 +35,7 @@ struct SampledMode {
 struct SampledSpectrum {
   std::vector<SampledMode> modes;   ///< with the indices of the continuous modes they come from
   std::vector<Complex> zero_modes;  ///< z of the velocities along the zero modes that are damped
-  std::vector<Complex>
-      others;  ///< z of the loop's own memory: delay, filter, last position, states
+  std::vector<Complex> others;      ///< z of the loop's own memory: delay, filter, last position
   /// Largest |z| except for z = 1 of the zero modes: of their positions, and of the velocities
   /// along them that nothing damps. The loop is stable if it is below 1.
   double spectral_radius = 0;
