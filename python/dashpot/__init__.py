@@ -7,10 +7,6 @@ Everything that Dashpot refuses is a dashpot.Error, a ValueError with the progra
 
 from importlib.metadata import version as _version
 
-from ._arch import load_core as _load_core
-
-__build__ = _load_core()  # for which processors the code in use was compiled
-
 from ._analysis import (DampingDesign, Gradients, Miss, Response, SampledModes, Sensitivities,
                         design_damping, modes, receptance, response, sampled_modes, sensitivities)
 from ._audit import (Audit, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit,
