@@ -112,6 +112,7 @@ void ControllerCore::restart_springs() noexcept {
   none.tool.selected = target.tool.selected;
   none.damping_ratio = target.damping_ratio;  // of springs that grow from zero
   none.joint_damping_ratio = target.joint_damping_ratio;
+  none.null_damping_ratio = target.null_damping_ratio;
   gains_.start(none);
   gains_.set_target(target);
   wrench_.start(Vector6::Zero());
