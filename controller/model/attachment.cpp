@@ -21,6 +21,7 @@ Attachment::Attachment(const Payload& payload, const Pose& given)
   std::string problem = mass_problem(payload.mass, payload.center, payload.inertia);
   if (problem.empty()) problem = inertia_problem(payload.mass, payload.inertia);
   if (!problem.empty()) throw InvalidModel("payload: " + problem);
+  if (!first_moment.allFinite() || !inertia.allFinite()) throw InvalidModel("payload: too large");
   const Eigen::Matrix3d& R = given.rotation;
   const bool turns = (R.transpose() * R).isIdentity(1e-9) && R.determinant() > 0;
   if (!turns || !given.position.allFinite()) {

@@ -74,6 +74,9 @@ TEST(Attachment, OfNoBodyIsRefused) {
   EXPECT_EQ(reason(some_payload()), "");
   EXPECT_EQ(reason(some_payload(-1)), "payload: its mass is negative, -1 kg");
   EXPECT_EQ(reason(some_payload(std::nan(""))), "payload: its mass is not a finite number");
+  Payload far = some_payload(1e300);
+  far.center.setConstant(1e10);
+  EXPECT_EQ(reason(far), "payload: too large");
   Payload thin = some_payload();
   thin.inertia(2, 2) = 0.1;
   EXPECT_NE(reason(thin).find("triangle inequality"), std::string::npos);
