@@ -40,6 +40,48 @@ class Judgement {
   /// were accepted last, no joint further than 0.1 rad from q, pass. Throws if there is no memory.
   GainJudge::Verdict judge(const Gains& gains, const JointVector& q, bool again) {
     const std::lock_guard lock(mutex_);
+    return here(gains, q, again);
+  }
+  /// Judges gains that have passed check_gains with something else attached to the tip link, at q
+  /// or, if that has no entries, anywhere. What is attached stays so if the verdict is enough.
+  /// Throws as judge().
+  GainJudge::Verdict judge(const Gains& gains, const JointVector& q, const Attachment& attachment) {
+    const std::lock_guard lock(mutex_);
+    const Attachment before = attached_;
+    replace(attachment);
+    try {
+      const GainJudge::Verdict verdict = q.size() == 0 ? anywhere(gains) : here(gains, q, true);
+      if (!enough(verdict)) replace(before);
+      return verdict;
+    } catch (...) {
+      replace(before);
+      throw;
+    }
+  }
+  /// Judges gains that have passed check_gains, as long as nobody knows where the robot is.
+  GainJudge::Verdict judge_anywhere(const Gains& gains) {
+    const std::lock_guard lock(mutex_);
+    return anywhere(gains);
+  }
+  bool enough(const GainJudge::Verdict& verdict) const noexcept {
+    return verdict.margin >= wanted_;
+  }
+  /// Returns what is attached to the tip link.
+  Attachment attached() {
+    const std::lock_guard lock(mutex_);
+    return attached_;
+  }
+  /// Attaches something without judging it.
+  void attach(const Attachment& attachment) noexcept {
+    const std::lock_guard lock(mutex_);
+    replace(attachment);
+  }
+  /// Returns Limits::gain_margin.
+  double wanted() const noexcept { return wanted_; }
+
+ private:
+  // With the lock held:
+  GainJudge::Verdict here(const Gains& gains, const JointVector& q, bool again) {
     const bool known =
         any_ && same_gains(gains, accepted_) && (q - accepted_at_).cwiseAbs().maxCoeff() < 0.1;
     if (wanted_ <= 1 || (known && !again)) return {wanted_, Mode::kJoint};
@@ -51,36 +93,11 @@ class Judgement {
     }
     return verdict;
   }
-  /// Judges gains that have passed check_gains with something else attached to the tip link, at q
-  /// or, if that has no entries, anywhere. What is attached stays so if the verdict is enough.
-  GainJudge::Verdict judge(const Gains& gains, const JointVector& q, const Attachment& attachment) {
-    const Attachment before = attached();
-    attach(attachment);
-    const GainJudge::Verdict verdict =
-        q.size() == 0 ? judge_anywhere(gains) : judge(gains, q, true);
-    if (!enough(verdict)) attach(before);
-    return verdict;
-  }
-  /// Judges gains that have passed check_gains, as long as nobody knows where the robot is.
-  GainJudge::Verdict judge_anywhere(const Gains& gains) {
-    const std::lock_guard lock(mutex_);
+  GainJudge::Verdict anywhere(const Gains& gains) {
     if (wanted_ <= 1) return {wanted_, Mode::kJoint};
     return judge_.judge_anywhere(gains);
   }
-  bool enough(const GainJudge::Verdict& verdict) const noexcept {
-    return verdict.margin >= wanted_;
-  }
-  /// Returns what is attached to the tip link.
-  Attachment attached() {
-    const std::lock_guard lock(mutex_);
-    return attached_;
-  }
-  /// Returns Limits::gain_margin.
-  double wanted() const noexcept { return wanted_; }
-
- private:
-  void attach(const Attachment& attachment) {
-    const std::lock_guard lock(mutex_);
+  void replace(const Attachment& attachment) noexcept {
     judge_.attach(attachment);
     attached_ = attachment;
     any_ = false;
