@@ -4,10 +4,12 @@
 namespace dashpot::apps {
 
 void LoopGoal::begin(const controller::Setpoint& setpoint, const controller::Payload& payload) {
-  payload_ = payload;
   setpoint_ = accepted_ = setpoint;
-  gains_ = setpoint.gains;
   in_force_ = news_ = true;
+  const std::lock_guard lock(mutex_);
+  payload_ = payload;
+  gains_ = setpoint.gains;
+  begun_ = true;
 }
 
 const controller::Setpoint* LoopGoal::told(std::int64_t time) noexcept {
@@ -61,20 +63,34 @@ std::int32_t LoopGoal::change_gains(const std::function<void(controller::Gains&)
 
 std::int32_t LoopGoal::change(const Change& change, std::string& reason) {
   const std::lock_guard lock(mutex_);
+  if (!begun_) {
+    reason = "the loop has not begun";
+    return DASHPOT_NOTHING_YET;
+  }
   std::int32_t code = DASHPOT_OK;
   // Gains come last, because they are judged with the payload.
   if (change.payload) code = controller_.set_payload(*change.payload, reason);
+  const bool paid = change.payload && code == DASHPOT_OK;
+  if (change.tip_speed && code == DASHPOT_OK) {
+    code = controller_.limit_tip_speed(*change.tip_speed, reason);
+  }
   const bool speed = change.tip_speed && code == DASHPOT_OK;
-  if (speed) code = controller_.limit_tip_speed(*change.tip_speed, reason);
   if (change.gains && code == DASHPOT_OK) code = set_gains(change.gains, reason);
   if (code == DASHPOT_OK) {
     payload_ = change.payload.value_or(payload_);
     tip_speed_ = change.tip_speed.value_or(tip_speed_);
     return code;
   }
-  std::string ignored;
-  if (change.payload) controller_.set_payload(payload_, ignored);
-  if (speed) controller_.limit_tip_speed(tip_speed_, ignored);
+  // Back to what was in force. Where the payload itself was refused, it was.
+  std::string why;
+  if (paid && controller_.set_payload(payload_, why) != DASHPOT_OK) {
+    payload_ = *change.payload;
+    reason += "; the payload is not taken back: " + why;
+  }
+  if (speed && controller_.limit_tip_speed(tip_speed_, why) != DASHPOT_OK) {
+    tip_speed_ = *change.tip_speed;
+    reason += "; the speed is not taken back: " + why;
+  }
   return code;
 }
 
@@ -92,6 +108,7 @@ std::int32_t LoopGoal::set_gains(const std::function<void(controller::Gains&)>& 
 
 void LoopGoal::release() {
   const std::lock_guard lock(mutex_);
+  if (!begun_) return;
   released_.store(true, std::memory_order_release);  // first, so that no tick takes it for its own
   controller_.release();
 }

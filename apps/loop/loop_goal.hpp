@@ -42,7 +42,8 @@ class LoopGoal {
   /// itself, what was held before goes on.
   void note_fault(bool latched) noexcept;
 
-  // Other threads, which may have to wait for each other:
+  // Other threads, which may have to wait for each other. Before begin() changes are refused
+  // (DASHPOT_NOTHING_YET) and releases do nothing, because the controller is being started:
   /// Changes the gains in force; DASHPOT_OK, or the code of the controller's refusal, with its
   /// reason in one line.
   std::int32_t change_gains(const std::function<void(controller::Gains&)>& change,
@@ -84,6 +85,7 @@ class LoopGoal {
   std::atomic<bool> released_{false};          ///< somebody asked for the release of the fault
 
   std::mutex mutex_;  ///< of what follows, and of the controller's functions for other threads
+  bool begun_ = false;
   controller::Gains gains_;
   controller::Payload payload_;
   controller::TipSpeed tip_speed_;
