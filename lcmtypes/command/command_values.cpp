@@ -19,6 +19,7 @@ using controller::Setpoint;
 using Verdict = CommandVerdict;
 
 constexpr std::int32_t kAllParts = 2 * command_t::TIP_SPEED - 1;
+constexpr double kSlowestTip = 1e-4;     // m/s and rad/s, as for the controller
 constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion
 // Relative to the largest entry; no wider than what the controller accepts
 constexpr double kSymmetryTolerance = 1e-9;
@@ -147,11 +148,13 @@ Verdict copy_payload(const command_t& message, const CommandLimits& limits,
   using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   payload = {message.payload_mass, Eigen::Map<const Eigen::Vector3d>(message.payload_center),
              Eigen::Map<const RowMajor3>(&message.payload_inertia[0][0])};
-  if (!payload.inertia.allFinite()) return Verdict::kNotFinite;
   const Eigen::Matrix<double, 1, 1> mass(payload.mass);
+  // That of the whole mass at the greatest distance.
+  const double most = payload.mass * limits.payload_distance * limits.payload_distance;
   return first_fault(
       {judge_entries(mass, 0, limits.payload),
-       judge_entries(payload.center, -limits.payload_distance, limits.payload_distance)});
+       judge_entries(payload.center, -limits.payload_distance, limits.payload_distance),
+       judge_entries(payload.inertia, -most, most)});
 }
 
 Verdict copy_tip_speed(const command_t& message, const CommandLimits& limits,
@@ -162,7 +165,8 @@ Verdict copy_tip_speed(const command_t& message, const CommandLimits& limits,
         {message.angular_velocity, limits.angular_velocity, &speed.angular},
         {message.tip_velocity, limits.tip_velocity, &speed.limit}}) {
     if (!std::isfinite(given)) return Verdict::kNotFinite;
-    if (given < 0 || given > most) return Verdict::kOutOfLimits;
+    const bool fits = given >= kSlowestTip && given <= most;
+    if (given != 0 && !fits) return Verdict::kOutOfLimits;
     if (given > 0) *value = given;
   }
   return Verdict::kAccepted;

@@ -194,6 +194,8 @@ const std::vector<Fault>& faults() {
       {"mass NaN", Verdict::kNotFinite, [](command_t& m) { m.payload_mass = kNaN; }},
       {"mass negative", Verdict::kOutOfLimits, [](command_t& m) { m.payload_mass = -1e-9; }},
       {"mass too large", Verdict::kOutOfLimits, [](command_t& m) { m.payload_mass = 20.1; }},
+      {"payload unwieldy", Verdict::kOutOfLimits,
+       [](command_t& m) { m.payload_inertia[0][0] = 1.01 * m.payload_mass; }},
       {"payload far away", Verdict::kOutOfLimits, [](command_t& m) { m.payload_center[1] = -1.1; }},
       {"speed NaN", Verdict::kNotFinite, [](command_t& m) { m.linear_velocity = kNaN; }},
       {"speed negative", Verdict::kOutOfLimits, [](command_t& m) { m.angular_velocity = -0.1; }},

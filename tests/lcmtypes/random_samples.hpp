@@ -151,7 +151,7 @@ inline command_t random_command(Random& random, int n) {
   message.null_damping.assign(static_cast<std::size_t>(n), random.uniform(0, 2));
   message.task_damping_ratio = random.uniform(0.1, 2);
   message.joint_damping_ratio = random.uniform(0.1, 2);
-  message.payload_mass = random.uniform(0, 9);
+  message.payload_mass = random.uniform(1, 9);
   Eigen::Map<Eigen::Vector3d>(message.payload_center) = 0.1 * random.vector(3);
   for (int i = 0; i < 3; ++i) message.payload_inertia[i][i] = random.uniform(0.1, 0.15);
   message.linear_velocity = random.uniform(0.1, 2);
