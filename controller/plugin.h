@@ -171,7 +171,8 @@ typedef struct dashpot_gains {
   const double* task_damping_ratio;  /* 1, from 0 to 2. Above 0, C_C is designed at every tick so
                                         that every mode of the task has this damping ratio, and
                                         task_damping has to be NULL. 0: C_C is task_damping.
-                                        task_damping without a ratio sets the ratio to 0. */
+                                        task_damping without a ratio sets the ratio to 0.
+                                        Zero stiffness with a ratio has no damping. */
   const double* null_stiffness;      /* n, not negative, N m/rad, toward the posture */
   const double* null_damping;        /* n, not negative, N m s/rad */
   const int32_t* frame;              /* axes of the 6 x 6: DASHPOT_FRAME_BASE or _TOOL */
@@ -443,13 +444,14 @@ int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains*
  *
  * Refused (DASHPOT_WRONG_VALUE) is what no body can be, and a weight that limits.torque does not
  * hold at the latest posture; and (DASHPOT_UNSTABLE_GAINS) what leaves the gains in force too
- * little margin, as in dashpot_set_gains. Takes some milliseconds and allocates. Returns DASHPOT_OK
- * or a negative code. */
+ * little margin, as in dashpot_set_gains. What was attached before the last call passes unjudged,
+ * once, if gains or tip speeds told since then were refused last. Takes some milliseconds and
+ * allocates. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_set_payload(dashpot_controller* controller, const dashpot_payload* payload);
 
 /* Limits the tip's speed from the next tick on. Called on the other thread. `linear` (m/s) and
  * `angular` (rad/s) are those of the reference on its way to a set-point, `limit` (m/s) that of the
- * tip's origin, beyond which it is a fault. Each is above zero and at most what the configuration
+ * tip's origin, beyond which it is a fault. Each is 1e-4 or more, and at most what the configuration
  * says (motion.linear_velocity, motion.angular_velocity, limits.tip_velocity); infinity stands for
  * that. With a lower `limit` the reference moves with at most 0.6 of it. A tip that is faster just
  * then is a fault. Resets keep the limits. Returns DASHPOT_OK or a negative code. */

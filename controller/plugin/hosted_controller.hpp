@@ -48,6 +48,8 @@ struct HostedController {
 
   // Of the other thread:
   Request request;
+  Attachment attachment_before;  ///< the last dashpot_set_payload that was accepted
+  bool undoable = false;         ///< what came after it was refused: the one before may come back
   const SampledVibration* sampled() noexcept { return controller_.sampled_vibration(); }
 
   // Of the real-time thread:

@@ -238,6 +238,7 @@ int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* g
   if (problem == DASHPOT_OK && !same_gains(wanted, request.setpoint.gains)) {
     problem = judge(*controller, wanted, q, false, nullptr);
   }
+  controller->undoable = problem != DASHPOT_OK && request.attachments > 0;
   if (problem != DASHPOT_OK) return problem;
   request.setpoint.gains = wanted;
   ++request.gain_changes;

@@ -10,6 +10,8 @@ using namespace dashpot::controller;  // NOLINT(google-build-using-namespace): t
 
 namespace {
 
+constexpr double kSlowestTip = 1e-4;  // m/s and rad/s: less is as good as none, or a mistake
+
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 /// Throws InvalidModel unless a body can be so.
@@ -57,14 +59,21 @@ int32_t dashpot_set_payload(dashpot_controller* controller, const dashpot_payloa
   try {
     Request& request = controller->request;
     const Attachment wanted = read(*payload, request.attachment.tool);
-    controller->model.with(wanted);  // throws if a joint has no inertia
-    JointVector q;
-    controller->judgement.where(q);
-    std::int32_t code = check_weight(*controller, wanted, q);
-    if (code != DASHPOT_OK) return code;
     Judgement& judgement = controller->judgement;
-    code = finish(judgement, judgement.judge(request.setpoint.gains, q, wanted), q.size() != 0);
-    if (code != DASHPOT_OK) return code;
+    std::int32_t code = DASHPOT_OK;
+    if (controller->undoable && wanted == controller->attachment_before) {
+      judgement.attach(wanted);
+    } else {
+      controller->model.with(wanted);  // throws if a joint has no inertia
+      JointVector q;
+      judgement.where(q);
+      code = check_weight(*controller, wanted, q);
+      if (code != DASHPOT_OK) return code;
+      code = finish(judgement, judgement.judge(request.setpoint.gains, q, wanted), q.size() != 0);
+      if (code != DASHPOT_OK) return code;
+    }
+    controller->attachment_before = request.attachment;
+    controller->undoable = false;
     request.setpoint.tip_pose =
         carried(request.setpoint.tip_pose, request.attachment.tool, wanted.tool);
     request.attachment = wanted;
@@ -86,11 +95,12 @@ int32_t dashpot_limit_tip_speed(dashpot_controller* controller, double linear, d
   constexpr std::array kNames{"motion.linear_velocity", "motion.angular_velocity",
                               "limits.tip_velocity"};
   for (std::size_t i = 0; i < given.size(); ++i) {
-    if (given[i] > 0 && (given[i] <= most[i] || std::isinf(given[i]))) continue;
+    if (given[i] >= kSlowestTip && (given[i] <= most[i] || std::isinf(given[i]))) continue;
     std::array<char, 128> text{};
     std::snprintf(text.data(), text.size(),
-                  "%s %.4g: must be above zero and at most %.4g, as the configuration says",
-                  kNames[i], given[i], most[i]);
+                  "%s %.4g: must be at least %g and at most %.4g, as the configuration says",
+                  kNames[i], given[i], kSlowestTip, most[i]);
+    controller->undoable = controller->request.attachments > 0;
     return finish(DASHPOT_WRONG_VALUE, text.data());
   }
   controller->request.tip_speed = {linear, angular, limit};

@@ -122,6 +122,24 @@ TEST(PluginPayload, IsJudgedWithTheGainsInForce) {
   EXPECT_EQ(plugin().judge_gains(host.controller.get(), &same, nullptr, &margin), DASHPOT_OK);
 }
 
+TEST(PluginPayload, IsLetBackAfterWhatCameWithItWasRefused) {
+  const dashpot_payload heavy = payload(8), nothing = payload(0);
+  Host host =
+      carrying_host("mass: 8, center: [0, 0, 0.05], inertia: [0.008, 0.008, 0.008]", kGains);
+  dashpot_controller* const arm = host.controller.get();
+  ASSERT_NE(arm, nullptr) << plugin().last_error();
+  ASSERT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_OK) << plugin().last_error();
+  // Meanwhile the arm has gone to where 8 kg are too heavy.
+  const std::vector<double> stretched{0, 1.5, 0, -0.3, 0, 1.8, 0};
+  ASSERT_EQ(plugin().start(arm, stretched.data(), nullptr), DASHPOT_OK) << plugin().last_error();
+  EXPECT_EQ(plugin().set_payload(arm, &heavy), DASHPOT_WRONG_VALUE);
+  dashpot_gains wrong{};
+  EXPECT_NE(plugin().set_gains(arm, &wrong), DASHPOT_OK);
+  EXPECT_EQ(plugin().set_payload(arm, &heavy), DASHPOT_OK) << plugin().last_error();
+  EXPECT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_OK) << plugin().last_error();
+  EXPECT_EQ(plugin().set_payload(arm, &heavy), DASHPOT_WRONG_VALUE);
+}
+
 TEST(PluginPayload, LeavesTheArmWhereItIsWithANewTool) {
   Host host = panda_host(kCartesian);
   host.tick();
@@ -159,10 +177,11 @@ TEST(PluginTipSpeed, IsAtMostThatOfTheConfiguration) {
   EXPECT_EQ(plugin().limit_tip_speed(nullptr, any, any, any), DASHPOT_NULL_ARGUMENT);
   EXPECT_EQ(plugin().limit_tip_speed(arm, 0.1, any, 0.2), DASHPOT_OK);
   EXPECT_EQ(plugin().limit_tip_speed(arm, 0, any, any), DASHPOT_WRONG_VALUE);
+  EXPECT_EQ(plugin().limit_tip_speed(arm, 1e-310, any, any), DASHPOT_WRONG_VALUE);
   EXPECT_EQ(plugin().limit_tip_speed(arm, any, std::nan(""), any), DASHPOT_WRONG_VALUE);
   EXPECT_EQ(plugin().limit_tip_speed(arm, any, any, 100), DASHPOT_WRONG_VALUE);
   EXPECT_THAT(plugin().last_error(),
-              HasSubstr("limits.tip_velocity 100: must be above zero and at most"));
+              HasSubstr("limits.tip_velocity 100: must be at least 0.0001 and at most"));
   host.tick();
   const dashpot_snapshot start = host.snapshot();
   dashpot_setpoint goal{};
