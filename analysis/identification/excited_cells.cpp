@@ -61,7 +61,7 @@ double output_band(const MatrixXd& grid, double step, const VectorXd& noise) {
     const VectorXd power = power_of(grid.row(c).transpose());
     const Index bin = std::max<Index>(8, static_cast<Index>(2 * kPi / 2 / width));  // 0.5 Hz
     for (Index from = 0; from + bin <= power.size(); from += bin) {
-      const double w = width * static_cast<double>(from + bin / 2);
+      const double w = width * (static_cast<double>(from) + 0.5 * static_cast<double>(bin));
       const double floor =
           static_cast<double>(grid.cols()) * std::pow(2 * std::sin(w * step / 2) * noise[c], 2);
       if (power.segment(from, bin).mean() > 10 * floor) {
