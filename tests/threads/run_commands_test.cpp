@@ -224,7 +224,7 @@ TEST(RunWithCommands, HoldsARatioCarriesAPayloadAndLowersTheTipsSpeed) {
   // A body that cannot be is refused, with the gains beside it.
   command.parts = int{command_t::TASK_RATIO} + int{command_t::PAYLOAD};
   command.task_damping_ratio = 0.9;
-  command.payload_inertia[0][0] = 1;
+  command.payload_inertia[0][0] = 0.4;
   command.sequence = 2;
   command.utime = utime();
   listener.bus().publish(lcmtypes::kCommandChannel, &command);
