@@ -15,7 +15,7 @@ struct Attachment {
   /// Nothing, with T at the tip link.
   Attachment() = default;
   /// Throws InvalidModel unless a body can be so and the tool is a rotation and a position.
-  Attachment(const Payload& payload, const Pose& tool);
+  Attachment(const Payload& payload, const Pose& given);
 
   /// Returns the body as a payload: its centre of mass, and the inertia about that.
   Payload payload() const noexcept;

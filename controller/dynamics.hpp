@@ -37,7 +37,7 @@ class DynamicsKernel {
   explicit DynamicsKernel(const RobotModel& model);
 
   /// From now on this is attached to the tip link. Allocates nothing.
-  void attach(const Attachment& attachment) noexcept;
+  void attach(const Attachment& given) noexcept;
 
   /// Sets `result` at q (n), rad (m), and qd (n), rad/s (m/s). Allocates nothing. If q or qd is not
   /// finite, neither is the result.

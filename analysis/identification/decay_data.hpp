@@ -68,7 +68,7 @@ struct DecayData {
 
   /// With `driven`, the samples are means of cells of its grids, and begin with them.
   explicit DecayData(const std::vector<MotionRecord>& all,
-                     std::shared_ptr<const std::vector<DrivenGrid>> driven = {});
+                     const std::shared_ptr<const std::vector<DrivenGrid>>& driven = {});
 };
 
 /// Samples of a part.
