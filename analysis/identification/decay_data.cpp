@@ -25,7 +25,7 @@ DecayFactor DecayFactor::of_pair(Complex eigenvalue) {
 }
 
 DecayData::DecayData(const std::vector<MotionRecord>& all,
-                     std::shared_ptr<const std::vector<DrivenGrid>> driven)
+                     const std::shared_ptr<const std::vector<DrivenGrid>>& driven)
     : channels(all.front().output.rows()),
       records(all.size()),
       inputs(driven ? static_cast<std::size_t>(driven->front().input.rows()) : 0) {
