@@ -451,10 +451,11 @@ int32_t dashpot_set_payload(dashpot_controller* controller, const dashpot_payloa
 
 /* Limits the tip's speed from the next tick on. Called on the other thread. `linear` (m/s) and
  * `angular` (rad/s) are those of the reference on its way to a set-point, `limit` (m/s) that of the
- * tip's origin, beyond which it is a fault. Each is 1e-4 or more, and at most what the configuration
- * says (motion.linear_velocity, motion.angular_velocity, limits.tip_velocity); infinity stands for
- * that. With a lower `limit` the reference moves with at most 0.6 of it. A tip that is faster just
- * then is a fault. Resets keep the limits. Returns DASHPOT_OK or a negative code. */
+ * tip's origin, beyond which it is a fault. Each is 1e-4 or more, and at most what the
+ * configuration says (motion.linear_velocity, motion.angular_velocity, limits.tip_velocity);
+ * infinity stands for that. With a lower `limit` the reference moves with at most 0.6 of it. A tip
+ * that is faster just then is a fault. Resets keep the limits. Returns DASHPOT_OK or a negative
+ * code. */
 int32_t dashpot_limit_tip_speed(dashpot_controller* controller, double linear, double angular,
                                 double limit);
 

@@ -20,6 +20,13 @@ using testing::kInfinity;
 using testing::Random;
 using Long = long double;
 
+Long wide(double x) {
+  return static_cast<Long>(x);
+}
+Long square(double x) {
+  return wide(x) * wide(x);
+}
+
 /// A basis of a system with p modes and n - p zero modes, and a residual made up by hand.
 struct HandMade {
   System<kMaxDof> system;
@@ -44,17 +51,17 @@ struct HandMade {
   Long squares(const PackedMatrix& X, int i, int j) const {
     Long sum = 0;
     for (const int row : columns(i)) {
-      for (const int column : columns(j)) sum += static_cast<Long>(X(row, column)) * X(row, column);
+      for (const int column : columns(j)) sum += square(X(row, column));
     }
     return sum;
   }
   Long rate(int i) const {
-    if (i >= basis.modes) return std::abs(basis.rate[static_cast<std::size_t>(i - basis.modes)]);
+    if (i >= basis.modes)
+      return std::abs(wide(basis.rate[static_cast<std::size_t>(i - basis.modes)]));
     const auto [a, b, c, d] = basis.block(i);
-    return std::sqrt(static_cast<Long>(a) * a + static_cast<Long>(b) * b +
-                     static_cast<Long>(c) * c + static_cast<Long>(d) * d);
+    return std::sqrt(square(a) + square(b) + square(c) + square(d));
   }
-  Long separation_of(int i, int j) const {
+  double separation_of(int i, int j) const {
     const auto rate_of = [&](int k) {
       return basis.rate[static_cast<std::size_t>(k - basis.modes)];
     };
@@ -77,13 +84,13 @@ std::vector<Long> expected_radii(const HandMade& made) {
   const Long gamma = (2 * (n + p) + 16) * std::ldexp(1.0L, -53);
   Long mass = 0, damping = 0;
   std::vector<Long> s, elastic;
-  for (int k = 0; k < n; ++k) s.push_back(std::sqrt(static_cast<Long>(system.mass(k, k))));
-  for (int k = 0; k < n; ++k) elastic.push_back(system.stiffness_factor.col(k).norm());
+  for (int k = 0; k < n; ++k) s.push_back(std::sqrt(wide(system.mass(k, k))));
+  for (int k = 0; k < n; ++k) elastic.push_back(wide(system.stiffness_factor.col(k).norm()));
   const auto at = [](int i) { return static_cast<std::size_t>(i); };
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
-      mass = std::max(mass, std::abs(system.mass(i, j)) / (s[at(i)] * s[at(j)]));
-      damping = std::max(damping, std::abs(system.damping(i, j)) / (s[at(i)] * s[at(j)]));
+      mass = std::max(mass, std::abs(wide(system.mass(i, j))) / (s[at(i)] * s[at(j)]));
+      damping = std::max(damping, std::abs(wide(system.damping(i, j))) / (s[at(i)] * s[at(j)]));
     }
   }
   std::vector<Long> a(at(blocks)), b = a, m = a;
@@ -92,11 +99,11 @@ std::vector<Long> expected_radii(const HandMade& made) {
     for (const int column : made.columns(i)) {
       Long b_column = 0, m_column = 0;
       for (int k = 0; k < p; ++k) {
-        a[at(i)] += static_cast<Long>(basis.Z(k, column)) * basis.Z(k, column);
+        a[at(i)] += square(basis.Z(k, column));
       }
       for (int k = 0; k < n; ++k) {
-        b_column += elastic[at(k)] * std::abs(basis.Z(p + k, column));
-        m_column += std::sqrt(mass) * s[at(k)] * std::abs(basis.Z(p + k, column));
+        b_column += elastic[at(k)] * std::abs(wide(basis.Z(p + k, column)));
+        m_column += std::sqrt(mass) * s[at(k)] * std::abs(wide(basis.Z(p + k, column)));
       }
       b[at(i)] += b_column * b_column;
       m[at(i)] += m_column * m_column;
@@ -113,7 +120,7 @@ std::vector<Long> expected_radii(const HandMade& made) {
   for (int i = 0; i < blocks; ++i) {
     for (int j = 0; j < blocks; ++j) {
       R[at(i)] += made.squares(made.residual.R, i, j);
-      G[at(j)] += i == j && i < p ? static_cast<Long>(made.residual.diagonal[at(i)])
+      G[at(j)] += i == j && i < p ? wide(made.residual.diagonal[at(i)])
                                   : made.squares(made.residual.G, i, j);
     }
     R_all += R[at(i)];
@@ -128,7 +135,7 @@ std::vector<Long> expected_radii(const HandMade& made) {
                                                         all_m * (c * mj + mj * rate))) /
                         (1 - R_all);
     for (int i = 0; i < blocks; ++i) {
-      const Long own = i == j && i < p ? static_cast<Long>(made.residual.diagonal[at(i)])
+      const Long own = i == j && i < p ? wide(made.residual.diagonal[at(i)])
                                        : made.squares(made.residual.G, i, j);
       F[at(i)][at(j)] =
           std::sqrt(own) +
@@ -146,12 +153,12 @@ std::vector<Long> expected_radii(const HandMade& made) {
   everything = std::sqrt(everything) + largest;
   std::vector<Long> radii;
   for (int i = 0; i < blocks; ++i) {
-    Long right = 0, left = 0, apart = kInfinity;
+    Long right = 0, left = 0, apart = wide(kInfinity);
     for (int j = 0; j < blocks; ++j) {
       if (j == i) continue;
       right += F[at(i)][at(j)] * F[at(i)][at(j)];
       left += F[at(j)][at(i)] * F[at(j)][at(i)];
-      apart = std::min(apart, made.separation_of(i, j));
+      apart = std::min(apart, wide(made.separation_of(i, j)));
     }
     const Long own = F[at(i)][at(i)];
     radii.push_back(own + 2 * std::sqrt(right * left) / (apart - own - everything));
@@ -169,9 +176,9 @@ TEST(TrackedProofTerms, ARateIsEnclosedForEveryGramMatrix) {
     made.residual.R(2, 2) = r;
     made.residual.G(2, 2) = 0.25;
     made.prove();
-    const Long exact = 0.25L / (1 - static_cast<Long>(r));
-    EXPECT_GE(static_cast<Long>(made.enclosure.radius[1]), exact) << r;
-    EXPECT_LE(static_cast<Long>(made.enclosure.radius[1]), exact * (1 + 1e-8L)) << r;
+    const Long exact = 0.25L / (1 - wide(r));
+    EXPECT_GE(wide(made.enclosure.radius[1]), exact) << r;
+    EXPECT_LE(wide(made.enclosure.radius[1]), exact * (1 + 1e-8L)) << r;
   }
 }
 
@@ -213,7 +220,7 @@ TEST(TrackedProofTerms, RadiiAreThoseOfTheFormula) {
         EXPECT_EQ(made.enclosure.radius[i], kInfinity) << "trial " << trial;
       } else if (made.enclosure.alone(i)) {
         ++compared;
-        const Long share = made.enclosure.radius[i] / radii[static_cast<std::size_t>(i)];
+        const Long share = wide(made.enclosure.radius[i]) / radii[static_cast<std::size_t>(i)];
         EXPECT_GE(share, 1) << "trial " << trial << ", block " << i;
         EXPECT_LE(share, 1 + 1e-8L) << "trial " << trial << ", block " << i;
       }
@@ -261,14 +268,14 @@ TEST(TrackedProofTerms, RoundingErrorsOfEigenvaluesOfABlock) {
     const double c = -0.25 * (a - d) * (a - d) / b * (1 + random.log_uniform(1e-16, 1e-8));
     std::array<bool, kMaxDof> soft{};
     const TrackedSpectrum spectrum = modes_of({{a, b, c, d}}, 0, true, 0, soft);
-    const Long half = (static_cast<Long>(a) - d) / 2;
+    const Long half = (wide(a) - wide(d)) / 2;
     const std::complex<Long> root =
-        std::sqrt(std::complex<Long>(half * half + static_cast<Long>(b) * static_cast<Long>(c), 0));
-    const std::complex<Long> mean = (static_cast<Long>(a) + d) / 2;
+        std::sqrt(std::complex<Long>(half * half + wide(b) * wide(c), 0));
+    const std::complex<Long> mean = (wide(a) + wide(d)) / 2;
     for (const Complex& value : spectrum.modes[0].eigenvalues) {
       const std::complex<Long> z(value);
       const Long error = std::min(std::abs(z - mean - root), std::abs(z - mean + root));
-      EXPECT_LE(error, static_cast<Long>(spectrum.modes[0].error_bound)) << "trial " << trial;
+      EXPECT_LE(error, wide(spectrum.modes[0].error_bound)) << "trial " << trial;
     }
   }
 }
