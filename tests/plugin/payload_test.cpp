@@ -66,7 +66,7 @@ TEST(PluginPayload, BlendsIntoTheLoopAndItsModes) {
     EXPECT_NEAR(found.modes[i].damping_ratio, wanted.modes[i].damping_ratio, 1e-8);
   }
   EXPECT_GT(std::abs(before - found.modes[0].natural_frequency), 0.01 * before);
-  for (int i = 0; i < 7; ++i) EXPECT_NEAR(host.torque[i], configured.torque[i], 1e-9);
+  for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(host.torque[i], configured.torque[i], 1e-9);
   // Without a loop as well.
   dashpot_modes there{};
   there.struct_size = sizeof there;

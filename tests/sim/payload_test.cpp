@@ -133,7 +133,7 @@ TEST(PayloadInTheLoop, IsCarriedWithoutSaggingByAnArmThatIsTold) {
 
 TEST(PayloadInTheLoop, GivesTheModesOfTheMotion) {
   double worst_frequency = 0, worst_ratio = 0;
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
     TwinModels twin(testing::arms()[seed == 3 ? 2 : 0]);
