@@ -1,5 +1,6 @@
 #include <dashpot/analysis/identification/moving_channels.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -17,6 +18,22 @@ bool moves(const MotionRecord& record, Index channel) {
   return false;
 }
 
+/// Which inputs move, by more than rounding errors of those that move most, in any record.
+std::vector<Index> moving_inputs(const std::vector<MotionRecord>& records) {
+  Eigen::VectorXd range = Eigen::VectorXd::Zero(records.front().input.rows());
+  for (const MotionRecord& record : records) {
+    for (Index i = 0; i < range.size(); ++i) {
+      const auto row = record.input.row(i);
+      range[i] = std::max(range[i], row.maxCoeff() - row.minCoeff());
+    }
+  }
+  std::vector<Index> moving;
+  for (Index i = 0; i < range.size(); ++i) {
+    if (range[i] > 1e-9 * range.maxCoeff()) moving.push_back(i);
+  }
+  return moving;
+}
+
 }  // namespace
 
 MovingChannels::MovingChannels(const std::vector<MotionRecord>& all)
@@ -27,9 +44,10 @@ MovingChannels::MovingChannels(const std::vector<MotionRecord>& all)
     if (any) channels.push_back(c);
   }
   if (channels.empty()) throw std::invalid_argument("identify: nothing moves");
-  if (static_cast<Index>(channels.size()) == count_) return;
+  const std::vector<Index> inputs = moving_inputs(all);
   for (MotionRecord& record : records) {
     record.output = Eigen::MatrixXd(record.output(channels, Eigen::all));
+    record.input = Eigen::MatrixXd(record.input(inputs, Eigen::all));
   }
 }
 

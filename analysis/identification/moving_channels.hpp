@@ -5,9 +5,9 @@
 
 namespace dashpot::analysis {
 
-/// Records without the channels that are constant in all of them, which say nothing.
+/// Records without the channels and the inputs that are constant in all of them, which say nothing.
 struct MovingChannels {
-  /// Throws std::invalid_argument if there is none.
+  /// Throws std::invalid_argument if no channel moves.
   explicit MovingChannels(const std::vector<MotionRecord>& all);
 
   /// Gives the shapes and the noise of all channels their places; zero for constant ones.

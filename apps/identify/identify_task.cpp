@@ -86,7 +86,7 @@ class Task {
     }
     for (const std::string& note : file.notes) report_.notes.push_back(name + ": " + note);
     const auto note = [this, &path](int count, const std::string& what) {
-      if (count > 0) report_.notes.push_back(path + ": " + std::to_string(count) + what);
+      if (count > 0) report_.notes.push_back(path + ": " + std::to_string(count).append(what));
     };
     note(file.duplicates, " samples left out, because another has the same time");
     note(file.out_of_order, " samples left out, because their time runs backwards");
@@ -270,7 +270,7 @@ class Task {
         posture.found = report_.kind == MotionKind::kAmbient
                             ? analysis::identify_ambient(records, options)
                         : report_.kind == MotionKind::kExcited
-                            ? analysis::identify_excited(moving_inputs(std::move(records)), options)
+                            ? analysis::identify_excited(records, options)
                             : analysis::identify_decays(records, options);
       } catch (const std::invalid_argument& error) {
         for (const std::size_t i : group) report_.parts[parts_[i].report].reason = error.what();
@@ -286,23 +286,6 @@ class Task {
       }
       report_.postures.push_back(std::move(posture));
     }
-  }
-
-  /// Without the inputs that rest in all records.
-  static std::vector<MotionRecord> moving_inputs(std::vector<MotionRecord> records) {
-    std::vector<Index> moving;
-    for (Index i = 0; i < records.front().input.rows(); ++i) {
-      const bool moves = std::any_of(records.begin(), records.end(), [i](const auto& record) {
-        const auto row = record.input.row(i);
-        return row.maxCoeff() - row.minCoeff() > 1e-9;
-      });
-      if (moves) moving.push_back(i);
-    }
-    if (moving.empty()) throw std::invalid_argument("no input moves");
-    for (MotionRecord& record : records) {
-      record.input = Eigen::MatrixXd(record.input(moving, Eigen::all));
-    }
-    return records;
   }
 
   void compare() {

@@ -75,38 +75,55 @@ def _measured(found: dict[str, Any], channels: int) -> MeasuredModes:
                          **found)
 
 
+def _columns(name: str, what: str, given: Any, records: int, many: bool) -> list[Array]:
+    arrays = list(given) if many else [given]
+    if len(arrays) != records:
+        raise Error(f"identify: {records} arrays of times, {len(arrays)} of {what}")
+    columns = []
+    for each in arrays:
+        array = np.asarray(each, dtype=float)
+        if array.ndim == 1:
+            array = array[:, np.newaxis]
+        if array.ndim != 2:
+            raise Error(f"{name}: has {array.ndim} dimensions, expected samples x {what}")
+        columns.append(np.ascontiguousarray(array.T))
+    return columns
+
+
 def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike],
-             y: npt.ArrayLike | Sequence[npt.ArrayLike], *, find: bool = True,
+             y: npt.ArrayLike | Sequence[npt.ArrayLike], *,
+             input: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None, find: bool = True,
              ambient: bool = False, max_order: int = 0) -> Identification:
-    """Returns the modes that records of motion show: of free decays, or of ambient motion.
+    """Returns the modes that records of motion show: of free decays, of motion under inputs that
+    were measured, or of ambient motion.
 
     `t` has the times (N, s, rising, not necessarily even) and `y` the channels (N x channels, or N
     for one channel) of a record; NaN is a sample that is missing. Lists of such arrays are several
     records at one posture. Free decays, after a push, a release or a step, are found in them;
-    with find=False each record is one. With ambient=True the records are those of an arm that
+    with find=False each record is one. With `input` (N x inputs, or N for one input; nothing
+    missing; a list of such arrays for several records) the records are taken whole: what moved
+    the arm from each sample to the next, from outside, as a chirp or pulses (least squares in the
+    frequency domain with one denominator, Guillaume et al. 2003, refined to the maximum of the
+    likelihood); inputs that rest are left out. With ambient=True the records are those of an arm that
     many small, irregular forces shake, which nobody measured, for a minute or more (covariance-
     driven stochastic subspace identification, Peeters and De Roeck 1999). `max_order` bounds the
     order of the models tried (0: 2 for each channel, at least 12; of ambient motion 4 for each
-    channel and 4 more, at most 40).
+    channel and 4 more, at most 40; with inputs 2 more).
 
     Raises Error for arrays of the wrong size, times that do not rise, fewer than 20 samples, where
-    nothing moves freely, and for ambient motion that is too short.
+    nothing moves freely, inputs of which none moves, and for ambient motion that is too short.
     """
     many = isinstance(t, (list, tuple)) and len(t) > 0 and np.ndim(t[0]) > 0
     times: list[Any] = list(t) if many else [t]  # type: ignore[arg-type]
-    outputs: list[Any] = list(y) if many else [y]  # type: ignore[arg-type]
-    if len(times) != len(outputs):
-        raise Error(f"identify: {len(times)} arrays of times, {len(outputs)} of channels")
-    values = []
-    for output in outputs:
-        array = np.asarray(output, dtype=float)
-        if array.ndim == 1:
-            array = array[:, np.newaxis]
-        if array.ndim != 2:
-            raise Error(f"y: has {array.ndim} dimensions, expected samples x channels")
-        values.append(np.ascontiguousarray(array.T))
-    found = _core.identify([to_numbers("t", time, 1) for time in times], values, find, ambient,
-                           max_order)
+    values = _columns("y", "channels", y, len(times), many)
+    if input is None:
+        inputs = [np.empty((0, 0))] * len(times)
+    elif ambient:
+        raise Error("identify: ambient motion is that whose input was not measured")
+    else:
+        inputs = _columns("input", "inputs", input, len(times), many)
+    found = _core.identify([to_numbers("t", time, 1) for time in times], values, inputs, find,
+                           ambient, max_order)
     channels = values[0].shape[0]
     return Identification(modes=_measured(found.pop("modes"), channels),
                           rejected=_measured(found.pop("rejected"), channels), **found)

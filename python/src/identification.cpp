@@ -30,20 +30,23 @@ nb::dict modes_of(const std::vector<MeasuredMode>& modes) {
   return result;
 }
 
-/// `outputs`: channels x samples each.
+/// `outputs`: channels x samples each. `inputs`: likewise, or no rows.
 nb::dict identify(const std::vector<Eigen::VectorXd>& times,
-                  const std::vector<Eigen::MatrixXd>& outputs, bool find, bool ambient,
+                  const std::vector<Eigen::MatrixXd>& outputs,
+                  const std::vector<Eigen::MatrixXd>& inputs, bool find, bool ambient,
                   int max_order) {
   std::vector<MotionRecord> records;
   std::vector<std::array<double, 3>> parts;  // number of the record, begin and end
   Identification found;
+  bool excited = false;
   {
     const nb::gil_scoped_release release;
     for (std::size_t r = 0; r < times.size(); ++r) {
-      const MotionRecord record{times[r], outputs[r]};
+      const MotionRecord record{times[r], outputs[r], inputs[r]};
       analysis::check_records({record});
+      excited = excited || record.input.rows() > 0;
       std::vector<FreeDecay> pieces{{0, record.time.size(), {}}};
-      if (find && !ambient) pieces = find_decays(record);
+      if (find && !ambient && !excited) pieces = find_decays(record);
       for (const FreeDecay& piece : pieces) {
         if (!piece.reason.empty()) continue;
         records.push_back(part_of(record, piece.from, piece.to));
@@ -52,8 +55,9 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
       }
     }
     if (records.empty()) throw std::invalid_argument("identify: no free decay was found");
-    found = ambient ? identify_ambient(records, {.max_order = max_order})
-                    : identify_decays(records, {.max_order = max_order});
+    found = ambient   ? identify_ambient(records, {.max_order = max_order})
+            : excited ? identify_excited(records, {.max_order = max_order})
+                      : identify_decays(records, {.max_order = max_order});
   }
   nb::dict result;
   result["modes"] = modes_of(found.modes);
@@ -71,7 +75,7 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
 }  // namespace
 
 void add_identification(nb::module_& m) {
-  m.def("identify", &identify, nb::arg("times"), nb::arg("outputs"), nb::arg("find"),
+  m.def("identify", &identify, nb::arg("times"), nb::arg("outputs"), nb::arg("inputs"), nb::arg("find"),
         nb::arg("ambient"), nb::arg("max_order"));
 }
 

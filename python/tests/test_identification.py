@@ -87,6 +87,43 @@ def test_finds_the_modes_of_ambient_motion():
         dashpot.identify(t[:300], y[:300], ambient=True)
 
 
+def chirped(rng, start):
+    """Two oscillators that move already when a chirp meets them, 500 Hz, and an input that rests."""
+    t = 0.002 * np.arange(3000)
+    u = np.sin(2 * np.pi * t * (0.3 + 0.64 * t))
+    y = np.zeros((3000, 2))
+    for w, z, gain, shape in ((9, 0.12, 0.005, [2, 1]), (24, 0.8, 0.02, [1, -2])):
+        A = np.array([[0, 1], [-w * w, -2 * z * w]])
+        values, vectors = np.linalg.eig(A)
+        over = (vectors * np.exp(0.002 * values) @ np.linalg.inv(vectors)).real
+        x = np.array([start, 0.0])
+        for k in range(3000):
+            y[k] += x[0] * np.array(shape)
+            x = over @ (x - [gain * u[k], 0]) + [gain * u[k], 0]
+    return t, y + 1e-5 * rng.standard_normal(y.shape), np.column_stack([0 * u, 30 * u])
+
+
+def test_finds_the_modes_of_motion_under_a_measured_input():
+    rng = np.random.default_rng(5)
+    records = [chirped(rng, 0.01), chirped(rng, -0.02)]
+    t, y, u = ([record[i] for record in records] for i in range(3))
+    for found in (dashpot.identify(t, y, input=u), dashpot.identify(t[0], y[0], input=u[0][:, 1])):
+        modes = found.modes
+        assert len(modes) == 2
+        assert np.all(np.abs(modes.natural_frequency - [9, 24]) < 4 * modes.natural_frequency_std)
+        assert np.all(np.abs(modes.damping_ratio - [0.12, 0.8]) < 4 * modes.damping_ratio_std)
+        assert np.all(modes.natural_frequency_std < [0.02, 0.05])
+        assert np.allclose(modes.shapes[0], np.array([2, 1]) / np.sqrt(5), atol=0.01)
+    for bad, message in ((u[0][:, 0], "no input moves"), (u[0][:7], "inputs x samples"),
+                         (np.full(3000, np.nan), "not finite"), (np.zeros((2, 2, 2)), "3 dim")):
+        with pytest.raises(dashpot.Error, match=message):
+            dashpot.identify(t[0], y[0], input=bad)
+    with pytest.raises(dashpot.Error, match="2 arrays of times, 1 of inputs"):
+        dashpot.identify(t, y, input=u[:1])
+    with pytest.raises(dashpot.Error, match="not measured"):
+        dashpot.identify(t[0], y[0], input=u[0], ambient=True)
+
+
 @pytest.mark.parametrize("t, y, message", [
     ([0, 1], [0, 1], "2 samples"),
     (np.zeros(30), np.zeros(30), "time does not rise"),
