@@ -277,8 +277,10 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
   fit.amplitudes = there.amplitudes;
   fit.whiteness = variance_growth(there, data);
   const Index p = there.normal.rows();
-  // Scaled, so that parameters of unlike size are no deficiency.
-  const VectorXd scale = there.normal.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  // Scaled, so that parameters of unlike size are no deficiency. One that moves nothing, so that
+  // squares underflow, tells nothing and is not determined.
+  const VectorXd scale = there.normal.diagonal().unaryExpr(
+      [](double square) { return square > 1e-200 ? 1 / std::sqrt(square) : 0; });
   // Where two factors have become alike, some direction is not determined; the others still are.
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(scale.asDiagonal() * there.normal *
                                                        scale.asDiagonal());
@@ -289,6 +291,9 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
   fit.covariance = all.topLeftCorner(eigen, eigen);
   if (solver.info() != Eigen::Success || !fit.covariance.allFinite()) {
     fit.covariance.setConstant(eigen, eigen, std::numeric_limits<double>::infinity());
+  }
+  for (Index i = 0; i < eigen; ++i) {
+    if (scale[i] == 0) fit.covariance(i, i) = std::numeric_limits<double>::infinity();
   }
   return fit;
 }

@@ -1,4 +1,5 @@
 #include <dashpot/analysis/identification.hpp>
+#include <dashpot/analysis/identification/decay_fit.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
 
@@ -274,6 +275,25 @@ TEST(FindDecays, KeepsToWhatIsFree) {
   const std::vector<FreeDecay> found = find_decays(record, free);
   ASSERT_EQ(found.size(), 2U);
   EXPECT_GE(record.time[found[1].from], 5.4);
+}
+
+TEST(DecayFit, DoesNotDetermineWhatMovesNothing) {
+  Draws draw(33);
+  const KnownDecay decay;
+  const DecayData data({decay.record(1e-5, 0, draw)});
+  std::vector<DecayFactor> factors;
+  for (const auto& [w, z] : {std::array{decay.w1, decay.z1}, std::array{decay.w2, decay.z2}}) {
+    factors.push_back(DecayFactor::of_pair(w * Complex(-z, std::sqrt(1 - z * z))));
+  }
+  const VectorXd noise = VectorXd::Constant(2, 1e-5);
+  const DecayFit fit = fit_decays(data, factors, noise, 20);
+  // Lost before the second sample, but for a derivative whose square is no number above zero.
+  factors.push_back(DecayFactor::of_single(-2e5));
+  const DecayFit more = fit_decays(data, factors, noise, 20);
+  for (int i = 0; i < 4; ++i) {
+    EXPECT_NEAR(more.covariance(i, i), fit.covariance(i, i), 0.2 * fit.covariance(i, i)) << i;
+  }
+  EXPECT_FALSE(more.covariance(4, 4) < 1e10);
 }
 
 TEST(FindDecays, FindsNothingInRest) {
