@@ -323,6 +323,26 @@ VectorXd differences(const std::vector<PostureReport>& postures,
   return VectorXd::Map(all.data(), static_cast<Index>(all.size()));
 }
 
+/// Puts modes into the order of others by their shapes: frequencies cross as parameters change.
+void align(const std::vector<PredictedMode>& others, std::vector<PredictedMode>& modes) {
+  if (others.size() != modes.size()) return;
+  for (std::size_t placed = 0; placed < modes.size(); ++placed) {
+    // The most alike of those without a place.
+    std::size_t from = placed, to = placed;
+    double best = -1;
+    for (std::size_t i = 0; i < modes.size(); ++i) {
+      for (std::size_t k = 0; k < others.size(); ++k) {
+        if (modes[i].measured >= 0 || modes[k].measured >= 0) continue;
+        const double alike = likeness(others[k].shape, modes[i].shape);
+        if (alike > best) best = alike, from = i, to = k;
+      }
+    }
+    std::swap(modes[from], modes[to]);
+    modes[to].measured = 0;  // has its place
+  }
+  for (PredictedMode& mode : modes) mode.measured = -1;
+}
+
 }  // namespace
 
 Calibration calibrate(const LoopPrediction& loop, const std::string& names,
@@ -336,6 +356,7 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
     all.reserve(postures.size());
     for (const PostureReport& posture : postures) {
       all.push_back(loop.predict(posture.rest, parameters.correction(values, n)));
+      align(posture.predicted, all.back());
     }
     return all;
   };
@@ -351,7 +372,7 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
   };
   // First of all with large deviations, so that no match that is wrong at the start decides. In the
   // end nothing is better known than to this: no arm is linear, and at one posture, to less.
-  constexpr std::array<double, 5> kLeast = {0.05, 0.02, 0.01, 3e-3, 1e-3};
+  constexpr std::array<double, 6> kLeast = {0.05, 0.02, 0.01, 3e-3, 1e-3, 3e-4};
   double least = kLeast.back();
   Calibration result;
   rematch(before);

@@ -279,14 +279,17 @@ class HiddenArm {
     return "{robot: {urdf: " + testing::arm_path("iiwa14") +
            ", base: iiwa_link_0, tip: iiwa_link_ee_kuka, reflected_inertia: " + inertia +
            ", payload: {mass: " + mass +
-           "}}, control: {mode: joint}, gains: {joint: {stiffness: [800, 800, 500, 500, 200, 100, "
+           "}}, control: {mode: joint, period: 2 ms}, gains: {joint: {stiffness: [800, 800, 500, 500, 200, 100, "
            "50], damping: [20, 25, 10, 12, 3, 2, 0.5]}}";
   }
 
-  /// Logs of a push each, two at each posture.
+  /// Logs of a release each, two at each posture: a wrench that holds the tip ends at 1.5 s.
   HiddenArm(const Scratch& scratch, std::size_t count) {
     std::vector<std::string> postures = {"[0, 0.5, 0, -1.4, 0, 1, 0]",
-                                         "[-0.5, 0.3, -0.4, -1.6, 1, 1.2, 0.5]"};
+                                         "[-0.5, 0.3, -0.4, -1.6, 1, 1.2, 0.5]",
+                                         "[0.4, 0.9, 0.6, -0.9, -0.8, 0.5, 1]",
+                                         "[1, -0.4, 0.3, -1.9, 0.5, -0.9, -0.6]",
+                                         "[-0.8, 1.1, -1, -0.6, 1.4, 1.5, 0.2]"};
     postures.resize(count);
     int n = 0;
     for (const std::string& posture : postures) {
@@ -297,8 +300,8 @@ class HiddenArm {
             config("0", "[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1]") +
                 ", simulation: {robot: {payload: {mass: 1.5}, reflected_inertia: [0.13, 0.12, "
                 "0.11, 0.1, 0.09, 0.08, 0.05]}, sensors: {position_noise: 1e-5 rad}}, scenario: "
-                "{duration: 3.5, start: {position: " +
-                posture + "}, pushes: [{begin: 1.5, end: 1.52, wrench: " + wrench + "}]}}");
+                "{duration: 3, start: {position: " +
+                posture + "}, pushes: [{begin: 0.55, end: 1.5, wrench: " + wrench + "}]}}");
         logs.push_back(scratch.path(name + ".lcm"));
         const Outcome outcome = run_program({"run", scene, "--fast", "--log", logs.back()});
         EXPECT_EQ(outcome.status, 0) << outcome.err;
@@ -317,7 +320,7 @@ TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
   const std::string guess = scratch.write("guess.yaml", HiddenArm::config("0", inertia) + "}");
   const std::string output = scratch.path("found.yaml");
   std::vector<std::string> arguments = arm.logs;
-  arguments.insert(arguments.end(), {"--from", "1.53", "--against", truth});
+  arguments.insert(arguments.end(), {"--from", "1.51", "--against", truth});
   const Json known = identify(arguments);
   EXPECT_EQ(known["postures"].size(), 2U);
   int near = 0;
@@ -346,12 +349,33 @@ TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
   EXPECT_NEAR(std::stod(text.substr(mass + 6)), payload["value"].get<double>(), 1e-6);
 }
 
+TEST(Identify, RecoversPayloadAndReflectedInertiasFromTenReleases) {
+  const Scratch scratch;
+  HiddenArm arm(scratch, 5);
+  std::vector<std::string> arguments = arm.logs;
+  arguments.insert(
+      arguments.end(),
+      {"--from", "1.51", "--against",
+       scratch.write("guess.yaml",
+                     HiddenArm::config("0", "[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1]") + "}"),
+       "--calibrate", "payload,reflected_inertia"});
+  const Json found = identify(arguments);
+  const std::array<double, 8> truth{1.5, 0.13, 0.12, 0.11, 0.1, 0.09, 0.08, 0.05};
+  const Json& parameters = found["calibration"]["parameters"];
+  ASSERT_EQ(parameters.size(), truth.size());
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const double value = parameters[i]["value"];
+    EXPECT_NEAR(value, truth[i], (i == 0 ? 0.02 : 0.05) * truth[i]) << parameters[i]["name"];
+    EXPECT_NEAR(value, truth[i], 3 * parameters[i]["std"].get<double>()) << parameters[i]["name"];
+  }
+}
+
 TEST(Identify, SaysWhatRecordsCannotTellApart) {
   const Scratch scratch;
   HiddenArm arm(scratch, 1);
   const std::string guess = scratch.write(
       "guess.yaml", HiddenArm::config("0", "[0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1]") + "}");
-  const Json found = identify({arm.logs[0], "--from", "1.53", "--against", guess, "--calibrate",
+  const Json found = identify({arm.logs[0], "--from", "1.51", "--against", guess, "--calibrate",
                                "payload,reflected_inertia,friction,delay"});
   EXPECT_FALSE(found["calibration"]["warnings"].empty());
   const Outcome wrong =
