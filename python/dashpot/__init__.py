@@ -7,6 +7,10 @@ Everything that Dashpot refuses is a dashpot.Error, a ValueError with the progra
 
 from importlib.metadata import version as _version
 
+from ._arch import load_core as _load_core
+
+__build__ = _load_core()  # for which processors the code in use was compiled
+
 from ._analysis import (DampingDesign, Gradients, Miss, Response, SampledModes, Sensitivities,
                         design_damping, modes, receptance, response, sampled_modes, sensitivities)
 from ._audit import (Audit, DampingSuggestion, Distribution, PostureAudit, WorkspaceAudit,
@@ -22,8 +26,8 @@ from ._robot import ClosedLoop, Robot, closed_loop
 
 __version__ = _version("dashpot")
 __all__ = ["Audit", "ClosedLoop", "Controller", "DampingDesign", "DampingSuggestion",
-           "Distribution", "Error", "Gradients", "Identification", "MeasuredModes", "Miss", "Modes", "PostureAudit", "RegionDesign",
-           "Response", "Robot", "SampledModes", "Sensitivities", "Setpoint", "Snapshot", "Status",
-           "TrackedModes", "TrackedSampledModes", "WorkspaceAudit", "audit", "closed_loop",
-           "design_damping", "design_region", "identify", "modes", "read_log", "receptance", "response",
-           "sampled_modes", "sensitivities"]
+           "Distribution", "Error", "Gradients", "Identification", "MeasuredModes", "Miss", "Modes",
+           "PostureAudit", "RegionDesign", "Response", "Robot", "SampledModes", "Sensitivities",
+           "Setpoint", "Snapshot", "Status", "TrackedModes", "TrackedSampledModes",
+           "WorkspaceAudit", "audit", "closed_loop", "design_damping", "design_region", "identify",
+           "modes", "read_log", "receptance", "response", "sampled_modes", "sensitivities"]

@@ -11,6 +11,8 @@ _Question = tuple[_Array, float, float, float, list[int]]
 # level, largest ratio, worst sample, those that bind
 _Verdict = tuple[float, float, int, list[tuple[float, int]]]
 
+__build__: str
+
 class Error(ValueError): ...
 
 class Impedance:

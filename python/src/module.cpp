@@ -33,6 +33,7 @@ NB_MODULE(_core, m) {
   PyObject* const error = PyErr_NewException("dashpot.Error", PyExc_ValueError, nullptr);
   if (error == nullptr) nb::raise_python_error();
   m.attr("Error") = nb::steal(error);
+  m.attr("__build__") = DASHPOT_ARCH;
   nb::register_exception_translator(translate, error);
   add_analysis(m);
   add_design(m);
