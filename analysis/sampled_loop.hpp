@@ -6,9 +6,9 @@
 namespace dashpot::analysis {
 
 /// Computes the modes of  M q'' + C q' + K q = 0  where C and K act through a computer. The robot
-///     M q'' + D q' + G q = f
+///     M q'' + D q' + (G + P) q = f
 /// moves under a torque f that is held from tick k to tick k + 1. The controller commands
-///     u_k = (G - K) q_k - (C - D) v_k,   v_k = q'_k, or (q_k - q_k-1) / T if differenced,
+///     u_k = (G + P - K) q_k - (C - D) v_k,   v_k = q'_k, or (q_k - q_k-1) / T if differenced,
 ///     f_k = f_k-1 + (1 - exp(-2 pi f_c T)) (u_k-d - f_k-1),   or u_k-d without a filter.
 /// The state x = (q, q', [v], u_k-d .. u_k-1, [f]) goes from tick to tick as x_k+1 = A x_k. This is
 /// exact, because the robot's part of A is a matrix exponential. The eigenvalues z of A are given
@@ -30,7 +30,7 @@ template <int N>
 SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum,
                             const SampledLoop& loop);
 
-/// Returns the factor by which K and the controller's damping C - D may grow together before the
+/// Returns the factor by which the controller's K - P and C - D may grow together before the
 /// loop becomes unstable, to six digits. It is the first boundary above 1, searched in steps of a
 /// quarter, or infinity if there is none up to `most`. Where the loop is unstable as it is, the
 /// result is the first boundary below 1, or zero if there is none down to 1e-3. Motions with

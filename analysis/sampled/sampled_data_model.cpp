@@ -60,7 +60,8 @@ SampledDataModel::SampledDataModel(const System<N>& system, const Spectrum<N>& s
   C = T * unit(checked(system.damping, n, "damping"));
   K = T * T * unit(checked(system.stiffness, n, "stiffness"));
   D = T * unit(checked(loop.friction, n, "friction"));
-  G = T * T * unit(checked(loop.gravity_gradient, n, "gravity_gradient"));
+  P = T * T * unit(checked(loop.passive_stiffness, n, "passive_stiffness"));
+  G = P + T * T * unit(checked(loop.gravity_gradient, n, "gravity_gradient"));
   zero_modes = mass.matrixU() * MatrixXd(spectrum.zero_modes.basis);
   integrate();
 }
@@ -70,11 +71,12 @@ SampledDataModel::SampledDataModel(const ElasticForm<N>& form, const SampledLoop
     : n(form.coordinates.rows()) {
   set_loop(loop);
   const Index m = form.modes();
-  const bool plain = loop.friction.isZero(0) && loop.gravity_gradient.isZero(0);
+  const bool plain = loop.friction.isZero(0) && loop.gravity_gradient.isZero(0) &&
+                     loop.passive_stiffness.isZero(0);
   if (plain && form.free_zero_modes) n = m;
   const auto unit = [&](const MatrixXd& A) -> MatrixXd {
     if (plain) return MatrixXd::Zero(n, n);
-    const MatrixXd given = checked(A, n, "friction and gravity_gradient");
+    const MatrixXd given = checked(A, n, "friction, gravity_gradient and passive_stiffness");
     return form.coordinates.transpose() * given * form.coordinates;
   };
   const double T = loop.period;
@@ -82,7 +84,8 @@ SampledDataModel::SampledDataModel(const ElasticForm<N>& form, const SampledLoop
   K = MatrixXd::Zero(n, n);
   K.topLeftCorner(m, m).noalias() = T * T * form.root.lazyProduct(form.root.transpose());
   D = T * unit(loop.friction);
-  G = T * T * unit(loop.gravity_gradient);
+  P = T * T * unit(loop.passive_stiffness);
+  G = P + T * T * unit(loop.gravity_gradient);
   zero_modes = MatrixXd::Identity(n, n).rightCols(n - m);
   integrate();
 }
@@ -107,7 +110,7 @@ MatrixXd SampledDataModel::transition(double factor) const {
   const Index filter = queue + n * delay;
 
   MatrixXd command = MatrixXd::Zero(n, rows);
-  command.leftCols(n) = G - factor * K;
+  command.leftCols(n) = G - factor * K + (factor - 1) * P;
   command.middleCols(v, n) -= factor * (C - D);
   MatrixXd torque = command;
   if (delay > 0) torque.setZero(), torque.middleCols(queue, n).setIdentity();

@@ -11,7 +11,9 @@ namespace dashpot::analysis {
 /// unit of time: mass 1, period 1.
 struct SampledDataModel {
   Eigen::Index n = 0;
-  Eigen::MatrixXd C, K, D, G;  ///< n x n
+  Eigen::MatrixXd C, K, D;  ///< n x n
+  Eigen::MatrixXd G;        ///< of the robot without its controller, with P
+  Eigen::MatrixXd P;
   Eigen::MatrixXd zero_modes;  ///< n x r, orthonormal
   int delay = 0;
   double filter_gain = 1;  ///< 1: no filter
@@ -27,8 +29,8 @@ struct SampledDataModel {
   bool filtered() const { return filter_gain < 1; }
   /// Returns the number of rows of the state in addition to y and y'.
   Eigen::Index memory() const { return n * (delay + (filtered() ? 1 : 0) + (difference ? 1 : 0)); }
-  /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f]), with `factor` times K and C - D;
-  /// see sample_loop.
+  /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f]), with `factor` times K - P and
+  /// C - D; see sample_loop.
   Eigen::MatrixXd transition(double factor = 1) const;
   /// Returns a basis of the states along the zero modes that A does not change or only lets drift:
   /// positions, with the compensated gravity in the memory, and velocities that nothing damps.

@@ -15,9 +15,12 @@ struct SampledLoop {
   bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / T as q'
   /// D, n x n, N m s/rad: the part of the damping that the joints supply. Empty: none.
   Eigen::MatrixXd friction = {};
-  /// G, n x n, N m/rad: the stiffness of the robot without its controller, such as dg/dq, the
-  /// gradient of the gravity that the controller compensates. Empty: none.
+  /// G, n x n, N m/rad: the stiffness of the robot that the controller compensates, such as dg/dq,
+  /// the gradient of gravity. Empty: none.
   Eigen::MatrixXd gravity_gradient = {};
+  /// P, n x n, N m/rad: the part of the stiffness K that the world supplies, such as the springs of
+  /// a contact. Empty: none.
+  Eigen::MatrixXd passive_stiffness = {};
 };
 
 /// A mode of the loop that is closed once a tick. One with a z that is real and negative

@@ -125,10 +125,10 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
   const controller::PassivePart outside = controller::passive_part(
       at.J, settings.environment, controller::JointMatrix::Zero(q.size(), q.size()));
   sampled.friction += outside.damping;
-  sampled.gravity_gradient = outside.stiffness;
+  sampled.passive_stiffness = outside.stiffness;
   if (settings.feed_forward.gravity) {
     const MatrixXd gravity = controller::gravity_gradient(controller::DynamicsKernel(arm), q);
-    sampled.gravity_gradient += gravity;
+    sampled.gravity_gradient = gravity;
     if (correction.payload != 0) {  // whose weight nobody holds
       const MatrixXd added =
           gravity - controller::gravity_gradient(controller::DynamicsKernel(config_.model), q);

@@ -42,8 +42,13 @@ SampledModes sampled_modes(const Scene& scene) {
   loop.delay = scene.plant.delay;
   loop.torque_cutoff = scene.plant.torque_cutoff;
   loop.difference_velocity = scene.plant.difference_velocity;
-  loop.friction =
-      Eigen::VectorXd(model.joint_values(&controller::Joint::viscous_friction)).asDiagonal();
+  const JointVector none = JointVector::Zero(scene.dof());
+  const controller::PassivePart outside = controller::passive_part(
+      controller::evaluate(model, scene.rest, none).J, scene.arm->config.settings.environment,
+      controller::JointMatrix::Zero(none.size(), none.size()));
+  loop.friction = outside.damping;
+  loop.friction.diagonal() += model.joint_values(&controller::Joint::viscous_friction);
+  loop.passive_stiffness = outside.stiffness;
   if (scene.arm->config.settings.feed_forward.gravity) {
     loop.gravity_gradient =
         controller::gravity_gradient(controller::DynamicsKernel(model), scene.rest);

@@ -114,9 +114,9 @@ void SampledAnalysis::solve(const Task& task, SampledVibration& result) {
   result.status = continuous.status;
   analysis::SampledLoop loop = loop_;
   loop.friction += task.passive.damping;
-  loop.gravity_gradient = task.passive.stiffness;
+  loop.passive_stiffness = task.passive.stiffness;
   kernel_.attach(task.attachment);
-  if (gravity_) loop.gravity_gradient += gravity_gradient(kernel_, task.position);
+  if (gravity_) loop.gravity_gradient = gravity_gradient(kernel_, task.position);
   const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, loop);
   result.spectral_radius = sampled.spectral_radius;
   result.gain_margin = analysis::gain_margin(system, continuous, loop, 1e6, kSlowestVibration);

@@ -258,7 +258,7 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
     loop.gravity_gradient = twin.gravity_gradient(q0);
     if (!held) {
       const auto passive = passive_part(robot.J, world.environment, load);
-      loop.gravity_gradient += passive.stiffness;
+      loop.passive_stiffness = passive.stiffness;
       loop.friction += passive.damping;
     }
     const analysis::SampledSpectrum sampled = sample_loop(arm.system, spectrum, loop);

@@ -53,22 +53,24 @@ TEST(LoopStability, TurnsWhereTheAnalysisSays) {
     loop.difference_velocity = random.integer(0, 1) == 1;
     loop.friction = 0.5 * random.spd(n);
     nominal.damping += loop.friction;
+    const MatrixXd passive = random.integer(0, 1) * 500 * random.spd(n);  // springs of the world
+    loop.passive_stiffness = passive;
+    nominal.stiffness += passive;
     const double margin = gain_margin(nominal, analyze(nominal), loop);
     ASSERT_GT(margin, 0);
     ASSERT_TRUE(std::isfinite(margin));
     for (const double factor : {0.98, 1.02}) {
       analysis::System<> system = nominal;
-      system.stiffness *= factor * margin;
+      system.stiffness = passive + factor * margin * (nominal.stiffness - passive);
       system.damping = loop.friction + factor * margin * (nominal.damping - loop.friction);
       const analysis::SampledSpectrum sampled = sample_loop(system, analyze(system), loop);
       EXPECT_EQ(sampled.stable(), factor < 1);
-      sim::LinearSystem masses(system.mass, loop.friction, MatrixXd::Zero(n, n));
+      sim::LinearSystem masses(system.mass, loop.friction, passive);
       sim::Plant plant(masses, plant_options(loop), random.vector(n));
-      const MatrixXd C = system.damping - loop.friction;
+      const MatrixXd K = system.stiffness - passive, C = system.damping - loop.friction;
       const double grown = growth(ticks_to_tell(sampled.spectral_radius), [&] {
         const sim::Measurement& seen = plant.measured();
-        EXPECT_EQ(plant.step(-system.stiffness * seen.position - C * seen.velocity),
-                  sim::Status::kOk);
+        EXPECT_EQ(plant.step(-K * seen.position - C * seen.velocity), sim::Status::kOk);
         return plant.position().norm();
       });
       if (factor < 1) {
