@@ -10,15 +10,23 @@ namespace dashpot::controller {
 /// than 1 rad/s do not count. Gravity compensation with a zero-order hold feeds motions without
 /// springs, which then grow that slowly, so that otherwise all gains would be refused.
 ///
+/// Damping that is designed for a ratio grows with the payload told, whether the arm carries it or
+/// not. So in a mode with a ratio the same springs and dampers are judged on the arm without
+/// payload, too, to which they stay until somebody tells that it was dropped. There a margin of
+/// kDropped, or of Limits::gain_margin if that is less, is enough.
+///
 /// Not for the real-time thread, because it allocates, and takes milliseconds, or tenths of a
 /// second with a long delay and many joints.
 class GainJudge {
  public:
   struct Verdict {
-    double margin;  ///< of the worse mode; at most Limits::gain_margin, which is enough; below 1
-                    ///< if the loop is unstable, 0 if it could not be analysed
-    Mode mode;      ///< the worse mode
+    double margin;  ///< of the worst that is too little; Limits::gain_margin if all is enough;
+                    ///< below 1 if the loop is unstable, 0 if it could not be analysed
+    Mode mode;      ///< of the worst
+    bool dropped = false;  ///< the worst is the arm without payload
   };
+  /// The margin that is enough without the payload told.
+  static constexpr double kDropped = 1.2;
 
   /// The settings have to be valid.
   GainJudge(const RobotModel& model, const Settings& settings);
@@ -27,6 +35,7 @@ class GainJudge {
   void attach(const Attachment& attachment) noexcept {
     kernel_.attach(attachment);
     posture_loop_.attach(attachment);
+    loaded_ = attachment.mass > 0;
   }
   /// Judges gains at the posture `q` (n, rad). The gains must have passed check_gains in both
   /// modes.
@@ -38,9 +47,15 @@ class GainJudge {
   static constexpr int kPostures = 8;
 
  private:
-  double margin(const JointVector& q, const Gains& gains, Mode mode);
+  /// Returns the margin of a closed loop with this gravity gradient, at most `enough`; 0 if it
+  /// cannot be analysed.
+  double margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,
+                double enough);
+  Eigen::MatrixXd gravity_of(const DynamicsKernel& kernel, const JointVector& q) const;
 
   DynamicsKernel kernel_;
+  DynamicsKernel bare_;        ///< without payload
+  bool loaded_;                ///< there is a payload
   JointVector lower_, upper_;  ///< of the positions, rad
   double wanted_;
   bool gravity_;

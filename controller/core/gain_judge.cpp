@@ -1,12 +1,12 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/gain_judge.hpp>
+#include <dashpot/controller/model/least_inertia.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <exception>
-#include <limits>
 #include <numbers>
 
 namespace dashpot::controller {
@@ -24,10 +24,21 @@ Settings judging(Settings settings) {
   return settings;
 }
 
+/// Whether the payload has a part in the damping. In motions that leave the tip where it is, it has
+/// none.
+bool counts_payload(const Gains& gains, Mode mode) noexcept {
+  if (mode == Mode::kJoint) return gains.joint_damping_ratio > 0;
+  const auto& held = gains.directions;
+  const bool moves = std::find(held.begin(), held.end(), false) != held.end();
+  return gains.task_damping_ratio > 0 || (moves && gains.null_damping_ratio > 0);
+}
+
 }  // namespace
 
 GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
     : kernel_(model),
+      bare_(unloaded(model)),
+      loaded_(model.attachment().mass > 0),
       lower_(settings.limits.position_lower),
       upper_(settings.limits.position_upper),
       wanted_(settings.limits.gain_margin),
@@ -36,14 +47,21 @@ GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
       posture_loop_(model, judging(settings)) {}
 
 GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
-  Verdict worst{std::numeric_limits<double>::infinity(), Mode::kJoint};
-  loop_.gravity_gradient = Eigen::MatrixXd();
-  if (gravity_) loop_.gravity_gradient = gravity_gradient(kernel_, q);
+  Verdict worst{wanted_, Mode::kJoint};
+  const Eigen::MatrixXd gravity = gravity_of(kernel_, q);
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
-    const double found = margin(q, gains, mode);
+    analysis::System<kMaxJoints> system;
+    const bool known = posture_loop_.closed_loop(q, gains, mode, system) == Status::kOk;
+    const double found = known ? margin(system, gravity, wanted_) : 0;
     if (found < worst.margin) worst = {found, mode};
+    if (!known || !loaded_ || !counts_payload(gains, mode)) continue;
+    DynamicsResult there;
+    bare_.evaluate(q, JointVector::Zero(q.size()), there);
+    system.mass = there.M;
+    const double enough = std::min(kDropped, wanted_);
+    const double dropped = margin(system, gravity_of(bare_, q), enough);
+    if (dropped < std::min(enough, worst.margin)) worst = {dropped, mode, true};
   }
-  worst.margin = std::min(worst.margin, wanted_);
   return worst;
 }
 
@@ -66,14 +84,19 @@ GainJudge::Verdict GainJudge::judge_anywhere(const Gains& gains) {
   return best;
 }
 
-double GainJudge::margin(const JointVector& q, const Gains& gains, Mode mode) try {
-  analysis::System<kMaxJoints> system;
-  if (posture_loop_.closed_loop(q, gains, mode, system) != Status::kOk) return 0;
+Eigen::MatrixXd GainJudge::gravity_of(const DynamicsKernel& kernel, const JointVector& q) const {
+  return gravity_ ? gravity_gradient(kernel, q) : Eigen::MatrixXd();
+}
+
+double GainJudge::margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,
+                         double enough) try {
+  loop_.gravity_gradient = gravity;
   analysis::SpectrumSolver<kMaxJoints> solver;
   analysis::Spectrum<kMaxJoints> spectrum;
   const analysis::Status solved = solver.solve(system, spectrum);
   if (solved != analysis::Status::kOk && solved != analysis::Status::kUncertified) return 0;
-  return analysis::gain_margin(system, spectrum, loop_, wanted_, kSlowestVibration);
+  return std::min(enough,
+                  analysis::gain_margin(system, spectrum, loop_, enough, kSlowestVibration));
 } catch (const std::exception&) {  // no convergence
   return 0;
 }

@@ -96,5 +96,38 @@ TEST_F(Judge, CountsTheGravityCompensationWhereItGrowsFast) {
   }
 }
 
+/// A damper designed for the inertia of the link and 20 kg, held for T, takes from the link alone
+/// (2 - c T / I) of its swing: the margin is 2 I / (T c), whatever the spring.
+TEST_F(Judge, JudgesDesignedDampingWithoutThePayload) {
+  ModelOptions options;
+  options.gravity.setZero();
+  options.coulomb_friction = options.viscous_friction = JointVector::Zero(1);
+  options.payload = {20, {0, 0.5, 0}, Eigen::Matrix3d::Zero()};
+  const RobotModel loaded = testing::chain_of({"continuous"}, options);
+  const JointVector q = JointVector::Constant(1, 0.4);
+  const double inertia = evaluate(loaded, q, JointVector::Zero(1)).M(0, 0);
+  ASSERT_GT(inertia, 20 * kInertia);
+  for (const double margin : {0.5, 0.9, 1.1, 1.3}) {
+    const double damper = 2 * kInertia / (settings.period * margin);
+    gains.joint_damping_ratio = 0.7;
+    gains.joint_stiffness(0, 0) = std::pow(damper / 1.4, 2) / inertia;
+    GainJudge judge(loaded, settings);
+    const GainJudge::Verdict found = judge.judge(q, gains);
+    const bool enough = margin > GainJudge::kDropped;
+    EXPECT_NEAR(found.margin, enough ? 3 : margin, 1e-3 * margin);
+    EXPECT_EQ(found.dropped, !enough);
+    // The same damper, but given, is judged with what is carried; so is an arm that carries
+    // nothing.
+    gains.joint_damping_ratio = 0;
+    gains.joint_damping(0, 0) = damper;
+    EXPECT_EQ(judge.judge(q, gains).margin, 3);
+    gains.joint_damping_ratio = 0.7;
+    judge.attach(Attachment());
+    EXPECT_EQ(judge.judge(q, gains).margin, 3);
+    judge.attach(loaded.attachment());
+    EXPECT_EQ(judge.judge(q, gains).dropped, !enough);
+  }
+}
+
 }  // namespace
 }  // namespace dashpot::controller
