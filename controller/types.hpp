@@ -40,8 +40,9 @@ struct Payload {
 
 /// Limits of the tip's speed, below those of the settings; infinity: those of the settings.
 struct TipSpeed {
-  double linear = std::numeric_limits<double>::infinity();   ///< of the tip reference, m/s
-  double angular = std::numeric_limits<double>::infinity();  ///< of the tip reference, rad/s
+  static constexpr double kLeast = 1e-4;  ///< m/s and rad/s: less is as good as none, or a mistake
+  double linear = std::numeric_limits<double>::infinity();   ///< to which references take it, m/s
+  double angular = std::numeric_limits<double>::infinity();  ///< likewise, rad/s
   double limit = std::numeric_limits<double>::infinity();    ///< Limits::tip_velocity, m/s
   bool operator==(const TipSpeed&) const = default;
 };
@@ -80,12 +81,14 @@ struct Gains {
   JointMatrix joint_stiffness;  ///< n x n, N m/rad, of mode kJoint
   JointMatrix joint_damping;    ///< n x n, N m s/rad, of mode kJoint
   /// Damping ratio that every mode of mode kJoint is to have, 0 < ratio <= 2: the damping is then
-  /// designed at every tick, and joint_damping is not used. 0: joint_damping acts.
+  /// designed at every tick, and joint_damping acts only on joints without springs, for which there
+  /// is nothing to design. 0: joint_damping acts.
   double joint_damping_ratio = 0;
   Matrix6 task_stiffness = Matrix6::Zero();  ///< K_C, N/m, N/rad and N m/rad
   Matrix6 task_damping = Matrix6::Zero();    ///< C_C, N s/m, N s/rad and N m s/rad
   /// Damping ratio that every mode of K_C is to have, 0 < ratio <= 2: C_C is then designed at every
-  /// tick (see DesignedDamping), and task_damping is not used. 0: C_C is task_damping.
+  /// tick (see DesignedDamping), and task_damping acts only in selected directions without springs.
+  /// 0: C_C is task_damping.
   double task_damping_ratio = 0;
   Frame frame = Frame::kBase;
   /// Selected directions: the task directions with springs and dampers, in the axes of `frame`. The
@@ -94,8 +97,8 @@ struct Gains {
   JointVector null_stiffness;  ///< n, N m/rad, toward the posture, within the free motions
   JointVector null_damping;    ///< n, N m s/rad, within the free motions
   /// Damping ratio that the free motions are to have with null_stiffness, 0 < ratio <= 2: their
-  /// damping is then designed at every tick (see NullSpace::ratio_damping), and null_damping is not
-  /// used. 0: null_damping acts.
+  /// damping is then designed at every tick (see NullSpace::ratio_damping), and null_damping acts
+  /// only if null_stiffness is zero. 0: null_damping acts.
   double null_damping_ratio = 0;
 };
 

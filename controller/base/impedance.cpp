@@ -1,6 +1,21 @@
 #include <dashpot/controller/base/impedance.hpp>
 
 namespace dashpot::controller {
+namespace {
+
+/// The dampers C where the stiffness K has no springs: rows and columns of the others are zero.
+template <class Matrix>
+Matrix beside_springs(const Matrix& K, const Matrix& C) noexcept {
+  Matrix result = C;
+  for (Eigen::Index i = 0; i < K.rows(); ++i) {
+    if (!(K.row(i).array() != 0).any()) continue;
+    result.row(i).setZero();
+    result.col(i).setZero();
+  }
+  return result;
+}
+
+}  // namespace
 
 Impedance::Impedance(int n)
     : null_stiffness(JointVector::Zero(n)),
@@ -17,9 +32,10 @@ Impedance::Impedance(const Setpoint& setpoint, int n) noexcept : Impedance(n) {
     for (int j = 0; j < n; ++j) {
       for (int i = 0; i < n; ++i) {
         joint_stiffness(i, j) = 0.5 * (K(i, j) + K(j, i));
-        if (joint_damping_ratio == 0) joint_damping(i, j) = 0.5 * (C(i, j) + C(j, i));
+        joint_damping(i, j) = 0.5 * (C(i, j) + C(j, i));
       }
     }
+    if (joint_damping_ratio > 0) joint_damping = beside_springs(joint_stiffness, joint_damping);
     return;
   }
   task_weight = 1;
@@ -32,11 +48,13 @@ Impedance::Impedance(const Setpoint& setpoint, int n) noexcept : Impedance(n) {
     return tip.selected.asDiagonal() * (0.5 * (A + A.transpose())) * tip.selected.asDiagonal();
   };
   tip.stiffness = in_selected_directions(gains.task_stiffness);
-  if (damping_ratio == 0) tip.damping = in_selected_directions(gains.task_damping);
+  tip.damping = in_selected_directions(gains.task_damping);
+  if (damping_ratio > 0) tip.damping = beside_springs(tip.stiffness, tip.damping);
   if (n > tip.selected.sum()) {
     if (gains.null_stiffness.size() == n) null_stiffness = gains.null_stiffness;
     null_damping_ratio = gains.null_damping_ratio;
-    if (gains.null_damping.size() == n && null_damping_ratio == 0) {
+    const bool springs = (null_stiffness.array() != 0).any();
+    if (gains.null_damping.size() == n && !(springs && null_damping_ratio > 0)) {
       null_damping = gains.null_damping;
     }
   }

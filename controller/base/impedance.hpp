@@ -32,7 +32,9 @@ struct Impedance {
   explicit Impedance(int n);
   /// The impedance that a set-point asks for, which is valid for n joints. Directions that are not
   /// selected have no springs and dampers. There are no null-space springs and dampers unless there
-  /// are more joints than selected directions.
+  /// are more joints than selected directions. With a damping ratio the dampers given act only
+  /// where there is no spring: on joints and in directions whose row of the stiffness is zero, and
+  /// in the null space if all its stiffness is zero.
   Impedance(const Setpoint& setpoint, int n) noexcept;
 
   /// Returns true if there are springs or dampers in the null space.

@@ -62,16 +62,21 @@ Settings default_settings(const RobotModel& model) {
   constexpr double kOmega = 2 * std::numbers::pi * 1.5;  // rad/s
   Gains& gains = settings.initial.gains;
   gains.joint_stiffness = (kOmega * kOmega * inertia).asDiagonal();
-  gains.joint_damping = JointMatrix::Zero(n, n);
+  gains.joint_damping = (2 * kRatio * kOmega * inertia).asDiagonal();
   // A damper 2 ratio omega m is the fastest for the fastest mode, whose omega^2 is at most
   // k_v / m_v + k_w / m_w: half for translation, half for rotation.
   constexpr double kFastest = kFastestDecay / (2 * kRatio);  // rad/s
-  const TipInertia least = least_tip_inertia(model, limits.position_lower, limits.position_upper);
+  const TipInertia least =
+      least_tip_inertia(unloaded(model), limits.position_lower, limits.position_upper);
   const double linear = std::min(400.0, 0.5 * kFastest * kFastest * least.linear);
   const double angular = std::min(20.0, 0.5 * kFastest * kFastest * least.angular);
   gains.task_stiffness.diagonal() << linear, linear, linear, angular, angular, angular;
   gains.null_stiffness = 0.25 * gains.joint_stiffness.diagonal();
-  gains.null_damping = none;
+  // For springs that are taken away: a ratio of theirs is no damping.
+  const double slide = std::min(40.0, kFastestDecay * least.linear);
+  const double turn = std::min(2.0, kFastestDecay * least.angular);
+  gains.task_damping.diagonal() << slide, slide, slide, turn, turn, turn;
+  gains.null_damping = 0.5 * gains.joint_damping.diagonal();
   gains.joint_damping_ratio = gains.task_damping_ratio = gains.null_damping_ratio = kRatio;
   settings.initial.joint_position = middle;
   return settings;

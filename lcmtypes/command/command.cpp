@@ -4,6 +4,15 @@
 #include <bit>
 
 namespace dashpot::lcmtypes {
+namespace {
+
+/// With a ratio the dampers of a command act only beside springs; without any, those before stay.
+template <class Matrix>
+void take_dampers(double ratio, const Matrix& from, Matrix& to) noexcept {
+  if (ratio == 0 || (from.array() != 0).any()) to = from;
+}
+
+}  // namespace
 
 bool has_set(const Command& command, std::int32_t part, std::int64_t after) noexcept {
   const auto bit = static_cast<std::size_t>(std::countr_zero(static_cast<std::uint32_t>(part)));
@@ -19,7 +28,8 @@ void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t 
   if (has(command_t::WRENCH)) setpoint.wrench = from.wrench;
   if (has(command_t::JOINT_GAINS)) {
     setpoint.gains.joint_stiffness = from.gains.joint_stiffness;
-    setpoint.gains.joint_damping = from.gains.joint_damping;
+    take_dampers(from.gains.joint_damping_ratio, from.gains.joint_damping,
+                 setpoint.gains.joint_damping);
   }
   if (has(command_t::JOINT_GAINS) || has(command_t::JOINT_RATIO)) {
     setpoint.gains.joint_damping_ratio = from.gains.joint_damping_ratio;
@@ -28,7 +38,8 @@ void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t 
     setpoint.gains.frame = from.gains.frame;
     setpoint.gains.directions = from.gains.directions;
     setpoint.gains.task_stiffness = from.gains.task_stiffness;
-    setpoint.gains.task_damping = from.gains.task_damping;
+    take_dampers(from.gains.task_damping_ratio, from.gains.task_damping,
+                 setpoint.gains.task_damping);
   }
   if (has(command_t::TASK_GAINS) || has(command_t::TASK_RATIO)) {
     setpoint.gains.task_damping_ratio = from.gains.task_damping_ratio;

@@ -19,7 +19,6 @@ using controller::Setpoint;
 using Verdict = CommandVerdict;
 
 constexpr std::int32_t kAllParts = 2 * command_t::TIP_SPEED - 1;
-constexpr double kSlowestTip = 1e-4;     // m/s and rad/s, as for the controller
 constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion
 // Relative to the largest entry; no wider than what the controller accepts
 constexpr double kSymmetryTolerance = 1e-9;
@@ -165,7 +164,7 @@ Verdict copy_tip_speed(const command_t& message, const CommandLimits& limits,
         {message.angular_velocity, limits.angular_velocity, &speed.angular},
         {message.tip_velocity, limits.tip_velocity, &speed.limit}}) {
     if (!std::isfinite(given)) return Verdict::kNotFinite;
-    const bool fits = given >= kSlowestTip && given <= most;
+    const bool fits = given >= controller::TipSpeed::kLeast && given <= most;
     if (given != 0 && !fits) return Verdict::kOutOfLimits;
     if (given > 0) *value = given;
   }

@@ -93,6 +93,33 @@ TEST(CommandFilter, EndsARatioWithGainsOfTheSamePart) {
   EXPECT_EQ(setpoint.gains.joint_damping_ratio, message.joint_damping_ratio);
 }
 
+TEST(CommandFilter, KeepsDampersBesideARatioUnlessThereAreOthers) {
+  Random random(926);
+  CommandFilter filter(limits_for(7));
+  command_t message = random_command(random, 7);
+  message.parts = int{command_t::TASK_GAINS} + int{command_t::TASK_RATIO} +
+                  int{command_t::JOINT_GAINS} + int{command_t::JOINT_RATIO};
+  for (auto& row : message.task_damping) std::fill(std::begin(row), std::end(row), 0.0);
+  for (auto& row : message.joint_damping) std::fill(row.begin(), row.end(), 0.0);
+  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  controller::Setpoint setpoint;
+  setpoint.gains.task_damping = random.spd(6);
+  setpoint.gains.joint_damping = random.spd(7);
+  const controller::Gains before = setpoint.gains;
+  apply(filter.command(), setpoint);
+  EXPECT_EQ(setpoint.gains.task_damping, before.task_damping);
+  EXPECT_EQ(setpoint.gains.joint_damping, before.joint_damping);
+  EXPECT_EQ(setpoint.gains.task_damping_ratio, message.task_damping_ratio);
+  // Without a ratio zeros are what they say.
+  message.parts = int{command_t::TASK_GAINS} + int{command_t::JOINT_GAINS};
+  ++message.sequence;
+  ++message.utime;
+  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  apply(filter.command(), setpoint, 1);
+  EXPECT_TRUE(setpoint.gains.task_damping.isZero(0));
+  EXPECT_TRUE(setpoint.gains.joint_damping.isZero(0));
+}
+
 TEST(CommandFilter, LeavesAloneWhatNoCommandSet) {
   Random random(922);
   CommandFilter filter(limits_for(7));

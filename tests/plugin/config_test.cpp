@@ -174,6 +174,8 @@ TEST(Config, TakesADampingRatioOfTheJoints) {
   EXPECT_EQ(gains("stiffness: 300, damping: 9").joint_damping_ratio, 0);
   EXPECT_EQ(gains("stiffness: 300, damping_ratio: 0.8").joint_damping_ratio, 0.8);
   EXPECT_EQ(gains("stiffness: 300, damping_ratio: 0.8").task_damping_ratio, 0.7);
+  // Where no spring is left, nothing can be designed.
+  EXPECT_GT(gains("stiffness: 0, damping_ratio: 0.8").joint_damping.diagonal().minCoeff(), 0);
 }
 
 TEST(Config, TakesADampingRatioOfTheNullSpace) {
