@@ -80,8 +80,9 @@ class Controller {
   /// in force in faults and resets; after a reset there is no way left.
   void attach(const Attachment& attachment) noexcept;
   /// Sets limits of the tip's speed from the next tick on; where they exceed those of the settings,
-  /// the settings' limits hold. With a lower TipSpeed::limit the tip's reference moves with at most
-  /// 0.6 of it. A tip that is faster just then is a fault. Resets keep them.
+  /// the settings' limits hold. With a lower TipSpeed::limit the reference takes the tip with at
+  /// most 0.6 of it. In mode kJoint the reference keeps to them where the robot is, and without
+  /// them to Motion::velocity alone. A tip that is faster just then is a fault. Resets keep them.
   void limit_tip_speed(const TipSpeed& speed) noexcept;
 
   int joints() const noexcept;  ///< n

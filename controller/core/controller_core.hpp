@@ -72,6 +72,9 @@ class ControllerCore {
   Status setpoint_age_status() const noexcept;
   /// Returns the share of its speed limits at which the tip's reference takes no joint too fast.
   double tip_reference_speed() const noexcept;
+  /// Returns the share of its speed limits at which the joints' reference takes the tip no faster
+  /// than limit_tip_speed allows, where the robot is.
+  double joint_reference_speed() const noexcept;
   /// Moves what is attached on by one period, and the tip's reference with the tool.
   void step_attachment() noexcept;
   /// Returns where the accepted set-point wants T, as far as T is on its way to its new place.
@@ -120,6 +123,7 @@ class ControllerCore {
   ImpedanceLaw law_;
   SafetyFilter filter_;
   LoopSystem loop_;
+  TipSpeed tip_speed_;  ///< of the reference, in either mode
   ErrorClamp clamp_;
   JointVector damping_;           ///< of the safe output "damp", N m s/rad
   JointVector viscous_friction_;  ///< of the robot, N m s/rad

@@ -97,10 +97,13 @@ Pose ControllerCore::tip_goal() const noexcept {
 void ControllerCore::limit_tip_speed(const TipSpeed& speed) noexcept {
   constexpr double kReferenceShare = 0.6;  // SafetyFilter takes drive away from 0.65 on
   const Motion& motion = settings_.motion;
-  double linear = std::min(motion.linear_velocity, speed.linear);
   const double limit = std::min(settings_.limits.tip_velocity, speed.limit);
-  if (limit < settings_.limits.tip_velocity) linear = std::min(linear, kReferenceShare * limit);
-  references_.tip.limit_speed(linear, std::min(motion.angular_velocity, speed.angular));
+  tip_speed_ = speed;
+  if (limit < settings_.limits.tip_velocity) {
+    tip_speed_.linear = std::min(speed.linear, kReferenceShare * limit);
+  }
+  references_.tip.limit_speed(std::min(motion.linear_velocity, tip_speed_.linear),
+                              std::min(motion.angular_velocity, tip_speed_.angular));
   filter_.limit_tip_speed(limit);
   motion_watch_.limit_tip_speed(limit);
 }
@@ -156,6 +159,17 @@ double ControllerCore::tip_reference_speed() const noexcept {
   return share > kReferenceShare * speed ? kReferenceShare * speed / share : 1;
 }
 
+double ControllerCore::joint_reference_speed() const noexcept {
+  const JointReference& path = references_.joint;
+  const bool any = std::isfinite(tip_speed_.linear) || std::isfinite(tip_speed_.angular);
+  const double speed = path.speed();
+  if (!any || speed == 0) return 1;
+  const Vector6 V = twist(robot_.J, path.point_velocity());
+  const double share =
+      std::max(V.head<3>().norm() / tip_speed_.linear, V.tail<3>().norm() / tip_speed_.angular);
+  return share > speed ? speed / share : 1;
+}
+
 void ControllerCore::impedance_torque(bool hold, JointVector& tau) noexcept {
   if (springs_ != Springs::kInForce) restart_springs();
   springs_ = Springs::kInForce;
@@ -169,7 +183,7 @@ void ControllerCore::impedance_torque(bool hold, JointVector& tau) noexcept {
   const bool joint = accepted_.mode == Mode::kJoint;
   if (impedance.joint_weight > 0) {
     if (joint && !hold) {
-      references_.joint.step(goal_);
+      references_.joint.step(goal_, joint_reference_speed());
     } else {
       references_.joint.halt();
     }

@@ -17,17 +17,17 @@ void JointReference::start(const JointVector& position) noexcept {
   smoothing_.reset();
 }
 
-void JointReference::step(const JointVector& goal) noexcept {
-  go(difference(goal, point_), &goal);
+void JointReference::step(const JointVector& goal, double share) noexcept {
+  go(difference(goal, point_), &goal, share);
 }
 
 void JointReference::halt() noexcept {
-  go(JointVector::Zero(point_.size()), nullptr);
+  go(JointVector::Zero(point_.size()), nullptr, 1);
 }
 
 /// Moves one period along the difference `way`, at whose end is the goal, if there is one.
-void JointReference::go(const JointVector& way, const JointVector* goal) noexcept {
-  const bool arrives = approach(way, velocity_, norm_, period_);
+void JointReference::go(const JointVector& way, const JointVector* goal, double share) noexcept {
+  const bool arrives = approach(way, velocity_, norm_, period_, share);
   if (arrives && goal != nullptr) {
     point_ = *goal;
   } else {

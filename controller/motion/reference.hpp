@@ -16,8 +16,8 @@ class JointReference {
 
   /// Places the reference at rest at `position`.
   void start(const JointVector& position) noexcept;
-  /// Moves one period toward `goal`.
-  void step(const JointVector& goal) noexcept;
+  /// Moves one period toward `goal`, with a `share` of the speed limits, from 0 to 1.
+  void step(const JointVector& goal, double share = 1) noexcept;
   /// Moves coordinate i to `position` and keeps its velocity.
   void relocate(int i, double position) noexcept {
     point_[i] += position - position_[i];
@@ -29,9 +29,12 @@ class JointReference {
   const JointVector& position() const noexcept { return position_; }
   const JointVector& velocity() const noexcept { return smoothing_.velocity(); }
   const JointVector& acceleration() const noexcept { return smoothing_.acceleration(); }
+  /// Returns the velocity before smoothing, and its share of the speed limits.
+  const JointVector& point_velocity() const noexcept { return velocity_; }
+  double speed() const noexcept { return norm_.speed(velocity_); }
 
  private:
-  void go(const JointVector& way, const JointVector* goal) noexcept;
+  void go(const JointVector& way, const JointVector* goal, double share) noexcept;
 
   JointNorm norm_;
   double period_;

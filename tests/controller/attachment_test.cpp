@@ -216,36 +216,5 @@ TEST(Attachment, FollowsInAFaultAndStaysInAReset) {
   EXPECT_EQ(arm.controller->snapshot().payload.mass, 0);
 }
 
-TEST(TipSpeed, IsOnlyEverLowered) {
-  testing::SimulatedArm arm(
-      testing::panda_model(),
-      [] {
-        Settings settings = testing::quiet_settings(testing::panda_model());
-        settings.initial.mode = Mode::kCartesian;
-        return settings;
-      }(),
-      testing::panda_ready());
-  const auto fastest = [&](const TipSpeed& speed, double way) {
-    arm.controller.limit_tip_speed(speed);
-    arm.setpoint.tip_pose.position.y() += way;
-    double found = 0;
-    for (int k = 0; k < 1500; ++k) {
-      EXPECT_LT(arm.step(), Status::kSetpointStale);
-      found = std::max(found, arm.controller.snapshot().reference_twist.head<3>().norm());
-    }
-    return found;
-  };
-  const double all = arm.controller.settings().motion.linear_velocity;
-  EXPECT_NEAR(fastest({}, 0.3), all, 1e-3 * all);
-  EXPECT_NEAR(fastest({.linear = 0.1}, -0.1), 0.1, 1e-4);
-  EXPECT_NEAR(fastest({.limit = 0.2}, -0.15), 0.12, 1e-4);
-  EXPECT_NEAR(fastest({.linear = 10 * all}, 0.3), all, 1e-3 * all);
-  arm.controller.limit_tip_speed({.limit = 0.05});
-  for (int k = 0; k < 100; ++k) arm.step();
-  arm.state.velocity[0] = 0.5;  // a blow: the tip is faster than allowed
-  arm.step();
-  EXPECT_EQ(arm.controller.snapshot().fault, Status::kTipSpeedLimit);
-}
-
 }  // namespace
 }  // namespace dashpot::controller
