@@ -39,7 +39,7 @@ extern "C" {
 
 /* Version of this interface. It increases whenever a function or struct changes. A library
  * serves the versions that it knows. */
-#define DASHPOT_PLUGIN_VERSION 8u
+#define DASHPOT_PLUGIN_VERSION 9u
 /* Largest n. */
 #define DASHPOT_MAX_JOINTS 16
 
@@ -172,7 +172,9 @@ typedef struct dashpot_gains {
                                         that every mode of the task has this damping ratio, and
                                         task_damping has to be NULL. 0: C_C is task_damping.
                                         task_damping without a ratio sets the ratio to 0.
-                                        Zero stiffness with a ratio has no damping. */
+                                        Where no spring acts, there is nothing to design: there
+                                        the task_damping given last, or the configuration's, acts
+                                        with a ratio, too. */
   const double* null_stiffness;      /* n, not negative, N m/rad, toward the posture */
   const double* null_damping;        /* n, not negative, N m s/rad */
   const int32_t* frame;              /* axes of the 6 x 6: DASHPOT_FRAME_BASE or _TOOL */
@@ -193,6 +195,7 @@ typedef struct dashpot_payload {
   double inertia[9];           /* 3 x 3, about the centre of mass, kg m^2 */
   const double* tool_position; /* 3, of the tool's frame T in the tip link, m; NULL: as it is */
   const double* tool_rotation; /* 3 x 3, turns T's axes into the tip link's; NULL: as it is */
+  const dashpot_gains* gains;  /* that come with it, in the same tick; NULL: as they are */
 } dashpot_payload;
 
 /* The torque that the robot's joints are to exert. */
@@ -355,7 +358,8 @@ dashpot_controller* dashpot_create_from_text(const char* text, const char* direc
 /* Destroys a controller. Does nothing if `controller` is NULL. */
 void dashpot_destroy(dashpot_controller* controller);
 
-/* Returns a one-line description of the last error in this thread; "" if the last call succeeded.
+/* Returns a one-line description of the last error in this thread; "" if the last call succeeded,
+ * or what to be warned of if dashpot_set_gains or dashpot_set_payload took it nevertheless.
  * Calls that count are dashpot_create, ..._create_from_text, dashpot_start, dashpot_set_setpoint,
  * dashpot_set_gains, dashpot_judge_gains, dashpot_set_payload, dashpot_limit_tip_speed,
  * dashpot_evaluate, dashpot_analyze, dashpot_release, dashpot_read_snapshot, ..._modes and
@@ -419,7 +423,10 @@ int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpo
  * would have less than limits.gain_margin in either mode at the latest posture: that of the latest
  * tick with a good state, or of dashpot_start. As long as there was neither, gains are refused if
  * they have this margin at none of eight postures spread over the position limits. Motions slower
- * than 1 rad/s do not count: those that need more than 6 s to swing, or a second to grow e-fold. */
+ * than 1 rad/s do not count: those that need more than 6 s to swing, or a second to grow e-fold.
+ * Damping that is designed for a ratio has to leave a margin of 1.2 to the arm without its payload,
+ * too, which may be dropped. Where the margin is too little already, gains with a larger one are
+ * taken, and dashpot_last_error says what is missing. */
 int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains);
 
 /* Judges gains as dashpot_set_gains does, without setting them. May be called on any thread, for
@@ -437,25 +444,26 @@ int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains*
  * next tick begins to take it up, and within motion.gain_time the weight, the inertia and all that
  * follows from them have gone evenly to their new values. In a fault the weight that is held
  * follows as well; dashpot_reset and dashpot_start keep the payload and leave no way to go.
+ * `gains` that come with it go to their values in the same time.
  *
  * A new T moves no spring: reference and goal keep their places on the tip link. The pose of a
  * set-point is one of the T told before it, on the same thread. For dashpot_update that is the T of
  * a call that an earlier tick has taken up.
  *
  * Refused (DASHPOT_WRONG_VALUE) is what no body can be, and a weight that limits.torque does not
- * hold at the latest posture; and (DASHPOT_UNSTABLE_GAINS) what leaves the gains in force too
- * little margin, as in dashpot_set_gains. What was attached before the last call passes unjudged,
- * once, if gains or tip speeds told since then were refused last. Takes some milliseconds and
- * allocates. Returns DASHPOT_OK or a negative code. */
+ * hold at the latest posture, unless it is less than now; and (DASHPOT_UNSTABLE_GAINS) what leaves
+ * the gains too little margin, as in dashpot_set_gains: those that come with it, or else those in
+ * force. What is refused changes nothing. Takes some milliseconds and allocates. Returns DASHPOT_OK
+ * or a negative code. */
 int32_t dashpot_set_payload(dashpot_controller* controller, const dashpot_payload* payload);
 
 /* Limits the tip's speed from the next tick on. Called on the other thread. `linear` (m/s) and
  * `angular` (rad/s) are those of the reference on its way to a set-point, `limit` (m/s) that of the
  * tip's origin, beyond which it is a fault. Each is 1e-4 or more, and at most what the
  * configuration says (motion.linear_velocity, motion.angular_velocity, limits.tip_velocity);
- * infinity stands for that. With a lower `limit` the reference moves with at most 0.6 of it. A tip
- * that is faster just then is a fault. Resets keep the limits. Returns DASHPOT_OK or a negative
- * code. */
+ * infinity stands for that. With a lower `limit` the reference moves with at most 0.6 of it. In the
+ * joint mode the reference keeps to what is not infinity, where the robot is. A tip that is faster
+ * just then is a fault. Resets keep the limits. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_limit_tip_speed(dashpot_controller* controller, double linear, double angular,
                                 double limit);
 

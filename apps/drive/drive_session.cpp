@@ -262,7 +262,7 @@ void DriveSession::begin(const DriverStatus& status) {
   const auto there = controller::evaluate(config_.model, status.position, JointVector::Zero(n_));
   setpoint.tip_pose = {there.p_BT_B, there.R_BT};
   setpoint.wrench.setZero();
-  goal_.begin(setpoint, config_.robot.options.payload);
+  goal_.begin(setpoint);
   running_ = true;
 }
 

@@ -58,7 +58,7 @@ void ClosedLoop::begin() {
       controller_.set_gains(first.gains, reason) != DASHPOT_OK) {
     throw InputError("scenario.start", "the controller refuses it: " + reason);
   }
-  goal_.begin(first, scene_.arm->config.robot.options.payload);
+  goal_.begin(first);
 }
 
 void ClosedLoop::guide(const JointVector& from, const JointVector& to, double duration,

@@ -33,10 +33,13 @@ class LoopController {
   /// Before the loop begins, with the robot at rest at q. Returns DASHPOT_OK, or the code of a
   /// refusal; `reason` then says why, in one line.
   virtual std::int32_t start(const JointVector& q, std::string& reason) = 0;
-  /// The springs and dampers from the next tick on. Returns as start().
+  /// The springs and dampers from the next tick on. Returns as start(); with DASHPOT_OK `reason`
+  /// says what to be warned of, or nothing.
   virtual std::int32_t set_gains(const controller::Gains& gains, std::string& reason) = 0;
-  /// What the arm carries from the next tick on; the tool stays. Returns as start().
-  virtual std::int32_t set_payload(const controller::Payload& payload, std::string& reason) = 0;
+  /// What the arm carries from the next tick on, and with which gains, if there are new ones; the
+  /// tool stays. Returns as set_gains().
+  virtual std::int32_t set_payload(const controller::Payload& payload,
+                                   const controller::Gains* gains, std::string& reason) = 0;
   /// How fast the tip may be from the next tick on. Returns as start().
   virtual std::int32_t limit_tip_speed(const controller::TipSpeed& speed, std::string& reason) = 0;
   /// Whether the controller would go there, with these gains, from q; for one that is in no loop.

@@ -1,13 +1,14 @@
 #include <dashpot/apps/loop/loop_goal.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
+#include <cstdio>
+
 namespace dashpot::apps {
 
-void LoopGoal::begin(const controller::Setpoint& setpoint, const controller::Payload& payload) {
+void LoopGoal::begin(const controller::Setpoint& setpoint) {
   setpoint_ = accepted_ = setpoint;
   in_force_ = news_ = true;
   const std::lock_guard lock(mutex_);
-  payload_ = payload;
   gains_ = setpoint.gains;
   begun_ = true;
 }
@@ -67,42 +68,28 @@ std::int32_t LoopGoal::change(const Change& change, std::string& reason) {
     reason = "the loop has not begun";
     return DASHPOT_NOTHING_YET;
   }
+  controller::Gains gains = gains_;
+  if (change.gains) change.gains(gains);
+  const bool news = !controller::same_gains(gains, gains_);
+  std::string said;
   std::int32_t code = DASHPOT_OK;
-  // Gains come last, because they are judged with the payload.
-  if (change.payload) code = controller_.set_payload(*change.payload, reason);
-  const bool paid = change.payload && code == DASHPOT_OK;
-  if (change.tip_speed && code == DASHPOT_OK) {
-    code = controller_.limit_tip_speed(*change.tip_speed, reason);
+  if (change.tip_speed) code = controller_.limit_tip_speed(*change.tip_speed, said);
+  const bool slowed = change.tip_speed && code == DASHPOT_OK;
+  if (code == DASHPOT_OK && change.payload) {
+    code = controller_.set_payload(*change.payload, news ? &gains : nullptr, said);
+  } else if (code == DASHPOT_OK && news) {
+    code = controller_.set_gains(gains, said);
   }
-  const bool speed = change.tip_speed && code == DASHPOT_OK;
-  if (change.gains && code == DASHPOT_OK) code = set_gains(change.gains, reason);
-  if (code == DASHPOT_OK) {
-    payload_ = change.payload.value_or(payload_);
-    tip_speed_ = change.tip_speed.value_or(tip_speed_);
+  if (code != DASHPOT_OK) {
+    reason = said;
+    // Back to the speed that was in force, which therefore is not refused.
+    if (slowed) controller_.limit_tip_speed(tip_speed_, said);
     return code;
   }
-  // Back to what was in force. Where the payload itself was refused, it was.
-  std::string why;
-  if (paid && controller_.set_payload(payload_, why) != DASHPOT_OK) {
-    payload_ = *change.payload;
-    reason += "; the payload is not taken back: " + why;
-  }
-  if (speed && controller_.limit_tip_speed(tip_speed_, why) != DASHPOT_OK) {
-    tip_speed_ = *change.tip_speed;
-    reason += "; the speed is not taken back: " + why;
-  }
-  return code;
-}
-
-std::int32_t LoopGoal::set_gains(const std::function<void(controller::Gains&)>& change,
-                                 std::string& reason) {
-  controller::Gains wanted = gains_;
-  change(wanted);
-  if (controller::same_gains(wanted, gains_)) return DASHPOT_OK;
-  const std::int32_t code = controller_.set_gains(wanted, reason);
-  if (code != DASHPOT_OK) return code;
-  gains_ = wanted;
-  gain_changes_.fetch_add(1, std::memory_order_release);
+  if (!said.empty()) std::fprintf(stderr, "warning: %s\n", said.c_str());
+  tip_speed_ = change.tip_speed.value_or(tip_speed_);
+  gains_ = gains;
+  if (news) gain_changes_.fetch_add(1, std::memory_order_release);
   return code;
 }
 

@@ -20,9 +20,8 @@ class LoopGoal {
       : controller_(controller), repeat_every_(repeat_every) {}
 
   // Before the loop begins:
-  /// Holds `setpoint`, with the gains in it, which the controller has taken already, as it has
-  /// `payload`.
-  void begin(const controller::Setpoint& setpoint, const controller::Payload& payload);
+  /// Holds `setpoint`, with the gains in it, which the controller has taken already.
+  void begin(const controller::Setpoint& setpoint);
 
   /// Adds this wrench to that of what is held. Its time begins with the next tick; a fault ends it
   /// for good.
@@ -54,16 +53,13 @@ class LoopGoal {
     std::optional<controller::Payload> payload;
     std::optional<controller::TipSpeed> tip_speed;
   };
-  /// Makes all of a change, or, if the controller refuses some of it, nothing. Otherwise as
-  /// change_gains().
+  /// Makes all of a change, which the controller judges by what it leads to, or, if it is refused,
+  /// nothing. What the controller warns of goes to stderr. Otherwise as change_gains().
   std::int32_t change(const Change& change, std::string& reason);
   /// Releases a latched fault at the next tick.
   void release();
 
  private:
-  std::int32_t set_gains(const std::function<void(controller::Gains&)>& change,
-                         std::string& reason);
-
   LoopController& controller_;
   std::int64_t repeat_every_;
 
@@ -87,7 +83,6 @@ class LoopGoal {
   std::mutex mutex_;  ///< of what follows, and of the controller's functions for other threads
   bool begun_ = false;
   controller::Gains gains_;
-  controller::Payload payload_;
   controller::TipSpeed tip_speed_;
 };
 

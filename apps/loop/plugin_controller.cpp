@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 #include <Eigen/Core>
 #include <filesystem>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -66,8 +67,15 @@ class PluginController : public LoopController {
     return explain(plugin_.set_gains(handle_.get(), &wanted), reason);
   }
 
-  std::int32_t set_payload(const controller::Payload& payload, std::string& reason) override {
+  std::int32_t set_payload(const controller::Payload& payload, const controller::Gains* gains,
+                           std::string& reason) override {
     dashpot_payload wanted{};
+    std::optional<GainArrays> arrays;
+    dashpot_gains with{};
+    if (gains != nullptr) {
+      with = arrays.emplace(*gains).gains(n());
+      wanted.gains = &with;
+    }
     wanted.struct_size = sizeof wanted;
     wanted.mass = payload.mass;
     Eigen::Map<Eigen::Vector3d>(wanted.center) = payload.center;
@@ -131,7 +139,7 @@ class PluginController : public LoopController {
   std::uint32_t n() const noexcept { return plugin_.joints(handle_.get()); }
 
   std::int32_t explain(std::int32_t code, std::string& reason) const {
-    if (code != DASHPOT_OK) reason = plugin_.last_error();
+    reason = plugin_.last_error();
     return code;
   }
 

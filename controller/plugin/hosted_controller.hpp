@@ -7,6 +7,7 @@
 #include <dashpot/controller/plugin/plugin_judgement.hpp>
 #include <dashpot/controller/vibration/vibration_solver.hpp>
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -48,8 +49,6 @@ struct HostedController {
 
   // Of the other thread:
   Request request;
-  Attachment attachment_before;  ///< the last dashpot_set_payload that was accepted
-  bool undoable = false;         ///< what came after it was refused: the one before may come back
   const SampledVibration* sampled() noexcept { return controller_.sampled_vibration(); }
 
   // Of the real-time thread:
@@ -91,9 +90,14 @@ struct HostedController {
 /// Sets what dashpot_last_error says; returns `code`.
 std::int32_t finish(std::int32_t code, const char* text) noexcept;
 std::int32_t finish(std::int32_t code) noexcept;
-/// Likewise of a verdict found `here`, or wherever the robot may be.
-std::int32_t finish(const Judgement& judgement, const GainJudge::Verdict& verdict,
-                    bool here) noexcept;
+/// Likewise DASHPOT_OK, with something to be warned of.
+std::int32_t warn(const char* text) noexcept;
+/// What is too little in a verdict found `here`, or wherever the robot may be, in one line.
+using VerdictText = std::array<char, 256>;
+VerdictText describe(const Judgement& judgement, const GainJudge::Verdict& verdict,
+                     bool here) noexcept;
+/// Puts the gains given into `wanted`. DASHPOT_OK or why they are none.
+std::int32_t read_gains(const dashpot_gains* given, int n, Gains& wanted) noexcept;
 
 /// Returns a controller as dashpot_create does, from a configuration that was read before. Throws
 /// InputError, with the key `gains`, for gains that dashpot_set_gains would refuse.

@@ -4,6 +4,7 @@
 #include <dashpot/controller/plugin/plugin_data.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -18,6 +19,12 @@ namespace {
 // In storage of fixed size: nothing to allocate, nothing to destroy when a thread ends.
 thread_local std::array<char, 1024> last_error{};
 
+std::int32_t refuse(const SetpointFault& fault) noexcept {
+  std::array<char, 128> text{};
+  std::snprintf(text.data(), text.size(), "%s %s", fault.key, fault.reason);
+  return finish(DASHPOT_WRONG_VALUE, text.data());
+}
+
 }  // namespace
 
 namespace dashpot::controller {
@@ -31,43 +38,32 @@ std::int32_t finish(std::int32_t code) noexcept {
   return finish(code, dashpot_status_text(code));
 }
 
-std::int32_t finish(const Judgement& judgement, const GainJudge::Verdict& verdict,
-                    bool here) noexcept {
-  if (judgement.enough(verdict)) return finish(DASHPOT_OK);
-  std::array<char, 256> text{};
-  std::snprintf(text.data(), text.size(),
-                "with the %s gains the sampled loop has a gain margin of %.3g %s, "
-                "limits.gain_margin asks for %.3g",
-                verdict.mode == Mode::kJoint ? "joint" : "task", verdict.margin,
-                here ? "here" : "at best, wherever the robot is", judgement.wanted());
-  return finish(DASHPOT_UNSTABLE_GAINS, text.data());
+std::int32_t warn(const char* text) noexcept {
+  std::snprintf(last_error.data(), last_error.size(), "%s", text);
+  return DASHPOT_OK;
 }
 
-}  // namespace dashpot::controller
-
-namespace {
-
-/// Judges gains at q, or, where `q` has no entries, anywhere. DASHPOT_OK or why not.
-std::int32_t judge(dashpot_controller& controller, const Gains& gains, const JointVector& q,
-                   bool again, double* margin) noexcept {
-  Judgement& judgement = controller.judgement;
-  GainJudge::Verdict verdict{0, Mode::kJoint};
-  try {
-    verdict = q.size() == 0 ? judgement.judge_anywhere(gains) : judgement.judge(gains, q, again);
-  } catch (...) {
-    return finish(DASHPOT_UNSTABLE_GAINS, "the gains could not be judged");
+VerdictText describe(const Judgement& judgement, const GainJudge::Verdict& verdict,
+                     bool here) noexcept {
+  VerdictText text{};
+  const char* const mode = verdict.mode == Mode::kJoint ? "joint" : "task";
+  const char* const where = here ? "here" : "at best, wherever the robot is";
+  if (verdict.dropped) {
+    std::snprintf(
+        text.data(), text.size(),
+        "with the %s gains, whose damping counts with the payload, the sampled loop has a "
+        "gain margin of %.3g %s once the payload is dropped; %.3g is needed: ask for less "
+        "stiffness or a smaller ratio",
+        mode, verdict.margin, where, std::min(GainJudge::kDropped, judgement.wanted()));
+  } else {
+    std::snprintf(text.data(), text.size(),
+                  "with the %s gains the sampled loop has a gain margin of %.3g %s, "
+                  "limits.gain_margin asks for %.3g",
+                  mode, verdict.margin, where, judgement.wanted());
   }
-  if (margin != nullptr) *margin = verdict.margin;
-  return finish(judgement, verdict, q.size() != 0);
+  return text;
 }
 
-std::int32_t refuse(const SetpointFault& fault) noexcept {
-  std::array<char, 128> text{};
-  std::snprintf(text.data(), text.size(), "%s %s", fault.key, fault.reason);
-  return finish(DASHPOT_WRONG_VALUE, text.data());
-}
-
-/// Puts the gains given into `wanted`. DASHPOT_OK or why they are none.
 std::int32_t read_gains(const dashpot_gains* given, int n, Gains& wanted) noexcept {
   const std::int32_t problem = to_gains(given, n, wanted);
   if (problem != DASHPOT_OK) return finish(problem);
@@ -76,6 +72,25 @@ std::int32_t read_gains(const dashpot_gains* given, int n, Gains& wanted) noexce
     if (fault) return refuse(fault);
   }
   return DASHPOT_OK;
+}
+
+}  // namespace dashpot::controller
+
+namespace {
+
+/// Judges gains at q, or, where `q` has no entries, anywhere. DASHPOT_OK or why not.
+std::int32_t judge(dashpot_controller& controller, const Gains& gains, const JointVector& q,
+                   double* margin) noexcept {
+  Judgement& judgement = controller.judgement;
+  GainJudge::Verdict verdict{0, Mode::kJoint};
+  try {
+    verdict = judgement.judge(gains, q);
+  } catch (...) {
+    return finish(DASHPOT_UNSTABLE_GAINS, "the gains could not be judged");
+  }
+  if (margin != nullptr) *margin = verdict.margin;
+  if (judgement.enough(verdict)) return finish(DASHPOT_OK);
+  return finish(DASHPOT_UNSTABLE_GAINS, describe(judgement, verdict, q.size() != 0).data());
 }
 
 /// The controller that `make` makes. Null, and the error is set, where it throws.
@@ -112,7 +127,7 @@ std::int32_t check_result(const dashpot_controller* controller, const Struct* re
 dashpot_controller* dashpot::controller::create_controller(const Config& config) {
   auto controller = std::make_unique<dashpot_controller>(config);
   const std::int32_t code =
-      judge(*controller, controller->request.setpoint.gains, JointVector(), true, nullptr);
+      judge(*controller, controller->request.setpoint.gains, JointVector(), nullptr);
   if (code != DASHPOT_OK) throw InputError("gains", dashpot_last_error());
   return controller.release();
 }
@@ -180,8 +195,7 @@ int32_t dashpot_start(dashpot_controller* controller, const double* position,
   if (controller == nullptr || position == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
   const JointVector q = Eigen::Map<const Eigen::VectorXd>(position, controller->n);
   if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
-  const std::int32_t code =
-      judge(*controller, controller->request.setpoint.gains, q, true, nullptr);
+  const std::int32_t code = judge(*controller, controller->request.setpoint.gains, q, nullptr);
   if (code != DASHPOT_OK) return code;
   controller->judgement.locate(q);
   if (torque != nullptr) return finish(dashpot_reset(controller, torque));
@@ -228,24 +242,6 @@ int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpo
   return finish(DASHPOT_OK);
 }
 
-int32_t dashpot_set_gains(dashpot_controller* controller, const dashpot_gains* gains) {
-  if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
-  Request& request = controller->request;
-  Gains wanted = request.setpoint.gains;
-  std::int32_t problem = read_gains(gains, controller->n, wanted);
-  JointVector q;
-  controller->judgement.where(q);
-  if (problem == DASHPOT_OK && !same_gains(wanted, request.setpoint.gains)) {
-    problem = judge(*controller, wanted, q, false, nullptr);
-  }
-  controller->undoable = problem != DASHPOT_OK && request.attachments > 0;
-  if (problem != DASHPOT_OK) return problem;
-  request.setpoint.gains = wanted;
-  ++request.gain_changes;
-  controller->requests.write(request);
-  return finish(DASHPOT_OK);
-}
-
 int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains* gains,
                             const double* position, double* margin) {
   if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
@@ -259,7 +255,7 @@ int32_t dashpot_judge_gains(dashpot_controller* controller, const dashpot_gains*
     return finish(DASHPOT_NOTHING_YET);
   }
   if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
-  return judge(*controller, wanted, q, true, margin);
+  return judge(*controller, wanted, q, margin);
 }
 
 int32_t dashpot_evaluate(const dashpot_controller* controller, const double* position,

@@ -36,32 +36,41 @@ class Judgement {
     return true;
   }
 
-  /// Judges gains that have passed check_gains, at q. Unless it is to be done `again`, those that
-  /// were accepted last, no joint further than 0.1 rad from q, pass. Throws if there is no memory.
-  GainJudge::Verdict judge(const Gains& gains, const JointVector& q, bool again) {
+  /// Judges gains that have passed check_gains, at q or, if that has no entries, because nobody
+  /// knows where the robot is, anywhere. Throws if there is no memory.
+  GainJudge::Verdict judge(const Gains& gains, const JointVector& q) {
     const std::lock_guard lock(mutex_);
-    return here(gains, q, again);
+    return look(gains, q, true);
   }
-  /// Judges gains that have passed check_gains with something else attached to the tip link, at q
-  /// or, if that has no entries, anywhere. What is attached stays so if the verdict is enough.
-  /// Throws as judge().
-  GainJudge::Verdict judge(const Gains& gains, const JointVector& q, const Attachment& attachment) {
+  /// What becomes of a change.
+  struct Change {
+    GainJudge::Verdict verdict;  ///< of what it leads to
+    double before;  ///< margin of what it leaves; that of the verdict if that is enough
+    bool taken;
+  };
+  /// Judges the change from the gains `before` to `wanted`, both of which have passed check_gains,
+  /// and to another attachment, as a whole. It is taken if the verdict is enough, or better than
+  /// that of the state it leaves. Gains that were accepted last with the same attachment, no joint
+  /// further than 0.1 rad from q, pass unjudged. A change that is not taken, or judging which
+  /// throws, leaves everything as it was. Otherwise as judge().
+  Change change(const Gains& before, const Gains& wanted, const JointVector& q,
+                const Attachment& attachment) {
     const std::lock_guard lock(mutex_);
-    const Attachment before = attached_;
-    replace(attachment);
+    const Attachment old = attached_;
+    const bool moves = !(attachment == old);
+    if (moves) replace(attachment);
     try {
-      const GainJudge::Verdict verdict = q.size() == 0 ? anywhere(gains) : here(gains, q, true);
-      if (!enough(verdict)) replace(before);
-      return verdict;
+      const GainJudge::Verdict found = look(wanted, q, moves);
+      if (enough(found)) return {found, found.margin, true};
+      if (moves) replace(old);
+      const GainJudge::Verdict now = look(before, q, true);
+      const bool better = found.margin > now.margin;
+      if (better && moves) replace(attachment);
+      return {found, now.margin, better};
     } catch (...) {
-      replace(before);
+      if (moves) replace(old);
       throw;
     }
-  }
-  /// Judges gains that have passed check_gains, as long as nobody knows where the robot is.
-  GainJudge::Verdict judge_anywhere(const Gains& gains) {
-    const std::lock_guard lock(mutex_);
-    return anywhere(gains);
   }
   bool enough(const GainJudge::Verdict& verdict) const noexcept {
     return verdict.margin >= wanted_;
@@ -71,20 +80,17 @@ class Judgement {
     const std::lock_guard lock(mutex_);
     return attached_;
   }
-  /// Attaches something without judging it.
-  void attach(const Attachment& attachment) noexcept {
-    const std::lock_guard lock(mutex_);
-    replace(attachment);
-  }
   /// Returns Limits::gain_margin.
   double wanted() const noexcept { return wanted_; }
 
  private:
   // With the lock held:
-  GainJudge::Verdict here(const Gains& gains, const JointVector& q, bool again) {
+  GainJudge::Verdict look(const Gains& gains, const JointVector& q, bool again) {
+    if (wanted_ <= 1) return {wanted_, Mode::kJoint};
+    if (q.size() == 0) return judge_.judge_anywhere(gains);
     const bool known =
         any_ && same_gains(gains, accepted_) && (q - accepted_at_).cwiseAbs().maxCoeff() < 0.1;
-    if (wanted_ <= 1 || (known && !again)) return {wanted_, Mode::kJoint};
+    if (known && !again) return {wanted_, Mode::kJoint};
     const GainJudge::Verdict verdict = judge_.judge(q, gains);
     if (enough(verdict)) {
       accepted_ = gains;
@@ -92,10 +98,6 @@ class Judgement {
       any_ = true;
     }
     return verdict;
-  }
-  GainJudge::Verdict anywhere(const Gains& gains) {
-    if (wanted_ <= 1) return {wanted_, Mode::kJoint};
-    return judge_.judge_anywhere(gains);
   }
   void replace(const Attachment& attachment) noexcept {
     judge_.attach(attachment);

@@ -36,7 +36,8 @@ class Gains(c.Structure):
 class Payload(c.Structure):
     _fields_ = [("struct_size", c.c_uint32), ("reserved", c.c_uint32), ("mass", c.c_double),
                 ("center", c.c_double * 3), ("inertia", c.c_double * 9),
-                ("tool_position", Doubles), ("tool_rotation", Doubles)]
+                ("tool_position", Doubles), ("tool_rotation", Doubles),
+                ("gains", c.c_void_p)]
 
 
 class Output(c.Structure):

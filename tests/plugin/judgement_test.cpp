@@ -2,10 +2,12 @@
 #include <dashpot/controller/plugin/plugin_judgement.hpp>
 #include <dashpot/tests/support/chains.hpp>
 #include <dashpot/tests/support/constant_damping.hpp>
+#include <dashpot/tests/support/count_allocations.hpp>
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <new>
 #include <optional>
 
 namespace dashpot::controller {
@@ -26,7 +28,9 @@ class Judging : public ::testing::Test {
     return gains;
   }
   bool accepts(double damper, double elbow, bool again = false) {
-    return judgement->enough(judgement->judge(gains(damper), at(elbow), again));
+    if (again) return judgement->enough(judgement->judge(gains(damper), at(elbow)));
+    const Gains same = gains(damper);
+    return judgement->change(same, same, at(elbow), judgement->attached()).taken;
   }
   /// The largest damper with enough of a margin with this elbow.
   double most(double elbow) {
@@ -59,6 +63,47 @@ TEST_F(Judging, KnowsGainsNextToWhereItAcceptedThemLast) {
   EXPECT_TRUE(accepts(damper, 0.705));      // which are not remembered
   EXPECT_TRUE(accepts(damper, 1.1));        // judged, and there it was accepted last,
   EXPECT_FALSE(accepts(damper, 0.705));     // so that this is far
+}
+
+/// Where the arm has gone to a place that bears less than limits.gain_margin.
+TEST_F(Judging, TakesWhatIsBetterThanWhatIs) {
+  make();
+  const double damper = 1.2 * most(0.8);
+  const Attachment nothing = judgement->attached();
+  const Attachment body({0.1, {0.2, 0, 0}, Eigen::Matrix3d::Zero()}, nothing.tool);
+  const auto change = [&](double before, double wanted, const Attachment& attachment) {
+    return judgement->change(gains(before), gains(wanted), at(0.8), attachment);
+  };
+  Judgement::Change found = change(damper, 0.95 * damper, nothing);
+  EXPECT_TRUE(found.taken);
+  EXPECT_FALSE(judgement->enough(found.verdict));
+  EXPECT_GT(found.verdict.margin, found.before);
+  EXPECT_FALSE(change(damper, damper, nothing).taken);
+  EXPECT_FALSE(change(damper, 1.05 * damper, nothing).taken);
+  // A body that helps,
+  found = change(damper, damper, body);
+  EXPECT_TRUE(found.taken);
+  EXPECT_GT(found.verdict.margin, found.before);
+  EXPECT_EQ(judgement->attached(), body);
+  // and is put down again: alone it harms, with other gains it does not.
+  EXPECT_FALSE(change(damper, damper, nothing).taken);
+  EXPECT_EQ(judgement->attached(), body);
+  found = change(damper, 0.5 * damper, nothing);
+  EXPECT_TRUE(judgement->enough(found.verdict));
+  EXPECT_EQ(judgement->attached(), nothing);
+}
+
+TEST_F(Judging, ForgetsABodyIfJudgingItThrows) {
+  if (DASHPOT_COUNTS_ALLOCATIONS == 0) GTEST_SKIP() << "the sanitizer's own malloc";
+  make();
+  const Attachment nothing = judgement->attached();
+  const Attachment body({1, {0.1, 0, 0}, Eigen::Matrix3d::Zero()}, nothing.tool);
+  const double margin = judgement->judge(gains(1.2 * most(0.8)), at(0.8)).margin;
+  const Gains same = gains(1.2 * most(0.8));
+  EXPECT_THROW(testing::without_memory([&] { judgement->change(same, same, at(0.8), body); }),
+               std::bad_alloc);
+  EXPECT_EQ(judgement->attached(), nothing);
+  EXPECT_EQ(judgement->judge(same, at(0.8)).margin, margin);
 }
 
 TEST_F(Judging, AcceptsAllWhereNoMarginIsWanted) {

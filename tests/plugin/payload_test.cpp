@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -122,22 +123,140 @@ TEST(PluginPayload, IsJudgedWithTheGainsInForce) {
   EXPECT_EQ(plugin().judge_gains(host.controller.get(), &same, nullptr, &margin), DASHPOT_OK);
 }
 
-TEST(PluginPayload, IsLetBackAfterWhatCameWithItWasRefused) {
-  const dashpot_payload heavy = payload(8), nothing = payload(0);
+/// Gains of the joint mode, diagonal.
+struct JointGains {
+  JointGains(double stiffness, double damping) {
+    for (std::size_t i = 0; i < 7; ++i) {
+      K[8 * i] = stiffness;
+      D[8 * i] = damping;
+    }
+    gains.struct_size = sizeof gains;
+    gains.joints = 7;
+    gains.joint_stiffness = K.data();
+    gains.joint_damping = D.data();
+  }
+  JointGains(const JointGains&) = delete;
+  JointGains& operator=(const JointGains&) = delete;
+  std::array<double, 49> K{}, D{};
+  dashpot_gains gains{};
+};
+
+TEST(PluginPayload, IsJudgedWithTheGainsThatComeWithIt) {
+  Host host = carrying_host("mass: 3, center: [0, 0, 0.1], inertia: [0.3, 0.3, 0.3]",
+                            "gains: {joint: {stiffness: 300, damping: 45}}\n");
+  dashpot_controller* const arm = host.controller.get();
+  ASSERT_NE(arm, nullptr) << plugin().last_error();
+  host.tick();
+  const JointGains soft(50, 5), hard(300, 60);
+  dashpot_payload nothing = payload(0);
+  ASSERT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_UNSTABLE_GAINS);
+  // Refused with what comes with it, nothing of both is in force.
+  nothing.gains = &hard.gains;
+  ASSERT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_UNSTABLE_GAINS);
+  dashpot_gains wrong{};
+  nothing.gains = &wrong;
+  EXPECT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_WRONG_STRUCT_SIZE);
+  for (int i = 0; i < 600; ++i) host.tick();
+  EXPECT_NEAR(host.snapshot().payload_mass, 3, 1e-12);
+  const double before = host.modes().modes[0].natural_frequency;
+  // Either alone would do harm; together they are taken, and begin in one tick.
+  nothing.gains = &soft.gains;
+  ASSERT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_OK) << plugin().last_error();
+  EXPECT_STREQ(plugin().last_error(), "");
+  for (int i = 0; i < 250; ++i) host.tick();
+  EXPECT_NEAR(host.snapshot().payload_mass, 1.5, 1e-12);
+  for (int i = 0; i < 350; ++i) host.tick();
+  EXPECT_EQ(host.snapshot().payload_mass, 0);
+  Host bare = panda_host("gains: {joint: {stiffness: 50, damping: 5}}\n");
+  for (int i = 0; i < 600; ++i) bare.tick();
+  EXPECT_NEAR(host.modes().modes[0].natural_frequency, bare.modes().modes[0].natural_frequency,
+              1e-6 * before);
+  EXPECT_GT(std::abs(before - bare.modes().modes[0].natural_frequency), 0.01 * before);
+}
+
+TEST(PluginPayload, HasToLeaveRatioDampingItsMarginOnceItIsDropped) {
+  const std::string stiff =
+      "analysis: {sampled: {delay: 2}}\ngains: {task: {stiffness: [1500, 1500, 1500, 80, 80, 80], "
+      "damping_ratio: 0.7}}\n";
+  Host host = panda_host(kCartesian + stiff);
+  dashpot_controller* const arm = host.controller.get();
+  ASSERT_NE(arm, nullptr) << plugin().last_error();
+  host.tick();
+  dashpot_payload body = payload(3);
+  for (int i = 0; i < 3; ++i) body.inertia[4 * i] = 0.1;
+  EXPECT_EQ(plugin().set_payload(arm, &body), DASHPOT_UNSTABLE_GAINS);
+  EXPECT_THAT(plugin().last_error(), HasSubstr("once the payload is dropped; 1.2 is needed"));
+  dashpot_gains soft{};
+  std::array<double, 36> K{};
+  for (std::size_t i = 0; i < 6; ++i) K[7 * i] = i < 3 ? 1500 : 10;
+  soft.struct_size = sizeof soft;
+  soft.joints = 7;
+  soft.task_stiffness = K.data();
+  body.gains = &soft;
+  EXPECT_EQ(plugin().set_payload(arm, &body), DASHPOT_OK) << plugin().last_error();
+  // So has one that is configured.
+  std::string text = panda();
+  text.replace(text.rfind('}'), 1,
+               ", payload: {mass: 3, center: [0, 0, 0.05], inertia: [0.1, 0.1, 0.1]}}");
+  EXPECT_EQ(create(text + stiff), nullptr);
+  EXPECT_THAT(plugin().last_error(), HasSubstr("gains: with the task gains, whose damping counts"));
+  EXPECT_NE(create(text + "analysis: {sampled: {delay: 2}}\n"), nullptr) << plugin().last_error();
+}
+
+/// Where the arm has gone to a place at which less is borne.
+TEST(PluginPayload, IsTakenWithAWarningIfItIsBetterThanWhatIs) {
+  Host host = panda_host("gains: {joint: {stiffness: 300, damping: 5}}\n");
+  dashpot_controller* const arm = host.controller.get();
+  ASSERT_NE(arm, nullptr) << plugin().last_error();
+  const std::vector<double> folded{0, -0.2, 0, -2.9, 0, 2.9, 0.785};
+  // The most damping that is borne at the start, a little of it less.
+  std::array<double, 49> D{};
+  dashpot_gains gains{};
+  gains.struct_size = sizeof gains;
+  gains.joints = 7;
+  gains.joint_damping = D.data();
+  const auto margin = [&](const std::vector<double>& q, double damping) {
+    for (std::size_t i = 0; i < 7; ++i) D[8 * i] = i == 0 ? damping : 1;
+    double found = 0;
+    plugin().judge_gains(arm, &gains, q.data(), &found);
+    return found;
+  };
+  double low = 10, high = 1e4;
+  while (high > 1.001 * low) {
+    const double middle = std::sqrt(low * high);
+    (margin(host.position, middle) >= 2 ? low : high) = middle;
+  }
+  ASSERT_LT(margin(folded, low), 1.9);
+  host.tick();
+  margin(host.position, low);
+  ASSERT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK) << plugin().last_error();
+  host.position = folded;
+  for (int i = 0; i < 100; ++i) host.tick();
+  EXPECT_NEAR(host.snapshot().position[3], -2.9, 1e-12);
+  margin(folded, 1.02 * low);
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_UNSTABLE_GAINS);
+  margin(folded, 0.98 * low);
+  EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK) << plugin().last_error();
+  EXPECT_THAT(plugin().last_error(),
+              HasSubstr("limits.gain_margin asks for 2; taken because it was"));
+  dashpot_payload body = payload(0.5);
+  body.center[0] = 0.3;
+  EXPECT_EQ(plugin().set_payload(arm, &body), DASHPOT_OK) << plugin().last_error();
+  EXPECT_THAT(plugin().last_error(), HasSubstr("taken because it was"));
+  const dashpot_payload nothing = payload(0);
+  EXPECT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_UNSTABLE_GAINS);
+}
+
+TEST(PluginPayload, ThatIsTooHeavyHereIsTakenIfItIsLighterThanWhatIsCarried) {
   Host host =
       carrying_host("mass: 8, center: [0, 0, 0.05], inertia: [0.008, 0.008, 0.008]", kGains);
   dashpot_controller* const arm = host.controller.get();
   ASSERT_NE(arm, nullptr) << plugin().last_error();
-  ASSERT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_OK) << plugin().last_error();
-  // Meanwhile the arm has gone to where 8 kg are too heavy.
   const std::vector<double> stretched{0, 1.5, 0, -0.3, 0, 1.8, 0};
   ASSERT_EQ(plugin().start(arm, stretched.data(), nullptr), DASHPOT_OK) << plugin().last_error();
-  EXPECT_EQ(plugin().set_payload(arm, &heavy), DASHPOT_WRONG_VALUE);
-  dashpot_gains wrong{};
-  EXPECT_NE(plugin().set_gains(arm, &wrong), DASHPOT_OK);
-  EXPECT_EQ(plugin().set_payload(arm, &heavy), DASHPOT_OK) << plugin().last_error();
-  EXPECT_EQ(plugin().set_payload(arm, &nothing), DASHPOT_OK) << plugin().last_error();
-  EXPECT_EQ(plugin().set_payload(arm, &heavy), DASHPOT_WRONG_VALUE);
+  const dashpot_payload heavier = payload(9), lighter = payload(7);
+  EXPECT_EQ(plugin().set_payload(arm, &heavier), DASHPOT_WRONG_VALUE);
+  EXPECT_EQ(plugin().set_payload(arm, &lighter), DASHPOT_OK) << plugin().last_error();
 }
 
 TEST(PluginPayload, LeavesTheArmWhereItIsWithANewTool) {

@@ -24,9 +24,12 @@ namespace dashpot::testing {
 
 inline constinit thread_local bool counting_allocations = false;
 inline constinit thread_local int allocations = 0;
+inline constinit thread_local bool refusing_memory = false;
 
-inline void note_allocation() {
+/// Returns whether there is memory.
+inline bool note_allocation() {
   if (counting_allocations) ++allocations;  // a breakpoint here shows who allocates
+  return !refusing_memory;
 }
 
 /// Allocations of this thread while `act` runs.
@@ -37,6 +40,16 @@ int allocations_of(const Act& act) {
   act();
   counting_allocations = false;
   return allocations;
+}
+
+/// Does `act` while this thread gets no memory.
+template <class Act>
+void without_memory(const Act& act) {
+  struct Refusal {
+    Refusal() { refusing_memory = true; }
+    ~Refusal() { refusing_memory = false; }
+  } const refusal;
+  act();
 }
 
 }  // namespace dashpot::testing
@@ -50,28 +63,22 @@ void* __libc_realloc(void* block, std::size_t size);
 void* __libc_memalign(std::size_t alignment, std::size_t size);
 
 DASHPOT_SHARED void* malloc(std::size_t size) noexcept {
-  dashpot::testing::note_allocation();
-  return __libc_malloc(size);
+  return dashpot::testing::note_allocation() ? __libc_malloc(size) : nullptr;
 }
 DASHPOT_SHARED void* calloc(std::size_t count, std::size_t size) noexcept {
-  dashpot::testing::note_allocation();
-  return __libc_calloc(count, size);
+  return dashpot::testing::note_allocation() ? __libc_calloc(count, size) : nullptr;
 }
 DASHPOT_SHARED void* realloc(void* block, std::size_t size) noexcept {
-  dashpot::testing::note_allocation();
-  return __libc_realloc(block, size);
+  return dashpot::testing::note_allocation() ? __libc_realloc(block, size) : nullptr;
 }
 DASHPOT_SHARED void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
-  dashpot::testing::note_allocation();
-  return __libc_memalign(alignment, size);
+  return dashpot::testing::note_allocation() ? __libc_memalign(alignment, size) : nullptr;
 }
 DASHPOT_SHARED void* memalign(std::size_t alignment, std::size_t size) noexcept {
-  dashpot::testing::note_allocation();
-  return __libc_memalign(alignment, size);
+  return dashpot::testing::note_allocation() ? __libc_memalign(alignment, size) : nullptr;
 }
 DASHPOT_SHARED int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
-  dashpot::testing::note_allocation();
-  *block = __libc_memalign(alignment, size);
+  *block = dashpot::testing::note_allocation() ? __libc_memalign(alignment, size) : nullptr;
   return *block != nullptr ? 0 : ENOMEM;
 }
 }

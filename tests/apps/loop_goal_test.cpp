@@ -1,0 +1,131 @@
+// What a loop is told while it runs, with a controller that only writes it down.
+#include <dashpot/apps/loop/loop_goal.hpp>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+/// Refuses what `refused` names.
+class Notes : public LoopController {
+ public:
+  std::vector<std::string> calls;
+  std::string refused, warned;
+
+  std::int32_t update(std::int64_t, const JointVector&, const JointVector&,
+                      const controller::Setpoint*, JointVector&) noexcept override {
+    return DASHPOT_OK;
+  }
+  const dashpot_snapshot& snapshot() noexcept override { return snapshot_; }
+  const dashpot_modes* new_modes() noexcept override { return nullptr; }
+  std::int32_t start(const JointVector&, std::string&) override { return DASHPOT_OK; }
+  std::int32_t set_gains(const controller::Gains& gains, std::string& reason) override {
+    return note("gains " + number(gains.task_damping_ratio), reason);
+  }
+  std::int32_t set_payload(const controller::Payload& payload, const controller::Gains* gains,
+                           std::string& reason) override {
+    const std::string with = gains ? " with " + number(gains->task_damping_ratio) : "";
+    return note("payload " + number(payload.mass) + with, reason);
+  }
+  std::int32_t limit_tip_speed(const controller::TipSpeed& speed, std::string& reason) override {
+    return note("speed " + number(speed.linear), reason);
+  }
+  std::int32_t check(const controller::Setpoint&, const JointVector&, std::string&) override {
+    return DASHPOT_OK;
+  }
+  std::int32_t release() override {
+    calls.emplace_back("release");
+    return DASHPOT_OK;
+  }
+
+ private:
+  static std::string number(double value) {
+    std::string text = std::to_string(value);
+    return text.substr(0, text.find('.') + 2);
+  }
+  std::int32_t note(const std::string& call, std::string& reason) {
+    calls.push_back(call);
+    const bool fails = !refused.empty() && call.starts_with(refused);
+    reason = fails ? "no " + call : warned;
+    return fails ? DASHPOT_UNSTABLE_GAINS : DASHPOT_OK;
+  }
+  dashpot_snapshot snapshot_{};
+};
+
+class Goal : public ::testing::Test {
+ protected:
+  Goal() { setpoint.gains.task_damping_ratio = 0.7; }
+  static std::function<void(controller::Gains&)> ratio(double value) {
+    return [value](controller::Gains& gains) { gains.task_damping_ratio = value; };
+  }
+
+  Notes notes;
+  LoopGoal goal{notes, 100};
+  controller::Setpoint setpoint;
+  std::string reason;
+};
+
+TEST_F(Goal, RefusesChangesUntilTheLoopHasBegun) {
+  LoopGoal::Change all{ratio(0.5), controller::Payload{2}, controller::TipSpeed{.linear = 0.1}};
+  EXPECT_EQ(goal.change(all, reason), DASHPOT_NOTHING_YET);
+  EXPECT_EQ(reason, "the loop has not begun");
+  EXPECT_EQ(goal.change_gains(ratio(0.5), reason), DASHPOT_NOTHING_YET);
+  goal.release();
+  EXPECT_THAT(notes.calls, IsEmpty());
+  goal.begin(setpoint);
+  EXPECT_EQ(goal.change(all, reason), DASHPOT_OK);
+  goal.release();
+  EXPECT_THAT(notes.calls, ElementsAre("speed 0.1", "payload 2.0 with 0.5", "release"));
+}
+
+TEST_F(Goal, HasGainsAndPayloadJudgedTogether) {
+  goal.begin(setpoint);
+  EXPECT_EQ(goal.change({ratio(0.7), controller::Payload{2}, {}}, reason), DASHPOT_OK);
+  EXPECT_EQ(goal.change({ratio(0.6), {}, {}}, reason), DASHPOT_OK);
+  EXPECT_EQ(goal.change({ratio(0.6), {}, {}}, reason), DASHPOT_OK);  // nothing is new
+  EXPECT_THAT(notes.calls, ElementsAre("payload 2.0", "gains 0.6"));
+}
+
+TEST_F(Goal, LeavesAllAsItWasIfSomethingIsRefused) {
+  goal.begin(setpoint);
+  ASSERT_EQ(goal.change({{}, {}, controller::TipSpeed{.linear = 0.3}}, reason), DASHPOT_OK);
+  notes.calls.clear();
+  notes.refused = "payload";
+  LoopGoal::Change all{ratio(0.5), controller::Payload{2}, controller::TipSpeed{.linear = 0.1}};
+  EXPECT_EQ(goal.change(all, reason), DASHPOT_UNSTABLE_GAINS);
+  EXPECT_EQ(reason, "no payload 2.0 with 0.5");
+  EXPECT_THAT(notes.calls, ElementsAre("speed 0.1", "payload 2.0 with 0.5", "speed 0.3"));
+  // The gains that were refused are not in force: the old ones are no news, these are.
+  notes.calls.clear();
+  notes.refused = "";
+  EXPECT_EQ(goal.change({ratio(0.7), {}, {}}, reason), DASHPOT_OK);
+  EXPECT_EQ(goal.change({ratio(0.5), {}, {}}, reason), DASHPOT_OK);
+  EXPECT_THAT(notes.calls, ElementsAre("gains 0.5"));
+  // Where the speed is refused, nothing else is tried.
+  notes.calls.clear();
+  notes.refused = "speed";
+  EXPECT_EQ(
+      goal.change({ratio(0.4), controller::Payload{1}, controller::TipSpeed{.linear = 9}}, reason),
+      DASHPOT_UNSTABLE_GAINS);
+  EXPECT_THAT(notes.calls, ElementsAre("speed 9.0"));
+}
+
+TEST_F(Goal, WarnsOfWhatIsTakenNevertheless) {
+  goal.begin(setpoint);
+  notes.warned = "little margin";
+  ::testing::internal::CaptureStderr();
+  EXPECT_EQ(goal.change({ratio(0.5), {}, {}}, reason), DASHPOT_OK);
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "warning: little margin\n");
+}
+
+}  // namespace
+}  // namespace dashpot::apps
