@@ -26,7 +26,8 @@ struct Command {
 bool has_set(const Command& command, std::int32_t part, std::int64_t after) noexcept;
 
 /// Copies the parts that were set by commands later than the `after`-th accepted one into
-/// `setpoint`, and does not change its other parts and its time.
+/// `setpoint`, and does not change its other parts and its time. Dampers that are zero beside a
+/// ratio are not copied: those before act where there is no spring.
 void apply(const Command& command, controller::Setpoint& setpoint, std::int64_t after = 0) noexcept;
 
 }  // namespace dashpot::lcmtypes
