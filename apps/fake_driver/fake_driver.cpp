@@ -1,5 +1,7 @@
 #include <dashpot/apps/fake_driver/fake_driver.hpp>
+#include <dashpot/controller/dynamics.hpp>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,24 +12,35 @@
 namespace dashpot::apps {
 namespace {
 
+using controller::JointMatrix;
 using lcmtypes::DriverCommand;
 using lcmtypes::DriverKind;
+using Seven = std::array<double, 7>;
 
 constexpr std::int64_t kEarliest = 250'000;  // us from the first status to a command (iiwa)
 constexpr std::int64_t kSilence = 50'000;    // us without a command (iiwa)
 constexpr std::int64_t kExpiry = 100'000;    // us of a command's utime (Panda)
-constexpr double kHoldStiffness = 1000, kHoldDamping = 50;  // N m/rad, N m s/rad (iiwa)
-constexpr double kVelocityCutoff = 40;                      // Hz (iiwa)
-constexpr double kTorqueCutoff = 30;                        // Hz (Panda)
-constexpr double kTorqueRate = 1000;                        // N m/s (Panda)
-constexpr std::int64_t kWithoutClock = 200;                 // statuses (iiwa)
-constexpr std::array<double, 7> kDamping = {37.5, 50, 37.5, 25, 5, 3.75, 2.5};  // Panda
+constexpr Seven kHoldStiffness = {1000, 1000, 1000, 500, 500, 500, 500};  // N m/rad (iiwa)
+constexpr Seven kHoldDamping = {50, 50, 50, 50, 35, 35, 35};              // N m s/rad (iiwa)
+constexpr double kVelocityCutoff = 40;                                    // Hz (iiwa)
+constexpr double kTorqueCutoff = 30;                                      // Hz (Panda)
+constexpr double kTorqueRate = 1000;                                      // N m/s (Panda)
+constexpr std::int64_t kWithoutClock = 200;                               // statuses (iiwa)
+constexpr Seven kDamping = {37.5, 50, 37.5, 25, 5, 3.75, 2.5};            // N m s/rad (Panda)
 
-sim::PlantOptions plant_options(const Scene& scene, DriverKind kind) {
+JointVector vector(const Seven& values) {
+  return Eigen::Map<const Eigen::Matrix<double, 7, 1>>(values.data());
+}
+
+sim::PlantOptions plant_options(const Scene& scene) {
   sim::PlantOptions options = scene.plant;
-  options.delay = std::max(options.delay, 1);
-  if (kind == DriverKind::kPanda) options.torque_cutoff = kTorqueCutoff;
+  options.delay = 0;  // here, because what acts without commands is not delayed
   return options;
+}
+
+/// What both drivers have for a low-pass: y += gain (u - y) once a period.
+double low_pass_gain(double cutoff, double period) {
+  return period / (period + 1 / (2 * std::numbers::pi * cutoff));
 }
 
 }  // namespace
@@ -39,9 +52,10 @@ FakeDriver::FakeDriver(const Scene& scene, DriverKind kind) : scene_(scene), kin
                      "must be [0, 0, 0]: the driver compensates gravity, so that none is left");
   }
   mechanism_ = make_mechanism(scene);
-  plant_.emplace(*mechanism_, plant_options(scene, kind), scene.start, scene.velocity);
+  plant_.emplace(*mechanism_, plant_options(scene), scene.start, scene.velocity);
   last_position_ = spring_rest_ = scene.start;
   velocity_ = last_torque_ = JointVector::Zero(scene.dof());
+  due_.assign(static_cast<std::size_t>(std::max(scene.plant.delay, 1)), last_torque_);
 }
 
 void FakeDriver::take(const void* data, std::size_t size, std::int64_t utime) {
@@ -70,36 +84,54 @@ void FakeDriver::take(const void* data, std::size_t size, std::int64_t utime) {
 }
 
 JointVector FakeDriver::torque(std::int64_t utime) {
-  const JointVector& q = plant_->measured().position;
-  const JointVector qd = plant_->measured().velocity;
-  if (kind_ == DriverKind::kIiwa) {
-    const bool counts = command_ && utime - arrived_ <= kSilence;
-    if (!counts) ++uncommanded_;
-    if (has_springs()) {
-      const controller::Environment& own = scene_.arm->config.settings.environment;
-      const JointVector pull =
-          own.joint_stiffness.cwiseProduct(spring_rest_ - q) - own.joint_damping.cwiseProduct(qd);
-      return counts ? JointVector(command_->torque + pull) : pull;
-    }
-    if (counts) {
-      held_.reset();
-      return command_->torque;
-    }
-    if (!held_) held_ = q;
-    return kHoldStiffness * (*held_ - q) - kHoldDamping * qd;
+  const bool iiwa = kind_ == DriverKind::kIiwa;
+  const bool counts = command_ && (iiwa ? utime - arrived_ <= kSilence
+                                        : std::abs(utime - command_->utime) <= kExpiry);
+  if (!counts) ++uncommanded_;
+  if (!counts && !has_springs()) {
+    due_.assign(due_.size(), iiwa ? resting_torque() : filtered(resting_torque()));
+    return due_.front();
   }
-  JointVector wanted = JointVector::Zero(7);
-  if (command_ && std::abs(utime - command_->utime) <= kExpiry) {
-    wanted = command_->torque;
-  } else {
-    ++uncommanded_;
-    for (Eigen::Index i = 0; i < 7; ++i) wanted[i] = -kDamping[static_cast<std::size_t>(i)] * qd[i];
-  }
-  const double step = kTorqueRate * period();
-  for (Eigen::Index i = 0; i < 7; ++i) {
-    last_torque_[i] += std::clamp(wanted[i] - last_torque_[i], -step, step);
-  }
+  held_.reset();
+  due_.push_back(iiwa ? torque_of_iiwa(counts) : filtered(command_->torque));
+  JointVector due = due_.front();
+  due_.pop_front();
+  return due;
+}
+
+JointVector FakeDriver::torque_of_iiwa(bool counts) const {
+  if (!has_springs()) return command_->torque;
+  const sim::Measurement& now = plant_->measured();
+  const controller::Environment& own = scene_.arm->config.settings.environment;
+  const JointVector pull = own.joint_stiffness.cwiseProduct(spring_rest_ - now.position) -
+                           own.joint_damping.cwiseProduct(now.velocity);
+  return counts ? JointVector(command_->torque + pull) : pull;
+}
+
+/// In the order of libfranka.
+JointVector FakeDriver::filtered(const JointVector& torque) {
+  const double most = kTorqueRate * period();
+  const JointVector change = low_pass_gain(kTorqueCutoff, period()) * (torque - last_torque_);
+  last_torque_ += change.cwiseMin(most).cwiseMax(-most);
   return last_torque_;
+}
+
+/// A step h of the implicit Euler method, which acts at once, because the model has no rotors: its
+/// wrist would not bear these gains a period late.
+///     (M + h D + h^2 K) qd+ = M qd + h K (q_h - q),  torque = K (q_h - q - h qd+) - D qd+
+JointVector FakeDriver::resting_torque() {
+  const JointVector& q = plant_->measured().position;
+  const JointVector& qd = plant_->measured().velocity;
+  if (!held_) held_ = q;
+  const bool iiwa = kind_ == DriverKind::kIiwa;
+  const double h = period();
+  const JointVector K = iiwa ? vector(kHoldStiffness) : JointVector(JointVector::Zero(7));
+  const JointVector D = vector(iiwa ? kHoldDamping : kDamping);
+  JointMatrix M = controller::evaluate(scene_.arm->config.model, q, qd).M;
+  const JointVector impulse = M * qd + h * K.cwiseProduct(*held_ - q);
+  M.diagonal() += h * D + h * h * K;
+  const JointVector next = M.llt().solve(impulse);
+  return K.cwiseProduct(*held_ - q - h * next) - D.cwiseProduct(next);
 }
 
 bool FakeDriver::has_springs() const noexcept {
@@ -114,8 +146,8 @@ void FakeDriver::step(std::int64_t utime) {
     throw std::runtime_error(std::string("the simulation ended: ") + sim::to_text(moved));
   }
   const JointVector& q = plant_->measured().position;
-  const double gain = 1 - std::exp(-2 * std::numbers::pi * kVelocityCutoff * period());
-  velocity_ += gain * ((q - last_position_) / period() - velocity_);
+  velocity_ +=
+      low_pass_gain(kVelocityCutoff, period()) * ((q - last_position_) / period() - velocity_);
   last_position_ = q;
   if (first_ == 0) first_ = utime;
   ++statuses_;

@@ -3,6 +3,7 @@
 #include <dashpot/lcmtypes/driver.hpp>
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 
@@ -12,19 +13,19 @@ namespace dashpot::apps {
 /// commanded: their filters, what they do without commands, and what they die of. A command acts a
 /// period after its status, or later if the scene's `delay` says so.
 ///
-/// iiwa (`--torque_only`): without a command for 0.05 s, and before the first, a PD controller of
-/// 1000 N m/rad and 50 N m s/rad holds the position of that moment; torques count again with the
-/// next command, without blending. Velocities are differences through a low-pass of 40 Hz. utime is
-/// -1 for the first 200 statuses. It dies of a command within 0.25 s of the first status, and of
-/// arrays of another length.
+/// iiwa (`--torque_only`): without a command for 0.05 s, and before the first, the driver's PD
+/// controller holds the position of that moment; torques count again with the next command, without
+/// blending. Velocities are differences through a low-pass of 40 Hz. utime is -1 for the first 200
+/// statuses. It dies of a command within 0.25 s of the first status, and of arrays of another
+/// length.
 ///
 /// With `environment.joint_stiffness` or `joint_damping` in its scene, the iiwa is in KUKA's mode
 /// Torque: these springs pull to the position commanded a period before, at first where it is.
 ///
 /// Panda (`--control_mode torque`): a command whose utime is more than 0.1 s in the past or the
-/// future does not count; without one that counts, joints are damped. Torques pass a rate limit of
-/// 1000 N m/s and a low-pass of 30 Hz. It dies of anything but seven torques, no positions, and
-/// control mode 4.
+/// future does not count; without one that counts, joints are damped. Torques pass libfranka's
+/// low-pass of 30 Hz and rate limit of 1000 N m/s. It dies of anything but seven torques, no
+/// positions, and control mode 4.
 ///
 /// The driver compensates gravity, so that the scene's robot has none.
 class FakeDriver {
@@ -48,7 +49,13 @@ class FakeDriver {
   std::int64_t uncommanded() const noexcept { return uncommanded_; }
 
  private:
+  /// What acts in this period: a torque acts `delay` periods after the status that it answers.
   JointVector torque(std::int64_t utime);
+  JointVector torque_of_iiwa(bool counts) const;
+  /// Through the Panda's low-pass and rate limit.
+  JointVector filtered(const JointVector& torque);
+  /// Of what the driver does without commands: it holds, or damps.
+  JointVector resting_torque();
   bool has_springs() const noexcept;
 
   const Scene& scene_;
@@ -60,7 +67,8 @@ class FakeDriver {
   std::int64_t first_ = 0;                ///< utime of the first status
   std::optional<JointVector> held_;       ///< the position that the PD holds
   JointVector spring_rest_;               ///< to which springs of KUKA's pull
-  JointVector last_torque_;               ///< before the plant's low-pass
+  std::deque<JointVector> due_;           ///< torques that are to act
+  JointVector last_torque_;               ///< of the Panda's low-pass
   JointVector last_position_, velocity_;  ///< through the iiwa's low-pass
   std::int64_t statuses_ = 0, commands_ = 0, uncommanded_ = 0;
 };

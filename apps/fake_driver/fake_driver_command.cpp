@@ -27,6 +27,7 @@ struct FakeOptions {
   bool iiwa = false;
   bool panda = false;
   bool lock_step = false;
+  std::string trouble_name;
   Trouble trouble = Trouble::kNone;
   double from = 1, lasts = 0.1;  // s
 };
@@ -131,7 +132,8 @@ void fake_driver(const FakeOptions& options) {
   bus->subscribe(lcmtypes::profile_of(kind).command_channel, &CommandInbox::take, &inbox);
   StatusOutlet outlet(*bus, kind, options);
   const StopSignal stop;
-  const std::int64_t start = fake_utime();
+  // In lock-step no time of day, because it is not kept.
+  const std::int64_t start = options.lock_step ? 1'000'000 : fake_utime();
   Pace pace(driver.period());
   int patience = kPatience;
   while (!StopSignal::given() && !(options.duration && driver.time() >= *options.duration)) {
@@ -186,9 +188,9 @@ void add_fake_driver(CLI::App& program) {
       {"nan", Trouble::kNotANumber},  {"repeat", Trouble::kRepeat},
       {"reorder", Trouble::kReorder}, {"user-stop", Trouble::kUserStop}};
   CLI::Option* trouble = command
-                             ->add_option("--trouble", options->trouble,
+                             ->add_option("--trouble", options->trouble_name,
                                           "What goes wrong; user-stop with --panda only")
-                             ->transform(CLI::CheckedTransformer(troubles))
+                             ->check(CLI::IsMember(troubles))
                              ->option_text("stall|die|nan|repeat|reorder|user-stop");
   command->add_option("--from", options->from, "When it begins, s (1)")
       ->needs(trouble)
@@ -199,7 +201,10 @@ void add_fake_driver(CLI::App& program) {
       ->transform(quantity("s", 0, 1e7, "a time from 0 to 1e7 s"))
       ->option_text("S");
   command->footer("Ctrl-C ends it.\n" + std::string(kExitStatusHelp));
-  command->callback([options] { fake_driver(*options); });
+  command->callback([options, trouble, troubles] {
+    if (trouble->count() > 0) options->trouble = troubles.at(options->trouble_name);
+    fake_driver(*options);
+  });
 }
 
 }  // namespace dashpot::apps

@@ -168,7 +168,7 @@ TEST_P(Drive, RefusesALoopThatIsNotTheDrivers) {
   EXPECT_THAT(refusal("gravity: false", "gravity: true"),
               HasSubstr("feed_forward.gravity: must be false"));
   EXPECT_THAT(refusal("delay: 1", "delay: 0"), HasSubstr("analysis.sampled.delay: must be"));
-  EXPECT_THAT(refusal(iiwa ? ", difference_velocity: true" : ", cutoff: 30 Hz", ""),
+  EXPECT_THAT(refusal(iiwa ? ", difference_velocity: true" : ", cutoff: 27.484 Hz", ""),
               HasSubstr(iiwa ? "difference_velocity: must be true" : "cutoff: must be that of"));
   // Dampers that the wrist does not bear are refused before the first torque.
   EXPECT_THAT(refusal("damping_ratio: 0.8", "damping: [20, 20, 10, 10, 20, 10, 4]"),
@@ -292,15 +292,27 @@ TEST_P(Drive, AnswersNoStatusTwice) {
   EXPECT_EQ(fake_status, 0) << fake_said;
 }
 
+/// Half of the statuses are too few for the loop.
+TEST_P(Drive, AnswersTheNewerOfReorderedStatuses) {
+  const Json result = troubled({"--trouble", "reorder", "--from", "3", "--lasts", "0.1"});
+  if (!seen) GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  EXPECT_GE(result["statuses"]["repeated"].get<int>() + result["statuses"]["overtaken"].get<int>(),
+            40);
+  EXPECT_EQ(result["faults"], 1);
+  EXPECT_EQ(result["fault"]["status"], "loop at the wrong rate, damping") << result.dump(2);
+  EXPECT_EQ(fake_status, 0) << fake_said;
+}
+
 INSTANTIATE_TEST_SUITE_P(Arms, Drive, ::testing::Values(kIiwa, kPanda), [](const auto& given) {
   return std::string(given.param.option).substr(2);
 });
 
 /// What drive says when it has begun or ended, with a driver that commands one posture or what it
 /// measures.
-std::string first_words(const std::string& url, bool fixed, const std::string& option,
-                        int& status) {
-  Running driving({"drive", configuration("iiwa14"), "--iiwa", "--lcm-url", url, option});
+std::string first_words(const std::string& url, bool fixed, const std::string& option, int& status,
+                        const std::string& config = configuration("iiwa14"),
+                        std::string* table = nullptr) {
+  Running driving({"drive", config, "--iiwa", "--lcm-url", url, option});
   {
     const TremblingArm trembling(kIiwa, url, 1e-6, fixed);
     for (int k = 0; k < 1000 && driving.complaints().empty(); ++k) usleep(10'000);
@@ -308,6 +320,7 @@ std::string first_words(const std::string& url, bool fixed, const std::string& o
   }
   driving.send(SIGTERM);
   status = driving.finish();
+  if (table != nullptr) *table = driving.output();
   return driving.complaints();
 }
 
@@ -343,7 +356,20 @@ TEST(DriveOfAnIiwa, RefusesSpringsOfKukas) {
   EXPECT_EQ(status, 2);
   EXPECT_THAT(springs, HasSubstr("KUKA's mode Torque"));
   EXPECT_THAT(springs, ::testing::Not(HasSubstr("the arm is held")));
-  const std::string watched = first_words(own_url(), true, "--dry-run", status);
+  const Scratch scratch;
+  const std::string stiff = first_words(
+      own_url(), true, "--json", status,
+      changed_configuration(scratch, kIiwa,
+                            {{"analysis:",
+                              "environment: {joint_stiffness: 100 N m/rad, joint_damping: 1 N m "
+                              "s/rad}\nanalysis:"}}));
+  EXPECT_EQ(status, 2);
+  EXPECT_THAT(stiff, HasSubstr("environment.joint_stiffness must be 0 in KUKA's mode Torque"));
+  std::string table;
+  const std::string watched =
+      first_words(own_url(), true, "--dry-run", status, configuration("iiwa14"), &table);
+  EXPECT_THAT(table, HasSubstr("dry run: nothing was commanded"));
+  EXPECT_THAT(table, HasSubstr("  modes, rad/s (ratio): "));
   EXPECT_EQ(status, 0);
   EXPECT_THAT(watched, HasSubstr("KUKA's mode Torque"));
   const std::string none = first_words(own_url(), false, "--json", status);
@@ -395,6 +421,33 @@ TEST(DriveOfAnIiwa, CountsWhatSpringsOfKukasDamp) {
   }
 }
 
+TEST(DriveOfAPanda, WaitsForTheNextDriverAfterOneThatDied) {
+  const std::string url = own_url();
+  const std::vector<std::string> words = {"fake-driver", scene("drivers/panda"), "--panda",
+                                          "--lcm-url", url};
+  std::vector<std::string> dying = words;
+  dying.insert(dying.end(), {"--trouble", "die", "--from", "1.5"});
+  Listener listener(url);
+  Running first(dying);
+  Running driving({"drive", configuration("panda"), "--panda", "--json", "--lcm-url", url});
+  if (!listener.until([&] { return listener.states > 20; })) {
+    GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  }
+  EXPECT_EQ(first.finish(), 1);
+  const auto says = [&](const char* what) {
+    return driving.complaints().find(what) != std::string::npos;
+  };
+  EXPECT_TRUE(listener.until([&] { return says("no status on PANDA_STATUS for 2 s"); }));
+  Running next(words);
+  EXPECT_TRUE(listener.until([&] { return listener.state.fault != 0; }));
+  driving.send(SIGTERM);
+  EXPECT_EQ(driving.finish(), 0) << driving.complaints();
+  const Json result = Json::parse(driving.output());
+  EXPECT_EQ(result["ended"], "ended by the user");
+  EXPECT_EQ(result["fault"]["status"], "gap between states, damping");
+  EXPECT_GE(result["statuses"]["awaited"].get<int>(), 100);
+}
+
 TEST(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
   const std::string url = own_url();
   Listener listener(url);
@@ -411,50 +464,6 @@ TEST(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
   EXPECT_GE(result["statuses"]["of_stopped_robot"].get<int>(), 50);
   EXPECT_EQ(result["fault"]["status"], "gap between states, damping");
   EXPECT_THAT(driving.complaints(), HasSubstr("the robot has stopped by itself (robot_mode 5)"));
-}
-
-TEST(FakeDriver, DiesAsTheDriverDoes) {
-  const std::string url = own_url();
-  for (const Arm& arm : {kIiwa, kPanda}) {
-    Listener listener(url);
-    Running fake({"fake-driver", scene(std::string("drivers/") + arm.name), arm.option, "--lcm-url",
-                  url, "--duration", "10"});
-    lcmtypes::DriverCommand command;
-    command.torque = controller::JointVector::Zero(6);
-    std::vector<std::uint8_t> bytes;
-    encode(arm.kind, command, bytes);
-    for (int k = 0; k < 500 && fake.complaints().empty(); ++k) {
-      listener.bus().publish(lcmtypes::profile_of(arm.kind).command_channel, bytes.data(),
-                             static_cast<unsigned>(bytes.size()));
-      listener.until(
-          [&, end = Clock::now() + std::chrono::milliseconds(10)] { return Clock::now() > end; });
-    }
-    EXPECT_EQ(fake.finish(), 1);
-    EXPECT_THAT(
-        fake.complaints(),
-        HasSubstr(arm.kind == DriverKind::kIiwa ? "a command came within 0.25 s of the first status"
-                                                : "a command has 6 torques and 0 positions"));
-  }
-}
-
-TEST(FakeDriver, RefusesWhatItCannotBe) {
-  const Outcome weighty =
-      run_program({"fake-driver", scene("panda_release_c2"), "--panda", "--duration", "0.1"});
-  EXPECT_EQ(weighty.status, 2);
-  EXPECT_THAT(weighty.err, HasSubstr("robot.gravity: must be [0, 0, 0]"));
-  const Outcome both = run_program({"fake-driver", scene("drivers/panda"), "--panda", "--iiwa"});
-  EXPECT_EQ(both.status, 2);
-  const Outcome none = run_program({"fake-driver", scene("drivers/panda")});
-  EXPECT_EQ(none.status, 2);
-  EXPECT_THAT(none.err, HasSubstr("one of them is wanted"));
-  const Outcome stopped =
-      run_program({"fake-driver", scene("drivers/iiwa14"), "--iiwa", "--trouble", "user-stop"});
-  EXPECT_EQ(stopped.status, 2);
-  EXPECT_THAT(stopped.err, HasSubstr("user-stop is for --panda"));
-  const Outcome when =
-      run_program({"fake-driver", scene("drivers/panda"), "--panda", "--from", "1"});
-  EXPECT_EQ(when.status, 2);
-  EXPECT_THAT(when.err, HasSubstr("--trouble"));
 }
 
 }  // namespace
