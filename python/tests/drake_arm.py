@@ -50,7 +50,7 @@ class DrakeArm:
             f"{kind.upper()}_STATUS", status, self.lcm, publish_period=1e6,  # when told
             use_cpp_serializer=True))
         # The simulator takes a message up in the period after the one in which it came.
-        gain = 1 - math.exp(-2 * math.pi * cutoff * PERIOD) if cutoff else 1.0
+        gain = PERIOD / (PERIOD + 1 / (2 * math.pi * cutoff)) if cutoff else 1.0  # as libfranka
         one, zero = np.eye(N), np.zeros((N, N))
         self.drives = builder.AddSystem(  # torque += gain (command - torque)
             LinearSystem((1 - gain) * one, gain * one, one, zero, PERIOD))

@@ -111,6 +111,19 @@ INSTANTIATE_TEST_SUITE_P(Arms, DriveConfigs, ::testing::Values(kIiwa14, kIiwa7, 
 INSTANTIATE_TEST_SUITE_P(Arms, DesignedDriveConfigs,
                          ::testing::Values(kIiwa14, kIiwa7, kPanda, kFr3), config_name);
 
+/// libfranka, lowpass_filter.cpp: y += T / (T + 1 / (2 pi f)) (u - y), with the driver's f of 30
+/// Hz.
+TEST(DriveConfig, HasTheLowPassOfLibfranka) {
+  for (const char* name : {"panda", "fr3"}) {
+    const Config config = controller::load_config(std::string(DASHPOT_SOURCE_DIR) +
+                                                  "/controller/examples/" + name + "_drive.yaml");
+    const double T = config.settings.period;
+    const double pole =
+        std::exp(-2 * std::numbers::pi * config.settings.analysis.sampled.cutoff * T);
+    EXPECT_NEAR(1 - pole, T / (T + 1 / (2 * std::numbers::pi * 30)), 1e-5) << name;
+  }
+}
+
 /// libfranka, rate_limiting.h: the FR3's limits of velocity at a position.
 TEST(DriveConfig, HoldsTheLimitsOfVelocityThatAnFr3HasAtItsPosition) {
   const Config config = controller::load_config(std::string(DASHPOT_SOURCE_DIR) +
