@@ -16,7 +16,6 @@ struct DriverProfile {
   const char* name;             ///< "iiwa", "panda"
   const char* status_channel;   ///< "IIWA_STATUS"
   const char* command_channel;  ///< "IIWA_COMMAND"
-  double torque_cutoff;         ///< of the driver's low-pass on torques, Hz; 0: none
   /// External torque with which the driver stops, N m, for seven joints; empty: it has no such
   /// limit.
   std::vector<double> external_torque;

@@ -127,15 +127,15 @@ std::string converse(const DriveOptions& options, lcm::LCM& bus, lcmtypes::Drive
     const bool ran = session.running();
     const lcmtypes::DriverStatus status = std::move(*inbox.newest);
     inbox.newest.reset();
-    const bool answers =
-        session.take(status, 1e-6 * static_cast<double>(now - inbox.arrived), command);
+    const bool answers = session.take(status, inbox.arrived, now, command);
     if (!ran && session.running()) {
       began = Clock::now();
       std::fprintf(
           stderr, "%s\n",
           options.dry_run ? "watching; nothing is commanded" : "the arm is held where it is");
     }
-    if (answers) {
+    // The program may have been kept waiting since.
+    if (answers && session.may_send(utime_now())) {
       encode(driver, command, bytes);
       const int failed =
           bus.publish(profile.command_channel, bytes.data(), static_cast<unsigned>(bytes.size()));

@@ -63,6 +63,15 @@ std::string to_table(const DriveReport& report) {
     if (report.loop.statuses[status] == 0) continue;
     text += line("  %lld x %s", n(report.loop.statuses[status]), status_name(status).c_str());
   }
+  const dashpot_modes& modes = report.loop.last_modes;
+  if (modes.count > 0) text += "  modes, rad/s (ratio):";
+  for (std::uint32_t i = 0; i < modes.count; ++i) {
+    std::array<char, 64> mode{};
+    std::snprintf(mode.data(), mode.size(), " %.4g (%.3g)", modes.modes[i].natural_frequency,
+                  modes.modes[i].damping_ratio);
+    text += mode.data();
+  }
+  if (modes.count > 0) text += "\n";
   text += fault_text(report.loop);
   text += commands_text(report.commands, report.loop.commands_refused);
   text += line("messages: %lld states, %lld modes, %lld sampled modes", n(report.messages.states),

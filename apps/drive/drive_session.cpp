@@ -19,10 +19,12 @@ using lcmtypes::DriverStatus;
 constexpr std::int64_t kWatch = 300'000;  // us of statuses before the start
 constexpr std::size_t kFewest = 20;       // of them
 constexpr double kPeriodTolerance = 0.2;  // of the period
-constexpr double kOldest = 2;             // periods that a status may be old
-constexpr double kNearLimit = 0.8;        // of an external torque with which the driver stops
-constexpr std::size_t kRemembered = 64;   // commands sent
-constexpr double kFade = 0.2;             // s from the springs to no torque, at least
+constexpr double kOldest = 2;             // periods that a status may be old when it is answered
+constexpr std::int64_t kSameClock = 1'000'000;  // us between the driver's clock and the time of day
+constexpr std::int64_t kDrift = 1000;    // of a clock's time, by which the other one may differ
+constexpr double kNearLimit = 0.8;       // of an external torque with which the driver stops
+constexpr std::size_t kRemembered = 64;  // commands sent
+constexpr double kFade = 0.2;            // s from the springs to no torque, at least
 // us: what comes later is no time of a clock, and nanoseconds would not fit.
 constexpr std::int64_t kLatest = std::numeric_limits<std::int64_t>::max() / 2000;
 
@@ -48,14 +50,16 @@ void check_loop(const controller::Settings& settings, DriverKind driver) {
                      "must be at least 1: a command acts a period after its status at the soonest");
   }
   if (driver == DriverKind::kIiwa && !loop.difference_velocity) {
-    throw InputError("analysis.sampled.difference_velocity",
-                     "must be true: velocities are differenced here, because those of the driver "
-                     "went through its low-pass of 40 Hz");
+    throw InputError(
+        "analysis.sampled.difference_velocity",
+        "must be true with --iiwa: velocities are differenced here, because those of the "
+        "driver went through its low-pass of 40 Hz");
   }
   if (driver == DriverKind::kPanda && !(loop.cutoff > 0)) {
-    throw InputError("analysis.sampled.cutoff",
-                     "must be that of the driver's low-pass on torques (--low_pass_freq), 30 Hz "
-                     "unless it is set");
+    throw InputError(
+        "analysis.sampled.cutoff",
+        "must be that of the driver's low-pass on torques with --panda: 27.484 Hz for its "
+        "--low_pass_freq of 30 Hz");
   }
 }
 
@@ -82,7 +86,8 @@ bool DriveSession::stopped_by_itself(const DriverStatus& status) const noexcept 
   return options_.driver == DriverKind::kPanda && status.robot_mode >= 3 && status.robot_mode <= 6;
 }
 
-bool DriveSession::take(const DriverStatus& status, double age, DriverCommand& command) {
+bool DriveSession::take(const DriverStatus& status, std::int64_t arrived, std::int64_t now,
+                        DriverCommand& command) {
   ++record.statuses;
   const bool possible = status.utime <= kLatest;
   if (!possible || status.position.size() != n_ || status.velocity.size() != n_) {
@@ -105,7 +110,7 @@ bool DriveSession::take(const DriverStatus& status, double age, DriverCommand& c
   const std::int64_t interval = last_ > 0 ? status.utime - last_ : 0;
   last_ = status.utime;
   repeated_ = 0;
-  const bool late = age > kOldest * config_.settings.period;
+  note_age(status.utime, interval, arrived, now);
   if (stopped_by_itself(status)) {
     ++record.stopped;
     if (record.stopped == 1) {
@@ -118,7 +123,7 @@ bool DriveSession::take(const DriverStatus& status, double age, DriverCommand& c
   }
   if (!running_) {
     if (interval > 0 && first_ > 0) intervals_.push_back(interval);
-    watch(status, late);
+    watch(status, age(now) > kOldest * config_.settings.period);
     if (!running_) return false;
   } else {
     const double periods = 1e-6 * static_cast<double>(interval) / config_.settings.period;
@@ -128,12 +133,10 @@ bool DriveSession::take(const DriverStatus& status, double age, DriverCommand& c
   restarted_ = false;
   if (status.utime < quiet_until_) {  // the driver may be another one, which a command would end
     ++record.awaited;
+    fastest_.reset();  // the iiwa's driver is still learning the robot's clock
     return false;
   }
-  if (late) {
-    ++record.late;
-    return false;
-  }
+  if (!fresh(now)) return false;
   note_external(status);
 
   journal_.begin_tick();
@@ -177,6 +180,34 @@ bool DriveSession::take(const DriverStatus& status, double age, DriverCommand& c
   command.position = options_.driver == DriverKind::kIiwa ? last_position_ : JointVector();
   command.torque = torque_;
   return true;
+}
+
+/// LCM tells when it read a status, which may be long after that came: it looks for the kernel's
+/// time only where it had no message before. So what a status took longer than the fastest one
+/// counts as well, if the driver's clock is that of the day. The two clocks may drift apart.
+void DriveSession::note_age(std::int64_t utime, std::int64_t interval, std::int64_t arrived,
+                            std::int64_t now) {
+  sent_at_ = arrived;
+  const std::int64_t way = now - utime;
+  if (!fastest_ && std::abs(way) > kSameClock) return;
+  fastest_ = fastest_ ? std::min(way, *fastest_ + (interval + kDrift - 1) / kDrift) : way;
+  sent_at_ = std::min(arrived, utime + *fastest_);
+}
+
+double DriveSession::age(std::int64_t now) const noexcept {
+  return 1e-6 * static_cast<double>(now - sent_at_);
+}
+
+bool DriveSession::fresh(std::int64_t now) {
+  if (age(now) <= kOldest * config_.settings.period) {
+    lates_ = 0;
+    return true;
+  }
+  ++record.late;
+  ++lates_;
+  if (static_cast<double>(lates_) * config_.settings.period < 1e-6 * kWatch) return false;
+  throw std::runtime_error("for " + number(1e-6 * kWatch) +
+                           " s all statuses were older than two periods: nothing more is sent");
 }
 
 /// A clock that went back would leave every status unanswered, without a word.
@@ -226,15 +257,23 @@ void DriveSession::watch(const DriverStatus& status, bool late) {
 
 /// With --torque_only the driver commands each position that it measures. With springs of KUKA's it
 /// commands the one where they are fixed. Commands then lead them with the arm, so that they only
-/// damp; the configuration has to say how much.
+/// damp; the configuration has to say how much, and no stiffness.
 void DriveSession::check_springs() {
-  if (!config_.settings.environment.joint_damping.isZero(0)) return;
   const bool known = first_commanded_.allFinite() && !first_commanded_.isZero(0);
   if (options_.driver != DriverKind::kIiwa || !known || !moved_ || recommanded_) return;
-  const std::string reason =
-      "the driver commands one fixed position while the arm's measured one changes: KUKA's mode "
-      "Torque, or no torque is taken yet; use the mode TorqueOnly and --torque_only, or say in "
-      "environment.joint_damping how KUKA's springs damp the arm";
+  const controller::Environment& told = config_.settings.environment;
+  std::string reason;
+  if (told.joint_damping.isZero(0)) {
+    reason =
+        "the driver commands one fixed position while the arm's measured one changes: KUKA's mode "
+        "Torque, or no torque is taken yet; use the mode TorqueOnly and --torque_only, or say in "
+        "environment.joint_damping how KUKA's springs damp the arm";
+  } else if (!told.joint_stiffness.isZero(0)) {
+    reason =
+        "environment.joint_stiffness must be 0 in KUKA's mode Torque, because commands lead KUKA's "
+        "springs with the arm, so that they hold nothing";
+  }
+  if (reason.empty()) return;
   if (!options_.dry_run) throw InputError("", reason);
   warning_ = reason;
 }
@@ -263,6 +302,7 @@ void DriveSession::begin(const DriverStatus& status) {
   setpoint.tip_pose = {there.p_BT_B, there.R_BT};
   setpoint.wrench.setZero();
   goal_.begin(setpoint);
+  fastest_.reset();  // the iiwa's driver was still learning the robot's clock
   running_ = true;
 }
 

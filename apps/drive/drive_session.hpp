@@ -51,10 +51,14 @@ class DriveSession {
   DriveSession(const controller::Config& config, LoopController& controller, LoopGoal& goal,
                LoopJournal& journal, const Options& options);
 
-  /// Takes a status that arrived `age` s ago. Returns
+  /// Takes a status at `now`, us since 1970-01-01 UTC, that LCM read at `arrived`. Returns
   /// true if `command` is to be sent. Throws InputError if the conversation must not begin, and
   /// std::runtime_error if it must not go on.
-  bool take(const lcmtypes::DriverStatus& status, double age, lcmtypes::DriverCommand& command);
+  bool take(const lcmtypes::DriverStatus& status, std::int64_t arrived, std::int64_t now,
+            lcmtypes::DriverCommand& command);
+  /// Whether `command` may still be sent. It is too late for that if the status is too old by now,
+  /// as far as the driver's clock is the time of day: in lock-step a status waits for its answer.
+  bool may_send(std::int64_t now) { return !fastest_ || fresh(now); }
   /// Notes a command on the driver's channel. Nothing throws: LCM calls it.
   void hear_command(const void* data, std::size_t size) noexcept;
   /// True if somebody else commands beside this session, which must then end.
@@ -75,6 +79,11 @@ class DriveSession {
   DriveRecord record;
 
  private:
+  void note_age(std::int64_t utime, std::int64_t interval, std::int64_t arrived, std::int64_t now);
+  /// Whether the status that was taken may be answered; if not, it counts as late. Throws
+  /// std::runtime_error if all were late for long.
+  bool fresh(std::int64_t now);
+  double age(std::int64_t now) const noexcept;  ///< of the status that was taken, s
   void note_repeated(const lcmtypes::DriverStatus& status);
   void fade(std::int64_t utime);
   void watch(const lcmtypes::DriverStatus& status, bool late);
@@ -101,6 +110,10 @@ class DriveSession {
   JointVector last_position_;
   std::int64_t measured_at_ = 0;  ///< utime of last_position_
   std::int64_t repeated_ = 0;     ///< old statuses since the last new one
+  std::int64_t sent_at_ = 0;      ///< when the status that was taken was sent, at the latest, us
+  /// The least time from a status's utime, which has to be a time of day, until it was taken, us.
+  std::optional<std::int64_t> fastest_;
+  std::int64_t lates_ = 0;        ///< since the last status that was not late
   bool restarted_ = false;        ///< the driver's clock was not known while this ran
   std::int64_t quiet_until_ = 0;  ///< utime of the first status to be answered again
   bool ending_ = false, ended_ = false;

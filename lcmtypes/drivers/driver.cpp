@@ -80,8 +80,8 @@ std::vector<double> list(const JointVector& values, const JointVector& like) {
 
 const DriverProfile& profile_of(DriverKind kind) noexcept {
   static const std::array<DriverProfile, 2> profiles = {
-      DriverProfile{"iiwa", "IIWA_STATUS", "IIWA_COMMAND", 0, {60, 60, 60, 30, 12, 12, 6}},
-      DriverProfile{"panda", "PANDA_STATUS", "PANDA_COMMAND", 30, {}}};
+      DriverProfile{"iiwa", "IIWA_STATUS", "IIWA_COMMAND", {60, 60, 60, 30, 12, 12, 6}},
+      DriverProfile{"panda", "PANDA_STATUS", "PANDA_COMMAND", {}}};
   return profiles[static_cast<std::size_t>(kind)];
 }
 

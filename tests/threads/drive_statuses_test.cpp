@@ -71,6 +71,13 @@ class StatusWriter {
     for (int k = 0; k < count; ++k) step(100);
   }
 
+  /// The next status, with the time of day and at it.
+  bool step_in_time() {
+    next.utime = std::max(next.utime + 1000, utime() / 1000 * 1000);
+    while (utime() < next.utime) usleep(50);
+    return send(next, 1);
+  }
+
   DriverStatus next;
   std::vector<DriverCommand> commands;
 
@@ -206,6 +213,31 @@ TEST_P(DriveStatuses, OthersThanOfThisArmAreNotAnswered) {
   EXPECT_EQ(result["faults"], 0);
 }
 
+/// The arm is pushed away, faster than the torque may change and further than it may be large.
+TEST_P(DriveStatuses, TorquesKeepToTheLimitsOfTheConfiguration) {
+  writer.steps(20);
+  writer.forget();
+  const double most = arm.kind == DriverKind::kIiwa ? 80 : 40;  // N m, of the first joint
+  double greatest = 0, steepest = 0, before = 0;
+  std::int64_t then = writer.next.utime;
+  for (int k = 0; k < 900; ++k) {
+    writer.next.position[0] += 1e-3;
+    writer.next.velocity[0] = 1;
+    if (!writer.step(100)) continue;
+    const DriverCommand& command = writer.commands.back();
+    const double change = std::abs(command.torque[0] - before);
+    const double time = 1e-6 * static_cast<double>(command.utime - then);
+    EXPECT_LE(change, kRate * time + 1e-9) << k;
+    EXPECT_LE(std::abs(command.torque[0]), most) << k;
+    steepest = std::max(steepest, change / time);
+    greatest = std::max(greatest, std::abs(command.torque[0]));
+    before = command.torque[0];
+    then = command.utime;
+  }
+  EXPECT_GT(steepest, 0.99 * kRate);
+  EXPECT_GT(greatest, 0.9 * most);
+}
+
 /// As the iiwa's are differenced here: over the time that has passed since the last position.
 TEST_P(DriveStatuses, VelocitiesAfterPositionsThatAreNoNumbers) {
   const double velocity = 0.1;  // rad/s
@@ -237,10 +269,62 @@ TEST_P(DriveStatuses, VelocitiesAfterPositionsThatAreNoNumbers) {
   EXPECT_LT(fastest, 1.1 * velocity);
 }
 
+/// kuka_driver ends at 12 N m of the sixth joint.
+TEST_P(DriveStatuses, AnExternalTorqueNearTheDriversLimitIsTold) {
+  writer.next.external = JointVector::Zero(7);
+  writer.next.external[5] = 9.5;
+  writer.steps(20);
+  EXPECT_THAT(driving.complaints(), ::testing::Not(HasSubstr("external torque")));
+  writer.next.external[5] = -9.7;
+  writer.steps(20);
+  driving.send(SIGTERM);
+  while (writer.step(20)) {
+  }
+  EXPECT_EQ(driving.finish(), 0);
+  const auto told = HasSubstr("joint 6: external torque -9.7 N m; the driver stops at 12 N m");
+  if (arm.kind == DriverKind::kIiwa) {
+    EXPECT_THAT(driving.complaints(), told);
+  } else {  // libfranka's limits are the robot's own business
+    EXPECT_THAT(driving.complaints(), ::testing::Not(HasSubstr("external torque")));
+  }
+  EXPECT_EQ(Json::parse(driving.output())["external_torque"][5], 9.7);
+}
+
 INSTANTIATE_TEST_SUITE_P(Arms, DriveStatuses, ::testing::Values(kIiwa, kPanda),
                          [](const auto& given) {
                            return std::string(given.param.option).substr(2);
                          });
+
+/// A status that waited because the program was kept from running.
+TEST(DriveInTime, AStatusOlderThanTwoPeriodsIsNotAnswered) {
+  for (const Arm& arm : {kIiwa, kPanda}) {
+    const std::string url = own_url();
+    Running driving({"drive", configuration(arm.name), arm.option, "--json", "--lcm-url", url});
+    StatusWriter writer(arm, url);
+    const auto until_answered = [&] {
+      const auto end = Clock::now() + std::chrono::seconds(10);
+      while (!writer.step_in_time()) {
+        if (Clock::now() > end) return false;
+      }
+      return true;
+    };
+    if (!until_answered()) GTEST_SKIP() << "multicast does not work on this machine";
+    for (int k = 0; k < 50; ++k) writer.step_in_time();
+    writer.forget();
+    ASSERT_TRUE(until_answered());
+    writer.forget();
+    driving.send(SIGSTOP);
+    usleep(1000);
+    EXPECT_FALSE(writer.step_in_time());
+    usleep(20'000);
+    driving.send(SIGCONT);
+    EXPECT_FALSE(writer.send(writer.next, 50));  // repeated, which is not answered either
+    ASSERT_TRUE(until_answered());
+    driving.send(SIGTERM);
+    while (!driving.ended()) writer.step_in_time();
+    EXPECT_GE(Json::parse(driving.output())["statuses"]["late"].get<int>(), 1);
+  }
+}
 
 }  // namespace
 }  // namespace dashpot::tests
