@@ -13,6 +13,7 @@
 namespace dashpot::tests {
 namespace {
 
+using lcmtypes::DriverKind;
 using ::testing::HasSubstr;
 
 class Drive : public ::testing::TestWithParam<Arm> {
