@@ -10,19 +10,20 @@ namespace dashpot::analysis {
 /// moves under a torque f that is held from tick k to tick k + 1. The controller commands
 ///     u_k = (G + P - K) q_k - (C - D) v_k,   v_k = q'_k, or (q_k - q_k-1) / T if differenced,
 ///     f_k = f_k-1 + (1 - exp(-2 pi f_c T)) (u_k-d - f_k-1),   or u_k-d without a filter.
-/// The state x = (q, q', [v], u_k-d .. u_k-1, [f]) goes from tick to tick as x_k+1 = A x_k. This is
-/// exact, because the robot's part of A is a matrix exponential. The eigenvalues z of A are given
-/// as lambda = log(z) / T, which compare with the continuous eigenvalues. To first order in omega T
-/// the hold acts like a delay of T/2: natural_frequency grows by the factor 1 + zeta omega t and
-/// the damping ratio falls by (1 - 2 zeta^2) omega t / 2, with t = (d + 1/2) T plus the lag of the
-/// filter.
+/// With states w of SampledLoop::memory, u_k has another term -output w_k.
+/// The state x = (q, q', [v], u_k-d .. u_k-1, [f], [w]) goes from tick to tick as x_k+1 = A x_k.
+/// This is exact, because the robot's part of A is a matrix exponential. The eigenvalues z of A are
+/// given as lambda = log(z) / T, which compare with the continuous eigenvalues. To first order in
+/// omega T the hold acts like a delay of T/2: natural_frequency grows by the factor 1 + zeta omega
+/// t and the damping ratio falls by (1 - 2 zeta^2) omega t / 2, with t = (d + 1/2) T plus the lag
+/// of the filter.
 ///
 /// `spectrum` has to be the spectrum of `system`. Each of its modes gets the z nearest to its
 /// eigenvalues, moved by the loop's delays to first order, nearest pairs first. That is meaningful
 /// while omega T stays well below 1.
 ///
 /// Call it at a lower rate than the tick's, because it allocates, and solves one dense eigenproblem
-/// of up to (4 + d) n rows. Throws std::invalid_argument for matrices of other sizes or entries
+/// of up to (4 + d) n + m rows. Throws std::invalid_argument for matrices of other sizes or entries
 /// that are not finite, a period that is not positive, a negative delay or cutoff, and a spectrum
 /// without modes because of its status. Throws std::runtime_error if the eigenvalue iteration does
 /// not converge.
@@ -30,13 +31,13 @@ template <int N>
 SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum,
                             const SampledLoop& loop);
 
-/// Returns the factor by which the controller's K - P and C - D may grow together before the
-/// loop becomes unstable, to six digits. It is the first boundary above 1, searched in steps of a
-/// quarter, or infinity if there is none up to `most`. Where the loop is unstable as it is, the
-/// result is the first boundary below 1, or zero if there is none down to 1e-3. Motions with
-/// |log z| / T below `slowest`, rad/s, do not count, because a self-motion fed by gravity
-/// compensation with a zero-order hold is no vibration. The search takes ten to some tens of
-/// eigenproblems. Throws like sample_loop.
+/// Returns the factor by which the controller's K - P and C - D and what SampledLoop::memory puts
+/// out may grow together before the loop becomes unstable, to six digits. It is the first boundary
+/// above 1, searched in steps of a quarter, or infinity if there is none up to `most`. Where the
+/// loop is unstable as it is, the result is the first boundary below 1, or zero if there is none
+/// down to 1e-3. Motions with |log z| / T below `slowest`, rad/s, do not count, because a
+/// self-motion fed by gravity compensation with a zero-order hold is no vibration. The search takes
+/// ten to some tens of eigenproblems. Throws like sample_loop.
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
                    double most = 1e6, double slowest = 0);

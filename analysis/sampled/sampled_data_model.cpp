@@ -63,6 +63,7 @@ SampledDataModel::SampledDataModel(const System<N>& system, const Spectrum<N>& s
   P = T * T * unit(checked(loop.passive_stiffness, n, "passive_stiffness"));
   G = P + T * T * unit(checked(loop.gravity_gradient, n, "gravity_gradient"));
   zero_modes = mass.matrixU() * MatrixXd(spectrum.zero_modes.basis);
+  remember(loop, mass.matrixU().solve(MatrixXd::Identity(n, n)));
   integrate();
 }
 
@@ -72,7 +73,7 @@ SampledDataModel::SampledDataModel(const ElasticForm<N>& form, const SampledLoop
   set_loop(loop);
   const Index m = form.modes();
   const bool plain = loop.friction.isZero(0) && loop.gravity_gradient.isZero(0) &&
-                     loop.passive_stiffness.isZero(0);
+                     loop.passive_stiffness.isZero(0) && loop.memory.state.size() == 0;
   if (plain && form.free_zero_modes) n = m;
   const auto unit = [&](const MatrixXd& A) -> MatrixXd {
     if (plain) return MatrixXd::Zero(n, n);
@@ -87,7 +88,23 @@ SampledDataModel::SampledDataModel(const ElasticForm<N>& form, const SampledLoop
   P = T * T * unit(loop.passive_stiffness);
   G = P + T * T * unit(loop.gravity_gradient);
   zero_modes = MatrixXd::Identity(n, n).rightCols(n - m);
+  remember(loop, form.coordinates.leftCols(n));
   integrate();
+}
+
+void SampledDataModel::remember(const SampledLoop& loop, const MatrixXd& coordinates) {
+  const auto& [state, position, output] = loop.memory;
+  const Index m = state.rows(), joints = coordinates.rows();
+  require(state.cols() == m && position.rows() == m && output.cols() == m &&
+              (m == 0 || (position.cols() == joints && output.rows() == joints)),
+          "memory has to be m x m, m x n and n x m");
+  require(state.allFinite() && position.allFinite() && output.allFinite(), "memory is not finite");
+  if (m == 0) return;
+  const double T = loop.period;
+  states = {state, position * coordinates, T * T * coordinates.transpose() * output};
+  if ((states.position * zero_modes).norm() > 1e-10 * states.position.norm()) {
+    zero_modes.resize(n, 0);
+  }
 }
 
 void SampledDataModel::integrate() {
@@ -105,13 +122,14 @@ void SampledDataModel::integrate() {
 }
 
 MatrixXd SampledDataModel::transition(double factor) const {
-  const Index rows = 2 * n + memory();
+  const Index rows = 2 * n + memory(), m = states.state.rows();
   const Index v = difference ? 2 * n : n, queue = difference ? 3 * n : 2 * n;
   const Index filter = queue + n * delay;
 
   MatrixXd command = MatrixXd::Zero(n, rows);
   command.leftCols(n) = G - factor * K + (factor - 1) * P;
   command.middleCols(v, n) -= factor * (C - D);
+  command.rightCols(m) = -factor * states.output;
   MatrixXd torque = command;
   if (delay > 0) torque.setZero(), torque.middleCols(queue, n).setIdentity();
   if (filtered()) {
@@ -130,6 +148,8 @@ MatrixXd SampledDataModel::transition(double factor) const {
     A.middleRows(queue + n * (delay - 1), n) = command;
   }
   if (filtered()) A.middleRows(filter, n) = torque;
+  A.bottomLeftCorner(m, n) = states.position;
+  A.bottomRightCorner(m, m) = states.state;
   return A;
 }
 
@@ -145,7 +165,7 @@ MatrixXd SampledDataModel::unit_motions() const {
   while (undamped < r && svd.singularValues()[r - 1 - undamped] <= negligible) ++undamped;
   MatrixXd X = MatrixXd::Zero(2 * n + memory(), r + undamped);
   X.topLeftCorner(n, r) = zero_modes;
-  for (Index at = difference ? 3 * n : 2 * n; at < X.rows(); at += n) {
+  for (Index at = difference ? 3 * n : 2 * n; at + n <= X.rows() - states.state.rows(); at += n) {
     X.block(at, 0, n, r) = G * zero_modes;
   }
   const MatrixXd drifts = zero_modes * svd.matrixV().rightCols(undamped);

@@ -14,7 +14,8 @@ struct SampledDataModel {
   Eigen::MatrixXd C, K, D;  ///< n x n
   Eigen::MatrixXd G;        ///< of the robot without its controller, with P
   Eigen::MatrixXd P;
-  Eigen::MatrixXd zero_modes;  ///< n x r, orthonormal
+  Eigen::MatrixXd zero_modes;  ///< n x r, orthonormal; none where a state w reads one
+  ControllerMemory states;     ///< w, in these coordinates; m = 0: none
   int delay = 0;
   double filter_gain = 1;  ///< 1: no filter
   bool difference = false;
@@ -28,9 +29,11 @@ struct SampledDataModel {
 
   bool filtered() const { return filter_gain < 1; }
   /// Returns the number of rows of the state in addition to y and y'.
-  Eigen::Index memory() const { return n * (delay + (filtered() ? 1 : 0) + (difference ? 1 : 0)); }
-  /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f]), with `factor` times K - P and
-  /// C - D; see sample_loop.
+  Eigen::Index memory() const {
+    return n * (delay + (filtered() ? 1 : 0) + (difference ? 1 : 0)) + states.state.rows();
+  }
+  /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f], [w]), with `factor` times K - P,
+  /// C - D and the output of w; see sample_loop.
   Eigen::MatrixXd transition(double factor = 1) const;
   /// Returns a basis of the states along the zero modes that A does not change or only lets drift:
   /// positions, with the compensated gravity in the memory, and velocities that nothing damps.
@@ -44,6 +47,9 @@ struct SampledDataModel {
  private:
   /// Checks the loop, throws std::invalid_argument, and sets what depends on it alone.
   void set_loop(const SampledLoop& loop);
+  /// Checks SampledLoop::memory, throws std::invalid_argument, and sets `states`, where
+  /// q = coordinates y.
+  void remember(const SampledLoop& loop, const Eigen::MatrixXd& coordinates);
   /// Sets `motion_`.
   void integrate();
 

@@ -3,6 +3,9 @@
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -103,7 +106,8 @@ double find_margin(const SampledDataModel& unit, double most, double slowest) {
 
 /// An eigenvalue (per tick) of a mode after the loop's delays, to first order: the Newton step from
 /// the continuous one to a zero of
-///     lambda^2 + lambda D + G + h(lambda) (K - G + lambda e^(-lambda/2 if differenced) (C - D)),
+///     lambda^2 + lambda D + G + h(lambda) (K - G + lambda e^(-lambda/2 if differenced) (C - D)
+///         + output (e^lambda - state)^-1 position),
 /// h = e^(-lambda (d + 1/2)) times the filter.
 Complex delayed(const SampledDataModel& loop, Complex lambda, const VectorXcd& u,
                 const VectorXcd& y) {
@@ -114,8 +118,15 @@ Complex delayed(const SampledDataModel& loop, Complex lambda, const VectorXcd& u
     return (y.transpose() * A.cast<Complex>() * u).value();
   };
   const Complex product = (y.transpose() * u).value();
+  Complex sprung = form(loop.K - loop.G);
+  const ControllerMemory& states = loop.states;
+  if (const Index m = states.state.rows(); m > 0) {
+    const Eigen::MatrixXcd step = std::exp(lambda) * MatrixXd::Identity(m, m) - states.state;
+    const VectorXcd read = states.position * u;
+    sprung += y.cwiseProduct(states.output * step.partialPivLu().solve(read)).sum();
+  }
   const Complex value = lambda * lambda * product + lambda * form(loop.D) + form(loop.G) +
-                        h * (form(loop.K - loop.G) + v * form(loop.C - loop.D));
+                        h * (sprung + v * form(loop.C - loop.D));
   const Complex step = -value / (2.0 * lambda * product + form(loop.C));
   return modulus(step) < 0.5 * modulus(lambda) ? lambda + step
                                                : lambda;  // not so near a double one
@@ -163,12 +174,26 @@ class Matcher {
   std::vector<bool> free_;
 };
 
-/// What is looked for: the two eigenvalues of a mode, or one of a zero mode, per tick.
+constexpr int kZeroMode = -1, kMemory = -2;
+
+/// What is looked for: the two eigenvalues of a mode, or one of a zero mode or of the controller's
+/// memory, per tick.
 struct Wanted {
   std::array<Complex, 2> lambda;
-  int mode = -1;  // -1: a zero mode
+  int mode = kZeroMode;
   bool done = false;
 };
+
+/// Adds what the controller's memory does while all else is at rest, K y = -output w.
+void list_memory(const SampledDataModel& loop, std::vector<Wanted>& wanted) {
+  const ControllerMemory& states = loop.states;
+  if (states.state.rows() == 0 || loop.n == 0) return;
+  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> springs(
+      loop.K + loop.K.norm() * loop.zero_modes * loop.zero_modes.transpose());
+  const MatrixXd slow = states.state - states.position * springs.solve(states.output);
+  const VectorXcd found = Eigen::EigenSolver<MatrixXd>(slow, false).eigenvalues();
+  for (const Complex z : found) wanted.push_back({{std::log(z), std::log(z)}, kMemory});
+}
 
 bool alternates(Complex z) {
   return z.imag() == 0 && z.real() < 0;
@@ -232,6 +257,7 @@ std::vector<Wanted> list_wanted(const System<N>& system, const Spectrum<N>& spec
   const Index r = loop.zero_modes.cols(), damped = 2 * r - loop.unit_motions().cols();
   rates.resize(std::min(rates.size(), static_cast<std::size_t>(damped)));
   for (const double rate : rates) wanted.push_back({{rate, rate}});
+  list_memory(loop, wanted);
   return wanted;
 }
 
@@ -255,14 +281,24 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
     std::size_t which = 0;
     for (Wanted& one : wanted) {
       for (std::size_t i = 0; i < (one.mode < 0 ? 1 : 2) && !one.done; ++i) {
-        const Matcher::Nearest found = matcher.nearest(one.lambda[i], one.mode < 0);
+        const Matcher::Nearest found = matcher.nearest(one.lambda[i], one.mode == kZeroMode);
         if (found.distance < best.distance) best = found, owner = &one, which = i;
       }
     }
     if (owner == nullptr) break;
     owner->done = true;
     const Complex first = matcher.take(best.index);
-    if (owner->mode < 0) {
+    if (owner->mode == kMemory) {
+      result.memory.push_back(first);
+      if (first.imag() == 0) continue;
+      result.memory.push_back(std::conj(first));  // which another one would have
+      const auto other = std::find_if(wanted.begin(), wanted.end(), [](const Wanted& one) {
+        return one.mode == kMemory && !one.done;
+      });
+      if (other != wanted.end()) other->done = true;
+      continue;
+    }
+    if (owner->mode == kZeroMode) {
       result.zero_modes.push_back(first);
       continue;
     }

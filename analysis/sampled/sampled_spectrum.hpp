@@ -7,6 +7,15 @@
 
 namespace dashpot::analysis {
 
+/// Linear states w (m) of a controller beside its springs and dampers, such as integrals of an
+/// error, which step once a tick:
+///     w_k+1 = state w_k + position q_k,   and  -output w_k  is added to the command.
+struct ControllerMemory {
+  Eigen::MatrixXd state;     ///< m x m
+  Eigen::MatrixXd position;  ///< m x n
+  Eigen::MatrixXd output;    ///< n x m
+};
+
 /// The parts between the springs and dampers of a controller and the joints.
 struct SampledLoop {
   double period = 0.001;             ///< T, of the control loop, s
@@ -21,6 +30,7 @@ struct SampledLoop {
   /// P, n x n, N m/rad: the part of the stiffness K that the world supplies, such as the springs of
   /// a contact. Empty: none.
   Eigen::MatrixXd passive_stiffness = {};
+  ControllerMemory memory = {};  ///< m = 0: none
 };
 
 /// A mode of the loop that is closed once a tick. One with a z that is real and negative
@@ -38,7 +48,10 @@ struct SampledMode {
 struct SampledSpectrum {
   std::vector<SampledMode> modes;   ///< with the indices of the continuous modes they come from
   std::vector<Complex> zero_modes;  ///< z of the velocities along the zero modes that are damped
-  std::vector<Complex> others;      ///< z of the loop's own memory: delay, filter, last position
+  std::vector<Complex> memory;  ///< z of the m states of SampledLoop::memory, nearest to those of
+                                ///< state - position K^-1 output, the motion at rest; one more
+                                ///< where a pair would be torn
+  std::vector<Complex> others;  ///< z of the loop's own memory: delay, filter, last position
   /// Largest |z| except for z = 1 of the zero modes: of their positions, and of the velocities
   /// along them that nothing damps. The loop is stable if it is below 1.
   double spectral_radius = 0;
