@@ -12,9 +12,9 @@ namespace dashpot::controller {
 
 /// Sections of a configuration file. What stands under the last three is for the program that runs
 /// the controller.
-inline constexpr std::array<std::string_view, 12> kConfigSections = {
-    "robot",        "control",  "environment", "gains",    "limits",     "motion",
-    "feed_forward", "watchdog", "analysis",    "commands", "simulation", "scenario"};
+inline constexpr std::array<std::string_view, 13> kConfigSections = {
+    "robot",    "control",  "environment", "gains",    "limits",     "motion",  "feed_forward",
+    "integral", "watchdog", "analysis",    "commands", "simulation", "scenario"};
 
 /// Contents of a configuration file. controller/examples/panda.yaml has all keys with their units
 /// and defaults.

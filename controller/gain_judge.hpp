@@ -5,10 +5,12 @@
 namespace dashpot::controller {
 
 /// Computes, before gains are accepted, whether they leave the sampled loop the margin of
-/// Limits::gain_margin. The loop has a zero-order hold, delay and filters (Analysis::Sampled). The
-/// margin is that of analysis::gain_margin at one posture at rest, in both modes. Motions slower
-/// than 1 rad/s do not count. Gravity compensation with a zero-order hold feeds motions without
-/// springs, which then grow that slowly, so that otherwise all gains would be refused.
+/// Limits::gain_margin. The loop has a zero-order hold, delay and filters (Analysis::Sampled),
+/// and the integral of the springs; what compensates friction at the measured velocity counts as
+/// damping taken away. The margin is that of analysis::gain_margin at one posture at rest, in both
+/// modes. Motions slower than 1 rad/s do not count. Gravity compensation with a zero-order hold
+/// feeds motions without springs, which then grow that slowly, so that otherwise all gains would be
+/// refused.
 ///
 /// Damping that is designed for a ratio grows with the payload told, whether the arm carries it or
 /// not. So in a mode with a ratio the same springs and dampers are judged on the arm without
@@ -51,6 +53,8 @@ class GainJudge {
   /// cannot be analysed.
   double margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,
                 double enough);
+  /// Returns the integral of these springs as states of the loop.
+  analysis::ControllerMemory memory(const JointVector& q, const Gains& gains, Mode mode) const;
   Eigen::MatrixXd gravity_of(const DynamicsKernel& kernel, const JointVector& q) const;
 
   DynamicsKernel kernel_;
@@ -58,6 +62,7 @@ class GainJudge {
   bool loaded_;                ///< there is a payload
   JointVector lower_, upper_;  ///< of the positions, rad
   double wanted_;
+  double integral_time_;  ///< s; 0: none
   bool gravity_;
   analysis::SampledLoop loop_;
   PostureLoop posture_loop_;

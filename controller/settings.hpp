@@ -15,10 +15,33 @@ struct FeedForward {
   /// semidefinite. Without this term the energy changes by -qd' D qd, and the loop is passive at
   /// any speed; see docs/energy.md.
   bool coriolis = true;
-  bool friction = false;     ///< the model's viscous and Coulomb friction, at the velocity of the
-                             ///< reference, so that it adds no feedback
+  bool friction = false;     ///< the model's viscous and Coulomb friction
   bool acceleration = true;  ///< M times the acceleration of the reference
   bool wrench = true;        ///< J' times the wrench of the set-point
+
+  /// At whose velocity friction is compensated.
+  enum class FrictionAt : std::uint8_t {
+    kReference,  ///< the reference's: it adds no feedback
+    kMeasured,   ///< the joints' own: a feedback that takes damping away, see `friction_share`
+  } friction_at = FrictionAt::kReference;
+  /// At the measured velocity v the torque is friction_share (viscous v + coulomb tanh(v /
+  /// friction_rise)). With a share of at most 1 it gives no more power than the friction of the
+  /// model takes, whatever the velocity, and none at rest. Its slope at rest, friction_share
+  /// (viscous + coulomb / friction_rise), is taken from the damping in the modes, where Coulomb
+  /// friction does not count.
+  double friction_share = 0.8;
+  double friction_rise = 0.1;  ///< rad/s (m/s)
+};
+
+/// Integral action: springs that are held away from their reference pull harder and harder. The
+/// joint torques t and the wrench f (at the tip, in B's axes) that it adds grow by
+///     dt/dt = K_q (q_d - q) / time,    df/dt = K_C e / time,
+/// within their bounds. See SpringIntegral for when they stand still, and when they are let go.
+struct Integral {
+  double time = 0;  ///< about the time constant of the slow modes that it makes, s; 0: no integral
+  double force = 10;   ///< |f| of the force, N
+  double moment = 1;   ///< |f| of the moment, N m
+  JointVector torque;  ///< |t_i|, n, N m
 };
 
 /// How the wrench f that the world exerts on the tip, RobotState::external_wrench, moves with the
@@ -163,6 +186,7 @@ struct Analysis {
 struct Settings {
   double period = 0.001;  ///< of the control loop, s
   FeedForward feed_forward;
+  Integral integral;
   TaskTerms task_terms;
   Environment environment;
   /// Whether the joints' viscous friction in the model is subtracted from damping that is designed

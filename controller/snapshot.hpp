@@ -34,7 +34,11 @@ struct Snapshot {
   Vector6 reference_twist = Vector6::Zero();  ///< velocity of reference_tip, m/s and rad/s
   JointVector joint_error;                    ///< reference_position - position, n, rad
   Vector6 tip_error = Vector6::Zero();   ///< from tip to reference: m, and rotation vector, rad
-  Vector6 tip_wrench = Vector6::Zero();  ///< of the Cartesian springs, dampers and feed-forward
+  Vector6 tip_wrench = Vector6::Zero();  ///< of the Cartesian springs, dampers and feed-forward,
+                                         ///< and of their integral
+  /// What the integral of the springs has stored: t (n, N m) and f, see Integral.
+  JointVector integral_torque;
+  Vector6 integral_wrench = Vector6::Zero();
   /// Damping ratios that the damping of the springs in force is designed for; 0: it is given.
   double joint_damping_ratio = 0, task_damping_ratio = 0;
   Payload payload;  ///< in force at this tick, on the way to what Controller::attach was given
@@ -113,7 +117,10 @@ struct SampledVibration {
   double gain_margin = std::numeric_limits<double>::quiet_NaN();
   int count = 0;                                       ///< of modes
   std::array<SampledVibrationMode, kMaxJoints> modes;  ///< by falling continuous frequency
-  std::uint64_t resets = 0;                            ///< of the controller before `tick`
+  /// Eigenvalues that the integral of the springs makes, 1/s, SampledSpectrum::memory
+  int integral_count = 0;
+  std::array<analysis::Complex, kMaxJoints> integrals{};
+  std::uint64_t resets = 0;  ///< of the controller before `tick`
 };
 
 }  // namespace dashpot::controller

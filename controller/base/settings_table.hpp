@@ -19,7 +19,7 @@ struct Setting {
 
 /// Calls visit(setting, member) for every setting but the gains and the walls. `Struct` is
 /// Settings or const Settings. Members are double, int, bool, JointVector (n entries), Vector6 (of
-/// the tip), Mode, Load and Analysis::Where.
+/// the tip), Mode, Load, Analysis::Where and FeedForward::FrictionAt.
 template <class Struct, class Visitor>
 void for_each_setting(Struct& settings, Visitor&& visit) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -74,8 +74,17 @@ void for_each_setting(Struct& settings, Visitor&& visit) {
   visit(Setting{"feed_forward.gravity"}, feed_forward.gravity);
   visit(Setting{"feed_forward.coriolis"}, feed_forward.coriolis);
   visit(Setting{"feed_forward.friction"}, feed_forward.friction);
+  visit(Setting{"feed_forward.friction_at"}, feed_forward.friction_at);
+  visit(Setting{"feed_forward.friction_share", "", "", {0, true, 1}}, feed_forward.friction_share);
+  visit(Setting{"feed_forward.friction_rise", "rad/s", "", kPositive}, feed_forward.friction_rise);
   visit(Setting{"feed_forward.acceleration"}, feed_forward.acceleration);
   visit(Setting{"feed_forward.wrench"}, feed_forward.wrench);
+
+  auto& integral = settings.integral;
+  visit(Setting{"integral.time", "s", "", kNotNegative}, integral.time);
+  visit(Setting{"integral.force", "N", "", kNotNegative}, integral.force);
+  visit(Setting{"integral.moment", "N m", "", kNotNegative}, integral.moment);
+  visit(Setting{"integral.torque", "N m", "N", kNotNegative}, integral.torque);
 
   auto& watchdog = settings.watchdog;
   visit(Setting{"watchdog.setpoint_hold", "s", "", kNotNegative}, watchdog.setpoint_hold);

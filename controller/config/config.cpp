@@ -83,6 +83,13 @@ class SettingsReader {
     read_choice(keys, key, kPlaces, value);
   }
   static void read(const YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
+                   FeedForward::FrictionAt& value) {
+    static constexpr std::array<std::pair<std::string_view, FeedForward::FrictionAt>, 2> kAt = {
+        {{"reference", FeedForward::FrictionAt::kReference},
+         {"measured", FeedForward::FrictionAt::kMeasured}}};
+    read_choice(keys, key, kAt, value);
+  }
+  static void read(const YamlMapping& keys, std::string_view key, const Setting& /*setting*/,
                    Load& value) {
     static constexpr std::array<std::pair<std::string_view, Load>, 4> kLoads = {
         {{"ignored", Load::kIgnored},

@@ -33,14 +33,15 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
       gains_(gain_ticks(settings), Impedance(n_)),
       attachment_(gain_ticks(settings), model.attachment()),
       wrench_(gain_ticks(settings), Vector6::Zero()),
-      designed_(settings.subtract_friction ? model.joint_values(&Joint::viscous_friction)
+      designed_(settings.subtract_friction ? JointVector(friction_left(model, settings).cwiseMax(0))
                                            : JointVector(JointVector::Zero(n_))),
-      law_(model, settings.feed_forward),
+      law_(model, settings.feed_forward, SpringIntegral(settings.integral, settings.period)),
       filter_(settings, least_joint_inertia(unloaded(model), settings.limits.position_lower,
                                             settings.limits.position_upper)),
       clamp_{settings.limits.linear_error, settings.limits.angular_error},
       damping_(filter_.borne(settings.limits.damping)),
       viscous_friction_(model.joint_values(&Joint::viscous_friction)),
+      friction_left_(friction_left(model, settings)),
       turn_(JointVector::Zero(n_)),
       q_(turn_),
       qd_(turn_),
@@ -77,7 +78,8 @@ void ControllerCore::reset(const JointVector& torque) noexcept {
   snapshot_ = Snapshot();
   for (JointVector* vector :
        {&snapshot_.position, &snapshot_.velocity, &snapshot_.torque, &snapshot_.law_torque,
-        &snapshot_.reference_position, &snapshot_.reference_velocity, &snapshot_.joint_error}) {
+        &snapshot_.reference_position, &snapshot_.reference_velocity, &snapshot_.joint_error,
+        &snapshot_.integral_torque}) {
     vector->setZero(n_);
   }
   external_wrench_.setZero();
@@ -93,6 +95,7 @@ void ControllerCore::release() noexcept {
   rest_ = 0;
   state_check_.trust_velocities();
   springs_ = Springs::kOff;
+  law_.integral().reset();
   accepted_.wrench = settings_.initial.wrench;
   accepted_.joint_position = settings_.initial.joint_position;
   from_user_ = false;  // springs start where the robot is, with the gains in force
@@ -136,8 +139,12 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
     impedance_torque(status == Status::kSetpointStale, torque);
   }
   const bool springs = springs_ != Springs::kOff, returns = fault_ == Status::kPositionLimit;
-  status = worse(status, filter_.apply({q_, qd_, motion_watch_.tip_speed(), springs, returns},
-                                       weight_, torque));
+  const Status limits =
+      filter_.apply({q_, qd_, motion_watch_.tip_speed(), springs, returns}, weight_, torque);
+  if (springs_ == Springs::kInForce && law_.integral().on()) {
+    integrate(limits, status == Status::kSetpointStale);
+  }
+  status = worse(status, limits);
   motion_watch_.applied(torque, weight_);
   if (status == Status::kNotFinite) {
     if (++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap) latch(status);
@@ -179,6 +186,7 @@ bool ControllerCore::rested(double dt) noexcept {
 }
 
 void ControllerCore::damping_torque(JointVector& tau) noexcept {
+  law_.integral().reset();
   if (springs_ != Springs::kOff || ramp_ticks_ > 0) filter_.begin_anew();
   springs_ = Springs::kOff;
   tau = weight_;
@@ -252,96 +260,9 @@ void ControllerCore::fill_snapshot() noexcept {
   snapshot_.payload = attachment_.now().payload();
   snapshot_.tool = attachment_.now().tool;
   snapshot_.tip_wrench = springs ? law_.tip_wrench() : Vector6(Vector6::Zero());
-}
-
-void ControllerCore::analyse() noexcept {
-  const TaskTerms& terms = settings_.task_terms;
-  const bool with_wrench = terms.load != Load::kIgnored && !external_wrench_.isZero(0);
-  const bool with_velocity = terms.jacobian_rate && !qd_.isZero(0);
-  if (loop_unchanged(with_wrench, with_velocity)) {
-    vibration_.repeat(time_, snapshot_.tick);
-    return;
-  }
-  if (terms.load != Load::kIgnored && !with_wrench) ++vibration_.counters().no_wrench;
-  if (terms.jacobian_rate && !with_velocity) ++vibration_.counters().at_rest;
-  VibrationTask& task = vibration_.task();
-  task.time = time_;
-  task.tick = snapshot_.tick;
-  task.position = snapshot_.position;
-  if (with_wrench || with_velocity) {
-    closed_loop(task.system);
-    task.springs = true;
-  } else {
-    loop_.form(robot_, impedance(), law_.null_space(), viscous_friction_, task.system);
-    task.springs = task.system.stiffness_factor.rows() > 0;
-  }
-  vibration_.update();
-}
-
-bool ControllerCore::loop_unchanged(bool with_wrench, bool with_velocity) noexcept {
-  Analysed now{springs_ != Springs::kOff,
-               false,
-               gains_.changes() + attachment_.changes(),
-               q_,
-               {},
-               Vector6::Zero()};
-  if (with_velocity) now.qd = qd_;
-  if (with_wrench) now.wrench = external_wrench_ + wrench_.now();
-  bool same = false, settled = false;
-  if (analysed_) {
-    now.gains_moved = analysed_->gain_changes != now.gain_changes;
-    settled = analysed_->gains_moved && !now.gains_moved;
-    same = !now.gains_moved && analysed_->springs == now.springs && analysed_->q == now.q &&
-           analysed_->qd.size() == now.qd.size() && analysed_->qd == now.qd &&
-           analysed_->wrench == now.wrench;
-  }
-  analysed_ = now;
-  if (settled) vibration_.restart();
-  return same && !settled;
-}
-
-void ControllerCore::hand_over() noexcept {
-  SampledAnalysis::Task& task = sampled_->task();
-  task.time = time_;
-  task.tick = snapshot_.tick;
-  task.position = snapshot_.position;
-  task.attachment = attachment_.now();
-  closed_loop(task.system);
-  JointMatrix load = JointMatrix::Zero(n_, n_);
-  if (settings_.task_terms.load != Load::kIgnored) {
-    load = stiffness_of_load(robot_.J, settings_.task_terms.load, external_wrench_);
-  }
-  task.passive = passive_part(robot_.J, settings_.environment, load);
-  sampled_->hand_over();
-}
-
-const Impedance& ControllerCore::impedance() noexcept {
-  const bool springs = springs_ != Springs::kOff, repels = filter_.repels(q_);
-  if (springs && !repels && !outside_) return designed_.now(gains_.now());
-  combined_ = springs ? designed_.now(gains_.now()) : Impedance(n_);
-  if (!springs && !motion_watch_.sees_frozen()) combined_.joint_damping.diagonal() = damping_;
-  if (repels) {
-    filter_.add_repulsion(q_, springs, combined_.joint_stiffness, combined_.joint_damping);
-    combined_.joint_weight = 1;  // there are joint springs
-  }
-  if (outside_) add_environment(settings_.environment, combined_);
-  return combined_;
-}
-
-void ControllerCore::closed_loop(analysis::System<kMaxJoints>& system) noexcept {
-  const TaskTerms& terms = settings_.task_terms;
-  JointMatrix load;
-  StiffnessTerms more{terms.jacobian_rate};
-  if (terms.load != Load::kIgnored && !external_wrench_.isZero(0)) {
-    const bool springs = springs_ != Springs::kOff;
-    const bool pushes = springs && settings_.feed_forward.wrench;
-    const TipWrenches wrenches{external_wrench_, pushes ? wrench_.now() : Vector6::Zero().eval()};
-    load =
-        stiffness_under_load(robot_, springs ? gains_.now() : Impedance(n_), terms.load, wrenches);
-    more.load = &load;
-  }
-  controller::closed_loop(robot_, qd_, impedance(), law_.null_space(), viscous_friction_, more,
-                          system);
+  if (!law_.integral().on()) return;
+  snapshot_.integral_torque = law_.integral().torque();
+  snapshot_.integral_wrench = law_.integral().wrench();
 }
 
 }  // namespace dashpot::controller

@@ -29,6 +29,8 @@ class ControllerCore {
   void closed_loop(analysis::System<kMaxJoints>& system) noexcept;
   void attach(const Attachment& attachment) noexcept;
   void limit_tip_speed(const TipSpeed& speed) noexcept;
+  /// Returns K_I of `integral_stiffness` for the springs in force; empty if there is no integral.
+  JointMatrix integral_stiffness() const noexcept;
 
   const Snapshot& snapshot() const noexcept { return snapshot_; }
   const Vibration& vibration() const noexcept { return vibration_.result(); }
@@ -81,6 +83,8 @@ class ControllerCore {
   Pose tip_goal() const noexcept;
   /// Moves gains and references on by one period, and sets the law's torque.
   void impedance_torque(bool hold, JointVector& tau) noexcept;
+  /// The integral's step after a torque whose limits reported `limits`.
+  void integrate(Status limits, bool hold) noexcept;
 
   /// Latches and releases faults. Returns kOk if the state allows springs, or kFaultLatched or
   /// worse.
@@ -102,6 +106,11 @@ class ControllerCore {
   void hand_over() noexcept;
   /// Whether the closed loop is that of the last analysis, exactly.
   bool loop_unchanged(bool with_wrench, bool with_velocity) noexcept;
+  /// Returns what the joints damp by themselves: their viscous friction, less, with springs in
+  /// force, the slope of what compensates friction at the measured velocity.
+  const JointVector& joint_friction() const noexcept {
+    return springs_ == Springs::kOff ? viscous_friction_ : friction_left_;
+  }
   /// Returns springs and dampers in force, the repulsion of position limits included; valid until
   /// the next call.
   const Impedance& impedance() noexcept;
@@ -119,6 +128,7 @@ class ControllerCore {
   GainBlend gains_;
   Ramp<Attachment> attachment_;
   Ramp<Vector6> wrench_;
+  std::uint64_t integrated_ = 0;  ///< changes of gains and attachment that the integral knows of
   DesignedDamping designed_;
   ImpedanceLaw law_;
   SafetyFilter filter_;
@@ -127,6 +137,7 @@ class ControllerCore {
   ErrorClamp clamp_;
   JointVector damping_;           ///< of the safe output "damp", N m s/rad
   JointVector viscous_friction_;  ///< of the robot, N m s/rad
+  JointVector friction_left_;     ///< by what compensates it, at small velocities; may be negative
   JointVector turn_;              ///< 2 pi for a continuous joint, else 0
 
   // The last good state, and the robot there

@@ -119,6 +119,7 @@ void ControllerCore::restart_springs() noexcept {
   gains_.start(none);
   gains_.set_target(target);
   wrench_.start(Vector6::Zero());
+  law_.integral().reset();
   if (!from_user_) {
     accepted_.joint_position = q_;
     accepted_.tip_pose =
@@ -204,6 +205,18 @@ void ControllerCore::impedance_torque(bool hold, JointVector& tau) noexcept {
     }
   }
   law_.torque(robot_, q_, qd_, impedance, references_, wrench_.now(), clamp_, tau);
+}
+
+void ControllerCore::integrate(Status limits, bool hold) noexcept {
+  using Change = SpringIntegral::Change;
+  const std::uint64_t changes = gains_.changes() + attachment_.changes();
+  if (changes != integrated_) {
+    integrated_ = changes;
+    law_.integral().fade(std::max(gains_.steps_left(), attachment_.steps_left()));
+    return;
+  }
+  const Change free = limits == Status::kOk ? Change::kFree : Change::kShrink;
+  law_.integrate(hold ? Change::kNone : free);
 }
 
 }  // namespace dashpot::controller

@@ -42,6 +42,7 @@ GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
       lower_(settings.limits.position_lower),
       upper_(settings.limits.position_upper),
       wanted_(settings.limits.gain_margin),
+      integral_time_(settings.integral.time),
       gravity_(settings.feed_forward.gravity),
       loop_(sampled_loop(model, settings)),
       posture_loop_(model, judging(settings)) {}
@@ -52,6 +53,7 @@ GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
     analysis::System<kMaxJoints> system;
     const bool known = posture_loop_.closed_loop(q, gains, mode, system) == Status::kOk;
+    loop_.memory = memory(q, gains, mode);
     const double found = known ? margin(system, gravity, wanted_) : 0;
     if (found < worst.margin) worst = {found, mode};
     if (!known || !loaded_ || !counts_payload(gains, mode)) continue;
@@ -86,6 +88,19 @@ GainJudge::Verdict GainJudge::judge_anywhere(const Gains& gains) {
 
 Eigen::MatrixXd GainJudge::gravity_of(const DynamicsKernel& kernel, const JointVector& q) const {
   return gravity_ ? gravity_gradient(kernel, q) : Eigen::MatrixXd();
+}
+
+analysis::ControllerMemory GainJudge::memory(const JointVector& q, const Gains& gains,
+                                             Mode mode) const {
+  if (integral_time_ == 0) return {};
+  Setpoint setpoint;
+  setpoint.mode = mode;
+  setpoint.gains = gains;
+  const int n = static_cast<int>(q.size());
+  DynamicsResult robot;
+  kernel_.evaluate(q, JointVector::Zero(n), robot);
+  return integral_memory(integral_stiffness(robot, Impedance(setpoint, n), integral_time_),
+                         loop_.period);
 }
 
 double GainJudge::margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,

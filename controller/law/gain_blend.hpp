@@ -37,6 +37,9 @@ class Ramp {
     now_ = s_ == 1 ? to_ : blend(from_, to_, s_);
   }
 
+  /// Returns how many steps are left, 0 where the target is reached.
+  double steps_left() const noexcept { return (1 - s_) / step_; }
+
   bool still() const noexcept { return s_ == 1; }
   const Value& now() const noexcept { return now_; }
   const Value& target() const noexcept { return to_; }

@@ -16,10 +16,21 @@ Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R, const Vector6
 
 }  // namespace
 
-ImpedanceLaw::ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward)
+ImpedanceLaw::ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward,
+                           const SpringIntegral& integral)
     : feed_forward_(feed_forward),
+      friction_of_reference_(feed_forward.friction &&
+                             feed_forward.friction_at == FeedForward::FrictionAt::kReference),
+      friction_of_robot_(feed_forward.friction && !friction_of_reference_),
+      friction_rise_(friction_of_robot_ ? feed_forward.friction_rise : 0.01),
       viscous_friction_(model.joint_values(&Joint::viscous_friction)),
-      coulomb_friction_(model.joint_values(&Joint::coulomb_friction)) {}
+      coulomb_friction_(model.joint_values(&Joint::coulomb_friction)),
+      integral_(integral),
+      joint_pull_(JointVector::Zero(model.dof())) {
+  if (!friction_of_robot_) return;
+  viscous_friction_ *= feed_forward.friction_share;
+  coulomb_friction_ *= feed_forward.friction_share;
+}
 
 void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, const JointVector& qd,
                           const Impedance& impedance, const SpringReferences& references,
@@ -29,19 +40,26 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
   JointVector reference_velocity = tau;  // qd_f
   e_.setZero();
   F_.setZero();
+  if (integral_.on()) {
+    clamped_ = false;
+    tip_pull_.setZero();
+  }
   if (impedance.joint_weight > 0) {
     const JointReference& path = references.joint;
     add_product(impedance.joint_stiffness, difference(path.position(), q), tau);
+    if (integral_.on()) joint_pull_ = tau;
     add_product(impedance.joint_damping, difference(path.velocity(), qd), tau);
     if (feed_forward_.acceleration) {
       add_product(robot.M, path.acceleration(), tau, impedance.joint_weight);
     }
     add(path.velocity(), reference_velocity, impedance.joint_weight);
+  } else if (integral_.on()) {
+    joint_pull_.setZero();
   }
   if (impedance.task_weight > 0) {
     const bool null_space = impedance.null_space();
     const bool moves = (references.tip.point_velocity().array() != 0).any();
-    if (null_space || moves || feed_forward_.acceleration || feed_forward_.friction) {
+    if (null_space || moves || feed_forward_.acceleration || friction_of_reference_) {
       null_space_.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
     }
     F_ = task_wrench(robot, qd, impedance, references.tip, clamp);
@@ -57,14 +75,18 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
         add(null_space_.damper(D, dqd), tau);
       }
     }
-    if (feed_forward_.friction) {
+    if (friction_of_reference_) {
       add(null_space_.joint_velocity(references.tip.velocity()), reference_velocity,
           impedance.task_weight);
     }
   }
   if (feed_forward_.wrench) F_ += wrench;
+  if (integral_.on()) {
+    F_ += integral_.wrench();
+    add(integral_.torque(), tau);
+  }
   add_torque(robot.J, F_, tau);
-  if (feed_forward_.friction) add_friction(reference_velocity, tau);
+  if (feed_forward_.friction) add_friction(friction_of_robot_ ? qd : reference_velocity, tau);
   if (feed_forward_.coriolis) add(robot.coriolis, tau);
   if (feed_forward_.gravity) add(robot.gravity, tau);
 }
@@ -75,14 +97,21 @@ Vector6 ImpedanceLaw::task_wrench(const DynamicsResult& robot, const JointVector
   e_.head<3>() = path.position() - robot.p_BT_B;
   e_.tail<3>() = orientation_.update(path.rotation(), Eigen::Quaterniond(robot.R_BT));
   const Vector6 clamped = clamp.clamped(e_, impedance.base, impedance.tool, robot.R_BT);
+  if (integral_.on()) {  // the reference keeps e at the edge of the clamp
+    const Vector6 further = 1.02 * e_;
+    clamped_ = clamp.clamped(further, impedance.base, impedance.tool, robot.R_BT) != further;
+  }
   const Vector6 velocity_error = path.velocity() - twist(robot.J, qd);
   Vector6 F = Vector6::Zero();
   if (!impedance.base.none()) {
-    F += impedance.base.stiffness * clamped + impedance.base.damping * velocity_error;
+    const Vector6 pull = impedance.base.stiffness * clamped;
+    if (integral_.on()) tip_pull_ = pull;
+    F += pull + impedance.base.damping * velocity_error;
   }
   if (!impedance.tool.none()) {
-    F += in_tool_axes(impedance.tool.stiffness, robot.R_BT, clamped) +
-         in_tool_axes(impedance.tool.damping, robot.R_BT, velocity_error);
+    const Vector6 pull = in_tool_axes(impedance.tool.stiffness, robot.R_BT, clamped);
+    if (integral_.on()) tip_pull_ += pull;
+    F += pull + in_tool_axes(impedance.tool.damping, robot.R_BT, velocity_error);
   }
   if (feed_forward_.acceleration) {
     F += impedance.task_weight * null_space_.inertia().wrench(path.acceleration());
@@ -96,11 +125,15 @@ void ImpedanceLaw::subtract_posture_share(JointVector& dq) const noexcept {
   add(share, dq, -1 / std::sqrt(1 + product(share, share) / (kMost * kMost)));
 }
 
+void ImpedanceLaw::integrate(SpringIntegral::Change change) noexcept {
+  if (clamped_ && change == SpringIntegral::Change::kFree) change = SpringIntegral::Change::kShrink;
+  integral_.step(joint_pull_, tip_pull_, change);
+}
+
 void ImpedanceLaw::add_friction(const JointVector& velocity, JointVector& tau) const noexcept {
-  constexpr double kRise = 0.01;  // rad/s; over this Coulomb friction changes sign smoothly
   for (Eigen::Index i = 0; i < tau.size(); ++i) {
-    tau[i] +=
-        viscous_friction_[i] * velocity[i] + coulomb_friction_[i] * std::tanh(velocity[i] / kRise);
+    tau[i] += viscous_friction_[i] * velocity[i] +
+              coulomb_friction_[i] * std::tanh(velocity[i] / friction_rise_);
   }
 }
 

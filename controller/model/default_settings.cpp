@@ -50,6 +50,7 @@ Settings default_settings(const RobotModel& model) {
     const double center = 0.5 * (joint.lower + joint.upper);
     middle[i] = std::isfinite(center) ? center : 0;
   }
+  settings.integral.torque = limits.torque / 10;
   settings.motion.velocity = 0.25 * limits.velocity;
   settings.motion.acceleration = limits.velocity;
 

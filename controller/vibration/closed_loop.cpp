@@ -144,6 +144,29 @@ PassivePart passive_part(const Jacobian& J, const Environment& environment,
   return part;
 }
 
+JointVector friction_left(const RobotModel& model, const Settings& settings) {
+  const FeedForward& given = settings.feed_forward;
+  JointVector left = model.joint_values(&Joint::viscous_friction);
+  if (!given.friction || given.friction_at != FeedForward::FrictionAt::kMeasured) return left;
+  const JointVector coulomb = model.joint_values(&Joint::coulomb_friction);
+  for (Index i = 0; i < left.size(); ++i) {
+    left[i] -= given.friction_share * (left[i] + coulomb[i] / given.friction_rise);
+  }
+  return left;
+}
+
+JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& impedance,
+                               double time) noexcept {
+  const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
+  JointMatrix K = impedance.joint_stiffness;
+  add_congruence(robot.J, K_C, robot.J, K);
+  const Index n = K.rows();
+  for (Index j = 0; j < n; ++j) {
+    for (Index i = 0; i <= j; ++i) K(i, j) = K(j, i) = 0.5 * (K(i, j) + K(j, i)) / time;
+  }
+  return K;
+}
+
 void null_projector(const NullSpace& null_space, JointMatrix& P) noexcept {
   for (Index j = 0; j < P.cols(); ++j) {
     const JointVector column = null_space.projected_velocity(JointVector::Unit(P.rows(), j));

@@ -53,6 +53,16 @@ struct PassivePart {
 PassivePart passive_part(const Jacobian& J, const Environment& environment,
                          const JointMatrix& load_stiffness) noexcept;
 
+/// Returns viscous friction less the slope at rest of what compensates friction at the measured
+/// velocity, n, N m s/rad: what the joints damp small motions with where Coulomb friction is left
+/// out. See FeedForward::friction_share.
+JointVector friction_left(const RobotModel& model, const Settings& settings);
+
+/// Returns K_I (n x n, N m/(rad s)): the torque of the integral of these springs grows by -K_I q,
+/// K_I = (K_q + J' K_C J) / time.
+JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& impedance,
+                               double time) noexcept;
+
 /// Terms of the stiffness that most analyses leave out.
 struct StiffnessTerms {
   bool jacobian_rate = false;         ///< J' C_C Jdot

@@ -4,6 +4,7 @@
 
 #include <pthread.h>
 #include <sched.h>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -40,6 +41,18 @@ Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector
     gradient.col(i) = (after.gravity - before.gravity) / (2 * kStep);
   }
   return gradient;
+}
+
+analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period) {
+  constexpr double kNothing = 1e-12;  // of the largest eigenvalue
+  const Eigen::Index n = K_I.rows();
+  if (n == 0 || K_I.isZero(0)) return {};
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(K_I);
+  const Eigen::VectorXd& values = eigen.eigenvalues();
+  const Eigen::Index rank = (values.array() > kNothing * values[n - 1]).count();
+  const Eigen::MatrixXd F =
+      eigen.eigenvectors().rightCols(rank) * values.tail(rank).cwiseSqrt().asDiagonal();
+  return {Eigen::MatrixXd::Identity(rank, rank), period * F.transpose(), F};
 }
 
 SampledAnalysis::SampledAnalysis(const RobotModel& model, const Settings& settings)
@@ -115,11 +128,17 @@ void SampledAnalysis::solve(const Task& task, SampledVibration& result) {
   analysis::SampledLoop loop = loop_;
   loop.friction += task.passive.damping;
   loop.passive_stiffness = task.passive.stiffness;
+  loop.memory = integral_memory(task.integral, loop.period);
   kernel_.attach(task.attachment);
   if (gravity_) loop.gravity_gradient = gravity_gradient(kernel_, task.position);
   const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, loop);
   result.spectral_radius = sampled.spectral_radius;
   result.gain_margin = analysis::gain_margin(system, continuous, loop, 1e6, kSlowestVibration);
+  const std::size_t slow = std::min(sampled.memory.size(), result.integrals.size());
+  for (std::size_t i = 0; i < slow; ++i) {
+    result.integrals[i] = std::log(sampled.memory[i]) / loop.period;
+  }
+  result.integral_count = static_cast<int>(slow);
   result.count = static_cast<int>(sampled.modes.size());
   for (std::size_t i = 0; i < sampled.modes.size(); ++i) {
     const analysis::SampledMode& from = sampled.modes[i];

@@ -22,6 +22,12 @@ inline constexpr double kSlowestVibration = 1;
 /// Returns the sampled loop that the settings describe, without gravity.
 analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& settings);
 
+/// Returns the integral of springs with this K_I (n x n, N m/(rad s), symmetric positive
+/// semidefinite; see integral_stiffness) as states of the loop, as many as its rank: with K_I = F
+/// F',
+///     w_k+1 = w_k + T F' q_k,   and the torque -F w_k.
+analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period);
+
 /// Finds, at intervals and on a thread of its own, the modes of the loop with its torque held over
 /// a period (zero-order hold), delayed and filtered, by analysis::sample_loop and
 /// analysis::gain_margin. The thread is needed because this takes milliseconds and allocates.
@@ -37,7 +43,8 @@ class SampledAnalysis {
     std::uint64_t resets = 0;  ///< filled in by `hand_over`
     JointVector position;
     analysis::System<kMaxJoints> system;
-    PassivePart passive;  ///< of what the world adds
+    PassivePart passive;   ///< of what the world adds
+    JointMatrix integral;  ///< K_I of integral_stiffness; empty: none
     Attachment attachment;
   };
 

@@ -67,6 +67,34 @@ TEST_F(Judge, NamesTheModeThatBearsLess) {
   EXPECT_EQ(judge().mode, Mode::kJoint);
 }
 
+/// I s^3 + c s^2 + k s + k / time is stable for time > I / c, and so is the sampled loop nearly.
+TEST_F(Judge, CountsTheIntegral) {
+  gains.joint_damping(0, 0) = 2 * kInertia;  // I / c = 0.5 s
+  gains.joint_stiffness(0, 0) = 100 * kInertia;
+  for (const double time : {0.45, 0.55}) {
+    settings.integral.time = time;
+    EXPECT_EQ(judge().margin < 1, time < 0.5) << time;
+  }
+}
+
+/// Friction that is compensated at the measured velocity takes damping away.
+TEST_F(Judge, CountsTheCompensationOfFriction) {
+  ModelOptions options;
+  options.gravity.setZero();
+  options.viscous_friction = JointVector::Zero(1);
+  options.coulomb_friction = JointVector::Constant(1, 0.5);
+  const RobotModel rough = testing::chain_of({"continuous"}, options);
+  settings.feed_forward.friction = true;
+  settings.feed_forward.friction_at = FeedForward::FrictionAt::kMeasured;
+  gains.joint_stiffness(0, 0) = 100 * kInertia;
+  for (const double damping : {3.8, 4.2}) {  // 0.8 * 0.5 / 0.1 = 4
+    gains.joint_damping(0, 0) = gains.task_damping(5, 5) = damping;
+    const double margin =
+        GainJudge(rough, settings).judge(JointVector::Constant(1, 0.4), gains).margin;
+    EXPECT_EQ(margin < 1, damping < 4) << damping;
+  }
+}
+
 /// Walls, position limits and what the modes hold besides are no matter of gains.
 TEST_F(Judge, KnowsNoLimits) {
   const double borne = 2 * kInertia / settings.period;

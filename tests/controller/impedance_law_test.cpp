@@ -117,6 +117,27 @@ void expect_joint_law(Random& random, int n) {
   EXPECT_TRUE(near(one.torque(impedance, kAll, f), all, size));
 }
 
+/// At the measured velocity friction is compensated in part, and gives less power than it takes.
+TEST(FrictionCompensation, IsThatOfTheMeasuredVelocity) {
+  Random random(24);
+  Case one(rough_chain(random, 7), random);
+  FeedForward parts = kNone;
+  parts.friction = true;
+  parts.friction_at = FeedForward::FrictionAt::kMeasured;
+  parts.friction_share = 0.7;
+  parts.friction_rise = 0.02;
+  for (const double size : {1e-9, 1e-3, 1.0}) {
+    one.qd = size * random.vector(7);
+    const JointVector tau = one.torque(Impedance(7), parts, Vector6::Zero());
+    for (int i = 0; i < 7; ++i) {
+      const Joint& joint = one.model.joints()[static_cast<std::size_t>(i)];
+      const double b = joint.viscous_friction, c = joint.coulomb_friction, v = one.qd[i];
+      EXPECT_NEAR(tau[i], 0.7 * (b * v + c * std::tanh(v / 0.02)), 1e-14);
+      EXPECT_LE(tau[i] * v, 0.7 * (b * v * v + c * std::abs(v)) * (1 + 1e-15));
+    }
+  }
+}
+
 TEST(JointImpedance, IsItsEquation) {
   Random random(321);
   for (int k = 0; k < 20; ++k) {

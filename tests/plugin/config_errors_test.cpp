@@ -36,7 +36,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadConfig{
             "UnknownGroup",
             "gain: unknown key; the keys are robot, control, environment, gains, limits, motion, "
-            "feed_forward, watchdog, analysis, commands, simulation, scenario (line 2)",
+            "feed_forward, integral, watchdog, analysis, commands, simulation, scenario (line 2)",
             "gain: {}\n"},
         BadConfig{"UnknownKey",
                   "gains.joint.stifness: unknown key; the keys are stiffness, damping, "

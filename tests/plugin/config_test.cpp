@@ -251,7 +251,8 @@ TEST(Config, FillsTheRest) {
            "  walls: [{point: [0, 0, 10 cm], normal: [0, 0, 2]}]}\n"
            "gains: {null_space: {stiffness: 4, damping: [1, 2, 3, 4, 5, 6, 7]}}\n"
            "feed_forward: {gravity: false, coriolis: false, friction: true, acceleration: false,\n"
-           "  wrench: false}\n"
+           "  wrench: false, friction_at: measured, friction_share: 0.5, friction_rise: 3 deg/s}\n"
+           "integral: {time: 800 ms, force: 5, moment: 0.5 N m, torque: [1, 2, 3, 4, 5, 6, 7]}\n"
            "watchdog: {setpoint_hold: 100 ms, setpoint_damp: 0, longest_gap: 5 ms, feedback: 1,\n"
            "  release_after: 3}\n"
            "analysis: {where: 'off', every: 7, share: 0.3, soft_frequency: 0.2 rad/s,\n"
@@ -289,6 +290,13 @@ TEST(Config, FillsTheRest) {
   EXPECT_FALSE(all.feed_forward.gravity || all.feed_forward.coriolis ||
                all.feed_forward.acceleration || all.feed_forward.wrench);
   EXPECT_TRUE(all.feed_forward.friction);
+  EXPECT_EQ(all.feed_forward.friction_at, controller::FeedForward::FrictionAt::kMeasured);
+  EXPECT_EQ(all.feed_forward.friction_share, 0.5);
+  EXPECT_DOUBLE_EQ(all.feed_forward.friction_rise, 3 * kDegree);
+  EXPECT_DOUBLE_EQ(all.integral.time, 0.8);
+  EXPECT_EQ(all.integral.force, 5);
+  EXPECT_EQ(all.integral.moment, 0.5);
+  EXPECT_EQ(all.integral.torque, VectorXd::LinSpaced(7, 1, 7));
   EXPECT_DOUBLE_EQ(all.watchdog.setpoint_hold, 0.1);
   EXPECT_EQ(all.watchdog.setpoint_damp, 0);
   EXPECT_EQ(all.watchdog.longest_gap, 0.005);
@@ -425,7 +433,8 @@ TEST(ConfigExample, ShowsEveryKey) {
         panda() + "gains: {joint: {no: 1}}\n", panda() + "gains: {task: {no: 1}}\n",
         panda() + "gains: {null_space: {no: 1}}\n", panda() + "limits: {no: 1}\n",
         panda() + "motion: {no: 1}\n", panda() + "feed_forward: {no: 1}\n",
-        panda() + "watchdog: {no: 1}\n", panda() + "analysis: {no: 1}\n"}) {
+        panda() + "integral: {no: 1}\n", panda() + "watchdog: {no: 1}\n",
+        panda() + "analysis: {no: 1}\n"}) {
     const std::string said = complaint(text);
     const std::size_t list = said.find("the keys are ");
     ASSERT_NE(list, std::string::npos) << said;
