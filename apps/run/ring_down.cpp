@@ -121,6 +121,10 @@ void add_sampled(const Scene& scene, RingDown& ring_down) {
   const SampledModes modes = sampled_modes(scene);
   ring_down.gain_margin = modes.gain_margin;
   ring_down.growth = std::max(0.0, std::log(modes.sampled.spectral_radius) / scene.plant.period);
+  for (const analysis::Complex z : modes.sampled.memory) {
+    ring_down.integral_decays.push_back(-std::log(std::abs(z)) / scene.plant.period);
+  }
+  std::sort(ring_down.integral_decays.begin(), ring_down.integral_decays.end());
   for (RingDownMode& row : ring_down.modes) {
     for (int i = 0; i < modes.continuous.modes.size(); ++i) {
       const analysis::Mode<>& from = modes.continuous.modes[i];

@@ -101,6 +101,14 @@ std::string ring_down_table(const RingDown& ring_down) {
   return table.text();
 }
 
+std::string integral_text(const RingDown& ring_down) {
+  const std::vector<double>& decays = ring_down.integral_decays;
+  if (decays.empty()) return "";
+  return "  The integral of the springs makes " +
+         count(static_cast<std::int64_t>(decays.size()), "slow mode") + ", which decay at " +
+         format_number(decays.front(), 3) + " to " + format_number(decays.back(), 3) + " 1/s.\n";
+}
+
 std::string stability_text(const RingDown& ring_down) {
   if (ring_down.growth > 0) {
     return "  In this loop a motion grows e-fold every " + format_number(1 / ring_down.growth, 3) +
@@ -274,6 +282,7 @@ Json ring_down_json(const RingDown& ring_down) {
           {"residual", ring_down.residual},
           {"growth", ring_down.growth},
           {"gain_margin", ring_down.gain_margin},
+          {"integral_decays", ring_down.integral_decays},
           {"modes", modes}};
 }
 
@@ -299,7 +308,7 @@ std::string to_table(const RunReport& report) {
     out += "\nRing-down after " + count(report.ring_down->releases, "small release") +
            " (sampled: predicted with the drives of the scene)\n" +
            ring_down_table(*report.ring_down);
-    out += stability_text(*report.ring_down);
+    out += integral_text(*report.ring_down) + stability_text(*report.ring_down);
   }
   if (report.identified) out += "\n" + identify_table(*report.identified);
   return out;

@@ -53,6 +53,13 @@ SampledModes sampled_modes(const Scene& scene) {
     loop.gravity_gradient =
         controller::gravity_gradient(controller::DynamicsKernel(model), scene.rest);
   }
+  const controller::Settings& settings = scene.arm->config.settings;
+  if (settings.integral.time > 0) {
+    const auto robot = evaluate(model, scene.rest, JointVector::Zero(scene.dof()));
+    const controller::Impedance springs(scene.steps.front().setpoint, scene.dof());
+    loop.memory = controller::integral_memory(
+        integral_stiffness(robot, springs, settings.integral.time), loop.period);
+  }
   const analysis::System<> system = loop_at_rest(scene);
   SampledModes result;
   result.continuous = analysis::analyze(system);
