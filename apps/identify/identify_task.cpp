@@ -267,11 +267,10 @@ class Task {
       }
       posture.parts = static_cast<int>(group.size());
       try {
-        posture.found = report_.kind == MotionKind::kAmbient
-                            ? analysis::identify_ambient(records, options)
-                        : report_.kind == MotionKind::kExcited
-                            ? analysis::identify_excited(records, options)
-                            : analysis::identify_decays(records, options);
+        posture.found =
+            report_.kind == MotionKind::kAmbient   ? analysis::identify_ambient(records, options)
+            : report_.kind == MotionKind::kExcited ? analysis::identify_excited(records, options)
+                                                   : analysis::identify_decays(records, options);
       } catch (const std::invalid_argument& error) {
         for (const std::size_t i : group) report_.parts[parts_[i].report].reason = error.what();
         continue;

@@ -75,8 +75,8 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
 }  // namespace
 
 void add_identification(nb::module_& m) {
-  m.def("identify", &identify, nb::arg("times"), nb::arg("outputs"), nb::arg("inputs"), nb::arg("find"),
-        nb::arg("ambient"), nb::arg("max_order"));
+  m.def("identify", &identify, nb::arg("times"), nb::arg("outputs"), nb::arg("inputs"),
+        nb::arg("find"), nb::arg("ambient"), nb::arg("max_order"));
 }
 
 }  // namespace dashpot::python

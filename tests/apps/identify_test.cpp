@@ -279,17 +279,17 @@ class HiddenArm {
     return "{robot: {urdf: " + testing::arm_path("iiwa14") +
            ", base: iiwa_link_0, tip: iiwa_link_ee_kuka, reflected_inertia: " + inertia +
            ", payload: {mass: " + mass +
-           "}}, control: {mode: joint, period: 2 ms}, gains: {joint: {stiffness: [800, 800, 500, 500, 200, 100, "
+           "}}, control: {mode: joint, period: 2 ms}, gains: {joint: {stiffness: [800, 800, 500, "
+           "500, 200, 100, "
            "50], damping: [20, 25, 10, 12, 3, 2, 0.5]}}";
   }
 
   /// Logs of a release each, two at each posture: a wrench that holds the tip ends at 1.5 s.
   HiddenArm(const Scratch& scratch, std::size_t count) {
-    std::vector<std::string> postures = {"[0, 0.5, 0, -1.4, 0, 1, 0]",
-                                         "[-0.5, 0.3, -0.4, -1.6, 1, 1.2, 0.5]",
-                                         "[0.4, 0.9, 0.6, -0.9, -0.8, 0.5, 1]",
-                                         "[1, -0.4, 0.3, -1.9, 0.5, -0.9, -0.6]",
-                                         "[-0.8, 1.1, -1, -0.6, 1.4, 1.5, 0.2]"};
+    std::vector<std::string> postures = {
+        "[0, 0.5, 0, -1.4, 0, 1, 0]", "[-0.5, 0.3, -0.4, -1.6, 1, 1.2, 0.5]",
+        "[0.4, 0.9, 0.6, -0.9, -0.8, 0.5, 1]", "[1, -0.4, 0.3, -1.9, 0.5, -0.9, -0.6]",
+        "[-0.8, 1.1, -1, -0.6, 1.4, 1.5, 0.2]"};
     postures.resize(count);
     int n = 0;
     for (const std::string& posture : postures) {
