@@ -90,14 +90,16 @@ TEST_P(FakeDrivers, PutOutWhatWasCommanded) {
   // libfranka: lowpassFilter and limitRate, 30 Hz and 1000 N m/s
   const double gain = 1e-3 / (1e-3 + 1 / (2 * std::numbers::pi * 30));
   double expected = 0;
-  EXPECT_EQ(driver.heard[asked].torque[0], 0);
-  EXPECT_EQ(driver.heard[asked + 1].torque[0], 0);
-  for (std::size_t k = 0; k + 1 < 60; ++k) {
+  std::size_t first = asked;  // that shows a command: one or two later, as the bus delivers
+  while (first < asked + 4 && driver.heard[first].torque[0] == 0) ++first;
+  EXPECT_GE(first, asked + 1);
+  ASSERT_GE(driver.heard.size(), first + 58);
+  for (std::size_t k = 0; k < 58; ++k) {
     const double wanted = k < 30 ? 0.5 : 20;
     expected = arm.kind == DriverKind::kIiwa
                    ? wanted
                    : expected + std::clamp(gain * (wanted - expected), -1.0, 1.0);
-    EXPECT_NEAR(driver.heard[asked + 2 + k].torque[0], expected, 1e-12) << k;
+    EXPECT_NEAR(driver.heard[first + k].torque[0], expected, 1e-12) << k;
   }
 }
 
