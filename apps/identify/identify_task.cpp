@@ -84,9 +84,10 @@ class Task {
                            })) {
       throw InputError(path, "its channels differ from those of " + command_.files.front());
     }
-    for (const std::string& note : file.notes) report_.notes.push_back(name + ": " + note);
+    for (const std::string& note : file.notes)
+      report_.notes.push_back(std::string(name).append(": ").append(note));
     const auto note = [this, &path](int count, const std::string& what) {
-      if (count > 0) report_.notes.push_back(path + ": " + std::to_string(count).append(what));
+      if (count > 0) report_.notes.push_back(path + ": " + std::to_string(count) + what);
     };
     note(file.duplicates, " samples left out, because another has the same time");
     note(file.out_of_order, " samples left out, because their time runs backwards");
