@@ -106,6 +106,7 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work&
       return out.status = Status::kUnfinished;
     }
     if (!is_finite(out.basis.Lambda) || !is_finite(out.basis.U)) {
+      if (cluster < kClusters.back()) continue;  // a wider one may hold what came apart
       out.modes.resize(0);
       return out.status = Status::kOverflow;
     }
