@@ -99,6 +99,7 @@ void SampledDataModel::remember(const SampledLoop& loop, const MatrixXd& coordin
               (m == 0 || (position.cols() == joints && output.rows() == joints)),
           "memory has to be m x m, m x n and n x m");
   require(state.allFinite() && position.allFinite() && output.allFinite(), "memory is not finite");
+  states = {MatrixXd(0, 0), MatrixXd(0, n), MatrixXd(n, 0)};
   if (m == 0) return;
   const double T = loop.period;
   states = {state, position * coordinates, T * T * coordinates.transpose() * output};
