@@ -36,16 +36,4 @@ class LoopPrediction {
   std::vector<Eigen::Index> joint_;  ///< of each channel
 };
 
-/// Gives each prediction the measured mode that it is: the nearest in frequency, ratio and shape,
-/// nearest pairs first.
-void match(const std::vector<analysis::MeasuredMode>& measured,
-           std::vector<PredictedMode>& predicted);
-
-/// Which change of the parameters called `names` ("payload,reflected_inertia,friction,delay")
-/// explains the differences best: least squares of what was measured at all postures, each number
-/// in units of its deviation, within bounds (no mass, inertia, friction or delay below zero).
-/// Updates the predictions. Throws InputError for other names.
-Calibration calibrate(const LoopPrediction& loop, const std::string& names,
-                      std::vector<PostureReport>& postures);
-
 }  // namespace dashpot::apps

@@ -1,0 +1,236 @@
+#include <dashpot/apps/identify/calibration.hpp>
+#include <dashpot/apps/identify/mode_match.hpp>
+#include <dashpot/controller/input_error.hpp>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace dashpot::apps {
+namespace {
+
+using analysis::MeasuredMode;
+using controller::InputError;
+using controller::Joint;
+using controller::JointVector;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Parameters by their names, and what they do to a correction.
+class Parameters {
+ public:
+  Parameters(const LoopPrediction& loop, const std::string& names) {
+    const controller::Config& config = loop.config();
+    const Index n = loop.dof();
+    for (std::size_t at = 0; at <= names.size();) {
+      const auto end = std::min(names.find(',', at), names.size());
+      const std::string name = names.substr(at, end - at);
+      at = end + 1;
+      if (name == "payload") {
+        add(name, "kg", config.robot.options.payload.mass, 20, -1);
+      } else if (name == "delay") {
+        add(name, "ticks", config.settings.analysis.sampled.delay, 10, -1);
+      } else if (name == "reflected_inertia" || name == "friction") {
+        const bool inertia = name == "reflected_inertia";
+        JointVector before = inertia ? config.robot.options.reflected_inertia
+                                     : config.model.joint_values(&Joint::viscous_friction);
+        if (before.size() == 0) before = JointVector::Zero(n);
+        for (Index i = 0; i < n; ++i) {
+          add(name + " " + std::to_string(i + 1), inertia ? "kg m^2" : "N m s/rad", before[i],
+              inertia ? 1 : 20, static_cast<int>(i));
+        }
+      } else {
+        throw InputError("--calibrate", "'" + name +
+                                            "' is none of payload, reflected_inertia, "
+                                            "friction, delay");
+      }
+      if (std::count(kinds_.begin(), kinds_.end(), name) > 0) {
+        throw InputError("--calibrate", "'" + name + "' twice");
+      }
+      kinds_.push_back(name);
+    }
+  }
+
+  Index size() const { return static_cast<Index>(list.size()); }
+
+  ModelCorrection correction(const VectorXd& values, Index n) const {
+    ModelCorrection result;
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      const double added = values[static_cast<Index>(k)] - list[k].before;
+      const int joint = joints_[k];
+      if (joint >= 0) {
+        VectorXd& vector =
+            list[k].name.starts_with("friction") ? result.friction : result.reflected_inertia;
+        if (vector.size() == 0) vector = VectorXd::Zero(n);
+        vector[joint] = added;
+      } else {
+        (list[k].name == "payload" ? result.payload : result.delay) = added;
+      }
+    }
+    return result;
+  }
+
+  std::vector<CalibratedParameter> list;
+  VectorXd prior;  ///< how far a parameter may be from what the configuration says
+
+ private:
+  void add(const std::string& name, const std::string& unit, double before, double far, int joint) {
+    list.push_back({name, unit, before, before, 0, false});
+    joints_.push_back(joint);
+    prior.conservativeResize(prior.size() + 1);
+    prior[prior.size() - 1] = far;
+  }
+
+  std::vector<int> joints_;  ///< -1: of none
+  std::vector<std::string> kinds_;
+};
+
+/// Differences of measured and predicted numbers in units of their deviations, of which none is
+/// taken to be less than `least`, relative for frequencies.
+VectorXd differences(const std::vector<PostureReport>& postures,
+                     const std::vector<std::vector<PredictedMode>>& predicted, double least) {
+  std::vector<double> all;
+  for (std::size_t k = 0; k < postures.size(); ++k) {
+    for (std::size_t i = 0; i < postures[k].predicted.size(); ++i) {
+      const int number = postures[k].predicted[i].measured;
+      if (number < 0 || i >= predicted[k].size()) continue;
+      const MeasuredMode& mode = postures[k].found.modes[static_cast<std::size_t>(number)];
+      const PredictedMode& there = predicted[k][i];
+      const double w = mode.natural_frequency;
+      Eigen::Matrix2d covariance;
+      const double cross =
+          std::clamp(mode.covariance, -0.99 * mode.natural_frequency_std * mode.damping_ratio_std,
+                     0.99 * mode.natural_frequency_std * mode.damping_ratio_std);
+      covariance << std::pow(mode.natural_frequency_std, 2) + std::pow(least * w, 2), cross, cross,
+          std::pow(mode.damping_ratio_std, 2) + least * least;
+      const Eigen::Vector2d difference(w - there.natural_frequency,
+                                       mode.damping_ratio - there.damping_ratio);
+      const Eigen::Vector2d scaled = covariance.llt().matrixL().solve(difference);
+      all.insert(all.end(), {scaled[0], scaled[1]});
+    }
+  }
+  return VectorXd::Map(all.data(), static_cast<Index>(all.size()));
+}
+
+}  // namespace
+
+Calibration calibrate(const LoopPrediction& loop, const std::string& names,
+                      std::vector<PostureReport>& postures) {
+  Parameters parameters(loop, names);
+  const Index p = parameters.size(), n = loop.dof();
+  VectorXd before(p);
+  for (Index i = 0; i < p; ++i) before[i] = parameters.list[static_cast<std::size_t>(i)].before;
+  const auto predict = [&](const VectorXd& values) {
+    std::vector<std::vector<PredictedMode>> all;
+    all.reserve(postures.size());
+    for (const PostureReport& posture : postures) {
+      all.push_back(loop.predict(posture.rest, parameters.correction(values, n)));
+      put_in_order(posture.predicted, all.back());
+    }
+    return all;
+  };
+  const auto rematch = [&](const VectorXd& values) {
+    const auto all = predict(values);
+    for (std::size_t k = 0; k < postures.size(); ++k) {
+      postures[k].predicted = all[k];
+      match(postures[k].found.modes, postures[k].predicted);
+    }
+  };
+  const auto rms = [](const VectorXd& r) {
+    return r.size() > 0 ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0;
+  };
+  // First of all with large deviations, so that no match that is wrong at the start decides. In the
+  // end nothing is better known than to this: no arm is linear, and at one posture, to less.
+  constexpr std::array<double, 6> kLeast = {0.05, 0.02, 0.01, 3e-3, 1e-3, 3e-4};
+  double least = kLeast.back();
+  Calibration result;
+  rematch(before);
+  result.misfit_before = rms(differences(postures, predict(before), least));
+
+  VectorXd x = before;
+  MatrixXd J;
+  VectorXd r;
+  const VectorXd weight = parameters.prior.cwiseInverse();
+  // Huber's weights: what is far off counts less than by its square.
+  const auto robust = [](const VectorXd& differences) {
+    constexpr double kFar = 2.5;
+    return VectorXd(differences.unaryExpr([](double d) {
+      const double size = std::abs(d);
+      return size <= kFar ? d : std::copysign(std::sqrt(2 * kFar * size - kFar * kFar), d);
+    }));
+  };
+  const auto residual = [&](const VectorXd& values) {
+    return robust(differences(postures, predict(values), least));
+  };
+  const auto linearize = [&] {
+    r = residual(x);
+    J.resize(r.size(), p);
+    for (Index i = 0; i < p; ++i) {
+      VectorXd moved = x;
+      const double step = 1e-4 * parameters.prior[i];
+      moved[i] += step;
+      J.col(i) = (residual(moved) - r) / step;
+    }
+  };
+  for (const double stage : kLeast) {
+    least = stage;
+    double damping = 1e-3;
+    for (int iteration = 0; iteration < 20; ++iteration) {
+      rematch(x);
+      linearize();
+      const VectorXd pull = weight.cwiseProduct(x - before);
+      const double cost = r.squaredNorm() + pull.squaredNorm();
+      MatrixXd A = J.transpose() * J;
+      A.diagonal() += weight.cwiseAbs2();
+      const VectorXd g = J.transpose() * r + weight.cwiseProduct(pull);
+      bool better = false;
+      double gain = 0;
+      for (; !better && damping < 1e10; damping *= 10) {
+        MatrixXd damped = A;
+        damped.diagonal() *= 1 + damping;
+        const VectorXd next = (x - damped.ldlt().solve(g)).cwiseMax(0);
+        const VectorXd there = residual(next);
+        gain = cost - there.squaredNorm() - weight.cwiseProduct(next - before).squaredNorm();
+        if (there.size() == r.size() && gain >= 0) x = next, better = true;
+      }
+      damping = std::max(1e-9, damping / 100);
+      if (!better || gain < 1e-4 * (1 + cost)) break;
+    }
+  }
+  rematch(x);
+  linearize();
+  result.numbers = static_cast<int>(r.size());
+  result.misfit = rms(differences(postures, predict(x), least));
+  MatrixXd A = J.transpose() * J;
+  A.diagonal() += weight.cwiseAbs2();
+  const double excess = r.squaredNorm() / std::max(1.0, static_cast<double>(r.size() - p));
+  const MatrixXd covariance = A.ldlt().solve(MatrixXd::Identity(p, p)) * std::max(1.0, excess);
+  for (Index i = 0; i < p; ++i) {
+    CalibratedParameter& one = parameters.list[static_cast<std::size_t>(i)];
+    one.value = x[i];
+    one.std = std::sqrt(covariance(i, i));
+    one.determined = one.std < 0.2 * parameters.prior[i];
+  }
+  for (Index i = 0; i < p; ++i) {
+    for (Index k = i + 1; k < p; ++k) {
+      const double correlation = covariance(i, k) / std::sqrt(covariance(i, i) * covariance(k, k));
+      if (std::abs(correlation) < 0.95) continue;
+      result.warnings.push_back(parameters.list[static_cast<std::size_t>(i)].name + " and " +
+                                parameters.list[static_cast<std::size_t>(k)].name +
+                                " can hardly be told apart by these records (correlation " +
+                                std::to_string(correlation).substr(0, 5) +
+                                "): other postures, or fix one of them");
+    }
+  }
+  if (r.size() < p) {
+    result.warnings.push_back("fewer numbers were measured (" + std::to_string(r.size()) +
+                              ") than parameters are wanted (" + std::to_string(p) + ")");
+  }
+  result.correction = parameters.correction(x, n);
+  result.parameters = std::move(parameters.list);
+  return result;
+}
+
+}  // namespace dashpot::apps
