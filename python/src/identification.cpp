@@ -37,14 +37,13 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
                   int max_order) {
   std::vector<MotionRecord> records;
   std::vector<std::array<double, 3>> parts;  // number of the record, begin and end
+  const bool excited = !inputs.empty() && inputs.front().rows() > 0;
   Identification found;
-  bool excited = false;
   {
     const nb::gil_scoped_release release;
     for (std::size_t r = 0; r < times.size(); ++r) {
       const MotionRecord record{times[r], outputs[r], inputs[r]};
       analysis::check_records({record});
-      excited = excited || record.input.rows() > 0;
       std::vector<FreeDecay> pieces{{0, record.time.size(), {}}};
       if (find && !ambient && !excited) pieces = find_decays(record);
       for (const FreeDecay& piece : pieces) {
