@@ -4,6 +4,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_impedance.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -21,15 +22,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
+using testing::one_joint;
 using testing::Random;
-
-System<> one_joint(double mass, double damping, double stiffness) {
-  System<> system(1);
-  system.mass(0, 0) = mass;
-  system.damping(0, 0) = damping;
-  system.stiffness(0, 0) = stiffness;
-  return system;
-}
 
 /// The integral of all springs, of which `factor` is W with K = W' W: w_k+1 = w_k + T W q_k, and
 /// W' w / time.

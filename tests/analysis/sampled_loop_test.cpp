@@ -3,6 +3,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_impedance.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -17,15 +18,8 @@ namespace {
 
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
+using testing::one_joint;
 using testing::Random;
-
-System<> one_joint(double mass, double damping, double stiffness) {
-  System<> system(1);
-  system.mass(0, 0) = mass;
-  system.damping(0, 0) = damping;
-  system.stiffness(0, 0) = stiffness;
-  return system;
-}
 
 System<> random_system(Random& random, Eigen::Index n) {
   System<> system(n);

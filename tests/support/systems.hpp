@@ -27,6 +27,11 @@ inline analysis::System<> system_from(const Eigen::MatrixXd& mass, const Eigen::
   return system;
 }
 
+inline analysis::System<> one_joint(double mass, double damping, double stiffness) {
+  const auto entry = [](double value) { return Eigen::MatrixXd::Constant(1, 1, value); };
+  return system_from(entry(mass), entry(damping), entry(stiffness));
+}
+
 /// Eigenvalues of [0 I; -M^-1 K  -M^-1 C] in long double, by Eigen.
 inline std::vector<LongComplex> true_eigenvalues(const analysis::System<>& system) {
   const Eigen::Index n = system.dof();
