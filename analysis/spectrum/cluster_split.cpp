@@ -30,7 +30,7 @@ bool split_coinciding(const State<N>& small, Complex mean, SplitCluster<N>& spli
   State<N> J = small;
   J.diagonal().array() -= a;
   if (b == 0) {
-    if (J.norm() > tolerance) return false;
+    if (!(J.norm() <= tolerance)) return false;
     split.columns.setIdentity(size, size);
     split.Lambda = a * split.columns;
     add_blocks(1, split);
@@ -40,7 +40,8 @@ bool split_coinciding(const State<N>& small, Complex mean, SplitCluster<N>& spli
   J /= b;
   State<N> J2 = J * J;
   J2.diagonal().array() += 1;
-  if (J2.norm() * b > tolerance) return false;
+  // A cluster that is wide holds a real eigenvalue too, perhaps, which has no direction to go with.
+  if (size % 2 != 0 || !(J2.norm() * b <= tolerance)) return false;
   State<N> done(size, 0);
   split.columns.resize(size, size);
   split.Lambda = a * State<N>::Identity(size, size);
