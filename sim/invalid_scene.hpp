@@ -1,5 +1,6 @@
 #pragma once
 #include <stdexcept>
+#include <string>
 
 namespace dashpot::sim {
 
@@ -7,6 +8,8 @@ namespace dashpot::sim {
 class InvalidScene : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
+  InvalidScene(const std::string& key, const std::string& reason)
+      : InvalidScene(key + ": " + reason) {}
 };
 
 }  // namespace dashpot::sim

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/design/damping_fit.hpp>
 #include <dashpot/analysis/spectrum.hpp>
@@ -8,7 +9,6 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -19,14 +19,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Extended = long double;
-using Matrix = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
-using Values = Eigen::Matrix<Extended, Eigen::Dynamic, 1>;
+using ExtendedMatrix = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
+using ExtendedVector = Eigen::Matrix<Extended, Eigen::Dynamic, 1>;
 
 /// Ratios nearer to their target than this reach it.
 constexpr double kReached = 1e-9;
 /// Steps in which a level is sought, and how near a search has to come to one.
 constexpr double kRatioStep = 5e-4, kRatioSlack = 1e-7;
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 MatrixXd symmetric_part(const MatrixXd& A) {
   return 0.5 * (A + A.transpose());
@@ -34,15 +33,16 @@ MatrixXd symmetric_part(const MatrixXd& A) {
 
 /// F with K = F F', without the columns of directions that K leaves free. K is scaled to a unit
 /// diagonal first, so that stiffnesses in different units do not hide each other.
-Matrix stiffness_factor(const std::string& key, const MatrixXd& stiffness) {
+ExtendedMatrix stiffness_factor(const std::string& key, const MatrixXd& stiffness) {
   const Index k = stiffness.rows();
-  if (k == 0) return Matrix(0, 0);
-  const Matrix K = symmetric_part(stiffness).cast<Extended>();
-  const Values scale =
+  if (k == 0) return ExtendedMatrix(0, 0);
+  const ExtendedMatrix K = symmetric_part(stiffness).cast<Extended>();
+  const ExtendedVector scale =
       (K.diagonal().array() > 0).select(K.diagonal().array().abs().sqrt(), Extended{1});
-  const Matrix unit = scale.cwiseInverse().asDiagonal() * K * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(unit);
-  const Values& values = eigen.eigenvalues();
+  const ExtendedMatrix unit =
+      scale.cwiseInverse().asDiagonal() * K * scale.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<ExtendedMatrix> eigen(unit);
+  const ExtendedVector& values = eigen.eigenvalues();
   const Extended rounding =
       16 * static_cast<Extended>(k) * static_cast<Extended>(kEps) * values.cwiseAbs().maxCoeff();
   if (values[0] < -rounding) {
@@ -62,27 +62,27 @@ struct ClosedForm {
 ClosedForm solve_closed_form(const TaskImpedance& impedance, const MatrixXd& map,
                              const DampingTarget& target) {
   const Index k = map.cols();
-  const Matrix F = impedance.jacobian
-                       ? stiffness_factor("task_stiffness", *impedance.task_stiffness)
-                       : stiffness_factor("stiffness", *impedance.stiffness);
-  const Eigen::LLT<Matrix> cholesky(symmetric_part(impedance.mass).cast<Extended>());
-  const Matrix columns = cholesky.matrixL().solve(map.cast<Extended>() * F);  // L^-1 J' F
+  const ExtendedMatrix F = impedance.jacobian
+                               ? stiffness_factor("task_stiffness", *impedance.task_stiffness)
+                               : stiffness_factor("stiffness", *impedance.stiffness);
+  const Eigen::LLT<ExtendedMatrix> cholesky(symmetric_part(impedance.mass).cast<Extended>());
+  const ExtendedMatrix columns = cholesky.matrixL().solve(map.cast<Extended>() * F);  // L^-1 J' F
   if (columns.size() == 0) return {MatrixXd::Zero(k, k)};
-  const Eigen::JacobiSVD<Matrix> svd(columns, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const Values& omega = svd.singularValues();
+  const Eigen::JacobiSVD<ExtendedMatrix> svd(columns, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const ExtendedVector& omega = svd.singularValues();
   const double soft = target.soft_limit(static_cast<double>(omega[0]));
   const Index count = omega.size();
-  Values damper(count);
+  ExtendedVector damper(count);
   for (Index i = 0; i < count; ++i) {
     damper[i] = static_cast<Extended>(target.damper(static_cast<double>(omega[i]), soft));
   }
-  const Matrix FU = F * svd.matrixV();
+  const ExtendedMatrix FU = F * svd.matrixV();
   if (!impedance.damping) {
     const MatrixXd C = (FU * damper.asDiagonal() * FU.transpose()).cast<double>();
     return {symmetric_part(C)};
   }
   // With S^2 = damper / (2 zeta omega): 1 / omega^2, less for soft modes.
-  Values S(count), wanted(count);
+  ExtendedVector S(count), wanted(count);
   for (Index i = 0; i < count; ++i) {
     const double frequency = static_cast<double>(omega[i]);
     wanted[i] = static_cast<Extended>(2 * target.ratio(frequency) * frequency);
@@ -90,13 +90,14 @@ ClosedForm solve_closed_form(const TaskImpedance& impedance, const MatrixXd& map
     const double s = frequency > 0 ? std::sqrt(unit.damper(frequency, soft) / (2 * frequency)) : 0;
     S[i] = static_cast<Extended>(s);
   }
-  const Matrix D = symmetric_part(*impedance.damping).cast<Extended>();
-  const Matrix LV = cholesky.matrixU().solve(svd.matrixU());  // L^-T V
-  Matrix T = -(LV.transpose() * D * LV);
+  const ExtendedMatrix D = symmetric_part(*impedance.damping).cast<Extended>();
+  const ExtendedMatrix LV = cholesky.matrixU().solve(svd.matrixU());  // L^-T V
+  ExtendedMatrix T = -(LV.transpose() * D * LV);
   T.diagonal() += wanted;
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(Matrix((T + T.transpose()) / 2));
-  const Values positive = eigen.eigenvalues().cwiseMax(0);
-  const Matrix half = FU * S.asDiagonal() * eigen.eigenvectors();
+  const Eigen::SelfAdjointEigenSolver<ExtendedMatrix> eigen(
+      ExtendedMatrix((T + T.transpose()) / 2));
+  const ExtendedVector positive = eigen.eigenvalues().cwiseMax(0);
+  const ExtendedMatrix half = FU * S.asDiagonal() * eigen.eigenvectors();
   const MatrixXd C = (half * positive.asDiagonal() * half.transpose()).cast<double>();
   const Extended least = eigen.eigenvalues()[0];
   const bool indefinite = least < -1e-13L * (wanted.maxCoeff() + D.norm());

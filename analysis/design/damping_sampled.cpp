@@ -20,7 +20,7 @@ DampingTarget scaled(DampingTarget target, double level) {
 }
 
 /// The design at one level.
-struct Candidate {
+struct Leveled {
   double level = 1;
   DampingDesign design;
   double gain_margin = 0;
@@ -37,21 +37,19 @@ class Levels {
         structure_(structure),
         start_(start) {}
 
-  Candidate at(double level) const {
-    Candidate result{level, design_damping(impedance_, scaled(target_, level), structure_, start_)};
+  Leveled at(double level) const {
+    Leveled result{level, design_damping(impedance_, scaled(target_, level), structure_, start_)};
     result.gain_margin =
         analysis::gain_margin(result.design.system, result.design.spectrum, limit_.loop);
     return result;
   }
-  bool keeps(const Candidate& candidate) const {
-    return candidate.gain_margin >= limit_.gain_margin;
-  }
+  bool keeps(const Leveled& candidate) const { return candidate.gain_margin >= limit_.gain_margin; }
 
   /// The first on a falling grid that keeps the margin; else the one with the largest margin.
-  Candidate first_on_grid() const {
-    Candidate best = at(1);
+  Leveled first_on_grid() const {
+    Leveled best = at(1);
     for (double level = kGridStep; level > kLowestLevel && !keeps(best); level *= kGridStep) {
-      Candidate next = at(level);
+      Leveled next = at(level);
       if (next.gain_margin > best.gain_margin) best = std::move(next);
     }
     return best;
@@ -59,7 +57,7 @@ class Levels {
 
   /// Towards the largest margin between the neighbours of a grid point, by golden section, until
   /// one keeps the margin wanted.
-  Candidate climb(Candidate best) const {
+  Leveled climb(Leveled best) const {
     constexpr double kGolden = 0.6180339887498949;
     double low = best.level * kGridStep, high = std::min(1.0, best.level / kGridStep);
     double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
@@ -77,10 +75,10 @@ class Levels {
   }
 
   /// The largest level up to that of the next grid point, from one that keeps the margin.
-  Candidate raise(Candidate inside) const {
+  Leveled raise(Leveled inside) const {
     double outside = std::min(1.0, inside.level / kGridStep);
     while (outside - inside.level > kLevelPrecision * outside) {
-      Candidate middle = at(0.5 * (inside.level + outside));
+      Leveled middle = at(0.5 * (inside.level + outside));
       if (keeps(middle)) {
         inside = std::move(middle);
       } else {
@@ -92,8 +90,8 @@ class Levels {
 
  private:
   /// Keeps the better one of `best` and the level asked for.
-  double margin_at(double level, Candidate& best) const {
-    Candidate next = at(level);
+  double margin_at(double level, Leveled& best) const {
+    Leveled next = at(level);
     const double margin = next.gain_margin;
     if (margin > best.gain_margin) best = std::move(next);
     return margin;
@@ -127,7 +125,7 @@ SampledDamping design_damping(const TaskImpedance& impedance, const DampingTarge
     throw std::invalid_argument("damping: a gain margin below 1 is none");
   }
   const Levels levels(impedance, target, limit, structure, start);
-  Candidate best = levels.first_on_grid();
+  Leveled best = levels.first_on_grid();
   if (!levels.keeps(best)) best = levels.climb(std::move(best));
   SampledDamping result;
   result.kept = levels.keeps(best);

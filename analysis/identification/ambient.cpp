@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/identification.hpp>
 #include <dashpot/analysis/identification/ambient_correlations.hpp>
 #include <dashpot/analysis/identification/measured_modes.hpp>
@@ -17,7 +18,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kFewest = 0.8;        // share of the parts that must have a mode
 constexpr double kLeastRatio = 0.001;  // of what decays
 /// Of 20 parts: Student's 95 % quantile over that of the normal distribution.

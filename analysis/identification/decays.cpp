@@ -1,3 +1,5 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
+#include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/identification.hpp>
 #include <dashpot/analysis/identification/decay_columns.hpp>
 #include <dashpot/analysis/identification/measured_modes.hpp>
@@ -18,12 +20,6 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::invalid_argument("identify: " + message);
-}
 
 /// The shape of a factor's first eigenvalue, from its amplitudes.
 VectorXcd shape_of(const DecayFactor& factor, const MatrixXd& amplitude) {
@@ -96,7 +92,8 @@ void doubt_order(const DecayFit& fit, const DecayFit& larger, std::vector<Measur
 }
 
 void check_order(const IdentifyOptions& options) {
-  require(options.max_order >= 0 && options.max_order <= 60, "max_order has to be within 0 and 60");
+  require("identify", options.max_order >= 0 && options.max_order <= 60,
+          "max_order has to be within 0 and 60");
 }
 
 Identification describe(const ModelSearch& search, const std::vector<MotionRecord>& records) {
@@ -157,7 +154,7 @@ Identification identify_excited(const std::vector<MotionRecord>& records,
                                 const IdentifyOptions& options) {
   check_records(records);
   check_order(options);
-  require(records.front().input.rows() > 0, "the records have no inputs");
+  require("identify", records.front().input.rows() > 0, "the records have no inputs");
   const MovingChannels moving(records);
   const ExcitedCells cells(moving.records);
   return moving.of_all(describe(ModelSearch(cells, options.max_order), cells.records));

@@ -12,13 +12,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kMoves = 3;        // in units of the noise
-constexpr double kStrong = 10;      // worth a decay
-constexpr double kRise = 3;         // a new push
-constexpr double kBridge = 0.3;     // s, standstill within a motion
-constexpr double kEnvelope = 0.25;  // s
-constexpr double kLag = 0.01;       // s, of differences
-constexpr Index kLeast = 60;        // samples of a decay
+constexpr double kMoves = 3;         // in units of the noise
+constexpr double kStrong = 10;       // worth a decay
+constexpr double kRise = 3;          // a new push
+constexpr double kStandstill = 0.3;  // s, standstill within a motion
+constexpr double kEnvelope = 0.25;   // s
+constexpr double kLag = 0.01;        // s, of differences
+constexpr Index kLeast = 60;         // samples of a decay
 
 /// How fast the channels move: root mean square of differences over kLag, in units of their noise.
 VectorXd speed_of(const MatrixXd& grid, const VectorXd& noise, Index lag) {
@@ -111,7 +111,7 @@ std::vector<Event> find_events(const VectorXd& speed, double step) {
       continue;
     }
     Index last = k;
-    for (Index i = k; i < N && i - last <= points(kBridge); ++i) {
+    for (Index i = k; i < N && i - last <= points(kStandstill); ++i) {
       if (speed[i] > kMoves) last = i;
     }
     const std::size_t before = events.size();

@@ -1,3 +1,5 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
+#include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/mode_identification.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
 
@@ -21,31 +23,28 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::invalid_argument("identify_modes: " + message);
-}
 
 /// n, after all checks but that of the number of samples.
 Index checked_dof(const std::vector<Recording>& recordings, const IdentificationOptions& options) {
-  require(!recordings.empty(), "there is no recording");
+  require("identify_modes", !recordings.empty(), "there is no recording");
   const Index n = recordings.front().position.rows();
-  require(n > 0, "the positions have no rows");
+  require("identify_modes", n > 0, "the positions have no rows");
   for (std::size_t k = 0; k < recordings.size(); ++k) {
     const auto& [q, v] = recordings[k];
     const std::string name = "recording " + std::to_string(k + 1);
     require(
-        q.rows() == n && v.rows() == n && q.cols() == v.cols(),
+        "identify_modes", q.rows() == n && v.rows() == n && q.cols() == v.cols(),
         name + ": positions and velocities have to be of one size, with as many rows as others");
-    require(q.allFinite() && v.allFinite(), name + ": an entry is not finite");
+    require("identify_modes", q.allFinite() && v.allFinite(), name + ": an entry is not finite");
   }
-  require(std::isfinite(options.period) && options.period > 0, "period has to be positive, s");
-  require(options.stride >= 0, "stride must not be negative");
-  require(options.rank_tolerance > 0 && options.rank_tolerance < 1,
+  require("identify_modes", std::isfinite(options.period) && options.period > 0,
+          "period has to be positive, s");
+  require("identify_modes", options.stride >= 0, "stride must not be negative");
+  require("identify_modes", options.rank_tolerance > 0 && options.rank_tolerance < 1,
           "rank_tolerance has to be between 0 and 1");
-  require(options.mass.size() == 0 || (options.mass.rows() == n && options.mass.cols() == n),
+  require("identify_modes",
+          options.mass.size() == 0 || (options.mass.rows() == n && options.mass.cols() == n),
           "mass has to be n x n");
   return n;
 }
@@ -60,7 +59,7 @@ struct States {
       : L_T(MatrixXd::Identity(n, n)) {
     if (mass.size() != 0) {
       const Eigen::LLT<MatrixXd> factors(mass);
-      require(mass.allFinite() && factors.info() == Eigen::Success,
+      require("identify_modes", mass.allFinite() && factors.info() == Eigen::Success,
               "mass is not positive definite");
       L_T = factors.matrixU();
     }
@@ -72,7 +71,7 @@ struct States {
       v_size += x.bottomRows(n).squaredNorm();
       of.push_back(std::move(x));
     }
-    require(q_size + v_size > 0, "nothing moves");
+    require("identify_modes", q_size + v_size > 0, "nothing moves");
     if (q_size > 0 && v_size > 0) weight = std::sqrt(v_size / q_size);
     for (MatrixXd& x : of) x.topRows(n) *= weight;
   }
@@ -111,14 +110,14 @@ struct LinearFit {
 LinearFit::LinearFit(const States& states, int stride, const IdentificationOptions& options) {
   MatrixXd X0, X1;
   states.pairs(stride, X0, X1);
-  require(X0.cols() > X0.rows(), std::to_string(X0.cols()) +
-                                     " pairs of samples are too few, need " +
-                                     std::to_string(X0.rows() + 1) + " or more");
+  require("identify_modes", X0.cols() > X0.rows(),
+          std::to_string(X0.cols()) + " pairs of samples are too few, need " +
+              std::to_string(X0.rows() + 1) + " or more");
   // Of the transpose: tall, so that a QR factorisation comes first.
   const Eigen::JacobiSVD<MatrixXd> svd(X0.transpose(), Eigen::ComputeThinU | Eigen::ComputeThinV);
   const VectorXd& S = svd.singularValues();
   while (rank < S.size() && S[rank] > options.rank_tolerance * S[0]) ++rank;
-  require(rank > 0, "nothing moves");
+  require("identify_modes", rank > 0, "nothing moves");
   condition = S[0] / S[rank - 1];
   const MatrixXd U = svd.matrixV().leftCols(rank), V = svd.matrixU().leftCols(rank);
   const VectorXd per_S = S.head(rank).cwiseInverse();
@@ -128,7 +127,8 @@ LinearFit::LinearFit(const States& states, int stride, const IdentificationOptio
   residual = (X1 - U * (UX1 - left_over)).norm() / X1.norm();
 
   const Eigen::EigenSolver<MatrixXd> solver(A);
-  require(solver.info() == Eigen::Success, "the eigenvalue iteration did not converge");
+  require("identify_modes", solver.info() == Eigen::Success,
+          "the eigenvalue iteration did not converge");
   const VectorXcd& z = solver.eigenvalues();
   const MatrixXcd right = solver.eigenvectors(), left = right.inverse();
   const double duration = stride * options.period;

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/identification/common_denominator.hpp>
 #include <dashpot/analysis/identification/model_search.hpp>
 
@@ -12,10 +13,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::invalid_argument("identify: " + message);
-}
 
 /// Those that a record of this length (s) can tell from a constant, as factors.
 std::vector<DecayFactor> factors_of(const std::vector<RealizedPole>& poles, double duration) {
@@ -66,7 +63,7 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& records, int max_order
       max_order > 0 ? max_order : static_cast<int>(std::clamp<Index>(2 * channels, 12, 32));
   const int most = std::min(
       {wanted, realization.max_order(), static_cast<int>(cells.shortest() * channels / 4)});
-  require(most >= 1, "nothing moves");
+  require("identify", most >= 1, "nothing moves");
   for (int n = 1; n <= most; ++n) {
     by_order.push_back(realization.poles(n));
     for (RealizedPole& pole :
@@ -144,7 +141,7 @@ void ModelSearch::choose_order(const VectorXd& noise) {
     order = static_cast<int>(n) + 1;
     worse = 0;
   }
-  require(best.has_value(), "no decay is to be seen");
+  require("identify", best.has_value(), "no decay is to be seen");
   fit = std::move(*best);
 }
 

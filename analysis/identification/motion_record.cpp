@@ -1,5 +1,7 @@
 #include <dashpot/analysis/motion_record.hpp>
 
+#include <dashpot/analysis/base/require.hpp>
+
 #include <cmath>
 #include <stdexcept>
 #include <string>
@@ -8,10 +10,6 @@ namespace dashpot::analysis {
 namespace {
 
 using Eigen::Index;
-
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::invalid_argument("identify: " + message);
-}
 
 }  // namespace
 
@@ -23,30 +21,32 @@ MotionRecord part_of(const MotionRecord& record, Index from, Index to) {
 }
 
 void check_records(const std::vector<MotionRecord>& records) {
-  require(!records.empty(), "there is no record");
+  require("identify", !records.empty(), "there is no record");
   const Index channels = records.front().output.rows();
-  require(channels > 0, "there is no channel");
+  require("identify", channels > 0, "there is no channel");
   for (std::size_t r = 0; r < records.size(); ++r) {
     const auto& [time, output, input] = records[r];
     const std::string name = "record " + std::to_string(r + 1) + ": ";
-    require(output.rows() == channels && output.cols() == time.size(),
+    require("identify", output.rows() == channels && output.cols() == time.size(),
             name + "output has to be channels x samples, with as many channels as others");
-    require(time.size() >= 20, name + std::to_string(time.size()) + " samples, need 20 or more");
-    require(time.allFinite(), name + "a time is not finite");
-    require(input.size() == 0 || input.cols() == time.size(),
+    require("identify", time.size() >= 20,
+            name + std::to_string(time.size()) + " samples, need 20 or more");
+    require("identify", time.allFinite(), name + "a time is not finite");
+    require("identify", input.size() == 0 || input.cols() == time.size(),
             name + "input has to be inputs x samples");
-    require(input.rows() == records.front().input.rows() && input.allFinite(),
+    require("identify", input.rows() == records.front().input.rows() && input.allFinite(),
             name + "its inputs are not finite, or not as many as others");
     for (Index i = 1; i < time.size(); ++i)
-      require(time[i] > time[i - 1], name + "time does not rise");
+      require("identify", time[i] > time[i - 1], name + "time does not rise");
     for (Index c = 0; c < channels; ++c) {
       Index samples = 0;
       for (const double y : output.row(c)) {
         samples += std::isfinite(y);
-        require(!std::isinf(y), name + "a sample is infinite");
+        require("identify", !std::isinf(y), name + "a sample is infinite");
       }
-      require(samples >= 10, name + "channel " + std::to_string(c + 1) + " has " +
-                                 std::to_string(samples) + " samples, need 10 or more");
+      require("identify", samples >= 10,
+              name + "channel " + std::to_string(c + 1) + " has " + std::to_string(samples) +
+                  " samples, need 10 or more");
     }
   }
 }

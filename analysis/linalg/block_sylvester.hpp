@@ -2,11 +2,11 @@
 // Sylvester equations A X - X B = Q of real 2 x 2 blocks: of one block (double), or of one in each
 // lane (Vec4d).
 
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/packed_matrix.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 
 #include <cmath>
-#include <limits>
 
 namespace dashpot::analysis {
 
@@ -54,7 +54,7 @@ struct MeasuredBlock : Block2<T> {
 /// is at least s_min(p(A)) / (|A - t/2| + |B - t/2|). The rounding errors are subtracted.
 template <typename T, typename U>
 U separation(const MeasuredBlock<T>& A, const MeasuredBlock<U>& B) noexcept {
-  constexpr double kRounding = 32 * std::numeric_limits<double>::epsilon(), kSlack = 1 + 1e-10;
+  constexpr double kRounding = 32 * kEps;
   const U trace = B.trace();
   const U across = A.trace() - trace, product = A.b * A.c + B.determinant();
   const U p00 = A.a * (A.a - trace) + product, p11 = A.d * (A.d - trace) + product;
@@ -69,7 +69,7 @@ U separation(const MeasuredBlock<T>& A, const MeasuredBlock<U>& B) noexcept {
 /// The same for a block of one entry x.
 template <typename U>
 U separation(double x, const MeasuredBlock<U>& B) noexcept {
-  constexpr double kRounding = 32 * std::numeric_limits<double>::epsilon(), kSlack = 1 + 1e-10;
+  constexpr double kRounding = 32 * kEps;
   const U trace = B.trace();
   const U least = magnitude(x * x - trace * x + B.determinant()) -
                   kRounding * (x * x + trace * trace + B.size2);

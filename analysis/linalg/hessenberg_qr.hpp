@@ -1,11 +1,11 @@
 #pragma once
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/types.hpp>
 #include <dashpot/analysis/work.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 namespace dashpot::analysis {
 
@@ -86,7 +86,6 @@ inline std::array<Complex, 2> eigenvector_2x2(double a, double b, double c, doub
 /// more than `work` grants. (Golub and Van Loan, 4th ed., Algorithm 7.5.2.)
 template <typename Matrix>
 bool hessenberg_eigenvalues(Matrix& H, Complex* eigenvalues, Work& work) noexcept {
-  constexpr double kEps = std::numeric_limits<double>::epsilon();
   const Eigen::Index n = H.rows();
   double norm = 0;
   for (Eigen::Index j = 0; j < n; ++j) {

@@ -1,3 +1,5 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
+#include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/linalg/phi_functions.hpp>
 #include <dashpot/analysis/response.hpp>
 
@@ -17,21 +19,18 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::invalid_argument("Response: " + message);
-}
-
 void require_vector(const VectorXd& vector, Index n, const std::string& name) {
-  require(vector.size() == n, name + " has " + std::to_string(vector.size()) +
-                                  " entries, expected " + std::to_string(n));
-  require(vector.allFinite(), name + " is not finite");
+  require(
+      "Response", vector.size() == n,
+      name + " has " + std::to_string(vector.size()) + " entries, expected " + std::to_string(n));
+  require("Response", vector.allFinite(), name + " is not finite");
 }
 
 void require_forced_time(double time) {
-  require(std::isfinite(time) && time >= 0, "time is not a finite number of at least 0 s");
+  require("Response", std::isfinite(time) && time >= 0,
+          "time is not a finite number of at least 0 s");
 }
 
 /// The square block of a block-diagonal matrix.
@@ -81,9 +80,9 @@ void add_small_resolvent(const MatrixXcd& left, const MatrixXd& A, const MatrixX
 Response::Response(const System<>& system, const Spectrum<>& spectrum)
     : mass_(system.mass), damping_(system.damping), basis_(spectrum.basis) {
   const Index n = system.dof();
-  require(spectrum.status == Status::kOk || spectrum.status == Status::kUncertified,
+  require("Response", spectrum.status == Status::kOk || spectrum.status == Status::kUncertified,
           std::string("the spectrum holds no modes: ") + to_text(spectrum.status));
-  require(basis_.U.rows() == n && basis_.U.cols() == 2 * n,
+  require("Response", basis_.U.rows() == n && basis_.U.cols() == 2 * n,
           "the spectrum is not that of a system with " + std::to_string(n) + " coordinates");
   velocity_basis_ = basis_.U * basis_.Lambda;
   const MatrixXd& zero_modes = spectrum.zero_modes.basis;
@@ -91,7 +90,7 @@ Response::Response(const System<>& system, const Spectrum<>& spectrum)
 }
 
 Motion Response::free(const VectorXd& position, const VectorXd& velocity, double time) const {
-  require(std::isfinite(time), "time is not a finite number");
+  require("Response", std::isfinite(time), "time is not a finite number");
   return motion(phi_of_basis(0, time) * start(position, velocity));
 }
 
@@ -108,7 +107,7 @@ Motion Response::step(const VectorXd& force, double time) const {
 Motion Response::harmonic(const VectorXd& cosine, const VectorXd& sine, double omega,
                           double time) const {
   require_forced_time(time);
-  require(std::isfinite(omega), "omega is not a finite number");
+  require("Response", std::isfinite(omega), "omega is not a finite number");
   const VectorXd real_drive = drive_of(cosine, "cosine");
   const VectorXd imaginary_drive = -drive_of(sine, "sine");
   // The force is Re((cosine - i sine) e^(i omega t)). With xi = Re(e^(i omega t) eta), eta answers
@@ -127,8 +126,8 @@ Motion Response::harmonic(const VectorXd& cosine, const VectorXd& sine, double o
 std::vector<Motion> Response::sampled(const VectorXd& position, const VectorXd& velocity,
                                       const MatrixXd& forces, double h,
                                       const std::vector<double>& times) const {
-  require(std::isfinite(h) && h > 0, "the sampling interval is not a positive number");
-  require(forces.cols() > 0, "there are no force samples");
+  require("Response", std::isfinite(h) && h > 0, "the sampling interval is not a positive number");
+  require("Response", forces.cols() > 0, "there are no force samples");
   const Index last = forces.cols() - 1;
   const double end = static_cast<double>(last) * h * (1 + 4 * kEpsilon);
 
@@ -148,7 +147,7 @@ std::vector<Motion> Response::sampled(const VectorXd& position, const VectorXd& 
   Index k = 0;
   double previous = 0;
   for (const double time : times) {
-    require(time >= previous && time <= end, "times do not rise within [0, (s-1) h]");
+    require("Response", time >= previous && time <= end, "times do not rise within [0, (s-1) h]");
     previous = time;
     while (k + 1 < last && static_cast<double>(k + 1) * h <= time) {
       xi = after(h, phi_0, phi_1, phi_2);
@@ -163,7 +162,7 @@ std::vector<Motion> Response::sampled(const VectorXd& position, const VectorXd& 
 }
 
 MatrixXcd Response::receptance(double omega) const {
-  require(std::isfinite(omega), "omega is not a finite number");
+  require("Response", std::isfinite(omega), "omega is not a finite number");
   const Index n = mass_.rows();
   MatrixXcd sum = MatrixXcd::Zero(n, n);
   if (n == 0) return sum;

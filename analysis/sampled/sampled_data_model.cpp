@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/analysis/linalg/phi_functions.hpp>
 #include <dashpot/analysis/sampled/sampled_data_model.hpp>
@@ -17,23 +18,20 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 
-void require(bool condition, const std::string& message) {
-  if (!condition) throw std::invalid_argument("sample_loop: " + message);
-}
-
 MatrixXd checked(const MatrixXd& A, Index n, const char* name) {
   if (A.size() == 0) return MatrixXd::Zero(n, n);
-  require(A.rows() == n && A.cols() == n, std::string(name) + " has to be n x n");
-  require(A.allFinite(), std::string(name) + " is not finite");
+  require("sample_loop", A.rows() == n && A.cols() == n, std::string(name) + " has to be n x n");
+  require("sample_loop", A.allFinite(), std::string(name) + " is not finite");
   return A;
 }
 
 }  // namespace
 
 void SampledDataModel::set_loop(const SampledLoop& loop) {
-  require(std::isfinite(loop.period) && loop.period > 0, "period has to be positive, s");
-  require(loop.delay >= 0, "delay must not be negative, ticks");
-  require(std::isfinite(loop.torque_cutoff) && loop.torque_cutoff >= 0,
+  require("sample_loop", std::isfinite(loop.period) && loop.period > 0,
+          "period has to be positive, s");
+  require("sample_loop", loop.delay >= 0, "delay must not be negative, ticks");
+  require("sample_loop", std::isfinite(loop.torque_cutoff) && loop.torque_cutoff >= 0,
           "torque_cutoff must be finite and not negative, Hz");
   delay = loop.delay;
   difference = loop.difference_velocity;
@@ -47,11 +45,11 @@ SampledDataModel::SampledDataModel(const System<N>& system, const Spectrum<N>& s
                                    const SampledLoop& loop)
     : n(system.dof()) {
   set_loop(loop);
-  require(spectrum.status == Status::kOk || spectrum.status == Status::kUncertified,
+  require("sample_loop", spectrum.status == Status::kOk || spectrum.status == Status::kUncertified,
           std::string("the spectrum failed: ") + to_text(spectrum.status));
-  require(spectrum.zero_modes.basis.rows() == n, "the spectrum has another size");
+  require("sample_loop", spectrum.zero_modes.basis.rows() == n, "the spectrum has another size");
   const Eigen::LLT<MatrixXd> mass(checked(system.mass, n, "mass"));
-  require(mass.info() == Eigen::Success, "mass is not positive definite");
+  require("sample_loop", mass.info() == Eigen::Success, "mass is not positive definite");
   const auto unit = [&](const MatrixXd& A) -> MatrixXd {
     const MatrixXd half = mass.matrixL().solve(A);
     return mass.matrixL().solve(half.transpose()).transpose();
@@ -95,10 +93,12 @@ SampledDataModel::SampledDataModel(const ElasticForm<N>& form, const SampledLoop
 void SampledDataModel::remember(const SampledLoop& loop, const MatrixXd& coordinates) {
   const auto& [state, position, output] = loop.memory;
   const Index m = state.rows(), joints = coordinates.rows();
-  require(state.cols() == m && position.rows() == m && output.cols() == m &&
+  require("sample_loop",
+          state.cols() == m && position.rows() == m && output.cols() == m &&
               (m == 0 || (position.cols() == joints && output.rows() == joints)),
           "memory has to be m x m, m x n and n x m");
-  require(state.allFinite() && position.allFinite() && output.allFinite(), "memory is not finite");
+  require("sample_loop", state.allFinite() && position.allFinite() && output.allFinite(),
+          "memory is not finite");
   states = {MatrixXd(0, 0), MatrixXd(0, n), MatrixXd(n, 0)};
   if (m == 0) return;
   const double T = loop.period;

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/sampled/sampled_data_model.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
@@ -16,8 +17,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
-
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The loop with `factor` times its stiffness and its controller's damping.
 class ScaledLoop {

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/cluster_split.hpp>
 
@@ -8,7 +9,6 @@
 namespace dashpot::analysis {
 namespace {
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 /// A cluster is split into eigenvectors if their matrix has a condition number below this.
 constexpr double kSeparable = 1e4;
 /// Below this the planes of pairs are not looked for.

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/analysis/spectrum/cluster_split.hpp>
 #include <dashpot/analysis/spectrum/core_eigenvalues.hpp>
@@ -6,11 +7,7 @@
 #include <limits>
 
 namespace dashpot::analysis {
-namespace {
-
-constexpr double kEps = std::numeric_limits<double>::epsilon();
-
-}  // namespace
+namespace {}  // namespace
 
 template <int N>
 CoreEigenvalues<N>::CoreEigenvalues(const EnergyForm<N>& form,

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/elastic_form.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
@@ -51,7 +52,6 @@ Status to_elastic_form(const System<N>& system, ElasticForm<N>& out) noexcept {
   multiply(system.damping, out.coordinates, half);
   multiply(transposed, half, out.damping);
   const double all = out.damping.norm(), zero = out.damping.rightCols(n - out.modes()).norm();
-  constexpr double kEps = std::numeric_limits<double>::epsilon();
   out.free_zero_modes = zero <= 8 * static_cast<double>(n) * kEps * all;
   return std::isfinite(all + out.root.norm()) ? Status::kOk : Status::kNotFinite;
 }

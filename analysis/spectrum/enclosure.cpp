@@ -1,17 +1,14 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/enclosure.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace dashpot::analysis {
 namespace {
 
-constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// For the rounding errors of the bounds themselves.
-constexpr double kSlack = 1 + 1e-10;
 
 /// The radius of a disc is found within kLeap^(1 / 2^kHalves), 4 %, over the range of numbers.
 constexpr double kLeap = 16;

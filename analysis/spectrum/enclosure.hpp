@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
 #include <dashpot/analysis/spectrum/refinement.hpp>
 
@@ -51,7 +52,6 @@ struct PerturbationBounds {
 template <int N, class Matrix, class Vector>
 void prove(const PerturbationBounds<Matrix, Vector>& bounds,
            BlockEnclosure<N>& enclosure) noexcept {
-  constexpr double kSlack = 1 + 1e-10;  // for rounding errors of the bounds themselves
   const auto own_of = [&bounds](int i) { return bounds.own.data()[i]; };
   const auto count = static_cast<int>(enclosure.group.size());
   double everything2 = 0, largest = 0;  // F as a whole stands for E22

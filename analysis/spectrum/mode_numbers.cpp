@@ -1,16 +1,13 @@
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
 
+#include <dashpot/analysis/base/arithmetic.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 namespace dashpot::analysis {
-namespace {
-
-constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-}  // namespace
+namespace {}  // namespace
 
 Invariants block_invariants(double l00, double l01, double l10, double l11, double rho) noexcept {
   const double half_difference = 0.5 * (l00 - l11), half_sum = 0.5 * (l00 + l11);

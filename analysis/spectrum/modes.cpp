@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
 #include <dashpot/analysis/spectrum/mode_shapes.hpp>
@@ -10,8 +11,6 @@
 namespace dashpot::analysis {
 namespace {
 
-constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 struct PairedRoot : BlockRoot {

@@ -1,4 +1,5 @@
 // Newton's step of refinement.hpp, and the Sylvester equations that it solves.
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/block_sylvester.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/refinement.hpp>
@@ -7,8 +8,6 @@
 
 namespace dashpot::analysis {
 namespace {
-
-constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
 
 template <typename Matrix>
 Block2<double> block2(const Matrix& A) {

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/extended_residual.hpp>
 #include <dashpot/analysis/spectrum/refinement.hpp>
@@ -7,7 +8,6 @@
 namespace dashpot::analysis {
 namespace {
 
-constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
 /// Distance of the Gram matrix from its diagonal blocks up to which these serve for all of it, and
 /// up to which it is looked at as a perturbation of them.
 constexpr double kOrthogonal = 1e-8;

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/spectrum/modes.hpp>
@@ -7,7 +8,6 @@
 #include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 namespace dashpot::analysis {
@@ -24,7 +24,6 @@ constexpr double kHopeless = 1e-6;
 /// and its backward error is below the next number.
 constexpr std::array<double, 3> kClusters = {0.02, 0.2, 3};
 constexpr double kAcceptableBackwardError = 1e-12;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 template <int N>
 Status check(const System<N>& system) {

@@ -1,15 +1,14 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/cluster_split.hpp>
 #include <dashpot/analysis/spectrum/core_eigenvalues.hpp>
 #include <dashpot/analysis/spectrum/starting_basis.hpp>
 
 #include <cmath>
-#include <limits>
 
 namespace dashpot::analysis {
 namespace {
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 /// Two eigenvalues of one mode this close together (relative) count as nearly critical.
 constexpr double kCluster = 0.02;
 

@@ -1,15 +1,15 @@
 #include <dashpot/analysis/system/energy_form.hpp>
 
+#include <dashpot/analysis/base/arithmetic.hpp>
+
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace dashpot::analysis {
 namespace {
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 /// Undamped frequencies are equal, and rotated together, if their squares differ by no more than
 /// rounding errors, and these are within limits (relative).
 constexpr double kLeastEqual = 1e-13, kMostEqual = 1e-10;

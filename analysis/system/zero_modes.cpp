@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/system/zero_modes.hpp>
@@ -11,7 +12,6 @@
 namespace dashpot::analysis {
 namespace {
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 /// Squared frequencies this far apart or less are right to half their digits straight from K.
 constexpr double kWellScaled = 1e-8;
 /// A correction of the null space (tangents of angles) up to which it is small enough to be one.

@@ -1,14 +1,12 @@
 #include <dashpot/analysis/tracker/basis_extrapolation.hpp>
 
+#include <dashpot/analysis/base/arithmetic.hpp>
+
 namespace dashpot::analysis {
 namespace {
 
 /// Squared error of an extrapolation, relative to that of a simpler one, that makes it worth using.
 constexpr double kForeseen = 0.25;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 }  // namespace
 

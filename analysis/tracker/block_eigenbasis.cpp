@@ -1,5 +1,7 @@
 #include <dashpot/analysis/tracker/block_eigenbasis.hpp>
 
+#include <dashpot/analysis/base/arithmetic.hpp>
+
 #include <algorithm>
 #include <cmath>
 
@@ -13,10 +15,6 @@ constexpr double kSmallStep = 0.3;
 constexpr double kSmallZeroStep = 1e-3;
 /// Up to this size it does no harm if it comes of rounding errors.
 constexpr double kTinyStep = 1e-6;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 void clear_padding(const BlockEigenbasis& basis, int rows, PackedMatrix& X) {
   for (int i = 0; i < rows; ++i) {

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/tracker/cluster_separation.hpp>
@@ -16,7 +17,6 @@ constexpr double kNeutral = 1e-4;
 constexpr double kCoinciding = 1e-10;
 /// What is smaller than this, relative to the rest, has no direction.
 constexpr double kNothing = 1e-8;
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 
 /// k x l, k and l <= 2 kMaxDof
 using Cluster = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxWidth, kMaxWidth>;
@@ -24,10 +24,6 @@ using ClusterSolver = Eigen::SelfAdjointEigenSolver<Cluster>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;
 using ComplexSmall = Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
 using ComplexSmallVector = Eigen::Matrix<Complex, Eigen::Dynamic, 1, 0, 4, 1>;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// The system in some columns of a basis: N = Z' S Z and T = Z' B Z.
 struct Projection {

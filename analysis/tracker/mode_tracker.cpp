@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/tracker/cluster_separation.hpp>
 #include <dashpot/analysis/tracker/tracked_input.hpp>
@@ -7,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 namespace dashpot::analysis {
@@ -29,10 +29,6 @@ constexpr double kBuried = 1e-6, kFarApart = 1e-6;
 constexpr double kBalanced = 0.6;
 /// Units of Work of separating two blocks.
 constexpr std::int64_t kPartingWork = 60'000;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// Work of evaluating a basis, and of the step that follows.
 std::int64_t iteration_work(const BlockEigenbasis& basis) {

@@ -1,23 +1,16 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/tracker/tracked_enclosure.hpp>
 #include <dashpot/analysis/tracker/two_sided_errors.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace dashpot::analysis {
 namespace {
 
-constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// For the rounding errors of the bounds themselves.
-constexpr double kSlack = 1 + 1e-10;
 /// Largest distance of the Gram matrix from Sigma that is looked at as a perturbation.
 constexpr double kNearlyOrthonormal = 0.1;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 template <typename T>
 T square(const T& x) {

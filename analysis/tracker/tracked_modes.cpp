@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/enclosure.hpp>
@@ -9,12 +10,6 @@
 
 namespace dashpot::analysis {
 namespace {
-
-constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// Times the squared frequency that told zero modes from others: rounding errors may reach it.
 constexpr double kWellAbove = 4;

@@ -1,8 +1,8 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/analysis/tracker/tracked_start.hpp>
 
 #include <cmath>
-#include <limits>
 
 namespace dashpot::analysis {
 namespace {
@@ -10,10 +10,6 @@ namespace {
 /// Squared lengths in the metric below this, relative to those in the energy metric, belong to
 /// vectors of no sign type: a pair at critical damping that is not in one block.
 constexpr double kNeutral = 1e-6;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// p + n: elastic coordinates, then velocities.
 using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxWidth, 1>;
@@ -206,7 +202,6 @@ void form_stiffness(System<kMaxDof>& system) noexcept {
   const auto& W = system.stiffness_factor;
   const Eigen::Index n = system.dof();
   // Products are exact, sums within 3 u^2 of partial sums no longer than those of absolute values.
-  constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
   const double loss = 4 * static_cast<double>(W.rows()) * kUnit * kUnit;
   if (system.stiffness_error.size() == 0) system.stiffness_error.setZero(n, n);
   system.stiffness.resize(n, n);

@@ -1,5 +1,7 @@
 #include <dashpot/analysis/tracker/two_sided_basis.hpp>
 
+#include <dashpot/analysis/base/arithmetic.hpp>
+
 #include <algorithm>
 #include <cmath>
 
@@ -12,10 +14,6 @@ constexpr double kLeaning = 0.6, kUneven = 9;
 /// Least rate that balances positions and velocities of a block, relative to the largest one: zero
 /// modes have no frequency of their own.
 constexpr double kLeastRate = 1e-3;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// Squared lengths of the columns of four blocks, and the products of the two columns.
 struct Lengths {

@@ -1,5 +1,7 @@
 #include <dashpot/analysis/tracker/two_sided_errors.hpp>
 
+#include <dashpot/analysis/base/arithmetic.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -7,13 +9,7 @@
 namespace dashpot::analysis {
 namespace {
 
-constexpr double kUnit = std::numeric_limits<double>::epsilon() / 2;
 /// For the rounding errors of the bounds themselves.
-constexpr double kSlack = 1 + 1e-10;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 using Blocks = BlockEigenbasis::Entries;
 /// One number for each state, row or column, read in fours; zero beyond the last.

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/tracker/two_sided_basis.hpp>
 
@@ -8,10 +9,6 @@ namespace {
 
 using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxWidth, kMaxWidth>;
 using Coefficients = Eigen::Map<const Eigen::MatrixXd>;
-
-std::size_t at(int i) {
-  return static_cast<std::size_t>(i);
-}
 
 /// Columns of a spectrum's basis by what they are.
 struct Choice {

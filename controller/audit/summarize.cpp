@@ -7,7 +7,7 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNotFound = std::numeric_limits<double>::quiet_NaN();
 
 using Numbers = std::vector<PostureNumbers>;
 
@@ -41,8 +41,8 @@ WorkspaceAudit summarize(const Audit& audit, const Numbers& numbers,
                                   [](const PostureNumbers& one) { return one.singular; });
   const auto distribution = [&](double PostureNumbers::*member, double PostureAudit::*bound) {
     Distribution found;
-    found.median = found.p05 = found.p95 = found.worst = kNan;
-    if (bound == nullptr) found.bound = kNan;
+    found.median = found.p05 = found.p95 = found.worst = kNotFound;
+    if (bound == nullptr) found.bound = kNotFound;
     const std::vector<std::int64_t> order = ranking(numbers, member);
     if (order.empty()) return found;
     const auto number_at = [&](std::int64_t index) {

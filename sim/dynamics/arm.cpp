@@ -9,17 +9,15 @@
 namespace dashpot::sim {
 namespace {
 
-[[noreturn]] void fail(const std::string& key, const std::string& reason) {
-  throw InvalidScene(key + ": " + reason);
-}
-
 void require_not_negative(double value, const std::string& key, const char* unit) {
   if (std::isfinite(value) && value >= 0) return;
-  fail(key, "is " + std::to_string(value) + " " + unit + ", must be finite and not negative");
+  throw InvalidScene(
+      key, "is " + std::to_string(value) + " " + unit + ", must be finite and not negative");
 }
 
 void validate(const ArmOptions& options) {
-  if (!(options.friction_velocity > 0)) fail("friction_velocity", "must be positive, rad/s");
+  if (!(options.friction_velocity > 0))
+    throw InvalidScene("friction_velocity", "must be positive, rad/s");
   if (options.stops) {
     require_not_negative(options.stops->stiffness, "stops: stiffness", "N m/rad");
     require_not_negative(options.stops->damping, "stops: damping", "N m s/rad");
@@ -27,26 +25,29 @@ void validate(const ArmOptions& options) {
   if (options.wall) {
     require_not_negative(options.wall->contact.stiffness, "wall: stiffness", "N/m");
     require_not_negative(options.wall->contact.damping, "wall: damping", "N s/m");
-    if (!options.wall->point.allFinite()) fail("wall: point", "is not finite");
+    if (!options.wall->point.allFinite()) throw InvalidScene("wall: point", "is not finite");
     const double norm = options.wall->normal.norm();
-    if (!std::isfinite(norm) || norm == 0) fail("wall: normal", "is zero or not finite");
+    if (!std::isfinite(norm) || norm == 0)
+      throw InvalidScene("wall: normal", "is zero or not finite");
   }
   for (const Piece<Vector6>& piece : options.wrenches) {
-    if (!piece.value.allFinite()) fail("wrenches", "a piece is not finite");
-    if (!(piece.begin < piece.end)) fail("wrenches", "a piece does not begin before it ends");
+    if (!piece.value.allFinite()) throw InvalidScene("wrenches", "a piece is not finite");
+    if (!(piece.begin < piece.end))
+      throw InvalidScene("wrenches", "a piece does not begin before it ends");
   }
   for (const Piece<Inertia>& piece : options.loads) {
     const Inertia& load = piece.value;
     require_not_negative(load.mass, "loads: mass", "kg");
     if (!load.center.allFinite() || !load.about_center.allFinite()) {
-      fail("loads", "a body is not finite");
+      throw InvalidScene("loads", "a body is not finite");
     }
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(load.about_center,
                                                                 Eigen::EigenvaluesOnly);
     if (load.about_center != load.about_center.transpose() || solver.eigenvalues()[0] < 0) {
-      fail("loads", "an inertia is not symmetric positive semidefinite");
+      throw InvalidScene("loads", "an inertia is not symmetric positive semidefinite");
     }
-    if (!(piece.begin < piece.end)) fail("loads", "a piece does not begin before it ends");
+    if (!(piece.begin < piece.end))
+      throw InvalidScene("loads", "a piece does not begin before it ends");
   }
 }
 

@@ -11,18 +11,14 @@ namespace {
 
 using Eigen::MatrixXd;
 
-[[noreturn]] void fail(const std::string& key, const std::string& reason) {
-  throw InvalidScene(key + ": " + reason);
-}
-
 void require_square(const MatrixXd& A, Eigen::Index n, const char* key) {
   if (A.rows() == n && A.cols() == n) {
-    if (!A.allFinite()) fail(key, "has an entry that is not finite");
+    if (!A.allFinite()) throw InvalidScene(key, "has an entry that is not finite");
     return;
   }
   std::ostringstream text;
   text << "is " << A.rows() << " x " << A.cols() << ", must be " << n << " x " << n;
-  fail(key, text.str());
+  throw InvalidScene(key, text.str());
 }
 
 void require_symmetric(const MatrixXd& A, const char* key) {
@@ -32,7 +28,7 @@ void require_symmetric(const MatrixXd& A, const char* key) {
       std::ostringstream text;
       text << "is not symmetric: entry (" << j + 1 << "," << i + 1 << ") is " << A(j, i)
            << ", entry (" << i + 1 << "," << j + 1 << ") is " << A(i, j);
-      fail(key, text.str());
+      throw InvalidScene(key, text.str());
     }
   }
 }
@@ -42,19 +38,21 @@ int checked_dof(const MatrixXd& M, const MatrixXd& C, const MatrixXd& K,
                 const std::vector<Piece<JointVector>>& forces) {
   const Eigen::Index n = M.rows();
   if (n < 1 || n > kMaxJoints) {
-    fail("mass",
-         "has " + std::to_string(n) + " rows, must have 1 to " + std::to_string(kMaxJoints));
+    throw InvalidScene(
+        "mass", "has " + std::to_string(n) + " rows, must have 1 to " + std::to_string(kMaxJoints));
   }
   require_square(M, n, "mass");
   require_square(C, n, "damping");
   require_square(K, n, "stiffness");
   require_symmetric(M, "mass");
   require_symmetric(K, "stiffness");
-  if (M.llt().info() != Eigen::Success) fail("mass", "is not positive definite");
+  if (M.llt().info() != Eigen::Success) throw InvalidScene("mass", "is not positive definite");
   for (const Piece<JointVector>& piece : forces) {
-    if (piece.value.size() != n) fail("forces", "a piece has the wrong number of entries");
-    if (!piece.value.allFinite()) fail("forces", "a piece is not finite");
-    if (!(piece.begin < piece.end)) fail("forces", "a piece does not begin before it ends");
+    if (piece.value.size() != n)
+      throw InvalidScene("forces", "a piece has the wrong number of entries");
+    if (!piece.value.allFinite()) throw InvalidScene("forces", "a piece is not finite");
+    if (!(piece.begin < piece.end))
+      throw InvalidScene("forces", "a piece does not begin before it ends");
   }
   return static_cast<int>(n);
 }

@@ -10,30 +10,28 @@
 namespace dashpot::sim {
 namespace {
 
-[[noreturn]] void fail(const std::string& key, const std::string& reason) {
-  throw InvalidScene(key + ": " + reason);
-}
-
 void require_size(const JointVector& values, int n, const char* key) {
   if (values.size() == n) return;
-  fail(key, "has " + std::to_string(values.size()) + " entries, must have " + std::to_string(n));
+  throw InvalidScene(
+      key, "has " + std::to_string(values.size()) + " entries, must have " + std::to_string(n));
 }
 
 void require_finite(const JointVector& values, int n, const char* key) {
   require_size(values, n, key);
-  if (!values.allFinite()) fail(key, "is not finite");
+  if (!values.allFinite()) throw InvalidScene(key, "is not finite");
 }
 
 /// Whether the option is on, after a check of its values.
 bool is_on(const JointVector& values, int n, const char* key, const char* unit) {
   if (values.size() == 0) return false;
   require_size(values, n, key);
-  if (!(values.array() >= 0).all()) fail(key, std::string("must not be negative, ") + unit);
+  if (!(values.array() >= 0).all())
+    throw InvalidScene(key, std::string("must not be negative, ") + unit);
   return (values.array() > 0).any();
 }
 
 void check(const SensorFault& fault, int n) {
-  if (!(fault.begin < fault.end)) fail("faults", "one does not begin before it ends");
+  if (!(fault.begin < fault.end)) throw InvalidScene("faults", "one does not begin before it ends");
   if (fault.position_offset.size() != 0) {
     require_finite(fault.position_offset, n, "faults: position_offset");
   }
@@ -48,7 +46,8 @@ Plant::Plant(System& system, const PlantOptions& options, const JointVector& q,
              const JointVector& qd)
     : system_(&system), options_(options), integrator_(options.integrator), noise_(options.seed) {
   const int n = system.dof();
-  if (!std::isfinite(options.period) || options.period <= 0) fail("period", "must be positive, s");
+  if (!std::isfinite(options.period) || options.period <= 0)
+    throw InvalidScene("period", "must be positive, s");
   require_finite(q, n, "initial position");
   if (qd.size() != 0) require_finite(qd, n, "initial velocity");
   y_ = StateVector::Zero(2 * n + kWorkChannels);
@@ -65,13 +64,13 @@ Plant::Plant(System& system, const PlantOptions& options, const JointVector& q,
     is_on(options.torque_limit, n, "torque_limit", "N m");
     actuation_.push_back(&limit);
   }
-  if (options.delay < 0) fail("delay", "must not be negative, ticks");
+  if (options.delay < 0) throw InvalidScene("delay", "must not be negative, ticks");
   if (options.delay > 0) {
     delayed_.assign(static_cast<std::size_t>(options.delay), torque_);
     actuation_.push_back(&delay);
   }
   if (!std::isfinite(options.torque_cutoff) || options.torque_cutoff < 0) {
-    fail("torque_cutoff", "must be finite and not negative, Hz");
+    throw InvalidScene("torque_cutoff", "must be finite and not negative, Hz");
   }
   if (options.torque_cutoff > 0) {
     filter_gain_ = -std::expm1(-2 * std::numbers::pi * options.torque_cutoff * options.period);
