@@ -1,6 +1,7 @@
 // `dashpot run --excite`: the wrench that acts, what is refused, and what a fault leaves of it.
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -47,6 +48,7 @@ std::vector<state_t> states_of(const std::string& path, const std::vector<std::s
 }
 
 TEST(Excite, PulsesActWhenTheyShould) {
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes a minute; the tests beside it run the same code";
   const Scratch scratch;
   const auto states = states_of(
       calm_scene(scratch),

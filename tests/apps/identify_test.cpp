@@ -2,6 +2,7 @@
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <array>
 #include <cmath>
@@ -312,6 +313,7 @@ class HiddenArm {
 };
 
 TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes minutes; the tests beside it run the same code";
   const Scratch scratch;
   HiddenArm arm(scratch, 2);
   const std::string inertia = "[0.13, 0.12, 0.11, 0.1, 0.09, 0.08, 0.05]";
@@ -349,11 +351,7 @@ TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
 }
 
 TEST(Identify, RecoversPayloadAndReflectedInertiasFromTenReleases) {
-#ifdef __has_feature
-#if __has_feature(address_sanitizer)
-  GTEST_SKIP() << "takes minutes with the sanitizer; the tests beside it run the same code";
-#endif
-#endif
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes minutes; the tests beside it run the same code";
   const Scratch scratch;
   HiddenArm arm(scratch, 5);
   std::vector<std::string> arguments = arm.logs;

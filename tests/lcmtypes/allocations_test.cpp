@@ -4,6 +4,7 @@
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/tests/lcmtypes/allocations.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -11,18 +12,6 @@
 #include <cstdlib>
 #include <limits>
 #include <new>
-
-// Sanitizers bring their own operator new: there nothing is counted, and the tests say so.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define DASHPOT_COUNTS_NEW 0
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define DASHPOT_COUNTS_NEW 0
-#endif
-#endif
-#ifndef DASHPOT_COUNTS_NEW
-#define DASHPOT_COUNTS_NEW 1
-#endif
 
 namespace dashpot::lcmtypes {
 
@@ -33,7 +22,7 @@ Allocations& allocations() noexcept {
 
 }  // namespace dashpot::lcmtypes
 
-#if DASHPOT_COUNTS_NEW  // for the whole program; inlined, g++ 12 takes them for a mismatch
+#if !DASHPOT_SANITIZED  // for the whole program; inlined, g++ 12 takes them for a mismatch
 [[gnu::noinline]] void* operator new(std::size_t size) {
   dashpot::lcmtypes::Allocations& all = dashpot::lcmtypes::allocations();
   ++all.count;
@@ -53,7 +42,7 @@ namespace dashpot::lcmtypes {
 namespace {
 
 TEST(Allocations, AreSeenByThisTest) {
-  if (!DASHPOT_COUNTS_NEW) GTEST_SKIP() << "the sanitizer owns operator new";
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "the sanitizer owns operator new";
   EXPECT_EQ(allocations_of([] {}).count, 0);
   const Allocations seen = allocations_of([] { std::vector<double>(1000, 1.0); });
   EXPECT_EQ(seen.count, 1);
@@ -61,7 +50,7 @@ TEST(Allocations, AreSeenByThisTest) {
 }
 
 TEST(Allocations, DoNotHappenWhereSamplesAreOffered) {
-  if (!DASHPOT_COUNTS_NEW) GTEST_SKIP() << "the sanitizer owns operator new";
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "the sanitizer owns operator new";
   Random random(981);
   PublisherOptions options;
   options.queue = 10;
@@ -81,7 +70,7 @@ TEST(Allocations, DoNotHappenWhereSamplesAreOffered) {
 }
 
 TEST(Allocations, DoNotHappenWhereCommandsAreFetched) {
-  if (!DASHPOT_COUNTS_NEW) GTEST_SKIP() << "the sanitizer owns operator new";
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "the sanitizer owns operator new";
   Random random(982);
   CommandFilter filter(limits_for(7));
   const Bytes bytes = bytes_of(random_command(random, 7));
@@ -109,7 +98,7 @@ Allocations allocations_of_decoding(Bytes bytes, std::size_t offset, std::int32_
 }
 
 TEST(Allocations, StaySmallWhateverTheSizesInAMessageSay) {
-  if (!DASHPOT_COUNTS_NEW) GTEST_SKIP() << "the sanitizer owns operator new";
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "the sanitizer owns operator new";
   Random random(983);
   const Bytes state = bytes_of(message_of<state_t>(random_state(random, 7)));
   const Bytes modes = bytes_of(message_of<modes_t>(random_modes(random, 7)));

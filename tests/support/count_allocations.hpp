@@ -2,22 +2,16 @@
 // Allocations of a thread, counted in the program's own malloc and relatives on top of glibc's;
 // operator new and Eigen call them. Any number of a program's source files may include this.
 
+#include <dashpot/tests/support/sanitized.hpp>
+
 #include <cerrno>
 #include <cstddef>
 
 // Sanitizers bring their own malloc: there nothing is counted, and a test has to skip.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if DASHPOT_SANITIZED || !defined(__GLIBC__)
 #define DASHPOT_COUNTS_ALLOCATIONS 0
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
-    __has_feature(memory_sanitizer)
-#define DASHPOT_COUNTS_ALLOCATIONS 0
-#endif
-#endif
-#if !defined(DASHPOT_COUNTS_ALLOCATIONS) && defined(__GLIBC__)
+#else
 #define DASHPOT_COUNTS_ALLOCATIONS 1
-#elif !defined(DASHPOT_COUNTS_ALLOCATIONS)
-#define DASHPOT_COUNTS_ALLOCATIONS 0
 #endif
 
 namespace dashpot::testing {
