@@ -8,6 +8,7 @@ import json
 import math
 import numbers
 import os
+import warnings
 from collections.abc import Mapping
 from typing import Any, Sequence
 
@@ -289,21 +290,24 @@ class Controller:
                   directions: Sequence[str] | None = None) -> None:
         """Sets gains that the next tick takes up; None keeps one as it is. Matrices (n x n, 6 x 6)
         may be given as their diagonals, null_stiffness and null_damping have n entries. Raises Error
-        for gains that are not possible, or leave the sampled loop too small a gain margin."""
+        for gains that are not possible, or leave the sampled loop too small a gain margin. Warns of
+        ones that are taken with too small a margin because it was smaller before."""
         given = {key: value for key, value in locals().items() if key != "self"}
-        self._core.set_gains(_gains(given))
+        _warn(self._core.set_gains(_gains(given)))
 
     def set_payload(self, mass: float, center: npt.ArrayLike = (0, 0, 0),
                     inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)), *,
-                    tool: npt.ArrayLike | None = None) -> None:
+                    tool: npt.ArrayLike | None = None,
+                    gains: Mapping[str, Any] | None = None) -> None:
         """Tells what the arm carries from the next tick on: mass (kg), centre (3, m, in the tip
         link) and inertia about it (3 x 3, kg m^2), and the pose of the tool in the tip link (4 x 4;
-        None keeps it). Weight and modes follow within motion.gain_time. Raises Error for what no
-        body can be, what the torque limits do not hold, and what leaves the gains too small a
-        margin."""
-        self._core.set_payload(float(mass), to_numbers("center", center, 1).reshape(-1, 1),
-                               to_numbers("inertia", inertia, 2),
-                               None if tool is None else to_numbers("tool", tool, 2))
+        None keeps it). `gains`, as for set_gains, come with it in the same tick. Weight and modes
+        follow within motion.gain_time. Raises Error for what no body can be, what the torque limits
+        do not hold, and what leaves the gains too small a margin. Warns as set_gains does."""
+        _warn(self._core.set_payload(float(mass), to_numbers("center", center, 1).reshape(-1, 1),
+                                     to_numbers("inertia", inertia, 2),
+                                     None if tool is None else to_numbers("tool", tool, 2),
+                                     None if gains is None else _gains(dict(gains))))
 
     def limit_tip_speed(self, *, linear: float | None = None, angular: float | None = None,
                         limit: float | None = None) -> None:
@@ -364,6 +368,11 @@ def _gains(given: dict[str, Any]) -> dict[str, Any]:
         else:
             raise TypeError(f"unknown gain '{key}'")
     return result
+
+
+def _warn(text: str) -> None:
+    if text:
+        warnings.warn(text, stacklevel=3)
 
 
 def _plain(value: object) -> object:

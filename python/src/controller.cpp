@@ -202,11 +202,13 @@ void set_setpoint(Host& host, bool cartesian, const OptionalMatrix& joint_positi
   check(dashpot_set_setpoint(host.get(), &setpoint.given));
 }
 
-void set_gains(Host& host, const nb::dict& keys) {
+/// Returns what to be warned of, as set_payload does; "" if nothing.
+std::string set_gains(Host& host, const nb::dict& keys) {
   const GainsData gains(host, keys);
   const nb::gil_scoped_release release;
   const std::lock_guard lock(host.other);
   check(dashpot_set_gains(host.get(), &gains.given));
+  return dashpot_last_error();
 }
 
 double judge_gains(Host& host, const OptionalMatrix& position, const nb::dict& keys) {
@@ -221,8 +223,11 @@ double judge_gains(Host& host, const OptionalMatrix& position, const nb::dict& k
   return margin;
 }
 
-void set_payload(Host& host, double mass, const Eigen::MatrixXd& center,
-                 const Eigen::MatrixXd& inertia, const OptionalMatrix& tool) {
+std::string set_payload(Host& host, double mass, const Eigen::MatrixXd& center,
+                        const Eigen::MatrixXd& inertia, const OptionalMatrix& tool,
+                        const std::optional<nb::dict>& keys) {
+  std::optional<GainsData> gains;
+  if (keys) gains.emplace(host, *keys);
   Numbers numbers;
   dashpot_payload payload{};
   payload.struct_size = sizeof payload;
@@ -234,9 +239,11 @@ void set_payload(Host& host, double mass, const Eigen::MatrixXd& center,
     payload.tool_position = numbers.add("", tool->topRightCorner(3, 1), 3, 1);
     payload.tool_rotation = numbers.add("", tool->topLeftCorner(3, 3), 3, 3);
   }
+  if (gains) payload.gains = &gains->given;
   const nb::gil_scoped_release release;
   const std::lock_guard lock(host.other);
   check(dashpot_set_payload(host.get(), &payload));
+  return dashpot_last_error();
 }
 
 void limit_tip_speed(Host& host, double linear, double angular, double limit) {
@@ -277,7 +284,7 @@ void add_controller(nb::module_& m) {
       .def("set_gains", &set_gains, nb::arg("gains"))
       .def("judge_gains", &judge_gains, nb::arg("position").none(), nb::arg("gains"))
       .def("set_payload", &set_payload, nb::arg("mass"), nb::arg("center"), nb::arg("inertia"),
-           nb::arg("tool").none())
+           nb::arg("tool").none(), nb::arg("gains").none())
       .def("limit_tip_speed", &limit_tip_speed, nb::arg("linear"), nb::arg("angular"),
            nb::arg("limit"))
       .def("release", &release)

@@ -172,6 +172,54 @@ def test_what_is_not_possible_is_refused_or_gives_a_status(config):
         assert found is dashpot.Status[status] and torque.shape == (7,) and np.isfinite(torque).all()
 
 
+def test_gains_that_are_taken_though_their_margin_is_small_are_warned_of(config):
+    controller = dashpot.Controller(config)
+    folded = [0, -0.2, 0, -2.9, 0, 2.9, 0.785]  # where less is borne
+
+    def gains(damping):
+        return dict(joint_stiffness=[300] * 7, joint_damping=[damping, 1, 1, 1, 1, 1, 1])
+
+    low, high = 10.0, 1e4
+    while high > 1.001 * low:
+        middle = np.sqrt(low * high)
+        if controller.judge_gains(HOME, **gains(middle)) >= 2:
+            low = middle
+        else:
+            high = middle
+    controller.update(0.0, HOME, np.zeros(7))
+    controller.set_gains(**gains(low))
+    for tick in range(1, 100):
+        controller.update(0.001 * tick, folded, np.zeros(7))
+    with pytest.raises(dashpot.Error, match="gain margin"):
+        controller.set_gains(**gains(1.02 * low))
+    with pytest.warns(UserWarning, match="asks for 2; taken because it was") as warned:
+        controller.set_gains(**gains(0.98 * low))
+        controller.set_payload(0.5, [0.3, 0, 0.05], np.diag([0.001] * 3))
+    assert [one.filename for one in warned] == [__file__] * 2
+
+
+def test_a_payload_comes_with_its_gains(config):
+    soft = {"joint_stiffness": np.array(STIFFNESS) / 4}
+    frequencies = []
+    for together, after in [(None, None), (soft, None), (None, soft)]:
+        controller = dashpot.Controller(config)
+        controller.start(HOME)
+        with pytest.raises(dashpot.Error, match="gain margin"):
+            controller.set_payload(1.5, gains={"joint_stiffness": [1e7] * 7})
+        with pytest.raises(TypeError, match="unknown gain 'stiffness'"):
+            controller.set_payload(1.5, gains={"stiffness": 1})
+        controller.set_payload(1.5, gains=together)
+        if after is not None:
+            controller.set_gains(**after)
+        for tick in range(700):
+            controller.update(tick * 0.001, HOME, np.zeros(7))
+        assert controller.snapshot().payload_mass == pytest.approx(1.5)
+        frequencies.append(controller.modes().natural_frequency)
+    stiff, with_gains, and_then_gains = frequencies
+    np.testing.assert_allclose(with_gains, and_then_gains, rtol=1e-9)
+    assert with_gains[0] < 0.9 * stiff[0]
+
+
 def test_payload_and_speed_can_be_told_in_the_loop(config):
     controller = dashpot.Controller(config)
     controller.start(HOME)
