@@ -72,24 +72,27 @@ class Arm:
         waves = np.exp(np.outer(period * np.arange(samples), self.values)) * weights
         return (waves @ self.vectors[:len(position)].T).real
 
-    def shake(self, rng, strength, samples, period):
-        """How it moves under white torques that change each period and turn each joint's inertia
-        at `strength` (rad/s^2), samples x joints."""
+    def move(self, torques, period):
+        """How torques (samples x joints, N m) that change each period move it from rest."""
         from scipy.signal import lfilter
 
         joints = len(self.mass)
-        before = int(3 / period)  # to forget the rest
-        torques = rng.standard_normal((before + samples, joints))
         drive = np.linalg.solve(self.vectors, np.vstack([
-            np.zeros((joints, joints)),
-            np.linalg.inv(self.mass) * np.diag(self.mass) * strength]).astype(complex))
+            np.zeros((joints, joints)), np.linalg.inv(self.mass)]).astype(complex))
         over = np.exp(self.values * period)
-        motion = np.zeros((before + samples, joints))
+        motion = np.zeros((len(torques), joints))
         for k, value in enumerate(self.values):
             pushes = torques @ ((over[k] - 1) / value * drive[k])
-            wave = lfilter([1], [1, -over[k]], pushes)
+            wave = lfilter([0, 1], [1, -over[k]], pushes)
             motion += np.outer(wave, self.vectors[:joints, k]).real
-        return motion[before:]
+        return motion
+
+    def shake(self, rng, strength, samples, period):
+        """How it moves under white torques that change each period and turn each joint's inertia
+        at `strength` (rad/s^2), samples x joints."""
+        before = int(3 / period)  # to forget the rest
+        torques = rng.standard_normal((before + samples, len(self.mass)))
+        return self.move(strength * torques * np.diag(self.mass), period)[before:]
 
 
 @dataclasses.dataclass
@@ -101,6 +104,8 @@ class Record:
     modes: np.ndarray
     """The true eigenvalues that count, with rising natural frequency."""
     all: np.ndarray
+    u: np.ndarray | None = None
+    """What moved it from each sample to the next, N m along one direction."""
 
 
 @functools.lru_cache(maxsize=None)
@@ -127,15 +132,41 @@ def ambient(seed):
     return Record(0.002, 0.002 * np.arange(60000), y, arm.true, arm.true)
 
 
-RECORDS = {"decays": decay, "ambient": ambient}
-NEAR = {"decays": 0.1, "ambient": 0.2}  # of a mode that is found, relative, of its eigenvalue
+@functools.lru_cache(maxsize=None)
+def excited(seed):
+    """A chirp of torques, 0.3 to 12 Hz in 10 s, which moves the arm by about 0.02 rad, and 2 s in
+    which its motion ends; modes below 10 Hz count whose resonance has 5 % of the highest one's height or more."""
+    rng = np.random.default_rng([3, seed])
+    joints = 3 + seed % 5
+    arm = Arm(rng, joints, 0.05, 0.9)
+    t = 0.001 * np.arange(12000)
+    direction = rng.standard_normal(joints) * np.diag(arm.mass)
+    u = np.where(t < 10, np.sin(2 * np.pi * (0.3 * t + 11.7 / 20 * t * t)), 0)
+    still = arm.move(np.outer(u, direction), 0.001)
+    size = 0.02 / np.abs(still).max()
+    y = size * still + 1e-5 * rng.standard_normal(still.shape)
+    residues = np.linalg.solve(arm.vectors, np.concatenate(
+        [np.zeros(joints), np.linalg.solve(arm.mass, direction)]).astype(complex))
+    shares = []
+    for mode in arm.true:
+        k = np.argmin(np.abs(arm.values - mode))
+        shape = arm.vectors[:joints, k] * residues[k]
+        shares.append(np.linalg.norm(shape / mode.real))  # the height of its resonance
+    shares = np.array(shares) / max(shares)
+    return Record(0.001, t, y,
+                  arm.true[(shares >= 0.05) & (np.abs(arm.true) < 20 * np.pi)], arm.true, size * u)
+
+
+RECORDS = {"decays": decay, "ambient": ambient, "excited": excited}
+NEAR = {"decays": 0.1, "ambient": 0.2, "excited": 0.1}  # of a mode that is found, relative, of its eigenvalue
 
 
 # The codes: each takes a record and returns eigenvalues, 1/s.
 
 
 def of_dashpot(record, kind):
-    found = dashpot.identify(record.t, record.y, find=False, ambient=kind == "ambient")
+    found = dashpot.identify(record.t, record.y, input=record.u, find=False,
+                             ambient=kind == "ambient")
     return found.modes.eigenvalues[:, 0]
 
 
@@ -198,9 +229,24 @@ def koma(record, kind, count, rows, order, weighting="none"):
     return upper(koma.oma.find_stable_poles(values, shapes, of, 1)[0])
 
 
-def sdypy(record, kind, method, count, order):
+def response(record, count, highest):
+    """The receptance of each channel, and its frequencies in Hz, from 0 to `highest`: the quotient
+    of the transforms of the whole record, which begins and ends at rest."""
+    rows = len(record.y) // count
+    # Means of both: their quotient is as before.
+    y = record.y[:rows * count].reshape(rows, count, -1).mean(axis=1).T
+    u = record.u[:rows * count].reshape(rows, count).mean(axis=1)
+    f = np.fft.rfftfreq(rows, record.period * count)
+    return (np.fft.rfft(y) / np.fft.rfft(u))[:, f <= highest], f[f <= highest]
+
+
+def sdypy(record, kind, method, count, order, highest=0):
     from sdypy import EMA
 
+    if kind == "excited":
+        lines, f = response(record, count, highest)
+        model = EMA.Model(lines, f, lower=0.2, upper=f[-1], pol_order_high=order)
+        return stable_of(model, method)
     y, period = means(record, count)
     y = y[:len(y) // 2 * 2]
     # The transform of a decay is a sum of its modes' transforms, as a frequency response is. The
@@ -209,6 +255,10 @@ def sdypy(record, kind, method, count, order):
     f = np.fft.rfftfreq(len(y) + 2, period * len(y) / (len(y) + 2))
     model = EMA.Model(np.column_stack([lines, lines[:, -1]]), f,
                       lower=f[1] if method == "lscf" else 0, upper=f[-1], pol_order_high=order)
+    return stable_of(model, method)
+
+
+def stable_of(model, method):
     model.get_poles(method=method, show_progress=False)
     stable = []  # as in its diagram: frequency within 5 %, ratio within 10 % of the order before
     for before, after in zip(map(upper, model.all_poles), map(upper, model.all_poles[1:])):
@@ -254,6 +304,10 @@ RIVALS = [
           dict(method="pLSCF", count=10, order=8, segment=512), False),
     Rival("koma covssi, CVA", "koma-python", "koma.oma", "ambient", koma,
           dict(count=10, rows=10, order=40, weighting="cva"), False),
+    Rival("sdypy-EMA LSCF", "sdypy-EMA", "sdypy.EMA", "excited", sdypy,
+          dict(method="lscf", count=10, order=20, highest=14), True),
+    Rival("sdypy-EMA LSCE", "sdypy-EMA", "sdypy.EMA", "excited", sdypy,
+          dict(method="lsce", count=10, order=20, highest=14), True),
 ]
 
 
@@ -351,8 +405,10 @@ def test_is_as_exact_as(rival):
 
 def test_finds_modes_of_these_records():
     pytest.importorskip("scipy")
-    decays, shaken = compare("decays", range(20)), compare("ambient", range(20))
+    decays, shaken, moved = (compare(kind, range(20)) for kind in RECORDS)
     assert decays.found >= 0.95 * decays.modes and shaken.found >= 0.8 * shaken.modes
+    assert moved.found >= 0.95 * moved.modes
+    assert np.all(np.median(moved.both[:, 2], axis=0) < 5e-4)
     assert np.all(np.median(decays.both[:, 2], axis=0) < 5e-4)
     assert np.all(np.median(shaken.both[:, 2], axis=0) < 0.025)
 
