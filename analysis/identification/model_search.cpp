@@ -94,9 +94,8 @@ ModelSearch::ModelSearch(const ExcitedCells& cells, int max_order)
       duration_(cells.duration),
       most_added_(3),
       iterations_(15) {
-  const int most = max_order > 0
-                       ? max_order
-                       : static_cast<int>(std::clamp<Index>(2 * data.channels + 2, 12, 32));
+  const int most =
+      max_order > 0 ? max_order : static_cast<int>(std::min<Index>(2 * data.channels + 16, 32));
   by_order = common_denominator_poles(cells.bridged, cells.step, most, cells.highest);
   for (std::vector<RealizedPole>& poles : by_order) {
     for (RealizedPole& pole : poles) {

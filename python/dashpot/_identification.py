@@ -108,7 +108,7 @@ def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike],
     many small, irregular forces shake, which nobody measured, for a minute or more (covariance-
     driven stochastic subspace identification, Peeters and De Roeck 1999). `max_order` bounds the
     order of the models tried (0: 2 for each channel, at least 12; of ambient motion 4 for each
-    channel and 4 more, at most 40; with inputs 2 more).
+    channel and 4 more, at most 40; with inputs 2 for each channel and 16 more, at most 32).
 
     Raises Error for arrays of the wrong size, times that do not rise, fewer than 20 samples, where
     nothing moves freely, inputs of which none moves, and for ambient motion that is too short.

