@@ -396,7 +396,7 @@ def test_is_as_exact_as(rival):
     theirs = compare(rival.kind, seeds, rival)
     found = compare(rival.kind, seeds).found
     assert theirs.found > 0.3 * theirs.modes, "is it called as it wants to be?"
-    assert found >= (0.95 if rival.kind == "excited" else 1) * theirs.found
+    assert found >= theirs.found
     best, middle, own = np.median(theirs.both, axis=0)
     assert np.all(own <= middle), (own, middle)
     if rival.nearest:
@@ -405,9 +405,10 @@ def test_is_as_exact_as(rival):
 
 def test_finds_modes_of_these_records():
     pytest.importorskip("scipy")
-    decays, shaken, moved = (compare(kind, range(20)) for kind in RECORDS)
+    decays, shaken, moved = (compare(kind, range(number)) for kind, number in
+                             [("decays", 20), ("ambient", 20), ("excited", 6)])
     assert decays.found >= 0.95 * decays.modes and shaken.found >= 0.8 * shaken.modes
-    assert moved.found >= 0.9 * moved.modes
+    assert moved.found >= 0.95 * moved.modes
     assert np.all(np.median(moved.both[:, 2], axis=0) < 5e-4)
     assert np.all(np.median(decays.both[:, 2], axis=0) < 5e-4)
     assert np.all(np.median(shaken.both[:, 2], axis=0) < 0.025)
