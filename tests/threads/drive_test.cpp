@@ -81,7 +81,9 @@ command_t command_for(const state_t& state, std::int32_t parts, std::int64_t seq
 void Drive::hold_and_move() {
   const Scratch scratch;
   const std::string config = changed_configuration(
-      scratch, arm, {{"analysis:", "commands: {silence: 30 s, oldest: 20 s}\nanalysis:"}});
+      scratch, arm,
+      {{"analysis:",  // gaps are for a machine that is busy
+        "commands: {silence: 30 s, oldest: 20 s}\nwatchdog: {longest_gap: 200 ms}\nanalysis:"}});
   Listener listener(url);
   Running fake(driver());
   const std::string log = scratch.path("drive.lcm");
