@@ -3,7 +3,6 @@
 #include <dashpot/analysis/base/require.hpp>
 
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 namespace dashpot::analysis {

@@ -14,7 +14,7 @@ import os
 import platform
 import time
 import warnings
-from typing import Callable
+from typing import Callable, Optional
 
 import numpy as np
 import pytest
@@ -73,18 +73,19 @@ class Arm:
         return (waves @ self.vectors[:len(position)].T).real
 
     def move(self, torques, period):
-        """How torques (samples x joints, N m) that change each period move it from rest."""
+        """How torques (samples x joints, N m) that change each period move it from rest, at the
+        beginning of each period and at the end, (samples + 1) x joints."""
         from scipy.signal import lfilter
 
         joints = len(self.mass)
         drive = np.linalg.solve(self.vectors, np.vstack([
             np.zeros((joints, joints)), np.linalg.inv(self.mass)]).astype(complex))
         over = np.exp(self.values * period)
-        motion = np.zeros((len(torques), joints))
+        motion = np.zeros((len(torques) + 1, joints))
         for k, value in enumerate(self.values):
             pushes = torques @ ((over[k] - 1) / value * drive[k])
-            wave = lfilter([0, 1], [1, -over[k]], pushes)
-            motion += np.outer(wave, self.vectors[:joints, k]).real
+            wave = lfilter([1], [1, -over[k]], pushes)
+            motion[1:] += np.outer(wave, self.vectors[:joints, k]).real
         return motion
 
     def shake(self, rng, strength, samples, period):
@@ -92,7 +93,7 @@ class Arm:
         at `strength` (rad/s^2), samples x joints."""
         before = int(3 / period)  # to forget the rest
         torques = rng.standard_normal((before + samples, len(self.mass)))
-        return self.move(strength * torques * np.diag(self.mass), period)[before:]
+        return self.move(strength * torques * np.diag(self.mass), period)[before + 1:]
 
 
 @dataclasses.dataclass
@@ -104,7 +105,7 @@ class Record:
     modes: np.ndarray
     """The true eigenvalues that count, with rising natural frequency."""
     all: np.ndarray
-    u: np.ndarray | None = None
+    u: Optional[np.ndarray] = None
     """What moved it from each sample to the next, N m along one direction."""
 
 
@@ -135,14 +136,15 @@ def ambient(seed):
 @functools.lru_cache(maxsize=None)
 def excited(seed):
     """A chirp of torques, 0.3 to 12 Hz in 10 s, which moves the arm by about 0.02 rad, and 2 s in
-    which its motion ends; modes below 10 Hz count whose resonance has 5 % of the highest one's height or more."""
+    which its motion ends; modes below 10 Hz count whose resonance has 5 % of the highest one's
+    height or more."""
     rng = np.random.default_rng([3, seed])
     joints = 3 + seed % 5
     arm = Arm(rng, joints, 0.05, 0.9)
     t = 0.001 * np.arange(12000)
     direction = rng.standard_normal(joints) * np.diag(arm.mass)
     u = np.where(t < 10, np.sin(2 * np.pi * (0.3 * t + 11.7 / 20 * t * t)), 0)
-    still = arm.move(np.outer(u, direction), 0.001)
+    still = arm.move(np.outer(u, direction), 0.001)[:-1]
     size = 0.02 / np.abs(still).max()
     y = size * still + 1e-5 * rng.standard_normal(still.shape)
     residues = np.linalg.solve(arm.vectors, np.concatenate(
@@ -158,7 +160,8 @@ def excited(seed):
 
 
 RECORDS = {"decays": decay, "ambient": ambient, "excited": excited}
-NEAR = {"decays": 0.1, "ambient": 0.2, "excited": 0.1}  # of a mode that is found, relative, of its eigenvalue
+# Of a mode that is found, relative, of its eigenvalue.
+NEAR = {"decays": 0.1, "ambient": 0.2, "excited": 0.1}
 
 
 # The codes: each takes a record and returns eigenvalues, 1/s.
