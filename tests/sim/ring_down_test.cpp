@@ -40,14 +40,14 @@ const analysis::IdentifiedMode& nearest(const analysis::IdentifiedModes& fit, Co
 }
 
 /// One arm at one random posture with random gains, to be released with one period or another.
-struct Scene {
+struct ReleasedTwin {
   const TwinModels& twin;
   Random& random;
   JointVector q0;
   controller::Gains gains;
   analysis::SampledLoop loop;
 
-  Scene(const TwinModels& models, Random& generator, bool hold_posture)
+  ReleasedTwin(const TwinModels& models, Random& generator, bool hold_posture)
       : twin(models), random(generator), q0(random_posture(models, generator)) {
     VectorXd omega(6), zeta(6);
     for (int i = 0; i < 6; ++i) {
@@ -118,7 +118,7 @@ class RingDown : public ::testing::TestWithParam<testing::Arm> {
   TwinModels twin{GetParam()};
 
   /// Every other one holds its posture.
-  Scene scene_of(int seed, Random& random) const { return {twin, random, seed % 2 == 0}; }
+  ReleasedTwin scene_of(int seed, Random& random) const { return {twin, random, seed % 2 == 0}; }
   void report(const Worst& worst) const {
     std::printf("%-12s %3d modes, seeds 1 to %d: frequency within %.2e, ratio within %.2e\n",
                 GetParam().file, worst.modes, kPostures, worst.frequency, worst.ratio);
@@ -131,7 +131,7 @@ TEST_P(RingDown, HasTheModesOfTheSampledLoopAtOneKilohertz) {
   Worst worst;
   for (int seed = 1; seed <= kPostures; ++seed) {
     Random random(static_cast<std::uint64_t>(seed));
-    Scene scene = scene_of(seed, random);
+    ReleasedTwin scene = scene_of(seed, random);
     scene.loop.delay = seed % 3;
     scene.loop.torque_cutoff = seed % 4 == 3 ? 200 : 0;
     scene.loop.difference_velocity = seed % 5 == 4;
@@ -144,7 +144,7 @@ TEST_P(RingDown, HasThePublishedModesAtTenKilohertz) {
   Worst worst;
   for (int seed = 1; seed <= kPostures; ++seed) {
     Random random(static_cast<std::uint64_t>(seed));
-    Scene scene = scene_of(seed, random);
+    ReleasedTwin scene = scene_of(seed, random);
     scene.loop.period = 1e-4;
     scene.compare(false, 2000, 10, worst);
   }
