@@ -14,9 +14,11 @@ struct Command {
   std::int32_t parts = 0;     ///< sum of command_t::MODE, ... that were ever set
   std::int64_t accepted = 0;  ///< number of accepted commands so far
   /// For each bit of `parts`, the number of the accepted command that set it last, counted from 1.
-  std::array<std::int64_t, 13> set_by{};
+  std::array<std::int64_t, 14> set_by{};
   std::int64_t fault_tick = 0;     ///< of part RELEASE: the fault to release, by its tick
   controller::Payload payload;     ///< of part PAYLOAD
+  controller::Pose tool;           ///< of part TOOL_FRAME: T in the tip link
+  controller::Pose pose_tool;      ///< T of the tip's pose in `setpoint`, as the CommandTaker says
   controller::TipSpeed tip_speed;  ///< of part TIP_SPEED
   controller::Setpoint setpoint;   ///< only the parts set so far mean anything; its time does not
 };

@@ -14,8 +14,9 @@ namespace dashpot::lcmtypes {
 
 /// Decides last about a command that passed all other checks and is contained in `command`. Returns
 /// true if the command is accepted, and false if the controller refuses its gains; `reason` then
-/// says why, in one line.
-using CommandTaker = std::function<bool(const Command& command, std::string& reason)>;
+/// says why, in one line. Sets Command::pose_tool if the command sets the tip's pose, because what
+/// T is only the controller knows.
+using CommandTaker = std::function<bool(Command& command, std::string& reason)>;
 
 /// Decides which commands are accepted, and accumulates what they set. Judging needs no memory
 /// beyond the memory of one decoded message, and the work is bounded.

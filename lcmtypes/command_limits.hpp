@@ -20,6 +20,7 @@ struct CommandLimits {
   double damping_ratio = controller::kLargestDampingRatio;
   double payload = 20;               ///< mass, kg
   double payload_distance = 1;       ///< of its centre from the tip link's origin, m
+  double tool_distance = 1;          ///< of T's origin from the tip link's, m
   double linear_velocity = 10;       ///< of the tip's reference, m/s; hosts set the robot's
   double angular_velocity = 100;     ///< likewise, rad/s
   double tip_velocity = 10;          ///< limit of the tip's speed, m/s; likewise

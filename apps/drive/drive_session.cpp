@@ -301,7 +301,7 @@ void DriveSession::begin(const DriverStatus& status) {
   const auto there = controller::evaluate(config_.model, status.position, JointVector::Zero(n_));
   setpoint.tip_pose = {there.p_BT_B, there.R_BT};
   setpoint.wrench.setZero();
-  goal_.begin(setpoint);
+  goal_.begin(setpoint, config_.model.attachment());
   fastest_.reset();  // the iiwa's driver was still learning the robot's clock
   running_ = true;
 }

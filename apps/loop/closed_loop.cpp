@@ -58,7 +58,7 @@ void ClosedLoop::begin() {
       controller_.set_gains(first.gains, reason) != DASHPOT_OK) {
     throw InputError("scenario.start", "the controller refuses it: " + reason);
   }
-  goal_.begin(first);
+  goal_.begin(first, scene_.arm->config.model.attachment());
 }
 
 void ClosedLoop::guide(const JointVector& from, const JointVector& to, double duration,
@@ -150,7 +150,7 @@ void ClosedLoop::follow_gains() {
   const std::size_t due = due_steps_.load(std::memory_order_acquire);
   if (due == followed_steps_) return;
   const controller::Gains& wanted = scene_.steps[due - 1].setpoint.gains;
-  LoopGoal::Change change{[&wanted](controller::Gains& gains) { gains = wanted; }, {}, {}};
+  LoopGoal::Change change{[&wanted](controller::Gains& gains) { gains = wanted; }, {}, {}, {}};
   for (; followed_steps_ < due; ++followed_steps_) {
     const auto& payload = scene_.steps[followed_steps_].payload;
     if (payload) change.payload = payload;

@@ -1,4 +1,5 @@
 #include <dashpot/apps/loop/command_source.hpp>
+#include <dashpot/controller/attachment.hpp>
 
 #include <utility>
 
@@ -8,7 +9,7 @@ namespace {
 using lcmtypes::Command;
 
 /// The receiver's part of a command that is in order: false if the controller refuses it.
-bool carry_out(const Command& command, LoopGoal& goal, std::string& reason) {
+bool carry_out(Command& command, LoopGoal& goal, std::string& reason) {
   const std::int64_t before = command.accepted - 1;
   const auto change = [&command, before](controller::Gains& gains) {
     controller::Setpoint changed;
@@ -16,12 +17,16 @@ bool carry_out(const Command& command, LoopGoal& goal, std::string& reason) {
     lcmtypes::apply(command, changed, before);
     gains = changed.gains;
   };
-  LoopGoal::Change wanted{change, {}, {}};
+  LoopGoal::Change wanted{change, {}, {}, {}};
   if (lcmtypes::has_set(command, command_t::PAYLOAD, before)) wanted.payload = command.payload;
+  if (lcmtypes::has_set(command, command_t::TOOL_FRAME, before)) wanted.tool = command.tool;
   if (lcmtypes::has_set(command, command_t::TIP_SPEED, before)) {
     wanted.tip_speed = command.tip_speed;
   }
   if (goal.change(wanted, reason) != DASHPOT_OK) return false;
+  if (lcmtypes::has_set(command, command_t::TIP_POSE, before)) {
+    command.pose_tool = goal.latest_tool();
+  }
   if (lcmtypes::has_set(command, command_t::RELEASE, before)) goal.release();
   return true;
 }
@@ -31,7 +36,7 @@ bool carry_out(const Command& command, LoopGoal& goal, std::string& reason) {
 CommandSource::CommandSource(std::shared_ptr<lcm::LCM> bus, const lcmtypes::CommandLimits& limits,
                              LoopGoal& goal)
     : goal_(goal),
-      receiver_(std::move(bus), limits, [&goal](const Command& command, std::string& reason) {
+      receiver_(std::move(bus), limits, [&goal](Command& command, std::string& reason) {
         return carry_out(command, goal, reason);
       }) {}
 
@@ -49,6 +54,9 @@ bool CommandSource::take() noexcept {
   if (taken_) {
     controller::Setpoint setpoint = goal_.setpoint();
     lcmtypes::apply(command, setpoint, before);
+    if (lcmtypes::has_set(command, command_t::TIP_POSE, before)) {
+      setpoint.tip_pose = controller::carried(setpoint.tip_pose, command.pose_tool, goal_.tool());
+    }
     goal_.hold(setpoint);
   }
   return lcmtypes::has_set(command, command_t::RELEASE, before);

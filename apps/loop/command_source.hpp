@@ -8,9 +8,9 @@
 
 namespace dashpot::apps {
 
-/// Takes commands for a loop from a bus. Gains, payload, speeds and releases go to the controller
-/// on the receiver's thread, because they are judged, which may take milliseconds; what it refuses
-/// is refused whole. The rest goes to the loop's thread.
+/// Takes commands for a loop from a bus. Gains, payload, tool, speeds and releases go to the
+/// controller on the receiver's thread, because they are judged, which may take milliseconds; what
+/// it refuses is refused whole. The rest goes to the loop's thread.
 class CommandSource {
  public:
   /// `goal` must outlive it. Otherwise as CommandReceiver.

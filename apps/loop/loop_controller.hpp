@@ -20,6 +20,7 @@ class LoopController {
 
   /// A tick: the torque for this measurement, and a status. `time` in ns; n entries each.
   /// `setpoint` says where to go, and is new if its time is; its gains do not count. Null: no news.
+  /// A pose is one of the T that a tick before has taken up.
   virtual std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
                               const controller::Setpoint* setpoint,
                               JointVector& torque) noexcept = 0;
@@ -36,9 +37,9 @@ class LoopController {
   /// The springs and dampers from the next tick on. Returns as start(); with DASHPOT_OK `reason`
   /// says what to be warned of, or nothing.
   virtual std::int32_t set_gains(const controller::Gains& gains, std::string& reason) = 0;
-  /// What the arm carries from the next tick on, and with which gains, if there are new ones; the
-  /// tool stays. Returns as set_gains().
-  virtual std::int32_t set_payload(const controller::Payload& payload,
+  /// What the arm carries from the next tick on, where T is in the tip link, and with which gains,
+  /// if there are new ones. Returns as set_gains().
+  virtual std::int32_t set_payload(const controller::Payload& payload, const controller::Pose& tool,
                                    const controller::Gains* gains, std::string& reason) = 0;
   /// How fast the tip may be from the next tick on. Returns as start().
   virtual std::int32_t limit_tip_speed(const controller::TipSpeed& speed, std::string& reason) = 0;

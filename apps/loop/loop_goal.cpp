@@ -5,15 +5,21 @@
 
 namespace dashpot::apps {
 
-void LoopGoal::begin(const controller::Setpoint& setpoint) {
+void LoopGoal::begin(const controller::Setpoint& setpoint,
+                     const controller::Attachment& attachment) {
   setpoint_ = accepted_ = setpoint;
   in_force_ = news_ = true;
+  tool_ = attachment.tool;
   const std::lock_guard lock(mutex_);
   gains_ = setpoint.gains;
+  payload_ = attachment.payload();
+  latest_tool_ = attachment.tool;
   begun_ = true;
 }
 
 const controller::Setpoint* LoopGoal::told(std::int64_t time) noexcept {
+  told_ = false;
+  if (!follow_tool()) return nullptr;
   // New gains count with a set-point that is read again.
   const std::int64_t changes = gain_changes_.load(std::memory_order_acquire);
   if (ticks_++ % repeat_every_ == 0 || changes != gain_changes_seen_) news_ = true;
@@ -33,11 +39,26 @@ const controller::Setpoint* LoopGoal::told(std::int64_t time) noexcept {
   return &excited_;
 }
 
+bool LoopGoal::follow_tool() noexcept {
+  const std::int64_t changes = tool_changes_.load(std::memory_order_acquire);
+  if (changes == tool_changes_seen_) return true;
+  if (changes % 2 != 0) return false;
+  tool_changes_seen_ = changes;
+  if (!tools_.fetch()) return false;  // it was refused
+  for (controller::Setpoint* held : {&setpoint_, &accepted_}) {
+    held->tip_pose = controller::carried(held->tip_pose, tool_, tools_.value());
+  }
+  tool_ = tools_.value();
+  news_ = true;
+  return false;  // this tick takes T up, if none before did
+}
+
 void LoopGoal::note_status(std::int32_t status) noexcept {
+  if (!told_) return;
   // What was rejected shows in the status, once; then what was held before goes on.
-  const bool rejected = told_ && news_ && status == DASHPOT_SETPOINT_REJECTED;
+  const bool rejected = news_ && status == DASHPOT_SETPOINT_REJECTED;
   if (rejected) setpoint_ = accepted_;
-  if (told_ && news_ && !rejected) accepted_ = setpoint_;
+  if (news_ && !rejected) accepted_ = setpoint_;
   news_ = rejected;
 }
 
@@ -59,7 +80,7 @@ void LoopGoal::note_fault(bool latched) noexcept {
 
 std::int32_t LoopGoal::change_gains(const std::function<void(controller::Gains&)>& change,
                                     std::string& reason) {
-  return this->change({change, {}, {}}, reason);
+  return this->change({change, {}, {}, {}}, reason);
 }
 
 std::int32_t LoopGoal::change(const Change& change, std::string& reason) {
@@ -75,8 +96,8 @@ std::int32_t LoopGoal::change(const Change& change, std::string& reason) {
   std::int32_t code = DASHPOT_OK;
   if (change.tip_speed) code = controller_.limit_tip_speed(*change.tip_speed, said);
   const bool slowed = change.tip_speed && code == DASHPOT_OK;
-  if (code == DASHPOT_OK && change.payload) {
-    code = controller_.set_payload(*change.payload, news ? &gains : nullptr, said);
+  if (code == DASHPOT_OK && (change.payload || change.tool)) {
+    code = attach(change, news ? &gains : nullptr, said);
   } else if (code == DASHPOT_OK && news) {
     code = controller_.set_gains(gains, said);
   }
@@ -91,6 +112,32 @@ std::int32_t LoopGoal::change(const Change& change, std::string& reason) {
   gains_ = gains;
   if (news) gain_changes_.fetch_add(1, std::memory_order_release);
   return code;
+}
+
+std::int32_t LoopGoal::attach(const Change& change, const controller::Gains* gains,
+                              std::string& said) {
+  struct UnderWay {
+    explicit UnderWay(std::atomic<std::int64_t>& changes) : count(changes) { ++count; }
+    ~UnderWay() { ++count; }
+    UnderWay(const UnderWay&) = delete;
+    UnderWay& operator=(const UnderWay&) = delete;
+    std::atomic<std::int64_t>& count;
+  };
+  const controller::Payload payload = change.payload.value_or(payload_);
+  const controller::Pose tool = change.tool.value_or(latest_tool_);
+  std::optional<UnderWay> under_way;
+  if (change.tool) under_way.emplace(tool_changes_);
+  const std::int32_t code = controller_.set_payload(payload, tool, gains, said);
+  if (code != DASHPOT_OK) return code;
+  if (change.tool) tools_.write(tool);
+  payload_ = payload;
+  latest_tool_ = tool;
+  return code;
+}
+
+controller::Pose LoopGoal::latest_tool() {
+  const std::lock_guard lock(mutex_);
+  return latest_tool_;
 }
 
 void LoopGoal::release() {

@@ -1,6 +1,8 @@
 #pragma once
 #include <dashpot/apps/loop/excitation.hpp>
 #include <dashpot/apps/loop/loop_controller.hpp>
+#include <dashpot/controller/attachment.hpp>
+#include <dashpot/controller/latest.hpp>
 
 #include <atomic>
 #include <cstdint>
@@ -12,7 +14,8 @@
 namespace dashpot::apps {
 
 /// What a loop is to do: the set-point that it holds, which is repeated so that it does not go
-/// stale, and the gains in force. Between the loop's thread and those that command it.
+/// stale, the gains in force, and what is attached to the tip link. Between the loop's thread and
+/// those that command it. A new T keeps the place of what is held on the tip link.
 class LoopGoal {
  public:
   /// The controller must outlive it. The set-point is repeated once in so many ticks.
@@ -20,22 +23,26 @@ class LoopGoal {
       : controller_(controller), repeat_every_(repeat_every) {}
 
   // Before the loop begins:
-  /// Holds `setpoint`, with the gains in it, which the controller has taken already.
-  void begin(const controller::Setpoint& setpoint);
+  /// Holds `setpoint`, with the gains in it, which the controller has taken already, and with what
+  /// is attached to the tip link.
+  void begin(const controller::Setpoint& setpoint, const controller::Attachment& attachment);
 
   /// Adds this wrench to that of what is held. Its time begins with the next tick; a fault ends it
   /// for good.
   void excite(const Excitation& excitation) noexcept { excitation_ = excitation; }
 
   // The loop's thread:
-  /// Before a tick at `time`, ns: what the controller is told; null: nothing.
+  /// Before a tick at `time`, ns: what the controller is told; null: nothing, as long as no tick
+  /// is known to have taken up a new T.
   const controller::Setpoint* told(std::int64_t time) noexcept;
   /// After that tick.
   void note_status(std::int32_t status) noexcept;
-  /// Goes there from the next tick on. The gains of `setpoint` do not count.
+  /// Goes there from the next tick on, with a pose of tool(). The gains of `setpoint` do not count.
   void hold(const controller::Setpoint& setpoint) noexcept;
   /// What the controller was told to hold last.
   const controller::Setpoint& setpoint() const noexcept { return setpoint_; }
+  /// T in the tip link, of the pose in setpoint().
+  const controller::Pose& tool() const noexcept { return tool_; }
   /// After a tick: whether a fault is latched. Meanwhile nothing is held. Whoever releases it finds
   /// the robot held where it is until there is news; if the controller has let go of the fault by
   /// itself, what was held before goes on.
@@ -51,15 +58,24 @@ class LoopGoal {
   struct Change {
     std::function<void(controller::Gains&)> gains;
     std::optional<controller::Payload> payload;
+    std::optional<controller::Pose> tool;  ///< T in the tip link
     std::optional<controller::TipSpeed> tip_speed;
   };
   /// Makes all of a change, which the controller judges by what it leads to, or, if it is refused,
   /// nothing. What the controller warns of goes to stderr. Otherwise as change_gains().
   std::int32_t change(const Change& change, std::string& reason);
+  /// T in the tip link, as the controller was told last; the loop may not have taken it up yet.
+  controller::Pose latest_tool();
   /// Releases a latched fault at the next tick.
   void release();
 
  private:
+  /// Carries what is held over to a new T. False as long as it is unknown which T the controller
+  /// counts with in the next tick.
+  bool follow_tool() noexcept;
+  /// Has the controller take the payload, the tool and, unless null, the gains.
+  std::int32_t attach(const Change& change, const controller::Gains* gains, std::string& said);
+
   LoopController& controller_;
   std::int64_t repeat_every_;
 
@@ -75,14 +91,20 @@ class LoopGoal {
   bool faulted_ = false;                       ///< a fault was latched after the last tick
   std::int64_t ticks_ = 0;
   std::int64_t gain_changes_seen_ = 0;
+  controller::Pose tool_;  ///< T in the tip link, of the poses above
+  std::int64_t tool_changes_seen_ = 0;
 
   // Between the threads:
   std::atomic<std::int64_t> gain_changes_{0};  ///< so far
   std::atomic<bool> released_{false};          ///< somebody asked for the release of the fault
+  std::atomic<std::int64_t> tool_changes_{0};  ///< twice those so far; odd: one is under way
+  controller::Latest<controller::Pose> tools_;
 
   std::mutex mutex_;  ///< of what follows, and of the controller's functions for other threads
   bool begun_ = false;
   controller::Gains gains_;
+  controller::Payload payload_;
+  controller::Pose latest_tool_;
   controller::TipSpeed tip_speed_;
 };
 

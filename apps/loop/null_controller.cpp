@@ -79,8 +79,8 @@ class NullController : public LoopController {
 
   std::int32_t start(const JointVector&, std::string&) override { return DASHPOT_OK; }
   std::int32_t set_gains(const controller::Gains&, std::string&) override { return DASHPOT_OK; }
-  std::int32_t set_payload(const controller::Payload&, const controller::Gains*,
-                           std::string&) override {
+  std::int32_t set_payload(const controller::Payload&, const controller::Pose&,
+                           const controller::Gains*, std::string&) override {
     return DASHPOT_OK;
   }
   std::int32_t limit_tip_speed(const controller::TipSpeed&, std::string&) override {

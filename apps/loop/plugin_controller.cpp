@@ -67,8 +67,8 @@ class PluginController : public LoopController {
     return explain(plugin_.set_gains(handle_.get(), &wanted), reason);
   }
 
-  std::int32_t set_payload(const controller::Payload& payload, const controller::Gains* gains,
-                           std::string& reason) override {
+  std::int32_t set_payload(const controller::Payload& payload, const controller::Pose& tool,
+                           const controller::Gains* gains, std::string& reason) override {
     dashpot_payload wanted{};
     std::optional<GainArrays> arrays;
     dashpot_gains with{};
@@ -80,6 +80,9 @@ class PluginController : public LoopController {
     wanted.mass = payload.mass;
     Eigen::Map<Eigen::Vector3d>(wanted.center) = payload.center;
     Eigen::Map<RowMajor3>(wanted.inertia) = payload.inertia;
+    const RowMajor3 rotation = tool.rotation;
+    wanted.tool_position = tool.position.data();
+    wanted.tool_rotation = rotation.data();
     return explain(plugin_.set_payload(handle_.get(), &wanted), reason);
   }
 

@@ -76,6 +76,8 @@ MessageJson message_json(const state_t& m) {
           {"task_damping_ratio", m.task_damping_ratio},
           {"payload_mass", m.payload_mass},
           {"payload_center", fixed_list(m.payload_center)},
+          {"tool_position", fixed_list(m.tool_position)},
+          {"tool_quaternion", fixed_list(m.tool_quaternion)},
           {"tick_time", m.tick_time},
           {"longest_tick_time", m.longest_tick_time},
           {"overruns", m.overruns},

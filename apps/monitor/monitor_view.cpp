@@ -89,13 +89,17 @@ std::string tick_times(const state_t& state) {
          fixed(1e-3 * state.longest_tick_time, 1) + ")";
 }
 
-/// What the arm carries, and the damping ratios that are held.
+/// " at (0.000, 0.000, 0.100) m"
+std::string place(const double (&p)[3]) {
+  return " at (" + fixed(p[0], 3) + ", " + fixed(p[1], 3) + ", " + fixed(p[2], 3) + ") m";
+}
+
+/// What the arm carries, where its tool is, and the damping ratios that are held.
 std::string told(const state_t& state) {
   std::string text = "payload " + format_number(state.payload_mass, 4) + " kg";
-  if (state.payload_mass != 0) {
-    const auto& c = state.payload_center;
-    text += " at (" + fixed(c[0], 3) + ", " + fixed(c[1], 3) + ", " + fixed(c[2], 3) + ") m";
-  }
+  if (state.payload_mass != 0) text += place(state.payload_center);
+  const auto& tool = state.tool_position;
+  if (tool[0] != 0 || tool[1] != 0 || tool[2] != 0) text += "; tool" + place(tool);
   for (const auto& [name, ratio] :
        {std::pair("joint", state.joint_damping_ratio), {"task", state.task_damping_ratio}}) {
     if (ratio != 0) text += "; " + std::string(name) + " damping ratio " + format_number(ratio, 3);

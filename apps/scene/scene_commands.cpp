@@ -27,15 +27,25 @@ void read_at_most(const YamlMapping& keys, const char* key, const char* unit, do
 }  // namespace
 
 void read_commands(const YamlMapping& root, lcmtypes::CommandLimits& limits) {
-  static constexpr std::array<std::string_view, 18> kKeys = {"reach",           "force",
-                                                             "torque",          "joint_stiffness",
-                                                             "joint_damping",   "task_stiffness",
-                                                             "task_damping",    "damping_ratio",
-                                                             "payload",         "payload_distance",
-                                                             "linear_velocity", "angular_velocity",
-                                                             "tip_velocity",    "oldest",
-                                                             "furthest",        "silence",
-                                                             "most_per_second", "burst"};
+  static constexpr std::array<std::string_view, 19> kKeys = {"reach",
+                                                             "force",
+                                                             "torque",
+                                                             "joint_stiffness",
+                                                             "joint_damping",
+                                                             "task_stiffness",
+                                                             "task_damping",
+                                                             "damping_ratio",
+                                                             "payload",
+                                                             "payload_distance",
+                                                             "tool_distance",
+                                                             "linear_velocity",
+                                                             "angular_velocity",
+                                                             "tip_velocity",
+                                                             "oldest",
+                                                             "furthest",
+                                                             "silence",
+                                                             "most_per_second",
+                                                             "burst"};
   const YamlMapping keys = root.mapping("commands", kKeys);
   read_number(keys, "reach", "m", kPositive, limits.reach);
   read_number(keys, "force", "N", kNotNegative, limits.force);
@@ -47,6 +57,7 @@ void read_commands(const YamlMapping& root, lcmtypes::CommandLimits& limits) {
   read_at_most(keys, "damping_ratio", "", limits.damping_ratio);
   read_number(keys, "payload", "kg", kNotNegative, limits.payload);
   read_number(keys, "payload_distance", "m", kNotNegative, limits.payload_distance);
+  read_number(keys, "tool_distance", "m", kNotNegative, limits.tool_distance);
   read_at_most(keys, "linear_velocity", "m/s", limits.linear_velocity);
   read_at_most(keys, "angular_velocity", "rad/s", limits.angular_velocity);
   read_at_most(keys, "tip_velocity", "m/s", limits.tip_velocity);

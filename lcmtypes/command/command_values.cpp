@@ -18,7 +18,7 @@ using controller::Matrix6;
 using controller::Setpoint;
 using Verdict = CommandVerdict;
 
-constexpr std::int32_t kAllParts = 2 * command_t::TIP_SPEED - 1;
+constexpr std::int32_t kAllParts = 2 * command_t::TOOL_FRAME - 1;
 constexpr double kUnitTolerance = 1e-3;  // of the length of a quaternion
 // Relative to the largest entry; no wider than what the controller accepts
 constexpr double kSymmetryTolerance = 1e-9;
@@ -92,15 +92,17 @@ Verdict copy_joint_position(const command_t& message, const CommandLimits& limit
   return Verdict::kAccepted;
 }
 
-Verdict copy_tip_pose(const command_t& message, const CommandLimits& limits, Setpoint& setpoint) {
-  const Eigen::Map<const Eigen::Vector3d> position(message.tip_position);
-  const Eigen::Map<const Eigen::Vector4d> wxyz(message.tip_quaternion);
+/// A position no further than `most` from the origin, and a quaternion.
+Verdict copy_pose(const double (&given)[3], const double (&quaternion)[4], double most,
+                  controller::Pose& pose) {
+  const Eigen::Map<const Eigen::Vector3d> position(given);
+  const Eigen::Map<const Eigen::Vector4d> wxyz(quaternion);
   if (!position.allFinite() || !wxyz.allFinite()) return Verdict::kNotFinite;
   // Not stableNorm: an overflow to infinity is out of limits as well.
-  if (!(position.norm() <= limits.reach)) return Verdict::kOutOfLimits;
+  if (!(position.norm() <= most)) return Verdict::kOutOfLimits;
   if (!(std::abs(wxyz.norm() - 1) <= kUnitTolerance)) return Verdict::kNotUnit;
-  setpoint.tip_pose.position = position;
-  setpoint.tip_pose.rotation =
+  pose.position = position;
+  pose.rotation =
       Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]).normalized().toRotationMatrix();
   return Verdict::kAccepted;
 }
@@ -192,7 +194,11 @@ CommandVerdict copy_values(const command_t& message, const CommandLimits& limits
       judge(command_t::MODE, [&] { return copy_mode(message, setpoint); }),
       judge(command_t::JOINT_POSITION,
             [&] { return copy_joint_position(message, limits, setpoint); }),
-      judge(command_t::TIP_POSE, [&] { return copy_tip_pose(message, limits, setpoint); }),
+      judge(command_t::TIP_POSE,
+            [&] {
+              return copy_pose(message.tip_position, message.tip_quaternion, limits.reach,
+                               setpoint.tip_pose);
+            }),
       judge(command_t::WRENCH, [&] { return copy_wrench(message, limits, setpoint); }),
       judge(command_t::JOINT_GAINS,
             [&] { return copy_joint_gains(message, limits, setpoint.gains); }),
@@ -211,6 +217,11 @@ CommandVerdict copy_values(const command_t& message, const CommandLimits& limits
                                 setpoint.gains.task_damping_ratio);
             }),
       judge(command_t::PAYLOAD, [&] { return copy_payload(message, limits, command.payload); }),
+      judge(command_t::TOOL_FRAME,
+            [&] {
+              return copy_pose(message.tool_position, message.tool_quaternion, limits.tool_distance,
+                               command.tool);
+            }),
       judge(command_t::TIP_SPEED,
             [&] { return copy_tip_speed(message, limits, command.tip_speed); }),
       judge(command_t::NULL_GAINS,

@@ -131,6 +131,8 @@ void fill(const StateSample& sample, state_t& message) {
   message.task_damping_ratio = snapshot.task_damping_ratio;
   message.payload_mass = snapshot.payload.mass;
   copy_to(snapshot.payload.center, message.payload_center);
+  copy_to(snapshot.tool.position, message.tool_position);
+  write_quaternion(snapshot.tool.rotation, message.tool_quaternion);
 
   message.tick_time = sample.health.tick_time;
   message.longest_tick_time = sample.health.longest_tick_time;

@@ -64,7 +64,10 @@ TEST(CommandFilter, TakesEveryPart) {
     for (int i = 0; i < 3; ++i) {
       EXPECT_EQ(command.payload.center[i], message.payload_center[i]);
       EXPECT_EQ(command.payload.inertia(i, i), message.payload_inertia[i][i]);
+      EXPECT_EQ(command.tool.position[i], message.tool_position[i]);
     }
+    write_quaternion(command.tool.rotation, quaternion);
+    for (int i = 0; i < 4; ++i) EXPECT_NEAR(quaternion[i], message.tool_quaternion[i], 1e-15);
     EXPECT_EQ(command.tip_speed.linear, message.linear_velocity);
     EXPECT_EQ(command.tip_speed.angular, message.angular_velocity);
     EXPECT_EQ(command.tip_speed.limit, kInfinity);  // 0: the configuration's
@@ -170,7 +173,7 @@ const std::vector<Fault>& faults() {
   static const std::vector<Fault> all = {
       {"no part", Verdict::kUnknown, [](command_t& m) { m.parts = 0; }},
       {"unknown part", Verdict::kUnknown,
-       [](command_t& m) { m.parts = 2 * command_t::TIP_SPEED + 1; }},
+       [](command_t& m) { m.parts = 2 * command_t::TOOL_FRAME + 1; }},
       {"all bits", Verdict::kUnknown, [](command_t& m) { m.parts = -1; }},
       {"no sender", Verdict::kNoSender, [](command_t& m) { m.sender = 0; }},
       {"another sender", Verdict::kOtherSender, [](command_t& m) { ++m.sender; }},
@@ -224,6 +227,14 @@ const std::vector<Fault>& faults() {
       {"payload unwieldy", Verdict::kOutOfLimits,
        [](command_t& m) { m.payload_inertia[0][0] = 1.01 * m.payload_mass; }},
       {"payload far away", Verdict::kOutOfLimits, [](command_t& m) { m.payload_center[1] = -1.1; }},
+      {"tool NaN", Verdict::kNotFinite, [](command_t& m) { m.tool_position[2] = kNaN; }},
+      {"tool turned by NaN", Verdict::kNotFinite,
+       [](command_t& m) { m.tool_quaternion[1] = kNaN; }},
+      {"tool too long", Verdict::kOutOfLimits, [](command_t& m) { m.tool_position[2] = -1.1; }},
+      {"tool not turned", Verdict::kNotUnit,
+       [](command_t& m) {
+         for (double& x : m.tool_quaternion) x *= 0.998;
+       }},
       {"speed NaN", Verdict::kNotFinite, [](command_t& m) { m.linear_velocity = kNaN; }},
       {"speed negative", Verdict::kOutOfLimits, [](command_t& m) { m.angular_velocity = -0.1; }},
       {"speed too large", Verdict::kOutOfLimits, [](command_t& m) { m.tip_velocity = 10.1; }},

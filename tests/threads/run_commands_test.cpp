@@ -1,6 +1,5 @@
 // `dashpot run` with commands over a bus: whose are taken, which gains are, and what releases a
 // fault.
-#include <dashpot/lcmtypes/command_t.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/threads/live_run.hpp>
 
@@ -10,28 +9,6 @@ namespace dashpot::tests {
 namespace {
 
 using ::testing::HasSubstr;
-
-constexpr std::int64_t kMe = 42;
-
-/// A command for a Panda that moves joint 1 in joint mode.
-command_t joint_command(const state_t& state, double first_joint, std::int64_t sequence) {
-  command_t command{};
-  command.n = state.n;
-  command.sender = kMe;
-  command.utime = utime();
-  command.sequence = sequence;
-  command.parts = int{command_t::MODE} + int{command_t::JOINT_POSITION};
-  command.mode = command_t::JOINT;
-  command.joint_position = state.reference_joint_position;
-  command.joint_position[0] = first_joint;
-  command.tip_quaternion[0] = 1;
-  const auto n = static_cast<std::size_t>(state.n);
-  command.joint_stiffness.assign(n, std::vector<double>(n));
-  command.joint_damping = command.joint_stiffness;
-  command.null_stiffness.assign(n, 0);
-  command.null_damping.assign(n, 0);
-  return command;
-}
 
 /// The scene of a Panda with parts of its text replaced, and limits that a busy machine keeps.
 std::string patient_scene(const Scratch& scratch, const std::string& from, const std::string& to) {
