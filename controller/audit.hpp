@@ -34,6 +34,9 @@ struct AuditOptions {
   int delay = 0;                     ///< ticks from a torque to its effect, beyond the hold
   double cutoff = 0;                 ///< of a first-order low-pass on the torque, Hz; 0: none
   bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / period as velocity
+  /// Of the integral of the springs of task or joints, s: their pull adds up to a torque or wrench
+  /// that grows by pull / integral_time (see Integral::time). 0: none. Counts in the gain margin.
+  double integral_time = 0;
   /// True if the null space's springs and dampers act through the projector N = I - J^+ J of the
   /// pseudo-inverse, as many controllers have it. It ignores the inertia, so that they act on the
   /// tip as well. False: through the dynamically consistent one, see NullSpace.
@@ -64,7 +67,10 @@ struct PostureAudit {
   PostureNumbers numbers;           ///< read from `spectrum`
   double smallest_ratio_bound = 0;  ///< proved bound of |computed - true|
   double fastest_pole_bound = 0;    ///< the same, 1/s
-  analysis::Spectrum<> spectrum;    ///< as from analysis::analyze
+  /// Rates at which the slow modes of the integral decay in the sampled loop, 1/s, the slowest
+  /// first; negative where they grow. None without an integral or a period.
+  std::vector<double> integral_decays;
+  analysis::Spectrum<> spectrum;  ///< as from analysis::analyze
 };
 
 /// How one number is distributed over postures. Each entry is the number at one of the postures
@@ -101,7 +107,8 @@ struct DampingSuggestion {
 /// Finds what gains really do on an arm: the modes of  M q'' + C q' + K q = 0  with
 ///     mode kCartesian: K = J' K_C J + N' K_0 N,  C = J' C_C J + N' C_0 N + viscous friction,
 ///     mode kJoint:     K = K_q,                  C = C_q + viscous friction,
-/// at rest, where the springs are at rest. M has the reflected inertia and the payload of the
+/// at rest, where the springs are at rest. The gain margin counts an integral of the springs as
+/// well; ratios and poles are those without it. M has the reflected inertia and the payload of the
 /// model, and viscous friction is the model's. Gravity is taken to be compensated exactly.
 ///
 /// An Audit does not change: several threads may use one at once.
@@ -148,6 +155,8 @@ class Audit {
   bool kinematic() const noexcept { return options_.kinematic_null_space; }
   /// Returns the springs and dampers that act at a posture.
   Impedance impedance_at(const DynamicsResult& robot) const;
+  /// Returns the sampled loop at a posture, with the integral of these springs.
+  analysis::SampledLoop loop_at(const DynamicsResult& robot, const Impedance& impedance) const;
   /// Returns the same as matrices of an impedance whose errors are counted.
   analysis::TaskImpedance task_impedance(const DynamicsResult& robot) const;
 

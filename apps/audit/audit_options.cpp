@@ -186,9 +186,11 @@ void check(const AuditCommand& command) {
   }
   if (command.spread && command.samples == 0) throw InputError("--spread", "needs --samples");
   const analysis::SampledLoop& loop = command.loop;
-  if (command.period == 0 &&
-      (loop.delay > 0 || loop.torque_cutoff > 0 || loop.difference_velocity)) {
-    throw InputError("--period", "missing; --delay, --cutoff and --difference-velocity need it");
+  if (command.period == 0 && (loop.delay > 0 || loop.torque_cutoff > 0 ||
+                              loop.difference_velocity || command.integral_time > 0)) {
+    throw InputError(
+        "--period",
+        "missing; --delay, --cutoff, --difference-velocity and --integral-time need it");
   }
   const bool many = command.samples > 0 || !list.empty() || !log.empty();
   for (const auto& [option, path] : {std::pair("--csv", &command.csv), {"--plot", &command.plot}}) {
@@ -209,6 +211,7 @@ AuditTask read_task(const AuditCommand& command) {
   audit.delay = command.loop.delay;
   audit.cutoff = command.loop.torque_cutoff;
   audit.difference_velocity = command.loop.difference_velocity;
+  audit.integral_time = command.integral_time;
   const double intended = std::isnan(task.intended_ratio) ? 0.7 : task.intended_ratio;
   task.wanted_ratio = command.damping_ratio.value_or(intended);
   task.q = arm.q.empty() ? middle(task.model)
@@ -257,7 +260,7 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
   command.add_option("--period", options.period, "Of the control loop: computes the gain margin")
       ->transform(positive("s", "a time in s"))
       ->option_text("S");
-  add_loop_options(command, options.loop);
+  add_loop_options(command, options.loop, options.integral_time);
   command.add_flag("--no-margin", options.no_margin, "Leave the gain margin out");
   add("--q", arm.q, "Joint positions, rad or m", "a,b,... (middle of the limits)");
   add("--postures", options.postures, "YAML file with a list of postures", "FILE");

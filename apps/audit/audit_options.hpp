@@ -21,7 +21,8 @@ struct AuditCommand {
   std::optional<double> damping_factor;
   std::string rotation, frame;
   double period = 0;           ///< s
-  analysis::SampledLoop loop;  ///< but for the period
+  analysis::SampledLoop loop;  ///< but for the period and the integral
+  double integral_time = 0;    ///< s; 0: no integral
   bool no_margin = false;
   std::string postures;    ///< a file
   std::string log;         ///< an LCM log

@@ -2,6 +2,7 @@
 #include <dashpot/apps/audit/audit_writer.hpp>
 #include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/design/design_writer.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <array>
@@ -67,6 +68,7 @@ std::string posture_table(const AuditTask& task, const controller::PostureAudit&
             (numbers.gain_margin < 1 ? "the sampled loop is unstable.\n"
                                      : "stiffness and damping may grow by it together.\n");
   }
+  text += integral_text(posture.integral_decays);
   text += "  Zero modes: " + std::to_string(numbers.zero_modes) + ".";
   if (numbers.singular) text += " The posture is singular: a direction of the task has no spring.";
   return text + "\n";
@@ -142,6 +144,7 @@ std::string audit_json(const AuditTask& task, const AuditReport& report) {
                    {"fastest_pole", numbers.fastest_pole},
                    {"fastest_pole_bound", report.posture.fastest_pole_bound},
                    {"gain_margin", numbers.gain_margin},
+                   {"integral_decays", report.posture.integral_decays},
                    {"zero_modes", numbers.zero_modes},
                    {"singular", numbers.singular}}}};
   if (report.workspace) {

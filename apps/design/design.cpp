@@ -7,6 +7,7 @@
 #include <dashpot/apps/design/design_options.hpp>
 #include <dashpot/apps/design/design_report.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -22,6 +23,14 @@ namespace {
 
 std::string key_of(const analysis::TaskImpedance& impedance) {
   return impedance.jacobian ? "task_damping" : "damping";
+}
+
+/// That of the task's springs, n x n, or of the joints' where there is no task.
+Eigen::MatrixXd controlled_stiffness(const analysis::TaskImpedance& impedance) {
+  if (!impedance.jacobian || !impedance.task_stiffness) {
+    return impedance.stiffness.value_or(Eigen::MatrixXd());
+  }
+  return impedance.jacobian->transpose() * *impedance.task_stiffness * *impedance.jacobian;
 }
 
 /// The damping for one system, and what the loop makes of it where that counts.
@@ -42,6 +51,11 @@ Found design_one(const SystemEntry& entry, const DesignOptions& options) {
   analysis::LoopLimit limit = options.limit;
   limit.loop.period = *options.period;
   limit.loop.friction = entry.friction;
+  if (options.integral_time > 0) {
+    analysis::to_joint_space(given);  // throws for wrong sizes
+    limit.loop.memory = controller::integral_memory(
+        controlled_stiffness(given) / options.integral_time, *options.period);
+  }
   analysis::SampledDamping found = analysis::design_damping(given, target, limit, structure, start);
   if (!found.kept) {
     const std::string where =

@@ -42,7 +42,7 @@ void add_loop(CLI::App& command, DesignOptions& options) {
                   "Of the control loop: propose only what it bears sampled and held")
       ->transform(positive("s", "a time in s"))
       ->option_text("S");
-  add_loop_options(command, loop);
+  add_loop_options(command, loop, options.integral_time);
   command
       .add_option("--margin", options.limit.gain_margin,
                   "Springs and damping may grow by this factor together")
@@ -66,7 +66,7 @@ void add_model_options(CLI::App& command, ArmOptions& arm) {
                    "Take inertias of the description that no body can have as they are");
 }
 
-void add_loop_options(CLI::App& command, analysis::SampledLoop& loop) {
+void add_loop_options(CLI::App& command, analysis::SampledLoop& loop, double& integral_time) {
   command.add_option("--delay", loop.delay, "Ticks from a command to its effect, beyond the hold")
       ->check(CLI::Range(0, 100))
       ->option_text("N (0)");
@@ -75,6 +75,9 @@ void add_loop_options(CLI::App& command, analysis::SampledLoop& loop) {
       ->option_text("HZ (0)");
   command.add_flag("--difference-velocity", loop.difference_velocity,
                    "The controller takes velocities from positions");
+  command.add_option("--integral-time", integral_time, "Of the integral of the springs; 0: none")
+      ->transform(quantity("s", 0, kLargest, "a time in s"))
+      ->option_text("S (0)");
 }
 
 DampingStructure DesignOptions::damping_structure() const {
@@ -146,9 +149,11 @@ void check(const DesignOptions& options) {
   if (!options.csv.empty() && !options.region) throw InputError("--csv", "needs --region");
   const analysis::LoopLimit& limit = options.limit;
   const bool loop = limit.loop.delay > 0 || limit.loop.torque_cutoff > 0 ||
-                    limit.loop.difference_velocity || limit.gain_margin != 2;
+                    limit.loop.difference_velocity || options.integral_time > 0 ||
+                    limit.gain_margin != 2;
   if (!options.period && loop) {
-    throw InputError("--period", "missing; --delay, --cutoff and --margin need it");
+    throw InputError("--period",
+                     "missing; --delay, --cutoff, --integral-time and --margin need it");
   }
   if (options.period && options.region) throw InputError("--period", "does not go with --region");
 }

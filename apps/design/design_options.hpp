@@ -16,7 +16,8 @@ struct DesignOptions {
   std::string structure = "full";
   double soft_frequency = analysis::DampingTarget().soft_frequency;  ///< rad/s
   std::optional<double> period;  ///< s; none: the loop is taken for continuous
-  analysis::LoopLimit limit;     ///< but for the period
+  analysis::LoopLimit limit;     ///< but for the period and the integral
+  double integral_time = 0;      ///< s; 0: no integral
   std::optional<double> largest_ratio;
   int threads = 0;
   std::string csv;  ///< where the map of the region goes; nowhere if empty
@@ -32,8 +33,9 @@ struct DesignOptions {
 /// Adds the options of the arm's inertia and friction: reflected inertia, payload and so on.
 void add_model_options(CLI::App& command, ArmOptions& arm);
 
-/// Adds those of the loop but for its period: delay, low-pass, differenced velocity.
-void add_loop_options(CLI::App& command, analysis::SampledLoop& loop);
+/// Adds those of the loop but for its period: delay, low-pass, differenced velocity, and the time
+/// of the integral of the springs, s.
+void add_loop_options(CLI::App& command, analysis::SampledLoop& loop, double& integral_time);
 
 /// Adds the options to the subcommand; they are written to `options`.
 void add_design_options(CLI::App& command, DesignOptions& options);

@@ -3,6 +3,7 @@
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_trends.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -48,6 +49,7 @@ Json to_value(const LoopReport& report) {
           {"margin", report.limit.gain_margin},
           {"gain_margin", report.gain_margin},
           {"level", report.level},
+          {"integral_decays", controller::integral_decays(report.sampled, loop.period)},
           {"spectral_radius", report.sampled.spectral_radius},
           {"modes", modes}};
 }
@@ -187,7 +189,11 @@ std::string design_table(const std::vector<DesignReport>& reports, bool as_list)
     if (as_list) text += "[" + std::to_string(i) + "] ";
     text += report.key + "\n" + matrix_text(report.design.damping) + "\n";
     for (const std::string& note : report.notes) text += "  Note: " + note + "\n";
-    if (report.loop) text += loop_text(report);
+    if (report.loop) {
+      text += loop_text(report);
+      text += integral_text(
+          controller::integral_decays(report.loop->sampled, report.loop->limit.loop.period));
+    }
     text += miss_text(report);
     if (!report.after.spectrum.modes.empty()) text += "\n" + mode_table(report);
     if (!report.sensitivities.empty()) text += sensitivity_text(report);
@@ -258,6 +264,16 @@ std::string region_csv(const RegionReport& report) {
          << sample.damping_ratio << ',' << sample.largest_ratio << ',' << sample.soft_modes << '\n';
   }
   return text.str();
+}
+
+std::string integral_text(const std::vector<double>& decays) {
+  if (decays.empty()) return "";
+  const bool one = decays.size() == 1;
+  std::string text = "  The integral of the springs makes " + std::to_string(decays.size()) +
+                     (one ? " slow mode, which decays at " : " slow modes, which decay at ") +
+                     format_number(decays.front(), 3);
+  if (!one) text += " to " + format_number(decays.back(), 3);
+  return text + " 1/s.\n";
 }
 
 }  // namespace dashpot::apps

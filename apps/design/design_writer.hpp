@@ -12,5 +12,8 @@ std::string region_json(const RegionReport& report);
 std::string region_table(const RegionReport& report);
 /// The map of the worst mode, a line for each configuration after one of headings.
 std::string region_csv(const RegionReport& report);
+/// A line that tells at which rates, 1/s, the slow modes decay that an integral of springs makes;
+/// "" if there are none. `decays` by size.
+std::string integral_text(const std::vector<double>& decays);
 
 }  // namespace dashpot::apps

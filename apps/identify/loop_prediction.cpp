@@ -103,11 +103,8 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
       at.J, settings.environment, controller::JointMatrix::Zero(q.size(), q.size()));
   sampled.friction += outside.damping;
   sampled.passive_stiffness = outside.stiffness;
-  if (settings.integral.time > 0) {
-    const controller::Impedance springs(settings.initial, static_cast<int>(q.size()));
-    sampled.memory = controller::integral_memory(
-        controller::integral_stiffness(at, springs, settings.integral.time), sampled.period);
-  }
+  const controller::Impedance springs(settings.initial, static_cast<int>(q.size()));
+  sampled.memory = controller::integral_memory(at, springs, settings.integral.time, sampled.period);
   if (settings.feed_forward.gravity) {
     const MatrixXd gravity = controller::gravity_gradient(controller::DynamicsKernel(arm), q);
     sampled.gravity_gradient = gravity;

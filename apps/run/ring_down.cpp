@@ -2,6 +2,7 @@
 #include <dashpot/apps/loop/closed_loop.hpp>
 #include <dashpot/apps/run/ring_down.hpp>
 #include <dashpot/apps/run/sampled_modes.hpp>
+#include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <algorithm>
 #include <array>
@@ -121,10 +122,7 @@ void add_sampled(const Scene& scene, RingDown& ring_down) {
   const SampledModes modes = sampled_modes(scene);
   ring_down.gain_margin = modes.gain_margin;
   ring_down.growth = std::max(0.0, std::log(modes.sampled.spectral_radius) / scene.plant.period);
-  for (const analysis::Complex z : modes.sampled.memory) {
-    ring_down.integral_decays.push_back(-std::log(std::abs(z)) / scene.plant.period);
-  }
-  std::sort(ring_down.integral_decays.begin(), ring_down.integral_decays.end());
+  ring_down.integral_decays = controller::integral_decays(modes.sampled, scene.plant.period);
   for (RingDownMode& row : ring_down.modes) {
     for (int i = 0; i < modes.continuous.modes.size(); ++i) {
       const analysis::Mode<>& from = modes.continuous.modes[i];

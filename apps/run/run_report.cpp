@@ -2,6 +2,7 @@
 #include <dashpot/apps/analyze/json_writer.hpp>
 #include <dashpot/apps/cli/shape_text.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/design/design_writer.hpp>
 #include <dashpot/apps/run/run_report.hpp>
 #include <dashpot/controller/status.hpp>
 #include <dashpot/text/printable.hpp>
@@ -99,14 +100,6 @@ std::string ring_down_table(const RingDown& ring_down) {
                    format_number(mode.measured_ratio, 4)});
   }
   return table.text();
-}
-
-std::string integral_text(const RingDown& ring_down) {
-  const std::vector<double>& decays = ring_down.integral_decays;
-  if (decays.empty()) return "";
-  return "  The integral of the springs makes " +
-         count(static_cast<std::int64_t>(decays.size()), "slow mode") + ", which decay at " +
-         format_number(decays.front(), 3) + " to " + format_number(decays.back(), 3) + " 1/s.\n";
 }
 
 std::string stability_text(const RingDown& ring_down) {
@@ -308,7 +301,7 @@ std::string to_table(const RunReport& report) {
     out += "\nRing-down after " + count(report.ring_down->releases, "small release") +
            " (sampled: predicted with the drives of the scene)\n" +
            ring_down_table(*report.ring_down);
-    out += integral_text(*report.ring_down) + stability_text(*report.ring_down);
+    out += integral_text(report.ring_down->integral_decays) + stability_text(*report.ring_down);
   }
   if (report.identified) out += "\n" + identify_table(*report.identified);
   return out;

@@ -42,24 +42,20 @@ SampledModes sampled_modes(const Scene& scene) {
   loop.delay = scene.plant.delay;
   loop.torque_cutoff = scene.plant.torque_cutoff;
   loop.difference_velocity = scene.plant.difference_velocity;
-  const JointVector none = JointVector::Zero(scene.dof());
+  const controller::Settings& settings = scene.arm->config.settings;
+  const auto robot = controller::evaluate(model, scene.rest, JointVector::Zero(scene.dof()));
   const controller::PassivePart outside = controller::passive_part(
-      controller::evaluate(model, scene.rest, none).J, scene.arm->config.settings.environment,
-      controller::JointMatrix::Zero(none.size(), none.size()));
+      robot.J, settings.environment, controller::JointMatrix::Zero(scene.dof(), scene.dof()));
   loop.friction = outside.damping;
   loop.friction.diagonal() += model.joint_values(&controller::Joint::viscous_friction);
   loop.passive_stiffness = outside.stiffness;
-  if (scene.arm->config.settings.feed_forward.gravity) {
+  if (settings.feed_forward.gravity) {
     loop.gravity_gradient =
         controller::gravity_gradient(controller::DynamicsKernel(model), scene.rest);
   }
-  const controller::Settings& settings = scene.arm->config.settings;
-  if (settings.integral.time > 0) {
-    const auto robot = evaluate(model, scene.rest, JointVector::Zero(scene.dof()));
-    const controller::Impedance springs(scene.steps.front().setpoint, scene.dof());
-    loop.memory = controller::integral_memory(
-        integral_stiffness(robot, springs, settings.integral.time), loop.period);
-  }
+  loop.memory = controller::integral_memory(
+      robot, controller::Impedance(scene.steps.front().setpoint, scene.dof()),
+      settings.integral.time, loop.period);
   const analysis::System<> system = loop_at_rest(scene);
   SampledModes result;
   result.continuous = analysis::analyze(system);

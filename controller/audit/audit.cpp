@@ -6,6 +6,7 @@
 #include <dashpot/controller/model/posture_sequence.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/loop_system.hpp>
+#include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -127,6 +128,8 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
   require(options.delay >= 0, "delay: must not be negative, ticks");
   require(std::isfinite(options.cutoff) && options.cutoff >= 0,
           "cutoff: must be finite and not negative, Hz");
+  require(std::isfinite(options.integral_time) && options.integral_time >= 0,
+          "integral_time: must be finite and not negative, s");
   if (options.lower.size() == 0) options_.lower = model.joint_values(&Joint::lower);
   if (options.upper.size() == 0) options_.upper = model.joint_values(&Joint::upper);
   require(options_.lower.size() == n && options_.upper.size() == n &&
@@ -166,6 +169,13 @@ Impedance Audit::impedance_at(const DynamicsResult& robot) const {
   return result;
 }
 
+analysis::SampledLoop Audit::loop_at(const DynamicsResult& robot,
+                                     const Impedance& impedance) const {
+  analysis::SampledLoop loop = loop_;
+  loop.memory = integral_memory(robot, impedance, options_.integral_time, loop.period);
+  return loop;
+}
+
 PostureNumbers Audit::numbers(const JointVector& q) const {
   const DynamicsResult robot = evaluate(q);
   Impedance impedance = impedance_at(robot);
@@ -191,7 +201,8 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
   if (!clear) return audit(q).numbers;
   result.zero_modes = model_.dof() - springs_;
   if (options_.period > 0) try {
-      result.gain_margin = analysis::gain_margin(form, loop_, 1e6, options_.soft_frequency);
+      const analysis::SampledLoop sampled = loop_at(robot, impedance_at(robot));
+      result.gain_margin = analysis::gain_margin(form, sampled, 1e6, options_.soft_frequency);
     } catch (const std::runtime_error&) {
       result.gain_margin = kNan;
     }
@@ -233,7 +244,8 @@ analysis::TaskImpedance Audit::task_impedance(const DynamicsResult& robot) const
 }
 
 PostureAudit Audit::audit(const JointVector& q) const {
-  const analysis::System<> system = analysis::to_joint_space(task_impedance(evaluate(q)));
+  const DynamicsResult robot = evaluate(q);
+  const analysis::System<> system = analysis::to_joint_space(task_impedance(robot));
   PostureAudit result;
   result.q = q;
   analysis::SpectrumOptions options;
@@ -241,9 +253,13 @@ PostureAudit Audit::audit(const JointVector& q) const {
   result.spectrum = analysis::analyze(system, options);
   read_spectrum(result);
   result.numbers.singular = result.numbers.zero_modes > model_.dof() - springs_;
-  if (options_.period > 0) {
-    result.numbers.gain_margin =
-        analysis::gain_margin(system, result.spectrum, loop_, 1e6, options_.soft_frequency);
+  if (options_.period == 0) return result;
+  const analysis::SampledLoop loop = loop_at(robot, impedance_at(robot));
+  result.numbers.gain_margin =
+      analysis::gain_margin(system, result.spectrum, loop, 1e6, options_.soft_frequency);
+  if (options_.integral_time > 0) {
+    result.integral_decays =
+        integral_decays(sample_loop(system, result.spectrum, loop), loop.period);
   }
   return result;
 }

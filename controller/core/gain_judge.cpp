@@ -92,15 +92,13 @@ Eigen::MatrixXd GainJudge::gravity_of(const DynamicsKernel& kernel, const JointV
 
 analysis::ControllerMemory GainJudge::memory(const JointVector& q, const Gains& gains,
                                              Mode mode) const {
-  if (integral_time_ == 0) return {};
   Setpoint setpoint;
   setpoint.mode = mode;
   setpoint.gains = gains;
   const int n = static_cast<int>(q.size());
   DynamicsResult robot;
   kernel_.evaluate(q, JointVector::Zero(n), robot);
-  return integral_memory(integral_stiffness(robot, Impedance(setpoint, n), integral_time_),
-                         loop_.period);
+  return integral_memory(robot, Impedance(setpoint, n), integral_time_, loop_.period);
 }
 
 double GainJudge::margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,

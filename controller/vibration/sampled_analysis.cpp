@@ -55,6 +55,21 @@ analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double pe
   return {Eigen::MatrixXd::Identity(rank, rank), period * F.transpose(), F};
 }
 
+analysis::ControllerMemory integral_memory(const DynamicsResult& robot, const Impedance& springs,
+                                           double time, double period) {
+  if (time == 0) return {};
+  return integral_memory(integral_stiffness(robot, springs, time), period);
+}
+
+std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, double period) {
+  std::vector<double> decays;
+  for (const analysis::Complex z : sampled.memory) {
+    decays.push_back(-std::log(std::abs(z)) / period);
+  }
+  std::sort(decays.begin(), decays.end());
+  return decays;
+}
+
 SampledAnalysis::SampledAnalysis(const RobotModel& model, const Settings& settings)
     : kernel_(model),
       gravity_(settings.feed_forward.gravity),

@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <thread>
+#include <vector>
 
 namespace dashpot::controller {
 
@@ -27,6 +28,15 @@ analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& sett
 /// F',
 ///     w_k+1 = w_k + T F' q_k,   and the torque -F w_k.
 analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period);
+
+/// Returns that of the springs of an impedance at a posture, with the K_I of integral_stiffness; no
+/// states if `time` (Integral::time, s) is zero.
+analysis::ControllerMemory integral_memory(const DynamicsResult& robot, const Impedance& springs,
+                                           double time, double period);
+
+/// Returns at which rates, 1/s, the slow modes decay that the integral makes, the slowest first;
+/// negative: it grows.
+std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, double period);
 
 /// Finds, at intervals and on a thread of its own, the modes of the loop with its torque held over
 /// a period (zero-order hold), delayed and filtered, by analysis::sample_loop and

@@ -139,6 +139,8 @@ class SampledModes(Result):
     negative z changes its sign with every tick."""
     zero_modes: ComplexArray
     """z of the velocities along the zero modes that are damped."""
+    memory: ComplexArray
+    """z of the slow modes that the integral makes."""
     others: ComplexArray
     """z of the loop's own memory: delay, filter, last position."""
     spectral_radius: float
@@ -153,22 +155,44 @@ def _make_sampled(found: dict[str, Any]) -> SampledModes:
                            "continuous": make_modes(found["continuous"])})
 
 
+def _integral(time: float, K: npt.ArrayLike | None, jacobian: npt.ArrayLike | None,
+              task_stiffness: npt.ArrayLike | None) -> Array | None:
+    """Returns K_I, n x n, of the integral of the task's springs, or, without a jacobian, of K."""
+    if not 0 <= time < np.inf:
+        raise _core.Error(f"integral_time: {time} s is negative, or not finite")
+    if time == 0:
+        return None
+    if jacobian is None or task_stiffness is None:
+        springs = to_matrix("stiffness", K)
+        square = springs is not None and springs.shape[0] == springs.shape[1]
+        return springs / time if springs is not None and square else None
+    J, task = to_numbers("jacobian", jacobian, 2), to_numbers("task_stiffness", task_stiffness, 2)
+    if task.shape != (len(J), len(J)):
+        raise _core.Error(f"task_stiffness: is {task.shape}, and the jacobian {J.shape}")
+    return J.T @ task @ J / time
+
+
 def sampled_modes(M: npt.ArrayLike, C: npt.ArrayLike | None, K: npt.ArrayLike | None, *,
                   period: float, delay: int = 0, torque_cutoff: float = 0,
                   difference_velocity: bool = False, friction: npt.ArrayLike | None = None,
-                  gravity_gradient: npt.ArrayLike | None = None) -> SampledModes:
+                  gravity_gradient: npt.ArrayLike | None = None,
+                  integral_time: float = 0) -> SampledModes:
     """Returns the modes of the loop as it is sampled: the torque -K q - C q' is computed once a
     `period` (s), acts `delay` ticks later, is held until the next tick, and passes a first-order
     low-pass of `torque_cutoff` (Hz; 0: none). With `difference_velocity` the controller takes
     (q_k - q_k-1) / period for q'. `friction` (n x n) is the part of C that the joints supply, and
-    `gravity_gradient` (n x n) the gradient of the gravity that the controller compensates.
+    `gravity_gradient` (n x n) the gradient of the gravity that the controller compensates. With an
+    `integral_time` t (s; 0: none) the controller integrates its springs, too: its torque has another
+    term -s with s' = K q / t.
 
     Raises Error as `modes` does, and for a period that is not positive.
     """
+    impedance = _impedance(M, C, K, None, None, None)
     loop = _core.SampledLoop(period, delay, torque_cutoff, difference_velocity,
                              to_matrix("friction", friction),
-                             to_matrix("gravity_gradient", gravity_gradient))
-    return _make_sampled(_core.sampled_modes(_impedance(M, C, K, None, None, None), loop))
+                             to_matrix("gravity_gradient", gravity_gradient),
+                             _integral(integral_time, K, None, None))
+    return _make_sampled(_core.sampled_modes(impedance, loop))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -209,8 +233,8 @@ def design_damping(M: npt.ArrayLike, K: npt.ArrayLike | None = None, *, damping_
                    damping: npt.ArrayLike | None = None, structure: str = "full",
                    start: npt.ArrayLike | None = None, high_ratio: float | None = None,
                    corner: float = 1, soft_frequency: float = 1e-3, period: float | None = None,
-                   delay: int = 0, torque_cutoff: float = 0, gain_margin: float = 2
-                   ) -> DampingDesign:
+                   delay: int = 0, torque_cutoff: float = 0, integral_time: float = 0,
+                   gain_margin: float = 2) -> DampingDesign:
     """Returns the damping with which every mode has `damping_ratio`.
 
     The springs are `task_stiffness` K_C (m x m) at `jacobian` J (m x n), or K (n x n) alone. The
@@ -218,14 +242,15 @@ def design_damping(M: npt.ArrayLike, K: npt.ArrayLike | None = None, *, damping_
     with the frequency, from `damping_ratio` of slow modes to `high_ratio` of fast ones, half-way at
     `corner` (rad/s). `structure` is full, block or diagonal; with `start` the result is near that
     matrix. Modes below `soft_frequency` (rad/s) get less. With a `period` (s) the loop is the one of
-    `sampled_modes` and keeps `gain_margin`.
+    `sampled_modes`, where the springs of the task alone are integrated, and keeps `gain_margin`.
 
     Raises Error as `modes` does.
     """
     high = damping_ratio if high_ratio is None else high_ratio
     loop = None
     if period is not None:
-        loop = _core.SampledLoop(period, delay, torque_cutoff, False, None, None)
+        loop = _core.SampledLoop(period, delay, torque_cutoff, False, None, None,
+                                 _integral(integral_time, K, jacobian, task_stiffness))
     found = _core.design_damping(_impedance(M, damping, K, jacobian, None, task_stiffness),
                                  damping_ratio, high, corner, soft_frequency, structure,
                                  to_matrix("start", start), loop, gain_margin)

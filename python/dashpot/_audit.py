@@ -32,6 +32,9 @@ class PostureAudit(Result):
     smallest_ratio_bound: float
     fastest_pole_bound: float
     """1/s."""
+    integral_decays: Array
+    """Rates at which the slow modes of the integral decay, 1/s, the slowest first; none without an
+    integral or a period."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -118,7 +121,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           joint_damping: npt.ArrayLike | None = None, frame: str = "base",
           directions: Sequence[str] = DIRECTIONS, half_quaternion: bool = False,
           inertia_blocks: bool = False, period: float = 0, delay: int = 0, cutoff: float = 0,
-          difference_velocity: bool = False, soft_frequency: float = 0.1,
+          difference_velocity: bool = False, integral_time: float = 0,
+          soft_frequency: float = 0.1,
           damping_ratio: float | None = None, samples: int = 0, seed: int = 0,
           lower: npt.ArrayLike | None = None, upper: npt.ArrayLike | None = None,
           postures: npt.ArrayLike | None = None,
@@ -136,7 +140,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     with `inertia_blocks` it multiplies gains by the tip's inertia, for translation and rotation
     apart, with a `null_projector` of "kinematic" instead of "dynamic" null-space gains act through
     I - J^+ J. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
-    (Hz; 0: none), and `difference_velocity`. Modes below `soft_frequency` (rad/s) are soft.
+    (Hz; 0: none), `difference_velocity`, and an integral of the springs with `integral_time` (s; 0:
+    none), which counts in the gain margin alone. Modes below `soft_frequency` (rad/s) are soft.
 
     An `executor` of concurrent.futures maps over chunks of postures, by default one of threads. The
     results are the same to the last bit whatever executor and however many workers.
@@ -167,6 +172,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
                                "period": float(period), "delay": delay, "cutoff": float(cutoff),
                                "difference_velocity": difference_velocity,
                                "soft_frequency": float(soft_frequency)}
+    if integral_time != 0:
+        options["integral_time"] = float(integral_time)
     for name, values in (("lower", lower), ("upper", upper)):
         if values is not None:
             options[name] = to_numbers(name, values, 1)

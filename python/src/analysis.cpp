@@ -2,6 +2,7 @@
 
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/sensitivity.hpp>
+#include <dashpot/controller/vibration/sampled_analysis.hpp>
 #include <dashpot/python/src/analysis.hpp>
 
 namespace dashpot::python {
@@ -55,6 +56,7 @@ nb::dict sampled_modes_of(const analysis::SampledSpectrum& sampled) {
       to_pairs(modes, [](const SampledMode& mode) { return mode.discrete_eigenvalues; });
   result["kind"] = to_list(modes, [](const SampledMode& mode) { return to_text(mode.kind); });
   result["zero_modes"] = to_column(sampled.zero_modes, same);
+  result["memory"] = to_column(sampled.memory, same);
   result["others"] = to_column(sampled.others, same);
   result["spectral_radius"] = sampled.spectral_radius;
   return result;
@@ -191,8 +193,10 @@ nb::dict find_sensitivities(const TaskImpedance& impedance) {
   return result;
 }
 
+/// `integral`: K_I of controller::integral_memory.
 SampledLoop make_loop(double period, int delay, double torque_cutoff, bool difference_velocity,
-                      const OptionalMatrix& friction, const OptionalMatrix& gravity_gradient) {
+                      const OptionalMatrix& friction, const OptionalMatrix& gravity_gradient,
+                      const OptionalMatrix& integral) {
   SampledLoop loop;
   loop.period = period;
   loop.delay = delay;
@@ -200,6 +204,7 @@ SampledLoop make_loop(double period, int delay, double torque_cutoff, bool diffe
   loop.difference_velocity = difference_velocity;
   if (friction) loop.friction = *friction;
   if (gravity_gradient) loop.gravity_gradient = *gravity_gradient;
+  if (integral) loop.memory = controller::integral_memory(*integral, period);
   return loop;
 }
 
@@ -229,7 +234,7 @@ void add_analysis(nb::module_& m) {
   nb::class_<SampledLoop>(m, "SampledLoop", "analysis::SampledLoop")
       .def(nb::new_(&make_loop), nb::arg("period"), nb::arg("delay"), nb::arg("torque_cutoff"),
            nb::arg("difference_velocity"), nb::arg("friction").none(),
-           nb::arg("gravity_gradient").none());
+           nb::arg("gravity_gradient").none(), nb::arg("integral").none());
   m.def("modes", &find_modes, nb::arg("impedance"), nb::arg("soft_frequency"));
   m.def("response", &respond, nb::arg("impedance"), nb::arg("times"), nb::arg("position").none(),
         nb::arg("velocity").none(), nb::arg("impulse").none(), nb::arg("force").none());

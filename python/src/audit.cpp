@@ -42,6 +42,9 @@ RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool c
   options.cutoff = nb::cast<double>(given["cutoff"]);
   options.difference_velocity = nb::cast<bool>(given["difference_velocity"]);
   options.soft_frequency = nb::cast<double>(given["soft_frequency"]);
+  if (given.contains("integral_time")) {
+    options.integral_time = nb::cast<double>(given["integral_time"]);
+  }
   if (given.contains("lower")) {
     options.lower = robot.joint_vector("lower", nb::cast<Eigen::VectorXd>(given["lower"]));
   }
@@ -133,6 +136,7 @@ nb::dict posture(const RobotAudit& all, const Eigen::VectorXd& q) {
   result["singular"] = found.numbers.singular;
   result["smallest_ratio_bound"] = found.smallest_ratio_bound;
   result["fastest_pole_bound"] = found.fastest_pole_bound;
+  result["integral_decays"] = to_column(found.integral_decays, [](double decay) { return decay; });
   return result;
 }
 

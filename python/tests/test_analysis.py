@@ -193,6 +193,24 @@ def test_sampled_modes_are_those_of_the_map_from_tick_to_tick():
         dashpot.sampled_modes([[m]], [[c]], [[k]], period=0)
 
 
+def test_an_integral_makes_a_slow_mode():
+    m, c, k, period, time = 2.0, 40.0, 800.0, 0.002, 0.5
+    found = dashpot.sampled_modes([[m]], [[c]], [[k]], period=period, integral_time=time)
+    step = np.array([[1, period, 0], [0, 1, 0], [period * k / time, 0, 1]])
+    gain = np.array([[period**2 / 2 / m], [period / m], [0]])
+    expected = np.linalg.eigvals(step - gain @ np.array([[k, c, 1]]))
+    assert found.memory == pytest.approx([max(expected.real)])
+    design = dashpot.design_damping([[m]], jacobian=[[1]], task_stiffness=[[k]], period=period,
+                                    integral_time=time)
+    assert len(design.sampled.memory) == 1 and np.log(design.sampled.memory[0].real) < 0
+    for wrong in (dict(integral_time=-1), dict(integral_time=np.nan)):
+        with pytest.raises(dashpot.Error, match="integral_time"):
+            dashpot.sampled_modes([[m]], [[c]], [[k]], period=period, **wrong)
+    with pytest.raises(dashpot.Error, match="task_stiffness"):
+        dashpot.design_damping([[m]], jacobian=[[1]], task_stiffness=np.eye(2), period=period,
+                               integral_time=time)
+
+
 def test_designed_damping_gives_the_ratio():
     M, _, K = random_system(9)
     J = np.random.default_rng(10).standard_normal((3, 5))

@@ -32,6 +32,20 @@ def test_a_posture_has_the_modes_of_the_closed_loop(panda):
     assert found.workspace is None
 
 
+def test_an_integral_counts_in_the_margin(panda):
+    stiff = dict(task_stiffness=[150] * 3 + [250] * 3, damping_factor=2, inertia_blocks=True)
+    plain = dashpot.audit(panda, HOME, **stiff, period=0.001).posture
+    found = dashpot.audit(panda, HOME, **stiff, period=0.001, integral_time=2).posture
+    assert len(plain.integral_decays) == 0 and len(found.integral_decays) == 6
+    np.testing.assert_allclose(found.integral_decays, 0.5, atol=0.1)
+    assert found.gain_margin == pytest.approx(plain.gain_margin, rel=0.02)
+    quick = dashpot.audit(panda, HOME, **stiff, period=0.001, integral_time=0.8).posture
+    assert plain.gain_margin > 1 and quick.gain_margin == 0
+    assert found.smallest_ratio == plain.smallest_ratio
+    with pytest.raises(dashpot.Error, match="integral_time"):
+        dashpot.audit(panda, HOME, **stiff, period=0.001, integral_time=-1)
+
+
 def test_a_kinematic_null_space_acts_through_the_pseudo_inverse(panda):
     for q in (HOME, [0.3, -0.4, 0.8, -1.9, 0.2, 2.1, -0.5]):
         M, J = panda.mass(q), panda.jacobian(q)

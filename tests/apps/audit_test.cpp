@@ -54,6 +54,29 @@ TEST(Audit, ReproducesWhatIsKnownOfPublicControllers) {
   }
 }
 
+/// Its slowest mode has 2.386 rad/s and a ratio of 0.25, and bears no integral below 0.84 s.
+TEST(Audit, CountsAnIntegralAndTellsHowItsSlowModesDecay) {
+  const std::vector<std::string> options = {"--preset", "deoxys",    "--period",
+                                            "1ms",      "--samples", "20"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), options.begin(), options.end());
+    return audit_json(more);
+  };
+  const Json plain = with({}), slow = with({"--integral-time", "3 s"});
+  EXPECT_EQ(plain["posture"]["integral_decays"], Json::array());
+  const Numbers decays = slow["posture"]["integral_decays"];
+  ASSERT_EQ(decays.size(), 6U);
+  for (const double decay : decays) EXPECT_NEAR(decay, 1. / 3, 0.05);
+  EXPECT_EQ(slow["posture"]["smallest_ratio"], plain["posture"]["smallest_ratio"]);
+  EXPECT_GT(slow["posture"]["gain_margin"], 10);
+  const Json quick = with({"--integral-time", "0.8 s"});
+  EXPECT_EQ(quick["posture"]["gain_margin"], 0);
+  EXPECT_GT(plain["workspace"]["gain_margin"]["worst"], 1);
+  EXPECT_LT(quick["workspace"]["gain_margin"]["worst"], 1);
+  EXPECT_EQ(with({"--integral-time", "3 s", "--no-margin"})["posture"]["integral_decays"],
+            Json::array());
+}
+
 TEST(Audit, HasTheModesOfDesign) {
   const Json found = audit_json(
       {"--stiffness", "200,200,200,20,20,20", "--damping", "30,30,30,9,9,9", "--period", "1ms"});
@@ -201,6 +224,7 @@ TEST(Audit, RefusesInOneLineThatNamesTheOption) {
       {{"--stiffness", "1,1,1,1,1,-1", "--damping", "1,1,1,1,1,1"},
        "task_stiffness: is not positive semidefinite"},
       {{"--preset", "crisp", "--delay", "1"}, "--period: missing"},
+      {{"--preset", "crisp", "--integral-time", "1"}, "--period: missing"},
       {{"--preset", "crisp", "--q", "1,2"}, "--q: 2 numbers, expected 7"},
       {{"--preset", "crisp", "--postures", short_list}, "[0].posture: 2 numbers, expected 7"},
       {{"--preset", "crisp", "--spread", "1"}, "--spread: needs --samples"},

@@ -1,7 +1,11 @@
 // `dashpot design --period`: what a sampled loop bears, of a mass under a held force.
 #include <dashpot/tests/apps/json_result.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <complex>
+#include <string>
+#include <vector>
 
 namespace dashpot::tests {
 namespace {
@@ -64,6 +68,62 @@ TEST(DesignForALoop, TakesTheDampingThatIsThereForTheJointsOwn) {
   EXPECT_GT(result["modes"][0]["damping_ratio"], without + 0.3);
 }
 
+using Complex = std::complex<double>;
+
+/// What is zero at the eigenvalues z of the mass with its springs of 800 N/m and their integral,
+/// and with the damper c, all times s: of a torque held for T = 20 ms, one tick late.
+Complex characteristic(Complex z, double c, double integral_time, double s) {
+  constexpr double T = 0.02, m = 2, k = 800;
+  const Complex force = T * T * (z + 1.0) / 2.0 * (k * (z - 1.0) + k * T / integral_time) +
+                        T * c * (z - 1.0) * (z - 1.0);
+  return z * m * std::pow(z - 1.0, 3) + s * force;
+}
+
+TEST(DesignForALoop, CountsTheIntegralOfTheSprings) {
+  const std::vector<std::string> options = {"--damping-ratio", "0.4", "--period", "0.02",
+                                            "--delay",         "1",   "--margin", "1.1"};
+  const double without = design_json(kMass, options)["loop"]["gain_margin"];
+  std::vector<std::string> with = options;
+  with.insert(with.end(), {"--integral-time", "500 ms"});
+  const Json result = design_json(kMass, with);
+  const double c = result["damping"][0][0], margin = result["loop"]["gain_margin"];
+  EXPECT_EQ(result["loop"]["level"], 1);
+  EXPECT_LT(margin, 0.98 * without);
+  ASSERT_EQ(result["loop"]["integral_decays"].size(), 1U);
+  const double decay = result["loop"]["integral_decays"][0];
+  EXPECT_NEAR(decay, 2, 0.3);
+  EXPECT_LT(std::abs(characteristic(std::exp(-0.02 * decay), c, 0.5, 1)), 1e-12);
+  // At the margin an eigenvalue lies on the unit circle.
+  double least = 1;
+  for (int i = 1; i <= 100'000; ++i) {
+    const Complex z = std::polar(1.0, 3.14159265358979 * i / 100'000);
+    least = std::min(least, std::abs(characteristic(z, c, 0.5, margin) / std::pow(z - 1.0, 3)));
+  }
+  EXPECT_LT(least, 1e-3);
+  EXPECT_THAT(design(kMass, with).out, HasSubstr("The integral of the springs makes 1 slow mode, "
+                                                 "which decays at "));
+  // Quicker than the mass follows: nothing is proposed.
+  with.back() = "20 ms";
+  EXPECT_EQ(design(kMass, with).status, 1);
+}
+
+TEST(DesignForALoop, IntegratesTheSpringsOfTheTaskAlone) {
+  const std::string task = "mass: [[2, 0], [0, 3]]\njacobian: [[1, 0]]\ntask_stiffness: [[800]]\n";
+  const std::vector<std::string> options = {"--damping-ratio", "0.7", "--period", "0.002",
+                                            "--integral-time", "0.5"};
+  const Json found = design_json(task +
+                                     "stiffness: [[0, 0], [0, 900]]\n"
+                                     "damping: [[0, 0], [0, 50]]\n",
+                                 options);
+  EXPECT_EQ(found["loop"]["integral_decays"].size(), 1U);
+  const Outcome wrong = design(
+      "mass: [[2, 0], [0, 3]]\njacobian: [[1]]\n"
+      "task_stiffness: [[800]]\n",
+      options);
+  EXPECT_EQ(wrong.status, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("jacobian"));
+}
+
 TEST(DesignForALoop, ProposesNothingWhereNoRatioWillDo) {
   const Outcome outcome = design("- " + std::string("{mass: [[2]], stiffness: [[800]]}\n"),
                                  {"--damping-ratio", "0.09", "--period", "0.02"});
@@ -85,6 +145,8 @@ TEST(DesignForALoop, RefusesOptionsThatMakeNoLoop) {
   };
   refused({"--delay", "1"}, "--period: missing");
   refused({"--margin", "3"}, "--period: missing");
+  refused({"--integral-time", "1"}, "--period: missing");
+  refused({"--period", "0.001", "--integral-time", "-1 s"}, "a time in s is wanted");
   refused({"--period", "0"}, "a time in s is wanted");
   refused({"--period", "0.001", "--margin", "0.99"}, "a factor of at least 1");
   refused({"--period", "0.001", "--delay", "-1"}, "--delay");

@@ -1,6 +1,5 @@
-// What gains do on an arm: against the companion matrix in long double, a loop stepped tick by
-// tick, and closed forms.
-#include <dashpot/controller/audit.hpp>
+// What gains do on an arm: against the companion matrix in long double, and closed forms.
+#include <dashpot/tests/controller/audited_panda.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/chains.hpp>
 
@@ -16,49 +15,6 @@
 
 namespace dashpot::controller {
 namespace {
-
-using LongRows = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
-
-const Vector6 kTranslationFirst = (Vector6() << 200, 200, 200, 20, 20, 20).finished();
-
-RobotModel audited_panda(double friction = 0) {
-  ModelOptions options;
-  options.viscous_friction = JointVector::Constant(7, friction);
-  return RobotModel::from_urdf_file(std::string(DASHPOT_SOURCE_DIR) + "/sim/models/panda.urdf",
-                                    "panda_link0", "panda_hand_tcp", options);
-}
-
-JointVector home() {
-  constexpr double kQuarter = 0.78539816339744831;
-  JointVector q(7);
-  q << 0, -kQuarter, 0, -3 * kQuarter, 0, 2 * kQuarter, kQuarter;
-  return q;
-}
-
-AuditOptions stated(const Vector6& stiffness, double factor) {
-  AuditOptions options;
-  options.gains.task_stiffness = stiffness.asDiagonal();
-  options.gains.task_damping = Vector6(factor * stiffness.cwiseSqrt()).asDiagonal();
-  return options;
-}
-
-/// The closed loop of task gains as matrices, in long double.
-struct TaskLoop {
-  LongRows M, C, K;
-};
-
-TaskLoop loop_at(const RobotModel& model, const JointVector& q, const Matrix6& stiffness,
-                 const Matrix6& damping) {
-  const DynamicsResult robot = evaluate(model, q, JointVector::Zero(q.size()));
-  const LongRows J = Eigen::MatrixXd(robot.J).cast<long double>();
-  TaskLoop loop;
-  loop.M = Eigen::MatrixXd(robot.M).cast<long double>();
-  loop.K = J.transpose() * Eigen::MatrixXd(stiffness).cast<long double>() * J;
-  loop.C = J.transpose() * Eigen::MatrixXd(damping).cast<long double>() * J;
-  loop.C.diagonal() +=
-      Eigen::VectorXd(model.joint_values(&Joint::viscous_friction)).cast<long double>();
-  return loop;
-}
 
 /// Smallest ratio of the complex eigenvalues, and the smallest real part.
 PostureNumbers numbers_of(const TaskLoop& loop) {
@@ -132,77 +88,6 @@ TEST(Audit, ScalesGainsByTheInertiaOfTheTip) {
     EXPECT_NEAR(found.smallest_ratio, expected.smallest_ratio, 1e-9);
     EXPECT_NEAR(found.fastest_pole, expected.fastest_pole, 1e-9 * std::abs(expected.fastest_pole));
   }
-}
-
-/// Runs the sampled loop with `factor` times the gains, and returns the largest deflection of the
-/// last ticks over that of those before.
-double growth(const TaskLoop& loop, const AuditOptions& options, double factor) {
-  const Eigen::Index n = loop.M.rows();
-  const Eigen::MatrixXd M = loop.M.cast<double>(), K = factor * loop.K.cast<double>(),
-                        C = factor * loop.C.cast<double>();
-  const Eigen::LLT<Eigen::MatrixXd> mass(M);
-  const double T = options.period;
-  const double gain = options.cutoff > 0 ? -std::expm1(-2 * M_PI * options.cutoff * T) : 1;
-  const Eigen::VectorXd start = Eigen::VectorXd::LinSpaced(n, 1, 2);
-  Eigen::VectorXd q = start, velocity = Eigen::VectorXd::Zero(n), before = q;
-  Eigen::VectorXd filtered = Eigen::VectorXd::Zero(n);
-  std::vector<Eigen::VectorXd> queue(static_cast<std::size_t>(options.delay),
-                                     Eigen::VectorXd::Zero(n));
-  double early = 0, late = 0;
-  constexpr int kTicks = 40000;
-  for (int tick = 0; tick < kTicks; ++tick) {
-    const Eigen::VectorXd used =
-        options.difference_velocity ? Eigen::VectorXd((q - before) / T) : velocity;
-    queue.push_back(-K * q - C * used);
-    filtered += gain * (queue.front() - filtered);
-    queue.erase(queue.begin());
-    const Eigen::VectorXd acceleration = mass.solve(filtered);
-    before = q;
-    q += T * velocity + 0.5 * T * T * acceleration;
-    velocity += T * acceleration;
-    const double size = (K * q).norm() + T * (K * velocity).norm();
-    if (tick >= kTicks / 2 && tick < 3 * kTicks / 4) early = std::max(early, size);
-    if (tick >= 3 * kTicks / 4) late = std::max(late, size);
-    if (!(size < 1e200)) return std::numeric_limits<double>::infinity();
-  }
-  return late / early;
-}
-
-TEST(Audit, FindsTheMarginAtWhichASampledLoopStartsToGrow) {
-  const RobotModel model = audited_panda();
-  AuditOptions options = stated(kTranslationFirst, 2);
-  options.period = 0.0005;
-  for (const bool slow : {false, true}) {
-    options.delay = slow ? 1 : 0;
-    options.cutoff = slow ? 300 : 0;
-    options.difference_velocity = slow;
-    const Audit audit(model, options);
-    const double margin = audit.numbers(home()).gain_margin;
-    const TaskLoop loop =
-        loop_at(model, home(), options.gains.task_stiffness, options.gains.task_damping);
-    EXPECT_LT(growth(loop, options, 0.995 * margin), 1) << margin;
-    EXPECT_GT(growth(loop, options, 1.005 * margin), 1) << margin;
-    EXPECT_NEAR(audit.audit(home()).numbers.gain_margin, margin, 1e-6 * margin);
-  }
-}
-
-/// A damper c held for T makes v <- (1 - c T / I) v: stable up to c T / I = 2.
-TEST(Audit, FindsPoleAndMarginOfOneJoint) {
-  constexpr double kInertia = 0.02 + 0.25 * 0.25;  // of a link of the chain, kg m^2
-  ModelOptions model;
-  model.viscous_friction = model.coulomb_friction = JointVector::Zero(1);
-  AuditOptions options;
-  options.mode = Mode::kJoint;
-  options.gains.joint_stiffness = JointMatrix::Constant(1, 1, 1e-3);
-  options.gains.joint_damping = JointMatrix::Constant(1, 1, 10);
-  options.period = 0.001;
-  options.soft_frequency = 1e-3;
-  const PostureNumbers found =
-      Audit(testing::chain_of({"continuous"}, model), options).numbers(JointVector::Zero(1));
-  EXPECT_NEAR(found.fastest_pole, -10 / kInertia, 1e-3);
-  EXPECT_NEAR(found.gain_margin, 2 * kInertia / (10 * options.period), 1e-3);
-  EXPECT_NEAR(found.smallest_ratio, 10 / (2 * std::sqrt(1e-3 * kInertia)), 1e-3);
-  EXPECT_EQ(found.zero_modes, 0);
 }
 
 /// With springs and dampers that are the same for all joints, the self-motion z (J z = 0) has
@@ -342,6 +227,9 @@ TEST(Audit, RefusesGainsThatCannotBe) {
   bad = good;
   bad.period = -1;
   expect_refusal(bad, "period");
+  bad = good;
+  bad.integral_time = std::numeric_limits<double>::quiet_NaN();
+  expect_refusal(bad, "integral_time");
   EXPECT_THROW(Audit(audited_panda(), good).numbers(JointVector::Zero(6)), std::invalid_argument);
 }
 

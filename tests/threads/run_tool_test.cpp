@@ -101,9 +101,18 @@ TEST(RunWithCommands, MovesTheToolFrameOfAnArmAtRest) {
     changed_by = std::max(changed_by, std::abs(before[i] / wanted[i] - 1));
   }
   EXPECT_GT(changed_by, 0.02);
-  // A pose is one of the T that comes with it: where that is already, nothing moves.
-  for (int i = 0; i < 3; ++i) command.tip_position[i] = start.tip_position[i];
-  for (int i = 0; i < 4; ++i) command.tip_quaternion[i] = start.tip_quaternion[i];
+  // A pose is one of the T told last: where that is already, nothing moves.
+  std::copy_n(listener.state.tip_position, 3, command.tip_position);
+  std::copy_n(listener.state.tip_quaternion, 4, command.tip_quaternion);
+  send(command, command_t::TIP_POSE);
+  ASSERT_TRUE(accepted());
+  const std::int64_t posed = listener.state.tick;
+  ASSERT_TRUE(until([&] { return listener.state.tick > posed + 500; }));
+  EXPECT_LT(moved, 1e-6);
+  EXPECT_LT(jump, 1e-3);
+  // Or of the one that comes with it.
+  std::copy_n(start.tip_position, 3, command.tip_position);
+  std::copy_n(start.tip_quaternion, 4, command.tip_quaternion);
   command.tool_position[1] = command.tool_position[2] = 0;
   command.tool_quaternion[0] = 1;
   command.tool_quaternion[3] = 0;
