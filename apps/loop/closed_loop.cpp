@@ -1,5 +1,6 @@
 #include <dashpot/apps/loop/closed_loop.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/controller/attachment.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -140,7 +141,10 @@ void ClosedLoop::follow_scenario() noexcept {
   if (!scene_.arm) return;
   const auto& steps = scene_.steps;
   while (next_step_ < steps.size() && steps[next_step_].at <= plant_->time()) {
-    goal_.hold(steps[next_step_++].setpoint);
+    controller::Setpoint setpoint = steps[next_step_++].setpoint;
+    setpoint.tip_pose = controller::carried(
+        setpoint.tip_pose, scene_.arm->config.model.attachment().tool, goal_.tool());
+    goal_.hold(setpoint);
     due_steps_.store(next_step_, std::memory_order_release);
   }
   if (!leave_gains_) follow_gains();

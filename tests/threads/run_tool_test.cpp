@@ -148,5 +148,35 @@ TEST(RunWithCommands, MovesTheToolFrameOfAnArmAtRest) {
   EXPECT_EQ(run.finish(), 0);
 }
 
+/// Where a scenario wants the tip is a place of the configuration's T, whatever was told since.
+TEST(RunWithCommands, GoesWhereTheScenarioWantsTheTipLinkWithAnotherTool) {
+  const std::string url = own_url();
+  Listener listener(url);
+  const Scratch scratch;
+  const std::string file =
+      changed(scratch, "panda_release_c2",
+              {{"tip_displacement: [0, 2 cm, 0, 0, 0, 0]",
+                "tip_displacement: [0, 0, 0, 0, 0, 0]\n  steps:\n    - at: 4 s\n      "
+                "tip_displacement: [0, 3 cm, 0, 0, 0, 0]"},
+               {"scenario:", "commands: {silence: 30 s, oldest: 20 s}\nscenario:"}});
+  Running run({"run", file, "--commands", "--lcm-url", url, "--duration", "60", "--json"});
+  if (!listener.until([&] { return listener.states > 100; })) {
+    GTEST_SKIP() << "multicast does not work on this machine: " << url;
+  }
+  const state_t start = listener.state;
+  command_t command = joint_command(start, 0, 1);
+  command.parts = command_t::TOOL_FRAME;
+  command.tool_position[2] = 0.1;
+  command.tool_quaternion[0] = 1;
+  listener.bus().publish(lcmtypes::kCommandChannel, &command);
+  ASSERT_TRUE(listener.until([&] { return listener.state.tool_position[2] == 0.1; }));
+  const auto y = [&] { return listener.state.reference_tip_position[1] - start.tip_position[1]; };
+  EXPECT_TRUE(listener.until([&] { return std::abs(y() - 0.03) < 1e-9; })) << y();
+  // The tool points downward, as far as the tip link does.
+  EXPECT_NEAR(listener.state.reference_tip_position[2], start.tip_position[2] - 0.1, 1e-4);
+  run.send(SIGTERM);
+  EXPECT_EQ(run.finish(), 0);
+}
+
 }  // namespace
 }  // namespace dashpot::tests
