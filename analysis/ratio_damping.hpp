@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/analysis/borne_damping.hpp>
 #include <dashpot/analysis/damping_target.hpp>
 #include <dashpot/analysis/status.hpp>
 #include <dashpot/analysis/types.hpp>
@@ -43,6 +44,9 @@ using TaskJacobian =
 /// friction is more than is wanted, C is a semidefinite matrix near the exact one, and `overdone`
 /// says so. Its bound is larger than the bound without friction by a factor of a few.
 ///
+/// For a sampled loop (`set_loop`) each mode gets the share of its damping 2 zeta omega that the
+/// loop bears, see BorneDamping. C is then continuous, with kinks where the share leaves 1.
+///
 /// For fewer task directions, leave rows of J and K_C zero. Nothing here allocates or throws (as
 /// long as matrices, not expressions, are passed), and the work is bounded. Each step starts from
 /// the rotations of the last one, which changes the result by rounding only.
@@ -58,6 +62,13 @@ class RatioDamping {
   /// Sets d, n, N m s/rad, not negative; without entries: none.
   void set_friction(const Vector<kMaxDof>& friction) noexcept { friction_ = friction; }
 
+  /// Sets what the loop bears, which has to outlive this; null: any damping. Of springs that are
+  /// in force in part it takes their share, above 0 and at most 1.
+  void set_loop(const BorneDamping* borne, double in_force = 1) noexcept {
+    borne_ = borne;
+    in_force_ = in_force;
+  }
+
   /// Factors K, of which only the lower triangle is read. On kWrongSize, kStiffnessIndefinite or
   /// kNotFinite the previous stiffness stays.
   Status set_stiffness(const ConstMatrix& K) noexcept;
@@ -71,6 +82,8 @@ class RatioDamping {
 
   /// True if friction was too much for the target at the last good update.
   bool overdone() const noexcept { return overdone_; }
+  /// What the loop left of the target at the last good update.
+  const DampingLevel& level() const noexcept { return level_; }
 
  private:
   using Factor = std::array<double, kMaxDof * kMaxDof>;  // by rows, see ratio_damping.cpp
@@ -83,6 +96,9 @@ class RatioDamping {
   Eigen::Index springs_ = 0;  // k
   int updates_ = 0;           // since rotated_ was F
   bool overdone_ = false;
+  DampingLevel level_;
+  const BorneDamping* borne_ = nullptr;
+  double in_force_ = 1;
   alignas(64) Factor factor_{};   // F
   alignas(64) Factor rotated_{};  // F U of the last update
 };

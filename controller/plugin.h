@@ -39,7 +39,7 @@ extern "C" {
 
 /* Version of this interface. It increases whenever a function or struct changes. A library
  * serves the versions that it knows. */
-#define DASHPOT_PLUGIN_VERSION 9u
+#define DASHPOT_PLUGIN_VERSION 10u
 /* Largest n. */
 #define DASHPOT_MAX_JOINTS 16
 
@@ -67,32 +67,34 @@ typedef struct dashpot_controller dashpot_controller;
  * Below zero: the call was refused and did nothing. */
 enum {
   DASHPOT_OK = 0,
-  DASHPOT_TORQUE_LIMITED = 1,    /* a limit of torque, torque rate, power or speed is at work */
-  DASHPOT_NEAR_JOINT_LIMIT = 2,  /* a joint is pushed back from a position limit that is near */
-  DASHPOT_WRENCH_NOT_FINITE = 3, /* NaN or infinity in the external wrench; the last finite one
-                                    stays in force. With limits.external_force: a collision */
-  DASHPOT_SETPOINT_REJECTED = 4, /* the set-point is not possible; the last good one stays */
-  DASHPOT_WEIGHT_NOT_HELD = 5,   /* the weight needs more than a torque limit: the arm sinks */
-  DASHPOT_SETPOINT_STALE = 6,    /* the set-point is old: hold */
-  DASHPOT_SETPOINT_LOST = 7,     /* the set-point is very old: damp */
-  DASHPOT_FAULT_LATCHED = 8,     /* a fault is over, but was not released: damp */
-  DASHPOT_TOO_MANY_RESTARTS = 9, /* the springs restarted too often: damp */
-  DASHPOT_TIME_GAP = 10,         /* more than watchdog.longest_gap since the last state: damp */
-  DASHPOT_WRONG_RATE = 11,       /* the loop runs at another rate than the configured one: damp */
-  DASHPOT_COLLISION = 12,        /* an external torque or force above its threshold: damp */
-  DASHPOT_INSTABILITY = 13,      /* a vibration grows, or the torque reverses all the time: damp */
-  DASHPOT_TIP_SPEED_LIMIT = 14,  /* the tip is too fast: damp */
-  DASHPOT_VELOCITY_LIMIT = 15,   /* a joint is too fast: damp */
-  DASHPOT_WALL = 16,             /* the tip is beyond a wall of limits.walls: damp */
-  DASHPOT_POSITION_LIMIT = 17,   /* a joint is outside its position limits: damp; slow return */
-  DASHPOT_STATE_FROZEN = 18,     /* the state never changes though the torque does: weight alone */
-  DASHPOT_STATE_CONTRADICTORY = 19, /* positions do not move as the velocities say: damp, with
+  DASHPOT_TORQUE_LIMITED = 1,     /* a limit of torque, torque rate, power or speed is at work */
+  DASHPOT_NEAR_JOINT_LIMIT = 2,   /* a joint is pushed back from a position limit that is near */
+  DASHPOT_LITTLE_MARGIN = 3,      /* springs too stiff for the sampled loop: no damping ratio, or no
+                                      lower one, keeps limits.gain_margin here */
+  DASHPOT_WRENCH_NOT_FINITE = 4,  /* NaN or infinity in the external wrench; the last finite one
+                                     stays in force. With limits.external_force: a collision */
+  DASHPOT_SETPOINT_REJECTED = 5,  /* the set-point is not possible; the last good one stays */
+  DASHPOT_WEIGHT_NOT_HELD = 6,    /* the weight needs more than a torque limit: the arm sinks */
+  DASHPOT_SETPOINT_STALE = 7,     /* the set-point is old: hold */
+  DASHPOT_SETPOINT_LOST = 8,      /* the set-point is very old: damp */
+  DASHPOT_FAULT_LATCHED = 9,      /* a fault is over, but was not released: damp */
+  DASHPOT_TOO_MANY_RESTARTS = 10, /* the springs restarted too often: damp */
+  DASHPOT_TIME_GAP = 11,          /* more than watchdog.longest_gap since the last state: damp */
+  DASHPOT_WRONG_RATE = 12,        /* the loop runs at another rate than the configured one: damp */
+  DASHPOT_COLLISION = 13,         /* an external torque or force above its threshold: damp */
+  DASHPOT_INSTABILITY = 14,       /* a vibration grows, or the torque reverses all the time: damp */
+  DASHPOT_TIP_SPEED_LIMIT = 15,   /* the tip is too fast: damp */
+  DASHPOT_VELOCITY_LIMIT = 16,    /* a joint is too fast: damp */
+  DASHPOT_WALL = 17,              /* the tip is beyond a wall of limits.walls: damp */
+  DASHPOT_POSITION_LIMIT = 18,    /* a joint is outside its position limits: damp; slow return */
+  DASHPOT_STATE_FROZEN = 19,      /* the state never changes though the torque does: weight alone */
+  DASHPOT_STATE_CONTRADICTORY = 20, /* positions do not move as the velocities say: damp, with
                                        velocities from the positions */
-  DASHPOT_STATE_NOT_FINITE = 20,    /* NaN or infinity in position or velocity: ramp */
-  DASHPOT_STATE_WRONG_SIZE = 21,    /* the state is missing or not one of n joints: ramp */
-  DASHPOT_STATE_JUMP = 22,          /* further from the last state than the robot can move: ramp */
-  DASHPOT_TIME_BACKWARD = 23,       /* the state's time is at or before the last one: ramp */
-  DASHPOT_NOT_FINITE = 24,          /* the torque would not be finite: ramp */
+  DASHPOT_STATE_NOT_FINITE = 21,    /* NaN or infinity in position or velocity: ramp */
+  DASHPOT_STATE_WRONG_SIZE = 22,    /* the state is missing or not one of n joints: ramp */
+  DASHPOT_STATE_JUMP = 23,          /* further from the last state than the robot can move: ramp */
+  DASHPOT_TIME_BACKWARD = 24,       /* the state's time is at or before the last one: ramp */
+  DASHPOT_NOT_FINITE = 25,          /* the torque would not be finite: ramp */
 
   DASHPOT_NULL_ARGUMENT = -1,     /* a required pointer is NULL */
   DASHPOT_WRONG_STRUCT_SIZE = -2, /* struct_size is not the size of the struct in this version */
@@ -237,6 +239,8 @@ typedef struct dashpot_snapshot {
   /* The damping ratios for which the damping of the springs in force is designed; 0: given. */
   double joint_damping_ratio;
   double task_damping_ratio;
+  double damping_level; /* share of its ratio that the mode has that the sampled loop leaves least,
+                           those of the null space too; 1: the loop bears all ratios */
   /* What the arm counts with at this tick, on the way to what dashpot_set_payload was told. */
   double payload_mass;       /* kg */
   double payload_center[3];  /* from the tip link's origin, in its axes, m */

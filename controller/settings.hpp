@@ -133,7 +133,8 @@ struct Limits {
   std::vector<Wall> walls;  ///< at most kMaxWalls
   /// Hosts refuse gains with which the sampled loop would be unstable, or would become so with all
   /// gains multiplied by a factor of up to this; 1 accepts all gains. See GainJudge. Controller
-  /// itself takes any gains.
+  /// itself takes any gains, and lowers damping ratios where the loop does not bear them with this
+  /// margin; 1 lowers none. See DesignedDamping.
   double gain_margin = 2;
 };
 

@@ -41,6 +41,9 @@ struct Snapshot {
   Vector6 integral_wrench = Vector6::Zero();
   /// Damping ratios that the damping of the springs in force is designed for; 0: it is given.
   double joint_damping_ratio = 0, task_damping_ratio = 0;
+  /// Share of its ratio that the mode has that the sampled loop leaves least, of the ratios above
+  /// and of the null space's: above 0, and 1 where the loop bears all of them.
+  double damping_level = 1;
   Payload payload;  ///< in force at this tick, on the way to what Controller::attach was given
   Pose tool;        ///< likewise: T in the tip link
 };

@@ -24,6 +24,8 @@ enum class Status : std::uint8_t {
   // The torque is the wanted one as far as possible:
   kTorqueLimited,    ///< a limit of torque, torque rate, power or speed is at work
   kNearJointLimit,   ///< a joint is within the margin of a position limit; its repulsion is at work
+  kLittleMargin,     ///< springs too stiff for the sampled loop, or a damping ratio too small for
+                     ///< them: no share of the ratio keeps Limits::gain_margin at this posture
   kWrenchNotFinite,  ///< NaN or infinity in RobotState::external_wrench; the last finite wrench
                      ///< stays in force in the analysis. With Limits::external_force: kCollision
   kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, a matrix that is no

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/damping_target.hpp>
 #include <dashpot/analysis/design/modal_damping.hpp>
 
 #include <Eigen/Eigenvalues>
@@ -54,12 +55,11 @@ double coupling_share(double wanted, double there) noexcept {
 
 }  // namespace
 
-Status missing_damping(const Vector<kMaxDof>& omega, const DampingTarget& target, double soft,
+Status missing_damping(const Vector<kMaxDof>& omega, const Vector<kMaxDof>& wanted, double soft,
                        Matrix& G, bool& overdone) noexcept {
   const Index k = omega.size();
-  Vector<kMaxDof> S(k), wanted(k), share(k);
+  Vector<kMaxDof> S(k), share(k);
   for (Index i = 0; i < k; ++i) {
-    wanted[i] = 2 * target.ratio(omega[i]) * omega[i];
     share[i] = coupling_share(wanted[i], G(i, i));
   }
   for (Index i = 0; i < k; ++i) {

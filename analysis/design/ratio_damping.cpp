@@ -264,16 +264,22 @@ Status RatioDamping::design(const ConstMatrix& M, const double* J, Index stride,
   if (!problem.omega.allFinite()) return Status::kNotFinite;
   const double soft = target_.soft_limit(problem.omega.maxCoeff());
   bool overdone = false;
-  Vector<kMaxDof> weight(k);
+  DampingLevel level;
+  Vector<kMaxDof> wanted(k), weight(k);
+  for (Index i = 0; i < k; ++i) {
+    const double omega = problem.omega[i], whole = 2 * target_.ratio(omega) * omega;
+    const double share = borne_ == nullptr ? 1 : borne_->share(omega, whole, in_force_, level);
+    wanted[i] = share * whole;
+    if (!friction) weight[i] = share * target_.damper(omega, soft);
+  }
   if (friction) {
     normalize(problem);
-    status = missing_damping(problem.omega, target_, soft, problem.G, overdone);
+    status = missing_damping(problem.omega, wanted, soft, problem.G, overdone);
     if (status != Status::kOk) return status;
-  } else {
-    for (Index i = 0; i < k; ++i) weight[i] = target_.damper(problem.omega[i], soft);
   }
   congruence(problem, friction ? &problem.G : nullptr, weight, C);
   overdone_ = overdone;
+  level_ = level;
   updates_ = updates_ < kFreshStart ? updates_ + 1 : 0;
   std::copy_n(B.begin(), k * 2 * lanes(half), rotated_.begin());
   return Status::kOk;

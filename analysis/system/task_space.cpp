@@ -18,16 +18,16 @@ constexpr double kOperation =
     std::numeric_limits<double>::epsilon() * std::numeric_limits<double>::epsilon();
 
 /// A matrix of double-doubles, high + low, that lacks at most `error` in every entry.
-struct ExtendedMatrix {
+struct PreciseMatrix {
   MatrixXd high;
   MatrixXd low;
   MatrixXd error;
 
-  ExtendedMatrix(Index rows, Index cols)
+  PreciseMatrix(Index rows, Index cols)
       : high(MatrixXd::Zero(rows, cols)), low(high), error(high) {}
   /// A symmetric matrix: the symmetric part of `value`, with the rest as error.
-  ExtendedMatrix(const std::string& key, const MatrixXd& value, Index size)
-      : ExtendedMatrix(size, size) {
+  PreciseMatrix(const std::string& key, const MatrixXd& value, Index size)
+      : PreciseMatrix(size, size) {
     check_size(key, value, size, size);
     check_finite(key, value);
     check_symmetric(key, value);
@@ -40,7 +40,7 @@ struct ExtendedMatrix {
     high(i, j) = value.high;
     low(i, j) = value.low;
   }
-  void add(const ExtendedMatrix& other) {
+  void add(const PreciseMatrix& other) {
     for (Index j = 0; j < high.cols(); ++j) {
       for (Index i = 0; i < high.rows(); ++i) set(i, j, get(i, j) + other.get(i, j));
     }
@@ -54,9 +54,9 @@ struct ExtendedMatrix {
 };
 
 /// left' middle right, with about 32 digits; `middle` has no low words.
-ExtendedMatrix sandwich(const MatrixXd& left, const ExtendedMatrix& factor, const MatrixXd& right) {
+PreciseMatrix sandwich(const MatrixXd& left, const PreciseMatrix& factor, const MatrixXd& right) {
   const MatrixXd& middle = factor.high;
-  ExtendedMatrix inner(middle.rows(), right.cols());
+  PreciseMatrix inner(middle.rows(), right.cols());
   for (Index i = 0; i < inner.high.rows(); ++i) {
     for (Index j = 0; j < inner.high.cols(); ++j) {
       DotAccumulator sum;
@@ -64,7 +64,7 @@ ExtendedMatrix sandwich(const MatrixXd& left, const ExtendedMatrix& factor, cons
       inner.set(i, j, sum.value());
     }
   }
-  ExtendedMatrix product(left.cols(), right.cols());
+  PreciseMatrix product(left.cols(), right.cols());
   for (Index i = 0; i < product.high.rows(); ++i) {
     for (Index j = 0; j < product.high.cols(); ++j) {
       DotAccumulator sum;
@@ -80,18 +80,18 @@ ExtendedMatrix sandwich(const MatrixXd& left, const ExtendedMatrix& factor, cons
 }
 
 /// J' A J for a symmetric A: exactly symmetric.
-ExtendedMatrix congruence(const MatrixXd& jacobian, const ExtendedMatrix& middle) {
-  ExtendedMatrix product = sandwich(jacobian, middle, jacobian);
+PreciseMatrix congruence(const MatrixXd& jacobian, const PreciseMatrix& middle) {
+  PreciseMatrix product = sandwich(jacobian, middle, jacobian);
   for (Index i = 0; i < product.high.rows(); ++i) {
     for (Index j = 0; j < i; ++j) product.set(i, j, product.get(j, i));
   }
   return product;
 }
 
-ExtendedMatrix extended_geometric_stiffness(const std::vector<MatrixXd>& derivatives,
-                                            const VectorXd& wrench) {
+PreciseMatrix extended_geometric_stiffness(const std::vector<MatrixXd>& derivatives,
+                                           const VectorXd& wrench) {
   const auto n = static_cast<Index>(derivatives.size());
-  ExtendedMatrix result(n, n);
+  PreciseMatrix result(n, n);
   for (Index k = 0; k < n; ++k) {
     const MatrixXd& derivative = derivatives[static_cast<std::size_t>(k)];
     for (Index i = 0; i < n; ++i) {
@@ -106,7 +106,7 @@ ExtendedMatrix extended_geometric_stiffness(const std::vector<MatrixXd>& derivat
 }
 
 /// Averages entries with their mirror images if they agree within the tolerance.
-void average_if_symmetric(ExtendedMatrix& matrix) {
+void average_if_symmetric(PreciseMatrix& matrix) {
   const double largest = matrix.high.size() == 0 ? 0 : matrix.high.cwiseAbs().maxCoeff();
   const MatrixXd skew = matrix.high - matrix.high.transpose();
   if ((skew.array().abs() > kSymmetryTolerance * largest).any()) return;
@@ -170,7 +170,7 @@ void check_members(const TaskImpedance& impedance) {
 }
 
 /// K_G, if its two members are there.
-std::optional<ExtendedMatrix> checked_geometric_stiffness(const TaskImpedance& impedance) {
+std::optional<PreciseMatrix> checked_geometric_stiffness(const TaskImpedance& impedance) {
   const std::string key = "jacobian_derivatives";
   if (impedance.jacobian_derivatives.empty() && !impedance.wrench) return std::nullopt;
   if (!impedance.wrench) throw InvalidSystem(key, "needs a wrench");
@@ -190,7 +190,7 @@ std::optional<ExtendedMatrix> checked_geometric_stiffness(const TaskImpedance& i
     check_size(numbered, derivative, wrench.size(), n);
     check_finite(numbered, derivative);
   }
-  ExtendedMatrix result = extended_geometric_stiffness(impedance.jacobian_derivatives, wrench);
+  PreciseMatrix result = extended_geometric_stiffness(impedance.jacobian_derivatives, wrench);
   average_if_symmetric(result);
   return result;
 }
@@ -218,8 +218,8 @@ class FactorStack {
 
 /// C and K as they add up, and the factor of K.
 struct Assembly {
-  ExtendedMatrix damping;
-  ExtendedMatrix stiffness;
+  PreciseMatrix damping;
+  PreciseMatrix stiffness;
   FactorStack factor;
 
   explicit Assembly(Index n) : damping(n, n), stiffness(n, n), factor(n) {}
@@ -228,11 +228,11 @@ struct Assembly {
 void add_joint_space(const TaskImpedance& impedance, Assembly& sum) {
   const Index n = impedance.mass.rows();
   if (impedance.damping) {
-    sum.damping.add(ExtendedMatrix("damping", *impedance.damping, n));
+    sum.damping.add(PreciseMatrix("damping", *impedance.damping, n));
     sum.damping.add_error("damping_error", impedance.damping_error);
   }
   if (impedance.stiffness) {
-    const ExtendedMatrix stiffness("stiffness", *impedance.stiffness, n);
+    const PreciseMatrix stiffness("stiffness", *impedance.stiffness, n);
     sum.stiffness.add(stiffness);
     sum.factor.append(factor_transposed(stiffness.high));
   }
@@ -242,13 +242,13 @@ void add_task_space(const TaskImpedance& impedance, Assembly& sum) {
   if (!impedance.jacobian) return;
   const MatrixXd& J = *impedance.jacobian;
   if (impedance.task_stiffness) {
-    const ExtendedMatrix K("task_stiffness", *impedance.task_stiffness, J.rows());
+    const PreciseMatrix K("task_stiffness", *impedance.task_stiffness, J.rows());
     sum.stiffness.add(congruence(J, K));
     const std::optional<MatrixXd> root = factor_transposed(K.high);
     sum.factor.append(root ? std::optional<MatrixXd>(*root * J) : std::nullopt);
   }
   if (impedance.task_damping) {
-    const ExtendedMatrix C("task_damping", *impedance.task_damping, J.rows());
+    const PreciseMatrix C("task_damping", *impedance.task_damping, J.rows());
     sum.damping.add(congruence(J, C));
     if (impedance.jacobian_rate) {
       sum.stiffness.add(sandwich(J, C, *impedance.jacobian_rate));
@@ -271,7 +271,7 @@ MatrixXd geometric_stiffness(const std::vector<MatrixXd>& jacobian_derivatives,
 System<> to_joint_space(const TaskImpedance& impedance) {
   const Index n = impedance.mass.rows();
   System<> system(n);
-  ExtendedMatrix mass("mass", impedance.mass, n);
+  PreciseMatrix mass("mass", impedance.mass, n);
   mass.add_error("mass_error", impedance.mass_error);
   system.mass = mass.high;
   system.mass_error = mass.error;

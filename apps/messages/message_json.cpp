@@ -74,6 +74,7 @@ MessageJson message_json(const state_t& m) {
           {"tip_wrench", fixed_list(m.tip_wrench)},
           {"joint_damping_ratio", m.joint_damping_ratio},
           {"task_damping_ratio", m.task_damping_ratio},
+          {"damping_level", m.damping_level},
           {"payload_mass", m.payload_mass},
           {"payload_center", fixed_list(m.payload_center)},
           {"tool_position", fixed_list(m.tool_position)},

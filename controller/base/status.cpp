@@ -10,6 +10,8 @@ const char* to_text(Status status) noexcept {
       return "torque, torque rate, power or speed limited";
     case Status::kNearJointLimit:
       return "near a joint's position limit";
+    case Status::kLittleMargin:
+      return "springs leave the sampled loop too little gain margin";
     case Status::kWrenchNotFinite:
       return "external wrench not finite, the last one stays";
     case Status::kSetpointRejected:

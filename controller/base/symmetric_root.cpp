@@ -26,7 +26,7 @@ void turn(std::array<double, kMaxJoints>& a, std::array<double, kMaxJoints>& b, 
 
 }  // namespace
 
-JointMatrix symmetric_root(const JointMatrix& A, double factor) noexcept {
+SymmetricRoot symmetric_root(const JointMatrix& A) noexcept {
   const auto n = static_cast<std::size_t>(A.rows());
   std::array<std::array<double, kMaxJoints>, kMaxJoints> B, V{};  // A, and eigenvectors by rows
   double largest = 0;
@@ -58,18 +58,13 @@ JointMatrix symmetric_root(const JointMatrix& A, double factor) noexcept {
       }
     }
   }
-  JointMatrix root = JointMatrix::Zero(A.rows(), A.rows());
+  SymmetricRoot result{JointVector::Zero(A.rows()), {}};
   for (std::size_t k = 0; k < n; ++k) {
+    result.vectors[k] = Eigen::Map<const JointVector>(V[k].data(), A.rows());
     if (!(B[k][k] > kVanishes * largest)) continue;
-    const double value = factor * std::sqrt(B[k][k]);
-    for (std::size_t j = 0; j < n; ++j) {
-      const double scaled = value * V[k][j];
-      for (std::size_t i = 0; i < n; ++i) {
-        root(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) += scaled * V[k][i];
-      }
-    }
+    result.roots[static_cast<Eigen::Index>(k)] = std::sqrt(B[k][k]);
   }
-  return root;
+  return result;
 }
 
 }  // namespace dashpot::controller

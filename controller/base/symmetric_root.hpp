@@ -3,10 +3,16 @@
 
 namespace dashpot::controller {
 
-/// Returns factor A^1/2 for a symmetric A (n x n), of which the lower triangle is read. Eigenvalues
+/// A^1/2 = sum of root_k v_k v_k', with orthonormal v_k.
+struct SymmetricRoot {
+  JointVector roots;                            ///< n
+  std::array<JointVector, kMaxJoints> vectors;  ///< v_k, n each
+};
+
+/// Returns the root of a symmetric A (n x n), of which the lower triangle is read. Eigenvalues
 /// below 1e-13 of the largest entry count as zero, because rounding makes them of those that
 /// vanish. Jacobi rotations in at most 12 sweeps, so that the work is bounded; the root of a finite
 /// A is finite.
-JointMatrix symmetric_root(const JointMatrix& A, double factor) noexcept;
+SymmetricRoot symmetric_root(const JointMatrix& A) noexcept;
 
 }  // namespace dashpot::controller

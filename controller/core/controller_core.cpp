@@ -10,9 +10,17 @@ namespace dashpot::controller {
 namespace {
 
 constexpr double kMostRestarts = 3;
+constexpr double kReserve = 1.02;  // of the gain margin, for what couples modes
 
 int gain_ticks(const Settings& settings) {
   return static_cast<int>(std::lround(settings.motion.gain_time / settings.period));
+}
+
+std::optional<analysis::BorneDamping> borne_damping(const RobotModel& model,
+                                                    const Settings& settings) {
+  const double margin = settings.limits.gain_margin;
+  if (margin == 1) return {};
+  return analysis::BorneDamping(sampled_loop(model, settings), kReserve * margin);
 }
 
 /// Whole ns, which add up without rounding errors.
@@ -33,9 +41,12 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
       gains_(gain_ticks(settings), Impedance(n_)),
       attachment_(gain_ticks(settings), model.attachment()),
       wrench_(gain_ticks(settings), Vector6::Zero()),
+      borne_(borne_damping(model, settings)),
       designed_(settings.subtract_friction ? JointVector(friction_left(model, settings).cwiseMax(0))
-                                           : JointVector(JointVector::Zero(n_))),
-      law_(model, settings.feed_forward, SpringIntegral(settings.integral, settings.period)),
+                                           : JointVector(JointVector::Zero(n_)),
+                borne_ ? &*borne_ : nullptr),
+      law_(model, settings.feed_forward, SpringIntegral(settings.integral, settings.period),
+           borne_ ? &*borne_ : nullptr),
       filter_(settings, least_joint_inertia(unloaded(model), settings.limits.position_lower,
                                             settings.limits.position_upper)),
       clamp_{settings.limits.linear_error, settings.limits.angular_error},
@@ -137,6 +148,9 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
     damping_torque(torque);
   } else {
     impedance_torque(status == Status::kSetpointStale, torque);
+    level_ = designed_.level();
+    level_.include(law_.null_level());
+    if (!level_.kept) status = worse(status, Status::kLittleMargin);
   }
   const bool springs = springs_ != Springs::kOff, returns = fault_ == Status::kPositionLimit;
   const Status limits =
@@ -257,6 +271,7 @@ void ControllerCore::fill_snapshot() noexcept {
   }
   snapshot_.joint_damping_ratio = springs ? impedance.joint_damping_ratio : 0;
   snapshot_.task_damping_ratio = springs ? impedance.damping_ratio : 0;
+  snapshot_.damping_level = springs ? level_.level : 1;
   snapshot_.payload = attachment_.now().payload();
   snapshot_.tool = attachment_.now().tool;
   snapshot_.tip_wrench = springs ? law_.tip_wrench() : Vector6(Vector6::Zero());

@@ -129,6 +129,7 @@ class ControllerCore {
   Ramp<Attachment> attachment_;
   Ramp<Vector6> wrench_;
   std::uint64_t integrated_ = 0;  ///< changes of gains and attachment that the integral knows of
+  const std::optional<analysis::BorneDamping> borne_;  ///< none: any damping
   DesignedDamping designed_;
   ImpedanceLaw law_;
   SafetyFilter filter_;
@@ -144,7 +145,8 @@ class ControllerCore {
   std::int64_t time_ = 0;
   double setpoint_age_ = 0;  ///< ns, counted on, whatever the clock does after it was accepted
   JointVector q_, qd_;
-  JointVector weight_;  ///< what is compensated here of the gravity torque
+  analysis::DampingLevel level_;  ///< of the ratios, at this tick
+  JointVector weight_;            ///< what is compensated here of the gravity torque
   Vector6 external_wrench_ = Vector6::Zero();
   DynamicsResult robot_;
 

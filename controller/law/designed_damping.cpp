@@ -11,11 +11,13 @@ bool in_tool(const Impedance& given) noexcept {
 
 }  // namespace
 
-void RatioDamper::set(const JointMatrix& K, double ratio, const JointVector& friction) noexcept {
+void RatioDamper::set(const JointMatrix& K, double ratio, const JointVector& friction,
+                      const analysis::BorneDamping* borne, double in_force) noexcept {
   analysis::DampingTarget target = analysis::DampingTarget::constant(ratio);
   target.soft_frequency = kSoftFrequency;
   design_.set_target(target);
   design_.set_friction(friction);
+  design_.set_loop(borne, in_force);
   if (design_.set_stiffness(K) == analysis::Status::kOk) return;
   // As much as check_gains lets pass. A slow mode more, and a soft one.
   JointMatrix raised = K;
@@ -33,8 +35,10 @@ void RatioDamper::update(const JointMatrix& M, const Jacobian* J) noexcept {
   }
 }
 
-DesignedDamping::DesignedDamping(const JointVector& viscous_friction)
-    : joint_damper_(static_cast<int>(viscous_friction.size())),
+DesignedDamping::DesignedDamping(const JointVector& viscous_friction,
+                                 const analysis::BorneDamping* borne)
+    : borne_(borne),
+      joint_damper_(static_cast<int>(viscous_friction.size())),
       in_force_(static_cast<int>(viscous_friction.size())) {
   if ((viscous_friction.array() > 0).any()) friction_ = viscous_friction;
 }
@@ -51,7 +55,7 @@ const Impedance& DesignedDamping::update(const GainBlend& gains,
     if (tip) set_tip(given, robot);
     if (joints) {
       joint_damper_.set(given.joint_stiffness, given.joint_damping_ratio,
-                        friction(given.joint_weight));
+                        friction(given.joint_weight), borne_, given.joint_weight);
     }
   }
   tip_ = tip;
@@ -63,6 +67,13 @@ const Impedance& DesignedDamping::update(const GainBlend& gains,
     in_force_.joint_damping = given.joint_damping + joint_damper_.damping();
   }
   return now(given);
+}
+
+analysis::DampingLevel DesignedDamping::level() const noexcept {
+  analysis::DampingLevel result;
+  if (tip_) result.include(tip_damper_.level());
+  if (joints_) result.include(joint_damper_.level());
+  return result;
 }
 
 JointVector DesignedDamping::friction(double share) const noexcept {
@@ -77,7 +88,7 @@ void DesignedDamping::set_tip(const Impedance& given, const DynamicsResult& robo
   const Matrix6 K_C = in_tool(given)       ? K_T
                       : !given.tool.none() ? Matrix6(K_B + turned(K_T, robot.R_BT))
                                            : K_B;
-  tip_damper_.set(K_C, given.damping_ratio, friction(given.task_weight));
+  tip_damper_.set(K_C, given.damping_ratio, friction(given.task_weight), borne_, given.task_weight);
 }
 
 void DesignedDamping::design_tip(const Impedance& given, const DynamicsResult& robot) noexcept {

@@ -17,7 +17,7 @@ Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R, const Vector6
 }  // namespace
 
 ImpedanceLaw::ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward,
-                           const SpringIntegral& integral)
+                           const SpringIntegral& integral, const analysis::BorneDamping* borne)
     : feed_forward_(feed_forward),
       friction_of_reference_(feed_forward.friction &&
                              feed_forward.friction_at == FeedForward::FrictionAt::kReference),
@@ -27,6 +27,7 @@ ImpedanceLaw::ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forw
       coulomb_friction_(model.joint_values(&Joint::coulomb_friction)),
       integral_(integral),
       joint_pull_(JointVector::Zero(model.dof())) {
+  null_space_.set_loop(borne);
   if (!friction_of_robot_) return;
   viscous_friction_ *= feed_forward.friction_share;
   coulomb_friction_ *= feed_forward.friction_share;
@@ -40,6 +41,7 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
   JointVector reference_velocity = tau;  // qd_f
   e_.setZero();
   F_.setZero();
+  null_level_ = {};
   if (integral_.on()) {
     clamped_ = false;
     tip_pull_.setZero();
@@ -70,8 +72,7 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
       add(null_space_.spring(impedance.null_stiffness, dq), tau);
       add(null_space_.damper(impedance.null_damping, dqd), tau);
       if (impedance.null_damping_ratio > 0) {
-        const JointMatrix D =
-            null_space_.ratio_damping(impedance.null_damping_ratio, impedance.null_stiffness);
+        const JointMatrix D = null_space_.ratio_damping(impedance, null_level_);
         add(null_space_.damper(D, dqd), tau);
       }
     }

@@ -38,7 +38,8 @@ namespace dashpot::controller {
 class ImpedanceLaw {
  public:
   ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward,
-               const SpringIntegral& integral = SpringIntegral(Integral(), 0));
+               const SpringIntegral& integral = SpringIntegral(Integral(), 0),
+               const analysis::BorneDamping* borne = nullptr);
 
   /// Sets `tau` to the joint torque. `wrench` is f, which counts only if FeedForward::wrench is on.
   void torque(const DynamicsResult& robot, const JointVector& q, const JointVector& qd,
@@ -58,6 +59,8 @@ class ImpedanceLaw {
   const Vector6& tip_error() const noexcept { return e_; }
   const Vector6& tip_wrench() const noexcept { return F_; }
   const NullSpace& null_space() const noexcept { return null_space_; }
+  /// Returns what the loop left of the null space's damping ratio.
+  const analysis::DampingLevel& null_level() const noexcept { return null_level_; }
 
  private:
   /// K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d
@@ -77,6 +80,7 @@ class ImpedanceLaw {
   Vector6 e_ = Vector6::Zero();
   Vector6 F_ = Vector6::Zero();
   NullSpace null_space_;
+  analysis::DampingLevel null_level_;
   SpringIntegral integral_;
   bool clamped_ = false;    ///< the error clamp acts
   JointVector joint_pull_;  ///< K_q (q_d - q)

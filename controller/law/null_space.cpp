@@ -44,9 +44,18 @@ JointVector NullSpace::projected_velocity(const JointVector& dq) const noexcept 
   return y;
 }
 
-JointMatrix NullSpace::ratio_damping(double ratio, const JointVector& k) const noexcept {
+double NullSpace::damping(const Impedance& impedance, double omega,
+                          analysis::DampingLevel& level) const noexcept {
+  const double wanted = 2 * impedance.null_damping_ratio * omega;
+  if (borne_ == nullptr) return wanted;
+  return wanted * borne_->share(omega, wanted, impedance.task_weight, level);
+}
+
+JointMatrix NullSpace::ratio_damping(const Impedance& impedance,
+                                     analysis::DampingLevel& level) const noexcept {
+  const JointVector& k = impedance.null_stiffness;
   JointMatrix D(k.size(), k.size());
-  if (damp_one_motion(ratio, k, D)) return D;
+  if (damp_one_motion(impedance, level, D)) return D;
   const Eigen::Index n = k.size();
   std::array<JointVector, kMaxJoints> velocity;  // columns of L^-T P
   for (Eigen::Index j = 0; j < n; ++j) {
@@ -62,10 +71,23 @@ JointMatrix NullSpace::ratio_damping(double ratio, const JointVector& k) const n
       D(i, j) = D(j, i) = sum;
     }
   }
-  return symmetric_root(D, 2 * ratio);
+  const SymmetricRoot root = symmetric_root(D);
+  D.setZero();
+  for (Eigen::Index l = 0; l < n; ++l) {
+    if (root.roots[l] == 0) continue;
+    const JointVector& v = root.vectors[static_cast<std::size_t>(l)];
+    const double rate = damping(impedance, root.roots[l], level);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const double scaled = rate * v[j];
+      for (Eigen::Index i = 0; i < n; ++i) D(i, j) += scaled * v[i];
+    }
+  }
+  return D;
 }
 
-bool NullSpace::damp_one_motion(double ratio, const JointVector& k, JointMatrix& D) const noexcept {
+bool NullSpace::damp_one_motion(const Impedance& impedance, analysis::DampingLevel& level,
+                                JointMatrix& D) const noexcept {
+  const JointVector& k = impedance.null_stiffness;
   const Eigen::Index n = k.size();
   double trace = 0, most = 0;  // of P's diagonal
   Eigen::Index best = 0;
@@ -83,7 +105,7 @@ bool NullSpace::damp_one_motion(double ratio, const JointVector& k, JointMatrix&
   mass_.solve_LT(velocity.data());
   double stiffness = 0;
   for (Eigen::Index i = 0; i < n; ++i) stiffness += k[i] * velocity[i] * velocity[i];
-  const double rate = 2 * ratio * std::sqrt(stiffness / most) / most;
+  const double rate = damping(impedance, std::sqrt(stiffness / most), level) / most;
   for (Eigen::Index j = 0; j < n; ++j) {
     for (Eigen::Index i = 0; i < n; ++i) D(i, j) = rate * y[i] * y[j];
   }

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/analysis/borne_damping.hpp>
 #include <dashpot/controller/base/joint_algebra.hpp>
 #include <dashpot/controller/law/task_inertia.hpp>
 
@@ -19,6 +20,8 @@ namespace dashpot::controller {
 ///     cond(M) max(k) |dq|.
 class NullSpace {
  public:
+  /// Sets what the loop bears of ratio_damping, which has to outlive this; null: any damping.
+  void set_loop(const analysis::BorneDamping* borne) noexcept { borne_ = borne; }
   void compute(const JointMatrix& M, const Jacobian& J, const TipImpedance& base,
                const TipImpedance& tool, const Eigen::Matrix3d& R_BT) noexcept;
 
@@ -29,10 +32,12 @@ class NullSpace {
     return spring(c, projected_velocity(dqd));
   }
   /// Returns D = 2 ratio (P L^-1 K_0 L^-T P)^1/2, n x n, 1/s, symmetric, positive semidefinite: the
-  /// damping in energy coordinates with which every free motion has the ratio on the springs k (n).
-  /// Next to a singularity it fades as the root of what P leaves of the springs, so that there the
-  /// ratio stays as well.
-  JointMatrix ratio_damping(double ratio, const JointVector& k) const noexcept;
+  /// damping in energy coordinates with which every free motion has the impedance's ratio on its
+  /// null-space springs K_0. Next to a singularity it fades as the root of what P leaves of the
+  /// springs, so that there the ratio stays as well. In a sampled loop each motion gets the share
+  /// that the loop bears, and `level` counts it.
+  JointMatrix ratio_damping(const Impedance& impedance,
+                            analysis::DampingLevel& level) const noexcept;
   /// Returns L D L' dqd: the torque of dampers D in energy coordinates for the velocity dqd.
   JointVector damper(const JointMatrix& D, const JointVector& dqd) const noexcept;
   /// Returns N dq.
@@ -50,11 +55,16 @@ class NullSpace {
 
  private:
   /// Sets D of ratio_damping if P is a projector on one motion; returns false if not.
-  bool damp_one_motion(double ratio, const JointVector& k, JointMatrix& D) const noexcept;
+  bool damp_one_motion(const Impedance& impedance, analysis::DampingLevel& level,
+                       JointMatrix& D) const noexcept;
+  /// Returns the damping of a free motion of this frequency, 1/s.
+  double damping(const Impedance& impedance, double omega,
+                 analysis::DampingLevel& level) const noexcept;
 
   TaskInertia inertia_;
   SmallCholesky mass_;
   Jacobian Jh_;
+  const analysis::BorneDamping* borne_ = nullptr;
 };
 
 }  // namespace dashpot::controller

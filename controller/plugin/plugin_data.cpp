@@ -44,6 +44,7 @@ std::int32_t check(const Struct* given, int n) noexcept {
 static_assert(DASHPOT_OK == static_cast<int>(Status::kOk));
 static_assert(DASHPOT_TORQUE_LIMITED == static_cast<int>(Status::kTorqueLimited));
 static_assert(DASHPOT_NEAR_JOINT_LIMIT == static_cast<int>(Status::kNearJointLimit));
+static_assert(DASHPOT_LITTLE_MARGIN == static_cast<int>(Status::kLittleMargin));
 static_assert(DASHPOT_WRENCH_NOT_FINITE == static_cast<int>(Status::kWrenchNotFinite));
 static_assert(DASHPOT_SETPOINT_REJECTED == static_cast<int>(Status::kSetpointRejected));
 static_assert(DASHPOT_WEIGHT_NOT_HELD == static_cast<int>(Status::kWeightNotHeld));
@@ -203,6 +204,7 @@ void to_c(const Snapshot& snapshot, dashpot_snapshot& out) noexcept {
   put(snapshot.tip_wrench, out.tip_wrench);
   out.joint_damping_ratio = snapshot.joint_damping_ratio;
   out.task_damping_ratio = snapshot.task_damping_ratio;
+  out.damping_level = snapshot.damping_level;
   out.payload_mass = snapshot.payload.mass;
   put(snapshot.payload.center, out.payload_center);
   put_rows(snapshot.payload.inertia, out.payload_inertia);

@@ -185,8 +185,8 @@ void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) n
 void add_null_damping(const Impedance& impedance, const NullSpace& null_space,
                       JointMatrix& C) noexcept {
   if (impedance.null_damping_ratio == 0) return;
-  const JointMatrix D =
-      null_space.ratio_damping(impedance.null_damping_ratio, impedance.null_stiffness);
+  analysis::DampingLevel level;
+  const JointMatrix D = null_space.ratio_damping(impedance, level);
   for (Index j = 0; j < C.cols(); ++j) {
     const JointVector column = null_space.damper(D, JointVector::Unit(C.rows(), j));
     for (Index i = 0; i < C.rows(); ++i) C(i, j) += column[i];

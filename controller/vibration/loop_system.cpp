@@ -108,8 +108,8 @@ bool LoopSystem::add_free_motions(const Impedance& impedance, const NullSpace& n
     }
   }
   if (impedance.null_damping_ratio > 0) {
-    const JointMatrix designed =
-        null_space.ratio_damping(impedance.null_damping_ratio, impedance.null_stiffness);
+    analysis::DampingLevel level;
+    const JointMatrix designed = null_space.ratio_damping(impedance, level);
     for (int k = 0; k < r; ++k) {
       JointVector y = JointVector::Zero(n_);
       add_product(designed, Q_[static_cast<std::size_t>(k)], y);

@@ -35,6 +35,7 @@ void fill(const dashpot_snapshot& from, controller::Snapshot& to) noexcept {
   to.tip_wrench = Eigen::Map<const controller::Vector6>(from.tip_wrench);
   to.joint_damping_ratio = from.joint_damping_ratio;
   to.task_damping_ratio = from.task_damping_ratio;
+  to.damping_level = from.damping_level;
   to.payload = {from.payload_mass, Eigen::Map<const Eigen::Vector3d>(from.payload_center),
                 Eigen::Map<const RowMajor3>(from.payload_inertia)};
   to.tool = pose(from.tool_position, from.tool_rotation);

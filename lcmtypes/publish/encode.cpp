@@ -129,6 +129,7 @@ void fill(const StateSample& sample, state_t& message) {
   copy_to(snapshot.tip_wrench, message.tip_wrench);
   message.joint_damping_ratio = snapshot.joint_damping_ratio;
   message.task_damping_ratio = snapshot.task_damping_ratio;
+  message.damping_level = snapshot.damping_level;
   message.payload_mass = snapshot.payload.mass;
   copy_to(snapshot.payload.center, message.payload_center);
   copy_to(snapshot.tool.position, message.tool_position);

@@ -29,28 +29,29 @@ class Status(enum.IntEnum):
     OK = 0
     TORQUE_LIMITED = 1
     NEAR_JOINT_LIMIT = 2
-    WRENCH_NOT_FINITE = 3
-    SETPOINT_REJECTED = 4
-    WEIGHT_NOT_HELD = 5
-    SETPOINT_STALE = 6
-    SETPOINT_LOST = 7
-    FAULT_LATCHED = 8
-    TOO_MANY_RESTARTS = 9
-    TIME_GAP = 10
-    WRONG_RATE = 11
-    COLLISION = 12
-    INSTABILITY = 13
-    TIP_SPEED_LIMIT = 14
-    VELOCITY_LIMIT = 15
-    WALL = 16
-    POSITION_LIMIT = 17
-    STATE_FROZEN = 18
-    STATE_CONTRADICTORY = 19
-    STATE_NOT_FINITE = 20
-    STATE_WRONG_SIZE = 21
-    STATE_JUMP = 22
-    TIME_BACKWARD = 23
-    NOT_FINITE = 24
+    LITTLE_MARGIN = 3
+    WRENCH_NOT_FINITE = 4
+    SETPOINT_REJECTED = 5
+    WEIGHT_NOT_HELD = 6
+    SETPOINT_STALE = 7
+    SETPOINT_LOST = 8
+    FAULT_LATCHED = 9
+    TOO_MANY_RESTARTS = 10
+    TIME_GAP = 11
+    WRONG_RATE = 12
+    COLLISION = 13
+    INSTABILITY = 14
+    TIP_SPEED_LIMIT = 15
+    VELOCITY_LIMIT = 16
+    WALL = 17
+    POSITION_LIMIT = 18
+    STATE_FROZEN = 19
+    STATE_CONTRADICTORY = 20
+    STATE_NOT_FINITE = 21
+    STATE_WRONG_SIZE = 22
+    STATE_JUMP = 23
+    TIME_BACKWARD = 24
+    NOT_FINITE = 25
 
     @property
     def text(self) -> str:
@@ -125,6 +126,8 @@ class Snapshot(Result):
     """For which the damping of the joint springs in force is designed; 0: it is given."""
     task_damping_ratio: float
     """Likewise of the Cartesian springs."""
+    damping_level: float
+    """Share of its ratio that the mode has that the sampled loop leaves least; 1: it bears all ratios."""
     payload_mass: float
     """kg, with which the arm counts at this tick, on the way to that of set_payload."""
     payload_center: Array

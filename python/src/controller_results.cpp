@@ -88,6 +88,7 @@ nb::object snapshot_of(dashpot_controller* controller) {
   result["tip_wrench"] = to_array(Map(found.tip_wrench, 6));
   result["joint_damping_ratio"] = found.joint_damping_ratio;
   result["task_damping_ratio"] = found.task_damping_ratio;
+  result["damping_level"] = found.damping_level;
   result["payload_mass"] = found.payload_mass;
   result["payload_center"] = to_array(Map(found.payload_center, 3));
   result["payload_inertia"] = to_array(RotationMap(found.payload_inertia));

@@ -108,12 +108,13 @@ nb::dict columns_of(const std::vector<state_t>& messages) {
              "reference_tip_position", &M::reference_tip_position)(
              "reference_tip_quaternion", &M::reference_tip_quaternion)("tip_error", &M::tip_error)(
              "tip_wrench", &M::tip_wrench)("joint_damping_ratio", &M::joint_damping_ratio)(
-             "task_damping_ratio", &M::task_damping_ratio)("payload_mass", &M::payload_mass)(
-             "payload_center", &M::payload_center)("tool_position", &M::tool_position)(
-             "tool_quaternion", &M::tool_quaternion)("tick_time", &M::tick_time)(
-             "longest_tick_time", &M::longest_tick_time)("overruns", &M::overruns)(
-             "states_dropped", &M::states_dropped)("verdicts", &M::verdicts)(
-             "last_refusal", &M::last_refusal)("last_refusal_utime", &M::last_refusal_utime)(
+             "task_damping_ratio", &M::task_damping_ratio)("damping_level", &M::damping_level)(
+             "payload_mass", &M::payload_mass)("payload_center", &M::payload_center)(
+             "tool_position", &M::tool_position)("tool_quaternion", &M::tool_quaternion)(
+             "tick_time", &M::tick_time)("longest_tick_time", &M::longest_tick_time)(
+             "overruns", &M::overruns)("states_dropped", &M::states_dropped)(
+             "verdicts", &M::verdicts)("last_refusal", &M::last_refusal)("last_refusal_utime",
+                                                                         &M::last_refusal_utime)(
              "last_refused_sender", &M::last_refused_sender)("commander", &M::commander)(
              "commands_accepted", &M::commands_accepted)("commands_rejected", &M::commands_rejected)
       .result();

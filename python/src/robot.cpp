@@ -57,6 +57,7 @@ analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, cons
   if (fault) throw std::invalid_argument(std::string(fault.key) + " " + fault.reason);
   Settings settings = controller::default_settings(robot.model);
   settings.task_terms.load = load;
+  settings.limits.gain_margin = 1;  // no loop is told that could lower a ratio
   controller::PostureLoop loop(robot.model, settings);
   analysis::System<controller::kMaxJoints> system;
   const controller::Status status = loop.closed_loop(

@@ -58,7 +58,8 @@ inline const std::vector<Room>& rooms() {
        {kEigen, "unsupported/Eigen/FFT"}},
       {"analysis/design",
        5,
-       {"damping_target", "damping_design", "damping_region", "damping_sampled", "ratio_damping"},
+       {"damping_target", "damping_design", "damping_region", "damping_sampled", "ratio_damping",
+        "borne_damping"},
        {kEigen}},
 
       {"controller/base",
