@@ -40,9 +40,11 @@ class BorneDamping {
   /// Returns the share, above 0 and at most 1, of the damping `wanted` (1/s) with which a mode of
   /// frequency `omega` (rad/s) keeps the margin. Where no share keeps it, because the spring alone
   /// is too much for the loop, or what is wanted too little for the spring, it is the share with
-  /// the largest margin. `worst` then says so, and keeps the least share it has met. `in_force` is
-  /// the share of spring and damper in force, above 0 and at most 1: so that springs that replace
-  /// each other gradually bear no more together than each of them alone.
+  /// the largest margin. `worst` then says so, and keeps the least share it has met.
+  ///
+  /// `in_force`, above 0 and at most 1, is the share of this mode where springs replace each other
+  /// gradually: omega^2 and `wanted` then count as that share of a whole, so that together they
+  /// bear no more than one. Nothing is said of their margin, because the others damp as well.
   ///
   /// Shares are up to a few percent less than the largest that keeps the margin, because the
   /// boundary is interpolated between kCells + 1 points, inside of it.
@@ -50,12 +52,12 @@ class BorneDamping {
     const double k = square_ * omega * omega / in_force, c = period_ * wanted / in_force;
     double most = steepest_ * k;
     const double at = k * cells_per_k_;
-    bool kept = false;
+    bool kept = in_force < 1;
     if (at < kCells) {
       const auto i = static_cast<std::size_t>(at);
       const double s = at - static_cast<double>(i);
       most = most_[i] + s * (most_[i + 1] - most_[i]);
-      kept = c >= least_[i] + s * (least_[i + 1] - least_[i]);
+      kept = kept || c >= least_[i] + s * (least_[i + 1] - least_[i]);
     }
     const double result = c > most ? most / c : 1;
     worst.include({result, kept});

@@ -102,6 +102,7 @@ BorneDamping::BorneDamping(const SampledLoop& loop, double gain_margin)
     least_[i] = boundary.least(k) / gain_margin;
   }
   most_[kCells] = least_[kCells] = tip.c / gain_margin;
+  least_[0] = 0;  // exactly: of motions without springs
 }
 
 }  // namespace dashpot::analysis

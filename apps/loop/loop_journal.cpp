@@ -98,6 +98,7 @@ void LoopJournal::publish_sampled(std::int64_t utime, std::int64_t time) noexcep
 
 void LoopJournal::note_errors(const dashpot_snapshot& snapshot) noexcept {
   if (snapshot.status >= DASHPOT_STATE_NOT_FINITE) return;  // of an earlier tick
+  record.damping_level = std::min(record.damping_level, snapshot.damping_level);
   if (snapshot.mode == DASHPOT_MODE_CARTESIAN) {
     record.cartesian = true;
     const Eigen::Map<const controller::Vector6> error(snapshot.tip_error);

@@ -32,6 +32,7 @@ struct LoopRecord {
   double tip_error = 0;        ///< m
   double tip_angle_error = 0;  ///< rad
   double joint_error = 0;      ///< rad
+  double damping_level = 1;    ///< the least one, see dashpot_snapshot
 };
 
 /// Keeps the record of a loop, tick by tick, and offers what is published of it. The loop's thread

@@ -104,6 +104,9 @@ std::string told(const state_t& state) {
        {std::pair("joint", state.joint_damping_ratio), {"task", state.task_damping_ratio}}) {
     if (ratio != 0) text += "; " + std::string(name) + " damping ratio " + format_number(ratio, 3);
   }
+  if (state.damping_level < 1) {
+    text += "; lowered to " + format_number(state.damping_level, 3) + " of it";
+  }
   return text;
 }
 

@@ -188,6 +188,10 @@ std::string error_text(const LoopRecord& loop) {
         "  Joint farthest from where its springs are fixed: " + format_number(loop.joint_error, 3) +
         " rad (m)\n";
   }
+  if (loop.damping_level < 1) {
+    out += "  Damping ratios lowered, where the sampled loop bears no more, to " +
+           format_number(loop.damping_level, 3) + " of what was asked for\n";
+  }
   return out;
 }
 
@@ -345,6 +349,7 @@ std::string to_json(const RunReport& report) {
       {"solved", solved_json(loop.first_modes, loop.last_modes)},
       {"largest_tracking_error",
        {{"tip", loop.tip_error}, {"tip_angle", loop.tip_angle_error}, {"joint", loop.joint_error}}},
+      {"least_damping_level", loop.damping_level},
       {"energy", energy_json(report.energy)},
       {"messages",
        {{"states", report.messages.states},

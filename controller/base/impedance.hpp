@@ -37,6 +37,8 @@ struct Impedance {
   /// in the null space if all its stiffness is zero.
   Impedance(const Setpoint& setpoint, int n) noexcept;
 
+  /// Returns the share of the Cartesian springs in all springs in force, 1 if there are no others.
+  double task_share() const noexcept { return task_weight / (task_weight + joint_weight); }
   /// Returns true if there are springs or dampers in the null space.
   bool null_space() const noexcept;
 };

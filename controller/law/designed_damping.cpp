@@ -55,7 +55,7 @@ const Impedance& DesignedDamping::update(const GainBlend& gains,
     if (tip) set_tip(given, robot);
     if (joints) {
       joint_damper_.set(given.joint_stiffness, given.joint_damping_ratio,
-                        friction(given.joint_weight), borne_, given.joint_weight);
+                        friction(given.joint_weight), borne_, 1 - given.task_share());
     }
   }
   tip_ = tip;
@@ -88,7 +88,8 @@ void DesignedDamping::set_tip(const Impedance& given, const DynamicsResult& robo
   const Matrix6 K_C = in_tool(given)       ? K_T
                       : !given.tool.none() ? Matrix6(K_B + turned(K_T, robot.R_BT))
                                            : K_B;
-  tip_damper_.set(K_C, given.damping_ratio, friction(given.task_weight), borne_, given.task_weight);
+  tip_damper_.set(K_C, given.damping_ratio, friction(given.task_weight), borne_,
+                  given.task_share());
 }
 
 void DesignedDamping::design_tip(const Impedance& given, const DynamicsResult& robot) noexcept {

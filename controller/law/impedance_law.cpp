@@ -26,8 +26,8 @@ ImpedanceLaw::ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forw
       viscous_friction_(model.joint_values(&Joint::viscous_friction)),
       coulomb_friction_(model.joint_values(&Joint::coulomb_friction)),
       integral_(integral),
-      joint_pull_(JointVector::Zero(model.dof())) {
-  null_space_.set_loop(borne);
+      joint_pull_(JointVector::Zero(model.dof())),
+      borne_(borne) {
   if (!friction_of_robot_) return;
   viscous_friction_ *= feed_forward.friction_share;
   coulomb_friction_ *= feed_forward.friction_share;
@@ -72,6 +72,7 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
       add(null_space_.spring(impedance.null_stiffness, dq), tau);
       add(null_space_.damper(impedance.null_damping, dqd), tau);
       if (impedance.null_damping_ratio > 0) {
+        null_space_.set_loop(borne_, impedance.task_share());
         const JointMatrix D = null_space_.ratio_damping(impedance, null_level_);
         add(null_space_.damper(D, dqd), tau);
       }

@@ -85,6 +85,7 @@ class ImpedanceLaw {
   bool clamped_ = false;    ///< the error clamp acts
   JointVector joint_pull_;  ///< K_q (q_d - q)
   Vector6 tip_pull_ = Vector6::Zero();
+  const analysis::BorneDamping* borne_;
 };
 
 }  // namespace dashpot::controller

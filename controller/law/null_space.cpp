@@ -48,7 +48,7 @@ double NullSpace::damping(const Impedance& impedance, double omega,
                           analysis::DampingLevel& level) const noexcept {
   const double wanted = 2 * impedance.null_damping_ratio * omega;
   if (borne_ == nullptr) return wanted;
-  return wanted * borne_->share(omega, wanted, impedance.task_weight, level);
+  return wanted * borne_->share(omega, wanted, in_force_, level);
 }
 
 JointMatrix NullSpace::ratio_damping(const Impedance& impedance,

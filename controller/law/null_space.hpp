@@ -20,8 +20,12 @@ namespace dashpot::controller {
 ///     cond(M) max(k) |dq|.
 class NullSpace {
  public:
-  /// Sets what the loop bears of ratio_damping, which has to outlive this; null: any damping.
-  void set_loop(const analysis::BorneDamping* borne) noexcept { borne_ = borne; }
+  /// Sets what the loop bears of ratio_damping, which has to outlive this; null: any damping. Of
+  /// springs that are in force in part it takes their share, above 0 and at most 1.
+  void set_loop(const analysis::BorneDamping* borne, double in_force) noexcept {
+    borne_ = borne;
+    in_force_ = in_force;
+  }
   void compute(const JointMatrix& M, const Jacobian& J, const TipImpedance& base,
                const TipImpedance& tool, const Eigen::Matrix3d& R_BT) noexcept;
 
@@ -65,6 +69,7 @@ class NullSpace {
   SmallCholesky mass_;
   Jacobian Jh_;
   const analysis::BorneDamping* borne_ = nullptr;
+  double in_force_ = 1;
 };
 
 }  // namespace dashpot::controller

@@ -112,7 +112,17 @@ TEST(BorneDamping, GivesAPartOfTheSpringsItsPart) {
     DampingLevel level;
     EXPECT_NEAR(mode.borne.share(std::sqrt(part) * mode.omega, part * mode.wanted, part, level),
                 mode.share, 1e-9 * mode.share);
-    EXPECT_EQ(level.kept, mode.level.kept);
+    EXPECT_TRUE(level.kept);
+  }
+}
+
+TEST(BorneDamping, KeepsTheMarginOfMotionsWithoutSprings) {
+  Random random(4105);
+  for (int k = 0; k < 20; ++k) {
+    DampingLevel level;
+    const Case mode(random);
+    EXPECT_EQ(mode.borne.share(0, 0, 1, level), 1);
+    EXPECT_TRUE(level.kept);
   }
 }
 

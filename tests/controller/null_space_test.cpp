@@ -147,7 +147,11 @@ TEST_F(NullSpaceOfPanda, DampsFreeMotionsWithTheRatio) {
     at(random.vector(7));
     if (null_space.inertia().nearly_singular()) continue;
     const JointVector k0 = 30 * random.vector(7).cwiseAbs();
-    const JointMatrix D = null_space.ratio_damping(0.6, k0);
+    Impedance impedance(7);
+    impedance.null_stiffness = k0;
+    impedance.null_damping_ratio = 0.6;
+    analysis::DampingLevel level;
+    const JointMatrix D = null_space.ratio_damping(impedance, level);
     MatrixXd C(7, 7);
     for (int j = 0; j < 7; ++j) C.col(j) = null_space.damper(D, JointVector::Unit(7, j));
     const MatrixXd M = robot.M, J = held.selected.asDiagonal() * robot.J;

@@ -45,6 +45,7 @@ inline StateSample random_state(Random& random, int n) {
   snapshot.tip_wrench = random.vector(6);
   snapshot.joint_damping_ratio = random.uniform(0, 2);
   snapshot.task_damping_ratio = random.uniform(0, 2);
+  snapshot.damping_level = random.uniform(0.1, 1);
   snapshot.payload = {random.uniform(0, 9), random.vector(3), Eigen::Matrix3d::Identity()};
   snapshot.tool = random_pose(random);
   snapshot.fault = static_cast<controller::Status>(random.integer(0, 13));

@@ -56,6 +56,7 @@ class Snapshot(c.Structure):
                 ("law_torque", c.c_double * MAX_JOINTS), ("tip_error", c.c_double * 6),
                 ("tip_wrench", c.c_double * 6),
                 ("joint_damping_ratio", c.c_double), ("task_damping_ratio", c.c_double),
+                ("damping_level", c.c_double),
                 ("payload_mass", c.c_double), ("payload_center", c.c_double * 3),
                 ("payload_inertia", c.c_double * 9), ("tool_position", c.c_double * 3),
                 ("tool_rotation", c.c_double * 9)]

@@ -234,6 +234,7 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
   }
   snapshot.tip_error = numbers.vector(6);
   snapshot.tip_wrench = numbers.vector(6);
+  snapshot.damping_level = 0.3;
   dashpot_snapshot out;
   std::memset(&out, 7, sizeof out);
   to_c(snapshot, out);
@@ -255,6 +256,7 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
   EXPECT_EQ(seen(out.reference_tip_position, 3), snapshot.reference_tip.position);
   EXPECT_EQ(seen_square(out.reference_tip_rotation, 3), snapshot.reference_tip.rotation);
   EXPECT_EQ(seen(out.tip_error, 6), snapshot.tip_error);
+  EXPECT_EQ(out.damping_level, 0.3);
   EXPECT_EQ(seen(out.tip_wrench, 6), snapshot.tip_wrench);
 }
 
