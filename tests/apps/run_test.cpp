@@ -43,8 +43,8 @@ TEST_P(EveryScene, RunsWithoutAnOverrunAndAccountsForItsEnergy) {
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryScene,
                          ::testing::Values("panda", "panda_release_c1", "panda_release_c2",
                                            "panda_release_ratio_damping", "panda_push_free",
-                                           "panda_push_held", "panda_pick_up", "iiwa14", "ur5",
-                                           "baxter_left", "chain3"));
+                                           "panda_push_held", "panda_pick_up", "panda_late_torque",
+                                           "iiwa14", "ur5", "baxter_left", "chain3"));
 
 TEST(Scenes, AreAllTested) {
   std::size_t files = 0;
@@ -52,7 +52,7 @@ TEST(Scenes, AreAllTested) {
        std::filesystem::directory_iterator(std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes")) {
     files += entry.path().extension() == ".yaml" ? 1 : 0;
   }
-  EXPECT_EQ(files, 11U);  // those of EveryScene
+  EXPECT_EQ(files, 12U);  // those of EveryScene
 }
 
 /// Every key that the reader says it knows stands in the example.
@@ -102,6 +102,27 @@ TEST(Run, TheSameSceneGivesTheSameBits) {
                 .status,
             0);
   EXPECT_EQ(first, scratch.read("c.csv"));
+}
+
+/// The ratio of the scene shakes the arm where it is stretched out, unless it is lowered there.
+TEST(Run, LowersARatioBeforeTheArmShakes) {
+  const Scratch scratch;
+  const std::string csv = scratch.path("lowered.csv");
+  const Json lowered = run_json(scene("panda_late_torque"), {"--csv", csv});
+  EXPECT_EQ(lowered["faults"], 0);
+  EXPECT_EQ(lowered["status"]["ok"], lowered["ticks"]);
+  EXPECT_GT(lowered["least_damping_level"].get<double>(), 0.1);
+  EXPECT_LT(lowered["least_damping_level"].get<double>(), 0.5);
+  EXPECT_LT(lowered["largest_tracking_error"]["joint"].get<double>(), 0.1);
+  for (const char* end : {"start", "end"}) {  // drawn in
+    for (const Json& mode : lowered["modes"][end]) EXPECT_NEAR(mode["damping_ratio"], 2, 1e-6);
+  }
+  run_scene(scene("panda_late_torque"), {"--csv", scratch.path("again.csv")});
+  EXPECT_EQ(text_of(csv), scratch.read("again.csv"));
+  const Json asked = run_json(
+      changed(scratch, "panda_late_torque", "scenario:", "limits: {gain_margin: 1}\nscenario:"));
+  EXPECT_EQ(asked["least_damping_level"], 1);
+  EXPECT_GT(asked["faults"], 0);
 }
 
 // Table 1 of the paper: 20.25, 10.98, 9.755 rad/s with 0.0255, 0.0316, 0.0294 (C1), 20.23, 10.95,

@@ -23,9 +23,6 @@ namespace {
 using testing::LedArm;
 using testing::Random;
 
-/// Below this share of the margin wanted no loop was seen, with all that couples modes.
-constexpr double kTolerance = 0.02;
-
 /// The margin of the closed loop of an arm, if it is not far above `wanted`.
 double margin_of(const LedArm& arm, double wanted) {
   const Settings& settings = arm.controller.settings();
@@ -58,12 +55,12 @@ double fastest(const LedArm& arm) {
   return std::sqrt(modes.eigenvalues().maxCoeff());
 }
 
-enum class What { kTip, kJoints, kFreeMotions, kFriction, kPayload };
+enum class What { kTip, kJoints, kFreeMotions, kSingular, kFriction, kPayload };
 
 /// An arm with gains whose fastest mode is about as fast as the loop bears.
 class Case {
  public:
-  Case(const testing::Arm& arm, What what, Random& random) : random_(random) {
+  Case(const testing::Arm& arm, What what, Random& random) : what_(what), random_(random) {
     const RobotModel bare = testing::smooth_arm(arm);
     const int n = bare.dof();
     ModelOptions options;
@@ -100,7 +97,8 @@ class Case {
   /// The arm at a random posture, at rest, with stiffness that makes the fastest mode about as fast
   /// as the loop bears.
   void meet() {
-    const JointVector q = 2 * random_.vector(model->dof()).cwiseMax(-1).cwiseMin(1);
+    JointVector q = 2 * random_.vector(model->dof()).cwiseMax(-1).cwiseMin(1);
+    if (what_ == What::kSingular) q *= random_.log_uniform(1e-4, 0.1);  // stretched out
     Settings trial = settings;
     trial.limits.gain_margin = 1;
     LedArm first(*model, trial);
@@ -132,13 +130,14 @@ class Case {
   Status status = Status::kOk;
 
  private:
+  What what_;
   Random& random_;
 };
 
 class DampingLevel : public ::testing::TestWithParam<What> {};
 INSTANTIATE_TEST_SUITE_P(OfAll, DampingLevel,
                          ::testing::Values(What::kTip, What::kJoints, What::kFreeMotions,
-                                           What::kFriction, What::kPayload));
+                                           What::kSingular, What::kFriction, What::kPayload));
 
 TEST_P(DampingLevel, KeepsTheMarginOfEveryArm) {
   Random random(5200 + static_cast<std::uint64_t>(GetParam()));
@@ -156,7 +155,7 @@ TEST_P(DampingLevel, KeepsTheMarginOfEveryArm) {
         if (one.status == Status::kLittleMargin) continue;
         ASSERT_EQ(one.status, Status::kOk);
         ++kept;
-        EXPECT_GE(margin_of(*one.held, wanted), wanted * (1 - kTolerance));
+        EXPECT_GE(margin_of(*one.held, wanted), wanted);
         if (level == 1) {
           EXPECT_EQ(one.held->torque, one.asked->torque);
           continue;
@@ -211,7 +210,7 @@ TEST(HeldDamping, FallsAndRisesAlongAPath) {
       EXPECT_EQ(held.torque, asked.torque) << k;
     }
     if (k % 50 == 0) {
-      EXPECT_GE(margin_of(held, 2), 2 * (1 - kTolerance)) << k;
+      EXPECT_GE(margin_of(held, 2), 2) << k;
       lost = std::min(lost, margin_of(asked, 2));
     }
     EXPECT_LT(std::abs(level - last), 0.01) << k;
@@ -247,7 +246,7 @@ TEST(HeldDamping, KeepsTheMarginWhileTheModeChanges) {
       if (k % 25 != 0) continue;
       const double found = margin_of(arm, 2);
       if (margin == 2) {
-        EXPECT_GE(found, 2 * (1 - kTolerance)) << k;
+        EXPECT_GE(found, 2) << k;
       } else {
         least = std::min(least, found);
       }
