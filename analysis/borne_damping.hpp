@@ -44,7 +44,7 @@ class BorneDamping {
   ///
   /// `in_force`, above 0 and at most 1, is the share of this mode where springs replace each other
   /// gradually: omega^2 and `wanted` then count as that share of a whole, so that together they
-  /// bear no more than one. Nothing is said of their margin, because the others damp as well.
+  /// bear no more than one.
   ///
   /// Shares are up to a few percent less than the largest that keeps the margin, because the
   /// boundary is interpolated between kCells + 1 points, inside of it.
@@ -52,12 +52,12 @@ class BorneDamping {
     const double k = square_ * omega * omega / in_force, c = period_ * wanted / in_force;
     double most = steepest_ * k;
     const double at = k * cells_per_k_;
-    bool kept = in_force < 1;
+    bool kept = false;
     if (at < kCells) {
       const auto i = static_cast<std::size_t>(at);
       const double s = at - static_cast<double>(i);
       most = most_[i] + s * (most_[i + 1] - most_[i]);
-      kept = kept || c >= least_[i] + s * (least_[i + 1] - least_[i]);
+      kept = c >= least_[i] + s * (least_[i + 1] - least_[i]);
     }
     const double result = c > most ? most / c : 1;
     worst.include({result, kept});

@@ -150,7 +150,8 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
     impedance_torque(status == Status::kSetpointStale, torque);
     level_ = designed_.level();
     level_.include(law_.null_level());
-    if (!level_.kept) status = worse(status, Status::kLittleMargin);
+    // While gains change, dampers that fade keep the margin as well.
+    if (!level_.kept && gains_.still()) status = worse(status, Status::kLittleMargin);
   }
   const bool springs = springs_ != Springs::kOff, returns = fault_ == Status::kPositionLimit;
   const Status limits =
