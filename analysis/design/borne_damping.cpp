@@ -38,7 +38,8 @@ class Boundary {
 
   /// The point of the largest stiffness.
   Point tip() const { return at(tip_); }
-  /// The least and the most damping for a stiffness.
+  /// The least and the most damping for a stiffness. If k does not return to 0 before theta = pi,
+  /// the most damping is that of z = -1 for every k.
   double least(double k) const { return at(where(k, 0, tip_)).c; }
   double most(double k) const { return at(tip_ < end_ ? where(k, end_, tip_) : end_).c; }
 
