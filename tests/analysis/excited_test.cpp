@@ -21,14 +21,14 @@ using ::testing::HasSubstr;
 /// chirp of 0.3 to 8 Hz moves, at 500 Hz; 3 % of the samples are missing.
 MotionRecord chirped(Draws& draw, double start, double noise = 1e-5) {
   constexpr int kSamples = 3000;
-  constexpr double kPeriod = 0.002;
+  constexpr double kStep = 0.002;
   MotionRecord record{VectorXd(kSamples), MatrixXd(2, kSamples), MatrixXd(1, kSamples)};
   struct Oscillator {
     double w, z, x, v = 0;
     void step(double u) {  // exactly, about u
       const double d = w * std::sqrt(1 - z * z), y = x - u, b = (v + z * w * y) / d;
-      const double fade = std::exp(-z * w * kPeriod);
-      const double c = std::cos(d * kPeriod), s = std::sin(d * kPeriod);
+      const double fade = std::exp(-z * w * kStep);
+      const double c = std::cos(d * kStep), s = std::sin(d * kStep);
       const double next = fade * (y * c + b * s);
       v = fade * (b * c - y * s) * d - z * w * next;
       x = next + u;
@@ -36,7 +36,7 @@ MotionRecord chirped(Draws& draw, double start, double noise = 1e-5) {
   };
   Oscillator first{9, 0.12, start}, second{24, 0.8, -start};
   for (int i = 0; i < kSamples; ++i) {
-    const double t = kPeriod * i, u = std::sin(2 * std::numbers::pi * t * (0.3 + 0.64 * t));
+    const double t = kStep * i, u = std::sin(2 * std::numbers::pi * t * (0.3 + 0.64 * t));
     record.time[i] = t;
     record.input(0, i) = 3 * u;
     const bool missing = draw(0, 1) < 0.03;
