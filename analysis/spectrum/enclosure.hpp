@@ -120,7 +120,7 @@ struct BlockRoot : Root {
 
 /// Sets the bound of each of `count` roots. Where discs of one group meet, all that is known is how
 /// many eigenvalues their union holds: the bound is then the distance of the farthest point of the
-/// union. `groups` holds the group of each block.
+/// union. `groups` holds the group of each block. (Radii have slack for the comparison.)
 template <class BlockRoots, class Groups>
 void bound_roots(BlockRoots* roots, int count, const Groups& groups) noexcept {
   bool any = false;
@@ -144,9 +144,8 @@ void bound_roots(BlockRoots* roots, int count, const Groups& groups) noexcept {
     for (int j = 0; any && j < count; ++j) {
       if (roots[i].united != roots[j].united) continue;
       const double farthest = modulus(roots[i].value - roots[j].value) + roots[j].radius;
-      roots[i].bound = std::max(roots[i].bound, farthest);
+      roots[i].bound = std::max(roots[i].bound, kSlack * farthest);
     }
-    roots[i].bound += std::numeric_limits<double>::epsilon() * modulus(roots[i].value);
   }
 }
 
