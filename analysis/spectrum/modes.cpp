@@ -103,12 +103,9 @@ void ModeExtractor<N>::take_zero_rates() {
   for (int i = 0; i + 1 < root_count_ && found < r; ++i) {
     const Block& b = basis_.blocks[root(i).block];
     if (!b.zero_mode || b.size != 2) continue;
-    // Of the block's two eigenvalues, 0 and the rate, the one that is nearer to the rate.
-    const double rate = basis_.Lambda(b.first + 1, b.first + 1);
-    const double away = modulus(root(i).value - rate), next = modulus(root(i + 1).value - rate);
-    spectrum_.zero_mode_rates[found] = rate;
-    spectrum_.zero_mode_rates_bound[found++] =
-        next < away ? root(i + 1).bound + next : root(i).bound + away;
+    // eigenvalues_2x2 returns 0 and then the rate, as it stands in the block.
+    spectrum_.zero_mode_rates[found] = root(i + 1).value.real();
+    spectrum_.zero_mode_rates_bound[found++] = root(i + 1).bound;
     ++i;
   }
   // The rest are real eigenvalues whose motion is mostly along the zero modes.
