@@ -63,7 +63,7 @@ U separation(const MeasuredBlock<T>& A, const MeasuredBlock<U>& B) noexcept {
   const U norm = square_root(p00 * p00 + p01 * p01 + (p10 * p10 + p11 * p11));
   const U rounding = kRounding * (A.size2 + trace * trace + B.size2);
   const U halves = A.traceless + B.traceless + 0.7072 * magnitude(across);
-  return (magnitude(p00 * p11 - p01 * p10) - rounding * norm) / (kSlack * norm * halves);
+  return (magnitude(p00 * p11 - p01 * p10) - rounding * norm) / (norm * halves);
 }
 
 /// The same for a block of one entry x.
@@ -73,7 +73,7 @@ U separation(double x, const MeasuredBlock<U>& B) noexcept {
   const U trace = B.trace();
   const U least = magnitude(x * x - trace * x + B.determinant()) -
                   kRounding * (x * x + trace * trace + B.size2);
-  return least / (kSlack * (magnitude(x - 0.5 * trace) + B.traceless));
+  return least / (magnitude(x - 0.5 * trace) + B.traceless);
 }
 
 }  // namespace dashpot::analysis

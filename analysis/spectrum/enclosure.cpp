@@ -8,8 +8,6 @@
 namespace dashpot::analysis {
 namespace {
 
-/// For the rounding errors of the bounds themselves.
-
 /// The radius of a disc is found within kLeap^(1 / 2^kHalves), 4 %, over the range of numbers.
 constexpr double kLeap = 16;
 constexpr int kHalves = 6, kMostLeaps = 530;
@@ -43,14 +41,14 @@ void enclose(const BasisResidual<N>& residual, ModalBasis<N>& basis,
                            basis.weight.block(bi.first, bi.first, bi.size, bi.size).norm();
       coupling2(i, j) =
           scale * (in(residual.F, bi).cwiseAbs() + in(residual.F_error, bi)).squaredNorm();
-      if (i < j) separation(i, j) = block_separation<N>(basis.Lambda, bi, bj) / kSlack;
+      if (i < j) separation(i, j) = block_separation<N>(basis.Lambda, bi, bj);
     }
   }
   for (int j = 0; j < count; ++j) {
     const Block& b = blocks[j];
     auto block = basis.Lambda.block(b.first, b.first, b.size, b.size);
     if (!b.zero_mode) block += residual.F.block(b.first, b.first, b.size, b.size);
-    own[j] = kSlack * own[j] + (b.zero_mode ? 0 : kUnit * block.norm());
+    own[j] += b.zero_mode ? 0 : kUnit * block.norm();
     // Separations were taken before that addition: it moves them by at most the sum of the norms.
     for (int i = 0; i < j; ++i) {
       separation(i, j) -= moved[i] + moved[j];

@@ -49,6 +49,11 @@ struct PerturbationBounds {
 /// group of blocks with close eigenvalues, and the E are parts of F. The condition then holds for
 /// every t E, 0 <= t <= 1, too. As t grows, the eigenvalues of a group never meet the other
 /// eigenvalues, and so no eigenvalue counts for two groups.
+///
+/// Rounding errors: the slack of the radius covers what is small beside it or beside delta. That of
+/// |E22| covers the rest of delta, because |E22| >= |E11|, and where |E22| is below 1e-6 of the
+/// separation, delta has no cancellation. At the border of the condition |E22| > delta / 2, whose
+/// slack is more than the rounding errors of the condition.
 template <int N, class Matrix, class Vector>
 void prove(const PerturbationBounds<Matrix, Vector>& bounds,
            BlockEnclosure<N>& enclosure) noexcept {
@@ -80,11 +85,11 @@ void prove(const PerturbationBounds<Matrix, Vector>& bounds,
           if (apart < separation || nearest < 0) separation = apart, nearest = k;
         }
       }
-      const double inner = kSlack * (own + std::sqrt(inner2));
+      const double inner = own + std::sqrt(inner2);
       const double product = std::sqrt(right2) * std::sqrt(left2);
       const double delta = separation - inner - everything;
-      if (nearest < 0 || (delta > 0 && 4 * kSlack * product < delta * delta)) {
-        const double radius = nearest < 0 ? inner : kSlack * (inner + 2 * product / delta);
+      if (nearest < 0 || (delta > 0 && 4 * product < delta * delta)) {
+        const double radius = kSlack * (nearest < 0 ? inner : inner + 2 * product / delta);
         for (int j = 0; j < count; ++j) {
           if (enclosure.group[j] == i && radius >= 0) enclosure.radius[j] = radius;
         }
