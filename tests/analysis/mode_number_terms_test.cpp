@@ -1,5 +1,6 @@
 // Each term of the bounds of eigenvalues, frequencies and ratios, in a case that is not enclosed
 // without it.
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/spectrum/enclosure.hpp>
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
 #include <dashpot/analysis/spectrum/modes.hpp>
@@ -84,6 +85,61 @@ TEST(ModeNumberTerms, DiscsThatMeetCountAsOne) {
     } else {
       EXPECT_NEAR(spectrum.modes[0].error_bound, 0.1, 1e-12);
     }
+  }
+}
+
+TEST(ModeNumberTerms, OfABlockInAGroupOnlyTheDiscsAreKnown) {
+  // Two equal oscillators. diag(L, L) + [0 e; e 0] is within e, in the spectral norm, and has the
+  // eigenvalues of L + e and of L - e: their sums move by 2 e, not by the sqrt(2) e of one block.
+  const double c = 0.02, e = 1e-3;
+  const System<> system = testing::system_from(
+      MatrixXd::Identity(2, 2), c * MatrixXd::Identity(2, 2), MatrixXd::Identity(2, 2));
+  MatrixXd Lambda = MatrixXd::Zero(4, 4), U = MatrixXd::Zero(2, 4);
+  for (const int i : {0, 1}) {
+    Lambda.block<2, 2>(2 * i, 2 * i) << 0, 1, -1, -c;
+    U(i, 2 * i) = 1;
+  }
+  BlockEnclosure<> enclosure;
+  enclosure.radius = VectorXd::Constant(2, e);
+  enclosure.group = Eigen::Vector2i(0, 0);
+  const Spectrum<> spectrum = modes_of(system, Lambda, U, {2, 2}, enclosure);
+  ASSERT_EQ(spectrum.modes.size(), 2);
+  for (const Mode<>& mode : spectrum.modes) {
+    for (const double moved : {-e, e}) {
+      const Complex value = mode.eigenvalues[0] + moved;
+      EXPECT_LE(std::abs(-value.real() / std::abs(value) - mode.damping_ratio),
+                mode.damping_ratio_bound);
+      EXPECT_LE(std::abs(std::abs(value) - mode.natural_frequency), mode.natural_frequency_bound);
+    }
+  }
+}
+
+TEST(ModeNumberTerms, RatesOfZeroModesMayMeetOtherEigenvalues) {
+  // 0 and the rate in one block, or in two of one group, with discs that meet.
+  const double a = 0.1, radius = 0.08;
+  for (const bool one_block : {true, false}) {
+    Spectrum<> spectrum;
+    spectrum.zero_modes.count = 1;
+    spectrum.zero_modes.basis = MatrixXd::Ones(1, 1);
+    ModalBasis<>& basis = spectrum.basis;
+    basis.U = Eigen::RowVector2d(1, one_block ? 0 : 1);
+    basis.Lambda = Eigen::Vector2d(0, -a).asDiagonal();
+    basis.Lambda(0, 1) = one_block ? 1 : 0;
+    basis.blocks.push_back({0, one_block ? 2 : 1, true});
+    if (!one_block) basis.blocks.push_back({1, 1, false});
+    BlockEnclosure<> enclosure;
+    enclosure.radius = VectorXd::Constant(basis.blocks.size(), radius);
+    enclosure.group = Eigen::VectorXi::Zero(basis.blocks.size());
+    const System<> system = testing::one_joint(1, a, 0);
+    BasisResidual<> residual;
+    evaluate_residual<kDynamic>(system, false, false, basis, residual);
+    read_modes<kDynamic>(system, residual, enclosure, 0, spectrum);
+    ASSERT_EQ(spectrum.zero_mode_rates.size(), 1);
+    EXPECT_EQ(spectrum.zero_mode_rates[0], -a);
+    const std::array<Complex, 2> values{0, -a};
+    const double disc =
+        one_block ? disc_radius(values.data(), 2, 0, basis.Lambda.norm(), radius) : radius;
+    EXPECT_GE(spectrum.zero_mode_rates_bound[0], a + disc);
   }
 }
 
@@ -228,6 +284,8 @@ TEST(ModeNumberTerms, FrequencyAndRatioAreWithinTheirBounds) {
     v.product_error = exact ? 0 : random.uniform(0, 0.99) * v.product;
     v.discriminant_error = 0;
     const ModeNumbers mode = mode_numbers({{-1, 1}, 0}, {{-1, -1}, 0}, v, 0);
+    // What the frequency may err by, and the rounding error of the division by it.
+    EXPECT_GE(mode.damping_ratio_bound, 5 * kUnit * std::abs(mode.damping_ratio));
     for (const int side : {-1, 1}) {
       for (const int other : {-1, 1}) {
         const long double product =
