@@ -60,7 +60,7 @@ struct Case {
 TEST(BorneDamping, LeavesEachModeItsMargin) {
   Random random(4101);
   int whole = 0, lowered = 0, hopeless = 0;
-  for (int k = 0; k < 400; ++k) {
+  for (int k = 0; k < 600; ++k) {
     const Case mode(random);
     SCOPED_TRACE(k);
     ASSERT_GT(mode.share, 0);

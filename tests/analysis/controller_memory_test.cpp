@@ -107,7 +107,7 @@ TEST(ControllerMemory, OfAnIntegralMakesSlowModes) {
     const SampledSpectrum sampled = sample_loop(system, spectrum, loop);
     ASSERT_EQ(sampled.memory.size(), 6u);
     for (const Complex z : sampled.memory) {
-      EXPECT_LT(modulus(std::log(z) / loop.period * time + 1.0), 3e-3) << z;
+      EXPECT_LT(modulus(std::log(z) / loop.period * time + 1.0), 1e-2) << z;  // 1 - z is 1e-9
     }
     EXPECT_TRUE(sampled.zero_modes.empty() && sampled.others.empty());
     EXPECT_TRUE(sampled.stable());

@@ -88,14 +88,15 @@ TEST(Realtime, HostileInputNeverGivesHostileTorque) {
       ASSERT_STREQ(watch.see(torque), nullptr) << "tick " << k;
     }
   }
-  // All but what needs a setting (kCollision, kWall), a robot that is not there (kInstability,
-  // kStateFrozen, kStateContradictory), or is not reached by finite input within its limits.
+  // All but what needs a setting (kCollision, kWall, kLittleMargin), a robot that is not there
+  // (kInstability, kStateFrozen, kStateContradictory), or is not reached by finite input within its
+  // limits.
   for (int i = 0; i < static_cast<int>(Status::kNotFinite); ++i) {
     const auto status = static_cast<Status>(i);
     const bool rare = status == Status::kCollision || status == Status::kWall ||
-                      status == Status::kInstability || status == Status::kStateFrozen ||
-                      status == Status::kStateContradictory || status == Status::kWrongRate ||
-                      status == Status::kTooManyRestarts;
+                      status == Status::kLittleMargin || status == Status::kInstability ||
+                      status == Status::kStateFrozen || status == Status::kStateContradictory ||
+                      status == Status::kWrongRate || status == Status::kTooManyRestarts;
     EXPECT_TRUE(rare || seen.count(status) > 0) << to_text(status);
   }
 }

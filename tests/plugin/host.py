@@ -148,8 +148,8 @@ def load(path):
     library.dashpot_plugin_interface.restype = c.POINTER(Plugin)
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
-    plugin = library.dashpot_plugin_interface(9).contents
-    assert plugin.version == 9 and plugin.struct_size == c.sizeof(Plugin)
+    plugin = library.dashpot_plugin_interface(10).contents
+    assert plugin.version == 10 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
 

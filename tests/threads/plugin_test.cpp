@@ -87,7 +87,7 @@ TEST(Plugin, HasATextForEverythingItReturns) {
   for (std::int32_t code = DASHPOT_UNSTABLE_GAINS; code <= DASHPOT_NOT_FINITE; ++code) {
     texts.insert(plugin().status_text(code));
   }
-  EXPECT_EQ(texts.size(), 31u);
+  EXPECT_EQ(texts.size(), 32u);
   EXPECT_FALSE(texts.count("unknown status"));
   for (const std::int32_t code :
        {DASHPOT_UNSTABLE_GAINS - 1, DASHPOT_NOT_FINITE + 1, 1000, -1000}) {
