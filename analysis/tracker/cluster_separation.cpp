@@ -12,7 +12,7 @@ namespace dashpot::analysis {
 namespace {
 
 /// Squared lengths in the metric below this, relative to Euclidean ones, count as zero.
-constexpr double kNeutral = 1e-4;
+constexpr double kNeutralLength = 1e-4;
 /// Blocks whose trace and determinant agree to this, relative to their size, coincide.
 constexpr double kCoinciding = 1e-10;
 /// What is smaller than this, relative to the rest, has no direction.
@@ -114,13 +114,13 @@ bool normalize(const SmallProblem& problem, const Cluster& vectors, Cluster& out
   const ClusterSolver eigen(gram);
   const auto& lengths = eigen.eigenvalues();
   const Eigen::Index last = lengths.size() - 1;
-  if (!(lengths[0] < -kNeutral)) return false;
+  if (!(lengths[0] < -kNeutralLength)) return false;
   const SmallVector minus = vectors * eigen.eigenvectors().col(0) / std::sqrt(-lengths[0]);
   if (out.cols() == 1) {
     out.col(0) = minus;
     return true;
   }
-  if (!(lengths[last] > kNeutral)) return false;
+  if (!(lengths[last] > kNeutralLength)) return false;
   out.col(0) = vectors * eigen.eigenvectors().col(last) / std::sqrt(lengths[last]);
   out.col(1) = minus;
   return true;
