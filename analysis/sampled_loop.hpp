@@ -36,13 +36,20 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
 /// above 1, searched in steps of a quarter, or infinity if there is none up to `most`. Where the
 /// loop is unstable as it is, the result is the first boundary below 1, or zero if there is none
 /// down to 1e-3. Motions with |log z| / T below `slowest`, rad/s, do not count, because a
-/// self-motion fed by gravity compensation with a zero-order hold is no vibration. The search takes
-/// ten to some tens of eigenproblems. Throws like sample_loop.
+/// self-motion fed by gravity compensation with a zero-order hold is no vibration; where the state
+/// has more than 200 rows, `slowest` is at least 1e-6 / T. The search takes ten to some tens of
+/// eigenproblems, or, with more than 200 rows, of counts whose work does not grow with the delay.
+/// Throws like sample_loop.
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
                    double most = 1e6, double slowest = 0);
 
-/// Returns the same from an elastic form, without a spectrum.
+/// Returns whether gain_margin is at least `margin`, from the few factors that its search would try
+/// up to there. Throws likewise, and for a margin below 1.
+bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const SampledLoop& loop,
+                  double margin);
+
+/// Returns the gain margin of an elastic form, without a spectrum.
 template <int N>
 double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double most = 1e6,
                    double slowest = 0);

@@ -5,8 +5,11 @@
 // fixed-size matrices. design/friction/n takes joint friction off besides, design/joint/n is that
 // of springs in the joints. design/region/n designs one matrix for 32 configurations of n joints on
 // one thread, design/map/n only judges one there; items_per_second counts configurations.
+// design/loop/n/d is one for a sampled loop with friction, a low-pass and d ticks of delay, which
+// bears less than is wanted.
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_region.hpp>
+#include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/analysis/ratio_damping.hpp>
 
 #include <benchmark/benchmark.h>
@@ -116,6 +119,23 @@ void region(benchmark::State& state, bool design) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(all.size()));
 }
 
+void sampled(benchmark::State& state) {
+  dashpot::analysis::TaskImpedance arm = configurations(state.range(0)).front();
+  const double fastest =
+      design_damping(arm, DampingTarget::constant(kRatio)).spectrum.modes[0].natural_frequency;
+  dashpot::analysis::LoopLimit limit;
+  limit.loop.delay = static_cast<int>(state.range(1));
+  limit.loop.period = 0.5 / fastest / (limit.loop.delay + 1.5);
+  limit.loop.torque_cutoff = 0.1 / limit.loop.period;
+  limit.loop.friction = Eigen::MatrixXd::Identity(arm.mass.rows(), arm.mass.rows());
+  arm.damping = limit.loop.friction;
+  double level = 0;
+  for (auto _ : state) {
+    level = design_damping(arm, DampingTarget::constant(1.5), limit).level;
+  }
+  state.counters["level"] = level;
+}
+
 /// C_C = Lambda V diag(2 zeta omega) V' Lambda with K_C V = Lambda V diag(omega^2), V' Lambda V =
 /// I.
 template <int N>
@@ -161,6 +181,13 @@ int main(int argc, char** argv) {
     benchmark::RegisterBenchmark(design ? "design/region" : "design/map", region, design)
         ->Arg(7)
         ->Unit(benchmark::kMillisecond);
+  }
+  for (const int n : {7, 10}) {
+    for (const int delay : {1, 20, 100}) {
+      benchmark::RegisterBenchmark("design/loop", sampled)
+          ->Args({n, delay})
+          ->Unit(benchmark::kMillisecond);
+    }
   }
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();

@@ -7,11 +7,11 @@
 namespace dashpot::analysis {
 namespace {
 
-constexpr double kGridStep = 0.9;
+constexpr double kGridStep = 2. / 3;
 constexpr double kLowestLevel = 1e-3;
 constexpr double kLevelPrecision = 1e-6;
 /// Of the level with the largest margin.
-constexpr double kPeakPrecision = 1e-4;
+constexpr double kPeakPrecision = 3e-3;
 
 DampingTarget scaled(DampingTarget target, double level) {
   target.low_ratio *= level;
@@ -23,7 +23,8 @@ DampingTarget scaled(DampingTarget target, double level) {
 struct Leveled {
   double level = 1;
   DampingDesign design;
-  double gain_margin = 0;
+  bool keeps = false;      ///< the margin wanted
+  double gain_margin = 0;  ///< where it was asked for
 };
 
 /// Designs at any level, and judges them by the loop.
@@ -37,32 +38,28 @@ class Levels {
         structure_(structure),
         start_(start) {}
 
-  Leveled at(double level) const {
-    Leveled result{level, design_damping(impedance_, scaled(target_, level), structure_, start_)};
-    result.gain_margin =
-        analysis::gain_margin(result.design.system, result.design.spectrum, limit_.loop);
-    return result;
-  }
-  bool keeps(const Leveled& candidate) const { return candidate.gain_margin >= limit_.gain_margin; }
-
-  /// The first on a falling grid that keeps the margin; else the one with the largest margin.
+  /// The first on a falling grid that keeps the margin; else any.
   Leveled first_on_grid() const {
-    Leveled best = at(1);
-    for (double level = kGridStep; level > kLowestLevel && !keeps(best); level *= kGridStep) {
-      Leveled next = at(level);
-      if (next.gain_margin > best.gain_margin) best = std::move(next);
+    Leveled next = at(1);
+    for (double level = kGridStep; level > kLowestLevel && !next.keeps; level *= kGridStep) {
+      next = at(level);
     }
-    return best;
+    return next;
   }
 
-  /// Towards the largest margin between the neighbours of a grid point, by golden section, until
-  /// one keeps the margin wanted.
-  Leveled climb(Leveled best) const {
+  /// The one with the largest margin that is found, or one that keeps the margin wanted: on a
+  /// coarser grid, then by golden section between the neighbours of the best there.
+  Leveled best() const {
     constexpr double kGolden = 0.6180339887498949;
+    Leveled best = at(1);
+    best.gain_margin = margin_of(best.design);
+    for (double level = kGridStep; level > kLowestLevel; level *= kGridStep) {
+      margin_at(level, best);
+    }
     double low = best.level * kGridStep, high = std::min(1.0, best.level / kGridStep);
     double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
     double at_left = margin_at(left, best), at_right = margin_at(right, best);
-    while (high - low > kPeakPrecision * high && !keeps(best)) {
+    while (high - low > kPeakPrecision * high && !best.keeps) {
       if (at_left > at_right) {
         high = right, right = left, at_right = at_left;
         at_left = margin_at(left = high - kGolden * (high - low), best);
@@ -79,7 +76,7 @@ class Levels {
     double outside = std::min(1.0, inside.level / kGridStep);
     while (outside - inside.level > kLevelPrecision * outside) {
       Leveled middle = at(0.5 * (inside.level + outside));
-      if (keeps(middle)) {
+      if (middle.keeps) {
         inside = std::move(middle);
       } else {
         outside = middle.level;
@@ -88,12 +85,23 @@ class Levels {
     return inside;
   }
 
+  double margin_of(const DampingDesign& design) const {
+    return analysis::gain_margin(design.system, design.spectrum, limit_.loop);
+  }
+
  private:
+  Leveled at(double level) const {
+    Leveled result{level, design_damping(impedance_, scaled(target_, level), structure_, start_)};
+    const DampingDesign& design = result.design;
+    result.keeps = keeps_margin(design.system, design.spectrum, limit_.loop, limit_.gain_margin);
+    return result;
+  }
+
   /// Keeps the better one of `best` and the level asked for.
   double margin_at(double level, Leveled& best) const {
     Leveled next = at(level);
-    const double margin = next.gain_margin;
-    if (margin > best.gain_margin) best = std::move(next);
+    const double margin = next.gain_margin = margin_of(next.design);
+    if (next.keeps || (margin > best.gain_margin && !best.keeps)) best = std::move(next);
     return margin;
   }
 
@@ -125,15 +133,17 @@ SampledDamping design_damping(const TaskImpedance& impedance, const DampingTarge
     throw std::invalid_argument("damping: a gain margin below 1 is none");
   }
   const Levels levels(impedance, target, limit, structure, start);
-  Leveled best = levels.first_on_grid();
-  if (!levels.keeps(best)) best = levels.climb(std::move(best));
+  Leveled found = levels.first_on_grid();
+  if (!found.keeps) found = levels.best();
+  if (found.keeps && found.level < 1) found = levels.raise(std::move(found));
   SampledDamping result;
-  result.kept = levels.keeps(best);
-  if (result.kept && best.level < 1) best = levels.raise(std::move(best));
-  result.level = best.level;
-  result.gain_margin = best.gain_margin;
-  result.sampled = sample_loop(best.design.system, best.design.spectrum, limit.loop);
-  result.design = std::move(best.design);
+  result.kept = found.keeps;
+  result.level = found.level;
+  result.gain_margin = levels.margin_of(found.design);
+  // Its search has other brackets, and may end a rounding error below.
+  if (result.kept) result.gain_margin = std::max(result.gain_margin, limit.gain_margin);
+  result.sampled = sample_loop(found.design.system, found.design.spectrum, limit.loop);
+  result.design = std::move(found.design);
   if (result.level < 1) result.design.misses = misses_of(result.design, target);
   return result;
 }

@@ -109,21 +109,21 @@ void SampledDataModel::remember(const SampledLoop& loop, const MatrixXd& coordin
 }
 
 void SampledDataModel::integrate() {
-  motion_ = MatrixXd::Zero(2 * n, 3 * n);
+  motion = MatrixXd::Zero(2 * n, 3 * n);
   if (D.isZero(0) && G.isZero(0)) {  // masses alone
     const MatrixXd unit = MatrixXd::Identity(n, n);
-    motion_ << unit, unit, 0.5 * unit, MatrixXd::Zero(n, n), unit, unit;
+    motion << unit, unit, 0.5 * unit, MatrixXd::Zero(n, n), unit, unit;
     return;
   }
   // d/dt (y, y', f) = rate (y, y', f)
   MatrixXd rate = MatrixXd::Zero(3 * n, 3 * n);
   rate.block(0, n, n, n).setIdentity();
   rate.middleRows(n, n) << -G, -D, MatrixXd::Identity(n, n);
-  motion_ = phi(0, rate, 1).real().topRows(2 * n);
+  motion = phi(0, rate, 1).real().topRows(2 * n);
 }
 
 MatrixXd SampledDataModel::transition(double factor) const {
-  const Index rows = 2 * n + memory(), m = states.state.rows();
+  const Index rows = this->rows(), m = states.state.rows();
   const Index v = difference ? 2 * n : n, queue = difference ? 3 * n : 2 * n;
   const Index filter = queue + n * delay;
 
@@ -138,8 +138,8 @@ MatrixXd SampledDataModel::transition(double factor) const {
     torque.middleCols(filter, n).diagonal().array() += 1 - filter_gain;
   }
   MatrixXd A = MatrixXd::Zero(rows, rows);
-  A.topRows(2 * n).noalias() = motion_.rightCols(n) * torque;
-  A.topLeftCorner(2 * n, 2 * n) += motion_.leftCols(2 * n);
+  A.topRows(2 * n).noalias() = motion.rightCols(n) * torque;
+  A.topLeftCorner(2 * n, 2 * n) += motion.leftCols(2 * n);
   if (difference) {
     A.middleRows(v, n) = A.topRows(n);
     A.block(v, 0, n, n).diagonal().array() -= 1;

@@ -19,6 +19,7 @@ struct SampledDataModel {
   int delay = 0;
   double filter_gain = 1;  ///< 1: no filter
   bool difference = false;
+  Eigen::MatrixXd motion;  ///< (y, y') after a tick from (y, y', torque), 2n x 3n
 
   /// Throws std::invalid_argument as sample_loop does.
   template <int N>
@@ -32,6 +33,7 @@ struct SampledDataModel {
   Eigen::Index memory() const {
     return n * (delay + (filtered() ? 1 : 0) + (difference ? 1 : 0)) + states.state.rows();
   }
+  Eigen::Index rows() const { return 2 * n + memory(); }
   /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f], [w]), with `factor` times K - P,
   /// C - D and the output of w; see sample_loop.
   Eigen::MatrixXd transition(double factor = 1) const;
@@ -50,11 +52,8 @@ struct SampledDataModel {
   /// Checks SampledLoop::memory, throws std::invalid_argument, and sets `states`, where
   /// q = coordinates y.
   void remember(const SampledLoop& loop, const Eigen::MatrixXd& coordinates);
-  /// Sets `motion_`.
+  /// Sets `motion`.
   void integrate();
-
-  /// (y, y') after a tick from (y, y', torque), 2n x 3n.
-  Eigen::MatrixXd motion_;
 };
 
 /// Returns the eigenvalues of A, which is destroyed. Throws std::runtime_error.

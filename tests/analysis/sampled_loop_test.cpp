@@ -3,6 +3,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_impedance.hpp>
+#include <dashpot/tests/support/sampled_loops.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
@@ -21,18 +22,6 @@ using Eigen::MatrixXd;
 using testing::one_joint;
 using testing::Random;
 
-System<> random_system(Random& random, Eigen::Index n) {
-  System<> system(n);
-  system.mass = random.spd(n);
-  system.stiffness = 1000 * random.spd(n);
-  system.damping = random.log_uniform(1, 10) * random.spd(n);
-  return system;
-}
-
-SampledSpectrum sample(const System<>& system, const SampledLoop& loop) {
-  return sample_loop(system, analyze(system), loop);
-}
-
 std::vector<Complex> all_multipliers(const SampledSpectrum& sampled) {
   std::vector<Complex> all = sampled.others;
   all.insert(all.end(), sampled.zero_modes.begin(), sampled.zero_modes.end());
@@ -49,15 +38,6 @@ Complex per_actuation(const SampledLoop& loop, Complex z) {
   return std::pow(z, loop.delay) / filter;
 }
 
-SampledLoop random_loop(Random& random) {
-  SampledLoop loop;
-  loop.period = random.log_uniform(1e-4, 5e-3);
-  loop.delay = random.integer(0, 3);
-  loop.torque_cutoff = random.integer(0, 1) * random.log_uniform(50, 500);
-  loop.difference_velocity = random.integer(0, 1) == 1;
-  return loop;
-}
-
 // --------------------------------------------------------------------- characteristic equations
 
 /// A mass under held torque moves by q += T q' + T^2/2 M^-1 f, q' += T M^-1 f, so that
@@ -67,9 +47,9 @@ TEST(SampledLoop, SolvesTheCharacteristicEquation) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     Random random(seed);
     const Eigen::Index n = random.integer(1, 6);
-    const System<> system = random_system(random, n);
-    const SampledLoop loop = random_loop(random);
-    const SampledSpectrum sampled = sample(system, loop);
+    const System<> system = testing::random_system(random, n);
+    const SampledLoop loop = testing::random_loop(random);
+    const SampledSpectrum sampled = testing::sample(system, loop);
     const std::vector<Complex> all = all_multipliers(sampled);
     const Eigen::Index memory =
         loop.delay + (loop.torque_cutoff > 0 ? 1 : 0) + (loop.difference_velocity ? 1 : 0);
@@ -101,14 +81,14 @@ TEST(SampledLoop, KnowsFrictionAndGravity) {
     const double M = random.log_uniform(0.1, 5), C = random.log_uniform(1, 50);
     const double K = random.log_uniform(100, 2000), D = random.uniform(0.1, 0.9) * C;
     const double G = random.uniform(-20, 20);
-    SampledLoop loop = random_loop(random);
+    SampledLoop loop = testing::random_loop(random);
     loop.difference_velocity = false;
     loop.friction = MatrixXd::Constant(1, 1, D);
     loop.gravity_gradient = MatrixXd::Constant(1, 1, G);
     const double T = loop.period;
     const Complex root = std::sqrt(Complex(D * D - 4 * M * G));
     const Complex r[] = {(-D + root) / (2 * M), (-D - root) / (2 * M)};
-    for (const Complex z : all_multipliers(sample(one_joint(M, C, K), loop))) {
+    for (const Complex z : all_multipliers(testing::sample(one_joint(M, C, K), loop))) {
       if (modulus(z) < 1e-3) continue;  // memory that nothing reads
       Complex position = 0, velocity = 0;
       for (int i = 0; i < 2; ++i) {
@@ -140,7 +120,7 @@ TEST(SampledLoop, ShiftsModesLikeHalfATickOfDelay) {
         const double a = std::exp(-2 * std::numbers::pi * cutoff / 1e3);
         const double lag = cutoff > 0 ? a / (1 - a) : 0;
         const double t = (delay + 0.5 + lag) * loop.period;
-        const SampledMode mode = sample(system, loop).modes.at(0);
+        const SampledMode mode = testing::sample(system, loop).modes.at(0);
         EXPECT_NEAR((mode.damping_ratio - zeta) / (omega * t), -(1 - 2 * zeta * zeta) / 2, 5e-3);
         EXPECT_NEAR((mode.natural_frequency / omega - 1) / (omega * t), zeta, 5e-3);
       }
@@ -153,9 +133,9 @@ TEST(SampledLoop, DelaysDifferencedVelocitiesByHalfATickMore) {
   SampledLoop loop;
   loop.period = 1e-6;
   const System<> system = one_joint(2, 4 * zeta * omega, 2 * omega * omega);
-  const SampledMode exact = sample(system, loop).modes.at(0);
+  const SampledMode exact = testing::sample(system, loop).modes.at(0);
   loop.difference_velocity = true;
-  const SampledMode differenced = sample(system, loop).modes.at(0);
+  const SampledMode differenced = testing::sample(system, loop).modes.at(0);
   // lambda^2 (1 - c T/2) + ...: the mass seems smaller by C T/2
   EXPECT_NEAR((differenced.natural_frequency / exact.natural_frequency - 1) / (omega * 1e-6),
               zeta / 2, 1e-3);
@@ -169,9 +149,9 @@ TEST(SampledLoop, PutsModesInThePlacesOfTheContinuousOnes) {
   int compared = 0;
   for (std::uint64_t seed = 100; seed < 160; ++seed) {
     Random random(seed);
-    const System<> system = random_system(random, random.integer(2, 7));
+    const System<> system = testing::random_system(random, random.integer(2, 7));
     const Spectrum<> spectrum = analyze(system);
-    SampledLoop loop = random_loop(random);
+    SampledLoop loop = testing::random_loop(random);
     loop.period = 0.003 / spectrum.modes[0].natural_frequency;
     loop.torque_cutoff *= 1e-3 / loop.period;
     const SampledSpectrum sampled = sample_loop(system, spectrum, loop);
@@ -192,7 +172,7 @@ TEST(SampledLoop, PutsModesInThePlacesOfTheContinuousOnes) {
 TEST(SampledLoop, FollowsAnOverdampedMode) {
   SampledLoop loop;
   loop.period = 1e-4;
-  const SampledMode mode = sample(one_joint(1, 200, 1000), loop).modes.at(0);
+  const SampledMode mode = testing::sample(one_joint(1, 200, 1000), loop).modes.at(0);
   EXPECT_EQ(mode.kind, ModeKind::kOverdamped);
   EXPECT_EQ(mode.damped_frequency, 0);
   EXPECT_NEAR(mode.eigenvalues[0].real(), -5.13, 0.01);
@@ -204,7 +184,7 @@ TEST(SampledLoop, SaysWhatAlternates) {
   SampledLoop loop;
   const double T = loop.period, K = 100;
   for (const double C : {1400.0, 1990.0, 2100.0}) {
-    const SampledMode mode = sample(one_joint(1, C, K), loop).modes.at(0);
+    const SampledMode mode = testing::sample(one_joint(1, C, K), loop).modes.at(0);
     const double trace = 2 - K * T * T / 2 - C * T;
     const double determinant = (1 - K * T * T / 2) * (1 - C * T) + (T - C * T * T / 2) * K * T;
     const double root = std::sqrt(trace * trace / 4 - determinant);
@@ -217,7 +197,7 @@ TEST(SampledLoop, SaysWhatAlternates) {
     EXPECT_NEAR(mode.natural_frequency, modulus(mode.eigenvalues[0]), 1e-9);
     EXPECT_NEAR(mode.damping_ratio, -std::log(-z) / T / mode.natural_frequency, 1e-9);
   }
-  const SampledMode calm = sample(one_joint(1, 900, K), loop).modes.at(0);
+  const SampledMode calm = testing::sample(one_joint(1, 900, K), loop).modes.at(0);
   EXPECT_EQ(calm.kind, ModeKind::kOverdamped);
 }
 
@@ -226,7 +206,7 @@ TEST(SampledLoop, AlternatesAtTheSlowerOfTwoNegativeEigenvalues) {
   SampledLoop loop;
   loop.period = 1;
   // z^2 - (2 - C - K/2) z + 1 - C + K/2 = (z + 0.2) (z + 0.5)
-  const SampledMode mode = sample(one_joint(1, 1.8, 1.8), loop).modes.at(0);
+  const SampledMode mode = testing::sample(one_joint(1, 1.8, 1.8), loop).modes.at(0);
   EXPECT_NEAR(mode.discrete_eigenvalues[0].real(), -0.5, 1e-12);
   EXPECT_NEAR(mode.discrete_eigenvalues[1].real(), -0.2, 1e-12);
   EXPECT_EQ(mode.kind, ModeKind::kAlternating);
@@ -235,7 +215,7 @@ TEST(SampledLoop, AlternatesAtTheSlowerOfTwoNegativeEigenvalues) {
 
 TEST(SampledLoop, IsTheSameInFixedStorage) {
   Random random(170);
-  const System<> system = random_system(random, 6);
+  const System<> system = testing::random_system(random, 6);
   System<kMaxDof> fixed(6);
   fixed.mass = system.mass;
   fixed.damping = system.damping;
@@ -243,8 +223,8 @@ TEST(SampledLoop, IsTheSameInFixedStorage) {
   Spectrum<kMaxDof> spectrum;
   SpectrumSolver<kMaxDof> solver;
   ASSERT_EQ(solver.solve(fixed, spectrum), Status::kOk);
-  const SampledLoop loop = random_loop(random);
-  const SampledSpectrum a = sample(system, loop), b = sample_loop(fixed, spectrum, loop);
+  const SampledLoop loop = testing::random_loop(random);
+  const SampledSpectrum a = testing::sample(system, loop), b = sample_loop(fixed, spectrum, loop);
   ASSERT_EQ(a.modes.size(), b.modes.size());
   for (std::size_t k = 0; k < a.modes.size(); ++k) {
     EXPECT_NEAR(a.modes[k].natural_frequency, b.modes[k].natural_frequency, 1e-9);
@@ -259,9 +239,9 @@ TEST(SampledLoop, LeavesOutTheOnesOfZeroModes) {
   for (std::uint64_t seed = 200; seed < 220; ++seed) {
     Random random(seed);
     System<> system = to_joint_space(testing::random_impedance(random, 7, 6));
-    SampledLoop loop = random_loop(random);
+    SampledLoop loop = testing::random_loop(random);
     loop.period = 1e-4;
-    const SampledSpectrum free = sample(system, loop);
+    const SampledSpectrum free = testing::sample(system, loop);
     const Eigen::Index memory =
         loop.delay + (loop.torque_cutoff > 0 ? 1 : 0) + (loop.difference_velocity ? 1 : 0);
     EXPECT_TRUE(free.zero_modes.empty());
@@ -290,8 +270,8 @@ TEST(SampledLoop, HasNothingToAnalyseWhereNothingHoldsOrDamps) {
   system.mass = random.spd(3);
   const Spectrum<> spectrum = analyze(system);
   ASSERT_EQ(spectrum.zero_modes.basis.cols(), 3);
-  EXPECT_EQ(sample(system, {}).spectral_radius, 0);
-  EXPECT_TRUE(sample(system, {}).others.empty());
+  EXPECT_EQ(testing::sample(system, {}).spectral_radius, 0);
+  EXPECT_TRUE(testing::sample(system, {}).others.empty());
   EXPECT_EQ(gain_margin(system, spectrum, {}, 2), std::numeric_limits<double>::infinity());
 }
 
@@ -299,7 +279,7 @@ TEST(SampledLoop, HasNothingToAnalyseWhereNothingHoldsOrDamps) {
 TEST(SampledLoop, DampsAFreeMassStepByStep) {
   SampledLoop loop;
   loop.period = 0.01;
-  const SampledSpectrum sampled = sample(one_joint(2, 6, 0), loop);
+  const SampledSpectrum sampled = testing::sample(one_joint(2, 6, 0), loop);
   ASSERT_EQ(sampled.zero_modes.size(), 1u);
   EXPECT_NEAR(sampled.zero_modes[0].real(), 1 - 0.03, 1e-14);
   EXPECT_TRUE(sampled.modes.empty());
@@ -314,7 +294,7 @@ TEST(SampledLoop, KeepsZeroModesInCompensatedGravity) {
     loop.delay = delay;
     loop.torque_cutoff = 100;
     loop.gravity_gradient = MatrixXd::Constant(1, 1, -5.0);
-    const SampledSpectrum sampled = sample(one_joint(2, 6, 0), loop);
+    const SampledSpectrum sampled = testing::sample(one_joint(2, 6, 0), loop);
     ASSERT_EQ(sampled.zero_modes.size(), 1u);
     EXPECT_EQ(sampled.others.size(), static_cast<std::size_t>(delay + 1));
     const double lag = 0.001 * (delay + 0.5) + 1 / (2 * std::numbers::pi * 100);
@@ -323,55 +303,11 @@ TEST(SampledLoop, KeepsZeroModesInCompensatedGravity) {
   }
 }
 
-// -------------------------------------------------------------------------------------- stability
-
-/// Without delay one joint is stable for T^2 K / 2 < T C and T C < 2 M.
-TEST(GainMargin, IsThatOfOneJoint) {
-  Random random(300);
-  for (int i = 0; i < 20; ++i) {
-    SampledLoop loop;
-    loop.period = random.log_uniform(1e-4, 1e-2);
-    const double M = random.log_uniform(0.1, 10);
-    const double C = random.uniform(0.01, 5) * M / loop.period;
-    const double K = random.uniform(0.01, 1.9) * C / loop.period;
-    const System<> system = one_joint(M, C, K);
-    const double expected = 2 * M / (loop.period * C);
-    EXPECT_NEAR(gain_margin(system, analyze(system), loop), expected, 1e-5 * expected);
-    EXPECT_EQ(sample(system, loop).stable(), expected > 1);
-  }
-}
-
-TEST(GainMargin, IsZeroIfNothingHelpsAndInfiniteIfNothingHarms) {
-  const System<> undamped = one_joint(1, 0, 100);
-  EXPECT_EQ(gain_margin(undamped, analyze(undamped), {}), 0);
-  SampledLoop passive;  // the friction is all there is
-  passive.friction = MatrixXd::Constant(1, 1, 3);
-  const System<> free = one_joint(1, 3, 0);
-  EXPECT_EQ(gain_margin(free, analyze(free), passive), std::numeric_limits<double>::infinity());
-}
-
-TEST(GainMargin, IsWhereTheSpectralRadiusIsOne) {
-  for (std::uint64_t seed = 310; seed < 330; ++seed) {
-    Random random(seed);
-    System<> system = random_system(random, random.integer(1, 5));
-    SampledLoop loop = random_loop(random);
-    loop.friction = 0.1 * system.damping;
-    const double margin = gain_margin(system, analyze(system), loop);
-    if (margin == 0 || !std::isfinite(margin)) continue;
-    const System<> nominal = system;
-    for (const double factor : {0.999 * margin, 1.001 * margin}) {
-      system.stiffness = factor * nominal.stiffness;
-      system.damping = loop.friction + factor * (nominal.damping - loop.friction);
-      EXPECT_EQ(sample(system, loop).stable(), factor < margin);
-    }
-  }
-}
-
 TEST(SampledLoop, RefusesOptionsThatMakeNoSense) {
   const System<> system = one_joint(1, 2, 3);
   const auto refused = [&](const SampledLoop& loop) -> std::string {
     try {
-      sample(system, loop);
+      testing::sample(system, loop);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }

@@ -102,6 +102,24 @@ TEST(DampingInLoop, SettlesWithTheMarginThatItClaimsAndNoMore) {
   EXPECT_GT(given_up, 3);
 }
 
+/// Where the states are too many to solve for each trial.
+TEST(DampingInLoop, HoldsThroughManyTicksOfDelay) {
+  Random random(6);
+  const TaskImpedance arm = random_arm(random, 4, 3);
+  LoopLimit limit;
+  limit.loop.delay = 60;
+  limit.loop.period = 0.2 / 60 / design_damping(arm, {}).spectrum.modes[0].natural_frequency;
+  const SampledDamping result = design_damping(arm, DampingTarget::constant(3), limit);
+  ASSERT_TRUE(result.kept);
+  EXPECT_GT(result.level, 0.1);
+  EXPECT_LT(result.level, 0.9);
+  EXPECT_NEAR(result.gain_margin, 2, 1e-4);
+  const VectorXd start = random.vector(4);
+  EXPECT_LT(growth(result.design.system, limit.loop, 1, start), 0.1);
+  EXPECT_LT(growth(result.design.system, limit.loop, 1.9, start), 0.1);
+  EXPECT_GT(growth(result.design.system, limit.loop, 2.1, start), 10);
+}
+
 TEST(DampingInLoop, LowersTheRatioNoFurtherThanItHasTo) {
   int lowered = 0;
   for (int seed = 1; seed <= 30; ++seed) {

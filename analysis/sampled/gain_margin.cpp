@@ -1,0 +1,148 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
+#include <dashpot/analysis/base/require.hpp>
+#include <dashpot/analysis/sampled/circle_count.hpp>
+#include <dashpot/analysis/sampled_loop.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+
+/// Loops with more states are counted, not solved, which takes longer for fewer of them.
+constexpr Eigen::Index kDenseRows = 200;
+/// From one factor to the next that is tried.
+constexpr double kFactorStep = 1.25;
+
+/// The loop with `factor` times its stiffness and its controller's damping.
+class ScaledLoop {
+ public:
+  /// Motions with |log z| below `slowest`, per tick, do not count.
+  ScaledLoop(const SampledDataModel& loop, double slowest) : slowest_(slowest) {
+    if (loop.rows() > kDenseRows) {
+      counted_.emplace(loop, slowest);
+      return;
+    }
+    free_ = loop.transition(0);
+    gain_ = loop.transition(1) - free_;
+    if (loop.zero_modes.cols() == 0) return;
+    const MatrixXd rest = loop.other_motions();  // the same with every factor but zero
+    free_ = (rest.transpose() * free_ * rest).eval();
+    gain_ = (rest.transpose() * gain_ * rest).eval();
+  }
+
+  /// The largest |z|, less 1, or something like it: the loop is stable if it is negative.
+  double excess(double factor) const {
+    if (counted_) return counted_->excess(factor);
+    MatrixXd A = free_ + factor * gain_;
+    double result = 0;
+    for (const Complex z : eigenvalues_of(A)) {
+      if (slowest_ > 0 && z != 0.0 && modulus(std::log(z)) < slowest_) continue;
+      result = std::max(result, modulus(z));
+    }
+    return result - 1;
+  }
+
+ private:
+  double slowest_;
+  MatrixXd free_, gain_;
+  std::optional<CircleCount> counted_;
+};
+
+/// A factor and the excess there.
+struct Trial {
+  double factor, excess;
+};
+
+/// Where the excess changes its sign between two trials, to 1e-7 of the factor: inverse quadratic
+/// interpolation where it is safe, bisection elsewhere (Chandrupatla 1997).
+double boundary(const ScaledLoop& loop, Trial inside, Trial outside) {
+  constexpr double kPrecision = 0.5e-7;
+  Trial a = outside, b = inside, c = inside;
+  double share = 0.5;  // of the way from a to b
+  const double secant = a.excess / (a.excess - b.excess);
+  if (secant > 0 && secant < 1) share = secant;
+  for (;;) {
+    const double least = kPrecision * outside.factor / std::abs(b.factor - a.factor);
+    if (least > 0.5) return 0.5 * (a.factor + b.factor);
+    share = std::clamp(share, least, 1 - least);
+    Trial next{a.factor + share * (b.factor - a.factor), 0};
+    next.excess = loop.excess(next.factor);
+    if ((next.excess < 0) == (a.excess < 0)) {
+      c = a;
+    } else {
+      c = b;
+      b = a;
+    }
+    a = next;
+    const double xi = (a.factor - b.factor) / (c.factor - b.factor);
+    const double phi = (a.excess - b.excess) / (c.excess - b.excess);
+    share = 0.5;
+    if (phi * phi < xi && (1 - phi) * (1 - phi) < 1 - xi) {
+      const double ab = a.excess - b.excess, ac = a.excess - c.excess, bc = b.excess - c.excess;
+      share = a.excess / -ab * c.excess / bc +
+              (c.factor - a.factor) / (b.factor - a.factor) * a.excess / -ac * b.excess / -bc;
+    }
+  }
+}
+
+bool keeps(const SampledDataModel& unit, double margin) {
+  const ScaledLoop loop(unit, 0);
+  if (!(loop.excess(margin) < 0)) return false;
+  for (double factor = 1; factor < margin; factor *= kFactorStep) {
+    if (!(loop.excess(factor) < 0)) return false;
+  }
+  return true;
+}
+
+/// See gain_margin.
+double find_margin(const SampledDataModel& unit, double most, double slowest) {
+  const ScaledLoop loop(unit, slowest);
+  Trial here{1, loop.excess(1)};
+  if (here.excess < 0) {
+    for (Trial inside = here;; inside = here) {
+      if (inside.factor >= most) return kInfinity;
+      here.factor = std::min(kFactorStep * inside.factor, most);
+      here.excess = loop.excess(here.factor);
+      if (!(here.excess < 0)) return boundary(loop, inside, here);
+    }
+  }
+  for (Trial outside = here;; outside = here) {
+    if (outside.factor < 1e-3) return 0;
+    here.factor = 0.8 * outside.factor;
+    here.excess = loop.excess(here.factor);
+    if (here.excess < 0) return boundary(loop, here, outside);
+  }
+}
+
+}  // namespace
+
+template <int N>
+double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
+                   double most, double slowest) {
+  return find_margin(SampledDataModel(system, spectrum, loop), most, slowest * loop.period);
+}
+
+template <int N>
+double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double most,
+                   double slowest) {
+  return find_margin(SampledDataModel(form, loop), most, slowest * loop.period);
+}
+
+bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const SampledLoop& loop,
+                  double margin) {
+  require("keeps_margin", margin >= 1, "a gain margin below 1 is none");
+  return keeps(SampledDataModel(system, spectrum, loop), margin);
+}
+
+template double gain_margin(const System<kDynamic>&, const Spectrum<kDynamic>&, const SampledLoop&,
+                            double, double);
+template double gain_margin(const System<kMaxDof>&, const Spectrum<kMaxDof>&, const SampledLoop&,
+                            double, double);
+template double gain_margin(const ElasticForm<kDynamic>&, const SampledLoop&, double, double);
+template double gain_margin(const ElasticForm<kMaxDof>&, const SampledLoop&, double, double);
+
+}  // namespace dashpot::analysis

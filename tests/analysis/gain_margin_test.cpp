@@ -1,0 +1,173 @@
+// How far gains may grow before a sampled loop is unstable, from eigenvalues and by counting them.
+#include <dashpot/analysis/sampled/circle_count.hpp>
+#include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/sampled_loops.hpp>
+#include <dashpot/tests/support/systems.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using testing::one_joint;
+using testing::Random;
+
+/// Without delay one joint is stable for T^2 K / 2 < T C and T C < 2 M.
+TEST(GainMargin, IsThatOfOneJoint) {
+  Random random(300);
+  for (int i = 0; i < 20; ++i) {
+    SampledLoop loop;
+    loop.period = random.log_uniform(1e-4, 1e-2);
+    const double M = random.log_uniform(0.1, 10);
+    const double C = random.uniform(0.01, 5) * M / loop.period;
+    const double K = random.uniform(0.01, 1.9) * C / loop.period;
+    const System<> system = one_joint(M, C, K);
+    const double expected = 2 * M / (loop.period * C);
+    EXPECT_NEAR(gain_margin(system, analyze(system), loop), expected, 1e-5 * expected);
+    EXPECT_EQ(testing::sample(system, loop).stable(), expected > 1);
+  }
+}
+
+TEST(GainMargin, IsZeroIfNothingHelpsAndInfiniteIfNothingHarms) {
+  const System<> undamped = one_joint(1, 0, 100);
+  EXPECT_EQ(gain_margin(undamped, analyze(undamped), {}), 0);
+  SampledLoop passive;  // the friction is all there is
+  passive.friction = MatrixXd::Constant(1, 1, 3);
+  const System<> free = one_joint(1, 3, 0);
+  EXPECT_EQ(gain_margin(free, analyze(free), passive), std::numeric_limits<double>::infinity());
+}
+
+TEST(GainMargin, IsWhereTheSpectralRadiusIsOne) {
+  for (std::uint64_t seed = 310; seed < 330; ++seed) {
+    Random random(seed);
+    System<> system = testing::random_system(random, random.integer(1, 5));
+    SampledLoop loop = testing::random_loop(random);
+    loop.friction = 0.1 * system.damping;
+    const double margin = gain_margin(system, analyze(system), loop);
+    if (margin == 0 || !std::isfinite(margin)) continue;
+    const System<> nominal = system;
+    for (const double factor : {0.999 * margin, 1.001 * margin}) {
+      system.stiffness = factor * nominal.stiffness;
+      system.damping = loop.friction + factor * (nominal.damping - loop.friction);
+      EXPECT_EQ(testing::sample(system, loop).stable(), factor < margin);
+    }
+  }
+}
+
+/// v_k+1 = v_k - a v_k-d is stable for 0 < a < 2 sin(pi / (2 (2 d + 1))) (Levin and May 1976).
+TEST(GainMargin, OfADampedMassFallsWithTheDelay) {
+  for (const int delay : {1, 20, 198, 199, 250, 2000}) {  // from 199 on by counting
+    SampledLoop loop;
+    loop.delay = delay;
+    const double most = 2 * std::sin(std::numbers::pi / (2 * (2 * delay + 1)));
+    const double a = 0.3 * most;
+    const System<> mass = one_joint(3, a * 3 / loop.period, 0);
+    EXPECT_NEAR(gain_margin(mass, analyze(mass), loop), 1 / 0.3, 1e-6) << delay;
+    EXPECT_TRUE(keeps_margin(mass, analyze(mass), loop, 3.333)) << delay;
+    EXPECT_FALSE(keeps_margin(mass, analyze(mass), loop, 3.334)) << delay;
+  }
+}
+
+TEST(GainMargin, BelowOneIsNotAskedFor) {
+  const System<> system = one_joint(1, 2, 3);
+  EXPECT_THROW(keeps_margin(system, analyze(system), {}, 0.99), std::invalid_argument);
+  EXPECT_THROW(keeps_margin(system, analyze(system), {}, std::nan("")), std::invalid_argument);
+}
+
+/// With all that a loop may have: friction, gravity, springs of the world, zero modes, an integral.
+SampledLoop add_parts(Random& random, System<>& system, SampledLoop loop) {
+  const Eigen::Index n = system.dof();
+  if (random.integer(0, 1) == 1) {
+    loop.friction = random.log_uniform(0.1, 3) * random.spd(n);
+    system.damping += loop.friction;
+  }
+  if (random.integer(0, 2) == 0) loop.gravity_gradient = random.spd(n) - random.spd(n);
+  if (random.integer(0, 2) == 0) loop.passive_stiffness = 0.1 * system.stiffness;
+  if (random.integer(0, 2) == 0) {
+    loop.memory = {MatrixXd::Identity(n, n), MatrixXd::Identity(n, n),
+                   random.log_uniform(0.1, 3) * loop.period * system.stiffness};
+  }
+  return loop;
+}
+
+/// The largest |z|, by the eigenvalues of the whole state.
+double spectral_radius(const SampledDataModel& model, double factor) {
+  MatrixXd A = model.transition(factor);
+  if (model.zero_modes.cols() > 0) {
+    const MatrixXd rest = model.other_motions();
+    A = (rest.transpose() * A * rest).eval();
+  }
+  return eigenvalues_of(A).cwiseAbs().maxCoeff();
+}
+
+TEST(CircleCount, AgreesWithTheEigenvalues) {
+  int stable = 0, unstable = 0;
+  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    Random random(seed);
+    System<> system = testing::random_system(random, random.integer(1, 5));
+    SampledLoop loop = testing::random_loop(random);
+    loop.delay = random.integer(0, 20);
+    if (seed % 4 == 0) {  // leaves one direction free
+      const MatrixXd factor = random.matrix(system.dof(), system.dof() - 1);
+      system.stiffness = 1000 * factor * factor.transpose();
+    }
+    loop = add_parts(random, system, loop);
+    const SampledDataModel model(system, analyze(system), loop);
+    const CircleCount count(model, 0);
+    for (const double factor : {0.01, 0.1, 0.5, 1.0, 2.0, 10.0}) {
+      const double radius = spectral_radius(model, factor);
+      if (std::abs(radius - 1) < 1e-8) continue;
+      EXPECT_EQ(count.excess(factor) < 0, radius < 1) << radius - 1;
+      ++(radius < 1 ? stable : unstable);
+    }
+  }
+  std::printf("stable %d times, unstable %d times\n", stable, unstable);
+  EXPECT_GT(stable, 50);
+  EXPECT_GT(unstable, 50);
+}
+
+/// Close to the boundary on either side, and several zeros crossing the circle in one place.
+TEST(CircleCount, TellsTheSidesOfTheBoundary) {
+  SampledLoop loop;
+  loop.delay = 30;
+  const double most = 2 * std::sin(std::numbers::pi / (2 * (2 * loop.delay + 1)));
+  for (const Eigen::Index n : {1, 2, 6}) {
+    System<> masses(n);
+    masses.mass = MatrixXd::Identity(n, n);
+    masses.damping = most / loop.period * MatrixXd::Identity(n, n);
+    const CircleCount count(SampledDataModel(masses, analyze(masses), loop), 0);
+    for (const double distance : {1e-1, 1e-3, 1e-5, 1e-7}) {
+      EXPECT_LT(count.excess(1 - distance), 0) << n << ' ' << distance;
+      EXPECT_GT(count.excess(1 + distance), 0) << n << ' ' << distance;
+    }
+    EXPECT_GT(count.excess(1), 0);
+  }
+}
+
+/// A hill that a late compensation of gravity does not quite level is fallen from slowly.
+TEST(CircleCount, LeavesSlowMotionsOut) {
+  System<> system(2);
+  system.mass = MatrixXd::Identity(2, 2);
+  system.stiffness.diagonal() << 400, 0;
+  system.damping.diagonal() << 20, 0;
+  SampledLoop loop;
+  loop.gravity_gradient = MatrixXd::Zero(2, 2);
+  loop.gravity_gradient(1, 1) = -1;  // (1/s)^2
+  loop.friction = MatrixXd::Zero(2, 2);
+  system.stiffness(1, 1) = -1e-4;  // 0.01 1/s
+  const Spectrum<> spectrum = analyze(system);
+  const SampledDataModel model(system, spectrum, loop);
+  EXPECT_GT(CircleCount(model, 0.005 * loop.period).excess(1), 0);
+  EXPECT_LT(CircleCount(model, 0.05 * loop.period).excess(1), 0);
+}
+
+}  // namespace
+}  // namespace dashpot::analysis

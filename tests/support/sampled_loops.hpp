@@ -1,0 +1,32 @@
+#pragma once
+// Systems and loops of a controller that samples, drawn by chance.
+
+#include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+namespace dashpot::testing {
+
+inline analysis::System<> random_system(Random& random, Eigen::Index n) {
+  analysis::System<> system(n);
+  system.mass = random.spd(n);
+  system.stiffness = 1000 * random.spd(n);
+  system.damping = random.log_uniform(1, 10) * random.spd(n);
+  return system;
+}
+
+inline analysis::SampledSpectrum sample(const analysis::System<>& system,
+                                        const analysis::SampledLoop& loop) {
+  return sample_loop(system, analysis::analyze(system), loop);
+}
+
+inline analysis::SampledLoop random_loop(Random& random) {
+  analysis::SampledLoop loop;
+  loop.period = random.log_uniform(1e-4, 5e-3);
+  loop.delay = random.integer(0, 3);
+  loop.torque_cutoff = random.integer(0, 1) * random.log_uniform(50, 500);
+  loop.difference_velocity = random.integer(0, 1) == 1;
+  return loop;
+}
+
+}  // namespace dashpot::testing
