@@ -3,7 +3,9 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <utility>
 
@@ -28,8 +30,8 @@ Complex exp_less_1(Complex x) {
 struct CirclePoint {
   Complex z_less_1, h, change;  ///< change: h (1 - 1 / z)
   MatrixXcd inverse;
-  MatrixXcd pulls[2];  ///< inverse B C
-  double phase = 0;    ///< of det F
+  std::array<MatrixXcd, 2> pulls;  ///< inverse B C
+  double phase = 0;                ///< of det F
 };
 
 double phase_of_determinant(const Eigen::PartialPivLU<MatrixXcd>& lu) {
@@ -90,7 +92,7 @@ double CircleCount::excess(double factor) const {
     const Eigen::PartialPivLU<MatrixXcd> lu(F);
     point.phase = phase_of_determinant(lu);
     point.inverse = lu.inverse();
-    for (int i = 0; i < 2; ++i) point.pulls[i] = point.inverse * pull[i];
+    for (std::size_t i = 0; i < 2; ++i) point.pulls[i] = point.inverse * pull[i];
     return point;
   };
   const double speed = std::exp(slowest_);  // largest |dz / dx|

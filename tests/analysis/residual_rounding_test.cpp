@@ -24,7 +24,7 @@ using testing::Random;
 QuadMatrix quad(const MatrixXd& A) {
   QuadMatrix out(static_cast<std::size_t>(A.rows()));
   for (int i = 0; i < A.rows(); ++i) {
-    for (int j = 0; j < A.cols(); ++j) out[at(i)].push_back({A(i, j), 0});
+    for (int j = 0; j < A.cols(); ++j) out[at(i)].push_back({static_cast<Quad>(A(i, j)), 0});
   }
   return out;
 }
