@@ -47,8 +47,8 @@ class Levels {
     return next;
   }
 
-  /// The one with the largest margin that is found, or one that keeps the margin wanted: on a
-  /// coarser grid, then by golden section between the neighbours of the best there.
+  /// The one with the largest margin that is found, or one that keeps the margin wanted: on the
+  /// grid, then by golden section between the neighbours of the best there.
   Leveled best() const {
     constexpr double kGolden = 0.6180339887498949;
     Leveled best = at(1);
