@@ -12,30 +12,10 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::Quad;
+using testing::quad_matrix;
 using testing::QuadComplex;
 using testing::QuadMatrix;
 using testing::Random;
-
-QuadMatrix quad(const MatrixXd& A) {
-  QuadMatrix result(static_cast<std::size_t>(A.rows()),
-                    std::vector<QuadComplex>(static_cast<std::size_t>(A.cols())));
-  for (Eigen::Index i = 0; i < A.rows(); ++i) {
-    for (Eigen::Index j = 0; j < A.cols(); ++j) {
-      result[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] = testing::to_quad(A(i, j));
-    }
-  }
-  return result;
-}
-
-QuadMatrix times(const QuadMatrix& A, const QuadMatrix& B) {
-  QuadMatrix C(A.size(), std::vector<QuadComplex>(B[0].size()));
-  for (std::size_t i = 0; i < A.size(); ++i) {
-    for (std::size_t j = 0; j < B[0].size(); ++j) {
-      for (std::size_t k = 0; k < B.size(); ++k) C[i][j] = C[i][j] + A[i][k] * B[k][j];
-    }
-  }
-  return C;
-}
 
 QuadMatrix transposed(const QuadMatrix& A) {
   QuadMatrix T(A[0].size(), std::vector<QuadComplex>(A.size()));
@@ -46,7 +26,7 @@ QuadMatrix transposed(const QuadMatrix& A) {
 }
 
 QuadMatrix inverse(QuadMatrix A) {
-  QuadMatrix B = quad(
+  QuadMatrix B = quad_matrix(
       MatrixXd::Identity(static_cast<Eigen::Index>(A.size()), static_cast<Eigen::Index>(A.size())));
   testing::solve(A, B);
   return B;
@@ -54,13 +34,13 @@ QuadMatrix inverse(QuadMatrix A) {
 
 /// N' D N with N = I - M^-1 J' (J M^-1 J')^-1 J.
 QuadMatrix exact_null_space_damping(const MatrixXd& M, const MatrixXd& J, const MatrixXd& D) {
-  const QuadMatrix JT = transposed(quad(J)), MJ = times(inverse(quad(M)), JT);
-  const QuadMatrix held = times(times(MJ, inverse(times(quad(J), MJ))), quad(J));
-  QuadMatrix N = quad(MatrixXd::Identity(M.rows(), M.rows()));
+  const QuadMatrix JT = transposed(quad_matrix(J)), MJ = inverse(quad_matrix(M)) * JT;
+  const QuadMatrix held = MJ * inverse(quad_matrix(J) * MJ) * quad_matrix(J);
+  QuadMatrix N = quad_matrix(MatrixXd::Identity(M.rows(), M.rows()));
   for (std::size_t i = 0; i < N.size(); ++i) {
     for (std::size_t j = 0; j < N.size(); ++j) N[i][j] = N[i][j] - held[i][j];
   }
-  return times(times(transposed(N), quad(D)), N);
+  return transposed(N) * quad_matrix(D) * N;
 }
 
 double worst_share(const QuadMatrix& exact, const NullSpaceDamping& found) {

@@ -18,33 +18,9 @@ namespace {
 using Eigen::MatrixXd;
 using testing::LongMatrix;
 using testing::Quad;
+using testing::quad_matrix;
 using testing::QuadMatrix;
 using testing::Random;
-
-QuadMatrix quad(const MatrixXd& A) {
-  QuadMatrix out(static_cast<std::size_t>(A.rows()));
-  for (int i = 0; i < A.rows(); ++i) {
-    for (int j = 0; j < A.cols(); ++j) out[at(i)].push_back({static_cast<Quad>(A(i, j)), 0});
-  }
-  return out;
-}
-
-QuadMatrix operator*(const QuadMatrix& A, const QuadMatrix& B) {
-  QuadMatrix out(A.size(), std::vector<testing::QuadComplex>(B[0].size()));
-  for (std::size_t i = 0; i < A.size(); ++i) {
-    for (std::size_t j = 0; j < B[0].size(); ++j) {
-      for (std::size_t k = 0; k < B.size(); ++k) out[i][j] = out[i][j] + A[i][k] * B[k][j];
-    }
-  }
-  return out;
-}
-
-QuadMatrix operator+(QuadMatrix A, const QuadMatrix& B) {
-  for (std::size_t i = 0; i < A.size(); ++i) {
-    for (std::size_t j = 0; j < B[0].size(); ++j) A[i][j] = A[i][j] + B[i][j];
-  }
-  return A;
-}
 
 /// Largest shares of a bound that an error takes: of F_error by F* - F, with F* = -G^-1 Y' R, and
 /// of E by weight G - I.
@@ -55,13 +31,13 @@ struct Shares {
 /// `off`: what the true coefficients differ by from the given ones.
 Shares expect_bounded(const System<>& system, const System<>& off, const ModalBasis<>& basis,
                       const BasisResidual<>& residual) {
-  const QuadMatrix M = quad(system.mass) + quad(off.mass);
-  const QuadMatrix C = quad(system.damping) + quad(off.damping);
-  const QuadMatrix K = quad(system.stiffness) + quad(off.stiffness);
-  const QuadMatrix Lambda = quad(basis.Lambda), U = quad(basis.U), V = U * Lambda;
-  const QuadMatrix Y = quad(basis.Y.transpose()), YG = quad(residual.YG.transpose());
+  const QuadMatrix M = quad_matrix(system.mass) + quad_matrix(off.mass);
+  const QuadMatrix C = quad_matrix(system.damping) + quad_matrix(off.damping);
+  const QuadMatrix K = quad_matrix(system.stiffness) + quad_matrix(off.stiffness);
+  const QuadMatrix Lambda = quad_matrix(basis.Lambda), U = quad_matrix(basis.U), V = U * Lambda;
+  const QuadMatrix Y = quad_matrix(basis.Y.transpose()), YG = quad_matrix(residual.YG.transpose());
   QuadMatrix G = Y * (C * U + M * V) + YG * (M * U), F = Y * (K * U + C * V + M * (V * Lambda));
-  const QuadMatrix wG = quad(basis.weight) * G;
+  const QuadMatrix wG = quad_matrix(basis.weight) * G;
   testing::solve(G, F);
   Shares shares;
   const auto take = [](Quad error, double bound, double& largest) {

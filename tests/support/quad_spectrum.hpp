@@ -12,7 +12,7 @@ namespace dashpot::testing {
 #if __LDBL_MANT_DIG__ == 113  // 64-bit ARM, which has no __float128
 using Quad = long double;
 #else
-__extension__ typedef __float128 Quad;  // NOLINT(modernize-use-using): __extension__ is for this
+__extension__ typedef __float128 Quad;
 #endif
 
 /// What std::complex does not promise for types of its own.
@@ -38,6 +38,31 @@ inline QuadComplex to_quad(const std::complex<double>& z) {
 
 /// Row by row.
 using QuadMatrix = std::vector<std::vector<QuadComplex>>;
+
+inline QuadMatrix quad_matrix(const Eigen::MatrixXd& A) {
+  QuadMatrix result(static_cast<std::size_t>(A.rows()));
+  for (Eigen::Index i = 0; i < A.rows(); ++i) {
+    for (const double a : A.row(i)) result[static_cast<std::size_t>(i)].push_back(to_quad(a));
+  }
+  return result;
+}
+
+inline QuadMatrix operator*(const QuadMatrix& A, const QuadMatrix& B) {
+  QuadMatrix C(A.size(), std::vector<QuadComplex>(B[0].size()));
+  for (std::size_t i = 0; i < A.size(); ++i) {
+    for (std::size_t j = 0; j < B[0].size(); ++j) {
+      for (std::size_t k = 0; k < B.size(); ++k) C[i][j] = C[i][j] + A[i][k] * B[k][j];
+    }
+  }
+  return C;
+}
+
+inline QuadMatrix operator+(QuadMatrix A, const QuadMatrix& B) {
+  for (std::size_t i = 0; i < A.size(); ++i) {
+    for (std::size_t j = 0; j < B[0].size(); ++j) A[i][j] = A[i][j] + B[i][j];
+  }
+  return A;
+}
 
 /// Solves A X = B in place of B, by elimination with pivots. Destroys A.
 inline void solve(QuadMatrix& A, QuadMatrix& B) {
