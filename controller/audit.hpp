@@ -146,6 +146,10 @@ class Audit {
   /// dampers and the friction, without the dampers of task or joints. Throws like numbers().
   analysis::TaskImpedance undamped(const JointVector& q) const;
 
+  /// Returns the sampled loop at q, with the joints' friction and the integral of the springs.
+  /// Throws like numbers(), and std::invalid_argument without a period.
+  analysis::SampledLoop loop(const JointVector& q) const;
+
   /// Designs damping for the stiffness at q, with `ratio` for every mode. Throws
   /// std::invalid_argument for a ratio that is not positive.
   DampingSuggestion suggest(const JointVector& q, double ratio) const;

@@ -39,6 +39,29 @@ struct Found {
   std::optional<LoopReport> loop;
 };
 
+/// The loop of the options, with the joints' friction and the integral of one system.
+analysis::LoopLimit limit_of(const SystemEntry& entry, const DesignOptions& options) {
+  const analysis::TaskImpedance& given = entry.impedance;
+  analysis::LoopLimit limit = options.limit;
+  limit.loop.period = *options.period;
+  limit.loop.friction = entry.friction;
+  if (options.integral_time > 0) {
+    analysis::to_joint_space(given);  // throws for wrong sizes
+    limit.loop.memory = controller::integral_memory(
+        controlled_stiffness(given) / options.integral_time, *options.period);
+  }
+  return limit;
+}
+
+/// Says that a gain margin cannot be kept: "NO ... keeps a gain margin of ..."
+std::runtime_error lost_margin(const std::string& none, const DesignOptions& options,
+                               double largest, const std::string& with) {
+  return std::runtime_error(none + " keeps a gain margin of " +
+                            format_number(options.limit.gain_margin, 3) +
+                            " with this period and delay; the largest margin is " +
+                            format_number(largest, 3) + ", with " + with);
+}
+
 Found design_one(const SystemEntry& entry, const DesignOptions& options) {
   const analysis::TaskImpedance& given = entry.impedance;
   const analysis::DampingStructure structure = options.damping_structure();
@@ -48,23 +71,14 @@ Found design_one(const SystemEntry& entry, const DesignOptions& options) {
   const auto start = options.near ? given.task_damping : std::nullopt;
   const analysis::DampingTarget target = options.target();
   if (!options.period) return {analysis::design_damping(given, target, structure, start), {}};
-  analysis::LoopLimit limit = options.limit;
-  limit.loop.period = *options.period;
-  limit.loop.friction = entry.friction;
-  if (options.integral_time > 0) {
-    analysis::to_joint_space(given);  // throws for wrong sizes
-    limit.loop.memory = controller::integral_memory(
-        controlled_stiffness(given) / options.integral_time, *options.period);
-  }
+  const analysis::LoopLimit limit = limit_of(entry, options);
   analysis::SampledDamping found = analysis::design_damping(given, target, limit, structure, start);
   if (!found.kept) {
     const std::string where =
         entry.prefix.empty() ? "" : entry.prefix.substr(0, entry.prefix.size() - 1) + ": ";
-    throw std::runtime_error(where + "no damping ratio up to " + format_number(options.ratio, 3) +
-                             " keeps a gain margin of " + format_number(limit.gain_margin, 3) +
-                             " with this period and delay; the largest margin is " +
-                             format_number(found.gain_margin, 3) + ", with a ratio of " +
-                             format_number(found.level * options.ratio, 3));
+    throw lost_margin(where + "no damping ratio up to " + format_number(options.ratio, 3), options,
+                      found.gain_margin,
+                      "a ratio of " + format_number(found.level * options.ratio, 3));
   }
   return {std::move(found.design),
           LoopReport{limit, found.level, found.gain_margin, std::move(found.sampled)}};
@@ -127,9 +141,23 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
   region.ceiling = options.largest_ratio;
   region.threads = options.threads;
   region.progress = show_progress;
+  region.gain_margin = options.limit.gain_margin;
+  if (options.period) {
+    region.loop = [&](std::size_t i) { return limit_of(file.entries[i], options).loop; };
+  }
   try {
-    return {key_of(configurations[0]), options.ratio,
-            analysis::design_region(configurations, region)};
+    RegionReport report{key_of(configurations[0]),
+                        options.ratio,
+                        analysis::design_region(configurations, region),
+                        {}};
+    const analysis::RegionDesign& design = report.design;
+    if (!design.kept) {
+      throw lost_margin("no share of the damping found for the region", options, design.gain_margin,
+                        "a share of " + format_number(design.share, 3) + ", at configuration [" +
+                            std::to_string(design.margin_sample) + "]");
+    }
+    if (options.period) report.limit = limit_of(file.entries[0], options);
+    return report;
   } catch (const analysis::InvalidSystem&) {
     for (const SystemEntry& entry : file.entries) report_on(entry, options);  // names the entry
     throw;
@@ -177,8 +205,8 @@ constexpr const char* kHelp =
 there already (joint friction, null-space damping). A task_damping is what `before` shows, and what
 --near stays near. Without a jacobian the damping is designed in joint space. The matrix is always
 positive semidefinite; a mode that cannot have its ratio is named, with the reason. With --period it
-is one that the sampled loop bears with the margin: the ratio is lowered where it has to be, and
-where no ratio will do, the exit status is 1.
+is one that the sampled loop bears with the margin: the ratio is lowered where it has to be, with
+--region the whole matrix, and where that will not do, the exit status is 1.
 )";
 
 }  // namespace

@@ -155,7 +155,6 @@ void check(const DesignOptions& options) {
     throw InputError("--period",
                      "missing; --delay, --cutoff, --integral-time and --margin need it");
   }
-  if (options.period && options.region) throw InputError("--period", "does not go with --region");
 }
 
 }  // namespace dashpot::apps

@@ -36,6 +36,7 @@ struct RegionReport {
   std::string key;
   double ratio = 0;
   analysis::RegionDesign design;
+  std::optional<analysis::LoopLimit> limit;  ///< none if the loops are taken for continuous
 };
 
 }  // namespace dashpot::apps

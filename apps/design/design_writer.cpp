@@ -33,8 +33,15 @@ Json to_value(const DampingMiss& miss) {
           {"reason", analysis::to_text(miss.reason)}};
 }
 
+/// What is said of a loop and its margin, but for what follows from them.
+Json limit_value(const analysis::LoopLimit& limit, double gain_margin) {
+  return {
+      {"period", limit.loop.period},        {"delay", limit.loop.delay},
+      {"cutoff", limit.loop.torque_cutoff}, {"difference_velocity", limit.loop.difference_velocity},
+      {"margin", limit.gain_margin},        {"gain_margin", gain_margin}};
+}
+
 Json to_value(const LoopReport& report) {
-  const analysis::SampledLoop& loop = report.limit.loop;
   Json modes = Json::array();
   for (const analysis::SampledMode& mode : report.sampled.modes) {
     modes.push_back({{"natural_frequency", mode.natural_frequency},
@@ -42,16 +49,12 @@ Json to_value(const LoopReport& report) {
                      {"damped_frequency", mode.damped_frequency},
                      {"kind", analysis::to_text(mode.kind)}});
   }
-  return {{"period", loop.period},
-          {"delay", loop.delay},
-          {"cutoff", loop.torque_cutoff},
-          {"difference_velocity", loop.difference_velocity},
-          {"margin", report.limit.gain_margin},
-          {"gain_margin", report.gain_margin},
-          {"level", report.level},
-          {"integral_decays", controller::integral_decays(report.sampled, loop.period)},
-          {"spectral_radius", report.sampled.spectral_radius},
-          {"modes", modes}};
+  Json result = limit_value(report.limit, report.gain_margin);
+  result["level"] = report.level;
+  result["integral_decays"] = controller::integral_decays(report.sampled, report.limit.loop.period);
+  result["spectral_radius"] = report.sampled.spectral_radius;
+  result["modes"] = modes;
+  return result;
 }
 
 Json to_value(const DesignReport& report) {
@@ -121,12 +124,14 @@ std::string mode_table(const DesignReport& report) {
   return table.text();
 }
 
+std::string margin_text(double gain_margin) {
+  return "  Springs and damping may grow by a factor of " + format_number(gain_margin, 3) +
+         " together before the loop is unstable.\n";
+}
+
 std::string loop_text(const DesignReport& report) {
   const LoopReport& loop = *report.loop;
-  if (loop.level == 1) {
-    return "  Springs and damping may grow by a factor of " + format_number(loop.gain_margin, 3) +
-           " together before the loop is unstable.\n";
-  }
+  if (loop.level == 1) return margin_text(loop.gain_margin);
   return "  The loop bears " + format_number(loop.level * report.ratio, 6) + " instead of " +
          format_number(report.ratio, 3) + ": with more damping, a gain margin of " +
          format_number(loop.limit.gain_margin, 3) + " is lost.\n";
@@ -211,14 +216,21 @@ std::string region_json(const RegionReport& report) {
                        {"wanted", sample.wanted},
                        {"largest_ratio", sample.largest_ratio},
                        {"soft_modes", sample.soft_modes}});
+    if (report.limit) samples.back()["gain_margin"] = sample.gain_margin;
   }
-  return json_text({{report.key, json_rows(design.damping)},
-                    {"smallest_eigenvalue", smallest_eigenvalue(design.damping)},
-                    {"wanted", report.ratio},
-                    {"level", design.level},
-                    {"violation", design.violation},
-                    {"worst_sample", design.worst_sample},
-                    {"samples", samples}});
+  Json result = {{report.key, json_rows(design.damping)},
+                 {"smallest_eigenvalue", smallest_eigenvalue(design.damping)},
+                 {"wanted", report.ratio},
+                 {"level", design.level},
+                 {"violation", design.violation},
+                 {"worst_sample", design.worst_sample}};
+  if (report.limit) {
+    result["loop"] = limit_value(*report.limit, design.gain_margin);
+    result["loop"]["share"] = design.share;
+    result["loop"]["margin_sample"] = design.margin_sample;
+  }
+  result["samples"] = samples;
+  return json_text(result);
 }
 
 std::string region_table(const RegionReport& report) {
@@ -235,6 +247,14 @@ std::string region_table(const RegionReport& report) {
     text += "  What is there already damps more than is allowed, by " +
             format_number(design.violation, 3) + ".\n";
   }
+  if (report.limit && design.share < 1) {
+    text += "  The loops bear " + format_number(design.share, 6) +
+            " of the damping found for continuous ones: with more, a gain margin of " +
+            format_number(report.limit->gain_margin, 3) + " is lost, first at configuration [" +
+            std::to_string(design.margin_sample) + "].\n";
+  } else if (report.limit) {
+    text += margin_text(design.gain_margin);
+  }
   TextTable table;
   table.add_column(Align::kRight, {"", "configuration"});
   table.add_column(Align::kRight, {"worst", "mode"});
@@ -242,14 +262,18 @@ std::string region_table(const RegionReport& report) {
   table.add_column(Align::kPoint, {"smallest", "ratio"});
   table.add_column(Align::kPoint, {"largest", "ratio"});
   table.add_column(Align::kRight, {"soft", "modes"});
+  if (report.limit) table.add_column(Align::kPoint, {"gain", "margin"});
   for (std::size_t i = 0; i < design.samples.size(); ++i) {
     const analysis::RegionSample& sample = design.samples[i];
     const bool any = sample.worst_mode >= 0;
-    table.add_row({"[" + std::to_string(i) + "]", any ? std::to_string(sample.worst_mode + 1) : "-",
-                   any ? format_number(sample.natural_frequency, 6) : "-",
-                   any ? format_number(sample.damping_ratio, 6) : "-",
-                   any ? format_number(sample.largest_ratio, 6) : "-",
-                   std::to_string(sample.soft_modes)});
+    std::vector<std::string> row = {"[" + std::to_string(i) + "]",
+                                    any ? std::to_string(sample.worst_mode + 1) : "-",
+                                    any ? format_number(sample.natural_frequency, 6) : "-",
+                                    any ? format_number(sample.damping_ratio, 6) : "-",
+                                    any ? format_number(sample.largest_ratio, 6) : "-",
+                                    std::to_string(sample.soft_modes)};
+    if (report.limit) row.push_back(format_number(sample.gain_margin, 3));
+    table.add_row(std::move(row));
   }
   return text + "\n" + table.text();
 }
@@ -257,11 +281,14 @@ std::string region_table(const RegionReport& report) {
 std::string region_csv(const RegionReport& report) {
   std::ostringstream text;
   text.precision(17);
-  text << "configuration,worst_mode,natural_frequency,damping_ratio,largest_ratio,soft_modes\n";
+  text << "configuration,worst_mode,natural_frequency,damping_ratio,largest_ratio,soft_modes"
+       << (report.limit ? ",gain_margin\n" : "\n");
   for (std::size_t i = 0; i < report.design.samples.size(); ++i) {
     const analysis::RegionSample& sample = report.design.samples[i];
     text << i << ',' << sample.worst_mode << ',' << sample.natural_frequency << ','
-         << sample.damping_ratio << ',' << sample.largest_ratio << ',' << sample.soft_modes << '\n';
+         << sample.damping_ratio << ',' << sample.largest_ratio << ',' << sample.soft_modes;
+    if (report.limit) text << ',' << sample.gain_margin;
+    text << '\n';
   }
   return text.str();
 }

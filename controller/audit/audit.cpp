@@ -283,6 +283,12 @@ analysis::TaskImpedance Audit::undamped(const JointVector& q) const {
   return impedance;
 }
 
+analysis::SampledLoop Audit::loop(const JointVector& q) const {
+  require(options_.period > 0, "period: a loop needs one");
+  const DynamicsResult robot = evaluate(q);
+  return loop_at(robot, impedance_at(robot));
+}
+
 DampingSuggestion Audit::suggest(const JointVector& q, double ratio) const {
   require(std::isfinite(ratio) && ratio > 0, "ratio: has to be positive");
   analysis::DampingTarget target = analysis::DampingTarget::constant(ratio);

@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 _Array = npt.NDArray[np.float64]
-# damping, ratio wanted, level, ceiling, members
-_Question = tuple[_Array, float, float, float, list[int]]
-# level, largest ratio, worst sample, those that bind
-_Verdict = tuple[float, float, int, list[tuple[float, int]]]
+# damping, ratio wanted, level, ceiling, largest gain margin that is sought, members
+_Question = tuple[_Array, float, float, float, float, list[int]]
+# level, largest ratio, worst sample, smallest gain margin, where, those that bind
+_Verdict = tuple[float, float, int, float, int, list[tuple[float, int]]]
 
 __build__: str
 
@@ -106,5 +106,5 @@ class Audit:
     def judge(self, question: _Question, seed: int, first: int, count: int,
               postures: _Array | None) -> _Verdict: ...
     def design_region(self, count: int, seed: int, postures: _Array | None, ratio: float,
-                      structure: str, largest_ratio: float | None,
+                      structure: str, largest_ratio: float | None, gain_margin: float,
                       ask_all: Callable[[_Question], list[_Verdict]]) -> dict[str, Any]: ...

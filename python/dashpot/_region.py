@@ -26,6 +26,12 @@ class RegionDesign(Result):
     """By how much a ratio exceeds the largest one allowed."""
     worst_q: Array
     """n, rad, the posture of the smallest ratio; no entries if no posture has a ratio."""
+    share: float
+    """Of the damping found for continuous loops, the share that the sampled loops bear, at most 1."""
+    gain_margin: float
+    """Smallest over all postures; infinite without a period."""
+    margin_q: Array
+    """n, rad, the posture of the smallest gain margin; no entries without a period."""
 
 
 def design_region(robot: Robot, *, damping_ratio: float = 0.7,
@@ -37,6 +43,9 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
                   largest_ratio: float | None = None, soft_frequency: float = 0.1,
                   samples: int = 0, seed: int = 0, lower: npt.ArrayLike | None = None,
                   upper: npt.ArrayLike | None = None, postures: npt.ArrayLike | None = None,
+                  period: float = 0, delay: int = 0, cutoff: float = 0,
+                  difference_velocity: bool = False, integral_time: float = 0,
+                  gain_margin: float = 2,
                   executor: concurrent.futures.Executor | None = None) -> RegionDesign:
     """Returns one constant damping matrix for many postures, as `dashpot design --region` does.
 
@@ -45,22 +54,31 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     if that is more). Postures, springs and null-space gains are those of `audit`; `structure` is
     full, block or diagonal. Modes below `soft_frequency` (rad/s) do not count.
 
+    With a `period` (s) the matrix is lowered as a whole to what the sampled loop of every posture
+    bears with the `gain_margin`. The loop is that of `audit`: `delay` (ticks), `cutoff` (Hz),
+    `difference_velocity`, `integral_time` (s), but all motions count in its margin, soft ones too.
+
     Only postures that bind are searched over. An `executor` of concurrent.futures judges all of
     them in chunks, where the workers are, and only the few that come off worst come back. The result
     is the same to the last bit whatever executor and however many workers.
 
-    Raises Error and BrokenExecutor as `audit` does, and Error without postures.
+    Raises Error and BrokenExecutor as `audit` does, and Error without postures and where no share of
+    the damping keeps the gain margin.
     """
     if (task_stiffness is None) == (joint_stiffness is None):
         raise Error("task_stiffness: give one of task_stiffness and joint_stiffness")
+    if not period and (delay or cutoff or difference_velocity or integral_time or gain_margin != 2):
+        raise Error("period: missing; the other numbers of a loop need it")
     gains = (to_gain("joint_stiffness", joint_stiffness), None, 0.0,
              to_gain("task_stiffness", task_stiffness), None, 0.0,
              to_vector("null_stiffness", null_stiffness), to_vector("null_damping", null_damping),
              0.0, is_tool(frame), [True] * 6)
     options: dict[str, Any] = {"half_quaternion": half_quaternion, "inertia_blocks": False,
                                "kinematic_null_space": False,
-                               "period": 0.0, "delay": 0, "cutoff": 0.0,
-                               "difference_velocity": False,
+                               "period": float(period), "delay": int(delay),
+                               "cutoff": float(cutoff),
+                               "difference_velocity": bool(difference_velocity),
+                               "integral_time": float(integral_time),
                                "soft_frequency": float(soft_frequency)}
     for name, values in (("lower", lower), ("upper", upper)):
         if values is not None:
@@ -78,5 +96,9 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
                               first, count, None if given is None else given[first:first + count]))
                 for first, count in chunks_of(samples)], samples)
 
-        return RegionDesign(**task.core.design_region(samples, seed, given, float(damping_ratio),
-                                                      structure, largest_ratio, ask_all))
+        found = task.core.design_region(samples, seed, given, float(damping_ratio), structure,
+                                        largest_ratio, float(gain_margin), ask_all)
+    if not found.pop("kept"):
+        raise Error(f"gain_margin: no share of the damping keeps {gain_margin:.3g} at every posture; "
+                    f"the largest is {found['gain_margin']:.3g}, with {found['share']:.3g} of it")
+    return RegionDesign(**found)

@@ -161,11 +161,13 @@ JointVector posture_of(const RobotAudit& all, std::uint64_t seed, const Optional
   return all.robot.joint_vector("postures", postures->row(index));
 }
 
-/// A question that other processes are asked: damping, ratio wanted, level, ceiling, members.
-using Question = std::tuple<Eigen::MatrixXd, double, double, double, std::vector<std::size_t>>;
-/// Their answer: level, largest ratio, worst sample, those that bind.
-using Verdict =
-    std::tuple<double, double, std::int64_t, std::vector<std::pair<double, std::size_t>>>;
+/// A question that other processes are asked: damping, ratio wanted, level, ceiling, largest gain
+/// margin that is sought, members.
+using Question =
+    std::tuple<Eigen::MatrixXd, double, double, double, double, std::vector<std::size_t>>;
+/// Their answer: level, largest ratio, worst sample, smallest gain margin, where, those that bind.
+using Verdict = std::tuple<double, double, std::int64_t, double, std::int64_t,
+                           std::vector<std::pair<double, std::size_t>>>;
 
 analysis::DampingTarget target_of(const RobotAudit& all, double ratio) {
   analysis::DampingTarget target = analysis::DampingTarget::constant(ratio);
@@ -177,16 +179,20 @@ analysis::DampingTarget target_of(const RobotAudit& all, double ratio) {
 /// rows these are just the rows that are judged.
 Verdict judge(const RobotAudit& all, const Question& asked, std::uint64_t seed, std::int64_t first,
               std::int64_t count, const OptionalMatrix& postures) {
+  const auto q = [&](std::int64_t number) {
+    return posture_of(all, seed, postures, postures ? number - first : number);
+  };
   std::vector<analysis::TaskImpedance> configurations;
-  for (std::int64_t i = 0; i < count; ++i) {
-    configurations.push_back(
-        all.audit.undamped(posture_of(all, seed, postures, postures ? i : first + i)));
+  for (std::int64_t i = first; i < first + count; ++i) {
+    configurations.push_back(all.audit.undamped(q(i)));
   }
-  const auto& [damping, ratio, level, ceiling, members] = asked;
-  const analysis::RegionVerdict found =
-      analysis::judge_region(configurations, static_cast<std::size_t>(first),
-                             {damping, target_of(all, ratio), level, ceiling, members});
-  return {found.level, found.largest_ratio, found.worst_sample, found.binding};
+  const auto& [damping, ratio, level, ceiling, most_margin, members] = asked;
+  const analysis::RegionVerdict found = analysis::judge_region(
+      configurations, static_cast<std::size_t>(first),
+      {damping, target_of(all, ratio), level, ceiling, members, most_margin},
+      [&](std::size_t number) { return all.audit.loop(q(static_cast<std::int64_t>(number))); });
+  return {found.level,       found.largest_ratio, found.worst_sample,
+          found.gain_margin, found.margin_sample, found.binding};
 }
 
 /// Asks all parts of a region, in Python.
@@ -194,25 +200,34 @@ using AskAll = std::function<std::vector<Verdict>(const Question&)>;
 
 nb::dict design_region(const RobotAudit& all, std::int64_t count, std::uint64_t seed,
                        const OptionalMatrix& postures, double ratio, const std::string& structure,
-                       const std::optional<double>& largest_ratio, const AskAll& ask_all) {
+                       const std::optional<double>& largest_ratio, double gain_margin,
+                       const AskAll& ask_all) {
   analysis::RegionOptions options;
   options.target = target_of(all, ratio);
   options.structure = structure_of(structure);
   options.ceiling = largest_ratio;
+  options.gain_margin = gain_margin;
+  const auto q = [&](std::int64_t i) { return posture_of(all, seed, postures, i); };
+  if (all.audit.options().period > 0) {
+    options.loop = [&](std::size_t i) { return all.audit.loop(q(static_cast<std::int64_t>(i))); };
+  }
   analysis::RegionSource source;
   source.count = static_cast<std::size_t>(count);
   source.configuration = [&](std::size_t i) {
-    return all.audit.undamped(posture_of(all, seed, postures, static_cast<std::int64_t>(i)));
+    return all.audit.undamped(q(static_cast<std::int64_t>(i)));
   };
   source.judge = [&](const analysis::RegionQuestion& question) {
     const nb::gil_scoped_acquire locked;
     analysis::RegionVerdict verdict;
-    for (const auto& [level, largest, worst, binding] :
-         ask_all({question.damping, ratio, question.level, question.ceiling, question.members})) {
+    for (const auto& [level, largest, worst, margin, where, binding] :
+         ask_all({question.damping, ratio, question.level, question.ceiling, question.most_margin,
+                  question.members})) {
       analysis::RegionVerdict part;
       part.level = level;
       part.largest_ratio = largest;
       part.worst_sample = worst;
+      part.gain_margin = margin;
+      part.margin_sample = where;
       part.binding = binding;
       verdict.add(part);
     }
@@ -227,9 +242,11 @@ nb::dict design_region(const RobotAudit& all, std::int64_t count, std::uint64_t 
   result["damping"] = to_array(found.damping);
   result["level"] = found.level;
   result["violation"] = found.violation;
-  const JointVector worst =
-      found.worst_sample < 0 ? JointVector() : posture_of(all, seed, postures, found.worst_sample);
-  result["worst_q"] = to_array(worst);
+  result["worst_q"] = to_array(found.worst_sample < 0 ? JointVector() : q(found.worst_sample));
+  result["kept"] = found.kept;
+  result["share"] = found.share;
+  result["gain_margin"] = found.gain_margin;
+  result["margin_q"] = to_array(found.margin_sample < 0 ? JointVector() : q(found.margin_sample));
   return result;
 }
 
@@ -249,7 +266,7 @@ void add_audit(nb::module_& m) {
            nb::arg("count"), nb::arg("postures").none())
       .def("design_region", &design_region, nb::arg("count"), nb::arg("seed"),
            nb::arg("postures").none(), nb::arg("ratio"), nb::arg("structure"),
-           nb::arg("largest_ratio").none(), nb::arg("ask_all"));
+           nb::arg("largest_ratio").none(), nb::arg("gain_margin"), nb::arg("ask_all"));
 }
 
 }  // namespace dashpot::python

@@ -64,7 +64,33 @@ def test_regions_of_given_postures_keep_their_structure(panda):
     assert reached[worst[0]] == pytest.approx(min(reached), rel=1e-7)  # several may bind
 
 
+def test_regions_are_lowered_to_what_every_loop_bears(panda):
+    postures = np.random.default_rng(2).uniform(NEAR["lower"], NEAR["upper"], (40, 7))
+    gains, loop = dict(task_stiffness=REGION["task_stiffness"]), dict(period=0.002, delay=1)
+
+    def margins(design):
+        return [dashpot.audit(panda, q, **gains, **loop,
+                              task_damping=design.damping).posture.gain_margin for q in postures]
+
+    free = dashpot.design_region(panda, **gains, postures=postures)
+    assert free.share == 1 and np.isinf(free.gain_margin) and free.margin_q.size == 0
+    wanted = 1.5 * min(margins(free))
+    asked = dict(**gains, **loop, postures=postures, gain_margin=wanted)
+    lowered = dashpot.design_region(panda, **asked)
+    assert 0.4 < lowered.share < 0.9
+    np.testing.assert_allclose(lowered.damping, lowered.share * free.damping, rtol=1e-12)
+    found = margins(lowered)
+    assert min(found) == pytest.approx(wanted, rel=1e-4) == lowered.gain_margin
+    np.testing.assert_array_equal(lowered.margin_q, postures[np.argmin(found)])
+    with spawned(2) as processes:
+        same(lowered, dashpot.design_region(panda, **asked, executor=processes))
+    with pytest.raises(dashpot.Error, match="gain_margin: no share of the damping keeps 2 at every"):
+        dashpot.design_region(panda, **gains, postures=postures, period=0.1)
+
+
 @pytest.mark.parametrize("given, message", [
+    (dict(task_stiffness=[1] * 6, samples=9, delay=1), "period: missing"),
+    (dict(task_stiffness=[1] * 6, samples=9, period=1e-3, gain_margin=0.5), "a gain margin below 1"),
     (dict(), "give one of task_stiffness and joint_stiffness"),
     (dict(task_stiffness=[1] * 6), "a region without postures"),
     (dict(task_stiffness=[1] * 6, samples=9, structure="round"), "none of full, block and diagonal"),

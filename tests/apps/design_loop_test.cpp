@@ -1,9 +1,11 @@
 // `dashpot design --period`: what a sampled loop bears, of a mass under a held force.
 #include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/support/scratch.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -134,6 +136,62 @@ TEST(DesignForALoop, ProposesNothingWhereNoRatioWillDo) {
               HasSubstr("[0]: no damping ratio up to 0.0900 keeps a gain margin of 2"));
 }
 
+TEST(DesignForALoop, LowersTheDampingOfARegionToWhatEveryLoopBears) {
+  const std::string list = "[{mass: [[4]], stiffness: [[800]]}, {mass: [[2]], stiffness: [[800]]}]";
+  const std::vector<std::string> options = {"--region", "--damping-ratio", "2",  "--period",
+                                            "0.02",     "--margin",        "1.6"};
+  const Json result = design_json(list, options);
+  EXPECT_NEAR(result["damping"][0][0], 200 / 1.6, 1e-3);  // of the lighter
+  const Json& loop = result["loop"];
+  EXPECT_EQ(loop["margin"], 1.6);
+  EXPECT_NEAR(loop["gain_margin"], 1.6, 1e-5);
+  EXPECT_EQ(loop["margin_sample"], 1);
+  const double free = design_json(list, {"--region", "--damping-ratio", "2"})["damping"][0][0];
+  EXPECT_NEAR(loop["share"], 200 / 1.6 / free, 1e-5);
+  EXPECT_NEAR(result["samples"][0]["gain_margin"], 3.2, 1e-3);
+  const Outcome table = design(list, options);
+  EXPECT_THAT(table.out, HasSubstr("The loops bear 0."));
+  EXPECT_THAT(table.out, HasSubstr("first at configuration [1]"));
+  EXPECT_THAT(table.out, HasSubstr("margin"));
+  const Scratch scratch;
+  std::vector<std::string> with_csv = options;
+  with_csv.insert(with_csv.end(), {"--csv", scratch.path("map.csv")});
+  EXPECT_EQ(design(list, with_csv).status, 0);
+  std::ifstream file(scratch.path("map.csv"));
+  std::string line;
+  std::getline(file, line);
+  EXPECT_THAT(line, ::testing::EndsWith("soft_modes,gain_margin"));
+  std::getline(file, line);
+  EXPECT_NEAR(std::stod(line.substr(line.rfind(',') + 1)), 3.2, 1e-3);
+}
+
+TEST(DesignForALoop, CountsFrictionAndIntegralOfEachConfigurationOfARegion) {
+  const std::vector<std::string> options = {"--region", "--damping-ratio", "2.5", "--period",
+                                            "0.02"};
+  const auto with = [&](const std::string& first, std::vector<std::string> more) {
+    more.insert(more.begin(), options.begin(), options.end());
+    return design_json(
+        "[{mass: [[2]], stiffness: [[800]]" + first + "}, {mass: [[9]], stiffness: [[800]]}]",
+        std::move(more));
+  };
+  const double plain = with("", {})["damping"][0][0];
+  EXPECT_NEAR(plain, 100, 1e-3);
+  EXPECT_GT(with(", damping: [[40]]", {})["damping"][0][0], plain + 1);  // brakes within a tick
+  EXPECT_LT(with("", {"--integral-time", "0.2"})["damping"][0][0], plain - 0.01);
+}
+
+TEST(DesignForALoop, ProposesNothingForARegionThatBearsNone) {
+  const Outcome outcome =
+      design("[{mass: [[2]], stiffness: [[800]]}, {mass: [[0.01]], stiffness: [[800]]}]",
+             {"--region", "--damping-ratio", "0.7", "--period", "0.02"});
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.out, IsEmpty());
+  EXPECT_EQ(count_lines(outcome.err), 1);
+  EXPECT_THAT(outcome.err, HasSubstr("no share of the damping found for the region keeps a gain "
+                                     "margin of 2"));
+  EXPECT_THAT(outcome.err, HasSubstr("configuration [1]"));
+}
+
 TEST(DesignForALoop, RefusesOptionsThatMakeNoLoop) {
   const auto refused = [](std::vector<std::string> options, const std::string& reason) {
     options.insert(options.end(), {"--damping-ratio", "1"});
@@ -151,7 +209,6 @@ TEST(DesignForALoop, RefusesOptionsThatMakeNoLoop) {
   refused({"--period", "0.001", "--margin", "0.99"}, "a factor of at least 1");
   refused({"--period", "0.001", "--delay", "-1"}, "--delay");
   refused({"--period", "0.001", "--cutoff", "nan"}, "a frequency in Hz");
-  refused({"--period", "0.001", "--region"}, "--period: does not go with --region");
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 namespace dashpot::testing {
 
@@ -35,6 +37,23 @@ inline analysis::TaskImpedance random_arm(Random& random, Eigen::Index n, Eigen:
   arm.jacobian = 0.5 * random.matrix(m, n);
   arm.task_stiffness = graded(random, m, 3000, stiffness_condition);
   return arm;
+}
+
+/// An arm of 7 joints and 6 directions at some configurations of a path.
+inline std::vector<analysis::TaskImpedance> path_of_configurations(Random& random, int count) {
+  const analysis::TaskImpedance arm = random_arm(random, 7, 6, 10, 30);
+  const Eigen::MatrixXd swing = random.matrix(6, 7), root = 0.2 * random.matrix(7, 7);
+  std::vector<analysis::TaskImpedance> result;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 0.4 * std::sin(0.5 * i);
+    analysis::TaskImpedance one = arm;
+    one.jacobian = *arm.jacobian + 0.3 * angle * swing;
+    const Eigen::MatrixXd T = Eigen::MatrixXd::Identity(7, 7) + angle * root;
+    const Eigen::MatrixXd M = T * arm.mass * T.transpose();
+    one.mass = 0.5 * (M + M.transpose());
+    result.push_back(one);
+  }
+  return result;
 }
 
 /// K_C or C_C with rows and columns of zeros for the directions that are not there.

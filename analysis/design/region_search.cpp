@@ -1,11 +1,11 @@
+#include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_region.hpp>
-#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/design/level_search.hpp>
+#include <dashpot/analysis/design/region_verdict.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -15,18 +15,15 @@ namespace {
 using Eigen::MatrixXd;
 
 constexpr double kLevelStep = 5e-4;
-/// A configuration that misses the level by less need not join the search.
-constexpr double kLevelMissed = 2e-4;
-/// A search that comes as near as this to its goal has reached it.
-constexpr double kMet = 1e-7;
 /// Configurations whose exact design is tried, about; and how often one is scaled down.
 constexpr std::size_t kStarts = 8;
 constexpr int kScalings = 12;
-/// Configurations that a search begins with, that join it at a time, and how often some may join.
+/// Configurations that a search begins with, and how often some may join.
 constexpr std::size_t kFirst = 32;
-constexpr std::size_t kJoining = 8;
 constexpr int kRounds = 40;
 constexpr std::size_t kMembers = kFirst + kRounds * kJoining;  // at most
+/// Gain margins beyond it count as infinite.
+constexpr double kMostMargin = 1e6;
 
 std::vector<DampingSample> samples_of(const std::vector<TaskImpedance>& configurations,
                                       int threads) {
@@ -36,91 +33,22 @@ std::vector<DampingSample> samples_of(const std::vector<TaskImpedance>& configur
   return samples;
 }
 
+/// Of options that are valid.
 double ceiling_of(const RegionOptions& options) {
+  require("damping", options.gain_margin >= 1, "a gain margin below 1 is none");
   const double wanted = std::max(options.target.low_ratio, options.target.high_ratio);
   const double ceiling = options.ceiling.value_or(std::max(1.0, 1.5 * wanted));
-  if (!(ceiling >= wanted)) {
-    throw std::invalid_argument("damping: the largest ratio allowed is below the one wanted");
-  }
+  require("damping", ceiling >= wanted, "the largest ratio allowed is below the one wanted");
   return ceiling;
 }
 
-RegionSample read(const Spectrum<>& spectrum, const DampingTarget& target) {
-  RegionSample result;
-  const double fastest = spectrum.modes.empty() ? 0 : spectrum.modes[0].natural_frequency;
-  const double soft = target.soft_limit(fastest);
-  double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < spectrum.modes.size(); ++i) {
-    const Mode<>& mode = spectrum.modes[i];
-    if (!(mode.natural_frequency >= soft)) {
-      ++result.soft_modes;
-      continue;
-    }
-    result.largest_ratio = std::max(result.largest_ratio, mode.damping_ratio);
-    const double wanted = target.ratio(mode.natural_frequency);
-    const double level = wanted > 0 ? mode.damping_ratio / wanted : 1;
-    if (level < least) {
-      least = level;
-      result.worst_mode = i;
-      result.natural_frequency = mode.natural_frequency;
-      result.damping_ratio = mode.damping_ratio;
-      result.wanted = wanted;
-    }
-  }
-  return result;
-}
-
-/// Smallest ratio relative to its target; 1 where none counts.
-double level_of(const RegionSample& sample) {
-  return sample.worst_mode < 0 || !(sample.wanted > 0) ? 1 : sample.damping_ratio / sample.wanted;
-}
-
-RegionSample read(const DampingSample& sample, const MatrixXd& damping,
-                  const DampingTarget& target) {
-  System<> system = sample.system;
-  const MatrixXd C = sample.map * damping * sample.map.transpose();
-  system.damping += 0.5 * (C + C.transpose());
-  system.has_low_words = false;
-  return read(analyze(system), target);
-}
-
 std::vector<RegionSample> read_all(const std::vector<DampingSample>& samples,
-                                   const MatrixXd& damping, const RegionOptions& options) {
+                                   const RegionQuestion& question, const RegionOptions& options) {
   std::vector<RegionSample> found(samples.size());
   for_each_in_parallel(samples.size(), options.threads, [&](std::size_t i) {
-    found[i] = read(samples[i], damping, options.target);
+    found[i] = judge_sample(samples[i], i, question, options.loop);
   });
   return found;
-}
-
-/// The worst first; of equal ones that with the lower number, wherever they were judged.
-void keep_worst(RegionVerdict& verdict) {
-  std::sort(verdict.binding.begin(), verdict.binding.end());
-  verdict.binding.resize(std::min(verdict.binding.size(), kJoining));
-}
-
-RegionVerdict verdict_of(const std::vector<RegionSample>& samples, std::size_t first,
-                         const RegionQuestion& question) {
-  RegionVerdict verdict;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    const RegionSample& sample = samples[i];
-    const std::size_t number = first + i;
-    verdict.largest_ratio = std::max(verdict.largest_ratio, sample.largest_ratio);
-    const bool counts = sample.worst_mode >= 0 && sample.wanted > 0;
-    if (counts && level_of(sample) < verdict.level) {
-      verdict.level = level_of(sample);
-      verdict.worst_sample = static_cast<std::int64_t>(number);
-    }
-    const double missed = question.level - level_of(sample);
-    const double over = sample.largest_ratio - question.ceiling;
-    if (missed <= kLevelMissed && over <= kMet) continue;
-    const std::vector<std::size_t>& members = question.members;
-    if (std::find(members.begin(), members.end(), number) == members.end()) {
-      verdict.binding.emplace_back(-std::max(missed, over), number);
-    }
-  }
-  keep_worst(verdict);
-  return verdict;
 }
 
 /// What all configurations say of one damping matrix.
@@ -133,6 +61,8 @@ RegionDesign design_of(const MatrixXd& damping, const RegionVerdict& verdict, co
   design.level = std::min(1.0, verdict.level);
   design.violation = std::max({0.0, verdict.largest_ratio - ceiling, fit.excess(damping)});
   design.worst_sample = static_cast<int>(verdict.worst_sample);
+  design.gain_margin = verdict.gain_margin;
+  design.margin_sample = static_cast<int>(verdict.margin_sample);
   return design;
 }
 
@@ -164,7 +94,7 @@ void offer(MatrixXd damping, const Judge& judge, const DampingFit& fit, double c
   for (int k = 0; k < kScalings; ++k) {
     const RegionVerdict verdict = judge(damping);
     const RegionDesign design = design_of(damping, verdict, fit, ceiling);
-    if (design.violation <= kMet) {
+    if (design.violation <= kLevelMet) {
       if (design.level > best.level) best = {damping, design.level};
       return;
     }
@@ -181,7 +111,8 @@ Candidate search_level(const std::vector<TaskImpedance>& configurations, const M
   const std::vector<DampingSample> samples = samples_of(configurations, options.threads);
   const DampingFit fit(samples, options.structure, options.bounds, options.threads);
   const Judge judge = [&](const MatrixXd& damping) {
-    return verdict_of(read_all(samples, damping, options), 0, {damping, options.target, 0, 0, {}});
+    const RegionQuestion question{damping, options.target, 0, 0, {}};
+    return verdict_of(read_all(samples, question, options), 0, question);
   };
   std::vector<MatrixXd> starts = starts_of(configurations, options);
   if (given.size() > 0) starts.insert(starts.begin(), given);
@@ -193,7 +124,7 @@ Candidate search_level(const std::vector<TaskImpedance>& configurations, const M
     for (const MatrixXd& start : {last, best.level >= 0 ? best.damping : starts.back()}) {
       last = fit.search(start, {options.target, level, ceiling}).damping;
       offer(last, judge, fit, ceiling, best);
-      if (best.level >= level - kMet) return true;
+      if (best.level >= level - kLevelMet) return true;
     }
     return false;
   };
@@ -210,31 +141,42 @@ Candidate search_level(const std::vector<TaskImpedance>& configurations, const M
   return best;
 }
 
-}  // namespace
-
-void RegionVerdict::add(const RegionVerdict& other) {
-  const bool earlier = other.level == level && other.worst_sample >= 0 &&
-                       (worst_sample < 0 || other.worst_sample < worst_sample);
-  if (other.level < level || earlier) worst_sample = other.worst_sample;
-  level = std::min(level, other.level);
-  largest_ratio = std::max(largest_ratio, other.largest_ratio);
-  binding.insert(binding.end(), other.binding.begin(), other.binding.end());
-  keep_worst(*this);
+/// Seeks the largest share of `damping` with which every loop keeps its margin. At each share those
+/// are asked first that have lost it at another.
+FoundLevel find_share(const RegionSource& source, const MatrixXd& damping,
+                      const RegionOptions& options, const std::function<void()>& tell) {
+  std::vector<std::size_t> losing;
+  const auto question = [&](double share, double most_margin) {
+    return RegionQuestion{share * damping, options.target, 0, 0, losing, most_margin};
+  };
+  const auto keeps = [&](double share) {
+    tell();
+    const RegionQuestion asked = question(share, options.gain_margin);
+    for (const std::size_t i : losing) {
+      const DampingSample one = damping_sample(source.configuration(i));
+      if (judge_sample(one, i, asked, options.loop).gain_margin < options.gain_margin) return false;
+    }
+    const RegionVerdict verdict = source.judge(asked);
+    for (const auto& [margin, number] : verdict.binding) losing.push_back(number);
+    return verdict.binding.empty();
+  };
+  const auto margin = [&](double share) {
+    tell();
+    return source.judge(question(share, kMostMargin)).gain_margin;
+  };
+  return find_level(keeps, margin, options.gain_margin);
 }
 
-RegionVerdict judge_region(const std::vector<TaskImpedance>& configurations, std::size_t first,
-                           const RegionQuestion& question) {
-  std::vector<RegionSample> samples;
-  samples.reserve(configurations.size());
-  for (const TaskImpedance& one : configurations) {
-    samples.push_back(read(damping_sample(one), question.damping, question.target));
-  }
-  return verdict_of(samples, first, question);
-}
+/// A damping matrix, and which share it is of one for continuous loops.
+struct Lowered {
+  MatrixXd damping;
+  FoundLevel share;
+};
 
-RegionDesign design_region(const RegionSource& source, const RegionOptions& options) {
+/// The best matrix for continuous loops, and the share of it that sampled ones bear.
+Lowered search_region(const RegionSource& source, const RegionOptions& options) {
   const double ceiling = ceiling_of(options);
-  if (source.count == 0) throw std::invalid_argument("damping: a region without configurations");
+  require("damping", source.count > 0, "a region without configurations");
   double told = 0;
   const auto tell = [&](double done) {
     told = std::max(told, done);
@@ -246,11 +188,10 @@ RegionDesign design_region(const RegionSource& source, const RegionOptions& opti
   for (std::size_t i = 0; i < first; ++i) members.push_back(i * source.count / first);
   const std::vector<DampingSample> one = {damping_sample(source.configuration(0))};
   const Eigen::Index n = one[0].system.dof(), k = one[0].map.cols();
-  if (!DampingFit::fits(std::min(kMembers, source.count), n, k, options.structure)) {
-    throw std::invalid_argument("damping: a region of " + std::to_string(source.count) +
-                                " configurations of " + std::to_string(n) + " coordinates and " +
-                                std::to_string(k) + " directions would take more than 1 GB");
-  }
+  require("damping", DampingFit::fits(std::min(kMembers, source.count), n, k, options.structure),
+          "a region of " + std::to_string(source.count) + " configurations of " +
+              std::to_string(n) + " coordinates and " + std::to_string(k) +
+              " directions would take more than 1 GB");
   const DampingFit fit(one, options.structure, options.bounds, options.threads);  // for the limits
   std::vector<TaskImpedance> chosen;
   Candidate candidate{MatrixXd(), 1}, best;
@@ -264,7 +205,7 @@ RegionDesign design_region(const RegionSource& source, const RegionOptions& opti
     const RegionVerdict verdict =
         source.judge({candidate.damping, options.target, candidate.level, ceiling, members});
     design = design_of(candidate.damping, verdict, fit, ceiling);
-    if (design.violation <= kMet && design.level > best.level) {
+    if (design.violation <= kLevelMet && design.level > best.level) {
       best = {design.damping, design.level};
     }
     if (best.level >= candidate.level - kLevelMissed || verdict.binding.empty()) break;
@@ -274,23 +215,51 @@ RegionDesign design_region(const RegionSource& source, const RegionOptions& opti
     return source.judge({damping, options.target, 0, ceiling, members});
   };
   if (best.level < 0) offer(candidate.damping, judge, fit, ceiling, best);
-  tell(1);
-  if (best.level >= 0 && best.damping != design.damping) {
-    design = design_of(best.damping, judge(best.damping), fit, ceiling);
+  Lowered result{best.level >= 0 ? best.damping : design.damping, {}};
+  if (options.loop) {
+    double left = 0.1;
+    result.share = find_share(source, result.damping, options, [&] { tell(1 - (left *= 0.9)); });
+    result.damping *= result.share.level;
   }
+  return result;
+}
+
+/// The design with the matrix of `found`; `one` is any of the configurations.
+RegionDesign design_of(const Lowered& found, const RegionVerdict& verdict, const DampingSample& one,
+                       const RegionOptions& options) {
+  const std::vector<DampingSample> samples = {one};
+  const DampingFit fit(samples, options.structure, options.bounds);
+  RegionDesign design = design_of(found.damping, verdict, fit, ceiling_of(options));
+  design.share = found.share.level;
+  design.kept =
+      found.share.kept && design.gain_margin >= (1 - kMarginPrecision) * options.gain_margin;
+  if (design.kept) design.gain_margin = std::max(design.gain_margin, options.gain_margin);
+  if (options.progress) options.progress(1);
   return design;
 }
 
-RegionDesign evaluate_region(const std::vector<TaskImpedance>& configurations,
-                             const MatrixXd& damping, const RegionOptions& options) {
+/// What is asked last.
+RegionQuestion last_question(const MatrixXd& damping, const RegionOptions& options) {
+  return {damping, options.target, 0, 0, {}, options.loop ? kMostMargin : 0};
+}
+
+RegionDesign evaluate(const std::vector<TaskImpedance>& configurations, const Lowered& found,
+                      const RegionOptions& options) {
+  require("damping", !configurations.empty(), "a region without configurations");
   const std::vector<DampingSample> samples = samples_of(configurations, options.threads);
-  std::vector<RegionSample> map = read_all(samples, damping, options);
-  const RegionVerdict verdict = verdict_of(map, 0, {damping, options.target, 0, 0, {}});
-  RegionDesign design = design_of(
-      damping, verdict, DampingFit(samples, options.structure, options.bounds, options.threads),
-      ceiling_of(options));
+  const RegionQuestion question = last_question(found.damping, options);
+  std::vector<RegionSample> map = read_all(samples, question, options);
+  RegionDesign design = design_of(found, verdict_of(map, 0, question), samples[0], options);
   design.samples = std::move(map);
   return design;
+}
+
+}  // namespace
+
+RegionDesign design_region(const RegionSource& source, const RegionOptions& options) {
+  const Lowered found = search_region(source, options);
+  const RegionVerdict verdict = source.judge(last_question(found.damping, options));
+  return design_of(found, verdict, damping_sample(source.configuration(0)), options);
 }
 
 RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
@@ -301,9 +270,14 @@ RegionDesign design_region(const std::vector<TaskImpedance>& configurations,
   source.count = configurations.size();
   source.configuration = [&](std::size_t i) { return configurations[i]; };
   source.judge = [&](const RegionQuestion& question) {
-    return verdict_of(read_all(samples, question.damping, options), 0, question);
+    return verdict_of(read_all(samples, question, options), 0, question);
   };
-  return evaluate_region(configurations, design_region(source, options).damping, options);
+  return evaluate(configurations, search_region(source, options), options);
+}
+
+RegionDesign evaluate_region(const std::vector<TaskImpedance>& configurations,
+                             const MatrixXd& damping, const RegionOptions& options) {
+  return evaluate(configurations, {damping, {}}, options);
 }
 
 }  // namespace dashpot::analysis

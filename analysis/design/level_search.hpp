@@ -1,0 +1,26 @@
+#pragma once
+#include <functional>
+
+namespace dashpot::analysis {
+
+/// A gain margin has this relative error: its search may have other brackets than the question
+/// whether it is kept.
+inline constexpr double kMarginPrecision = 1e-6;
+
+/// A share of the damping wanted, and whether a loop keeps its margin with it.
+struct FoundLevel {
+  double level = 1;
+  bool kept = true;
+};
+
+/// Seeks the largest level in (0, 1] at which a loop keeps the gain margin `wanted`: on a grid that
+/// falls by a third from 1 to 1e-3, and to 1e-6 of itself by bisection above the first grid point
+/// that keeps the margin. If no grid point keeps it, golden section starts from the one with the
+/// largest margin; if it finds no level either, the level found is that of the largest margin.
+///
+/// keeps(level) says whether the margin is kept; margin(level), the margin there, is asked for only
+/// where no grid point keeps it.
+FoundLevel find_level(const std::function<bool(double)>& keeps,
+                      const std::function<double(double)>& margin, double wanted);
+
+}  // namespace dashpot::analysis
