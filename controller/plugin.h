@@ -30,7 +30,7 @@
  * Every struct begins with struct_size, which the caller sets to the sizeof of the struct; a
  * function refuses any other value. No exception leaves the library. */
 
-/* NOLINTBEGIN(readability-identifier-naming,modernize-use-using,modernize-deprecated-headers) */
+/* NOLINTBEGIN(readability-identifier-naming,modernize-deprecated-headers) */
 #include <stdint.h>
 
 #ifdef __cplusplus
@@ -509,7 +509,7 @@ typedef struct dashpot_plugin {
   dashpot_controller* (*create)(const char*);
   dashpot_controller* (*create_from_text)(const char*, const char*);
   void (*destroy)(dashpot_controller*);
-  const char* (*last_error)(void); /* NOLINT(modernize-redundant-void-arg): C needs it */
+  const char* (*last_error)(void);
   uint32_t (*joints)(const dashpot_controller*);
   const char* (*joint_name)(const dashpot_controller*, uint32_t);
   double (*period)(const dashpot_controller*);
@@ -540,4 +540,4 @@ const dashpot_plugin* dashpot_plugin_interface(uint32_t version);
 #ifdef __cplusplus
 }
 #endif
-/* NOLINTEND(readability-identifier-naming,modernize-use-using,modernize-deprecated-headers) */
+/* NOLINTEND(readability-identifier-naming,modernize-deprecated-headers) */

@@ -14,7 +14,7 @@
  * each other faster are published in part. `utime` is when the tick was found. What only the host
  * knows (tick_time, overruns, verdicts of commands) is zero. */
 
-/* NOLINTBEGIN(readability-identifier-naming,modernize-use-using) */
+/* NOLINTBEGIN(readability-identifier-naming) */
 #include <dashpot/controller/plugin.h>
 
 #ifdef __cplusplus
@@ -34,9 +34,9 @@ void dashpot_publisher_destroy(dashpot_publisher* publisher);
 
 /* Returns why dashpot_publisher_create failed last in this thread; "" if it did not. The text is
  * valid until the next call of it in this thread. */
-const char* dashpot_publisher_error(void); /* NOLINT(modernize-redundant-void-arg): C needs it */
+const char* dashpot_publisher_error(void);
 
 #ifdef __cplusplus
 }
 #endif
-/* NOLINTEND(readability-identifier-naming,modernize-use-using) */
+/* NOLINTEND(readability-identifier-naming) */

@@ -19,6 +19,11 @@ enum WorkChannel : int {
 using StateVector =
     Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxJoints + kWorkChannels, 1>;
 
+/// Returns n of a state.
+inline Eigen::Index dof_of(const StateVector& y) noexcept {
+  return (y.size() - kWorkChannels) / 2;
+}
+
 /// Stored energies, J.
 struct StoredEnergy {
   double kinetic = 0;

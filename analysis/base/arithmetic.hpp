@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <numbers>
 
 namespace dashpot::analysis {
 
@@ -12,6 +13,7 @@ inline constexpr double kEps = std::numeric_limits<double>::epsilon();
 inline constexpr double kUnit = kEps / 2;
 /// For the rounding errors of the bounds themselves.
 inline constexpr double kSlack = 1 + 1e-10;
+inline constexpr double kPi = std::numbers::pi;
 inline constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The index of an array, of one that counts matrices.

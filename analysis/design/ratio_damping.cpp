@@ -13,7 +13,7 @@ using Eigen::Index;
 using ConstMatrix = RatioDamping::ConstMatrix;
 
 /// Cosines between columns below this are squared by the sweep that has seen them.
-constexpr double kConverged = 1e-8;
+constexpr double kRatioConverged = 1e-8;
 constexpr int kMaxSweeps = 16;
 /// After so many updates the rotations restart, before their rounding errors add up.
 constexpr int kFreshStart = 256;
@@ -48,7 +48,7 @@ class Decomposition {
   Status run() noexcept {
     if (!scale()) return Status::kMassNotPositiveDefinite;
     double worst = 1;
-    for (int count = 0; !(worst <= kConverged * kConverged); ++count) {
+    for (int count = 0; !(worst <= kRatioConverged * kRatioConverged); ++count) {
       if (count == kMaxSweeps) return Status::kNotConverged;
       worst = sweep();
     }

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/identification/decay_cells.hpp>
 #include <dashpot/analysis/identification/excited_cells.hpp>
 
@@ -6,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 
 namespace dashpot::analysis {
@@ -17,7 +17,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr Index kMostCells = 8000;  // of all records
 constexpr double kBridge = 3.5;     // steps, over which samples are interpolated

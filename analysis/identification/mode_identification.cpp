@@ -22,8 +22,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-
 /// n, after all checks but that of the number of samples.
 Index checked_dof(const std::vector<Recording>& recordings, const IdentificationOptions& options) {
   require("identify_modes", !recordings.empty(), "there is no recording");
@@ -49,12 +47,12 @@ Index checked_dof(const std::vector<Recording>& recordings, const Identification
 }
 
 /// The recordings in the coordinates x.
-struct States {
+struct MotionStates {
   std::vector<MatrixXd> of;  // 2n x samples each
   MatrixXd L_T;              // n x n
   double weight = 1;         // w, 1/s
 
-  States(const std::vector<Recording>& recordings, const MatrixXd& mass, Index n)
+  MotionStates(const std::vector<Recording>& recordings, const MatrixXd& mass, Index n)
       : L_T(MatrixXd::Identity(n, n)) {
     if (mass.size() != 0) {
       const Eigen::LLT<MatrixXd> factors(mass);
@@ -103,10 +101,10 @@ struct LinearFit {
   int rank = 0;
   double residual = 0, condition = 0;
 
-  LinearFit(const States& states, int stride, const IdentificationOptions& options);
+  LinearFit(const MotionStates& states, int stride, const IdentificationOptions& options);
 };
 
-LinearFit::LinearFit(const States& states, int stride, const IdentificationOptions& options) {
+LinearFit::LinearFit(const MotionStates& states, int stride, const IdentificationOptions& options) {
   MatrixXd X0, X1;
   states.pairs(stride, X0, X1);
   require("identify_modes", X0.cols() > X0.rows(),
@@ -135,7 +133,7 @@ LinearFit::LinearFit(const States& states, int stride, const IdentificationOptio
   for (Index i = 0; i < z.size(); ++i) {
     const VectorXcd x = right.col(i);
     const double noise = (left.row(i) * left_over).norm();
-    const double rounding = kEpsilon * left.row(i).norm() * X1.norm();
+    const double rounding = kEps * left.row(i).norm() * X1.norm();
     const double error = (noise + rounding) * per_S.cwiseProduct(x).norm();
     FittedRoot root;
     root.value = std::log(z[i]) / duration;  // of a negative z too
@@ -149,7 +147,7 @@ LinearFit::LinearFit(const States& states, int stride, const IdentificationOptio
 }
 
 /// About 1 rad of the fastest mode that the data determine.
-int chosen_stride(const States& states, const IdentificationOptions& options) {
+int chosen_stride(const MotionStates& states, const IdentificationOptions& options) {
   Index shortest = states.of.front().cols();
   for (const MatrixXd& x : states.of) shortest = std::min(shortest, x.cols());
   double fastest = 0;
@@ -201,7 +199,7 @@ std::pair<std::size_t, std::size_t> most_alike(const std::vector<FittedRoot>& ro
 IdentifiedModes identify_modes(const std::vector<Recording>& recordings,
                                const IdentificationOptions& options) {
   const Index n = checked_dof(recordings, options);
-  const States states(recordings, options.mass, n);
+  const MotionStates states(recordings, options.mass, n);
   IdentifiedModes fit;
   fit.stride = options.stride > 0 ? options.stride : chosen_stride(states, options);
   const LinearFit linear(states, fit.stride, options);

@@ -19,7 +19,7 @@ using Eigen::VectorXd;
 
 constexpr Index kNear = 30;          // bins of the spectrum to each side
 constexpr double kOutstanding = 20;  // times their median
-constexpr Index kParts = 8;
+constexpr Index kSteadyParts = 8;
 constexpr double kSteady = 0.7;  // of irregular motion, two in ten thousand reach it
 constexpr int kMostLines = 20;
 
@@ -106,16 +106,16 @@ double refined(const MatrixXd& scaled, double w, double bin, double step) {
 
 /// Share of the motion at frequency `w` in parts of the record that has one phase, 0 to 1.
 double steadiness(const MatrixXd& scaled, double w, double step) {
-  const Index length = scaled.cols() / kParts;
+  const Index length = scaled.cols() / kSteadyParts;
   const VectorXcd turns = turning(w, step, scaled.cols());
   const ArrayXd taper = taper_of(length);
-  MatrixXcd amplitudes(scaled.rows(), kParts);
-  for (Index p = 0; p < kParts; ++p) {
+  MatrixXcd amplitudes(scaled.rows(), kSteadyParts);
+  for (Index p = 0; p < kSteadyParts; ++p) {
     amplitudes.col(p) = scaled.middleCols(p * length, length) *
                         (turns.segment(p * length, length).array() * taper).matrix();
   }
   const double all = amplitudes.squaredNorm();
-  return all > 0 ? amplitudes.rowwise().sum().squaredNorm() / (kParts * all) : 0;
+  return all > 0 ? amplitudes.rowwise().sum().squaredNorm() / (kSteadyParts * all) : 0;
 }
 
 }  // namespace

@@ -37,8 +37,8 @@ void multiply_rows(const Strided& A, int first, int inner, const double* X, cons
 }
 
 template <int V>
-void multiply(const Strided& A, int rows, int inner, const double* X, const double* start,
-              double sign, double* out, int stride) noexcept {
+void multiply_strided(const Strided& A, int rows, int inner, const double* X, const double* start,
+                      double sign, double* out, int stride) noexcept {
   constexpr int kTogether = V <= 2 ? 4 : V <= 4 ? 2 : 1;  // as many as registers hold
   int i = 0;
   for (; i + kTogether <= rows; i += kTogether) {
@@ -49,7 +49,7 @@ void multiply(const Strided& A, int rows, int inner, const double* X, const doub
 
 template <int... I>
 constexpr std::array<PaddedMultiply, sizeof...(I)> table(std::integer_sequence<int, I...>) {
-  return {multiply<I + 1>...};
+  return {multiply_strided<I + 1>...};
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 
 namespace dashpot::analysis {
@@ -17,8 +16,6 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
-
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
 
 void require_vector(const VectorXd& vector, Index n, const std::string& name) {
   require(
@@ -40,7 +37,7 @@ MatrixXd part(const MatrixXd& matrix, const Block& block) {
 /// Adds numerator / 0 + finite to the receptance: infinite where the numerator is not zero to
 /// rounding, `finite` elsewhere.
 void add_singular(const MatrixXcd& numerator, const MatrixXcd& finite, MatrixXcd& receptance) {
-  const double negligible = 16 * kEpsilon * numerator.cwiseAbs().maxCoeff();
+  const double negligible = 16 * kEps * numerator.cwiseAbs().maxCoeff();
   for (Index j = 0; j < numerator.cols(); ++j) {
     for (Index i = 0; i < numerator.rows(); ++i) {
       const bool reached = std::abs(numerator(i, j)) > negligible;
@@ -128,7 +125,7 @@ std::vector<Motion> Response::sampled(const VectorXd& position, const VectorXd& 
   require("Response", std::isfinite(h) && h > 0, "the sampling interval is not a positive number");
   require("Response", forces.cols() > 0, "there are no force samples");
   const Index last = forces.cols() - 1;
-  const double end = static_cast<double>(last) * h * (1 + 4 * kEpsilon);
+  const double end = static_cast<double>(last) * h * (1 + 4 * kEps);
 
   VectorXd xi = start(position, velocity);  // at k h
   VectorXd drive_now = drive_of(forces.col(0), "forces");

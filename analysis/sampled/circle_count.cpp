@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <utility>
 
 namespace dashpot::analysis {
@@ -17,7 +16,6 @@ using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kPi = std::numbers::pi;
 /// A distance where rounding leaves none.
 constexpr double kNone = 1e-12;
 

@@ -14,7 +14,7 @@ constexpr double kSeparable = 1e4;
 /// Below this the planes of pairs are not looked for.
 constexpr double kWellApart = 100;
 /// Eigenvalues this close together (relative) coincide.
-constexpr double kCoinciding = 1e-13;
+constexpr double kCoincidingValues = 1e-13;
 
 /// Adds blocks of `step` columns for as many columns as `split` has.
 template <int N>
@@ -26,7 +26,7 @@ void add_blocks(int step, SplitCluster<N>& split) {
 template <int N>
 bool split_coinciding(const State<N>& small, Complex mean, SplitCluster<N>& split) {
   const Eigen::Index size = small.rows();
-  const double a = mean.real(), b = mean.imag(), tolerance = kCoinciding * modulus(mean);
+  const double a = mean.real(), b = mean.imag(), tolerance = kCoincidingValues * modulus(mean);
   State<N> J = small;
   J.diagonal().array() -= a;
   if (b == 0) {

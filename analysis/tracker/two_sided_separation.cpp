@@ -20,7 +20,7 @@ using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;
 
 /// Two blocks: their columns, and how the system acts on them, A = N^-1 T.
-struct Pair {
+struct BlockPair {
   std::array<int, 4> columns{};
   int size = 0, split = 0;  ///< columns of both, and of the first
   Small A;
@@ -28,7 +28,7 @@ struct Pair {
 };
 
 bool pose(const TrackedResidual& residual, const CloseBlocks& close, const BlockEigenbasis& basis,
-          Pair& pair) {
+          BlockPair& pair) {
   const int m = basis.modes;
   for (const int block : {close.first, close.second}) {
     pair.split = pair.size;
@@ -78,7 +78,7 @@ Small range(Small X, int count) {
 
 /// The space of the eigenvalues in `set`: the range of the product of A - mu for all others, real
 /// because complex ones come in pairs.
-Small space(const Pair& pair, unsigned set, int dimension) {
+Small space(const BlockPair& pair, unsigned set, int dimension) {
   Small product = Small::Identity(pair.size, pair.size);
   for (int i = 0; i < pair.size; ++i) {
     const Complex mu = pair.values[at(i)];
@@ -95,7 +95,7 @@ Small space(const Pair& pair, unsigned set, int dimension) {
 }
 
 /// Whether conjugates go together.
-bool is_closed(const Pair& pair, unsigned set) {
+bool is_closed(const BlockPair& pair, unsigned set) {
   for (int i = 0; i < pair.size; ++i) {
     for (int j = 0; j < pair.size; ++j) {
       const bool conjugate =
@@ -108,7 +108,7 @@ bool is_closed(const Pair& pair, unsigned set) {
 
 /// The plane of x and A x, which is invariant where both blocks have the same eigenvalues and no
 /// others.
-Small krylov_plane(const Pair& pair, int column) {
+Small krylov_plane(const BlockPair& pair, int column) {
   Small both(pair.size, 2);
   both.col(0) = SmallVector::Unit(pair.size, column);
   both.col(1) = pair.A.col(column);
@@ -122,7 +122,7 @@ struct Division {
   double share = -1;
 };
 
-void consider(const Pair& pair, const Small& first, const Small& second, Division& best) {
+void consider(const BlockPair& pair, const Small& first, const Small& second, Division& best) {
   const int size = pair.size, split = pair.split;
   Small X(size, size);
   X << first, second;
@@ -142,7 +142,7 @@ void consider(const Pair& pair, const Small& first, const Small& second, Divisio
 
 bool separate_two_sided(const TrackedResidual& residual, const CloseBlocks& close,
                         BlockEigenbasis& basis) noexcept {
-  Pair pair;
+  BlockPair pair;
   if (!pose(residual, close, basis, pair)) return false;
   const int size = pair.size, split = pair.split, rest = size - split;
   Division best;

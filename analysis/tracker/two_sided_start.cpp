@@ -11,13 +11,13 @@ using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxWid
 using Coefficients = Eigen::Map<const Eigen::MatrixXd>;
 
 /// Columns of a spectrum's basis by what they are.
-struct Choice {
+struct VelocityChoice {
   std::array<int, kMaxDof> still_position{}, still_velocity{};
   int positions = 0, velocities = 0;
 };
 
 /// Zero modes: positions, and what the modes left over. False if a block has several modes.
-bool choose(const Spectrum<kMaxDof>& spectrum, Choice& choice) {
+bool choose(const Spectrum<kMaxDof>& spectrum, VelocityChoice& choice) {
   std::array<bool, kMaxWidth> taken{};
   for (const Mode<kMaxDof>& mode : spectrum.modes) {
     for (const int column : mode.columns) taken[at(column)] = true;
@@ -87,7 +87,7 @@ bool set_left(const SymmetricPencil& pencil, BlockEigenbasis& basis) {
 bool start_two_sided(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum,
                      BlockEigenbasis& basis) noexcept {
   const int n = pencil.joints, p = pencil.rank, vibrations = spectrum.modes.size();
-  Choice choice;
+  VelocityChoice choice;
   if (n == 0 || !choose(spectrum, choice)) return false;
   if (vibrations + choice.velocities != n || (pencil.factored && vibrations != p)) return false;
   basis = BlockEigenbasis{};

@@ -7,7 +7,7 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kRounding = 1e-9;
+constexpr double kNullRounding = 1e-9;
 
 }  // namespace
 
@@ -97,10 +97,10 @@ bool NullSpace::damp_one_motion(const Impedance& impedance, analysis::DampingLev
     trace += entry;
     if (entry > most) most = entry, best = j;
   }
-  if (!(std::abs(trace - 1) < kRounding)) return false;
+  if (!(std::abs(trace - 1) < kNullRounding)) return false;
   JointVector y = JointVector::Unit(n, best);
   project(y);
-  if (!(std::abs(product(y, y) - most) < kRounding)) return false;  // P is no projector
+  if (!(std::abs(product(y, y) - most) < kNullRounding)) return false;  // P is no projector
   JointVector velocity = y;
   mass_.solve_LT(velocity.data());
   double stiffness = 0;

@@ -10,11 +10,11 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kRounding = 0.005;  // of published inertias, relative
-constexpr double kSmallest = 1e-12;  // squared radius of gyration that counts, m^2
-constexpr double kLightest = 1e-6;   // kg
+constexpr double kInertiaRounding = 0.005;  // of published inertias, relative
+constexpr double kSmallest = 1e-12;         // squared radius of gyration that counts, m^2
+constexpr double kLightest = 1e-6;          // kg
 
-std::string number(double value) {
+std::string number_text(double value) {
   std::array<char, 40> text{};
   std::snprintf(text.data(), text.size(), "%.6g", value);
   return text.data();
@@ -51,7 +51,7 @@ std::string mass_problem(double mass, const Eigen::Vector3d& center,
   if (!std::isfinite(mass)) return "its mass is not a finite number";
   if (!center.allFinite()) return "its centre of mass is not finite";
   if (!inertia.allFinite()) return "its inertia is not finite";
-  if (mass < 0) return "its mass is negative, " + number(mass) + " kg";
+  if (mass < 0) return "its mass is negative, " + number_text(mass) + " kg";
   return "";
 }
 
@@ -60,14 +60,15 @@ std::string inertia_problem(double mass, const Eigen::Matrix3d& inertia) {
   const Eigen::Vector3d moments =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(inertia, Eigen::EigenvaluesOnly).eigenvalues();
   const double rounding =
-      kRounding * moments.cwiseAbs().maxCoeff() + kSmallest * std::max(mass, kLightest);
+      kInertiaRounding * moments.cwiseAbs().maxCoeff() + kSmallest * std::max(mass, kLightest);
   if (moments[0] < -rounding) {
-    return "its inertia is not positive definite: a principal moment is " + number(moments[0]) +
-           " kg m^2";
+    return "its inertia is not positive definite: a principal moment is " +
+           number_text(moments[0]) + " kg m^2";
   }
   if (moments[2] > moments[0] + moments[1] + rounding) {
-    return "its inertia breaks the triangle inequality: principal moments " + number(moments[0]) +
-           ", " + number(moments[1]) + ", " + number(moments[2]) + " kg m^2";
+    return "its inertia breaks the triangle inequality: principal moments " +
+           number_text(moments[0]) + ", " + number_text(moments[1]) + ", " +
+           number_text(moments[2]) + " kg m^2";
   }
   return "";
 }

@@ -13,7 +13,7 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 /// The joints from `base` to `tip`, fixed ones too.
 std::vector<urdf::JointConstSharedPtr> path_between(const urdf::ModelInterface& tree,
@@ -61,8 +61,8 @@ Joint read_joint(const urdf::Joint& source) {
   if (!(length > 1e-9) || !std::isfinite(length)) {
     throw std::invalid_argument("its axis has no direction");
   }
-  joint.lower = -kInfinity;
-  joint.upper = joint.velocity = joint.effort = kInfinity;
+  joint.lower = -kUnlimited;
+  joint.upper = joint.velocity = joint.effort = kUnlimited;
   if (source.limits) {
     if (joint.type != JointType::kContinuous) {
       joint.lower = source.limits->lower;

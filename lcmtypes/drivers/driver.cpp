@@ -49,7 +49,7 @@ class Sizes {
 };
 
 template <class Message>
-bool decode_exactly(const void* data, std::size_t size, Message& message) noexcept {
+bool decode_status(const void* data, std::size_t size, Message& message) noexcept {
   try {
     return message.decode(data, 0, static_cast<int>(size)) == static_cast<int>(size);
   } catch (...) {  // out of memory
@@ -90,7 +90,7 @@ bool decode(DriverKind kind, const void* data, std::size_t size, DriverStatus& s
   if (kind == DriverKind::kIiwa) {
     drake::lcmt_iiwa_status message;
     if (!Sizes(data, size, message.getHash()).skip(8).arrays(1, 7).end() ||
-        !decode_exactly(data, size, message)) {
+        !decode_status(data, size, message)) {
       return false;
     }
     status.utime = message.utime;
@@ -103,7 +103,7 @@ bool decode(DriverKind kind, const void* data, std::size_t size, DriverStatus& s
   }
   drake::lcmt_panda_status message;
   if (!Sizes(data, size, message.getHash()).skip(8).arrays(1, 8).skip(8 + 1 + 8 + 1).end() ||
-      !decode_exactly(data, size, message)) {
+      !decode_status(data, size, message)) {
     return false;
   }
   status.utime = message.utime;
@@ -121,7 +121,7 @@ bool decode(DriverKind kind, const void* data, std::size_t size, DriverCommand& 
   if (kind == DriverKind::kIiwa) {
     drake::lcmt_iiwa_command message;
     if (!Sizes(data, size, message.getHash()).skip(8).arrays(0, 1).arrays(0, 1).end() ||
-        !decode_exactly(data, size, message)) {
+        !decode_status(data, size, message)) {
       return false;
     }
     command.utime = message.utime;
@@ -137,7 +137,7 @@ bool decode(DriverKind kind, const void* data, std::size_t size, DriverCommand& 
            .arrays(0, 1)
            .skip(1)
            .end() ||
-      !decode_exactly(data, size, message)) {
+      !decode_status(data, size, message)) {
     return false;
   }
   command.utime = message.utime;

@@ -17,12 +17,6 @@ constexpr std::uint64_t kSyncSize = 4;
 constexpr std::size_t kHeaderSize = 24;        // number, time, and two lengths
 constexpr std::uint32_t kLongestChannel = 63;  // LCM sends none that is longer
 
-std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t count) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < count; ++i) value = value << 8 | bytes[i];
-  return value;
-}
-
 /// Nothing for a pipe or a device.
 std::optional<std::uint64_t> size_of(const std::string& path) {
   std::error_code unknown;

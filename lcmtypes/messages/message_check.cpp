@@ -9,12 +9,6 @@ namespace {
 
 constexpr std::size_t kFingerprintSize = 8;
 
-std::uint64_t read_big_endian(const unsigned char* bytes, std::size_t count) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < count; ++i) value = (value << 8) | bytes[i];
-  return value;
-}
-
 /// The fingerprint is that of Message, and `sizes` are read from the fields that follow it.
 template <class Message, std::size_t Count>
 bool read_sizes(const void* data, std::size_t size, std::array<std::int32_t, Count>& sizes) {

@@ -9,6 +9,13 @@
 
 namespace dashpot::lcmtypes {
 
+/// Returns the integer of `count` bytes, the most significant first.
+inline std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t count) noexcept {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < count; ++i) value = value << 8 | bytes[i];
+  return value;
+}
+
 /// Largest message that is looked at, bytes; any that obeys the limits of its definition is
 /// smaller.
 inline constexpr std::size_t kMaxMessageSize = 65536;

@@ -5,14 +5,6 @@
 #include <cmath>
 
 namespace dashpot::sim {
-namespace {
-
-/// n
-Eigen::Index dof_of(const StateVector& y) noexcept {
-  return (y.size() - kWorkChannels) / 2;
-}
-
-}  // namespace
 
 /// y+ = 2 z - y with z = y + (h/2) f(z), by Newton's iteration with the Jacobian at y.
 Status Integrator::implicit_midpoint(System& system, double h) noexcept {

@@ -10,11 +10,6 @@ namespace {
 constexpr double kLocated = 1e-10;    // contacts begin and end within this, s
 constexpr double kLeastStep = 1e-12;  // s
 
-/// n
-Eigen::Index dof_of(const StateVector& y) noexcept {
-  return (y.size() - kWorkChannels) / 2;
-}
-
 /// Their equations may have no solution where a force jumps, so contacts keep still in a step.
 bool is_implicit(Method method) noexcept {
   return method == Method::kImplicitMidpoint || method == Method::kRosenbrock;

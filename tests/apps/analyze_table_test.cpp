@@ -15,7 +15,7 @@ using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-std::string table(const Outcome& outcome) {
+std::string table_of(const Outcome& outcome) {
   EXPECT_EQ(outcome.status, 0) << outcome.err;
   EXPECT_THAT(outcome.err, IsEmpty());
   return outcome.out;
@@ -29,7 +29,7 @@ std::size_t widest_line(const std::string& text) {
 }
 
 TEST(AnalyzeTable, ShowsTheModesOfThePaper) {
-  const std::string text = table(run_program({"analyze", example("chain3.yaml")}));
+  const std::string text = table_of(run_program({"analyze", example("chain3.yaml")}));
   EXPECT_THAT(text, StartsWith("3 coordinates: 2 vibration modes, 1 zero mode\n"));
   EXPECT_THAT(text, ContainsRegex("\n +1 +40\\.2214 +6\\.40144 +0\\.255794 +underdamped"));
   EXPECT_THAT(text, ContainsRegex("\n +2 +30\\.9783 +4\\.93036 +0\\.0976200 +underdamped"));
@@ -43,41 +43,42 @@ TEST(AnalyzeTable, ShowsTheModesOfThePaper) {
 
 TEST(AnalyzeTable, FitsAHundredColumns) {
   for (const std::string name : {"chain3.yaml", "chain3_impulse.yaml", "baxter7.yaml"}) {
-    EXPECT_LE(widest_line(table(run_program({"analyze", example(name)}))), 100u) << name;
+    EXPECT_LE(widest_line(table_of(run_program({"analyze", example(name)}))), 100u) << name;
   }
 }
 
 TEST(AnalyzeTable, HasNoEscapeCodesUnlessOnATerminal) {
-  EXPECT_THAT(table(run_program({"analyze", example("chain3.yaml")})), Not(HasSubstr("\033")));
+  EXPECT_THAT(table_of(run_program({"analyze", example("chain3.yaml")})), Not(HasSubstr("\033")));
 }
 
 TEST(AnalyzeTable, SaysWhatIsSpecialAboutASystem) {
   const std::string general =
-      table(analyze_text("{mass: [[1]], damping: [[1]], stiffness: [[1]], jacobian: [[1]], "
-                         "task_damping: [[1]], jacobian_rate: [[1]]}"));
+      table_of(analyze_text("{mass: [[1]], damping: [[1]], stiffness: [[1]], jacobian: [[1]], "
+                            "task_damping: [[1]], jacobian_rate: [[1]]}"));
   EXPECT_THAT(general, Not(HasSubstr("Note")));  // 1 x 1 is symmetric
-  const std::string coupled = table(analyze_text(
+  const std::string coupled = table_of(analyze_text(
       "{mass: [[1, 0], [0, 1]], damping: [[1, 0], [0, 0]], stiffness: [[1, -1], [-1, 1]]}"));
   EXPECT_THAT(coupled, HasSubstr("Note: the damping couples zero modes and vibrations"));
   EXPECT_THAT(coupled, HasSubstr(", solved together."));
-  EXPECT_THAT(table(analyze_text("{mass: [[1]], stiffness: [[1]]}")),
+  EXPECT_THAT(table_of(analyze_text("{mass: [[1]], stiffness: [[1]]}")),
               HasSubstr("Note: no damping given: taken as zero"));
 }
 
 TEST(AnalyzeTable, HeadsTheSystemsOfAListWithTheirIndex) {
   const std::string text =
-      table(analyze_text("[{mass: [[1]], stiffness: [[1]]}, {mass: [[1]], stiffness: [[0]]}]"));
+      table_of(analyze_text("[{mass: [[1]], stiffness: [[1]]}, {mass: [[1]], stiffness: [[0]]}]"));
   EXPECT_THAT(text, AllOf(StartsWith("[0] 1 coordinate: 1 vibration mode, no zero modes\n"),
                           HasSubstr("\n[1] 1 coordinate: no vibration modes, 1 zero mode\n")));
 }
 
 TEST(AnalyzeTable, HasALineForASystemWithoutJoints) {
-  EXPECT_EQ(table(analyze_text("mass: []")), "no coordinates: no vibration modes, no zero modes\n");
-  EXPECT_EQ(table(analyze_text("[]")), "no systems\n");
+  EXPECT_EQ(table_of(analyze_text("mass: []")),
+            "no coordinates: no vibration modes, no zero modes\n");
+  EXPECT_EQ(table_of(analyze_text("[]")), "no systems\n");
 }
 
 TEST(AnalyzeTable, ShowsBothRealEigenvalues) {
-  EXPECT_THAT(table(analyze_text("{mass: [[1]], damping: [[5]], stiffness: [[4]]}")),
+  EXPECT_THAT(table_of(analyze_text("{mass: [[1]], damping: [[5]], stiffness: [[4]]}")),
               ContainsRegex("overdamped +-1\\.00000 +-4\\.00000"));
 }
 
@@ -90,20 +91,20 @@ TEST(AnalyzeTable, SplitsTheResponseOfManyJoints) {
     unit += "],";
     zeros += "1,";
   }
-  const std::string text = table(analyze_text("{mass: " + unit + "], stiffness: " + unit +
-                                              "], force: " + zeros + "], times: [1]}"));
+  const std::string text = table_of(analyze_text("{mass: " + unit + "], stiffness: " + unit +
+                                                 "], force: " + zeros + "], times: [1]}"));
   EXPECT_THAT(text, ContainsRegex("t, s +q1 .* q7\n"));
   EXPECT_THAT(text, ContainsRegex("t, s +q8 +q9\n"));
   EXPECT_LE(widest_line(text), 100u);
 }
 
 TEST(Program, TellsItsVersion) {
-  EXPECT_EQ(table(run_program({"--version"})), "dashpot " DASHPOT_VERSION "\n");
+  EXPECT_EQ(table_of(run_program({"--version"})), "dashpot " DASHPOT_VERSION "\n");
 }
 
 TEST(Program, ExplainsItself) {
-  EXPECT_THAT(table(run_program({"--help"})), HasSubstr("analyze"));
-  const std::string help = table(run_program({"analyze", "--help"}));
+  EXPECT_THAT(table_of(run_program({"--help"})), HasSubstr("analyze"));
+  const std::string help = table_of(run_program({"analyze", "--help"}));
   for (const std::string word :
        {"mass", "damping", "stiffness", "jacobian", "task_damping", "task_stiffness",
         "jacobian_rate", "jacobian_derivatives", "wrench", "initial_position", "initial_velocity",
@@ -121,7 +122,7 @@ TEST(Program, ExplainsItsExitStatusEverywhere) {
                                              {"run", "--help"},
                                              {"export", "--help"},
                                              {"monitor", "--help"}}) {
-    EXPECT_THAT(table(run_program(arguments)), HasSubstr("\nExit status: 0 if "));
+    EXPECT_THAT(table_of(run_program(arguments)), HasSubstr("\nExit status: 0 if "));
   }
 }
 
@@ -163,7 +164,7 @@ TEST(AnalyzeTable, RoundsBoundsUp) {
     systems += "- {mass: [[2, 1], [1, 3]], damping: [[0.1, 0], [0, 0.2]], stiffness: [[" +
                std::to_string(4 + i) + ", 1], [1, 7]]}\n";
   }
-  const std::vector<double> printed = column_of_bounds(table(analyze_text(systems)));
+  const std::vector<double> printed = column_of_bounds(table_of(analyze_text(systems)));
   const Json exact = analyze_json(systems);
   ASSERT_EQ(printed.size(), 120u);
   for (std::size_t i = 0; i < printed.size(); ++i) {

@@ -39,9 +39,9 @@ Extremes run(SimulatedArm& arm, double seconds) {
   return extremes;
 }
 
-class Motion : public ::testing::Test {
+class MovingArm : public ::testing::Test {
  protected:
-  Motion()
+  MovingArm()
       : model(testing::arm_model(testing::arms()[0])),
         arm(model, testing::quiet_settings(model), testing::panda_ready()) {}
 
@@ -72,13 +72,13 @@ class Motion : public ::testing::Test {
 
 const Vector6 kLoad{30, -20, 25, 1, 2, -1};  // N, N m
 
-TEST_F(Motion, HoldsStillWhereItStarts) {
+TEST_F(MovingArm, HoldsStillWhereItStarts) {
   start(Mode::kJoint);
   EXPECT_TRUE(near(arm.state.position, testing::panda_ready(), 1e-6));
   EXPECT_EQ(arm.controller.snapshot().restarts, 1u);
 }
 
-TEST_F(Motion, JointStepArrives) {
+TEST_F(MovingArm, JointStepArrives) {
   start(Mode::kJoint);
   arm.setpoint.joint_position[0] += 1.0;
   arm.setpoint.joint_position[3] += 0.5;
@@ -87,7 +87,7 @@ TEST_F(Motion, JointStepArrives) {
   EXPECT_EQ(arm.controller.snapshot().reference_position, arm.setpoint.joint_position);
 }
 
-TEST_F(Motion, PoseStepArrives) {
+TEST_F(MovingArm, PoseStepArrives) {
   start(Mode::kCartesian);
   arm.setpoint.tip_pose.position += Eigen::Vector3d(0.1, 0.2, -0.15);
   arm.setpoint.tip_pose.rotation = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()) *
@@ -98,7 +98,7 @@ TEST_F(Motion, PoseStepArrives) {
   EXPECT_EQ(arm.controller.snapshot().reference_tip.position, arm.setpoint.tip_pose.position);
 }
 
-TEST_F(Motion, AWrenchIsExertedAgainstAWall) {
+TEST_F(MovingArm, AWrenchIsExertedAgainstAWall) {
   start(Mode::kCartesian);
   arm.setpoint.wrench << 0, 0, -20, 0, 0, 0;
   load(Vector6{0, 0, 20, 0, 0, 0});
@@ -107,7 +107,7 @@ TEST_F(Motion, AWrenchIsExertedAgainstAWall) {
   EXPECT_TRUE(near(arm.tip().position, arm.setpoint.tip_pose.position, 1e-3));
 }
 
-TEST_F(Motion, GainStepUnderLoadIsSmooth) {
+TEST_F(MovingArm, GainStepUnderLoadIsSmooth) {
   start(Mode::kCartesian);
   load(kLoad);
   run(arm, 2.0);
@@ -118,7 +118,7 @@ TEST_F(Motion, GainStepUnderLoadIsSmooth) {
   EXPECT_TRUE(near(arm.setpoint.gains.task_stiffness * sag, -kLoad, 0.05));
 }
 
-TEST_F(Motion, ModeSwitchesUnderLoadAreSmooth) {
+TEST_F(MovingArm, ModeSwitchesUnderLoadAreSmooth) {
   start(Mode::kJoint);
   load(0.5 * kLoad);
   for (const Mode mode : {Mode::kCartesian, Mode::kJoint, Mode::kCartesian}) {
@@ -131,7 +131,7 @@ TEST_F(Motion, ModeSwitchesUnderLoadAreSmooth) {
   }
 }
 
-TEST_F(Motion, TargetsMayChangeInTheMiddleOfABlend) {
+TEST_F(MovingArm, TargetsMayChangeInTheMiddleOfABlend) {
   start(Mode::kJoint);
   for (int k = 0; k < 12; ++k) {
     arm.setpoint.mode = k % 2 == 0 ? Mode::kCartesian : Mode::kJoint;
@@ -143,7 +143,7 @@ TEST_F(Motion, TargetsMayChangeInTheMiddleOfABlend) {
   }
 }
 
-TEST_F(Motion, FreeDirectionsGiveWay) {
+TEST_F(MovingArm, FreeDirectionsGiveWay) {
   start(Mode::kCartesian);
   arm.setpoint.gains.directions = {true, true, false, true, true, true};
   run(arm, 1.0);
@@ -153,7 +153,7 @@ TEST_F(Motion, FreeDirectionsGiveWay) {
   EXPECT_LT((arm.tip().position - before.position).head<2>().norm(), 0.005);
 }
 
-TEST_F(Motion, PullsBackTheWayItCameBeyondHalfATurn) {
+TEST_F(MovingArm, PullsBackTheWayItCameBeyondHalfATurn) {
   Settings settings = arm.controller.settings();
   settings.limits.angular_error = 10;
   arm = SimulatedArm(model, settings, testing::panda_ready());

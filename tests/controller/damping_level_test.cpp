@@ -58,9 +58,9 @@ double fastest(const LedArm& arm) {
 enum class What { kTip, kJoints, kFreeMotions, kSingular, kFriction, kPayload };
 
 /// An arm with gains whose fastest mode is about as fast as the loop bears.
-class Case {
+class LevelCase {
  public:
-  Case(const testing::Arm& arm, What what, Random& random) : what_(what), random_(random) {
+  LevelCase(const testing::Arm& arm, What what, Random& random) : what_(what), random_(random) {
     const RobotModel bare = testing::smooth_arm(arm);
     const int n = bare.dof();
     ModelOptions options;
@@ -144,7 +144,7 @@ TEST_P(DampingLevel, KeepsTheMarginOfEveryArm) {
   int kept = 0, lowered = 0, too_little = 0;
   for (const testing::Arm& arm : testing::all_arms()) {
     for (int k = 0; k < 2; ++k) {
-      Case one(arm, GetParam(), random);
+      LevelCase one(arm, GetParam(), random);
       for (int posture = 0; posture < 2; ++posture) {
         one.meet();
         SCOPED_TRACE(arm.file);
