@@ -1,6 +1,7 @@
 // Modes from motion under forces that nobody measured.
 #include <dashpot/analysis/identification.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gmock/gmock.h>
 
@@ -76,6 +77,7 @@ struct ShakenArm {
 };
 
 TEST(IdentifyAmbient, FindsTheModesOfShakenArmsWithinTheirDeviations) {
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes minutes; the tests beside it run the same code";
   Comparison all;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {  // the arms, twice
     ShakenArm shaken(seed);

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/identification/decay_fit.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gmock/gmock.h>
 
@@ -174,6 +175,7 @@ void expect_modes_of_arms(std::size_t count, const Sense& sense) {
 }
 
 TEST(IdentifyDecays, FindsTheModesOfArms) {
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes minutes; the tests beside it run the same code";
   expect_modes_of_arms(4, [](const SprungArm& arm, const VectorXd& start, Draws& draw) {
     return sensed(arm, start, 1500, 0.001, {}, draw);
   });
