@@ -168,21 +168,25 @@ TEST(DesignForALoop, LowersTheDampingOfARegionToWhatEveryLoopBears) {
 TEST(DesignForALoop, CountsFrictionAndIntegralOfEachConfigurationOfARegion) {
   const std::vector<std::string> options = {"--region", "--damping-ratio", "2.5", "--period",
                                             "0.02"};
-  const auto with = [&](const std::string& first, std::vector<std::string> more) {
+  const auto with = [&](const std::string& light, std::vector<std::string> more) {
     more.insert(more.begin(), options.begin(), options.end());
     return design_json(
-        "[{mass: [[2]], stiffness: [[800]]" + first + "}, {mass: [[9]], stiffness: [[800]]}]",
+        "[{mass: [[9]], stiffness: [[800]]}, {mass: [[2]], stiffness: [[800]]" + light + "}]",
         std::move(more));
   };
   const double plain = with("", {})["damping"][0][0];
   EXPECT_NEAR(plain, 100, 1e-3);
-  EXPECT_GT(with(", damping: [[40]]", {})["damping"][0][0], plain + 1);  // brakes within a tick
-  EXPECT_LT(with("", {"--integral-time", "0.2"})["damping"][0][0], plain - 0.01);
+  EXPECT_GT(with(", damping: [[40]]", {})["damping"][0][0], plain + 0.5);  // brakes within a tick
+  EXPECT_NEAR(with("", {"--integral-time", "2"})["damping"][0][0], plain, 1e-3);
+  const Outcome quick =
+      design("[{mass: [[2]], stiffness: [[800]]}]",
+             {"--region", "--damping-ratio", "2.5", "--period", "0.02", "--integral-time", "0.02"});
+  EXPECT_EQ(quick.status, 1);  // quicker than the mass follows
 }
 
 TEST(DesignForALoop, ProposesNothingForARegionThatBearsNone) {
   const Outcome outcome =
-      design("[{mass: [[2]], stiffness: [[800]]}, {mass: [[0.01]], stiffness: [[800]]}]",
+      design("[{mass: [[2]], stiffness: [[800]]}, {mass: [[0.1]], stiffness: [[800]]}]",
              {"--region", "--damping-ratio", "0.7", "--period", "0.02"});
   EXPECT_EQ(outcome.status, 1);
   EXPECT_THAT(outcome.out, IsEmpty());
