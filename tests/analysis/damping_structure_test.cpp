@@ -4,6 +4,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
@@ -269,6 +270,7 @@ TEST(RegionDesign, RaisesTheWorstRatioAndMapsIt) {
 }
 
 TEST(RegionDesign, FindsTheFewOfManyThatBind) {
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes minutes; the tests beside it run the same code";
   Random random(7312);
   std::vector<TaskImpedance> region = path_of_configurations(random, 80);
   region[61].mass *= 2.5;  // a payload, not among those that the search begins with
@@ -292,6 +294,7 @@ TEST(RegionDesign, FindsTheFewOfManyThatBind) {
 }
 
 TEST(RegionDesign, IsTheSameWhereverConfigurationsAreJudged) {
+  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes minutes; the tests beside it run the same code";
   Random random(7314);
   std::vector<TaskImpedance> region = path_of_configurations(random, 40);
   region[29].mass *= 2.5;
