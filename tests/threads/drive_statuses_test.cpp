@@ -216,7 +216,7 @@ TEST_P(DriveStatuses, OthersThanOfThisArmAreNotAnswered) {
 
 /// The arm is pushed away, faster than the torque may change and further than it may be large.
 TEST_P(DriveStatuses, TorquesKeepToTheLimitsOfTheConfiguration) {
-  if (DASHPOT_SANITIZED) GTEST_SKIP() << "a sanitized loop has gaps";
+  if (DASHPOT_THREAD_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
   writer.steps(20);
   writer.forget();
   const double most = arm.kind == DriverKind::kIiwa ? 80 : 40;  // N m, of the first joint
