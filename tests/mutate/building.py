@@ -90,8 +90,8 @@ def without_misfits(changes, folders, commands):
         return changes
     alike = {re.sub(r"\d", "", name): name for name in commands if name.split("/")[0] in folders}
     unchecked = list(alike.values())  # one of those that instantiate the same for other sizes
-    precompiled = {os.path.relpath(word, BUILD) + ".gch" for name in unchecked
-                   for word in commands[name] if word.endswith("cmake_pch.hxx")}
+    precompiled = {os.path.relpath(word, BUILD) for name in unchecked
+                   for word in commands[name] if word.endswith("cmake_pch.hxx.pch")}
     subprocess.run(["cmake", "--build", BUILD, "--target", *precompiled],
                    check=True, stdout=subprocess.DEVNULL)
     while unchecked:
