@@ -108,6 +108,10 @@ ModelSearch::ModelSearch(const ExcitedCells& cells, int max_order)
   };
   choose_order(cells.noise);
   improve();
+  // A model that none larger was compared with is not known to be large enough.
+  for (int k = 0; k < 4 && !larger && add_from_rest(); ++k) {
+    while (drop_one()) continue;
+  }
   forget_useless_larger();
 }
 

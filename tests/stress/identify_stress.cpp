@@ -167,7 +167,7 @@ int main(int argc, char** argv) {
   std::printf("%d modes that are none; %.2f s a case\n", ordinary.false_modes,
               seconds / static_cast<double>(std::max(1L, cases)));
   // Of few cases, fewer may be inside by chance.
-  const double least = cases >= 100 ? 0.88 : 0.75;
+  const double least = cases >= 40 ? 0.88 : 0.75;
   const bool good = ordinary.found > 0 && ordinary.frequency_inside >= least * ordinary.found &&
                     ordinary.ratio_inside >= least * ordinary.found;
   return good ? 0 : 1;
