@@ -94,7 +94,7 @@ TEST_P(FakeDrivers, PutOutWhatWasCommanded) {
   while (first < asked + 4 && driver.heard[first].torque[0] == 0) ++first;
   EXPECT_GE(first, asked + 1);
   ASSERT_GE(driver.heard.size(), first + 54);
-  // Of commands that come within one period the last counts: 0.5 may be put out less often than sent.
+  // Of commands that come within one period the last counts, so 0.5 may act less often than sent.
   int smaller = 0;
   for (std::size_t k = first; k < first + 54; ++k) {
     const auto after = [&](double wanted) {
@@ -103,8 +103,8 @@ TEST_P(FakeDrivers, PutOutWhatWasCommanded) {
                  : expected + std::clamp(gain * (wanted - expected), -1.0, 1.0);
     };
     const double torque_out = driver.heard[k].torque[0];
-    const bool is_smaller = smaller == static_cast<int>(k - first) &&
-                            std::abs(torque_out - after(0.5)) <= 1e-12;
+    const bool is_smaller =
+        smaller == static_cast<int>(k - first) && std::abs(torque_out - after(0.5)) <= 1e-12;
     smaller += is_smaller;
     expected = after(is_smaller ? 0.5 : 20);
     EXPECT_NEAR(torque_out, expected, 1e-12) << k - first;
