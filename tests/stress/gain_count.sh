@@ -28,7 +28,7 @@ for joints in 7 16; do
   ticks=$(wc -l <"$folder/gains.counts")
   median=$(sed -n "$(((ticks + 1) / 2))p" "$folder/gains.sorted" | cut -f 1)
   read -r worst gains < <(tail -n 1 "$folder/gains.sorted")
-  line=$(sed 's/^line \([0-9]*\).*/\1/' <<<"$gains")
+  line=${gains#line } line=${line%%[^0-9]*}
   echo "$joints joints: instructions a tick: followed $followed (median); $ticks ticks with" \
     "$(wc -l <"$folder/gains.txt") gains, sought and random: median $median, most $worst"
   awk -v w="$worst" -v f="$followed" 'BEGIN { printf "  most: %.2f medians of followed ticks", w / f
