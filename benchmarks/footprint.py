@@ -1,35 +1,24 @@
 """What callgrind saw of single control ticks, by the part of the library that ran:
-    footprint.py BUILD FILE...
+    footprint.py FILE...
 reads callgrind's dumps of tick_bench's `footprint`, which began with empty and practically
 unlimited caches, so that each line of memory was missed once; prints Google Benchmark's rows with
 the instructions, the lines of code and the lines of data (64 bytes each) of a tick, and of its
-parts: the folders whose object files in BUILD hold the functions."""
+parts: the namespaces of the functions."""
 
 import collections
 import json
 import pathlib
 import re
-import subprocess
 import sys
 
-ROOT = pathlib.Path(__file__).parent.parent
-LIBRARIES = ("analysis", "controller")
 COUNTS = {"instructions": ("Ir",), "code_lines": ("I1mr",), "data_lines": ("D1mr", "D1mw")}
 
 
-def folders_of_functions(build):
-    """The folder of the source file that a function was compiled from, by mangled name."""
-    folders = {}
-    for library in LIBRARIES:
-        sources = {path.name: path.parent.relative_to(ROOT).as_posix()
-                   for path in (ROOT / library).rglob("*.cpp")}
-        archive = pathlib.Path(build) / library / f"libdashpot_{library}.a"
-        listed = subprocess.run(["nm", "-A", "--defined-only", archive],
-                                check=True, capture_output=True, text=True).stdout
-        for line in listed.splitlines():
-            member, _, rest = line.removeprefix(f"{archive}:").partition(":")
-            folders.setdefault(rest.split()[-1], sources.get(member.removesuffix(".o")))
-    return folders
+def part_of(function):
+    """Whose a function is, by the namespace in its mangled name. Eigen's are instances of its templates
+    that were not made part of their callers."""
+    namespace = re.match(r"_Z+NK?(?:7dashpot\d+(analysis|controller)|5(Eigen))", function)
+    return next(filter(None, namespace.groups())) if namespace else "other"
 
 
 def costs(text):
@@ -58,11 +47,10 @@ def counted(event_counts):
             for what, events in COUNTS.items()}
 
 
-def row(text, folders):
+def row(text):
     parts = collections.defaultdict(collections.Counter)
     for function, events in costs(text):
-        plain = re.sub(r"'\d+$", "", function)  # callgrind numbers the levels of a recursion
-        parts[folders.get(plain) or "other"].update(counted(events))
+        parts[part_of(function)].update(counted(events))
     total = sum(parts.values(), collections.Counter())
     name = re.search(r"Client Request: (\S+)", text)[1]
     return {"name": f"footprint/{name}", "run_type": "iteration", "iterations": 1, **total,
@@ -70,8 +58,7 @@ def row(text, folders):
 
 
 def main():
-    folders = folders_of_functions(sys.argv[1])
-    rows = [row(pathlib.Path(name).read_text(), folders) for name in sys.argv[2:]]
+    rows = [row(pathlib.Path(name).read_text()) for name in sys.argv[1:]]
     print(json.dumps({"context": {}, "benchmarks": rows}, indent=1))
 
 

@@ -177,7 +177,7 @@ def markdown(rows, context):
 
 
 def footprint_table(results):
-    """Of ticks of 7 joints; of that with modes by folders as well."""
+    """Of ticks of 7 joints; of that with modes by namespaces as well."""
     lines = ["Lines of 64 bytes that a tick of 7 joints touches, counted by callgrind:", "",
              "| | instructions | lines of code | lines of data |", "|---|---|---|---|"]
     for row in results.footprints:
@@ -233,7 +233,7 @@ def passes_table(results):
             row = results.rows.get(f"spectrum_error/{family}/ours_{method}/6")
             if not row:
                 continue
-            iterations = f"{row['iterations']:4.2f} iterations" if "iterations" in row else ""
+            iterations = f"{row['mean_iterations']:4.2f} iterations" if "mean_iterations" in row else ""
             if row.get("direct_share", 0) > 0:
                 iterations += f", {row['direct_share']:.0%} solved directly"
             lines.append(f"  {family:14} {method:12} {us(microseconds(row)):>5} us  bound "

@@ -3,8 +3,8 @@
 //   ours_direct, ours_tracked (from a system that differs by 1e-4), ours_values (the same without
 //     shapes), ours_reused (the same system again): {M, C, K} to modes, with proved bounds
 //   ours_working, ours_extended: directly, with residuals in working precision or in twice that
-//   ours_moved_1e-K: tracked from a system that differs by 1e-K; `iterations` grow with the change
-//   eigen, eigen_values, dgeev (both sides), dgeev_values, dggev, dggev3: from the 2m x 2m
+//   ours_moved_1e-K: tracked from a system that differs by 1e-K; `mean_iterations` grow with the
+//   change eigen, eigen_values, dgeev (both sides), dgeev_values, dggev, dggev3: from the 2m x 2m
 //   matrices,
 //     which are formed outside the clock
 //   quadeig: from {M, C, K}, scaled and deflated, with right vectors
@@ -163,7 +163,7 @@ void track(benchmark::State& state, const Problem& problem, bool shapes, double 
   const TrackerCounters& after = tracker->counters();
   state.counters["direct_share"] =
       static_cast<double>(after.direct - before.direct) / static_cast<double>(runs);
-  state.counters["iterations"] =
+  state.counters["mean_iterations"] =
       static_cast<double>(after.iterations - before.iterations) / static_cast<double>(runs);
   if (runs % 2 != 0) tracker->update(system, *spectrum);
   Values found;

@@ -202,8 +202,8 @@ void track(benchmark::State& state, const std::vector<System<kMaxDof>>& path,
   }
   if (spectrum->status != Status::kOk) state.SkipWithError(to_text(spectrum->status));
   const TrackerCounters& counters = tracker->counters();
-  state.counters["iterations"] = static_cast<double>(counters.iterations - before.iterations) /
-                                 static_cast<double>(counters.updates() - before.updates());
+  state.counters["mean_iterations"] = static_cast<double>(counters.iterations - before.iterations) /
+                                      static_cast<double>(counters.updates() - before.updates());
   state.counters["direct"] = static_cast<double>(counters.direct - before.direct);
   double bound = 0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(spectrum->mode_count); ++i) {
