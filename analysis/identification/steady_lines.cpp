@@ -1,5 +1,6 @@
 #include <dashpot/analysis/identification/steady_lines.hpp>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <complex>
