@@ -62,7 +62,10 @@ struct Identification {
 /// record, and an information criterion (Akaike 1974, with 4 for each parameter) chooses among
 /// them. The model chosen is refined on the samples as they are, at the times at which they were
 /// taken; what it leaves over is searched for more. So neither gaps nor uneven time steps matter,
-/// and heavily damped modes are as good as the record allows.
+/// and heavily damped modes are as good as the record allows. Where more decays are found than as
+/// many joints can have, a second search has the products of the two strongest motions in the
+/// model, e^((lambda_i + lambda_j) t): what an arm that is not quite linear makes of them, to
+/// second order.
 ///
 /// The standard deviations are those of maximum likelihood (inverse of Fisher's information, with
 /// the noise that the model leaves over), enlarged where the rest is not white, and by what the

@@ -218,6 +218,58 @@ MatrixXd direct_columns(const DecayPart& part) {
   return columns;
 }
 
+std::vector<MotionProduct> products_of(const std::vector<DecayFactor>& factors) {
+  std::vector<MotionProduct> single, products;
+  for (const DecayFactor& factor : factors) {
+    if (!factor.bends) continue;
+    const auto both = factor.eigenvalues();
+    for (int k = 0; k < factor.parameters(); ++k) {
+      const Complex lambda = both[static_cast<std::size_t>(k)];
+      const Complex rate = factor.pair ? lambda / std::exp(factor.first) : 0;
+      MotionProduct& one = single.emplace_back(MotionProduct{lambda, {}});
+      for (const auto& [alpha, beta] : factor.scale) one.strength.push_back(alpha + beta * rate);
+    }
+  }
+  for (std::size_t i = 0; i < single.size(); ++i) {
+    for (std::size_t j = i; j < single.size(); ++j) {
+      MotionProduct product = single[i];
+      product.eigenvalue += single[j].eigenvalue;
+      if (product.eigenvalue.imag() < 0) continue;
+      for (std::size_t r = 0; r < product.strength.size(); ++r) {
+        product.strength[r] *= single[j].strength[r];
+      }
+      products.push_back(std::move(product));
+    }
+  }
+  return products;
+}
+
+MatrixXd product_columns(const std::vector<MotionProduct>& products, const DecayPart& part) {
+  MatrixXd columns(samples_of(part), 2 * static_cast<Index>(products.size()));
+  Index at = 0;
+  for (const MotionProduct& product : products) {
+    Index row = 0;
+    for (std::size_t r = 0; r < part.time.size(); ++r) {
+      for (const double t : part.time[r]) {
+        const Complex value = product.strength[r] * std::exp(product.eigenvalue * t);
+        columns(row, at) = value.real();
+        columns(row++, at + 1) = value.imag();
+      }
+    }
+    at += product.eigenvalue.imag() > 0 ? 2 : 1;
+  }
+  columns.conservativeResize(Eigen::NoChange, at);
+  return columns;
+}
+
+Index product_width(const std::vector<DecayFactor>& factors) {
+  Index width = 0;
+  for (const MotionProduct& product : products_of(factors)) {
+    width += product.eigenvalue.imag() > 0 ? 2 : 1;
+  }
+  return width;
+}
+
 Index factor_width(const std::vector<DecayFactor>& factors) {
   Index width = 0;
   for (const DecayFactor& factor : factors) width += factor.parameters();

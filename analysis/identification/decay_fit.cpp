@@ -29,7 +29,8 @@ class Evaluation {
         count(squares),
         record_noise_(record_noise) {
     const Index eigen = factor_width(factors);
-    const Index width = eigen + static_cast<Index>(data.sources());
+    products_ = products_of(factors);
+    const Index width = eigen + static_cast<Index>(data.sources()) + product_width(factors);
     const Index p = eigen * static_cast<Index>(data.sources());
     if (derivatives) normal.setZero(p, p), gradient.setZero(p);
     amplitudes.setZero(width, data.channels);
@@ -66,7 +67,8 @@ class Evaluation {
       basis.col(at++).segment(from, time.size()).setOnes();
       from += time.size();
     }
-    basis.rightCols(part.inputs()) = direct_columns(part);
+    basis.middleCols(at, part.inputs()) = direct_columns(part);
+    basis.rightCols(width - at - part.inputs()) = product_columns(products_, part);
     VectorXd weight(N);  // of the records
     from = 0;
     for (std::size_t r = 0; r < part.time.size(); ++r) {
@@ -81,10 +83,10 @@ class Evaluation {
     basis *= size.cwiseInverse().asDiagonal();
     const Eigen::ColPivHouseholderQR<MatrixXd> qr(basis);
     const Index rank = qr.rank();
-    const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(N, rank);
     const MatrixXd amplitude = size.cwiseInverse().asDiagonal() * qr.solve(output);
-    MatrixXd residual = output - Q * (Q.transpose() * output);
-    residual -= Q * (Q.transpose() * residual);
+    MatrixXd residual = qr.householderQ().transpose() * output;
+    residual.topRows(rank).setZero();
+    residual.applyOnTheLeft(qr.householderQ());
 
     VectorXd r(N * channels);
     for (Index c = 0; c < channels; ++c) {
@@ -102,19 +104,25 @@ class Evaluation {
       r.segment(c * N, N) = residual.col(c) / noise[channel];
     }
     if (!derivatives) return;
+    const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(N, rank);
     MatrixXd J(N * channels, normal.rows());
     Index eigen_at = 0, scale_at = eigen;
     for (std::size_t k = 0; k < factors.size(); ++k) {
       const int parameters = factors[k].parameters();
       const MatrixXd of_factor = amplitude.middleRows(eigen_at, parameters);
-      for (std::size_t j = 0; j < columns[k].derivative.size(); ++j) {
-        MatrixXd change = weight.asDiagonal() * (columns[k].derivative[j] * of_factor);
-        change -= Q * (Q.transpose() * change);
+      const std::size_t derivatives_of_factor = columns[k].derivative.size();
+      MatrixXd change(N, static_cast<Index>(derivatives_of_factor) * channels);
+      for (std::size_t j = 0; j < derivatives_of_factor; ++j) {
+        change.middleCols(static_cast<Index>(j) * channels, channels).noalias() =
+            weight.asDiagonal() * columns[k].derivative[j] * of_factor;
+      }
+      change -= Q * (Q.transpose() * change);
+      for (std::size_t j = 0; j < derivatives_of_factor; ++j) {
         const bool of_scale = j >= static_cast<std::size_t>(parameters);
         const Index column = of_scale ? scale_at++ : eigen_at + static_cast<Index>(j);
         for (Index c = 0; c < channels; ++c) {
-          J.col(column).segment(c * N, N) =
-              change.col(c) / noise[part.channels[static_cast<std::size_t>(c)]];
+          J.col(column).segment(c * N, N) = change.col(static_cast<Index>(j) * channels + c) /
+                                            noise[part.channels[static_cast<std::size_t>(c)]];
         }
       }
       eigen_at += parameters;
@@ -126,6 +134,7 @@ class Evaluation {
   }
 
   VectorXd record_noise_;
+  std::vector<MotionProduct> products_;
 };
 
 std::vector<DecayFactor> moved(const std::vector<DecayFactor>& factors, const VectorXd& step) {
@@ -223,6 +232,12 @@ double variance_growth(const Evaluation& evaluation, const DecayData& data) {
   return std::max(1.0, sum / static_cast<double>(p));
 }
 
+/// Of each channel.
+double linear_parameters(const std::vector<DecayFactor>& factors, const DecayData& data) {
+  return static_cast<double>(factor_width(factors) + static_cast<Index>(data.sources()) +
+                             product_width(factors));
+}
+
 }  // namespace
 
 DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start,
@@ -236,7 +251,6 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
   find_scales(data, noise, fit.factors);
   const Index eigen = factor_width(start);
   const auto nonlinear = static_cast<double>(eigen) * static_cast<double>(data.sources());
-  const auto linear = static_cast<double>(eigen) + static_cast<double>(data.sources());
   const auto channels = static_cast<double>(data.channels);
   constexpr int kRounds = 5;
   for (int round = 0; round < kRounds; ++round) {
@@ -247,6 +261,7 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
     const VectorXd noise_before = fit.noise, record_before = fit.record_noise;
     const VectorXd inverse = fit.record_noise.cwiseAbs2().cwiseInverse();
     const VectorXd count = there.count.rowwise().sum();
+    const double linear = linear_parameters(fit.factors, data);
     for (Index c = 0; c < data.channels; ++c) {
       const double n = std::max(1.0, count[c] - linear - nonlinear / channels);
       const double squares = there.squares.row(c) * inverse;
@@ -299,9 +314,9 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
 }
 
 double parameter_penalty(const DecayFit& fit, const DecayData& data) {
-  const auto eigen = static_cast<double>(factor_width(fit.factors));
-  const auto sources = static_cast<double>(data.sources());
-  return kPenalty * (eigen * sources + (eigen + sources) * static_cast<double>(data.channels));
+  const auto nonlinear = factor_width(fit.factors) * static_cast<Index>(data.sources());
+  return kPenalty * (static_cast<double>(nonlinear) +
+                     linear_parameters(fit.factors, data) * static_cast<double>(data.channels));
 }
 
 std::vector<MatrixXd> factor_motion(const DecayData& data, const DecayFit& fit,
@@ -324,6 +339,7 @@ std::vector<MatrixXd> factor_motion(const DecayData& data, const DecayFit& fit,
 std::vector<MatrixXd> left_over(const DecayData& data, const DecayFit& fit) {
   std::vector<MatrixXd> result;
   const Index constants = factor_width(fit.factors);
+  const std::vector<MotionProduct> products = products_of(fit.factors);
   for (const DecayPart& part : data.parts) {
     MatrixXd rest = part.output;
     Index from = 0, record = constants;
@@ -335,11 +351,12 @@ std::vector<MatrixXd> left_over(const DecayData& data, const DecayFit& fit) {
       from += time.size();
       ++record;
     }
-    if (part.inputs() > 0) {
-      const MatrixXd direct = direct_columns(part) * fit.amplitudes.bottomRows(part.inputs());
-      for (std::size_t c = 0; c < part.channels.size(); ++c) {
-        rest.col(static_cast<Index>(c)) -= direct.col(part.channels[c]);
-      }
+    MatrixXd others(samples_of(part), fit.amplitudes.rows() - record);
+    others.leftCols(part.inputs()) = direct_columns(part);
+    others.rightCols(others.cols() - part.inputs()) = product_columns(products, part);
+    for (std::size_t c = 0; c < part.channels.size(); ++c) {
+      rest.col(static_cast<Index>(c)) -=
+          others * fit.amplitudes.col(part.channels[c]).tail(others.cols());
     }
     result.push_back(std::move(rest));
   }

@@ -10,8 +10,8 @@ namespace dashpot::analysis {
 struct DecayFit {
   std::vector<DecayFactor> factors;
   Eigen::MatrixXd covariance;  ///< of the factors' `first` and `second`, in their order
-  /// Columns of the model (two for each pair, one for a single, then a constant for each record and
-  /// each input itself) x channels.
+  /// Columns of the model (two for each pair, one for a single, then a constant for each record,
+  /// each input itself, and the products) x channels.
   Eigen::MatrixXd amplitudes;
   Eigen::VectorXd noise;  ///< of each channel, standard deviation of what is left over
   /// Of each record, relative to `noise`: what is large is less linear, and counts less.
@@ -21,12 +21,13 @@ struct DecayFit {
   bool converged = false;
 };
 
-/// Fits y(t) = c_0 + sum of the factors' free motions by least squares, each channel weighted by
-/// its noise, which is estimated as well: the maximum likelihood for noise that is white and
-/// normal. The amplitudes are eliminated (variable projection, Golub and Pereyra 1973, with
-/// Kaufman's Jacobian); the factors are found by Levenberg and Marquardt's method. Gives
-/// up, with an infinite criterion, where the squares of what is left over, in units of `noise`,
-/// will stay above `hopeless`.
+/// Fits y(t) = c_0 + sum of the factors' free motions and of their products by least squares, each
+/// channel weighted by its noise, which is estimated as well: the maximum likelihood for noise that
+/// is white and normal. The amplitudes are eliminated (variable projection, Golub and Pereyra 1973,
+/// with Kaufman's Jacobian, in which products, small beside what they are products of, count as
+/// constant); the factors are found by Levenberg and Marquardt's method. Gives up, with an infinite
+/// criterion, where the squares of what is left over, in units of `noise`, will stay above
+/// `hopeless`.
 DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start,
                     const Eigen::VectorXd& noise, int max_iterations,
                     double hopeless = std::numeric_limits<double>::infinity());

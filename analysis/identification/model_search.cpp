@@ -1,10 +1,12 @@
 #include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/identification/common_denominator.hpp>
+#include <dashpot/analysis/identification/decay_columns.hpp>
 #include <dashpot/analysis/identification/model_search.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 namespace dashpot::analysis {
 namespace {
@@ -12,6 +14,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+constexpr int kFirstIterations = 12;  ///< of models of rising order
 
 /// Those that a record of this length (s) can tell from a constant, as factors.
 std::vector<DecayFactor> factors_of(const std::vector<RealizedPole>& poles, double duration) {
@@ -50,6 +54,38 @@ double sample_count(const DecayData& data) {
   return count;
 }
 
+/// Of a factor's motion, in units of the noise.
+double energy_of(const DecayData& data, const DecayFit& fit, std::size_t factor) {
+  double energy = 0;
+  const std::vector<MatrixXd> motion = factor_motion(data, fit, factor);
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    const auto& channels = data.parts[i].channels;
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      energy +=
+          motion[i].col(static_cast<Index>(c)).squaredNorm() / std::pow(fit.noise[channels[c]], 2);
+    }
+  }
+  return energy;
+}
+
+/// The same with the products of its strongest motions: an arm that moves far is not linear, and
+/// what it makes of them would be taken for modes.
+DecayFit with_products(const DecayData& data, const DecayFit& plain) {
+  constexpr std::size_t kStrongest = 2;
+  std::vector<std::pair<double, std::size_t>> strongest;
+  for (std::size_t k = 0; k < plain.factors.size(); ++k) {
+    if (plain.factors[k].eigenvalues()[0].imag() == 0) continue;
+    strongest.emplace_back(energy_of(data, plain, k), k);
+  }
+  std::sort(strongest.rbegin(), strongest.rend());
+  std::vector<DecayFactor> factors = plain.factors;
+  for (DecayFactor& factor : factors) factor.bends = false;
+  for (std::size_t i = 0; i < std::min(kStrongest, strongest.size()); ++i) {
+    factors[strongest[i].second].bends = true;
+  }
+  return fit_decays(data, factors, plain.noise, kFirstIterations);
+}
+
 }  // namespace
 
 ModelSearch::ModelSearch(const std::vector<MotionRecord>& records, int max_order, bool refine)
@@ -76,9 +112,10 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& records, int max_order
     return rest_poles(rest, step, channels);
   };
   data = DecayData(cells_);
-  choose_order(cells.noise);
+  choose_order(cells.noise, false);
   if (!refine) return;
   improve();
+  if (factor_width(fit.factors) > 2 * channels) try_products(cells.noise);
 
   data = DecayData(records);
   fit = fit_decays(data, fit.factors, fit.noise / cells.noise_factor(), 30);
@@ -106,7 +143,7 @@ ModelSearch::ModelSearch(const ExcitedCells& cells, int max_order)
     for (std::size_t r = 0; r < records.size(); ++r) records[r].output = rest[r];
     return common_denominator_poles(records, cells.step, 2, cells.highest);
   };
-  choose_order(cells.noise);
+  choose_order(cells.noise, false);
   improve();
   // A model that none larger was compared with is not known to be large enough.
   for (int k = 0; k < 4 && !larger && add_from_rest(); ++k) {
@@ -121,6 +158,19 @@ void ModelSearch::improve() {
   untangle();
 }
 
+/// More decays than n joints can have are products, if these explain them better.
+void ModelSearch::try_products(const VectorXd& noise) {
+  DecayFit plain = fit;
+  std::optional<DecayFit> plain_larger = std::exchange(larger, std::nullopt);
+  const int plain_order = order;
+  choose_order(noise, true);
+  improve();
+  if (fit.criterion < plain.criterion) return;
+  fit = std::move(plain);
+  larger = std::move(plain_larger);
+  order = plain_order;
+}
+
 /// Of a larger model that fits no better nothing is learnt.
 void ModelSearch::forget_useless_larger() {
   const double gained = larger ? larger->criterion - fit.criterion : 0;
@@ -130,13 +180,21 @@ void ModelSearch::forget_useless_larger() {
   }
 }
 
-void ModelSearch::choose_order(const VectorXd& noise) {
+void ModelSearch::choose_order(const VectorXd& noise, bool products) {
   std::optional<DecayFit> best;
   int worse = 0;
   for (std::size_t n = 0; n < by_order.size() && worse < 6; ++n) {
-    const std::vector<DecayFactor> factors = factors_of(by_order[n], duration_);
-    if (factors.empty()) continue;
-    DecayFit there = fit_decays(data, factors, noise, 12);
+    if (n == plain_by_order_.size()) {
+      const std::vector<DecayFactor> factors = factors_of(by_order[n], duration_);
+      plain_by_order_.push_back(
+          factors.empty() ? DecayFit{} : fit_decays(data, factors, noise, kFirstIterations));
+    }
+    DecayFit there = plain_by_order_[n];
+    if (there.factors.empty()) continue;  // no decay
+    if (products) {
+      DecayFit bent = with_products(data, there);
+      if (bent.criterion < there.criterion) there = std::move(bent);
+    }
     ++worse;
     if (best && there.criterion >= best->criterion) continue;
     best = std::move(there);
@@ -238,16 +296,7 @@ void ModelSearch::untangle() {
     }
   }
   for (std::size_t k = 0; k < fit.factors.size(); ++k) {
-    double energy = 0;
-    const std::vector<MatrixXd> motion = factor_motion(data, fit, k);
-    for (std::size_t i = 0; i < motion.size(); ++i) {
-      const auto& channels = data.parts[i].channels;
-      for (std::size_t c = 0; c < channels.size(); ++c) {
-        energy += motion[i].col(static_cast<Index>(c)).squaredNorm() /
-                  std::pow(fit.noise[channels[c]], 2);
-      }
-    }
-    if (energy < kCancels * all) kept.push_back(fit.factors[k]);
+    if (energy_of(data, fit, k) < kCancels * all) kept.push_back(fit.factors[k]);
   }
   if (kept.size() == fit.factors.size() || kept.empty()) return;
   DecayFit before = fit;

@@ -26,8 +26,9 @@ class ModelSearch {
   DecayData data;
 
  private:
-  void choose_order(const Eigen::VectorXd& noise);
+  void choose_order(const Eigen::VectorXd& noise, bool products);
   void improve();
+  void try_products(const Eigen::VectorXd& noise);
   void forget_useless_larger();
   std::vector<DecayFactor> candidates() const;
   bool add_from_rest();
@@ -36,9 +37,10 @@ class ModelSearch {
   bool change(const std::vector<DecayFactor>& factors);
 
   std::vector<MotionRecord> cells_;
-  double duration_ = 0;  ///< s
-  int most_added_ = 6;   ///< factors from what is left over
-  int iterations_ = 40;  ///< of a changed model
+  std::vector<DecayFit> plain_by_order_;  ///< of the first orders, without products
+  double duration_ = 0;                   ///< s
+  int most_added_ = 6;                    ///< factors from what is left over
+  int iterations_ = 40;                   ///< of a changed model
   /// Poles of what is left over in the cells, in units of the noise.
   std::function<std::vector<std::vector<RealizedPole>>(const std::vector<Eigen::MatrixXd>&)>
       poles_of_rest_;

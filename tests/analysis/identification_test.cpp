@@ -147,6 +147,30 @@ TEST(IdentifyDecays, RejectsSumsOfEigenvaluesAsNoModes) {
   EXPECT_GE(sums, 1);
 }
 
+TEST(IdentifyDecays, TellsProductsOfStrongMotionsFromModes) {
+  Draws draw(18);
+  const KnownDecay decay;
+  std::vector<MotionRecord> records = {decay.record(1e-6, 0, draw), decay.record(1e-6, 0, draw, 1)};
+  records[1].output.row(0).array() -= 0.3;  // half as large
+  records[1].output.row(1).array() += 1;
+  records[1].output /= 2;
+  records[1].output.row(0).array() += 0.3;
+  records[1].output.row(1).array() -= 1;
+  for (MotionRecord& record : records) {
+    for (auto output : record.output.colwise()) {
+      const double a = output[0] - 0.3, b = output[1] + 1;
+      const double x = (2 * a + b) / 0.05, y = (a - 2 * b) / 0.05;  // about one at first
+      output[0] += 1e-4 * (x * x + y * y) + 2e-4 * x * y;
+      output[1] += 1e-4 * x * x - 2e-4 * y * y + 1e-4 * x * y;
+    }
+  }
+  const Identification found = identify_decays(records);
+  decay.expect_in(found, 3.5);
+  EXPECT_EQ(found.order, 4);
+  EXPECT_TRUE(found.rejected.empty());
+  EXPECT_LT(found.noise.maxCoeff(), 1.5e-6);
+}
+
 /// Three releases of each of the first `count` arms, whose motion `sense` (of arm, position and
 /// draws) records.
 template <typename Sense>
