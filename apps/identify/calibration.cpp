@@ -143,7 +143,7 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
   };
   // First of all with large deviations, so that no match that is wrong at the start decides. In the
   // end nothing is better known than to this: no arm is linear, and at one posture, to less.
-  constexpr std::array<double, 6> kLeast = {0.05, 0.02, 0.01, 3e-3, 1e-3, 3e-4};
+  constexpr std::array<double, 7> kLeast = {0.05, 0.02, 0.01, 3e-3, 1e-3, 3e-4, 1e-4};
   double least = kLeast.back();
   Calibration result;
   rematch(before);

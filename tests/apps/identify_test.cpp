@@ -367,9 +367,7 @@ TEST(Identify, RecoversPayloadAndReflectedInertiasFromTenReleases) {
   ASSERT_EQ(parameters.size(), truth.size());
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const double value = parameters[i]["value"];
-    // Beside the arm's own inertia the drives of joints 1 and 2 are small, and known less well.
-    const double share = i == 0 ? 0.02 : i < 3 ? 0.1 : 0.05;
-    EXPECT_NEAR(value, truth[i], share * truth[i]) << parameters[i]["name"];
+    EXPECT_NEAR(value, truth[i], (i == 0 ? 0.02 : 0.05) * truth[i]) << parameters[i]["name"];
     EXPECT_NEAR(value, truth[i], 3 * parameters[i]["std"].get<double>()) << parameters[i]["name"];
   }
 }
