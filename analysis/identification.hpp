@@ -63,7 +63,7 @@ struct Identification {
 /// them. The model chosen is refined on the samples as they are, at the times at which they were
 /// taken; what it leaves over is searched for more. So neither gaps nor uneven time steps matter,
 /// and heavily damped modes are as good as the record allows. Where more decays are found than as
-/// many joints can have, a second search has the products of the two strongest motions in the
+/// many joints can have, a second search has the products of the two strongest oscillations in the
 /// model, e^((lambda_i + lambda_j) t): what an arm that is not quite linear makes of them, to
 /// second order.
 ///
@@ -87,7 +87,8 @@ Identification identify_decays(const std::vector<MotionRecord>& records,
 /// input make of it. Models of rising order come from least squares in the frequency domain with
 /// one denominator (LSCF, Guillaume et al. 2003). The likelihood is that of means of samples, as
 /// many as the band of the motion allows; samples that are missing are interpolated over three
-/// steps at most, and uneven times to even ones. All else is as with identify_decays.
+/// steps at most, and uneven times to even ones. The model has no products of motions. All else is
+/// as with identify_decays.
 ///
 /// An input that is itself made of the motion, as the torques of a controller are, shows the arm
 /// without the controller, and noise in it shifts the result: use what is put in from outside.

@@ -221,11 +221,9 @@ MatrixXd direct_columns(const DecayPart& part) {
 std::vector<MotionProduct> products_of(const std::vector<DecayFactor>& factors) {
   std::vector<MotionProduct> single, products;
   for (const DecayFactor& factor : factors) {
-    if (!factor.bends) continue;
-    const auto both = factor.eigenvalues();
-    for (int k = 0; k < factor.parameters(); ++k) {
-      const Complex lambda = both[static_cast<std::size_t>(k)];
-      const Complex rate = factor.pair ? lambda / std::exp(factor.first) : 0;
+    if (!factor.has_products) continue;
+    for (const Complex& lambda : factor.eigenvalues()) {
+      const Complex rate = lambda / std::exp(factor.first);
       MotionProduct& one = single.emplace_back(MotionProduct{lambda, {}});
       for (const auto& [alpha, beta] : factor.scale) one.strength.push_back(alpha + beta * rate);
     }
@@ -245,7 +243,7 @@ std::vector<MotionProduct> products_of(const std::vector<DecayFactor>& factors) 
 }
 
 MatrixXd product_columns(const std::vector<MotionProduct>& products, const DecayPart& part) {
-  MatrixXd columns(samples_of(part), 2 * static_cast<Index>(products.size()));
+  MatrixXd columns(samples_of(part), product_width(products));
   Index at = 0;
   for (const MotionProduct& product : products) {
     Index row = 0;
@@ -253,20 +251,18 @@ MatrixXd product_columns(const std::vector<MotionProduct>& products, const Decay
       for (const double t : part.time[r]) {
         const Complex value = product.strength[r] * std::exp(product.eigenvalue * t);
         columns(row, at) = value.real();
-        columns(row++, at + 1) = value.imag();
+        if (product.eigenvalue.imag() > 0) columns(row, at + 1) = value.imag();
+        ++row;
       }
     }
     at += product.eigenvalue.imag() > 0 ? 2 : 1;
   }
-  columns.conservativeResize(Eigen::NoChange, at);
   return columns;
 }
 
-Index product_width(const std::vector<DecayFactor>& factors) {
+Index product_width(const std::vector<MotionProduct>& products) {
   Index width = 0;
-  for (const MotionProduct& product : products_of(factors)) {
-    width += product.eigenvalue.imag() > 0 ? 2 : 1;
-  }
+  for (const MotionProduct& product : products) width += product.eigenvalue.imag() > 0 ? 2 : 1;
   return width;
 }
 

@@ -17,20 +17,20 @@ FactorColumns columns_of(const DecayFactor& factor, const DecayPart& part, bool 
 /// The inputs themselves, samples x inputs: what follows them at once, such as modes far above.
 Eigen::MatrixXd direct_columns(const DecayPart& part);
 
-/// A product of the motions of two factors that bend.
+/// A product of the motions of two factors that have products.
 struct MotionProduct {
   Complex eigenvalue;             ///< lambda_i + lambda_j, 1/s; not below the real axis
-  std::vector<Complex> strength;  ///< in each record, the product of those of both
+  std::vector<Complex> strength;  ///< of each source, the product of those of both
 };
 
-/// Those of all two, each with itself, too, and one of those that are conjugate. The free motion of
-/// a smooth system near rest is a sum of such powers (Poincare); those of third order and more are
-/// left out. The scales of the factors are known.
+/// The products of two eigenvalues of such factors, squares included; of two that are conjugate the
+/// one above the real axis. The free motion of a smooth system near rest is a sum of such powers
+/// (Poincare); those of third order and more are left out. The factors' scales have to be known.
 std::vector<MotionProduct> products_of(const std::vector<DecayFactor>& factors);
 
 /// The motions of `products`, samples x (2 for each, or 1 if it is real).
 Eigen::MatrixXd product_columns(const std::vector<MotionProduct>& products, const DecayPart& part);
-Eigen::Index product_width(const std::vector<DecayFactor>& factors);
+Eigen::Index product_width(const std::vector<MotionProduct>& products);
 
 /// Columns of the factors alone.
 Eigen::Index factor_width(const std::vector<DecayFactor>& factors);

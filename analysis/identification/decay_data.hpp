@@ -20,9 +20,10 @@ struct DecayFactor {
   /// single lambda: one shape for all. Empty: not known yet.
   std::vector<std::array<double, 2>> scale = {};
   std::size_t reference = 0;
-  /// Whether the model has the products of its motion with itself and with those of other factors
-  /// of which this is said: what an arm that is not quite linear makes of them, to second order.
-  bool bends = false;
+  /// Whether the model has the products of this pair's motion with itself and with those of other
+  /// pairs of which this is said: what an arm that is not quite linear makes of them, to second
+  /// order.
+  bool has_products = false;
 
   int parameters() const { return pair ? 2 : 1; }
   /// 1/s; the same one twice where there is one.

@@ -30,7 +30,7 @@ class Evaluation {
         record_noise_(record_noise) {
     const Index eigen = factor_width(factors);
     products_ = products_of(factors);
-    const Index width = eigen + static_cast<Index>(data.sources()) + product_width(factors);
+    const Index width = eigen + static_cast<Index>(data.sources()) + product_width(products_);
     const Index p = eigen * static_cast<Index>(data.sources());
     if (derivatives) normal.setZero(p, p), gradient.setZero(p);
     amplitudes.setZero(width, data.channels);
@@ -116,7 +116,7 @@ class Evaluation {
         change.middleCols(static_cast<Index>(j) * channels, channels).noalias() =
             weight.asDiagonal() * columns[k].derivative[j] * of_factor;
       }
-      change -= Q * (Q.transpose() * change);
+      change.noalias() -= Q * (Q.transpose() * change);
       for (std::size_t j = 0; j < derivatives_of_factor; ++j) {
         const bool of_scale = j >= static_cast<std::size_t>(parameters);
         const Index column = of_scale ? scale_at++ : eigen_at + static_cast<Index>(j);
@@ -188,6 +188,7 @@ bool descend(const DecayData& data, const VectorXd& noise, const VectorXd& recor
       A.diagonal() += lambda * now.normal.diagonal().cwiseMax(1e-300);
       VectorXd step = A.ldlt().solve(now.gradient);
       if (!step.allFinite()) return false;
+      if (step.dot(now.gradient) < 1e-4) return true;  // no step promises more
       const std::vector<DecayFactor> next = moved(factors, step);
       if (makes_sense(next, longest)) {
         const double gain = now.cost - Evaluation(data, next, noise, record_noise, false).cost;
@@ -232,12 +233,6 @@ double variance_growth(const Evaluation& evaluation, const DecayData& data) {
   return std::max(1.0, sum / static_cast<double>(p));
 }
 
-/// Of each channel.
-double linear_parameters(const std::vector<DecayFactor>& factors, const DecayData& data) {
-  return static_cast<double>(factor_width(factors) + static_cast<Index>(data.sources()) +
-                             product_width(factors));
-}
-
 }  // namespace
 
 DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start,
@@ -261,7 +256,8 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
     const VectorXd noise_before = fit.noise, record_before = fit.record_noise;
     const VectorXd inverse = fit.record_noise.cwiseAbs2().cwiseInverse();
     const VectorXd count = there.count.rowwise().sum();
-    const double linear = linear_parameters(fit.factors, data);
+    fit.amplitudes = there.amplitudes;
+    const auto linear = static_cast<double>(fit.amplitudes.rows());
     for (Index c = 0; c < data.channels; ++c) {
       const double n = std::max(1.0, count[c] - linear - nonlinear / channels);
       const double squares = there.squares.row(c) * inverse;
@@ -315,8 +311,7 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
 
 double parameter_penalty(const DecayFit& fit, const DecayData& data) {
   const auto nonlinear = factor_width(fit.factors) * static_cast<Index>(data.sources());
-  return kPenalty * (static_cast<double>(nonlinear) +
-                     linear_parameters(fit.factors, data) * static_cast<double>(data.channels));
+  return kPenalty * (static_cast<double>(nonlinear) + static_cast<double>(fit.amplitudes.size()));
 }
 
 std::vector<MatrixXd> factor_motion(const DecayData& data, const DecayFit& fit,

@@ -68,8 +68,8 @@ double energy_of(const DecayData& data, const DecayFit& fit, std::size_t factor)
   return energy;
 }
 
-/// The same with the products of its strongest motions: an arm that moves far is not linear, and
-/// what it makes of them would be taken for modes.
+/// The same with the products of its strongest oscillations: an arm that moves far is not linear,
+/// and what it makes of them would be taken for modes.
 DecayFit with_products(const DecayData& data, const DecayFit& plain) {
   constexpr std::size_t kStrongest = 2;
   std::vector<std::pair<double, std::size_t>> strongest;
@@ -79,9 +79,8 @@ DecayFit with_products(const DecayData& data, const DecayFit& plain) {
   }
   std::sort(strongest.rbegin(), strongest.rend());
   std::vector<DecayFactor> factors = plain.factors;
-  for (DecayFactor& factor : factors) factor.bends = false;
   for (std::size_t i = 0; i < std::min(kStrongest, strongest.size()); ++i) {
-    factors[strongest[i].second].bends = true;
+    factors[strongest[i].second].has_products = true;
   }
   return fit_decays(data, factors, plain.noise, kFirstIterations);
 }
@@ -158,7 +157,8 @@ void ModelSearch::improve() {
   untangle();
 }
 
-/// More decays than n joints can have are products, if these explain them better.
+/// More eigenvalues than a linear arm of as many joints as channels has are products, if these
+/// explain the records better.
 void ModelSearch::try_products(const VectorXd& noise) {
   DecayFit plain = fit;
   std::optional<DecayFit> plain_larger = std::exchange(larger, std::nullopt);

@@ -169,6 +169,12 @@ TEST(IdentifyDecays, TellsProductsOfStrongMotionsFromModes) {
   EXPECT_EQ(found.order, 4);
   EXPECT_TRUE(found.rejected.empty());
   EXPECT_LT(found.noise.maxCoeff(), 1.5e-6);
+  // Of unlike length, and with samples missing in one channel.
+  records[1] = part_of(records[1], 0, 800);
+  for (Index i = 0; i < records[0].time.size(); i += 7) {
+    records[0].output(1, i) = std::numeric_limits<double>::quiet_NaN();
+  }
+  decay.expect_in(identify_decays(records), 3.5);
 }
 
 /// Three releases of each of the first `count` arms, whose motion `sense` (of arm, position and
