@@ -3,10 +3,9 @@
 //   ours_direct, ours_tracked (from a system that differs by 1e-4), ours_values (the same without
 //     shapes), ours_reused (the same system again): {M, C, K} to modes, with proved bounds
 //   ours_working, ours_extended: directly, with residuals in working precision or in twice that
-//   ours_moved_1e-K: tracked from a system that differs by 1e-K; `mean_iterations` grow with the
-//   change eigen, eigen_values, dgeev (both sides), dgeev_values, dggev, dggev3: from the 2m x 2m
-//   matrices,
-//     which are formed outside the clock
+//   ours_moved_1e-K: tracked from a system that differs by 1e-K, with `mean_iterations`
+//   eigen, eigen_values, dgeev (both sides), dgeev_values, dggev, dggev3: from the 2m x 2m
+//     matrices, which are formed outside the clock
 //   quadeig: from {M, C, K}, scaled and deflated, with right vectors
 //   arb_BITS: from {M, C, K} to eigenvalues that FLINT/Arb proves with this precision
 #include <dashpot/analysis/mode_tracker.hpp>

@@ -171,9 +171,8 @@ void add_footprint(const std::string& name, Mode mode, const Analysis& analysis,
   benchmark::RegisterBenchmark(("footprint/" + name).c_str(), [=](benchmark::State& bench) {
     Loop loop(7, mode, analysis, extra);
     const bool follows = analysis.where == Analysis::Where::kInline;
-    std::uint64_t tracked = 0;
     const auto step_and_follow = [&] {
-      tracked = loop.vibration().counters.tracked;
+      const std::uint64_t tracked = loop.vibration().counters.tracked;
       loop.step();
       return !follows || loop.vibration().counters.tracked > tracked;
     };
@@ -187,7 +186,10 @@ void add_footprint(const std::string& name, Mode mode, const Analysis& analysis,
       followed = step_and_follow();
       CALLGRIND_STOP_INSTRUMENTATION;
     }
-    if (!followed) return bench.SkipWithError("the modes are not followed in this tick");
+    if (!followed) {
+      CALLGRIND_ZERO_STATS;
+      return bench.SkipWithError("the modes are not followed in this tick");
+    }
     CALLGRIND_DUMP_STATS_AT(name.c_str());
   })->Iterations(1);
 }

@@ -162,8 +162,8 @@ struct Analysis {
   int every = 1;  ///< ticks between two analyses, at least 1
   /// Share of a period that the analysis within a tick may take, above 0 and at most 1. A task that
   /// needs more continues on a thread of its own, and the status is analysis::Status::kUnfinished
-  /// meanwhile. Work is counted, not timed: kWorkPerSecond units of analysis::Work are a second, as
-  /// measured by ./run bench: 4.80 us for a tick of 7 joints with 104,559 instructions. So that
+  /// meanwhile. Work is counted, not timed: kWorkPerSecond units of analysis::Work are a second to
+  /// 15 %, by ./run bench: 4.80 us for a tick of 7 joints with 104,559 instructions. So that
   /// ticks are even, the work is at most kEvenWork (n / 7)^3 share / 10 % for n joints, the work of
   /// about ten ticks in which modes are followed; for fewer than 7 joints it is that of 7.
   double share = 0.1;
