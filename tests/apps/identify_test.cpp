@@ -365,6 +365,8 @@ TEST(Identify, RecoversPayloadAndReflectedInertiasFromTenReleases) {
   const std::array<double, 8> truth{1.5, 0.13, 0.12, 0.11, 0.1, 0.09, 0.08, 0.05};
   const Json& parameters = found["calibration"]["parameters"];
   ASSERT_EQ(parameters.size(), truth.size());
+  // Deviations are what they say, because what is not linear is in the model.
+  EXPECT_LT(found["calibration"]["misfit"].get<double>(), 3);
   for (std::size_t i = 0; i < truth.size(); ++i) {
     const double value = parameters[i]["value"];
     EXPECT_NEAR(value, truth[i], (i == 0 ? 0.02 : 0.05) * truth[i]) << parameters[i]["name"];
