@@ -461,18 +461,26 @@ TEST(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
   const std::string url = own_url();
   Listener listener(url);
   Running fake({"fake-driver", scene("drivers/panda"), "--panda", "--lcm-url", url, "--lock-step",
-                "--trouble", "user-stop", "--from", "0.8", "--lasts", "0.1"});
+                "--trouble", "user-stop", "--from", "3", "--lasts", "0.1"});
   Running driving({"drive", configuration("panda"), "--panda", "--json", "--lcm-url", url});
   if (!listener.until([&] { return listener.states > 100; })) {
     GTEST_SKIP() << "multicast does not work on this machine: " << url;
   }
-  EXPECT_TRUE(listener.until([&] { return listener.state.fault != 0; }));
+  const auto says = [&](const char* what) {
+    return driving.complaints().find(what) != std::string::npos;
+  };
+  EXPECT_TRUE(listener.until([&] {
+    return says("the robot has stopped by itself (robot_mode 5)");
+  })) << driving.complaints();
+  const std::int64_t stopped = listener.state.utime;  // or before
+  EXPECT_TRUE(listener.until([&] { return listener.state.utime > stopped + 300'000; }));
   driving.send(SIGTERM);
   EXPECT_EQ(driving.finish(), 0);
   const Json result = Json::parse(driving.output());
   EXPECT_GE(result["statuses"]["of_stopped_robot"].get<int>(), 50);
-  EXPECT_EQ(result["fault"]["status"], "gap between states, damping");
-  EXPECT_THAT(driving.complaints(), HasSubstr("the robot has stopped by itself (robot_mode 5)"));
+  // A busy machine may have made a gap before.
+  EXPECT_EQ(result["faults"], 1);
+  EXPECT_THAT(driving.complaints(), HasSubstr("a fault has latched"));
 }
 
 }  // namespace
