@@ -37,8 +37,8 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
 /// loop is unstable as it is, the result is the first boundary below 1, or zero if there is none
 /// down to 1e-3. Motions with |log z| / T below `slowest`, rad/s, do not count, because a
 /// self-motion fed by gravity compensation with a zero-order hold is no vibration; where the state
-/// has more than 200 rows, `slowest` is at least 1e-6 / T. The search takes ten to some tens of
-/// eigenproblems, or, with more than 200 rows, of counts whose work does not grow with the delay.
+/// has more than 100 rows, `slowest` is at least 1e-6 / T. The search takes ten to some tens of
+/// eigenproblems, or, with more than 100 rows, of counts whose work does not grow with the delay.
 /// Throws like sample_loop.
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,

@@ -6,7 +6,7 @@
 // of springs in the joints. design/region/n designs one matrix for 32 configurations of n joints on
 // one thread, design/map/n only judges one there; items_per_second counts configurations.
 // design/loop/n/d is one for a sampled loop with friction, a low-pass and d ticks of delay, which
-// bears less than is wanted.
+// bears less than is wanted, and design/hopeless/n/d one where no damping has the margin wanted.
 #include <dashpot/analysis/damping_design.hpp>
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/analysis/damping_sampled.hpp>
@@ -18,6 +18,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <random>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -119,13 +120,14 @@ void region(benchmark::State& state, bool design) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(all.size()));
 }
 
-void sampled(benchmark::State& state) {
+/// `speed`: fastest natural frequency times the loop's dead time.
+void sampled(benchmark::State& state, double speed) {
   dashpot::analysis::TaskImpedance arm = configurations(state.range(0)).front();
   const double fastest =
       design_damping(arm, DampingTarget::constant(kRatio)).spectrum.modes[0].natural_frequency;
   dashpot::analysis::LoopLimit limit;
   limit.loop.delay = static_cast<int>(state.range(1));
-  limit.loop.period = 0.5 / fastest / (limit.loop.delay + 1.5);
+  limit.loop.period = speed / fastest / (limit.loop.delay + 1.5);
   limit.loop.torque_cutoff = 0.1 / limit.loop.period;
   limit.loop.friction = Eigen::MatrixXd::Identity(arm.mass.rows(), arm.mass.rows());
   arm.damping = limit.loop.friction;
@@ -184,9 +186,11 @@ int main(int argc, char** argv) {
   }
   for (const int n : {7, 10}) {
     for (const int delay : {1, 20, 100}) {
-      benchmark::RegisterBenchmark("design/loop", sampled)
-          ->Args({n, delay})
-          ->Unit(benchmark::kMillisecond);
+      for (const auto& [name, speed] : {std::pair("design/loop", 0.5), {"design/hopeless", 2.0}}) {
+        benchmark::RegisterBenchmark(name, sampled, speed)
+            ->Args({n, delay})
+            ->Unit(benchmark::kMillisecond);
+      }
     }
   }
   benchmark::RunSpecifiedBenchmarks();

@@ -1,32 +1,33 @@
 #include <dashpot/analysis/design/level_search.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 namespace dashpot::analysis {
 namespace {
 
 constexpr double kGridStep = 2. / 3;
 constexpr double kLowestLevel = 1e-3;
-constexpr double kLevelPrecision = 1e-6;
-/// Of the level with the largest margin.
-constexpr double kPeakPrecision = 3e-3;
+/// Of a level, which is found from below.
+constexpr double kLevelPrecision = 1e-4;
+/// The peak of a margin below this part of the one wanted is found less precisely.
+constexpr double kReach = 0.8, kCoarse = 0.05;
 
-/// The level with the largest margin that is found, or one that keeps the margin wanted: on the
-/// grid, then by golden section between the neighbours of the best there.
+/// The level with the largest margin that is found, or one that keeps the margin wanted.
 FoundLevel find_peak(const std::function<bool(double)>& keeps,
                      const std::function<double(double)>& margin, double wanted) {
   constexpr double kGolden = 0.6180339887498949;
   double best = 1, largest = margin(1);
-  const auto ask = [&](double level) {
-    const double found = margin(level);
+  const auto ask = [&](double log_level) {
+    const double level = std::exp(log_level), found = margin(level);
     if (found > largest) best = level, largest = found;
     return found;
   };
-  for (double level = kGridStep; level > kLowestLevel; level *= kGridStep) ask(level);
-  double low = best * kGridStep, high = std::min(1.0, best / kGridStep);
+  double low = std::log(kLowestLevel), high = 0;
   double left = high - kGolden * (high - low), right = low + kGolden * (high - low);
   double at_left = ask(left), at_right = ask(right);
-  while (high - low > kPeakPrecision * high && largest < wanted) {
+  const auto precision = [&] { return largest < kReach * wanted ? kCoarse : kLevelPrecision; };
+  while (largest < wanted && high - low > precision()) {
     if (at_left > at_right) {
       high = right, right = left, at_right = at_left;
       at_left = ask(left = high - kGolden * (high - low));

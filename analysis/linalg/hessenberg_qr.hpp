@@ -29,16 +29,13 @@ void reduce_to_hessenberg(Matrix& A) noexcept {
     const double inverse = 1 / v0;
     x[k + 1] = 1;
     for (Eigen::Index i = k + 2; i < n; ++i) x[i] *= inverse;
+    y.setZero();
     for (Eigen::Index j = k + 1; j < n; ++j) {
       double* const column = &A(0, j);
       double dot = 0;
       for (Eigen::Index i = k + 1; i < n; ++i) dot += x[i] * column[i];
       dot *= tau;
       for (Eigen::Index i = k + 1; i < n; ++i) column[i] -= dot * x[i];
-    }
-    y.setZero();
-    for (Eigen::Index j = k + 1; j < n; ++j) {
-      const double* const column = &A(0, j);
       const double factor = tau * x[j];
       for (Eigen::Index i = 0; i < n; ++i) y[i] += factor * column[i];
     }

@@ -28,7 +28,7 @@ Complex exp_less_1(Complex x) {
 struct CirclePoint {
   Complex z_less_1, h, change;  ///< change: h (1 - 1 / z)
   MatrixXcd inverse;
-  std::array<MatrixXcd, 2> pulls;  ///< inverse B C
+  std::array<MatrixXcd, 2> pulls;  ///< inverse B C; the second empty where nothing differences
   double phase = 0;                ///< of det F
 };
 
@@ -36,6 +36,10 @@ double phase_of_determinant(const Eigen::PartialPivLU<MatrixXcd>& lu) {
   double phase = lu.permutationP().determinant() < 0 ? kPi : 0;
   for (Index i = 0; i < lu.matrixLU().rows(); ++i) phase += std::arg(lu.matrixLU()(i, i));
   return phase;
+}
+
+auto moduli(const MatrixXcd& A) {
+  return A.cwiseAbs2().cwiseSqrt();
 }
 
 /// A bound of the largest eigenvalue of a nonnegative matrix; improves its eigenvector.
@@ -52,7 +56,10 @@ double perron_bound(const MatrixXd& N, VectorXd& vector) {
 }  // namespace
 
 CircleCount::CircleCount(const SampledDataModel& loop, double slowest)
-    : slowest_(std::max(slowest, 1e-6)), delay_(loop.delay), filter_gain_(loop.filter_gain) {
+    : slowest_(std::max(slowest, 1e-6)),
+      delay_(loop.delay),
+      filter_gain_(loop.filter_gain),
+      differences_(loop.difference) {
   rate_ = delay_ + (1 - filter_gain_) / filter_gain_;
   const Index n = loop.n, m = loop.states.state.rows(), p = 2 * n + m;
   rest_ = MatrixXd::Zero(p, p);
@@ -85,12 +92,14 @@ double CircleCount::excess(double factor) const {
     const Complex back = std::exp(-x);
     point.h = std::exp(-delay_ * x) * filter_gain_ / (1.0 - (1 - filter_gain_) * back);
     point.change = point.h * back * point.z_less_1;
-    MatrixXcd F = -point.h * pull[0] - point.change * pull[1] - rest_;
+    MatrixXcd F = -point.h * pull[0] - rest_;
+    if (differences_) F -= point.change * pull[1];
     F.diagonal().array() += point.z_less_1;
     const Eigen::PartialPivLU<MatrixXcd> lu(F);
     point.phase = phase_of_determinant(lu);
     point.inverse = lu.inverse();
-    for (std::size_t i = 0; i < 2; ++i) point.pulls[i] = point.inverse * pull[i];
+    point.pulls[0].noalias() = point.inverse * pull[0];
+    if (differences_) point.pulls[1].noalias() = point.inverse * pull[1];
     return point;
   };
   const double speed = std::exp(slowest_);  // largest |dz / dx|
@@ -99,17 +108,17 @@ double CircleCount::excess(double factor) const {
   CirclePoint here = point_at(t);
   while (t < length) {
     const double distance = t < arc ? slowest_ : slowest_ + t - arc;  // |log z|
-    const MatrixXd N = speed * here.inverse.cwiseAbs() + rate_ * here.pulls[0].cwiseAbs() +
-                       (rate_ * std::min(1.5 * distance, 2.0) + 1) * here.pulls[1].cwiseAbs();
+    MatrixXd N = speed * moduli(here.inverse) + rate_ * moduli(here.pulls[0]);
+    if (differences_) N += (rate_ * std::min(1.5 * distance, 2.0) + 1) * moduli(here.pulls[1]);
     const double clear = 1 / perron_bound(N, vector),
                  step = std::min(radius * clear, 0.5 * distance);
     if (!(step > 1e-9 * distance)) return step > 0 ? step : kNone;
     nearest = std::min(nearest, clear);
     t = std::min(t + step, length);
     CirclePoint next = point_at(t);
-    const MatrixXcd E = (next.z_less_1 - here.z_less_1) * here.inverse -
-                        (next.h - here.h) * here.pulls[0] -
-                        (next.change - here.change) * here.pulls[1];
+    MatrixXcd E =
+        (next.z_less_1 - here.z_less_1) * here.inverse - (next.h - here.h) * here.pulls[0];
+    if (differences_) E -= (next.change - here.change) * here.pulls[1];
     const double about = (E.trace() - 0.5 * E.cwiseProduct(E.transpose()).sum()).imag();
     turned += about + std::remainder(next.phase - here.phase - about, 2 * kPi);
     here = std::move(next);

@@ -31,6 +31,7 @@ class CircleCount {
  private:
   double slowest_;
   double delay_, filter_gain_;
+  bool differences_;
   double rate_;                           ///< largest |d log h / d log z|
   Eigen::MatrixXd rest_;                  ///< A - 1
   Eigen::MatrixXd fixed_[2], scaled_[2];  ///< B C(z) = (fixed + factor scaled)[0] + [1] (1 - 1 / z)

@@ -13,7 +13,7 @@ namespace {
 using Eigen::MatrixXd;
 
 /// Loops with more states are counted, not solved, which takes longer for fewer of them.
-constexpr Eigen::Index kDenseRows = 200;
+constexpr Eigen::Index kDenseRows = 100;
 /// From one factor to the next that is tried.
 constexpr double kFactorStep = 1.25;
 
@@ -26,12 +26,9 @@ class ScaledLoop {
       counted_.emplace(loop, slowest);
       return;
     }
-    free_ = loop.transition(0);
-    gain_ = loop.transition(1) - free_;
-    if (loop.zero_modes.cols() == 0) return;
-    const MatrixXd rest = loop.other_motions();  // the same with every factor but zero
-    free_ = (rest.transpose() * free_ * rest).eval();
-    gain_ = (rest.transpose() * gain_ * rest).eval();
+    // Which they are is the same with every factor but zero.
+    free_ = loop.on_other_motions(loop.transition(0));
+    gain_ = loop.on_other_motions(loop.transition(1)) - free_;
   }
 
   /// The largest |z|, less 1, or something like it: the loop is stable if it is negative.

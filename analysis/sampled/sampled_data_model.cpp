@@ -175,20 +175,19 @@ MatrixXd SampledDataModel::unit_motions() const {
   return X;
 }
 
-MatrixXd SampledDataModel::other_motions() const {
+MatrixXd SampledDataModel::on_other_motions(MatrixXd A) const {
   const MatrixXd X = unit_motions();
-  if (X.cols() == 0) return MatrixXd(X.rows(), 0);
-  const MatrixXd Q = Eigen::HouseholderQR<MatrixXd>(X).householderQ();
-  return Q.rightCols(X.rows() - X.cols());
+  if (X.cols() == 0) return A;
+  const Eigen::HouseholderQR<MatrixXd> qr(X);
+  A.applyOnTheLeft(qr.householderQ().adjoint());
+  A.applyOnTheRight(qr.householderQ());
+  const Index rest = X.rows() - X.cols();
+  return A.bottomRightCorner(rest, rest);
 }
 
 VectorXcd SampledDataModel::discrete_eigenvalues() const {
   if (n == 0) return {};
-  MatrixXd A = transition();
-  if (zero_modes.cols() > 0) {
-    const MatrixXd rest = other_motions();
-    A = (rest.transpose() * A * rest).eval();
-  }
+  MatrixXd A = on_other_motions(transition());
   return eigenvalues_of(A);
 }
 

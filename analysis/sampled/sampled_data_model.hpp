@@ -40,9 +40,8 @@ struct SampledDataModel {
   /// Returns a basis of the states along the zero modes that A does not change or only lets drift:
   /// positions, with the compensated gravity in the memory, and velocities that nothing damps.
   Eigen::MatrixXd unit_motions() const;
-  /// Returns an orthonormal basis of what unit_motions() leaves of the states; no columns if
-  /// unit_motions() has none.
-  Eigen::MatrixXd other_motions() const;
+  /// Returns A (rows() x rows()) on the orthogonal complement of unit_motions().
+  Eigen::MatrixXd on_other_motions(Eigen::MatrixXd A) const;
   /// Returns all eigenvalues of A except those of unit_motions(). Throws std::runtime_error.
   Eigen::VectorXcd discrete_eigenvalues() const;
 

@@ -64,7 +64,7 @@ TEST(GainMargin, IsWhereTheSpectralRadiusIsOne) {
 
 /// v_k+1 = v_k - a v_k-d is stable for 0 < a < 2 sin(pi / (2 (2 d + 1))) (Levin and May 1976).
 TEST(GainMargin, OfADampedMassFallsWithTheDelay) {
-  for (const int delay : {1, 20, 198, 199, 250, 2000}) {  // from 199 on by counting
+  for (const int delay : {1, 20, 98, 99, 250, 2000}) {  // from 99 on by counting
     SampledLoop loop;
     loop.delay = delay;
     const double most = 2 * std::sin(std::numbers::pi / (2 * (2 * delay + 1)));
@@ -100,11 +100,7 @@ SampledLoop add_parts(Random& random, System<>& system, SampledLoop loop) {
 
 /// The largest |z| that a count takes in, by the eigenvalues of the whole state.
 double spectral_radius(const SampledDataModel& model, double factor) {
-  MatrixXd A = model.transition(factor);
-  if (model.zero_modes.cols() > 0) {
-    const MatrixXd rest = model.other_motions();
-    A = (rest.transpose() * A * rest).eval();
-  }
+  MatrixXd A = model.on_other_motions(model.transition(factor));
   double radius = 0;
   for (const Complex z : eigenvalues_of(A)) {
     if (std::abs(z - 1.0) > 1e-6) radius = std::max(radius, std::abs(z));

@@ -1,0 +1,69 @@
+// The search for the largest share of damping that a loop bears, on margins that are functions.
+#include <dashpot/analysis/design/level_search.hpp>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::analysis {
+namespace {
+
+/// A margin that rises to `peak` at `level`, and falls beyond it.
+struct Peak {
+  double level, peak, rise, fall;  ///< rise and fall: powers of the level
+
+  double margin(double at) const { return peak * std::pow(at / level, at < level ? rise : -fall); }
+};
+
+struct Search {
+  FoundLevel found;
+  int questions = 0, margins = 0;
+
+  Search(const Peak& peak, double wanted) {
+    found = find_level(
+        [&](double level) {
+          ++questions;
+          return peak.margin(level) >= wanted;
+        },
+        [&](double level) {
+          ++margins;
+          return peak.margin(level);
+        },
+        wanted);
+  }
+};
+
+TEST(LevelSearch, FindsTheLargestLevelFromBelow) {
+  for (const double level : {2e-3, 0.01, 0.1, 0.3, 0.66, 0.9}) {
+    const Search search({0.5 * level, 4, 1, 1}, 2);  // 2 at `level`
+    EXPECT_TRUE(search.found.kept);
+    EXPECT_LE(search.found.level, level * (1 + 1e-12));
+    EXPECT_GE(search.found.level, level * (1 - 1.1e-4));
+    EXPECT_EQ(search.margins, 0);
+  }
+  EXPECT_EQ(Search({1, 2.1, 1, 1}, 2).found.level, 1);
+}
+
+TEST(LevelSearch, FindsAPeakBetweenGridPoints) {
+  for (const double level : {0.003, 0.05, 0.8, 0.95}) {
+    for (const double rise : {0.5, 4.0}) {
+      const Search search({level, 2.0001, rise, 1}, 2);
+      EXPECT_TRUE(search.found.kept) << level;
+      EXPECT_NEAR(search.found.level, level, 3e-4 * level);
+    }
+  }
+}
+
+TEST(LevelSearch, SpendsLittleOnAMarginOutOfReach) {
+  for (const double level : {0.003, 0.05, 0.3, 1.0, 5.0}) {
+    const Search search({level, 0.7, 4, 1}, 2);
+    EXPECT_FALSE(search.found.kept);
+    EXPECT_LE(search.questions, 18);
+    EXPECT_LE(search.margins, 16);
+    EXPECT_NEAR(std::log(search.found.level), std::log(std::min(level, 1.0)), 0.05);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
