@@ -27,6 +27,7 @@ class Running {
     argv.push_back(nullptr);
     child_ = fork();
     if (child_ != 0) return;
+    std::signal(SIGHUP, SIG_DFL);  // which nohup has ignored
     if (std::freopen(out().c_str(), "w", stdout) == nullptr ||
         std::freopen(err().c_str(), "w", stderr) == nullptr) {
       _exit(126);
