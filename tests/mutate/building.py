@@ -34,6 +34,13 @@ def configure():
                 if entry["file"].startswith(str(SOURCE))}
 
 
+def units_of(folder, commands):
+    """What is compiled for a folder: some of its sources by themselves, others many at a time."""
+    return [name for name in commands
+            if name.startswith((f"{folder}/", f"build/release/{folder}/"))
+            and not name.endswith("cmake_pch.hxx.cxx")]
+
+
 def to_blame(output, changes):
     """The changes in lines that the compiler complains of."""
     lines = set(re.findall(r"([\w/.]+):(\d+):\d*", output))
@@ -88,8 +95,7 @@ def without_misfits(changes, folders, commands):
         checked.unlink(missing_ok=True)
     if checked.exists():
         return changes
-    alike = {re.sub(r"\d", "", name): name for name in commands if name.split("/")[0] in folders}
-    unchecked = list(alike.values())  # one of those that instantiate the same for other sizes
+    unchecked = [name for folder in folders for name in units_of(folder, commands)]
     precompiled = {os.path.relpath(word, BUILD) for name in unchecked
                    for word in commands[name] if word.endswith("cmake_pch.hxx.pch")}
     subprocess.run(["cmake", "--build", BUILD, "--target", *precompiled],

@@ -15,7 +15,7 @@ import re
 from concurrent.futures import ThreadPoolExecutor
 
 import judge
-from building import BUILD, ROOT, SOURCE, SUITES, WORK, build_changed, configure
+from building import BUILD, ROOT, SOURCE, SUITES, WORK, build_changed, configure, units_of
 from changes import find, one_line
 from rewrite import copy_tree
 
@@ -43,8 +43,8 @@ def all_changes(folders, commands):
     for folder in folders:
         own = sorted(str(path.relative_to(ROOT)) for path in (ROOT / folder).rglob("*.[ch]pp")
                      if path.name not in ("compiled_eigen.hpp", "compiled_eigen.cpp"))
-        sources = [name for name in own if name in commands]
-        command = commands[sources[0]]
+        sources = [name for name in own if name.endswith(".cpp")]
+        command = commands[units_of(folder, commands)[0]]
         flags = ["-x", "c++", f"-I{include}"]
         for flag, value in zip(command, command[1:]):
             if flag == "-isystem":
