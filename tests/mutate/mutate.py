@@ -129,8 +129,11 @@ def judge_all(changes, tests, before):
         if not any(number in test.reached for test in tests):
             return "UNREACHED"
         found = judge.noticed(number, tests)
-        print("." if found else "!", end="", flush=True)
-        return f"noticed: {found[0]} {found[1]}" if found else "UNNOTICED"
+        if not found:
+            print(f"\n{change.file}:{change.line}: {named(change)[1]}: UNNOTICED", flush=True)
+            return "UNNOTICED"
+        print(".", end="", flush=True)
+        return f"noticed: {found[0]} {found[1]}"
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         verdicts = list(pool.map(verdict, range(1, len(changes) + 1), changes))
