@@ -173,7 +173,7 @@ TEST(BorneDamping, AgreesWithTheSearchOfTheDesign) {
     Eigen::MatrixXd C(6, 6);
     ASSERT_EQ(damper.update(impedance.mass, *impedance.jacobian, C), Status::kOk);
     EXPECT_TRUE(damper.level().kept);
-    EXPECT_LE(damper.level().level, searched.level * (1 + 2e-4)) << k;
+    EXPECT_LE(damper.level().level, searched.level * (1 + 1e-4)) << k;
     EXPECT_GE(damper.level().level, searched.level * 0.96) << k;
     lowered += searched.level < 0.99 ? 1 : 0;
     impedance.task_damping = C;

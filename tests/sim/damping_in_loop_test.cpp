@@ -113,7 +113,7 @@ TEST(DampingInLoop, HoldsThroughManyTicksOfDelay) {
   ASSERT_TRUE(result.kept);
   EXPECT_GT(result.level, 0.1);
   EXPECT_LT(result.level, 0.9);
-  EXPECT_NEAR(result.gain_margin, 2, 1e-3);
+  EXPECT_NEAR(result.gain_margin, 2, 1e-4);
   const VectorXd start = random.vector(4);
   EXPECT_LT(growth(result.design.system, limit.loop, 1, start), 0.1);
   EXPECT_LT(growth(result.design.system, limit.loop, 1.9, start), 0.1);
@@ -138,7 +138,7 @@ TEST(DampingInLoop, LowersTheRatioNoFurtherThanItHasTo) {
       EXPECT_EQ(miss.reason, DampingMiss::Reason::kLoop);
       EXPECT_EQ(miss.wanted, 1.2);
     }
-    for (double level = 1.0002 * result.level; level < 1; level *= 1.03) {
+    for (double level = 1.0001 * result.level; level < 1; level *= 1.03) {
       const analysis::DampingDesign more =
           design_damping(arm, DampingTarget::constant(1.2 * level));
       EXPECT_LT(gain_margin(more.system, more.spectrum, limit.loop), limit.gain_margin) << level;
@@ -158,9 +158,7 @@ TEST(DampingInLoop, FindsTheBoundsOfASingleMass) {
   limit.gain_margin = 1.5;
   const double largest = 2 * 2 / 0.02 / 1.5;                  // N s/m
   const double ratio = largest / (2 * std::sqrt(2 * 800.0));  // 1.667
-  const double level = design_damping(mass, DampingTarget::constant(3), limit).level;
-  EXPECT_LE(level, ratio / 3 * (1 + 1e-6));
-  EXPECT_GE(level, ratio / 3 * (1 - 1.1e-4));
+  EXPECT_NEAR(design_damping(mass, DampingTarget::constant(3), limit).level, ratio / 3, 2e-6);
   EXPECT_EQ(design_damping(mass, DampingTarget::constant(0.99 * ratio), limit).level, 1);
   // k T / 2 = 8 N s/m is a ratio of 0.1: less is unstable, and nothing lower helps.
   const SampledDamping none = design_damping(mass, DampingTarget::constant(0.09), limit);
@@ -195,7 +193,7 @@ TEST(DampingInLoop, FindsAMarginThatOnlyFewRatiosKeep) {
   limit.gain_margin = 1e9;                                            // out of reach
   const SampledDamping none = design_damping(arm, target, limit);
   EXPECT_FALSE(none.kept);
-  EXPECT_GE(none.gain_margin, most * 0.8);
+  EXPECT_GE(none.gain_margin, most * (1 - 1e-4));
   limit.gain_margin = most * (1 - 1e-4);
   const SampledDamping narrow = design_damping(arm, target, limit);
   EXPECT_TRUE(narrow.kept);
