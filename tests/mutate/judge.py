@@ -9,7 +9,6 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
-
 SKIPPED = 77  # exit status of a test by a script, as CTest knows it
 
 
