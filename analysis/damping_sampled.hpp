@@ -37,11 +37,11 @@ struct SampledDamping {
 ///     k (d + 1/2) T < c < 2 m / T  (half of the right side for d = 1).
 ///
 /// The level is 1 if that keeps the margin. Otherwise it is found on a grid that falls by a third
-/// from 1 to 1e-3, and to 1e-4 of itself by bisection above the first grid point that keeps the
+/// from 1 to 1e-3, and to 1e-6 of itself by bisection above the first grid point that keeps the
 /// margin. If no grid point keeps the margin, the level of largest margin is sought by golden
-/// section, to 5 % of itself where that margin is out of reach. The result is the largest level
+/// section, to 3e-3 of itself where that margin is out of reach. The result is the largest level
 /// there is as long as the levels that keep the margin form one interval. The search asks some tens
-/// of times whether a margin is kept, and, if no grid point keeps it, for ten to thirty margins.
+/// of times whether a margin is kept, and, if no grid point keeps it, for some tens of margins.
 ///
 /// Throws like design_damping and sample_loop, and std::invalid_argument for a margin below 1.
 SampledDamping design_damping(const TaskImpedance& impedance, const DampingTarget& target,

@@ -9,9 +9,9 @@ namespace {
 constexpr double kGridStep = 2. / 3;
 constexpr double kLowestLevel = 1e-3;
 /// Of a level, which is found from below.
-constexpr double kLevelPrecision = 1e-4;
+constexpr double kLevelPrecision = 1e-6;
 /// The peak of a margin below this part of the one wanted is found less precisely.
-constexpr double kReach = 0.8, kCoarse = 0.05;
+constexpr double kReach = 0.8, kCoarse = 3e-3;
 
 /// The level with the largest margin that is found, or one that keeps the margin wanted.
 FoundLevel find_peak(const std::function<bool(double)>& keeps,

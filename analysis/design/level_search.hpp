@@ -14,10 +14,10 @@ struct FoundLevel {
 };
 
 /// Seeks the largest level in (0, 1] at which a loop keeps the gain margin `wanted`: on a grid that
-/// falls by a third from 1 to 1e-3, and to 1e-4 of itself by bisection above the first grid point
+/// falls by a third from 1 to 1e-3, and to 1e-6 of itself by bisection above the first grid point
 /// that keeps the margin. If no grid point keeps it, the level with the largest margin is sought by
-/// golden section, as if the margin rose and then fell with the level: to 1e-4 of itself if the
-/// margin found comes to 0.8 of the one wanted, otherwise to 5 %. If that does not keep the margin
+/// golden section, as if the margin rose and then fell with the level: to 1e-6 of itself if the
+/// margin found comes to 0.8 of the one wanted, otherwise to 3e-3. If that does not keep the margin
 /// either, it is the level found.
 ///
 /// keeps(level) says whether the margin is kept; margin(level), the margin there, is asked for only
