@@ -19,7 +19,7 @@ SUITES = {
     "analysis": ["analysis", "controller", "sim"],
     "controller": ["controller", "plugin", "sim", "threads"],
     "sim": ["sim", "threads", "apps"],
-    "lcmtypes": ["lcmtypes", "threads", "apps"],
+    "lcmtypes": ["lcmtypes", "plugin", "threads", "apps"],
 }
 
 

@@ -14,11 +14,15 @@ namespace dashpot_mutants {
 
 constexpr int kMost = 20000;
 
-/// The change in force, from the environment: 0 for none.
-inline const int active = [] {
-  const char* const text = std::getenv("DASHPOT_MUTANT");
-  return text == nullptr ? 0 : std::atoi(text);
-}();
+/// The change in force, from the environment: 0 for none. Like the record below it is there when a
+/// constant of some source asks for it before main.
+inline int active() {
+  static const int number = [] {
+    const char* const text = std::getenv("DASHPOT_MUTANT");
+    return text == nullptr ? 0 : std::atoi(text);
+  }();
+  return number;
+}
 
 /// Which changes were reached, appended to a file at the end of the process.
 class Record {
@@ -47,15 +51,18 @@ class Record {
   const char* path_;
   std::array<std::atomic<bool>, kMost> reached_{};
 };
-inline Record record;
+inline Record& record() {
+  static Record all;
+  return all;
+}
 
 }  // namespace dashpot_mutants
 
 /// Whether change k is in force.
 inline bool dashpot_mutant(int k) noexcept {
-  if (dashpot_mutants::record.wanted()) [[unlikely]]
-    dashpot_mutants::record.add(k);
-  return k == dashpot_mutants::active;
+  if (dashpot_mutants::record().wanted()) [[unlikely]]
+    dashpot_mutants::record().add(k);
+  return k == dashpot_mutants::active();
 }
 
 /// Eigen's expressions as matrices, so that a sum and a difference have the same type.
