@@ -134,9 +134,10 @@ bool ModeTracker::follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Wo
   state_ = State::kFollowing;
   extrapolation_.apply(basis_.columns(), basis_.Z);
   if (basis_.two_sided) left_extrapolation_.apply(basis_.columns(), basis_.Y);
-  if (basis_.two_sided ? balance(pencil, false, basis_)
-                       : rotate_hyperbolically(residual_, kBalanced, basis_)) {
-    forget_past();
+  if (basis_.two_sided) {
+    balance(pencil, false, basis_);
+  } else {
+    rotate_hyperbolically(residual_, kBalanced, basis_);
   }
   if (refine(pencil, out, work)) {
     publish(pencil, SpectrumOrigin::kTracked, out);

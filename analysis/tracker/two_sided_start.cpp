@@ -88,7 +88,7 @@ bool start_two_sided(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spe
                      BlockEigenbasis& basis) noexcept {
   const int n = pencil.joints, p = pencil.rank, vibrations = spectrum.modes.size();
   VelocityChoice choice;
-  if (n == 0 || !choose(spectrum, choice)) return false;
+  if (!choose(spectrum, choice)) return false;
   if (vibrations + choice.velocities != n || (pencil.factored && vibrations != p)) return false;
   basis = BlockEigenbasis{};
   basis.two_sided = true;
