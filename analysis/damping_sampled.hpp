@@ -41,7 +41,7 @@ struct SampledDamping {
 /// margin. If no grid point keeps the margin, the level of largest margin is sought by golden
 /// section, to 3e-3 of itself where that margin is out of reach. The result is the largest level
 /// there is as long as the levels that keep the margin form one interval. The search asks some tens
-/// of times whether a margin is kept, and, if no grid point keeps it, for some tens of margins.
+/// of times whether a margin is kept, and, if no grid point keeps it, for some ten margins.
 ///
 /// Throws like design_damping and sample_loop, and std::invalid_argument for a margin below 1.
 SampledDamping design_damping(const TaskImpedance& impedance, const DampingTarget& target,

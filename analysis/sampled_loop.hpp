@@ -23,7 +23,8 @@ namespace dashpot::analysis {
 /// while omega T stays well below 1.
 ///
 /// Call it at a lower rate than the tick's, because it allocates, and solves one dense eigenproblem
-/// of up to (4 + d) n + m rows. Throws std::invalid_argument for matrices of other sizes or entries
+/// of up to (4 + d) n + m rows; where all springs and dampers of the controller act in fewer than n
+/// directions, a delay and the filter have only so many rows each. Throws std::invalid_argument for matrices of other sizes or entries
 /// that are not finite, a period that is not positive, a negative delay or cutoff, and a spectrum
 /// without modes because of its status. Throws std::runtime_error if the eigenvalue iteration does
 /// not converge.
@@ -45,7 +46,8 @@ double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const S
                    double most = 1e6, double slowest = 0);
 
 /// Returns whether gain_margin is at least `margin`, from the few factors that its search would try
-/// up to there. Throws likewise, and for a margin below 1.
+/// up to there; of a margin below 1 this is whether the loop is stable with it. Throws likewise,
+/// and for a negative margin.
 bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const SampledLoop& loop,
                   double margin);
 

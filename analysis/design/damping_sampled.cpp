@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/analysis/design/level_search.hpp>
 
@@ -29,15 +30,16 @@ std::vector<DampingMiss> misses_of(const DampingDesign& design, const DampingTar
 SampledDamping design_damping(const TaskImpedance& impedance, const DampingTarget& target,
                               const LoopLimit& limit, DampingStructure structure,
                               const std::optional<Eigen::MatrixXd>& start) {
+  require("damping", limit.gain_margin >= 1, "a gain margin below 1 is none");
   const auto at = [&](double level) {
     return design_damping(impedance, scaled(target, level), structure, start);
   };
   const auto margin_of = [&](const DampingDesign& design) {
     return analysis::gain_margin(design.system, design.spectrum, limit.loop);
   };
-  const auto keeps = [&](double level) {
+  const auto keeps = [&](double level, double margin) {
     const DampingDesign design = at(level);
-    return keeps_margin(design.system, design.spectrum, limit.loop, limit.gain_margin);
+    return keeps_margin(design.system, design.spectrum, limit.loop, margin);
   };
   const FoundLevel found = find_level(
       keeps, [&](double level) { return margin_of(at(level)); }, limit.gain_margin);

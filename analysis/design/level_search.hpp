@@ -20,9 +20,10 @@ struct FoundLevel {
 /// margin found comes to 0.8 of the one wanted, otherwise to 3e-3. If that does not keep the margin
 /// either, it is the level found.
 ///
-/// keeps(level) says whether the margin is kept; margin(level), the margin there, is asked for only
-/// where no grid point keeps it.
-FoundLevel find_level(const std::function<bool(double)>& keeps,
+/// keeps(level, m) says whether the margin there is at least m; margin(level) is it. That is asked
+/// for only where no grid point keeps the margin, and there of levels better than those before: the
+/// others are told by one question.
+FoundLevel find_level(const std::function<bool(double, double)>& keeps,
                       const std::function<double(double)>& margin, double wanted);
 
 }  // namespace dashpot::analysis

@@ -149,7 +149,12 @@ FoundLevel find_share(const RegionSource& source, const MatrixXd& damping,
   const auto question = [&](double share, double most_margin) {
     return RegionQuestion{share * damping, options.target, 0, 0, losing, most_margin};
   };
-  const auto keeps = [&](double share) {
+  const auto margin_of = [&](double share) {
+    tell();
+    return source.judge(question(share, kMostMargin)).gain_margin;
+  };
+  const auto keeps = [&](double share, double least) {
+    if (least < options.gain_margin) return margin_of(share) >= least;
     tell();
     const RegionQuestion asked = question(share, options.gain_margin);
     for (const std::size_t i : losing) {
@@ -160,11 +165,7 @@ FoundLevel find_share(const RegionSource& source, const MatrixXd& damping,
     for (const auto& [margin, number] : verdict.binding) losing.push_back(number);
     return verdict.binding.empty();
   };
-  const auto margin = [&](double share) {
-    tell();
-    return source.judge(question(share, kMostMargin)).gain_margin;
-  };
-  return find_level(keeps, margin, options.gain_margin);
+  return find_level(keeps, margin_of, options.gain_margin);
 }
 
 /// A damping matrix, and which share it is of one for continuous loops.

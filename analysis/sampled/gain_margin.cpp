@@ -14,8 +14,8 @@ using Eigen::MatrixXd;
 
 /// Loops with more states are counted, not solved, which takes longer for fewer of them.
 constexpr Eigen::Index kDenseRows = 100;
-/// From one factor to the next that is tried.
-constexpr double kFactorStep = 1.25;
+/// From one factor to the next that is tried, and the least one.
+constexpr double kFactorStep = 1.25, kLeastMargin = 1e-3;
 
 /// The loop with `factor` times its stiffness and its controller's damping.
 class ScaledLoop {
@@ -108,7 +108,7 @@ double find_margin(const SampledDataModel& unit, double most, double slowest) {
     }
   }
   for (Trial outside = here;; outside = here) {
-    if (outside.factor < 1e-3) return 0;
+    if (outside.factor < kLeastMargin) return 0;
     here.factor = 0.8 * outside.factor;
     here.excess = loop.excess(here.factor);
     if (here.excess < 0) return boundary(loop, here, outside);
@@ -131,8 +131,8 @@ double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double m
 
 bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const SampledLoop& loop,
                   double margin) {
-  require("keeps_margin", margin >= 1, "a gain margin below 1 is none");
-  return keeps(SampledDataModel(system, spectrum, loop), margin);
+  require("keeps_margin", margin >= 0, "a gain margin below 0 is none");
+  return margin < kLeastMargin || keeps(SampledDataModel(system, spectrum, loop), margin);
 }
 
 template double gain_margin(const System<kDynamic>&, const Spectrum<kDynamic>&, const SampledLoop&,

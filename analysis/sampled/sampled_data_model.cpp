@@ -6,7 +6,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <string>
@@ -109,6 +111,7 @@ void SampledDataModel::remember(const SampledLoop& loop, const MatrixXd& coordin
 }
 
 void SampledDataModel::integrate() {
+  span_commands();
   motion = MatrixXd::Zero(2 * n, 3 * n);
   if (D.isZero(0) && G.isZero(0)) {  // masses alone
     const MatrixXd unit = MatrixXd::Identity(n, n);
@@ -122,33 +125,46 @@ void SampledDataModel::integrate() {
   motion = phi(0, rate, 1).real().topRows(2 * n);
 }
 
+void SampledDataModel::span_commands() {
+  commands.setIdentity(n, n);
+  if (n == 0 || (delay == 0 && !filtered())) return;
+  const Index m = states.state.rows();
+  MatrixXd parts(n, 3 * n + m);
+  parts << G - P, K - P, C - D, states.output * std::max(1.0, states.position.norm());
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(parts);
+  const double rounding = static_cast<double>(n) * std::numeric_limits<double>::epsilon();
+  const Index count = (qr.matrixR().diagonal().array().abs() > rounding).count();
+  if (count < n) commands = MatrixXd(qr.householderQ()).leftCols(count);
+}
+
 MatrixXd SampledDataModel::transition(double factor) const {
-  const Index rows = this->rows(), m = states.state.rows();
+  const Index rows = this->rows(), m = states.state.rows(), r = commands.cols();
   const Index v = difference ? 2 * n : n, queue = difference ? 3 * n : 2 * n;
-  const Index filter = queue + n * delay;
+  const Index filter = queue + r * delay;
 
   MatrixXd command = MatrixXd::Zero(n, rows);
   command.leftCols(n) = G - factor * K + (factor - 1) * P;
   command.middleCols(v, n) -= factor * (C - D);
   command.rightCols(m) = -factor * states.output;
+  if (r < n) command = commands.transpose() * command;
   MatrixXd torque = command;
-  if (delay > 0) torque.setZero(), torque.middleCols(queue, n).setIdentity();
+  if (delay > 0) torque.setZero(), torque.middleCols(queue, r).setIdentity();
   if (filtered()) {
     torque *= filter_gain;
-    torque.middleCols(filter, n).diagonal().array() += 1 - filter_gain;
+    torque.middleCols(filter, r).diagonal().array() += 1 - filter_gain;
   }
   MatrixXd A = MatrixXd::Zero(rows, rows);
-  A.topRows(2 * n).noalias() = motion.rightCols(n) * torque;
+  A.topRows(2 * n).noalias() = motion.rightCols(n) * commands * torque;
   A.topLeftCorner(2 * n, 2 * n) += motion.leftCols(2 * n);
   if (difference) {
     A.middleRows(v, n) = A.topRows(n);
     A.block(v, 0, n, n).diagonal().array() -= 1;
   }
   if (delay > 0) {
-    A.block(queue, queue + n, n * (delay - 1), n * (delay - 1)).setIdentity();
-    A.middleRows(queue + n * (delay - 1), n) = command;
+    A.block(queue, queue + r, r * (delay - 1), r * (delay - 1)).setIdentity();
+    A.middleRows(queue + r * (delay - 1), r) = command;
   }
-  if (filtered()) A.middleRows(filter, n) = torque;
+  if (filtered()) A.middleRows(filter, r) = torque;
   A.bottomLeftCorner(m, n) = states.position;
   A.bottomRightCorner(m, m) = states.state;
   return A;
@@ -166,8 +182,10 @@ MatrixXd SampledDataModel::unit_motions() const {
   while (undamped < r && svd.singularValues()[r - 1 - undamped] <= negligible) ++undamped;
   MatrixXd X = MatrixXd::Zero(2 * n + memory(), r + undamped);
   X.topLeftCorner(n, r) = zero_modes;
-  for (Index at = difference ? 3 * n : 2 * n; at + n <= X.rows() - states.state.rows(); at += n) {
-    X.block(at, 0, n, r) = G * zero_modes;
+  const MatrixXd held = commands.transpose() * G * zero_modes;
+  const Index step = std::max<Index>(1, commands.cols());
+  for (Index at = difference ? 3 * n : 2 * n; at < X.rows() - states.state.rows(); at += step) {
+    X.block(at, 0, step, r) = held;
   }
   const MatrixXd drifts = zero_modes * svd.matrixV().rightCols(undamped);
   X.block(n, r, n, undamped) = drifts;
@@ -188,7 +206,12 @@ MatrixXd SampledDataModel::on_other_motions(MatrixXd A) const {
 VectorXcd SampledDataModel::discrete_eigenvalues() const {
   if (n == 0) return {};
   MatrixXd A = on_other_motions(transition());
-  return eigenvalues_of(A);
+  const VectorXcd z = eigenvalues_of(A);
+  // Where nothing is commanded, a delay and a filter do by themselves.
+  const Index idle = n - commands.cols(), filters = filtered() ? idle : 0;
+  VectorXcd all(z.size() + idle * delay + filters);
+  all << z, VectorXcd::Zero(idle * delay), VectorXcd::Constant(filters, 1 - filter_gain);
+  return all;
 }
 
 VectorXcd eigenvalues_of(MatrixXd& A) {

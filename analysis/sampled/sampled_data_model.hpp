@@ -20,6 +20,10 @@ struct SampledDataModel {
   double filter_gain = 1;  ///< 1: no filter
   bool difference = false;
   Eigen::MatrixXd motion;  ///< (y, y') after a tick from (y, y', torque), 2n x 3n
+  /// Orthonormal, n x r: all commands lie in its span but for what is less than the rounding errors
+  /// of A. They are delayed and filtered in these coordinates: of springs and dampers in 6
+  /// directions there are 6.
+  Eigen::MatrixXd commands;
 
   /// Throws std::invalid_argument as sample_loop does.
   template <int N>
@@ -31,10 +35,12 @@ struct SampledDataModel {
   bool filtered() const { return filter_gain < 1; }
   /// Returns the number of rows of the state in addition to y and y'.
   Eigen::Index memory() const {
-    return n * (delay + (filtered() ? 1 : 0) + (difference ? 1 : 0)) + states.state.rows();
+    return commands.cols() * (delay + (filtered() ? 1 : 0)) + (difference ? n : 0) +
+           states.state.rows();
   }
   Eigen::Index rows() const { return 2 * n + memory(); }
-  /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f], [w]), with `factor` times K - P,
+  /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f], [w]), u and f by their coordinates
+  /// in `commands`, with `factor` times K - P,
   /// C - D and the output of w; see sample_loop.
   Eigen::MatrixXd transition(double factor = 1) const;
   /// Returns a basis of the states along the zero modes that A does not change or only lets drift:
@@ -42,7 +48,8 @@ struct SampledDataModel {
   Eigen::MatrixXd unit_motions() const;
   /// Returns A (rows() x rows()) on the orthogonal complement of unit_motions().
   Eigen::MatrixXd on_other_motions(Eigen::MatrixXd A) const;
-  /// Returns all eigenvalues of A except those of unit_motions(). Throws std::runtime_error.
+  /// Returns all eigenvalues of A except those of unit_motions(), and those of a delay and a filter
+  /// of the n - r commands that are always zero. Throws std::runtime_error.
   Eigen::VectorXcd discrete_eigenvalues() const;
 
  private:
@@ -51,8 +58,9 @@ struct SampledDataModel {
   /// Checks SampledLoop::memory, throws std::invalid_argument, and sets `states`, where
   /// q = coordinates y.
   void remember(const SampledLoop& loop, const Eigen::MatrixXd& coordinates);
-  /// Sets `motion`.
+  /// Sets `motion` and `commands`.
   void integrate();
+  void span_commands();
 };
 
 /// Returns the eigenvalues of A, which is destroyed. Throws std::runtime_error.

@@ -76,9 +76,23 @@ TEST(GainMargin, OfADampedMassFallsWithTheDelay) {
   }
 }
 
-TEST(GainMargin, BelowOneIsNotAskedFor) {
+TEST(GainMargin, IsAskedForBelowOneToo) {
+  for (const int delay : {1, 98, 250}) {
+    SampledLoop loop;
+    loop.delay = delay;
+    const double most = 2 * std::sin(std::numbers::pi / (2 * (2 * delay + 1)));
+    const System<> mass = one_joint(3, 4 * most * 3 / loop.period, 0);
+    EXPECT_NEAR(gain_margin(mass, analyze(mass), loop), 0.25, 1e-6) << delay;
+    EXPECT_TRUE(keeps_margin(mass, analyze(mass), loop, 0.2499)) << delay;
+    EXPECT_FALSE(keeps_margin(mass, analyze(mass), loop, 0.2501)) << delay;
+    EXPECT_FALSE(keeps_margin(mass, analyze(mass), loop, 1)) << delay;
+    EXPECT_TRUE(keeps_margin(mass, analyze(mass), loop, 0)) << delay;
+  }
+}
+
+TEST(GainMargin, IsNotAskedForBelowZero) {
   const System<> system = one_joint(1, 2, 3);
-  EXPECT_THROW(keeps_margin(system, analyze(system), {}, 0.99), std::invalid_argument);
+  EXPECT_THROW(keeps_margin(system, analyze(system), {}, -0.01), std::invalid_argument);
   EXPECT_THROW(keeps_margin(system, analyze(system), {}, std::nan("")), std::invalid_argument);
 }
 

@@ -1,4 +1,5 @@
 // The loop as it really runs: against characteristic equations in closed form, and to first order.
+#include <dashpot/analysis/sampled/sampled_data_model.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -169,6 +170,26 @@ TEST(SampledLoop, PutsModesInThePlacesOfTheContinuousOnes) {
   EXPECT_GT(compared, 300);
 }
 
+/// An oscillation and an overdamped mode of like size: z = e^(lambda T) of the one is no nearer to
+/// the lambda of the other because both are large.
+TEST(SampledLoop, TellsAnOscillationFromADecayOfItsSize) {
+  System<> system(2);
+  system.mass = Eigen::Matrix2d::Identity();
+  system.stiffness = Eigen::Vector2d(100, 99).asDiagonal();
+  system.damping = Eigen::Vector2d(1, 20).asDiagonal();
+  const Spectrum<> spectrum = analyze(system);
+  SampledLoop loop;
+  loop.period = 1e-4;
+  const SampledSpectrum sampled = sample_loop(system, spectrum, loop);
+  for (int k = 0; k < 2; ++k) {
+    const SampledMode& image = sampled.modes.at(static_cast<std::size_t>(k));
+    EXPECT_EQ(image.kind, spectrum.modes[k].kind);
+    for (std::size_t i = 0; i < 2; ++i) {
+      EXPECT_LT(modulus(image.eigenvalues[i] - spectrum.modes[k].eigenvalues[i]), 0.1);
+    }
+  }
+}
+
 TEST(SampledLoop, FollowsAnOverdampedMode) {
   SampledLoop loop;
   loop.period = 1e-4;
@@ -301,6 +322,59 @@ TEST(SampledLoop, KeepsZeroModesInCompensatedGravity) {
     EXPECT_NEAR(std::log(sampled.zero_modes[0].real()) / 0.001, -3 + 2.5 * lag, 0.2);
     EXPECT_TRUE(sampled.stable());
   }
+}
+
+/// Springs and dampers in 6 directions of a longer arm give 6 commands to delay and filter, and the
+/// same eigenvalues as if there were one for each joint.
+TEST(SampledLoop, DelaysOnlyTheCommandsThatThereAre) {
+  int largest = 0;
+  for (std::uint64_t seed = 230; seed < 260; ++seed) {
+    Random random(seed);
+    const int n = random.integer(7, 9);
+    System<> system = to_joint_space(testing::random_impedance(random, n, 6));
+    SampledLoop loop = testing::random_loop(random);
+    loop.delay = random.integer(1, 4);
+    if (random.integer(0, 1) == 1) {  // of the joints, which nothing delays
+      loop.friction = 0.5 * MatrixXd::Identity(n, n);
+      system.damping += MatrixXd(loop.friction);
+    }
+    SampledDataModel model(system, analyze(system), loop);
+    EXPECT_EQ(model.commands.cols(), 6);
+    const Eigen::VectorXcd few = model.discrete_eigenvalues();
+    const double radius = few.cwiseAbs().maxCoeff();
+    const Eigen::Index rows = model.rows();
+    model.commands.setIdentity(n, n);
+    EXPECT_EQ(model.rows() - rows, (n - 6) * (loop.delay + (model.filtered() ? 1 : 0)));
+    const Eigen::VectorXcd all = model.discrete_eigenvalues();
+    ASSERT_EQ(few.size(), all.size());
+    EXPECT_NEAR(radius, all.cwiseAbs().maxCoeff(), 1e-10);
+    for (const Complex& z : all) {  // those at zero are defective, and none of theirs is exact
+      if (std::abs(z) < 0.1) continue;
+      EXPECT_LT((few.array() - z).abs().minCoeff(), 1e-9) << z;
+      ++largest;
+    }
+    const auto beyond = [](const Eigen::VectorXcd& values) {
+      return (values.array().abs() > 0.1).count();
+    };
+    EXPECT_EQ(beyond(few), beyond(all));
+  }
+  EXPECT_GT(largest, 300);
+}
+
+/// A command that is small beside the others is none the less one.
+TEST(SampledLoop, DelaysACommandThatIsSmall) {
+  System<> system(2);
+  system.mass.setIdentity();
+  system.stiffness = Eigen::Vector2d(1e4, 1e-4).asDiagonal();
+  system.damping = Eigen::Vector2d(100, 2e-3).asDiagonal();
+  SampledLoop loop;
+  loop.delay = 3;
+  EXPECT_EQ(SampledDataModel(system, analyze(system), loop).commands.cols(), 2);
+  system.stiffness(1, 1) = system.damping(1, 1) = 0;
+  EXPECT_EQ(SampledDataModel(system, analyze(system), loop).commands.cols(), 1);
+  loop.memory = {MatrixXd::Identity(1, 1), MatrixXd::Constant(1, 2, 1e9),
+                 MatrixXd{{0}, {1e-9}}};  // small, of a state that is large
+  EXPECT_EQ(SampledDataModel(system, analyze(system), loop).commands.cols(), 2);
 }
 
 TEST(SampledLoop, RefusesOptionsThatMakeNoSense) {
