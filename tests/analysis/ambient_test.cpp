@@ -77,7 +77,7 @@ struct ShakenArm {
 };
 
 TEST(IdentifyAmbient, FindsTheModesOfShakenArmsWithinTheirDeviations) {
-  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes minutes; the tests beside it run the same code";
+  DASHPOT_SKIP_IF_QUICK();
   Comparison all;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {  // the arms, twice
     ShakenArm shaken(seed);
@@ -102,6 +102,7 @@ TEST(IdentifyAmbient, DoesNotTakeTheSensorsNoiseForMotion) {
 }
 
 TEST(IdentifyAmbient, TakesSeveralRecordsAsOne) {
+  DASHPOT_SKIP_IF_QUICK();
   ShakenArm shaken(1);
   const auto part = [&](int from, int count) {
     return sensed(shaken.motion.middleCols(from, count), kPeriod, noise_of(1e-5), shaken.draw);

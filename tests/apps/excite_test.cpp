@@ -48,7 +48,7 @@ std::vector<state_t> states_of(const std::string& path, const std::vector<std::s
 }
 
 TEST(Excite, PulsesActWhenTheyShould) {
-  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes a minute; the tests beside it run the same code";
+  DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
   const auto states = states_of(
       calm_scene(scratch),
@@ -72,6 +72,7 @@ TEST(Excite, PulsesActWhenTheyShould) {
 }
 
 TEST(Excite, AChirpSweepsItsFrequencies) {
+  DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
   const auto states =
       states_of(calm_scene(scratch),

@@ -313,7 +313,7 @@ class HiddenArm {
 };
 
 TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
-  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes minutes; the tests beside it run the same code";
+  DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
   HiddenArm arm(scratch, 2);
   const std::string inertia = "[0.13, 0.12, 0.11, 0.1, 0.09, 0.08, 0.05]";
@@ -351,7 +351,7 @@ TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
 }
 
 TEST(Identify, RecoversPayloadAndReflectedInertiasFromTenReleases) {
-  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes minutes; the tests beside it run the same code";
+  DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
   HiddenArm arm(scratch, 5);
   std::vector<std::string> arguments = arm.logs;

@@ -5,6 +5,7 @@
 #include <dashpot/sim/linear_system.hpp>
 #include <dashpot/tests/support/plant_options.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -38,6 +39,7 @@ double growth(int ticks, const Step& step) {
 }
 
 TEST(LoopStability, TurnsWhereTheAnalysisSays) {
+  DASHPOT_SKIP_IF_QUICK();
   int compared = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     Random random(seed);

@@ -2,6 +2,7 @@
 // the simulated motion after small releases.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
 
 #include <gtest/gtest.h>
 
@@ -141,6 +142,7 @@ TEST_P(RingDown, HasTheModesOfTheSampledLoopAtOneKilohertz) {
 }
 
 TEST_P(RingDown, HasThePublishedModesAtTenKilohertz) {
+  DASHPOT_SKIP_IF_QUICK();
   Worst worst;
   for (int seed = 1; seed <= kPostures; ++seed) {
     Random random(static_cast<std::uint64_t>(seed));

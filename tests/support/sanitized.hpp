@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdlib>
 
 /// 1 under the address, thread or memory sanitizer, which bring their own malloc and make all slow.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -12,6 +13,17 @@
 #ifndef DASHPOT_SANITIZED
 #define DASHPOT_SANITIZED 0
 #endif
+
+namespace dashpot::testing {
+/// Whether to leave out what takes long and runs the code of other tests, too: CTest says so where
+/// all is slow, under sanitizers and emulators.
+inline bool quick() {
+  return std::getenv("DASHPOT_QUICK") != nullptr;
+}
+}  // namespace dashpot::testing
+#define DASHPOT_SKIP_IF_QUICK()    \
+  if (::dashpot::testing::quick()) \
+  GTEST_SKIP() << "takes long; the tests beside it run the same code"
 
 /// 1 under the thread sanitizer, which makes a loop slower than 1 kHz leaves time for.
 #if defined(__SANITIZE_THREAD__)
