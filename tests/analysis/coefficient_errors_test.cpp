@@ -86,6 +86,19 @@ TEST(CoefficientErrors, CountWhatTheProductOfAFactorLacks) {
   EXPECT_GT(share, 0.01);
 }
 
+TEST(CoefficientErrors, OfAProductAreThoseOfTheirFormula) {
+  System<kMaxDof> system(3);
+  system.stiffness_factor.resize(2, 3);
+  system.stiffness_factor << 1, -2, 3, 0.5, 4, -0.25;
+  const Eigen::MatrixXd size = Eigen::MatrixXd(system.stiffness_factor).cwiseAbs();
+  const Eigen::MatrixXd expected = 8 * 0x1p-106 * size.transpose() * size;
+  form_stiffness(system);
+  EXPECT_EQ(Eigen::MatrixXd(system.stiffness_error), expected);
+  system.stiffness_error.setConstant(1);
+  form_stiffness(system);  // beside errors that were there
+  EXPECT_EQ(system.stiffness_error(1, 0), 1 + expected(1, 0));
+}
+
 TEST(CoefficientErrors, CountWhatCancelsBeyondDoubleDoubles) {
   Random random(2101);
   int exact = 0, wrong = 0;

@@ -1,11 +1,13 @@
 #include <dashpot/analysis/identification.hpp>
 #include <dashpot/analysis/identification/decay_fit.hpp>
+#include <dashpot/analysis/identification/model_search.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -99,6 +101,7 @@ TEST(IdentifyDecays, CountsANoisyRecordLess) {
 }
 
 TEST(IdentifyDecays, IntervalsHoldTheTruthAsOftenAsTheySay) {
+  DASHPOT_SKIP_IF_QUICK();
   const KnownDecay decay;
   int inside = 0, all = 0;
   for (std::uint64_t seed = 100; seed < 160; ++seed) {
@@ -205,13 +208,14 @@ void expect_modes_of_arms(std::size_t count, const Sense& sense) {
 }
 
 TEST(IdentifyDecays, FindsTheModesOfArms) {
-  if (DASHPOT_SANITIZED) GTEST_SKIP() << "takes minutes; the tests beside it run the same code";
+  DASHPOT_SKIP_IF_QUICK();
   expect_modes_of_arms(4, [](const SprungArm& arm, const VectorXd& start, Draws& draw) {
     return sensed(arm, start, 1500, 0.001, {}, draw);
   });
 }
 
 TEST(IdentifyDecays, FindsTheModesOfArmsInTorquesOfTwelveBits) {
+  DASHPOT_SKIP_IF_QUICK();
   expect_modes_of_arms(1, [](const SprungArm& arm, const VectorXd& start, Draws& draw) {
     VectorXd limits = VectorXd::Constant(start.size(), 87);  // N m
     limits.tail(3).setConstant(12);
@@ -326,6 +330,63 @@ TEST(DecayFit, DoesNotDetermineWhatMovesNothing) {
     EXPECT_NEAR(more.covariance(i, i), fit.covariance(i, i), 0.2 * fit.covariance(i, i)) << i;
   }
   EXPECT_FALSE(more.covariance(4, 4) < 1e10);
+}
+
+/// Deviations are those of the fit and, squared and added, how far away the same mode of the next
+/// larger model is.
+TEST(IdentifyDecays, DeviationsHoldWhatALargerModelThinks) {
+  int compared = 0;
+  for (const std::uint64_t seed : {41u, 42u, 43u}) {
+    Draws draw(seed);
+    const std::vector<MotionRecord> records = {KnownDecay().record(3e-5, 0, draw)};
+    const ModelSearch search(records, 0, true);
+    const Identification found = identify_decays(records);
+    if (!search.larger) continue;
+    Index at = 0;
+    for (const DecayFactor& factor : search.fit.factors) {
+      ASSERT_TRUE(factor.pair);
+      const double w = std::exp(factor.first), ratio = factor.second;
+      const auto same = [&](const double frequency) { return std::abs(frequency / w - 1) < 0.1; };
+      for (const MeasuredMode& mode : found.modes) {
+        if (!same(mode.natural_frequency)) continue;
+        for (const DecayFactor& other : search.larger->factors) {
+          if (!other.pair || !same(std::exp(other.first))) continue;
+          const double dw = std::exp(other.first) - w, dz = other.second - ratio;
+          const MatrixXd& V = search.fit.covariance;
+          EXPECT_NEAR(mode.natural_frequency_std, std::hypot(w * std::sqrt(V(at, at)), dw),
+                      1e-6 * mode.natural_frequency_std);
+          EXPECT_NEAR(mode.damping_ratio_std, std::hypot(std::sqrt(V(at + 1, at + 1)), dz),
+                      1e-6 * mode.damping_ratio_std);
+          EXPECT_NEAR(mode.covariance, w * V(at, at + 1) + dw * dz,
+                      1e-6 * mode.natural_frequency_std * mode.damping_ratio_std);
+          EXPECT_GT(std::abs(dw), 1e-3 * mode.natural_frequency_std);
+          ++compared;
+        }
+      }
+      at += factor.parameters();
+    }
+  }
+  EXPECT_GE(compared, 2);
+}
+
+/// Of two arms whose search gets lost among factors that cancel each other and begins again: one of
+/// them loses a mode if it does not.
+TEST(IdentifyDecays, BeginsAgainWhereASearchGotLost) {
+  std::size_t found = 0;
+  for (const int number : {56, 61}) {
+    Draws draw(1'000'003 + static_cast<std::uint64_t>(number));
+    const SprungArm arm(static_cast<std::size_t>(number), draw, 0.05, 0.9);
+    VectorXd start(arm.system.mass.rows());
+    for (double& q : start) q = 0.02 * draw.normal();
+    const Identification result = identify_decays({sensed(arm, start, 1500, 0.001, {}, draw)});
+    for (const MeasuredMode& mode : result.modes) {
+      const bool known = std::any_of(arm.modes.begin(), arm.modes.end(), [&](const Mode<>& truth) {
+        return std::abs(mode.natural_frequency / truth.natural_frequency - 1) < 0.1;
+      });
+      if (known) ++found;
+    }
+  }
+  EXPECT_GE(found, 12u);  // of 14; 11 if no search begins again
 }
 
 TEST(FindDecays, FindsNothingInRest) {

@@ -207,6 +207,24 @@ TEST(ModeTracker, NeverReusesASpectrumForAFactorThatIsNotFinite) {
   }
 }
 
+/// A spectrum is used again for the factor that it belongs to, and for no earlier one.
+TEST(ModeTracker, ReusesASpectrumForItsOwnFactor) {
+  const System<kMaxDof> first = panda_impedance(swing(0.1), 0.3);
+  System<kMaxDof> second = first;
+  second.stiffness_factor(2, 3) += 0.1;
+  Tracked tracked;
+  ASSERT_EQ(tracked.update(first), Status::kOk);
+  ASSERT_EQ(tracked.update(second), Status::kOk);
+  EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kTracked);
+  ASSERT_EQ(tracked.update(second), Status::kOk);
+  EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kReused);
+  expect_enclosed(second, *tracked.spectrum);
+  ASSERT_EQ(tracked.update(first), Status::kOk);
+  EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kTracked);
+  expect_enclosed(first, *tracked.spectrum);
+  EXPECT_EQ(tracked.counters().reused, 1);
+}
+
 TEST(ModeTracker, ChangesSizes) {
   Random random(4004);
   Tracked tracked;

@@ -103,6 +103,21 @@ TEST(SpectrumOfOneCoordinate, IsTheTextbookOscillator) {
   EXPECT_TRUE(spectrum.proportional);
 }
 
+/// Without damping there is no doubt that a mode is undamped, and no need for more digits; the
+/// solver asks this of each system anew.
+TEST(SpectrumOfOneCoordinate, NeedsNoMoreDigitsWithoutDamping) {
+  SpectrumSolver<> solver;
+  Spectrum<> spectrum;
+  System<> system(1);
+  system.mass << 2;
+  system.stiffness << 50;
+  for (const double damping : {0.0, 1e-16, 0.0, 4.0}) {
+    system.damping << damping;
+    ASSERT_EQ(solver.solve(system, spectrum), Status::kOk);
+    EXPECT_EQ(spectrum.extended, damping == 1e-16) << damping;
+  }
+}
+
 TEST(SpectrumWithoutStiffness, HasOnlyZeroModes) {
   Random random(301);
   const MatrixXd M = random.spd(4), Z = MatrixXd::Zero(4, 4);

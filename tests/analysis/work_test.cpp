@@ -1,5 +1,8 @@
 // An analysis does no more work than it is granted, and what it finds does not depend on that.
 #include <dashpot/analysis/mode_tracker.hpp>
+#include <dashpot/analysis/spectrum/refinement.hpp>
+#include <dashpot/analysis/tracker/cluster_separation.hpp>
+#include <dashpot/analysis/tracker/tracked_start.hpp>
 #include <dashpot/tests/support/random.hpp>
 
 #include <gtest/gtest.h>
@@ -76,6 +79,43 @@ TEST(Work, OfTheSolverIsAllOrNothing) {
       }
     }
   }
+}
+
+/// In the solver's first blocks the work of a step is that of each pair of blocks, once.
+TEST(Work, OfASylvesterEquationIsCountedOnceForEachPair) {
+  BlockList<kMaxDof> blocks;
+  int first = 0;
+  for (const int size : {2, 1, 2, 3}) {
+    blocks.push_back({first, size});
+    first += size;
+  }
+  const auto equation = [](std::int64_t unknowns, std::int64_t square, std::int64_t more) {
+    return cubed(unknowns, 4) + squared(unknowns, square) + more;
+  };
+  EXPECT_EQ(sylvester_work<kMaxDof>(blocks),
+            3 * 250 + equation(3, 40, 500) + 2 * equation(6, 60, 0));
+}
+
+/// Modes that coincide are parted if the work of that is granted, and stay if it is not.
+TEST(Work, OfPartingModesThatCoincide) {
+  System<kMaxDof> system(3);
+  system.mass.setIdentity();
+  system.damping.setIdentity();
+  system.stiffness.diagonal() << 9, 9, 400;
+  const SymmetricPencil pencil = symmetric_pencil(system);
+  auto spectrum = std::make_unique<Spectrum<kMaxDof>>();
+  ASSERT_EQ(SpectrumSolver<kMaxDof>().solve(system, *spectrum), Status::kOk);
+  auto basis = std::make_unique<BlockEigenbasis>();
+  auto residual = std::make_unique<TrackedResidual>();
+  ASSERT_TRUE(start_basis(pencil, *spectrum, *basis));
+  evaluate(pencil, *basis, *residual);
+  const std::int64_t needed = cubed(4, 60) + squared(4, 300);
+  const PackedMatrix before = basis->Z;
+  Work less(needed - 1), enough(needed);
+  EXPECT_FALSE(separate_coinciding(*residual, *basis, less));
+  EXPECT_EQ(basis->Z.items, before.items);
+  EXPECT_TRUE(separate_coinciding(*residual, *basis, enough));
+  EXPECT_EQ(enough.done(), needed);
 }
 
 /// What one update left undone the next one finds, in its place.

@@ -53,6 +53,20 @@ TEST(Messages, SayTheUnitOrMeaningOfEveryField) {
   EXPECT_GT(fields, 50);
 }
 
+/// Before the end of the first tick.
+TEST(StateMessage, HasNoTimesOfALoopThatHasNone) {
+  Random random(900);
+  StateSample sample = random_state(random, 2);
+  sample.health = {};
+  const Bytes bytes = bytes_of(message_of<state_t>(sample));
+  state_t message;
+  ASSERT_TRUE(decode(bytes.data(), bytes.size(), message));
+  EXPECT_EQ(message.tick_time, 0);
+  EXPECT_EQ(message.longest_tick_time, 0);
+  EXPECT_EQ(message.overruns, 0);
+  EXPECT_EQ(message.fault_tick, 0);
+}
+
 TEST(StateMessage, SaysWhatTheSampleSays) {
   Random random(901);
   for (int n = 1; n <= controller::kMaxJoints; ++n) {

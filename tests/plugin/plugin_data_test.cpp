@@ -1,5 +1,7 @@
-// From the C structs to the controller's types and back: every field arrives, and in its own place.
+// From the C structs to the controller's types, to them, and from there to those of messages: every
+// field arrives, and in its own place.
 #include <dashpot/controller/plugin/plugin_data.hpp>
+#include <dashpot/lcmtypes/plugin_samples.hpp>
 
 #include <gtest/gtest.h>
 
@@ -228,13 +230,19 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
                               &snapshot.law_torque, &snapshot.reference_position}) {
     *values = numbers.vector(3);
   }
-  for (Pose* pose : {&snapshot.tip, &snapshot.reference_tip}) {
+  snapshot.fault = Status::kStateNotFinite;
+  for (Pose* pose : {&snapshot.tip, &snapshot.reference_tip, &snapshot.tool}) {
     pose->position = numbers.vector(3);
     pose->rotation = numbers.vector(9).reshaped(3, 3);
   }
   snapshot.tip_error = numbers.vector(6);
   snapshot.tip_wrench = numbers.vector(6);
-  snapshot.damping_level = 0.3;
+  for (double* value : {&snapshot.joint_damping_ratio, &snapshot.task_damping_ratio,
+                        &snapshot.damping_level, &snapshot.payload.mass}) {
+    *value = numbers();
+  }
+  snapshot.payload.center = numbers.vector(3);
+  snapshot.payload.inertia = numbers.vector(9).reshaped(3, 3);
   dashpot_snapshot out;
   std::memset(&out, 7, sizeof out);
   to_c(snapshot, out);
@@ -256,8 +264,36 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
   EXPECT_EQ(seen(out.reference_tip_position, 3), snapshot.reference_tip.position);
   EXPECT_EQ(seen_square(out.reference_tip_rotation, 3), snapshot.reference_tip.rotation);
   EXPECT_EQ(seen(out.tip_error, 6), snapshot.tip_error);
-  EXPECT_EQ(out.damping_level, 0.3);
+  EXPECT_EQ(out.damping_level, snapshot.damping_level);
   EXPECT_EQ(seen(out.tip_wrench, 6), snapshot.tip_wrench);
+
+  // And again what it was, for the publisher of a host.
+  Snapshot again;
+  lcmtypes::fill(out, again);
+  EXPECT_EQ(again.time, snapshot.time);
+  EXPECT_EQ(again.tick, snapshot.tick);
+  EXPECT_EQ(again.restarts, snapshot.restarts);
+  EXPECT_EQ(again.status, snapshot.status);
+  EXPECT_EQ(again.fault, snapshot.fault);
+  EXPECT_EQ(again.mode, snapshot.mode);
+  for (const auto values : {&Snapshot::position, &Snapshot::velocity, &Snapshot::torque,
+                            &Snapshot::law_torque, &Snapshot::reference_position}) {
+    EXPECT_EQ(again.*values, snapshot.*values);
+  }
+  EXPECT_EQ(again.joint_error, JointVector(snapshot.reference_position - snapshot.position));
+  for (const auto pose : {&Snapshot::tip, &Snapshot::reference_tip, &Snapshot::tool}) {
+    EXPECT_EQ((again.*pose).position, (snapshot.*pose).position);
+    EXPECT_EQ((again.*pose).rotation, (snapshot.*pose).rotation);
+  }
+  EXPECT_EQ(again.tip_error, snapshot.tip_error);
+  EXPECT_EQ(again.tip_wrench, snapshot.tip_wrench);
+  for (const auto value :
+       {&Snapshot::joint_damping_ratio, &Snapshot::task_damping_ratio, &Snapshot::damping_level}) {
+    EXPECT_EQ(again.*value, snapshot.*value);
+  }
+  EXPECT_EQ(again.payload.mass, snapshot.payload.mass);
+  EXPECT_EQ(again.payload.center, snapshot.payload.center);
+  EXPECT_EQ(again.payload.inertia, snapshot.payload.inertia);
 }
 
 TEST(ToC, ModesHaveAllThatIsInThem) {
@@ -325,6 +361,29 @@ TEST(ToC, ModesHaveAllThatIsInThem) {
   }
   EXPECT_EQ(out.modes[2].natural_frequency, 0);
   EXPECT_EQ(out.modes[2].label, 0);
+
+  lcmtypes::ModesSample again;
+  lcmtypes::fill(out, again);
+  EXPECT_EQ(again.vibration.time, 77);
+  EXPECT_EQ(again.vibration.tick, vibration.tick);
+  EXPECT_EQ(again.vibration.position, vibration.position);
+  EXPECT_EQ(again.vibration.status, vibration.status);
+  EXPECT_EQ(again.vibration.origin, vibration.origin);
+  EXPECT_EQ(again.vibration.zero_modes, 1);
+  ASSERT_EQ(again.vibration.count, 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const VibrationMode &mode = again.vibration.modes[i], &from = vibration.modes[i];
+    EXPECT_EQ(mode.label, from.label);
+    EXPECT_EQ(mode.kind, from.kind);
+    EXPECT_EQ(mode.eigenvalues, from.eigenvalues);
+    EXPECT_EQ(mode.shape, from.shape);
+    for (const auto value :
+         {&VibrationMode::natural_frequency, &VibrationMode::damping_ratio,
+          &VibrationMode::damped_frequency, &VibrationMode::error_bound,
+          &VibrationMode::natural_frequency_bound, &VibrationMode::damping_ratio_bound}) {
+      EXPECT_EQ(mode.*value, from.*value);
+    }
+  }
 }
 
 TEST(ToC, TheSampledLoopHasAllThatIsInIt) {
@@ -363,6 +422,26 @@ TEST(ToC, TheSampledLoopHasAllThatIsInIt) {
     EXPECT_EQ(out.modes[i].reserved, 0);
   }
   EXPECT_EQ(out.modes[2].natural_frequency, 0);
+
+  lcmtypes::SampledModesSample again;
+  lcmtypes::fill(out, again);
+  EXPECT_EQ(again.vibration.time, 77);
+  EXPECT_EQ(again.vibration.tick, vibration.tick);
+  EXPECT_EQ(again.vibration.position, vibration.position);
+  EXPECT_EQ(again.vibration.status, vibration.status);
+  EXPECT_EQ(again.vibration.spectral_radius, vibration.spectral_radius);
+  EXPECT_EQ(again.vibration.gain_margin, vibration.gain_margin);
+  ASSERT_EQ(again.vibration.count, 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const SampledVibrationMode &mode = again.vibration.modes[i], &from = vibration.modes[i];
+    EXPECT_EQ(mode.kind, from.kind);
+    for (const auto value :
+         {&SampledVibrationMode::continuous_frequency, &SampledVibrationMode::continuous_ratio,
+          &SampledVibrationMode::natural_frequency, &SampledVibrationMode::damping_ratio,
+          &SampledVibrationMode::damped_frequency}) {
+      EXPECT_EQ(mode.*value, from.*value);
+    }
+  }
 }
 
 }  // namespace

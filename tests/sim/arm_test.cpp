@@ -301,12 +301,43 @@ TEST(ArmOptions, ThatMakeNoSenseAreRefused) {
   options.stops = Contact{-1, 0};
   EXPECT_EQ(refused(options),
             "stops: stiffness: is -1.000000 N m/rad, must be finite and not negative");
+  options.stops = Contact{0, -1};
+  EXPECT_EQ(refused(options),
+            "stops: damping: is -1.000000 N m s/rad, must be finite and not negative");
+  options = {};
+  options.wall = Wall{Vector3d::Zero(), Vector3d::UnitZ(), {-1, 0}};
+  EXPECT_EQ(refused(options), "wall: stiffness: is -1.000000 N/m, must be finite and not negative");
+  options.wall->contact = {0, -1};
+  EXPECT_EQ(refused(options), "wall: damping: is -1.000000 N s/m, must be finite and not negative");
+  options.wall->contact = {};
+  options.wall->point.x() = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(refused(options), "wall: point: is not finite");
   options = {};
   options.wall = Wall{Vector3d::Zero(), Vector3d::Zero(), {}};
   EXPECT_EQ(refused(options), "wall: normal: is zero or not finite");
   options = {};
   options.wrenches = {{2, 1, Vector6::Ones()}};
   EXPECT_EQ(refused(options), "wrenches: a piece does not begin before it ends");
+  options.wrenches = {{1, 2, Vector6::Constant(std::nan(""))}};
+  EXPECT_EQ(refused(options), "wrenches: a piece is not finite");
+  options = {};
+  const auto refused_load = [&](double mass, const Vector3d& center, const Vector3d& moments) {
+    options.loads = {{1, 2, {mass, center, moments.asDiagonal()}}};
+    return refused(options);
+  };
+  EXPECT_EQ(refused_load(1, Vector3d::Zero(), Vector3d::Ones()), "accepted");
+  EXPECT_EQ(refused_load(-1, Vector3d::Zero(), Vector3d::Ones()),
+            "loads: mass: is -1.000000 kg, must be finite and not negative");
+  EXPECT_EQ(refused_load(1, Vector3d::Constant(std::nan("")), Vector3d::Ones()),
+            "loads: a body is not finite");
+  EXPECT_EQ(refused_load(1, Vector3d::Zero(), {1, 1, -1}),
+            "loads: an inertia is not symmetric positive semidefinite");
+  options.loads[0].value.about_center.setIdentity();
+  options.loads[0].value.about_center(0, 1) = 0.1;
+  EXPECT_EQ(refused(options), "loads: an inertia is not symmetric positive semidefinite");
+  options.loads[0].value.about_center(0, 1) = 0;
+  options.loads[0].end = 1;
+  EXPECT_EQ(refused(options), "loads: a piece does not begin before it ends");
   EXPECT_EQ(refused({}), "accepted");
 }
 

@@ -255,9 +255,55 @@ class CountingOscillator : public LinearSystem {
   void rates(const StateVector& y, StateVector& y_dot) noexcept override {
     ++evaluations;
     LinearSystem::rates(y, y_dot);
+    if (broken) y_dot.setConstant(std::numeric_limits<double>::quiet_NaN());
   }
   int evaluations = 0;
+  bool broken = false;
 };
+
+/// Error over tolerance stays the same over eight decades, because the estimate has the order of
+/// the method; and so does the work, which grows by 10^(1/8) a decade.
+TEST(AdaptiveSteps, OfOrderEightEstimateTheirErrorWithItsOrder) {
+  int last = 0;
+  for (const double tolerance : {1e-6, 1e-8, 1e-10, 1e-12}) {
+    IntegratorOptions options;
+    options.method = Method::kDormandPrince8;
+    options.adaptive = true;
+    options.max_step = 10;
+    options.absolute_tolerance = options.relative_tolerance = tolerance;
+    Integrator integrator(options);
+    CountingOscillator system;
+    StateVector y = StateVector::Zero(2 + kWorkChannels);
+    y[0] = 1;
+    ASSERT_EQ(integrator.advance(system, 100, y), Status::kOk);
+    const double error = std::hypot(y[0] - std::cos(100), y[1] + std::sin(100));
+    EXPECT_LT(error, 20 * tolerance) << tolerance;
+    EXPECT_GT(error, 5 * tolerance) << tolerance;
+    if (last > 0) EXPECT_NEAR(system.evaluations / (last * std::pow(10, 2.0 / 8)), 1, 0.15);
+    last = system.evaluations;
+  }
+}
+
+TEST(AdaptiveSteps, GiveUpSoonWhereRatesAreNoNumbersAndRecover) {
+  for (const Method method :
+       {Method::kDormandPrince, Method::kDormandPrince8, Method::kRosenbrock}) {
+    IntegratorOptions options;
+    options.method = method;
+    options.adaptive = true;
+    Integrator integrator(options);
+    CountingOscillator system;
+    system.broken = true;
+    StateVector y = StateVector::Zero(2 + kWorkChannels);
+    y[0] = 1;
+    EXPECT_NE(integrator.advance(system, 1, y), Status::kOk) << name_of(method);
+    EXPECT_LT(system.evaluations, 1000) << name_of(method);
+    system.broken = false;
+    y.setZero();
+    y[0] = 1;
+    EXPECT_EQ(integrator.advance(system, 1, y), Status::kOk) << name_of(method);
+    EXPECT_NEAR(y[0], std::cos(1), 1e-4) << name_of(method);
+  }
+}
 
 TEST(Evaluations, AreNotMadeTwice) {
   const auto evaluations = [](Method method, bool adaptive) {

@@ -73,7 +73,15 @@ TEST(SensorFaults, AreRefusedWhereTheyMakeNoSense) {
   options.faults.resize(1);
   options.faults[0].velocity_factor = joints({1, 1});
   EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
+  options.faults[0].velocity_factor = joints({std::nan("")});
+  EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
   options.faults[0].velocity_factor = joints({1});
+  EXPECT_NO_THROW(Plant(mass, options, joints({0})));
+  options.faults[0].position_offset = joints({0, 0});
+  EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
+  options.faults[0].position_offset = joints({std::nan("")});
+  EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
+  options.faults[0].position_offset = joints({0});
   EXPECT_NO_THROW(Plant(mass, options, joints({0})));
   options.faults[0].end = 0;
   EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
