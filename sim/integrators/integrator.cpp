@@ -170,7 +170,7 @@ double Integrator::first_step(System& system) noexcept {
   const double change = std::max(rate, weighted_size(error_) / h);
   const double wanted = change > 1e-15 ? std::pow(0.01 / change, -exponent_) : 1e3 * h;
   const double step = std::min({100 * h, wanted, options_.max_step});
-  return std::isfinite(step) ? std::max(step, kLeastStep) : options_.max_step;
+  return std::max(step, kLeastStep);
 }
 
 void Integrator::begin_step(System& system) noexcept {

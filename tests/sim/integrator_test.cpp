@@ -284,7 +284,7 @@ TEST(AdaptiveSteps, OfOrderEightEstimateTheirErrorWithItsOrder) {
   }
 }
 
-TEST(AdaptiveSteps, GiveUpSoonWhereRatesAreNoNumbersAndRecover) {
+TEST(AdaptiveSteps, GiveUpSoonWhereThereAreNoNumbersAndRecover) {
   for (const Method method :
        {Method::kDormandPrince, Method::kDormandPrince8, Method::kRosenbrock}) {
     IntegratorOptions options;
@@ -298,6 +298,10 @@ TEST(AdaptiveSteps, GiveUpSoonWhereRatesAreNoNumbersAndRecover) {
     EXPECT_NE(integrator.advance(system, 1, y), Status::kOk) << name_of(method);
     EXPECT_LT(system.evaluations, 1000) << name_of(method);
     system.broken = false;
+    system.evaluations = 0;
+    y[0] = std::numeric_limits<double>::infinity();
+    EXPECT_NE(Integrator(options).advance(system, 1, y), Status::kOk) << name_of(method);
+    EXPECT_LT(system.evaluations, 1000) << name_of(method);
     y.setZero();
     y[0] = 1;
     EXPECT_EQ(integrator.advance(system, 1, y), Status::kOk) << name_of(method);
