@@ -187,6 +187,67 @@ TEST(ToJointSpace, PaperEq55AddsTheGeometricStiffness) {
   EXPECT_FALSE(to_joint_space(impedance).symmetric());
 }
 
+TEST(ToJointSpace, NamesWhatIsMissingOrWrong) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto refusal = [](const auto& change) -> std::string {
+    TaskImpedance impedance;
+    impedance.mass = MatrixXd::Identity(2, 2);
+    impedance.jacobian = MatrixXd::Identity(2, 2);
+    impedance.task_damping = impedance.task_stiffness = impedance.jacobian_rate =
+        impedance.jacobian;
+    impedance.wrench = VectorXd{{3, -7}};
+    impedance.jacobian_derivatives = planar_derivatives(0.3, 0.8);
+    change(impedance);
+    try {
+      to_joint_space(impedance);
+    } catch (const InvalidSystem& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal([](TaskImpedance&) {}), "");
+  EXPECT_EQ(refusal([](TaskImpedance& a) {
+              a.jacobian.reset();
+              a.jacobian_rate.reset();
+            }),
+            "task_damping: needs a jacobian");
+  EXPECT_EQ(refusal([](TaskImpedance& a) {
+              a.jacobian.reset();
+              a.task_damping.reset();
+              a.jacobian_rate.reset();
+            }),
+            "task_stiffness: needs a jacobian");
+  EXPECT_EQ(refusal([](TaskImpedance& a) {
+              a.task_damping.reset();
+              a.task_stiffness.reset();
+            }),
+            "jacobian: needs task_damping or task_stiffness");
+  EXPECT_EQ(refusal([](TaskImpedance& a) { a.task_damping.reset(); }),
+            "jacobian_rate: needs task_damping");
+  EXPECT_EQ(refusal([](TaskImpedance& a) { a.jacobian = MatrixXd::Zero(2, 3); }),
+            "jacobian: is 2 x 3, expected 2 x 2");
+  EXPECT_EQ(refusal([](TaskImpedance& a) { a.jacobian_rate = MatrixXd::Zero(1, 2); }),
+            "jacobian_rate: is 1 x 2, expected 2 x 2");
+  EXPECT_EQ(refusal([&](TaskImpedance& a) { (*a.jacobian)(1, 0) = nan; }),
+            "jacobian: entry (2,1) is not a finite number");
+  EXPECT_EQ(refusal([&](TaskImpedance& a) { (*a.jacobian_rate)(0, 1) = nan; }),
+            "jacobian_rate: entry (1,2) is not a finite number");
+  EXPECT_EQ(refusal([](TaskImpedance& a) { a.wrench.reset(); }),
+            "jacobian_derivatives: needs a wrench");
+  EXPECT_EQ(refusal([](TaskImpedance& a) { a.jacobian_derivatives.clear(); }),
+            "wrench: needs jacobian_derivatives");
+  EXPECT_EQ(refusal([](TaskImpedance& a) { a.jacobian_derivatives.pop_back(); }),
+            "jacobian_derivatives: has 1 matrices, expected 2");
+  EXPECT_EQ(refusal([](TaskImpedance& a) { a.wrench = VectorXd::Ones(3); }),
+            "wrench: is 3 x 1, expected 2 x 1");
+  EXPECT_EQ(refusal([&](TaskImpedance& a) { (*a.wrench)[1] = nan; }),
+            "wrench: entry (2,1) is not a finite number");
+  EXPECT_EQ(refusal([](TaskImpedance& a) { a.jacobian_derivatives[1] = MatrixXd::Zero(2, 3); }),
+            "jacobian_derivatives[2]: is 2 x 3, expected 2 x 2");
+  EXPECT_EQ(refusal([&](TaskImpedance& a) { a.jacobian_derivatives[1](0, 1) = nan; }),
+            "jacobian_derivatives[2]: entry (1,2) is not a finite number");
+}
+
 // -------------------------------------------------------------------------------------- the factor
 
 void expect_factor(const System<>& system, Eigen::Index rows) {
