@@ -97,7 +97,6 @@ class DotAccumulator {
   void add(double a, double b) { sum_ += two_product(a, b); }
   void add(const DoubleDouble& a, double b) { sum_ += a * b; }
   void add(const DoubleDouble& a, const DoubleDouble& b) { sum_ += a * b; }
-  void add(const DoubleDouble& term) { sum_ += term; }
   DoubleDouble value() const { return sum_; }
 
  private:

@@ -50,17 +50,6 @@ double solve_sylvester(const Eigen::Ref<const State<N>>& A, const Eigen::Ref<con
     if (gap != 0) X(0, 0) = C(0, 0) / gap;
     return std::abs(gap);
   }
-  if (l == 1) {
-    State<N> shifted = A;
-    shifted.diagonal().array() -= B(0, 0);
-    State<N> inverse = State<N>::Identity(k, k);
-    solve_in_place(shifted, inverse, std::numeric_limits<double>::min());
-    X = inverse * C;
-    const double rounding = static_cast<double>(k * k) * kUnit * (A.norm() + std::abs(B(0, 0)));
-    const double separation = 1 / inverse.norm() - rounding;
-    if (!(separation > 0) || !X.allFinite()) X.setZero(k, l);
-    return separation > 0 ? separation : 0;
-  }
   // Larger blocks are rare: the Kronecker matrix of the map, where it fits the capacity.
   X.setZero(k, l);
   if (N != kDynamic && k * l > kTwice<N>) return 0;
