@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 #include <vector>
 
@@ -141,6 +142,58 @@ TEST(TwoSidedErrors, AreThoseOfTheFormulas) {
     near(errors.of_G(),
          gamma * (A.norm() * X.norm() + B.norm() * F.norm() + P.norm() * momenta.norm()));
     near(errors.of_N(), gamma * (A.norm() * z_of.norm() + P.norm() * mass * e_of.norm()));
+  }
+}
+
+/// N = Y S Z and G = Y B Z - N Lambda with the states and matrices of the documentation.
+TEST(TwoSidedResidual, IsThatOfItsDefinition) {
+  Random random(8110);
+  for (const auto& [n, p] : {std::pair(1, 1), {6, 6}, {16, 16}, {3, 2}, {7, 5}, {16, 13}}) {
+    SCOPED_TRACE(std::to_string(n) + " joints, rank " + std::to_string(p));
+    AnyBasis any(random, n, p);
+    TrackedResidual residual;
+    for (PackedMatrix* X : {&residual.MV, &residual.image, &residual.R, &residual.G}) {
+      X->items.fill(7);  // of another update
+    }
+    evaluate(any.pencil(), any.basis, residual);
+
+    MatrixXd S = MatrixXd::Identity(n + p, n + p), B = MatrixXd::Zero(n + p, n + p);
+    S.bottomRightCorner(n, n) = -any.system.mass;
+    B.bottomRightCorner(n, n) = any.system.damping;
+    if (p < n) {
+      B.topRightCorner(p, n) = any.system.stiffness_factor;
+      B.bottomLeftCorner(n, p) = any.system.stiffness_factor.transpose();
+    } else {
+      B.topRightCorner(n, n).setIdentity();
+      B.bottomLeftCorner(n, n) = any.system.stiffness;
+    }
+    const MatrixXd Z = AnyBasis::dense(any.basis.Z, n + p), Y = AnyBasis::dense(any.basis.Y, n + p);
+    const MatrixXd N = Y * S * Z, T = Y * B * Z;
+    MatrixXd sigma = -MatrixXd::Identity(n + p, n + p), Lambda = MatrixXd::Zero(n + p, n + p);
+    sigma.topLeftCorner(p, p) *= -1;
+    MatrixXd off = MatrixXd::Ones(n + p, n + p);  // no block of a mode or rate
+    for (int i = 0; i < any.basis.blocks(); ++i) {
+      std::vector<int> at = {any.basis.first(i)};
+      if (i < p) at.push_back(any.basis.second(i));
+      Lambda(at, at) = MatrixXd(N(at, at)).inverse() * T(at, at);
+      off(at, at).setZero();
+      if (i >= p) {
+        EXPECT_NEAR(any.basis.rate[static_cast<std::size_t>(i - p)], Lambda(at[0], at[0]),
+                    1e-9 * std::abs(Lambda(at[0], at[0])));
+        continue;
+      }
+      const Block2<double> block = any.basis.block(i);
+      const Eigen::Matrix2d found{{block.a, block.b}, {block.c, block.d}};
+      EXPECT_LT((found - Lambda(at, at)).norm(), 1e-9 * found.norm());
+      EXPECT_LT(residual.diagonal[static_cast<std::size_t>(i)], 1e-20 * T.squaredNorm());
+      for (const int row : at) {
+        for (const int column : at) EXPECT_EQ(residual.G(row, column), 0);
+      }
+    }
+    const MatrixXd G = (T - N * Lambda).cwiseProduct(off);
+    const MatrixXd found = AnyBasis::dense(residual.G, n + p).cwiseProduct(off);
+    EXPECT_LT((found - G).norm(), 1e-9 * (1 + G.norm()));
+    EXPECT_LT((AnyBasis::dense(residual.R, n + p) - (N - sigma)).norm(), 1e-12 * (1 + N.norm()));
   }
 }
 

@@ -178,6 +178,16 @@ TEST(ZeroModes, KeepNegativeStiffness) {
   EXPECT_TRUE(near(found.stiffness_values, Eigen::Vector3d(-9, 4, 0), 1e-14));
 }
 
+/// A zero on the diagonal beside what is not: indefinite, with no zero mode at all.
+TEST(ZeroModes, AreNoneWhereOnlyTheDiagonalVanishes) {
+  System<> system(2);
+  system.stiffness << 0, 3, 3, 0;
+  const ZeroModes<> found = zero_modes_of(system);
+  EXPECT_EQ(found.count, 0);
+  EXPECT_NEAR(found.stiffness_values.minCoeff(), -3, 1e-14);
+  EXPECT_NEAR(found.stiffness_values.maxCoeff(), 3, 1e-14);
+}
+
 TEST(ZeroModes, OfANonsymmetricStiffnessSpanItsNullSpace) {
   Random random(405);
   const MatrixXd J = random.matrix(3, 5);

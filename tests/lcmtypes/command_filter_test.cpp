@@ -96,6 +96,23 @@ TEST(CommandFilter, EndsARatioWithGainsOfTheSamePart) {
   EXPECT_EQ(setpoint.gains.joint_damping_ratio, message.joint_damping_ratio);
 }
 
+/// A sender's numbers may begin with 1, and a speed that a later command does not name is none.
+TEST(CommandFilter, ForgetsASpeedThatIsNotNamedAgain) {
+  Random random(927);
+  CommandFilter filter(limits_for(7));
+  command_t message = random_command(random, 7);
+  message.parts = command_t::TIP_SPEED;
+  message.sequence = 1;
+  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  EXPECT_EQ(filter.command().tip_speed.linear, message.linear_velocity);
+  message.linear_velocity = 0;
+  ++message.sequence;
+  ++message.utime;
+  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  EXPECT_EQ(filter.command().tip_speed.linear, controller::TipSpeed().linear);
+  EXPECT_EQ(filter.command().tip_speed.angular, message.angular_velocity);
+}
+
 TEST(CommandFilter, KeepsDampersBesideARatioUnlessThereAreOthers) {
   Random random(926);
   CommandFilter filter(limits_for(7));
