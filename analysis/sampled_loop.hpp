@@ -24,10 +24,10 @@ namespace dashpot::analysis {
 ///
 /// Call it at a lower rate than the tick's, because it allocates, and solves one dense eigenproblem
 /// of up to (4 + d) n + m rows; where all springs and dampers of the controller act in fewer than n
-/// directions, a delay and the filter have only so many rows each. Throws std::invalid_argument for matrices of other sizes or entries
-/// that are not finite, a period that is not positive, a negative delay or cutoff, and a spectrum
-/// without modes because of its status. Throws std::runtime_error if the eigenvalue iteration does
-/// not converge.
+/// directions, a delay and the filter have only so many rows each. Throws std::invalid_argument for
+/// matrices of other sizes or entries that are not finite, a period that is not positive, a
+/// negative delay or cutoff, and a spectrum without modes because of its status. Throws
+/// std::runtime_error if the eigenvalue iteration does not converge.
 template <int N>
 SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum,
                             const SampledLoop& loop);

@@ -40,8 +40,7 @@ struct SampledDataModel {
   }
   Eigen::Index rows() const { return 2 * n + memory(); }
   /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f], [w]), u and f by their coordinates
-  /// in `commands`, with `factor` times K - P,
-  /// C - D and the output of w; see sample_loop.
+  /// in `commands`, with `factor` times K - P, C - D and the output of w; see sample_loop.
   Eigen::MatrixXd transition(double factor = 1) const;
   /// Returns a basis of the states along the zero modes that A does not change or only lets drift:
   /// positions, with the compensated gravity in the memory, and velocities that nothing damps.
