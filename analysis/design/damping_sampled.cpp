@@ -31,14 +31,20 @@ SampledDamping design_damping(const TaskImpedance& impedance, const DampingTarge
                               const LoopLimit& limit, DampingStructure structure,
                               const std::optional<Eigen::MatrixXd>& start) {
   require("damping", limit.gain_margin >= 1, "a gain margin below 1 is none");
-  const auto at = [&](double level) {
-    return design_damping(impedance, scaled(target, level), structure, start);
+  double last_level = 0;
+  DampingDesign last;
+  const auto at = [&](double level) -> const DampingDesign& {
+    if (level != last_level) {
+      last = design_damping(impedance, scaled(target, level), structure, start);
+      last_level = level;
+    }
+    return last;
   };
   const auto margin_of = [&](const DampingDesign& design) {
     return analysis::gain_margin(design.system, design.spectrum, limit.loop);
   };
   const auto keeps = [&](double level, double margin) {
-    const DampingDesign design = at(level);
+    const DampingDesign& design = at(level);
     return keeps_margin(design.system, design.spectrum, limit.loop, margin);
   };
   const FoundLevel found = find_level(

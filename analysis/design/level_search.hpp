@@ -21,8 +21,8 @@ struct FoundLevel {
 /// either, it is the level found.
 ///
 /// keeps(level, m) says whether the margin there is at least m; margin(level) is it. That is asked
-/// for only where no grid point keeps the margin, and there of levels better than those before: the
-/// others are told by one question.
+/// for only where no grid point keeps the margin, and there of level 1 and of levels that are as
+/// good as the best before: the others are told by one question.
 FoundLevel find_level(const std::function<bool(double, double)>& keeps,
                       const std::function<double(double)>& margin, double wanted);
 

@@ -149,9 +149,12 @@ FoundLevel find_share(const RegionSource& source, const MatrixXd& damping,
   const auto question = [&](double share, double most_margin) {
     return RegionQuestion{share * damping, options.target, 0, 0, losing, most_margin};
   };
+  std::pair<double, double> judged{0, 0};  // a share, and its margin
   const auto margin_of = [&](double share) {
+    if (judged.first == share) return judged.second;
     tell();
-    return source.judge(question(share, kMostMargin)).gain_margin;
+    judged = {share, source.judge(question(share, kMostMargin)).gain_margin};
+    return judged.second;
   };
   const auto keeps = [&](double share, double least) {
     if (least < options.gain_margin) return margin_of(share) >= least;

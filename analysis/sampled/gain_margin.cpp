@@ -88,6 +88,8 @@ double boundary(const ScaledLoop& loop, Trial inside, Trial outside) {
 
 bool keeps(const SampledDataModel& unit, double margin) {
   const ScaledLoop loop(unit, 0);
+  // Also where it is not stable with less: gain_margin begins at 1.
+  if (margin < 1) return loop.excess(margin) < 0 || loop.excess(1) < 0;
   if (!(loop.excess(margin) < 0)) return false;
   for (double factor = 1; factor < margin; factor *= kFactorStep) {
     if (!(loop.excess(factor) < 0)) return false;
@@ -132,7 +134,8 @@ double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double m
 bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const SampledLoop& loop,
                   double margin) {
   require("keeps_margin", margin >= 0, "a gain margin below 0 is none");
-  return margin < kLeastMargin || keeps(SampledDataModel(system, spectrum, loop), margin);
+  const SampledDataModel unit(system, spectrum, loop);
+  return margin == 0 || keeps(unit, margin);
 }
 
 template double gain_margin(const System<kDynamic>&, const Spectrum<kDynamic>&, const SampledLoop&,

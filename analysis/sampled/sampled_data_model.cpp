@@ -133,7 +133,7 @@ void SampledDataModel::span_commands() {
   parts << G - P, K - P, C - D, states.output * std::max(1.0, states.position.norm());
   const Eigen::ColPivHouseholderQR<MatrixXd> qr(parts);
   const double rounding = static_cast<double>(n) * std::numeric_limits<double>::epsilon();
-  const Index count = (qr.matrixR().diagonal().array().abs() > rounding).count();
+  const Index count = n - (qr.matrixR().diagonal().array().abs() <= rounding).count();
   if (count < n) commands = MatrixXd(qr.householderQ()).leftCols(count);
 }
 

@@ -22,7 +22,7 @@ struct SampledDataModel {
   Eigen::MatrixXd motion;  ///< (y, y') after a tick from (y, y', torque), 2n x 3n
   /// Orthonormal, n x r: all commands lie in its span but for what is less than the rounding errors
   /// of A. They are delayed and filtered in these coordinates: of springs and dampers in 6
-  /// directions there are 6.
+  /// directions there are 6. The identity where nothing is delayed or filtered.
   Eigen::MatrixXd commands;
 
   /// Throws std::invalid_argument as sample_loop does.

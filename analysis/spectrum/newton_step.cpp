@@ -50,7 +50,7 @@ double solve_sylvester(const Eigen::Ref<const State<N>>& A, const Eigen::Ref<con
     if (gap != 0) X(0, 0) = C(0, 0) / gap;
     return std::abs(gap);
   }
-  // Larger blocks are rare: the Kronecker matrix of the map, where it fits the capacity.
+  // Others are rare: the Kronecker matrix of the map, where it fits the capacity.
   X.setZero(k, l);
   if (N != kDynamic && k * l > kTwice<N>) return 0;
   State<N> map = State<N>::Zero(k * l, k * l), inverse = State<N>::Identity(k * l, k * l);

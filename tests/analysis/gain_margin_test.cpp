@@ -90,8 +90,25 @@ TEST(GainMargin, IsAskedForBelowOneToo) {
   }
 }
 
+/// With an integral a loop may be stable as it is and not with less.
+TEST(GainMargin, BelowOneIsKeptByALoopThatIsStableAsItIs) {
+  const System<> system = one_joint(1, 20, 100);
+  SampledLoop loop;
+  const MatrixXd one = MatrixXd::Identity(1, 1);
+  loop.memory = {one, one, 1000 * loop.period * one};
+  EXPECT_GT(gain_margin(system, analyze(system), loop), 10);
+  EXPECT_TRUE(keeps_margin(system, analyze(system), loop, 1));
+  EXPECT_TRUE(keeps_margin(system, analyze(system), loop, 0.3));
+  const System<> less = one_joint(1, 0.3 * 20, 0.3 * 100);
+  loop.memory.output *= 0.3;
+  EXPECT_FALSE(keeps_margin(less, analyze(less), loop, 1));
+}
+
 TEST(GainMargin, IsNotAskedForBelowZero) {
   const System<> system = one_joint(1, 2, 3);
+  SampledLoop wrong;
+  wrong.period = -1;
+  EXPECT_THROW(keeps_margin(system, analyze(system), wrong, 0), std::invalid_argument);
   EXPECT_THROW(keeps_margin(system, analyze(system), {}, -0.01), std::invalid_argument);
   EXPECT_THROW(keeps_margin(system, analyze(system), {}, std::nan("")), std::invalid_argument);
 }

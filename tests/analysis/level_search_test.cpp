@@ -55,6 +55,22 @@ TEST(LevelSearch, FindsAPeakBetweenGridPoints) {
   }
 }
 
+TEST(LevelSearch, StaysAtFullDampingWhereNoLevelHasAMargin) {
+  const Search search({1, 0, 1, 1}, 2);
+  EXPECT_FALSE(search.found.kept);
+  EXPECT_EQ(search.found.level, 1);
+  EXPECT_EQ(search.margins, 1);
+}
+
+/// A margin that is zero but for a part of the levels.
+TEST(LevelSearch, FindsALevelThatHasAMarginAtAll) {
+  const auto margin = [](double level) { return level > 0.1 && level < 0.7 ? 0.5 : 0.0; };
+  const FoundLevel found =
+      find_level([&](double level, double least) { return margin(level) >= least; }, margin, 2);
+  EXPECT_FALSE(found.kept);
+  EXPECT_EQ(margin(found.level), 0.5);
+}
+
 TEST(LevelSearch, SpendsLittleOnAMarginOutOfReach) {
   for (const double level : {0.003, 0.007, 0.02, 0.05, 0.13, 0.3, 0.6, 1.0, 5.0}) {
     const Search search({level, 0.7, 4, 1}, 2);
