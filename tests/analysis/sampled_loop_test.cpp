@@ -170,26 +170,6 @@ TEST(SampledLoop, PutsModesInThePlacesOfTheContinuousOnes) {
   EXPECT_GT(compared, 300);
 }
 
-/// An oscillation and an overdamped mode of like size: z = e^(lambda T) of the one is no nearer to
-/// the lambda of the other because both are large.
-TEST(SampledLoop, TellsAnOscillationFromADecayOfItsSize) {
-  System<> system(2);
-  system.mass = Eigen::Matrix2d::Identity();
-  system.stiffness = Eigen::Vector2d(100, 99).asDiagonal();
-  system.damping = Eigen::Vector2d(1, 20).asDiagonal();
-  const Spectrum<> spectrum = analyze(system);
-  SampledLoop loop;
-  loop.period = 1e-4;
-  const SampledSpectrum sampled = sample_loop(system, spectrum, loop);
-  for (int k = 0; k < 2; ++k) {
-    const SampledMode& image = sampled.modes.at(static_cast<std::size_t>(k));
-    EXPECT_EQ(image.kind, spectrum.modes[k].kind);
-    for (std::size_t i = 0; i < 2; ++i) {
-      EXPECT_LT(modulus(image.eigenvalues[i] - spectrum.modes[k].eigenvalues[i]), 0.1);
-    }
-  }
-}
-
 TEST(SampledLoop, FollowsAnOverdampedMode) {
   SampledLoop loop;
   loop.period = 1e-4;
