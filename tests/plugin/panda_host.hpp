@@ -10,7 +10,7 @@
 
 namespace dashpot::tests {
 
-inline const std::string kCartesian = "control: {mode: cartesian}\n";
+inline constexpr const char* kCartesian = "control: {mode: cartesian}\n";
 
 inline controller::JointVector joint_vector(const std::vector<double>& values) {
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));

@@ -40,7 +40,7 @@ Host carrying_host(const std::string& carried, const std::string& settings) {
 
 /// Gains of its own, because the default ones depend on what is configured.
 const std::string kGains =
-    kCartesian +
+    std::string(kCartesian) +
     "gains: {task: {stiffness: [500, 500, 500, 30, 30, 30], damping: [40, 40, 40, 3, 3, 3]}, "
     "null_space: {stiffness: 10, damping: 2}}\n";
 

@@ -14,7 +14,7 @@ namespace {
 TEST(Plugin, AllocatesNothingInATick) {
   if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "the sanitizer owns malloc";
   EXPECT_GE(testing::allocations_of([] { create(panda()); }), 1);
-  for (const std::string& mode : {std::string(), kCartesian}) {
+  for (const std::string& mode : {std::string(), std::string(kCartesian)}) {
     Host host(create(panda() + mode + "analysis: {every: 2}\n"), panda_posture());
     std::vector<double> goal = panda_posture();
     const dashpot_setpoint setpoint = host.joint_setpoint(goal);
