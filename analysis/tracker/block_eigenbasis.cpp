@@ -8,20 +8,6 @@
 namespace dashpot::analysis {
 namespace {
 
-/// A step as large as this does not say what it seems to.
-constexpr double kSmallStep = 0.3;
-/// Between zero modes, whose couplings and rates are often small together: they are better parted
-/// all at once.
-constexpr double kSmallZeroStep = 1e-3;
-/// Up to this size it does no harm if it comes of rounding errors.
-constexpr double kTinyStep = 1e-6;
-
-void clear_padding(const BlockEigenbasis& basis, int rows, PackedMatrix& X) {
-  for (int i = 0; i < rows; ++i) {
-    for (int j = basis.columns(); j < X.width; ++j) X(i, j) = 0;
-  }
-}
-
 /// X(row, column), X(row + 1, column + 1), ...: four entries, of which `count` exist.
 Vec4d diagonal(const PackedMatrix& X, int row, int column, int count, double otherwise) {
   Vec4d lanes;
@@ -79,95 +65,6 @@ void take_diagonal(const BlockEigenbasis& basis, PackedMatrix& G,
       }
     }
   }
-}
-
-/// E between mode i and all others.
-void solve_row(const BlockEigenbasis& basis, const PackedMatrix& G, int i, PackedMatrix& E) {
-  const int m = basis.modes;
-  const Block2<double> A = basis.block(i);
-  std::array<Block2<Vec4d>, kMaxDof / 4> X;
-  for (int j = 0; j < m; j += 4) {
-    const Block2<Vec4d> B = basis.blocks_from(j);
-    const Block2<Vec4d> Q{-load(G.row(i) + j), -load(G.row(i) + m + j), load(G.row(m + i) + j),
-                          load(G.row(m + i) + m + j)};
-    X[at(j / 4)] = solve_sylvester(A, B, Q);
-  }
-  // What lanes beyond the last mode hold is overwritten by the next part of the row.
-  for (int j = 0; j < m; j += 4) {
-    store(E.row(i) + j, X[at(j / 4)].a);
-    store(E.row(m + i) + j, X[at(j / 4)].c);
-  }
-  for (int j = 0; j < m; j += 4) {
-    store(E.row(i) + m + j, X[at(j / 4)].b);
-    store(E.row(m + i) + m + j, X[at(j / 4)].d);
-  }
-}
-
-/// E between mode i and zero mode k, both ways, and between zero modes.
-void solve_zeros(const BlockEigenbasis& basis, const PackedMatrix& G, PackedMatrix& E) {
-  const int m = basis.modes;
-  for (int k = 0; k < basis.zeros; ++k) {
-    const int column = 2 * m + k;
-    const double x = basis.rate[at(k)];
-    for (int i = 0; i < m; ++i) {
-      auto [a, b, c, d] = basis.block(i);
-      a -= x, d -= x;
-      const double inverse = 1 / (a * d - b * c);
-      const double q0 = -G(i, column), q1 = G(m + i, column);
-      E(i, column) = inverse * (d * q0 - b * q1);
-      E(m + i, column) = inverse * (a * q1 - c * q0);
-      const double w0 = G(column, i), w1 = G(column, m + i);  // x e - e Lambda_i = w
-      E(column, i) = -inverse * (w0 * d - w1 * c);
-      E(column, m + i) = -inverse * (w1 * a - w0 * b);
-    }
-    for (int l = 0; l < basis.zeros; ++l) {
-      E(column, 2 * m + l) = G(column, 2 * m + l) / (x - basis.rate[at(l)]);
-    }
-  }
-}
-
-template <typename Visit>
-void visit_block(const BlockEigenbasis& basis, int i, int j, const Visit& visit) {
-  visit(basis.first(i), basis.first(j));
-  if (j < basis.modes) visit(basis.first(i), basis.second(j));
-  if (i < basis.modes) {
-    visit(basis.second(i), basis.first(j));
-    if (j < basis.modes) visit(basis.second(i), basis.second(j));
-  }
-}
-
-double block_norm(const BlockEigenbasis& basis, const PackedMatrix& X, int i, int j) {
-  double sum = 0;
-  visit_block(basis, i, j, [&](int row, int column) { sum += X(row, column) * X(row, column); });
-  return std::sqrt(sum);
-}
-
-/// E_ij = -Sigma_i R_ij / 2: the columns stay orthonormal, and are not told apart.
-void only_orthonormalize(const BlockEigenbasis& basis, const PackedMatrix& R, int i, int j,
-                         PackedMatrix& E) {
-  visit_block(basis, i, j, [&](int row, int column) {
-    E(row, column) = row < basis.modes ? -0.5 * R(row, column) : 0.5 * R(row, column);
-  });
-}
-
-double squared_norm(const BlockEigenbasis& basis, const PackedMatrix& X) {
-  Vec4d squares{};
-  for (int i = 0; i < basis.columns(); ++i) {
-    for (int j = 0; j < X.width; j += 4) squares += load(X.row(i) + j) * load(X.row(i) + j);
-  }
-  return sum(squares);
-}
-
-/// Couplings between zero modes that come of what the rest of the step, to its square, lets them
-/// have of the modes' damping: they go away with it.
-double zeros_disturbance(const BlockEigenbasis& basis, const PackedMatrix& E) {
-  if (basis.zeros < 2) return 0;
-  double rates = 0, among_zeros = 0;
-  for (int i = 0; i < basis.modes; ++i) rates += basis.block(i).squared_norm();
-  for (int i = 2 * basis.modes; i < basis.columns(); ++i) {
-    for (int j = 2 * basis.modes; j < basis.columns(); ++j) among_zeros += E(i, j) * E(i, j);
-  }
-  return std::sqrt(rates) * std::max(0.0, squared_norm(basis, E) - among_zeros);
 }
 
 /// R = Z' S Z (Sigma is not yet subtracted) and G = Z' B Z, with S Z = [Z_s or K Z_s; -M V] and
@@ -266,41 +163,6 @@ void evaluate(const SymmetricPencil& pencil, BlockEigenbasis& basis,
   subtract_blocks(basis, residual.R, residual.G);
   for (int i = 0; i < basis.columns(); ++i) residual.R(i, i) -= i < basis.modes ? 1 : -1;
   take_diagonal(basis, residual.G, residual.diagonal);
-}
-
-CloseBlocks newton_step(const BlockEigenbasis& basis, const TrackedResidual& residual,
-                        double roundoff_bound, PackedMatrix& E, double& size) noexcept {
-  E.width = basis.Z.width;
-  for (int i = 0; i < basis.modes; ++i) solve_row(basis, residual.G, i, E);
-  if (basis.zeros > 0) solve_zeros(basis, residual.G, E);
-  for (int i = 0; i < basis.blocks(); ++i) only_orthonormalize(basis, residual.R, i, i, E);
-  clear_padding(basis, basis.columns(), E);
-  size = std::sqrt(squared_norm(basis, E));
-  CloseBlocks close;
-  if (size < kTinyStep) return close;
-  const double zeros_roundoff_bound = roundoff_bound + zeros_disturbance(basis, E);
-  double worst = 0;
-  bool left_out = false;
-  for (int i = 0; i < basis.blocks(); ++i) {
-    for (int j = 0; j < i; ++j) {
-      const double step = std::max(block_norm(basis, E, i, j), block_norm(basis, E, j, i));
-      if (step < kTinyStep) continue;
-      const bool zeros = j >= basis.modes;
-      const double small = zeros ? kSmallZeroStep : kSmallStep,
-                   least = zeros ? zeros_roundoff_bound : roundoff_bound;
-      const double coupling =
-          std::max(block_norm(basis, residual.G, i, j), block_norm(basis, residual.G, j, i));
-      if (coupling > roundoff_bound && step < small) continue;
-      only_orthonormalize(basis, residual.R, i, j, E);
-      only_orthonormalize(basis, residual.R, j, i, E);
-      left_out = true;
-      if (coupling <= least || coupling < worst) continue;
-      worst = coupling;
-      close = {j, i};
-    }
-  }
-  if (left_out) size = std::sqrt(squared_norm(basis, E));
-  return close;
 }
 
 int packed_width(int modes, int zeros) noexcept {

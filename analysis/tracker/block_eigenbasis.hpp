@@ -95,9 +95,12 @@ struct CloseBlocks {
 /// Computes Newton's step Z <- Z (I + E) on the whole basis:
 /// Lambda_i E_ij - E_ij Lambda_j = -Sigma_i G_ij off the diagonal. On the diagonal, and where F_ij
 /// and the differences of the eigenvalues are below `roundoff_bound` (1/s), E makes Z orthonormal
-/// again. Returns the two blocks that are hardest to separate, if there are pairs whose E is not
-/// small; E is left out for all such pairs. `size` is the Frobenius norm of E. (Dongarra, Moler,
-/// Wilkinson 1983; Davies, Modi 1986; Ogita, Aishima 2018.)
+/// again. Modes that coincide as far as the rest of the step lets one see are only parted across
+/// (an eigenvalue of one from the other one's conjugate, or from its other real one): no direction
+/// tells them apart, and what couples them goes away with the square of the step. Returns the two
+/// blocks that are hardest to separate, if there are other pairs whose E is not small; E is left
+/// out for all such pairs. `size` is the Frobenius norm of E. (Dongarra, Moler, Wilkinson 1983;
+/// Davies, Modi 1986; Ogita, Aishima 2018.)
 CloseBlocks newton_step(const BlockEigenbasis& basis, const TrackedResidual& residual,
                         double roundoff_bound, PackedMatrix& E, double& size) noexcept;
 

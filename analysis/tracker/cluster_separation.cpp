@@ -13,10 +13,6 @@ namespace {
 
 /// Squared lengths in the metric below this, relative to Euclidean ones, count as zero.
 constexpr double kNeutralLength = 1e-4;
-/// Blocks whose trace and determinant agree to this, relative to their size, coincide.
-constexpr double kCoinciding = 1e-10;
-/// What is smaller than this, relative to the rest, has no direction.
-constexpr double kNothing = 1e-8;
 
 /// k x l, k and l <= 2 kMaxDof
 using Cluster = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxWidth, kMaxWidth>;
@@ -195,67 +191,6 @@ bool solve_chosen(const SmallProblem& problem, const Choice& choice, Cluster& ou
   return vectors.allFinite() && normalize(problem, vectors, out);
 }
 
-bool coincide(const BlockEigenbasis& basis, int i, int j) {
-  const Block2<double> a = basis.block(i), b = basis.block(j);
-  const double size = std::max(std::abs(a.trace()), std::sqrt(std::abs(a.determinant())));
-  return std::abs(a.trace() - b.trace()) <= kCoinciding * size &&
-         std::abs(a.determinant() - b.determinant()) <= kCoinciding * size * size;
-}
-
-/// The energy metric in the columns of a projection: N, with the sign of kinetic energies turned.
-Cluster energy_metric(const BlockEigenbasis& basis, const TrackedResidual& residual,
-                      const Projection& shared) {
-  Cluster energy = shared.N;
-  for (int i = 0; i < shared.size; ++i) {
-    for (int j = 0; j < shared.size; ++j) {
-      for (int k = basis.modes; k < basis.columns(); ++k) {
-        energy(i, j) -=
-            2 * basis.Z(k, shared.columns[at(i)]) * residual.MV(k, shared.columns[at(j)]);
-      }
-    }
-  }
-  return energy;
-}
-
-/// X with X' N X = diag(I, -I) and X' energy X diagonal, columns of type + first.
-bool orthonormal_columns(const Projection& shared, const Cluster& energy, Cluster& X) {
-  const int k = shared.size / 2;
-  const ClusterSolver energies(energy);
-  if (!(energies.eigenvalues()[0] > kNothing * energies.eigenvalues()[2 * k - 1])) return false;
-  X = energies.eigenvectors();
-  for (int j = 0; j < 2 * k; ++j) X.col(j) /= std::sqrt(energies.eigenvalues()[j]);
-  const Cluster metric = X.transpose() * shared.N * X;
-  const ClusterSolver types(metric);
-  const auto& lengths = types.eigenvalues();
-  if (!(lengths[k - 1] < -kNothing) || !(lengths[k] > kNothing)) return false;
-  const Cluster rotated = X * types.eigenvectors();
-  for (int j = 0; j < k; ++j) {
-    X.col(j) = rotated.col(k + j) / std::sqrt(lengths[k + j]);
-    X.col(k + j) = rotated.col(j) / std::sqrt(-lengths[j]);
-  }
-  return true;
-}
-
-/// Pairs them: with T = [A B; B' D], A is made diagonal, and B by rotating the columns of type -.
-/// Of coinciding modes Lambda^2 - 2 a Lambda + w^2 = 0, so that D is diagonal then, too.
-bool pair_columns(const Projection& shared, Cluster& X) {
-  const int k = shared.size / 2;
-  Cluster T = X.transpose() * shared.T * X;
-  const Cluster A = T.topLeftCorner(k, k);
-  const ClusterSolver elastic(A);
-  Cluster rotated = X.leftCols(k) * elastic.eigenvectors();
-  X.leftCols(k) = rotated;
-  Cluster Q = T.bottomLeftCorner(k, k) * elastic.eigenvectors();
-  const double size = Q.norm();
-  for (int j = 0; j < k; ++j) {
-    if (!(Q.col(j).norm() > kNothing * size)) return false;
-  }
-  orthonormalize(Q);
-  rotated = X.rightCols(k) * Q;
-  X.rightCols(k) = rotated;
-  return X.allFinite();
-}
-
 }  // namespace
 
 bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
@@ -280,31 +215,6 @@ bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
   columns << (X_first ? X : Y), (X_first ? Y : X);
   turn_columns(problem, columns, basis);
   return true;
-}
-
-bool separate_coinciding(const TrackedResidual& residual, BlockEigenbasis& basis,
-                         Work& work) noexcept {
-  std::array<bool, kMaxDof> done{};
-  bool any = false;
-  for (int i = 0; i < basis.modes; ++i) {
-    Projection shared;
-    for (int j = i; j < basis.modes; ++j) {
-      if (done[at(j)] || !coincide(basis, i, j)) continue;
-      done[at(j)] = true;
-      shared.add(j);
-    }
-    const int modes = shared.size;
-    if (modes < 2) continue;
-    if (!work.take(cubed(2 * modes, 60) + squared(2 * modes, 300))) return any;
-    for (int j = 0; j < modes; ++j) shared.add(basis.modes + shared.columns[at(j)]);
-    project(basis, residual, shared);
-    Cluster X;
-    if (!orthonormal_columns(shared, energy_metric(basis, residual, shared), X)) continue;
-    if (!pair_columns(shared, X)) continue;
-    turn_columns(shared, X, basis);
-    any = true;
-  }
-  return any;
 }
 
 bool separate_zero_modes(const TrackedResidual& residual, BlockEigenbasis& basis) noexcept {

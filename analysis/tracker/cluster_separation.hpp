@@ -15,14 +15,6 @@ namespace dashpot::analysis {
 bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
                      BlockEigenbasis& basis) noexcept;
 
-/// Gives each mode of a group with coinciding eigenvalues a plane that is orthogonal to the others'
-/// planes, in the metric and in the energy, and as well conditioned as the space allows. Such modes
-/// share a space in which any orthonormal columns are a solution. The columns of a direct solution
-/// depend on rounding errors. `residual` belongs to the basis. Returns true if there were any such
-/// modes. Modes for which `work` does not grant enough stay as they are.
-bool separate_coinciding(const TrackedResidual& residual, BlockEigenbasis& basis,
-                         Work& work) noexcept;
-
 /// Rotates the columns of the zero modes, all at once, until the damping tells them apart. The
 /// columns are orthonormal, or nearly. `residual` belongs to the basis, at least nearly. Returns
 /// false if it is not finite.

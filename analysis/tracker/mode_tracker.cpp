@@ -33,7 +33,7 @@ constexpr std::int64_t kPartingWork = 60'000;
 /// Work of evaluating a basis, and of the step that follows.
 std::int64_t iteration_work(const BlockEigenbasis& basis) {
   const std::int64_t left = basis.two_sided ? cubed(basis.columns(), 6) : 0;
-  return cubed(basis.columns(), 16) + squared(basis.columns(), 60) + left;
+  return cubed(basis.columns(), 16) + squared(basis.columns(), 130) + left;
 }
 
 /// Work of the enclosure, the modes and their shapes, of n joints.
@@ -194,7 +194,7 @@ bool ModeTracker::separate(const CloseBlocks& close, Work& work) noexcept {
   if (!work.take(kPartingWork)) return false;
   if (basis_.two_sided) return separate_two_sided(residual_, close, basis_);
   if (close.first >= basis_.modes) return separate_zero_modes(residual_, basis_);
-  return separate_coinciding(residual_, basis_, work) || separate_blocks(residual_, close, basis_);
+  return separate_blocks(residual_, close, basis_);
 }
 
 /// Reads the numbers of basis_; false if what is a zero mode is to be decided again.
@@ -248,10 +248,7 @@ bool ModeTracker::restart(const SymmetricPencil& pencil, bool two_sided, Tracked
   }
   still_floor_ = spectrum_.zero_modes.floor;
   evaluate(pencil, basis_, residual_);
-  if (!two_sided) {
-    if (separate_coinciding(residual_, basis_, work)) evaluate(pencil, basis_, residual_);
-    rotate_hyperbolically(residual_, 0, basis_);
-  }
+  if (!two_sided) rotate_hyperbolically(residual_, 0, basis_);
   enclose(pencil, basis_, residual_, enclosure_);  // for its roundoff_bound
   match(pencil, before);
   forget_past();

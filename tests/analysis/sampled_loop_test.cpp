@@ -330,7 +330,8 @@ TEST(SampledLoop, DelaysOnlyTheCommandsThatThereAre) {
     EXPECT_NEAR(radius, all.cwiseAbs().maxCoeff(), 1e-10);
     for (const Complex& z : all) {  // those at zero are defective, and none of theirs is exact
       if (std::abs(z) < 0.1) continue;
-      EXPECT_LT((few.array() - z).abs().minCoeff(), 1e-9) << z;
+      const bool doubled = ((all.array() - z).abs() < 1e-6).count() > 1;  // known to a root of eps
+      EXPECT_LT((few.array() - z).abs().minCoeff(), doubled ? 1e-7 : 1e-9) << z;
       ++largest;
     }
     const auto beyond = [](const Eigen::VectorXcd& values) {

@@ -96,28 +96,6 @@ TEST(Work, OfASylvesterEquationIsCountedOnceForEachPair) {
             3 * 250 + equation(3, 40, 500) + 2 * equation(6, 60, 0));
 }
 
-/// Modes that coincide are parted if the work of that is granted, and stay if it is not.
-TEST(Work, OfPartingModesThatCoincide) {
-  System<kMaxDof> system(3);
-  system.mass.setIdentity();
-  system.damping.setIdentity();
-  system.stiffness.diagonal() << 9, 9, 400;
-  const SymmetricPencil pencil = symmetric_pencil(system);
-  auto spectrum = std::make_unique<Spectrum<kMaxDof>>();
-  ASSERT_EQ(SpectrumSolver<kMaxDof>().solve(system, *spectrum), Status::kOk);
-  auto basis = std::make_unique<BlockEigenbasis>();
-  auto residual = std::make_unique<TrackedResidual>();
-  ASSERT_TRUE(start_basis(pencil, *spectrum, *basis));
-  evaluate(pencil, *basis, *residual);
-  const std::int64_t needed = cubed(4, 60) + squared(4, 300);
-  const PackedMatrix before = basis->Z;
-  Work less(needed - 1), enough(needed);
-  EXPECT_FALSE(separate_coinciding(*residual, *basis, less));
-  EXPECT_EQ(basis->Z.items, before.items);
-  EXPECT_TRUE(separate_coinciding(*residual, *basis, enough));
-  EXPECT_EQ(enough.done(), needed);
-}
-
 /// What one update left undone the next one finds, in its place.
 TEST(Work, OfTheTrackerIsAllOrNothing) {
   Random random(812);

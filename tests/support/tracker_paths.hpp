@@ -202,6 +202,20 @@ inline SystemPath coinciding(Dice& dice) {
   };
 }
 
+/// Modes that coincide throughout while all shapes turn, as those of a moving arm whose stiffness
+/// is a multiple of its mass.
+inline SystemPath turning_coinciding(Dice& dice) {
+  const int n = dice.integer(2, 7), equal = dice.integer(2, n);
+  const Eigen::MatrixXd T = dice.congruence(n, 2), turn = 0.3 * dice.matrix(n, n);
+  const double zeta = dice.log_uniform(1e-3, 3);
+  Eigen::VectorXd w = 5 * dice.log_vector(n, 10);
+  w.head(equal).setConstant(w[0]);
+  return [=](double t) {
+    return classical_system(T * (Eigen::MatrixXd::Identity(n, n) + t * turn), (1 + 0.3 * t) * w,
+                            Eigen::VectorXd::Constant(n, zeta));
+  };
+}
+
 /// Coefficients that turn and swing at random, not proportionally damped; `Factored` comes with a
 /// factor of fewer rows than joints at times.
 inline SystemPath wandering(Dice& dice) {
@@ -359,6 +373,7 @@ inline const std::vector<PathFamily>& path_families() {
       {"reals meet", reals_meet},
       {"graded", graded},
       {"coinciding", coinciding},
+      {"turning coinciding", turning_coinciding},
       {"wandering", wandering},
       {"frozen", frozen},
       {"jumping", jumping},

@@ -1,0 +1,110 @@
+// Modes of one frequency and ratio that stay so while their shapes turn: followed, with bounds that
+// hold, and told apart when they part.
+#include <dashpot/tests/support/enclosure.hpp>
+#include <dashpot/tests/support/panda_path.hpp>
+#include <dashpot/tests/support/tracked.hpp>
+#include <dashpot/tests/support/tracker_paths.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+
+namespace dashpot::analysis {
+namespace {
+
+using Eigen::MatrixXd;
+using testing::Dice;
+using testing::SystemPath;
+
+struct EnclosedFollower : testing::Tracked {
+  /// Along [0, length] of the path.
+  void follow(const SystemPath& path, int steps, double length) {
+    for (int step = 0; step < steps; ++step) {
+      const System<kMaxDof> system = path(length * step / steps);
+      ASSERT_EQ(update(system), Status::kOk) << "step " << step;
+      const testing::Verdict verdict = testing::judge<long double>(system, *spectrum, 1e-17);
+      ASSERT_TRUE(verdict.enclosed)
+          << "step " << step << ": " << verdict.what << ", error / bound " << verdict.tightest;
+      widest = std::max(widest, verdict.widest);
+    }
+  }
+  double widest = 0;
+};
+
+/// Springs and dampers that are multiples of a moving arm's mass matrix.
+SystemPath shaped_panda(double ratio, bool factored) {
+  return [=](double t) {
+    System<kMaxDof> system(7);
+    system.mass = testing::panda(testing::swing(t)).mass;
+    system.damping = 2 * ratio * 20 * system.mass;
+    system.stiffness = 400 * system.mass;
+    if (factored) system.stiffness_factor = 20 * MatrixXd(system.mass.llt().matrixU());
+    return system;
+  };
+}
+
+TEST(CoincidingModes, OfAMovingArmAreFollowed) {
+  for (const double ratio : {0.01, 0.2, 0.7, 3.0}) {
+    for (const bool factored : {false, true}) {
+      SCOPED_TRACE(::testing::Message() << "ratio " << ratio << ", factored " << factored);
+      EnclosedFollower follower;
+      follower.follow(shaped_panda(ratio, factored), 100, 0.1);
+      EXPECT_EQ(follower.counters().direct, 1);
+      EXPECT_EQ(follower.spectrum->epoch, 1);
+      EXPECT_LE(follower.counters().iterations, 250);
+      EXPECT_LE(follower.widest, 2e-8);
+      for (int i = 0; i < 7; ++i) {
+        EXPECT_NEAR(follower.mode(i).natural_frequency, 20, 1e-9);
+        EXPECT_NEAR(follower.mode(i).damping_ratio, ratio, 1e-9);
+      }
+    }
+  }
+}
+
+/// Some of them differ from then on, by more and more.
+TEST(CoincidingModes, ArePartedWhenTheyDiffer) {
+  const SystemPath same = shaped_panda(0.3, false);
+  const SystemPath path = [&same](double t) {
+    System<kMaxDof> system = same(t);
+    const double late = std::max(0.0, t - 0.05);
+    system.stiffness.diagonal() += 1e4 * late * late * Eigen::VectorXd::LinSpaced(7, 1, 4);
+    return system;
+  };
+  EnclosedFollower follower;
+  follower.follow(path, 200, 0.15);
+  EXPECT_LE(follower.counters().direct, 3);
+  EXPECT_LE(follower.widest, 1e-8);
+  std::vector<double> frequencies;
+  for (int i = 0; i < 7; ++i) frequencies.push_back(follower.mode(i).natural_frequency);
+  std::sort(frequencies.begin(), frequencies.end());
+  for (std::size_t i = 0; i < 6; ++i) EXPECT_GT(frequencies[i + 1], 1.01 * frequencies[i]);
+}
+
+TEST(CoincidingModes, AreFollowedAlongHardPaths) {
+  struct Family {
+    SystemPath (*make)(Dice&);
+    double tracked;  ///< least share of updates after the first
+  };
+  for (const auto& [make, tracked] :
+       {Family{testing::coinciding, 0.95}, Family{testing::turning_coinciding, 0.98},
+        Family{testing::skewed_coinciding, 0.95}}) {
+    TrackerCounters sum;
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      SCOPED_TRACE(::testing::Message() << "seed " << seed);
+      Dice dice(seed);
+      EnclosedFollower follower;
+      follower.follow(make(dice), 60, 0.3);
+      EXPECT_LE(follower.widest, 1e-5);
+      sum.tracked += follower.counters().tracked;
+      sum.direct += follower.counters().direct - 1;
+    }
+    EXPECT_GE(static_cast<double>(sum.tracked),
+              tracked * static_cast<double>(sum.tracked + sum.direct));
+    std::printf("tracked %lld, direct %lld\n", static_cast<long long>(sum.tracked),
+                static_cast<long long>(sum.direct));
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::analysis
