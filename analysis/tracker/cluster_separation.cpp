@@ -4,7 +4,6 @@
 #include <dashpot/analysis/tracker/cluster_separation.hpp>
 
 #include <Eigen/Eigenvalues>
-#include <algorithm>
 #include <cmath>
 #include <limits>
 

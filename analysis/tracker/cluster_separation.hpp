@@ -1,6 +1,5 @@
 #pragma once
 #include <dashpot/analysis/tracker/block_eigenbasis.hpp>
-#include <dashpot/analysis/work.hpp>
 
 namespace dashpot::analysis {
 

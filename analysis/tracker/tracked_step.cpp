@@ -10,16 +10,20 @@ namespace {
 
 /// A step as large as this does not say what it seems to.
 constexpr double kSmallStep = 0.3;
-/// Between what may coincide: modes, or zero modes, whose couplings and rates are often small
-/// together. They are better parted all at once.
+/// Between what may coincide: modes that are alike, and zero modes, whose couplings and rates are
+/// often small together. They are better parted all at once.
 constexpr double kSureStep = 1e-3;
 /// Up to this size it does no harm if it comes of rounding errors.
 constexpr double kTinyStep = 1e-6;
 /// Squares of half the difference of a mode's two eigenvalues from here on, relative to the squared
 /// size of its block: not critical.
 constexpr double kTwoRates = 1e-4;
-/// Modes coincide whose eigenvalues differ by less than this part of what disturbs them.
-constexpr double kSame = 0.1;
+/// Distance of the eigenvalues of two modes, relative to that of each one's own two, below which
+/// they may coincide.
+constexpr double kAlike = 0.03;
+/// Alike modes coincide that differ by less than this part of the couplings that the rest of the
+/// step, to its square, and rounding errors bring about.
+constexpr double kSame = 0.3;
 
 void clear_padding(const BlockEigenbasis& basis, PackedMatrix& X) {
   for (int i = 0; i < basis.columns(); ++i) {
@@ -128,18 +132,20 @@ double squared_radius(const Block2<double>& A) {
   return 0.25 * A.trace() * A.trace() - A.determinant();
 }
 
-/// Whether both vibrate or both are overdamped: neither is critical.
-bool may_coincide(const Block2<double>& A, const Block2<double>& B) {
-  const double a = squared_radius(A), b = squared_radius(B);
-  return std::abs(a) > kTwoRates * A.squared_norm() && std::abs(b) > kTwoRates * B.squared_norm() &&
-         (a > 0) == (b > 0);
-}
-
-/// How far the eigenvalues of two modes that may coincide are apart.
+/// How far the eigenvalues of two modes are apart of which both vibrate or both are overdamped.
 double distance(const Block2<double>& A, const Block2<double>& B) {
   const double a = squared_radius(A), b = squared_radius(B);
   return 0.5 * std::abs(A.trace() - B.trace()) +
          std::abs(a - b) / (std::sqrt(std::abs(a)) + std::sqrt(std::abs(b)));
+}
+
+/// Whether two modes are far nearer to each other than their own eigenvalues are, and neither is
+/// critical.
+bool are_alike(const Block2<double>& A, const Block2<double>& B) {
+  const double a = squared_radius(A), b = squared_radius(B);
+  return std::abs(a) > kTwoRates * A.squared_norm() && std::abs(b) > kTwoRates * B.squared_norm() &&
+         (a > 0) == (b > 0) &&
+         distance(A, B) < kAlike * (std::sqrt(std::abs(a)) + std::sqrt(std::abs(b)));
 }
 
 using Matrix2 = Eigen::Matrix2d;
@@ -180,9 +186,9 @@ struct PairEquation {
 
 /// Two blocks whose E may not be what it seems, and the coupling that E leaves.
 struct UnsurePair {
-  int i = 0, j = 0;
-  double coupling = 0, step = 0;
-  bool modes = false;  ///< that may coincide
+  int i, j;
+  double coupling, step;
+  bool alike;
 };
 
 }  // namespace
@@ -204,31 +210,32 @@ CloseBlocks newton_step(const BlockEigenbasis& basis, const TrackedResidual& res
     for (int j = 0; j < i; ++j) {
       const double step = std::max(block_norm(basis, E, i, j), block_norm(basis, E, j, i));
       if (step < kTinyStep) continue;
-      const bool modes = i < basis.vibrations() && may_coincide(basis.block(i), basis.block(j));
-      const double sure = modes || j >= basis.modes ? kSureStep : kSmallStep;
+      const bool alike = i < basis.vibrations() && are_alike(basis.block(i), basis.block(j));
+      const double sure = alike || j >= basis.modes ? kSureStep : kSmallStep;
       double coupling =
           std::max(block_norm(basis, residual.G, i, j), block_norm(basis, residual.G, j, i));
       if (coupling > roundoff_bound && step < sure) continue;
       only_orthonormalize(basis, residual.R, i, j, E);
       only_orthonormalize(basis, residual.R, j, i, E);
-      if (modes) {
-        coupling = std::max(PairEquation(basis, residual.G, i, j).solve_across(E),
-                            PairEquation(basis, residual.G, j, i).solve_across(E));
+      if (alike) {  // less may be left of the coupling, or more of what were rounding errors
+        const double left = std::max(PairEquation(basis, residual.G, i, j).solve_across(E),
+                                     PairEquation(basis, residual.G, j, i).solve_across(E));
+        coupling = std::min(coupling, left);
       }
-      pairs[at(count++)] = {i, j, coupling, step, modes};
+      pairs[at(count++)] = {i, j, coupling, step, alike};
     }
   }
   if (count == 0) return close;
   const double disturbed = roundoff_bound + disturbance(basis, std::sqrt(squared_norm(basis, E)));
   double worst = 0;
   for (int k = 0; k < count; ++k) {
-    const auto& [i, j, coupling, step, modes] = pairs[at(k)];
-    const bool coincide = modes && distance(basis.block(i), basis.block(j)) < kSame * disturbed;
+    const auto& [i, j, coupling, step, alike] = pairs[at(k)];
+    const bool coincide = alike && distance(basis.block(i), basis.block(j)) < kSame * disturbed;
     const double least = coincide           ? disturbed
                          : j >= basis.modes ? zeros_roundoff_bound
                                             : roundoff_bound;
     if (coupling <= least) continue;
-    if (modes && step < kSmallStep) {
+    if (alike && step < kSmallStep) {
       PairEquation(basis, residual.G, i, j).solve(E);
       PairEquation(basis, residual.G, j, i).solve(E);
       continue;

@@ -9,6 +9,8 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cstdio>
+#include <vector>
 
 namespace dashpot::analysis {
 namespace {
@@ -45,7 +47,7 @@ SystemPath shaped_panda(double ratio, bool factored) {
 }
 
 TEST(CoincidingModes, OfAMovingArmAreFollowed) {
-  for (const double ratio : {0.01, 0.2, 0.7, 3.0}) {
+  for (const double ratio : {0.01, 0.2, 0.7, 0.9, 0.97, 1.05, 3.0}) {
     for (const bool factored : {false, true}) {
       SCOPED_TRACE(::testing::Message() << "ratio " << ratio << ", factored " << factored);
       EnclosedFollower follower;
@@ -79,6 +81,27 @@ TEST(CoincidingModes, ArePartedWhenTheyDiffer) {
   for (int i = 0; i < 7; ++i) frequencies.push_back(follower.mode(i).natural_frequency);
   std::sort(frequencies.begin(), frequencies.end());
   for (std::size_t i = 0; i < 6; ++i) EXPECT_GT(frequencies[i + 1], 1.01 * frequencies[i]);
+}
+
+/// Those of one ratio near 1 and different frequencies do not coincide, although steps are large.
+TEST(CoincidingModes, AreNotSeenInModesOfOneRatio) {
+  Dice dice(5);
+  const MatrixXd T = dice.congruence(7, 3), turn = dice.matrix(7, 7);
+  const Eigen::VectorXd w = (Eigen::VectorXd(7) << 5, 8, 12, 18, 25, 40, 60).finished();
+  for (const double ratio : {0.9, 0.95, 0.98, 0.995, 1.05}) {
+    for (const double pace : {0.001, 0.002}) {
+      SCOPED_TRACE(::testing::Message() << "ratio " << ratio << ", pace " << pace);
+      testing::Tracked tracked;
+      for (int step = 0; step < 40; ++step) {
+        const double angle = std::sin(step * step);  // nothing that one could extrapolate
+        const MatrixXd turned = T * (MatrixXd::Identity(7, 7) + pace * angle * turn);
+        ASSERT_EQ(tracked.update(
+                      testing::classical_system(turned, w, Eigen::VectorXd::Constant(7, ratio))),
+                  Status::kOk);
+      }
+      EXPECT_EQ(tracked.counters().direct, 1);
+    }
+  }
 }
 
 TEST(CoincidingModes, AreFollowedAlongHardPaths) {

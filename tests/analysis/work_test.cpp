@@ -1,7 +1,6 @@
 // An analysis does no more work than it is granted, and what it finds does not depend on that.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/spectrum/refinement.hpp>
-#include <dashpot/analysis/tracker/cluster_separation.hpp>
 #include <dashpot/analysis/tracker/tracked_start.hpp>
 #include <dashpot/tests/support/random.hpp>
 
