@@ -108,23 +108,22 @@ double squared_norm(const BlockEigenbasis& basis, const PackedMatrix& X) {
   return sum(squares);
 }
 
+/// Couplings that the square of a step brings about: they go away with it.
+double disturbance(const BlockEigenbasis& basis, double squared_size) {
+  double rates = 0;
+  for (int i = 0; i < basis.modes; ++i) rates += basis.block(i).squared_norm();
+  return std::sqrt(rates) * squared_size;
+}
+
 /// Couplings between zero modes that come of what the rest of the step, to its square, lets them
 /// have of the modes' damping: they go away with it.
 double zeros_disturbance(const BlockEigenbasis& basis, const PackedMatrix& E) {
   if (basis.zeros < 2) return 0;
-  double rates = 0, among_zeros = 0;
-  for (int i = 0; i < basis.modes; ++i) rates += basis.block(i).squared_norm();
+  double among_zeros = 0;
   for (int i = 2 * basis.modes; i < basis.columns(); ++i) {
     for (int j = 2 * basis.modes; j < basis.columns(); ++j) among_zeros += E(i, j) * E(i, j);
   }
-  return std::sqrt(rates) * std::max(0.0, squared_norm(basis, E) - among_zeros);
-}
-
-/// Couplings that the step's square brings about: they go away with it.
-double disturbance(const BlockEigenbasis& basis, double size) {
-  double rates = 0;
-  for (int i = 0; i < basis.modes; ++i) rates += basis.block(i).squared_norm();
-  return std::sqrt(rates) * size * size;
+  return disturbance(basis, std::max(0.0, squared_norm(basis, E) - among_zeros));
 }
 
 /// The square of half the difference of a block's eigenvalues.
@@ -226,7 +225,7 @@ CloseBlocks newton_step(const BlockEigenbasis& basis, const TrackedResidual& res
     }
   }
   if (count == 0) return close;
-  const double disturbed = roundoff_bound + disturbance(basis, std::sqrt(squared_norm(basis, E)));
+  const double disturbed = roundoff_bound + disturbance(basis, squared_norm(basis, E));
   double worst = 0;
   for (int k = 0; k < count; ++k) {
     const auto& [i, j, coupling, step, alike] = pairs[at(k)];
