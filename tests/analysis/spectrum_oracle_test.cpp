@@ -149,21 +149,12 @@ class SpectrumOracle : public ::testing::TestWithParam<std::string> {
     RecordProperty("loosest_bound_over_error", std::to_string(all_seen.loosest));
   }
 
-  const SpectrumCase& reference = testing::spectrum_case(GetParam());
+  const SpectrumCase reference = testing::spectrum_case(GetParam());
   System<> system = system_of(reference);
   Spectrum<> spectrum;
   Tightness seen;
   inline static Tightness all_seen;
 };
-
-template <class Keep>
-std::vector<std::string> names_of_cases(const Keep& keep) {
-  std::vector<std::string> names;
-  for (const SpectrumCase& c : testing::spectrum_cases()) {
-    if (keep(c)) names.push_back(c.name);
-  }
-  return names;
-}
 
 std::string alphanumeric(const ::testing::TestParamInfo<std::string>& instance) {
   std::string name;
@@ -175,9 +166,8 @@ std::string alphanumeric(const ::testing::TestParamInfo<std::string>& instance) 
   return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Systems, SpectrumOracle,
-    ::testing::ValuesIn(names_of_cases([](const SpectrumCase&) { return true; })), alphanumeric);
+INSTANTIATE_TEST_SUITE_P(Systems, SpectrumOracle, ::testing::ValuesIn(testing::spectrum_names()),
+                         alphanumeric);
 
 TEST_P(SpectrumOracle, EnclosesTheTruthByDefault) {
   solve(SpectrumOptions::Residual::kAutomatic);
@@ -203,10 +193,7 @@ TEST_P(SpectrumOracle, EnclosesTheTruthWithWorkingResidualsWhateverTheStatus) {
 
 class SpectrumOracleWithFactor : public SpectrumOracle {};
 INSTANTIATE_TEST_SUITE_P(Systems, SpectrumOracleWithFactor,
-                         ::testing::ValuesIn(names_of_cases([](const SpectrumCase& c) {
-                           return c.stiffness_factor.has_value();
-                         })),
-                         alphanumeric);
+                         ::testing::ValuesIn(testing::spectrum_names_with_factor()), alphanumeric);
 
 TEST_P(SpectrumOracleWithFactor, EnclosesTheTruth) {
   system.stiffness_factor = *reference.stiffness_factor;

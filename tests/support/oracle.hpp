@@ -2,9 +2,9 @@
 // Reference data of tests/data: second-order systems M q'' + C q' + K q = f with spectra known to
 // 32 digits and responses to 16.
 //
-//   for (const SpectrumCase& reference : spectrum_cases())
-//     for (const Match& match : match_eigenvalues(computed_of(reference), reference.eigenvalues))
-//       EXPECT_LT(match.relative, 1e-12L);
+//   const SpectrumCase reference = spectrum_case(spectrum_names().front());
+//   for (const Match& match : match_eigenvalues(computed_of(reference), reference.eigenvalues))
+//     EXPECT_LT(match.relative, 1e-12L);
 //
 // The truth is that of the stored doubles; how it was found and proved is told in
 // tests/data/exact.py. SI units throughout.
@@ -13,7 +13,6 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <cstdint>
 #include <fstream>
 #include <limits>
 #include <optional>
@@ -45,7 +44,6 @@ struct ReferenceEigenvalue {
   /// eigenvalues, and where it is not known (responses.json).
   double condition = std::numeric_limits<double>::infinity();
 
-  [[nodiscard]] std::complex<double> rounded() const { return {re_hi, im_hi}; }
   [[nodiscard]] std::complex<long double> value() const {
     return {widened(re_hi) + widened(re_lo), widened(im_hi) + widened(im_lo)};
   }
@@ -55,27 +53,13 @@ struct ReferenceEigenvalue {
 
 /// One entry of spectra.json. Matrices are n x n and exactly symmetric; mass is positive definite.
 struct SpectrumCase {
-  std::string name, family;
-  std::uint64_t seed = 0;
+  std::string name;
   int n = 0;
   /// Zero modes: the exact dimension of the null space of the stored stiffness.
   int r = 0;
-  /// What the family promises (criticality, defect, coincidence) holds for the stored doubles.
-  bool exact = false;
-  /// Decided exactly; rounding can make a singular damping slightly indefinite.
-  bool damping_semidefinite = false;
-  bool stiffness_semidefinite = false;
-  /// U0' C V != 0 for some V that is M-orthogonal to the zero modes U0.
-  bool couples_zero_modes = false;
-  /// C U0 != 0.
-  bool damps_zero_modes = false;
   Eigen::MatrixXd mass, damping, stiffness;
   /// W, (n - r) x n, with W' W = stiffness exactly.
   std::optional<Eigen::MatrixXd> stiffness_factor;
-  /// J, K_C and C_C: J' K_C J = stiffness exactly. With friction, damping is more than J' C_C J.
-  std::optional<Eigen::MatrixXd> jacobian, task_stiffness, task_damping;
-  /// Of the `classical` families, before rounding; else empty.
-  std::vector<double> prescribed_damping_ratios;
   /// All 2n, by modulus, conjugates adjacent (positive imaginary part first).
   std::vector<ReferenceEigenvalue> eigenvalues;
 };
@@ -125,12 +109,6 @@ struct ResponseCase {
   std::vector<ReferenceReceptance> receptance;
 };
 
-inline std::ostream& operator<<(std::ostream& out, const SpectrumCase& c) {
-  return out << c.name;
-}
-inline std::ostream& operator<<(std::ostream& out, const ResponseCase& c) {
-  return out << c.name;
-}
 inline std::ostream& operator<<(std::ostream& out, const ReferenceEigenvalue& z) {
   return out << z.re_hi << (z.im_hi < 0 ? " - " : " + ") << std::abs(z.im_hi) << "i";
 }
@@ -229,24 +207,12 @@ inline Trajectory get_trajectory(const Json& object, int n) {
 inline SpectrumCase to_spectrum_case(const Json& j) {
   SpectrumCase c;
   c.name = get<std::string>(j, "name");
-  c.family = get<std::string>(j, "family");
-  c.seed = get<std::uint64_t>(j, "seed");
   c.n = get<int>(j, "n");
   c.r = get<int>(j, "r");
-  c.exact = get<bool>(j, "exact");
-  c.damping_semidefinite = get<bool>(j, "damping_semidefinite");
-  c.stiffness_semidefinite = get<bool>(j, "stiffness_semidefinite");
-  c.couples_zero_modes = get<bool>(j, "couples_zero_modes");
-  c.damps_zero_modes = get<bool>(j, "damps_zero_modes");
   c.mass = get_square(j, "mass", c.n);
   c.damping = get_square(j, "damping", c.n);
   c.stiffness = get_square(j, "stiffness", c.n);
   if (j.contains("stiffness_factor")) c.stiffness_factor = get_matrix(j, "stiffness_factor", c.n);
-  c.jacobian = get_optional_matrix(j, "jacobian");
-  c.task_stiffness = get_optional_matrix(j, "task_stiffness");
-  c.task_damping = get_optional_matrix(j, "task_damping");
-  if (j.contains("prescribed_damping_ratios"))
-    c.prescribed_damping_ratios = get<std::vector<double>>(j, "prescribed_damping_ratios");
   c.eigenvalues = get_eigenvalues(j, c.n);
   return c;
 }
@@ -291,63 +257,77 @@ inline ResponseCase to_response_case(const Json& j) {
   return c;
 }
 
-/// Throws std::runtime_error naming the file, the system and the key.
-template <class Case>
-std::vector<Case> load(const std::string& path, Case (*convert)(const Json&)) {
-  std::ifstream file(path);
-  if (!file)
-    throw std::runtime_error(path + ": cannot be opened (tests/data/make_oracle.py writes it)");
-  Json root;
-  try {
-    root = Json::parse(file);
-  } catch (const Json::exception& error) {
-    throw std::runtime_error(path + ": " + error.what());
-  }
-  std::vector<Case> cases;
-  std::string current = "(top level)";
-  try {
-    for (const Json& entry : member(root, "systems")) {
-      current = "system " + std::to_string(cases.size());
-      current += " '" + get<std::string>(entry, "name") + "'";
-      cases.push_back(convert(entry));
+/// The systems of a file, each in a line of its own, by their names. A line is read only when its
+/// system is wanted: each test is a process, and most of them want none.
+class Systems {
+ public:
+  /// Throws std::runtime_error naming the file.
+  explicit Systems(const std::string& file) : path_(DASHPOT_TEST_DATA_DIR "/" + file) {
+    std::ifstream stream(path_);
+    const std::string begin = "{\"name\":\"";
+    for (std::string line; std::getline(stream, line);) {
+      if (line.compare(0, begin.size(), begin) != 0) continue;
+      if (line.back() == ',') line.pop_back();
+      names_.push_back(line.substr(begin.size(), line.find('"', begin.size()) - begin.size()));
+      lines_.push_back(std::move(line));
     }
-  } catch (const std::exception& error) {
-    throw std::runtime_error(path + ": " + current + ": " + error.what());
+    if (names_.empty()) {
+      throw std::runtime_error(path_ + ": no systems in it (tests/data/make_oracle.py writes it)");
+    }
   }
-  if (cases.empty()) throw std::runtime_error(path + ": no systems in it");
-  return cases;
+
+  const std::vector<std::string>& names() const { return names_; }
+
+  /// The names of those that have something under `key`.
+  std::vector<std::string> names_with(const std::string& key) const {
+    std::vector<std::string> result;
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      if (lines_[i].find('"' + key + "\":") != std::string::npos) result.push_back(names_[i]);
+    }
+    return result;
+  }
+
+  /// Throws std::runtime_error naming the file and the system.
+  Json read(const std::string& name) const {
+    const auto found = std::find(names_.begin(), names_.end(), name);
+    if (found == names_.end()) throw std::runtime_error(path_ + ": no system '" + name + "'");
+    return Json::parse(lines_[static_cast<std::size_t>(found - names_.begin())]);
+  }
+
+ private:
+  std::string path_;
+  std::vector<std::string> names_, lines_;
+};
+
+inline const Systems& spectra() {
+  static const Systems systems("spectra.json");
+  return systems;
 }
 
-template <class Case>
-const Case& find(const std::vector<Case>& cases, const std::string& name) {
-  const auto found =
-      std::find_if(cases.begin(), cases.end(), [&](const Case& c) { return c.name == name; });
-  if (found == cases.end())
-    throw std::runtime_error("no reference system is called '" + name + "'");
-  return *found;
+inline const Systems& responses() {
+  static const Systems systems("responses.json");
+  return systems;
 }
 
 }  // namespace detail
 
-/// All systems of spectra.json, read once.
-inline const std::vector<SpectrumCase>& spectrum_cases() {
-  static const auto cases =
-      detail::load(std::string(DASHPOT_TEST_DATA_DIR) + "/spectra.json", &detail::to_spectrum_case);
-  return cases;
+/// The systems of spectra.json, and those whose stiffness has a factor.
+inline const std::vector<std::string>& spectrum_names() {
+  return detail::spectra().names();
+}
+inline std::vector<std::string> spectrum_names_with_factor() {
+  return detail::spectra().names_with("stiffness_factor");
+}
+inline SpectrumCase spectrum_case(const std::string& name) {
+  return detail::to_spectrum_case(detail::spectra().read(name));
 }
 
-/// All systems of responses.json, read once.
-inline const std::vector<ResponseCase>& response_cases() {
-  static const auto cases = detail::load(std::string(DASHPOT_TEST_DATA_DIR) + "/responses.json",
-                                         &detail::to_response_case);
-  return cases;
+/// The systems of responses.json.
+inline const std::vector<std::string>& response_names() {
+  return detail::responses().names();
 }
-
-inline const SpectrumCase& spectrum_case(const std::string& name) {
-  return detail::find(spectrum_cases(), name);
-}
-inline const ResponseCase& response_case(const std::string& name) {
-  return detail::find(response_cases(), name);
+inline ResponseCase response_case(const std::string& name) {
+  return detail::to_response_case(detail::responses().read(name));
 }
 
 // ---------------------------------------------------------------------- comparing
@@ -438,20 +418,6 @@ inline std::vector<Match> match_eigenvalues(const std::vector<std::complex<doubl
                   relative_distance(computed[i], reference[j - 1])};
   }
   return matches;
-}
-
-/// The largest relative distance of such a pairing: one number for a whole spectrum. Zero
-/// eigenvalues count as 1 unless computed as exact zeros; pass a scale (rad/s) to measure them
-/// against it instead.
-inline long double worst_relative_distance(const std::vector<std::complex<double>>& computed,
-                                           const std::vector<ReferenceEigenvalue>& reference,
-                                           long double zero_scale = 0) {
-  long double worst = 0;
-  for (const Match& match : match_eigenvalues(computed, reference)) {
-    const bool scaled = zero_scale > 0 && reference[match.reference].is_zero();
-    worst = std::max(worst, scaled ? match.absolute / zero_scale : match.relative);
-  }
-  return worst;
 }
 
 }  // namespace dashpot::testing
