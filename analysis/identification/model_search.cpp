@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <tuple>
 #include <utility>
 
 namespace dashpot::analysis {
@@ -299,14 +300,11 @@ void ModelSearch::untangle() {
     if (energy_of(data, fit, k) < kCancels * all) kept.push_back(fit.factors[k]);
   }
   if (kept.size() == fit.factors.size() || kept.empty()) return;
-  DecayFit before = fit;
-  std::optional<DecayFit> larger_before = larger;
-  fit = fit_decays(data, kept, before.noise, 40);
+  auto before = std::pair(fit, larger);
+  fit = fit_decays(data, kept, fit.noise, 40);
   for (int k = 0; k < 8 && add_from_rest(); ++k) continue;
   while (drop_one()) continue;
-  if (fit.criterion < before.criterion) return;
-  fit = std::move(before);
-  larger = std::move(larger_before);
+  if (!(fit.criterion < before.first.criterion)) std::tie(fit, larger) = std::move(before);
 }
 
 }  // namespace dashpot::analysis

@@ -127,8 +127,7 @@ Eigen::MatrixXcd phi_general(int k, const Eigen::MatrixXcd& Z) {
   const Eigen::Index n = Z.rows();
   const Eigen::MatrixXcd inverse = Z.partialPivLu().inverse();
   if (inverse.cwiseAbs().colwise().sum().maxCoeff() <= 1) {  // false if it is not finite
-    const Complex value_at_zero = reciprocal_factorial(k - 1);
-    return inverse * (phi_general(k - 1, Z) - value_at_zero * Eigen::MatrixXcd::Identity(n, n));
+    return inverse * (phi_general(k - 1, Z) - Eigen::MatrixXcd::Identity(n, n));  // 0! = 1! = 1
   }
   // exp([Z I 0; 0 0 I; 0 0 0]) = [phi_0 phi_1 phi_2; ...]
   Eigen::MatrixXcd augmented = Eigen::MatrixXcd::Zero((k + 1) * n, (k + 1) * n);
@@ -141,7 +140,7 @@ Eigen::MatrixXcd phi_general(int k, const Eigen::MatrixXcd& Z) {
 
 Complex phi(int k, Complex z) {
   if (k == 0) return std::exp(z);
-  if (std::abs(z) >= 1) return (phi(k - 1, z) - reciprocal_factorial(k - 1)) / z;
+  if (std::abs(z) >= 1) return (phi(k - 1, z) - 1.0) / z;  // 0! = 1! = 1
   double coefficient = reciprocal_factorial(k + kTerms);
   Complex sum = coefficient;
   for (int j = kTerms - 1; j >= 0; --j) {

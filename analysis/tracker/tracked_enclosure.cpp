@@ -8,7 +8,6 @@
 namespace dashpot::analysis {
 namespace {
 
-/// For the rounding errors of the bounds themselves.
 /// Largest distance of the Gram matrix from Sigma that is looked at as a perturbation.
 constexpr double kNearlyOrthonormal = 0.1;
 
