@@ -1,5 +1,6 @@
 #include <dashpot/analysis/identification.hpp>
 #include <dashpot/analysis/identification/decay_fit.hpp>
+#include <dashpot/analysis/identification/decay_scales.hpp>
 #include <dashpot/analysis/identification/model_search.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
@@ -115,6 +116,30 @@ TEST(IdentifyDecays, IntervalsHoldTheTruthAsOftenAsTheySay) {
   }
   EXPECT_GE(inside, 0.87 * all);
   EXPECT_LT(inside, all);
+}
+
+TEST(DecayScales, AreFoundOfEachRecordBesideTheStrongest) {
+  constexpr double w = 9, z = 0.12;
+  const std::vector<std::array<double, 2>> scale{{0.5, 0}, {1, 0}, {0.25, 0.3}};  // of x, x' / w
+  std::vector<MotionRecord> records;
+  for (const auto& [alpha, beta] : scale) {
+    MotionRecord record{VectorXd(400), MatrixXd(2, 400)};
+    for (Index i = 0; i < 400; ++i) {
+      const double t = record.time[i] = 0.005 * static_cast<double>(i), d = std::sqrt(1 - z * z);
+      const double c = std::exp(-z * w * t) * std::cos(w * d * t),
+                   s = std::exp(-z * w * t) * std::sin(w * d * t);
+      const double motion = alpha * c + beta * (-z * c - d * s);
+      record.output.col(i) << 0.3 + 0.02 * motion, -1 - 0.01 * motion;
+    }
+    records.push_back(std::move(record));
+  }
+  std::vector<DecayFactor> factors{DecayFactor::of_pair({-z * w, w * std::sqrt(1 - z * z)})};
+  find_scales(DecayData(records), VectorXd::Constant(2, 1e-5), factors);
+  ASSERT_EQ(factors[0].scale.size(), 3U);
+  EXPECT_EQ(factors[0].reference, 1U);
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t k : {0U, 1U}) EXPECT_NEAR(factors[0].scale[r][k], scale[r][k], 1e-9) << r;
+  }
 }
 
 TEST(IdentifyDecays, FindsAnOverdampedModeByItsTwoDecays) {

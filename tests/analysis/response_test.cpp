@@ -248,6 +248,18 @@ TEST(ResponseOfAResonator, ReceptanceIsInfiniteAtResonanceAndExactBeside) {
   EXPECT_DOUBLE_EQ(resonator().receptance(0)(0, 0).real(), 1.0 / 9);
 }
 
+TEST(ResponseOfADampedZeroMode, IsInfiniteAtFrequencyZeroOnlyWhereAForceMovesIt) {
+  System<> system(2);  // the second mass is held by nothing, and damped against the first
+  system.mass.setIdentity();
+  system.damping << 1, 0.5, 0.5, 1;
+  system.stiffness << 1, 0, 0, 0;
+  const MatrixXcd H = Response(system, analyze(system)).receptance(0);
+  EXPECT_EQ(H(1, 1).real(), std::numeric_limits<double>::infinity());
+  EXPECT_NEAR(std::abs(H(0, 0) - 1.0), 0, 1e-14);  // the limits of the exact inverse
+  EXPECT_NEAR(std::abs(H(0, 1) + 0.5), 0, 1e-14);
+  EXPECT_NEAR(std::abs(H(1, 0) + 0.5), 0, 1e-14);
+}
+
 // -------------------------------------------------------------------------------------- refusals
 
 TEST(Response, RefusesWrongSizesTimesAndSpectra) {

@@ -1,4 +1,6 @@
 // What validate() accepts, and the words in which it refuses the rest.
+#include <dashpot/analysis/elastic_form.hpp>
+#include <dashpot/analysis/mode.hpp>
 #include <dashpot/analysis/system.hpp>
 
 #include <gtest/gtest.h>
@@ -114,6 +116,24 @@ TEST(Validate, ChecksTheOptionalParts) {
   system.stiffness_error.resize(0, 0);
   system.stiffness_low(0, 1) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(refusal(system), "stiffness_low: entry (1,2) is not a finite number");
+}
+
+TEST(ElasticForm, RefusesWhatOverflowsInItsCoordinates) {
+  System<> system(1);
+  system.mass << 1e-10;
+  system.stiffness_factor = MatrixXd::Ones(1, 1);
+  ElasticForm<> form;
+  EXPECT_EQ(to_elastic_form(system, form), Status::kOk);
+  system.damping << 1e300;
+  EXPECT_EQ(to_elastic_form(system, form), Status::kNotFinite);
+  system.damping << 0;
+  system.stiffness_factor *= 1e305;
+  EXPECT_EQ(to_elastic_form(system, form), Status::kNotFinite);
+}
+
+TEST(ModeList, BeginsEmpty) {
+  EXPECT_TRUE(ModeList<kDynamic>().empty());
+  EXPECT_TRUE(ModeList<kMaxDof>().empty());
 }
 
 }  // namespace

@@ -256,6 +256,7 @@ TEST(RobotModelErrors, SayThatAXacroHasToBeExpanded) {
   const std::string start = "arm.urdf: is a xacro that is not expanded yet (";
   EXPECT_EQ(problem(head + "<xacro:include filename='b.xacro'/>" + rest),
             start + "<xacro:include>" + how);
+  EXPECT_EQ(problem("<xacro:arm name='r'/>"), start + "<xacro:arm>" + how);
   EXPECT_EQ(problem(arm(inertial("${2 * m}", "1", "1", "1"))), start + "${2 * m}" + how);
   EXPECT_EQ(problem(head + "<!-- from <xacro:arm/> and ${m} -->" + rest), "no error") << "expanded";
   EXPECT_THAT(problem(head + "<!-- ${m}" + rest), Not(HasSubstr("xacro arm")));

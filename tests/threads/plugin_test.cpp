@@ -206,6 +206,20 @@ TEST(Plugin, GoesToASetpointFromTheOtherThreadsSide) {
   EXPECT_EQ(host.snapshot().reference_joint_position[0], goal[0]);
 }
 
+TEST(Plugin, TakesASecondSetpointOfTheSameTime) {
+  Host host = panda_host();
+  std::vector<double> goal = panda_posture();
+  goal[0] += 0.3;
+  dashpot_setpoint setpoint = host.joint_setpoint(goal, host.time);
+  ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_OK);
+  ASSERT_EQ(host.tick(), DASHPOT_OK);
+  goal[0] -= 0.6;
+  setpoint.joint_position = goal.data();
+  ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_OK);
+  for (int k = 0; k < 100; ++k) ASSERT_EQ(host.tick(), DASHPOT_OK);
+  EXPECT_LT(host.snapshot().reference_joint_position[0], panda_posture()[0]);
+}
+
 TEST(Plugin, GoesToAPose) {
   const Config config = load(panda() + kCartesian);
   Host host = panda_host(kCartesian);
