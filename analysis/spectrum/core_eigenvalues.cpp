@@ -7,7 +7,6 @@
 #include <limits>
 
 namespace dashpot::analysis {
-namespace {}  // namespace
 
 template <int N>
 CoreEigenvalues<N>::CoreEigenvalues(const EnergyForm<N>& form,
@@ -38,7 +37,11 @@ bool CoreEigenvalues<N>::find_items(double cluster, Work& work) noexcept {
   reduce_to_hessenberg(H);
   if (!hessenberg_eigenvalues(H, values.data(), work)) return false;
   size_ = 0;
-  for (const Complex& value : values) {
+  for (Complex& value : values) {
+    if (coupled_zeros_ > 0) {  // equal rates of zero modes, which rounding may have made a pair
+      if (std::abs(value.imag()) <= rounding()) value = value.real();
+      if (modulus(value) <= rounding()) value = 0;
+    }
     if (value.imag() < 0) continue;
     const int i = size_++;
     item(i) = {value, i, false};

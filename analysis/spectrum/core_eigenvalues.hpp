@@ -54,7 +54,8 @@ class CoreEigenvalues {
   const CoreEigenvalue& operator[](int i) const { return items_[static_cast<std::size_t>(i)]; }
 
   const State<N>& matrix() const { return A_; }
-  double norm() const { return A_norm_; }  ///< of A, Frobenius
+  /// Rates of zero modes that are no farther apart than this (1/s) are equal.
+  double rounding() const { return 64 * kEps * A_norm_; }
 
   /// Returns the eigenvector of A to a real eigenvalue, of unit length.
   StateVector<N> vector(double value, Work& work) const noexcept;

@@ -64,7 +64,7 @@ class BasisFromEigenvectors {
   void write_cluster_of(int first);
   void write_cluster(int cluster, int members, Eigen::Index size, Complex mean, bool near_axis);
   void write_single(Complex value);
-  void write_zero_rate(double rate);
+  void write_zero_rates(double rate, Eigen::Index count);
   State<N> positions(const State<N>& S, const State<N>& Lambda) const;
 
   const EnergyForm<N>& form_;
@@ -181,8 +181,13 @@ void BasisFromEigenvectors<N>::write_cluster_of(int first) {
     near_axis = near_axis || 2 * value.imag() <= kCluster * modulus(value);
   }
   mean /= static_cast<double>(members);
-  if (members == 1 && core_[first].zero_rate) {
-    write_zero_rate(mean.real());
+  bool equal_rates = true;
+  for (int i = 0; i < core_.size(); ++i) {
+    if (core_[i].cluster != cluster) continue;
+    equal_rates &= core_[i].zero_rate && modulus(core_[i].value - mean) <= core_.rounding();
+  }
+  if (equal_rates) {
+    write_zero_rates(mean.real(), size);
   } else if (members == 1 && !(near_axis && size == 2)) {
     write_single(mean);
   } else {
@@ -240,21 +245,26 @@ void BasisFromEigenvectors<N>::write_single(Complex value) {
   append_pair(re_im, value);
 }
 
-/// Block of a coupled zero mode whose velocity changes as exp(rate t), with the state (s, v). Its
-/// columns are p0, the zero modes' part of v, and p1 = s / omega in the coordinates of the nonzero
-/// modes: Lambda = [0 1; 0 rate] gives the second column the velocity p0 + rate p1 = v.
+/// Blocks of `count` coupled zero modes whose velocities change alike, as exp(rate t), with the
+/// states (s, v). The columns of each are p0, the zero modes' part of v, and p1 = s / omega in the
+/// coordinates of the nonzero modes: Lambda = [0 1; 0 rate] gives the second column the velocity
+/// p0 + rate p1 = v.
 template <int N>
-void BasisFromEigenvectors<N>::write_zero_rate(double rate) {
-  const StateVector<N> z = core_.vector(rate, work_);
-  if (std::abs(rate) <= 8 * kEps * core_.norm()) rate = 0;
-  const double size = z.tail(c_ - m_).norm();
-  State<N> p = State<N>::Zero(c_, 2), Lambda(2, 2);
-  p.col(0).tail(c_ - m_) = z.tail(c_ - m_) / size;
-  zero_span_.conservativeResize(c_ - m_, zero_span_.cols() + 1);
-  zero_span_.col(zero_span_.cols() - 1) = p.col(0).tail(c_ - m_);
-  for (Eigen::Index i = 0; i < m_; ++i) p(i, 1) = z[i] / (frequency(i) * size);
-  Lambda << 0, 1, 0, rate;
-  append(p, Lambda, true);
+void BasisFromEigenvectors<N>::write_zero_rates(double rate, Eigen::Index count) {
+  const State<N> states = count == 1
+                              ? State<N>(core_.vector(rate, work_))
+                              : invariant_subspace<N>(core_.matrix(), rate, true, count, 8, work_);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const auto z = states.col(k);
+    const double size = z.tail(c_ - m_).norm();
+    State<N> p = State<N>::Zero(c_, 2), Lambda(2, 2);
+    p.col(0).tail(c_ - m_) = z.tail(c_ - m_) / size;
+    zero_span_.conservativeResize(c_ - m_, zero_span_.cols() + 1);
+    zero_span_.col(zero_span_.cols() - 1) = p.col(0).tail(c_ - m_);
+    for (Eigen::Index i = 0; i < m_; ++i) p(i, 1) = z[i] / (frequency(i) * size);
+    Lambda << 0, 1, 0, rate;
+    append(p, Lambda, true);
+  }
 }
 
 /// Position columns of the invariant columns S = (elastic coordinate, velocity) with A S = S
