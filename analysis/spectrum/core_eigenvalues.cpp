@@ -26,9 +26,8 @@ CoreEigenvalues<N>::CoreEigenvalues(const EnergyForm<N>& form,
   A_norm_ = A_.norm();
 }
 
-/// Eigenvalues, and their clusters: connected components of "near each other".
 template <int N>
-bool CoreEigenvalues<N>::find_items(double cluster, Work& work) noexcept {
+bool CoreEigenvalues<N>::find_items(Work& work) noexcept {
   const Eigen::Index size = A_.rows();
   ComplexStateVector<N> values(size);
   if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(size));
@@ -38,23 +37,27 @@ bool CoreEigenvalues<N>::find_items(double cluster, Work& work) noexcept {
   if (!hessenberg_eigenvalues(H, values.data(), work)) return false;
   size_ = 0;
   for (Complex& value : values) {
-    if (coupled_zeros_ > 0) {  // equal rates of zero modes, which rounding may have made a pair
-      if (std::abs(value.imag()) <= rounding()) value = value.real();
-      if (modulus(value) <= rounding()) value = 0;
-    }
-    if (value.imag() < 0) continue;
-    const int i = size_++;
-    item(i) = {value, i, false};
+    // Of equal rates of several zero modes rounding may have made a pair.
+    if (coupled_zeros_ > 1 && std::abs(value.imag()) <= rounding()) value = value.real();
+    if (value.imag() >= 0) item(size_++) = {value};
+  }
+  return true;
+}
+
+/// Connected components of "near each other".
+template <int N>
+void CoreEigenvalues<N>::find_clusters(double cluster) noexcept {
+  for (int i = 0; i < size_; ++i) {
+    item(i).cluster = i;
     for (int j = 0; j < i; ++j) {
-      const double larger = std::max(modulus(value), modulus(item(j).value));
-      if (modulus(value - item(j).value) > cluster * larger) continue;
+      const double larger = std::max(modulus(item(i).value), modulus(item(j).value));
+      if (modulus(item(i).value - item(j).value) > cluster * larger) continue;
       const int from = item(i).cluster, to = item(j).cluster;
       for (int k = 0; k <= i; ++k) {
         if (item(k).cluster == from) item(k).cluster = to;
       }
     }
   }
-  return true;
 }
 
 /// Eigenvector of A to a real eigenvalue.
@@ -68,30 +71,40 @@ StateVector<N> CoreEigenvalues<N>::vector(double value, Work& work) const noexce
                            });
 }
 
-/// Of the real eigenvalues, marks those whose motion is mostly that of a coupled zero mode.
+/// Of the real eigenvalues, marks those whose motion is mostly that of a coupled zero mode. Rates
+/// that are zero to rounding become zero where there are several, so that they share a cluster,
+/// whose width is relative.
 template <int N>
 void CoreEigenvalues<N>::mark_zero_rates(Work& work) noexcept {
+  constexpr double kAlone = 0.99;  // of the kinetic energy
   if (coupled_zeros_ == 0) return;
+  const auto is_still = [this](const CoreEigenvalue& item) {
+    return coupled_zeros_ > 1 && modulus(item.value) <= rounding();
+  };
   StateVector<N> score = StateVector<N>::Constant(size_, -1);  // -1: not eligible
   for (int i = 0; i < size_; ++i) {
     if (item(i).value.imag() != 0) continue;
     const StateVector<N> z = vector(item(i).value.real(), work);
     const double kinetic = z.tail(c_).squaredNorm();  // of a total energy of 1
-    // Velocities of zero modes have more kinetic than elastic energy.
-    score[i] = z.tail(c_ - m_).squaredNorm() / kinetic + (kinetic > 0.5 ? 1 : 0);
+    const double share = z.tail(c_ - m_).squaredNorm() / kinetic;
+    // Velocities of zero modes have more kinetic than elastic energy, or else they are constant.
+    score[i] = share + (kinetic > 0.5 ? 1 : 0) + (share > kAlone && is_still(item(i)) ? 2 : 0);
   }
   for (int wanted = coupled_zeros_; wanted > 0; --wanted) {
     Eigen::Index best = 0;
     if (score.maxCoeff(&best) < 0) return;
-    item(static_cast<int>(best)).zero_rate = true;
+    CoreEigenvalue& found = item(static_cast<int>(best));
+    found.zero_rate = true;
+    if (is_still(found)) found.value = 0;
     score[best] = -1;
   }
 }
 
 template <int N>
 bool CoreEigenvalues<N>::find(double cluster, Work& work) noexcept {
-  if (!find_items(cluster, work)) return false;
+  if (!find_items(work)) return false;
   mark_zero_rates(work);
+  find_clusters(cluster);
   return true;
 }
 

@@ -54,7 +54,8 @@ class CoreEigenvalues {
   const CoreEigenvalue& operator[](int i) const { return items_[static_cast<std::size_t>(i)]; }
 
   const State<N>& matrix() const { return A_; }
-  /// Rates of zero modes that are no farther apart than this (1/s) are equal.
+  /// Rounding errors of eigenvalues (1/s): rates of zero modes that are no farther from each other
+  /// or from zero are equal.
   double rounding() const { return 64 * kEps * A_norm_; }
 
   /// Returns the eigenvector of A to a real eigenvalue, of unit length.
@@ -62,7 +63,8 @@ class CoreEigenvalues {
 
  private:
   CoreEigenvalue& item(int i) { return items_[static_cast<std::size_t>(i)]; }
-  bool find_items(double cluster, Work& work) noexcept;
+  bool find_items(Work& work) noexcept;
+  void find_clusters(double cluster) noexcept;
   void mark_zero_rates(Work& work) noexcept;
 
   int coupled_zeros_;

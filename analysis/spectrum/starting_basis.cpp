@@ -11,6 +11,8 @@ namespace {
 
 /// Two eigenvalues of one mode this close together (relative) count as nearly critical.
 constexpr double kCluster = 0.02;
+/// Of a subspace iteration.
+constexpr int kSteps = 8;
 
 template <int N>
 class BasisFromEigenvectors {
@@ -199,7 +201,7 @@ void BasisFromEigenvectors<N>::write_cluster_of(int first) {
 template <int N>
 void BasisFromEigenvectors<N>::write_cluster(int cluster, int members, Eigen::Index size,
                                              Complex mean, bool near_axis) {
-  const int steps = cluster_ > kCluster ? 40 : 8;  // wide clusters part slowly from the rest
+  const int steps = cluster_ > kCluster ? 40 : kSteps;  // wide clusters part slowly from the rest
   const State<N> S = invariant_subspace<N>(core_.matrix(), mean, near_axis, size, steps, work_);
   // To split the cluster: inverse iterations for each member, and products.
   const std::int64_t splitting_work = members * (cubed(size, 24) + squared(size, 240) + 900) +
@@ -246,14 +248,14 @@ void BasisFromEigenvectors<N>::write_single(Complex value) {
 }
 
 /// Blocks of `count` coupled zero modes whose velocities change alike, as exp(rate t), with the
-/// states (s, v). The columns of each are p0, the zero modes' part of v, and p1 = s / omega in the
-/// coordinates of the nonzero modes: Lambda = [0 1; 0 rate] gives the second column the velocity
-/// p0 + rate p1 = v.
+/// states (s, v): any basis of what changes so. The columns of each are p0, the zero modes' part of
+/// v, and p1 = s / omega in the coordinates of the nonzero modes: Lambda = [0 1; 0 rate] gives the
+/// second column the velocity p0 + rate p1 = v.
 template <int N>
 void BasisFromEigenvectors<N>::write_zero_rates(double rate, Eigen::Index count) {
-  const State<N> states = count == 1
-                              ? State<N>(core_.vector(rate, work_))
-                              : invariant_subspace<N>(core_.matrix(), rate, true, count, 8, work_);
+  const State<N> states =
+      count == 1 ? State<N>(core_.vector(rate, work_))
+                 : invariant_subspace<N>(core_.matrix(), rate, true, count, kSteps, work_);
   for (Eigen::Index k = 0; k < count; ++k) {
     const auto z = states.col(k);
     const double size = z.tail(c_ - m_).norm();
