@@ -72,14 +72,13 @@ StateVector<N> CoreEigenvalues<N>::vector(double value, Work& work) const noexce
 }
 
 /// Of the real eigenvalues, marks those whose motion is mostly that of a coupled zero mode. Rates
-/// that are zero to rounding become zero where there are several, so that they share a cluster,
-/// whose width is relative.
+/// that are zero to rounding become zero, so that they share a cluster, whose width is relative.
 template <int N>
 void CoreEigenvalues<N>::mark_zero_rates(Work& work) noexcept {
   constexpr double kAlone = 0.99;  // of the kinetic energy
   if (coupled_zeros_ == 0) return;
   const auto is_still = [this](const CoreEigenvalue& item) {
-    return coupled_zeros_ > 1 && modulus(item.value) <= rounding();
+    return modulus(item.value) <= rounding();
   };
   StateVector<N> score = StateVector<N>::Constant(size_, -1);  // -1: not eligible
   for (int i = 0; i < size_; ++i) {

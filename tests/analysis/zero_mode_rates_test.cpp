@@ -88,10 +88,10 @@ System<> moving_springs(Random& random, int n, int zeros, double damping, double
   return system;
 }
 
-TEST(ZeroModeRates, OfSeveralThatAreEqualAreFoundWithoutSymmetry) {
+TEST(ZeroModeRates, AreFoundWithoutSymmetryBesideStrongDamping) {
   Random random(2203);
-  for (int trial = 0; trial < 200; ++trial) {
-    const int n = random.integer(3, 7), zeros = random.integer(2, std::min(3, n - 1));
+  for (int trial = 0; trial < 300; ++trial) {
+    const int n = random.integer(3, 7), zeros = random.integer(1, std::min(3, n - 1));
     const double rate = trial % 2 == 0 ? 0 : 0.4;
     const double damping = rate == 0 ? random.log_uniform(5, 100) : 5;
     const System<> system = moving_springs(random, n, zeros, damping, rate);
