@@ -39,7 +39,7 @@ bool CoreEigenvalues<N>::find_items(Work& work) noexcept {
   for (Complex& value : values) {
     // Of equal rates of several zero modes rounding may have made a pair.
     if (coupled_zeros_ > 1 && std::abs(value.imag()) <= rounding()) value = value.real();
-    if (value.imag() >= 0) item(size_++) = {value};
+    if (!(value.imag() < 0)) item(size_++) = {value};
   }
   return true;
 }

@@ -165,7 +165,7 @@ struct Family {
 TEST(TwoSidedTracker, EnclosesTheTruthOnHardPaths) {
   const std::vector<Family> families = {{testing::skewed_critical, 4, 100, 1, 0.98},
                                         {testing::skewed_wandering, 6, 60, 0.4, 0.97},
-                                        {testing::skewed_coinciding, 10, 40, 0.2, 0.95}};
+                                        {testing::skewed_coinciding, 10, 60, 0.3, 0.95}};
   for (std::size_t f = 0; f < families.size(); ++f) {
     const Family& family = families[f];
     TrackerCounters sum;
