@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace dashpot::analysis {
 namespace {
@@ -188,9 +189,14 @@ FactorColumns columns_of(const DecayFactor& factor, const DecayPart& part, bool 
   }
   const Adder add(factor, derivatives, columns);
   Index from = 0;
+  std::vector<std::pair<double, Wave>> waves;  // that were found: most records have the same times
   for (std::size_t r = 0; r < records; ++r) {
-    for (Index i = 0; i < part.time[r].size(); ++i) {
-      add.wave(r, from + i, wave_at(factor, part.time[r][i]));
+    const VectorXd& time = part.time[r];
+    for (Index i = 0; i < time.size(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (k == waves.size()) waves.emplace_back(time[i], wave_at(factor, time[i]));
+      const auto& [known, wave] = waves[k];
+      add.wave(r, from + i, known == time[i] ? wave : wave_at(factor, time[i]));
     }
     for (Index j = 0; j < part.inputs(); ++j) {
       const std::vector<Wave> forced =

@@ -1,13 +1,14 @@
 #include <dashpot/analysis/identification/decay_columns.hpp>
 #include <dashpot/analysis/identification/decay_fit.hpp>
 #include <dashpot/analysis/identification/decay_scales.hpp>
+#include <dashpot/analysis/identification/variable_projection.hpp>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace dashpot::analysis {
 namespace {
@@ -20,131 +21,12 @@ using Eigen::VectorXd;
 /// Schwarz's logarithm of the number of samples, about 9, which lets weak modes spoil strong ones.
 constexpr double kPenalty = 4;
 
-/// The least-squares problem at some factors.
-class Evaluation {
- public:
-  Evaluation(const DecayData& data, const std::vector<DecayFactor>& factors, const VectorXd& noise,
-             const VectorXd& record_noise, bool derivatives)
-      : squares(MatrixXd::Zero(data.channels, static_cast<Index>(data.records))),
-        count(squares),
-        record_noise_(record_noise) {
-    const Index eigen = factor_width(factors);
-    products_ = products_of(factors);
-    const Index width = eigen + static_cast<Index>(data.sources()) + product_width(products_);
-    const Index p = eigen * static_cast<Index>(data.sources());
-    if (derivatives) normal.setZero(p, p), gradient.setZero(p);
-    amplitudes.setZero(width, data.channels);
-    for (const DecayPart& part : data.parts) add(part, factors, noise, derivatives);
-    cost = (noise.cwiseInverse().asDiagonal() * squares * record_noise.cwiseInverse().asDiagonal())
-               .cwiseQuotient(noise * record_noise.transpose())
-               .sum();
-  }
-
-  MatrixXd normal;    ///< J'J, weighted; parameters: eigenvalues of all factors, then their scales
-  VectorXd gradient;  ///< J'r, weighted
-  double cost = 0;    ///< r'r, weighted
-  MatrixXd amplitudes;  ///< width x channels
-  MatrixXd squares;     ///< r'r of each channel and record, unweighted
-  MatrixXd count;       ///< samples of each channel and record
-  /// Of each part: J (samples of its channels one after the other) and r, weighted.
-  std::vector<std::pair<MatrixXd, VectorXd>> scores;
-
- private:
-  void add(const DecayPart& part, const std::vector<DecayFactor>& factors, const VectorXd& noise,
-           bool derivatives) {
-    const Index N = samples_of(part), channels = part.output.cols(), width = amplitudes.rows();
-    MatrixXd basis = MatrixXd::Zero(N, width);
-    std::vector<FactorColumns> columns;
-    Index at = 0;
-    for (const DecayFactor& factor : factors) {
-      columns.push_back(columns_of(factor, part, derivatives));
-      basis.middleCols(at, factor.parameters()) = columns.back().value;
-      at += factor.parameters();
-    }
-    const Index eigen = at;
-    Index from = 0;
-    for (const VectorXd& time : part.time) {
-      basis.col(at++).segment(from, time.size()).setOnes();
-      from += time.size();
-    }
-    basis.middleCols(at, part.inputs()) = direct_columns(part);
-    basis.rightCols(width - at - part.inputs()) = product_columns(products_, part);
-    VectorXd weight(N);  // of the records
-    from = 0;
-    for (std::size_t r = 0; r < part.time.size(); ++r) {
-      weight.segment(from, part.time[r].size())
-          .setConstant(1 / record_noise_[static_cast<Index>(r)]);
-      from += part.time[r].size();
-    }
-    basis = weight.asDiagonal() * basis;
-    const MatrixXd output = weight.asDiagonal() * part.output;
-    // Columns of very different size, as those of a mode that is over at once, are no deficiency.
-    const VectorXd size = basis.colwise().norm().transpose().cwiseMax(1e-300);
-    basis *= size.cwiseInverse().asDiagonal();
-    const Eigen::ColPivHouseholderQR<MatrixXd> qr(basis);
-    const Index rank = qr.rank();
-    const MatrixXd amplitude = size.cwiseInverse().asDiagonal() * qr.solve(output);
-    MatrixXd residual = qr.householderQ().transpose() * output;
-    residual.topRows(rank).setZero();
-    residual.applyOnTheLeft(qr.householderQ());
-
-    VectorXd r(N * channels);
-    for (Index c = 0; c < channels; ++c) {
-      const Index channel = part.channels[static_cast<std::size_t>(c)];
-      amplitudes.col(channel) = amplitude.col(c);
-      from = 0;
-      for (std::size_t k = 0; k < part.time.size(); ++k) {
-        const auto record = static_cast<Index>(k);
-        const Index n = part.time[k].size();
-        squares(channel, record) +=
-            residual.col(c).segment(from, n).squaredNorm() * std::pow(record_noise_[record], 2);
-        count(channel, record) += static_cast<double>(n);
-        from += n;
-      }
-      r.segment(c * N, N) = residual.col(c) / noise[channel];
-    }
-    if (!derivatives) return;
-    const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(N, rank);
-    MatrixXd J(N * channels, normal.rows());
-    Index eigen_at = 0, scale_at = eigen;
-    for (std::size_t k = 0; k < factors.size(); ++k) {
-      const int parameters = factors[k].parameters();
-      const MatrixXd of_factor = amplitude.middleRows(eigen_at, parameters);
-      const std::size_t derivatives_of_factor = columns[k].derivative.size();
-      MatrixXd change(N, static_cast<Index>(derivatives_of_factor) * channels);
-      for (std::size_t j = 0; j < derivatives_of_factor; ++j) {
-        change.middleCols(static_cast<Index>(j) * channels, channels).noalias() =
-            weight.asDiagonal() * columns[k].derivative[j] * of_factor;
-      }
-      change.noalias() -= Q * (Q.transpose() * change);
-      for (std::size_t j = 0; j < derivatives_of_factor; ++j) {
-        const bool of_scale = j >= static_cast<std::size_t>(parameters);
-        const Index column = of_scale ? scale_at++ : eigen_at + static_cast<Index>(j);
-        for (Index c = 0; c < channels; ++c) {
-          J.col(column).segment(c * N, N) = change.col(static_cast<Index>(j) * channels + c) /
-                                            noise[part.channels[static_cast<std::size_t>(c)]];
-        }
-      }
-      eigen_at += parameters;
-    }
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(J.transpose());
-    normal.triangularView<Eigen::StrictlyUpper>() = normal.transpose();
-    gradient.noalias() += J.transpose() * r;
-    scores.emplace_back(std::move(J), std::move(r));
-  }
-
-  VectorXd record_noise_;
-  std::vector<MotionProduct> products_;
-};
-
 std::vector<DecayFactor> moved(const std::vector<DecayFactor>& factors, const VectorXd& step) {
   std::vector<DecayFactor> result = factors;
   Index at = 0;
   for (DecayFactor& factor : result) {
     factor.first += step[at++];
     if (factor.pair) factor.second += step[at++];
-  }
-  for (DecayFactor& factor : result) {
     for (std::size_t r = 0; r < factor.scale.size(); ++r) {
       if (r == factor.reference) continue;
       factor.scale[r][0] += step[at++];
@@ -179,7 +61,8 @@ double longest_record(const DecayData& data) {
 bool descend(const DecayData& data, const VectorXd& noise, const VectorXd& record_noise,
              int max_iterations, double hopeless, std::vector<DecayFactor>& factors) {
   const double longest = longest_record(data);
-  Evaluation now(data, factors, noise, record_noise, true);
+  VariableProjection now(data, factors, noise, record_noise);
+  now.differentiate();
   double lambda = 1e-3;
   for (int i = 0; i < max_iterations; ++i) {
     bool better = false;
@@ -191,13 +74,15 @@ bool descend(const DecayData& data, const VectorXd& noise, const VectorXd& recor
       if (step.dot(now.gradient) < 1e-4) return true;  // no step promises more
       const std::vector<DecayFactor> next = moved(factors, step);
       if (makes_sense(next, longest)) {
-        const double gain = now.cost - Evaluation(data, next, noise, record_noise, false).cost;
+        VariableProjection there(data, next, noise, record_noise);
+        const double gain = now.cost - there.cost;
         if (gain >= 0) {
           factors = next;
           const double size = step.dot(now.normal * step);
           if (gain < 1e-4 || size < 1e-4) return true;  // far below what noise does
           if (i > 3 && now.cost - 30 * gain > hopeless) return false;
-          now = Evaluation(data, next, noise, record_noise, true);
+          now = std::move(there);
+          now.differentiate();
           lambda = std::max(1e-12, lambda / 10);
           better = true;
         }
@@ -212,25 +97,11 @@ bool descend(const DecayData& data, const VectorXd& noise, const VectorXd& recor
 /// By how much the variance of the estimates exceeds that for white noise, because what is left
 /// over is alike from sample to sample: the mean over the parameters, in the coordinates in which
 /// they are uncorrelated, of sums of scores over stretches of time (batch means).
-double variance_growth(const Evaluation& evaluation, const DecayData& data) {
+double variance_growth(const VariableProjection& evaluation) {
   const Index p = evaluation.normal.rows();
   const Eigen::LLT<MatrixXd> factor(evaluation.normal);
   if (p == 0 || factor.info() != Eigen::Success) return 1;
-  constexpr Index kStretches = 40;
-  double sum = 0;
-  for (std::size_t k = 0; k < data.parts.size(); ++k) {
-    const auto& [J, r] = evaluation.scores[k];
-    const Index N = samples_of(data.parts[k]);
-    const Index length = std::max<Index>(1, N / (kStretches * static_cast<Index>(data.records)));
-    for (Index c = 0; c < data.parts[k].output.cols(); ++c) {
-      for (Index at = 0; at < N; at += length) {
-        const Index n = std::min(length, N - at);
-        const VectorXd g = J.middleRows(c * N + at, n).transpose() * r.segment(c * N + at, n);
-        sum += factor.matrixL().solve(g).squaredNorm();
-      }
-    }
-  }
-  return std::max(1.0, sum / static_cast<double>(p));
+  return std::max(1.0, evaluation.squared_scores(factor) / static_cast<double>(p));
 }
 
 }  // namespace
@@ -251,7 +122,7 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
   for (int round = 0; round < kRounds; ++round) {
     fit.converged =
         descend(data, fit.noise, fit.record_noise, max_iterations, hopeless, fit.factors);
-    const Evaluation there(data, fit.factors, fit.noise, fit.record_noise, false);
+    const VariableProjection there(data, fit.factors, fit.noise, fit.record_noise);
     if (there.cost > hopeless) break;
     const VectorXd noise_before = fit.noise, record_before = fit.record_noise;
     const VectorXd inverse = fit.record_noise.cwiseAbs2().cwiseInverse();
@@ -284,9 +155,10 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
                  (fit.record_noise.array() / record_before.array()).log().abs().maxCoeff());
     if (change < 0.02) break;
   }
-  const Evaluation there(data, fit.factors, fit.noise, fit.record_noise, true);
+  VariableProjection there(data, fit.factors, fit.noise, fit.record_noise);
+  there.differentiate();
   fit.amplitudes = there.amplitudes;
-  fit.whiteness = variance_growth(there, data);
+  fit.whiteness = variance_growth(there);
   const Index p = there.normal.rows();
   // Scaled, so that parameters of unlike size are no deficiency. One that moves nothing, so that
   // squares underflow, tells nothing and is not determined.
@@ -299,12 +171,20 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
   const VectorXd inverse = solver.eigenvalues().cwiseMax(least).cwiseInverse();
   const MatrixXd all = scale.asDiagonal() * solver.eigenvectors() * inverse.asDiagonal() *
                        solver.eigenvectors().transpose() * scale.asDiagonal() * fit.whiteness;
-  fit.covariance = all.topLeftCorner(eigen, eigen);
+  std::vector<Index> eigenvalues;  // among the parameters
+  Index first = 0;
+  for (const DecayFactor& factor : fit.factors) {
+    for (Index i = 0; i < factor.parameters(); ++i) eigenvalues.push_back(first + i);
+    first += factor.parameters() * static_cast<Index>(data.sources());
+  }
+  fit.covariance = all(eigenvalues, eigenvalues);
   if (solver.info() != Eigen::Success || !fit.covariance.allFinite()) {
     fit.covariance.setConstant(eigen, eigen, std::numeric_limits<double>::infinity());
   }
   for (Index i = 0; i < eigen; ++i) {
-    if (scale[i] == 0) fit.covariance(i, i) = std::numeric_limits<double>::infinity();
+    if (scale[eigenvalues[static_cast<std::size_t>(i)]] == 0) {
+      fit.covariance(i, i) = std::numeric_limits<double>::infinity();
+    }
   }
   return fit;
 }

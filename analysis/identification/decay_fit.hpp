@@ -23,11 +23,9 @@ struct DecayFit {
 
 /// Fits y(t) = c_0 + sum of the factors' free motions and of their products by least squares, each
 /// channel weighted by its noise, which is estimated as well: the maximum likelihood for noise that
-/// is white and normal. The amplitudes are eliminated (variable projection, Golub and Pereyra 1973,
-/// with Kaufman's Jacobian, in which products, small beside what they are products of, count as
-/// constant); the factors are found by Levenberg and Marquardt's method. Gives up, with an infinite
-/// criterion, where the squares of what is left over, in units of `noise`, will stay above
-/// `hopeless`.
+/// is white and normal. The amplitudes are eliminated (VariableProjection); the
+/// factors are found by Levenberg and Marquardt's method. Gives up, with an infinite criterion,
+/// where the squares of what is left over, in units of `noise`, will stay above `hopeless`.
 DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start,
                     const Eigen::VectorXd& noise, int max_iterations,
                     double hopeless = std::numeric_limits<double>::infinity());

@@ -1,0 +1,160 @@
+#include <dashpot/analysis/identification/variable_projection.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::analysis {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+VariableProjection::VariableProjection(const DecayData& data,
+                                       const std::vector<DecayFactor>& factors,
+                                       const VectorXd& noise, const VectorXd& record_noise)
+    : squares(MatrixXd::Zero(data.channels, static_cast<Index>(data.records))),
+      count(squares),
+      data_(&data),
+      factors_(factors),
+      products_(products_of(factors)) {
+  amplitudes.setZero(
+      factor_width(factors) + static_cast<Index>(data.sources()) + product_width(products_),
+      data.channels);
+  for (const DecayPart& part : data.parts) fitted_.push_back(fit(part, noise, record_noise));
+  cost = (noise.cwiseInverse().asDiagonal() * squares * record_noise.cwiseInverse().asDiagonal())
+             .cwiseQuotient(noise * record_noise.transpose())
+             .sum();
+}
+
+void VariableProjection::differentiate() {
+  const Index p = factor_width(factors_) * static_cast<Index>(data_->sources());
+  normal.setZero(p, p);
+  gradient.setZero(p);
+  for (std::size_t k = 0; k < fitted_.size(); ++k) {
+    const Fitted& fitted = fitted_[k];
+    const auto& [parameters, changes] = changes_of(data_->parts[k], fitted);
+    const MatrixXd weight = fitted.amplitude * fitted.amplitude.transpose();
+    const MatrixXd products = changes.transpose() * changes;
+    gradient += scores(parameters, fitted, changes.transpose() * fitted.residual).rowwise().sum();
+    for (Index i = 0; i < p; ++i) {
+      const Parameter& a = parameters[static_cast<std::size_t>(i)];
+      for (Index j = 0; j < p; ++j) {
+        const Parameter& b = parameters[static_cast<std::size_t>(j)];
+        normal(i, j) += weight.block(a.column, b.column, a.width, b.width)
+                            .cwiseProduct(products.block(a.change, b.change, a.width, b.width))
+                            .sum();
+      }
+    }
+  }
+}
+
+double VariableProjection::squared_scores(const Eigen::LLT<MatrixXd>& factor) const {
+  constexpr Index kStretches = 40;
+  double sum = 0;
+  for (std::size_t k = 0; k < fitted_.size(); ++k) {
+    const auto& [parameters, changes] = changes_of(data_->parts[k], fitted_[k]);
+    const Index N = changes.rows();
+    const Index length = std::max<Index>(1, N / (kStretches * static_cast<Index>(data_->records)));
+    for (Index at = 0; at < N; at += length) {
+      const Index n = std::min(length, N - at);
+      const MatrixXd sums =
+          changes.middleRows(at, n).transpose() * fitted_[k].residual.middleRows(at, n);
+      sum += factor.matrixL().solve(scores(parameters, fitted_[k], sums)).squaredNorm();
+    }
+  }
+  return sum;
+}
+
+/// Eliminates the amplitudes.
+VariableProjection::Fitted VariableProjection::fit(const DecayPart& part, const VectorXd& noise,
+                                                   const VectorXd& record_noise) {
+  const Index N = samples_of(part), channels = part.output.cols(), width = amplitudes.rows();
+  MatrixXd basis = MatrixXd::Zero(N, width);
+  Index at = 0;
+  for (const DecayFactor& factor : factors_) {
+    basis.middleCols(at, factor.parameters()) = columns_of(factor, part, false).value;
+    at += factor.parameters();
+  }
+  const Index eigen = at;
+  VectorXd weight(N);
+  Index from = 0;
+  for (std::size_t r = 0; r < part.time.size(); ++r) {
+    const Index n = part.time[r].size();
+    basis.col(at++).segment(from, n).setOnes();
+    weight.segment(from, n).setConstant(1 / record_noise[static_cast<Index>(r)]);
+    from += n;
+  }
+  basis.middleCols(at, part.inputs()) = direct_columns(part);
+  basis.rightCols(width - at - part.inputs()) = product_columns(products_, part);
+  basis = weight.asDiagonal() * basis;
+  const MatrixXd output = weight.asDiagonal() * part.output;
+  // Columns of very different size, as those of a mode that is over at once, are no deficiency.
+  const VectorXd size = basis.colwise().norm().transpose().cwiseMax(1e-300);
+  basis *= size.cwiseInverse().asDiagonal();
+  Fitted fitted{Eigen::ColPivHouseholderQR<MatrixXd>(basis), std::move(weight), {}, {}};
+  const auto& qr = fitted.qr;
+  fitted.amplitude = size.cwiseInverse().asDiagonal() * qr.solve(output);
+  MatrixXd& residual = fitted.residual;
+  residual = qr.householderQ().transpose() * output;
+  residual.topRows(qr.rank()).setZero();
+  residual.applyOnTheLeft(qr.householderQ());
+  for (Index c = 0; c < channels; ++c) {
+    const Index channel = part.channels[static_cast<std::size_t>(c)];
+    amplitudes.col(channel) = fitted.amplitude.col(c);
+    from = 0;
+    for (std::size_t k = 0; k < part.time.size(); ++k) {
+      const auto record = static_cast<Index>(k);
+      const Index n = part.time[k].size();
+      squares(channel, record) +=
+          residual.col(c).segment(from, n).squaredNorm() * std::pow(record_noise[record], 2);
+      count(channel, record) += static_cast<double>(n);
+      from += n;
+    }
+    residual.col(c) /= noise[channel];
+    fitted.amplitude.col(c) /= noise[channel];
+  }
+  fitted.amplitude.conservativeResize(eigen, channels);
+  return fitted;
+}
+
+std::pair<std::vector<VariableProjection::Parameter>, MatrixXd> VariableProjection::changes_of(
+    const DecayPart& part, const Fitted& fitted) const {
+  const Index N = samples_of(part);
+  std::vector<Parameter> parameters;
+  std::vector<MatrixXd> derivatives;
+  Index column = 0, change = 0;
+  for (const DecayFactor& factor : factors_) {
+    const Index width = factor.parameters();
+    for (MatrixXd& derivative : columns_of(factor, part, true).derivative) {
+      parameters.push_back({column, change, width});
+      derivatives.push_back(std::move(derivative));
+      change += width;
+    }
+    column += width;
+  }
+  MatrixXd changes(N, change);
+  for (std::size_t i = 0; i < derivatives.size(); ++i) {
+    changes.middleCols(parameters[i].change, parameters[i].width) =
+        fitted.weight.asDiagonal() * derivatives[i];
+  }
+  const MatrixXd Q = fitted.qr.householderQ() * MatrixXd::Identity(N, fitted.qr.rank());
+  changes -= Q * (Q.transpose() * changes);
+  return {std::move(parameters), std::move(changes)};
+}
+
+/// Each parameter's part of `gradient`, x channels, from the changes' sums over samples, x
+/// channels.
+MatrixXd VariableProjection::scores(const std::vector<Parameter>& parameters, const Fitted& fitted,
+                                    const MatrixXd& sums) {
+  MatrixXd result(static_cast<Index>(parameters.size()), sums.cols());
+  for (Index i = 0; i < result.rows(); ++i) {
+    const auto& [column, change, width] = parameters[static_cast<std::size_t>(i)];
+    result.row(i) = fitted.amplitude.middleRows(column, width)
+                        .cwiseProduct(sums.middleRows(change, width))
+                        .colwise()
+                        .sum();
+  }
+  return result;
+}
+
+}  // namespace dashpot::analysis

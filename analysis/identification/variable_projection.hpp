@@ -1,0 +1,63 @@
+#pragma once
+#include <dashpot/analysis/identification/decay_columns.hpp>
+#include <dashpot/analysis/identification/decay_data.hpp>
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <utility>
+#include <vector>
+
+namespace dashpot::analysis {
+
+/// The least-squares problem that is left of a sum of decays when its amplitudes are eliminated, at
+/// some factors: variable projection (Golub and Pereyra 1973) with Kaufman's Jacobian, in which
+/// products, small beside what they are products of, count as constant.
+class VariableProjection {
+ public:
+  /// `noise` is each channel's, `record_noise` each record's, relative to it; standard deviations.
+  VariableProjection(const DecayData& data, const std::vector<DecayFactor>& factors,
+                     const Eigen::VectorXd& noise, const Eigen::VectorXd& record_noise);
+
+  /// Finds `normal` and `gradient`.
+  void differentiate();
+
+  /// The sum over stretches of time and channels of s' N^-1 s, with N = `normal` = L L' and the
+  /// part s of `gradient` that comes of such a stretch.
+  double squared_scores(const Eigen::LLT<Eigen::MatrixXd>& factor) const;
+
+  /// J'J, weighted; parameters: of each factor the eigenvalues, then its scales.
+  Eigen::MatrixXd normal;
+  Eigen::VectorXd gradient;    ///< J'r, weighted
+  double cost = 0;             ///< r'r, weighted
+  Eigen::MatrixXd amplitudes;  ///< width x channels
+  Eigen::MatrixXd squares;     ///< r'r of each channel and record, unweighted
+  Eigen::MatrixXd count;       ///< samples of each channel and record
+
+ private:
+  /// Changes `width` columns of the model, from `column`; what they change by, without what other
+  /// amplitudes would do as well, begins at `change` among such columns of all parameters.
+  struct Parameter {
+    Eigen::Index column, change, width;
+  };
+  /// Of a part, weighted.
+  struct Fitted {
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;  ///< of the model's columns
+    Eigen::VectorXd weight;                          ///< of each sample, of its record
+    Eigen::MatrixXd residual;                        ///< samples x channels
+    Eigen::MatrixXd amplitude;                       ///< columns of the factors x channels
+  };
+
+  Fitted fit(const DecayPart& part, const Eigen::VectorXd& noise,
+             const Eigen::VectorXd& record_noise);
+  std::pair<std::vector<Parameter>, Eigen::MatrixXd> changes_of(const DecayPart& part,
+                                                                const Fitted& fitted) const;
+  static Eigen::MatrixXd scores(const std::vector<Parameter>& parameters, const Fitted& fitted,
+                                const Eigen::MatrixXd& sums);
+
+  const DecayData* data_;
+  std::vector<DecayFactor> factors_;
+  std::vector<MotionProduct> products_;
+  std::vector<Fitted> fitted_;  ///< of each part
+};
+
+}  // namespace dashpot::analysis
