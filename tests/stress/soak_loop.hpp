@@ -1,5 +1,6 @@
 #pragma once
-// A simulated Panda under a controller of the C interface, in real time, on a thread of its own.
+// A simulated Panda under a controller of the C interface, in real time or a multiple of it, on a
+// thread of its own.
 
 #include <dashpot/controller/plugin.h>
 #include <dashpot/apps/loop/privileges.hpp>
@@ -43,10 +44,12 @@ struct LoopInterval {
 /// begins with a fault, positions that are lost for 20 ms, which somebody else has to release.
 class SoakLoop {
  public:
-  /// `controller` is one of kSoakConfig; nobody else may call its dashpot_update. Throws
-  /// sim::InvalidRobot.
-  SoakLoop(dashpot_controller* controller, std::int64_t cycles, std::int64_t cycles_of_interval)
+  /// `controller` is one of kSoakConfig; nobody else may call its dashpot_update. The loop wakes
+  /// every `period`, ns, and lives through a millisecond. Throws sim::InvalidRobot.
+  SoakLoop(dashpot_controller* controller, std::int64_t period, std::int64_t cycles,
+           std::int64_t cycles_of_interval)
       : controller_(controller),
+        period_(period),
         ticks_(cycles * kCycle),
         ticks_of_interval_(cycles_of_interval * kCycle),
         arm_(sim::Robot::from_file(DASHPOT_SOURCE_DIR "/sim/models/panda.urdf", "panda_link0",
@@ -107,19 +110,18 @@ class SoakLoop {
   }
 
   void run() noexcept {
-    constexpr std::int64_t kPeriod = 1'000'000;  // ns
     scheduled_ = apps::schedule_ahead_of_others();
-    std::int64_t deadline = now() + kPeriod;
+    std::int64_t deadline = now() + period_;
     for (std::int64_t k = 0; k < ticks_ && seen_.simulated; ++k) {
       const timespec time = {deadline / 1'000'000'000, deadline % 1'000'000'000};
       while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr) == EINTR) {
       }
       seen_.late.add(now() - deadline);
       tick(k);
-      deadline += kPeriod;
+      deadline += period_;
       if (const std::int64_t end = now(); end > deadline) {
         ++seen_.missed;
-        if (end > deadline + kPeriod) deadline = end;
+        if (end > deadline + period_) deadline = end;
       }
       ticks_made_ = k + 1;
       const bool last = k + 1 == ticks_ || !seen_.simulated || (stop_ && (k + 1) % kCycle == 0);
@@ -177,7 +179,7 @@ class SoakLoop {
   }
 
   dashpot_controller* controller_;
-  std::int64_t ticks_, ticks_of_interval_;
+  std::int64_t period_, ticks_, ticks_of_interval_;
   sim::Arm arm_;
   std::array<Goal, 4> goals_;
   std::thread thread_;

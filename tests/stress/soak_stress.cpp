@@ -1,5 +1,6 @@
-// The loop of a host in real time, for as long as one likes, 60 s by default:
-//     soak_stress [SECONDS]
+// The loop of a host in real time, for as long as one likes, 60 s by default, or so many times as
+// fast:
+//     soak_stress [SECONDS [TIMES]]
 // A simulated Panda follows goals at 1 kHz under the plugin. Meanwhile the host changes gains,
 // asks for some that are refused, releases faults, and makes a second controller with a publisher
 // and destroys it; states and modes go over LCM and are read again. A line each 10 minutes, or each
@@ -256,14 +257,15 @@ class Judge {
   double first_error_ = 0, last_error_ = 0;
 };
 
-bool soak(double seconds) {
+bool soak(double seconds, double times) {
   // A port of this process alone.
   const std::string url =
       "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 30000) + "?ttl=0";
   const auto cycles = std::max<std::int64_t>(4, std::llround(seconds * kSecond / kCycle));
   Listener listener(url);
   const Hosted hosted(url);
-  SoakLoop loop(hosted.controller.get(), cycles, std::min<std::int64_t>(cycles / 4, 150));
+  SoakLoop loop(hosted.controller.get(), std::llround(1e6 / times), cycles,
+                std::min<std::int64_t>(cycles / 4, 150));
   Operator operator_thread(hosted.controller.get(), url);
   Judge judge;
   loop.start();
@@ -292,7 +294,11 @@ bool soak(double seconds) {
 
 int main(int argc, char** argv) try {
   for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = true; });
-  return soak(argc > 1 ? std::atof(argv[1]) : 60) ? 0 : 1;
+  const double seconds = argc > 1 ? std::atof(argv[1]) : 60,
+               times = argc > 2 ? std::atof(argv[2]) : 1;
+  if (!(seconds > 0 && times > 0))
+    throw std::runtime_error("soak_stress [SECONDS [TIMES]], both above 0");
+  return soak(seconds, times) ? 0 : 1;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "soak_stress: %s\n", error.what());
   return 1;
