@@ -53,12 +53,12 @@ class StatusWriter {
     while (!answered() && Clock::now() < end) bus_->handleTimeout(1);
     return answered();
   }
-  /// Statuses until one is answered, each given `patience`, ms: a program that is slow for a moment
-  /// (its start, a sanitizer) does not find so many that it misses ten, which is a fault. Returns
-  /// false after ten seconds.
-  bool until_answered(int patience = 20) {
+  /// Statuses until one is answered, false after ten seconds. As soon as there are answers at all,
+  /// each is given `patience`, ms: of a program that is slow for a moment (a sanitizer) ten would
+  /// pass unanswered otherwise, which is a fault.
+  bool until_answered(int patience = 100) {
     const auto end = Clock::now() + std::chrono::seconds(10);
-    while (!step(patience)) {
+    while (!step(heard_ ? patience : 2)) {
       if (Clock::now() > end) return false;
     }
     return true;
@@ -86,11 +86,13 @@ class StatusWriter {
 
  private:
   void take(const lcm::ReceiveBuffer* buffer, const std::string&) {
+    heard_ = true;
     commands.emplace_back();
     if (!decode(kind_, buffer->data, buffer->data_size, commands.back())) commands.pop_back();
   }
 
   DriverKind kind_;
+  bool heard_ = false;
   std::shared_ptr<lcm::LCM> bus_;
   std::vector<std::uint8_t> bytes_;
 };
