@@ -123,6 +123,11 @@ class SoakLoop {
         ++seen_.missed;
         if (end > deadline + period_) deadline = end;
       }
+      // On a busy machine the release is late: the second lasts until then, a minute at most.
+      if (asked_ && (k + 1) % kSecond == 0) {
+        asked_ = ++waited_ < 600;
+        k -= 100;
+      }
       ticks_made_ = k + 1;
       const bool last = k + 1 == ticks_ || !seen_.simulated || (stop_ && (k + 1) % kCycle == 0);
       if (last || (k + 1) % ticks_of_interval_ == 0) hand_over();
@@ -155,8 +160,8 @@ class SoakLoop {
     const std::int32_t status =
         dashpot_update(controller_, &state, rest % 100 == 0 ? &setpoint : nullptr, &output);
     seen_.tick.add(now() - begin);
-    if (rest > kRelease && status == DASHPOT_OK) asked_ = false;
-    if (status != DASHPOT_OK && (!asked_ || status < 0 || rest == kSecond - 1)) {
+    if (rest > kRelease && status == DASHPOT_OK) asked_ = false, waited_ = 0;
+    if (status != DASHPOT_OK && (!asked_ || status < 0)) {
       ++seen_.unasked;
       seen_.status = status;
     }
@@ -187,7 +192,8 @@ class SoakLoop {
   // The loop's own:
   std::optional<sim::Plant> plant_;
   sim::JointVector torque_;
-  bool asked_ = false;  ///< a fault on purpose is not over yet
+  bool asked_ = false;       ///< a fault on purpose is not over yet
+  std::int64_t waited_ = 0;  ///< tenths of a second for its release, after its second
   LoopInterval seen_;
 
   // Between the threads:
