@@ -31,35 +31,38 @@ void VariableProjection::differentiate() {
   normal.setZero(p, p);
   gradient.setZero(p);
   for (std::size_t k = 0; k < fitted_.size(); ++k) {
-    const Fitted& fitted = fitted_[k];
-    const auto& [parameters, changes] = changes_of(data_->parts[k], fitted);
-    const MatrixXd weight = fitted.amplitude * fitted.amplitude.transpose();
-    const MatrixXd products = changes.transpose() * changes;
-    gradient += scores(parameters, fitted, changes.transpose() * fitted.residual).rowwise().sum();
+    const Jacobian J = jacobian(data_->parts[k], fitted_[k]);
+    gradient += scores(J, J.motions.transpose() * fitted_[k].residual).rowwise().sum();
+    // Sums over the samples before those over the channels.
+    MatrixXd products = MatrixXd::Zero(J.motions.cols(), J.motions.cols());
+    products.selfadjointView<Eigen::Lower>().rankUpdate(J.motions.transpose());
+    products.triangularView<Eigen::StrictlyUpper>() = products.transpose();
+    const MatrixXd alike = J.shapes * J.shapes.transpose();
     for (Index i = 0; i < p; ++i) {
-      const Parameter& a = parameters[static_cast<std::size_t>(i)];
-      for (Index j = 0; j < p; ++j) {
-        const Parameter& b = parameters[static_cast<std::size_t>(j)];
-        normal(i, j) += weight.block(a.column, b.column, a.width, b.width)
-                            .cwiseProduct(products.block(a.change, b.change, a.width, b.width))
+      const Parameter& a = J.parameters[static_cast<std::size_t>(i)];
+      for (Index j = 0; j <= i; ++j) {
+        const Parameter& b = J.parameters[static_cast<std::size_t>(j)];
+        normal(i, j) += alike.block(a.shape, b.shape, a.rank, b.rank)
+                            .cwiseProduct(products.block(a.motion, b.motion, a.rank, b.rank))
                             .sum();
       }
     }
   }
+  normal.triangularView<Eigen::StrictlyUpper>() = normal.transpose();
 }
 
 double VariableProjection::squared_scores(const Eigen::LLT<MatrixXd>& factor) const {
   constexpr Index kStretches = 40;
   double sum = 0;
   for (std::size_t k = 0; k < fitted_.size(); ++k) {
-    const auto& [parameters, changes] = changes_of(data_->parts[k], fitted_[k]);
-    const Index N = changes.rows();
+    const Jacobian J = jacobian(data_->parts[k], fitted_[k]);
+    const Index N = J.motions.rows();
     const Index length = std::max<Index>(1, N / (kStretches * static_cast<Index>(data_->records)));
     for (Index at = 0; at < N; at += length) {
       const Index n = std::min(length, N - at);
       const MatrixXd sums =
-          changes.middleRows(at, n).transpose() * fitted_[k].residual.middleRows(at, n);
-      sum += factor.matrixL().solve(scores(parameters, fitted_[k], sums)).squaredNorm();
+          J.motions.middleRows(at, n).transpose() * fitted_[k].residual.middleRows(at, n);
+      sum += factor.matrixL().solve(scores(J, sums)).squaredNorm();
     }
   }
   return sum;
@@ -117,40 +120,45 @@ VariableProjection::Fitted VariableProjection::fit(const DecayPart& part, const 
   return fitted;
 }
 
-std::pair<std::vector<VariableProjection::Parameter>, MatrixXd> VariableProjection::changes_of(
-    const DecayPart& part, const Fitted& fitted) const {
-  const Index N = samples_of(part);
-  std::vector<Parameter> parameters;
-  std::vector<MatrixXd> derivatives;
-  Index column = 0, change = 0;
+VariableProjection::Jacobian VariableProjection::jacobian(const DecayPart& part,
+                                                          const Fitted& fitted) const {
+  const Index N = samples_of(part), channels = fitted.residual.cols();
+  const Index p = factor_width(factors_) * static_cast<Index>(data_->sources());
+  Jacobian J;
+  J.motions.resize(N, std::min<Index>(2, channels) * p);
+  J.shapes.resize(J.motions.cols(), channels);
+  Index column = 0, shape = 0, motion = 0;
   for (const DecayFactor& factor : factors_) {
-    const Index width = factor.parameters();
-    for (MatrixXd& derivative : columns_of(factor, part, true).derivative) {
-      parameters.push_back({column, change, width});
-      derivatives.push_back(std::move(derivative));
-      change += width;
+    const Index width = factor.parameters(), rank = std::min(width, channels);
+    // Where large amplitudes of the two columns of a pair cancel, they do so here.
+    const Eigen::HouseholderQR<MatrixXd> qr(fitted.amplitude.middleRows(column, width).transpose());
+    const MatrixXd amplitude =
+        MatrixXd(qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>()).transpose();
+    J.shapes.middleRows(shape, rank) =
+        MatrixXd(qr.householderQ() * MatrixXd::Identity(channels, rank)).transpose();
+    for (const MatrixXd& derivative : columns_of(factor, part, true).derivative) {
+      J.parameters.push_back({shape, motion, rank});
+      J.motions.middleCols(motion, rank).noalias() =
+          fitted.weight.asDiagonal() * derivative * amplitude;
+      motion += rank;
     }
     column += width;
+    shape += rank;
   }
-  MatrixXd changes(N, change);
-  for (std::size_t i = 0; i < derivatives.size(); ++i) {
-    changes.middleCols(parameters[i].change, parameters[i].width) =
-        fitted.weight.asDiagonal() * derivatives[i];
-  }
+  J.motions.conservativeResize(N, motion);
+  J.shapes.conservativeResize(shape, channels);
   const MatrixXd Q = fitted.qr.householderQ() * MatrixXd::Identity(N, fitted.qr.rank());
-  changes -= Q * (Q.transpose() * changes);
-  return {std::move(parameters), std::move(changes)};
+  J.motions -= Q * (Q.transpose() * J.motions);
+  return J;
 }
 
-/// Each parameter's part of `gradient`, x channels, from the changes' sums over samples, x
-/// channels.
-MatrixXd VariableProjection::scores(const std::vector<Parameter>& parameters, const Fitted& fitted,
-                                    const MatrixXd& sums) {
-  MatrixXd result(static_cast<Index>(parameters.size()), sums.cols());
+/// Each parameter's part of `gradient`, x channels, from sums over samples, motions x channels.
+MatrixXd VariableProjection::scores(const Jacobian& J, const MatrixXd& sums) {
+  MatrixXd result(static_cast<Index>(J.parameters.size()), sums.cols());
   for (Index i = 0; i < result.rows(); ++i) {
-    const auto& [column, change, width] = parameters[static_cast<std::size_t>(i)];
-    result.row(i) = fitted.amplitude.middleRows(column, width)
-                        .cwiseProduct(sums.middleRows(change, width))
+    const auto& [shape, motion, rank] = J.parameters[static_cast<std::size_t>(i)];
+    result.row(i) = J.shapes.middleRows(shape, rank)
+                        .cwiseProduct(sums.middleRows(motion, rank))
                         .colwise()
                         .sum();
   }

@@ -4,7 +4,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
-#include <utility>
 #include <vector>
 
 namespace dashpot::analysis {
@@ -34,10 +33,16 @@ class VariableProjection {
   Eigen::MatrixXd count;       ///< samples of each channel and record
 
  private:
-  /// Changes `width` columns of the model, from `column`; what they change by, without what other
-  /// amplitudes would do as well, begins at `change` among such columns of all parameters.
+  /// What a parameter changes is the sum of `rank` motions from `motion`, each in the channels by
+  /// its shape, from `shape`.
   struct Parameter {
-    Eigen::Index column, change, width;
+    Eigen::Index shape, motion, rank;
+  };
+  /// J of a part: what the amplitudes can do as well is left out.
+  struct Jacobian {
+    std::vector<Parameter> parameters;
+    Eigen::MatrixXd motions;  ///< samples x motions
+    Eigen::MatrixXd shapes;   ///< shapes x channels, those of a factor orthonormal
   };
   /// Of a part, weighted.
   struct Fitted {
@@ -49,10 +54,8 @@ class VariableProjection {
 
   Fitted fit(const DecayPart& part, const Eigen::VectorXd& noise,
              const Eigen::VectorXd& record_noise);
-  std::pair<std::vector<Parameter>, Eigen::MatrixXd> changes_of(const DecayPart& part,
-                                                                const Fitted& fitted) const;
-  static Eigen::MatrixXd scores(const std::vector<Parameter>& parameters, const Fitted& fitted,
-                                const Eigen::MatrixXd& sums);
+  Jacobian jacobian(const DecayPart& part, const Fitted& fitted) const;
+  static Eigen::MatrixXd scores(const Jacobian& jacobian, const Eigen::MatrixXd& sums);
 
   const DecayData* data_;
   std::vector<DecayFactor> factors_;

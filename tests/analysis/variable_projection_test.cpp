@@ -1,5 +1,6 @@
 // The least-squares problem of decays against differences of its cost.
 #include <dashpot/analysis/identification/decay_columns.hpp>
+#include <dashpot/analysis/identification/decay_fit.hpp>
 #include <dashpot/analysis/identification/variable_projection.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
 
@@ -140,6 +141,38 @@ TEST(DecayColumns, AreOfTheTimesOfEachRecord) {
     EXPECT_DOUBLE_EQ(columns.value(i, 0), std::exp(-3 * t));
     EXPECT_DOUBLE_EQ(columns.value(5 + i, 0), 0.5 * std::exp(-6 * t));
   }
+}
+
+/// A channel whose samples begin when the fast decay of a pair is over: its two columns are
+/// parallel there, and large amplitudes cancel.
+TEST(DecayFit, KeepsItsDigitsWhereAFastDecayIsOver) {
+  constexpr Index kMissing = 12;
+  const double fast = 200, slow = 2;  // 1/s
+  Draws draw(43);
+  std::vector<MotionRecord> records;
+  for (const double strength : {1.0, 0.6}) {
+    MotionRecord record{VectorXd::LinSpaced(150, 0, 1.49), MatrixXd(3, 150)};
+    for (Index i = 0; i < 150; ++i) {
+      const double t = record.time[i];
+      for (int c = 0; c < 3; ++c) {
+        record.output(c, i) = strength * (1 + c) * std::exp(-t) * std::cos(9 * t + strength) +
+                              (0.5 + 0.3 * c) * std::exp(-slow * t) / strength +
+                              (0.4 - 0.2 * c) * std::exp(-fast * t) + 1e-3 * draw.normal();
+      }
+    }
+    record.output.row(0).head(kMissing).setConstant(std::numeric_limits<double>::quiet_NaN());
+    records.push_back(record);
+  }
+  const double w = std::sqrt(fast * slow), zeta = (fast + slow) / (2 * w);
+  const DecayFit fit = fit_decays(DecayData(records),
+                                  {{.first = std::log(9.05), .second = 0.11},
+                                   {.first = std::log(1.05 * w), .second = 1.03 * zeta}},
+                                  VectorXd::Constant(3, 1e-3), 30);
+  EXPECT_TRUE(fit.converged);
+  EXPECT_LT(fit.whiteness, 1.5);
+  const double deviation = std::sqrt(fit.covariance(3, 3));
+  EXPECT_LT(deviation, 0.1);
+  EXPECT_NEAR(fit.factors[1].second, zeta, 4 * deviation);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sources, Decays, ::testing::Bool(),
