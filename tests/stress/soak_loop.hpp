@@ -125,8 +125,8 @@ class SoakLoop {
         ++seen_.missed;
         if (end > deadline + period_) deadline = end;
       }
-      // On a busy machine the release is late: nothing goes on until then, for
-      // 60 s of the loop at most.
+      // On a busy machine the release is late: nothing goes on until then, for 60 s
+      // of the loop at most.
       if (asked_ && (k + 1) % kSecond == kRelease + 100) {
         asked_ = ++waited_ < 600;
         k -= 99;
