@@ -477,8 +477,8 @@ TEST(DriveOfAPanda, DoesNotAnswerARobotThatHasStopped) {
   EXPECT_TRUE(listener.until([&] {
     return says("the robot has stopped by itself (robot_mode 5)");
   })) << driving.complaints();
-  const std::int64_t stopped = listener.state.utime;  // or before
-  EXPECT_TRUE(listener.until([&] { return listener.state.utime > stopped + 300'000; }));
+  // The robot goes on. What is heard may lie any time behind it: only a fault says that it did.
+  EXPECT_TRUE(listener.until([&] { return listener.state.fault != 0; }));
   driving.send(SIGTERM);
   EXPECT_EQ(driving.finish(), 0);
   const Json result = Json::parse(driving.output());
