@@ -11,7 +11,7 @@ namespace dashpot::analysis {
 template <int N>
 CoreEigenvalues<N>::CoreEigenvalues(const EnergyForm<N>& form,
                                     const ZeroModes<N>& zero_modes) noexcept
-    : coupled_zeros_(form.coupled_zeros), m_(form.modes), c_(form.core()) {
+    : form_(form), coupled_zeros_(form.coupled_zeros), m_(form.modes), c_(form.core()) {
   A_.setZero(m_ + c_, m_ + c_);
   for (Eigen::Index i = 0; i < m_; ++i) {
     const double omega = std::sqrt(std::abs(zero_modes.stiffness_values[i]));
@@ -46,12 +46,17 @@ bool CoreEigenvalues<N>::find_items(Work& work) noexcept {
 
 /// Connected components of "near each other".
 template <int N>
-void CoreEigenvalues<N>::find_clusters(double cluster) noexcept {
+void CoreEigenvalues<N>::find_clusters(double cluster, bool rates_apart) noexcept {
+  constexpr double kApart = 1e6;  // rounding errors, which leave the vectors enough digits
   for (int i = 0; i < size_; ++i) {
     item(i).cluster = i;
     for (int j = 0; j < i; ++j) {
       const double larger = std::max(modulus(item(i).value), modulus(item(j).value));
-      if (modulus(item(i).value - item(j).value) > cluster * larger) continue;
+      double width = cluster * larger;
+      if (rates_apart && only_rates_ && (item(i).zero_rate || item(j).zero_rate)) {
+        width = std::min(width, kApart * rounding());
+      }
+      if (modulus(item(i).value - item(j).value) > width) continue;
       const int from = item(i).cluster, to = item(j).cluster;
       for (int k = 0; k <= i; ++k) {
         if (item(k).cluster == from) item(k).cluster = to;
@@ -71,39 +76,61 @@ StateVector<N> CoreEigenvalues<N>::vector(double value, Work& work) const noexce
                            });
 }
 
+/// Velocities along which no spring acts, y' Kp = 0: c x coupled zeros, orthonormal.
+template <int N>
+Square<N> CoreEigenvalues<N>::unsprung() const noexcept {
+  Square<N> directions = Square<N>::Identity(c_, c_).rightCols(coupled_zeros_);
+  if (form_.symmetric) return directions;
+  Square<N> K = form_.stiffness.topLeftCorner(m_, m_).transpose();
+  Square<N> y = -form_.stiffness.block(m_, 0, coupled_zeros_, m_).transpose();
+  solve_in_place(K, y, kEps * form_.stiffness.norm());
+  directions.topRows(m_) = y;
+  orthonormalize(directions);
+  return directions;
+}
+
 /// Of the real eigenvalues, marks those whose motion is mostly that of a coupled zero mode. Rates
 /// that are zero to rounding become zero, so that they share a cluster, whose width is relative.
+///
+/// A symmetric system's zero modes move with more kinetic than elastic energy. Without symmetry
+/// strong damping can deform them, but only they have momentum along which no spring acts, if the
+/// dampers slow all such momentum alike. Velocities that stay as they are belong to zero modes.
 template <int N>
 void CoreEigenvalues<N>::mark_zero_rates(Work& work) noexcept {
-  constexpr double kAlone = 0.99;  // of the kinetic energy
+  constexpr double kAlone = 0.99;   // of the kinetic energy
+  constexpr double kHardly = 1e-8;  // of the energy of a momentum
   if (coupled_zeros_ == 0) return;
-  const auto is_still = [this](const CoreEigenvalue& item) {
-    return modulus(item.value) <= rounding();
-  };
+  if (!form_.symmetric && !work.take(cubed(c_, 8) + 2500)) return;
+  const Square<N> directions = unsprung();
+  const double still = form_.symmetric ? rounding() : 100 * rounding();
   StateVector<N> score = StateVector<N>::Constant(size_, -1);  // -1: not eligible
   for (int i = 0; i < size_; ++i) {
     if (item(i).value.imag() != 0) continue;
     const StateVector<N> z = vector(item(i).value.real(), work);
     const double kinetic = z.tail(c_).squaredNorm();  // of a total energy of 1
-    const double share = z.tail(c_ - m_).squaredNorm() / kinetic;
-    // Velocities of zero modes have more kinetic than elastic energy, or else they are constant.
-    score[i] = share + (kinetic > 0.5 ? 1 : 0) + (share > kAlone && is_still(item(i)) ? 2 : 0);
+    const double share = (directions.transpose() * z.tail(c_)).squaredNorm();
+    score[i] = form_.symmetric ? share / kinetic + (kinetic > 0.5 ? 1 : 0) : share;
+    const bool alone = z.tail(c_ - m_).squaredNorm() > kAlone * kinetic;
+    if (alone && modulus(item(i).value) <= still) score[i] += 2;
   }
+  double least = 0;
   for (int wanted = coupled_zeros_; wanted > 0; --wanted) {
     Eigen::Index best = 0;
-    if (score.maxCoeff(&best) < 0) return;
+    least = score.maxCoeff(&best);
+    if (least < 0) return;
     CoreEigenvalue& found = item(static_cast<int>(best));
     found.zero_rate = true;
-    if (is_still(found)) found.value = 0;
+    if (modulus(found.value) <= rounding()) found.value = 0;
     score[best] = -1;
   }
+  only_rates_ = !form_.symmetric && score.maxCoeff() <= kHardly * least;
 }
 
 template <int N>
-bool CoreEigenvalues<N>::find(double cluster, Work& work) noexcept {
+bool CoreEigenvalues<N>::find(double cluster, bool rates_apart, Work& work) noexcept {
   if (!find_items(work)) return false;
   mark_zero_rates(work);
-  find_clusters(cluster);
+  find_clusters(cluster, rates_apart);
   return true;
 }
 

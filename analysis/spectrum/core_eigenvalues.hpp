@@ -42,13 +42,15 @@ struct CoreEigenvalue {
 template <int N>
 class CoreEigenvalues {
  public:
-  /// Forms A = [0 G; -G' -D], the time derivative of [elastic coordinates; velocities].
+  /// Forms A = [0 G; -G' -D], the time derivative of [elastic coordinates; velocities]. Reads
+  /// `form` until it is destroyed.
   CoreEigenvalues(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes) noexcept;
 
   /// Finds the eigenvalues by QR iteration, and their clusters: those within the relative distance
-  /// `cluster` of each other, directly or by way of others. Returns false if the iteration fails or
-  /// `work` does not grant it.
-  bool find(double cluster, Work& work) noexcept;
+  /// `cluster` of each other, directly or by way of others. With `rates_apart` rates of zero modes
+  /// that nothing couples to others are in clusters only with what hardly differs from them.
+  /// Returns false if the iteration fails or `work` does not grant it.
+  bool find(double cluster, bool rates_apart, Work& work) noexcept;
 
   int size() const { return size_; }
   const CoreEigenvalue& operator[](int i) const { return items_[static_cast<std::size_t>(i)]; }
@@ -64,13 +66,16 @@ class CoreEigenvalues {
  private:
   CoreEigenvalue& item(int i) { return items_[static_cast<std::size_t>(i)]; }
   bool find_items(Work& work) noexcept;
-  void find_clusters(double cluster) noexcept;
+  void find_clusters(double cluster, bool rates_apart) noexcept;
+  Square<N> unsprung() const noexcept;
   void mark_zero_rates(Work& work) noexcept;
 
+  const EnergyForm<N>& form_;
   int coupled_zeros_;
   Eigen::Index m_, c_;
   State<N> A_;
   double A_norm_ = 0;
+  bool only_rates_ = false;  ///< without symmetry: have momentum along which no spring acts
   std::conditional_t<
       N == kDynamic, std::vector<CoreEigenvalue>,
       std::array<CoreEigenvalue, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>

@@ -39,7 +39,7 @@ class BasisFromEigenvectors {
     if (form_.proportional) {
       write_proportional();
     } else if (c_ > 0) {
-      const bool found = core_.find(cluster_, work_);
+      const bool found = core_.find(cluster_, cluster_ <= kCluster, work_);
       if (work_.over()) return Status::kUnfinished;
       if (!found) return Status::kNotConverged;
       for (int i = 0; i < core_.size() && !work_.over(); ++i) write_cluster_of(i);

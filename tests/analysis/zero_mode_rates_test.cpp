@@ -108,6 +108,56 @@ TEST(ZeroModeRates, AreFoundWithoutSymmetryBesideStrongDamping) {
   }
 }
 
+/// Without symmetry the dampers deform the motions that decay at the rate, and other decays are
+/// near it.
+TEST(ZeroModeRates, AreToldFromOverdampedDecays) {
+  Random random(2204);
+  for (const double rate : {0.01, 0.4, 10.0, 300.0}) {
+    for (int trial = 0; trial < 200; ++trial) {
+      const int n = random.integer(3, 7), zeros = random.integer(1, std::min(3, n - 1));
+      const double damping = random.log_uniform(20, 60);
+      const System<> system = moving_springs(random, n, zeros, damping, rate);
+      const Spectrum<> spectrum = analyze(system);
+      ASSERT_EQ(spectrum.status, Status::kOk) << rate << ", trial " << trial;
+      ASSERT_EQ(spectrum.modes.size(), n - zeros) << rate << ", trial " << trial;
+      for (int i = 0; i < zeros; ++i) {
+        EXPECT_LE(std::abs(spectrum.zero_mode_rates[i] + rate), spectrum.zero_mode_rates_bound[i])
+            << rate << ", trial " << trial;
+        EXPECT_LE(spectrum.zero_mode_rates_bound[i], 1e-3 * rate) << rate << ", trial " << trial;
+      }
+    }
+  }
+}
+
+TEST(ZeroModeRates, ThatAreZeroAreFoundWhateverDampersDoToOthers) {
+  for (const double damping : {1.0, 5.0, 10.0, 100.0}) {
+    System<> pair(2);  // lambda^2 (lambda^2 + 18 - damping^2) = 0
+    pair.stiffness << 9, -9, -9, 9;
+    pair.damping.diagonal() << damping, -damping;
+    const Spectrum<> spectrum = analyze(pair);
+    ASSERT_EQ(spectrum.status, Status::kOk) << damping;
+    EXPECT_LE(std::abs(spectrum.zero_mode_rates[0]), spectrum.zero_mode_rates_bound[0]) << damping;
+    EXPECT_LE(spectrum.zero_mode_rates_bound[0], 1e-5) << damping;
+  }
+  // Dampers leave the zero mode x alone, but not the momentum y' x' along which no spring acts.
+  Random random(2205);
+  for (int trial = 0; trial < 300; ++trial) {
+    const int n = random.integer(2, 6);
+    const Eigen::VectorXd x = random.matrix(n, 1).normalized(),
+                          y = random.matrix(n, 1).normalized();
+    if (std::abs(x.dot(y)) < 0.1) continue;
+    const MatrixXd others = MatrixXd::Identity(n, n) - x * y.transpose() / x.dot(y);
+    System<> system(n);
+    system.stiffness = 100 * others;
+    system.damping = random.log_uniform(1, 1000) * others.transpose() * others;
+    const Spectrum<> spectrum = analyze(system);
+    ASSERT_EQ(spectrum.status, Status::kOk) << "trial " << trial;
+    ASSERT_EQ(spectrum.modes.size(), n - 1) << "trial " << trial;
+    EXPECT_LE(std::abs(spectrum.zero_mode_rates[0]), spectrum.zero_mode_rates_bound[0])
+        << "trial " << trial;
+  }
+}
+
 TEST(ZeroModeRates, CountWhatTheStiffnessLacks) {
   // k instead of 0 makes -a of the rate -a +- sqrt(a^2 - 4 k)) / 2, or a frequency where a = 0.
   for (const double a : {0.0, 1e-3, 1.0}) {
