@@ -129,6 +129,52 @@ TEST(ZeroModeRates, AreToldFromOverdampedDecays) {
   }
 }
 
+/// Relative distance of the first rate from the nearest real eigenvalue of a mode.
+double distance_to_decays(const Spectrum<>& spectrum) {
+  const double rate = spectrum.zero_mode_rates[0];
+  double nearest = testing::kInfinity;
+  for (const Mode<>& mode : spectrum.modes) {
+    for (const Complex& value : mode.eigenvalues) {
+      if (value.imag() == 0) nearest = std::min(nearest, std::abs(value.real() - rate));
+    }
+  }
+  return nearest / std::abs(rate);
+}
+
+/// A damper couples the momentum along which no spring acts to the modes: rate and decay share
+/// their vectors nearly, and only together are they known well.
+TEST(ZeroModeRates, ThatMeetADecayKeepTheirBounds) {
+  Random random(2206);
+  int met = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const int n = random.integer(3, 5);
+    System<> system = moving_springs(random, n, 1, random.log_uniform(1, 30), 0);
+    MatrixXd dampers = system.damping;
+    dampers(0, 0) += dampers.norm() / n;
+    const auto scaled = [&](double factor) {
+      system.damping = factor * dampers;
+      return analyze(system);
+    };
+    double nearest = testing::kInfinity, factor = 1;
+    const auto look_at = [&](double candidate) {
+      const double distance = distance_to_decays(scaled(candidate));
+      if (distance < nearest) nearest = distance, factor = candidate;
+    };
+    for (double candidate = 0.5; candidate < 8; candidate *= 1.1) look_at(candidate);
+    for (double step = 0.05; step > 1e-6; step /= 2) {
+      const double middle = factor;
+      look_at(middle * (1 - step));
+      look_at(middle * (1 + step));
+    }
+    if (nearest > 0.01) continue;
+    ++met;
+    const Spectrum<> spectrum = scaled(factor);
+    EXPECT_EQ(spectrum.status, Status::kOk) << "trial " << trial;
+    EXPECT_LE(spectrum.zero_mode_rates_bound[0], 1e-6) << "trial " << trial << ": " << nearest;
+  }
+  EXPECT_GT(met, 10);
+}
+
 TEST(ZeroModeRates, ThatAreZeroAreFoundWhateverDampersDoToOthers) {
   for (const double damping : {1.0, 5.0, 10.0, 100.0}) {
     System<> pair(2);  // lambda^2 (lambda^2 + 18 - damping^2) = 0
