@@ -53,7 +53,7 @@ void CoreEigenvalues<N>::find_clusters(double cluster, bool rates_apart) noexcep
     for (int j = 0; j < i; ++j) {
       const double larger = std::max(modulus(item(i).value), modulus(item(j).value));
       double width = cluster * larger;
-      if (rates_apart && only_rates_ && (item(i).zero_rate || item(j).zero_rate)) {
+      if (rates_apart && (item(i).zero_rate || item(j).zero_rate)) {
         width = std::min(width, kApart * rounding());
       }
       if (modulus(item(i).value - item(j).value) > width) continue;
@@ -94,14 +94,16 @@ Square<N> CoreEigenvalues<N>::unsprung() const noexcept {
 ///
 /// A symmetric system's zero modes move with more kinetic than elastic energy. Without symmetry
 /// strong damping can deform them, but only they have momentum along which no spring acts, if the
-/// dampers slow all such momentum alike. Velocities that stay as they are belong to zero modes.
+/// dampers slow all such momentum alike: returns whether that is so. Velocities that stay as they
+/// are belong to zero modes, whatever the momentum.
 template <int N>
-void CoreEigenvalues<N>::mark_zero_rates(Work& work) noexcept {
+bool CoreEigenvalues<N>::mark_zero_rates(Work& work) noexcept {
   constexpr double kAlone = 0.99;   // of the kinetic energy
   constexpr double kHardly = 1e-8;  // of the energy of a momentum
-  if (coupled_zeros_ == 0) return;
-  if (!form_.symmetric && !work.take(cubed(c_, 8) + 2500)) return;
+  if (coupled_zeros_ == 0) return false;
+  if (!form_.symmetric && !work.take(cubed(c_, 8) + 2500)) return false;
   const Square<N> directions = unsprung();
+  // Without symmetry rounding errors move an eigenvalue farther.
   const double still = form_.symmetric ? rounding() : 100 * rounding();
   StateVector<N> score = StateVector<N>::Constant(size_, -1);  // -1: not eligible
   for (int i = 0; i < size_; ++i) {
@@ -117,20 +119,20 @@ void CoreEigenvalues<N>::mark_zero_rates(Work& work) noexcept {
   for (int wanted = coupled_zeros_; wanted > 0; --wanted) {
     Eigen::Index best = 0;
     least = score.maxCoeff(&best);
-    if (least < 0) return;
+    if (least < 0) return false;
     CoreEigenvalue& found = item(static_cast<int>(best));
     found.zero_rate = true;
     if (modulus(found.value) <= rounding()) found.value = 0;
     score[best] = -1;
   }
-  only_rates_ = !form_.symmetric && score.maxCoeff() <= kHardly * least;
+  return !form_.symmetric && score.maxCoeff() <= kHardly * least;
 }
 
 template <int N>
 bool CoreEigenvalues<N>::find(double cluster, bool rates_apart, Work& work) noexcept {
   if (!find_items(work)) return false;
-  mark_zero_rates(work);
-  find_clusters(cluster, rates_apart);
+  const bool uncoupled = mark_zero_rates(work);
+  find_clusters(cluster, rates_apart && uncoupled);
   return true;
 }
 

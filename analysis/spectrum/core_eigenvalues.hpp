@@ -68,14 +68,13 @@ class CoreEigenvalues {
   bool find_items(Work& work) noexcept;
   void find_clusters(double cluster, bool rates_apart) noexcept;
   Square<N> unsprung() const noexcept;
-  void mark_zero_rates(Work& work) noexcept;
+  bool mark_zero_rates(Work& work) noexcept;
 
   const EnergyForm<N>& form_;
   int coupled_zeros_;
   Eigen::Index m_, c_;
   State<N> A_;
   double A_norm_ = 0;
-  bool only_rates_ = false;  ///< without symmetry: have momentum along which no spring acts
   std::conditional_t<
       N == kDynamic, std::vector<CoreEigenvalue>,
       std::array<CoreEigenvalue, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
