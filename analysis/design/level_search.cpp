@@ -13,7 +13,7 @@ constexpr double kLevelPrecision = 1e-6;
 /// The peak of a margin below this part of the one wanted is found less precisely.
 constexpr double kReach = 0.8, kCoarse = 3e-3;
 /// gain_margin finds none below.
-constexpr double kLeastMargin = 1e-3;
+constexpr double kLeastQuestion = 1e-3;
 
 /// The level with the largest margin that is found, or one that keeps the margin wanted.
 FoundLevel find_peak(const std::function<bool(double, double)>& keeps,
@@ -25,7 +25,7 @@ FoundLevel find_peak(const std::function<bool(double, double)>& keeps,
   while (largest < wanted && high - low > precision()) {
     const bool below = best - low > high - best;
     const double next = best - kGolden * (below ? best - low : best - high);
-    if (keeps(std::exp(next), std::max(largest, kLeastMargin))) {
+    if (keeps(std::exp(next), std::max(largest, kLeastQuestion))) {
       (below ? high : low) = best;
       best = next;
       largest = std::max(largest, margin(std::exp(next)));

@@ -19,7 +19,7 @@ namespace {
 
 using Residual = analysis::SpectrumOptions::Residual;
 
-struct Options {
+struct AnalyzeOptions {
   std::string file;
   bool json = false;
   double soft_frequency = analysis::SpectrumOptions().soft_frequency;  // rad/s
@@ -27,7 +27,7 @@ struct Options {
   analysis::Pivot pivot = analysis::Pivot::kLargest;
 };
 
-std::vector<Report> make_reports(const SystemFile& file, const Options& options) {
+std::vector<Report> make_reports(const SystemFile& file, const AnalyzeOptions& options) {
   std::vector<analysis::System<>> systems;
   for (const SystemEntry& entry : file.entries) {
     try {
@@ -50,7 +50,7 @@ std::vector<Report> make_reports(const SystemFile& file, const Options& options)
   return reports;
 }
 
-void run(const Options& options) try {
+void run_analyze(const AnalyzeOptions& options) try {
   const SystemFile file = read_systems(options.file);
   const std::vector<Report> reports = make_reports(file, options);
   const bool bold = isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
@@ -67,7 +67,7 @@ void run(const Options& options) try {
 template <class Value>
 void add_choice(CLI::App& command, const std::string& name, const std::string& help,
                 const std::string& words, const std::map<std::string, Value>& choices,
-                const std::shared_ptr<Options>& options, Value Options::*member) {
+                const std::shared_ptr<AnalyzeOptions>& options, Value AnalyzeOptions::*member) {
   command
       .add_option_function<std::string>(
           name,
@@ -84,7 +84,7 @@ void add_choice(CLI::App& command, const std::string& name, const std::string& h
 void add_analyze(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "analyze", "Frequencies, damping ratios, zero modes and response of a system");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<AnalyzeOptions>();
   command->add_option("FILE", options->file, "YAML or JSON file; - reads standard input")
       ->required()
       ->option_text(" ");
@@ -99,14 +99,14 @@ void add_analyze(CLI::App& program) {
              {{"automatic", Residual::kAutomatic},
               {"working", Residual::kWorking},
               {"extended", Residual::kExtended}},
-             options, &Options::residual);
+             options, &AnalyzeOptions::residual);
   add_choice(*command, "--pivot",
              "Coordinate that the constraint matrix eliminates for a zero mode",
              "largest|last (largest)",
              {{"largest", analysis::Pivot::kLargest}, {"last", analysis::Pivot::kLast}}, options,
-             &Options::pivot);
+             &AnalyzeOptions::pivot);
   command->footer(std::string(kSystemFileHelp) + "\n\n" + kExitStatusHelp);
-  command->callback([options] { run(*options); });
+  command->callback([options] { run_analyze(*options); });
 }
 
 }  // namespace dashpot::apps

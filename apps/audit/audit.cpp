@@ -24,7 +24,7 @@ using controller::Audit;
 using controller::JointVector;
 using controller::PostureNumbers;
 
-constexpr std::int64_t kChunk = 64;  // postures that a thread takes at a time
+constexpr std::int64_t kPosturesAtATime = 64;
 
 /// The postures of a task, by number.
 struct Postures {
@@ -76,9 +76,9 @@ class Workers {
     Clock::time_point shown = Clock::now();
     try {
       while (!stopped_ && !StopSignal::given()) {
-        const std::int64_t first = next_.fetch_add(kChunk);
+        const std::int64_t first = next_.fetch_add(kPosturesAtATime);
         if (first >= postures_.count) return;
-        const std::int64_t size = std::min(kChunk, postures_.count - first);
+        const std::int64_t size = std::min(kPosturesAtATime, postures_.count - first);
         const std::vector<PostureNumbers> found = postures_.numbers(first, size);
         std::copy(found.begin(), found.end(), numbers_.begin() + first);
         if (!shows || Clock::now() - shown < std::chrono::milliseconds(100)) continue;
@@ -123,7 +123,7 @@ void suggest(const Audit& audit, const AuditTask& task, AuditReport& report) {
   }
 }
 
-void run(const AuditCommand& command) try {
+void run_audit(const AuditCommand& command) try {
   const AuditTask task = read_task(command);
   const Audit audit(task.model, task.options);
   OutputFile csv(nullptr, std::fclose);
@@ -146,7 +146,7 @@ void run(const AuditCommand& command) try {
   throw InputError("", error.what());
 }
 
-constexpr const char* kHelp =
+constexpr const char* kAuditHelp =
     R"(The modes of  M q'' + C q' + K q = 0  with gains as a controller states them, where the ratio
 that they were meant to give is F/2 for a damping of F sqrt(stiffness). Damping, pole and margin are
 given at one posture, with proved bounds, and over many. A quaternion's vector part is half of the
@@ -161,14 +161,14 @@ void add_audit(CLI::App& program) {
       program.add_subcommand("audit", "What the gains of a controller really do on an arm");
   const auto options = std::make_shared<AuditCommand>();
   add_audit_options(*command, *options);
-  command->footer(std::string(kHelp) + kUnitsHelp + "\n" + kExitStatusHelp);
+  command->footer(std::string(kAuditHelp) + kUnitsHelp + "\n" + kExitStatusHelp);
   command->callback([options] {
     check_outputs({{"--csv", options->csv}, {"--plot", options->plot}},
                   {{"--urdf", options->arm.urdf},
                    {"--gains", options->gains},
                    {"--postures", options->postures},
                    {"--log", options->log}});
-    run(*options);
+    run_audit(*options);
   });
 }
 

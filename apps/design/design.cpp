@@ -172,7 +172,7 @@ void write_csv(OutputFile file, const std::string& path, const std::string& text
 }
 
 /// `csv`: may be null.
-void run(const DesignOptions& options, OutputFile csv) try {
+void run_design(const DesignOptions& options, OutputFile csv) try {
   SystemFile file;
   if (options.arm.urdf.empty()) {
     file = read_systems(options.file);
@@ -200,7 +200,7 @@ void run(const DesignOptions& options, OutputFile csv) try {
   throw error.in_file(options.file);
 }
 
-constexpr const char* kHelp =
+constexpr const char* kDesignHelp =
     R"(FILE is as for `dashpot analyze`, with mass, jacobian and task_stiffness; damping is what is
 there already (joint friction, null-space damping). A task_damping is what `before` shows, and what
 --near stays near. Without a jacobian the damping is designed in joint space. The matrix is always
@@ -216,14 +216,14 @@ void add_design(CLI::App& program) {
       program.add_subcommand("design", "The damping matrix that gives every mode a damping ratio");
   const auto options = std::make_shared<DesignOptions>();
   add_design_options(*command, *options);
-  command->footer(std::string(kHelp) + kUnitsHelp + "\n" + kExitStatusHelp);
+  command->footer(std::string(kDesignHelp) + kUnitsHelp + "\n" + kExitStatusHelp);
   command->callback([options] {
     check(*options);
     check_outputs({{"--csv", options->csv}},
                   {{"FILE", options->file}, {"--urdf", options->arm.urdf}});
     OutputFile csv(nullptr, std::fclose);
     if (!options->csv.empty()) csv = open_output("--csv", options->csv);
-    run(*options, std::move(csv));
+    run_design(*options, std::move(csv));
   });
 }
 

@@ -124,14 +124,14 @@ std::string mode_table(const DesignReport& report) {
   return table.text();
 }
 
-std::string margin_text(double gain_margin) {
+std::string loop_margin_text(double gain_margin) {
   return "  Springs and damping may grow by a factor of " + format_number(gain_margin, 3) +
          " together before the loop is unstable.\n";
 }
 
 std::string loop_text(const DesignReport& report) {
   const LoopReport& loop = *report.loop;
-  if (loop.level == 1) return margin_text(loop.gain_margin);
+  if (loop.level == 1) return loop_margin_text(loop.gain_margin);
   return "  The loop bears " + format_number(loop.level * report.ratio, 6) + " instead of " +
          format_number(report.ratio, 3) + ": with more damping, a gain margin of " +
          format_number(loop.limit.gain_margin, 3) + " is lost.\n";
@@ -253,7 +253,7 @@ std::string region_table(const RegionReport& report) {
             format_number(report.limit->gain_margin, 3) + " is lost, first at configuration [" +
             std::to_string(design.margin_sample) + "].\n";
   } else if (report.limit) {
-    text += margin_text(design.gain_margin);
+    text += loop_margin_text(design.gain_margin);
   }
   TextTable table;
   table.add_column(Align::kRight, {"", "configuration"});

@@ -20,7 +20,7 @@ using controller::Joint;
 using controller::JointVector;
 using controller::RobotModel;
 
-struct Options {
+struct InspectOptions {
   std::string urdf, base, tip;
   std::string q, qd, gravity, reflected_inertia;
   bool exclude_off_chain = false;
@@ -35,7 +35,7 @@ JointVector joint_list(const std::string& option, const std::string& text, const
   return parse_quantities(option, text, controller::joint_units(model, revolute, prismatic));
 }
 
-RobotModel read_model(const Options& options) {
+RobotModel read_model(const InspectOptions& options) {
   controller::ModelOptions model;
   model.include_off_chain = !options.exclude_off_chain;
   model.accept_inertias = options.accept_inertias;
@@ -184,7 +184,7 @@ std::string to_table(const RobotModel& model, const DynamicsResult& dynamics, co
          "\nTip\n" + tip_table(dynamics);
 }
 
-void run(const Options& options) {
+void run_inspect(const InspectOptions& options) {
   const RobotModel model = read_model(options);
   const JointVector q = joint_list("--q", options.q, model, "rad", "m");
   const JointVector qd = joint_list("--qd", options.qd, model, "rad/s", "m/s");
@@ -197,20 +197,20 @@ void run(const Options& options) {
 void add_inspect(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
       "inspect", "Mass matrix, Jacobian, gravity and Coriolis torques of an arm at one state");
-  const auto options = std::make_shared<Options>();
-  const auto add = [&](const char* name, std::string Options::*member, const char* help,
+  const auto options = std::make_shared<InspectOptions>();
+  const auto add = [&](const char* name, std::string InspectOptions::*member, const char* help,
                        const char* words) {
     return command->add_option(name, (*options).*member, help)->option_text(words);
   };
-  add("--urdf", &Options::urdf, "Robot description", "FILE")->required();
-  add("--base", &Options::base, "Link that stands still; results are in its axes", "LINK")
+  add("--urdf", &InspectOptions::urdf, "Robot description", "FILE")->required();
+  add("--base", &InspectOptions::base, "Link that stands still; results are in its axes", "LINK")
       ->required();
-  add("--tip", &Options::tip, "Link at the end of the chain", "LINK")->required();
-  add("--q", &Options::q, "Joint positions, rad or m", "a,b,... (0)");
-  add("--qd", &Options::qd, "Joint velocities, rad/s or m/s", "a,b,... (0)");
-  add("--gravity", &Options::gravity, "In axes of the file's root link, m/s^2",
+  add("--tip", &InspectOptions::tip, "Link at the end of the chain", "LINK")->required();
+  add("--q", &InspectOptions::q, "Joint positions, rad or m", "a,b,... (0)");
+  add("--qd", &InspectOptions::qd, "Joint velocities, rad/s or m/s", "a,b,... (0)");
+  add("--gravity", &InspectOptions::gravity, "In axes of the file's root link, m/s^2",
       "x,y,z (0,0,-9.81)");
-  add("--reflected-inertia", &Options::reflected_inertia,
+  add("--reflected-inertia", &InspectOptions::reflected_inertia,
       "Of rotors and gears at the joints, kg m^2 or kg; one number is that of all joints",
       "a,b,... (0)");
   command->add_flag("--exclude-off-chain", options->exclude_off_chain,
@@ -219,7 +219,7 @@ void add_inspect(CLI::App& program) {
                     "Take inertias that no body can have as they are");
   command->add_flag("--json", options->json, "Print JSON instead of tables");
   command->footer(std::string(kUnitsHelp) + "\n" + kExitStatusHelp);
-  command->callback([options] { run(*options); });
+  command->callback([options] { run_inspect(*options); });
 }
 
 }  // namespace dashpot::apps
