@@ -1,4 +1,4 @@
-// Every family of hard paths, for a few of its members; tests/stress/tracker_stress.cpp follows
+// Every family of hard paths, for a few of its members; tests/stress/tracker.cpp follows
 // them by the hundred, and knows the truth to 50 digits.
 #include <dashpot/tests/support/enclosure.hpp>
 #include <dashpot/tests/support/tracker_paths.hpp>

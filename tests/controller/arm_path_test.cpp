@@ -1,5 +1,5 @@
 // Each arm through its stretched singularity at 1 kHz, as far as a test has time for it;
-// tests/stress/arm_stress.cpp leads them all the way and back.
+// tests/stress/arm.cpp leads them all the way and back.
 #include <dashpot/tests/support/arm_path.hpp>
 #include <dashpot/tests/support/enclosure.hpp>
 

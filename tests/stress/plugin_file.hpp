@@ -16,7 +16,8 @@ namespace dashpot::stress {
 class PluginFile {
  public:
   PluginFile(std::string label_text, const std::string& path) : label(std::move(label_text)) {
-    void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+    // Its functions call each other, and not those of the plugin that the program links with.
+    void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND);
     if (library == nullptr) throw std::runtime_error(dlerror());
     find(library, "dashpot_create", create);
     find(library, "dashpot_destroy", destroy);

@@ -1,11 +1,10 @@
 // Drives controllers of several arms with hostile input for a given number of ticks and stops at
-// the first torque that is not finite or above a limit:
-//     controller_stress [TICKS [SEED]]
+// the first torque that is not finite or above a limit.
+#include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/support/hostile_ticks.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
 
 #include <cstdio>
-#include <cstdlib>
 #include <map>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@
 namespace {
 
 using namespace dashpot::controller;  // NOLINT(google-build-using-namespace)
+using dashpot::stress::Request;
 using dashpot::testing::HostileTicks;
 
 struct Robot {
@@ -45,26 +45,31 @@ bool drive(const Robot& robot, long ticks, std::uint64_t seed) {
     if (input.releases()) controller.release();
     ++seen[controller.update(input.state, input.setpoint, torque)];
     if (const char* fault = watch.see(torque)) {
-      std::printf("%s, seed %llu, tick %ld: torque %s\n", robot.name.c_str(),
-                  static_cast<unsigned long long>(seed), k, fault);
+      std::printf("%s, seed %lu, tick %ld: torque %s\n", robot.name.c_str(), seed, k, fault);
       return false;
     }
   }
-  std::printf("%s, seed %llu: %ld ticks, every torque finite and within its limits\n",
-              robot.name.c_str(), static_cast<unsigned long long>(seed), ticks);
+  std::printf("%s, seed %lu: %ld ticks, every torque finite and within its limits\n",
+              robot.name.c_str(), seed, ticks);
   for (const auto& [status, count] : seen) std::printf("  %9ld  %s\n", count, to_text(status));
   return true;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const long ticks = argc > 1 ? std::atol(argv[1]) : 10'000'000;
-  const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
+bool drive_all(const Request& request) {
   const std::vector<Robot> all = robots();
   bool good = true;
   for (const Robot& robot : all) {
-    good &= drive(robot, ticks / static_cast<long>(all.size()), seed);
+    good &= drive(robot, request.whole() / static_cast<long>(all.size()), request.seed);
   }
-  return good ? 0 : 1;
+  return good;
 }
+
+const dashpot::stress::AddPart part({"controller",
+                                     1,
+                                     "Drive controllers of several arms with hostile input",
+                                     "TICKS",
+                                     {{10'000'000, 40'000}},
+                                     drive_all,
+                                     {"SEED"}});
+
+}  // namespace

@@ -1,24 +1,23 @@
 // Leads each arm of sim/models through its workspace, through its stretched singularity and back,
-// at 1 kHz, with its modes followed as in the controller's tick, and watches them:
-//     arm_stress [SECONDS]
+// at 1 kHz, with its modes followed as in the controller's tick, and watches them.
+#include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/support/arm_path.hpp>
 #include <dashpot/tests/support/enclosure.hpp>
 
 #include <cstdio>
-#include <cstdlib>
 
 namespace {
 
+using namespace dashpot::stress;   // NOLINT(google-build-using-namespace)
 using namespace dashpot::testing;  // NOLINT(google-build-using-namespace)
 using dashpot::analysis::TrackerCounters;
 
 void print(const char* arm, const GainScales& scales, const TrackerCounters& c, const ModeWatch& w,
            const Verdict& all) {
   std::printf(
-      "%-12s %4g %4g | %6lld %6lld %5lld | %4.2f | %4.2f %7.1e | %7ld %4ld | %7ld %5ld %4ld %4ld "
+      "%-12s %4g %4g | %6ld %6ld %5ld | %4.2f | %4.2f %7.1e | %7ld %4ld | %7ld %5ld %4ld %4ld "
       "%4ld | %7.1e\n",
-      arm, scales.damping, scales.null_space, static_cast<long long>(c.updates()),
-      static_cast<long long>(c.tracked), static_cast<long long>(c.direct),
+      arm, scales.damping, scales.null_space, c.updates(), c.tracked, c.direct,
       static_cast<double>(c.iterations) / static_cast<double>(c.updates()), all.tightest,
       all.widest, w.separated, w.lost, w.foreseen, w.finer, w.paired_anew, w.veered, w.unexplained,
       w.largest_change);
@@ -46,10 +45,7 @@ bool lead(const Arm& arm, const GainScales& scales, long ticks) {
   return good;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const long ticks = 1000 * (argc > 1 ? std::atol(argv[1]) : 20);
+bool lead_arms(const Request& request) {
   std::printf(
       "Damping and null space: multiples of the default gains. Modes: identity decided by the "
       "eigenvalues,\nlost; damping ratio from tick to tick within bounds and derivative, or so "
@@ -62,8 +58,18 @@ int main(int argc, char** argv) {
   bool good = true;
   for (const Arm& arm : arms()) {
     for (const GainScales& scales : {GainScales{1, 1}, GainScales{0.1, 0}, GainScales{3, 1}}) {
-      good &= lead(arm, scales, ticks);
+      good &= lead(arm, scales, std::lround(1000 * request.count));
     }
   }
-  return good ? 0 : 1;
+  return good;
 }
+
+const AddPart part({"arm",
+                    3,
+                    "Lead each arm through its workspace and its stretched singularity at 1 kHz, "
+                    "with its modes followed",
+                    "SECONDS",
+                    {{20, 2}},
+                    lead_arms});
+
+}  // namespace

@@ -1,16 +1,14 @@
-// An hour of simulated time:
-//     hour_stress [SECONDS]
-// How far the energy of a swinging Panda drifts with each method, and whether the modes of one that
-// moves periodically are where they were after each of 1800 rounds.
+// An hour of simulated time: how far the energy of a swinging Panda drifts with each method, and
+// whether the modes of one that moves periodically are where they were after each of 1800 rounds.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/plant.hpp>
+#include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <memory>
 #include <vector>
 
@@ -79,19 +77,25 @@ bool keeps_modes(double seconds) {
   }
   const analysis::TrackerCounters& counters = tracker->counters();
   std::printf(
-      "modes, %ld rounds of 2 s, %lld updates, %lld solved directly: %d out of place or out of "
+      "modes, %ld rounds of 2 s, %ld updates, %ld solved directly: %d out of place or out of "
       "their bounds, farthest %.1e relative\n",
-      rounds, static_cast<long long>(counters.updates()), static_cast<long long>(counters.direct),
-      exchanged, farthest);
+      rounds, counters.updates(), counters.direct, exchanged, farthest);
   return exchanged == 0;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const double seconds = argc > 1 ? std::atof(argv[1]) : 3600;
+bool simulate(const stress::Request& request) {
+  const double seconds = request.count;
   bool good = keeps_energy("rk4", sim::Method::kRungeKutta4, 1e-3, seconds, 1e-6);
   good &= keeps_energy("dormand_prince_8", sim::Method::kDormandPrince8, 5e-3, seconds, 1e-8);
   good &= keeps_modes(seconds);
-  return good ? 0 : 1;
+  return good;
 }
+
+const stress::AddPart part({"hour",
+                            6,
+                            "Simulate an arm, and follow its modes round and round",
+                            "SECONDS",
+                            {{3600, 10}},
+                            simulate});
+
+}  // namespace

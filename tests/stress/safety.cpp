@@ -1,7 +1,7 @@
 // Drives plugin files through every scenario that this project has seen go wrong, on several arms,
-// and shows in one table what comes of it:
-//     safety_stress [LABEL=]PLUGIN...
-// The last plugin has to keep what is promised; the others are there to compare it with.
+// and shows in one table what comes of it. The last plugin has to keep what is promised; the
+// others are there to compare it with.
+#include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/safety_contact.hpp>
 #include <dashpot/tests/stress/safety_scenarios.hpp>
 
@@ -62,12 +62,9 @@ bool chosen(const Scenario& scenario, const TestArm& arm) {
   return std::find(scenario.arms.begin(), scenario.arms.end(), arm.name) != scenario.arms.end();
 }
 
-}  // namespace
-
-int main(int argc, char** argv) try {
+bool drive_plugins(const Request& request) {
   std::vector<PluginFile> plugins;
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
+  for (const std::string& word : request.plugins) {
     const std::size_t equals = word.find('=');
     const bool labelled = equals != std::string::npos;
     plugins.emplace_back(labelled ? word.substr(0, equals) : "today",
@@ -80,8 +77,9 @@ int main(int argc, char** argv) try {
               "/ limit", "m/s", "J", "%", "", "rest", "first status", "");
   std::size_t broken = 0, rows = 0;
   for (const Scenario& scenario : scenarios()) {
+    std::size_t arms = 0;
     for (const TestArm& arm : test_arms()) {
-      if (!chosen(scenario, arm)) continue;
+      if (!chosen(scenario, arm) || (request.brief && ++arms > 1)) continue;
       for (const PluginFile& plugin : plugins) {
         const Row row = run_scenario(scenario, plugin, arm);
         print(row, &plugin == &plugins.front());
@@ -93,8 +91,16 @@ int main(int argc, char** argv) try {
   }
   std::printf("\n%s: %zu of %zu rows break what is promised\n", plugins.back().label.c_str(),
               broken, rows);
-  return broken == 0 ? 0 : 1;
-} catch (const std::exception& error) {
-  std::fprintf(stderr, "safety_stress: %s\n", error.what());
-  return 2;
+  return broken == 0;
 }
+
+const AddPart part({"safety",
+                    11,
+                    "Drive plugins through everything that was seen to go wrong, on several "
+                    "simulated arms, or with --short on one",
+                    "",
+                    {{0, 0}},
+                    drive_plugins,
+                    {"PLUGIN"}});
+
+}  // namespace

@@ -1,4 +1,4 @@
-// Control ticks with the worst of all gains that are accepted: what gain_count.sh counts.
+// Control ticks with the worst of all gains that are accepted: what instruction_count.sh counts.
 //     gain_ticks JOINTS followed TICKS     ticks of a swinging arm whose modes are followed
 //     gain_ticks JOINTS search TRIALS      looks for gains that make an analysis long, and writes
 //                                          these and others to standard output, one line each

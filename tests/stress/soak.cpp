@@ -1,16 +1,15 @@
-// The loop of a host in real time, for as long as one likes, 60 s by default, or so many times as
-// fast:
-//     soak_stress [SECONDS [TIMES]]
-// A simulated Panda follows goals at 1 kHz under the plugin. Meanwhile the host changes gains,
-// asks for some that are refused, releases faults, and makes a second controller with a publisher
-// and destroys it; states and modes go over LCM and are read again. A line each 10 minutes, or each
-// quarter of a shorter run. The first of these is for warming up; what the last one needs more than
-// the second is a failure, as is a status other than ok, a bound that is lost, a goal that is not
-// reached. Durations are told and not judged. SIGINT or SIGTERM ends it with the cycle of 4 s.
+// The loop of a host in real time, for as long as one likes, or so many times as fast. A simulated
+// Panda follows goals at 1 kHz under the plugin. Meanwhile the host changes gains, asks for some
+// that are refused, releases faults, and makes a second controller with a publisher and destroys
+// it; states and modes go over LCM and are read again. A line each 10 minutes, or each quarter of a
+// shorter run. The first of these is for warming up; what the last one needs more than the second
+// is a failure, as is a status other than ok, a bound that is lost, a goal that is not reached.
+// Durations are told and not judged. SIGINT or SIGTERM ends it with the cycle of 4 s.
 #include <dashpot/lcmtypes/plugin_publisher.h>
 #include <dashpot/analysis/status.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
+#include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/soak_loop.hpp>
 
 #include <unistd.h>
@@ -21,7 +20,6 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -200,14 +198,12 @@ class Judge {
     const std::int64_t states = listener.states - states_, modes = listener.modes - modes_;
     const std::int64_t unbounded = listener.unbounded - unbounded_;
     states_ += states, modes_ += modes, unbounded_ += unbounded;
-    std::printf("%8.0f%10lld", 1e-3 * static_cast<double>(ticks_),
-                static_cast<long long>(loop.ticks));
+    std::printf("%8.0f%10ld", 1e-3 * static_cast<double>(ticks_), loop.ticks);
     print(loop.tick);
     print(loop.late);
-    std::printf("%7lld%9.2f%5lld%8lld%8.1f%8lld%9lld\n", static_cast<long long>(loop.missed),
-                1e-6 * static_cast<double>(held.memory), static_cast<long long>(held.descriptors),
-                static_cast<long long>(held.threads), 1e6 * loop.tip_error,
-                static_cast<long long>(modes), static_cast<long long>(modes - unbounded));
+    std::printf("%7ld%9.2f%5ld%8ld%8.1f%8ld%9ld\n", loop.missed,
+                1e-6 * static_cast<double>(held.memory), held.descriptors, held.threads,
+                1e6 * loop.tip_error, modes, modes - unbounded);
     if (!loop.simulated) fail("the simulation failed");
     if (loop.unasked > 0) {
       fail(std::to_string(loop.unasked) +
@@ -227,10 +223,9 @@ class Judge {
       std::printf("too short to compare its beginning with its end\n");
       return;
     }
-    std::printf("since the second line: %+.2f MB, %+lld descriptors, %+lld threads, %+.2f um\n",
+    std::printf("since the second line: %+.2f MB, %+ld descriptors, %+ld threads, %+.2f um\n",
                 1e-6 * static_cast<double>(last_.memory - first_.memory),
-                static_cast<long long>(last_.descriptors - first_.descriptors),
-                static_cast<long long>(last_.threads - first_.threads),
+                last_.descriptors - first_.descriptors, last_.threads - first_.threads,
                 1e6 * (last_error_ - first_error_));
     if (last_.memory > first_.memory + kMoreMemory) fail("memory grew");
     if (last_.descriptors > first_.descriptors) fail("descriptors grew");
@@ -257,14 +252,15 @@ class Judge {
   double first_error_ = 0, last_error_ = 0;
 };
 
-bool soak(double seconds, double times) {
+bool soak(const Request& request) {
+  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = true; });
   // A port of this process alone.
   const std::string url =
       "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 30000) + "?ttl=0";
-  const auto cycles = std::max<std::int64_t>(4, std::llround(seconds * kSecond / kCycle));
+  const auto cycles = std::max<std::int64_t>(4, std::llround(request.count * kSecond / kCycle));
   Listener listener(url);
   const Hosted hosted(url);
-  SoakLoop loop(hosted.controller.get(), std::llround(1e6 / times), cycles,
+  SoakLoop loop(hosted.controller.get(), std::llround(1e6 / request.times), cycles,
                 std::min<std::int64_t>(cycles / 4, 150));
   Operator operator_thread(hosted.controller.get(), url);
   Judge judge;
@@ -290,16 +286,13 @@ bool soak(double seconds, double times) {
   return judge.good();
 }
 
-}  // namespace
+const AddPart part({"soak",
+                    0,
+                    "Run the loop of a host in real time, or so many times as fast: durations, "
+                    "memory, descriptors and threads; SIGINT ends it early",
+                    "SECONDS",
+                    {{60, 16}},
+                    soak,
+                    {"TIMES"}});
 
-int main(int argc, char** argv) try {
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = true; });
-  const double seconds = argc > 1 ? std::atof(argv[1]) : 60,
-               times = argc > 2 ? std::atof(argv[2]) : 1;
-  if (!(seconds > 0 && times > 0))
-    throw std::runtime_error("soak_stress [SECONDS [TIMES]], both above 0");
-  return soak(seconds, times) ? 0 : 1;
-} catch (const std::exception& error) {
-  std::fprintf(stderr, "soak_stress: %s\n", error.what());
-  return 1;
-}
+}  // namespace

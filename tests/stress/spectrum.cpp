@@ -1,11 +1,10 @@
 // Sweeps the conditioning of systems until the spectrum, solved or tracked from a system nearby,
-// breaks, and says where and how it says so:
-//     spectrum_stress [APART]
-// APART: of the steps that are taken, for a coarser sweep. Every eigenvalue with a finite bound has
+// breaks, and says where and how it says so. Every eigenvalue with a finite bound has
 // to lie within it of a true one (33 digits). What cannot be proved has to be said: by an infinite
-// bound, or by a status. Anything else ends with exit status 1.
+// bound, or by a status.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/support/quad_spectrum.hpp>
 
 #include <Eigen/Cholesky>
@@ -14,7 +13,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <functional>
 #include <map>
 #include <memory>
@@ -301,7 +299,7 @@ std::string text_of(const Judgement& found) {
 }
 
 /// Prints where the outcome changes. Whether nothing is wrong.
-bool run(const Sweep& sweep, int apart) {
+bool walk(const Sweep& sweep, int apart) {
   std::printf("%s\n", sweep.what);
   bool good = true;
   std::string last, last_tracked;
@@ -322,13 +320,21 @@ bool run(const Sweep& sweep, int apart) {
   return good;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const int apart = argc > 1 ? std::max(1, std::atoi(argv[1])) : 1;
+bool sweep_all(const dashpot::stress::Request& request) {
+  const int apart = std::max(1, static_cast<int>(request.count));
   bool good = true;
-  for (const Sweep& sweep : sweeps()) good &= run(sweep, apart);
+  for (const Sweep& sweep : sweeps()) good &= walk(sweep, apart);
   std::printf(good ? "Every finite bound held, and whatever has none was said.\n"
                    : "Some bound did not hold, or was missing without a word.\n");
-  return good ? 0 : 1;
+  return good;
 }
+
+const dashpot::stress::AddPart part({"spectrum",
+                                     4,
+                                     "Sweep the conditioning of systems until their spectrum "
+                                     "breaks, taking each APARTth step",
+                                     "APART",
+                                     {{1, 5}},
+                                     sweep_all});
+
+}  // namespace

@@ -1,21 +1,20 @@
 // Follows the modes along random paths of every family of tests/support/tracker_paths.hpp, and
 // checks every published bound against eigenvalues in long double; what comes near its bound, and
-// every hundredth step besides, against 50 digits:
-//     tracker_stress [STEPS [SEED]]
+// every hundredth step besides, against 50 digits.
+#include <dashpot/tests/stress/part.hpp>
+#include <dashpot/tests/stress/paths.hpp>
 #include <dashpot/tests/support/enclosure.hpp>
-#include <dashpot/tests/support/tracker_paths.hpp>
 
 #include <boost/multiprecision/cpp_bin_float.hpp>
 #include <boost/multiprecision/eigen.hpp>
 
 #include <cstdio>
-#include <cstdlib>
 #include <memory>
 
 namespace {
 
 using namespace dashpot::analysis;  // NOLINT(google-build-using-namespace)
-using dashpot::testing::Dice;
+using dashpot::stress::kStepsOfAPath;
 using dashpot::testing::judge;
 using dashpot::testing::PathFamily;
 using dashpot::testing::SystemPath;
@@ -24,7 +23,6 @@ using dashpot::testing::Verdict;
 using Real50 = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<50>,
                                              boost::multiprecision::et_off>;
 
-constexpr int kStepsOfAPath = 200;
 constexpr long kApart = 100;  ///< of the checks with 50 digits
 
 struct Tally {
@@ -42,10 +40,19 @@ void add(const TrackerCounters& from, TrackerCounters& to) {
   to.iterations += from.iterations;
 }
 
-/// One path, made and followed with `seed`.
-void follow(const PathFamily& family, std::uint64_t seed, int steps, Tally& tally) {
-  Dice dice(seed);
-  const SystemPath path = family.make(dice);
+void add(const Tally& from, Tally& to) {
+  to.steps += from.steps;
+  to.precise += from.precise;
+  to.unproved += from.unproved;
+  to.outside += from.outside;
+  to.tightest = std::max(to.tightest, from.tightest);
+  to.widest = std::max(to.widest, from.widest);
+  add(from.counters, to.counters);
+}
+
+/// One path, made with `seed`.
+void follow(const PathFamily& family, const SystemPath& path, std::uint64_t seed, int steps,
+            Tally& tally) {
   const auto tracker = std::make_unique<ModeTracker>();
   const auto spectrum = std::make_unique<TrackedSpectrum>();
   for (int step = 0; step < steps; ++step) {
@@ -71,25 +78,17 @@ void follow(const PathFamily& family, std::uint64_t seed, int steps, Tally& tall
     }
     if (verdict.enclosed) continue;
     if (tally.outside++ == 0) {
-      std::printf("%s, seed %llu, step %d: outside its bound: %s (error / bound %.3g)\n",
-                  family.name.c_str(), static_cast<unsigned long long>(seed), step, verdict.what,
-                  verdict.tightest);
+      std::printf("%s, seed %lu, step %d: outside its bound: %s (error / bound %.3g)\n",
+                  family.name.c_str(), seed, step, verdict.what, verdict.tightest);
     }
   }
   add(tracker->counters(), tally.counters);
 }
 
-void print_head() {
-  std::printf("%-17s %7s %6s %7s %6s %6s %6s | %5s | %8s %8s\n", "family", "steps", "digits",
-              "tracked", "reused", "direct", "failed", "pass", "err/bnd", "widest");
-}
-
 void print(const std::string& name, const Tally& t) {
   const TrackerCounters& c = t.counters;
-  std::printf("%-17s %7ld %6ld %7lld %6lld %6lld %6lld | %5.2f | %8.2g %8.1e", name.c_str(),
-              t.steps, t.precise, static_cast<long long>(c.tracked),
-              static_cast<long long>(c.reused), static_cast<long long>(c.direct),
-              static_cast<long long>(c.failed),
+  std::printf("%-17s %7ld %6ld %7ld %6ld %6ld %6ld | %5.2f | %8.2g %8.1e", name.c_str(), t.steps,
+              t.precise, c.tracked, c.reused, c.direct, c.failed,
               static_cast<double>(c.iterations) /
                   static_cast<double>(std::max<std::int64_t>(1, c.tracked + c.direct)),
               t.tightest, t.widest);
@@ -98,34 +97,32 @@ void print(const std::string& name, const Tally& t) {
   std::printf("\n");
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  const long steps = argc > 1 ? std::atol(argv[1]) : 100'000;
-  const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
-  const auto& families = dashpot::testing::path_families();
-  const long each =
-      (steps + static_cast<long>(families.size()) - 1) / static_cast<long>(families.size());
-  std::printf("Seed %llu. `digits`: steps judged with 50 digits; the rest in long double.\n",
-              static_cast<unsigned long long>(seed));
-  print_head();
+bool follow_all(const dashpot::stress::Request& request) {
+  const long each = dashpot::stress::steps_of_each(request.whole());
+  std::printf("Seed %lu. `digits`: steps judged with 50 digits; the rest in long double.\n",
+              request.seed);
+  std::printf("%-17s %7s %6s %7s %6s %6s %6s | %5s | %8s %8s\n", "family", "steps", "digits",
+              "tracked", "reused", "direct", "failed", "pass", "err/bnd", "widest");
   Tally all;
-  for (const PathFamily& family : families) {
+  for (const PathFamily& family : dashpot::testing::path_families()) {
     Tally tally;
-    for (std::uint64_t k = 0; tally.steps < each; ++k) {
-      const long left = each - tally.steps;
-      follow(family, 1'000'003 * seed + k, static_cast<int>(std::min<long>(left, kStepsOfAPath)),
-             tally);
-    }
+    dashpot::stress::follow_paths(family, request.seed, each,
+                                  [&](const SystemPath& path, std::uint64_t seed, int steps) {
+                                    follow(family, path, seed, steps, tally);
+                                  });
     print(family.name, tally);
-    all.steps += tally.steps;
-    all.precise += tally.precise;
-    all.unproved += tally.unproved;
-    all.outside += tally.outside;
-    all.tightest = std::max(all.tightest, tally.tightest);
-    all.widest = std::max(all.widest, tally.widest);
-    add(tally.counters, all.counters);
+    add(tally, all);
   }
   print("all", all);
-  return all.outside == 0 && all.counters.failed == 0 ? 0 : 1;
+  return all.outside == 0 && all.counters.failed == 0;
 }
+
+const dashpot::stress::AddPart part({"tracker",
+                                     2,
+                                     "Follow modes along random paths, each bound checked",
+                                     "STEPS",
+                                     {{100'000, 2400}},
+                                     follow_all,
+                                     {"SEED"}});
+
+}  // namespace

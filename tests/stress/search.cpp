@@ -1,8 +1,8 @@
 // Looks for the start, gains, goals, pushes and gaps that make an arm fastest, give it the most
-// kinetic energy, or drive a joint on longest while it is too fast, under the plugin:
-//     safety_search [EVALUATIONS [SEED [PLUGIN]]]
+// kinetic energy, or drive a joint on longest while it is too fast, under a plugin.
 // Cross-entropy method (R. Rubinstein, 1999): samples of a normal distribution for each parameter,
 // whose mean and width follow the best of them. The same arguments give the same result.
+#include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/safety_rig.hpp>
 
 #include <random>
@@ -195,23 +195,31 @@ void report(const PluginFile& plugin, const TestArm& arm, const Found& found, co
   std::fflush(stdout);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) try {
-  const int evaluations = argc > 1 ? std::atoi(argv[1]) : 300;
-  const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
-  const PluginFile plugin("", argc > 3 ? argv[3] : DASHPOT_PLUGIN);
-  std::printf("The worst of %d runs of %.1f s each for each arm and aim, seed %llu\n", evaluations,
-              Attack::kDuration, static_cast<unsigned long long>(seed));
+bool search_all(const Request& request) {
+  const PluginFile plugin("", request.plugins.empty() ? DASHPOT_PLUGIN : request.plugins.back());
+  const auto evaluations = static_cast<int>(request.count);
+  std::printf("The worst of %d runs of %.1f s each for each arm and aim, seed %lu\n", evaluations,
+              Attack::kDuration, request.seed);
+  struct Aim {
+    double Measures::*objective;
+    const char* name;
+  };
   for (const TestArm& arm : test_arms()) {
-    report(plugin, arm, search(plugin, arm, &Measures::speed_share, evaluations, seed), "fastest");
-    report(plugin, arm, search(plugin, arm, &Measures::kinetic_energy, evaluations, seed),
-           "most energy");
-    report(plugin, arm, search(plugin, arm, &Measures::driven, evaluations, seed),
-           "driven longest");
+    for (const Aim& aim : {Aim{&Measures::speed_share, "fastest"},
+                           {&Measures::kinetic_energy, "most energy"},
+                           {&Measures::driven, "driven longest"}}) {
+      report(plugin, arm, search(plugin, arm, aim.objective, evaluations, request.seed), aim.name);
+    }
   }
-  return 0;
-} catch (const std::exception& error) {
-  std::fprintf(stderr, "safety_search: %s\n", error.what());
-  return 2;
+  return true;
 }
+
+const AddPart part({"search",
+                    0,
+                    "Look for the state, gains, goals and timing that make each arm fastest",
+                    "EVALUATIONS",
+                    {{300, 2}},
+                    search_all,
+                    {"SEED", "PLUGIN"}});
+
+}  // namespace
