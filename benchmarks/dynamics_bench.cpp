@@ -5,6 +5,7 @@
 // of each term, is printed beside each time.
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
 
 #include <benchmark/benchmark.h>

@@ -11,6 +11,7 @@
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
 
 #include <unistd.h>

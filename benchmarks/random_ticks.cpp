@@ -7,6 +7,7 @@
 // trembles.
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <cmath>
 #include <cstdio>

@@ -3,6 +3,7 @@
 // integrators.
 #include <dashpot/sim/dynamics/articulated_body.hpp>
 #include <dashpot/sim/system.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <Eigen/Geometry>
 #include <array>

@@ -2,6 +2,7 @@
 // than real time that is.
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/plant.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <benchmark/benchmark.h>
 

@@ -3,6 +3,7 @@
 //     sim_ticks KIND TICKS
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/plant.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <cstdio>
 #include <cstdlib>

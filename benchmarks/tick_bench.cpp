@@ -12,6 +12,7 @@
 #include <dashpot/benchmarks/one_by_one.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
 
 #include <benchmark/benchmark.h>

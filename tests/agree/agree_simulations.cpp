@@ -4,6 +4,7 @@
 #include <dashpot/sim/plant.hpp>
 #include <dashpot/tests/agree/agree_numbers.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <string>
 

@@ -5,6 +5,7 @@
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/tests/agree/agree_numbers.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <string>
 

@@ -1,6 +1,7 @@
 // `dashpot audit`: what a user sees, and what is refused.
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <cmath>
 #include <cstdlib>
@@ -246,9 +247,8 @@ TEST(Audit, RefusesInOneLineThatNamesTheOption) {
 
 TEST(AuditTable, IsPrintedForEachPreset) {
   const Scratch scratch;
-  const std::string line = "cd " DASHPOT_SOURCE_DIR
-                           " && python3 apps/plots/audit.py " DASHPOT_PROGRAM " 50 >" +
-                           scratch.path("out") + " 2>&1";
+  const std::string line = "cd " + DASHPOT_SOURCE_DIR " && python3 apps/plots/audit.py " +
+                           DASHPOT_PROGRAM + " 50 >" + scratch.path("out") + " 2>&1";
   ASSERT_EQ(std::system(line.c_str()), 0) << scratch.read("out");
   const std::string text = scratch.read("out");
   EXPECT_EQ(count_lines(text), 9);

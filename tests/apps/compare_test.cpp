@@ -1,4 +1,5 @@
 // The table of apps/plots/compare.py, of a release whose numbers are known.
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 
 #include <gtest/gtest.h>
@@ -23,9 +24,9 @@ TEST(Compare, MeasuresADampedSwing) {
   }
   scratch.write("a.csv", csv);
   scratch.write("a.txt", "# smallest_ratio 0.0995\n0 0 0\n");
-  const std::string line =
-      "python3 " DASHPOT_SOURCE_DIR "/apps/plots/compare.py swing=" + scratch.path("a") + " >" +
-      scratch.path("out");
+  const std::string line = "python3 " +
+                           DASHPOT_SOURCE_DIR "/apps/plots/compare.py swing=" + scratch.path("a") +
+                           " >" + scratch.path("out");
   ASSERT_EQ(std::system(line.c_str()), 0);
   std::istringstream out(scratch.read("out"));
   std::string skipped, name;

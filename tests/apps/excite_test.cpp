@@ -1,6 +1,7 @@
 // `dashpot run --excite`: the wrench that acts, what is refused, and what a fault leaves of it.
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
 #include <gmock/gmock.h>

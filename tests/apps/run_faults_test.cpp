@@ -1,5 +1,6 @@
 // Scenes in which something goes wrong, and what the summary says of them.
 #include <dashpot/tests/apps/scene_run.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,7 @@
 #pragma once
 // Runs the built program as a user would.
 
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 
 #include <fcntl.h>

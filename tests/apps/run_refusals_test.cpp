@@ -1,5 +1,6 @@
 // What `dashpot run` refuses, and what it says then.
 #include <dashpot/tests/apps/scene_run.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <gtest/gtest.h>
 

@@ -2,6 +2,7 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <gtest/gtest.h>
 

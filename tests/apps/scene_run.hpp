@@ -1,6 +1,7 @@
 #pragma once
 // `dashpot run` of the project's scenes, as they are and changed.
 #include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <fstream>
 #include <map>

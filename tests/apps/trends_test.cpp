@@ -1,4 +1,5 @@
 // The maps of apps/plots/trends.gp.
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 
 #include <gmock/gmock.h>
@@ -18,9 +19,9 @@ TEST(Trends, ShowNoSignBeforeZero) {
   for (const char* name : {"damping", "stiffness", "inertia"}) {
     scratch.write(std::string("trends_") + name + ".txt", rows);
   }
-  const std::string line = "gnuplot -e \"dir='" + scratch.path("") +
-                           "'\" " DASHPOT_SOURCE_DIR "/apps/plots/trends.gp >" +
-                           scratch.path("out") + " 2>&1";
+  const std::string line = "gnuplot -e \"dir='" + scratch.path("") + "'\" " +
+                           DASHPOT_SOURCE_DIR "/apps/plots/trends.gp >" + scratch.path("out") +
+                           " 2>&1";
   ASSERT_EQ(std::system(line.c_str()), 0) << scratch.read("out");
   const std::string drawn = scratch.read("trends.svg");
   EXPECT_THAT(drawn, ::testing::HasSubstr("-0.01"));

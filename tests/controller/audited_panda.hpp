@@ -3,6 +3,7 @@
 
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <Eigen/Core>
 #include <string>

@@ -1,5 +1,6 @@
 // What is wrong with a URDF or an option is said in one line that names it.
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
 
 #include <gmock/gmock.h>

@@ -1,6 +1,7 @@
 // What the messages say is what the samples said, and their definitions keep their promises.
 #include <dashpot/lcmtypes/messages/message_check.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,7 @@
 // A log read in Python, with types from the stock generator, says what was published.
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 
 #include <gtest/gtest.h>

@@ -3,6 +3,7 @@
 
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/input_error.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 
 #include <string>

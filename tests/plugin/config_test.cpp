@@ -3,6 +3,7 @@
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/plugin/config_file.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/special_values.hpp>
 
 #include <gmock/gmock.h>

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/tests/plugin/config_file.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/random.hpp>
 
 #include <gtest/gtest.h>

@@ -3,6 +3,7 @@
 
 #include <dashpot/controller/plugin.h>
 #include <dashpot/tests/plugin/config_file.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <dlfcn.h>
 #include <gtest/gtest.h>

@@ -1,6 +1,8 @@
 #pragma once
 // The files of the source tree.
 
+#include <dashpot/tests/support/places.hpp>
+
 #include <filesystem>
 #include <fstream>
 #include <string>

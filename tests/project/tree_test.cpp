@@ -2,6 +2,7 @@
 #include <dashpot/tests/project/markdown.hpp>
 #include <dashpot/tests/project/rules.hpp>
 #include <dashpot/tests/project/tree.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <gmock/gmock.h>
 

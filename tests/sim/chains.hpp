@@ -2,6 +2,7 @@
 // Robots for the tests of the simulator: the four arms, and chains made up from a seed.
 
 #include <dashpot/sim/robot.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
 

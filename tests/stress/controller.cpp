@@ -2,6 +2,7 @@
 // the first torque that is not finite or above a limit.
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/support/hostile_ticks.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/random_robot.hpp>
 
 #include <cstdio>

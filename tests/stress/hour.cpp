@@ -5,6 +5,7 @@
 #include <dashpot/sim/plant.hpp>
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -3,6 +3,7 @@
 // functions.
 
 #include <dashpot/controller/plugin.h>
+#include <dashpot/tests/support/places.hpp>
 
 #include <dlfcn.h>
 

@@ -4,6 +4,7 @@
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/safety_contact.hpp>
 #include <dashpot/tests/stress/safety_scenarios.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 namespace {
 

@@ -4,6 +4,7 @@
 // whose mean and width follow the best of them. The same arguments give the same result.
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/safety_rig.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <random>
 

@@ -11,6 +11,7 @@
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/soak_loop.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <unistd.h>
 
@@ -50,7 +51,8 @@ struct Destroy {
 /// A controller at rest at its home, with its publisher.
 struct Hosted {
   explicit Hosted(const std::string& url)
-      : controller(dashpot_create_from_text(kSoakConfig, DASHPOT_SOURCE_DIR "/sim/models")) {
+      : controller(
+            dashpot_create_from_text(kSoakConfig, (DASHPOT_SOURCE_DIR "/sim/models").c_str())) {
     if (!controller || dashpot_start(controller.get(), SoakLoop::home().data(), nullptr) != 0) {
       throw std::runtime_error(dashpot_last_error());
     }

@@ -8,6 +8,7 @@
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/plant.hpp>
 #include <dashpot/tests/stress/log_histogram.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <algorithm>
 #include <array>

@@ -2,6 +2,7 @@
 // The arms of sim/models.
 
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <string>
 #include <vector>

@@ -9,6 +9,8 @@
 // The truth is that of the stored doubles; how it was found and proved is told in
 // tests/data/exact.py. SI units throughout.
 
+#include <dashpot/tests/support/places.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -23,10 +25,6 @@
 
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
-
-#ifndef DASHPOT_TEST_DATA_DIR
-#error "DASHPOT_TEST_DATA_DIR must be defined: the folder of spectra.json and responses.json"
-#endif
 
 namespace dashpot::testing {
 

@@ -4,6 +4,7 @@
 
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/plant.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/skip_tally.hpp>
 #include <dashpot/tests/support/tracker_paths.hpp>
 

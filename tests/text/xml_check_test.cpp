@@ -1,4 +1,5 @@
 // Which XML a parser may see.
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/text/xml_check.hpp>
 
 #include <gtest/gtest.h>

@@ -4,6 +4,7 @@
 #include <dashpot/lcmtypes/driver.hpp>
 #include <dashpot/lcmtypes/log_file.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/threads/live_run.hpp>
 
 #include <gtest/gtest.h>

@@ -1,6 +1,7 @@
 // `dashpot drive` with `dashpot fake-driver`: what it answers, what it refuses, and what becomes of
 // a driver's troubles.
 #include <dashpot/lcmtypes/command_t.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/threads/drive_arms.hpp>
 

@@ -5,6 +5,7 @@
 #include <dashpot/lcmtypes/command_t.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/tests/apps/run_program.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <chrono>
 #include <csignal>

@@ -2,6 +2,7 @@
 #include <dashpot/lcmtypes/publish/encode.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/tests/apps/run_program.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <gmock/gmock.h>
 #include <poll.h>

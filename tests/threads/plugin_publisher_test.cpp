@@ -4,6 +4,7 @@
 #include <dashpot/lcmtypes/modes_t.hpp>
 #include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/threads/live_run.hpp>
 
 #include <gmock/gmock.h>

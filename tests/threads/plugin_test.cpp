@@ -2,6 +2,7 @@
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/tests/plugin/panda_host.hpp>
 #include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/support/random.hpp>
 
 #include <gmock/gmock.h>

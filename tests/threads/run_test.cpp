@@ -1,5 +1,6 @@
 // `dashpot run` in real time: beside a bus and whoever listens.
 #include <dashpot/tests/apps/scene_run.hpp>
+#include <dashpot/tests/support/places.hpp>
 #include <dashpot/tests/threads/live_run.hpp>
 
 #include <gmock/gmock.h>
