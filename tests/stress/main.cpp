@@ -5,11 +5,10 @@
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -32,85 +31,56 @@ int run(const Part& part, const Request& request) try {
 }
 
 /// A part with one of its amounts, in a process of its own.
-class Job {
- public:
-  Job(const Part& part, const Amount& amount, Request request) : part_(part), request_(request) {
-    request_.kind = amount.kind;
-    request_.count = request.brief ? amount.brief : amount.count;
-  }
-
-  void change_count(double count) { request_.count = count; }
-  const Part& part() const { return part_; }
-  bool started() const { return process_ > 0; }
-  bool ended() const { return ended_; }
-  bool good() const { return good_; }
-
-  void start() {
-    output_ = std::tmpfile();
-    if (output_ == nullptr) throw std::runtime_error("no temporary file");
-    std::fflush(stdout);
-    process_ = fork();
-    if (process_ < 0) throw std::runtime_error("no process");
-    if (process_ > 0) return;
-    dup2(fileno(output_), STDOUT_FILENO);
-    dup2(fileno(output_), STDERR_FILENO);
-    _exit(run(part_, request_));
-  }
-
-  /// Takes the exit status, if the process is this one.
-  void end(pid_t process, int status) {
-    if (process != process_) return;
-    ended_ = true;
-    good_ = WIFEXITED(status) && WEXITSTATUS(status) == 0;
-    died_ = !WIFEXITED(status);
-  }
-
-  void print() {
-    std::printf("== %s%s%s\n", part_.name, request_.kind.empty() ? "" : " ", request_.kind.c_str());
-    std::rewind(output_);
-    std::array<char, 4096> text{};
-    for (std::size_t size = 0; (size = std::fread(text.data(), 1, text.size(), output_)) > 0;) {
-      std::fwrite(text.data(), 1, size, stdout);
-    }
-    std::fclose(output_);
-    if (!good_) std::printf("%s: %s\n", part_.name, died_ ? "DIED" : "FAILED");
-    std::fflush(stdout);
-  }
-
- private:
-  const Part& part_;
-  Request request_;
-  std::FILE* output_ = nullptr;
-  pid_t process_ = 0;
-  bool ended_ = false, good_ = false, died_ = false;
+struct Job {
+  const Part* part;
+  Request request;
+  std::FILE* output = nullptr;
+  pid_t process = 0;
+  bool ended = false;
+  int status = 0;  ///< of wait()
 };
+
+void start(Job& job) {
+  job.output = std::tmpfile();
+  std::fflush(stdout);
+  job.process = job.output == nullptr ? -1 : fork();
+  if (job.process < 0) throw std::runtime_error("no process or no temporary file");
+  if (job.process > 0) return;
+  dup2(fileno(job.output), STDOUT_FILENO);
+  dup2(fileno(job.output), STDERR_FILENO);
+  _exit(run(*job.part, job.request));
+}
+
+void print(const Job& job) {
+  std::printf("== %s %s\n", job.part->name, job.request.kind.c_str());
+  std::rewind(job.output);
+  for (int c = 0; (c = std::fgetc(job.output)) != EOF;) std::putchar(c);
+  std::fclose(job.output);
+  if (job.status != 0) std::printf("FAILED%s\n", WIFEXITED(job.status) ? "" : " by a signal");
+  std::fflush(stdout);
+}
 
 /// Runs so many jobs at a time, and prints what they say in their order. Whether all are well.
 bool run_side_by_side(std::vector<Job>& jobs, std::size_t at_a_time) {
   std::size_t started = 0, ended = 0, printed = 0;
+  std::string failed;
   while (printed < jobs.size()) {
-    while (started < jobs.size() && started - ended < at_a_time) jobs[started++].start();
+    while (started < jobs.size() && started - ended < at_a_time) start(jobs[started++]);
     int status = 0;
     const pid_t process = wait(&status);
     if (process < 0) throw std::runtime_error("a process was lost");
-    for (Job& job : jobs) job.end(process, status);
-    ++ended;
-    while (printed < jobs.size() && jobs[printed].ended()) jobs[printed++].print();
-  }
-  std::string failed;
-  for (const Job& job : jobs) {
-    const std::string name = std::string(" ") + job.part().name;
-    if (!job.good() && failed.find(name) == std::string::npos) failed += name;
+    for (Job& job : jobs) {
+      if (job.process == process) job.ended = true, job.status = status, ++ended;
+    }
+    for (; printed < jobs.size() && jobs[printed].ended; ++printed) {
+      const Job& job = jobs[printed];
+      print(job);
+      if (job.status != 0) failed += " " + (job.part->name + (" " + job.request.kind));
+    }
   }
   if (!failed.empty()) std::printf("Failed:%s\n", failed.c_str());
   return failed.empty();
 }
-
-/// What CLI11 fills in.
-struct Options {
-  Request request;
-  std::size_t jobs = static_cast<std::size_t>(std::max(1L, sysconf(_SC_NPROCESSORS_ONLN)));
-};
 
 CLI::Validator above_zero() {
   return {[](const std::string& text) {
@@ -121,94 +91,68 @@ CLI::Validator above_zero() {
           ""};
 }
 
-void add_seed(CLI::App& command, Request& request) {
-  command.add_option("SEED", request.seed, "of the random numbers")
-      ->capture_default_str()
-      ->check(CLI::Validator(
-          [](const std::string& text) {
-            const bool digits = text.find_first_not_of("0123456789") == std::string::npos;
-            return digits ? "" : text + " is no seed";
-          },
-          ""));
-}
-
-void add_short(CLI::App& command, Request& request) {
+/// What each part and `all` can be told.
+void add_options(CLI::App& command, const std::vector<std::string>& more, Request& request) {
   command.add_flag("--short", request.brief, "do little, to see that it works");
+  for (const std::string& option : more) {
+    if (option == "SEED") command.add_option(option, request.seed, "of the random numbers, or 1");
+    if (option == "TIMES") {
+      command.add_option(option, request.times, "as fast as real time")->check(above_zero());
+    }
+    if (option == "PLUGIN") {
+      command.add_option(option, request.plugins, "[LABEL=]FILE of several, or today's");
+    }
+    if (option == "--verbose") command.add_flag(option, request.verbose, "show each case");
+  }
 }
 
-std::string shown(double count) {
-  std::string text = std::to_string(count);
-  return text.substr(0, text.find_last_not_of('0')).substr(0, text.find('.'));
-}
-
-void add_part(CLI::App& program, const Part& part, Options& options, int& status) {
+void add_part(CLI::App& program, const Part& part, Request& request, int& status) {
   std::string help = part.help;
   std::vector<std::string> kinds;
   for (const Amount& amount : part.amounts) {
     if (*amount.kind == '\0') continue;
     kinds.emplace_back(amount.kind);
-    help += std::string("\n  ") + amount.kind + ": " + amount.what;
+    help += std::string("\n  ") + amount.kind + ": " + amount.what + "; " +
+            std::to_string(std::lround(amount.count)) + " without " + part.unit;
   }
   CLI::App& command = *program.add_subcommand(part.name, help);
-  Request& request = options.request;
   if (!kinds.empty()) {
-    command.add_option("KIND", request.kind, "of the above")
-        ->required()
-        ->check(CLI::IsMember(kinds));
+    command.add_option("KIND", request.kind, "see above")->required()->check(CLI::IsMember(kinds));
   }
   if (*part.unit != '\0') {
-    std::string counts;
-    for (const Amount& amount : part.amounts) {
-      counts += (counts.empty() ? "" : ", ") + shown(amount.count) +
-                (*amount.kind == '\0' ? "" : std::string(" ") + amount.kind);
-    }
-    command.add_option(part.unit, request.count, "how many; without it " + counts)
+    const std::string count = std::to_string(std::lround(part.amounts.front().count));
+    command.add_option(part.unit, request.count, kinds.empty() ? "or " + count : "how many")
         ->check(above_zero());
   }
-  add_short(command, request);
-  for (const std::string& option : part.more) {
-    if (option == "SEED") add_seed(command, request);
-    if (option == "TIMES") {
-      command.add_option("TIMES", request.times, "as fast as real time")->check(above_zero());
-    }
-    if (option == "PLUGIN") {
-      command.add_option("PLUGIN", request.plugins,
-                         "[LABEL=]FILE, today's without it; the last "
-                         "one has to keep what is promised");
-    }
-    if (option == "--verbose") command.add_flag(option, request.verbose, "show each case");
-  }
+  add_options(command, part.more, request);
   command.callback([&part, &request, &status] {
     for (const Amount& amount : part.amounts) {
       if (request.kind != amount.kind) continue;
       if (request.count == 0) request.count = request.brief ? amount.brief : amount.count;
       status = run(part, request);
-      return;
     }
   });
 }
 
-void add_all(CLI::App& program, Options& options, int& status) {
+void add_all(CLI::App& program, Request& request, std::size_t& at_a_time, int& status) {
   CLI::App& command = *program.add_subcommand(
       "all", "Run all parts but search and soak, and print what they say in this order");
-  command.add_option("TICKS", options.request.count, "of the controller; without it ten million")
+  command.add_option("TICKS", request.count, "of the controller")->check(above_zero());
+  add_options(command, {"SEED"}, request);
+  command.add_option("--jobs", at_a_time, "at a time, or as many as there are processors")
       ->check(above_zero());
-  add_seed(command, options.request);
-  add_short(command, options.request);
-  command.add_option("--jobs", options.jobs, "how many run at a time; without it one a processor")
-      ->check(above_zero());
-  command.callback([&options, &status] {
+  command.callback([&request, &at_a_time, &status] {
     std::vector<Job> jobs;
     for (const Part& part : parts()) {
-      if (part.place == 0) continue;
       for (const Amount& amount : part.amounts) {
-        if (!amount.of_all) continue;
-        jobs.emplace_back(part, amount, options.request);
-        const bool ticks = options.request.count > 0 && part.unit == std::string("TICKS");
-        if (ticks) jobs.back().change_count(options.request.count);
+        if (part.place == 0 || !amount.of_all) continue;
+        Job& job = jobs.emplace_back(Job{&part, request});
+        job.request.kind = amount.kind;
+        if (request.count > 0 && part.unit == std::string("TICKS")) continue;
+        job.request.count = request.brief ? amount.brief : amount.count;
       }
     }
-    status = run_side_by_side(jobs, options.jobs) ? 0 : kFailure;
+    status = run_side_by_side(jobs, at_a_time) ? 0 : kFailure;
   });
 }
 
@@ -222,10 +166,11 @@ int main(int argc, char** argv) {
                    "dashpot_stress");
   program.require_subcommand(1);
   program.footer("Exit status: 0 all is well, 1 something is not, 2 bad arguments.");
-  Options options;
+  Request request;
+  auto at_a_time = static_cast<std::size_t>(std::max(1L, sysconf(_SC_NPROCESSORS_ONLN)));
   int status = 0;
-  for (const Part& part : parts()) add_part(program, part, options, status);
-  add_all(program, options, status);
+  for (const Part& part : parts()) add_part(program, part, request, status);
+  add_all(program, request, at_a_time, status);
   try {
     program.parse(argc, argv);
     return status;
