@@ -95,7 +95,9 @@ CLI::Validator above_zero() {
 void add_options(CLI::App& command, const std::vector<std::string>& more, Request& request) {
   command.add_flag("--short", request.brief, "do little, to see that it works");
   for (const std::string& option : more) {
-    if (option == "SEED") command.add_option(option, request.seed, "of the random numbers, or 1");
+    if (option == "SEED") {
+      command.add_option(option, request.seed, "of the random numbers, or 1")->check(above_zero());
+    }
     if (option == "TIMES") {
       command.add_option(option, request.times, "as fast as real time")->check(above_zero());
     }
