@@ -1,6 +1,7 @@
 #pragma once
-#include <dashpot/analysis/design/damping_fit.hpp>
+#include <dashpot/analysis/damping_target.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/analysis/task_space.hpp>
 
 #include <cstddef>
 #include <cstdint>

@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -61,6 +62,12 @@ enum class DampingStructure {
   kFull,
   kBlock,  ///< two blocks: the first three directions (translation) and the others (rotation)
   kDiagonal,
+};
+
+/// Bounds on the entries of a damping matrix (k x k each), infinite ones allowed.
+struct EntryBounds {
+  Eigen::MatrixXd lower;
+  Eigen::MatrixXd upper;
 };
 
 }  // namespace dashpot::analysis

@@ -27,7 +27,7 @@ const char* to_text(ModeKind kind) noexcept;
 /// Where a spectrum comes from.
 enum class SpectrumOrigin {
   kTracked,  ///< the previous spectrum, refined
-  kReused,   ///< the previous spectrum, because the system has hardly changed
+  kReused,   ///< the previous spectrum, because the system is the same to the last bit
   kDirect,   ///< solved directly
 };
 

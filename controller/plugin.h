@@ -123,7 +123,7 @@ enum {
 /* Where modes come from. */
 enum {
   DASHPOT_TRACKED = 0, /* the last modes were refined */
-  DASHPOT_REUSED = 1,  /* the last modes stay: nothing that matters has changed */
+  DASHPOT_REUSED = 1,  /* the last modes, because the system is the same to the last bit */
   DASHPOT_DIRECT = 2   /* the modes were solved directly */
 };
 
@@ -280,7 +280,7 @@ typedef struct dashpot_modes {
   /* Numbers of ticks since the start or the last reset. Each tick that is to be analysed
    * (analysis.every) counts once in these: */
   uint64_t tracked;    /* the last modes were refined */
-  uint64_t reused;     /* the last modes were still right within their bounds */
+  uint64_t reused;     /* the last modes, because the system is the same to the last bit */
   uint64_t direct;     /* the modes were solved directly */
   uint64_t unchanged;  /* joints and gains did not move at all, so nothing was computed */
   uint64_t no_springs; /* nothing vibrates, so nothing was solved */

@@ -69,7 +69,7 @@ struct VibrationMode {
 struct VibrationCounters {
   // Each tick that is to be analysed counts once in these:
   std::uint64_t tracked = 0;     ///< the last modes were refined
-  std::uint64_t reused = 0;      ///< the last modes are still right within their bounds
+  std::uint64_t reused = 0;      ///< the last modes, because the system is the same to the last bit
   std::uint64_t direct = 0;      ///< the modes were solved directly
   std::uint64_t unchanged = 0;   ///< joints and gains did not move at all, so nothing was computed
   std::uint64_t no_springs = 0;  ///< nothing vibrates, so nothing was solved

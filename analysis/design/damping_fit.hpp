@@ -22,12 +22,6 @@ struct DampingSample {
 /// include: a jacobian_rate, or a jacobian without task stiffness.
 DampingSample damping_sample(const TaskImpedance& impedance);
 
-/// Bounds on the entries of X (k x k each), infinite ones allowed.
-struct EntryBounds {
-  Eigen::MatrixXd lower;
-  Eigen::MatrixXd upper;
-};
-
 /// The ratios that a mode may have: at least `level` times its target and at most `ceiling`;
 /// without a ceiling exactly `level` times its target. Soft modes may have any ratio.
 struct RatioGoal {

@@ -1,4 +1,5 @@
 #include <dashpot/analysis/damping_sampled.hpp>
+#include <dashpot/analysis/design/damping_fit.hpp>
 #include <dashpot/apps/analyze/system_file.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
