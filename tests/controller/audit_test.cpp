@@ -1,42 +1,70 @@
-// What gains do on an arm: against the companion matrix in long double, and closed forms.
-#include <dashpot/tests/controller/audited_panda.hpp>
+// What gains do on an arm: against eigenvalues in long double, a sampled loop that is stepped tick
+// by tick, and closed forms.
+#include <dashpot/controller/audit.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/chains.hpp>
+#include <dashpot/tests/support/simulated_arm.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gmock/gmock.h>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <complex>
+#include <deque>
+#include <functional>
 #include <limits>
 #include <stdexcept>
 
 namespace dashpot::controller {
 namespace {
 
-/// Smallest ratio of the complex eigenvalues, and the smallest real part.
-PostureNumbers numbers_of(const TaskLoop& loop) {
-  const Eigen::Index n = loop.M.rows();
-  LongRows A = LongRows::Zero(2 * n, 2 * n);
-  A.topRightCorner(n, n).setIdentity();
-  const Eigen::PartialPivLU<LongRows> mass(loop.M);
-  A.bottomLeftCorner(n, n) = -mass.solve(loop.K);
-  A.bottomRightCorner(n, n) = -mass.solve(loop.C);
-  const Eigen::EigenSolver<LongRows> solver(A, false);
-  PostureNumbers numbers;
-  numbers.smallest_ratio = numbers.fastest_pole = std::numeric_limits<double>::infinity();
-  for (const std::complex<long double> value : solver.eigenvalues()) {
-    numbers.fastest_pole = std::min(numbers.fastest_pole, static_cast<double>(value.real()));
-    if (std::abs(value) < 0.1L || std::abs(value.imag()) < 1e-6L * std::abs(value)) continue;
-    numbers.smallest_ratio =
-        std::min(numbers.smallest_ratio, static_cast<double>(-value.real() / std::abs(value)));
-  }
-  return numbers;
+using Eigen::MatrixXd;
+using TaskLoop = analysis::System<>;
+using testing::kInfinity;
+using testing::panda_ready;
+
+const Vector6 kTranslationFirst = (Vector6() << 200, 200, 200, 20, 20, 20).finished();
+
+RobotModel audited_panda(double friction = 0) {
+  ModelOptions options;
+  options.viscous_friction = JointVector::Constant(7, friction);
+  return testing::arm_model(testing::arms()[0], options);
 }
 
-TEST(Audit, AgreesWithTheCompanionMatrixOverTheWorkspace) {
+AuditOptions stated(const Vector6& stiffness, double factor) {
+  AuditOptions options;
+  options.gains.task_stiffness = stiffness.asDiagonal();
+  options.gains.task_damping = Vector6(factor * stiffness.cwiseSqrt()).asDiagonal();
+  return options;
+}
+
+/// The closed loop of task gains.
+TaskLoop loop_at(const RobotModel& model, const JointVector& q, const Matrix6& stiffness,
+                 const Matrix6& damping) {
+  const DynamicsResult robot = evaluate(model, q, JointVector::Zero(q.size()));
+  const MatrixXd J = robot.J;
+  TaskLoop loop =
+      testing::system_from(robot.M, J.transpose() * damping * J, J.transpose() * stiffness * J);
+  loop.damping.diagonal() += model.joint_values(&Joint::viscous_friction);
+  return loop;
+}
+
+/// Expects the smallest ratio of the complex eigenvalues, and the smallest real part.
+void expect_numbers(const PostureNumbers& found, const TaskLoop& loop, double ratio_error = 1e-9,
+                    double pole_error = 0) {
+  double ratio = kInfinity, pole = kInfinity;
+  for (const testing::LongComplex value : testing::true_eigenvalues(loop)) {
+    pole = std::min(pole, static_cast<double>(value.real()));
+    if (std::abs(value) < 0.1L || std::abs(value.imag()) < 1e-6L * std::abs(value)) continue;
+    ratio = std::min(ratio, static_cast<double>(-value.real() / std::abs(value)));
+  }
+  EXPECT_NEAR(found.smallest_ratio, ratio, ratio_error);
+  EXPECT_NEAR(found.fastest_pole, pole, pole_error > 0 ? pole_error : 1e-9 * std::abs(pole));
+}
+
+TEST(Audit, AgreesWithTheEigenvaluesOverTheWorkspace) {
   for (const double friction : {0.0, 0.5}) {
     const RobotModel model = audited_panda(friction);
     AuditOptions options = stated(kTranslationFirst, 2);
@@ -44,14 +72,13 @@ TEST(Audit, AgreesWithTheCompanionMatrixOverTheWorkspace) {
     const Audit audit(model, options);
     Matrix6 stiffness = options.gains.task_stiffness;
     stiffness.bottomRightCorner<3, 3>() *= 0.5;
-    const std::vector<PostureNumbers> found = audit.sample(7, 0, 200);
-    for (std::int64_t i = 0; i < 200; ++i) {
+    const std::vector<PostureNumbers> found = audit.sample(7, 0, 100);
+    for (std::int64_t i = 0; i < 100; ++i) {
+      SCOPED_TRACE(i);
       const PostureNumbers& one = found[static_cast<std::size_t>(i)];
       if (one.singular) continue;
-      const PostureNumbers expected =
-          numbers_of(loop_at(model, audit.posture(7, i), stiffness, options.gains.task_damping));
-      EXPECT_NEAR(one.smallest_ratio, expected.smallest_ratio, 1e-9) << i;
-      EXPECT_NEAR(one.fastest_pole, expected.fastest_pole, 1e-9 * std::abs(expected.fastest_pole));
+      expect_numbers(one,
+                     loop_at(model, audit.posture(7, i), stiffness, options.gains.task_damping));
     }
   }
 }
@@ -59,13 +86,13 @@ TEST(Audit, AgreesWithTheCompanionMatrixOverTheWorkspace) {
 TEST(Audit, ProvesBoundsThatHold) {
   const RobotModel model = audited_panda();
   const AuditOptions options = stated(kTranslationFirst, 2);
-  const PostureAudit found = Audit(model, options).audit(home());
-  const PostureNumbers expected =
-      numbers_of(loop_at(model, home(), options.gains.task_stiffness, options.gains.task_damping));
+  const PostureAudit found = Audit(model, options).audit(panda_ready());
   EXPECT_LT(found.smallest_ratio_bound, 1e-10);
   EXPECT_LT(found.fastest_pole_bound, 1e-8);
-  EXPECT_NEAR(found.numbers.smallest_ratio, expected.smallest_ratio, found.smallest_ratio_bound);
-  EXPECT_NEAR(found.numbers.fastest_pole, expected.fastest_pole, found.fastest_pole_bound + 1e-9);
+  expect_numbers(
+      found.numbers,
+      loop_at(model, panda_ready(), options.gains.task_stiffness, options.gains.task_damping),
+      found.smallest_ratio_bound, found.fastest_pole_bound + 1e-9);
   EXPECT_EQ(found.numbers.zero_modes, 1);
 }
 
@@ -74,19 +101,17 @@ TEST(Audit, ScalesGainsByTheInertiaOfTheTip) {
   const RobotModel model = audited_panda();
   AuditOptions options = stated((Vector6() << 150, 150, 150, 250, 250, 250).finished(), 2);
   options.inertia_blocks = true;
-  const DynamicsResult robot = evaluate(model, home(), JointVector::Zero(7));
-  const Eigen::MatrixXd mobility =
-      robot.J * Eigen::MatrixXd(robot.M).inverse() * robot.J.transpose();
+  const DynamicsResult robot = evaluate(model, panda_ready(), JointVector::Zero(7));
+  const MatrixXd mobility = robot.J * MatrixXd(robot.M).inverse() * robot.J.transpose();
   Matrix6 inertia = Matrix6::Zero();
   inertia.topLeftCorner<3, 3>() = Eigen::Matrix3d(mobility.topLeftCorner<3, 3>()).inverse();
   inertia.bottomRightCorner<3, 3>() = Eigen::Matrix3d(mobility.bottomRightCorner<3, 3>()).inverse();
   const Matrix6 K = options.gains.task_stiffness, C = options.gains.task_damping;
-  const PostureNumbers expected = numbers_of(loop_at(model, home(), K * inertia, C * inertia));
+  const TaskLoop expected = loop_at(model, panda_ready(), inertia * options.gains.task_stiffness,
+                                    inertia * options.gains.task_damping);
   for (const Frame frame : {Frame::kBase, Frame::kTool}) {
     options.gains.frame = frame;
-    const PostureNumbers found = Audit(model, options).numbers(home());
-    EXPECT_NEAR(found.smallest_ratio, expected.smallest_ratio, 1e-9);
-    EXPECT_NEAR(found.fastest_pole, expected.fastest_pole, 1e-9 * std::abs(expected.fastest_pole));
+    expect_numbers(Audit(model, options).numbers(panda_ready()), expected);
   }
 }
 
@@ -99,19 +124,19 @@ TEST(Audit, CountsSpringsInTheNullSpace) {
   options.gains.null_stiffness = JointVector::Constant(7, kSpring);
   options.gains.null_damping = JointVector::Constant(7, kDamper);
   const Audit audit(model, options);
-  const PostureNumbers fast = audit.numbers(home());
-  const PostureAudit proved = audit.audit(home());
+  const PostureNumbers fast = audit.numbers(panda_ready());
+  const PostureAudit proved = audit.audit(panda_ready());
   EXPECT_EQ(fast.zero_modes, 0);
   EXPECT_EQ(proved.spectrum.modes.size(), 7);
-  const DynamicsResult robot = evaluate(model, home(), JointVector::Zero(7));
-  const Eigen::VectorXd z = Eigen::FullPivLU<Eigen::MatrixXd>(robot.J).kernel().col(0);
-  const double per_mass = z.squaredNorm() / z.dot(Eigen::MatrixXd(robot.M) * z);
+  const DynamicsResult robot = evaluate(model, panda_ready(), JointVector::Zero(7));
+  const Eigen::VectorXd z = Eigen::FullPivLU<MatrixXd>(robot.J).kernel().col(0);
+  const double per_mass = z.squaredNorm() / z.dot(MatrixXd(robot.M) * z);
   const double ratio = 0.5 * kDamper * std::sqrt(per_mass / kSpring);
   EXPECT_NEAR(fast.smallest_ratio, ratio, 1e-9);
   EXPECT_NEAR(proved.numbers.smallest_ratio, ratio, 1e-9);
   EXPECT_NEAR(fast.fastest_pole, proved.numbers.fastest_pole, 1e-6);
   options.gains.null_stiffness = {};
-  EXPECT_EQ(Audit(model, options).numbers(home()).zero_modes, 1);
+  EXPECT_EQ(Audit(model, options).numbers(panda_ready()).zero_modes, 1);
 }
 
 TEST(Audit, TakesTheProjectorOfThePseudoInverse) {
@@ -124,24 +149,22 @@ TEST(Audit, TakesTheProjectorOfThePseudoInverse) {
   for (int k = 0; k < 50; ++k) {
     const JointVector q = audit.posture(1, k);
     TaskLoop loop = loop_at(model, q, options.gains.task_stiffness, options.gains.task_damping);
-    const Eigen::MatrixXd J = evaluate(model, q, JointVector::Zero(7)).J;
-    const LongRows z = Eigen::FullPivLU<LongRows>(J.cast<long double>()).kernel();
-    const LongRows N = z * z.transpose() / z.squaredNorm();
-    loop.K += 10 * N, loop.C += 6 * N;
-    const PostureNumbers wanted = numbers_of(loop);
-    for (const PostureNumbers& found : {audit.numbers(q), audit.audit(q).numbers}) {
-      EXPECT_NEAR(found.fastest_pole, wanted.fastest_pole, 1e-9 * std::abs(wanted.fastest_pole));
-      EXPECT_NEAR(found.smallest_ratio, wanted.smallest_ratio, 1e-8);
-    }
+    const MatrixXd z =
+        Eigen::FullPivLU<MatrixXd>(evaluate(model, q, JointVector::Zero(7)).J).kernel();
+    const MatrixXd N = z * z.transpose() / z.squaredNorm();
+    loop.stiffness += 10 * N;
+    loop.damping += 6 * N;
+    expect_numbers(audit.numbers(q), loop, 1e-8);
+    expect_numbers(audit.audit(q).numbers, loop, 1e-8);
   }
 }
 
 TEST(Audit, NamesASingularPosture) {
-  JointVector stretched = home();
+  JointVector stretched = panda_ready();
   stretched[1] = stretched[3] = stretched[5] = 0;
   const Audit audit(audited_panda(), stated(kTranslationFirst, 2));
   EXPECT_TRUE(audit.numbers(stretched).singular);
-  EXPECT_FALSE(audit.numbers(home()).singular);
+  EXPECT_FALSE(audit.numbers(panda_ready()).singular);
   EXPECT_GT(audit.numbers(stretched).zero_modes, 1);
 }
 
@@ -185,52 +208,180 @@ TEST(Audit, SummarizesByNearestRank) {
 
 TEST(Audit, SuggestsDampingThatGivesTheRatio) {
   AuditOptions options = stated(kTranslationFirst, 2);
-  const DampingSuggestion found = Audit(audited_panda(), options).suggest(home(), 0.6);
+  const DampingSuggestion found = Audit(audited_panda(), options).suggest(panda_ready(), 0.6);
   options.gains.task_damping = found.damping;
-  const PostureAudit with = Audit(audited_panda(), options).audit(home());
+  const PostureAudit with = Audit(audited_panda(), options).audit(panda_ready());
   for (const analysis::Mode<>& mode : with.spectrum.modes) {
     EXPECT_NEAR(mode.damping_ratio, 0.6, 1e-8);
   }
   EXPECT_EQ(found.diagonal, Eigen::VectorXd(found.damping.diagonal()));
   options.gains.task_damping = Matrix6(found.diagonal.asDiagonal());
-  EXPECT_NEAR(Audit(audited_panda(), options).audit(home()).numbers.smallest_ratio,
+  EXPECT_NEAR(Audit(audited_panda(), options).audit(panda_ready()).numbers.smallest_ratio,
               found.diagonal_smallest_ratio, 1e-9);
 }
 
-void expect_refusal(const AuditOptions& options, const std::string& words) {
-  try {
-    const Audit audit(audited_panda(), options);
-    FAIL() << "not refused: " << words;
-  } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr(words));
+TEST(Audit, RefusesGainsThatCannotBe) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  const struct {
+    std::function<void(AuditOptions&)> spoil;
+    const char* words;
+  } cases[] = {
+      {[](auto& o) { o.gains.task_stiffness(0, 0) = -1; },
+       "task_stiffness: is not positive semidefinite"},
+      {[](auto& o) { o.gains.task_damping(0, 1) = 1; }, "task_damping: is not symmetric"},
+      {[](auto& o) { o.gains.task_damping(2, 2) = kNaN; },
+       "task_damping: has an entry that is not a finite number"},
+      {[](auto& o) { o.gains.null_stiffness = JointVector::Zero(6); },
+       "null_stiffness: has 6 entries, expected 7"},
+      {[](auto& o) { o.gains.task_stiffness(1, 1) = 3, o.inertia_blocks = true; },
+       "task_stiffness: needs one number for translation"},
+      {[](auto& o) { o.period = -1; }, "period"},
+      {[](auto& o) { o.integral_time = kNaN; }, "integral_time"},
+  };
+  const RobotModel model = audited_panda();
+  for (const auto& [spoil, words] : cases) {
+    AuditOptions options = stated(kTranslationFirst, 2);
+    spoil(options);
+    EXPECT_THAT([&] { Audit(model, options); },
+                ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr(words)));
+  }
+  const Audit good(model, stated(kTranslationFirst, 2));
+  EXPECT_THROW(good.numbers(JointVector::Zero(6)), std::invalid_argument);
+}
+
+/// Runs the sampled loop with `factor` times the gains, and returns the largest deflection of the
+/// last ticks over that of those before.
+double growth(const TaskLoop& loop, const AuditOptions& options, double factor) {
+  const Eigen::Index n = loop.dof();
+  const MatrixXd K = factor * loop.stiffness, C = factor * loop.damping;
+  const Eigen::LLT<MatrixXd> mass(loop.mass);
+  const double T = options.period;
+  const double gain = options.cutoff > 0 ? -std::expm1(-2 * M_PI * options.cutoff * T) : 1;
+  const Eigen::VectorXd start = Eigen::VectorXd::LinSpaced(n, 1, 2);
+  Eigen::VectorXd q = start, velocity = Eigen::VectorXd::Zero(n), before = q;
+  Eigen::VectorXd filtered = Eigen::VectorXd::Zero(n), stored = filtered;
+  std::deque<Eigen::VectorXd> queue(static_cast<std::size_t>(options.delay), filtered);
+  double early = 0, late = 0;
+  constexpr int kTicks = 16000;
+  for (int tick = 0; tick < kTicks; ++tick) {
+    const Eigen::VectorXd used =
+        options.difference_velocity ? Eigen::VectorXd((q - before) / T) : velocity;
+    queue.push_back(-K * q - C * used - stored);
+    if (options.integral_time > 0) stored += T / options.integral_time * K * q;
+    filtered += gain * (queue.front() - filtered);
+    queue.pop_front();
+    const Eigen::VectorXd acceleration = mass.solve(filtered);
+    before = q;
+    q += T * velocity + 0.5 * T * T * acceleration;
+    velocity += T * acceleration;
+    const double size = (K * q).norm() + T * (K * velocity).norm();
+    if (tick >= kTicks / 2 && tick < 3 * kTicks / 4) early = std::max(early, size);
+    if (tick >= 3 * kTicks / 4) late = std::max(late, size);
+    if (!(size < 1e200)) return kInfinity;
+  }
+  return late / early;
+}
+
+TEST(Audit, FindsTheMarginAtWhichASampledLoopStartsToGrow) {
+  const RobotModel model = audited_panda();
+  AuditOptions options = stated(kTranslationFirst, 2);
+  options.period = 0.0005;
+  for (const bool slow : {false, true}) {
+    options.delay = slow ? 1 : 0;
+    options.cutoff = slow ? 300 : 0;
+    options.difference_velocity = slow;
+    const Audit audit(model, options);
+    const double margin = audit.numbers(panda_ready()).gain_margin;
+    const TaskLoop loop =
+        loop_at(model, panda_ready(), options.gains.task_stiffness, options.gains.task_damping);
+    EXPECT_LT(growth(loop, options, 0.995 * margin), 1) << margin;
+    EXPECT_GT(growth(loop, options, 1.005 * margin), 1) << margin;
+    EXPECT_NEAR(audit.audit(panda_ready()).numbers.gain_margin, margin, 1e-6 * margin);
+    EXPECT_TRUE(audit.audit(panda_ready()).integral_decays.empty());
   }
 }
 
-TEST(Audit, RefusesGainsThatCannotBe) {
-  const AuditOptions good = stated(kTranslationFirst, 2);
-  AuditOptions bad = good;
-  bad.gains.task_stiffness(0, 0) = -1;
-  expect_refusal(bad, "task_stiffness: is not positive semidefinite");
-  bad = good;
-  bad.gains.task_damping(0, 1) = 1;
-  expect_refusal(bad, "task_damping: is not symmetric");
-  bad = good;
-  bad.gains.task_damping(2, 2) = std::numeric_limits<double>::quiet_NaN();
-  expect_refusal(bad, "task_damping: has an entry that is not a finite number");
-  bad = good;
-  bad.gains.null_stiffness = JointVector::Zero(6);
-  expect_refusal(bad, "null_stiffness: has 6 entries, expected 7");
-  bad = good;
-  bad.gains.task_stiffness(1, 1) = 3;
-  bad.inertia_blocks = true;
-  expect_refusal(bad, "task_stiffness: needs one number for translation");
-  bad = good;
-  bad.period = -1;
-  expect_refusal(bad, "period");
-  bad = good;
-  bad.integral_time = std::numeric_limits<double>::quiet_NaN();
-  expect_refusal(bad, "integral_time");
-  EXPECT_THROW(Audit(audited_panda(), good).numbers(JointVector::Zero(6)), std::invalid_argument);
+TEST(Audit, CountsTheIntegralOfTheSprings) {
+  const RobotModel model = audited_panda();
+  AuditOptions options = stated(kTranslationFirst, 2);
+  options.period = 0.0005;
+  options.delay = 1;
+  options.half_quaternion = true;
+  const double without = Audit(model, options).numbers(panda_ready()).gain_margin;
+  Matrix6 K = options.gains.task_stiffness;  // with which the springs act
+  K.bottomRightCorner<3, 3>() *= 0.5;
+  const TaskLoop loop = loop_at(model, panda_ready(), K, options.gains.task_damping);
+  for (const double time : {0.02, 1.0}) {
+    SCOPED_TRACE(time);
+    options.integral_time = time;
+    const Audit audit(model, options);
+    const PostureAudit found = audit.audit(panda_ready());
+    const double margin = found.numbers.gain_margin;
+    EXPECT_NEAR(audit.numbers(panda_ready()).gain_margin, margin, 1e-5 * margin);
+    ASSERT_GE(found.integral_decays.size(), 6U);
+    if (time < 0.1) {  // slow modes follow it, and it is unstable
+      EXPECT_GT(growth(loop, options, 1), 1);
+      EXPECT_LT(margin, 1);
+      continue;
+    }
+    EXPECT_LT(growth(loop, options, 0.995 * margin), 1) << margin;
+    EXPECT_GT(growth(loop, options, 1.005 * margin), 1) << margin;
+    EXPECT_NEAR(margin, without, 1e-3 * without);  // at which a wrist vibrates, much faster
+    for (const double decay : found.integral_decays) EXPECT_NEAR(decay * time, 1, 0.6);
+    EXPECT_TRUE(std::is_sorted(found.integral_decays.begin(), found.integral_decays.end()));
+  }
+}
+
+constexpr double kLinkInertia = 0.02 + 0.25 * 0.25;  // of a link of the chain, kg m^2
+
+/// A link on its own, and its gains.
+struct OneLink {
+  RobotModel model;
+  AuditOptions options;
+
+  OneLink(double spring, double damper, double period) : model(chain()) {
+    options.mode = Mode::kJoint;
+    options.gains.joint_stiffness = JointMatrix::Constant(1, 1, spring);
+    options.gains.joint_damping = JointMatrix::Constant(1, 1, damper);
+    options.period = period;
+  }
+  static RobotModel chain() {
+    ModelOptions smooth;
+    smooth.viscous_friction = smooth.coulomb_friction = JointVector::Zero(1);
+    return testing::chain_of({"continuous"}, smooth);
+  }
+  PostureNumbers numbers() const { return Audit(model, options).numbers(JointVector::Zero(1)); }
+  PostureAudit audit() const { return Audit(model, options).audit(JointVector::Zero(1)); }
+};
+
+/// A damper c held for T makes v <- (1 - c T / I) v: stable up to c T / I = 2.
+TEST(Audit, FindsPoleAndMarginOfOneJoint) {
+  OneLink one(1e-3, 10, 0.001);
+  one.options.soft_frequency = 1e-3;
+  const PostureNumbers found = one.numbers();
+  EXPECT_NEAR(found.fastest_pole, -10 / kLinkInertia, 1e-3);
+  EXPECT_NEAR(found.gain_margin, 2 * kLinkInertia / (10 * 0.001), 1e-3);
+  EXPECT_NEAR(found.smallest_ratio, 10 / (2 * std::sqrt(1e-3 * kLinkInertia)), 1e-3);
+  EXPECT_EQ(found.zero_modes, 0);
+}
+
+/// With an integral l is a root of I l^3 + s (c l^2 + k l + k / t): stable for s > I / (c t).
+TEST(Audit, FindsSlowModeAndMarginOfOneJointWithAnIntegral) {
+  constexpr double kSpring = 20, kDamper = 2, kPeriod = 1e-4;
+  OneLink one(kSpring, kDamper, kPeriod);
+  double& time = one.options.integral_time;
+  time = 0.9 * kLinkInertia / kDamper;
+  EXPECT_LT(one.numbers().gain_margin, 1);
+  time = 0.5;
+  const PostureAudit found = one.audit();
+  EXPECT_NEAR(found.numbers.gain_margin, 2 * kLinkInertia / (kDamper * kPeriod), 1);
+  ASSERT_EQ(found.integral_decays.size(), 1U);
+  const double l = -found.integral_decays[0];
+  const double residual = ((kLinkInertia * l + kDamper) * l + kSpring) * l + kSpring / time;
+  EXPECT_NEAR(residual / (kSpring / time), 0, 2e-4);
+  // Without a period there is no loop that it could be in.
+  one.options.period = 0;
+  EXPECT_TRUE(one.audit().integral_decays.empty());
 }
 
 }  // namespace
