@@ -171,36 +171,33 @@ void expect_task_law(const RobotModel& model, Random& random) {
   const MatrixXd M = one.kdl.M, J = one.kdl.J, JS = S * J;
   const MatrixXd A = JS * M.inverse() * JS.transpose();
   if (Eigen::JacobiSVD<MatrixXd>(A).singularValues().reverse()[0] < 0.05 * A.norm()) return;
-  const MatrixXd K_C = S.transpose() * (S * turn.transpose()) * gains.task_stiffness *
-                       (S * turn.transpose()).transpose() * S;
-  const MatrixXd C_C = S.transpose() * (S * turn.transpose()) * gains.task_damping *
-                       (S * turn.transpose()).transpose() * S;
+  const MatrixXd pseudo = M.inverse() * JS.transpose() * A.inverse();
+  const MatrixXd held_only = S.transpose() * S * turn.transpose();
+  const MatrixXd K_C = held_only * gains.task_stiffness * held_only.transpose(),
+                 C_C = held_only * gains.task_damping * held_only.transpose();
   const TipReference& path = one.references.tip;
   VectorXd tau = J.transpose() * (K_C * one.tip_error() + C_C * (path.velocity() - J * one.qd));
   if (n > held) {
-    const MatrixXd projector =
-        MatrixXd::Identity(n, n) - M.inverse() * JS.transpose() * A.inverse() * JS;
+    const MatrixXd projector = MatrixXd::Identity(n, n) - pseudo * JS;
     const JointReference& rest = one.references.posture;
-    VectorXd share = M.inverse() * JS.transpose() * A.inverse() * S * one.tip_error();
+    VectorXd share = pseudo * S * one.tip_error();
     share /= std::sqrt(1 + share.squaredNorm() / 0.09);
-    tau += projector.transpose() * gains.null_stiffness.asDiagonal() *
-           (rest.position() - one.q - share);
-    tau += projector.transpose() * gains.null_damping.asDiagonal() * projector *
-           (rest.velocity() - one.qd);
+    tau += projector.transpose() *
+           (gains.null_stiffness.asDiagonal() * VectorXd(rest.position() - one.q - share) +
+            gains.null_damping.asDiagonal() * projector * VectorXd(rest.velocity() - one.qd));
   }
   const double size = 1e-9 * (1 + tau.norm() + M.norm());
   const Vector6 f = random.vector(6);
   EXPECT_TRUE(near(one.torque(impedance, kNone, f), tau, size));
-  const VectorXd all =
-      tau + JS.transpose() * A.inverse() * S * path.acceleration() + one.kdl.coriolis +
-      one.kdl.gravity + J.transpose() * f +
-      one.friction(M.inverse() * JS.transpose() * A.inverse() * S * path.velocity());
+  const VectorXd all = tau + M * pseudo * S * path.acceleration() + one.kdl.coriolis +
+                       one.kdl.gravity + J.transpose() * f +
+                       one.friction(pseudo * S * path.velocity());
   EXPECT_TRUE(near(one.torque(impedance, kAll, f), all, size + 1e-9 * all.norm()));
 }
 
 TEST(CartesianImpedance, IsItsEquation) {
   Random random(322);
-  for (int k = 0; k < 100; ++k) {
+  for (int k = 0; k < 50; ++k) {
     expect_task_law(testing::arm_model(testing::arms()[0]), random);
     expect_task_law(testing::arm_model(testing::arms()[2]), random);
     expect_task_law(rough_chain(random, 9), random);
@@ -208,10 +205,11 @@ TEST(CartesianImpedance, IsItsEquation) {
   }
 }
 
+// Of the springs and of the feed-forward each mode gives its share while one passes into the other.
 TEST(Law, SumsTheModesByTheirWeights) {
   Random random(323);
   for (int k = 0; k < 50; ++k) {
-    Case one(testing::arm_model(testing::arms()[1]), random);
+    Case one(rough_chain(random, 7), random);
     Setpoint setpoint;
     setpoint.gains = random_gains(random, 7);
     setpoint.gains.null_stiffness.setZero();
@@ -219,90 +217,27 @@ TEST(Law, SumsTheModesByTheirWeights) {
     const auto joint = Impedance(setpoint, 7);
     setpoint.mode = Mode::kCartesian;
     const auto task = Impedance(setpoint, 7);
-    const double s = random.uniform(0, 1);
-    const Vector6 f = Vector6::Zero();
-    const VectorXd expected =
-        (1 - s) * one.torque(joint, kNone, f) + s * one.torque(task, kNone, f);
-    EXPECT_TRUE(near(one.torque(blend(joint, task, s), kNone, f), expected, 1e-9));
-  }
-}
-
-// Of the feed-forward, too, each mode gives its share while one passes into the other.
-TEST(Law, FeedsForwardEachModeByItsWeight) {
-  Random random(327);
-  for (int k = 0; k < 50; ++k) {
-    Case one(rough_chain(random, 7), random);
-    Setpoint setpoint;
-    setpoint.gains = random_gains(random, 7);
-    const auto joint = Impedance(setpoint, 7);
-    setpoint.mode = Mode::kCartesian;
     const double s = random.uniform(0.1, 0.9);
-    const auto impedance = blend(joint, Impedance(setpoint, 7), s);
+    const auto impedance = blend(joint, task, s);
     const Vector6 f = Vector6::Zero();
     const VectorXd plain = one.torque(impedance, kNone, f);
+    const VectorXd springs = (1 - s) * one.torque(joint, kNone, f) + s * one.torque(task, kNone, f);
+    const double size = 1e-9 * (1 + plain.norm());
+    EXPECT_TRUE(near(plain, springs, size));
     NullSpace null_space;  // of directions that are held in part
     null_space.compute(one.robot.M, one.robot.J, impedance.base, impedance.tool, one.robot.R_BT);
-
+    const JointReference& joints = one.references.joint;
+    const TipReference& tip = one.references.tip;
     const VectorXd acceleration =
-        one.torque(impedance, {false, false, false, true, false}, f) - plain;
-    const VectorXd of_joints = one.kdl.M * one.references.joint.acceleration();
-    const VectorXd of_tip =
-        one.kdl.J.transpose() * null_space.inertia().wrench(one.references.tip.acceleration());
-    const VectorXd expected = (1 - s) * of_joints + s * of_tip;
-    ASSERT_GT(of_joints.norm(), 1e-2);
-    ASSERT_GT(of_tip.norm(), 1e-2);
-    EXPECT_TRUE(near(acceleration, expected, 1e-9 * (1 + plain.norm())));
-
-    const VectorXd friction = one.torque(impedance, {false, false, true, false, false}, f) - plain;
-    const VectorXd velocity = (1 - s) * one.references.joint.velocity() +
-                              s * null_space.joint_velocity(one.references.tip.velocity());
-    EXPECT_TRUE(near(friction, one.friction(velocity), 1e-9 * (1 + plain.norm())));
-  }
-}
-
-TEST(Law, StiffnessOfTheClosedLoopIsTheDerivativeOfItsTorque) {
-  Random random(324);
-  for (int k = 0; k < 30; ++k) {
-    Case one(testing::arm_model(testing::arms()[0]), random);
-    Setpoint setpoint;
-    setpoint.gains = random_gains(random, 7);
-    const auto joint = Impedance(setpoint, 7);
-    setpoint.mode = Mode::kCartesian;
-    setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
-    auto impedance = Impedance(setpoint, 7);
-    if (k % 3 == 1) impedance = joint;
-    if (k % 3 == 2) impedance = blend(joint, impedance, 0.3);
-    // At rest on all springs
-    one.qd.setZero();
-    one.references.joint.start(one.q);
-    one.references.posture.start(one.q);
-    one.references.tip.start(one.robot.p_BT_B, Quaterniond(one.robot.R_BT));
-    ImpedanceLaw law(one.model, kNone);
-    const DynamicsKernel kernel(one.model);
-    const auto torque = [&](const JointVector& q, const JointVector& qd) {
-      DynamicsResult robot;
-      JointVector tau;
-      kernel.evaluate(q, qd, robot);
-      law.torque(robot, q, qd, impedance, one.references, Vector6::Zero(), kEndless, tau);
-      return tau;
-    };
-    MatrixXd K(7, 7), C(7, 7);
-    constexpr double kStep = 1e-5;
-    for (int i = 0; i < 7; ++i) {
-      const JointVector d = kStep * JointVector::Unit(7, i), z = JointVector::Zero(7);
-      K.col(i) = -(torque(one.q + d, z) - torque(one.q - d, z)) / (2 * kStep);
-      C.col(i) = -(torque(one.q, d) - torque(one.q, -d)) / (2 * kStep);
-    }
-    torque(one.q, one.qd);
-    analysis::System<kMaxJoints> system;
-    controller::closed_loop(one.robot, one.qd, impedance, law.null_space(), JointVector::Zero(7),
-                            {}, system);
-    EXPECT_TRUE(system.symmetric());
-    EXPECT_TRUE(near(system.mass, one.kdl.M, 1e-12));
-    EXPECT_TRUE(near(system.damping, C, 1e-6 * C.norm()));
-    EXPECT_TRUE(near(system.stiffness_factor.transpose() * system.stiffness_factor,
-                     system.stiffness, 1e-12 * K.norm()));
-    EXPECT_TRUE(near(system.stiffness, K, 1e-6 * K.norm()));
+        (1 - s) * one.kdl.M * joints.acceleration() +
+        s * one.kdl.J.transpose() * null_space.inertia().wrench(tip.acceleration());
+    ASSERT_GT(acceleration.norm(), 1e-2);
+    EXPECT_TRUE(near(one.torque(impedance, {false, false, false, true, false}, f) - plain,
+                     acceleration, size));
+    const VectorXd velocity =
+        (1 - s) * joints.velocity() + s * null_space.joint_velocity(tip.velocity());
+    EXPECT_TRUE(near(one.torque(impedance, {false, false, true, false, false}, f) - plain,
+                     one.friction(velocity), size));
   }
 }
 
@@ -340,7 +275,8 @@ TEST(ClosedLoop, AddsOptionalTermsAndFriction) {
   const auto impedance = Impedance(setpoint, 7);
   NullSpace null_space;
   null_space.compute(one.robot.M, one.robot.J, impedance.base, impedance.tool, one.robot.R_BT);
-  const JointVector friction = random.vector(7).cwiseAbs();
+  JointVector friction = random.vector(7).cwiseAbs();
+  const MatrixXd wanted = friction.asDiagonal();
   const Vector6 f = random.vector(6);
   const auto system_with = [&](const StiffnessTerms& terms) {
     analysis::System<kMaxJoints> system;
@@ -349,16 +285,13 @@ TEST(ClosedLoop, AddsOptionalTermsAndFriction) {
   };
   const JointMatrix load = stiffness_under_load(one.robot, impedance, Load::kToolWrench, {f, f});
   const auto plain = system_with({}), both = system_with({true, &load});
-  const MatrixXd J = one.robot.J;
-  const MatrixXd extra =
-      J.transpose() * setpoint.gains.task_damping * jacobian_rate(one.robot.J, one.qd) + load;
-  EXPECT_TRUE(near(both.stiffness - plain.stiffness, extra, 1e-9));
+  const MatrixXd J = one.robot.J, given = J.transpose() * setpoint.gains.task_damping;
+  EXPECT_TRUE(near(both.stiffness - plain.stiffness,
+                   given * jacobian_rate(one.robot.J, one.qd) + load, 1e-9));
   EXPECT_EQ(both.stiffness_factor.rows(), 0);
   EXPECT_EQ(plain.stiffness_factor.rows(), 13);
-  const MatrixXd smooth = plain.damping - MatrixXd(friction.asDiagonal());
-  EXPECT_TRUE(near(smooth.diagonal() + friction, plain.damping.diagonal(), 1e-9));
-  EXPECT_GT((MatrixXd(plain.damping) - J.transpose() * setpoint.gains.task_damping * J).trace(),
-            friction.sum());
+  friction.setZero();
+  EXPECT_TRUE(near(plain.damping - system_with({}).damping, wanted, 1e-9));
 }
 
 }  // namespace

@@ -56,10 +56,11 @@ struct HeldLoad {
                          quaternion(Eigen::Vector3d(e.tail<3>())) * Quaterniond(robot.R_BT));
   }
   /// Of springs, feed-forward and world.
-  JointVector torque(ImpedanceLaw& law, Load load, const JointVector& there) const {
+  JointVector torque(ImpedanceLaw& law, Load load, const JointVector& there,
+                     const JointVector& qd) const {
     const DynamicsResult now = at(there);
     JointVector tau;
-    law.torque(now, there, rest, impedance, references, wrenches.commanded, kUnclamped, tau);
+    law.torque(now, there, qd, impedance, references, wrenches.commanded, kUnclamped, tau);
     Vector6 f = wrenches.world;
     if (load == Load::kToolWrench) {
       const Eigen::Matrix3d turn = now.R_BT * robot.R_BT.transpose();
@@ -80,13 +81,32 @@ Gains springs(Random& random) {
   return gains;
 }
 
+/// -df/dx_i of a torque.
+template <class Torque>
+MatrixXd falling(const Torque& torque) {
+  constexpr double kStep = 1e-5;
+  MatrixXd result(7, 7);
+  for (int i = 0; i < 7; ++i) {
+    const JointVector d = kStep * JointVector::Unit(7, i);
+    result.col(i) = (torque(JointVector(-d)) - torque(d)) / (2 * kStep);
+  }
+  return result;
+}
+
 TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
   Random random(411);
-  std::printf("seed 411\n");
-  for (int k = 0; k < 48; ++k) {
+  for (int k = 0; k < 60; ++k) {
     HeldLoad held(random);
+    const bool loaded = k % 5 > 0;
     Setpoint setpoint;
     setpoint.gains = springs(random);
+    if (!loaded) {  // the loop as it is analysed: null space and dampers, too
+      held.wrenches = {};
+      setpoint.gains.joint_damping = 10 * random.spd(7);
+      setpoint.gains.task_damping = 20 * random.spd(6);
+      setpoint.gains.null_stiffness = 20 * random.vector(7).cwiseAbs();
+      setpoint.gains.null_damping = 2 * random.vector(7).cwiseAbs();
+    }
     const Impedance joint(setpoint, 7);
     setpoint.mode = Mode::kCartesian;
     setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
@@ -96,20 +116,26 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
     ImpedanceLaw law(held.model, {false, false, false, false, true});
     for (const Load load : {Load::kBaseWrench, Load::kToolWrench, Load::kJointTorques}) {
       SCOPED_TRACE(std::to_string(k) + ", load " + std::to_string(static_cast<int>(load)));
-      constexpr double kStep = 1e-5;
-      MatrixXd K(7, 7);
-      for (int i = 0; i < 7; ++i) {
-        const JointVector d = kStep * JointVector::Unit(7, i);
-        K.col(i) =
-            (held.torque(law, load, held.q - d) - held.torque(law, load, held.q + d)) / (2 * kStep);
-      }
+      const MatrixXd K = falling(
+          [&](const JointVector& d) { return held.torque(law, load, held.q + d, held.rest); });
+      const MatrixXd C =
+          falling([&](const JointVector& d) { return held.torque(law, load, held.q, d); });
       const JointMatrix added =
           stiffness_under_load(held.robot, held.impedance, load, held.wrenches);
       analysis::System<kMaxJoints> system;
       closed_loop(held.robot, held.rest, held.impedance, law.null_space(), held.rest,
-                  {false, &added}, system);
-      EXPECT_TRUE(near(system.stiffness, K, 1e-7 * K.norm()));
-      EXPECT_GT(added.norm(), 1e-3 * K.norm()) << "else it shows nothing";
+                  {false, loaded ? &added : nullptr}, system);
+      EXPECT_TRUE(near(system.mass, held.robot.M, 0));
+      EXPECT_TRUE(near(system.damping, C, 1e-6 * C.norm()));
+      EXPECT_TRUE(near(system.stiffness, K, (loaded ? 1e-7 : 1e-6) * K.norm()));
+      if (loaded) {
+        EXPECT_GT(added.norm(), 1e-3 * K.norm()) << "else it shows nothing";
+        continue;
+      }
+      EXPECT_TRUE(system.symmetric());
+      const MatrixXd W = system.stiffness_factor;
+      EXPECT_TRUE(near(W.transpose() * W, system.stiffness, 1e-12 * K.norm()));
+      break;
     }
   }
 }

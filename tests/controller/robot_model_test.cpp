@@ -25,6 +25,10 @@ std::string with(const std::string& text, const std::string& more) {
   return text.substr(0, text.rfind("</robot>")) + more + "</robot>";
 }
 
+RobotModel chain(const std::string& text, const ModelOptions& options = {}) {
+  return RobotModel::from_urdf_text(text, "link0", "tip", options);
+}
+
 DynamicsResult at(const RobotModel& model) {
   const int n = model.dof();
   return evaluate(model, JointVector::LinSpaced(n, -1, 1.3), JointVector::LinSpaced(n, 0.7, -0.4));
@@ -54,45 +58,41 @@ TEST(RobotModel, TakesJointsFromTheFile) {
   EXPECT_EQ(model.gravity(), Eigen::Vector3d(0, 0, -9.81));
 }
 
-TEST(RobotModel, GivesAContinuousJointNoLimits) {
-  const RobotModel model = RobotModel::from_urdf_text(
+/// A link on a joint without limits, about this axis.
+RobotModel hinge(const std::string& axis) {
+  return RobotModel::from_urdf_text(
       "<robot name='r'><link name='a'/><link name='b'>" +
-          testing::inertial(1, {1, 0, 0}, Eigen::Matrix3d::Identity()) +
-          "</link><joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint>"
-          "</robot>",
+          testing::inertial(1, {0.3, 0.1, 0}, 0.1 * Eigen::Matrix3d::Identity()) +
+          "</link><joint name='j' type='continuous'><parent link='a'/><child link='b'/><axis "
+          "xyz='" +
+          axis + "'/></joint></robot>",
       "a", "b");
-  const Joint& joint = model.joints()[0];
-  EXPECT_EQ(joint.type, JointType::kContinuous);
-  EXPECT_EQ(joint.lower, -kInfinity);
-  EXPECT_EQ(joint.upper, kInfinity);
-  EXPECT_EQ(joint.velocity, kInfinity);
-  EXPECT_EQ(joint.effort, kInfinity);
 }
 
-TEST(RobotModel, ReadsEveryArm) {
-  for (const auto& arm : testing::all_arms()) {
-    EXPECT_EQ(testing::arm_model(arm).dof(), std::string(arm.file) == "ur5" ? 6 : 7) << arm.file;
+TEST(RobotModel, GivesAContinuousJointNoLimits) {
+  const Joint joint = hinge("1 0 0").joints()[0];
+  EXPECT_EQ(joint.type, JointType::kContinuous);
+  EXPECT_EQ(joint.lower, -kInfinity);
+  for (const double limit : {joint.upper, joint.velocity, joint.effort}) {
+    EXPECT_EQ(limit, kInfinity);
   }
 }
 
-TEST(RobotModel, AddsReflectedInertiaToTheDiagonalAlone) {
-  ModelOptions options;
-  options.reflected_inertia = JointVector::LinSpaced(7, 0.1, 0.7);
-  const DynamicsResult bare = at(testing::arm_model(testing::arms()[0]));
-  DynamicsResult expected = bare;
-  expected.M.diagonal() += options.reflected_inertia;
-  EXPECT_TRUE(same_dynamics(at(testing::arm_model(testing::arms()[0], options)), expected,
-                            JointVector::Ones(7), 1e-14));
+TEST(RobotModel, TakesAnAxisOfAnyLength) {
+  EXPECT_TRUE(same(hinge("0 0.6 -0.8"), hinge("0 6e-4 -8e-4")));
 }
 
-TEST(RobotModel, PutsFrictionFromTheOptionsInPlaceOfTheFiles) {
+TEST(RobotModel, TakesReflectedInertiaAndFrictionFromTheOptions) {
   ModelOptions options;
   options.viscous_friction = JointVector::LinSpaced(7, 1, 7);
   options.coulomb_friction = JointVector::LinSpaced(7, 0.1, 0.7);
+  options.reflected_inertia = JointVector::LinSpaced(7, 0.1, 0.7);
   const RobotModel model = testing::arm_model(testing::arms()[0], options);
   EXPECT_EQ(model.joint_values(&Joint::viscous_friction), options.viscous_friction);
   EXPECT_EQ(model.joint_values(&Joint::coulomb_friction), options.coulomb_friction);
-  EXPECT_TRUE(same(model, testing::arm_model(testing::arms()[0])));  // friction is no dynamics
+  DynamicsResult expected = at(testing::arm_model(testing::arms()[0]));  // friction is no dynamics
+  expected.M.diagonal() += options.reflected_inertia;
+  EXPECT_TRUE(same_dynamics(at(model), expected, JointVector::Ones(7), 1e-14));
 }
 
 TEST(RobotModel, CarriesAPayloadAsItWouldALink) {
@@ -106,9 +106,9 @@ TEST(RobotModel, CarriesAPayloadAsItWouldALink) {
       "<link name='load'>" +
       testing::inertial(1.7, options.payload.center, options.payload.inertia) +
       "</link><joint name='grasp' type='fixed'><parent link='tip'/><child link='load'/></joint>";
-  const RobotModel loaded = RobotModel::from_urdf_text(text, "link0", "tip", options);
-  EXPECT_TRUE(same(loaded, RobotModel::from_urdf_text(with(text, link), "link0", "tip")));
-  const double bare = at(RobotModel::from_urdf_text(text, "link0", "tip")).M(0, 0);
+  const RobotModel loaded = chain(text, options);
+  EXPECT_TRUE(same(loaded, chain(with(text, link))));
+  const double bare = at(chain(text)).M(0, 0);
   EXPECT_GT(std::abs(at(loaded).M(0, 0) - bare), 0.01);
 }
 
@@ -126,27 +126,22 @@ TEST(RobotModel, WeighsLinksOffTheChainAtTheirZeroPosition) {
   const auto model = [&](const std::string& more, bool include = true) {
     ModelOptions options;
     options.include_off_chain = include;
-    return RobotModel::from_urdf_text(with(text, more), "link0", "tip", options);
+    return chain(with(text, more), options);
   };
   const RobotModel moving = model(links + finger + nail);
   EXPECT_TRUE(same(moving, model(links + fixed(finger) + fixed(nail))));
   EXPECT_FALSE(same(moving, model("")));
   EXPECT_TRUE(same(model(links + finger + nail, false), model("")));
-}
-
-TEST(RobotModel, LeavesOutWhatStandsStill) {
-  RandomRobot random(743);
-  const std::string text = random.chain(4, 0);
-  const std::string beside = random.link("camera") + random.joint("c", "fixed", "link0", "camera");
-  EXPECT_TRUE(same(RobotModel::from_urdf_text(with(text, beside), "link0", "tip"),
-                   RobotModel::from_urdf_text(text, "link0", "tip")));
+  // What stands still
+  const std::string camera = random.link("camera") + random.joint("c", "fixed", "link0", "camera");
+  EXPECT_TRUE(same(model(camera), model("")));
 }
 
 TEST(RobotModel, TurnsGravityIntoTheAxesOfABaseThatIsNotTheRoot) {
   RandomRobot random(744);
   const std::string text = random.chain(8, 0.3);
   // From link 3 on, with the joints before it at zero, against the whole chain.
-  const RobotModel whole = RobotModel::from_urdf_text(text, "link0", "tip");
+  const RobotModel whole = chain(text);
   const RobotModel part = RobotModel::from_urdf_text(text, "link3", "tip");
   ASSERT_EQ(part.dof(), 5);
   JointVector q = JointVector::Zero(8), qd = JointVector::Zero(8);
@@ -189,11 +184,16 @@ TEST(RobotModel, MergesFixedJointsAndMasslessLinks) {
       "<robot name='r'><link name='a'/>" + random.joint("j", "revolute", "a", "b");
   const std::string inertia_1 = testing::inertial(1, {0.1, 0, 0}, random.inertia(1, 0.1));
   const std::string inertia_2 = testing::inertial(2, {0, 0.3, 0}, random.inertia(2, 0.1));
+  const auto fixed = [](const std::string& name, const std::string& parent,
+                        const std::string& child, const std::string& origin) {
+    return "<joint name='" + name + "' type='fixed'><parent link='" + parent + "'/><child link='" +
+           child + "'/><origin " + origin + "/></joint>";
+  };
+  const std::string bodies =
+      "<link name='b'>" + inertia_1 + "</link><link name='d'>" + inertia_2 + "</link>";
   const RobotModel split = RobotModel::from_urdf_text(
-      head + "<link name='b'>" + inertia_1 + "</link><link name='c'/><link name='d'>" + inertia_2 +
-          "</link><joint name='k' type='fixed'><parent link='b'/><child link='c'/><origin "
-          "xyz='1 2 3' rpy='0 0 1.5'/></joint><joint name='l' type='fixed'><parent link='c'/>"
-          "<child link='d'/><origin xyz='-2 1 -3' rpy='0 0 -1.5'/></joint></robot>",
+      head + bodies + "<link name='c'/>" + fixed("k", "b", "c", "xyz='1 2 3' rpy='0 0 1.5'") +
+          fixed("l", "c", "d", "xyz='-2 1 -3' rpy='0 0 -1.5'") + "</robot>",
       "a", "d");
   EXPECT_EQ(split.dof(), 1);
   // The second joint's offset undoes the first: Rz(1.5) (-2, 1, -3) + (1, 2, 3).
@@ -201,25 +201,9 @@ TEST(RobotModel, MergesFixedJointsAndMasslessLinks) {
       Eigen::AngleAxisd(1.5, Eigen::Vector3d::UnitZ()) * Eigen::Vector3d(-2, 1, -3) +
       Eigen::Vector3d(1, 2, 3);
   const RobotModel joined = RobotModel::from_urdf_text(
-      head + "<link name='b'>" + inertia_1 + "</link><link name='d'>" + inertia_2 +
-          "</link><joint name='k' type='fixed'><parent link='b'/><child link='d'/><origin xyz='" +
-          testing::exact(p) + "'/></joint></robot>",
-      "a", "d");
+      head + bodies + fixed("k", "b", "d", "xyz='" + testing::exact(p) + "'") + "</robot>", "a",
+      "d");
   EXPECT_TRUE(same(split, joined));
-}
-
-TEST(RobotModel, TakesAnAxisOfAnyLength) {
-  const std::string link = "<link name='b'>" +
-                           testing::inertial(1, {0.3, 0.1, 0}, 0.1 * Eigen::Matrix3d::Identity()) +
-                           "</link>";
-  const auto model = [&](const std::string& axis) {
-    return RobotModel::from_urdf_text(
-        "<robot name='r'><link name='a'/>" + link +
-            "<joint name='j' type='continuous'><parent link='a'/><child link='b'/><axis xyz='" +
-            axis + "'/></joint></robot>",
-        "a", "b");
-  };
-  EXPECT_TRUE(same(model("0 0.6 -0.8"), model("0 6e-4 -8e-4")));
 }
 
 }  // namespace

@@ -14,22 +14,22 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::string refusal(const std::string& text) {
+template <class Read>
+std::string refusal_of(const Read& read) {
   try {
-    RobotModel::from_urdf_text(text, "link0", "link1", {}, "arm.urdf");
+    read();
   } catch (const InvalidModel& error) {
     return error.what();
   }
   return "read";
 }
 
+std::string refusal(const std::string& text) {
+  return refusal_of([&] { RobotModel::from_urdf_text(text, "link0", "link1", {}, "arm.urdf"); });
+}
+
 std::string refusal_of_file(const std::string& path) {
-  try {
-    RobotModel::from_urdf_file(path, "link0", "link1");
-  } catch (const InvalidModel& error) {
-    return error.what();
-  }
-  return "read";
+  return refusal_of([&] { RobotModel::from_urdf_file(path, "link0", "link1"); });
 }
 
 /// A hinge from link0 to link1, on which a chain of so many more links hangs. Names are too long
@@ -50,17 +50,13 @@ std::string long_chain(int links, const std::string& more = "") {
   return text + more + "</robot>";
 }
 
-TEST(UrdfLimits, RefuseNestingThatWouldOverflowTheStack) {
+TEST(UrdfLimits, RefuseWhatCouldOverflowTheStack) {
   std::string text;
   for (int i = 0; i < 100'000; ++i) text += "<a>";
   for (int i = 0; i < 100'000; ++i) text += "</a>";
-  EXPECT_EQ(refusal("<robot name='r'>" + text + "</robot>"),
-            "arm.urdf: line 1: elements are nested more than 64 deep");
-  EXPECT_EQ(refusal(long_chain(1, text)),
-            "arm.urdf: line 1: elements are nested more than 64 deep");
-}
-
-TEST(UrdfLimits, RefuseChainsThatCouldOverflowTheStack) {
+  const std::string said = "arm.urdf: line 1: elements are nested more than 64 deep";
+  EXPECT_EQ(refusal("<robot name='r'>" + text + "</robot>"), said);
+  EXPECT_EQ(refusal(long_chain(1, text)), said);
   EXPECT_EQ(refusal(long_chain(2500)), "arm.urdf: line 1: holds more than 2000 links");
 }
 
@@ -75,9 +71,7 @@ TEST(UrdfLimits, CountEveryLinkOfALongChain) {
 }
 
 TEST(UrdfLimits, ReadALongChainInTimeThatGrowsWithIt) {
-#if !DASHPOT_COUNTS_ALLOCATIONS
-  GTEST_SKIP() << "sanitizers count for themselves";
-#endif
+  if (!DASHPOT_COUNTS_ALLOCATIONS) GTEST_SKIP() << "sanitizers count for themselves";
   const auto allocations = [](int links) {
     const std::string text = long_chain(links);
     return testing::allocations_of([&] { RobotModel::from_urdf_text(text, "link0", "link1"); });
@@ -88,12 +82,12 @@ TEST(UrdfLimits, ReadALongChainInTimeThatGrowsWithIt) {
 }
 
 TEST(UrdfLimits, KeepMessagesShort) {
-  const std::string name(1'000'000, 'x');
+  const std::string name(300'000, 'x');
   EXPECT_LT(
       refusal("<robot name='r'><link name='link0'/><joint name='" + name + "'/></robot>").size(),
       3000u);
   std::string numbers;
-  for (int i = 0; i < 1'000'000; ++i) numbers += "1 ";
+  for (int i = 0; i < 300'000; ++i) numbers += "1 ";
   const std::string said = refusal(long_chain(
       1, "<joint name='j' type='continuous'><parent link='link1'/><child link='x'/><axis xyz='" +
              numbers + "'/></joint>"));
