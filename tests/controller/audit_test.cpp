@@ -23,6 +23,7 @@ namespace {
 using Eigen::MatrixXd;
 using TaskLoop = analysis::System<>;
 using testing::kInfinity;
+using testing::kLinkInertia;
 using testing::panda_ready;
 
 const Vector6 kTranslationFirst = (Vector6() << 200, 200, 200, 20, 20, 20).finished();
@@ -332,23 +333,16 @@ TEST(Audit, CountsTheIntegralOfTheSprings) {
   }
 }
 
-constexpr double kLinkInertia = 0.02 + 0.25 * 0.25;  // of a link of the chain, kg m^2
-
 /// A link on its own, and its gains.
 struct OneLink {
   RobotModel model;
   AuditOptions options;
 
-  OneLink(double spring, double damper, double period) : model(chain()) {
+  OneLink(double spring, double damper, double period) : model(testing::one_link()) {
     options.mode = Mode::kJoint;
     options.gains.joint_stiffness = JointMatrix::Constant(1, 1, spring);
     options.gains.joint_damping = JointMatrix::Constant(1, 1, damper);
     options.period = period;
-  }
-  static RobotModel chain() {
-    ModelOptions smooth;
-    smooth.viscous_friction = smooth.coulomb_friction = JointVector::Zero(1);
-    return testing::chain_of({"continuous"}, smooth);
   }
   PostureNumbers numbers() const { return Audit(model, options).numbers(JointVector::Zero(1)); }
   PostureAudit audit() const { return Audit(model, options).audit(JointVector::Zero(1)); }

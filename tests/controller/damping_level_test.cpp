@@ -143,30 +143,28 @@ TEST_P(DampingLevel, KeepsTheMarginOfEveryArm) {
   Random random(5200 + static_cast<std::uint64_t>(GetParam()));
   int kept = 0, lowered = 0, too_little = 0;
   for (const testing::Arm& arm : testing::all_arms()) {
-    for (int k = 0; k < 2; ++k) {
-      LevelCase one(arm, GetParam(), random);
-      for (int posture = 0; posture < 2; ++posture) {
-        one.meet();
-        SCOPED_TRACE(arm.file);
-        const double wanted = one.settings.limits.gain_margin;
-        const double level = one.held->controller.snapshot().damping_level;
-        ASSERT_GT(level, 0);
-        ASSERT_LE(level, 1);
-        if (one.status == Status::kLittleMargin) continue;
-        ASSERT_EQ(one.status, Status::kOk);
-        ++kept;
-        EXPECT_GE(margin_of(*one.held, wanted), wanted);
-        if (level == 1) {
-          EXPECT_EQ(one.held->torque, one.asked->torque);
-          continue;
-        }
-        ++lowered;
-        too_little += margin_of(*one.asked, wanted) < wanted ? 1 : 0;
+    LevelCase one(arm, GetParam(), random);
+    for (int posture = 0; posture < 2; ++posture) {
+      one.meet();
+      SCOPED_TRACE(arm.file);
+      const double wanted = one.settings.limits.gain_margin;
+      const double level = one.held->controller.snapshot().damping_level;
+      ASSERT_GT(level, 0);
+      ASSERT_LE(level, 1);
+      if (one.status == Status::kLittleMargin) continue;
+      ASSERT_EQ(one.status, Status::kOk);
+      ++kept;
+      EXPECT_GE(margin_of(*one.held, wanted), wanted);
+      if (level == 1) {
+        EXPECT_EQ(one.held->torque, one.asked->torque);
+        continue;
       }
+      ++lowered;
+      too_little += margin_of(*one.asked, wanted) < wanted ? 1 : 0;
     }
   }
-  EXPECT_GT(kept, 20);
-  EXPECT_GT(lowered, 5);
+  EXPECT_GT(kept, 10);
+  EXPECT_GT(lowered, 3);
   EXPECT_GT(too_little, lowered / 2);
 }
 
@@ -197,8 +195,8 @@ TEST(HeldDamping, FallsAndRisesAlongAPath) {
   double least = 1, lost = 2, last = 1;
   int whole = 0, changes = 0;
   Eigen::MatrixXd before;
-  for (int k = 0; k <= 4000; ++k) {
-    const double t = 1e-3 * k, pi = std::numbers::pi;  // two swings of 2 s
+  for (int k = 0; k <= 2000; ++k) {
+    const double t = 1e-3 * k, pi = std::numbers::pi;  // a swing of 2 s
     for (LedArm* arm : {&held, &asked}) {
       arm->state.position = in + 0.5 * (1 - std::cos(pi * t)) * (out - in);
       arm->state.velocity = 0.5 * pi * std::sin(pi * t) * (out - in);
@@ -225,8 +223,8 @@ TEST(HeldDamping, FallsAndRisesAlongAPath) {
     before = C;
   }
   EXPECT_LT(least, 0.8);
-  EXPECT_GT(whole, 1000);
-  EXPECT_EQ(changes, 4);
+  EXPECT_GT(whole, 500);
+  EXPECT_EQ(changes, 2);
   EXPECT_LT(lost, 1.6);
 }
 
@@ -281,24 +279,19 @@ TEST(HeldDamping, IsLeftAloneWhileSpringsStart) {
 /// spring.
 class OneJoint : public ::testing::Test {
  protected:
-  static constexpr double kInertia = 0.02 + 0.25 * 0.25, kPeriod = 0.001;  // kg m^2, s
+  static constexpr double kInertia = testing::kLinkInertia, kPeriod = 0.001;  // s
 
-  OneJoint() : settings(plain(model(), Mode::kJoint)) { settings.limits.gain_margin = 2.5; }
-  static RobotModel model() {
-    ModelOptions options;
-    options.gravity.setZero();
-    options.coulomb_friction = options.viscous_friction = JointVector::Zero(1);
-    return testing::chain_of({"continuous"}, options);
-  }
+  OneJoint() : settings(plain(model, Mode::kJoint)) { settings.limits.gain_margin = 2.5; }
   Status hold(double omega, double ratio) {
     settings.initial.gains.joint_stiffness(0, 0) = omega * omega * kInertia;
     settings.initial.gains.joint_damping_ratio = ratio;
-    arm.emplace(model(), settings);
+    arm.emplace(model, settings);
     arm->settle();
     return arm->tick();
   }
   double level() const { return arm->controller.snapshot().damping_level; }
 
+  const RobotModel model = testing::one_link();
   Settings settings;
   std::optional<LedArm> arm;
 };
@@ -322,23 +315,22 @@ TEST_F(OneJoint, SaysWhereNoShareKeepsTheMargin) {
   EXPECT_EQ(hold(400, 0.11), Status::kOk);
   EXPECT_EQ(hold(400, 0.09), Status::kLittleMargin);
   EXPECT_EQ(level(), 1);
-}
-
-TEST_F(OneJoint, IsLeftAloneWhereAllGainsAreAccepted) {
-  settings.limits.gain_margin = 1;
+  settings.limits.gain_margin = 1;  // all gains are accepted
   EXPECT_EQ(hold(1900, 2), Status::kOk);
   EXPECT_EQ(level(), 1);
 }
 
 /// What is judged is what will be in force.
 TEST_F(OneJoint, IsJudgedWithTheDampingThatItBears) {
-  settings.initial.gains.joint_damping_ratio = 2;
-  settings.initial.gains.task_stiffness.setZero();
-  settings.initial.gains.joint_stiffness(0, 0) = 1100 * 1100 * kInertia;
-  const JointVector q = JointVector::Constant(1, 0.4);
-  EXPECT_EQ(GainJudge(model(), settings).judge(q, settings.initial.gains).margin, 2.5);
-  settings.initial.gains.joint_stiffness(0, 0) = 1500 * 1500 * kInertia;
-  EXPECT_LT(GainJudge(model(), settings).judge(q, settings.initial.gains).margin, 2);
+  Gains& gains = settings.initial.gains;
+  gains.joint_damping_ratio = 2;
+  gains.task_stiffness.setZero();
+  const auto margin = [&](double omega) {
+    gains.joint_stiffness(0, 0) = omega * omega * kInertia;
+    return GainJudge(model, settings).judge(JointVector::Constant(1, 0.4), gains).margin;
+  };
+  EXPECT_EQ(margin(1100), 2.5);
+  EXPECT_LT(margin(1500), 2);
 }
 
 }  // namespace

@@ -11,13 +11,13 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kInertia = 0.02 + 0.25 * 0.25;  // of a link of the chain about its joint, kg m^2
+constexpr double kInertia = testing::kLinkInertia;
 
 /// A damper c held for T makes v <- (1 - c T / I) v, and with the torque a tick late
 /// v_k+1 = v_k - c T / I v_k-1: stable up to c T / I = 2, and 1.
 class Judge : public ::testing::Test {
  protected:
-  Judge() : settings(testing::constant_damping(model())) {
+  Judge() : settings(testing::constant_damping(testing::one_link())) {
     settings.limits.gain_margin = 3;
     gains = settings.initial.gains;
     gains.joint_stiffness.setZero();
@@ -27,42 +27,38 @@ class Judge : public ::testing::Test {
     gains.null_stiffness.setZero();
     gains.null_damping.setZero();
   }
-  static RobotModel model(double gravity = 0) {
-    ModelOptions options;
-    options.gravity = {gravity, 0, 0};
-    options.coulomb_friction = options.viscous_friction = JointVector::Zero(1);
-    return testing::chain_of({"continuous"}, options);
+  GainJudge::Verdict judge(const RobotModel& model = testing::one_link()) const {
+    return GainJudge(model, settings).judge(q, gains);
   }
-  GainJudge::Verdict judge(double gravity = 0) const {
-    return GainJudge(model(gravity), settings).judge(JointVector::Constant(1, 0.4), gains);
-  }
+  double borne() const { return 2 * kInertia / settings.period; }
 
+  const JointVector q = JointVector::Constant(1, 0.4);
   Settings settings;
   Gains gains;
 };
 
 TEST_F(Judge, FindsTheMarginOfADamper) {
-  const double borne = 2 * kInertia / settings.period;
   for (const double margin : {0.5, 1.5, 2.5}) {
-    gains.joint_damping(0, 0) = borne / margin;
+    gains.joint_damping(0, 0) = borne() / margin;
     EXPECT_NEAR(judge().margin, margin, 1e-3 * margin);
     EXPECT_EQ(judge().mode, Mode::kJoint);
     settings.analysis.sampled.delay = 1;
     EXPECT_NEAR(judge().margin, margin / 2, 1e-3 * margin);
     settings.analysis.sampled.delay = 0;
   }
-  gains.joint_damping(0, 0) = borne / 4;
+  gains.joint_damping(0, 0) = borne() / 4;
   EXPECT_EQ(judge().margin, 3);  // enough
+  gains.joint_damping(0, 0) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(judge().margin, 0);  // no gain
 }
 
 /// The tip is on the joint's axis and turns with it.
 TEST_F(Judge, NamesTheModeThatBearsLess) {
-  const double borne = 2 * kInertia / settings.period;
-  gains.joint_damping(0, 0) = borne / 2.5;
-  gains.task_damping(5, 5) = borne / 1.5;
+  gains.joint_damping(0, 0) = borne() / 2.5;
+  gains.task_damping(5, 5) = borne() / 1.5;
   EXPECT_NEAR(judge().margin, 1.5, 1e-3);
   EXPECT_EQ(judge().mode, Mode::kCartesian);
-  gains.joint_damping(0, 0) = borne / 1.2;
+  gains.joint_damping(0, 0) = borne() / 1.2;
   EXPECT_NEAR(judge().margin, 1.2, 1e-3);
   EXPECT_EQ(judge().mode, Mode::kJoint);
 }
@@ -80,34 +76,24 @@ TEST_F(Judge, CountsTheIntegral) {
 /// Friction that is compensated at the measured velocity takes damping away.
 TEST_F(Judge, CountsTheCompensationOfFriction) {
   ModelOptions options;
-  options.gravity.setZero();
-  options.viscous_friction = JointVector::Zero(1);
   options.coulomb_friction = JointVector::Constant(1, 0.5);
-  const RobotModel rough = testing::chain_of({"continuous"}, options);
+  const RobotModel rough = testing::one_link(options);
   settings.feed_forward.friction = true;
   settings.feed_forward.friction_at = FeedForward::FrictionAt::kMeasured;
   gains.joint_stiffness(0, 0) = 100 * kInertia;
   for (const double damping : {3.8, 4.2}) {  // 0.8 * 0.5 / 0.1 = 4
     gains.joint_damping(0, 0) = gains.task_damping(5, 5) = damping;
-    const double margin =
-        GainJudge(rough, settings).judge(JointVector::Constant(1, 0.4), gains).margin;
-    EXPECT_EQ(margin < 1, damping < 4) << damping;
+    EXPECT_EQ(judge(rough).margin < 1, damping < 4) << damping;
   }
 }
 
 /// Walls, position limits and what the modes hold besides are no matter of gains.
 TEST_F(Judge, KnowsNoLimits) {
-  const double borne = 2 * kInertia / settings.period;
-  gains.joint_damping(0, 0) = borne / 2.5;
+  gains.joint_damping(0, 0) = borne() / 2.5;
   settings.limits.walls = {{{0, 0, 1}, Eigen::Vector3d::UnitZ()}};  // the tip is beyond it
   settings.limits.position_lower[0] = -0.1;
   settings.limits.position_upper[0] = 0.1;  // and the joint, too
   EXPECT_NEAR(judge().margin, 2.5, 2.5e-3);
-}
-
-TEST_F(Judge, AcceptsNothingThatIsNoGain) {
-  gains.joint_damping(0, 0) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(judge().margin, 0);
 }
 
 /// The gravity compensation of a joint that falls away from its top grows by about w^2 (1/2 + 1) T
@@ -118,9 +104,9 @@ TEST_F(Judge, CountsTheGravityCompensationWhereItGrowsFast) {
   for (const double growth : {0.7, 1.4}) {
     const double gravity = growth / (1.5 * settings.period) * kInertia / 0.25 / std::cos(0.4);
     settings.feed_forward.gravity = true;
-    EXPECT_EQ(judge(-gravity).margin, growth < 1 ? 3 : 0) << growth;
+    EXPECT_EQ(judge(testing::one_link({}, -gravity)).margin, growth < 1 ? 3 : 0) << growth;
     settings.feed_forward.gravity = false;
-    EXPECT_EQ(judge(-gravity).margin, 3) << growth;
+    EXPECT_EQ(judge(testing::one_link({}, -gravity)).margin, 3) << growth;
   }
 }
 
@@ -128,19 +114,16 @@ TEST_F(Judge, CountsTheGravityCompensationWhereItGrowsFast) {
 /// (2 - c T / I) of its swing: the margin is 2 I / (T c), whatever the spring.
 TEST_F(Judge, JudgesDesignedDampingWithoutThePayload) {
   ModelOptions options;
-  options.gravity.setZero();
-  options.coulomb_friction = options.viscous_friction = JointVector::Zero(1);
   options.payload = {20, {0, 0.5, 0}, Eigen::Matrix3d::Zero()};
-  const RobotModel loaded = testing::chain_of({"continuous"}, options);
-  const JointVector q = JointVector::Constant(1, 0.4);
+  const RobotModel loaded = testing::one_link(options);
   const double inertia = evaluate(loaded, q, JointVector::Zero(1)).M(0, 0);
   ASSERT_GT(inertia, 20 * kInertia);
   for (const double margin : {0.5, 0.9, 1.1, 1.3}) {
     const double damper = 2 * kInertia / (settings.period * margin);
     gains.joint_damping_ratio = 0.7;
     gains.joint_stiffness(0, 0) = std::pow(damper / 1.4, 2) / inertia;
-    GainJudge judge(loaded, settings);
-    const GainJudge::Verdict found = judge.judge(q, gains);
+    GainJudge one(loaded, settings);
+    const GainJudge::Verdict found = one.judge(q, gains);
     const bool enough = margin > GainJudge::kDropped;
     EXPECT_NEAR(found.margin, enough ? 3 : margin, 1e-3 * margin);
     EXPECT_EQ(found.dropped, !enough);
@@ -148,12 +131,12 @@ TEST_F(Judge, JudgesDesignedDampingWithoutThePayload) {
     // nothing.
     gains.joint_damping_ratio = 0;
     gains.joint_damping(0, 0) = damper;
-    EXPECT_EQ(judge.judge(q, gains).margin, 3);
+    EXPECT_EQ(one.judge(q, gains).margin, 3);
     gains.joint_damping_ratio = 0.7;
-    judge.attach(Attachment());
-    EXPECT_EQ(judge.judge(q, gains).margin, 3);
-    judge.attach(loaded.attachment());
-    EXPECT_EQ(judge.judge(q, gains).dropped, !enough);
+    one.attach(Attachment());
+    EXPECT_EQ(one.judge(q, gains).margin, 3);
+    one.attach(loaded.attachment());
+    EXPECT_EQ(one.judge(q, gains).dropped, !enough);
   }
 }
 

@@ -39,78 +39,61 @@ class NullSpaceOfPanda : public ::testing::Test {
   NullSpace null_space;
 };
 
-TEST_F(NullSpaceOfPanda, DoesNotAccelerateTheTip) {
+/// For every subset of directions, in either frame.
+TEST_F(NullSpaceOfPanda, DoesNotAccelerateTheDirectionsThatAreHeld) {
   Random random(331);
   int regular = 0;
-  for (int k = 0; k < 1000; ++k) {
+  for (int k = 0; k < 600; ++k) {
+    const bool in_tool = k % 4 == 0;
+    TipImpedance& one = in_tool ? tool : held;
+    (in_tool ? held : tool).selected.setZero();
+    for (int i = 0; i < 6; ++i) one.selected[i] = k % 2 == 0 ? random.integer(0, 1) : 1;
     at(random.vector(7));
     if (null_space.inertia().regularity() < TaskInertia::kNearlySingular) continue;
     ++regular;
-    const JointVector k0 = 30 * random.vector(7).cwiseAbs();
-    for (const JointVector& tau :
-         {null_space.spring(k0, random.vector(7)), null_space.damper(k0, random.vector(7))}) {
-      const Vector6 acceleration = robot.J * robot.M.llt().solve(tau);
-      EXPECT_LT(acceleration.norm(), 1e-9 * robot.M.llt().solve(tau).norm());
+    Jacobian J = robot.J;  // in the frame's axes, of what is held
+    if (in_tool) {
+      J.topRows<3>() = (robot.R_BT.transpose() * J.topRows<3>()).eval();
+      J.bottomRows<3>() = (robot.R_BT.transpose() * J.bottomRows<3>()).eval();
+    }
+    J = (one.selected.asDiagonal() * J).eval();
+    const JointVector k0 = 30 * random.vector(7).cwiseAbs(), dq = random.vector(7);
+    for (const JointVector& tau : {null_space.spring(k0, dq), null_space.damper(k0, dq)}) {
+      const JointVector acceleration = robot.M.llt().solve(tau);
+      EXPECT_LT((J * acceleration).norm(), 1e-9 * acceleration.norm());
       EXPECT_GT(tau.norm(), 1e-3);
     }
-    EXPECT_LT((robot.J * null_space.projected_velocity(random.vector(7))).norm(), 1e-10);
+    EXPECT_LT((J * null_space.projected_velocity(dq)).norm(), 1e-10);
+    // What the spring does on its own: qdd = M^-1 N' K_0 dq, along which dq' K_0 dq falls.
+    EXPECT_GE(robot.M.llt().solve(null_space.spring(k0, dq)).dot(k0.cwiseProduct(dq)), -1e-10);
+    if (k % 2 == 0) continue;
+    const Vector6 a = random.vector(6);  // the inertia is that of the tip
+    const MatrixXd mobility = J * robot.M.llt().solve(MatrixXd(J.transpose()));
+    const MatrixXd wanted = mobility.inverse() * a;
+    EXPECT_TRUE(near(null_space.inertia().wrench(a), wanted, 1e-8 * wanted.norm()));
+    EXPECT_TRUE(near(J * null_space.joint_velocity(a), a, 1e-9));
   }
-  EXPECT_GT(regular, 500);
-}
-
-TEST_F(NullSpaceOfPanda, HeldDirectionsAreExactForEverySubset) {
-  Random random(332);
-  for (int k = 0; k < 500; ++k) {
-    const bool in_tool = k % 2 == 0;
-    TipImpedance& one = in_tool ? tool : held;
-    (in_tool ? held : tool).selected.setZero();
-    for (int i = 0; i < 6; ++i) one.selected[i] = random.integer(0, 1);
-    at(random.vector(7));
-    if (null_space.inertia().regularity() < TaskInertia::kNearlySingular) continue;
-    const JointVector tau = null_space.spring(JointVector::Ones(7), random.vector(7));
-    Vector6 acceleration = robot.J * robot.M.llt().solve(tau);
-    if (in_tool) {
-      acceleration.head<3>() = (robot.R_BT.transpose() * acceleration.head<3>()).eval();
-      acceleration.tail<3>() = (robot.R_BT.transpose() * acceleration.tail<3>()).eval();
-    }
-    EXPECT_LT(one.selected.cwiseProduct(acceleration).norm(), 1e-9);
-  }
-}
-
-TEST_F(NullSpaceOfPanda, InertiaIsThatOfTheTip) {
-  Random random(333);
-  for (int k = 0; k < 200; ++k) {
-    at(random.vector(7));
-    if (null_space.inertia().regularity() < TaskInertia::kNearlySingular) continue;
-    const Vector6 a = random.vector(6);
-    const MatrixXd J = robot.J, M = robot.M;
-    const Eigen::VectorXd expected = (J * M.inverse() * J.transpose()).inverse() * a;
-    EXPECT_TRUE(near(null_space.inertia().wrench(a), expected, 1e-8 * expected.norm()));
-    EXPECT_TRUE(near(robot.J * null_space.joint_velocity(a), a, 1e-9));
-  }
+  EXPECT_GT(regular, 300);
 }
 
 TEST_F(NullSpaceOfPanda, TorqueKeepsItsBoundAndTurnsSmoothlyThroughTheStretchedArm) {
-  const double cond = [&] {
-    double worst = 0;
-    for (double bend = -0.5; bend <= 0.5; bend += 0.01) {
-      at(stretched(bend));
-      const Eigen::SelfAdjointEigenSolver<MatrixXd> values{MatrixXd(robot.M)};
-      worst = std::max(worst, values.eigenvalues()[6] / values.eigenvalues()[0]);
-    }
-    return worst;
-  }();
+  double cond = 0;
+  for (double bend = -0.5; bend <= 0.5; bend += 0.01) {
+    at(stretched(bend));
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> values{MatrixXd(robot.M)};
+    cond = std::max(cond, values.eigenvalues()[6] / values.eigenvalues()[0]);
+  }
   const JointVector k0{{30, 25, 20, 15, 10, 5, 2}}, dq{{0.3, -0.2, 0.5, 0.4, -0.3, 0.2, 0.6}};
   JointVector last;
   double least = 1, largest_step = 0;
-  for (int step = -50000; step <= 50000; ++step) {
+  for (int step = -20000; step <= 20000; ++step) {
     at(stretched(1e-5 * step));
     const JointVector spring = null_space.spring(k0, dq), damper = null_space.damper(k0, dq);
     ASSERT_LE(spring.norm(), std::sqrt(cond) * 30 * dq.norm());
     ASSERT_LE(damper.norm(), cond * 30 * dq.norm());
     ASSERT_GE(dq.dot(damper), 0);
     least = std::min(least, null_space.inertia().regularity());
-    if (step > -50000) largest_step = std::max(largest_step, (spring - last).norm());
+    if (step > -20000) largest_step = std::max(largest_step, (spring - last).norm());
     last = spring;
   }
   EXPECT_LT(least, 1e-6);         // the sweep does meet the singularity
@@ -119,7 +102,7 @@ TEST_F(NullSpaceOfPanda, TorqueKeepsItsBoundAndTurnsSmoothlyThroughTheStretchedA
 
 TEST_F(NullSpaceOfPanda, EigenvaluesOfTheProjectorAreBetweenZeroAndOneEverywhere) {
   Random random(334);
-  for (int k = 0; k < 500; ++k) {
+  for (int k = 0; k < 200; ++k) {
     for (int i = 0; i < 6; ++i)
       held.selected[i] = random.uniform(0, 1);  // half held, while blending
     for (int i = 0; i < 6; ++i) tool.selected[i] = (1 - held.selected[i]) * random.uniform(0, 1);
@@ -164,17 +147,6 @@ TEST_F(NullSpaceOfPanda, DampsFreeMotionsWithTheRatio) {
     EXPECT_TRUE(near(shapes.transpose() * C * shapes, wanted, 1e-6 * wanted.norm()));
     EXPECT_LT((J * M.llt().solve(C)).norm(), 1e-6 * M.llt().solve(C).norm());
     EXPECT_LT((C - C.transpose()).norm(), 1e-12 * C.norm());
-  }
-}
-
-TEST_F(NullSpaceOfPanda, SpringPullsDownhill) {
-  Random random(335);
-  for (int k = 0; k < 500; ++k) {
-    at(random.vector(7));
-    const JointVector k0 = 30 * random.vector(7).cwiseAbs(), dq = random.vector(7);
-    // What the spring does on its own: qdd = M^-1 N' K_0 dq, along which dq' K_0 dq falls.
-    const JointVector acceleration = robot.M.llt().solve(null_space.spring(k0, dq));
-    EXPECT_GE(acceleration.dot(k0.cwiseProduct(dq)), -1e-10);
   }
 }
 

@@ -14,6 +14,8 @@
 namespace dashpot::controller {
 namespace {
 
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+
 Limits limits_of_two_joints() {
   Limits limits;
   limits.torque = JointVector::Constant(2, 10);
@@ -51,57 +53,47 @@ struct Edge {
 };
 
 TEST(SetpointCheck, HasItsBoundsWhereItSaysSo) {
+  using S = Setpoint;
   const Mode joint = Mode::kJoint, tip = Mode::kCartesian;
   const auto turned_by = [](Setpoint& s, double defect) {  // |R'R - I| = defect
     const Eigen::Quaterniond q = quaternion(Eigen::Vector3d(0.3, -0.5, 0.8));
     s.tip_pose.rotation = std::sqrt(1 + defect) * q.toRotationMatrix();
   };
   const std::vector<Edge> edges = {
-      {joint, "joint_position", [](Setpoint& s, double x) { s.joint_position[1] = x; }, -1, -1.001},
-      {joint, "joint_position", [](Setpoint& s, double x) { s.joint_position[1] = x; }, 2, 2.001},
-      {tip, "joint_position", [](Setpoint& s, double x) { s.joint_position[0] = x; }, 2, 2.001},
-      {joint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(1, 1) = x; },
-       1e9, 1.001e9},
-      {joint, "joint_damping", [](Setpoint& s, double x) { s.gains.joint_damping(0, 0) = x; }, 0,
-       -1e-3},
+      {joint, "joint_position", [](S& s, double x) { s.joint_position[1] = x; }, -1, -1.001},
+      {joint, "joint_position", [](S& s, double x) { s.joint_position[1] = x; }, 2, 2.001},
+      {tip, "joint_position", [](S& s, double x) { s.joint_position[0] = x; }, 2, 2.001},
+      {joint, "joint_stiffness", [](S& s, double x) { s.gains.joint_stiffness(1, 1) = x; }, 1e9,
+       1.001e9},
+      {joint, "joint_damping", [](S& s, double x) { s.gains.joint_damping(0, 0) = x; }, 0, -1e-3},
       // Symmetric within 1e-9 of the largest entry, which is 100
-      {joint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(0, 1) += x; },
-       0.9e-7, 1.1e-7},
-      {joint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(1, 0) += x; },
-       0.9e-7, 1.1e-7},
+      {joint, "joint_stiffness", [](S& s, double x) { s.gains.joint_stiffness(0, 1) += x; }, 0.9e-7,
+       1.1e-7},
+      {joint, "joint_stiffness", [](S& s, double x) { s.gains.joint_stiffness(1, 0) += x; }, 0.9e-7,
+       1.1e-7},
       // Positive semidefinite within 1e-10 of it
-      {joint, "joint_stiffness", [](Setpoint& s, double x) { s.gains.joint_stiffness(1, 1) = x; },
-       -0.9e-8, -1.1e-8},
+      {joint, "joint_stiffness", [](S& s, double x) { s.gains.joint_stiffness(1, 1) = x; }, -0.9e-8,
+       -1.1e-8},
       {joint, "joint_stiffness",  // the eigenvalues 100 +- x
-       [](Setpoint& s, double x) {
-         s.gains.joint_stiffness(0, 1) = s.gains.joint_stiffness(1, 0) = x;
-       },
+       [](S& s, double x) { s.gains.joint_stiffness(0, 1) = s.gains.joint_stiffness(1, 0) = x; },
        99.999, 100.001},
-      {tip, "task_stiffness", [](Setpoint& s, double x) { s.gains.task_stiffness(5, 5) = x; }, 0,
-       -1e-3},
+      {tip, "task_stiffness", [](S& s, double x) { s.gains.task_stiffness(5, 5) = x; }, 0, -1e-3},
       {tip, "task_stiffness",
-       [](Setpoint& s, double x) {
-         s.gains.task_stiffness(5, 2) = s.gains.task_stiffness(2, 5) = x;
-       },
+       [](S& s, double x) { s.gains.task_stiffness(5, 2) = s.gains.task_stiffness(2, 5) = x; },
        0.999, 1.001},
-      {tip, "task_damping", [](Setpoint& s, double x) { s.gains.task_damping(4, 4) = x; }, 1e9,
-       1.001e9},
-      {tip, "null_stiffness", [](Setpoint& s, double x) { s.gains.null_stiffness[1] = x; }, 0,
-       -1e-9},
-      {tip, "null_stiffness", [](Setpoint& s, double x) { s.gains.null_stiffness[0] = x; }, 1e9,
-       1.001e9},
-      {tip, "null_damping", [](Setpoint& s, double x) { s.gains.null_damping[1] = x; }, 0, -1e-9},
-      {joint, "joint_damping_ratio", [](Setpoint& s, double x) { s.gains.joint_damping_ratio = x; },
-       2, 2.001},
-      {joint, "joint_damping_ratio", [](Setpoint& s, double x) { s.gains.joint_damping_ratio = x; },
-       0, -1e-9},
-      {tip, "task_damping_ratio", [](Setpoint& s, double x) { s.gains.task_damping_ratio = x; }, 2,
+      {tip, "task_damping", [](S& s, double x) { s.gains.task_damping(4, 4) = x; }, 1e9, 1.001e9},
+      {tip, "null_stiffness", [](S& s, double x) { s.gains.null_stiffness[1] = x; }, 0, -1e-9},
+      {tip, "null_stiffness", [](S& s, double x) { s.gains.null_stiffness[0] = x; }, 1e9, 1.001e9},
+      {tip, "null_damping", [](S& s, double x) { s.gains.null_damping[1] = x; }, 0, -1e-9},
+      {joint, "joint_damping_ratio", [](S& s, double x) { s.gains.joint_damping_ratio = x; }, 2,
        2.001},
-      {tip, "task_damping_ratio", [](Setpoint& s, double x) { s.gains.task_damping_ratio = x; }, 0,
+      {joint, "joint_damping_ratio", [](S& s, double x) { s.gains.joint_damping_ratio = x; }, 0,
        -1e-9},
-      {joint, "wrench", [](Setpoint& s, double x) { s.wrench[5] = x; }, 1e9, 1.001e9},
-      {joint, "wrench", [](Setpoint& s, double x) { s.wrench[0] = x; }, -1e9, -1.001e9},
-      {tip, "tip_pose.position", [](Setpoint& s, double x) { s.tip_pose.position.y() = x; }, -1e6,
+      {tip, "task_damping_ratio", [](S& s, double x) { s.gains.task_damping_ratio = x; }, 2, 2.001},
+      {tip, "task_damping_ratio", [](S& s, double x) { s.gains.task_damping_ratio = x; }, 0, -1e-9},
+      {joint, "wrench", [](S& s, double x) { s.wrench[5] = x; }, 1e9, 1.001e9},
+      {joint, "wrench", [](S& s, double x) { s.wrench[0] = x; }, -1e9, -1.001e9},
+      {tip, "tip_pose.position", [](S& s, double x) { s.tip_pose.position.y() = x; }, -1e6,
        -1.001e6},
       {tip, "tip_pose.rotation", turned_by, 0.9e-6, 1.1e-6},
       {tip, "tip_pose.rotation", turned_by, -0.9e-6, -1.1e-6},
@@ -119,48 +111,40 @@ TEST(SetpointCheck, HasItsBoundsWhereItSaysSo) {
         edge.key.find("ness") != std::string::npos || edge.key.find("damping") != std::string::npos;
     EXPECT_EQ(fault(setpoint, true), of_gains ? "" : edge.key);
     setpoint = good_setpoint(edge.mode);
-    edge.set(setpoint, std::numeric_limits<double>::quiet_NaN());
+    edge.set(setpoint, kNoNumber);
     EXPECT_EQ(fault(setpoint), edge.key);
   }
 }
 
-TEST(SetpointCheck, AsksForEverySize) {
-  const auto expect_fault = [](Mode mode, const std::string& key, const auto& spoil) {
+TEST(SetpointCheck, AsksForEverySizeAndLooksAtThePoseInItsModeAlone) {
+  const Mode joint = Mode::kJoint, tip = Mode::kCartesian;
+  const struct {
+    Mode mode;
+    std::string key;
+    void (*spoil)(Setpoint&);
+  } cases[] = {
+      {joint, "joint_position", [](Setpoint& s) { s.joint_position.resize(0); }},
+      {joint, "joint_position", [](Setpoint& s) { s.joint_position.setZero(3); }},
+      {tip, "", [](Setpoint& s) { s.joint_position.resize(0); }},
+      {tip, "joint_position", [](Setpoint& s) { s.joint_position.setZero(1); }},
+      {joint, "joint_stiffness", [](Setpoint& s) { s.gains.joint_stiffness.setIdentity(2, 3); }},
+      {joint, "joint_stiffness", [](Setpoint& s) { s.gains.joint_stiffness.setIdentity(3, 2); }},
+      {joint, "joint_damping", [](Setpoint& s) { s.gains.joint_damping.setIdentity(3, 3); }},
+      {tip, "",
+       [](Setpoint& s) { s.gains.null_stiffness.resize(0), s.gains.null_damping.resize(0); }},
+      {tip, "null_stiffness", [](Setpoint& s) { s.gains.null_stiffness.setZero(1); }},
+      {tip, "null_damping", [](Setpoint& s) { s.gains.null_damping.setZero(3); }},
+      {tip, "frame", [](Setpoint& s) { s.gains.frame = static_cast<Frame>(2); }},
+      {tip, "", [](Setpoint& s) { s.gains.frame = Frame::kTool; }},
+      {joint, "", [](Setpoint& s) { s.tip_pose.position[0] = kNoNumber; }},
+      {tip, "tip_pose.position", [](Setpoint& s) { s.tip_pose.position[0] = kNoNumber; }},
+      {joint, "mode", [](Setpoint& s) { s.mode = static_cast<Mode>(2); }},
+  };
+  for (const auto& [mode, key, spoil] : cases) {
     Setpoint setpoint = good_setpoint(mode);
     spoil(setpoint);
     EXPECT_EQ(fault(setpoint), key);
-  };
-  expect_fault(Mode::kJoint, "joint_position", [](Setpoint& s) { s.joint_position.resize(0); });
-  expect_fault(Mode::kJoint, "joint_position", [](Setpoint& s) { s.joint_position.setZero(3); });
-  expect_fault(Mode::kCartesian, "", [](Setpoint& s) { s.joint_position.resize(0); });
-  expect_fault(Mode::kCartesian, "joint_position",
-               [](Setpoint& s) { s.joint_position.setZero(1); });
-  expect_fault(Mode::kJoint, "joint_stiffness",
-               [](Setpoint& s) { s.gains.joint_stiffness.setIdentity(2, 3); });
-  expect_fault(Mode::kJoint, "joint_stiffness",
-               [](Setpoint& s) { s.gains.joint_stiffness.setIdentity(3, 2); });
-  expect_fault(Mode::kJoint, "joint_damping",
-               [](Setpoint& s) { s.gains.joint_damping.setIdentity(3, 3); });
-  expect_fault(Mode::kCartesian, "", [](Setpoint& s) {
-    s.gains.null_stiffness.resize(0), s.gains.null_damping.resize(0);
-  });
-  expect_fault(Mode::kCartesian, "null_stiffness",
-               [](Setpoint& s) { s.gains.null_stiffness.setZero(1); });
-  expect_fault(Mode::kCartesian, "null_damping",
-               [](Setpoint& s) { s.gains.null_damping.setZero(3); });
-  expect_fault(Mode::kCartesian, "frame",
-               [](Setpoint& s) { s.gains.frame = static_cast<Frame>(2); });
-  expect_fault(Mode::kCartesian, "", [](Setpoint& s) { s.gains.frame = Frame::kTool; });
-}
-
-TEST(SetpointCheck, LooksAtThePoseInItsModeAlone) {
-  Setpoint setpoint = good_setpoint(Mode::kJoint);
-  setpoint.tip_pose.position[0] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(fault(setpoint), "");
-  setpoint.mode = Mode::kCartesian;
-  EXPECT_EQ(fault(setpoint), "tip_pose.position");
-  setpoint.mode = static_cast<Mode>(2);
-  EXPECT_EQ(fault(setpoint), "mode");
+  }
 }
 
 // Of a joint without limits the position is bounded all the same.

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <cmath>
 
 namespace dashpot::controller {
@@ -24,32 +25,27 @@ MatrixXd of_rank(Random& random, int n, int rank) {
   return root * root.transpose();
 }
 
-void expect_small_cholesky(Random& random, int n) {
-  const MatrixXd A = random.spd(n);
-  const MatrixXd L = A.llt().matrixL();
-  SmallCholesky factor;
-  factor.compute(A, 1e-14);
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j <= i; ++j) EXPECT_NEAR(factor.L(i, j), L(i, j), 1e-14);
-    EXPECT_NEAR(factor.per_diagonal(i), 1 / L(i, i), 1e-13 / L(i, i));
-  }
-  const VectorXd x = random.vector(n);
-  const auto expect = [&](const auto& act, const VectorXd& wanted) {
-    VectorXd y = x;
-    act(y.data());
-    EXPECT_TRUE(near(y, wanted, 1e-12 * (1 + wanted.norm())));
-  };
-  expect([&](double* y) { factor.solve_L(y); }, L.triangularView<Eigen::Lower>().solve(x));
-  expect([&](double* y) { factor.solve_LT(y); },
-         L.transpose().triangularView<Eigen::Upper>().solve(x));
-  expect([&](double* y) { factor.multiply_L(y); }, L * x);
-  expect([&](double* y) { factor.multiply_LT(y); }, L.transpose() * x);
-}
-
 TEST(SmallCholesky, IsTheFactorAndItsInverse) {
   Random random(341);
-  for (int k = 0; k < 20; ++k) {
-    for (const int n : {1, 2, 6, 9, 16}) expect_small_cholesky(random, n);
+  for (int k = 0; k < 100; ++k) {
+    const int n = std::array{1, 2, 6, 9, 16}[static_cast<std::size_t>(k % 5)];
+    const MatrixXd A = random.spd(n), L = A.llt().matrixL();
+    SmallCholesky factor;
+    factor.compute(A, 1e-14);
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j <= i; ++j) EXPECT_NEAR(factor.L(i, j), L(i, j), 1e-14);
+      EXPECT_NEAR(factor.per_diagonal(i), 1 / L(i, i), 1e-13 / L(i, i));
+    }
+    const VectorXd x = random.vector(n);
+    VectorXd y = x;
+    factor.multiply_L(y.data());
+    EXPECT_TRUE(near(y, L * x, 1e-12 * (1 + y.norm())));
+    factor.solve_L(y.data());
+    EXPECT_TRUE(near(y, x, 1e-12 * (1 + x.norm())));
+    factor.multiply_LT(y.data());
+    EXPECT_TRUE(near(y, L.transpose() * x, 1e-12 * (1 + y.norm())));
+    factor.solve_LT(y.data());
+    EXPECT_TRUE(near(y, x, 1e-12 * (1 + x.norm())));
   }
 }
 
@@ -162,6 +158,31 @@ TEST(SpringFactor, FollowsItsMatrix) {
   }
 }
 
+/// Appends W and reads it back.
+void append(FactorRows& rows, const MatrixXd& W) {
+  const int before = rows.size(), count = static_cast<int>(W.rows());
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < W.cols(); ++j) rows.at(i, j) = W(i, j);
+  }
+  rows.grow(count);
+  ASSERT_EQ(rows.size(), before + count);
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < W.cols(); ++j) EXPECT_EQ(rows.at_row(before + i, j), W(i, j));
+  }
+}
+
+MatrixXd triangle(FactorRows& rows, int n) {
+  rows.triangularize(n);
+  EXPECT_EQ(rows.size(), n);
+  MatrixXd R(n, n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) R(i, j) = rows.at_row(i, j);
+  }
+  EXPECT_TRUE(R.isUpperTriangular(0));
+  EXPECT_GE(R.diagonal().minCoeff(), 0);
+  return R;
+}
+
 TEST(FactorRows, BecomeATriangleWithTheSameProduct) {
   Random random(346);
   FactorRows rows;
@@ -172,26 +193,9 @@ TEST(FactorRows, BecomeATriangleWithTheSameProduct) {
     MatrixXd W = random.matrix(random.integer(4, 20), 4);
     if (k % 3 == 1) W.col(k % 4).setZero();
     if (k % 3 == 2) W.row(k % 4).setZero();
-    // In two blocks
-    const auto first = static_cast<int>(W.rows()) / 2, all = static_cast<int>(W.rows());
-    for (const auto& [from, to] : {std::pair(0, first), std::pair(first, all)}) {
-      for (int i = from; i < to; ++i) {
-        for (int j = 0; j < 4; ++j) rows.at(i - from, j) = W(i, j);
-      }
-      rows.grow(to - from);
-    }
-    ASSERT_EQ(rows.size(), W.rows());
-    for (int i = 0; i < all; ++i) {
-      for (int j = 0; j < 4; ++j) EXPECT_EQ(rows.at_row(i, j), W(i, j));
-    }
-    rows.triangularize(4);
-    ASSERT_EQ(rows.size(), 4);
-    MatrixXd R(4, 4);
-    for (int i = 0; i < 4; ++i) {
-      for (int j = 0; j < 4; ++j) R(i, j) = rows.at_row(i, j);
-      EXPECT_GE(R(i, i), 0);
-    }
-    EXPECT_TRUE(R.isUpperTriangular(0));
+    append(rows, W.topRows(W.rows() / 2));
+    append(rows, W.bottomRows(W.rows() - W.rows() / 2));
+    const MatrixXd R = triangle(rows, 4);
     EXPECT_TRUE(near(R.transpose() * R, W.transpose() * W, 1e-13 * (1 + W.squaredNorm())));
   }
 }
@@ -200,16 +204,11 @@ TEST(FactorRows, BecomeATriangleWithTheSameProduct) {
 TEST(FactorRows, KeepTheirDigitsWhereATriangleIsAlmostThere) {
   for (const double head : {0.5, -0.5, 2.0, -2.0}) {
     FactorRows rows;
-    const Eigen::Matrix<double, 3, 2> W{{head, 3.0}, {1e-12, 2.0}, {1e-12, -1.0}};
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 2; ++j) rows.at(i, j) = W(i, j);
-    }
-    rows.grow(3);
-    rows.triangularize(2);
-    EXPECT_DOUBLE_EQ(rows.at_row(0, 0), std::abs(head));
-    EXPECT_NEAR(rows.at_row(0, 1), std::copysign(3.0, head), 1e-11);
-    EXPECT_NEAR(rows.at_row(1, 1), std::sqrt(5), 1e-11);
-    EXPECT_EQ(rows.at_row(1, 0), 0);
+    append(rows, Eigen::Matrix<double, 3, 2>{{head, 3.0}, {1e-12, 2.0}, {1e-12, -1.0}});
+    const MatrixXd R = triangle(rows, 2);
+    EXPECT_DOUBLE_EQ(R(0, 0), std::abs(head));
+    EXPECT_NEAR(R(0, 1), std::copysign(3.0, head), 1e-11);
+    EXPECT_NEAR(R(1, 1), std::sqrt(5), 1e-11);
   }
 }
 

@@ -55,6 +55,10 @@ struct PulledArm : LedArm {
     const Snapshot& now = controller.snapshot();
     return now.integral_torque.norm() + now.integral_wrench.norm();
   }
+  void stale_tick(std::int64_t after) {  // ns; with the set-point of before
+    state.time += after;
+    controller.update(state, setpoint, torque);
+  }
   void hold(int ticks) {
     for (int k = 0; k < ticks; ++k) tick();
   }
@@ -109,16 +113,11 @@ TEST_P(StoredTorque, IsLetGoWithTheSprings) {
   PulledArm arm(GetParam());
   arm.hold(400);
   EXPECT_GT(arm.stored(), 0.3);
-  for (int k = 0; k < 300; ++k) {  // the set-point grows old: hold
-    arm.state.time += 1'000'000;
-    arm.controller.update(arm.state, arm.setpoint, arm.torque);
-  }
+  for (int k = 0; k < 300; ++k) arm.stale_tick(1'000'000);  // the set-point grows old: hold
   const double held = arm.stored();
-  arm.state.time += 1'000'000;
-  arm.controller.update(arm.state, arm.setpoint, arm.torque);
+  arm.stale_tick(1'000'000);
   EXPECT_EQ(arm.stored(), held);
-  arm.state.time += 1'000'000'000;  // a gap: a fault
-  arm.controller.update(arm.state, arm.setpoint, arm.torque);
+  arm.stale_tick(1'000'000'000);  // a gap: a fault
   EXPECT_NE(arm.controller.snapshot().fault, Status::kOk);
   EXPECT_EQ(arm.stored(), 0);
 }

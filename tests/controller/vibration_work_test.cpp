@@ -14,50 +14,70 @@ namespace {
 
 using analysis::SpectrumOrigin;
 using testing::at;
-using testing::in_mode;
-using testing::kSmallSwing;
 using testing::LedArm;
 using testing::panda_model;
-using testing::unlimited_settings;
+
+/// A Panda that swings a little, or not at all.
+struct SmallSwing : LedArm {
+  explicit SmallSwing(Mode mode, void (*change)(Settings&) = nullptr)
+      : LedArm(panda_model(), settings_with(mode, change), testing::kSmallSwing) {}
+  static Settings settings_with(Mode mode, void (*change)(Settings&)) {
+    Settings settings = testing::in_mode(testing::unlimited_settings(panda_model()), mode);
+    if (change != nullptr) change(settings);
+    return settings;
+  }
+  void swing_from(int first, int last, bool at_rest = false) {
+    for (int k = first; k <= last; ++k) {
+      swing(1e-3 * k);
+      if (at_rest) state.velocity.setZero();
+      tick();
+    }
+  }
+  const VibrationCounters& counters() const { return modes().counters; }
+};
+
+void expect_same_eigenvalues(const Vibration& a, const Vibration& b) {
+  ASSERT_EQ(a.count, b.count);
+  for (int i = 0; i < a.count; ++i) {
+    EXPECT_EQ(a.modes[at(i)].eigenvalues, b.modes[at(i)].eigenvalues);
+    EXPECT_EQ(a.modes[at(i)].label, b.modes[at(i)].label);
+  }
+}
 
 TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {
-  const RobotModel model = panda_model();
-  LedArm led(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSmallSwing);
+  SmallSwing led(Mode::kCartesian);
   led.settle();
   const Vibration before = led.modes();
   for (int k = 0; k < 100; ++k) led.tick();
-  const Vibration& after = led.modes();
+  const Vibration after = led.modes();
   EXPECT_EQ(after.counters.unchanged, before.counters.unchanged + 100);
   EXPECT_EQ(after.counters.tracked, before.counters.tracked);
   EXPECT_EQ(after.counters.direct, before.counters.direct);
   EXPECT_EQ(after.origin, SpectrumOrigin::kReused);
   EXPECT_EQ(after.tick, before.tick + 100);
   EXPECT_EQ(after.time, led.state.time);
-  for (int i = 0; i < after.count; ++i) {
-    EXPECT_EQ(after.modes[at(i)].eigenvalues, before.modes[at(i)].eigenvalues);
-  }
+  expect_same_eigenvalues(after, before);
   // The smallest motion that there is matters.
   led.state.position[3] = std::nextafter(led.state.position[3], 0.0);
   led.tick();
-  EXPECT_EQ(led.modes().counters.unchanged, after.counters.unchanged);
+  EXPECT_EQ(led.counters().unchanged, after.counters.unchanged);
   EXPECT_EQ(led.modes().origin, SpectrumOrigin::kTracked);
 }
 
 // A robot that is damped at the same spot before and after a reset: nothing changed, and yet there
 // is nothing to repeat.
 TEST(VibrationInTheTick, RepeatsNothingFromBeforeAReset) {
-  const RobotModel model = panda_model();
-  Settings settings = in_mode(unlimited_settings(model), Mode::kJoint);
-  settings.limits.position_upper[3] = -2.5;  // the robot stands outside
-  settings.limits.return_velocity.setZero();
-  LedArm led(model, settings, kSmallSwing);
+  SmallSwing led(Mode::kJoint, [](Settings& settings) {
+    settings.limits.position_upper[3] = -2.5;  // the robot stands outside
+    settings.limits.return_velocity.setZero();
+  });
   for (int k = 0; k < 5; ++k) ASSERT_EQ(led.tick(), Status::kPositionLimit);
-  EXPECT_EQ(led.modes().counters.no_springs, 1U);
-  EXPECT_EQ(led.modes().counters.unchanged, 4U);
+  EXPECT_EQ(led.counters().no_springs, 1U);
+  EXPECT_EQ(led.counters().unchanged, 4U);
   led.controller.reset();
   ASSERT_EQ(led.tick(), Status::kPositionLimit);
-  EXPECT_EQ(led.modes().counters.no_springs, 1U);
-  EXPECT_EQ(led.modes().counters.unchanged, 0U);
+  EXPECT_EQ(led.counters().no_springs, 1U);
+  EXPECT_EQ(led.counters().unchanged, 0U);
 }
 
 /// One that was to be solved directly may be missed; the next one then is.
@@ -84,8 +104,7 @@ TEST(VibrationSolver, SolvesAnewAfterATaskThatItMissed) {
 
 /// A change of gains is no standing still.
 TEST(VibrationInTheTick, SeesGainsChange) {
-  const RobotModel model = panda_model();
-  LedArm led(model, in_mode(unlimited_settings(model), Mode::kJoint), kSmallSwing);
+  SmallSwing led(Mode::kJoint);
   led.settle();
   led.tick();
   const Vibration before = led.modes();
@@ -94,62 +113,46 @@ TEST(VibrationInTheTick, SeesGainsChange) {
   const Vibration& after = led.modes();
   ASSERT_EQ(after.count, 7);
   double ratio = 1;
-  for (std::size_t i = 0; i < 7; ++i) {
-    ratio *= after.modes[i].natural_frequency / before.modes[i].natural_frequency;
+  std::set<int> labels, old;
+  for (int i = 0; i < 7; ++i) {
+    ratio *= after.modes[at(i)].natural_frequency / before.modes[at(i)].natural_frequency;
+    labels.insert(after.modes[at(i)].label);
+    old.insert(before.modes[at(i)].label);
   }
   EXPECT_NEAR(ratio, 128, 1e-6);
-  std::set<int> labels, old;
-  for (std::size_t i = 0; i < 7; ++i) {
-    labels.insert(after.modes[i].label);
-    old.insert(before.modes[i].label);
-  }
   EXPECT_EQ(labels, old);
 }
 
 TEST(VibrationInTheTick, IsNotThereIfOff) {
-  const RobotModel model = panda_model();
-  Settings settings = unlimited_settings(model);
-  settings.analysis.where = Analysis::Where::kOff;
-  LedArm led(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
+  SmallSwing led(Mode::kCartesian,
+                 [](Settings& settings) { settings.analysis.where = Analysis::Where::kOff; });
   led.settle();
   EXPECT_EQ(led.modes().tick, 0u);
   EXPECT_EQ(led.modes().count, 0);
-  const VibrationCounters& counters = led.modes().counters;
-  EXPECT_EQ(counters.tracked + counters.reused + counters.direct + counters.unchanged +
-                counters.no_springs + counters.failed + counters.missed,
+  const VibrationCounters& seen = led.counters();
+  EXPECT_EQ(seen.tracked + seen.reused + seen.direct + seen.unchanged + seen.no_springs +
+                seen.failed + seen.missed,
             0u);
 }
 
 TEST(VibrationInTheTick, LeavesOutShapesThatNobodyWants) {
-  const RobotModel model = panda_model();
-  Settings settings = unlimited_settings(model);
-  settings.analysis.shapes = false;
-  LedArm led(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
-  settings.analysis.shapes = true;
-  LedArm full(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
-  for (int k = 0; k < 600; ++k) {
-    led.swing(1e-3 * k);
-    full.swing(1e-3 * k);
-    led.tick();
-    full.tick();
-  }
+  SmallSwing led(Mode::kCartesian, [](Settings& settings) { settings.analysis.shapes = false; });
+  SmallSwing full(Mode::kCartesian, [](Settings& settings) { settings.analysis.shapes = true; });
+  for (SmallSwing* one : {&led, &full}) one->swing_from(0, 600);
   ASSERT_EQ(led.modes().count, 7);
-  EXPECT_GE(led.modes().counters.no_shapes, led.modes().counters.tracked);
-  EXPECT_EQ(full.modes().counters.no_shapes, 0u);
-  for (std::size_t i = 0; i < 7; ++i) {
-    EXPECT_EQ(led.modes().modes[i].shape.size(), 0);
-    EXPECT_EQ(full.modes().modes[i].shape.size(), 7);
-    EXPECT_EQ(led.modes().modes[i].eigenvalues, full.modes().modes[i].eigenvalues);
+  EXPECT_GE(led.counters().no_shapes, led.counters().tracked);
+  EXPECT_EQ(full.counters().no_shapes, 0u);
+  expect_same_eigenvalues(led.modes(), full.modes());
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_EQ(led.modes().modes[at(i)].shape.size(), 0);
+    EXPECT_EQ(full.modes().modes[at(i)].shape.size(), 7);
   }
 }
 
 TEST(VibrationInTheTick, HasNothingToSolveWithoutSprings) {
-  const RobotModel model = panda_model();
-  Settings settings = unlimited_settings(model);
-  settings.watchdog.setpoint_damp = 0.01;
-  LedArm led(model, in_mode(settings, Mode::kJoint), kSmallSwing);
+  SmallSwing led(Mode::kJoint, [](Settings& settings) { settings.watchdog.setpoint_damp = 0.01; });
   led.settle();
-  const std::uint64_t solved = led.modes().counters.tracked + led.modes().counters.direct;
+  const std::uint64_t solved = led.counters().tracked + led.counters().direct;
   for (int k = 1; k <= 50; ++k) {
     led.swing(1e-3 * k);
     led.state.time += 1'000'000;
@@ -160,53 +163,40 @@ TEST(VibrationInTheTick, HasNothingToSolveWithoutSprings) {
   EXPECT_EQ(led.modes().status, analysis::Status::kOk);
   EXPECT_EQ(led.modes().count, 0);
   EXPECT_EQ(led.modes().zero_modes, 7);
-  EXPECT_GE(led.modes().counters.no_springs, 35u);
-  EXPECT_LE(led.modes().counters.tracked + led.modes().counters.direct, solved + 15);
+  EXPECT_GE(led.counters().no_springs, 35u);
+  EXPECT_LE(led.counters().tracked + led.counters().direct, solved + 15);
 }
 
 TEST(VibrationInTheTick, TellsZeroModesFromVibrations) {
-  const RobotModel model = panda_model();
-  Settings settings = unlimited_settings(model);
-  settings.initial.gains.null_stiffness.setZero();
-  LedArm free(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
+  SmallSwing free(Mode::kCartesian,
+                  [](Settings& settings) { settings.initial.gains.null_stiffness.setZero(); });
   free.settle();
-  for (int k = 1; k <= 100; ++k) {
-    free.swing(1e-3 * k);
-    free.tick();
-  }
+  free.swing_from(1, 100);
   EXPECT_EQ(free.modes().count, 6);
   EXPECT_EQ(free.modes().zero_modes, 1);
-  EXPECT_EQ(free.modes().counters.no_zero_modes, 0u);
-  EXPECT_GE(free.modes().counters.tracked, 100u);
-  LedArm held(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSmallSwing);
+  EXPECT_EQ(free.counters().no_zero_modes, 0u);
+  EXPECT_GE(free.counters().tracked, 100u);
+  SmallSwing held(Mode::kCartesian);
   held.settle();
   EXPECT_EQ(held.modes().zero_modes, 0);
-  EXPECT_EQ(
-      held.modes().counters.no_zero_modes,
-      held.modes().counters.tracked + held.modes().counters.direct + held.modes().counters.reused);
+  const VibrationCounters& seen = held.counters();
+  EXPECT_EQ(seen.no_zero_modes, seen.tracked + seen.direct + seen.reused);
 }
 
 TEST(VibrationInTheTick, LeavesOutTermsThatAreZero) {
-  const RobotModel model = panda_model();
-  Settings settings = unlimited_settings(model);
-  settings.task_terms = {Load::kBaseWrench, true};
-  LedArm led(model, in_mode(settings, Mode::kCartesian), kSmallSwing);
+  SmallSwing led(Mode::kCartesian, [](Settings& settings) {
+    settings.task_terms = {Load::kBaseWrench, true};
+  });
   led.settle();
-  const auto swing = [&](int from) {
-    for (int k = from + 1; k <= from + 100; ++k) {
-      led.swing(1e-3 * k);
-      led.state.velocity.setZero();
-      led.tick();
-    }
-    return led.modes().counters;
-  };
-  const VibrationCounters before = led.modes().counters;
-  const VibrationCounters still = swing(0);
+  const VibrationCounters before = led.counters();
+  led.swing_from(1, 100, true);
+  const VibrationCounters still = led.counters();
   EXPECT_EQ(still.no_wrench, before.no_wrench + 100);
   EXPECT_EQ(still.at_rest, before.at_rest + 100);
   EXPECT_EQ(still.tracked, before.tracked + 100);
   led.state.external_wrench << 20, 0, -10, 0, 1, 0;
-  const VibrationCounters loaded = swing(100);
+  led.swing_from(101, 200, true);
+  const VibrationCounters loaded = led.counters();
   EXPECT_EQ(loaded.no_wrench, still.no_wrench);
   EXPECT_EQ(loaded.at_rest, still.at_rest + 100);
   // A nonsymmetric stiffness is followed as well, from its first tick on.
@@ -225,7 +215,7 @@ TEST(VibrationInTheTick, NeverTouchesTheTorque) {
   Controller without(model, settings);
   testing::HostileTicks input(model, settings, 611, 0.02);
   JointVector torque, plain;
-  for (int k = 0; k < 20'000; ++k) {
+  for (int k = 0; k < 10'000; ++k) {
     input.next();
     ASSERT_EQ(with.update(input.state, input.setpoint, torque),
               without.update(input.state, input.setpoint, plain));
@@ -240,30 +230,18 @@ TEST(VibrationInTheTick, NeverTouchesTheTorque) {
 }
 
 TEST(VibrationInTheTick, ForgetsAtAReset) {
-  const RobotModel model = panda_model();
-  LedArm first(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSmallSwing);
-  LedArm again(model, in_mode(unlimited_settings(model), Mode::kCartesian), kSmallSwing);
-  const auto run = [](LedArm& led) {
-    for (int k = 0; k < 600; ++k) {
-      led.swing(1e-3 * k);
-      led.tick();
-    }
-  };
+  SmallSwing first(Mode::kCartesian), again(Mode::kCartesian);
   again.setpoint.mode = Mode::kJoint;  // its modes are not those of the Cartesian mode
-  run(again);
+  again.swing_from(0, 600);
   again.setpoint.mode = Mode::kCartesian;
   again.controller.reset();
   EXPECT_EQ(again.modes().tick, 0u);
   EXPECT_EQ(again.modes().count, 0);
-  EXPECT_EQ(again.modes().counters.tracked, 0u);
-  run(again);
-  run(first);
+  EXPECT_EQ(again.counters().tracked, 0u);
+  for (SmallSwing* one : {&first, &again}) one->swing_from(0, 600);
   ASSERT_EQ(again.modes().count, 7);
-  EXPECT_EQ(again.modes().counters.tracked, first.modes().counters.tracked);
-  for (std::size_t i = 0; i < 7; ++i) {
-    EXPECT_EQ(again.modes().modes[i].label, first.modes().modes[i].label);
-    EXPECT_EQ(again.modes().modes[i].eigenvalues, first.modes().modes[i].eigenvalues);
-  }
+  EXPECT_EQ(again.counters().tracked, first.counters().tracked);
+  expect_same_eigenvalues(again.modes(), first.modes());
 }
 
 }  // namespace

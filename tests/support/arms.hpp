@@ -4,6 +4,7 @@
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/tests/support/places.hpp>
 
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,10 @@ struct Arm {
   const char* base;
   const char* tip;
 };
+
+inline std::ostream& operator<<(std::ostream& out, const Arm& arm) {
+  return out << arm.file;
+}
 
 /// The four on which most tests are run.
 inline const std::vector<Arm>& arms() {

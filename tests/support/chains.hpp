@@ -3,6 +3,7 @@
 
 #include <dashpot/controller/robot_model.hpp>
 
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,18 @@ inline controller::RobotModel chain_of(const std::vector<std::string>& types,
   }
   return controller::RobotModel::from_urdf_text(text + "</robot>", "link0",
                                                 "link" + std::to_string(types.size()), options);
+}
+
+/// Of a link of a chain about its joint, kg m^2.
+inline constexpr double kLinkInertia = 0.02 + 0.25 * 0.25;
+
+/// One link on a joint without friction, in weightlessness unless told otherwise.
+inline controller::RobotModel one_link(controller::ModelOptions options = {},
+                                       double gravity_along_x = 0) {
+  options.gravity = {gravity_along_x, 0, 0};
+  if (options.coulomb_friction.size() == 0) options.coulomb_friction = Eigen::VectorXd::Zero(1);
+  options.viscous_friction = Eigen::VectorXd::Zero(1);
+  return chain_of({"continuous"}, options);
 }
 
 }  // namespace dashpot::testing
