@@ -237,6 +237,10 @@ TEST(Audit, RefusesGainsThatCannotBe) {
       {[](auto& o) { o.gains.task_stiffness(1, 1) = 3, o.inertia_blocks = true; },
        "task_stiffness: needs one number for translation"},
       {[](auto& o) { o.period = -1; }, "period"},
+      {[](auto& o) { o.delay = -1; }, "delay"},
+      {[](auto& o) { o.cutoff = -1; }, "cutoff"},
+      {[](auto& o) { o.soft_frequency = 0; }, "soft_frequency"},
+      {[](auto& o) { o.lower = JointVector::Zero(3); }, "lower, upper"},
       {[](auto& o) { o.integral_time = kNaN; }, "integral_time"},
   };
   const RobotModel model = audited_panda();

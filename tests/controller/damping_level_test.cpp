@@ -57,6 +57,12 @@ double fastest(const LedArm& arm) {
 
 enum class What { kTip, kJoints, kFreeMotions, kSingular, kFriction, kPayload };
 
+std::ostream& operator<<(std::ostream& out, What what) {
+  constexpr const char* kNames[] = {"tip",      "joints",   "free motions",
+                                    "singular", "friction", "payload"};
+  return out << kNames[static_cast<int>(what)];
+}
+
 /// An arm with gains whose fastest mode is about as fast as the loop bears.
 class LevelCase {
  public:

@@ -85,25 +85,6 @@ TEST(Dynamics, PutTheTipOfAnArmAtZeroWhereItIsPublished) {
   }
 }
 
-TEST(Dynamics, OfAChainHeldStillBeyondALinkAreThoseOfTheChainUpToIt) {
-  Random random(714);
-  RandomRobot robot(715);
-  const std::string text = robot.chain(kMaxJoints, 0.3);
-  const RobotModel whole = RobotModel::from_urdf_text(text, "link0", "tip");
-  for (int n = 1; n < kMaxJoints; ++n) {
-    const RobotModel part = RobotModel::from_urdf_text(text, "link0", "link" + std::to_string(n));
-    JointVector q = JointVector::Zero(kMaxJoints), qd = JointVector::Zero(kMaxJoints);
-    q.head(n) = random.vector(n);
-    qd.head(n) = random.vector(n);
-    const DynamicsResult all = evaluate(whole, q, qd);
-    const DynamicsResult some = evaluate(part, q.head(n), qd.head(n));
-    const double size = all.M.diagonal().head(n).maxCoeff();
-    EXPECT_TRUE(near(some.M, all.M.topLeftCorner(n, n), 1e-13 * size)) << n;
-    EXPECT_TRUE(near(some.coriolis, all.coriolis.head(n), 1e-13 * size * qd.squaredNorm())) << n;
-    EXPECT_TRUE(near(some.gravity, all.gravity.head(n), 1e-11)) << n;
-  }
-}
-
 TEST(Dynamics, OfAPendulumAreThoseOfTheTextbook) {
   // 2 kg, 0.5 m from a horizontal axis along y; 0.1 kg m^2 about its centre of mass; at q from the
   // x axis downward.
@@ -119,29 +100,6 @@ TEST(Dynamics, OfAPendulumAreThoseOfTheTextbook) {
   EXPECT_NEAR(result.M(0, 0), 0.1 + 2 * 0.25, 1e-15);
   EXPECT_NEAR(result.gravity[0], -2 * 9.81 * 0.5 * std::cos(q), 1e-14);
   EXPECT_NEAR(result.coriolis[0], 0, 1e-15);
-}
-
-TEST(Dynamics, OfAPrismaticPairFeelTheCoriolisForce) {
-  // A slider of 3 kg on a turntable about z, at q2 along x: inertia 3 q2^2, radial force -3 q2
-  // qd1^2, torque 2 * 3 q2 qd1 qd2.
-  const std::string body = testing::inertial(3, {0, 0, 0}, Eigen::Matrix3d::Zero());
-  const RobotModel model = RobotModel::from_urdf_text(
-      "<robot name='slider'><link name='a'/><link name='b'/><link name='c'>" + body +
-          "</link><joint name='turn' type='continuous'><parent link='a'/><child link='b'/>"
-          "<axis xyz='0 0 1'/></joint><joint name='slide' type='prismatic'><parent link='b'/>"
-          "<child link='c'/><axis xyz='2 0 0'/><limit lower='0' upper='1' effort='1' "
-          "velocity='1'/></joint></robot>",
-      "a", "c");
-  JointVector q(2), qd(2);
-  q << 0.7, 0.4;
-  qd << 1.5, -0.5;
-  const DynamicsResult result = evaluate(model, q, qd);
-  EXPECT_TRUE(near(result.M, Eigen::Matrix2d{{3 * 0.16, 0}, {0, 3}}, 1e-15));
-  EXPECT_TRUE(near(result.coriolis, Eigen::Vector2d(2 * 3 * 0.4 * 1.5 * -0.5, -3 * 0.4 * 1.5 * 1.5),
-                   1e-14));
-  EXPECT_TRUE(
-      near(result.p_BT_B, Eigen::Vector3d(0.4 * std::cos(0.7), 0.4 * std::sin(0.7), 0), 1e-15));
-  EXPECT_EQ(result.gravity, Eigen::Vector2d::Zero());
 }
 
 TEST(Dynamics, OfThePandaGiveTheTranslationalModesOfThePaper) {

@@ -49,16 +49,6 @@ class LeastInertia : public ::testing::Test {
   const RobotModel model = testing::chain_of({"continuous", "continuous"});
 };
 
-TEST_F(LeastInertia, IsAtMostThatOfEveryPosture) {
-  const JointVector least = of_elbow(-2, 1);
-  EXPECT_GT(least.minCoeff(), 0.005);
-  for (double elbow = -2; elbow <= 1; elbow += 0.01) {
-    Eigen::Matrix2d rest = evaluate(model, both(0, elbow), both(0, 0)).M;
-    rest.diagonal() -= least;
-    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(rest).eigenvalues()[0], -1e-3);
-  }
-}
-
 /// A posture a turn away is the same one; more than a turn is a turn, and so is no limit.
 TEST_F(LeastInertia, IsThatOfTheRangeOnTheCircle) {
   ASSERT_GT((of_elbow(-0.5, 0.5) - of_elbow(1, 2)).norm(), 0.01);
