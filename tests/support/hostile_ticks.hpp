@@ -104,108 +104,67 @@ class HostileTicks {
     controller::Setpoint& s = good_setpoint_;
     controller::Gains& gains = s.gains;
     const Eigen::Index i = joint();
-    switch (engine_() % 8) {
-      case 0:
-        s.mode = s.mode == controller::Mode::kJoint ? controller::Mode::kCartesian
-                                                    : controller::Mode::kJoint;
-        break;
-      case 1:
-        s.joint_position[i] = uniform(std::max(settings_.limits.position_lower[i], -10.0),
-                                      std::min(settings_.limits.position_upper[i], 10.0));
-        break;
-      case 2:
-        s.tip_pose.position = {uniform(-2, 2), uniform(-2, 2), uniform(-2, 2)};
-        s.tip_pose.rotation = Eigen::Quaterniond(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), 2)
-                                  .normalized()
-                                  .toRotationMatrix();
-        break;
-      case 3:
-        gains.frame = chance(0.5) ? controller::Frame::kBase : controller::Frame::kTool;
-        gains.directions[engine_() % 6] ^= true;
-        break;
-      case 4: {
-        Eigen::Matrix<double, 6, 1> u;
-        for (int k = 0; k < 6; ++k) u[k] = uniform(-30, 30);
-        gains.task_stiffness = u * u.transpose();
-        gains.task_damping_ratio = std::max(0.0, u[0] / 15);
-        break;
-      }
-      case 5:
-        gains.joint_stiffness(i, i) = uniform(0, 1000);
-        gains.joint_damping(i, i) = uniform(0, 100);
-        break;
-      case 6:
-        gains.null_stiffness[i] = uniform(0, 100);
-        gains.null_damping[i] = uniform(0, 10);
-        break;
-      default:
-        s.wrench[static_cast<int>(engine_() % 6)] = uniform(-100, 100);
+    const auto what = engine_() % 8;
+    if (what == 0) {
+      const bool joint_mode = s.mode == controller::Mode::kJoint;
+      s.mode = joint_mode ? controller::Mode::kCartesian : controller::Mode::kJoint;
+    } else if (what == 1) {
+      s.joint_position[i] = uniform(std::max(settings_.limits.position_lower[i], -10.0),
+                                    std::min(settings_.limits.position_upper[i], 10.0));
+    } else if (what == 2) {
+      s.tip_pose.position = {uniform(-2, 2), uniform(-2, 2), uniform(-2, 2)};
+      s.tip_pose.rotation = Eigen::Quaterniond(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), 2)
+                                .normalized()
+                                .toRotationMatrix();
+    } else if (what == 3) {
+      gains.frame = chance(0.5) ? controller::Frame::kBase : controller::Frame::kTool;
+      gains.directions[engine_() % 6] ^= true;
+    } else if (what == 4) {
+      Eigen::Matrix<double, 6, 1> u;
+      for (int k = 0; k < 6; ++k) u[k] = uniform(-30, 30);
+      gains.task_stiffness = u * u.transpose();
+      gains.task_damping_ratio = std::max(0.0, u[0] / 15);
+    } else if (what == 5) {
+      gains.joint_stiffness(i, i) = uniform(0, 1000);
+      gains.joint_damping(i, i) = uniform(0, 100);
+    } else if (what == 6) {
+      gains.null_stiffness[i] = uniform(0, 100);
+      gains.null_damping[i] = uniform(0, 10);
+    } else {
+      s.wrench[static_cast<int>(engine_() % 6)] = uniform(-100, 100);
     }
   }
 
+  Eigen::Index odd_size() { return static_cast<Eigen::Index>(engine_() % 17); }
+
   void spoil_state() {
-    switch (engine_() % 8) {
-      case 0:
-        state.position[joint()] = odd();
-        break;
-      case 1:
-        state.velocity[joint()] = odd();
-        break;
-      case 2:
-        state.position.resize(static_cast<Eigen::Index>(engine_() % 17));
-        break;
-      case 3:
-        state.velocity.resize(static_cast<Eigen::Index>(engine_() % 17));
-        break;
-      case 4:
-        state.time = static_cast<std::int64_t>(engine_());
-        break;
-      case 5:
-        good_.time += static_cast<std::int64_t>(engine_() % 100'000'000);  // a real gap
-        state.time = good_.time;
-        break;
-      case 6:
-        state.external_wrench[static_cast<int>(engine_() % 6)] = odd();
-        break;
-      default:
-        state.position[joint()] += uniform(-1, 1);
+    const auto what = engine_() % 8;
+    if (what == 0) state.position[joint()] = odd();
+    if (what == 1) state.velocity[joint()] = odd();
+    if (what == 2) state.position.resize(odd_size());
+    if (what == 3) state.velocity.resize(odd_size());
+    if (what == 4) state.time = static_cast<std::int64_t>(engine_());
+    if (what == 5) {  // a real gap
+      state.time = good_.time += static_cast<std::int64_t>(engine_() % 100'000'000);
     }
+    if (what == 6) state.external_wrench[static_cast<int>(engine_() % 6)] = odd();
+    if (what == 7) state.position[joint()] += uniform(-1, 1);
   }
 
   void spoil_setpoint() {
     controller::Setpoint& s = setpoint;
     const int k = static_cast<int>(engine_() % 6);
-    switch (engine_() % 10) {
-      case 0:
-        s.joint_position[joint()] = odd();
-        break;
-      case 1:
-        s.joint_position.resize(static_cast<Eigen::Index>(engine_() % 17));
-        break;
-      case 2:
-        s.tip_pose.position[k % 3] = odd();
-        break;
-      case 3:
-        s.tip_pose.rotation(k % 3, k / 3) = odd();
-        break;
-      case 4:
-        s.wrench[k] = odd();
-        break;
-      case 5:
-        s.time = static_cast<std::int64_t>(engine_());
-        break;
-      case 6:
-        s.gains.joint_stiffness(joint(), joint()) = odd();
-        break;
-      case 7:
-        (k == 0 ? s.gains.task_damping_ratio : s.gains.task_damping(k, k)) = odd();
-        break;
-      case 8:
-        s.gains.null_stiffness.resize(static_cast<Eigen::Index>(engine_() % 17));
-        break;
-      default:
-        s.mode = static_cast<controller::Mode>(engine_() % 256);
-    }
+    const auto what = engine_() % 10;
+    if (what == 0) s.joint_position[joint()] = odd();
+    if (what == 1) s.joint_position.resize(odd_size());
+    if (what == 2) s.tip_pose.position[k % 3] = odd();
+    if (what == 3) s.tip_pose.rotation(k % 3, k / 3) = odd();
+    if (what == 4) s.wrench[k] = odd();
+    if (what == 5) s.time = static_cast<std::int64_t>(engine_());
+    if (what == 6) s.gains.joint_stiffness(joint(), joint()) = odd();
+    if (what == 7) (k == 0 ? s.gains.task_damping_ratio : s.gains.task_damping(k, k)) = odd();
+    if (what == 8) s.gains.null_stiffness.resize(odd_size());
+    if (what == 9) s.mode = static_cast<controller::Mode>(engine_() % 256);
   }
 
   Eigen::Index n_;

@@ -202,31 +202,31 @@ inline Trajectory get_trajectory(const Json& object, int n) {
   return result;
 }
 
-inline SpectrumCase to_spectrum_case(const Json& j) {
-  SpectrumCase c;
+/// What both kinds of cases begin with.
+template <class Case>
+Case to_case(const Json& j) {
+  Case c;
   c.name = get<std::string>(j, "name");
   c.n = get<int>(j, "n");
   c.r = get<int>(j, "r");
   c.mass = get_square(j, "mass", c.n);
   c.damping = get_square(j, "damping", c.n);
   c.stiffness = get_square(j, "stiffness", c.n);
-  if (j.contains("stiffness_factor")) c.stiffness_factor = get_matrix(j, "stiffness_factor", c.n);
   c.eigenvalues = get_eigenvalues(j, c.n);
   return c;
 }
 
+inline SpectrumCase to_spectrum_case(const Json& j) {
+  auto c = to_case<SpectrumCase>(j);
+  if (j.contains("stiffness_factor")) c.stiffness_factor = get_matrix(j, "stiffness_factor", c.n);
+  return c;
+}
+
 inline ResponseCase to_response_case(const Json& j) {
-  ResponseCase c;
-  c.name = get<std::string>(j, "name");
-  c.n = get<int>(j, "n");
-  c.r = get<int>(j, "r");
-  c.mass = get_square(j, "mass", c.n);
-  c.damping = get_square(j, "damping", c.n);
-  c.stiffness = get_square(j, "stiffness", c.n);
+  auto c = to_case<ResponseCase>(j);
   c.jacobian = get_optional_matrix(j, "jacobian");
   c.task_stiffness = get_optional_matrix(j, "task_stiffness");
   c.task_damping = get_optional_matrix(j, "task_damping");
-  c.eigenvalues = get_eigenvalues(j, c.n);
   const Json& free = member(j, "free");
   c.initial_position = get_vector(free, "initial_position");
   c.initial_velocity = get_vector(free, "initial_velocity");
