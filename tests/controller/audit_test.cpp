@@ -65,10 +65,23 @@ void expect_numbers(const PostureNumbers& found, const TaskLoop& loop, double ra
   EXPECT_NEAR(found.fastest_pole, pole, pole_error > 0 ? pole_error : 1e-9 * std::abs(pole));
 }
 
-TEST(Audit, AgreesWithTheEigenvaluesOverTheWorkspace) {
+TaskLoop loop_at(const RobotModel& model, const JointVector& q, const AuditOptions& options) {
+  return loop_at(model, q, options.gains.task_stiffness, options.gains.task_damping);
+}
+
+class AuditOfPanda : public ::testing::Test {
+ protected:
+  PostureNumbers numbers() const { return Audit(model, options).numbers(home); }
+  PostureAudit audited() const { return Audit(model, options).audit(home); }
+
+  RobotModel model = audited_panda();
+  AuditOptions options = stated(kTranslationFirst, 2);
+  const JointVector home = panda_ready();
+};
+
+TEST_F(AuditOfPanda, AgreesWithTheEigenvaluesOverTheWorkspace) {
   for (const double friction : {0.0, 0.5}) {
     const RobotModel model = audited_panda(friction);
-    AuditOptions options = stated(kTranslationFirst, 2);
     options.half_quaternion = true;
     const Audit audit(model, options);
     Matrix6 stiffness = options.gains.task_stiffness;
@@ -84,52 +97,45 @@ TEST(Audit, AgreesWithTheEigenvaluesOverTheWorkspace) {
   }
 }
 
-TEST(Audit, ProvesBoundsThatHold) {
-  const RobotModel model = audited_panda();
-  const AuditOptions options = stated(kTranslationFirst, 2);
-  const PostureAudit found = Audit(model, options).audit(panda_ready());
+TEST_F(AuditOfPanda, ProvesBoundsThatHold) {
+  const PostureAudit found = audited();
   EXPECT_LT(found.smallest_ratio_bound, 1e-10);
   EXPECT_LT(found.fastest_pole_bound, 1e-8);
-  expect_numbers(
-      found.numbers,
-      loop_at(model, panda_ready(), options.gains.task_stiffness, options.gains.task_damping),
-      found.smallest_ratio_bound, found.fastest_pole_bound + 1e-9);
+  expect_numbers(found.numbers, loop_at(model, home, options), found.smallest_ratio_bound,
+                 found.fastest_pole_bound + 1e-9);
   EXPECT_EQ(found.numbers.zero_modes, 1);
 }
 
 /// F = blkdiag(L_v, L_w) (K e + D v) turns with neither frame nor order of the joints.
-TEST(Audit, ScalesGainsByTheInertiaOfTheTip) {
-  const RobotModel model = audited_panda();
-  AuditOptions options = stated((Vector6() << 150, 150, 150, 250, 250, 250).finished(), 2);
+TEST_F(AuditOfPanda, ScalesGainsByTheInertiaOfTheTip) {
+  options = stated((Vector6() << 150, 150, 150, 250, 250, 250).finished(), 2);
   options.inertia_blocks = true;
-  const DynamicsResult robot = evaluate(model, panda_ready(), JointVector::Zero(7));
+  const DynamicsResult robot = evaluate(model, home, JointVector::Zero(7));
   const MatrixXd mobility = robot.J * MatrixXd(robot.M).inverse() * robot.J.transpose();
   Matrix6 inertia = Matrix6::Zero();
   inertia.topLeftCorner<3, 3>() = Eigen::Matrix3d(mobility.topLeftCorner<3, 3>()).inverse();
   inertia.bottomRightCorner<3, 3>() = Eigen::Matrix3d(mobility.bottomRightCorner<3, 3>()).inverse();
   const Matrix6 K = options.gains.task_stiffness, C = options.gains.task_damping;
-  const TaskLoop expected = loop_at(model, panda_ready(), inertia * options.gains.task_stiffness,
+  const TaskLoop expected = loop_at(model, home, inertia * options.gains.task_stiffness,
                                     inertia * options.gains.task_damping);
   for (const Frame frame : {Frame::kBase, Frame::kTool}) {
     options.gains.frame = frame;
-    expect_numbers(Audit(model, options).numbers(panda_ready()), expected);
+    expect_numbers(numbers(), expected);
   }
 }
 
 /// With springs and dampers that are the same for all joints, the self-motion z (J z = 0) has
 /// omega^2 = k z'z / z'Mz and the ratio c z'z / (2 omega z'Mz).
-TEST(Audit, CountsSpringsInTheNullSpace) {
+TEST_F(AuditOfPanda, CountsSpringsInTheNullSpace) {
   constexpr double kSpring = 5, kDamper = 0.1;
-  const RobotModel model = audited_panda();
-  AuditOptions options = stated(kTranslationFirst, 2);
   options.gains.null_stiffness = JointVector::Constant(7, kSpring);
   options.gains.null_damping = JointVector::Constant(7, kDamper);
   const Audit audit(model, options);
-  const PostureNumbers fast = audit.numbers(panda_ready());
-  const PostureAudit proved = audit.audit(panda_ready());
+  const PostureNumbers fast = audit.numbers(home);
+  const PostureAudit proved = audit.audit(home);
   EXPECT_EQ(fast.zero_modes, 0);
   EXPECT_EQ(proved.spectrum.modes.size(), 7);
-  const DynamicsResult robot = evaluate(model, panda_ready(), JointVector::Zero(7));
+  const DynamicsResult robot = evaluate(model, home, JointVector::Zero(7));
   const Eigen::VectorXd z = Eigen::FullPivLU<MatrixXd>(robot.J).kernel().col(0);
   const double per_mass = z.squaredNorm() / z.dot(MatrixXd(robot.M) * z);
   const double ratio = 0.5 * kDamper * std::sqrt(per_mass / kSpring);
@@ -137,19 +143,17 @@ TEST(Audit, CountsSpringsInTheNullSpace) {
   EXPECT_NEAR(proved.numbers.smallest_ratio, ratio, 1e-9);
   EXPECT_NEAR(fast.fastest_pole, proved.numbers.fastest_pole, 1e-6);
   options.gains.null_stiffness = {};
-  EXPECT_EQ(Audit(model, options).numbers(panda_ready()).zero_modes, 1);
+  EXPECT_EQ(numbers().zero_modes, 1);
 }
 
-TEST(Audit, TakesTheProjectorOfThePseudoInverse) {
-  const RobotModel model = audited_panda();
-  AuditOptions options = stated(kTranslationFirst, 2);
+TEST_F(AuditOfPanda, TakesTheProjectorOfThePseudoInverse) {
   options.gains.null_stiffness = JointVector::Constant(7, 10);
   options.gains.null_damping = JointVector::Constant(7, 6);
   options.kinematic_null_space = true;
   const Audit audit(model, options);
   for (int k = 0; k < 50; ++k) {
     const JointVector q = audit.posture(1, k);
-    TaskLoop loop = loop_at(model, q, options.gains.task_stiffness, options.gains.task_damping);
+    TaskLoop loop = loop_at(model, q, options);
     const MatrixXd z =
         Eigen::FullPivLU<MatrixXd>(evaluate(model, q, JointVector::Zero(7)).J).kernel();
     const MatrixXd N = z * z.transpose() / z.squaredNorm();
@@ -160,17 +164,17 @@ TEST(Audit, TakesTheProjectorOfThePseudoInverse) {
   }
 }
 
-TEST(Audit, NamesASingularPosture) {
-  JointVector stretched = panda_ready();
+TEST_F(AuditOfPanda, NamesASingularPosture) {
+  JointVector stretched = home;
   stretched[1] = stretched[3] = stretched[5] = 0;
-  const Audit audit(audited_panda(), stated(kTranslationFirst, 2));
+  const Audit audit(model, options);
   EXPECT_TRUE(audit.numbers(stretched).singular);
-  EXPECT_FALSE(audit.numbers(panda_ready()).singular);
+  EXPECT_FALSE(audit.numbers(home).singular);
   EXPECT_GT(audit.numbers(stretched).zero_modes, 1);
 }
 
-TEST(Audit, DrawsPosturesByNumberAlone) {
-  const Audit audit(audited_panda(), stated(kTranslationFirst, 2));
+TEST_F(AuditOfPanda, DrawsPosturesByNumberAlone) {
+  const Audit audit(model, options);
   const std::vector<PostureNumbers> all = audit.sample(3, 0, 90);
   const std::vector<PostureNumbers> part = audit.sample(3, 40, 10);
   for (std::size_t i = 0; i < part.size(); ++i) {
@@ -185,8 +189,8 @@ TEST(Audit, DrawsPosturesByNumberAlone) {
   }
 }
 
-TEST(Audit, SummarizesByNearestRank) {
-  const Audit audit(audited_panda(), stated(kTranslationFirst, 2));
+TEST_F(AuditOfPanda, SummarizesByNearestRank) {
+  const Audit audit(model, options);
   const std::vector<PostureNumbers> all = audit.sample(5, 0, 101);
   const WorkspaceAudit found =
       summarize(audit, all, [&](std::int64_t i) { return audit.posture(5, i); });
@@ -207,21 +211,19 @@ TEST(Audit, SummarizesByNearestRank) {
   EXPECT_TRUE(std::isnan(found.gain_margin.median));
 }
 
-TEST(Audit, SuggestsDampingThatGivesTheRatio) {
-  AuditOptions options = stated(kTranslationFirst, 2);
-  const DampingSuggestion found = Audit(audited_panda(), options).suggest(panda_ready(), 0.6);
+TEST_F(AuditOfPanda, SuggestsDampingThatGivesTheRatio) {
+  const DampingSuggestion found = Audit(model, options).suggest(home, 0.6);
   options.gains.task_damping = found.damping;
-  const PostureAudit with = Audit(audited_panda(), options).audit(panda_ready());
+  const PostureAudit with = audited();
   for (const analysis::Mode<>& mode : with.spectrum.modes) {
     EXPECT_NEAR(mode.damping_ratio, 0.6, 1e-8);
   }
   EXPECT_EQ(found.diagonal, Eigen::VectorXd(found.damping.diagonal()));
   options.gains.task_damping = Matrix6(found.diagonal.asDiagonal());
-  EXPECT_NEAR(Audit(audited_panda(), options).audit(panda_ready()).numbers.smallest_ratio,
-              found.diagonal_smallest_ratio, 1e-9);
+  EXPECT_NEAR(audited().numbers.smallest_ratio, found.diagonal_smallest_ratio, 1e-9);
 }
 
-TEST(Audit, RefusesGainsThatCannotBe) {
+TEST_F(AuditOfPanda, RefusesGainsThatCannotBe) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   const struct {
     std::function<void(AuditOptions&)> spoil;
@@ -243,9 +245,8 @@ TEST(Audit, RefusesGainsThatCannotBe) {
       {[](auto& o) { o.lower = JointVector::Zero(3); }, "lower, upper"},
       {[](auto& o) { o.integral_time = kNaN; }, "integral_time"},
   };
-  const RobotModel model = audited_panda();
   for (const auto& [spoil, words] : cases) {
-    AuditOptions options = stated(kTranslationFirst, 2);
+    options = stated(kTranslationFirst, 2);
     spoil(options);
     EXPECT_THAT([&] { Audit(model, options); },
                 ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr(words)));
@@ -287,42 +288,37 @@ double growth(const TaskLoop& loop, const AuditOptions& options, double factor) 
   return late / early;
 }
 
-TEST(Audit, FindsTheMarginAtWhichASampledLoopStartsToGrow) {
-  const RobotModel model = audited_panda();
-  AuditOptions options = stated(kTranslationFirst, 2);
+TEST_F(AuditOfPanda, FindsTheMarginAtWhichASampledLoopStartsToGrow) {
   options.period = 0.0005;
   for (const bool slow : {false, true}) {
     options.delay = slow ? 1 : 0;
     options.cutoff = slow ? 300 : 0;
     options.difference_velocity = slow;
     const Audit audit(model, options);
-    const double margin = audit.numbers(panda_ready()).gain_margin;
-    const TaskLoop loop =
-        loop_at(model, panda_ready(), options.gains.task_stiffness, options.gains.task_damping);
+    const double margin = audit.numbers(home).gain_margin;
+    const TaskLoop loop = loop_at(model, home, options);
     EXPECT_LT(growth(loop, options, 0.995 * margin), 1) << margin;
     EXPECT_GT(growth(loop, options, 1.005 * margin), 1) << margin;
-    EXPECT_NEAR(audit.audit(panda_ready()).numbers.gain_margin, margin, 1e-6 * margin);
-    EXPECT_TRUE(audit.audit(panda_ready()).integral_decays.empty());
+    EXPECT_NEAR(audit.audit(home).numbers.gain_margin, margin, 1e-6 * margin);
+    EXPECT_TRUE(audit.audit(home).integral_decays.empty());
   }
 }
 
-TEST(Audit, CountsTheIntegralOfTheSprings) {
-  const RobotModel model = audited_panda();
-  AuditOptions options = stated(kTranslationFirst, 2);
+TEST_F(AuditOfPanda, CountsTheIntegralOfTheSprings) {
   options.period = 0.0005;
   options.delay = 1;
   options.half_quaternion = true;
-  const double without = Audit(model, options).numbers(panda_ready()).gain_margin;
+  const double without = numbers().gain_margin;
   Matrix6 K = options.gains.task_stiffness;  // with which the springs act
   K.bottomRightCorner<3, 3>() *= 0.5;
-  const TaskLoop loop = loop_at(model, panda_ready(), K, options.gains.task_damping);
+  const TaskLoop loop = loop_at(model, home, K, options.gains.task_damping);
   for (const double time : {0.02, 1.0}) {
     SCOPED_TRACE(time);
     options.integral_time = time;
     const Audit audit(model, options);
-    const PostureAudit found = audit.audit(panda_ready());
+    const PostureAudit found = audit.audit(home);
     const double margin = found.numbers.gain_margin;
-    EXPECT_NEAR(audit.numbers(panda_ready()).gain_margin, margin, 1e-5 * margin);
+    EXPECT_NEAR(audit.numbers(home).gain_margin, margin, 1e-5 * margin);
     ASSERT_GE(found.integral_decays.size(), 6U);
     if (time < 0.1) {  // slow modes follow it, and it is unstable
       EXPECT_GT(growth(loop, options, 1), 1);
