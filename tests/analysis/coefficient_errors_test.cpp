@@ -70,6 +70,10 @@ TEST(CoefficientErrors, CountWhatTheProductOfAFactorLacks) {
     W.col(n - 1) *= 1e8;  // graded, and its product with the first column cancels
     W(0, n - 1) -= W.col(0).dot(W.col(n - 1)) / W(0, 0);
     form_stiffness(system);
+    System<kMaxDof> again = system;
+    again.stiffness_error.setConstant(1);
+    form_stiffness(again);  // beside errors that were there
+    EXPECT_EQ(again.stiffness_error, MatrixXd(system.stiffness_error.array() + 1));
     for (Eigen::Index i = 0; i < n; ++i) {
       for (Eigen::Index j = 0; j < n; ++j) {
         Quad lacking = -static_cast<Quad>(system.stiffness(i, j)) -
@@ -84,19 +88,6 @@ TEST(CoefficientErrors, CountWhatTheProductOfAFactorLacks) {
     }
   }
   EXPECT_GT(share, 0.01);
-}
-
-TEST(CoefficientErrors, OfAProductAreThoseOfTheirFormula) {
-  System<kMaxDof> system(3);
-  system.stiffness_factor.resize(2, 3);
-  system.stiffness_factor << 1, -2, 3, 0.5, 4, -0.25;
-  const Eigen::MatrixXd size = Eigen::MatrixXd(system.stiffness_factor).cwiseAbs();
-  const Eigen::MatrixXd expected = 8 * 0x1p-106 * size.transpose() * size;
-  form_stiffness(system);
-  EXPECT_EQ(Eigen::MatrixXd(system.stiffness_error), expected);
-  system.stiffness_error.setConstant(1);
-  form_stiffness(system);  // beside errors that were there
-  EXPECT_EQ(system.stiffness_error(1, 0), 1 + expected(1, 0));
 }
 
 TEST(CoefficientErrors, CountWhatCancelsBeyondDoubleDoubles) {

@@ -25,33 +25,6 @@ using testing::Random;
 
 // ------------------------------------------------------------------- from a block to eigenvalues
 
-TEST(ModeNumberTerms, DiscsOfAPairThatMeets) {
-  // [g/2 N; e -g/2] with e = -share g^2 / (4 N): the eigenvalues meet at 0 for share = 1.
-  const double gap = 1e-3, N = 1;
-  const std::array<Complex, 3> values{gap / 2, -gap / 2, 1};
-  for (const double share : {0.5, 0.9, 1.0}) {
-    const double disc = disc_radius(values.data(), 2, 0, N, share * gap * gap / (4 * N));
-    EXPECT_GE(disc, gap / 2 * (1 - std::sqrt(1 - share))) << share;
-    EXPECT_LE(disc, 0.51 * share * gap) << share;
-    // With a third eigenvalue, by the other road.
-    const double wider = disc_radius(values.data(), 3, 0, N, share * gap * gap / (4 * N));
-    EXPECT_GE(wider, gap / 2 * (1 - std::sqrt(1 - share))) << share;
-    EXPECT_LE(wider, 1.1 * share * gap) << share;
-  }
-}
-
-TEST(ModeNumberTerms, DiscsOfJordanBlocks) {
-  // The eigenvalues of a Jordan block with e in its corner are the k-th roots of e.
-  for (const int size : {2, 3, 4, 6}) {
-    const Eigen::ArrayXcd values = Eigen::ArrayXcd::Zero(size);
-    for (const double e : {1e-12, 1e-6, 1e-3}) {
-      const double disc = disc_radius(values.data(), size, 0, 1, e), root = std::pow(e, 1.0 / size);
-      EXPECT_GE(disc, root) << size;
-      EXPECT_LE(disc, 1.1 * root * (1 + root)) << size;
-    }
-  }
-}
-
 /// Modes of a basis of one block for each list of columns, with given radii and groups.
 Spectrum<> modes_of(const System<>& system, const MatrixXd& Lambda, const MatrixXd& U,
                     const std::vector<int>& sizes, const BlockEnclosure<>& enclosure) {
@@ -181,60 +154,60 @@ TEST(ModeNumberTerms, RoundingErrorsOfEigenvaluesOfABlock) {
 // ------------------------------------------------------------------------ from eigenvalues to
 // modes
 
-/// Sum, product and discriminant of the eigenvalues of a matrix.
-std::array<long double, 3> exact_invariants(const LongMatrix& L) {
-  const long double sum = L(0, 0) + L(1, 1), half = (L(0, 0) - L(1, 1)) / 2;
-  return {sum, L(0, 0) * L(1, 1) - L(0, 1) * L(1, 0), half * half + L(0, 1) * L(1, 0)};
-}
+/// Largest shares of the errors of sum, product and discriminant that any truth has taken.
+struct InvariantShares {
+  std::array<double, 3> worst{};
 
-/// Largest share of each error that a matrix at the distance rho from L takes.
-std::array<double, 3> shares(const Matrix2d& L, const Matrix2d& direction, double rho) {
-  const LongMatrix change = direction.cast<long double>() / direction.cast<long double>().norm();
-  const auto exact =
-      exact_invariants(L.cast<long double>() + static_cast<long double>(rho) * change);
-  const Invariants v = block_invariants(L(0, 0), L(0, 1), L(1, 0), L(1, 1), rho);
-  return {static_cast<double>(std::abs(exact[0] - static_cast<long double>(v.sum))) / v.sum_error,
-          static_cast<double>(std::abs(exact[1] - static_cast<long double>(v.product))) /
-              v.product_error,
-          static_cast<double>(std::abs(exact[2] - static_cast<long double>(v.discriminant))) /
-              v.discriminant_error};
-}
+  void take(const Invariants& v, const std::array<long double, 3>& exact) {
+    const std::array<double, 3> found = {v.sum, v.product, v.discriminant};
+    const std::array<double, 3> bounds = {v.sum_error, v.product_error, v.discriminant_error};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const auto error =
+          static_cast<double>(std::abs(exact[k] - static_cast<long double>(found[k])));
+      EXPECT_LE(error, bounds[k] * (1 + 1e-12)) << k;
+      if (error > 0) worst[k] = std::max(worst[k], error / bounds[k]);
+    }
+  }
+  /// The matrix at the distance rho from L in this direction.
+  void take(const Matrix2d& L, const Matrix2d& direction, double rho) {
+    const LongMatrix A = L.cast<long double>() + static_cast<long double>(rho) *
+                                                     direction.cast<long double>() /
+                                                     direction.cast<long double>().norm();
+    const long double half = (A(0, 0) - A(1, 1)) / 2, product = A(0, 1) * A(1, 0);
+    take(block_invariants(L(0, 0), L(0, 1), L(1, 0), L(1, 1), rho),
+         {A(0, 0) + A(1, 1), A(0, 0) * A(1, 1) - product, half * half + product});
+  }
+  void expect_above(double share) const {
+    for (const double of_one : worst) EXPECT_GT(of_one, share);
+  }
+};
 
 TEST(ModeNumberTerms, InvariantsOfABlockAreWithinTheirErrors) {
   Random random(2406);
-  std::array<double, 3> attained{}, quadratic{}, rounding{};
-  const auto take = [](std::array<double, 3>& worst, const std::array<double, 3>& seen) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      EXPECT_LE(seen[k], 1 + 1e-12) << k;
-      worst[k] = std::max(worst[k], seen[k]);
-    }
-  };
+  InvariantShares attained, quadratic, rounding;
   const Matrix2d identity = Matrix2d::Identity();
   for (int trial = 0; trial < 500; ++trial) {
     const Matrix2d L = random.matrix(2, 2);
     Matrix2d adjugate;  // transposed: the gradient of the determinant
     adjugate << L(1, 1), -L(1, 0), -L(0, 1), L(0, 0);
-    Matrix2d traceless = L.transpose() - 0.5 * L.trace() * identity;
+    const Matrix2d traceless = L.transpose() - 0.5 * L.trace() * identity;
     const double rho = random.log_uniform(1e-6, 1e-3);
-    take(attained, shares(L, identity, rho));
-    take(attained, shares(L, adjugate, rho));
-    take(attained, shares(L, traceless, rho));
-    take(rounding, shares(L, L, 0));
-    take(rounding, shares(1e3 * identity + L, L, 0));
+    for (const Matrix2d& direction : {identity, adjugate, traceless}) {
+      attained.take(L, direction, rho);
+    }
+    rounding.take(L, L, 0);
+    rounding.take(1e3 * identity + L, L, 0);
   }
-  for (const double share : attained) EXPECT_GT(share, 0.99);
-  // Rounding errors are some of the four or eight that are allowed.
-  for (const double share : rounding) EXPECT_GT(share, 0.02);
-  Matrix2d swap;
-  swap << 0, 1, 1, 0;
-  take(quadratic, shares(Matrix2d::Zero(), identity, 0.1));
-  take(quadratic, shares(Matrix2d::Zero(), swap, 0.1));
-  for (const double share : quadratic) EXPECT_GT(share, 0.99);
+  attained.expect_above(0.99);
+  rounding.expect_above(0.02);  // some of the four or eight that are allowed
+  quadratic.take(Matrix2d::Zero(), identity, 0.1);
+  quadratic.take(Matrix2d::Zero(), Matrix2d(identity.rowwise().reverse()), 0.1);
+  quadratic.expect_above(0.99);
 }
 
 TEST(ModeNumberTerms, InvariantsOfTwoRootsAreWithinTheirErrors) {
   Random random(2407);
-  std::array<double, 3> attained{}, rounding{};
+  InvariantShares attained, rounding;
   for (int trial = 0; trial < 2000; ++trial) {
     const bool exact = trial % 2 == 0;
     // Real ones, or a pair whose second root is the conjugate.
@@ -244,36 +217,24 @@ TEST(ModeNumberTerms, InvariantsOfTwoRootsAreWithinTheirErrors) {
     b.value = real ? Complex(random.uniform(-2, 2)) : std::conj(a.value);
     a.bound = exact ? 0 : random.log_uniform(1e-6, 0.5);
     b.bound = exact ? 0 : real ? random.log_uniform(1e-6, 0.5) : a.bound;
-    const Invariants v = root_invariants(a, b);
     for (int turn = 0; turn < 16; ++turn) {
-      const long double angle = std::numbers::pi_v<long double> * turn / 8;
       const auto moved = [](const Root& root, long double by) {
-        return LongComplex(root.value) +
-               static_cast<long double>(root.bound) * std::polar(1.0L, by);
+        return LongComplex(root.value) + static_cast<long double>(root.bound) *
+                                             std::polar(1.0L, by * std::numbers::pi_v<long double>);
       };
-      const LongComplex p = moved(a, real ? (turn % 2) * std::numbers::pi_v<long double> : angle);
-      const LongComplex q =
-          real ? moved(b, (turn / 2 % 2) * std::numbers::pi_v<long double>) : std::conj(p);
-      const LongComplex half = (p - q) / 2.0L;
-      const std::array<long double, 3> errors = {
-          std::abs((p + q).real() - static_cast<long double>(v.sum)),
-          std::abs((p * q).real() - static_cast<long double>(v.product)),
-          std::abs((half * half).real() - static_cast<long double>(v.discriminant))};
-      const std::array<double, 3> bounds = {v.sum_error, v.product_error, v.discriminant_error};
-      for (std::size_t k = 0; k < 3; ++k) {
-        EXPECT_LE(errors[k], static_cast<long double>(bounds[k]) * (1 + 1e-12L)) << k;
-        double& worst = (exact ? rounding : attained)[k];
-        if (errors[k] > 0) worst = std::max(worst, static_cast<double>(errors[k]) / bounds[k]);
-      }
+      const LongComplex p = moved(a, real ? turn % 2 : turn / 8.0L);
+      const LongComplex q = real ? moved(b, turn / 2 % 2) : std::conj(p), half = (p - q) / 2.0L;
+      (exact ? rounding : attained)
+          .take(root_invariants(a, b), {(p + q).real(), (p * q).real(), (half * half).real()});
     }
   }
-  for (const double share : attained) EXPECT_GT(share, 0.99);
-  for (const double share : rounding) EXPECT_GT(share, 0.05);
+  attained.expect_above(0.99);
+  rounding.expect_above(0.05);
 }
 
 TEST(ModeNumberTerms, FrequencyAndRatioAreWithinTheirBounds) {
   Random random(2408);
-  double omega_share = 0, zeta_share = 0, rounding = 0, zeta_rounding = 0;
+  std::array<double, 2> omega_share{}, zeta_share{};  // of errors, and of rounding alone
   for (int trial = 0; trial < 4000; ++trial) {
     const bool exact = trial % 2 == 0;
     Invariants v;
@@ -286,30 +247,26 @@ TEST(ModeNumberTerms, FrequencyAndRatioAreWithinTheirBounds) {
     const ModeNumbers mode = mode_numbers({{-1, 1}, 0}, {{-1, -1}, 0}, v, 0);
     // What the frequency may err by, and the rounding error of the division by it.
     EXPECT_GE(mode.damping_ratio_bound, 5 * kUnit * std::abs(mode.damping_ratio));
-    for (const int side : {-1, 1}) {
-      for (const int other : {-1, 1}) {
-        const long double product =
-            static_cast<long double>(v.product) + side * static_cast<long double>(v.product_error);
-        const long double sum =
-            static_cast<long double>(v.sum) + other * static_cast<long double>(v.sum_error);
-        const long double omega = std::sqrt(product), zeta = -sum / (2 * omega);
-        const auto omega_error =
-            static_cast<double>(std::abs(omega - static_cast<long double>(mode.natural_frequency)));
-        const auto zeta_error =
-            static_cast<double>(std::abs(zeta - static_cast<long double>(mode.damping_ratio)));
-        EXPECT_LE(omega_error, mode.natural_frequency_bound);
-        EXPECT_LE(zeta_error, mode.damping_ratio_bound);
-        double& worst_omega = exact ? rounding : omega_share;
-        double& worst_zeta = exact ? zeta_rounding : zeta_share;
-        worst_omega = std::max(worst_omega, omega_error / mode.natural_frequency_bound);
-        worst_zeta = std::max(worst_zeta, zeta_error / mode.damping_ratio_bound);
-      }
+    const auto take = [&](long double error, double bound, std::array<double, 2>& share) {
+      EXPECT_LE(error, static_cast<long double>(bound));
+      double& worst = share[exact ? 1 : 0];
+      worst = std::max(worst, static_cast<double>(error) / bound);
+    };
+    const auto wide = [](double x) { return static_cast<long double>(x); };
+    for (const int signs : {0, 1, 2, 3}) {
+      const long double product =
+          wide(v.product) + (signs % 2 == 0 ? 1 : -1) * wide(v.product_error);
+      const long double sum = wide(v.sum) + (signs / 2 == 0 ? 1 : -1) * wide(v.sum_error);
+      const long double omega = std::sqrt(product), zeta = -sum / (2 * omega);
+      take(std::abs(omega - wide(mode.natural_frequency)), mode.natural_frequency_bound,
+           omega_share);
+      take(std::abs(zeta - wide(mode.damping_ratio)), mode.damping_ratio_bound, zeta_share);
     }
   }
-  EXPECT_GT(omega_share, 0.999);
-  EXPECT_GT(zeta_share, 0.999);
-  EXPECT_GT(rounding, 0.1);
-  EXPECT_GT(zeta_rounding, 0.05);
+  EXPECT_GT(omega_share[0], 0.999);
+  EXPECT_GT(zeta_share[0], 0.999);
+  EXPECT_GT(omega_share[1], 0.1);
+  EXPECT_GT(zeta_share[1], 0.05);
 }
 
 }  // namespace

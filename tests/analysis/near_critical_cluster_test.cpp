@@ -22,63 +22,47 @@ Eigen::MatrixXd symmetric_noise(Eigen::Index n, std::mt19937_64& generator) {
   return 0.5 * (A + A.transpose());
 }
 
-TEST(NearCriticalCluster, IsSolvedHoweverWeaklyItsModesAreCoupled) {
-  constexpr unsigned kSeed = 7001;
-  SCOPED_TRACE("seed " + std::to_string(kSeed));
-  RecordProperty("seed", kSeed);
-  std::mt19937_64 generator(kSeed);
-  for (const double coupling : {1e-12, 1e-10, 1e-9, 1e-6, 1e-4, 1e-3, 1e-2}) {
-    for (Eigen::Index n = 2; n <= 7; ++n) {
-      for (int repeat = 0; repeat < 20; ++repeat) {
-        System<> system(n);
-        system.damping = 2 * system.mass + coupling * symmetric_noise(n, generator);
-        system.stiffness = system.mass + coupling * symmetric_noise(n, generator);
-        const Spectrum<> spectrum = analyze(system);
-        SCOPED_TRACE("coupling " + std::to_string(coupling) + ", n " + std::to_string(n));
-        ASSERT_EQ(spectrum.modes.size(), n);
-        for (const Mode<>& mode : spectrum.modes) {
-          // All eigenvalues lie within the root of the coupling of -1 (times a modest factor).
-          for (const Complex& value : mode.eigenvalues) {
-            EXPECT_LT(modulus(value + 1.0), 10 * std::sqrt(coupling) + 1e-5);
-          }
-          EXPECT_LT(mode.backward_error, 1e-11);
-        }
-      }
-    }
-  }
+/// 2 q'' M + C q' + K q of a cluster at -1, coupled at random.
+System<> cluster(Eigen::Index n, double coupling, std::mt19937_64& generator) {
+  System<> system(n);
+  system.damping = 2 * system.mass + coupling * symmetric_noise(n, generator);
+  system.stiffness = system.mass + coupling * symmetric_noise(n, generator);
+  return system;
 }
 
-/// Its modes are a root of the coupling apart, far more than the bounds.
-TEST(NearCriticalCluster, HasABoundForEachMode) {
-  constexpr unsigned kSeed = 7002;
+/// Its modes are a root of the coupling apart, far more than the bounds, unless it is next to none.
+TEST(NearCriticalCluster, IsSolvedAndBoundedHoweverWeaklyItsModesAreCoupled) {
+  constexpr unsigned kSeed = 7001;
   SCOPED_TRACE("seed " + std::to_string(kSeed));
-  RecordProperty("seed", kSeed);
   std::mt19937_64 generator(kSeed);
-  for (const double coupling : {1e-11, 1e-10, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3}) {
+  for (const double coupling : {1e-12, 1e-11, 1e-10, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3, 1e-2}) {
     for (Eigen::Index n = 2; n <= 7; ++n) {
-      SCOPED_TRACE("coupling " + std::to_string(coupling) + ", n " + std::to_string(n));
-      System<> system(n);
-      system.damping = 2 * system.mass + coupling * symmetric_noise(n, generator);
-      system.stiffness = system.mass + coupling * symmetric_noise(n, generator);
-      const Spectrum<> spectrum = analyze(system);
-      ASSERT_EQ(spectrum.modes.size(), n);
-      std::vector<testing::QuadComplex> truth;
-      for (const Mode<>& mode : spectrum.modes) {
-        EXPECT_LT(mode.error_bound, 0.03 * std::sqrt(coupling));
-        EXPECT_NE(mode.kind, ModeKind::kCritical);
-        for (const Complex& value : mode.eigenvalues) {
-          const double step = 1e-12 * static_cast<double>(truth.size() + 1);
-          truth.push_back(testing::to_quad(value + Complex(step, 0.7 * step)));
-        }
-      }
-      truth = testing::refine_eigenvalues(system, truth);
-      for (const Mode<>& mode : spectrum.modes) {
-        for (const Complex& value : mode.eigenvalues) {
-          testing::Quad nearest = 1;
-          for (const testing::QuadComplex& true_one : truth) {
-            nearest = std::min(nearest, (true_one - testing::to_quad(value)).norm());
+      for (int repeat = 0; repeat < 10; ++repeat) {
+        SCOPED_TRACE("coupling " + std::to_string(coupling) + ", n " + std::to_string(n));
+        const System<> system = cluster(n, coupling, generator);
+        const Spectrum<> spectrum = analyze(system);
+        ASSERT_EQ(spectrum.modes.size(), n);
+        std::vector<testing::QuadComplex> truth;
+        for (const Mode<>& mode : spectrum.modes) {
+          EXPECT_LT(mode.backward_error, 1e-11);
+          for (const Complex& value : mode.eigenvalues) {
+            EXPECT_LT(modulus(value + 1.0), 10 * std::sqrt(coupling) + 1e-5);
+            const double step = 1e-12 * static_cast<double>(truth.size() + 1);
+            truth.push_back(testing::to_quad(value + Complex(step, 0.7 * step)));
           }
-          EXPECT_LE(std::sqrt(static_cast<double>(nearest)), mode.error_bound);
+        }
+        if (repeat > 0 || coupling < 1e-11 || coupling > 1e-3) continue;
+        truth = testing::refine_eigenvalues(system, truth);
+        for (const Mode<>& mode : spectrum.modes) {
+          EXPECT_LT(mode.error_bound, 0.03 * std::sqrt(coupling));
+          EXPECT_NE(mode.kind, ModeKind::kCritical);
+          for (const Complex& value : mode.eigenvalues) {
+            testing::Quad nearest = 1;
+            for (const testing::QuadComplex& true_one : truth) {
+              nearest = std::min(nearest, (true_one - testing::to_quad(value)).norm());
+            }
+            EXPECT_LE(std::sqrt(static_cast<double>(nearest)), mode.error_bound);
+          }
         }
       }
     }
@@ -89,7 +73,6 @@ TEST(NearCriticalCluster, HasABoundForEachMode) {
 TEST(NearCriticalCluster, IsFollowed) {
   constexpr unsigned kSeed = 7003;
   SCOPED_TRACE("seed " + std::to_string(kSeed));
-  RecordProperty("seed", kSeed);
   std::mt19937_64 generator(kSeed);
   for (const double coupling : {1e-9, 1e-8, 1e-7, 1e-6, 1e-4}) {
     for (Eigen::Index n = 2; n <= 7; ++n) {

@@ -1,9 +1,11 @@
-// Joint-space systems of task-space impedances, exactly, and their factors.
+// Joint-space systems of task-space impedances, exactly, and their factors; and the words in which
+// an impedance is refused.
 #include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/paper_examples.hpp>
 #include <dashpot/tests/support/random_impedance.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
 
@@ -15,6 +17,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::as_printed;
+using testing::kNan;
 using testing::near;
 
 // --------------------------------------------------------------------------------- the products
@@ -187,65 +190,88 @@ TEST(ToJointSpace, PaperEq55AddsTheGeometricStiffness) {
   EXPECT_FALSE(to_joint_space(impedance).symmetric());
 }
 
-TEST(ToJointSpace, NamesWhatIsMissingOrWrong) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto refusal = [](const auto& change) -> std::string {
-    TaskImpedance impedance;
-    impedance.mass = MatrixXd::Identity(2, 2);
-    impedance.jacobian = MatrixXd::Identity(2, 2);
-    impedance.task_damping = impedance.task_stiffness = impedance.jacobian_rate =
-        impedance.jacobian;
-    impedance.wrench = VectorXd{{3, -7}};
-    impedance.jacobian_derivatives = planar_derivatives(0.3, 0.8);
-    change(impedance);
-    try {
-      to_joint_space(impedance);
-    } catch (const InvalidSystem& error) {
-      return error.what();
-    }
+std::string refusal_of(const TaskImpedance& impedance) {
+  try {
+    to_joint_space(impedance);
     return "";
+  } catch (const InvalidSystem& error) {
+    return error.what();
+  }
+}
+
+TEST(ToJointSpace, SaysWhatIsWrongWithAnImpedance) {
+  using Change = void (*)(TaskImpedance&);
+  struct Case {
+    Change change;
+    const char* refusal;
   };
-  EXPECT_EQ(refusal([](TaskImpedance&) {}), "");
-  EXPECT_EQ(refusal([](TaskImpedance& a) {
-              a.jacobian.reset();
-              a.jacobian_rate.reset();
-            }),
-            "task_damping: needs a jacobian");
-  EXPECT_EQ(refusal([](TaskImpedance& a) {
-              a.jacobian.reset();
-              a.task_damping.reset();
-              a.jacobian_rate.reset();
-            }),
-            "task_stiffness: needs a jacobian");
-  EXPECT_EQ(refusal([](TaskImpedance& a) {
-              a.task_damping.reset();
-              a.task_stiffness.reset();
-            }),
-            "jacobian: needs task_damping or task_stiffness");
-  EXPECT_EQ(refusal([](TaskImpedance& a) { a.task_damping.reset(); }),
-            "jacobian_rate: needs task_damping");
-  EXPECT_EQ(refusal([](TaskImpedance& a) { a.jacobian = MatrixXd::Zero(2, 3); }),
-            "jacobian: is 2 x 3, expected 2 x 2");
-  EXPECT_EQ(refusal([](TaskImpedance& a) { a.jacobian_rate = MatrixXd::Zero(1, 2); }),
-            "jacobian_rate: is 1 x 2, expected 2 x 2");
-  EXPECT_EQ(refusal([&](TaskImpedance& a) { (*a.jacobian)(1, 0) = nan; }),
-            "jacobian: entry (2,1) is not a finite number");
-  EXPECT_EQ(refusal([&](TaskImpedance& a) { (*a.jacobian_rate)(0, 1) = nan; }),
-            "jacobian_rate: entry (1,2) is not a finite number");
-  EXPECT_EQ(refusal([](TaskImpedance& a) { a.wrench.reset(); }),
-            "jacobian_derivatives: needs a wrench");
-  EXPECT_EQ(refusal([](TaskImpedance& a) { a.jacobian_derivatives.clear(); }),
-            "wrench: needs jacobian_derivatives");
-  EXPECT_EQ(refusal([](TaskImpedance& a) { a.jacobian_derivatives.pop_back(); }),
-            "jacobian_derivatives: has 1 matrices, expected 2");
-  EXPECT_EQ(refusal([](TaskImpedance& a) { a.wrench = VectorXd::Ones(3); }),
-            "wrench: is 3 x 1, expected 2 x 1");
-  EXPECT_EQ(refusal([&](TaskImpedance& a) { (*a.wrench)[1] = nan; }),
-            "wrench: entry (2,1) is not a finite number");
-  EXPECT_EQ(refusal([](TaskImpedance& a) { a.jacobian_derivatives[1] = MatrixXd::Zero(2, 3); }),
-            "jacobian_derivatives[2]: is 2 x 3, expected 2 x 2");
-  EXPECT_EQ(refusal([&](TaskImpedance& a) { a.jacobian_derivatives[1](0, 1) = nan; }),
-            "jacobian_derivatives[2]: entry (1,2) is not a finite number");
+  static const auto zero = [](int rows, int columns) -> MatrixXd {
+    return MatrixXd::Zero(rows, columns);
+  };
+  // With a wrench and its derivatives, unless these are taken away.
+  for (const Case& c : {
+           Case{[](TaskImpedance&) {}, ""},
+           // What is missing
+           Case{[](TaskImpedance& i) { i.jacobian.reset(); }, "task_damping: needs a jacobian"},
+           Case{[](TaskImpedance& i) { i.jacobian.reset(), i.task_damping.reset(); },
+                "task_stiffness: needs a jacobian"},
+           Case{[](TaskImpedance& i) { i.task_stiffness.reset(); }, ""},
+           Case{[](TaskImpedance& i) {
+                  i.task_stiffness.reset(), i.task_damping.reset(), i.wrench.reset();
+                  i.jacobian_derivatives.clear();
+                },
+                "jacobian: needs task_damping or task_stiffness"},
+           Case{[](TaskImpedance& i) { i.jacobian_rate = zero(2, 3), i.task_damping.reset(); },
+                "jacobian_rate: needs task_damping"},
+           Case{[](TaskImpedance& i) { i.jacobian_derivatives.clear(); },
+                "wrench: needs jacobian_derivatives"},
+           Case{[](TaskImpedance& i) { i.wrench.reset(); }, "jacobian_derivatives: needs a wrench"},
+           // What is of the wrong size
+           Case{[](TaskImpedance& i) { i.mass = zero(3, 2); }, "mass: is 3 x 2, expected 3 x 3"},
+           Case{[](TaskImpedance& i) { i.jacobian = zero(2, 4); },
+                "jacobian: is 2 x 4, expected 2 x 3"},
+           Case{[](TaskImpedance& i) { i.task_stiffness = zero(3, 3); },
+                "task_stiffness: is 3 x 3, expected 2 x 2"},
+           Case{[](TaskImpedance& i) { i.task_damping = zero(1, 1); },
+                "task_damping: is 1 x 1, expected 2 x 2"},
+           Case{[](TaskImpedance& i) { i.damping = zero(2, 2); },
+                "damping: is 2 x 2, expected 3 x 3"},
+           Case{[](TaskImpedance& i) { i.jacobian_rate = zero(1, 3); },
+                "jacobian_rate: is 1 x 3, expected 2 x 3"},
+           Case{[](TaskImpedance& i) { i.jacobian_derivatives.pop_back(); },
+                "jacobian_derivatives: has 2 matrices, expected 3"},
+           Case{[](TaskImpedance& i) { i.jacobian_derivatives[1] = zero(1, 3); },
+                "jacobian_derivatives[2]: is 1 x 3, expected 2 x 3"},
+           Case{[](TaskImpedance& i) { i.wrench = VectorXd::Zero(3); },
+                "wrench: is 3 x 1, expected 2 x 1"},
+           // What is not finite, or not symmetric
+           Case{[](TaskImpedance& i) { (*i.jacobian)(1, 2) = kNan; },
+                "jacobian: entry (2,3) is not a finite number"},
+           Case{[](TaskImpedance& i) { (*i.task_damping)(0, 0) = kNan; },
+                "task_damping: entry (1,1) is not a finite number"},
+           Case{[](TaskImpedance& i) {
+                  i.jacobian_rate = zero(2, 3);
+                  (*i.jacobian_rate)(0, 1) = kNan;
+                },
+                "jacobian_rate: entry (1,2) is not a finite number"},
+           Case{[](TaskImpedance& i) { i.jacobian_derivatives[1](0, 1) = kNan; },
+                "jacobian_derivatives[2]: entry (1,2) is not a finite number"},
+           Case{[](TaskImpedance& i) { i.wrench = VectorXd::Constant(2, kNan); },
+                "wrench: entry (1,1) is not a finite number"},
+           Case{[](TaskImpedance& i) {
+                  i.task_stiffness = (MatrixXd(2, 2) << 5, 3, 4, 5).finished();
+                },
+                "task_stiffness: is not symmetric: entry (1,2) is 3, entry (2,1) is 4"},
+           Case{[](TaskImpedance& i) { i.mass *= -1; }, "mass: is not positive definite"},
+       }) {
+    SCOPED_TRACE(c.refusal);
+    testing::Random random(28);
+    TaskImpedance impedance = testing::random_impedance(random, 3, 2);
+    impedance.wrench = random.vector(2);
+    impedance.jacobian_derivatives.assign(3, random.matrix(2, 3));
+    c.change(impedance);
+    EXPECT_EQ(refusal_of(impedance), c.refusal);
+  }
 }
 
 // -------------------------------------------------------------------------------------- the factor
