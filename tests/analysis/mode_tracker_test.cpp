@@ -16,6 +16,7 @@ namespace dashpot::analysis {
 namespace {
 
 using Eigen::MatrixXd;
+using testing::backward_error;
 using testing::expect_enclosed;
 using testing::panda_impedance;
 using testing::Random;
@@ -28,16 +29,6 @@ System<kMaxDof> random_fixed_system(Random& random, int n, double damping) {
   system.damping = damping * random.spd(n);
   system.stiffness = 100 * random.spd(n);
   return system;
-}
-
-/// |Q(lambda) u| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |u|)
-double backward_error(const System<kMaxDof>& system, const Complex& value,
-                      const ComplexVector<kMaxDof>& u) {
-  const ComplexVector<kMaxDof> residual =
-      value * value * (system.mass * u) + value * (system.damping * u) + system.stiffness * u;
-  const double size = std::norm(value) * system.mass.norm() +
-                      std::abs(value) * system.damping.norm() + system.stiffness.norm();
-  return residual.norm() / (size * u.norm());
 }
 
 TEST(ModeTracker, GivesEigenvectorsOfSmallBackwardError) {

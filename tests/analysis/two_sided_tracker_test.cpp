@@ -14,6 +14,7 @@
 namespace dashpot::analysis {
 namespace {
 
+using testing::backward_error;
 using testing::Dice;
 using testing::panda_impedance;
 using testing::SystemPath;
@@ -48,15 +49,6 @@ Truth truth_of(const System<kMaxDof>& system, const TrackedSpectrum& spectrum) {
     truth.push_back({static_cast<long double>(value.re), static_cast<long double>(value.im)});
   }
   return truth;
-}
-
-double backward_error(const System<kMaxDof>& system, const Complex& value,
-                      const ComplexVector<kMaxDof>& u) {
-  const ComplexVector<kMaxDof> residual =
-      value * value * (system.mass * u) + value * (system.damping * u) + system.stiffness * u;
-  const double size = std::norm(value) * system.mass.norm() +
-                      std::abs(value) * system.damping.norm() + system.stiffness.norm();
-  return residual.norm() / (size * u.norm());
 }
 
 /// Follows a path and expects what is published to be true at every step.

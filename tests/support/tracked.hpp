@@ -23,4 +23,15 @@ struct Tracked {
   std::unique_ptr<analysis::TrackedSpectrum> spectrum;
 };
 
+/// |Q(lambda) u| / ((|lambda|^2 |M| + |lambda| |C| + |K|) |u|)
+inline double backward_error(const analysis::System<analysis::kMaxDof>& system,
+                             const analysis::Complex& value,
+                             const analysis::ComplexVector<analysis::kMaxDof>& u) {
+  const analysis::ComplexVector<analysis::kMaxDof> residual =
+      value * value * (system.mass * u) + value * (system.damping * u) + system.stiffness * u;
+  const double size = std::norm(value) * system.mass.norm() +
+                      std::abs(value) * system.damping.norm() + system.stiffness.norm();
+  return residual.norm() / (size * u.norm());
+}
+
 }  // namespace dashpot::testing
