@@ -1,4 +1,4 @@
-// Our enclosures beside FLINT/Arb's: for each of ten thousand systems the discs of the direct
+// Our enclosures beside FLINT/Arb's: for each of some thousand systems the discs of the direct
 // solver and of the tracker meet Arb's balls, one to one, with as many left over as there are zero
 // modes.
 #if defined(DASHPOT_HAVE_ARB)
@@ -24,7 +24,7 @@ TEST(CertifiedReferee, NeedsArb) {
   GTEST_SKIP() << "FLINT/Arb is not installed (libflint-arb-dev, libflint-dev)";
 }
 #else
-const int kSystemsOfAFamily = testing::quick() ? 66 : 530;  // of 19 families
+const int kSystemsOfAFamily = testing::quick() ? 66 : 180;  // of 19 families
 constexpr int kStepsOfAPath = 10;
 
 using Eigen::MatrixXd;
@@ -187,22 +187,6 @@ Published published(const Spectrum<kMaxDof>& spectrum) {
   return result;
 }
 
-/// Of all systems of a family.
-struct Tally {
-  int systems = 0, unproved = 0;
-  std::array<int, kMaxDof + 1> sizes{};
-  std::vector<double> ours, arbs;  ///< each system's widest radius / |largest eigenvalue|
-  int most_bits = 0;
-
-  static double median(std::vector<double> values) {
-    std::sort(values.begin(), values.end());
-    return values.empty() ? 0 : values[values.size() / 2];
-  }
-  static double most(const std::vector<double>& values) {
-    return values.empty() ? 0 : *std::max_element(values.begin(), values.end());
-  }
-};
-
 /// A thousandth of the least radius: what the truth has to be known to.
 long double wanted_radius(const std::vector<const Published*>& all) {
   long double least = std::numeric_limits<long double>::infinity();
@@ -237,24 +221,24 @@ INSTANTIATE_TEST_SUITE_P(Systems, CertifiedReferee, ::testing::ValuesIn(families
                          });
 
 TEST_P(CertifiedReferee, EveryDiscMeetsABallOfItsOwn) {
-  Tally tally;
+  int systems = 0;
   bool symmetric = true;
+  std::vector<double> radii;  // over the largest eigenvalue
   const auto tracker = std::make_unique<ModeTracker>();
   const auto tracked = std::make_unique<TrackedSpectrum>();
-  for (std::uint64_t seed = 1; tally.systems < kSystemsOfAFamily; ++seed) {
+  for (std::uint64_t seed = 1; systems < kSystemsOfAFamily; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Dice dice(seed);
     const SystemPath path = GetParam().make(dice);
     const double from = dice.uniform(0, 0.95);
     tracker->forget();
-    for (int step = 0; step < kStepsOfAPath && tally.systems < kSystemsOfAFamily; ++step) {
+    for (int step = 0; step < kStepsOfAPath && systems < kSystemsOfAFamily; ++step) {
       SCOPED_TRACE("step " + std::to_string(step));
       const System<kMaxDof> system = path(from + 0.005 * step);
       const int n = static_cast<int>(system.dof());
       if (n > 10) break;
       symmetric = symmetric && system.symmetric();
-      ++tally.systems;
-      ++tally.sizes[static_cast<std::size_t>(n)];
+      ++systems;
       System<kMaxDof> plain = system;
       if (system.stiffness_factor.rows() > 0) form_stiffness(plain);
       if (plain.stiffness_low.isZero(0)) plain.stiffness_factor.resize(0, n);
@@ -280,28 +264,19 @@ TEST_P(CertifiedReferee, EveryDiscMeetsABallOfItsOwn) {
         expect_met(of_tracked, followed, truth, 2 * (n - zeros) + static_cast<int>(listed));
       }
       if (HasFailure()) return;
-      const bool proved = solved == Status::kOk && followed == Status::kOk;
-      tally.unproved += proved ? 0 : 1;
       long double size = 0;
       for (const Disc& z : truth.center) size = std::max(size, distance(z, Disc{}));
       for (const Published* each : {&of_direct, &of_tracked}) {
         for (const long double radius : each->radius) {
-          tally.ours.push_back(static_cast<double>(radius / size));
+          radii.push_back(static_cast<double>(radius / size));
         }
       }
-      tally.arbs.push_back(static_cast<double>(truth.widest() / size));
-      tally.most_bits = std::max(tally.most_bits, truth.bits);
     }
   }
-  const auto followed = static_cast<int>(tracker->counters().tracked);
-  EXPECT_TRUE(!symmetric || followed > tally.systems / 4);
-  std::printf(
-      "%d systems, %d not all proved, %d followed; radius / largest eigenvalue: ours median %.1e, "
-      "widest %.1e; Arb's %.1e, %.1e, with up to %d bits; sizes 1 to 10:",
-      tally.systems, tally.unproved, followed, Tally::median(tally.ours), Tally::most(tally.ours),
-      Tally::median(tally.arbs), Tally::most(tally.arbs), tally.most_bits);
-  for (int n = 1; n <= 10; ++n) std::printf(" %d", tally.sizes[static_cast<std::size_t>(n)]);
-  std::printf("\n");
+  EXPECT_TRUE(!symmetric || tracker->counters().tracked > systems / 10);
+  // Enclosures that are worth something: half of the radii are far below what anyone measures.
+  std::sort(radii.begin(), radii.end());
+  EXPECT_LE(radii[radii.size() / 2], 1e-9);
 }
 #endif
 

@@ -145,7 +145,7 @@ TEST(CoefficientErrors, CountAsymmetryThatIsAveraged) {
   Random random(2102);
   for (const int part : {0, 1, 2}) {
     double largest = 0;
-    for (int trial = 0; trial < 20; ++trial) {
+    for (int trial = 0; trial < 8; ++trial) {
       const int n = random.integer(2, 4);
       TaskImpedance given;
       given.mass = 2 * MatrixXd::Identity(n, n);

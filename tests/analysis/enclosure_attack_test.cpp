@@ -1,6 +1,7 @@
 // Systems that once got a dangerous answer: a growing motion reported as a harmless one, numbers
 // with the status kOk that mean nothing.
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -12,12 +13,8 @@ namespace {
 using Eigen::MatrixXd;
 
 Spectrum<> solve(const MatrixXd& mass, const MatrixXd& damping, const MatrixXd& stiffness) {
-  System<> system(mass.rows());
-  system.mass = mass;
-  system.damping = damping;
-  system.stiffness = stiffness;
   Spectrum<> spectrum;
-  SpectrumSolver<>().solve(system, spectrum);
+  SpectrumSolver<>().solve(testing::system_from(mass, damping, stiffness), spectrum);
   return spectrum;
 }
 

@@ -160,29 +160,23 @@ TEST(ModeTracker, SaysWhatIsWrongAndRecovers) {
     ASSERT_EQ(tracked.update(good), Status::kOk);
     EXPECT_EQ(tracked.spectrum->mode_count, 3);
   };
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  System<kMaxDof> bad = good;
-  bad.mass(1, 1) = nan;
-  expect_failure(bad, Status::kNotFinite);
-  bad = good;
-  bad.damping(0, 2) = std::numeric_limits<double>::infinity();
-  expect_failure(bad, Status::kNotFinite);
-  bad = good;
-  bad.stiffness_factor.resize(0, 4);
-  bad.stiffness(2, 0) = nan;
-  expect_failure(bad, Status::kNotFinite);
-  bad = good;
-  bad.mass(0, 0) = -1;
-  expect_failure(bad, Status::kMassNotPositiveDefinite);
-  bad = good;
-  bad.mass(0, 1) += 0.1;
-  expect_failure(bad, Status::kNotSymmetric);
-  bad = good;
-  bad.damping.resize(2, 2);
-  expect_failure(bad, Status::kWrongSize);
-  bad = good;
-  bad.stiffness_factor.setConstant(nan);
-  expect_failure(bad, Status::kNotFinite);
+  static constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  using Change = void (*)(System<kMaxDof>&);
+  for (const auto& [change, status] : std::initializer_list<std::pair<Change, Status>>{
+           {[](System<kMaxDof>& s) { s.mass(1, 1) = kNan; }, Status::kNotFinite},
+           {[](System<kMaxDof>& s) { s.damping(0, 2) = -std::numeric_limits<double>::infinity(); },
+            Status::kNotFinite},
+           {[](System<kMaxDof>& s) { s.stiffness_factor.resize(0, 4), s.stiffness(2, 0) = kNan; },
+            Status::kNotFinite},
+           {[](System<kMaxDof>& s) { s.mass(0, 0) = -1; }, Status::kMassNotPositiveDefinite},
+           {[](System<kMaxDof>& s) { s.mass(0, 1) += 0.1; }, Status::kNotSymmetric},
+           {[](System<kMaxDof>& s) { s.damping.resize(2, 2); }, Status::kWrongSize},
+           {[](System<kMaxDof>& s) { s.stiffness_factor.setConstant(kNan); },
+            Status::kNotFinite}}) {
+    System<kMaxDof> bad = good;
+    change(bad);
+    expect_failure(bad, status);
+  }
   EXPECT_EQ(tracked.tracker->counters().failed, 7);
 }
 

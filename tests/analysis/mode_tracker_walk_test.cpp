@@ -65,6 +65,9 @@ class Walk {
 struct Size {
   int joints, rows;
 };
+void PrintTo(const Size& size, std::ostream* out) {
+  *out << size.joints << " joints, " << size.rows << " rows";
+}
 
 class RandomWalk : public ::testing::TestWithParam<Size> {};
 INSTANTIATE_TEST_SUITE_P(Sizes, RandomWalk,
@@ -85,7 +88,7 @@ TEST_P(RandomWalk, IsFollowedWithinItsBounds) {
   Random random(2000 + 100U * static_cast<unsigned>(n) + static_cast<unsigned>(rows));
   const auto tracker = std::make_unique<ModeTracker>();
   const auto spectrum = std::make_unique<TrackedSpectrum>();
-  const int steps = n <= 7 ? 1200 : 400, apart = n <= 7 ? 10 : 25;
+  const int steps = n <= 7 ? 500 : 200, apart = n <= 7 ? 10 : 25;
   double tightest = 0, widest = 0;
   for (const double damping : {0.02, 1.0, 12.0}) {
     Walk walk(random, n, rows, damping, 0.02);
@@ -102,10 +105,9 @@ TEST_P(RandomWalk, IsFollowedWithinItsBounds) {
   }
   const TrackerCounters& counters = tracker->counters();
   // Followed, not solved directly; and the bounds are worth something.
-  EXPECT_GE(counters.tracked, 0.98 * 3 * steps);
+  EXPECT_GE(counters.tracked, 0.97 * 3 * steps);
   EXPECT_LE(tightest, 1);
-  RecordProperty("iterations", std::to_string(counters.iterations));
-  RecordProperty("widest", std::to_string(widest));
+  EXPECT_LE(widest, 1e-3);
 }
 
 /// All eigenvalues of modes, each with its bound.
@@ -126,7 +128,7 @@ TEST(RandomWalkAgainstDirect, AgreesWithinBothBounds) {
   for (const int n : {2, 4, 6, 7}) {
     for (const double damping : {0.1, 3.0}) {
       Walk walk(random, n, 0, damping, 0.02);
-      for (int step = 0; step < 2500; ++step) {
+      for (int step = 0; step < 700; ++step) {
         const System<kMaxDof> system = walk.next();
         ASSERT_EQ(tracker->update(system, *spectrum), Status::kOk);
         ASSERT_EQ(solver->solve(system, *direct), Status::kOk);
@@ -153,7 +155,7 @@ TEST(RandomWalkAgainstDirect, AgreesWithinBothBounds) {
       }
     }
   }
-  EXPECT_GE(compared, 180000);
+  EXPECT_GE(compared, 50000);
 }
 
 }  // namespace

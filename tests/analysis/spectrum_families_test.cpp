@@ -21,11 +21,6 @@ using testing::Random;
 using testing::symmetrized;
 using testing::system_from;
 
-System<> scalar(double mass, double damping, double stiffness) {
-  return system_from(MatrixXd::Constant(1, 1, mass), MatrixXd::Constant(1, 1, damping),
-                     MatrixXd::Constant(1, 1, stiffness));
-}
-
 struct ClosedForm {
   double omega, zeta;
 };
@@ -145,7 +140,7 @@ TEST_P(ClassicalDamping, IsFoundInEveryMode) {
 }
 
 TEST(CriticalOscillator, IsExact) {
-  const Spectrum<> spectrum = analyze(scalar(1, 2, 1));
+  const Spectrum<> spectrum = analyze(testing::one_joint(1, 2, 1));
   ASSERT_EQ(spectrum.modes.size(), 1);
   const Mode<>& mode = spectrum.modes[0];
   EXPECT_EQ(mode.kind, ModeKind::kCritical);
@@ -201,13 +196,13 @@ TEST(ProportionalDamping, IsNotSeenWhereDampingMixesTheModes) {
 }
 
 TEST(VeryLightDamping, IsNotTakenForNone) {
-  const Spectrum<> spectrum = analyze(scalar(3, 6e-12, 27));
+  const Spectrum<> spectrum = analyze(testing::one_joint(3, 6e-12, 27));
   EXPECT_EQ(spectrum.modes[0].kind, ModeKind::kUnderdamped);
   EXPECT_NEAR(spectrum.modes[0].damping_ratio, 1e-12 / 3, 1e-27);
 }
 
 TEST(NegativeDamping, IsUnstable) {
-  const Spectrum<> one = analyze(scalar(1, -0.2, 4));
+  const Spectrum<> one = analyze(testing::one_joint(1, -0.2, 4));
   EXPECT_EQ(one.modes[0].kind, ModeKind::kUnstable);
   EXPECT_NEAR(one.modes[0].damping_ratio, -0.05, 1e-16);
   EXPECT_NEAR(one.modes[0].eigenvalues[0].real(), 0.1, 1e-16);

@@ -1,5 +1,5 @@
-// Systems whose damping or stiffness is not symmetric, followed: bounds against 33 digits at every
-// step, labels, shapes, and what ends it.
+// Systems whose damping or stiffness is not symmetric, followed: bounds against 33 digits, labels,
+// shapes, and what ends it.
 #include <dashpot/analysis/spectrum/mode_numbers.hpp>
 #include <dashpot/tests/support/enclosure.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
@@ -51,20 +51,22 @@ Truth truth_of(const System<kMaxDof>& system, const TrackedSpectrum& spectrum) {
   return truth;
 }
 
-/// Follows a path and expects what is published to be true at every step.
+/// Follows a path and expects what is published to be true: shapes at every step, bounds at every
+/// fourth.
 struct Follower : Tracked {
   void follow(const SystemPath& path, int steps, double length) {
     for (int step = 0; step < steps && !::testing::Test::HasFailure(); ++step) {
       SCOPED_TRACE("step " + std::to_string(step));
       const System<kMaxDof> system = path(length * step / steps);
       ASSERT_EQ(update(system), Status::kOk);
+      look_at_shapes(system);
+      if (step % 4 != 0 && step + 1 < steps) continue;
       const testing::Verdict verdict =
           testing::judge_against<long double>(truth_of(system, *spectrum), *spectrum, 1e-18);
       EXPECT_TRUE(verdict.enclosed) << verdict.what << ", error / bound " << verdict.tightest;
       EXPECT_TRUE(verdict.proved);
       tightest = std::max(tightest, verdict.tightest);
       widest = std::max(widest, verdict.widest);
-      look_at_shapes(system);
     }
   }
   void look_at_shapes(const System<kMaxDof>& system) {
@@ -111,28 +113,25 @@ Eigen::MatrixXd geometric_stiffness(const Eigen::MatrixXd& J, const Eigen::Vecto
 }
 
 TEST(TwoSidedTracker, FollowsALoadedArm) {
-  for (const double ratio : {0.1}) {
-    SCOPED_TRACE(ratio);
-    Follower follower;
-    follower.follow(
-        [ratio](double t) {
-          System<kMaxDof> system = panda_impedance(testing::swing(t), ratio);
-          system.stiffness += geometric_stiffness(testing::panda(testing::swing(t)).jacobian,
-                                                  Eigen::Vector3d(20, -30, 60));
-          system.stiffness.diagonal().array() += 10;
-          system.damping.diagonal().array() += 0.5;
-          system.stiffness_factor.resize(0, 7);
-          return system;
-        },
-        100, 0.1);
-    follower.expect_followed();
-    EXPECT_EQ(follower.spectrum->mode_count, 7);
-    EXPECT_LE(follower.counters().iterations, 250);
-    EXPECT_LE(follower.widest, 1e-9);
-    EXPECT_GE(follower.tightest, 1e-5) << "bounds without meaning";
-    EXPECT_LE(follower.worst_shape, 1e-14);
-    EXPECT_GE(follower.least_overlap, 0.98);
-  }
+  Follower follower;
+  follower.follow(
+      [](double t) {
+        System<kMaxDof> system = panda_impedance(testing::swing(t), 0.1);
+        system.stiffness += geometric_stiffness(testing::panda(testing::swing(t)).jacobian,
+                                                Eigen::Vector3d(20, -30, 60));
+        system.stiffness.diagonal().array() += 10;
+        system.damping.diagonal().array() += 0.5;
+        system.stiffness_factor.resize(0, 7);
+        return system;
+      },
+      100, 0.1);
+  follower.expect_followed();
+  EXPECT_EQ(follower.spectrum->mode_count, 7);
+  EXPECT_LE(follower.counters().iterations, 250);
+  EXPECT_LE(follower.widest, 1e-9);
+  EXPECT_GE(follower.tightest, 1e-5) << "bounds without meaning";
+  EXPECT_LE(follower.worst_shape, 1e-14);
+  EXPECT_GE(follower.least_overlap, 0.98);
 }
 
 /// The term J' C_C dJ/dt leaves the springs' directions, and so a zero mode.

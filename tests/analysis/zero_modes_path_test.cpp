@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <memory>
 
 namespace dashpot::analysis {
@@ -22,6 +23,9 @@ enum class Friction {
   kSmall,     ///< of each joint, a millionth of the springs' damping
   kOrdinary,  ///< of each joint
 };
+void PrintTo(Friction friction, std::ostream* out) {
+  *out << std::array{"none", "equal", "small", "ordinary"}[static_cast<std::size_t>(friction)];
+}
 
 class SeveralZeroModes : public ::testing::TestWithParam<std::tuple<int, Friction>> {};
 

@@ -276,15 +276,6 @@ class Systems {
 
   const std::vector<std::string>& names() const { return names_; }
 
-  /// The names of those that have something under `key`.
-  std::vector<std::string> names_with(const std::string& key) const {
-    std::vector<std::string> result;
-    for (std::size_t i = 0; i < names_.size(); ++i) {
-      if (lines_[i].find('"' + key + "\":") != std::string::npos) result.push_back(names_[i]);
-    }
-    return result;
-  }
-
   /// Throws std::runtime_error naming the file and the system.
   Json read(const std::string& name) const {
     const auto found = std::find(names_.begin(), names_.end(), name);
@@ -309,12 +300,9 @@ inline const Systems& responses() {
 
 }  // namespace detail
 
-/// The systems of spectra.json, and those whose stiffness has a factor.
+/// The systems of spectra.json.
 inline const std::vector<std::string>& spectrum_names() {
   return detail::spectra().names();
-}
-inline std::vector<std::string> spectrum_names_with_factor() {
-  return detail::spectra().names_with("stiffness_factor");
 }
 inline SpectrumCase spectrum_case(const std::string& name) {
   return detail::to_spectrum_case(detail::spectra().read(name));

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <functional>
 #include <numbers>
+#include <ostream>
 #include <random>
 #include <string>
 #include <vector>
@@ -361,6 +362,9 @@ struct PathFamily {
   std::string name;
   SystemPath (*make)(Dice&);
 };
+inline void PrintTo(const PathFamily& family, std::ostream* out) {
+  *out << family.name;
+}
 
 inline const std::vector<PathFamily>& path_families() {
   static const std::vector<PathFamily> all = {
