@@ -4,7 +4,6 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random_arms.hpp>
-#include <dashpot/tests/support/sanitized.hpp>
 #include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
@@ -38,24 +37,36 @@ double sum_with(const TaskImpedance& arm, const MatrixXd& damping, double zeta) 
   return sum_of_squares(analyze(to_joint_space(with_damping(arm, damping))), zeta);
 }
 
-bool has_structure(const MatrixXd& A, DampingStructure structure) {
+/// With zeros where the structure has them.
+MatrixXd within(MatrixXd A, DampingStructure structure) {
   for (Index j = 0; j < A.cols(); ++j) {
     for (Index i = 0; i < A.rows(); ++i) {
       const bool free = i == j || structure == DampingStructure::kFull ||
                         (structure == DampingStructure::kBlock && (i < 3) == (j < 3));
-      if (!free && A(i, j) != 0) return false;
+      if (!free) A(i, j) = 0;
     }
   }
-  return true;
+  return A;
 }
 
-class Structure : public ::testing::TestWithParam<DampingStructure> {};
+MatrixXd symmetric(const MatrixXd& A) {
+  return 0.5 * (A + A.transpose());
+}
 
 double smallest_ratio(const Spectrum<>& spectrum) {
   double smallest = kInfinity;
   for (const Mode<>& mode : spectrum.modes) smallest = std::min(smallest, mode.damping_ratio);
   return smallest;
 }
+
+std::string name_of(const ::testing::TestParamInfo<DampingStructure>& info) {
+  return info.param == DampingStructure::kBlock ? "Block" : "Diagonal";
+}
+
+class Structure : public ::testing::TestWithParam<DampingStructure> {};
+INSTANTIATE_TEST_SUITE_P(Designs, Structure,
+                         ::testing::Values(DampingStructure::kBlock, DampingStructure::kDiagonal),
+                         name_of);
 
 TEST_P(Structure, GivesALargerSmallestRatioThanLeastSquaresAndThanEntriesLeftOut) {
   const DampingStructure structure = GetParam();
@@ -65,29 +76,20 @@ TEST_P(Structure, GivesALargerSmallestRatioThanLeastSquaresAndThanEntriesLeftOut
   for (int i = 0; i < 12; ++i) {
     const TaskImpedance arm = random_arm(random, 7, 6, 10, 30);
     const MatrixXd exact = design_damping(arm, target).damping;
-    MatrixXd plain = exact;
-    for (Index q = 0; q < 6; ++q) {
-      for (Index p = 0; p < 6; ++p) {
-        MatrixXd one = MatrixXd::Zero(6, 6);
-        one(p, q) = 1;
-        if (!has_structure(one, structure)) plain(p, q) = 0;
-      }
-    }
     const double least_squares =
         smallest_ratio(design_damping(arm, target, structure, exact).spectrum);
-    const double left_out = smallest_ratio(analyze(to_joint_space(with_damping(arm, plain))));
+    const double left_out =
+        smallest_ratio(analyze(to_joint_space(with_damping(arm, within(exact, structure)))));
     const double found = smallest_ratio(design_damping(arm, target, structure).spectrum);
     EXPECT_GE(found, std::max(least_squares, left_out) - 1e-9) << "system " << i;
     if (found > std::max(least_squares, left_out) + 0.01) ++better;
   }
-  std::printf("larger than both in %d of 12\n", better);
   EXPECT_GE(better, 3);
 }
 
 TEST_P(Structure, IsKeptAndNoSmallChangeNearAStartDoesBetter) {
   const DampingStructure structure = GetParam();
   Random random(7301);
-  int reached = 0;
   for (int i = 0; i < 12; ++i) {
     const TaskImpedance arm = random_arm(random, 7, 6, 10, 30);
     const DampingTarget target = DampingTarget::constant(0.3);
@@ -95,43 +97,20 @@ TEST_P(Structure, IsKeptAndNoSmallChangeNearAStartDoesBetter) {
         design_damping(arm, target, structure, design_damping(arm, target).damping);
     SCOPED_TRACE("system " + std::to_string(i));
     const MatrixXd& C = design.damping;
-    EXPECT_TRUE(has_structure(C, structure));
+    EXPECT_EQ(C, within(C, structure));
     EXPECT_EQ(negative_eigenvalues(C).size(), 0);
-    if (design.misses.empty()) {
-      ++reached;
-      continue;
-    }
+    if (design.misses.empty()) continue;
     const double sum = sum_of_squares(design.spectrum, 0.3);
     for (const DampingMiss& miss : design.misses) {
       EXPECT_EQ(miss.reason, DampingMiss::Reason::kStructure);
       EXPECT_EQ(miss.obtained, design.spectrum.modes[miss.mode].damping_ratio);
     }
     for (int k = 0; k < 40; ++k) {  // S (1 + E)(1 + E)' S, the structure's congruences
-      MatrixXd E = 1e-3 * random.matrix(6, 6);
-      for (Index q = 0; q < 6; ++q) {
-        for (Index p = 0; p < 6; ++p) {
-          MatrixXd one = MatrixXd::Zero(6, 6);
-          one(p, q) = 1;
-          if (!has_structure(one, structure)) E(p, q) = 0;
-        }
-      }
-      const MatrixXd T = MatrixXd::Identity(6, 6) + E;
-      const MatrixXd other = T * C * T.transpose();
-      EXPECT_GE(sum_with(arm, 0.5 * (other + other.transpose()), 0.3), sum * (1 - 2e-3));
+      const MatrixXd T = MatrixXd::Identity(6, 6) + within(1e-3 * random.matrix(6, 6), structure);
+      EXPECT_GE(sum_with(arm, symmetric(T * C * T.transpose()), 0.3), sum * (1 - 2e-3));
     }
   }
-  std::printf("exact in %d of 12\n", reached);
 }
-
-std::string name_of(const ::testing::TestParamInfo<DampingStructure>& info) {
-  return info.param == DampingStructure::kFull    ? "Full"
-         : info.param == DampingStructure::kBlock ? "Block"
-                                                  : "Diagonal";
-}
-
-INSTANTIATE_TEST_SUITE_P(Designs, Structure,
-                         ::testing::Values(DampingStructure::kBlock, DampingStructure::kDiagonal),
-                         name_of);
 
 TEST(DiagonalDesign, FindsTheExactOneWhereThereIsOne) {
   Random random(7302);
@@ -153,6 +132,17 @@ TEST(DiagonalDesign, FindsTheExactOneWhereThereIsOne) {
   }
 }
 
+TEST(DiagonalDesign, WorksInJointSpaceToo) {
+  Random random(7305);
+  TaskImpedance arm;
+  arm.mass = random.spd(5);
+  arm.stiffness = 100 * random.spd(5);
+  const DampingDesign design =
+      design_damping(arm, DampingTarget::constant(0.4), DampingStructure::kDiagonal);
+  EXPECT_EQ(design.damping, within(design.damping, DampingStructure::kDiagonal));
+  EXPECT_GE(smallest_ratio(design.spectrum), 0.3);
+}
+
 TEST(DesignNearAStart, ReachesTheTargetAndStaysThere) {
   Random random(7303);
   for (int i = 0; i < 20; ++i) {
@@ -160,17 +150,16 @@ TEST(DesignNearAStart, ReachesTheTargetAndStaysThere) {
     const DampingTarget target = DampingTarget::constant(0.5);
     const MatrixXd exact = design_damping(arm, target).damping;
     const MatrixXd T = MatrixXd::Identity(6, 6) + 0.05 * random.matrix(6, 6);
-    const MatrixXd start = T * exact * T.transpose();
-    const MatrixXd symmetric = 0.5 * (start + start.transpose());
-    const DampingDesign design = design_damping(arm, target, DampingStructure::kFull, symmetric);
+    const MatrixXd start = symmetric(T * exact * T.transpose());
+    const DampingDesign design = design_damping(arm, target, DampingStructure::kFull, start);
     EXPECT_TRUE(design.misses.empty());
     EXPECT_EQ(negative_eigenvalues(design.damping).size(), 0);
-    const VectorXd unit = symmetric.diagonal().cwiseSqrt().cwiseInverse();
+    const VectorXd unit = start.diagonal().cwiseSqrt().cwiseInverse();
     const auto size = [&unit](const MatrixXd& A) {
       return MatrixXd(unit.asDiagonal() * A * unit.asDiagonal()).norm();
     };
     // No further from the start than the closed form is.
-    EXPECT_LE(size(design.damping - symmetric), size(exact - symmetric));
+    EXPECT_LE(size(design.damping - start), size(exact - start));
     const DampingDesign same = design_damping(arm, target, DampingStructure::kFull, exact);
     EXPECT_TRUE(near(same.damping, exact, 1e-8 * exact.norm()));
   }
@@ -190,17 +179,6 @@ TEST(DesignNearAStart, RefusesOneThatIsNoDamping) {
   } catch (const InvalidSystem& error) {
     EXPECT_STREQ(error.what(), "task_damping: is 5 x 5, expected 6 x 6");
   }
-}
-
-TEST(DiagonalDesign, WorksInJointSpaceToo) {
-  Random random(7305);
-  TaskImpedance arm;
-  arm.mass = random.spd(5);
-  arm.stiffness = 100 * random.spd(5);
-  const DampingDesign design =
-      design_damping(arm, DampingTarget::constant(0.4), DampingStructure::kDiagonal);
-  EXPECT_TRUE(has_structure(design.damping, DampingStructure::kDiagonal));
-  EXPECT_GE(smallest_ratio(design.spectrum), 0.3);
 }
 
 /// Two joints, two directions: small enough to try all diagonal matrices.
@@ -240,9 +218,13 @@ TEST(RegionDesign, RaisesTheWorstRatioAndMapsIt) {
   const std::vector<TaskImpedance> region = path_of_configurations(random, 8);
   RegionOptions options;
   options.target = DampingTarget::constant(0.7);
+  options.threads = 1;
+  const MatrixXd alone = design_region(region, options).damping;
+  options.threads = 3;
   std::vector<double> told;
   options.progress = [&told](double done) { told.push_back(done); };
   const RegionDesign design = design_region(region, options);
+  EXPECT_EQ(design.damping, alone);
   EXPECT_LE(design.violation, 2e-7);
   EXPECT_EQ(negative_eigenvalues(design.damping).size(), 0);
   EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
@@ -269,16 +251,14 @@ TEST(RegionDesign, RaisesTheWorstRatioAndMapsIt) {
     for (; one.violation > 0; one = evaluate_region(region, C, options)) C *= 0.98;
     others = std::max(others, one.level);
   }
-  std::printf("level %.4f; best of the designs for one configuration %.4f\n", design.level, others);
   EXPECT_GT(design.level, others);
 }
 
 TEST(RegionDesign, FindsTheFewOfManyThatBind) {
-  DASHPOT_SKIP_IF_QUICK();
   Random random(7312);
-  std::vector<TaskImpedance> region = path_of_configurations(random, 150);
-  region[101].mass *= 2.5;  // a payload, not among those that the search begins with
-  region[37].mass *= 0.4;
+  std::vector<TaskImpedance> region = path_of_configurations(random, 50);
+  region[41].mass *= 2.5;  // a payload, not among those that the search begins with
+  region[17].mass *= 0.4;
   RegionOptions options;
   options.target = DampingTarget::constant(0.7);
   const RegionDesign design = design_region(region, options);
@@ -287,64 +267,17 @@ TEST(RegionDesign, FindsTheFewOfManyThatBind) {
   EXPECT_EQ(again.level, design.level);
   EXPECT_EQ(again.violation, design.violation);
   // No lower than of the worst alone, which is as high as the level of all can be.
-  std::vector<TaskImpedance> worst = {region[101], region[37]};
-  for (std::size_t i = 0; i < region.size() && worst.size() < 30; ++i) {
-    const RegionSample& sample = design.samples[i];
-    if (sample.damping_ratio < (design.level + 0.05) * 0.7) worst.push_back(region[i]);
+  std::vector<TaskImpedance> worst = {region[41], region[17]};
+  for (std::size_t i = 0; i < region.size(); ++i) {
+    double largest = 0;
+    for (const Mode<>& mode :
+         analyze(to_joint_space(with_damping(region[i], design.damping))).modes) {
+      largest = std::max(largest, mode.damping_ratio);
+    }
+    const bool low = design.samples[i].damping_ratio < (design.level + 0.05) * 0.7;
+    if (low || largest > 1.04) worst.push_back(region[i]);  // of 1.05 at most
   }
-  const double alone = design_region(worst, options).level;
-  std::printf("level %.4f; of %zu alone %.4f\n", design.level, worst.size(), alone);
-  EXPECT_GE(design.level, alone - 5e-3);
-}
-
-TEST(RegionDesign, IsTheSameWhereverConfigurationsAreJudged) {
-  DASHPOT_SKIP_IF_QUICK();
-  Random random(7314);
-  std::vector<TaskImpedance> region = path_of_configurations(random, 70);
-  region[51].mass *= 2.5;
-  RegionOptions options;
-  options.target = DampingTarget::constant(0.7);
-  options.structure = DampingStructure::kDiagonal;
-  const RegionDesign design = design_region(region, options);
-  for (const std::size_t size : {9U, 70U}) {
-    RegionSource source;
-    source.count = region.size();
-    std::size_t fetched = 0;
-    source.configuration = [&](std::size_t i) {
-      ++fetched;
-      return region[i];
-    };
-    source.judge = [&](const RegionQuestion& question) {
-      RegionVerdict verdict;
-      for (std::size_t last = region.size(); last > 0;) {  // the last part first
-        const std::size_t first = last > size ? last - size : 0;
-        const auto at = [&](std::size_t i) {
-          return region.begin() + static_cast<std::ptrdiff_t>(i);
-        };
-        verdict.add(judge_region({at(first), at(last)}, first, question));
-        last = first;
-      }
-      EXPECT_LE(verdict.binding.size(), 8U);
-      return verdict;
-    };
-    const RegionDesign parts = design_region(source, options);
-    EXPECT_EQ(parts.damping, design.damping) << size;
-    EXPECT_EQ(parts.level, design.level);
-    EXPECT_EQ(parts.violation, design.violation);
-    EXPECT_EQ(parts.worst_sample, design.worst_sample);
-    EXPECT_LT(fetched, region.size());
-  }
-}
-
-TEST(RegionDesign, DoesNotDependOnTheNumberOfThreads) {
-  Random random(7308);
-  const std::vector<TaskImpedance> region = path_of_configurations(random, 5);
-  RegionOptions options;
-  options.target = DampingTarget::constant(0.6);
-  options.threads = 1;
-  const MatrixXd alone = design_region(region, options).damping;
-  options.threads = 3;
-  EXPECT_EQ(design_region(region, options).damping, alone);
+  EXPECT_GE(design.level, design_region(worst, options).level - 5e-3);
 }
 
 TEST(RegionDesign, KeepsToBoundsOnTheEntries) {

@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <stdexcept>
 #include <vector>
 
@@ -112,8 +111,6 @@ TEST(RegionForALoop, KeepsTheMarginOfEveryArmAndNoMoreDampingWould) {
     std::vector<double> told;
     options.progress = [&told](double done) { told.push_back(done); };
     const RegionDesign design = design_region(region, options);
-    std::printf("share %.4f, level %.4f, margin %.6f at %d\n", design.share, design.level,
-                design.gain_margin, design.margin_sample);
     EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
     EXPECT_EQ(told.back(), 1);
     ASSERT_TRUE(design.kept);
@@ -130,29 +127,51 @@ TEST(RegionForALoop, KeepsTheMarginOfEveryArmAndNoMoreDampingWould) {
   }
 }
 
-TEST(RegionForALoop, IsTheSameWhereverConfigurationsAreJudged) {
+/// In parts, the last one first, with and without a loop.
+TEST(RegionDesign, IsTheSameWhereverConfigurationsAreJudged) {
   Random random(7321);
-  const std::vector<TaskImpedance> region = path_of_configurations(random, 20);
+  std::vector<TaskImpedance> region = path_of_configurations(random, 45);
+  region[35].mass *= 2.5;
   RegionOptions options = options_for(0.7, loop_of(0.006, 0));
   options.structure = DampingStructure::kDiagonal;
-  const RegionDesign design = design_region(region, options);
-  RegionSource source;
-  source.count = region.size();
-  source.configuration = [&](std::size_t i) { return region[i]; };
-  source.judge = [&](const RegionQuestion& question) {
-    RegionVerdict verdict;
-    for (const std::size_t first : {10U, 0U}) {
-      const auto from = region.begin() + static_cast<std::ptrdiff_t>(first);
-      verdict.add(judge_region({from, from + 10}, first, question, options.loop));
+  for (const bool looped : {true, false}) {
+    SCOPED_TRACE(looped);
+    if (!looped) options.loop = {};
+    const RegionDesign design = design_region(region, options);
+    RegionSource source;
+    source.count = region.size();
+    std::size_t fetched = 0;
+    source.configuration = [&](std::size_t i) {
+      ++fetched;
+      return region[i];
+    };
+    source.judge = [&](const RegionQuestion& question) {
+      RegionVerdict verdict;
+      for (std::size_t last = region.size(); last > 0;) {
+        const std::size_t first = last > 9 ? last - 9 : 0;
+        const auto at = [&](std::size_t i) {
+          return region.begin() + static_cast<std::ptrdiff_t>(i);
+        };
+        verdict.add(judge_region({at(first), at(last)}, first, question, options.loop));
+        last = first;
+      }
+      EXPECT_LE(verdict.binding.size(), 8U);
+      return verdict;
+    };
+    const RegionDesign parts = design_region(source, options);
+    EXPECT_EQ(parts.damping, design.damping);
+    EXPECT_EQ(parts.level, design.level);
+    EXPECT_EQ(parts.violation, design.violation);
+    EXPECT_EQ(parts.worst_sample, design.worst_sample);
+    if (looped) {
+      EXPECT_LT(design.share, 1);
+      EXPECT_EQ(parts.share, design.share);
+      EXPECT_EQ(parts.gain_margin, design.gain_margin);
+      EXPECT_EQ(parts.margin_sample, design.margin_sample);
+    } else {
+      EXPECT_LT(fetched, region.size());
     }
-    return verdict;
-  };
-  const RegionDesign parts = design_region(source, options);
-  EXPECT_LT(design.share, 1);
-  EXPECT_EQ(parts.damping, design.damping);
-  EXPECT_EQ(parts.share, design.share);
-  EXPECT_EQ(parts.gain_margin, design.gain_margin);
-  EXPECT_EQ(parts.margin_sample, design.margin_sample);
+  }
 }
 
 TEST(RegionForALoop, SaysWhereNoShareKeepsTheMargin) {
