@@ -1,18 +1,16 @@
-// Sampled loops whose controllers have states of their own, such as integrals.
+// Sampled loops whose controllers have states of their own, such as integrals; that these are in
+// the characteristic equation is in sampled_loop_test.cpp.
 #include <dashpot/analysis/elastic_form.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_impedance.hpp>
+#include <dashpot/tests/support/sampled_loops.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 
@@ -20,7 +18,6 @@ namespace dashpot::analysis {
 namespace {
 
 using Eigen::Index;
-using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 using testing::one_joint;
 using testing::Random;
@@ -30,60 +27,6 @@ using testing::Random;
 ControllerMemory integral(const MatrixXd& factor, double period, double time) {
   const Index m = factor.rows();
   return {MatrixXd::Identity(m, m), period * factor, factor.transpose() / time};
-}
-
-std::vector<Complex> all_multipliers(const SampledSpectrum& sampled) {
-  std::vector<Complex> all = sampled.others;
-  all.insert(all.end(), sampled.memory.begin(), sampled.memory.end());
-  for (const SampledMode& mode : sampled.modes) {
-    all.insert(all.end(), mode.discrete_eigenvalues.begin(), mode.discrete_eigenvalues.end());
-  }
-  return all;
-}
-
-/// The characteristic equation of SampledLoop.SolvesTheCharacteristicEquation, in which K has
-/// another term  output (z - state)^-1 position.
-TEST(ControllerMemory, IsInTheCharacteristicEquation) {
-  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
-    SCOPED_TRACE(seed);
-    Random random(seed);
-    const Index n = random.integer(1, 5), m = random.integer(1, 6);
-    System<> system(n);
-    system.mass = random.spd(n);
-    system.stiffness = 1000 * random.spd(n);
-    system.damping = random.log_uniform(1, 10) * random.spd(n);
-    SampledLoop loop;
-    loop.period = random.log_uniform(5e-4, 5e-3);
-    loop.delay = random.integer(0, 3);
-    loop.torque_cutoff = random.integer(0, 1) * random.log_uniform(50, 500);
-    loop.difference_velocity = random.integer(0, 1) == 1;
-    loop.memory.state = random.matrix(m, m) / static_cast<double>(m);
-    loop.memory.position = random.matrix(m, n);
-    loop.memory.output = 100 * random.matrix(n, m);
-    const SampledSpectrum sampled = sample_loop(system, analyze(system), loop);
-    const std::vector<Complex> all = all_multipliers(sampled);
-    const Index memory =
-        loop.delay + (loop.torque_cutoff > 0 ? 1 : 0) + (loop.difference_velocity ? 1 : 0);
-    EXPECT_EQ(static_cast<Index>(all.size()), (2 + memory) * n + m);
-    const double T = loop.period;
-    const double a = std::exp(-2 * std::numbers::pi * loop.torque_cutoff * T);
-    double largest = 0;
-    for (const Complex z : all) {
-      largest = std::max(largest, modulus(z));
-      if (modulus(z) < 0.1) continue;  // of high multiplicity
-      const Complex filter = loop.torque_cutoff > 0 ? (1 - a) * z / (z - a) : 1;
-      const Complex damping = T * (loop.difference_velocity ? (z * z - 1.0) / (2.0 * z) : z - 1.0);
-      const MatrixXcd step = z * MatrixXd::Identity(m, m) - loop.memory.state;
-      const MatrixXcd stored =
-          loop.memory.output * step.partialPivLu().solve(MatrixXcd(loop.memory.position));
-      const MatrixXcd P = (z - 1.0) * (z - 1.0) * std::pow(z, loop.delay) / filter * system.mass +
-                          T * T * (z + 1.0) / 2.0 * (system.stiffness + stored) +
-                          damping * system.damping;
-      const auto values = Eigen::JacobiSVD<MatrixXcd>(P).singularValues();
-      EXPECT_LT(values[n - 1], 1e-9 * system.mass.norm() + 1e-7 * values[0]) << z;
-    }
-    EXPECT_NEAR(sampled.spectral_radius, largest, 1e-13);
-  }
 }
 
 /// Beside quick springs the torque of their integral decays as 1 - T / time per tick, also where
@@ -112,7 +55,7 @@ TEST(ControllerMemory, OfAnIntegralMakesSlowModes) {
     EXPECT_TRUE(sampled.zero_modes.empty() && sampled.others.empty());
     EXPECT_TRUE(sampled.stable());
     loop.memory.position += 1e-3 * random.matrix(6, 7) * loop.memory.position.norm();
-    EXPECT_EQ(all_multipliers(sample_loop(system, spectrum, loop)).size(), 20u);
+    EXPECT_EQ(testing::all_multipliers(sample_loop(system, spectrum, loop)).size(), 20u);
   }
 }
 

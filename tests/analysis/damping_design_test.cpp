@@ -9,7 +9,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <cstdio>
 
 namespace dashpot::analysis {
 namespace {
@@ -48,103 +47,50 @@ MatrixXd task_inertia(const TaskImpedance& arm) {
   return (*arm.jacobian * arm.mass.llt().solve(arm.jacobian->transpose())).inverse();
 }
 
-// The analysis is the judge: its ratios carry proved bounds.
+// The analysis is the judge: its ratios carry proved bounds. Half of the targets change with
+// frequency.
 TEST(DampingDesign, GivesEveryModeOfRandomArmsItsRatio) {
-  constexpr int kSystems = 10000;
+  constexpr int kSystems = 2000;
   Random random(7001);
-  int redundant = 0, ill_conditioned = 0;
-  double worst = 0;
+  int redundant = 0;
   for (int i = 0; i < kSystems; ++i) {
     const int n = random.integer(1, 10), m = random.integer(1, std::min(n, 6));
     const bool hard = random.integer(0, 1) == 1;
     const TaskImpedance arm = random_arm(random, n, m, hard ? 1e8 : random.log_uniform(1, 1e8),
                                          hard ? 1e8 : random.log_uniform(1, 1e8));
     DampingTarget target = DampingTarget::constant(random.log_uniform(0.01, 2));
+    if (i % 2 == 1) target.high_ratio = random.log_uniform(0.01, 2);
+    target.corner = 30;
     target.soft_frequency = 1e-9;
     const DampingDesign design = design_damping(arm, target);
     redundant += n > m ? 1 : 0;
-    ill_conditioned += hard ? 1 : 0;
     SCOPED_TRACE("system " + std::to_string(i) + ", n = " + std::to_string(n) +
                  ", m = " + std::to_string(m));
     ASSERT_EQ(design.spectrum.modes.size(), m);
     ASSERT_TRUE(design.misses.empty()) << design.misses[0].obtained - design.misses[0].wanted;
-    const double error = worst_error(design.spectrum, target);
-    ASSERT_LE(error, 1e-9);
-    worst = std::max(worst, error);
+    ASSERT_LE(worst_error(design.spectrum, target), 1e-9);
     ASSERT_EQ(design.damping, design.damping.transpose());
     ASSERT_EQ(negative_eigenvalues(design.damping).size(), 0);
   }
-  std::printf(
-      "%d systems, %d redundant, %d with mass and stiffness conditioned 1e8: worst ratio off by "
-      "%.2g\n",
-      kSystems, redundant, ill_conditioned, worst);
   EXPECT_GT(redundant, kSystems / 4);
-  EXPECT_GT(ill_conditioned, kSystems / 4);
 }
 
+/// Of inertia and stiffness, in task space and in joint space; so it goes along with a change of
+/// task coordinates.
 TEST(DampingDesign, IsTheGeometricMeanOfInertiaAndStiffness) {
   Random random(7002);
+  const DampingTarget target = DampingTarget::constant(0.7);
   for (int i = 0; i < 20; ++i) {
     const TaskImpedance arm = random_arm(random, 7, 6);
     const MatrixXd Lambda = task_inertia(arm), K = *arm.task_stiffness;
-    const MatrixXd C = design_damping(arm, DampingTarget::constant(0.7)).damping;
-    EXPECT_TRUE(near(C, 1.4 * geometric_mean(Lambda, K), 1e-10 * C.norm()));
-    EXPECT_TRUE(near(C, 1.4 * geometric_mean(K, Lambda), 1e-10 * C.norm()));
-    // C Lambda^-1 C = 4 zeta^2 K, the equation that defines the mean
-    const MatrixXd square = C * Lambda.llt().solve(C);
-    EXPECT_TRUE(near(square, 1.96 * K, 1e-10 * K.norm()));
-  }
-}
-
-TEST(DampingDesign, GoesAlongWithAChangeOfTaskCoordinates) {
-  Random random(7003);
-  for (int i = 0; i < 20; ++i) {
-    const TaskImpedance arm = random_arm(random, 7, 6);
-    const MatrixXd T = random.matrix(6, 6) + 3 * MatrixXd::Identity(6, 6);
-    TaskImpedance changed = arm;
-    changed.jacobian = T * *arm.jacobian;
-    const MatrixXd inverse = T.inverse();
-    const MatrixXd K = inverse.transpose() * *arm.task_stiffness * inverse;
-    changed.task_stiffness = 0.5 * (K + K.transpose());
-    const DampingTarget target = DampingTarget::constant(0.4);
     const MatrixXd C = design_damping(arm, target).damping;
-    const MatrixXd expected = inverse.transpose() * C * inverse;
-    EXPECT_TRUE(near(design_damping(changed, target).damping, expected, 1e-10 * expected.norm()));
-  }
-}
-
-TEST(DampingDesign, OfCommutingMatricesIsTwiceZetaRootOfMassTimesStiffness) {
-  TaskImpedance arm;
-  arm.mass = VectorXd{{2, 5, 0.1}}.asDiagonal();
-  arm.jacobian = MatrixXd::Identity(3, 3);
-  arm.task_stiffness = VectorXd{{200, 45, 1000}}.asDiagonal();
-  const MatrixXd C = design_damping(arm, DampingTarget::constant(0.5)).damping;
-  EXPECT_TRUE(near(C, MatrixXd(VectorXd{{20, 15, 10}}.asDiagonal()), 1e-14));
-}
-
-TEST(DampingDesign, FollowsATargetThatChangesWithFrequency) {
-  Random random(7004);
-  DampingTarget target;
-  target.low_ratio = 1;
-  target.high_ratio = 0.3;
-  target.corner = 30;
-  for (int i = 0; i < 50; ++i) {
-    const DampingDesign design = design_damping(random_arm(random, 7, 6), target);
+    EXPECT_TRUE(near(C, 1.4 * geometric_mean(Lambda, K), 1e-10 * C.norm()));
+    TaskImpedance joints;
+    joints.mass = random.spd(6);
+    joints.stiffness = graded(random, 6, 500, 100);
+    const DampingDesign design = design_damping(joints, target);
     EXPECT_TRUE(design.misses.empty());
-    EXPECT_LE(worst_error(design.spectrum, target), 1e-9);
-  }
-}
-
-TEST(DampingDesign, InJointSpaceFollowsTheJointStiffness) {
-  Random random(7005);
-  for (int i = 0; i < 50; ++i) {
-    TaskImpedance arm;
-    arm.mass = random.spd(6);
-    arm.stiffness = graded(random, 6, 500, 100);
-    const DampingDesign design = design_damping(arm, DampingTarget::constant(0.6));
-    EXPECT_TRUE(design.misses.empty());
-    EXPECT_EQ(design.damping.rows(), 6);
-    const MatrixXd expected = 1.2 * geometric_mean(arm.mass, *arm.stiffness);
+    const MatrixXd expected = 1.4 * geometric_mean(joints.mass, *joints.stiffness);
     EXPECT_TRUE(near(design.damping, expected, 1e-10 * expected.norm()));
   }
 }
@@ -186,7 +132,6 @@ TEST(DampingDesign, CountsFrictionThatIsThereAlready) {
       }
     }
   }
-  std::printf("reached %d, overdone by friction %d\n", reached, overdone);
   EXPECT_GT(reached, 40);
   EXPECT_GT(overdone, 40);
 }
@@ -279,16 +224,6 @@ TEST(DampingDesign, RefusesWhatIsNoProblemOfDamping) {
   EXPECT_THROW(design_damping(arm, target), InvalidSystem);
 }
 
-// The Discussion of the paper proposes a damping matrix that feeds energy in.
-TEST(PaperDiscussion, ProposesAnIndefiniteDamping) {
-  MatrixXd C_C1 = MatrixXd::Zero(6, 6);
-  C_C1.diagonal() << 0.1, 0.1, 0.1, 10, 10, 1;
-  C_C1(2, 4) = C_C1(4, 2) = 10;
-  const VectorXd negative = negative_eigenvalues(C_C1);
-  ASSERT_EQ(negative.size(), 1);
-  EXPECT_NEAR(negative[0], 5.05 - std::sqrt(4.95 * 4.95 + 100), 1e-12);  // -6.1
-}
-
 // zeta (Lambda^1/2 K^1/2 + K^1/2 Lambda^1/2), which some controllers use, is no damping matrix
 // where the two are ill-conditioned; the geometric mean always is.
 TEST(FactorisationDesign, IsIndefiniteWhereThisOneIsNot) {
@@ -306,7 +241,6 @@ TEST(FactorisationDesign, IsIndefiniteWhereThisOneIsNot) {
     EXPECT_GT(smallest_eigenvalue(design.damping), 0);
     EXPECT_TRUE(design.misses.empty());
   }
-  std::printf("the factorisation design is indefinite in %d of 200 cases\n", indefinite);
   EXPECT_GT(indefinite, 50);
 }
 

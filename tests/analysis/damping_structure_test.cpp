@@ -256,8 +256,8 @@ TEST(RegionDesign, RaisesTheWorstRatioAndMapsIt) {
 
 TEST(RegionDesign, FindsTheFewOfManyThatBind) {
   Random random(7312);
-  std::vector<TaskImpedance> region = path_of_configurations(random, 50);
-  region[41].mass *= 2.5;  // a payload, not among those that the search begins with
+  std::vector<TaskImpedance> region = path_of_configurations(random, 40);
+  region[33].mass *= 2.5;  // a payload, not among those that the search begins with
   region[17].mass *= 0.4;
   RegionOptions options;
   options.target = DampingTarget::constant(0.7);
@@ -267,17 +267,14 @@ TEST(RegionDesign, FindsTheFewOfManyThatBind) {
   EXPECT_EQ(again.level, design.level);
   EXPECT_EQ(again.violation, design.violation);
   // No lower than of the worst alone, which is as high as the level of all can be.
-  std::vector<TaskImpedance> worst = {region[41], region[17]};
+  std::vector<TaskImpedance> worst = {region[33], region[17]};
   for (std::size_t i = 0; i < region.size(); ++i) {
-    double largest = 0;
-    for (const Mode<>& mode :
-         analyze(to_joint_space(with_damping(region[i], design.damping))).modes) {
-      largest = std::max(largest, mode.damping_ratio);
-    }
-    const bool low = design.samples[i].damping_ratio < (design.level + 0.05) * 0.7;
-    if (low || largest > 1.04) worst.push_back(region[i]);  // of 1.05 at most
+    const RegionSample& sample = design.samples[i];
+    const bool low = sample.damping_ratio < (design.level + 0.05) * 0.7;
+    if (low || sample.largest_ratio > 1) worst.push_back(region[i]);  // of 1.05 at most
   }
-  EXPECT_GE(design.level, design_region(worst, options).level - 5e-3);
+  EXPECT_LT(worst.size(), region.size());
+  EXPECT_GE(design.level, design_region(worst, options).level - 1e-2);
 }
 
 TEST(RegionDesign, KeepsToBoundsOnTheEntries) {

@@ -10,7 +10,6 @@
 
 #include <Eigen/Eigenvalues>
 
-#include <cstdio>
 #include <limits>
 
 namespace dashpot::analysis {
@@ -47,9 +46,8 @@ void expect_semidefinite(const MatrixXd& C) {
 
 TEST(RatioDampingOfJoints, MatchesTheDesignOfSetUpTime) {
   Random random(7301);
-  double worst = 0;
   int overdone = 0, beside = 0;
-  for (int i = 0; i < 600; ++i) {
+  for (int i = 0; i < 300; ++i) {
     const int n = random.integer(1, kMaxDof);
     TaskImpedance arm = random_joints(random, n);
     if (i % 3 > 0) arm.damping = testing::random_friction(random, n, random.log_uniform(0.1, 300));
@@ -61,16 +59,13 @@ TEST(RatioDampingOfJoints, MatchesTheDesignOfSetUpTime) {
     EXPECT_EQ(C, Matrix(C.transpose()));
     EXPECT_EQ(damper.overdone(), design.indefinite_by < 0);
     if (arm.damping) ++(damper.overdone() ? overdone : beside);
-    const double error = (MatrixXd(C) - design.damping).norm() / (1e-3 + design.damping.norm());
     expect_semidefinite(C);
     if (damper.overdone()) continue;
-    worst = std::max(worst, error);
-    ASSERT_LE(error, 1e-9) << "system " << i << ", n = " << n;
+    ASSERT_LE((MatrixXd(C) - design.damping).norm(), 1e-9 * (1e-3 + design.damping.norm()))
+        << "system " << i << ", n = " << n;
   }
-  std::printf("largest relative difference %.2g; friction overdid it %d times, not %d\n", worst,
-              overdone, beside);
-  EXPECT_GT(overdone, 50);
-  EXPECT_GT(beside, 50);
+  EXPECT_GT(overdone, 25);
+  EXPECT_GT(beside, 25);
 }
 
 TEST(RatioDampingOfJoints, StartedFromTheLastConfigurationMatchesAColdStart) {
@@ -142,9 +137,8 @@ TEST(RatioDampingOfJoints, NeverAllocates) {
 // As many joints as directions: nothing couples, and both are exact unless friction is too much.
 TEST(RatioDampingBesideFriction, MatchesTheDesignOfSetUpTime) {
   Random random(7305);
-  double worst = 0;
   int overdone = 0;
-  for (int i = 0; i < 600; ++i) {
+  for (int i = 0; i < 300; ++i) {
     const int n = random.integer(1, 6);
     TaskImpedance arm = testing::random_arm(random, n, n);
     arm.damping = testing::random_friction(random, n, random.log_uniform(0.01, 100));
@@ -160,16 +154,14 @@ TEST(RatioDampingBesideFriction, MatchesTheDesignOfSetUpTime) {
     EXPECT_EQ(C_C, TaskMatrix(C_C.transpose()));
     EXPECT_EQ(damper.overdone(), design.indefinite_by < 0);
     overdone += damper.overdone() ? 1 : 0;
-    const double error =
-        (MatrixXd(C_C) - padded(design.damping)).norm() / (1e-3 + design.damping.norm());
     expect_semidefinite(C_C);
     if (damper.overdone()) continue;
-    worst = std::max(worst, error);
-    ASSERT_LE(error, 1e-9) << "system " << i << ", n = " << n;
+    ASSERT_LE((MatrixXd(C_C) - padded(design.damping)).norm(),
+              1e-9 * (1e-3 + design.damping.norm()))
+        << "system " << i << ", n = " << n;
   }
-  std::printf("largest relative difference %.2g; friction overdid it %d times\n", worst, overdone);
-  EXPECT_GT(overdone, 100);
-  EXPECT_LT(overdone, 500);
+  EXPECT_GT(overdone, 50);
+  EXPECT_LT(overdone, 250);
 }
 
 }  // namespace

@@ -42,12 +42,12 @@ DampingTarget falling_target() {
   return target;
 }
 
+/// Matches the design of set-up time, and gives the modes their ratios.
 TEST(RatioDamping, MatchesTheDesignOfSetUpTime) {
   Random random(7101);
-  double worst = 0;
-  for (int i = 0; i < 2000; ++i) {
+  for (int i = 0; i < 1000; ++i) {
     const int n = random.integer(1, kMaxDof), m = random.integer(1, 6);
-    const TaskImpedance arm =
+    TaskImpedance arm =
         random_arm(random, n, m, random.log_uniform(1, 1e4), random.log_uniform(1, 1e4));
     const DampingTarget target =
         i % 2 == 0 ? DampingTarget::constant(random.log_uniform(0.01, 2)) : falling_target();
@@ -57,33 +57,16 @@ TEST(RatioDamping, MatchesTheDesignOfSetUpTime) {
     ASSERT_EQ(update(damper, arm, C_C), Status::kOk);
     EXPECT_EQ(C_C, TaskMatrix(C_C.transpose()));
     const MatrixXd expected = padded(design_damping(arm, target).damping);
-    const double error = (C_C - expected).norm() / expected.norm();
-    worst = std::max(worst, error);
-    ASSERT_LE(error, 1e-10) << "system " << i << ", n = " << n << ", m = " << m;
-  }
-  std::printf("largest relative difference %.2g\n", worst);
-}
-
-TEST(RatioDamping, GivesTheModesTheirRatios) {
-  Random random(7102);
-  double worst = 0;
-  for (int i = 0; i < 500; ++i) {
-    const int n = random.integer(1, 9), m = random.integer(1, std::min(n, 6));
-    TaskImpedance arm =
-        random_arm(random, n, m, random.log_uniform(1, 1e4), random.log_uniform(1, 1e4));
-    RatioDamping damper(DampingTarget::constant(0.7));
-    ASSERT_EQ(damper.set_stiffness(padded(*arm.task_stiffness)), Status::kOk);
-    TaskMatrix C_C;
-    ASSERT_EQ(update(damper, arm, C_C), Status::kOk);
+    ASSERT_LE((C_C - expected).norm(), 1e-10 * expected.norm())
+        << "system " << i << ", n = " << n << ", m = " << m;
+    if (i % 2 == 1 || n > 9 || m > n) continue;
     arm.task_damping = C_C.topLeftCorner(m, m);
     const Spectrum<> spectrum = analyze(to_joint_space(arm));
     ASSERT_EQ(spectrum.modes.size(), m);
     for (const Mode<>& mode : spectrum.modes) {
-      worst = std::max(worst, std::abs(mode.damping_ratio - 0.7));
+      EXPECT_NEAR(mode.damping_ratio, target.ratio(mode.natural_frequency), 1e-9);
     }
-    EXPECT_LE(worst, 1e-9);
   }
-  std::printf("worst ratio off by %.2g\n", worst);
 }
 
 /// An arm that moves along a smooth path; at phase 0 the smallest singular value of J is zero.
@@ -97,6 +80,7 @@ TaskImpedance on_path(const TaskImpedance& arm, const MatrixXd& J_swing, double 
   return moved;
 }
 
+/// After any number of ticks: it does not drift.
 TEST(RatioDamping, StartedFromTheLastConfigurationMatchesAColdStart) {
   Random random(7103);
   const TaskImpedance arm = random_arm(random, 7, 6);
@@ -104,17 +88,15 @@ TEST(RatioDamping, StartedFromTheLastConfigurationMatchesAColdStart) {
   RatioDamping warm(DampingTarget::constant(0.7));
   ASSERT_EQ(warm.set_stiffness(*arm.task_stiffness), Status::kOk);
   TaskMatrix C_warm, C_cold;
-  double worst = 0;
   for (int tick = 0; tick < 5000; ++tick) {
     const TaskImpedance moved = on_path(arm, swing, 0.3 + 1e-3 * tick);
+    ASSERT_EQ(update(warm, moved, C_warm), Status::kOk);
+    if (tick % 3 != 0 && tick < 4900) continue;
     RatioDamping cold(DampingTarget::constant(0.7));
     ASSERT_EQ(cold.set_stiffness(*arm.task_stiffness), Status::kOk);
-    ASSERT_EQ(update(warm, moved, C_warm), Status::kOk);
     ASSERT_EQ(update(cold, moved, C_cold), Status::kOk);
-    worst = std::max(worst, (C_warm - C_cold).norm() / C_cold.norm());
+    ASSERT_LE((C_warm - C_cold).norm(), 1e-10 * C_cold.norm()) << tick;
   }
-  std::printf("largest relative difference %.2g\n", worst);
-  EXPECT_LE(worst, 1e-10);
 }
 
 // The bound of the header, and no jumps: halving the step halves the largest change.
@@ -170,28 +152,9 @@ TEST(RatioDamping, IsSmoothThroughACrossing) {
   EXPECT_LT(change, 1e-5 * C_C.norm());
 }
 
-TEST(RatioDamping, DoesNotDriftOverManyTicks) {
-  Random random(7105);
-  const TaskImpedance arm = random_arm(random, 7, 6);
-  const TaskJacobian<kMaxDof> J = *arm.jacobian;
-  const TaskJacobian<kMaxDof> swing = 0.2 * random.matrix(6, 7);
-  const Square<kMaxDof> M = arm.mass;
-  RatioDamping damper(DampingTarget::constant(0.7));
-  ASSERT_EQ(damper.set_stiffness(*arm.task_stiffness), Status::kOk);
-  TaskMatrix first, C_C;
-  ASSERT_EQ(damper.update(M, J, first), Status::kOk);
-  TaskJacobian<kMaxDof> moved = J;
-  for (int tick = 0; tick < 100000; ++tick) {
-    moved = J + std::sin(0.1 * tick) * swing;
-    damper.update(M, moved, C_C);
-  }
-  ASSERT_EQ(damper.update(M, J, C_C), Status::kOk);
-  EXPECT_TRUE(near(C_C, first, 1e-11 * first.norm()));
-}
-
 TEST(RatioDamping, ConvergesOnAnythingFinite) {
   Random random(7106);
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < 5000; ++i) {
     const int n = random.integer(1, kMaxDof);
     TaskImpedance arm = random_arm(random, n, 6, random.log_uniform(1, 1e15), 1e12);
     MatrixXd& J = *arm.jacobian;
@@ -218,17 +181,17 @@ TEST(RatioDamping, SaysWhatIsWrongAndKeepsTheDampingBefore) {
   TaskMatrix C_C, before;
   ASSERT_EQ(update(damper, arm, C_C), Status::kOk);
   before = C_C;
-  TaskImpedance bad = arm;
-  bad.mass(4, 4) = -1;
-  EXPECT_EQ(update(damper, bad, C_C), Status::kMassNotPositiveDefinite);
-  bad = arm;
-  (*bad.jacobian)(0, 1) = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(update(damper, bad, C_C), Status::kNotFinite);
-  (*bad.jacobian)(0, 1) = std::numeric_limits<double>::infinity();
-  EXPECT_EQ(update(damper, bad, C_C), Status::kNotFinite);
-  bad = arm;
-  bad.mass = random.spd(4);
-  EXPECT_EQ(update(damper, bad, C_C), Status::kWrongSize);
+  const auto of = [&](const auto& change) {
+    TaskImpedance bad = arm;
+    change(bad);
+    return update(damper, bad, C_C);
+  };
+  EXPECT_EQ(of([](auto& bad) { bad.mass(4, 4) = -1; }), Status::kMassNotPositiveDefinite);
+  for (const double entry :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+    EXPECT_EQ(of([entry](auto& bad) { (*bad.jacobian)(0, 1) = entry; }), Status::kNotFinite);
+  }
+  EXPECT_EQ(of([&](auto& bad) { bad.mass = random.spd(4); }), Status::kWrongSize);
   TaskMatrix K = *arm.task_stiffness;
   K(3, 3) = -1;
   EXPECT_EQ(damper.set_stiffness(K), Status::kStiffnessIndefinite);

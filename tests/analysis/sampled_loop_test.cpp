@@ -20,17 +20,10 @@ namespace {
 
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
+using testing::all_multipliers;
+using testing::memory_of;
 using testing::one_joint;
 using testing::Random;
-
-std::vector<Complex> all_multipliers(const SampledSpectrum& sampled) {
-  std::vector<Complex> all = sampled.others;
-  all.insert(all.end(), sampled.zero_modes.begin(), sampled.zero_modes.end());
-  for (const SampledMode& mode : sampled.modes) {
-    all.insert(all.end(), mode.discrete_eigenvalues.begin(), mode.discrete_eigenvalues.end());
-  }
-  return all;
-}
 
 /// 1 / (transfer from the command to the torque, in z)
 Complex per_actuation(const SampledLoop& loop, Complex z) {
@@ -39,33 +32,46 @@ Complex per_actuation(const SampledLoop& loop, Complex z) {
   return std::pow(z, loop.delay) / filter;
 }
 
-// --------------------------------------------------------------------- characteristic equations
-
 /// A mass under held torque moves by q += T q' + T^2/2 M^-1 f, q' += T M^-1 f, so that
 ///     det( (z - 1)^2 / actuation(z) M + T^2 (z + 1)/2 K + T (z - 1) C ) = 0,
 /// with (z^2 - 1) / (2 z) for z - 1 in the last term if velocities are differenced.
+/// A memory of the controller adds  output (z - state)^-1 position  to K.
 TEST(SampledLoop, SolvesTheCharacteristicEquation) {
-  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 80; ++seed) {
+    SCOPED_TRACE(seed);
     Random random(seed);
-    const Eigen::Index n = random.integer(1, 6);
+    const Eigen::Index n = random.integer(1, 6), m = seed % 2 == 0 ? 0 : random.integer(1, 6);
     const System<> system = testing::random_system(random, n);
-    const SampledLoop loop = testing::random_loop(random);
+    SampledLoop loop = testing::random_loop(random);
+    if (m > 0) {
+      loop.period = std::max(loop.period, 5e-4);
+      loop.memory.state = random.matrix(m, m) / static_cast<double>(m);
+      loop.memory.position = random.matrix(m, n);
+      loop.memory.output = 100 * random.matrix(n, m);
+    }
     const SampledSpectrum sampled = testing::sample(system, loop);
     const std::vector<Complex> all = all_multipliers(sampled);
-    const Eigen::Index memory =
-        loop.delay + (loop.torque_cutoff > 0 ? 1 : 0) + (loop.difference_velocity ? 1 : 0);
-    EXPECT_EQ(static_cast<Eigen::Index>(all.size()), (2 + memory) * n);
+    EXPECT_EQ(static_cast<Eigen::Index>(all.size()), (2 + memory_of(loop)) * n + m);
     double largest = 0;
     for (const Complex z : all) {
       largest = std::max(largest, modulus(z));
       if (modulus(z) < 0.1) continue;  // of high multiplicity
       const double T = loop.period;
       const Complex damping = T * (loop.difference_velocity ? (z * z - 1.0) / (2.0 * z) : z - 1.0);
+      MatrixXcd stiffness = system.stiffness.cast<Complex>();
+      double slope = 0;  // of the memory's part, which is steep next to its own eigenvalues
+      if (m > 0) {
+        const MatrixXcd step = z * MatrixXd::Identity(m, m) - loop.memory.state;
+        const MatrixXcd inverse = step.partialPivLu().inverse();
+        slope = T * T * inverse.norm() * loop.memory.output.norm() * inverse.norm() *
+                loop.memory.position.norm();
+        stiffness += loop.memory.output * inverse * loop.memory.position;
+      }
       const MatrixXcd P = (z - 1.0) * (z - 1.0) * per_actuation(loop, z) * system.mass +
-                          T * T * (z + 1.0) / 2.0 * system.stiffness + damping * system.damping;
+                          T * T * (z + 1.0) / 2.0 * stiffness + damping * system.damping;
       const auto values = Eigen::JacobiSVD<MatrixXcd>(P).singularValues();
       // P is linear in z with slope about |z - 1|; z is good to the root of the precision at worst
-      EXPECT_LT(values[n - 1], 1e-9 * system.mass.norm() + 1e-7 * values[0]) << z;
+      EXPECT_LT(values[n - 1], 1e-9 * (system.mass.norm() + slope) + 1e-7 * values[0]) << z;
     }
     EXPECT_NEAR(sampled.spectral_radius, largest, 1e-13);
     EXPECT_EQ(sampled.stable(), largest < 1);
@@ -103,8 +109,6 @@ TEST(SampledLoop, KnowsFrictionAndGravity) {
     }
   }
 }
-
-// ------------------------------------------------------------------------------- to first order
 
 /// The hold acts like half a tick of delay: zeta falls by (1 - 2 zeta^2) omega t / 2 and omega
 /// grows by the factor 1 + zeta omega t.
@@ -144,8 +148,6 @@ TEST(SampledLoop, DelaysDifferencedVelocitiesByHalfATickMore) {
               1e-3);
 }
 
-// --------------------------------------------------------------------------------------- matching
-
 TEST(SampledLoop, PutsModesInThePlacesOfTheContinuousOnes) {
   int compared = 0;
   for (std::uint64_t seed = 100; seed < 160; ++seed) {
@@ -170,16 +172,6 @@ TEST(SampledLoop, PutsModesInThePlacesOfTheContinuousOnes) {
   EXPECT_GT(compared, 300);
 }
 
-TEST(SampledLoop, FollowsAnOverdampedMode) {
-  SampledLoop loop;
-  loop.period = 1e-4;
-  const SampledMode mode = testing::sample(one_joint(1, 200, 1000), loop).modes.at(0);
-  EXPECT_EQ(mode.kind, ModeKind::kOverdamped);
-  EXPECT_EQ(mode.damped_frequency, 0);
-  EXPECT_NEAR(mode.eigenvalues[0].real(), -5.13, 0.01);
-  EXPECT_NEAR(mode.eigenvalues[1].real(), -196.9, 0.1);  // -194.9, faster by its square times T/2
-}
-
 /// More damping than the hold bears: the matrix from tick to tick has two rows, and a negative z.
 TEST(SampledLoop, SaysWhatAlternates) {
   SampledLoop loop;
@@ -200,6 +192,12 @@ TEST(SampledLoop, SaysWhatAlternates) {
   }
   const SampledMode calm = testing::sample(one_joint(1, 900, K), loop).modes.at(0);
   EXPECT_EQ(calm.kind, ModeKind::kOverdamped);
+  loop.period = 1e-4;
+  const SampledMode slow = testing::sample(one_joint(1, 200, 1000), loop).modes.at(0);
+  EXPECT_EQ(slow.kind, ModeKind::kOverdamped);
+  EXPECT_EQ(slow.damped_frequency, 0);
+  EXPECT_NEAR(slow.eigenvalues[0].real(), -5.13, 0.01);
+  EXPECT_NEAR(slow.eigenvalues[1].real(), -196.9, 0.1);  // -194.9, faster by its square times T/2
 }
 
 /// Of two negative z the larger is the mode's.
@@ -233,8 +231,6 @@ TEST(SampledLoop, IsTheSameInFixedStorage) {
   }
 }
 
-// ------------------------------------------------------------------------------------- zero modes
-
 /// A free self-motion has z = 1, twice if nothing damps it: neither counts.
 TEST(SampledLoop, LeavesOutTheOnesOfZeroModes) {
   for (std::uint64_t seed = 200; seed < 220; ++seed) {
@@ -243,8 +239,7 @@ TEST(SampledLoop, LeavesOutTheOnesOfZeroModes) {
     SampledLoop loop = testing::random_loop(random);
     loop.period = 1e-4;
     const SampledSpectrum free = testing::sample(system, loop);
-    const Eigen::Index memory =
-        loop.delay + (loop.torque_cutoff > 0 ? 1 : 0) + (loop.difference_velocity ? 1 : 0);
+    const Eigen::Index memory = memory_of(loop);
     EXPECT_TRUE(free.zero_modes.empty());
     // The self-motion's own memory is deadbeat or the filter's: 7 * memory in all.
     EXPECT_EQ(static_cast<Eigen::Index>(free.others.size()), 7 * memory);

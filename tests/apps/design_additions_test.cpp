@@ -15,28 +15,13 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 
 const std::string kQ = "0,-0.785,0,-2.356,0,1.571,0.785";
-const std::vector<std::string> kPanda = {"design",
-                                         "--urdf",
-                                         testing::arm_path("panda"),
-                                         "--base",
-                                         "panda_link0",
-                                         "--tip",
-                                         "panda_hand_tcp",
-                                         "--q",
-                                         kQ,
-                                         "--task-stiffness",
-                                         "2000,600,2000,100,100,100",
-                                         "--damping-ratio",
-                                         "0.7"};
-
-Json panda(std::vector<std::string> options) {
-  options.insert(options.begin(), kPanda.begin(), kPanda.end());
-  options.emplace_back("--json");
-  return parse(run_program(options));
+Json panda(const Words& options) {
+  return parse(run_program(
+      of_panda("design", joined({"--q", kQ, "--task-stiffness", "2000,600,2000,100,100,100",
+                                 "--damping-ratio", "0.7", "--json"},
+                                options))));
 }
 
 MatrixXd matrix(const Json& rows) {
@@ -138,28 +123,9 @@ TEST(DesignBesideWhatIsThere, ReadsTheSameFromAFile) {
   for (const std::string wrong :
        {"payload: -1\n", "payload: [1]\n", "reflected_inertia: [1]\n", "null_damping: [1, 2]\n",
         "reflected_inertia: [0, 0, 0, -3, 0, 0]\n"}) {
-    const Outcome outcome = run_program({"design", "-", "--damping-ratio", "0.5"}, kSix + wrong);
-    EXPECT_EQ(outcome.status, 2) << wrong;
-    EXPECT_THAT(outcome.out, IsEmpty());
-    EXPECT_EQ(count_lines(outcome.err), 1);
-    EXPECT_THAT(outcome.err, HasSubstr(wrong.substr(0, wrong.find(':'))));
+    expect_refusal(run_program({"design", "-", "--damping-ratio", "0.5"}, kSix + wrong),
+                   wrong.substr(0, wrong.find(':')));
   }
-}
-
-TEST(DesignBesideWhatIsThere, RefusesOptionsThatDoNotFit) {
-  const auto refused = [](std::vector<std::string> options, const std::string& reason) {
-    options.insert(options.begin(), kPanda.begin(), kPanda.end());
-    const Outcome outcome = run_program(options);
-    EXPECT_EQ(outcome.status, 2);
-    EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
-    EXPECT_THAT(outcome.err, HasSubstr(reason));
-  };
-  refused({"--viscous-friction", "1,2"}, "--viscous-friction: 2 numbers, expected 1 or 7");
-  refused({"--reflected-inertia", "-1"}, "--reflected-inertia: a number is negative");
-  refused({"--payload", "1,2"}, "--payload: 2 numbers, expected 1 or 4");
-  refused({"--payload", "-1"}, "--payload: the mass is negative");
-  const Outcome idle = run_program({"design", "x.yaml", "--damping-ratio", "1", "--payload", "1"});
-  EXPECT_THAT(idle.err, HasSubstr("--urdf: missing"));
 }
 
 // The trends by what a user can change, against the program itself with that changed.

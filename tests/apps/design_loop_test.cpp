@@ -196,24 +196,5 @@ TEST(DesignForALoop, ProposesNothingForARegionThatBearsNone) {
   EXPECT_THAT(outcome.err, HasSubstr("configuration [1]"));
 }
 
-TEST(DesignForALoop, RefusesOptionsThatMakeNoLoop) {
-  const auto refused = [](std::vector<std::string> options, const std::string& reason) {
-    options.insert(options.end(), {"--damping-ratio", "1"});
-    const Outcome outcome = design(kMass, options);
-    EXPECT_EQ(outcome.status, 2);
-    EXPECT_THAT(outcome.out, IsEmpty());
-    EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
-    EXPECT_THAT(outcome.err, HasSubstr(reason));
-  };
-  refused({"--delay", "1"}, "--period: missing");
-  refused({"--margin", "3"}, "--period: missing");
-  refused({"--integral-time", "1"}, "--period: missing");
-  refused({"--period", "0.001", "--integral-time", "-1 s"}, "a time in s is wanted");
-  refused({"--period", "0"}, "a time in s is wanted");
-  refused({"--period", "0.001", "--margin", "0.99"}, "a factor of at least 1");
-  refused({"--period", "0.001", "--delay", "-1"}, "--delay");
-  refused({"--period", "0.001", "--cutoff", "nan"}, "a frequency in Hz");
-}
-
 }  // namespace
 }  // namespace dashpot::tests

@@ -15,13 +15,10 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-using Words = std::vector<std::string>;
-
-Outcome inspect(const dashpot::testing::Arm& arm, Words more) {
-  Words words = {"inspect", "--urdf", dashpot::testing::arm_path(arm.file), "--base", arm.base,
-                 "--tip",   arm.tip};
-  words.insert(words.end(), more.begin(), more.end());
-  return run_program(words);
+Outcome inspect(const dashpot::testing::Arm& arm, const Words& more) {
+  return run_program(joined({"inspect", "--urdf", dashpot::testing::arm_path(arm.file), "--base",
+                             arm.base, "--tip", arm.tip},
+                            more));
 }
 
 Outcome inspect_panda(const Words& more) {
@@ -32,7 +29,7 @@ constexpr const char* kUnitInertia = "ixx='1' iyy='1' izz='1'";
 
 /// Of one joint about z, `pivot`, of this kind, that moves a link of this inertia.
 Outcome inspect_text(const Scratch& scratch, const std::string& kind, const std::string& inertia,
-                     Words more = {}) {
+                     const Words& more = {}) {
   const std::string urdf = scratch.write(
       "arm.urdf",
       "<robot name='r'><link name='wall'/><link name='arm'><inertial><mass value='1'/>"
@@ -43,9 +40,8 @@ Outcome inspect_text(const Scratch& scratch, const std::string& kind, const std:
           kind +
           "><parent link='wall'/><child link='arm'/>"
           "<axis xyz='0 0 1'/></joint></robot>");
-  Words words = {"inspect", "--json", "--urdf", urdf, "--base", "wall", "--tip", "arm"};
-  words.insert(words.end(), more.begin(), more.end());
-  return run_program(words);
+  return run_program(
+      joined({"inspect", "--json", "--urdf", urdf, "--base", "wall", "--tip", "arm"}, more));
 }
 
 Rows rows_of(const Eigen::MatrixXd& matrix) {
@@ -176,49 +172,42 @@ TEST(Inspect, ShowsTablesToPeople) {
   EXPECT_THAT(outcome.out, HasSubstr("  x  0.307020"));
 }
 
-void expect_refused(const Outcome& outcome, const std::string& text) {
-  EXPECT_EQ(outcome.status, 2);
-  EXPECT_THAT(outcome.out, IsEmpty());
-  EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
-  EXPECT_THAT(outcome.err, StartsWith("dashpot inspect: " + text));
-}
-
 TEST(Inspect, RefusesNumbersThatDoNotFit) {
-  expect_refused(inspect_panda({"--q", "1,2"}), "--q: 2 numbers, expected 7");
-  expect_refused(inspect_panda({"--qd", "1,2,3,4,5,6,7,8"}), "--qd: 8 numbers, expected 7");
-  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,nan"}), "--q: is not finite: 'nan'");
-  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1e999"}), "--q: is not finite: '1e999'");
-  expect_refused(inspect_panda({"--q", "0,0,0,,0,0,0"}), "--q: is not a number but ''");
-  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1x"}),
-                 "--q: is not a number but '1x': unknown unit 'x'");
-  expect_refused(inspect_panda({"--q", "0,0,0,0,0,0,1 m"}),
-                 "--q: has a wrong unit: '1 m'; rad is wanted");
-  expect_refused(inspect_panda({"--gravity", "9.81"}), "--gravity: 1 numbers, expected 3");
-  expect_refused(inspect_panda({"--reflected-inertia", "1,2"}),
-                 "--reflected-inertia: 2 numbers, expected 1 or 7");
-  expect_refused(inspect_panda({"--reflected-inertia", "1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1"}),
-                 "--reflected-inertia: 17 numbers, expected 1 or 7");
-  expect_refused(inspect_panda({"--reflected-inertia", "-1"}),
-                 "--reflected-inertia: a number is negative");
+  for (const auto& [option, numbers, reason] : {
+           std::tuple("--q", "1,2", "2 numbers, expected 7"),
+           {"--qd", "1,2,3,4,5,6,7,8", "8 numbers, expected 7"},
+           {"--q", "0,0,0,0,0,0,nan", "is not finite: 'nan'"},
+           {"--q", "0,0,0,0,0,0,1e999", "is not finite: '1e999'"},
+           {"--q", "0,0,0,,0,0,0", "is not a number but ''"},
+           {"--q", "0,0,0,0,0,0,1x", "is not a number but '1x': unknown unit 'x'"},
+           {"--q", "0,0,0,0,0,0,1 m", "has a wrong unit: '1 m'; rad is wanted"},
+           {"--gravity", "9.81", "1 numbers, expected 3"},
+           {"--reflected-inertia", "1,2", "2 numbers, expected 1 or 7"},
+           {"--reflected-inertia", "1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1",
+            "17 numbers, expected 1 or 7"},
+           {"--reflected-inertia", "-1", "a number is negative"},
+       }) {
+    expect_refusal(inspect_panda({option, numbers}),
+                   "dashpot inspect: " + std::string(option) + ": " + reason);
+  }
 }
 
 TEST(Inspect, RefusesFilesAndLinksThatDoNotFit) {
+  const auto refuses = [](const Outcome& outcome, const std::string& text) {
+    expect_refusal(outcome, "dashpot inspect: " + text);
+  };
   const auto panda = dashpot::testing::arm_path("panda");
-  expect_refused(
-      inspect({"panda", "panda_link0", "hand"}, {}),
-      panda + ": link 'hand': there is none; the nearest of its 11 links are panda_hand, ");
-  expect_refused(inspect({"panda", "base", "panda_link7"}, {}),
-                 panda + ": link 'base': there is none");
-  expect_refused(inspect({"panda", "panda_link7", "panda_link0"}, {"--json"}),
-                 panda + ": link 'panda_link0': not beyond the base, 'panda_link7'");
+  refuses(inspect({"panda", "panda_link0", "hand"}, {}),
+          panda + ": link 'hand': there is none; the nearest of its 11 links are panda_hand, ");
+  refuses(inspect({"panda", "base", "panda_link7"}, {}), panda + ": link 'base': there is none");
+  refuses(inspect({"panda", "panda_link7", "panda_link0"}, {"--json"}),
+          panda + ": link 'panda_link0': not beyond the base, 'panda_link7'");
   const auto missing = dashpot::testing::arm_path("no_such_arm");
-  expect_refused(inspect({"no_such_arm", "a", "b"}, {}),
-                 missing + ": cannot be read: No such file");
+  refuses(inspect({"no_such_arm", "a", "b"}, {}), missing + ": cannot be read: No such file");
   const Scratch scratch;
   const std::string broken = scratch.write("broken.urdf", "<robot name='r'><link");
-  expect_refused(run_program({"inspect", "--urdf", broken, "--base", "a", "--tip", "b"}),
-                 broken + ": ");
-  expect_refused(run_program({"inspect", "--base", "a", "--tip", "b"}), "--urdf is required");
+  refuses(run_program({"inspect", "--urdf", broken, "--base", "a", "--tip", "b"}), broken + ": ");
+  refuses(run_program({"inspect", "--base", "a", "--tip", "b"}), "--urdf is required");
 }
 
 }  // namespace

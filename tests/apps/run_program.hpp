@@ -18,6 +18,21 @@
 
 namespace dashpot::tests {
 
+using Words = std::vector<std::string>;
+
+/// One list of words after the other.
+inline Words joined(Words first, const Words& second) {
+  first.insert(first.end(), second.begin(), second.end());
+  return first;
+}
+
+/// `dashpot SUBCOMMAND` of a Panda, with `more` words.
+inline Words of_panda(const std::string& subcommand, const Words& more) {
+  return joined({subcommand, "--urdf", DASHPOT_SOURCE_DIR "/sim/models/panda.urdf", "--base",
+                 "panda_link0", "--tip", "panda_hand_tcp"},
+                more);
+}
+
 struct Outcome {
   int status = -1;  ///< exit status; 128 + signal if one ended the program
   std::string out;
@@ -79,6 +94,15 @@ inline std::string own_url() {
 
 inline auto count_lines(const std::string& text) {
   return std::count(text.begin(), text.end(), '\n');
+}
+
+/// That the program said no, in one line that holds `text`, and nothing else.
+inline void expect_refusal(const Outcome& outcome, const std::string& text) {
+  SCOPED_TRACE(text);
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
+  EXPECT_NE(outcome.err.find(text), std::string::npos) << outcome.err;
 }
 
 }  // namespace dashpot::tests

@@ -5,6 +5,8 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 
+#include <vector>
+
 namespace dashpot::testing {
 
 inline analysis::System<> random_system(Random& random, Eigen::Index n) {
@@ -27,6 +29,22 @@ inline analysis::SampledLoop random_loop(Random& random) {
   loop.torque_cutoff = random.integer(0, 1) * random.log_uniform(50, 500);
   loop.difference_velocity = random.integer(0, 1) == 1;
   return loop;
+}
+
+/// Ticks that the torque of a command depends on beside the present one.
+inline Eigen::Index memory_of(const analysis::SampledLoop& loop) {
+  return loop.delay + (loop.torque_cutoff > 0 ? 1 : 0) + (loop.difference_velocity ? 1 : 0);
+}
+
+/// All discrete eigenvalues.
+inline std::vector<analysis::Complex> all_multipliers(const analysis::SampledSpectrum& sampled) {
+  std::vector<analysis::Complex> all = sampled.others;
+  all.insert(all.end(), sampled.zero_modes.begin(), sampled.zero_modes.end());
+  all.insert(all.end(), sampled.memory.begin(), sampled.memory.end());
+  for (const analysis::SampledMode& mode : sampled.modes) {
+    all.insert(all.end(), mode.discrete_eigenvalues.begin(), mode.discrete_eigenvalues.end());
+  }
+  return all;
 }
 
 }  // namespace dashpot::testing
