@@ -1,19 +1,17 @@
 // What `dashpot analyze` prints as JSON for good input.
 #include <dashpot/tests/apps/json_result.hpp>
 
+#include <array>
 #include <cmath>
 
 namespace dashpot::tests {
 namespace {
 
-TEST(Analyze, ReadsJsonFromStandardInput) {
-  const Json result =
+TEST(Analyze, AnswersAListWithAListAndReadsJson) {
+  const Json one =
       analyze_json("{\n\t\"mass\": [[2]],\n\t\"damping\": [[1.2e0]], \"stiffness\":[[18.0]]\n}\n");
-  expect_near({of_modes(result, "natural_frequency")}, {{3}}, 1e-15);
-  expect_near({of_modes(result, "damping_ratio")}, {{0.1}}, 1e-15);
-}
-
-TEST(Analyze, AnswersAListWithAList) {
+  expect_near({of_modes(one, "natural_frequency")}, {{3}}, 1e-15);
+  expect_near({of_modes(one, "damping_ratio")}, {{0.1}}, 1e-15);
   const Json result = analyze_json(
       "- {mass: &m [[1]], stiffness: [[4]]}\n- {mass: *m, stiffness: [[9]]}\n"
       "- {mass: [], stiffness: []}\n");
@@ -94,24 +92,22 @@ TEST(Analyze, NeedsNoJoints) {
   }
 }
 
-TEST(Analyze, NamesTheKindsOfModes) {
-  const auto kind = [](const std::string& damping, const std::string& stiffness) {
-    const Json result = analyze_json("{mass: [[1]], damping: [[" + damping + "]], stiffness: [[" +
-                                     stiffness + "]]}");
-    return result["modes"][0]["kind"].get<std::string>();
-  };
-  EXPECT_EQ(kind("1", "4"), "underdamped");
-  EXPECT_EQ(kind("4", "4"), "critical");
-  EXPECT_EQ(kind("5", "4"), "overdamped");
-  EXPECT_EQ(kind("0", "4"), "undamped");
-  EXPECT_EQ(kind("-1", "4"), "unstable");
-  EXPECT_EQ(kind("1", "-4"), "unstable");
-}
-
-TEST(Analyze, PutsTheSlowerOfTwoRealEigenvaluesFirst) {
-  const Json result = analyze_json("{mass: [[1]], damping: [[5]], stiffness: [[4]]}");
-  expect_near(result["modes"][0]["eigenvalues"], {{-1, 0}, {-4, 0}}, 1e-15);
-  expect_near({of_modes(result, "damping_ratio")}, {{1.25}}, 1e-15);
+TEST(Analyze, NamesTheKindsOfModesAndPutsTheSlowerOfTwoRealEigenvaluesFirst) {
+  std::string list;
+  const std::vector<std::array<const char*, 3>> all = {
+      {"5", "4", "overdamped"}, {"1", "4", "underdamped"}, {"4", "4", "critical"},
+      {"0", "4", "undamped"},   {"-1", "4", "unstable"},   {"1", "-4", "unstable"}};
+  for (const auto& [damping, stiffness, kind] : all) {
+    list += std::string("- {mass: [[1]], damping: [[") + damping + "]], stiffness: [[" + stiffness +
+            "]]}\n";
+  }
+  const Json result = analyze_json(list);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EXPECT_EQ(result[i]["modes"][0]["kind"], all[i][2]) << i;
+  }
+  expect_near(result[0]["modes"][0]["eigenvalues"], {{-1, 0}, {-4, 0}}, 1e-15);
+  expect_near({of_modes(result[0], "damping_ratio")}, {{1.25}}, 1e-15);
+  EXPECT_TRUE(result[5]["modes"][0]["natural_frequency"].is_null());  // not a number
 }
 
 TEST(Analyze, CallsModesBelowTheSoftFrequencySoft) {
@@ -138,15 +134,10 @@ TEST(Analyze, ReportsTheDampingThatCouplesZeroModesAndVibrations) {
 }
 
 TEST(Analyze, WritesNumbersSoThatTheyReadBackTheSame) {
-  const Json result = analyze_json("{mass: [[0.30000000000000004]], stiffness: [[1e-7]]}");
-  EXPECT_EQ(result["reduced"]["mass"][0][0].get<double>(), 0.30000000000000004);
-}
-
-TEST(Analyze, WritesNullForWhatIsNotANumber) {
-  const Json result = analyze_json("{mass: [[1]], damping: [[1]], stiffness: [[-4]]}");
-  EXPECT_TRUE(result["modes"][0]["natural_frequency"].is_null());
   const Json free = analyze_json("{mass: [[1]], damping: [[1]], stiffness: [[0]]}");
   EXPECT_TRUE(free["rank_gap"]["smallest_kept"].is_null());
+  const Json result = analyze_json("{mass: [[0.30000000000000004]], stiffness: [[1e-7]]}");
+  EXPECT_EQ(result["reduced"]["mass"][0][0].get<double>(), 0.30000000000000004);
 }
 
 TEST(Analyze, NotesWhatTheReaderMayNotExpect) {

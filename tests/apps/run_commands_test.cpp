@@ -13,9 +13,7 @@ using ::testing::Not;
 
 std::string complaint_about(const std::vector<std::string>& words) {
   const Outcome outcome = run_program(words);
-  EXPECT_EQ(outcome.status, 2);
-  EXPECT_EQ(outcome.out, "");
-  EXPECT_EQ(count_lines(outcome.err), 1);
+  expect_refusal(outcome, "");
   return outcome.err;
 }
 

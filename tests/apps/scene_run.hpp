@@ -17,14 +17,12 @@ inline std::string text_of(const std::string& path) {
   return text.str();
 }
 
-inline Outcome run_scene(const std::string& path, std::vector<std::string> options = {}) {
-  options.insert(options.begin(), {"run", path, "--fast"});
-  return run_program(options);
+inline Outcome run_scene(const std::string& path, const Words& options = {}) {
+  return run_program(joined({"run", path, "--fast"}, options));
 }
 
-inline Json run_json(const std::string& path, std::vector<std::string> options = {}) {
-  options.emplace_back("--json");
-  return parse(run_scene(path, options));
+inline Json run_json(const std::string& path, const Words& options = {}) {
+  return parse(run_scene(path, joined(options, {"--json"})));
 }
 
 /// A scene with parts of its text replaced, its URDF named absolutely, in a file of its own.
