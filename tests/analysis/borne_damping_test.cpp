@@ -103,7 +103,8 @@ TEST(BorneDamping, IsContinuous) {
 }
 
 /// Springs that are in force in part bear the same part of the damping, so that parts of several
-/// springs that make up one bear no more than one.
+/// springs that make up one bear no more than one; and without springs any damping keeps the
+/// margin.
 TEST(BorneDamping, GivesAPartOfTheSpringsItsPart) {
   Random random(4103);
   for (int k = 0; k < 100; ++k) {
@@ -113,14 +114,6 @@ TEST(BorneDamping, GivesAPartOfTheSpringsItsPart) {
     EXPECT_NEAR(mode.borne.share(std::sqrt(part) * mode.omega, part * mode.wanted, part, level),
                 mode.share, 1e-9 * mode.share);
     EXPECT_EQ(level.kept, mode.level.kept);
-  }
-}
-
-TEST(BorneDamping, KeepsTheMarginOfMotionsWithoutSprings) {
-  Random random(4105);
-  for (int k = 0; k < 20; ++k) {
-    DampingLevel level;
-    const Case mode(random);
     EXPECT_EQ(mode.borne.share(0, 0, 1, level), 1);
     EXPECT_TRUE(level.kept);
   }
@@ -135,18 +128,13 @@ TEST(BorneDamping, BearsAnythingWithoutALoop) {
 
 TEST(BorneDamping, RefusesWhatIsNoLoop) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  SampledLoop loop;
   for (const double margin : {1.0, 0.0, nan}) {
-    EXPECT_THROW(BorneDamping(loop, margin), std::invalid_argument);
+    EXPECT_THROW(BorneDamping({}, margin), std::invalid_argument);
   }
-  loop.period = 0;
-  EXPECT_THROW(BorneDamping(loop, 2), std::invalid_argument);
-  loop = {};
-  loop.delay = -1;
-  EXPECT_THROW(BorneDamping(loop, 2), std::invalid_argument);
-  loop = {};
-  loop.torque_cutoff = nan;
-  EXPECT_THROW(BorneDamping(loop, 2), std::invalid_argument);
+  for (const SampledLoop& loop :
+       {SampledLoop{.period = 0}, SampledLoop{.delay = -1}, SampledLoop{.torque_cutoff = nan}}) {
+    EXPECT_THROW(BorneDamping(loop, 2), std::invalid_argument);
+  }
 }
 
 /// The level of the design at set-up time lowers all modes to what the worst one bears.

@@ -204,7 +204,7 @@ TEST(IdentifyDecays, TellsProductsOfStrongMotionsFromModes) {
 TEST(IdentifyDecays, FindsTheModesOfArms) {
   DASHPOT_SKIP_IF_QUICK();
   constexpr int kSamples = 750;
-  constexpr double kPeriod = 0.002;
+  constexpr double kSampling = 0.002;
   for (const std::size_t which : {1U, 2U, 0U}) {
     Draws draw(20 + which);
     const SprungArm arm(which, draw, 0.05, 0.4);
@@ -213,7 +213,7 @@ TEST(IdentifyDecays, FindsTheModesOfArms) {
       VectorXd start(arm.system.mass.rows());
       for (double& q : start) q = 0.02 * draw.normal();
       if (which > 0) {
-        records.push_back(sensed(arm, start, kSamples, kPeriod, {}, draw));
+        records.push_back(sensed(arm, start, kSamples, kSampling, {}, draw));
         continue;
       }
       VectorXd limits = VectorXd::Constant(start.size(), 87);  // N m
@@ -221,8 +221,8 @@ TEST(IdentifyDecays, FindsTheModesOfArms) {
       testing::Sensors bits;
       bits.noise = 0;
       bits.resolution = 1.0 / 2048;  // of the limits
-      const MatrixXd torque = arm.system.stiffness * arm.release(start, kSamples, kPeriod);
-      records.push_back(sensed(limits.cwiseInverse().asDiagonal() * torque, kPeriod, bits, draw));
+      const MatrixXd torque = arm.system.stiffness * arm.release(start, kSamples, kSampling);
+      records.push_back(sensed(limits.cwiseInverse().asDiagonal() * torque, kSampling, bits, draw));
     }
     const Identification found = identify_decays(records);
     for (const Mode<>& mode : arm.modes) {
@@ -254,13 +254,13 @@ TEST(IdentifyDecays, RefusesWhatIsNoRecord) {
     change(bad);
     return bad;
   };
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
   expect_refused({}, "no record");
   expect_refused({good, changed([](auto& bad) { bad.time[7] = bad.time[6]; })},
                  "record 2: time does not rise");
-  expect_refused({changed([](auto& bad) { bad.output.row(1).setConstant(kInfinity - kInfinity); })},
+  expect_refused({changed([](auto& bad) { bad.output.row(1).setConstant(kInfinite - kInfinite); })},
                  "channel 2 has 0 samples");
-  expect_refused({changed([](auto& bad) { bad.output(0, 5) = kInfinity; })}, "infinite");
+  expect_refused({changed([](auto& bad) { bad.output(0, 5) = kInfinite; })}, "infinite");
   expect_refused({part_of(good, 0, 19)}, "19 samples");
   expect_refused(
       {good, changed([](auto& bad) { bad.output.conservativeResize(1, Eigen::NoChange); })},

@@ -52,53 +52,37 @@ std::vector<Complex> eigenvalues_of(const Spectrum<>& spectrum) {
 VectorXd nonzero_part(const Motion& motion) {
   return motion.position - motion.zero_mode_position;
 }
-VectorXd nonzero_velocity(const Motion& motion) {
-  return motion.velocity - motion.zero_mode_velocity;
-}
 
-class PaperChain : public ::testing::Test {
- protected:
-  System<> system = testing::paper_chain();
-  Spectrum<> spectrum = analyze(system);
-  Response response{system, spectrum};
-
-  Motion free(double t) const {
+TEST(PaperChain, PaperEqs43To51Appendices1And2Responses) {
+  const System<> system = testing::paper_chain();
+  const Spectrum<> spectrum = analyze(system);
+  const Response response(system, spectrum);
+  const auto free = [&](double t) {
     return response.free(VectorXd{{0, 0.03, 0}}, VectorXd::Zero(3), t);
-  }
-  Motion impulse(double t) const { return response.impulse(VectorXd{{1, 0, 0}}, t); }
-};
-
-TEST_F(PaperChain, PaperEq43RigidBodyPartOfTheFreeMotion) {
+  };
+  const auto impulse = [&](double t) { return response.impulse(VectorXd{{1, 0, 0}}, t); };
   EXPECT_TRUE(near(free(0.7).zero_mode_position, VectorXd::Constant(3, 0.004), 1e-16));
   EXPECT_TRUE(near(free(0.7).zero_mode_velocity, VectorXd::Zero(3), 1e-15));
-}
-
-TEST_F(PaperChain, PaperAppendix1FreeMotion) {
-  EXPECT_TRUE(as_printed(
-      coefficients(eigenvalues_of(spectrum), [&](double t) { return nonzero_part(free(t)); }),
-      {{"-0.002293", "-0.001256", "-0.001707", "0.0003660"},
-       {"0.001563", "0.001344", "0.02444", "0.005522"},
-       {"0.003044", "0.001472", "-0.007044", "-0.002794"}}));
-}
-
-TEST_F(PaperChain, PaperEq48RigidBodyPartOfTheImpulseResponse) {
   EXPECT_TRUE(near(impulse(3.0).zero_mode_position, VectorXd::Constant(3, 3.0 / 15), 1e-14));
   EXPECT_TRUE(near(impulse(3.0).zero_mode_velocity, VectorXd::Constant(3, 1.0 / 15), 1e-15));
-}
-
-TEST_F(PaperChain, PaperAppendix2ImpulseResponse) {
-  EXPECT_TRUE(as_printed(
-      coefficients(eigenvalues_of(spectrum), [&](double t) { return nonzero_part(impulse(t)); }),
-      {{"-0.00004006", "0.001863", "0.00004006", "0.00003087"},
-       {"0.0003357", "-0.001430", "-0.0003357", "-0.0006435"},
-       {"-0.00007018", "-0.002408", "0.00007018", "0.0002080"}}));
-}
-
-TEST_F(PaperChain, PaperEq49VelocitiesOfTheImpulseResponse) {
-  const MatrixXd all = coefficients(eigenvalues_of(spectrum),
-                                    [&](double t) { return nonzero_velocity(impulse(t)); });
-  EXPECT_TRUE(as_printed(all.topRows(2), {{"0.05755", "-0.004398", "0.0007881", "-0.001875"},
-                                          {"-0.04510", "-0.006025", "-0.02157", "0.01967"}}));
+  const auto printed = [&](const auto& motion) {
+    return coefficients(eigenvalues_of(spectrum), motion);
+  };
+  EXPECT_TRUE(as_printed(printed([&](double t) { return nonzero_part(free(t)); }),
+                         {{"-0.002293", "-0.001256", "-0.001707", "0.0003660"},
+                          {"0.001563", "0.001344", "0.02444", "0.005522"},
+                          {"0.003044", "0.001472", "-0.007044", "-0.002794"}}));
+  EXPECT_TRUE(as_printed(printed([&](double t) { return nonzero_part(impulse(t)); }),
+                         {{"-0.00004006", "0.001863", "0.00004006", "0.00003087"},
+                          {"0.0003357", "-0.001430", "-0.0003357", "-0.0006435"},
+                          {"-0.00007018", "-0.002408", "0.00007018", "0.0002080"}}));
+  const MatrixXd velocities = printed([&](double t) -> VectorXd {
+    const Motion motion = impulse(t);
+    return motion.velocity - motion.zero_mode_velocity;
+  });
+  EXPECT_TRUE(
+      as_printed(velocities.topRows(2), {{"0.05755", "-0.004398", "0.0007881", "-0.001875"},
+                                         {"-0.04510", "-0.006025", "-0.02157", "0.01967"}}));
 }
 
 TEST(PaperArm, PaperEq64Appendix3FreeMotion) {

@@ -18,14 +18,12 @@ using ::testing::IsEmpty;
 /// 2 kg on 800 N/m: 20 rad/s. Sampled every 20 ms it is stable for 8 N s/m < c < 200 N s/m.
 const std::string kMass = "mass: [[2]]\nstiffness: [[800]]\n";
 
-Outcome design(const std::string& text, std::vector<std::string> options) {
-  options.insert(options.begin(), {"design", "-"});
-  return run_program(options, text);
+Outcome design(const std::string& text, const Words& options) {
+  return run_program(joined({"design", "-"}, options), text);
 }
 
-Json design_json(const std::string& text, std::vector<std::string> options) {
-  options.emplace_back("--json");
-  return parse(design(text, std::move(options)));
+Json design_json(const std::string& text, const Words& options) {
+  return parse(design(text, joined(options, {"--json"})));
 }
 
 TEST(DesignForALoop, KeepsTheRatioWhereTheLoopBearsIt) {
@@ -85,8 +83,7 @@ TEST(DesignForALoop, CountsTheIntegralOfTheSprings) {
   const std::vector<std::string> options = {"--damping-ratio", "0.4", "--period", "0.02",
                                             "--delay",         "1",   "--margin", "1.1"};
   const double without = design_json(kMass, options)["loop"]["gain_margin"];
-  std::vector<std::string> with = options;
-  with.insert(with.end(), {"--integral-time", "500 ms"});
+  Words with = joined(options, {"--integral-time", "500 ms"});
   const Json result = design_json(kMass, with);
   const double c = result["damping"][0][0], margin = result["loop"]["gain_margin"];
   EXPECT_EQ(result["loop"]["level"], 1);
@@ -154,9 +151,7 @@ TEST(DesignForALoop, LowersTheDampingOfARegionToWhatEveryLoopBears) {
   EXPECT_THAT(table.out, HasSubstr("first at configuration [1]"));
   EXPECT_THAT(table.out, HasSubstr("margin"));
   const Scratch scratch;
-  std::vector<std::string> with_csv = options;
-  with_csv.insert(with_csv.end(), {"--csv", scratch.path("map.csv")});
-  EXPECT_EQ(design(list, with_csv).status, 0);
+  EXPECT_EQ(design(list, joined(options, {"--csv", scratch.path("map.csv")})).status, 0);
   std::ifstream file(scratch.path("map.csv"));
   std::string line;
   std::getline(file, line);
@@ -168,11 +163,10 @@ TEST(DesignForALoop, LowersTheDampingOfARegionToWhatEveryLoopBears) {
 TEST(DesignForALoop, CountsFrictionAndIntegralOfEachConfigurationOfARegion) {
   const std::vector<std::string> options = {"--region", "--damping-ratio", "2.5", "--period",
                                             "0.02"};
-  const auto with = [&](const std::string& light, std::vector<std::string> more) {
-    more.insert(more.begin(), options.begin(), options.end());
+  const auto with = [&](const std::string& light, const Words& more) {
     return design_json(
         "[{mass: [[9]], stiffness: [[800]]}, {mass: [[2]], stiffness: [[800]]" + light + "}]",
-        std::move(more));
+        joined(options, more));
   };
   const double plain = with("", {})["damping"][0][0];
   EXPECT_NEAR(plain, 100, 1e-3);

@@ -15,16 +15,12 @@ using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
 /// `dashpot design - --damping-ratio RATIO OPTIONS...` with `text` on standard input.
-Outcome design_text(const std::string& text, const std::string& ratio,
-                    std::vector<std::string> options = {}) {
-  options.insert(options.begin(), {"design", "-", "--damping-ratio", ratio});
-  return run_program(options, text);
+Outcome design_text(const std::string& text, const std::string& ratio, const Words& options = {}) {
+  return run_program(joined({"design", "-", "--damping-ratio", ratio}, options), text);
 }
 
-Json design_json(const std::string& text, const std::string& ratio,
-                 std::vector<std::string> options = {}) {
-  options.emplace_back("--json");
-  return parse(design_text(text, ratio, std::move(options)));
+Json design_json(const std::string& text, const std::string& ratio, const Words& options = {}) {
+  return parse(design_text(text, ratio, joined(options, {"--json"})));
 }
 
 std::string baxter() {
@@ -109,9 +105,8 @@ TEST(Design, FlagsATaskDampingThatFeedsEnergyIn) {
   const Json result = design_json(text, "0.7");
   ASSERT_EQ(result["notes"].size(), 1U);
   EXPECT_THAT(result["notes"][0].get<std::string>(), HasSubstr("-6.1"));
-  const Outcome refused = design_text(text, "0.7", {"--near"});
-  EXPECT_EQ(refused.status, 2);
-  EXPECT_THAT(refused.err, HasSubstr("task_damping: is not positive semidefinite"));
+  expect_refusal(design_text(text, "0.7", {"--near"}),
+                 "task_damping: is not positive semidefinite");
 }
 
 TEST(Design, StaysNearTheTaskDampingOfTheFile) {
@@ -144,23 +139,19 @@ TEST(Design, OfARegionMapsTheWorstMode) {
   EXPECT_THAT(table.err, IsEmpty());
 }
 
-TEST(Design, NamesTheWorstConfigurationWhereAllReachTheirRatio) {
+/// And names the worst configuration where all reach their ratio.
+TEST(Design, WritesTheMapOfARegion) {
   const std::string list = "[{mass: [[1]], stiffness: [[4]]}, {mass: [[2]], stiffness: [[4]]}]";
-  const Json result = design_json(list, "0.7", {"--region"});
+  const Scratch scratch;
+  const std::string path = scratch.path("map.csv");
+  const Json result = design_json(list, "0.7", {"--region", "--csv", path});
   ASSERT_EQ(result["samples"].size(), 2U);
-  const double first = result["samples"][0]["damping_ratio"].get<double>();
-  const double second = result["samples"][1]["damping_ratio"].get<double>();
+  const double first = result["samples"][0]["damping_ratio"];
+  const double second = result["samples"][1]["damping_ratio"];
   ASSERT_GT(first, second);
   ASSERT_GT(second, 0.7);
   EXPECT_EQ(result["worst_sample"], 1);
   EXPECT_EQ(result["level"], 1);
-}
-
-TEST(Design, WritesTheMapOfARegion) {
-  const std::string list = "[{mass: [[1]], stiffness: [[4]]}, {mass: [[4]], stiffness: [[4]]}]";
-  const Scratch scratch;
-  const std::string path = scratch.path("map.csv");
-  const Json result = design_json(list, "0.5", {"--region", "--csv", path});
   std::ifstream file(path);
   std::string heading, line;
   std::getline(file, heading);
@@ -172,11 +163,9 @@ TEST(Design, WritesTheMapOfARegion) {
     EXPECT_EQ(std::stod(line), sample["damping_ratio"]);
   }
   EXPECT_FALSE(std::getline(file, line));
-  const Outcome nowhere = design_text(list, "0.5", {"--region", "--csv", "/nowhere/map.csv"});
-  EXPECT_EQ(nowhere.status, 2);
-  EXPECT_THAT(nowhere.out, IsEmpty());
-  EXPECT_EQ(nowhere.err,  // as `dashpot run` says it
-            "dashpot design: --csv: /nowhere/map.csv: cannot write: No such file or directory\n");
+  expect_refusal(  // as `dashpot run` says it
+      design_text(list, "0.5", {"--region", "--csv", "/nowhere/map.csv"}),
+      "dashpot design: --csv: /nowhere/map.csv: cannot write: No such file or directory\n");
   EXPECT_EQ(design_text(list, "0.5", {"--region", "--csv", "/dev/full"}).status, 1);
   EXPECT_THAT(design_text(list, "0.5", {"--csv", path}).err, HasSubstr("--csv: needs --region"));
 }

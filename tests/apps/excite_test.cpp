@@ -41,9 +41,8 @@ struct Excited {
 
   Excited(const std::string& path, const std::vector<std::string>& options) {
     const Scratch scratch;
-    std::vector<std::string> words = {"--json", "--log", scratch.path("log")};
-    words.insert(words.end(), options.begin(), options.end());
-    const Outcome outcome = run_scene(path, words);
+    const Outcome outcome =
+        run_scene(path, joined({"--json", "--log", scratch.path("log")}, options));
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     identified = nlohmann::json::parse(outcome.out).value("identified", nlohmann::json());
     lcmtypes::MessageHandlers handlers;

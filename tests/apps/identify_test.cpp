@@ -36,10 +36,8 @@ std::string decay_csv(const std::string& heading, double angle, double time = 1)
   return text;
 }
 
-Json identify(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "identify");
-  arguments.push_back("--json");
-  return parse(run_program(arguments));
+Json identify(const Words& arguments) {
+  return parse(run_program(joined({"identify", "--json"}, arguments)));
 }
 
 void expect_known_modes(const Json& found) {

@@ -26,9 +26,8 @@ inline Json parse(const Outcome& outcome) {
   return Json::parse(outcome.out);
 }
 
-inline Json analyze_json(const std::string& text, std::vector<std::string> options = {}) {
-  options.emplace_back("--json");
-  return parse(analyze_text(text, options));
+inline Json analyze_json(const std::string& text, const Words& options = {}) {
+  return parse(analyze_text(text, joined(options, {"--json"})));
 }
 
 /// `relative` to the largest of the expected numbers.

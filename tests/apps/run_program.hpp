@@ -74,9 +74,8 @@ inline Outcome run_program(const std::vector<std::string>& arguments, const std:
 }
 
 /// `dashpot analyze - OPTIONS...` with `text` on standard input.
-inline Outcome analyze_text(const std::string& text, std::vector<std::string> options = {}) {
-  options.insert(options.begin(), {"analyze", "-"});
-  return run_program(options, text);
+inline Outcome analyze_text(const std::string& text, const Words& options = {}) {
+  return run_program(joined({"analyze", "-"}, options), text);
 }
 
 inline std::string example(const std::string& name) {
