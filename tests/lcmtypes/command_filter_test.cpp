@@ -397,7 +397,7 @@ TEST(CommandFilter, LimitsTheRate) {
   CommandFilter filter(limits);
   command_t message = random_command(random, 7);
   int accepted = 0, too_many = 0;
-  constexpr int kMessages = 10'000;  // over one second
+  constexpr int kMessages = 5'000;  // over half a second
   for (int i = 0; i < kMessages; ++i) {
     message.utime += 100;
     ++message.sequence;
@@ -406,12 +406,12 @@ TEST(CommandFilter, LimitsTheRate) {
     too_many += verdict == Verdict::kTooMany;
   }
   EXPECT_EQ(accepted + too_many, kMessages);
-  EXPECT_NEAR(accepted, 1010, 2);
+  EXPECT_NEAR(accepted, 510, 2);
 }
 
 TEST(CommandFilter, SurvivesRandomMutations) {
   constexpr std::uint64_t kSeed = 932;
-  constexpr int kCases = 40'000;
+  constexpr int kCases = 16'000;
   constexpr int kAfterSequence = 36;  // of another sender, or far ahead, it is refused at once
   Random random(kSeed);
   CommandFilter filter(limits_for(7));
@@ -447,8 +447,8 @@ TEST(CommandFilter, SurvivesRandomMutations) {
     std::printf(" %d %s;", verdicts[i], to_text(static_cast<Verdict>(i)));
   }
   std::printf("\n");
-  EXPECT_GT(verdicts[0], 100);
-  EXPECT_GT(verdicts[static_cast<std::size_t>(Verdict::kIndefinite)], 100);
+  EXPECT_GT(verdicts[0], 50);
+  EXPECT_GT(verdicts[static_cast<std::size_t>(Verdict::kIndefinite)], 50);
 }
 
 TEST(CommandFilter, WantsLimitsForEveryJoint) {

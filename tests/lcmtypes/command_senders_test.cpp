@@ -274,7 +274,7 @@ TEST_F(CommandSenders, AreKeptApartWhateverTheySend) {
   Random random(kSeed);
   std::printf("seed %llu\n", static_cast<unsigned long long>(kSeed));
   std::int64_t heard_at = -10 * kSilence, commander = 0;
-  for (int i = 0; i < 20'000; ++i) {
+  for (int i = 0; i < 10'000; ++i) {
     pass(random.integer(0, 3) == 0 ? random.integer(0, 1'200'000) : random.integer(0, 2000));
     const std::int64_t sender = random.integer(1, 4);
     command_t message = command_of(sender);

@@ -233,7 +233,7 @@ TEST(Log, DoesNoHarmWhenDamaged) {
   write_log(scratch.path("a.lcm"), 10);
   const std::string whole = scratch.read("a.lcm");
   std::int64_t events = 0, malformed = 0;
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 150; ++i) {
     std::string damaged = whole;
     for (int k = random.integer(1, 20); k > 0; --k) {
       damaged[static_cast<std::size_t>(random.integer(0, static_cast<int>(whole.size()) - 1))] =
@@ -247,8 +247,8 @@ TEST(Log, DoesNoHarmWhenDamaged) {
   std::printf("seed %llu: %lld messages read, %lld malformed\n",
               static_cast<unsigned long long>(kSeed), static_cast<long long>(events),
               static_cast<long long>(malformed));
-  EXPECT_GT(events, 300);
-  EXPECT_GT(malformed, 10);
+  EXPECT_GT(events, 150);
+  EXPECT_GT(malformed, 5);
 }
 
 TEST(Log, NamesTheFileThatCannotBeOpened) {

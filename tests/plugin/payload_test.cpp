@@ -104,8 +104,7 @@ TEST(PluginPayload, IsJudgedWithTheGainsInForce) {
   // Damping that a heavy wrist bears and a light one does not.
   Host host = carrying_host("mass: 3, center: [0, 0, 0.1], inertia: [0.3, 0.3, 0.3]",
                             "gains: {joint: {stiffness: [500, 500, 500, 500, 300, 300, 300], "
-                            "damping: [50, 50, 50, 50, 30, "
-                            "30, 45]}}\n");
+                            "damping: [50, 50, 50, 50, 30, 30, 45]}}\n");
   ASSERT_NE(host.controller, nullptr) << plugin().last_error();
   host.tick();
   const dashpot_payload nothing = payload(0);

@@ -30,6 +30,7 @@ struct ActingTerms {
   const char* name;
   Mode mode;
   bool integral, friction;
+  friend void PrintTo(const ActingTerms& terms, std::ostream* out) { *out << terms.name; }
 };
 
 class ActingModes : public ::testing::TestWithParam<ActingTerms> {

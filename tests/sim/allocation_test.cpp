@@ -59,7 +59,7 @@ void expect_no_allocation(System& system, PlantOptions options, const JointVecto
                     }
                   }),
                   0)
-            << "method " << static_cast<int>(method) << ", adaptive " << adaptive;
+            << "method " << name_of(method) << ", adaptive " << adaptive;
         EXPECT_EQ(status, Status::kOk);
         EXPECT_EQ(refused, Status::kCommandNotFinite);
       }

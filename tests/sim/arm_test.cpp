@@ -147,9 +147,8 @@ TEST_P(Contacts, AreMetWithinAStepByFixedSteps) {
     Arm arm(slider(kDown), options());
     Plant plant(arm, fixed_steps(method, 1e-5), joints({height}));
     ASSERT_EQ(run(plant, 17000), Status::kOk);
-    EXPECT_NEAR(plant.position()[0], expected.height(plant.time()), 2e-5)
-        << static_cast<int>(method);
-    EXPECT_NEAR(plant.audit().imbalance(), 0, 2e-3) << static_cast<int>(method);
+    EXPECT_NEAR(plant.position()[0], expected.height(plant.time()), 2e-5) << name_of(method);
+    EXPECT_NEAR(plant.audit().imbalance(), 0, 2e-3) << name_of(method);
   }
 }
 
@@ -196,7 +195,7 @@ TEST(Wrenches, ChangeTheMomentumByTheirImpulse) {
     Arm arm(slider(kWeightless), options);
     Plant plant(arm, fixed_steps(method, 0.01), joints({5}));
     ASSERT_EQ(run(plant, 10), Status::kOk);
-    EXPECT_NEAR(plant.velocity()[0], impulse / kMass, 1e-11) << static_cast<int>(method);
+    EXPECT_NEAR(plant.velocity()[0], impulse / kMass, 1e-11) << name_of(method);
     const EnergyAudit audit = plant.audit();
     if (method == Method::kSemiImplicitEuler) continue;  // its audit is of order 1
     EXPECT_NEAR(audit.by_world, 0.5 * impulse * impulse / kMass, 1e-10);
@@ -272,7 +271,7 @@ TEST_P(Audit, ClosesUnderTorquesAndPushes) {
     JointVector torque = JointVector::Zero(arm.dof());
     for (int i = 0; i < 2500; ++i) {
       if (i % 5 == 0) torque = 10 * torques.vector(arm.dof());
-      ASSERT_EQ(plant.step(torque), Status::kOk) << static_cast<int>(method);
+      ASSERT_EQ(plant.step(torque), Status::kOk) << name_of(method);
     }
     const EnergyAudit audit = plant.audit();
     EXPECT_GT(std::abs(audit.by_actuators), 0.01);
@@ -280,7 +279,7 @@ TEST_P(Audit, ClosesUnderTorquesAndPushes) {
     const double tolerance = method == Method::kSemiImplicitEuler ? 0.02 : 1e-3;
     EXPECT_NEAR(audit.imbalance(), 0,
                 tolerance * (audit.initial.kinetic + audit.dissipated() + audit.work_in()))
-        << static_cast<int>(method);
+        << name_of(method);
   }
 }
 

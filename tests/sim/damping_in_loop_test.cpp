@@ -68,7 +68,7 @@ LoopLimit random_limit(const TaskImpedance& arm, Random& random, int seed) {
 
 TEST(DampingInLoop, SettlesWithTheMarginThatItClaimsAndNoMore) {
   int kept = 0, lowered = 0, given_up = 0;
-  for (int seed = 1; seed <= 40; ++seed) {
+  for (int seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(static_cast<std::uint64_t>(seed));
     const int n = random.integer(2, 5);
@@ -97,9 +97,9 @@ TEST(DampingInLoop, SettlesWithTheMarginThatItClaimsAndNoMore) {
     EXPECT_GT(growth(system, limit.loop, 1.05 * result.gain_margin, start), 10);
   }
   std::printf("ratio kept %d times, lowered %d, given up %d\n", kept, lowered, given_up);
-  EXPECT_GT(kept, 10);
-  EXPECT_GT(lowered, 5);
-  EXPECT_GT(given_up, 3);
+  EXPECT_GT(kept, 5);
+  EXPECT_GT(lowered, 3);
+  EXPECT_GT(given_up, 2);
 }
 
 /// Where the states are too many to solve for each trial.

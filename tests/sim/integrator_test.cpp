@@ -38,12 +38,6 @@ int order_of(Method method) {
   return 0;
 }
 
-std::string name_of(Method method) {
-  const char* const names[] = {"SemiImplicitEuler", "RungeKutta4",      "DormandPrince",
-                               "DormandPrince8",    "ImplicitMidpoint", "Rosenbrock"};
-  return names[static_cast<int>(method)];
-}
-
 class Methods : public ::testing::TestWithParam<Method> {};
 INSTANTIATE_TEST_SUITE_P(All, Methods, ::testing::ValuesIn(kMethods),
                          [](const auto& instance) { return name_of(instance.param); });

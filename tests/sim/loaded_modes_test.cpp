@@ -153,6 +153,7 @@ struct Case {
   Mode mode;
   controller::Frame frame;
   bool environment;
+  friend void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
 };
 
 class LoadedModes : public ::testing::TestWithParam<Case> {};
@@ -180,7 +181,7 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
   const int n = twin.dof();
   ASSERT_EQ(n, 6);
   double frequency = 0, ratio = 0, moved = 0;
-  for (int seed = 1; seed <= 6; ++seed) {
+  for (int seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(static_cast<std::uint64_t>(seed));
     const JointVector q0 = random_posture(twin, random);
@@ -286,7 +287,7 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
         moved, (unloaded.stiffness - arm.system.stiffness).norm() / arm.system.stiffness.norm());
   }
   std::printf(
-      "%s, seeds 1 to 6: frequency within %.1e, ratio within %.1e; %.2g of K is the load's\n",
+      "%s, seeds 1 to 3: frequency within %.1e, ratio within %.1e; %.2g of K is the load's\n",
       param.name, frequency, ratio, moved);
   EXPECT_GT(moved, 1e-3);
 }

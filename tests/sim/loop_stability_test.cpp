@@ -21,9 +21,9 @@ using Eigen::VectorXd;
 using testing::plant_options;
 using testing::Random;
 
-/// Ticks in which |z| or its inverse grows to e^12, and those before the largest |z| rules.
+/// Ticks in which |z| or its inverse grows to e^9, and those before the largest |z| rules.
 int ticks_to_tell(double spectral_radius) {
-  return 200 + static_cast<int>(12 / std::abs(std::log(spectral_radius)));
+  return 200 + static_cast<int>(9 / std::abs(std::log(spectral_radius)));
 }
 
 /// Growth of |q| from the first to the last tenth of the ticks.
@@ -41,7 +41,7 @@ double growth(int ticks, const Step& step) {
 TEST(LoopStability, TurnsWhereTheAnalysisSays) {
   DASHPOT_SKIP_IF_QUICK();
   int compared = 0;
-  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) {
     Random random(seed);
     const int n = random.integer(1, 5);
     analysis::System<> nominal(n);
@@ -83,7 +83,7 @@ TEST(LoopStability, TurnsWhereTheAnalysisSays) {
       ++compared;
     }
   }
-  EXPECT_EQ(compared, 80);
+  EXPECT_EQ(compared, 48);
 }
 
 /// The real controller and the arms at 1 kHz with one tick of delay, and with what else there is.

@@ -37,8 +37,8 @@ TEST(Plant, HoldsATorqueForAPeriod) {
 TEST(Plant, KeepsTimeWithoutDrift) {
   LinearSystem mass(kOne, kZero, kZero);
   Plant plant(mass, {}, joints({0}));
-  ASSERT_EQ(run(plant, 1234567), Status::kOk);
-  EXPECT_EQ(plant.measured().time, 1234567000000);
+  ASSERT_EQ(run(plant, 123456), Status::kOk);
+  EXPECT_EQ(plant.measured().time, 123456000000);
 }
 
 TEST(Torque, ArrivesAfterTheDelayToTheTick) {

@@ -5,7 +5,21 @@
 #include <dashpot/sim/linear_system.hpp>
 #include <dashpot/sim/plant.hpp>
 
+#include <ostream>
 #include <string>
+
+namespace dashpot::sim {
+
+inline std::string name_of(Method method) {
+  const char* const names[] = {"SemiImplicitEuler", "RungeKutta4",      "DormandPrince",
+                               "DormandPrince8",    "ImplicitMidpoint", "Rosenbrock"};
+  return names[static_cast<int>(method)];
+}
+inline void PrintTo(Method method, std::ostream* out) {
+  *out << name_of(method);
+}
+
+}  // namespace dashpot::sim
 
 namespace dashpot::testing {
 

@@ -14,6 +14,7 @@ struct Arm {
   const char* file;
   const char* base;
   const char* tip;
+  friend void PrintTo(const Arm& arm, std::ostream* out) { *out << arm.file; }
 };
 
 inline std::ostream& operator<<(std::ostream& out, const Arm& arm) {
