@@ -22,6 +22,25 @@ Verdict judge(CommandFilter& filter, const command_t& message, std::int64_t late
   return filter.judge(bytes.data(), bytes.size(), kNow + later, kSteady + later);
 }
 
+/// One filter for seven joints, and a command.
+class CommandFilters : public ::testing::Test {
+ protected:
+  Verdict judge_next() {
+    ++message.sequence;
+    ++message.utime;
+    return judge(filter, message);
+  }
+  /// Judges a command with these parts; those that follow come after it.
+  Verdict judge_parts(std::int32_t parts) {
+    message.parts = parts;
+    return judge_next();
+  }
+  Random random{922};
+  CommandFilter filter{limits_for(7)};
+  command_t message = random_command(random, 7);
+  controller::Setpoint setpoint;
+};
+
 TEST(CommandFilter, TakesEveryPart) {
   Random random(921);
   for (int n = 1; n <= controller::kMaxJoints; ++n) {
@@ -74,55 +93,39 @@ TEST(CommandFilter, TakesEveryPart) {
   }
 }
 
-TEST(CommandFilter, EndsARatioWithGainsOfTheSamePart) {
-  Random random(925);
-  CommandFilter filter(limits_for(7));
-  command_t message = random_command(random, 7);
-  message.parts = int{command_t::TASK_RATIO} + int{command_t::JOINT_RATIO};
-  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
-  controller::Setpoint setpoint;
+TEST_F(CommandFilters, EndsARatioWithGainsOfTheSamePart) {
+  ASSERT_EQ(judge_parts(int{command_t::TASK_RATIO} + int{command_t::JOINT_RATIO}),
+            Verdict::kAccepted);
   setpoint.gains.task_stiffness = random.spd(6);
   const controller::Matrix6 before = setpoint.gains.task_stiffness;
   apply(filter.command(), setpoint);
   EXPECT_EQ(setpoint.gains.task_stiffness, before);
   EXPECT_EQ(setpoint.gains.task_damping_ratio, message.task_damping_ratio);
   EXPECT_EQ(setpoint.gains.joint_damping_ratio, message.joint_damping_ratio);
-  message.parts = command_t::TASK_GAINS;
-  ++message.sequence;
-  ++message.utime;
-  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  ASSERT_EQ(judge_parts(command_t::TASK_GAINS), Verdict::kAccepted);
   apply(filter.command(), setpoint, 1);
   EXPECT_EQ(setpoint.gains.task_damping_ratio, 0);
   EXPECT_EQ(setpoint.gains.joint_damping_ratio, message.joint_damping_ratio);
 }
 
 /// A sender's numbers may begin with 1, and a speed that a later command does not name is none.
-TEST(CommandFilter, ForgetsASpeedThatIsNotNamedAgain) {
-  Random random(927);
-  CommandFilter filter(limits_for(7));
-  command_t message = random_command(random, 7);
+TEST_F(CommandFilters, ForgetsASpeedThatIsNotNamedAgain) {
   message.parts = command_t::TIP_SPEED;
   message.sequence = 1;
   ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
   EXPECT_EQ(filter.command().tip_speed.linear, message.linear_velocity);
   message.linear_velocity = 0;
-  ++message.sequence;
-  ++message.utime;
-  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  ASSERT_EQ(judge_next(), Verdict::kAccepted);
   EXPECT_EQ(filter.command().tip_speed.linear, controller::TipSpeed().linear);
   EXPECT_EQ(filter.command().tip_speed.angular, message.angular_velocity);
 }
 
-TEST(CommandFilter, KeepsDampersBesideARatioUnlessThereAreOthers) {
-  Random random(926);
-  CommandFilter filter(limits_for(7));
-  command_t message = random_command(random, 7);
+TEST_F(CommandFilters, KeepsDampersBesideARatioUnlessThereAreOthers) {
   message.parts = int{command_t::TASK_GAINS} + int{command_t::TASK_RATIO} +
                   int{command_t::JOINT_GAINS} + int{command_t::JOINT_RATIO};
   for (auto& row : message.task_damping) std::fill(std::begin(row), std::end(row), 0.0);
   for (auto& row : message.joint_damping) std::fill(row.begin(), row.end(), 0.0);
   ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
-  controller::Setpoint setpoint;
   setpoint.gains.task_damping = random.spd(6);
   setpoint.gains.joint_damping = random.spd(7);
   const controller::Gains before = setpoint.gains;
@@ -131,23 +134,18 @@ TEST(CommandFilter, KeepsDampersBesideARatioUnlessThereAreOthers) {
   EXPECT_EQ(setpoint.gains.joint_damping, before.joint_damping);
   EXPECT_EQ(setpoint.gains.task_damping_ratio, message.task_damping_ratio);
   // Without a ratio zeros are what they say.
-  message.parts = int{command_t::TASK_GAINS} + int{command_t::JOINT_GAINS};
-  ++message.sequence;
-  ++message.utime;
-  ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
+  ASSERT_EQ(judge_parts(int{command_t::TASK_GAINS} + int{command_t::JOINT_GAINS}),
+            Verdict::kAccepted);
   apply(filter.command(), setpoint, 1);
   EXPECT_TRUE(setpoint.gains.task_damping.isZero(0));
   EXPECT_TRUE(setpoint.gains.joint_damping.isZero(0));
 }
 
-TEST(CommandFilter, LeavesAloneWhatNoCommandSet) {
-  Random random(922);
-  CommandFilter filter(limits_for(7));
-  command_t message = random_command(random, 7);
+TEST_F(CommandFilters, LeavesAloneWhatNoCommandSet) {
   message.parts = command_t::JOINT_POSITION;
   message.wrench[0] = kNaN;  // not one of the parts: not looked at
   ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
-  controller::Setpoint setpoint, before;
+  controller::Setpoint before;
   before.wrench = random.vector(6);
   before.gains.task_stiffness = random.spd(6);
   setpoint = before;
@@ -159,9 +157,7 @@ TEST(CommandFilter, LeavesAloneWhatNoCommandSet) {
   EXPECT_EQ(setpoint.gains.joint_stiffness.size(), 0);
 }
 
-TEST(CommandFilter, AddsUpThePartsOfSeveralCommands) {
-  Random random(923);
-  CommandFilter filter(limits_for(7));
+TEST_F(CommandFilters, AddsUpThePartsOfSeveralCommands) {
   command_t first = random_command(random, 7), second = random_command(random, 7);
   first.parts = command_t::WRENCH | 0;
   second.parts = command_t::TIP_POSE | 0;
@@ -169,7 +165,6 @@ TEST(CommandFilter, AddsUpThePartsOfSeveralCommands) {
   second.utime = first.utime + 1;
   ASSERT_EQ(judge(filter, first), Verdict::kAccepted);
   ASSERT_EQ(judge(filter, second), Verdict::kAccepted);
-  controller::Setpoint setpoint;
   apply(filter.command(), setpoint);
   EXPECT_EQ(setpoint.wrench[0], first.wrench[0]);
   EXPECT_EQ(setpoint.tip_pose.position[0], second.tip_position[0]);
@@ -181,112 +176,90 @@ TEST(CommandFilter, AddsUpThePartsOfSeveralCommands) {
 }
 
 struct Fault {
+  CommandVerdict verdict;
   const char* name;
-  Verdict verdict;
   std::function<void(command_t&)> make;
 };
 
-const std::vector<Fault>& faults() {
-  static const std::vector<Fault> all = {
-      {"no part", Verdict::kUnknown, [](command_t& m) { m.parts = 0; }},
-      {"unknown part", Verdict::kUnknown,
-       [](command_t& m) { m.parts = 2 * command_t::TOOL_FRAME + 1; }},
-      {"all bits", Verdict::kUnknown, [](command_t& m) { m.parts = -1; }},
-      {"no sender", Verdict::kNoSender, [](command_t& m) { m.sender = 0; }},
-      {"another sender", Verdict::kOtherSender, [](command_t& m) { ++m.sender; }},
-      {"no fault to release", Verdict::kNoSuchFault,
-       [](command_t& m) { m.parts |= command_t::RELEASE; }},
-      {"unknown mode", Verdict::kUnknown, [](command_t& m) { m.mode = 2; }},
-      {"unknown frame", Verdict::kUnknown, [](command_t& m) { m.frame = -1; }},
-      {"position NaN", Verdict::kNotFinite, [](command_t& m) { m.joint_position[6] = kNaN; }},
-      {"position infinite", Verdict::kNotFinite,
-       [](command_t& m) { m.joint_position[0] = -kInfinity; }},
-      {"tip NaN", Verdict::kNotFinite, [](command_t& m) { m.tip_position[1] = kNaN; }},
-      {"quaternion NaN", Verdict::kNotFinite, [](command_t& m) { m.tip_quaternion[3] = kNaN; }},
-      {"wrench infinite", Verdict::kNotFinite, [](command_t& m) { m.wrench[5] = kInfinity; }},
-      {"joint stiffness NaN", Verdict::kNotFinite,
-       [](command_t& m) { m.joint_stiffness[3][4] = kNaN; }},
-      {"joint damping infinite", Verdict::kNotFinite,
-       [](command_t& m) { m.joint_damping[6][6] = kInfinity; }},
-      {"task stiffness NaN", Verdict::kNotFinite,
-       [](command_t& m) { m.task_stiffness[0][5] = kNaN; }},
-      {"task damping NaN", Verdict::kNotFinite, [](command_t& m) { m.task_damping[5][5] = kNaN; }},
-      {"null stiffness NaN", Verdict::kNotFinite, [](command_t& m) { m.null_stiffness[2] = kNaN; }},
-      {"null damping NaN", Verdict::kNotFinite, [](command_t& m) { m.null_damping[2] = kNaN; }},
-      {"position too low", Verdict::kOutOfLimits,
-       [](command_t& m) { m.joint_position[6] = -3.0001; }},
-      {"position too high", Verdict::kOutOfLimits,
-       [](command_t& m) { m.joint_position[0] = 3.0001; }},
-      {"tip out of reach", Verdict::kOutOfLimits, [](command_t& m) { m.tip_position[2] = 3.1; }},
-      {"tip overflows", Verdict::kOutOfLimits, [](command_t& m) { m.tip_position[2] = 1e200; }},
-      {"force too large", Verdict::kOutOfLimits, [](command_t& m) { m.wrench[2] = -201; }},
-      {"torque too large", Verdict::kOutOfLimits, [](command_t& m) { m.wrench[3] = 51; }},
-      {"joint stiffness too large", Verdict::kOutOfLimits,
-       [](command_t& m) { m.joint_stiffness[1][1] = 20001; }},
-      {"joint damping too large", Verdict::kOutOfLimits,
-       [](command_t& m) { m.joint_damping[1][1] = 2001; }},
-      {"task stiffness too large", Verdict::kOutOfLimits,
-       [](command_t& m) { m.task_stiffness[1][1] = 50001; }},
-      {"task damping too large", Verdict::kOutOfLimits,
-       [](command_t& m) { m.task_damping[1][1] = 5001; }},
-      {"null stiffness negative", Verdict::kOutOfLimits,
-       [](command_t& m) { m.null_stiffness[0] = -1e-3; }},
-      {"null damping too large", Verdict::kOutOfLimits,
-       [](command_t& m) { m.null_damping[6] = 2001; }},
-      {"ratio NaN", Verdict::kNotFinite, [](command_t& m) { m.task_damping_ratio = kNaN; }},
-      {"ratio zero", Verdict::kOutOfLimits, [](command_t& m) { m.task_damping_ratio = 0; }},
-      {"ratio too large", Verdict::kOutOfLimits,
-       [](command_t& m) { m.joint_damping_ratio = 2.001; }},
-      {"payload NaN", Verdict::kNotFinite, [](command_t& m) { m.payload_inertia[0][2] = kNaN; }},
-      {"mass NaN", Verdict::kNotFinite, [](command_t& m) { m.payload_mass = kNaN; }},
-      {"mass negative", Verdict::kOutOfLimits, [](command_t& m) { m.payload_mass = -1e-9; }},
-      {"mass too large", Verdict::kOutOfLimits, [](command_t& m) { m.payload_mass = 20.1; }},
-      {"payload unwieldy", Verdict::kOutOfLimits,
-       [](command_t& m) { m.payload_inertia[0][0] = 1.01 * m.payload_mass; }},
-      {"payload far away", Verdict::kOutOfLimits, [](command_t& m) { m.payload_center[1] = -1.1; }},
-      {"tool NaN", Verdict::kNotFinite, [](command_t& m) { m.tool_position[2] = kNaN; }},
-      {"tool turned by NaN", Verdict::kNotFinite,
-       [](command_t& m) { m.tool_quaternion[1] = kNaN; }},
-      {"tool too long", Verdict::kOutOfLimits, [](command_t& m) { m.tool_position[2] = -1.1; }},
-      {"tool not turned", Verdict::kNotUnit,
-       [](command_t& m) {
-         for (double& x : m.tool_quaternion) x *= 0.998;
-       }},
-      {"speed NaN", Verdict::kNotFinite, [](command_t& m) { m.linear_velocity = kNaN; }},
-      {"speed negative", Verdict::kOutOfLimits, [](command_t& m) { m.angular_velocity = -0.1; }},
-      {"speed too large", Verdict::kOutOfLimits, [](command_t& m) { m.tip_velocity = 10.1; }},
-      {"quaternion too long", Verdict::kNotUnit,
-       [](command_t& m) {
-         for (double& x : m.tip_quaternion) x *= 1.002;
-       }},
-      {"quaternion zero", Verdict::kNotUnit,
-       [](command_t& m) {
-         for (double& x : m.tip_quaternion) x = 0;
-       }},
-      {"quaternion huge", Verdict::kNotUnit, [](command_t& m) { m.tip_quaternion[0] = 1e300; }},
-      {"joint stiffness not symmetric", Verdict::kIndefinite,
-       [](command_t& m) { m.joint_stiffness[0][1] += 1; }},
-      {"joint stiffness indefinite", Verdict::kIndefinite,
-       [](command_t& m) { m.joint_stiffness[2][2] = -1; }},
-      {"joint damping indefinite", Verdict::kIndefinite,
-       [](command_t& m) { m.joint_damping[2][2] = -0.1; }},
-      {"task stiffness indefinite", Verdict::kIndefinite,
-       [](command_t& m) { m.task_stiffness[4][4] = -1; }},
-      {"task damping not symmetric", Verdict::kIndefinite,
-       [](command_t& m) { m.task_damping[4][2] -= 1; }},
-      {"too old", Verdict::kStale, [](command_t& m) { m.utime -= 500'001; }},
-      {"very old", Verdict::kStale,
-       [](command_t& m) { m.utime = std::numeric_limits<std::int64_t>::min(); }},
-      {"ahead", Verdict::kFromFuture, [](command_t& m) { m.utime += 100'001; }},
-      {"very far ahead", Verdict::kFromFuture,
-       [](command_t& m) { m.utime = std::numeric_limits<std::int64_t>::max(); }},
-  };
-  return all;
-}
+using V = CommandVerdict;
+using M = command_t;
+constexpr auto kFirst = std::numeric_limits<std::int64_t>::min();
+constexpr auto kLast = std::numeric_limits<std::int64_t>::max();
+const std::vector<Fault> kFaults = {
+    {V::kUnknown, "no part", [](M& m) { m.parts = 0; }},
+    {V::kUnknown, "unknown part", [](M& m) { m.parts = 2 * command_t::TOOL_FRAME + 1; }},
+    {V::kUnknown, "all bits", [](M& m) { m.parts = -1; }},
+    {V::kUnknown, "unknown mode", [](M& m) { m.mode = 2; }},
+    {V::kUnknown, "unknown frame", [](M& m) { m.frame = -1; }},
+    {V::kNoSender, "no sender", [](M& m) { m.sender = 0; }},
+    {V::kOtherSender, "another sender", [](M& m) { ++m.sender; }},
+    {V::kNoSuchFault, "no fault to release", [](M& m) { m.parts |= command_t::RELEASE; }},
+    {V::kNotFinite, "position NaN", [](M& m) { m.joint_position[6] = kNaN; }},
+    {V::kNotFinite, "position infinite", [](M& m) { m.joint_position[0] = -kInfinity; }},
+    {V::kNotFinite, "tip NaN", [](M& m) { m.tip_position[1] = kNaN; }},
+    {V::kNotFinite, "quaternion NaN", [](M& m) { m.tip_quaternion[3] = kNaN; }},
+    {V::kNotFinite, "wrench infinite", [](M& m) { m.wrench[5] = kInfinity; }},
+    {V::kNotFinite, "joint stiffness NaN", [](M& m) { m.joint_stiffness[3][4] = kNaN; }},
+    {V::kNotFinite, "joint damping infinite", [](M& m) { m.joint_damping[6][6] = kInfinity; }},
+    {V::kNotFinite, "task stiffness NaN", [](M& m) { m.task_stiffness[0][5] = kNaN; }},
+    {V::kNotFinite, "task damping NaN", [](M& m) { m.task_damping[5][5] = kNaN; }},
+    {V::kNotFinite, "null stiffness NaN", [](M& m) { m.null_stiffness[2] = kNaN; }},
+    {V::kNotFinite, "null damping NaN", [](M& m) { m.null_damping[2] = kNaN; }},
+    {V::kNotFinite, "ratio NaN", [](M& m) { m.task_damping_ratio = kNaN; }},
+    {V::kNotFinite, "payload NaN", [](M& m) { m.payload_inertia[0][2] = kNaN; }},
+    {V::kNotFinite, "mass NaN", [](M& m) { m.payload_mass = kNaN; }},
+    {V::kNotFinite, "tool NaN", [](M& m) { m.tool_position[2] = kNaN; }},
+    {V::kNotFinite, "tool turned by NaN", [](M& m) { m.tool_quaternion[1] = kNaN; }},
+    {V::kNotFinite, "speed NaN", [](M& m) { m.linear_velocity = kNaN; }},
+    {V::kOutOfLimits, "position too low", [](M& m) { m.joint_position[6] = -3.0001; }},
+    {V::kOutOfLimits, "position too high", [](M& m) { m.joint_position[0] = 3.0001; }},
+    {V::kOutOfLimits, "tip out of reach", [](M& m) { m.tip_position[2] = 3.1; }},
+    {V::kOutOfLimits, "tip overflows", [](M& m) { m.tip_position[2] = 1e200; }},
+    {V::kOutOfLimits, "force too large", [](M& m) { m.wrench[2] = -201; }},
+    {V::kOutOfLimits, "torque too large", [](M& m) { m.wrench[3] = 51; }},
+    {V::kOutOfLimits, "joint stiffness too large", [](M& m) { m.joint_stiffness[1][1] = 20001; }},
+    {V::kOutOfLimits, "joint damping too large", [](M& m) { m.joint_damping[1][1] = 2001; }},
+    {V::kOutOfLimits, "task stiffness too large", [](M& m) { m.task_stiffness[1][1] = 50001; }},
+    {V::kOutOfLimits, "task damping too large", [](M& m) { m.task_damping[1][1] = 5001; }},
+    {V::kOutOfLimits, "null stiffness negative", [](M& m) { m.null_stiffness[0] = -1e-3; }},
+    {V::kOutOfLimits, "null damping too large", [](M& m) { m.null_damping[6] = 2001; }},
+    {V::kOutOfLimits, "ratio zero", [](M& m) { m.task_damping_ratio = 0; }},
+    {V::kOutOfLimits, "ratio too large", [](M& m) { m.joint_damping_ratio = 2.001; }},
+    {V::kOutOfLimits, "mass negative", [](M& m) { m.payload_mass = -1e-9; }},
+    {V::kOutOfLimits, "mass too large", [](M& m) { m.payload_mass = 20.1; }},
+    {V::kOutOfLimits, "payload unwieldy",
+     [](M& m) { m.payload_inertia[0][0] = 1.01 * m.payload_mass; }},
+    {V::kOutOfLimits, "payload far away", [](M& m) { m.payload_center[1] = -1.1; }},
+    {V::kOutOfLimits, "tool too long", [](M& m) { m.tool_position[2] = -1.1; }},
+    {V::kOutOfLimits, "speed negative", [](M& m) { m.angular_velocity = -0.1; }},
+    {V::kOutOfLimits, "speed too large", [](M& m) { m.tip_velocity = 10.1; }},
+    {V::kNotUnit, "tool not turned",
+     [](M& m) {
+       for (double& x : m.tool_quaternion) x *= 0.998;
+     }},
+    {V::kNotUnit, "quaternion too long",
+     [](M& m) {
+       for (double& x : m.tip_quaternion) x *= 1.002;
+     }},
+    {V::kNotUnit, "quaternion zero",
+     [](M& m) {
+       for (double& x : m.tip_quaternion) x = 0;
+     }},
+    {V::kNotUnit, "quaternion huge", [](M& m) { m.tip_quaternion[0] = 1e300; }},
+    {V::kIndefinite, "joint stiffness not symmetric", [](M& m) { m.joint_stiffness[0][1] += 1; }},
+    {V::kIndefinite, "joint stiffness indefinite", [](M& m) { m.joint_stiffness[2][2] = -1; }},
+    {V::kIndefinite, "joint damping indefinite", [](M& m) { m.joint_damping[2][2] = -0.1; }},
+    {V::kIndefinite, "task stiffness indefinite", [](M& m) { m.task_stiffness[4][4] = -1; }},
+    {V::kIndefinite, "task damping not symmetric", [](M& m) { m.task_damping[4][2] -= 1; }},
+    {V::kStale, "too old", [](M& m) { m.utime -= 500'001; }},
+    {V::kStale, "very old", [](M& m) { m.utime = kFirst; }},
+    {V::kFromFuture, "ahead", [](M& m) { m.utime += 100'001; }},
+    {V::kFromFuture, "very far ahead", [](M& m) { m.utime = kLast; }},
+};
 
 TEST(CommandFilter, NamesEachFaultAndKeepsTheLastGoodCommand) {
   Random random(924);
-  for (const Fault& fault : faults()) {
+  for (const Fault& fault : kFaults) {
     SCOPED_TRACE(fault.name);
     CommandFilter filter(limits_for(7));
     const command_t good = random_command(random, 7);
@@ -312,17 +285,12 @@ TEST(CommandFilter, NamesEachFaultAndKeepsTheLastGoodCommand) {
   }
 }
 
-TEST(CommandFilter, RefusesAnotherNumberOfJoints) {
-  Random random(925);
-  CommandFilter filter(limits_for(7));
+TEST_F(CommandFilters, RefusesAnotherNumberOfJoints) {
   EXPECT_EQ(judge(filter, random_command(random, 6)), Verdict::kWrongSize);
   EXPECT_EQ(judge(filter, random_command(random, 8)), Verdict::kWrongSize);
 }
 
-TEST(CommandFilter, AcceptsGainsThatAreSemidefinite) {
-  Random random(926);
-  CommandFilter filter(limits_for(7));
-  command_t message = random_command(random, 7);
+TEST_F(CommandFilters, AcceptsGainsThatAreSemidefinite) {
   const Eigen::MatrixXd W = 10 * random.matrix(2, 7);
   message.joint_stiffness = rows_of(W.transpose() * W);
   for (auto& row : message.task_stiffness) std::fill(std::begin(row), std::end(row), 0.0);
@@ -330,9 +298,7 @@ TEST(CommandFilter, AcceptsGainsThatAreSemidefinite) {
   EXPECT_EQ(judge(filter, message), Verdict::kAccepted);
 }
 
-TEST(CommandFilter, RefusesReplays) {
-  Random random(927);
-  CommandFilter filter(limits_for(7));
+TEST_F(CommandFilters, RefusesReplays) {
   command_t first = random_command(random, 7), second = first;
   second.utime += 1000;
   ++second.sequence;
@@ -349,9 +315,7 @@ TEST(CommandFilter, RefusesReplays) {
 }
 
 // The time is right, the sequence is not, and the other way round.
-TEST(CommandFilter, WantsBothTimeAndSequenceToRise) {
-  Random random(928);
-  CommandFilter filter(limits_for(7));
+TEST_F(CommandFilters, WantsBothTimeAndSequenceToRise) {
   const command_t first = random_command(random, 7);
   ASSERT_EQ(judge(filter, first), Verdict::kAccepted);
   command_t message = first;
@@ -362,10 +326,7 @@ TEST(CommandFilter, WantsBothTimeAndSequenceToRise) {
   EXPECT_EQ(judge(filter, message, 10), Verdict::kReplayed);
 }
 
-TEST(CommandFilter, LetsARestartedSenderBeginItsSequenceAnewAfterASilence) {
-  Random random(929);
-  CommandFilter filter(limits_for(7));
-  command_t message = random_command(random, 7);
+TEST_F(CommandFilters, LetsARestartedSenderBeginItsSequenceAnewAfterASilence) {
   message.sequence = std::numeric_limits<std::int64_t>::max();
   ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
   message.sequence = 1;
@@ -375,10 +336,7 @@ TEST(CommandFilter, LetsARestartedSenderBeginItsSequenceAnewAfterASilence) {
   EXPECT_EQ(judge(filter, message, 600'001), Verdict::kAccepted);
 }
 
-TEST(CommandFilter, SurvivesAClockThatIsSetBack) {
-  Random random(930);
-  CommandFilter filter(limits_for(7));
-  command_t message = random_command(random, 7);
+TEST_F(CommandFilters, SurvivesAClockThatIsSetBack) {
   ASSERT_EQ(judge(filter, message), Verdict::kAccepted);
   // One hour back, as all clocks of the machine; a second later commands count again.
   const std::int64_t back = 3'600'000'000;

@@ -204,7 +204,7 @@ def main(library, config):
             run(1)
         return math.prod(modes.modes[i].natural_frequency for i in range(modes.count))
 
-    # Joint mode, then eight times the stiffness: n frequencies, each sqrt(8) as high on average.
+#Joint mode, then eight times the stiffness : n frequencies, each sqrt(8) as high on average.
     goal = Setpoint(c.sizeof(Setpoint), n, -2**63, 0, position)
     expect(plugin, plugin.set_setpoint(arm, goal))
 
@@ -221,7 +221,7 @@ def main(library, config):
     run(450)
     before = product_of_frequencies()
 
-    # Of all eigenvalues the product is det K / det M, whatever the damping.
+#Of all eigenvalues the product is det K / det M, whatever the damping.
     loop = ClosedLoop(struct_size=c.sizeof(ClosedLoop))
     here = Modes(struct_size=c.sizeof(Modes))
     expect(plugin, plugin.analyze(arm, position, 0, None, loop, here))

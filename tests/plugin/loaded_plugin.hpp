@@ -39,6 +39,21 @@ struct Destroy {
 };
 using Handle = std::unique_ptr<dashpot_controller, Destroy>;
 
+/// Nothing but its size.
+template <class Struct>
+Struct sized() {
+  Struct result{};
+  result.struct_size = sizeof result;
+  return result;
+}
+
+/// Gains of an arm of seven joints of which none is given.
+inline dashpot_gains panda_gains() {
+  auto gains = sized<dashpot_gains>();
+  gains.joints = 7;
+  return gains;
+}
+
 /// A controller configured by `text`, which is null if the plugin refuses.
 inline Handle create(const std::string& text) {
   const Scratch scratch;
@@ -77,14 +92,12 @@ struct Host {
             nullptr};
   }
   dashpot_snapshot snapshot() const {
-    dashpot_snapshot result{};
-    result.struct_size = sizeof result;
+    auto result = sized<dashpot_snapshot>();
     EXPECT_EQ(plugin().read_snapshot(controller.get(), &result), DASHPOT_OK);
     return result;
   }
   dashpot_modes modes() const {
-    dashpot_modes result{};
-    result.struct_size = sizeof result;
+    auto result = sized<dashpot_modes>();
     EXPECT_EQ(plugin().read_modes(controller.get(), &result), DASHPOT_OK);
     return result;
   }

@@ -15,8 +15,7 @@ namespace {
 using ::testing::HasSubstr;
 
 dashpot_payload payload(double mass, const double* tool_position = nullptr) {
-  dashpot_payload result{};
-  result.struct_size = sizeof result;
+  auto result = sized<dashpot_payload>();
   result.mass = mass;
   result.center[2] = 0.05;
   for (int i = 0; i < 3; ++i) result.inertia[4 * i] = 1e-3 * mass;
@@ -69,8 +68,7 @@ TEST(PluginPayload, BlendsIntoTheLoopAndItsModes) {
   EXPECT_GT(std::abs(before - found.modes[0].natural_frequency), 0.01 * before);
   for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(host.torque[i], configured.torque[i], 1e-9);
   // Without a loop as well.
-  dashpot_modes there{};
-  there.struct_size = sizeof there;
+  auto there = sized<dashpot_modes>();
   ASSERT_EQ(plugin().analyze(host.controller.get(), host.position.data(), DASHPOT_MODE_CARTESIAN,
                              nullptr, nullptr, &there),
             DASHPOT_OK);
@@ -116,9 +114,7 @@ TEST(PluginPayload, IsJudgedWithTheGainsInForce) {
   double margin = 0;
   EXPECT_EQ(plugin().judge_gains(host.controller.get(), nullptr, nullptr, &margin),
             DASHPOT_NULL_ARGUMENT);
-  dashpot_gains same{};
-  same.struct_size = sizeof same;
-  same.joints = 7;
+  dashpot_gains same = panda_gains();
   EXPECT_EQ(plugin().judge_gains(host.controller.get(), &same, nullptr, &margin), DASHPOT_OK);
 }
 
@@ -210,9 +206,7 @@ TEST(PluginPayload, IsTakenWithAWarningIfItIsBetterThanWhatIs) {
   const std::vector<double> folded{0, -0.2, 0, -2.9, 0, 2.9, 0.785};
   // The most damping that is borne at the start, a little of it less.
   std::array<double, 49> D{};
-  dashpot_gains gains{};
-  gains.struct_size = sizeof gains;
-  gains.joints = 7;
+  dashpot_gains gains = panda_gains();
   gains.joint_damping = D.data();
   const auto margin = [&](const std::vector<double>& q, double damping) {
     for (std::size_t i = 0; i < 7; ++i) D[8 * i] = i == 0 ? damping : 1;
@@ -262,8 +256,7 @@ TEST(PluginPayload, LeavesTheArmWhereItIsWithANewTool) {
   Host host = panda_host(kCartesian);
   host.tick();
   const dashpot_snapshot start = host.snapshot();
-  dashpot_setpoint goal{};
-  goal.struct_size = sizeof goal;
+  auto goal = sized<dashpot_setpoint>();
   goal.joints = 7;
   goal.mode = DASHPOT_MODE_CARTESIAN;
   goal.tip_position = start.tip_position;
@@ -302,8 +295,7 @@ TEST(PluginTipSpeed, IsAtMostThatOfTheConfiguration) {
               HasSubstr("limits.tip_velocity 100: must be at least 0.0001 and at most"));
   host.tick();
   const dashpot_snapshot start = host.snapshot();
-  dashpot_setpoint goal{};
-  goal.struct_size = sizeof goal;
+  auto goal = sized<dashpot_setpoint>();
   goal.joints = 7;
   goal.mode = DASHPOT_MODE_CARTESIAN;
   double position[3] = {start.tip_position[0], start.tip_position[1] + 0.2, start.tip_position[2]};

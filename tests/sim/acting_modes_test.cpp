@@ -133,9 +133,6 @@ TEST_P(ActingModes, AreThoseOfTheSimulatedMotion) {
   ReleasedArm arm(twin, settings, q0, JointVector::Zero(6));
   analysis::System<controller::kMaxJoints> system;
   arm.controller.closed_loop(system);
-  analysis::SpectrumSolver<controller::kMaxJoints> solver;
-  analysis::Spectrum<controller::kMaxJoints> spectrum;
-  solver.solve(system, spectrum);
   analysis::SampledLoop loop;
   loop.period = kPeriod;
   loop.friction = twin.friction();
@@ -145,7 +142,7 @@ TEST_P(ActingModes, AreThoseOfTheSimulatedMotion) {
     loop.memory = controller::integral_memory(
         integral_stiffness(robot, springs, settings.integral.time), kPeriod);
   }
-  const analysis::SampledSpectrum sampled = sample_loop(system, spectrum, loop);
+  const analysis::SampledSpectrum sampled = sample_loop(system, testing::spectrum_of(system), loop);
   EXPECT_TRUE(sampled.stable());
   const auto nearest = [](const std::vector<Complex>& all, Complex wanted) {
     double least = 1;
@@ -172,9 +169,8 @@ TEST_P(ActingModes, AreThoseOfTheSimulatedMotion) {
   plain.feed_forward.friction = false;
   ReleasedArm other(twin, plain, q0, JointVector::Zero(6));
   other.controller.closed_loop(system);
-  solver.solve(system, spectrum);
   loop.memory = {};
-  const analysis::SampledSpectrum without = sample_loop(system, spectrum, loop);
+  const analysis::SampledSpectrum without = sample_loop(system, testing::spectrum_of(system), loop);
   for (std::size_t k = 0; k < 6; ++k) {
     moved = std::max(
         moved, std::abs(without.modes[k].eigenvalues[0] / sampled.modes[k].eigenvalues[0] - 1.0));

@@ -39,89 +39,43 @@ class Dynamics : public ::testing::TestWithParam<ChainFile> {
 INSTANTIATE_TEST_SUITE_P(Chains, Dynamics, ::testing::ValuesIn(chains()),
                          [](const auto& instance) { return instance.param.name; });
 
-TEST_P(Dynamics, SatisfyTheEquationOfMotion) {
+TEST_P(Dynamics, AreThoseOfTheMassMatrix) {
   Random random(702);
-  RobotParameters parameters;
-  parameters.gravity = 5 * random.vector(3);
-  const Robot robot = testing::robot_of(file(), parameters);
-  ArticulatedBody bodies(robot);
-  const int n = robot.dof();
-  KdlReference reference(file(), robot.gravity());
-  for (int trial = 0; trial < 50; ++trial) {
-    const VectorXd q = 2 * random.vector(n), qd = random.vector(n), tau = 20 * random.vector(n);
-    const Vector6 wrench = 10 * random.vector(6);
-    VectorXd qdd(n);
-    bodies.move_to(q.data(), qd.data());
-    bodies.push_tip(wrench);
-    bodies.accelerations(tau.data(), qdd.data());
-    const Terms is = reference.at(q, qd);
-    const VectorXd left = is.M * qdd + is.coriolis + is.gravity;
-    const VectorXd right = tau + is.J.transpose() * wrench;
-    EXPECT_TRUE(near(left, right, 1e-11 * size_of(is, qdd, right)));
-  }
-}
-
-TEST_P(Dynamics, GiveTheAccelerationsOfTheMassMatrix) {
-  Random random(703);
-  const Robot robot = testing::robot_of(file());
-  ArticulatedBody bodies(robot);
-  const int n = robot.dof();
-  KdlReference reference(file(), robot.gravity());
-  for (int trial = 0; trial < 50; ++trial) {
-    const VectorXd q = 2 * random.vector(n), qd = random.vector(n), tau = 20 * random.vector(n);
-    VectorXd qdd(n);
-    bodies.move_to(q.data(), qd.data());
-    bodies.accelerations(tau.data(), qdd.data());
-    const Terms is = reference.at(q, qd);
-    const Eigen::LLT<MatrixXd> factors(is.M);
-    ASSERT_EQ(factors.info(), Eigen::Success);
-    // In coordinates where the mass is 1, so that light joints do not hide behind heavy ones.
-    const VectorXd expected = factors.solve(tau - is.coriolis - is.gravity);
-    const VectorXd difference = factors.matrixU() * (qdd - expected);
-    const double worth = std::max(1e-11, 1e-14 / factors.rcond());  // of the reference
-    EXPECT_LT(difference.norm(), worth * (factors.matrixU() * expected).norm());
-  }
-}
-
-TEST_P(Dynamics, AddArmatureToTheDiagonalOfTheMassMatrix) {
-  Random random(704);
   const int n = testing::robot_of(file()).dof();
-  RobotParameters parameters;
-  parameters.reflected_inertia = random.vector(n).cwiseAbs();
-  const Robot robot = testing::robot_of(file(), parameters);
-  ArticulatedBody bodies(robot);
-  KdlReference reference(file(), robot.gravity());
-  for (int trial = 0; trial < 20; ++trial) {
-    const VectorXd q = 2 * random.vector(n), qd = random.vector(n), tau = 20 * random.vector(n);
-    VectorXd qdd(n);
-    bodies.move_to(q.data(), qd.data());
-    bodies.accelerations(tau.data(), qdd.data());
-    Terms is = reference.at(q, qd);
-    is.M.diagonal() += parameters.reflected_inertia;
-    const VectorXd left = is.M * qdd + is.coriolis + is.gravity;
-    EXPECT_TRUE(near(left, tau, 1e-11 * size_of(is, qdd, tau)));
-    EXPECT_NEAR(bodies.kinetic_energy(), 0.5 * qd.dot(is.M * qd), 1e-12 * bodies.kinetic_energy());
-  }
-}
-
-TEST_P(Dynamics, PlaceTheTip) {
-  Random random(705);
-  const Robot robot = testing::robot_of(file());
-  ArticulatedBody bodies(robot);
-  const int n = robot.dof();
-  KdlReference reference(file(), robot.gravity());
-  for (int trial = 0; trial < 20; ++trial) {
-    const VectorXd q = 2 * random.vector(n), qd = random.vector(n);
-    const Vector6 wrench = random.vector(6);
-    bodies.move_to(q.data(), qd.data());
-    const Terms is = reference.at(q, qd);
-    const Pose tip = bodies.tip_pose();
-    EXPECT_TRUE(near(tip.position, is.tip_position, 1e-12 * n));
-    EXPECT_TRUE(near(tip.rotation, is.tip_rotation, 1e-13 * n));
-    EXPECT_TRUE(near(bodies.tip_twist(), is.J * qd, 1e-12 * (1 + (is.J * qd).norm())));
-    VectorXd tau(n);
-    bodies.transposed_jacobian(wrench, tau.data());
-    EXPECT_TRUE(near(tau, is.J.transpose() * wrench, 1e-12 * (1 + tau.norm())));
+  for (const bool reflected : {false, true}) {
+    RobotParameters parameters;
+    parameters.gravity = 5 * random.vector(3);
+    if (reflected) parameters.reflected_inertia = random.vector(n).cwiseAbs();
+    const Robot robot = testing::robot_of(file(), parameters);
+    ArticulatedBody bodies(robot);
+    KdlReference reference(file(), robot.gravity());
+    for (int trial = 0; trial < 40; ++trial) {
+      const VectorXd q = 2 * random.vector(n), qd = random.vector(n), tau = 20 * random.vector(n);
+      const Vector6 wrench = (trial % 2) * 10 * random.vector(6);
+      VectorXd qdd(n), pulled(n);
+      bodies.move_to(q.data(), qd.data());
+      if (trial % 2 == 1) bodies.push_tip(wrench);
+      bodies.accelerations(tau.data(), qdd.data());
+      Terms is = reference.at(q, qd);
+      if (reflected) is.M.diagonal() += parameters.reflected_inertia;
+      const VectorXd force = tau + is.J.transpose() * wrench - is.coriolis - is.gravity;
+      EXPECT_TRUE(near(is.M * qdd, force, 1e-11 * size_of(is, qdd, tau)));
+      EXPECT_NEAR(bodies.kinetic_energy(), 0.5 * qd.dot(is.M * qd),
+                  1e-12 * bodies.kinetic_energy());
+      // In coordinates where the mass is 1, so that light joints do not hide behind heavy ones.
+      const Eigen::LLT<MatrixXd> factors(is.M);
+      ASSERT_EQ(factors.info(), Eigen::Success);
+      const VectorXd expected = factors.solve(force);
+      const double worth = std::max(1e-11, 1e-14 / factors.rcond());  // of the reference
+      EXPECT_LT((factors.matrixU() * (qdd - expected)).norm(),
+                worth * (factors.matrixU() * expected).norm());
+      const Pose tip = bodies.tip_pose();
+      EXPECT_TRUE(near(tip.position, is.tip_position, 1e-12 * n));
+      EXPECT_TRUE(near(tip.rotation, is.tip_rotation, 1e-13 * n));
+      EXPECT_TRUE(near(bodies.tip_twist(), is.J * qd, 1e-12 * (1 + (is.J * qd).norm())));
+      bodies.transposed_jacobian(wrench, pulled.data());
+      EXPECT_TRUE(near(pulled, is.J.transpose() * wrench, 1e-12 * (1 + pulled.norm())));
+    }
   }
 }
 

@@ -42,15 +42,11 @@ double growth(const analysis::System<>& system, const analysis::SampledLoop& loo
   const int ticks = static_cast<int>(std::min(wanted, 50000.0));
   sim::LinearSystem masses(system.mass, D, MatrixXd::Zero(n, n));
   sim::Plant plant(masses, plant_options(loop), start);
-  double first = 0, last = 0;
-  for (int k = 0; k < ticks; ++k) {
+  return testing::growth(ticks, [&] {
     const sim::Measurement& seen = plant.measured();
     EXPECT_EQ(plant.step(-K * seen.position - C * seen.velocity), sim::Status::kOk);
-    const double speed = plant.velocity().norm();
-    if (k < ticks / 10) first = std::max(first, speed);
-    if (k >= ticks - ticks / 10) last = std::max(last, speed);
-  }
-  return last / first;
+    return plant.velocity().norm();
+  });
 }
 
 /// A loop that the fastest mode of the arm tries.

@@ -18,24 +18,14 @@ namespace {
 using controller::JointVector;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using testing::growth;
 using testing::plant_options;
 using testing::Random;
+using testing::spectrum_of;
 
 /// Ticks in which |z| or its inverse grows to e^9, and those before the largest |z| rules.
 int ticks_to_tell(double spectral_radius) {
   return 200 + static_cast<int>(9 / std::abs(std::log(spectral_radius)));
-}
-
-/// Growth of |q| from the first to the last tenth of the ticks.
-template <class Step>
-double growth(int ticks, const Step& step) {
-  double first = 0, last = 0;
-  for (int k = 0; k < ticks; ++k) {
-    const double size = step();
-    if (k < ticks / 10) first = std::max(first, size);
-    if (k >= ticks - ticks / 10) last = std::max(last, size);
-  }
-  return last / first;
 }
 
 TEST(LoopStability, TurnsWhereTheAnalysisSays) {
@@ -117,11 +107,6 @@ TEST_P(ArmStability, TurnsWhereTheAnalysisSays) {
     };
     std::optional<testing::ReleasedArm> keep;
     testing::ReleasedArm* arm = nullptr;
-    const auto spectrum_of = [&](const analysis::System<controller::kMaxJoints>& system) {
-      analysis::Spectrum<controller::kMaxJoints> spectrum;
-      analysis::SpectrumSolver<controller::kMaxJoints>().solve(system, spectrum);
-      return spectrum;
-    };
     release(1, arm, keep);
     const double margin = gain_margin(arm->closed_loop, spectrum_of(arm->closed_loop), loop);
     ASSERT_GT(margin, 1);

@@ -69,22 +69,18 @@ TEST(SensorFaults, SpoilNumbersAndTheClock) {
 
 TEST(SensorFaults, AreRefusedWhereTheyMakeNoSense) {
   LinearSystem mass(kOne, kZero, kZero);
-  PlantOptions options;
-  options.faults.resize(1);
-  options.faults[0].velocity_factor = joints({1, 1});
-  EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
-  options.faults[0].velocity_factor = joints({std::nan("")});
-  EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
-  options.faults[0].velocity_factor = joints({1});
-  EXPECT_NO_THROW(Plant(mass, options, joints({0})));
-  options.faults[0].position_offset = joints({0, 0});
-  EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
-  options.faults[0].position_offset = joints({std::nan("")});
-  EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
-  options.faults[0].position_offset = joints({0});
-  EXPECT_NO_THROW(Plant(mass, options, joints({0})));
-  options.faults[0].end = 0;
-  EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
+  for (const auto field : {&SensorFault::velocity_factor, &SensorFault::position_offset}) {
+    PlantOptions options;
+    options.faults.resize(1);
+    for (const auto& wrong : {joints({1, 1}), joints({std::nan("")})}) {
+      options.faults[0].*field = wrong;
+      EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
+    }
+    options.faults[0].*field = joints({1});
+    EXPECT_NO_THROW(Plant(mass, options, joints({0})));
+    options.faults[0].end = 0;
+    EXPECT_THROW(Plant(mass, options, joints({0})), InvalidScene);
+  }
 }
 
 TEST(Plant, IsCarriedByAHandThatDoesTheWork) {

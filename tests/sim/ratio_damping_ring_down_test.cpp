@@ -48,10 +48,7 @@ std::vector<double> seen_ratios(const TwinModels& twin, const controller::Settin
     arm.emplace(twin, settings, q0, dq);
     recordings.push_back(arm->record(q0, 300));
   }
-  analysis::IdentificationOptions options;
-  options.period = settings.period;
-  options.mass = arm->closed_loop.mass;
-  const analysis::IdentifiedModes fit = identify_modes(recordings, options);
+  const auto fit = testing::fit_modes(recordings, settings.period, arm->closed_loop.mass);
   std::vector<double> ratios;
   for (const analysis::IdentifiedMode& mode : fit.modes) {
     if (mode.natural_frequency > slowest) ratios.push_back(mode.damping_ratio);

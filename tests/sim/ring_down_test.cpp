@@ -12,33 +12,13 @@
 namespace dashpot {
 namespace {
 
-using analysis::Complex;
 using controller::JointVector;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::Random;
 using testing::ReleasedArm;
 using testing::TwinModels;
-
-/// Largest differences of all modes of an arm.
-struct Worst {
-  double frequency = 0;  ///< relative
-  double ratio = 0;
-  int modes = 0;
-
-  void add(double frequency_difference, double ratio_difference) {
-    frequency = std::max(frequency, frequency_difference);
-    ratio = std::max(ratio, ratio_difference);
-    ++modes;
-  }
-};
-
-/// The fitted mode nearest to an eigenvalue.
-const analysis::IdentifiedMode& nearest(const analysis::IdentifiedModes& fit, Complex eigenvalue) {
-  return *std::min_element(fit.modes.begin(), fit.modes.end(), [&](const auto& a, const auto& b) {
-    return std::abs(a.eigenvalues[0] - eigenvalue) < std::abs(b.eigenvalues[0] - eigenvalue);
-  });
-}
+using testing::Worst;
 
 /// One arm at one random posture with random gains, to be released with one period or another.
 struct ReleasedTwin {
@@ -82,16 +62,11 @@ struct ReleasedTwin {
       recordings.push_back(arm->record(q0, ticks, every, 40));
       ASSERT_EQ(arm->worst, controller::Status::kOk) << to_text(arm->worst);
     }
-    analysis::IdentificationOptions fit_options;
-    fit_options.period = every * loop.period;
-    fit_options.mass = arm->closed_loop.mass;
-    const analysis::IdentifiedModes fit = identify_modes(recordings, fit_options);
+    const auto fit = testing::fit_modes(recordings, every * loop.period, arm->closed_loop.mass);
     EXPECT_LT(fit.residual, 1e-3);
 
-    analysis::Spectrum<controller::kMaxJoints> spectrum;
-    analysis::SpectrumSolver<controller::kMaxJoints> solver;
-    solver.solve(arm->closed_loop, spectrum);
-    const analysis::SampledSpectrum images = sample_loop(arm->closed_loop, spectrum, loop);
+    const analysis::SampledSpectrum images =
+        sample_loop(arm->closed_loop, testing::spectrum_of(arm->closed_loop), loop);
     const controller::Vibration& published = arm->vibration;
     const bool free = twin.dof() > 6 && gains.null_stiffness.isZero(0);
     EXPECT_EQ(published.zero_modes, free ? 1 : 0);
@@ -100,15 +75,12 @@ struct ReleasedTwin {
     for (int k = 0; k < published.count; ++k) {
       const auto index = static_cast<std::size_t>(k);
       const controller::VibrationMode& mode = published.modes[index];
-      const analysis::SampledMode& image = images.modes[index];
-      const double omega = sampled ? image.natural_frequency : mode.natural_frequency;
-      const double ratio = sampled ? image.damping_ratio : mode.damping_ratio;
-      const Complex wanted = sampled ? image.eigenvalues[0] : mode.eigenvalues[0];
-      const analysis::IdentifiedMode& seen = nearest(fit, wanted);
-      worst.add(std::abs(seen.natural_frequency / omega - 1), std::abs(seen.damping_ratio - ratio));
-      const double most = sampled ? 1e-4 : 0.005;
-      EXPECT_LT(std::abs(seen.natural_frequency / omega - 1), most) << seen.natural_frequency;
-      EXPECT_LT(std::abs(seen.damping_ratio - ratio), most) << seen.damping_ratio;
+      if (sampled) {
+        worst.add(fit, images.modes[index], 1e-4, 1e-4);
+      } else {
+        worst.add(fit, mode.eigenvalues[0], mode.natural_frequency, mode.damping_ratio, 0.005,
+                  0.005);
+      }
     }
   }
 };

@@ -62,6 +62,17 @@ inline sim::Robot pendulum(int bars) {
   return sim::Robot::from_text(text + "</robot>", "link0", "link" + std::to_string(bars));
 }
 
+/// What InvalidScene says of what `make` makes.
+template <class Make>
+std::string refusal_of(const Make& make) {
+  try {
+    make();
+  } catch (const sim::InvalidScene& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
 /// Three masses that drift together (the first example of Kao and Saldarriaga, 2021).
 struct Chain3 {
   Eigen::Matrix3d M{{8, 0, 0}, {0, 2, 0}, {0, 0, 5}};

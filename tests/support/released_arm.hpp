@@ -4,6 +4,7 @@
 
 #include <dashpot/analysis/mode_identification.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/robot_model.hpp>
@@ -12,12 +13,15 @@
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/random.hpp>
 
+#include <gtest/gtest.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <vector>
 
 namespace dashpot::testing {
 
@@ -210,5 +214,50 @@ class ReleasedArm {
   std::optional<sim::Arm> arm_;
   std::optional<sim::Plant> plant_;
 };
+
+/// Largest differences between modes that were seen and modes that were predicted.
+struct Worst {
+  double frequency = 0;  ///< relative
+  double ratio = 0;
+  int modes = 0;
+
+  /// Compares the fitted mode next to `eigenvalue` with this frequency and ratio; both have to be
+  /// within these differences.
+  void add(const analysis::IdentifiedModes& fit, analysis::Complex eigenvalue, double omega,
+           double zeta, double most_frequency, double most_ratio) {
+    const auto& seen =
+        *std::min_element(fit.modes.begin(), fit.modes.end(), [&](const auto& a, const auto& b) {
+          return std::abs(a.eigenvalues[0] - eigenvalue) < std::abs(b.eigenvalues[0] - eigenvalue);
+        });
+    const double off = std::abs(seen.natural_frequency / omega - 1);
+    const double ratio_off = std::abs(seen.damping_ratio - zeta);
+    EXPECT_LT(off, most_frequency) << seen.natural_frequency;
+    EXPECT_LT(ratio_off, most_ratio) << seen.damping_ratio;
+    frequency = std::max(frequency, off);
+    ratio = std::max(ratio, ratio_off);
+    ++modes;
+  }
+  /// The same with a mode of a sampled loop.
+  void add(const analysis::IdentifiedModes& fit, const analysis::SampledMode& mode,
+           double most_frequency, double most_ratio) {
+    add(fit, mode.eigenvalues[0], mode.natural_frequency, mode.damping_ratio, most_frequency,
+        most_ratio);
+  }
+};
+
+inline analysis::IdentifiedModes fit_modes(const std::vector<analysis::Recording>& recordings,
+                                           double period, const Eigen::MatrixXd& mass) {
+  analysis::IdentificationOptions options;
+  options.period = period;
+  options.mass = mass;
+  return identify_modes(recordings, options);
+}
+
+inline analysis::Spectrum<controller::kMaxJoints> spectrum_of(
+    const analysis::System<controller::kMaxJoints>& system) {
+  analysis::Spectrum<controller::kMaxJoints> spectrum;
+  analysis::SpectrumSolver<controller::kMaxJoints>().solve(system, spectrum);
+  return spectrum;
+}
 
 }  // namespace dashpot::testing
