@@ -100,9 +100,22 @@ class StatusWriter {
 class DriveStatuses : public ::testing::TestWithParam<Arm> {
  protected:
   void SetUp() override {
-    if (!writer.until_answered()) GTEST_SKIP() << "multicast does not work on this machine";
+    if (!writer.until_answered()) GTEST_SKIP() << kNoMulticast;
   }
   double greatest_torque() const { return writer.commands.back().torque.cwiseAbs().maxCoeff(); }
+  /// Ends the program, whose last commands still need statuses; what it says.
+  Json end() {
+    driving.send(SIGTERM);
+    while (writer.step(20)) {
+    }
+    EXPECT_EQ(driving.finish(), 0) << driving.complaints();
+    return Json::parse(driving.output());
+  }
+  /// After some statuses that were answered.
+  void begin() {
+    writer.steps(20);
+    writer.forget();
+  }
 
   Arm arm = GetParam();
   std::string url = own_url();
@@ -155,8 +168,7 @@ TEST_P(DriveStatuses, ACommandHasTheTimeOfItsStatus) {
 }
 
 TEST_P(DriveStatuses, ADriverThatWasRestartedIsNotAnsweredAtOnce) {
-  writer.steps(20);
-  writer.forget();
+  begin();
   if (arm.kind == DriverKind::kIiwa) {
     const DriverStatus last = writer.next;
     writer.next.utime = -1;
@@ -171,19 +183,14 @@ TEST_P(DriveStatuses, ADriverThatWasRestartedIsNotAnsweredAtOnce) {
   EXPECT_GE(writer.commands.front().utime - began, 300'000);
   writer.steps(20);
   EXPECT_LT(greatest_torque(), 1e-9);  // the springs have ended, and the arm is at rest
-  driving.send(SIGTERM);
-  while (writer.step(20)) {
-  }
-  driving.finish();
-  const Json result = Json::parse(driving.output());
+  const Json result = end();
   EXPECT_EQ(result["fault"]["status"], "gap between states, damping");
   EXPECT_GE(result["statuses"]["awaited"].get<int>(), 100);
   EXPECT_THAT(driving.complaints(), HasSubstr("a fault has latched, the arm is damped: gap"));
 }
 
 TEST_P(DriveStatuses, AClockThatGoesBackEndsIt) {
-  writer.steps(20);
-  writer.forget();
+  begin();
   writer.next.utime -= 900'000;
   for (int k = 0; k < 2000; ++k) {
     writer.step(1);
@@ -197,8 +204,7 @@ TEST_P(DriveStatuses, AClockThatGoesBackEndsIt) {
 
 /// Neither is answered nor believed, and the next one is as if there had been none.
 TEST_P(DriveStatuses, OthersThanOfThisArmAreNotAnswered) {
-  writer.steps(20);
-  writer.forget();
+  begin();
   DriverStatus other = writer.next;
   other.utime = std::numeric_limits<std::int64_t>::max();
   EXPECT_FALSE(writer.send(other, 50));
@@ -209,11 +215,7 @@ TEST_P(DriveStatuses, OthersThanOfThisArmAreNotAnswered) {
   }
   ASSERT_TRUE(writer.until_answered());
   EXPECT_EQ(writer.commands.back().torque.size(), 7);
-  driving.send(SIGTERM);
-  while (writer.step(20)) {
-  }
-  EXPECT_EQ(driving.finish(), 0);
-  const Json result = Json::parse(driving.output());
+  const Json result = end();
   EXPECT_EQ(result["statuses"]["unreadable"], 5);
   EXPECT_EQ(result["faults"], 0);
 }
@@ -221,8 +223,7 @@ TEST_P(DriveStatuses, OthersThanOfThisArmAreNotAnswered) {
 /// The arm is pushed away, faster than the torque may change and further than it may be large.
 TEST_P(DriveStatuses, TorquesKeepToTheLimitsOfTheConfiguration) {
   if (DASHPOT_THREAD_SANITIZED) GTEST_SKIP() << "the loop has gaps then";
-  writer.steps(20);
-  writer.forget();
+  begin();
   const double most = arm.kind == DriverKind::kIiwa ? 80 : 40;  // N m, of the first joint
   double greatest = 0, steepest = 0, before = 0;
   std::int64_t then = writer.next.utime;
@@ -263,10 +264,7 @@ TEST_P(DriveStatuses, VelocitiesAfterPositionsThatAreNoNumbers) {
   writer.next.position = good.position;
   writer.next.position[0] += 8e-3 * velocity;
   move(50);
-  driving.send(SIGTERM);
-  while (writer.step(20)) {
-  }
-  driving.finish();
+  end();
   double fastest = 0;
   for (const state_t& state : states_of(log)) {
     fastest = std::max(fastest, std::abs(state.joint_velocity[0]));
@@ -283,17 +281,14 @@ TEST_P(DriveStatuses, AnExternalTorqueNearTheDriversLimitIsTold) {
   EXPECT_THAT(driving.complaints(), ::testing::Not(HasSubstr("external torque")));
   writer.next.external[5] = -9.7;
   writer.steps(20);
-  driving.send(SIGTERM);
-  while (writer.step(20)) {
-  }
-  EXPECT_EQ(driving.finish(), 0);
+  const Json result = end();
   const auto told = HasSubstr("joint 6: external torque -9.7 N m; the driver stops at 12 N m");
   if (arm.kind == DriverKind::kIiwa) {
     EXPECT_THAT(driving.complaints(), told);
   } else {  // libfranka's limits are the robot's own business
     EXPECT_THAT(driving.complaints(), ::testing::Not(HasSubstr("external torque")));
   }
-  EXPECT_EQ(Json::parse(driving.output())["external_torque"][5], 9.7);
+  EXPECT_EQ(result["external_torque"][5], 9.7);
 }
 
 INSTANTIATE_TEST_SUITE_P(Arms, DriveStatuses, ::testing::Values(kIiwa, kPanda),
@@ -314,7 +309,7 @@ TEST(DriveInTime, AStatusOlderThanTwoPeriodsIsNotAnswered) {
       }
       return true;
     };
-    if (!until_answered()) GTEST_SKIP() << "multicast does not work on this machine";
+    if (!until_answered()) GTEST_SKIP() << kNoMulticast;
     for (int k = 0; k < 50; ++k) writer.step_in_time();
     writer.forget();
     ASSERT_TRUE(until_answered());

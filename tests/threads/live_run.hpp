@@ -4,9 +4,10 @@
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/command_t.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
-#include <dashpot/tests/apps/run_program.hpp>
+#include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/places.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <lcm/lcm-cpp.hpp>
@@ -107,6 +108,42 @@ class Listener {
   std::shared_ptr<lcm::LCM> bus_;
   lcmtypes::MessageHandlers handlers_;
   std::optional<lcmtypes::BusReader> reader_;
+};
+
+inline constexpr const char* kNoMulticast = "multicast does not work on this machine";
+
+/// A `dashpot run` beside the test, for a minute at most unless told otherwise, and what it says
+/// over a bus of its own.
+class LiveRun : public Listener {
+ public:
+  explicit LiveRun(const std::string& scene, std::vector<std::string> more = {"--commands"},
+                   std::string bus_url = own_url())
+      : Listener(bus_url), url(std::move(bus_url)), run([&] {
+          more.insert(more.begin(), {"run", scene, "--json", "--lcm-url", url});
+          if (std::find(more.begin(), more.end(), "--duration") == more.end()) {
+            more.insert(more.end(), {"--duration", "60"});
+          }
+          return more;
+        }()) {}
+
+  /// Waits for states, and modes; false if none come, which is so without multicast.
+  bool heard(int least_modes = 0) {
+    return until([&] { return states > 100 && modes_messages >= least_modes; });
+  }
+  /// Waits for so many ticks more.
+  bool passed(std::int64_t ticks) {
+    return until([this, end = state.tick + ticks] { return state.tick > end; });
+  }
+  void publish(const command_t& command) { bus().publish(lcmtypes::kCommandChannel, &command); }
+  /// Ends the run; what it says at its end.
+  Json end(int signal = SIGTERM) {
+    run.send(signal);
+    EXPECT_EQ(run.finish(), 0) << run.complaints();
+    return Json::parse(run.output());
+  }
+
+  std::string url;
+  Running run;
 };
 
 /// Now, us since 1970-01-01 UTC.

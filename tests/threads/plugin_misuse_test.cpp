@@ -75,8 +75,7 @@ TEST(PluginRefuses, AnotherNumberOfJoints) {
   dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());
   setpoint.joints = 8;
   EXPECT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_WRONG_JOINTS);
-  dashpot_gains gains{};
-  gains.struct_size = sizeof gains;
+  auto gains = sized<dashpot_gains>();
   EXPECT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_WRONG_JOINTS);
 }
 
@@ -103,9 +102,7 @@ TEST(PluginRefuses, ImpossibleValues) {
   EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_WRONG_VALUE);
   EXPECT_STREQ(plugin().last_error(), "tip_pose.rotation is not a rotation matrix");
 
-  dashpot_gains gains{};
-  gains.struct_size = sizeof gains;
-  gains.joints = 7;
+  dashpot_gains gains = panda_gains();
   const std::int32_t frame = 5;
   gains.frame = &frame;
   EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_WRONG_VALUE);
@@ -119,11 +116,9 @@ TEST(PluginRefuses, ImpossibleValues) {
 
 TEST(PluginRefuses, ToReadBeforeTheFirstTick) {
   const Handle arm = create(panda());
-  dashpot_snapshot snapshot{};
-  snapshot.struct_size = sizeof snapshot;
+  auto snapshot = sized<dashpot_snapshot>();
   EXPECT_EQ(plugin().read_snapshot(arm.get(), &snapshot), DASHPOT_NOTHING_YET);
-  dashpot_modes modes{};
-  modes.struct_size = sizeof modes;
+  auto modes = sized<dashpot_modes>();
   EXPECT_EQ(plugin().read_modes(arm.get(), &modes), DASHPOT_NOTHING_YET);
   dashpot_sampled_modes sampled{};
   EXPECT_EQ(plugin().read_sampled_modes(arm.get(), &sampled), DASHPOT_WRONG_STRUCT_SIZE);

@@ -29,8 +29,7 @@ MatrixXd rows(const double* values, int m, int n) {
 
 dashpot_dynamics dynamics(const Handle& arm, const std::vector<double>& q,
                           const double* velocity = nullptr) {
-  dashpot_dynamics result{};
-  result.struct_size = sizeof result;
+  auto result = sized<dashpot_dynamics>();
   EXPECT_EQ(plugin().evaluate(arm.get(), q.data(), velocity, &result), DASHPOT_OK);
   return result;
 }
@@ -118,9 +117,7 @@ TEST(PluginPosture, FindsTheModesThatALoopPublishes) {
   C.diagonal() << 10, 10, 8, 8, 2, 2, 0.3;
   K(1, 2) = K(2, 1) = 20;
   const MatrixXd friction = 0.003 * MatrixXd::Identity(7, 7);  // that of the URDF
-  dashpot_gains gains{};
-  gains.struct_size = sizeof gains;
-  gains.joints = 7;
+  dashpot_gains gains = panda_gains();
   gains.joint_stiffness = K.data();
   gains.joint_damping = C.data();
   for (const bool cartesian : {false, true}) {
@@ -157,9 +154,7 @@ TEST(PluginPosture, FindsTheModesThatALoopPublishes) {
 TEST(PluginPosture, KnowsARobotWithoutSprings) {
   const Handle arm = create(panda());
   const MatrixXd none = MatrixXd::Zero(7, 7), C = 3 * MatrixXd::Identity(7, 7);
-  dashpot_gains gains{};
-  gains.struct_size = sizeof gains;
-  gains.joints = 7;
+  dashpot_gains gains = panda_gains();
   gains.joint_stiffness = none.data();
   gains.joint_damping = C.data();
   const Found found = analyze(arm, DASHPOT_MODE_JOINT, &gains);
@@ -220,9 +215,7 @@ TEST(PluginPosture, RefusesWhatIsWrong) {
   EXPECT_EQ(analyzed(bad.data(), DASHPOT_MODE_JOINT), DASHPOT_WRONG_VALUE);
   EXPECT_EQ(plugin().evaluate(arm.get(), bad.data(), nullptr, &at), DASHPOT_WRONG_VALUE);
   EXPECT_EQ(plugin().evaluate(arm.get(), q, bad.data(), &at), DASHPOT_WRONG_VALUE);
-  dashpot_gains gains{};
-  gains.struct_size = sizeof gains;
-  gains.joints = 7;
+  dashpot_gains gains = panda_gains();
   const MatrixXd K = -MatrixXd::Identity(7, 7);
   gains.joint_stiffness = K.data();
   EXPECT_EQ(analyzed(q, DASHPOT_MODE_JOINT, &gains), DASHPOT_WRONG_VALUE);

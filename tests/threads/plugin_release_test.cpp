@@ -29,9 +29,7 @@ class PluginRelease : public ::testing::Test {
   void release() { EXPECT_EQ(plugin().release(arm()), DASHPOT_OK); }
   void set_stiffness(double stiffness) {
     const Eigen::Matrix<double, 7, 7> K = stiffness * Eigen::Matrix<double, 7, 7>::Identity();
-    dashpot_gains gains{};
-    gains.struct_size = sizeof gains;
-    gains.joints = 7;
+    dashpot_gains gains = panda_gains();
     gains.joint_stiffness = K.data();
     ASSERT_EQ(plugin().set_gains(arm(), &gains), DASHPOT_OK) << plugin().last_error();
   }

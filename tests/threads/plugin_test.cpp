@@ -334,9 +334,7 @@ TEST(Plugin, RefusesGainsThatTheSampledLoopDoesNotBear) {
   Host host(create(panda()), panda_posture());
   host.tick();
   std::array<double, 49> damping{};
-  dashpot_gains gains = {};
-  gains.struct_size = sizeof gains;
-  gains.joints = 7;
+  dashpot_gains gains = panda_gains();
   gains.joint_damping = damping.data();
   for (std::size_t i = 0; i < 7; ++i) damping[8 * i] = 20;
   double margin = 0;
@@ -360,8 +358,7 @@ TEST(Plugin, HasNoModesAfterAReset) {
   for (const char* where : {"inline", "background"}) {
     Host host = panda_host("analysis: {where: " + std::string(where) + "}\n");
     dashpot_controller* const arm = host.controller.get();
-    dashpot_modes modes{};
-    modes.struct_size = sizeof modes;
+    auto modes = sized<dashpot_modes>();
     while (plugin().read_modes(arm, &modes) != DASHPOT_OK) host.tick();
     ASSERT_EQ(plugin().reset(arm, host.torque.data()), DASHPOT_OK);
     EXPECT_EQ(plugin().read_modes(arm, &modes), DASHPOT_NOTHING_YET);
@@ -386,9 +383,7 @@ TEST(Plugin, ChangesGainsAtRunTime) {
   };
   const double before = product();
   const Eigen::Matrix<double, 7, 7> stiffness = 400 * Eigen::Matrix<double, 7, 7>::Identity();
-  dashpot_gains gains{};
-  gains.struct_size = sizeof gains;
-  gains.joints = 7;
+  dashpot_gains gains = panda_gains();
   gains.joint_stiffness = stiffness.data();
   ASSERT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_OK);
   EXPECT_NEAR(product() / before, 128, 1e-6);
@@ -413,9 +408,7 @@ TEST(Plugin, HoldsADampingRatio) {
     return count;
   };
   double ratio = 0.4;
-  dashpot_gains gains{};
-  gains.struct_size = sizeof gains;
-  gains.joints = 7;
+  dashpot_gains gains = panda_gains();
   gains.task_damping_ratio = &ratio;
   ASSERT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
   EXPECT_EQ(modes_with(0.4), 6);

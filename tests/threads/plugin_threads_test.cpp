@@ -18,9 +18,7 @@ TEST(Plugin, AllocatesNothingInATick) {
     Host host(create(panda() + mode + "analysis: {every: 2}\n"), panda_posture());
     std::vector<double> goal = panda_posture();
     const dashpot_setpoint setpoint = host.joint_setpoint(goal);
-    dashpot_gains gains{};
-    gains.struct_size = sizeof gains;
-    gains.joints = 7;
+    dashpot_gains gains = panda_gains();
     Eigen::Matrix<double, 6, 6> K_C = Eigen::Matrix<double, 6, 6>::Identity();
     gains.task_stiffness = K_C.data();
     for (int tick = 0; tick < 500; ++tick) {
@@ -52,9 +50,7 @@ TEST(Plugin, ServesTwoThreads) {
     dashpot_controller* const arm = host.controller.get();
     std::vector<double> goal = panda_posture();
     Eigen::Matrix<double, 7, 7> K = Eigen::Matrix<double, 7, 7>::Identity();
-    dashpot_gains gains{};
-    gains.struct_size = sizeof gains;
-    gains.joints = 7;
+    dashpot_gains gains = panda_gains();
     gains.joint_stiffness = K.data();
     const auto modes = std::make_unique<dashpot_modes>();
     std::uint64_t last = 0;
@@ -71,8 +67,7 @@ TEST(Plugin, ServesTwoThreads) {
                                          nullptr};
       EXPECT_EQ(plugin().set_setpoint(arm, &setpoint), DASHPOT_OK);
       EXPECT_EQ(plugin().set_gains(arm, &gains), DASHPOT_OK);
-      dashpot_snapshot snapshot{};
-      snapshot.struct_size = sizeof snapshot;
+      auto snapshot = sized<dashpot_snapshot>();
       if (plugin().read_snapshot(arm, &snapshot) == DASHPOT_OK) {
         EXPECT_GE(snapshot.tick, last);
         if (snapshot.tick != last) snapshots.push_back(snapshot);

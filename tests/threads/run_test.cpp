@@ -14,21 +14,15 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST(RunInRealTime, PublishesStatesAndModesUntilCtrlC) {
-  const std::string url = own_url();
-  Listener listener(url);
-  Running run({"run", scene("panda_release_c2"), "--lcm-url", url, "--duration", "60", "--json"});
-  if (!listener.until([&] { return listener.states > 100 && listener.modes_messages > 5; })) {
-    GTEST_SKIP() << "multicast does not work on this machine: " << url;
-  }
-  EXPECT_EQ(listener.malformed(), 0);
-  EXPECT_EQ(listener.state.n, 7);
-  EXPECT_EQ(listener.state.mode, state_t::CARTESIAN);
-  EXPECT_EQ(listener.modes.zero_modes, 1);
-  EXPECT_EQ(listener.modes.num_modes, 6);
-  EXPECT_NEAR(static_cast<double>(listener.state.utime), static_cast<double>(utime()), 20e6);
-  run.send(SIGINT);
-  EXPECT_EQ(run.finish(), 0);
-  const Json result = Json::parse(run.output());
+  LiveRun live(scene("panda_release_c2"), std::vector<std::string>{});
+  if (!live.heard(6)) GTEST_SKIP() << kNoMulticast;
+  EXPECT_EQ(live.malformed(), 0);
+  EXPECT_EQ(live.state.n, 7);
+  EXPECT_EQ(live.state.mode, state_t::CARTESIAN);
+  EXPECT_EQ(live.modes.zero_modes, 1);
+  EXPECT_EQ(live.modes.num_modes, 6);
+  EXPECT_NEAR(static_cast<double>(live.state.utime), static_cast<double>(utime()), 20e6);
+  const Json result = live.end(SIGINT);
   EXPECT_EQ(result["interrupted"], true);
   EXPECT_EQ(result["real_time"], true);
   EXPECT_LT(result["ticks"].get<int>(), 60'000);
@@ -36,17 +30,12 @@ TEST(RunInRealTime, PublishesStatesAndModesUntilCtrlC) {
 }
 
 TEST(RunInRealTime, PublishesTheSampledLoop) {
-  const std::string url = own_url();
-  Listener listener(url);
-  Running run({"run", scene("panda"), "--lcm-url", url, "--duration", "60", "--json"});
-  if (!listener.until([&] { return listener.states > 100; })) {
-    GTEST_SKIP() << "multicast does not work on this machine: " << url;
-  }
-  ASSERT_TRUE(listener.until([&] { return listener.sampled_messages >= 2; }));
-  EXPECT_EQ(listener.malformed(), 0);
-  run.send(SIGTERM);
-  EXPECT_EQ(run.finish(), 0);
-  const sampled_modes_t& sampled = listener.sampled;
+  LiveRun live(scene("panda"), std::vector<std::string>{});
+  if (!live.heard()) GTEST_SKIP() << kNoMulticast;
+  ASSERT_TRUE(live.until([&] { return live.sampled_messages >= 2; }));
+  EXPECT_EQ(live.malformed(), 0);
+  const Json result = live.end();
+  const sampled_modes_t& sampled = live.sampled;
   EXPECT_EQ(sampled.n, 7);
   EXPECT_EQ(sampled.status, 0);
   EXPECT_LT(sampled.spectral_radius, 1);
@@ -57,26 +46,21 @@ TEST(RunInRealTime, PublishesTheSampledLoop) {
     EXPECT_NEAR(sampled.natural_frequency[i], sampled.continuous_frequency[i],
                 0.1 * sampled.continuous_frequency[i]);
   }
-  EXPECT_GE(Json::parse(run.output())["messages"]["sampled_modes"].get<int>(), 2);
+  EXPECT_GE(result["messages"]["sampled_modes"].get<int>(), 2);
 }
 
 TEST(RunInRealTime, DoesNotNoticeWhoListens) {
-  const std::string url = own_url();
-  Listener listener(url);
-  Running run({"run", scene("ur5"), "--lcm-url", url, "--duration", "3", "--json"});
-  if (!listener.until([&] { return listener.states > 100; })) {
-    GTEST_SKIP() << "multicast does not work on this machine: " << url;
-  }
+  LiveRun live(scene("ur5"), {"--duration", "1.5"});
+  if (!live.heard()) GTEST_SKIP() << kNoMulticast;
   for (int i = 0; i < 3; ++i) {
-    Running monitor({"monitor", "--lcm-url", url});
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    Running monitor({"monitor", "--lcm-url", live.url});
+    std::this_thread::sleep_for(std::chrono::milliseconds(150));
     monitor.send(SIGKILL);
     EXPECT_EQ(monitor.finish(), 128 + SIGKILL);
   }
-  EXPECT_EQ(run.finish(), 0);
-  const Json result = Json::parse(run.output());
-  EXPECT_EQ(result["ticks"], 3000);
-  EXPECT_EQ(result["status"], Json({{"ok", 3000}}));
+  const Json result = live.end(0);
+  EXPECT_EQ(result["ticks"], 1500);
+  EXPECT_EQ(result["status"], Json({{"ok", 1500}}));
   EXPECT_EQ(result["messages"]["errors"], 0);
 }
 
@@ -95,7 +79,7 @@ bool has_a_row(const std::string& csv) {
 // Whoever takes the processor away for longer than a period makes no tick slower.
 TEST(RunInFastMotion, CountsItsOwnComputingAlone) {
   Running run({"run", scene("panda_release_c2"), "--fast", "--duration", "60", "--json"});
-  for (int i = 0; i < 150; ++i) {
+  for (int i = 0; i < 100; ++i) {
     run.send(SIGSTOP);
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
     run.send(SIGCONT);
@@ -104,7 +88,7 @@ TEST(RunInFastMotion, CountsItsOwnComputingAlone) {
   EXPECT_EQ(run.finish(), 0) << run.complaints();
   const Json result = Json::parse(run.output());
   EXPECT_EQ(result["ticks"], 60'000);
-  EXPECT_LT(result["overruns"], 50);  // of 150 interruptions, each longer than a period
+  EXPECT_LT(result["overruns"], 35);  // of 100 interruptions, each longer than a period
 }
 
 // The releases take long with a period this short; the run itself is over when its table is there.
@@ -129,10 +113,10 @@ TEST(RunInFastMotion, EndsItsRingDownOnCtrlC) {
 }
 
 TEST(RunInRealTime, ShowsHowFarItIs) {
-  Running run({"run", scene("chain3"), "--duration", "4.5", "--lcm-url", own_url()});
+  Running run({"run", scene("chain3"), "--duration", "2.5", "--lcm-url", own_url()});
   EXPECT_EQ(run.finish(), 0);
-  EXPECT_THAT(run.complaints(), HasSubstr(" of 4.5 s, "));
-  EXPECT_THAT(run.output(), HasSubstr("4500 ticks of 1.00 ms, in real time; "));
+  EXPECT_THAT(run.complaints(), HasSubstr(" of 2.5 s, "));
+  EXPECT_THAT(run.output(), HasSubstr("2500 ticks of 1.00 ms, in real time; "));
 }
 
 }  // namespace

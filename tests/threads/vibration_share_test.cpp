@@ -8,9 +8,16 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <ostream>
+#include <string>
 #include <thread>
 
 namespace dashpot::controller {
+
+void PrintTo(Mode mode, std::ostream* out) {
+  *out << (mode == Mode::kJoint ? "joint" : "cartesian");
+}
+
 namespace {
 
 using analysis::SpectrumOrigin;
@@ -130,7 +137,10 @@ TEST_P(VibrationShare, IsNotSpentInVain) {
   ASSERT_TRUE(arm.wait_until(false, [](const Vibration& v) { return v.count > 0; }));
 }
 
-INSTANTIATE_TEST_SUITE_P(Modes, VibrationShare, ::testing::Values(Mode::kJoint, Mode::kCartesian));
+INSTANTIATE_TEST_SUITE_P(Modes, VibrationShare, ::testing::Values(Mode::kJoint, Mode::kCartesian),
+                         [](const auto& mode) {
+                           return std::string(mode.param == Mode::kJoint ? "joint" : "cartesian");
+                         });
 
 }  // namespace
 }  // namespace dashpot::controller

@@ -9,6 +9,7 @@
 #include <poll.h>
 #include <sys/socket.h>
 
+#include <atomic>
 #include <fstream>
 #include <limits>
 #include <thread>
@@ -87,6 +88,12 @@ class Site {
     return client.hear();
   }
   std::string host() const { return "Host: 127.0.0.1:" + std::to_string(port) + "\r\n"; }
+  /// A page that gets the stream.
+  Connection open_stream() const {
+    Connection page(port);
+    page.say("GET /stream HTTP/1.1\r\n" + host() + "\r\n");
+    return page;
+  }
   std::string get(const std::string& path) const {
     return ask("GET " + path + " HTTP/1.1", host());
   }
@@ -154,40 +161,37 @@ TEST(WebMonitor, ReachesNoFile) {
   }
 }
 
-TEST(WebMonitor, EndsRequestsThatAreLongOrNoRequests) {
+TEST(WebMonitor, EndsRequestsThatAreLongSlowOrNoRequests) {
   const Site site({"--lcm-url", own_url()});
   const std::string much(200'000, 'a');
+  std::vector<Connection> bad;
   for (const std::string& text :
        {"GET /" + much + " HTTP/1.1\r\n" + site.host() + "\r\n",
         "GET / HTTP/1.1\r\n" + site.host() + "X: " + much + "\r\n\r\n", much,
         std::string(1000, '\0') + "\r\n\r\n", std::string("\x16\x03\x01\x02") + much}) {
-    const Connection client(site.port);
-    client.say(text);
-    EXPECT_THAT(client.hear(), Not(HasSubstr("200 OK")));
+    bad.emplace_back(site.port).say(text);
   }
-  EXPECT_THAT(site.get("/"), StartsWith("HTTP/1.1 200"));
-}
-
-TEST(WebMonitor, CutsOffTheSlow) {
-  const Site site({"--lcm-url", own_url()});
-  const Connection client(site.port);
-  client.say("GET / HT");
-  std::thread drip([&client] {  // a byte now and then keeps nothing open
-    for (int i = 0; i < 30; ++i) {
-      client.say("x");
+  const Connection slow(site.port);
+  slow.say("GET / HT");
+  std::atomic<bool> ended = false;
+  std::thread drip([&] {  // a byte now and then keeps nothing open
+    while (!ended) {
+      slow.say("x");
       std::this_thread::sleep_for(std::chrono::milliseconds(200));
     }
   });
   const auto begin = Clock::now();
-  EXPECT_EQ(client.hear(), "");
+  EXPECT_EQ(slow.hear(), "");
   EXPECT_LT(Clock::now() - begin, std::chrono::seconds(9));  // hear() gives up after ten
+  ended = true;
   drip.join();
+  for (const Connection& client : bad) EXPECT_THAT(client.hear(), Not(HasSubstr("200 OK")));
+  EXPECT_THAT(site.get("/"), StartsWith("HTTP/1.1 200"));
 }
 
 TEST(WebMonitor, ServesPagesBesideThousandsOfConnections) {
   const Site site({"--lcm-url", own_url()});
-  const Connection page(site.port);
-  page.say("GET /stream HTTP/1.1\r\n" + site.host() + "\r\n");
+  const Connection page = site.open_stream();
   ASSERT_THAT(page.hear("data: "), HasSubstr("data: "));
   for (int round = 0; round < 10; ++round) {
     std::vector<Connection> idle;
@@ -202,8 +206,7 @@ TEST(WebMonitor, ServesPagesBesideThousandsOfConnections) {
 
 TEST(WebMonitor, EndsWithPagesOpen) {
   Site site({"--lcm-url", own_url()});
-  const Connection page(site.port);
-  page.say("GET /stream HTTP/1.1\r\n" + site.host() + "\r\n");
+  const Connection page = site.open_stream();
   ASSERT_THAT(page.hear("data: "), HasSubstr("data: "));
   site.monitor().send(SIGTERM);
   EXPECT_EQ(site.monitor().finish(), 0) << site.monitor().complaints();
@@ -214,7 +217,7 @@ TEST(WebMonitor, OpensAFewStreamsOnly) {
   const Site site({"--lcm-url", own_url()});
   std::vector<Connection> pages;
   for (int i = 0; i < 8; ++i) {
-    pages.emplace_back(site.port).say("GET /stream HTTP/1.1\r\n" + site.host() + "\r\n");
+    pages.push_back(site.open_stream());
     ASSERT_THAT(pages.back().hear("data: "), HasSubstr("data: "));
   }
   EXPECT_THAT(site.get("/stream"), StartsWith("HTTP/1.1 503"));
@@ -222,9 +225,7 @@ TEST(WebMonitor, OpensAFewStreamsOnly) {
   std::string again;
   for (int i = 0; i < 100 && !again.starts_with("HTTP/1.1 200"); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    const Connection next(site.port);
-    next.say("GET /stream HTTP/1.1\r\n" + site.host() + "\r\n");
-    again = next.hear("\r\n\r\n");
+    again = site.open_stream().hear("\r\n\r\n");
   }
   EXPECT_THAT(again, StartsWith("HTTP/1.1 200"));
 }
@@ -294,30 +295,6 @@ TEST(WebMonitor, ComputesTheResponseAtAPosture) {
   }
 }
 
-TEST(WebMonitor, RefusesBadInput) {
-  const Scratch scratch;
-  const auto expect_error = [](const std::vector<std::string>& words, const std::string& text) {
-    const Outcome outcome = run_program(words);
-    EXPECT_EQ(outcome.status, 2) << text;
-    EXPECT_EQ(outcome.out, "");
-    EXPECT_THAT(outcome.err, HasSubstr(text));
-    EXPECT_EQ(count_lines(outcome.err), 1);
-  };
-  expect_error({"monitor", "--web", "0", "--log", scratch.write("a.txt", "no log")}, "--log: ");
-  expect_error({"monitor", "--web", "0", "--log", "/nonexistent.lcm"}, "--log: ");
-  expect_error({"monitor", "--web", "0", "--config", "/nonexistent.yaml"}, "/nonexistent.yaml");
-  expect_error({"monitor", "--web", "70000"}, "--web");
-  expect_error({"monitor", "--config", "x"}, "--web");
-  const std::string log = short_log(scratch);
-  expect_error({"monitor", "--web", "0", "--log", log, "--identified", scratch.write("i", "{}")},
-               "\"modes\"");
-  expect_error({"monitor", "--web", "0", "--log", log, "--identified",
-                scratch.write("j", R"({"modes": [{"natural_frequency": "x"}]})")},
-               "\"natural_frequency\"");
-  const Site first({"--log", log});
-  expect_error({"monitor", "--web", std::to_string(first.port), "--log", log}, "in use");
-}
-
 TEST(Export, WritesALineForEachModeOfEachMessage) {
   const Scratch scratch;
   const std::string log = short_log(scratch);
@@ -351,20 +328,37 @@ TEST(Export, WritesALineForEachModeOfEachMessage) {
   EXPECT_FALSE(std::getline(table, line));
 }
 
-TEST(Export, RefusesBadInput) {
+TEST(WebMonitor, AndExportRefuseBadInput) {
   const Scratch scratch;
-  const std::string log = short_log(scratch);
-  const std::string text = scratch.write("a.txt", "no log");
-  for (const auto& words : std::vector<std::vector<std::string>>{
-           {"export", log},
-           {"export", log, "--csv", log},
-           {"export", log, "--csv", scratch.path("x"), "--mcap", scratch.path("x")},
-           {"export", text, "--csv", scratch.path("y")},
-           {"export", "/nonexistent.lcm", "--csv", scratch.path("y")},
-           {"export", log, "--csv", "/nonexistent/y"}}) {
+  const std::string log = short_log(scratch), text = scratch.write("a.txt", "no log");
+  const std::string no_modes = scratch.write("i", "{}"),
+                    no_number = scratch.write("j", R"({"modes": [{"natural_frequency": "x"}]})");
+  const Site first({"--log", log});
+  struct Refusal {
+    std::string said;
+    std::vector<std::string> words;
+  };
+  for (const auto& [said, words] : std::vector<Refusal>{
+           {"--log: ", {"monitor", "--web", "0", "--log", text}},
+           {"--log: ", {"monitor", "--web", "0", "--log", "/nonexistent.lcm"}},
+           {"/nonexistent.yaml", {"monitor", "--web", "0", "--config", "/nonexistent.yaml"}},
+           {"--web", {"monitor", "--web", "70000"}},
+           {"--web", {"monitor", "--config", "x"}},
+           {"\"modes\"", {"monitor", "--web", "0", "--log", log, "--identified", no_modes}},
+           {"\"natural_frequency\"",
+            {"monitor", "--web", "0", "--log", log, "--identified", no_number}},
+           {"in use", {"monitor", "--web", std::to_string(first.port), "--log", log}},
+           {"", {"export", log}},
+           {"", {"export", log, "--csv", log}},
+           {"", {"export", log, "--csv", scratch.path("x"), "--mcap", scratch.path("x")}},
+           {"", {"export", text, "--csv", scratch.path("y")}},
+           {"", {"export", "/nonexistent.lcm", "--csv", scratch.path("y")}},
+           {"", {"export", log, "--csv", "/nonexistent/y"}}}) {
+    SCOPED_TRACE(::testing::PrintToString(words));
     const Outcome outcome = run_program(words);
     EXPECT_EQ(outcome.status, 2);
     EXPECT_EQ(outcome.out, "");
+    EXPECT_THAT(outcome.err, HasSubstr(said));
     EXPECT_EQ(count_lines(outcome.err), 1) << outcome.err;
   }
 }
