@@ -88,9 +88,7 @@ TEST(Allocations, DoNotHappenWhereCommandsAreFetched) {
 
 template <class Message>
 Allocations allocations_of_decoding(Bytes bytes, std::size_t offset, std::int32_t size) {
-  for (std::size_t i = 0; i < 4; ++i) {
-    bytes[offset + i] = static_cast<std::uint8_t>(static_cast<std::uint32_t>(size) >> (24 - 8 * i));
-  }
+  write_int32(bytes, offset, size);
   return allocations_of([&bytes] {
     Message message;
     EXPECT_FALSE(decode(bytes.data(), bytes.size(), message));

@@ -4,7 +4,7 @@
 #include <dashpot/lcmtypes/lcmt_iiwa_status.hpp>
 #include <dashpot/lcmtypes/lcmt_panda_command.hpp>
 #include <dashpot/lcmtypes/lcmt_panda_status.hpp>
-#include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/lcmtypes/random_samples.hpp>
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,6 @@ namespace dashpot::lcmtypes {
 namespace {
 
 using controller::JointVector;
-using DriverBytes = std::vector<std::uint8_t>;
 
 constexpr DriverKind kKinds[] = {DriverKind::kIiwa, DriverKind::kPanda};
 
@@ -38,11 +37,8 @@ JointVector some(testing::Random& random, int n) {
 }
 
 template <class Message>
-bool decodes(DriverKind kind, const DriverBytes& bytes, Message& message) {
-  // In memory of exactly their size, so that the address sanitizer sees any read beyond.
-  const auto exact = std::make_unique<std::uint8_t[]>(bytes.size());
-  std::copy(bytes.begin(), bytes.end(), exact.get());
-  return decode(kind, exact.get(), bytes.size(), message);
+bool decodes(DriverKind kind, const Bytes& bytes, Message& message) {
+  return decode(kind, Exact(bytes).data(), bytes.size(), message);
 }
 
 DriverStatus random_status(testing::Random& random, int n) {
@@ -62,7 +58,7 @@ TEST(Driver, GivesBackWhatWasEncoded) {
   for (const DriverKind kind : kKinds) {
     for (int n = 1; n <= controller::kMaxJoints; ++n) {
       const DriverStatus status = random_status(random, n);
-      DriverBytes bytes;
+      Bytes bytes;
       encode(kind, status, bytes);
       DriverStatus back;
       ASSERT_TRUE(decodes(kind, bytes, back));
@@ -90,30 +86,27 @@ TEST(Driver, GivesBackWhatWasEncoded) {
 TEST(Driver, RefusesBytesOfAnotherSize) {
   testing::Random random(21);
   for (const DriverKind kind : kKinds) {
-    DriverBytes bytes;
+    Bytes bytes;
     DriverStatus status = random_status(random, 7);
     DriverCommand command{1, status.position, status.torque, 4};
     for (const bool of_status : {true, false}) {
       of_status ? encode(kind, status, bytes) : encode(kind, command, bytes);
-      const auto fits = [&](const DriverBytes& some_bytes) {
+      const auto fits = [&](const Bytes& some_bytes) {
         return of_status ? decodes(kind, some_bytes, status) : decodes(kind, some_bytes, command);
       };
       EXPECT_TRUE(fits(bytes));
       for (std::size_t size = 0; size < bytes.size(); ++size) {
-        EXPECT_FALSE(fits(DriverBytes(bytes.begin(), bytes.begin() + static_cast<long>(size))));
+        EXPECT_FALSE(fits(Bytes(bytes.begin(), bytes.begin() + static_cast<long>(size))));
       }
-      DriverBytes longer = bytes;
+      Bytes longer = bytes;
       longer.push_back(0);
       EXPECT_FALSE(fits(longer));
       for (const std::int32_t joints : {-1, 0, 6, 8, 17, 1 << 30}) {
-        DriverBytes other = bytes;  // the number of joints follows the fingerprint and utime
-        for (std::size_t i = 0; i < 4; ++i) {
-          other[16 + i] =
-              static_cast<std::uint8_t>(static_cast<std::uint32_t>(joints) >> (24 - 8 * i));
-        }
+        Bytes other = bytes;  // the number of joints follows the fingerprint and utime
+        write_int32(other, 16, joints);
         EXPECT_FALSE(fits(other)) << joints;
       }
-      DriverBytes other = bytes;
+      Bytes other = bytes;
       other[3] ^= 1;
       EXPECT_FALSE(fits(other));
     }

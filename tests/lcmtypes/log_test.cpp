@@ -67,13 +67,8 @@ TEST(Log, GivesBackWhatWasPublished) {
   std::int64_t malformed = -1;
   EXPECT_EQ(read_log(scratch.path("a.lcm"), &malformed), expected);
   EXPECT_EQ(malformed, 0);
-}
-
-TEST(Log, IsTheSameTwice) {
-  const Scratch scratch;
-  write_log(scratch.path("a.lcm"), 50);
-  write_log(scratch.path("b.lcm"), 50);
-  EXPECT_EQ(scratch.read("a.lcm"), scratch.read("b.lcm"));
+  write_log(scratch.path("b.lcm"), 200);
+  EXPECT_EQ(scratch.read("a.lcm"), scratch.read("b.lcm"));  // the same twice
 }
 
 TEST(Log, IsReplayedByTheStockPlayer) {

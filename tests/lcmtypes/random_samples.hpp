@@ -7,7 +7,9 @@
 #include <dashpot/tests/support/random.hpp>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace dashpot::lcmtypes {
@@ -183,6 +185,27 @@ Message message_of(const Sample& sample) {
   Message message{};
   fill(sample, message);
   return message;
+}
+
+/// A copy in memory of exactly its size, so that the address sanitizer sees any read beyond.
+class Exact {
+ public:
+  explicit Exact(const Bytes& bytes) : size(bytes.size()), copy_(new std::uint8_t[bytes.size()]) {
+    std::copy(bytes.begin(), bytes.end(), copy_.get());
+  }
+  const std::uint8_t* data() const { return copy_.get(); }
+  std::size_t size;
+
+ private:
+  std::unique_ptr<std::uint8_t[]> copy_;
+};
+
+/// As LCM writes it: the first byte is the highest.
+inline void write_int32(Bytes& bytes, std::size_t offset, std::int32_t value) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    bytes[offset + i] =
+        static_cast<std::uint8_t>(static_cast<std::uint32_t>(value) >> (24 - 8 * i));
+  }
 }
 
 }  // namespace dashpot::lcmtypes

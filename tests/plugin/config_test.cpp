@@ -167,26 +167,36 @@ TEST(Config, FillsJointMatrices) {
   EXPECT_EQ(full.initial.gains.joint_stiffness, expected);
 }
 
-TEST(Config, TakesADampingRatioOfTheJoints) {
-  const auto gains = [](const std::string& joint) {
-    return load(panda() + "gains: {joint: {" + joint + "}}\n").settings.initial.gains;
+TEST(Config, TakesADampingRatioInPlaceOfADamping) {
+  const auto gains = [](const std::string& group, const std::string& keys) {
+    return load(panda() + "gains: {" + group + ": {" + keys + "}}\n").settings.initial.gains;
   };
-  EXPECT_EQ(gains("").joint_damping_ratio, 0.7);
-  EXPECT_EQ(gains("stiffness: 300, damping: 9").joint_damping_ratio, 0);
-  EXPECT_EQ(gains("stiffness: 300, damping_ratio: 0.8").joint_damping_ratio, 0.8);
-  EXPECT_EQ(gains("stiffness: 300, damping_ratio: 0.8").task_damping_ratio, 0.7);
+  const std::string task_springs = "stiffness: [9, 8, 7, 6, 5, 4], ";
+  struct Group {
+    const char* name;
+    double controller::Gains::*ratio;
+    std::string springs, dampers;
+  };
+  for (const auto& [name, ratio, springs, dampers] : std::vector<Group>{
+           {"joint", &controller::Gains::joint_damping_ratio, "stiffness: 300, ", "damping: 9"},
+           {"null_space", &controller::Gains::null_damping_ratio, "stiffness: 3, ", "damping: 1"},
+           {"task", &controller::Gains::task_damping_ratio, task_springs,
+            "damping: [1, 1, 1, 1, 1, 1]"}}) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(gains(name, "").*ratio, 0.7);
+    EXPECT_EQ(gains(name, springs + dampers).*ratio, 0);
+    const controller::Gains both = gains(name, springs + "damping_ratio: 0.8");
+    EXPECT_DOUBLE_EQ(both.joint_damping_ratio + both.null_damping_ratio + both.task_damping_ratio,
+                     0.7 + 0.7 + 0.8);
+    EXPECT_EQ(both.*ratio, 0.8);
+    EXPECT_EQ(gains(name, "damping_ratio: 2").*ratio, 2);
+  }
+  EXPECT_EQ(gains("null_space", "stiffness: 3, damping_ratio: 0.8").null_stiffness,
+            VectorXd::Constant(7, 3));
+  EXPECT_EQ(gains("task", task_springs + "damping_ratio: 2").task_stiffness(0, 0), 9);
   // Where no spring is left, nothing can be designed.
-  EXPECT_GT(gains("stiffness: 0, damping_ratio: 0.8").joint_damping.diagonal().minCoeff(), 0);
-}
-
-TEST(Config, TakesADampingRatioOfTheNullSpace) {
-  const auto gains = [](const std::string& null_space) {
-    return load(panda() + "gains: {null_space: {" + null_space + "}}\n").settings.initial.gains;
-  };
-  EXPECT_EQ(gains("").null_damping_ratio, 0.7);
-  EXPECT_EQ(gains("stiffness: 3, damping: 1").null_damping_ratio, 0);
-  EXPECT_EQ(gains("stiffness: 3, damping_ratio: 0.8").null_damping_ratio, 0.8);
-  EXPECT_EQ(gains("stiffness: 3, damping_ratio: 0.8").null_stiffness, VectorXd::Constant(7, 3));
+  EXPECT_GT(gains("joint", "stiffness: 0, damping_ratio: 0.8").joint_damping.diagonal().minCoeff(),
+            0);
 }
 
 TEST(Config, FillsTheTask) {
@@ -205,19 +215,6 @@ TEST(Config, FillsTheTask) {
   EXPECT_EQ(gains.task_damping(5, 3), 2);
   EXPECT_EQ(gains.frame, Frame::kTool);
   EXPECT_THAT(gains.directions, ::testing::ElementsAre(false, false, true, true, false, false));
-}
-
-TEST(Config, ADampingRatioStandsForTheDampingOfTheTask) {
-  const auto gains = [](const std::string& task) {
-    return load(panda() + "gains: {task: {" + task + "}}\n").settings.initial.gains;
-  };
-  EXPECT_EQ(gains("").task_damping_ratio, 0.7);
-  EXPECT_EQ(gains("stiffness: [9, 8, 7, 6, 5, 4], damping: [1, 1, 1, 1, 1, 1]").task_damping_ratio,
-            0);
-  EXPECT_EQ(gains("damping_ratio: 0.6").task_damping_ratio, 0.6);
-  const auto both = gains("stiffness: [9, 8, 7, 6, 5, 4], damping_ratio: 2");
-  EXPECT_EQ(both.task_damping_ratio, 2);
-  EXPECT_EQ(both.task_stiffness(0, 0), 9);
 }
 
 TEST(Config, FillsLimits) {

@@ -45,4 +45,14 @@ inline const std::vector<File>& files() {
   return all;
 }
 
+/// Paths of the files that are so.
+template <class IsSo>
+std::vector<std::string> paths_of(const IsSo& is_so) {
+  std::vector<std::string> paths;
+  for (const File& file : files()) {
+    if (is_so(file)) paths.push_back(file.path);
+  }
+  return paths;
+}
+
 }  // namespace dashpot::tests

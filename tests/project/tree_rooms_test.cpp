@@ -58,11 +58,9 @@ TEST(Tree, IncludesOnlyWhatTheTableOfRoomsAllows) {
 }
 
 TEST(Tree, KeepsEverySourceInARoom) {
-  std::vector<std::string> offences;
-  for (const File& file : files()) {
-    if (file.is_source() && room_of(file.path) == nullptr) offences.push_back(file.path);
-  }
-  EXPECT_THAT(offences, IsEmpty());
+  EXPECT_THAT(
+      paths_of([](const File& file) { return file.is_source() && room_of(file.path) == nullptr; }),
+      IsEmpty());
 }
 
 TEST(Tree, HasEveryPublicHeaderOfTheTable) {

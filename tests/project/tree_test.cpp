@@ -33,22 +33,20 @@ TEST(Tree, HoldsNoPathOfAMachineAndNoNoteOfUnfinishedWork) {
 }
 
 TEST(Tree, KeepsTestsWithThreadsWhereTheThreadSanitizerRuns) {
-  std::vector<std::string> offences;
-  for (const File& file : files()) {
-    if (file.path.starts_with("tests/") && !file.path.starts_with("tests/threads/") &&
-        !file.path.starts_with("tests/stress/soak") && includes_threads(file.text)) {
-      offences.push_back(file.path);
-    }
-  }
-  EXPECT_THAT(offences, IsEmpty()) << "Their place is tests/threads.";
+  EXPECT_THAT(paths_of([](const File& file) {
+                return file.path.starts_with("tests/") &&
+                       !file.path.starts_with("tests/threads/") &&
+                       !file.path.starts_with("tests/stress/soak") && includes_threads(file.text);
+              }),
+              IsEmpty())
+      << "Their place is tests/threads.";
 }
 
 TEST(Tree, StartsEveryHeaderWithPragmaOnce) {
-  std::vector<std::string> offences;
-  for (const File& file : files()) {
-    if (file.has_end(".hpp") && !starts_with_pragma_once(file.text)) offences.push_back(file.path);
-  }
-  EXPECT_THAT(offences, IsEmpty());
+  EXPECT_THAT(paths_of([](const File& file) {
+                return file.has_end(".hpp") && !starts_with_pragma_once(file.text);
+              }),
+              IsEmpty());
 }
 
 /// The file of this path; null if there is none, or it is no text.

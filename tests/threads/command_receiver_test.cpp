@@ -117,6 +117,32 @@ bool wait_for_sequence(CommandReceiver& receiver, std::int64_t sequence) {
   return false;
 }
 
+/// Two threads that send what `next` makes for each, every 20 us or so.
+class Flood {
+ public:
+  template <class Next>
+  Flood(lcm::LCM& bus, const Next& next) {
+    for (std::uint64_t number = 1; number <= 2; ++number) {
+      threads_.emplace_back([this, &bus, make = next(number)]() mutable {
+        while (!stop_.load()) {
+          send(bus, make());
+          std::this_thread::sleep_for(std::chrono::microseconds(20));
+        }
+      });
+    }
+  }
+  ~Flood() { end(); }
+  void end() {
+    stop_.store(true);
+    for (std::thread& thread : threads_) thread.join();
+    threads_.clear();
+  }
+
+ private:
+  std::atomic<bool> stop_{false};
+  std::vector<std::thread> threads_;
+};
+
 TEST(CommandReceiver, HandsOnGoodCommands) {
   const auto bus = open_bus("memq://");
   CommandReceiver receiver(bus, patient_limits());
@@ -160,19 +186,13 @@ TEST(CommandReceiver, KeepsTheLastGoodCommandUnderAttack) {
 TEST(CommandReceiver, IsNotConfusedByAFlood) {
   const auto bus = open_bus("memq://");
   CommandReceiver receiver(bus, patient_limits());
-  std::atomic<bool> stop{false};
-  std::vector<std::thread> flood;
-  for (std::uint64_t seed = 963; seed < 965; ++seed) {
-    flood.emplace_back([&bus, &stop, seed] {
-      std::mt19937_64 engine(seed);
-      while (!stop.load()) {
-        Bytes bytes(engine() % 2000);
-        for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(engine());
-        send(*bus, bytes);
-        std::this_thread::sleep_for(std::chrono::microseconds(20));
-      }
-    });
-  }
+  Flood flood(*bus, [](std::uint64_t number) {
+    return [engine = std::mt19937_64(962 + number)]() mutable {
+      Bytes bytes(engine() % 2000);
+      for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(engine());
+      return bytes;
+    };
+  });
   Sender sender(*bus, 966);
   int came_through = 0;
   for (int i = 0; i < 50; ++i) {
@@ -185,8 +205,7 @@ TEST(CommandReceiver, IsNotConfusedByAFlood) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
   }
-  stop.store(true);
-  for (std::thread& thread : flood) thread.join();
+  flood.end();
   ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));  // it works as before
   EXPECT_TRUE(sender.is_last(receiver.command()));
   EXPECT_GT(came_through, 0);
@@ -200,21 +219,16 @@ TEST(CommandReceiver, HearsTheOneThatCommandsThroughAFloodOfOthers) {
   CommandReceiver receiver(bus, patient_limits());
   Sender sender(*bus, 968);
   ASSERT_TRUE(wait_for_sequence(receiver, sender.send_good()));
-  std::atomic<bool> stop{false};
-  std::vector<std::thread> flood;
-  for (std::int64_t other = 1; other <= 2; ++other) {
-    flood.emplace_back([&bus, &stop, other] {
-      Random random(969);
-      command_t message = random_command(random, kJoints);
-      message.sender = other;
-      message.sequence = std::numeric_limits<std::int64_t>::max();
-      while (!stop.load()) {
-        message.utime = unix_time();
-        send(*bus, bytes_of(message));
-        std::this_thread::sleep_for(std::chrono::microseconds(20));
-      }
-    });
-  }
+  Flood flood(*bus, [](std::uint64_t number) {
+    Random random(969);
+    command_t message = random_command(random, kJoints);
+    message.sender = static_cast<std::int64_t>(number);
+    message.sequence = std::numeric_limits<std::int64_t>::max();
+    return [message]() mutable {
+      message.utime = unix_time();
+      return bytes_of(message);
+    };
+  });
   int came_through = 0;
   for (int i = 0; i < 50; ++i) {
     const std::int64_t sequence = sender.send_good();
@@ -227,8 +241,7 @@ TEST(CommandReceiver, HearsTheOneThatCommandsThroughAFloodOfOthers) {
     }
     if (receiver.command().sequence == sequence) ++came_through;
   }
-  stop.store(true);
-  for (std::thread& thread : flood) thread.join();
+  flood.end();
   EXPECT_GT(came_through, 0);
   const CommandTally tally = receiver.tally();
   EXPECT_EQ(tally.commander, kSender);

@@ -156,28 +156,19 @@ TEST(Plugin, IsTheController) {
   }
 }
 
-class PluginHolds : public ::testing::TestWithParam<const char*> {};
-
 /// Without any set-point the arm stays where it was found, far beyond the watchdog's times.
-TEST_P(PluginHolds, StillWithoutASetpoint) {
-  const Config config = load(panda() + GetParam());
-  Host host = panda_host(GetParam());
-  for (int tick = 0; tick < 3000; ++tick) {
-    ASSERT_EQ(host.tick(), DASHPOT_OK) << "tick " << tick;
-    simulate(config.model, host);
+TEST(Plugin, HoldsStillWithoutASetpoint) {
+  for (const std::string mode : {"", kCartesian}) {
+    const Config config = load(panda() + mode);
+    Host host = panda_host(mode);
+    for (int tick = 0; tick < 3000; ++tick) {
+      ASSERT_EQ(host.tick(), DASHPOT_OK) << mode << "tick " << tick;
+      simulate(config.model, host);
+    }
+    for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(host.position[i], panda_posture()[i], 2e-2);
+    EXPECT_LT(joint_vector(host.velocity).norm(), 1e-2);
   }
-  for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(host.position[i], panda_posture()[i], 2e-2);
-  EXPECT_LT(joint_vector(host.velocity).norm(), 1e-2);
 }
-
-std::string name_of(const ::testing::TestParamInfo<const char*>& info) {
-  return info.index == 0 ? "Joint" : "Cartesian";
-}
-
-INSTANTIATE_TEST_SUITE_P(Modes, PluginHolds,
-                         ::testing::Values("control: {mode: joint}\n",
-                                           "control: {mode: cartesian}\n"),
-                         name_of);
 
 /// Not even at the first tick, before it is known where the springs are to stay.
 TEST(Plugin, HidesNoStatusWithoutASetpoint) {
