@@ -28,6 +28,15 @@ inline void simulate(const controller::RobotModel& model, Host& host, double per
   Eigen::Map<Eigen::VectorXd>(host.position.data(), velocity.size()) = q + period * velocity;
 }
 
+/// Ticks with this set-point, after each of which the arm moves; none may complain.
+inline void run_simulated(const controller::RobotModel& model, Host& host, int ticks,
+                          const dashpot_setpoint* setpoint = nullptr) {
+  for (int tick = 0; tick < ticks; ++tick) {
+    ASSERT_EQ(host.tick(setpoint), DASHPOT_OK) << "tick " << tick;
+    simulate(model, host);
+  }
+}
+
 /// A Panda whose joints bear their gravity already.
 inline Host panda_host(const std::string& settings = "") {
   Host host(create(panda() + settings), panda_posture());

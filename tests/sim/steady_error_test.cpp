@@ -42,6 +42,17 @@ struct RoughPanda {
     gains.joint_stiffness = JointVector::Constant(7, 60).asDiagonal();
     gains.joint_damping = JointVector::Constant(7, 20).asDiagonal();
   }
+  /// Springs at the tip, isotropic: N/m, N m/rad and their dampers.
+  void hold_tip(double stiffness, double damping, double turning, double turning_damping) {
+    settings.initial.mode = Mode::kCartesian;
+    controller::Gains& gains = settings.initial.gains;
+    gains.task_stiffness.diagonal() << Eigen::Vector3d::Constant(stiffness),
+        Eigen::Vector3d::Constant(turning);
+    gains.task_damping.diagonal() << Eigen::Vector3d::Constant(damping),
+        Eigen::Vector3d::Constant(turning_damping);
+    gains.null_stiffness.setConstant(10);
+    gains.null_damping.setConstant(5);
+  }
   void compensate_friction() {
     settings.feed_forward.friction = true;
     settings.feed_forward.friction_at = FeedForward::FrictionAt::kMeasured;
@@ -135,13 +146,7 @@ TEST(SteadyError, IsSmallerWithEachOfTheTwo) {
 
 TEST(SteadyError, OfTheTipIsSmallerWithTheIntegral) {
   RoughPanda plain(1), integral(1);
-  for (RoughPanda* panda : {&plain, &integral}) {
-    panda->settings.initial.mode = Mode::kCartesian;
-    panda->settings.initial.gains.task_stiffness.diagonal() << 200, 200, 200, 20, 20, 20;
-    panda->settings.initial.gains.task_damping.diagonal() << 40, 40, 40, 4, 4, 4;
-    panda->settings.initial.gains.null_stiffness.setConstant(10);
-    panda->settings.initial.gains.null_damping.setConstant(5);
-  }
+  for (RoughPanda* panda : {&plain, &integral}) panda->hold_tip(200, 40, 20, 4);
   integral.settings.integral = {kTime, 20, 5, integral.settings.integral.torque};
   const double without = miss(plain, Mode::kCartesian);
   const double with = miss(integral, Mode::kCartesian);
@@ -155,15 +160,7 @@ TEST(SteadyError, OfTheTipIsSmallerWithTheIntegral) {
 TEST(SteadyError, OfAnUntoldPayloadGoesToZero) {
   constexpr double kMass = 0.5, kStiffness = 400, kSlow = 1;
   RoughPanda plain(0, kMass), integral(0, kMass);
-  for (RoughPanda* panda : {&plain, &integral}) {
-    panda->settings.initial.mode = Mode::kCartesian;
-    controller::Gains& gains = panda->settings.initial.gains;
-    gains.task_stiffness.diagonal() << Eigen::Vector3d::Constant(kStiffness),
-        Eigen::Vector3d::Constant(30);
-    gains.task_damping.diagonal() << Eigen::Vector3d::Constant(50), Eigen::Vector3d::Constant(4);
-    gains.null_stiffness.setConstant(10);
-    gains.null_damping.setConstant(5);
-  }
+  for (RoughPanda* panda : {&plain, &integral}) panda->hold_tip(kStiffness, 50, 30, 4);
   integral.settings.integral = {kSlow, 20, 5, integral.settings.integral.torque};
   const auto sag = [](Loop& loop) { return loop.controller.snapshot().tip_error[2]; };
   Loop without(plain), with(integral);

@@ -161,10 +161,7 @@ TEST(Plugin, HoldsStillWithoutASetpoint) {
   for (const std::string mode : {"", kCartesian}) {
     const Config config = load(panda() + mode);
     Host host = panda_host(mode);
-    for (int tick = 0; tick < 3000; ++tick) {
-      ASSERT_EQ(host.tick(), DASHPOT_OK) << mode << "tick " << tick;
-      simulate(config.model, host);
-    }
+    ASSERT_NO_FATAL_FAILURE(run_simulated(config.model, host, 3000)) << mode;
     for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(host.position[i], panda_posture()[i], 2e-2);
     EXPECT_LT(joint_vector(host.velocity).norm(), 1e-2);
   }
@@ -186,13 +183,10 @@ TEST(Plugin, GoesToASetpointFromTheOtherThreadsSide) {
   std::vector<double> goal = panda_posture();
   goal[0] += 0.3;
   goal[3] -= 0.2;
-  for (int tick = 0; tick < 4000; ++tick) {
-    if (tick % 100 == 0) {
-      const dashpot_setpoint setpoint = host.joint_setpoint(goal);
-      ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_OK);
-    }
-    ASSERT_EQ(host.tick(), DASHPOT_OK) << "tick " << tick;
-    simulate(config.model, host);
+  const dashpot_setpoint setpoint = host.joint_setpoint(goal);
+  for (int k = 0; k < 40; ++k) {
+    ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_OK);
+    ASSERT_NO_FATAL_FAILURE(run_simulated(config.model, host, 100));
   }
   for (std::size_t i = 0; i < 7; ++i) EXPECT_NEAR(host.position[i], goal[i], 2e-2);
   EXPECT_EQ(host.snapshot().reference_joint_position[0], goal[0]);
@@ -219,12 +213,11 @@ TEST(Plugin, GoesToAPose) {
   const dashpot_snapshot start = host.snapshot();
   const std::array<double, 3> goal = {start.tip_position[0] + 0.05, start.tip_position[1],
                                       start.tip_position[2] - 0.1};
-  for (int tick = 0; tick < 4000; ++tick) {
+  for (int k = 0; k < 40; ++k) {
     const dashpot_setpoint setpoint = {sizeof(dashpot_setpoint), 7,       host.time,
                                        DASHPOT_MODE_CARTESIAN,   nullptr, goal.data(),
                                        start.tip_rotation,       nullptr};
-    ASSERT_EQ(host.tick(&setpoint), DASHPOT_OK) << "tick " << tick;
-    simulate(config.model, host);
+    ASSERT_NO_FATAL_FAILURE(run_simulated(config.model, host, 100, &setpoint));
   }
   const dashpot_snapshot end = host.snapshot();
   EXPECT_EQ(end.mode, DASHPOT_MODE_CARTESIAN);

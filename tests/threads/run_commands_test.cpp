@@ -38,7 +38,7 @@ TEST(RunWithCommands, TakesGoodCommandsAndKeepsTheLastOne) {
     return live.state.mode == state_t::JOINT &&
            std::abs(live.state.reference_joint_position[0] - 0.1) < 1e-9;
   }));
-  EXPECT_TRUE(live.passed(2500));
+  EXPECT_TRUE(live.passed(1500));
   EXPECT_EQ(live.state.status, 0);  // not stale
   const Json result = live.end();
   const Json& commands = result["commands"];
