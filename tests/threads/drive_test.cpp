@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <list>
 #include <thread>
+#include <tuple>
 
 namespace dashpot::tests {
 namespace {
@@ -293,21 +295,39 @@ INSTANTIATE_TEST_SUITE_P(Arms, Drive, ::testing::Values(kIiwa, kPanda), [](const
   return std::string(given.param.option).substr(2);
 });
 
-/// What drive says when it has begun or ended, with a driver that commands one posture or what it
-/// measures.
-std::string first_words(const std::string& url, bool fixed, const std::string& option, int& status,
-                        const std::string& config = configuration("iiwa14"),
-                        std::string* table = nullptr) {
-  Running driving({"drive", config, "--iiwa", "--lcm-url", url, option});
-  {
-    const TremblingArm trembling(kIiwa, url, 1e-6, fixed);
-    for (int k = 0; k < 1000 && driving.complaints().empty(); ++k) usleep(10'000);
-    usleep(100'000);
+/// A drive whose driver commands one posture, or what it measures, and what drive says of it.
+struct Watched {
+  bool fixed;
+  std::string option = "--json", config = configuration("iiwa14");
+  int status = 0;
+  std::string said = {}, table = {};
+};
+
+/// All of them side by side, until each has begun or ended.
+void watch(std::vector<Watched>& all) {
+  std::list<Running> drives;
+  std::list<TremblingArm> arms;
+  std::vector<std::string> urls;
+  for (const Watched& one : all) {
+    const auto number = 4 * getpid() + static_cast<int>(urls.size());  // a bus of its own
+    urls.push_back("udpm://239.255.76.67:" + std::to_string(50'000 + number % 15'000) + "?ttl=0");
+    drives.emplace_back(std::vector<std::string>{"drive", one.config, "--iiwa", "--lcm-url",
+                                                 urls.back(), one.option});
   }
-  driving.send(SIGTERM);
-  status = driving.finish();
-  if (table != nullptr) *table = driving.output();
-  return driving.complaints();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    arms.emplace_back(kIiwa, urls[i], 1e-6, all[i].fixed);
+  }
+  for (const Running& drive : drives) {
+    for (int k = 0; k < 1000 && drive.complaints().empty(); ++k) usleep(10'000);
+  }
+  usleep(100'000);
+  for (const Running& drive : drives) drive.send(SIGTERM);
+  auto drive = drives.begin();
+  for (Watched& one : all) {
+    one.status = drive->finish();
+    one.said = drive->complaints();
+    one.table = drive++->output();
+  }
 }
 
 /// Gains that Drake's iiwa bears at 1 ms, rings with at 5 ms, and does not bear with more damping
@@ -340,34 +360,28 @@ TEST(DriveOfAnIiwa, JudgesGainsForThePeriod) {
 }
 
 TEST(DriveOfAnIiwa, RefusesSpringsOfKukas) {
-  int status = 0;
-  const std::string springs = first_words(own_url(), true, "--json", status);
-  if (springs.find("no status") != std::string::npos) {
-    GTEST_SKIP() << kNoMulticast;
-  }
-  EXPECT_EQ(status, 2);
-  EXPECT_THAT(springs, HasSubstr("KUKA's mode Torque"));
-  EXPECT_THAT(springs, ::testing::Not(HasSubstr("the arm is held")));
   const Scratch scratch;
-  const std::string stiff = first_words(
-      own_url(), true, "--json", status,
-      changed_configuration(scratch, kIiwa,
-                            {{"analysis:",
-                              "environment: {joint_stiffness: 100 N m/rad, joint_damping: 1 N m "
-                              "s/rad}\nanalysis:"}}));
-  EXPECT_EQ(status, 2);
-  EXPECT_THAT(stiff, HasSubstr("environment.joint_stiffness must be 0 in KUKA's mode Torque"));
-  std::string table;
-  const std::string watched =
-      first_words(own_url(), true, "--dry-run", status, configuration("iiwa14"), &table);
-  EXPECT_THAT(table, HasSubstr("dry run: nothing was commanded"));
-  EXPECT_THAT(table, HasSubstr("  modes, rad/s (ratio): "));
-  EXPECT_EQ(status, 0);
-  EXPECT_THAT(watched, HasSubstr("KUKA's mode Torque"));
-  const std::string none = first_words(own_url(), false, "--json", status);
-  EXPECT_EQ(status, 0);
-  EXPECT_THAT(none, HasSubstr("the arm is held where it is"));
-  EXPECT_THAT(none, ::testing::Not(HasSubstr("KUKA's mode Torque")));
+  const std::string stiff = changed_configuration(
+      scratch, kIiwa,
+      {{"analysis:",
+        "environment: {joint_stiffness: 100 N m/rad, joint_damping: 1 N m s/rad}\nanalysis:"}});
+  std::vector<Watched> all = {{true}, {true, "--json", stiff}, {true, "--dry-run"}, {false}};
+  watch(all);
+  const auto& [springs, stiffness, dry, none] = std::tie(all[0], all[1], all[2], all[3]);
+  if (springs.said.find("no status") != std::string::npos) GTEST_SKIP() << kNoMulticast;
+  EXPECT_EQ(springs.status, 2);
+  EXPECT_THAT(springs.said, HasSubstr("KUKA's mode Torque"));
+  EXPECT_THAT(springs.said, ::testing::Not(HasSubstr("the arm is held")));
+  EXPECT_EQ(stiffness.status, 2);
+  EXPECT_THAT(stiffness.said,
+              HasSubstr("environment.joint_stiffness must be 0 in KUKA's mode Torque"));
+  EXPECT_EQ(dry.status, 0);
+  EXPECT_THAT(dry.table, HasSubstr("dry run: nothing was commanded"));
+  EXPECT_THAT(dry.table, HasSubstr("  modes, rad/s (ratio): "));
+  EXPECT_THAT(dry.said, HasSubstr("KUKA's mode Torque"));
+  EXPECT_EQ(none.status, 0);
+  EXPECT_THAT(none.said, HasSubstr("the arm is held where it is"));
+  EXPECT_THAT(none.said, ::testing::Not(HasSubstr("KUKA's mode Torque")));
 }
 
 /// Springs of KUKA's that commands lead to where the arm is hold nothing, and damp.
