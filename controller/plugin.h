@@ -39,7 +39,7 @@ extern "C" {
 
 /* Version of this interface. It increases whenever a function or struct changes. A library
  * serves the versions that it knows. */
-#define DASHPOT_PLUGIN_VERSION 10u
+#define DASHPOT_PLUGIN_VERSION 11u
 /* Largest n. */
 #define DASHPOT_MAX_JOINTS 16
 
@@ -52,14 +52,15 @@ typedef struct dashpot_controller dashpot_controller;
  * this list, is returned. Before DASHPOT_SETPOINT_STALE the torque is that of the springs, dampers
  * and feed-forward, within the limits. From there on each status names its output:
  *   hold: the springs stop where they are, whatever the set-point says; no commanded wrench.
- *   damp: there are no springs, only joint damping, and the weight of the arm where the controller
+ *   damp: there are no springs, only a brake, and the weight of the arm where the controller
  *         compensates it.
  *   ramp: the last good torque goes to zero within 0.1 s, or as fast as limits.torque_rate allows.
  * Where damp and ramp take torque away, it fades evenly, in all joints alike.
  *
  * Faults latch. After any "damp" but DASHPOT_SETPOINT_LOST, after DASHPOT_STATE_FROZEN, and after a
- * "ramp" longer than watchdog.longest_gap, the arm stays damped, with its weight held (without
- * damping as long as the state is frozen), and the status is at least DASHPOT_FAULT_LATCHED.
+ * "ramp" longer than watchdog.longest_gap, the arm stays braked, with its weight held (the weight
+ * alone as long as the state is frozen, and after DASHPOT_BRAKE_DOUBTED), and the status is at least
+ * DASHPOT_FAULT_LATCHED.
  * dashpot_snapshot.fault names the fault. This ends with dashpot_release or dashpot_reset, or, if
  * the configuration sets watchdog.release_after, once the arm has been at rest for that long.
  * Springs then start where the robot is. docs/safety.md describes each fault.
@@ -68,7 +69,7 @@ typedef struct dashpot_controller dashpot_controller;
 enum {
   DASHPOT_OK = 0,
   DASHPOT_TORQUE_LIMITED = 1,     /* a limit of torque, torque rate, power or speed is at work */
-  DASHPOT_NEAR_JOINT_LIMIT = 2,   /* a joint is pushed back from a position limit that is near */
+  DASHPOT_NEAR_JOINT_LIMIT = 2,   /* a joint is kept from going beyond a position limit */
   DASHPOT_LITTLE_MARGIN = 3,      /* springs too stiff for the sampled loop: no damping ratio, or no
                                       lower one, keeps limits.gain_margin here */
   DASHPOT_WRENCH_NOT_FINITE = 4,  /* NaN or infinity in the external wrench; the last finite one
@@ -82,19 +83,22 @@ enum {
   DASHPOT_TIME_GAP = 11,          /* more than watchdog.longest_gap since the last state: damp */
   DASHPOT_WRONG_RATE = 12,        /* the loop runs at another rate than the configured one: damp */
   DASHPOT_COLLISION = 13,         /* an external torque or force above its threshold: damp */
-  DASHPOT_INSTABILITY = 14,       /* a vibration grows, or the torque reverses all the time: damp */
+  DASHPOT_INSTABILITY = 14,       /* a vibration, or a torque that reverses all the time: damp */
   DASHPOT_TIP_SPEED_LIMIT = 15,   /* the tip is too fast: damp */
   DASHPOT_VELOCITY_LIMIT = 16,    /* a joint is too fast: damp */
   DASHPOT_WALL = 17,              /* the tip is beyond a wall of limits.walls: damp */
   DASHPOT_POSITION_LIMIT = 18,    /* a joint is outside its position limits: damp; slow return */
-  DASHPOT_STATE_FROZEN = 19,      /* the state never changes though the torque does: weight alone */
+  DASHPOT_STATE_FROZEN = 19,      /* the state never changes though it should: weight alone */
   DASHPOT_STATE_CONTRADICTORY = 20, /* positions do not move as the velocities say: damp, with
                                        velocities from the positions */
-  DASHPOT_STATE_NOT_FINITE = 21,    /* NaN or infinity in position or velocity: ramp */
-  DASHPOT_STATE_WRONG_SIZE = 22,    /* the state is missing or not one of n joints: ramp */
-  DASHPOT_STATE_JUMP = 23,          /* further from the last state than the robot can move: ramp */
-  DASHPOT_TIME_BACKWARD = 24,       /* the state's time is at or before the last one: ramp */
-  DASHPOT_NOT_FINITE = 25,          /* the torque would not be finite: ramp */
+  DASHPOT_TIME_BACKWARD = 21,       /* times that do not go forward count as a period: no torque
+                                       changes, but damp after watchdog.longest_gap of them */
+  DASHPOT_BRAKE_DOUBTED = 22,       /* the brake acts, and the arm gets faster or vibrates: weight
+                                       alone. Engage the robot's own brakes */
+  DASHPOT_STATE_NOT_FINITE = 23,    /* NaN or infinity in position or velocity: ramp */
+  DASHPOT_STATE_WRONG_SIZE = 24,    /* the state is missing or not one of n joints: ramp */
+  DASHPOT_STATE_JUMP = 25,          /* further from the last state than the robot can move: ramp */
+  DASHPOT_NOT_FINITE = 26,          /* the torque would not be finite: ramp */
 
   DASHPOT_NULL_ARGUMENT = -1,     /* a required pointer is NULL */
   DASHPOT_WRONG_STRUCT_SIZE = -2, /* struct_size is not the size of the struct in this version */

@@ -107,21 +107,16 @@ struct Limits {
   double tip_velocity = 1.5;    ///< of the tip's origin, m/s, positive
   JointVector position_lower;   ///< n, rad; -infinity if there is none
   JointVector position_upper;   ///< n, rad; infinity if there is none
-  JointVector position_margin;  ///< repulsion begins this far before a position limit, n, rad
-  /// Torque of the repulsion at the position limit, as a fraction of the torque limit. It is less
-  /// where this torque would make the joint vibrate, or push it back faster than a tenth of its
-  /// velocity limit.
-  double repulsion = 0.5;
-  JointVector return_velocity;  ///< of a joint outside its limits, n, rad/s; 0: it does not return
+  /// Time constant with which the brake stops the arm, s: at a fault, and, five times as fast, what
+  /// would take a joint beyond its limits of velocity and position. It is longer where the sampled
+  /// loop bears no harder brake. See Brake.
+  double stopping_time = 0.05;
   /// Error clamp: the Cartesian springs are extended no further than this, m and rad, however far
   /// away the goal is. Beyond it they pull no harder, and the reference waits for the robot (see
   /// TipReference). A reference that is to brake within the clamp is no faster than
   /// sqrt(acceleration * clamp).
   double linear_error = 0.3;
   double angular_error = 1.0;
-  /// Joint damping of the safe output "damp", n, N m s/rad, positive; it is less where the sampled
-  /// loop would be unstable with it.
-  JointVector damping;
   /// Largest power of the torque in excess of the weight, W; infinity: any. A larger power is
   /// scaled down, in all joints alike.
   double power = std::numeric_limits<double>::infinity();

@@ -6,14 +6,16 @@ namespace dashpot::controller {
 /// Result of one tick. If several conditions hold, the most severe, the last in this list, is
 /// returned. From kSetpointStale on each comes with a safe output:
 ///   hold:  the springs stop where they are, whatever the set-point says; no commanded wrench.
-///   damp:  no springs: joint damping, and the arm's weight where the controller compensates it.
+///   damp:  no springs: the brake (see Brake), and the arm's weight where the controller
+///          compensates it.
 ///   ramp:  the last good torque goes to zero within 0.1 s.
 /// Torque and torque-rate limits hold for all of them. Where damp and ramp take torque away, it
 /// fades evenly: in all joints alike, as slowly as the slowest torque-rate limit makes it.
 ///
-/// Faults latch. A status whose safe output is "damp" (but kSetpointLost), or "ramp" for longer
-/// than Watchdog::longest_gap, leaves a fault behind: the arm stays damped, with its weight held
-/// (without damping as long as the state is frozen), the status is kFaultLatched or worse, and
+/// Faults latch. A status whose safe output is "damp" (but kSetpointLost), or "ramp" or
+/// kTimeBackward for longer than Watchdog::longest_gap, leaves a fault behind: the arm stays braked,
+/// with its weight held (the weight alone as long as the state is frozen, and where the brake is
+/// doubted), the status is kFaultLatched or worse, and
 /// Snapshot::fault names the fault. This ends with Controller::release or reset, or, if
 /// Watchdog::release_after is set, once the arm has been at rest for that long. Then, as after a
 /// lost set-point, the springs start where the robot is, with gains that grow from zero within
@@ -23,7 +25,7 @@ enum class Status : std::uint8_t {
   kOk,
   // The torque is the wanted one as far as possible:
   kTorqueLimited,    ///< a limit of torque, torque rate, power or speed is at work
-  kNearJointLimit,   ///< a joint is within the margin of a position limit; its repulsion is at work
+  kNearJointLimit,   ///< the brake keeps a joint from going beyond a position limit
   kLittleMargin,     ///< springs too stiff for the sampled loop, or a damping ratio too small for
                      ///< them: no share of the ratio keeps Limits::gain_margin at this posture
   kWrenchNotFinite,  ///< NaN or infinity in RobotState::external_wrench; the last finite wrench
@@ -41,18 +43,22 @@ enum class Status : std::uint8_t {
   kTimeGap,             ///< more than the longest gap since the last tick
   kWrongRate,           ///< ticks come at less than 2/3 or more than 3/2 of the configured rate
   kCollision,           ///< an external torque or force above its threshold
-  kInstability,         ///< a vibration that grows, or a torque that reverses in every tick or two
+  kInstability,         ///< a vibration, or a torque that reverses in every tick or two
   kTipSpeedLimit,       ///< the tip moves faster than its limit
   kVelocityLimit,       ///< a joint moves faster than its limit
   kWall,                ///< the tip is beyond a wall that it must not cross
   kPositionLimit,       ///< a joint is outside its position limits; it may return slowly
-  kStateFrozen,         ///< the state does not change at all though the torque does: weight alone
+  kStateFrozen,         ///< the state does not change at all, though the torque does or the
+                        ///< velocity is not zero: weight alone
   kStateContradictory,  ///< positions do not move as the velocities say
+  kTimeBackward,        ///< time stamps at or before that of the last tick; they count as a period.
+                        ///< For at most Watchdog::longest_gap this changes no torque
+  kBrakeDoubted,        ///< the brake alone acts, and the arm gets faster or vibrates: weight alone.
+                        ///< The robot needs its own brakes
   // The state cannot be trusted: ramp:
   kStateNotFinite,  ///< NaN or infinity
   kStateWrongSize,  ///< not n entries
   kStateJump,       ///< a position or velocity further from the last than the robot can move
-  kTimeBackward,    ///< time stamp at or before that of the last tick
   kNotFinite,       ///< the law gave a NaN or infinity
 };
 

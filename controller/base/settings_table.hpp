@@ -47,12 +47,9 @@ void for_each_setting(Struct& settings, Visitor&& visit) {
   visit(Setting{"limits.position_lower", "rad", "m", kAnyNumber, -kInfinity},
         limits.position_lower);
   visit(Setting{"limits.position_upper", "rad", "m", kAnyNumber, kInfinity}, limits.position_upper);
-  visit(Setting{"limits.position_margin", "rad", "m", kPositive}, limits.position_margin);
-  visit(Setting{"limits.repulsion", "", "", {0, true, 1}}, limits.repulsion);
-  visit(Setting{"limits.return_velocity", "rad/s", "m/s", kNotNegative}, limits.return_velocity);
+  visit(Setting{"limits.stopping_time", "s", "", kPositive}, limits.stopping_time);
   visit(Setting{"limits.linear_error", "m", "", kPositive}, limits.linear_error);
   visit(Setting{"limits.angular_error", "rad", "", kPositive}, limits.angular_error);
-  visit(Setting{"limits.damping", "N m s/rad", "N s/m", kPositive}, limits.damping);
   visit(Setting{"limits.power", "W", "", kPositive, kInfinity}, limits.power);
   visit(Setting{"limits.external_torque", "N m", "N", kPositive, kInfinity},
         limits.external_torque);

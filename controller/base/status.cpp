@@ -33,7 +33,7 @@ const char* to_text(Status status) noexcept {
     case Status::kCollision:
       return "collision, damping";
     case Status::kInstability:
-      return "vibration grows, damping";
+      return "vibration, damping";
     case Status::kTipSpeedLimit:
       return "tip speed limit exceeded, damping";
     case Status::kVelocityLimit:
@@ -46,14 +46,16 @@ const char* to_text(Status status) noexcept {
       return "state frozen, holding the weight";
     case Status::kStateContradictory:
       return "position and velocity contradict each other, damping";
+    case Status::kTimeBackward:
+      return "time not after the last, damping";
+    case Status::kBrakeDoubted:
+      return "the brake does not stop the arm, holding the weight: engage the robot's brakes";
     case Status::kStateNotFinite:
       return "state not finite, torque ramped down";
     case Status::kStateWrongSize:
       return "state of wrong size, torque ramped down";
     case Status::kStateJump:
       return "state jumped, torque ramped down";
-    case Status::kTimeBackward:
-      return "time not after the last, torque ramped down";
     case Status::kNotFinite:
       return "torque not finite, ramped down";
   }

@@ -116,6 +116,35 @@ class SettingsReader {
   std::map<std::string, YamlMapping> sections_;
 };
 
+/// The line of the value under a key such as "limits.torque"; if it is not there, of what is
+/// nearest above it, unless it has to be `exactly` there; 0 if nothing is.
+int line_of(const YamlNode& root, const std::string& key, bool exactly = false) {
+  const YamlNode* node = &root;
+  int line = 0;
+  for (std::size_t begin = 0; begin < key.size();) {
+    const std::size_t end = std::min(key.find('.', begin), key.size());
+    const auto item = std::find_if(
+        node->items.begin(), node->items.end(),
+        [&](const YamlNode& one) { return one.text == key.substr(begin, end - begin); });
+    if (node->kind != YamlNode::Kind::kMap || item == node->items.end()) {
+      return exactly ? 0 : line;
+    }
+    node = &*std::next(item);
+    line = node->line;
+    begin = end + 1;
+  }
+  return line;
+}
+
+/// Refuses keys that limits.stopping_time replaces.
+void refuse_replaced(const YamlNode& document) {
+  for (const char* key : {"damping", "position_margin", "repulsion", "return_velocity"}) {
+    const std::string name = std::string("limits.") + key;
+    const int line = line_of(document, name, true);
+    if (line > 0) throw InputError(name, "is gone: limits.stopping_time replaces it", line);
+  }
+}
+
 /// The period, and the defaults that depend on it.
 void read_period(const YamlMapping& control, Settings& settings) {
   constexpr double kGap = 2.5;  // periods
@@ -169,24 +198,6 @@ std::string key_of_setting(std::string setting) {
   return setting;
 }
 
-/// The line of the value under a key such as "limits.torque"; if it is not there, of what is
-/// nearest above it; 0 if nothing is.
-int line_of(const YamlNode& root, const std::string& key) {
-  const YamlNode* node = &root;
-  int line = 0;
-  for (std::size_t begin = 0; begin < key.size();) {
-    const std::size_t end = std::min(key.find('.', begin), key.size());
-    const auto item = std::find_if(
-        node->items.begin(), node->items.end(),
-        [&](const YamlNode& one) { return one.text == key.substr(begin, end - begin); });
-    if (node->kind != YamlNode::Kind::kMap || item == node->items.end()) break;
-    node = &*std::next(item);
-    line = node->line;
-    begin = end + 1;
-  }
-  return line;
-}
-
 /// Throws an InputError about the first setting that the controller would refuse, in either mode.
 void check(const Settings& settings, int n, const YamlNode& document) {
   Settings other = settings;
@@ -205,6 +216,7 @@ void check(const Settings& settings, int n, const YamlNode& document) {
 }  // namespace
 
 Config read_config(const YamlNode& document, const std::filesystem::path& directory) {
+  refuse_replaced(document);
   const YamlMapping root(document, "", kConfigSections);
   const RobotDescription robot = read_robot(root, directory);
   const RobotModel model = robot.model();

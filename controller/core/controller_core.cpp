@@ -1,5 +1,4 @@
 #include <dashpot/controller/core/controller_core.hpp>
-#include <dashpot/controller/model/least_inertia.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 
 #include <algorithm>
@@ -37,6 +36,7 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
       kernel_(model),
       state_check_(model, settings),
       motion_watch_(model, settings),
+      doubt_(settings.limits),
       references_(settings.motion, settings.period),
       gains_(gain_ticks(settings), Impedance(n_)),
       attachment_(gain_ticks(settings), model.attachment()),
@@ -47,10 +47,8 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
                 borne_ ? &*borne_ : nullptr),
       law_(model, settings.feed_forward, SpringIntegral(settings.integral, settings.period),
            borne_ ? &*borne_ : nullptr),
-      filter_(settings, least_joint_inertia(unloaded(model), settings.limits.position_lower,
-                                            settings.limits.position_upper)),
+      filter_(settings),
       clamp_{settings.limits.linear_error, settings.limits.angular_error},
-      damping_(filter_.borne(settings.limits.damping)),
       viscous_friction_(model.joint_values(&Joint::viscous_friction)),
       friction_left_(friction_left(model, settings)),
       turn_(JointVector::Zero(n_)),
@@ -143,9 +141,15 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   status = worse(status, setpoint_age_status());
   // A reflex that has lost its sensor protects nobody.
   const bool blind = !wrench_known && std::isfinite(settings_.limits.external_force);
-  status = worse(status, watch_motion(blind ? worse(input, Status::kCollision) : input, dt));
+  // A stamp or two that say nothing change no torque.
+  const bool odd_stamp =
+      input == Status::kTimeBackward && state_check_.backward() <= settings_.watchdog.longest_gap;
+  const Status seen = odd_stamp ? Status::kOk : input;
+  status = worse(status, watch_motion(blind ? worse(seen, Status::kCollision) : seen, dt));
+  SafetyFilter::Aim aim = SafetyFilter::Aim::kSprings;
   if (status >= Status::kSetpointLost) {
-    damping_torque(torque);
+    aim = end_springs();
+    torque = weight_;
   } else {
     impedance_torque(status == Status::kSetpointStale, torque);
     level_ = designed_.level();
@@ -153,9 +157,8 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
     // While gains change, dampers that fade keep the margin as well.
     if (!level_.kept && gains_.still()) status = worse(status, Status::kLittleMargin);
   }
-  const bool springs = springs_ != Springs::kOff, returns = fault_ == Status::kPositionLimit;
-  const Status limits =
-      filter_.apply({q_, qd_, motion_watch_.tip_speed(), springs, returns}, weight_, torque);
+  const Status limits = filter_.apply({q_, qd_, robot_, weight_}, motion_watch_.tip_speed(), aim,
+                                      law_.dampers(), torque);
   if (springs_ == Springs::kInForce && law_.integral().on()) {
     integrate(limits, status == Status::kSetpointStale);
   }
@@ -167,7 +170,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
     ramp_ticks_ = 0;
   }
   fill_snapshot();
-  return finish(status, torque);
+  return finish(odd_stamp ? worse(status, input) : status, torque);
 }
 
 Status ControllerCore::watch_motion(Status input, double dt) noexcept {
@@ -175,6 +178,7 @@ Status ControllerCore::watch_motion(Status input, double dt) noexcept {
   const bool still = references_still();
   Status now = worse(input, motion_watch_.check({dt, q_, qd_, robot_, external_wrench_, still}));
   if (restarts_ > kMostRestarts) now = worse(now, Status::kTooManyRestarts);
+  if (brake_fails(now, dt)) now = fault_ = Status::kBrakeDoubted;
   if (latches(now)) {
     latch(now);
     rest_ = 0;
@@ -185,7 +189,10 @@ Status ControllerCore::watch_motion(Status input, double dt) noexcept {
 }
 
 void ControllerCore::latch(Status fault) noexcept {
-  if (fault_ == Status::kOk) fault_ = fault;
+  if (fault_ == Status::kOk) {
+    fault_ = fault;
+    motion_watch_.forget_swings();  // those that come from now on are the brake's
+  }
   if (springs_ == Springs::kInForce) springs_ = Springs::kEnding;
 }
 
@@ -200,13 +207,24 @@ bool ControllerCore::rested(double dt) noexcept {
   return rest_ >= wanted;
 }
 
-void ControllerCore::damping_torque(JointVector& tau) noexcept {
+SafetyFilter::Aim ControllerCore::end_springs() noexcept {
+  using Aim = SafetyFilter::Aim;
   law_.integral().reset();
-  if (springs_ != Springs::kOff || ramp_ticks_ > 0) filter_.begin_anew();
+  if (springs_ != Springs::kOff || ramp_ticks_ > 0) {
+    filter_.begin_anew();
+    doubt_.reset();
+  }
   springs_ = Springs::kOff;
-  tau = weight_;
-  if (motion_watch_.sees_frozen()) return;  // the velocity means nothing
-  for (int i = 0; i < n_; ++i) tau[i] -= damping_[i] * qd_[i];
+  const bool means_nothing = motion_watch_.sees_frozen();  // the velocity
+  if (means_nothing || fault_ == Status::kBrakeDoubted) return Aim::kFloat;
+  return fault_ == Status::kPositionLimit ? Aim::kReturn : Aim::kStop;
+}
+
+bool ControllerCore::brake_fails(Status now, double dt) noexcept {
+  if (fault_ == Status::kBrakeDoubted) return true;
+  if (springs_ != Springs::kOff || filter_.fades() || motion_watch_.sees_frozen()) return false;
+  const bool vibrates = fault_ != Status::kOk && now == Status::kInstability;
+  return doubt_.grows(dt, robot_, qd_) || vibrates;
 }
 
 Status ControllerCore::ramp(Status status, JointVector& tau) noexcept {

@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/law/impedance_law.hpp>
+#include <dashpot/controller/safety/brake_doubt.hpp>
 #include <dashpot/controller/safety/motion_watch.hpp>
 #include <dashpot/controller/safety/safety_filter.hpp>
 #include <dashpot/controller/safety/state_check.hpp>
@@ -43,7 +44,7 @@ class ControllerCore {
   enum class Springs : std::uint8_t {
     kInForce,
     kEnding,  ///< that of springs, which restart when they are next in force
-    kOff,     ///< that of `damping_torque`; springs restart when they are next in force
+    kOff,     ///< that of the brake; springs restart when they are next in force
   };
   /// The last set-point that was looked at, and whether it was in order.
   struct Look {
@@ -92,8 +93,10 @@ class ControllerCore {
   /// True once the robot has been at rest for Watchdog::release_after.
   bool rested(double dt) noexcept;
   void latch(Status fault) noexcept;
-  /// The safe output without springs.
-  void damping_torque(JointVector& tau) noexcept;
+  /// No springs act from now on. Returns what the arm is to do instead.
+  SafetyFilter::Aim end_springs() noexcept;
+  /// True if the brake acts alone, and does not stop the arm.
+  bool brake_fails(Status now, double dt) noexcept;
   /// The safe output without a state.
   Status ramp(Status status, JointVector& tau) noexcept;
   Status finish(Status status, const JointVector& tau) noexcept;
@@ -111,8 +114,7 @@ class ControllerCore {
   const JointVector& joint_friction() const noexcept {
     return springs_ == Springs::kOff ? viscous_friction_ : friction_left_;
   }
-  /// Returns springs and dampers in force, the repulsion of position limits included; valid until
-  /// the next call.
+  /// Returns springs and dampers in force, or the brake in their place; valid until the next call.
   const Impedance& impedance() noexcept;
 
   const int n_;
@@ -124,6 +126,7 @@ class ControllerCore {
   DynamicsKernel kernel_;
   StateCheck state_check_;
   MotionWatch motion_watch_;
+  BrakeDoubt doubt_;
   SpringReferences references_;
   GainBlend gains_;
   Ramp<Attachment> attachment_;
@@ -136,7 +139,6 @@ class ControllerCore {
   LoopSystem loop_;
   TipSpeed tip_speed_;  ///< of the reference, in either mode
   ErrorClamp clamp_;
-  JointVector damping_;           ///< of the safe output "damp", N m s/rad
   JointVector viscous_friction_;  ///< of the robot, N m s/rad
   JointVector friction_left_;     ///< by what compensates it, at small velocities; may be negative
   JointVector turn_;              ///< 2 pi for a continuous joint, else 0

@@ -73,13 +73,11 @@ JointMatrix ControllerCore::integral_stiffness() const noexcept {
 }
 
 const Impedance& ControllerCore::impedance() noexcept {
-  const bool springs = springs_ != Springs::kOff, repels = filter_.repels(q_);
-  if (springs && !repels && !outside_) return designed_.now(gains_.now());
+  const bool springs = springs_ != Springs::kOff;
+  if (springs && !outside_) return designed_.now(gains_.now());
   combined_ = springs ? designed_.now(gains_.now()) : Impedance(n_);
-  if (!springs && !motion_watch_.sees_frozen()) combined_.joint_damping.diagonal() = damping_;
-  if (repels) {
-    filter_.add_repulsion(q_, springs, combined_.joint_stiffness, combined_.joint_damping);
-    combined_.joint_weight = 1;  // there are joint springs
+  if (!springs && !motion_watch_.sees_frozen() && fault_ != Status::kBrakeDoubted) {
+    combined_.joint_damping = robot_.M / filter_.brake().stopping_time();
   }
   if (outside_) add_environment(settings_.environment, combined_);
   return combined_;

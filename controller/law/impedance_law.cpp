@@ -26,7 +26,8 @@ ImpedanceLaw::ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forw
       viscous_friction_(model.joint_values(&Joint::viscous_friction)),
       coulomb_friction_(model.joint_values(&Joint::coulomb_friction)),
       integral_(integral),
-      joint_pull_(JointVector::Zero(model.dof())),
+      dampers_(JointVector::Zero(model.dof())),
+      joint_pull_(dampers_),
       borne_(borne) {
   if (!friction_of_robot_) return;
   viscous_friction_ *= feed_forward.friction_share;
@@ -39,6 +40,7 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
                           JointVector& tau) noexcept {
   tau.setZero(q.size());
   JointVector reference_velocity = tau;  // qd_f
+  dampers_ = tau;
   e_.setZero();
   F_.setZero();
   null_level_ = {};
@@ -50,7 +52,7 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
     const JointReference& path = references.joint;
     add_product(impedance.joint_stiffness, difference(path.position(), q), tau);
     if (integral_.on()) joint_pull_ = tau;
-    add_product(impedance.joint_damping, difference(path.velocity(), qd), tau);
+    add_product(impedance.joint_damping, difference(path.velocity(), qd), dampers_);
     if (feed_forward_.acceleration) {
       add_product(robot.M, path.acceleration(), tau, impedance.joint_weight);
     }
@@ -70,11 +72,11 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
       subtract_posture_share(dq);
       const JointVector dqd = difference(references.posture.velocity(), qd);
       add(null_space_.spring(impedance.null_stiffness, dq), tau);
-      add(null_space_.damper(impedance.null_damping, dqd), tau);
+      add(null_space_.damper(impedance.null_damping, dqd), dampers_);
       if (impedance.null_damping_ratio > 0) {
         null_space_.set_loop(borne_, impedance.task_share());
         const JointMatrix D = null_space_.ratio_damping(impedance, null_level_);
-        add(null_space_.damper(D, dqd), tau);
+        add(null_space_.damper(D, dqd), dampers_);
       }
     }
     if (friction_of_reference_) {
@@ -88,6 +90,8 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
     add(integral_.torque(), tau);
   }
   add_torque(robot.J, F_, tau);
+  add(dampers_, tau);
+  if (impedance.task_weight > 0) add_torque(robot.J, tip_damping_, dampers_);
   if (feed_forward_.friction) add_friction(friction_of_robot_ ? qd : reference_velocity, tau);
   if (feed_forward_.coriolis) add(robot.coriolis, tau);
   if (feed_forward_.gravity) add(robot.gravity, tau);
@@ -105,16 +109,20 @@ Vector6 ImpedanceLaw::task_wrench(const DynamicsResult& robot, const JointVector
   }
   const Vector6 velocity_error = path.velocity() - twist(robot.J, qd);
   Vector6 F = Vector6::Zero();
+  tip_damping_.setZero();
   if (!impedance.base.none()) {
     const Vector6 pull = impedance.base.stiffness * clamped;
     if (integral_.on()) tip_pull_ = pull;
-    F += pull + impedance.base.damping * velocity_error;
+    F += pull;
+    tip_damping_ += impedance.base.damping * velocity_error;
   }
   if (!impedance.tool.none()) {
     const Vector6 pull = in_tool_axes(impedance.tool.stiffness, robot.R_BT, clamped);
     if (integral_.on()) tip_pull_ += pull;
-    F += pull + in_tool_axes(impedance.tool.damping, robot.R_BT, velocity_error);
+    F += pull;
+    tip_damping_ += in_tool_axes(impedance.tool.damping, robot.R_BT, velocity_error);
   }
+  F += tip_damping_;
   if (feed_forward_.acceleration) {
     F += impedance.task_weight * null_space_.inertia().wrench(path.acceleration());
   }

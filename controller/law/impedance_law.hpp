@@ -57,13 +57,15 @@ class ImpedanceLaw {
   /// Return terms of the last torque: e, the wrench of its Cartesian part, and the null space,
   /// which is up to date if the impedance has null-space springs or dampers.
   const Vector6& tip_error() const noexcept { return e_; }
+  /// The part of the torque that comes from dampers, n.
+  const JointVector& dampers() const noexcept { return dampers_; }
   const Vector6& tip_wrench() const noexcept { return F_; }
   const NullSpace& null_space() const noexcept { return null_space_; }
   /// Returns what the loop left of the null space's damping ratio.
   const analysis::DampingLevel& null_level() const noexcept { return null_level_; }
 
  private:
-  /// K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d
+  /// K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d; sets `tip_damping_` to the second.
   Vector6 task_wrench(const DynamicsResult& robot, const JointVector& qd,
                       const Impedance& impedance, const TipReference& path,
                       const ErrorClamp& clamp) noexcept;
@@ -82,7 +84,9 @@ class ImpedanceLaw {
   NullSpace null_space_;
   analysis::DampingLevel null_level_;
   SpringIntegral integral_;
-  bool clamped_ = false;    ///< the error clamp acts
+  bool clamped_ = false;  ///< the error clamp acts
+  JointVector dampers_;
+  Vector6 tip_damping_ = Vector6::Zero();
   JointVector joint_pull_;  ///< K_q (q_d - q)
   Vector6 tip_pull_ = Vector6::Zero();
   const analysis::BorneDamping* borne_;

@@ -30,9 +30,8 @@ Settings default_settings(const RobotModel& model) {
   Settings settings;
   settings.environment.joint_stiffness = settings.environment.joint_damping = none;
   Limits& limits = settings.limits;
-  limits.torque = limits.torque_rate = limits.velocity = limits.damping = none;
+  limits.torque = limits.torque_rate = limits.velocity = none;
   limits.position_lower = limits.position_upper = none;
-  limits.position_margin = limits.return_velocity = none;
   limits.external_torque = JointVector::Constant(n, std::numeric_limits<double>::infinity());
   JointVector middle = none;
   for (int i = 0; i < n; ++i) {
@@ -44,9 +43,6 @@ Settings default_settings(const RobotModel& model) {
     limits.velocity[i] = finite_or(joint.velocity, 2);
     limits.position_lower[i] = joint.lower;
     limits.position_upper[i] = joint.upper;
-    limits.position_margin[i] =
-        std::min(slides ? 0.02 : 0.1, 0.1 * std::max(joint.upper - joint.lower, 1e-6));
-    limits.return_velocity[i] = slides ? 0.01 : 0.05;
     const double center = 0.5 * (joint.lower + joint.upper);
     middle[i] = std::isfinite(center) ? center : 0;
   }
@@ -58,7 +54,6 @@ Settings default_settings(const RobotModel& model) {
   const Eigen::MatrixXd M = evaluate(model, middle, none).M;
   const Eigen::MatrixXd M_inverse = M.llt().solve(Eigen::MatrixXd::Identity(n, n));
   const JointVector inertia = M.diagonal().cwiseQuotient(M_inverse.diagonal()).cwiseSqrt();
-  limits.damping = 20 * inertia;
 
   constexpr double kOmega = 2 * std::numbers::pi * 1.5;  // rad/s
   Gains& gains = settings.initial.gains;

@@ -47,6 +47,7 @@ Status MotionWatch::check(const Tick& tick) noexcept {
     fast |= std::abs(tick.qd[i]) > joint.velocity_limit;
     outside |= tick.q[i] < joint.lower || tick.q[i] > joint.upper;
     unstable |= joint.grows(tick.qd[i], tick.still);
+    unstable |= joint.vibrates(tick.qd[i], tick.dt);
     unstable |= joint.reversals > 0.47;
   }
   const double largest = v.cwiseAbs().maxCoeff();  // whose square may overflow
@@ -116,6 +117,33 @@ bool MotionWatch::Record::grows(double now, bool still) noexcept {
   return grown >= kHalfSwings && peak > kLarge * velocity_limit;
 }
 
+bool MotionWatch::Record::vibrates(double now, double dt) noexcept {
+  constexpr double kSlow = 0.05;     // s
+  constexpr double kHigh = 0.18;     // of the velocity limit: `slow` takes some of a fifth
+  constexpr double kLongest = 0.09;  // s, of a half swing: 5.6 Hz
+  constexpr double kEnough = 0.4;    // s; what is struck decays sooner
+  constexpr int kSwings = 10;
+  slow += std::min(1.0, dt / kSlow) * (now - slow);
+  const double last = fast;
+  fast = now - slow;
+  if (fast * last < 0 || swing > kLongest) {
+    const bool counts = swing <= kLongest && height > kHigh * velocity_limit;
+    vibrating = counts ? vibrating + swing : 0;
+    swings = counts ? swings + 1 : 0;
+    swing = height = 0;
+  }
+  swing += dt;
+  height = std::max(height, std::abs(fast));
+  return swings >= kSwings && vibrating >= kEnough;
+}
+
+void MotionWatch::forget_swings() noexcept {
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    joint(i).grown = joint(i).swings = 0;
+    joint(i).vibrating = joint(i).reversals = 0;
+  }
+}
+
 bool MotionWatch::frozen(const Tick& tick) noexcept {
   bool same = !first_ && frozen_after_ > 0;
   for (Eigen::Index i = 0; i < n_ && same; ++i) {
@@ -128,6 +156,11 @@ bool MotionWatch::frozen(const Tick& tick) noexcept {
     return false;
   }
   same_ += tick.dt;
+  constexpr double kCreeps = 0.04;  // s
+  constexpr double kWay = 1e-4;     // rad (m): further than any encoder's count
+  for (Eigen::Index i = 0; i < n_ && same_ >= kCreeps; ++i) {
+    frozen_ |= std::abs(tick.qd[i]) * same_ > kWay;
+  }
   for (Eigen::Index i = 0; i < n_ && same_ >= frozen_after_; ++i) {
     const double change = std::abs(joint(i).excess - joint(i).before);
     frozen_ |= change > 0.05 * joint(i).torque_limit + joint(i).coulomb;

@@ -15,12 +15,15 @@ namespace dashpot::controller {
 ///   tau being the mean of what was applied meanwhile, or the force at the tip that the robot
 ///   reports, is above its threshold. Without a threshold for a joint nothing is computed.
 /// - kInstability: a joint swings to and fro with a velocity that grows by 2 % or more with each of
-///   ten half swings, to more than a tenth of its limit, while the springs stand still; or the
-///   torque beyond the weight reverses, at more than a twentieth of its limit, in every tick for 40
-///   ticks, or in every other tick for 180.
+///   ten half swings, to more than a tenth of its limit, while the springs stand still; or it
+///   vibrates with more than about a fifth of its limit for 0.4 s, in at least ten half swings of
+///   at most 90 ms, whatever the springs do, which is faster than a person shakes; or the torque
+///   beyond the weight reverses, at more than a twentieth of its limit, in every tick for 40 ticks,
+///   or in every other tick for 180.
 /// - kStateFrozen: position and velocity stay the same to the last bit for 0.4 times
 ///   Watchdog::feedback, while that torque changes by a twentieth of its limit more than Coulomb
-///   friction explains.
+///   friction explains; or for 40 ms, in which the velocity would have moved a joint by 0.1 mrad
+///   (0.1 mm).
 class MotionWatch {
  public:
   MotionWatch(const RobotModel& model, const Settings& settings) noexcept;
@@ -38,6 +41,9 @@ class MotionWatch {
   Status check(const Tick& tick) noexcept;
   /// Takes note of a torque that is applied beside a weight.
   void applied(const JointVector& torque, const JointVector& weight) noexcept;
+
+  /// Swings and reversals are counted anew.
+  void forget_swings() noexcept;
 
   /// True as long as the state is frozen, so that its velocity means nothing.
   bool sees_frozen() const noexcept { return frozen_; }
@@ -66,9 +72,15 @@ class MotionWatch {
     double peak = 0, last_peak = 0;  ///< of |qd| in this half swing and the last
     double reversals = 0;            ///< share of the last ticks
     int grown = 0;                   ///< half swings, one larger than the other
+    double slow = 0, fast = 0;       ///< qd, smoothed over 50 ms, and the rest of it
+    double swing = 0, height = 0;    ///< how long this half swing of `fast` has been, and how high
+    double vibrating = 0;            ///< for how long half swings have been fast and high, s
+    int swings = 0;                  ///< how many these were
 
     /// Counts half swings. True if the joint swings with a velocity that grows.
     bool grows(double now, bool still) noexcept;
+    /// True if the joint vibrates.
+    bool vibrates(double now, double dt) noexcept;
   };
   Record& joint(Eigen::Index i) noexcept { return joints_[static_cast<std::size_t>(i)]; }
 

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace dashpot::controller {
 namespace {
@@ -11,20 +10,15 @@ namespace {
 constexpr double kRampTime = 0.1;    // s
 constexpr double kLeastRoom = 0.05;  // of a torque limit
 constexpr double kReturnRise = 1;    // s
-constexpr double kFull = 0.9;        // of a velocity limit: nothing drives further
-constexpr double kFirst = 0.5;       // from here on the drive is bounded ...
-constexpr double kWholly = 0.65;     // ... and from here on to what can be taken away
+constexpr double kFull = 0.9;        // of the tip's speed limit: nothing drives further
+constexpr double kWholly = 0.65;     // from here on the drive is taken away
+constexpr double kMoves = 0.05;      // of a velocity limit: torque that drives ends at once
 
 }  // namespace
 
-double loop_lag(const Settings& settings) noexcept {
-  const Analysis::Sampled& loop = settings.analysis.sampled;
-  const double filter = loop.cutoff > 0 ? 1 / (2 * std::numbers::pi * loop.cutoff) : 0;
-  return settings.period * (1 + loop.delay + (loop.difference_velocity ? 0.5 : 0)) + filter;
-}
-
-SafetyFilter::SafetyFilter(const Settings& settings, const JointVector& inertia) noexcept
-    : n_(inertia.size()),
+SafetyFilter::SafetyFilter(const Settings& settings) noexcept
+    : n_(settings.limits.torque.size()),
+      brake_(settings),
       per_tip_velocity_(1 / settings.limits.tip_velocity),
       power_(settings.limits.power),
       ramp_share_(settings.period / kRampTime),
@@ -32,22 +26,8 @@ SafetyFilter::SafetyFilter(const Settings& settings, const JointVector& inertia)
       last_(JointVector::Zero(n_)),
       asked_(last_) {
   const Limits& limits = settings.limits;
-  const double lag = loop_lag(settings);
   for (Eigen::Index i = 0; i < n_; ++i) {
-    Bounds& bounds = joint(i);
-    bounds.lower = limits.position_lower[i];
-    bounds.upper = limits.position_upper[i];
-    bounds.margin = limits.position_margin[i];
-    bounds.per_velocity = 1 / limits.velocity[i];
-    bounds.torque = limits.torque[i];
-    bounds.torque_step = limits.torque_rate[i] * settings.period;
-    bounds.velocity = limits.velocity[i];
-    bounds.return_velocity = limits.return_velocity[i];
-    bounds.damper = 0.4 * inertia[i] / lag;
-    bounds.repulsion =
-        std::min(limits.repulsion * bounds.torque, 0.1 * bounds.damper * bounds.velocity);
-    bounds.toward = std::min(bounds.torque, 0.2 * inertia[i] * bounds.margin / (lag * lag));
-    bounds.late = limits.torque_rate[i] * inertia[i];
+    joint(i) = {limits.torque[i], limits.torque_rate[i] * settings.period, 1 / limits.velocity[i]};
   }
 }
 
@@ -65,108 +45,78 @@ void SafetyFilter::restart() noexcept {
   begin_anew();
 }
 
-Status SafetyFilter::apply(const Motion& motion, const JointVector& weight,
-                           JointVector& tau) noexcept {
+Status SafetyFilter::apply(const Brake::Motion& motion, double tip_speed, Aim aim,
+                           const JointVector& dampers, JointVector& tau) noexcept {
   asked_ = tau;
-  if (!finite(tau)) {
+  const bool springs = aim == Aim::kSprings;
+  JointVector base = motion.weight, excess(n_);
+  if (!springs) {
+    excess.setZero();
+    returning_ = aim == Aim::kReturn ? std::min(1.0, returning_ + return_step_) : 0;
+    if (aim != Aim::kFloat) add(brake_.stop(motion, returning_), base);
+    asked_ = base;
+  } else {
+    excess = difference(tau, motion.weight);
+  }
+  if (!finite(asked_)) {
     ramp(tau);
     return Status::kNotFinite;
   }
   ramping_ = false;
-  JointVector excess = difference(tau, weight);
-  JointVector base(n_);
-  Status status = repel(motion, excess, base);
-  double fastest = motion.tip_speed * per_tip_velocity_;
+  Status status = Status::kOk;
   for (Eigen::Index i = 0; i < n_; ++i) {
-    fastest = std::max(fastest, std::abs(motion.qd[i]) * joint(i).per_velocity);
+    if (std::abs(motion.weight[i]) > joint(i).torque) status = Status::kWeightNotHeld;
+    base[i] = std::clamp(base[i], -joint(i).torque, joint(i).torque);
   }
+  if (anew_) take_over(base, motion.weight);
   bool limited = false;
-  if (fastest > kFirst) {
-    limited = hold_back(motion.qd, fastest, excess);
-    limited |= hold_back(motion.qd, fastest, base);
+  if (springs) {
+    limited = hold_back(motion.qd, tip_speed, excess);
+    limited |= share_out(base, dampers, excess);
   }
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    if (std::abs(weight[i]) > joint(i).torque) status = worse(status, Status::kWeightNotHeld);
-    base[i] = std::clamp(base[i] + weight[i], -joint(i).torque, joint(i).torque);
-  }
-  if (anew_) take_over(base, weight);
-  // Dampers alone oppose each joint's motion: they are clipped one by one, and lose nothing
-  // elsewhere.
-  if (motion.springs) limited |= shrink(motion.qd, base, excess);
-  if (fading_) limited |= fade(motion.qd, base, excess);
+  if (fading_) limited |= fade(motion.qd, springs, base, excess);
+  if (springs) status = worse(status, brake_.hold(motion, excess));
   for (Eigen::Index i = 0; i < n_; ++i) tau[i] = base[i] + excess[i];
+  if (!finite(tau)) {
+    ramp(tau);
+    return Status::kNotFinite;
+  }
   limited |= limit(tau);
   return limited ? worse(status, Status::kTorqueLimited) : status;
 }
 
-Status SafetyFilter::repel(const Motion& motion, JointVector& excess,
-                           JointVector& repulsion) noexcept {
-  repulsion.setZero();
-  if (!repels(motion.q)) {  // as almost always
-    returning_ = 0;
-    return Status::kOk;
-  }
-  Status status = Status::kOk;
-  bool any_outside = false;
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    const Bounds::Near near = joint(i).nearer(motion.q[i]);
-    if (!(near.distance < joint(i).margin)) continue;
-    const double toward = near.toward, rate = toward * motion.qd[i];
-    const double room = std::max(near.distance, 0.0) / joint(i).margin;
-    excess[i] = toward * std::min(toward * excess[i], joint(i).toward * room);
-    if (near.distance >= 0) {
-      const double y = 1 - room;
-      const double spring = motion.springs ? joint(i).repulsion * y * y : 0;
-      repulsion[i] = -toward * (spring + joint(i).damper * y * rate);
-      status = worse(status, Status::kNearJointLimit);
-      continue;
-    }
-    any_outside = true;
-    const double inward = joint(i).return_velocity * returning_;
-    repulsion[i] = -toward * std::clamp(joint(i).damper * (inward + rate), -joint(i).repulsion,
-                                        joint(i).repulsion);
-    status = worse(status, Status::kPositionLimit);
-  }
-  returning_ = motion.returns && any_outside ? std::min(1.0, returning_ + return_step_) : 0;
-  return status;
-}
-
-bool SafetyFilter::hold_back(const JointVector& qd, double fastest,
+bool SafetyFilter::hold_back(const JointVector& qd, double tip_speed,
                              JointVector& excess) const noexcept {
-  double power = 0;
-  for (Eigen::Index i = 0; i < n_; ++i) power += excess[i] * qd[i];
-  bool changed = false;
-  if (power > 0 && fastest > kWholly) {
-    const double share = std::max(0.0, (kFull - fastest) / (kFull - kWholly));
-    for (Eigen::Index i = 0; i < n_; ++i) excess[i] *= share;
-    changed = true;
-  }
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    const double speed = std::abs(qd[i]), share = speed * joint(i).per_velocity;
-    if (!(excess[i] * qd[i] > 0) || share <= kFirst) continue;
-    const double room = std::max(0.0, kFull * joint(i).velocity - speed);
-    const double most = std::min(std::sqrt(joint(i).late * room), joint(i).damper * room) +
-                        joint(i).torque * std::max(0.0, (kWholly - share) / (kWholly - kFirst));
-    if (std::abs(excess[i]) <= most) continue;
-    excess[i] = std::copysign(most, excess[i]);
-    changed = true;
-  }
-  return changed;
-}
-
-bool SafetyFilter::shrink(const JointVector& qd, const JointVector& base,
-                          JointVector& excess) const noexcept {
-  double power = 0;
-  for (Eigen::Index i = 0; i < n_; ++i) power += excess[i] * qd[i];
-  double share = power > power_ ? power_ / power : 1;
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    // A joint whose weight is about at its limit has little say: `limit` clips what is left of it.
-    const double room = std::max(joint(i).torque - std::copysign(1, excess[i]) * base[i],
-                                 kLeastRoom * joint(i).torque);
-    if (share * std::abs(excess[i]) > room) share = room / std::abs(excess[i]);
-  }
+  const double power = product(excess, qd);
+  if (!(power > 0)) return false;
+  double share = std::min(1.0, power_ / power);
+  const double v = tip_speed * per_tip_velocity_;
+  if (v > kWholly) share *= std::max(0.0, (kFull - v) / (kFull - kWholly));
   if (share == 1) return false;
   for (Eigen::Index i = 0; i < n_; ++i) excess[i] *= share;
+  return true;
+}
+
+double SafetyFilter::fitting(const JointVector& base, const JointVector& part) const noexcept {
+  double share = 1;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    // A joint whose weight is about at its limit has little say: `limit` clips what is left of it.
+    const double room = std::max(joint(i).torque - std::copysign(1, part[i]) * base[i],
+                                 kLeastRoom * joint(i).torque);
+    if (share * std::abs(part[i]) > room) share = room / std::abs(part[i]);
+  }
+  return share;
+}
+
+bool SafetyFilter::share_out(const JointVector& base, const JointVector& dampers,
+                             JointVector& excess) const noexcept {
+  if (fitting(base, excess) == 1) return false;
+  const double damping = fitting(base, dampers);
+  JointVector beside = base, rest = excess;
+  add(dampers, beside, damping);
+  add(dampers, rest, -1);
+  const double springs = fitting(beside, rest);
+  for (Eigen::Index i = 0; i < n_; ++i) excess[i] = damping * dampers[i] + springs * rest[i];
   return true;
 }
 
@@ -196,12 +146,12 @@ void SafetyFilter::take_over(const JointVector& base, const JointVector& weight)
   fade_ticks_ = 0;
   for (Eigen::Index i = 0; i < n_; ++i) {
     const double excess = last_[i] - std::clamp(weight[i], -joint(i).torque, joint(i).torque);
-    const double repulsion = base[i] - weight[i];
-    joint(i).acting = excess - std::clamp(repulsion, std::min(excess, 0.0), std::max(excess, 0.0));
+    const double brake = base[i] - weight[i];
+    joint(i).acting = excess - std::clamp(brake, std::min(excess, 0.0), std::max(excess, 0.0));
   }
 }
 
-bool SafetyFilter::fade(const JointVector& qd, const JointVector& base,
+bool SafetyFilter::fade(const JointVector& qd, bool springs, const JointVector& base,
                         JointVector& excess) noexcept {
   double ticks = 1;
   const auto way = [&](Eigen::Index i) {
@@ -217,7 +167,8 @@ bool SafetyFilter::fade(const JointVector& qd, const JointVector& base,
   fade_ticks_ -= 1;
   for (Eigen::Index i = 0; i < n_; ++i) {
     Bounds& bounds = joint(i);
-    const bool drives = bounds.acting * qd[i] > 0 && std::abs(qd[i]) * bounds.per_velocity >= 1;
+    const bool drives =
+        !springs && bounds.acting * qd[i] > 0 && std::abs(qd[i]) * bounds.per_velocity > kMoves;
     excess[i] = bounds.acting +=
         drives ? std::clamp(way(i), -bounds.torque_step, bounds.torque_step) : way(i) / ticks;
   }
@@ -233,31 +184,6 @@ bool SafetyFilter::limit(JointVector& tau) noexcept {
     tau[i] = last_[i] = safe;
   }
   return changed;
-}
-
-bool SafetyFilter::repels(const JointVector& q) const noexcept {
-  bool any = false;
-  for (Eigen::Index i = 0; i < n_; ++i) any |= joint(i).nearer(q[i]).distance < joint(i).margin;
-  return any;
-}
-
-void SafetyFilter::add_repulsion(const JointVector& q, bool springs, JointMatrix& stiffness,
-                                 JointMatrix& damping) const noexcept {
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    const Bounds& bounds = joint(i);
-    const double distance = bounds.nearer(q[i]).distance;
-    if (!(distance < bounds.margin)) continue;
-    const double y = 1 - std::max(distance, 0.0) / bounds.margin;
-    if (springs && distance >= 0) stiffness(i, i) += 2 * bounds.repulsion * y / bounds.margin;
-    damping(i, i) += bounds.damper * y;
-  }
-}
-
-JointVector SafetyFilter::borne(JointVector damping) const noexcept {
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    damping[i] = std::min(damping[i], 2.5 * joint(i).damper);
-  }
-  return damping;
 }
 
 }  // namespace dashpot::controller

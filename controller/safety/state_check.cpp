@@ -49,6 +49,7 @@ StateCheck::StateCheck(const RobotModel& model, const Settings& settings)
 
 void StateCheck::reset() noexcept {
   timed_ = false;
+  backward_ = ahead_ = 0;
   for (Last* last : {&good_, &doubtful_}) {
     last->any = false;
     last->age = 0;
@@ -67,14 +68,25 @@ void StateCheck::forget_motion() noexcept {
   travelled_.setZero(n_);
 }
 
+double StateCheck::counted(double gap) noexcept {
+  constexpr double kLeast = 0.1;  // of a period: jitter of a loop that is not in real time is less
+  const bool says_nothing = gap < kLeast * period_;
+  const double left = gap - (says_nothing ? 0 : ahead_);
+  ahead_ = says_nothing ? ahead_ + period_ : 0;
+  ahead_ = std::min(ahead_, longest_gap_);
+  return left < kLeast * period_ ? period_ : left;
+}
+
 Status StateCheck::check(const RobotState& state) noexcept {
   const double gap = timed_ ? seconds_between(last_time_, state.time) : period_;
   const bool backward = !(gap > 0);
   timed_ = true;
   last_time_ = state.time;
-  good_.age += backward ? period_ : gap;
+  backward_ = backward ? backward_ + period_ : 0;
+  const double passed = counted(gap);
+  good_.age += passed;
   age_ = 1e-9 * std::round(1e9 * good_.age);  // so that gaps add up exactly
-  doubtful_.age = gap;
+  doubtful_.age = passed;
 
   Status status = Status::kOk;
   bool relocated = false;
@@ -83,11 +95,10 @@ Status StateCheck::check(const RobotState& state) noexcept {
   } else if (!state.position.allFinite() || !state.velocity.allFinite()) {
     status = Status::kStateNotFinite;
   } else if (good_.any && !follows(good_, state)) {
-    relocated = believed(state, gap);
+    relocated = believed(state, passed);
     if (!relocated) status = Status::kStateJump;
   }
-  if (backward) status = worse(status, Status::kTimeBackward);
-  if (backward || status != Status::kStateJump) doubtful_.any = false;
+  if (status != Status::kStateJump) doubtful_.any = false;
   if (status != Status::kOk) return status;
 
   const bool unwraps = any_continuous_ && good_.any;
@@ -109,7 +120,7 @@ Status StateCheck::check(const RobotState& state) noexcept {
   good_.velocity = state.velocity;
   good_.age = 0;
   good_.any = true;
-  return status;
+  return backward ? worse(status, Status::kTimeBackward) : status;
 }
 
 Status StateCheck::compare(const JointVector& position, const JointVector& velocity,
@@ -124,7 +135,7 @@ Status StateCheck::compare(const JointVector& position, const JointVector& veloc
 }
 
 bool StateCheck::wrong_rate(double gap) noexcept {
-  const double excess = gap / period_ - 1;
+  const double excess = std::max(gap, 0.0) / period_ - 1;
   if (intervals_ < kIntervals) ++intervals_;
   excess_ += (excess - excess_) / intervals_;
   return intervals_ == kIntervals && (excess_ < kFastest || excess_ > kSlowest);

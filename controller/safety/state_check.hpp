@@ -25,6 +25,9 @@ namespace dashpot::controller {
 /// grown enough. By then a fault has latched (see Status), because the jump took longer than
 /// longest_gap.
 ///
+/// A time stamp that is not after the last one, or by less than a tenth of a period, says nothing:
+/// it counts as a period, and so does what the next one says less.
+///
 /// Good states are compared with each other over about Watchdog::feedback: what the positions moved
 /// by against what the velocities say, and the time stamps against the period. See
 /// kStateContradictory and kWrongRate.
@@ -35,17 +38,19 @@ class StateCheck {
  public:
   StateCheck(const RobotModel& model, const Settings& settings);
 
-  /// Returns kOk; kTimeGap, kWrongRate or kStateContradictory, whose safe output is "damp"; or a
-  /// status whose safe output is "ramp". Times are compared with the last state's, good or not.
+  /// Returns kOk; kTimeGap, kWrongRate, kStateContradictory or kTimeBackward, whose states are
+  /// good; or a status whose safe output is "ramp". Times are compared with the last state's, good
+  /// or not.
   Status check(const RobotState& state) noexcept;
   /// Returns the last good position, n, rad.
   const JointVector& position() const noexcept { return good_.position; }
   /// Returns the last good velocity, n, rad/s: the measured one, or, from a contradiction on until
   /// `trust_velocities`, how fast positions change, smoothed over three ticks.
   const JointVector& velocity() const noexcept { return blind_ ? velocity_ : good_.velocity; }
-  /// Returns how long before the last state the last good one before it was, s; an interval in
-  /// which the clock went backward counts as a period.
+  /// Returns how long before the last state the last good one before it was, s.
   double age() const noexcept { return age_; }
+  /// Returns for how long time stamps have not gone forward, s.
+  double backward() const noexcept { return backward_; }
   /// Velocities are measured again, after a contradiction.
   void trust_velocities() noexcept { blind_ = false; }
   /// The next state is like the first.
@@ -60,6 +65,8 @@ class StateCheck {
     JointVector velocity;
   };
 
+  /// Returns how much time counts as passed where time stamps differ by `gap`, s.
+  double counted(double gap) noexcept;
   bool follows(const Last& last, const RobotState& state) const noexcept;
   /// True if this state and those before have agreed with each other for long enough.
   bool believed(const RobotState& state, double gap) noexcept;
@@ -85,6 +92,8 @@ class StateCheck {
   bool timed_ = false;  ///< last_time_ is known
   std::int64_t last_time_ = 0;
   double age_ = 0;
+  double backward_ = 0;
+  double ahead_ = 0;  ///< how much more was counted than the time stamps said, s
   Last good_;
   Last doubtful_;         ///< since the last good one
   double agreement_ = 0;  ///< for how long the doubtful ones have agreed with each other, s

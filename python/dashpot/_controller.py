@@ -47,11 +47,12 @@ class Status(enum.IntEnum):
     POSITION_LIMIT = 18
     STATE_FROZEN = 19
     STATE_CONTRADICTORY = 20
-    STATE_NOT_FINITE = 21
-    STATE_WRONG_SIZE = 22
-    STATE_JUMP = 23
-    TIME_BACKWARD = 24
-    NOT_FINITE = 25
+    TIME_BACKWARD = 21
+    BRAKE_DOUBTED = 22
+    STATE_NOT_FINITE = 23
+    STATE_WRONG_SIZE = 24
+    STATE_JUMP = 25
+    NOT_FINITE = 26
 
     @property
     def text(self) -> str:

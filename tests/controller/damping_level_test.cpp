@@ -206,7 +206,7 @@ TEST(HeldDamping, FallsAndRisesAlongAPath) {
     for (LedArm* arm : {&held, &asked}) {
       arm->state.position = in + 0.5 * (1 - std::cos(pi * t)) * (out - in);
       arm->state.velocity = 0.5 * pi * std::sin(pi * t) * (out - in);
-      ASSERT_EQ(arm->tick(), Status::kOk) << k;
+      ASSERT_LE(arm->tick(), Status::kNearJointLimit) << k;
     }
     EXPECT_EQ(asked.controller.snapshot().damping_level, 1);
     const double level = held.controller.snapshot().damping_level;
@@ -246,7 +246,7 @@ TEST(HeldDamping, KeepsTheMarginWhileTheModeChanges) {
     arm.settle();
     arm.setpoint.mode = Mode::kCartesian;
     for (int k = 0; k < 600; ++k) {
-      ASSERT_EQ(arm.tick(), Status::kOk) << k;
+      ASSERT_LE(arm.tick(), Status::kNearJointLimit) << k;
       if (k % 25 != 0) continue;
       const double found = margin_of(arm, 2);
       if (margin == 2) {

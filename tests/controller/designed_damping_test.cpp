@@ -112,7 +112,7 @@ TEST(DesignedDamping, HoldsTheRatioAlongAPathOfEveryArm) {
       int soft = 0;
       for (int k = 1; k <= 300; ++k) {
         led.swing((friction > 0 ? 1e-3 : 3e-3) * k);
-        ASSERT_LE(led.tick(), Status::kTorqueLimited);
+        ASSERT_LE(led.tick(), Status::kNearJointLimit);
         const Vibration& modes = led.modes();
         ASSERT_EQ(modes.position, led.state.position);
         ASSERT_EQ(modes.count, tip ? 6 : model.dof());
@@ -141,7 +141,7 @@ TEST(DesignedDamping, LosesNoModesOfALongChain) {
   const auto before = led.modes().counters;
   for (int k = 1; k <= 2000; ++k) {  // a swing
     led.swing(1e-3 * k);
-    ASSERT_LE(led.tick(), Status::kTorqueLimited);
+    ASSERT_LE(led.tick(), Status::kNearJointLimit);
     ASSERT_EQ(led.modes().status, analysis::Status::kOk);
   }
   EXPECT_EQ(led.modes().counters.direct - before.direct, 0U);

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <vector>
 
 namespace dashpot::controller {
 namespace {
@@ -60,7 +62,9 @@ TEST_P(Ramp, OneBadTickCostsLittleAndNothingStartsAfresh) {
   arm->setpoint.time = arm->state.time;
   spoil(arm->state);
   EXPECT_EQ(tick(), expected());
-  EXPECT_TRUE(near(arm->torque, 0.99 * before, 1e-9));
+  // Of a time stamp alone that is wrong, nothing is taken away.
+  const double left = expected() == Status::kTimeBackward ? 1 : 0.99;
+  EXPECT_TRUE(near(arm->torque, left * before, 1e-9));
   arm->state = good;
   EXPECT_EQ(next(), Status::kOk);
   EXPECT_TRUE(near(arm->torque, before, 1e-3));
@@ -69,7 +73,7 @@ TEST_P(Ramp, OneBadTickCostsLittleAndNothingStartsAfresh) {
 
 class LongRamp : public Ramp {};
 // A jump is believed after a while, see below.
-INSTANTIATE_TEST_SUITE_P(Faults, LongRamp, ::testing::Values(0, 1, 2, 3, 6));
+INSTANTIATE_TEST_SUITE_P(Faults, LongRamp, ::testing::Range(0, 4));
 
 TEST_P(LongRamp, EndsAtZeroTorqueAndStartsAfresh) {
   run(1.0);
@@ -78,7 +82,7 @@ TEST_P(LongRamp, EndsAtZeroTorqueAndStartsAfresh) {
   const JointVector step = settings.limits.torque_rate * settings.period;
   for (int k = 0; k < 150; ++k) {
     arm->state = good;
-    arm->state.time += expected() == Status::kTimeBackward ? -k : 1'000'000 * k;
+    arm->state.time += 1'000'000 * k;
     spoil(arm->state);
     EXPECT_EQ(tick(), expected());
     EXPECT_TRUE(arm->torque.norm() < last.norm() || k >= 100);
@@ -98,6 +102,37 @@ TEST_P(LongRamp, EndsAtZeroTorqueAndStartsAfresh) {
   for (int k = 0; k < 3000; ++k) arm->step();
   EXPECT_EQ(snapshot().status, Status::kOk);
   EXPECT_EQ(snapshot().restarts, 2u);
+}
+
+/// Where time stamps are wrong and positions are good, the weight is held and the brake acts.
+TEST_F(Safety, WrongTimeStampsDropNoArm) {
+  const std::vector<std::function<std::int64_t(std::int64_t)>> clocks = {
+      [](std::int64_t) { return 0; },                      // stands still
+      [](std::int64_t ns) { return -ns; },                 // runs backward
+      [](std::int64_t ns) { return ns / 1'000'000'000; },  // counts seconds,
+      [](std::int64_t ns) { return ns / 1000; },           // us,
+      [](std::int64_t ns) { return ns / 1'000'000; }};     // ms
+  for (std::size_t clock = 0; clock < clocks.size(); ++clock) {
+    make();
+    run(1.0);
+    const JointVector start = arm->state.position;
+    const std::int64_t from = arm->state.time;
+    std::int64_t passed = 0;
+    for (int k = 0; k < 1000; ++k) {
+      arm->state.time = from + clocks[clock](passed += 1'000'000);
+      arm->state.external_wrench[0] = k >= 400 && k < 418 ? 10 : 0;  // somebody bumps into it
+      arm->setpoint.time = arm->state.time;
+      arm->fresh = false;
+      const std::int64_t told = arm->state.time;
+      arm->step();
+      arm->state.time = told;
+    }
+    const bool slow = clock > 2;
+    EXPECT_EQ(snapshot().fault, slow ? Status::kWrongRate : Status::kTimeBackward) << clock;
+    EXPECT_LT((arm->state.position - start).cwiseAbs().maxCoeff(), 0.05) << clock;
+    EXPECT_LT(arm->state.velocity.cwiseAbs().maxCoeff(), 0.01) << clock;
+    EXPECT_TRUE(near(arm->torque, gravity(), 0.1)) << clock;
+  }
 }
 
 /// An encoder that slips, or wraps by a turn: nobody knows which state is right.
@@ -168,7 +203,8 @@ TEST_F(Safety, VelocitiesThatContradictThePositionsLatch) {
       arm->state.position[4] += 1e-3 * v;
       next();
     }
-    EXPECT_NEAR((arm->torque - gravity())[4], -settings.limits.damping[4] * v, 1e-6) << scale;
+    const auto there = evaluate(model, arm->state.position, arm->state.velocity);
+    EXPECT_NEAR((arm->torque - gravity())[4], -there.M(4, 4) * v / 0.05, 1e-6) << scale;
   }
 }
 
@@ -211,7 +247,21 @@ TEST_F(Safety, AStateThatNeverChangesWhileTheTorqueDoesLatches) {
     ASSERT_EQ(snapshot().fault, Status::kStateFrozen);
   }
   const JointVector damping = arm->torque - gravity();
-  EXPECT_LT(damping[1], -0.1 * settings.limits.damping[1]);
+  EXPECT_LT(damping[1], -1);
+}
+
+/// Bits that repeat while the arm creeps are a fault within 50 ms, and within 0.2 s however slowly.
+TEST_F(Safety, AStateThatFreezesInACreepingMotionLatches) {
+  settings.watchdog.feedback = 0.5;
+  for (const double v : {0.03, 0.003, 0.0006}) {
+    make();
+    run(1.0);
+    arm->state.velocity[4] = v;
+    int ticks = 0;
+    for (; snapshot().fault == Status::kOk && ticks < 300; ++ticks) next();
+    EXPECT_EQ(snapshot().fault, Status::kStateFrozen) << v;
+    EXPECT_LE(ticks, v > 0.0025 ? 50 : 200) << v;
+  }
 }
 
 TEST_F(Safety, ALoopAtAnotherRateLatches) {

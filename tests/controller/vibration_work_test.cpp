@@ -69,7 +69,6 @@ TEST(VibrationInTheTick, ComputesNothingWhileNothingChanges) {
 TEST(VibrationInTheTick, RepeatsNothingFromBeforeAReset) {
   SmallSwing led(Mode::kJoint, [](Settings& settings) {
     settings.limits.position_upper[3] = -2.5;  // the robot stands outside
-    settings.limits.return_velocity.setZero();
   });
   for (int k = 0; k < 5; ++k) ASSERT_EQ(led.tick(), Status::kPositionLimit);
   EXPECT_EQ(led.counters().no_springs, 1U);

@@ -243,9 +243,8 @@ TEST(Config, FillsTheRest) {
            "  linear_acceleration: 1, angular_velocity: 2, angular_acceleration: 3, smoothing: 20 "
            "ms,\n"
            "  gain_time: 1}\n"
-           "limits: {position_margin: 5 deg, repulsion: 0.25, damping: 3, tip_velocity: 2, power: "
-           "80 W,\n"
-           "  return_velocity: 1 deg/s, external_torque: 9, external_force: 40, gain_margin: 3,\n"
+           "limits: {stopping_time: 30 ms, tip_velocity: 2, power: 80 W,\n"
+           "  external_torque: 9, external_force: 40, gain_margin: 3,\n"
            "  walls: [{point: [0, 0, 10 cm], normal: [0, 0, 2]}]}\n"
            "gains: {null_space: {stiffness: 4, damping: [1, 2, 3, 4, 5, 6, 7]}}\n"
            "feed_forward: {gravity: false, coriolis: false, friction: true, acceleration: false,\n"
@@ -272,17 +271,14 @@ TEST(Config, FillsTheRest) {
   EXPECT_EQ(all.motion.angular_acceleration, 3);
   EXPECT_EQ(all.motion.smoothing, 0.02);
   EXPECT_EQ(all.motion.gain_time, 1);
-  EXPECT_TRUE(all.limits.position_margin.isApprox(VectorXd::Constant(7, 5 * kDegree), 1e-15));
+  EXPECT_DOUBLE_EQ(all.limits.stopping_time, 0.03);
   EXPECT_EQ(all.limits.tip_velocity, 2);
   EXPECT_EQ(all.limits.power, 80);
-  EXPECT_TRUE(all.limits.return_velocity.isApprox(VectorXd::Constant(7, kDegree), 1e-15));
   EXPECT_EQ(all.limits.external_torque, VectorXd::Constant(7, 9));
   EXPECT_EQ(all.limits.external_force, 40);
   EXPECT_EQ(all.limits.gain_margin, 3);
   ASSERT_EQ(all.limits.walls.size(), 1u);
   EXPECT_DOUBLE_EQ(all.limits.walls[0].distance(Eigen::Vector3d(5, 6, 0.3)), 0.2);
-  EXPECT_EQ(all.limits.repulsion, 0.25);
-  EXPECT_EQ(all.limits.damping, VectorXd::Constant(7, 3));
   EXPECT_EQ(all.initial.gains.null_stiffness, VectorXd::Constant(7, 4));
   EXPECT_EQ(all.initial.gains.null_damping, VectorXd::LinSpaced(7, 1, 7));
   EXPECT_FALSE(all.feed_forward.gravity || all.feed_forward.coriolis ||
@@ -416,7 +412,7 @@ TEST(ConfigExample, ShowsDefaults) {
   const Settings none = controller::default_settings(config.model);
   EXPECT_THAT(differences(config.settings, none),
               ElementsAre("control.mode", "limits.position_lower", "limits.position_upper",
-                          "limits.damping", "motion.velocity", "motion.acceleration"));
+                          "motion.velocity", "motion.acceleration"));
   EXPECT_EQ(config.settings.initial.gains.frame, none.initial.gains.frame);
   EXPECT_EQ(config.settings.initial.gains.directions, none.initial.gains.directions);
 }

@@ -151,7 +151,7 @@ def load(path):
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
     plugin = library.dashpot_plugin_interface(10).contents
-    assert plugin.version == 10 and plugin.struct_size == c.sizeof(Plugin)
+    assert plugin.version == 11 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
 

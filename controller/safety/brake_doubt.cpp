@@ -1,0 +1,29 @@
+#include <dashpot/controller/base/joint_algebra.hpp>
+#include <dashpot/controller/safety/brake_doubt.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::controller {
+
+bool BrakeDoubt::grows(double dt, const DynamicsResult& robot, const JointVector& qd) noexcept {
+  constexpr double kMemory = 0.5;   // s, ten times as long as the brake needs
+  constexpr double kPushed = 0.25;  // of a velocity limit
+  JointVector momentum = JointVector::Zero(qd.size());
+  add_product(robot.M, qd, momentum);
+  const double energy = 0.5 * product(momentum, qd);
+  double pushed = 0, power = 0;
+  for (Eigen::Index i = 0; i < qd.size(); ++i) {
+    const double v = kPushed * velocity_[i];
+    pushed += 0.5 * robot.M(i, i) * v * v;
+    power += std::abs(robot.gravity[i] * qd[i]);
+  }
+  if (least_ < 0 || energy < least_) {
+    least_ = energy;
+    given_ = 0;
+  }
+  given_ = given_ * std::max(0.0, 1 - dt / kMemory) + power * dt;
+  return energy > least_ + given_ + pushed;
+}
+
+}  // namespace dashpot::controller
