@@ -11,6 +11,7 @@ namespace {
 constexpr double kMargin = 10;         // of gain, that the sampled loop keeps
 constexpr double kNear = 0.2;          // t / T: short, so that the law keeps its say
 constexpr double kFullVelocity = 0.9;  // of a velocity limit: the rest is for what nobody expects
+constexpr double kSlowly = 0.5;  // of a velocity limit: what is slower may be pressing on something
 constexpr double kBraking = 0.5;       // of the torque that is left: the rest is for other joints
 constexpr double kLeastBraking = 0.1;  // of a torque limit, whatever the weight
 constexpr double kReturn = 0.025;      // of a velocity limit
@@ -93,7 +94,8 @@ bool Brake::allows(const Motion& motion, Eigen::Index i, double way,
   double more = along * near_;  // of the velocity, that this needs to be allowed
   const double moves = way * motion.qd[i];
   if (along > 0 && moves > 0) {
-    more = std::max(more, along * along * M / (2 * bounds.torque_rate));
+    const double slow = std::min(1.0, moves / (kSlowly * bounds.velocity)) * along;
+    more = std::max(more, slow * slow * M / (2 * bounds.torque_rate));
   }
   const double v = moves + more;
   if (v > kFullVelocity * bounds.velocity) return false;
@@ -109,7 +111,8 @@ Brake::Bound Brake::bound(const Motion& motion, Eigen::Index i, double way) cons
   const double moves = way * motion.qd[i], away = std::min(full, near) - moves;
   double most = away / near_;
   if (away > 0 && moves > 0) {
-    most = std::min(most, std::sqrt(2 * away * bounds.torque_rate / M));
+    const double slow = std::min(1.0, moves / (kSlowly * bounds.velocity));
+    most = std::min(most, std::sqrt(2 * away * bounds.torque_rate / M) / slow);
   }
   return {i, way, way * most, near < full};
 }

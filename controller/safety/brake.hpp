@@ -29,16 +29,16 @@ double loop_lag(const Settings& settings) noexcept;
 /// its interval [-v-_i, v+_i]. With t = T / 5, the distance d_i to a position limit less a margin,
 /// the acceleration a_i = room_i / (2 M_ii) of half of the torque that the weight leaves, and the
 /// time r_i = max(4 t, t + lag + torque_i / torque_rate_i) until it is there,
-///     v+_i = min(0.9 velocity_i, sqrt((a_i r_i)^2 + 2 a_i d_i) - a_i r_i),   d_i / r_i for d_i <
-///     0,
+///     v+_i = min(0.9 velocity_i, sqrt((a_i r_i)^2 + 2 a_i d_i) - a_i r_i),  d_i / r_i if d_i < 0,
 /// from which the joint stops before the limit, and likewise v-_i. The acceleration M^-1 (x -
 /// coriolis) of the model may be at most
-///     min((v+_i - qd_i) / t, sqrt(2 (v+_i - qd_i) torque_rate_i / M_ii))
-/// and likewise downward, the latter only where the joint moves that way already, so that braking
-/// is not bounded: it vanishes at the edge, is negative beyond it, and can be taken away as fast as
-/// the torque-rate limit allows. By Gauss's principle of least constraint hold adds to x the
-/// torques of the fewest joints, with the sign of a brake, that keep these bounds: torques on the
-/// joints at their bounds alone. The others keep the torque that x gives them.
+///     min((v+_i - qd_i) / t, sqrt(2 (v+_i - qd_i) torque_rate_i / M_ii) / s_i)
+/// and likewise downward, the latter only where the joint moves that way already, with the share
+/// s_i = min(1, 2 |qd_i| / velocity_i): braking is not bounded, nor what presses. It vanishes at
+/// the edge, is negative beyond it, and can be taken away as fast as the torque-rate limit allows.
+/// By Gauss's principle of least constraint hold adds to x the torques of the fewest joints, with
+/// the sign of a brake, that keep these bounds: torques on the joints at their bounds alone. The
+/// others keep the torque that x gives them.
 class Brake {
  public:
   explicit Brake(const Settings& settings) noexcept;

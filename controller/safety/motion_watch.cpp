@@ -128,8 +128,8 @@ bool MotionWatch::Record::vibrates(double now, double dt) noexcept {
   fast = now - slow;
   if (fast * last < 0 || swing > kLongest) {
     const bool counts = swing <= kLongest && height > kHigh * velocity_limit;
-    vibrating = counts ? vibrating + swing : 0;
-    swings = counts ? swings + 1 : 0;
+    vibrating = std::max(0.0, vibrating + (counts ? swing : -swing));
+    swings = vibrating > 0 ? swings + (counts ? 1 : 0) : 0;
     swing = height = 0;
   }
   swing += dt;

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kRampTime = 0.1;    // s
 constexpr double kLeastRoom = 0.05;  // of a torque limit
+constexpr double kSprings = 0.8;     // of the torque beside the weight: the rest is for dampers
 constexpr double kReturnRise = 1;    // s
 constexpr double kFull = 0.9;        // of the tip's speed limit: nothing drives further
 constexpr double kWholly = 0.65;     // from here on the drive is taken away
@@ -97,11 +98,12 @@ bool SafetyFilter::hold_back(const JointVector& qd, double tip_speed,
   return true;
 }
 
-double SafetyFilter::fitting(const JointVector& base, const JointVector& part) const noexcept {
+double SafetyFilter::fitting(const JointVector& base, const JointVector& part,
+                             double most) const noexcept {
   double share = 1;
   for (Eigen::Index i = 0; i < n_; ++i) {
     // A joint whose weight is about at its limit has little say: `limit` clips what is left of it.
-    const double room = std::max(joint(i).torque - std::copysign(1, part[i]) * base[i],
+    const double room = std::max(most * (joint(i).torque - std::copysign(1, part[i]) * base[i]),
                                  kLeastRoom * joint(i).torque);
     if (share * std::abs(part[i]) > room) share = room / std::abs(part[i]);
   }
@@ -110,13 +112,16 @@ double SafetyFilter::fitting(const JointVector& base, const JointVector& part) c
 
 bool SafetyFilter::share_out(const JointVector& base, const JointVector& dampers,
                              JointVector& excess) const noexcept {
-  if (fitting(base, excess) == 1) return false;
-  const double damping = fitting(base, dampers);
-  JointVector beside = base, rest = excess;
-  add(dampers, beside, damping);
+  JointVector rest = excess;
   add(dampers, rest, -1);
-  const double springs = fitting(beside, rest);
-  for (Eigen::Index i = 0; i < n_; ++i) excess[i] = damping * dampers[i] + springs * rest[i];
+  const double springs = fitting(base, rest, kSprings);
+  if (springs == 1 && fitting(base, excess, 1) == 1) return false;
+  const double damping = fitting(base, dampers, 1);
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double limit = joint(i).torque;
+    excess[i] =
+        std::clamp(springs * rest[i] + damping * dampers[i], -limit - base[i], limit - base[i]);
+  }
   return true;
 }
 

@@ -14,9 +14,10 @@ namespace dashpot::controller {
 /// f, in this order, while springs are in force:
 /// - x shrinks evenly by (0.9 - v) / 0.25 where it adds energy (x' qd > 0) to a robot whose tip
 ///   moves with the share v > 0.65 of its limit, and to the power Limits::power.
-/// - Where torques saturate, dampers go first: they shrink evenly, in all joints alike, as far as
-///   they have to beside the weight. Springs and all else shrink evenly into what is left, so that
-///   the wrench at the tip keeps its direction, and an arm that presses too hard stays damped.
+/// - Springs, and all that is no damper, shrink evenly, in all joints alike, to 0.8 of the torque
+///   that the weight leaves: the wrench at the tip keeps its direction. Dampers shrink evenly to
+///   all of it, and the sum is clipped. So an arm that presses too hard stays damped: if springs
+///   took all that is left, the torque of a joint at its limit would not change with its velocity.
 /// - Brake::hold takes away what would take a joint out of its interval of allowed velocity.
 ///
 /// Where springs end or start again, x goes from what acts to what is asked for evenly: by the same
@@ -88,7 +89,7 @@ class SafetyFilter {
   bool share_out(const JointVector& base, const JointVector& dampers,
                  JointVector& excess) const noexcept;
   /// Returns the share of `part` for which there is room beside `base`, at most 1.
-  double fitting(const JointVector& base, const JointVector& part) const noexcept;
+  double fitting(const JointVector& base, const JointVector& part, double most) const noexcept;
   /// Splits the last torque into `weight`, the brake in `base` as far as it acted already, and what
   /// fades.
   void take_over(const JointVector& base, const JointVector& weight) noexcept;

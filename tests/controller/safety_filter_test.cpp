@@ -65,12 +65,12 @@ TEST_F(Filter, ShrinksAllJointsAlikeBeyondTheWeight) {
   EXPECT_EQ(apply({29, 4}), Status::kOk);            // away from the limit there is room
   EXPECT_TRUE(near(out, Pair(29, 4), 1e-12));
   EXPECT_EQ(apply({-139, 4}), Status::kTorqueLimited);
-  EXPECT_TRUE(near(out, Pair(-40, 4 * 79.0 / 178), 1e-12));
+  EXPECT_TRUE(near(out, Pair(39 - 0.8 * 79, 4 * 0.8 * 79 / 178), 1e-12));
   weight = {30, 0};
   EXPECT_EQ(apply({50, 20}), Status::kTorqueLimited);
-  EXPECT_TRUE(near(out, Pair(40, 10), 1e-12));
+  EXPECT_TRUE(near(out, Pair(38, 8), 1e-12));
   EXPECT_EQ(apply({50, 25}), Status::kTorqueLimited);  // the other joint shrinks it most
-  EXPECT_TRUE(near(out, Pair(30 + 20 * 0.4, 10), 1e-12));
+  EXPECT_TRUE(near(out, Pair(30 + 20 * 0.32, 8), 1e-12));
   weight = {-50, 0};
   EXPECT_EQ(apply({-60, 4}), Status::kWeightNotHeld);
   EXPECT_TRUE(near(out, Pair(-40, 4 * 0.2), 1e-12));
@@ -78,11 +78,12 @@ TEST_F(Filter, ShrinksAllJointsAlikeBeyondTheWeight) {
   EXPECT_EQ(apply(weight), Status::kOk);
 }
 
-/// A joint at its limit shrinks the springs of all joints, but no damper.
+/// Springs use 0.8 of the torque beside the weight, so that dampers always have some, and shrink no
+/// damper.
 TEST_F(Filter, LetsDampersGoFirst) {
   dampers = {-5, 6};
   EXPECT_EQ(apply(Pair(95, 3) + dampers), Status::kTorqueLimited);
-  EXPECT_TRUE(near(out, Pair(-5, 6) + 45.0 / 95 * Pair(95, 3), 1e-12));
+  EXPECT_TRUE(near(out, Pair(-5, 6) + 32.0 / 95 * Pair(95, 3), 1e-12));
   dampers = {0, 20};  // more than there is room for
   EXPECT_EQ(apply(Pair(8, 0) + dampers), Status::kTorqueLimited);
   EXPECT_TRUE(near(out, Pair(8, 10), 1e-12));
@@ -174,9 +175,9 @@ TEST_F(Filter, FadesEvenly) {
     EXPECT_TRUE(near(out, (1 - 0.05 * k) * Pair(20, 4), 1e-9)) << k;
   }
   filter.begin_anew();
-  for (int k = 1; k <= 20; ++k) {
-    apply(filter, {2, -80});  // of which an eighth is within the limits
-    EXPECT_TRUE(near(out, 0.05 * k * Pair(0.25, -10), 1e-9)) << k;
+  for (int k = 1; k <= 16; ++k) {
+    apply(filter, {2, -80});  // of which a tenth is left
+    EXPECT_TRUE(near(out, k / 16.0 * Pair(0.2, -8), 1e-9)) << k;
   }
   // Without a new beginning each joint changes as fast as it may.
   filter.reset(Pair(0, 0));

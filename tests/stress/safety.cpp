@@ -15,6 +15,11 @@ std::vector<Scenario> scenarios() {
   const std::vector<std::string> lift = {"lift+gripper"};
   const std::vector<std::string> three = {"panda", "iiwa14", "ur5"};
   return {
+      {"0", "joint 1 at 0.9 of its limit, a gap", {}, stop_from(0.9, false)},
+      {"0", "all joints at 0.9 of their limits, a gap", {}, stop_from(0.9, true)},
+      {"0", "feedback frozen while the arm creeps", {}, frozen_creep},
+      {"0", "time stamps stand still", {}, wrong_clock(0)},
+      {"0", "time stamps in us", {}, wrong_clock(1e-3)},
       {"1", "parked 60 deg outside (lift: 0.2 m)", {}, outside(pi / 3, 0.2, 0)},
       {"1", "5 deg outside (lift: 2 cm)", {}, outside(pi / 36, 0.02, 0)},
       {"1", "outside, moving inward at 3.7 x limit", {}, outside(pi / 3, 0.2, 3.7)},

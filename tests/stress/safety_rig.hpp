@@ -116,6 +116,7 @@ class Rig {
   }
 
   std::optional<Goal> goal;  ///< what the host wants
+  double clock_rate = 1;     ///< of the time stamps from now on
   int every = 1;             ///< the controller is called every so many periods; 0: not at all
   Measures seen;
 
@@ -149,6 +150,9 @@ class Rig {
   void reset(const JointVector* torque) {
     plugin_.reset(controller_.get(), torque != nullptr ? torque->data() : nullptr);
   }
+
+  /// The time stamps from now on are so much later, s.
+  void skip_time(double seconds) { skipped_ += std::llround(1e9 * seconds); }
 
   /// Ticks with the robot free.
   void run(double seconds) {
@@ -221,9 +225,11 @@ class Rig {
   void control() {
     if (goal && ticks_ % 100 == 0) tell();
     const sim::Measurement& measured = plant_->measured();
-    const dashpot_state state = {
-        sizeof(dashpot_state),    n_,     measured.time, measured.position.data(),
-        measured.velocity.data(), nullptr};
+    stamp_ += clock_rate * static_cast<double>(measured.time - last_time_);
+    last_time_ = measured.time;
+    const std::int64_t time = skipped_ + std::llround(stamp_);
+    const dashpot_state state = {sizeof(dashpot_state),    n_,     time, measured.position.data(),
+                                 measured.velocity.data(), nullptr};
     dashpot_output output = {sizeof(dashpot_output), n_, torque_.data()};
     const JointVector before = torque_;
     const std::int32_t status = plugin_.update(controller_.get(), &state, nullptr, &output);
@@ -254,6 +260,8 @@ class Rig {
   std::uint32_t n_ = 0;
   std::int64_t ticks_ = 0;
   JointVector torque_;
+  std::int64_t skipped_ = 0, last_time_ = 0;  ///< ns
+  double stamp_ = 0;                          ///< ns
   std::int32_t last_status_ = DASHPOT_OK;
   std::deque<double> change_times_;  ///< of the status, s
   Eigen::Vector3d first_tip_;

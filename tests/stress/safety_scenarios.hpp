@@ -232,4 +232,77 @@ inline void hard_jolts(const PluginFile& plugin, const TestArm& arm, Row& row) {
   row.require(row.seen.least_weight > 0.7, "drops the weight");
 }
 
+/// Joint 1, or all joints, at so much of their velocity limits when a gap is seen.
+inline Act stop_from(double share, bool all) {
+  return [=](const PluginFile& plugin, const TestArm& arm, Row& row) {
+    RigOptions options;
+    options.start = start_of(arm);
+    const sim::Robot robot = simulated_robot(arm);
+    options.velocity = JointVector::Zero(robot.dof());
+    for (int i = 0; i < (all ? robot.dof() : 1); ++i) {
+      options.velocity[i] = share * robot.joints()[static_cast<std::size_t>(i)].velocity;
+    }
+    options.world.viscous_friction = options.world.coulomb_friction = false;
+    Rig rig(plugin, arm, options);
+    rig.run(rig.period());
+    rig.skip_time(0.02);
+    const JointVector from = rig.position();
+    double slow = -1;  // s, when all were slower than a tenth for good
+    Eigen::VectorXd way = Eigen::VectorXd::Zero(robot.dof());
+    for (int tick = 0; tick < 1000; ++tick) {
+      rig.run(rig.period());
+      const JointVector speed = rig.plant().velocity().cwiseQuotient(rig.limits().velocity);
+      if (speed.cwiseAbs().maxCoeff() > 0.1 * share) {
+        slow = -1;
+      } else if (slow < 0) {
+        slow = tick * rig.period();
+      }
+      way = way.cwiseMax((rig.position() - from).cwiseAbs());
+    }
+    row.finish(rig, {100, true, false});
+    const double degrees = 180 / std::numbers::pi;
+    row.note = "a tenth left after " + number(slow) + " s; joint 1 went " +
+               number(slides(arm, 0) ? way[0] : degrees * way[0]) +
+               (slides(arm, 0) ? " m" : " deg") + ", any " + number(degrees * way.maxCoeff());
+    row.require(all || (slow >= 0 && slow <= 0.25), "goes on for long");
+    row.require(all || slides(arm, 0) || degrees * way[0] <= 20, "goes far");
+  };
+}
+
+/// In the settling of a move of 10 cm every state repeats the same bits.
+inline void frozen_creep(const PluginFile& plugin, const TestArm& arm, Row& row) {
+  RigOptions options;
+  options.config = "control: {mode: cartesian}\n";
+  sim::SensorFault fault;
+  fault.begin = 1.2;
+  fault.frozen = true;
+  options.faults = {fault};
+  Rig rig(plugin, arm, options);
+  rig.goal = Goal::at(rig.tip_at(rig.position()));
+  rig.goal->tip.position.z() -= 0.1;
+  rig.run(1.2);
+  const bool creeps = rig.plant().velocity().cwiseAbs().maxCoeff() > 2.5e-3;
+  rig.run(0.05);
+  row.finish(rig, {100, false, false});
+  row.note = creeps ? "creeps" : "stands";
+  row.require(!creeps || row.seen.last_status != "ok", "never noticed");
+}
+
+/// From 0.5 s on time stamps are wrong by so much, and somebody bumps into the arm.
+inline Act wrong_clock(double rate) {
+  return [rate](const PluginFile& plugin, const TestArm& arm, Row& row) {
+    RigOptions options;
+    controller::Vector6 push = controller::Vector6::Zero();
+    push[0] = 10;
+    options.world.wrenches = {{1.0, 1.018, push}};
+    Rig rig(plugin, arm, options);
+    rig.run(0.5);
+    rig.clock_rate = rate;
+    rig.run(3);
+    row.finish(rig, {1, true, false});
+    row.note = "carries " + number(100 * row.seen.least_weight, "%.0f") + " % of the weight";
+    row.require(row.seen.least_weight > 0.5, "drops the weight");
+  };
+}
+
 }  // namespace dashpot::stress
