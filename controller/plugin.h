@@ -487,7 +487,7 @@ int32_t dashpot_evaluate(const dashpot_controller* controller, const double* pos
  * `gains` that is NULL, or all if `gains` is NULL, stands for the gain of the configuration.
  * Payload and tool are those told last. `loop` or `modes` may be NULL; the caller sets the
  * struct_size of the other. The modes are solved directly (`tick`, `time` and the counters are 0).
- * Position limits and their repulsion do not count. May be called on any thread, also beside a
+ * Position limits and the brake do not count. May be called on any thread, also beside a
  * running loop; takes some milliseconds and allocates. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_analyze(const dashpot_controller* controller, const double* position, int32_t mode,
                         const dashpot_gains* gains, dashpot_closed_loop* loop,

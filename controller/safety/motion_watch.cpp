@@ -128,7 +128,7 @@ bool MotionWatch::Record::vibrates(double now, double dt) noexcept {
   fast = now - slow;
   if (fast * last < 0 || swing > kLongest) {
     const bool counts = swing <= kLongest && height > kHigh * velocity_limit;
-    vibrating = std::max(0.0, vibrating + (counts ? swing : -swing));
+    vibrating = std::max(0.0, vibrating + (counts ? swing : -0.5 * swing));
     swings = vibrating > 0 ? swings + (counts ? 1 : 0) : 0;
     swing = height = 0;
   }

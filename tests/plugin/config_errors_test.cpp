@@ -114,7 +114,7 @@ const BadConfig kBadConfigs[] = {
          kTaskRows},
     {"limits.position_lower[1]: is 2 rad, has to be below the upper limit (line 4)",
      "limits:\n  torque: 10\n  position_lower: [-1, 2, -1, -2, -1, -1, -1]\n"},
-    {"limits.stopping_time: is 0 s, must be above 0 (line 2)", "limits: {stopping_time: 0}\n"},
+    {"limits.stopping_time: is 0 s, not positive (line 2)", "limits: {stopping_time: 0}\n"},
     {"limits.damping: is gone: limits.stopping_time replaces it (line 3)",
      "limits:\n  damping: 5\n"},
     {"watchdog.longest_gap: is 0.001 s, has to exceed the period (line 3)",
