@@ -119,6 +119,7 @@ class Loop {
     if (extra.steady) settings.integral.time = 1;
     settings.limits.torque *= 1e3;  // so that no limit is at work
     settings.limits.torque_rate *= 1e6;
+    settings.limits.velocity *= 1e3;
     settings.limits.tip_velocity *= 1e3;
     return settings;
   }

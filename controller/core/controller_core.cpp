@@ -157,8 +157,9 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
     // While gains change, dampers that fade keep the margin as well.
     if (!level_.kept && gains_.still()) status = worse(status, Status::kLittleMargin);
   }
-  const Status limits = filter_.apply({q_, qd_, robot_, weight_}, motion_watch_.tip_speed(), aim,
-                                      law_.dampers(), torque);
+  const Status limits = filter_.apply(
+      {q_, qd_, robot_, weight_, springs_ == Springs::kInForce ? law_.mass() : nullptr},
+      motion_watch_.tip_speed(), aim, law_.dampers(), torque);
   if (springs_ == Springs::kInForce && law_.integral().on()) {
     integrate(limits, status == Status::kSetpointStale);
   }

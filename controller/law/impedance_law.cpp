@@ -44,6 +44,7 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
   e_.setZero();
   F_.setZero();
   null_level_ = {};
+  mass_known_ = false;
   if (integral_.on()) {
     clamped_ = false;
     tip_pull_.setZero();
@@ -64,6 +65,7 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
     const bool null_space = impedance.null_space();
     const bool moves = (references.tip.point_velocity().array() != 0).any();
     if (null_space || moves || feed_forward_.acceleration || friction_of_reference_) {
+      mass_known_ = true;
       null_space_.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
     }
     F_ = task_wrench(robot, qd, impedance, references.tip, clamp);

@@ -61,6 +61,8 @@ class ImpedanceLaw {
   const JointVector& dampers() const noexcept { return dampers_; }
   const Vector6& tip_wrench() const noexcept { return F_; }
   const NullSpace& null_space() const noexcept { return null_space_; }
+  /// Returns the factor of the mass matrix of the last torque; null if it was not needed.
+  const SmallCholesky* mass() const noexcept { return mass_known_ ? &null_space_.mass() : nullptr; }
   /// Returns what the loop left of the null space's damping ratio.
   const analysis::DampingLevel& null_level() const noexcept { return null_level_; }
 
@@ -82,6 +84,7 @@ class ImpedanceLaw {
   Vector6 e_ = Vector6::Zero();
   Vector6 F_ = Vector6::Zero();
   NullSpace null_space_;
+  bool mass_known_ = false;
   analysis::DampingLevel null_level_;
   SpringIntegral integral_;
   bool clamped_ = false;  ///< the error clamp acts

@@ -50,6 +50,7 @@ Brake::Brake(const Settings& settings) noexcept : n_(settings.limits.torque.size
     bounds.velocity = limits.velocity[i];
     bounds.torque = limits.torque[i];
     bounds.torque_rate = limits.torque_rate[i];
+    bounds.per_rate = 0.5 / limits.torque_rate[i];
     bounds.reaction = std::max(4 * near_, near_ + lag + limits.torque[i] / limits.torque_rate[i]);
   }
 }
@@ -87,6 +88,15 @@ double Brake::braking_torque(const Motion& motion, Eigen::Index i) const noexcep
   return kBraking * std::max(torque - std::abs(motion.weight[i]), kLeastBraking * torque);
 }
 
+bool Brake::at_ease(const Motion& motion, Eigen::Index i, double acceleration) const noexcept {
+  const Bounds& bounds = joint(i);
+  const double M = motion.robot.M(i, i), a = std::abs(acceleration);
+  const double v = std::abs(motion.qd[i]) + a * std::max(near_, a * M * bounds.per_rate);
+  const double left = std::min(bounds.upper - motion.q[i], motion.q[i] - bounds.lower);
+  return v <= kFullVelocity * bounds.velocity &&
+         v * v * M <= 2 * braking_torque(motion, i) * (left - v * bounds.reaction);
+}
+
 bool Brake::allows(const Motion& motion, Eigen::Index i, double way,
                    double acceleration) const noexcept {
   const Bounds& bounds = joint(i);
@@ -120,8 +130,11 @@ Brake::Bound Brake::bound(const Motion& motion, Eigen::Index i, double way) cons
 /// Lawson and Hanson's way to a least constraint: one joint more at a time, the one furthest beyond
 /// its bound, and out again with those that would have to be driven to theirs.
 Status Brake::hold(const Motion& motion, JointVector& excess) noexcept {
-  const JointMatrix& M = motion.robot.M;
-  mass_.compute(M, 1e-14 * M.trace());
+  mass_ = motion.mass;
+  if (mass_ == nullptr) {
+    own_mass_.compute(motion.robot.M, 1e-14 * motion.robot.M.trace());
+    mass_ = &own_mass_;
+  }
   JointVector free = difference(excess, motion.robot.coriolis);
   accelerate(free);
   JointVector now = free;
@@ -131,7 +144,7 @@ Status Brake::hold(const Motion& motion, JointVector& excess) noexcept {
     Bound worst{-1, 0, 0, false};
     double most = 0;
     for (Eigen::Index i = 0; i < n_; ++i) {
-      if (holds(i)) continue;
+      if (at_ease(motion, i, now[i]) || holds(i)) continue;
       for (const double way : {1.0, -1.0}) {
         if (allows(motion, i, way, now[i])) continue;
         const Bound found = bound(motion, i, way);
@@ -161,8 +174,8 @@ bool Brake::holds(Eigen::Index i) const noexcept {
 }
 
 void Brake::accelerate(JointVector& torque) const noexcept {
-  mass_.solve_L(torque.data());
-  mass_.solve_LT(torque.data());
+  mass_->solve_L(torque.data());
+  mass_->solve_LT(torque.data());
 }
 
 void Brake::add_held(const Bound& bound) noexcept {

@@ -48,6 +48,7 @@ class Brake {
     const JointVector& qd;
     const DynamicsResult& robot;
     const JointVector& weight;  ///< that is compensated here
+    const SmallCholesky* mass;  ///< factor of robot.M, if anybody has it already; or null
   };
 
   /// Returns b, n, N m, within the torque limits beside the weight. `inward` scales the velocity of
@@ -68,6 +69,7 @@ class Brake {
     double torque;        ///< limit, N m
     double torque_rate;   ///< limit, N m/s
     double reaction;      ///< r, s
+    double per_rate;      ///< 1 / (2 torque_rate), s/(N m)
   };
   /// The acceleration that a joint may have in one direction.
   struct Bound {
@@ -89,6 +91,8 @@ class Brake {
   Held& held(Eigen::Index k) noexcept { return held_[static_cast<std::size_t>(k)]; }
   double distance(const Motion& motion, Eigen::Index i, double way) const noexcept;
   double braking_torque(const Motion& motion, Eigen::Index i) const noexcept;
+  /// True if an acceleration is far from the bounds of both directions, which is soon told.
+  bool at_ease(const Motion& motion, Eigen::Index i, double acceleration) const noexcept;
   /// True if an acceleration keeps the bound of this direction.
   bool allows(const Motion& motion, Eigen::Index i, double way, double acceleration) const noexcept;
   Bound bound(const Motion& motion, Eigen::Index i, double way) const noexcept;
@@ -103,7 +107,8 @@ class Brake {
   Eigen::Index n_;
   double stopping_time_;  ///< T
   double near_;           ///< t
-  SmallCholesky mass_;
+  SmallCholesky own_mass_;
+  const SmallCholesky* mass_ = nullptr;  ///< of this tick
   SmallCholesky constrained_;
   Eigen::Index count_ = 0;  ///< of those held
   std::array<Held, kMaxJoints> held_;

@@ -41,13 +41,15 @@ void MotionWatch::reset() noexcept {
 Status MotionWatch::check(const Tick& tick) noexcept {
   Eigen::Vector3d v = Eigen::Vector3d::Zero();
   bool fast = false, outside = false, unstable = false;
+  constexpr double kSlow = 0.05;  // s
+  const double share = std::min(1.0, tick.dt / kSlow);
   for (Eigen::Index i = 0; i < n_; ++i) {
     Record& joint = this->joint(i);
     v += tick.qd[i] * tick.robot.J.col(i).head<3>();
     fast |= std::abs(tick.qd[i]) > joint.velocity_limit;
     outside |= tick.q[i] < joint.lower || tick.q[i] > joint.upper;
     unstable |= joint.grows(tick.qd[i], tick.still);
-    unstable |= joint.vibrates(tick.qd[i], tick.dt);
+    unstable |= joint.vibrates(tick.qd[i], tick.dt, share);
     unstable |= joint.reversals > 0.47;
   }
   const double largest = v.cwiseAbs().maxCoeff();  // whose square may overflow
@@ -117,13 +119,12 @@ bool MotionWatch::Record::grows(double now, bool still) noexcept {
   return grown >= kHalfSwings && peak > kLarge * velocity_limit;
 }
 
-bool MotionWatch::Record::vibrates(double now, double dt) noexcept {
-  constexpr double kSlow = 0.05;     // s
+bool MotionWatch::Record::vibrates(double now, double dt, double share) noexcept {
   constexpr double kHigh = 0.18;     // of the velocity limit: `slow` takes some of a fifth
   constexpr double kLongest = 0.09;  // s, of a half swing: 5.6 Hz
   constexpr double kEnough = 0.4;    // s; what is struck decays sooner
   constexpr int kSwings = 10;
-  slow += std::min(1.0, dt / kSlow) * (now - slow);
+  slow += share * (now - slow);
   const double last = fast;
   fast = now - slow;
   if (fast * last < 0 || swing > kLongest) {

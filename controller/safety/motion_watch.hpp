@@ -79,8 +79,8 @@ class MotionWatch {
 
     /// Counts half swings. True if the joint swings with a velocity that grows.
     bool grows(double now, bool still) noexcept;
-    /// True if the joint vibrates.
-    bool vibrates(double now, double dt) noexcept;
+    /// True if the joint vibrates; `slow` goes by a `share` of the way to qd.
+    bool vibrates(double now, double dt, double share) noexcept;
   };
   Record& joint(Eigen::Index i) noexcept { return joints_[static_cast<std::size_t>(i)]; }
 

@@ -112,6 +112,12 @@ double SafetyFilter::fitting(const JointVector& base, const JointVector& part,
 
 bool SafetyFilter::share_out(const JointVector& base, const JointVector& dampers,
                              JointVector& excess) const noexcept {
+  bool little = true;  // as almost always
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double most = kSprings * (joint(i).torque - std::abs(base[i]));
+    little &= std::abs(excess[i]) + std::abs(dampers[i]) <= most;
+  }
+  if (little) return false;
   JointVector rest = excess;
   add(dampers, rest, -1);
   const double springs = fitting(base, rest, kSprings);

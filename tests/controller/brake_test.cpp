@@ -43,7 +43,7 @@ class AnyArm {
     }
     robot = evaluate(model, q, qd);
   }
-  Brake::Motion motion() const { return {q, qd, robot, robot.gravity}; }
+  Brake::Motion motion() const { return {q, qd, robot, robot.gravity, nullptr}; }
   JointVector acceleration(const JointVector& torque) const {
     return Eigen::MatrixXd(robot.M).llt().solve(Eigen::VectorXd(torque - robot.coriolis));
   }

@@ -36,7 +36,7 @@ class Filter : public ::testing::Test {
   Status apply(SafetyFilter& filter, const Pair& tau) {
     out = tau;
     const JointVector position = q, velocity = qd, held = weight, damps = dampers;
-    return filter.apply({position, velocity, robot, held}, tip_speed, aim, damps, out);
+    return filter.apply({position, velocity, robot, held, nullptr}, tip_speed, aim, damps, out);
   }
   Status apply(const Pair& tau) {
     SafetyFilter filter = make();
