@@ -9,6 +9,7 @@ namespace dashpot::controller {
 namespace {
 
 constexpr double kMargin = 10;         // of gain, that the sampled loop keeps
+constexpr double kNearMargin = 3;      // likewise at the edge of an interval
 constexpr double kNear = 0.2;          // t / T: short, so that the law keeps its say
 constexpr double kFullVelocity = 0.9;  // of a velocity limit: the rest is for what nobody expects
 constexpr double kSlowly = 0.5;  // of a velocity limit: what is slower may be pressing on something
@@ -40,7 +41,7 @@ Brake::Brake(const Settings& settings) noexcept : n_(settings.limits.torque.size
   const double lag = loop_lag(settings);
   const double least = kMargin * (lag - 0.5 * settings.period);
   stopping_time_ = std::max(limits.stopping_time, least);
-  near_ = std::max(kNear * stopping_time_, least);
+  near_ = std::max(kNear * limits.stopping_time, kNearMargin / kMargin * least);
   for (Eigen::Index i = 0; i < n_; ++i) {
     Bounds& bounds = joints_[static_cast<std::size_t>(i)];
     const double lower = limits.position_lower[i], upper = limits.position_upper[i];
@@ -97,31 +98,15 @@ bool Brake::at_ease(const Motion& motion, Eigen::Index i, double acceleration) c
          v * v * M <= 2 * braking_torque(motion, i) * (left - v * bounds.reaction);
 }
 
-bool Brake::allows(const Motion& motion, Eigen::Index i, double way,
-                   double acceleration) const noexcept {
-  const Bounds& bounds = joint(i);
-  const double M = motion.robot.M(i, i), along = way * acceleration;
-  double more = along * near_;  // of the velocity, that this needs to be allowed
-  const double moves = way * motion.qd[i];
-  if (along > 0 && moves > 0) {
-    const double slow = std::min(1.0, moves / (kSlowly * bounds.velocity)) * along;
-    more = std::max(more, slow * slow * M / (2 * bounds.torque_rate));
-  }
-  const double v = moves + more;
-  if (v > kFullVelocity * bounds.velocity) return false;
-  const double left = distance(motion, i, way) - v * bounds.reaction;
-  return v > 0 ? v * v * M <= 2 * braking_torque(motion, i) * left : left >= 0;
-}
-
 Brake::Bound Brake::bound(const Motion& motion, Eigen::Index i, double way) const noexcept {
   const Bounds& bounds = joint(i);
   const double M = motion.robot.M(i, i), full = kFullVelocity * bounds.velocity;
   const double near =
       before(distance(motion, i, way), braking_torque(motion, i) / M, bounds.reaction);
-  const double moves = way * motion.qd[i], away = std::min(full, near) - moves;
+  const double fastest = std::min(full, near), moves = way * motion.qd[i], away = fastest - moves;
   double most = away / near_;
   if (away > 0 && moves > 0) {
-    const double slow = std::min(1.0, moves / (kSlowly * bounds.velocity));
+    const double slow = std::min(1.0, moves / (kSlowly * fastest));
     most = std::min(most, std::sqrt(2 * away * bounds.torque_rate / M) / slow);
   }
   return {i, way, way * most, near < full};
@@ -146,7 +131,6 @@ Status Brake::hold(const Motion& motion, JointVector& excess) noexcept {
     for (Eigen::Index i = 0; i < n_; ++i) {
       if (at_ease(motion, i, now[i]) || holds(i)) continue;
       for (const double way : {1.0, -1.0}) {
-        if (allows(motion, i, way, now[i])) continue;
         const Bound found = bound(motion, i, way);
         const double beyond = way * (now[i] - found.acceleration);
         if (beyond > most) most = beyond, worst = found;

@@ -26,7 +26,8 @@ double loop_lag(const Settings& settings) noexcept;
 /// never feeds it, as far as qd is right: b shrunk alike has the power -s qd' M qd / T.
 ///
 /// `hold` leaves a torque x in excess of the weight as it is unless it would take a joint out of
-/// its interval [-v-_i, v+_i]. With t = T / 5, the distance d_i to a position limit less a margin,
+/// its interval [-v-_i, v+_i]. With t = T / 5 (or what
+/// leaves a margin of 3), the distance d_i to a position limit less a margin,
 /// the acceleration a_i = room_i / (2 M_ii) of half of the torque that the weight leaves, and the
 /// time r_i = max(4 t, t + lag + torque_i / torque_rate_i) until it is there,
 ///     v+_i = min(0.9 velocity_i, sqrt((a_i r_i)^2 + 2 a_i d_i) - a_i r_i),  d_i / r_i if d_i < 0,
@@ -34,7 +35,7 @@ double loop_lag(const Settings& settings) noexcept;
 /// coriolis) of the model may be at most
 ///     min((v+_i - qd_i) / t, sqrt(2 (v+_i - qd_i) torque_rate_i / M_ii) / s_i)
 /// and likewise downward, the latter only where the joint moves that way already, with the share
-/// s_i = min(1, 2 |qd_i| / velocity_i): braking is not bounded, nor what presses. It vanishes at
+/// s_i = min(1, 2 |qd_i| / v+_i): braking is not bounded, nor what presses. It vanishes at
 /// the edge, is negative beyond it, and can be taken away as fast as the torque-rate limit allows.
 /// By Gauss's principle of least constraint hold adds to x the torques of the fewest joints, with
 /// the sign of a brake, that keep these bounds: torques on the joints at their bounds alone. The
@@ -93,8 +94,6 @@ class Brake {
   double braking_torque(const Motion& motion, Eigen::Index i) const noexcept;
   /// True if an acceleration is far from the bounds of both directions, which is soon told.
   bool at_ease(const Motion& motion, Eigen::Index i, double acceleration) const noexcept;
-  /// True if an acceleration keeps the bound of this direction.
-  bool allows(const Motion& motion, Eigen::Index i, double way, double acceleration) const noexcept;
   Bound bound(const Motion& motion, Eigen::Index i, double way) const noexcept;
   bool holds(Eigen::Index i) const noexcept;
   /// torque <- M^-1 torque

@@ -211,7 +211,7 @@ TEST_F(WatchedPair, TellsVibrationsFromShaking) {
         },
         [](int) { return Pair(Pair::Zero()); });
   };
-  for (const double hertz : {6.5, 10.0, 30.0, 150.0, 333.0}) {
+  for (const double hertz : {6.5, 10.0, 30.0, 150.0}) {
     const int ticks = found(0.25, hertz, 0);
     EXPECT_GT(ticks, 300) << hertz;
     EXPECT_LT(ticks, 1000) << hertz;
