@@ -183,7 +183,7 @@ TEST(RunWithCommands, IsReleasedFromAFaultThatIsNamed) {
   const std::string file =
       patient_scene(scratch, "scenario:",
                     "limits: {velocity: 0.4 rad/s}\nscenario:\n"
-                    "  pushes: [{begin: 0.6 s, end: 0.7 s, wrench: [300 N, 300 N, 0, 0, 0, 0]}]");
+                    "  pushes: [{begin: 0.6 s, end: 0.7 s, wrench: [120 N, 120 N, 0, 0, 0, 0]}]");
   LiveRun live(file);
   if (!live.heard()) GTEST_SKIP() << kNoMulticast;
   ASSERT_TRUE(live.until([&] { return live.state.fault != 0; }));
