@@ -7,9 +7,9 @@
 namespace dashpot::controller {
 
 bool BrakeDoubt::grows(double dt, const DynamicsResult& robot, const JointVector& qd) noexcept {
-  constexpr double kMemory = 0.5;   // s, ten times as long as the brake needs
-  constexpr double kPushed = 0.25;  // of a velocity limit
-  constexpr double kLeast = 0.5;    // rad/s (m/s): somebody pushes as fast, however low the limit
+  constexpr double kMemory = 0.5;  // s, ten times as long as the brake needs
+  constexpr double kPushed = 0.5;  // of a velocity limit
+  constexpr double kLeast = 1;     // rad/s (m/s): somebody pushes as fast, however low the limit
   JointVector momentum = JointVector::Zero(qd.size());
   add_product(robot.M, qd, momentum);
   const double energy = 0.5 * product(momentum, qd);

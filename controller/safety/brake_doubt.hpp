@@ -7,8 +7,8 @@ namespace dashpot::controller {
 /// Doubts a brake that acts alone and does not stop the arm: because of velocities that are late or
 /// torques of the wrong sign it may feed the arm instead. The kinetic energy may exceed the least
 /// since the brake began by what the weight can have given, int |w_i qd_i| dt over about half a
-/// second, as if all of it were held wrongly, and by that of joints with a quarter of their
-/// velocity limits (at least 0.5 rad/s), each by itself: somebody may push the arm.
+/// second, as if all of it were held wrongly, and by that of joints with half of their
+/// velocity limits (at least 1 rad/s), each by itself: somebody may push the arm.
 class BrakeDoubt {
  public:
   explicit BrakeDoubt(const Limits& limits) noexcept : velocity_(limits.velocity) {}

@@ -150,7 +150,7 @@ def load(path):
     library.dashpot_plugin_interface.restype = c.POINTER(Plugin)
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
-    plugin = library.dashpot_plugin_interface(10).contents
+    plugin = library.dashpot_plugin_interface(11).contents
     assert plugin.version == 11 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
