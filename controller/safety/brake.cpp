@@ -56,7 +56,7 @@ Brake::Brake(const Settings& settings) noexcept : n_(settings.limits.torque.size
   }
 }
 
-JointVector Brake::stop(const Motion& motion, double inward) const noexcept {
+JointVector Brake::stop(const Motion& motion, double inward) noexcept {
   JointVector change(n_), torque = JointVector::Zero(n_);
   for (Eigen::Index i = 0; i < n_; ++i) {
     const Bounds& bounds = joint(i);
@@ -77,7 +77,26 @@ JointVector Brake::stop(const Motion& motion, double inward) const noexcept {
   }
   if (share == 1) return torque;
   for (Eigen::Index i = 0; i < n_; ++i) torque[i] *= share;
-  return product(clipped, change) > product(torque, change) ? clipped : torque;
+  if (product(clipped, change) <= product(torque, change)) return torque;
+  factor(motion);
+  JointVector further = difference(clipped, torque), gained = further;
+  accelerate(gained);
+  double part = 1;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double way = motion.qd[i] < 0 ? -1 : 1, alike = way * share * change[i] / stopping_time_;
+    const double left = (kFullVelocity * joint(i).velocity - way * motion.qd[i]) / near_;
+    const double most = std::max(0.0, std::max(left, alike) - alike);
+    if (way * gained[i] > most) part = std::min(part, most / (way * gained[i]));
+  }
+  add(further, torque, part);
+  return torque;
+}
+
+void Brake::factor(const Motion& motion) noexcept {
+  mass_ = motion.mass;
+  if (mass_ != nullptr) return;
+  own_mass_.compute(motion.robot.M, 1e-14 * motion.robot.M.trace());
+  mass_ = &own_mass_;
 }
 
 double Brake::distance(const Motion& motion, Eigen::Index i, double way) const noexcept {
@@ -115,11 +134,7 @@ Brake::Bound Brake::bound(const Motion& motion, Eigen::Index i, double way) cons
 /// Lawson and Hanson's way to a least constraint: one joint more at a time, the one furthest beyond
 /// its bound, and out again with those that would have to be driven to theirs.
 Status Brake::hold(const Motion& motion, JointVector& excess) noexcept {
-  mass_ = motion.mass;
-  if (mass_ == nullptr) {
-    own_mass_.compute(motion.robot.M, 1e-14 * motion.robot.M.trace());
-    mass_ = &own_mass_;
-  }
+  factor(motion);
   JointVector free = difference(excess, motion.robot.coriolis);
   accelerate(free);
   JointVector now = free;

@@ -2,7 +2,7 @@
 #include <dashpot/controller/base/small_cholesky.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/settings.hpp>
-#include <dashpot/controller/status.hpp>
+#include <dashpot/controller/tick_status.hpp>
 
 #include <array>
 
@@ -21,9 +21,11 @@ double loop_lag(const Settings& settings) noexcept;
 ///
 /// `stop` wants the velocity zero, or the return velocity v_r outside a position limit:
 ///     b = M (v_wanted - qd) / T.
-/// Where torque limits do not leave room for b it clips b joint by joint, or shrinks it in all
-/// joints alike, whichever takes more energy from the arm. So what stops the arm at v_wanted = 0
-/// never feeds it, as far as qd is right: b shrunk alike has the power -s qd' M qd / T.
+/// Where torque limits do not leave room for b it shrinks b in all joints alike, to s b, which
+/// speeds up no joint. If b clipped joint by joint takes more energy from the arm, it goes from s b
+/// toward that as far as no joint is sped up beyond 0.9 of its velocity limit: what the others are
+/// braked with can drive a light joint. So what stops the arm at v_wanted = 0 never feeds it, as
+/// far as qd is right: both take energy, s b the power s qd' M qd / T.
 ///
 /// `hold` leaves a torque x in excess of the weight as it is unless it would take a joint out of
 /// its interval [-v-_i, v+_i]. With t = T / 5 (or what
@@ -54,7 +56,7 @@ class Brake {
 
   /// Returns b, n, N m, within the torque limits beside the weight. `inward` scales the velocity of
   /// joints outside their position limits back to them, 0 to 1.
-  JointVector stop(const Motion& motion, double inward) const noexcept;
+  JointVector stop(const Motion& motion, double inward) noexcept;
   /// Bounds `excess`. Returns kOk, kTorqueLimited, or kNearJointLimit.
   Status hold(const Motion& motion, JointVector& excess) noexcept;
 
@@ -90,6 +92,8 @@ class Brake {
     return joints_[static_cast<std::size_t>(i)];
   }
   Held& held(Eigen::Index k) noexcept { return held_[static_cast<std::size_t>(k)]; }
+  /// Sets the factor of M for this tick.
+  void factor(const Motion& motion) noexcept;
   double distance(const Motion& motion, Eigen::Index i, double way) const noexcept;
   double braking_torque(const Motion& motion, Eigen::Index i) const noexcept;
   /// True if an acceleration is far from the bounds of both directions, which is soon told.

@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/controller/settings.hpp>
-#include <dashpot/controller/status.hpp>
+#include <dashpot/controller/tick_status.hpp>
 
 #include <array>
 

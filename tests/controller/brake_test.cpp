@@ -100,7 +100,7 @@ TEST_F(BrakeClaims, StopsAndNeverFeeds) {
   int whole = 0, shrunk = 0;
   for (int arm = 0; arm < 20; ++arm) {
     AnyArm any(engine);
-    const Brake brake(any.settings);
+    Brake brake(any.settings);
     for (int k = 0; k < 200; ++k) {
       any.draw(std::pow(10, any.uniform(-2, 3)), 0);
       const JointVector b = brake.stop(any.motion(), 0);
@@ -113,6 +113,16 @@ TEST_F(BrakeClaims, StopsAndNeverFeeds) {
           const double limit =
               std::max(any.settings.limits.torque[i], std::abs(any.robot.gravity[i]));
           EXPECT_LE(std::abs(any.robot.gravity[i] + b[i]), limit * (1 + 1e-12));
+        }
+        // What brakes the others drives no joint beyond its velocity limit.
+        const JointVector gained = Eigen::MatrixXd(any.robot.M).llt().solve(Eigen::VectorXd(b));
+        for (int i = 0; i < any.model.dof(); ++i) {
+          const double way = any.qd[i] < 0 ? -1 : 1, limit = any.settings.limits.velocity[i];
+          if (way * any.qd[i] >= 0.9 * limit) {
+            EXPECT_LE(way * gained[i], 1e-9 * gained.norm()) << i;
+          } else {
+            EXPECT_LE(way * any.qd[i] + way * gained[i] * 0.01, limit) << i;
+          }
         }
       }
       EXPECT_LE(b.dot(any.qd), 0);
