@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/status.hpp>
+#include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/analysis/system.hpp>
 
 namespace dashpot::analysis {

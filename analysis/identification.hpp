@@ -1,6 +1,6 @@
 #pragma once
+#include <dashpot/analysis/matrix_types.hpp>
 #include <dashpot/analysis/motion_record.hpp>
-#include <dashpot/analysis/types.hpp>
 
 #include <array>
 #include <limits>

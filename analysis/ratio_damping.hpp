@@ -1,8 +1,8 @@
 #pragma once
 #include <dashpot/analysis/borne_damping.hpp>
 #include <dashpot/analysis/damping_target.hpp>
-#include <dashpot/analysis/status.hpp>
-#include <dashpot/analysis/types.hpp>
+#include <dashpot/analysis/matrix_types.hpp>
+#include <dashpot/analysis/solver_status.hpp>
 
 #include <array>
 

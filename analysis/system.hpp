@@ -1,6 +1,6 @@
 #pragma once
+#include <dashpot/analysis/matrix_types.hpp>
 #include <dashpot/analysis/system/checks.hpp>
-#include <dashpot/analysis/types.hpp>
 
 namespace dashpot::analysis {
 

@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/analysis/mode.hpp>
-#include <dashpot/analysis/status.hpp>
+#include <dashpot/analysis/solver_status.hpp>
 
 #include <array>
 #include <cstdint>

@@ -2,7 +2,7 @@
 // A Panda under Cartesian impedance control that is let go: one right-hand side for everyone's
 // integrators.
 #include <dashpot/sim/dynamics/articulated_body.hpp>
-#include <dashpot/sim/system.hpp>
+#include <dashpot/sim/simulated_system.hpp>
 #include <dashpot/tests/support/places.hpp>
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/controller/types.hpp>
+#include <dashpot/controller/robot_types.hpp>
 
 #include <limits>
 #include <vector>
@@ -101,12 +101,12 @@ struct Wall {
 
 /// Limits of torque and motion. SafetyFilter and MotionWatch enforce them.
 struct Limits {
-  JointVector torque;           ///< n, N m, positive
-  JointVector torque_rate;      ///< n, N m/s, positive
-  JointVector velocity;         ///< n, rad/s, positive
-  double tip_velocity = 1.5;    ///< of the tip's origin, m/s, positive
-  JointVector position_lower;   ///< n, rad; -infinity if there is none
-  JointVector position_upper;   ///< n, rad; infinity if there is none
+  JointVector torque;          ///< n, N m, positive
+  JointVector torque_rate;     ///< n, N m/s, positive
+  JointVector velocity;        ///< n, rad/s, positive
+  double tip_velocity = 1.5;   ///< of the tip's origin, m/s, positive
+  JointVector position_lower;  ///< n, rad; -infinity if there is none
+  JointVector position_upper;  ///< n, rad; infinity if there is none
   /// Time constant with which the brake stops the arm, s: at a fault, and, five times as fast, what
   /// would take a joint beyond its limits of velocity and position. It is longer where the sampled
   /// loop bears no harder brake. See Brake.

@@ -1,8 +1,8 @@
 #pragma once
 #include <dashpot/analysis/mode.hpp>
-#include <dashpot/analysis/status.hpp>
-#include <dashpot/controller/status.hpp>
-#include <dashpot/controller/types.hpp>
+#include <dashpot/analysis/solver_status.hpp>
+#include <dashpot/controller/robot_types.hpp>
+#include <dashpot/controller/tick_status.hpp>
 
 #include <limits>
 

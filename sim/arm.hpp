@@ -4,7 +4,7 @@
 #include <dashpot/sim/invalid_scene.hpp>
 #include <dashpot/sim/robot.hpp>
 #include <dashpot/sim/schedule.hpp>
-#include <dashpot/sim/system.hpp>
+#include <dashpot/sim/simulated_system.hpp>
 
 #include <optional>
 #include <vector>

@@ -1,6 +1,6 @@
 #pragma once
-#include <dashpot/sim/status.hpp>
-#include <dashpot/sim/system.hpp>
+#include <dashpot/sim/simulated_system.hpp>
+#include <dashpot/sim/step_status.hpp>
 
 #include <Eigen/LU>
 #include <array>

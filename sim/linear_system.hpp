@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/sim/invalid_scene.hpp>
 #include <dashpot/sim/schedule.hpp>
-#include <dashpot/sim/system.hpp>
+#include <dashpot/sim/simulated_system.hpp>
 
 #include <vector>
 

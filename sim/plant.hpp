@@ -1,8 +1,8 @@
 #pragma once
 #include <dashpot/sim/hardware/noise.hpp>
 #include <dashpot/sim/integrator.hpp>
-#include <dashpot/sim/status.hpp>
-#include <dashpot/sim/system.hpp>
+#include <dashpot/sim/simulated_system.hpp>
+#include <dashpot/sim/step_status.hpp>
 
 #include <cstdint>
 #include <limits>

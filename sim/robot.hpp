@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/sim/dynamics/inertia.hpp>
-#include <dashpot/sim/types.hpp>
+#include <dashpot/sim/joint_types.hpp>
 
 #include <stdexcept>
 #include <string>

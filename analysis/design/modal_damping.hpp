@@ -1,6 +1,6 @@
 #pragma once
-#include <dashpot/analysis/status.hpp>
-#include <dashpot/analysis/types.hpp>
+#include <dashpot/analysis/matrix_types.hpp>
+#include <dashpot/analysis/solver_status.hpp>
 
 namespace dashpot::analysis {
 

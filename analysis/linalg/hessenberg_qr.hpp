@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/analysis/base/arithmetic.hpp>
-#include <dashpot/analysis/types.hpp>
+#include <dashpot/analysis/matrix_types.hpp>
 #include <dashpot/analysis/work.hpp>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/analysis/linalg/packed_matrix.hpp>
-#include <dashpot/analysis/types.hpp>
+#include <dashpot/analysis/matrix_types.hpp>
 
 #include <array>
 #include <cmath>

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/types.hpp>
+#include <dashpot/analysis/matrix_types.hpp>
 
 #include <array>
 #include <type_traits>

@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/analysis/mode.hpp>
+#include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/analysis/spectrum/modal_basis.hpp>
-#include <dashpot/analysis/status.hpp>
 #include <dashpot/analysis/system/zero_modes.hpp>
 
 namespace dashpot::analysis {

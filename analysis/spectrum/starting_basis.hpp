@@ -1,6 +1,6 @@
 #pragma once
+#include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/analysis/spectrum/modal_basis.hpp>
-#include <dashpot/analysis/status.hpp>
 #include <dashpot/analysis/system/energy_form.hpp>
 #include <dashpot/analysis/work.hpp>
 

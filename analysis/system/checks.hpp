@@ -2,7 +2,7 @@
 // Checks of matrices at set-up. Each throws InvalidSystem with the key and a readable reason;
 // entries are counted from 1.
 
-#include <dashpot/analysis/types.hpp>
+#include <dashpot/analysis/matrix_types.hpp>
 
 #include <Eigen/Core>
 #include <stdexcept>

@@ -1,5 +1,5 @@
 #include <dashpot/apps/drive/drive_report.hpp>
-#include <dashpot/controller/status.hpp>
+#include <dashpot/controller/tick_status.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <nlohmann/json.hpp>

@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/apps/identify/identify_writer.hpp>
-#include <dashpot/controller/types.hpp>
+#include <dashpot/controller/robot_types.hpp>
 
 #include <functional>
 #include <optional>

@@ -1,5 +1,5 @@
 #include <dashpot/apps/loop/command_report.hpp>
-#include <dashpot/controller/status.hpp>
+#include <dashpot/controller/tick_status.hpp>
 
 #include <nlohmann/json.hpp>
 

@@ -1,6 +1,6 @@
 #pragma once
+#include <dashpot/controller/robot_types.hpp>
 #include <dashpot/controller/settings.hpp>
-#include <dashpot/controller/types.hpp>
 
 #include <string>
 

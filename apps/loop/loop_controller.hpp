@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/controller/plugin.h>
 #include <dashpot/apps/scene/scene.hpp>
-#include <dashpot/controller/types.hpp>
+#include <dashpot/controller/robot_types.hpp>
 
 #include <memory>
 #include <string>

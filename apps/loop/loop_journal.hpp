@@ -1,7 +1,7 @@
 #pragma once
 #include <dashpot/apps/loop/command_source.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
-#include <dashpot/sim/status.hpp>
+#include <dashpot/sim/step_status.hpp>
 
 #include <array>
 #include <cstdint>

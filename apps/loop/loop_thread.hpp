@@ -1,7 +1,7 @@
 #pragma once
-#include <dashpot/apps/loop/closed_loop.hpp>
 #include <dashpot/apps/loop/loop_journal.hpp>
 #include <dashpot/apps/loop/privileges.hpp>
+#include <dashpot/apps/loop/simulated_loop.hpp>
 
 #include <atomic>
 #include <cstdint>

@@ -1,7 +1,7 @@
 #include <dashpot/analysis/mode.hpp>
-#include <dashpot/analysis/status.hpp>
+#include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/apps/messages/message_json.hpp>
-#include <dashpot/controller/status.hpp>
+#include <dashpot/controller/tick_status.hpp>
 
 #include <string>
 

@@ -3,7 +3,7 @@
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/loop/command_report.hpp>
 #include <dashpot/apps/monitor/monitor_view.hpp>
-#include <dashpot/controller/status.hpp>
+#include <dashpot/controller/tick_status.hpp>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 #include <dashpot/analysis/mode_identification.hpp>
-#include <dashpot/apps/loop/closed_loop.hpp>
+#include <dashpot/apps/loop/simulated_loop.hpp>
 #include <dashpot/apps/run/ring_down.hpp>
 #include <dashpot/apps/run/sampled_modes.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>

@@ -4,7 +4,7 @@
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
 #include <dashpot/apps/run/run_report.hpp>
-#include <dashpot/controller/status.hpp>
+#include <dashpot/controller/tick_status.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <nlohmann/json.hpp>

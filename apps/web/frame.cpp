@@ -1,5 +1,5 @@
 #include <dashpot/analysis/mode.hpp>
-#include <dashpot/analysis/status.hpp>
+#include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/apps/messages/message_json.hpp>
 #include <dashpot/apps/web/frame.hpp>
 

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/controller/types.hpp>
+#include <dashpot/controller/robot_types.hpp>
 
 namespace dashpot::controller {
 

@@ -2,7 +2,7 @@
 // The few operations on n joint coordinates that the controller needs. n is known at run time, and
 // each operation is compiled once, because a tick between which the caches forget waits for code.
 
-#include <dashpot/controller/types.hpp>
+#include <dashpot/controller/robot_types.hpp>
 
 namespace dashpot::controller {
 

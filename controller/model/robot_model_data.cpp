@@ -1,5 +1,4 @@
 // What a RobotModel shows of its data.
-#include <dashpot/controller/kdl_chain.hpp>
 #include <dashpot/controller/model/rigid_bodies.hpp>
 #include <dashpot/controller/model/robot_model_data.hpp>
 
@@ -46,10 +45,6 @@ void RobotModel::Data::attach(const Attachment& given) {
   const KDL::Frame tool(to_kdl(given.tool.rotation), to_kdl(given.tool.position));
   chain.getSegment(end) =
       KDL::Segment("tool", KDL::Joint("tool", KDL::Joint::None), tip_link * tool);
-}
-
-const KDL::Chain& kdl_chain(const RobotModel& model) noexcept {
-  return model.data().chain;
 }
 
 }  // namespace dashpot::controller

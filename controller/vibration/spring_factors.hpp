@@ -1,7 +1,7 @@
 #pragma once
 // Factors of spring matrices: K = W' W, row by row.
 
-#include <dashpot/controller/types.hpp>
+#include <dashpot/controller/robot_types.hpp>
 
 #include <array>
 

@@ -3,7 +3,7 @@
 // Everything wrong is an InputError that names key, entry, value, unit and line.
 
 #include <dashpot/controller/base/range.hpp>
-#include <dashpot/controller/types.hpp>
+#include <dashpot/controller/robot_types.hpp>
 #include <dashpot/controller/yaml/yaml_mapping.hpp>
 
 #include <Eigen/Core>

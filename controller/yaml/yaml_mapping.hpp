@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/controller/input_error.hpp>
-#include <dashpot/controller/types.hpp>
+#include <dashpot/controller/robot_types.hpp>
 #include <dashpot/controller/yaml/yaml_document.hpp>
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-#include <dashpot/controller/types.hpp>
+#include <dashpot/controller/robot_types.hpp>
 #include <dashpot/lcmtypes/messages/message_check.hpp>
 
 #include <array>

@@ -1,6 +1,6 @@
 // What a controller found, as dicts.
 
-#include <dashpot/analysis/status.hpp>
+#include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/python/src/controller_results.hpp>
 
 #include <array>

@@ -1,6 +1,6 @@
 #pragma once
+#include <dashpot/sim/joint_types.hpp>
 #include <dashpot/sim/robot.hpp>
-#include <dashpot/sim/types.hpp>
 
 #include <array>
 

@@ -31,8 +31,8 @@ struct Room {
 inline const std::vector<Room>& rooms() {
   static constexpr std::string_view kAnalysis = "dashpot/analysis/", kText = "dashpot/text/";
   static constexpr std::string_view kEigen = "Eigen/";
-  static const std::vector<std::string_view> snapshots = {"dashpot/analysis/types.hpp",
-                                                          "dashpot/controller/types.hpp",
+  static const std::vector<std::string_view> snapshots = {"dashpot/analysis/matrix_types.hpp",
+                                                          "dashpot/controller/robot_types.hpp",
                                                           "dashpot/controller/snapshot.hpp",
                                                           "dashpot/controller/latest.hpp",
                                                           kEigen,
@@ -42,7 +42,7 @@ inline const std::vector<Room>& rooms() {
   static const std::vector<Room> table = {
       {"text", 0, {}, {"fcntl.h", "sys/stat.h", "unistd.h"}},
 
-      {"analysis/base", 0, {"types", "status", "work"}, {kEigen}},
+      {"analysis/base", 0, {"matrix_types", "solver_status", "work"}, {kEigen}},
       {"analysis/linalg", 1, {}, {kEigen}},
       {"analysis/system",
        2,
@@ -64,7 +64,7 @@ inline const std::vector<Room>& rooms() {
 
       {"controller/base",
        0,
-       {"types", "status", "settings", "snapshot", "latest", "input_error"},
+       {"robot_types", "tick_status", "settings", "snapshot", "latest", "input_error"},
        {kAnalysis, kText, kEigen}},
       {"controller/model",
        1,
@@ -85,7 +85,10 @@ inline const std::vector<Room>& rooms() {
       {"controller/plugin", 7, {"plugin"}, {kAnalysis, kEigen, "stdint.h"}},  // plugin.h is C
 
       // an independent check of the two above, which shares no mechanics with them:
-      {"sim/base", 0, {"types", "status", "system", "schedule", "invalid_scene"}, {kEigen}},
+      {"sim/base",
+       0,
+       {"joint_types", "step_status", "simulated_system", "schedule", "invalid_scene"},
+       {kEigen}},
       {"sim/dynamics",
        1,
        {"robot", "arm", "linear_system"},
@@ -135,12 +138,13 @@ inline const std::vector<Room>& rooms() {
   return table;
 }
 
-/// "analysis/base/status.cpp" without its end.
+/// "analysis/base/solver_status.cpp" without its end.
 inline std::string_view without_end(std::string_view path) {
   return path.substr(0, path.rfind('.'));
 }
 
-/// The room of a file ("analysis/base/status.cpp", "analysis/status.hpp"), or null: there is none.
+/// The room of a file ("analysis/base/solver_status.cpp", "analysis/solver_status.hpp"), or null:
+/// there is none.
 inline const Room* room_of(std::string_view path) {
   const std::size_t slash = std::min(path.rfind('/'), path.size());
   const std::string_view folder = path.substr(0, slash);
@@ -159,7 +163,7 @@ inline const Room* room_of(std::string_view path) {
   return found;
 }
 
-/// Whether `header` ("dashpot/analysis/types.hpp") is one that users may include.
+/// Whether `header` ("dashpot/analysis/matrix_types.hpp") is one that users may include.
 inline bool is_public(std::string_view header) {
   if (!header.starts_with("dashpot/")) return false;
   const std::string_view path = header.substr(8);

@@ -20,15 +20,15 @@ bool may_file_include(std::string_view path, std::string_view header) {
 }
 
 TEST(Rooms, HoldTheirFilesAndTheirPublicHeaders) {
-  EXPECT_EQ(folder_name("analysis/base/status.cpp"), "analysis/base");
-  EXPECT_EQ(folder_name("analysis/status.hpp"), "analysis/base");
+  EXPECT_EQ(folder_name("analysis/base/solver_status.cpp"), "analysis/base");
+  EXPECT_EQ(folder_name("analysis/solver_status.hpp"), "analysis/base");
   EXPECT_EQ(folder_name("controller/plugin.h"), "controller/plugin");
   EXPECT_EQ(folder_name("text/printable.hpp"), "text");
   EXPECT_EQ(folder_name("apps/run/run.cpp"), "apps/run");
   EXPECT_EQ(folder_name("apps/main.cpp"), "apps");
   EXPECT_EQ(folder_name("tests/analysis/system_test.cpp"), "tests");
   // nowhere:
-  EXPECT_EQ(folder_name("analysis/status.cpp"), "none");
+  EXPECT_EQ(folder_name("analysis/solver_status.cpp"), "none");
   EXPECT_EQ(folder_name("analysis/secret.hpp"), "none");
   EXPECT_EQ(folder_name("analysis/unknown/status.cpp"), "none");
   EXPECT_EQ(folder_name("analysis"), "none");
@@ -52,16 +52,17 @@ TEST(Rooms, IncludeWhatIsOnALowerStep) {
   EXPECT_TRUE(may_file_include("analysis/spectrum/modes.cpp", "dashpot/analysis/linalg/lu.hpp"));
   EXPECT_TRUE(may_file_include("analysis/spectrum/modes.cpp", "dashpot/analysis/system.hpp"));
   EXPECT_TRUE(may_file_include("analysis/spectrum/modes.cpp", "dashpot/analysis/mode.hpp"));
-  EXPECT_TRUE(may_file_include("analysis/mode.hpp", "dashpot/analysis/types.hpp"));
-  EXPECT_TRUE(
-      may_file_include("controller/law/designed_damping.hpp", "dashpot/controller/types.hpp"));
+  EXPECT_TRUE(may_file_include("analysis/mode.hpp", "dashpot/analysis/matrix_types.hpp"));
+  EXPECT_TRUE(may_file_include("controller/law/designed_damping.hpp",
+                               "dashpot/controller/robot_types.hpp"));
   EXPECT_TRUE(may_file_include("apps/main.cpp", "dashpot/apps/run/run_report.hpp"));
 }
 
 TEST(Rooms, IncludeNothingOnTheirOwnStepOrAbove) {
   EXPECT_FALSE(may_file_include("analysis/mode.hpp", "dashpot/analysis/tracked_spectrum.hpp"));
   EXPECT_FALSE(may_file_include("analysis/linalg/lu.hpp", "dashpot/analysis/system.hpp"));
-  EXPECT_FALSE(may_file_include("analysis/base/status.cpp", "dashpot/analysis/linalg/lu.hpp"));
+  EXPECT_FALSE(
+      may_file_include("analysis/base/solver_status.cpp", "dashpot/analysis/linalg/lu.hpp"));
   EXPECT_FALSE(
       may_file_include("analysis/response.hpp", "dashpot/analysis/sampled/sampled_data_model.hpp"));
   EXPECT_FALSE(may_file_include("controller/law/impedance_law.hpp",
@@ -81,14 +82,14 @@ TEST(Rooms, IncludeOnlyWhatTheyMayOfOthers) {
   EXPECT_TRUE(may_file_include("controller/yaml/x.cpp", "yaml-cpp/yaml.h"));
   EXPECT_FALSE(may_file_include("controller/config/x.cpp", "yaml-cpp/yaml.h"));
   EXPECT_FALSE(may_file_include("controller/core/x.cpp", "lcm/lcm-cpp.hpp"));
-  EXPECT_FALSE(may_file_include("analysis/mode.hpp", "dashpot/controller/types.hpp"));
+  EXPECT_FALSE(may_file_include("analysis/mode.hpp", "dashpot/controller/robot_types.hpp"));
   EXPECT_FALSE(may_file_include("analysis/mode.hpp", "dashpot/tests/support/matrices.hpp"));
   EXPECT_FALSE(may_file_include("analysis/mode.hpp", "dashpot/text/printable.hpp"));
   EXPECT_FALSE(may_file_include("analysis/mode.hpp", "nlohmann/json.hpp"));
   EXPECT_FALSE(may_file_include("analysis/mode.hpp", "lapacke.h"));
   EXPECT_FALSE(may_file_include("text/printable.cpp", "Eigen/Core"));
-  EXPECT_FALSE(may_file_include("sim/arm.hpp", "dashpot/analysis/types.hpp"));
-  EXPECT_FALSE(may_file_include("sim/arm.hpp", "dashpot/controller/types.hpp"));
+  EXPECT_FALSE(may_file_include("sim/arm.hpp", "dashpot/analysis/matrix_types.hpp"));
+  EXPECT_FALSE(may_file_include("sim/arm.hpp", "dashpot/controller/robot_types.hpp"));
   EXPECT_FALSE(may_file_include("sim/arm.hpp", "kdl/chain.hpp"));
   EXPECT_TRUE(may_file_include("sim/dynamics/x.cpp", "urdf_model/model.h"));
   EXPECT_TRUE(may_file_include("lcmtypes/bus.hpp", "lcm/lcm-cpp.hpp"));

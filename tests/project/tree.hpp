@@ -12,7 +12,7 @@
 namespace dashpot::tests {
 
 struct File {
-  std::string path;  ///< from the top of the tree, "analysis/types.hpp"
+  std::string path;  ///< from the top of the tree, "analysis/matrix_types.hpp"
   std::string text;
 
   bool is_source() const { return has_end(".hpp") || has_end(".cpp") || has_end(".h"); }

@@ -11,7 +11,8 @@ namespace {
 
 using testing::IsEmpty;
 
-/// All files of a source are one component: "analysis/base/status" has status.hpp and status.cpp.
+/// All files of a source are one component: "analysis/base/solver_status" has solver_status.hpp and
+/// .cpp.
 std::string component_of(std::string_view path) {
   const std::string_view name = without_end(path);
   const Room* room = room_of(path);

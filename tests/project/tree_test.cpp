@@ -1,5 +1,6 @@
 // Applies the rules to every file of the source tree.
 #include <dashpot/tests/project/markdown.hpp>
+#include <dashpot/tests/project/rooms.hpp>
 #include <dashpot/tests/project/rules.hpp>
 #include <dashpot/tests/project/tree.hpp>
 #include <dashpot/tests/support/places.hpp>
@@ -8,6 +9,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <string>
 
 namespace dashpot::tests {
 namespace {
@@ -47,6 +50,19 @@ TEST(Tree, StartsEveryHeaderWithPragmaOnce) {
                 return file.has_end(".hpp") && !starts_with_pragma_once(file.text);
               }),
               IsEmpty());
+}
+
+TEST(Tree, GivesEveryHeaderOfALibraryANameOfItsOwn) {
+  std::map<std::string, std::string> known;
+  for (const File& file : files()) {
+    if (!file.has_end(".hpp")) continue;
+    const Room* room = room_of(file.path);
+    if (room == nullptr || !room->is_of_library()) continue;
+    const std::string name = fs::path(file.path).filename();
+    const auto [at, is_new] = known.emplace(name, file.path);
+    EXPECT_TRUE(is_new) << file.path << " and " << at->second;
+  }
+  EXPECT_GT(known.size(), 100U);
 }
 
 /// The file of this path; null if there is none, or it is no text.

@@ -6,7 +6,7 @@
 // is a failure, as is a status other than ok, a bound that is lost, a goal that is not reached.
 // Durations are told and not judged. SIGINT or SIGTERM ends it with the cycle of 4 s.
 #include <dashpot/lcmtypes/plugin_publisher.h>
-#include <dashpot/analysis/status.hpp>
+#include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/tests/stress/part.hpp>

@@ -1,4 +1,4 @@
-#include <dashpot/controller/status.hpp>
+#include <dashpot/controller/tick_status.hpp>
 
 namespace dashpot::controller {
 

@@ -1,4 +1,4 @@
-#include <dashpot/sim/status.hpp>
+#include <dashpot/sim/step_status.hpp>
 
 namespace dashpot::sim {
 

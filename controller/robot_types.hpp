@@ -3,7 +3,7 @@
 // tool's frame). p_BT_B is the position of T in B, expressed in B's axes; R_BT turns T's axes into
 // B's. Twists and wrenches have the linear part first, are taken at the tip, in B's axes.
 
-#include <dashpot/analysis/types.hpp>
+#include <dashpot/analysis/matrix_types.hpp>
 
 #include <Eigen/Core>
 #include <array>

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/sim/types.hpp>
+#include <dashpot/sim/joint_types.hpp>
 
 #include <cstdint>
 

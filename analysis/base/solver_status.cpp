@@ -1,4 +1,4 @@
-#include <dashpot/analysis/status.hpp>
+#include <dashpot/analysis/solver_status.hpp>
 
 namespace dashpot::analysis {
 

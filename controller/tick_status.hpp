@@ -13,23 +13,23 @@ namespace dashpot::controller {
 /// fades evenly: in all joints alike, as slowly as the slowest torque-rate limit makes it.
 ///
 /// Faults latch. A status whose safe output is "damp" (but kSetpointLost), or "ramp" or
-/// kTimeBackward for longer than Watchdog::longest_gap, leaves a fault behind: the arm stays braked,
-/// with its weight held (the weight alone as long as the state is frozen, and where the brake is
-/// doubted), the status is kFaultLatched or worse, and
-/// Snapshot::fault names the fault. This ends with Controller::release or reset, or, if
-/// Watchdog::release_after is set, once the arm has been at rest for that long. Then, as after a
-/// lost set-point, the springs start where the robot is, with gains that grow from zero within
-/// Motion::gain_time; Snapshot::restarts counts these restarts. After a ramp of at most
-/// Watchdog::longest_gap the controller continues where it was.
+/// kTimeBackward for longer than Watchdog::longest_gap, leaves a fault behind: the arm stays
+/// braked, with its weight held (the weight alone as long as the state is frozen, and where the
+/// brake is doubted), the status is kFaultLatched or worse, and Snapshot::fault names the fault.
+/// This ends with Controller::release or reset, or, if Watchdog::release_after is set, once the arm
+/// has been at rest for that long. Then, as after a lost set-point, the springs start where the
+/// robot is, with gains that grow from zero within Motion::gain_time; Snapshot::restarts counts
+/// these restarts. After a ramp of at most Watchdog::longest_gap the controller continues where it
+/// was.
 enum class Status : std::uint8_t {
   kOk,
   // The torque is the wanted one as far as possible:
-  kTorqueLimited,    ///< a limit of torque, torque rate, power or speed is at work
-  kNearJointLimit,   ///< the brake keeps a joint from going beyond a position limit
-  kLittleMargin,     ///< springs too stiff for the sampled loop, or a damping ratio too small for
-                     ///< them: no share of the ratio keeps Limits::gain_margin at this posture
-  kWrenchNotFinite,  ///< NaN or infinity in RobotState::external_wrench; the last finite wrench
-                     ///< stays in force in the analysis. With Limits::external_force: kCollision
+  kTorqueLimited,     ///< a limit of torque, torque rate, power or speed is at work
+  kNearJointLimit,    ///< the brake keeps a joint from going beyond a position limit
+  kLittleMargin,      ///< springs too stiff for the sampled loop, or a damping ratio too small for
+                      ///< them: no share of the ratio keeps Limits::gain_margin at this posture
+  kWrenchNotFinite,   ///< NaN or infinity in RobotState::external_wrench; the last finite wrench
+                      ///< stays in force in the analysis. With Limits::external_force: kCollision
   kSetpointRejected,  ///< set-point with a NaN, a wrong size, indefinite gains, a matrix that is no
                       ///< rotation, a goal beyond a limit or wall, or a time further ahead than
                       ///< the first time-out; the last good set-point stays in force
@@ -53,8 +53,8 @@ enum class Status : std::uint8_t {
   kStateContradictory,  ///< positions do not move as the velocities say
   kTimeBackward,        ///< time stamps at or before that of the last tick; they count as a period.
                         ///< For at most Watchdog::longest_gap this changes no torque
-  kBrakeDoubted,        ///< the brake alone acts, and the arm gets faster or vibrates: weight alone.
-                        ///< The robot needs its own brakes
+  kBrakeDoubted,  ///< the brake alone acts, and the arm gets faster or vibrates: weight alone.
+                  ///< The robot needs its own brakes
   // The state cannot be trusted: ramp:
   kStateNotFinite,  ///< NaN or infinity
   kStateWrongSize,  ///< not n entries
