@@ -22,6 +22,7 @@ struct TestArm {
   int joint;                  ///< that is taken out of its limits, slips, ...
   int light;                  ///< the revolute one with the least inertia
   const char* limits;         ///< lines under `limits` for plugins whose defaults do not fit it
+  bool stops_only = false;    ///< it is there to be stopped
 };
 
 inline const std::vector<TestArm>& test_arms() {
@@ -82,6 +83,26 @@ inline const std::vector<TestArm>& test_arms() {
        0,
        3,
        ""},
+      {"gen3",
+       "gen3",
+       "base_link",
+       "end_effector_link",
+       0,
+       {0, 0.26, 3.14, -2.27, 0, 0.96, 1.57},
+       0,
+       6,
+       "",
+       true},
+      {"baxter",
+       "baxter_left",
+       "left_arm_mount",
+       "left_gripper",
+       0,
+       {0, -0.55, 0, 0.75, 0, 1.26, 0},
+       0,
+       6,
+       "",
+       true},
   };
   return all;
 }
