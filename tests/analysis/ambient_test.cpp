@@ -81,7 +81,7 @@ struct ShakenArm {
   MatrixXd motion;
 };
 
-/// How often intervals hold the truth is counted by identify_stress.
+/// How often intervals hold the truth is counted by `./run stress identify`.
 TEST(IdentifyAmbient, FindsTheModesOfShakenArmsWithinTheirDeviations) {
   DASHPOT_SKIP_IF_QUICK();
   Comparison all;

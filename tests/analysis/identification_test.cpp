@@ -92,7 +92,7 @@ TEST(IdentifyDecays, TakesRecordsTogetherAndANoisyOneForLess) {
   }
 }
 
-/// How often intervals hold the truth is counted by identify_stress.
+/// How often intervals hold the truth is counted by `./run stress identify`.
 TEST(IdentifyDecays, HasErrorsOfTheSizeOfItsDeviations) {
   DASHPOT_SKIP_IF_QUICK();
   const KnownDecay decay;
