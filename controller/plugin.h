@@ -59,11 +59,11 @@ typedef struct dashpot_controller dashpot_controller;
  *
  * Faults latch. After any "damp" but DASHPOT_SETPOINT_LOST, after DASHPOT_STATE_FROZEN, and after a
  * "ramp" longer than watchdog.longest_gap, the arm stays braked, with its weight held (the weight
- * alone as long as the state is frozen, and after DASHPOT_BRAKE_DOUBTED), and the status is at least
- * DASHPOT_FAULT_LATCHED.
- * dashpot_snapshot.fault names the fault. This ends with dashpot_release or dashpot_reset, or, if
- * the configuration sets watchdog.release_after, once the arm has been at rest for that long.
- * Springs then start where the robot is. docs/safety.md describes each fault.
+ * alone as long as the state is frozen, and after DASHPOT_BRAKE_DOUBTED), and the status is at
+ * least DASHPOT_FAULT_LATCHED. dashpot_snapshot.fault names the fault. This ends with
+ * dashpot_release or dashpot_reset, or, if the configuration sets watchdog.release_after, once the
+ * arm has been at rest for that long. Springs then start where the robot is. docs/safety.md
+ * describes each fault.
  *
  * Below zero: the call was refused and did nothing. */
 enum {
