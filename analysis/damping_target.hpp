@@ -1,5 +1,6 @@
 #pragma once
-#include <Eigen/Core>
+#include <dashpot/analysis/matrix_types.hpp>
+
 #include <algorithm>
 #include <cmath>
 
