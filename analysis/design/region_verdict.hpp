@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/analysis/damping_region.hpp>
+#include <dashpot/analysis/design/damping_fit.hpp>
 
 #include <cstddef>
 #include <vector>
