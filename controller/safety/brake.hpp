@@ -64,7 +64,7 @@ class Brake {
   double stopping_time() const noexcept { return stopping_time_; }
 
  private:
-  /// What is known of a joint.
+  /// Limits and delays of one joint.
   struct Bounds {
     double lower, upper;  ///< position limits less the margin, rad
     double outermost;     ///< the margin, rad
