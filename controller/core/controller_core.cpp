@@ -36,7 +36,6 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
       kernel_(model),
       state_check_(model, settings),
       motion_watch_(model, settings),
-      doubt_(settings.limits),
       references_(settings.motion, settings.period),
       gains_(gain_ticks(settings), Impedance(n_)),
       attachment_(gain_ticks(settings), model.attachment()),
@@ -179,7 +178,7 @@ Status ControllerCore::watch_motion(Status input, double dt) noexcept {
   const bool still = references_still();
   Status now = worse(input, motion_watch_.check({dt, q_, qd_, robot_, external_wrench_, still}));
   if (restarts_ > kMostRestarts) now = worse(now, Status::kTooManyRestarts);
-  if (brake_fails(now, dt)) now = fault_ = Status::kBrakeDoubted;
+  if (brake_fails(now)) now = fault_ = Status::kBrakeDoubted;
   if (latches(now)) {
     latch(now);
     rest_ = 0;
@@ -213,7 +212,6 @@ SafetyFilter::Aim ControllerCore::end_springs() noexcept {
   law_.integral().reset();
   if (springs_ != Springs::kOff || ramp_ticks_ > 0) {
     filter_.begin_anew();
-    doubt_.reset();
   }
   springs_ = Springs::kOff;
   const bool means_nothing = motion_watch_.sees_frozen();  // the velocity
@@ -221,11 +219,12 @@ SafetyFilter::Aim ControllerCore::end_springs() noexcept {
   return fault_ == Status::kPositionLimit ? Aim::kReturn : Aim::kStop;
 }
 
-bool ControllerCore::brake_fails(Status now, double dt) noexcept {
-  if (fault_ == Status::kBrakeDoubted) return true;
+bool ControllerCore::brake_fails(Status now) noexcept {
+  if (fault_ == Status::kBrakeDoubted || filter_.brake().feeds()) return true;
   if (springs_ != Springs::kOff || filter_.fades() || motion_watch_.sees_frozen()) return false;
-  const bool vibrates = fault_ != Status::kOk && now == Status::kInstability;
-  return doubt_.grows(dt, robot_, qd_) || vibrates;
+  if (fault_ == Status::kOk || now != Status::kInstability) return false;
+  motion_watch_.forget_swings();
+  return !filter_.brake().soften();  // it shakes the arm
 }
 
 Status ControllerCore::ramp(Status status, JointVector& tau) noexcept {

@@ -1,7 +1,6 @@
 #pragma once
 #include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/law/impedance_law.hpp>
-#include <dashpot/controller/safety/brake_doubt.hpp>
 #include <dashpot/controller/safety/motion_watch.hpp>
 #include <dashpot/controller/safety/safety_filter.hpp>
 #include <dashpot/controller/safety/state_check.hpp>
@@ -96,7 +95,7 @@ class ControllerCore {
   /// No springs act from now on. Returns what the arm is to do instead.
   SafetyFilter::Aim end_springs() noexcept;
   /// True if the brake acts alone, and does not stop the arm.
-  bool brake_fails(Status now, double dt) noexcept;
+  bool brake_fails(Status now) noexcept;
   /// The safe output without a state.
   Status ramp(Status status, JointVector& tau) noexcept;
   Status finish(Status status, const JointVector& tau) noexcept;
@@ -126,7 +125,6 @@ class ControllerCore {
   DynamicsKernel kernel_;
   StateCheck state_check_;
   MotionWatch motion_watch_;
-  BrakeDoubt doubt_;
   SpringReferences references_;
   GainBlend gains_;
   Ramp<Attachment> attachment_;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace dashpot::controller {
@@ -18,6 +19,15 @@ constexpr double kLeastBraking = 0.1;  // of a torque limit, whatever the weight
 constexpr double kReturn = 0.025;      // of a velocity limit
 constexpr double kFastestStop = 1000;  // velocity limits: no robot, and sums stay finite
 constexpr double kMarginShare = 0.02;  // of the way between two position limits
+constexpr double kFell = 0.5;          // of the kinetic energy: the brake has acted,
+constexpr double kRose = 0.1;          // and drives the arm back
+constexpr double kSlowAlready = 0.1;   // of velocity limits: no brake has to be softer
+constexpr double kSoftest = 8;         // times T
+constexpr double kMemory = 0.5;        // s, ten times as long as the brake needs
+constexpr double kPushed = 0.5;        // of velocity limits: somebody pushes the arm
+constexpr double kPushedLeast = 1;     // rad/s (m/s): likewise, however low the limit
+constexpr double kRounding = 1e-9;     // N m or rad/s^2, in coordinates in which the mass is 1
+constexpr double kSoft = 1e-7;         // of a bound of acceleration, beside one of torque
 constexpr double kMarginMost = 0.02;   // rad, m
 
 /// The velocity with which a joint may move toward a limit at a distance.
@@ -41,6 +51,7 @@ Brake::Brake(const Settings& settings) noexcept : n_(settings.limits.torque.size
   const double lag = loop_lag(settings);
   const double least = kMargin * (lag - 0.5 * settings.period);
   stopping_time_ = std::max(limits.stopping_time, least);
+  period_ = settings.period;
   near_ = std::max(kNear * limits.stopping_time, kNearMargin / kMargin * least);
   for (Eigen::Index i = 0; i < n_; ++i) {
     Bounds& bounds = joints_[static_cast<std::size_t>(i)];
@@ -51,12 +62,13 @@ Brake::Brake(const Settings& settings) noexcept : n_(settings.limits.torque.size
     bounds.velocity = limits.velocity[i];
     bounds.torque = limits.torque[i];
     bounds.torque_rate = limits.torque_rate[i];
+    bounds.torque_step = limits.torque_rate[i] * settings.period;
     bounds.per_rate = 0.5 / limits.torque_rate[i];
     bounds.reaction = std::max(4 * near_, near_ + lag + limits.torque[i] / limits.torque_rate[i]);
   }
 }
 
-JointVector Brake::stop(const Motion& motion, double inward) noexcept {
+JointVector Brake::stop(const Motion& motion, double inward) const noexcept {
   JointVector change(n_), torque = JointVector::Zero(n_);
   for (Eigen::Index i = 0; i < n_; ++i) {
     const Bounds& bounds = joint(i);
@@ -66,30 +78,43 @@ JointVector Brake::stop(const Motion& motion, double inward) noexcept {
     if (q < bounds.lower - bounds.outermost) wanted = kReturn * inward * bounds.velocity;
     change[i] = wanted - std::clamp(motion.qd[i], -most, most);
   }
-  add_product(motion.robot.M, change, torque, 1 / stopping_time_);
-  JointVector clipped = torque;
-  double share = 1;
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    const Bounds& bounds = joint(i);
-    const double weight = std::clamp(motion.weight[i], -bounds.torque, bounds.torque);
-    clipped[i] = std::clamp(torque[i], -bounds.torque - weight, bounds.torque - weight);
-    if (clipped[i] != torque[i]) share = std::min(share, clipped[i] / torque[i]);
-  }
-  if (share == 1) return torque;
-  for (Eigen::Index i = 0; i < n_; ++i) torque[i] *= share;
-  if (product(clipped, change) <= product(torque, change)) return torque;
-  factor(motion);
-  JointVector further = difference(clipped, torque), gained = further;
-  accelerate(gained);
-  double part = 1;
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    const double way = motion.qd[i] < 0 ? -1 : 1, alike = way * share * change[i] / stopping_time_;
-    const double left = (kFullVelocity * joint(i).velocity - way * motion.qd[i]) / near_;
-    const double most = std::max(0.0, std::max(left, alike) - alike);
-    if (way * gained[i] > most) part = std::min(part, most / (way * gained[i]));
-  }
-  add(further, torque, part);
+  add_product(motion.robot.M, change, torque, 1 / stopping_time());
   return torque;
+}
+
+void Brake::watch(const Motion& motion) noexcept {
+  JointVector momentum = JointVector::Zero(n_);
+  add_product(motion.robot.M, motion.qd, momentum);
+  const double energy = 0.5 * product(momentum, motion.qd);
+  double slow = 0, pushed = 0, power = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double M = motion.robot.M(i, i), v = joint(i).velocity;
+    slow += 0.5 * M * std::pow(kSlowAlready * v, 2);
+    pushed += 0.5 * M * std::pow(std::max(kPushed * v, kPushedLeast), 2);
+    power += std::abs(motion.robot.gravity[i] * motion.qd[i]);
+  }
+  most_ = std::max(most_, energy);
+  if (energy < least_) least_ = energy, given_ = 0;
+  given_ = given_ * (1 - period_ / kMemory) + power * period_;
+  const bool driven_back = least_ <= kFell * most_ && energy > least_ + kRose * most_ + slow;
+  if (driven_back && soften()) {
+    least_ = energy;
+    given_ = 0;
+  }
+  feeds_ |= energy > least_ + given_ + pushed;
+}
+
+bool Brake::soften() noexcept {
+  const bool can = 2 * softness_ <= kSoftest * (1 + 1e-9);
+  if (can) softness_ *= 2;
+  return can;
+}
+
+void Brake::firm() noexcept {
+  softness_ = 1;
+  most_ = given_ = 0;
+  least_ = std::numeric_limits<double>::infinity();
+  feeds_ = false;
 }
 
 void Brake::factor(const Motion& motion) noexcept {
@@ -101,6 +126,10 @@ void Brake::factor(const Motion& motion) noexcept {
 
 double Brake::distance(const Motion& motion, Eigen::Index i, double way) const noexcept {
   return way > 0 ? joint(i).upper - motion.q[i] : motion.q[i] - joint(i).lower;
+}
+
+double Brake::held_weight(const Motion& motion, Eigen::Index i) const noexcept {
+  return std::clamp(motion.weight[i], -joint(i).torque, joint(i).torque);
 }
 
 double Brake::braking_torque(const Motion& motion, Eigen::Index i) const noexcept {
@@ -117,57 +146,86 @@ bool Brake::at_ease(const Motion& motion, Eigen::Index i, double acceleration) c
          v * v * M <= 2 * braking_torque(motion, i) * (left - v * bounds.reaction);
 }
 
-Brake::Bound Brake::bound(const Motion& motion, Eigen::Index i, double way) const noexcept {
+Brake::Bound Brake::acceleration_bound(const Motion& motion, Eigen::Index i, double way,
+                                       bool stops) const noexcept {
   const Bounds& bounds = joint(i);
   const double M = motion.robot.M(i, i), full = kFullVelocity * bounds.velocity;
-  const double near =
-      before(distance(motion, i, way), braking_torque(motion, i) / M, bounds.reaction);
+  double near = before(distance(motion, i, way), braking_torque(motion, i) / M, bounds.reaction);
+  if (stops) near = std::max(near, 0.0);
   const double fastest = std::min(full, near), moves = way * motion.qd[i], away = fastest - moves;
   double most = away / near_;
-  if (away > 0 && moves > 0) {
+  if (stops) {
+    most = std::max(most, 0.0);
+  } else if (away > 0 && moves > 0) {
     const double slow = std::min(1.0, moves / (kSlowly * fastest));
     most = std::min(most, std::sqrt(2 * away * bounds.torque_rate / M) / slow);
   }
-  return {i, way, way * most, near < full};
+  return {i, Bound::Of::kAcceleration, way, way * most, near < full};
 }
 
-/// Lawson and Hanson's way to a least constraint: one joint more at a time, the one furthest beyond
-/// its bound, and out again with those that would have to be driven to theirs.
-Status Brake::hold(const Motion& motion, JointVector& excess) noexcept {
+Brake::Bound Brake::torque_bound(const Motion& motion, const JointVector& last, Eigen::Index i,
+                                 double way) const noexcept {
+  const Bounds& bounds = joint(i);
+  const double most = std::min(bounds.torque, way * last[i] + bounds.torque_step);
+  return {i, Bound::Of::kTorque, way, way * most - held_weight(motion, i), false};
+}
+
+/// Lawson and Hanson's way to a least constraint: one bound more at a time, the one that is missed
+/// by most, and out again with those that would have to be driven to theirs.
+Status Brake::constrain(const Motion& motion, const JointVector& last, bool stops,
+                        JointVector& excess) noexcept {
   factor(motion);
-  JointVector free = difference(excess, motion.robot.coriolis);
+  for (Eigen::Index i = 0; i < n_ && !stops; ++i) {
+    for (const double way : {1.0, -1.0}) {
+      const double most = torque_bound(motion, last, i, way).value;
+      excess[i] = way * std::min(way * excess[i], way * most);
+    }
+  }
+  const JointVector wanted = excess;
+  JointVector free = stops ? wanted : difference(wanted, motion.robot.coriolis);
   accelerate(free);
   JointVector now = free;
-  Status status = Status::kOk;
   count_ = 0;
-  for (Eigen::Index pass = 0; pass < 2 * n_; ++pass) {
-    Bound worst{-1, 0, 0, false};
-    double most = 0;
+  for (Eigen::Index pass = 0; pass < 8 * n_; ++pass) {
+    Bound worst{-1, Bound::Of::kTorque, 0, 0, false};
+    double most = kRounding;
     for (Eigen::Index i = 0; i < n_; ++i) {
-      if (at_ease(motion, i, now[i]) || holds(i)) continue;
+      const double root = std::sqrt(motion.robot.M(i, i));
+      const double toward = excess[i] + held_weight(motion, i) < last[i] ? -1 : 1;
+      const Bound torque = torque_bound(motion, last, i, toward);
+      const double too_much = toward * (excess[i] - torque.value) / root;
+      if (too_much > most && !holds(torque)) most = too_much, worst = torque;
+      if (at_ease(motion, i, now[i])) continue;
       for (const double way : {1.0, -1.0}) {
-        const Bound found = bound(motion, i, way);
-        const double beyond = way * (now[i] - found.acceleration);
-        if (beyond > most) most = beyond, worst = found;
+        const Bound found = acceleration_bound(motion, i, way, stops);
+        const double beyond = way * (now[i] - found.value) * root;
+        if (beyond > most && !holds(found)) most = beyond, worst = found;
       }
     }
-    if (worst.joint < 0) break;
-    add_held(worst);
-    solve(free);
+    if (worst.joint < 0 || count_ == kMaxJoints) break;
+    hold(motion, worst);
+    solve(wanted, free);
+    excess = wanted;
     now = free;
-    for (Eigen::Index k = 0; k < count_; ++k) add(held(k).column, now, held(k).torque);
+    for (Eigen::Index k = 0; k < count_; ++k) {
+      const Held& h = held(k);
+      const bool torque = h.bound.of == Bound::Of::kTorque;
+      add(h.column, torque ? excess : now, h.factor * h.scale);
+      (torque ? now : excess)[h.bound.joint] += h.factor * h.scale;
+    }
   }
+  Status status = Status::kOk;
   for (Eigen::Index k = 0; k < count_; ++k) {
-    excess[held(k).bound.joint] += held(k).torque;
     status =
         worse(status, held(k).bound.at_limit ? Status::kNearJointLimit : Status::kTorqueLimited);
   }
   return status;
 }
 
-bool Brake::holds(Eigen::Index i) const noexcept {
+bool Brake::holds(const Bound& bound) const noexcept {
   for (Eigen::Index k = 0; k < count_; ++k) {
-    if (held_[static_cast<std::size_t>(k)].bound.joint == i) return true;
+    const Bound& other = held_[static_cast<std::size_t>(k)].bound;
+    if (other.joint == bound.joint && other.of == bound.of) return true;
   }
   return false;
 }
@@ -177,41 +235,63 @@ void Brake::accelerate(JointVector& torque) const noexcept {
   mass_->solve_LT(torque.data());
 }
 
-void Brake::add_held(const Bound& bound) noexcept {
-  Held& next = held(count_++);
-  next.bound = bound;
-  next.torque = 0;
-  next.column.setZero(n_);
-  next.column[bound.joint] = 1;
-  accelerate(next.column);
+void Brake::hold(const Motion& motion, const Bound& bound) noexcept {
+  Held next{bound};
+  if (bound.of == Bound::Of::kTorque) {
+    next.column = motion.robot.M.col(bound.joint);
+  } else {
+    next.column.setZero(n_);
+    next.column[bound.joint] = 1;
+    accelerate(next.column);
+  }
+  next.scale = 1 / std::sqrt(next.column[bound.joint]);
+  held(count_++) = next;
 }
 
-void Brake::solve(const JointVector& free) noexcept {
+void Brake::let_go(Eigen::Index k) noexcept {
+  --count_;
+  for (; k < count_; ++k) held(k) = held(k + 1);
+}
+
+void Brake::factor_held() noexcept {
+  JointMatrix A(count_, count_);
+  for (Eigen::Index k = 0; k < count_; ++k) {
+    const Held& one = held(k);
+    for (Eigen::Index l = 0; l < count_; ++l) {
+      const Bound& other = held(l).bound;
+      const bool same = one.bound.joint == other.joint;
+      const double response = one.bound.of == other.of ? one.column[other.joint] : same ? 1 : 0;
+      A(l, k) = one.scale * held(l).scale * response;
+    }
+    if (one.bound.of == Bound::Of::kAcceleration) A(k, k) += kSoft;
+  }
+  constrained_.compute(A, 1e-3 * kSoft);
+}
+
+void Brake::solve(const JointVector& torque, const JointVector& acceleration) noexcept {
   while (count_ > 0) {  // each time round with a joint less
-    JointMatrix A(count_, count_);
-    JointVector torques(count_);
+    factor_held();
+    JointVector factors(count_);
     for (Eigen::Index k = 0; k < count_; ++k) {
       const Bound& bound = held(k).bound;
-      for (Eigen::Index l = 0; l < count_; ++l) A(l, k) = held(k).column[held(l).bound.joint];
-      torques[k] = bound.acceleration - free[bound.joint];
+      const JointVector& free = bound.of == Bound::Of::kTorque ? torque : acceleration;
+      factors[k] = held(k).scale * (bound.value - free[bound.joint]);
     }
-    constrained_.compute(A, 1e-14 * A.trace());
-    constrained_.solve_L(torques.data());
-    constrained_.solve_LT(torques.data());
-    double share = 1;  // of the way there, before a torque would begin to drive
+    constrained_.solve_L(factors.data());
+    constrained_.solve_LT(factors.data());
+    double share = 1;  // of the way there, before a joint would begin to be driven
     Eigen::Index first = -1;
     for (Eigen::Index k = 0; k < count_; ++k) {
-      const double from = held(k).torque, to = torques[k];
+      const double from = held(k).factor, to = factors[k];
       if (held(k).bound.way * to < 0) continue;
       const double part = from == to ? 0 : from / (from - to);
       if (first < 0 || part < share) share = part, first = k;
     }
     for (Eigen::Index k = 0; k < count_; ++k) {
-      held(k).torque += share * (torques[k] - held(k).torque);
+      held(k).factor += share * (factors[k] - held(k).factor);
     }
     if (first < 0) return;
-    --count_;
-    for (Eigen::Index k = first; k < count_; ++k) held(k) = held(k + 1);
+    let_go(first);
   }
 }
 

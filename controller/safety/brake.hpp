@@ -5,6 +5,7 @@
 #include <dashpot/controller/tick_status.hpp>
 
 #include <array>
+#include <limits>
 
 namespace dashpot::controller {
 
@@ -20,28 +21,38 @@ double loop_lag(const Settings& settings) noexcept;
 /// Limits::stopping_time, or what leaves a margin of about kMargin, if that is longer.
 ///
 /// `stop` wants the velocity zero, or the return velocity v_r outside a position limit:
-///     b = M (v_wanted - qd) / T.
-/// Where torque limits do not leave room for b it shrinks b in all joints alike, to s b, which
-/// speeds up no joint. If b clipped joint by joint takes more energy from the arm, it goes from s b
-/// toward that as far as no joint is sped up beyond 0.9 of its velocity limit: what the others are
-/// braked with can drive a light joint. So what stops the arm at v_wanted = 0 never feeds it, as
-/// far as qd is right: both take energy, s b the power s qd' M qd / T.
+///     x = M (v_wanted - qd) / T.
 ///
-/// `hold` leaves a torque x in excess of the weight as it is unless it would take a joint out of
-/// its interval [-v-_i, v+_i]. With t = T / 5 (or what
-/// leaves a margin of 3), the distance d_i to a position limit less a margin,
-/// the acceleration a_i = room_i / (2 M_ii) of half of the torque that the weight leaves, and the
-/// time r_i = max(4 t, t + lag + torque_i / torque_rate_i) until it is there,
+/// A brake whose velocities are late, or whose model is wrong, may drive the arm back or shake it.
+/// `watch` softens it: where the kinetic energy fell by half and rises again by a tenth of what it
+/// was, T is doubled, up to eight times, until springs act again. And it doubts it: the energy
+/// may exceed the least, since the stop began or was softened, by what the weight can have given,
+/// int |w_i qd_i| dt over about half a second, as if all of it were held wrongly, and by that of
+/// joints with half of their velocity limits (at least 1 rad/s), each by itself: somebody may push.
+///
+/// `constrain` finds the torque x' in excess of the weight w next to a torque x that is wanted, in
+/// the sense of Gauss's principle of least constraint,
+///     (x' - x)' M^-1 (x' - x) -> min,
+/// that keeps the limits of torque and, from the last torque on, of torque rate,
+///     max(-torque_i, last_i - rate_i T) <= w_i + x'_i <= min(torque_i, last_i + rate_i T),
+/// and takes no joint out of its interval [-v-_i, v+_i]. Joints whose torque is at no limit keep
+/// the acceleration that x gives them, or their bound. With x of `stop`, v_wanted = 0 and limits
+/// that allow x' = 0, x' takes energy from the arm as far as qd is right: at least
+/// (T / 2) x'' M^-1 x'.
+///
+/// With t = T / 5 (or what leaves a margin of 3), the distance d_i to a position limit less a
+/// margin, the acceleration a_i = room_i / (2 M_ii) of half of the torque that the weight leaves,
+/// and the time r_i = max(4 t, t + lag + torque_i / torque_rate_i) until it is there,
 ///     v+_i = min(0.9 velocity_i, sqrt((a_i r_i)^2 + 2 a_i d_i) - a_i r_i),  d_i / r_i if d_i < 0,
-/// from which the joint stops before the limit, and likewise v-_i. The acceleration M^-1 (x -
-/// coriolis) of the model may be at most
+/// from which the joint stops before the limit, and likewise v-_i. While the law acts, the
+/// acceleration M^-1 (x' - coriolis) of the model may be at most
 ///     min((v+_i - qd_i) / t, sqrt(2 (v+_i - qd_i) torque_rate_i / M_ii) / s_i)
 /// and likewise downward, the latter only where the joint moves that way already, with the share
 /// s_i = min(1, 2 |qd_i| / v+_i): braking is not bounded, nor what presses. It vanishes at
 /// the edge, is negative beyond it, and can be taken away as fast as the torque-rate limit allows.
-/// By Gauss's principle of least constraint hold adds to x the torques of the fewest joints, with
-/// the sign of a brake, that keep these bounds: torques on the joints at their bounds alone. The
-/// others keep the torque that x gives them.
+/// In a stop M^-1 x' may be at most max(0, (v+_i - qd_i) / t), with v+_i at least 0: what brakes
+/// the others takes no joint to its limits. Where the limits of torque do not allow that, they
+/// count.
 class Brake {
  public:
   explicit Brake(const Settings& settings) noexcept;
@@ -54,14 +65,24 @@ class Brake {
     const SmallCholesky* mass;  ///< factor of robot.M, if anybody has it already; or null
   };
 
-  /// Returns b, n, N m, within the torque limits beside the weight. `inward` scales the velocity of
-  /// joints outside their position limits back to them, 0 to 1.
-  JointVector stop(const Motion& motion, double inward) noexcept;
-  /// Bounds `excess`. Returns kOk, kTorqueLimited, or kNearJointLimit.
-  Status hold(const Motion& motion, JointVector& excess) noexcept;
+  /// Returns x, n, N m. `inward` scales the velocity of joints outside their position limits back
+  /// to them, 0 to 1.
+  JointVector stop(const Motion& motion, double inward) const noexcept;
+  /// Sets `excess` x to x', `last` being the torque of the last tick, n, N m; `stops` if it is one
+  /// of `stop`. Returns kOk, kTorqueLimited, or kNearJointLimit.
+  Status constrain(const Motion& motion, const JointVector& last, bool stops,
+                   JointVector& excess) noexcept;
 
-  /// Returns T, s.
-  double stopping_time() const noexcept { return stopping_time_; }
+  /// Takes note of a motion in which a stop acts alone.
+  void watch(const Motion& motion) noexcept;
+  /// True if a stop has not stopped the arm, since springs last acted.
+  bool feeds() const noexcept { return feeds_; }
+  /// Doubles T. False if it is as long as it may be.
+  bool soften() noexcept;
+  /// No stop acts any more.
+  void firm() noexcept;
+  /// Returns T as it is now, s.
+  double stopping_time() const noexcept { return softness_ * stopping_time_; }
 
  private:
   /// Limits and delays of one joint.
@@ -71,21 +92,26 @@ class Brake {
     double velocity;      ///< limit, rad/s
     double torque;        ///< limit, N m
     double torque_rate;   ///< limit, N m/s
+    double torque_step;   ///< limit of its change in a tick, N m
     double reaction;      ///< r, s
     double per_rate;      ///< 1 / (2 torque_rate), s/(N m)
   };
-  /// The acceleration that a joint may have in one direction.
+  /// What a joint may have in one direction.
   struct Bound {
+    enum class Of : std::uint8_t { kTorque, kAcceleration };
     Eigen::Index joint;
-    double way;           ///< 1 or -1
-    double acceleration;  ///< rad/s^2
-    bool at_limit;        ///< because of a position limit
+    Of of;
+    double way;     ///< 1 or -1
+    double value;   ///< N m or rad/s^2
+    bool at_limit;  ///< because of a position limit
   };
-  /// A joint at its bound, and the torque that keeps it there.
+  /// A joint at its bound. A torque s unit' M of all joints accelerates it alone, and s unit is
+  /// what accelerates all joints by s M^-1 unit.
   struct Held {
     Bound bound;
-    double torque = 0;   ///< N m
-    JointVector column;  ///< of M^-1
+    JointVector column = {};  ///< of M or M^-1
+    double scale = 1;         ///< s, with which the factors' matrix has a diagonal of ones
+    double factor = 0;        ///< of what keeps it there
   };
 
   const Bounds& joint(Eigen::Index i) const noexcept {
@@ -95,21 +121,35 @@ class Brake {
   /// Sets the factor of M for this tick.
   void factor(const Motion& motion) noexcept;
   double distance(const Motion& motion, Eigen::Index i, double way) const noexcept;
+  /// Returns what the torque limit leaves of the weight, N m.
+  double held_weight(const Motion& motion, Eigen::Index i) const noexcept;
   double braking_torque(const Motion& motion, Eigen::Index i) const noexcept;
   /// True if an acceleration is far from the bounds of both directions, which is soon told.
   bool at_ease(const Motion& motion, Eigen::Index i, double acceleration) const noexcept;
-  Bound bound(const Motion& motion, Eigen::Index i, double way) const noexcept;
-  bool holds(Eigen::Index i) const noexcept;
+  Bound acceleration_bound(const Motion& motion, Eigen::Index i, double way,
+                           bool stops) const noexcept;
+  Bound torque_bound(const Motion& motion, const JointVector& last, Eigen::Index i,
+                     double way) const noexcept;
+  bool holds(const Bound& bound) const noexcept;
   /// torque <- M^-1 torque
   void accelerate(JointVector& torque) const noexcept;
-  void add_held(const Bound& bound) noexcept;
-  /// Sets the torques with which those held are at their bounds. Those that would have to be driven
+  void hold(const Motion& motion, const Bound& bound) noexcept;
+  void let_go(Eigen::Index k) noexcept;
+  /// Sets the factor of the matrix of those held.
+  void factor_held() noexcept;
+  /// Sets the factors with which those held are at their bounds. Those that would have to be driven
   /// there are let go.
-  void solve(const JointVector& free) noexcept;
+  void solve(const JointVector& torque, const JointVector& acceleration) noexcept;
 
   Eigen::Index n_;
   double stopping_time_;  ///< T
   double near_;           ///< t
+  double period_;
+  double softness_ = 1;  ///< of this stop: what its T is multiplied by
+  double most_ = 0;      ///< kinetic energy in this stop, J
+  double least_ = std::numeric_limits<double>::infinity();  ///< likewise, since it was softened
+  double given_ = 0;                                        ///< by the weight, J
+  bool feeds_ = false;
   SmallCholesky own_mass_;
   const SmallCholesky* mass_ = nullptr;  ///< of this tick
   SmallCholesky constrained_;

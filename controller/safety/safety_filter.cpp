@@ -48,16 +48,19 @@ void SafetyFilter::restart() noexcept {
 
 Status SafetyFilter::apply(const Brake::Motion& motion, double tip_speed, Aim aim,
                            const JointVector& dampers, JointVector& tau) noexcept {
-  asked_ = tau;
   const bool springs = aim == Aim::kSprings;
-  JointVector base = motion.weight, excess(n_);
-  if (!springs) {
-    excess.setZero();
-    returning_ = aim == Aim::kReturn ? std::min(1.0, returning_ + return_step_) : 0;
-    if (aim != Aim::kFloat) add(brake_.stop(motion, returning_), base);
-    asked_ = base;
-  } else {
+  JointVector excess(n_), brake = JointVector::Zero(n_);
+  if (springs) brake_.firm();
+  if (aim != Aim::kFloat && !springs && !fades()) brake_.watch(motion);
+  returning_ = aim == Aim::kReturn ? std::min(1.0, returning_ + return_step_) : 0;
+  if (springs) {
+    asked_ = tau;
     excess = difference(tau, motion.weight);
+  } else {
+    excess.setZero();
+    if (aim != Aim::kFloat) brake = brake_.stop(motion, returning_);
+    asked_ = motion.weight;
+    add(brake, asked_);
   }
   if (!finite(asked_)) {
     ramp(tau);
@@ -65,19 +68,23 @@ Status SafetyFilter::apply(const Brake::Motion& motion, double tip_speed, Aim ai
   }
   ramping_ = false;
   Status status = Status::kOk;
+  JointVector weight = motion.weight, base = asked_;
   for (Eigen::Index i = 0; i < n_; ++i) {
-    if (std::abs(motion.weight[i]) > joint(i).torque) status = Status::kWeightNotHeld;
-    base[i] = std::clamp(base[i], -joint(i).torque, joint(i).torque);
+    const double limit = joint(i).torque;
+    if (std::abs(weight[i]) > limit) status = Status::kWeightNotHeld;
+    weight[i] = std::clamp(weight[i], -limit, limit);
+    base[i] = springs ? weight[i] : std::clamp(base[i], -limit, limit);
   }
-  if (anew_) take_over(base, motion.weight);
+  if (anew_) take_over(base, weight);
   bool limited = false;
   if (springs) {
     limited = hold_back(motion.qd, tip_speed, excess);
     limited |= share_out(base, dampers, excess);
   }
   if (fading_) limited |= fade(motion.qd, springs, base, excess);
-  if (springs) status = worse(status, brake_.hold(motion, excess));
-  for (Eigen::Index i = 0; i < n_; ++i) tau[i] = base[i] + excess[i];
+  add(brake, excess);
+  if (aim != Aim::kFloat) status = worse(status, brake_.constrain(motion, last_, !springs, excess));
+  for (Eigen::Index i = 0; i < n_; ++i) tau[i] = weight[i] + excess[i];
   if (!finite(tau)) {
     ramp(tau);
     return Status::kNotFinite;
@@ -156,7 +163,7 @@ void SafetyFilter::take_over(const JointVector& base, const JointVector& weight)
   fading_ = true;
   fade_ticks_ = 0;
   for (Eigen::Index i = 0; i < n_; ++i) {
-    const double excess = last_[i] - std::clamp(weight[i], -joint(i).torque, joint(i).torque);
+    const double excess = last_[i] - weight[i];
     const double brake = base[i] - weight[i];
     joint(i).acting = excess - std::clamp(brake, std::min(excess, 0.0), std::max(excess, 0.0));
   }

@@ -67,7 +67,7 @@ class SafetyFilter {
   const JointVector& last() const noexcept { return last_; }
   /// True while what acted when springs ended or started goes over into what is asked for.
   bool fades() const noexcept { return anew_ || fading_; }
-  const Brake& brake() const noexcept { return brake_; }
+  Brake& brake() noexcept { return brake_; }
 
  private:
   /// What is known of a joint.

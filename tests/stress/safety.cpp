@@ -3,7 +3,7 @@
 // others are there to compare it with.
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/safety_contact.hpp>
-#include <dashpot/tests/stress/safety_scenarios.hpp>
+#include <dashpot/tests/stress/safety_doubt.hpp>
 #include <dashpot/tests/support/places.hpp>
 
 namespace {
@@ -19,6 +19,10 @@ std::vector<Scenario> scenarios() {
   return {
       {"0", "joint 1 at 0.9 of its limit, a gap", all, stop_from(0.9, false)},
       {"0", "all joints at 0.9 of their limits, a gap", all, stop_from(0.9, true)},
+      {"0", "the same, states 30 ms late", {}, late_states(30, 3, true)},
+      {"0", "the same, states 100 ms late", {}, late_states(100, 100, false)},
+      {"0", "the same, torque of the wrong sign", {}, wrong_torque},
+      {"0", "the same, rotors told and not there", {}, no_rotors},
       {"0", "feedback frozen while the arm creeps", {}, frozen_creep},
       {"0", "time stamps stand still", {}, wrong_clock(0)},
       {"0", "time stamps in us", {}, wrong_clock(1e-3)},
@@ -39,7 +43,11 @@ std::vector<Scenario> scenarios() {
       {"5", "hard jolts at the wrist", {}, hard_jolts},
       {"6", "table, goal 15 cm below", three, table(0.15)},
       {"6", "table, goal 20 cm below", three, table(0.2)},
-      {"7", "12 moves of the tip, all defaults", {}, default_moves},
+      {"6", "springy plane, goal 15 cm below", {}, table(0.15, true)},
+      {"6", "springy plane, goal 20 cm below", {}, table(0.2, true)},
+      {"7", "40 moves of the tip, all defaults", {}, default_moves},
+      {"7", "a move past a joint limit", {"fr3"}, past_a_limit},
+      {"7", "upright, pulled outward", {"iiwa14", "iiwa7"}, upright},
       {"7", "toward a stretched arm", {}, stretched},
       {"9", "K = 50000, D = 0, alternating goals", {}, stiff_undamped},
       {"9", "D = 5000 at rest", {}, over_damped},

@@ -123,13 +123,13 @@ inline std::string yaml_list(const JointVector& values) {
 }
 
 /// The lines of a configuration that name the robot.
-inline std::string robot_yaml(const TestArm& arm) {
+inline std::string robot_yaml(const TestArm& arm, double told_rotors) {
+  const double rotors = arm.reflected_inertia + told_rotors;
   std::string text = "robot:\n  urdf: " + std::string(DASHPOT_SOURCE_DIR "/sim/models/") +
                      arm.file + ".urdf\n  base: " + arm.base + "\n  tip: " + arm.tip + "\n";
-  if (arm.reflected_inertia > 0) {
+  if (rotors > 0) {
     text += "  reflected_inertia: " +
-            yaml_list(JointVector::Constant(static_cast<Eigen::Index>(arm.start.size()),
-                                            arm.reflected_inertia)) +
+            yaml_list(JointVector::Constant(static_cast<Eigen::Index>(arm.start.size()), rotors)) +
             "\n";
   }
   return text;

@@ -32,6 +32,7 @@ struct RigOptions {
   sim::ArmOptions world;        ///< wall, pushes; stops are added
   std::vector<sim::SensorFault> faults;
   bool told_weight = true;  ///< dashpot_reset with the weight before the first tick
+  double told_rotors = 0;   ///< kg m^2 (kg) each that the controller alone knows of
 };
 
 /// A set-point that the host repeats every 0.1 s.
@@ -117,7 +118,10 @@ class Rig {
 
   std::optional<Goal> goal;  ///< what the host wants
   double clock_rate = 1;     ///< of the time stamps from now on
+  int late = 0;              ///< periods of the states
+  double excess_factor = 1;  ///< of what exceeds the weight, between controller and robot
   int every = 1;             ///< the controller is called every so many periods; 0: not at all
+  bool faulted = false;      ///< a fault has ended the springs
   Measures seen;
 
   /// `seen`, with what the last second was like.
@@ -159,7 +163,7 @@ class Rig {
     for (std::int64_t i = std::llround(seconds / period()); i > 0; --i) {
       if (every > 0 && ticks_ % every == 0) control();
       ++ticks_;
-      if (plant_->step(torque_) != sim::Status::kOk) {
+      if (plant_->step(exerted()) != sim::Status::kOk) {
         throw std::runtime_error("the simulation failed at " + std::to_string(plant_->time()) +
                                  " s");
       }
@@ -203,7 +207,7 @@ class Rig {
       close(file);
       path_ = name;
     }
-    std::ofstream(path_) << robot_yaml(arm) << "analysis: {where: off}\n"
+    std::ofstream(path_) << robot_yaml(arm, options.told_rotors) << "analysis: {where: off}\n"
                          << options.config << (limits.empty() ? "" : "limits:\n") << limits;
     return path_;
   }
@@ -222,9 +226,23 @@ class Rig {
     if (plugin_.set_setpoint(controller_.get(), &setpoint) != DASHPOT_OK) ++seen.refused_goals;
   }
 
+  JointVector exerted() const {
+    if (excess_factor == 1) return torque_;
+    const JointVector g = weight(position());
+    return g + excess_factor * (torque_ - g);
+  }
+
   void control() {
     if (goal && ticks_ % 100 == 0) tell();
-    const sim::Measurement& measured = plant_->measured();
+    for (int k = measured_.empty() ? late : 0; k > 0; --k) {  // the robot came this way
+      sim::Measurement before = plant_->measured();
+      before.position -= k * period() * before.velocity;
+      before.time -= std::llround(1e9 * k * period());
+      measured_.push_back(before);
+    }
+    measured_.push_back(plant_->measured());
+    while (measured_.size() > static_cast<std::size_t>(late) + 1) measured_.pop_front();
+    const sim::Measurement measured = measured_.front();
     stamp_ += clock_rate * static_cast<double>(measured.time - last_time_);
     last_time_ = measured.time;
     const std::int64_t time = skipped_ + std::llround(stamp_);
@@ -246,6 +264,7 @@ class Rig {
     const char* text = plugin_.status_text(status);
     if (seen.first_status == "ok") seen.first_status = text;
     seen.last_status = text;
+    faulted |= status >= DASHPOT_FAULT_LATCHED;
     last_status_ = status;
   }
 
@@ -260,6 +279,7 @@ class Rig {
   std::uint32_t n_ = 0;
   std::int64_t ticks_ = 0;
   JointVector torque_;
+  std::deque<sim::Measurement> measured_;     ///< on their way
   std::int64_t skipped_ = 0, last_time_ = 0;  ///< ns
   double stamp_ = 0;                          ///< ns
   std::int32_t last_status_ = DASHPOT_OK;

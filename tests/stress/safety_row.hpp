@@ -26,6 +26,7 @@ struct Row {
   std::string arm;
   std::string plugin;
   Measures seen;
+  double kept = 1;                  ///< share of the kinetic energy at the end, in a stop
   std::string note;                 ///< what this scenario is about
   std::vector<std::string> broken;  ///< invariants
 
@@ -56,7 +57,10 @@ struct Scenario {
 };
 
 inline Row run_scenario(const Scenario& scenario, const PluginFile& plugin, const TestArm& arm) {
-  Row row{std::string(scenario.point) + " " + scenario.name, arm.name, plugin.label, {}, {}, {}};
+  Row row;
+  row.scenario = std::string(scenario.point) + " " + scenario.name;
+  row.arm = arm.name;
+  row.plugin = plugin.label;
   try {
     scenario.act(plugin, arm, row);
   } catch (const std::runtime_error& error) {
