@@ -53,8 +53,6 @@ class GainJudge {
   /// cannot be analysed.
   double margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,
                 double enough);
-  /// Returns the integral of these springs as states of the loop.
-  analysis::ControllerMemory memory(const JointVector& q, const Gains& gains, Mode mode) const;
   Eigen::MatrixXd gravity_of(const DynamicsKernel& kernel, const JointVector& q) const;
 
   DynamicsKernel kernel_;

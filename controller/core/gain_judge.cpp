@@ -50,16 +50,22 @@ GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
 GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
   Verdict worst{wanted_, Mode::kJoint};
   const Eigen::MatrixXd gravity = gravity_of(kernel_, q);
+  const JointVector rest = JointVector::Zero(q.size());
+  DynamicsResult robot, bare;
+  kernel_.evaluate(q, rest, robot);
+  if (loaded_) bare_.evaluate(q, rest, bare);
   for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+    Setpoint setpoint;
+    setpoint.mode = mode;
+    setpoint.gains = gains;
+    const Impedance springs(setpoint, static_cast<int>(q.size()));
+    loop_.memory = integral_memory(robot, springs, integral_time_, loop_.period);
     analysis::System<kMaxJoints> system;
-    const bool known = posture_loop_.closed_loop(q, gains, mode, system) == Status::kOk;
-    loop_.memory = memory(q, gains, mode);
-    const double found = known ? margin(system, gravity, wanted_) : 0;
+    posture_loop_.closed_loop(robot, gains, mode, system);
+    const double found = margin(system, gravity, wanted_);
     if (found < worst.margin) worst = {found, mode};
-    if (!known || !loaded_ || !counts_payload(gains, mode)) continue;
-    DynamicsResult there;
-    bare_.evaluate(q, JointVector::Zero(q.size()), there);
-    system.mass = there.M;
+    if (!loaded_ || !counts_payload(gains, mode)) continue;
+    system.mass = bare.M;
     const double enough = std::min(kDropped, wanted_);
     const double dropped = margin(system, gravity_of(bare_, q), enough);
     if (dropped < std::min(enough, worst.margin)) worst = {dropped, mode, true};
@@ -88,17 +94,6 @@ GainJudge::Verdict GainJudge::judge_anywhere(const Gains& gains) {
 
 Eigen::MatrixXd GainJudge::gravity_of(const DynamicsKernel& kernel, const JointVector& q) const {
   return gravity_ ? gravity_gradient(kernel, q) : Eigen::MatrixXd();
-}
-
-analysis::ControllerMemory GainJudge::memory(const JointVector& q, const Gains& gains,
-                                             Mode mode) const {
-  Setpoint setpoint;
-  setpoint.mode = mode;
-  setpoint.gains = gains;
-  const int n = static_cast<int>(q.size());
-  DynamicsResult robot;
-  kernel_.evaluate(q, JointVector::Zero(n), robot);
-  return integral_memory(robot, Impedance(setpoint, n), integral_time_, loop_.period);
 }
 
 double GainJudge::margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,

@@ -1,54 +1,42 @@
-#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/core/controller_core.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 
-#include <cmath>
-
 namespace dashpot::controller {
-namespace {
-
-/// Those of a controller whose closed loop has the gains of a set-point from the second tick on,
-/// wherever the robot is.
-Settings anywhere(Settings settings) {
-  constexpr double kFar = 1e5;  // rad: set-points at the robot are within it
-  settings.motion.gain_time = settings.period;
-  settings.analysis.where = Analysis::Where::kOff;
-  settings.analysis.sampled.interval = 0;
-  settings.limits.position_lower.setConstant(-kFar);
-  settings.limits.position_upper.setConstant(kFar);
-  settings.limits.walls.clear();
-  return settings;
-}
-
-}  // namespace
 
 PostureLoop::PostureLoop(const RobotModel& model, const Settings& settings)
-    : kernel_(model), controller_(model, anywhere(settings)) {}
+    : kernel_(model),
+      terms_(settings.task_terms),
+      environment_(settings.environment),
+      friction_left_(friction_left(model, settings)),
+      damping_(std::make_unique<DesignedDamping>(designed_damping(model, settings))) {}
+PostureLoop::~PostureLoop() = default;
+PostureLoop::PostureLoop(PostureLoop&&) noexcept = default;
 
 Status PostureLoop::closed_loop(const JointVector& q, const Gains& gains, Mode mode,
                                 analysis::System<kMaxJoints>& system,
                                 const Vector6& external_wrench) {
-  RobotState state;
-  state.position = q;
-  state.velocity = JointVector::Zero(q.size());
-  state.external_wrench = external_wrench;
-  DynamicsResult there;
-  kernel_.evaluate(q, state.velocity, there);
+  if (q.size() != friction_left_.size()) return Status::kStateWrongSize;
+  if (!q.allFinite()) return Status::kStateNotFinite;
+  if (!external_wrench.allFinite()) return Status::kWrenchNotFinite;
+  DynamicsResult robot;
+  kernel_.evaluate(q, JointVector::Zero(q.size()), robot);
+  closed_loop(robot, gains, mode, system, external_wrench);
+  return Status::kOk;
+}
+
+void PostureLoop::closed_loop(const DynamicsResult& robot, const Gains& gains, Mode mode,
+                              analysis::System<kMaxJoints>& system,
+                              const Vector6& external_wrench) {
   Setpoint setpoint;
   setpoint.mode = mode;
-  setpoint.joint_position = q;
-  setpoint.tip_pose = {there.p_BT_B, there.R_BT};
   setpoint.gains = gains;
-  controller_.reset();
-  const auto period = static_cast<std::int64_t>(std::ceil(1e9 * controller_.settings().period));
-  JointVector torque;
-  for (int tick = 0; tick < 3; ++tick) {
-    time_ += period;
-    state.time = setpoint.time = time_;
-    const Status status = controller_.update(state, setpoint, torque);
-    if (status == Status::kSetpointRejected || status > Status::kWeightNotHeld) return status;
-  }
-  controller_.closed_loop(system);
-  return Status::kOk;
+  const auto n = static_cast<int>(friction_left_.size());
+  const GainBlend given(1, Impedance(setpoint, n));
+  damping_->reset();
+  const Impedance& impedance = damping_->update(given, robot);
+  controller::closed_loop(robot, JointVector::Zero(n),
+                          {impedance, damping_->null_space(), friction_left_, {external_wrench}},
+                          terms_, environment_, system);
 }
 
 }  // namespace dashpot::controller

@@ -182,13 +182,9 @@ void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) n
   }
 }
 
-void add_null_damping(const Impedance& impedance, const NullSpace& null_space,
-                      JointMatrix& C) noexcept {
-  if (impedance.null_damping_ratio == 0) return;
-  analysis::DampingLevel level;
-  const JointMatrix D = null_space.ratio_damping(impedance, level);
+void add_null_damping(const NullSpace& null_space, JointMatrix& C) noexcept {
   for (Index j = 0; j < C.cols(); ++j) {
-    const JointVector column = null_space.damper(D, JointVector::Unit(C.rows(), j));
+    const JointVector column = null_space.ratio_damper(JointVector::Unit(C.rows(), j));
     for (Index i = 0; i < C.rows(); ++i) C(i, j) += column[i];
   }
 }
@@ -207,7 +203,7 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
     null_projector(null_space, projector);
     add_projected(projector, impedance.null_stiffness, K_N);
     add_projected(projector, impedance.null_damping, C);
-    add_null_damping(impedance, null_space, C);
+    if (impedance.null_damping_ratio > 0) add_null_damping(null_space, C);
   }
   JointMatrix K = K_N;
   add_congruence(J, K_C, J, K);
@@ -245,6 +241,20 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
       system.stiffness_factor(i + 6, j) = scale * W_N(i, j);
     }
   }
+}
+
+void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Acting& acting,
+                 const TaskTerms& terms, const Environment& environment,
+                 analysis::System<kMaxJoints>& system) noexcept {
+  StiffnessTerms more{terms.jacobian_rate};
+  JointMatrix load;
+  if (terms.load != Load::kIgnored && !acting.wrenches.world.isZero(0)) {
+    load = stiffness_under_load(robot, acting.impedance, terms.load, acting.wrenches);
+    more.load = &load;
+  }
+  Impedance impedance = acting.impedance;
+  if (!environment.none()) add_environment(environment, impedance);
+  closed_loop(robot, qd, impedance, acting.null_space, acting.friction, more, system);
 }
 
 }  // namespace dashpot::controller

@@ -73,8 +73,7 @@ struct StiffnessTerms {
 void null_projector(const NullSpace& null_space, JointMatrix& P) noexcept;
 
 /// C += L D L' with the D of the null space's ratio, see NullSpace::ratio_damping.
-void add_null_damping(const Impedance& impedance, const NullSpace& null_space,
-                      JointMatrix& C) noexcept;
+void add_null_damping(const NullSpace& null_space, JointMatrix& C) noexcept;
 
 /// K += P' diag(k) P
 void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) noexcept;
@@ -89,5 +88,19 @@ void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) n
 void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Impedance& impedance,
                  const NullSpace& null_space, const JointVector& viscous_friction,
                  const StiffnessTerms& terms, analysis::System<kMaxJoints>& system) noexcept;
+
+/// What acts on a robot, besides its environment.
+struct Acting {
+  const Impedance& impedance;
+  const NullSpace& null_space;
+  const JointVector& friction;  ///< what the joints damp by themselves, n, N m s/rad
+  TipWrenches wrenches;
+};
+
+/// Sets `system` to the same with an environment, and with the terms of the stiffness that are
+/// asked for. A load has none if the world exerts no wrench.
+void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Acting& acting,
+                 const TaskTerms& terms, const Environment& environment,
+                 analysis::System<kMaxJoints>& system) noexcept;
 
 }  // namespace dashpot::controller

@@ -59,8 +59,12 @@ struct HeldLoad {
   JointVector torque(ImpedanceLaw& law, Load load, const JointVector& there,
                      const JointVector& qd) const {
     const DynamicsResult now = at(there);
-    JointVector tau;
-    law.torque(now, there, qd, impedance, references, wrenches.commanded, kUnclamped, tau);
+    NullSpace null_space;
+    null_space.compute(now, impedance);
+    LawTorque result;
+    law.torque({now, there, qd, impedance, null_space, references, kUnclamped, wrenches.commanded},
+               result);
+    JointVector tau = result.torque;
     Vector6 f = wrenches.world;
     if (load == Load::kToolWrench) {
       const Eigen::Matrix3d turn = now.R_BT * robot.R_BT.transpose();
@@ -123,7 +127,9 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
       const JointMatrix added =
           stiffness_under_load(held.robot, held.impedance, load, held.wrenches);
       analysis::System<kMaxJoints> system;
-      closed_loop(held.robot, held.rest, held.impedance, law.null_space(), held.rest,
+      NullSpace null_space;
+      null_space.compute(held.robot, held.impedance);
+      closed_loop(held.robot, held.rest, held.impedance, null_space, held.rest,
                   {false, loaded ? &added : nullptr}, system);
       EXPECT_TRUE(near(system.mass, held.robot.M, 0));
       EXPECT_TRUE(near(system.damping, C, 1e-6 * C.norm()));

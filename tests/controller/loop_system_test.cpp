@@ -41,7 +41,7 @@ struct Loop {
   /// Expects the same M, C and K of both forms; returns the number of rows of the factor.
   Eigen::Index expect_agreement(const Impedance& impedance) {
     NullSpace null_space;
-    null_space.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
+    null_space.compute(robot, impedance);
     nearly_singular = null_space.inertia().nearly_singular();
     analysis::System<kMaxJoints> plain, system;
     for (analysis::System<kMaxJoints>* one : {&plain, &system}) {  // of what was there before

@@ -1,0 +1,83 @@
+#include <dashpot/controller/core/faults.hpp>
+#include <dashpot/controller/core/thresholds.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dashpot::controller {
+
+Faults::Faults(const RobotModel& model, const Settings& settings) noexcept
+    : motion_watch_(model, settings),
+      doubt_(settings.limits),
+      velocity_(settings.limits.velocity),
+      watchdog_(settings.watchdog),
+      period_(settings.period) {}
+
+void Faults::reset() noexcept {
+  motion_watch_.reset();
+  release();
+  restarts_ = 0;
+  ramp_ticks_ = 0;
+}
+
+void Faults::release() noexcept {
+  fault_ = Status::kOk;
+  rest_ = 0;
+}
+
+Status Faults::watch(Status seen, const Sensed& now, bool still, bool braked) noexcept {
+  restarts_ = std::max(0.0, restarts_ - now.dt);
+  Status found = worse(
+      seen, motion_watch_.check({now.dt, now.q, now.qd, now.robot, now.external_wrench, still}));
+  if (restarts_ > kMostRestarts) found = worse(found, Status::kTooManyRestarts);
+  if (brake_fails(found, now, braked)) found = fault_ = Status::kBrakeDoubted;
+  if (latches(found)) {
+    latch(found);
+    rest_ = 0;
+  } else if (fault_ != Status::kOk && rested(now)) {
+    release();
+  }
+  return fault_ == Status::kOk ? Status::kOk : worse(found, Status::kFaultLatched);
+}
+
+void Faults::lose_state(Status seen, bool for_long) noexcept {
+  rest_ = 0;
+  if (for_long) latch(seen);
+}
+
+void Faults::applied(Status status, const Sensed& now, const JointVector& torque) noexcept {
+  ramp_ticks_ = status < Status::kStateNotFinite ? 0 : ramp_ticks_ + 1;
+  if (ramp_ticks_ * period_ > watchdog_.longest_gap) latch(status);
+  if (now.any) motion_watch_.applied(torque, now.weight);
+}
+
+Faults::Aim Faults::aim() const noexcept {
+  const bool means_nothing = motion_watch_.sees_frozen();  // the velocity
+  if (means_nothing || fault_ == Status::kBrakeDoubted) return Aim::kFloat;
+  return fault_ == Status::kPositionLimit ? Aim::kReturn : Aim::kStop;
+}
+
+void Faults::latch(Status fault) noexcept {
+  if (fault_ != Status::kOk) return;
+  fault_ = fault;
+  motion_watch_.forget_swings();  // those that come from now on are the brake's
+}
+
+bool Faults::rested(const Sensed& now) noexcept {
+  const double wanted = watchdog_.release_after;
+  if (wanted == 0) return false;
+  rest_ = now.dt > watchdog_.longest_gap ? 0 : rest_ + now.dt;
+  for (Eigen::Index i = 0; i < now.qd.size(); ++i) {
+    if (std::abs(now.qd[i]) > kAtRest * velocity_[i]) rest_ = 0;
+  }
+  return rest_ >= wanted;
+}
+
+bool Faults::brake_fails(Status found, const Sensed& now, bool braked) noexcept {
+  if (fault_ == Status::kBrakeDoubted) return true;
+  if (!braked || motion_watch_.sees_frozen()) return false;
+  const bool vibrates = fault_ != Status::kOk && found == Status::kInstability;
+  return doubt_.grows(now.dt, now.robot, now.qd) || vibrates;
+}
+
+}  // namespace dashpot::controller
