@@ -55,13 +55,10 @@ class GainJudge {
                 double enough);
   Eigen::MatrixXd gravity_of(const DynamicsKernel& kernel, const JointVector& q) const;
 
+  Settings settings_;
   DynamicsKernel kernel_;
-  DynamicsKernel bare_;        ///< without payload
-  bool loaded_;                ///< there is a payload
-  JointVector lower_, upper_;  ///< of the positions, rad
-  double wanted_;
-  double integral_time_;  ///< s; 0: none
-  bool gravity_;
+  DynamicsKernel bare_;  ///< without payload
+  bool loaded_;          ///< there is a payload
   analysis::SampledLoop loop_;
   PostureLoop posture_loop_;
 };

@@ -1,14 +1,10 @@
 #pragma once
 #include <dashpot/analysis/system.hpp>
-#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/tick_status.hpp>
 
-#include <memory>
-
 namespace dashpot::controller {
-
-class DesignedDamping;
 
 /// The closed loop that gains make at any posture, with the robot at rest there, without a loop
 /// that runs: the matrices that Controller::closed_loop gives once the gains are in force.
@@ -17,8 +13,6 @@ class PostureLoop {
   /// Copies the model. The settings have to be valid. Limits, but the gain margin, and `analysis`,
   /// but the sampled loop's delays, are not looked at.
   PostureLoop(const RobotModel& model, const Settings& settings);
-  ~PostureLoop();
-  PostureLoop(PostureLoop&&) noexcept;
 
   /// Attaches something else to the tip link.
   void attach(const Attachment& attachment) noexcept { kernel_.attach(attachment); }
@@ -31,17 +25,12 @@ class PostureLoop {
   Status closed_loop(const JointVector& q, const Gains& gains, Mode mode,
                      analysis::System<kMaxJoints>& system,
                      const Vector6& external_wrench = Vector6::Zero());
-  /// Does the same for a robot that is somewhere.
-  void closed_loop(const DynamicsResult& robot, const Gains& gains, Mode mode,
-                   analysis::System<kMaxJoints>& system,
-                   const Vector6& external_wrench = Vector6::Zero());
 
  private:
   DynamicsKernel kernel_;
-  TaskTerms terms_;
-  Environment environment_;
+  Settings settings_;
   JointVector friction_left_;
-  std::unique_ptr<DesignedDamping> damping_;
+  DesignedDamping damping_;
 };
 
 }  // namespace dashpot::controller

@@ -85,85 +85,109 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
                               JointVector& torque) noexcept {
   ++snapshot_.tick;
   snapshot_.time = state.time;
+
+  // Check the state.
   const Status input = state_check_.check(state);
-  if (input >= Status::kStateNotFinite) return ramp(input, state, torque);
-  sense(state);
-
-  const bool wrench_known = state.external_wrench.allFinite();
-  Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
-  if (setpoint != nullptr) status = worse(status, take(*setpoint));
-  status = worse(status, course_.age_status());
-  // A stamp or two that say nothing change no torque.
-  const bool odd_stamp =
-      input == Status::kTimeBackward && state_check_.backward() <= settings_.watchdog.longest_gap;
-  Status seen = odd_stamp ? Status::kOk : input;
-  // A reflex that has lost its sensor protects nobody.
-  const bool blind = !wrench_known && std::isfinite(settings_.limits.external_force);
-  if (blind) seen = worse(seen, Status::kCollision);
-  status = worse(status, watch(seen));
-
-  const bool hold = status == Status::kSetpointStale;
-  if (status < Status::kSetpointLost) {
-    status = worse(status, pull(hold));
-    torque = asked_.torque;
-  } else {
-    brake();
-    torque = sensed_.weight;
+  const double age = state_check_.age(), longest_gap = settings_.watchdog.longest_gap;
+  if (input >= Status::kStateNotFinite) {
+    if (state.position.size() == n_ && state.position.allFinite()) {
+      snapshot_.position = state.position;  // all else stays that of the last good state
+    }
+    if (state.velocity.size() == n_ && state.velocity.allFinite()) {
+      snapshot_.velocity = state.velocity;
+    }
+    filter_.ramp(torque);
+    faults_.applied(input, sensed_, sensed_.any ? age : 0, torque);
+    return finish(input, torque);
   }
-  const SmallCholesky* factor = nullptr;  // of M, where somebody has it
-  if (in_force() && course_.gains().now().task_weight > 0) factor = &designed_.null_space().mass();
-  const Status limits =
-      filter_.apply({sensed_.q, sensed_.qd, sensed_.robot, sensed_.weight, factor},
-                    faults_.tip_speed(), aim_, asked_.dampers, torque);
-  if (in_force() && integral_.on()) integrate(limits, hold);
-  status = worse(status, limits);
-  faults_.applied(status, sensed_, torque);
-  show();
-  return finish(odd_stamp ? worse(status, input) : status, torque);
-}
-
-void ControllerCore::sense(const RobotState& state) noexcept {
-  const double age = state_check_.age();
   sensed_.dt = sensed_.any ? std::max(settings_.period, age) : settings_.period;
   if (sensed_.any) course_.age(sensed_.dt);
   sensed_.any = true;
   sensed_.time = state.time;
   sensed_.q = state_check_.position();
   sensed_.qd = state_check_.velocity();
-  if (state.external_wrench.allFinite()) sensed_.external_wrench = state.external_wrench;
-  step_attachment();
+  const bool wrench_known = state.external_wrench.allFinite();
+  if (wrench_known) sensed_.external_wrench = state.external_wrench;
+
+  // Evaluate the robot there, with what it carries now.
+  if (!course_.attachment().still()) {
+    const Pose before = course_.attachment().now().tool;
+    course_.step_attachment();
+    kernel_.attach(course_.attachment().now());
+    guide_.carry(before, course_.attachment().now().tool);
+  }
   kernel_.evaluate(sensed_.q, sensed_.qd, sensed_.robot);
   if (settings_.feed_forward.gravity) sensed_.weight = sensed_.robot.gravity;
   filter_.assume(sensed_.weight);
-}
 
-void ControllerCore::step_attachment() noexcept {
-  if (course_.attachment().still()) return;
-  const Pose before = course_.attachment().now().tool;
-  course_.step_attachment();
-  kernel_.attach(course_.attachment().now());
-  guide_.carry(before, course_.attachment().now().tool);
-}
-
-Status ControllerCore::take(const Setpoint& setpoint) noexcept {
-  const Course::News news = course_.take(setpoint, sensed_.time);
-  if (in_force() && news == Course::News::kGains) {
-    guide_.start_new_springs(course_.gains(), sensed_);
+  // Take over the set-point.
+  Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
+  if (setpoint != nullptr) {
+    using News = Course::News;
+    const News news = course_.take(*setpoint, sensed_.time);
+    if (news == News::kRefused) status = Status::kSetpointRejected;
+    if (in_force() && news == News::kGains) guide_.start_new_springs(course_.gains(), sensed_);
+    if (in_force() && news >= News::kGoal) guide_.set_goal(course_, sensed_);
   }
-  if (in_force() && news >= Course::News::kGoal) guide_.set_goal(course_, sensed_);
-  return news == Course::News::kRefused ? Status::kSetpointRejected : Status::kOk;
-}
+  status = worse(status, course_.age_status());
 
-Status ControllerCore::watch(Status seen) noexcept {
+  // Watch the motion.
+  const bool odd_stamp = input == Status::kTimeBackward && state_check_.backward() <= longest_gap;
+  Status seen = odd_stamp ? Status::kOk : input;  // a stamp or two that say nothing
+  // A reflex that has lost its sensor protects nobody.
+  const bool blind = !wrench_known && std::isfinite(settings_.limits.external_force);
+  if (blind) seen = worse(seen, Status::kCollision);
   const bool braked = aim_ != Aim::kSprings && !filter_.fades();
   const bool still = guide_.still(course_.gains().now());
   const bool latched = faults_.fault() != Status::kOk;
-  const Status status = faults_.watch(seen, sensed_, still, braked);
+  status = worse(status, faults_.watch(seen, sensed_, still, braked));
   if (latched && faults_.fault() == Status::kOk) forget_springs();
-  return status;
+
+  // Ask the law, or leave it to the brake.
+  const bool hold = status == Status::kSetpointStale;
+  const SmallCholesky* factor = nullptr;  // of M, where somebody has it
+  if (status < Status::kSetpointLost) {
+    if (aim_ != Aim::kSprings) restart_springs();
+    course_.step(hold);
+    const Impedance &given = course_.gains().now(),
+                    &impedance = designed_.update(course_.gains(), sensed_.robot);
+    const NullSpace& null_space = designed_.null_space();
+    guide_.step(course_, hold, sensed_, null_space);
+    law_.torque({sensed_.robot, sensed_.q, sensed_.qd, impedance, null_space, guide_.references(),
+                 guide_.clamp(), course_.wrench(), integral_.on() ? &integral_ : nullptr},
+                asked_);
+    torque = asked_.torque;
+    level_ = designed_.level(given);
+    // While gains change, dampers that fade keep the margin as well.
+    if (!level_.kept && course_.gains().still()) status = worse(status, Status::kLittleMargin);
+    if (given.task_weight > 0) factor = &null_space.mass();
+  } else {
+    brake();
+    torque = sensed_.weight;
+  }
+
+  // Limit the torque.
+  const Status limits =
+      filter_.apply({sensed_.q, sensed_.qd, sensed_.robot, sensed_.weight, factor},
+                    faults_.tip_speed(), aim_, asked_.dampers, torque);
+  if (in_force() && integral_.on()) {
+    const bool may_grow = limits == Status::kOk && !asked_.clamped;
+    if (course_.changes() != integrated_) {
+      integral_.fade(course_.steps_left());
+    } else if (!hold) {
+      integral_.step(asked_.joint_pull, asked_.tip_pull, may_grow);
+    }
+    integrated_ = course_.changes();
+  }
+  status = worse(status, limits);
+  faults_.applied(status, sensed_, 0, torque);
+
+  show();
+  return finish(odd_stamp ? worse(status, input) : status, torque);
 }
 
 void ControllerCore::restart_springs() noexcept {
+  aim_ = Aim::kSprings;
   course_.restart(sensed_);
   guide_.set_goal(course_, sensed_);
   integral_.reset();
@@ -172,56 +196,16 @@ void ControllerCore::restart_springs() noexcept {
   if (snapshot_.restarts++ > 0) faults_.count_restart();
 }
 
-Status ControllerCore::pull(bool hold) noexcept {
-  if (aim_ != Aim::kSprings) restart_springs();
-  aim_ = Aim::kSprings;
-  course_.step(hold);
-  const Impedance& impedance = designed_.update(course_.gains(), sensed_.robot);
-  guide_.step(course_, hold, sensed_, designed_.null_space());
-  law_.torque(
-      {sensed_.robot, sensed_.q, sensed_.qd, impedance, designed_.null_space(), guide_.references(),
-       guide_.clamp(), course_.wrench(), integral_.on() ? &integral_ : nullptr},
-      asked_);
-  // While gains change, dampers that fade keep the margin as well.
-  const bool kept = designed_.level(course_.gains().now()).kept || !course_.gains().still();
-  return kept ? Status::kOk : Status::kLittleMargin;
-}
-
 void ControllerCore::brake() noexcept {
+  const bool begins = aim_ == Aim::kSprings || faults_.ramps();
+  if (begins) filter_.begin_anew();
+  aim_ = faults_.brake(begins);
   integral_.reset();
-  if (aim_ == Aim::kSprings || faults_.ramps()) {
-    filter_.begin_anew();
-    faults_.begin_brake();
-  }
-  aim_ = faults_.aim();
+  level_ = {};
+  asked_.tip_error.setZero();
+  asked_.tip_wrench.setZero();
   brake_.joint_damping = sensed_.robot.M / filter_.brake().stopping_time();
   if (aim_ == Aim::kFloat) brake_.joint_damping.setZero();
-}
-
-void ControllerCore::integrate(Status limits, bool hold) noexcept {
-  using Change = SpringIntegral::Change;
-  if (course_.changes() != integrated_) {
-    integrated_ = course_.changes();
-    integral_.fade(course_.steps_left());
-    return;
-  }
-  const bool free = limits == Status::kOk && !asked_.clamped;
-  integral_.step(asked_.joint_pull, asked_.tip_pull,
-                 hold ? Change::kNone : (free ? Change::kFree : Change::kShrink));
-}
-
-Status ControllerCore::ramp(Status status, const RobotState& state, JointVector& torque) noexcept {
-  // What was measured, as far as it is numbers; all else stays that of the last good state.
-  if (state.position.size() == n_ && state.position.allFinite()) {
-    snapshot_.position = state.position;
-  }
-  if (state.velocity.size() == n_ && state.velocity.allFinite()) {
-    snapshot_.velocity = state.velocity;
-  }
-  faults_.lose_state(status, sensed_.any && state_check_.age() > settings_.watchdog.longest_gap);
-  filter_.ramp(torque);
-  faults_.applied(status, sensed_, torque);
-  return finish(status, torque);
 }
 
 LoopAnalysis::Loop ControllerCore::loop() const noexcept {
@@ -239,8 +223,7 @@ LoopAnalysis::Loop ControllerCore::loop() const noexcept {
 }
 
 void ControllerCore::show() noexcept {
-  const bool springs = aim_ == Aim::kSprings;
-  const Impedance& impedance = springs ? course_.gains().now() : brake_;  // which has no ratios
+  const Impedance& impedance = aim_ == Aim::kSprings ? course_.gains().now() : brake_;
   const SpringReferences& references = guide_.references();
   Snapshot& shown = snapshot_;
   shown.mode = course_.setpoint().mode;
@@ -250,30 +233,26 @@ void ControllerCore::show() noexcept {
   shown.velocity = sensed_.qd;
   shown.law_torque = filter_.asked();
   shown.tip = {sensed_.robot.p_BT_B, sensed_.robot.R_BT};
-  if (shown.joint_weight > 0 || shown.task_weight > 0) {
-    const JointReference& path = shown.mode == Mode::kJoint ? references.joint : references.posture;
-    shown.reference_position = path.position();
-    shown.reference_velocity = path.velocity();
-  } else {
-    shown.reference_position = sensed_.q;
-    shown.reference_velocity.setZero();
-  }
-  shown.joint_error = difference(shown.reference_position, sensed_.q);
-  if (shown.task_weight > 0) {
+  const JointReference& path = shown.mode == Mode::kJoint ? references.joint : references.posture;
+  const bool springs = impedance.joint_weight > 0 || impedance.task_weight > 0;
+  shown.reference_position = springs ? path.position() : sensed_.q;
+  shown.reference_velocity = path.velocity();
+  if (!springs) shown.reference_velocity.setZero();
+  for (int i = 0; i < n_; ++i) shown.joint_error[i] = shown.reference_position[i] - sensed_.q[i];
+  if (impedance.task_weight > 0) {
     shown.reference_tip = {references.tip.position(), references.tip.rotation().toRotationMatrix()};
     shown.reference_twist = references.tip.velocity();
-    shown.tip_error = asked_.tip_error;
   } else {
     shown.reference_tip = shown.tip;
     shown.reference_twist.setZero();
-    shown.tip_error.setZero();
   }
+  shown.tip_error = asked_.tip_error;
+  shown.tip_wrench = asked_.tip_wrench;
   shown.joint_damping_ratio = impedance.joint_damping_ratio;
   shown.task_damping_ratio = impedance.damping_ratio;
-  shown.damping_level = springs ? designed_.level(impedance).level : 1;
+  shown.damping_level = level_.level;
   shown.payload = course_.attachment().now().payload();
   shown.tool = course_.attachment().now().tool;
-  shown.tip_wrench = springs ? asked_.tip_wrench : Vector6(Vector6::Zero());
   if (!integral_.on()) return;
   shown.integral_torque = integral_.torque();
   shown.integral_wrench = integral_.wrench();
@@ -284,7 +263,8 @@ Status ControllerCore::finish(Status status, const JointVector& torque) noexcept
   snapshot_.status = status;
   snapshot_.fault = faults_.fault();
   analysis_.collect();
-  if (status < Status::kStateNotFinite) analysis_.update(loop());
+  const bool good = status < Status::kStateNotFinite;
+  if (good && analysis_.due(snapshot_.tick)) analysis_.update(loop());
   return status;
 }
 

@@ -37,25 +37,12 @@ class ControllerCore {
  private:
   using Aim = SafetyFilter::Aim;
 
-  /// Takes in a good state and the robot there.
-  void sense(const RobotState& state) noexcept;
-  /// Moves what is attached on by one period, and the tip's reference with the tool.
-  void step_attachment() noexcept;
-  /// Takes over a set-point. Returns kOk, or what is wrong with it.
-  Status take(const Setpoint& setpoint) noexcept;
-  Status watch(Status seen) noexcept;
   /// Starts the springs where the robot is, with gains that grow from zero.
   void restart_springs() noexcept;
-  /// Sets the torque that the law asks for. Returns kOk or kLittleMargin.
-  Status pull(bool hold) noexcept;
   /// No springs act from now on.
   void brake() noexcept;
-  /// Lets the integral follow the last torque, whose limits reported `limits`.
-  void integrate(Status limits, bool hold) noexcept;
   /// Springs restart when they are next in force.
   void forget_springs() noexcept;
-  /// The safe output without a state.
-  Status ramp(Status status, const RobotState& state, JointVector& torque) noexcept;
   /// Shows the tick.
   void show() noexcept;
   Status finish(Status status, const JointVector& torque) noexcept;
@@ -85,6 +72,7 @@ class ControllerCore {
   Sensed sensed_;
   Aim aim_ = Aim::kStop;
   LawTorque asked_;
+  analysis::DampingLevel level_;  ///< of the ratios
   Impedance brake_;               ///< damping of the brake that acts where no springs do
   std::uint64_t integrated_ = 0;  ///< changes of the course that the integral knows of
   Snapshot snapshot_;

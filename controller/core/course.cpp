@@ -2,53 +2,37 @@
 #include <dashpot/controller/safety/state_check.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
-#include <cmath>
-
 namespace dashpot::controller {
-namespace {
 
-int gain_ticks(const Settings& settings) {
+static int gain_ticks(const Settings& settings) {
   return static_cast<int>(std::lround(settings.motion.gain_time / settings.period));
 }
 
-/// Whole ns, which add up without rounding errors.
-double nanoseconds(double seconds) noexcept {
-  return std::round(1e9 * seconds);
-}
-
-}  // namespace
-
 Course::Course(const RobotModel& model, const Settings& settings)
     : n_(model.dof()),
-      limits_(settings.limits),
-      watchdog_(settings.watchdog),
-      initial_(settings.initial),
+      settings_(settings),
       gains_(gain_ticks(settings), Impedance(n_)),
       attachment_(gain_ticks(settings), model.attachment()),
       wrench_(gain_ticks(settings), Vector6::Zero()) {}
 
 void Course::reset() noexcept {
   release();
-  accepted_ = initial_;
+  accepted_ = settings_.initial;
   look_.reset();
   age_ = 0;
   attachment_.start(attachment_.target());
 }
 
 void Course::release() noexcept {
-  accepted_.wrench = initial_.wrench;
-  accepted_.joint_position = initial_.joint_position;
+  accepted_.wrench = settings_.initial.wrench;
   from_user_ = false;
-}
-
-void Course::age(double dt) noexcept {
-  age_ += nanoseconds(dt);
 }
 
 Status Course::age_status() const noexcept {
   const double age = 1e-9 * age_;
-  if (watchdog_.setpoint_damp > 0 && age > watchdog_.setpoint_damp) return Status::kSetpointLost;
-  if (watchdog_.setpoint_hold > 0 && age > watchdog_.setpoint_hold) return Status::kSetpointStale;
+  const Watchdog& limit = settings_.watchdog;
+  if (limit.setpoint_damp > 0 && age > limit.setpoint_damp) return Status::kSetpointLost;
+  if (limit.setpoint_hold > 0 && age > limit.setpoint_hold) return Status::kSetpointStale;
   return Status::kOk;
 }
 
@@ -56,10 +40,10 @@ Course::News Course::take(const Setpoint& setpoint, std::int64_t now) noexcept {
   if (look_ && look_->time == setpoint.time) return look_->in_order ? News::kNone : News::kRefused;
   const bool same =
       setpoint.mode == accepted_.mode && same_gains(setpoint.gains, accepted_.gains, setpoint.mode);
-  const double hold = watchdog_.setpoint_hold;
-  const double patience = hold > 0 ? hold : watchdog_.setpoint_damp;
+  const double hold = settings_.watchdog.setpoint_hold;
+  const double patience = hold > 0 ? hold : settings_.watchdog.setpoint_damp;
   const bool to_come = patience > 0 && seconds_between(now, setpoint.time) > patience;
-  look_ = {setpoint.time, !to_come && !check_setpoint(setpoint, limits_, same)};
+  look_ = {setpoint.time, !to_come && !check_setpoint(setpoint, settings_.limits, same)};
   if (!look_->in_order) return News::kRefused;
   age_ = nanoseconds(seconds_between(setpoint.time, now));
   accepted_.joint_position = setpoint.joint_position;

@@ -4,6 +4,7 @@
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/tick_status.hpp>
 
+#include <cmath>
 #include <optional>
 
 namespace dashpot::controller {
@@ -19,7 +20,7 @@ class Course {
   void release() noexcept;
 
   /// The set-point gets older, whatever the clock does after it was accepted.
-  void age(double dt) noexcept;
+  void age(double dt) noexcept { age_ += nanoseconds(dt); }
   /// Whether it is fresh: kOk, kSetpointStale or kSetpointLost.
   Status age_status() const noexcept;
 
@@ -45,6 +46,7 @@ class Course {
   const Setpoint& setpoint() const noexcept { return accepted_; }
   /// Returns where the set-point wants T, as far as T is on its way to its new place.
   Pose tip_goal() const noexcept {
+    if (attachment_.still()) return accepted_.tip_pose;
     return carried(accepted_.tip_pose, attachment_.target().tool, attachment_.now().tool);
   }
   const GainBlend& gains() const noexcept { return gains_; }
@@ -61,11 +63,11 @@ class Course {
     std::int64_t time;
     bool in_order;
   };
+  /// Whole ns, which add up without rounding errors.
+  static double nanoseconds(double seconds) noexcept { return std::round(1e9 * seconds); }
 
   const int n_;
-  const Limits limits_;
-  const Watchdog watchdog_;
-  const Setpoint initial_;
+  const Settings settings_;
   Setpoint accepted_;
   bool from_user_ = false;    ///< or else it is Settings::initial, where the robot started
   std::optional<Look> look_;  ///< at the last set-point; none yet

@@ -6,13 +6,6 @@
 
 namespace dashpot::controller {
 
-Faults::Faults(const RobotModel& model, const Settings& settings) noexcept
-    : motion_watch_(model, settings),
-      doubt_(settings.limits),
-      velocity_(settings.limits.velocity),
-      watchdog_(settings.watchdog),
-      period_(settings.period) {}
-
 void Faults::reset() noexcept {
   motion_watch_.reset();
   release();
@@ -40,18 +33,18 @@ Status Faults::watch(Status seen, const Sensed& now, bool still, bool braked) no
   return fault_ == Status::kOk ? Status::kOk : worse(found, Status::kFaultLatched);
 }
 
-void Faults::lose_state(Status seen, bool for_long) noexcept {
-  rest_ = 0;
-  if (for_long) latch(seen);
-}
-
-void Faults::applied(Status status, const Sensed& now, const JointVector& torque) noexcept {
-  ramp_ticks_ = status < Status::kStateNotFinite ? 0 : ramp_ticks_ + 1;
-  if (ramp_ticks_ * period_ > watchdog_.longest_gap) latch(status);
+void Faults::applied(Status status, const Sensed& now, double lost,
+                     const JointVector& torque) noexcept {
+  const bool ramps = status >= Status::kStateNotFinite;
+  ramp_ticks_ = ramps ? ramp_ticks_ + 1 : 0;
+  if (ramps) rest_ = 0;
+  if (std::max(lost, ramp_ticks_ * settings_.period) > settings_.watchdog.longest_gap)
+    latch(status);
   if (now.any) motion_watch_.applied(torque, now.weight);
 }
 
-Faults::Aim Faults::aim() const noexcept {
+Faults::Aim Faults::brake(bool begins) noexcept {
+  if (begins) doubt_.reset();
   const bool means_nothing = motion_watch_.sees_frozen();  // the velocity
   if (means_nothing || fault_ == Status::kBrakeDoubted) return Aim::kFloat;
   return fault_ == Status::kPositionLimit ? Aim::kReturn : Aim::kStop;
@@ -64,11 +57,11 @@ void Faults::latch(Status fault) noexcept {
 }
 
 bool Faults::rested(const Sensed& now) noexcept {
-  const double wanted = watchdog_.release_after;
+  const double wanted = settings_.watchdog.release_after;
   if (wanted == 0) return false;
-  rest_ = now.dt > watchdog_.longest_gap ? 0 : rest_ + now.dt;
+  rest_ = now.dt > settings_.watchdog.longest_gap ? 0 : rest_ + now.dt;
   for (Eigen::Index i = 0; i < now.qd.size(); ++i) {
-    if (std::abs(now.qd[i]) > kAtRest * velocity_[i]) rest_ = 0;
+    if (std::abs(now.qd[i]) > kAtRest * settings_.limits.velocity[i]) rest_ = 0;
   }
   return rest_ >= wanted;
 }

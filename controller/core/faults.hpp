@@ -12,7 +12,8 @@ class Faults {
  public:
   using Aim = SafetyFilter::Aim;
 
-  Faults(const RobotModel& model, const Settings& settings) noexcept;
+  Faults(const RobotModel& model, const Settings& settings)
+      : motion_watch_(model, settings), doubt_(settings.limits), settings_(settings) {}
   void reset() noexcept;
   void release() noexcept;
 
@@ -20,19 +21,16 @@ class Faults {
   /// `braked`: the brake alone acts. Returns kOk if the state allows springs, or kFaultLatched or
   /// worse.
   Status watch(Status seen, const Sensed& now, bool still, bool braked) noexcept;
-  /// A tick without a good state, whose output is a ramp.
-  void lose_state(Status seen, bool for_long) noexcept;
-  /// The torque of a tick, and its status: a ramp latches if it lasts.
-  void applied(Status status, const Sensed& now, const JointVector& torque) noexcept;
+  /// The torque of a tick, and its status. A ramp latches if it lasts, or where there has been no
+  /// good state for a time `lost` that is too long, s.
+  void applied(Status status, const Sensed& now, double lost, const JointVector& torque) noexcept;
   /// Springs restart, not for the first time.
   void count_restart() noexcept { ++restarts_; }
-  /// The brake begins.
-  void begin_brake() noexcept { doubt_.reset(); }
 
   /// Returns the fault that latched, or kOk.
   Status fault() const noexcept { return fault_; }
-  /// Returns what the arm is to do without springs.
-  Aim aim() const noexcept;
+  /// Returns what the arm is to do without springs; `begins`: from now on.
+  Aim brake(bool begins) noexcept;
   /// True after a tick whose output was a ramp.
   bool ramps() const noexcept { return ramp_ticks_ > 0; }
   double tip_speed() const noexcept { return motion_watch_.tip_speed(); }
@@ -47,9 +45,7 @@ class Faults {
 
   MotionWatch motion_watch_;
   BrakeDoubt doubt_;
-  const JointVector velocity_;  ///< limits, n, rad/s
-  const Watchdog watchdog_;
-  const double period_;
+  const Settings settings_;
   Status fault_ = Status::kOk;
   double rest_ = 0;      ///< for how long the robot has been at rest, s
   double restarts_ = 0;  ///< of the last second or so

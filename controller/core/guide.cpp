@@ -10,10 +10,9 @@ namespace dashpot::controller {
 using Eigen::Quaterniond;
 
 Guide::Guide(const RobotModel& model, const Settings& settings)
-    : references_(settings.motion, settings.period),
+    : settings_(settings),
+      references_(settings.motion, settings.period),
       clamp_{settings.limits.linear_error, settings.limits.angular_error},
-      fastest_{settings.motion.linear_velocity, settings.motion.angular_velocity},
-      velocity_(settings.limits.velocity),
       turn_(JointVector::Zero(model.dof())),
       goal_(turn_) {
   for (Eigen::Index i = 0; i < turn_.size(); ++i) {
@@ -24,8 +23,8 @@ Guide::Guide(const RobotModel& model, const Settings& settings)
 
 void Guide::limit_tip_speed(const TipSpeed& speed) noexcept {
   tip_speed_ = speed;
-  references_.tip.limit_speed(std::min(fastest_.linear_velocity, speed.linear),
-                              std::min(fastest_.angular_velocity, speed.angular));
+  references_.tip.limit_speed(std::min(settings_.motion.linear_velocity, speed.linear),
+                              std::min(settings_.motion.angular_velocity, speed.angular));
 }
 
 void Guide::carry(const Pose& from, const Pose& to) noexcept {
@@ -111,7 +110,7 @@ double Guide::tip_share(const NullSpace& null_space) const noexcept {
   const JointVector qd = null_space.joint_velocity(references_.tip.point_velocity());
   double share = 0;
   for (Eigen::Index i = 0; i < qd.size(); ++i) {
-    share = std::max(share, std::abs(qd[i]) / velocity_[i]);
+    share = std::max(share, std::abs(qd[i]) / settings_.limits.velocity[i]);
   }
   return share > kShareOfJointLimit * speed ? kShareOfJointLimit * speed / share : 1;
 }

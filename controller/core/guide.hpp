@@ -36,13 +36,12 @@ class Guide {
   /// than limit_tip_speed allows.
   double joint_share(const Jacobian& J) const noexcept;
 
+  const Settings settings_;
   SpringReferences references_;
   ErrorClamp clamp_;
-  TwistNorm fastest_;     ///< of Settings::motion
-  TipSpeed tip_speed_;    ///< of the references
-  JointVector velocity_;  ///< limits, n, rad/s
-  JointVector turn_;      ///< 2 pi for a continuous joint, else 0
-  JointVector goal_;      ///< of the joints, or of the posture
+  TipSpeed tip_speed_;  ///< of the references
+  JointVector turn_;    ///< 2 pi for a continuous joint, else 0
+  JointVector goal_;    ///< of the joints, or of the posture
 };
 
 }  // namespace dashpot::controller

@@ -4,10 +4,8 @@ namespace dashpot::controller {
 
 LoopAnalysis::LoopAnalysis(const RobotModel& model, const Settings& settings)
     : n_(model.dof()),
-      terms_(settings.task_terms),
-      environment_(settings.environment),
-      outside_(!environment_.none()),
-      integral_time_(settings.integral.time),
+      settings_(settings),
+      outside_(!settings.environment.none()),
       vibration_(settings) {
   if (settings.analysis.sampled.interval > 0) {
     sampled_ = std::make_unique<SampledAnalysis>(model, settings);
@@ -29,7 +27,8 @@ void LoopAnalysis::update(const Loop& loop) noexcept {
 
 void LoopAnalysis::find_modes(const Loop& loop) noexcept {
   const Sensed& now = loop.now;
-  const bool load = terms_.load != Load::kIgnored, rate = terms_.jacobian_rate;
+  const bool load = settings_.task_terms.load != Load::kIgnored;
+  const bool rate = settings_.task_terms.jacobian_rate;
   const bool with_wrench = load && !now.external_wrench.isZero(0);
   const bool with_velocity = rate && !now.qd.isZero(0);
   if (unchanged(loop, with_wrench, with_velocity)) {
@@ -47,7 +46,7 @@ void LoopAnalysis::find_modes(const Loop& loop) noexcept {
     closed_loop(loop, task.system);
   } else {
     std::optional<Impedance> both;
-    if (outside_) add_environment(environment_, both.emplace(loop.acting.impedance));
+    if (outside_) add_environment(settings_.environment, both.emplace(loop.acting.impedance));
     loop_.form(now.robot, outside_ ? *both : loop.acting.impedance, loop.acting.null_space,
                loop.acting.friction, task.system);
     task.springs = task.system.stiffness_factor.rows() > 0;
@@ -80,21 +79,15 @@ void LoopAnalysis::hand_over(const Loop& loop) noexcept {
   task.position = now.q;
   task.attachment = loop.attachment;
   closed_loop(loop, task.system);
-  JointMatrix load = JointMatrix::Zero(n_, n_);
-  if (terms_.load != Load::kIgnored) {
-    load = stiffness_of_load(J, terms_.load, now.external_wrench);
-  }
-  task.passive = passive_part(J, environment_, load);
+  const Load load = settings_.task_terms.load;
+  JointMatrix of_load = JointMatrix::Zero(n_, n_);
+  if (load != Load::kIgnored) of_load = stiffness_of_load(J, load, now.external_wrench);
+  task.passive = passive_part(J, settings_.environment, of_load);
   task.integral.resize(0, 0);
-  if (integral_time_ > 0) {
-    task.integral = integral_stiffness(now.robot, loop.acting.impedance, integral_time_);
+  if (settings_.integral.time > 0) {
+    task.integral = integral_stiffness(now.robot, loop.acting.impedance, settings_.integral.time);
   }
   sampled_->hand_over();
-}
-
-void LoopAnalysis::closed_loop(const Loop& loop,
-                               analysis::System<kMaxJoints>& system) const noexcept {
-  controller::closed_loop(loop.now.robot, loop.now.qd, loop.acting, terms_, environment_, system);
 }
 
 }  // namespace dashpot::controller

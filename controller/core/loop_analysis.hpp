@@ -25,12 +25,17 @@ class LoopAnalysis {
     std::uint64_t changes;  ///< of gains and attachment so far
     const Attachment& attachment;
   };
-  /// Analyses a loop if it is time to.
+  /// Returns true if it is time to analyse the loop of this tick.
+  bool due(std::uint64_t tick) const noexcept {
+    return vibration_.due(tick) || (sampled_ && sampled_->due(tick));
+  }
   void update(const Loop& loop) noexcept;
   /// Fetches what another thread found.
   void collect() noexcept { vibration_.collect(); }
   /// Sets `system` to a loop, with the terms and the environment of the settings.
-  void closed_loop(const Loop& loop, analysis::System<kMaxJoints>& system) const noexcept;
+  void closed_loop(const Loop& loop, analysis::System<kMaxJoints>& system) const noexcept {
+    controller::closed_loop(loop.now.robot, loop.now.qd, loop.acting, settings_, system);
+  }
 
   const Vibration& result() const noexcept { return vibration_.result(); }
   /// Returns the analysis of the sampled loop; null unless Analysis::Sampled asks for it.
@@ -43,10 +48,7 @@ class LoopAnalysis {
     std::uint64_t changes;
     JointVector q, qd;
     Vector6 wrench;
-    bool operator==(const Analysed& other) const noexcept {
-      return springs == other.springs && changes == other.changes && q == other.q &&
-             qd == other.qd && wrench == other.wrench;
-    }
+    bool operator==(const Analysed&) const = default;
   };
 
   void find_modes(const Loop& loop) noexcept;
@@ -55,10 +57,8 @@ class LoopAnalysis {
   void hand_over(const Loop& loop) noexcept;
 
   const int n_;
-  const TaskTerms terms_;
-  const Environment environment_;
+  const Settings settings_;
   const bool outside_;  ///< whether there is an environment
-  const double integral_time_;
   VibrationAnalysis vibration_;
   LoopSystem loop_;
   std::unique_ptr<SampledAnalysis> sampled_;

@@ -1,15 +1,6 @@
 #include <dashpot/controller/law/designed_damping.hpp>
 
 namespace dashpot::controller {
-namespace {
-
-/// Returns true if all springs are in the tool's axes. C_C is then designed in these axes, because
-/// there K_C does not change as the tool turns.
-bool in_tool(const Impedance& given) noexcept {
-  return given.base.none();
-}
-
-}  // namespace
 
 void RatioDamper::set(const JointMatrix& K, double ratio, const JointVector& friction) noexcept {
   analysis::DampingTarget target = analysis::DampingTarget::constant(ratio);
@@ -84,9 +75,11 @@ JointVector DesignedDamping::friction(double share) const noexcept {
 }
 
 void DesignedDamping::set_tip(const Impedance& given, const DynamicsResult& robot) noexcept {
-  // Springs in both frames are in force only while gains change, so that K_C is new at every tick.
+  // If all springs are in the tool's axes, C_C is designed there, because K_C does not change in
+  // them as the tool turns. Springs in both frames are in force only while gains change, so that
+  // K_C is new at every tick.
   const Matrix6 &K_B = given.base.stiffness, &K_T = given.tool.stiffness;
-  const Matrix6 K_C = in_tool(given)       ? K_T
+  const Matrix6 K_C = given.base.none()    ? K_T
                       : !given.tool.none() ? Matrix6(K_B + turned(K_T, robot.R_BT))
                                            : K_B;
   tip_damper_.set_loop(borne_, given.task_share());
@@ -94,7 +87,7 @@ void DesignedDamping::set_tip(const Impedance& given, const DynamicsResult& robo
 }
 
 void DesignedDamping::design_tip(const Impedance& given, const DynamicsResult& robot) noexcept {
-  if (!in_tool(given)) {
+  if (!given.base.none()) {
     tip_damper_.update(robot.M, &robot.J);
     in_force_.base.damping = given.base.damping + tip_damper_.damping();
     return;

@@ -22,15 +22,15 @@ Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R, const Vector6
 
 ImpedanceLaw::ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward)
     : feed_forward_(feed_forward),
-      friction_of_reference_(feed_forward.friction &&
-                             feed_forward.friction_at == FeedForward::FrictionAt::kReference),
-      friction_of_robot_(feed_forward.friction && !friction_of_reference_),
-      friction_rise_(friction_of_robot_ ? feed_forward.friction_rise : kReferenceFrictionRise),
+      measured_(feed_forward.friction_at == FeedForward::FrictionAt::kMeasured),
       viscous_friction_(model.joint_values(&Joint::viscous_friction)),
       coulomb_friction_(model.joint_values(&Joint::coulomb_friction)) {
-  if (!friction_of_robot_) return;
-  viscous_friction_ *= feed_forward.friction_share;
-  coulomb_friction_ *= feed_forward.friction_share;
+  if (measured_) {
+    viscous_friction_ *= feed_forward.friction_share;
+    coulomb_friction_ *= feed_forward.friction_share;
+  } else {
+    feed_forward_.friction_rise = kReferenceFrictionRise;
+  }
 }
 
 void ImpedanceLaw::torque(const Input& now, LawTorque& result) noexcept {
@@ -45,26 +45,26 @@ void ImpedanceLaw::torque(const Input& now, LawTorque& result) noexcept {
     add_product(impedance.joint_damping, difference(path.velocity(), qd), result.dampers);
     add(path.velocity(), reference_velocity, impedance.joint_weight);
   }
-  result.joint_pull = tau;
+  if (integral != nullptr) result.joint_pull = tau;
   if (impedance.joint_weight > 0 && feed_forward_.acceleration) {
     add_product(robot.M, references.joint.acceleration(), tau, impedance.joint_weight);
   }
   const bool task = impedance.task_weight > 0;
   Vector6& F = result.tip_wrench;
   Vector6 tip_damping;
-  result.tip_error.setZero();
   result.tip_pull.setZero();
   result.clamped = false;
-  F.setZero();
   if (task) {
     tip_damping = pull_tip(now, result);
     if (impedance.null_space()) add_null_torque(now, result);
-    if (friction_of_reference_) {
+    if (feed_forward_.friction && !measured_) {
       add(null_space.joint_velocity(references.tip.velocity()), reference_velocity,
           impedance.task_weight);
     }
   } else {
     orientation_.reset();
+    result.tip_error.setZero();
+    F.setZero();
   }
   if (feed_forward_.wrench) F += wrench;
   if (integral != nullptr) {
@@ -74,7 +74,7 @@ void ImpedanceLaw::torque(const Input& now, LawTorque& result) noexcept {
   add_torque(robot.J, F, tau);
   add(result.dampers, tau);
   if (task) add_torque(robot.J, tip_damping, result.dampers);
-  if (feed_forward_.friction) add_friction(friction_of_robot_ ? qd : reference_velocity, tau);
+  if (feed_forward_.friction) add_friction(measured_ ? qd : reference_velocity, tau);
   if (feed_forward_.coriolis) add(robot.coriolis, tau);
   if (feed_forward_.gravity) add(robot.gravity, tau);
 }
@@ -125,7 +125,7 @@ void ImpedanceLaw::add_null_torque(const Input& now, LawTorque& result) noexcept
 void ImpedanceLaw::add_friction(const JointVector& velocity, JointVector& tau) const noexcept {
   for (Eigen::Index i = 0; i < tau.size(); ++i) {
     tau[i] += viscous_friction_[i] * velocity[i] +
-              coulomb_friction_[i] * std::tanh(velocity[i] / friction_rise_);
+              coulomb_friction_[i] * std::tanh(velocity[i] / feed_forward_.friction_rise);
   }
 }
 

@@ -75,8 +75,7 @@ class ImpedanceLaw {
   void add_friction(const JointVector& velocity, JointVector& tau) const noexcept;
 
   FeedForward feed_forward_;
-  bool friction_of_reference_, friction_of_robot_;
-  double friction_rise_;  ///< rad/s; over this Coulomb friction changes sign smoothly
+  bool measured_;  ///< friction is compensated at the measured velocity, not the reference's
   JointVector viscous_friction_;
   JointVector coulomb_friction_;
   OrientationError orientation_;

@@ -5,11 +5,6 @@
 #include <cmath>
 
 namespace dashpot::controller {
-namespace {
-
-constexpr double kNullRounding = 1e-9;
-
-}  // namespace
 
 void NullSpace::compute(const DynamicsResult& robot, const Impedance& impedance,
                         const analysis::BorneDamping& borne) noexcept {
@@ -83,6 +78,7 @@ void NullSpace::damp(const JointVector& k, const Damping& damping) noexcept {
 }
 
 bool NullSpace::damp_one_motion(const JointVector& k, const Damping& damping) noexcept {
+  constexpr double kNullRounding = 1e-9;
   const Eigen::Index n = k.size();
   double trace = 0, most = 0;  // of P's diagonal
   Eigen::Index best = 0;

@@ -50,12 +50,7 @@ StateCheck::StateCheck(const RobotModel& model, const Settings& settings)
 void StateCheck::reset() noexcept {
   timed_ = false;
   backward_ = ahead_ = 0;
-  for (Last* last : {&good_, &doubtful_}) {
-    last->any = false;
-    last->age = 0;
-    last->position.setZero(n_);
-    last->velocity.setZero(n_);
-  }
+  good_ = doubtful_ = {false, 0, JointVector::Zero(n_), JointVector::Zero(n_)};
   velocity_.setZero(n_);
   blind_ = false;
   intervals_ = 0;

@@ -189,9 +189,11 @@ void add_null_damping(const NullSpace& null_space, JointMatrix& C) noexcept {
   }
 }
 
-void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Impedance& impedance,
-                 const NullSpace& null_space, const JointVector& viscous_friction,
-                 const StiffnessTerms& terms, analysis::System<kMaxJoints>& system) noexcept {
+void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Acting& acting,
+                 const Settings& settings, analysis::System<kMaxJoints>& system) noexcept {
+  const NullSpace& null_space = acting.null_space;
+  Impedance impedance = acting.impedance;
+  if (!settings.environment.none()) add_environment(settings.environment, impedance);
   const Jacobian& J = robot.J;
   const Index n = J.cols();
   const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
@@ -208,10 +210,12 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
   JointMatrix K = K_N;
   add_congruence(J, K_C, J, K);
   add_congruence(J, C_C, J, C);
-  for (Index i = 0; i < n; ++i) C(i, i) += viscous_friction[i];
+  for (Index i = 0; i < n; ++i) C(i, i) += acting.friction[i];
 
+  const TaskTerms& terms = settings.task_terms;
+  const bool loaded = terms.load != Load::kIgnored && !acting.wrenches.world.isZero(0);
   JointMatrix extra = JointMatrix::Zero(n, n);
-  if (terms.load != nullptr) extra = *terms.load;
+  if (loaded) extra = stiffness_under_load(robot, acting.impedance, terms.load, acting.wrenches);
   if (terms.jacobian_rate) add_congruence(J, C_C, jacobian_rate(J, qd), extra);
 
   system.has_low_words = false;
@@ -224,7 +228,7 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
       system.stiffness(i, j) = 0.5 * (K(i, j) + K(j, i)) + extra(i, j);
     }
   }
-  if (terms.jacobian_rate || terms.load != nullptr) {
+  if (terms.jacobian_rate || loaded) {
     system.stiffness_factor.resize(0, n);
     return;
   }
@@ -241,20 +245,6 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
       system.stiffness_factor(i + 6, j) = scale * W_N(i, j);
     }
   }
-}
-
-void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Acting& acting,
-                 const TaskTerms& terms, const Environment& environment,
-                 analysis::System<kMaxJoints>& system) noexcept {
-  StiffnessTerms more{terms.jacobian_rate};
-  JointMatrix load;
-  if (terms.load != Load::kIgnored && !acting.wrenches.world.isZero(0)) {
-    load = stiffness_under_load(robot, acting.impedance, terms.load, acting.wrenches);
-    more.load = &load;
-  }
-  Impedance impedance = acting.impedance;
-  if (!environment.none()) add_environment(environment, impedance);
-  closed_loop(robot, qd, impedance, acting.null_space, acting.friction, more, system);
 }
 
 }  // namespace dashpot::controller

@@ -280,13 +280,15 @@ TEST(ClosedLoop, AddsOptionalTermsAndFriction) {
   JointVector friction = random.vector(7).cwiseAbs();
   const MatrixXd wanted = friction.asDiagonal();
   const Vector6 f = random.vector(6);
-  const auto system_with = [&](const StiffnessTerms& terms) {
+  const auto system_with = [&](const TaskTerms& terms) {
+    Settings settings;
+    settings.task_terms = terms;
     analysis::System<kMaxJoints> system;
-    controller::closed_loop(one.robot, one.qd, impedance, null_space, friction, terms, system);
+    closed_loop(one.robot, one.qd, {impedance, null_space, friction, {f, f}}, settings, system);
     return system;
   };
   const JointMatrix load = stiffness_under_load(one.robot, impedance, Load::kToolWrench, {f, f});
-  const auto plain = system_with({}), both = system_with({true, &load});
+  const auto plain = system_with({}), both = system_with({Load::kToolWrench, true});
   const MatrixXd J = one.robot.J, given = J.transpose() * setpoint.gains.task_damping;
   EXPECT_TRUE(near(both.stiffness - plain.stiffness,
                    given * jacobian_rate(one.robot.J, one.qd) + load, 1e-9));

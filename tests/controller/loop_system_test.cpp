@@ -48,7 +48,7 @@ struct Loop {
       one->has_low_words = true;
       one->stiffness_factor.setOnes(3, 2);
     }
-    closed_loop(robot, JointVector::Zero(n), impedance, null_space, friction, {}, plain);
+    closed_loop(robot, JointVector::Zero(n), {impedance, null_space, friction, {}}, {}, plain);
     factored.form(robot, impedance, null_space, friction, system);
     EXPECT_FALSE(plain.has_low_words || system.has_low_words);
     EXPECT_EQ(system.stiffness_factor.cols(), n);
