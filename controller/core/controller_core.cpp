@@ -6,14 +6,6 @@
 
 namespace dashpot::controller {
 
-DesignedDamping designed_damping(const RobotModel& model, const Settings& settings) {
-  JointVector subtracted = JointVector::Zero(model.dof());
-  if (settings.subtract_friction) subtracted = friction_left(model, settings).cwiseMax(0);
-  const double margin = settings.limits.gain_margin;
-  if (margin == 1) return DesignedDamping(subtracted);
-  return DesignedDamping(subtracted, {sampled_loop(model, settings), kReserve * margin});
-}
-
 ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings)
     : n_(model.dof()),
       settings_(settings),
@@ -123,11 +115,11 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   // Take over the set-point.
   Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
   if (setpoint != nullptr) {
-    using News = Course::News;
-    const News news = course_.take(*setpoint, sensed_.time);
-    if (news == News::kRefused) status = Status::kSetpointRejected;
-    if (in_force() && news == News::kGains) guide_.start_new_springs(course_.gains(), sensed_);
-    if (in_force() && news >= News::kGoal) guide_.set_goal(course_, sensed_);
+    const Course::News news = course_.take(*setpoint, sensed_.time);
+    if (news == Course::News::kRefused) status = Status::kSetpointRejected;
+    if (in_force() && news >= Course::News::kGoal) {
+      guide_.set_goal(course_, news == Course::News::kGains, sensed_);
+    }
   }
   status = worse(status, course_.age_status());
 
@@ -189,7 +181,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
 void ControllerCore::restart_springs() noexcept {
   aim_ = Aim::kSprings;
   course_.restart(sensed_);
-  guide_.set_goal(course_, sensed_);
+  guide_.set_goal(course_, false, sensed_);
   integral_.reset();
   law_.reset();
   filter_.begin_anew();

@@ -9,9 +9,6 @@
 
 namespace dashpot::controller {
 
-/// Returns what designs the damping of springs for their ratios, with what the loop bears of it.
-DesignedDamping designed_damping(const RobotModel& model, const Settings& settings);
-
 /// Implementation of Controller: the stages of a tick, which `update` calls one after the other and
 /// passes their results on. No stage knows another.
 class ControllerCore {

@@ -13,11 +13,6 @@ void Faults::reset() noexcept {
   ramp_ticks_ = 0;
 }
 
-void Faults::release() noexcept {
-  fault_ = Status::kOk;
-  rest_ = 0;
-}
-
 Status Faults::watch(Status seen, const Sensed& now, bool still, bool braked) noexcept {
   restarts_ = std::max(0.0, restarts_ - now.dt);
   Status found = worse(

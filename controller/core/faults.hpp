@@ -15,7 +15,10 @@ class Faults {
   Faults(const RobotModel& model, const Settings& settings)
       : motion_watch_(model, settings), doubt_(settings.limits), settings_(settings) {}
   void reset() noexcept;
-  void release() noexcept;
+  void release() noexcept {
+    fault_ = Status::kOk;
+    rest_ = 0;
+  }
 
   /// A tick with a good state: `seen` is what its check says. `still`: the references are at rest;
   /// `braked`: the brake alone acts. Returns kOk if the state allows springs, or kFaultLatched or

@@ -53,9 +53,10 @@ void Guide::start_new_springs(const GainBlend& gains, const Sensed& sensed) noex
   references_.tip.relocate(robot.p_BT_B + left.head<3>(), quaternion(left.tail<3>()) * tip);
 }
 
-void Guide::set_goal(const Course& course, const Sensed& now) noexcept {
+void Guide::set_goal(const Course& course, bool new_gains, const Sensed& now) noexcept {
   const Setpoint& wanted = course.setpoint();
   const Impedance& impedance = course.gains().now();
+  if (new_gains) start_new_springs(course.gains(), now);
   const bool joint = wanted.mode == Mode::kJoint;
   JointReference& path = joint ? references_.joint : references_.posture;
   if ((joint ? impedance.joint_weight : impedance.task_weight) == 0) {

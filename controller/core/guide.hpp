@@ -16,10 +16,9 @@ class Guide {
   void limit_tip_speed(const TipSpeed& speed) noexcept;
   /// T goes from one place on the tip link to another, and the tip's reference with it.
   void carry(const Pose& from, const Pose& to) noexcept;
-  /// Springs that are to grow from zero start where the robot is.
-  void start_new_springs(const GainBlend& gains, const Sensed& now) noexcept;
-  /// Sets the goal of the course.
-  void set_goal(const Course& course, const Sensed& now) noexcept;
+  /// Sets the goal of the course. With new gains, springs that are to grow from zero start where
+  /// the robot is.
+  void set_goal(const Course& course, bool new_gains, const Sensed& now) noexcept;
   /// Moves references on by one period, in `hold` to rest.
   void step(const Course& course, bool hold, const Sensed& now,
             const NullSpace& null_space) noexcept;
@@ -30,6 +29,7 @@ class Guide {
   bool still(const Impedance& impedance) const noexcept;
 
  private:
+  void start_new_springs(const GainBlend& gains, const Sensed& now) noexcept;
   /// Returns the share of its speed limits at which the tip's reference takes no joint too fast.
   double tip_share(const NullSpace& null_space) const noexcept;
   /// Returns the share of its speed limits at which the joints' reference takes the tip no faster

@@ -7,8 +7,6 @@ namespace dashpot::controller {
 inline constexpr double kMostRestarts = 3;
 /// A joint rests below this share of its velocity limit: sensors that are noisy stay below it.
 inline constexpr double kAtRest = 0.01;
-/// A designed ratio keeps this multiple of the gain margin, for what couples modes.
-inline constexpr double kReserve = 1.02;
 /// With a lower TipSpeed::limit references keep to this share of it, because SafetyFilter takes
 /// drive away from 0.65 of it on.
 inline constexpr double kShareOfTipLimit = 0.6;

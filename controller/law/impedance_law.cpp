@@ -74,7 +74,11 @@ void ImpedanceLaw::torque(const Input& now, LawTorque& result) noexcept {
   add_torque(robot.J, F, tau);
   add(result.dampers, tau);
   if (task) add_torque(robot.J, tip_damping, result.dampers);
-  if (feed_forward_.friction) add_friction(measured_ ? qd : reference_velocity, tau);
+  const JointVector& v = measured_ ? qd : reference_velocity;
+  for (Eigen::Index i = 0; i < tau.size() && feed_forward_.friction; ++i) {
+    tau[i] += viscous_friction_[i] * v[i] +
+              coulomb_friction_[i] * std::tanh(v[i] / feed_forward_.friction_rise);
+  }
   if (feed_forward_.coriolis) add(robot.coriolis, tau);
   if (feed_forward_.gravity) add(robot.gravity, tau);
 }
@@ -120,13 +124,6 @@ void ImpedanceLaw::add_null_torque(const Input& now, LawTorque& result) noexcept
   add(null_space.spring(impedance.null_stiffness, dq), result.torque);
   add(null_space.damper(impedance.null_damping, dqd), result.dampers);
   if (impedance.null_damping_ratio > 0) add(null_space.ratio_damper(dqd), result.dampers);
-}
-
-void ImpedanceLaw::add_friction(const JointVector& velocity, JointVector& tau) const noexcept {
-  for (Eigen::Index i = 0; i < tau.size(); ++i) {
-    tau[i] += viscous_friction_[i] * velocity[i] +
-              coulomb_friction_[i] * std::tanh(velocity[i] / feed_forward_.friction_rise);
-  }
 }
 
 }  // namespace dashpot::controller

@@ -72,7 +72,6 @@ class ImpedanceLaw {
   Vector6 pull_tip(const Input& now, LawTorque& result) noexcept;
   /// N' K_0 (q_0 - q - s J# e) + N' C_0 N (qd_0 - qd), without the damper in the first.
   static void add_null_torque(const Input& now, LawTorque& result) noexcept;
-  void add_friction(const JointVector& velocity, JointVector& tau) const noexcept;
 
   FeedForward feed_forward_;
   bool measured_;  ///< friction is compensated at the measured velocity, not the reference's

@@ -1,5 +1,5 @@
-#include <dashpot/controller/core/controller_core.hpp>
 #include <dashpot/controller/posture_loop.hpp>
+#include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 namespace dashpot::controller {
 
