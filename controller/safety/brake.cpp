@@ -96,7 +96,8 @@ void Brake::watch(const Motion& motion) noexcept {
   most_ = std::max(most_, energy);
   if (energy < least_) least_ = energy, given_ = 0;
   given_ = given_ * (1 - period_ / kMemory) + power * period_;
-  const bool driven_back = least_ <= kFell * most_ && energy > least_ + kRose * most_ + slow;
+  fell_ |= energy <= kFell * most_;
+  const bool driven_back = fell_ && energy > least_ + kRose * most_ + slow;
   if (driven_back && soften()) {
     least_ = energy;
     given_ = 0;
@@ -114,7 +115,7 @@ void Brake::firm() noexcept {
   softness_ = 1;
   most_ = given_ = 0;
   least_ = std::numeric_limits<double>::infinity();
-  feeds_ = false;
+  fell_ = feeds_ = false;
 }
 
 void Brake::factor(const Motion& motion) noexcept {
@@ -175,9 +176,11 @@ Brake::Bound Brake::torque_bound(const Motion& motion, const JointVector& last, 
 Status Brake::constrain(const Motion& motion, const JointVector& last, bool stops,
                         JointVector& excess) noexcept {
   factor(motion);
+  Status status = Status::kOk;
   for (Eigen::Index i = 0; i < n_ && !stops; ++i) {
     for (const double way : {1.0, -1.0}) {
       const double most = torque_bound(motion, last, i, way).value;
+      if (way * (excess[i] - most) > kRounding) status = Status::kTorqueLimited;
       excess[i] = way * std::min(way * excess[i], way * most);
     }
   }
@@ -214,7 +217,6 @@ Status Brake::constrain(const Motion& motion, const JointVector& last, bool stop
       (torque ? now : excess)[h.bound.joint] += h.factor * h.scale;
     }
   }
-  Status status = Status::kOk;
   for (Eigen::Index k = 0; k < count_; ++k) {
     status =
         worse(status, held(k).bound.at_limit ? Status::kNearJointLimit : Status::kTorqueLimited);

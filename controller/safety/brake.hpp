@@ -149,6 +149,7 @@ class Brake {
   double most_ = 0;      ///< kinetic energy in this stop, J
   double least_ = std::numeric_limits<double>::infinity();  ///< likewise, since it was softened
   double given_ = 0;                                        ///< by the weight, J
+  bool fell_ = false;
   bool feeds_ = false;
   SmallCholesky own_mass_;
   const SmallCholesky* mass_ = nullptr;  ///< of this tick

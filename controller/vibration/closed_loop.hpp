@@ -63,31 +63,33 @@ JointVector friction_left(const RobotModel& model, const Settings& settings);
 JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& impedance,
                                double time) noexcept;
 
-/// Terms of the stiffness that most analyses leave out.
-struct StiffnessTerms {
-  bool jacobian_rate = false;         ///< J' C_C Jdot
-  const JointMatrix* load = nullptr;  ///< of stiffness_under_load, n x n
-};
-
 /// Sets P to N, which projects joint velocities on the null space.
 void null_projector(const NullSpace& null_space, JointMatrix& P) noexcept;
 
 /// C += L D L' with the D of the null space's ratio, see NullSpace::ratio_damping.
-void add_null_damping(const Impedance& impedance, const NullSpace& null_space,
-                      JointMatrix& C) noexcept;
+void add_null_damping(const NullSpace& null_space, JointMatrix& C) noexcept;
 
 /// K += P' diag(k) P
 void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) noexcept;
 
-/// Sets `system` to the robot with the springs and dampers of an impedance, M q'' + C q' + K q = f,
-/// linearised where the springs are at rest (e = 0, q = q_d, q = q_0) and N stands still:
+/// What acts on a robot, besides its environment.
+struct Acting {
+  const Impedance& impedance;
+  const NullSpace& null_space;
+  const JointVector& friction;  ///< what the joints damp by themselves, n, N m s/rad
+  TipWrenches wrenches;
+};
+
+/// Sets `system` to the robot with what acts on it and the environment of the settings, M q'' +
+/// C q' + K q = f, linearised where the springs are at rest (e = 0, q = q_d, q = q_0) and N stands
+/// still:
 ///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot]  [+ that of a load]
-///     C = C_q + J' C_C J + N' C_0 N + viscous friction of the joints.
-/// `terms` says which terms in brackets are included. If none is, K is symmetric and has its
-/// factor W. The feed-forward does not appear, because it depends on the set-point, not on the
-/// state, except for Coriolis and gravity, which cancel the robot's Coriolis and gravity torques.
-void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Impedance& impedance,
-                 const NullSpace& null_space, const JointVector& viscous_friction,
-                 const StiffnessTerms& terms, analysis::System<kMaxJoints>& system) noexcept;
+///     C = C_q + J' C_C J + N' C_0 N + friction.
+/// The task_terms of the settings say which terms in brackets are included; a load has none if the
+/// world exerts no wrench. If none is, K is symmetric and has its factor W. The feed-forward does
+/// not appear, because it depends on the set-point, not on the state, except for Coriolis and
+/// gravity, which cancel the robot's Coriolis and gravity torques.
+void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Acting& acting,
+                 const Settings& settings, analysis::System<kMaxJoints>& system) noexcept;
 
 }  // namespace dashpot::controller

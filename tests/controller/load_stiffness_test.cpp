@@ -59,8 +59,12 @@ struct HeldLoad {
   JointVector torque(ImpedanceLaw& law, Load load, const JointVector& there,
                      const JointVector& qd) const {
     const DynamicsResult now = at(there);
-    JointVector tau;
-    law.torque(now, there, qd, impedance, references, wrenches.commanded, kUnclamped, tau);
+    NullSpace null_space;
+    null_space.compute(now, impedance);
+    LawTorque result;
+    law.torque({now, there, qd, impedance, null_space, references, kUnclamped, wrenches.commanded},
+               result);
+    JointVector tau = result.torque;
     Vector6 f = wrenches.world;
     if (load == Load::kToolWrench) {
       const Eigen::Matrix3d turn = now.R_BT * robot.R_BT.transpose();
@@ -123,8 +127,12 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
       const JointMatrix added =
           stiffness_under_load(held.robot, held.impedance, load, held.wrenches);
       analysis::System<kMaxJoints> system;
-      closed_loop(held.robot, held.rest, held.impedance, law.null_space(), held.rest,
-                  {false, loaded ? &added : nullptr}, system);
+      NullSpace null_space;
+      null_space.compute(held.robot, held.impedance);
+      Settings settings;
+      settings.task_terms.load = load;
+      closed_loop(held.robot, held.rest, {held.impedance, null_space, held.rest, held.wrenches},
+                  settings, system);
       EXPECT_TRUE(near(system.mass, held.robot.M, 0));
       EXPECT_TRUE(near(system.damping, C, 1e-6 * C.norm()));
       EXPECT_TRUE(near(system.stiffness, K, (loaded ? 1e-7 : 1e-6) * K.norm()));
@@ -187,9 +195,11 @@ TEST(LoadStiffness, AnEnvironmentAddsItsSpringsAndDampers) {
     setpoint.mode = mode;
     Impedance impedance(setpoint, 7);
     analysis::System<kMaxJoints> before, after;
-    closed_loop(held.robot, held.rest, impedance, null_space, held.rest, {}, before);
-    add_environment(environment, impedance);
-    closed_loop(held.robot, held.rest, impedance, null_space, held.rest, {}, after);
+    const Acting acting{impedance, null_space, held.rest, {}};
+    Settings settings;
+    closed_loop(held.robot, held.rest, acting, settings, before);
+    settings.environment = environment;
+    closed_loop(held.robot, held.rest, acting, settings, after);
     const MatrixXd J = held.robot.J;
     MatrixXd K = J.transpose() * environment.tip_stiffness.asDiagonal() * J;
     MatrixXd C = J.transpose() * environment.tip_damping.asDiagonal() * J;
