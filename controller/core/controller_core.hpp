@@ -57,6 +57,7 @@ class ControllerCore {
     std::uint64_t gain_changes;
     JointVector q, qd;
     Vector6 wrench;
+    JointVector posture_error;  ///< no entries where it does not matter
   };
 
   // From the set-point to the law's torque:

@@ -29,21 +29,22 @@ void ControllerCore::analyse() noexcept {
 }
 
 bool ControllerCore::loop_unchanged(bool with_wrench, bool with_velocity) noexcept {
-  Analysed now{springs_ != Springs::kOff,
-               false,
-               gains_.changes() + attachment_.changes(),
-               q_,
-               {},
-               Vector6::Zero()};
+  Analysed now{springs_ != Springs::kOff, false, gains_.changes() + attachment_.changes(), q_, {},
+               Vector6::Zero(),           {}};
   if (with_velocity) now.qd = qd_;
-  if (with_wrench) now.wrench = external_wrench_ + wrench_.now() + law_.integral().wrench();
+  if (with_wrench) {
+    now.wrench = external_wrench_ + wrench_.now() + law_.integral().wrench();
+    now.posture_error = law_.posture_error();
+  }
   bool same = false, settled = false;
   if (analysed_) {
     now.gains_moved = analysed_->gain_changes != now.gain_changes;
     settled = analysed_->gains_moved && !now.gains_moved;
     same = !now.gains_moved && analysed_->springs == now.springs && analysed_->q == now.q &&
            analysed_->qd.size() == now.qd.size() && analysed_->qd == now.qd &&
-           analysed_->wrench == now.wrench;
+           analysed_->wrench == now.wrench &&
+           analysed_->posture_error.size() == now.posture_error.size() &&
+           analysed_->posture_error == now.posture_error;
   }
   analysed_ = now;
   if (settled) vibration_.restart();
@@ -87,13 +88,22 @@ void ControllerCore::closed_loop(analysis::System<kMaxJoints>& system) noexcept 
   const TaskTerms& terms = settings_.task_terms;
   JointMatrix load;
   StiffnessTerms more{terms.jacobian_rate};
+  const Impedance& given = gains_.now();
+  const NullSpaceChange change(kernel_, q_, robot_, law_.null_space(), !given.tool.none());
+  const bool springs = springs_ != Springs::kOff;
+  const bool posture = springs && law_.posture_error().size() == n_;
+  if (posture && terms.jacobian_rate) {
+    more.null_space = &change;
+    more.posture_velocity = references_.posture.velocity();
+  }
   if (terms.load != Load::kIgnored && !external_wrench_.isZero(0)) {
-    const bool springs = springs_ != Springs::kOff;
     const bool pushes = springs && settings_.feed_forward.wrench;
     TipWrenches wrenches{external_wrench_, pushes ? wrench_.now() : Vector6::Zero().eval()};
     if (springs) wrenches.commanded += law_.integral().wrench();
-    load =
-        stiffness_under_load(robot_, springs ? gains_.now() : Impedance(n_), terms.load, wrenches);
+    const LoadedPosture loaded{change, law_.posture_error()};
+    const bool pulls = posture && !given.null_stiffness.isZero(0);
+    load = stiffness_under_load(robot_, springs ? given : Impedance(n_), terms.load, wrenches,
+                                pulls ? &loaded : nullptr);
     more.load = &load;
   }
   controller::closed_loop(robot_, qd_, impedance(), law_.null_space(), joint_friction(), more,

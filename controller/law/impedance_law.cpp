@@ -43,6 +43,7 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
   dampers_ = tau;
   e_.setZero();
   F_.setZero();
+  posture_error_.resize(0);
   null_level_ = {};
   mass_known_ = false;
   if (integral_.on()) {
@@ -70,10 +71,10 @@ void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, con
     }
     F_ = task_wrench(robot, qd, impedance, references.tip, clamp);
     if (null_space) {
-      JointVector dq = difference(references.posture.position(), q);
-      subtract_posture_share(dq);
+      posture_error_ = difference(references.posture.position(), q);
+      subtract_posture_share(posture_error_);
       const JointVector dqd = difference(references.posture.velocity(), qd);
-      add(null_space_.spring(impedance.null_stiffness, dq), tau);
+      add(null_space_.spring(impedance.null_stiffness, posture_error_), tau);
       add(null_space_.damper(impedance.null_damping, dqd), dampers_);
       if (impedance.null_damping_ratio > 0) {
         null_space_.set_loop(borne_, impedance.task_share());
@@ -132,9 +133,8 @@ Vector6 ImpedanceLaw::task_wrench(const DynamicsResult& robot, const JointVector
 }
 
 void ImpedanceLaw::subtract_posture_share(JointVector& dq) const noexcept {
-  constexpr double kMost = 0.3;  // rad
   const JointVector share = null_space_.joint_velocity(e_);
-  add(share, dq, -1 / std::sqrt(1 + product(share, share) / (kMost * kMost)));
+  add(share, dq, -1 / std::sqrt(1 + product(share, share) / (kPostureShare * kPostureShare)));
 }
 
 void ImpedanceLaw::integrate(SpringIntegral::Change change) noexcept {

@@ -7,6 +7,10 @@
 
 namespace dashpot::controller {
 
+/// How far a deflection of the tip may have moved the joints before the posture springs count less
+/// of it, rad (m).
+inline constexpr double kPostureShare = 0.3;
+
 /// Computes the joint torque of springs and dampers between robot and reference, and of the
 /// feed-forward:
 ///
@@ -60,6 +64,8 @@ class ImpedanceLaw {
   /// The part of the torque that comes from dampers, n.
   const JointVector& dampers() const noexcept { return dampers_; }
   const Vector6& tip_wrench() const noexcept { return F_; }
+  /// q_0 - q - s J# e, n; without entries where the null space has no springs or dampers.
+  const JointVector& posture_error() const noexcept { return posture_error_; }
   const NullSpace& null_space() const noexcept { return null_space_; }
   /// Returns the factor of the mass matrix of the last torque; null if it was not needed.
   const SmallCholesky* mass() const noexcept { return mass_known_ ? &null_space_.mass() : nullptr; }
@@ -89,6 +95,7 @@ class ImpedanceLaw {
   SpringIntegral integral_;
   bool clamped_ = false;  ///< the error clamp acts
   JointVector dampers_;
+  JointVector posture_error_;
   Vector6 tip_damping_ = Vector6::Zero();
   JointVector joint_pull_;  ///< K_q (q_d - q)
   Vector6 tip_pull_ = Vector6::Zero();

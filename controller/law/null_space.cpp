@@ -44,6 +44,14 @@ JointVector NullSpace::projected_velocity(const JointVector& dq) const noexcept 
   return y;
 }
 
+JointVector NullSpace::projected_acceleration(const JointVector& torque) const noexcept {
+  JointVector y = torque;
+  mass_.solve_L(y.data());
+  project(y);
+  mass_.solve_LT(y.data());
+  return y;
+}
+
 double NullSpace::damping(const Impedance& impedance, double omega,
                           analysis::DampingLevel& level) const noexcept {
   const double wanted = 2 * impedance.null_damping_ratio * omega;

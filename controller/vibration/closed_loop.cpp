@@ -1,3 +1,4 @@
+#include <dashpot/controller/law/impedance_law.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/spring_factors.hpp>
 
@@ -50,6 +51,47 @@ Matrix3d derivative_of_error(const Vector3d& e) noexcept {
   return Matrix3d::Identity() + 0.5 * cross + c * cross * cross;
 }
 
+/// K += what a load adds to the stiffness of posture springs `k`. `e` is the tip's error, and `A`
+/// its derivative_of_error.
+void add_loaded_posture(const LoadedPosture& posture, const Jacobian& J, const JointVector& k,
+                        const Vector6& e, const Matrix3d& A, JointMatrix& K) noexcept {
+  const Index n = J.cols();
+  const NullSpace& null_space = posture.change.null_space();
+  const JointVector x = null_space.joint_velocity(e);
+  const double s = 1 / std::sqrt(1 + product(x, x) / (kPostureShare * kPostureShare));
+  const JointMatrix change = posture.change.of_joint_velocity(e);
+  JointVector pull(n);
+  for (Index i = 0; i < n; ++i) pull[i] = k[i] * posture.error[i];
+  const JointMatrix turned = posture.change.of_torque(pull);
+  for (Index j = 0; j < n; ++j) {
+    Vector6 moved;  // the change of e, as far as J# e does not turn with it
+    moved << -J.col(j).head<3>(), -(A * J.col(j).tail<3>());
+    JointVector dx = null_space.joint_velocity(moved - posture.change.turning(e, j));
+    for (Index i = 0; i < n; ++i) dx[i] += change(i, j);
+    const double along = product(x, dx) * s * s / (kPostureShare * kPostureShare);
+    JointVector deflected = JointVector::Unit(n, j);
+    add(dx, deflected, s);
+    add(x, deflected, -s * along);
+    add(null_space.projected_velocity(JointVector::Unit(n, j)), deflected, -1);
+    const JointVector torque = null_space.spring(k, deflected);
+    for (Index i = 0; i < n; ++i) K(i, j) += torque[i] - turned(i, j);
+  }
+}
+
+/// K += D d(N qd)/dq with the damping D of the null space, N D N.
+void add_null_space_rate(const NullSpaceChange& change, const Jacobian& J, const JointVector& qd,
+                         const JointMatrix& D, JointMatrix& K) noexcept {
+  const Jacobian moved = change.twists(qd);
+  const JointMatrix share = change.of_joint_velocity(twist(J, qd));
+  for (Index k = 0; k < J.cols(); ++k) {
+    JointVector rate = change.null_space().joint_velocity(moved.col(k));
+    for (Index i = 0; i < rate.size(); ++i) rate[i] += share(i, k);
+    JointVector torque = JointVector::Zero(rate.size());
+    add_product(D, rate, torque, -1);
+    for (Index i = 0; i < rate.size(); ++i) K(i, k) += torque[i];
+  }
+}
+
 }  // namespace
 
 Jacobian jacobian_rate(const Jacobian& J, const JointVector& qd) noexcept {
@@ -95,13 +137,15 @@ JointMatrix stiffness_of_load(const Jacobian& J, Load load, const Vector6& f) no
 }
 
 JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& impedance, Load load,
-                                 const TipWrenches& wrenches) noexcept {
+                                 const TipWrenches& wrenches,
+                                 const LoadedPosture* posture) noexcept {
   const Jacobian& J = robot.J;
   const Matrix6& K_B = impedance.base.stiffness;
   const Matrix6 K_T = turned(impedance.tool.stiffness, robot.R_BT);
   const Matrix6 K_C = K_B + K_T;
-  const Vector6 F = -impedance.task_weight * (wrenches.world + wrenches.commanded);
-  Vector6 e = deflection(K_C, F);
+  const Vector6 wanted = -impedance.task_weight * (wrenches.world + wrenches.commanded);
+  Vector6 e = deflection(K_C, wanted);
+  const Vector6 F = K_C * e;  // what K_C can hold
   const double angle = e.tail<3>().norm();
   if (angle > kLargestAngle) e.tail<3>() *= kLargestAngle / angle;
   const Matrix3d A = derivative_of_error(e.tail<3>());
@@ -120,6 +164,7 @@ JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& i
     more.tail<3>() += F_T.tail<3>().cross(w);
     for (Index j = 0; j < J.cols(); ++j) K(j, k) += J.col(j).dot(more);
   }
+  if (posture != nullptr) add_loaded_posture(*posture, J, impedance.null_stiffness, e, A, K);
   return K;
 }
 
@@ -202,12 +247,13 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
   const Matrix6 C_C = impedance.base.damping + turned(impedance.tool.damping, robot.R_BT);
   JointMatrix K_N = impedance.joint_stiffness;  // all stiffness but the tip's springs
   JointMatrix C = impedance.joint_damping;
-  JointMatrix projector = JointMatrix::Zero(n, n);
+  JointMatrix projector = JointMatrix::Zero(n, n), D = projector;  // D: of the null space
   if (impedance.null_space()) {
     null_projector(null_space, projector);
     add_projected(projector, impedance.null_stiffness, K_N);
-    add_projected(projector, impedance.null_damping, C);
-    add_null_damping(impedance, null_space, C);
+    add_projected(projector, impedance.null_damping, D);
+    add_null_damping(impedance, null_space, D);
+    C += D;
   }
   JointMatrix K = K_N;
   add_congruence(J, K_C, J, K);
@@ -216,7 +262,13 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
 
   JointMatrix extra = JointMatrix::Zero(n, n);
   if (terms.load != nullptr) extra = *terms.load;
-  if (terms.jacobian_rate) add_congruence(J, C_C, jacobian_rate(J, qd), extra);
+  if (terms.jacobian_rate) {
+    add_congruence(J, C_C, jacobian_rate(J, qd), extra);
+    if (terms.null_space != nullptr && !D.isZero(0)) {
+      const JointVector error = difference(qd, terms.posture_velocity);
+      add_null_space_rate(*terms.null_space, J, error, D, extra);
+    }
+  }
 
   system.has_low_words = false;
   system.mass = robot.M;

@@ -3,6 +3,7 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/law/null_space.hpp>
 #include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/vibration/null_space_change.hpp>
 
 namespace dashpot::controller {
 
@@ -27,8 +28,15 @@ struct TipWrenches {
 ///     of J 0                               joint_torques: J' f is constant.
 JointMatrix stiffness_of_load(const Jacobian& J, Load load, const Vector6& f) noexcept;
 
+/// The posture springs of an arm that holds a load.
+struct LoadedPosture {
+  const NullSpaceChange& change;
+  const JointVector& error;  ///< p = q_0 - q - s J# e, n; see ImpedanceLaw
+};
+
 /// Returns what a load adds to the stiffness J' K_C J of springs at rest, n x n, where the springs
-/// of `impedance` hold it: they carry F = -w_C (f + f_c) at the error e with K_C e = F, and
+/// of `impedance` hold it: they carry F = -w_C (f + f_c), without the directions in which there is
+/// no spring, at the error e with K_C e = F, and
 ///     -d(J' (F + f_c) + load)/dq - J' K_C J = J' (S - K_C J) - K_G(F + f_c) + stiffness_of_load,
 ///     S = K_B (J_v; A J_w) + K_T (J_v; A J_w) + (([F_l x]; [F_m x]) - K_T ([e_l x]; [e_m x])) J_w.
 /// K_B is given in B's axes, K_T in the tool's and turned into B's, the wrench F in the second line
@@ -36,10 +44,15 @@ JointMatrix stiffness_of_load(const Jacobian& J, Load load, const Vector6& f) no
 /// the derivative of the rotation vector. So a constant wrench of the world and the springs that
 /// hold it cancel up to e, whereas constant joint torques leave +K_G(f), the term of the paper.
 ///
-/// Springs of joints and of the null space carry none of F, and K_C has to hold all of it. A
-/// deflection of more than 2 rad counts as one of 2 rad.
+/// Springs of joints carry none of F, and K_C has to hold all of it. A deflection of more than 2
+/// rad counts as one of 2 rad.
+///
+/// To the stiffness N' K_0 N of posture springs the load adds, because N' and J# e change with q,
+///     -d(N' t)/dq + N' K_0 (1 + d(s J# e)/dq - N),     t = K_0 p constant in the first term.
+/// Null: there are none. `wrenches` without load, and an error of zero, add nothing.
 JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& impedance, Load load,
-                                 const TipWrenches& wrenches) noexcept;
+                                 const TipWrenches& wrenches,
+                                 const LoadedPosture* posture = nullptr) noexcept;
 
 /// Adds an environment's springs and dampers to those of an impedance.
 void add_environment(const Environment& environment, Impedance& impedance) noexcept;
@@ -67,6 +80,10 @@ JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& imp
 struct StiffnessTerms {
   bool jacobian_rate = false;         ///< J' C_C Jdot
   const JointMatrix* load = nullptr;  ///< of stiffness_under_load, n x n
+  /// With jacobian_rate: N' C_0 d(N (qd - qd_0))/dq as well, of the dampers of the null space, as
+  /// long as they pull little. Null: there are none.
+  const NullSpaceChange* null_space = nullptr;
+  JointVector posture_velocity = {};  ///< qd_0, n, rad/s
 };
 
 /// Sets P to N, which projects joint velocities on the null space.
@@ -81,7 +98,8 @@ void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) n
 
 /// Sets `system` to the robot with the springs and dampers of an impedance, M q'' + C q' + K q = f,
 /// linearised where the springs are at rest (e = 0, q = q_d, q = q_0) and N stands still:
-///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot]  [+ that of a load]
+///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot + N' C_0 d(N (qd - qd_0))/dq]
+///         [+ that of a load]
 ///     C = C_q + J' C_C J + N' C_0 N + viscous friction of the joints.
 /// `terms` says which terms in brackets are included. If none is, K is symmetric and has its
 /// factor W. The feed-forward does not appear, because it depends on the set-point, not on the
