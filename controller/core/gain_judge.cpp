@@ -1,6 +1,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/controller/model/least_inertia.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <algorithm>
@@ -36,7 +37,10 @@ bool counts_payload(const Gains& gains, Mode mode) noexcept {
 }  // namespace
 
 GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
-    : kernel_(model),
+    : model_(model),
+      settings_(settings),
+      attached_(model.attachment()),
+      kernel_(model),
       bare_(unloaded(model)),
       loaded_(model.attachment().mass > 0),
       lower_(settings.limits.position_lower),
@@ -64,6 +68,7 @@ GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
     const double dropped = margin(system, gravity_of(bare_, q), enough);
     if (dropped < std::min(enough, worst.margin)) worst = {dropped, mode, true};
   }
+  worst.q = q;
   return worst;
 }
 
@@ -84,6 +89,27 @@ GainJudge::Verdict GainJudge::judge_anywhere(const Gains& gains) {
     if (found.margin > best.margin) best = found;
   }
   return best;
+}
+
+std::string GainJudge::missing(const Verdict& verdict, const Gains& gains) const {
+  const RobotModel model = model_.with(attached_);
+  const std::string missing = missing_rotors_text(model);
+  if (missing.empty() || verdict.q.size() == 0) return missing;
+  PostureLoop loop(model, judging(settings_));
+  analysis::System<kMaxJoints> closed;
+  if (loop.closed_loop(verdict.q, gains, verdict.mode, closed) != Status::kOk) return missing;
+  analysis::System<> system(verdict.q.size());
+  system.mass = closed.mass;
+  system.damping = closed.damping;
+  system.stiffness = closed.stiffness;
+  const std::optional<JointVector> enough =
+      enough_reflected_inertia(model, system, settings_.period, [&](const RobotModel& with_rotors) {
+        return GainJudge(with_rotors, settings_).judge(verdict.q, gains).margin >= wanted_;
+      });
+  const std::string hint = rotors_hint(model, "robot.reflected_inertia", "robot.drives:");
+  if (!enough) return missing + ", but no reflected inertia would be enough. " + hint;
+  return missing + ", and with " + inertia_text(model, *enough) + " the margin would be enough. " +
+         hint;
 }
 
 Eigen::MatrixXd GainJudge::gravity_of(const DynamicsKernel& kernel, const JointVector& q) const {

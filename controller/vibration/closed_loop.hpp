@@ -3,18 +3,10 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/law/null_space.hpp>
 #include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/vibration/jacobian_change.hpp>
 #include <dashpot/controller/vibration/null_space_change.hpp>
 
 namespace dashpot::controller {
-
-/// Returns Jdot (6 x n) at joint velocity qd: with j and k counted from the base, v and w the
-/// linear and angular rows of J,
-///     dJ_j/dq_k = (w_k x v_j, w_k x w_j) for k <= j,  (w_j x v_k, 0) for k > j.
-Jacobian jacobian_rate(const Jacobian& J, const JointVector& qd) noexcept;
-
-/// Returns K_G(f) = [(dJ/dq_1)' f ... (dJ/dq_n)' f], n x n, for the wrench f in B's axes: how the
-/// joint torques J' f change with q where f stays.
-JointMatrix geometric_stiffness(const Jacobian& J, const Vector6& f) noexcept;
 
 /// The wrenches at the tip, in B's axes, that do not come from springs, N and N m.
 struct TipWrenches {

@@ -1,4 +1,4 @@
-#include <dashpot/controller/vibration/closed_loop.hpp>
+#include <dashpot/controller/vibration/jacobian_change.hpp>
 #include <dashpot/controller/vibration/null_space_change.hpp>
 
 #include <Eigen/Geometry>
@@ -7,17 +7,6 @@ namespace dashpot::controller {
 
 using Eigen::Index;
 using Eigen::Vector3d;
-
-Jacobian twist_change(const Jacobian& J, const JointVector& x) noexcept {
-  Jacobian change = jacobian_rate(J, x);  // its linear rows are symmetric in k and x
-  Vector3d beyond = twist(J, x).tail<3>();
-  for (Index k = 0; k < J.cols(); ++k) {
-    const Vector3d w = J.col(k).tail<3>();
-    beyond -= w * x[k];
-    change.col(k).tail<3>() = w.cross(beyond);
-  }
-  return change;
-}
 
 Vector6 NullSpaceChange::turning(const Vector6& V, Index k) const noexcept {
   Vector6 change = Vector6::Zero();

@@ -4,9 +4,6 @@
 
 namespace dashpot::controller {
 
-/// Returns d(J x)/dq (6 x n) for constant x: column k is (dJ/dq_k) x.
-Jacobian twist_change(const Jacobian& J, const JointVector& x) noexcept;
-
 /// How the null space's projector N' and J# = M^-1 J' (J M^-1 J')^-1 change with q, where no gains
 /// change and the arm is not nearly singular. With G = H (H J M^-1 J' H)^-1 H of the selected
 /// directions H, dJ_k = dJ/dq_k and dM_k = dM/dq_k,
