@@ -1,7 +1,7 @@
-#include <dashpot/controller/rotors.hpp>
 #include <dashpot/apps/audit/audit_writer.hpp>
 #include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/controller/rotors.hpp>
 
 #include <algorithm>
 #include <cmath>
