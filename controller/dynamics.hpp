@@ -43,18 +43,8 @@ class DynamicsKernel {
   /// finite, neither is the result.
   void evaluate(const JointVector& q, const JointVector& qd, DynamicsResult& result) const noexcept;
 
-  /// Returns (dM/dq) x, n x n: column k is (dM/dq_k) x. `J` is the Jacobian of `evaluate` at q.
-  /// Allocates nothing.
-  ///
-  /// At the tip, with the twist c_i and the composite inertia I_i of all that joint i carries, the
-  /// velocities V_k = sum of c_j x_j for j <= k, and the momentum W_k of all that joint k carries,
-  /// joint k moves everything beyond it by its twist, and leaves energies as they are. So
-  ///     -(I_i c_i).(c_k x V_k)                      in row i >= k,
-  ///     c_i.(c_k x* W_k - I_k (c_k x V_k))          in row i < k.
-  JointMatrix mass_change(const JointVector& q, const Jacobian& J,
-                          const JointVector& x) const noexcept;
-
  private:
+  friend class MassChange;
   /// One number for each of four joints; zeros beyond the last joint.
   using Four = std::array<double, 4>;
   /// Four links, each in its own axes.

@@ -89,21 +89,27 @@ void ControllerCore::closed_loop(analysis::System<kMaxJoints>& system) noexcept 
   JointMatrix load;
   StiffnessTerms more{terms.jacobian_rate};
   const Impedance& given = gains_.now();
-  const NullSpaceChange change(kernel_, q_, robot_, law_.null_space(), !given.tool.none());
   const bool springs = springs_ != Springs::kOff;
+  const bool with_wrench = terms.load != Load::kIgnored && !external_wrench_.isZero(0);
   const bool posture = springs && law_.posture_error().size() == n_;
-  if (posture && terms.jacobian_rate) {
-    more.null_space = &change;
+  std::optional<NullSpaceChange> change;
+  if (posture && (with_wrench || terms.jacobian_rate)) {
+    change.emplace(kernel_, q_, robot_, law_.null_space(), !given.tool.none());
+  }
+  if (change && terms.jacobian_rate) {
+    more.null_space = &*change;
     more.posture_velocity = references_.posture.velocity();
   }
-  if (terms.load != Load::kIgnored && !external_wrench_.isZero(0)) {
+  if (with_wrench) {
     const bool pushes = springs && settings_.feed_forward.wrench;
     TipWrenches wrenches{external_wrench_, pushes ? wrench_.now() : Vector6::Zero().eval()};
     if (springs) wrenches.commanded += law_.integral().wrench();
-    const LoadedPosture loaded{change, law_.posture_error()};
-    const bool pulls = posture && !given.null_stiffness.isZero(0);
+    std::optional<LoadedPosture> loaded;
+    if (change && !given.null_stiffness.isZero(0)) {
+      loaded.emplace(LoadedPosture{*change, law_.posture_error()});
+    }
     load = stiffness_under_load(robot_, springs ? given : Impedance(n_), terms.load, wrenches,
-                                pulls ? &loaded : nullptr);
+                                loaded ? &*loaded : nullptr);
     more.load = &load;
   }
   controller::closed_loop(robot_, qd_, impedance(), law_.null_space(), joint_friction(), more,

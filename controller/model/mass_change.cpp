@@ -1,4 +1,4 @@
-#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/model/mass_change.hpp>
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -8,21 +8,6 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-/// A rigid body's inertia about one point.
-struct BodyInertia {
-  double mass = 0;
-  Vector3d first_moment = Vector3d::Zero();
-  Matrix3d second = Matrix3d::Zero();
-
-  /// Returns the momentum of a twist at the point, linear first.
-  Vector6 operator*(const Vector6& twist) const {
-    const Vector3d v = twist.head<3>(), w = twist.tail<3>();
-    Vector6 momentum;
-    momentum << mass * v + w.cross(first_moment), second * w + first_moment.cross(v);
-    return momentum;
-  }
-};
 
 /// Returns the change of the twist b that moves along with the twist a.
 Vector6 turned_twist(const Vector6& a, const Vector6& b) {
@@ -47,15 +32,23 @@ Vector3d three(const Rows& rows, std::size_t first, std::size_t lane) {
 
 }  // namespace
 
-JointMatrix DynamicsKernel::mass_change(const JointVector& q, const Jacobian& J,
-                                        const JointVector& x) const noexcept {
-  const auto n = static_cast<std::size_t>(n_);
+Vector6 MassChange::Body::operator*(const Vector6& twist) const noexcept {
+  const Vector3d v = twist.head<3>(), w = twist.tail<3>();
+  Vector6 result;
+  result << mass * v + w.cross(first_moment), second * w + first_moment.cross(v);
+  return result;
+}
+
+MassChange::MassChange(const DynamicsKernel& kernel, const JointVector& q,
+                       const Jacobian& J) noexcept
+    : J_(J) {
+  const auto n = static_cast<std::size_t>(kernel.n_);
   std::array<Matrix3d, kMaxJoints> R;
   std::array<Vector3d, kMaxJoints> p;  // from the first joint's origin
   Matrix3d R_now = Matrix3d::Identity();
   Vector3d tip = Vector3d::Zero();
   for (std::size_t i = 0; i < n; ++i) {
-    const Links& links = links_[i / 4];
+    const DynamicsKernel::Links& links = kernel.links_[i / 4];
     const std::size_t lane = i % 4;
     const auto at = static_cast<Eigen::Index>(i);
     const double angle = links.revolute[lane] * q[at];
@@ -71,44 +64,47 @@ JointMatrix DynamicsKernel::mass_change(const JointVector& q, const Jacobian& J,
     p[i] = tip;
     tip += R_now * (three(links.offset, 0, lane) + next * three(links.next_slide, 0, lane));
   }
-
-  std::array<Vector6, kMaxJoints> V;
-  Vector6 sum = Vector6::Zero();
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    V[i] = sum += x[at] * J.col(at);
-  }
-  JointMatrix change(n_, n_);
-  std::array<Vector6, kMaxJoints> momentum;  // I_i c_i
-  BodyInertia carried;
-  Vector6 W = Vector6::Zero();
+  Body carried;
   for (std::size_t k = n; k-- > 0;) {
-    const Links& links = links_[k / 4];
+    const DynamicsKernel::Links& links = kernel.links_[k / 4];
     const std::size_t lane = k % 4;
-    const auto column = static_cast<Eigen::Index>(k);
     const Vector3d a = p[k] - tip, h = R[k] * three(links.first_moment, 0, lane);
     Matrix3d I;
     I << links.inertia[0][lane], links.inertia[3][lane], links.inertia[4][lane],
         links.inertia[3][lane], links.inertia[1][lane], links.inertia[5][lane],
         links.inertia[4][lane], links.inertia[5][lane], links.inertia[2][lane];
     const double m = links.mass[lane];
-    BodyInertia link;
-    link.mass = m;
-    link.first_moment = h + m * a;
-    link.second = R[k] * I * R[k].transpose() +
-                  (2 * h.dot(a) + m * a.squaredNorm()) * Matrix3d::Identity() - h * a.transpose() -
-                  a * h.transpose() - m * a * a.transpose();
-    carried.mass += link.mass;
-    carried.first_moment += link.first_moment;
-    carried.second += link.second;
-    W += link * V[k];
-    const Vector6 twist_k = J.col(column);
-    momentum[k] = carried * twist_k;
-    const Vector6 moved = turned_twist(twist_k, V[k]);
-    const Vector6 lower = turned_wrench(twist_k, W) - carried * moved;
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto row = static_cast<Eigen::Index>(i);
-      change(row, column) = i < k ? lower.dot(J.col(row)) : -momentum[i].dot(moved);
+    link_[k].mass = m;
+    link_[k].first_moment = h + m * a;
+    link_[k].second = R[k] * I * R[k].transpose() +
+                      (2 * h.dot(a) + m * a.squaredNorm()) * Matrix3d::Identity() -
+                      h * a.transpose() - a * h.transpose() - m * a * a.transpose();
+    carried.mass += link_[k].mass;
+    carried.first_moment += link_[k].first_moment;
+    carried.second += link_[k].second;
+    carried_[k] = carried;
+    momentum_[k] = carried * J.col(static_cast<Eigen::Index>(k));
+  }
+}
+
+JointMatrix MassChange::times(const JointVector& x) const noexcept {
+  const Eigen::Index n = J_.cols();
+  std::array<Vector6, kMaxJoints> V;
+  Vector6 sum = Vector6::Zero();
+  for (Eigen::Index i = 0; i < n; ++i) {
+    sum += x[i] * J_.col(i);
+    V[static_cast<std::size_t>(i)] = sum;
+  }
+  JointMatrix change(n, n);
+  Vector6 W = Vector6::Zero();
+  for (Eigen::Index k = n; k-- > 0;) {
+    const auto at = static_cast<std::size_t>(k);
+    W += link_[at] * V[at];
+    const Vector6 twist = J_.col(k), moved = turned_twist(twist, V[at]);
+    const Vector6 lower = turned_wrench(twist, W) - carried_[at] * moved;
+    for (Eigen::Index i = 0; i < k; ++i) change(i, k) = lower.dot(J_.col(i));
+    for (Eigen::Index i = k; i < n; ++i) {
+      change(i, k) = -momentum_[static_cast<std::size_t>(i)].dot(moved);
     }
   }
   return change;

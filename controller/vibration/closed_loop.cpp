@@ -56,40 +56,37 @@ Matrix3d derivative_of_error(const Vector3d& e) noexcept {
 void add_loaded_posture(const LoadedPosture& posture, const Jacobian& J, const JointVector& k,
                         const Vector6& e, const Matrix3d& A, JointMatrix& K) noexcept {
   const Index n = J.cols();
-  const NullSpace& null_space = posture.change.null_space();
-  const JointVector x = null_space.joint_velocity(e);
+  const NullSpaceChange& change = posture.change;
+  const JointVector x = change.share() * e;
   const double s = 1 / std::sqrt(1 + product(x, x) / (kPostureShare * kPostureShare));
-  const JointMatrix change = posture.change.of_joint_velocity(e);
+  JointMatrix dx = change.of_joint_velocity(e);
+  Jacobian moved(6, n);  // the change of e, as far as J# e does not turn with it
+  for (Index j = 0; j < n; ++j) {
+    moved.col(j) << -J.col(j).head<3>(), -(A * J.col(j).tail<3>());
+    moved.col(j) -= change.turning(e, j);
+  }
+  dx += change.share().lazyProduct(moved);
   JointVector pull(n);
   for (Index i = 0; i < n; ++i) pull[i] = k[i] * posture.error[i];
-  const JointMatrix turned = posture.change.of_torque(pull);
+  JointMatrix deflected = change.share().lazyProduct(J);  // 1 - N
   for (Index j = 0; j < n; ++j) {
-    Vector6 moved;  // the change of e, as far as J# e does not turn with it
-    moved << -J.col(j).head<3>(), -(A * J.col(j).tail<3>());
-    JointVector dx = null_space.joint_velocity(moved - posture.change.turning(e, j));
-    for (Index i = 0; i < n; ++i) dx[i] += change(i, j);
-    const double along = product(x, dx) * s * s / (kPostureShare * kPostureShare);
-    JointVector deflected = JointVector::Unit(n, j);
-    add(dx, deflected, s);
-    add(x, deflected, -s * along);
-    add(null_space.projected_velocity(JointVector::Unit(n, j)), deflected, -1);
-    const JointVector torque = null_space.spring(k, deflected);
-    for (Index i = 0; i < n; ++i) K(i, j) += torque[i] - turned(i, j);
+    double along = 0;
+    for (Index i = 0; i < n; ++i) along += x[i] * dx(i, j);
+    along *= s * s / (kPostureShare * kPostureShare);
+    for (Index i = 0; i < n; ++i) {
+      deflected(i, j) = k[i] * (deflected(i, j) + s * (dx(i, j) - x[i] * along));
+    }
   }
+  K += change.projector().lazyProduct(deflected);
+  K -= change.of_torque(pull);
 }
 
 /// K += D d(N qd)/dq with the damping D of the null space, N D N.
 void add_null_space_rate(const NullSpaceChange& change, const Jacobian& J, const JointVector& qd,
                          const JointMatrix& D, JointMatrix& K) noexcept {
-  const Jacobian moved = change.twists(qd);
-  const JointMatrix share = change.of_joint_velocity(twist(J, qd));
-  for (Index k = 0; k < J.cols(); ++k) {
-    JointVector rate = change.null_space().joint_velocity(moved.col(k));
-    for (Index i = 0; i < rate.size(); ++i) rate[i] += share(i, k);
-    JointVector torque = JointVector::Zero(rate.size());
-    add_product(D, rate, torque, -1);
-    for (Index i = 0; i < rate.size(); ++i) K(i, k) += torque[i];
-  }
+  JointMatrix rate = change.of_joint_velocity(twist(J, qd));
+  rate += change.share().lazyProduct(change.twists(qd));
+  K -= D.lazyProduct(rate);
 }
 
 }  // namespace

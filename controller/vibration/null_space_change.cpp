@@ -8,69 +8,68 @@ namespace dashpot::controller {
 using Eigen::Index;
 using Eigen::Vector3d;
 
+NullSpaceChange::NullSpaceChange(const DynamicsKernel& kernel, const JointVector& q,
+                                 const DynamicsResult& robot, const NullSpace& null_space,
+                                 bool in_tool_axes) noexcept
+    : tool_(in_tool_axes), J_(robot.J), mass_(kernel, q, robot.J) {
+  const Index n = J_.cols();
+  share_.resize(n, 6);
+  for (Index i = 0; i < 6; ++i) {
+    const Vector6 unit = Vector6::Unit(i);
+    inertia_.col(i) = null_space.inertia().wrench(unit);
+    share_.col(i) = null_space.joint_velocity(unit);
+  }
+  tip_torque_ = J_.transpose().lazyProduct(inertia_);
+  mobility_.resize(n, n);
+  for (Index i = 0; i < n; ++i) {
+    mobility_.col(i) = null_space.projected_acceleration(JointVector::Unit(n, i));
+  }
+  torque_projector_ = JointMatrix::Identity(n, n);
+  torque_projector_ -= J_.transpose().lazyProduct(share_.transpose());
+}
+
 Vector6 NullSpaceChange::turning(const Vector6& V, Index k) const noexcept {
   Vector6 change = Vector6::Zero();
   if (!tool_) return change;
-  const Vector3d w = robot_.J.col(k).tail<3>();
+  const Vector3d w = J_.col(k).tail<3>();
   change << w.cross(V.head<3>()), w.cross(V.tail<3>());
   return change;
 }
 
 Jacobian NullSpaceChange::twists(const JointVector& x) const noexcept {
-  Jacobian change = twist_change(robot_.J, x);
+  Jacobian change = twist_change(J_, x);
   if (!tool_) return change;
-  const Vector6 V = twist(robot_.J, x);
+  const Vector6 V = twist(J_, x);
   for (Index k = 0; k < change.cols(); ++k) change.col(k) -= turning(V, k);
   return change;
 }
 
 JointMatrix NullSpaceChange::torques(const Vector6& F) const noexcept {
-  JointMatrix change = geometric_stiffness(robot_.J, F);
+  JointMatrix change = geometric_stiffness(J_, F);
   if (!tool_) return change;
   for (Index k = 0; k < change.cols(); ++k) {
     const Vector6 turned = turning(F, k);
-    for (Index j = 0; j < change.rows(); ++j) change(j, k) += robot_.J.col(j).dot(turned);
+    for (Index j = 0; j < change.rows(); ++j) change(j, k) += J_.col(j).dot(turned);
   }
   return change;
 }
 
 JointMatrix NullSpaceChange::of_joint_velocity(const Vector6& V) const noexcept {
-  const Index n = robot_.J.cols();
-  const JointVector x = null_space_.joint_velocity(V);
-  const Jacobian moved = twists(x);
-  const JointMatrix mass = kernel_.mass_change(q_, robot_.J, x);
-  JointMatrix change = torques(null_space_.inertia().wrench(V));
-  for (Index k = 0; k < n; ++k) {
-    JointVector y(n);
-    for (Index i = 0; i < n; ++i) y[i] = change(i, k) - mass(i, k);
-    y = null_space_.projected_acceleration(y);
-    add(null_space_.joint_velocity(moved.col(k)), y, -1);
-    for (Index i = 0; i < n; ++i) change(i, k) = y[i];
-  }
+  const JointVector x = share_ * V;
+  const JointMatrix inert = torques(inertia_ * V) - mass_.times(x);
+  JointMatrix change = mobility_.lazyProduct(inert);
+  change -= share_.lazyProduct(twists(x));
   return change;
 }
 
 JointMatrix NullSpaceChange::of_torque(const JointVector& t) const noexcept {
-  const Index n = robot_.J.cols();
-  const JointVector ones = JointVector::Ones(n);
-  JointVector u = t;
-  null_space_.mass().solve_L(u.data());
-  null_space_.mass().solve_LT(u.data());
-  const JointVector z = null_space_.projected_acceleration(t);
-  const Jacobian moved = twists(z);
-  const JointMatrix mass = kernel_.mass_change(q_, robot_.J, z);
-  JointMatrix change = torques(null_space_.inertia().wrench(twist(robot_.J, u)));
-  for (Index k = 0; k < n; ++k) {
-    JointVector y(n), inert(n);
-    for (Index i = 0; i < n; ++i) {
-      inert[i] = mass(i, k);
-      y[i] = -change(i, k) - inert[i];
-    }
-    y = null_space_.spring(ones, y);
-    add(inert, y);
-    add_torque(robot_.J, -null_space_.inertia().wrench(moved.col(k)), y);
-    for (Index i = 0; i < n; ++i) change(i, k) = y[i];
-  }
+  JointVector z = JointVector::Zero(t.size());
+  add_product(mobility_, t, z);
+  const Vector6 h = share_.transpose() * t;
+  JointMatrix change = mass_.times(z);
+  const JointMatrix projected = torques(h) + change;
+  change -= torque_projector_.lazyProduct(projected);
+  change -= tip_torque_.lazyProduct(twists(z));
   return change;
 }
 
