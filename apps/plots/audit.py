@@ -105,7 +105,9 @@ def main():
         arm = ["--urdf", f"sim/models/{name}.urdf", "--base", "base_link", "--tip", "tool0", "--q",
                "0,-1.57,1.57,-1.57,-1.57,0", "--joint-stiffness", stiffness, "--joint-damping", damping,
                "--period", "2 ms"]
-        rows.append(arm_row(f"{name}, its maker's joint PD, 500 Hz", arm, name))
+        rows.append(arm_row(f"{name}, joint PD of its maker's library, 500 Hz", arm, name))
+        arm[9], arm[11] = "100", "20"
+        rows.append(arm_row(f"{name}, joint PD of 100 and 20, 500 Hz", arm, name))
     rows.append(arm_row("fr3, crisp, 1 kHz",
                         [*FRANKAS["fr3"], "--preset", "crisp", "--period", "1 ms"], "fr3"))
     rows.append(arm_row("iiwa14, K 1000 and 100, factor 1.4, 2 ms", [

@@ -218,7 +218,7 @@ TEST(AuditTable, IsPrintedForEachPreset) {
                            DASHPOT_PROGRAM + " 20 >" + scratch.path("out") + " 2>&1";
   ASSERT_EQ(std::system(line.c_str()), 0) << scratch.read("out");
   const std::string text = scratch.read("out");
-  EXPECT_EQ(count_lines(text), 2 * 12 + 7 + 1 + 13);
+  EXPECT_EQ(count_lines(text), 2 * 12 + 10 + 1 + 13);
   EXPECT_THAT(text, HasSubstr("| `libfranka` | 1 | 0.394, 0.455, 0.512 |"));
   EXPECT_THAT(text, HasSubstr("| `fr3` | 0.195, 0.195, 0.195, 0.195, 0.074, 0.074, 0.074 |"));
 }
