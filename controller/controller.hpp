@@ -24,9 +24,8 @@ class ControllerCore;
 ///       ...                                      // send `torque`, whatever the status
 ///     }
 ///
-/// Read in this order: robot_model.hpp, dynamics.hpp, motion/reference.hpp, law/gain_blend.hpp,
-/// law/designed_damping.hpp, law/impedance_law.hpp, safety/safety_filter.hpp,
-/// vibration/vibration.hpp, and core/controller_core.hpp, which calls them.
+/// Read core/controller_core.cpp first, whose `update` calls the stages of a tick one after the
+/// other, and then the stages in this order.
 ///
 /// One thread at a time may use a Controller, also its const functions; `Latest` (latest.hpp)
 /// hands set-points to the thread of `update` and snapshots from it.

@@ -61,20 +61,14 @@ class GainJudge {
   /// cannot be analysed.
   double margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,
                 double enough);
-  /// Returns the integral of these springs as states of the loop.
-  analysis::ControllerMemory memory(const JointVector& q, const Gains& gains, Mode mode) const;
   Eigen::MatrixXd gravity_of(const DynamicsKernel& kernel, const JointVector& q) const;
 
   RobotModel model_;
   Settings settings_;
   Attachment attached_;
   DynamicsKernel kernel_;
-  DynamicsKernel bare_;        ///< without payload
-  bool loaded_;                ///< there is a payload
-  JointVector lower_, upper_;  ///< of the positions, rad
-  double wanted_;
-  double integral_time_;  ///< s; 0: none
-  bool gravity_;
+  DynamicsKernel bare_;  ///< without payload
+  bool loaded_;          ///< there is a payload
   analysis::SampledLoop loop_;
   PostureLoop posture_loop_;
 };

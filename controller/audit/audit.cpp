@@ -183,12 +183,13 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
   Impedance impedance = impedance_at(robot);
   NullSpace null_space;
   if (kinematic() && impedance.null_space()) {
-    null_space.compute(JointMatrix::Identity(model_.dof(), model_.dof()), robot.J, impedance.base,
-                       impedance.tool, robot.R_BT);
+    DynamicsResult unit = robot;
+    unit.M.setIdentity();
+    null_space.compute(unit, impedance);
     if (null_space.inertia().nearly_singular()) return audit(q).numbers;
     take_into_joints(null_space, impedance);
   } else if (impedance.null_space()) {
-    null_space.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
+    null_space.compute(robot, impedance);
   }
   LoopSystem loop;
   analysis::System<kMaxJoints> system;

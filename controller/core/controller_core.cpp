@@ -1,89 +1,46 @@
 #include <dashpot/controller/core/controller_core.hpp>
-#include <dashpot/controller/vibration/closed_loop.hpp>
+#include <dashpot/controller/core/thresholds.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace dashpot::controller {
-namespace {
-
-constexpr double kMostRestarts = 3;
-constexpr double kReserve = 1.02;  // of the gain margin, for what couples modes
-
-int gain_ticks(const Settings& settings) {
-  return static_cast<int>(std::lround(settings.motion.gain_time / settings.period));
-}
-
-std::optional<analysis::BorneDamping> borne_damping(const RobotModel& model,
-                                                    const Settings& settings) {
-  const double margin = settings.limits.gain_margin;
-  if (margin == 1) return {};
-  return analysis::BorneDamping(sampled_loop(model, settings), kReserve * margin);
-}
-
-/// Whole ns, which add up without rounding errors.
-double nanoseconds(double seconds) noexcept {
-  return std::round(1e9 * seconds);
-}
-
-}  // namespace
 
 ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings)
     : n_(model.dof()),
       settings_(settings),
-      vibration_(settings),
-      kernel_(model),
       state_check_(model, settings),
-      motion_watch_(model, settings),
-      doubt_(settings.limits),
-      references_(settings.motion, settings.period),
-      gains_(gain_ticks(settings), Impedance(n_)),
-      attachment_(gain_ticks(settings), model.attachment()),
-      wrench_(gain_ticks(settings), Vector6::Zero()),
-      borne_(borne_damping(model, settings)),
-      designed_(settings.subtract_friction ? JointVector(friction_left(model, settings).cwiseMax(0))
-                                           : JointVector(JointVector::Zero(n_)),
-                borne_ ? &*borne_ : nullptr),
-      law_(model, settings.feed_forward, SpringIntegral(settings.integral, settings.period),
-           borne_ ? &*borne_ : nullptr),
+      kernel_(model),
+      course_(model, settings),
+      faults_(model, settings),
+      designed_(designed_damping(model, settings)),
+      guide_(model, settings),
+      law_(model, settings.feed_forward),
+      integral_(settings.integral, settings.period),
       filter_(settings),
-      clamp_{settings.limits.linear_error, settings.limits.angular_error},
+      analysis_(model, settings),
       viscous_friction_(model.joint_values(&Joint::viscous_friction)),
       friction_left_(friction_left(model, settings)),
-      turn_(JointVector::Zero(n_)),
-      q_(turn_),
-      qd_(turn_),
-      weight_(turn_),
-      goal_(turn_),
-      outside_(!settings.environment.none()),
-      combined_(n_) {
-  if (settings.analysis.sampled.interval > 0) {
-    sampled_ = std::make_unique<SampledAnalysis>(model, settings);
-  }
-  for (int i = 0; i < n_; ++i) {
-    const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
-    if (joint.type == JointType::kContinuous) turn_[i] = 2 * std::numbers::pi;
-  }
+      brake_(n_) {
+  sensed_.q = sensed_.qd = sensed_.weight = JointVector::Zero(n_);
   reset(JointVector());
 }
 
 void ControllerCore::reset(const JointVector& torque) noexcept {
   state_check_.reset();
-  motion_watch_.reset();
+  faults_.reset();
   if (torque.size() == n_ && torque.allFinite()) {
     filter_.reset(torque);
   } else {
     filter_.restart();
   }
-  release();
-  accepted_ = settings_.initial;
-  look_.reset();
-  first_ = true;
-  ramp_ticks_ = 0;
-  restarts_ = 0;
-  attachment_.start(attachment_.target());
-  kernel_.attach(attachment_.now());
+  forget_springs();
+  course_.reset();
+  kernel_.attach(course_.attachment().now());
+  sensed_.any = false;
+  sensed_.external_wrench.setZero();
+  designed_.reset();
+  analysis_.reset();
   snapshot_ = Snapshot();
   for (JointVector* vector :
        {&snapshot_.position, &snapshot_.velocity, &snapshot_.torque, &snapshot_.law_torque,
@@ -91,213 +48,220 @@ void ControllerCore::reset(const JointVector& torque) noexcept {
         &snapshot_.integral_torque}) {
     vector->setZero(n_);
   }
-  external_wrench_.setZero();
-  vibration_.reset(n_);
-  designed_.reset();
-  loop_.reset();
-  analysed_.reset();
-  if (sampled_) sampled_->reset();
 }
 
 void ControllerCore::release() noexcept {
-  fault_ = Status::kOk;
-  rest_ = 0;
+  faults_.release();
+  forget_springs();
+}
+
+void ControllerCore::forget_springs() noexcept {
   state_check_.trust_velocities();
-  springs_ = Springs::kOff;
-  law_.integral().reset();
-  accepted_.wrench = settings_.initial.wrench;
-  accepted_.joint_position = settings_.initial.joint_position;
-  from_user_ = false;  // springs start where the robot is, with the gains in force
+  course_.release();
+  integral_.reset();
+  aim_ = Aim::kStop;
+}
+
+void ControllerCore::limit_tip_speed(const TipSpeed& speed) noexcept {
+  const double limit = std::min(settings_.limits.tip_velocity, speed.limit);
+  TipSpeed of_references = speed;
+  if (limit < settings_.limits.tip_velocity) {
+    of_references.linear = std::min(speed.linear, kShareOfTipLimit * limit);
+  }
+  guide_.limit_tip_speed(of_references);
+  filter_.limit_tip_speed(limit);
+  faults_.limit_tip_speed(limit);
 }
 
 Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
                               JointVector& torque) noexcept {
   ++snapshot_.tick;
   snapshot_.time = state.time;
-  const Status input = state_check_.check(state);
-  if (input >= Status::kStateNotFinite) {
-    show_measured(state);
-    rest_ = 0;
-    if (!first_ && state_check_.age() > settings_.watchdog.longest_gap) latch(input);
-    return ramp(input, torque);
-  }
-  const double dt = first_ ? settings_.period : std::max(settings_.period, state_check_.age());
-  setpoint_age_ = first_ ? 0 : setpoint_age_ + nanoseconds(dt);
-  time_ = state.time;
-  q_ = state_check_.position();
-  qd_ = state_check_.velocity();
-  const bool wrench_known = state.external_wrench.allFinite();
-  if (wrench_known) external_wrench_ = state.external_wrench;
-  step_attachment();
-  kernel_.evaluate(q_, qd_, robot_);
-  if (settings_.feed_forward.gravity) weight_ = robot_.gravity;
-  filter_.assume(weight_);
-  first_ = false;
 
-  Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
-  if (setpoint != nullptr && !accept_setpoint(*setpoint)) {
-    status = worse(status, Status::kSetpointRejected);
+  // Check the state.
+  const Status input = state_check_.check(state);
+  const double age = state_check_.age(), longest_gap = settings_.watchdog.longest_gap;
+  if (input >= Status::kStateNotFinite) {
+    if (state.position.size() == n_ && state.position.allFinite()) {
+      snapshot_.position = state.position;  // all else stays that of the last good state
+    }
+    if (state.velocity.size() == n_ && state.velocity.allFinite()) {
+      snapshot_.velocity = state.velocity;
+    }
+    filter_.ramp(torque);
+    faults_.applied(input, sensed_, sensed_.any ? age : 0, torque);
+    return finish(input, torque);
   }
-  status = worse(status, setpoint_age_status());
+  sensed_.dt = sensed_.any ? std::max(settings_.period, age) : settings_.period;
+  if (sensed_.any) course_.age(sensed_.dt);
+  sensed_.any = true;
+  sensed_.time = state.time;
+  sensed_.q = state_check_.position();
+  sensed_.qd = state_check_.velocity();
+  const bool wrench_known = state.external_wrench.allFinite();
+  if (wrench_known) sensed_.external_wrench = state.external_wrench;
+
+  // Evaluate the robot there, with what it carries now.
+  if (!course_.attachment().still()) {
+    const Pose before = course_.attachment().now().tool;
+    course_.step_attachment();
+    kernel_.attach(course_.attachment().now());
+    guide_.carry(before, course_.attachment().now().tool);
+  }
+  kernel_.evaluate(sensed_.q, sensed_.qd, sensed_.robot);
+  if (settings_.feed_forward.gravity) sensed_.weight = sensed_.robot.gravity;
+  filter_.assume(sensed_.weight);
+
+  // Take over the set-point.
+  Status status = wrench_known ? Status::kOk : Status::kWrenchNotFinite;
+  if (setpoint != nullptr) {
+    const Course::News news = course_.take(*setpoint, sensed_.time);
+    if (news == Course::News::kRefused) status = Status::kSetpointRejected;
+    if (in_force() && news >= Course::News::kGoal) {
+      guide_.set_goal(course_, news == Course::News::kGains, sensed_);
+    }
+  }
+  status = worse(status, course_.age_status());
+
+  // Watch the motion.
+  const bool odd_stamp = input == Status::kTimeBackward && state_check_.backward() <= longest_gap;
+  Status seen = odd_stamp ? Status::kOk : input;  // a stamp or two that say nothing
   // A reflex that has lost its sensor protects nobody.
   const bool blind = !wrench_known && std::isfinite(settings_.limits.external_force);
-  // A stamp or two that say nothing change no torque.
-  const bool odd_stamp =
-      input == Status::kTimeBackward && state_check_.backward() <= settings_.watchdog.longest_gap;
-  const Status seen = odd_stamp ? Status::kOk : input;
-  status = worse(status, watch_motion(blind ? worse(seen, Status::kCollision) : seen, dt));
-  SafetyFilter::Aim aim = SafetyFilter::Aim::kSprings;
-  if (status >= Status::kSetpointLost) {
-    aim = end_springs();
-    torque = weight_;
-  } else {
-    impedance_torque(status == Status::kSetpointStale, torque);
-    level_ = designed_.level();
-    level_.include(law_.null_level());
+  if (blind) seen = worse(seen, Status::kCollision);
+  const bool braked = aim_ != Aim::kSprings && !filter_.fades();
+  const bool still = guide_.still(course_.gains().now());
+  const bool latched = faults_.fault() != Status::kOk;
+  status = worse(status, faults_.watch(seen, sensed_, still, braked));
+  if (latched && faults_.fault() == Status::kOk) forget_springs();
+
+  // Ask the law, or leave it to the brake.
+  const bool hold = status == Status::kSetpointStale;
+  const SmallCholesky* factor = nullptr;  // of M, where somebody has it
+  if (status < Status::kSetpointLost) {
+    if (aim_ != Aim::kSprings) restart_springs();
+    course_.step(hold);
+    const Impedance &given = course_.gains().now(),
+                    &impedance = designed_.update(course_.gains(), sensed_.robot);
+    const NullSpace& null_space = designed_.null_space();
+    guide_.step(course_, hold, sensed_, null_space);
+    law_.torque({sensed_.robot, sensed_.q, sensed_.qd, impedance, null_space, guide_.references(),
+                 guide_.clamp(), course_.wrench(), integral_.on() ? &integral_ : nullptr},
+                asked_);
+    torque = asked_.torque;
+    level_ = designed_.level(given);
     // While gains change, dampers that fade keep the margin as well.
-    if (!level_.kept && gains_.still()) status = worse(status, Status::kLittleMargin);
+    if (!level_.kept && course_.gains().still()) status = worse(status, Status::kLittleMargin);
+    if (given.task_weight > 0) factor = &null_space.mass();
+  } else {
+    brake();
+    torque = sensed_.weight;
   }
-  const Status limits = filter_.apply(
-      {q_, qd_, robot_, weight_, springs_ == Springs::kInForce ? law_.mass() : nullptr},
-      motion_watch_.tip_speed(), aim, law_.dampers(), torque);
-  if (springs_ == Springs::kInForce && law_.integral().on()) {
-    integrate(limits, status == Status::kSetpointStale);
+
+  // Limit the torque.
+  const Status limits =
+      filter_.apply({sensed_.q, sensed_.qd, sensed_.robot, sensed_.weight, factor},
+                    faults_.tip_speed(), aim_, asked_.dampers, torque);
+  if (in_force() && integral_.on()) {
+    const bool may_grow = limits == Status::kOk && !asked_.clamped;
+    if (course_.changes() != integrated_) {
+      integral_.fade(course_.steps_left());
+    } else if (!hold) {
+      integral_.step(asked_.joint_pull, asked_.tip_pull, may_grow);
+    }
+    integrated_ = course_.changes();
   }
   status = worse(status, limits);
-  motion_watch_.applied(torque, weight_);
-  if (status == Status::kNotFinite) {
-    if (++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap) latch(status);
-  } else {
-    ramp_ticks_ = 0;
-  }
-  fill_snapshot();
+  faults_.applied(status, sensed_, 0, torque);
+
+  show();
   return finish(odd_stamp ? worse(status, input) : status, torque);
 }
 
-Status ControllerCore::watch_motion(Status input, double dt) noexcept {
-  restarts_ = std::max(0.0, restarts_ - dt);
-  const bool still = references_still();
-  Status now = worse(input, motion_watch_.check({dt, q_, qd_, robot_, external_wrench_, still}));
-  if (restarts_ > kMostRestarts) now = worse(now, Status::kTooManyRestarts);
-  if (brake_fails(now, dt)) now = fault_ = Status::kBrakeDoubted;
-  if (latches(now)) {
-    latch(now);
-    rest_ = 0;
-  } else if (fault_ != Status::kOk && rested(dt)) {
-    release();
+void ControllerCore::restart_springs() noexcept {
+  aim_ = Aim::kSprings;
+  course_.restart(sensed_);
+  guide_.set_goal(course_, false, sensed_);
+  integral_.reset();
+  law_.reset();
+  filter_.begin_anew();
+  if (snapshot_.restarts++ > 0) faults_.count_restart();
+}
+
+void ControllerCore::brake() noexcept {
+  const bool begins = aim_ == Aim::kSprings || faults_.ramps();
+  if (begins) filter_.begin_anew();
+  aim_ = faults_.brake(begins);
+  integral_.reset();
+  level_ = {};
+  asked_.tip_error.setZero();
+  asked_.tip_wrench.setZero();
+  brake_.joint_damping = sensed_.robot.M / filter_.brake().stopping_time();
+  if (aim_ == Aim::kFloat) brake_.joint_damping.setZero();
+}
+
+LoopAnalysis::Loop ControllerCore::loop() const noexcept {
+  const bool springs = aim_ == Aim::kSprings;
+  TipWrenches wrenches{sensed_.external_wrench};
+  if (springs && settings_.feed_forward.wrench) wrenches.commanded = course_.wrench();
+  if (springs) wrenches.commanded += integral_.wrench();
+  std::optional<Posture> posture;
+  if (springs && asked_.posture_error.size() == n_) {
+    posture = {&kernel_, &sensed_.q, asked_.posture_error, guide_.references().posture.velocity()};
   }
-  return fault_ == Status::kOk ? Status::kOk : worse(now, Status::kFaultLatched);
+  return {snapshot_.tick,
+          sensed_,
+          springs,
+          {springs ? designed_.now(course_.gains().now()) : brake_, designed_.null_space(),
+           springs ? friction_left_ : viscous_friction_, wrenches, posture},
+          course_.changes(),
+          course_.attachment().now()};
 }
 
-void ControllerCore::latch(Status fault) noexcept {
-  if (fault_ == Status::kOk) {
-    fault_ = fault;
-    motion_watch_.forget_swings();  // those that come from now on are the brake's
+void ControllerCore::show() noexcept {
+  const Impedance& impedance = aim_ == Aim::kSprings ? course_.gains().now() : brake_;
+  const SpringReferences& references = guide_.references();
+  Snapshot& shown = snapshot_;
+  shown.mode = course_.setpoint().mode;
+  shown.joint_weight = impedance.joint_weight;
+  shown.task_weight = impedance.task_weight;
+  shown.position = sensed_.q;
+  shown.velocity = sensed_.qd;
+  shown.law_torque = filter_.asked();
+  shown.tip = {sensed_.robot.p_BT_B, sensed_.robot.R_BT};
+  const JointReference& path = shown.mode == Mode::kJoint ? references.joint : references.posture;
+  const bool springs = impedance.joint_weight > 0 || impedance.task_weight > 0;
+  shown.reference_position = springs ? path.position() : sensed_.q;
+  shown.reference_velocity = path.velocity();
+  if (!springs) shown.reference_velocity.setZero();
+  for (int i = 0; i < n_; ++i) shown.joint_error[i] = shown.reference_position[i] - sensed_.q[i];
+  if (impedance.task_weight > 0) {
+    shown.reference_tip = {references.tip.position(), references.tip.rotation().toRotationMatrix()};
+    shown.reference_twist = references.tip.velocity();
+  } else {
+    shown.reference_tip = shown.tip;
+    shown.reference_twist.setZero();
   }
-  if (springs_ == Springs::kInForce) springs_ = Springs::kEnding;
+  shown.tip_error = asked_.tip_error;
+  shown.tip_wrench = asked_.tip_wrench;
+  shown.joint_damping_ratio = impedance.joint_damping_ratio;
+  shown.task_damping_ratio = impedance.damping_ratio;
+  shown.damping_level = level_.level;
+  shown.payload = course_.attachment().now().payload();
+  shown.tool = course_.attachment().now().tool;
+  if (!integral_.on()) return;
+  shown.integral_torque = integral_.torque();
+  shown.integral_wrench = integral_.wrench();
 }
 
-bool ControllerCore::rested(double dt) noexcept {
-  constexpr double kAtRest = 0.01;  // of the velocity limits
-  const double wanted = settings_.watchdog.release_after;
-  if (wanted == 0) return false;
-  rest_ = dt > settings_.watchdog.longest_gap ? 0 : rest_ + dt;
-  for (int i = 0; i < n_; ++i) {
-    if (std::abs(qd_[i]) > kAtRest * settings_.limits.velocity[i]) rest_ = 0;
-  }
-  return rest_ >= wanted;
-}
-
-SafetyFilter::Aim ControllerCore::end_springs() noexcept {
-  using Aim = SafetyFilter::Aim;
-  law_.integral().reset();
-  if (springs_ != Springs::kOff || ramp_ticks_ > 0) {
-    filter_.begin_anew();
-    doubt_.reset();
-  }
-  springs_ = Springs::kOff;
-  const bool means_nothing = motion_watch_.sees_frozen();  // the velocity
-  if (means_nothing || fault_ == Status::kBrakeDoubted) return Aim::kFloat;
-  return fault_ == Status::kPositionLimit ? Aim::kReturn : Aim::kStop;
-}
-
-bool ControllerCore::brake_fails(Status now, double dt) noexcept {
-  if (fault_ == Status::kBrakeDoubted) return true;
-  if (springs_ != Springs::kOff || filter_.fades() || motion_watch_.sees_frozen()) return false;
-  const bool vibrates = fault_ != Status::kOk && now == Status::kInstability;
-  return doubt_.grows(dt, robot_, qd_) || vibrates;
-}
-
-Status ControllerCore::ramp(Status status, JointVector& tau) noexcept {
-  if (++ramp_ticks_ * settings_.period > settings_.watchdog.longest_gap) latch(status);
-  filter_.ramp(tau);
-  if (!first_) motion_watch_.applied(tau, weight_);
-  return finish(status, tau);
-}
-
-Status ControllerCore::finish(Status status, const JointVector& tau) noexcept {
-  snapshot_.torque = tau;
+Status ControllerCore::finish(Status status, const JointVector& torque) noexcept {
+  snapshot_.torque = torque;
   snapshot_.status = status;
-  snapshot_.fault = fault_;
-  vibration_.collect();
-  if (status >= Status::kStateNotFinite) return status;
-  if (vibration_.due(snapshot_.tick)) analyse();
-  if (sampled_ && sampled_->due(snapshot_.tick)) hand_over();
+  snapshot_.fault = faults_.fault();
+  analysis_.collect();
+  const bool good = status < Status::kStateNotFinite;
+  if (good && analysis_.due(snapshot_.tick)) analysis_.update(loop());
   return status;
-}
-
-/// What was measured, as far as it is numbers; all else in the snapshot stays that of the last good
-/// state.
-void ControllerCore::show_measured(const RobotState& state) noexcept {
-  if (state.position.size() == n_ && state.position.allFinite()) {
-    snapshot_.position = state.position;
-  }
-  if (state.velocity.size() == n_ && state.velocity.allFinite()) {
-    snapshot_.velocity = state.velocity;
-  }
-}
-
-void ControllerCore::fill_snapshot() noexcept {
-  const Impedance& impedance = gains_.now();
-  const bool springs = springs_ != Springs::kOff;
-  snapshot_.mode = accepted_.mode;
-  snapshot_.joint_weight = springs ? impedance.joint_weight : 0;
-  snapshot_.task_weight = springs ? impedance.task_weight : 0;
-  snapshot_.position = q_;
-  snapshot_.velocity = qd_;
-  snapshot_.law_torque = filter_.asked();
-  snapshot_.tip = {robot_.p_BT_B, robot_.R_BT};
-  if (snapshot_.joint_weight > 0 || snapshot_.task_weight > 0) {
-    const JointReference& path =
-        accepted_.mode == Mode::kJoint ? references_.joint : references_.posture;
-    snapshot_.reference_position = path.position();
-    snapshot_.reference_velocity = path.velocity();
-  } else {
-    snapshot_.reference_position = q_;
-    snapshot_.reference_velocity.setZero();
-  }
-  for (int i = 0; i < n_; ++i) {
-    snapshot_.joint_error[i] = snapshot_.reference_position[i] - q_[i];
-  }
-  if (snapshot_.task_weight > 0) {
-    snapshot_.reference_tip = {references_.tip.position(),
-                               references_.tip.rotation().toRotationMatrix()};
-    snapshot_.reference_twist = references_.tip.velocity();
-    snapshot_.tip_error = law_.tip_error();
-  } else {
-    snapshot_.reference_tip = snapshot_.tip;
-    snapshot_.reference_twist.setZero();
-    snapshot_.tip_error.setZero();
-  }
-  snapshot_.joint_damping_ratio = springs ? impedance.joint_damping_ratio : 0;
-  snapshot_.task_damping_ratio = springs ? impedance.damping_ratio : 0;
-  snapshot_.damping_level = springs ? level_.level : 1;
-  snapshot_.payload = attachment_.now().payload();
-  snapshot_.tool = attachment_.now().tool;
-  snapshot_.tip_wrench = springs ? law_.tip_wrench() : Vector6(Vector6::Zero());
-  if (!law_.integral().on()) return;
-  snapshot_.integral_torque = law_.integral().torque();
-  snapshot_.integral_wrench = law_.integral().wrench();
 }
 
 }  // namespace dashpot::controller

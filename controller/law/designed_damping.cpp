@@ -1,23 +1,12 @@
 #include <dashpot/controller/law/designed_damping.hpp>
 
 namespace dashpot::controller {
-namespace {
 
-/// Returns true if all springs are in the tool's axes. C_C is then designed in these axes, because
-/// there K_C does not change as the tool turns.
-bool in_tool(const Impedance& given) noexcept {
-  return given.base.none();
-}
-
-}  // namespace
-
-void RatioDamper::set(const JointMatrix& K, double ratio, const JointVector& friction,
-                      const analysis::BorneDamping* borne, double in_force) noexcept {
+void RatioDamper::set(const JointMatrix& K, double ratio, const JointVector& friction) noexcept {
   analysis::DampingTarget target = analysis::DampingTarget::constant(ratio);
   target.soft_frequency = kSoftFrequency;
   design_.set_target(target);
   design_.set_friction(friction);
-  design_.set_loop(borne, in_force);
   if (design_.set_stiffness(K) == analysis::Status::kOk) return;
   // As much as check_gains lets pass. A slow mode more, and a soft one.
   JointMatrix raised = K;
@@ -36,7 +25,7 @@ void RatioDamper::update(const JointMatrix& M, const Jacobian* J) noexcept {
 }
 
 DesignedDamping::DesignedDamping(const JointVector& viscous_friction,
-                                 const analysis::BorneDamping* borne)
+                                 const analysis::BorneDamping& borne)
     : borne_(borne),
       joint_damper_(static_cast<int>(viscous_friction.size())),
       in_force_(static_cast<int>(viscous_friction.size())) {
@@ -54,8 +43,9 @@ const Impedance& DesignedDamping::update(const GainBlend& gains,
     if (!joints_) joint_damper_.reset();
     if (tip) set_tip(given, robot);
     if (joints) {
+      joint_damper_.set_loop(borne_, 1 - given.task_share());
       joint_damper_.set(given.joint_stiffness, given.joint_damping_ratio,
-                        friction(given.joint_weight), borne_, 1 - given.task_share());
+                        friction(given.joint_weight));
     }
   }
   tip_ = tip;
@@ -66,11 +56,13 @@ const Impedance& DesignedDamping::update(const GainBlend& gains,
     joint_damper_.update(robot.M, nullptr);
     in_force_.joint_damping = given.joint_damping + joint_damper_.damping();
   }
+  if (given.task_weight > 0) null_space_.compute(robot, given, borne_);
   return now(given);
 }
 
-analysis::DampingLevel DesignedDamping::level() const noexcept {
+analysis::DampingLevel DesignedDamping::level(const Impedance& given) const noexcept {
   analysis::DampingLevel result;
+  if (given.task_weight > 0) result = null_space_.level();
   if (tip_) result.include(tip_damper_.level());
   if (joints_) result.include(joint_damper_.level());
   return result;
@@ -83,17 +75,19 @@ JointVector DesignedDamping::friction(double share) const noexcept {
 }
 
 void DesignedDamping::set_tip(const Impedance& given, const DynamicsResult& robot) noexcept {
-  // Springs in both frames are in force only while gains change, so that K_C is new at every tick.
+  // If all springs are in the tool's axes, C_C is designed there, because K_C does not change in
+  // them as the tool turns. Springs in both frames are in force only while gains change, so that
+  // K_C is new at every tick.
   const Matrix6 &K_B = given.base.stiffness, &K_T = given.tool.stiffness;
-  const Matrix6 K_C = in_tool(given)       ? K_T
+  const Matrix6 K_C = given.base.none()    ? K_T
                       : !given.tool.none() ? Matrix6(K_B + turned(K_T, robot.R_BT))
                                            : K_B;
-  tip_damper_.set(K_C, given.damping_ratio, friction(given.task_weight), borne_,
-                  given.task_share());
+  tip_damper_.set_loop(borne_, given.task_share());
+  tip_damper_.set(K_C, given.damping_ratio, friction(given.task_weight));
 }
 
 void DesignedDamping::design_tip(const Impedance& given, const DynamicsResult& robot) noexcept {
-  if (!in_tool(given)) {
+  if (!given.base.none()) {
     tip_damper_.update(robot.M, &robot.J);
     in_force_.base.damping = given.base.damping + tip_damper_.damping();
     return;

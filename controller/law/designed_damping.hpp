@@ -2,6 +2,7 @@
 #include <dashpot/analysis/ratio_damping.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/law/gain_blend.hpp>
+#include <dashpot/controller/law/null_space.hpp>
 
 namespace dashpot::controller {
 
@@ -22,10 +23,13 @@ class RatioDamper {
   void reset() noexcept { C_.setZero(); }
   /// Sets the stiffness, which rounding errors may make slightly indefinite, and the ratio.
   /// `friction` is the viscous friction of the joints (n, N m s/rad), which is subtracted from the
-  /// damping; without entries there is none. A sampled loop leaves of the ratio what it bears of
-  /// springs that are in force with the share `in_force`; null: all of it.
-  void set(const JointMatrix& K, double ratio, const JointVector& friction,
-           const analysis::BorneDamping* borne = nullptr, double in_force = 1) noexcept;
+  /// damping; without entries there is none.
+  void set(const JointMatrix& K, double ratio, const JointVector& friction) noexcept;
+  /// A sampled loop leaves of the ratio what it bears of springs that are in force with the share
+  /// `in_force`; `borne` has to outlive this.
+  void set_loop(const analysis::BorneDamping& borne, double in_force) noexcept {
+    design_.set_loop(&borne, in_force);
+  }
   /// Designs C for this tick, from the lower triangle of M, which rounding errors may make slightly
   /// indefinite. `J` is null for springs in the joints.
   void update(const JointMatrix& M, const Jacobian* J) noexcept;
@@ -44,22 +48,26 @@ class RatioDamper {
 /// C_C and C_q that give this ratio to the springs of tip and joints at the robot's posture. Ratio
 /// and stiffness are the blended ones, so that the damping changes as smoothly as they do. The
 /// given viscous friction is subtracted; if two modes are in force, each subtracts its share.
-/// Damping in the null space is added. Where the sampled loop does not bear a ratio, it is lowered.
+/// Where the sampled loop does not bear a ratio, it is lowered. Springs at the tip come with their
+/// null space.
 class DesignedDamping {
  public:
   /// `viscous_friction` is the friction of the robot's joints, n, N m s/rad; `borne` is what the
-  /// loop bears, which has to outlive this; null: any damping.
+  /// loop bears.
   explicit DesignedDamping(const JointVector& viscous_friction,
-                           const analysis::BorneDamping* borne = nullptr);
+                           const analysis::BorneDamping& borne = {});
 
-  /// Designs the damping of this tick. Returns springs and dampers, valid until the next tick.
+  /// Designs the damping of this tick, and computes the null space if there are springs at the tip.
+  /// Returns springs and dampers, valid until the next tick.
   const Impedance& update(const GainBlend& gains, const DynamicsResult& robot) noexcept;
   /// Returns springs and dampers of this tick again; `given` are the blended gains.
   const Impedance& now(const Impedance& given) const noexcept {
     return tip_ || joints_ ? in_force_ : given;
   }
-  /// Returns what the loop left of the ratios at this tick.
-  analysis::DampingLevel level() const noexcept;
+  /// Returns the null space of the last tick with springs at the tip.
+  const NullSpace& null_space() const noexcept { return null_space_; }
+  /// Returns what the loop left of the ratios at this tick; `given` are the blended gains.
+  analysis::DampingLevel level(const Impedance& given) const noexcept;
   void reset() noexcept { tip_ = joints_ = false; }
 
  private:
@@ -70,11 +78,12 @@ class DesignedDamping {
   bool tip_ = false, joints_ = false;  ///< whose damping is designed
   std::uint64_t changes_ = 0;
   JointVector friction_;  ///< no entries: none
-  const analysis::BorneDamping* borne_;
+  analysis::BorneDamping borne_;
   RatioDamper tip_damper_{6};
   RatioDamper joint_damper_;
   Jacobian J_;  ///< in the tool's axes
   Impedance in_force_;
+  NullSpace null_space_;
 };
 
 }  // namespace dashpot::controller

@@ -3,6 +3,9 @@
 namespace dashpot::controller {
 namespace {
 
+constexpr double kReferenceFrictionRise = 0.01;  // rad/s, of a velocity that has no noise
+constexpr double kFurther = 1.02;                // the reference keeps e at the edge of the clamp
+
 /// Returns R K_T R' a: K_T in the tool's axes times a vector in B's axes.
 Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R, const Vector6& a) noexcept {
   Vector6 local, result;
@@ -16,137 +19,112 @@ Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R, const Vector6
 
 }  // namespace
 
-ImpedanceLaw::ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward,
-                           const SpringIntegral& integral, const analysis::BorneDamping* borne)
+ImpedanceLaw::ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward)
     : feed_forward_(feed_forward),
-      friction_of_reference_(feed_forward.friction &&
-                             feed_forward.friction_at == FeedForward::FrictionAt::kReference),
-      friction_of_robot_(feed_forward.friction && !friction_of_reference_),
-      friction_rise_(friction_of_robot_ ? feed_forward.friction_rise : 0.01),
+      measured_(feed_forward.friction_at == FeedForward::FrictionAt::kMeasured),
       viscous_friction_(model.joint_values(&Joint::viscous_friction)),
-      coulomb_friction_(model.joint_values(&Joint::coulomb_friction)),
-      integral_(integral),
-      dampers_(JointVector::Zero(model.dof())),
-      joint_pull_(dampers_),
-      borne_(borne) {
-  if (!friction_of_robot_) return;
-  viscous_friction_ *= feed_forward.friction_share;
-  coulomb_friction_ *= feed_forward.friction_share;
+      coulomb_friction_(model.joint_values(&Joint::coulomb_friction)) {
+  if (measured_) {
+    viscous_friction_ *= feed_forward.friction_share;
+    coulomb_friction_ *= feed_forward.friction_share;
+  } else {
+    feed_forward_.friction_rise = kReferenceFrictionRise;
+  }
 }
 
-void ImpedanceLaw::torque(const DynamicsResult& robot, const JointVector& q, const JointVector& qd,
-                          const Impedance& impedance, const SpringReferences& references,
-                          const Vector6& wrench, const ErrorClamp& clamp,
-                          JointVector& tau) noexcept {
+void ImpedanceLaw::torque(const Input& now, LawTorque& result) noexcept {
+  const auto& [robot, q, qd, impedance, null_space, references, clamp, wrench, integral] = now;
+  JointVector& tau = result.torque;
   tau.setZero(q.size());
   JointVector reference_velocity = tau;  // qd_f
-  dampers_ = tau;
-  e_.setZero();
-  F_.setZero();
-  posture_error_.resize(0);
-  null_level_ = {};
-  mass_known_ = false;
-  if (integral_.on()) {
-    clamped_ = false;
-    tip_pull_.setZero();
-  }
+  result.dampers = tau;
+  result.posture_error.resize(0);
   if (impedance.joint_weight > 0) {
     const JointReference& path = references.joint;
     add_product(impedance.joint_stiffness, difference(path.position(), q), tau);
-    if (integral_.on()) joint_pull_ = tau;
-    add_product(impedance.joint_damping, difference(path.velocity(), qd), dampers_);
-    if (feed_forward_.acceleration) {
-      add_product(robot.M, path.acceleration(), tau, impedance.joint_weight);
-    }
+    add_product(impedance.joint_damping, difference(path.velocity(), qd), result.dampers);
     add(path.velocity(), reference_velocity, impedance.joint_weight);
-  } else if (integral_.on()) {
-    joint_pull_.setZero();
   }
-  if (impedance.task_weight > 0) {
-    const bool null_space = impedance.null_space();
-    const bool moves = (references.tip.point_velocity().array() != 0).any();
-    if (null_space || moves || feed_forward_.acceleration || friction_of_reference_) {
-      mass_known_ = true;
-      null_space_.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
-    }
-    F_ = task_wrench(robot, qd, impedance, references.tip, clamp);
-    if (null_space) {
-      posture_error_ = difference(references.posture.position(), q);
-      subtract_posture_share(posture_error_);
-      const JointVector dqd = difference(references.posture.velocity(), qd);
-      add(null_space_.spring(impedance.null_stiffness, posture_error_), tau);
-      add(null_space_.damper(impedance.null_damping, dqd), dampers_);
-      if (impedance.null_damping_ratio > 0) {
-        null_space_.set_loop(borne_, impedance.task_share());
-        const JointMatrix D = null_space_.ratio_damping(impedance, null_level_);
-        add(null_space_.damper(D, dqd), dampers_);
-      }
-    }
-    if (friction_of_reference_) {
-      add(null_space_.joint_velocity(references.tip.velocity()), reference_velocity,
+  if (integral != nullptr) result.joint_pull = tau;
+  if (impedance.joint_weight > 0 && feed_forward_.acceleration) {
+    add_product(robot.M, references.joint.acceleration(), tau, impedance.joint_weight);
+  }
+  const bool task = impedance.task_weight > 0;
+  Vector6& F = result.tip_wrench;
+  Vector6 tip_damping;
+  result.tip_pull.setZero();
+  result.clamped = false;
+  if (task) {
+    tip_damping = pull_tip(now, result);
+    if (impedance.null_space()) add_null_torque(now, result);
+    if (feed_forward_.friction && !measured_) {
+      add(null_space.joint_velocity(references.tip.velocity()), reference_velocity,
           impedance.task_weight);
     }
+  } else {
+    orientation_.reset();
+    result.tip_error.setZero();
+    F.setZero();
   }
-  if (feed_forward_.wrench) F_ += wrench;
-  if (integral_.on()) {
-    F_ += integral_.wrench();
-    add(integral_.torque(), tau);
+  if (feed_forward_.wrench) F += wrench;
+  if (integral != nullptr) {
+    F += integral->wrench();
+    add(integral->torque(), tau);
   }
-  add_torque(robot.J, F_, tau);
-  add(dampers_, tau);
-  if (impedance.task_weight > 0) add_torque(robot.J, tip_damping_, dampers_);
-  if (feed_forward_.friction) add_friction(friction_of_robot_ ? qd : reference_velocity, tau);
+  add_torque(robot.J, F, tau);
+  add(result.dampers, tau);
+  if (task) add_torque(robot.J, tip_damping, result.dampers);
+  const JointVector& v = measured_ ? qd : reference_velocity;
+  for (Eigen::Index i = 0; i < tau.size() && feed_forward_.friction; ++i) {
+    tau[i] += viscous_friction_[i] * v[i] +
+              coulomb_friction_[i] * std::tanh(v[i] / feed_forward_.friction_rise);
+  }
   if (feed_forward_.coriolis) add(robot.coriolis, tau);
   if (feed_forward_.gravity) add(robot.gravity, tau);
 }
 
-Vector6 ImpedanceLaw::task_wrench(const DynamicsResult& robot, const JointVector& qd,
-                                  const Impedance& impedance, const TipReference& path,
-                                  const ErrorClamp& clamp) noexcept {
-  e_.head<3>() = path.position() - robot.p_BT_B;
-  e_.tail<3>() = orientation_.update(path.rotation(), Eigen::Quaterniond(robot.R_BT));
-  const Vector6 clamped = clamp.clamped(e_, impedance.base, impedance.tool, robot.R_BT);
-  if (integral_.on()) {  // the reference keeps e at the edge of the clamp
-    const Vector6 further = 1.02 * e_;
-    clamped_ = clamp.clamped(further, impedance.base, impedance.tool, robot.R_BT) != further;
+Vector6 ImpedanceLaw::pull_tip(const Input& now, LawTorque& result) noexcept {
+  const TipImpedance &base = now.impedance.base, &tool = now.impedance.tool;
+  const Eigen::Matrix3d& R_BT = now.robot.R_BT;
+  const TipReference& path = now.references.tip;
+  Vector6& e = result.tip_error;
+  e.head<3>() = path.position() - now.robot.p_BT_B;
+  e.tail<3>() = orientation_.update(path.rotation(), Eigen::Quaterniond(R_BT));
+  const Vector6 clamped = now.clamp.clamped(e, base, tool, R_BT);
+  if (now.integral != nullptr) {
+    const Vector6 further = kFurther * e;
+    result.clamped = now.clamp.clamped(further, base, tool, R_BT) != further;
   }
-  const Vector6 velocity_error = path.velocity() - twist(robot.J, qd);
-  Vector6 F = Vector6::Zero();
-  tip_damping_.setZero();
-  if (!impedance.base.none()) {
-    const Vector6 pull = impedance.base.stiffness * clamped;
-    if (integral_.on()) tip_pull_ = pull;
-    F += pull;
-    tip_damping_ += impedance.base.damping * velocity_error;
+  const Vector6 velocity_error = path.velocity() - twist(now.robot.J, now.qd);
+  Vector6 damping = Vector6::Zero();
+  if (!base.none()) {
+    result.tip_pull = base.stiffness * clamped;
+    damping += base.damping * velocity_error;
   }
-  if (!impedance.tool.none()) {
-    const Vector6 pull = in_tool_axes(impedance.tool.stiffness, robot.R_BT, clamped);
-    if (integral_.on()) tip_pull_ += pull;
-    F += pull;
-    tip_damping_ += in_tool_axes(impedance.tool.damping, robot.R_BT, velocity_error);
+  if (!tool.none()) {
+    result.tip_pull += in_tool_axes(tool.stiffness, R_BT, clamped);
+    damping += in_tool_axes(tool.damping, R_BT, velocity_error);
   }
-  F += tip_damping_;
+  result.tip_wrench = result.tip_pull + damping;
   if (feed_forward_.acceleration) {
-    F += impedance.task_weight * null_space_.inertia().wrench(path.acceleration());
+    result.tip_wrench +=
+        now.impedance.task_weight * now.null_space.inertia().wrench(path.acceleration());
   }
-  return F;
+  return damping;
 }
 
-void ImpedanceLaw::subtract_posture_share(JointVector& dq) const noexcept {
-  const JointVector share = null_space_.joint_velocity(e_);
+void ImpedanceLaw::add_null_torque(const Input& now, LawTorque& result) noexcept {
+  const Impedance& impedance = now.impedance;
+  const NullSpace& null_space = now.null_space;
+  const JointReference& posture = now.references.posture;
+  JointVector& dq = result.posture_error;
+  dq = difference(posture.position(), now.q);
+  const JointVector share = null_space.joint_velocity(result.tip_error);
   add(share, dq, -1 / std::sqrt(1 + product(share, share) / (kPostureShare * kPostureShare)));
-}
-
-void ImpedanceLaw::integrate(SpringIntegral::Change change) noexcept {
-  if (clamped_ && change == SpringIntegral::Change::kFree) change = SpringIntegral::Change::kShrink;
-  integral_.step(joint_pull_, tip_pull_, change);
-}
-
-void ImpedanceLaw::add_friction(const JointVector& velocity, JointVector& tau) const noexcept {
-  for (Eigen::Index i = 0; i < tau.size(); ++i) {
-    tau[i] += viscous_friction_[i] * velocity[i] +
-              coulomb_friction_[i] * std::tanh(velocity[i] / friction_rise_);
-  }
+  const JointVector dqd = difference(posture.velocity(), now.qd);
+  add(null_space.spring(impedance.null_stiffness, dq), result.torque);
+  add(null_space.damper(impedance.null_damping, dqd), result.dampers);
+  if (impedance.null_damping_ratio > 0) add(null_space.ratio_damper(dqd), result.dampers);
 }
 
 }  // namespace dashpot::controller

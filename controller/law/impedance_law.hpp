@@ -11,6 +11,18 @@ namespace dashpot::controller {
 /// of it, rad (m).
 inline constexpr double kPostureShare = 0.3;
 
+/// A torque of the law, and what it is made of.
+struct LawTorque {
+  JointVector torque;                    ///< n, N m
+  JointVector dampers;                   ///< the part that comes from dampers, n, N m
+  JointVector joint_pull;                ///< K_q (q_d - q), n, N m
+  Vector6 tip_pull = Vector6::Zero();    ///< K_C e within the error clamp
+  Vector6 tip_error = Vector6::Zero();   ///< e
+  Vector6 tip_wrench = Vector6::Zero();  ///< of the Cartesian part
+  JointVector posture_error;             ///< q_0 - q - s J# e, n; no entries without null space
+  bool clamped = false;                  ///< the error clamp acts; told for an integral only
+};
+
 /// Computes the joint torque of springs and dampers between robot and reference, and of the
 /// feed-forward:
 ///
@@ -41,65 +53,36 @@ inline constexpr double kPostureShare = 0.3;
 /// Lambda is divided by something that vanishes at a singularity, and it is damped there.
 class ImpedanceLaw {
  public:
-  ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward,
-               const SpringIntegral& integral = SpringIntegral(Integral(), 0),
-               const analysis::BorneDamping* borne = nullptr);
+  ImpedanceLaw(const RobotModel& model, const FeedForward& feed_forward);
 
-  /// Sets `tau` to the joint torque. `wrench` is f, which counts only if FeedForward::wrench is on.
-  void torque(const DynamicsResult& robot, const JointVector& q, const JointVector& qd,
-              const Impedance& impedance, const SpringReferences& references, const Vector6& wrench,
-              const ErrorClamp& clamp, JointVector& tau) noexcept;
+  struct Input {
+    const DynamicsResult& robot;
+    const JointVector &q, &qd;
+    const Impedance& impedance;
+    const NullSpace& null_space;  ///< of these; not looked at without springs at the tip
+    const SpringReferences& references;
+    const ErrorClamp& clamp;
+    const Vector6& wrench;                     ///< f; counts only if FeedForward::wrench is on
+    const SpringIntegral* integral = nullptr;  ///< none, or one that is on
+  };
+  void torque(const Input& now, LawTorque& result) noexcept;
 
-  /// Forgets the last orientation error: the next one is the short way round.
+  /// Forgets the last orientation error: the next one is the short way round, as it is where
+  /// springs at the tip begin.
   void reset() noexcept { orientation_.reset(); }
 
-  /// Lets the integral take in the springs of the last torque, or what `change` allows of it.
-  void integrate(SpringIntegral::Change change) noexcept;
-  SpringIntegral& integral() noexcept { return integral_; }
-  const SpringIntegral& integral() const noexcept { return integral_; }
-
-  /// Return terms of the last torque: e, the wrench of its Cartesian part, and the null space,
-  /// which is up to date if the impedance has null-space springs or dampers.
-  const Vector6& tip_error() const noexcept { return e_; }
-  /// The part of the torque that comes from dampers, n.
-  const JointVector& dampers() const noexcept { return dampers_; }
-  const Vector6& tip_wrench() const noexcept { return F_; }
-  /// q_0 - q - s J# e, n; without entries where the null space has no springs or dampers.
-  const JointVector& posture_error() const noexcept { return posture_error_; }
-  const NullSpace& null_space() const noexcept { return null_space_; }
-  /// Returns the factor of the mass matrix of the last torque; null if it was not needed.
-  const SmallCholesky* mass() const noexcept { return mass_known_ ? &null_space_.mass() : nullptr; }
-  /// Returns what the loop left of the null space's damping ratio.
-  const analysis::DampingLevel& null_level() const noexcept { return null_level_; }
-
  private:
-  /// K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d; sets `tip_damping_` to the second.
-  Vector6 task_wrench(const DynamicsResult& robot, const JointVector& qd,
-                      const Impedance& impedance, const TipReference& path,
-                      const ErrorClamp& clamp) noexcept;
-  /// dq -= s J# e
-  void subtract_posture_share(JointVector& dq) const noexcept;
-  void add_friction(const JointVector& velocity, JointVector& tau) const noexcept;
+  /// Sets e and K_C e, and the wrench K_C e + C_C (V_d - J qd) + w_C Lambda Vd_d, of which it
+  /// returns the second term.
+  Vector6 pull_tip(const Input& now, LawTorque& result) noexcept;
+  /// N' K_0 (q_0 - q - s J# e) + N' C_0 N (qd_0 - qd), without the damper in the first.
+  static void add_null_torque(const Input& now, LawTorque& result) noexcept;
 
   FeedForward feed_forward_;
-  bool friction_of_reference_, friction_of_robot_;
-  double friction_rise_;  ///< rad/s; over this Coulomb friction changes sign smoothly
+  bool measured_;  ///< friction is compensated at the measured velocity, not the reference's
   JointVector viscous_friction_;
   JointVector coulomb_friction_;
   OrientationError orientation_;
-  Vector6 e_ = Vector6::Zero();
-  Vector6 F_ = Vector6::Zero();
-  NullSpace null_space_;
-  bool mass_known_ = false;
-  analysis::DampingLevel null_level_;
-  SpringIntegral integral_;
-  bool clamped_ = false;  ///< the error clamp acts
-  JointVector dampers_;
-  JointVector posture_error_;
-  Vector6 tip_damping_ = Vector6::Zero();
-  JointVector joint_pull_;  ///< K_q (q_d - q)
-  Vector6 tip_pull_ = Vector6::Zero();
-  const analysis::BorneDamping* borne_;
 };
 
 }  // namespace dashpot::controller

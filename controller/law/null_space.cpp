@@ -5,26 +5,27 @@
 #include <cmath>
 
 namespace dashpot::controller {
-namespace {
 
-constexpr double kNullRounding = 1e-9;
-
-}  // namespace
-
-void NullSpace::compute(const JointMatrix& M, const Jacobian& J, const TipImpedance& base,
-                        const TipImpedance& tool, const Eigen::Matrix3d& R_BT) noexcept {
+void NullSpace::compute(const DynamicsResult& robot, const Impedance& impedance,
+                        const analysis::BorneDamping& borne) noexcept {
+  const JointMatrix& M = robot.M;
   const auto n = static_cast<int>(M.rows());
   mass_.compute(M, 1e-14 * M.trace());
   Jh_.resize(6, n);
   Matrix6 A = Matrix6::Zero();  // Jh Jh'
   for (int i = 0; i < n; ++i) {
-    Vector6 y = J.col(i);
+    Vector6 y = robot.J.col(i);
     for (int k = 0; k < i; ++k) y -= mass_.L(i, k) * Jh_.col(k);
     y *= mass_.per_diagonal(i);
     Jh_.col(i) = y;
     A.noalias() += y * y.transpose();
   }
-  inertia_.compute(A, base, tool, R_BT);
+  inertia_.compute(A, impedance.base, impedance.tool, robot.R_BT);
+  level_ = {};
+  ratio_damping_.resize(0, 0);
+  if (impedance.null_damping_ratio > 0 && impedance.null_space()) {
+    damp(impedance.null_stiffness, {impedance, borne, level_});
+  }
 }
 
 JointVector NullSpace::spring(const JointVector& k, const JointVector& dq) const noexcept {
@@ -52,19 +53,11 @@ JointVector NullSpace::projected_acceleration(const JointVector& torque) const n
   return y;
 }
 
-double NullSpace::damping(const Impedance& impedance, double omega,
-                          analysis::DampingLevel& level) const noexcept {
-  const double wanted = 2 * impedance.null_damping_ratio * omega;
-  if (borne_ == nullptr) return wanted;
-  return wanted * borne_->share(omega, wanted, in_force_, level);
-}
-
-JointMatrix NullSpace::ratio_damping(const Impedance& impedance,
-                                     analysis::DampingLevel& level) const noexcept {
-  const JointVector& k = impedance.null_stiffness;
-  JointMatrix D(k.size(), k.size());
-  if (damp_one_motion(impedance, level, D)) return D;
+void NullSpace::damp(const JointVector& k, const Damping& damping) noexcept {
   const Eigen::Index n = k.size();
+  JointMatrix& D = ratio_damping_;
+  D.resize(n, n);
+  if (damp_one_motion(k, damping)) return;
   std::array<JointVector, kMaxJoints> velocity;  // columns of L^-T P
   for (Eigen::Index j = 0; j < n; ++j) {
     JointVector& y = velocity[static_cast<std::size_t>(j)];
@@ -84,18 +77,16 @@ JointMatrix NullSpace::ratio_damping(const Impedance& impedance,
   for (Eigen::Index l = 0; l < n; ++l) {
     if (root.roots[l] == 0) continue;
     const JointVector& v = root.vectors[static_cast<std::size_t>(l)];
-    const double rate = damping(impedance, root.roots[l], level);
+    const double rate = damping(root.roots[l]);
     for (Eigen::Index j = 0; j < n; ++j) {
       const double scaled = rate * v[j];
       for (Eigen::Index i = 0; i < n; ++i) D(i, j) += scaled * v[i];
     }
   }
-  return D;
 }
 
-bool NullSpace::damp_one_motion(const Impedance& impedance, analysis::DampingLevel& level,
-                                JointMatrix& D) const noexcept {
-  const JointVector& k = impedance.null_stiffness;
+bool NullSpace::damp_one_motion(const JointVector& k, const Damping& damping) noexcept {
+  constexpr double kNullRounding = 1e-9;
   const Eigen::Index n = k.size();
   double trace = 0, most = 0;  // of P's diagonal
   Eigen::Index best = 0;
@@ -113,17 +104,17 @@ bool NullSpace::damp_one_motion(const Impedance& impedance, analysis::DampingLev
   mass_.solve_LT(velocity.data());
   double stiffness = 0;
   for (Eigen::Index i = 0; i < n; ++i) stiffness += k[i] * velocity[i] * velocity[i];
-  const double rate = damping(impedance, std::sqrt(stiffness / most), level) / most;
+  const double rate = damping(std::sqrt(stiffness / most)) / most;
   for (Eigen::Index j = 0; j < n; ++j) {
-    for (Eigen::Index i = 0; i < n; ++i) D(i, j) = rate * y[i] * y[j];
+    for (Eigen::Index i = 0; i < n; ++i) ratio_damping_(i, j) = rate * y[i] * y[j];
   }
   return true;
 }
 
-JointVector NullSpace::damper(const JointMatrix& D, const JointVector& dqd) const noexcept {
+JointVector NullSpace::ratio_damper(const JointVector& dqd) const noexcept {
   JointVector y = dqd, result = JointVector::Zero(dqd.size());
   mass_.multiply_LT(y.data());
-  add_product(D, y, result);
+  add_product(ratio_damping_, y, result);
   mass_.multiply_L(result.data());
   return result;
 }

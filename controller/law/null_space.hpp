@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/analysis/borne_damping.hpp>
 #include <dashpot/controller/base/joint_algebra.hpp>
+#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/law/task_inertia.hpp>
 
 namespace dashpot::controller {
@@ -20,14 +21,14 @@ namespace dashpot::controller {
 ///     cond(M) max(k) |dq|.
 class NullSpace {
  public:
-  /// Sets what the loop bears of ratio_damping, which has to outlive this; null: any damping. Of
-  /// springs that are in force in part it takes their share, above 0 and at most 1.
-  void set_loop(const analysis::BorneDamping* borne, double in_force) noexcept {
-    borne_ = borne;
-    in_force_ = in_force;
-  }
-  void compute(const JointMatrix& M, const Jacobian& J, const TipImpedance& base,
-               const TipImpedance& tool, const Eigen::Matrix3d& R_BT) noexcept;
+  /// Computes the null space of the directions that an impedance selects, and, if it has null-space
+  /// springs and a ratio for them, the damping D = 2 ratio (P L^-1 K_0 L^-T P)^1/2, n x n, 1/s, in
+  /// energy coordinates: with it every free motion has the ratio on the springs K_0. Next to a
+  /// singularity D fades as the root of what P leaves of the springs, so that there the ratio stays
+  /// as well. In a sampled loop each motion gets the share that the loop bears; of springs that are
+  /// in force in part it takes their share.
+  void compute(const DynamicsResult& robot, const Impedance& impedance,
+               const analysis::BorneDamping& borne = {}) noexcept;
 
   /// Returns N' K_0 dq with K_0 = diag(k): the torque of springs k (n) for the deflection dq.
   JointVector spring(const JointVector& k, const JointVector& dq) const noexcept;
@@ -35,15 +36,12 @@ class NullSpace {
   JointVector damper(const JointVector& c, const JointVector& dqd) const noexcept {
     return spring(c, projected_velocity(dqd));
   }
-  /// Returns D = 2 ratio (P L^-1 K_0 L^-T P)^1/2, n x n, 1/s, symmetric, positive semidefinite: the
-  /// damping in energy coordinates with which every free motion has the impedance's ratio on its
-  /// null-space springs K_0. Next to a singularity it fades as the root of what P leaves of the
-  /// springs, so that there the ratio stays as well. In a sampled loop each motion gets the share
-  /// that the loop bears, and `level` counts it.
-  JointMatrix ratio_damping(const Impedance& impedance,
-                            analysis::DampingLevel& level) const noexcept;
-  /// Returns L D L' dqd: the torque of dampers D in energy coordinates for the velocity dqd.
-  JointVector damper(const JointMatrix& D, const JointVector& dqd) const noexcept;
+  /// Returns L D L' dqd: the torque of the damping for the ratio.
+  JointVector ratio_damper(const JointVector& dqd) const noexcept;
+  /// Returns D; it has no entries if there is no ratio.
+  const JointMatrix& ratio_damping() const noexcept { return ratio_damping_; }
+  /// Returns what the loop left of the ratio.
+  const analysis::DampingLevel& level() const noexcept { return level_; }
   /// Returns N dq.
   JointVector projected_velocity(const JointVector& dq) const noexcept;
   /// Returns M^-1 N' t = N M^-1 t: the acceleration that a joint torque leaves in the null space.
@@ -60,18 +58,26 @@ class NullSpace {
   }
 
  private:
-  /// Sets D of ratio_damping if P is a projector on one motion; returns false if not.
-  bool damp_one_motion(const Impedance& impedance, analysis::DampingLevel& level,
-                       JointMatrix& D) const noexcept;
-  /// Returns the damping of a free motion of this frequency, 1/s.
-  double damping(const Impedance& impedance, double omega,
-                 analysis::DampingLevel& level) const noexcept;
+  /// Returns the damping of a free motion of a frequency, 1/s, and includes what is left of it in
+  /// the level.
+  struct Damping {
+    const Impedance& impedance;
+    const analysis::BorneDamping& borne;
+    analysis::DampingLevel& level;
+    double operator()(double omega) const noexcept {
+      const double wanted = 2 * impedance.null_damping_ratio * omega;
+      return wanted * borne.share(omega, wanted, impedance.task_share(), level);
+    }
+  };
+  void damp(const JointVector& k, const Damping& damping) noexcept;
+  /// Sets D if P is a projector on one motion; returns false if not.
+  bool damp_one_motion(const JointVector& k, const Damping& damping) noexcept;
 
   TaskInertia inertia_;
   SmallCholesky mass_;
   Jacobian Jh_;
-  const analysis::BorneDamping* borne_ = nullptr;
-  double in_force_ = 1;
+  JointMatrix ratio_damping_;
+  analysis::DampingLevel level_;
 };
 
 }  // namespace dashpot::controller

@@ -31,9 +31,7 @@ void SpringIntegral::reset() noexcept {
 }
 
 void SpringIntegral::step(const JointVector& joint_pull, const Vector6& tip_pull,
-                          Change change) noexcept {
-  if (change == Change::kNone) return;
-  const bool may_grow = change == Change::kFree;
+                          bool may_grow) noexcept {
   for (Eigen::Index i = 0; i < torque_.size(); ++i) {
     const double next = torque_[i] + rate_ * joint_pull[i];
     if (!std::isfinite(next) || (!may_grow && std::abs(next) > std::abs(torque_[i]))) continue;

@@ -23,16 +23,13 @@ namespace dashpot::controller {
 /// deflects its springs, and returns with about the time constant `time`.
 class SpringIntegral {
  public:
-  /// May it change?
-  enum class Change : std::uint8_t { kFree, kShrink, kNone };
-
   SpringIntegral(const Integral& settings, double period) noexcept;
 
   bool on() const noexcept { return rate_ > 0; }
   void reset() noexcept;
   /// One tick with these pulls of the springs (n; 6, in B's axes). A pull of springs that are not
-  /// in force has to be zero.
-  void step(const JointVector& joint_pull, const Vector6& tip_pull, Change change) noexcept;
+  /// in force has to be zero. `may_grow`: or else it may only shrink.
+  void step(const JointVector& joint_pull, const Vector6& tip_pull, bool may_grow) noexcept;
   /// One tick of a fade to zero; `ticks`, at least 1, are left of it.
   void fade(double ticks) noexcept;
 

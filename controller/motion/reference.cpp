@@ -18,18 +18,8 @@ void JointReference::start(const JointVector& position) noexcept {
 }
 
 void JointReference::step(const JointVector& goal, double share) noexcept {
-  go(difference(goal, point_), &goal, share);
-}
-
-void JointReference::halt() noexcept {
-  go(JointVector::Zero(point_.size()), nullptr, 1);
-}
-
-/// Moves one period along the difference `way`, at whose end is the goal, if there is one.
-void JointReference::go(const JointVector& way, const JointVector* goal, double share) noexcept {
-  const bool arrives = approach(way, velocity_, norm_, period_, share);
-  if (arrives && goal != nullptr) {
-    point_ = *goal;
+  if (approach(difference(goal, point_), velocity_, norm_, period_, share)) {
+    point_ = goal;
   } else {
     add(velocity_, point_, period_);
   }
@@ -72,12 +62,6 @@ void TipReference::step(const Eigen::Vector3d& position, const Eigen::Quaternion
   go(position, rotation, within - e, false, share);
 }
 
-void TipReference::halt() noexcept {
-  approach<Vector6>(Vector6::Zero(), velocity_, norm_, period_);
-  advance();
-  smooth();
-}
-
 Vector6 TipReference::way_to(const Eigen::Vector3d& position,
                              const Eigen::Quaterniond& rotation) const noexcept {
   Vector6 d;
@@ -93,32 +77,21 @@ void TipReference::go(const Eigen::Vector3d& position, const Eigen::Quaterniond&
     point_ = position;
     point_rotation_ = rotation;
   } else {
-    advance();
+    point_ += period_ * velocity_.head<3>();
+    if ((velocity_.tail<3>().array() != 0).any()) {
+      point_rotation_ = quaternion(period_ * velocity_.tail<3>()) * point_rotation_;
+      point_rotation_.normalize();
+    }
   }
-  smooth();
-}
-
-void TipReference::advance() noexcept {
-  point_ += period_ * velocity_.head<3>();
-  if ((velocity_.tail<3>().array() == 0).all()) return;
-  point_rotation_ = quaternion(period_ * velocity_.tail<3>()) * point_rotation_;
-  point_rotation_.normalize();
-}
-
-void TipReference::smooth() noexcept {
   smoothing_.step(velocity_, period_);
   position_ = point_ + smoothing_.offset().head<3>();
   rotation_ = quaternion(smoothing_.offset().tail<3>()) * point_rotation_;
 }
 
-namespace {
-
 /// Ticks over which references are smoothed.
-int window(const Motion& motion, double period) {
+static int window(const Motion& motion, double period) {
   return static_cast<int>(std::lround(motion.smoothing / period));
 }
-
-}  // namespace
 
 SpringReferences::SpringReferences(const Motion& motion, double period) noexcept
     : joint({motion.velocity, motion.acceleration}, period, window(motion, period)),

@@ -24,7 +24,7 @@ class JointReference {
     position_[i] = position;
   }
   /// Brakes for one period, or stays at rest.
-  void halt() noexcept;
+  void halt() noexcept { step(point_); }
 
   const JointVector& position() const noexcept { return position_; }
   const JointVector& velocity() const noexcept { return smoothing_.velocity(); }
@@ -34,8 +34,6 @@ class JointReference {
   double speed() const noexcept { return norm_.speed(velocity_); }
 
  private:
-  void go(const JointVector& way, const JointVector* goal, double share) noexcept;
-
   JointNorm norm_;
   double period_;
   JointVector point_;  ///< before smoothing
@@ -81,7 +79,7 @@ class TipReference {
   void step(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation,
             const ReferenceGovernor& governor, double share = 1) noexcept;
   /// Brakes for one period, or stays at rest.
-  void halt() noexcept;
+  void halt() noexcept { go(point_, point_rotation_, Vector6::Zero(), true, 1); }
   /// Sets the limits of velocity, m/s and rad/s, both above zero.
   void limit_speed(double linear, double angular) noexcept {
     norm_.linear_velocity = linear;
@@ -102,8 +100,6 @@ class TipReference {
   /// Moves one period along the difference `d`, which `ends` at the given goal or before it.
   void go(const Eigen::Vector3d& position, const Eigen::Quaterniond& rotation, const Vector6& d,
           bool ends, double share) noexcept;
-  void advance() noexcept;
-  void smooth() noexcept;
 
   TwistNorm norm_;
   double period_;

@@ -16,16 +16,11 @@ struct JointNorm {
   JointVector velocity;      ///< limits, n, rad/s
   JointVector acceleration;  ///< n, rad/s^2
 
-  double speed(const JointVector& v) const noexcept { return largest(v, velocity); }
-  double effort(const JointVector& a) const noexcept { return largest(a, acceleration); }
-
- private:
-  static double largest(const JointVector& x, const JointVector& limit) noexcept {
-    double result = 0;
-    for (Eigen::Index i = 0; i < x.size(); ++i) {
-      result = std::max(result, std::abs(x[i]) / limit[i]);
-    }
-    return result;
+  double speed(const JointVector& v) const noexcept {
+    return v.cwiseQuotient(velocity).cwiseAbs().maxCoeff();
+  }
+  double effort(const JointVector& a) const noexcept {
+    return a.cwiseQuotient(acceleration).cwiseAbs().maxCoeff();
   }
 };
 
@@ -130,8 +125,6 @@ class Smoothing {
     }
   }
 
-  /// Returns true if all of the last W velocities were zero.
-  bool still() const noexcept { return still_ == window_; }
   const Vector& velocity() const noexcept { return velocity_; }
   const Vector& acceleration() const noexcept { return acceleration_; }
   const Vector& offset() const noexcept { return offset_; }

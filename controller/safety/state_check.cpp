@@ -50,12 +50,7 @@ StateCheck::StateCheck(const RobotModel& model, const Settings& settings)
 void StateCheck::reset() noexcept {
   timed_ = false;
   backward_ = ahead_ = 0;
-  for (Last* last : {&good_, &doubtful_}) {
-    last->any = false;
-    last->age = 0;
-    last->position.setZero(n_);
-    last->velocity.setZero(n_);
-  }
+  good_ = doubtful_ = {false, 0, JointVector::Zero(n_), JointVector::Zero(n_)};
   velocity_.setZero(n_);
   blind_ = false;
   intervals_ = 0;
@@ -105,7 +100,10 @@ Status StateCheck::check(const RobotState& state) noexcept {
   JointVector unwrapped;
   if (unwraps) {
     unwrapped = state.position;
-    unwrap(unwrapped, good_.position);
+    for (Eigen::Index i = 0; i < n_; ++i) {
+      if (!continuous_[static_cast<std::size_t>(i)]) continue;
+      unwrapped[i] += whole_turns(good_.position[i] - unwrapped[i]);
+    }
   }
   const JointVector& position = unwraps ? unwrapped : state.position;
   if (good_.any && (relocated || good_.age > longest_gap_)) {
@@ -159,7 +157,7 @@ bool StateCheck::follows(const Last& last, const RobotState& state) const noexce
   for (Eigen::Index i = 0; i < n_; ++i) {
     const double limit = velocity_limit_[i];
     const double before = last.velocity[i], now = state.velocity[i];
-    double position = state.position[i];  // as `unwrap` takes it
+    double position = state.position[i];  // as `check` takes it
     if (std::abs(position) > kFarthest) return false;
     if (any_continuous_ && continuous_[static_cast<std::size_t>(i)]) {
       position += whole_turns(last.position[i] - position);
@@ -186,12 +184,6 @@ bool StateCheck::believed(const RobotState& state, double gap) noexcept {
   doubtful_.position = state.position;
   doubtful_.velocity = state.velocity;
   return agreement_ > std::max(kAgreement, longest_gap_);
-}
-
-void StateCheck::unwrap(JointVector& position, const JointVector& last) const noexcept {
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    if (continuous_[static_cast<std::size_t>(i)]) position[i] += whole_turns(last[i] - position[i]);
-  }
 }
 
 }  // namespace dashpot::controller

@@ -70,8 +70,6 @@ class StateCheck {
   bool follows(const Last& last, const RobotState& state) const noexcept;
   /// True if this state and those before have agreed with each other for long enough.
   bool believed(const RobotState& state, double gap) noexcept;
-  /// Brings angles of continuous joints next to their last.
-  void unwrap(JointVector& position, const JointVector& last) const noexcept;
   /// True if ticks have come at another rate than the configured one.
   bool wrong_rate(double gap) noexcept;
   /// Compares a good state with the one before. Returns kOk, kStateContradictory or kWrongRate.

@@ -196,20 +196,18 @@ void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) n
   }
 }
 
-void add_null_damping(const Impedance& impedance, const NullSpace& null_space,
-                      JointMatrix& C) noexcept {
-  if (impedance.null_damping_ratio == 0) return;
-  analysis::DampingLevel level;
-  const JointMatrix D = null_space.ratio_damping(impedance, level);
+void add_null_damping(const NullSpace& null_space, JointMatrix& C) noexcept {
   for (Index j = 0; j < C.cols(); ++j) {
-    const JointVector column = null_space.damper(D, JointVector::Unit(C.rows(), j));
+    const JointVector column = null_space.ratio_damper(JointVector::Unit(C.rows(), j));
     for (Index i = 0; i < C.rows(); ++i) C(i, j) += column[i];
   }
 }
 
-void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Impedance& impedance,
-                 const NullSpace& null_space, const JointVector& viscous_friction,
-                 const StiffnessTerms& terms, analysis::System<kMaxJoints>& system) noexcept {
+void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Acting& acting,
+                 const Settings& settings, analysis::System<kMaxJoints>& system) noexcept {
+  const NullSpace& null_space = acting.null_space;
+  Impedance impedance = acting.impedance;
+  if (!settings.environment.none()) add_environment(settings.environment, impedance);
   const Jacobian& J = robot.J;
   const Index n = J.cols();
   const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
@@ -221,21 +219,34 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
     null_projector(null_space, projector);
     add_projected(projector, impedance.null_stiffness, K_N);
     add_projected(projector, impedance.null_damping, D);
-    add_null_damping(impedance, null_space, D);
+    if (impedance.null_damping_ratio > 0) add_null_damping(null_space, D);
     C += D;
   }
   JointMatrix K = K_N;
   add_congruence(J, K_C, J, K);
   add_congruence(J, C_C, J, C);
-  for (Index i = 0; i < n; ++i) C(i, i) += viscous_friction[i];
+  for (Index i = 0; i < n; ++i) C(i, i) += acting.friction[i];
 
+  const TaskTerms& terms = settings.task_terms;
+  const bool loaded = terms.load != Load::kIgnored && !acting.wrenches.world.isZero(0);
   JointMatrix extra = JointMatrix::Zero(n, n);
-  if (terms.load != nullptr) extra = *terms.load;
+  std::optional<NullSpaceChange> change;
+  if (acting.posture && impedance.null_space() && (loaded || terms.jacobian_rate)) {
+    change.emplace(*acting.posture->kernel, *acting.posture->q, robot, null_space,
+                   !impedance.tool.none());
+  }
+  if (loaded) {
+    std::optional<LoadedPosture> pulled;
+    if (change && !impedance.null_stiffness.isZero(0)) {
+      pulled.emplace(LoadedPosture{*change, acting.posture->error});
+    }
+    extra = stiffness_under_load(robot, acting.impedance, terms.load, acting.wrenches,
+                                 pulled ? &*pulled : nullptr);
+  }
   if (terms.jacobian_rate) {
     add_congruence(J, C_C, jacobian_rate(J, qd), extra);
-    if (terms.null_space != nullptr && !D.isZero(0)) {
-      const JointVector error = difference(qd, terms.posture_velocity);
-      add_null_space_rate(*terms.null_space, J, error, D, extra);
+    if (change && !D.isZero(0)) {
+      add_null_space_rate(*change, J, difference(qd, acting.posture->velocity), D, extra);
     }
   }
 
@@ -249,7 +260,7 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Imped
       system.stiffness(i, j) = 0.5 * (K(i, j) + K(j, i)) + extra(i, j);
     }
   }
-  if (terms.jacobian_rate || terms.load != nullptr) {
+  if (terms.jacobian_rate || loaded) {
     system.stiffness_factor.resize(0, n);
     return;
   }

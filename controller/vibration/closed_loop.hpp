@@ -6,6 +6,8 @@
 #include <dashpot/controller/vibration/jacobian_change.hpp>
 #include <dashpot/controller/vibration/null_space_change.hpp>
 
+#include <optional>
+
 namespace dashpot::controller {
 
 /// The wrenches at the tip, in B's axes, that do not come from springs, N and N m.
@@ -68,36 +70,44 @@ JointVector friction_left(const RobotModel& model, const Settings& settings);
 JointMatrix integral_stiffness(const DynamicsResult& robot, const Impedance& impedance,
                                double time) noexcept;
 
-/// Terms of the stiffness that most analyses leave out.
-struct StiffnessTerms {
-  bool jacobian_rate = false;         ///< J' C_C Jdot
-  const JointMatrix* load = nullptr;  ///< of stiffness_under_load, n x n
-  /// With jacobian_rate: N' C_0 d(N (qd - qd_0))/dq as well, of the dampers of the null space, as
-  /// long as they pull little. Null: there are none.
-  const NullSpaceChange* null_space = nullptr;
-  JointVector posture_velocity = {};  ///< qd_0, n, rad/s
-};
-
 /// Sets P to N, which projects joint velocities on the null space.
 void null_projector(const NullSpace& null_space, JointMatrix& P) noexcept;
 
 /// C += L D L' with the D of the null space's ratio, see NullSpace::ratio_damping.
-void add_null_damping(const Impedance& impedance, const NullSpace& null_space,
-                      JointMatrix& C) noexcept;
+void add_null_damping(const NullSpace& null_space, JointMatrix& C) noexcept;
 
 /// K += P' diag(k) P
 void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) noexcept;
 
-/// Sets `system` to the robot with the springs and dampers of an impedance, M q'' + C q' + K q = f,
-/// linearised where the springs are at rest (e = 0, q = q_d, q = q_0) and N stands still:
+/// Where an arm with posture springs or dampers is, and where these pull it: what makes N and J#
+/// turn.
+struct Posture {
+  const DynamicsKernel* kernel;
+  const JointVector* q;  ///< n, rad
+  JointVector error;     ///< p = q_0 - q - s J# e, n; see ImpedanceLaw
+  JointVector velocity;  ///< qd_0, n, rad/s
+};
+
+/// What acts on a robot, besides its environment.
+struct Acting {
+  const Impedance& impedance;
+  const NullSpace& null_space;
+  const JointVector& friction;  ///< what the joints damp by themselves, n, N m s/rad
+  TipWrenches wrenches;
+  std::optional<Posture> posture = {};  ///< none: N stands still
+};
+
+/// Sets `system` to the robot with what acts on it and the environment of the settings, M q'' +
+/// C q' + K q = f, linearised where the springs are at rest (e = 0, q = q_d, q = q_0) and N stands
+/// still:
 ///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot + N' C_0 d(N (qd - qd_0))/dq]
 ///         [+ that of a load]
-///     C = C_q + J' C_C J + N' C_0 N + viscous friction of the joints.
-/// `terms` says which terms in brackets are included. If none is, K is symmetric and has its
-/// factor W. The feed-forward does not appear, because it depends on the set-point, not on the
-/// state, except for Coriolis and gravity, which cancel the robot's Coriolis and gravity torques.
-void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Impedance& impedance,
-                 const NullSpace& null_space, const JointVector& viscous_friction,
-                 const StiffnessTerms& terms, analysis::System<kMaxJoints>& system) noexcept;
+///     C = C_q + J' C_C J + N' C_0 N + friction.
+/// The task_terms of the settings say which terms in brackets are included; a load has none if the
+/// world exerts no wrench. If none is, K is symmetric and has its factor W. The feed-forward does
+/// not appear, because it depends on the set-point, not on the state, except for Coriolis and
+/// gravity, which cancel the robot's Coriolis and gravity torques.
+void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Acting& acting,
+                 const Settings& settings, analysis::System<kMaxJoints>& system) noexcept;
 
 }  // namespace dashpot::controller

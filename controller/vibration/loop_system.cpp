@@ -108,8 +108,7 @@ bool LoopSystem::add_free_motions(const Impedance& impedance, const NullSpace& n
     }
   }
   if (impedance.null_damping_ratio > 0) {
-    analysis::DampingLevel level;
-    const JointMatrix designed = null_space.ratio_damping(impedance, level);
+    const JointMatrix& designed = null_space.ratio_damping();
     for (int k = 0; k < r; ++k) {
       JointVector y = JointVector::Zero(n_);
       add_product(designed, Q_[static_cast<std::size_t>(k)], y);
@@ -148,7 +147,7 @@ void LoopSystem::add_null_space(const Impedance& impedance, const NullSpace& nul
     }
   }
   add_projected(projector, impedance.null_damping, C);
-  add_null_damping(impedance, null_space, C);
+  if (impedance.null_damping_ratio > 0) add_null_damping(null_space, C);
   if (any(impedance.null_stiffness)) rows_.grow(n_);
 }
 

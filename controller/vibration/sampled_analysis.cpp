@@ -43,6 +43,15 @@ Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector
   return gradient;
 }
 
+DesignedDamping designed_damping(const RobotModel& model, const Settings& settings) {
+  constexpr double kReserve = 1.02;  // of the margin, for what couples modes
+  JointVector subtracted = JointVector::Zero(model.dof());
+  if (settings.subtract_friction) subtracted = friction_left(model, settings).cwiseMax(0);
+  const double margin = settings.limits.gain_margin;
+  if (margin == 1) return DesignedDamping(subtracted);
+  return DesignedDamping(subtracted, {sampled_loop(model, settings), kReserve * margin});
+}
+
 analysis::ControllerMemory integral_memory(const Eigen::MatrixXd& K_I, double period) {
   constexpr double kNothing = 1e-12;  // of the largest eigenvalue
   const Eigen::Index n = K_I.rows();

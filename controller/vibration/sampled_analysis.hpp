@@ -2,6 +2,7 @@
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/latest.hpp>
+#include <dashpot/controller/law/designed_damping.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/snapshot.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
@@ -22,6 +23,10 @@ inline constexpr double kSlowestVibration = 1;
 
 /// Returns the sampled loop that the settings describe, without gravity.
 analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& settings);
+
+/// Returns what designs the damping of springs for their ratios: as much of it as that loop bears
+/// with Limits::gain_margin and a reserve.
+DesignedDamping designed_damping(const RobotModel& model, const Settings& settings);
 
 /// Returns the integral of springs with this K_I (n x n, N m/(rad s), symmetric positive
 /// semidefinite; see integral_stiffness) as states of the loop, as many as its rank: with K_I = F

@@ -72,9 +72,11 @@ struct Case {
   }
   JointVector torque(const Impedance& impedance, const FeedForward& parts, const Vector6& wrench) {
     ImpedanceLaw law(model, parts);
-    JointVector tau;
-    law.torque(robot, q, qd, impedance, references, wrench, kEndless, tau);
-    return tau;
+    NullSpace null_space;
+    null_space.compute(robot, impedance);
+    LawTorque result;
+    law.torque({robot, q, qd, impedance, null_space, references, kEndless, wrench}, result);
+    return result.torque;
   }
   Vector6 tip_error() const {
     Vector6 e;
@@ -225,7 +227,7 @@ TEST(Law, SumsTheModesByTheirWeights) {
     const double size = 1e-9 * (1 + plain.norm());
     EXPECT_TRUE(near(plain, springs, size));
     NullSpace null_space;  // of directions that are held in part
-    null_space.compute(one.robot.M, one.robot.J, impedance.base, impedance.tool, one.robot.R_BT);
+    null_space.compute(one.robot, impedance);
     const JointReference& joints = one.references.joint;
     const TipReference& tip = one.references.tip;
     const VectorXd acceleration =
@@ -274,17 +276,19 @@ TEST(ClosedLoop, AddsOptionalTermsAndFriction) {
   setpoint.gains = random_gains(random, 7);
   const auto impedance = Impedance(setpoint, 7);
   NullSpace null_space;
-  null_space.compute(one.robot.M, one.robot.J, impedance.base, impedance.tool, one.robot.R_BT);
+  null_space.compute(one.robot, impedance);
   JointVector friction = random.vector(7).cwiseAbs();
   const MatrixXd wanted = friction.asDiagonal();
   const Vector6 f = random.vector(6);
-  const auto system_with = [&](const StiffnessTerms& terms) {
+  const auto system_with = [&](const TaskTerms& terms) {
+    Settings settings;
+    settings.task_terms = terms;
     analysis::System<kMaxJoints> system;
-    controller::closed_loop(one.robot, one.qd, impedance, null_space, friction, terms, system);
+    closed_loop(one.robot, one.qd, {impedance, null_space, friction, {f, f}}, settings, system);
     return system;
   };
   const JointMatrix load = stiffness_under_load(one.robot, impedance, Load::kToolWrench, {f, f});
-  const auto plain = system_with({}), both = system_with({true, &load});
+  const auto plain = system_with({}), both = system_with({Load::kToolWrench, true});
   const MatrixXd J = one.robot.J, given = J.transpose() * setpoint.gains.task_damping;
   EXPECT_TRUE(near(both.stiffness - plain.stiffness,
                    given * jacobian_rate(one.robot.J, one.qd) + load, 1e-9));

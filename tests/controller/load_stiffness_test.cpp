@@ -68,8 +68,12 @@ struct HeldLoad {
   JointVector torque(ImpedanceLaw& law, Load load, const JointVector& there,
                      const JointVector& qd) const {
     const DynamicsResult now = at(there);
-    JointVector tau;
-    law.torque(now, there, qd, impedance, references, wrenches.commanded, kUnclamped, tau);
+    NullSpace null_space;
+    null_space.compute(now, impedance);
+    LawTorque result;
+    law.torque({now, there, qd, impedance, null_space, references, kUnclamped, wrenches.commanded},
+               result);
+    JointVector tau = result.torque;
     Vector6 f = wrenches.world;
     if (load == Load::kToolWrench) {
       const Eigen::Matrix3d turn = now.R_BT * robot.R_BT.transpose();
@@ -132,8 +136,12 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
       const JointMatrix added =
           stiffness_under_load(held.robot, held.impedance, load, held.wrenches);
       analysis::System<kMaxJoints> system;
-      closed_loop(held.robot, held.rest, held.impedance, law.null_space(), held.rest,
-                  {false, loaded ? &added : nullptr}, system);
+      NullSpace null_space;
+      null_space.compute(held.robot, held.impedance);
+      Settings settings;
+      settings.task_terms.load = load;
+      closed_loop(held.robot, held.rest, {held.impedance, null_space, held.rest, held.wrenches},
+                  settings, system);
       EXPECT_TRUE(near(system.mass, held.robot.M, 0));
       EXPECT_TRUE(near(system.damping, C, 1e-6 * C.norm()));
       EXPECT_TRUE(near(system.stiffness, K, (loaded ? 1e-7 : 1e-6) * K.norm()));
@@ -168,10 +176,14 @@ TEST(LoadStiffness, IsTheDerivativeOfPostureSpringsToo) {
       held.hold();
       held.references.posture.start(held.q + JointVector(0.2 * random.vector(7)));
       ImpedanceLaw law(held.model, {false, false, false, false, true});
-      held.torque(law, Load::kBaseWrench, held.q, held.rest);
-      if (law.null_space().inertia().regularity() < 3e-3) continue;
-      const NullSpace null_space = law.null_space();
-      const JointVector error = law.posture_error();
+      NullSpace null_space;
+      null_space.compute(held.robot, held.impedance);
+      if (null_space.inertia().regularity() < 3e-3) continue;
+      LawTorque asked;
+      law.torque({held.robot, held.q, held.rest, held.impedance, null_space, held.references,
+                  kUnclamped, held.wrenches.commanded},
+                 asked);
+      const JointVector error = asked.posture_error;
       const NullSpaceChange change(held.kernel, held.q, held.robot, null_space, k % 2 == 1);
       const LoadedPosture posture{change, error};
       for (const Load load : {Load::kBaseWrench, Load::kToolWrench, Load::kJointTorques}) {
@@ -182,8 +194,12 @@ TEST(LoadStiffness, IsTheDerivativeOfPostureSpringsToo) {
         const JointMatrix before =
             stiffness_under_load(held.robot, held.impedance, load, held.wrenches);
         analysis::System<kMaxJoints> system;
-        closed_loop(held.robot, held.rest, held.impedance, null_space, held.rest, {false, &added},
-                    system);
+        Settings settings;
+        settings.task_terms.load = load;
+        closed_loop(held.robot, held.rest,
+                    {held.impedance, null_space, held.rest, held.wrenches,
+                     Posture{&held.kernel, &held.q, error, held.rest}},
+                    settings, system);
         EXPECT_TRUE(near(system.stiffness, K, 1e-7 * K.norm()))
             << (system.stiffness - K).norm() / K.norm();
         most = std::max(most, (added - before).norm() / K.norm());
@@ -212,20 +228,20 @@ TEST(LoadStiffness, OfDampersUnderWayIsTheirDerivative) {
       held.impedance = Impedance(setpoint, 7);
       held.hold();
       ImpedanceLaw law(held.model, {false, false, false, false, false});
-      held.torque(law, Load::kBaseWrench, held.q, held.rest);
-      if (law.null_space().inertia().regularity() < 3e-3) continue;
-      const NullSpace null_space = law.null_space();
+      NullSpace null_space;
+      null_space.compute(held.robot, held.impedance);
+      if (null_space.inertia().regularity() < 3e-3) continue;
       const JointVector qd = null_space.joint_velocity(random.vector(6));
       const MatrixXd K = falling([&](const JointVector& d) {
         return held.torque(law, Load::kBaseWrench, held.q + d, qd);
       });
-      const NullSpaceChange change(held.kernel, held.q, held.robot, null_space, k % 2 == 1);
-      StiffnessTerms terms;
-      terms.jacobian_rate = true;
-      terms.null_space = &change;
-      terms.posture_velocity = held.rest;
+      Settings settings;
+      settings.task_terms.jacobian_rate = true;
       analysis::System<kMaxJoints> system;
-      closed_loop(held.robot, qd, held.impedance, null_space, held.rest, terms, system);
+      closed_loop(held.robot, qd,
+                  {held.impedance, null_space, held.rest, held.wrenches,
+                   Posture{&held.kernel, &held.q, held.rest, held.rest}},
+                  settings, system);
       EXPECT_TRUE(near(system.stiffness, K, 1e-7 * K.norm()));
       most = std::max(most, K.norm());
     }
@@ -280,9 +296,11 @@ TEST(LoadStiffness, AnEnvironmentAddsItsSpringsAndDampers) {
     setpoint.mode = mode;
     Impedance impedance(setpoint, 7);
     analysis::System<kMaxJoints> before, after;
-    closed_loop(held.robot, held.rest, impedance, null_space, held.rest, {}, before);
-    add_environment(environment, impedance);
-    closed_loop(held.robot, held.rest, impedance, null_space, held.rest, {}, after);
+    const Acting acting{impedance, null_space, held.rest, {}};
+    Settings settings;
+    closed_loop(held.robot, held.rest, acting, settings, before);
+    settings.environment = environment;
+    closed_loop(held.robot, held.rest, acting, settings, after);
     const MatrixXd J = held.robot.J;
     MatrixXd K = J.transpose() * environment.tip_stiffness.asDiagonal() * J;
     MatrixXd C = J.transpose() * environment.tip_damping.asDiagonal() * J;

@@ -41,14 +41,14 @@ struct Loop {
   /// Expects the same M, C and K of both forms; returns the number of rows of the factor.
   Eigen::Index expect_agreement(const Impedance& impedance) {
     NullSpace null_space;
-    null_space.compute(robot.M, robot.J, impedance.base, impedance.tool, robot.R_BT);
+    null_space.compute(robot, impedance);
     nearly_singular = null_space.inertia().nearly_singular();
     analysis::System<kMaxJoints> plain, system;
     for (analysis::System<kMaxJoints>* one : {&plain, &system}) {  // of what was there before
       one->has_low_words = true;
       one->stiffness_factor.setOnes(3, 2);
     }
-    closed_loop(robot, JointVector::Zero(n), impedance, null_space, friction, {}, plain);
+    closed_loop(robot, JointVector::Zero(n), {impedance, null_space, friction, {}}, {}, plain);
     factored.form(robot, impedance, null_space, friction, system);
     EXPECT_FALSE(plain.has_low_words || system.has_low_words);
     EXPECT_EQ(system.stiffness_factor.cols(), n);

@@ -22,10 +22,11 @@ class NullSpaceOfPanda : public ::testing::Test {
  protected:
   NullSpaceOfPanda() : model(testing::arm_model(testing::arms()[0])), kernel(model) {
     held.selected.setOnes();
+    impedance.task_weight = 1;
   }
   void at(const JointVector& q) {
     kernel.evaluate(q, JointVector::Zero(7), robot);
-    null_space.compute(robot.M, robot.J, held, tool, robot.R_BT);
+    null_space.compute(robot, impedance);
   }
   /// Stretched out: joints 2, 4 and 6 at zero align the elbow with the rest.
   static JointVector stretched(double bend) {
@@ -35,7 +36,8 @@ class NullSpaceOfPanda : public ::testing::Test {
   RobotModel model;
   DynamicsKernel kernel;
   DynamicsResult robot;
-  TipImpedance held, tool;
+  Impedance impedance{7};
+  TipImpedance &held = impedance.base, &tool = impedance.tool;
   NullSpace null_space;
 };
 
@@ -127,16 +129,13 @@ TEST_F(NullSpaceOfPanda, DampsFreeMotionsWithTheRatio) {
   for (int k = 0; k < 200; ++k) {
     held.selected.setOnes();
     if (k % 2 == 1) held.selected[k % 6] = held.selected[(k + 2) % 6] = 0;
-    at(random.vector(7));
-    if (null_space.inertia().nearly_singular()) continue;
-    const JointVector k0 = 30 * random.vector(7).cwiseAbs();
-    Impedance impedance(7);
+    const JointVector q = random.vector(7), k0 = 30 * random.vector(7).cwiseAbs();
     impedance.null_stiffness = k0;
     impedance.null_damping_ratio = 0.6;
-    analysis::DampingLevel level;
-    const JointMatrix D = null_space.ratio_damping(impedance, level);
+    at(q);
+    if (null_space.inertia().nearly_singular()) continue;
     MatrixXd C(7, 7);
-    for (int j = 0; j < 7; ++j) C.col(j) = null_space.damper(D, JointVector::Unit(7, j));
+    for (int j = 0; j < 7; ++j) C.col(j) = null_space.ratio_damper(JointVector::Unit(7, j));
     const MatrixXd M = robot.M, J = held.selected.asDiagonal() * robot.J;
     const MatrixXd Z = Eigen::FullPivLU<MatrixXd>(J).kernel();
     const Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd> modes(

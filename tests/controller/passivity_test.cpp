@@ -48,7 +48,7 @@ class Swing {
     torque(at);
     const JointVector e = references_.joint.position() - at.q;
     const double springs = 0.5 * e.dot(impedance_.joint_stiffness * e) +
-                           0.5 * law_.tip_error().dot(impedance_.base.stiffness * law_.tip_error());
+                           0.5 * asked_.tip_error.dot(impedance_.base.stiffness * asked_.tip_error);
     return springs + 0.5 * at.qd.dot(robot_.M * at.qd);
   }
 
@@ -66,10 +66,17 @@ class Swing {
   }
   JointVector torque(const JointState& there) {
     kernel_.evaluate(there.q, there.qd, robot_);
-    JointVector tau;
-    law_.torque(robot_, there.q, there.qd, impedance_, references_, Vector6::Zero(),
-                {kNoClamp, kNoClamp}, tau);
-    return tau;
+    null_space_.compute(robot_, impedance_);
+    law_.torque({robot_,
+                 there.q,
+                 there.qd,
+                 impedance_,
+                 null_space_,
+                 references_,
+                 {kNoClamp, kNoClamp},
+                 Vector6::Zero()},
+                asked_);
+    return asked_.torque;
   }
   JointState rate(const JointState& there) {
     const JointVector tau = torque(there);
@@ -80,6 +87,8 @@ class Swing {
   DynamicsKernel kernel_{model_};
   ImpedanceLaw law_;
   Impedance impedance_{7};
+  NullSpace null_space_;
+  LawTorque asked_;
   SpringReferences references_{{JointVector::Ones(7), JointVector::Ones(7), 1, 1, 1, 1, 1e-3, 0},
                                1e-3};
   DynamicsResult robot_;

@@ -77,10 +77,10 @@ inline const std::vector<Room>& rooms() {
       {"controller/safety", 3, {"setpoint_check", "settings_check"}, {kEigen}},
       {"controller/vibration",
        4,
-       {"rotors"},
+       {"posture_loop", "rotors"},
        {kAnalysis, kText, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
-      {"controller/core", 5, {"controller", "gain_judge", "posture_loop"}, {kAnalysis, kEigen}},
-      {"controller/audit", 5, {"audit"}, {kAnalysis, kEigen}},
+      {"controller/core", 5, {"controller"}, {kAnalysis, kEigen}},
+      {"controller/audit", 5, {"audit", "gain_judge"}, {kAnalysis, kEigen}},
       {"controller/config", 6, {"config"}, {kEigen}},
       {"controller/plugin", 7, {"plugin"}, {kAnalysis, kEigen, "stdint.h"}},  // plugin.h is C
 

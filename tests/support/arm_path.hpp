@@ -64,7 +64,7 @@ class ArmLoop {
 
   const analysis::System<analysis::kMaxDof>& at(const controller::JointVector& q) {
     kernel_.evaluate(q, controller::JointVector::Zero(q.size()), robot_);
-    null_space_.compute(robot_.M, robot_.J, impedance_.base, impedance_.tool, robot_.R_BT);
+    null_space_.compute(robot_, impedance_);
     loop_.form(robot_, impedance_, null_space_, friction_, system_);
     return system_;
   }

@@ -1,0 +1,58 @@
+#pragma once
+#include <dashpot/controller/core/sensed.hpp>
+#include <dashpot/controller/safety/brake_doubt.hpp>
+#include <dashpot/controller/safety/motion_watch.hpp>
+#include <dashpot/controller/safety/safety_filter.hpp>
+
+namespace dashpot::controller {
+
+/// Latches what the arm must not go on with, and releases it. Whoever latched first is the fault,
+/// until the brake is doubted.
+class Faults {
+ public:
+  using Aim = SafetyFilter::Aim;
+
+  Faults(const RobotModel& model, const Settings& settings)
+      : motion_watch_(model, settings), doubt_(settings.limits), settings_(settings) {}
+  void reset() noexcept;
+  void release() noexcept {
+    fault_ = Status::kOk;
+    rest_ = 0;
+  }
+
+  /// A tick with a good state: `seen` is what its check says. `still`: the references are at rest;
+  /// `braked`: the brake alone acts. Returns kOk if the state allows springs, or kFaultLatched or
+  /// worse.
+  Status watch(Status seen, const Sensed& now, bool still, bool braked) noexcept;
+  /// The torque of a tick, and its status. A ramp latches if it lasts, or where there has been no
+  /// good state for a time `lost` that is too long, s.
+  void applied(Status status, const Sensed& now, double lost, const JointVector& torque) noexcept;
+  /// Springs restart, not for the first time.
+  void count_restart() noexcept { ++restarts_; }
+
+  /// Returns the fault that latched, or kOk.
+  Status fault() const noexcept { return fault_; }
+  /// Returns what the arm is to do without springs; `begins`: from now on.
+  Aim brake(bool begins) noexcept;
+  /// True after a tick whose output was a ramp.
+  bool ramps() const noexcept { return ramp_ticks_ > 0; }
+  double tip_speed() const noexcept { return motion_watch_.tip_speed(); }
+  void limit_tip_speed(double limit) noexcept { motion_watch_.limit_tip_speed(limit); }
+
+ private:
+  void latch(Status fault) noexcept;
+  /// True once the robot has been at rest for Watchdog::release_after.
+  bool rested(const Sensed& now) noexcept;
+  /// True if the brake acts alone, and does not stop the arm.
+  bool brake_fails(Status found, const Sensed& now, bool braked) noexcept;
+
+  MotionWatch motion_watch_;
+  BrakeDoubt doubt_;
+  const Settings settings_;
+  Status fault_ = Status::kOk;
+  double rest_ = 0;      ///< for how long the robot has been at rest, s
+  double restarts_ = 0;  ///< of the last second or so
+  int ramp_ticks_ = 0;
+};
+
+}  // namespace dashpot::controller

@@ -1,0 +1,47 @@
+#pragma once
+#include <dashpot/controller/core/course.hpp>
+#include <dashpot/controller/law/null_space.hpp>
+#include <dashpot/controller/motion/reference.hpp>
+
+namespace dashpot::controller {
+
+/// Leads the references of the springs to where the course wants them, as fast as the limits of tip
+/// and joints allow where the robot is. A reference whose springs are not in force starts where the
+/// robot is; of two modes in force, the one that fades away stays where it is.
+class Guide {
+ public:
+  Guide(const RobotModel& model, const Settings& settings);
+
+  /// Sets limits of the tip's speed for the references in either mode.
+  void limit_tip_speed(const TipSpeed& speed) noexcept;
+  /// T goes from one place on the tip link to another, and the tip's reference with it.
+  void carry(const Pose& from, const Pose& to) noexcept;
+  /// Sets the goal of the course. With new gains, springs that are to grow from zero start where
+  /// the robot is.
+  void set_goal(const Course& course, bool new_gains, const Sensed& now) noexcept;
+  /// Moves references on by one period, in `hold` to rest.
+  void step(const Course& course, bool hold, const Sensed& now,
+            const NullSpace& null_space) noexcept;
+
+  const SpringReferences& references() const noexcept { return references_; }
+  const ErrorClamp& clamp() const noexcept { return clamp_; }
+  /// Returns true if all references in force are at rest; one that is not stays as it was.
+  bool still(const Impedance& impedance) const noexcept;
+
+ private:
+  void start_new_springs(const GainBlend& gains, const Sensed& now) noexcept;
+  /// Returns the share of its speed limits at which the tip's reference takes no joint too fast.
+  double tip_share(const NullSpace& null_space) const noexcept;
+  /// Returns the share of its speed limits at which the joints' reference takes the tip no faster
+  /// than limit_tip_speed allows.
+  double joint_share(const Jacobian& J) const noexcept;
+
+  const Settings settings_;
+  SpringReferences references_;
+  ErrorClamp clamp_;
+  TipSpeed tip_speed_;  ///< of the references
+  JointVector turn_;    ///< 2 pi for a continuous joint, else 0
+  JointVector goal_;    ///< of the joints, or of the posture
+};
+
+}  // namespace dashpot::controller

@@ -1,0 +1,70 @@
+#pragma once
+#include <dashpot/controller/core/sensed.hpp>
+#include <dashpot/controller/vibration/loop_system.hpp>
+#include <dashpot/controller/vibration/sampled_analysis.hpp>
+#include <dashpot/controller/vibration/vibration.hpp>
+
+#include <memory>
+#include <optional>
+
+namespace dashpot::controller {
+
+/// Finds the modes of the closed loop, tick by tick, and hands the loop to the analysis of the
+/// sampled one now and then.
+class LoopAnalysis {
+ public:
+  LoopAnalysis(const RobotModel& model, const Settings& settings);
+  void reset() noexcept;
+
+  /// The loop that a tick closed.
+  struct Loop {
+    std::uint64_t tick;
+    const Sensed& now;
+    bool springs;  ///< or the brake, or nothing
+    Acting acting;
+    std::uint64_t changes;  ///< of gains and attachment so far
+    const Attachment& attachment;
+  };
+  /// Returns true if it is time to analyse the loop of this tick.
+  bool due(std::uint64_t tick) const noexcept {
+    return vibration_.due(tick) || (sampled_ && sampled_->due(tick));
+  }
+  void update(const Loop& loop) noexcept;
+  /// Fetches what another thread found.
+  void collect() noexcept { vibration_.collect(); }
+  /// Sets `system` to a loop, with the terms and the environment of the settings.
+  void closed_loop(const Loop& loop, analysis::System<kMaxJoints>& system) const noexcept {
+    controller::closed_loop(loop.now.robot, loop.now.qd, loop.acting, settings_, system);
+  }
+
+  const Vibration& result() const noexcept { return vibration_.result(); }
+  /// Returns the analysis of the sampled loop; null unless Analysis::Sampled asks for it.
+  SampledAnalysis* sampled() noexcept { return sampled_.get(); }
+
+ private:
+  /// What the last analysis was of. qd, wrench and posture_error are zero where they do not matter.
+  struct Analysed {
+    bool springs;
+    std::uint64_t changes;
+    JointVector q, qd;
+    Vector6 wrench;
+    JointVector posture_error;
+    bool operator==(const Analysed&) const = default;
+  };
+
+  void find_modes(const Loop& loop) noexcept;
+  /// Whether the loop is that of the last analysis, exactly.
+  bool unchanged(const Loop& loop, bool with_wrench, bool with_velocity) noexcept;
+  void hand_over(const Loop& loop) noexcept;
+
+  const int n_;
+  const Settings settings_;
+  const bool outside_;  ///< whether there is an environment
+  VibrationAnalysis vibration_;
+  LoopSystem loop_;
+  std::unique_ptr<SampledAnalysis> sampled_;
+  std::optional<Analysed> analysed_;
+  bool moved_ = false;  ///< gains or attachment, before the last analysis
+};
+
+}  // namespace dashpot::controller

@@ -1,0 +1,17 @@
+#pragma once
+// The thresholds of controller/core, and why they are what they are.
+
+namespace dashpot::controller {
+
+/// Springs that restart more often than this within about a second hunt a fault that comes back.
+inline constexpr double kMostRestarts = 3;
+/// A joint rests below this share of its velocity limit: sensors that are noisy stay below it.
+inline constexpr double kAtRest = 0.01;
+/// With a lower TipSpeed::limit references keep to this share of it, because SafetyFilter takes
+/// drive away from 0.65 of it on.
+inline constexpr double kShareOfTipLimit = 0.6;
+/// The tip's reference takes each joint to at most this share of its velocity limit where the robot
+/// is: what is left is for vibrations and the null space.
+inline constexpr double kShareOfJointLimit = 0.4;
+
+}  // namespace dashpot::controller

@@ -1,0 +1,95 @@
+// The closed loop at a posture, against that of a controller which runs there.
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/posture_loop.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::MatrixXd;
+using testing::near;
+
+/// What a controller has at rest at q, once its gains are in force.
+analysis::System<kMaxJoints> by_controller(const RobotModel& model, Settings settings, Mode mode,
+                                           const JointVector& q, const Vector6& wrench) {
+  settings.motion.gain_time = settings.period;
+  Controller controller(model, settings);
+  RobotState state;
+  state.position = q;
+  state.velocity.setZero(q.size());
+  state.external_wrench = wrench;
+  Setpoint setpoint = settings.initial;
+  setpoint.mode = mode;
+  setpoint.joint_position = q;
+  const DynamicsResult there = evaluate(model, q, state.velocity);
+  setpoint.tip_pose = {there.p_BT_B, there.R_BT};
+  JointVector torque;
+  for (int tick = 1; tick <= 3; ++tick) {
+    state.time = setpoint.time = tick * 1'000'000;
+    EXPECT_LE(controller.update(state, setpoint, torque), Status::kLittleMargin);
+  }
+  analysis::System<kMaxJoints> system;
+  controller.closed_loop(system);
+  return system;
+}
+
+/// With constant and designed damping, friction, an environment and a load.
+TEST(PostureLoop, IsThatOfAControllerThere) {
+  testing::Random random(3901);
+  for (int k = 0; k < 48; ++k) {
+    SCOPED_TRACE(k);
+    const RobotModel model = testing::arm_model(testing::arms()[static_cast<std::size_t>(k % 3)]);
+    const int n = model.dof();
+    Settings settings = default_settings(model);
+    Gains& gains = settings.initial.gains;
+    gains.null_damping_ratio = k % 4 < 2 ? 0.5 : 0;
+    if (k % 5 == 0) gains.task_damping_ratio = gains.joint_damping_ratio = 0;
+    settings.limits.gain_margin = k % 6 < 3 ? 1 : 2;
+    settings.subtract_friction = k % 7 == 0;
+    if (k % 4 == 1) settings.environment.tip_stiffness.setConstant(50);
+    if (k % 4 == 2) settings.environment.joint_damping.setConstant(n, 0.3);
+    settings.task_terms.load = static_cast<Load>(k % 4);
+    const Vector6 wrench = k % 8 < 4 ? Vector6(Vector6::Zero()) : Vector6(5 * random.vector(6));
+    const JointVector q =
+        0.5 * (settings.limits.position_lower.cwiseMax(-2) +
+               settings.limits.position_upper.cwiseMin(2) + JointVector(random.vector(n)));
+    PostureLoop loop(model, settings);
+    for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+      const auto wanted = by_controller(model, settings, mode, q, wrench);
+      analysis::System<kMaxJoints> found;
+      ASSERT_EQ(loop.closed_loop(q, gains, mode, found, wrench), Status::kOk);
+      EXPECT_TRUE(near(found.mass, wanted.mass, 0));
+      EXPECT_TRUE(near(found.damping, wanted.damping, 1e-9 * (1 + wanted.damping.norm())));
+      EXPECT_TRUE(near(found.stiffness, wanted.stiffness, 1e-9 * (1 + wanted.stiffness.norm())));
+      ASSERT_EQ(found.stiffness_factor.rows(), wanted.stiffness_factor.rows());
+    }
+  }
+}
+
+TEST(PostureLoop, RefusesWhatIsNoPosture) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const RobotModel model = testing::arm_model(testing::arms()[0]);
+  const Settings settings = default_settings(model);
+  PostureLoop loop(model, settings);
+  analysis::System<kMaxJoints> system;
+  const auto status = [&](const JointVector& q, const Vector6& wrench) {
+    return loop.closed_loop(q, settings.initial.gains, Mode::kJoint, system, wrench);
+  };
+  const JointVector q = JointVector::Zero(7);
+  EXPECT_EQ(status(q.head(6), Vector6::Zero()), Status::kStateWrongSize);
+  EXPECT_EQ(status(kNan * q, Vector6::Zero()), Status::kStateNotFinite);
+  EXPECT_EQ(status(q, Vector6::Constant(kNan)), Status::kWrenchNotFinite);
+  EXPECT_EQ(system.mass.size(), 0);
+  EXPECT_EQ(status(q, Vector6::Zero()), Status::kOk);
+  EXPECT_EQ(system.mass.rows(), 7);
+}
+
+}  // namespace
+}  // namespace dashpot::controller
