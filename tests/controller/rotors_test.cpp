@@ -1,6 +1,7 @@
 // What a model does not tell of its rotors, how much would be enough, and the public figures.
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/config.hpp>
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/tests/support/arms.hpp>
