@@ -56,6 +56,8 @@ class DesignedDamping {
   /// loop bears.
   explicit DesignedDamping(const JointVector& viscous_friction,
                            const analysis::BorneDamping& borne = {});
+  DesignedDamping(const DesignedDamping&) = delete;  // the dampers look at what the loop bears
+  DesignedDamping& operator=(const DesignedDamping&) = delete;
 
   /// Designs the damping of this tick, and computes the null space if there are springs at the tip.
   /// Returns springs and dampers, valid until the next tick.

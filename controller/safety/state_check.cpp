@@ -9,6 +9,13 @@ namespace dashpot::controller {
 namespace {
 
 constexpr double kFarthest = 1e6;  // rad (m): no joint gets there, and turns cannot be told there
+// Of follows:
+constexpr double kFaster = 2;         // times a velocity limit: a robot may exceed it a little
+constexpr double kResolution = 1e-3;  // rad (m): coarse encoders
+constexpr double kApart = 0.5;        // of the larger velocity: what a blow within a tick explains
+constexpr double kJolt = 0.5;         // of a velocity limit, at once: noise, and hard drives
+constexpr double kJoltRate = 10;      // of a velocity limit in a second
+constexpr double kBlow = 3;           // a third of a change of velocity has to show in the position
 
 // Of wrong_rate: long enough for the jitter of a loop that is not in real time.
 constexpr int kIntervals = 50;
@@ -165,12 +172,12 @@ bool StateCheck::follows(const Last& last, const RobotState& state) const noexce
     const double moved = position - last.position[i];
     const double apart = std::abs(moved - 0.5 * (before + now) * last.age);
     const double fastest = std::max(std::abs(before), std::abs(now));
-    const bool near = std::abs(moved) <= 2 * last.age * limit + 1e-3;
-    const bool as_measured = apart <= 0.5 * fastest * last.age + 1e-3;
+    const bool near = std::abs(moved) <= kFaster * last.age * limit + kResolution;
+    const bool as_measured = apart <= kApart * fastest * last.age + kResolution;
     const double change = now - before;
-    const bool smooth = std::abs(change) <= (0.5 + 10 * last.age) * limit;
+    const bool smooth = std::abs(change) <= (kJolt + kJoltRate * last.age) * limit;
     const double beyond = (moved - before * last.age) * std::copysign(1, change);
-    const bool blow = 3 * beyond >= std::abs(change) * last.age;  // the position moved with it
+    const bool blow = kBlow * beyond >= std::abs(change) * last.age;  // the position moved with it
     if (blind_ ? !near : !(near || as_measured) || !(smooth || (as_measured && blow))) return false;
   }
   return true;

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 namespace dashpot::controller {
@@ -45,8 +46,11 @@ TEST(PostureLoop, IsThatOfAControllerThere) {
   testing::Random random(3901);
   for (int k = 0; k < 48; ++k) {
     SCOPED_TRACE(k);
-    const RobotModel model = testing::arm_model(testing::arms()[static_cast<std::size_t>(k % 3)]);
-    const int n = model.dof();
+    const testing::Arm& arm = testing::arms()[static_cast<std::size_t>(k % 3)];
+    const int n = testing::arm_model(arm).dof();
+    ModelOptions options;
+    options.viscous_friction = 0.4 * random.vector(n).cwiseAbs();
+    const RobotModel model = testing::arm_model(arm, options);
     Settings settings = default_settings(model);
     Gains& gains = settings.initial.gains;
     gains.null_damping_ratio = k % 4 < 2 ? 0.5 : 0;
@@ -57,9 +61,12 @@ TEST(PostureLoop, IsThatOfAControllerThere) {
     if (k % 4 == 2) settings.environment.joint_damping.setConstant(n, 0.3);
     settings.task_terms.load = static_cast<Load>(k % 4);
     const Vector6 wrench = k % 8 < 4 ? Vector6(Vector6::Zero()) : Vector6(5 * random.vector(6));
-    const JointVector q =
-        0.5 * (settings.limits.position_lower.cwiseMax(-2) +
-               settings.limits.position_upper.cwiseMin(2) + JointVector(random.vector(n)));
+    JointVector q(n);
+    for (Eigen::Index i = 0; i < n; ++i) {  // well within the limits
+      const double lower = std::max(settings.limits.position_lower[i], -2.0);
+      q[i] = lower +
+             random.uniform(0.2, 0.8) * (std::min(settings.limits.position_upper[i], 2.0) - lower);
+    }
     PostureLoop loop(model, settings);
     for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
       const auto wanted = by_controller(model, settings, mode, q, wrench);
