@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace dashpot::controller {
@@ -34,6 +35,7 @@ struct AuditOptions {
   int delay = 0;                     ///< ticks from a torque to its effect, beyond the hold
   double cutoff = 0;                 ///< of a first-order low-pass on the torque, Hz; 0: none
   bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / period as velocity
+  double margin = 2;  ///< gain margin that is asked for, see PostureAudit::rotors; at least 1
   /// Of the integral of the springs of task or joints, s: their pull adds up to a torque or wrench
   /// that grows by pull / integral_time (see Integral::time). 0: none. Counts in the gain margin.
   double integral_time = 0;
@@ -61,6 +63,19 @@ struct PostureNumbers {
   bool singular = false;  ///< there are more zero modes than joints beyond the task's directions
 };
 
+/// What the rotors would change that the model does not tell of.
+struct MissingRotors {
+  /// Reflected inertia of the joints without (n, kg m^2; zero where none is needed) with which the
+  /// loop has AuditOptions::margin, see enough_reflected_inertia. All zero if the loop has the
+  /// margin as it is. None if nothing is missing, there is no period, or no inertia is enough.
+  std::optional<JointVector> inertia;
+  /// Rotors with which the arm is compared (n, kg m^2): published ones of such an arm, or
+  /// `inertia`; no entries: none.
+  JointVector compared;
+  PostureNumbers numbers;          ///< with these rotors
+  Eigen::VectorXd damping_ratios;  ///< of the modes with them, by falling natural frequency
+};
+
 /// A posture in full.
 struct PostureAudit {
   JointVector q;                    ///< n, rad (m)
@@ -71,6 +86,7 @@ struct PostureAudit {
   /// first; negative where they grow. None without an integral or a period.
   std::vector<double> integral_decays;
   analysis::Spectrum<> spectrum;  ///< as from analysis::analyze
+  MissingRotors rotors;           ///< set by Audit::missing_rotors
 };
 
 /// How one number is distributed over postures. Each entry is the number at one of the postures
@@ -131,6 +147,9 @@ class Audit {
   /// Computes modes and numbers at q with proved bounds. Throws like numbers(), and
   /// std::runtime_error if the eigenvalue iteration fails.
   PostureAudit audit(const JointVector& q) const;
+
+  /// Returns what rotors would change at a posture, of which audit() has found `found`.
+  MissingRotors missing_rotors(const PostureAudit& found) const;
 
   /// Returns posture `index` (from 0) of the sequence `seed`. It is spread evenly over the range of
   /// all joints at once, at most half a turn each way, by the quasi-random sequence of Roberts

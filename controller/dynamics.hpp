@@ -44,6 +44,7 @@ class DynamicsKernel {
   void evaluate(const JointVector& q, const JointVector& qd, DynamicsResult& result) const noexcept;
 
  private:
+  friend class MassChange;
   /// One number for each of four joints; zeros beyond the last joint.
   using Four = std::array<double, 4>;
   /// Four links, each in its own axes.

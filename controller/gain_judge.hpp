@@ -2,6 +2,8 @@
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 
+#include <string>
+
 namespace dashpot::controller {
 
 /// Computes, before gains are accepted, whether they leave the sampled loop the margin of
@@ -26,6 +28,7 @@ class GainJudge {
                     ///< below 1 if the loop is unstable, 0 if it could not be analysed
     Mode mode;      ///< of the worst
     bool dropped = false;  ///< the worst is the arm without payload
+    JointVector q = {};    ///< posture that was judged, n, rad
   };
   /// The margin that is enough without the payload told.
   static constexpr double kDropped = 1.2;
@@ -35,6 +38,7 @@ class GainJudge {
 
   /// Attaches something else to the tip link.
   void attach(const Attachment& attachment) noexcept {
+    attached_ = attachment;
     kernel_.attach(attachment);
     posture_loop_.attach(attachment);
     loaded_ = attachment.mass > 0;
@@ -47,6 +51,10 @@ class GainJudge {
   /// be wrong everywhere.
   Verdict judge_anywhere(const Gains& gains);
   static constexpr int kPostures = 8;
+  /// Returns what the model lacks that could have made a verdict, of these gains, too small: "the
+  /// model has no reflected inertia of joint7, with joint7 0.02 kg m^2 it would be enough ...".
+  /// Empty if it lacks nothing. Takes the time of some twenty verdicts.
+  std::string missing(const Verdict& verdict, const Gains& gains) const;
 
  private:
   /// Returns the margin of a closed loop with this gravity gradient, at most `enough`; 0 if it
@@ -55,7 +63,9 @@ class GainJudge {
                 double enough);
   Eigen::MatrixXd gravity_of(const DynamicsKernel& kernel, const JointVector& q) const;
 
+  RobotModel model_;
   Settings settings_;
+  Attachment attached_;
   DynamicsKernel kernel_;
   DynamicsKernel bare_;  ///< without payload
   bool loaded_;          ///< there is a payload

@@ -34,8 +34,12 @@ struct ModelOptions {
   /// so.
   bool accept_inertias = false;
   JointVector reflected_inertia;  ///< n, kg m^2; a URDF has none
-  JointVector viscous_friction;   ///< n, N m s/rad
-  JointVector coulomb_friction;   ///< n, N m
+  /// Name of published_drives, whose reflected inertia takes the place of a missing one; empty:
+  /// none.
+  std::string drives;
+  bool drives_friction = false;  ///< the friction of `drives` takes the place of the URDF's
+  JointVector viscous_friction;  ///< n, N m s/rad
+  JointVector coulomb_friction;  ///< n, N m
   Payload payload;
   Pose tool;  ///< the tool's frame T in the tip link
 };
@@ -83,6 +87,9 @@ class RobotModel {
   /// Returns the model with something else attached. Throws InvalidModel if a joint has no inertia
   /// without what was attached before.
   RobotModel with(const Attachment& attachment) const;
+  /// Returns the model with other reflected inertia (n, kg m^2, not negative). Throws InvalidModel
+  /// if a joint has no inertia then.
+  RobotModel with_reflected_inertia(const JointVector& inertia) const;
 
   /// Returns the acceleration of gravity in B's axes, m/s^2.
   const Eigen::Vector3d& gravity() const noexcept;

@@ -130,6 +130,7 @@ void run_audit(const AuditCommand& command) try {
   if (!command.csv.empty()) csv = open_output("--csv", command.csv);
   AuditReport report;
   report.posture = audit.audit(task.q);
+  report.posture.rotors = audit.missing_rotors(report.posture);
   suggest(audit, task, report);
   const std::int64_t listed = static_cast<std::int64_t>(task.postures.size());
   const Postures postures{task, audit, command.seed, listed > 0 ? listed : command.samples};

@@ -211,6 +211,7 @@ AuditTask read_task(const AuditCommand& command) {
   audit.delay = command.loop.delay;
   audit.cutoff = command.loop.torque_cutoff;
   audit.difference_velocity = command.loop.difference_velocity;
+  audit.margin = command.margin;
   audit.integral_time = command.integral_time;
   const double intended = std::isnan(task.intended_ratio) ? 0.7 : task.intended_ratio;
   task.wanted_ratio = command.damping_ratio.value_or(intended);
@@ -261,6 +262,9 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
       ->transform(positive("s", "a time in s"))
       ->option_text("S");
   add_loop_options(command, options.loop, options.integral_time);
+  command.add_option("--margin", options.margin, "Gain margin that is asked for")
+      ->transform(quantity("", 1, 1e6, "a factor of at least 1"))
+      ->option_text("G (2)");
   command.add_flag("--no-margin", options.no_margin, "Leave the gain margin out");
   add("--q", arm.q, "Joint positions, rad or m", "a,b,... (middle of the limits)");
   add("--postures", options.postures, "YAML file with a list of postures", "FILE");

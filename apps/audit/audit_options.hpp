@@ -24,6 +24,7 @@ struct AuditCommand {
   analysis::SampledLoop loop;  ///< but for the period and the integral
   double integral_time = 0;    ///< s; 0: no integral
   bool no_margin = false;
+  double margin = 2;
   std::string postures;    ///< a file
   std::string log;         ///< an LCM log
   double log_step = 0.01;  ///< rad or m, between two postures of the log

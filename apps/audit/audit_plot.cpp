@@ -1,6 +1,7 @@
 #include <dashpot/apps/audit/audit_writer.hpp>
 #include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/controller/rotors.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -68,7 +69,10 @@ std::string script(const std::string& path, const AuditTask& task, const Numbers
     out << "$margins << EOD\n"
         << points << "EOD\nset ylabel 'gain margin'\nset yrange [0:*]\nunset label 1\n"
         << "plot $margins using 1:2 with points pt 7 ps 0.3 lc rgb '#1f77b4' notitle, "
-        << "1 with lines lw 2 lc rgb '#d62728' title 'unstable below 1'\nunset multiplot\n";
+        << "1 with lines lw 2 lc rgb '#d62728' title '"
+        << (controller::unknown_rotors(task.model).any() ? "too little below 1; rotors unknown"
+                                                         : "unstable below 1")
+        << "'\nunset multiplot\n";
   }
   return out.str();
 }

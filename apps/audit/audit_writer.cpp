@@ -3,6 +3,7 @@
 #include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <array>
@@ -36,7 +37,10 @@ std::string margin_text(double margin) {
   return std::isinf(margin) ? "above 1e6" : format_number(margin, 4);
 }
 
-std::string modes_table(const AuditTask& task, const analysis::Spectrum<>& spectrum) {
+std::string modes_table(const AuditTask& task, const controller::PostureAudit& posture) {
+  const analysis::Spectrum<>& spectrum = posture.spectrum;
+  const Eigen::VectorXd& with_rotors = posture.rotors.damping_ratios;
+  const bool compares = with_rotors.size() == spectrum.modes.size();
   TextTable table;
   table.add_column(Align::kRight, {"", "mode"});
   table.add_column(Align::kPoint, {"natural", "rad/s"});
@@ -44,19 +48,64 @@ std::string modes_table(const AuditTask& task, const analysis::Spectrum<>& spect
   table.add_column(Align::kPoint, {"", "meant"});
   table.add_column(Align::kLeft, {"", "kind"});
   table.add_column(Align::kPoint, {"fastest", "1/s"});
+  if (compares) table.add_column(Align::kPoint, {"ratio with", "rotors"});
   for (int i = 0; i < spectrum.modes.size(); ++i) {
     const analysis::Mode<>& mode = spectrum.modes[i];
     const double fastest = std::min(mode.eigenvalues[0].real(), mode.eigenvalues[1].real());
-    table.add_row({std::to_string(i + 1), format_number(mode.natural_frequency, 6),
-                   format_number(mode.damping_ratio, 6), format_number(task.intended_ratio, 3),
-                   analysis::to_text(mode.kind), format_number(fastest, 6)});
+    std::vector<std::string> row = {std::to_string(i + 1),
+                                    format_number(mode.natural_frequency, 6),
+                                    format_number(mode.damping_ratio, 6),
+                                    format_number(task.intended_ratio, 3),
+                                    analysis::to_text(mode.kind),
+                                    format_number(fastest, 6)};
+    if (compares) row.push_back(format_number(with_rotors[i], 6));
+    table.add_row(row);
   }
   return table.text();
 }
 
+/// What is not known because the model has no rotors; empty if it has.
+std::string rotors_table(const AuditTask& task, const controller::PostureAudit& posture) {
+  const controller::RobotModel& model = task.model;
+  const std::string missing = controller::missing_rotors_text(model);
+  if (missing.empty()) return "";
+  const bool loop = task.options.period > 0;
+  std::string text = "\n  Rotors unknown: " + missing + ". Fast modes" +
+                     (loop ? ",\n  fastest pole, and gain margin" : "\n  and fastest pole") +
+                     " are those of an arm without rotors.\n";
+  const controller::MissingRotors& rotors = posture.rotors;
+  const std::string asked = format_number(task.options.margin, 3);
+  if (rotors.inertia && !rotors.inertia->isZero(0)) {
+    text += "  Enough for a margin of " + asked + " would be " +
+            controller::inertia_text(model, *rotors.inertia) + ".\n";
+  } else if (rotors.inertia) {
+    text += "  The margin of " + asked + " is there without them.\n";
+  } else if (loop) {
+    text += "  No reflected inertia of these joints gives a margin of " + asked + ".\n";
+  }
+  if (rotors.compared.size() > 0) {
+    const controller::Drives* published = controller::unknown_rotors(model).published;
+    text += "  With " +
+            (published != nullptr ? "the published drives " + std::string(published->name)
+                                  : std::string("it")) +
+            " the smallest ratio is " + format_number(rotors.numbers.smallest_ratio, 6) +
+            ", the fastest pole " + format_number(rotors.numbers.fastest_pole, 6) + " 1/s" +
+            (loop ? ", the gain margin " + margin_text(rotors.numbers.gain_margin) : "") + ".\n";
+  }
+  return text + "  " + controller::rotors_hint(model, "--reflected-inertia", "--drives", "\n  ") +
+         "\n";
+}
+
+/// What a gain margin means. A loop whose rotors are not told is not called unstable.
+std::string margin_verdict(const AuditTask& task, double margin) {
+  if (margin >= 1) return "stiffness and damping may grow by it together.\n";
+  return controller::unknown_rotors(task.model).any() ? "too little of an arm without rotors.\n"
+                                                      : "the sampled loop is unstable.\n";
+}
+
 std::string posture_table(const AuditTask& task, const controller::PostureAudit& posture) {
   const controller::PostureNumbers& numbers = posture.numbers;
-  std::string text = "At q = " + joined(posture.q, 5) + "\n" + modes_table(task, posture.spectrum) +
+  std::string text = "At q = " + joined(posture.q, 5) + "\n" + modes_table(task, posture) +
                      "\n  Smallest ratio " + format_number(numbers.smallest_ratio, 6);
   if (!std::isnan(task.intended_ratio)) {
     text += " where " + format_number(task.intended_ratio, 3) + " was meant";
@@ -64,14 +113,13 @@ std::string posture_table(const AuditTask& task, const controller::PostureAudit&
   text += "; fastest pole " + format_number(numbers.fastest_pole, 6) + " 1/s.\n";
   if (task.options.period > 0) {
     text += "  Gain margin " + margin_text(numbers.gain_margin) + " with a period of " +
-            format_number(task.options.period, 3) + " s: " +
-            (numbers.gain_margin < 1 ? "the sampled loop is unstable.\n"
-                                     : "stiffness and damping may grow by it together.\n");
+            format_number(task.options.period, 3) +
+            " s: " + margin_verdict(task, numbers.gain_margin);
   }
   text += integral_text(posture.integral_decays);
   text += "  Zero modes: " + std::to_string(numbers.zero_modes) + ".";
   if (numbers.singular) text += " The posture is singular: a direction of the task has no spring.";
-  return text + "\n";
+  return text + "\n" + rotors_table(task, posture);
 }
 
 std::string workspace_table(const AuditTask& task, const AuditReport& report) {
@@ -91,7 +139,10 @@ std::string workspace_table(const AuditTask& task, const AuditReport& report) {
   };
   add("smallest ratio", found.smallest_ratio);
   add("fastest pole, 1/s", found.fastest_pole);
-  if (task.options.period > 0) add("gain margin", found.gain_margin);
+  const bool known = !controller::unknown_rotors(task.model).any();
+  if (task.options.period > 0) {
+    add(known ? "gain margin" : "margin without rotors", found.gain_margin);
+  }
   return "\nOver " + std::to_string(found.samples) + " postures, " +
          std::to_string(found.singular) + " of them singular" +
          (report.interrupted ? " (interrupted: no more were done)" : "") + "\n" + table.text() +
@@ -131,6 +182,30 @@ std::string shortest(double value) {
   return buffer.data();
 }
 
+void rotors_json(const AuditTask& task, const controller::PostureAudit& posture, Json& result) {
+  const controller::UnknownRotors unknown = controller::unknown_rotors(task.model);
+  result["rotors"] = unknown.any() ? "unknown" : "known";
+  if (!unknown.any()) return;
+  const auto& rotors = posture.rotors;
+  Json names = Json::array();
+  for (const int i : unknown.joints) {
+    names.push_back(text::printable(task.model.joints()[static_cast<std::size_t>(i)].name));
+  }
+  result["joints_without_rotors"] = names;
+  result["margin"] = task.options.margin;
+  result["reflected_inertia_for_margin"] = rotors.inertia ? json_list(*rotors.inertia) : Json();
+  result["published_drives"] =
+      unknown.published != nullptr ? Json(std::string(unknown.published->name)) : Json();
+  result["with_rotors"] = Json();
+  if (rotors.compared.size() > 0) {
+    result["with_rotors"] = {{"reflected_inertia", json_list(rotors.compared)},
+                             {"smallest_ratio", rotors.numbers.smallest_ratio},
+                             {"fastest_pole", rotors.numbers.fastest_pole},
+                             {"gain_margin", rotors.numbers.gain_margin},
+                             {"damping_ratios", json_list(rotors.damping_ratios)}};
+  }
+}
+
 }  // namespace
 
 std::string audit_json(const AuditTask& task, const AuditReport& report) {
@@ -147,6 +222,7 @@ std::string audit_json(const AuditTask& task, const AuditReport& report) {
                    {"integral_decays", report.posture.integral_decays},
                    {"zero_modes", numbers.zero_modes},
                    {"singular", numbers.singular}}}};
+  rotors_json(task, report.posture, result["posture"]);
   if (report.workspace) {
     result["workspace"] = {{"samples", report.workspace->samples},
                            {"singular", report.workspace->singular},

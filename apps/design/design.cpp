@@ -8,6 +8,7 @@
 #include <dashpot/apps/design/design_options.hpp>
 #include <dashpot/apps/design/design_report.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <CLI/CLI.hpp>
@@ -116,6 +117,46 @@ DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) t
   throw entry.error(error);
 }
 
+/// Says what is missing of an arm's rotors, and, where the loop did not bear the ratio, how much
+/// would be enough. Empty if nothing is missing.
+std::string rotors_note(const DesignOptions& options, const controller::RobotModel& model,
+                        bool lowered) {
+  std::string note = controller::missing_rotors_text(model);
+  if (note.empty()) return "";
+  note += options.period ? ": fast modes, and what the loop bears, are those"
+                         : ": fast modes are those";
+  note += " of an arm without rotors. ";
+  if (lowered) {
+    const analysis::DampingDesign wanted = analysis::design_damping(
+        read_arm(options.arm, model).impedance, options.target(), options.damping_structure());
+    const auto enough = controller::enough_reflected_inertia(
+        model, wanted.system, *options.period, [&](const controller::RobotModel& with_rotors) {
+          const Found found = design_one(read_arm(options.arm, with_rotors), options);
+          return found.loop->level == 1;
+        });
+    note += enough ? "With " + controller::inertia_text(model, *enough) +
+                         " the loop would bear a ratio of " + format_number(options.ratio, 3) + ". "
+                   : "No reflected inertia would be enough. ";
+  }
+  return note + controller::rotors_hint(model, "--reflected-inertia", "--drives");
+}
+
+DesignReport report_on_arm(const DesignOptions& options, const SystemEntry& entry,
+                           const controller::RobotModel& model) {
+  try {
+    DesignReport report = report_on(entry, options);
+    const std::string note = rotors_note(options, model, report.loop && report.loop->level < 1);
+    if (!note.empty()) report.notes.push_back(note);
+    report.rotors = note.empty() ? "known" : "unknown";
+    return report;
+  } catch (const InputError&) {
+    throw;
+  } catch (const std::runtime_error& error) {  // the margin is lost
+    const std::string note = rotors_note(options, model, options.period.has_value());
+    throw std::runtime_error(error.what() + (note.empty() ? "" : "; " + note));
+  }
+}
+
 RegionReport report_on_region(const SystemFile& file, const DesignOptions& options) {
   if (file.entries.empty()) throw InputError("", "lists no configurations");
   std::vector<analysis::TaskImpedance> configurations;
@@ -175,10 +216,12 @@ void write_csv(OutputFile file, const std::string& path, const std::string& text
 /// `csv`: may be null.
 void run_design(const DesignOptions& options, OutputFile csv) try {
   SystemFile file;
+  std::optional<controller::RobotModel> model;
   if (options.arm.urdf.empty()) {
     file = read_systems(options.file);
   } else {
-    file.entries.push_back(read_arm(options.arm));
+    model = read_model(options.arm);
+    file.entries.push_back(read_arm(options.arm, *model));
   }
   if (options.region) {
     const RegionReport report = report_on_region(file, options);
@@ -192,7 +235,7 @@ void run_design(const DesignOptions& options, OutputFile csv) try {
     if (several) {
       show_progress(static_cast<double>(reports.size()) / static_cast<double>(file.entries.size()));
     }
-    reports.push_back(report_on(entry, options));
+    reports.push_back(model ? report_on_arm(options, entry, *model) : report_on(entry, options));
     if (several && reports.size() == file.entries.size()) show_progress(1);
   }
   print(options.json ? design_json(reports, file.is_list) : design_table(reports, file.is_list));

@@ -1,5 +1,7 @@
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/design/design_arm.hpp>
+#include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/dynamics.hpp>
 
@@ -32,16 +34,26 @@ std::optional<Eigen::VectorXd> per_joint(const std::string& option, const std::s
 controller::Payload read_payload(const std::string& text) {
   controller::Payload payload;
   if (text.empty()) return payload;
-  const auto commas = std::count(text.begin(), text.end(), ',');
-  if (commas != 0 && commas != 3) {
-    throw InputError("--payload", std::to_string(commas + 1) + " numbers, expected 1 or 4");
+  const auto count = std::count(text.begin(), text.end(), ',') + 1;
+  if (count != 1 && count != 4 && count != 7 && count != 10) {
+    throw InputError("--payload", std::to_string(count) +
+                                      " numbers, expected 1 (mass), 4 (and center), 7 (and moments "
+                                      "of inertia) or 10 (and products)");
   }
-  const bool centered = commas == 3;
-  const Eigen::VectorXd values =
-      parse_quantities("--payload", text, centered ? Units{"kg", "m", "m", "m"} : Units{"kg"});
+  Units units{"kg", "m", "m", "m"};
+  units.insert(units.end(), 6, "kg m^2");
+  units.resize(static_cast<std::size_t>(count));
+  const Eigen::VectorXd values = parse_quantities("--payload", text, units);
   if (values[0] < 0) throw InputError("--payload", "the mass is negative");
   payload.mass = values[0];
-  if (centered) payload.center = values.tail<3>();
+  if (count >= 4) payload.center = values.segment<3>(1);
+  if (count >= 7) payload.inertia = values.segment<3>(4).asDiagonal();
+  if (count == 10) {
+    Eigen::Matrix3d& I = payload.inertia;
+    I(0, 1) = I(1, 0) = values[7];
+    I(0, 2) = I(2, 0) = values[8];
+    I(1, 2) = I(2, 1) = values[9];
+  }
   return payload;
 }
 
@@ -50,17 +62,27 @@ controller::Payload read_payload(const std::string& text) {
 RobotModel read_model(const ArmOptions& options) try {
   controller::ModelOptions model;
   model.accept_inertias = options.accept_inertias;
+  take_drives(options.drives, model);
   const RobotModel plain =
       RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
   const auto inertia =
       per_joint("--reflected-inertia", options.reflected_inertia, plain, "kg m^2", "kg");
   if (inertia) model.reflected_inertia = *inertia;
-  if (options.viscous_friction != "urdf") {
+  model.drives_friction = options.viscous_friction == "drives";
+  if (model.drives_friction && options.drives.empty()) {
+    throw InputError("--viscous-friction", "drives: there are none; name them with --drives");
+  }
+  if (options.viscous_friction != "urdf" && !model.drives_friction) {
     model.viscous_friction =
         per_joint("--viscous-friction", options.viscous_friction, plain, "N m s/rad", "N s/m")
             .value_or(Eigen::VectorXd::Zero(plain.dof()));
   }
-  model.payload = read_payload(options.payload);
+  try {
+    model.payload = read_payload(options.payload);
+    controller::Attachment(model.payload, model.tool);
+  } catch (const controller::InvalidModel& error) {
+    throw InputError("--payload", error.what());
+  }
   return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
 } catch (const controller::InvalidModel& error) {
   throw InputError("", error.what());
@@ -68,14 +90,13 @@ RobotModel read_model(const ArmOptions& options) try {
 
 bool ArmOptions::any() const {
   for (const auto* text : {&base, &tip, &q, &task_stiffness, &task_damping, &viscous_friction,
-                           &null_damping, &reflected_inertia, &payload}) {
+                           &null_damping, &reflected_inertia, &drives, &payload}) {
     if (!text->empty()) return true;
   }
   return accept_inertias;
 }
 
-SystemEntry read_arm(const ArmOptions& options) {
-  const RobotModel model = read_model(options);
+SystemEntry read_arm(const ArmOptions& options, const RobotModel& model) {
   const Eigen::Index n = model.dof();
   const auto stiffness = quantities("--task-stiffness", options.task_stiffness,
                                     {"N/m", "N/m", "N/m", "N m/rad", "N m/rad", "N m/rad"});

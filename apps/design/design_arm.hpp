@@ -14,10 +14,13 @@ struct ArmOptions {
   std::string task_stiffness;  ///< diagonal of K_C, 6: linear, then angular; N/m, N m/rad
   std::string task_damping;    ///< diagonal of C_C before, 6; none if empty
   // What is there besides, none where empty; n numbers, or one for all joints
-  std::string viscous_friction;   ///< N m s/rad, or "urdf" for that of the description
+  std::string viscous_friction;   ///< N m s/rad, or "urdf" or "drives" for what these have
   std::string null_damping;       ///< of the motions that the task leaves free, N m s/rad
   std::string reflected_inertia;  ///< kg m^2
-  std::string payload;            ///< mass at the tip and its center: m, or m,x,y,z; kg, m
+  std::string drives;             ///< name of public figures
+  /// Mass at the tip, its center, and its inertia about that: m, or m,x,y,z, or with
+  /// xx,yy,zz[,xy,xz,yz]; kg, m, kg m^2.
+  std::string payload;
 
   bool accept_inertias = false;  ///< though no body can have them
 
@@ -30,6 +33,6 @@ controller::RobotModel read_model(const ArmOptions& options);
 /// The arm with its springs, as a file would give it: mass, jacobian (6 x n, base-aligned axes at
 /// the tip), task_stiffness, task_damping, and damping with what friction and null space add.
 /// Throws InputError.
-SystemEntry read_arm(const ArmOptions& options);
+SystemEntry read_arm(const ArmOptions& options, const controller::RobotModel& model);
 
 }  // namespace dashpot::apps

@@ -1,3 +1,4 @@
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/design/design_options.hpp>
 
@@ -57,11 +58,13 @@ void add_model_options(CLI::App& command, ArmOptions& arm) {
     command.add_option(name, text, help)->option_text(words);
   };
   add("--viscous-friction", arm.viscous_friction, "In the joints, N m s/rad; urdf: the file's",
-      "a,b,...|x|urdf (0)");
+      "a,b,...|x|urdf|drives (0)");
   add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
       "a,b,...|x (0)");
-  add("--payload", arm.payload, "Mass at the tip, kg, and its center in the tip's axes, m",
-      "m[,x,y,z] (0)");
+  add("--drives", arm.drives, kDrivesHelp, "NAME");
+  add("--payload", arm.payload,
+      "Mass at the tip, its center in the tip's axes, its inertia about that; kg, m, kg m^2",
+      "m[,x,y,z[,xx,yy,zz[,xy,xz,yz]]] (0)");
   command.add_flag("--accept-inertias", arm.accept_inertias,
                    "Take inertias of the description that no body can have as they are");
 }

@@ -29,6 +29,7 @@ struct DesignReport {
   std::vector<analysis::ModeSensitivity> sensitivities;  ///< of `after`; none if not asked for
   std::optional<LoopReport> loop;  ///< none if the loop is taken for continuous
   std::vector<std::string> notes;
+  std::string rotors;  ///< of an arm: "known" or "unknown"
 };
 
 /// What `dashpot design --region` says.

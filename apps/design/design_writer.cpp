@@ -71,6 +71,7 @@ Json to_value(const DesignReport& report) {
                  {"modes", after["modes"]},
                  {"before", before},
                  {"after", after}};
+  if (!report.rotors.empty()) result["rotors"] = report.rotors;
   if (report.loop) result["loop"] = to_value(*report.loop);
   if (!report.sensitivities.empty()) result["sensitivity"] = sensitivity_json(report);
   return result;

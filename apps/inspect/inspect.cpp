@@ -1,9 +1,12 @@
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <CLI/CLI.hpp>
@@ -22,7 +25,7 @@ using controller::RobotModel;
 
 struct InspectOptions {
   std::string urdf, base, tip;
-  std::string q, qd, gravity, reflected_inertia;
+  std::string q, qd, gravity, reflected_inertia, drives;
   bool exclude_off_chain = false;
   bool accept_inertias = false;
   bool json = false;
@@ -42,6 +45,7 @@ RobotModel read_model(const InspectOptions& options) {
   if (!options.gravity.empty()) {
     model.gravity = parse_quantities("--gravity", options.gravity, controller::Units(3, "m/s^2"));
   }
+  take_drives(options.drives, model);
   try {
     if (!options.reflected_inertia.empty()) {
       const RobotModel plain =
@@ -80,20 +84,35 @@ nlohmann::ordered_json json_joints(const RobotModel& model) {
                     {"lower", limit(joint.lower)},
                     {"upper", limit(joint.upper)},
                     {"velocity", limit(joint.velocity)},
-                    {"effort", limit(joint.effort)}});
+                    {"effort", limit(joint.effort)},
+                    {"reflected_inertia", joint.reflected_inertia}});
   }
   return list;
 }
 
-std::string to_json(const RobotModel& model, const DynamicsResult& dynamics) {
-  const nlohmann::ordered_json result = {{"joints", json_joints(model)},
-                                         {"mass_matrix", json_rows(dynamics.M)},
-                                         {"coriolis", json_list(dynamics.coriolis)},
-                                         {"gravity", json_list(dynamics.gravity)},
-                                         {"jacobian", json_rows(dynamics.J)},
-                                         {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
-                                         {"tip_position", json_list(dynamics.p_BT_B)},
-                                         {"tip_rotation", json_rows(dynamics.R_BT)}};
+nlohmann::ordered_json json_drives(const controller::Drives& drives) {
+  return {{"name", drives.name},
+          {"reflected_inertia", json_list(drives.values(drives.reflected_inertia))},
+          {"viscous_friction", json_list(drives.values(drives.viscous_friction))},
+          {"coulomb_friction", json_list(drives.values(drives.coulomb_friction))},
+          {"source", drives.source},
+          {"doubt", drives.doubt}};
+}
+
+std::string to_json(const InspectOptions& options, const RobotModel& model,
+                    const DynamicsResult& dynamics) {
+  const bool unknown = controller::unknown_rotors(model).any();
+  nlohmann::ordered_json result = {{"joints", json_joints(model)},
+                                   {"rotors", unknown ? "unknown" : "known"},
+                                   {"mass_matrix", json_rows(dynamics.M)},
+                                   {"coriolis", json_list(dynamics.coriolis)},
+                                   {"gravity", json_list(dynamics.gravity)},
+                                   {"jacobian", json_rows(dynamics.J)},
+                                   {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
+                                   {"tip_position", json_list(dynamics.p_BT_B)},
+                                   {"tip_rotation", json_rows(dynamics.R_BT)}};
+  if (!options.drives.empty())
+    result["drives"] = json_drives(controller::find_drives(options.drives));
   return result.dump(2, ' ', true) + "\n";
 }
 
@@ -118,6 +137,7 @@ std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics
   add("upper", "limit", model.joint_values(&Joint::upper));
   add("velocity", "limit", model.joint_values(&Joint::velocity));
   add("effort", "limit", model.joint_values(&Joint::effort));
+  add("reflected", "inertia", model.joint_values(&Joint::reflected_inertia));
   add("", "q", q);
   add("", "qd", qd);
   add("Coriolis", "torque", dynamics.coriolis);
@@ -169,6 +189,38 @@ std::string tip_table(const DynamicsResult& dynamics) {
   return table.text();
 }
 
+/// What is known of the rotors, and from where.
+std::string rotors_text(const InspectOptions& options, const RobotModel& model) {
+  std::string text;
+  if (!options.drives.empty()) {
+    const controller::Drives& drives = controller::find_drives(options.drives);
+    text += "\nDrives of " + std::string(drives.name) +
+            "\n  Source: " + std::string(drives.source) +
+            ".\n  Doubt: " + std::string(drives.doubt) + ".\n";
+    if (!drives.values(drives.viscous_friction).isZero(0)) {
+      TextTable table;
+      table.add_column(TextTable::Align::kLeft, {""});
+      for (int i = 1; i <= drives.joints; ++i) {
+        table.add_column(TextTable::Align::kPoint, {std::to_string(i)});
+      }
+      const auto add = [&](const char* name, const auto& figures) {
+        std::vector<std::string> row = {name};
+        const std::vector<std::string> rest = numbers(drives.values(figures));
+        row.insert(row.end(), rest.begin(), rest.end());
+        table.add_row(row);
+      };
+      add("viscous friction, N m s/rad", drives.viscous_friction);
+      add("Coulomb friction, N m", drives.coulomb_friction);
+      text += table.text();
+    }
+  }
+  const std::string missing = controller::missing_rotors_text(model);
+  if (missing.empty()) return text;
+  return text + "\nRotors unknown: " + missing +
+         ".\nThe mass matrix is that of an arm without them; they resist wrists most.\n" +
+         controller::rotors_hint(model, "--reflected-inertia", "--drives", "\n") + "\n";
+}
+
 std::string to_table(const RobotModel& model, const DynamicsResult& dynamics, const JointVector& q,
                      const JointVector& qd) {
   std::vector<std::string> joints;
@@ -189,7 +241,8 @@ void run_inspect(const InspectOptions& options) {
   const JointVector q = joint_list("--q", options.q, model, "rad", "m");
   const JointVector qd = joint_list("--qd", options.qd, model, "rad/s", "m/s");
   const DynamicsResult dynamics = controller::evaluate(model, q, qd);
-  print(options.json ? to_json(model, dynamics) : to_table(model, dynamics, q, qd));
+  print(options.json ? to_json(options, model, dynamics)
+                     : to_table(model, dynamics, q, qd) + rotors_text(options, model));
 }
 
 }  // namespace
@@ -213,6 +266,7 @@ void add_inspect(CLI::App& program) {
   add("--reflected-inertia", &InspectOptions::reflected_inertia,
       "Of rotors and gears at the joints, kg m^2 or kg; one number is that of all joints",
       "a,b,... (0)");
+  add("--drives", &InspectOptions::drives, kDrivesHelp, "NAME");
   command->add_flag("--exclude-off-chain", options->exclude_off_chain,
                     "Leave out links that hang off the chain");
   command->add_flag("--accept-inertias", options->accept_inertias,

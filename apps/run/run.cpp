@@ -6,6 +6,7 @@
 #include <dashpot/apps/run/csv_sink.hpp>
 #include <dashpot/apps/run/run_report.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 
 #include <unistd.h>
@@ -206,6 +207,12 @@ void run(const Options& options) {
   RunReport report = run_loop(options, scene, loop, open_bus(options));
   report.scene = options.scene;
   report.joints = scene.dof();
+  if (scene.arm) {
+    const controller::RobotModel& model = scene.arm->config.model;
+    report.missing_rotors = controller::missing_rotors_text(model);
+    report.rotors_hint =
+        controller::rotors_hint(model, "robot.reflected_inertia", "robot.drives:", "\n  ");
+  }
   report.period = scene.plant.period;
   report.simulated_time = loop.plant().time();
   report.energy = loop.plant().audit();

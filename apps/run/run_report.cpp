@@ -296,6 +296,11 @@ std::string to_table(const RunReport& report) {
          commands_text(report.commands, loop.commands_refused);
   if (loop.first_modes.tick != 0) {
     out += solved_text(loop.first_modes, loop.last_modes);
+    if (!report.missing_rotors.empty()) {
+      out += "\n  Rotors unknown: " + report.missing_rotors +
+             ". Fast modes and gain\n  margins are those of an arm without rotors.\n  " +
+             report.rotors_hint + "\n";
+    }
     out += "\nModes at the start, " + count(loop.first_modes.zero_modes, "zero mode") + "\n" +
            modes_table(loop.first_modes);
     out += "\nModes at the end, " + count(loop.last_modes.zero_modes, "zero mode") + "\n" +
@@ -321,6 +326,7 @@ std::string to_json(const RunReport& report) {
   Json result = {
       {"scene", report.scene},
       {"joints", report.joints},
+      {"rotors", report.missing_rotors.empty() ? "known" : "unknown"},
       {"period", report.period},
       {"ticks", loop.ticks},
       {"simulated_time", report.simulated_time},

@@ -13,8 +13,10 @@ namespace dashpot::apps {
 struct RunReport {
   std::string scene;  ///< the file
   int joints = 0;
-  double period = 0;     ///< s
-  double wall_time = 0;  ///< s
+  std::string missing_rotors;  ///< of the controller's model, see missing_rotors_text
+  std::string rotors_hint;     ///< where they are found
+  double period = 0;           ///< s
+  double wall_time = 0;        ///< s
   Pace pace = Pace::kFast;
   bool interrupted = false;  ///< by the user
   Privileges privileges;

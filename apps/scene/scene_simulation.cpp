@@ -1,4 +1,5 @@
 #include <dashpot/apps/scene/scene_parts.hpp>
+#include <dashpot/controller/drives.hpp>
 
 #include <algorithm>
 #include <limits>
@@ -86,10 +87,20 @@ void read_contact(const YamlMapping& keys, const char* stiffness, const char* da
 }
 
 void read_robot(const YamlMapping& simulation, const Units& positions, ArmSimulation& arm) {
-  static constexpr std::array<std::string_view, 5> kKeys = {
-      "reflected_inertia", "viscous_friction", "coulomb_friction", "friction_velocity", "payload"};
+  static constexpr std::array<std::string_view, 6> kKeys = {
+      "drives",           "reflected_inertia", "viscous_friction",
+      "coulomb_friction", "friction_velocity", "payload"};
   const YamlMapping keys = simulation.mapping("robot", kKeys);
   sim::RobotParameters& parameters = arm.parameters;
+  if (keys.has("drives")) try {
+      std::string name;
+      read_text(keys, "drives", name);
+      const controller::Drives& drives =
+          controller::find_drives(name, static_cast<int>(positions.size()));
+      parameters.reflected_inertia = drives.values(drives.reflected_inertia);
+    } catch (const controller::InvalidModel& error) {
+      throw keys.error("drives", error.what());
+    }
   read_joint_option(keys, "reflected_inertia", joint_units(positions, "kg m^2", "kg"), kNotNegative,
                     parameters.reflected_inertia);
   read_joint_option(keys, "viscous_friction", joint_units(positions, "N m s/rad", "N s/m"),

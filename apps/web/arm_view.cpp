@@ -5,6 +5,7 @@
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
 
 #include <algorithm>
@@ -95,6 +96,7 @@ ArmJson ArmView::chain() const {
          {"axis", vector_json(joint.JointAxis())},
          {"frame", frame_json(joint.pose(0).Inverse() * segment.pose(0))}});
   }
+  document["missing_rotors"] = controller::missing_rotors_text(config_.model);
   document["tip"] = frame_json(chain.getSegment(static_cast<unsigned>(joints.size())).pose(0));
   return document;
 }

@@ -4,6 +4,7 @@
 #include <dashpot/controller/audit.hpp>
 #include <dashpot/controller/audit/stated_gains.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/loop_system.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
@@ -130,6 +131,7 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
           "cutoff: must be finite and not negative, Hz");
   require(std::isfinite(options.integral_time) && options.integral_time >= 0,
           "integral_time: must be finite and not negative, s");
+  require(std::isfinite(options.margin) && options.margin >= 1, "margin: must be at least 1");
   if (options.lower.size() == 0) options_.lower = model.joint_values(&Joint::lower);
   if (options.upper.size() == 0) options_.upper = model.joint_values(&Joint::upper);
   require(options_.lower.size() == n && options_.upper.size() == n &&
@@ -263,6 +265,34 @@ PostureAudit Audit::audit(const JointVector& q) const {
         integral_decays(sample_loop(system, result.spectrum, loop), loop.period);
   }
   return result;
+}
+
+MissingRotors Audit::missing_rotors(const PostureAudit& found) const {
+  MissingRotors missing;
+  const UnknownRotors unknown = unknown_rotors(model_);
+  if (!unknown.any()) return missing;
+  if (options_.period > 0 && found.numbers.gain_margin >= options_.margin) {
+    missing.inertia = JointVector::Zero(model_.dof());
+  } else if (options_.period > 0) {
+    const analysis::System<> system = analysis::to_joint_space(task_impedance(evaluate(found.q)));
+    missing.inertia = enough_reflected_inertia(
+        model_, system, options_.period, [&](const RobotModel& with_rotors) {
+          return Audit(with_rotors, options_).numbers(found.q).gain_margin >= options_.margin;
+        });
+  }
+  if (unknown.published != nullptr) {
+    missing.compared = unknown.published->values(unknown.published->reflected_inertia);
+  } else if (missing.inertia && !missing.inertia->isZero(0)) {
+    missing.compared = *missing.inertia;
+  }
+  if (missing.compared.size() == 0) return missing;
+  const PostureAudit with = Audit(with_at_least(model_, missing.compared), options_).audit(found.q);
+  missing.numbers = with.numbers;
+  missing.damping_ratios.resize(with.spectrum.modes.size());
+  for (int i = 0; i < with.spectrum.modes.size(); ++i) {
+    missing.damping_ratios[i] = with.spectrum.modes[i].damping_ratio;
+  }
+  return missing;
 }
 
 JointVector Audit::posture(std::uint64_t seed, std::int64_t index) const {

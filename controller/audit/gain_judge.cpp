@@ -2,6 +2,7 @@
 #include <dashpot/controller/gain_judge.hpp>
 #include <dashpot/controller/model/least_inertia.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <algorithm>
@@ -31,7 +32,9 @@ bool counts_payload(const Gains& gains, Mode mode) noexcept {
 }  // namespace
 
 GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
-    : settings_(settings),
+    : model_(model),
+      settings_(settings),
+      attached_(model.attachment()),
       kernel_(model),
       bare_(unloaded(model)),
       loaded_(model.attachment().mass > 0),
@@ -62,6 +65,7 @@ GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
     const double dropped = margin(system, gravity_of(bare_, q), enough);
     if (dropped < std::min(enough, worst.margin)) worst = {dropped, mode, true};
   }
+  worst.q = q;
   return worst;
 }
 
@@ -74,6 +78,28 @@ GainJudge::Verdict GainJudge::judge_anywhere(const Gains& gains) {
     if (found.margin > best.margin) best = found;
   }
   return best;
+}
+
+std::string GainJudge::missing(const Verdict& verdict, const Gains& gains) const {
+  const RobotModel model = model_.with(attached_);
+  const std::string missing = missing_rotors_text(model);
+  if (missing.empty() || verdict.q.size() == 0) return missing;
+  PostureLoop loop(model, judging(settings_));
+  analysis::System<kMaxJoints> closed;
+  if (loop.closed_loop(verdict.q, gains, verdict.mode, closed) != Status::kOk) return missing;
+  analysis::System<> system(verdict.q.size());
+  system.mass = closed.mass;
+  system.damping = closed.damping;
+  system.stiffness = closed.stiffness;
+  const std::optional<JointVector> enough =
+      enough_reflected_inertia(model, system, settings_.period, [&](const RobotModel& with_rotors) {
+        return GainJudge(with_rotors, settings_).judge(verdict.q, gains).margin >=
+               settings_.limits.gain_margin;
+      });
+  const std::string hint = rotors_hint(model, "robot.reflected_inertia", "robot.drives:");
+  if (!enough) return missing + ", but no reflected inertia would be enough. " + hint;
+  return missing + ", and with " + inertia_text(model, *enough) + " the margin would be enough. " +
+         hint;
 }
 
 Eigen::MatrixXd GainJudge::gravity_of(const DynamicsKernel& kernel, const JointVector& q) const {

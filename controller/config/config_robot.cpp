@@ -1,4 +1,5 @@
 #include <dashpot/controller/config/config_robot.hpp>
+#include <dashpot/controller/drives.hpp>
 
 #include <Eigen/Geometry>
 
@@ -40,6 +41,24 @@ void read_joint_option(const YamlMapping& robot, std::string_view key, const Uni
   read_numbers(robot, key, units, kNotNegative, option);
 }
 
+/// Takes the drives that the keys name into `robot`, and returns its model.
+RobotModel read_drives(const YamlMapping& keys, RobotDescription& robot) {
+  read_switch(keys, "drives_friction", robot.options.drives_friction);
+  if (robot.options.drives_friction && !keys.has("drives")) {
+    throw keys.error("drives_friction", "needs drives");
+  }
+  if (!keys.has("drives")) return robot.model();
+  std::string name;
+  read_text(keys, "drives", name);
+  try {
+    find_drives(name);
+  } catch (const InvalidModel& error) {
+    throw keys.error("drives", error.what());
+  }
+  robot.options.drives = name;
+  return robot.model();
+}
+
 }  // namespace
 
 Units joint_units(const RobotModel& model, const char* revolute, const char* prismatic) {
@@ -51,13 +70,15 @@ Units joint_units(const RobotModel& model, const char* revolute, const char* pri
 }
 
 RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path& directory) try {
-  static constexpr std::array<std::string_view, 11> kKeys = {"urdf",
+  static constexpr std::array<std::string_view, 13> kKeys = {"urdf",
                                                              "base",
                                                              "tip",
                                                              "gravity",
                                                              "include_off_chain",
                                                              "accept_inertias",
                                                              "reflected_inertia",
+                                                             "drives",
+                                                             "drives_friction",
                                                              "viscous_friction",
                                                              "coulomb_friction",
                                                              "payload",
@@ -80,7 +101,12 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
   if (inertia != nullptr && inertia->items.size() <= kMaxJoints) {
     preliminary.options.reflected_inertia.setOnes(static_cast<Eigen::Index>(inertia->items.size()));
   }
-  const RobotModel model = preliminary.model();
+  const RobotModel model = read_drives(keys, preliminary);
+  if (keys.has("drives")) options.reflected_inertia = model.joint_values(&Joint::reflected_inertia);
+  if (preliminary.options.drives_friction) {
+    options.viscous_friction = model.joint_values(&Joint::viscous_friction);
+    options.coulomb_friction = model.joint_values(&Joint::coulomb_friction);
+  }
   const Units damping = joint_units(model, "N m s/rad", "N s/m");
   read_joint_option(keys, "reflected_inertia", joint_units(model, "kg m^2", "kg"),
                     options.reflected_inertia);

@@ -205,11 +205,15 @@ LoopAnalysis::Loop ControllerCore::loop() const noexcept {
   TipWrenches wrenches{sensed_.external_wrench};
   if (springs && settings_.feed_forward.wrench) wrenches.commanded = course_.wrench();
   if (springs) wrenches.commanded += integral_.wrench();
+  std::optional<Posture> posture;
+  if (springs && asked_.posture_error.size() == n_) {
+    posture = {&kernel_, &sensed_.q, asked_.posture_error, guide_.references().posture.velocity()};
+  }
   return {snapshot_.tick,
           sensed_,
           springs,
           {springs ? designed_.now(course_.gains().now()) : brake_, designed_.null_space(),
-           springs ? friction_left_ : viscous_friction_, wrenches},
+           springs ? friction_left_ : viscous_friction_, wrenches, posture},
           course_.changes(),
           course_.attachment().now()};
 }

@@ -57,10 +57,14 @@ void LoopAnalysis::find_modes(const Loop& loop) noexcept {
 bool LoopAnalysis::unchanged(const Loop& loop, bool with_wrench, bool with_velocity) noexcept {
   const Sensed& now = loop.now;
   const TipWrenches& wrenches = loop.acting.wrenches;
+  const std::optional<Posture>& posture = loop.acting.posture;
   const Analysed next{
-      loop.springs, loop.changes, now.q,
+      loop.springs,
+      loop.changes,
+      now.q,
       with_velocity ? now.qd : JointVector(JointVector::Zero(n_)),
-      with_wrench ? Vector6(wrenches.world + wrenches.commanded) : Vector6(Vector6::Zero())};
+      with_wrench ? Vector6(wrenches.world + wrenches.commanded) : Vector6(Vector6::Zero()),
+      with_wrench && posture ? posture->error : JointVector(JointVector::Zero(n_))};
   const bool moved = analysed_ && analysed_->changes != next.changes;
   const bool settled = moved_ && !moved;
   const bool same = analysed_ == next;

@@ -42,12 +42,13 @@ class LoopAnalysis {
   SampledAnalysis* sampled() noexcept { return sampled_.get(); }
 
  private:
-  /// What the last analysis was of. qd and wrench are zero where they do not matter.
+  /// What the last analysis was of. qd, wrench and posture_error are zero where they do not matter.
   struct Analysed {
     bool springs;
     std::uint64_t changes;
     JointVector q, qd;
     Vector6 wrench;
+    JointVector posture_error;
     bool operator==(const Analysed&) const = default;
   };
 

@@ -5,7 +5,6 @@ namespace {
 
 constexpr double kReferenceFrictionRise = 0.01;  // rad/s, of a velocity that has no noise
 constexpr double kFurther = 1.02;                // the reference keeps e at the edge of the clamp
-constexpr double kPostureShare = 0.3;            // rad, of |J# e| that counts almost fully
 
 /// Returns R K_T R' a: K_T in the tool's axes times a vector in B's axes.
 Vector6 in_tool_axes(const Matrix6& K_T, const Eigen::Matrix3d& R, const Vector6& a) noexcept {
@@ -39,6 +38,7 @@ void ImpedanceLaw::torque(const Input& now, LawTorque& result) noexcept {
   tau.setZero(q.size());
   JointVector reference_velocity = tau;  // qd_f
   result.dampers = tau;
+  result.posture_error.resize(0);
   if (impedance.joint_weight > 0) {
     const JointReference& path = references.joint;
     add_product(impedance.joint_stiffness, difference(path.position(), q), tau);
@@ -117,7 +117,8 @@ void ImpedanceLaw::add_null_torque(const Input& now, LawTorque& result) noexcept
   const Impedance& impedance = now.impedance;
   const NullSpace& null_space = now.null_space;
   const JointReference& posture = now.references.posture;
-  JointVector dq = difference(posture.position(), now.q);
+  JointVector& dq = result.posture_error;
+  dq = difference(posture.position(), now.q);
   const JointVector share = null_space.joint_velocity(result.tip_error);
   add(share, dq, -1 / std::sqrt(1 + product(share, share) / (kPostureShare * kPostureShare)));
   const JointVector dqd = difference(posture.velocity(), now.qd);

@@ -7,6 +7,10 @@
 
 namespace dashpot::controller {
 
+/// How far a deflection of the tip may have moved the joints before the posture springs count less
+/// of it, rad (m).
+inline constexpr double kPostureShare = 0.3;
+
 /// A torque of the law, and what it is made of.
 struct LawTorque {
   JointVector torque;                    ///< n, N m
@@ -15,6 +19,7 @@ struct LawTorque {
   Vector6 tip_pull = Vector6::Zero();    ///< K_C e within the error clamp
   Vector6 tip_error = Vector6::Zero();   ///< e
   Vector6 tip_wrench = Vector6::Zero();  ///< of the Cartesian part
+  JointVector posture_error;             ///< q_0 - q - s J# e, n; no entries without null space
   bool clamped = false;                  ///< the error clamp acts; told for an integral only
 };
 

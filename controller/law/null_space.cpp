@@ -45,6 +45,14 @@ JointVector NullSpace::projected_velocity(const JointVector& dq) const noexcept 
   return y;
 }
 
+JointVector NullSpace::projected_acceleration(const JointVector& torque) const noexcept {
+  JointVector y = torque;
+  mass_.solve_L(y.data());
+  project(y);
+  mass_.solve_LT(y.data());
+  return y;
+}
+
 void NullSpace::damp(const JointVector& k, const Damping& damping) noexcept {
   const Eigen::Index n = k.size();
   JointMatrix& D = ratio_damping_;

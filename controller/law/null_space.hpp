@@ -44,6 +44,8 @@ class NullSpace {
   const analysis::DampingLevel& level() const noexcept { return level_; }
   /// Returns N dq.
   JointVector projected_velocity(const JointVector& dq) const noexcept;
+  /// Returns M^-1 N' t = N M^-1 t: the acceleration that a joint torque leaves in the null space.
+  JointVector projected_acceleration(const JointVector& torque) const noexcept;
   /// Returns M^-1 J' H G^-1 H V: the joint velocity of least kinetic energy with which the tip
   /// moves at `twist` in the selected directions.
   JointVector joint_velocity(const Vector6& twist) const noexcept;

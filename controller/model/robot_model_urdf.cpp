@@ -1,4 +1,5 @@
 // A RobotModel from a URDF.
+#include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
 #include <dashpot/controller/model/rigid_bodies.hpp>
@@ -151,6 +152,17 @@ std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& pat
       refuse(name, "joint", joint->name, error.what());
     }
   }
+  if (!options.drives.empty()) {
+    const Drives& drives = find_drives(options.drives, static_cast<int>(joints.size()));
+    const auto take = [&](const auto& figures, double Joint::*property) {
+      for (std::size_t i = 0; i < joints.size(); ++i) joints[i].*property = figures[i];
+    };
+    take(drives.reflected_inertia, &Joint::reflected_inertia);
+    if (options.drives_friction) {
+      take(drives.viscous_friction, &Joint::viscous_friction);
+      take(drives.coulomb_friction, &Joint::coulomb_friction);
+    }
+  }
   apply(options.reflected_inertia, &Joint::reflected_inertia, "reflected inertia", joints, name);
   apply(options.viscous_friction, &Joint::viscous_friction, "damping", joints, name);
   apply(options.coulomb_friction, &Joint::coulomb_friction, "friction", joints, name);
@@ -262,6 +274,27 @@ RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string
 RobotModel RobotModel::with(const Attachment& attachment) const {
   auto data = std::make_shared<Data>(*data_);
   data->attach(attachment);
+  RobotModel model(std::move(data));
+  check_inertia(model, name());
+  return model;
+}
+
+RobotModel RobotModel::with_reflected_inertia(const JointVector& inertia) const {
+  auto data = std::make_shared<Data>(*data_);
+  data->chain = KDL::Chain();
+  for (unsigned i = 0; i < data_->chain.getNrOfSegments(); ++i) {
+    KDL::Segment segment = data_->chain.getSegment(i);
+    if (i < data->joints.size()) {
+      const KDL::Joint& joint = segment.getJoint();
+      const double own = inertia[static_cast<Eigen::Index>(i)];
+      data->joints[i].reflected_inertia = own;
+      segment = KDL::Segment(segment.getName(),
+                             KDL::Joint(joint.getName(), joint.JointOrigin(), joint.JointAxis(),
+                                        joint.getType(), 1, 0, own),
+                             segment.pose(0), segment.getInertia());
+    }
+    data->chain.addSegment(segment);
+  }
   RobotModel model(std::move(data));
   check_inertia(model, name());
   return model;

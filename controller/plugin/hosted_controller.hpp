@@ -92,10 +92,11 @@ std::int32_t finish(std::int32_t code, const char* text) noexcept;
 std::int32_t finish(std::int32_t code) noexcept;
 /// Likewise DASHPOT_OK, with something to be warned of.
 std::int32_t warn(const char* text) noexcept;
-/// What is too little in a verdict found `here`, or wherever the robot may be, in one line.
-using VerdictText = std::array<char, 256>;
-VerdictText describe(const Judgement& judgement, const GainJudge::Verdict& verdict,
-                     bool here) noexcept;
+/// What is too little in a verdict of gains, found `here` or wherever the robot may be, in one
+/// line: the margin, what `became` of the gains, and what the model lacks that may be why.
+using VerdictText = std::array<char, 960>;
+VerdictText describe(Judgement& judgement, const GainJudge::Verdict& verdict, const Gains& gains,
+                     bool here, const char* became = "") noexcept;
 /// Puts the gains given into `wanted`. DASHPOT_OK or why they are none.
 std::int32_t read_gains(const dashpot_gains* given, int n, Gains& wanted) noexcept;
 

@@ -65,12 +65,14 @@ std::int32_t judge_change(dashpot_controller& controller, const Gains& gains,
     const Judgement::Change change =
         judgement.change(controller.request.setpoint.gains, gains, q, attachment);
     if (judgement.enough(change.verdict)) return finish(DASHPOT_OK);
-    const VerdictText text = describe(judgement, change.verdict, q.size() != 0);
-    if (!change.taken) return finish(DASHPOT_UNSTABLE_GAINS, text.data());
-    std::array<char, 384> taken{};
-    std::snprintf(taken.data(), taken.size(), "%s; taken because it was %.3g before", text.data(),
-                  change.before);
-    return warn(taken.data());
+    std::array<char, 64> became{};
+    if (change.taken) {
+      std::snprintf(became.data(), became.size(), "; taken because it was %.3g before",
+                    change.before);
+    }
+    const VerdictText text =
+        describe(judgement, change.verdict, gains, q.size() != 0, became.data());
+    return change.taken ? warn(text.data()) : finish(DASHPOT_UNSTABLE_GAINS, text.data());
   } catch (...) {
     return finish(DASHPOT_UNSTABLE_GAINS, "the gains could not be judged");
   }

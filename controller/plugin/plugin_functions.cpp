@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <memory>
 #include <string>
@@ -43,8 +44,8 @@ std::int32_t warn(const char* text) noexcept {
   return DASHPOT_OK;
 }
 
-VerdictText describe(const Judgement& judgement, const GainJudge::Verdict& verdict,
-                     bool here) noexcept {
+VerdictText describe(Judgement& judgement, const GainJudge::Verdict& verdict, const Gains& gains,
+                     bool here, const char* became) noexcept {
   VerdictText text{};
   const char* const mode = verdict.mode == Mode::kJoint ? "joint" : "task";
   const char* const where = here ? "here" : "at best, wherever the robot is";
@@ -60,6 +61,13 @@ VerdictText describe(const Judgement& judgement, const GainJudge::Verdict& verdi
                   "with the %s gains the sampled loop has a gain margin of %.3g %s, "
                   "limits.gain_margin asks for %.3g",
                   mode, verdict.margin, where, judgement.wanted());
+  }
+  try {
+    const std::string missing = judgement.missing(verdict, gains);
+    const std::size_t length = std::strlen(text.data());
+    std::snprintf(text.data() + length, text.size() - length, "%s%s%s", became,
+                  missing.empty() ? "" : ": ", missing.c_str());
+  } catch (...) {  // the verdict alone has to do
   }
   return text;
 }
@@ -90,7 +98,7 @@ std::int32_t judge(dashpot_controller& controller, const Gains& gains, const Joi
   }
   if (margin != nullptr) *margin = verdict.margin;
   if (judgement.enough(verdict)) return finish(DASHPOT_OK);
-  return finish(DASHPOT_UNSTABLE_GAINS, describe(judgement, verdict, q.size() != 0).data());
+  return finish(DASHPOT_UNSTABLE_GAINS, describe(judgement, verdict, gains, q.size() != 0).data());
 }
 
 /// The controller that `make` makes. Null, and the error is set, where it throws.

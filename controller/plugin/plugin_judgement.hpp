@@ -72,6 +72,11 @@ class Judgement {
       throw;
     }
   }
+  /// Returns what the model lacks that could have made a verdict on gains too small.
+  std::string missing(const GainJudge::Verdict& verdict, const Gains& gains) {
+    const std::lock_guard lock(mutex_);
+    return judge_.missing(verdict, gains);
+  }
   bool enough(const GainJudge::Verdict& verdict) const noexcept {
     return verdict.margin >= wanted_;
   }

@@ -1,3 +1,4 @@
+#include <dashpot/controller/law/impedance_law.hpp>
 #include <dashpot/controller/vibration/closed_loop.hpp>
 #include <dashpot/controller/vibration/spring_factors.hpp>
 
@@ -50,35 +51,45 @@ Matrix3d derivative_of_error(const Vector3d& e) noexcept {
   return Matrix3d::Identity() + 0.5 * cross + c * cross * cross;
 }
 
-}  // namespace
-
-Jacobian jacobian_rate(const Jacobian& J, const JointVector& qd) noexcept {
-  Jacobian rate(6, J.cols());
-  Vector3d inner = Vector3d::Zero();        // sum of w_k qd_k for k <= j
-  Vector3d outer = twist(J, qd).head<3>();  // sum of v_k qd_k for k > j
-  for (Index j = 0; j < J.cols(); ++j) {
-    const Vector3d v = J.col(j).head<3>(), w = J.col(j).tail<3>();
-    inner += w * qd[j];
-    outer -= v * qd[j];
-    rate.col(j).head<3>() = inner.cross(v) + w.cross(outer);
-    rate.col(j).tail<3>() = inner.cross(w);
+/// K += what a load adds to the stiffness of posture springs `k`. `e` is the tip's error, and `A`
+/// its derivative_of_error.
+void add_loaded_posture(const LoadedPosture& posture, const Jacobian& J, const JointVector& k,
+                        const Vector6& e, const Matrix3d& A, JointMatrix& K) noexcept {
+  const Index n = J.cols();
+  const NullSpaceChange& change = posture.change;
+  const JointVector x = change.share() * e;
+  const double s = 1 / std::sqrt(1 + product(x, x) / (kPostureShare * kPostureShare));
+  JointMatrix dx = change.of_joint_velocity(e);
+  Jacobian moved(6, n);  // the change of e, as far as J# e does not turn with it
+  for (Index j = 0; j < n; ++j) {
+    moved.col(j) << -J.col(j).head<3>(), -(A * J.col(j).tail<3>());
+    moved.col(j) -= change.turning(e, j);
   }
-  return rate;
-}
-
-JointMatrix geometric_stiffness(const Jacobian& J, const Vector6& f) noexcept {
-  JointMatrix K_G(J.cols(), J.cols());
-  const Vector3d force = f.head<3>(), moment = f.tail<3>();
-  for (Index k = 0; k < J.cols(); ++k) {
-    const Vector3d v_k = J.col(k).head<3>(), w_k = J.col(k).tail<3>();
-    for (Index j = 0; j < J.cols(); ++j) {
-      const Vector3d v = J.col(j).head<3>(), w = J.col(j).tail<3>();
-      K_G(j, k) =
-          k <= j ? force.dot(w_k.cross(v)) + moment.dot(w_k.cross(w)) : force.dot(w.cross(v_k));
+  dx += change.share().lazyProduct(moved);
+  JointVector pull(n);
+  for (Index i = 0; i < n; ++i) pull[i] = k[i] * posture.error[i];
+  JointMatrix deflected = change.share().lazyProduct(J);  // 1 - N
+  for (Index j = 0; j < n; ++j) {
+    double along = 0;
+    for (Index i = 0; i < n; ++i) along += x[i] * dx(i, j);
+    along *= s * s / (kPostureShare * kPostureShare);
+    for (Index i = 0; i < n; ++i) {
+      deflected(i, j) = k[i] * (deflected(i, j) + s * (dx(i, j) - x[i] * along));
     }
   }
-  return K_G;
+  K += change.projector().lazyProduct(deflected);
+  K -= change.of_torque(pull);
 }
+
+/// K += D d(N qd)/dq with the damping D of the null space, N D N.
+void add_null_space_rate(const NullSpaceChange& change, const Jacobian& J, const JointVector& qd,
+                         const JointMatrix& D, JointMatrix& K) noexcept {
+  JointMatrix rate = change.of_joint_velocity(twist(J, qd));
+  rate += change.share().lazyProduct(change.twists(qd));
+  K -= D.lazyProduct(rate);
+}
+
+}  // namespace
 
 JointMatrix stiffness_of_load(const Jacobian& J, Load load, const Vector6& f) noexcept {
   if (load == Load::kJointTorques) return JointMatrix::Zero(J.cols(), J.cols());
@@ -95,13 +106,15 @@ JointMatrix stiffness_of_load(const Jacobian& J, Load load, const Vector6& f) no
 }
 
 JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& impedance, Load load,
-                                 const TipWrenches& wrenches) noexcept {
+                                 const TipWrenches& wrenches,
+                                 const LoadedPosture* posture) noexcept {
   const Jacobian& J = robot.J;
   const Matrix6& K_B = impedance.base.stiffness;
   const Matrix6 K_T = turned(impedance.tool.stiffness, robot.R_BT);
   const Matrix6 K_C = K_B + K_T;
-  const Vector6 F = -impedance.task_weight * (wrenches.world + wrenches.commanded);
-  Vector6 e = deflection(K_C, F);
+  const Vector6 wanted = -impedance.task_weight * (wrenches.world + wrenches.commanded);
+  Vector6 e = deflection(K_C, wanted);
+  const Vector6 F = K_C * e;  // what K_C can hold
   const double angle = e.tail<3>().norm();
   if (angle > kLargestAngle) e.tail<3>() *= kLargestAngle / angle;
   const Matrix3d A = derivative_of_error(e.tail<3>());
@@ -120,6 +133,7 @@ JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& i
     more.tail<3>() += F_T.tail<3>().cross(w);
     for (Index j = 0; j < J.cols(); ++j) K(j, k) += J.col(j).dot(more);
   }
+  if (posture != nullptr) add_loaded_posture(*posture, J, impedance.null_stiffness, e, A, K);
   return K;
 }
 
@@ -200,12 +214,13 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Actin
   const Matrix6 C_C = impedance.base.damping + turned(impedance.tool.damping, robot.R_BT);
   JointMatrix K_N = impedance.joint_stiffness;  // all stiffness but the tip's springs
   JointMatrix C = impedance.joint_damping;
-  JointMatrix projector = JointMatrix::Zero(n, n);
+  JointMatrix projector = JointMatrix::Zero(n, n), D = projector;  // D: of the null space
   if (impedance.null_space()) {
     null_projector(null_space, projector);
     add_projected(projector, impedance.null_stiffness, K_N);
-    add_projected(projector, impedance.null_damping, C);
-    if (impedance.null_damping_ratio > 0) add_null_damping(null_space, C);
+    add_projected(projector, impedance.null_damping, D);
+    if (impedance.null_damping_ratio > 0) add_null_damping(null_space, D);
+    C += D;
   }
   JointMatrix K = K_N;
   add_congruence(J, K_C, J, K);
@@ -215,8 +230,25 @@ void closed_loop(const DynamicsResult& robot, const JointVector& qd, const Actin
   const TaskTerms& terms = settings.task_terms;
   const bool loaded = terms.load != Load::kIgnored && !acting.wrenches.world.isZero(0);
   JointMatrix extra = JointMatrix::Zero(n, n);
-  if (loaded) extra = stiffness_under_load(robot, acting.impedance, terms.load, acting.wrenches);
-  if (terms.jacobian_rate) add_congruence(J, C_C, jacobian_rate(J, qd), extra);
+  std::optional<NullSpaceChange> change;
+  if (acting.posture && impedance.null_space() && (loaded || terms.jacobian_rate)) {
+    change.emplace(*acting.posture->kernel, *acting.posture->q, robot, null_space,
+                   !impedance.tool.none());
+  }
+  if (loaded) {
+    std::optional<LoadedPosture> pulled;
+    if (change && !impedance.null_stiffness.isZero(0)) {
+      pulled.emplace(LoadedPosture{*change, acting.posture->error});
+    }
+    extra = stiffness_under_load(robot, acting.impedance, terms.load, acting.wrenches,
+                                 pulled ? &*pulled : nullptr);
+  }
+  if (terms.jacobian_rate) {
+    add_congruence(J, C_C, jacobian_rate(J, qd), extra);
+    if (change && !D.isZero(0)) {
+      add_null_space_rate(*change, J, difference(qd, acting.posture->velocity), D, extra);
+    }
+  }
 
   system.has_low_words = false;
   system.mass = robot.M;

@@ -3,17 +3,12 @@
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/law/null_space.hpp>
 #include <dashpot/controller/settings.hpp>
+#include <dashpot/controller/vibration/jacobian_change.hpp>
+#include <dashpot/controller/vibration/null_space_change.hpp>
+
+#include <optional>
 
 namespace dashpot::controller {
-
-/// Returns Jdot (6 x n) at joint velocity qd: with j and k counted from the base, v and w the
-/// linear and angular rows of J,
-///     dJ_j/dq_k = (w_k x v_j, w_k x w_j) for k <= j,  (w_j x v_k, 0) for k > j.
-Jacobian jacobian_rate(const Jacobian& J, const JointVector& qd) noexcept;
-
-/// Returns K_G(f) = [(dJ/dq_1)' f ... (dJ/dq_n)' f], n x n, for the wrench f in B's axes: how the
-/// joint torques J' f change with q where f stays.
-JointMatrix geometric_stiffness(const Jacobian& J, const Vector6& f) noexcept;
 
 /// The wrenches at the tip, in B's axes, that do not come from springs, N and N m.
 struct TipWrenches {
@@ -27,8 +22,15 @@ struct TipWrenches {
 ///     of J 0                               joint_torques: J' f is constant.
 JointMatrix stiffness_of_load(const Jacobian& J, Load load, const Vector6& f) noexcept;
 
+/// The posture springs of an arm that holds a load.
+struct LoadedPosture {
+  const NullSpaceChange& change;
+  const JointVector& error;  ///< p = q_0 - q - s J# e, n; see ImpedanceLaw
+};
+
 /// Returns what a load adds to the stiffness J' K_C J of springs at rest, n x n, where the springs
-/// of `impedance` hold it: they carry F = -w_C (f + f_c) at the error e with K_C e = F, and
+/// of `impedance` hold it: they carry F = -w_C (f + f_c), without the directions in which there is
+/// no spring, at the error e with K_C e = F, and
 ///     -d(J' (F + f_c) + load)/dq - J' K_C J = J' (S - K_C J) - K_G(F + f_c) + stiffness_of_load,
 ///     S = K_B (J_v; A J_w) + K_T (J_v; A J_w) + (([F_l x]; [F_m x]) - K_T ([e_l x]; [e_m x])) J_w.
 /// K_B is given in B's axes, K_T in the tool's and turned into B's, the wrench F in the second line
@@ -36,10 +38,15 @@ JointMatrix stiffness_of_load(const Jacobian& J, Load load, const Vector6& f) no
 /// the derivative of the rotation vector. So a constant wrench of the world and the springs that
 /// hold it cancel up to e, whereas constant joint torques leave +K_G(f), the term of the paper.
 ///
-/// Springs of joints and of the null space carry none of F, and K_C has to hold all of it. A
-/// deflection of more than 2 rad counts as one of 2 rad.
+/// Springs of joints carry none of F, and K_C has to hold all of it. A deflection of more than 2
+/// rad counts as one of 2 rad.
+///
+/// To the stiffness N' K_0 N of posture springs the load adds, because N' and J# e change with q,
+///     -d(N' t)/dq + N' K_0 (1 + d(s J# e)/dq - N),     t = K_0 p constant in the first term.
+/// Null: there are none. `wrenches` without load, and an error of zero, add nothing.
 JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& impedance, Load load,
-                                 const TipWrenches& wrenches) noexcept;
+                                 const TipWrenches& wrenches,
+                                 const LoadedPosture* posture = nullptr) noexcept;
 
 /// Adds an environment's springs and dampers to those of an impedance.
 void add_environment(const Environment& environment, Impedance& impedance) noexcept;
@@ -72,18 +79,29 @@ void add_null_damping(const NullSpace& null_space, JointMatrix& C) noexcept;
 /// K += P' diag(k) P
 void add_projected(const JointMatrix& P, const JointVector& k, JointMatrix& K) noexcept;
 
+/// Where an arm with posture springs or dampers is, and where these pull it: what makes N and J#
+/// turn.
+struct Posture {
+  const DynamicsKernel* kernel;
+  const JointVector* q;  ///< n, rad
+  JointVector error;     ///< p = q_0 - q - s J# e, n; see ImpedanceLaw
+  JointVector velocity;  ///< qd_0, n, rad/s
+};
+
 /// What acts on a robot, besides its environment.
 struct Acting {
   const Impedance& impedance;
   const NullSpace& null_space;
   const JointVector& friction;  ///< what the joints damp by themselves, n, N m s/rad
   TipWrenches wrenches;
+  std::optional<Posture> posture = {};  ///< none: N stands still
 };
 
 /// Sets `system` to the robot with what acts on it and the environment of the settings, M q'' +
 /// C q' + K q = f, linearised where the springs are at rest (e = 0, q = q_d, q = q_0) and N stands
 /// still:
-///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot]  [+ that of a load]
+///     K = K_q + J' K_C J + N' K_0 N  [+ J' C_C Jdot + N' C_0 d(N (qd - qd_0))/dq]
+///         [+ that of a load]
 ///     C = C_q + J' C_C J + N' C_0 N + friction.
 /// The task_terms of the settings say which terms in brackets are included; a load has none if the
 /// world exerts no wrench. If none is, K is symmetric and has its factor W. The feed-forward does

@@ -26,7 +26,11 @@ Status PostureLoop::closed_loop(const JointVector& q, const Gains& gains, Mode m
   damping_.reset();
   const Impedance& impedance = damping_.update(given, robot);
   controller::closed_loop(robot, rest,
-                          {impedance, damping_.null_space(), friction_left_, {external_wrench}},
+                          {impedance,
+                           damping_.null_space(),
+                           friction_left_,
+                           {external_wrench},
+                           Posture{&kernel_, &q, rest, rest}},
                           settings_, system);
   return Status::kOk;
 }

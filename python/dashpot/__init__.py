@@ -22,7 +22,7 @@ from ._identification import Identification, MeasuredModes, identify
 from ._log import read_log
 from ._region import RegionDesign, design_region
 from ._results import Modes
-from ._robot import ClosedLoop, Robot, closed_loop
+from ._robot import ClosedLoop, Robot, closed_loop, published_drives
 
 __version__ = _version("dashpot")
 __all__ = ["Audit", "ClosedLoop", "Controller", "DampingDesign", "DampingSuggestion",
@@ -30,4 +30,4 @@ __all__ = ["Audit", "ClosedLoop", "Controller", "DampingDesign", "DampingSuggest
            "PostureAudit", "RegionDesign", "Response", "Robot", "SampledModes", "Sensitivities",
            "Setpoint", "Snapshot", "Status", "TrackedModes", "TrackedSampledModes",
            "WorkspaceAudit", "audit", "closed_loop", "design_damping", "design_region", "identify",
-           "modes", "read_log", "receptance", "response", "sampled_modes", "sensitivities"]
+           "modes", "published_drives", "read_log", "receptance", "response", "sampled_modes", "sensitivities"]

@@ -35,6 +35,15 @@ class PostureAudit(Result):
     integral_decays: Array
     """Rates at which the slow modes of the integral decay, 1/s, the slowest first; none without an
     integral or a period."""
+    rotors: str
+    """known, or unknown where a joint has no reflected inertia: then fast modes, pole and margin are
+    those of an arm without rotors (Robot.missing_rotors names the joints)."""
+    reflected_inertia_for_margin: Array | None
+    """n, kg m^2, of the joints without, that would be enough for the margin asked for; zeros where
+    none is needed. None if rotors are known, without a period, or if no inertia is enough."""
+    damping_ratios_with_rotors: Array
+    """m, of the modes with published rotors of such an arm, or else with that inertia; empty where
+    there is neither."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -122,7 +131,7 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           directions: Sequence[str] = DIRECTIONS, half_quaternion: bool = False,
           inertia_blocks: bool = False, period: float = 0, delay: int = 0, cutoff: float = 0,
           difference_velocity: bool = False, integral_time: float = 0,
-          soft_frequency: float = 0.1,
+          margin: float = 2, soft_frequency: float = 0.1,
           damping_ratio: float | None = None, samples: int = 0, seed: int = 0,
           lower: npt.ArrayLike | None = None, upper: npt.ArrayLike | None = None,
           postures: npt.ArrayLike | None = None,
@@ -141,7 +150,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     apart, with a `null_projector` of "kinematic" instead of "dynamic" null-space gains act through
     I - J^+ J. The loop has a `period` (s; 0: no gain margin), `delay` (ticks), a low-pass of `cutoff`
     (Hz; 0: none), `difference_velocity`, and an integral of the springs with `integral_time` (s; 0:
-    none), which counts in the gain margin alone. Modes below `soft_frequency` (rad/s) are soft.
+    none), which counts in the gain margin alone. Where the robot has no reflected inertia, the posture tells
+    how much would be enough for a gain margin of `margin`. Modes below `soft_frequency` (rad/s) are soft.
 
     An `executor` of concurrent.futures maps over chunks of postures, by default one of threads. The
     results are the same to the last bit whatever executor and however many workers.
@@ -174,6 +184,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
                                "soft_frequency": float(soft_frequency)}
     if integral_time != 0:
         options["integral_time"] = float(integral_time)
+    if margin != 2:
+        options["margin"] = float(margin)
     for name, values in (("lower", lower), ("upper", upper)):
         if values is not None:
             options[name] = to_numbers(name, values, 1)

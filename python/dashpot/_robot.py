@@ -54,7 +54,8 @@ class Robot:
     @classmethod
     def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str, *,
                   gravity: npt.ArrayLike | None = None, include_off_chain: bool = True,
-                  accept_inertias: bool = False, reflected_inertia: npt.ArrayLike | None = None,
+                  accept_inertias: bool = False, drives: str = "", drives_friction: bool = False,
+                  reflected_inertia: npt.ArrayLike | None = None,
                   viscous_friction: npt.ArrayLike | None = None,
                   coulomb_friction: npt.ArrayLike | None = None, payload_mass: float = 0,
                   payload_center: npt.ArrayLike = (0, 0, 0),
@@ -65,8 +66,10 @@ class Robot:
         `gravity` (3, m/s^2) is in the axes of the file's root link, by default 9.81 along -z.
         Fingers and other links off the chain count as rigid at their zero position unless
         `include_off_chain` is False. `accept_inertias` takes inertias that no body can have.
+        `drives` names public figures of reflected inertia, see published_drives, whose friction
+        takes the place of the URDF's with `drives_friction`.
         `reflected_inertia` (n, kg m^2), `viscous_friction` (n, N m s/rad) and `coulomb_friction`
-        (n, N m) replace the URDF's. A payload at the tip has `payload_mass` (kg), `payload_center`
+        (n, N m) replace these and the URDF's. A payload at the tip has `payload_mass` (kg), `payload_center`
         (3, m, in the tip link) and `payload_inertia` (3 x 3, kg m^2, about that centre). `tool` is
         the pose (4 x 4) of the tool's frame in the tip link; the tip is then this frame.
 
@@ -78,6 +81,8 @@ class Robot:
                                    "payload_center": _sized("payload_center", payload_center, (3,)),
                                    "payload_inertia": _sized("payload_inertia", payload_inertia,
                                                              (3, 3))}
+        if drives or drives_friction:
+            options["drives"], options["drives_friction"] = drives, drives_friction
         if gravity is not None:
             options["gravity"] = _sized("gravity", gravity, (3,))
         for name, values in (("reflected_inertia", reflected_inertia),
@@ -108,6 +113,12 @@ class Robot:
         """The robot's name in the URDF."""
         return self._core.name
 
+    @property
+    def missing_rotors(self) -> str:
+        """Which joints have no reflected inertia, so that fast modes and gain margins are wrong;
+        empty if all have."""
+        return self._core.missing_rotors()
+
     def pose(self, q: npt.ArrayLike) -> Array:
         """Returns the pose of the tip at q (n, rad): 4 x 4, from the tip's axes into the base's."""
         return self._core.pose(_joint_values("q", q))
@@ -132,6 +143,13 @@ class Robot:
     def jacobian_dot_qd(self, q: npt.ArrayLike, qd: npt.ArrayLike) -> Array:
         """Returns dJ/dt qd: 6, the tip's acceleration without joint accelerations."""
         return self._core.jacobian_dot_qd(_joint_values("q", q), _joint_values("qd", qd))
+
+
+def published_drives() -> dict[str, dict[str, Any]]:
+    """Returns public figures of arms' drives by name: `reflected_inertia` (n, kg m^2),
+    `viscous_friction` (n, N m s/rad) and `coulomb_friction` (n, N m; zeros: not published), with
+    `source` and `doubt`. None was measured on the arm at hand."""
+    return _core.published_drives()
 
 
 def _make_robot(urdf: str, base: str, tip: str, file: str, options: dict[str, Any]) -> Robot:

@@ -2,6 +2,7 @@
 
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/controller/audit.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/python/src/analysis.hpp>
 #include <dashpot/python/src/robot.hpp>
 
@@ -45,6 +46,7 @@ RobotAudit make_audit(const Robot& robot, const controller::Gains& gains, bool c
   if (given.contains("integral_time")) {
     options.integral_time = nb::cast<double>(given["integral_time"]);
   }
+  if (given.contains("margin")) options.margin = nb::cast<double>(given["margin"]);
   if (given.contains("lower")) {
     options.lower = robot.joint_vector("lower", nb::cast<Eigen::VectorXd>(given["lower"]));
   }
@@ -126,6 +128,7 @@ nb::dict posture(const RobotAudit& all, const Eigen::VectorXd& q) {
   {
     const nb::gil_scoped_release release;
     found = all.audit.audit(all.robot.joint_vector("q", q));
+    found.rotors = all.audit.missing_rotors(found);
   }
   nb::dict result;
   result["q"] = to_array(found.q);
@@ -137,6 +140,13 @@ nb::dict posture(const RobotAudit& all, const Eigen::VectorXd& q) {
   result["smallest_ratio_bound"] = found.smallest_ratio_bound;
   result["fastest_pole_bound"] = found.fastest_pole_bound;
   result["integral_decays"] = to_column(found.integral_decays, [](double decay) { return decay; });
+  const bool unknown = controller::unknown_rotors(all.robot.model).any();
+  result["rotors"] = unknown ? "unknown" : "known";
+  result["reflected_inertia_for_margin"] = nb::none();
+  if (found.rotors.inertia) {
+    result["reflected_inertia_for_margin"] = to_array(*found.rotors.inertia);
+  }
+  result["damping_ratios_with_rotors"] = to_array(found.rotors.damping_ratios);
   return result;
 }
 

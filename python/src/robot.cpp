@@ -1,8 +1,10 @@
 // The robot's dynamics, and its closed loop with springs and dampers.
 
+#include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
 #include <dashpot/controller/posture_loop.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/python/src/analysis.hpp>
 #include <dashpot/python/src/robot.hpp>
@@ -119,6 +121,13 @@ Robot make_robot(const std::string& urdf, const std::string& name, const std::st
   read_vector("reflected_inertia", options.reflected_inertia);
   read_vector("viscous_friction", options.viscous_friction);
   read_vector("coulomb_friction", options.coulomb_friction);
+  if (given.contains("drives")) options.drives = nb::cast<std::string>(given["drives"]);
+  if (!options.drives.empty()) try {
+      controller::find_drives(options.drives);
+    } catch (const controller::InvalidModel& error) {
+      throw std::invalid_argument(std::string("drives: ") + error.what());
+    }
+  read("drives_friction", options.drives_friction);
   read("payload_mass", options.payload.mass);
   read("payload_center", options.payload.center);
   read("payload_inertia", options.payload.inertia);
@@ -161,6 +170,20 @@ Gains make_gains(const Robot& robot, const OptionalMatrix& joint_stiffness,
   return gains;
 }
 
+nb::dict published_drives() {
+  nb::dict all;
+  for (const controller::Drives& drives : controller::published_drives()) {
+    nb::dict one;
+    one["reflected_inertia"] = to_array(drives.values(drives.reflected_inertia));
+    one["viscous_friction"] = to_array(drives.values(drives.viscous_friction));
+    one["coulomb_friction"] = to_array(drives.values(drives.coulomb_friction));
+    one["source"] = std::string(drives.source);
+    one["doubt"] = std::string(drives.doubt);
+    all[nb::cast(std::string(drives.name))] = one;
+  }
+  return all;
+}
+
 nb::dict joint_properties(const Robot& robot) {
   const auto values = [&](double Joint::*property) {
     return to_array(robot.model.joint_values(property));
@@ -180,6 +203,7 @@ nb::dict joint_properties(const Robot& robot) {
 
 void add_robot(nb::module_& m) {
   using Vector = Eigen::VectorXd;
+  m.def("published_drives", &published_drives);
   m.def("read_urdf", &controller::read_text, nb::arg("path"));
   nb::class_<Robot>(m, "Robot", "controller::RobotModel with its DynamicsKernel")
       .def(nb::new_(&make_robot), nb::arg("urdf"), nb::arg("name"), nb::arg("base"), nb::arg("tip"),
@@ -190,6 +214,8 @@ void add_robot(nb::module_& m) {
              return to_list(robot.model.joints(), [](const Joint& joint) { return joint.name; });
            })
       .def("joint_properties", &joint_properties)
+      .def("missing_rotors",
+           [](const Robot& robot) { return controller::missing_rotors_text(robot.model); })
       .def("pose", &pose)
       .def("mass",
            [](const Robot& robot, const Vector& q) { return to_array(dynamics(robot, q, {}).M); })

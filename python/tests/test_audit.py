@@ -121,3 +121,30 @@ def test_half_quaternions_halve_the_rotational_springs(panda):
 def test_bad_input_gives_the_programs_messages(panda, given, message):
     with pytest.raises(dashpot.Error, match=message):
         dashpot.audit(panda, **given)
+
+
+def test_unknown_rotors_are_said_to_be_so_with_what_would_be_enough(root, panda):
+    gains = {"task_stiffness": [500] * 3 + [30] * 3, "damping_factor": 2, "period": 1e-3, "delay": 1}
+    posture = dashpot.audit(panda, HOME, **gains).posture
+    assert posture.rotors == "unknown" and posture.gain_margin < 1
+    assert panda.missing_rotors == "the model has no reflected inertia of any joint"
+    enough = posture.reflected_inertia_for_margin
+    assert (enough >= 0).all() and (enough[:3] == 0).all() and enough[6] > 0
+    assert posture.damping_ratios_with_rotors.shape == posture.modes.damping_ratio.shape
+    model = (root / "sim/models/panda.urdf", "panda_link0", "panda_hand_tcp")
+    known = dashpot.Robot.from_urdf(*model, reflected_inertia=enough + 1e-6)
+    assert dashpot.audit(known, HOME, **gains).posture.gain_margin >= 2
+    more = dashpot.audit(panda, HOME, margin=4, **gains).posture.reflected_inertia_for_margin
+    assert more[6] > enough[6]
+    drives = dashpot.published_drives()["panda"]
+    assert drives["source"] and drives["doubt"]
+    named = dashpot.Robot.from_urdf(*model, drives="panda")
+    assert (named.reflected_inertia == drives["reflected_inertia"]).all()
+    assert (named.viscous_friction == panda.viscous_friction).all()
+    rubs = dashpot.Robot.from_urdf(*model, drives="panda", drives_friction=True)
+    assert (rubs.viscous_friction == drives["viscous_friction"]).all()
+    found = dashpot.audit(named, HOME, **gains).posture
+    assert found.rotors == "known" and found.reflected_inertia_for_margin is None
+    np.testing.assert_allclose(posture.damping_ratios_with_rotors, found.modes.damping_ratio, rtol=1e-9)
+    with pytest.raises(dashpot.Error, match="drives: 'pandas' is none of panda, fr3"):
+        dashpot.Robot.from_urdf(*model, drives="pandas")

@@ -270,7 +270,7 @@ TEST(Design, RefusesInOneLine) {
             "--viscous-friction: 2 numbers, expected 1 or 7"},
            {joined(arm, {"--reflected-inertia", "-1"}),
             "--reflected-inertia: a number is negative"},
-           {joined(arm, {"--payload", "1,2"}), "--payload: 2 numbers, expected 1 or 4"},
+           {joined(arm, {"--payload", "1,2"}), "--payload: 2 numbers, expected 1 (mass), 4"},
            {joined(arm, {"--payload", "-1"}), "--payload: the mass is negative"}}) {
     expect_refusal(run_program(of_panda("design", options)), reason);
   }

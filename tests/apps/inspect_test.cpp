@@ -56,7 +56,7 @@ Rows rows_of(const Eigen::MatrixXd& matrix) {
 /// Compares the object with KDL's numbers.
 void expect_matches(const Json& result, const controller::DynamicsResult& expected) {
   const auto vector = [](const Eigen::MatrixXd& v) { return rows_of(v.transpose()); };
-  EXPECT_EQ(result.size(), 8u);
+  EXPECT_EQ(result.size(), 9u);
   expect_near(result["mass_matrix"], rows_of(expected.M), 1e-12);
   expect_near({result["coriolis"]}, vector(expected.coriolis), 1e-12);
   expect_near({result["gravity"]}, vector(expected.gravity), 1e-12);
@@ -102,7 +102,8 @@ TEST(Inspect, ListsTheJointsWithTheirLimits) {
                             {"lower", -3.0718},
                             {"upper", -0.0698},
                             {"velocity", 2.175},
-                            {"effort", 87}}));
+                            {"effort", 87},
+                            {"reflected_inertia", 0.0}}));
   const Json lift = parse(inspect({"lift_gripper", "base", "fingertip"}, {"--json"}))["joints"];
   EXPECT_EQ(lift[0]["type"], "prismatic");
   EXPECT_EQ(lift[0]["upper"], 0.8);
@@ -113,7 +114,8 @@ TEST(Inspect, ListsTheJointsWithTheirLimits) {
                          {"lower", nullptr},
                          {"upper", nullptr},
                          {"velocity", nullptr},
-                         {"effort", nullptr}}}));
+                         {"effort", nullptr},
+                         {"reflected_inertia", 0.0}}}));
 }
 
 TEST(Inspect, TakesUnits) {

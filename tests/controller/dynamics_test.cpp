@@ -3,6 +3,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
+#include <dashpot/controller/model/mass_change.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/dynamics_match.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>
@@ -67,6 +68,39 @@ TEST(Dynamics, AreThoseOfKdl) {
     SCOPED_TRACE(arm.file);
     const RobotModel model = arm_model(arm);
     for (int trial = 0; trial < 100; ++trial) expect_match(model, 2);
+  }
+}
+
+TEST(Dynamics, MassChangesAsDifferencesSay) {
+  constexpr double kStep = 1e-5;
+  Random random(712);
+  const auto expect_match = [&](const RobotModel& model) {
+    const int n = model.dof();
+    const DynamicsKernel kernel(model);
+    const JointVector q = 2 * random.vector(n), x = random.vector(n), none = JointVector::Zero(n);
+    DynamicsResult there;
+    kernel.evaluate(q, none, there);
+    const JointMatrix found = MassChange(kernel, q, there.J).times(x);
+    Eigen::MatrixXd expected(n, n);
+    for (int k = 0; k < n; ++k) {
+      DynamicsResult after, before;
+      kernel.evaluate(q + kStep * JointVector::Unit(n, k), none, after);
+      kernel.evaluate(q - kStep * JointVector::Unit(n, k), none, before);
+      expected.col(k) = (after.M - before.M) * x / (2 * kStep);
+    }
+    EXPECT_TRUE(near(found, expected, 1e-8 * there.M.norm()));
+  };
+  for (int n = 1; n <= kMaxJoints; ++n) {
+    for (int trial = 0; trial < 6; ++trial) {
+      RandomRobot robot(random.engine()());
+      const std::string text = robot.chain(n, trial % 3 == 0 ? 0 : trial % 3 == 1 ? 0.3 : 1);
+      SCOPED_TRACE("n = " + std::to_string(n) + ", trial " + std::to_string(trial) + "\n" + text);
+      expect_match(RobotModel::from_urdf_text(text, "link0", "tip", random_options(random, n)));
+    }
+  }
+  for (const auto& arm : all_arms()) {
+    SCOPED_TRACE(arm.file);
+    expect_match(arm_model(arm));
   }
 }
 

@@ -8,7 +8,8 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
+#include <Eigen/QR>
+#include <cmath>
 #include <limits>
 #include <string>
 
@@ -23,9 +24,10 @@ using testing::Random;
 constexpr ErrorClamp kUnclamped{std::numeric_limits<double>::infinity(),
                                 std::numeric_limits<double>::infinity()};
 
-/// An arm whose springs hold a wrench of the world at q.
+/// An arm of seven joints whose springs hold a wrench of the world at q.
 struct HeldLoad {
-  RobotModel model = testing::arm_model(testing::arms()[0]);
+  RobotModel model;
+  DynamicsKernel kernel{model};
   JointVector q, rest = JointVector::Zero(7);
   DynamicsResult robot;
   Impedance impedance{7};
@@ -33,22 +35,29 @@ struct HeldLoad {
   SpringReferences references{{JointVector::Ones(7), JointVector::Ones(7), 1, 1, 1, 1, 0.01, 0},
                               1e-3};
 
-  explicit HeldLoad(Random& random) : q(random.vector(7)), robot(at(q)) {
+  explicit HeldLoad(Random& random, const testing::Arm& arm = testing::arms()[0])
+      : model(testing::arm_model(arm)), q(random.vector(7)), robot(at(q)) {
     wrenches.world << 20 * random.vector(3), 2 * random.vector(3);
     wrenches.commanded << 10 * random.vector(3), random.vector(3);
   }
   DynamicsResult at(const JointVector& there) const {
     DynamicsResult result;
-    DynamicsKernel(model).evaluate(there, rest, result);
+    kernel.evaluate(there, rest, result);
     return result;
   }
   /// Puts the springs' rest to where they hold the load.
   void hold() {
     const Matrix6 K_C = impedance.base.stiffness + turned(impedance.tool.stiffness, robot.R_BT);
     Vector6 e = Vector6::Zero();
-    if (impedance.task_weight > 0) {
-      e = -impedance.task_weight *
-          Eigen::FullPivLU<Matrix6>(K_C).solve(wrenches.world + wrenches.commanded);
+    if (impedance.task_weight > 0 && !K_C.isZero(0)) {
+      // Where a direction has no spring, the deflection is the least one, with springs scaled to 1.
+      Vector6 unit = Vector6::Zero();
+      for (int i = 0; i < 6; ++i) unit[i] = K_C(i, i) > 0 ? 1 / std::sqrt(K_C(i, i)) : 0;
+      Eigen::CompleteOrthogonalDecomposition<Matrix6> solved;
+      solved.setThreshold(1e-10);
+      solved.compute(unit.asDiagonal() * K_C * unit.asDiagonal());
+      e = -impedance.task_weight * unit.cwiseProduct(Vector6(solved.solve(
+                                       unit.cwiseProduct(wrenches.world + wrenches.commanded))));
     }
     references.joint.start(q);
     references.posture.start(q);
@@ -146,6 +155,98 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
       break;
     }
   }
+}
+
+/// The same where posture springs pull that were led elsewhere: N' and J# e change with q.
+TEST(LoadStiffness, IsTheDerivativeOfPostureSpringsToo) {
+  Random random(415);
+  double most = 0;
+  for (const testing::Arm& arm : testing::all_arms()) {
+    if (testing::arm_model(arm).dof() != 7) continue;
+    for (int k = 0; k < 24; ++k) {
+      SCOPED_TRACE(std::string(arm.file) + ", " + std::to_string(k));
+      HeldLoad held(random, arm);
+      Setpoint setpoint;
+      setpoint.mode = Mode::kCartesian;
+      setpoint.gains = springs(random);
+      setpoint.gains.null_stiffness = 20 * random.vector(7).cwiseAbs();
+      setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
+      if (k % 4 > 1) setpoint.gains.directions[static_cast<std::size_t>(k / 4)] = false;
+      held.impedance = Impedance(setpoint, 7);
+      held.hold();
+      held.references.posture.start(held.q + JointVector(0.2 * random.vector(7)));
+      ImpedanceLaw law(held.model, {false, false, false, false, true});
+      NullSpace null_space;
+      null_space.compute(held.robot, held.impedance);
+      if (null_space.inertia().regularity() < 3e-3) continue;
+      LawTorque asked;
+      law.torque({held.robot, held.q, held.rest, held.impedance, null_space, held.references,
+                  kUnclamped, held.wrenches.commanded},
+                 asked);
+      const JointVector error = asked.posture_error;
+      const NullSpaceChange change(held.kernel, held.q, held.robot, null_space, k % 2 == 1);
+      const LoadedPosture posture{change, error};
+      for (const Load load : {Load::kBaseWrench, Load::kToolWrench, Load::kJointTorques}) {
+        const MatrixXd K = falling(
+            [&](const JointVector& d) { return held.torque(law, load, held.q + d, held.rest); });
+        const JointMatrix added =
+            stiffness_under_load(held.robot, held.impedance, load, held.wrenches, &posture);
+        const JointMatrix before =
+            stiffness_under_load(held.robot, held.impedance, load, held.wrenches);
+        analysis::System<kMaxJoints> system;
+        Settings settings;
+        settings.task_terms.load = load;
+        closed_loop(held.robot, held.rest,
+                    {held.impedance, null_space, held.rest, held.wrenches,
+                     Posture{&held.kernel, &held.q, error, held.rest}},
+                    settings, system);
+        EXPECT_TRUE(near(system.stiffness, K, 1e-7 * K.norm()))
+            << (system.stiffness - K).norm() / K.norm();
+        most = std::max(most, (added - before).norm() / K.norm());
+      }
+    }
+  }
+  EXPECT_GT(most, 0.1) << "else it shows nothing";
+}
+
+/// Under way N turns, so that its dampers brake what moved the tip alone a moment ago.
+TEST(LoadStiffness, OfDampersUnderWayIsTheirDerivative) {
+  Random random(416);
+  double most = 0;
+  for (const testing::Arm& arm : testing::all_arms()) {
+    if (testing::arm_model(arm).dof() != 7) continue;
+    for (int k = 0; k < 8; ++k) {
+      SCOPED_TRACE(std::string(arm.file) + ", " + std::to_string(k));
+      HeldLoad held(random, arm);
+      held.wrenches = {};
+      Setpoint setpoint;
+      setpoint.mode = Mode::kCartesian;
+      setpoint.gains = springs(random);
+      setpoint.gains.task_stiffness.setZero();
+      setpoint.gains.null_damping = 2 * random.vector(7).cwiseAbs();
+      setpoint.gains.frame = k % 2 == 0 ? Frame::kBase : Frame::kTool;
+      held.impedance = Impedance(setpoint, 7);
+      held.hold();
+      ImpedanceLaw law(held.model, {false, false, false, false, false});
+      NullSpace null_space;
+      null_space.compute(held.robot, held.impedance);
+      if (null_space.inertia().regularity() < 3e-3) continue;
+      const JointVector qd = null_space.joint_velocity(random.vector(6));
+      const MatrixXd K = falling([&](const JointVector& d) {
+        return held.torque(law, Load::kBaseWrench, held.q + d, qd);
+      });
+      Settings settings;
+      settings.task_terms.jacobian_rate = true;
+      analysis::System<kMaxJoints> system;
+      closed_loop(held.robot, qd,
+                  {held.impedance, null_space, held.rest, held.wrenches,
+                   Posture{&held.kernel, &held.q, held.rest, held.rest}},
+                  settings, system);
+      EXPECT_TRUE(near(system.stiffness, K, 1e-7 * K.norm()));
+      most = std::max(most, K.norm());
+    }
+  }
+  EXPECT_GT(most, 1) << "else it shows nothing";
 }
 
 /// A dead weight at the tip and translational springs that hold it are as without the weight.

@@ -69,7 +69,7 @@ inline const std::vector<Room>& rooms() {
       {"controller/model",
        1,
        {"attachment", "robot_model", "robot_description", "kdl_chain", "dynamics",
-        "default_settings"},
+        "default_settings", "drives"},
        {kText, kEigen, "kdl/", "urdf_", "console_bridge/"}},
       {"controller/yaml", 1, {}, {kEigen, "yaml-cpp/"}},
       {"controller/motion", 2, {}, {kEigen}},
@@ -77,8 +77,8 @@ inline const std::vector<Room>& rooms() {
       {"controller/safety", 3, {"setpoint_check", "settings_check"}, {kEigen}},
       {"controller/vibration",
        4,
-       {"posture_loop"},
-       {kAnalysis, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
+       {"posture_loop", "rotors"},
+       {kAnalysis, kText, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
       {"controller/core", 5, {"controller"}, {kAnalysis, kEigen}},
       {"controller/audit", 5, {"audit", "gain_judge"}, {kAnalysis, kEigen}},
       {"controller/config", 6, {"config"}, {kEigen}},

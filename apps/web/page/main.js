@@ -337,6 +337,8 @@ function sampledNumbers(period) {
   const items = !sampled ? [['sampled loop', 'not analysed']] : [
     ['gain margin', sampled.gain_margin === null ? '∞' : `${number(sampled.gain_margin, 3)} ×`],
     ['largest |z|', sampled.spectral_radius === null ? '–' : sampled.spectral_radius.toFixed(6)],
+    ...(page.setup.arm && page.setup.arm.missing_rotors
+      ? [['rotors unknown', `${page.setup.arm.missing_rotors}: the margin is that of an arm without rotors`]] : []),
     ['period', period ? `${number(1e3 * period, 3)} ms` : '–']];
   const value = items.flat().join('|');
   if ($('sampled').dataset.value === value) return;

@@ -1,0 +1,46 @@
+#pragma once
+#include <dashpot/controller/law/null_space.hpp>
+#include <dashpot/controller/model/mass_change.hpp>
+
+namespace dashpot::controller {
+
+/// How the null space's projector N' and J# = M^-1 J' (J M^-1 J')^-1 change with q, where no gains
+/// change and the arm is not nearly singular. With G = H (H J M^-1 J' H)^-1 H of the selected
+/// directions H, dJ_k = dJ/dq_k and dM_k = dM/dq_k,
+///     d(J# V)/dq_k = M^-1 N' (dJ_k' G V - dM_k J# V) - J# dJ_k J# V
+///     d(N' t)/dq_k = -N' dJ_k' h - J' G dJ_k z + (1 - N') dM_k z,    h = J#' t, z = M^-1 N' t.
+/// Where the selected directions turn with the tool, dJ_k is less by the turning of J's rows.
+class NullSpaceChange {
+ public:
+  using TipMatrix = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::ColMajor, kMaxJoints, 6>;
+
+  /// `robot` and `null_space` are those of the kernel at `q`.
+  NullSpaceChange(const DynamicsKernel& kernel, const JointVector& q, const DynamicsResult& robot,
+                  const NullSpace& null_space, bool in_tool_axes) noexcept;
+
+  /// Returns d(J# V)/dq, n x n, for a V that is constant in the axes of the selected directions.
+  JointMatrix of_joint_velocity(const Vector6& V) const noexcept;
+  /// Returns d(N' t)/dq, n x n, for constant t.
+  JointMatrix of_torque(const JointVector& t) const noexcept;
+  /// Returns what turns V, constant in the axes of the selected directions, as joint k moves.
+  Vector6 turning(const Vector6& V, Eigen::Index k) const noexcept;
+  /// Returns d(J x)/dq (6 x n) for constant x, in the axes of the selected directions.
+  Jacobian twists(const JointVector& x) const noexcept;
+
+  const TipMatrix& share() const noexcept { return share_; }                   ///< J#, n x 6
+  const JointMatrix& projector() const noexcept { return torque_projector_; }  ///< N', n x n
+
+ private:
+  /// (dJ/dq_k)' F by columns
+  JointMatrix torques(const Vector6& F) const noexcept;
+
+  bool tool_;
+  Jacobian J_;
+  MassChange mass_;
+  Matrix6 inertia_;               ///< G
+  TipMatrix share_, tip_torque_;  ///< J#, J' G
+  JointMatrix mobility_;          ///< M^-1 N'
+  JointMatrix torque_projector_;
+};
+
+}  // namespace dashpot::controller

@@ -1,0 +1,117 @@
+#include <dashpot/controller/rotors.hpp>
+#include <dashpot/text/printable.hpp>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+
+namespace dashpot::controller {
+namespace {
+
+constexpr double kMostInertia = 100;  // kg m^2, of a joint: no arm has more
+
+const Joint& joint_of(const RobotModel& model, int i) {
+  return model.joints()[static_cast<std::size_t>(i)];
+}
+
+/// Two digits, rounded up: what is told is enough.
+std::string rounded_up(double value) {
+  const double unit = std::pow(10, std::floor(std::log10(value)) - 1);
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.2g", unit * std::ceil(value / unit - 1e-9));
+  return text.data();
+}
+
+}  // namespace
+
+UnknownRotors unknown_rotors(const RobotModel& model) {
+  UnknownRotors unknown;
+  for (int i = 0; i < model.dof(); ++i) {
+    if (joint_of(model, i).reflected_inertia == 0) unknown.joints.push_back(i);
+  }
+  if (unknown.any()) unknown.published = drives_like(model);
+  return unknown;
+}
+
+RobotModel with_at_least(const RobotModel& model, const JointVector& inertia) {
+  return model.with_reflected_inertia(
+      model.joint_values(&Joint::reflected_inertia).cwiseMax(inertia));
+}
+
+std::optional<JointVector> enough_reflected_inertia(
+    const RobotModel& model, const analysis::System<>& loop, double period,
+    const std::function<bool(const RobotModel&)>& keeps) {
+  const UnknownRotors unknown = unknown_rotors(model);
+  if (!unknown.any()) return std::nullopt;
+  const Eigen::VectorXd resists = loop.mass.inverse().diagonal().cwiseInverse();
+  JointVector demand = JointVector::Zero(model.dof());
+  double first = std::numeric_limits<double>::infinity(), largest = 0;
+  for (const int i : unknown.joints) {
+    demand[i] = period * loop.damping(i, i) + period * period * loop.stiffness(i, i);
+    if (demand[i] > 0) first = std::min(first, resists[i] / demand[i]);
+    largest = std::max(largest, demand[i]);
+  }
+  const auto inertia = [&](double share) {
+    return JointVector(
+        (share * demand - JointVector(resists))
+            .cwiseMax(0)
+            .cwiseMin(
+                (demand.array() > 0).select(JointVector::Constant(model.dof(), kMostInertia), 0)));
+  };
+  const auto enough = [&](double share) {
+    try {
+      return keeps(with_at_least(model, inertia(share)));
+    } catch (const std::exception&) {
+      return false;
+    }
+  };
+  if (!(largest > 0)) return std::nullopt;
+  double low = first, high = 2 * first;
+  while (!enough(high)) {
+    if (high * largest > kMostInertia) return std::nullopt;
+    low = high;
+    high *= 2;
+  }
+  for (int k = 0; k < 8; ++k) {
+    const double middle = std::sqrt(low * high);
+    (enough(middle) ? high : low) = middle;
+  }
+  return inertia(high);
+}
+
+std::string missing_rotors_text(const RobotModel& model) {
+  const UnknownRotors unknown = unknown_rotors(model);
+  if (!unknown.any()) return "";
+  std::string names;
+  for (const int i : unknown.joints) {
+    names += (names.empty() ? "" : ", ") + text::printable(joint_of(model, i).name);
+  }
+  const bool all = static_cast<int>(unknown.joints.size()) == model.dof();
+  return "the model has no reflected inertia of " + (all ? "any joint" : names);
+}
+
+std::string inertia_text(const RobotModel& model, const JointVector& inertia) {
+  std::string text;
+  for (int i = 0; i < model.dof(); ++i) {
+    if (!(inertia[i] > 0)) continue;
+    text += (text.empty() ? "" : ", ") + text::printable(joint_of(model, i).name) + " " +
+            rounded_up(inertia[i]);
+  }
+  return text + " kg m^2";
+}
+
+std::string rotors_hint(const RobotModel& model, const std::string& inertia_option,
+                        const std::string& drives_option, const std::string& between) {
+  const UnknownRotors unknown = unknown_rotors(model);
+  const std::string hint =
+      "The maker may tell it, a MuJoCo model has it as armature, dashpot identify finds it: " +
+      inertia_option + ".";
+  if (unknown.published == nullptr) return hint;
+  return hint + between + "Public figures of such an arm, with their doubts: " + drives_option +
+         " " + std::string(unknown.published->name) + ".";
+}
+
+}  // namespace dashpot::controller

@@ -1,0 +1,113 @@
+// What the program says of an arm whose rotors are not told, public drives, and bodies at the tip.
+#include <dashpot/controller/audit.hpp>
+#include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/support/arms.hpp>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+const Words kCrisp = {"--q",      "0,-45 deg,0,-135 deg,0,90 deg,45 deg",
+                      "--preset", "crisp",
+                      "--period", "1 ms",
+                      "--delay",  "1"};
+
+TEST(RotorsOfAudit, AreSaidToBeUnknownWithWhatWouldBeEnough) {
+  const std::string text = run_program(of_panda("audit", kCrisp)).out;
+  EXPECT_THAT(text,
+              AllOf(HasSubstr("Rotors unknown: the model has no reflected inertia of any joint"),
+                    HasSubstr("Enough for a margin of 2.00 would be panda_joint"),
+                    HasSubstr("--drives panda"), HasSubstr("too little of an arm without rotors"),
+                    Not(HasSubstr("unstable"))));
+  const Json found = parse(run_program(of_panda("audit", joined(kCrisp, {"--json"}))))["posture"];
+  EXPECT_EQ(found["rotors"], "unknown");
+  EXPECT_EQ(found["published_drives"], "panda");
+  EXPECT_EQ(found["joints_without_rotors"].size(), 7U);
+  const Numbers enough = found["reflected_inertia_for_margin"];
+  std::string list;
+  for (const double inertia : enough)
+    list += (list.empty() ? "" : ",") + std::to_string(inertia + 1e-6);
+  const Json with = parse(
+      run_program(of_panda("audit", joined(kCrisp, {"--json", "--reflected-inertia", list}))));
+  EXPECT_GE(with["posture"]["gain_margin"].get<double>(), 2);
+  const Json drives = parse(
+      run_program(of_panda("audit", joined(kCrisp, {"--json", "--drives", "panda"}))))["posture"];
+  EXPECT_EQ(drives["rotors"], "known");
+  EXPECT_GT(drives["gain_margin"].get<double>(), 2);
+  EXPECT_FALSE(drives.contains("reflected_inertia_for_margin"));
+  EXPECT_EQ(found["with_rotors"]["gain_margin"], drives["gain_margin"]);
+  EXPECT_EQ(found["with_rotors"]["smallest_ratio"], drives["smallest_ratio"]);
+  const Json more =
+      parse(run_program(of_panda("audit", joined(kCrisp, {"--json", "--margin", "4"}))))["posture"];
+  EXPECT_GT(more["reflected_inertia_for_margin"][6].get<double>(), enough[6]);
+}
+
+TEST(RotorsOfInspect, HaveSourceAndDoubt) {
+  EXPECT_THAT(run_program(of_panda("inspect", {})).out, HasSubstr("Rotors unknown"));
+  const std::string text = run_program(of_panda("inspect", {"--drives", "panda"})).out;
+  EXPECT_THAT(text, AllOf(HasSubstr("Source: MuJoCo Menagerie"), HasSubstr("Doubt: "),
+                          Not(HasSubstr("Rotors unknown"))));
+  const Json found = parse(run_program(of_panda("inspect", {"--drives", "panda", "--json"})));
+  EXPECT_EQ(found["rotors"], "known");
+  EXPECT_EQ(found["joints"][0]["reflected_inertia"], 0.1);
+  expect_refusal(run_program(of_panda("inspect", {"--drives", "pandas"})),
+                 "--drives: 'pandas' is none of panda, fr3");
+  expect_refusal(run_program(of_panda("audit", joined(kCrisp, {"--drives", "ur5e"}))),
+                 "those of ur5e have 6 joints, the arm has 7");
+}
+
+TEST(RotorsOfDesign, AreNamedWhereTheLoopBearsLess) {
+  const Words options = {"--q",
+                         "0,-0.785,0,-2.356,0,1.571,0.785",
+                         "--task-stiffness",
+                         "500,500,500,30,30,30",
+                         "--damping-ratio",
+                         "1",
+                         "--period",
+                         "2.5 ms",
+                         "--delay",
+                         "2"};
+  const Json plain = parse(run_program(of_panda("design", joined(options, {"--json"}))));
+  EXPECT_EQ(plain["rotors"], "unknown");
+  ASSERT_EQ(plain["notes"].size(), 1U);
+  EXPECT_THAT(plain["notes"][0].get<std::string>(),
+              AllOf(HasSubstr("no reflected inertia of any joint"),
+                    HasSubstr("the loop would bear a ratio of 1.00"), HasSubstr("--drives panda")));
+  const Json known =
+      parse(run_program(of_panda("design", joined(options, {"--json", "--drives", "panda"}))));
+  EXPECT_EQ(known["rotors"], "known");
+  EXPECT_EQ(known["notes"].size(), 0U);
+  EXPECT_EQ(known["loop"]["level"], 1);
+}
+
+TEST(PayloadOfTheCommandLine, HasCenterAndInertia) {
+  controller::ModelOptions model;
+  model.viscous_friction = controller::JointVector::Zero(7);
+  model.payload.mass = 0.73;
+  model.payload.center = {-0.01, 0.02, 0.03};
+  model.payload.inertia << 0.01, 0.001, 0.002, 0.001, 0.02, -0.003, 0.002, -0.003, 0.015;
+  controller::AuditOptions options;
+  options.gains.task_stiffness = controller::Vector6{{200, 200, 200, 20, 20, 20}}.asDiagonal();
+  options.gains.task_damping = controller::Vector6{{30, 30, 30, 5, 5, 5}}.asDiagonal();
+  const controller::JointVector q{{0, -0.785, 0, -2.356, 0, 1.571, 0.785}};
+  const double pole = controller::Audit(testing::arm_model(testing::arms()[0], model), options)
+                          .audit(q)
+                          .numbers.fastest_pole;
+  const auto audited = [&](const std::string& payload) {
+    return run_program(of_panda(
+        "audit", {"--q", "0,-0.785,0,-2.356,0,1.571,0.785", "--stiffness", "200,200,200,20,20,20",
+                  "--damping", "30,30,30,5,5,5", "--payload", payload, "--json"}));
+  };
+  const Json found = parse(audited("0.73,-1 cm,0.02,0.03,0.01,0.02,0.015,0.001,0.002,-0.003"));
+  EXPECT_NEAR(found["posture"]["fastest_pole"].get<double>(), pole, 1e-9 * std::abs(pole));
+  const Json round = parse(audited("0.73,-0.01,0.02,0.03,0.01,0.02,0.015"));
+  EXPECT_GT(std::abs(round["posture"]["fastest_pole"].get<double>() - pole), 1e-6);
+  expect_refusal(audited("1,2"), "--payload: 2 numbers, expected 1 (mass), 4 (and center), 7");
+  expect_refusal(audited("1,0,0,0,1,0.1,0.1"), "--payload: ");
+}
+
+}  // namespace
+}  // namespace dashpot::tests
