@@ -15,29 +15,6 @@ namespace {
 using testing::Random;
 using testing::Tracked;
 
-/// The modes turn into each other's places within 90 degrees; each solution is compared with the
-/// last one, not with that of the symmetric start.
-TEST(ModeTracker, KeepsThePlacesOfModesThatItSolvesDirectly) {
-  Tracked tracked;
-  for (int degrees = 0; degrees <= 90; degrees += 5) {
-    const double angle = degrees * std::numbers::pi / 180;
-    const Eigen::Rotation2Dd turn(angle);
-    System<kMaxDof> system(2);
-    system.stiffness = turn.toRotationMatrix() * Eigen::Vector2d(100, 400).asDiagonal() *
-                       turn.toRotationMatrix().transpose();
-    system.stiffness = (0.5 * (system.stiffness + system.stiffness.transpose())).eval();
-    system.damping.diagonal().setConstant(0.1);
-    if (degrees > 0) system.damping(0, 1) = 1e-3, system.damping(1, 0) = -1e-3;
-    ASSERT_EQ(tracked.update(system), Status::kOk);
-    EXPECT_EQ(tracked.spectrum->epoch, 1);
-    EXPECT_NEAR(tracked.mode(0).natural_frequency, 20, 1e-3) << degrees;
-    EXPECT_NEAR(tracked.mode(1).natural_frequency, 10, 1e-3) << degrees;
-    for (int i = 0; degrees > 0 && i < 2; ++i) {
-      EXPECT_EQ(tracked.spectrum->shapes[static_cast<std::size_t>(i)].slope[0], Complex());
-    }
-  }
-}
-
 /// A spring that no motion extends has an eigenvalue of zero, and no shape.
 TEST(ModeTracker, HasNoShapeWhereNothingMoves) {
   for (const double coupling : {0.0, 0.05}) {
