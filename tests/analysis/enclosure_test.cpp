@@ -416,38 +416,6 @@ TEST(DiscRadius, IsHardlyMoreThanEigenvaluesMove) {
   }
 }
 
-/// prod max(d, |mu - mu_j| / 2) = radius (norm + |mu| + d)^(k-1)
-TEST(DiscRadius, ReachesToWhereItsInequalityEnds) {
-  Random random(5107);
-  for (int trial = 0; trial < 2000; ++trial) {
-    const int count = random.integer(2, 4);
-    std::vector<Complex> values(static_cast<std::size_t>(count));
-    const double spread = random.log_uniform(1e-6, 1);
-    for (Complex& value : values) {
-      value = Complex(-1, 1) + spread * Complex(random.uniform(-1, 1), random.uniform(-1, 1));
-    }
-    double radius = random.log_uniform(1e-16, 1), norm = random.log_uniform(1, 10);
-    if (trial % 8 == 1) radius *= 1e-290;
-    if (trial % 4 == 0) {
-      // Where the search ends: with norm = 48 r the k-th power of d = 16 r is what is asked for.
-      values.assign(3, 0);
-      norm = 48 * radius * (1 + random.integer(-8, 8) * kEps);
-    }
-    const auto d = static_cast<Long>(
-        disc_radius(values.data(), static_cast<int>(values.size()), 0, norm, radius));
-    const auto excess = [&](Long at) {
-      const Long size = static_cast<Long>(norm) + std::abs(LongComplex(values[0])) + at;
-      Long product = size / static_cast<Long>(radius);
-      for (const Complex& value : values) {
-        product *= std::max(at, std::abs(LongComplex(values[0]) - LongComplex(value)) / 2) / size;
-      }
-      return product;
-    };
-    EXPECT_GE(excess(d), 1) << "trial " << trial << ", " << count << " values";
-    EXPECT_LE(excess(d * (values.size() == 2 ? 1 - 1e-9L : 0.95L)), 1) << "trial " << trial;
-  }
-}
-
 TEST(RootBounds, AreTheFarthestPointsOfUnionsOfDiscs) {
   // Discs of one group: three that hang together, a fourth apart; and one of another group.
   const std::array<double, 5> values = {0, 1, 1.5, 9, 1.2}, radii = {0.6, 0.6, 0.1, 0.5, 3};
