@@ -43,7 +43,7 @@ def units_of(folder, commands):
 
 def to_blame(output, changes):
     """The changes in lines that the compiler complains of."""
-    lines = set(re.findall(r"([\w/.]+):(\d+):\d*", output))
+    lines = set(re.findall(r"([^\s:]+):(\d+):\d*", output))
     lines = {(os.path.relpath(file, ROOT), int(line)) for file, line in lines
              if file.startswith(str(ROOT))}
     blamed = set()
