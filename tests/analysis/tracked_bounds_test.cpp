@@ -225,6 +225,42 @@ TEST(TrackedEnclosure, HoldsForEveryGramMatrix) {
   }
 }
 
+/// Errors of N are gamma (a a' + m m'), those of G gamma (a b' + b a' + c m m') and those of
+/// N Lambda (tracked_enclosure.cpp). A single block has a radius of G / (1 - N).
+TEST(TrackedEnclosure, CountsRoundingErrorsOfTheResidual) {
+  Random random(2501);
+  int single = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const int n = random.integer(1, 4), p = random.integer(1, n);
+    HandMade made(random, n, p);
+    const auto& system = made.system;
+    made.system.mass *= random.log_uniform(1e-2, 1e2);
+    const MatrixXd Z = random.log_uniform(1, 1e7) * random.matrix(n + p, n + p);
+    pack(Z, made.basis.Z);
+    made.prove();
+    const VectorXd s = system.mass.diagonal().cwiseSqrt(),
+                   rates = made.norms(made.Lambda()).diagonal();
+    const auto largest = [&](const MatrixXd& A) {
+      return A.cwiseAbs().cwiseQuotient(s * s.transpose()).maxCoeff();
+    };
+    const double gamma = (2 * made.size + 16) * kUnit, mass = largest(system.mass);
+    const MatrixXd V = Z.bottomRows(n).cwiseAbs().transpose();
+    const VectorXd a = Z.topRows(p).colwise().norm(), m = std::sqrt(mass) * (V * s);
+    const VectorXd b = V * system.stiffness_factor.colwise().norm().transpose();
+    VectorXd rate(made.size);
+    for (int i = 0; i < n; ++i) rate(made.columns(i)).setConstant(rates[i]);
+    const double a_rate = a.cwiseProduct(rate).norm(), m_rate = m.cwiseProduct(rate).norm();
+    const double N = gamma * (a.squaredNorm() + m.squaredNorm());
+    const double G = gamma * (a.norm() * (2 * b.norm() + a_rate) +
+                              m.norm() * (largest(system.damping) / mass * m.norm() + m_rate));
+    EXPECT_NEAR(made.enclosure.roundoff_bound / G, 1, 1e-8) << "trial " << trial;
+    if (n > 1 || N > 0.09) continue;
+    EXPECT_NEAR(made.enclosure.radius[0] * (1 - N) / G, 1, 1e-8);
+    ++single;
+  }
+  EXPECT_GT(single, 50);
+}
+
 TEST(TrackedEnclosure, ProvesNothingBeyondTheRangeOfNumbers) {
   // Products of such masses, and of such rates, may overflow or underflow.
   Random random(2503);
