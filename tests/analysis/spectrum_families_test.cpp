@@ -90,6 +90,25 @@ TEST_P(ClassicalDamping, IsFoundInEveryMode) {
   }
 }
 
+/// NLEVP "sleeper": A is circulant [1 -2 1], C = I + A^2, K = I + A + A^2, all of them integers.
+/// Where n is a multiple of six, -1 has two Jordan blocks, which rounding errors split.
+TEST(SleeperFamily, HasTwoCriticalModes) {
+  for (const int n : {6, 12, 24}) {
+    const MatrixXd I = MatrixXd::Identity(n, n);
+    MatrixXd A = -2 * I;
+    for (int i = 0; i < n; ++i) A(i, (i + 1) % n) = A((i + 1) % n, i) = 1;
+    int critical = 0;
+    for (const Mode<>& mode : analyze(system_from(I, I + A * A, I + A + A * A)).modes) {
+      if (mode.kind != ModeKind::kCritical) continue;
+      ++critical;
+      EXPECT_NEAR(mode.natural_frequency, 1, 1e-13);
+      EXPECT_NEAR(mode.damping_ratio, 1, 1e-13);
+      EXPECT_LE(std::abs(mode.eigenvalues[0] + 1.0), mode.error_bound);
+    }
+    EXPECT_EQ(critical, 2) << n;
+  }
+}
+
 TEST(CriticalOscillator, IsExact) {
   const Spectrum<> spectrum = analyze(testing::one_joint(1, 2, 1));
   ASSERT_EQ(spectrum.modes.size(), 1);
