@@ -15,7 +15,6 @@ namespace dashpot::analysis {
 namespace {
 
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
 using testing::allocations_of;
 using testing::Random;
 using testing::symmetrized;

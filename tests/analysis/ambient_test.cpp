@@ -1,5 +1,6 @@
 // Modes from motion under forces that nobody measured.
 #include <dashpot/analysis/identification.hpp>
+#include <dashpot/tests/support/refusal.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
@@ -16,7 +17,7 @@ namespace dashpot::analysis {
 namespace {
 
 using Eigen::MatrixXd;
-using testing::Draws;
+using testing::Dice;
 using ::testing::HasSubstr;
 using testing::sensed;
 using testing::Sensors;
@@ -76,7 +77,7 @@ struct ShakenArm {
     return sensed(motion.middleCols(from, count), kPeriod, noise_of(noise, missing), draw);
   }
 
-  Draws draw;
+  Dice draw;
   SprungArm arm;
   MatrixXd motion;
 };
@@ -193,7 +194,7 @@ TEST(IdentifyAmbient, AHumIsTakenAway) {
 
 /// Its peaks are as sharp as a hum's, and wander.
 TEST(IdentifyAmbient, AnArmThatRingsIsNotTakenForAHum) {
-  Draws draw(5);
+  Dice draw(5);
   const SprungArm arm(2, draw, 0.003, 0.006);
   const Identification result = identify_ambient(
       {sensed(arm.shake(kStrength, kTwoMinutes, kPeriod, draw), kPeriod, noise_of(1e-5), draw)});
@@ -208,7 +209,7 @@ TEST(IdentifyAmbient, AnArmThatRingsIsNotTakenForAHum) {
 
 TEST(IdentifyAmbient, WhatOnlyHumsOrIsNoiseHasNoModes) {
   for (std::uint64_t seed = 0; seed <= 3; ++seed) {  // 0: a hum
-    Draws draw(seed);
+    Dice draw(seed);
     MatrixXd motion(2, 20000);
     for (Eigen::Index i = 0; i < motion.cols(); ++i) {
       motion(0, i) = seed == 0 ? std::sin(0.05 * static_cast<double>(i)) : draw.normal();
@@ -220,15 +221,12 @@ TEST(IdentifyAmbient, WhatOnlyHumsOrIsNoiseHasNoModes) {
 }
 
 TEST(IdentifyAmbient, RefusesWhatIsTooShortOrRests) {
-  Draws draw(1);
+  Dice draw(1);
   MatrixXd motion(2, 400);
   for (double& y : motion.reshaped()) y = draw.normal();
-  try {
-    identify_ambient({sensed(motion, kPeriod, noise_of(1e-5), draw)});
-    FAIL();
-  } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("takes a longer record"));
-  }
+  EXPECT_THAT(testing::refusal<std::invalid_argument>(
+                  [&] { identify_ambient({sensed(motion, kPeriod, noise_of(1e-5), draw)}); }),
+              HasSubstr("takes a longer record"));
   EXPECT_THROW(identify_ambient({}), std::invalid_argument);
   const MatrixXd rest = MatrixXd::Constant(2, 20000, 0.3);
   EXPECT_THROW(identify_ambient({sensed(rest, 0.01, noise_of(0), draw)}), std::invalid_argument);

@@ -110,7 +110,7 @@ SystemPath free_directions(Dice& dice) {
 
 /// A block of every kind that a solver hands out, some of them defective.
 SystemPath every_kind(Dice& dice) {
-  testing::Random random(dice.engine());
+  testing::Random random(dice.engine()());
   const System<> made = (dice.integer(0, 1) == 0 ? testing::make_system_of_every_kind(random)
                                                  : testing::make_defective_system(random))
                             .system;

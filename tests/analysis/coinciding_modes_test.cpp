@@ -1,15 +1,12 @@
 // Modes of one frequency and ratio that stay so while their shapes turn: followed, with bounds that
 // hold, and told apart when they part.
-#include <dashpot/tests/support/enclosure.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 #include <dashpot/tests/support/tracked.hpp>
-#include <dashpot/tests/support/tracker_paths.hpp>
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cstdio>
 #include <vector>
 
 namespace dashpot::analysis {
@@ -17,22 +14,8 @@ namespace {
 
 using Eigen::MatrixXd;
 using testing::Dice;
+using testing::Follower;
 using testing::SystemPath;
-
-struct EnclosedFollower : testing::Tracked {
-  /// Along [0, length] of the path.
-  void follow(const SystemPath& path, int steps, double length) {
-    for (int step = 0; step < steps; ++step) {
-      const System<kMaxDof> system = path(length * step / steps);
-      ASSERT_EQ(update(system), Status::kOk) << "step " << step;
-      const testing::Verdict verdict = testing::judge<long double>(system, *spectrum, 1e-17);
-      ASSERT_TRUE(verdict.enclosed)
-          << "step " << step << ": " << verdict.what << ", error / bound " << verdict.tightest;
-      widest = std::max(widest, verdict.widest);
-    }
-  }
-  double widest = 0;
-};
 
 /// Springs and dampers that are multiples of a moving arm's mass matrix.
 SystemPath shaped_panda(double ratio, bool factored) {
@@ -50,10 +33,9 @@ TEST(CoincidingModes, OfAMovingArmAreFollowed) {
   for (const double ratio : {0.01, 0.2, 0.7, 0.9, 0.97, 1.05, 3.0}) {
     for (const bool factored : {false, true}) {
       SCOPED_TRACE(::testing::Message() << "ratio " << ratio << ", factored " << factored);
-      EnclosedFollower follower;
+      Follower follower;
       follower.follow(shaped_panda(ratio, factored), 100, 0.1);
-      EXPECT_EQ(follower.counters().direct, 1);
-      EXPECT_EQ(follower.spectrum->epoch, 1);
+      follower.expect_followed();
       EXPECT_LE(follower.counters().iterations, 250);
       EXPECT_LE(follower.widest, 2e-8);
       for (int i = 0; i < 7; ++i) {
@@ -73,7 +55,7 @@ TEST(CoincidingModes, ArePartedWhenTheyDiffer) {
     system.stiffness.diagonal() += 1e4 * late * late * Eigen::VectorXd::LinSpaced(7, 1, 4);
     return system;
   };
-  EnclosedFollower follower;
+  Follower follower;
   follower.follow(path, 200, 0.15);
   EXPECT_LE(follower.counters().direct, 3);
   EXPECT_LE(follower.widest, 1e-8);
@@ -116,7 +98,7 @@ TEST(CoincidingModes, AreFollowedAlongHardPaths) {
     for (std::uint64_t seed = 1; seed <= 12; ++seed) {
       SCOPED_TRACE(::testing::Message() << "seed " << seed);
       Dice dice(seed);
-      EnclosedFollower follower;
+      Follower follower;
       follower.follow(make(dice), 60, 0.3);
       EXPECT_LE(follower.widest, 1e-5);
       sum.tracked += follower.counters().tracked;
@@ -124,8 +106,6 @@ TEST(CoincidingModes, AreFollowedAlongHardPaths) {
     }
     EXPECT_GE(static_cast<double>(sum.tracked),
               tracked * static_cast<double>(sum.tracked + sum.direct));
-    std::printf("tracked %lld, direct %lld\n", static_cast<long long>(sum.tracked),
-                static_cast<long long>(sum.direct));
   }
 }
 

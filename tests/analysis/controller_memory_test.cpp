@@ -5,6 +5,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_impedance.hpp>
+#include <dashpot/tests/support/refusal.hpp>
 #include <dashpot/tests/support/sampled_loops.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
@@ -102,13 +103,9 @@ TEST(ControllerMemory, HasTheSameMarginInAnElasticForm) {
 TEST(ControllerMemory, OfOtherSizesIsRefused) {
   const System<> system = one_joint(1, 2, 3);
   const MatrixXd one = MatrixXd::Ones(1, 1);
-  const auto refused = [&](const ControllerMemory& memory) -> std::string {
-    try {
-      sample_loop(system, analyze(system), {.memory = memory});
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "accepted";
+  const auto refused = [&](const ControllerMemory& memory) {
+    return testing::refusal<std::invalid_argument>(
+        [&] { sample_loop(system, analyze(system), {.memory = memory}); });
   };
   EXPECT_EQ(refused({one, one, one}), "accepted");
   const std::string sizes = "sample_loop: memory has to be m x m, m x n and n x m";

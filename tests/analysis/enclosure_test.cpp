@@ -115,9 +115,11 @@ TEST(BlockEnclosure, HoldsInTheWorstCases) {
   }
 }
 
+/// By no more than it has to, and however the columns are scaled.
 TEST(BlockEnclosure, HoldsForEveryMatrixWithinTheErrors) {
   Random random(1006);
   int apart = 0;
+  double tightest = 0;
   for (int trial = 0; trial < 1000; ++trial) {
     Perturbed all(-3 * random.vector(2 * random.integer(1, 3)).cwiseAbs());
     const Eigen::Index states = all.size();
@@ -125,71 +127,26 @@ TEST(BlockEnclosure, HoldsForEveryMatrixWithinTheErrors) {
     error.diagonal() = random.log_uniform(1e-3, 1) * random.vector(states);
     all.residual.F_error = error.cwiseAbs();
     if (trial % 4 == 0) all.residual.F.diagonal() = 1e-3 * random.vector(states);  // rounded
+    Perturbed scaled = all;
     all.expect_enclosed(error);
-    apart += all.all_alone() ? 1 : 0;
+    if (!all.all_alone()) continue;
+    ++apart;
+    const double moved = std::abs(error(0, 0));
+    tightest = std::max(tightest, moved / all.enclosure.radius[0]);
+    const VectorXd scale =
+        VectorXd::NullaryExpr(states, [&] { return std::ldexp(1, random.integer(-9, 9)); });
+    for (MatrixXd* A : {&scaled.residual.F, &scaled.residual.F_error}) {
+      *A = (scale.cwiseInverse().asDiagonal() * *A * scale.asDiagonal()).eval();
+    }
+    scaled.basis.weight = scale.cwiseAbs2().cwiseInverse().asDiagonal();
+    scaled.prove();
+    for (Eigen::Index i = 0; i < states; ++i) {
+      EXPECT_NEAR(scaled.enclosure.radius[i], all.enclosure.radius[i],
+                  1e-8 * all.enclosure.radius[i]);
+    }
   }
   EXPECT_GT(apart, 100);
-}
-
-/// r = |E11| + 2 |E12| |E21| / delta, delta = sep - |E11| - |E22|, with all of E for E22: no less,
-/// whatever rounding does to a delta that is a small difference, and no more; however the columns
-/// are scaled.
-TEST(BlockEnclosure, HasTheRadiiOfTheTheorem) {
-  Random random(5101);
-  std::array<int, 5> alone{};
-  for (int trial = 0; trial < 5000; ++trial) {
-    const int kind = trial % 5;
-    const double gap = random.uniform(1, 3), delta = random.log_uniform(2e-9, 1e-7) * gap;
-    VectorXd Lambda{{0, gap, 100, 1000}};
-    MatrixXd F = MatrixXd::Zero(4, 4), error = F;
-    F(0, 1) = F(1, 0) = 0.01 * delta * delta;
-    if (kind == 0) {  // far apart
-      Lambda = VectorXd{{0, 10, 20, 30}} + random.vector(4).cwiseMin(2).cwiseMax(-2);
-      error = 0.2 * random.matrix(4, 4).cwiseAbs();
-    } else if (kind == 1) {  // weakly coupled
-      F = 1e-10 * random.matrix(4, 4);
-      F.diagonal().setZero();
-    } else if (kind == 2) {  // other blocks are coupled by almost as much as the gap is wide
-      F(1, 2) = gap - delta;
-    } else if (kind == 3) {  // errors of the blocks nearly fill the gap
-      error.diagonal().setConstant((gap - delta) / 2);
-    } else {  // both move to almost the same place, near 0
-      Lambda[0] = -random.uniform(0.1, 1);
-      F(0, 0) = -Lambda[0];
-      F(1, 1) = delta - gap;
-    }
-    Perturbed all(Lambda);
-    const VectorXd scale =
-        VectorXd::NullaryExpr(4, [&] { return std::ldexp(1, random.integer(-9, 9)); });
-    const auto scaled = [&](const MatrixXd& A) -> MatrixXd {
-      return scale.cwiseInverse().asDiagonal() * A * scale.asDiagonal();
-    };
-    all.residual.F = scaled(F);
-    all.residual.F_error = scaled(error);
-    all.basis.weight = scale.cwiseAbs2().cwiseInverse().asDiagonal();
-    all.prove();
-    if (!all.enclosure.alone(0) || !all.enclosure.alone(1)) continue;
-    ++alone[static_cast<std::size_t>(kind)];
-    const LongMatrix moved = F.cast<Long>().diagonal().cwiseAbs();
-    LongMatrix E = F.cwiseAbs().cast<Long>() + error.cast<Long>();
-    E.diagonal() = error.cast<Long>().diagonal();
-    const LongMatrix squares = E.cwiseAbs2();
-    const Long everything =
-        E.diagonal().maxCoeff() + std::sqrt(squares.sum() - squares.diagonal().sum());
-    for (int i = 0; i < (kind == 0 ? 4 : 1); ++i) {
-      Long apart = 1e9L, right = 0, left = 0;
-      for (int j = 0; j < 4; ++j) {
-        if (j == i) continue;
-        right += squares(i, j), left += squares(j, i);
-        const Long between = static_cast<Long>(Lambda[i]) - static_cast<Long>(Lambda[j]);
-        apart = std::min(apart, std::abs(between) - moved(i) - moved(j));
-      }
-      const Long exact = E(i, i) + 2 * std::sqrt(right * left) / (apart - E(i, i) - everything);
-      EXPECT_GE(static_cast<Long>(all.enclosure.radius[i]), exact) << "trial " << trial;
-      if (kind == 0) EXPECT_LE(static_cast<Long>(all.enclosure.radius[i]), exact * (1 + 1e-8L));
-    }
-  }
-  for (const int count : alone) EXPECT_GT(count, 200);
+  EXPECT_GT(tightest, 0.9);
 }
 
 TEST(BlockEnclosure, SeparatesBlocksUpToTheLimitOfTheTheorem) {
@@ -413,38 +370,6 @@ TEST(DiscRadius, IsHardlyMoreThanEigenvaluesMove) {
   EXPECT_EQ(disc_radius(pair.data(), 1, 0, 3, 1e-9), 1e-9);
   for (const double radius : {0.0, kInfinity}) {
     EXPECT_EQ(disc_radius(pair.data(), 2, 0, 3, radius), radius);
-  }
-}
-
-/// prod max(d, |mu - mu_j| / 2) = radius (norm + |mu| + d)^(k-1)
-TEST(DiscRadius, ReachesToWhereItsInequalityEnds) {
-  Random random(5107);
-  for (int trial = 0; trial < 2000; ++trial) {
-    const int count = random.integer(2, 4);
-    std::vector<Complex> values(static_cast<std::size_t>(count));
-    const double spread = random.log_uniform(1e-6, 1);
-    for (Complex& value : values) {
-      value = Complex(-1, 1) + spread * Complex(random.uniform(-1, 1), random.uniform(-1, 1));
-    }
-    double radius = random.log_uniform(1e-16, 1), norm = random.log_uniform(1, 10);
-    if (trial % 8 == 1) radius *= 1e-290;
-    if (trial % 4 == 0) {
-      // Where the search ends: with norm = 48 r the k-th power of d = 16 r is what is asked for.
-      values.assign(3, 0);
-      norm = 48 * radius * (1 + random.integer(-8, 8) * kEps);
-    }
-    const auto d = static_cast<Long>(
-        disc_radius(values.data(), static_cast<int>(values.size()), 0, norm, radius));
-    const auto excess = [&](Long at) {
-      const Long size = static_cast<Long>(norm) + std::abs(LongComplex(values[0])) + at;
-      Long product = size / static_cast<Long>(radius);
-      for (const Complex& value : values) {
-        product *= std::max(at, std::abs(LongComplex(values[0]) - LongComplex(value)) / 2) / size;
-      }
-      return product;
-    };
-    EXPECT_GE(excess(d), 1) << "trial " << trial << ", " << count << " values";
-    EXPECT_LE(excess(d * (values.size() == 2 ? 1 - 1e-9L : 0.95L)), 1) << "trial " << trial;
   }
 }
 

@@ -54,23 +54,6 @@ TEST(Drive, IsTheChangeOfCoordinatesByAnImpulse) {
   EXPECT_TRUE(near(drive<kDynamic>(spectrum.basis, f), jump, 1e-11));
 }
 
-TEST(ModalBasis, OfFixedCapacityMatchesDynamic) {
-  testing::Random random(54);
-  const auto [system, spectrum] = testing::make_system_of_every_kind(random);
-  ModalBasis<kMaxDof> fixed;
-  fixed.U = spectrum.basis.U;
-  fixed.Lambda = spectrum.basis.Lambda;
-  fixed.Y = spectrum.basis.Y;
-  fixed.Gamma = spectrum.basis.Gamma;
-  fixed.weight = spectrum.basis.weight;
-  const VectorXd q = random.vector(4);
-  const VectorXd v = random.vector(4);
-  EXPECT_TRUE(near(coordinates<kMaxDof>(fixed, system.mass, system.damping, q, v),
-                   coordinates<kDynamic>(spectrum.basis, system.mass, system.damping, q, v),
-                   1e-12));
-  EXPECT_TRUE(near(drive<kMaxDof>(fixed, q), drive<kDynamic>(spectrum.basis, q), 1e-12));
-}
-
 /// A system with r zero modes, which the damping couples with each other and with all others.
 System<> coupled_system(testing::Random& random, Eigen::Index n, Eigen::Index r) {
   System<> system(n);

@@ -4,6 +4,7 @@
 #include <dashpot/tests/support/made_to_measure.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/random_impedance.hpp>
+#include <dashpot/tests/support/refusal.hpp>
 
 #include <gtest/gtest.h>
 
@@ -261,13 +262,8 @@ TEST(IdentifiedModes, LeavesAloneWhatHasNoPartner) {
 
 TEST(IdentifiedModes, RefusesWhatItCannotFit) {
   const auto refused = [](const std::vector<Recording>& recordings,
-                          const IdentificationOptions& options = {}) -> std::string {
-    try {
-      identify_modes(recordings, options);
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "accepted";
+                          const IdentificationOptions& options = {}) {
+    return testing::refusal<std::invalid_argument>([&] { identify_modes(recordings, options); });
   };
   Random random(80);
   const Recording good{random.matrix(2, 30), random.matrix(2, 30)};

@@ -97,40 +97,6 @@ TEST(ModeTracker, GivesTheSameNumbersWithoutShapes) {
   EXPECT_EQ(without.spectrum->shapes[0].u[0].size(), 0);
 }
 
-TEST(ModeTracker, SortsByFallingFrequency) {
-  Tracked tracked;
-  for (int step = 0; step < 500; ++step) {
-    ASSERT_EQ(tracked.update(panda_impedance(swing(5e-3 * step), 0.1)), Status::kOk);
-    std::array<bool, 6> seen{};
-    double last = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < 6; ++k) {
-      const int place = tracked.spectrum->order[k];
-      seen[static_cast<std::size_t>(place)] = true;
-      EXPECT_LE(tracked.mode(place).natural_frequency, last);
-      last = tracked.mode(place).natural_frequency;
-    }
-    EXPECT_TRUE(std::all_of(seen.begin(), seen.end(), [](bool s) { return s; }));
-  }
-}
-
-TEST(ModeTracker, ZeroModeRatesAreThoseOfTheirFriction) {
-  // Damping that acts on the self-motion alone, U'C = a U'M: the rate is -a.
-  System<kMaxDof> system(3);
-  system.mass.diagonal() << 2, 3, 4;
-  system.stiffness_factor.resize(1, 3);
-  system.stiffness_factor << 5, 0, 0;
-  system.damping.diagonal() << 1, 6, 2;
-  Tracked tracked;
-  ASSERT_EQ(tracked.update(system), Status::kOk);
-  ASSERT_EQ(tracked.spectrum->zero_mode_count, 2);
-  std::array<double, 2> rates{tracked.spectrum->zero_mode_rates[0],
-                              tracked.spectrum->zero_mode_rates[1]};
-  std::sort(rates.begin(), rates.end());
-  EXPECT_NEAR(rates[0], -2, 1e-14);
-  EXPECT_NEAR(rates[1], -0.5, 1e-14);
-  EXPECT_NEAR(tracked.mode(0).natural_frequency, 5 / std::sqrt(2.0), 1e-14);
-}
-
 TEST(ModeTracker, SmallFrequenciesKeepTheirDigitsWithAFactor) {
   // 1e-5 beside 1e3 rad/s: squared, 16 orders of magnitude apart.
   System<kMaxDof> system(2);
@@ -269,14 +235,15 @@ TEST(ModeTracker, RefusesOptionsThatMeanNothing) {
   EXPECT_THROW(ModeTracker{options}, std::invalid_argument);
 }
 
+/// And by no more than it has to, where most of the bound is what the disturbance does.
 TEST(TrackedEnclosure, OfAPerturbedBasisStillEncloses) {
   Random random(4005);
   int proved = 0;
+  double tightest = 0;
   for (int trial = 0; trial < 600; ++trial) {
     const int n = random.integer(2, 7), rows = trial % 2 == 0 ? n - 1 : 0;
     System<kMaxDof> system = random_fixed_system(random, n, random.log_uniform(0.1, 30));
     if (rows > 0) system.stiffness_factor = 10 * random.matrix(rows, n);
-    const SymmetricPencil pencil = symmetric_pencil(system);
     // An orthonormal basis of the space, from the true eigenvectors disturbed: found by a tracker
     // of a system that lies nearby.
     System<kMaxDof> nearby = system;
@@ -288,13 +255,13 @@ TEST(TrackedEnclosure, OfAPerturbedBasisStillEncloses) {
     options.max_iterations = 1;
     Tracked tracked(options);
     tracked.update(nearby);
-    const Status status = tracked.update(system);
-    if (status != Status::kOk) continue;
+    if (tracked.update(system) != Status::kOk) continue;
     ++proved;
-    expect_enclosed(system, *tracked.spectrum);
-    EXPECT_EQ(pencil.zeros(), rows > 0 ? 1 : 0);
+    tightest = std::max(tightest, expect_enclosed(system, *tracked.spectrum).tightest);
+    EXPECT_EQ(symmetric_pencil(system).zeros(), rows > 0 ? 1 : 0);
   }
   EXPECT_GE(proved, 500);
+  EXPECT_GE(tightest, 0.01);
 }
 
 /// Where bounds begin to fail, following fails before the direct solver does, and the other way

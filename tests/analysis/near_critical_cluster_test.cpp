@@ -1,45 +1,41 @@
 // Many modes near critical damping at one frequency: how impedance controllers are often tuned, and
 // the hardest clusters of eigenvalues there are, since each mode is nearly defective by itself.
-#include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/quad_spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/systems.hpp>
+#include <dashpot/tests/support/tracked.hpp>
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <random>
 #include <vector>
 
 namespace dashpot::analysis {
 namespace {
 
-Eigen::MatrixXd symmetric_noise(Eigen::Index n, std::mt19937_64& generator) {
-  std::normal_distribution<double> normal;
-  const Eigen::MatrixXd A = Eigen::MatrixXd::NullaryExpr(n, n, [&] { return normal(generator); });
-  return 0.5 * (A + A.transpose());
+Eigen::MatrixXd symmetric_noise(Eigen::Index n, testing::Random& random) {
+  return testing::symmetrized(random.matrix(n, n));
 }
 
 /// 2 q'' M + C q' + K q of a cluster at -1, coupled at random.
-System<> cluster(Eigen::Index n, double coupling, std::mt19937_64& generator) {
+System<> cluster(Eigen::Index n, double coupling, testing::Random& random) {
   System<> system(n);
-  system.damping = 2 * system.mass + coupling * symmetric_noise(n, generator);
-  system.stiffness = system.mass + coupling * symmetric_noise(n, generator);
+  system.damping = 2 * system.mass + coupling * symmetric_noise(n, random);
+  system.stiffness = system.mass + coupling * symmetric_noise(n, random);
   return system;
 }
 
 /// Its modes are a root of the coupling apart, far more than the bounds, unless it is next to none.
 TEST(NearCriticalCluster, IsSolvedAndBoundedHoweverWeaklyItsModesAreCoupled) {
-  constexpr unsigned kSeed = 7001;
-  SCOPED_TRACE("seed " + std::to_string(kSeed));
-  std::mt19937_64 generator(kSeed);
+  testing::Random random(7001);
   for (const double coupling : {1e-12, 1e-11, 1e-10, 1e-8, 1e-7, 1e-6, 1e-5, 1e-3, 1e-2}) {
     for (Eigen::Index n = 2; n <= 7; ++n) {
       for (int repeat = 0; repeat < 10; ++repeat) {
         SCOPED_TRACE("coupling " + std::to_string(coupling) + ", n " + std::to_string(n));
-        const System<> system = cluster(n, coupling, generator);
+        const System<> system = cluster(n, coupling, random);
         const Spectrum<> spectrum = analyze(system);
         ASSERT_EQ(spectrum.modes.size(), n);
         std::vector<testing::QuadComplex> truth;
@@ -71,42 +67,25 @@ TEST(NearCriticalCluster, IsSolvedAndBoundedHoweverWeaklyItsModesAreCoupled) {
 
 /// What changes is far below what Newton's method can tell apart in the basis.
 TEST(NearCriticalCluster, IsFollowed) {
-  constexpr unsigned kSeed = 7003;
-  SCOPED_TRACE("seed " + std::to_string(kSeed));
-  std::mt19937_64 generator(kSeed);
+  testing::Random random(7003);
   for (const double coupling : {1e-9, 1e-8, 1e-7, 1e-6, 1e-4}) {
     for (Eigen::Index n = 2; n <= 7; ++n) {
       SCOPED_TRACE("coupling " + std::to_string(coupling) + ", n " + std::to_string(n));
-      const Eigen::MatrixXd C1 = symmetric_noise(n, generator), C2 = symmetric_noise(n, generator);
-      const Eigen::MatrixXd K1 = symmetric_noise(n, generator), K2 = symmetric_noise(n, generator);
-      ModeTracker tracker;
-      TrackedSpectrum spectrum;
+      const Eigen::MatrixXd C1 = symmetric_noise(n, random), C2 = symmetric_noise(n, random);
+      const Eigen::MatrixXd K1 = symmetric_noise(n, random), K2 = symmetric_noise(n, random);
+      testing::Tracked tracked;
       for (int k = 0; k < 200; ++k) {
         const double c = std::cos(1e-3 * k), s = std::sin(1e-3 * k);
         System<kMaxDof> system(n);
         system.damping = 2 * system.mass + coupling * (c * C1 + s * C2);
         system.stiffness = system.mass + coupling * (c * K1 + s * K2);
-        ASSERT_EQ(tracker.update(system, spectrum), Status::kOk);
-        for (int i = 0; i < spectrum.mode_count; ++i) {
-          EXPECT_LT(spectrum.modes[static_cast<std::size_t>(i)].error_bound,
-                    0.1 * std::sqrt(coupling));
+        ASSERT_EQ(tracked.update(system), Status::kOk);
+        for (int i = 0; i < tracked.spectrum->mode_count; ++i) {
+          EXPECT_LT(tracked.mode(i).error_bound, 0.1 * std::sqrt(coupling));
         }
       }
-      EXPECT_LE(tracker.counters().direct, 3);
+      EXPECT_LE(tracked.counters().direct, 3);
     }
-  }
-}
-
-TEST(NearCriticalCluster, OfTwoModesHasTheEigenvaluesOfItsParts) {
-  // Modes (1, 1) and (1, -1) decouple: l^2 + (2 +- e) l + (1 + d) with a common stiffness.
-  System<> system(2);
-  system.damping << 2, 1e-6, 1e-6, 2;
-  system.stiffness << 1, 0, 0, 1;
-  const Spectrum<> spectrum = analyze(system);
-  ASSERT_EQ(spectrum.modes.size(), 2);
-  for (const Mode<>& mode : spectrum.modes) {
-    EXPECT_NEAR(mode.natural_frequency, 1, 1e-13);
-    EXPECT_NEAR(std::abs(mode.damping_ratio - 1), 0.5e-6, 1e-13);
   }
 }
 

@@ -85,18 +85,6 @@ TEST(RatioDampingOfJoints, StartedFromTheLastConfigurationMatchesAColdStart) {
   }
 }
 
-TEST(RatioDampingOfJoints, LeavesJointsWithoutSpringsFree) {
-  TaskImpedance arm;
-  arm.mass = VectorXd{{2, 1, 1}}.asDiagonal();
-  arm.stiffness = VectorXd{{200, 0, 25}}.asDiagonal();
-  arm.damping = VectorXd{{1, 1, 1}}.asDiagonal();
-  RatioDamping damper = damper_of(arm, 0.5);
-  Matrix C(3, 3);
-  ASSERT_EQ(damper.update(Matrix(arm.mass), C), Status::kOk);
-  EXPECT_TRUE(near(MatrixXd(C), MatrixXd(VectorXd{{19, 0, 4}}.asDiagonal()), 1e-12));
-  EXPECT_FALSE(damper.overdone());
-}
-
 TEST(RatioDampingOfJoints, SaysWhatIsWrongAndKeepsTheDampingBefore) {
   Random random(7303);
   const TaskImpedance arm = random_joints(random, 4);

@@ -18,7 +18,6 @@ namespace dashpot::analysis {
 namespace {
 
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
 using testing::near;
 using testing::padded;
 using testing::Random;

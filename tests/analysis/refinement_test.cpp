@@ -114,12 +114,13 @@ TEST(BasisResidual, OfAnyBasisIsCounted) {
   Random random(5201);
   double largest = 0;
   for (int trial = 0; trial < 900; ++trial) {
-    const int n = random.integer(1, 3);
+    const bool wide = trial % 180 == 4;  // one block, whose sums are long
+    const int n = wide ? 8 : random.integer(1, 3);
     ModalBasis<> basis;
     basis.U = random.matrix(n, 2 * n);
     basis.Lambda = MatrixXd::Zero(2 * n, 2 * n);
     for (int first = 0; first < 2 * n;) {
-      const int size = std::min(random.integer(1, 3), 2 * n - first);
+      const int size = wide ? 2 * n : std::min(random.integer(1, 3), 2 * n - first);
       basis.blocks.push_back({first, size, false});
       basis.Lambda.block(first, first, size, size) = random.matrix(size, size);
       first += size;
@@ -226,27 +227,6 @@ TEST(BasisResidual, OfForcesNearlyOrthogonalToALeftVectorIsCounted) {
     expect_bounded(system, none(2), false, true, basis, residual);
     ASSERT_TRUE(residual.F_error.allFinite());
   }
-}
-
-TEST(BasisResidual, OfWideBlocksCountsTheirSums) {
-  // k u for each sum of k products: of weight G one, of M U Lambda^2 two, and n u.
-  Random random(5206);
-  const int n = 8, k = 2 * n;
-  System<> system(n);
-  system.mass = random.spd(n);
-  ModalBasis<> basis;
-  basis.U = random.matrix(n, k);
-  basis.Lambda = random.matrix(k, k);
-  basis.blocks.push_back({0, k, false});
-  BasisResidual<> residual;
-  evaluate_residual<kDynamic>(system, false, true, basis, residual);
-  const MatrixXd gram = k * kUnit * basis.weight.cwiseAbs() * residual.gram.cwiseAbs();
-  EXPECT_TRUE((residual.E.array() >= gram.array()).all());
-  evaluate_residual<kDynamic>(system, false, false, basis, residual);
-  const MatrixXd size = basis.Lambda.cwiseAbs();
-  const MatrixXd sums =
-      (2 * k + n) * kUnit * system.mass.cwiseAbs() * basis.U.cwiseAbs() * size * size;
-  EXPECT_TRUE((residual.R_size.array() >= sums.array()).all());
 }
 
 TEST(BasisResidual, AttainsErrorsOfCoefficients) {

@@ -2,17 +2,14 @@
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/task_space.hpp>
-#include <dashpot/tests/support/equation_residual.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/oracle.hpp>
-#include <dashpot/tests/support/random.hpp>
 
 #include <gtest/gtest.h>
 
 namespace dashpot::analysis {
 namespace {
 
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::near;
 using testing::ResponseCase;
@@ -87,40 +84,6 @@ TEST_P(ResponseOracle, Agrees) {
   for (const auto& [frequency, value] : reference.receptance) {
     const Eigen::MatrixXcd H = response.receptance(frequency);
     EXPECT_TRUE(near(H, value, kTolerance * value.cwiseAbs().maxCoeff())) << frequency;
-  }
-}
-
-/// With bases of the solver, and zero modes that a factor of K tells.
-TEST(ResponseOfRandomSystems, MeetsItsInitialConditionsAndSolvesTheEquation) {
-  testing::Random random(42);
-  for (int i = 0; i < 50; ++i) {
-    const int n = random.integer(1, 8), r = random.integer(0, std::min(2, n));
-    System<> system(n);
-    const MatrixXd W = 5 * random.matrix(n - r, n);
-    system.mass = random.spd(n);
-    system.damping = random.uniform(0, 4) * random.spd(n);
-    system.stiffness = W.transpose() * W;
-    system.stiffness = (0.5 * (system.stiffness + system.stiffness.transpose())).eval();
-    system.stiffness_factor = W;
-    const Response response(system, analyze(system));
-    const VectorXd q = random.vector(n), v = 10 * random.vector(n), f = 100 * random.vector(n);
-    const Motion start = response.free(q, v, 0);
-    EXPECT_TRUE(near(start.position, q, 1e-13 * q.norm()));
-    EXPECT_TRUE(near(start.velocity, v, 1e-13 * (v.norm() + 50 * q.norm())));
-    const auto residual = [&](const auto& motion, const auto& force) {
-      return testing::worst_residual(system, random, 0.01, 10, 5e-4, motion, force);
-    };
-    EXPECT_LT(residual([&](double t) { return response.free(q, v, t); },
-                       [n](double) -> VectorXd { return VectorXd::Zero(n); }),
-              1e-10);
-    EXPECT_LT(residual([&](double t) { return response.step(f, t); }, [&](double) { return f; }),
-              1e-10);
-    const double omega = random.log_uniform(0.1, 50);
-    EXPECT_LT(residual([&](double t) { return response.harmonic(f, q, omega, t); },
-                       [&](double t) -> VectorXd {
-                         return f * std::cos(omega * t) + q * std::sin(omega * t);
-                       }),
-              1e-10);
   }
 }
 

@@ -1,7 +1,6 @@
 // Responses of systems made from known bases: initial conditions, the differential equation itself,
 // and the identities that tie the responses to each other. No solver takes part.
 #include <dashpot/analysis/response.hpp>
-#include <dashpot/tests/support/equation_residual.hpp>
 #include <dashpot/tests/support/made_to_measure.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 
@@ -53,11 +52,30 @@ TEST_P(ResponseOf, InitialConditionsAreMet) {
   }
 }
 
+/// |M q'' + C q' + K q - f| at random times, relative to the sum of the sizes of its terms. q''
+/// comes from the velocities by an eighth-order difference: its error is about (omega h)^8 / 630
+/// for a motion of frequency omega.
 TEST_P(ResponseOf, TheEquationIsSolved) {
   const VectorXd q = random.vector(4), v = random.vector(4);
+  const System<>& system = made.system;
   const auto expect_solved = [&](const std::function<Motion(double)>& motion,
                                  const std::function<VectorXd(double)>& force) {
-    EXPECT_LT(testing::worst_residual(made.system, random, 0.02, 20, 1e-3, motion, force), 1e-10);
+    for (int i = 0; i < 20; ++i) {
+      const double t = random.log_uniform(0.02, 20), h = 1e-3;
+      const auto difference = [&](int k) -> VectorXd {
+        return motion(t + k * h).velocity - motion(t - k * h).velocity;
+      };
+      const VectorXd acceleration =
+          (672 * difference(1) - 168 * difference(2) + 32 * difference(3) - 3 * difference(4)) /
+          (840 * h);
+      const Motion now = motion(t);
+      const VectorXd residual = system.mass * acceleration + system.damping * now.velocity +
+                                system.stiffness * now.position - force(t);
+      EXPECT_LT(residual.norm(),
+                1e-10 * (system.mass.norm() * acceleration.norm() +
+                         system.damping.norm() * now.velocity.norm() +
+                         system.stiffness.norm() * now.position.norm() + force(t).norm()));
+    }
   };
   expect_solved([&](double t) { return response.free(q, v, t); }, [](double) { return kNoForce; });
   expect_solved([&](double t) { return response.step(q, t); }, [&](double) { return q; });
@@ -140,11 +158,6 @@ TEST(ResponseOfAFreeMass, PaperEq24DampedMotionComesToRest) {
     EXPECT_DOUBLE_EQ(motion.zero_mode_position(0), motion.position(0));
     EXPECT_DOUBLE_EQ(motion.zero_mode_velocity(0), motion.velocity(0));
   }
-}
-
-TEST(ResponseOfAFreeMass, PaperEq26UndampedMotionDrifts) {
-  EXPECT_DOUBLE_EQ(free_mass(0).free(one(2), one(3), 1e6).position(0), 2 + 3e6);
-  EXPECT_DOUBLE_EQ(free_mass(0).step(one(3), 1e3).position(0), 1.5e6);
 }
 
 /// q'' + 9 q = f: the undamped mode resonates at 3 rad/s.

@@ -5,6 +5,7 @@
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/paper_examples.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/systems.hpp>
 
 #include <gtest/gtest.h>
 
@@ -43,65 +44,50 @@ ZeroModes<> chain_zero_modes() {
   return zero_modes_from(testing::paper_chain(), MatrixXd::Ones(3, 1));
 }
 
-/// The vectors printed as U_r, of which S0 depends on the first.
-ZeroModes<> baxter_zero_modes(const System<>& system) {
-  MatrixXd printed(7, 2);
-  printed << 0.1988, -0.06389, 0, 0, -0.4589, 0.3744, 0, 0, 0.3825, -0.6587, 0, 0, 0.1478, 2.952;
-  return zero_modes_from(system, printed);
-}
-
-RigidBodyElimination remove_from_baxter() {
-  const System<> system = to_joint_space(testing::paper_baxter());
-  return eliminate_zero_modes(system, baxter_zero_modes(system), Pivot::kLast);
-}
-
-TEST(RigidBodyElimination, PaperEq40ConstraintMatrixOfTheChain) {
+TEST(RigidBodyElimination, PaperEqs40And42MatricesOfTheChain) {
   const RigidBodyElimination elimination =
       eliminate_zero_modes(testing::paper_chain(), chain_zero_modes(), Pivot::kLast);
-  EXPECT_TRUE(near(elimination.constraint_matrix,
-                   (MatrixXd(3, 2) << 1, 0, 0, 1, -1.6, -0.4).finished(), 1e-14));
   EXPECT_EQ(elimination.eliminated, std::vector<int>{2});
+  const auto expect = [](const MatrixXd& found, const MatrixXd& printed, double tolerance) {
+    EXPECT_TRUE(near(found, printed, tolerance));
+  };
+  expect(elimination.constraint_matrix, MatrixXd{{1, 0}, {0, 1}, {-1.6, -0.4}}, 1e-14);
+  expect(elimination.mass, MatrixXd{{20.8, 3.2}, {3.2, 2.8}}, 1e-13);
+  expect(elimination.damping, MatrixXd{{133.8, 40.2}, {40.2, 55.8}}, 1e-12);
+  expect(elimination.stiffness, MatrixXd{{21264, 4656}, {4656, 4524}}, 1e-10);
 }
 
-TEST(RigidBodyElimination, PaperEq42ReducedMatricesOfTheChain) {
-  const RigidBodyElimination elimination =
-      eliminate_zero_modes(testing::paper_chain(), chain_zero_modes(), Pivot::kLast);
-  EXPECT_TRUE(near(elimination.mass, (MatrixXd(2, 2) << 20.8, 3.2, 3.2, 2.8).finished(), 1e-13));
-  EXPECT_TRUE(
-      near(elimination.damping, (MatrixXd(2, 2) << 133.8, 40.2, 40.2, 55.8).finished(), 1e-12));
-  EXPECT_TRUE(
-      near(elimination.stiffness, (MatrixXd(2, 2) << 21264, 4656, 4656, 4524).finished(), 1e-10));
-}
+/// The arm without the vectors printed as U_r, of which S0 depends on the first.
+class PaperArmReduced : public ::testing::Test {
+ protected:
+  PaperArmReduced() {
+    MatrixXd printed(7, 2);
+    printed << 0.1988, -0.06389, 0, 0, -0.4589, 0.3744, 0, 0, 0.3825, -0.6587, 0, 0, 0.1478, 2.952;
+    elimination = eliminate_zero_modes(system, zero_modes_from(system, printed), Pivot::kLast);
+    S0 = elimination.steps.at(0);
+  }
+  System<> system = to_joint_space(testing::paper_baxter());
+  RigidBodyElimination elimination;
+  MatrixXd S0;
+};
 
-TEST(RigidBodyElimination, PaperEq62FirstConstraintMatrixOfTheArm) {
-  const RigidBodyElimination elimination = remove_from_baxter();
+TEST_F(PaperArmReduced, Eqs60To63ConstraintMatrices) {
   ASSERT_EQ(elimination.steps.size(), 2u);
-  const MatrixXd& S0 = elimination.steps[0];
+  const MatrixXd &S1 = elimination.steps[1], &S = elimination.constraint_matrix;
   EXPECT_TRUE(near(S0.topRows(6), MatrixXd::Identity(6, 6), 0));
-  EXPECT_TRUE(as_printed(S0.bottomRows(1), {{"-17.0", "3.12", "11.5", "1.86", "-6.3", "1.94"}}));
   EXPECT_TRUE(
       as_printed(S0.bottomRows(1), {{"-17.04", "3.118", "11.45", "1.86", "-6.304", "1.94"}}));
-}
-
-TEST(RigidBodyElimination, PaperEq63SecondConstraintMatrixOfTheArm) {
-  const MatrixXd S1 = remove_from_baxter().steps[1];
-  EXPECT_TRUE(near(S1.topRows(5), MatrixXd::Identity(5, 5), 0));
+  for (const MatrixXd* one : {&S1, &S}) {
+    EXPECT_TRUE(near(one->topRows(5), MatrixXd::Identity(5, 5), 0));
+  }
   EXPECT_TRUE(as_printed(S1.bottomRows(1), {{"22.4", "-1.93", "-14.1", "-0.813", "9.48"}}));
-}
-
-TEST(RigidBodyElimination, PaperEq60FullConstraintMatrixOfTheArm) {
-  const RigidBodyElimination elimination = remove_from_baxter();
-  EXPECT_TRUE(near(elimination.constraint_matrix.topRows(5), MatrixXd::Identity(5, 5), 0));
-  EXPECT_TRUE(as_printed(elimination.constraint_matrix.bottomRows(2),
-                         {{"22.36", "-1.925", "-14.08", "-0.8126", "9.478"},
-                          {"26.43", "-0.6264", "-15.93", "0.2800", "12.12"}}));
+  EXPECT_TRUE(as_printed(S.bottomRows(2), {{"22.36", "-1.925", "-14.08", "-0.8126", "9.478"},
+                                           {"26.43", "-0.6264", "-15.93", "0.2800", "12.12"}}));
 }
 
 // Which null vector is removed first is known from four printed digits only: hence three units, and
 // the fifth digit of C'(1,3) (-4.6863) and of an eigenvalue of K' (67.585) is out of reach.
-TEST(RigidBodyElimination, PaperAppendix3MatricesOfTheFirstReducedSpace) {
-  const System<> system = to_joint_space(testing::paper_baxter());
-  const MatrixXd S0 = remove_from_baxter().steps[0];
+TEST_F(PaperArmReduced, Appendix3MatricesOfTheFirstReducedSpace) {
   EXPECT_TRUE(as_printed(S0.transpose() * system.mass * S0,
                          {{"21.97", "-3.269", "-17.02", "-1.677", "6.208", "-1.508"},
                           {"-3.269", "9.030", "2.916", "5.617", "-0.3513", "3.232"},
@@ -128,8 +114,7 @@ TEST(RigidBodyElimination, PaperAppendix3MatricesOfTheFirstReducedSpace) {
                          3));
 }
 
-TEST(RigidBodyElimination, PaperAppendix3MatricesOfTheSecondReducedSpace) {
-  const RigidBodyElimination elimination = remove_from_baxter();
+TEST_F(PaperArmReduced, Appendix3MatricesOfTheSecondReducedSpace) {
   EXPECT_TRUE(as_printed(elimination.mass, {{"1200", "-35.30", "-746.4", "9.815", "516.2"},
                                             {"-35.30", "5.813", "22.01", "2.106", "-14.85"},
                                             {"-746.4", "22.01", "469.6", "-6.214", "-318.4"},
@@ -148,10 +133,7 @@ TEST(RigidBodyElimination, PaperAppendix3MatricesOfTheSecondReducedSpace) {
                                          {"4703", "-197.7", "-2783.8", "93.54", "1980.5"}}));
 }
 
-TEST(RigidBodyElimination, PaperEigenvaluesOfTheReducedStiffnesses) {
-  const System<> system = to_joint_space(testing::paper_baxter());
-  const RigidBodyElimination elimination = remove_from_baxter();
-  const MatrixXd& S0 = elimination.steps[0];
+TEST_F(PaperArmReduced, EigenvaluesOfTheReducedStiffnesses) {
   const auto eigenvalues = [](const MatrixXd& K) -> MatrixXd {
     return Eigen::SelfAdjointEigenSolver<MatrixXd>(K).eigenvalues().reverse().transpose();
   };
@@ -163,98 +145,75 @@ TEST(RigidBodyElimination, PaperEigenvaluesOfTheReducedStiffnesses) {
 
 // ------------------------------------------------------------------------ any system, any pivot
 
-/// n coordinates, r zero modes, given with a factor or without.
-System<> random_system(testing::Random& random, int n, int r, bool factored) {
-  System<> system(n);
+System<> random_system(testing::Random& random, int n, int r) {
   const MatrixXd W = random.matrix(n - r, n);
-  system.mass = random.spd(n);
-  system.damping = random.spd(n);
-  system.stiffness = 100 * W.transpose() * W;
-  system.stiffness = (0.5 * (system.stiffness + system.stiffness.transpose())).eval();
-  if (factored) system.stiffness_factor = 10 * W;
-  return system;
+  return testing::system_from(random.spd(n), random.spd(n),
+                              testing::symmetrized(100 * W.transpose() * W));
 }
 
-TEST(RigidBodyElimination, LeaveTheNonzeroFrequenciesAlone) {
+TEST(RigidBodyElimination, LeavesTheNonzeroFrequenciesAndMotionsOrthogonalToEveryZeroMode) {
   testing::Random random(12);
   for (int i = 0; i < 50; ++i) {
-    const int n = random.integer(2, 7);
-    const int r = random.integer(1, std::min(3, n - 1));
-    const System<> system = random_system(random, n, r, false);
+    const int n = random.integer(2, 7), r = random.integer(1, std::min(3, n - 1));
+    const System<> system = random_system(random, n, r);
     const ZeroModes<> zero_modes = zero_modes_from(system, random.matrix(n, r));
     const RigidBodyElimination elimination =
         eliminate_zero_modes(system, zero_modes, Pivot::kLargest);
-    const VectorXd all =
-        Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(system.stiffness, system.mass)
-            .eigenvalues();
-    const VectorXd kept =
-        Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(elimination.stiffness, elimination.mass)
-            .eigenvalues();
-    EXPECT_TRUE(near(kept, all.tail(n - r), 1e-10 * all(n - 1)));
+    const auto frequencies = [](const MatrixXd& K, const MatrixXd& M) -> VectorXd {
+      return Eigen::GeneralizedSelfAdjointEigenSolver<MatrixXd>(K, M).eigenvalues();
+    };
+    const VectorXd all = frequencies(system.stiffness, system.mass);
+    EXPECT_TRUE(near(frequencies(elimination.stiffness, elimination.mass), all.tail(n - r),
+                     1e-10 * all(n - 1)));
+    const MatrixXd& S = elimination.constraint_matrix;
+    EXPECT_TRUE(near(zero_modes.basis.transpose() * system.mass * S, MatrixXd::Zero(r, n - r),
+                     1e-13 * S.norm()));
+    MatrixXd product = MatrixXd::Identity(n, n);
+    for (const MatrixXd& step : elimination.steps) product *= step;
+    EXPECT_TRUE(near(S, product, 1e-14 * S.norm()));
   }
+  const System<> whole = random_system(random, 4, 0);
+  const RigidBodyElimination none =
+      eliminate_zero_modes(whole, zero_modes_from(whole, MatrixXd(4, 0)), Pivot::kLargest);
+  EXPECT_TRUE(near(none.constraint_matrix, MatrixXd::Identity(4, 4), 0));
+  EXPECT_TRUE(near(none.stiffness, whole.stiffness, 0));
+  EXPECT_TRUE(none.steps.empty());
 }
 
-TEST(RigidBodyElimination, KeepMotionsOrthogonalToEveryZeroMode) {
-  testing::Random random(13);
-  const System<> system = random_system(random, 6, 2, true);
-  const ZeroModes<> zero_modes = zero_modes_from(system, random.matrix(6, 2));
-  const RigidBodyElimination elimination =
-      eliminate_zero_modes(system, zero_modes, Pivot::kLargest);
-  const MatrixXd overlap =
-      zero_modes.basis.transpose() * system.mass * elimination.constraint_matrix;
-  EXPECT_TRUE(near(overlap, MatrixXd::Zero(2, 4), 1e-13));
-  EXPECT_TRUE(near(elimination.constraint_matrix, elimination.steps[0] * elimination.steps[1], 0));
-}
-
-TEST(RigidBodyElimination, DependOnTheZeroModesTogetherOnly) {
+TEST(RigidBodyElimination, DependsOnTheZeroModesTogetherOnly) {
   testing::Random random(14);
-  const System<> system = random_system(random, 6, 3, false);
+  const System<> system = random_system(random, 6, 3);
   const MatrixXd some = random.matrix(6, 3);
-  const RigidBodyElimination one =
-      eliminate_zero_modes(system, zero_modes_from(system, some), Pivot::kLast);
-  const RigidBodyElimination other = eliminate_zero_modes(
-      system, zero_modes_from(system, some * random.matrix(3, 3)), Pivot::kLast);
+  const auto eliminated = [&](const MatrixXd& vectors) {
+    return eliminate_zero_modes(system, zero_modes_from(system, vectors), Pivot::kLast);
+  };
+  const RigidBodyElimination one = eliminated(some), other = eliminated(some * random.matrix(3, 3));
   EXPECT_TRUE(near(one.constraint_matrix, other.constraint_matrix, 1e-11));
   EXPECT_FALSE(near(one.steps[0], other.steps[0], 1e-3));
 }
 
-TEST(RigidBodyElimination, EliminateTheCoordinateThatMovesMost) {
+TEST(RigidBodyElimination, EliminatesTheCoordinateThatMovesMostAndRefusesOneThatDoesNot) {
   System<> chain = testing::paper_chain();
-  EXPECT_EQ(eliminate_zero_modes(chain, chain_zero_modes(), Pivot::kLargest).eliminated,
-            std::vector<int>{0});
+  const auto eliminated = [](const System<>& system, const MatrixXd& vectors) {
+    return eliminate_zero_modes(system, zero_modes_from(system, vectors), Pivot::kLargest)
+        .eliminated;
+  };
+  EXPECT_EQ(eliminated(chain, MatrixXd::Ones(3, 1)), std::vector<int>{0});
   chain.mass.diagonal() << 2, 8, 5;
-  EXPECT_EQ(
-      eliminate_zero_modes(chain, zero_modes_from(chain, MatrixXd::Ones(3, 1)), Pivot::kLargest)
-          .eliminated,
-      std::vector<int>{1});
-}
-
-TEST(RigidBodyElimination, OfEveryCoordinateLeaveNothing) {
-  const System<> free(3);
-  const ZeroModes<> zero_modes =
-      zero_modes_from(free, MatrixXd::Identity(3, 3).rowwise().reverse());
-  const RigidBodyElimination elimination = eliminate_zero_modes(free, zero_modes, Pivot::kLargest);
-  EXPECT_EQ(elimination.eliminated, (std::vector<int>{2, 1, 0}));
-  EXPECT_EQ(elimination.mass.size(), 0);
-}
-
-TEST(RigidBodyElimination, WithoutZeroModesChangeNothing) {
-  testing::Random random(15);
-  const System<> system = random_system(random, 4, 0, false);
-  const RigidBodyElimination elimination =
-      eliminate_zero_modes(system, zero_modes_from(system, MatrixXd(4, 0)), Pivot::kLargest);
-  EXPECT_TRUE(near(elimination.constraint_matrix, MatrixXd::Identity(4, 4), 0));
-  EXPECT_TRUE(near(elimination.stiffness, system.stiffness, 0));
-  EXPECT_TRUE(elimination.steps.empty());
-}
-
-TEST(RigidBodyElimination, RefuseToDivideByACoordinateThatDoesNotMove) {
+  EXPECT_EQ(eliminated(chain, MatrixXd::Ones(3, 1)), std::vector<int>{1});
+  const MatrixXd all = MatrixXd::Identity(3, 3).rowwise().reverse();
+  EXPECT_EQ(eliminated(System<>(3), all), (std::vector<int>{2, 1, 0}));
+  EXPECT_EQ(eliminate_zero_modes(System<>(3), zero_modes_from(System<>(3), all), Pivot::kLargest)
+                .mass.size(),
+            0);
   System<> system(2);
   system.stiffness(1, 1) = 1;
-  const ZeroModes<> zero_modes = zero_modes_from(system, MatrixXd::Identity(2, 1));
-  EXPECT_THROW(eliminate_zero_modes(system, zero_modes, Pivot::kLast), std::domain_error);
-  EXPECT_EQ(eliminate_zero_modes(system, zero_modes, Pivot::kLargest).eliminated,
-            std::vector<int>{0});
+  const MatrixXd first = MatrixXd::Identity(2, 1);
+  EXPECT_THROW(eliminate_zero_modes(system, zero_modes_from(system, first), Pivot::kLast),
+               std::domain_error);
+  EXPECT_EQ(eliminated(system, first), std::vector<int>{0});
+  EXPECT_THROW(eliminate_zero_modes(System<>(2), chain_zero_modes(), Pivot::kLast),
+               std::invalid_argument);
 }
 
 /// Masses 1, 2, 4 with two springs, one of them much stiffer, whose zero mode is (1, 1, 1).
@@ -277,11 +236,6 @@ TEST(RigidBodyElimination, OfUnlikeSpringsIsExact) {
     const MatrixXd reduced = S.transpose() * *chain.stiffness * S;
     EXPECT_TRUE(near(elimination.stiffness, reduced, 2e-14 * k)) << "2^" << grade;
   }
-}
-
-TEST(RigidBodyElimination, RefuseZeroModesOfAnotherSystem) {
-  EXPECT_THROW(eliminate_zero_modes(System<>(2), chain_zero_modes(), Pivot::kLast),
-               std::invalid_argument);
 }
 
 }  // namespace

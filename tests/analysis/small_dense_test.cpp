@@ -2,6 +2,7 @@
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/special_values.hpp>
 
 #include <gtest/gtest.h>
 
@@ -19,20 +20,8 @@ using testing::Random;
 
 constexpr double kTiny = std::numeric_limits<double>::min();
 
-TEST(Multiply, AgreesWithEigen) {
-  Random random(804);
-  for (int n = 0; n <= 2 * kMaxDof + 1; ++n) {
-    const MatrixXd A = random.matrix(n, 5), B = random.matrix(5, 7);
-    MatrixXd out;
-    multiply(A, B, out);
-    EXPECT_TRUE(near(out, A * B, 1e-14)) << "n = " << n;
-  }
-}
-
 TEST(IsFinite, LooksAtEveryEntry) {
-  for (const double value :
-       {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
-        std::numeric_limits<double>::quiet_NaN()}) {
+  for (const double value : {testing::kInfinity, -testing::kInfinity, testing::kNan}) {
     for (Eigen::Index i = 0; i < 15; ++i) {
       MatrixXd X = MatrixXd::Constant(5, 3, std::numeric_limits<double>::max());
       EXPECT_TRUE(is_finite(X));
@@ -43,42 +32,38 @@ TEST(IsFinite, LooksAtEveryEntry) {
   EXPECT_TRUE(is_finite(MatrixXd(0, 0)));
 }
 
-TEST(SolveInPlace, AgreesWithEigen) {
-  Random random(801);
-  for (int n = 0; n <= 20; ++n) {
-    const MatrixXd A = random.matrix(n, n), B = random.matrix(n, 3);
-    MatrixXd factor = A, X = B;
-    solve_in_place(factor, X, kTiny);
-    if (n == 0) continue;
-    EXPECT_TRUE(near(A * X, B, 1e-13 * A.norm() * X.norm())) << "n = " << n;
-    const MatrixXd expected = A.partialPivLu().solve(B);
-    const double condition = A.norm() * A.inverse().norm();
-    EXPECT_TRUE(near(X, expected, 1e-15 * condition * X.norm())) << "n = " << n;
-  }
-}
-
-TEST(SolveInPlace, TakesComplexMatrices) {
-  Random random(802);
-  MatrixXcd A(7, 7), B(7, 2);
-  A.real() = random.matrix(7, 7);
-  A.imag() = random.matrix(7, 7);
-  B.real() = random.matrix(7, 2);
-  B.imag() = random.matrix(7, 2);
-  MatrixXcd factor = A, X = B;
+/// A X = B is solved, with rows in any order.
+template <class Matrix>
+void expect_solved(const Matrix& A, const Matrix& B) {
+  Matrix factor = A, X = B;
   solve_in_place(factor, X, kTiny);
-  EXPECT_TRUE(near(A * X, B, 1e-13 * A.norm() * X.norm()));
+  EXPECT_TRUE(near(A * X, B, 1e-13 * A.norm() * X.norm())) << A.rows() << " rows";
+  if (A.rows() == 0) return;
+  const double condition = A.norm() * A.inverse().norm();
+  EXPECT_TRUE(near(X, A.partialPivLu().solve(B), 1e-15 * condition * X.norm()));
 }
 
-TEST(SolveInPlace, NeedsItsPivoting) {
+TEST(SolveInPlace, SolvesAndPivots) {
+  Random random(801);
+  for (int n = 0; n <= 2 * kMaxDof + 1; ++n) {
+    const MatrixXd A = random.matrix(n, n), B = random.matrix(n, 3);
+    expect_solved(A, B);
+    MatrixXd product;
+    multiply(A, B, product);
+    EXPECT_TRUE(near(product, A * B, 1e-13)) << n << " rows";
+    expect_solved<MatrixXcd>(A + Complex(0, 1) * random.matrix(n, n),
+                             B + Complex(0, 1) * random.matrix(n, 3));
+  }
   MatrixXd A(3, 3);
   A << 0, 2, 1, 1e-20, 1, 0, 3, 0, 1;
-  const VectorXd x{{1, -2, 3}};
-  VectorXd b = A * x;
-  solve_in_place(A, b, kTiny);
-  EXPECT_TRUE(near(b, x, 1e-15));
+  expect_solved<MatrixXd>(A, A * VectorXd{{1, -2, 3}});
 }
 
-TEST(SolveInPlace, FindsTheNullVectorOfASingularMatrix) {
+TEST(SolveInPlace, ReplacesPivotsThatAreTooSmallAndFindsANullVector) {
+  MatrixXd zero = MatrixXd::Zero(2, 2);
+  VectorXd b{{3, 5}};
+  solve_in_place(zero, b, 0.5);
+  EXPECT_TRUE(near(b, VectorXd{{6, 10}}, 0));
   Random random(803);
   for (int trial = 0; trial < 20; ++trial) {
     const int n = random.integer(1, 9);
@@ -95,18 +80,10 @@ TEST(SolveInPlace, FindsTheNullVectorOfASingularMatrix) {
   }
 }
 
-TEST(SolveInPlace, ReplacesPivotsThatAreTooSmall) {
-  MatrixXd A = MatrixXd::Zero(2, 2);
-  VectorXd b{{3, 5}};
-  solve_in_place(A, b, 0.5);
-  EXPECT_TRUE(near(b, VectorXd{{6, 10}}, 0));
-}
-
 TEST(Orthonormalize, KeepsTheSpansOfLeadingColumns) {
   Random random(804);
   for (const double angle : {1.0, 1e-5, 1e-10}) {
-    const MatrixXd start = random.matrix(8, 4);
-    MatrixXd S = start;
+    MatrixXd S = random.matrix(8, 4);
     S.col(2) = S.col(0) + S.col(1) + angle * S.col(2);
     const MatrixXd given = S;
     orthonormalize(S);
@@ -116,10 +93,6 @@ TEST(Orthonormalize, KeepsTheSpansOfLeadingColumns) {
     EXPECT_TRUE(
         near(MatrixXd(R.triangularView<Eigen::StrictlyLower>()), MatrixXd::Zero(4, 4), 1e-14));
   }
-}
-
-TEST(Orthonormalize, TakesHugeAndTinyColumns) {
-  Random random(805);
   MatrixXd S = random.matrix(5, 3) * VectorXd{{1e200, 1, 1e-200}}.asDiagonal();
   orthonormalize(S);
   EXPECT_TRUE(near(S.transpose() * S, MatrixXd::Identity(3, 3), 1e-14));

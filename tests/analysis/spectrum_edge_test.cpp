@@ -22,6 +22,7 @@ using testing::Random;
 using testing::symmetrized;
 using testing::system_from;
 using testing::true_eigenvalues;
+using testing::worst_distance;
 
 /// All 2n: of the modes, then of the zero modes.
 std::vector<Complex> all_eigenvalues(const Spectrum<>& spectrum) {
@@ -32,21 +33,6 @@ std::vector<Complex> all_eigenvalues(const Spectrum<>& spectrum) {
   all.resize(all.size() + static_cast<std::size_t>(spectrum.zero_modes.count), 0.0);
   for (const double rate : spectrum.zero_mode_rates) all.emplace_back(rate);
   return all;
-}
-
-/// Largest distance when each computed eigenvalue takes the nearest true one that is left.
-double worst_distance(const std::vector<Complex>& computed, std::vector<LongComplex> truth) {
-  if (computed.size() != truth.size()) return kInfinity;
-  long double worst = 0;
-  for (const Complex& value : computed) {
-    const auto away = [&](const LongComplex& z) { return std::abs(z - LongComplex(value)); };
-    const auto nearest =
-        std::min_element(truth.begin(), truth.end(),
-                         [&](const auto& a, const auto& b) { return away(a) < away(b); });
-    worst = std::max(worst, away(*nearest));
-    truth.erase(nearest);
-  }
-  return static_cast<double>(worst);
 }
 
 /// Every eigenvalue within the bound of its mode, and both eigenvectors solve their equations.
@@ -239,47 +225,6 @@ TEST(CoupledZeroModes, AreNotReportedForTaskDamping) {
   EXPECT_FALSE(spectrum.coupled);
   EXPECT_LE(spectrum.coupling, 1e-14);
   EXPECT_TRUE(near(spectrum.zero_mode_rates, MatrixXd::Zero(2, 1), 0));
-}
-
-std::vector<LongComplex> widened(const std::vector<Complex>& values) {
-  return {values.begin(), values.end()};
-}
-
-TEST(SpectrumLaws, ScalingTimeScalesEigenvalues) {
-  Random random(308);
-  for (const double s : {1e-8, 1e-3, 3.7, 1e5}) {
-    const System<> system = redundant_with_friction(random, 0.5);
-    const System<> faster = system_from(system.mass, s * system.damping, s * s * system.stiffness);
-    std::vector<Complex> expected = all_eigenvalues(analyze(system));
-    for (Complex& value : expected) value *= s;
-    SpectrumOptions options;
-    options.soft_frequency = 0;
-    const std::vector<Complex> computed = all_eigenvalues(analyze(faster, options));
-    EXPECT_LE(worst_distance(computed, widened(expected)), 1e-12 * std::abs(expected[0])) << s;
-  }
-}
-
-TEST(SpectrumLaws, CongruencesLeaveEigenvaluesAlone) {
-  Random random(309);
-  for (int trial = 0; trial < 20; ++trial) {
-    const System<> system = system_from(random.spd(5), random.spd(5), 30 * random.spd(5));
-    const std::vector<Complex> expected = all_eigenvalues(analyze(system));
-    MatrixXd T = random.matrix(5, 5) + 3 * MatrixXd::Identity(5, 5);
-    const auto transformed = [&] {
-      return system_from(symmetrized(T.transpose() * system.mass * T),
-                         symmetrized(T.transpose() * system.damping * T),
-                         symmetrized(T.transpose() * system.stiffness * T));
-    };
-    const double size = std::abs(expected[0]);
-    EXPECT_LE(worst_distance(all_eigenvalues(analyze(transformed())), widened(expected)),
-              1e-11 * size);
-    // Coordinates in which the mass is the identity, and rotations of them.
-    T = analyze(system).zero_modes.coordinates;
-    EXPECT_TRUE(near(transformed().mass, MatrixXd::Identity(5, 5), 1e-13));
-    T *= MatrixXd(random.matrix(5, 5).householderQr().householderQ());
-    EXPECT_LE(worst_distance(all_eigenvalues(analyze(transformed())), widened(expected)),
-              1e-12 * size);
-  }
 }
 
 }  // namespace

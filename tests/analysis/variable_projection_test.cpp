@@ -17,7 +17,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using testing::Draws;
+using testing::Dice;
 
 /// Two records of three channels, of which one has samples of its own, moved by an input or not.
 class Decays : public ::testing::TestWithParam<bool> {
@@ -27,7 +27,7 @@ class Decays : public ::testing::TestWithParam<bool> {
   static VectorXd noise() { return (VectorXd(3) << 1, 2, 0.5).finished(); }
   static VectorXd record_noise() { return (VectorXd(2) << 1.2, 0.7).finished(); }
 
-  static DecayData data_of(Draws& draw, bool driven) {
+  static DecayData data_of(Dice& draw, bool driven) {
     std::vector<MotionRecord> records;
     auto grids = std::make_shared<std::vector<DrivenGrid>>();
     for (int r = 0; r < 2; ++r) {
@@ -70,7 +70,7 @@ class Decays : public ::testing::TestWithParam<bool> {
   VectorXd zero() const { return VectorXd::Zero(size()); }
   VectorXd step(Index i, double h) const { return h * VectorXd::Unit(size(), i); }
 
-  Draws draw_{41};
+  Dice draw_{41};
   DecayData data_ = data_of(draw_, GetParam());
   mutable std::vector<DecayFactor> factors_;  ///< of the last call of `at`
 };
@@ -148,7 +148,7 @@ TEST(DecayColumns, AreOfTheTimesOfEachRecord) {
 TEST(DecayFit, KeepsItsDigitsWhereAFastDecayIsOver) {
   constexpr Index kMissing = 12;
   const double fast = 200, slow = 2;  // 1/s
-  Draws draw(43);
+  Dice draw(43);
   std::vector<MotionRecord> records;
   for (const double strength : {1.0, 0.6}) {
     MotionRecord record{VectorXd::LinSpaced(150, 0, 1.49), MatrixXd(3, 150)};

@@ -1,20 +1,17 @@
 // Arms with several zero modes, as a stiffness of translations alone leaves them: their rates often
 // coincide, and must not keep the modes from being followed.
-#include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/tests/support/random.hpp>
-#include <dashpot/tests/support/true_spectrum.hpp>
+#include <dashpot/tests/support/tracked.hpp>
 
 #include <gtest/gtest.h>
 
 #include <array>
-#include <memory>
 
 namespace dashpot::analysis {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using testing::expect_enclosed;
 using testing::Random;
 
 enum class Friction {
@@ -38,9 +35,7 @@ TEST_P(SeveralZeroModes, AreFollowed) {
   for (int i = 0; i < p; ++i) W(i, i) += 10 + 2 * i;
   const MatrixXd dM = 1e-6 * random.spd(n), dW = 1e-3 * random.matrix(p, n);
   const VectorXd joints = VectorXd::NullaryExpr(n, [&] { return random.uniform(0.5, 2); });
-  ModeTracker tracker;
-  const auto spectrum = std::make_unique<TrackedSpectrum>();
-  for (int step = 0; step < 250; ++step) {
+  const auto at = [&, friction = friction](double step) {
     System<kMaxDof> system(n);
     system.mass = M + step * dM;
     const MatrixXd factor = W + step * dW;
@@ -50,21 +45,22 @@ TEST_P(SeveralZeroModes, AreFollowed) {
     if (friction == Friction::kSmall) C += 1e-6 * MatrixXd(joints.asDiagonal());
     if (friction == Friction::kOrdinary) C += MatrixXd(joints.asDiagonal());
     system.damping = 0.5 * (C + C.transpose());
-    ASSERT_EQ(tracker.update(system, *spectrum), Status::kOk) << "step " << step;
-    if (step % 50 != 0) continue;
-    SCOPED_TRACE("step " + std::to_string(step));
-    expect_enclosed(system, *spectrum);
-    const auto truth = testing::precise_eigenvalues<long double>(system);
-    for (int k = 0; k < spectrum->zero_mode_count; ++k) {
-      const testing::Point<long double> rate{
-          static_cast<long double>(spectrum->zero_mode_rates[static_cast<std::size_t>(k)]), 0};
-      long double nearest = 1;
-      for (const auto& value : truth) nearest = std::min(nearest, distance(value, rate));
-      EXPECT_LE(nearest, 1e-11);
-    }
+    return system;
+  };
+  testing::Follower follower;
+  follower.follow(at, 250, 249, 50);
+  follower.expect_followed();
+  EXPECT_LE(follower.counters().iterations, 650);
+  ASSERT_EQ(follower.spectrum->zero_mode_count, n - p);
+  const auto truth = testing::precise_eigenvalues<long double>(at(249));
+  for (int k = 0; k < n - p; ++k) {
+    const testing::Point<long double> rate{
+        static_cast<long double>(follower.spectrum->zero_mode_rates[static_cast<std::size_t>(k)]),
+        0};
+    long double nearest = 1;
+    for (const auto& value : truth) nearest = std::min(nearest, distance(value, rate));
+    EXPECT_LE(nearest, 1e-11);
   }
-  EXPECT_EQ(tracker.counters().direct, 1);
-  EXPECT_LE(tracker.counters().iterations, 650);
 }
 
 INSTANTIATE_TEST_SUITE_P(Arms, SeveralZeroModes,

@@ -1,11 +1,5 @@
-// The arms of the paper: its Panda (Fig. 1) and the task of its Discussion.
-#include <dashpot/analysis/damping_design.hpp>
-#include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/controller/dynamics.hpp>
+// The Panda of the paper (Fig. 1).
 #include <dashpot/tests/apps/json_result.hpp>
-#include <dashpot/tests/support/arms.hpp>
-
-#include <Eigen/Core>
 
 namespace dashpot::tests {
 namespace {
@@ -31,45 +25,6 @@ TEST(DesignOfThePaper, LiftsThePandaFromThreeHundredthsToWhatIsWanted) {
   EXPECT_NEAR(frequencies[5], 9.755, 0.006 * 9.755);
   EXPECT_EQ(result["reached"], true);
   for (const double ratio : of_modes(result, "damping_ratio")) EXPECT_NEAR(ratio, 0.7, 1e-9);
-}
-
-/// Smallest damping ratio of the arm with C_C.
-double smallest_ratio(const analysis::TaskImpedance& arm, const Eigen::MatrixXd& C_C) {
-  double least = 1e9;
-  for (const auto& mode :
-       analysis::analyze(analysis::to_joint_space(analysis::with_damping(arm, C_C))).modes) {
-    least = std::min(least, mode.damping_ratio);
-  }
-  return least;
-}
-
-TEST(DesignOfThePaper, OutdoesItsDiscussionWithADampingThatIsOne) {
-  Eigen::MatrixXd C_C1 = Eigen::MatrixXd::Zero(6, 6);
-  C_C1.diagonal() << 0.1, 0.1, 0.1, 10, 10, 1;
-  C_C1(2, 4) = C_C1(4, 2) = 10;
-  const Eigen::VectorXd negative = analysis::negative_eigenvalues(C_C1);
-  ASSERT_EQ(negative.size(), 1);
-  EXPECT_NEAR(negative[0], -6.108, 1e-3);
-  for (const testing::Arm& one : testing::arms()) {
-    const controller::RobotModel model = testing::arm_model(one);
-    if (model.dof() != 7) continue;
-    controller::JointVector q(7);
-    q << 0.1, -0.7, 0.2, -1.9, 0.1, 1.4, 0.6;
-    if (std::string(one.file) == "baxter_left") q << 0.1, -0.6, 0.2, 1.4, 0.1, 0.9, 0.3;
-    const auto dynamics = controller::evaluate(model, q, controller::JointVector::Zero(7));
-    analysis::TaskImpedance arm;
-    arm.mass = dynamics.M;
-    arm.jacobian = dynamics.J;
-    arm.task_stiffness =
-        Eigen::MatrixXd(Eigen::VectorXd{{3000, 3000, 3000, 100, 100, 100}}.asDiagonal());
-    const double with_identity = smallest_ratio(arm, Eigen::MatrixXd::Identity(6, 6));
-    const double with_paper = smallest_ratio(arm, C_C1);
-    const auto design = analysis::design_damping(arm, analysis::DampingTarget::constant(0.7));
-    EXPECT_TRUE(design.misses.empty());
-    EXPECT_EQ(analysis::negative_eigenvalues(design.damping).size(), 0);
-    EXPECT_LT(with_identity, 0.05);
-    EXPECT_LT(with_paper, 0.3);
-  }
 }
 
 TEST(DesignOfAnArm, TakesUnits) {

@@ -72,7 +72,7 @@ TEST(Identify, FindsTheDecayInAFile) {
 /// Hz.
 std::string shaken_csv() {
   std::string text = "time [s],q1 [rad],q2 [rad]\n";
-  testing::Draws draw(3);
+  testing::Dice draw(3);
   struct Oscillator {
     double w, z, x = 0, v = 0;
     void step(double push) {  // exactly
@@ -161,7 +161,7 @@ TEST(Identify, TakesFilesAsPeopleAndRecordersWriteThem) {
 TEST(Identify, TakesInputsFromColumns) {
   const Scratch scratch;
   std::string text = "time [s],q1 [rad],q2 [rad],force [N]\n";
-  testing::Draws draw(8);
+  testing::Dice draw(8);
   double x = 0, v = 0;
   for (int i = 0; i < 1600; ++i) {
     const double t = 0.005 * i, u = std::sin(6.283185307179586 * t * (0.3 + 0.29 * t));

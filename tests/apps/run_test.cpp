@@ -1,14 +1,17 @@
 // `dashpot run` in fast motion: a whole robot, its controller as a plugin, and what is written.
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/kdl_dynamics.hpp>
 #include <dashpot/tests/support/places.hpp>
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
-#include <cstdlib>
+#include <complex>
 #include <filesystem>
 #include <numbers>
 #include <sstream>
@@ -240,23 +243,42 @@ TEST(Run, WritesALogThatTheMonitorReads) {
   EXPECT_THAT(outcome.out, HasSubstr("0 modes messages lost, 0 messages malformed\n"));
 }
 
-// Mass matrix, Jacobian and all else by plain vector algebra in Python.
+/// By KDL: (l^2 M + l C + K) u = 0 for each mode with K = J' K_C J, C = J' C_C J,
+/// as many modes as J has rows, and the sum of all eigenvalues is -trace(M^-1 C).
 TEST(Run, PublishesTheModesThatAStrangerComputes) {
   const Scratch scratch;
   const std::string log = scratch.path("a.lcm");
-  const std::string source = DASHPOT_SOURCE_DIR;
   EXPECT_EQ(run_scene(scene("panda_release_c2"), {"--duration", "0.5", "--log", log}).status, 0);
-  const auto shell = [](const std::string& command) {
-    EXPECT_EQ(std::system(command.c_str()), 0) << command;
+  const controller::RobotModel arm = testing::panda_model();
+  const Eigen::VectorXd K_C{{2000, 600, 2000, 100, 100, 100}}, C_C{{22.5, 23.5, 45, 2, 12, 1}};
+  int messages = 0;
+  lcmtypes::MessageHandlers handlers;
+  handlers.on_modes = [&](const modes_t& modes) {
+    ++messages;
+    const Eigen::VectorXd q = Eigen::Map<const Eigen::VectorXd>(modes.joint_position.data(), 7);
+    const auto terms = testing::by_kdl(arm, q, Eigen::VectorXd::Zero(7));
+    const Eigen::MatrixXd M = terms.M, J = terms.J;
+    const Eigen::MatrixXd K = J.transpose() * K_C.asDiagonal() * J,
+                          C = J.transpose() * C_C.asDiagonal() * J;
+    ASSERT_EQ(modes.num_modes, 6);
+    double sum = 0;
+    for (std::size_t i = 0; i < 6; ++i) {
+      const std::complex<double> l(modes.eigenvalue_real[i][0], modes.eigenvalue_imag[i][0]);
+      Eigen::VectorXcd u(7);
+      for (Eigen::Index k = 0; k < 7; ++k) {
+        const auto at = static_cast<std::size_t>(k);
+        u[k] = {modes.shape_real[i][at], modes.shape_imag[i][at]};
+      }
+      const double size = std::norm(l) * M.norm() + std::abs(l) * C.norm() + K.norm();
+      EXPECT_LT((l * l * (M * u) + l * (C * u) + K * u).norm(), 1e-13 * size * u.norm());
+      sum += modes.eigenvalue_real[i][0] + modes.eigenvalue_real[i][1];
+    }
+    const double trace = -M.llt().solve(C).trace();
+    EXPECT_NEAR(sum, trace, 1e-12 * std::abs(trace));
   };
-  shell("lcm-gen --python --ppath " + scratch.path("types") + " " + source + "/lcmtypes/*.lcm");
-  shell("python3 " + source + "/tests/apps/own_modes.py " + scratch.path("types") + " " + log +
-        " " + source + "/sim/models/panda.urdf panda_link0 panda_hand_tcp" +
-        " 2000,600,2000,100,100,100 22.5,23.5,45,2,12,1 40 >" + scratch.path("out"));
-  const Json result = Json::parse(scratch.read("out"));
-  EXPECT_EQ(result["messages"], 40);
-  EXPECT_LT(result["residual"].get<double>(), 1e-13);
-  EXPECT_LT(result["sum"].get<double>(), 1e-12);
+  lcmtypes::LogReader reader(log, handlers);
+  while (reader.read()) reader.handle();
+  EXPECT_GE(messages, 40);
 }
 
 TEST(Run, PrintsTablesForPeople) {

@@ -2,6 +2,7 @@
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/lcmtypes/publisher.hpp>
 #include <dashpot/tests/lcmtypes/random_samples.hpp>
+#include <dashpot/tests/support/refusal.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 
 #include <gmock/gmock.h>
@@ -202,13 +203,8 @@ TEST(Log, IsNoBusIfItIsDamaged) {
       "a.lcm", event_bytes("A", "1") + event_bytes(kStateChannel, "123", {}, 0x7FFFFFFF));
   for (const std::string options : {"", "?speed=0", "?mode=r", "?mode=w&mode=r"}) {
     const std::string url = "file://" + path + options;
-    try {
-      open_bus(url);
-      ADD_FAILURE() << url;
-    } catch (const std::runtime_error& error) {
-      EXPECT_EQ(error.what(),
-                "cannot open the LCM bus " + url + ": cut off in the event at byte 30");
-    }
+    EXPECT_EQ(testing::refusal<std::runtime_error>([&] { open_bus(url); }),
+              "cannot open the LCM bus " + url + ": cut off in the event at byte 30");
   }
   EXPECT_THROW(open_bus("file:///dev/zero"), std::runtime_error);
   EXPECT_THROW(open_bus("file://" + scratch.path("none")), std::runtime_error);
@@ -249,13 +245,8 @@ TEST(Log, DoesNoHarmWhenDamaged) {
 TEST(Log, NamesTheFileThatCannotBeOpened) {
   const std::string path = "/nonexistent/a.lcm";
   MessageHandlers handlers;
-  const auto message_of_error = [](const auto& act) -> std::string {
-    try {
-      act();
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "nothing thrown";
+  const auto message_of_error = [](const auto& act) {
+    return testing::refusal<std::runtime_error>(act);
   };
   EXPECT_EQ(message_of_error([&] { make_log_sink(path); }),
             path + ": cannot write the log: No such file or directory");

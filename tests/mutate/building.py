@@ -43,7 +43,7 @@ def units_of(folder, commands):
 
 def to_blame(output, changes):
     """The changes in lines that the compiler complains of."""
-    lines = set(re.findall(r"([\w/.]+):(\d+):\d*", output))
+    lines = set(re.findall(r"([^\s:]+):(\d+):\d*", output))
     lines = {(os.path.relpath(file, ROOT), int(line)) for file, line in lines
              if file.startswith(str(ROOT))}
     blamed = set()
@@ -114,10 +114,13 @@ def without_misfits(changes, folders, commands):
     return changes
 
 
+def suites_of(folders):
+    return sorted({suite for folder in folders for suite in SUITES[folder]})
+
+
 def build(folders):
     """Builds the tests; returns what the compiler complains of, empty if of nothing."""
-    suites = sorted({suite for folder in folders for suite in SUITES[folder]})
-    targets = [f"{suite}_tests" for suite in suites]
+    targets = [f"{suite}_tests" for suite in suites_of(folders)]
     command = ["cmake", "--build", BUILD, "--parallel", str(os.cpu_count()), "--target", *targets]
     with open(WORK / "build.log", "w") as log:  # changed code makes many warnings
         done = subprocess.run(command, stdout=log, stderr=subprocess.STDOUT)

@@ -22,13 +22,16 @@ class Test:
     reached: set = field(default_factory=set)
 
 
-def list_tests(build):
-    """What ctest knows of."""
+def list_tests(build, suites):
+    """What ctest knows of in these suites: programs of others may be there from another sample,
+    whose changes have the same numbers."""
     text = subprocess.run(["ctest", "--test-dir", build, "--show-only=json-v1"], check=True,
                           capture_output=True, text=True).stdout
     tests = []
     for entry in json.loads(text)["tests"]:
         command = entry.get("command")
+        if entry["name"].split("/")[0] not in suites:
+            continue
         if not command or not all(os.path.exists(part) for part in command
                                   if part == command[0] or part.startswith(str(build))):
             continue  # not built

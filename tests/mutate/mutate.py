@@ -15,7 +15,8 @@ import re
 from concurrent.futures import ThreadPoolExecutor
 
 import judge
-from building import BUILD, ROOT, SOURCE, SUITES, WORK, build_changed, configure, units_of
+from building import (BUILD, ROOT, SOURCE, SUITES, WORK, build_changed, configure, suites_of,
+                      units_of)
 from changes import find, one_line
 from rewrite import copy_tree
 
@@ -170,7 +171,7 @@ def main():
     drawn = sample(all_changes(folders, commands), options.places, options.count, options.seed)
     changes = build_changed(drawn, folders, commands)
     print("Running each test with no change in force", flush=True)
-    tests = judge.list_tests(BUILD)
+    tests = judge.list_tests(BUILD, suites_of(folders))
     failures = judge.explore(tests, os.cpu_count())
     if failures:
         raise SystemExit("mutate: " + "\n".join(failures))

@@ -4,6 +4,7 @@
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/tests/support/places.hpp>
+#include <dashpot/tests/support/refusal.hpp>
 #include <dashpot/tests/support/scratch.hpp>
 
 #include <string>
@@ -24,18 +25,16 @@ inline controller::Config load(const std::string& text) {
   return controller::load_config(scratch.write("arm.yaml", text));
 }
 
+inline std::string load_refusal(const std::string& path) {
+  return testing::refusal<controller::InputError>([&] { controller::load_config(path); });
+}
 /// What load_config says about `text`, without the file's name in front.
 inline std::string complaint(const std::string& text) {
   const Scratch scratch;
   const std::string path = scratch.write("arm.yaml", text);
-  try {
-    controller::load_config(path);
-  } catch (const controller::InputError& error) {
-    const std::string said = error.what();
-    EXPECT_EQ(said.find(path + ": "), 0u) << said;
-    return said.substr(std::min(path.size() + 2, said.size()));
-  }
-  return "nothing";
+  const std::string said = load_refusal(path);
+  EXPECT_EQ(said.find(path + ": "), 0u) << said;
+  return said.substr(std::min(path.size() + 2, said.size()));
 }
 
 }  // namespace dashpot::tests

@@ -9,6 +9,7 @@
 #include <array>
 #include <cstring>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace dashpot::controller {
@@ -42,10 +43,28 @@ Eigen::VectorXd seen(const double* data, Eigen::Index size) {
 Eigen::MatrixXd seen_square(const double* data, Eigen::Index size) {
   return Eigen::Map<const RowMajor>(data, size, size);
 }
-Eigen::VectorXd padded(const Eigen::VectorXd& values) {
-  Eigen::VectorXd result = Eigen::VectorXd::Zero(DASHPOT_MAX_JOINTS);
-  result.head(values.size()) = values;
-  return result;
+/// These arrays hold a number for each joint, and zeros.
+void expect_padded(const std::vector<std::pair<const double*, Eigen::VectorXd>>& arrays) {
+  for (const auto& [found, values] : arrays) {
+    Eigen::VectorXd expected = Eigen::VectorXd::Zero(DASHPOT_MAX_JOINTS);
+    expected.head(values.size()) = values;
+    EXPECT_EQ(seen(found, DASHPOT_MAX_JOINTS), expected);
+  }
+}
+/// What is made of something of three joints at 77 ns, in memory that was full of other things.
+template <class Struct, class From>
+Struct filled(const From& from) {
+  Struct out;
+  std::memset(&out, 7, sizeof out);
+  to_c(from, out);
+  EXPECT_EQ(out.struct_size, sizeof out);
+  EXPECT_EQ(out.joints, 3u);
+  EXPECT_EQ(out.time, 77);
+  return out;
+}
+template <class Thing, class... Member>
+void expect_same(const Thing& one, const Thing& other, Member... member) {
+  (void)std::initializer_list<int>{([&] { EXPECT_EQ(one.*member, other.*member); }(), 0)...};
 }
 
 TEST(FromC, AStateHasWhatIsGiven) {
@@ -243,22 +262,16 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
   }
   snapshot.payload.center = numbers.vector(3);
   snapshot.payload.inertia = numbers.vector(9).reshaped(3, 3);
-  dashpot_snapshot out;
-  std::memset(&out, 7, sizeof out);
-  to_c(snapshot, out);
-  EXPECT_EQ(out.struct_size, sizeof out);
-  EXPECT_EQ(out.joints, 3u);
-  EXPECT_EQ(out.time, 77);
+  const auto out = filled<dashpot_snapshot>(snapshot);
   EXPECT_EQ(out.tick, snapshot.tick);
   EXPECT_EQ(out.restarts, snapshot.restarts);
   EXPECT_EQ(out.status, DASHPOT_SETPOINT_STALE);
   EXPECT_EQ(out.mode, DASHPOT_MODE_CARTESIAN);
-  EXPECT_EQ(seen(out.position, DASHPOT_MAX_JOINTS), padded(snapshot.position));
-  EXPECT_EQ(seen(out.velocity, DASHPOT_MAX_JOINTS), padded(snapshot.velocity));
-  EXPECT_EQ(seen(out.torque, DASHPOT_MAX_JOINTS), padded(snapshot.torque));
-  EXPECT_EQ(seen(out.law_torque, DASHPOT_MAX_JOINTS), padded(snapshot.law_torque));
-  EXPECT_EQ(seen(out.reference_joint_position, DASHPOT_MAX_JOINTS),
-            padded(snapshot.reference_position));
+  expect_padded({{out.position, snapshot.position},
+                 {out.velocity, snapshot.velocity},
+                 {out.torque, snapshot.torque},
+                 {out.law_torque, snapshot.law_torque},
+                 {out.reference_joint_position, snapshot.reference_position}});
   EXPECT_EQ(seen(out.tip_position, 3), snapshot.tip.position);
   EXPECT_EQ(seen_square(out.tip_rotation, 3), snapshot.tip.rotation);
   EXPECT_EQ(seen(out.reference_tip_position, 3), snapshot.reference_tip.position);
@@ -270,30 +283,17 @@ TEST(ToC, ASnapshotHasAllThatIsInIt) {
   // And again what it was, for the publisher of a host.
   Snapshot again;
   lcmtypes::fill(out, again);
-  EXPECT_EQ(again.time, snapshot.time);
-  EXPECT_EQ(again.tick, snapshot.tick);
-  EXPECT_EQ(again.restarts, snapshot.restarts);
-  EXPECT_EQ(again.status, snapshot.status);
-  EXPECT_EQ(again.fault, snapshot.fault);
-  EXPECT_EQ(again.mode, snapshot.mode);
-  for (const auto values : {&Snapshot::position, &Snapshot::velocity, &Snapshot::torque,
-                            &Snapshot::law_torque, &Snapshot::reference_position}) {
-    EXPECT_EQ(again.*values, snapshot.*values);
-  }
+  expect_same(again, snapshot, &Snapshot::time, &Snapshot::tick, &Snapshot::restarts,
+              &Snapshot::status, &Snapshot::fault, &Snapshot::mode, &Snapshot::position,
+              &Snapshot::velocity, &Snapshot::torque, &Snapshot::law_torque,
+              &Snapshot::reference_position, &Snapshot::tip_error, &Snapshot::tip_wrench,
+              &Snapshot::joint_damping_ratio, &Snapshot::task_damping_ratio,
+              &Snapshot::damping_level);
   EXPECT_EQ(again.joint_error, JointVector(snapshot.reference_position - snapshot.position));
   for (const auto pose : {&Snapshot::tip, &Snapshot::reference_tip, &Snapshot::tool}) {
-    EXPECT_EQ((again.*pose).position, (snapshot.*pose).position);
-    EXPECT_EQ((again.*pose).rotation, (snapshot.*pose).rotation);
+    expect_same(again.*pose, snapshot.*pose, &Pose::position, &Pose::rotation);
   }
-  EXPECT_EQ(again.tip_error, snapshot.tip_error);
-  EXPECT_EQ(again.tip_wrench, snapshot.tip_wrench);
-  for (const auto value :
-       {&Snapshot::joint_damping_ratio, &Snapshot::task_damping_ratio, &Snapshot::damping_level}) {
-    EXPECT_EQ(again.*value, snapshot.*value);
-  }
-  EXPECT_EQ(again.payload.mass, snapshot.payload.mass);
-  EXPECT_EQ(again.payload.center, snapshot.payload.center);
-  EXPECT_EQ(again.payload.inertia, snapshot.payload.inertia);
+  expect_same(again.payload, snapshot.payload, &Payload::mass, &Payload::center, &Payload::inertia);
 }
 
 TEST(ToC, ModesHaveAllThatIsInThem) {
@@ -325,14 +325,9 @@ TEST(ToC, ModesHaveAllThatIsInThem) {
     }
     mode.shape = numbers.vector(3) + analysis::Complex(0, 1) * numbers.vector(3);
   }
-  dashpot_modes out;
-  std::memset(&out, 7, sizeof out);
-  to_c(vibration, out);
-  EXPECT_EQ(out.struct_size, sizeof out);
-  EXPECT_EQ(out.joints, 3u);
-  EXPECT_EQ(out.time, 77);
+  const auto out = filled<dashpot_modes>(vibration);
   EXPECT_EQ(out.tick, vibration.tick);
-  EXPECT_EQ(seen(out.position, DASHPOT_MAX_JOINTS), padded(vibration.position));
+  expect_padded({{out.position, vibration.position}});
   EXPECT_EQ(out.status, static_cast<int>(analysis::Status::kNotFinite));
   EXPECT_EQ(out.origin, DASHPOT_REUSED);
   EXPECT_EQ(out.zero_modes, 1u);
@@ -344,45 +339,30 @@ TEST(ToC, ModesHaveAllThatIsInThem) {
   for (std::size_t i = 0; i < 2; ++i) {
     const VibrationMode& from = vibration.modes[i];
     const dashpot_mode& mode = out.modes[i];
-    EXPECT_EQ(mode.natural_frequency, from.natural_frequency);
-    EXPECT_EQ(mode.natural_frequency_bound, from.natural_frequency_bound);
-    EXPECT_EQ(mode.damping_ratio, from.damping_ratio);
-    EXPECT_EQ(mode.damping_ratio_bound, from.damping_ratio_bound);
-    EXPECT_EQ(mode.damped_frequency, from.damped_frequency);
-    EXPECT_EQ(mode.eigenvalue_bound, from.error_bound);
+    EXPECT_EQ((std::array{mode.natural_frequency, mode.natural_frequency_bound, mode.damping_ratio,
+                          mode.damping_ratio_bound, mode.damped_frequency, mode.eigenvalue_bound}),
+              (std::array{from.natural_frequency, from.natural_frequency_bound, from.damping_ratio,
+                          from.damping_ratio_bound, from.damped_frequency, from.error_bound}));
     EXPECT_EQ(mode.label, from.label);
     EXPECT_EQ(mode.kind, i == 0 ? DASHPOT_OVERDAMPED : DASHPOT_SOFT);
     for (std::size_t k = 0; k < 2; ++k) {
-      EXPECT_EQ(mode.eigenvalues[k][0], from.eigenvalues[k].real());
-      EXPECT_EQ(mode.eigenvalues[k][1], from.eigenvalues[k].imag());
+      EXPECT_EQ(analysis::Complex(mode.eigenvalues[k][0], mode.eigenvalues[k][1]),
+                from.eigenvalues[k]);
     }
-    EXPECT_EQ(seen(mode.shape_real, DASHPOT_MAX_JOINTS), padded(from.shape.real()));
-    EXPECT_EQ(seen(mode.shape_imag, DASHPOT_MAX_JOINTS), padded(from.shape.imag()));
+    expect_padded({{mode.shape_real, from.shape.real()}, {mode.shape_imag, from.shape.imag()}});
   }
   EXPECT_EQ(out.modes[2].natural_frequency, 0);
   EXPECT_EQ(out.modes[2].label, 0);
 
   lcmtypes::ModesSample again;
   lcmtypes::fill(out, again);
-  EXPECT_EQ(again.vibration.time, 77);
-  EXPECT_EQ(again.vibration.tick, vibration.tick);
-  EXPECT_EQ(again.vibration.position, vibration.position);
-  EXPECT_EQ(again.vibration.status, vibration.status);
-  EXPECT_EQ(again.vibration.origin, vibration.origin);
-  EXPECT_EQ(again.vibration.zero_modes, 1);
-  ASSERT_EQ(again.vibration.count, 2);
+  expect_same(again.vibration, vibration, &Vibration::time, &Vibration::tick, &Vibration::position,
+              &Vibration::status, &Vibration::origin, &Vibration::zero_modes, &Vibration::count);
   for (std::size_t i = 0; i < 2; ++i) {
-    const VibrationMode &mode = again.vibration.modes[i], &from = vibration.modes[i];
-    EXPECT_EQ(mode.label, from.label);
-    EXPECT_EQ(mode.kind, from.kind);
-    EXPECT_EQ(mode.eigenvalues, from.eigenvalues);
-    EXPECT_EQ(mode.shape, from.shape);
-    for (const auto value :
-         {&VibrationMode::natural_frequency, &VibrationMode::damping_ratio,
-          &VibrationMode::damped_frequency, &VibrationMode::error_bound,
-          &VibrationMode::natural_frequency_bound, &VibrationMode::damping_ratio_bound}) {
-      EXPECT_EQ(mode.*value, from.*value);
-    }
+    using M = VibrationMode;
+    expect_same(again.vibration.modes[i], vibration.modes[i], &M::label, &M::kind, &M::eigenvalues,
+                &M::shape, &M::natural_frequency, &M::damping_ratio, &M::damped_frequency,
+                &M::error_bound, &M::natural_frequency_bound, &M::damping_ratio_bound);
   }
 }
 
@@ -400,48 +380,33 @@ TEST(ToC, TheSampledLoopHasAllThatIsInIt) {
     vibration.modes[i] = {
         analysis::ModeKind::kUnstable, numbers(), numbers(), numbers(), numbers(), numbers()};
   }
-  dashpot_sampled_modes out;
-  std::memset(&out, 7, sizeof out);
-  to_c(vibration, out);
-  EXPECT_EQ(out.struct_size, sizeof out);
-  EXPECT_EQ(out.joints, 3u);
-  EXPECT_EQ(out.time, 77);
+  const auto out = filled<dashpot_sampled_modes>(vibration);
   EXPECT_EQ(out.tick, vibration.tick);
-  EXPECT_EQ(seen(out.position, DASHPOT_MAX_JOINTS), padded(vibration.position));
+  expect_padded({{out.position, vibration.position}});
   EXPECT_EQ(out.status, static_cast<int>(analysis::Status::kNotFinite));
   EXPECT_EQ(out.spectral_radius, vibration.spectral_radius);
   EXPECT_EQ(out.gain_margin, vibration.gain_margin);
   ASSERT_EQ(out.count, 2u);
-  for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_EQ(out.modes[i].continuous_frequency, vibration.modes[i].continuous_frequency);
-    EXPECT_EQ(out.modes[i].continuous_ratio, vibration.modes[i].continuous_ratio);
-    EXPECT_EQ(out.modes[i].natural_frequency, vibration.modes[i].natural_frequency);
-    EXPECT_EQ(out.modes[i].damping_ratio, vibration.modes[i].damping_ratio);
-    EXPECT_EQ(out.modes[i].damped_frequency, vibration.modes[i].damped_frequency);
-    EXPECT_EQ(out.modes[i].kind, DASHPOT_UNSTABLE);
-    EXPECT_EQ(out.modes[i].reserved, 0);
-  }
-  EXPECT_EQ(out.modes[2].natural_frequency, 0);
-
   lcmtypes::SampledModesSample again;
   lcmtypes::fill(out, again);
-  EXPECT_EQ(again.vibration.time, 77);
-  EXPECT_EQ(again.vibration.tick, vibration.tick);
-  EXPECT_EQ(again.vibration.position, vibration.position);
-  EXPECT_EQ(again.vibration.status, vibration.status);
-  EXPECT_EQ(again.vibration.spectral_radius, vibration.spectral_radius);
-  EXPECT_EQ(again.vibration.gain_margin, vibration.gain_margin);
-  ASSERT_EQ(again.vibration.count, 2);
+  using V = SampledVibration;
+  expect_same(again.vibration, vibration, &V::time, &V::tick, &V::position, &V::status,
+              &V::spectral_radius, &V::gain_margin, &V::count);
   for (std::size_t i = 0; i < 2; ++i) {
-    const SampledVibrationMode &mode = again.vibration.modes[i], &from = vibration.modes[i];
-    EXPECT_EQ(mode.kind, from.kind);
-    for (const auto value :
-         {&SampledVibrationMode::continuous_frequency, &SampledVibrationMode::continuous_ratio,
-          &SampledVibrationMode::natural_frequency, &SampledVibrationMode::damping_ratio,
-          &SampledVibrationMode::damped_frequency}) {
-      EXPECT_EQ(mode.*value, from.*value);
-    }
+    const dashpot_sampled_mode& mode = out.modes[i];
+    const SampledVibrationMode& from = vibration.modes[i];
+    EXPECT_EQ((std::array{mode.continuous_frequency, mode.continuous_ratio, mode.natural_frequency,
+                          mode.damping_ratio, mode.damped_frequency}),
+              (std::array{from.continuous_frequency, from.continuous_ratio, from.natural_frequency,
+                          from.damping_ratio, from.damped_frequency}));
+    EXPECT_EQ(mode.kind, DASHPOT_UNSTABLE);
+    EXPECT_EQ(mode.reserved, 0);
+    using M = SampledVibrationMode;
+    expect_same(again.vibration.modes[i], from, &M::kind, &M::continuous_frequency,
+                &M::continuous_ratio, &M::natural_frequency, &M::damping_ratio,
+                &M::damped_frequency);
   }
+  EXPECT_EQ(out.modes[2].natural_frequency, 0);
 }
 
 }  // namespace

@@ -156,15 +156,6 @@ TEST_P(Contacts, AreMetWithinAStepByFixedSteps) {
   }
 }
 
-TEST_P(Contacts, ComeToRestOnTheSpring) {
-  Arm arm(slider(kDown), options());
-  Plant plant(arm, precise(0.01), joints({0.001}));
-  ASSERT_EQ(run(plant, 300), Status::kOk);
-  EXPECT_NEAR(plant.position()[0], -kMass * 9.81 / contact.stiffness, 1e-9);
-  EXPECT_NEAR(plant.velocity()[0], 0, 1e-9);
-  EXPECT_NEAR(plant.audit().imbalance(), 0, 1e-9);
-}
-
 TEST(Wall, HasNoFrictionAndPushesAlongItsNormalOnly) {
   ArmOptions options;
   options.wall = Wall{Vector3d::Zero(), Vector3d(1, 0, 1), Contact{1e4, 0}};

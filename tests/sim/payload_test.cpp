@@ -15,8 +15,6 @@ using controller::JointVector;
 using controller::Vector6;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using testing::Random;
-using testing::ReleasedArm;
 using testing::TwinModels;
 
 controller::Payload two_kilograms() {
@@ -130,56 +128,6 @@ TEST(PayloadInTheLoop, IsCarriedWithoutSaggingByAnArmThatIsTold) {
   EXPECT_LT(arm.largest_step, 1);
   EXPECT_GT(sag.norm(), 0.004);
   EXPECT_LT((sag - wanted).norm(), 0.01 * wanted.norm());
-}
-
-TEST(PayloadInTheLoop, GivesTheModesOfTheMotion) {
-  testing::Worst worst;
-  for (const std::uint64_t seed : {1U, 2U, 3U}) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    Random random(seed);
-    TwinModels twin(testing::arms()[seed == 3 ? 2 : 0]);
-    const JointVector q0 = random_posture(twin, random);
-    VectorXd omega(6), zeta(6);
-    for (int i = 0; i < 6; ++i) {
-      omega[i] = random.log_uniform(8, 60);
-      zeta[i] = random.uniform(0.15, 0.6);
-    }
-    controller::Gains gains = tip_gains(twin, q0, omega, zeta, 0.3, random);
-    if (twin.dof() > 6) {
-      const double softness = self_motion(twin, q0).squaredNorm();
-      gains.null_stiffness.setConstant(225 / softness);
-      gains.null_damping.setConstant(9 / softness);
-    }
-    const Attachment told(two_kilograms(), {});
-    const controller::RobotModel bare = twin.model;
-    twin.model = bare.with(told);  // for the sampled loop's gravity
-    analysis::SampledLoop loop;
-    loop.friction = twin.friction();
-    loop.gravity_gradient = twin.gravity_gradient(q0);
-    twin.model = bare;
-    twin.robot.carry({told.mass, told.payload().center, told.payload().inertia});
-    const controller::Settings settings = release_settings(twin, gains, loop.period);
-    std::vector<analysis::Recording> recordings;
-    std::optional<ReleasedArm> arm;
-    for (int k = 0; k < 3; ++k) {
-      arm.emplace(twin, settings, q0, 1e-7 * random.vector(q0.size()), sim::PlantOptions(),
-                  sim::ArmOptions(), &told);
-      recordings.push_back(arm->record(q0, 400, 1, 40));
-      ASSERT_EQ(arm->worst, controller::Status::kOk) << to_text(arm->worst);
-    }
-    const auto fit = testing::fit_modes(recordings, loop.period, arm->closed_loop.mass);
-    const auto spectrum = testing::spectrum_of(arm->closed_loop);
-    const analysis::SampledSpectrum sampled = sample_loop(arm->closed_loop, spectrum, loop);
-    ASSERT_EQ(arm->vibration.count, twin.dof());
-    for (int k = 0; k < arm->vibration.count; ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      EXPECT_NEAR(arm->vibration.modes[at].natural_frequency, spectrum.modes[k].natural_frequency,
-                  1e-9 * spectrum.modes[k].natural_frequency);
-      worst.add(fit, sampled.modes[at], 1e-4, 1e-3);
-    }
-  }
-  std::printf("sampled modes with 2 kg, seeds 1 to 3: frequency within %.1e, ratio within %.1e\n",
-              worst.frequency, worst.ratio);
 }
 
 /// An iiwa 7 whose drives are a tick late drops at 0.3 s the 3 kg at 0.12 m for which its damping

@@ -13,7 +13,6 @@ namespace dashpot {
 namespace {
 
 using controller::JointVector;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::Random;
 using testing::ReleasedArm;
@@ -27,6 +26,7 @@ struct ReleasedTwin {
   JointVector q0;
   controller::Gains gains;
   analysis::SampledLoop loop;
+  const controller::Attachment* told = nullptr;
 
   ReleasedTwin(const TwinModels& models, Random& generator, bool hold_posture)
       : twin(models), random(generator), q0(random_posture(models, generator)) {
@@ -58,7 +58,7 @@ struct ReleasedTwin {
     std::optional<ReleasedArm> arm;
     for (int k = 0; k < 3; ++k) {
       const JointVector dq = 1e-7 * random.vector(q0.size());
-      arm.emplace(twin, settings, q0, dq, options);
+      arm.emplace(twin, settings, q0, dq, options, sim::ArmOptions(), told);
       recordings.push_back(arm->record(q0, ticks, every, 40));
       ASSERT_EQ(arm->worst, controller::Status::kOk) << to_text(arm->worst);
     }
@@ -109,6 +109,24 @@ TEST_P(RingDown, HasTheModesOfTheSampledLoopAtOneKilohertz) {
     scene.loop.delay = seed % 3;
     scene.loop.torque_cutoff = seed % 4 == 3 ? 200 : 0;
     scene.loop.difference_velocity = seed % 5 == 4;
+    scene.compare(true, 400, 1, worst);
+  }
+  report(worst);
+}
+
+TEST_P(RingDown, HasTheModesOfTheSampledLoopWithABodyThatItIsToldOf) {
+  controller::Payload payload{2, {0.02, -0.01, 0.06}, Eigen::Matrix3d::Zero()};
+  payload.inertia.diagonal() << 0.004, 0.005, 0.003;
+  const controller::Attachment told(payload, {});
+  TwinModels loaded = twin;
+  loaded.model = twin.model.with(told);
+  twin.robot.carry({told.mass, payload.center, payload.inertia});
+  Worst worst;
+  for (int seed = 1; seed <= 2; ++seed) {
+    Random random(static_cast<std::uint64_t>(seed));
+    ReleasedTwin scene = scene_of(2, random);
+    scene.told = &told;
+    scene.loop.gravity_gradient = loaded.gravity_gradient(scene.q0);
     scene.compare(true, 400, 1, worst);
   }
   report(worst);

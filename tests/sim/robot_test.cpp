@@ -165,13 +165,10 @@ std::string refusal(const std::string& joint, const std::string& inertial = kToo
   const std::string urdf = "<robot name='r'><link name='a'/><link name='b'>" + inertial +
                            "</link><joint name='j' " + joint +
                            "<parent link='a'/><child link='b'/></joint>" + more + "</robot>";
-  try {
-    Robot::from_text(urdf, "a", tip, parameters, "arm.urdf");
-  } catch (const InvalidRobot& error) {
-    EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << "more than a line";
-    return error.what();
-  }
-  return "accepted";
+  const std::string said = testing::refusal<InvalidRobot>(
+      [&] { Robot::from_text(urdf, "a", tip, parameters, "arm.urdf"); });
+  EXPECT_EQ(said.find('\n'), std::string::npos) << "more than a line";
+  return said;
 }
 
 const std::string kHinge = "type='continuous'><axis xyz='0 0 1'/>";
@@ -256,14 +253,7 @@ TEST(RobotErrors, NameTheParameter) {
 }
 
 TEST(RobotErrors, NameTheFileThatIsNotThereOrNotARobot) {
-  const auto refused = [](const auto& read) -> std::string {
-    try {
-      read();
-    } catch (const InvalidRobot& error) {
-      return error.what();
-    }
-    return "accepted";
-  };
+  const auto refused = [](const auto& read) { return testing::refusal<InvalidRobot>(read); };
   EXPECT_EQ(refused([] { Robot::from_file("/nowhere/arm.urdf", "a", "b"); }),
             "/nowhere/arm.urdf: cannot be read: No such file or directory");
   EXPECT_THAT(refused([] { Robot::from_text("garbage", "a", "b", {}, "arm.urdf"); }),
@@ -275,13 +265,8 @@ TEST(RobotErrors, NameTheFileThatIsNotThereOrNotARobot) {
 }
 
 TEST(RobotErrors, AreForTextsThatWouldOverflowTheStack) {
-  const auto refused = [](const std::string& text) -> std::string {
-    try {
-      Robot::from_text(text, "l0", "l1", {}, "p");
-    } catch (const InvalidRobot& error) {
-      return error.what();
-    }
-    return "accepted";
+  const auto refused = [](const std::string& text) {
+    return testing::refusal<InvalidRobot>([&] { Robot::from_text(text, "l0", "l1", {}, "p"); });
   };
   std::string nested;
   for (int i = 0; i < 100'000; ++i) nested += "<a>";

@@ -4,6 +4,7 @@
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/linear_system.hpp>
 #include <dashpot/sim/plant.hpp>
+#include <dashpot/tests/support/refusal.hpp>
 
 #include <ostream>
 #include <string>
@@ -65,12 +66,7 @@ inline sim::Robot pendulum(int bars) {
 /// What InvalidScene says of what `make` makes.
 template <class Make>
 std::string refusal_of(const Make& make) {
-  try {
-    make();
-  } catch (const sim::InvalidScene& error) {
-    return error.what();
-  }
-  return "accepted";
+  return refusal<sim::InvalidScene>(make);
 }
 
 /// Three masses that drift together (the first example of Kao and Saldarriaga, 2021).

@@ -14,7 +14,6 @@ namespace {
 using controller::FeedForward;
 using controller::JointVector;
 using controller::Mode;
-using testing::Random;
 using testing::TwinModels;
 
 constexpr double kTime = 0.5;  // of the integral, s
@@ -111,27 +110,22 @@ struct Loop {
 };
 
 /// What is left of the way of joint 1, rad, once the arm rests at 0.4 rad.
-double miss(const RoughPanda& panda, Mode mode) {
+double miss(const RoughPanda& panda) {
   Loop loop(panda);
-  loop.setpoint.mode = mode;
   loop.run(0.2);
   loop.setpoint.joint_position[0] += 0.4;
-  const Eigen::AngleAxisd turn(0.4, Eigen::Vector3d::UnitZ());
-  loop.setpoint.tip_pose.position = turn * loop.setpoint.tip_pose.position;
-  loop.setpoint.tip_pose.rotation = turn * loop.setpoint.tip_pose.rotation;
   loop.run(3.5);
   EXPECT_EQ(loop.worst, controller::Status::kOk) << to_text(loop.worst);
-  if (mode == Mode::kJoint) return panda.q0[0] + 0.4 - loop.plant.position()[0];
-  return loop.controller.snapshot().tip_error.head<3>().norm();
+  return panda.q0[0] + 0.4 - loop.plant.position()[0];
 }
 
 TEST(SteadyError, IsSmallerWithEachOfTheTwo) {
   RoughPanda plain(1), friction(1), integral(1);
   friction.compensate_friction();
   integral.settings.integral.time = kTime;
-  const double without = miss(plain, Mode::kJoint);
-  const double compensated = miss(friction, Mode::kJoint);
-  const double integrated = miss(integral, Mode::kJoint);
+  const double without = miss(plain);
+  const double compensated = miss(friction);
+  const double integrated = miss(integral);
   // Springs of 60 N m/rad stop at 1 N m. What is left of friction stops them at 0.2 N m, and on the
   // way from where its compensation fades the reference brakes.
   const double fading = 0.05 * 0.05 / (2 * 0.5 * plain.settings.motion.acceleration[0]);
@@ -142,17 +136,6 @@ TEST(SteadyError, IsSmallerWithEachOfTheTwo) {
   EXPECT_LT(without, 1.0 / 60);
   EXPECT_LT(std::abs(compensated), (1 - kShare) / 60 + 2 * fading);
   EXPECT_LT(std::abs(integrated), 0.3 * without);
-}
-
-TEST(SteadyError, OfTheTipIsSmallerWithTheIntegral) {
-  RoughPanda plain(1), integral(1);
-  for (RoughPanda* panda : {&plain, &integral}) panda->hold_tip(200, 40, 20, 4);
-  integral.settings.integral = {kTime, 20, 5, integral.settings.integral.torque};
-  const double without = miss(plain, Mode::kCartesian);
-  const double with = miss(integral, Mode::kCartesian);
-  std::printf("tip: misses by %.2e m, with the integral by %.2e m\n", without, with);
-  EXPECT_GT(without, 2e-3);
-  EXPECT_LT(with, 0.5 * without);
 }
 
 /// The weight of a payload that the model lacks lowers the tip by m g / k, and with the integral,

@@ -34,7 +34,7 @@ double quantile(std::vector<double> values, double share) {
 }
 
 /// A record of a chirp, with `inputs` inputs of which it has number `r`.
-MotionRecord excited(const SprungArm& arm, int r, int inputs, Draws& draw,
+MotionRecord excited(const SprungArm& arm, int r, int inputs, Dice& draw,
                      std::vector<double>& shares) {
   constexpr int kSamples = 10'000;
   constexpr double kPeriod = 0.001, kFrom = 0.3, kTo = 12;  // s, Hz
@@ -61,7 +61,7 @@ struct Motions {
   std::vector<double> shares;
 };
 
-Motions chirps(const SprungArm& arm, int inputs, Draws& draw) {
+Motions chirps(const SprungArm& arm, int inputs, Dice& draw) {
   Motions result;
   result.shares.resize(arm.modes.size());
   for (int r = 0; r < inputs; ++r) {
@@ -73,7 +73,7 @@ Motions chirps(const SprungArm& arm, int inputs, Draws& draw) {
 }
 
 /// The energy of a release is in the springs; the shares are those of the last one.
-Motions releases(const SprungArm& arm, int count, Eigen::VectorXd start, Draws& draw) {
+Motions releases(const SprungArm& arm, int count, Eigen::VectorXd start, Dice& draw) {
   Motions result;
   for (int r = 0; r < count; ++r) {
     for (Eigen::Index i = 0; r > 0 && i < start.size(); ++i) start[i] = 0.02 * draw.normal();
@@ -87,7 +87,7 @@ Motions releases(const SprungArm& arm, int count, Eigen::VectorXd start, Draws& 
   return result;
 }
 
-Motions shaken(const SprungArm& arm, Draws& draw) {
+Motions shaken(const SprungArm& arm, Dice& draw) {
   return {{sensed(arm.shake(60, 60'000, 0.002, draw), 0.002, {}, draw)},
           std::vector<double>(arm.modes.size(), 1)};
 }
@@ -163,7 +163,7 @@ bool identify(const Request& request) {
   Tallies tallies;
   const auto begin = std::chrono::steady_clock::now();
   for (long k = 0; k < request.whole(); ++k) {
-    Draws draw(1'000'003 * request.seed + static_cast<std::uint64_t>(k));
+    Dice draw(1'000'003 * request.seed + static_cast<std::uint64_t>(k));
     const SprungArm arm(static_cast<std::size_t>(k), draw, 0.05, 0.9);
     Eigen::VectorXd start(arm.system.mass.rows());
     for (double& q : start) q = 0.02 * draw.normal();

@@ -2,17 +2,16 @@
 // What the controller leaves out where a tick does not need it, beside a controller that does it.
 
 #include <dashpot/controller/controller.hpp>
-#include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/robot_model.hpp>
 #include <dashpot/tests/support/constant_damping.hpp>
 #include <dashpot/tests/support/hostile_ticks.hpp>
+#include <dashpot/tests/support/led_arm.hpp>
 #include <dashpot/tests/support/skip_tally.hpp>
 
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <memory>
-#include <numbers>
 
 namespace dashpot::testing {
 
@@ -93,57 +92,39 @@ class AnalysisSkips {
   controller::JointVector torque_, other_torque_;
 };
 
-/// Two controllers that are led through the same smooth motion, with halts, in which one joint
-/// after the other makes a small step; what comes to one of them is changed so little that it
-/// cannot matter, but enough that nothing may be left out.
-class LedPair {
- public:
+/// Two arms that are led through the same smooth motion, with halts, in which one joint after the
+/// other makes a small step; what comes to one of them is changed so little that it cannot matter,
+/// but enough that nothing may be left out.
+struct LedPair {
   using Settings = controller::Settings;
   using Input = std::function<void(controller::RobotState&, controller::Setpoint&)>;
 
-  LedPair(const controller::RobotModel& model, const Settings& lean, const Settings& full)
-      : lean_(model, quiet(lean)),
-        full_(model, quiet(full)),
-        center_(controller::JointVector::LinSpaced(model.dof(), 0.3, 1.2)) {
-    const auto there =
-        controller::evaluate(model, center_, controller::JointVector::Zero(model.dof()));
-    setpoint_ = lean.initial;
-    setpoint_.mode = controller::Mode::kCartesian;
-    setpoint_.joint_position = center_;
-    setpoint_.tip_pose = {there.p_BT_B, there.R_BT};
-  }
+  LedPair(const controller::RobotModel& model, const Settings& of_lean, const Settings& of_full)
+      : lean(model, quiet(of_lean), kSmallSwing), full(model, quiet(of_full), kSmallSwing) {}
 
-  /// Swings of 0.2 rad, one in 2 s, with a halt in every other tenth of a second; `both` changes
-  /// the input, `of_full` that of the second controller alone.
+  /// A halt in every other tenth of a second; `both` changes the input, `of_full` that of the
+  /// second arm alone.
   void tick(const Input& both, const Input& of_full) {
-    setpoint_.time = state_.time += 1'000'000;
-    if (++ticks_ / 100 % 2 == 0) t_ += 1e-3;
-    if (ticks_ % 10 == 0) center_[ticks_ / 10 % center_.size()] += 1e-5;
-    state_.position = center_;
-    state_.velocity.setZero(center_.size());
-    for (Eigen::Index i = 0; i < center_.size(); ++i) {
-      const double phase = std::numbers::pi * t_ + static_cast<double>(i);
-      state_.position[i] += 0.2 * (std::sin(phase) - std::sin(static_cast<double>(i)));
-      if (ticks_ / 100 % 2 == 0) state_.velocity[i] = 0.2 * std::numbers::pi * std::cos(phase);
+    const bool moves = ++ticks / 100 % 2 == 0;
+    if (moves) t_ += 1e-3;
+    for (LedArm* one : {&lean, &full}) {
+      if (ticks % 10 == 0) one->center[ticks / 10 % one->center.size()] += 1e-5;
+      one->swing(t_);
+      if (!moves) one->state.velocity.setZero();
+      both(one->state, one->setpoint);
+      if (one == &full) of_full(one->state, one->setpoint);
+      one->tick();
     }
-    controller::RobotState state = state_;
-    controller::Setpoint setpoint = setpoint_;
-    both(state, setpoint);
-    lean_.update(state, setpoint, lean_torque);
-    of_full(state, setpoint);
-    full_.update(state, setpoint, full_torque);
   }
-
-  const controller::Vibration& lean() const { return lean_.vibration(); }
-  /// Its modes, solved from nothing.
+  /// The modes of the first, solved from nothing.
   const analysis::Spectrum<analysis::kMaxDof>& lean_anew() {
-    lean_.closed_loop(system_);
+    lean.controller.closed_loop(system_);
     solver_.solve(system_, anew_);
     return anew_;
   }
-  const controller::Vibration& full() const { return full_.vibration(); }
-  std::int64_t ticks() const { return ticks_; }
-  controller::JointVector lean_torque, full_torque;
+
+  LedArm lean, full;
+  std::int64_t ticks = 0;
 
  private:
   /// No limit or watchdog interferes.
@@ -154,18 +135,12 @@ class LedPair {
     settings.analysis.share = 1;
     settings.limits.position_lower.setConstant(-10);
     settings.limits.position_upper.setConstant(10);
-    settings.initial.mode = controller::Mode::kCartesian;
-    return settings;
+    return in_mode(settings, controller::Mode::kCartesian);
   }
 
-  controller::Controller lean_, full_;
   analysis::System<analysis::kMaxDof> system_;
   analysis::SpectrumSolver<analysis::kMaxDof> solver_;
   analysis::Spectrum<analysis::kMaxDof> anew_;
-  controller::JointVector center_;
-  controller::RobotState state_;
-  controller::Setpoint setpoint_;
-  std::int64_t ticks_ = 0;
   double t_ = 0;
 };
 
@@ -176,24 +151,23 @@ inline constexpr double kSameModes = 1e-9, kSameTorque = 1e-12;
 inline constexpr double kTiny = std::numeric_limits<double>::denorm_min();
 
 inline void compare_torques(const LedPair& pair, SkipTally& tally) {
-  const double size = 1e-300 + pair.full_torque.cwiseAbs().maxCoeff();
-  for (Eigen::Index i = 0; i < pair.full_torque.size(); ++i) {
-    tally.see(pair.lean_torque[i], pair.full_torque[i], kSameTorque * size);
-  }
+  const controller::JointVector &lean = pair.lean.torque, &full = pair.full.torque;
+  const double size = 1e-300 + full.cwiseAbs().maxCoeff();
+  for (Eigen::Index i = 0; i < full.size(); ++i) tally.see(lean[i], full[i], kSameTorque * size);
 }
 
 inline void compare_modes(LedPair& pair, SkipTally& tally) {
-  if (!has_modes(pair.lean()) || !has_modes(pair.full())) {
-    if (has_modes(pair.lean()) != has_modes(pair.full())) tally.fail();
+  const controller::Vibration &lean = pair.lean.modes(), &full = pair.full.modes();
+  if (!has_modes(lean) || !has_modes(full)) {
+    if (has_modes(lean) != has_modes(full)) tally.fail();
     return;
   }
   const auto& again = pair.lean_anew();
   if (again.status == analysis::Status::kOk) {
-    compare_bounded(plain_modes(pair.lean()), {again.modes.begin(), again.modes.end()},
-                    pair.lean().zero_modes, kSameModes, tally);
+    compare_bounded(plain_modes(lean), {again.modes.begin(), again.modes.end()}, lean.zero_modes,
+                    kSameModes, tally);
   }
-  compare_bounded(plain_modes(pair.lean()), plain_modes(pair.full()), pair.full().zero_modes,
-                  kSameModes, tally);
+  compare_bounded(plain_modes(lean), plain_modes(full), full.zero_modes, kSameModes, tally);
 }
 
 /// What a tick leaves out: `lean` input allows it, `full` input is next to it and does not.
@@ -212,7 +186,7 @@ inline std::vector<TermSkip> term_skips() {
   const auto nothing = [](RobotState&, Setpoint&) {};
   const auto still = [](RobotState& state, Setpoint&) { state.velocity.setZero(); };
   const auto every_tick = [](const LedPair& pair) {
-    return static_cast<std::uint64_t>(pair.ticks());
+    return static_cast<std::uint64_t>(pair.ticks);
   };
   std::vector<TermSkip> all;
   all.push_back({{"K_G without a wrench"},
@@ -221,14 +195,14 @@ inline std::vector<TermSkip> term_skips() {
                  },
                  nothing,
                  [](RobotState& state, Setpoint&) { state.external_wrench[2] = kTiny; },
-                 [](const LedPair& pair) { return pair.lean().counters.no_wrench; }});
+                 [](const LedPair& pair) { return pair.lean.modes().counters.no_wrench; }});
   all.push_back({{"J' C_C Jdot at rest"},
                  [](Settings& a, Settings& b) {
                    a.task_terms.jacobian_rate = b.task_terms.jacobian_rate = true;
                  },
                  still,
                  [](RobotState& state, Setpoint&) { state.velocity.setConstant(kTiny); },
-                 [](const LedPair& pair) { return pair.lean().counters.at_rest; }});
+                 [](const LedPair& pair) { return pair.lean.modes().counters.at_rest; }});
   all.push_back({{"nothing computed standing still"},
                  [](Settings&, Settings&) {},
                  nothing,
@@ -237,7 +211,7 @@ inline std::vector<TermSkip> term_skips() {
                    if (there == last) state.position[0] = std::nextafter(there, 10.0);
                    last = state.position[0];
                  },
-                 [](const LedPair& pair) { return pair.lean().counters.unchanged; }});
+                 [](const LedPair& pair) { return pair.lean.modes().counters.unchanged; }});
   all.push_back(
       {{"no null space: gains of zero"},
        [](Settings& a, Settings& b) {
@@ -273,7 +247,6 @@ inline void run_skip(const controller::RobotModel& model, int ticks, TermSkip& s
   LedPair pair(model, lean, full);
   for (int k = 0; k < ticks; ++k) {
     pair.tick(skip.both, skip.of_full);
-
     compare_torques(pair, skip.tally);
     compare_modes(pair, skip.tally);
   }

@@ -5,21 +5,15 @@
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/tests/support/random.hpp>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 namespace dashpot::testing {
 
-/// Random orthogonal matrix, n x n.
-inline Eigen::MatrixXd rotation(Random& random, Eigen::Index n) {
-  return Eigen::HouseholderQR<Eigen::MatrixXd>(random.matrix(n, n)).householderQ();
-}
-
 /// Symmetric, with eigenvalues from `largest` / `condition` to `largest`, these two included.
 inline Eigen::MatrixXd graded(Random& random, Eigen::Index n, double largest, double condition) {
-  const Eigen::MatrixXd Q = rotation(random, n);
+  const Eigen::MatrixXd Q = random.rotation(n);
   Eigen::VectorXd values(n);
   for (double& value : values) value = random.log_uniform(largest / condition, largest);
   values[0] = largest;

@@ -1,11 +1,12 @@
 #pragma once
 // URDFs of serial chains with random geometry and inertias, for tests and benchmarks.
 
+#include <dashpot/tests/support/dice.hpp>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdio>
-#include <random>
 #include <string>
 
 namespace dashpot::testing {
@@ -29,20 +30,13 @@ inline std::string inertial(double mass, const Eigen::Vector3d& center, const Ei
          "' izz='" + exact(I(2, 2)) + "'/></inertial>";
 }
 
-struct RandomRobot {
-  std::mt19937_64 engine;
-  explicit RandomRobot(std::uint64_t seed) : engine(seed) {}
+struct RandomRobot : Dice {
+  using Dice::Dice;
 
-  double uniform(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(engine);
-  }
   Eigen::Vector3d vector(double size) {
     return {uniform(-size, size), uniform(-size, size), uniform(-size, size)};
   }
-  Eigen::Vector3d direction() {
-    std::normal_distribution<double> normal;
-    return Eigen::Vector3d(normal(engine), normal(engine), normal(engine)).normalized();
-  }
+  Eigen::Vector3d direction() { return Eigen::Vector3d(matrix(3, 1)).normalized(); }
   /// About the centre of mass, that a body of this mass and size can have.
   Eigen::Matrix3d inertia(double mass, double size) {
     const Eigen::Matrix3d R = Eigen::AngleAxisd(uniform(0, 3), direction()).toRotationMatrix();

@@ -5,30 +5,16 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/dice.hpp>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
-#include <cstdint>
 #include <limits>
-#include <random>
 #include <vector>
 
 namespace dashpot::testing {
-
-/// Random numbers from a seed.
-class Draws {
- public:
-  explicit Draws(std::uint64_t seed) : engine_(seed) {}
-  double operator()(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(engine_);
-  }
-  double normal() { return std::normal_distribution<double>()(engine_); }
-
- private:
-  std::mt19937_64 engine_;
-};
 
 /// An arm near an equilibrium, with springs and dampers in its joints, linearized.
 struct SprungArm {
@@ -38,22 +24,23 @@ struct SprungArm {
   /// Some arm at some posture with springs that give frequencies of an impedance-controlled arm;
   /// each undamped mode gets a ratio within `least_ratio` and `largest_ratio`, and dampers in the
   /// joints couple them.
-  SprungArm(std::size_t which, Draws& draw, double least_ratio, double largest_ratio) {
+  SprungArm(std::size_t which, Dice& draw, double least_ratio, double largest_ratio) {
     const controller::RobotModel model = arm_model(arms()[which % arms().size()]);
     const int n = model.dof();
     controller::JointVector q(n);
-    for (int i = 0; i < n; ++i) q[i] = draw(-1.5, 1.5);
+    for (int i = 0; i < n; ++i) q[i] = draw.uniform(-1.5, 1.5);
     const auto at = evaluate(model, q, controller::JointVector::Zero(n));
     Eigen::MatrixXd M = at.M;
     M.diagonal().array() += 0.1;  // of the drives
     Eigen::VectorXd springs(n);
-    for (int i = 0; i < n; ++i) springs[i] = M(i, i) * std::pow(draw(8, 40), 2);
+    for (int i = 0; i < n; ++i) springs[i] = M(i, i) * std::pow(draw.uniform(8, 40), 2);
     const Eigen::MatrixXd K = springs.asDiagonal();
     const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> undamped(K, M);
     const Eigen::MatrixXd U = undamped.eigenvectors();
     Eigen::VectorXd damping(n);
     for (int i = 0; i < n; ++i) {
-      damping[i] = 2 * draw(least_ratio, largest_ratio) * std::sqrt(undamped.eigenvalues()[i]);
+      damping[i] =
+          2 * draw.uniform(least_ratio, largest_ratio) * std::sqrt(undamped.eigenvalues()[i]);
     }
     const Eigen::MatrixXd D = M * U * damping.asDiagonal() * U.transpose() * M;
     Eigen::MatrixXd C = D;
@@ -93,7 +80,7 @@ struct SprungArm {
 
   /// How it moves under random torques that change each `period` (s), whose spread in each joint is
   /// what turns the joint's inertia at `strength` (rad/s^2): n x samples.
-  Eigen::MatrixXd shake(double strength, int samples, double period, Draws& draw) const {
+  Eigen::MatrixXd shake(double strength, int samples, double period, Dice& draw) const {
     const Eigen::Index n = system.mass.rows();
     const Eigen::MatrixXd A = state_matrix();
     const Eigen::EigenSolver<Eigen::MatrixXd> solver(A);
@@ -156,12 +143,12 @@ struct Sensors {
 };
 
 inline analysis::MotionRecord sensed(const Eigen::MatrixXd& motion, double period,
-                                     const Sensors& sensors, Draws& draw) {
+                                     const Sensors& sensors, Dice& draw) {
   const auto samples = static_cast<int>(motion.cols());
   analysis::MotionRecord record{Eigen::VectorXd(samples), motion};
   for (int i = 0; i < samples; ++i) {
     record.time[i] = i * period;
-    const bool missing = draw(0, 1) < sensors.missing;
+    const bool missing = draw.uniform(0, 1) < sensors.missing;
     for (Eigen::Index c = 0; c < motion.rows(); ++c) {
       double& y = record.output(c, i);
       y += sensors.noise * draw.normal();
@@ -174,7 +161,7 @@ inline analysis::MotionRecord sensed(const Eigen::MatrixXd& motion, double perio
 
 inline analysis::MotionRecord sensed(const SprungArm& arm, const Eigen::VectorXd& position,
                                      int samples, double period, const Sensors& sensors,
-                                     Draws& draw) {
+                                     Dice& draw) {
   return sensed(arm.release(position, samples, period), period, sensors, draw);
 }
 

@@ -3,16 +3,15 @@
 // modes has to follow. SI units; a path goes from t = 0 to 1.
 
 #include <dashpot/analysis/system.hpp>
+#include <dashpot/tests/support/dice.hpp>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <Eigen/QR>
+#include <array>
 #include <cmath>
-#include <cstdint>
 #include <functional>
 #include <numbers>
 #include <ostream>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -20,35 +19,6 @@ namespace dashpot::testing {
 
 using TrackedSystem = analysis::System<analysis::kMaxDof>;
 using SystemPath = std::function<TrackedSystem(double)>;
-
-/// Random numbers without a test around them.
-struct Dice {
-  std::mt19937_64 engine;
-  explicit Dice(std::uint64_t seed) : engine(seed) {}
-
-  double uniform(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(engine);
-  }
-  double log_uniform(double low, double high) {
-    return std::exp(uniform(std::log(low), std::log(high)));
-  }
-  int integer(int low, int high) { return std::uniform_int_distribution<int>(low, high)(engine); }
-  Eigen::MatrixXd matrix(Eigen::Index rows, Eigen::Index columns) {
-    std::normal_distribution<double> normal;
-    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(engine); });
-  }
-  Eigen::MatrixXd rotation(Eigen::Index n) {
-    return Eigen::HouseholderQR<Eigen::MatrixXd>(matrix(n, n)).householderQ();
-  }
-  /// Magnitudes of 1 to `range`.
-  Eigen::VectorXd log_vector(Eigen::Index n, double range) {
-    return Eigen::VectorXd::NullaryExpr(n, [&] { return log_uniform(1, range); });
-  }
-  /// A regular T (n x n), M = T' T of condition number up to `range` squared.
-  Eigen::MatrixXd congruence(Eigen::Index n, double range) {
-    return rotation(n) * log_vector(n, range).asDiagonal() * rotation(n);
-  }
-};
 
 inline TrackedSystem symmetric_system(const Eigen::MatrixXd& M, const Eigen::MatrixXd& C,
                                       const Eigen::MatrixXd& K) {
@@ -242,7 +212,7 @@ inline SystemPath wandering(Dice& dice) {
 inline SystemPath frozen(Dice& dice) {
   const SystemPath path = wandering(dice);
   const double size = dice.uniform(0, 1) < 0.3 ? 0 : dice.log_uniform(1e-17, 1e-9);
-  const std::uint64_t seed = dice.engine();
+  const std::uint64_t seed = dice.engine()();
   return [=](double t) {
     TrackedSystem system = path(0.3);
     Dice jitter(seed + static_cast<std::uint64_t>(t * 1e6));
@@ -264,7 +234,7 @@ inline SystemPath frozen(Dice& dice) {
 /// A path that jumps elsewhere now and then.
 inline SystemPath jumping(Dice& dice) {
   const int n = dice.integer(2, 6);
-  const std::uint64_t seed = dice.engine();
+  const std::uint64_t seed = dice.engine()();
   const double apart = dice.log_uniform(0.003, 0.2);
   return [=](double t) {
     Dice jump(seed + static_cast<std::uint64_t>(t / apart));

@@ -1,13 +1,12 @@
 // The robot and its modes at a posture, from the plugin, without a loop and beside one.
+#include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/plugin/panda_host.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 
 #include <gtest/gtest.h>
-#include <Eigen/Eigenvalues>
 
 #include <atomic>
 #include <cmath>
-#include <complex>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -50,37 +49,29 @@ Found analyze(const Handle& arm, std::int32_t mode, const dashpot_gains* gains =
   return found;
 }
 
-/// The eigenvalue of M l^2 + C l + K next to `wanted`, by Eigen's solver of the companion matrix.
-std::complex<double> eigenvalue_near(const dashpot_closed_loop& loop, std::complex<double> wanted) {
-  const int n = static_cast<int>(loop.joints);
-  const auto inverse = rows(loop.mass, n, n).ldlt();
-  MatrixXd A = MatrixXd::Zero(2 * n, 2 * n);
-  A.topRightCorner(n, n).setIdentity();
-  A.bottomLeftCorner(n, n) = -inverse.solve(rows(loop.stiffness, n, n));
-  A.bottomRightCorner(n, n) = -inverse.solve(rows(loop.damping, n, n));
-  const Eigen::VectorXcd all = A.eigenvalues();
-  Eigen::Index nearest = 0;
-  (all.array() - wanted).abs().minCoeff(&nearest);
-  return all[nearest];
-}
-
-/// Each mode of `found` is one of its matrices.
+/// The modes of `found` are those of its matrices.
 void expect_modes_of_the_matrices(const Found& found, std::uint32_t count) {
   ASSERT_EQ(found.modes.status, 0);
   ASSERT_EQ(found.modes.count, count);
   EXPECT_EQ(found.modes.origin, DASHPOT_DIRECT);
   EXPECT_EQ(Map<const VectorXd>(found.modes.position, 7), joint_vector(panda_posture()));
-  for (std::uint32_t i = 0; i < found.modes.count; ++i) {
-    for (const auto& part : found.modes.modes[i].eigenvalues) {
-      const std::complex<double> lambda(part[0], part[1]);
-      EXPECT_LE(std::abs(lambda - eigenvalue_near(found.loop, lambda)), 1e-9 * std::abs(lambda));
-    }
+  analysis::System<> system(7);
+  system.mass = rows(found.loop.mass, 7, 7);
+  system.damping = rows(found.loop.damping, 7, 7);
+  system.stiffness = rows(found.loop.stiffness, 7, 7);
+  const analysis::Spectrum<> expected = analysis::analyze(system);
+  ASSERT_EQ(expected.modes.size(), static_cast<int>(count));
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const dashpot_mode& mode = found.modes.modes[i];
+    const auto& wanted = expected.modes[static_cast<int>(i)];
+    EXPECT_NEAR(mode.natural_frequency, wanted.natural_frequency, 1e-9 * wanted.natural_frequency);
+    EXPECT_NEAR(mode.damping_ratio, wanted.damping_ratio, 1e-9);
   }
 }
 
 TEST(PluginPosture, HasTheDynamicsOfTheRobot) {
   const Handle arm = create(panda());
-  std::vector<double> q = panda_posture();
+  const std::vector<double> q = panda_posture();
   const std::vector<double> qd = {0.1, -0.2, 0.3, 0.4, -0.5, 0.6, 0.7};
   const dashpot_dynamics at = dynamics(arm, q, qd.data());
   EXPECT_EQ(at.joints, 7u);
@@ -91,22 +82,8 @@ TEST(PluginPosture, HasTheDynamicsOfTheRobot) {
   EXPECT_EQ(Map<const VectorXd>(at.gravity, 7), VectorXd(expected.gravity));
   EXPECT_EQ(Map<const VectorXd>(at.jacobian_dot_qd, 6), VectorXd(expected.Jdot_qd));
   EXPECT_EQ(VectorXd::Zero(7), (Map<const VectorXd>(dynamics(arm, q).coriolis, 7)));
-  // The linear rows of J are the slopes of the tip's position.
-  const MatrixXd J = rows(at.jacobian, 6, 7);
-  for (int i = 0; i < 7; ++i) {
-    constexpr double kStep = 1e-5;
-    double& joint = q[static_cast<std::size_t>(i)];
-    const double here = joint;
-    joint = here + kStep;
-    const dashpot_dynamics above = dynamics(arm, q);
-    joint = here - kStep;
-    const dashpot_dynamics below = dynamics(arm, q);
-    joint = here;
-    const Eigen::Vector3d slope = (Map<const Eigen::Vector3d>(above.tip_position) -
-                                   Map<const Eigen::Vector3d>(below.tip_position)) /
-                                  (2 * kStep);
-    EXPECT_LT((slope - J.col(i).head<3>()).norm(), 1e-9);
-  }
+  EXPECT_EQ(rows(at.jacobian, 6, 7), MatrixXd(expected.J));
+  EXPECT_EQ((Map<const Eigen::Vector3d>(at.tip_position)), expected.p_BT_B);
   const MatrixXd R = rows(at.tip_rotation, 3, 3);
   EXPECT_EQ(R, MatrixXd(expected.R_BT));
 }

@@ -3,7 +3,7 @@
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
-#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/led_arm.hpp>
 
 #include <gtest/gtest.h>
 
@@ -14,27 +14,16 @@ namespace dashpot::controller {
 namespace {
 
 /// A Panda that is held still at one place by Cartesian springs.
-struct StillArm {
+struct StillArm : testing::LedArm {
   explicit StillArm(const Analysis::Sampled& sampled)
-      : model(testing::arm_model(testing::arms()[0])), controller(model, settings(sampled)) {
-    state.position.resize(7);
-    state.position << 0, -0.785, 0.1, -2.2, 0.2, 1.7, 0.785;
-    state.velocity = JointVector::Zero(7);
-    setpoint = controller.settings().initial;
+      : LedArm(testing::panda_model(), settings(sampled)) {
     setpoint.mode = Mode::kCartesian;
-    const DynamicsResult there = evaluate(model, state.position, state.velocity);
-    setpoint.tip_pose = {there.p_BT_B, there.R_BT};
-    setpoint.joint_position = state.position;
   }
-  Settings settings(const Analysis::Sampled& sampled) const {
-    Settings result = default_settings(model);
+  static Settings settings(const Analysis::Sampled& sampled) {
+    Settings result = default_settings(testing::panda_model());
     result.motion.gain_time = result.period;  // at once
     result.analysis.sampled = sampled;
     return result;
-  }
-  void tick() {
-    setpoint.time = state.time += 1'000'000;
-    controller.update(state, setpoint, torque);
   }
   /// Ticks until something new has been found about a tick after `tick_number`.
   const SampledVibration* wait_for(std::uint64_t tick_number) {
@@ -48,12 +37,6 @@ struct StillArm {
     }
     return nullptr;
   }
-
-  RobotModel model;
-  Controller controller;
-  RobotState state;
-  Setpoint setpoint;
-  JointVector torque;
 };
 
 TEST(SampledAnalysis, FindsWhatTheAnalysisOfThatLoopFinds) {

@@ -1,11 +1,9 @@
 // Modes from a thread of their own: the numbers of those within the tick.
-#include <dashpot/controller/controller.hpp>
-#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/led_arm.hpp>
 
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <cmath>
 #include <thread>
 
 namespace dashpot::controller {
@@ -13,33 +11,23 @@ namespace {
 
 using testing::panda_model;
 
-struct SwingingArm {
-  SwingingArm(const RobotModel& model, Analysis::Where where)
-      : controller(model,
-                   [&] {
-                     Settings settings = default_settings(model);
-                     settings.analysis.where = where;
-                     settings.motion.gain_time = settings.period;  // at once
-                     return settings;
-                   }()),
-        setpoint(controller.settings().initial) {
-    center.resize(7);
-    center << 0, -0.785, 0.1, -2.2, 0.2, 1.7, 0.785;
-    state.position = setpoint.joint_position = center;
-    state.velocity = JointVector::Zero(7);
+struct SwingingArm : testing::LedArm {
+  SwingingArm(const RobotModel& robot, Analysis::Where where)
+      : LedArm(robot, settings(robot, where), testing::kSmallSwing) {
     setpoint.mode = Mode::kJoint;
   }
-
+  static Settings settings(const RobotModel& model, Analysis::Where where) {
+    Settings settings = default_settings(model);
+    settings.analysis.where = where;
+    settings.motion.gain_time = settings.period;  // at once
+    return settings;
+  }
   /// One tick; `moving` or not.
   void tick(bool moving = true) {
-    setpoint.time = state.time += 1'000'000;
-    if (moving) phase += 3e-3;
-    for (Eigen::Index i = 0; i < 7; ++i) {
-      const double start = static_cast<double>(i);
-      state.position[i] = center[i] + 0.2 * (std::sin(phase + start) - std::sin(start));
-      state.velocity[i] = moving ? 0.6 * std::cos(phase + start) : 0;
-    }
-    controller.update(state, setpoint, torque);
+    if (moving) time += 1e-3;
+    swing(time);
+    if (!moving) state.velocity.setZero();
+    LedArm::tick();
   }
   /// Ticks without a motion, which are nothing new to analyse, until the modes are those of `tick`.
   bool wait_for(std::uint64_t tick_number) {
@@ -52,11 +40,7 @@ struct SwingingArm {
     return controller.vibration().tick == tick_number;
   }
 
-  Controller controller;
-  RobotState state;
-  Setpoint setpoint;
-  JointVector center, torque;
-  double phase = 0;
+  double time = 0;
 };
 
 /// Each tick counts once.

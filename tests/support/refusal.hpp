@@ -1,0 +1,17 @@
+#pragma once
+#include <string>
+
+namespace dashpot::testing {
+
+/// What an error of this kind says that `call` throws.
+template <class Error, class Call>
+std::string refusal(const Call& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+}  // namespace dashpot::testing
