@@ -95,6 +95,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   }
   sensed_.dt = sensed_.any ? std::max(settings_.period, age) : settings_.period;
   if (sensed_.any) course_.age(sensed_.dt);
+  if (sensed_.dt > longest_gap) filter_.brake().forget();
   sensed_.any = true;
   sensed_.time = state.time;
   sensed_.q = state_check_.position();
@@ -130,7 +131,7 @@ Status ControllerCore::update(const RobotState& state, const Setpoint* setpoint,
   // A reflex that has lost its sensor protects nobody.
   const bool blind = !wrench_known && std::isfinite(settings_.limits.external_force);
   if (blind) seen = worse(seen, Status::kCollision);
-  const bool brakes = aim_ != Aim::kSprings && !filter_.fades();
+  const bool brakes = aim_ != Aim::kSprings;
   const bool still = guide_.still(course_.gains().now());
   const bool latched = faults_.fault() != Status::kOk;
   status = worse(status, faults_.watch(seen, sensed_, still, brakes ? &filter_.brake() : nullptr));

@@ -66,7 +66,9 @@ bool Faults::brake_fails(Status found, Brake* brake) noexcept {
   if (brake->feeds()) return true;
   if (fault_ == Status::kOk || found != Status::kInstability) return false;
   motion_watch_.forget_swings();
-  return !brake->soften();  // it shakes the arm
+  const bool softer = brake->soften();  // it shakes the arm: as soft as can be
+  while (brake->soften()) continue;
+  return !softer;
 }
 
 }  // namespace dashpot::controller

@@ -26,6 +26,8 @@ constexpr double kSoftest = 8;         // times T
 constexpr double kMemory = 0.5;        // s, ten times as long as the brake needs
 constexpr double kPushed = 0.5;        // of velocity limits: somebody pushes the arm
 constexpr double kPushedLeast = 1;     // rad/s (m/s): likewise, however low the limit
+constexpr double kFarBeyond = 3;       // velocity limits: no joint that is braked gets faster there
+constexpr double kRises = 0.03;        // s, likewise
 constexpr double kRounding = 1e-9;     // N m or rad/s^2, in coordinates in which the mass is 1
 constexpr double kSoft = 1e-7;         // of a bound of acceleration, beside one of torque
 constexpr double kMarginMost = 0.02;   // rad, m
@@ -33,6 +35,7 @@ constexpr double kMarginMost = 0.02;   // rad, m
 /// The velocity with which a joint may move toward a limit at a distance.
 double before(double distance, double braking, double reaction) noexcept {
   if (distance < 0) return distance / reaction;
+  if (std::isinf(distance)) return distance;
   const double delayed = braking * reaction;
   // Two forms of the same: the first has no digits where the distance is short.
   return 2 * braking * distance / (std::sqrt(delayed * delayed + 2 * braking * distance) + delayed);
@@ -66,6 +69,7 @@ Brake::Brake(const Settings& settings) noexcept : n_(settings.limits.torque.size
     bounds.per_rate = 0.5 / limits.torque_rate[i];
     bounds.reaction = std::max(4 * near_, near_ + lag + limits.torque[i] / limits.torque_rate[i]);
   }
+  firm();
 }
 
 JointVector Brake::stop(const Motion& motion, double inward) const noexcept {
@@ -103,6 +107,13 @@ void Brake::watch(const Motion& motion) noexcept {
     given_ = 0;
   }
   feeds_ |= energy > least_ + given_ + pushed;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double speed = std::abs(motion.qd[i]);
+    const bool rises = speed > kFarBeyond * joint(i).velocity && speed > last_speed_[i];
+    rises_[i] = rises ? rises_[i] + period_ : 0;
+    last_speed_[i] = speed;
+    feeds_ |= rises_[i] > kRises;
+  }
 }
 
 bool Brake::soften() noexcept {
@@ -113,9 +124,16 @@ bool Brake::soften() noexcept {
 
 void Brake::firm() noexcept {
   softness_ = 1;
+  feeds_ = false;
+  forget();
+}
+
+void Brake::forget() noexcept {
   most_ = given_ = 0;
   least_ = std::numeric_limits<double>::infinity();
-  fell_ = feeds_ = false;
+  fell_ = false;
+  last_speed_.setZero(n_);
+  rises_.setZero(n_);
 }
 
 void Brake::factor(const Motion& motion) noexcept {
@@ -205,7 +223,7 @@ Status Brake::constrain(const Motion& motion, const JointVector& last, bool stop
         if (beyond > most && !holds(found)) most = beyond, worst = found;
       }
     }
-    if (worst.joint < 0 || count_ == kMaxJoints) break;
+    if (worst.joint < 0) break;
     hold(motion, worst);
     solve(wanted, free);
     excess = wanted;
@@ -255,8 +273,8 @@ void Brake::let_go(Eigen::Index k) noexcept {
   for (; k < count_; ++k) held(k) = held(k + 1);
 }
 
-void Brake::factor_held() noexcept {
-  JointMatrix A(count_, count_);
+bool Brake::factor_held() noexcept {
+  BoundMatrix A(count_, count_);
   for (Eigen::Index k = 0; k < count_; ++k) {
     const Held& one = held(k);
     for (Eigen::Index l = 0; l < count_; ++l) {
@@ -267,20 +285,20 @@ void Brake::factor_held() noexcept {
     }
     if (one.bound.of == Bound::Of::kAcceleration) A(k, k) += kSoft;
   }
-  constrained_.compute(A, 1e-3 * kSoft);
+  constrained_.compute(A);
+  return constrained_.info() == Eigen::Success;
 }
 
 void Brake::solve(const JointVector& torque, const JointVector& acceleration) noexcept {
   while (count_ > 0) {  // each time round with a joint less
-    factor_held();
-    JointVector factors(count_);
+    if (!factor_held()) return let_go(count_ - 1);
+    Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxJoints, 1> factors(count_);
     for (Eigen::Index k = 0; k < count_; ++k) {
       const Bound& bound = held(k).bound;
       const JointVector& free = bound.of == Bound::Of::kTorque ? torque : acceleration;
       factors[k] = held(k).scale * (bound.value - free[bound.joint]);
     }
-    constrained_.solve_L(factors.data());
-    constrained_.solve_LT(factors.data());
+    constrained_.solveInPlace(factors);
     double share = 1;  // of the way there, before a joint would begin to be driven
     Eigen::Index first = -1;
     for (Eigen::Index k = 0; k < count_; ++k) {

@@ -4,6 +4,7 @@
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/tick_status.hpp>
 
+#include <Eigen/Cholesky>
 #include <array>
 #include <limits>
 
@@ -29,6 +30,7 @@ double loop_lag(const Settings& settings) noexcept;
 /// may exceed the least, since the stop began or was softened, by what the weight can have given,
 /// int |w_i qd_i| dt over about half a second, as if all of it were held wrongly, and by that of
 /// joints with half of their velocity limits (at least 1 rad/s), each by itself: somebody may push.
+/// No joint may get faster for 30 ms beyond three times its limit.
 ///
 /// `constrain` finds the torque x' in excess of the weight w next to a torque x that is wanted, in
 /// the sense of Gauss's principle of least constraint,
@@ -54,6 +56,9 @@ double loop_lag(const Settings& settings) noexcept;
 /// the others takes no joint to its limits. Where the limits of torque do not allow that, they
 /// count.
 class Brake {
+  using BoundMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor,
+                                    2 * kMaxJoints, 2 * kMaxJoints>;
+
  public:
   explicit Brake(const Settings& settings) noexcept;
 
@@ -81,6 +86,8 @@ class Brake {
   bool soften() noexcept;
   /// No stop acts any more.
   void firm() noexcept;
+  /// The motion is not the one that was watched: nobody saw it for a while.
+  void forget() noexcept;
   /// Returns T as it is now, s.
   double stopping_time() const noexcept { return softness_ * stopping_time_; }
 
@@ -135,8 +142,8 @@ class Brake {
   void accelerate(JointVector& torque) const noexcept;
   void hold(const Motion& motion, const Bound& bound) noexcept;
   void let_go(Eigen::Index k) noexcept;
-  /// Sets the factor of the matrix of those held.
-  void factor_held() noexcept;
+  /// Sets the factor of the matrix of those held. False if rounding errors leave none.
+  bool factor_held() noexcept;
   /// Sets the factors with which those held are at their bounds. Those that would have to be driven
   /// there are let go.
   void solve(const JointVector& torque, const JointVector& acceleration) noexcept;
@@ -150,12 +157,14 @@ class Brake {
   double least_ = std::numeric_limits<double>::infinity();  ///< likewise, since it was softened
   double given_ = 0;                                        ///< by the weight, J
   bool fell_ = false;
+  JointVector last_speed_;  ///< n, rad/s
+  JointVector rises_;       ///< for how long a joint far beyond its velocity limit gets faster, s
   bool feeds_ = false;
   SmallCholesky own_mass_;
   const SmallCholesky* mass_ = nullptr;  ///< of this tick
-  SmallCholesky constrained_;
+  Eigen::LLT<BoundMatrix> constrained_{2 * kMaxJoints};
   Eigen::Index count_ = 0;  ///< of those held
-  std::array<Held, kMaxJoints> held_;
+  std::array<Held, static_cast<std::size_t>(2 * kMaxJoints)> held_;
   std::array<Bounds, kMaxJoints> joints_;
 };
 

@@ -101,7 +101,7 @@ bool MotionWatch::collides(const Tick& tick) noexcept {
     const double weight = gravity_ ? tick.robot.gravity[i] : 0;  // or the robot holds it itself
     const double now = force[i] + tick.robot.coriolis[i] + weight - joint.torque;
     joint.external += share * (now - joint.external);
-    found |= std::abs(joint.external) > joint.external_limit;
+    found |= !(std::abs(joint.external) <= joint.external_limit);  // or it is no number
   }
   return found;
 }

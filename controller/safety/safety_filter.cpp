@@ -7,13 +7,14 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kRampTime = 0.1;    // s
-constexpr double kLeastRoom = 0.05;  // of a torque limit
-constexpr double kSprings = 0.8;     // of the torque beside the weight: the rest is for dampers
-constexpr double kReturnRise = 1;    // s
-constexpr double kFull = 0.9;        // of the tip's speed limit: nothing drives further
-constexpr double kWholly = 0.65;     // from here on the drive is taken away
-constexpr double kMoves = 0.05;      // of a velocity limit: torque that drives ends at once
+constexpr double kRampTime = 0.1;     // s
+constexpr double kLeastRoom = 0.05;   // of a torque limit
+constexpr double kSprings = 0.8;      // of the torque beside the weight: the rest is for dampers
+constexpr double kReturnRise = 1;     // s
+constexpr double kLongestFade = 0.3;  // s: a brake is watched from then on, whatever fades
+constexpr double kFull = 0.9;         // of the tip's speed limit: nothing drives further
+constexpr double kWholly = 0.65;      // from here on the drive is taken away
+constexpr double kMoves = 0.05;       // of a velocity limit: torque that drives ends at once
 
 }  // namespace
 
@@ -24,6 +25,7 @@ SafetyFilter::SafetyFilter(const Settings& settings) noexcept
       power_(settings.limits.power),
       ramp_share_(settings.period / kRampTime),
       return_step_(settings.period / kReturnRise),
+      longest_fade_(kLongestFade / settings.period),
       last_(JointVector::Zero(n_)),
       asked_(last_) {
   const Limits& limits = settings.limits;
@@ -51,7 +53,9 @@ Status SafetyFilter::apply(const Brake::Motion& motion, double tip_speed, Aim ai
   const bool springs = aim == Aim::kSprings;
   JointVector excess(n_), brake = JointVector::Zero(n_);
   if (springs) brake_.firm();
-  if (aim != Aim::kFloat && !springs && !fades()) brake_.watch(motion);
+  stopping_ = springs ? 0 : stopping_ + 1;
+  const bool alone = !fades() || stopping_ > longest_fade_;
+  if (aim != Aim::kFloat && !springs && alone) brake_.watch(motion);
   returning_ = aim == Aim::kReturn ? std::min(1.0, returning_ + return_step_) : 0;
   if (springs) {
     asked_ = tau;

@@ -106,6 +106,8 @@ class SafetyFilter {
   double power_;
   double ramp_share_;  ///< of the torque, in one tick
   double return_step_;
+  double longest_fade_;   ///< ticks
+  double stopping_ = 0;   ///< for how many ticks no springs have acted
   double returning_ = 0;  ///< share of the return velocity
   bool known_ = false;
   bool ramping_ = false;
