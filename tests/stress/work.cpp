@@ -106,18 +106,17 @@ class Work {
     hold(0, round.told_late, 1);
     move({round.place.x(), round.place.y(), over}, 1.5);
     doing_ = "presses on the table";
-    go({0, 0, -kTable - 0.02});
+    go({0, 0, -kTable - 0.05});
     run(2);
     doing_ = "wipes the table";
-    go({round.wipe.x(), round.wipe.y(), -kTable - 0.02});
+    go({round.wipe.x(), round.wipe.y(), -kTable - 0.05});
     run(2);
     move({0, 0, 0}, 1.5);
     be_guided(round);  // 7 s
     doing_ = "moves its joints";
     joints_ = home_ + round.away;
-    goal_ = body_->tip_pose(joints_);
     cartesian_ = false;
-    arrive(3);
+    run(3);  // soft springs, friction and wrong weights leave 0.2 m
     stiffen(round.stiffer);
     move({0, 0, 0}, 3);
   }
@@ -126,9 +125,6 @@ class Work {
   void move(const Vector3d& to, double seconds) {
     doing_ = "moves its tip";
     go(to);
-    arrive(seconds);
-  }
-  void arrive(double seconds) {
     run(seconds);
     const double missed = (body_->tip_pose(plant_->position()).position - goal_.position).norm();
     if (missed >= kArrived) {
@@ -327,9 +323,11 @@ bool print(const char* name, const Seen& seen) {
 }
 
 bool work(const stress::Request& request) {
-  std::printf("Ordinary work, seed %lu\n%-14s %6s %8s %6s %8s %9s %8s %7s %7s %7s  %s\n",
-              request.seed, "arm", "min", "on table", "moves", "arrived", "miss, mm", "refused",
-              "speed", "torque", "faults", "statuses");
+  std::printf(
+      "Ordinary work, seed %lu; speed and torque: greatest shares of their limits\n%-14s %6s %8s "
+      "%6s %8s %9s %8s %7s %7s %7s  %s\n",
+      request.seed, "arm", "min", "on table", "moves", "arrived", "miss, mm", "refused", "speed",
+      "torque", "faults", "statuses");
   const int rounds = std::max(1, static_cast<int>(std::lround(request.count * 60 / kRound / 2)));
   bool good = true;
   for (const TestArm& arm : stress::test_arms()) {
