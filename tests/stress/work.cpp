@@ -115,6 +115,9 @@ class Work {
     be_guided(round);  // 7 s
     doing_ = "moves its joints";
     joints_ = home_ + round.away;
+    while (body_->tip_pose(joints_).position.z() < start_.position.z() - 0.75 * kTable) {
+      joints_ = 0.5 * (joints_ + home_);  // nobody drives an arm into a table
+    }
     cartesian_ = false;
     run(3);  // soft springs, friction and wrong weights leave 0.2 m
     stiffen(round.stiffer);
