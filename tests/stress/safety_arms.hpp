@@ -3,6 +3,7 @@
 
 #include <dashpot/controller/config.hpp>
 #include <dashpot/sim/arm.hpp>
+#include <dashpot/tests/support/places.hpp>
 
 #include <string>
 #include <vector>
