@@ -1,5 +1,6 @@
 // The robot's dynamics, and its closed loop with springs and dampers.
 
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
