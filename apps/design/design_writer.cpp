@@ -1,4 +1,5 @@
 #include <dashpot/apps/analyze/json_writer.hpp>
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_trends.hpp>
@@ -72,6 +73,7 @@ Json to_value(const DesignReport& report) {
                  {"before", before},
                  {"after", after}};
   if (!report.rotors.empty()) result["rotors"] = report.rotors;
+  if (!report.drives.empty()) result["drives"] = drives_json(report.drives);
   if (report.loop) result["loop"] = to_value(*report.loop);
   if (!report.sensitivities.empty()) result["sensitivity"] = sensitivity_json(report);
   return result;
