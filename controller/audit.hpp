@@ -73,7 +73,7 @@ struct MissingRotors {
   /// `inertia`; no entries: none.
   JointVector compared;
   PostureNumbers numbers;          ///< with these rotors
-  Eigen::VectorXd damping_ratios;  ///< of the modes with them, by falling natural frequency
+  Eigen::VectorXd damping_ratios;  ///< with them, of the modes likest to those without
 };
 
 /// A posture in full.

@@ -42,8 +42,16 @@ std::string missing_rotors_text(const RobotModel& model);
 /// Returns "joint5 0.02, joint6 0.012 kg m^2", without zeros, each rounded up to two digits.
 std::string inertia_text(const RobotModel& model, const JointVector& inertia);
 
+/// Returns "an arm without rotors", or "... in these joints" if others have them.
+std::string arm_without_rotors(const RobotModel& model);
+
+/// Returns the doubt about the published drives `name`, and which others the arm looks like, if it
+/// does. Empty if there is no name.
+std::string drives_text(const RobotModel& model, const std::string& name);
+
 /// Returns in two sentences where reflected inertia is found, and the public figures of an arm of
-/// this kind. The options are those that the caller takes: "--reflected-inertia", "--drives".
+/// this kind, or of all with as many joints. The options are those that the caller takes:
+/// "--reflected-inertia", "--drives".
 std::string rotors_hint(const RobotModel& model, const std::string& inertia_option,
                         const std::string& drives_option, const std::string& between = " ");
 

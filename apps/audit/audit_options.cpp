@@ -205,6 +205,7 @@ AuditTask read_task(const AuditCommand& command) {
   check(command);
   ArmOptions arm = command.arm;
   AuditTask task{read_model(arm), {}, std::numeric_limits<double>::quiet_NaN(), 0, {}, {}};
+  task.drives = arm.drives;
   AuditOptions& audit = task.options;
   read_gains(command, task.model, audit, task.intended_ratio);
   audit.period = command.no_margin ? 0 : command.period;

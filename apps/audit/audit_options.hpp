@@ -46,6 +46,7 @@ struct AuditTask {
   double wanted_ratio;  ///< of the suggestion
   controller::JointVector q;
   std::vector<controller::JointVector> postures;  ///< of the file or log; empty if there is none
+  std::string drives = {};  ///< name of the published drives that the model has
 };
 
 /// Adds the options to the subcommand; they are written to `options`.

@@ -1,5 +1,6 @@
 #include <dashpot/apps/analyze/json_writer.hpp>
 #include <dashpot/apps/audit/audit_writer.hpp>
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
@@ -68,11 +69,13 @@ std::string modes_table(const AuditTask& task, const controller::PostureAudit& p
 std::string rotors_table(const AuditTask& task, const controller::PostureAudit& posture) {
   const controller::RobotModel& model = task.model;
   const std::string missing = controller::missing_rotors_text(model);
-  if (missing.empty()) return "";
+  const std::string drives = controller::drives_text(model, task.drives);
+  const std::string used = drives.empty() ? "" : "\n  " + drives + "\n";
+  if (missing.empty()) return used;
   const bool loop = task.options.period > 0;
-  std::string text = "\n  Rotors unknown: " + missing + ". Fast modes" +
+  std::string text = used + "\n  Rotors unknown: " + missing + ". Fast modes" +
                      (loop ? ",\n  fastest pole, and gain margin" : "\n  and fastest pole") +
-                     " are those of an arm without rotors.\n";
+                     " are those of " + controller::arm_without_rotors(model) + ".\n";
   const controller::MissingRotors& rotors = posture.rotors;
   const std::string asked = format_number(task.options.margin, 3);
   if (rotors.inertia && !rotors.inertia->isZero(0)) {
@@ -99,8 +102,9 @@ std::string rotors_table(const AuditTask& task, const controller::PostureAudit& 
 /// What a gain margin means. A loop whose rotors are not told is not called unstable.
 std::string margin_verdict(const AuditTask& task, double margin) {
   if (margin >= 1) return "stiffness and damping may grow by it together.\n";
-  return controller::unknown_rotors(task.model).any() ? "too little of an arm without rotors.\n"
-                                                      : "the sampled loop is unstable.\n";
+  return controller::unknown_rotors(task.model).any()
+             ? "too little for an arm without rotors, which yours is not.\n"
+             : "the sampled loop is unstable.\n";
 }
 
 std::string posture_table(const AuditTask& task, const controller::PostureAudit& posture) {
@@ -185,6 +189,7 @@ std::string shortest(double value) {
 void rotors_json(const AuditTask& task, const controller::PostureAudit& posture, Json& result) {
   const controller::UnknownRotors unknown = controller::unknown_rotors(task.model);
   result["rotors"] = unknown.any() ? "unknown" : "known";
+  if (!task.drives.empty()) result["drives"] = drives_json(task.drives);
   if (!unknown.any()) return;
   const auto& rotors = posture.rotors;
   Json names = Json::array();

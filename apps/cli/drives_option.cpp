@@ -1,4 +1,5 @@
 #include <dashpot/apps/cli/drives_option.hpp>
+#include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/input_error.hpp>
 
@@ -9,6 +10,25 @@ void take_drives(const std::string& name, controller::ModelOptions& model) try {
   model.drives = name;
 } catch (const controller::InvalidModel& error) {
   throw controller::InputError("--drives", error.what());
+}
+
+nlohmann::ordered_json drives_json(const std::string& name) {
+  const controller::Drives& drives = controller::find_drives(name);
+  return {{"name", drives.name},
+          {"reflected_inertia", json_list(drives.values(drives.reflected_inertia))},
+          {"viscous_friction", json_list(drives.values(drives.viscous_friction))},
+          {"coulomb_friction", json_list(drives.values(drives.coulomb_friction))},
+          {"source", drives.source},
+          {"doubt", drives.doubt}};
+}
+
+CLI::Validator not_empty() {
+  return {[](const std::string& text) { return std::string(text.empty() ? "is empty" : ""); }, ""};
+}
+
+controller::InputError model_error(const controller::InvalidModel& error) {
+  const std::string what = error.what();
+  return {"", (what.starts_with("drives:") ? "--" : "") + what};
 }
 
 }  // namespace dashpot::apps

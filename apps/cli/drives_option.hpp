@@ -1,6 +1,9 @@
 #pragma once
+#include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/robot_model.hpp>
 
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 #include <string>
 
 namespace dashpot::apps {
@@ -11,5 +14,14 @@ inline constexpr const char* kDrivesHelp =
 /// Has the model take the published drives of this name, unless it is empty. Throws InputError with
 /// the option --drives.
 void take_drives(const std::string& name, controller::ModelOptions& model);
+
+/// Figures, source and doubt of the published drives of this name.
+nlohmann::ordered_json drives_json(const std::string& name);
+
+/// Refuses the name "".
+CLI::Validator not_empty();
+
+/// What is wrong with a model, with the options of the command line.
+controller::InputError model_error(const controller::InvalidModel& error);
 
 }  // namespace dashpot::apps

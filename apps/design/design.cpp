@@ -125,8 +125,20 @@ std::string rotors_note(const DesignOptions& options, const controller::RobotMod
   if (note.empty()) return "";
   note += options.period ? ": fast modes, and what the loop bears, are those"
                          : ": fast modes are those";
-  note += " of an arm without rotors. ";
+  note += " of " + controller::arm_without_rotors(model) + ". ";
   if (lowered) {
+    if (const controller::Drives* published = controller::unknown_rotors(model).published) {
+      const controller::RobotModel with_rotors =
+          controller::with_at_least(model, published->values(published->reflected_inertia));
+      const std::string with = "With the published drives " + std::string(published->name) + " it ";
+      try {
+        const Found found = design_one(read_arm(options.arm, with_rotors), options);
+        note += with + "bears a ratio of " + format_number(found.loop->level * options.ratio, 3) +
+                ", margin " + format_number(found.loop->gain_margin, 4) + ". ";
+      } catch (const std::runtime_error&) {
+        note += with + "bears none. ";
+      }
+    }
     const analysis::DampingDesign wanted = analysis::design_damping(
         read_arm(options.arm, model).impedance, options.target(), options.damping_structure());
     const auto enough = controller::enough_reflected_inertia(
@@ -145,6 +157,10 @@ DesignReport report_on_arm(const DesignOptions& options, const SystemEntry& entr
                            const controller::RobotModel& model) {
   try {
     DesignReport report = report_on(entry, options);
+    report.drives = options.arm.drives;
+    if (!report.drives.empty()) {
+      report.notes.push_back(controller::drives_text(model, report.drives));
+    }
     const std::string note = rotors_note(options, model, report.loop && report.loop->level < 1);
     if (!note.empty()) report.notes.push_back(note);
     report.rotors = note.empty() ? "known" : "unknown";

@@ -45,6 +45,9 @@ controller::Payload read_payload(const std::string& text) {
   units.resize(static_cast<std::size_t>(count));
   const Eigen::VectorXd values = parse_quantities("--payload", text, units);
   if (values[0] < 0) throw InputError("--payload", "the mass is negative");
+  if (values[0] == 0 && !values.tail(count - 1).isZero(0)) {
+    throw InputError("--payload", "center or inertia of a body without mass");
+  }
   payload.mass = values[0];
   if (count >= 4) payload.center = values.segment<3>(1);
   if (count >= 7) payload.inertia = values.segment<3>(4).asDiagonal();
@@ -85,7 +88,7 @@ RobotModel read_model(const ArmOptions& options) try {
   }
   return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
 } catch (const controller::InvalidModel& error) {
-  throw InputError("", error.what());
+  throw model_error(error);
 }
 
 bool ArmOptions::any() const {

@@ -30,6 +30,7 @@ struct DesignReport {
   std::optional<LoopReport> loop;  ///< none if the loop is taken for continuous
   std::vector<std::string> notes;
   std::string rotors;  ///< of an arm: "known" or "unknown"
+  std::string drives;  ///< name of the published drives that it has; empty: none
 };
 
 /// What `dashpot design --region` says.

@@ -1,4 +1,5 @@
 #include <dashpot/apps/analyze/json_writer.hpp>
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_trends.hpp>
@@ -72,6 +73,7 @@ Json to_value(const DesignReport& report) {
                  {"before", before},
                  {"after", after}};
   if (!report.rotors.empty()) result["rotors"] = report.rotors;
+  if (!report.drives.empty()) result["drives"] = drives_json(report.drives);
   if (report.loop) result["loop"] = to_value(*report.loop);
   if (!report.sensitivities.empty()) result["sensitivity"] = sensitivity_json(report);
   return result;
@@ -178,6 +180,22 @@ std::string miss_text(const DesignReport& report) {
   return text;
 }
 
+/// In lines of at most 100 characters where words allow it.
+std::string note_lines(const std::string& note) {
+  std::string text, line = "  Note:";
+  for (std::size_t at = 0; at < note.size();) {
+    const std::size_t end = std::min(note.find(' ', at), note.size());
+    const std::string word = note.substr(at, end - at);
+    if (line.size() + 1 + word.size() > 100) {
+      text += line + "\n";
+      line = "   ";
+    }
+    line += " " + word;
+    at = end + 1;
+  }
+  return text + line + "\n";
+}
+
 }  // namespace
 
 std::string design_json(const std::vector<DesignReport>& reports, bool as_list) {
@@ -194,7 +212,7 @@ std::string design_table(const std::vector<DesignReport>& reports, bool as_list)
     if (i > 0) text += '\n';
     if (as_list) text += "[" + std::to_string(i) + "] ";
     text += report.key + "\n" + matrix_text(report.design.damping) + "\n";
-    for (const std::string& note : report.notes) text += "  Note: " + note + "\n";
+    for (const std::string& note : report.notes) text += note_lines(note);
     if (report.loop) {
       text += loop_text(report);
       text += integral_text(

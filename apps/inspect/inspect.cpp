@@ -56,7 +56,7 @@ RobotModel read_model(const InspectOptions& options) {
     }
     return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
   } catch (const controller::InvalidModel& error) {
-    throw InputError("", error.what());
+    throw model_error(error);
   }
 }
 
@@ -90,15 +90,6 @@ nlohmann::ordered_json json_joints(const RobotModel& model) {
   return list;
 }
 
-nlohmann::ordered_json json_drives(const controller::Drives& drives) {
-  return {{"name", drives.name},
-          {"reflected_inertia", json_list(drives.values(drives.reflected_inertia))},
-          {"viscous_friction", json_list(drives.values(drives.viscous_friction))},
-          {"coulomb_friction", json_list(drives.values(drives.coulomb_friction))},
-          {"source", drives.source},
-          {"doubt", drives.doubt}};
-}
-
 std::string to_json(const InspectOptions& options, const RobotModel& model,
                     const DynamicsResult& dynamics) {
   const bool unknown = controller::unknown_rotors(model).any();
@@ -111,8 +102,7 @@ std::string to_json(const InspectOptions& options, const RobotModel& model,
                                    {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
                                    {"tip_position", json_list(dynamics.p_BT_B)},
                                    {"tip_rotation", json_rows(dynamics.R_BT)}};
-  if (!options.drives.empty())
-    result["drives"] = json_drives(controller::find_drives(options.drives));
+  if (!options.drives.empty()) result["drives"] = drives_json(options.drives);
   return result.dump(2, ' ', true) + "\n";
 }
 
@@ -266,7 +256,7 @@ void add_inspect(CLI::App& program) {
   add("--reflected-inertia", &InspectOptions::reflected_inertia,
       "Of rotors and gears at the joints, kg m^2 or kg; one number is that of all joints",
       "a,b,... (0)");
-  add("--drives", &InspectOptions::drives, kDrivesHelp, "NAME");
+  add("--drives", &InspectOptions::drives, kDrivesHelp, "NAME")->check(not_empty());
   command->add_flag("--exclude-off-chain", options->exclude_off_chain,
                     "Leave out links that hang off the chain");
   command->add_flag("--accept-inertias", options->accept_inertias,

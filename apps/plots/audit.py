@@ -11,6 +11,7 @@ with K of 1000 and 100, a damping factor of 1.4 and 2 ms. The arms of both have 
 `dashpot inspect --drives NAME`, or none. At last these, each with its source and doubt.
 """
 import json
+import math
 import subprocess
 import sys
 
@@ -31,12 +32,18 @@ def audit(arm, *more):
     return json.loads(done.stdout)
 
 
+def rounded_up(value):
+    """Two digits: what is told is enough."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return f"{unit * math.ceil(value / unit - 1e-9):.2g}"
+
+
 def enough(posture):
     """The reflected inertia that would be enough, without the joints that need none."""
     inertia = posture["reflected_inertia_for_margin"]
     if inertia is None:
         return "no inertia"
-    needed = [f"{i}: {value:.2g}" for i, value in enumerate(inertia, 1) if value > 0]
+    needed = [f"{i}: {rounded_up(value)}" for i, value in enumerate(inertia, 1) if value > 0]
     return ", ".join(needed) if needed else "none"
 
 
@@ -103,7 +110,7 @@ def main():
     rows = []
     for name, (stiffness, damping) in UR_GAINS.items():
         arm = ["--urdf", f"sim/models/{name}.urdf", "--base", "base_link", "--tip", "tool0", "--q",
-               "0,-1.57,1.57,-1.57,-1.57,0", "--joint-stiffness", stiffness, "--joint-damping", damping,
+               "0,-90 deg,90 deg,-90 deg,-90 deg,0", "--joint-stiffness", stiffness, "--joint-damping", damping,
                "--period", "2 ms"]
         rows.append(arm_row(f"{name}, joint PD of its maker's library, 500 Hz", arm, name))
         arm[9], arm[11] = "100", "20"

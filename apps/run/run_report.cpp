@@ -1,5 +1,6 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/apps/analyze/json_writer.hpp>
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/shape_text.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
@@ -296,9 +297,10 @@ std::string to_table(const RunReport& report) {
          commands_text(report.commands, loop.commands_refused);
   if (loop.first_modes.tick != 0) {
     out += solved_text(loop.first_modes, loop.last_modes);
+    if (!report.drives_text.empty()) out += "\n  " + report.drives_text + "\n";
     if (!report.missing_rotors.empty()) {
       out += "\n  Rotors unknown: " + report.missing_rotors +
-             ". Fast modes and gain\n  margins are those of an arm without rotors.\n  " +
+             ". Fast modes and gain\n  margins are those of " + report.without_rotors + ".\n  " +
              report.rotors_hint + "\n";
     }
     out += "\nModes at the start, " + count(loop.first_modes.zero_modes, "zero mode") + "\n" +
@@ -325,6 +327,7 @@ std::string to_json(const RunReport& report) {
   }
   Json result = {
       {"scene", report.scene},
+      {"drives", report.drives.empty() ? Json() : drives_json(report.drives)},
       {"joints", report.joints},
       {"rotors", report.missing_rotors.empty() ? "known" : "unknown"},
       {"period", report.period},

@@ -13,10 +13,12 @@ namespace dashpot::apps {
 struct RunReport {
   std::string scene;  ///< the file
   int joints = 0;
-  std::string missing_rotors;  ///< of the controller's model, see missing_rotors_text
-  std::string rotors_hint;     ///< where they are found
-  double period = 0;           ///< s
-  double wall_time = 0;        ///< s
+  std::string missing_rotors;       ///< of the controller's model, see missing_rotors_text
+  std::string without_rotors;       ///< see arm_without_rotors
+  std::string rotors_hint;          ///< where they are found
+  std::string drives, drives_text;  ///< published ones that it has; empty: none
+  double period = 0;                ///< s
+  double wall_time = 0;             ///< s
   Pace pace = Pace::kFast;
   bool interrupted = false;  ///< by the user
   Privileges privileges;

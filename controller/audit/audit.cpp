@@ -89,6 +89,39 @@ bool read_eigenvalues(const Eigen::Ref<const Eigen::VectorXcd>& values, double s
   return ratio < kInfinity && slowest <= kRounding * std::abs(fastest);
 }
 
+/// The largest likeness |u^H M v| of two modes' shapes, at most 1.
+double likeness(const MatrixXd& mass, const analysis::Mode<>& a, const analysis::Mode<>& b) {
+  double largest = 0;
+  for (const auto& u : a.shapes) {
+    for (const auto& v : b.shapes) {
+      const double norms = std::sqrt(std::abs(u.dot(mass * u)) * std::abs(v.dot(mass * v)));
+      if (norms > 0) largest = std::max(largest, std::abs(u.dot(mass * v)) / norms);
+    }
+  }
+  return largest;
+}
+
+/// The damping ratios of the modes `with` where those of `without` stand whose shapes are most
+/// alike, the likest pair first; NaN where none is left.
+Eigen::VectorXd paired_ratios(const MatrixXd& mass, const analysis::Spectrum<>& without,
+                              const analysis::Spectrum<>& with) {
+  MatrixXd alike(without.modes.size(), with.modes.size());
+  for (int i = 0; i < without.modes.size(); ++i) {
+    for (int j = 0; j < with.modes.size(); ++j) {
+      alike(i, j) = likeness(mass, without.modes[i], with.modes[j]);
+    }
+  }
+  Eigen::VectorXd ratios = Eigen::VectorXd::Constant(alike.rows(), kNan);
+  for (Index k = std::min(alike.rows(), alike.cols()); k > 0; --k) {
+    Index i = 0, j = 0;
+    alike.maxCoeff(&i, &j);
+    ratios[i] = with.modes[static_cast<int>(j)].damping_ratio;
+    alike.row(i).setConstant(-1);
+    alike.col(j).setConstant(-1);
+  }
+  return ratios;
+}
+
 /// Makes joint springs and dampers of the null space's.
 void take_into_joints(const NullSpace& null_space, Impedance& impedance) {
   const Index n = impedance.null_stiffness.size();
@@ -286,12 +319,11 @@ MissingRotors Audit::missing_rotors(const PostureAudit& found) const {
     missing.compared = *missing.inertia;
   }
   if (missing.compared.size() == 0) return missing;
-  const PostureAudit with = Audit(with_at_least(model_, missing.compared), options_).audit(found.q);
+  const Audit with_rotors(with_at_least(model_, missing.compared), options_);
+  const PostureAudit with = with_rotors.audit(found.q);
   missing.numbers = with.numbers;
-  missing.damping_ratios.resize(with.spectrum.modes.size());
-  for (int i = 0; i < with.spectrum.modes.size(); ++i) {
-    missing.damping_ratios[i] = with.spectrum.modes[i].damping_ratio;
-  }
+  missing.damping_ratios =
+      paired_ratios(with_rotors.evaluate(found.q).M, found.spectrum, with.spectrum);
   return missing;
 }
 

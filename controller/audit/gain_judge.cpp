@@ -82,7 +82,7 @@ GainJudge::Verdict GainJudge::judge_anywhere(const Gains& gains) {
 
 std::string GainJudge::missing(const Verdict& verdict, const Gains& gains) const {
   const RobotModel model = model_.with(attached_);
-  const std::string missing = missing_rotors_text(model);
+  std::string missing = missing_rotors_text(model);
   if (missing.empty() || verdict.q.size() == 0) return missing;
   PostureLoop loop(model, judging(settings_));
   analysis::System<kMaxJoints> closed;
@@ -96,6 +96,14 @@ std::string GainJudge::missing(const Verdict& verdict, const Gains& gains) const
         return GainJudge(with_rotors, settings_).judge(verdict.q, gains).margin >=
                settings_.limits.gain_margin;
       });
+  if (const Drives* published = unknown_rotors(model).published) {
+    const RobotModel with = with_at_least(model, published->values(published->reflected_inertia));
+    missing +=
+        ", with the published drives " + std::string(published->name) + " the margin is " +
+        (GainJudge(with, settings_).judge(verdict.q, gains).margin >= settings_.limits.gain_margin
+             ? "enough"
+             : "too small");
+  }
   const std::string hint = rotors_hint(model, "robot.reflected_inertia", "robot.drives:");
   if (!enough) return missing + ", but no reflected inertia would be enough. " + hint;
   return missing + ", and with " + inertia_text(model, *enough) + " the margin would be enough. " +

@@ -102,6 +102,7 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
     preliminary.options.reflected_inertia.setOnes(static_cast<Eigen::Index>(inertia->items.size()));
   }
   const RobotModel model = read_drives(keys, preliminary);
+  options.drives = preliminary.options.drives;
   if (keys.has("drives")) options.reflected_inertia = model.joint_values(&Joint::reflected_inertia);
   if (preliminary.options.drives_friction) {
     options.viscous_friction = model.joint_values(&Joint::viscous_friction);

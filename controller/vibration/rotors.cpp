@@ -103,13 +103,39 @@ std::string inertia_text(const RobotModel& model, const JointVector& inertia) {
   return text + " kg m^2";
 }
 
+std::string arm_without_rotors(const RobotModel& model) {
+  const bool all = static_cast<int>(unknown_rotors(model).joints.size()) == model.dof();
+  return all ? "an arm without rotors" : "an arm without rotors in these joints";
+}
+
+std::string drives_text(const RobotModel& model, const std::string& name) {
+  if (name.empty()) return "";
+  const Drives* like = drives_like(model);
+  return "Drives " + name + ", public figures: " + std::string(find_drives(name).doubt) + "." +
+         (like != nullptr && like->name != name
+              ? " This arm looks like " + std::string(like->name) + "."
+              : "");
+}
+
 std::string rotors_hint(const RobotModel& model, const std::string& inertia_option,
                         const std::string& drives_option, const std::string& between) {
   const UnknownRotors unknown = unknown_rotors(model);
   const std::string hint =
-      "The maker may tell it, a MuJoCo model has it as armature, dashpot identify finds it: " +
-      inertia_option + ".";
-  if (unknown.published == nullptr) return hint;
+      inertia_option +
+      " takes the inertia of rotor and gear at the joint (rotor times gear ratio "
+      "squared):" +
+      between +
+      "the maker tells it, `armature` of a MuJoCo model, or dashpot "
+      "identify --calibrate reflected_inertia.";
+  if (unknown.published == nullptr) {
+    std::string names;
+    for (const Drives& drives : published_drives()) {
+      if (drives.joints != model.dof()) continue;
+      names += (names.empty() ? "" : ", ") + std::string(drives.name);
+    }
+    if (names.empty()) return hint;
+    return hint + between + "Public figures by name: " + drives_option + " " + names + ".";
+  }
   return hint + between + "Public figures of such an arm, with their doubts: " + drives_option +
          " " + std::string(unknown.published->name) + ".";
 }

@@ -20,7 +20,7 @@ TEST(RotorsOfAudit, AreSaidToBeUnknownWithWhatWouldBeEnough) {
   EXPECT_THAT(text,
               AllOf(HasSubstr("Rotors unknown: the model has no reflected inertia of any joint"),
                     HasSubstr("Enough for a margin of 2.00 would be panda_joint"),
-                    HasSubstr("--drives panda"), HasSubstr("too little of an arm without rotors"),
+                    HasSubstr("--drives panda"), HasSubstr("too little for an arm without rotors"),
                     Not(HasSubstr("unstable"))));
   const Json found = parse(run_program(of_panda("audit", joined(kCrisp, {"--json"}))))["posture"];
   EXPECT_EQ(found["rotors"], "unknown");
@@ -53,10 +53,15 @@ TEST(RotorsOfInspect, HaveSourceAndDoubt) {
   const Json found = parse(run_program(of_panda("inspect", {"--drives", "panda", "--json"})));
   EXPECT_EQ(found["rotors"], "known");
   EXPECT_EQ(found["joints"][0]["reflected_inertia"], 0.1);
+  EXPECT_THAT(run_program(of_panda("audit", joined(kCrisp, {"--drives", "fr3"}))).out,
+              AllOf(HasSubstr("Drives fr3, public figures: "), HasSubstr("looks like panda.")));
+  for (const char* command : {"inspect", "audit"}) {
+    expect_refusal(run_program(of_panda(command, {"--drives", ""})), "--drives: is empty");
+  }
   expect_refusal(run_program(of_panda("inspect", {"--drives", "pandas"})),
                  "--drives: 'pandas' is none of panda, fr3");
   expect_refusal(run_program(of_panda("audit", joined(kCrisp, {"--drives", "ur5e"}))),
-                 "those of ur5e have 6 joints, the arm has 7");
+                 "--drives: those of ur5e have 6 joints, the arm has 7");
 }
 
 TEST(RotorsOfDesign, AreNamedWhereTheLoopBearsLess) {
@@ -75,11 +80,15 @@ TEST(RotorsOfDesign, AreNamedWhereTheLoopBearsLess) {
   ASSERT_EQ(plain["notes"].size(), 1U);
   EXPECT_THAT(plain["notes"][0].get<std::string>(),
               AllOf(HasSubstr("no reflected inertia of any joint"),
+                    HasSubstr("With the published drives panda it bears"),
                     HasSubstr("the loop would bear a ratio of 1.00"), HasSubstr("--drives panda")));
   const Json known =
       parse(run_program(of_panda("design", joined(options, {"--json", "--drives", "panda"}))));
   EXPECT_EQ(known["rotors"], "known");
-  EXPECT_EQ(known["notes"].size(), 0U);
+  EXPECT_EQ(known["notes"].size(), 1U);
+  EXPECT_THAT(known["notes"][0].get<std::string>(),
+              HasSubstr("Drives panda, public figures: round numbers"));
+  EXPECT_EQ(known["drives"]["name"], "panda");
   EXPECT_EQ(known["loop"]["level"], 1);
 }
 
@@ -106,6 +115,7 @@ TEST(PayloadOfTheCommandLine, HasCenterAndInertia) {
   const Json round = parse(audited("0.73,-0.01,0.02,0.03,0.01,0.02,0.015"));
   EXPECT_GT(std::abs(round["posture"]["fastest_pole"].get<double>() - pole), 1e-6);
   expect_refusal(audited("1,2"), "--payload: 2 numbers, expected 1 (mass), 4 (and center), 7");
+  expect_refusal(audited("0,0,0,0,1,1,1"), "--payload: center or inertia of a body without mass");
   expect_refusal(audited("1,0,0,0,1,0.1,0.1"), "--payload: ");
 }
 
