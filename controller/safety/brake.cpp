@@ -189,23 +189,31 @@ Brake::Bound Brake::torque_bound(const Motion& motion, const JointVector& last, 
   return {i, Bound::Of::kTorque, way, way * most - held_weight(motion, i), false};
 }
 
+bool Brake::clip(const Motion& motion, const JointVector& last,
+                 JointVector& excess) const noexcept {
+  bool clipped = false;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    for (const double way : {1.0, -1.0}) {
+      const double most = torque_bound(motion, last, i, way).value;
+      clipped |= way * (excess[i] - most) > kRounding;
+      excess[i] = way * std::min(way * excess[i], way * most);
+    }
+  }
+  return clipped;
+}
+
 /// Lawson and Hanson's way to a least constraint: one bound more at a time, the one that is missed
 /// by most, and out again with those that would have to be driven to theirs.
 Status Brake::constrain(const Motion& motion, const JointVector& last, bool stops,
                         JointVector& excess) noexcept {
   factor(motion);
   Status status = Status::kOk;
-  for (Eigen::Index i = 0; i < n_ && !stops; ++i) {
-    for (const double way : {1.0, -1.0}) {
-      const double most = torque_bound(motion, last, i, way).value;
-      if (way * (excess[i] - most) > kRounding) status = Status::kTorqueLimited;
-      excess[i] = way * std::min(way * excess[i], way * most);
-    }
-  }
+  if (!stops && clip(motion, last, excess)) status = Status::kTorqueLimited;
   const JointVector wanted = excess;
   JointVector free = stops ? wanted : difference(wanted, motion.robot.coriolis);
   accelerate(free);
   JointVector now = free;
+  bool solved = false;
   count_ = 0;
   for (Eigen::Index pass = 0; pass < 8 * n_; ++pass) {
     Bound worst{-1, Bound::Of::kTorque, 0, 0, false};
@@ -223,7 +231,8 @@ Status Brake::constrain(const Motion& motion, const JointVector& last, bool stop
         if (beyond > most && !holds(found)) most = beyond, worst = found;
       }
     }
-    if (worst.joint < 0) break;
+    solved = worst.joint < 0;
+    if (solved) break;
     hold(motion, worst);
     solve(wanted, free);
     excess = wanted;
@@ -234,6 +243,17 @@ Status Brake::constrain(const Motion& motion, const JointVector& last, bool stop
       add(h.column, torque ? excess : now, h.factor * h.scale);
       (torque ? now : excess)[h.bound.joint] += h.factor * h.scale;
     }
+  }
+  if (!solved) {  // many joints that are hard to tell apart: all alike, and each by itself
+    double share = 1;
+    for (Eigen::Index i = 0; i < n_; ++i) {
+      const double way = wanted[i] < 0 ? -1 : 1;
+      const double most = way * torque_bound(motion, last, i, way).value;
+      if (share * std::abs(wanted[i]) > most) share = std::max(most, 0.0) / std::abs(wanted[i]);
+    }
+    for (Eigen::Index i = 0; i < n_; ++i) excess[i] = share * wanted[i];
+    clip(motion, last, excess);
+    return Status::kTorqueLimited;
   }
   for (Eigen::Index k = 0; k < count_; ++k) {
     status =

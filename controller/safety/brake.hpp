@@ -137,6 +137,8 @@ class Brake {
                            bool stops) const noexcept;
   Bound torque_bound(const Motion& motion, const JointVector& last, Eigen::Index i,
                      double way) const noexcept;
+  /// Keeps the bounds of torque joint by joint. True if that changed anything.
+  bool clip(const Motion& motion, const JointVector& last, JointVector& excess) const noexcept;
   bool holds(const Bound& bound) const noexcept;
   /// torque <- M^-1 torque
   void accelerate(JointVector& torque) const noexcept;

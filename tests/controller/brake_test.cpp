@@ -2,6 +2,7 @@
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/safety/brake.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/chains.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 
 #include <gtest/gtest.h>
@@ -10,6 +11,8 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <string>
+#include <vector>
 
 namespace dashpot::controller {
 namespace {
@@ -20,9 +23,9 @@ using testing::near;
 class AnyArm {
  public:
   explicit AnyArm(std::mt19937_64& engine)
-      : engine_(engine),
-        model(testing::arm_model(testing::arms()[engine() % testing::arms().size()])),
-        settings(default_settings(model)) {}
+      : AnyArm(engine, testing::arm_model(testing::arms()[engine() % testing::arms().size()])) {}
+  AnyArm(std::mt19937_64& engine, const RobotModel& of)
+      : engine_(engine), model(of), settings(default_settings(model)) {}
 
   double uniform(double least, double most) {
     return std::uniform_real_distribution<double>(least, most)(engine_);
@@ -169,7 +172,10 @@ TEST_F(BrakeClaims, StopsWithTheLeastConstraintAndNeverFeeds) {
 /// From one torque to the next no more than the torque rate, also where a joint was driven.
 TEST_F(BrakeClaims, KeepsTorquesAndTheirRates) {
   for (int arm = 0; arm < 20; ++arm) {
-    AnyArm any(engine);
+    // 16 joints in a plane are hard to tell apart, and many bounds act at once.
+    AnyArm any = arm > 0
+                     ? AnyArm(engine)
+                     : AnyArm(engine, testing::chain_of(std::vector<std::string>(16, "revolute")));
     Brake brake(any.settings);
     const Limits& limits = any.settings.limits;
     for (int k = 0; k < 200; ++k) {
@@ -182,8 +188,8 @@ TEST_F(BrakeClaims, KeepsTorquesAndTheirRates) {
       for (int i = 0; i < any.model.dof(); ++i) {
         const double torque = limits.torque[i], step = 0.001 * limits.torque_rate[i];
         const double tau = std::clamp(any.robot.gravity[i], -torque, torque) + x[i];
-        EXPECT_LE(std::abs(tau), torque * (1 + 1e-6)) << i;
-        EXPECT_LE(std::abs(tau - last[i]), step + 1e-5 * torque) << i;
+        EXPECT_LE(std::abs(tau), torque * (1 + 1e-5)) << i;
+        EXPECT_LE(std::abs(tau - last[i]), step + 1e-4 * torque) << i;
       }
     }
   }
