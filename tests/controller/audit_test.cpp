@@ -209,6 +209,9 @@ TEST_F(AuditOfPanda, SummarizesByNearestRank) {
   EXPECT_NEAR(found.fastest_pole.worst, poles[0], 1e-6);
   EXPECT_NEAR(audit.numbers(found.smallest_ratio.worst_q).smallest_ratio, ratios[0], 1e-9);
   EXPECT_TRUE(std::isnan(found.gain_margin.median));
+  EXPECT_LT(found.smallest_ratio.bound, 1e-9);
+  EXPECT_GT(found.smallest_ratio.bound, 0);
+  EXPECT_TRUE(std::isnan(found.gain_margin.bound));
 }
 
 TEST_F(AuditOfPanda, SuggestsDampingThatGivesTheRatio) {

@@ -308,6 +308,7 @@ TEST_F(OneJoint, HasTheDampingThatItBears) {
       ASSERT_EQ(hold(omega, ratio), Status::kOk);
       const double whole = 2 * ratio * omega * kPeriod;
       EXPECT_NEAR(level(), std::min(1.0, 2 / (1.02 * 2.5) / whole), 1e-6);
+      EXPECT_EQ(arm->controller.snapshot().joint_damping_ratio, ratio);
       EXPECT_NEAR(arm->damping()(0, 0), level() * whole * kInertia / kPeriod,
                   1e-6 * whole * kInertia / kPeriod);
     }
