@@ -25,9 +25,7 @@ constexpr double kSlowAlready = 0.1;   // of velocity limits: no brake has to be
 constexpr double kSoftest = 8;         // times T
 constexpr double kMemory = 0.5;        // s, ten times as long as the brake needs
 constexpr double kPushed = 0.5;        // of velocity limits: somebody pushes the arm
-constexpr double kPushedLeast = 1;     // rad/s (m/s): likewise, however low the limit
-constexpr double kFarBeyond = 3;       // velocity limits: no joint that is braked gets faster there
-constexpr double kRises = 0.03;        // s, likewise
+constexpr double kPushedLeast = 1;     // rad/s (m/s): likewise, however low the limit is
 constexpr double kRounding = 1e-9;     // N m or rad/s^2, in coordinates in which the mass is 1
 constexpr double kSoft = 1e-7;         // of a bound of acceleration, beside one of torque
 constexpr double kMarginMost = 0.02;   // rad, m
@@ -107,13 +105,6 @@ void Brake::watch(const Motion& motion) noexcept {
     given_ = 0;
   }
   feeds_ |= energy > least_ + given_ + pushed;
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    const double speed = std::abs(motion.qd[i]);
-    const bool rises = speed > kFarBeyond * joint(i).velocity && speed > last_speed_[i];
-    rises_[i] = rises ? rises_[i] + period_ : 0;
-    last_speed_[i] = speed;
-    feeds_ |= rises_[i] > kRises;
-  }
 }
 
 bool Brake::soften() noexcept {
@@ -132,8 +123,6 @@ void Brake::forget() noexcept {
   most_ = given_ = 0;
   least_ = std::numeric_limits<double>::infinity();
   fell_ = false;
-  last_speed_.setZero(n_);
-  rises_.setZero(n_);
 }
 
 void Brake::factor(const Motion& motion) noexcept {

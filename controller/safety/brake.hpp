@@ -30,7 +30,6 @@ double loop_lag(const Settings& settings) noexcept;
 /// may exceed the least, since the stop began or was softened, by what the weight can have given,
 /// int |w_i qd_i| dt over about half a second, as if all of it were held wrongly, and by that of
 /// joints with half of their velocity limits (at least 1 rad/s), each by itself: somebody may push.
-/// No joint may get faster for 30 ms beyond three times its limit.
 ///
 /// `constrain` finds the torque x' in excess of the weight w next to a torque x that is wanted, in
 /// the sense of Gauss's principle of least constraint,
@@ -159,8 +158,6 @@ class Brake {
   double least_ = std::numeric_limits<double>::infinity();  ///< likewise, since it was softened
   double given_ = 0;                                        ///< by the weight, J
   bool fell_ = false;
-  JointVector last_speed_;  ///< n, rad/s
-  JointVector rises_;       ///< for how long a joint far beyond its velocity limit gets faster, s
   bool feeds_ = false;
   SmallCholesky own_mass_;
   const SmallCholesky* mass_ = nullptr;  ///< of this tick

@@ -185,22 +185,35 @@ inline std::vector<TermSkip> term_skips() {
   using controller::Settings;
   const auto nothing = [](RobotState&, Setpoint&) {};
   const auto still = [](RobotState& state, Setpoint&) { state.velocity.setZero(); };
+  // How the null space turns counts with a load, or under way, alone.
+  const auto without_posture = [](controller::Gains& gains) {
+    gains.null_stiffness.setZero();
+    gains.null_damping.setZero();
+  };
+  const auto free_posture = [=](RobotState&, Setpoint& setpoint) {
+    without_posture(setpoint.gains);
+  };
   const auto every_tick = [](const LedPair& pair) {
     return static_cast<std::uint64_t>(pair.ticks);
   };
   std::vector<TermSkip> all;
   all.push_back({{"K_G without a wrench"},
-                 [](Settings& a, Settings& b) {
+                 [=](Settings& a, Settings& b) {
                    a.task_terms.load = b.task_terms.load = controller::Load::kJointTorques;
+                   for (Settings* one : {&a, &b}) without_posture(one->initial.gains);
                  },
-                 nothing,
+                 free_posture,
                  [](RobotState& state, Setpoint&) { state.external_wrench[2] = kTiny; },
                  [](const LedPair& pair) { return pair.lean.modes().counters.no_wrench; }});
   all.push_back({{"J' C_C Jdot at rest"},
-                 [](Settings& a, Settings& b) {
+                 [=](Settings& a, Settings& b) {
                    a.task_terms.jacobian_rate = b.task_terms.jacobian_rate = true;
+                   for (Settings* one : {&a, &b}) without_posture(one->initial.gains);
                  },
-                 still,
+                 [=](RobotState& state, Setpoint& setpoint) {
+                   still(state, setpoint);
+                   free_posture(state, setpoint);
+                 },
                  [](RobotState& state, Setpoint&) { state.velocity.setConstant(kTiny); },
                  [](const LedPair& pair) { return pair.lean.modes().counters.at_rest; }});
   all.push_back({{"nothing computed standing still"},
@@ -214,17 +227,11 @@ inline std::vector<TermSkip> term_skips() {
                  [](const LedPair& pair) { return pair.lean.modes().counters.unchanged; }});
   all.push_back(
       {{"no null space: gains of zero"},
-       [](Settings& a, Settings& b) {
-         for (Settings* settings : {&a, &b}) {
-           settings->initial.gains.null_stiffness.setZero();
-           settings->initial.gains.null_damping.setZero();
-         }
+       [=](Settings& a, Settings& b) {
+         for (Settings* one : {&a, &b}) without_posture(one->initial.gains);
          b.initial.gains.null_damping.setConstant(1e-14);
        },
-       [](RobotState&, Setpoint& setpoint) {
-         setpoint.gains.null_stiffness.setZero();
-         setpoint.gains.null_damping.setZero();
-       },
+       free_posture,
        [](RobotState&, Setpoint& setpoint) { setpoint.gains.null_damping.setConstant(1e-14); },
        every_tick});
   const auto feed_forward = [&](const char* what, bool controller::FeedForward::*term,
