@@ -70,7 +70,7 @@ std::string rotors_table(const AuditTask& task, const controller::PostureAudit& 
   const controller::RobotModel& model = task.model;
   const std::string missing = controller::missing_rotors_text(model);
   const std::string drives = controller::drives_text(model, task.drives);
-  const std::string used = drives.empty() ? "" : "\n  " + drives + "\n";
+  std::string used = drives.empty() ? "" : "\n  " + drives + "\n";
   if (missing.empty()) return used;
   const bool loop = task.options.period > 0;
   std::string text = used + "\n  Rotors unknown: " + missing + ". Fast modes" +

@@ -29,7 +29,7 @@ class Guide {
   bool still(const Impedance& impedance) const noexcept;
 
  private:
-  void start_new_springs(const GainBlend& gains, const Sensed& now) noexcept;
+  void start_new_springs(const GainBlend& gains, const Sensed& sensed) noexcept;
   /// Returns the share of its speed limits at which the tip's reference takes no joint too fast.
   double tip_share(const NullSpace& null_space) const noexcept;
   /// Returns the share of its speed limits at which the joints' reference takes the tip no faster

@@ -96,7 +96,7 @@ class Judgement {
     const bool known =
         any_ && same_gains(gains, accepted_) && (q - accepted_at_).cwiseAbs().maxCoeff() < 0.1;
     if (known && !again) return {wanted_, Mode::kJoint};
-    const GainJudge::Verdict verdict = judge_.judge(q, gains);
+    GainJudge::Verdict verdict = judge_.judge(q, gains);
     if (enough(verdict)) {
       accepted_ = gains;
       accepted_at_ = q;

@@ -120,7 +120,7 @@ std::string drives_text(const RobotModel& model, const std::string& name) {
 std::string rotors_hint(const RobotModel& model, const std::string& inertia_option,
                         const std::string& drives_option, const std::string& between) {
   const UnknownRotors unknown = unknown_rotors(model);
-  const std::string hint =
+  std::string hint =
       inertia_option +
       " takes the inertia of rotor and gear at the joint (rotor times gear ratio "
       "squared):" +

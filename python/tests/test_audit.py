@@ -145,6 +145,9 @@ def test_unknown_rotors_are_said_to_be_so_with_what_would_be_enough(root, panda)
     assert (rubs.viscous_friction == drives["viscous_friction"]).all()
     found = dashpot.audit(named, HOME, **gains).posture
     assert found.rotors == "known" and found.reflected_inertia_for_margin is None
-    np.testing.assert_allclose(posture.damping_ratios_with_rotors, found.modes.damping_ratio, rtol=1e-9)
+    # Beside the modes without rotors, whose order is another.
+    np.testing.assert_allclose(
+        np.sort(posture.damping_ratios_with_rotors), np.sort(found.modes.damping_ratio), rtol=1e-9
+    )
     with pytest.raises(dashpot.Error, match="drives: 'pandas' is none of panda, fr3"):
         dashpot.Robot.from_urdf(*model, drives="pandas")
