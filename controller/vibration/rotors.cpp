@@ -120,13 +120,12 @@ std::string drives_text(const RobotModel& model, const std::string& name) {
 std::string rotors_hint(const RobotModel& model, const std::string& inertia_option,
                         const std::string& drives_option, const std::string& between) {
   const UnknownRotors unknown = unknown_rotors(model);
-  std::string hint =
-      inertia_option +
-      " takes the inertia of rotor and gear at the joint (rotor times gear ratio "
-      "squared):" +
-      between +
-      "the maker tells it, `armature` of a MuJoCo model, or dashpot "
-      "identify --calibrate reflected_inertia.";
+  std::string hint = inertia_option +
+                     " takes the inertia of rotor and gear at the joint (rotor times gear ratio "
+                     "squared):" +
+                     between +
+                     "the maker tells it, `armature` of a MuJoCo model, or dashpot "
+                     "identify --calibrate reflected_inertia.";
   if (unknown.published == nullptr) {
     std::string names;
     for (const Drives& drives : published_drives()) {

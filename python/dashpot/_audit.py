@@ -42,9 +42,8 @@ class PostureAudit(Result):
     """n, kg m^2, of the joints without, that would be enough for the margin asked for; zeros where
     none is needed. None if rotors are known, without a period, or if no inertia is enough."""
     damping_ratios_with_rotors: Array
-    """m, of the modes with published rotors of such an arm, or else with that inertia, each beside the
-    mode without rotors whose shape is likest; NaN where none is left; empty where
-    there is neither."""
+    """m, of the modes with published rotors of such an arm, or else with that inertia, each beside
+    the mode without rotors whose shape is likest; NaN where none is left. Empty where there is neither."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
