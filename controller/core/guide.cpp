@@ -105,15 +105,16 @@ bool Guide::still(const Impedance& impedance) const noexcept {
           (references_.posture.velocity().isZero(0) && references_.tip.velocity().isZero(0)));
 }
 
-double Guide::tip_share(const NullSpace& null_space) const noexcept {
+double Guide::tip_share(const NullSpace& null_space) noexcept {
   const double speed = references_.tip.speed();
-  if (speed == 0) return 1;
+  if (speed == 0) return tip_share_ = 1;
   const JointVector qd = null_space.joint_velocity(references_.tip.point_velocity());
   double share = 0;
   for (Eigen::Index i = 0; i < qd.size(); ++i) {
     share = std::max(share, std::abs(qd[i]) / settings_.limits.velocity[i]);
   }
-  return share > kShareOfJointLimit * speed ? kShareOfJointLimit * speed / share : 1;
+  const double now = share > kShareOfJointLimit * speed ? kShareOfJointLimit * speed / share : 1;
+  return tip_share_ = std::min(now, tip_share_ + settings_.period / kShareRise);
 }
 
 double Guide::joint_share(const Jacobian& J) const noexcept {

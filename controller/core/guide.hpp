@@ -30,8 +30,9 @@ class Guide {
 
  private:
   void start_new_springs(const GainBlend& gains, const Sensed& sensed) noexcept;
-  /// Returns the share of its speed limits at which the tip's reference takes no joint too fast.
-  double tip_share(const NullSpace& null_space) const noexcept;
+  /// Returns the share of its speed limits at which the tip's reference takes no joint too fast; it
+  /// rises slowly.
+  double tip_share(const NullSpace& null_space) noexcept;
   /// Returns the share of its speed limits at which the joints' reference takes the tip no faster
   /// than limit_tip_speed allows.
   double joint_share(const Jacobian& J) const noexcept;
@@ -40,8 +41,9 @@ class Guide {
   SpringReferences references_;
   ErrorClamp clamp_;
   TipSpeed tip_speed_;  ///< of the references
-  JointVector turn_;    ///< 2 pi for a continuous joint, else 0
-  JointVector goal_;    ///< of the joints, or of the posture
+  double tip_share_ = 1;
+  JointVector turn_;  ///< 2 pi for a continuous joint, else 0
+  JointVector goal_;  ///< of the joints, or of the posture
 };
 
 }  // namespace dashpot::controller

@@ -14,4 +14,8 @@ inline constexpr double kShareOfTipLimit = 0.6;
 /// is: what is left is for vibrations and the null space.
 inline constexpr double kShareOfJointLimit = 0.4;
 
+/// In so many s that share of the tip's speed rises by 1. Next to a singularity it changes several
+/// times over within a degree, so a share that followed the joints would shake the arm at 9 Hz.
+inline constexpr double kShareRise = 1;
+
 }  // namespace dashpot::controller

@@ -1,5 +1,6 @@
 // Arms under the real controller in simulation: rest stays rest, pushes are answered, and energy
 // comes from nowhere but the hold.
+#include <dashpot/controller/default_settings.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 
 #include <gtest/gtest.h>
@@ -229,6 +230,43 @@ TEST_P(ClosedLoop, BalancesItsBooksToTheIntegratorsOrder) {
   const EnergyRun fine = run(twin, q0, dq, 0.02, 8e-3, 4e-3);
   EXPECT_LT(coarse.imbalance, 1e-5 * coarse.start);
   EXPECT_LT(fine.imbalance, coarse.imbalance / 8 + 1e-10 * coarse.start);
+}
+
+/// From a stretched elbow to a pose far away. The tip's reference may be fast there one degree
+/// further on, and if it were so at once, the elbow would swing at 9 Hz with a quarter of its
+/// limit.
+TEST(ClosedLoopOfAStretchedArm, LeavesItsSingularityWithoutVibrating) {
+  const testing::Arm iiwa{"iiwa14", "iiwa_link_0", "iiwa_link_ee_kuka"};
+  const TwinModels twin(iiwa);
+  const JointVector from{{1.147, -0.790, -0.027, 0.047, -0.869, -1.257, 1.424}};
+  const JointVector to{{1.143, -0.776, -0.541, -0.868, -1.229, -0.218, 2.0}};
+  controller::Controller controller(twin.model, controller::default_settings(twin.model));
+  controller::Setpoint goal = controller.settings().initial;
+  goal.mode = controller::Mode::kCartesian;
+  goal.joint_position.resize(0);  // no posture
+  const auto there = evaluate(twin.model, to, JointVector::Zero(7));
+  goal.tip_pose = {there.p_BT_B, there.R_BT};
+  sim::Arm arm(twin.robot);
+  sim::PlantOptions options;
+  options.initial_torque = evaluate(twin.model, from, JointVector::Zero(7)).gravity;
+  sim::Plant plant(arm, options, from);
+  controller::RobotState state;
+  JointVector torque = options.initial_torque;
+  controller.reset(torque);
+  int turns = 0;
+  double last = 0;
+  for (int k = 0; k < 2000; ++k) {
+    goal.time = state.time += 1'000'000;
+    state.position = plant.measured().position;
+    state.velocity = plant.measured().velocity;
+    controller.update(state, goal, torque);
+    ASSERT_EQ(plant.step(torque), sim::Status::kOk);
+    const double share = plant.velocity()[3] / controller.settings().limits.velocity[3];
+    turns += share * last < 0 && std::abs(share) > 0.1 ? 1 : 0;
+    if (std::abs(share) > 0.1) last = share;
+  }
+  EXPECT_EQ(controller.snapshot().fault, controller::Status::kOk);
+  EXPECT_LE(turns, 2);
 }
 
 }  // namespace
