@@ -41,7 +41,10 @@ void Faults::applied(Status status, const Sensed& now, double lost,
 Faults::Aim Faults::aim() const noexcept {
   const bool means_nothing = motion_watch_.sees_frozen();  // the velocity
   if (means_nothing || fault_ == Status::kBrakeDoubted) return Aim::kFloat;
-  return fault_ == Status::kPositionLimit ? Aim::kReturn : Aim::kStop;
+  // Elsewhere positions may be wrong, or something is in the way.
+  const bool returns = fault_ == Status::kPositionLimit || fault_ == Status::kVelocityLimit ||
+                       fault_ == Status::kTipSpeedLimit;
+  return returns ? Aim::kReturn : Aim::kStop;
 }
 
 void Faults::latch(Status fault) noexcept {

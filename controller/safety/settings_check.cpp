@@ -1,12 +1,16 @@
 #include <dashpot/controller/base/settings_table.hpp>
+#include <dashpot/controller/safety/brake.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/settings_check.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 
 namespace dashpot::controller {
 namespace {
+
+constexpr double kLongStop = 0.5;  // s, ten times as long as by default
 
 std::string number(double value) {
   std::ostringstream text;
@@ -103,6 +107,13 @@ void validate(const Settings& settings, int n) {
   check_walls(limits.walls);
   if (!(settings.watchdog.longest_gap > settings.period)) {
     fail("watchdog.longest_gap", settings.watchdog.longest_gap, "s", "has to exceed the period");
+  }
+  const double stopping = Brake(settings).stopping_time();
+  if (stopping > std::max(kLongStop, 1.01 * limits.stopping_time)) {
+    fail("limits.stopping_time", limits.stopping_time, "s",
+         "but a loop whose torque is " + number(loop_lag(settings)) +
+             " s late (analysis.sampled) needs " + number(stopping) +
+             " s: ask for that, or for less delay and a higher cutoff");
   }
   check_initial(settings.initial, n);
 }

@@ -96,6 +96,21 @@ TEST_F(Safety, OutsideAPositionLimitReturnsSlowlyAndWaitsForItsRelease) {
   EXPECT_EQ(snapshot().fault, Status::kOk);
 }
 
+/// A joint that is too fast first, and then outside its limit, comes back as well.
+TEST_F(Safety, OutsideAPositionLimitReturnsWhateverLatchedFirst) {
+  JointVector q = testing::panda_ready();
+  const double lower = settings.limits.position_lower[3];
+  q[3] = lower + 0.01;
+  arm = std::make_unique<SimulatedArm>(model, settings, q);
+  arm->state.velocity[3] = -1.1 * settings.limits.velocity[3];
+  EXPECT_EQ(arm->step(), Status::kVelocityLimit);
+  for (int k = 0; k < 500; ++k) arm->step();
+  EXPECT_LT(arm->state.position[3], lower);
+  for (int k = 0; k < 4000; ++k) arm->step();
+  EXPECT_EQ(snapshot().fault, Status::kVelocityLimit);
+  EXPECT_GT(arm->state.position[3], lower);
+}
+
 // Thrown about by somebody: too fast is no broken sensor, and an arm that falls is damped.
 TEST_F(Safety, AFastRobotIsDampedHoweverFast) {
   settings.limits.tip_velocity = 100;
