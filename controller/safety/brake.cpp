@@ -25,10 +25,12 @@ constexpr double kSlowAlready = 0.1;   // of velocity limits: no brake has to be
 constexpr double kSoftest = 8;         // times T
 constexpr double kMemory = 0.5;        // s, ten times as long as the brake needs
 constexpr double kPushed = 0.5;        // of velocity limits: somebody pushes the arm
-constexpr double kPushedLeast = 1;     // rad/s (m/s): likewise, however low the limit is
+constexpr double kPushedLeast = 1;     // rad/s, or m/s: as fast as a hand pushes, be the limit low
 constexpr double kRounding = 1e-9;     // N m or rad/s^2, in coordinates in which the mass is 1
 constexpr double kSoft = 1e-7;         // of a bound of acceleration, beside one of torque
 constexpr double kMarginMost = 0.02;   // rad, m
+constexpr double kNearby = 0.02;       // rad (m), or of the inertia: M^-1 is about the same
+constexpr double kAbout = 1.5;         // times an acceleration that is known about
 
 /// The velocity with which a joint may move toward a limit at a distance.
 double before(double distance, double braking, double reaction) noexcept {
@@ -54,6 +56,7 @@ Brake::Brake(const Settings& settings) noexcept : n_(settings.limits.torque.size
   stopping_time_ = std::max(limits.stopping_time, least);
   period_ = settings.period;
   near_ = std::max(kNear * limits.stopping_time, kNearMargin / kMargin * least);
+  known_.q = JointVector::Constant(n_, std::numeric_limits<double>::infinity());
   for (Eigen::Index i = 0; i < n_; ++i) {
     Bounds& bounds = joints_[static_cast<std::size_t>(i)];
     const double lower = limits.position_lower[i], upper = limits.position_upper[i];
@@ -154,6 +157,43 @@ bool Brake::at_ease(const Motion& motion, Eigen::Index i, double acceleration) c
          v * v * M <= 2 * braking_torque(motion, i) * (left - v * bounds.reaction);
 }
 
+bool Brake::known_nearby(const Motion& motion) const noexcept {
+  double moved = std::abs(motion.robot.M.trace() / known_.inertia - 1);
+  for (Eigen::Index i = 0; i < n_; ++i)
+    moved = std::max(moved, std::abs(motion.q[i] - known_.q[i]));
+  return moved <= kNearby;
+}
+
+bool Brake::all_at_ease(const Motion& motion, const JointVector& torque) const noexcept {
+  double change = 0;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    change += known_.response[i] * std::abs(torque[i] - known_.torque[i]);
+  }
+  bool ease = true;
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const double most = std::abs(known_.acceleration[i]) + known_.response[i] * change;
+    ease &= at_ease(motion, i, kAbout * most);
+  }
+  return ease;
+}
+
+void Brake::respond(const Motion& motion) noexcept {
+  known_.q = motion.q;
+  known_.inertia = motion.robot.M.trace();
+  known_.response.resize(n_);
+  JointVector y(n_);  // a column of L^-1
+  for (int i = 0; i < n_; ++i) {
+    double sum = 0;
+    for (int k = i; k < n_; ++k) {
+      double left = k == i ? 1 : 0;
+      for (int j = i; j < k; ++j) left -= mass_->L(k, j) * y[j];
+      y[k] = left * mass_->per_diagonal(k);
+      sum += y[k] * y[k];
+    }
+    known_.response[i] = std::sqrt(sum);
+  }
+}
+
 Brake::Bound Brake::acceleration_bound(const Motion& motion, Eigen::Index i, double way,
                                        bool stops) const noexcept {
   const Bounds& bounds = joint(i);
@@ -182,11 +222,12 @@ bool Brake::clip(const Motion& motion, const JointVector& last,
                  JointVector& excess) const noexcept {
   bool clipped = false;
   for (Eigen::Index i = 0; i < n_; ++i) {
-    for (const double way : {1.0, -1.0}) {
-      const double most = torque_bound(motion, last, i, way).value;
-      clipped |= way * (excess[i] - most) > kRounding;
-      excess[i] = way * std::min(way * excess[i], way * most);
-    }
+    const Bounds& bounds = joint(i);
+    const double weight = held_weight(motion, i);
+    const double most = std::min(bounds.torque, last[i] + bounds.torque_step) - weight;
+    const double least = std::max(-bounds.torque, last[i] - bounds.torque_step) - weight;
+    clipped |= excess[i] > most + kRounding || excess[i] < least - kRounding;
+    excess[i] = std::max(least, std::min(excess[i], most));
   }
   return clipped;
 }
@@ -195,12 +236,17 @@ bool Brake::clip(const Motion& motion, const JointVector& last,
 /// by most, and out again with those that would have to be driven to theirs.
 Status Brake::constrain(const Motion& motion, const JointVector& last, bool stops,
                         JointVector& excess) noexcept {
-  factor(motion);
   Status status = Status::kOk;
   if (!stops && clip(motion, last, excess)) status = Status::kTorqueLimited;
-  const JointVector wanted = excess;
-  JointVector free = stops ? wanted : difference(wanted, motion.robot.coriolis);
+  JointVector free = stops ? excess : difference(excess, motion.robot.coriolis);
+  const bool nearby = known_nearby(motion);
+  if (!stops && nearby && all_at_ease(motion, free)) return status;
+  factor(motion);
+  if (!nearby) respond(motion);
+  known_.torque = free;
   accelerate(free);
+  known_.acceleration = free;
+  const JointVector wanted = excess;
   JointVector now = free;
   bool solved = false;
   count_ = 0;

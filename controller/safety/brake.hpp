@@ -130,6 +130,18 @@ class Brake {
   /// Returns what the torque limit leaves of the weight, N m.
   double held_weight(const Motion& motion, Eigen::Index i) const noexcept;
   double braking_torque(const Motion& motion, Eigen::Index i) const noexcept;
+  /// What is known of an earlier tick. |M^-1 (torque' - torque)|_i is at most r_i sum r_j
+  /// |torque'_j
+  /// - torque_j| with r_i^2 = (M^-1)_ii, so no M has to be factored as long as that is far from all
+  /// bounds, and the posture and what is carried are about the same.
+  struct Known {
+    JointVector q, response;           ///< where M was factored; r
+    double inertia = 0;                ///< trace of M there
+    JointVector torque, acceleration;  ///< in excess of the weight and M qdd
+  };
+  bool known_nearby(const Motion& motion) const noexcept;
+  bool all_at_ease(const Motion& motion, const JointVector& torque) const noexcept;
+  void respond(const Motion& motion) noexcept;
   /// True if an acceleration is far from the bounds of both directions, which is soon told.
   bool at_ease(const Motion& motion, Eigen::Index i, double acceleration) const noexcept;
   Bound acceleration_bound(const Motion& motion, Eigen::Index i, double way,
@@ -159,6 +171,7 @@ class Brake {
   double given_ = 0;                                        ///< by the weight, J
   bool fell_ = false;
   bool feeds_ = false;
+  Known known_;
   SmallCholesky own_mass_;
   const SmallCholesky* mass_ = nullptr;  ///< of this tick
   Eigen::LLT<BoundMatrix> constrained_{2 * kMaxJoints};

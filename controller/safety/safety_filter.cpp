@@ -86,7 +86,7 @@ Status SafetyFilter::apply(const Brake::Motion& motion, double tip_speed, Aim ai
     limited |= share_out(base, dampers, excess);
   }
   if (fading_) limited |= fade(motion.qd, springs, base, excess);
-  add(brake, excess);
+  if (!springs) add(brake, excess);
   if (aim != Aim::kFloat) status = worse(status, brake_.constrain(motion, last_, !springs, excess));
   for (Eigen::Index i = 0; i < n_; ++i) tau[i] = weight[i] + excess[i];
   if (!finite(tau)) {

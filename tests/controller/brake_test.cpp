@@ -1,6 +1,8 @@
 // The brake, on random arms and states: each claim of brake.hpp.
+#include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/default_settings.hpp>
 #include <dashpot/controller/safety/brake.hpp>
+#include <dashpot/controller/settings_check.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/chains.hpp>
 #include <dashpot/tests/support/matrices.hpp>
@@ -95,6 +97,18 @@ TEST(BrakeLag, LeavesTheSampledLoopItsMargin) {
       EXPECT_GT(borne * T / period, 9.9) << period << ' ' << delay;
     }
   }
+}
+
+/// A stop that takes long because the loop is late has to be asked for.
+TEST(BrakeLag, HasToBeToldWhereItIsLong) {
+  const RobotModel model = testing::chain_of({"revolute", "revolute"});
+  Settings settings = default_settings(model);
+  settings.analysis.sampled.cutoff = 5;
+  EXPECT_NO_THROW(validate(settings, 2));
+  settings.analysis.sampled.cutoff = 1;
+  EXPECT_THROW(validate(settings, 2), InvalidSettings);
+  settings.limits.stopping_time = 1.6;
+  EXPECT_NO_THROW(validate(settings, 2));
 }
 
 /// (x' - x)' M^-1 (x' - x) -> min with |w + x'| <= torque and way M^-1 x' <= most, by Hildreth's
@@ -263,6 +277,41 @@ TEST_F(BrakeClaims, StopsBeforePositionLimits) {
   }
   EXPECT_GT(arrived, 4);
   EXPECT_LE(beyond, 1);
+}
+
+/// What the brake remembers of earlier ticks spares it work and changes nothing: one that sees an
+/// arm for the first time gives the same torque, also where what the arm carries is dropped.
+TEST_F(BrakeClaims, RemembersNothingThatMatters) {
+  int held = 0, ticks = 0;
+  for (int arm = 0; arm < 12; ++arm) {
+    AnyArm any(engine);
+    any.settings.limits.torque_rate *= 10;  // so that torques change much from tick to tick
+    any.settings.limits.position_lower.setConstant(-1e6);
+    any.settings.limits.position_upper.setConstant(1e6);
+    any.draw(0.5, 0);
+    const RobotModel loaded = any.model.with({{3, {0, 0.02, 0.1}}, {}});
+    Brake brake(any.settings);
+    const Limits& limits = any.settings.limits;
+    JointVector last = any.robot.gravity, push = 0 * last;
+    for (int k = 0; k < 1500; ++k) {
+      any.robot = evaluate(k < 700 ? loaded : any.model, any.q, any.qd);
+      for (int i = 0; i < any.model.dof(); ++i) {
+        const double size = 0.2 * limits.torque[i] * std::pow(0.1, (k / 100) % 3);
+        push[i] += 0.02 * (size * any.uniform(-1, 1) - push[i]) + (k % 150 == 0 ? size : 0);
+      }
+      JointVector x = push - any.robot.M * any.qd / 0.2, fresh = x;
+      const Status status = brake.constrain(any.motion(), last, false, x);
+      ASSERT_EQ(Brake(any.settings).constrain(any.motion(), last, false, fresh), status) << k;
+      ASSERT_TRUE(near(x, fresh, 1e-9 * (1 + x.norm()))) << "tick " << k << '\n' << x - fresh;
+      held += status == Status::kOk ? 0 : 1;
+      ++ticks;
+      last = any.robot.gravity.cwiseMax(-limits.torque).cwiseMin(limits.torque) + x;
+      any.qd += any.settings.period * any.acceleration(x);
+      any.q += any.settings.period * any.qd;
+    }
+  }
+  EXPECT_GT(held, ticks / 100);
+  EXPECT_LT(held, 99 * ticks / 100);
 }
 
 /// A brake that feeds the arm is doubted before the arm is much faster than it may be pushed; one
