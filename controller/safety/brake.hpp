@@ -130,10 +130,9 @@ class Brake {
   /// Returns what the torque limit leaves of the weight, N m.
   double held_weight(const Motion& motion, Eigen::Index i) const noexcept;
   double braking_torque(const Motion& motion, Eigen::Index i) const noexcept;
-  /// What is known of an earlier tick. |M^-1 (torque' - torque)|_i is at most r_i sum r_j
-  /// |torque'_j
-  /// - torque_j| with r_i^2 = (M^-1)_ii, so no M has to be factored as long as that is far from all
-  /// bounds, and the posture and what is carried are about the same.
+  /// What is known of an earlier tick. A change d of the torque changes (M^-1 torque)_i by at most
+  /// r_i sum r_j |d_j| with r_i^2 = (M^-1)_ii. As long as that stays far from all bounds, and the
+  /// posture and what is carried are about the same, no M has to be factored.
   struct Known {
     JointVector q, response;           ///< where M was factored; r
     double inertia = 0;                ///< trace of M there
