@@ -133,7 +133,8 @@ void run_audit(const AuditCommand& command) try {
   report.posture.rotors = audit.missing_rotors(report.posture);
   suggest(audit, task, report);
   const std::int64_t listed = static_cast<std::int64_t>(task.postures.size());
-  const Postures postures{task, audit, command.seed, listed > 0 ? listed : command.samples};
+  const Postures postures{task, audit, command.postures.seed,
+                          listed > 0 ? listed : command.postures.samples};
   if (postures.count > 0) {
     const std::vector<PostureNumbers> numbers = Workers(postures).run(command.jobs);
     report.interrupted = static_cast<std::int64_t>(numbers.size()) < postures.count;
@@ -167,8 +168,8 @@ void add_audit(CLI::App& program) {
     check_outputs({{"--csv", options->csv}, {"--plot", options->plot}},
                   {{"--urdf", options->arm.urdf},
                    {"--gains", options->gains},
-                   {"--postures", options->postures},
-                   {"--log", options->log}});
+                   {"--postures", options->postures.file},
+                   {"--log", options->postures.log}});
     run_audit(*options);
   });
 }

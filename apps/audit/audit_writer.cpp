@@ -26,14 +26,6 @@ Json to_json(const controller::Distribution& found) {
           {"bound", found.bound}};
 }
 
-std::string joined(const Eigen::VectorXd& values, int digits) {
-  std::string text;
-  for (const double value : values) {
-    text += (text.empty() ? "" : ", ") + format_number(value, digits);
-  }
-  return text;
-}
-
 std::string margin_text(double margin) {
   return std::isinf(margin) ? "above 1e6" : format_number(margin, 4);
 }
@@ -71,6 +63,7 @@ std::string rotors_table(const AuditTask& task, const controller::PostureAudit& 
   const std::string missing = controller::missing_rotors_text(model);
   const std::string drives = controller::drives_text(model, task.drives);
   std::string used = drives.empty() ? "" : "\n  " + drives + "\n";
+  if (!task.friction.empty()) used += "\n  " + task.friction + "\n";
   if (missing.empty()) return used;
   const bool loop = task.options.period > 0;
   std::string text = used + "\n  Rotors unknown: " + missing + ". Fast modes" +
@@ -109,7 +102,7 @@ std::string margin_verdict(const AuditTask& task, double margin) {
 
 std::string posture_table(const AuditTask& task, const controller::PostureAudit& posture) {
   const controller::PostureNumbers& numbers = posture.numbers;
-  std::string text = "At q = " + joined(posture.q, 5) + "\n" + modes_table(task, posture) +
+  std::string text = "At q = " + format_list(posture.q, 5) + "\n" + modes_table(task, posture) +
                      "\n  Smallest ratio " + format_number(numbers.smallest_ratio, 6);
   if (!std::isnan(task.intended_ratio)) {
     text += " where " + format_number(task.intended_ratio, 3) + " was meant";
@@ -139,7 +132,7 @@ std::string workspace_table(const AuditTask& task, const AuditReport& report) {
       return std::isinf(value) ? std::string("above 1e6") : format_number(value, 4);
     };
     table.add_row({name, text(row.median), text(row.p05), text(row.p95), text(row.worst),
-                   joined(row.worst_q, 3)});
+                   format_list(row.worst_q, 3)});
   };
   add("smallest ratio", found.smallest_ratio);
   add("fastest pole, 1/s", found.fastest_pole);
@@ -175,7 +168,7 @@ std::string suggestion_table(const AuditTask& task, const AuditReport& report) {
     for (const auto& column : columns) row.push_back(column[i]);
     table.add_row(row);
   }
-  return text + table.text() + "\n  Nearest diagonal: " + joined(found.diagonal, 4) +
+  return text + table.text() + "\n  Nearest diagonal: " + format_list(found.diagonal, 4) +
          "; smallest ratio with it " + format_number(found.diagonal_smallest_ratio, 4) + "\n";
 }
 
@@ -226,7 +219,9 @@ std::string audit_json(const AuditTask& task, const AuditReport& report) {
                    {"gain_margin", numbers.gain_margin},
                    {"integral_decays", report.posture.integral_decays},
                    {"zero_modes", numbers.zero_modes},
-                   {"singular", numbers.singular}}}};
+                   {"singular", numbers.singular},
+                   {"viscous_friction",
+                    json_list(task.model.joint_values(&controller::Joint::viscous_friction))}}}};
   rotors_json(task, report.posture, result["posture"]);
   if (report.workspace) {
     result["workspace"] = {{"samples", report.workspace->samples},
