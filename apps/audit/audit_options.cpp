@@ -78,6 +78,15 @@ Matrix factor_damping(const std::string& option, double factor, const Matrix& K)
   return factor * K.cwiseSqrt();
 }
 
+/// A diagonal of the task's gains. Throws InputError for an entry that is negative: such a damper
+/// feeds energy in, and such a spring pushes away.
+Eigen::VectorXd gain_diagonal(const std::string& option, const std::string& text,
+                              const controller::Units& units) {
+  const Eigen::VectorXd values = parse_quantities(option, text, units);
+  if (values.minCoeff() < 0) throw InputError(option, "a number is negative");
+  return values;
+}
+
 void read_options_gains(const AuditCommand& command, const RobotModel& model, AuditOptions& audit) {
   controller::Gains& gains = audit.gains;
   const auto joints = [&](const char* option, const std::string& text, const char* revolute,
@@ -85,11 +94,10 @@ void read_options_gains(const AuditCommand& command, const RobotModel& model, Au
     return quantities_per_joint(option, text, controller::joint_units(model, revolute, prismatic));
   };
   if (!command.stiffness.empty()) {
-    gains.task_stiffness =
-        parse_quantities("--stiffness", command.stiffness, kStiffness).asDiagonal();
+    gains.task_stiffness = gain_diagonal("--stiffness", command.stiffness, kStiffness).asDiagonal();
   }
   if (!command.damping.empty()) {
-    gains.task_damping = parse_quantities("--damping", command.damping, kDamping).asDiagonal();
+    gains.task_damping = gain_diagonal("--damping", command.damping, kDamping).asDiagonal();
   }
   if (!command.joint_stiffness.empty()) {
     audit.mode = Mode::kJoint;

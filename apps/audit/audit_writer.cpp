@@ -100,7 +100,8 @@ std::string margin_verdict(const AuditTask& task, double margin) {
              : "the sampled loop is unstable.\n";
 }
 
-std::string posture_table(const AuditTask& task, const controller::PostureAudit& posture) {
+std::string posture_table(const AuditTask& task, const AuditReport& report) {
+  const controller::PostureAudit& posture = report.posture;
   const controller::PostureNumbers& numbers = posture.numbers;
   std::string text = "At q = " + format_list(posture.q, 5) + "\n" + modes_table(task, posture) +
                      "\n  Smallest ratio " + format_number(numbers.smallest_ratio, 6);
@@ -114,8 +115,16 @@ std::string posture_table(const AuditTask& task, const controller::PostureAudit&
             " s: " + margin_verdict(task, numbers.gain_margin);
   }
   text += integral_text(posture.integral_decays);
-  text += "  Zero modes: " + std::to_string(numbers.zero_modes) + ".";
-  if (numbers.singular) text += " The posture is singular: a direction of the task has no spring.";
+  const Eigen::Index zero = posture.spectrum.zero_modes.count;
+  text += "  Zero modes: " + std::to_string(zero) + ".";
+  if (numbers.zero_modes > zero) {
+    text += " Soft modes, which hardly any spring resists: " +
+            std::to_string(numbers.zero_modes - zero) + ".";
+  }
+  if (!report.lost_directions.empty()) {
+    text += "\n  The posture is singular, or next to it: no spring acts in direction " +
+            report.lost_directions + ".";
+  }
   return text + "\n" + rotors_table(task, posture);
 }
 
@@ -220,6 +229,7 @@ std::string audit_json(const AuditTask& task, const AuditReport& report) {
                    {"integral_decays", report.posture.integral_decays},
                    {"zero_modes", numbers.zero_modes},
                    {"singular", numbers.singular},
+                   {"lost_directions", report.lost_directions},
                    {"viscous_friction",
                     json_list(task.model.joint_values(&controller::Joint::viscous_friction))}}}};
   rotors_json(task, report.posture, result["posture"]);
@@ -249,7 +259,7 @@ std::string audit_table(const AuditTask& task, const AuditReport& report) {
   std::string text = text::printable(model.name()) + ": " + std::to_string(model.dof()) +
                      (model.dof() == 1 ? " joint" : " joints") + " from " +
                      text::printable(model.base()) + " to " + text::printable(model.tip()) + "\n\n";
-  text += posture_table(task, report.posture);
+  text += posture_table(task, report);
   if (report.workspace) text += workspace_table(task, report);
   return text + suggestion_table(task, report);
 }

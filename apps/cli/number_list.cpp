@@ -39,14 +39,14 @@ Eigen::VectorXd parse_quantities(const std::string& option, const std::string& t
     throw InputError(option, std::to_string(words.size()) + " numbers, expected " +
                                  std::to_string(units.size()));
   }
+  Eigen::VectorXd values(static_cast<Eigen::Index>(units.size()));
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    values[static_cast<Eigen::Index>(i)] = parse(option, words[i], units[i]);
+  }
   try {
     controller::refuse_mixed_angles(words, units);
   } catch (const std::invalid_argument& error) {
     throw InputError(option, error.what());
-  }
-  Eigen::VectorXd values(static_cast<Eigen::Index>(units.size()));
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    values[static_cast<Eigen::Index>(i)] = parse(option, words[i], units[i]);
   }
   return values;
 }

@@ -241,6 +241,7 @@ void run(const Options& options) {
                              " s: " + sim::to_text(report.loop.simulation) +
                              " (see simulation.integrator in the scene)");
   }
+  refuse_latched_fault(report.loop);
 }
 
 }  // namespace

@@ -86,6 +86,50 @@ TEST(RegionOfAnArm, SaysWhatBindsWhereTheAnswerMissesWhatWasAsked) {
   EXPECT_THAT(too_much.err, HasSubstr("damps more than --largest-ratio allows"));
 }
 
+TEST(SingularPosture, NamesTheDirectionsAndSuggestsNothing) {
+  // A UR5 with its elbow stretched: the wrist cannot come nearer to the base.
+  const auto& arm = dashpot::testing::arms()[2];
+  const auto at = [&](const std::string& elbow, const Words& more) {
+    return run_program(joined({"audit", "--urdf", dashpot::testing::arm_path(arm.file), "--base",
+                               arm.base, "--tip", arm.tip, "--q", "0,-1," + elbow + ",0,1,0"},
+                              joined(kGains, more)));
+  };
+  const Json stretched = parse(at("0.001", {"--json"}));
+  EXPECT_EQ(stretched["posture"]["singular"], true);
+  EXPECT_THAT(stretched["posture"]["lost_directions"].get<std::string>(), HasSubstr("z"));
+  EXPECT_TRUE(stretched["suggestion"].is_null());
+  const std::string text = at("0.001", {}).out;
+  EXPECT_THAT(text, HasSubstr("Zero modes: 0. Soft modes, which hardly any spring resists: 1."));
+  EXPECT_THAT(text, HasSubstr("no spring acts in direction z + "));
+  const Json bent = parse(at("1", {"--json"}));
+  EXPECT_EQ(bent["posture"]["lost_directions"], "");
+  EXPECT_FALSE(bent["suggestion"].is_null());
+}
+
+TEST(MistypedWords, AreNamedWithWhatMayBeMeant) {
+  expect_refusal(run_program({"analyse", "x"}),
+                 "'analyse' is no subcommand; did you mean analyze?");
+  expect_refusal(run_program({"xyz"}), "'xyz' is no subcommand; there are analyze, inspect, ");
+  expect_refusal(ask_panda("audit", kGains, {"--q", "0,-45 degrees,0,-2,0,2,0"}),
+                 "unknown unit 'degrees'; write deg");
+  const Scratch scratch;
+  expect_refusal(run_program({"analyze", scratch.write("tab.yaml", "mass:\n\t- 1\n")}),
+                 "a tab indents the line; YAML takes spaces (line 2)");
+  expect_refusal(ask_panda("audit", {"--stiffness", "1,1,1,1,1,1", "--damping", "1,1,-1,1,1,1"}),
+                 "--damping: a number is negative");
+}
+
+TEST(LogOfOthers, IsNamedAsOne) {
+  const Scratch scratch;
+  const std::string event(
+      "\xed\xa1\xda\x01\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\4\0\0\0\4POSEabcd", 36);
+  const std::string log = scratch.write("other.log", event);
+  expect_refusal(run_program({"monitor", "--log", log}),
+                 "has no messages of Dashpot; its channels are POSE");
+  expect_refusal(run_program({"export", log, "--csv", scratch.path("modes.csv")}),
+                 "has no messages of Dashpot; its channels are POSE");
+}
+
 TEST(Friction, OfTheDescriptionIsNamedWhereItIsLeftOut) {
   EXPECT_THAT(ask_panda("audit", kGains).out,
               HasSubstr("Viscous friction in the joints, 0.003 N m s/rad, as the URDF has it, is "
