@@ -3,6 +3,8 @@
 #include <dashpot/text/printable.hpp>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -19,6 +21,24 @@ constexpr int kBadInput = 2;
 int report(const std::string& message, int status) {
   print_error(message);
   return status;
+}
+
+/// Says which subcommand `word` may mean, the one with the longest common beginning, or names all
+/// of them; empty if it is one.
+std::string nearest_subcommand(const CLI::App& program, const std::string& word) {
+  std::string nearest, all;
+  std::size_t longest = 1;  // a single letter says nothing
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
+    const std::string name = command->get_name();
+    if (name == word) return "";
+    all += (all.empty() ? "" : ", ") + name;
+    const auto end = std::mismatch(name.begin(), name.end(), word.begin(), word.end()).first;
+    const auto common = static_cast<std::size_t>(end - name.begin());
+    if (common <= longest) continue;
+    longest = common;
+    nearest = name;
+  }
+  return nearest.empty() ? "there are " + all : "did you mean " + nearest + "?";
 }
 
 int run(int argc, char** argv) {
@@ -38,6 +58,14 @@ int run(int argc, char** argv) {
   add_drive(program);
   add_fake_driver(program);
 
+  if (argc > 1 && argv[1][0] != '-') {
+    const std::string meant = nearest_subcommand(program, argv[1]);
+    if (!meant.empty()) {
+      return report("dashpot: '" + std::string(argv[1]) + "' is no subcommand; " + meant +
+                        " (dashpot --help)",
+                    kBadInput);
+    }
+  }
   const auto name = [&program] {
     const auto chosen = program.get_subcommands();
     return "dashpot" + (chosen.empty() ? "" : " " + chosen.front()->get_name());

@@ -49,6 +49,10 @@ std::string arm_without_rotors(const RobotModel& model);
 /// does. Empty if there is no name.
 std::string drives_text(const RobotModel& model, const std::string& name);
 
+/// Returns in a sentence the viscous friction of the joints, which counts as damping beside the
+/// gains; empty if there is none.
+std::string friction_text(const RobotModel& model);
+
 /// Returns in two sentences where reflected inertia is found, and the public figures of an arm of
 /// this kind, or of all with as many joints. The options are those that the caller takes:
 /// "--reflected-inertia", "--drives".

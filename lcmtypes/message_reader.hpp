@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -59,10 +60,16 @@ class LogReader {
   /// Returns what was found wrong with the log so far; "" if nothing. See
   /// describe(LogFile::Damage).
   std::string damage() const { return describe(file_.damage()); }
+  /// Returns why nobody finds anything in the log if no event handed on was on a channel of
+  /// Dashpot's: "has no messages of Dashpot; its channels are ..."; "" if one was, or none was
+  /// read.
+  std::string foreign() const;
 
  private:
   LogFile file_;
   MessageHandlers& handlers_;
+  bool ours_ = false;
+  std::set<std::string> others_;  ///< channels of others, the first ones
 };
 
 }  // namespace dashpot::lcmtypes

@@ -3,11 +3,16 @@
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/controller/dynamics.hpp>
 
 #include <CLI/CLI.hpp>
+#include <Eigen/SVD>
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -115,7 +120,41 @@ void write_csv(OutputFile file, const std::string& path, const Postures& posture
   }
 }
 
+/// The directions of the task in which the arm hardly moves at q, each as its largest parts: "z",
+/// "y + 0.40 rx".
+std::string lost_directions(const controller::RobotModel& model, const JointVector& q) {
+  constexpr std::array<const char*, 6> kNames = {"x", "y", "z", "rx", "ry", "rz"};
+  const controller::DynamicsResult robot =
+      controller::evaluate(model, q, JointVector::Zero(model.dof()));
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(Eigen::MatrixXd(robot.J), Eigen::ComputeFullU);
+  std::string text;
+  for (Eigen::Index k = 0; k < svd.singularValues().size(); ++k) {
+    if (svd.singularValues()[k] > 0.02 * svd.singularValues()[0]) continue;
+    Eigen::VectorXd u = svd.matrixU().col(k);
+    Eigen::Index largest = 0;
+    u.cwiseAbs().maxCoeff(&largest);
+    u /= u[largest];
+    text += (text.empty() ? "" : ", ") + std::string(kNames[static_cast<std::size_t>(largest)]);
+    for (Eigen::Index i = 0; i < 6; ++i) {
+      if (i == largest || std::abs(u[i]) < 0.05) continue;
+      text += (u[i] < 0 ? " - " : " + ") + format_number(std::abs(u[i]), 2) + " " +
+              kNames[static_cast<std::size_t>(i)];
+    }
+  }
+  return text;
+}
+
 void suggest(const Audit& audit, const AuditTask& task, AuditReport& report) {
+  if (report.posture.numbers.singular) {
+    const std::string directions = task.options.mode == controller::Mode::kCartesian
+                                       ? lost_directions(task.model, task.q)
+                                       : "";
+    report.lost_directions = directions.empty() ? "some" : directions;
+    report.no_suggestion =
+        "where the posture is singular, the damping for it fits no posture beside it; take another "
+        "--q, or many (dashpot design --region)";
+    return;
+  }
   try {
     report.suggestion = audit.suggest(task.q, task.wanted_ratio);
   } catch (const std::exception& error) {  // such as a stiffness of zero
@@ -133,7 +172,8 @@ void run_audit(const AuditCommand& command) try {
   report.posture.rotors = audit.missing_rotors(report.posture);
   suggest(audit, task, report);
   const std::int64_t listed = static_cast<std::int64_t>(task.postures.size());
-  const Postures postures{task, audit, command.seed, listed > 0 ? listed : command.samples};
+  const Postures postures{task, audit, command.postures.seed,
+                          listed > 0 ? listed : command.postures.samples};
   if (postures.count > 0) {
     const std::vector<PostureNumbers> numbers = Workers(postures).run(command.jobs);
     report.interrupted = static_cast<std::int64_t>(numbers.size()) < postures.count;
@@ -167,8 +207,8 @@ void add_audit(CLI::App& program) {
     check_outputs({{"--csv", options->csv}, {"--plot", options->plot}},
                   {{"--urdf", options->arm.urdf},
                    {"--gains", options->gains},
-                   {"--postures", options->postures},
-                   {"--log", options->log}});
+                   {"--postures", options->postures.file},
+                   {"--log", options->postures.log}});
     run_audit(*options);
   });
 }

@@ -1,5 +1,4 @@
 #include <dashpot/apps/audit/audit_options.hpp>
-#include <dashpot/apps/audit/posture_files.hpp>
 #include <dashpot/apps/audit/presets.hpp>
 #include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
@@ -79,6 +78,15 @@ Matrix factor_damping(const std::string& option, double factor, const Matrix& K)
   return factor * K.cwiseSqrt();
 }
 
+/// A diagonal of the task's gains. Throws InputError for an entry that is negative: such a damper
+/// feeds energy in, and such a spring pushes away.
+Eigen::VectorXd gain_diagonal(const std::string& option, const std::string& text,
+                              const controller::Units& units) {
+  const Eigen::VectorXd values = parse_quantities(option, text, units);
+  if (values.minCoeff() < 0) throw InputError(option, "a number is negative");
+  return values;
+}
+
 void read_options_gains(const AuditCommand& command, const RobotModel& model, AuditOptions& audit) {
   controller::Gains& gains = audit.gains;
   const auto joints = [&](const char* option, const std::string& text, const char* revolute,
@@ -86,11 +94,10 @@ void read_options_gains(const AuditCommand& command, const RobotModel& model, Au
     return quantities_per_joint(option, text, controller::joint_units(model, revolute, prismatic));
   };
   if (!command.stiffness.empty()) {
-    gains.task_stiffness =
-        parse_quantities("--stiffness", command.stiffness, kStiffness).asDiagonal();
+    gains.task_stiffness = gain_diagonal("--stiffness", command.stiffness, kStiffness).asDiagonal();
   }
   if (!command.damping.empty()) {
-    gains.task_damping = parse_quantities("--damping", command.damping, kDamping).asDiagonal();
+    gains.task_damping = gain_diagonal("--damping", command.damping, kDamping).asDiagonal();
   }
   if (!command.joint_stiffness.empty()) {
     audit.mode = Mode::kJoint;
@@ -131,28 +138,6 @@ void read_gains(const AuditCommand& command, const RobotModel& model, AuditOptio
   gains.joint_damping = factor_damping("--damping-factor", *factor, gains.joint_stiffness);
 }
 
-/// The middle of the limits; zero where there are none.
-JointVector middle(const RobotModel& model) {
-  JointVector q(model.dof());
-  for (int i = 0; i < model.dof(); ++i) {
-    const controller::Joint& joint = model.joints()[static_cast<std::size_t>(i)];
-    const double sum = joint.lower + joint.upper;
-    q[i] = std::isfinite(sum) ? 0.5 * sum : 0;
-  }
-  return q;
-}
-
-void read_range(const AuditCommand& command, AuditTask& task) {
-  if (!command.spread) return;
-  const JointVector lower = task.model.joint_values(&controller::Joint::lower);
-  const JointVector upper = task.model.joint_values(&controller::Joint::upper);
-  task.options.lower = lower.cwiseMax((task.q.array() - *command.spread).matrix());
-  task.options.upper = upper.cwiseMin((task.q.array() + *command.spread).matrix());
-  if ((task.options.lower.array() > task.options.upper.array()).any()) {
-    throw InputError("--q", "is outside the position limits by more than --spread");
-  }
-}
-
 void check(const AuditCommand& command) {
   const bool joint = !command.joint_stiffness.empty();
   const int sources = (command.preset.empty() ? 0 : 1) + (command.gains.empty() ? 0 : 1) +
@@ -177,14 +162,7 @@ void check(const AuditCommand& command) {
   if (!command.mode.empty() && command.gains.empty()) {
     throw InputError("--mode", "goes with --gains");
   }
-  const auto& list = command.postures;
-  const auto& log = command.log;
-  if ((command.samples > 0 ? 1 : 0) + (list.empty() ? 0 : 1) + (log.empty() ? 0 : 1) > 1) {
-    throw InputError(list.empty() ? "--log" : "--postures",
-                     list.empty() || log.empty() ? "does not go with --samples"
-                                                 : "does not go with --samples or --log");
-  }
-  if (command.spread && command.samples == 0) throw InputError("--spread", "needs --samples");
+  command.postures.check();
   const analysis::SampledLoop& loop = command.loop;
   if (command.period == 0 && (loop.delay > 0 || loop.torque_cutoff > 0 ||
                               loop.difference_velocity || command.integral_time > 0)) {
@@ -192,9 +170,10 @@ void check(const AuditCommand& command) {
         "--period",
         "missing; --delay, --cutoff, --difference-velocity and --integral-time need it");
   }
-  const bool many = command.samples > 0 || !list.empty() || !log.empty();
   for (const auto& [option, path] : {std::pair("--csv", &command.csv), {"--plot", &command.plot}}) {
-    if (!path->empty() && !many) throw InputError(option, "needs --samples, --postures or --log");
+    if (!path->empty() && !command.postures.any()) {
+      throw InputError(option, "needs --samples, --postures or --log");
+    }
   }
   if (!command.plot.empty()) check_plot_name(command.plot);
 }
@@ -205,6 +184,7 @@ AuditTask read_task(const AuditCommand& command) {
   check(command);
   ArmOptions arm = command.arm;
   AuditTask task{read_model(arm), {}, std::numeric_limits<double>::quiet_NaN(), 0, {}, {}};
+  task.friction = friction_note(arm, task.model);
   task.drives = arm.drives;
   AuditOptions& audit = task.options;
   read_gains(command, task.model, audit, task.intended_ratio);
@@ -216,14 +196,11 @@ AuditTask read_task(const AuditCommand& command) {
   audit.integral_time = command.integral_time;
   const double intended = std::isnan(task.intended_ratio) ? 0.7 : task.intended_ratio;
   task.wanted_ratio = command.damping_ratio.value_or(intended);
-  task.q = arm.q.empty() ? middle(task.model)
-                         : JointVector(parse_quantities(
-                               "--q", arm.q, controller::joint_units(task.model, "rad", "m")));
-  if (!command.postures.empty()) task.postures = read_postures(command.postures, task.model.dof());
-  if (!command.log.empty()) {
-    task.postures = read_log_postures(command.log, task.model.dof(), command.log_step);
+  task.q = arm.posture.read(task.model);
+  task.postures = command.postures.listed(arm.posture, task.model);
+  if (command.postures.spread) {
+    command.postures.range(task.model, task.q, task.options.lower, task.options.upper);
   }
-  read_range(command, task);
   return task;
 }
 
@@ -267,19 +244,8 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
       ->transform(quantity("", 1, 1e6, "a factor of at least 1"))
       ->option_text("G (2)");
   command.add_flag("--no-margin", options.no_margin, "Leave the gain margin out");
-  add("--q", arm.q, "Joint positions, rad or m", "a,b,... (middle of the limits)");
-  add("--postures", options.postures, "YAML file with a list of postures", "FILE");
-  add("--log", options.log, "LCM log whose measured postures count", "FILE");
-  command.add_option("--log-step", options.log_step, "Movement of a joint between two of these")
-      ->transform(positive("rad", "an angle in rad"))
-      ->option_text("R (0.01)");
-  command.add_option("--samples", options.samples, "Postures spread over the position limits")
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{10'000'000}))
-      ->option_text("N");
-  command.add_option("--seed", options.seed, "Of the samples")->option_text("S (1)");
-  command.add_option("--spread", options.spread, "Samples no further than this from --q")
-      ->transform(positive("rad", "an angle in rad"))
-      ->option_text("R");
+  arm.posture.add(command);
+  options.postures.add(command);
   command.add_option("--damping-ratio", options.damping_ratio, "Wanted of the suggested damping")
       ->transform(positive("", "a positive ratio"))
       ->option_text("Z (F/2, or 0.7)");

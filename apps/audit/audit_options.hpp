@@ -3,7 +3,6 @@
 #include <dashpot/controller/audit.hpp>
 
 #include <CLI/App.hpp>
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,12 +24,7 @@ struct AuditCommand {
   double integral_time = 0;    ///< s; 0: no integral
   bool no_margin = false;
   double margin = 2;
-  std::string postures;    ///< a file
-  std::string log;         ///< an LCM log
-  double log_step = 0.01;  ///< rad or m, between two postures of the log
-  std::int64_t samples = 0;
-  std::uint64_t seed = 1;
-  std::optional<double> spread;         ///< rad
+  PosturesOption postures;
   std::optional<double> damping_ratio;  ///< wanted of the suggestion
   int jobs = 0;                         ///< 0: one for each processor
   std::string csv, plot;
@@ -46,7 +40,8 @@ struct AuditTask {
   double wanted_ratio;  ///< of the suggestion
   controller::JointVector q;
   std::vector<controller::JointVector> postures;  ///< of the file or log; empty if there is none
-  std::string drives = {};  ///< name of the published drives that the model has
+  std::string friction = {};  ///< what counts of it, or is left out; empty: there is none
+  std::string drives = {};    ///< name of the published drives that the model has
 };
 
 /// Adds the options to the subcommand; they are written to `options`.

@@ -26,14 +26,6 @@ Json to_json(const controller::Distribution& found) {
           {"bound", found.bound}};
 }
 
-std::string joined(const Eigen::VectorXd& values, int digits) {
-  std::string text;
-  for (const double value : values) {
-    text += (text.empty() ? "" : ", ") + format_number(value, digits);
-  }
-  return text;
-}
-
 std::string margin_text(double margin) {
   return std::isinf(margin) ? "above 1e6" : format_number(margin, 4);
 }
@@ -71,6 +63,7 @@ std::string rotors_table(const AuditTask& task, const controller::PostureAudit& 
   const std::string missing = controller::missing_rotors_text(model);
   const std::string drives = controller::drives_text(model, task.drives);
   std::string used = drives.empty() ? "" : "\n  " + drives + "\n";
+  if (!task.friction.empty()) used += "\n  " + task.friction + "\n";
   if (missing.empty()) return used;
   const bool loop = task.options.period > 0;
   std::string text = used + "\n  Rotors unknown: " + missing + ". Fast modes" +
@@ -107,9 +100,10 @@ std::string margin_verdict(const AuditTask& task, double margin) {
              : "the sampled loop is unstable.\n";
 }
 
-std::string posture_table(const AuditTask& task, const controller::PostureAudit& posture) {
+std::string posture_table(const AuditTask& task, const AuditReport& report) {
+  const controller::PostureAudit& posture = report.posture;
   const controller::PostureNumbers& numbers = posture.numbers;
-  std::string text = "At q = " + joined(posture.q, 5) + "\n" + modes_table(task, posture) +
+  std::string text = "At q = " + format_list(posture.q, 5) + "\n" + modes_table(task, posture) +
                      "\n  Smallest ratio " + format_number(numbers.smallest_ratio, 6);
   if (!std::isnan(task.intended_ratio)) {
     text += " where " + format_number(task.intended_ratio, 3) + " was meant";
@@ -121,8 +115,16 @@ std::string posture_table(const AuditTask& task, const controller::PostureAudit&
             " s: " + margin_verdict(task, numbers.gain_margin);
   }
   text += integral_text(posture.integral_decays);
-  text += "  Zero modes: " + std::to_string(numbers.zero_modes) + ".";
-  if (numbers.singular) text += " The posture is singular: a direction of the task has no spring.";
+  const Eigen::Index zero = posture.spectrum.zero_modes.count;
+  text += "  Zero modes: " + std::to_string(zero) + ".";
+  if (numbers.zero_modes > zero) {
+    text += " Soft modes, which hardly any spring resists: " +
+            std::to_string(numbers.zero_modes - zero) + ".";
+  }
+  if (!report.lost_directions.empty()) {
+    text += "\n  The posture is singular, or next to it: no spring acts in direction " +
+            report.lost_directions + ".";
+  }
   return text + "\n" + rotors_table(task, posture);
 }
 
@@ -139,7 +141,7 @@ std::string workspace_table(const AuditTask& task, const AuditReport& report) {
       return std::isinf(value) ? std::string("above 1e6") : format_number(value, 4);
     };
     table.add_row({name, text(row.median), text(row.p05), text(row.p95), text(row.worst),
-                   joined(row.worst_q, 3)});
+                   format_list(row.worst_q, 3)});
   };
   add("smallest ratio", found.smallest_ratio);
   add("fastest pole, 1/s", found.fastest_pole);
@@ -175,7 +177,7 @@ std::string suggestion_table(const AuditTask& task, const AuditReport& report) {
     for (const auto& column : columns) row.push_back(column[i]);
     table.add_row(row);
   }
-  return text + table.text() + "\n  Nearest diagonal: " + joined(found.diagonal, 4) +
+  return text + table.text() + "\n  Nearest diagonal: " + format_list(found.diagonal, 4) +
          "; smallest ratio with it " + format_number(found.diagonal_smallest_ratio, 4) + "\n";
 }
 
@@ -226,7 +228,10 @@ std::string audit_json(const AuditTask& task, const AuditReport& report) {
                    {"gain_margin", numbers.gain_margin},
                    {"integral_decays", report.posture.integral_decays},
                    {"zero_modes", numbers.zero_modes},
-                   {"singular", numbers.singular}}}};
+                   {"singular", numbers.singular},
+                   {"lost_directions", report.lost_directions},
+                   {"viscous_friction",
+                    json_list(task.model.joint_values(&controller::Joint::viscous_friction))}}}};
   rotors_json(task, report.posture, result["posture"]);
   if (report.workspace) {
     result["workspace"] = {{"samples", report.workspace->samples},
@@ -254,7 +259,7 @@ std::string audit_table(const AuditTask& task, const AuditReport& report) {
   std::string text = text::printable(model.name()) + ": " + std::to_string(model.dof()) +
                      (model.dof() == 1 ? " joint" : " joints") + " from " +
                      text::printable(model.base()) + " to " + text::printable(model.tip()) + "\n\n";
-  text += posture_table(task, report.posture);
+  text += posture_table(task, report);
   if (report.workspace) text += workspace_table(task, report);
   return text + suggestion_table(task, report);
 }

@@ -12,8 +12,9 @@ struct AuditReport {
   controller::PostureAudit posture;
   std::optional<controller::WorkspaceAudit> workspace;
   controller::DampingSuggestion suggestion;
-  std::string no_suggestion;  ///< why there is none; empty if there is one
-  bool interrupted = false;   ///< the workspace lacks postures
+  std::string no_suggestion;    ///< why there is none; empty if there is one
+  std::string lost_directions;  ///< of the task, where the posture is singular
+  bool interrupted = false;     ///< the workspace lacks postures
 };
 
 std::string audit_json(const AuditTask& task, const AuditReport& report);

@@ -43,6 +43,11 @@ Eigen::VectorXd parse_quantities(const std::string& option, const std::string& t
   for (std::size_t i = 0; i < words.size(); ++i) {
     values[static_cast<Eigen::Index>(i)] = parse(option, words[i], units[i]);
   }
+  try {
+    controller::refuse_mixed_angles(words, units);
+  } catch (const std::invalid_argument& error) {
+    throw InputError(option, error.what());
+  }
   return values;
 }
 

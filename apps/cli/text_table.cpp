@@ -70,6 +70,14 @@ std::string format_number(double value, int digits) {
   return text;
 }
 
+std::string format_list(const Eigen::VectorXd& values, int digits) {
+  std::string text;
+  for (const double value : values) {
+    text += (text.empty() ? "" : ", ") + format_number(value, digits);
+  }
+  return text;
+}
+
 std::string format_bound(double bound) {
   if (!std::isfinite(bound)) return "none";
   const int rounding = std::fegetround();

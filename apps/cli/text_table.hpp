@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,9 @@ class TextTable {
 
 /// `value` with so many significant digits; "-" if it is NaN.
 std::string format_number(double value, int digits);
+
+/// "0.1, -0.7": each with so many significant digits.
+std::string format_list(const Eigen::VectorXd& values, int digits);
 
 /// An upper bound with two significant digits, rounded up; "none" if it is infinite or NaN.
 std::string format_bound(double bound);

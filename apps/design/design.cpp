@@ -8,6 +8,7 @@
 #include <dashpot/apps/design/design_options.hpp>
 #include <dashpot/apps/design/design_report.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/controller/model/posture_sequence.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 
@@ -22,6 +23,8 @@
 
 namespace dashpot::apps {
 namespace {
+
+using controller::JointVector;
 
 std::string key_of(const analysis::TaskImpedance& impedance) {
   return impedance.jacobian ? "task_damping" : "damping";
@@ -120,7 +123,7 @@ DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) t
 /// Says what is missing of an arm's rotors, and, where the loop did not bear the ratio, how much
 /// would be enough. Empty if nothing is missing.
 std::string rotors_note(const DesignOptions& options, const controller::RobotModel& model,
-                        bool lowered) {
+                        const controller::JointVector& q, bool lowered) {
   std::string note = controller::missing_rotors_text(model);
   if (note.empty()) return "";
   note += options.period ? ": fast modes, and what the loop bears, are those"
@@ -132,7 +135,7 @@ std::string rotors_note(const DesignOptions& options, const controller::RobotMod
           controller::with_at_least(model, published->values(published->reflected_inertia));
       const std::string with = "With the published drives " + std::string(published->name) + " it ";
       try {
-        const Found found = design_one(read_arm(options.arm, with_rotors), options);
+        const Found found = design_one(read_arm(options.arm, with_rotors, q), options);
         note += with + "bears a ratio of " + format_number(found.loop->level * options.ratio, 3) +
                 ", margin " + format_number(found.loop->gain_margin, 4) + ". ";
       } catch (const std::runtime_error&) {
@@ -140,10 +143,10 @@ std::string rotors_note(const DesignOptions& options, const controller::RobotMod
       }
     }
     const analysis::DampingDesign wanted = analysis::design_damping(
-        read_arm(options.arm, model).impedance, options.target(), options.damping_structure());
+        read_arm(options.arm, model, q).impedance, options.target(), options.damping_structure());
     const auto enough = controller::enough_reflected_inertia(
         model, wanted.system, *options.period, [&](const controller::RobotModel& with_rotors) {
-          const Found found = design_one(read_arm(options.arm, with_rotors), options);
+          const Found found = design_one(read_arm(options.arm, with_rotors, q), options);
           return found.loop->level == 1;
         });
     note += enough ? "With " + controller::inertia_text(model, *enough) +
@@ -154,21 +157,24 @@ std::string rotors_note(const DesignOptions& options, const controller::RobotMod
 }
 
 DesignReport report_on_arm(const DesignOptions& options, const SystemEntry& entry,
-                           const controller::RobotModel& model) {
+                           const controller::RobotModel& model, const controller::JointVector& q) {
   try {
     DesignReport report = report_on(entry, options);
+    report.q = q;
     report.drives = options.arm.drives;
     if (!report.drives.empty()) {
       report.notes.push_back(controller::drives_text(model, report.drives));
     }
-    const std::string note = rotors_note(options, model, report.loop && report.loop->level < 1);
+    const std::string note = rotors_note(options, model, q, report.loop && report.loop->level < 1);
     if (!note.empty()) report.notes.push_back(note);
+    const std::string friction = friction_note(options.arm, model);
+    if (!friction.empty()) report.notes.push_back(friction);
     report.rotors = note.empty() ? "known" : "unknown";
     return report;
   } catch (const InputError&) {
     throw;
   } catch (const std::runtime_error& error) {  // the margin is lost
-    const std::string note = rotors_note(options, model, options.period.has_value());
+    const std::string note = rotors_note(options, model, q, options.period.has_value());
     throw std::runtime_error(error.what() + (note.empty() ? "" : "; " + note));
   }
 }
@@ -204,10 +210,8 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
     region.loop = [&](std::size_t i) { return limit_of(file.entries[i], options).loop; };
   }
   try {
-    RegionReport report{key_of(configurations[0]),
-                        options.ratio,
-                        analysis::design_region(configurations, region),
-                        {}};
+    RegionReport report{key_of(configurations[0]), options.ratio,
+                        analysis::design_region(configurations, region)};
     const analysis::RegionDesign& design = report.design;
     if (!design.kept) {
       throw lost_margin("no share of the damping found for the region", options, design.gain_margin,
@@ -229,20 +233,44 @@ void write_csv(OutputFile file, const std::string& path, const std::string& text
   }
 }
 
+/// The postures that the options ask for; the one of --q if they list none.
+std::vector<JointVector> region_postures(const DesignOptions& options,
+                                         const controller::RobotModel& model) {
+  const JointVector q = options.arm.posture.read(model);
+  if (!options.postures.any()) return {q};
+  std::vector<JointVector> postures = options.postures.listed(options.arm.posture, model);
+  if (!postures.empty()) return postures;
+  JointVector lower, upper;
+  options.postures.range(model, q, lower, upper);
+  const controller::PostureSequence sequence(lower, upper, options.postures.seed);
+  for (std::int64_t i = 0; i < options.postures.samples; ++i) postures.push_back(sequence.at(i));
+  return postures;
+}
+
 /// `csv`: may be null.
 void run_design(const DesignOptions& options, OutputFile csv) try {
   SystemFile file;
   std::optional<controller::RobotModel> model;
+  std::vector<JointVector> postures;
   if (options.arm.urdf.empty()) {
     file = read_systems(options.file);
   } else {
     model = read_model(options.arm);
-    file.entries.push_back(read_arm(options.arm, *model));
+    postures = region_postures(options, *model);
+    for (const JointVector& q : postures) {
+      file.entries.push_back(read_arm(options.arm, *model, q));
+      if (postures.size() > 1) {
+        file.entries.back().prefix = "posture [" + std::to_string(file.entries.size() - 1) + "].";
+      }
+    }
   }
   if (options.region) {
-    const RegionReport report = report_on_region(file, options);
+    RegionReport report = report_on_region(file, options);
+    report.postures = std::move(postures);
     if (csv) write_csv(std::move(csv), options.csv, region_csv(report));
     print(options.json ? region_json(report) : region_table(report));
+    const std::string complaint = region_complaint(report);
+    if (!complaint.empty()) throw std::runtime_error(complaint);
     return;
   }
   std::vector<DesignReport> reports;
@@ -251,7 +279,8 @@ void run_design(const DesignOptions& options, OutputFile csv) try {
     if (several) {
       show_progress(static_cast<double>(reports.size()) / static_cast<double>(file.entries.size()));
     }
-    reports.push_back(model ? report_on_arm(options, entry, *model) : report_on(entry, options));
+    reports.push_back(model ? report_on_arm(options, entry, *model, postures[0])
+                            : report_on(entry, options));
     if (several && reports.size() == file.entries.size()) show_progress(1);
   }
   print(options.json ? design_json(reports, file.is_list) : design_table(reports, file.is_list));
@@ -266,7 +295,8 @@ there already (joint friction, null-space damping). A task_damping is what `befo
 --near stays near. Without a jacobian the damping is designed in joint space. The matrix is always
 positive semidefinite; a mode that cannot have its ratio is named, with the reason. With --period it
 is one that the sampled loop bears with the margin: the ratio is lowered where it has to be, with
---region the whole matrix, and where that will not do, the exit status is 1.
+--region the whole matrix, and where that will not do, the exit status is 1. It is 1 as well where
+a region's damping has less than half of the ratio wanted somewhere, or more than is allowed.
 )";
 
 }  // namespace
@@ -279,8 +309,10 @@ void add_design(CLI::App& program) {
   command->footer(std::string(kDesignHelp) + kUnitsHelp + "\n" + kExitStatusHelp);
   command->callback([options] {
     check(*options);
-    check_outputs({{"--csv", options->csv}},
-                  {{"FILE", options->file}, {"--urdf", options->arm.urdf}});
+    check_outputs({{"--csv", options->csv}}, {{"FILE", options->file},
+                                              {"--urdf", options->arm.urdf},
+                                              {"--postures", options->postures.file},
+                                              {"--log", options->postures.log}});
     OutputFile csv(nullptr, std::fclose);
     if (!options->csv.empty()) csv = open_output("--csv", options->csv);
     run_design(*options, std::move(csv));

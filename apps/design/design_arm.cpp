@@ -4,6 +4,7 @@
 #include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/rotors.hpp>
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -91,31 +92,52 @@ RobotModel read_model(const ArmOptions& options) try {
   throw model_error(error);
 }
 
-bool ArmOptions::any() const {
-  for (const auto* text : {&base, &tip, &q, &task_stiffness, &task_damping, &viscous_friction,
-                           &null_damping, &reflected_inertia, &drives, &payload}) {
-    if (!text->empty()) return true;
-  }
-  return accept_inertias;
+std::string friction_note(const ArmOptions& options, const RobotModel& model) {
+  if (!options.viscous_friction.empty()) return controller::friction_text(model);
+  const std::string left_out = controller::friction_text(RobotModel::from_urdf_file(
+      options.urdf, options.base, options.tip, {.accept_inertias = options.accept_inertias}));
+  return left_out.empty() ? ""
+                          : left_out.substr(0, left_out.rfind(',')) +
+                                ", as the URDF has it, is left out; --viscous-friction urdf "
+                                "counts it.";
 }
 
-SystemEntry read_arm(const ArmOptions& options, const RobotModel& model) {
+bool ArmOptions::any() const {
+  for (const auto* text :
+       {&base, &tip, &posture.q, &joint_stiffness, &task_stiffness, &task_damping,
+        &viscous_friction, &null_damping, &reflected_inertia, &drives, &payload}) {
+    if (!text->empty()) return true;
+  }
+  return accept_inertias || posture.outside_limits;
+}
+
+SystemEntry read_arm(const ArmOptions& options, const RobotModel& model,
+                     const controller::JointVector& q) {
   const Eigen::Index n = model.dof();
+  const auto joint_springs =
+      per_joint("--joint-stiffness", options.joint_stiffness, model, "N m/rad", "N/m");
   const auto stiffness = quantities("--task-stiffness", options.task_stiffness,
                                     {"N/m", "N/m", "N/m", "N m/rad", "N m/rad", "N m/rad"});
-  if (!stiffness) throw InputError("--task-stiffness", "is needed with --urdf");
+  if (stiffness.has_value() == joint_springs.has_value()) {
+    throw InputError("--task-stiffness", stiffness ? "does not go with --joint-stiffness"
+                                                   : "or --joint-stiffness is needed with --urdf");
+  }
   const auto damping =
       quantities("--task-damping", options.task_damping,
                  {"N s/m", "N s/m", "N s/m", "N m s/rad", "N m s/rad", "N m s/rad"});
-  const controller::JointVector q =
-      quantities("--q", options.q, controller::joint_units(model, "rad", "m"))
-          .value_or(Eigen::VectorXd::Zero(n));
+  if (damping && joint_springs) {
+    throw InputError("--task-damping", "does not go with --joint-stiffness");
+  }
   const controller::DynamicsResult dynamics =
       controller::evaluate(model, q, controller::JointVector::Zero(n));
   SystemEntry entry;
   entry.impedance.mass = dynamics.M;
-  entry.impedance.jacobian = dynamics.J;
-  entry.impedance.task_stiffness = Eigen::MatrixXd(stiffness->asDiagonal());
+  if (joint_springs) {
+    entry.impedance.stiffness = Eigen::MatrixXd(joint_springs->asDiagonal());
+  } else {
+    entry.impedance.jacobian = dynamics.J;
+    entry.impedance.task_stiffness = Eigen::MatrixXd(stiffness->asDiagonal());
+  }
   const Eigen::VectorXd friction = model.joint_values(&controller::Joint::viscous_friction);
   if (!friction.isZero(0)) {
     entry.friction = friction.asDiagonal();

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/controller/robot_model.hpp>
 
 #include <string>
@@ -10,9 +11,10 @@ namespace dashpot::apps {
 /// quantities between commas.
 struct ArmOptions {
   std::string urdf, base, tip;
-  std::string q;               ///< n; zeros if empty
-  std::string task_stiffness;  ///< diagonal of K_C, 6: linear, then angular; N/m, N m/rad
-  std::string task_damping;    ///< diagonal of C_C before, 6; none if empty
+  PostureOption posture;
+  std::string joint_stiffness;  ///< of springs in the joints instead, n or one; N m/rad
+  std::string task_stiffness;   ///< diagonal of K_C, 6: linear, then angular; N/m, N m/rad
+  std::string task_damping;     ///< diagonal of C_C before, 6; none if empty
   // What is there besides, none where empty; n numbers, or one for all joints
   std::string viscous_friction;   ///< N m s/rad, or "urdf" or "drives" for what these have
   std::string null_damping;       ///< of the motions that the task leaves free, N m s/rad
@@ -30,9 +32,14 @@ struct ArmOptions {
 /// The arm with its payload, reflected inertia, and the friction that counts. Throws InputError.
 controller::RobotModel read_model(const ArmOptions& options);
 
-/// The arm with its springs, as a file would give it: mass, jacobian (6 x n, base-aligned axes at
-/// the tip), task_stiffness, task_damping, and damping with what friction and null space add.
+/// What counts of friction, or is left out, in a sentence; empty if there is none.
+std::string friction_note(const ArmOptions& options, const controller::RobotModel& model);
+
+/// The arm with its springs at q, as a file would give it: mass, jacobian (6 x n, base-aligned axes
+/// at the tip), task_stiffness, task_damping, and damping with what friction and null space add; or
+/// stiffness alone for springs in the joints.
 /// Throws InputError.
-SystemEntry read_arm(const ArmOptions& options, const controller::RobotModel& model);
+SystemEntry read_arm(const ArmOptions& options, const controller::RobotModel& model,
+                     const controller::JointVector& q);
 
 }  // namespace dashpot::apps

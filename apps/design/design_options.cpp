@@ -28,7 +28,9 @@ void add_arm(CLI::App& command, ArmOptions& arm) {
   add("--urdf", arm.urdf, "Instead of FILE: an arm", "FILE");
   add("--base", arm.base, "Its base link; axes of the task", "LINK");
   add("--tip", arm.tip, "Its link with the task's origin", "LINK");
-  add("--q", arm.q, "Joint positions, rad or m", "a,b,... (0)");
+  arm.posture.add(command);
+  add("--joint-stiffness", arm.joint_stiffness, "Instead of the task's: of the joints, N m/rad",
+      "a,b,...|x");
   add("--task-stiffness", arm.task_stiffness, "Diagonal of it, N/m and N m/rad", "x,y,z,rx,ry,rz");
   add("--task-damping", arm.task_damping, "Diagonal of the one before", "x,y,z,rx,ry,rz");
   add_model_options(command, arm);
@@ -97,6 +99,7 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
   command.add_option("FILE", options.file, "YAML or JSON file; - reads standard input")
       ->option_text(" ");
   add_arm(command, options.arm);
+  options.postures.add(command);
   command.add_option("--damping-ratio", options.ratio, "The ratio wanted of every mode")
       ->required()
       ->transform(positive("", "a positive ratio"))
@@ -109,7 +112,8 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
   command.add_flag("--near", options.near, "Stay near the task_damping of the file");
   add_loop(command, options);
   command.add_flag("--region", options.region,
-                   "FILE lists configurations: one matrix that raises their smallest ratio");
+                   "Configurations of FILE, or postures of the arm: one matrix that raises their\n"
+                   "smallest ratio");
   command
       .add_option("--largest-ratio", options.largest_ratio, "With --region: no mode may have more")
       ->transform(positive("", "a positive ratio"))
@@ -139,6 +143,13 @@ void check(const DesignOptions& options) {
   }
   if (arm.urdf.empty() && arm.any())
     throw InputError("--urdf", "missing; options that describe an arm need it");
+  options.postures.check();
+  if (options.postures.any() && !(options.region && !arm.urdf.empty())) {
+    throw InputError("--region", "--samples, --postures and --log need it, and --urdf");
+  }
+  if (options.region && !arm.urdf.empty() && !options.postures.any()) {
+    throw InputError("--region", "an arm needs --samples, --postures or --log with it");
+  }
   if (options.near && options.region) throw InputError("--near", "does not go with --region");
   if (options.sensitivity && options.region) {
     throw InputError("--sensitivity", "does not go with --region");

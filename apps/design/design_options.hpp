@@ -11,7 +11,8 @@ namespace dashpot::apps {
 /// The command line of `dashpot design`.
 struct DesignOptions {
   std::string file;
-  ArmOptions arm;  ///< instead of a file
+  ArmOptions arm;           ///< instead of a file
+  PosturesOption postures;  ///< of the arm's region
   double ratio = 0;
   std::string structure = "full";
   double soft_frequency = analysis::DampingTarget().soft_frequency;  ///< rad/s

@@ -29,8 +29,9 @@ struct DesignReport {
   std::vector<analysis::ModeSensitivity> sensitivities;  ///< of `after`; none if not asked for
   std::optional<LoopReport> loop;  ///< none if the loop is taken for continuous
   std::vector<std::string> notes;
-  std::string rotors;  ///< of an arm: "known" or "unknown"
-  std::string drives;  ///< name of the published drives that it has; empty: none
+  std::optional<Eigen::VectorXd> q;  ///< of an arm, rad or m
+  std::string rotors;                ///< of an arm: "known" or "unknown"
+  std::string drives;                ///< name of the published drives that it has; empty: none
 };
 
 /// What `dashpot design --region` says.
@@ -38,7 +39,8 @@ struct RegionReport {
   std::string key;
   double ratio = 0;
   analysis::RegionDesign design;
-  std::optional<analysis::LoopLimit> limit;  ///< none if the loops are taken for continuous
+  std::vector<controller::JointVector> postures = {};  ///< of an arm, one for each sample
+  std::optional<analysis::LoopLimit> limit = {};  ///< none if the loops are taken for continuous
 };
 
 }  // namespace dashpot::apps

@@ -72,6 +72,7 @@ Json to_value(const DesignReport& report) {
                  {"modes", after["modes"]},
                  {"before", before},
                  {"after", after}};
+  if (report.q) result["q"] = json_list(*report.q);
   if (!report.rotors.empty()) result["rotors"] = report.rotors;
   if (!report.drives.empty()) result["drives"] = drives_json(report.drives);
   if (report.loop) result["loop"] = to_value(*report.loop);
@@ -211,7 +212,8 @@ std::string design_table(const std::vector<DesignReport>& reports, bool as_list)
     const DesignReport& report = reports[i];
     if (i > 0) text += '\n';
     if (as_list) text += "[" + std::to_string(i) + "] ";
-    text += report.key + "\n" + matrix_text(report.design.damping) + "\n";
+    text += report.key + (report.q ? " at q = " + format_list(*report.q, 5) : "") + "\n" +
+            matrix_text(report.design.damping) + "\n";
     for (const std::string& note : report.notes) text += note_lines(note);
     if (report.loop) {
       text += loop_text(report);
@@ -229,6 +231,7 @@ std::string region_json(const RegionReport& report) {
   const analysis::RegionDesign& design = report.design;
   Json samples = Json::array();
   for (const analysis::RegionSample& sample : design.samples) {
+    const std::size_t index = samples.size();
     samples.push_back({{"worst_mode", sample.worst_mode},
                        {"natural_frequency", sample.natural_frequency},
                        {"damping_ratio", sample.damping_ratio},
@@ -236,6 +239,7 @@ std::string region_json(const RegionReport& report) {
                        {"largest_ratio", sample.largest_ratio},
                        {"soft_modes", sample.soft_modes}});
     if (report.limit) samples.back()["gain_margin"] = sample.gain_margin;
+    if (!report.postures.empty()) samples.back()["q"] = json_list(report.postures[index]);
   }
   Json result = {{report.key, json_rows(design.damping)},
                  {"smallest_eigenvalue", smallest_eigenvalue(design.damping)},
@@ -258,13 +262,15 @@ std::string region_table(const RegionReport& report) {
   if (design.worst_sample >= 0) {
     const analysis::RegionSample& worst =
         design.samples[static_cast<std::size_t>(design.worst_sample)];
-    text += "  Smallest ratio " + format_number(worst.damping_ratio, 6) + ", wanted " +
-            format_number(worst.wanted, 3) + ", at configuration [" +
-            std::to_string(design.worst_sample) + "].\n";
-  }
-  if (design.violation > 1e-6) {
-    text += "  What is there already damps more than is allowed, by " +
-            format_number(design.violation, 3) + ".\n";
+    text +=
+        "  Smallest ratio " + format_number(worst.damping_ratio, 6) + ", wanted " +
+        format_number(worst.wanted, 3) + ", at configuration [" +
+        std::to_string(design.worst_sample) + "]" +
+        (report.postures.empty()
+             ? ".\n"
+             : ",\n  q = " +
+                   format_list(report.postures[static_cast<std::size_t>(design.worst_sample)], 5) +
+                   ".\n");
   }
   if (report.limit && design.share < 1) {
     text += "  The loops bear " + format_number(design.share, 6) +
@@ -295,6 +301,26 @@ std::string region_table(const RegionReport& report) {
     table.add_row(std::move(row));
   }
   return text + "\n" + table.text();
+}
+
+std::string region_complaint(const RegionReport& report) {
+  const analysis::RegionDesign& design = report.design;
+  if (design.violation > 1e-6) {
+    return "what is there already damps more than --largest-ratio allows, by " +
+           format_number(design.violation, 3) + "; allow more, or take friction away";
+  }
+  if (design.worst_sample < 0) return "";
+  const analysis::RegionSample& worst =
+      design.samples[static_cast<std::size_t>(design.worst_sample)];
+  if (worst.damping_ratio >= 0.1 * worst.wanted) return "";
+  double largest = 0;
+  for (const analysis::RegionSample& sample : design.samples) {
+    largest = std::max(largest, sample.largest_ratio);
+  }
+  return "the smallest ratio, " + format_number(worst.damping_ratio, 3) +
+         ", is less than a tenth of the " + format_number(worst.wanted, 3) +
+         " wanted; what binds: no mode may have a ratio above --largest-ratio, and one has " +
+         format_number(largest, 4) + ", or the structure leaves no better matrix";
 }
 
 std::string region_csv(const RegionReport& report) {

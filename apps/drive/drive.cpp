@@ -227,6 +227,7 @@ void drive(const DriveOptions& options) {
     throw std::runtime_error(std::to_string(report.messages.send_errors) +
                              " messages could not be sent or written");
   }
+  refuse_latched_fault(report.loop);
 }
 
 }  // namespace

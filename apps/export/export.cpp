@@ -121,11 +121,13 @@ void export_log(const ExportOptions& options) {
   do {
     reader->handle();
   } while (!StopSignal::given() && reader->read());
+  if (!reader->foreign().empty()) throw InputError(options.log, reader->foreign());
   if (mcap) mcap->finish();
   if (csv) csv->finish();
   const std::string damage = reader->damage();
-  print(std::to_string(count) + " messages exported, " + std::to_string(handlers.malformed) +
-        " malformed\n" + (damage.empty() ? "" : "The log is " + damage + ".\n"));
+  print(std::string(StopSignal::given() ? "Interrupted. " : "") + std::to_string(count) +
+        " messages exported, " + std::to_string(handlers.malformed) + " malformed\n" +
+        (damage.empty() ? "" : "The log is " + damage + ".\n"));
 }
 
 }  // namespace

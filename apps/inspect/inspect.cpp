@@ -1,6 +1,7 @@
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
@@ -12,6 +13,7 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -25,7 +27,8 @@ using controller::RobotModel;
 
 struct InspectOptions {
   std::string urdf, base, tip;
-  std::string q, qd, gravity, reflected_inertia, drives;
+  PostureOption posture;
+  std::string qd, gravity, reflected_inertia, drives;
   bool exclude_off_chain = false;
   bool accept_inertias = false;
   bool json = false;
@@ -91,10 +94,11 @@ nlohmann::ordered_json json_joints(const RobotModel& model) {
 }
 
 std::string to_json(const InspectOptions& options, const RobotModel& model,
-                    const DynamicsResult& dynamics) {
+                    const DynamicsResult& dynamics, const JointVector& q) {
   const bool unknown = controller::unknown_rotors(model).any();
   nlohmann::ordered_json result = {{"joints", json_joints(model)},
                                    {"rotors", unknown ? "unknown" : "known"},
+                                   {"q", json_list(q)},
                                    {"mass_matrix", json_rows(dynamics.M)},
                                    {"coriolis", json_list(dynamics.coriolis)},
                                    {"gravity", json_list(dynamics.gravity)},
@@ -228,10 +232,10 @@ std::string to_table(const RobotModel& model, const DynamicsResult& dynamics, co
 
 void run_inspect(const InspectOptions& options) {
   const RobotModel model = read_model(options);
-  const JointVector q = joint_list("--q", options.q, model, "rad", "m");
+  const JointVector q = options.posture.read(model);
   const JointVector qd = joint_list("--qd", options.qd, model, "rad/s", "m/s");
   const DynamicsResult dynamics = controller::evaluate(model, q, qd);
-  print(options.json ? to_json(options, model, dynamics)
+  print(options.json ? to_json(options, model, dynamics, q)
                      : to_table(model, dynamics, q, qd) + rotors_text(options, model));
 }
 
@@ -249,7 +253,8 @@ void add_inspect(CLI::App& program) {
   add("--base", &InspectOptions::base, "Link that stands still; results are in its axes", "LINK")
       ->required();
   add("--tip", &InspectOptions::tip, "Link at the end of the chain", "LINK")->required();
-  add("--q", &InspectOptions::q, "Joint positions, rad or m", "a,b,... (0)");
+  options->posture.add(*command);
+  options->posture.refused = std::numbers::pi;  // its numbers hold beyond the limits, too
   add("--qd", &InspectOptions::qd, "Joint velocities, rad/s or m/s", "a,b,... (0)");
   add("--gravity", &InspectOptions::gravity, "In axes of the file's root link, m/s^2",
       "x,y,z (0,0,-9.81)");

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <stdexcept>
 
 namespace dashpot::apps {
 namespace {
@@ -54,6 +55,12 @@ std::string fault_text(const LoopRecord& loop) {
            std::to_string(loop.fault_tick);
   }
   return out + "\n";
+}
+
+void refuse_latched_fault(const LoopRecord& loop) {
+  if (loop.fault == DASHPOT_OK) return;
+  throw std::runtime_error("ended in a fault: " + latched_text(loop.fault) + ", at tick " +
+                           std::to_string(loop.fault_tick) + " (docs/safety.md)");
 }
 
 Json commands_json(const std::optional<CommandReport>& report, std::int64_t refused) {

@@ -27,6 +27,9 @@ std::string fault_text(const LoopRecord& loop);
 
 nlohmann::ordered_json commands_json(const std::optional<CommandReport>& report,
                                      std::int64_t refused);
+/// Throws std::runtime_error if a fault is latched at the end, so that a program that calls this
+/// one hears of it.
+void refuse_latched_fault(const LoopRecord& loop);
 /// null if no fault is latched at the end
 nlohmann::ordered_json fault_json(const LoopRecord& loop);
 

@@ -106,6 +106,9 @@ std::string watch_log(const Options& options, MonitorView& view,
     display.update(view);
   }
   if (!first && !StopSignal::given()) check_log(options.log);
+  if (!reader->foreign().empty()) {
+    throw CLI::ValidationError("--log", options.log + ": " + reader->foreign());
+  }
   return reader->damage();
 }
 

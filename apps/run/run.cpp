@@ -210,6 +210,7 @@ void run(const Options& options) {
   if (scene.arm) {
     const controller::RobotModel& model = scene.arm->config.model;
     report.missing_rotors = controller::missing_rotors_text(model);
+    report.friction_text = controller::friction_text(model);
     report.drives = scene.arm->config.robot.options.drives;
     report.drives_text = controller::drives_text(model, report.drives);
     report.without_rotors = controller::arm_without_rotors(model);
@@ -240,6 +241,7 @@ void run(const Options& options) {
                              " s: " + sim::to_text(report.loop.simulation) +
                              " (see simulation.integrator in the scene)");
   }
+  refuse_latched_fault(report.loop);
 }
 
 }  // namespace

@@ -297,6 +297,7 @@ std::string to_table(const RunReport& report) {
          commands_text(report.commands, loop.commands_refused);
   if (loop.first_modes.tick != 0) {
     out += solved_text(loop.first_modes, loop.last_modes);
+    if (!report.friction_text.empty()) out += "\n  " + report.friction_text + "\n";
     if (!report.drives_text.empty()) out += "\n  " + report.drives_text + "\n";
     if (!report.missing_rotors.empty()) {
       out += "\n  Rotors unknown: " + report.missing_rotors +

@@ -16,6 +16,7 @@ struct RunReport {
   std::string missing_rotors;       ///< of the controller's model, see missing_rotors_text
   std::string without_rotors;       ///< see arm_without_rotors
   std::string rotors_hint;          ///< where they are found
+  std::string friction_text;        ///< what damps beside the gains; empty: nothing
   std::string drives, drives_text;  ///< published ones that it has; empty: none
   double period = 0;                ///< s
   double wall_time = 0;             ///< s

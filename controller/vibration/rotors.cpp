@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <sstream>
 
 namespace dashpot::controller {
 namespace {
@@ -115,6 +116,16 @@ std::string drives_text(const RobotModel& model, const std::string& name) {
          (like != nullptr && like->name != name
               ? " This arm looks like " + std::string(like->name) + "."
               : "");
+}
+
+std::string friction_text(const RobotModel& model) {
+  const JointVector friction = model.joint_values(&Joint::viscous_friction);
+  if (friction.isZero(0)) return "";
+  std::ostringstream text;
+  text << "Viscous friction in the joints, " << friction.minCoeff();
+  if (friction.maxCoeff() > friction.minCoeff()) text << " to " << friction.maxCoeff();
+  text << " N m s/rad, damps beside the gains.";
+  return text.str();
 }
 
 std::string rotors_hint(const RobotModel& model, const std::string& inertia_option,

@@ -134,13 +134,34 @@ double parse_quantity(std::string_view text, const std::string& unit) {
   const std::optional<Unit> given = parse_unit(rest);
   if (!given) {
     throw std::invalid_argument("is not a number but " + quoted(text) + ": unknown unit " +
-                                quoted(rest));
+                                quoted(rest) + (rest.starts_with("degree") ? "; write deg" : ""));
   }
   if (given->powers != parse_unit(unit).value().powers) {
     throw std::invalid_argument("has a wrong unit: " + quoted(text) + "; " +
                                 (unit.empty() ? "a number without unit" : unit) + " is wanted");
   }
   return *value * given->factor;
+}
+
+void refuse_mixed_angles(const std::vector<std::string>& texts,
+                         const std::vector<std::string>& units) {
+  const auto bare = [](std::string_view text) {  // a number that is not zero and has no unit
+    text = trimmed(text);
+    const std::optional<double> value = take_number(text);
+    return value && *value != 0 && trimmed(text).empty();
+  };
+  const auto has_unit = [](std::string_view text) {
+    text = trimmed(text);
+    return take_number(text) && !trimmed(text).empty();
+  };
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    if (units[i] != "rad" || !bare(texts[i])) continue;
+    for (std::size_t j = 0; j < texts.size(); ++j) {
+      if (units[j] != "rad" || !has_unit(texts[j])) continue;
+      throw std::invalid_argument(quoted(texts[i]) + " has no unit beside " + quoted(texts[j]) +
+                                  "; give every number its unit, or none");
+    }
+  }
 }
 
 }  // namespace dashpot::controller

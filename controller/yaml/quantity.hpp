@@ -1,6 +1,7 @@
 #pragma once
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace dashpot::controller {
 
@@ -12,5 +13,11 @@ namespace dashpot::controller {
 /// std::invalid_argument with a sentence about `text` if it is not a finite number, or not one in
 /// such a unit.
 double parse_quantity(std::string_view text, const std::string& unit);
+
+/// Throws std::invalid_argument if, among the entries of a list that are wanted in rad, one has a
+/// unit of its own and another, which is not zero, has none: nobody knows whether "0, -45, 90 deg"
+/// begins in degrees. `units` has one unit for each of `texts`.
+void refuse_mixed_angles(const std::vector<std::string>& texts,
+                         const std::vector<std::string>& units);
 
 }  // namespace dashpot::controller

@@ -180,7 +180,15 @@ YamlNode parse_yaml(const std::string& text) {
     }
     return document.take();
   } catch (const YAML::Exception& error) {
-    throw InputError("", "is not YAML: " + error.msg, error.mark.line + 1);
+    std::istringstream lines(text);
+    std::string line;
+    for (int i = 0; i <= error.mark.line && std::getline(lines, line); ++i) {
+    }
+    const bool tab = line.substr(0, line.find_first_not_of(" \t")).find('\t') != std::string::npos;
+    throw InputError("",
+                     "is not YAML: " + (tab ? "a tab indents the line; YAML takes spaces"
+                                            : std::string(error.msg)),
+                     error.mark.line + 1);
   }
 }
 

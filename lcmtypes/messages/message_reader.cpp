@@ -58,7 +58,19 @@ bool BusReader::wait(int milliseconds) {
 
 void LogReader::handle() {
   const LogFile::Event& event = file_.event();
+  constexpr std::size_t kNamed = 8;
+  if (event.channel.starts_with("DASHPOT_"))
+    ours_ = true;
+  else if (others_.size() < kNamed)
+    others_.insert(event.channel);
   handlers_.take(event.channel, event.data.data(), event.size);
+}
+
+std::string LogReader::foreign() const {
+  if (ours_ || others_.empty()) return "";
+  std::string names;
+  for (const std::string& name : others_) names += (names.empty() ? "" : ", ") + name;
+  return "has no messages of Dashpot; its channels are " + names;
 }
 
 }  // namespace dashpot::lcmtypes

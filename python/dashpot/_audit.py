@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ._core import Error
 from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers, to_vector
-from ._robot import DIRECTIONS, Robot, is_tool, selected
+from ._robot import DIRECTIONS, Robot, check_postures, is_tool, selected
 from ._workers import Task, chunks_of, collect, workers
 
 
@@ -134,15 +134,20 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           margin: float = 2, soft_frequency: float = 0.1,
           damping_ratio: float | None = None, samples: int = 0, seed: int = 0,
           lower: npt.ArrayLike | None = None, upper: npt.ArrayLike | None = None,
-          postures: npt.ArrayLike | None = None,
+          postures: npt.ArrayLike | None = None, outside_limits: bool = False,
+          urdf_friction: bool = False,
           executor: concurrent.futures.Executor | None = None) -> Audit:
     """Returns what gains really do on a robot, as their documentation states them.
 
-    At posture q (n, rad): its modes, smallest damping ratio, fastest pole and gain margin. Over
+    At posture q (n, rad; without `samples` and `postures` the middle of the position limits): its
+    modes, smallest damping ratio, fastest pole and gain margin. Over
     `samples` postures, spread evenly by a sequence of number `seed` between `lower` and `upper` (n,
     rad; by default the position limits), or over `postures` (s x n, rad): the distributions of these
     numbers. With a `damping_ratio`: damping
     that gives every mode this ratio at q.
+
+    Postures outside the position limits are refused, unless `outside_limits`. Viscous friction that
+    was stated for the robot damps beside the gains; that of its URDF does so with `urdf_friction`.
 
     Gains are those of `closed_loop`; `damping_factor` F stands for a damping of F sqrt(K), entry by
     entry. With `half_quaternion` the controller takes half of the rotation vector for its error,
@@ -189,9 +194,14 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     for name, values in (("lower", lower), ("upper", upper)):
         if values is not None:
             options[name] = to_numbers(name, values, 1)
-    task = Task(robot, gains, at_tip, options)
+    task = Task(robot._for_gains(urdf_friction), gains, at_tip, options)
     given = None if postures is None else to_numbers("postures", postures, 2)
     samples = samples if given is None else len(given)
+    if q is None and samples == 0:
+        q = robot._core.middle_posture()
+    if not outside_limits:
+        check_postures(robot, "q", [] if q is None else [to_numbers("q", q, 1)])
+        check_postures(robot, "postures", [] if given is None else given)
     posture = workspace = suggestion = None
     if q is not None:
         at = to_numbers("q", q, 1)

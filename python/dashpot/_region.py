@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
+import warnings
 from typing import Any
 
 import numpy.typing as npt
 
 from ._core import Error
 from ._results import Array, Result, to_gain, to_numbers, to_vector
-from ._robot import Robot, is_tool
+from ._robot import Robot, check_postures, is_tool
 from ._workers import Task, chunks_of, collect, workers
 
 
@@ -43,6 +44,7 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
                   largest_ratio: float | None = None, soft_frequency: float = 0.1,
                   samples: int = 0, seed: int = 0, lower: npt.ArrayLike | None = None,
                   upper: npt.ArrayLike | None = None, postures: npt.ArrayLike | None = None,
+                  outside_limits: bool = False, urdf_friction: bool = False,
                   period: float = 0, delay: int = 0, cutoff: float = 0,
                   difference_velocity: bool = False, integral_time: float = 0,
                   gain_margin: float = 2,
@@ -61,6 +63,9 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     Only postures that bind are searched over. An `executor` of concurrent.futures judges all of
     them in chunks, where the workers are, and only the few that come off worst come back. The result
     is the same to the last bit whatever executor and however many workers.
+
+    Warns where the damping has less than a tenth of the ratio wanted at some posture, or more than the
+    largest one allowed.
 
     Raises Error and BrokenExecutor as `audit` does, and Error without postures and where no share of
     the damping keeps the gain margin.
@@ -83,9 +88,11 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     for name, values in (("lower", lower), ("upper", upper)):
         if values is not None:
             options[name] = to_numbers(name, values, 1)
-    task = Task(robot, gains, task_stiffness is not None, options)
+    task = Task(robot._for_gains(urdf_friction), gains, task_stiffness is not None, options)
     given = None if postures is None else to_numbers("postures", postures, 2)
     samples = samples if given is None else len(given)
+    if not outside_limits:
+        check_postures(robot, "postures", [] if given is None else given)
     if samples < 1:
         raise Error("samples: a region without postures")
     with workers(executor) as pool:
@@ -101,4 +108,11 @@ def design_region(robot: Robot, *, damping_ratio: float = 0.7,
     if not found.pop("kept"):
         raise Error(f"gain_margin: no share of the damping keeps {gain_margin:.3g} at every posture; "
                     f"the largest is {found['gain_margin']:.3g}, with {found['share']:.3g} of it")
-    return RegionDesign(**found)
+    region = RegionDesign(**found)
+    if region.violation > 1e-6:
+        warnings.warn("design_region: what is there already damps more than largest_ratio allows, by "
+                      f"{region.violation:.3g}", stacklevel=2)
+    elif region.level < 0.1:
+        warnings.warn(f"design_region: the smallest ratio is {region.level:.3g} of the one wanted; "
+                      "largest_ratio or the structure binds", stacklevel=2)
+    return region

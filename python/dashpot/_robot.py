@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from typing import Any, Sequence
+from typing import Any, Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -97,6 +97,16 @@ class Robot:
         file = os.fspath(path)
         return cls(_core.read_urdf(file), base, tip, file=file, **options)
 
+    def _for_gains(self, urdf_friction: bool) -> Robot:
+        """Returns the robot without the viscous friction of its URDF, unless that is asked for or
+        other friction is stated."""
+        urdf, base, tip, file, options = self._arguments
+        stated = "viscous_friction" in options or options.get("drives_friction")
+        if urdf_friction or stated or not self.viscous_friction.any():
+            return self
+        return _make_robot(urdf, base, tip, file,
+                           {**options, "viscous_friction": np.zeros(len(self))})
+
     def __reduce__(self) -> tuple[Any, ...]:
         return _make_robot, self._arguments
 
@@ -168,6 +178,14 @@ def _sized(name: str, given: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
     return numbers
 
 
+def check_postures(robot: Robot, name: str, postures: Iterable[Array]) -> None:
+    """Raises Error for the first of the postures (n, rad) outside the robot's position limits."""
+    for i, q in enumerate(postures):
+        complaint = robot._core.outside_limits(q)
+        if complaint:
+            raise Error(f"{name}{'' if name == 'q' else f'[{i}]'}: {complaint}")
+
+
 def selected(directions: Sequence[str]) -> list[bool]:
     """Returns which of the six directions are named."""
     for direction in directions:
@@ -219,7 +237,7 @@ def closed_loop(robot: Robot, q: npt.ArrayLike, *, task_stiffness: npt.ArrayLike
     a pose of the tip, with `task_stiffness` K_C and `task_damping` C_C (6 x 6, in the axes of
     `frame`, base or tool). In the motions that the selected `directions` leave free act
     `null_stiffness` and `null_damping` (n each). A damping ratio above 0 has the damping designed
-    for it. The springs hold an `external_wrench` (6, of the world on the tip, in
+    for it; the robot's viscous friction comes on top, and moves the ratios. The springs hold an `external_wrench` (6, of the world on the tip, in
     the base's axes) at q; `load` says how it moves with the arm, which adds stiffness: base_wrench,
     tool_wrench (it turns with the tip), joint_torques (its joint torques are constant).
 

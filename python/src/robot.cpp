@@ -4,6 +4,7 @@
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
@@ -215,6 +216,12 @@ void add_robot(nb::module_& m) {
              return to_list(robot.model.joints(), [](const Joint& joint) { return joint.name; });
            })
       .def("joint_properties", &joint_properties)
+      .def("outside_limits",
+           [](const Robot& robot, const Vector& q) {
+             return controller::outside_limits(robot.model, robot.joint_vector("q", q));
+           })
+      .def("middle_posture",
+           [](const Robot& robot) { return to_array(controller::middle_posture(robot.model)); })
       .def("missing_rotors",
            [](const Robot& robot) { return controller::missing_rotors_text(robot.model); })
       .def("pose", &pose)

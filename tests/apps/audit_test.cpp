@@ -194,7 +194,7 @@ TEST(Audit, RefusesInOneLineThatNamesTheOption) {
       {{"--stiffness", "1,1,1"}, "--damping: give --damping or --damping-factor"},
       {{"--stiffness", "1,1,1", "--damping-factor", "2"}, "--stiffness: 3 numbers, expected 6"},
       {{"--stiffness", "1,1,1,1,1,-1", "--damping", "1,1,1,1,1,1"},
-       "task_stiffness: is not positive semidefinite"},
+       "--stiffness: a number is negative"},
       {{"--preset", "crisp", "--delay", "1"}, "--period: missing"},
       {{"--preset", "crisp", "--integral-time", "1"}, "--period: missing"},
       {{"--preset", "crisp", "--q", "1,2"}, "--q: 2 numbers, expected 7"},

@@ -261,7 +261,7 @@ TEST(Design, RefusesInOneLine) {
   }
   const Words arm = {"--damping-ratio", "1", "--task-stiffness", "1,1,1,1,1,1"};
   for (const auto& [options, reason] : std::vector<std::pair<Words, std::string>>{
-           {{"--damping-ratio", "1"}, "--task-stiffness: is needed"},
+           {{"--damping-ratio", "1"}, "--task-stiffness: or --joint-stiffness is needed"},
            {{"--damping-ratio", "1", "--task-stiffness", "1,2"}, "2 numbers, expected 6"},
            {joined(arm, {"--q", "1"}), "1 numbers, expected 7"},
            {joined(arm, {"--period", "1 kg"}), "--period: a time in s is wanted, not"},

@@ -1,10 +1,13 @@
 // What `dashpot inspect` prints, and what it says to bad input.
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>
 
 #include <gmock/gmock.h>
 
+#include <array>
+#include <cstdio>
 #include <string>
 #include <vector>
 
@@ -56,7 +59,7 @@ Rows rows_of(const Eigen::MatrixXd& matrix) {
 /// Compares the object with KDL's numbers.
 void expect_matches(const Json& result, const controller::DynamicsResult& expected) {
   const auto vector = [](const Eigen::MatrixXd& v) { return rows_of(v.transpose()); };
-  EXPECT_EQ(result.size(), 9u);
+  EXPECT_EQ(result.size(), 10u);
   expect_near(result["mass_matrix"], rows_of(expected.M), 1e-12);
   expect_near({result["coriolis"]}, vector(expected.coriolis), 1e-12);
   expect_near({result["gravity"]}, vector(expected.gravity), 1e-12);
@@ -71,10 +74,15 @@ TEST(Inspect, PrintsWhatKdlComputesForEachArm) {
     SCOPED_TRACE(arm.file);
     const controller::RobotModel model = dashpot::testing::arm_model(arm);
     const bool six = model.dof() == 6;
-    const std::string q = six ? "0.1,-0.2,0.3,-0.4,0.5,-0.6" : "0.1,-0.2,0.3,-0.4,0.5,-0.6,0.7";
     const std::string qd = six ? "1,0,-1,0.5,2,-2" : "1,0,-1,0.5,2,-2,1e-1";
-    controller::JointVector position(model.dof()), velocity(model.dof());
-    for (int i = 0; i < model.dof(); ++i) position[i] = (i % 2 == 0 ? 0.1 : -0.1) * (i + 1);
+    controller::JointVector position = controller::middle_posture(model), velocity(model.dof());
+    std::string q;
+    for (int i = 0; i < model.dof(); ++i) {
+      position[i] += (i % 2 == 0 ? 0.1 : -0.1) * (i + 1);
+      std::array<char, 40> text{};
+      std::snprintf(text.data(), text.size(), "%s%.17g", i > 0 ? "," : "", position[i]);
+      q += text.data();
+    }
     velocity.head(6) << 1, 0, -1, 0.5, 2, -2;
     if (!six) velocity[6] = 0.1;
     expect_matches(parse(inspect(arm, {"--q", q, "--qd", qd, "--json"})),
@@ -82,11 +90,11 @@ TEST(Inspect, PrintsWhatKdlComputesForEachArm) {
   }
 }
 
-TEST(Inspect, TakesZerosAndEarthsGravityUnlessToldOtherwise) {
+TEST(Inspect, TakesTheMiddleOfTheLimitsAndEarthsGravityUnlessToldOtherwise) {
   const Json plain = parse(inspect_panda({"--json"}));
-  const Json zeros = parse(inspect_panda(
-      {"--json", "--q", "0,0,0,0,0,0,0", "--qd", "0,0,0,0,0,0,0", "--gravity", "0,0,-9.81"}));
-  EXPECT_EQ(plain, zeros);
+  const Json told = parse(inspect_panda({"--json", "--q", "0,0,0,-1.5708,0,1.8675,0", "--qd",
+                                         "0,0,0,0,0,0,0", "--gravity", "0,0,-9.81"}));
+  EXPECT_EQ(plain, told);
   EXPECT_EQ(plain["coriolis"], Json(Numbers(7, 0.0)));
   const Json upside_down = parse(inspect_panda({"--json", "--gravity", "0,0,9.81"}));
   for (std::size_t i = 0; i < 7; ++i) {
@@ -118,11 +126,28 @@ TEST(Inspect, ListsTheJointsWithTheirLimits) {
                          {"reflected_inertia", 0.0}}}));
 }
 
+TEST(Inspect, RefusesDegreesWithoutTheirUnit) {
+  expect_refusal(
+      inspect_panda({"--q", "0,-45,0,-135,0,90,45"}),
+      "--q: joint 'panda_joint2' at -45 rad is outside its limits -1.7628 to 1.7628 rad; "
+      "if these are degrees, give each number its unit: 'deg'; --outside-limits takes");
+  expect_refusal(inspect_panda({"--q", "0,-45,0,-135,0,90,45 deg"}),
+                 "--q: '-45' has no unit beside '45 deg'");
+  EXPECT_EQ(inspect_panda({"--q", "0,-45,0,-135,0,90,45", "--outside-limits"}).status, 0);
+  // Its numbers are as true a little outside the limits as inside: a warning is enough.
+  const Outcome outside = inspect_panda({"--q", "0,0,0,0,0,0,0"});
+  EXPECT_EQ(outside.status, 0);
+  EXPECT_EQ(outside.err,
+            "warning: --q: joint 'panda_joint4' at 0 rad is outside its limits -3.0718 to -0.0698 "
+            "rad\n");
+}
+
 TEST(Inspect, TakesUnits) {
-  EXPECT_EQ(parse(inspect_panda(
-                {"--json", "--q", "90 deg,0,-180deg,0,1,0,0", "--qd", "60 rpm,0,0,0,0,0,0"})),
-            parse(inspect_panda({"--json", "--q", "1.5707963267948966,0,-3.141592653589793,0,1,0,0",
-                                 "--qd", "6.283185307179586,0,0,0,0,0,0"})));
+  EXPECT_EQ(
+      parse(inspect_panda(
+          {"--json", "--q", "90 deg,0,-150deg,-1 rad,0,1 rad,0", "--qd", "60 rpm,0,0,0,0,0,0"})),
+      parse(inspect_panda({"--json", "--q", "1.5707963267948966,0,-2.6179938779914944,-1,0,1,0",
+                           "--qd", "6.283185307179586,0,0,0,0,0,0"})));
   const dashpot::testing::Arm lift = {"lift_gripper", "base", "fingertip"};
   EXPECT_EQ(parse(inspect(lift, {"--json", "--q", "25 cm,90 deg,0,0,1 cm"})),
             parse(inspect(lift, {"--json", "--q", "0.25,1.5707963267948966,0,0,0.01"})));

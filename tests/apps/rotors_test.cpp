@@ -77,7 +77,8 @@ TEST(RotorsOfDesign, AreNamedWhereTheLoopBearsLess) {
                          "2"};
   const Json plain = parse(run_program(of_panda("design", joined(options, {"--json"}))));
   EXPECT_EQ(plain["rotors"], "unknown");
-  ASSERT_EQ(plain["notes"].size(), 1U);
+  ASSERT_EQ(plain["notes"].size(), 2U);
+  EXPECT_THAT(plain["notes"][1].get<std::string>(), HasSubstr("friction"));
   EXPECT_THAT(plain["notes"][0].get<std::string>(),
               AllOf(HasSubstr("no reflected inertia of any joint"),
                     HasSubstr("With the published drives panda it bears"),
@@ -85,7 +86,7 @@ TEST(RotorsOfDesign, AreNamedWhereTheLoopBearsLess) {
   const Json known =
       parse(run_program(of_panda("design", joined(options, {"--json", "--drives", "panda"}))));
   EXPECT_EQ(known["rotors"], "known");
-  EXPECT_EQ(known["notes"].size(), 1U);
+  EXPECT_EQ(known["notes"].size(), 2U);
   EXPECT_THAT(known["notes"][0].get<std::string>(),
               HasSubstr("Drives panda, public figures: round numbers"));
   EXPECT_EQ(known["drives"]["name"], "panda");

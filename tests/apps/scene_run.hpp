@@ -21,8 +21,15 @@ inline Outcome run_scene(const std::string& path, const Words& options = {}) {
   return run_program(joined({"run", path, "--fast"}, options));
 }
 
+/// The summary; the exit status is 1, with a line about it, only if a fault is latched at the end.
 inline Json run_json(const std::string& path, const Words& options = {}) {
-  return parse(run_scene(path, joined(options, {"--json"})));
+  const Outcome outcome = run_scene(path, joined(options, {"--json"}));
+  if (outcome.status == 0) return parse(outcome);
+  EXPECT_EQ(outcome.status, 1) << outcome.err;
+  EXPECT_NE(outcome.err.find("dashpot run: ended in a fault: "), std::string::npos) << outcome.err;
+  Json result = Json::parse(outcome.out);
+  EXPECT_FALSE(result["fault"].is_null());
+  return result;
 }
 
 /// A scene with parts of its text replaced, its URDF named absolutely, in a file of its own.

@@ -69,7 +69,7 @@ inline const std::vector<Room>& rooms() {
       {"controller/model",
        1,
        {"attachment", "robot_model", "robot_description", "kdl_chain", "dynamics",
-        "default_settings", "drives"},
+        "default_settings", "drives", "posture"},
        {kText, kEigen, "kdl/", "urdf_", "console_bridge/"}},
       {"controller/yaml", 1, {}, {kEigen, "yaml-cpp/"}},
       {"controller/motion", 2, {}, {kEigen}},

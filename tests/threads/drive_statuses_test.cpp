@@ -108,8 +108,7 @@ class DriveStatuses : public ::testing::TestWithParam<Arm> {
     driving.send(SIGTERM);
     while (writer.step(20)) {
     }
-    EXPECT_EQ(driving.finish(), 0) << driving.complaints();
-    return Json::parse(driving.output());
+    return summary_of(driving);
   }
   /// After some statuses that were answered.
   void begin() {
@@ -142,8 +141,7 @@ TEST_P(DriveStatuses, TheTorqueFadesBeforeTheEnd) {
     writer.next.utime += 2000;  // 3 ms each: on a busy machine it does not wait for ever
     silent = writer.step(20) ? 0 : silent + 1;
   }
-  EXPECT_EQ(driving.finish(), 0) << driving.complaints();
-  EXPECT_EQ(Json::parse(driving.output())["ended"], "ended by the user");
+  EXPECT_EQ(summary_of(driving)["ended"], "ended by the user");
   ASSERT_GT(writer.commands.size(), 50u);
   double before = pull;
   std::int64_t then = writer.commands.front().utime - 1000;

@@ -67,6 +67,15 @@ class Running {
   int status_ = 0;
 };
 
+/// Waits for the end of a loop with --json, and returns what it says; its exit status is 1 only if
+/// a fault is latched at the end.
+inline nlohmann::json summary_of(Running& loop) {
+  const int status = loop.finish();
+  nlohmann::json result = nlohmann::json::parse(loop.output());
+  EXPECT_EQ(status, result["fault"].is_null() ? 0 : 1) << loop.complaints();
+  return result;
+}
+
 /// What comes over a bus.
 class Listener {
  public:

@@ -1,4 +1,4 @@
-#include <dashpot/apps/audit/posture_files.hpp>
+#include <dashpot/apps/cli/posture_files.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/yaml/yaml_document.hpp>
 #include <dashpot/controller/yaml/yaml_mapping.hpp>
