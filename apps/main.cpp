@@ -55,6 +55,7 @@ int run(int argc, char** argv) {
   add_audit(program);
   add_identify(program);
   add_run(program);
+  add_command(program);
   add_drive(program);
   add_fake_driver(program);
 
