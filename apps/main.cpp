@@ -30,7 +30,7 @@ std::string nearest_subcommand(const CLI::App& program, const std::string& word)
   std::size_t longest = 1;  // a single letter says nothing
   for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
     const std::string name = command->get_name();
-    if (name == word) return "";
+    if (command->check_name(word)) return "";
     all += (all.empty() ? "" : ", ") + name;
     const auto end = std::mismatch(name.begin(), name.end(), word.begin(), word.end()).first;
     const auto common = static_cast<std::size_t>(end - name.begin());
@@ -55,6 +55,7 @@ int run(int argc, char** argv) {
   add_audit(program);
   add_identify(program);
   add_run(program);
+  add_command(program);
   add_drive(program);
   add_fake_driver(program);
 

@@ -214,8 +214,10 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
   add("--tip", arm.tip, "Link at the end of the chain", "LINK")->required();
   add("--preset", options.preset, "Default gains of a public controller", "NAME")
       ->check(CLI::IsMember(preset_names()));
-  add("--stiffness", options.stiffness, "Diagonal, N/m and N m/rad", "x,y,z,rx,ry,rz");
-  add("--damping", options.damping, "Diagonal, N s/m and N m s/rad", "x,y,z,rx,ry,rz");
+  add("--stiffness,--task-stiffness", options.stiffness, "Diagonal, N/m and N m/rad",
+      "x,y,z,rx,ry,rz");
+  add("--damping,--task-damping", options.damping, "Diagonal, N s/m and N m s/rad",
+      "x,y,z,rx,ry,rz");
   command.add_option("--damping-factor", options.damping_factor, "Damping is F sqrt(stiffness)")
       ->transform(positive("", "a positive factor"))
       ->option_text("F");
@@ -249,7 +251,7 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
   command.add_option("--damping-ratio", options.damping_ratio, "Wanted of the suggested damping")
       ->transform(positive("", "a positive ratio"))
       ->option_text("Z (F/2, or 0.7)");
-  command.add_option("--jobs", options.jobs, "Threads; 0: one for each processor")
+  command.add_option("--jobs,--threads", options.jobs, "Threads; 0: one for each processor")
       ->check(CLI::Range(0, 1024))
       ->option_text("N (0)");
   add("--csv", options.csv, "Write a line for each posture there", "FILE");

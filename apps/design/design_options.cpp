@@ -31,8 +31,9 @@ void add_arm(CLI::App& command, ArmOptions& arm) {
   arm.posture.add(command);
   add("--joint-stiffness", arm.joint_stiffness, "Instead of the task's: of the joints, N m/rad",
       "a,b,...|x");
-  add("--task-stiffness", arm.task_stiffness, "Diagonal of it, N/m and N m/rad", "x,y,z,rx,ry,rz");
-  add("--task-damping", arm.task_damping, "Diagonal of the one before", "x,y,z,rx,ry,rz");
+  add("--task-stiffness,--stiffness", arm.task_stiffness, "Diagonal of it, N/m and N m/rad",
+      "x,y,z,rx,ry,rz");
+  add("--task-damping,--damping", arm.task_damping, "Diagonal of the one before", "x,y,z,rx,ry,rz");
   add_model_options(command, arm);
   add("--null-damping", arm.null_damping, "Of the motions that the task leaves free, N m s/rad",
       "a,b,...|x (0)");
@@ -120,7 +121,8 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
       ->option_text("R (1 or 1.5 Z)");
   command.add_option("--csv", options.csv, "With --region: write the map of the worst mode there")
       ->option_text("FILE");
-  command.add_option("--threads", options.threads, "With --region; 0: one for each processor")
+  command
+      .add_option("--threads,--jobs", options.threads, "With --region; 0: one for each processor")
       ->check(CLI::Range(0, 1024))
       ->option_text("N (0)");
   command

@@ -106,6 +106,18 @@ TEST(SingularPosture, NamesTheDirectionsAndSuggestsNothing) {
   EXPECT_FALSE(bent["suggestion"].is_null());
 }
 
+TEST(Options, OfOneMeaningTakeEitherName) {
+  const Outcome audit = ask_panda("audit", kGains);
+  EXPECT_EQ(ask_panda("modes", {"--task-stiffness", "400,400,400,20,20,20", "--damping-factor",
+                                "1.4", "--threads", "1"})
+                .out,
+            audit.out);
+  EXPECT_EQ(audit.status, 0);
+  EXPECT_EQ(
+      ask_panda("design", {"--stiffness", "400,400,400,20,20,20", "--damping-ratio", "0.7"}).out,
+      ask_panda("design", kSprings).out);
+}
+
 TEST(MistypedWords, AreNamedWithWhatMayBeMeant) {
   expect_refusal(run_program({"analyse", "x"}),
                  "'analyse' is no subcommand; did you mean analyze?");

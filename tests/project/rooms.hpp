@@ -126,6 +126,7 @@ inline const std::vector<Room>& rooms() {
       {"apps/drive", 3, {}, {""}},
       {"apps/fake_driver", 3, {}, {""}},
       {"apps/export", 3, {}, {""}},
+      {"apps/command", 3, {}, {""}},
       {"apps/web", 3, {}, {""}},
       {"apps/monitor", 4, {}, {""}},
       {"apps", 5, {}, {""}},

@@ -1,0 +1,62 @@
+// `dashpot command` beside a loop that runs.
+#include <dashpot/tests/apps/run_program.hpp>
+#include <dashpot/tests/threads/live_run.hpp>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+Outcome command(const LiveRun& live, const Words& words) {
+  return run_program(joined(joined({"command"}, words), {"--lcm-url", live.url}));
+}
+
+TEST(CommandProgram, MovesAnArmAndSetsItsGains) {
+  LiveRun live(scene("panda"));
+  if (!live.heard(1)) GTEST_SKIP() << kNoMulticast;
+  const Outcome moved = command(
+      live, {"--mode", "joint", "--joint-position", "0,-45 deg,0,-135 deg,0,90 deg,40 deg"});
+  EXPECT_EQ(moved.out, "accepted\n") << moved.err;
+  EXPECT_TRUE(live.until([&] { return std::abs(live.state.joint_position[6] - 0.6981) < 0.01; }))
+      << live.state.joint_position[6];
+  const Outcome softer =
+      command(live, {"--mode", "cartesian", "--stiffness", "200,200,200,10,10,10",
+                     "--damping-ratio", "0.9", "--payload", "0 kg"});
+  EXPECT_EQ(softer.out, "accepted\n") << softer.err;
+  EXPECT_TRUE(live.until([&] {
+    return live.modes.num_modes >= 6 && std::abs(live.modes.damping_ratio[0] - 0.9) < 0.05;
+  }));
+  // What the loop refuses is an error of the program's, with the loop's reason.
+  const Outcome far = command(live, {"--joint-position", "0,-0.8,0,-2.4,0,1.6,40"});
+  EXPECT_EQ(far.status, 1);
+  EXPECT_THAT(far.err, HasSubstr("dashpot command: refused: "));
+  expect_refusal(command(live, {"--release"}), "--release: no fault is latched");
+  expect_refusal(command(live, {}), "says nothing");
+  expect_refusal(command(live, {"--stiffness", "1,1,1,1,1,1"}),
+                 "--stiffness: needs --damping or --damping-ratio");
+  expect_refusal(command(live, {"--joint-position", "1,2"}), "2 numbers, expected 7");
+  live.end();
+}
+
+TEST(CommandProgram, SaysWhereNobodyListens) {
+  const std::string url = own_url();
+  const Outcome nobody =
+      run_program({"command", "--release", "--lcm-url", url, "--timeout", "0.2 s"});
+  EXPECT_EQ(nobody.status, 1);
+  EXPECT_THAT(nobody.err, HasSubstr("no loop publishes states on " + url));
+  LiveRun deaf(scene("panda"), {});
+  if (!deaf.heard()) GTEST_SKIP() << kNoMulticast;
+  const Outcome ignored = command(deaf, {"--mode", "joint", "--timeout", "0.3 s"});
+  EXPECT_EQ(ignored.status, 1);
+  EXPECT_THAT(ignored.err, HasSubstr("no answer; does the loop take commands"));
+  deaf.end();
+}
+
+}  // namespace
+}  // namespace dashpot::tests
