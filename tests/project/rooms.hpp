@@ -122,6 +122,7 @@ inline const std::vector<Room>& rooms() {
       {"apps/design", 2, {}, {""}},
       {"apps/identify", 2, {}, {""}},
       {"apps/loop", 2, {}, {""}},
+      {"apps/check_model", 3, {}, {""}},
       {"apps/audit", 3, {}, {""}},
       {"apps/run", 3, {}, {""}},
       {"apps/drive", 3, {}, {""}},
