@@ -1,3 +1,4 @@
+#include <dashpot/apps/check_model/driver_log.hpp>
 #include <dashpot/apps/check_model/torque_file.hpp>
 #include <dashpot/apps/identify/motion_file.hpp>
 #include <dashpot/controller/input_error.hpp>
@@ -52,7 +53,8 @@ Quantity quantity_of(const MotionChannel& channel) {
   if (channel.unit == "rad/s" || channel.unit == "m/s") return Quantity::kVelocity;
   if (channel.unit == "N m" || channel.unit == "N") return Quantity::kTorque;
   if (!channel.unit.empty()) return Quantity::kOther;
-  if (has_any(words, {"tau", "torque", "torques", "effort", "efforts"})) return Quantity::kTorque;
+  if (has_any(words, {"tau", "torque", "torques", "effort", "efforts", "moment"}))
+    return Quantity::kTorque;
   if (has_any(words, {"qd", "dq", "vel", "velocity", "velocities"})) return Quantity::kVelocity;
   if (has_any(words, {"q", "pos", "position", "positions", "angle"})) return Quantity::kPosition;
   return Quantity::kOther;
@@ -269,6 +271,7 @@ TorqueFile read_torque_file(const std::string& path, const RobotModel& model,
                             const std::string& positions, const std::string& torques) try {
   const MotionFile file = [&path] {
     try {
+      if (std::optional<MotionFile> driver = read_driver_log(path)) return *std::move(driver);
       return read_motion_file(path);
     } catch (const InputError& error) {
       // The file's name comes in front below.

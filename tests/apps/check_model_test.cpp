@@ -1,4 +1,5 @@
 // `dashpot check-model`: what a user sees, and what is refused.
+#include <dashpot/lcmtypes/driver.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/torque_record.hpp>
@@ -185,6 +186,36 @@ TEST(CheckModelProgram, WritesTheConfigurationAndKeepsTheRest) {
   const Json noted = check({file, "--config", anchors, "--write", scratch.path("n.yaml")});
   EXPECT_THAT(noted["notes"].dump(), HasSubstr("were not kept"));
   EXPECT_EQ(run_program({"check-model", file, "--config", scratch.path("n.yaml")}).status, 0);
+}
+
+TEST(CheckModelProgram, TakesMeasuredTorquesOfADriversLog) {
+  const Scratch scratch;
+  const controller::TorqueRecord& record = panda_record();
+  std::string log;
+  const auto add = [&log](std::uint64_t number, int bytes) {
+    for (int i = bytes - 1; i >= 0; --i) log += static_cast<char>(number >> (8 * i) & 0xFF);
+  };
+  for (Eigen::Index i = 0; i < record.time.size(); ++i) {
+    lcmtypes::DriverStatus status;
+    status.utime = 1'700'000'000'000'000 + std::llround(1e6 * record.time[i]);
+    status.position = record.position.col(i);
+    status.velocity.setZero(7);
+    status.torque = record.torque.col(i);
+    status.external.setZero(7);
+    std::vector<std::uint8_t> bytes;
+    lcmtypes::encode(lcmtypes::DriverKind::kPanda, status, bytes);
+    const std::string channel = "PANDA_STATUS";
+    add(0xEDA1DA01, 4);
+    add(static_cast<std::uint64_t>(i), 8);
+    add(static_cast<std::uint64_t>(status.utime), 8);
+    add(channel.size(), 4);
+    add(bytes.size(), 4);
+    log += channel;
+    log.append(bytes.begin(), bytes.end());
+  }
+  const Json found = check({scratch.write("panda.lcm", log), "--config", panda_config(scratch)});
+  EXPECT_NEAR(found["payload"]["mass"].get<double>(), 1.3, 0.02);
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("that the driver measured"));
 }
 
 /// The simulator shares no mechanics with the controller's model.
