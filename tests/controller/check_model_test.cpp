@@ -164,6 +164,20 @@ TEST(CheckModel, TakesGapsMissingAndRepeatedSamples) {
   }
 }
 
+TEST(CheckModel, TakesPositionsThatComeMoreRarelyThanTorques) {
+  RecordedArm arm = loaded_panda();
+  arm.rate = 1000;
+  arm.slowest = 0.2;
+  TorqueRecord record = arm.record(18);
+  for (Eigen::Index i = 0; i < record.time.size(); ++i) {
+    if (i % 10 > 0) record.position.col(i) = record.position.col(i - 1);
+  }
+  const ModelCheck check = check_model(panda(), {record});
+  expect_loaded_panda(check, 0.01, 0.003);
+  // Positions that are taken to be as old as their repetitions lag by 4.5 ms.
+  for (const JointCheck& joint : check.joints) EXPECT_LT(joint.residual_after, 0.04);
+}
+
 TEST(CheckModel, LeavesOutAContact) {
   RecordedArm arm = loaded_panda();
   arm.contact_from = 5;
