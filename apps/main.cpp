@@ -54,6 +54,7 @@ int run(int argc, char** argv) {
   add_design(program);
   add_audit(program);
   add_identify(program);
+  add_check_model(program);
   add_run(program);
   add_command(program);
   add_drive(program);

@@ -14,9 +14,9 @@ namespace dashpot::controller {
 /// contain no Eigen matrices.
 
 /// Returns the chain from B to T. It has a segment for each joint, whose tip is the URDF's link
-/// with all links that are rigidly fixed to it, and one more segment, without a joint and massless,
-/// that ends in T. Reflected inertias are KDL's joint inertias. The chain lives as long as the
-/// model or a copy of the model.
+/// (by which it is called) with all links that are rigidly fixed to it, and one more segment,
+/// without a joint and massless, that ends in T. Reflected inertias are KDL's joint inertias. The
+/// chain lives as long as the model or a copy of the model.
 const KDL::Chain& kdl_chain(const RobotModel& model) noexcept;
 
 }  // namespace dashpot::controller

@@ -29,6 +29,7 @@ void add_export(CLI::App& program);
 void add_design(CLI::App& program);
 void add_audit(CLI::App& program);
 void add_identify(CLI::App& program);
+void add_check_model(CLI::App& program);
 void add_run(CLI::App& program);
 void add_command(CLI::App& program);
 void add_drive(CLI::App& program);

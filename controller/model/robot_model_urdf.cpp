@@ -193,7 +193,7 @@ void make_chain(const urdf::ModelInterface& tree,
       finish();
       const auto type =
           joint.type == urdf::Joint::PRISMATIC ? KDL::Joint::TransAxis : KDL::Joint::RotAxis;
-      segment = KDL::Segment(joint.name,
+      segment = KDL::Segment(joint.child_link_name,
                              KDL::Joint(joint.name, origin.p, origin.M * to_kdl(joint.axis), type,
                                         1, 0, joints[moving].reflected_inertia),
                              origin);

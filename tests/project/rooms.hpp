@@ -81,6 +81,7 @@ inline const std::vector<Room>& rooms() {
        {kAnalysis, kText, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
       {"controller/core", 5, {"controller"}, {kAnalysis, kEigen}},
       {"controller/audit", 5, {"audit", "gain_judge"}, {kAnalysis, kEigen}},
+      {"controller/check_model", 5, {"check_model", "torque_record"}, {kText, kEigen, "kdl/"}},
       {"controller/config", 6, {"config"}, {kEigen}},
       {"controller/plugin", 7, {"plugin"}, {kAnalysis, kEigen, "stdint.h"}},  // plugin.h is C
 
@@ -121,6 +122,7 @@ inline const std::vector<Room>& rooms() {
       {"apps/design", 2, {}, {""}},
       {"apps/identify", 2, {}, {""}},
       {"apps/loop", 2, {}, {""}},
+      {"apps/check_model", 3, {}, {""}},
       {"apps/audit", 3, {}, {""}},
       {"apps/run", 3, {}, {""}},
       {"apps/drive", 3, {}, {""}},

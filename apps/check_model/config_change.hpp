@@ -1,0 +1,19 @@
+#pragma once
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// A key of a YAML file, from the root on, and its new value as YAML.
+struct ConfigChange {
+  std::vector<std::string> path;
+  std::string value;
+};
+
+/// Returns the text of a YAML mapping with some keys changed or added, and everything else,
+/// comments too, as it was. Where the text cannot be changed so (anchors, block sequences), it is
+/// written anew, without comments, and `kept` is false.
+std::string changed_config(const std::string& text, const std::vector<ConfigChange>& changes,
+                           bool& kept);
+
+}  // namespace dashpot::apps

@@ -1,0 +1,26 @@
+#pragma once
+#include <dashpot/controller/check_model.hpp>
+#include <dashpot/controller/robot_model.hpp>
+
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// A record of positions and torques, and which columns they are.
+struct TorqueFile {
+  controller::TorqueRecord record;
+  std::vector<std::string> positions, torques;  ///< names, in the model's order
+  std::vector<std::string> notes;
+};
+
+/// Reads a CSV file or an LCM log (see read_motion_file, read_driver_log) of the motion of a
+/// model's joints. Columns are told by their units or names; they belong to the joints by the
+/// joints' names or by numbers. `positions` and `torques` name the columns, "a,b,...", in the
+/// model's order; empty: those that are found. Throws InputError that names the file, the column
+/// and the value, for columns that are not found, and for positions or velocities that must be in
+/// degrees.
+TorqueFile read_torque_file(const std::string& path, const controller::RobotModel& model,
+                            const std::string& positions, const std::string& torques);
+
+}  // namespace dashpot::apps

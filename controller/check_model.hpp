@@ -1,0 +1,67 @@
+#pragma once
+#include <dashpot/controller/robot_description.hpp>
+#include <dashpot/controller/torque_record.hpp>
+
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace dashpot::controller {
+
+/// A fitted parameter. The truth lies within 1.96 deviations of the value in 95 of 100 cases.
+struct Estimate {
+  double value = 0;
+  double deviation = std::numeric_limits<double>::infinity();
+  bool determined = false;  ///< the records narrow it down
+};
+
+/// What torques say of one joint. For a prismatic joint read N for N m.
+struct JointCheck {
+  /// Root mean square of torque less model, N m, over means of about 2 T: of the model's M, C and g
+  /// alone, and with all that was fitted.
+  double residual_before = 0, residual_after = 0;
+  Estimate offset;            ///< N m
+  Estimate coulomb_friction;  ///< N m; all of it, whatever the model says
+  Estimate viscous_friction;  ///< N m s/rad; likewise
+  bool moves = false;         ///< enough for its friction
+  std::string suspicious;  ///< why the model or the data of this joint is doubted; empty: it is not
+};
+
+/// The payload with which the torques agree best, in place of that of the description.
+struct PayloadCheck {
+  Estimate mass;                   ///< kg
+  std::array<Estimate, 3> center;  ///< of mass, from the tip link's origin, m
+};
+
+/// A stretch of a record that was left out.
+struct LeftOut {
+  int record = 0;
+  double from = 0, to = 0;  ///< s, of the record's time
+};
+
+struct ModelCheck {
+  TorqueKind kind = TorqueKind::kWhole;
+  std::vector<JointCheck> joints;
+  PayloadCheck payload;
+  /// Which columns look exchanged or turned around, and which joints' torques fit far better then;
+  /// empty: none. The other results mean little until that is mended.
+  std::vector<std::string> order;
+  std::vector<std::string> ambiguities;  ///< what the records cannot tell apart
+  std::vector<LeftOut> contacts;         ///< where other forces acted
+  double used = 0;                       ///< s of motion
+  double window = 0;                     ///< 2 T, s
+};
+
+/// Compares the torques of records with the model, and fits offset, Coulomb and viscous friction of
+/// each joint, and a payload. Accelerations are not needed, because the equations of motion are
+/// taken in their weak form: with p = M qd and a test function f that vanishes at both ends,
+///     integral f torque = - integral f' p - integral f dL/dq,   dL/dq = Mdot qd - C qd - g
+/// Positions are differentiated once, by local cubic polynomials, and torques pass through the same
+/// filter. docs/check-model.md says how residuals become deviations.
+///
+/// Throws std::invalid_argument, with a sentence, for records of other sizes, or which are too
+/// short or not sampled often enough, and InvalidModel.
+ModelCheck check_model(const RobotDescription& robot, const std::vector<TorqueRecord>& records);
+
+}  // namespace dashpot::controller

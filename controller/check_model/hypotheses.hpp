@@ -1,0 +1,29 @@
+#pragma once
+#include <dashpot/controller/check_model/weak_form.hpp>
+#include <dashpot/controller/robot_description.hpp>
+
+#include <string>
+#include <vector>
+
+namespace dashpot::controller {
+
+/// Something that may be wrong with the model or a sensor, and what it would add to the torques.
+struct Hypothesis {
+  int joint = 0;                         ///< to which it belongs
+  std::vector<Eigen::MatrixXd> columns;  ///< each n x K, torque for a unit
+  /// What is said of it: "the mass of link 'a' is", and the unit, with the factor of its value.
+  std::string what, unit;
+  double factor = 1;
+};
+
+/// A link's mass and where its centre is, reflected inertias, and torques with a wrong scale.
+/// `model_torque` is n x K.
+std::vector<Hypothesis> list_hypotheses(const RobotDescription& robot, const RobotModel& model,
+                                        const WeakForm& form, const Eigen::MatrixXd& model_torque);
+
+/// What a unit of mass (1), first moment (3) and inertia about the origin (6: xx yy zz xy xz yz),
+/// fixed to the tip link of `model`, takes in torques, n x K each: the first `count` of them.
+std::vector<Eigen::MatrixXd> body_columns(const RobotModel& model, const WeakForm& form,
+                                          std::size_t count);
+
+}  // namespace dashpot::controller

@@ -1,0 +1,36 @@
+#pragma once
+#include <dashpot/controller/check_model/weak_form.hpp>
+
+#include <string>
+#include <vector>
+
+namespace dashpot::controller {
+
+/// Which column with which sign is taken for each joint.
+struct ColumnOrder {
+  std::vector<Eigen::Index> from;
+  Eigen::VectorXd sign;
+
+  explicit ColumnOrder(Eigen::Index n);
+  Eigen::MatrixXd apply(const Eigen::MatrixXd& value) const;
+};
+
+/// What the torques seem to be, and how the columns seem to belong to the joints.
+struct JointOrder {
+  TorqueKind kind = TorqueKind::kWhole;
+  ColumnOrder position, torque;
+
+  std::vector<SmoothRun> apply(const std::vector<SmoothRun>& runs) const;
+  /// Returns sentences; none: the columns fit as they are.
+  std::vector<std::string> changes() const;
+  /// Returns the joints, from 0, whose columns are doubted.
+  std::vector<Eigen::Index> joints() const;
+};
+
+/// Tries the kinds of torque, exchanged columns and signs on a part of the motion. What is as it
+/// should be is only doubted where something else leaves a seventh of the variance over, at one
+/// joint, or as little at several together.
+JointOrder find_order(const RobotModel& model, const std::vector<SmoothRun>& runs,
+                      const Smoothing& how);
+
+}  // namespace dashpot::controller

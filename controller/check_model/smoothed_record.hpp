@@ -1,0 +1,30 @@
+#pragma once
+#include <dashpot/controller/torque_record.hpp>
+
+#include <vector>
+
+namespace dashpot::controller {
+
+/// How records are smoothed: local cubic polynomials over `half_width` to either side.
+struct Smoothing {
+  double half_width = 0;       ///< h, s
+  double step = 0;             ///< between two values, s
+  Eigen::VectorXd rate_noise;  ///< n, standard deviation of the smoothed velocity, rad/s
+};
+
+/// A stretch of a record without gaps, smoothed, at evenly spaced times.
+struct SmoothRun {
+  int record = 0;
+  double begin = 0;                            ///< s, of the record's time
+  Eigen::MatrixXd position, velocity, torque;  ///< n x N
+};
+
+/// Chooses the narrowest smoothing that leaves velocities clear of the positions' noise and
+/// quantisation. Throws std::invalid_argument if there are too few samples.
+Smoothing choose_smoothing(const std::vector<TorqueRecord>& records);
+
+/// Smooths the records: positions and torques with the same weights, so that what the filter
+/// takes from one side of the equations of motion it takes from the other.
+std::vector<SmoothRun> smooth(const std::vector<TorqueRecord>& records, const Smoothing& how);
+
+}  // namespace dashpot::controller

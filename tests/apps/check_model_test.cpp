@@ -1,0 +1,254 @@
+// `dashpot check-model`: what a user sees, and what is refused.
+#include <dashpot/lcmtypes/driver.hpp>
+#include <dashpot/tests/apps/json_result.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/torque_record.hpp>
+
+#include <array>
+#include <cstdio>
+#include <functional>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// A Panda whose configuration has comments, and knows no payload.
+std::string panda_config(const Scratch& scratch) {
+  return scratch.write("arm.yaml",
+                       "# my arm\nrobot:\n  urdf: " + testing::arm_path("panda") +
+                           "  # as delivered\n  base: panda_link0\n  tip: panda_hand_tcp\n"
+                           "  payload:  # nothing yet\n    mass: 0 kg  # to be weighed\n"
+                           "control: {mode: joint}  # and so on\n");
+}
+
+const controller::TorqueRecord& panda_record() {
+  static const controller::TorqueRecord record = [] {
+    testing::RecordedArm arm({testing::arm_path("panda"), "panda_link0", "panda_hand_tcp", {}});
+    arm.center.resize(7);
+    arm.center << 0.2, -0.4, 0.3, -1.9, 0.1, 1.7, 0.6;
+    arm.coulomb << 0.8, 1.0, 0.6, 0.9, 0.4, 0.3, 0.2;
+    arm.viscous << 0.5, 0.8, 0.3, 0.6, 0.2, 0.1, 0.05;
+    arm.description.options.payload = {
+        1.3, {0.02, -0.03, 0.05}, Eigen::Matrix3d::Identity() * 0.003};
+    arm.duration = 8;
+    arm.rate = 100;
+    return arm.record(21);
+  }();
+  return record;
+}
+
+/// A CSV file of seven columns of positions called by `position`, and seven of torques.
+std::string csv(const std::function<std::string(int)>& position, double factor,
+                const std::function<std::string(int)>& torque, const std::vector<int>& order) {
+  const controller::TorqueRecord& record = panda_record();
+  std::string text = "time [s]";
+  for (const int j : order) text += "," + position(j);
+  for (const int j : order) text += "," + torque(j);
+  text += "\n";
+  std::array<char, 40> cell{};
+  const auto add = [&](double value) {
+    std::snprintf(cell.data(), cell.size(), ",%.7f", value);
+    text += cell.data();
+  };
+  for (Eigen::Index i = 0; i < record.time.size(); ++i) {
+    std::snprintf(cell.data(), cell.size(), "%.4f", record.time[i]);
+    text += cell.data();
+    for (const int j : order) add(factor * record.position(j, i));
+    for (const int j : order) add(record.torque(j, i));
+    text += "\n";
+  }
+  return text;
+}
+
+const std::vector<int> kInOrder = {0, 1, 2, 3, 4, 5, 6};
+
+std::function<std::string(int)> numbered(const std::string& before, const std::string& after = "") {
+  return [before, after](int j) { return before + std::to_string(j + 1) + after; };
+}
+
+Json check(const Words& arguments) {
+  return parse(run_program(joined({"check-model", "--json"}, arguments)));
+}
+
+TEST(CheckModelProgram, TellsFrictionAndPayloadOfAFile) {
+  const Scratch scratch;
+  const std::string config = panda_config(scratch);
+  const std::string file =
+      scratch.write("a.csv", csv(numbered("q"), 1, numbered("tau_J_"), kInOrder));
+  const Json found = check({file, "--config", config});
+  EXPECT_EQ(found["torques"], "whole");
+  ASSERT_EQ(found["joints"].size(), 7U);
+  const std::array<double, 7> coulomb{0.8, 1.0, 0.6, 0.9, 0.4, 0.3, 0.2};
+  for (std::size_t j = 0; j < 7; ++j) {
+    const Json& joint = found["joints"][j];
+    EXPECT_NEAR(joint["coulomb_friction"].get<double>(), coulomb[j], 0.05);
+    EXPECT_GT(joint["coulomb_friction_std"].get<double>(), 0);
+    EXPECT_LT(joint["residual_rms"]["after"].get<double>(), 0.04);
+    EXPECT_GT(joint["residual_rms"]["before"].get<double>(), 0.15);
+    EXPECT_TRUE(joint["suspicious"].is_null()) << joint.dump();
+  }
+  EXPECT_NEAR(found["payload"]["mass"].get<double>(), 1.3, 0.02);
+  EXPECT_NEAR(found["payload"]["center"][2].get<double>(), 0.05, 0.01);
+  EXPECT_TRUE(found["payload"]["determined"].get<bool>());
+  EXPECT_THAT(found["order"].dump(), "[]");
+  const Outcome table = run_program({"check-model", file, file, "--config", config});
+  EXPECT_EQ(table.status, 0);
+  EXPECT_THAT(table.out, HasSubstr("panda_joint7"));
+  EXPECT_THAT(table.out, HasSubstr("Payload: 1."));
+  EXPECT_THAT(table.out, HasSubstr("No joint is suspicious."));
+}
+
+TEST(CheckModelProgram, FindsColumnsByJointNamesAndUnits) {
+  const Scratch scratch;
+  const std::string config = panda_config(scratch);
+  const std::vector<int> mixed = {3, 1, 6, 0, 2, 5, 4};
+  const double degree = 57.29577951308232;
+  const std::string file =
+      scratch.write("a.csv", csv(numbered("panda_joint", "_pos [deg]"), degree,
+                                 numbered("panda_joint", "_effort [N m]"), mixed));
+  const Json found = check({file, "--config", config});
+  EXPECT_NEAR(found["payload"]["mass"].get<double>(), 1.3, 0.02);
+  EXPECT_THAT(found["order"].dump(), "[]");
+  // The same columns without names that tell.
+  const std::function<std::string(int)> letters = [](int j) {
+    return std::string(1, static_cast<char>('a' + j));
+  };
+  const std::function<std::string(int)> capitals = [](int j) {
+    return std::string(1, static_cast<char>('A' + j));
+  };
+  const std::string plain = scratch.write("b.csv", csv(letters, 1, capitals, mixed));
+  expect_refusal(run_program({"check-model", plain, "--config", config}),
+                 "no columns are known to be the positions of all 7 joints");
+  const Json named = check(
+      {plain, "--config", config, "--positions", "a,b,c,d,e,f,g", "--torques", "A,B,C,D,E,F,G"});
+  EXPECT_NEAR(named["payload"]["mass"].get<double>(), 1.3, 0.02);
+  const Json wrong = check(
+      {plain, "--config", config, "--positions", "a,b,c,d,e,f,g", "--torques", "A,D,C,B,E,F,G"});
+  EXPECT_THAT(wrong["order"].dump(), HasSubstr("1, 4, 3, 2, 5, 6, 7"));
+}
+
+TEST(CheckModelProgram, RefusesInOneLineThatNamesTheColumn) {
+  const Scratch scratch;
+  const std::string config = panda_config(scratch);
+  const std::string degrees =
+      scratch.write("deg.csv", csv(numbered("q"), 57.3, numbered("tau"), kInOrder));
+  const Outcome outcome = run_program({"check-model", degrees, "--config", config});
+  expect_refusal(outcome, "far beyond the limits of joint 'panda_joint1' in rad; degrees need");
+  EXPECT_THAT(outcome.err, HasSubstr("deg.csv: q1: "));
+  std::string text = csv(numbered("q"), 1, numbered("tau"), kInOrder);
+  text.replace(text.find('\n', 2000) + 1, 1, "x");
+  expect_refusal(run_program({"check-model", scratch.write("x.csv", text), "--config", config}),
+                 "x.csv: line ");
+  expect_refusal(run_program({"check-model", degrees, "--config", scratch.path("none.yaml")}),
+                 "none.yaml");
+  expect_refusal(run_program({"check-model", degrees, "--config", config, "--write", config}),
+                 "--write");
+  // Velocities in degrees, though nobody says so.
+  std::string rates = "time";
+  for (int j = 1; j < 8; ++j) rates += ",q" + std::to_string(j);
+  for (int j = 1; j < 8; ++j) rates += ",dq" + std::to_string(j);
+  for (int j = 1; j < 8; ++j) rates += ",tau" + std::to_string(j);
+  for (int i = 0; i < 300; ++i) {
+    rates += "\n" + std::to_string(0.01 * i);
+    for (int j = 0; j < 7; ++j) rates += "," + std::to_string(0.3 * std::sin(0.02 * i));
+    for (int j = 0; j < 7; ++j) rates += "," + std::to_string(57.3 * 0.6 * std::cos(0.02 * i));
+    for (int j = 0; j < 7; ++j) rates += ",1";
+  }
+  expect_refusal(run_program({"check-model", scratch.write("v.csv", rates), "--config", config}),
+                 "v.csv: dq1: 57.");
+}
+
+TEST(CheckModelProgram, WritesTheConfigurationAndKeepsTheRest) {
+  const Scratch scratch;
+  const std::string config = panda_config(scratch);
+  const std::string file = scratch.write("a.csv", csv(numbered("q"), 1, numbered("tau"), kInOrder));
+  const std::string written = scratch.path("new.yaml");
+  check({file, "--config", config, "--write", written});
+  const std::string text = scratch.read("new.yaml");
+  for (const char* kept : {"# my arm\n", "# as delivered\n", "payload:  # nothing yet\n",
+                           "  # to be weighed\n", "control: {mode: joint}  # and so on\n"}) {
+    EXPECT_THAT(text, HasSubstr(kept));
+  }
+  EXPECT_THAT(text, HasSubstr("    mass: 1."));
+  EXPECT_THAT(text, HasSubstr("coulomb_friction: [0.8"));
+  EXPECT_THAT(text, Not(HasSubstr("0 kg")));
+  const Json again = check({file, "--config", written});
+  EXPECT_LT(again["joints"][1]["residual_rms"]["before"].get<double>(), 2);  // 5.5
+  EXPECT_NEAR(again["payload"]["mass"].get<double>(), 1.3, 0.02);
+
+  // One that cannot be changed in place.
+  const std::string anchors = scratch.write(
+      "anchors.yaml", "robot: {urdf: " + testing::arm_path("panda") +
+                          ", base: panda_link0, tip: panda_hand_tcp, viscous_friction: &a [0, 0, "
+                          "0, 0, 0, 0, 0], coulomb_friction: *a}\ncontrol: {mode: joint}\n");
+  const Json noted = check({file, "--config", anchors, "--write", scratch.path("n.yaml")});
+  EXPECT_THAT(noted["notes"].dump(), HasSubstr("were not kept"));
+  EXPECT_EQ(run_program({"check-model", file, "--config", scratch.path("n.yaml")}).status, 0);
+}
+
+TEST(CheckModelProgram, TakesMeasuredTorquesOfADriversLog) {
+  const Scratch scratch;
+  const controller::TorqueRecord& record = panda_record();
+  std::string log;
+  const auto add = [&log](std::uint64_t number, int bytes) {
+    for (int i = bytes - 1; i >= 0; --i) log += static_cast<char>(number >> (8 * i) & 0xFF);
+  };
+  for (Eigen::Index i = 0; i < record.time.size(); ++i) {
+    lcmtypes::DriverStatus status;
+    status.utime = 1'700'000'000'000'000 + std::llround(1e6 * record.time[i]);
+    status.position = record.position.col(i);
+    status.velocity.setZero(7);
+    status.torque = record.torque.col(i);
+    status.external.setZero(7);
+    std::vector<std::uint8_t> bytes;
+    lcmtypes::encode(lcmtypes::DriverKind::kPanda, status, bytes);
+    const std::string channel = "PANDA_STATUS";
+    add(0xEDA1DA01, 4);
+    add(static_cast<std::uint64_t>(i), 8);
+    add(static_cast<std::uint64_t>(status.utime), 8);
+    add(channel.size(), 4);
+    add(bytes.size(), 4);
+    log += channel;
+    log.append(bytes.begin(), bytes.end());
+  }
+  const Json found = check({scratch.write("panda.lcm", log), "--config", panda_config(scratch)});
+  EXPECT_NEAR(found["payload"]["mass"].get<double>(), 1.3, 0.02);
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("that the driver measured"));
+}
+
+/// The simulator shares no mechanics with the controller's model.
+TEST(CheckModelProgram, ReadsALogOfTheSimulator) {
+  const Scratch scratch;
+  const std::string robot = "robot: {urdf: " + testing::arm_path("panda") +
+                            ", base: panda_link0, tip: panda_hand_tcp}\ncontrol: {mode: joint}\n";
+  std::string scene = robot +
+                      "simulation: {robot: {payload: {mass: 0.8 kg, center: [0, 0, 4 cm]}, "
+                      "coulomb_friction: 0.5 N m, viscous_friction: 0.4 N m s/rad}, sensors: "
+                      "{position_noise: 1e-5 rad}}\nscenario: {duration: 8, start: {position: [0, "
+                      "-45 deg, 0, -135 deg, 0, 90 deg, 45 deg]}, steps: [";
+  const std::array<const char*, 4> goals = {
+      "[0.5, -0.4, 0.3, -1.8, 0.4, 1.9, 0.2]", "[-0.4, -0.9, -0.3, -2.3, -0.5, 1.3, 1.2]",
+      "[0.3, -0.2, 0.5, -1.5, 0.8, 1.2, -0.5]", "[-0.3, -0.7, -0.5, -2, -0.2, 2.2, 0.9]"};
+  for (std::size_t i = 0; i < goals.size(); ++i) {
+    scene += std::string(i > 0 ? ", " : "") +
+             "{at: " + std::to_string(0.2 + 2.0 * static_cast<double>(i)) +
+             ", joint_position: " + goals[i] + "}";
+  }
+  const std::string log = scratch.path("run.lcm");
+  const Outcome run =
+      run_program({"run", scratch.write("scene.yaml", scene + "]}\n"), "--fast", "--log", log});
+  ASSERT_EQ(run.status, 0) << run.err;
+  const Json found = check({log, "--config", scratch.write("arm.yaml", robot)});
+  EXPECT_EQ(found["torques"], "whole");
+  EXPECT_NEAR(found["payload"]["mass"].get<double>(), 0.8, 0.02);
+  EXPECT_NEAR(found["payload"]["center"][2].get<double>(), 0.04, 0.01);
+  for (std::size_t j = 0; j < 5; ++j) {
+    EXPECT_NEAR(found["joints"][j]["coulomb_friction"].get<double>(), 0.5, 0.05) << j;
+    EXPECT_NEAR(found["joints"][j]["viscous_friction"].get<double>(), 0.4, 0.15) << j;
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::tests
