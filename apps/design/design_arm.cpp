@@ -64,7 +64,7 @@ controller::Payload read_payload(const std::string& text) {
 
 RobotModel read_model(const ArmOptions& options) try {
   controller::ModelOptions model;
-  model.accept_inertias = options.accept_inertias;
+  take_accepted(options.accept_inertias, model);
   take_drives(options.drives, model);
   const RobotModel plain =
       RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
@@ -86,17 +86,21 @@ RobotModel read_model(const ArmOptions& options) try {
   } catch (const controller::InvalidModel& error) {
     throw InputError("--payload", error.what());
   }
-  return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
+  const RobotModel result =
+      RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
+  warn_of(result);
+  return result;
 } catch (const controller::InvalidModel& error) {
   throw model_error(error);
 }
 
 bool ArmOptions::any() const {
-  for (const auto* text : {&base, &tip, &q, &task_stiffness, &task_damping, &viscous_friction,
-                           &null_damping, &reflected_inertia, &drives, &payload}) {
+  for (const auto* text :
+       {&base, &tip, &q, &task_stiffness, &task_damping, &viscous_friction, &null_damping,
+        &reflected_inertia, &drives, &payload, &accept_inertias}) {
     if (!text->empty()) return true;
   }
-  return accept_inertias;
+  return false;
 }
 
 SystemEntry read_arm(const ArmOptions& options, const RobotModel& model) {

@@ -119,6 +119,7 @@ Robot make_robot(const std::string& urdf, const std::string& name, const std::st
   read("gravity", options.gravity);
   read("include_off_chain", options.include_off_chain);
   read("accept_inertias", options.accept_inertias);
+  read("accept_inertias_of", options.accept_inertias_of);
   read_vector("reflected_inertia", options.reflected_inertia);
   read_vector("viscous_friction", options.viscous_friction);
   read_vector("coulomb_friction", options.coulomb_friction);
@@ -197,6 +198,9 @@ nb::dict joint_properties(const Robot& robot) {
   result["viscous_friction"] = values(&Joint::viscous_friction);
   result["coulomb_friction"] = values(&Joint::coulomb_friction);
   result["reflected_inertia"] = values(&Joint::reflected_inertia);
+  result["acceleration"] = values(&Joint::acceleration);
+  result["deceleration"] = values(&Joint::deceleration);
+  result["jerk"] = values(&Joint::jerk);
   return result;
 }
 
@@ -215,6 +219,7 @@ void add_robot(nb::module_& m) {
              return to_list(robot.model.joints(), [](const Joint& joint) { return joint.name; });
            })
       .def("joint_properties", &joint_properties)
+      .def("warnings", [](const Robot& robot) { return robot.model.warnings(); })
       .def("missing_rotors",
            [](const Robot& robot) { return controller::missing_rotors_text(robot.model); })
       .def("pose", &pose)
