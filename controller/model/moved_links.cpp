@@ -96,7 +96,7 @@ void doubt_masses(const RobotModel& model, const std::vector<MovedLink>& links,
 
 void doubt_inertias(const RobotModel& model, const std::vector<MovedLink>& links,
                     std::vector<std::string>& warnings) {
-  const double reach = reach_of(model), most = std::max(3 * reach, 1.0);
+  const double reach = reach_of(model), most = std::max(3 * reach, 3.0);
   double moments = 0;
   for (const KDL::Segment& segment : kdl_chain(model).segments) {
     moments += half_trace(segment.getInertia());
