@@ -230,6 +230,9 @@ def reasons_of(refused):
                                       r"(?: by)? ([^:]*):", text))
             text = "triangle inequality broken: " + ", ".join(f"{link} {by}" for link, by in links[:3])
             text += f" and {len(links) - 3} more" if len(links) > 3 else ""
+        elif "not positive definite" in text:
+            links = re.findall(r"link '([^']*)': its inertia is not positive definite", text)
+            text = "inertia not positive definite: " + ", ".join(sorted(links))
         counts[text.removeprefix("refused: ")] += 1
     return "; ".join(f"{count}: {text}" for text, count in counts.items()).replace("|", "/")
 

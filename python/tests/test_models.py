@@ -1,5 +1,7 @@
 """Models as people have them: MJCF beside the engine, xacro, doubtful URDFs, files that are saved."""
 
+import functools
+import importlib.util
 import json
 import subprocess
 
@@ -133,9 +135,14 @@ def test_a_path_is_as_good_as_a_model(mujoco, odd, tmp_path):
         dashpot.Robot.from_urdf(path, "base", "tip")
 
 
+@functools.cache
+def _rows(sweep):
+    return list(sweep())
+
+
 def _swept(sweep, needed, packages):
     pytest.importorskip(needed)
-    rows = list(sweep())
+    rows = _rows(sweep)
     if not rows:
         pytest.skip(f"{packages} is not installed")
     read = 0
@@ -157,6 +164,25 @@ def test_arms_of_robosuite_and_franky_sim_equal_the_engines():
 @pytest.mark.filterwarnings("ignore")
 def test_arms_of_example_robot_data_equal_pinocchios():
     _swept(models_sweep.sweep_urdf, "pinocchio", "example-robot-data (PyPI)")
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_table_of_the_documents_is_that_of_the_sweep(root):
+    told = {}
+    for line in (root / "docs/models.md").read_text().splitlines():
+        cells = [cell.strip() for cell in line.split("|")]
+        if len(cells) == 7 and cells[2].isdigit():
+            told[cells[1]] = (int(cells[2]), int(cells[3]))
+    found = {}
+    for sweep, needed in ((models_sweep.sweep_mjcf, "mujoco"), (models_sweep.sweep_urdf, "pinocchio")):
+        if importlib.util.find_spec(needed) is None:
+            continue
+        for name, _, _, numbers in _rows(sweep):
+            chains, read = found.get(name, (0, 0))
+            found[name] = (chains + 1, read + (not isinstance(numbers, str)))
+    if not found:
+        pytest.skip("robosuite, franky-sim and example-robot-data (PyPI) are not installed")
+    assert {name: told.get(name) for name in found} == found
 
 
 XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
