@@ -20,7 +20,7 @@ MJCF = """
  <body name="side" pos="0 0.3 0"><joint name="aside" axis="1 0 0"/><geom type="sphere" size="0.1"/></body>
  <body name="upper" pos="0.1 0 0.2" quat="0.8 0.1 -0.3 0.5">
   <joint name="one" axis="0.3 0.2 1" pos="0.05 -0.02 0.1" ref="0.4" range="-1 2" damping="0.7"
-   frictionloss="0.2" armature="0.11"/>
+   frictionloss="0.2" armature="0.11" actuatorfrcrange="-35 35"/>
   <joint name="two" axis="0 1 0.2" pos="-0.1 0.02 0.03" armature="0.05" actuatorfrcrange="-40 30"/>
   <geom type="capsule" size="0.05 0.2" pos="0.1 0 0.1" euler="0.4 0.2 0" mass="2.5"/>
   <body name="camera" pos="0.1 0.1 0" euler="0 0 1"><joint name="pan" axis="0 0 1" ref="0.3"/>
@@ -62,10 +62,20 @@ def test_what_an_engine_says_of_joints_is_taken(odd):
     assert list(robot.coulomb_friction) == [0.2, 0, 0, 0]
     assert list(robot.lower) == [-1, -np.inf, -0.2, -np.inf]
     assert list(robot.upper) == [2, np.inf, 0.5, np.inf]
-    assert list(robot.effort) == [40, 30, np.inf, 5]
+    assert list(robot.effort) == [35, 30, np.inf, 5]
     assert np.all(robot.velocity == np.inf)
     assert list(dashpot.Robot.from_mujoco(odd, "base", "tool",
                                           reflected_inertia=[1, 2, 3, 4]).reflected_inertia) == [1, 2, 3, 4]
+
+
+def test_gravity_can_be_off_and_names_can_coincide(mujoco, odd):
+    assert abs(dashpot.Robot.from_mujoco(odd, "base", "tool").gravity([0.1] * 4)).max() > 1
+    still = mujoco.MjModel.from_xml_string(MJCF.replace(
+        '<option gravity="0 0 -9.7"/>', '<option><flag gravity="disable"/></option>'))
+    assert not dashpot.Robot.from_mujoco(still, "base", "tool").gravity([0.1] * 4).any()
+    named = mujoco.MjModel.from_xml_string(MJCF.replace('name="camera"', 'name="link of one"'))
+    robot = dashpot.Robot.from_mujoco(named, "base", "tool")
+    assert max(models_sweep.beside_mujoco(named, "base", "tool", robot)) < 1e-12
 
 
 def test_positions_are_those_of_the_engine(mujoco, odd):

@@ -145,6 +145,9 @@ TEST(UrdfForms, MayHoldInertiasThatCannotMatter) {
                                 HasSubstr("cannot matter"))));
   EXPECT_THAT(refusal_of_panda(with_mass("0.1")),
               StartsWith("panda.urdf: link 'camera_frame': its inertia"));
+  std::string large = with_mass("1e-8");
+  large.replace(large.find("ixx='1e-8'"), 10, "ixx='1'");
+  EXPECT_THAT(refusal_of_panda(large), StartsWith("panda.urdf: link 'camera_frame': its inertia"));
   EXPECT_THAT(refusal_of_panda(with_mass("-1e-8")), HasSubstr("its mass is negative"));
 }
 

@@ -57,6 +57,16 @@ TEST(PlainUrdf, KeepsWhatAChainNeedsAndNoMore) {
       "<axis xyz=\"1 0 0\"/>\n<dynamics damping=\"1\"/>\n<mimic joint=\"k\"/></joint></robot>");
 }
 
+TEST(PlainUrdf, KeepsQuotesAndLeavesOutWhatIsBesideTheRobot) {
+  EXPECT_EQ(plain("<a><link name='no'/></a><robot name='a\"b'/><b><joint name='no'/></b>"),
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<robot name='a\"b'/>");
+}
+
+TEST(PlainUrdf, TakesRoundedQuaternionsForUnitOnes) {
+  EXPECT_EQ(plain(with_origin("1.1", "<origin quat_xyzw='0 0 0.6009 0.8012'/>")),
+            plain(with_origin("1.1", "<origin quat_xyzw='0 0 0.6 0.8'/>")));
+}
+
 TEST(PlainUrdf, LeavesToTheParserWhatIsNoRobot) {
   for (const std::string text : {"", "words", "<model/>", "<a/><b/>"}) {
     EXPECT_EQ(plain(text), text);
@@ -117,6 +127,8 @@ TEST(PlainUrdf, ReadsLimitsOfVersion12) {
   EXPECT_EQ(limits.deceleration, std::numeric_limits<double>::infinity());
   EXPECT_EQ(limits.jerk, 7500);
   EXPECT_TRUE(plain_urdf(with_limit("<limit effort='1'/>"), "").limits.empty());
+  EXPECT_TRUE(plain_urdf(with_limit("<limit effort='1'/><limit jerk='1'/>"), "").limits.empty())
+      << "parsers take the first";
   EXPECT_TRUE(plain_urdf(with_limit("<limit jerk='-1'/>", "1.1"), "").limits.empty());
 }
 
