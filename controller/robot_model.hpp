@@ -2,6 +2,7 @@
 #include <dashpot/controller/robot_types.hpp>
 
 #include <array>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -22,6 +23,10 @@ struct Joint {
   double viscous_friction = 0;   ///< viscous friction, N m s/rad
   double coulomb_friction = 0;   ///< Coulomb friction, N m
   double reflected_inertia = 0;  ///< of rotor and gear, as seen by the joint, kg m^2 (kg)
+  // Limits that URDF has from version 1.2 on, positive; infinity if there is none.
+  double acceleration = std::numeric_limits<double>::infinity();  ///< rad/s^2
+  double deceleration = std::numeric_limits<double>::infinity();  ///< rad/s^2
+  double jerk = std::numeric_limits<double>::infinity();          ///< rad/s^3
 };
 
 /// What a URDF does not say, or says wrong. A vector without entries keeps the URDF's values.
@@ -33,6 +38,8 @@ struct ModelOptions {
   /// with one moment above the sum of the others. The mass matrix has to be positive definite even
   /// so.
   bool accept_inertias = false;
+  /// Links whose inertias are accepted so, where not all are.
+  std::vector<std::string> accept_inertias_of;
   JointVector reflected_inertia;  ///< n, kg m^2; a URDF has none
   /// Name of published_drives, whose reflected inertia takes the place of a missing one; empty:
   /// none.
@@ -78,6 +85,9 @@ class RobotModel {
   int dof() const noexcept;
   /// Returns the n joints, from the base to the tip.
   const std::vector<Joint>& joints() const noexcept;
+  /// Returns what is doubtful about the description though it was read, a line for each: "link
+  /// 'hand': ...".
+  const std::vector<std::string>& warnings() const noexcept;
   /// Returns one property of all n joints, as in `joint_values(&Joint::effort)`.
   JointVector joint_values(double Joint::*property) const;
 

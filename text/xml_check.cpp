@@ -32,7 +32,8 @@ bool is_in_name(char c) noexcept {
 /// Reads a document from its beginning to its end.
 class XmlCheck {
  public:
-  explicit XmlCheck(std::string_view text) : text_(text) {}
+  XmlCheck(std::string_view text, const std::function<void(const XmlTag&)>& visit)
+      : text_(text), visit_(visit) {}
 
   void run() {
     if (text_.size() > kLargestXml) {
@@ -150,40 +151,44 @@ class XmlCheck {
            (open_.empty() ? "nothing" : "<" + std::string(open_.back()) + ">"));
     }
     open_.pop_back();
+    if (visit_) visit_({name, {}, open_.size(), false, true});
   }
 
   void read_start_tag() {
     ++at_;
-    const std::string_view name = read_name();
-    count(name);
-    std::size_t attributes = 0;
+    XmlTag tag;
+    tag.name = read_name();
+    tag.depth = open_.size();
+    tag.starts = true;
+    count(tag.name);
     for (skip_space(); next() != '>' && next() != '/'; skip_space()) {
-      if (++attributes > kMostAttributes) fail("an element has more than 64 attributes");
-      read_attribute();
+      if (tag.attributes.size() == kMostAttributes) {
+        fail("an element has more than 64 attributes");
+      }
+      tag.attributes.push_back(read_attribute());
     }
-    if (next() == '/') {
-      ++at_;
-      expect('>');
-      return;
-    }
+    tag.ends = next() == '/';
+    if (tag.ends) ++at_;
     expect('>');
-    open_.push_back(name);
+    if (visit_) visit_(tag);
+    if (tag.ends) return;
+    open_.push_back(tag.name);
     if (open_.size() > kDeepest) fail("elements are nested more than 64 deep");
   }
 
-  void read_attribute() {
-    read_name();
+  std::pair<std::string_view, std::string_view> read_attribute() {
+    const std::string_view name = read_name();
     skip_space();
     expect('=');
     skip_space();
     const char quote = next();
     if (quote != '"' && quote != '\'') fail("not XML: an attribute's value is not in quotes");
-    ++at_;
+    const std::size_t begin = ++at_;
     while (next() != quote) {
       if (next() == '<' || next() == '\0') fail("not XML: an attribute's value does not end");
       read_character();
     }
-    ++at_;
+    return {name, text_.substr(begin, at_++ - begin)};
   }
 
   void count(std::string_view name) {
@@ -193,6 +198,7 @@ class XmlCheck {
   }
 
   std::string_view text_;
+  const std::function<void(const XmlTag&)>& visit_;
   std::size_t at_ = 0;
   std::vector<std::string_view> open_;
   std::size_t elements_ = 0, links_ = 0, joints_ = 0;
@@ -200,8 +206,8 @@ class XmlCheck {
 
 }  // namespace
 
-void check_xml(std::string_view text) {
-  XmlCheck(text).run();
+void check_xml(std::string_view text, const std::function<void(const XmlTag&)>& visit) {
+  XmlCheck(text, visit).run();
 }
 
 }  // namespace dashpot::text

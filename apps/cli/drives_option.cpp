@@ -3,6 +3,9 @@
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/input_error.hpp>
 
+#include <cstdio>
+#include <sstream>
+
 namespace dashpot::apps {
 
 void take_drives(const std::string& name, controller::ModelOptions& model) try {
@@ -10,6 +13,27 @@ void take_drives(const std::string& name, controller::ModelOptions& model) try {
   model.drives = name;
 } catch (const controller::InvalidModel& error) {
   throw controller::InputError("--drives", error.what());
+}
+
+void add_accept_inertias(CLI::App& command, std::string& accepted) {
+  command.add_flag("--accept-inertias{true}", accepted,
+                   "Take inertias that no body can have as they are: all, or =LINK,... those of "
+                   "these links");
+}
+
+void take_accepted(const std::string& accepted, controller::ModelOptions& model) {
+  model.accept_inertias = accepted == "true";
+  if (accepted.empty() || accepted == "true" || accepted == "false") return;
+  std::istringstream names(accepted);
+  for (std::string name; std::getline(names, name, ',');) {
+    model.accept_inertias_of.push_back(name);
+  }
+}
+
+void warn_of(const controller::RobotModel& model) {
+  for (const std::string& warning : model.warnings()) {
+    std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  }
 }
 
 nlohmann::ordered_json drives_json(const std::string& name) {

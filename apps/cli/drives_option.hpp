@@ -15,6 +15,15 @@ inline constexpr const char* kDrivesHelp =
 /// the option --drives.
 void take_drives(const std::string& name, controller::ModelOptions& model);
 
+/// Adds the flag --accept-inertias to a command; `accepted` becomes "true", or what is said as in
+/// --accept-inertias=hand,finger.
+void add_accept_inertias(CLI::App& command, std::string& accepted);
+/// Has the model accept these inertias.
+void take_accepted(const std::string& accepted, controller::ModelOptions& model);
+
+/// Tells people at the terminal what is doubtful about the description of the arm.
+void warn_of(const controller::RobotModel& model);
+
 /// Figures, source and doubt of the published drives of this name.
 nlohmann::ordered_json drives_json(const std::string& name);
 

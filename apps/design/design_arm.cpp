@@ -65,7 +65,7 @@ controller::Payload read_payload(const std::string& text) {
 
 RobotModel read_model(const ArmOptions& options) try {
   controller::ModelOptions model;
-  model.accept_inertias = options.accept_inertias;
+  take_accepted(options.accept_inertias, model);
   take_drives(options.drives, model);
   const RobotModel plain =
       RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
@@ -87,15 +87,20 @@ RobotModel read_model(const ArmOptions& options) try {
   } catch (const controller::InvalidModel& error) {
     throw InputError("--payload", error.what());
   }
-  return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
+  const RobotModel result =
+      RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
+  warn_of(result);
+  return result;
 } catch (const controller::InvalidModel& error) {
   throw model_error(error);
 }
 
 std::string friction_note(const ArmOptions& options, const RobotModel& model) {
   if (!options.viscous_friction.empty()) return controller::friction_text(model);
-  const std::string left_out = controller::friction_text(RobotModel::from_urdf_file(
-      options.urdf, options.base, options.tip, {.accept_inertias = options.accept_inertias}));
+  controller::ModelOptions plain;
+  take_accepted(options.accept_inertias, plain);
+  const std::string left_out = controller::friction_text(
+      RobotModel::from_urdf_file(options.urdf, options.base, options.tip, plain));
   return left_out.empty() ? ""
                           : left_out.substr(0, left_out.rfind(',')) +
                                 ", as the URDF has it, is left out; --viscous-friction urdf "
@@ -103,12 +108,12 @@ std::string friction_note(const ArmOptions& options, const RobotModel& model) {
 }
 
 bool ArmOptions::any() const {
-  for (const auto* text :
-       {&base, &tip, &posture.q, &joint_stiffness, &task_stiffness, &task_damping,
-        &viscous_friction, &null_damping, &reflected_inertia, &drives, &payload}) {
+  for (const auto* text : {&base, &tip, &posture.q, &joint_stiffness, &task_stiffness,
+                           &task_damping, &viscous_friction, &null_damping, &reflected_inertia,
+                           &drives, &payload, &accept_inertias}) {
     if (!text->empty()) return true;
   }
-  return accept_inertias || posture.outside_limits;
+  return posture.outside_limits;
 }
 
 SystemEntry read_arm(const ArmOptions& options, const RobotModel& model,

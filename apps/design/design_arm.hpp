@@ -24,7 +24,7 @@ struct ArmOptions {
   /// xx,yy,zz[,xy,xz,yz]; kg, m, kg m^2.
   std::string payload;
 
-  bool accept_inertias = false;  ///< though no body can have them
+  std::string accept_inertias;  ///< though no body can have them, see take_accepted
 
   bool any() const;  ///< whether any option but `urdf` is there
 };

@@ -68,8 +68,7 @@ void add_model_options(CLI::App& command, ArmOptions& arm) {
   add("--payload", arm.payload,
       "Mass at the tip, its center in the tip's axes, its inertia about that; kg, m, kg m^2",
       "m[,x,y,z[,xx,yy,zz[,xy,xz,yz]]] (0)");
-  command.add_flag("--accept-inertias", arm.accept_inertias,
-                   "Take inertias of the description that no body can have as they are");
+  add_accept_inertias(command, arm.accept_inertias);
 }
 
 void add_loop_options(CLI::App& command, analysis::SampledLoop& loop, double& integral_time) {

@@ -28,9 +28,8 @@ using controller::RobotModel;
 struct InspectOptions {
   std::string urdf, base, tip;
   PostureOption posture;
-  std::string qd, gravity, reflected_inertia, drives;
+  std::string qd, gravity, reflected_inertia, drives, accept_inertias;
   bool exclude_off_chain = false;
-  bool accept_inertias = false;
   bool json = false;
 };
 
@@ -44,7 +43,7 @@ JointVector joint_list(const std::string& option, const std::string& text, const
 RobotModel read_model(const InspectOptions& options) {
   controller::ModelOptions model;
   model.include_off_chain = !options.exclude_off_chain;
-  model.accept_inertias = options.accept_inertias;
+  take_accepted(options.accept_inertias, model);
   if (!options.gravity.empty()) {
     model.gravity = parse_quantities("--gravity", options.gravity, controller::Units(3, "m/s^2"));
   }
@@ -89,6 +88,11 @@ nlohmann::ordered_json json_joints(const RobotModel& model) {
                     {"velocity", limit(joint.velocity)},
                     {"effort", limit(joint.effort)},
                     {"reflected_inertia", joint.reflected_inertia}});
+    for (const auto& [key, value] : {std::pair("acceleration", joint.acceleration),
+                                     {"deceleration", joint.deceleration},
+                                     {"jerk", joint.jerk}}) {
+      if (std::isfinite(value)) list.back()[key] = value;
+    }
   }
   return list;
 }
@@ -106,6 +110,7 @@ std::string to_json(const InspectOptions& options, const RobotModel& model,
                                    {"jacobian_dot_qd", json_list(dynamics.Jdot_qd)},
                                    {"tip_position", json_list(dynamics.p_BT_B)},
                                    {"tip_rotation", json_rows(dynamics.R_BT)}};
+  for (const std::string& warning : model.warnings()) result["warnings"].push_back(warning);
   if (!options.drives.empty()) result["drives"] = drives_json(options.drives);
   return result.dump(2, ' ', true) + "\n";
 }
@@ -131,6 +136,13 @@ std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics
   add("upper", "limit", model.joint_values(&Joint::upper));
   add("velocity", "limit", model.joint_values(&Joint::velocity));
   add("effort", "limit", model.joint_values(&Joint::effort));
+  for (const auto& [name, limit] : {std::pair("acceler.", &Joint::acceleration),
+                                    {"deceler.", &Joint::deceleration},
+                                    {"jerk", &Joint::jerk}}) {
+    if (model.joint_values(limit).array().isFinite().any()) {
+      add(name, "limit", model.joint_values(limit));
+    }
+  }
   add("reflected", "inertia", model.joint_values(&Joint::reflected_inertia));
   add("", "q", q);
   add("", "qd", qd);
@@ -235,6 +247,7 @@ void run_inspect(const InspectOptions& options) {
   const JointVector q = options.posture.read(model);
   const JointVector qd = joint_list("--qd", options.qd, model, "rad/s", "m/s");
   const DynamicsResult dynamics = controller::evaluate(model, q, qd);
+  warn_of(model);
   print(options.json ? to_json(options, model, dynamics, q)
                      : to_table(model, dynamics, q, qd) + rotors_text(options, model));
 }
@@ -264,8 +277,7 @@ void add_inspect(CLI::App& program) {
   add("--drives", &InspectOptions::drives, kDrivesHelp, "NAME")->check(not_empty());
   command->add_flag("--exclude-off-chain", options->exclude_off_chain,
                     "Leave out links that hang off the chain");
-  command->add_flag("--accept-inertias", options->accept_inertias,
-                    "Take inertias that no body can have as they are");
+  add_accept_inertias(*command, options->accept_inertias);
   command->add_flag("--json", options->json, "Print JSON instead of tables");
   command->footer(std::string(kUnitsHelp) + "\n" + kExitStatusHelp);
   command->callback([options] { run_inspect(*options); });

@@ -1,3 +1,4 @@
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
@@ -209,6 +210,7 @@ void run(const Options& options) {
   report.joints = scene.dof();
   if (scene.arm) {
     const controller::RobotModel& model = scene.arm->config.model;
+    warn_of(model);
     report.missing_rotors = controller::missing_rotors_text(model);
     report.friction_text = controller::friction_text(model);
     report.drives = scene.arm->config.robot.options.drives;

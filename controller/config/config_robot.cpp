@@ -27,6 +27,21 @@ void read_tool(const YamlMapping& robot, Pose& tool) {
                       .toRotationMatrix();
 }
 
+/// true, false, or a list of links.
+void read_accepted(const YamlMapping& robot, ModelOptions& options) {
+  const YamlNode* node = robot.find("accept_inertias");
+  if (node == nullptr || node->kind != YamlNode::Kind::kSequence) {
+    read_switch(robot, "accept_inertias", options.accept_inertias);
+    return;
+  }
+  for (const YamlNode& item : node->items) {
+    if (item.kind != YamlNode::Kind::kScalar) {
+      throw robot.error("accept_inertias", "true, false or names of links are wanted");
+    }
+    options.accept_inertias_of.push_back(item.text);
+  }
+}
+
 std::string required_text(const YamlMapping& root, const YamlMapping& robot, std::string_view key) {
   if (!robot.has(key)) throw robot.error(key, "missing", root.line("robot"));
   std::string text;
@@ -91,7 +106,7 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
   ModelOptions& options = robot.options;
   read_vector3(keys, "gravity", "m/s^2", options.gravity);
   read_switch(keys, "include_off_chain", options.include_off_chain);
-  read_switch(keys, "accept_inertias", options.accept_inertias);
+  read_accepted(keys, options);
   read_payload(keys, options.payload);
   read_tool(keys, options.tool);
 

@@ -49,6 +49,12 @@ Settings default_settings(const RobotModel& model) {
   settings.integral.torque = limits.torque / 10;
   settings.motion.velocity = 0.25 * limits.velocity;
   settings.motion.acceleration = limits.velocity;
+  for (int i = 0; i < n; ++i) {  // it brakes at half of this, and changes it within the smoothing
+    const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
+    double& most = settings.motion.acceleration[i];
+    most = std::min({most, joint.acceleration, 2 * joint.deceleration,
+                     0.5 * settings.motion.smoothing * joint.jerk});
+  }
 
   // Between the inertia of a joint with all others held and with all others free.
   const Eigen::MatrixXd M = evaluate(model, middle, none).M;

@@ -20,6 +20,15 @@ std::string number_text(double value) {
   return text.data();
 }
 
+/// By how much the largest moment exceeds the sum of the others: " by 8.6 %", or " far".
+std::string excess_text(const Eigen::Vector3d& moments) {
+  const double excess = moments[2] / (moments[0] + moments[1]) - 1;
+  if (!(excess > 0 && excess < 10)) return " far";
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), " by %.3g %%", 100 * excess);
+  return text.data();
+}
+
 KDL::RigidBodyInertia make_body(double mass, const Eigen::Vector3d& center,
                                 const Eigen::Matrix3d& I) {
   return KDL::RigidBodyInertia(
@@ -66,28 +75,30 @@ std::string inertia_problem(double mass, const Eigen::Matrix3d& inertia) {
            number_text(moments[0]) + " kg m^2";
   }
   if (moments[2] > moments[0] + moments[1] + rounding) {
-    return "its inertia breaks the triangle inequality: principal moments " +
-           number_text(moments[0]) + ", " + number_text(moments[1]) + ", " +
-           number_text(moments[2]) + " kg m^2";
+    return "its inertia breaks the triangle inequality" + excess_text(moments) +
+           ": principal moments " + number_text(moments[0]) + ", " + number_text(moments[1]) +
+           ", " + number_text(moments[2]) + " kg m^2";
   }
   return "";
 }
 
-KDL::RigidBodyInertia body_of(const urdf::Link& link, bool accept, const std::string& name) {
-  if (!link.inertial) return KDL::RigidBodyInertia::Zero();
+LinkBody body_of(const urdf::Link& link) {
+  LinkBody result;
+  result.link = link.name;
+  result.body = KDL::RigidBodyInertia::Zero();
+  if (!link.inertial) return result;
   const urdf::Inertial& source = *link.inertial;
   const KDL::Frame frame = to_kdl(source.origin);
   Eigen::Matrix3d I;
   I << source.ixx, source.ixy, source.ixz, source.ixy, source.iyy, source.iyz, source.ixz,
       source.iyz, source.izz;
-  const std::string problem = mass_problem(source.mass, {frame.p.x(), frame.p.y(), frame.p.z()}, I);
-  if (!problem.empty()) refuse(name, "link", link.name, problem);
-  const std::string doubt = accept ? "" : inertia_problem(source.mass, I);
-  if (!doubt.empty()) {
-    refuse(name, "link", link.name,
-           doubt + "; robot.accept_inertias: true, or --accept-inertias, takes it as it is");
-  }
-  return frame * make_body(source.mass, Eigen::Vector3d::Zero(), I);
+  result.problem = mass_problem(source.mass, {frame.p.x(), frame.p.y(), frame.p.z()}, I);
+  if (!result.problem.empty()) return result;
+  result.possible = true;
+  result.problem = inertia_problem(source.mass, I);
+  result.moment = I.cwiseAbs().maxCoeff();
+  result.body = frame * make_body(source.mass, Eigen::Vector3d::Zero(), I);
+  return result;
 }
 
 }  // namespace dashpot::controller

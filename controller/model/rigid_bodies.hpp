@@ -27,9 +27,15 @@ std::string mass_problem(double mass, const Eigen::Vector3d& center,
 /// where a moment is zero. Rods and point masses can exist.
 std::string inertia_problem(double mass, const Eigen::Matrix3d& inertia);
 
-/// Returns the inertia of the link alone, about its origin, in its axes; zero for a link without
-/// inertia. Throws InvalidModel, whose text begins with `name`. If `accept` is true, an inertia
-/// that no body can have is no error.
-KDL::RigidBodyInertia body_of(const urdf::Link& link, bool accept, const std::string& name);
+/// A link's inertia, and what is wrong with it.
+struct LinkBody {
+  std::string link;
+  KDL::RigidBodyInertia body;  ///< about the link's origin, in its axes; zero if there is none
+  double moment = 0;           ///< largest entry of the inertia about the centre of mass, kg m^2
+  std::string problem;         ///< "" if such a body can exist
+  bool possible = false;       ///< mass and centre are; only the inertia has the problem
+};
+
+LinkBody body_of(const urdf::Link& link);
 
 }  // namespace dashpot::controller

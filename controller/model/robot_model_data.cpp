@@ -19,6 +19,9 @@ int RobotModel::dof() const noexcept {
 const std::vector<Joint>& RobotModel::joints() const noexcept {
   return data_->joints;
 }
+const std::vector<std::string>& RobotModel::warnings() const noexcept {
+  return data_->warnings;
+}
 const Eigen::Vector3d& RobotModel::gravity() const noexcept {
   return data_->gravity;
 }

@@ -1,7 +1,9 @@
 // A RobotModel from a URDF.
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
+#include <dashpot/controller/model/moved_links.hpp>
 #include <dashpot/controller/model/rigid_bodies.hpp>
 #include <dashpot/controller/model/robot_model_data.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
@@ -69,8 +71,9 @@ Joint read_joint(const urdf::Joint& source) {
       joint.lower = source.limits->lower;
       joint.upper = source.limits->upper;
     }
-    joint.velocity = source.limits->velocity;
-    joint.effort = source.limits->effort;
+    // Files write 0 for a limit that they do not know.
+    if (source.limits->velocity != 0) joint.velocity = source.limits->velocity;
+    if (source.limits->effort != 0) joint.effort = source.limits->effort;
   }
   if (!(joint.lower <= joint.upper)) {
     throw std::invalid_argument("its lower limit is above its upper one");
@@ -105,15 +108,17 @@ void apply(const JointVector& option, double Joint::*property, const std::string
 /// `next`, at its zero position; in the link's axes. It does not call itself: branches may be
 /// thousands of links long.
 KDL::RigidBodyInertia lump(const urdf::ModelInterface& tree, const std::string& link,
-                           const std::string& next, const ModelOptions& options,
-                           const std::string& name) {
+                           const std::string& next, const ModelOptions& options, int segment,
+                           std::vector<MovedLink>& moved) {
   KDL::RigidBodyInertia sum = KDL::RigidBodyInertia::Zero();
   std::vector<std::pair<urdf::LinkConstSharedPtr, KDL::Frame>> open;  // with their poses in `link`
   open.emplace_back(tree.getLink(link), KDL::Frame::Identity());
   while (!open.empty()) {
     const auto [at, frame] = open.back();
     open.pop_back();
-    sum = sum + frame * body_of(*at, options.accept_inertias, name);
+    const LinkBody own = body_of(*at);
+    sum = sum + frame * own.body;
+    if (at->inertial) moved.push_back({own, segment});
     if (!options.include_off_chain) break;
     for (const urdf::JointSharedPtr& joint : at->child_joints) {
       if (joint->name == next) continue;
@@ -142,7 +147,8 @@ Attachment attached(const ModelOptions& options, const std::string& name) try {
 
 /// Moving joints of the path, in order, with what the options say of them.
 std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& path,
-                               const ModelOptions& options, const std::string& name) {
+                               const UrdfTree& tree, const ModelOptions& options,
+                               const std::string& name) {
   std::vector<Joint> joints;
   for (const urdf::JointConstSharedPtr& joint : path) {
     if (joint->type == urdf::Joint::FIXED) continue;
@@ -150,6 +156,11 @@ std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& pat
       joints.push_back(read_joint(*joint));
     } catch (const std::invalid_argument& error) {
       refuse(name, "joint", joint->name, error.what());
+    }
+    if (const auto limits = tree.limits.find(joint->name); limits != tree.limits.end()) {
+      joints.back().acceleration = limits->second.acceleration;
+      joints.back().deceleration = limits->second.deceleration;
+      joints.back().jerk = limits->second.jerk;
     }
   }
   if (!options.drives.empty()) {
@@ -169,11 +180,13 @@ std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& pat
   return joints;
 }
 
-/// Sets the chain, with nothing attached to it yet.
-void make_chain(const urdf::ModelInterface& tree,
-                const std::vector<urdf::JointConstSharedPtr>& path,
-                const std::vector<Joint>& joints, const ModelOptions& options,
-                const std::string& name, RobotModel::Data& data) {
+/// Sets the chain, with nothing attached to it yet, and returns the links that move and have a
+/// mass.
+std::vector<MovedLink> make_chain(const urdf::ModelInterface& tree,
+                                  const std::vector<urdf::JointConstSharedPtr>& path,
+                                  const std::vector<Joint>& joints, const ModelOptions& options,
+                                  RobotModel::Data& data) {
+  std::vector<MovedLink> moved;
   KDL::Chain& chain = data.chain;
   KDL::Segment segment;  // being put together; the first, what stands still, is dropped
   KDL::RigidBodyInertia body = KDL::RigidBodyInertia::Zero();
@@ -202,12 +215,31 @@ void make_chain(const urdf::ModelInterface& tree,
     }
     frame = moves ? KDL::Frame::Identity() : origin;
     if (moving == 0) continue;
-    body = body + frame * lump(tree, joint.child_link_name, next, options, name);
+    const int index = static_cast<int>(moving) - 1;
+    body = body + frame * lump(tree, joint.child_link_name, next, options, index, moved);
   }
   finish();
   chain.addSegment(KDL::Segment());
   data.last_body = body;
   data.tip_link = frame;
+  return moved;
+}
+
+/// What is wrong with the inertias of links before the first moving joint, which nothing depends
+/// on.
+void doubt_base(const urdf::ModelInterface& tree, const std::string& base,
+                const std::vector<urdf::JointConstSharedPtr>& path,
+                std::vector<std::string>& warnings) {
+  std::string link = base;
+  for (std::size_t i = 0;; ++i) {
+    const std::string problem = body_of(*tree.getLink(link)).problem;
+    if (!problem.empty()) {
+      warnings.push_back(
+          one_line("link '" + link + "': " + problem + "; it stands still, and does not count"));
+    }
+    if (i == path.size() || path[i]->type != urdf::Joint::FIXED) return;
+    link = path[i]->child_link_name;
+  }
 }
 
 /// The joint nearest to the tip that nothing resists, as the pivots of M from its last row up tell
@@ -245,9 +277,16 @@ void check_inertia(const RobotModel& model, const std::string& name) {
 RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string& base,
                                       const std::string& tip, const ModelOptions& options,
                                       const std::string& name) {
-  const std::shared_ptr<urdf::ModelInterface> tree = read_urdf(text, name);
+  const UrdfTree read = read_urdf(text, name);
+  const urdf::ModelInterface* const tree = read.model.get();
+  for (const std::string& link : options.accept_inertias_of) {
+    if (!tree->getLink(link)) {
+      refuse(name, "link", link,
+             "there is none whose inertia to accept; " + links_near(link, *tree));
+    }
+  }
   const auto path = path_between(*tree, base, tip, name);
-  std::vector<Joint> joints = read_joints(path, options, name);
+  std::vector<Joint> joints = read_joints(path, read, options, name);
   if (joints.empty()) refuse(name, "link", tip, "no joint moves it against '" + base + "'");
   if (joints.size() > static_cast<std::size_t>(kMaxJoints)) {
     refuse(name, "link", tip,
@@ -261,13 +300,16 @@ RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string
   data->name = tree->getName();
   data->base = base;
   data->tip = tip;
-  make_chain(*tree, path, joints, options, name, *data);
+  const std::vector<MovedLink> moved = make_chain(*tree, path, joints, options, *data);
+  check_links(moved, options, data->chain, name, data->warnings);
+  doubt_base(*tree, base, path, data->warnings);
   data->attach(attachment);
   data->joints = std::move(joints);
   const KDL::Vector g = rotation_of_base(*tree, base).Inverse(to_kdl(options.gravity));
   data->gravity = {g.x(), g.y(), g.z()};
-  RobotModel model(std::move(data));
+  RobotModel model(data);
   check_inertia(model, name);
+  doubt_units(model, moved, data->warnings);
   return model;
 }
 

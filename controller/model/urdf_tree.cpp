@@ -1,6 +1,7 @@
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/text/plain_urdf.hpp>
 #include <dashpot/text/read_file.hpp>
 #include <dashpot/text/xml_check.hpp>
 
@@ -42,38 +43,16 @@ class Messages : public console_bridge::OutputHandler {
   std::string errors_;
 };
 
-/// What makes a text a xacro that was not expanded: an element or an expression of it outside
-/// comments; "" if nothing does. (The name space alone may stay behind in an expanded one.)
-std::string xacro_sign(const std::string& text) {
-  std::size_t at = 0;
-  while ((at = text.find_first_of("<$", at)) != std::string::npos) {
-    if (text.compare(at, 4, "<!--") == 0) {
-      at = text.find("-->", at);
-      if (at == std::string::npos) break;
-    }
-    if (text.compare(at, 7, "<xacro:") == 0) {
-      return text.substr(at, text.find_first_of(" \t\r\n/>", at) - at) + ">";
-    }
-    if (text.compare(at, 2, "${") == 0) return text.substr(at, text.find('}', at) - at) + "}";
-    ++at;
-  }
-  return "";
-}
-
-std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::string& name) {
-  if (const std::string sign = xacro_sign(text); !sign.empty()) {
-    constexpr std::size_t kEnough = 60;
-    throw InvalidModel(one_line(name + ": is a xacro that is not expanded yet (" +
-                                sign.substr(0, kEnough) + "); expand it first: xacro " + name +
-                                " > robot.urdf"));
-  }
+std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::string& name,
+                                            UrdfTree& tree) {
   static std::mutex one_at_a_time;  // the handler of messages is global
   const std::lock_guard lock(one_at_a_time);
   const Messages messages;
   std::shared_ptr<urdf::ModelInterface> model;
   try {
-    text::check_xml(text);
-    model = urdf::parseURDF(text);
+    text::PlainUrdf plain = text::plain_urdf(text, name);
+    model = urdf::parseURDF(plain.text);
+    tree.limits = std::move(plain.limits);
   } catch (const std::exception& error) {
     throw InvalidModel(one_line(name + ": " + error.what()));
   }
@@ -129,10 +108,11 @@ void refuse(const std::string& name, const std::string& kind, const std::string&
   throw InvalidModel(one_line(name + ": " + kind + " '" + element + "': " + reason));
 }
 
-std::shared_ptr<urdf::ModelInterface> read_urdf(const std::string& text, const std::string& name) {
-  std::shared_ptr<urdf::ModelInterface> model = parse(text, name);
-  check_tree(*model, name);
-  return model;
+UrdfTree read_urdf(const std::string& text, const std::string& name) {
+  UrdfTree tree;
+  tree.model = parse(text, name, tree);
+  check_tree(*tree.model, name);
+  return tree;
 }
 
 std::string links_near(const std::string& name, const urdf::ModelInterface& tree) {

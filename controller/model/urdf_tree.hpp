@@ -1,6 +1,10 @@
 #pragma once
+#include <dashpot/text/plain_urdf.hpp>
+
 #include <urdf_model/model.h>
 
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -11,10 +15,16 @@ namespace dashpot::controller {
 [[noreturn]] void refuse(const std::string& name, const std::string& kind,
                          const std::string& element, const std::string& reason);
 
-/// Parses a URDF that text::check_xml accepts, and checks that it is a tree: one root, one parent
+/// A URDF as urdfdom has it, with the limits that urdfdom does not know.
+struct UrdfTree {
+  std::shared_ptr<urdf::ModelInterface> model;
+  std::map<std::string, text::MotionLimits, std::less<>> limits;  ///< by joint
+};
+
+/// Parses what text::plain_urdf makes of a URDF, and checks that it is a tree: one root, one parent
 /// for every other link, no loop. urdfdom's messages become the text of InvalidModel and do not
 /// reach the console. `name` stands in front of every message.
-std::shared_ptr<urdf::ModelInterface> read_urdf(const std::string& text, const std::string& name);
+UrdfTree read_urdf(const std::string& text, const std::string& name);
 
 /// Returns the links of the tree as text, the links with names nearest to `name` first: "its links
 /// are a, b", or, if there are more than ten, "the nearest of its 30 links are ...".

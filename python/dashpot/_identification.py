@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Sequence
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -90,15 +90,29 @@ def _columns(name: str, what: str, given: Any, records: int, many: bool) -> list
     return columns
 
 
-def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike],
-             y: npt.ArrayLike | Sequence[npt.ArrayLike], *,
+def _topic(joints: Mapping[str, Any]) -> tuple[Array, Array]:
+    """Times and positions of a topic of JointState, of the joints and messages that have both."""
+    for field in ("time", "position"):
+        if field not in joints:
+            raise Error(f"identify: the topic has no {field}, as that of a JointState would")
+    position = np.asarray(joints["position"], float)
+    seen = np.isfinite(position)
+    position = position[:, seen.mean(axis=0) > 0.5]  # without joints that others publish
+    complete = np.isfinite(position).all(axis=1)
+    time = np.asarray(joints["time"], float)[complete]
+    return time - (time[0] if time.size else 0), position[complete]
+
+
+def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike] | Mapping[str, Any],
+             y: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None, *,
              input: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None, find: bool = True,
              ambient: bool = False, max_order: int = 0) -> Identification:
     """Returns the modes that records of motion show: of free decays, of motion under inputs that
     were measured, or of ambient motion.
 
     `t` has the times (N, s, rising, not necessarily even) and `y` the channels (N x channels, or N
-    for one channel) of a record; NaN is a sample that is missing. Lists of such arrays are several
+    for one channel) of a record; NaN is a sample that is missing. Instead of both, `t` may be a topic
+    of JointState as read_log returns it, whose positions are the channels. Lists of such arrays are several
     records at one posture. Free decays, after a push, a release or a step, are found in them;
     with find=False each record is one. With `input` (N x inputs, or N for one input; nothing
     missing; a list of such arrays for several records) the records are taken whole: what moved
@@ -113,6 +127,12 @@ def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike],
     Raises Error for arrays of the wrong size, times that do not rise, fewer than 20 samples, where
     nothing moves freely, inputs of which none moves, and for ambient motion that is too short.
     """
+    if isinstance(t, Mapping):
+        if y is not None:
+            raise Error("identify: a topic has its own channels, but y is given as well")
+        t, y = _topic(t)
+    elif y is None:
+        raise Error("identify: y is missing")
     many = isinstance(t, (list, tuple)) and len(t) > 0 and np.ndim(t[0]) > 0
     times: list[Any] = list(t) if many else [t]  # type: ignore[arg-type]
     values = _columns("y", "channels", y, len(times), many)

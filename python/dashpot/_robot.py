@@ -3,18 +3,73 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
+import json
 import os
-from typing import Any, Iterable, Sequence
+import warnings
+from typing import Any, Iterable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _core
+from . import _core, _mujoco
 from ._core import Error
 from ._results import Array, Modes, Result, make_modes, to_gain, to_numbers, to_vector
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 LOADS = ("base_wrench", "tool_wrench", "joint_torques")
+
+
+def _options(*, gravity: npt.ArrayLike | None = None, include_off_chain: bool = True,
+             accept_inertias: bool | Sequence[str] = False, drives: str = "",
+             drives_friction: bool = False, reflected_inertia: npt.ArrayLike | None = None,
+             viscous_friction: npt.ArrayLike | None = None,
+             coulomb_friction: npt.ArrayLike | None = None, payload_mass: float = 0,
+             payload_center: npt.ArrayLike = (0, 0, 0),
+             payload_inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)),
+             tool: npt.ArrayLike | None = None) -> dict[str, Any]:
+    """Returns the options of from_urdf as the core takes them."""
+    options: dict[str, Any] = {"include_off_chain": include_off_chain,
+                               "accept_inertias": accept_inertias is True,
+                               "accept_inertias_of": ([] if isinstance(accept_inertias, bool)
+                                                      else list(accept_inertias)),
+                               "payload_mass": float(payload_mass),
+                               "payload_center": _sized("payload_center", payload_center, (3,)),
+                               "payload_inertia": _sized("payload_inertia", payload_inertia,
+                                                         (3, 3))}
+    if drives or drives_friction:
+        options["drives"], options["drives_friction"] = drives, drives_friction
+    if gravity is not None:
+        options["gravity"] = _sized("gravity", gravity, (3,))
+    for name, values in (("reflected_inertia", reflected_inertia),
+                         ("viscous_friction", viscous_friction),
+                         ("coulomb_friction", coulomb_friction)):
+        if values is not None:
+            options[name] = to_numbers(name, values, 1)
+    if tool is not None:
+        pose = _sized("tool", tool, (4, 4))
+        options["tool_position"] = pose[:3, 3].copy()
+        options["tool_rotation"] = pose[:3, :3].copy()
+    return options
+
+
+def _expand(path: str, arguments: Mapping[str, str]) -> str:
+    """Returns the URDF that a xacro makes."""
+    package: Any = None
+    for name in ("xacro", "xacrodoc"):
+        try:
+            package = package or importlib.import_module(name)
+        except ImportError:
+            continue
+    if package is None:
+        raise Error(f"{path}: is a xacro: pip install xacro (or xacrodoc), which expands it, or "
+                    f"expand it first: xacro {path} > robot.urdf")
+    try:
+        if package.__name__ == "xacro":
+            return str(package.process_file(path, mappings=dict(arguments)).toxml())
+        return str(package.XacroDoc.from_file(path, subargs=dict(arguments)).to_urdf_string())
+    except Exception as error:  # whatever the file makes of it
+        raise Error(f"{path}: xacro: {' '.join(str(error).split())}") from None
 
 
 class Robot:
@@ -40,6 +95,14 @@ class Robot:
     """n, N m."""
     reflected_inertia: Array
     """n, of rotors and gears, kg m^2."""
+    acceleration: Array
+    """n, limits of acceleration, rad/s^2, which URDF has from version 1.2 on; infinite if there is
+    none."""
+    deceleration: Array
+    jerk: Array
+    """n, rad/s^3; likewise."""
+    warnings: tuple[str, ...]
+    """What is doubtful about the description though it was read."""
 
     def __init__(self, urdf: str, base: str, tip: str, *, file: str = "URDF",
                  **options: Any) -> None:
@@ -50,22 +113,26 @@ class Robot:
         for name, values in self._core.joint_properties().items():
             values.flags.writeable = False
             setattr(self, name, values)
+        self.warnings = tuple(self._core.warnings())
 
     @classmethod
     def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str, *,
                   gravity: npt.ArrayLike | None = None, include_off_chain: bool = True,
-                  accept_inertias: bool = False, drives: str = "", drives_friction: bool = False,
+                  accept_inertias: bool | Sequence[str] = False, drives: str = "", drives_friction: bool = False,
                   reflected_inertia: npt.ArrayLike | None = None,
                   viscous_friction: npt.ArrayLike | None = None,
                   coulomb_friction: npt.ArrayLike | None = None, payload_mass: float = 0,
                   payload_center: npt.ArrayLike = (0, 0, 0),
                   payload_inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)),
-                  tool: npt.ArrayLike | None = None) -> Robot:
-        """Reads the chain from link `base` to link `tip` of the URDF at `path`.
+                  tool: npt.ArrayLike | None = None,
+                  xacro_arguments: Mapping[str, str] | None = None) -> Robot:
+        """Reads the chain from link `base` to link `tip` of the URDF at `path`. A xacro is expanded
+        with `xacro_arguments` by the Python package xacro or xacrodoc, if one is installed.
 
         `gravity` (3, m/s^2) is in the axes of the file's root link, by default 9.81 along -z.
         Fingers and other links off the chain count as rigid at their zero position unless
-        `include_off_chain` is False. `accept_inertias` takes inertias that no body can have.
+        `include_off_chain` is False. `accept_inertias` takes inertias that no body can have,
+        of all links or of those that it names.
         `drives` names public figures of reflected inertia, see published_drives, whose friction
         takes the place of the URDF's with `drives_friction`.
         `reflected_inertia` (n, kg m^2), `viscous_friction` (n, N m s/rad) and `coulomb_friction`
@@ -73,29 +140,72 @@ class Robot:
         (3, m, in the tip link) and `payload_inertia` (3 x 3, kg m^2, about that centre). `tool` is
         the pose (4 x 4) of the tool's frame in the tip link; the tip is then this frame.
 
-        Raises Error that names file, joint or link and reason.
+        Raises Error that names file, joint or link and reason, and warns of what is doubtful, as a
+        mass that is hardly one in kg.
         """
-        options: dict[str, Any] = {"include_off_chain": include_off_chain,
-                                   "accept_inertias": accept_inertias,
-                                   "payload_mass": float(payload_mass),
-                                   "payload_center": _sized("payload_center", payload_center, (3,)),
-                                   "payload_inertia": _sized("payload_inertia", payload_inertia,
-                                                             (3, 3))}
-        if drives or drives_friction:
-            options["drives"], options["drives_friction"] = drives, drives_friction
-        if gravity is not None:
-            options["gravity"] = _sized("gravity", gravity, (3,))
-        for name, values in (("reflected_inertia", reflected_inertia),
-                             ("viscous_friction", viscous_friction),
-                             ("coulomb_friction", coulomb_friction)):
-            if values is not None:
-                options[name] = to_numbers(name, values, 1)
-        if tool is not None:
-            pose = _sized("tool", tool, (4, 4))
-            options["tool_position"] = pose[:3, 3].copy()
-            options["tool_rotation"] = pose[:3, :3].copy()
+        options = _options(gravity=gravity, include_off_chain=include_off_chain,
+                           accept_inertias=accept_inertias, drives=drives,
+                           drives_friction=drives_friction, reflected_inertia=reflected_inertia,
+                           viscous_friction=viscous_friction, coulomb_friction=coulomb_friction,
+                           payload_mass=payload_mass, payload_center=payload_center,
+                           payload_inertia=payload_inertia, tool=tool)
         file = os.fspath(path)
-        return cls(_core.read_urdf(file), base, tip, file=file, **options)
+        text = _core.read_urdf(file)
+        try:
+            robot = cls(text, base, tip, file=file, **options)
+        except Error as error:
+            if "is a xacro that is not expanded yet" not in str(error):
+                raise
+            robot = cls(_expand(file, xacro_arguments or {}), base, tip, file=file, **options)
+        for said in robot.warnings:
+            warnings.warn(f"{file}: {said}", stacklevel=2)
+        return robot
+
+    @classmethod
+    def from_mujoco(cls, model: Any, base: str, tip: str, *, gravity: npt.ArrayLike | None = None,
+                    reflected_inertia: npt.ArrayLike | None = None, **options: Any) -> Robot:
+        """Reads the chain from body `base` to body or site `tip` of a mujoco.MjModel, or of the
+        MJCF or MJB file at the path `model`, with armature as reflected inertia, damping, dry
+        friction, gravity, and the limits of positions and actuators. Positions q are those of
+        MuJoCo. Bodies off the chain count as rigid at the model's reference position (qpos0).
+
+        `gravity` is in the axes of the model's world; other `options` are those of from_urdf:
+        viscous_friction, coulomb_friction, the payload and the tool. Raises Error for ball and free
+        joints on the chain, and warns of what it leaves out.
+        """
+        loaded, name = _mujoco.load(model)
+        arm = _mujoco.read_arm(loaded, name, base, tip)
+        return cls(arm.urdf, arm.base, arm.tip, file=name, **_options(
+            accept_inertias=True,
+            gravity=arm.gravity if gravity is None else gravity,
+            reflected_inertia=(arm.reflected_inertia if reflected_inertia is None
+                               else reflected_inertia), **options))
+
+    def save(self, path: str | os.PathLike[str]) -> tuple[str, str]:
+        """Writes the robot as files that the program and other programs read: its URDF to `path`,
+        and beside it, ending in .yaml, a configuration with its drives, friction, payload and tool.
+        Returns both paths."""
+        urdf = os.fspath(path)
+        config = os.path.splitext(urdf)[0] + ".yaml"
+        text, base, tip, _, options = self._arguments
+        robot: dict[str, Any] = {"urdf": os.path.basename(urdf), "base": base, "tip": tip}
+        for key, value in options.items():
+            if not key.startswith(("payload", "tool", "accept_inertias_of")):
+                robot[key] = value.tolist() if isinstance(value, np.ndarray) else value
+        if options.get("accept_inertias_of"):
+            robot["accept_inertias"] = options["accept_inertias_of"]
+        if options.get("payload_mass"):
+            robot["payload"] = {key: np.asarray(options[f"payload_{key}"]).tolist()
+                                for key in ("mass", "center", "inertia")}
+        if "tool_position" in options:
+            robot["tool"] = {"position": options["tool_position"].tolist(),
+                             "rpy": list(_mujoco.rpy_of(options["tool_rotation"]))}
+        with open(urdf, "w", encoding="utf-8") as file:
+            file.write(text)
+        with open(config, "w", encoding="utf-8") as file:
+            json.dump({"robot": robot}, file, indent=2)
+            file.write("\n")
+        return urdf, config
 
     def _for_gains(self, urdf_friction: bool) -> Robot:
         """Returns the robot without the viscous friction of its URDF, unless that is asked for or

@@ -120,6 +120,7 @@ Robot make_robot(const std::string& urdf, const std::string& name, const std::st
   read("gravity", options.gravity);
   read("include_off_chain", options.include_off_chain);
   read("accept_inertias", options.accept_inertias);
+  read("accept_inertias_of", options.accept_inertias_of);
   read_vector("reflected_inertia", options.reflected_inertia);
   read_vector("viscous_friction", options.viscous_friction);
   read_vector("coulomb_friction", options.coulomb_friction);
@@ -198,6 +199,9 @@ nb::dict joint_properties(const Robot& robot) {
   result["viscous_friction"] = values(&Joint::viscous_friction);
   result["coulomb_friction"] = values(&Joint::coulomb_friction);
   result["reflected_inertia"] = values(&Joint::reflected_inertia);
+  result["acceleration"] = values(&Joint::acceleration);
+  result["deceleration"] = values(&Joint::deceleration);
+  result["jerk"] = values(&Joint::jerk);
   return result;
 }
 
@@ -222,6 +226,7 @@ void add_robot(nb::module_& m) {
            })
       .def("middle_posture",
            [](const Robot& robot) { return to_array(controller::middle_posture(robot.model)); })
+      .def("warnings", [](const Robot& robot) { return robot.model.warnings(); })
       .def("missing_rotors",
            [](const Robot& robot) { return controller::missing_rotors_text(robot.model); })
       .def("pose", &pose)

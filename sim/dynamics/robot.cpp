@@ -1,4 +1,5 @@
 #include <dashpot/sim/robot.hpp>
+#include <dashpot/text/plain_urdf.hpp>
 #include <dashpot/text/printable.hpp>
 #include <dashpot/text/read_file.hpp>
 #include <dashpot/text/xml_check.hpp>
@@ -94,8 +95,7 @@ class Reader {
       : name_(name), any_inertia_(any_inertia) {
     ParserMessages messages;
     try {
-      text::check_xml(text);
-      model_ = urdf::parseURDF(text);
+      model_ = urdf::parseURDF(text::plain_urdf(text, name).text);
     } catch (const std::exception& error) {
       fail(name, error.what());
     }

@@ -1,5 +1,6 @@
 // What `dashpot inspect` prints, and what it says to bad input.
 #include <dashpot/controller/posture.hpp>
+#include <dashpot/controller/model/urdf_tree.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>
@@ -164,6 +165,43 @@ TEST(Inspect, GoesOnPastAnInertiaThatNoBodyHasIfToldTo) {
   const Json taken =
       parse(inspect_text(scratch, "type='continuous'", broken, {"--accept-inertias"}));
   EXPECT_EQ(taken["mass_matrix"], Json({{3.0}}));
+  EXPECT_EQ(parse(inspect_text(scratch, "type='continuous'", broken, {"--accept-inertias=arm"})),
+            taken);
+  const Outcome other =
+      inspect_text(scratch, "type='continuous'", broken, {"--accept-inertias=wall"});
+  EXPECT_THAT(other.err,
+              HasSubstr("link 'arm': its inertia breaks the triangle inequality by 50 %"));
+  const Outcome nobody =
+      inspect_text(scratch, "type='continuous'", broken, {"--accept-inertias=arm,hand"});
+  EXPECT_THAT(nobody.err, HasSubstr("link 'hand': there is none whose inertia to accept"));
+}
+
+TEST(Inspect, WarnsOfWhatIsDoubtful) {
+  const Scratch scratch;
+  const Outcome outcome = inspect_text(scratch, "type='continuous'", "ixx='90' iyy='90' izz='90'");
+  const std::string doubt =
+      "link 'arm': its inertia, 90 kg m^2, with its mass, 1 kg, is that of a body larger than the "
+      "arm, whose links add up to 0 m: is it in kg m^2?";
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_EQ(outcome.err, "warning: " + doubt + "\n");
+  EXPECT_EQ(Json::parse(outcome.out)["warnings"], Json({doubt}));
+}
+
+TEST(Inspect, ShowsLimitsOfVersion12WhereTheyAreStated) {
+  const Scratch scratch;
+  std::string text = dashpot::controller::read_text(dashpot::testing::arm_path("panda"));
+  text.replace(text.find("<robot name=\"panda\">"), 20, "<robot name=\"panda\" version=\"1.2\">");
+  text.replace(text.find("effort=\"12\""), 11, "effort=\"12\" acceleration=\"20\" jerk=\"5e3\"");
+  const Words words = {"inspect",       "--urdf",      scratch.write("arm.urdf", text),
+                       "--base",        "panda_link0", "--tip",
+                       "panda_hand_tcp"};
+  const Json joints = parse(run_program(joined(words, {"--json"})))["joints"];
+  EXPECT_EQ(joints[4]["acceleration"], 20);
+  EXPECT_EQ(joints[4]["jerk"], 5000);
+  EXPECT_FALSE(joints[4].contains("deceleration"));
+  EXPECT_FALSE(joints[3].contains("acceleration"));
+  EXPECT_THAT(run_program(words).out, HasSubstr("acceler."));
+  EXPECT_THAT(inspect_panda({}).out, ::testing::Not(HasSubstr("acceler.")));
 }
 
 TEST(Inspect, AddsReflectedInertia) {

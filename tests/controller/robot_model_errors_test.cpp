@@ -88,7 +88,10 @@ TEST(RobotModelErrors, AreOneLineThatNamesTheElement) {
       {"", "", "Error document empty"},
       {"mass: [[1]]", "", "Error document empty"},
       {"<robot name='r'><link name='a'", "", ""},
-      {"<sdf/>", "", "robot"},
+      {"<sdf/>", "is SDF, ", "give the URDF or xacro that it was made from"},
+      {"<?xml version='1.0'?><mujoco model='a'/>", "is MJCF, ", "dashpot.Robot.from_mujoco"},
+      {"<mujocoinclude/>", "is MJCF, ", "save()"},
+      {"<model/>", "", "robot"},
       {robot(""), "", "No link elements"},
       {robot(kTwoLinks + joint("j", "x", "b")), "", "[x]"},
       {robot("<link name='b'/>"), "link 'a': ", "there is none"},
@@ -130,7 +133,7 @@ TEST(RobotModelErrors, AreOneLineThatNamesTheElement) {
        "link 'b': ", "not positive definite: a principal moment is -1 kg m^2"},
       {arm(inertial("2", "1", "1", "1", "1.5")), "link 'b': ", "not positive definite"},
       {arm(inertial("2", "1", "1", "2.1")),
-       "link 'b': ", "breaks the triangle inequality: principal moments 1, 1, 2.1 kg m^2"},
+       "link 'b': ", "breaks the triangle inequality by 5 %: principal moments 1, 1, 2.1 kg m^2"},
       {arm(""), "joint 'j': ", "no inertia resists it"},
       {arm("<inertial><origin xyz='3 0 0'/><mass value='1'/><inertia ixx='0' ixy='0' ixz='0' "
            "iyy='0' iyz='0' izz='0'/></inertial>",
@@ -181,8 +184,9 @@ TEST(RobotModelErrors, SpareWhatCanExist) {
 
 TEST(RobotModelErrors, NameWhatAcceptsAnImpossibleInertia) {
   const std::string broken = arm(inertial("2", "1", "1", "2.1"));
-  EXPECT_THAT(problem(broken), EndsWith("2.1 kg m^2; robot.accept_inertias: true, or "
-                                        "--accept-inertias, takes it as it is"));
+  EXPECT_THAT(problem(broken),
+              EndsWith("2.1 kg m^2; robot.accept_inertias: true, or --accept-inertias, takes it as "
+                       "it is; both take names of links as well"));
   ModelOptions options;
   options.accept_inertias = true;
   EXPECT_EQ(problem(broken, options), "no error");
@@ -210,7 +214,9 @@ TEST(RobotModelErrors, ListTheLinksWithTheNearestNamesFirst) {
 TEST(RobotModelErrors, SayThatAXacroHasToBeExpanded) {
   const std::string head = "<robot name='r' xmlns:xacro='http://www.ros.org/wiki/xacro'>";
   const std::string rest = kTwoLinks + joint("j", "a", "b") + "</robot>";
-  const std::string how = "); expand it first: xacro arm.urdf > robot.urdf";
+  const std::string how =
+      "); expand it first: xacro arm.urdf > robot.urdf (xacro comes with ROS, or by pip install "
+      "xacro)";
   const std::string start = "arm.urdf: is a xacro that is not expanded yet (";
   EXPECT_EQ(problem(head + "<xacro:include filename='b.xacro'/>" + rest),
             start + "<xacro:include>" + how);

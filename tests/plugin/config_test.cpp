@@ -142,6 +142,13 @@ TEST(Config, TakesAnInertiaThatNoBodyHasIfToldTo) {
   const std::string robot = "robot: {urdf: " + path + ", base: base_link, tip: ee_link";
   EXPECT_THAT(complaint(robot + "}\n"), ::testing::HasSubstr("robot.accept_inertias: true"));
   EXPECT_EQ(load(robot + ", accept_inertias: true}\n").model.dof(), 6);
+  EXPECT_EQ(load(robot + ", accept_inertias: [upper_arm_link]}\n").model.dof(), 6);
+  EXPECT_THAT(complaint(robot + ", accept_inertias: [forearm_link]}\n"),
+              ::testing::HasSubstr("link 'upper_arm_link': "));
+  EXPECT_THAT(complaint(robot + ", accept_inertias: [[upper_arm_link]]}\n"),
+              ::testing::HasSubstr("true, false or names of links are wanted"));
+  EXPECT_THAT(complaint(robot + ", accept_inertias: [arm]}\n"),
+              ::testing::HasSubstr("link 'arm': there is none whose inertia to accept"));
 }
 
 TEST(Config, FillsJointMatrices) {

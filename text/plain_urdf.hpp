@@ -1,0 +1,32 @@
+#pragma once
+#include <limits>
+#include <map>
+#include <string>
+#include <string_view>
+
+namespace dashpot::text {
+
+/// Limits of a joint that URDF has from version 1.2 on, rad/s^2 and rad/s^3 (or m); infinity where
+/// the file states none.
+struct MotionLimits {
+  double acceleration = std::numeric_limits<double>::infinity();
+  double deceleration = std::numeric_limits<double>::infinity();
+  double jerk = std::numeric_limits<double>::infinity();
+};
+
+/// A URDF as a parser of version 1.0 reads it, and what this version has no place for.
+struct PlainUrdf {
+  std::string text;
+  std::map<std::string, MotionLimits, std::less<>>
+      limits;  ///< by joint; only those that are stated
+};
+
+/// Checks a URDF of version 1.0, 1.1 or 1.2 as check_xml does, and returns it in version 1.0 with
+/// nothing but what the mechanics of a chain need: shapes, materials, transmissions and extensions
+/// are left out unread. `quat_xyzw` of version 1.1 becomes `rpy`, exactly but for rounding. Throws
+/// std::runtime_error with the reason for other versions, for `quat_xyzw` in version 1.0, where
+/// other programs ignore it, for orientations that are no rotation, for limits that are not
+/// positive, and for MJCF, SDF and xacro, with the way on; `name` stands for the file there.
+PlainUrdf plain_urdf(std::string_view text, const std::string& name);
+
+}  // namespace dashpot::text
