@@ -16,9 +16,10 @@ void take_drives(const std::string& name, controller::ModelOptions& model) try {
 }
 
 void add_accept_inertias(CLI::App& command, std::string& accepted) {
-  command.add_flag("--accept-inertias{true}", accepted,
-                   "Take inertias that no body can have as they are: all, or =LINK,... those of "
-                   "these links");
+  command
+      .add_flag("--accept-inertias", accepted,
+                "Take inertias that no body can have as they are: all, or those of these links")
+      ->option_text("[=LINK,...]");
 }
 
 void take_accepted(const std::string& accepted, controller::ModelOptions& model) {

@@ -234,8 +234,8 @@ void doubt_base(const urdf::ModelInterface& tree, const std::string& base,
   for (std::size_t i = 0;; ++i) {
     const std::string problem = body_of(*tree.getLink(link)).problem;
     if (!problem.empty()) {
-      warnings.push_back(
-          one_line("link '" + link + "': " + problem + "; it stands still, and does not count"));
+      warnings.push_back(one_line(std::string("link '").append(link).append("': ").append(
+          problem + "; it stands still, and does not count")));
     }
     if (i == path.size() || path[i]->type != urdf::Joint::FIXED) return;
     link = path[i]->child_link_name;

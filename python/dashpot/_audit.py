@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
-from typing import Any, Sequence
+from typing import Any, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -122,6 +122,18 @@ def _damping(stiffness: npt.ArrayLike | None, damping: npt.ArrayLike | None,
     return factor * np.sqrt(matrix)
 
 
+def _measured(robot: Robot, joints: Mapping[str, Any]) -> Array:
+    """Returns the positions of the robot's joints in a topic of JointState, where it has all."""
+    names = [str(name) for name in joints.get("name", ())]
+    missing = [name for name in robot.joint_names if name not in names]
+    if missing or "position" not in joints:
+        raise Error(f"postures: the topic has no positions of {', '.join(missing) or 'joints'}")
+    columns = [names.index(name) for name in robot.joint_names]
+    position: Array = np.asarray(joints["position"], float)[:, columns]
+    complete: Array = position[np.isfinite(position).all(axis=1)]
+    return complete
+
+
 def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           task_stiffness: npt.ArrayLike | None = None, task_damping: npt.ArrayLike | None = None,
           damping_factor: float | None = None, null_stiffness: npt.ArrayLike | None = None,
@@ -134,7 +146,7 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
           margin: float = 2, soft_frequency: float = 0.1,
           damping_ratio: float | None = None, samples: int = 0, seed: int = 0,
           lower: npt.ArrayLike | None = None, upper: npt.ArrayLike | None = None,
-          postures: npt.ArrayLike | None = None, outside_limits: bool = False,
+          postures: npt.ArrayLike | Mapping[str, Any] | None = None, outside_limits: bool = False,
           urdf_friction: bool = False,
           executor: concurrent.futures.Executor | None = None) -> Audit:
     """Returns what gains really do on a robot, as their documentation states them.
@@ -142,7 +154,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
     At posture q (n, rad; without `samples` and `postures` the middle of the position limits): its
     modes, smallest damping ratio, fastest pole and gain margin. Over
     `samples` postures, spread evenly by a sequence of number `seed` between `lower` and `upper` (n,
-    rad; by default the position limits), or over `postures` (s x n, rad): the distributions of these
+    rad; by default the position limits), or over `postures` (s x n, rad, or a topic of
+    JointState as read_log returns it, whose joints are found by name): the distributions of these
     numbers. With a `damping_ratio`: damping
     that gives every mode this ratio at q.
 
@@ -195,6 +208,8 @@ def audit(robot: Robot, q: npt.ArrayLike | None = None, *,
         if values is not None:
             options[name] = to_numbers(name, values, 1)
     task = Task(robot._for_gains(urdf_friction), gains, at_tip, options)
+    if isinstance(postures, Mapping):
+        postures = _measured(robot, postures)
     given = None if postures is None else to_numbers("postures", postures, 2)
     samples = samples if given is None else len(given)
     if q is None and samples == 0:

@@ -86,6 +86,24 @@ def test_modes_are_identified_from_a_rosbag(tmp_path):
         [9 * np.hypot(1, 0.1)], rel=1e-3)
 
 
+def test_postures_of_a_topic_are_those_of_the_joints_by_name(panda):
+    random = np.random.default_rng(3)
+    order = random.permutation(8)
+    names = np.array([*panda.joint_names, "finger"])
+    positions = random.uniform(-0.5, 0.5, (6, 8)) + [*np.array([0, -0.8, 0, -2.3, 0, 1.6, 0.8]), 0]
+    joints = {"name": names[order], "position": positions[:, order].copy()}
+    gains = {"task_stiffness": [200] * 3 + [20] * 3, "damping_factor": 2}
+    given = dashpot.audit(panda, postures=positions[:, :7], **gains).workspace.smallest_ratio
+    found = dashpot.audit(panda, postures=joints, **gains).workspace.smallest_ratio
+    assert (found.median, found.worst) == (given.median, given.worst)
+    assert np.array_equal(found.worst_q, given.worst_q)
+    joints["position"][2, list(order).index(4)] = np.nan
+    assert dashpot.audit(panda, postures=joints, **gains).workspace.samples == 5
+    joints["name"][0] = "nobody"
+    with pytest.raises(dashpot.Error, match=f"no positions of {names[order[0]]}"):
+        dashpot.audit(panda, postures=joints, **gains)
+
+
 def test_mcap_of_the_program_is_read_as_its_log(root, program, tmp_path):
     pytest.importorskip("mcap")
     log, mcap = tmp_path / "run.lcm", tmp_path / "run.mcap"
