@@ -211,9 +211,11 @@ State<N> invariant_subspace(const State<N>& A, Complex mean, bool near_axis, Eig
 
 template <int N>
 SplitCluster<N> split_cluster(const State<N>& small, const ComplexStateVector<N>& values,
-                              Complex mean) noexcept {
+                              Complex mean, bool coinciding) noexcept {
   SplitCluster<N> split;
   if (split_coinciding<N>(small, mean, split)) return split;
+  if (coinciding && split_critical<N>(small, mean.real(), split)) return split;
+  split.blocks.clear();
   const double apart = split_apart<N>(small, values, split);
   if (apart < kWellApart) return split;
   SplitCluster<N> planes;
@@ -234,7 +236,7 @@ template State<kMaxDof> invariant_subspace<kMaxDof>(const State<kMaxDof>&, Compl
                                                     Eigen::Index, int, Work&) noexcept;
 template SplitCluster<kDynamic> split_cluster<kDynamic>(const State<kDynamic>&,
                                                         const ComplexStateVector<kDynamic>&,
-                                                        Complex) noexcept;
+                                                        Complex, bool) noexcept;
 template SplitCluster<kMaxDof> split_cluster<kMaxDof>(const State<kMaxDof>&,
                                                       const ComplexStateVector<kMaxDof>&, Complex,
                                                       bool) noexcept;
