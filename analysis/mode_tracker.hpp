@@ -87,7 +87,6 @@ class ModeTracker {
 
   bool follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
   bool refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
-  bool separate(const CloseBlocks& close, Work& work) noexcept;
   bool read(TrackedSpectrum& out) noexcept;
   void publish(const SymmetricPencil& pencil, SpectrumOrigin origin, TrackedSpectrum& out) noexcept;
   void solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil,

@@ -186,17 +186,10 @@ bool ModeTracker::refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Wo
       return true;
     }
     if (!close) continue;
-    if (!separate(close, work)) return false;
+    if (!work.take(kPartingWork) || !separate_blocks(residual_, close, basis_)) return false;
     forget_past();
   }
   return false;
-}
-
-bool ModeTracker::separate(const CloseBlocks& close, Work& work) noexcept {
-  if (!work.take(kPartingWork)) return false;
-  if (basis_.two_sided) return separate_two_sided(residual_, close, basis_);
-  if (close.first >= basis_.modes) return separate_zero_modes(residual_, basis_);
-  return separate_blocks(residual_, close, basis_);
 }
 
 /// Reads the numbers of basis_; false if what is a zero mode is to be decided again.
