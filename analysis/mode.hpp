@@ -48,6 +48,9 @@ struct ModeNumbers {
   /// not counted there.
   /// Of either eigenvalue, 1/s (of the computed and the true one nearest each other):
   double error_bound = std::numeric_limits<double>::infinity();
+  /// Of each of the two, 1/s: error_bound is the larger one.
+  std::array<double, 2> eigenvalue_bounds = {std::numeric_limits<double>::infinity(),
+                                             std::numeric_limits<double>::infinity()};
   double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s
   double damping_ratio_bound = std::numeric_limits<double>::infinity();
 };

@@ -62,11 +62,11 @@ class ModeTracker {
 
   /// Makes the next update start from scratch. Modes that it recognises keep their indices.
   void reset() noexcept {
-    if (state_ != State::kEmpty) state_ = State::kMatching;
+    forget_solution(state_ == State::kEmpty ? State::kEmpty : State::kMatching);
   }
   /// Forgets everything but the counters: the next update is like the first.
   void forget() noexcept {
-    state_ = State::kEmpty;
+    forget_solution(State::kEmpty);
     soft_ = {};
     enclosure_.roundoff_bound = 0;
     epoch_ = 0;
@@ -83,12 +83,10 @@ class ModeTracker {
     kMatching,   ///< its columns say which mode has which index
     kFollowing,  ///< and Newton's method starts from it
     kCurrent,    ///< and it is the solution for last_, as E_ and enclosure_ are
-    kKept,       ///< and kept_ is its spectrum
   };
 
   bool follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
   bool refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
-  bool separate(const CloseBlocks& close, Work& work) noexcept;
   bool read(TrackedSpectrum& out) noexcept;
   void publish(const SymmetricPencil& pencil, SpectrumOrigin origin, TrackedSpectrum& out) noexcept;
   void solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil,
@@ -98,6 +96,10 @@ class ModeTracker {
   void publish_direct(const SymmetricPencil& pencil, TrackedSpectrum& out) noexcept;
   std::array<int, kMaxDof> match(const SymmetricPencil& pencil,
                                  const BlockEigenbasis& before) noexcept;
+  void forget_solution(State state) noexcept {
+    state_ = state;
+    kept_known_ = false;
+  }
   void forget_past() noexcept {
     extrapolation_.forget();
     left_extrapolation_.forget();
@@ -118,6 +120,7 @@ class ModeTracker {
   BasisExtrapolation extrapolation_;
   PackedMatrix momenta_;
   TrackedSpectrum kept_;
+  bool kept_known_ = false;  ///< kept_ is the spectrum of last_
   SpectrumSolver<kMaxDof> solver_;
   Spectrum<kMaxDof> spectrum_;
   // Of two-sided bases

@@ -30,7 +30,7 @@ class Response {
   /// modes (its status is kOk or kUncertified); throws std::invalid_argument otherwise.
   Response(const System<>& system, const Spectrum<>& spectrum);
 
-  /// Returns the free response to q(0), q'(0) (paper, Eqs. 24, 26, 32).
+  /// Returns the free response to q(0), q'(0) (paper, Eqs. 24, 26, 32); at t = 0 these themselves.
   Motion free(const Eigen::VectorXd& position, const Eigen::VectorXd& velocity, double time) const;
   /// Returns the response from rest to a generalized impulse at t = 0 (N s or N m s), for t >= 0
   /// (paper, Eq. 49).
@@ -59,6 +59,7 @@ class Response {
   Eigen::VectorXd drive_of(const Eigen::VectorXd& force, const char* name) const;
   Eigen::MatrixXd phi_of_basis(int k, double time) const;
   Motion motion(const Eigen::VectorXd& xi) const;
+  Motion motion(const Eigen::VectorXd& position, const Eigen::VectorXd& velocity) const;
 
   Eigen::MatrixXd mass_;
   Eigen::MatrixXd damping_;

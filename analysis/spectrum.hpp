@@ -36,7 +36,7 @@ class SpectrumSolver {
   explicit SpectrumSolver(SpectrumOptions options = {}) : options_(options) {}
 
   /// Analyses `system` into `out` and returns out.status. The work is bounded (see
-  /// hessenberg_eigenvalues; three bases at most, 4 refinement steps each). For a fixed N there is
+  /// hessenberg_eigenvalues; four bases at most, 9 refinement steps each). For a fixed N there is
   /// no allocation. On a status other than kOk and kUncertified `out` has no modes.
   Status solve(const System<N>& system, Spectrum<N>& out) noexcept {
     Work work;

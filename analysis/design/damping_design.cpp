@@ -9,6 +9,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 #include <utility>
 
@@ -181,6 +182,18 @@ void raise_smallest_ratio(const TaskImpedance& impedance, const DampingTarget& t
   }
 }
 
+/// Replaces a design that a search from `start` found, and that misses its target, by a better one
+/// from farther on the way to `exact`: a search can get stuck where modes coincide.
+void search_farther_away(const MatrixXd& start, const MatrixXd& exact,
+                         const std::function<DampingDesign(const MatrixXd&)>& search,
+                         DampingDesign& design) {
+  constexpr double kFirstShare = 1.0 / 16;  // of `exact`
+  for (double share = kFirstShare; share <= 1 && worst_miss(design.misses) > 0; share *= 2) {
+    DampingDesign other = search((1 - share) * start + share * exact);
+    if (worst_miss(other.misses) < worst_miss(design.misses)) design = std::move(other);
+  }
+}
+
 }  // namespace
 
 const char* to_text(DampingMiss::Reason reason) noexcept {
@@ -281,14 +294,21 @@ DampingDesign design_damping(const TaskImpedance& impedance, const DampingTarget
   } else {
     from = design_damping(impedance, target).damping;
   }
-  DampingDesign design;
   const DampingFit fit(samples, structure);
-  design.damping = fit.search(from, {target, 1, {}}).damping;
-  evaluate(impedance, target, design);
-  if (!start && worst_miss(design.misses) > 0) {
+  const auto search = [&](const MatrixXd& first) {
+    DampingDesign found;
+    found.damping = fit.search(first, {target, 1, {}}).damping;
+    evaluate(impedance, target, found);
+    return found;
+  };
+  DampingDesign design = search(from);
+  if (worst_miss(design.misses) > 0 && start) {
+    search_farther_away(from, design_damping(impedance, target).damping, search, design);
+  } else if (worst_miss(design.misses) > 0) {
     raise_smallest_ratio(impedance, target, fit, from, design);
   }
   for (DampingMiss& miss : design.misses) {
+    if (structure == DampingStructure::kFull) break;  // which is none
     if (miss.reason != DampingMiss::Reason::kSoft) miss.reason = DampingMiss::Reason::kStructure;
   }
   return design;

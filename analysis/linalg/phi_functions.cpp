@@ -102,8 +102,16 @@ Eigen::Matrix2cd phi_two(int k, const Eigen::Matrix2d& A, double t, double omega
   return result;
 }
 
+/// Z e^x, without a product of zero and infinity where e^x leaves the range of numbers.
+void scale_by_exponential(double x, Eigen::MatrixXcd& Z) {
+  const double half = std::exp(0.5 * x);
+  const auto scaled = [half](double entry) { return entry == 0 ? 0 : half * entry * half; };
+  for (Complex& entry : Z.reshaped()) entry = {scaled(entry.real()), scaled(entry.imag())};
+}
+
 /// e^Z by scaling and squaring of the Taylor series. The mean eigenvalue is taken out first, which
 /// leaves little to square where the eigenvalues lie close together, as they do in large blocks.
+/// What the squares of a wide block grow by is taken out as well, before it is too large.
 Eigen::MatrixXcd matrix_exponential(const Eigen::MatrixXcd& Z) {
   const auto identity = Eigen::MatrixXcd::Identity(Z.rows(), Z.cols());
   const Complex mean = Z.trace() / static_cast<double>(Z.rows());
@@ -118,8 +126,19 @@ Eigen::MatrixXcd matrix_exponential(const Eigen::MatrixXcd& Z) {
     coefficient *= j + 1;
     sum = coefficient * identity + sum * scaled;
   }
-  for (int i = 0; i < squarings; ++i) sum = (sum * sum).eval();
-  return std::exp(mean) * sum;
+  constexpr double kLarge = 1e100;
+  double taken_out = 0;  // the exponent of a power of e
+  for (int i = 0; i < squarings; ++i) {
+    sum = (sum * sum).eval();
+    taken_out *= 2;
+    const double size = sum.cwiseAbs().maxCoeff();
+    if (size < kLarge) continue;
+    sum *= 1 / size;
+    taken_out += std::log(size);
+  }
+  sum *= std::polar(1.0, mean.imag());
+  scale_by_exponential(mean.real() + taken_out, sum);
+  return sum;
 }
 
 Eigen::MatrixXcd phi_general(int k, const Eigen::MatrixXcd& Z) {

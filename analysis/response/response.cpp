@@ -87,12 +87,15 @@ Response::Response(const System<>& system, const Spectrum<>& spectrum)
 
 Motion Response::free(const VectorXd& position, const VectorXd& velocity, double time) const {
   require("Response", std::isfinite(time), "time is not a finite number");
-  return motion(phi_of_basis(0, time) * start(position, velocity));
+  const VectorXd xi = start(position, velocity);
+  return time == 0 ? motion(position, velocity) : motion(phi_of_basis(0, time) * xi);
 }
 
 Motion Response::impulse(const VectorXd& impulse, double time) const {
   require_forced_time(time);
-  return motion(phi_of_basis(0, time) * drive_of(impulse, "impulse"));
+  Motion result = motion(phi_of_basis(0, time) * drive_of(impulse, "impulse"));
+  if (time == 0) result.position.setZero(), result.zero_mode_position.setZero();
+  return result;
 }
 
 Motion Response::step(const VectorXd& force, double time) const {
@@ -152,7 +155,9 @@ std::vector<Motion> Response::sampled(const VectorXd& position, const VectorXd& 
       drive_next = drive_of(forces.col(k + 1), "forces");
     }
     const double s = time - static_cast<double>(k) * h;
-    motions.push_back(motion(after(s, phi_of_basis(0, s), phi_of_basis(1, s), phi_of_basis(2, s))));
+    motions.push_back(
+        time == 0 ? motion(position, velocity)
+                  : motion(after(s, phi_of_basis(0, s), phi_of_basis(1, s), phi_of_basis(2, s))));
   }
   return motions;
 }
@@ -209,9 +214,13 @@ MatrixXd Response::phi_of_basis(int k, double time) const {
 }
 
 Motion Response::motion(const VectorXd& xi) const {
+  return motion(basis_.U * xi, velocity_basis_ * xi);
+}
+
+Motion Response::motion(const VectorXd& position, const VectorXd& velocity) const {
   Motion result;
-  result.position = basis_.U * xi;
-  result.velocity = velocity_basis_ * xi;
+  result.position = position;
+  result.velocity = velocity;
   if (zero_projector_.isZero(0)) {  // not 0 times what may have grown beyond all numbers
     result.zero_mode_position = result.zero_mode_velocity = Eigen::VectorXd::Zero(mass_.rows());
     return result;

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/spectrum/cluster_split.hpp>
 
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -15,6 +16,8 @@ constexpr double kSeparable = 1e4;
 constexpr double kWellApart = 100;
 /// Eigenvalues this close together (relative) coincide.
 constexpr double kCoincidingValues = 1e-13;
+/// Couplings between modes that coincide at critical damping, relative to those in each of them.
+constexpr double kCriticalCoupling = 1e-6;
 
 /// Adds blocks of `step` columns for as many columns as `split` has.
 template <int N>
@@ -58,6 +61,34 @@ bool split_coinciding(const State<N>& small, Complex mean, SplitCluster<N>& spli
   }
   add_blocks(2, split);
   return true;
+}
+
+/// Modes that coincide at critical damping: with J = small - a, J^2 = 0 as far as rounding errors
+/// tell, each of the size / 2 right singular vectors v of J spans a plane with J v, and these
+/// planes are orthogonal. False if they do not take all of J.
+template <int N>
+bool split_critical(const State<N>& small, double a, SplitCluster<N>& split) {
+  const Eigen::Index size = small.rows(), pairs = size / 2;
+  State<N> J = small;
+  J.diagonal().array() -= a;
+  const Eigen::JacobiSVD<State<N>> svd(J, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const auto& lengths = svd.singularValues();
+  if (size % 2 != 0 || !(lengths[pairs] < kCriticalCoupling * lengths[pairs - 1])) return false;
+  State<N>& W = split.columns;
+  W.resize(size, size);
+  for (Eigen::Index k = 0; k < pairs; ++k) {
+    W.col(2 * k) = svd.matrixV().col(k);
+    W.col(2 * k + 1) = svd.matrixU().col(k);
+  }
+  orthonormalize(W);
+  split.Lambda = W.transpose() * small * W;
+  split.blocks.clear();
+  add_blocks(2, split);
+  double coupling2 = split.Lambda.squaredNorm();
+  for (const Block& b : split.blocks) {
+    coupling2 -= split.Lambda.block(b.first, b.first, 2, 2).squaredNorm();
+  }
+  return coupling2 < kCriticalCoupling * kCriticalCoupling * lengths[0] * lengths[0];
 }
 
 /// Sets Lambda from the columns, and returns their condition number.
@@ -180,15 +211,18 @@ State<N> invariant_subspace(const State<N>& A, Complex mean, bool near_axis, Eig
 
 template <int N>
 SplitCluster<N> split_cluster(const State<N>& small, const ComplexStateVector<N>& values,
-                              Complex mean) noexcept {
+                              Complex mean, bool coinciding) noexcept {
   SplitCluster<N> split;
   if (split_coinciding<N>(small, mean, split)) return split;
+  if (coinciding && split_critical<N>(small, mean.real(), split)) return split;
+  split.blocks.clear();
   const double apart = split_apart<N>(small, values, split);
   if (apart < kWellApart) return split;
   SplitCluster<N> planes;
   const double paired = split_pairs<N>(small, values, mean.real(), planes);
   if (paired < apart && paired < kSeparable) return planes;
   if (apart < kSeparable) return split;
+  if (split_critical<N>(small, mean.real(), planes)) return planes;
   split.columns.setIdentity(small.rows(), small.cols());
   split.Lambda = small;
   split.blocks.clear();
@@ -202,9 +236,9 @@ template State<kMaxDof> invariant_subspace<kMaxDof>(const State<kMaxDof>&, Compl
                                                     Eigen::Index, int, Work&) noexcept;
 template SplitCluster<kDynamic> split_cluster<kDynamic>(const State<kDynamic>&,
                                                         const ComplexStateVector<kDynamic>&,
-                                                        Complex) noexcept;
+                                                        Complex, bool) noexcept;
 template SplitCluster<kMaxDof> split_cluster<kMaxDof>(const State<kMaxDof>&,
-                                                      const ComplexStateVector<kMaxDof>&,
-                                                      Complex) noexcept;
+                                                      const ComplexStateVector<kMaxDof>&, Complex,
+                                                      bool) noexcept;
 
 }  // namespace dashpot::analysis

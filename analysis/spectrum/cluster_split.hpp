@@ -27,10 +27,10 @@ struct SplitCluster {
 /// Splits the matrix of a cluster, with the eigenvalues `values` (of complex pairs the upper half)
 /// about `mean`, as far as that is well conditioned: into any orthonormal directions where all
 /// eigenvalues coincide to rounding without being defective; else into eigenvectors, if they are
-/// well apart; else into planes of two eigenvalues, which near critical damping are the modes; else
-/// not at all.
+/// well apart; else into planes of two eigenvalues, which near critical damping are the modes, also
+/// where several coincide; else not at all. With `coinciding` the latter come first.
 template <int N>
 SplitCluster<N> split_cluster(const State<N>& small, const ComplexStateVector<N>& values,
-                              Complex mean) noexcept;
+                              Complex mean, bool coinciding) noexcept;
 
 }  // namespace dashpot::analysis

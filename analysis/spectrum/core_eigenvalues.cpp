@@ -3,6 +3,7 @@
 #include <dashpot/analysis/spectrum/cluster_split.hpp>
 #include <dashpot/analysis/spectrum/core_eigenvalues.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -26,15 +27,78 @@ CoreEigenvalues<N>::CoreEigenvalues(const EnergyForm<N>& form,
   A_norm_ = A_.norm();
 }
 
+namespace {
+
+template <int N>
+bool find_eigenvalues(State<N> A, ComplexStateVector<N>& values, Work& work) {
+  const Eigen::Index size = A.rows();
+  values.resize(size);
+  if (!work.take(cubed(size, 9) + squared(size, 20))) return false;
+  reduce_to_hessenberg(A);
+  return hessenberg_eigenvalues(A, values.data(), work);
+}
+
+/// By falling modulus.
+template <int N>
+void sort(ComplexStateVector<N>& values) {
+  std::sort(values.data(), values.data() + values.size(),
+            [](const Complex& a, const Complex& b) { return modulus(a) > modulus(b); });
+}
+
+}  // namespace
+
+/// Replaces the slow ones of the eigenvalues of A, of which rounding errors of the fast ones leave
+/// nothing, by those of its inverse [-w^-1 D w^-1  -w^-1; w^-1  0], if A is symmetric but for
+/// signs.
+template <int N>
+bool CoreEigenvalues<N>::replace_slow(ComplexStateVector<N>& values, Work& work) noexcept {
+  constexpr double kWide =
+      1e9;  // condition number of A that leaves slow eigenvalues too few digits
+  constexpr double kApart = 1.01;  // no conjugates, and none of a cluster
+  if (!form_.symmetric || m_ != c_ || m_ == 0) return true;
+  const Vector<N> inverse = A_.topRightCorner(m_, m_).diagonal().cwiseInverse();
+  const Vector<N> lower = A_.bottomLeftCorner(m_, m_).diagonal().cwiseInverse();
+  double B_norm2 = lower.squaredNorm() + inverse.squaredNorm();
+  for (Eigen::Index j = 0; j < m_; ++j) {
+    for (Eigen::Index i = 0; i < m_; ++i) {
+      const double entry = lower[i] * A_(m_ + i, m_ + j) * inverse[j];
+      B_norm2 += entry * entry;
+    }
+  }
+  const double B_norm = std::sqrt(B_norm2);
+  if (!(A_norm_ * B_norm > kWide) || !std::isfinite(B_norm)) return true;
+  State<N> B = State<N>::Zero(2 * m_, 2 * m_);
+  B.topLeftCorner(m_, m_) =
+      lower.asDiagonal() * (-A_.bottomRightCorner(m_, m_)) * inverse.asDiagonal();
+  B.topRightCorner(m_, m_).diagonal() = lower;
+  B.bottomLeftCorner(m_, m_).diagonal() = inverse;
+  ComplexStateVector<N> slow;
+  if (!find_eigenvalues<N>(B, slow, work)) return false;
+  for (Complex& value : slow) value = 1.0 / value;
+  sort<N>(slow);
+  sort<N>(values);
+  // Of the places to divide them at that are clear in both, the one with the least relative errors.
+  double least = std::numeric_limits<double>::infinity();
+  Eigen::Index division = 2 * m_;
+  for (Eigen::Index k = 0; k < 2 * m_; ++k) {
+    const double last_fast = k == 0 ? kInfinity : modulus(values[k - 1]);
+    if (k > 0 && !(last_fast > kApart * modulus(values[k]) &&
+                   modulus(slow[k - 1]) > kApart * modulus(slow[k]))) {
+      continue;
+    }
+    const double error = std::max(A_norm_ / last_fast, B_norm * modulus(slow[k]));
+    if (error < least) least = error, division = k;
+  }
+  for (Eigen::Index k = division; k < 2 * m_; ++k) values[k] = slow[k];
+  return true;
+}
+
 template <int N>
 bool CoreEigenvalues<N>::find_items(Work& work) noexcept {
   const Eigen::Index size = A_.rows();
   ComplexStateVector<N> values(size);
   if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(size));
-  if (!work.take(cubed(size, 9) + squared(size, 20))) return false;
-  State<N> H = A_;
-  reduce_to_hessenberg(H);
-  if (!hessenberg_eigenvalues(H, values.data(), work)) return false;
+  if (!find_eigenvalues<N>(A_, values, work) || !replace_slow(values, work)) return false;
   size_ = 0;
   for (Complex& value : values) {
     // Of equal rates of several zero modes rounding may have made a pair.

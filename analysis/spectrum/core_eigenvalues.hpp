@@ -66,6 +66,7 @@ class CoreEigenvalues {
  private:
   CoreEigenvalue& item(int i) { return items_[static_cast<std::size_t>(i)]; }
   bool find_items(Work& work) noexcept;
+  bool replace_slow(ComplexStateVector<N>& values, Work& work) noexcept;
   void find_clusters(double cluster, bool rates_apart) noexcept;
   Square<N> unsprung() const noexcept;
   bool mark_zero_rates(Work& work) noexcept;

@@ -41,6 +41,57 @@ struct PerturbationBounds {
   const Vector& own;         ///< bounds of the norms of the diagonal blocks of F
 };
 
+/// The radius of the group `i` of `groups`, whose own perturbation is at most `inner`, where F has
+/// entries of many sizes, each of which counts only where it acts; infinite if nothing is proved.
+///
+/// The invariant subspace [1; X] solves, for each block j that is not of the group,
+///     (A_j + F_jj) X_j - X_j (A_i + F_ii) = -F_ji - sum F_jk X_k + X_j sum F_ik X_k.
+/// If numbers x_j have
+///     (sep(A_i, A_j) - |F_ii| - |F_jj|) x_j >= |F_ji| + sum |F_jk| x_k + 2 x_j sum |F_ik| x_k,
+/// then the matrices with |X_j| <= x_j are mapped into themselves, and hold a solution (Brouwer).
+/// Because of the 2 the eigenvalues of the group do not meet the others, for every t F.
+template <int N, class Matrix, class Vector, class Groups>
+double graded_radius(const PerturbationBounds<Matrix, Vector>& bounds, const Groups& groups, int i,
+                     double inner) noexcept {
+  constexpr int kTries = 4;
+  constexpr double kLeast = 1e-290;  // of |F_ji|: all x_j are positive
+  const auto count = static_cast<int>(groups.size());
+  StateVector<N> to = StateVector<N>::Zero(count), from = to, apart = to, x = to;
+  for (int j = 0; j < count; ++j) {
+    if (groups[j] == i) continue;
+    apart[j] = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < count; ++k) {
+      if (groups[k] != i) continue;
+      to[j] += bounds.coupling2(j, k);
+      from[j] += bounds.coupling2(k, j);
+      const double separation = bounds.separation(k, j);
+      apart[j] = separation < apart[j] ? separation : separation >= apart[j] ? apart[j] : 0;
+    }
+    to[j] = std::sqrt(to[j]) + kLeast;
+    from[j] = std::sqrt(from[j]);
+    apart[j] -= (kSlack - 1) * apart[j] + kSlack * (inner + bounds.own.data()[j]);
+    if (!(apart[j] > 0)) return std::numeric_limits<double>::infinity();
+    x[j] = 2 * to[j] / apart[j];
+  }
+  for (int tries = 0; tries < kTries; ++tries) {
+    const double back = from.dot(x);
+    bool fits = true;
+    StateVector<N> wider = x;
+    for (int j = 0; j < count; ++j) {
+      if (groups[j] == i) continue;
+      double need = to[j] + 2 * x[j] * back;
+      for (int k = 0; k < count; ++k) {
+        if (k != j && groups[k] != i) need += std::sqrt(bounds.coupling2(j, k)) * x[k];
+      }
+      fits &= kSlack * need <= apart[j] * x[j];
+      wider[j] = std::max(x[j], 2 * need / apart[j]);
+    }
+    if (fits) return kSlack * (inner + back);
+    x = wider;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
 /// Finds the radius of each block, in an enclosure that was reset.
 ///
 /// Stewart (SIAM Review 15(4), 1973): a matrix [A11+E11 E12; E21 A22+E22] with
@@ -88,8 +139,14 @@ void prove(const PerturbationBounds<Matrix, Vector>& bounds,
       const double inner = own + std::sqrt(inner2);
       const double product = std::sqrt(right2) * std::sqrt(left2);
       const double delta = separation - inner - everything;
-      if (nearest < 0 || (delta > 0 && 4 * product < delta * delta)) {
-        const double radius = kSlack * (nearest < 0 ? inner : inner + 2 * product / delta);
+      const bool simple = nearest < 0 || (delta > 0 && 4 * product < delta * delta);
+      double radius = std::numeric_limits<double>::infinity();
+      if (simple) {
+        radius = kSlack * (nearest < 0 ? inner : inner + 2 * product / delta);
+      } else if (everything > 0.5 * separation) {  // F as a whole is too much for it
+        radius = graded_radius<N>(bounds, enclosure.group, i, inner);
+      }
+      if (simple || std::isfinite(radius)) {
         for (int j = 0; j < count; ++j) {
           if (enclosure.group[j] == i && radius >= 0) enclosure.radius[j] = radius;
         }

@@ -7,7 +7,6 @@
 #include <utility>
 
 namespace dashpot::analysis {
-namespace {}  // namespace
 
 Invariants block_invariants(double l00, double l01, double l10, double l11, double rho) noexcept {
   const double half_difference = 0.5 * (l00 - l11), half_sum = 0.5 * (l00 + l11);
@@ -48,12 +47,14 @@ ModeNumbers mode_numbers(const Root& first, const Root& second, const Invariants
   const Invariants& v = invariants;
   ModeNumbers mode;
   mode.eigenvalues = {first.value, second.value};
+  mode.eigenvalue_bounds = {first.bound, second.bound};
   mode.error_bound = std::max(first.bound, second.bound);
   mode.natural_frequency_bound = mode.damping_ratio_bound = kInfinity;
   mode.damped_frequency = std::abs(mode.eigenvalues[0].imag());
   const bool real = mode.eigenvalues[0].imag() == 0;
   if (real && modulus(mode.eigenvalues[0]) > modulus(mode.eigenvalues[1])) {
     std::swap(mode.eigenvalues[0], mode.eigenvalues[1]);
+    std::swap(mode.eigenvalue_bounds[0], mode.eigenvalue_bounds[1]);
   }
   if (!(v.product > 0)) {
     mode.natural_frequency = mode.damping_ratio = std::numeric_limits<double>::quiet_NaN();

@@ -9,20 +9,23 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace dashpot::analysis {
 namespace {
 
-/// Times the basis is evaluated with one kind of residual, with a refinement step between each two;
-/// the last evaluation is taken as it is.
-constexpr int kMaxEvaluations = 4;
+/// Times the basis is evaluated with residuals of working precision and extended ones, with a
+/// refinement step between each two; the last evaluation is taken as it is.
+constexpr int kMaxEvaluations = 4, kMaxExtendedEvaluations = 7;
 /// Refinement goes on until every mode's backward error is below this.
 constexpr double kTargetBackwardError = 2e-14;
 /// With a relative bound above this, residuals of working precision are not worth a step.
 constexpr double kHopeless = 1e-6;
-/// Relative distances of eigenvalues that share a block, tried in turn until the result is proved
-/// and its backward error is below the next number.
-constexpr std::array<double, 3> kClusters = {0.02, 0.2, 3};
+/// Relative distances of eigenvalues that share a block, and whether modes near critical damping
+/// are taken to coincide, tried in turn until the result is proved and its backward error is below
+/// the next number.
+constexpr std::array<std::pair<double, bool>, 4> kAttempts = {
+    {{0.02, false}, {0.02, true}, {0.2, true}, {3, true}}};
 constexpr double kAcceptableBackwardError = 1e-12;
 
 template <int N>
@@ -63,6 +66,21 @@ std::int64_t step_work(Eigen::Index n, const BlockList<N>& blocks) {
   return cubed(n, 180) + 3 * sylvester_work(blocks);
 }
 
+bool is_better(const Quality& a, const Quality& b) {
+  return a.bound < b.bound || (a.bound == b.bound && a.backward_error < b.backward_error);
+}
+
+/// Evaluates the basis of `out`, bounds its errors and reads the modes; false without the work.
+template <int N>
+bool read_basis(const System<N>& system, double soft_frequency, BasisResidual<N>& residual,
+                BlockEnclosure<N>& enclosure, Spectrum<N>& out, Work& work) {
+  evaluate_residual<N>(system, out.symmetric, out.extended, out.basis, residual, work);
+  if (!work.take(reading_work<N>(system.dof(), out.basis.blocks))) return false;
+  enclose<N>(residual, out.basis, enclosure);
+  read_modes<N>(system, residual, enclosure, soft_frequency, out);
+  return true;
+}
+
 }  // namespace
 
 template <int N>
@@ -88,8 +106,12 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work&
   out.proportional = form.proportional;
   out.coupling = form.coupling;
   out.coupled = form.coupled_zeros > 0;
-  for (const double cluster : kClusters) {
-    out.status = build_starting_basis<N>(form, out.zero_modes, cluster, out.basis, work);
+  ModalBasis<N> best;
+  Quality best_quality{kInfinity, kInfinity};
+  bool best_extended = false;
+  for (const auto& [cluster, coinciding] : kAttempts) {
+    out.status =
+        build_starting_basis<N>(form, out.zero_modes, cluster, coinciding, out.basis, work);
     if (out.status != Status::kOk) {
       out.modes.resize(0);
       return out.status;
@@ -104,13 +126,27 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work&
       out.modes.resize(0);
       return out.status = Status::kUnfinished;
     }
+    const bool last = cluster == kAttempts.back().first;
+    Quality quality = worst_quality(out);
     if (!is_finite(out.basis.Lambda) || !is_finite(out.basis.U)) {
-      if (cluster < kClusters.back()) continue;  // a wider one may hold what came apart
-      out.modes.resize(0);
-      return out.status = Status::kOverflow;
+      quality = {kInfinity, kInfinity};
+      if (last && best.blocks.size() == 0) {
+        out.modes.resize(0);
+        return out.status = Status::kOverflow;
+      }
+    } else if (std::isfinite(quality.bound) && quality.backward_error <= kAcceptableBackwardError) {
+      break;
     }
-    const Quality quality = worst_quality(out);
-    if (std::isfinite(quality.bound) && quality.backward_error <= kAcceptableBackwardError) break;
+    if (is_better(quality, best_quality)) {
+      if (!last) best = out.basis, best_quality = quality, best_extended = out.extended;
+    } else if (last && best.blocks.size() > 0) {  // a wider cluster was no better
+      out.basis = best;
+      out.extended = best_extended;
+      if (!read_basis(system, options_.soft_frequency, residual_, enclosure_, out, work)) {
+        out.modes.resize(0);
+        return out.status = Status::kUnfinished;
+      }
+    }
   }
   for (const Mode<N>& mode : out.modes) {
     if (!std::isfinite(modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]))) {
@@ -146,12 +182,10 @@ void SpectrumSolver<N>::refine(const System<N>& system, Spectrum<N>& out, Work& 
   Quality previous{kInfinity, kInfinity};
   bool restored = false;
   for (int evaluation = 1;; ++evaluation) {
-    evaluate_residual<N>(system, out.symmetric, out.extended, out.basis, residual_, work);
-    if (!work.take(reading_work<N>(system.dof(), out.basis.blocks))) return;
-    enclose<N>(residual_, out.basis, enclosure_);
-    read_modes<N>(system, residual_, enclosure_, options_.soft_frequency, out);
+    if (!read_basis(system, options_.soft_frequency, residual_, enclosure_, out, work)) return;
     const Quality quality = worst_quality(out);
-    if (good(out) || restored || evaluation == kMaxEvaluations) return;
+    const int most = out.extended ? kMaxExtendedEvaluations : kMaxEvaluations;
+    if (good(out) || restored || evaluation == most) return;
     if (quality.bound > 2 * previous.bound) {  // the step did harm: back, and be done
       out.basis = before_step_;
       restored = true;

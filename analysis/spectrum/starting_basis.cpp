@@ -18,10 +18,11 @@ template <int N>
 class BasisFromEigenvectors {
  public:
   BasisFromEigenvectors(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes, double cluster,
-                        ModalBasis<N>& basis, Work& work)
+                        bool coinciding, ModalBasis<N>& basis, Work& work)
       : form_(form),
         work_(work),
         cluster_(cluster),
+        coinciding_(coinciding),
         zero_modes_(zero_modes),
         basis_(basis),
         n_(form.damping.rows()),
@@ -72,6 +73,7 @@ class BasisFromEigenvectors {
   const EnergyForm<N>& form_;
   Work& work_;
   double cluster_;
+  bool coinciding_;
   const ZeroModes<N>& zero_modes_;
   ModalBasis<N>& basis_;
   Eigen::Index n_, m_, c_;
@@ -212,7 +214,7 @@ void BasisFromEigenvectors<N>::write_cluster(int cluster, int members, Eigen::In
     if (core_[i].cluster == cluster) values[next++] = core_[i].value;
   }
   const State<N> AS = core_.matrix() * S;
-  const SplitCluster<N> split = split_cluster<N>(S.transpose() * AS, values, mean);
+  const SplitCluster<N> split = split_cluster<N>(S.transpose() * AS, values, mean, coinciding_);
   for (const Block& b : split.blocks) {
     const State<N> Lambda = split.Lambda.block(b.first, b.first, b.size, b.size);
     append(positions(S * split.columns.middleCols(b.first, b.size), Lambda), Lambda);
@@ -289,13 +291,14 @@ State<N> BasisFromEigenvectors<N>::positions(const State<N>& S, const State<N>& 
 
 template <int N>
 Status build_starting_basis(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes,
-                            double cluster, ModalBasis<N>& basis, Work& work) noexcept {
-  return BasisFromEigenvectors<N>(form, zero_modes, cluster, basis, work).build();
+                            double cluster, bool coinciding, ModalBasis<N>& basis,
+                            Work& work) noexcept {
+  return BasisFromEigenvectors<N>(form, zero_modes, cluster, coinciding, basis, work).build();
 }
 
 template Status build_starting_basis(const EnergyForm<kDynamic>&, const ZeroModes<kDynamic>&,
-                                     double, ModalBasis<kDynamic>&, Work&) noexcept;
+                                     double, bool, ModalBasis<kDynamic>&, Work&) noexcept;
 template Status build_starting_basis(const EnergyForm<kMaxDof>&, const ZeroModes<kMaxDof>&, double,
-                                     ModalBasis<kMaxDof>&, Work&) noexcept;
+                                     bool, ModalBasis<kMaxDof>&, Work&) noexcept;
 
 }  // namespace dashpot::analysis

@@ -21,9 +21,12 @@ namespace dashpot::analysis {
 ///
 /// Eigenvalues within the relative distance `cluster` of each other share a block unless their
 /// vectors are well apart. A larger `cluster` is slower and safer, and from 2 on one block holds
-/// all eigenvalues. Returns kUnfinished, and no basis, if `work` does not grant enough.
+/// all eigenvalues. With `coinciding` modes of one cluster near critical damping are taken to have
+/// one frequency, if they have it to rounding. Returns kUnfinished, and no basis, if `work` does
+/// not grant enough.
 template <int N>
 Status build_starting_basis(const EnergyForm<N>& form, const ZeroModes<N>& zero_modes,
-                            double cluster, ModalBasis<N>& basis, Work& work) noexcept;
+                            double cluster, bool coinciding, ModalBasis<N>& basis,
+                            Work& work) noexcept;
 
 }  // namespace dashpot::analysis

@@ -1,7 +1,7 @@
 #include <dashpot/analysis/rigid_body_elimination.hpp>
-#include <dashpot/analysis/system/checks.hpp>
 
 #include <Eigen/Cholesky>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -27,7 +27,21 @@ void check(const System<>& system, const ZeroModes<>& zero_modes) {
   if (zero_modes.basis.rows() != system.dof() || zero_modes.basis.cols() != zero_modes.count) {
     throw std::invalid_argument("elimination: the zero modes are not those of the system");
   }
-  if (zero_modes.count > 0) check_symmetric("stiffness", system.stiffness);
+}
+
+/// Directions y in which no spring acts, y' K = 0: the zero modes where K is symmetric, and
+/// otherwise as many left singular vectors of L^-1 K L^-T, M = L L'.
+MatrixXd unsprung_directions(const System<>& system, const ZeroModes<>& zero_modes) {
+  if (zero_modes.count == 0 || system.stiffness == system.stiffness.transpose()) {
+    return zero_modes.basis;
+  }
+  const Eigen::LLT<MatrixXd> cholesky(system.mass);
+  MatrixXd K = system.stiffness.transpose();
+  cholesky.matrixL().solveInPlace(K);
+  K.transposeInPlace();
+  cholesky.matrixL().solveInPlace(K);
+  const Eigen::JacobiSVD<MatrixXd> svd(K, Eigen::ComputeFullU);
+  return cholesky.matrixU().solve(svd.matrixU().rightCols(zero_modes.count));
 }
 
 /// The elimination so far: nothing removed yet.
@@ -90,7 +104,7 @@ RigidBodyElimination eliminate_zero_modes(const System<>& system, const ZeroMode
   check(system, zero_modes);
   RigidBodyElimination elimination = nothing_removed(system);
   MatrixXd mass = system.mass;
-  MatrixXd remaining = zero_modes.basis;
+  MatrixXd remaining = unsprung_directions(system, zero_modes);
   while (remaining.cols() > 0) {
     const MatrixXd step = append_step(mass, remaining.col(0), pivot, elimination);
     const MatrixXd reduced_mass = congruence(step, mass);

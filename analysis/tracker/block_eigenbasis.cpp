@@ -68,10 +68,12 @@ void take_diagonal(const BlockEigenbasis& basis, PackedMatrix& G,
 }
 
 /// R = Z' S Z (Sigma is not yet subtracted) and G = Z' B Z, with S Z = [Z_s or K Z_s; -M V] and
-/// B Z = [W V; W' Z_s + C V].
+/// B Z = [W V; W' Z_s + C V]. In a two-sided basis (two_sided_basis.hpp) Y is in the place of Z',
+/// and without a factor S Z = [Z_q; -M V] and B Z = [V; K Z_q + C V].
 void multiply(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
               TrackedResidual& residual) {
   const int n = pencil.joints, p = pencil.rank, states = pencil.states(), width = basis.Z.width;
+  const bool plain = basis.two_sided && !pencil.factored;
   const auto product = [multiplication = padded_multiply(width), width](
                            const Strided& A, int rows, int inner, const double* X,
                            const double* start, double sign, double* out) {
@@ -79,43 +81,20 @@ void multiply(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
   };
   const double *const elastic = basis.Z.row(0), *const velocity = basis.Z.row(p);
   product({pencil.M, 1, n}, n, n, velocity, nullptr, -1, residual.MV.row(p));
-  product({pencil.W, 1, p}, p, n, velocity, nullptr, 1, residual.image.row(0));
-  product({pencil.W, p, 1}, n, p, elastic, nullptr, 1, residual.image.row(p));
-  if (pencil.factored) {
-    std::copy(elastic, velocity, residual.MV.row(0));
-  } else {
-    std::copy(residual.image.row(p), residual.image.row(p + n), residual.MV.row(0));
-  }
-  product({pencil.C, 1, n}, n, n, velocity, residual.image.row(p), 1, residual.image.row(p));
-  const Strided transposed{basis.Z.row(0), 1, width};
-  product(transposed, basis.columns(), states, residual.MV.row(0), nullptr, 1, residual.R.row(0));
-  product(transposed, basis.columns(), states, residual.image.row(0), nullptr, 1,
-          residual.G.row(0));
-}
-
-/// R = Y S Z and G = Y B Z of a two-sided basis (two_sided_basis.hpp).
-void multiply_two_sided(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
-                        TrackedResidual& residual) {
-  const int n = pencil.joints, p = pencil.rank, states = pencil.states(), width = basis.Z.width;
-  const auto product = [multiplication = padded_multiply(width), width](
-                           const Strided& A, int rows, int inner, const double* X,
-                           const double* start, double sign, double* out) {
-    multiplication(A, rows, inner, X, start, sign, out, width);
-  };
-  const double *const position = basis.Z.row(0), *const velocity = basis.Z.row(p);
-  std::copy(position, velocity, residual.MV.row(0));
-  product({pencil.M, 1, n}, n, n, velocity, nullptr, -1, residual.MV.row(p));
-  if (pencil.factored) {
-    product({pencil.W, 1, p}, p, n, velocity, nullptr, 1, residual.image.row(0));
-    product({pencil.W, p, 1}, n, p, position, nullptr, 1, residual.image.row(p));
-  } else {
+  if (plain) {
     std::copy(velocity, velocity + n * width, residual.image.row(0));
-    product({pencil.W, 1, n}, n, n, position, nullptr, 1, residual.image.row(p));
+    product({pencil.W, 1, n}, n, n, elastic, nullptr, 1, residual.image.row(p));
+  } else {
+    product({pencil.W, 1, p}, p, n, velocity, nullptr, 1, residual.image.row(0));
+    product({pencil.W, p, 1}, n, p, elastic, nullptr, 1, residual.image.row(p));
   }
+  const double* const upper = pencil.factored || plain ? elastic : residual.image.row(p);
+  std::copy(upper, upper + p * width, residual.MV.row(0));
   product({pencil.C, 1, n}, n, n, velocity, residual.image.row(p), 1, residual.image.row(p));
-  const Strided left{basis.Y.row(0), width, 1};
-  product(left, states, states, residual.MV.row(0), nullptr, 1, residual.R.row(0));
-  product(left, states, states, residual.image.row(0), nullptr, 1, residual.G.row(0));
+  const Strided left =
+      basis.two_sided ? Strided{basis.Y.row(0), width, 1} : Strided{basis.Z.row(0), 1, width};
+  product(left, basis.columns(), states, residual.MV.row(0), nullptr, 1, residual.R.row(0));
+  product(left, basis.columns(), states, residual.image.row(0), nullptr, 1, residual.G.row(0));
 }
 
 /// v' M v of the columns of block i, and between the two; elastic energies differ from
@@ -154,11 +133,7 @@ void evaluate(const SymmetricPencil& pencil, BlockEigenbasis& basis,
   for (PackedMatrix* rows : {&residual.R, &residual.G, &residual.MV, &residual.image}) {
     rows->width = basis.Z.width;
   }
-  if (basis.two_sided) {
-    multiply_two_sided(pencil, basis, residual);
-  } else {
-    multiply(pencil, basis, residual);
-  }
+  multiply(pencil, basis, residual);
   set_blocks(residual.R, residual.G, basis);
   subtract_blocks(basis, residual.R, residual.G);
   for (int i = 0; i < basis.columns(); ++i) residual.R(i, i) -= i < basis.modes ? 1 : -1;

@@ -4,6 +4,7 @@
 #include <dashpot/analysis/tracker/cluster_separation.hpp>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -12,217 +13,238 @@ namespace {
 
 /// Squared lengths in the metric below this, relative to Euclidean ones, count as zero.
 constexpr double kNeutralLength = 1e-4;
+/// Columns whose inverse is larger than this separate nothing.
+constexpr double kIllConditioned = 1e5;
+/// Couplings that a division may leave, relative to the whole: Newton's method removes them.
+constexpr double kCoupled = 1e-2;
 
-/// k x l, k and l <= 2 kMaxDof
-using Cluster = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxWidth, kMaxWidth>;
-using ClusterSolver = Eigen::SelfAdjointEigenSolver<Cluster>;
+/// k x l, k and l <= 4
+using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;
-using ComplexSmall = Eigen::Matrix<Complex, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
-using ComplexSmallVector = Eigen::Matrix<Complex, Eigen::Dynamic, 1, 0, 4, 1>;
 
-/// The system in some columns of a basis: N = Z' S Z and T = Z' B Z.
-struct Projection {
-  std::array<int, kMaxWidth> columns{};
-  int size = 0;
-  Cluster N, T;
-
-  void add(int column) { columns[at(size++)] = column; }
-};
-
-void project(const BlockEigenbasis& basis, const TrackedResidual& residual,
-             Projection& projection) {
-  const int m = basis.modes, size = projection.size;
-  projection.N.resize(size, size);
-  projection.T.resize(size, size);
-  for (int i = 0; i < size; ++i) {
-    const int row = projection.columns[at(i)];
-    const auto N = [&](int j) {
-      return residual.R(row, j) + (row == j ? (row < m ? 1.0 : -1.0) : 0.0);
-    };
-    for (int j = 0; j < size; ++j) {
-      const int column = projection.columns[at(j)];
-      double T = residual.G(row, column);
-      if (column >= 2 * m) {
-        T += N(column) * basis.rate[at(column - 2 * m)];
-      } else {
-        const bool first = column < m;
-        const int mode = first ? column : column - m;
-        T += N(mode) * (first ? basis.l00[at(mode)] : basis.l01[at(mode)]) +
-             N(m + mode) * (first ? basis.l10[at(mode)] : basis.l11[at(mode)]);
-      }
-      projection.N(i, j) = N(column);
-      projection.T(i, j) = T;
-    }
-  }
-}
-
-/// Replaces the projection's columns Z of the basis by Z X.
-void turn_columns(const Projection& projection, const Cluster& X, BlockEigenbasis& basis) {
-  for (int row = 0; row < basis.columns(); ++row) {
-    std::array<double, kMaxWidth> z{};
-    for (int j = 0; j < projection.size; ++j) z[at(j)] = basis.Z(row, projection.columns[at(j)]);
-    for (int j = 0; j < projection.size; ++j) {
-      double sum = 0;
-      for (int k = 0; k < projection.size; ++k) sum += z[at(k)] * X(k, j);
-      basis.Z(row, projection.columns[at(j)]) = sum;
-    }
-  }
-}
-
-/// Two blocks: eigenvalues of B = N^-1 T.
-struct SmallProblem : Projection {
-  Cluster B;
+/// Two blocks: their columns with the products N, and how the system acts on them, A = N^-1 T.
+struct BlockPair {
+  std::array<int, 4> columns{};
+  int size = 0, split = 0;  ///< columns of both, and of the first
+  bool two_sided = false;
+  Small N, A;
   std::array<Complex, 4> values{};
+
+  Complex value(int i) const { return values[at(i)]; }
+  bool any_complex() const {
+    bool any = false;
+    for (int i = 0; i < size; ++i) any |= value(i).imag() != 0;
+    return any;
+  }
 };
 
 bool pose(const TrackedResidual& residual, const CloseBlocks& close, const BlockEigenbasis& basis,
-          SmallProblem& problem) {
+          BlockPair& pair) {
+  const int m = basis.modes;
+  pair.two_sided = basis.two_sided;
   for (const int block : {close.first, close.second}) {
-    problem.add(basis.first(block));
-    if (block < basis.modes) problem.add(basis.second(block));
+    pair.split = pair.size;
+    pair.columns[at(pair.size++)] = basis.first(block);
+    if (block < m) pair.columns[at(pair.size++)] = basis.second(block);
   }
-  project(basis, residual, problem);
-  Cluster N = problem.N;
-  problem.B = problem.T;
-  solve_in_place(N, problem.B, std::numeric_limits<double>::min());
-  if (!problem.B.allFinite()) return false;
-  Cluster H = problem.B;
+  Small Lambda = Small::Zero(pair.size, pair.size);
+  pair.N.resize(pair.size, pair.size);
+  pair.A.resize(pair.size, pair.size);
+  int first = 0;
+  for (const int block : {close.first, close.second}) {
+    if (block < m) {
+      const Block2<double> L = basis.block(block);
+      Lambda.block(first, first, 2, 2) << L.a, L.b, L.c, L.d;
+      first += 2;
+    } else {
+      Lambda(first, first) = basis.rate[at(block - m)];
+      ++first;
+    }
+  }
+  for (int i = 0; i < pair.size; ++i) {
+    for (int j = 0; j < pair.size; ++j) {
+      const int row = pair.columns[at(i)], column = pair.columns[at(j)];
+      pair.N(i, j) = residual.R(row, column) + (row != column ? 0.0 : row < m ? 1.0 : -1.0);
+      pair.A(i, j) = residual.G(row, column);
+    }
+  }
+  Small N = pair.N;
+  solve_in_place(N, pair.A, std::numeric_limits<double>::min());
+  pair.A += Lambda;
+  if (!pair.A.allFinite()) return false;
+  Small H = pair.A;
   reduce_to_hessenberg(H);
-  return hessenberg_eigenvalues(H, problem.values.data());
+  return hessenberg_eigenvalues(H, pair.values.data());
 }
 
-ComplexSmallVector eigenvector(const SmallProblem& problem, const Complex& value) {
-  ComplexSmallVector x = ComplexSmallVector::Ones(problem.size);
-  for (int k = 0; k < problem.size; ++k) x[k] += 0.1 * k;
-  for (int step = 0; step < 3; ++step) {
-    ComplexSmall shifted = problem.B.cast<Complex>();
-    shifted.diagonal().array() -= value;
-    solve_in_place(shifted, x, kEps * problem.B.norm());
-    x /= x.norm();
+/// Orthonormal columns of X, the longest first.
+Small range(Small X, int count) {
+  Small Q(X.rows(), count);
+  for (int k = 0; k < count; ++k) {
+    Eigen::Index longest = 0;
+    X.colwise().squaredNorm().maxCoeff(&longest);
+    Q.col(k) = X.col(longest).normalized();
+    X -= Q.col(k) * (Q.col(k).transpose() * X).eval();
+    X -= Q.col(k) * (Q.col(k).transpose() * X).eval();
   }
-  return x;
+  return Q;
 }
 
-/// Columns of both sign types that span what x and y span, or of type - alone if there is no y.
-bool normalize(const SmallProblem& problem, const Cluster& vectors, Cluster& out) {
-  const Cluster gram = vectors.transpose() * problem.N * vectors;
-  const ClusterSolver eigen(gram);
-  const auto& lengths = eigen.eigenvalues();
-  const Eigen::Index last = lengths.size() - 1;
-  if (!(lengths[0] < -kNeutralLength)) return false;
-  const SmallVector minus = vectors * eigen.eigenvectors().col(0) / std::sqrt(-lengths[0]);
-  if (out.cols() == 1) {
-    out.col(0) = minus;
-    return true;
+/// The space of the eigenvalues in `set`: the range of the product of A - mu for all others, real
+/// because complex ones come in pairs.
+Small space(const BlockPair& pair, unsigned set, int dimension) {
+  Small product = Small::Identity(pair.size, pair.size);
+  for (int i = 0; i < pair.size; ++i) {
+    const Complex mu = pair.value(i);
+    if ((set >> i & 1) != 0 || mu.imag() < 0) continue;
+    const Small shifted = pair.A - mu.real() * Small::Identity(pair.size, pair.size);
+    Small factor = shifted;
+    if (mu.imag() > 0) {
+      factor = shifted * shifted;
+      factor.diagonal().array() += mu.imag() * mu.imag();
+    }
+    product = (product * factor).eval();
   }
-  if (!(lengths[last] > kNeutralLength)) return false;
-  out.col(0) = vectors * eigen.eigenvectors().col(last) / std::sqrt(lengths[last]);
-  out.col(1) = minus;
+  return range(product, dimension);
+}
+
+/// Whether conjugates go together.
+bool is_closed(const BlockPair& pair, unsigned set) {
+  for (int i = 0; i < pair.size; ++i) {
+    for (int j = 0; j < pair.size; ++j) {
+      const bool conjugate = pair.value(i).imag() != 0 && pair.value(j) == std::conj(pair.value(i));
+      if (conjugate && (set >> i & 1) != (set >> j & 1)) return false;
+    }
+  }
   return true;
 }
 
-/// What is orthogonal to X, in the metric.
-bool complement(const SmallProblem& problem, const Cluster& X, Cluster& out) {
-  Cluster signs = X.transpose() * problem.N * X;  // nearly diag(1, -1) or -1
-  for (Eigen::Index i = 0; i < signs.rows(); ++i) {
-    for (Eigen::Index j = 0; j < signs.cols(); ++j) {
-      signs(i, j) = i != j ? 0 : signs(i, i) > 0 ? 1 : -1;
-    }
-  }
-  const Cluster projector =
-      Cluster::Identity(problem.size, problem.size) - X * signs * X.transpose() * problem.N;
-  return normalize(problem, projector, out);
+/// The plane of x and A x, which is invariant where both blocks have the same eigenvalues and no
+/// others.
+Small krylov_plane(const BlockPair& pair, int column) {
+  Small both(pair.size, 2);
+  both.col(0) = SmallVector::Unit(pair.size, column);
+  both.col(1) = pair.A.col(column);
+  return range(both, 2);
 }
 
-/// Two eigenvalues that go together, or one of a zero mode, such that the rest go together as well
-/// and lie no further apart: what is further apart has the better conditioned eigenvectors.
-struct Choice {
-  int first = -1, second = -1;
+/// Distance of the two nearest real eigenvalues that share a block: of opposite sign
+/// characteristic, these may meet and turn complex.
+double nearest_pair(const BlockPair& pair, unsigned set) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < pair.size; ++i) {
+    for (int j = 0; j < i; ++j) {
+      if ((set >> i & 1) != (set >> j & 1)) continue;
+      nearest = std::min(nearest, modulus(pair.value(i) - pair.value(j)));
+    }
+  }
+  return nearest;
+}
+
+/// Makes the columns orthonormal in the metric N, with one of either sign type in a plane, and of
+/// type - alone; false if they are not of these.
+bool orthonormalize_in(const Small& N, Small& columns) {
+  const Small gram = columns.transpose() * N * columns;
+  const Eigen::SelfAdjointEigenSolver<Small> eigen(gram);
+  const auto& lengths = eigen.eigenvalues();
+  const Eigen::Index last = lengths.size() - 1;
+  if (!(lengths[0] < -kNeutralLength)) return false;
+  const SmallVector minus = columns * eigen.eigenvectors().col(0) / std::sqrt(-lengths[0]);
+  if (last > 0) {
+    if (!(lengths[last] > kNeutralLength)) return false;
+    columns.col(0) = (columns * eigen.eigenvectors().col(last) / std::sqrt(lengths[last])).eval();
+  }
+  columns.col(last) = minus;
+  return true;
+}
+
+/// A division: columns X, and how good it is.
+struct Division {
+  Small X, inverse;
+  double gap = 0;     ///< of the pair of real eigenvalues that are to share a block; the least wins
+  double share = -1;  ///< of the old blocks that the new ones have; then the most
 };
 
-Choice choose(const SmallProblem& problem) {
-  const int size = problem.size;
-  const auto value = [&](int i) { return problem.values[at(i)]; };
-  Choice pair, rest;
-  double nearest = std::numeric_limits<double>::infinity();
-  const bool any_complex = [&] {
-    for (int i = 0; i < size; ++i) {
-      if (value(i).imag() != 0) return true;
-    }
-    return false;
-  }();
-  std::array<double, 4> sign{};
-  for (int i = 0; i < size && !any_complex; ++i) {
-    const SmallVector x = eigenvector(problem, value(i)).real();
-    sign[at(i)] = x.dot(problem.N * x);
+/// Considers the invariant space `first`, with `second` or, on one side, what is orthogonal to it.
+void consider(const BlockPair& pair, Small first, Small second, double gap, Division& best) {
+  const int size = pair.size, split = pair.split;
+  if (!pair.two_sided) {
+    if (!orthonormalize_in(pair.N, first)) return;
+    Small signed_rows = first.transpose() * pair.N;
+    signed_rows.row(split - 1) *= -1;
+    second = range(Small::Identity(size, size) - first * signed_rows, size - split);
+    if (!orthonormalize_in(pair.N, second)) return;
   }
-  for (int i = 0; i < size; ++i) {
-    for (int j = i + 1; j < size; ++j) {
-      const bool fits = any_complex ? value(i).imag() != 0 && value(i) == std::conj(value(j))
-                                    : sign[at(i)] * sign[at(j)] < 0;
-      const double gap = modulus(value(i) - value(j));
-      if (fits && gap < nearest) nearest = gap, pair = {i, j};
-    }
+  Small X(size, size);
+  X << first, second;
+  Small copy = X, inverse = Small::Identity(size, size);
+  solve_in_place(copy, inverse, std::numeric_limits<double>::min());
+  if (!(inverse.norm() < kIllConditioned)) return;
+  const Small divided = inverse * pair.A * X;
+  const double coupling = divided.topRightCorner(split, size - split).norm() +
+                          divided.bottomLeftCorner(size - split, split).norm();
+  if (!(coupling <= kCoupled * pair.A.norm())) return;
+  const double share = first.topRows(split).squaredNorm() / first.squaredNorm() +
+                       second.bottomRows(size - split).squaredNorm() / second.squaredNorm();
+  if (best.share < 0 || gap < best.gap || (gap == best.gap && share > best.share)) {
+    best = {X, inverse, gap, share};
   }
-  for (int i = 0; i < size; ++i) {
-    if (i == pair.first || i == pair.second) continue;
-    (rest.first < 0 ? rest.first : rest.second) = i;
-  }
-  if (size == 2) return {0, -1};  // of two zero modes: either
-  if (size == 3 || pair.first < 0) return rest;
-  return modulus(value(rest.first) - value(rest.second)) >= nearest ? rest : pair;
 }
 
-/// The columns of the chosen eigenvalues.
-bool solve_chosen(const SmallProblem& problem, const Choice& choice, Cluster& out) {
-  const auto value = [&](int i) { return problem.values[at(i)]; };
-  const ComplexSmallVector x = eigenvector(problem, value(choice.first));
-  Cluster vectors(problem.size, choice.second < 0 ? 1 : 2);
-  vectors.col(0) = x.real();
-  out.resize(problem.size, vectors.cols());
-  if (choice.second >= 0) {
-    vectors.col(1) = value(choice.first).imag() != 0
-                         ? SmallVector(x.imag())
-                         : SmallVector(eigenvector(problem, value(choice.second)).real());
-    vectors.col(1) /= vectors.col(1).norm();
+/// Rotates the columns of the zero modes of a basis of one side, all at once, until the damping
+/// tells them apart. The columns are orthonormal, or nearly. False if the residual is not finite.
+bool separate_zero_modes(const TrackedResidual& residual, BlockEigenbasis& basis) {
+  using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxDof, kMaxDof>;
+  const int first = 2 * basis.modes, count = basis.zeros;
+  Columns T(count, count);  // symmetric but for rounding errors; one triangle is read
+  for (int i = 0; i < count; ++i) {
+    for (int j = 0; j < count; ++j) {
+      const double N = residual.R(first + i, first + j) - (i == j ? 1 : 0);
+      T(i, j) = residual.G(first + i, first + j) + N * basis.rate[at(j)];
+    }
   }
-  vectors.col(0) /= vectors.col(0).norm();
-  return vectors.allFinite() && normalize(problem, vectors, out);
+  const Eigen::SelfAdjointEigenSolver<Columns> rates(T);
+  if (!rates.eigenvectors().allFinite()) return false;
+  for (int row = 0; row < basis.columns(); ++row) {
+    Eigen::Map<Vector<kMaxDof>> z(&basis.Z(row, first), count);
+    z = (rates.eigenvectors().transpose() * z).eval();
+  }
+  return true;
 }
 
 }  // namespace
 
 bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
                      BlockEigenbasis& basis) noexcept {
-  SmallProblem problem;
-  if (!pose(residual, close, basis, problem)) return false;
-  const Choice choice = choose(problem);
-  if (choice.first < 0) return false;
-  Cluster X;
-  if (!solve_chosen(problem, choice, X)) return false;
-  Cluster Y(problem.size, problem.size - X.cols());
-  if (!complement(problem, X, Y)) return false;
-  // In the order of the columns: the first of the two blocks is a mode unless both are zero
-  // modes.
-  const Eigen::Index split = close.first < basis.modes ? 2 : 1;
-  bool X_first = X.cols() == split;
-  if (X.cols() == Y.cols()) {
-    const double share = X.topRows(split).squaredNorm() / X.squaredNorm();
-    X_first = share >= Y.topRows(split).squaredNorm() / Y.squaredNorm();
+  if (close.first >= basis.modes && !basis.two_sided) return separate_zero_modes(residual, basis);
+  BlockPair pair;
+  if (!pose(residual, close, basis, pair)) return false;
+  const int size = pair.size, split = pair.split, rest = size - split;
+  const bool by_gap = !pair.two_sided && !pair.any_complex();
+  Division best;
+  for (unsigned set = 0; set < 1U << size; ++set) {
+    if (__builtin_popcount(set) != split || !is_closed(pair, set)) continue;
+    consider(pair, space(pair, set, split), space(pair, ~set, rest),
+             by_gap ? nearest_pair(pair, set) : 0, best);
   }
-  Cluster columns(problem.size, problem.size);
-  columns << (X_first ? X : Y), (X_first ? Y : X);
-  turn_columns(problem, columns, basis);
-  return true;
-}
-
-bool separate_zero_modes(const TrackedResidual& residual, BlockEigenbasis& basis) noexcept {
-  Projection zeros;
-  for (int k = 0; k < basis.zeros; ++k) zeros.add(2 * basis.modes + k);
-  project(basis, residual, zeros);
-  const ClusterSolver rates(zeros.T);  // reads one triangle: T is symmetric but for rounding errors
-  if (!rates.eigenvectors().allFinite()) return false;
-  turn_columns(zeros, rates.eigenvectors(), basis);
+  if (split == 2 && rest == 2 && (pair.two_sided || best.share < 0)) {
+    consider(pair, krylov_plane(pair, 0), krylov_plane(pair, 2), 0, best);
+  }
+  if (best.share < 0) return false;
+  for (int row = 0; row < basis.columns(); ++row) {
+    SmallVector z(size), y(size);
+    for (int j = 0; j < size; ++j) {
+      const int k = pair.columns[at(j)];
+      z[j] = basis.Z(row, k);
+      y[j] = !basis.two_sided ? 0 : k < basis.modes ? basis.Y(k, row) : -basis.Y(k, row);
+    }
+    const SmallVector right = best.X.transpose() * z, left = best.inverse * y;
+    for (int j = 0; j < size; ++j) {
+      const int k = pair.columns[at(j)];
+      basis.Z(row, k) = right[j];
+      if (basis.two_sided) basis.Y(k, row) = k < basis.modes ? left[j] : -left[j];
+    }
+  }
   return true;
 }
 

@@ -3,20 +3,16 @@
 
 namespace dashpot::analysis {
 
-/// Separates two blocks that Newton's method cannot tell apart, by solving the eigenvalue problem
-/// of their four columns again (three columns with a zero mode, two with two zero modes). Real
-/// eigenvalues are paired so that the two of opposite sign characteristic that are nearest each
-/// other share a block, because only such a pair can meet and turn complex. Each new block gets the
-/// index of the old block that it has more of.
+/// Separates two blocks that Newton's method cannot tell apart, by dividing the space of their
+/// columns into two invariant planes again (a plane and a line with a zero mode, lines of two).
+/// Of the divisions that there are, each new block has most of the old one whose index it gets. In
+/// a basis of one side the blocks are orthonormal, and of real eigenvalues the two of opposite sign
+/// characteristic that are nearest each other share a block, because only such a pair can meet and
+/// turn complex. Zero modes of such a basis are separated all at once.
 ///
 /// `residual` belongs to the basis, at least nearly. Returns false, and does not change the basis,
 /// where no well-conditioned columns separate the blocks: a defective eigenvalue of two modes.
 bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
                      BlockEigenbasis& basis) noexcept;
-
-/// Rotates the columns of the zero modes, all at once, until the damping tells them apart. The
-/// columns are orthonormal, or nearly. `residual` belongs to the basis, at least nearly. Returns
-/// false if it is not finite.
-bool separate_zero_modes(const TrackedResidual& residual, BlockEigenbasis& basis) noexcept;
 
 }  // namespace dashpot::analysis

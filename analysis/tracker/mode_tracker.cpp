@@ -90,18 +90,19 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
     return out.status = Status::kWrongSize;
   }
   const SymmetricPencil pencil = symmetric_pencil(system), last = symmetric_pencil(last_);
-  if (!same_form(pencil, last)) state_ = State::kEmpty;
+  if (!same_form(pencil, last)) forget_solution(State::kEmpty);
   const bool exact = !has_errors(system);
-  if (exact && state_ >= State::kCurrent && identical(pencil, last)) {
-    if (state_ == State::kCurrent) {
+  if (exact && (kept_known_ || state_ == State::kCurrent) && identical(pencil, last)) {
+    if (!kept_known_) {
       read(kept_);
       publish(pencil, SpectrumOrigin::kReused, kept_);
-      state_ = State::kKept;
+      kept_known_ = true;
     }
     out = kept_;
     ++counters_.reused;
     return out.status;
   }
+  kept_known_ = false;
   const bool symmetric = is_symmetric(system.mass) && is_symmetric(system.damping) &&
                          (pencil.factored || is_symmetric(system.stiffness));
   // A basis of one side is dearer to find than to follow: a symmetric system gets it back at once.
@@ -122,6 +123,7 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
   }
   if (!work.over()) solve_directly(system, pencil, out, work);
   if (work.over()) out.status = Status::kUnfinished;  // what is known serves the next update
+  kept_known_ &= exact && !work.over();
   if (!has_modes(out.status)) out.mode_count = out.zero_mode_count = 0;
   ++(work.over()             ? counters_.unfinished
      : has_modes(out.status) ? counters_.direct
@@ -184,17 +186,10 @@ bool ModeTracker::refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Wo
       return true;
     }
     if (!close) continue;
-    if (!separate(close, work)) return false;
+    if (!work.take(kPartingWork) || !separate_blocks(residual_, close, basis_)) return false;
     forget_past();
   }
   return false;
-}
-
-bool ModeTracker::separate(const CloseBlocks& close, Work& work) noexcept {
-  if (!work.take(kPartingWork)) return false;
-  if (basis_.two_sided) return separate_two_sided(residual_, close, basis_);
-  if (close.first >= basis_.modes) return separate_zero_modes(residual_, basis_);
-  return separate_blocks(residual_, close, basis_);
 }
 
 /// Reads the numbers of basis_; false if what is a zero mode is to be decided again.
@@ -300,6 +295,9 @@ void ModeTracker::publish_direct(const SymmetricPencil& pencil, TrackedSpectrum&
     out.zero_mode_rates[at(k)] = spectrum_.zero_mode_rates[k];
   }
   sort_by_frequency(out);
+  kept_ = out;
+  kept_.origin = SpectrumOrigin::kReused;
+  kept_known_ = true;
 }
 
 }  // namespace dashpot::analysis

@@ -25,24 +25,6 @@ struct CoefficientSizes {
   bool in_range = false;  ///< masses and rates are not too large or too small
 };
 
-/// The largest |A_ij| inverse_i inverse_j of a symmetric matrix, n x n: from its upper triangle,
-/// read in fours where a column has them.
-double largest_entry(const double* A, int n, const std::array<double, kMaxDof>& inverse) {
-  Vec4d largest{};
-  double rest = 0;
-  for (int j = 0; j < n; ++j) {
-    const double* const column = A + j * n;
-    const double factor = inverse[at(j)];
-    int i = 0;
-    for (; i <= j && i + 4 <= n; i += 4) {
-      const Vec4d entry = magnitude(load(column + i) * load(&inverse[at(i)])) * factor;
-      largest = entry > largest ? entry : largest;
-    }
-    for (; i <= j; ++i) rest = std::max(rest, std::abs(column[i]) * inverse[at(i)] * factor);
-  }
-  return std::max({rest, largest[0], largest[1], largest[2], largest[3]});
-}
-
 CoefficientSizes coefficient_sizes(const SymmetricPencil& pencil) {
   const int n = pencil.joints;
   CoefficientSizes sizes;
@@ -55,16 +37,16 @@ CoefficientSizes coefficient_sizes(const SymmetricPencil& pencil) {
     sizes.s[at(k)] = std::sqrt(diagonal);
     inverse[at(k)] = 1 / sizes.s[at(k)];
   }
-  const double mass = largest_entry(pencil.M, n, inverse),
-               damping = largest_entry(pencil.C, n, inverse);
-  const double stiffness = pencil.factored ? 0 : largest_entry(pencil.W, n, inverse);
+  const double mass = largest_entry(pencil.M, n, inverse.data(), true),
+               damping = largest_entry(pencil.C, n, inverse.data(), true);
+  const double stiffness = pencil.factored ? 0 : largest_entry(pencil.W, n, inverse.data(), true);
   for (int j = 0; pencil.factored && j < n; ++j) {
     double W = 0;
     for (int i = 0; i < pencil.rank; ++i) W += square(pencil.W[i + j * pencil.rank]);
     sizes.elastic[at(j)] = std::sqrt(W);
   }
-  sizes.mass = kSlack * mass;
-  sizes.damping = kSlack * damping;
+  sizes.mass = mass;
+  sizes.damping = damping;
   sizes.stiffness = kSlack * std::sqrt(stiffness);
   if (!pencil.factored) {
     for (int k = 0; k < n; ++k) sizes.elastic[at(k)] = sizes.stiffness * sizes.s[at(k)];
@@ -270,6 +252,23 @@ void prove_blocks(const BlockEigenbasis& basis, const TrackedResidual& residual,
 }
 
 }  // namespace
+
+double largest_entry(const double* A, int n, const double* inverse, bool symmetric) noexcept {
+  Vec4d largest{};
+  double rest = 0;
+  for (int j = 0; j < n; ++j) {
+    const double* const column = A + j * n;
+    const double factor = inverse[j];
+    const int rows = symmetric ? j + 1 : n;
+    int i = 0;
+    for (; i + 4 <= rows; i += 4) {  // read in fours where a column has them
+      const Vec4d entry = magnitude(load(column + i) * load(inverse + i)) * factor;
+      largest = entry > largest ? entry : largest;
+    }
+    for (; i < rows; ++i) rest = std::max(rest, std::abs(column[i]) * inverse[i] * factor);
+  }
+  return kSlack * std::max({rest, largest[0], largest[1], largest[2], largest[3]});
+}
 
 void enclose(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
              const TrackedResidual& residual, TrackedEnclosure& enclosure) noexcept {

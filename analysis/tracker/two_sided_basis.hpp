@@ -34,14 +34,6 @@ bool balance(const SymmetricPencil& pencil, bool all, BlockEigenbasis& basis) no
 bool start_two_sided(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum,
                      BlockEigenbasis& basis) noexcept;
 
-/// Separates two blocks of a two-sided basis that Newton's method cannot tell apart, by dividing
-/// the space of their columns into two invariant planes again (lines, of zero modes of a factor).
-/// Of the divisions that there are, each new block has most of the old one whose index it gets.
-/// `residual` belongs to the basis, at least nearly. Returns false, and does not change the basis,
-/// where no well-conditioned columns separate the blocks.
-bool separate_two_sided(const TrackedResidual& residual, const CloseBlocks& close,
-                        BlockEigenbasis& basis) noexcept;
-
 /// Whether the symmetric matrix M (n x n) has a Cholesky factor.
 bool is_positive_definite(const double* M, int n) noexcept;
 

@@ -9,31 +9,12 @@
 namespace dashpot::analysis {
 namespace {
 
-/// For the rounding errors of the bounds themselves.
-
 using Blocks = BlockEigenbasis::Entries;
 /// One number for each state, row or column, read in fours; zero beyond the last.
 using States = std::array<double, kMaxWidth + 4>;
 
 double largest_of(const Vec4d& x) {
   return std::max(std::max(x[0], x[1]), std::max(x[2], x[3]));
-}
-
-/// The largest |A_ij| inverse_i inverse_j of a matrix, n x n.
-double largest_entry(const double* A, int n, const States& inverse) {
-  Vec4d largest{};
-  double rest = 0;
-  for (int j = 0; j < n; ++j) {
-    const double* const column = A + j * n;
-    const double factor = inverse[at(j)];
-    int i = 0;
-    for (; i + 4 <= n; i += 4) {
-      const Vec4d entry = magnitude(load(column + i) * load(&inverse[at(i)])) * factor;
-      largest = entry > largest ? entry : largest;
-    }
-    for (; i < n; ++i) rest = std::max(rest, std::abs(column[i]) * inverse[at(i)] * factor);
-  }
-  return kSlack * std::max(rest, largest_of(largest));
 }
 
 /// Weights of the entries of a state, zero where they belong to the other half of it.
@@ -59,9 +40,9 @@ Weights weights_of(const SymmetricPencil& pencil) {
     weights.position[at(k)] = pencil.factored ? 1 : weights.velocity[at(p + k)];
     weights.inverse_position[at(k)] = pencil.factored ? 1 : inverse[at(k)];
   }
-  weights.mass = largest_entry(pencil.M, n, inverse);
-  weights.damping = largest_entry(pencil.C, n, inverse);
-  if (!pencil.factored) weights.stiffness = largest_entry(pencil.W, n, inverse);
+  weights.mass = largest_entry(pencil.M, n, inverse.data(), false);
+  weights.damping = largest_entry(pencil.C, n, inverse.data(), false);
+  if (!pencil.factored) weights.stiffness = largest_entry(pencil.W, n, inverse.data(), false);
   double rate = weights.damping + std::sqrt(weights.stiffness);
   for (int k = 0; pencil.factored && k < n; ++k) {
     double sum = 0;

@@ -49,4 +49,8 @@ class TwoSidedErrors {
          all_momenta_ = 0;  ///< of all rows or columns; the last one is of |M| e
 };
 
+/// Returns a bound of the largest |A_ij| inverse_i inverse_j of a matrix (n x n), from its upper
+/// triangle if it is symmetric.
+double largest_entry(const double* A, int n, const double* inverse, bool symmetric) noexcept;
+
 }  // namespace dashpot::analysis

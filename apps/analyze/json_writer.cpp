@@ -42,6 +42,7 @@ Json to_value(const analysis::Mode<>& mode) {
       {"backward_error", mode.backward_error},
       {"condition", mode.condition},
       {"error_bound", mode.error_bound},
+      {"eigenvalue_bounds", mode.eigenvalue_bounds},
       {"natural_frequency_bound", mode.natural_frequency_bound},
       {"damping_ratio_bound", mode.damping_ratio_bound}};
 }

@@ -28,6 +28,12 @@ std::string second_eigenvalue(const analysis::Mode<>& mode) {
   return "+- " + format_number(std::abs(first.imag()), 6) + "i";
 }
 
+/// The bound of both of a complex pair, or of each of two real eigenvalues.
+std::string eigenvalue_bounds(const analysis::Mode<>& mode) {
+  if (mode.eigenvalues[0].imag() != 0) return format_bound(mode.error_bound);
+  return format_bound(mode.eigenvalue_bounds[0]) + " " + format_bound(mode.eigenvalue_bounds[1]);
+}
+
 class Writer {
  public:
   explicit Writer(bool bold) : bold_(bold) {}
@@ -74,7 +80,7 @@ class Writer {
                      format_number(mode.natural_frequency / (2 * std::numbers::pi), 6),
                      format_number(mode.damping_ratio, 6), analysis::to_text(mode.kind),
                      format_number(mode.eigenvalues[0].real(), 6), second_eigenvalue(mode),
-                     format_bound(mode.error_bound), format_number(mode.backward_error, 2)});
+                     eigenvalue_bounds(mode), format_number(mode.backward_error, 2)});
       shapes.add_row({number, format_shape(mode.shapes[0], kWidth - 10)});
     }
     out_ += '\n' + table.text() + '\n' + shapes.text();

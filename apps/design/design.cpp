@@ -61,10 +61,12 @@ analysis::LoopLimit limit_of(const SystemEntry& entry, const DesignOptions& opti
 /// Says that a gain margin cannot be kept: "NO ... keeps a gain margin of ..."
 std::runtime_error lost_margin(const std::string& none, const DesignOptions& options,
                                double largest, const std::string& with) {
+  const std::string reason =
+      largest > 0 ? "largest margin is " + format_number(largest, 3) + ", with " + with
+                  : "loop is unstable however little of the gains is left";
   return std::runtime_error(none + " keeps a gain margin of " +
                             format_number(options.limit.gain_margin, 3) +
-                            " with this period and delay; the largest margin is " +
-                            format_number(largest, 3) + ", with " + with);
+                            " with this period and delay; the " + reason);
 }
 
 Found design_one(const SystemEntry& entry, const DesignOptions& options) {

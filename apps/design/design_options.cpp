@@ -96,13 +96,15 @@ analysis::DampingTarget DesignOptions::target() const {
 }
 
 void add_design_options(CLI::App& command, DesignOptions& options) {
+  constexpr double kLeast = std::numeric_limits<double>::min();
+  const CLI::Validator a_ratio = quantity("", kLeast, 1e9, "a positive ratio up to 1e9");
   command.add_option("FILE", options.file, "YAML or JSON file; - reads standard input")
       ->option_text(" ");
   add_arm(command, options.arm);
   options.postures.add(command);
   command.add_option("--damping-ratio", options.ratio, "The ratio wanted of every mode")
       ->required()
-      ->transform(positive("", "a positive ratio"))
+      ->transform(a_ratio)
       ->option_text("Z");
   command
       .add_option("--keep-structure", options.structure,
@@ -116,7 +118,7 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
                    "smallest ratio");
   command
       .add_option("--largest-ratio", options.largest_ratio, "With --region: no mode may have more")
-      ->transform(positive("", "a positive ratio"))
+      ->transform(a_ratio)
       ->option_text("R (1 or 1.5 Z)");
   command.add_option("--csv", options.csv, "With --region: write the map of the worst mode there")
       ->option_text("FILE");

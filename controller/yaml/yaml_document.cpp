@@ -168,6 +168,10 @@ std::string read_regular_file(const std::string& path) {
 }
 
 YamlNode parse_yaml(const std::string& text) {
+  // gzip, zip, xz, zstd, bzip2
+  for (const char* begin : {"\x1f\x8b", "PK\x03\x04", "\3757zXZ", "\x28\xb5\x2f\xfd", "BZh9"}) {
+    if (text.starts_with(begin)) throw InputError("", "is compressed; unpack it first");
+  }
   check_limits(text);
   try {
     std::istringstream stream(text);

@@ -155,6 +155,21 @@ TEST(DesignNearAStart, ReachesTheTargetAndStaysThere) {
   }
 }
 
+TEST(DesignNearAStart, GoesAsFarAsTheTargetIs) {
+  // A search from the start gets stuck where two modes coincide on the way.
+  Random random(7305);
+  for (int i = 0; i < 60; ++i) {
+    const TaskImpedance arm = random_arm(random, 5, 3, 10, 30);
+    const MatrixXd exact = design_damping(arm, DampingTarget::constant(0.7)).damping;
+    const MatrixXd other = random.spd(3);
+    const MatrixXd start = symmetric(exact.trace() / other.trace() * other);
+    const DampingDesign design =
+        design_damping(arm, DampingTarget::constant(0.7), DampingStructure::kFull, start);
+    EXPECT_TRUE(design.misses.empty());
+    for (const DampingMiss& miss : design.misses) EXPECT_EQ(miss.obtained, 0.7);
+  }
+}
+
 TEST(DesignNearAStart, RefusesOneThatIsNoDamping) {
   Random random(7304);
   const TaskImpedance arm = random_arm(random, 7, 6);

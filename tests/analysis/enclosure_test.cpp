@@ -149,6 +149,25 @@ TEST(BlockEnclosure, HoldsForEveryMatrixWithinTheErrors) {
   EXPECT_GT(tightest, 0.9);
 }
 
+/// Slow blocks beside fast ones whose errors are far more than the slow ones are apart.
+TEST(BlockEnclosure, CountsErrorsWhereTheyAct) {
+  Random random(1047);
+  int apart = 0;
+  for (int trial = 0; trial < 1000; ++trial) {
+    VectorXd Lambda = -random.vector(6).cwiseAbs();
+    Lambda.tail(3) *= random.log_uniform(1e2, 1e6);
+    Perturbed all(Lambda);
+    MatrixXd error = random.log_uniform(1e-4, 0.1) * random.matrix(6, 6);
+    error.bottomLeftCorner(3, 3) *= random.log_uniform(1, 1e3);
+    error.bottomRightCorner(3, 3) *= random.log_uniform(1, 1e5);
+    all.residual.F_error = error.cwiseAbs();
+    all.expect_enclosed(error);
+    const double errors = error.bottomRows(3).norm();
+    if (all.enclosure.alone(0) && errors > Lambda.head(3).norm()) ++apart;
+  }
+  EXPECT_GT(apart, 100);
+}
+
 TEST(BlockEnclosure, SeparatesBlocksUpToTheLimitOfTheTheorem) {
   // 4 |E12| |E21| = delta^2 within some units of the last place.
   Random random(5104);

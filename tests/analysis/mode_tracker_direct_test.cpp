@@ -47,6 +47,37 @@ TEST(ModeTracker, HasNoShapeWhereNothingMoves) {
   }
 }
 
+/// A defective eigenvalue of three modes is solved directly. The same system has the same spectrum,
+/// whatever order another solution might find the modes in.
+TEST(ModeTracker, PublishesAgainWhatItCannotFollow) {
+  System<kMaxDof> system(3);
+  system.damping.diagonal().setConstant(0.2);
+  system.stiffness << 4, 1, 0, 0, 4, 1, 0, 0, 4;
+  Tracked tracked;
+  const Status status = tracked.update(system);
+  ASSERT_TRUE(status == Status::kOk || status == Status::kUncertified) << to_text(status);
+  ASSERT_FALSE(tracked.tracker->follows());
+  const TrackedSpectrum first = *tracked.spectrum;
+  EXPECT_EQ(first.origin, SpectrumOrigin::kDirect);
+  for (int call = 0; call < 2; ++call) {
+    ASSERT_EQ(tracked.update(system), status);
+    EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kReused);
+    EXPECT_EQ(tracked.spectrum->epoch, first.epoch);
+    EXPECT_EQ(tracked.spectrum->mode_count, first.mode_count);
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(tracked.spectrum->modes[i].eigenvalues, first.modes[i].eigenvalues);
+      EXPECT_EQ(tracked.spectrum->order[i], first.order[i]);
+    }
+  }
+  EXPECT_EQ(tracked.counters().reused, 2);
+  tracked.tracker->reset();
+  tracked.update(system);
+  EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kDirect);
+  system.damping(0, 0) = 0.3;
+  tracked.update(system);
+  EXPECT_EQ(tracked.spectrum->origin, SpectrumOrigin::kDirect);
+}
+
 /// Nonsymmetric damping of a spring and two zero modes can leave two complex pairs: a mode more
 /// than the stiffness factor has rows, and two zero modes as well.
 TEST(ModeTracker, HasRoomForModesThatDampingMakesOfZeroModes) {

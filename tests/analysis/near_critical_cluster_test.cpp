@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -61,6 +62,36 @@ TEST(NearCriticalCluster, IsSolvedAndBoundedHoweverWeaklyItsModesAreCoupled) {
           }
         }
       }
+    }
+  }
+}
+
+/// Where the ratio is 1 to the last bit, frequencies that are equal are known to about a root of
+/// the rounding errors, however ill conditioned the mass matrix is.
+TEST(NearCriticalCluster, IsBoundedWhereModesCoincide) {
+  testing::Random random(7005);
+  for (int trial = 0; trial < 60; ++trial) {
+    const int n = random.integer(3, 7), others = random.integer(0, n - 2);
+    // Integers, and so exact.
+    Eigen::MatrixXd L = Eigen::MatrixXd::Identity(n, n);
+    for (int j = 0; j < n; ++j) {
+      for (int i = j + 1; i < n; ++i) L(i, j) = random.integer(-3, 3);
+    }
+    Eigen::VectorXd w = Eigen::VectorXd::Constant(n, 7);
+    w.tail(others).setConstant(6);
+    System<> system(n);
+    system.mass = L * L.transpose();
+    system.damping = L * (2 * w).asDiagonal() * L.transpose();
+    system.stiffness = L * w.cwiseAbs2().asDiagonal() * L.transpose();
+    const Spectrum<> spectrum = analyze(system);
+    EXPECT_EQ(spectrum.status, Status::kOk);
+    ASSERT_EQ(spectrum.modes.size(), n);
+    const double condition = system.mass.norm() * system.mass.inverse().norm();
+    for (int i = 0; i < n; ++i) {
+      const Mode<>& mode = spectrum.modes[i];
+      EXPECT_EQ(mode.kind, ModeKind::kCritical);
+      EXPECT_LT(mode.error_bound, 1e-6 * std::sqrt(condition)) << condition;
+      EXPECT_LE(modulus(mode.eigenvalues[0] + w[i]), mode.error_bound);
     }
   }
 }

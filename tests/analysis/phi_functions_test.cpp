@@ -105,6 +105,22 @@ TEST(Phi, OfALargeDefectiveBlockIsAccurate) {
   }
 }
 
+TEST(Phi, OfALargeBlockWiderThanTheRangeOfNumbersIsFinite) {
+  // e^(A t) = S diag(e^(-t), e^(-3 t), e^(-14 t)) S^-1; the eigenvalues lie up to 8 from their
+  // mean.
+  const Eigen::Matrix3d S{{1, 0, 0}, {2, 1, 0}, {0, 1, 1}},
+      inverse{{1, 0, 0}, {-2, 1, 0}, {2, -1, 1}};
+  const MatrixXd A = S * Eigen::Vector3d(-1, -3, -14).asDiagonal() * inverse;
+  for (const double t : {10.0, 100.0, 300.0, 700.0, 1e3, 1e6, 1e9, 1e15}) {
+    const Eigen::Vector3d values(std::exp(-t), std::exp(-3 * t), std::exp(-14 * t));
+    const MatrixXd expected = S * values.asDiagonal() * inverse;
+    EXPECT_TRUE(near(phi(0, A, t), expected, 1e-14 * (1 + t) * std::exp(-t))) << "t = " << t;
+    EXPECT_TRUE(near(phi(1, A, t) * t, -A.inverse(), 1e-4)) << "t = " << t;
+  }
+  EXPECT_TRUE(near(phi(0, -A, 300.0).real().array().isNaN().cast<double>().matrix(),
+                   MatrixXd::Zero(3, 3), 0));  // too large for a number, and no worse
+}
+
 TEST(Phi, WithAShiftIsAccurateAtAndBesideResonance) {
   for (const double t : {1e-8, 0.01, 0.5, 1.0, 3.0, 40.0, 1e3, 1e6}) {
     for (const double omega : {0.0, 1e-9, 0.5, 1 - 1e-9, 1.0, 1 + 1e-5, 2.0, 1e3}) {

@@ -180,6 +180,35 @@ TEST(RigidBodyElimination, LeavesTheNonzeroFrequenciesAndMotionsOrthogonalToEver
   EXPECT_TRUE(none.steps.empty());
 }
 
+TEST(RigidBodyElimination, LeavesTheModesOfAMovingRedundantArm) {
+  testing::Random random(47);
+  for (int i = 0; i < 50; ++i) {
+    TaskImpedance impedance;
+    const int n = random.integer(2, 8), m = random.integer(1, n - 1);
+    impedance.mass = random.spd(n);
+    impedance.jacobian = random.matrix(m, n);
+    impedance.task_stiffness = 100 * random.spd(m);
+    impedance.task_damping = random.spd(m);
+    impedance.jacobian_rate = random.matrix(m, n);
+    const System<> system = to_joint_space(impedance);
+    ASSERT_FALSE(system.symmetric());
+    const Spectrum<> spectrum = analyze(system);
+    ASSERT_EQ(spectrum.zero_modes.count, n - m);
+    const RigidBodyElimination elimination = eliminate_zero_modes(system, spectrum.zero_modes);
+    System<> reduced(m);
+    reduced.mass = elimination.mass;
+    reduced.damping = elimination.damping;
+    reduced.stiffness = elimination.stiffness;
+    const Spectrum<> same = analyze(reduced);
+    ASSERT_EQ(spectrum.modes.size(), m);
+    for (int k = 0; k < m; ++k) {
+      const Mode<>&one = spectrum.modes[k], &other = same.modes[k];
+      EXPECT_NEAR(one.natural_frequency, other.natural_frequency, 1e-8 * one.natural_frequency);
+      EXPECT_NEAR(one.damping_ratio, other.damping_ratio, 1e-8);
+    }
+  }
+}
+
 TEST(RigidBodyElimination, DependsOnTheZeroModesTogetherOnly) {
   testing::Random random(14);
   const System<> system = random_system(random, 6, 3);

@@ -1,6 +1,7 @@
 // Systems at the edges: empty ones, bad ones, ones that are not symmetric, coupled zero modes.
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/matrices.hpp>
+#include <dashpot/tests/support/quad_spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
@@ -225,6 +226,44 @@ TEST(CoupledZeroModes, AreNotReportedForTaskDamping) {
   EXPECT_FALSE(spectrum.coupled);
   EXPECT_LE(spectrum.coupling, 1e-14);
   EXPECT_TRUE(near(spectrum.zero_mode_rates, MatrixXd::Zero(2, 1), 0));
+}
+
+/// However strong the damping is: frequency and ratio are proved to as many digits, and with them
+/// both eigenvalues are.
+TEST(Spectrum, BoundsEachEigenvalueOfOverdampedModes) {
+  Random random(4701);
+  for (int trial = 0; trial < 120; ++trial) {
+    const int n = random.integer(1, trial % 10 == 0 ? 14 : 6);
+    System<> system(n);
+    system.mass = random.spd(n);
+    system.damping = random.log_uniform(1e3, 1e12) * random.spd(n);
+    system.stiffness = random.log_uniform(1e-6, 1e3) * random.spd(n);
+    const Spectrum<> spectrum = analyze(system);
+    EXPECT_EQ(spectrum.status, Status::kOk);
+    ASSERT_EQ(spectrum.modes.size(), n);
+    std::vector<testing::QuadComplex> truth;
+    for (const Mode<>& mode : spectrum.modes) {
+      ASSERT_EQ(mode.kind, ModeKind::kOverdamped);
+      EXPECT_EQ(mode.error_bound, std::max(mode.eigenvalue_bounds[0], mode.eigenvalue_bounds[1]));
+      for (std::size_t k = 0; k < 2; ++k) {
+        const Complex value = mode.eigenvalues[k];
+        EXPECT_LE(mode.eigenvalue_bounds[k], 1e-9 * modulus(value)) << value;
+        const double step = 1e-9 * static_cast<double>(truth.size() + 1);
+        truth.push_back(testing::to_quad(value * Complex(1 + step, step)));
+      }
+    }
+    truth = testing::refine_eigenvalues(system, truth);
+    for (const Mode<>& mode : spectrum.modes) {
+      for (std::size_t k = 0; k < 2; ++k) {
+        double nearest = kInfinity;
+        for (const testing::QuadComplex& true_one : truth) {
+          const auto distance = (true_one - testing::to_quad(mode.eigenvalues[k])).norm();
+          nearest = std::min(nearest, std::sqrt(static_cast<double>(distance)));
+        }
+        EXPECT_LE(nearest, mode.eigenvalue_bounds[k]) << mode.eigenvalues[k];
+      }
+    }
+  }
 }
 
 }  // namespace

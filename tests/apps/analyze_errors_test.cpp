@@ -126,6 +126,7 @@ TEST(AnalyzeErrors, AreOneLineThatNamesTheKey) {
        std::string("\x7f"
                    "ELF\0\1\2",
                    7)},
+      {"is compressed; unpack it first", "", std::string("\x1f\x8b\x08\0\0\0\"\\\x03", 8)},
       {"holds several documents; give a list instead", "", "---\n" + kTwo + "---\n" + kTwo},
       {"is not YAML: ", "", "mass: *m\n"},
       {"an alias refers to itself", "", "mass: &m [*m]\n"},

@@ -48,6 +48,32 @@ TEST(Analyze, AddsTheGeometricStiffnessAndTheJacobiansRate) {
             Json::parse(R"(["stiffness is not symmetric: solved as a general problem"])"));
 }
 
+TEST(Analyze, AddsTheJacobiansRateOfARedundantArm) {
+  // The springs act along (2, 1) only, K = (1, 0.5)' (101, 53): the momentum that they do not
+  // change is (-0.5, 1) M q' = -0.5 q1' + 0.75 q2', and so the reduced system has q = (1, 2/3) q1.
+  const Json result = analyze_json(
+      "mass: [[2, 0.5], [0.5, 1]]\njacobian: [[1, 0.5]]\ntask_stiffness: [[100]]\n"
+      "task_damping: [[10]]\njacobian_rate: [[0.1, 0.3]]\n");
+  expect_near(result["constraint_matrix"], {{1}, {2.0 / 3}}, 1e-14);
+  expect_near(result["reduced"]["mass"], {{28.0 / 9}}, 1e-14);
+  expect_near(result["reduced"]["damping"], {{160.0 / 9}}, 1e-13);
+  expect_near(result["reduced"]["stiffness"], {{1636.0 / 9}}, 1e-12);
+  expect_near({of_modes(result, "natural_frequency")}, {{std::sqrt(409.0 / 7)}}, 1e-13);
+  expect_near({of_modes(result, "damping_ratio")}, {{20 / 7.0 / std::sqrt(409.0 / 7)}}, 1e-13);
+}
+
+TEST(Analyze, SettlesWhereSeveralCriticalModesCoincide) {
+  const Json result = analyze_json(
+      "mass: [[2, 1, 0], [1, 3, 1], [0, 1, 4]]\ndamping: [[28, 14, 0], [14, 42, 14], [0, 14, 54]]\n"
+      "stiffness: [[98, 49, 0], [49, 147, 49], [0, 49, 181]]\n"
+      "initial_position: [0.1, -0.2, 0.3]\ninitial_velocity: [1, 2, 3]\n"
+      "times: [0, 1000, 1e12]\n");
+  EXPECT_EQ(result["response"]["position"],
+            Json::parse("[[0.1, -0.2, 0.3], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]"));
+  EXPECT_EQ(result["response"]["velocity"],
+            Json::parse("[[1.0, 2.0, 3.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]"));
+}
+
 TEST(Analyze, SumsTheResponsesToAllThatIsGiven) {
   const std::string system =
       "mass: [[2, 0.5], [0.5, 1]]\ndamping: [[1, -0.3], [-0.3, 0.4]]\n"

@@ -131,6 +131,9 @@ TEST(DesignForALoop, ProposesNothingWhereNoRatioWillDo) {
   EXPECT_EQ(count_lines(outcome.err), 1);
   EXPECT_THAT(outcome.err,
               HasSubstr("[0]: no damping ratio up to 0.0900 keeps a gain margin of 2"));
+  // Stable where c / k > period / 2, whatever the share of both.
+  EXPECT_THAT(design(kMass, {"--damping-ratio", "1", "--period", "0.5"}).err,
+              HasSubstr("the loop is unstable however little of the gains is left"));
 }
 
 TEST(DesignForALoop, LowersTheDampingOfARegionToWhatEveryLoopBears) {

@@ -205,9 +205,9 @@ TEST(Design, RefusesInOneLine) {
   const std::vector<Bad> all = {
 
       {{}, kArm, "--damping-ratio is required"},
-      {{"--damping-ratio", "-1"}, kArm, "a positive ratio is wanted"},
-      {{"--damping-ratio", "0.7x"}, kArm, "a positive ratio is wanted"},
-      {{"--damping-ratio", "inf"}, kArm, "a positive ratio is wanted"},
+      {{"--damping-ratio", "-1"}, kArm, "a positive ratio up to 1e9 is wanted"},
+      {{"--damping-ratio", "0.7x"}, kArm, "a positive ratio up to 1e9 is wanted"},
+      {{"--damping-ratio", "inf"}, kArm, "a positive ratio up to 1e9 is wanted"},
       {{"--damping-ratio", "1", "--keep-structure", "odd"}, kArm, "odd not in"},
       {{"--damping-ratio", "1", "--largest-ratio", "2"}, kArm, "--largest-ratio: needs --region"},
       {{"--damping-ratio", "1", "--region", "--largest-ratio", "0.5"},
@@ -240,6 +240,7 @@ TEST(Design, RefusesInOneLine) {
       {{"--damping-ratio", "1"},
        "mass: [[1, 0], [1, 1]]\nstiffness: [[1, 0], [0, 1]]\n",
        "mass: is not symmetric"},
+      {{"--damping-ratio", "1e308"}, kArm, "--damping-ratio: a positive ratio up to 1e9 is"},
       {{"--damping-ratio", "1", "--delay", "1"}, kArm, "--period: missing"},
       {{"--damping-ratio", "1", "--margin", "3"}, kArm, "--period: missing"},
       {{"--damping-ratio", "1", "--integral-time", "1"}, kArm, "--period: missing"},
