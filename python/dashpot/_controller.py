@@ -327,6 +327,17 @@ class Controller:
         below 1 if the loop is unstable."""
         return self._core.judge_gains(_column(to_vector("position", position)), _gains(gains))
 
+    def publish(self, *urls: str) -> None:
+        """Publishes states and modes of every tick over LCM from now on, as docs/plugin.md says, on
+        each of these buses, or else on that of LCM_DEFAULT_URL or of this machine:
+        "file:///tmp/arm.lcm?mode=w" writes a log. A thread without Python does it, which alone may
+        read results: until `stop_publishing`, snapshot, modes and sampled_modes raise Error."""
+        self._core.publish("\n".join(urls))
+
+    def stop_publishing(self) -> None:
+        """Publishes the last tick, and ends what `publish` began."""
+        self._core.stop_publishing()
+
     def snapshot(self) -> Snapshot | None:
         """Returns what the latest tick measured and put out; None before the first."""
         found = self._core.snapshot()

@@ -1,6 +1,7 @@
 // The controller behind the plugin's C functions, so that Python drives what other hosts load.
 
 #include <dashpot/controller/plugin/hosted_controller.hpp>
+#include <dashpot/lcmtypes/plugin_publisher.h>
 #include <dashpot/python/src/controller_results.hpp>
 
 #include <algorithm>
@@ -21,6 +22,19 @@ class Host {
   dashpot_controller* get() const { return controller_.get(); }
   std::size_t joints() const { return dashpot_joints(get()); }
 
+  /// Publishes every tick on buses, one URL a line, by a thread that needs no interpreter.
+  void publish(const std::string& urls) {
+    publisher_.reset();  // before another one reads the same results
+    publisher_.reset(dashpot_publisher_create(get(), urls.empty() ? nullptr : urls.c_str()));
+    if (!publisher_) throw std::invalid_argument(dashpot_publisher_error());
+  }
+  void stop_publishing() { publisher_.reset(); }
+  /// For reading results: a publisher is the only one that may.
+  dashpot_controller* readable() const {
+    if (publisher_) throw std::invalid_argument("publish: results are read by the publisher");
+    return get();
+  }
+
   std::mutex loop;   ///< of update, start and reset
   std::mutex other;  ///< of set_setpoint, set_gains, set_payload, ...
 
@@ -28,7 +42,11 @@ class Host {
   struct Destroy {
     void operator()(dashpot_controller* one) const { dashpot_destroy(one); }
   };
+  struct DestroyPublisher {
+    void operator()(dashpot_publisher* one) const { dashpot_publisher_destroy(one); }
+  };
   std::unique_ptr<dashpot_controller, Destroy> controller_;
+  std::unique_ptr<dashpot_publisher, DestroyPublisher> publisher_;
 };
 
 void check(std::int32_t code) {
@@ -258,6 +276,21 @@ void release(Host& host) {
   check(dashpot_release(host.get()));
 }
 
+/// What a host of a robot compares with the robot.
+nb::dict loop_of(const Host& host) {
+  const controller::Settings& settings = host.get()->settings;
+  const controller::Analysis::Sampled& sampled = settings.analysis.sampled;
+  nb::dict loop;
+  loop["gravity"] = settings.feed_forward.gravity;
+  loop["delay"] = sampled.delay;
+  loop["cutoff"] = sampled.cutoff;
+  loop["difference_velocity"] = sampled.difference_velocity;
+  loop["torque"] = Eigen::VectorXd(settings.limits.torque);
+  loop["torque_rate"] = Eigen::VectorXd(settings.limits.torque_rate);
+  loop["cartesian"] = settings.initial.mode == controller::Mode::kCartesian;
+  return loop;
+}
+
 }  // namespace
 
 void add_controller(nb::module_& m) {
@@ -288,9 +321,12 @@ void add_controller(nb::module_& m) {
       .def("limit_tip_speed", &limit_tip_speed, nb::arg("linear"), nb::arg("angular"),
            nb::arg("limit"))
       .def("release", &release)
-      .def("snapshot", [](const Host& host) { return snapshot_of(host.get()); })
-      .def("modes", [](const Host& host) { return modes_of(host.get()); })
-      .def("sampled_modes", [](const Host& host) { return sampled_modes_of(host.get()); });
+      .def("loop", &loop_of)
+      .def("publish", &Host::publish, nb::arg("urls"))
+      .def("stop_publishing", &Host::stop_publishing)
+      .def("snapshot", [](const Host& host) { return snapshot_of(host.readable()); })
+      .def("modes", [](const Host& host) { return modes_of(host.readable()); })
+      .def("sampled_modes", [](const Host& host) { return sampled_modes_of(host.readable()); });
 }
 
 }  // namespace dashpot::python
