@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import fcntl
 import gc
 import importlib
 import json
@@ -160,7 +161,6 @@ class Wire:
         """Returns when the state that was read last arrived, ns since 1970-01-01 UTC."""
         if self._socket is not None:
             with contextlib.suppress(OSError):
-                import fcntl
                 stamp = fcntl.ioctl(self._socket, self.STAMP, bytes(16))
                 seconds, ns = struct.unpack("ll", stamp)
                 return int(seconds * 1_000_000_000 + ns)

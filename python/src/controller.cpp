@@ -1,7 +1,8 @@
 // The controller behind the plugin's C functions, so that Python drives what other hosts load.
 
-#include <dashpot/controller/plugin/hosted_controller.hpp>
 #include <dashpot/lcmtypes/plugin_publisher.h>
+#include <dashpot/controller/plugin/hosted_controller.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/python/src/controller_results.hpp>
 
 #include <algorithm>
@@ -241,6 +242,29 @@ double judge_gains(Host& host, const OptionalMatrix& position, const nb::dict& k
   return margin;
 }
 
+/// The modes at rest at a posture, where no loop has to run; the tip's Jacobian and place there.
+nb::tuple modes_at(Host& host, const Eigen::VectorXd& position, bool cartesian,
+                   const nb::dict& keys) {
+  analysis::check_size("q", position, static_cast<Eigen::Index>(host.joints()), 1);
+  const GainsData gains(host, keys);
+  dashpot_modes modes{};
+  dashpot_dynamics dynamics{};
+  modes.struct_size = sizeof modes;
+  dynamics.struct_size = sizeof dynamics;
+  {
+    const nb::gil_scoped_release release;
+    check(dashpot_analyze(host.get(), position.data(),
+                          cartesian ? DASHPOT_MODE_CARTESIAN : DASHPOT_MODE_JOINT, &gains.given,
+                          nullptr, &modes));
+    check(dashpot_evaluate(host.get(), position.data(), nullptr, &dynamics));
+  }
+  using Rows =
+      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
+  return nb::make_tuple(to_dict(modes),
+                        Eigen::MatrixXd(Rows(dynamics.jacobian, 6, position.size())),
+                        Eigen::VectorXd(Eigen::Map<const Eigen::Vector3d>(dynamics.tip_position)));
+}
+
 std::string set_payload(Host& host, double mass, const Eigen::MatrixXd& center,
                         const Eigen::MatrixXd& inertia, const OptionalMatrix& tool,
                         const std::optional<nb::dict>& keys) {
@@ -287,6 +311,8 @@ nb::dict loop_of(const Host& host) {
   loop["difference_velocity"] = sampled.difference_velocity;
   loop["torque"] = Eigen::VectorXd(settings.limits.torque);
   loop["torque_rate"] = Eigen::VectorXd(settings.limits.torque_rate);
+  loop["gain_margin"] = settings.limits.gain_margin;
+  loop["missing_rotors"] = controller::missing_rotors_text(host.get()->model);
   loop["cartesian"] = settings.initial.mode == controller::Mode::kCartesian;
   return loop;
 }
@@ -316,6 +342,7 @@ void add_controller(nb::module_& m) {
            nb::arg("tip_pose").none(), nb::arg("wrench").none(), nb::arg("time").none())
       .def("set_gains", &set_gains, nb::arg("gains"))
       .def("judge_gains", &judge_gains, nb::arg("position").none(), nb::arg("gains"))
+      .def("modes_at", &modes_at, nb::arg("q"), nb::arg("cartesian"), nb::arg("gains"))
       .def("set_payload", &set_payload, nb::arg("mass"), nb::arg("center"), nb::arg("inertia"),
            nb::arg("tool").none(), nb::arg("gains").none())
       .def("limit_tip_speed", &limit_tip_speed, nb::arg("linear"), nb::arg("angular"),

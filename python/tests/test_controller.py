@@ -323,3 +323,15 @@ def test_publishes_each_tick_on_every_bus(config, tmp_path):
         np.testing.assert_array_equal(states["joint_position"][-1], HOME)
     with pytest.raises(dashpot.Error, match="nowhere"):
         controller.publish("nowhere")
+
+
+def test_modes_at_a_posture_are_those_of_the_loop(config, panda):
+    controller = dashpot.Controller(config)
+    gains = {"joint_stiffness": [300] * 7, "joint_damping_ratio": 0.4}
+    found = controller.modes_at(HOME, "joint", **gains)
+    expected = dashpot.closed_loop(panda, HOME, **gains).modes
+    np.testing.assert_allclose(found.natural_frequency, expected.natural_frequency, rtol=1e-9)
+    np.testing.assert_allclose(found.damping_ratio, expected.damping_ratio, rtol=1e-9)
+    assert len(controller.modes_at(HOME)) == 7 and found.shapes.shape == (7, 7)
+    with pytest.raises(dashpot.Error, match="q: "):
+        controller.modes_at([0] * 6)
