@@ -76,7 +76,8 @@ class Arm {
   /// Adds the torque to the passive forces; false, with `reason`, if it must not begin here.
   bool act(const mjModel* model, mjData* data, std::string& reason) {
     const std::int64_t step = std::llround(data->time / model->opt.timestep);
-    if (started_ && step < step_) restart();  // somebody has set the time back
+    // Somebody has set the time back, or looked at the model before placing the arm.
+    if (started_ && (step < step_ || (step == begin_ && moved(model, data)))) restart();
     if (!started_ || step >= step_ + every_) {
       for (std::size_t i = 0; i < joints_.size(); ++i) {
         position_[i] = data->qpos[model->jnt_qposadr[joints_[i]]];
@@ -86,6 +87,7 @@ class Arm {
         reason = dashpot_last_error();
         return false;
       }
+      if (!started_) begin_ = step;
       step_ = step;
       started_ = true;
       tick(data);
@@ -109,6 +111,13 @@ class Arm {
   }
 
  private:
+  bool moved(const mjModel* model, const mjData* data) const noexcept {
+    for (std::size_t i = 0; i < joints_.size(); ++i) {
+      if (data->qpos[model->jnt_qposadr[joints_[i]]] != position_[i]) return true;
+    }
+    return false;
+  }
+
   struct Destroy {
     void operator()(dashpot_controller* one) const { dashpot_destroy(one); }
   };
@@ -208,6 +217,7 @@ class Arm {
   int goal_ = -1;            ///< body whose pose is the set-point; -1: none
   int base_ = 0;             ///< body that is the base link; 0: the world
   std::int64_t every_ = 1;   ///< steps of the model from tick to tick
+  std::int64_t begin_ = 0;   ///< step of the first tick
   std::int64_t step_ = 0;    ///< of the last tick
   bool started_ = false;
   std::vector<double> position_, velocity_, torque_;

@@ -115,15 +115,21 @@ def test_a_robot_with_another_period_gets_no_torque(run):
     assert robot.written == []
 
 
-def test_gains_are_judged_before_the_first_torque(run):
+def test_gains_are_judged_where_the_arm_is_before_the_first_torque(run, monkeypatch):
+    asked = []
+
+    def start(self, q, torque=None):
+        asked.append(q)
+        raise dashpot.Error("gains: too little margin")
+    monkeypatch.setattr(dashpot.Controller, "start", start)
     robot = MadeUpRobot()
-    unstable = settings(gains={"joint": {"stiffness": STIFFNESS, "damping": [3] * 4 + [1, 1, 0.6]}},
-                        robot={"payload": {"mass": 0.0, "center": [0, 0, 0]}, "drives": "none"})
-    del unstable["robot"]["drives"]
-    unstable["gains"]["joint"]["damping"] = [40] * 4 + [40, 40, 40]
+    report = run(robot)
+    np.testing.assert_allclose(asked, [HOME], atol=1e-8)
+    assert report["failure"] == "gains: too little margin" and robot.written == []
+    monkeypatch.undo()
+    stiff = settings(gains={"joint": {"stiffness": STIFFNESS, "damping": [400] * 7}})
     with pytest.raises(dashpot.Error, match="gains"):
-        run(robot, unstable)
-    assert robot.written == []
+        franka.Session(stiff, "10.0.0.1")
 
 
 def test_a_dry_run_commands_nothing_and_finds_the_modes(run):
@@ -132,6 +138,19 @@ def test_a_dry_run_commands_nothing_and_finds_the_modes(run):
     assert report["failure"] is None and report["ended"] == "ended after its time"
     assert robot.written == [] and robot.read == 0 and report["commands_sent"] == 0
     assert report["ticks"] == 201 and len(report["modes"]) == 7
+
+
+def test_in_a_dry_run_faults_do_not_last(run):
+    robot = MadeUpRobot("Guiding")
+    read_once = robot.read_once
+
+    def with_a_gap():
+        robot.tick += 50 * (robot.tick == 500)
+        return read_once()
+    robot.read_once = with_a_gap
+    report = run(robot, duration=0.5, dry_run=True)
+    assert report["faults"] == 1 and report["fault"] is None
+    assert report["tick_statuses"]["ok"] > 400
 
 
 def test_the_torque_fades_before_the_end(run):
@@ -169,10 +188,17 @@ def test_a_gap_latches_and_the_arm_is_damped(run):
 
 
 def test_a_released_fault_is_over(run):
+    """The set-point from before the fault is not taken up again."""
+    def moved(robot):
+        robot.session.set_setpoint(joint_position=np.array(HOME) + 0.2)
+
     def gap(robot):
         robot.tick += 50
-    robot = MadeUpRobot(events={300: gap, 400: lambda robot: robot.session.controller.release()})
+    robot = MadeUpRobot(events={10: moved, 300: gap,
+                                400: lambda robot: robot.session.controller.release()})
     report = run(robot, duration=1)
+    assert np.abs(robot.written[250]).max() > 0.1
+    assert np.abs(robot.written[700:]).max() < 1e-3
     assert report["faults"] == 1 and report["fault"] is None and report["restarts"] == 2
 
 

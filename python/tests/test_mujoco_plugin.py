@@ -30,7 +30,8 @@ analysis: {{sampled: {{interval: 0.1 s}}}}
 """
 
 
-def model_of(tmp_path, *, mode="joint", period="1 ms", more="", world="", sensor=True, **attributes):
+def model_of(tmp_path, *, mode="joint", period="1 ms", integrator="implicitfast", more="", world="",
+             sensor=True, **attributes):
     """A Panda whose arm has the plugin; each step takes a millisecond."""
     config = tmp_path / "config.yaml"
     config.write_text(CONFIG.format(root=ROOT, mode=mode, period=period))
@@ -40,7 +41,7 @@ def model_of(tmp_path, *, mode="joint", period="1 ms", more="", world="", sensor
     instance = "".join(f'<config key="{key}" value="{value}"/>' for key, value in keys.items())
     text = (tmp_path / "plain.xml").read_text()
     text = re.sub("(<mujoco[^>]*>)", r"\1" + f"""
-      <option timestep="0.001" integrator="implicitfast"><flag contact="disable"/></option>
+      <option timestep="0.001" integrator="{integrator}"><flag contact="disable"/></option>
       <extension><plugin plugin="dashpot.impedance"><instance name="arm">{instance}</instance>
       </plugin></extension>""", text, count=1)
     text = text.replace("<worldbody>", "<worldbody>" + world, 1)
@@ -143,10 +144,36 @@ def test_a_reset_begins_anew(tmp_path):
     np.testing.assert_allclose(data.qpos[:7], np.array(HOME) + 0.1, atol=2e-3)
 
 
+def test_an_arm_may_be_placed_after_a_look(tmp_path):
+    model, data = model_of(tmp_path)
+    data.qpos[:7] = np.array(HOME) + 0.3
+    mujoco.mj_forward(model, data)
+    data.qpos[:7] = HOME
+    for _ in range(200):
+        mujoco.mj_step(model, data)
+    assert data.sensordata[0] == 0 and data.sensordata[1] == 0
+    np.testing.assert_allclose(data.qpos[:7], HOME, atol=2e-3)
+
+
+def test_each_data_has_an_arm_of_its_own(tmp_path):
+    model, _ = model_of(tmp_path)
+    starts = [np.array(HOME) + shift for shift in (0, 0.1, -0.1)]
+    several = [mujoco.MjData(model) for _ in starts]
+    for data, start in zip(several, starts):
+        data.qpos[:7] = start
+    for _ in range(200):
+        for data in several:
+            mujoco.mj_step(model, data)
+    for data, start in zip(several, starts):
+        np.testing.assert_allclose(data.qpos[:7], start, atol=2e-3)
+        assert data.sensordata[1] == 0
+
+
 @pytest.mark.parametrize("attributes, reason", [
     ({"config": "nowhere.yaml"}, "nowhere.yaml"),
     ({"prefix": "other_"}, "the model has no joint 'other_panda_joint1'"),
     ({"goal": "moon"}, "the model has no body 'moon'"),
+    ({"integrator": "RK4"}, "RK4 has states between steps"),
     ({"period": "1.5 ms"}, "no multiple of the model's timestep"),
     ({"lcm_url": "nonsense"}, "nonsense")])
 def test_what_does_not_fit_is_refused(attributes, reason, tmp_path, capfd):

@@ -1,5 +1,6 @@
 """python -m dashpot.ros with rclpy, in processes of their own. Skipped without it."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -86,10 +87,16 @@ def peer():
     rclpy.shutdown()
 
 
+@contextlib.contextmanager
 def start(*arguments):
-    return subprocess.Popen([sys.executable, "-m", "dashpot.ros", *map(str, arguments)],
-                            env={**os.environ, "ROS_DOMAIN_ID": DOMAIN}, stdout=subprocess.PIPE,
-                            stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen([sys.executable, "-m", "dashpot.ros", *map(str, arguments)],
+                               env={**os.environ, "ROS_DOMAIN_ID": DOMAIN},
+                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
 
 
 def end(process, status=0):
@@ -152,7 +159,7 @@ control: {{period: 10 ms}}
 gains: {{joint: {{stiffness: 20, damping_ratio: 0.7}}}}
 """)
     with start(config, "--torque-topic", "/effort") as process:
-        for k in range(100_000):
+        for k in range(6000):
             peer.send(np.array(HOME) + 1e-9 * (k % 7), time_ns=k * 10_000_000)
             rclpy.spin_once(peer.node, timeout_sec=0.01)
             if "/effort" in peer.heard and k % 50 == 0:
@@ -161,10 +168,12 @@ gains: {{joint: {{stiffness: 20, damping_ratio: 0.7}}}}
                                          "panda_hand_tcp").gravity(HOME)
         np.testing.assert_allclose(peer.heard["/effort"].data, weight, atol=1e-3)
         process.send_signal(signal.SIGINT)
-        while process.poll() is None:
+        limit = time.monotonic() + 60
+        while process.poll() is None and time.monotonic() < limit:
             k += 1
             peer.send(np.array(HOME) + 1e-9 * (k % 7), time_ns=k * 10_000_000)
             rclpy.spin_once(peer.node, timeout_sec=0.01)
+        process.kill()  # if it has not ended by itself
         for _ in range(50):
             rclpy.spin_once(peer.node, timeout_sec=0.01)
         assert np.abs(peer.heard["/effort"].data).max() == 0
@@ -174,10 +183,12 @@ gains: {{joint: {{stiffness: 20, damping_ratio: 0.7}}}}
 
 def test_another_period_is_refused(peer):
     with start(CONFIG, "--torque-topic", "/effort") as process:
-        k = 0
-        while process.poll() is None:
+        k, limit = 0, time.monotonic() + 60
+        while process.poll() is None and time.monotonic() < limit:
             k += 1
             peer.send(HOME, time_ns=k * 10_000_000)
             rclpy.spin_once(peer.node, timeout_sec=0.01)
+        process.terminate()  # if it did not end by itself
+        assert process.wait(60) == 2
         assert process.returncode == 2 and "/effort" not in peer.heard
         assert "joint states come every 10 ms" in process.stderr.read()
