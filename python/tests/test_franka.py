@@ -5,6 +5,7 @@ import importlib.util
 import itertools
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -384,6 +385,22 @@ def test_a_robot_that_vanishes_ends_the_loop(arm, tmp_path):
     print(report["failure"])
     assert report["running"] and ("no state for 1 s" in report["failure"]
                                   or "libfranka" in report["failure"])
+
+
+def test_the_program_ends_with_ctrl_c(arm, tmp_path):
+    command = [sys.executable, "-m", "dashpot.franka", ROOT / "controller/examples/fr3_franka.yaml",
+               "--robot", arm.address, "--json", "--lcm-url", f"file://{tmp_path}/bus.lcm?mode=w",
+               "--log", tmp_path / "log.lcm"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                          text=True) as process:
+        assert process.stderr.readline() == "the arm is held where it is\n"
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=120)
+        assert process.returncode == 0, err
+    report = json.loads(out)
+    assert report["ended"] == "ended by the user" and report["commands_sent"] >= 200
+    states = [dashpot.read_log(tmp_path / name)["DASHPOT_STATE"] for name in ("bus.lcm", "log.lcm")]
+    assert states[0]["tick"][-1] == states[1]["tick"][-1] == report["ticks"]
 
 
 def test_the_program_says_what_is_missing():
