@@ -34,6 +34,7 @@ from ._core import Error
 WATCH = 0.3  # s of states before the start
 FADE = 0.2  # s from the springs to no torque, at least
 REPEAT = 100  # ticks from one repetition of a set-point to the next
+TIP_TOLERANCE = 0.02  # m between the configuration's tip and the robot's end effector
 SILENCE = 1.0  # s without a state, after which the robot is given up
 PERIOD_TOLERANCE = 0.2  # of the period
 TORQUE_RATE = 1000.0  # N m/s that the robot bears
@@ -219,6 +220,7 @@ class Session:
         self.fault = Status.OK  # that has latched; OK: none
         self.states = self.lost = self.sent = self.waited = 0
         self.period = 0.0
+        self.tip_distance = 0.0  # m, from the configuration's tip to the robot's end effector
         self.success_rate = self.least_success_rate = 1.0
         loop = check_loop(self.controller)
         self._fade = max(FADE, float(np.max(loop["torque"] / loop["torque_rate"])))
@@ -300,6 +302,12 @@ class Session:
             raise RobotStopped(f"the robot is not ready (mode {mode}): " +
                                MODES.get(mode, "see Desk").format(robot=self.robot))
         self.controller.start(state.q)
+        place = self.controller._modes_at(state.q, None, {})[2]
+        self.tip_distance = float(np.linalg.norm(place - np.array(state.O_T_EE)[12:15]))
+        if self.tip_distance > TIP_TOLERANCE:
+            print(f"dashpot.franka: the configuration's tip is {1e3 * self.tip_distance:.0f} mm from the "
+                  "robot's end effector (O_T_EE): it has another tool, or is another arm",
+                  file=sys.stderr, flush=True)
 
     def _converse(self, franka: Any, robot: Any, wire: Wire, duration: float | None) -> str:
         """Answers states until it is to end. Returns why it ended."""
@@ -392,6 +400,7 @@ class Session:
         return {
             "driver": "libfranka", "robot": self.robot, "dry_run": self.dry_run,
             "running": self.running, "ended": ended, "failure": failure, "period": self.period,
+            "tip_distance": self.tip_distance,
             "states": {"received": self.states, "awaited": self.waited, "lost": self.lost},
             "commands_sent": self.sent,
             "success_rate": {"last": self.success_rate, "least": self.least_success_rate},

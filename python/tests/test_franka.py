@@ -39,11 +39,15 @@ def settings(**changes):
 class State:
     """What pylibfranka tells of a robot that stands still."""
 
+    END = np.array(dashpot.Robot.from_urdf(ROOT / "sim/models/fr3.urdf", "fr3_link0",
+                                           "fr3_hand_tcp").pose(HOME))
+
     def __init__(self, tick, mode="Idle", q=HOME):
         self.q, self.dq = [x + 1e-9 * (tick % 7) for x in q], [0.0] * 7  # no frozen feedback
         self.time = types.SimpleNamespace(to_sec=lambda: 1e-3 * tick)
         self.robot_mode = types.SimpleNamespace(name=mode)
         self.control_command_success_rate = 0.98
+        self.O_T_EE = State.END.T.ravel().tolist()
 
 
 class MadeUpRobot:
@@ -139,6 +143,16 @@ def test_a_dry_run_commands_nothing_and_finds_the_modes(run):
     assert report["failure"] is None and report["ended"] == "ended after its time"
     assert robot.written == [] and robot.read == 0 and report["commands_sent"] == 0
     assert report["ticks"] == 201 and len(report["modes"]) == 7
+
+
+def test_another_end_effector_is_told(run, capfd, monkeypatch):
+    assert run(MadeUpRobot(), duration=0.01)["tip_distance"] < 1e-6
+    assert "end effector" not in capfd.readouterr().err
+    other = State.END.copy()
+    other[:3, 3] += [0, 0.03, 0.04]
+    monkeypatch.setattr(State, "END", other)
+    assert run(MadeUpRobot(), duration=0.01)["tip_distance"] == pytest.approx(0.05, abs=1e-6)
+    assert "the configuration's tip is 50 mm from the robot's end effector" in capfd.readouterr().err
 
 
 def test_in_a_dry_run_faults_do_not_last(run):
@@ -323,7 +337,7 @@ def test_modes_are_those_of_the_arm_behind_libfranka(arm, tmp_path):
             free.append((first + 60, first + 390))
         windows.append(free)
     report = arm.end()
-    assert report["failure"] is None and report["faults"] == 0
+    assert report["failure"] is None and report["faults"] == 0 and report["tip_distance"] < 0.001
     assert report["states"]["lost"] == 0 and report["success_rate"]["last"] == 1
     log = dashpot.read_log(tmp_path / "log.lcm")
     frequencies = []
