@@ -10,16 +10,16 @@ import sys
 import time
 
 import pylibfranka
-from dashpot import franka
+from dashpot import _libfranka, franka
 
 
 def bare(address, seconds):
     """Returns the times of answers of a loop that does nothing, and the periods without one."""
-    before = franka.open_files()
+    before = _libfranka.open_files()
     robot = pylibfranka.Robot(address, pylibfranka.RealtimeConfig.kIgnore)
-    wire = franka.Wire(before)
-    answers, lost, last = franka.Answers(), 0, None
-    with franka.undisturbed():
+    wire = _libfranka.Wire(before)
+    answers, lost, last = _libfranka.Answers(), 0, None
+    with _libfranka.undisturbed():
         control = robot.start_torque_control()
         for tick in range(round(1000 * seconds)):
             state, _ = control.readOnce()

@@ -17,7 +17,7 @@ import pytest
 
 import dashpot
 from conftest import HOME, ROOT
-from dashpot import franka
+from dashpot import _libfranka, franka
 
 STIFFNESS, DAMPING = [100] * 4 + [30, 20, 10], [3] * 4 + [1, 1, 0.6]
 
@@ -223,7 +223,7 @@ def test_reflexes_are_named_with_what_to_do(run, reflex):
     def fails(robot):
         raise robot.ControlException(f'libfranka: motion aborted by reflex! ["{reflex}"]')
     report = run(MadeUpRobot(events={20: fails}))
-    assert report["failure"].count(reflex) == 2 and franka.REFLEXES[reflex] in report["failure"]
+    assert report["failure"].count(reflex) == 2 and _libfranka.REFLEXES[reflex] in report["failure"]
     assert "pylibfranka.Robot('10.0.0.1').automatic_error_recovery()" in report["failure"]
     assert report["running"] and report["commands_sent"] == 19
 
