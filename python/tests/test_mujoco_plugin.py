@@ -132,11 +132,13 @@ def test_ticks_come_as_often_as_the_period_says(tmp_path):
     assert np.median(np.diff(states["utime"]) / np.diff(states["tick"])) == 2000
 
 
-def test_a_reset_begins_anew(tmp_path):
+@pytest.mark.parametrize("then", [0, 10])  # s; a keyframe may have any time
+def test_a_reset_begins_anew(tmp_path, then):
     model, data = model_of(tmp_path)
     for _ in range(50):
         mujoco.mj_step(model, data)
     mujoco.mj_resetData(model, data)
+    data.time = then
     data.qpos[:7] = np.array(HOME) + 0.1
     for _ in range(200):
         mujoco.mj_step(model, data)
