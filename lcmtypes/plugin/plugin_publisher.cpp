@@ -7,6 +7,7 @@
 #include <chrono>
 #include <exception>
 #include <memory>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -27,9 +28,13 @@ std::int64_t utime_now() {
   return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
 }
 
-std::vector<std::unique_ptr<Sink>> bus_sinks(const char* url) {
+std::vector<std::unique_ptr<Sink>> bus_sinks(const char* urls) {
   std::vector<std::unique_ptr<Sink>> sinks;
-  sinks.push_back(make_bus_sink(open_bus(url != nullptr ? url : "")));
+  std::istringstream lines(urls != nullptr ? urls : "");
+  for (std::string url; std::getline(lines, url);) {
+    sinks.push_back(make_bus_sink(open_bus(url)));
+  }
+  if (sinks.empty()) sinks.push_back(make_bus_sink(open_bus("")));
   return sinks;
 }
 

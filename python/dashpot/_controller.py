@@ -327,6 +327,30 @@ class Controller:
         below 1 if the loop is unstable."""
         return self._core.judge_gains(_column(to_vector("position", position)), _gains(gains))
 
+    def publish(self, *urls: str) -> None:
+        """Publishes states and modes of every tick over LCM from now on, as docs/plugin.md says, on
+        each of these buses, or else on that of LCM_DEFAULT_URL or of this machine:
+        "file:///tmp/arm.lcm?mode=w" writes a log. A thread without Python does it, which alone may
+        read results: until `stop_publishing`, snapshot, modes and sampled_modes raise Error."""
+        self._core.publish("\n".join(urls))
+
+    def stop_publishing(self) -> None:
+        """Publishes the last tick, and ends what `publish` began."""
+        self._core.stop_publishing()
+
+    def modes_at(self, q: npt.ArrayLike, mode: str | None = None, **gains: Any) -> TrackedModes:
+        """Returns the modes at rest at q (n, rad), as a loop would publish them; none has to run.
+        `mode` is joint or cartesian (None: that of the configuration), gains are as in set_gains,
+        those of the configuration by default. Shapes as the configuration asks for them."""
+        return self._modes_at(q, mode, gains)[0]
+
+    def _modes_at(self, q: npt.ArrayLike, mode: str | None, gains: dict[str, Any]
+                  ) -> tuple[TrackedModes, Array, Array]:
+        """The modes, and at the tip the Jacobian (6 x n) and the place (3, m)."""
+        cartesian = self._core.loop()["cartesian"] if mode is None else is_cartesian(mode)
+        found, jacobian, place = self._core.modes_at(to_numbers("q", q, 1), cartesian, _gains(gains))
+        return _tracked(found), jacobian, place
+
     def snapshot(self) -> Snapshot | None:
         """Returns what the latest tick measured and put out; None before the first."""
         found = self._core.snapshot()
@@ -338,11 +362,7 @@ class Controller:
     def modes(self) -> TrackedModes | None:
         """Returns the modes of the latest tick that was analysed; None as long as there are none."""
         found = self._core.modes()
-        if found is None:
-            return None
-        return TrackedModes(**{**found, "kind": np.array(found["kind"], dtype=np.str_),
-                               "label": np.array(found["label"], dtype=np.int64),
-                               "shapes": stack(found["shapes"], found["position"].shape, complex)})
+        return None if found is None else _tracked(found)
 
     def sampled_modes(self) -> TrackedSampledModes | None:
         """Returns the latest analysis of the sampled loop (analysis.sampled.interval); None as long
@@ -351,6 +371,12 @@ class Controller:
         if found is None:
             return None
         return TrackedSampledModes(**{**found, "kind": np.array(found["kind"], dtype=np.str_)})
+
+
+def _tracked(found: dict[str, Any]) -> TrackedModes:
+    return TrackedModes(**{**found, "kind": np.array(found["kind"], dtype=np.str_),
+                           "label": np.array(found["label"], dtype=np.int64),
+                           "shapes": stack(found["shapes"], found["position"].shape, complex)})
 
 
 def _gains(given: dict[str, Any]) -> dict[str, Any]:

@@ -1,6 +1,8 @@
 // The controller behind the plugin's C functions, so that Python drives what other hosts load.
 
+#include <dashpot/lcmtypes/plugin_publisher.h>
 #include <dashpot/controller/plugin/hosted_controller.hpp>
+#include <dashpot/controller/rotors.hpp>
 #include <dashpot/python/src/controller_results.hpp>
 
 #include <algorithm>
@@ -21,6 +23,19 @@ class Host {
   dashpot_controller* get() const { return controller_.get(); }
   std::size_t joints() const { return dashpot_joints(get()); }
 
+  /// Publishes every tick on buses, one URL a line, by a thread that needs no interpreter.
+  void publish(const std::string& urls) {
+    publisher_.reset();  // before another one reads the same results
+    publisher_.reset(dashpot_publisher_create(get(), urls.empty() ? nullptr : urls.c_str()));
+    if (!publisher_) throw std::invalid_argument(dashpot_publisher_error());
+  }
+  void stop_publishing() { publisher_.reset(); }
+  /// For reading results: a publisher is the only one that may.
+  dashpot_controller* readable() const {
+    if (publisher_) throw std::invalid_argument("publish: results are read by the publisher");
+    return get();
+  }
+
   std::mutex loop;   ///< of update, start and reset
   std::mutex other;  ///< of set_setpoint, set_gains, set_payload, ...
 
@@ -28,7 +43,11 @@ class Host {
   struct Destroy {
     void operator()(dashpot_controller* one) const { dashpot_destroy(one); }
   };
+  struct DestroyPublisher {
+    void operator()(dashpot_publisher* one) const { dashpot_publisher_destroy(one); }
+  };
   std::unique_ptr<dashpot_controller, Destroy> controller_;
+  std::unique_ptr<dashpot_publisher, DestroyPublisher> publisher_;
 };
 
 void check(std::int32_t code) {
@@ -223,6 +242,29 @@ double judge_gains(Host& host, const OptionalMatrix& position, const nb::dict& k
   return margin;
 }
 
+/// The modes at rest at a posture, where no loop has to run; the tip's Jacobian and place there.
+nb::tuple modes_at(Host& host, const Eigen::VectorXd& position, bool cartesian,
+                   const nb::dict& keys) {
+  analysis::check_size("q", position, static_cast<Eigen::Index>(host.joints()), 1);
+  const GainsData gains(host, keys);
+  dashpot_modes modes{};
+  dashpot_dynamics dynamics{};
+  modes.struct_size = sizeof modes;
+  dynamics.struct_size = sizeof dynamics;
+  {
+    const nb::gil_scoped_release release;
+    check(dashpot_analyze(host.get(), position.data(),
+                          cartesian ? DASHPOT_MODE_CARTESIAN : DASHPOT_MODE_JOINT, &gains.given,
+                          nullptr, &modes));
+    check(dashpot_evaluate(host.get(), position.data(), nullptr, &dynamics));
+  }
+  using Rows =
+      Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
+  return nb::make_tuple(to_dict(modes),
+                        Eigen::MatrixXd(Rows(dynamics.jacobian, 6, position.size())),
+                        Eigen::VectorXd(Eigen::Map<const Eigen::Vector3d>(dynamics.tip_position)));
+}
+
 std::string set_payload(Host& host, double mass, const Eigen::MatrixXd& center,
                         const Eigen::MatrixXd& inertia, const OptionalMatrix& tool,
                         const std::optional<nb::dict>& keys) {
@@ -258,6 +300,23 @@ void release(Host& host) {
   check(dashpot_release(host.get()));
 }
 
+/// What a host of a robot compares with the robot.
+nb::dict loop_of(const Host& host) {
+  const controller::Settings& settings = host.get()->settings;
+  const controller::Analysis::Sampled& sampled = settings.analysis.sampled;
+  nb::dict loop;
+  loop["gravity"] = settings.feed_forward.gravity;
+  loop["delay"] = sampled.delay;
+  loop["cutoff"] = sampled.cutoff;
+  loop["difference_velocity"] = sampled.difference_velocity;
+  loop["torque"] = Eigen::VectorXd(settings.limits.torque);
+  loop["torque_rate"] = Eigen::VectorXd(settings.limits.torque_rate);
+  loop["gain_margin"] = settings.limits.gain_margin;
+  loop["missing_rotors"] = controller::missing_rotors_text(host.get()->model);
+  loop["cartesian"] = settings.initial.mode == controller::Mode::kCartesian;
+  return loop;
+}
+
 }  // namespace
 
 void add_controller(nb::module_& m) {
@@ -283,14 +342,18 @@ void add_controller(nb::module_& m) {
            nb::arg("tip_pose").none(), nb::arg("wrench").none(), nb::arg("time").none())
       .def("set_gains", &set_gains, nb::arg("gains"))
       .def("judge_gains", &judge_gains, nb::arg("position").none(), nb::arg("gains"))
+      .def("modes_at", &modes_at, nb::arg("q"), nb::arg("cartesian"), nb::arg("gains"))
       .def("set_payload", &set_payload, nb::arg("mass"), nb::arg("center"), nb::arg("inertia"),
            nb::arg("tool").none(), nb::arg("gains").none())
       .def("limit_tip_speed", &limit_tip_speed, nb::arg("linear"), nb::arg("angular"),
            nb::arg("limit"))
       .def("release", &release)
-      .def("snapshot", [](const Host& host) { return snapshot_of(host.get()); })
-      .def("modes", [](const Host& host) { return modes_of(host.get()); })
-      .def("sampled_modes", [](const Host& host) { return sampled_modes_of(host.get()); });
+      .def("loop", &loop_of)
+      .def("publish", &Host::publish, nb::arg("urls"))
+      .def("stop_publishing", &Host::stop_publishing)
+      .def("snapshot", [](const Host& host) { return snapshot_of(host.readable()); })
+      .def("modes", [](const Host& host) { return modes_of(host.readable()); })
+      .def("sampled_modes", [](const Host& host) { return sampled_modes_of(host.readable()); });
 }
 
 }  // namespace dashpot::python

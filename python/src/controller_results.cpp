@@ -99,6 +99,10 @@ nb::object snapshot_of(dashpot_controller* controller) {
 nb::object modes_of(dashpot_controller* controller) {
   dashpot_modes found{};
   if (!read_result(controller, dashpot_read_modes, found)) return nb::none();
+  return to_dict(found);
+}
+
+nb::dict to_dict(const dashpot_modes& found) {
   const std::vector<dashpot_mode> modes = first(found.modes, found.count);
   const auto n = static_cast<Eigen::Index>(found.joints);
   nb::dict result = columns(modes);

@@ -304,3 +304,34 @@ def test_gains_may_come_from_another_thread(config):
         stop.set()
         thread.join()
     assert not problems
+
+
+def test_publishes_each_tick_on_every_bus(config, tmp_path):
+    controller = dashpot.Controller(config)
+    controller.start(HOME)
+    logs = tmp_path / "a.lcm", tmp_path / "b.lcm"
+    controller.publish(*(f"file://{log}?mode=w" for log in logs))
+    with pytest.raises(dashpot.Error, match="read by the publisher"):
+        controller.modes()
+    for tick in range(50):
+        controller.update(tick * controller.period, HOME, [0] * 7)
+    controller.stop_publishing()
+    assert controller.modes() is not None
+    for log in logs:
+        states = dashpot.read_log(log)["DASHPOT_STATE"]
+        assert states["tick"][-1] == 50
+        np.testing.assert_array_equal(states["joint_position"][-1], HOME)
+    with pytest.raises(dashpot.Error, match="nowhere"):
+        controller.publish("nowhere")
+
+
+def test_modes_at_a_posture_are_those_of_the_loop(config, panda):
+    controller = dashpot.Controller(config)
+    gains = {"joint_stiffness": [300] * 7, "joint_damping_ratio": 0.4}
+    found = controller.modes_at(HOME, "joint", **gains)
+    expected = dashpot.closed_loop(panda, HOME, **gains).modes
+    np.testing.assert_allclose(found.natural_frequency, expected.natural_frequency, rtol=1e-9)
+    np.testing.assert_allclose(found.damping_ratio, expected.damping_ratio, rtol=1e-9)
+    assert len(controller.modes_at(HOME)) == 7 and found.shapes.shape == (7, 7)
+    with pytest.raises(dashpot.Error, match="q: "):
+        controller.modes_at([0] * 6)

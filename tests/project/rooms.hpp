@@ -114,6 +114,8 @@ inline const std::vector<Room>& rooms() {
         "lcmt_panda_status"},
        snapshots},
 
+      {"hosts", 0, {}, {"dashpot/controller/plugin.h", "dashpot/lcmtypes/", "mujoco/"}},
+
       {"apps/cli", 0, {}, {""}},
       {"apps/analyze", 1, {}, {""}},
       {"apps/inspect", 1, {}, {""}},

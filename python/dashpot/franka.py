@@ -1,0 +1,331 @@
+"""Drives a Franka Research 3 through libfranka: python -m dashpot.franka CONFIG --robot ADDRESS.
+
+It needs the package pylibfranka, which has the maker's library inside. docs/franka.md says how to
+begin. `Session` does the same for a program of one's own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import math
+import os
+import re
+import signal
+import statistics
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from typing import Any, Sequence
+
+import numpy as np
+
+from ._controller import Controller, Setpoint, Status
+from ._core import Error
+from ._libfranka import (MODES, Answers, RobotStopped, Wire, advice, check_loop, exceptions,
+                         is_realtime, open_files, undisturbed)
+
+WATCH = 0.3  # s of states before the start
+FADE = 0.2  # s from the springs to no torque, at least
+REPEAT = 100  # ticks from one repetition of a set-point to the next
+TIP_TOLERANCE = 0.02  # m between the configuration's tip and the robot's end effector
+SILENCE = 1.0  # s without a state, after which the robot is given up
+PERIOD_TOLERANCE = 0.2  # of the period
+
+class Session:
+    """One loop with a robot. `run` blocks until its end; other threads may call the rest, and
+    `controller.set_gains`, `set_payload` and `limit_tip_speed`."""
+
+    def __init__(self, config: str | os.PathLike[str] | Mapping[str, Any], robot: str, *,
+                 dry_run: bool = False, urls: Sequence[str] = (), publish: bool = True) -> None:
+        """Reads the configuration, a path or a dict. `urls` are the buses and logs to publish on.
+        Raises Error that names what does not fit the robot's loop."""
+        self.controller = Controller(config)
+        self.robot = robot
+        self.dry_run = dry_run
+        self.running = False  # the loop has begun
+        self.answers = Answers()
+        self.statuses = [0] * len(Status)
+        self.faults = 0
+        self.fault = Status.OK  # that has latched; OK: none
+        self.states = self.lost = self.sent = self.waited = 0
+        self.period = 0.0
+        self.tip_distance = 0.0  # m, from the configuration's tip to the robot's end effector
+        self.success_rate = self.least_success_rate = 1.0
+        loop = check_loop(self.controller)
+        self._fade = max(FADE, float(np.max(loop["torque"] / loop["torque_rate"])))
+        self._fading: int | None = None  # since when, ns
+        self._urls = tuple(urls)
+        self._publish = publish
+        self._goal: Any = None  # parts of the set-point in force
+        self._news = False  # of it
+        self._stop: str | None = None
+        self._now = False
+        self._lock = threading.Lock()
+
+    def set_setpoint(self, setpoint: Setpoint | None = None, **parts: Any) -> None:
+        """Sets where the arm is to go: a Setpoint, or what makes one. It stays in force until the
+        next one, or a fault."""
+        wanted = Setpoint(**parts) if setpoint is None else setpoint
+        with self._lock:
+            self._goal, self._news = wanted._parts()[:4], True
+
+    def stop(self, why: str = "ended by the user", *, at_once: bool = False) -> None:
+        """Ends the loop: the torque fades first, unless it is to end at once."""
+        self._now = self._now or at_once
+        self._stop = self._stop or why
+
+    def run(self, duration: float | None = None) -> dict[str, Any]:
+        """Drives the robot until `stop`, or for `duration` seconds. Returns the report; its key
+        `failure` says why the robot, or what was found of it, ended the loop: None if nothing did."""
+        franka = importlib.import_module("pylibfranka")
+        before = open_files()
+        failure = None
+        ended = ""
+        wire = None
+        try:
+            realtime = is_realtime()
+            robot = franka.Robot(self.robot, franka.RealtimeConfig.kEnforce if realtime else
+                                 franka.RealtimeConfig.kIgnore)
+            wire = Wire(before)
+            self._watch(robot, wire)
+            if self._publish:
+                self.controller.publish(*self._urls)
+            with undisturbed():
+                ended = self._converse(franka, robot, wire, duration)
+        except (Error, RobotStopped) as error:
+            failure = str(error)
+        except exceptions(franka) as error:
+            failure = advice(str(error), self.robot)
+        finally:
+            self.controller.stop_publishing()
+            if wire is not None:
+                wire.close()
+        return self._report(ended or str(failure), failure)
+
+    def _read(self, robot: Any, wire: Wire, control: Any = None) -> Any:
+        """Returns the next state; None if there was none for 50 ms."""
+        if not wire.wait(0.05):
+            return None
+        return robot.read_once() if control is None else control.readOnce()[0]
+
+    def _watch(self, robot: Any, wire: Wire) -> None:
+        """Looks at states for a while, and raises Error or RobotStopped unless all is in order."""
+        times: list[float] = []
+        silent = time.monotonic()
+        while not times or times[-1] - times[0] < WATCH:
+            state = self._read(robot, wire)
+            if state is None:
+                if time.monotonic() - silent > SILENCE:
+                    raise RobotStopped("the robot sends no states")
+                continue
+            silent = time.monotonic()
+            times.append(state.time.to_sec())
+            self.waited += 1
+        self.period = statistics.median(b - a for a, b in zip(times, times[1:]))
+        if abs(self.period - self.controller.period) > PERIOD_TOLERANCE * self.controller.period:
+            raise Error(f"control.period: is {1e3 * self.controller.period:g} ms, but states come "
+                        f"every {1e3 * self.period:g} ms")
+        if not np.isfinite([state.q, state.dq]).all():
+            raise RobotStopped("the robot's positions or velocities are no numbers")
+        mode = state.robot_mode.name
+        if not self.dry_run and mode != "Idle":
+            raise RobotStopped(f"the robot is not ready (mode {mode}): " +
+                               MODES.get(mode, "see Desk").format(robot=self.robot))
+        self.controller.start(state.q)
+        place = self.controller._modes_at(state.q, None, {})[2]
+        self.tip_distance = float(np.linalg.norm(place - np.array(state.O_T_EE)[12:15]))
+        if self.tip_distance > TIP_TOLERANCE:
+            print(f"dashpot.franka: the configuration's tip is {1e3 * self.tip_distance:.0f} mm from the "
+                  "robot's end effector (O_T_EE): it has another tool, or is another arm",
+                  file=sys.stderr, flush=True)
+
+    def _converse(self, franka: Any, robot: Any, wire: Wire, duration: float | None) -> str:
+        """Answers states until it is to end. Returns why it ended."""
+        control = None if self.dry_run else robot.start_torque_control()
+        torques = franka.Torques([0.0] * 7)
+        update = self.controller._core.update
+        q, qd = np.zeros(7), np.zeros(7)
+        latched = int(Status.FAULT_LATCHED)
+        first = last = None  # states, s by the robot
+        silent = 0.0
+        while True:
+            state = self._read(robot, wire, control)
+            if state is None:
+                silent += 0.05
+                if silent > SILENCE:
+                    raise RobotStopped(f"no state for {SILENCE:g} s: the robot is off, or the "
+                                       "connection is lost")
+                if self._stop and (self.dry_run or self._now):
+                    return self._stop
+                continue
+            silent = 0.0
+            arrived = wire.arrived()
+            now = state.time.to_sec()
+            self.states += 1
+            if last is None:
+                first, self.running = now, True
+                print("watching; nothing is commanded" if self.dry_run else
+                      "the arm is held where it is", file=sys.stderr, flush=True)
+            else:
+                self.lost += max(0, round(1e3 * (now - last)) - 1)
+            last = now
+            if duration is not None and now - float(first or 0) >= duration:
+                self.stop("ended after its time")
+            q[:], qd[:] = state.q, state.dq
+            ns = 1_000_000 * round(1e3 * now)
+            torque, status = update(ns, q, qd, self._setpoint(ns), None)
+            self.statuses[status] += 1
+            if status >= latched or self.fault:
+                self._note_fault(status)
+            if control is None:
+                if self._stop:
+                    return self._stop
+                continue
+            self._write(control, torques, torque.tolist(), ns)
+            self.answers.add(time.time_ns() - arrived)
+            self._note_rate(state.control_command_success_rate)
+            if torques.motion_finished:
+                return str(self._stop)
+
+    def _write(self, control: Any, torques: Any, values: list[float], ns: int) -> None:
+        """Sends torques, which fade from the first state at which the loop is to end."""
+        if self._stop:
+            if self._fading is None:
+                self._fading = ns
+            left = 0.0 if self._now else max(0.0, 1 - (ns - self._fading) / (1e9 * self._fade))
+            values = [left * value for value in values]
+            torques.motion_finished = left == 0
+        torques.tau_J = values
+        control.writeOnce(torques)
+        self.sent += 1
+
+    def _note_rate(self, rate: float) -> None:
+        self.success_rate = rate
+        if rate < self.least_success_rate and self.sent > REPEAT:  # zero before it has counted
+            self.least_success_rate = rate
+
+    def _setpoint(self, ns: int) -> Any:
+        """The set-point for the tick at `ns`, as the core takes it; None keeps the one in force."""
+        if not self._news and (self._goal is None or self.states % REPEAT):
+            return None
+        with self._lock:
+            self._news = False
+            return None if self._goal is None else (*self._goal, ns)
+
+    def _note_fault(self, status: int) -> None:
+        if status < Status.FAULT_LATCHED:
+            self.fault = Status.OK
+            return
+        if self.fault == Status.OK:
+            self.fault = Status(status)
+            self.faults += 1
+            with self._lock:
+                self._goal, self._news = None, False
+            if not self.dry_run:
+                print(f"dashpot.franka: a fault, the arm is damped: {self.fault.text}",
+                      file=sys.stderr, flush=True)
+        if self.dry_run:  # somebody else moves the arm as he likes: that is no fault of this loop
+            self.controller.release()
+
+    def _report(self, ended: str, failure: str | None) -> dict[str, Any]:
+        found = self.controller.modes() if self.running else None
+        snapshot = self.controller.snapshot() if self.running else None
+        return {
+            "driver": "libfranka", "robot": self.robot, "dry_run": self.dry_run,
+            "running": self.running, "ended": ended, "failure": failure, "period": self.period,
+            "tip_distance": self.tip_distance,
+            "states": {"received": self.states, "awaited": self.waited, "lost": self.lost},
+            "commands_sent": self.sent,
+            "success_rate": {"last": self.success_rate, "least": self.least_success_rate},
+            "latency": self.answers.summary(), "ticks": sum(self.statuses),
+            "restarts": 0 if snapshot is None else snapshot.restarts, "faults": self.faults,
+            "fault": None if self.fault == Status.OK else self.fault.text,
+            "tick_statuses": {Status(k).text: n for k, n in enumerate(self.statuses) if n},
+            "modes": [] if found is None else
+            [{"natural_frequency": omega, "damping_ratio": zeta} for omega, zeta in
+             zip(found.natural_frequency.tolist(), found.damping_ratio.tolist())]}
+
+
+def to_table(report: Mapping[str, Any]) -> str:
+    """Returns the report as text."""
+    lines = [f"libfranka, {report['robot']}" + (", dry run: nothing was commanded"
+                                                if report["dry_run"] else ""),
+             report["ended"]]
+    if not report["running"]:
+        return "\n  ".join([*lines, "the loop did not begin"])
+    states, took = report["states"], report["latency"]
+    lines.append(f"states: {states['received']}; periods without one {states['lost']}; "
+                 f"commands sent: {report['commands_sent']}")
+    if report["commands_sent"]:
+        rate = report["success_rate"]
+        lines.append(f"answers in time by the robot's count: {100 * rate['last']:.4g} %, at the least "
+                     f"{100 * rate['least']:.4g} %")
+        lines.append("from state to answer: " + ", ".join(
+            f"{name} {1e6 * took[key]:.0f} us" for name, key in
+            (("median", "median"), ("99 %", "p99"), ("99.9 %", "p999"), ("longest", "longest"))))
+    lines.append(f"ticks: {report['ticks']}; springs restarted {report['restarts']} times, faults "
+                 f"{report['faults']}")
+    lines += [f"  {count} x {name}" for name, count in report["tick_statuses"].items()]
+    if report["modes"]:
+        lines.append("modes, rad/s (ratio): " + " ".join(
+            f"{mode['natural_frequency']:.4g} ({mode['damping_ratio']:.3g})"
+            for mode in report["modes"]))
+    if report["fault"]:
+        lines.append(f"fault: {report['fault']}")
+    return "\n  ".join(lines)
+
+
+def _seconds(text: str) -> float:
+    match = re.fullmatch(r"([0-9.eE+-]+) ?s?", text)
+    try:
+        value = float(match.group(1)) if match else math.nan
+    except ValueError:
+        value = math.nan
+    if not 1e-3 <= value <= 1e7:
+        raise argparse.ArgumentTypeError("a time from 1e-3 to 1e7 s")
+    return value
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The program. Returns its exit status: 2 for input that is refused, 1 for a robot that stops."""
+    parser = argparse.ArgumentParser(
+        prog="python -m dashpot.franka", description=str(__doc__).split(":")[0] + ".",
+        epilog="Read docs/franka.md first; begin with --dry-run. Ctrl-C ends it: the torque fades; the "
+        "second one ends it at once.")
+    parser.add_argument("config", metavar="CONFIG", help="configuration file of the controller")
+    parser.add_argument("--robot", metavar="ADDRESS", required=True, help="of the robot")
+    parser.add_argument("--dry-run", action="store_true",
+                        help="computes and publishes everything, and commands nothing")
+    parser.add_argument("--lcm-url", metavar="URL", default="", help="bus; otherwise that of "
+                        "LCM_DEFAULT_URL, or multicast within this machine")
+    parser.add_argument("--log", metavar="FILE", help="LCM log to write")
+    parser.add_argument("--duration", metavar="S", type=_seconds, help="ends after this time")
+    parser.add_argument("--json", action="store_true", help="ends with JSON instead of a table")
+    options = parser.parse_args(arguments)
+    urls = [options.lcm_url] + ([f"file://{options.log}?mode=w"] if options.log else [])
+    try:
+        importlib.import_module("pylibfranka")
+    except ImportError as error:
+        print(f"dashpot.franka: {error}: pip install pylibfranka", file=sys.stderr)
+        return 1
+    try:
+        session = Session(options.config, options.robot, dry_run=options.dry_run, urls=urls)
+    except Error as error:
+        print(f"dashpot.franka: {error}", file=sys.stderr)
+        return 2
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda *_: session.stop(at_once=session._stop is not None))
+    report = session.run(options.duration)
+    print(json.dumps({"config": options.config, **report}, indent=2) if options.json else
+          to_table(report))
+    if report["failure"] is None:
+        return 0
+    print(f"dashpot.franka: {report['failure']}", file=sys.stderr)
+    return 1 if report["running"] else 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())
