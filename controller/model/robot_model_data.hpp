@@ -15,6 +15,7 @@ struct RobotModel::Data {
   KDL::RigidBodyInertia last_body;  ///< of the last joint, without what is attached
   KDL::Frame tip_link;              ///< in the last joint's segment
   Attachment attachment;
+  PositionSensor position_sensor = PositionSensor::kMotor;
 
   /// Puts what is attached into the chain's last two segments.
   void attach(const Attachment& given);
