@@ -23,6 +23,8 @@ sim::RobotParameters believed(const controller::Config& config) {
   parameters.reflected_inertia = config.model.joint_values(&Joint::reflected_inertia);
   parameters.viscous_friction = config.model.joint_values(&Joint::viscous_friction);
   parameters.coulomb_friction = config.model.joint_values(&Joint::coulomb_friction);
+  parameters.gear_stiffness = config.model.joint_values(&Joint::gear_stiffness);
+  parameters.gear_damping = config.model.joint_values(&Joint::gear_damping);
   parameters.gravity = options.gravity;
   parameters.accept_inertias = true;  // the controller's model has judged them
   parameters.payload = {options.payload.mass, options.payload.center, options.payload.inertia};
@@ -52,6 +54,9 @@ void read_arm(const YamlNode& document, const std::filesystem::path& directory, 
   const controller::RobotDescription robot = config.robot;
   const Units positions = controller::joint_units(config.model, "rad", "m");
   ArmSimulation simulation{believed(config), {}};
+  if (config.model.position_sensor() == controller::PositionSensor::kLink) {
+    simulation.options.position_sensor = sim::PositionSensor::kLink;
+  }
   scene.plant.period = config.settings.period;
   scene.commands = command_limits(root, config);
   read_simulation(root, positions, scene.plant, &simulation);

@@ -232,6 +232,22 @@ TEST(Run, SimulatesGearsThatBend) {
     EXPECT_GT(energy["initial"]["springs"].get<double>(), 0.05);
   }
   EXPECT_EQ(rigid["gear_heat"], 0);
+  // What the controller is told is true, unless the simulation knows better.
+  const auto told = [&](const std::string& gears, const std::string& simulated) {
+    const std::string file = changed(
+        scratch, "iiwa14",
+        {{"tip: iiwa_link_ee_kuka", "tip: iiwa_link_ee_kuka\n  reflected_inertia: 0.4\n  " + gears},
+         {"simulation:\n", "simulation:\n  robot: {" + simulated + "}\n"},
+         {"sensors: {position_resolution: 5e-6 rad, difference_velocity: true}", "seed: 2"}});
+    return run_json(file, {"--duration", "0.1"})["energy"]["initial"];
+  };
+  const std::string keys =
+      "gear_stiffness: [none, 2e4, 2e4, 1e4, 1e4, 1e4, 1e4]\n  "
+      "gear_damping: 40\n  position_sensor: ";
+  EXPECT_EQ(told(keys + "link", "")["springs"], link["initial"]["springs"]);
+  EXPECT_EQ(told(keys + "motor", "")["springs"], motor["initial"]["springs"]);
+  EXPECT_EQ(told(keys + "link", "position_sensor: motor")["springs"], motor["initial"]["springs"]);
+  EXPECT_EQ(told(keys + "link", "gear_stiffness: none")["springs"], 0);
   const auto height = [](const Json& energy) { return energy["initial"]["gravity"].get<double>(); };
   EXPECT_NEAR(height(link), height(rigid), 1e-12);
   EXPECT_LT(height(motor), height(rigid) - 0.1);
