@@ -4,6 +4,7 @@
 #include <dashpot/tests/sim/chains.hpp>
 #include <dashpot/tests/sim/scenes.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/elastic_loop.hpp>
 #include <dashpot/tests/support/released_arm.hpp>
 
 #include <gtest/gtest.h>
@@ -221,38 +222,11 @@ struct TickMap {
   bool mixed;  ///< every third gear is rigid
 
   static constexpr double kPeriod = 0.001;
-  static constexpr double kRate = 1000;  // that rates are divided by, 1/s
 
   RobotParameters parameters(Eigen::Index n) const {
     RobotParameters parameters = gears(n, stiffness, 0.002 * stiffness / 100);
     for (Eigen::Index i = 0; mixed && i < n; i += 3) parameters.gear_stiffness[i] = kRigid;
     return parameters;
-  }
-
-  /// Of the simulated arm, by central differences about where it rests.
-  MatrixXd simulated(const JointVector& q0, const JointVector& weight, const MatrixXd& K_p,
-                     const MatrixXd& K_d) const {
-    ArmOptions options;
-    options.position_sensor = sensor;
-    Arm arm(
-        Robot::from_file(testing::arm_path(file.file), file.base, file.tip, parameters(q0.size())),
-        options);
-    const Eigen::Index N = arm.coordinates();
-    const VectorXd rest = Plant(arm, precise(kPeriod), q0).state().head(2 * N);
-    const auto next = [&](const VectorXd& x) {
-      Plant plant(arm, precise(kPeriod), x.head(N), x.tail(N));
-      const Measurement& seen = plant.measured();
-      const JointVector u = weight - K_p * (seen.position - q0) - K_d * seen.velocity;
-      EXPECT_EQ(plant.step(u), Status::kOk);
-      return VectorXd(plant.state().head(2 * N));
-    };
-    MatrixXd map(2 * N, 2 * N);
-    for (Eigen::Index j = 0; j < 2 * N; ++j) {
-      const double h = j < N ? 1e-6 : 1e-6 * kRate;
-      const VectorXd step = h * VectorXd::Unit(2 * N, j);
-      map.col(j) = (next(rest + step) - next(rest - step)) / (2 * h);
-    }
-    return scaled(map);
   }
 
   /// Of the linear equations, with M and dg/dq of the controller's model at the links' q.
@@ -304,14 +278,11 @@ struct TickMap {
     if (sensor == PositionSensor::kMotor) show.rightCols(e) = S.transpose();
     MatrixXd feedback(n, 2 * N);
     feedback << -K_p * show, -K_d * show;
-    return scaled(step.topLeftCorner(2 * N, 2 * N) + step.topRightCorner(2 * N, n) * feedback);
-  }
-
-  static MatrixXd scaled(const MatrixXd& map) {
-    const Eigen::Index N = map.rows() / 2;
     VectorXd scale = VectorXd::Ones(2 * N);
-    scale.tail(N).setConstant(1 / kRate);
-    return scale.asDiagonal() * map * scale.cwiseInverse().asDiagonal();
+    scale.tail(N).setConstant(1 / testing::ArmMap::kRate);
+    return scale.asDiagonal() *
+           (step.topLeftCorner(2 * N, 2 * N) + step.topRightCorner(2 * N, n) * feedback) *
+           scale.cwiseInverse().asDiagonal();
   }
 };
 
@@ -320,8 +291,7 @@ TEST(ElasticLoop, IsThatOfItsLinearEquations) {
   double worst = 0, worst_frequency = 0;
   int loops = 0, unstable = 0;
   for (const testing::Arm& file : testing::arms()) {
-    controller::ModelOptions no_drives;
-    const controller::RobotModel model = testing::arm_model(file, no_drives);
+    const controller::RobotModel model = testing::arm_model(file);
     const testing::TwinModels twin(file);
     const Eigen::Index n = model.dof();
     for (int seed = 1; seed <= 8; ++seed) {
@@ -330,16 +300,18 @@ TEST(ElasticLoop, IsThatOfItsLinearEquations) {
                          random.log_uniform(5e3, 1e5), seed % 4 == 3};
       const JointVector q0 = random_posture(twin, random);
       const MatrixXd K_p = 300 * random.spd(n), K_d = 10 * random.spd(n);
-      // Where the links rest, which carry the weight by the gears.
       ArmOptions options;
       options.position_sensor = loop.sensor;
       Arm arm(
           Robot::from_file(testing::arm_path(file.file), file.base, file.tip, loop.parameters(n)),
           options);
-      const JointVector q = Plant(arm, {}, q0).position();
-      const JointVector weight = controller::evaluate(model, q, JointVector::Zero(n)).gravity;
-      const MatrixXd seen = loop.simulated(q0, weight, K_p, K_d);
-      const MatrixXd meant = loop.expected(model, q, K_p, K_d);
+      const testing::ArmMap map(arm, q0, TickMap::kPeriod, [&](const JointVector& q) {
+        return controller::evaluate(model, q, JointVector::Zero(n)).gravity;
+      });
+      MatrixXd law(n, 2 * n);
+      law << -K_p, -K_d;
+      const MatrixXd seen = map.closed(law, TickMap::kPeriod, 0, 0);
+      const MatrixXd meant = loop.expected(model, map.rest, K_p, K_d);
       ASSERT_EQ(seen.rows(), meant.rows());
       const double off = (seen - meant).cwiseAbs().maxCoeff();
       EXPECT_LT(off, 1e-6) << file << ", " << loop.stiffness << " N m/rad, seed " << seed;
