@@ -15,10 +15,9 @@
 #include <stdexcept>
 #include <string>
 
+namespace dashpot::stress {
 namespace {
 
-using namespace dashpot;          // NOLINT(google-build-using-namespace)
-using namespace dashpot::stress;  // NOLINT(google-build-using-namespace)
 using controller::JointVector;
 using controller::Mode;
 using Eigen::MatrixXd;
@@ -290,3 +289,4 @@ const AddPart part({"elastic",
                     {"SEED"}});
 
 }  // namespace
+}  // namespace dashpot::stress
