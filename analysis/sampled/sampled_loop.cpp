@@ -20,7 +20,7 @@ using Eigen::VectorXcd;
 
 /// An eigenvalue (per tick) of a mode after the loop's delays, to first order: the Newton step from
 /// the continuous one to a zero of
-///     lambda^2 + lambda D + G + h(lambda) (K - G + lambda e^(-lambda/2 if differenced) (C - D)
+///     lambda^2 + lambda D + G + h(lambda) (K - P - H + lambda e^(-lambda/2 if differenced) (C - D)
 ///         + output (e^lambda - state)^-1 position),
 /// h = e^(-lambda (d + 1/2)) times the filter.
 Complex delayed(const SampledDataModel& loop, Complex lambda, const VectorXcd& u,
@@ -32,7 +32,7 @@ Complex delayed(const SampledDataModel& loop, Complex lambda, const VectorXcd& u
     return (y.transpose() * A.cast<Complex>() * u).value();
   };
   const Complex product = (y.transpose() * u).value();
-  Complex sprung = form(loop.K - loop.G);
+  Complex sprung = form(loop.K - loop.P - loop.H);
   const ControllerMemory& states = loop.states;
   if (const Index m = states.state.rows(); m > 0) {
     const Eigen::MatrixXcd step = std::exp(lambda) * MatrixXd::Identity(m, m) - states.state;
@@ -180,6 +180,10 @@ std::vector<Wanted> list_wanted(const System<N>& system, const Spectrum<N>& spec
 template <int N>
 SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum,
                             const SampledLoop& loop) {
+  if (loop.gears.any()) {
+    const GearedLoop geared(system, loop);
+    return sample_loop(geared.system, geared.spectrum, geared.loop);
+  }
   const SampledDataModel unit(system, spectrum, loop);
   const VectorXcd z = unit.discrete_eigenvalues();
   std::vector<Wanted> wanted = list_wanted(system, spectrum, unit, loop.period);

@@ -26,6 +26,7 @@ using controller::RobotModel;
 struct InspectOptions {
   std::string urdf, base, tip;
   std::string q, qd, gravity, reflected_inertia, drives;
+  GearOptions gears;
   bool exclude_off_chain = false;
   bool accept_inertias = false;
   bool json = false;
@@ -47,12 +48,15 @@ RobotModel read_model(const InspectOptions& options) {
   }
   take_drives(options.drives, model);
   try {
-    if (!options.reflected_inertia.empty()) {
+    if (!options.reflected_inertia.empty() || options.gears.any()) {
       const RobotModel plain =
           RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
-      model.reflected_inertia =
-          quantities_per_joint("--reflected-inertia", options.reflected_inertia,
-                               controller::joint_units(plain, "kg m^2", "kg"));
+      if (!options.reflected_inertia.empty()) {
+        model.reflected_inertia =
+            quantities_per_joint("--reflected-inertia", options.reflected_inertia,
+                                 controller::joint_units(plain, "kg m^2", "kg"));
+      }
+      take_gears(options.gears, plain, model);
     }
     return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
   } catch (const controller::InvalidModel& error) {
@@ -86,6 +90,10 @@ nlohmann::ordered_json json_joints(const RobotModel& model) {
                     {"velocity", limit(joint.velocity)},
                     {"effort", limit(joint.effort)},
                     {"reflected_inertia", joint.reflected_inertia}});
+    if (joint.elastic()) {
+      list.back()["gear_stiffness"] = joint.gear_stiffness;
+      list.back()["gear_damping"] = joint.gear_damping;
+    }
   }
   return list;
 }
@@ -128,6 +136,10 @@ std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics
   add("velocity", "limit", model.joint_values(&Joint::velocity));
   add("effort", "limit", model.joint_values(&Joint::effort));
   add("reflected", "inertia", model.joint_values(&Joint::reflected_inertia));
+  if (model.elastic_joints() > 0) {
+    add("gear", "stiffness", model.joint_values(&Joint::gear_stiffness));
+    add("gear", "damping", model.joint_values(&Joint::gear_damping));
+  }
   add("", "q", q);
   add("", "qd", qd);
   add("Coriolis", "torque", dynamics.coriolis);
@@ -257,6 +269,7 @@ void add_inspect(CLI::App& program) {
       "Of rotors and gears at the joints, kg m^2 or kg; one number is that of all joints",
       "a,b,... (0)");
   add("--drives", &InspectOptions::drives, kDrivesHelp, "NAME")->check(not_empty());
+  add_gear_options(*command, options->gears);
   command->add_flag("--exclude-off-chain", options->exclude_off_chain,
                     "Leave out links that hang off the chain");
   command->add_flag("--accept-inertias", options->accept_inertias,

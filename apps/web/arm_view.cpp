@@ -56,7 +56,7 @@ analysis::System<> loop_at(const controller::Config& config, const Eigen::Vector
   }
   analysis::System<controller::kMaxJoints> system;
   controller.closed_loop(system);
-  analysis::System<> result(q.size());
+  analysis::System<> result(system.dof());
   result.mass = system.mass;
   result.damping = system.damping;
   result.stiffness = system.stiffness;

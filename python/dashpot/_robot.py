@@ -40,6 +40,10 @@ class Robot:
     """n, N m."""
     reflected_inertia: Array
     """n, of rotors and gears, kg m^2."""
+    gear_stiffness: Array
+    """n, N m/rad; infinite where the gear does not bend."""
+    gear_damping: Array
+    """n, N m s/rad, beside gear_stiffness."""
 
     def __init__(self, urdf: str, base: str, tip: str, *, file: str = "URDF",
                  **options: Any) -> None:
@@ -57,7 +61,10 @@ class Robot:
                   accept_inertias: bool = False, drives: str = "", drives_friction: bool = False,
                   reflected_inertia: npt.ArrayLike | None = None,
                   viscous_friction: npt.ArrayLike | None = None,
-                  coulomb_friction: npt.ArrayLike | None = None, payload_mass: float = 0,
+                  coulomb_friction: npt.ArrayLike | None = None,
+                  gear_stiffness: npt.ArrayLike | None = None,
+                  gear_damping: npt.ArrayLike | None = None, position_sensor: str = "motor",
+                  payload_mass: float = 0,
                   payload_center: npt.ArrayLike = (0, 0, 0),
                   payload_inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)),
                   tool: npt.ArrayLike | None = None) -> Robot:
@@ -69,7 +76,10 @@ class Robot:
         `drives` names public figures of reflected inertia, see published_drives, whose friction
         takes the place of the URDF's with `drives_friction`.
         `reflected_inertia` (n, kg m^2), `viscous_friction` (n, N m s/rad) and `coulomb_friction`
-        (n, N m) replace these and the URDF's. A payload at the tip has `payload_mass` (kg), `payload_center`
+        (n, N m) replace these and the URDF's. Gears bend with `gear_stiffness` (n, N m/rad,
+        numpy.inf: rigid) and `gear_damping` (n, N m s/rad) between a motor that has the reflected
+        inertia and its link; `position_sensor` (motor or link) says which of the two is measured.
+        A payload at the tip has `payload_mass` (kg), `payload_center`
         (3, m, in the tip link) and `payload_inertia` (3 x 3, kg m^2, about that centre). `tool` is
         the pose (4 x 4) of the tool's frame in the tip link; the tip is then this frame.
 
@@ -83,11 +93,14 @@ class Robot:
                                                              (3, 3))}
         if drives or drives_friction:
             options["drives"], options["drives_friction"] = drives, drives_friction
+        if position_sensor != "motor":
+            options["position_sensor"] = position_sensor
         if gravity is not None:
             options["gravity"] = _sized("gravity", gravity, (3,))
         for name, values in (("reflected_inertia", reflected_inertia),
                              ("viscous_friction", viscous_friction),
-                             ("coulomb_friction", coulomb_friction)):
+                             ("coulomb_friction", coulomb_friction),
+                             ("gear_stiffness", gear_stiffness), ("gear_damping", gear_damping)):
             if values is not None:
                 options[name] = to_numbers(name, values, 1)
         if tool is not None:
