@@ -251,9 +251,9 @@ VectorXcd SampledDataModel::discrete_eigenvalues() const {
   MatrixXd A = on_other_motions(transition());
   const VectorXcd z = eigenvalues_of(A);
   // Where nothing is commanded, a delay and a filter do by themselves.
-  const Index idle = n - commands.cols(), filters = filtered() ? idle : 0;
-  VectorXcd all(z.size() + idle * delay + filters);
-  all << z, VectorXcd::Zero(idle * delay), VectorXcd::Constant(filters, 1 - filter_gain);
+  const Index filters = filtered() ? n - commands.cols() : 0;
+  VectorXcd all(z.size() + idle());
+  all << z, VectorXcd::Zero(idle() - filters), VectorXcd::Constant(filters, 1 - filter_gain);
   return all;
 }
 

@@ -39,6 +39,9 @@ struct SampledDataModel {
     return commands.cols() * (delay + (filtered() ? 1 : 0)) + (difference ? n : 0) +
            states.state.rows();
   }
+  /// Returns how many of discrete_eigenvalues(), the last ones, are those of the delay and filter
+  /// of commands that are always zero.
+  Eigen::Index idle() const { return (n - commands.cols()) * (delay + (filtered() ? 1 : 0)); }
   Eigen::Index rows() const { return 2 * n + memory(); }
   /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f], [w]), u and f by their coordinates
   /// in `commands`, with `factor` times K - P, C - D and the output of w; see sample_loop.
