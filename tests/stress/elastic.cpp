@@ -1,5 +1,6 @@
-// Arms with gears of typical elasticity under default gains: at hundreds of postures the loop is
-// calm, or the gains are refused before the first torque; and the brake stops such arms.
+// Arms with gears of typical elasticity under default gains: at hundreds of
+// postures the loop is calm, or the gains are refused before the first torque;
+// and the brake stops such arms.
 #include <dashpot/controller/config.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -7,6 +8,7 @@
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/support/dice.hpp>
 #include <dashpot/tests/support/elastic_loop.hpp>
+#include <dashpot/tests/support/elastic_prediction.hpp>
 #include <dashpot/tests/support/places.hpp>
 
 #include <algorithm>
@@ -42,11 +44,13 @@ constexpr ElasticArm kElasticArms[] = {
     {"baxter_left", "left_arm_mount", "left_gripper"},
 };
 
-constexpr double kShoulder = 1e4, kWrist = 5e3;  // N m/rad, typical of light arms
-constexpr double kRotor = 0.1;                   // kg m^2, where no figure is published
-constexpr double kGearRatio = 0.01;              // damping of gear and rotor alone
+constexpr double kShoulder = 1e4,
+                 kWrist = 5e3;       // N m/rad, typical of light arms
+constexpr double kRotor = 0.1;       // kg m^2, where no figure is published
+constexpr double kGearRatio = 0.01;  // damping of gear and rotor alone
 
-/// An arm with gears, as the controller believes it to be and as it is simulated.
+/// An arm with gears, as the controller believes it to be and as it is
+/// simulated.
 struct Gears {
   controller::RobotModel model;
   sim::Robot robot;
@@ -117,8 +121,9 @@ double growth_of(const Gears& gears, const controller::Settings& settings,
   return testing::spectral_radius(map.closed(F, settings.period, 0, 0), settings.period);
 }
 
-/// One arm and sensor: how many postures the judge refuses, and in how many others a motion grows,
-/// in either mode. Where the drives cannot hold the weight, there is no posture.
+/// One arm and sensor: how many postures the judge refuses, and in how many
+/// others a motion grows, in either mode. Where the drives cannot hold the
+/// weight, there is no posture.
 Calm calm_of(const ElasticArm& arm, controller::PositionSensor sensor, long postures,
              std::uint64_t seed) {
   const Gears gears(arm, sensor);
@@ -165,7 +170,8 @@ constexpr controller::PositionSensor kSides[] = {controller::PositionSensor::kMo
 
 void print_gears() {
   std::printf(
-      "gears of %.0e N m/rad, %.0e in the last three joints, ratio %.2f; published rotors or %.1f "
+      "gears of %.0e N m/rad, %.0e in the last three joints, ratio "
+      "%.2f; published rotors or %.1f "
       "kg "
       "m^2\n\n",
       kShoulder, kWrist, kGearRatio, kRotor);
@@ -205,7 +211,8 @@ struct Stop {
   controller::Status status = controller::Status::kOk;
 };
 
-/// Joint 1 at 0.9 of its velocity limit, in the middle of the others' ranges; a gap of 20 ms.
+/// Joint 1 at 0.9 of its velocity limit, in the middle of the others' ranges; a
+/// gap of 20 ms.
 Stop stop_of(const Gears& gears, double stopping_time) {
   constexpr int kTicks = 1500;
   controller::Settings settings = controller::default_settings(gears.model);
@@ -252,7 +259,8 @@ bool stop_all(const Request& request) {
   constexpr double kStill = 0.05;
   print_gears();
   std::printf(
-      "joint 1 at 0.9 of its velocity limit, a gap, a tick of delay\n%-12s %-6s %6s %7s %8s "
+      "joint 1 at 0.9 of its velocity limit, a gap, a tick of "
+      "delay\n%-12s %-6s %6s %7s %8s "
       "%9s %9s  %s\n",
       "arm", "sensor", "T, s", "tenth, s", "way, deg", "after 0.1", "at last", "status");
   int chatter = 0;
@@ -274,16 +282,54 @@ bool stop_all(const Request& request) {
   return chatter == 0;
 }
 
+bool predict(const Request& request) {
+  testing::ElasticDifference worst;
+  long bounded = 0, unstable = 0, links = 0, off = 0;
+  for (long k = 0; k < request.whole(); ++k) {
+    const std::uint64_t seed = request.seed + static_cast<std::uint64_t>(k);
+    testing::DrawnElasticLoop loop(seed);
+    const testing::ElasticDifference seen = loop.compare();
+    const bool holds = seen.status == controller::Status::kOk && seen.frequency < 1e-4 &&
+                       seen.ratio < 1e-3 && seen.margin < 1e-3;
+    if (!holds) {
+      ++off;
+      std::printf(
+          "seed %llu: %s, frequency off by %.1e, ratio by %.1e, margin "
+          "by %.1e; %s\n",
+          static_cast<unsigned long long>(seed), loop.link() ? "link" : "motor", seen.frequency,
+          seen.ratio, seen.margin, to_text(seen.status));
+    }
+    worst.frequency = std::max(worst.frequency, seen.frequency);
+    worst.ratio = std::max(worst.ratio, seen.ratio);
+    worst.margin = std::max(worst.margin, seen.margin);
+    worst.modes += seen.modes;
+    bounded += seen.bounded ? 1 : 0;
+    unstable += seen.stable ? 0 : 1;
+    links += loop.link() ? 1 : 0;
+  }
+  std::printf(
+      "%d modes of %ld loops from seed %llu, %ld measured at the link, "
+      "%ld unstable:\n"
+      "frequency within %.1e, ratio within %.1e, %ld margins within "
+      "%.1e; %ld loops are off\n",
+      worst.modes, request.whole(), static_cast<unsigned long long>(request.seed), links, unstable,
+      worst.frequency, worst.ratio, bounded, worst.margin, off);
+  return off == 0;
+}
+
 bool run(const Request& request) {
+  if (request.kind == "modes") return predict(request);
   return request.kind == "calm" ? stay_calm(request) : stop_all(request);
 }
 
 const AddPart part({"elastic",
                     0,
-                    "Arms whose gears bend: calm at every posture with default gains, or refused; "
+                    "Arms whose gears bend: calm at every posture with default gains, or "
+                    "refused; "
                     "and stopped by the brake",
-                    "POSTURES",
-                    {{500, 3, "calm", "default gains, at so many postures of each arm"},
+                    "COUNT",
+                    {{400, 12, "modes", "predicted modes and margins of so many loops, simulated"},
+                     {500, 3, "calm", "default gains, at so many postures of each arm"},
                      {1, 1, "stop", "the brake, from 0.9 of a velocity limit"}},
                     run,
                     {"SEED"}});
