@@ -4,6 +4,7 @@
 #include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 #include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/count_allocations.hpp>
 #include <dashpot/tests/support/led_arm.hpp>
 #include <dashpot/tests/support/random.hpp>
 
@@ -124,7 +125,9 @@ TEST(ElasticJoints, HaveTheModesOfTheTextbookAtEveryTick) {
         }
         for (int k = 1; k <= 300; ++k) {
           led.swing(1e-3 * k);
-          ASSERT_LE(led.tick(), Status::kTorqueLimited);
+          Status status = Status::kOk;
+          ASSERT_EQ(testing::allocations_of([&] { status = led.tick(); }), 0);
+          ASSERT_LE(status, Status::kTorqueLimited);
           const Vibration& modes = led.modes();
           if (modes.status == analysis::Status::kUnfinished) continue;  // another thread is at work
           ASSERT_EQ(modes.status, analysis::Status::kOk) << k;
