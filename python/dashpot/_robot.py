@@ -205,14 +205,16 @@ def is_cartesian(mode: str) -> bool:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ClosedLoop(Result):
-    """The robot with springs and dampers, M q'' + C q' + K q = f, where its springs are at rest."""
+    """The robot with springs and dampers, M q'' + C q' + K q = f, where its springs are at rest. With
+    gears that bend n counts their motors as well, after the joints."""
 
     mass: Array
     """M, n x n, kg m^2."""
     damping: Array
     """C, n x n, N m s/rad, the joints' viscous friction included."""
     stiffness: Array
-    """K, n x n, N m/rad; not symmetric with an external wrench."""
+    """K, n x n, N m/rad; not symmetric with an external wrench, or where gears bend and links are
+    measured."""
     modes: Modes
 
 

@@ -16,9 +16,9 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNoBend = std::numeric_limits<double>::infinity();
 
-Gears::Data two_gears() {
+Gears::Data gears_of_two() {
   return {VectorXd::Constant(2, 2000), VectorXd::Constant(2, 2), VectorXd::Constant(2, 0.4),
           MatrixXd(VectorXd::Constant(2, 0.5).asDiagonal()), false};
 }
@@ -32,7 +32,7 @@ TEST(Gears, NameTheNumberOfJointsThatCanBeElastic) {
     EXPECT_STREQ(error.what(), "gears: 10 joints, of which at most 6 can be elastic");
   }
   Gears::Data some = many;
-  some.stiffness.head(4).setConstant(kInfinity);
+  some.stiffness.head(4).setConstant(kNoBend);
   EXPECT_EQ(Gears(some).coordinates(), 16);
   some.inertia[9] = 0;
   EXPECT_THROW(Gears{some}, std::invalid_argument);
@@ -44,24 +44,24 @@ TEST(Gears, NameTheNumberOfJointsThatCanBeElastic) {
 }
 
 TEST(Gears, AreNoneWhereAllAreRigid) {
-  Gears::Data data = two_gears();
-  data.stiffness.setConstant(kInfinity);
+  Gears::Data data = gears_of_two();
+  data.stiffness.setConstant(kNoBend);
   EXPECT_FALSE(Gears(data).any());
   EXPECT_FALSE(Gears().any());
 }
 
 /// Two joints with springs, undamped, and what the loop is.
-struct Case {
+struct GearedJoints {
   TaskImpedance impedance;
   LoopLimit limit;
 };
 
-Case springs(bool link) {
-  Case result;
+GearedJoints geared_joints(bool link) {
+  GearedJoints result;
   TaskImpedance& impedance = result.impedance;
   impedance.mass = (MatrixXd(2, 2) << 1.6, 0.3, 0.3, 0.9).finished();
   impedance.stiffness = MatrixXd(VectorXd::Constant(2, 120).asDiagonal());
-  Gears::Data data = two_gears();
+  Gears::Data data = gears_of_two();
   data.link_sensor = link;
   impedance.damping = data.friction;
   result.limit.loop.friction = data.friction;
@@ -74,8 +74,8 @@ TEST(Gears, LowerADesignToWhatTheLoopBears) {
   const DampingTarget target = DampingTarget::constant(0.7);
   for (const bool link : {false, true}) {
     SCOPED_TRACE(link);
-    Case with = springs(link);
-    Case rigid = with;
+    GearedJoints with = geared_joints(link);
+    GearedJoints rigid = with;
     rigid.limit.loop.gears = {};
     const SampledDamping without = design_damping(rigid.impedance, target, rigid.limit);
     EXPECT_EQ(without.level, 1);
@@ -109,7 +109,7 @@ TEST(Gears, LeaveAPartOfGravityWhereTheyBend) {
   system.mass = (MatrixXd(2, 2) << 1.6, 0.3, 0.3, 0.9).finished();
   system.stiffness = MatrixXd(Eigen::Vector2d(120, 0).asDiagonal());
   system.damping = MatrixXd(Eigen::Vector2d(15, 1).asDiagonal());
-  Gears::Data data = two_gears();
+  Gears::Data data = gears_of_two();
   data.friction.resize(0, 0);
   SampledLoop loop;
   loop.gears = Gears(data);
