@@ -8,8 +8,9 @@ namespace dashpot::analysis {
 /// Computes the modes of  M q'' + C q' + K q = 0  where C and K act through a computer. The robot
 ///     M q'' + D q' + (G + P) q = f
 /// moves under a torque f that is held from tick k to tick k + 1. The controller commands
-///     u_k = (G + P - K) q_k - (C - D) v_k,   v_k = q'_k, or (q_k - q_k-1) / T if differenced,
-///     f_k = f_k-1 + (1 - exp(-2 pi f_c T)) (u_k-d - f_k-1),   or u_k-d without a filter.
+///     u_k = (H + P - K) q_k - (C - D) v_k,   v_k = q'_k, or (q_k - q_k-1) / T if differenced,
+///     f_k = f_k-1 + (1 - exp(-2 pi f_c T)) (u_k-d - f_k-1),   or u_k-d without a filter,
+/// H = G unless SampledLoop::compensation differs.
 /// With states w of SampledLoop::memory, u_k has another term -output w_k.
 /// The state x = (q, q', [v], u_k-d .. u_k-1, [f], [w]) goes from tick to tick as x_k+1 = A x_k.
 /// This is exact, because the robot's part of A is a matrix exponential. The eigenvalues z of A are
@@ -18,7 +19,8 @@ namespace dashpot::analysis {
 /// t and the damping ratio falls by (1 - 2 zeta^2) omega t / 2, with t = (d + 1/2) T plus the lag
 /// of the filter.
 ///
-/// `spectrum` has to be the spectrum of `system`. Each of its modes gets the z nearest to its
+/// `spectrum` has to be the spectrum of `system`; with gears it is not read, and the modes are those
+/// of the system that SampledLoop::gears make of it. Each of its modes gets the z nearest to its
 /// eigenvalues, moved by the loop's delays to first order, nearest pairs first. That is meaningful
 /// while omega T stays well below 1.
 ///

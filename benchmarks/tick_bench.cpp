@@ -3,6 +3,7 @@
 // `tick/joint` is joint impedance. 6 joints are the UR5, 7 the Panda, 14 a random chain. The arm
 // swings, and its state is a new one at every tick. `tick/full` has the spectrum of each as well,
 // with shapes, and the snapshot; `tick/design` besides holds a damping ratio;
+// `tick/elastic` is `tick/full` of an arm whose gears bend, with 14 modes;
 // `tick/loaded` has `control.load` and `jacobian_rate` on, under a wrench; `_steady`
 // has the integral of the springs, and friction compensated at the measured velocity;
 // `_values_only` without shapes; `_background` hands it to a thread;
@@ -33,11 +34,18 @@ using dashpot::benchmarks::time_one_by_one;
 constexpr std::size_t kStates = 2048;  // one swing; its end meets its beginning
 constexpr double kPeriod = 0.001;
 
-RobotModel model_of(int n) {
+RobotModel model_of(int n, bool elastic) {
   const std::string models = DASHPOT_SOURCE_DIR "/sim/models/";
   if (n == 6) return RobotModel::from_urdf_file(models + "ur5.urdf", "base_link", "ee_link");
   if (n == 7) {
-    return RobotModel::from_urdf_file(models + "panda.urdf", "panda_link0", "panda_hand_tcp");
+    ModelOptions options;
+    if (elastic) {
+      options.drives = "fr3";
+      options.gear_stiffness = JointVector::LinSpaced(7, 1e4, 3e3);  // N m/rad
+      options.gear_damping = JointVector::LinSpaced(7, 1, 0.5);      // N m s/rad
+    }
+    return RobotModel::from_urdf_file(models + "panda.urdf", "panda_link0", "panda_hand_tcp",
+                                      options);
   }
   dashpot::testing::RandomRobot random(20210001);
   return RobotModel::from_urdf_text(random.chain(n, 0), "link0", "tip");
@@ -60,16 +68,17 @@ std::vector<RobotState> swing(const JointVector& center) {
 
 /// What a loop does besides.
 struct Extra {
-  double ratio = 0;     ///< damping ratio that is held; 0: none
-  bool loaded = false;  ///< a load and `jacobian_rate` are in the modes
-  bool steady = false;  ///< with what takes steady errors away
+  double ratio = 0;      ///< damping ratio that is held; 0: none
+  bool loaded = false;   ///< a load and `jacobian_rate` are in the modes
+  bool steady = false;   ///< with what takes steady errors away
+  bool elastic = false;  ///< the gears bend
 };
 
 /// A controller in the loop with a swinging arm.
 class Loop {
  public:
   Loop(int n, Mode mode, const Analysis& analysis, const Extra& extra = {})
-      : Loop(model_of(n), mode, analysis, extra) {}
+      : Loop(model_of(n, extra.elastic), mode, analysis, extra) {}
 
   Status step() {
     RobotState& state = states_[k_];
@@ -222,6 +231,7 @@ int main(int argc, char** argv) {
       {2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
   add("tick/design", Mode::kCartesian, every_tick, {6, 7, 14}, {0.7, false, false});
   add("tick/loaded", Mode::kCartesian, every_tick, {7}, {0, true, false});
+  add("tick/elastic", Mode::kCartesian, every_tick, {7}, {0, false, false, true});
   add("tick/full_joint", Mode::kJoint, every_tick, {6, 7, 14});
   add("tick/full_values_only", Mode::kCartesian, values_only, {6, 7, 14});
   add("tick/full_background", Mode::kCartesian, background, {6, 7, 14});

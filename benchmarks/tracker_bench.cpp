@@ -4,14 +4,16 @@
 // `values_only` leaves out the eigenvectors; `reused` sees one system again and again. Beside them,
 // Eigen's fixed-size EigenSolver with right vectors and LAPACK's dgeev with both sides on the
 // 12 x 12 state matrices of the same path, which are formed outside the clock. `tracked_full` and
-// `eigen_full` (of run-time size) have n joints and n modes; `tracked_nonsymmetric` has the same
-// path with a part of K and C that is not symmetric. `backward_error` is the worst along the path,
-// of every kRivalSteps-th system. `unproved` is what a hostile system takes. `paced` and `evicted`,
-// beside `eigen_...` and `lapack_...`, are timed call by call: one in a millisecond, and after 64
-// MB of other data have passed through the caches. What a loop has just written, the coefficients
-// or the state matrix, is near the processor.
+// `eigen_full` (of run-time size) have n joints and n modes; `tracked/14` and `path_eigen/14` are a
+// Panda whose gears bend, and `tracked_link/14` is one whose links are measured;
+// `tracked_nonsymmetric` has the same path with a part of K and C that is not symmetric.
+// `backward_error` is the worst along the path, of every kRivalSteps-th system. `unproved` is what
+// a hostile system takes. `paced` and `evicted`, beside `eigen_...` and `lapack_...`, are timed
+// call by call: one in a millisecond, and after 64 MB of other data have passed through the caches.
+// What a loop has just written, the coefficients or the state matrix, is near the processor.
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/benchmarks/one_by_one.hpp>
+#include <dashpot/tests/support/arm_path.hpp>
 #include <dashpot/tests/support/panda_path.hpp>
 
 #include <benchmark/benchmark.h>
@@ -49,6 +51,25 @@ const std::vector<System<kMaxDof>>& panda_path(double ratio) {
       path.push_back(panda_impedance(swing(1e-3 * step), ratio));
     }
     of = ratio;
+  }
+  return path;
+}
+
+/// One second of the path of a Panda whose gears bend, with posture springs: 14 modes. If the links
+/// are measured, the stiffness is not symmetric.
+std::vector<System<kMaxDof>> elastic_path(dashpot::controller::PositionSensor sensor) {
+  dashpot::controller::ModelOptions options;
+  options.drives = "fr3";
+  options.gear_stiffness = Eigen::VectorXd::LinSpaced(7, 1e4, 3e3);  // N m/rad
+  options.gear_damping = Eigen::VectorXd::LinSpaced(7, 1, 0.5);      // N m s/rad
+  options.position_sensor = sensor;
+  dashpot::testing::ArmLoop loop(dashpot::testing::arm_model(dashpot::testing::arms()[0], options),
+                                 {});
+  std::vector<System<kMaxDof>> path;
+  for (int step = 0; step < kSteps; ++step) {
+    path.push_back(loop.at(swing(1e-3 * step)));
+    const StiffnessFactor<kMaxDof>& W = path.back().stiffness_factor;
+    if (W.rows() > 0) path.back().stiffness = W.transpose() * W;  // for the backward error
   }
   return path;
 }
@@ -430,6 +451,13 @@ int main(int argc, char** argv) {
         [=](auto& state) { eigen<Eigen::Matrix<double, 12, 12>>(state, panda_path(damping)); });
     add("spectrum/path_lapack" + end, [=](auto& state) { lapack(state, panda_path(damping)); });
   }
+  using dashpot::controller::PositionSensor;
+  add("spectrum/tracked/14",
+      [](auto& state) { track(state, elastic_path(PositionSensor::kMotor), {}, Input::kMoving); });
+  add("spectrum/path_eigen/14",
+      [](auto& state) { eigen<MatrixXd>(state, elastic_path(PositionSensor::kMotor)); });
+  add("spectrum/tracked_link/14",
+      [](auto& state) { track(state, elastic_path(PositionSensor::kLink), {}, Input::kMoving); });
   for (int n = 2; n <= kMaxDof; ++n) add_full(n);
   for (const int n : {7, kMaxDof}) {
     add("spectrum/tracked_nonsymmetric/" + std::to_string(n),

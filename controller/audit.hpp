@@ -4,6 +4,7 @@
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/controller/base/impedance.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/elastic_joints.hpp>
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -125,7 +126,8 @@ struct DampingSuggestion {
 ///     mode kJoint:     K = K_q,                  C = C_q + viscous friction,
 /// at rest, where the springs are at rest. The gain margin counts an integral of the springs as
 /// well; ratios and poles are those without it. M has the reflected inertia and the payload of the
-/// model, and viscous friction is the model's. Gravity is taken to be compensated exactly.
+/// model, and viscous friction is the model's. Gravity is taken to be compensated exactly. With
+/// elastic joints the loop is that of analysis::Gears.
 ///
 /// An Audit does not change: several threads may use one at once.
 class Audit {
@@ -162,10 +164,12 @@ class Audit {
                                      std::int64_t count) const;
 
   /// Returns the system at q that damping is designed for: with the springs, the null space's
-  /// dampers and the friction, without the dampers of task or joints. Throws like numbers().
+  /// dampers and the friction, without the dampers of task or joints, and as if no gear gave way.
+  /// Throws like numbers().
   analysis::TaskImpedance undamped(const JointVector& q) const;
 
-  /// Returns the sampled loop at q, with the joints' friction and the integral of the springs.
+  /// Returns the sampled loop at q, with the joints' friction and the integral of the springs, in
+  /// joint coordinates.
   /// Throws like numbers(), and std::invalid_argument without a period.
   analysis::SampledLoop loop(const JointVector& q) const;
 
@@ -176,6 +180,8 @@ class Audit {
  private:
   DynamicsResult evaluate(const JointVector& q) const;
   bool kinematic() const noexcept { return options_.kinematic_null_space; }
+  /// Returns the closed loop, with elastic joints where there are some.
+  analysis::System<> system_of(const analysis::TaskImpedance& impedance) const;
   /// Returns the springs and dampers that act at a posture.
   Impedance impedance_at(const DynamicsResult& robot) const;
   /// Returns the sampled loop at a posture, with the integral of these springs.
@@ -186,6 +192,7 @@ class Audit {
   RobotModel model_;
   AuditOptions options_;
   DynamicsKernel kernel_;
+  analysis::Gears elastic_;
   JointVector friction_;
   Impedance impedance_;  ///< in 1/s^2 and 1/s with inertia_blocks
   analysis::SampledLoop loop_;

@@ -56,8 +56,8 @@ class Controller {
   /// be another thread than the one that calls `update`. The result is valid until the next call.
   const SampledVibration* sampled_vibration() noexcept;
   /// Sets `system` to the closed loop at the last tick, linearised where its springs are at rest,
-  /// in joint coordinates (vibration/closed_loop.hpp): mass, damping, stiffness and its factor.
-  /// Must not be called before the first good state.
+  /// in joint coordinates (vibration/closed_loop.hpp) or those of analysis::Gears: mass, damping,
+  /// stiffness and its factor. Must not be called before the first good state.
   void closed_loop(analysis::System<kMaxJoints>& system) const noexcept;
 
   /// Forgets everything, faults as well: the next tick is like the first, and keeps the robot where

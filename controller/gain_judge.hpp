@@ -70,6 +70,7 @@ class GainJudge {
   DynamicsKernel bare_;  ///< without payload
   bool loaded_;          ///< there is a payload
   analysis::SampledLoop loop_;
+  analysis::Gears elastic_;
   PostureLoop posture_loop_;
 };
 

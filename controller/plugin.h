@@ -265,7 +265,8 @@ typedef struct dashpot_mode {
   double eigenvalue_bound;               /* 1/s */
   int32_t kind;                          /* DASHPOT_UNDERDAMPED, ... */
   int32_t label;                         /* a mode keeps it as long as it can be followed */
-  double shape_real[DASHPOT_MAX_JOINTS]; /* real part of u: how far each joint moves, u^H M u = 1;
+  double shape_real[DASHPOT_MAX_JOINTS]; /* real part of u: how far each joint moves, u^H M u = 1,
+                                            then the motors of elastic joints, in order;
                                             zero if the configuration asks for no shapes */
   double shape_imag[DASHPOT_MAX_JOINTS]; /* imaginary part of u */
 } dashpot_mode;
@@ -279,7 +280,7 @@ typedef struct dashpot_modes {
   double position[DASHPOT_MAX_JOINTS]; /* of that state, rad */
   int32_t status;                      /* 0: all numbers have a proved bound */
   uint32_t zero_modes;                 /* number of motions that no spring resists */
-  uint32_t count;                      /* number of modes */
+  uint32_t count;                      /* number of modes, more than n with elastic joints */
   int32_t origin;                      /* DASHPOT_TRACKED, ... */
   /* Numbers of ticks since the start or the last reset. Each tick that is to be analysed
    * (analysis.every) counts once in these: */

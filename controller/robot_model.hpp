@@ -10,23 +10,36 @@
 
 namespace dashpot::controller {
 
+/// Where an arm with elastic joints measures its joint positions and velocities: what its springs
+/// and dampers act on.
+enum class PositionSensor : std::uint8_t {
+  kMotor,  ///< on the motor's side of the gear, theta
+  kLink,   ///< on the link's side, q
+};
+
 enum class JointType : std::uint8_t { kRevolute, kContinuous, kPrismatic };
 
 /// Properties of a joint in a URDF. For a prismatic joint read m for rad and N for N m.
 struct Joint {
   std::string name;
   JointType type = JointType::kRevolute;
-  double lower = 0;              ///< rad; -infinity for a continuous joint
-  double upper = 0;              ///< rad; infinity for a continuous joint
-  double velocity = 0;           ///< limit, rad/s, not negative; infinity if there is none
-  double effort = 0;             ///< limit, N m, not negative; infinity if there is none
-  double viscous_friction = 0;   ///< viscous friction, N m s/rad
-  double coulomb_friction = 0;   ///< Coulomb friction, N m
-  double reflected_inertia = 0;  ///< of rotor and gear, as seen by the joint, kg m^2 (kg)
+  double lower = 0;             ///< rad; -infinity for a continuous joint
+  double upper = 0;             ///< rad; infinity for a continuous joint
+  double velocity = 0;          ///< limit, rad/s, not negative; infinity if there is none
+  double effort = 0;            ///< limit, N m, not negative; infinity if there is none
+  double viscous_friction = 0;  ///< viscous friction, N m s/rad
+  double coulomb_friction = 0;  ///< Coulomb friction, N m
+  /// Of rotor and gear, as seen by the joint, and as it appears to who commands torques; kg m^2
+  /// (kg). See ModelOptions::torque_loop_inertia_ratio.
+  double reflected_inertia = 0;
+  double gear_stiffness = std::numeric_limits<double>::infinity();  ///< N m/rad; infinity: rigid
+  double gear_damping = 0;  ///< N m s/rad, beside gear_stiffness
   // Limits that URDF has from version 1.2 on, positive; infinity if there is none.
   double acceleration = std::numeric_limits<double>::infinity();  ///< rad/s^2
   double deceleration = std::numeric_limits<double>::infinity();  ///< rad/s^2
   double jerk = std::numeric_limits<double>::infinity();          ///< rad/s^3
+
+  bool elastic() const noexcept { return gear_stiffness < std::numeric_limits<double>::infinity(); }
 };
 
 /// What a URDF does not say, or says wrong. A vector without entries keeps the URDF's values.
@@ -47,6 +60,16 @@ struct ModelOptions {
   bool drives_friction = false;  ///< the friction of `drives` takes the place of the URDF's
   JointVector viscous_friction;  ///< n, N m s/rad
   JointVector coulomb_friction;  ///< n, N m
+  /// Stiffness of the gears, n, N m/rad, positive; infinity: rigid. An elastic joint needs a
+  /// reflected inertia, which is then the inertia of a body of its own, on the motor's side. The
+  /// friction of the joint acts there as well. At most kMaxJoints - n joints can be elastic.
+  JointVector gear_stiffness;
+  JointVector gear_damping;  ///< n, N m s/rad; of rigid joints it has no effect
+  PositionSensor position_sensor = PositionSensor::kMotor;  ///< of elastic joints
+  /// What a torque controller inside the drives leaves of the motors' inertia, n, above 0 and at
+  /// most 1: reflected_inertia, given or of `drives`, times this is Joint::reflected_inertia. No
+  /// entries: there is no such controller, or reflected_inertia is what it leaves.
+  JointVector torque_loop_inertia_ratio;
   Payload payload;
   Pose tool;  ///< the tool's frame T in the tip link
 };
@@ -90,6 +113,10 @@ class RobotModel {
   const std::vector<std::string>& warnings() const noexcept;
   /// Returns one property of all n joints, as in `joint_values(&Joint::effort)`.
   JointVector joint_values(double Joint::*property) const;
+  /// Returns the number of joints with a gear_stiffness.
+  int elastic_joints() const noexcept;
+  /// Returns what measures the positions of elastic joints.
+  PositionSensor position_sensor() const noexcept;
 
   /// Returns what is attached to the tip link: ModelOptions::payload and tool, unless `with` put
   /// something else in their place.
@@ -97,8 +124,8 @@ class RobotModel {
   /// Returns the model with something else attached. Throws InvalidModel if a joint has no inertia
   /// without what was attached before.
   RobotModel with(const Attachment& attachment) const;
-  /// Returns the model with other reflected inertia (n, kg m^2, not negative). Throws InvalidModel
-  /// if a joint has no inertia then.
+  /// Returns the model with other reflected inertia (n, kg m^2, not negative), as it appears to who
+  /// commands torques. Throws InvalidModel if a joint has no inertia then.
   RobotModel with_reflected_inertia(const JointVector& inertia) const;
 
   /// Returns the acceleration of gravity in B's axes, m/s^2.

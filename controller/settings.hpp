@@ -160,7 +160,8 @@ struct Analysis {
   /// meanwhile. Work is counted, not timed: kWorkPerSecond units of analysis::Work are a second to
   /// 15 %, by ./run bench: 4.80 us for a tick of 7 joints with 104,559 instructions. So that
   /// ticks are even, the work is at most kEvenWork (n / 7)^3 share / 10 % for n joints, the work of
-  /// about ten ticks in which modes are followed; for fewer than 7 joints it is that of 7.
+  /// about ten ticks in which modes are followed; for fewer than 7 joints it is that of 7. An
+  /// elastic joint counts as two.
   double share = 0.1;
   static constexpr double kWorkPerSecond = 2.5e10;
   static constexpr double kEvenWork = 1e6;

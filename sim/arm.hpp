@@ -6,6 +6,7 @@
 #include <dashpot/sim/schedule.hpp>
 #include <dashpot/sim/simulated_system.hpp>
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -18,6 +19,9 @@ struct Wall {
   Contact contact{1e4, 50};                           ///< N/m, N s/m
 };
 
+/// Which side of an elastic gear positions and velocities are measured on.
+enum class PositionSensor : std::uint8_t { kMotor, kLink };
+
 /// Forces on the arm in addition to gravity and torque. A force that is off or zero costs nothing.
 struct ArmOptions {
   bool viscous_friction = true;  ///< with the coefficients of the robot
@@ -26,6 +30,7 @@ struct ArmOptions {
   /// a damper of coulomb / v_s: joints creep slowly instead of sticking. With inertia m, RK4 then
   /// needs steps below 2.7 m v_s / coulomb, semi-implicit Euler below 2 m v_s / coulomb.
   double friction_velocity = 0.01;
+  PositionSensor position_sensor = PositionSensor::kMotor;  ///< of joints with elastic gears
   std::optional<Contact> stops;  ///< at the position limits; N m/rad and N m s/rad (N/m, N s/m)
   std::optional<Wall> wall;
   std::vector<Piece<Vector6>> wrenches;  ///< of the world on the tip, at its origin, in base axes
@@ -36,6 +41,12 @@ struct ArmOptions {
 };
 
 /// A robot arm: M(q) qdd + C(q, qd) qd + g(q) = tau - friction + stops + J' (wall + wrenches).
+///
+/// Where a gear is elastic, tau - friction moves the drive, and the gear's torque tau_J the link:
+///     B theta'' = tau - friction(theta') - tau_J,  tau_J = K_J (theta - q) + D_J (theta' - q'),
+/// with B the joint's reflected_inertia; M is then without B. Such joints have a second coordinate
+/// each, the deflection theta - q, which keeps its digits however stiff the gear is: the state is
+/// (q, deflections; their rates).
 class Arm : public System {
  public:
   /// Throws InvalidScene.
@@ -46,6 +57,12 @@ class Arm : public System {
   /// Returns the linear and angular velocity of the tip, m/s and rad/s, in the base's axes.
   Vector6 tip_twist(const JointVector& q, const JointVector& qd) noexcept;
 
+  /// Returns the highest natural frequency of the elastic gears at q with all drives free, rad/s;
+  /// zero if all are rigid.
+  double fastest_gear(const JointVector& q);
+
+  void place(const JointVector& q, const JointVector& qd, StateVector& y) noexcept override;
+  void read_sensors(const StateVector& y, JointVector& q, JointVector& qd) const noexcept override;
   double begin_segment(double t) noexcept override;
   double take_loads(double t, const StateVector& y) noexcept override;
   void rates(const StateVector& y, StateVector& y_dot) noexcept override;
@@ -65,6 +82,13 @@ class Arm : public System {
     const double* qd;
     double* tau;
     double* work;
+    const double* drive_rate;  ///< qd of rigid gears
+    double* drive_tau;         ///< likewise tau
+  };
+  /// An elastic gear with its drive.
+  struct Gear {
+    int joint;
+    double stiffness, damping, inertia;
   };
   using Force = void (*)(Arm& arm, const Sums& sums) noexcept;
   static void add_viscous_friction(Arm& arm, const Sums& sums) noexcept;
@@ -72,6 +96,7 @@ class Arm : public System {
   static void add_stops(Arm& arm, const Sums& sums) noexcept;
   static void add_wall(Arm& arm, const Sums& sums) noexcept;
   static void add_wrench(Arm& arm, const Sums& sums) noexcept;
+  void add_gears(const Sums& sums) noexcept;
 
   double wall_depth() const noexcept;
   double wall_rate() const noexcept;
@@ -81,6 +106,7 @@ class Arm : public System {
   Robot robot_;
   ArmOptions options_;
   ArticulatedBody bodies_;
+  std::vector<Gear> gears_;    // the elastic ones, in the order of their coordinates
   std::vector<Force> forces_;  // those that this scene has
   Schedule<Vector6> wrenches_;
   Vector6 wrench_ = Vector6::Zero();

@@ -61,9 +61,12 @@ struct EnergyAudit {
   double viscous_heat = 0;   ///< out
   double friction_heat = 0;  ///< out, Coulomb
   double contact_heat = 0;   ///< out, dampers of stops and wall
+  double gear_heat = 0;      ///< out, dampers of elastic gears
 
   double work_in() const noexcept { return by_actuators + by_world; }
-  double dissipated() const noexcept { return viscous_heat + friction_heat + contact_heat; }
+  double dissipated() const noexcept {
+    return viscous_heat + friction_heat + contact_heat + gear_heat;
+  }
   /// Returns the energy that came from nowhere: zero except for the error of the integrator, which
   /// is of the integrator's order.
   double imbalance() const noexcept {
@@ -78,7 +81,9 @@ struct EnergyAudit {
 /// and no two plants may share a system.
 class Plant {
  public:
-  /// Starts at rest if qd is empty. Throws InvalidScene.
+  /// Starts where the sensors show q and qd, with elastic gears at rest under the weight, or at the
+  /// coordinates q with the velocities qd, if they have an entry for each of the system's
+  /// coordinates. Starts at rest if qd is empty. Throws InvalidScene.
   Plant(System& system, const PlantOptions& options, const JointVector& q,
         const JointVector& qd = {});
   Plant(const Plant&) = delete;
@@ -88,14 +93,15 @@ class Plant {
   /// has changed.
   Status step(const JointVector& command) noexcept;
   /// Moves through one period in which a hand or a brake, and not the torque, brings the robot to
-  /// position q with velocity qd, n entries each. The energy counts as the world's work.
+  /// where the sensors show q and qd, n entries each. The energy counts as the world's work.
   void carry(const JointVector& q, const JointVector& qd) noexcept;
 
   const Measurement& measured() const noexcept { return measured_; }
 
   // The truth, which a controller does not get to see:
   JointVector position() const { return y_.head(system_->dof()); }
-  JointVector velocity() const { return y_.segment(system_->dof(), system_->dof()); }
+  JointVector velocity() const { return y_.segment(system_->coordinates(), system_->dof()); }
+  const StateVector& state() const noexcept { return y_; }
   /// Returns the torque that the drives held in the last period, N m.
   const JointVector& torque() const noexcept { return torque_; }
   std::int64_t ticks() const noexcept { return ticks_; }

@@ -2,6 +2,8 @@
 #include <dashpot/sim/dynamics/inertia.hpp>
 #include <dashpot/sim/joint_types.hpp>
 
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -29,6 +31,13 @@ struct Joint {
   double reflected_inertia = 0;  ///< of the drive, kg m^2 or kg
   double viscous_friction = 0;   ///< coefficient, N m s/rad or N s/m
   double coulomb_friction = 0;   ///< torque or force, N m or N
+  /// Of the gear between drive and link, N m/rad or N/m; infinite: rigid.
+  double gear_stiffness = std::numeric_limits<double>::infinity();
+  double gear_damping = 0;  ///< of an elastic gear, N m s/rad or N s/m
+
+  bool elastic() const noexcept { return std::isfinite(gear_stiffness); }
+  /// Returns the inertia of the drive as far as it is rigid with the link, kg m^2 or kg.
+  double drive_inertia_on_link() const noexcept { return elastic() ? 0 : reflected_inertia; }
 };
 
 /// Values that the file does not have, or that override its values. An empty vector: as in the
@@ -37,6 +46,8 @@ struct RobotParameters {
   JointVector reflected_inertia;         ///< n, kg m^2; files have none, so empty is zero
   JointVector viscous_friction;          ///< n, N m s/rad
   JointVector coulomb_friction;          ///< n, N m
+  JointVector gear_stiffness;            ///< n, N m/rad; infinite, and empty: rigid
+  JointVector gear_damping;              ///< n, N m s/rad; empty: zero
   Inertia payload;                       ///< rigid at the tip, in the tip's axes
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< m/s^2, in the axes of the file's root link
   bool accept_inertias = false;          ///< links may have principal moments below zero
@@ -57,6 +68,8 @@ class Robot {
 
   /// Returns n.
   int dof() const noexcept { return static_cast<int>(joints_.size()); }
+  /// Returns n and the number of elastic gears, at most kMaxJoints.
+  int coordinates() const noexcept;
   const std::vector<Joint>& joints() const noexcept { return joints_; }
   /// Returns the pose of the tip link in the frame of the last joint's body.
   const Pose& tip() const noexcept { return tip_; }

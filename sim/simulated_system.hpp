@@ -12,15 +12,17 @@ enum WorkChannel : int {
   kViscousHeat,   ///< out
   kFrictionHeat,  ///< out, Coulomb
   kContactHeat,   ///< out, dampers of joint stops and of the wall
+  kGearHeat,      ///< out, dampers of elastic gears
   kWorkChannels
 };
 
-/// The state that an integrator moves: position (n), velocity (n), and the work channels.
+/// The state that an integrator moves: N coordinates, their N velocities, and the work channels.
+/// The first n coordinates are the positions of the joints.
 using StateVector =
     Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxJoints + kWorkChannels, 1>;
 
-/// Returns n of a state.
-inline Eigen::Index dof_of(const StateVector& y) noexcept {
+/// Returns N of a state.
+inline Eigen::Index coordinates_of(const StateVector& y) noexcept {
   return (y.size() - kWorkChannels) / 2;
 }
 
@@ -28,7 +30,7 @@ inline Eigen::Index dof_of(const StateVector& y) noexcept {
 struct StoredEnergy {
   double kinetic = 0;
   double gravity = 0;
-  double springs = 0;  ///< of stops and wall, or of the system's own springs
+  double springs = 0;  ///< of gears, stops and wall, or of the system's own springs
   double sum() const noexcept { return kinetic + gravity + springs; }
 };
 
@@ -45,8 +47,22 @@ class System {
 
   /// Returns n.
   int dof() const noexcept { return static_cast<int>(torque_.size()); }
+  /// Returns N, n and the coordinates that no torque acts on by itself.
+  int coordinates() const noexcept { return coordinates_; }
   /// Sets the torque, which is held until the next call; n, N m.
   void set_torque(const JointVector& torque) noexcept { torque_ = torque; }
+
+  /// Sets the coordinates and velocities of y such that the sensors show q and qd, n entries each,
+  /// where the other coordinates are at rest under the weight.
+  virtual void place(const JointVector& q, const JointVector& qd, StateVector& y) noexcept {
+    y.head(q.size()) = q;
+    y.segment(coordinates_, q.size()) = qd;
+  }
+  /// Returns what the sensors show at y: n positions and n velocities.
+  virtual void read_sensors(const StateVector& y, JointVector& q, JointVector& qd) const noexcept {
+    q = y.head(dof());
+    qd = y.segment(coordinates_, dof());
+  }
 
   /// Begins a segment at t (s), with the external forces of this time. Returns the time at which
   /// the next of them jumps, or infinity if none does.
@@ -54,7 +70,7 @@ class System {
   /// Takes up the bodies that are carried from t (s) on, before begin_segment. Returns the energy
   /// that they bring with them at y, J.
   virtual double take_loads(double /*t*/, const StateVector& /*y*/) noexcept { return 0; }
-  /// Computes y' at y; both have 2n + kWorkChannels entries.
+  /// Computes y' at y; both have 2N + kWorkChannels entries.
   virtual void rates(const StateVector& y, StateVector& y_dot) noexcept = 0;
   virtual StoredEnergy stored_energy(const StateVector& y) noexcept = 0;
 
@@ -66,11 +82,13 @@ class System {
   virtual void thaw() noexcept {}
 
  protected:
-  explicit System(int n) : torque_(JointVector::Zero(n)) {}
+  explicit System(int n) : System(n, n) {}
+  System(int n, int coordinates) : torque_(JointVector::Zero(n)), coordinates_(coordinates) {}
   const JointVector& torque() const noexcept { return torque_; }
 
  private:
   JointVector torque_;
+  int coordinates_;
 };
 
 }  // namespace dashpot::sim

@@ -69,7 +69,7 @@ CircleCount::CircleCount(const SampledDataModel& loop, double slowest)
   rest_.diagonal().array() -= 1;
   const MatrixXd B = loop.motion.rightCols(n), damping = B * (loop.C - loop.D);
   for (int i = 0; i < 2; ++i) fixed_[i] = scaled_[i] = MatrixXd::Zero(p, p);
-  fixed_[0].topLeftCorner(2 * n, n) = B * (loop.G - loop.P);
+  fixed_[0].topLeftCorner(2 * n, n) = B * loop.H;
   scaled_[0].topLeftCorner(2 * n, n) = B * (loop.P - loop.K);
   scaled_[0].topRightCorner(2 * n, m) = -B * loop.states.output;
   (loop.difference ? scaled_[1].leftCols(n) : scaled_[0].middleCols(n, n)).topRows(2 * n) -=

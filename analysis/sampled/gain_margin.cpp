@@ -122,6 +122,10 @@ double find_margin(const SampledDataModel& unit, double most, double slowest) {
 template <int N>
 double gain_margin(const System<N>& system, const Spectrum<N>& spectrum, const SampledLoop& loop,
                    double most, double slowest) {
+  if (loop.gears.any()) {
+    const GearedLoop geared(system, loop);
+    return gain_margin(geared.system, geared.spectrum, geared.loop, most, slowest);
+  }
   return find_margin(SampledDataModel(system, spectrum, loop), most, slowest * loop.period);
 }
 
@@ -134,6 +138,10 @@ double gain_margin(const ElasticForm<N>& form, const SampledLoop& loop, double m
 bool keeps_margin(const System<>& system, const Spectrum<>& spectrum, const SampledLoop& loop,
                   double margin) {
   require("keeps_margin", margin >= 0, "a gain margin below 0 is none");
+  if (loop.gears.any()) {
+    const GearedLoop geared(system, loop);
+    return keeps_margin(geared.system, geared.spectrum, geared.loop, margin);
+  }
   const SampledDataModel unit(system, spectrum, loop);
   return margin == 0 || keeps(unit, margin);
 }

@@ -29,7 +29,43 @@ MatrixXd checked(const MatrixXd& A, Index n, const char* name) {
 
 }  // namespace
 
+SampledLoop with_gears(const SampledLoop& loop) {
+  const Gears& gears = loop.gears;
+  if (!gears.any()) return loop;
+  const Index n = gears.data().stiffness.size(), size = gears.coordinates();
+  const MatrixXd none = MatrixXd::Zero(size, size);
+  SampledLoop result = loop;
+  result.gears = {};
+  MatrixXd outside = checked(loop.friction, n, "friction");
+  if (gears.data().friction.size() > 0) outside -= gears.data().friction;
+  result.friction = result.passive_stiffness = none;
+  gears.add_on_links(outside, result.friction);
+  gears.add_friction(result.friction);
+  gears.add_gears(gears.data().damping, result.friction);
+  gears.add_on_links(checked(loop.passive_stiffness, n, "passive_stiffness"),
+                     result.passive_stiffness);
+  gears.add_gears(gears.data().stiffness, result.passive_stiffness);
+  const MatrixXd gravity = checked(loop.gravity_gradient, n, "gravity_gradient");
+  result.gravity_gradient = result.compensation = none;
+  gears.add_on_links(gravity, result.gravity_gradient);
+  gears.add_of_controller(loop.compensation.size() > 0 ? loop.compensation : gravity,
+                          result.compensation);
+  const auto& [state, position, output] = loop.memory;
+  const Index states = state.rows();
+  if (states == 0) return result;
+  require("sample_loop", position.cols() == n && output.rows() == n,
+          "memory has to be m x m, m x n and n x m");
+  result.memory.position = MatrixXd::Zero(position.rows(), size);
+  result.memory.output = MatrixXd::Zero(size, output.cols());
+  for (Index i = 0; i < n; ++i) {
+    result.memory.position.col(gears.measured(i)) = position.col(i);
+    result.memory.output.row(gears.motor(i)) = output.row(i);
+  }
+  return result;
+}
+
 void SampledDataModel::set_loop(const SampledLoop& loop) {
+  require("sample_loop", !loop.gears.any(), "a loop with gears has to be extended first");
   require("sample_loop", std::isfinite(loop.period) && loop.period > 0,
           "period has to be positive, s");
   require("sample_loop", loop.delay >= 0, "delay must not be negative, ticks");
@@ -62,6 +98,8 @@ SampledDataModel::SampledDataModel(const System<N>& system, const Spectrum<N>& s
   D = T * unit(checked(loop.friction, n, "friction"));
   P = T * T * unit(checked(loop.passive_stiffness, n, "passive_stiffness"));
   G = P + T * T * unit(checked(loop.gravity_gradient, n, "gravity_gradient"));
+  H = loop.compensation.size() == 0 ? MatrixXd(G - P)
+                                    : T * T * unit(checked(loop.compensation, n, "compensation"));
   zero_modes = mass.matrixU() * MatrixXd(spectrum.zero_modes.basis);
   remember(loop, mass.matrixU().solve(MatrixXd::Identity(n, n)));
   integrate();
@@ -73,11 +111,13 @@ SampledDataModel::SampledDataModel(const ElasticForm<N>& form, const SampledLoop
   set_loop(loop);
   const Index m = form.modes();
   const bool plain = loop.friction.isZero(0) && loop.gravity_gradient.isZero(0) &&
-                     loop.passive_stiffness.isZero(0) && loop.memory.state.size() == 0;
+                     loop.passive_stiffness.isZero(0) && loop.compensation.isZero(0) &&
+                     loop.memory.state.size() == 0;
   if (plain && form.free_zero_modes) n = m;
   const auto unit = [&](const MatrixXd& A) -> MatrixXd {
     if (plain) return MatrixXd::Zero(n, n);
-    const MatrixXd given = checked(A, n, "friction, gravity_gradient and passive_stiffness");
+    const MatrixXd given =
+        checked(A, n, "friction, gravity_gradient, compensation and passive_stiffness");
     return form.coordinates.transpose() * given * form.coordinates;
   };
   const double T = loop.period;
@@ -87,6 +127,7 @@ SampledDataModel::SampledDataModel(const ElasticForm<N>& form, const SampledLoop
   D = T * unit(loop.friction);
   P = T * T * unit(loop.passive_stiffness);
   G = P + T * T * unit(loop.gravity_gradient);
+  H = loop.compensation.size() == 0 ? MatrixXd(G - P) : T * T * unit(loop.compensation);
   zero_modes = MatrixXd::Identity(n, n).rightCols(n - m);
   remember(loop, form.coordinates.leftCols(n));
   integrate();
@@ -111,6 +152,8 @@ void SampledDataModel::remember(const SampledLoop& loop, const MatrixXd& coordin
 }
 
 void SampledDataModel::integrate() {
+  const MatrixXd uncompensated = (G - P - H) * zero_modes;
+  if (uncompensated.norm() > 1e-10 * (G.norm() + H.norm())) zero_modes.resize(n, 0);
   span_commands();
   motion = MatrixXd::Zero(2 * n, 3 * n);
   if (D.isZero(0) && G.isZero(0)) {  // masses alone
@@ -130,7 +173,7 @@ void SampledDataModel::span_commands() {
   if (n == 0 || (delay == 0 && !filtered())) return;
   const Index m = states.state.rows();
   MatrixXd parts(n, 3 * n + m);
-  parts << G - P, K - P, C - D, states.output * std::max(1.0, states.position.norm());
+  parts << H, K - P, C - D, states.output * std::max(1.0, states.position.norm());
   const Eigen::ColPivHouseholderQR<MatrixXd> qr(parts);
   const double rounding = static_cast<double>(n) * std::numeric_limits<double>::epsilon();
   const Index count = n - (qr.matrixR().diagonal().array().abs() <= rounding).count();
@@ -143,7 +186,7 @@ MatrixXd SampledDataModel::transition(double factor) const {
   const Index filter = queue + r * delay;
 
   MatrixXd command = MatrixXd::Zero(n, rows);
-  command.leftCols(n) = G - factor * K + (factor - 1) * P;
+  command.leftCols(n) = H - factor * (K - P);
   command.middleCols(v, n) -= factor * (C - D);
   command.rightCols(m) = -factor * states.output;
   if (r < n) command = commands.transpose() * command;
@@ -182,7 +225,7 @@ MatrixXd SampledDataModel::unit_motions() const {
   while (undamped < r && svd.singularValues()[r - 1 - undamped] <= negligible) ++undamped;
   MatrixXd X = MatrixXd::Zero(2 * n + memory(), r + undamped);
   X.topLeftCorner(n, r) = zero_modes;
-  const MatrixXd held = commands.transpose() * G * zero_modes;
+  const MatrixXd held = commands.transpose() * H * zero_modes;
   const Index step = std::max<Index>(1, commands.cols());
   for (Index at = difference ? 3 * n : 2 * n; at < X.rows() - states.state.rows(); at += step) {
     X.block(at, 0, step, r) = held;
@@ -208,9 +251,9 @@ VectorXcd SampledDataModel::discrete_eigenvalues() const {
   MatrixXd A = on_other_motions(transition());
   const VectorXcd z = eigenvalues_of(A);
   // Where nothing is commanded, a delay and a filter do by themselves.
-  const Index idle = n - commands.cols(), filters = filtered() ? idle : 0;
-  VectorXcd all(z.size() + idle * delay + filters);
-  all << z, VectorXcd::Zero(idle * delay), VectorXcd::Constant(filters, 1 - filter_gain);
+  const Index filters = filtered() ? n - commands.cols() : 0;
+  VectorXcd all(z.size() + idle());
+  all << z, VectorXcd::Zero(idle() - filters), VectorXcd::Constant(filters, 1 - filter_gain);
   return all;
 }
 

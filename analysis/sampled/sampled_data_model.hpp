@@ -3,7 +3,7 @@
 
 #include <dashpot/analysis/elastic_form.hpp>
 #include <dashpot/analysis/sampled/sampled_spectrum.hpp>
-#include <dashpot/analysis/spectrum/spectrum_result.hpp>
+#include <dashpot/analysis/spectrum.hpp>
 
 namespace dashpot::analysis {
 
@@ -14,6 +14,7 @@ struct SampledDataModel {
   Eigen::MatrixXd C, K, D;  ///< n x n
   Eigen::MatrixXd G;        ///< of the robot without its controller, with P
   Eigen::MatrixXd P;
+  Eigen::MatrixXd H;           ///< SampledLoop::compensation
   Eigen::MatrixXd zero_modes;  ///< n x r, orthonormal; none where a state w reads one
   ControllerMemory states;     ///< w, in these coordinates; m = 0: none
   int delay = 0;
@@ -38,6 +39,9 @@ struct SampledDataModel {
     return commands.cols() * (delay + (filtered() ? 1 : 0)) + (difference ? n : 0) +
            states.state.rows();
   }
+  /// Returns how many of discrete_eigenvalues(), the last ones, are those of the delay and filter
+  /// of commands that are always zero.
+  Eigen::Index idle() const { return (n - commands.cols()) * (delay + (filtered() ? 1 : 0)); }
   Eigen::Index rows() const { return 2 * n + memory(); }
   /// Returns A, for the state (y, y', [v], u_k-d .. u_k-1, [f], [w]), u and f by their coordinates
   /// in `commands`, with `factor` times K - P, C - D and the output of w; see sample_loop.
@@ -57,9 +61,33 @@ struct SampledDataModel {
   /// Checks SampledLoop::memory, throws std::invalid_argument, and sets `states`, where
   /// q = coordinates y.
   void remember(const SampledLoop& loop, const Eigen::MatrixXd& coordinates);
-  /// Sets `motion` and `commands`.
+  /// Sets `motion` and `commands`. Zero modes in which gravity is not compensated are none.
   void integrate();
   void span_commands();
+};
+
+/// A loop with gears in the coordinates of these.
+struct GearedLoop {
+  System<> system;
+  Spectrum<> spectrum;
+  SampledLoop loop;
+
+  /// Of a system in joint coordinates. Throws as analyze and sample_loop do.
+  template <int N>
+  GearedLoop(const System<N>& rigid, const SampledLoop& given)
+      : system(rigid.dof()), loop(with_gears(given)) {
+    system.mass = rigid.mass;
+    system.damping = rigid.damping;
+    system.stiffness = rigid.stiffness;
+    system.stiffness_factor = rigid.stiffness_factor;
+    const Eigen::Index n = rigid.dof();
+    PassivePart passive{Square<kMaxDof>::Zero(n, n), Square<kMaxDof>::Zero(n, n)};
+    if (given.passive_stiffness.size() > 0) passive.stiffness = given.passive_stiffness;
+    if (given.friction.size() > 0) passive.damping = given.friction;
+    if (given.gears.data().friction.size() > 0) passive.damping -= given.gears.data().friction;
+    given.gears.extend(passive, system);
+    spectrum = analyze(system);
+  }
 };
 
 /// Returns the eigenvalues of A, which is destroyed. Throws std::runtime_error.

@@ -20,7 +20,7 @@ using Eigen::VectorXcd;
 
 /// An eigenvalue (per tick) of a mode after the loop's delays, to first order: the Newton step from
 /// the continuous one to a zero of
-///     lambda^2 + lambda D + G + h(lambda) (K - G + lambda e^(-lambda/2 if differenced) (C - D)
+///     lambda^2 + lambda D + G + h(lambda) (K - P - H + lambda e^(-lambda/2 if differenced) (C - D)
 ///         + output (e^lambda - state)^-1 position),
 /// h = e^(-lambda (d + 1/2)) times the filter.
 Complex delayed(const SampledDataModel& loop, Complex lambda, const VectorXcd& u,
@@ -32,7 +32,7 @@ Complex delayed(const SampledDataModel& loop, Complex lambda, const VectorXcd& u
     return (y.transpose() * A.cast<Complex>() * u).value();
   };
   const Complex product = (y.transpose() * u).value();
-  Complex sprung = form(loop.K - loop.G);
+  Complex sprung = form(loop.K - loop.P - loop.H);
   const ControllerMemory& states = loop.states;
   if (const Index m = states.state.rows(); m > 0) {
     const Eigen::MatrixXcd step = std::exp(lambda) * MatrixXd::Identity(m, m) - states.state;
@@ -49,7 +49,9 @@ Complex delayed(const SampledDataModel& loop, Complex lambda, const VectorXcd& u
 /// Gives the z one by one to what they belong to.
 class Matcher {
  public:
-  explicit Matcher(const VectorXcd& z) : z_(z), free_(static_cast<std::size_t>(z.size()), true) {}
+  /// The last `idle` of z belong to nothing that moves.
+  Matcher(const VectorXcd& z, Index idle)
+      : z_(z), moving_(z.size() - idle), free_(static_cast<std::size_t>(z.size()), true) {}
 
   struct Nearest {
     Index index = -1;
@@ -58,7 +60,7 @@ class Matcher {
   /// The free z nearest to e^lambda in log(z); `real`: among the real ones.
   Nearest nearest(Complex lambda, bool real) const {
     Nearest best;
-    for (Index i = 0; i < z_.size(); ++i) {
+    for (Index i = 0; i < moving_; ++i) {
       if (!is_free(i) || z_[i] == 0.0 || z_[i].imag() < 0 || (real && z_[i].imag() != 0)) continue;
       const double distance = modulus(std::log(z_[i]) - lambda);
       if (distance < best.distance) best = {i, distance};
@@ -85,6 +87,7 @@ class Matcher {
   bool is_free(Index i) const { return free_[static_cast<std::size_t>(i)]; }
 
   const VectorXcd& z_;
+  Index moving_;
   std::vector<bool> free_;
 };
 
@@ -180,6 +183,10 @@ std::vector<Wanted> list_wanted(const System<N>& system, const Spectrum<N>& spec
 template <int N>
 SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum,
                             const SampledLoop& loop) {
+  if (loop.gears.any()) {
+    const GearedLoop geared(system, loop);
+    return sample_loop(geared.system, geared.spectrum, geared.loop);
+  }
   const SampledDataModel unit(system, spectrum, loop);
   const VectorXcd z = unit.discrete_eigenvalues();
   std::vector<Wanted> wanted = list_wanted(system, spectrum, unit, loop.period);
@@ -188,7 +195,7 @@ SampledSpectrum sample_loop(const System<N>& system, const Spectrum<N>& spectrum
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   SampledMode none{{kNan, kNan}, {kNan, kNan}, kNan, kNan, kNan, ModeKind::kSoft};
   result.modes.assign(static_cast<std::size_t>(spectrum.modes.size()), none);
-  Matcher matcher(z);
+  Matcher matcher(z, unit.idle());
   for (;;) {
     Matcher::Nearest best;
     Wanted* owner = nullptr;

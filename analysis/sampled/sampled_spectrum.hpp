@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/analysis/gears.hpp>
 #include <dashpot/analysis/mode.hpp>
 
 #include <Eigen/Core>
@@ -27,11 +28,23 @@ struct SampledLoop {
   /// G, n x n, N m/rad: the stiffness of the robot that the controller compensates, such as dg/dq,
   /// the gradient of gravity. Empty: none.
   Eigen::MatrixXd gravity_gradient = {};
+  /// H, n x n, N m/rad: what the controller commands against gravity, H q_k. Empty: G, at the
+  /// positions where gravity acts. Another one where it is measured, or acts, elsewhere.
+  Eigen::MatrixXd compensation = {};
   /// P, n x n, N m/rad: the part of the stiffness K that the world supplies, such as the springs of
   /// a contact. Empty: none.
   Eigen::MatrixXd passive_stiffness = {};
   ControllerMemory memory = {};  ///< m = 0: none
+  /// Gears that bend. The system and all of the above are then those in joint coordinates, friction
+  /// is the gears' and acts on the motors' side, and the modes are those of Gears::extend. An
+  /// elastic form with gears has to have been extended already, see with_gears.
+  Gears gears = {};
 };
+
+/// Returns the loop in the coordinates of its gears, without gears: with their springs and dampers
+/// among the passive ones, and gravity, which acts on the links, compensated where it is measured.
+/// Returns the loop as it is if it has none.
+SampledLoop with_gears(const SampledLoop& loop);
 
 /// A mode of the loop that is closed once a tick. One with a z that is real and negative
 /// alternates: its frequency and ratio are those of the larger such z alone, with an imaginary part

@@ -31,7 +31,7 @@ std::vector<Report> make_reports(const SystemFile& file, const AnalyzeOptions& o
   std::vector<analysis::System<>> systems;
   for (const SystemEntry& entry : file.entries) {
     try {
-      systems.push_back(analysis::to_joint_space(entry.impedance));
+      systems.push_back(entry.system(entry.impedance));
     } catch (const analysis::InvalidSystem& error) {
       throw entry.error(error);
     }

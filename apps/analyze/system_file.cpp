@@ -1,13 +1,17 @@
 #include <dashpot/analysis/null_damping.hpp>
 #include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/controller/yaml/setting_reader.hpp>
 #include <dashpot/controller/yaml/yaml_document.hpp>
 #include <dashpot/controller/yaml/yaml_mapping.hpp>
 
 #include <Eigen/Cholesky>
 #include <array>
 #include <limits>
+#include <stdexcept>
+#include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace dashpot::apps {
 namespace {
@@ -15,7 +19,7 @@ namespace {
 using controller::YamlMapping;
 using controller::YamlNode;
 
-constexpr std::array<std::string_view, 17> kKeys = {"mass",
+constexpr std::array<std::string_view, 20> kKeys = {"mass",
                                                     "damping",
                                                     "stiffness",
                                                     "jacobian",
@@ -25,6 +29,9 @@ constexpr std::array<std::string_view, 17> kKeys = {"mass",
                                                     "jacobian_derivatives",
                                                     "wrench",
                                                     "reflected_inertia",
+                                                    "gear_stiffness",
+                                                    "gear_damping",
+                                                    "position_sensor",
                                                     "payload",
                                                     "null_damping",
                                                     "initial_position",
@@ -69,6 +76,31 @@ void add(const Eigen::MatrixXd& more, const Eigen::MatrixXd& more_error, Eigen::
   error += more_error + kEpsilon * sum.cwiseAbs();
 }
 
+/// Gears that bend between the motors and the links of the joints.
+void read_gears(const YamlMapping& keys, SystemEntry& entry) {
+  const Eigen::Index n = entry.impedance.mass.rows();
+  std::vector<std::string> units(static_cast<std::size_t>(n));
+  Eigen::VectorXd stiffness(n), damping = Eigen::VectorXd::Zero(n);
+  for (const char* key : {"gear_damping", "position_sensor"}) {
+    if (keys.has(key) && !keys.has("gear_stiffness")) throw keys.error(key, "needs gear_stiffness");
+  }
+  if (!keys.has("gear_stiffness")) return;
+  const auto inertia = per_joint(keys, "reflected_inertia", n);
+  if (!inertia) throw keys.error("gear_stiffness", "needs reflected_inertia, of the motors");
+  constexpr double kRigid = std::numeric_limits<double>::infinity();
+  controller::read_numbers(keys, "gear_stiffness", units, controller::kPositive, stiffness, kRigid);
+  controller::read_numbers(keys, "gear_damping", units, controller::kNotNegative, damping);
+  bool link = false;
+  controller::read_choice(
+      keys, "position_sensor",
+      std::array<std::pair<std::string_view, bool>, 2>{{{"motor", false}, {"link", true}}}, link);
+  try {
+    entry.gears = analysis::Gears({stiffness, damping, *inertia, entry.friction, link});
+  } catch (const std::invalid_argument& error) {
+    throw keys.error("gear_stiffness", error.what());
+  }
+}
+
 /// What is there besides the matrices given: inertia of drives and of a point mass at the origin of
 /// the task, and damping in the null space.
 void read_additions(const YamlMapping& keys, SystemEntry& entry) {
@@ -79,6 +111,7 @@ void read_additions(const YamlMapping& keys, SystemEntry& entry) {
   if (const auto inertia = per_joint(keys, "reflected_inertia", n); inertia && square) {
     add(inertia->asDiagonal(), Eigen::MatrixXd::Zero(n, n), impedance.mass, impedance.mass_error);
   }
+  if (square) read_gears(keys, entry);
   if (const YamlNode* node = keys.find("payload")) {
     const double payload = keys.quantity("payload", *node, "kg", "");
     if (payload < 0) throw keys.error("payload", "is negative");
@@ -133,6 +166,9 @@ SystemEntry read_entry(const YamlNode& node, const std::string& prefix) {
   entry.impulse = joint_vector(keys, "impulse", n);
   entry.force = joint_vector(keys, "force", n);
   entry.times = keys.vector("times");
+  if (entry.times && entry.gears.any()) {
+    throw keys.error("times", "does not go with gear_stiffness");
+  }
   if (entry.times) {
     for (Eigen::Index i = 0; i < entry.times->size(); ++i) {
       if ((*entry.times)[i] < 0) {
@@ -144,6 +180,12 @@ SystemEntry read_entry(const YamlNode& node, const std::string& prefix) {
 }
 
 }  // namespace
+
+analysis::System<> SystemEntry::system(const analysis::TaskImpedance& given) const {
+  analysis::System<> result = analysis::to_joint_space(given);
+  if (gears.any()) gears.extend(result);
+  return result;
+}
 
 const char* const kSystemFileHelp =
     R"(FILE is YAML or JSON: one system, or a list of systems. "-" reads standard input.
@@ -159,6 +201,8 @@ Tables and messages count the systems of a list from 0: [0].mass is that of the 
                     n matrices m x n, dJ/dq_k, and the wrench (m) of the task spring at
                     equilibrium: adds the geometric stiffness [(dJ/dq_1)' f ...]
   reflected_inertia n, of drives, added to the diagonal of mass
+  gear_stiffness    n, of gears that bend between motors with that inertia and their links; none:
+                    rigid; with gear_damping (n) and position_sensor (motor or link)
   payload           a mass, kg, at the origin of a task of six directions, added to mass
   null_damping      n, damping of the motions that task_stiffness leaves free, as a
                     controller adds it: N' diag(null_damping) N, see docs/command-line.md

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/analysis/gears.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/controller/input_error.hpp>
 
@@ -18,6 +19,7 @@ struct SystemEntry {
   analysis::TaskImpedance impedance;  ///< with all that the keys add
   /// The part of its damping that the joints supply themselves, n x n; none if empty.
   Eigen::MatrixXd friction;
+  analysis::Gears gears;  ///< of elastic joints, with `friction`; none if there are none
   std::optional<Eigen::VectorXd> initial_position;  ///< q(0), n
   std::optional<Eigen::VectorXd> initial_velocity;  ///< q'(0), n
   std::optional<Eigen::VectorXd> impulse;           ///< at t = 0, n
@@ -30,6 +32,10 @@ struct SystemEntry {
   /// Adds N' D N, the damping D (n x n) of what task_stiffness leaves free, to the damping. Does
   /// nothing where mass or task do not allow it, which analysis::to_joint_space then says.
   void add_null_damping(const Eigen::MatrixXd& D);
+
+  /// Returns the system that an impedance, `impedance` or one with another damping, makes with the
+  /// gears. Throws analysis::InvalidSystem.
+  analysis::System<> system(const analysis::TaskImpedance& given) const;
 
   /// The error of this entry that an exception of the analysis reports.
   InputError error(const analysis::InvalidSystem& cause) const;

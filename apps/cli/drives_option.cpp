@@ -1,9 +1,12 @@
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/matrix_json.hpp>
+#include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/input_error.hpp>
 
 #include <cstdio>
+#include <limits>
 #include <sstream>
 
 namespace dashpot::apps {
@@ -34,6 +37,43 @@ void take_accepted(const std::string& accepted, controller::ModelOptions& model)
 void warn_of(const controller::RobotModel& model) {
   for (const std::string& warning : model.warnings()) {
     std::fprintf(stderr, "warning: %s\n", warning.c_str());
+  }
+}
+
+void add_gear_options(CLI::App& command, GearOptions& options) {
+  command
+      .add_option("--gear-stiffness", options.stiffness,
+                  "Of gears that bend, N m/rad; none: rigid. Needs reflected inertia")
+      ->option_text("a,b,...|x (none)");
+  command.add_option("--gear-damping", options.damping, "Of these gears, N m s/rad")
+      ->option_text("a,b,...|x (0)");
+  command
+      .add_option("--position-sensor", options.position_sensor,
+                  "On which side of them joint positions are measured")
+      ->check(CLI::IsMember({"motor", "link"}))
+      ->option_text("motor|link (motor)");
+}
+
+void take_gears(const GearOptions& options, const controller::RobotModel& plain,
+                controller::ModelOptions& model) {
+  if (options.stiffness.empty()) {
+    if (!options.damping.empty()) {
+      throw controller::InputError("--gear-damping", "needs --gear-stiffness, N m/rad");
+    }
+    if (!options.position_sensor.empty()) {
+      throw controller::InputError("--position-sensor", "needs --gear-stiffness, N m/rad");
+    }
+    return;
+  }
+  model.gear_stiffness = quantities_per_joint("--gear-stiffness", options.stiffness,
+                                              controller::joint_units(plain, "N m/rad", "N/m"),
+                                              std::numeric_limits<double>::infinity());
+  if (!options.damping.empty()) {
+    model.gear_damping = quantities_per_joint("--gear-damping", options.damping,
+                                              controller::joint_units(plain, "N m s/rad", "N s/m"));
+  }
+  if (options.position_sensor == "link") {
+    model.position_sensor = controller::PositionSensor::kLink;
   }
 }
 

@@ -23,6 +23,21 @@ void take_accepted(const std::string& accepted, controller::ModelOptions& model)
 
 /// Tells people at the terminal what is doubtful about the description of the arm.
 void warn_of(const controller::RobotModel& model);
+/// What is told of gears that bend; lists of quantities between commas, or one for all joints.
+struct GearOptions {
+  std::string stiffness;        ///< N m/rad; "none": rigid
+  std::string damping;          ///< N m s/rad
+  std::string position_sensor;  ///< motor or link; empty: motor
+
+  bool any() const { return !stiffness.empty() || !damping.empty() || !position_sensor.empty(); }
+};
+
+/// Adds --gear-stiffness, --gear-damping and --position-sensor.
+void add_gear_options(CLI::App& command, GearOptions& options);
+
+/// Has `model` take the gears of an arm with the joints of `plain`. Throws InputError.
+void take_gears(const GearOptions& options, const controller::RobotModel& plain,
+                controller::ModelOptions& model);
 
 /// Figures, source and doubt of the published drives of this name.
 nlohmann::ordered_json drives_json(const std::string& name);

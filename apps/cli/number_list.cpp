@@ -3,6 +3,7 @@
 #include <dashpot/controller/yaml/quantity.hpp>
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <limits>
 #include <sstream>
@@ -22,7 +23,9 @@ std::vector<std::string> split(const std::string& text) {
   return words;
 }
 
-double parse(const std::string& option, const std::string& word, const std::string& unit) {
+double parse(const std::string& option, const std::string& word, const std::string& unit,
+             double none = controller::kNoNone) {
+  if (!std::isnan(none) && word == "none") return none;
   try {
     return controller::parse_quantity(word, unit);
   } catch (const std::invalid_argument& error) {
@@ -52,17 +55,17 @@ Eigen::VectorXd parse_quantities(const std::string& option, const std::string& t
 }
 
 Eigen::VectorXd quantities_per_joint(const std::string& option, const std::string& text,
-                                     const Units& units) {
-  const std::size_t given = split(text).size();
+                                     const Units& units, double none) {
+  const std::vector<std::string> words = split(text);
+  const std::size_t given = words.size();
   if (given != 1 && given != units.size()) {
     throw InputError(
         option, std::to_string(given) + " numbers, expected 1 or " + std::to_string(units.size()));
   }
-  std::string all = text;
-  if (given == 1) {
-    for (std::size_t i = 1; i < units.size(); ++i) all += "," + text;
+  Eigen::VectorXd values(static_cast<Eigen::Index>(units.size()));
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    values[static_cast<Eigen::Index>(i)] = parse(option, words[given == 1 ? 0 : i], units[i], none);
   }
-  Eigen::VectorXd values = parse_quantities(option, all, units);
   if (values.minCoeff() < 0) throw InputError(option, "a number is negative");
   return values;
 }

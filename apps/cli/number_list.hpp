@@ -13,9 +13,11 @@ namespace dashpot::apps {
 Eigen::VectorXd parse_quantities(const std::string& option, const std::string& text,
                                  const controller::Units& units);
 
-/// The same, none negative; a single one is that of all joints.
+/// The same, none negative; a single one is that of all joints. Unless `none` is NaN, the word none
+/// stands for it.
 Eigen::VectorXd quantities_per_joint(const std::string& option, const std::string& text,
-                                     const controller::Units& units);
+                                     const controller::Units& units,
+                                     double none = controller::kNoNone);
 
 /// Checks that an option is a quantity from `least` to `most`, in the SI unit `unit`, and turns it
 /// into a number without unit, as CLI::Option::transform asks for; `what` says what is wanted.

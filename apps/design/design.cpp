@@ -50,6 +50,7 @@ analysis::LoopLimit limit_of(const SystemEntry& entry, const DesignOptions& opti
   analysis::LoopLimit limit = options.limit;
   limit.loop.period = *options.period;
   limit.loop.friction = entry.friction;
+  limit.loop.gears = entry.gears;
   if (options.integral_time > 0) {
     analysis::to_joint_space(given);  // throws for wrong sizes
     limit.loop.memory = controller::integral_memory(
@@ -104,9 +105,16 @@ DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) t
   const auto largest = analysis::Pivot::kLargest;
   SystemEntry plain = entry;  // no responses
   plain.times.reset();
-  report.before = make_report(plain, analysis::to_joint_space(entry.impedance), spectrum, largest);
+  report.before = make_report(plain, entry.system(entry.impedance), spectrum, largest);
   plain.impedance = report.impedance;
-  report.after = make_report(plain, report.design.system, spectrum, largest);
+  analysis::System<> after = report.design.system;
+  if (entry.gears.any()) entry.gears.extend(after);
+  report.after = make_report(plain, after, spectrum, largest);
+  if (entry.gears.any()) {
+    if (options.sensitivity) throw InputError("--sensitivity", "does not go with gears that bend");
+    report.notes.emplace_back(
+        "the damping is designed as if no gear gave way; the modes are those with gears that bend");
+  }
   if (options.sensitivity) {
     report.sensitivities = analysis::sensitivities(report.design.system, report.after.spectrum);
   }

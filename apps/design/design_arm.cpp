@@ -4,6 +4,7 @@
 #include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/rotors.hpp>
 
 #include <Eigen/Core>
@@ -72,6 +73,7 @@ RobotModel read_model(const ArmOptions& options) try {
   const auto inertia =
       per_joint("--reflected-inertia", options.reflected_inertia, plain, "kg m^2", "kg");
   if (inertia) model.reflected_inertia = *inertia;
+  take_gears(options.gears, plain, model);
   model.drives_friction = options.viscous_friction == "drives";
   if (model.drives_friction && options.drives.empty()) {
     throw InputError("--viscous-friction", "drives: there are none; name them with --drives");
@@ -113,7 +115,7 @@ bool ArmOptions::any() const {
                            &drives, &payload, &accept_inertias}) {
     if (!text->empty()) return true;
   }
-  return posture.outside_limits;
+  return posture.outside_limits || gears.any();
 }
 
 SystemEntry read_arm(const ArmOptions& options, const RobotModel& model,
@@ -148,6 +150,7 @@ SystemEntry read_arm(const ArmOptions& options, const RobotModel& model,
     entry.friction = friction.asDiagonal();
     entry.impedance.damping = entry.friction;
   }
+  entry.gears = controller::elastic_joints(model);
   if (const auto null =
           per_joint("--null-damping", options.null_damping, model, "N m s/rad", "N s/m")) {
     entry.add_null_damping(Eigen::MatrixXd(null->asDiagonal()));

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/controller/robot_model.hpp>
 
@@ -20,6 +21,7 @@ struct ArmOptions {
   std::string null_damping;       ///< of the motions that the task leaves free, N m s/rad
   std::string reflected_inertia;  ///< kg m^2
   std::string drives;             ///< name of public figures
+  GearOptions gears;
   /// Mass at the tip, its center, and its inertia about that: m, or m,x,y,z, or with
   /// xx,yy,zz[,xy,xz,yz]; kg, m, kg m^2.
   std::string payload;

@@ -65,6 +65,7 @@ void add_model_options(CLI::App& command, ArmOptions& arm) {
   add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
       "a,b,...|x (0)");
   command.add_option("--drives", arm.drives, kDrivesHelp)->option_text("NAME")->check(not_empty());
+  add_gear_options(command, arm.gears);
   add("--payload", arm.payload,
       "Mass at the tip, its center in the tip's axes, its inertia about that; kg, m, kg m^2",
       "m[,x,y,z[,xx,yy,zz[,xy,xz,yz]]] (0)");

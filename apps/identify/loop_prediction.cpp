@@ -80,7 +80,10 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
                                                               const ModelCorrection& correction,
                                                               int delay) const {
   const controller::Settings& settings = config_.settings;
-  controller::PostureLoop loop(config_.model, settings);
+  controller::RobotDescription rigid = config_.robot;  // what the controller feeds back
+  rigid.options.gear_stiffness.resize(0);
+  const bool elastic = config_.model.elastic_joints() > 0;
+  controller::PostureLoop loop(elastic ? rigid.model() : config_.model, settings);
   analysis::System<controller::kMaxJoints> believed;
   const controller::Status status =
       loop.closed_loop(q, settings.initial.gains, settings.initial.mode, believed);
@@ -115,6 +118,12 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
       system.stiffness_factor.resize(0, q.size());
     }
   }
+  const analysis::Gears gears = controller::elastic_joints(arm);
+  if (gears.any()) {
+    gears.extend(outside, system);
+    sampled.gears = gears;
+    sampled = analysis::with_gears(sampled);
+  }
   const auto spectrum = analysis::analyze(system);
   const auto modes = analysis::sample_loop(system, spectrum, sampled).modes;
   std::vector<PredictedMode> predicted;
@@ -125,7 +134,8 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
     const auto& shape = spectrum.modes[static_cast<int>(i)].shapes[0];
     mode.shape.resize(static_cast<Index>(joint_.size()));
     for (std::size_t c = 0; c < joint_.size(); ++c) {
-      mode.shape[static_cast<Index>(c)] = shape[joint_[c]];
+      mode.shape[static_cast<Index>(c)] =
+          shape[gears.any() ? gears.measured(joint_[c]) : joint_[c]];
     }
     predicted.push_back(std::move(mode));
   }

@@ -29,6 +29,7 @@ struct InspectOptions {
   std::string urdf, base, tip;
   PostureOption posture;
   std::string qd, gravity, reflected_inertia, drives, accept_inertias;
+  GearOptions gears;
   bool exclude_off_chain = false;
   bool json = false;
 };
@@ -49,12 +50,15 @@ RobotModel read_model(const InspectOptions& options) {
   }
   take_drives(options.drives, model);
   try {
-    if (!options.reflected_inertia.empty()) {
+    if (!options.reflected_inertia.empty() || options.gears.any()) {
       const RobotModel plain =
           RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
-      model.reflected_inertia =
-          quantities_per_joint("--reflected-inertia", options.reflected_inertia,
-                               controller::joint_units(plain, "kg m^2", "kg"));
+      if (!options.reflected_inertia.empty()) {
+        model.reflected_inertia =
+            quantities_per_joint("--reflected-inertia", options.reflected_inertia,
+                                 controller::joint_units(plain, "kg m^2", "kg"));
+      }
+      take_gears(options.gears, plain, model);
     }
     return RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
   } catch (const controller::InvalidModel& error) {
@@ -92,6 +96,10 @@ nlohmann::ordered_json json_joints(const RobotModel& model) {
                                      {"deceleration", joint.deceleration},
                                      {"jerk", joint.jerk}}) {
       if (std::isfinite(value)) list.back()[key] = value;
+    }
+    if (joint.elastic()) {
+      list.back()["gear_stiffness"] = joint.gear_stiffness;
+      list.back()["gear_damping"] = joint.gear_damping;
     }
   }
   return list;
@@ -144,6 +152,10 @@ std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics
     }
   }
   add("reflected", "inertia", model.joint_values(&Joint::reflected_inertia));
+  if (model.elastic_joints() > 0) {
+    add("gear", "stiffness", model.joint_values(&Joint::gear_stiffness));
+    add("gear", "damping", model.joint_values(&Joint::gear_damping));
+  }
   add("", "q", q);
   add("", "qd", qd);
   add("Coriolis", "torque", dynamics.coriolis);
@@ -275,6 +287,7 @@ void add_inspect(CLI::App& program) {
       "Of rotors and gears at the joints, kg m^2 or kg; one number is that of all joints",
       "a,b,... (0)");
   add("--drives", &InspectOptions::drives, kDrivesHelp, "NAME")->check(not_empty());
+  add_gear_options(*command, options->gears);
   command->add_flag("--exclude-off-chain", options->exclude_off_chain,
                     "Leave out links that hang off the chain");
   add_accept_inertias(*command, options->accept_inertias);

@@ -262,7 +262,8 @@ Json energy_json(const sim::EnergyAudit& energy) {
   return {{"initial", stored(energy.initial)},   {"final", stored(energy.stored)},
           {"by_actuators", energy.by_actuators}, {"by_world", energy.by_world},
           {"viscous_heat", energy.viscous_heat}, {"friction_heat", energy.friction_heat},
-          {"contact_heat", energy.contact_heat}, {"imbalance", energy.imbalance()}};
+          {"contact_heat", energy.contact_heat}, {"gear_heat", energy.gear_heat},
+          {"imbalance", energy.imbalance()}};
 }
 
 Json ring_down_json(const RingDown& ring_down) {

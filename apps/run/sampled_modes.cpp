@@ -1,6 +1,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/apps/run/sampled_modes.hpp>
 #include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <cmath>
@@ -25,7 +26,7 @@ analysis::System<> loop_at_rest(const Scene& scene) {
   }
   analysis::System<controller::kMaxJoints> system;
   controller.closed_loop(system);
-  analysis::System<> result(scene.dof());
+  analysis::System<> result(system.dof());
   result.mass = system.mass;
   result.damping = system.damping;
   result.stiffness = system.stiffness;
@@ -56,6 +57,8 @@ SampledModes sampled_modes(const Scene& scene) {
   loop.memory = controller::integral_memory(
       robot, controller::Impedance(scene.steps.front().setpoint, scene.dof()),
       settings.integral.time, loop.period);
+  loop.gears = controller::elastic_joints(model);
+  loop = analysis::with_gears(loop);
   const analysis::System<> system = loop_at_rest(scene);
   SampledModes result;
   result.continuous = analysis::analyze(system);

@@ -1,7 +1,9 @@
+#include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/apps/scene/scene_parts.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 
+#include <algorithm>
 #include <filesystem>
 
 namespace dashpot::apps {
@@ -21,6 +23,8 @@ sim::RobotParameters believed(const controller::Config& config) {
   parameters.reflected_inertia = config.model.joint_values(&Joint::reflected_inertia);
   parameters.viscous_friction = config.model.joint_values(&Joint::viscous_friction);
   parameters.coulomb_friction = config.model.joint_values(&Joint::coulomb_friction);
+  parameters.gear_stiffness = config.model.joint_values(&Joint::gear_stiffness);
+  parameters.gear_damping = config.model.joint_values(&Joint::gear_damping);
   parameters.gravity = options.gravity;
   parameters.accept_inertias = true;  // the controller's model has judged them
   parameters.payload = {options.payload.mass, options.payload.center, options.payload.inertia};
@@ -50,6 +54,9 @@ void read_arm(const YamlNode& document, const std::filesystem::path& directory, 
   const controller::RobotDescription robot = config.robot;
   const Units positions = controller::joint_units(config.model, "rad", "m");
   ArmSimulation simulation{believed(config), {}};
+  if (config.model.position_sensor() == controller::PositionSensor::kLink) {
+    simulation.options.position_sensor = sim::PositionSensor::kLink;
+  }
   scene.plant.period = config.settings.period;
   scene.commands = command_limits(root, config);
   read_simulation(root, positions, scene.plant, &simulation);
@@ -89,8 +96,25 @@ void read_system(const YamlNode& document, Scene& scene) {
   read_scenario(root, positions, scene);
 }
 
+/// Throws if fixed steps are too long for elastic gears: they would be damped by the integrator,
+/// and an arm that rings would look calm.
+void check_steps(const Scene& scene) {
+  constexpr double kFinest = 0.5;  // omega h, at which RK4 damps with a ratio of 2e-4
+  const sim::IntegratorOptions& integrator = scene.plant.integrator;
+  if (!scene.arm || integrator.adaptive) return;
+  const double omega = sim::Arm(scene.arm->robot).fastest_gear(scene.start);
+  const double step = std::min(integrator.max_step, scene.plant.period);
+  if (omega * step <= kFinest) return;
+  throw InputError("simulation.integrator.step",
+                   "is " + format_number(step, 3) + " s, too long for gears of " +
+                       format_number(omega, 3) + " rad/s: at most " +
+                       format_number(kFinest / omega, 2) +
+                       " s is possible, or adaptive steps, the default of such arms");
+}
+
 /// Throws unless the simulator takes the scene.
 void check(const Scene& scene) try {
+  check_steps(scene);
   const auto mechanism = make_mechanism(scene);
   const sim::Plant plant(*mechanism, scene.plant, scene.start, scene.velocity);
 } catch (const sim::InvalidScene& error) {

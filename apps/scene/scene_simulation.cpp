@@ -14,6 +14,7 @@ using controller::Units;
 using controller::YamlMapping;
 
 constexpr double kMostSteps = 1000;  // of the integrator in a control period
+constexpr double kRigid = std::numeric_limits<double>::infinity();
 
 /// The unit for each joint: `revolute`, or `prismatic` where a position is in m.
 Units joint_units(const Units& positions, const char* revolute, const char* prismatic) {
@@ -26,10 +27,10 @@ Units joint_units(const Units& positions, const char* revolute, const char* pris
 
 /// Sets `value` to n numbers if the key is there; otherwise it stays empty, which is off.
 void read_joint_option(const YamlMapping& keys, std::string_view key, const Units& units,
-                       const Range& range, JointVector& value) {
+                       const Range& range, JointVector& value, double none = controller::kNoNone) {
   if (!keys.has(key)) return;
   value.resize(static_cast<Eigen::Index>(units.size()));
-  read_numbers(keys, key, units, range, value);
+  read_numbers(keys, key, units, range, value, none);
 }
 
 void read_integrator(const YamlMapping& simulation, double period,
@@ -44,6 +45,8 @@ void read_integrator(const YamlMapping& simulation, double period,
        {"implicit_midpoint", sim::Method::kImplicitMidpoint},
        {"rosenbrock", sim::Method::kRosenbrock}}};
   const YamlMapping keys = simulation.mapping("integrator", kKeys);
+  options.method = sim::IntegratorOptions().method;
+  options.adaptive = false;
   read_choice(keys, "method", kMethods, options.method);
   read_number(keys, "step", "s", kPositive, options.max_step);
   read_switch(keys, "adaptive", options.adaptive);
@@ -87,9 +90,12 @@ void read_contact(const YamlMapping& keys, const char* stiffness, const char* da
 }
 
 void read_robot(const YamlMapping& simulation, const Units& positions, ArmSimulation& arm) {
-  static constexpr std::array<std::string_view, 6> kKeys = {
+  static constexpr std::array<std::string_view, 9> kKeys = {
       "drives",           "reflected_inertia", "viscous_friction",
-      "coulomb_friction", "friction_velocity", "payload"};
+      "coulomb_friction", "gear_stiffness",    "gear_damping",
+      "position_sensor",  "friction_velocity", "payload"};
+  static constexpr std::array<std::pair<std::string_view, sim::PositionSensor>, 2> kSensors = {
+      {{"motor", sim::PositionSensor::kMotor}, {"link", sim::PositionSensor::kLink}}};
   const YamlMapping keys = simulation.mapping("robot", kKeys);
   sim::RobotParameters& parameters = arm.parameters;
   if (keys.has("drives")) try {
@@ -107,6 +113,11 @@ void read_robot(const YamlMapping& simulation, const Units& positions, ArmSimula
                     kNotNegative, parameters.viscous_friction);
   read_joint_option(keys, "coulomb_friction", joint_units(positions, "N m", "N"), kNotNegative,
                     parameters.coulomb_friction);
+  read_joint_option(keys, "gear_stiffness", joint_units(positions, "N m/rad", "N/m"), kPositive,
+                    parameters.gear_stiffness, kRigid);
+  read_joint_option(keys, "gear_damping", joint_units(positions, "N m s/rad", "N s/m"),
+                    kNotNegative, parameters.gear_damping);
+  read_choice(keys, "position_sensor", kSensors, arm.options.position_sensor);
   read_number(keys, "friction_velocity", "rad/s", kPositive, arm.options.friction_velocity);
   static constexpr std::array<std::string_view, 3> kPayload = {"mass", "center", "inertia"};
   const YamlMapping payload = keys.mapping("payload", kPayload);
@@ -140,14 +151,19 @@ void read_simulation(const YamlMapping& root, const Units& positions, sim::Plant
       "integrator", "drives", "sensors", "seed", "robot", "stops", "wall"};
   const YamlMapping keys = root.mapping("simulation", kKeys);
   plant.integrator.max_step = plant.period;
-  read_integrator(keys, plant.period, plant.integrator);
+  if (arm != nullptr) read_robot(keys, positions, *arm);
+  // Gears ring much faster than the arm, and how fast depends on the posture.
+  if (arm != nullptr && (arm->parameters.gear_stiffness.array() < kRigid).any()) {
+    plant.integrator.method = sim::Method::kDormandPrince8;
+    plant.integrator.adaptive = true;
+  }
+  if (keys.has("integrator")) read_integrator(keys, plant.period, plant.integrator);
   read_drives(keys, positions, plant);
   read_sensors(keys, positions, plant);
   int seed = 1;
   read_count(keys, "seed", 0, seed);
   plant.seed = static_cast<std::uint64_t>(seed);
   if (arm != nullptr) {
-    read_robot(keys, positions, *arm);
     read_surroundings(keys, arm->options);
     return;
   }

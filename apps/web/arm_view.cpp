@@ -56,7 +56,7 @@ analysis::System<> loop_at(const controller::Config& config, const Eigen::Vector
   }
   analysis::System<controller::kMaxJoints> system;
   controller.closed_loop(system);
-  analysis::System<> result(q.size());
+  analysis::System<> result(system.dof());
   result.mass = system.mass;
   result.damping = system.damping;
   result.stiffness = system.stiffness;
@@ -113,10 +113,11 @@ ArmJson ArmView::response(const std::vector<double>& position, int mode,
   if (q.size() != dof() || !q.allFinite()) throw std::runtime_error("the arm has other joints");
   const controller::Jacobian J =
       controller::evaluate(config_.model, q, controller::JointVector::Zero(q.size())).J;
-  const Eigen::RowVectorXd d = direction_of(place, J);
   const bool cartesian = mode == state_t::CARTESIAN;
   const analysis::System<> system =
       loop_at(config_, q, cartesian ? controller::Mode::kCartesian : controller::Mode::kJoint);
+  Eigen::RowVectorXd d = Eigen::RowVectorXd::Zero(system.dof());  // of the links, not of motors
+  d.head(J.cols()) = direction_of(place, J);
   const analysis::Spectrum<> spectrum = analysis::analyze(system);
   const analysis::Response response(system, spectrum);
 

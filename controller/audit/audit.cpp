@@ -140,6 +140,7 @@ Audit::Audit(const RobotModel& model, const AuditOptions& options)
     : model_(model),
       options_(options),
       kernel_(model),
+      elastic_(elastic_joints(model)),
       friction_(model.joint_values(&Joint::viscous_friction)),
       impedance_(stated_impedance(options.gains,
                                   {options.mode, options.half_quaternion, options.inertia_blocks},
@@ -227,17 +228,22 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
   LoopSystem loop;
   analysis::System<kMaxJoints> system;
   loop.form(robot, impedance, null_space, friction_, system);
+  if (elastic_.any()) elastic_.extend_factored(system);
+  if (system.stiffness_factor.rows() == 0) return audit(q).numbers;
   analysis::ElasticForm<kMaxJoints> form;
   Eigen::Matrix<analysis::Complex, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxJoints, 1> values;
   PostureNumbers result;
   const bool clear = analysis::to_elastic_form(system, form) == analysis::Status::kOk &&
-                     form.slowest > options_.soft_frequency && form.modes() == springs_ &&
+                     form.slowest > options_.soft_frequency &&
+                     form.modes() == springs_ + elastic_.count() &&
                      analysis::elastic_eigenvalues(form, values) == analysis::Status::kOk &&
                      read_eigenvalues(values, options_.soft_frequency, result);
   if (!clear) return audit(q).numbers;
   result.zero_modes = model_.dof() - springs_;
   if (options_.period > 0) try {
-      const analysis::SampledLoop sampled = loop_at(robot, impedance_at(robot));
+      analysis::SampledLoop sampled = loop_at(robot, impedance_at(robot));
+      sampled.gears = elastic_;
+      sampled = analysis::with_gears(sampled);
       result.gain_margin = analysis::gain_margin(form, sampled, 1e6, options_.soft_frequency);
     } catch (const std::runtime_error&) {
       result.gain_margin = kNan;
@@ -279,9 +285,15 @@ analysis::TaskImpedance Audit::task_impedance(const DynamicsResult& robot) const
   return result;
 }
 
+analysis::System<> Audit::system_of(const analysis::TaskImpedance& impedance) const {
+  analysis::System<> system = analysis::to_joint_space(impedance);
+  if (elastic_.any()) elastic_.extend(system);
+  return system;
+}
+
 PostureAudit Audit::audit(const JointVector& q) const {
   const DynamicsResult robot = evaluate(q);
-  const analysis::System<> system = analysis::to_joint_space(task_impedance(robot));
+  const analysis::System<> system = system_of(task_impedance(robot));
   PostureAudit result;
   result.q = q;
   analysis::SpectrumOptions options;
@@ -290,7 +302,9 @@ PostureAudit Audit::audit(const JointVector& q) const {
   read_spectrum(result);
   result.numbers.singular = result.numbers.zero_modes > model_.dof() - springs_;
   if (options_.period == 0) return result;
-  const analysis::SampledLoop loop = loop_at(robot, impedance_at(robot));
+  analysis::SampledLoop loop = loop_at(robot, impedance_at(robot));
+  loop.gears = elastic_;
+  loop = analysis::with_gears(loop);
   result.numbers.gain_margin =
       analysis::gain_margin(system, result.spectrum, loop, 1e6, options_.soft_frequency);
   if (options_.integral_time > 0) {
@@ -307,7 +321,7 @@ MissingRotors Audit::missing_rotors(const PostureAudit& found) const {
   if (options_.period > 0 && found.numbers.gain_margin >= options_.margin) {
     missing.inertia = JointVector::Zero(model_.dof());
   } else if (options_.period > 0) {
-    const analysis::System<> system = analysis::to_joint_space(task_impedance(evaluate(found.q)));
+    const analysis::System<> system = system_of(task_impedance(evaluate(found.q)));
     missing.inertia = enough_reflected_inertia(
         model_, system, options_.period, [&](const RobotModel& with_rotors) {
           return Audit(with_rotors, options_).numbers(found.q).gain_margin >= options_.margin;
@@ -322,8 +336,9 @@ MissingRotors Audit::missing_rotors(const PostureAudit& found) const {
   const Audit with_rotors(with_at_least(model_, missing.compared), options_);
   const PostureAudit with = with_rotors.audit(found.q);
   missing.numbers = with.numbers;
-  missing.damping_ratios =
-      paired_ratios(with_rotors.evaluate(found.q).M, found.spectrum, with.spectrum);
+  MatrixXd mass = with_rotors.evaluate(found.q).M;
+  if (elastic_.any()) with_rotors.elastic_.extend_mass(mass);
+  missing.damping_ratios = paired_ratios(mass, found.spectrum, with.spectrum);
   return missing;
 }
 
@@ -363,8 +378,8 @@ DampingSuggestion Audit::suggest(const JointVector& q, double ratio) const {
     PostureAudit posture;
     analysis::SpectrumOptions options;
     options.soft_frequency = options_.soft_frequency;
-    posture.spectrum = analysis::analyze(
-        analysis::to_joint_space(analysis::with_damping(impedance, damping)), options);
+    posture.spectrum =
+        analysis::analyze(system_of(analysis::with_damping(impedance, damping)), options);
     read_spectrum(posture);
     return posture.numbers.smallest_ratio;
   };

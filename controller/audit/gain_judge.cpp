@@ -39,6 +39,7 @@ GainJudge::GainJudge(const RobotModel& model, const Settings& settings)
       bare_(unloaded(model)),
       loaded_(model.attachment().mass > 0),
       loop_(sampled_loop(model, settings)),
+      elastic_(elastic_joints(model)),
       posture_loop_(model, judging(settings)) {}
 
 GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
@@ -61,6 +62,7 @@ GainJudge::Verdict GainJudge::judge(const JointVector& q, const Gains& gains) {
     if (found < worst.margin) worst = {found, mode};
     if (!known || !loaded_ || !counts_payload(gains, mode)) continue;
     system.mass = bare.M;
+    if (elastic_.any()) elastic_.extend_mass(system.mass);
     const double enough = std::min(kDropped, wanted);
     const double dropped = margin(system, gravity_of(bare_, q), enough);
     if (dropped < std::min(enough, worst.margin)) worst = {dropped, mode, true};
@@ -87,7 +89,7 @@ std::string GainJudge::missing(const Verdict& verdict, const Gains& gains) const
   PostureLoop loop(model, judging(settings_));
   analysis::System<kMaxJoints> closed;
   if (loop.closed_loop(verdict.q, gains, verdict.mode, closed) != Status::kOk) return missing;
-  analysis::System<> system(verdict.q.size());
+  analysis::System<> system(closed.dof());
   system.mass = closed.mass;
   system.damping = closed.damping;
   system.stiffness = closed.stiffness;
@@ -116,13 +118,15 @@ Eigen::MatrixXd GainJudge::gravity_of(const DynamicsKernel& kernel, const JointV
 
 double GainJudge::margin(const analysis::System<kMaxJoints>& system, const Eigen::MatrixXd& gravity,
                          double enough) try {
-  loop_.gravity_gradient = gravity;
+  analysis::SampledLoop loop = loop_;
+  loop.gravity_gradient = gravity;
+  loop.gears = elastic_;
+  loop = analysis::with_gears(loop);
   analysis::SpectrumSolver<kMaxJoints> solver;
   analysis::Spectrum<kMaxJoints> spectrum;
   const analysis::Status solved = solver.solve(system, spectrum);
   if (solved != analysis::Status::kOk && solved != analysis::Status::kUncertified) return 0;
-  return std::min(enough,
-                  analysis::gain_margin(system, spectrum, loop_, enough, kSlowestVibration));
+  return std::min(enough, analysis::gain_margin(system, spectrum, loop, enough, kSlowestVibration));
 } catch (const std::exception&) {  // no convergence
   return 0;
 }

@@ -2,6 +2,7 @@
 #include <dashpot/controller/drives.hpp>
 
 #include <Eigen/Geometry>
+#include <limits>
 
 namespace dashpot::controller {
 namespace {
@@ -50,10 +51,31 @@ std::string required_text(const YamlMapping& root, const YamlMapping& robot, std
 }
 
 void read_joint_option(const YamlMapping& robot, std::string_view key, const Units& units,
-                       JointVector& option) {
+                       JointVector& option, const Range& range = kNotNegative,
+                       double none = kNoNone) {
   if (!robot.has(key)) return;
   option.resize(static_cast<Eigen::Index>(units.size()));
-  read_numbers(robot, key, units, kNotNegative, option);
+  read_numbers(robot, key, units, range, option, none);
+}
+
+/// What is told of gears that bend, and of torque controllers inside the drives.
+void read_gears(const YamlMapping& keys, const RobotModel& model, ModelOptions& options) {
+  read_joint_option(keys, "torque_loop_inertia_ratio", joint_units(model, "", ""),
+                    options.torque_loop_inertia_ratio, Range{0, false, 1});
+  if (options.torque_loop_inertia_ratio.size() > 0 && options.reflected_inertia.size() == 0) {
+    throw keys.error("torque_loop_inertia_ratio", "needs reflected_inertia, kg m^2, or drives");
+  }
+  read_joint_option(keys, "gear_stiffness", joint_units(model, "N m/rad", "N/m"),
+                    options.gear_stiffness, kPositive, std::numeric_limits<double>::infinity());
+  read_joint_option(keys, "gear_damping", joint_units(model, "N m s/rad", "N s/m"),
+                    options.gear_damping);
+  if (keys.has("gear_damping") && !keys.has("gear_stiffness")) {
+    throw keys.error("gear_damping", "needs gear_stiffness, N m/rad");
+  }
+  read_choice(keys, "position_sensor",
+              std::array<std::pair<std::string_view, PositionSensor>, 2>{
+                  {{"motor", PositionSensor::kMotor}, {"link", PositionSensor::kLink}}},
+              options.position_sensor);
 }
 
 /// Takes the drives that the keys name into `robot`, and returns its model.
@@ -85,7 +107,7 @@ Units joint_units(const RobotModel& model, const char* revolute, const char* pri
 }
 
 RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path& directory) try {
-  static constexpr std::array<std::string_view, 13> kKeys = {"urdf",
+  static constexpr std::array<std::string_view, 17> kKeys = {"urdf",
                                                              "base",
                                                              "tip",
                                                              "gravity",
@@ -96,6 +118,10 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
                                                              "drives_friction",
                                                              "viscous_friction",
                                                              "coulomb_friction",
+                                                             "torque_loop_inertia_ratio",
+                                                             "gear_stiffness",
+                                                             "gear_damping",
+                                                             "position_sensor",
                                                              "payload",
                                                              "tool"};
   const YamlMapping keys = root.mapping("robot", kKeys);
@@ -129,6 +155,7 @@ RobotDescription read_robot(const YamlMapping& root, const std::filesystem::path
   read_joint_option(keys, "viscous_friction", damping, options.viscous_friction);
   read_joint_option(keys, "coulomb_friction", joint_units(model, "N m", "N"),
                     options.coulomb_friction);
+  read_gears(keys, model, options);
   robot.model();  // throws what is wrong with it
   return robot;
 } catch (const InvalidModel& error) {

@@ -6,7 +6,8 @@ LoopAnalysis::LoopAnalysis(const RobotModel& model, const Settings& settings)
     : n_(model.dof()),
       settings_(settings),
       outside_(!settings.environment.none()),
-      vibration_(settings) {
+      elastic_(elastic_joints(model)),
+      vibration_(settings, static_cast<int>(elastic_.coordinates())) {
   if (settings.analysis.sampled.interval > 0) {
     sampled_ = std::make_unique<SampledAnalysis>(model, settings);
   }
@@ -42,14 +43,15 @@ void LoopAnalysis::find_modes(const Loop& loop) noexcept {
   task.tick = loop.tick;
   task.position = now.q;
   task.springs = true;
-  if (with_wrench || with_velocity) {
+  if (with_wrench || with_velocity || (outside_ && elastic_.any())) {
     closed_loop(loop, task.system);
   } else {
     std::optional<Impedance> both;
     if (outside_) add_environment(settings_.environment, both.emplace(loop.acting.impedance));
     loop_.form(now.robot, outside_ ? *both : loop.acting.impedance, loop.acting.null_space,
                loop.acting.friction, task.system);
-    task.springs = task.system.stiffness_factor.rows() > 0;
+    if (elastic_.any()) elastic_.extend_factored(task.system);
+    task.springs = elastic_.any() || task.system.stiffness_factor.rows() > 0;
   }
   vibration_.update();
 }
@@ -74,19 +76,29 @@ bool LoopAnalysis::unchanged(const Loop& loop, bool with_wrench, bool with_veloc
   return same && !settled;
 }
 
+void LoopAnalysis::closed_loop(const Loop& loop,
+                               analysis::System<kMaxJoints>& system) const noexcept {
+  controller::closed_loop(loop.now.robot, loop.now.qd, loop.acting, settings_, system);
+  if (elastic_.any()) elastic_.extend(passive(loop), system);
+}
+
+PassivePart LoopAnalysis::passive(const Loop& loop) const noexcept {
+  const Jacobian& J = loop.now.robot.J;
+  const Load load = settings_.task_terms.load;
+  JointMatrix of_load = JointMatrix::Zero(n_, n_);
+  if (load != Load::kIgnored) of_load = stiffness_of_load(J, load, loop.now.external_wrench);
+  return passive_part(J, settings_.environment, of_load);
+}
+
 void LoopAnalysis::hand_over(const Loop& loop) noexcept {
   const Sensed& now = loop.now;
-  const Jacobian& J = now.robot.J;
   SampledAnalysis::Task& task = sampled_->task();
   task.time = now.time;
   task.tick = loop.tick;
   task.position = now.q;
   task.attachment = loop.attachment;
   closed_loop(loop, task.system);
-  const Load load = settings_.task_terms.load;
-  JointMatrix of_load = JointMatrix::Zero(n_, n_);
-  if (load != Load::kIgnored) of_load = stiffness_of_load(J, load, now.external_wrench);
-  task.passive = passive_part(J, settings_.environment, of_load);
+  task.passive = passive(loop);
   task.integral.resize(0, 0);
   if (settings_.integral.time > 0) {
     task.integral = integral_stiffness(now.robot, loop.acting.impedance, settings_.integral.time);

@@ -33,9 +33,7 @@ class LoopAnalysis {
   /// Fetches what another thread found.
   void collect() noexcept { vibration_.collect(); }
   /// Sets `system` to a loop, with the terms and the environment of the settings.
-  void closed_loop(const Loop& loop, analysis::System<kMaxJoints>& system) const noexcept {
-    controller::closed_loop(loop.now.robot, loop.now.qd, loop.acting, settings_, system);
-  }
+  void closed_loop(const Loop& loop, analysis::System<kMaxJoints>& system) const noexcept;
 
   const Vibration& result() const noexcept { return vibration_.result(); }
   /// Returns the analysis of the sampled loop; null unless Analysis::Sampled asks for it.
@@ -56,10 +54,12 @@ class LoopAnalysis {
   /// Whether the loop is that of the last analysis, exactly.
   bool unchanged(const Loop& loop, bool with_wrench, bool with_velocity) noexcept;
   void hand_over(const Loop& loop) noexcept;
+  PassivePart passive(const Loop& loop) const noexcept;
 
   const int n_;
   const Settings settings_;
   const bool outside_;  ///< whether there is an environment
+  const analysis::Gears elastic_;
   VibrationAnalysis vibration_;
   LoopSystem loop_;
   std::unique_ptr<SampledAnalysis> sampled_;

@@ -32,6 +32,15 @@ JointVector RobotModel::joint_values(double Joint::*property) const {
   return values;
 }
 
+int RobotModel::elastic_joints() const noexcept {
+  int count = 0;
+  for (const Joint& joint : joints()) count += joint.elastic() ? 1 : 0;
+  return count;
+}
+PositionSensor RobotModel::position_sensor() const noexcept {
+  return data_->position_sensor;
+}
+
 const Attachment& RobotModel::attachment() const noexcept {
   return data_->attachment;
 }

@@ -16,6 +16,7 @@ struct RobotModel::Data {
   KDL::Frame tip_link;              ///< in the last joint's segment
   Attachment attachment;
   std::vector<std::string> warnings;
+  PositionSensor position_sensor = PositionSensor::kMotor;
 
   /// Puts what is attached into the chain's last two segments.
   void attach(const Attachment& given);

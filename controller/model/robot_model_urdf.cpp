@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 
 namespace dashpot::controller {
 namespace {
@@ -104,6 +105,53 @@ void apply(const JointVector& option, double Joint::*property, const std::string
   }
 }
 
+/// Throws what is wrong with elastic joints.
+void check_gears(const std::vector<Joint>& joints, const std::string& name) {
+  std::size_t elastic = 0;
+  for (const Joint& joint : joints) {
+    if (!(joint.gear_stiffness > 0)) {
+      refuse(name, "joint", joint.name, "gear stiffness is not a positive number, N m/rad");
+    }
+    if (!joint.elastic()) continue;
+    ++elastic;
+    if (joint.reflected_inertia > 0) continue;
+    std::ostringstream stiffness;
+    stiffness << joint.gear_stiffness;
+    refuse(name, "joint", joint.name,
+           "a gear stiffness of " + stiffness.str() +
+               " N m/rad needs the reflected inertia (kg m^2) of the motor behind it");
+  }
+  const std::size_t most = static_cast<std::size_t>(kMaxJoints) - joints.size();
+  if (elastic <= most) return;
+  throw InvalidModel(name + ": gear stiffness: " + std::to_string(elastic) + " of " +
+                     std::to_string(joints.size()) + " joints are elastic, at most " +
+                     std::to_string(most) + " of so many can be; give the others none");
+}
+
+/// Sets the gears, and what the drives' torque controllers make of the reflected inertia.
+void apply_gears(const ModelOptions& options, std::vector<Joint>& joints, const std::string& name) {
+  apply(options.gear_damping, &Joint::gear_damping, "gear damping", joints, name);
+  const auto n = static_cast<Eigen::Index>(joints.size());
+  for (const auto& [option, key] :
+       {std::pair(&options.gear_stiffness, "gear stiffness"),
+        std::pair(&options.torque_loop_inertia_ratio, "torque loop inertia ratio")}) {
+    if (option->size() == 0 || option->size() == n) continue;
+    throw InvalidModel(name + ": " + key + ": has " + std::to_string(option->size()) +
+                       " entries for " + std::to_string(n) + " joints");
+  }
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    if (options.gear_stiffness.size() != 0) joints[i].gear_stiffness = options.gear_stiffness[at];
+    if (options.torque_loop_inertia_ratio.size() == 0) continue;
+    const double ratio = options.torque_loop_inertia_ratio[at];
+    if (!(ratio > 0 && ratio <= 1)) {
+      refuse(name, "joint", joints[i].name, "torque loop inertia ratio is not in (0, 1]");
+    }
+    joints[i].reflected_inertia *= ratio;
+  }
+  check_gears(joints, name);
+}
+
 /// Inertia of `link`, and, if wanted, of all that hangs on it but the branch that begins with joint
 /// `next`, at its zero position; in the link's axes. It does not call itself: branches may be
 /// thousands of links long.
@@ -177,6 +225,7 @@ std::vector<Joint> read_joints(const std::vector<urdf::JointConstSharedPtr>& pat
   apply(options.reflected_inertia, &Joint::reflected_inertia, "reflected inertia", joints, name);
   apply(options.viscous_friction, &Joint::viscous_friction, "damping", joints, name);
   apply(options.coulomb_friction, &Joint::coulomb_friction, "friction", joints, name);
+  apply_gears(options, joints, name);
   return joints;
 }
 
@@ -249,6 +298,10 @@ int unresisted_joint(const RobotModel& model, double phase) {
   JointVector q(n);
   for (int i = 0; i < n; ++i) q[i] = std::sin(phase + 1.7 * i);
   JointMatrix M = evaluate(model, q, JointVector::Zero(n)).M;
+  for (int i = 0; i < n; ++i) {  // behind an elastic gear the motor resists no link
+    const Joint& joint = model.joints()[static_cast<std::size_t>(i)];
+    if (joint.elastic()) M(i, i) -= joint.reflected_inertia;
+  }
   double scale = M.diagonal().maxCoeff();  // of what rounds
   for (const KDL::Segment& segment : kdl_chain(model).segments) {
     const KDL::RigidBodyInertia& body = segment.getInertia();
@@ -269,7 +322,10 @@ void check_inertia(const RobotModel& model, const std::string& name) {
   const int i = unresisted_joint(model, 2.5);
   if (i < 0) return;
   refuse(name, "joint", model.joints()[static_cast<std::size_t>(i)].name,
-         "no inertia resists it: the links it moves lack mass, and it has no reflected inertia");
+         "no inertia resists it: the links it moves lack mass, and it has no reflected inertia" +
+             std::string(model.joints()[static_cast<std::size_t>(i)].elastic()
+                             ? " on this side of its gear"
+                             : ""));
 }
 
 }  // namespace
@@ -305,6 +361,7 @@ RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string
   doubt_base(*tree, base, path, data->warnings);
   data->attach(attachment);
   data->joints = std::move(joints);
+  data->position_sensor = options.position_sensor;
   const KDL::Vector g = rotation_of_base(*tree, base).Inverse(to_kdl(options.gravity));
   data->gravity = {g.x(), g.y(), g.z()};
   RobotModel model(data);

@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/analysis/system.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/law/null_space.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/vibration/jacobian_change.hpp>
@@ -50,11 +51,6 @@ JointMatrix stiffness_under_load(const DynamicsResult& robot, const Impedance& i
 
 /// Adds an environment's springs and dampers to those of an impedance.
 void add_environment(const Environment& environment, Impedance& impedance) noexcept;
-
-/// Stiffness and damping that the robot has without its controller, n x n each.
-struct PassivePart {
-  JointMatrix stiffness, damping;
-};
 
 /// Returns those of an environment, and of a load that adds `load_stiffness`.
 PassivePart passive_part(const Jacobian& J, const Environment& environment,

@@ -5,6 +5,7 @@ namespace dashpot::controller {
 
 PostureLoop::PostureLoop(const RobotModel& model, const Settings& settings)
     : kernel_(model),
+      elastic_(elastic_joints(model)),
       settings_(settings),
       friction_left_(friction_left(model, settings)),
       damping_(designed_damping(model, settings)) {}
@@ -32,6 +33,10 @@ Status PostureLoop::closed_loop(const JointVector& q, const Gains& gains, Mode m
                            {external_wrench},
                            Posture{&kernel_, &q, rest, rest}},
                           settings_, system);
+  if (elastic_.any()) {
+    const JointMatrix load = stiffness_of_load(robot.J, settings_.task_terms.load, external_wrench);
+    elastic_.extend(passive_part(robot.J, settings_.environment, load), system);
+  }
   return Status::kOk;
 }
 

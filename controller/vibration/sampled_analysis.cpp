@@ -81,6 +81,7 @@ std::vector<double> integral_decays(const analysis::SampledSpectrum& sampled, do
 
 SampledAnalysis::SampledAnalysis(const RobotModel& model, const Settings& settings)
     : kernel_(model),
+      elastic_(elastic_joints(model)),
       gravity_(settings.feed_forward.gravity),
       interval_(static_cast<std::uint64_t>(
           std::clamp(std::round(settings.analysis.sampled.interval / settings.period), 1.0, 1e15))),
@@ -142,7 +143,7 @@ void SampledAnalysis::solve(const Task& task, SampledVibration& result) {
   result.tick = task.tick;
   result.resets = task.resets;
   result.position = task.position;
-  analysis::System<> system(task.position.size());
+  analysis::System<> system(task.system.dof());
   system.mass = task.system.mass;
   system.damping = task.system.damping;
   system.stiffness = task.system.stiffness;
@@ -155,6 +156,8 @@ void SampledAnalysis::solve(const Task& task, SampledVibration& result) {
   loop.memory = integral_memory(task.integral, loop.period);
   kernel_.attach(task.attachment);
   if (gravity_) loop.gravity_gradient = gravity_gradient(kernel_, task.position);
+  loop.gears = elastic_;
+  loop = analysis::with_gears(loop);
   const analysis::SampledSpectrum sampled = analysis::sample_loop(system, continuous, loop);
   result.spectral_radius = sampled.spectral_radius;
   result.gain_margin = analysis::gain_margin(system, continuous, loop, 1e6, kSlowestVibration);

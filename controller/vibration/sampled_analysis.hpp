@@ -21,7 +21,8 @@ Eigen::MatrixXd gravity_gradient(const DynamicsKernel& kernel, const JointVector
 /// compensation of gravity through a zero-order hold is no vibration.
 inline constexpr double kSlowestVibration = 1;
 
-/// Returns the sampled loop that the settings describe, without gravity.
+/// Returns the sampled loop that the settings describe, without gravity, and without elastic
+/// joints; see analysis::SampledLoop::gears.
 analysis::SampledLoop sampled_loop(const RobotModel& model, const Settings& settings);
 
 /// Returns what designs the damping of springs for their ratios: as much of it as that loop bears
@@ -85,6 +86,7 @@ class SampledAnalysis {
   void solve(const Task& task, SampledVibration& result);
 
   DynamicsKernel kernel_;
+  const analysis::Gears elastic_;
   bool gravity_;  ///< whether gravity is compensated
   std::uint64_t interval_;
   std::uint64_t first_;  ///< tick

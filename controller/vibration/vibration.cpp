@@ -8,9 +8,9 @@ namespace {
 
 using analysis::SpectrumOrigin;
 
-std::int64_t analysis_budget(const Settings& settings) {
+std::int64_t analysis_budget(const Settings& settings, int coordinates) {
   const double share = settings.analysis.share;
-  const double size = static_cast<double>(settings.limits.torque.size()) / 7;
+  const double size = static_cast<double>(coordinates) / 7;
   const double even = 10 * share * Analysis::kEvenWork * std::max(1.0, size * size * size);
   return static_cast<std::int64_t>(
       std::min(share * settings.period * Analysis::kWorkPerSecond, even));
@@ -21,12 +21,12 @@ constexpr int kLongestWait = 64;
 
 }  // namespace
 
-VibrationAnalysis::VibrationAnalysis(const Settings& settings)
+VibrationAnalysis::VibrationAnalysis(const Settings& settings, int coordinates)
     : every_(settings.analysis.where == Analysis::Where::kOff
                  ? 0
                  : static_cast<std::uint64_t>(settings.analysis.every)),
       background_(settings.analysis.where == Analysis::Where::kBackground),
-      budget_(analysis_budget(settings)) {
+      budget_(analysis_budget(settings, coordinates)) {
   if (every_ != 0) thread_ = std::make_unique<VibrationThread>(settings.analysis);
 }
 

@@ -23,7 +23,8 @@ class VibrationThread;
 /// change.)
 class VibrationAnalysis {
  public:
-  explicit VibrationAnalysis(const Settings& settings);
+  /// Of systems with so many coordinates.
+  VibrationAnalysis(const Settings& settings, int coordinates);
   ~VibrationAnalysis();
   VibrationAnalysis(const VibrationAnalysis&) = delete;
   VibrationAnalysis& operator=(const VibrationAnalysis&) = delete;

@@ -50,7 +50,7 @@ template <class Message>
 bool decode_with_modes(const void* data, std::size_t size, Message& message) noexcept {
   std::array<std::int32_t, 2> sizes{};  // n, num_modes
   return read_sizes<Message>(data, size, sizes) && within(sizes[0], 1, controller::kMaxJoints) &&
-         within(sizes[1], 0, sizes[0]) && decode_exactly(data, size, message);
+         within(sizes[1], 0, most_modes(sizes[0])) && decode_exactly(data, size, message);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/controller/robot_types.hpp>
 #include <dashpot/lcmtypes/command_t.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
 #include <dashpot/lcmtypes/sampled_modes_t.hpp>
@@ -20,11 +21,16 @@ inline std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t coun
 /// smaller.
 inline constexpr std::size_t kMaxMessageSize = 65536;
 
+/// Returns the largest number of modes of n joints: 2 n where all of them are elastic, at most 16.
+constexpr std::int32_t most_modes(std::int32_t n) {
+  return n < controller::kMaxJoints / 2 ? 2 * n : controller::kMaxJoints;
+}
+
 /// Decodes bytes of unknown origin. The generated decoders allocate whatever an array's length
 /// field says before they look at how many bytes there are; so the fingerprint and these fields are
 /// read first. Returns false, with `message` unspecified, unless
 ///   - the fingerprint is that of the message type,
-///   - the sizes are within 1 <= n <= 16, 0 <= num_modes <= n,
+///   - the sizes are within 1 <= n <= 16, 0 <= num_modes <= most_modes(n),
 ///   - and the message fills `size` bytes exactly.
 /// Allocates less than kMaxMessageSize. Values are not judged: they may be NaN or out of range.
 bool decode(const void* data, std::size_t size, state_t& message) noexcept;

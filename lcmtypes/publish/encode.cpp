@@ -1,3 +1,4 @@
+#include <dashpot/lcmtypes/messages/message_check.hpp>
 #include <dashpot/lcmtypes/publish/encode.hpp>
 
 #include <Eigen/Geometry>
@@ -50,6 +51,12 @@ static_assert(static_cast<int>(controller::Mode::kCartesian) == state_t::CARTESI
 static_assert(static_cast<int>(analysis::SpectrumOrigin::kTracked) == modes_t::TRACKED);
 static_assert(static_cast<int>(analysis::SpectrumOrigin::kReused) == modes_t::REUSED);
 static_assert(static_cast<int>(analysis::SpectrumOrigin::kDirect) == modes_t::DIRECT);
+
+/// The number of modes of n joints in a message.
+std::size_t count_of(int modes, std::size_t n) {
+  return static_cast<std::size_t>(
+      std::clamp(modes, 0, static_cast<int>(most_modes(static_cast<std::int32_t>(n)))));
+}
 
 void resize_modes(std::size_t count, modes_t& message) {
   for (auto* list : {&message.natural_frequency, &message.damping_ratio, &message.damped_frequency,
@@ -144,7 +151,7 @@ void fill(const StateSample& sample, state_t& message) {
 void fill(const ModesSample& sample, modes_t& message) {
   const controller::Vibration& vibration = sample.vibration;
   const auto n = static_cast<std::size_t>(vibration.position.size());
-  const auto count = std::min(static_cast<std::size_t>(std::max(vibration.count, 0)), n);
+  const auto count = count_of(vibration.count, n);
   message.n = static_cast<std::int32_t>(n);
   message.num_modes = static_cast<std::int32_t>(count);
   message.utime = sample.utime;
@@ -162,7 +169,7 @@ void fill(const ModesSample& sample, modes_t& message) {
 void fill(const SampledModesSample& sample, sampled_modes_t& message) {
   const controller::SampledVibration& vibration = sample.vibration;
   const auto n = static_cast<std::size_t>(vibration.position.size());
-  const auto count = std::min(static_cast<std::size_t>(std::max(vibration.count, 0)), n);
+  const auto count = count_of(vibration.count, n);
   message.n = static_cast<std::int32_t>(n);
   message.num_modes = static_cast<std::int32_t>(count);
   message.utime = sample.utime;

@@ -24,8 +24,10 @@ def _options(*, gravity: npt.ArrayLike | None = None, include_off_chain: bool = 
              accept_inertias: bool | Sequence[str] = False, drives: str = "",
              drives_friction: bool = False, reflected_inertia: npt.ArrayLike | None = None,
              viscous_friction: npt.ArrayLike | None = None,
-             coulomb_friction: npt.ArrayLike | None = None, payload_mass: float = 0,
-             payload_center: npt.ArrayLike = (0, 0, 0),
+             coulomb_friction: npt.ArrayLike | None = None,
+             gear_stiffness: npt.ArrayLike | None = None,
+             gear_damping: npt.ArrayLike | None = None, position_sensor: str = "motor",
+             payload_mass: float = 0, payload_center: npt.ArrayLike = (0, 0, 0),
              payload_inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)),
              tool: npt.ArrayLike | None = None) -> dict[str, Any]:
     """Returns the options of from_urdf as the core takes them."""
@@ -41,9 +43,12 @@ def _options(*, gravity: npt.ArrayLike | None = None, include_off_chain: bool = 
         options["drives"], options["drives_friction"] = drives, drives_friction
     if gravity is not None:
         options["gravity"] = _sized("gravity", gravity, (3,))
+    if position_sensor != "motor":
+        options["position_sensor"] = position_sensor
     for name, values in (("reflected_inertia", reflected_inertia),
                          ("viscous_friction", viscous_friction),
-                         ("coulomb_friction", coulomb_friction)):
+                         ("coulomb_friction", coulomb_friction),
+                         ("gear_stiffness", gear_stiffness), ("gear_damping", gear_damping)):
         if values is not None:
             options[name] = to_numbers(name, values, 1)
     if tool is not None:
@@ -103,6 +108,10 @@ class Robot:
     """n, rad/s^3; likewise."""
     warnings: tuple[str, ...]
     """What is doubtful about the description though it was read."""
+    gear_stiffness: Array
+    """n, N m/rad; infinite where the gear does not bend."""
+    gear_damping: Array
+    """n, N m s/rad, beside gear_stiffness."""
 
     def __init__(self, urdf: str, base: str, tip: str, *, file: str = "URDF",
                  **options: Any) -> None:
@@ -118,10 +127,14 @@ class Robot:
     @classmethod
     def from_urdf(cls, path: str | os.PathLike[str], base: str, tip: str, *,
                   gravity: npt.ArrayLike | None = None, include_off_chain: bool = True,
-                  accept_inertias: bool | Sequence[str] = False, drives: str = "", drives_friction: bool = False,
+                  accept_inertias: bool | Sequence[str] = False, drives: str = "",
+                  drives_friction: bool = False,
                   reflected_inertia: npt.ArrayLike | None = None,
                   viscous_friction: npt.ArrayLike | None = None,
-                  coulomb_friction: npt.ArrayLike | None = None, payload_mass: float = 0,
+                  coulomb_friction: npt.ArrayLike | None = None,
+                  gear_stiffness: npt.ArrayLike | None = None,
+                  gear_damping: npt.ArrayLike | None = None, position_sensor: str = "motor",
+                  payload_mass: float = 0,
                   payload_center: npt.ArrayLike = (0, 0, 0),
                   payload_inertia: npt.ArrayLike = ((0, 0, 0), (0, 0, 0), (0, 0, 0)),
                   tool: npt.ArrayLike | None = None,
@@ -136,7 +149,10 @@ class Robot:
         `drives` names public figures of reflected inertia, see published_drives, whose friction
         takes the place of the URDF's with `drives_friction`.
         `reflected_inertia` (n, kg m^2), `viscous_friction` (n, N m s/rad) and `coulomb_friction`
-        (n, N m) replace these and the URDF's. A payload at the tip has `payload_mass` (kg), `payload_center`
+        (n, N m) replace these and the URDF's. Gears bend with `gear_stiffness` (n, N m/rad,
+        numpy.inf: rigid) and `gear_damping` (n, N m s/rad) between a motor that has the reflected
+        inertia and its link; `position_sensor` (motor or link) says which of the two is measured.
+        A payload at the tip has `payload_mass` (kg), `payload_center`
         (3, m, in the tip link) and `payload_inertia` (3 x 3, kg m^2, about that centre). `tool` is
         the pose (4 x 4) of the tool's frame in the tip link; the tip is then this frame.
 
@@ -147,6 +163,8 @@ class Robot:
                            accept_inertias=accept_inertias, drives=drives,
                            drives_friction=drives_friction, reflected_inertia=reflected_inertia,
                            viscous_friction=viscous_friction, coulomb_friction=coulomb_friction,
+                           gear_stiffness=gear_stiffness, gear_damping=gear_damping,
+                           position_sensor=position_sensor,
                            payload_mass=payload_mass, payload_center=payload_center,
                            payload_inertia=payload_inertia, tool=tool)
         file = os.fspath(path)
@@ -320,14 +338,16 @@ def is_cartesian(mode: str) -> bool:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ClosedLoop(Result):
-    """The robot with springs and dampers, M q'' + C q' + K q = f, where its springs are at rest."""
+    """The robot with springs and dampers, M q'' + C q' + K q = f, where its springs are at rest. With
+    gears that bend n counts their motors as well, after the joints."""
 
     mass: Array
     """M, n x n, kg m^2."""
     damping: Array
     """C, n x n, N m s/rad, the joints' viscous friction included."""
     stiffness: Array
-    """K, n x n, N m/rad; not symmetric with an external wrench."""
+    """K, n x n, N m/rad; not symmetric with an external wrench, or where gears bend and links are
+    measured."""
     modes: Modes
 
 

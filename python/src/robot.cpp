@@ -69,7 +69,7 @@ analysis::System<> closed_loop_at(const Robot& robot, const JointVector& q, cons
   if (status != controller::Status::kOk) {
     throw std::invalid_argument(std::string("closed loop: ") + to_text(status));
   }
-  analysis::System<> result(q.size());
+  analysis::System<> result(system.dof());
   result.mass = system.mass;
   result.damping = system.damping;
   result.stiffness = system.stiffness;
@@ -124,6 +124,15 @@ Robot make_robot(const std::string& urdf, const std::string& name, const std::st
   read_vector("reflected_inertia", options.reflected_inertia);
   read_vector("viscous_friction", options.viscous_friction);
   read_vector("coulomb_friction", options.coulomb_friction);
+  read_vector("gear_stiffness", options.gear_stiffness);
+  read_vector("gear_damping", options.gear_damping);
+  if (given.contains("position_sensor")) {
+    const auto sensor = nb::cast<std::string>(given["position_sensor"]);
+    if (sensor != "motor" && sensor != "link") {
+      throw std::invalid_argument("position_sensor: '" + sensor + "' is none of motor, link");
+    }
+    if (sensor == "link") options.position_sensor = controller::PositionSensor::kLink;
+  }
   if (given.contains("drives")) options.drives = nb::cast<std::string>(given["drives"]);
   if (!options.drives.empty()) try {
       controller::find_drives(options.drives);
@@ -202,6 +211,8 @@ nb::dict joint_properties(const Robot& robot) {
   result["acceleration"] = values(&Joint::acceleration);
   result["deceleration"] = values(&Joint::deceleration);
   result["jerk"] = values(&Joint::jerk);
+  result["gear_stiffness"] = values(&Joint::gear_stiffness);
+  result["gear_damping"] = values(&Joint::gear_damping);
   return result;
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -65,13 +66,18 @@ Stop nearer_stop(const Joint& joint, double q) noexcept {
 }  // namespace
 
 Arm::Arm(const Robot& robot, const ArmOptions& options)
-    : System(robot.dof()),
+    : System(robot.dof(), robot.coordinates()),
       robot_(robot),
       options_(options),
       bodies_(robot_),
       wrenches_(options.wrenches, Vector6::Zero()),
       loads_(options.loads, Inertia()) {
   validate(options);
+  for (int i = 0; i < robot.dof(); ++i) {
+    const Joint& joint = robot.joints()[static_cast<std::size_t>(i)];
+    if (!joint.elastic()) continue;
+    gears_.push_back({i, joint.gear_stiffness, joint.gear_damping, joint.reflected_inertia});
+  }
   const auto any = [&](double Joint::*member) {
     return std::any_of(robot_.joints().begin(), robot_.joints().end(),
                        [&](const Joint& joint) { return joint.*member != 0; });
@@ -86,6 +92,68 @@ Arm::Arm(const Robot& robot, const ArmOptions& options)
     forces_.push_back(&add_wall);
   }
   if (!wrenches_.empty()) forces_.push_back(&add_wrench);
+}
+
+double Arm::fastest_gear(const JointVector& q) {
+  const auto count = static_cast<Eigen::Index>(gears_.size());
+  if (count == 0) return 0;
+  const JointVector rest = JointVector::Zero(dof());
+  const auto accelerations_of = [&](const JointVector& tau) {
+    JointVector qdd(dof());
+    bodies_.move_to(q.data(), rest.data());
+    bodies_.accelerations(tau.data(), qdd.data());
+    return qdd;
+  };
+  const JointVector fall = accelerations_of(rest);
+  JointMatrix A(count, count);  // K^1/2 (B^-1 + M^-1) K^1/2 of the elastic joints
+  for (Eigen::Index j = 0; j < count; ++j) {
+    const Gear& pushed = gears_[static_cast<std::size_t>(j)];
+    const JointVector answer = accelerations_of(JointVector::Unit(dof(), pushed.joint)) - fall;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Gear& gear = gears_[static_cast<std::size_t>(i)];
+      const double drive = i == j ? 1 / gear.inertia : 0;
+      A(i, j) = std::sqrt(gear.stiffness * pushed.stiffness) * (answer[gear.joint] + drive);
+    }
+  }
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<JointMatrix>(A, Eigen::EigenvaluesOnly)
+                       .eigenvalues()[count - 1]);
+}
+
+void Arm::place(const JointVector& q, const JointVector& qd, StateVector& y) noexcept {
+  constexpr int kMostSteps = 100;
+  constexpr double kFound = 1e-15;  // rad
+  const Eigen::Index n = dof(), N = coordinates();
+  y.head(n) = q;
+  y.segment(N, n) = qd;
+  y.segment(n, N - n).setZero();
+  y.segment(N + n, N - n).setZero();
+  if (gears_.empty()) return;
+  // Deflections change the posture, and with it the weight, by parts of themselves only.
+  std::array<double, kMaxJoints> weight;
+  double change = 1;
+  for (int step = 0; step < kMostSteps && change > kFound; ++step) {
+    bodies_.move_to(y.data(), y.data() + N);
+    bodies_.weight(weight.data());
+    change = 0;
+    for (std::size_t k = 0; k < gears_.size(); ++k) {
+      double& deflection = y[n + static_cast<Eigen::Index>(k)];
+      const auto joint = static_cast<std::size_t>(gears_[k].joint);
+      change = std::max(change, std::abs(weight[joint] / gears_[k].stiffness - deflection));
+      deflection = weight[joint] / gears_[k].stiffness;
+      if (options_.position_sensor == PositionSensor::kLink) continue;
+      y[gears_[k].joint] = q[gears_[k].joint] - deflection;
+    }
+  }
+}
+
+void Arm::read_sensors(const StateVector& y, JointVector& q, JointVector& qd) const noexcept {
+  System::read_sensors(y, q, qd);
+  if (options_.position_sensor == PositionSensor::kLink) return;
+  for (std::size_t k = 0; k < gears_.size(); ++k) {
+    const Eigen::Index at = dof() + static_cast<Eigen::Index>(k);
+    q[gears_[k].joint] += y[at];
+    qd[gears_[k].joint] += y[coordinates() + at];
+  }
 }
 
 double Arm::begin_segment(double t) noexcept {
@@ -107,32 +175,70 @@ double Arm::take_loads(double t, const StateVector& y) noexcept {
 }
 
 void Arm::rates(const StateVector& y, StateVector& y_dot) noexcept {
-  const Eigen::Index n = dof();
+  const Eigen::Index n = dof(), N = coordinates();
   const double* const q = y.data();
-  const double* const qd = q + n;
-  double* const work = y_dot.data() + 2 * n;
-  std::array<double, kMaxJoints> tau;
+  const double* const qd = q + N;
+  double* const work = y_dot.data() + 2 * N;
+  std::array<double, kMaxJoints> tau, drive_rate, drive_tau;
+  Sums sums{q, qd, tau.data(), work, qd, tau.data()};
+  if (!gears_.empty()) {
+    std::copy_n(qd, n, drive_rate.data());
+    for (std::size_t k = 0; k < gears_.size(); ++k) {
+      drive_rate[static_cast<std::size_t>(gears_[k].joint)] += qd[static_cast<std::size_t>(n) + k];
+    }
+    std::fill_n(tau.data(), n, 0.0);
+    sums.drive_rate = drive_rate.data();
+    sums.drive_tau = drive_tau.data();
+  }
   double power = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
-    tau[static_cast<std::size_t>(i)] = torque()[i];
-    power += torque()[i] * qd[i];
-    y_dot[i] = qd[i];
+    sums.drive_tau[i] = torque()[i];
+    power += torque()[i] * sums.drive_rate[i];
   }
+  y_dot.head(N) = y.segment(N, N);
   std::fill_n(work, int{kWorkChannels}, 0.0);
   work[kByActuators] = power;
 
   bodies_.move_to(q, qd);
-  for (const Force add : forces_) add(*this, {q, qd, tau.data(), work});
-  bodies_.accelerations(tau.data(), y_dot.data() + n);
+  for (const Force add : forces_) add(*this, sums);
+  if (!gears_.empty()) add_gears(sums);
+  double* const accelerations = y_dot.data() + N;
+  bodies_.accelerations(tau.data(), accelerations);
+  for (std::size_t k = 0; k < gears_.size(); ++k) {
+    const Gear& gear = gears_[k];
+    accelerations[static_cast<std::size_t>(n) + k] =
+        sums.drive_tau[gear.joint] / gear.inertia - accelerations[gear.joint];
+  }
+}
+
+/// Rigid gears pass on the torque of the drive, elastic ones their own.
+void Arm::add_gears(const Sums& sums) noexcept {
+  const double* const deflection = sums.q + dof();
+  const double* const rate = sums.qd + dof();
+  double loss = 0;
+  std::size_t k = 0;
+  for (int i = 0; i < dof(); ++i) {
+    if (k == gears_.size() || gears_[k].joint != i) {
+      sums.tau[i] += sums.drive_tau[i];
+      continue;
+    }
+    const Gear& gear = gears_[k];
+    const double torque = gear.stiffness * deflection[k] + gear.damping * rate[k];
+    sums.tau[i] += torque;
+    sums.drive_tau[i] -= torque;
+    loss += gear.damping * rate[k] * rate[k];
+    ++k;
+  }
+  sums.work[kGearHeat] = loss;
 }
 
 void Arm::add_viscous_friction(Arm& arm, const Sums& sums) noexcept {
   double loss = 0;
   for (int i = 0; i < arm.dof(); ++i) {
     const double friction =
-        arm.robot_.joints()[static_cast<std::size_t>(i)].viscous_friction * sums.qd[i];
-    sums.tau[i] -= friction;
-    loss += friction * sums.qd[i];
+        arm.robot_.joints()[static_cast<std::size_t>(i)].viscous_friction * sums.drive_rate[i];
+    sums.drive_tau[i] -= friction;
+    loss += friction * sums.drive_rate[i];
   }
   sums.work[kViscousHeat] = loss;
 }
@@ -142,9 +248,9 @@ void Arm::add_coulomb_friction(Arm& arm, const Sums& sums) noexcept {
   double loss = 0;
   for (int i = 0; i < arm.dof(); ++i) {
     const double coulomb = arm.robot_.joints()[static_cast<std::size_t>(i)].coulomb_friction;
-    const double friction = coulomb * std::tanh(scale * sums.qd[i]);
-    sums.tau[i] -= friction;
-    loss += friction * sums.qd[i];
+    const double friction = coulomb * std::tanh(scale * sums.drive_rate[i]);
+    sums.drive_tau[i] -= friction;
+    loss += friction * sums.drive_rate[i];
   }
   sums.work[kFrictionHeat] = loss;
 }
@@ -196,13 +302,13 @@ ContactModes Arm::contact_modes(const StateVector& y) noexcept {
   if (options_.stops) {
     for (int i = 0; i < n; ++i) {
       const Stop stop = nearer_stop(robot_.joints()[static_cast<std::size_t>(i)], y[i]);
-      const double rate = -stop.direction * y[n + i];
+      const double rate = -stop.direction * y[coordinates() + i];
       modes |= static_cast<ContactModes>(contact_mode(*options_.stops, stop.depth, rate))
                << (2 * i);
     }
   }
   if (options_.wall) {
-    bodies_.move_to(y.data(), y.data() + n);
+    bodies_.move_to(y.data(), y.data() + coordinates());
     const ContactMode mode = contact_mode(options_.wall->contact, wall_depth(), wall_rate());
     modes |= static_cast<ContactModes>(mode) << (2 * kMaxJoints);
   }
@@ -211,8 +317,15 @@ ContactModes Arm::contact_modes(const StateVector& y) noexcept {
 
 StoredEnergy Arm::stored_energy(const StateVector& y) noexcept {
   const int n = dof();
-  bodies_.move_to(y.data(), y.data() + n);
-  double springs = 0;
+  bodies_.move_to(y.data(), y.data() + coordinates());
+  double springs = 0, kinetic = bodies_.kinetic_energy();
+  for (std::size_t k = 0; k < gears_.size(); ++k) {
+    const Gear& gear = gears_[k];
+    const Eigen::Index at = n + static_cast<Eigen::Index>(k);
+    const double rate = y[coordinates() + gear.joint] + y[coordinates() + at];
+    springs += 0.5 * gear.stiffness * y[at] * y[at];
+    kinetic += 0.5 * gear.inertia * rate * rate;
+  }
   if (options_.stops) {
     for (int i = 0; i < n; ++i) {
       const Stop stop = nearer_stop(robot_.joints()[static_cast<std::size_t>(i)], y[i]);
@@ -220,7 +333,7 @@ StoredEnergy Arm::stored_energy(const StateVector& y) noexcept {
     }
   }
   if (options_.wall) springs += contact_energy(options_.wall->contact, wall_depth());
-  return {bodies_.kinetic_energy(), bodies_.gravity_energy(), springs};
+  return {kinetic, bodies_.gravity_energy(), springs};
 }
 
 Pose Arm::tip_pose(const JointVector& q) noexcept {

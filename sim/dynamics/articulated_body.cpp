@@ -119,7 +119,7 @@ void ArticulatedBody::accelerations(const double* tau, double* qdd) noexcept {
   for (int i = n - 1; i >= 0; --i) {
     Body& body = bodies_[static_cast<std::size_t>(i)];
     body.reaction.noalias() = body.inertia * body.axis;
-    body.gain = 1 / (body.axis.dot(body.reaction) + joints[i].reflected_inertia);
+    body.gain = 1 / (body.axis.dot(body.reaction) + joints[i].drive_inertia_on_link());
     body.excess = tau[i] - body.axis.dot(body.bias);
     if (i == 0) break;
     Body& parent = (&body)[-1];
@@ -173,7 +173,7 @@ double ArticulatedBody::kinetic_energy() const noexcept {
     const Vector3d local = body.rotation.transpose() * omega;
     energy += 0.5 * (joint.inertia.mass * v.squaredNorm() +
                      local.dot(joint.inertia.about_center * local) +
-                     joint.reflected_inertia * qd_[i] * qd_[i]);
+                     joint.drive_inertia_on_link() * qd_[i] * qd_[i]);
   }
   return energy;
 }
@@ -184,6 +184,16 @@ double ArticulatedBody::gravity_energy() const noexcept {
     energy -= robot_->joints()[i].inertia.mass * robot_->gravity().dot(bodies_[i].center);
   }
   return energy;
+}
+
+void ArticulatedBody::weight(double* tau) const noexcept {
+  Vector6 weight = Vector6::Zero();
+  for (int i = robot_->dof() - 1; i >= 0; --i) {
+    const Body& body = bodies_[static_cast<std::size_t>(i)];
+    const double mass = robot_->joints()[static_cast<std::size_t>(i)].inertia.mass;
+    weight += force_at(body.center, Vector3d(mass * robot_->gravity()));
+    tau[i] = -body.axis.dot(weight);
+  }
 }
 
 }  // namespace dashpot::sim

@@ -43,7 +43,9 @@ class ArticulatedBody {
   Vector6 tip_twist() const noexcept;
   /// tau = J' w: what the wrench at the tip amounts to in the joints, N m.
   void transposed_jacobian(const Vector6& wrench, double* tau) const noexcept;
-  /// (qd' M qd) / 2 with the armatures, J
+  /// g(q), n, N m: the torques that hold the weight.
+  void weight(double* tau) const noexcept;
+  /// (qd' M qd) / 2 with the armatures of joints whose gears are rigid, J
   double kinetic_energy() const noexcept;
   /// -sum of m g.c, zero with all masses at the base's origin, J
   double gravity_energy() const noexcept;
@@ -59,7 +61,7 @@ class ArticulatedBody {
     Matrix6 inertia;   // I, then articulated
     Vector6 bias;      // p: force that keeps the acceleration zero, then articulated
     Vector6 reaction;  // U = I S
-    double gain;       // 1 / (S' I S + reflected_inertia)
+    double gain;       // 1 / (S' I S + drive_inertia_on_link)
     double excess;     // u: generalized force that is left to accelerate the joint
   };
 

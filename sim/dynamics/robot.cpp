@@ -257,18 +257,44 @@ Pose read_chain(const Reader& reader, const std::vector<urdf::JointConstSharedPt
   return link_in_body;
 }
 
+void require_size(const JointVector& values, const char* key, const std::vector<Joint>& joints) {
+  if (values.size() == static_cast<Eigen::Index>(joints.size())) return;
+  std::ostringstream text;
+  text << "has " << values.size() << " entries, the chain has " << joints.size() << " joints";
+  fail(key, text.str());
+}
+
 void override_with(const JointVector& values, double Joint::*member, const char* key,
                    const char* unit, std::vector<Joint>& joints) {
   if (values.size() == 0) return;
-  if (values.size() != static_cast<Eigen::Index>(joints.size())) {
-    std::ostringstream text;
-    text << "has " << values.size() << " entries, the chain has " << joints.size() << " joints";
-    fail(key, text.str());
-  }
+  require_size(values, key, joints);
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const double value = values[static_cast<Eigen::Index>(i)];
     require_finite(value, 0, std::string(key) + " of joint '" + joints[i].name + "'", unit);
     joints[i].*member = value;
+  }
+}
+
+/// Gears, of which an elastic one needs a drive with an inertia.
+void set_gears(const RobotParameters& parameters, std::vector<Joint>& joints) {
+  const JointVector& stiffness = parameters.gear_stiffness;
+  override_with(parameters.gear_damping, &Joint::gear_damping, "gear_damping", "N m s/rad", joints);
+  if (stiffness.size() == 0) return;
+  require_size(stiffness, "gear_stiffness", joints);
+  std::size_t coordinates = joints.size();
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    Joint& joint = joints[i];
+    const std::string where = "gear_stiffness of joint '" + joint.name + "'";
+    joint.gear_stiffness = stiffness[static_cast<Eigen::Index>(i)];
+    if (!(joint.gear_stiffness > 0)) fail(where, "must be positive, N m/rad; infinite: rigid");
+    if (!joint.elastic()) continue;
+    ++coordinates;
+    if (joint.reflected_inertia == 0) fail(where, "needs a reflected_inertia, of the drive");
+  }
+  if (coordinates > kMaxJoints) {
+    fail("gear_stiffness", "joints and elastic gears are " + std::to_string(coordinates) +
+                               " coordinates, at most " + std::to_string(kMaxJoints) +
+                               " are possible");
   }
 }
 
@@ -280,13 +306,21 @@ void require_inertia(const std::vector<Joint>& joints, const std::string& name) 
     mass += joint->inertia.mass;
     moment += joint->inertia.about_center.trace() +
               joint->inertia.mass * joint->inertia.center.squaredNorm();
-    if (joint->reflected_inertia == 0 && mass == 0 && (joint->prismatic || moment == 0)) {
-      fail(name + ": joint '" + joint->name + "'", "moves no mass and has no reflected_inertia");
+    if (joint->drive_inertia_on_link() == 0 && mass == 0 && (joint->prismatic || moment == 0)) {
+      fail(name + ": joint '" + joint->name + "'",
+           joint->elastic() ? "moves no mass behind its elastic gear"
+                            : "moves no mass and has no reflected_inertia");
     }
   }
 }
 
 }  // namespace
+
+int Robot::coordinates() const noexcept {
+  const auto elastic = std::count_if(joints_.begin(), joints_.end(),
+                                     [](const Joint& joint) { return joint.elastic(); });
+  return dof() + static_cast<int>(elastic);
+}
 
 Robot Robot::from_file(const std::string& path, const std::string& base, const std::string& tip,
                        const RobotParameters& parameters) {
@@ -320,6 +354,7 @@ Robot Robot::from_text(const std::string& urdf, const std::string& base, const s
                 "N m s/rad", robot.joints_);
   override_with(parameters.coulomb_friction, &Joint::coulomb_friction, "Coulomb friction", "N m",
                 robot.joints_);
+  set_gears(parameters, robot.joints_);
   require_inertia(robot.joints_, name);
 
   if (!parameters.gravity.allFinite()) fail("gravity", "is not finite");

@@ -48,11 +48,18 @@ Plant::Plant(System& system, const PlantOptions& options, const JointVector& q,
   const int n = system.dof();
   if (!std::isfinite(options.period) || options.period <= 0)
     throw InvalidScene("period", "must be positive, s");
-  require_finite(q, n, "initial position");
-  if (qd.size() != 0) require_finite(qd, n, "initial velocity");
-  y_ = StateVector::Zero(2 * n + kWorkChannels);
-  y_.head(n) = q;
-  if (qd.size() != 0) y_.segment(n, n) = qd;
+  const int coordinates = system.coordinates();
+  const int given = q.size() == coordinates ? coordinates : n;
+  require_finite(q, given, "initial position");
+  if (qd.size() != 0) require_finite(qd, given, "initial velocity");
+  const JointVector velocity = qd.size() == 0 ? JointVector(JointVector::Zero(given)) : qd;
+  y_ = StateVector::Zero(2 * coordinates + kWorkChannels);
+  if (given > n) {
+    y_.head(given) = q;
+    y_.segment(given, given) = velocity;
+  } else {
+    system.place(q, velocity, y_);
+  }
   initial_ = system.stored_energy(y_);
 
   torque_ = JointVector::Zero(n);
@@ -125,11 +132,9 @@ Status Plant::step(const JointVector& command) noexcept {
 }
 
 void Plant::carry(const JointVector& q, const JointVector& qd) noexcept {
-  const Eigen::Index n = system_->dof();
   const double before = system_->stored_energy(y_).sum();
-  y_.head(n) = q;
-  y_.segment(n, n) = qd;
-  y_[2 * n + kByWorld] += system_->stored_energy(y_).sum() - before;
+  system_->place(q, qd, y_);
+  y_[2 * system_->coordinates() + kByWorld] += system_->stored_energy(y_).sum() - before;
   ++ticks_;
   measure();
 }
@@ -138,7 +143,7 @@ void Plant::carry(const JointVector& q, const JointVector& qd) noexcept {
 Status Plant::move(StateVector& y) noexcept {
   const double end = static_cast<double>(ticks_ + 1) * options_.period;
   for (double t = time(); t < end;) {
-    y[2 * system_->dof() + kByWorld] += system_->take_loads(t, y);
+    y[2 * system_->coordinates() + kByWorld] += system_->take_loads(t, y);
     const double next = std::min(end, system_->begin_segment(t));
     const Status status = integrator_.advance(*system_, next - t, y);
     if (status != Status::kOk) return status;
@@ -148,10 +153,8 @@ Status Plant::move(StateVector& y) noexcept {
 }
 
 void Plant::measure() noexcept {
-  const Eigen::Index n = system_->dof();
   measured_.time = std::llround(time() * 1e9);
-  measured_.position = y_.head(n);
-  measured_.velocity = y_.segment(n, n);
+  system_->read_sensors(y_, measured_.position, measured_.velocity);
   measured_.torque = torque_;
   for (const Stage sense : sensing_) sense(*this);
 }
@@ -159,7 +162,7 @@ void Plant::measure() noexcept {
 EnergyAudit Plant::audit() const noexcept {
   const auto work = y_.tail<kWorkChannels>();
   return {initial_,           system_->stored_energy(y_), work[kByActuators], work[kByWorld],
-          work[kViscousHeat], work[kFrictionHeat],        work[kContactHeat]};
+          work[kViscousHeat], work[kFrictionHeat],        work[kContactHeat], work[kGearHeat]};
 }
 
 void Plant::limit(Plant& plant) noexcept {

@@ -10,7 +10,7 @@ namespace dashpot::sim {
 Status Integrator::implicit_midpoint(System& system, double h) noexcept {
   constexpr int kMaxIterations = 30;
   constexpr double kConverged = 1e-14;
-  const Eigen::Index n = 2 * dof_of(y_);
+  const Eigen::Index n = 2 * coordinates_of(y_);
   const double s = 2 / h;
   differentiate(system);
   if (!factor(s)) return Status::kStateNotFinite;
@@ -62,7 +62,7 @@ Status Integrator::rosenbrock(System& system, double h) noexcept {
 
 void Integrator::differentiate(System& system) noexcept {
   constexpr double kStep = 1.5e-8;  // sqrt of the rounding unit
-  const Eigen::Index n = dof_of(y_), rows = n + kWorkChannels;
+  const Eigen::Index n = coordinates_of(y_), rows = n + kWorkChannels;
   begin_step(system);
   if (jacobian_known_) return;
   jacobian_known_ = true;
@@ -78,7 +78,7 @@ void Integrator::differentiate(System& system) noexcept {
 }
 
 bool Integrator::factor(double s) noexcept {
-  const Eigen::Index n = dof_of(y_);
+  const Eigen::Index n = coordinates_of(y_);
   reduced_ = -jacobian_.topRightCorner(n, n) - (1 / s) * jacobian_.topLeftCorner(n, n);
   reduced_.diagonal().array() += s;
   if (!reduced_.allFinite()) return false;
@@ -89,7 +89,7 @@ bool Integrator::factor(double s) noexcept {
 /// With J = [0 1 0; A B 0; D E 0] and x = (a, b, c): (s - B - A/s) v = b + A a / s, then
 /// q = (a + v) / s, w = (c + D q + E v) / s.
 void Integrator::solve(double s, StateVector& x) const noexcept {
-  const Eigen::Index n = dof_of(y_);
+  const Eigen::Index n = coordinates_of(y_);
   JointVector v = x.segment(n, n);
   v.noalias() += jacobian_.topLeftCorner(n, n).lazyProduct(x.head(n) / s);
   v = factors_.solve(v);

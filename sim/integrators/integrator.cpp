@@ -137,7 +137,7 @@ Status Integrator::land_on_contact(System& system, ContactModes modes, double& h
 
 /// Largest entry of the error of position and velocity, relative to the tolerance.
 double Integrator::error_norm() const noexcept {
-  const Eigen::Index n = 2 * dof_of(y_);
+  const Eigen::Index n = 2 * coordinates_of(y_);
   double worst = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const double size = std::max(std::abs(y_[i]), std::abs(next_[i]));
@@ -151,7 +151,7 @@ double Integrator::error_norm() const noexcept {
 
 /// Largest entry of position and velocity, relative to the tolerance at y_.
 double Integrator::weighted_size(const StateVector& x) const noexcept {
-  const Eigen::Index n = 2 * dof_of(y_);
+  const Eigen::Index n = 2 * coordinates_of(y_);
   return (x.head(n).array().abs() /
           (options_.absolute_tolerance + options_.relative_tolerance * y_.head(n).array().abs()))
       .maxCoeff();
@@ -187,7 +187,7 @@ void Integrator::end_step() noexcept {
 }
 
 Status Integrator::semi_implicit_euler(System& system, double h) noexcept {
-  const Eigen::Index n = dof_of(y_);
+  const Eigen::Index n = coordinates_of(y_);
   begin_step(system);
   next_ = y_ + h * rates_[0];
   next_.head(n) = y_.head(n) + h * next_.segment(n, n);

@@ -31,13 +31,13 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
             "scenario.start.tip_displacement: is out of the arm's reach, by @ m and @ rad "
             "(line 20)"},
            {"panda", "point: [0, 0, 0.2 m]", "point: [0, 0, 0.9 m]",
-            "scenario.start.tip_displacement: puts the tip @ m inside the wall (line 59)"},
+            "scenario.start.tip_displacement: puts the tip @ m inside the wall (line 64)"},
            {"panda", "[5 cm, 5 cm, -5 cm, 0, 0, 20 deg]", "[5 cm, 1.5 m, -5 cm, 0, 0, 20 deg]",
             "scenario.steps[1].tip_displacement: is out of the arm's reach, by @ m and @ rad "
-            "(line 71)"},
+            "(line 76)"},
            {"panda", "position: [0, -45 deg", "position: [0, -145 deg",
             "scenario.start.position: joint 2 would be at -2.530727 rad, outside its limits "
-            "(line 58)"},
+            "(line 63)"},
            {"iiwa14", "    position: [0, 30 deg, 0, -80 deg, 0, 60 deg, 0]\n", "",
             "scenario.start.position: missing (line 20)"},
            {"ur5", "at: 4 s", "at: 1 s",
@@ -47,7 +47,7 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
             "limits (line 26)"},
            {"panda", "damping: [20 N s/m, 20", "damping: [-20 N s/m, 20",
             "scenario.steps: the controller refuses this: task_damping is not positive "
-            "semidefinite (line 72)"},
+            "semidefinite (line 77)"},
            {"iiwa14", "end: 1.6 s", "end: 1.4 s",
             "scenario.pushes[1].end: is not after begin (line 23)"},
            {"iiwa14", "joint_displacement: [0.02, 0.02", "joint_displacement: [0.02",
@@ -56,6 +56,14 @@ TEST(Run, RefusesScenesInOneLineThatNamesTheKey) {
            {"panda", "method: rk4", "method: rk5",
             "simulation.integrator.method: semi_implicit_euler, rk4, dormand_prince, "
             "dormand_prince_8, implicit_midpoint or rosenbrock is wanted, not 'rk5' (line 25)"},
+           {"ur5", "coulomb_friction: 0.1 N m", "gear_stiffness: 1e4",
+            "simulation: gear_stiffness of joint 'shoulder_pan_joint': needs a reflected_inertia, "
+            "of the drive"},
+           {"ur5", "coulomb_friction: 0.1 N m}",
+            "gear_stiffness: 2e4, reflected_inertia: 0.2}\n  integrator: {step: 0.5 ms}",
+            "simulation.integrator.step: is 0.000500 s, too long for gears of 1.13e+03 rad/s: at "
+            "most "
+            "0.00044 s is possible, or adaptive steps, the default of such arms"},
            {"ur5", "  steps:", "  faults: [{begin: 1 s}]\n  steps:",
             "scenario.faults[1].begin: is of a fault that does nothing (line 21)"},
            {"ur5", "  steps:", "  faults: [{begin: 1 s, end: 0.5 s, frozen: true}]\n  steps:",

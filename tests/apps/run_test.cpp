@@ -212,6 +212,47 @@ TEST(Run, SimulatesTheRobotThatTheControllerIsTold) {
   EXPECT_LT(result["largest_tracking_error"]["tip"].get<double>(), 1e-9);
 }
 
+/// Whose sensors are on the links, has the links where it is told to start; otherwise the motors.
+TEST(Run, SimulatesGearsThatBend) {
+  const Scratch scratch;
+  const auto energy_of = [&](const std::string& robot) {
+    const std::string file = changed(
+        scratch, "iiwa14",
+        {{"simulation:\n", "simulation:\n  robot: {reflected_inertia: 0.4, " + robot + "}\n"},
+         {"sensors: {position_resolution: 5e-6 rad, difference_velocity: true}", "seed: 2"}});
+    return run_json(file, {"--duration", "1"})["energy"];
+  };
+  const std::string gears =
+      "gear_stiffness: [none, 2e4, 2e4, 1e4, 1e4, 1e4, 1e4], gear_damping: 40";
+  const Json rigid = energy_of("gear_stiffness: none");
+  const Json link = energy_of(gears + ", position_sensor: link"), motor = energy_of(gears);
+  for (const Json& energy : {link, motor}) {
+    EXPECT_LT(std::abs(energy["imbalance"].get<double>()), 1e-9);
+    EXPECT_GT(energy["gear_heat"].get<double>(), 1e-3);
+    EXPECT_GT(energy["initial"]["springs"].get<double>(), 0.05);
+  }
+  EXPECT_EQ(rigid["gear_heat"], 0);
+  // What the controller is told is true, unless the simulation knows better.
+  const auto told = [&](const std::string& gears, const std::string& simulated) {
+    const std::string file = changed(
+        scratch, "iiwa14",
+        {{"tip: iiwa_link_ee_kuka", "tip: iiwa_link_ee_kuka\n  reflected_inertia: 0.4\n  " + gears},
+         {"simulation:\n", "simulation:\n  robot: {" + simulated + "}\n"},
+         {"sensors: {position_resolution: 5e-6 rad, difference_velocity: true}", "seed: 2"}});
+    return run_json(file, {"--duration", "0.1"})["energy"]["initial"];
+  };
+  const std::string keys =
+      "gear_stiffness: [none, 2e4, 2e4, 1e4, 1e4, 1e4, 1e4]\n  "
+      "gear_damping: 40\n  position_sensor: ";
+  EXPECT_EQ(told(keys + "link", "")["springs"], link["initial"]["springs"]);
+  EXPECT_EQ(told(keys + "motor", "")["springs"], motor["initial"]["springs"]);
+  EXPECT_EQ(told(keys + "link", "position_sensor: motor")["springs"], motor["initial"]["springs"]);
+  EXPECT_EQ(told(keys + "link", "gear_stiffness: none")["springs"], 0);
+  const auto height = [](const Json& energy) { return energy["initial"]["gravity"].get<double>(); };
+  EXPECT_NEAR(height(link), height(rigid), 1e-12);
+  EXPECT_LT(height(motor), height(rigid) - 0.1);
+}
+
 TEST(Run, MovesMatricesAsTheClosedFormSays) {
   const Scratch scratch;
   const std::string csv = scratch.path("chain.csv");

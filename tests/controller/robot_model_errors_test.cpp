@@ -232,6 +232,38 @@ TEST(RobotModelErrors, CountJoints) {
             "arm.urdf: link 'tip': 17 joints from 'link0', more than 16");
 }
 
+TEST(RobotModelErrors, SayHowManyJointsCanBeElastic) {
+  std::string links = "<link name='l0'/>", joints;
+  for (int i = 1; i <= 10; ++i) {
+    const std::string before = "l" + std::to_string(i - 1), link = "l" + std::to_string(i);
+    links += "<link name='" + link + "'>" + inertial("1", "1", "1", "1") + "</link>";
+    joints += joint("j" + std::to_string(i), before, link);
+  }
+  ModelOptions options;
+  options.reflected_inertia = JointVector::Ones(10);
+  options.gear_stiffness = JointVector::Constant(10, 1e4);
+  const auto problem = [&] {
+    try {
+      RobotModel::from_urdf_text(robot(links + joints), "l0", "l10", options, "arm.urdf");
+    } catch (const InvalidModel& error) {
+      return std::string(error.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_EQ(problem(),
+            "arm.urdf: gear stiffness: 10 of 10 joints are elastic, at most 6 of so many can be; "
+            "give the others none");
+  options.gear_stiffness.tail(4).setConstant(std::numeric_limits<double>::infinity());
+  EXPECT_EQ(problem(), "no error");
+}
+
+TEST(RobotModelErrors, NeedALinkBehindAnElasticGear) {
+  ModelOptions options;
+  options.reflected_inertia = JointVector::Constant(1, 0.1);
+  options.gear_stiffness = JointVector::Constant(1, 1e4);
+  EXPECT_THAT(problem(arm(""), options), EndsWith("no reflected inertia on this side of its gear"));
+}
+
 TEST(RobotModelErrors, NameTheOption) {
   using Options = ModelOptions;
   const std::pair<void (*)(Options&), const char*> cases[] = {
@@ -243,6 +275,12 @@ TEST(RobotModelErrors, NameTheOption) {
        "joint 'j': damping is negative or not a finite number"},
       {[](Options& o) { o.coulomb_friction = -JointVector::Ones(1); },
        "joint 'j': friction is negative or not a finite number"},
+      {[](Options& o) { o.gear_stiffness = JointVector::Zero(1); },
+       "joint 'j': gear stiffness is not a positive number, N m/rad"},
+      {[](Options& o) { o.gear_damping = -JointVector::Ones(1); },
+       "joint 'j': gear damping is negative or not a finite number"},
+      {[](Options& o) { o.torque_loop_inertia_ratio = JointVector::Zero(1); },
+       "joint 'j': torque loop inertia ratio is not in (0, 1]"},
       {[](Options& o) { o.gravity.x() = kNaN; }, "gravity: not finite"},
       {[](Options& o) { o.payload.mass = -1; }, "payload: its mass is negative, -1 kg"},
       {[](Options& o) { o.payload.inertia(0, 1) = 1; }, "payload: its inertia is not symmetric"},

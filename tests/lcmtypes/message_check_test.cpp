@@ -73,7 +73,7 @@ TYPED_TEST(MessageCheck, RefusesOtherLengthsFingerprintsAndSizes) {
   }
 }
 
-TEST(ModesCheck, RefusesMoreModesThanJoints) {
+TEST(ModesCheck, RefusesMoreModesThanElasticJointsHave) {
   Random random(915);
   modes_t message;
   ModesSample sample = random_modes(random, 7);
@@ -81,24 +81,24 @@ TEST(ModesCheck, RefusesMoreModesThanJoints) {
   for (auto& mode : sample.vibration.modes) mode.shape = analysis::ComplexVector<16>::Zero(7);
   const Bytes bytes = bytes_of(message_of<modes_t>(sample));
   ASSERT_TRUE(decodes(bytes, message));
-  for (const std::int32_t count : {-1, 8, 1 << 30, std::numeric_limits<std::int32_t>::min()}) {
+  for (const std::int32_t count : {-1, 8, 15, 1 << 30, std::numeric_limits<std::int32_t>::min()}) {
     Bytes hostile = bytes;
     write_int32(hostile, 12, count);
     EXPECT_FALSE(decodes(hostile, message)) << count;
   }
   modes_t many = message_of<modes_t>(sample);  // consistent, but there is no such robot
-  many.num_modes = 8;
+  many.num_modes = 15;
   for (auto* values :
        {&many.natural_frequency, &many.damping_ratio, &many.damped_frequency,
         &many.eigenvalue_bound, &many.natural_frequency_bound, &many.damping_ratio_bound}) {
-    values->resize(8);
+    values->resize(15);
   }
-  many.label.resize(8);
-  many.kind.resize(8);
-  many.eigenvalue_real.resize(8, {0, 0});
-  many.eigenvalue_imag.resize(8, {0, 0});
-  many.shape_real.resize(8, std::vector<double>(7));
-  many.shape_imag.resize(8, std::vector<double>(7));
+  many.label.resize(15);
+  many.kind.resize(15);
+  many.eigenvalue_real.resize(15, {0, 0});
+  many.eigenvalue_imag.resize(15, {0, 0});
+  many.shape_real.resize(15, std::vector<double>(7));
+  many.shape_imag.resize(15, std::vector<double>(7));
   EXPECT_FALSE(decodes(bytes_of(many), message));
 }
 

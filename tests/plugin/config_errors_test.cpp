@@ -172,7 +172,18 @@ TEST(ConfigRobot, HasKeysThatAreChecked) {
             ", reflected_inertia: 3 kg"},
            {"robot.coulomb_friction: has 2 entries; a list of 7, or one number for all, is wanted "
             "(line 2)",
-            ", coulomb_friction: [1, 2]"}}) {
+            ", coulomb_friction: [1, 2]"},
+           {"robot.gear_stiffness: is 0 N m/rad, not positive (line 2)",
+            ", reflected_inertia: 1, gear_stiffness: 0"},
+           {"robot.gear_damping: is -1 N m s/rad, negative (line 2)",
+            ", reflected_inertia: 1, gear_stiffness: 1e4, gear_damping: -1"},
+           {"robot.gear_damping: needs gear_stiffness, N m/rad (line 2)", ", gear_damping: 1"},
+           {"robot.position_sensor: motor or link is wanted, not 'both' (line 2)",
+            ", position_sensor: both"},
+           {"robot.torque_loop_inertia_ratio: is 2, must be at most 1 (line 2)",
+            ", reflected_inertia: 1, torque_loop_inertia_ratio: 2"},
+           {"robot.torque_loop_inertia_ratio: needs reflected_inertia, kg m^2, or drives (line 2)",
+            ", torque_loop_inertia_ratio: 0.5"}}) {
     EXPECT_EQ(complaint_about(keys), said);
   }
 }
@@ -186,6 +197,9 @@ TEST(ConfigRobot, HasAUrdfThatIsInOrder) {
               ::testing::MatchesRegex("robot: /nowhere.urdf: .*No such file.* \\(line 2\\)"));
   EXPECT_THAT(with(urdf_path("panda.urdf"), "panda_link99"),
               ::testing::MatchesRegex("robot: .*panda.urdf: link 'panda_link99': .* \\(line 2\\)"));
+  EXPECT_THAT(complaint_about(", gear_stiffness: 1e4"),
+              ::testing::HasSubstr("joint 'panda_joint1': a gear stiffness of 10000 N m/rad needs "
+                                   "the reflected inertia (kg m^2) of the motor behind it"));
   EXPECT_THAT(complaint_about(", reflected_inertia: [1, 2]"),
               ::testing::MatchesRegex("robot.*2 entries.* \\(line 2\\)"));
 }

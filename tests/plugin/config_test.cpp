@@ -343,6 +343,29 @@ TEST(Config, GivesTheRobotReflectedInertiaAndFriction) {
   EXPECT_EQ(load(panda_with("reflected_inertia: 0.1")).model.joints()[6].reflected_inertia, 0.1);
 }
 
+TEST(Config, GivesTheRobotGearsThatBend) {
+  EXPECT_EQ(load(panda()).model.elastic_joints(), 0);
+  const Config config = load(
+      panda_with("reflected_inertia: 0.4, torque_loop_inertia_ratio: [1, 1, 1, 1, 1, 0.5, 0.25], "
+                 "gear_stiffness: [1e4, 1e4, 1e4, 1e4, none, 5e3, 5e3 N m/rad], gear_damping: 3, "
+                 "position_sensor: link"));
+  EXPECT_EQ(config.model.elastic_joints(), 6);
+  EXPECT_EQ(config.model.position_sensor(), controller::PositionSensor::kLink);
+  const auto& joints = config.model.joints();
+  EXPECT_EQ(joints[0].gear_stiffness, 1e4);
+  EXPECT_FALSE(joints[4].elastic());
+  EXPECT_EQ(joints[6].gear_stiffness, 5e3);
+  EXPECT_EQ(joints[6].gear_damping, 3);
+  EXPECT_EQ(joints[0].reflected_inertia, 0.4);
+  EXPECT_EQ(joints[6].reflected_inertia, 0.1);
+  const auto model = config.robot.model();  // once more, from what it was read from
+  EXPECT_EQ(model.joints()[6].reflected_inertia, 0.1);
+  EXPECT_EQ(load(panda_with("drives: panda, torque_loop_inertia_ratio: 0.5"))
+                .model.joints()[2]
+                .reflected_inertia,
+            0.05);
+}
+
 TEST(Config, GivesTheRobotAPayloadAToolAndGravity) {
   const Config plain = load(panda());
   const Config loaded = load(panda_with(

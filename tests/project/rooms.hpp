@@ -46,7 +46,7 @@ inline const std::vector<Room>& rooms() {
       {"analysis/linalg", 1, {}, {kEigen}},
       {"analysis/system",
        2,
-       {"system", "task_space", "null_damping", "rigid_body_elimination"},
+       {"system", "task_space", "null_damping", "rigid_body_elimination", "gears"},
        {kEigen}},
       {"analysis/spectrum", 3, {"mode", "spectrum", "elastic_form"}, {kEigen}},
       {"analysis/tracker", 4, {"tracked_spectrum", "mode_tracker"}, {kEigen}},
@@ -77,7 +77,7 @@ inline const std::vector<Room>& rooms() {
       {"controller/safety", 3, {"setpoint_check", "settings_check"}, {kEigen}},
       {"controller/vibration",
        4,
-       {"posture_loop", "rotors"},
+       {"posture_loop", "rotors", "elastic_joints"},
        {kAnalysis, kText, kEigen, "pthread.h", "sched.h"}},  // threads have priorities
       {"controller/core", 5, {"controller"}, {kAnalysis, kEigen}},
       {"controller/audit", 5, {"audit", "gain_judge"}, {kAnalysis, kEigen}},

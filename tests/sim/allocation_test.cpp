@@ -82,6 +82,10 @@ TEST(Allocation, DoesNotHappenInAStepOfAnArm) {
   options.wall->contact = Contact{1e4, 50};
   Arm arm(testing::robot_of(file, parameters), options);
   expect_no_allocation(arm, {}, home);
+  parameters.gear_stiffness = JointVector::Constant(7, 2000);
+  parameters.gear_damping = JointVector::Constant(7, 2);
+  Arm elastic(testing::robot_of(file, parameters), options);
+  expect_no_allocation(elastic, {}, home);
 }
 
 TEST(Allocation, DoesNotHappenInAStepOfALinearSystem) {

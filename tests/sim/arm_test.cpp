@@ -231,8 +231,12 @@ struct Scene {
 
 TEST_P(Audit, NeverShowsEnergyFromNowhere) {
   testing::Random random(721);
-  for (int trial = 0; trial < 3; ++trial) {
-    const Scene scene(GetParam(), random);
+  for (int trial = 0; trial < 4; ++trial) {
+    Scene scene(GetParam(), random);
+    if (trial == 3) {
+      scene.parameters.gear_stiffness = JointVector::Constant(scene.q.size(), 3000);
+      scene.parameters.gear_damping = JointVector::Constant(scene.q.size(), 3);
+    }
     Arm arm(testing::robot_of(GetParam(), scene.parameters), scene.options);
     PlantOptions options = precise(0.01);
     options.integrator.absolute_tolerance = options.integrator.relative_tolerance = 1e-11;
@@ -246,8 +250,10 @@ TEST_P(Audit, NeverShowsEnergyFromNowhere) {
       EXPECT_GE(audit.viscous_heat, last.viscous_heat);
       EXPECT_GE(audit.friction_heat, last.friction_heat);
       EXPECT_GE(audit.contact_heat, last.contact_heat - 1e-12);
+      EXPECT_GE(audit.gear_heat, last.gear_heat);
       last = audit;
     }
+    EXPECT_EQ(last.gear_heat > 0.01, trial == 3) << last.gear_heat;
     EXPECT_GT(last.viscous_heat, 0.01);
     EXPECT_GT(last.friction_heat, 0.01);
     EXPECT_GT(last.contact_heat, 0.01);

@@ -6,6 +6,7 @@
 #include <dashpot/sim/plant.hpp>
 #include <dashpot/tests/support/refusal.hpp>
 
+#include <functional>
 #include <ostream>
 #include <string>
 
@@ -50,7 +51,8 @@ inline sim::Robot slider(const Eigen::Vector3d& gravity, double viscous = 0, dou
 
 /// Bars of 1.5 kg and length 0.8 m on hinges about y, one after the other, hanging along -z at 0.
 /// Each has its mass in its middle and a moment of 0.08 kg m^2 about it.
-inline sim::Robot pendulum(int bars) {
+inline sim::Robot pendulum(
+    int bars, const std::function<void(sim::RobotParameters&)>& change = [](auto&) {}) {
   std::string text = "<robot name='pendulum'><link name='link0'/>";
   for (int i = 1; i <= bars; ++i) {
     const std::string number = std::to_string(i), before = std::to_string(i - 1);
@@ -60,7 +62,10 @@ inline sim::Robot pendulum(int bars) {
             "'><inertial><origin xyz='0 0 -0.4'/><mass value='1.5'/><inertia ixx='0.08' "
             "iyy='0.08' izz='0' ixy='0' ixz='0' iyz='0'/></inertial></link>";
   }
-  return sim::Robot::from_text(text + "</robot>", "link0", "link" + std::to_string(bars));
+  sim::RobotParameters parameters;
+  change(parameters);
+  return sim::Robot::from_text(text + "</robot>", "link0", "link" + std::to_string(bars),
+                               parameters);
 }
 
 /// What InvalidScene says of what `make` makes.

@@ -5,6 +5,7 @@
 #include <dashpot/analysis/mode_tracker.hpp>
 #include <dashpot/controller/base/impedance.hpp>
 #include <dashpot/controller/default_settings.hpp>
+#include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/settings.hpp>
 #include <dashpot/controller/vibration/loop_system.hpp>
 #include <dashpot/tests/support/arms.hpp>
@@ -52,6 +53,7 @@ class ArmLoop {
  public:
   ArmLoop(const controller::RobotModel& model, const GainScales& scales)
       : kernel_(model),
+        elastic_(controller::elastic_joints(model)),
         friction_(model.joint_values(&controller::Joint::viscous_friction)),
         impedance_(model.dof()) {
     controller::Setpoint setpoint = constant_damping(model).initial;
@@ -66,11 +68,13 @@ class ArmLoop {
     kernel_.evaluate(q, controller::JointVector::Zero(q.size()), robot_);
     null_space_.compute(robot_, impedance_);
     loop_.form(robot_, impedance_, null_space_, friction_, system_);
+    if (elastic_.any()) elastic_.extend_factored(system_);
     return system_;
   }
 
  private:
   controller::DynamicsKernel kernel_;
+  analysis::Gears elastic_;
   controller::JointVector friction_;
   controller::Impedance impedance_;
   controller::NullSpace null_space_;

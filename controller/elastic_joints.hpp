@@ -1,0 +1,12 @@
+#pragma once
+#include <dashpot/analysis/gears.hpp>
+#include <dashpot/controller/robot_model.hpp>
+
+namespace dashpot::controller {
+
+using analysis::PassivePart;
+
+/// Returns the gears of a model for the analysis. Those of a model without elastic joints are none.
+analysis::Gears elastic_joints(const RobotModel& model);
+
+}  // namespace dashpot::controller

@@ -1,0 +1,380 @@
+// Gears that bend: in the modes of the tick, at a posture, and in the sampled loop.
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/controller/elastic_joints.hpp>
+#include <dashpot/controller/posture_loop.hpp>
+#include <dashpot/controller/vibration/sampled_analysis.hpp>
+#include <dashpot/tests/support/arms.hpp>
+#include <dashpot/tests/support/count_allocations.hpp>
+#include <dashpot/tests/support/led_arm.hpp>
+#include <dashpot/tests/support/random.hpp>
+
+#include <gtest/gtest.h>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <unsupported/Eigen/MatrixFunctions>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dashpot::controller {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXcd;
+using Eigen::VectorXd;
+using testing::LedArm;
+
+const double kRigid = std::numeric_limits<double>::infinity();
+
+/// The motors of an arm, and what is told of its gears.
+ModelOptions gears(int n, double stiffness, PositionSensor sensor, double damping_ratio = 0.01) {
+  ModelOptions options;
+  options.viscous_friction = JointVector::LinSpaced(n, 0.5, 0.2);
+  options.reflected_inertia = JointVector::LinSpaced(n, 0.6, 0.2);
+  options.gear_stiffness = stiffness * JointVector::LinSpaced(n, 1, 0.3);
+  options.gear_damping = 2 * damping_ratio *
+                         options.gear_stiffness.cwiseProduct(options.reflected_inertia).cwiseSqrt();
+  options.position_sensor = sensor;
+  return options;
+}
+
+/// The textbook's matrices of an arm, all of whose joints are elastic: links first.
+struct Matrices {
+  MatrixXd M, C, K;
+};
+
+/// Of what the controller feeds back, K_c and C_c, and friction on the motors' side.
+Matrices textbook(const RobotModel& model, const JointVector& q, const MatrixXd& K_c,
+                  const MatrixXd& C_c) {
+  const Index n = q.size();
+  const auto values = [&](double Joint::*property) -> MatrixXd {
+    return VectorXd(model.joint_values(property)).asDiagonal();
+  };
+  const MatrixXd B = values(&Joint::reflected_inertia), K_J = values(&Joint::gear_stiffness),
+                 D_J = values(&Joint::gear_damping), F = values(&Joint::viscous_friction);
+  Matrices out{MatrixXd::Zero(2 * n, 2 * n), MatrixXd(2 * n, 2 * n), MatrixXd(2 * n, 2 * n)};
+  out.M.topLeftCorner(n, n) = MatrixXd(evaluate(model, q, JointVector::Zero(n)).M) - B;
+  out.M.bottomRightCorner(n, n) = B;
+  const bool link = model.position_sensor() == PositionSensor::kLink;
+  const MatrixXd none = MatrixXd::Zero(n, n);
+  out.K << K_J, -K_J, (link ? K_c : none) - K_J, K_J + (link ? none : K_c);
+  out.C << D_J, -D_J, (link ? C_c : none) - D_J, D_J + F + (link ? none : C_c);
+  return out;
+}
+
+VectorXcd eigenvalues_of(const Matrices& loop) {
+  const Index n = loop.M.rows();
+  MatrixXd A = MatrixXd::Zero(2 * n, 2 * n);
+  A.topRightCorner(n, n).setIdentity();
+  A.bottomLeftCorner(n, n) = -loop.M.partialPivLu().solve(loop.K);
+  A.bottomRightCorner(n, n) = -loop.M.partialPivLu().solve(loop.C);
+  return Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues();
+}
+
+/// Springs and dampers of the gains with the textbook's null space, away from singularities.
+Matrices springs_of(const RobotModel& model, const Gains& gains, Mode mode, const JointVector& q) {
+  if (mode == Mode::kJoint) return {{}, gains.joint_damping, gains.joint_stiffness};
+  const auto robot = evaluate(model, q, JointVector::Zero(q.size()));
+  const MatrixXd M = robot.M, J = robot.J, W = M.inverse();
+  MatrixXd K = J.transpose() * gains.task_stiffness * J;
+  MatrixXd C = J.transpose() * gains.task_damping * J;
+  if (q.size() > 6) {
+    const MatrixXd N = MatrixXd::Identity(q.size(), q.size()) -
+                       W * J.transpose() * (J * W * J.transpose()).inverse() * J;
+    K += N.transpose() * gains.null_stiffness.asDiagonal() * N;
+    C += N.transpose() * gains.null_damping.asDiagonal() * N;
+  }
+  return {{}, C, K};
+}
+
+/// The largest distance of an eigenvalue from the nearest true one beyond what is proved, relative
+/// to it and to a millionth of the largest. Each true one counts once.
+double worst_error(const Vibration& found, VectorXcd truth) {
+  const double largest = truth.cwiseAbs().maxCoeff();
+  double worst = 0;
+  for (int i = 0; i < found.count; ++i) {
+    for (const analysis::Complex& value : found.modes[testing::at(i)].eigenvalues) {
+      Index nearest = 0;
+      const double distance = (truth.array() - value).abs().minCoeff(&nearest);
+      worst = std::max(worst, distance / (std::abs(value) + 1e-6 * largest));
+      truth[nearest] = 1e300;
+    }
+  }
+  return worst;
+}
+
+// An independent route: dense eigenvalues of the state matrix of 28 (24) states from the textbook's
+// blocks. The modes are tracked while the arm swings.
+TEST(ElasticJoints, HaveTheModesOfTheTextbookAtEveryTick) {
+  for (const testing::Arm& arm : testing::arms()) {
+    if (std::string(arm.file) == "baxter_left") continue;  // its null space is nearly singular
+    const int n = testing::arm_model(arm).dof();
+    for (const PositionSensor sensor : {PositionSensor::kMotor, PositionSensor::kLink}) {
+      for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
+        SCOPED_TRACE(std::string(arm.file) +
+                     (sensor == PositionSensor::kLink ? " link" : " motor") +
+                     (mode == Mode::kJoint ? " joint" : " cartesian"));
+        const RobotModel model = testing::arm_model(arm, gears(n, 1e4, sensor));
+        const Settings settings = testing::in_mode(testing::unlimited_settings(model), mode);
+        LedArm led(model, settings, testing::kSmallSwing);
+        led.settle();
+        for (int k = 0; k < 500'000 && led.modes().count == 0; ++k) {
+          led.tick();
+        }
+        for (int k = 1; k <= 300; ++k) {
+          led.swing(1e-3 * k);
+          Status status = Status::kOk;
+          ASSERT_EQ(testing::allocations_of([&] { status = led.tick(); }), 0);
+          ASSERT_LE(status, Status::kTorqueLimited);
+          const Vibration& modes = led.modes();
+          if (modes.status == analysis::Status::kUnfinished) continue;  // another thread is at work
+          ASSERT_EQ(modes.status, analysis::Status::kOk) << k;
+          ASSERT_EQ(modes.count, 2 * n);
+          ASSERT_EQ(modes.modes[0].shape.size(), 2 * n);
+          if (k % 50 != 0) continue;
+          const Matrices springs =
+              springs_of(model, settings.initial.gains, mode, led.state.position);
+          const Matrices truth = textbook(model, led.state.position, springs.K, springs.C);
+          EXPECT_LE(worst_error(modes, eigenvalues_of(truth)), 1e-8) << k;
+          for (int i = 0; i < modes.count; ++i) {
+            const VibrationMode& mode_i = modes.modes[testing::at(i)];
+            EXPECT_LE(mode_i.error_bound, 1e-6 * std::abs(mode_i.eigenvalues[1])) << i;
+          }
+        }
+        const VibrationCounters& counters = led.modes().counters;
+        EXPECT_GE(counters.tracked, 280u);
+        EXPECT_EQ(counters.failed + counters.missed, 0u);
+      }
+    }
+  }
+}
+
+// Without posture springs one motion of the Panda has no spring: links and motors together.
+TEST(ElasticJoints, LeaveTheZeroModesOfTheArm) {
+  for (const PositionSensor sensor : {PositionSensor::kMotor, PositionSensor::kLink}) {
+    const RobotModel model = testing::arm_model(testing::arms()[0], gears(7, 1e4, sensor));
+    Settings settings = testing::in_mode(testing::unlimited_settings(model), Mode::kCartesian);
+    settings.initial.gains.null_stiffness.setZero();
+    LedArm led(model, settings, testing::kSmallSwing);
+    led.settle();
+    for (int k = 1; k <= 100; ++k) {
+      led.swing(1e-3 * k);
+      led.tick();
+      ASSERT_EQ(led.modes().status, analysis::Status::kOk);
+      ASSERT_EQ(led.modes().zero_modes, 1) << k;
+      ASSERT_EQ(led.modes().count, 13) << k;
+    }
+  }
+}
+
+/// One joint, whose link has an inertia of 0.5 kg m^2.
+RobotModel one_joint(const ModelOptions& options) {
+  return RobotModel::from_urdf_text(
+      "<robot name='r'><link name='a'/><link name='b'><inertial><mass value='1'/><inertia "
+      "ixx='0.5' iyy='0.5' izz='0.5' ixy='0' ixz='0' iyz='0'/></inertial></link><joint name='j' "
+      "type='continuous'><parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>",
+      "a", "b", options);
+}
+
+/// The system of a joint spring and damper.
+analysis::System<kMaxJoints> joint_loop(const RobotModel& model, double stiffness,
+                                        double damping = 0) {
+  Settings settings = default_settings(model);
+  settings.limits.gain_margin = 1;
+  Gains gains = settings.initial.gains;
+  gains.joint_damping_ratio = 0;
+  gains.joint_stiffness = JointVector::Constant(model.dof(), stiffness).asDiagonal();
+  gains.joint_damping = JointVector::Constant(model.dof(), damping).asDiagonal();
+  analysis::System<kMaxJoints> system;
+  PostureLoop loop(model, settings);
+  EXPECT_EQ(loop.closed_loop(JointVector::Zero(model.dof()), gains, Mode::kJoint, system),
+            Status::kOk);
+  return system;
+}
+
+std::vector<double> frequencies_of(const analysis::System<kMaxJoints>& system) {
+  analysis::SpectrumSolver<kMaxJoints> solver;
+  analysis::Spectrum<kMaxJoints> spectrum;
+  EXPECT_EQ(solver.solve(system, spectrum), analysis::Status::kOk);
+  std::vector<double> result;
+  for (const auto& mode : spectrum.modes) result.push_back(mode.natural_frequency);
+  return result;
+}
+
+// m q'' = -k (q - theta), b theta'' = -k (theta - q) - c theta: the squares of the frequencies are
+// the roots of m b x^2 - ((m + b) k + m c) x + c k. With the link measured c pulls at q, and
+// b theta'' = -k (theta - q) - c q, of which the product of the roots is the same and the sum less.
+TEST(ElasticJoints, AreTwoMassesOnASpring) {
+  const double m = 0.5, b = 0.3, k = 4000, c = 700;
+  ModelOptions options = gears(1, k, PositionSensor::kMotor, 0);
+  options.viscous_friction.setZero();
+  options.reflected_inertia.setConstant(b);
+  options.gear_stiffness.setConstant(k);
+  for (const bool link : {false, true}) {
+    options.position_sensor = link ? PositionSensor::kLink : PositionSensor::kMotor;
+    const auto found = frequencies_of(joint_loop(one_joint(options), c));
+    const double sum = ((m + b) * k + (link ? 0 : m * c)) / (m * b), product = c * k / (m * b);
+    const double root = std::sqrt(0.25 * sum * sum - product);
+    ASSERT_EQ(found.size(), 2u);
+    EXPECT_NEAR(found[0], std::sqrt(0.5 * sum + root), 1e-11 * found[0]);
+    EXPECT_NEAR(found[1], std::sqrt(0.5 * sum - root), 1e-11 * found[1]);
+  }
+}
+
+TEST(ElasticJoints, ComeNearRigidOnesAsTheirStiffnessGrows) {
+  const testing::Arm& arm = testing::arms()[0];
+  ModelOptions rigid = gears(7, 1e4, PositionSensor::kMotor);
+  rigid.gear_stiffness = JointVector::Constant(7, kRigid);
+  const RobotModel plain = testing::arm_model(arm, rigid);
+  ASSERT_EQ(plain.elastic_joints(), 0);
+  const auto truth = frequencies_of(joint_loop(plain, 300, 20));
+  double last = 0;
+  for (const double stiffness : {1e5, 1e6, 1e7, 1e8}) {
+    ModelOptions options = gears(7, stiffness, PositionSensor::kMotor, 0);
+    const auto found = frequencies_of(joint_loop(testing::arm_model(arm, options), 300, 20));
+    ASSERT_EQ(found.size(), 14u);
+    double worst = 0;
+    for (std::size_t i = 0; i < 7; ++i) {
+      worst = std::max(worst, std::abs(found[i + 7] / truth[i] - 1));
+    }
+    EXPECT_GT(worst, 0);
+    if (last > 0) EXPECT_NEAR(last / worst, 10, 1.5) << stiffness;
+    last = worst;
+  }
+  EXPECT_LT(last, 1e-4);
+}
+
+// Pushed at its links, the arm gives way by springs and gears in series.
+TEST(ElasticJoints, SoftenTheArmByTheirCompliance) {
+  for (const PositionSensor sensor : {PositionSensor::kMotor, PositionSensor::kLink}) {
+    const RobotModel model = testing::arm_model(testing::arms()[1], gears(7, 1e4, sensor));
+    const analysis::System<kMaxJoints> system = joint_loop(model, 800);
+    const MatrixXd compliance = MatrixXd(system.stiffness).inverse().topLeftCorner(7, 7);
+    const VectorXd gear = model.joint_values(&Joint::gear_stiffness);
+    const MatrixXd wanted =
+        sensor == PositionSensor::kMotor
+            ? MatrixXd((gear.cwiseInverse().array() + 1.0 / 800).matrix().asDiagonal())
+            : MatrixXd(MatrixXd::Identity(7, 7) / 800);  // what is measured is held
+    EXPECT_LE((compliance - wanted).norm(), 1e-12 * wanted.norm());
+  }
+}
+
+TEST(ElasticJoints, MayBeSomeOfTheJoints) {
+  ModelOptions options = gears(7, 1e4, PositionSensor::kMotor, 0);
+  for (const Index rigid : {1, 4, 5}) options.gear_stiffness[rigid] = kRigid;
+  const RobotModel some = testing::arm_model(testing::arms()[0], options);
+  for (const Index rigid : {1, 4, 5}) options.gear_stiffness[rigid] = 1e9;
+  const RobotModel all = testing::arm_model(testing::arms()[0], options);
+  const auto found = frequencies_of(joint_loop(some, 500, 10));
+  const auto nearly = frequencies_of(joint_loop(all, 500, 10));
+  ASSERT_EQ(found.size(), 11u);
+  ASSERT_EQ(nearly.size(), 14u);
+  for (std::size_t i = 0; i < 11; ++i) EXPECT_NEAR(found[i], nearly[i + 3], 1e-4 * found[i]) << i;
+}
+
+/// One tick of the arm of the textbook with its controller, by the exponential of a matrix of
+/// Eigen's: gains times `factor`, gravity compensated where it is measured, torque late by a tick.
+double spectral_radius(const Matrices& loop, const Matrices& gears_alone, const MatrixXd& gravity,
+                       bool link, double factor, double period) {
+  const Index n = gravity.rows(), N = 2 * n;
+  MatrixXd robot = gears_alone.K;
+  robot.topLeftCorner(n, n) += gravity;
+  MatrixXd rate = MatrixXd::Zero(2 * N + n, 2 * N + n);
+  rate.block(0, N, N, N).setIdentity();
+  rate.block(N, 0, N, N) = -loop.M.inverse() * robot;
+  rate.block(N, N, N, N) = -loop.M.inverse() * gears_alone.C;
+  MatrixXd input = MatrixXd::Zero(N, n);
+  input.bottomRows(n).setIdentity();
+  rate.block(N, 2 * N, N, n) = loop.M.inverse() * input;
+  const MatrixXd step = (rate * period).exp();
+  MatrixXd A = MatrixXd::Zero(2 * N + n, 2 * N + n);  // state and the torque that is on its way
+  A.topRows(2 * N) = step.topRows(2 * N);
+  A.block(2 * N, 0, n, N) = -factor * (loop.K - gears_alone.K).bottomRows(n);
+  A.block(2 * N, N, n, N) = -factor * (loop.C - gears_alone.C).bottomRows(n);
+  A.block(2 * N, link ? 0 : n, n, n) += gravity;
+  double largest = 0;
+  for (const analysis::Complex z : Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues().eval()) {
+    if (std::abs(std::log(z)) / period >= kSlowestVibration) {
+      largest = std::max(largest, std::abs(z));
+    }
+  }
+  return largest;
+}
+
+// Against another way to sample the loop, whose boundary is where its spectral radius is 1.
+TEST(ElasticJoints, HaveTheGainMarginOfALoopSampledAnotherWay) {
+  testing::Random random(4101);
+  for (int k = 0; k < 24; ++k) {
+    SCOPED_TRACE(k);
+    const testing::Arm& arm = testing::arms()[static_cast<std::size_t>(k % 3)];
+    const int n = testing::arm_model(arm).dof();
+    const auto sensor = k % 2 == 0 ? PositionSensor::kMotor : PositionSensor::kLink;
+    const double stiffness = std::pow(10.0, random.uniform(3.7, 5));
+    const RobotModel model = testing::arm_model(arm, gears(n, stiffness, sensor, 0.05));
+    Settings settings = default_settings(model);
+    settings.limits.gain_margin = 1;
+    settings.analysis.sampled.delay = 1;
+    Gains gains = settings.initial.gains;
+    JointVector q(n);
+    for (Index i = 0; i < n; ++i) q[i] = random.uniform(-1, 1);
+    analysis::System<kMaxJoints> system;
+    PostureLoop posture(model, settings);
+    ASSERT_EQ(posture.closed_loop(q, gains, Mode::kJoint, system), Status::kOk);
+    analysis::SampledLoop loop = sampled_loop(model, settings);
+    const MatrixXd gravity = gravity_gradient(DynamicsKernel(model), q);
+    loop.gravity_gradient = gravity;
+    loop.gears = elastic_joints(model);
+    loop = analysis::with_gears(loop);
+    analysis::SpectrumSolver<kMaxJoints> solver;
+    analysis::Spectrum<kMaxJoints> spectrum;
+    ASSERT_EQ(solver.solve(system, spectrum), analysis::Status::kOk);
+    const double margin = analysis::gain_margin(system, spectrum, loop, 1e4, kSlowestVibration);
+    ASSERT_GT(margin, 1e-3);
+    ASSERT_LT(margin, 1e4);
+    const MatrixXd none = MatrixXd::Zero(n, n);
+    const Matrices whole{system.mass, system.damping, system.stiffness};
+    const Matrices alone = textbook(model, q, none, none);
+    const bool link = sensor == PositionSensor::kLink;
+    EXPECT_LT(spectral_radius(whole, alone, gravity, link, 0.999 * margin, settings.period), 1);
+    EXPECT_GT(spectral_radius(whole, alone, gravity, link, 1.001 * margin, settings.period), 1);
+  }
+}
+
+/// What a controller of the same gains has at rest.
+TEST(ElasticJoints, AreTheSameAtAPostureAndInAController) {
+  for (const PositionSensor sensor : {PositionSensor::kMotor, PositionSensor::kLink}) {
+    for (const bool outside : {false, true}) {
+      const RobotModel model = testing::arm_model(testing::arms()[0], gears(7, 1e4, sensor));
+      Settings settings = testing::in_mode(testing::unlimited_settings(model), Mode::kCartesian);
+      if (outside) settings.environment.tip_stiffness.setConstant(300);
+      if (outside) settings.environment.joint_damping.setConstant(7, 0.4);
+      LedArm led(model, settings);
+      led.settle();
+      analysis::System<kMaxJoints> here, there;
+      led.controller.closed_loop(here);
+      PostureLoop posture(model, settings);
+      ASSERT_EQ(posture.closed_loop(led.center, settings.initial.gains, Mode::kCartesian, there),
+                Status::kOk);
+      EXPECT_LE((here.stiffness - there.stiffness).norm(), 1e-9 * there.stiffness.norm());
+      EXPECT_LE((here.damping - there.damping).norm(), 1e-9 * there.damping.norm());
+      EXPECT_LE(worst_error(led.modes(), eigenvalues_of({here.mass, here.damping, here.stiffness})),
+                1e-8);
+      const Matrices springs =
+          springs_of(model, settings.initial.gains, Mode::kCartesian, led.center);
+      Matrices wanted = textbook(model, led.center, springs.K, springs.C);
+      if (outside) {  // it acts on the links, whatever is measured
+        const MatrixXd J = evaluate(model, led.center, JointVector::Zero(7)).J;
+        wanted.K.topLeftCorner(7, 7) += 300 * J.transpose() * J;
+        wanted.C.topLeftCorner(7, 7).diagonal().array() += 0.4;
+      }
+      EXPECT_LE((here.mass - wanted.M).norm(), 1e-12 * wanted.M.norm());
+      EXPECT_LE((here.stiffness - wanted.K).norm(), 1e-9 * wanted.K.norm());
+      EXPECT_LE((here.damping - wanted.C).norm(), 1e-9 * wanted.C.norm());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::controller
