@@ -36,7 +36,7 @@ enum class Pivot {
 /// S depends on the zero modes together and on the coordinates eliminated. S0, S1, ... also depend
 /// on the order of the columns of zero_modes.basis: step k eliminates the k-th column, freed from
 /// the columns before it. Of the zero modes only count and basis are read. The columns need not be
-/// M-orthonormal. The stiffness has to be symmetric.
+/// M-orthonormal. The stiffness has to be symmetric, or no force of it may act along a zero mode.
 ///
 /// Throws std::invalid_argument if the basis does not fit the system, and std::domain_error if
 /// Pivot::kLast meets a coordinate that the zero mode does not move (s_i = 0 to rounding).
