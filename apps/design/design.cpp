@@ -110,7 +110,8 @@ DesignReport report_on(const SystemEntry& entry, const DesignOptions& options) t
   analysis::System<> after = report.design.system;
   if (entry.gears.any()) entry.gears.extend(after);
   report.after = make_report(plain, after, spectrum, largest);
-  if (entry.gears.any()) {
+  report.gears = entry.gears.any();
+  if (report.gears) {
     if (options.sensitivity) throw InputError("--sensitivity", "does not go with gears that bend");
     report.notes.emplace_back(
         "the damping is designed as if no gear gave way; the modes are those with gears that bend");

@@ -147,7 +147,8 @@ std::string miss_text(const DesignReport& report) {
     return miss.reason != DampingMiss::Reason::kLoop;
   };
   if (std::none_of(report.design.misses.begin(), report.design.misses.end(), misses)) {
-    return "  Every mode has a damping ratio of " +
+    return std::string(report.gears ? "  If no gear gave way, every mode had a damping ratio of "
+                                    : "  Every mode has a damping ratio of ") +
            format_number(ratio, ratio < report.ratio ? 6 : 3) + ".\n";
   }
   std::string text;
