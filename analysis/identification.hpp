@@ -3,6 +3,7 @@
 #include <dashpot/analysis/motion_record.hpp>
 
 #include <array>
+#include <functional>
 #include <limits>
 #include <string>
 #include <vector>
@@ -14,6 +15,9 @@ struct IdentifyOptions {
   /// inputs 16 more, at most 32; of ambient motion 4 for each channel and 4 more, at most 40.
   int max_order = 0;
   bool refine = true;  ///< of decays: on the samples as they are; false: a first estimate, fast
+  /// Asked now and then in the search among models of decays and driven motion, with the share that
+  /// is done: true ends it with the best one so far.
+  std::function<bool(double)> stop = {};
 };
 
 /// A mode that records show. Standard deviations (std) are those of the estimate.
@@ -116,6 +120,24 @@ Identification identify_excited(const std::vector<MotionRecord>& records,
 /// Throws std::invalid_argument as identify_decays, and for records that are too short.
 Identification identify_ambient(const std::vector<MotionRecord>& records,
                                 const IdentifyOptions& options = {});
+
+/// What a record shows, by which its modes are looked for, or why they cannot be.
+enum class MotionKind { kDecays, kAmbient, kDriven, kLimitCycle, kLargeMotion, kNothing };
+
+struct MotionVerdict {
+  MotionKind kind = MotionKind::kNothing;
+  double frequency = 0;  ///< rad/s: of a limit cycle, or the pace of other motion
+  double harmonics = 0;  ///< of a limit cycle: share of its squares at multiples of the frequency
+};
+
+/// Tells by the outputs alone what kind of motion a record shows: nothing beyond noise; a limit
+/// cycle, which repeats itself with one amplitude in the second half of the record; motion that
+/// lasts and whose energy rises as often as it falls, under forces that nobody measured; or
+/// anything else, in which free decays may be. Scales of time and of the channels, offsets and slow
+/// drift make no difference.
+///
+/// Throws std::invalid_argument as identify_decays.
+MotionVerdict judge_motion(const MotionRecord& record);
 
 /// A part of a record in which an arm moves freely.
 struct FreeDecay {

@@ -1,4 +1,7 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/identification/decay_cells.hpp>
+
+#include <Eigen/Eigenvalues>
 
 #include <algorithm>
 #include <cmath>
@@ -41,6 +44,27 @@ Index audible(const MatrixXd& grid, const VectorXd& noise) {
     if (y.middleCols(at, window).squaredNorm() / samples > least) last = at + window;
   }
   return std::max(last, std::min<Index>(grid.cols(), 20));
+}
+
+/// The noise of evenly spaced samples by the least singular values of their Hankel matrix: motion
+/// that is predictable from sample to sample leaves them alone, however far apart samples are.
+double unpredictable(const MotionRecord& record, Index channel) {
+  constexpr Index kWindow = 40, kMostWindows = 1500;
+  const auto y = record.output.row(channel);
+  const Index N = y.size(), width = std::min(kWindow, N / 3);
+  if (width < 4) return kInfinity;
+  MatrixXd covariance = MatrixXd::Zero(width, width);
+  const Index stride = std::max<Index>(1, N / kMostWindows);
+  double count = 0;
+  for (Index at = 0; at + width <= N; at += stride) {
+    const VectorXd window = y.segment(at, width).transpose();
+    if (!window.allFinite()) continue;
+    covariance.selfadjointView<Eigen::Lower>().rankUpdate(VectorXd(window.array() - window.mean()));
+    ++count;
+  }
+  if (count < 1.5 * static_cast<double>(width)) return kInfinity;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(covariance / count, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, solver.eigenvalues()[1 + 2 * width / 5]));
 }
 
 }  // namespace
@@ -89,21 +113,27 @@ VectorXd first_noise(const std::vector<MotionRecord>& records) {
   VectorXd noise(channels);
   for (Index c = 0; c < channels; ++c) {
     std::vector<double> differences;
-    double largest = 0;
+    double largest = 0, quantum = kInfinity, hankel = kInfinity;
     for (const MotionRecord& record : records) {
       const auto y = record.output.row(c);
       for (Index i = 0; i < y.size(); ++i) {
         if (std::isfinite(y[i])) largest = std::max(largest, std::abs(y[i]));
+        const double change = i > 0 ? std::abs(y[i] - y[i - 1]) : 0;
+        if (change > 0) quantum = std::min(quantum, change);
         if (i < 5) continue;
         const double d =
             y[i] - 5 * y[i - 1] + 10 * y[i - 2] - 10 * y[i - 3] + 5 * y[i - 4] - y[i - 5];
         if (std::isfinite(d)) differences.push_back(std::abs(d));
       }
+      hankel = std::min(hankel, unpredictable(record, c));
     }
     // Pushes are in the last tenth. Of normal noise 90 % lies within 1.645 deviations.
     constexpr double kGain = 15.874507866387544;  // root of the coefficients' squares, 252
     const double size = quantile(std::move(differences), 0.9) / 1.645 / kGain;
-    noise[c] = std::max({size, 1e-13 * largest, 1e-300});
+    // Differences see motion where samples are far apart. Digits are no closer than the least step.
+    const double seen = hankel < size / 2 ? hankel : size;
+    const double digit = std::isfinite(quantum) ? quantum / std::sqrt(12.0) : 0;
+    noise[c] = std::max({seen, digit, 1e-13 * largest, 1e-300});
   }
   return noise;
 }

@@ -82,50 +82,37 @@ std::array<double, 2> rate_of(const std::array<double, 2>& x, double zeta) {
   return {-zeta * x[0] - (1 - zeta * zeta) * x[1], x[0] - zeta * x[1]};
 }
 
-/// Adds what a source makes to the columns of a factor.
-class Adder {
- public:
-  Adder(const DecayFactor& factor, bool derivatives, FactorColumns& columns)
-      : factor_(factor), derivatives_(derivatives), columns_(columns) {}
-
-  void wave(std::size_t source, Index at, const Wave& wave) const {
-    const auto [alpha, beta] = factor_.scale[source];
-    const auto width = static_cast<std::size_t>(factor_.parameters());
-    std::size_t place = width * (1 + source);  // of the scales' derivatives
-    if (source > factor_.reference) place -= width;
-    const bool scaled = derivatives_ && source != factor_.reference;
-    if (!factor_.pair) {
-      columns_.value(at, 0) += alpha * wave.x[0];
-      if (derivatives_) columns_.derivative[0](at, 0) += alpha * wave.by_first[0];
-      if (scaled) columns_.derivative[place](at, 0) += wave.x[0];
-      return;
-    }
-    const double zeta = factor_.second;
-    const std::array<double, 2> rate = rate_of(wave.x, zeta);
-    std::array<double, 2> by_first{}, by_second{};
-    if (derivatives_) {
-      by_first = rate_of(wave.by_first, zeta);
-      by_second = rate_of(wave.by_second, zeta);
-      by_second[0] += -wave.x[0] + 2 * zeta * wave.x[1];
-      by_second[1] -= wave.x[1];
-    }
-    for (Index k : {0, 1}) {
-      const auto j = static_cast<std::size_t>(k);
-      columns_.value(at, k) += alpha * wave.x[j] + beta * rate[j];
-      if (!derivatives_) continue;
-      columns_.derivative[0](at, k) += alpha * wave.by_first[j] + beta * by_first[j];
-      columns_.derivative[1](at, k) += alpha * wave.by_second[j] + beta * by_second[j];
-      if (!scaled) continue;
-      columns_.derivative[place](at, k) += wave.x[j];
-      columns_.derivative[place + 1](at, k) += rate[j];
-    }
+/// Adds what a source makes to a row of the columns of a factor; to `by_scale` what its scales do.
+void add_wave(const DecayFactor& factor, std::size_t source, Index at, const Wave& wave,
+              FactorColumns& columns, std::array<MatrixXd, 2>* by_scale) {
+  const auto [alpha, beta] = factor.scale[source];
+  const bool derivatives = by_scale != nullptr;
+  if (!factor.pair) {
+    columns.value(at, 0) += alpha * wave.x[0];
+    if (!derivatives) return;
+    columns.by_eigenvalue[0](at, 0) += alpha * wave.by_first[0];
+    (*by_scale)[0](at, 0) += wave.x[0];
+    return;
   }
-
- private:
-  const DecayFactor& factor_;
-  bool derivatives_;
-  FactorColumns& columns_;
-};
+  const double zeta = factor.second;
+  const std::array<double, 2> rate = rate_of(wave.x, zeta);
+  std::array<double, 2> by_first{}, by_second{};
+  if (derivatives) {
+    by_first = rate_of(wave.by_first, zeta);
+    by_second = rate_of(wave.by_second, zeta);
+    by_second[0] += -wave.x[0] + 2 * zeta * wave.x[1];
+    by_second[1] -= wave.x[1];
+  }
+  for (Index k : {0, 1}) {
+    const auto j = static_cast<std::size_t>(k);
+    columns.value(at, k) += alpha * wave.x[j] + beta * rate[j];
+    if (!derivatives) continue;
+    columns.by_eigenvalue[0](at, k) += alpha * wave.by_first[j] + beta * by_first[j];
+    columns.by_eigenvalue[1](at, k) += alpha * wave.by_second[j] + beta * by_second[j];
+    (*by_scale)[0](at, k) += wave.x[j];
+    (*by_scale)[1](at, k) += rate[j];
+  }
+}
 
 /// The mean in each of the `cells` of what an input makes of a factor at rest: the sum over the
 /// values before, each a start of the factor's own.
@@ -181,13 +168,15 @@ std::vector<Wave> forced_waves(const DecayFactor& factor, const DrivenGrid& grid
 
 FactorColumns columns_of(const DecayFactor& factor, const DecayPart& part, bool derivatives) {
   const Index N = samples_of(part), width = factor.parameters();
-  FactorColumns columns{MatrixXd::Zero(N, width), {}};
   const std::size_t records = part.time.size();
-  const std::size_t sources = records + static_cast<std::size_t>(part.inputs());
+  const auto inputs = static_cast<std::size_t>(part.inputs());
+  const MatrixXd zero = MatrixXd::Zero(N, width);
+  FactorColumns columns{zero, {}, {}, {}};
   if (derivatives) {
-    columns.derivative.assign(static_cast<std::size_t>(width) * sources, MatrixXd::Zero(N, width));
+    columns.by_eigenvalue.assign(static_cast<std::size_t>(width), zero);
+    columns.by_record_scale = {zero, zero};
+    columns.by_input_scale.assign(inputs, {zero, zero});
   }
-  const Adder add(factor, derivatives, columns);
   Index from = 0;
   std::vector<std::pair<double, Wave>> waves;  // that were found: most records have the same times
   for (std::size_t r = 0; r < records; ++r) {
@@ -196,19 +185,34 @@ FactorColumns columns_of(const DecayFactor& factor, const DecayPart& part, bool 
       const auto k = static_cast<std::size_t>(i);
       if (k == waves.size()) waves.emplace_back(time[i], wave_at(factor, time[i]));
       const auto& [known, wave] = waves[k];
-      add.wave(r, from + i, known == time[i] ? wave : wave_at(factor, time[i]));
+      add_wave(factor, r, from + i, known == time[i] ? wave : wave_at(factor, time[i]), columns,
+               derivatives ? &columns.by_record_scale : nullptr);
     }
-    for (Index j = 0; j < part.inputs(); ++j) {
-      const std::vector<Wave> forced =
-          forced_waves(factor, (*part.driven)[r], j, derivatives, part.cells[r]);
-      const std::size_t source = records + static_cast<std::size_t>(j);
+    for (std::size_t j = 0; j < inputs; ++j) {
+      const std::vector<Wave> forced = forced_waves(
+          factor, (*part.driven)[r], static_cast<Index>(j), derivatives, part.cells[r]);
       for (std::size_t i = 0; i < forced.size(); ++i) {
-        add.wave(source, from + static_cast<Index>(i), forced[i]);
+        add_wave(factor, records + j, from + static_cast<Index>(i), forced[i], columns,
+                 derivatives ? &columns.by_input_scale[j] : nullptr);
       }
     }
-    from += part.time[r].size();
+    from += time.size();
   }
   return columns;
+}
+
+void take_constants(const DecayPart& part, MatrixXd& columns) {
+  Index from = 0;
+  for (const VectorXd& time : part.time) {
+    auto rows = columns.middleRows(from, time.size());
+    from += time.size();
+    if (time.size() == 0) continue;
+    rows.rowwise() -= Eigen::RowVectorXd(rows.colwise().mean());
+    if (!part.drifts) continue;
+    const VectorXd slope = (time.array() - time.mean()).matrix();
+    const double size = slope.squaredNorm();
+    if (size > 0) rows -= slope * Eigen::RowVectorXd(slope.transpose() * rows / size);
+  }
 }
 
 MatrixXd direct_columns(const DecayPart& part) {

@@ -1,21 +1,27 @@
 #pragma once
 #include <dashpot/analysis/identification/decay_data.hpp>
 
+#include <array>
 #include <vector>
 
 namespace dashpot::analysis {
 
 /// The motions of a factor in all records, samples x 2 or x 1, and their derivatives by `first`,
-/// `second` and the scales of all sources but the reference.
+/// `second` and the scales: of each record those by its own scales, which move no other one.
 struct FactorColumns {
   Eigen::MatrixXd value;
-  std::vector<Eigen::MatrixXd> derivative;
+  std::vector<Eigen::MatrixXd> by_eigenvalue;
+  std::array<Eigen::MatrixXd, 2> by_record_scale;
+  std::vector<std::array<Eigen::MatrixXd, 2>> by_input_scale;
 };
 
 FactorColumns columns_of(const DecayFactor& factor, const DecayPart& part, bool derivatives);
 
 /// The inputs themselves, samples x inputs: what follows them at once, such as modes far above.
 Eigen::MatrixXd direct_columns(const DecayPart& part);
+
+/// Takes from the rows of each record what its constant, and its drift if there is one, can be.
+void take_constants(const DecayPart& part, Eigen::MatrixXd& columns);
 
 /// A product of the motions of two factors that have products.
 struct MotionProduct {

@@ -45,6 +45,7 @@ struct DecayPart {
   std::vector<Eigen::VectorXd> time;   ///< of each record, s, from its beginning
   Eigen::MatrixXd output;              ///< samples of all records, one after the other, x channels
   std::vector<Eigen::Index> channels;  ///< which of the records' channels
+  bool drifts = false;                 ///< each record has a slope as well as a constant
   /// With inputs: of each record the numbers of the cells that the samples are means of, and what
   /// moved it.
   std::vector<std::vector<Eigen::Index>> cells = {};
@@ -67,6 +68,11 @@ struct DecayData {
   static constexpr double kLinear = 1e-4;
 
   double least_noise(Eigen::Index channel) const;
+
+  bool drifts() const { return parts.front().drifts; }
+  void set_drifts(bool drifts) {
+    for (DecayPart& part : parts) part.drifts = drifts;
+  }
 
   std::size_t sources() const { return records + inputs; }
 

@@ -56,110 +56,131 @@ double longest_record(const DecayData& data) {
   return longest;
 }
 
-/// The factors of least cost near `factors`, for a given noise. Gives up where the cost will stay
-/// above `hopeless`.
-bool descend(const DecayData& data, const VectorXd& noise, const VectorXd& record_noise,
-             int max_iterations, double hopeless, std::vector<DecayFactor>& factors) {
-  const double longest = longest_record(data);
-  VariableProjection now(data, factors, noise, record_noise);
-  now.differentiate();
-  double lambda = 1e-3;
-  for (int i = 0; i < max_iterations; ++i) {
-    bool better = false;
-    while (!better && lambda < 1e12) {
-      MatrixXd A = now.normal;
-      A.diagonal() += lambda * now.normal.diagonal().cwiseMax(1e-300);
-      VectorXd step = A.ldlt().solve(now.gradient);
-      if (!step.allFinite()) return false;
-      if (step.dot(now.gradient) < 1e-4) return true;  // no step promises more
-      const std::vector<DecayFactor> next = moved(factors, step);
-      if (makes_sense(next, longest)) {
-        VariableProjection there(data, next, noise, record_noise);
-        const double gain = now.cost - there.cost;
-        if (gain >= 0) {
-          factors = next;
-          const double size = step.dot(now.normal * step);
-          if (gain < 1e-4 || size < 1e-4) return true;  // far below what noise does
-          if (i > 3 && now.cost - 30 * gain > hopeless) return false;
-          now = std::move(there);
-          now.differentiate();
-          lambda = std::max(1e-12, lambda / 10);
-          better = true;
-        }
+/// Fits `factors` and the noise of channels and records together, from what `fit` has of them: each
+/// step is that of Levenberg and Marquardt with the noise of the last one, and counts by the
+/// likelihood. Gives up where -2 log likelihood will stay above `hopeless`.
+class Descent {
+ public:
+  Descent(const DecayData& data, DecayFit& fit) : data_(data), fit_(fit) {}
+
+  bool run(int max_iterations, double hopeless) {
+    const double longest = longest_record(data_);
+    const double enough = max_iterations > kFew ? kSmallGain : kSearchGain;
+    VariableProjection now(data_, fit_.factors, fit_.noise, fit_.record_noise);
+    double lambda = 1e-3;
+    int quiet = 0;
+    for (int i = 0; i < max_iterations; ++i) {
+      const double before = misfit(now);
+      const bool settled = take_noise(now);
+      if (!settled) {
+        now = VariableProjection(data_, fit_.factors, fit_.noise, fit_.record_noise);
+        quiet = 0;
       }
-      if (!better) lambda *= 10;
+      now.differentiate();
+      bool better = false;
+      while (!better && lambda < 1e12) {
+        MatrixXd A = now.normal;
+        A.diagonal() += lambda * now.normal.diagonal().cwiseMax(1e-300);
+        const VectorXd step = A.ldlt().solve(now.gradient);
+        if (!step.allFinite()) return false;
+        if (step.dot(now.gradient) < enough && settled) return true;  // no step promises more
+        const std::vector<DecayFactor> next = moved(fit_.factors, step);
+        if (makes_sense(next, longest)) {
+          VariableProjection there(data_, next, fit_.noise, fit_.record_noise);
+          const double gain = misfit(now) - misfit(there);
+          if (gain >= 0) {
+            fit_.factors = next;
+            now = std::move(there);
+            hopeless_ = i > 3 && misfit(now) - 30 * (before - misfit(now)) > hopeless;
+            if (hopeless_) return false;
+            if (gain < enough && ++quiet > 1) return take_noise(now), true;
+            lambda = std::max(1e-12, lambda / 10);
+            better = true;
+          }
+        }
+        if (!better) lambda *= 10;
+      }
+      if (!better) return true;  // at the minimum to rounding
     }
-    if (!better) return true;  // at the minimum to rounding
+    take_noise(now);
+    return false;
   }
-  return false;
-}
+
+  bool is_hopeless() const { return hopeless_; }
+
+  /// -2 log likelihood at the noise that suits best.
+  double misfit(const VariableProjection& there) const {
+    const VectorXd count = there.count.rowwise().sum();
+    const VectorXd inverse = fit_.record_noise.cwiseAbs2().cwiseInverse();
+    double sum = 2 * there.count.colwise().sum().dot(fit_.record_noise.array().log().matrix());
+    for (Index c = 0; c < data_.channels; ++c) {
+      const double least = std::pow(data_.least_noise(c), 2);
+      const double square = there.squares.row(c).dot(inverse) / count[c];
+      // Below the least noise what is left over still counts by its squares.
+      sum += count[c] * (square > least ? std::log(square) : std::log(least) + square / least - 1);
+    }
+    return sum;
+  }
+
+ private:
+  static constexpr int kFew = 15;              // iterations of a search
+  static constexpr double kSearchGain = 0.02;  // of -2 log likelihood: nothing, beside a parameter
+  static constexpr double kSmallGain = 1e-4;
+
+  /// True if they change little.
+  bool take_noise(const VariableProjection& there) {
+    const VectorXd noise_before = fit_.noise, record_before = fit_.record_noise;
+    const VectorXd inverse = fit_.record_noise.cwiseAbs2().cwiseInverse();
+    const VectorXd count = there.count.rowwise().sum();
+    const double linear = static_cast<double>(there.amplitudes.rows()) +
+                          static_cast<double>(factor_width(fit_.factors)) *
+                              static_cast<double>(data_.sources()) /
+                              static_cast<double>(data_.channels);
+    for (Index c = 0; c < data_.channels; ++c) {
+      const double squares = there.squares.row(c).dot(inverse);
+      fit_.noise[c] =
+          std::max(std::sqrt(squares / std::max(1.0, count[c] - linear)), data_.least_noise(c));
+    }
+    // Each record's, about one: never so unequal that one counts for nothing.
+    if (data_.records > 1) {
+      const MatrixXd relative = fit_.noise.cwiseAbs2().cwiseInverse().asDiagonal() * there.squares;
+      fit_.record_noise = (relative.colwise().sum().transpose())
+                              .cwiseQuotient(there.count.colwise().sum().transpose())
+                              .cwiseSqrt()
+                              .cwiseMax(0.1);
+      fit_.record_noise /= std::exp(fit_.record_noise.array().log().mean());
+    }
+    return std::max((fit_.noise.array() / noise_before.array()).log().abs().maxCoeff(),
+                    (fit_.record_noise.array() / record_before.array()).log().abs().maxCoeff()) <
+           0.02;
+  }
+
+  const DecayData& data_;
+  DecayFit& fit_;
+  bool hopeless_ = false;
+};
 
 /// By how much the variance of the estimates exceeds that for white noise, because what is left
 /// over is alike from sample to sample: the mean over the parameters, in the coordinates in which
 /// they are uncorrelated, of sums of scores over stretches of time (batch means).
 double variance_growth(const VariableProjection& evaluation) {
   const Index p = evaluation.normal.rows();
-  const Eigen::LLT<MatrixXd> factor(evaluation.normal);
-  if (p == 0 || factor.info() != Eigen::Success) return 1;
-  return std::max(1.0, evaluation.squared_scores(factor) / static_cast<double>(p));
+  if (p == 0) return 1;
+  // Where factors are alike, some direction is not determined, and says nothing.
+  for (double ridge = 1e-9; ridge < 1; ridge *= 100) {
+    MatrixXd normal = evaluation.normal;
+    normal.diagonal() = normal.diagonal().cwiseMax(1e-300) * (1 + ridge);
+    const Eigen::LLT<MatrixXd> factor(normal);
+    if (factor.info() != Eigen::Success) continue;
+    return std::max(1.0, evaluation.squared_scores(factor) / static_cast<double>(p));
+  }
+  return 1;
 }
 
-}  // namespace
-
-DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start,
-                    const VectorXd& noise, int max_iterations, double hopeless) {
-  DecayFit fit;
-  fit.criterion = std::numeric_limits<double>::infinity();
-  fit.factors = start;
-  fit.noise = noise;
-  const auto records = static_cast<Index>(data.records);
-  fit.record_noise.setOnes(records);
-  find_scales(data, noise, fit.factors);
-  const Index eigen = factor_width(start);
-  const auto nonlinear = static_cast<double>(eigen) * static_cast<double>(data.sources());
-  const auto channels = static_cast<double>(data.channels);
-  constexpr int kRounds = 5;
-  for (int round = 0; round < kRounds; ++round) {
-    fit.converged =
-        descend(data, fit.noise, fit.record_noise, max_iterations, hopeless, fit.factors);
-    const VariableProjection there(data, fit.factors, fit.noise, fit.record_noise);
-    if (there.cost > hopeless) break;
-    const VectorXd noise_before = fit.noise, record_before = fit.record_noise;
-    const VectorXd inverse = fit.record_noise.cwiseAbs2().cwiseInverse();
-    const VectorXd count = there.count.rowwise().sum();
-    fit.amplitudes = there.amplitudes;
-    const auto linear = static_cast<double>(fit.amplitudes.rows());
-    for (Index c = 0; c < data.channels; ++c) {
-      const double n = std::max(1.0, count[c] - linear - nonlinear / channels);
-      const double squares = there.squares.row(c) * inverse;
-      fit.noise[c] = std::max(std::sqrt(squares / n), data.least_noise(c));
-    }
-    // Each record's, about one: never so unequal that one counts for nothing.
-    if (records > 1) {
-      const MatrixXd relative = fit.noise.cwiseAbs2().cwiseInverse().asDiagonal() * there.squares;
-      fit.record_noise = (relative.colwise().sum().transpose())
-                             .cwiseQuotient(there.count.colwise().sum().transpose())
-                             .cwiseSqrt()
-                             .cwiseMax(0.1);
-      fit.record_noise /= std::exp(fit.record_noise.array().log().mean());
-    }
-    fit.criterion = parameter_penalty(fit, data);
-    for (Index c = 0; c < data.channels; ++c) {
-      const double squares = there.squares.row(c) * fit.record_noise.cwiseAbs2().cwiseInverse();
-      fit.criterion +=
-          count[c] * std::log(std::max(squares / count[c], std::pow(data.least_noise(c), 2)));
-    }
-    fit.criterion += 2 * there.count.colwise().sum().dot(fit.record_noise.array().log().matrix());
-    const double change =
-        std::max((fit.noise.array() / noise_before.array()).log().abs().maxCoeff(),
-                 (fit.record_noise.array() / record_before.array()).log().abs().maxCoeff());
-    if (change < 0.02) break;
-  }
-  VariableProjection there(data, fit.factors, fit.noise, fit.record_noise);
-  there.differentiate();
-  fit.amplitudes = there.amplitudes;
-  fit.whiteness = variance_growth(there);
-  const Index p = there.normal.rows();
+/// The step of Gauss and Newton, of the eigenvalues.
+DecayStep step_of(const VariableProjection& there, const DecayData& data,
+                  const std::vector<DecayFactor>& factors, double whiteness) {
+  const Index p = there.normal.rows(), eigen = factor_width(factors);
   // Scaled, so that parameters of unlike size are no deficiency. One that moves nothing, so that
   // squares underflow, tells nothing and is not determined.
   const VectorXd scale = there.normal.diagonal().unaryExpr(
@@ -170,23 +191,52 @@ DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start
   const VectorXd least = VectorXd::Constant(p, 1e-13 * solver.eigenvalues().maxCoeff());
   const VectorXd inverse = solver.eigenvalues().cwiseMax(least).cwiseInverse();
   const MatrixXd all = scale.asDiagonal() * solver.eigenvectors() * inverse.asDiagonal() *
-                       solver.eigenvectors().transpose() * scale.asDiagonal() * fit.whiteness;
+                       solver.eigenvectors().transpose() * scale.asDiagonal();
   std::vector<Index> eigenvalues;  // among the parameters
   Index first = 0;
-  for (const DecayFactor& factor : fit.factors) {
+  for (const DecayFactor& factor : factors) {
     for (Index i = 0; i < factor.parameters(); ++i) eigenvalues.push_back(first + i);
     first += factor.parameters() * static_cast<Index>(data.sources());
   }
-  fit.covariance = all(eigenvalues, eigenvalues);
-  if (solver.info() != Eigen::Success || !fit.covariance.allFinite()) {
-    fit.covariance.setConstant(eigen, eigen, std::numeric_limits<double>::infinity());
+  DecayStep result{(all * there.gradient)(eigenvalues), all(eigenvalues, eigenvalues) * whiteness};
+  if (solver.info() != Eigen::Success || !result.covariance.allFinite()) {
+    result.covariance.setConstant(eigen, eigen, std::numeric_limits<double>::infinity());
   }
   for (Index i = 0; i < eigen; ++i) {
     if (scale[eigenvalues[static_cast<std::size_t>(i)]] == 0) {
-      fit.covariance(i, i) = std::numeric_limits<double>::infinity();
+      result.covariance(i, i) = std::numeric_limits<double>::infinity();
     }
   }
+  return result;
+}
+
+}  // namespace
+
+DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start,
+                    const VectorXd& noise, int max_iterations, double hopeless) {
+  DecayFit fit;
+  fit.factors = start;
+  fit.noise = noise;
+  fit.record_noise.setOnes(static_cast<Index>(data.records));
+  find_scales(data, noise, fit.factors);
+  Descent descent(data, fit);
+  fit.converged = descent.run(max_iterations, hopeless);
+  fit.criterion = std::numeric_limits<double>::infinity();
+  if (descent.is_hopeless()) return fit;
+  VariableProjection there(data, fit.factors, fit.noise, fit.record_noise);
+  there.differentiate();
+  fit.amplitudes = there.amplitudes;
+  fit.criterion = parameter_penalty(fit, data) + descent.misfit(there);
+  fit.whiteness = variance_growth(there);
+  fit.covariance = step_of(there, data, fit.factors, fit.whiteness).covariance;
   return fit;
+}
+
+DecayStep step_of(const DecayData& data, std::vector<DecayFactor> factors, const VectorXd& noise) {
+  find_scales(data, noise, factors);
+  VariableProjection there(data, factors, noise, VectorXd::Ones(static_cast<Index>(data.records)));
+  there.differentiate();
+  return step_of(there, data, factors, variance_growth(there));
 }
 
 double parameter_penalty(const DecayFit& fit, const DecayData& data) {
@@ -211,34 +261,35 @@ std::vector<MatrixXd> factor_motion(const DecayData& data, const DecayFit& fit,
   return result;
 }
 
+double energy_of(const DecayData& data, const DecayFit& fit, std::size_t factor) {
+  double energy = 0;
+  const std::vector<MatrixXd> motion = factor_motion(data, fit, factor);
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    const auto& channels = data.parts[i].channels;
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      energy +=
+          motion[i].col(static_cast<Index>(c)).squaredNorm() / std::pow(fit.noise[channels[c]], 2);
+    }
+  }
+  return energy;
+}
+
 std::vector<MatrixXd> left_over(const DecayData& data, const DecayFit& fit) {
   std::vector<MatrixXd> result;
-  const Index constants = factor_width(fit.factors);
+  const Index others_from = factor_width(fit.factors) + static_cast<Index>(data.records);
   const std::vector<MotionProduct> products = products_of(fit.factors);
   for (const DecayPart& part : data.parts) {
-    MatrixXd rest = part.output;
-    Index from = 0, record = constants;
-    for (const VectorXd& time : part.time) {
-      for (std::size_t c = 0; c < part.channels.size(); ++c) {
-        rest.col(static_cast<Index>(c)).segment(from, time.size()).array() -=
-            fit.amplitudes(record, part.channels[c]);
-      }
-      from += time.size();
-      ++record;
-    }
-    MatrixXd others(samples_of(part), fit.amplitudes.rows() - record);
-    others.leftCols(part.inputs()) = direct_columns(part);
-    others.rightCols(others.cols() - part.inputs()) = product_columns(products, part);
-    for (std::size_t c = 0; c < part.channels.size(); ++c) {
-      rest.col(static_cast<Index>(c)) -=
-          others * fit.amplitudes.col(part.channels[c]).tail(others.cols());
-    }
-    result.push_back(std::move(rest));
+    MatrixXd others(samples_of(part), part.inputs() + product_width(products));
+    others << direct_columns(part), product_columns(products, part);
+    result.emplace_back(part.output -
+                        others *
+                            fit.amplitudes(Eigen::seqN(others_from, others.cols()), part.channels));
   }
   for (std::size_t k = 0; k < fit.factors.size(); ++k) {
     const std::vector<MatrixXd> of_factor = factor_motion(data, fit, k);
     for (std::size_t i = 0; i < result.size(); ++i) result[i] -= of_factor[i];
   }
+  for (std::size_t i = 0; i < result.size(); ++i) take_constants(data.parts[i], result[i]);
   return result;
 }
 

@@ -25,10 +25,19 @@ struct DecayFit {
 /// channel weighted by its noise, which is estimated as well: the maximum likelihood for noise that
 /// is white and normal. The amplitudes are eliminated (VariableProjection); the
 /// factors are found by Levenberg and Marquardt's method. Gives up, with an infinite criterion,
-/// where the squares of what is left over, in units of `noise`, will stay above `hopeless`.
+/// where -2 log likelihood will stay above `hopeless`.
 DecayFit fit_decays(const DecayData& data, const std::vector<DecayFactor>& start,
                     const Eigen::VectorXd& noise, int max_iterations,
                     double hopeless = std::numeric_limits<double>::infinity());
+
+/// By how much the eigenvalues (`first` and `second` of the factors) differ for some data alone,
+/// to first order, and the covariance of that.
+struct DecayStep {
+  Eigen::VectorXd step;
+  Eigen::MatrixXd covariance;
+};
+DecayStep step_of(const DecayData& data, std::vector<DecayFactor> factors,
+                  const Eigen::VectorXd& noise);
 
 /// What a fit's criterion counts for its parameters.
 double parameter_penalty(const DecayFit& fit, const DecayData& data);
@@ -38,5 +47,8 @@ double parameter_penalty(const DecayFit& fit, const DecayData& data);
 std::vector<Eigen::MatrixXd> factor_motion(const DecayData& data, const DecayFit& fit,
                                            std::size_t factor);
 std::vector<Eigen::MatrixXd> left_over(const DecayData& data, const DecayFit& fit);
+
+/// The squares of that part, in units of the noise.
+double energy_of(const DecayData& data, const DecayFit& fit, std::size_t factor);
 
 }  // namespace dashpot::analysis

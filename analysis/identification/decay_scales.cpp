@@ -10,6 +10,18 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+/// A record's samples, which begin at a row, as a part of their own.
+DecayPart record_of(const DecayPart& part, std::size_t record, Index row) {
+  return {{part.time[record]},
+          part.output.middleRows(row, part.time[record].size()),
+          part.channels,
+          part.drifts};
+}
+
+}  // namespace
+
 void find_scales(const DecayData& data, const VectorXd& noise, std::vector<DecayFactor>& factors) {
   const std::size_t sources = data.sources();
   const bool known =
@@ -25,35 +37,44 @@ void find_scales(const DecayData& data, const VectorXd& noise, std::vector<Decay
   const auto blocks = static_cast<Index>(sources);
   std::vector<MatrixXd> amplitudes(sources, MatrixXd::Zero(eigen, data.channels));
   MatrixXd size = MatrixXd::Zero(eigen, blocks);  // squares of the columns
-  for (const DecayPart& part : data.parts) {
-    const Index N = samples_of(part);
-    MatrixXd basis = MatrixXd::Zero(N, eigen * blocks + blocks);
-    Index at = 0;
-    for (std::size_t s = 0; s < sources; ++s) {
-      for (DecayFactor factor : factors) {
-        factor.scale.assign(sources, {0, 0});
-        factor.scale[s] = {1, 0};
-        factor.reference = s;
-        basis.middleCols(at, factor.parameters()) = columns_of(factor, part, false).value;
-        at += factor.parameters();
+  for (const DecayPart& whole : data.parts) {
+    // Without inputs each record stands for itself.
+    const std::size_t groups = whole.inputs() > 0 ? 1 : data.records;
+    Index row = 0;
+    for (std::size_t g = 0; g < groups; ++g) {
+      const DecayPart part = groups > 1 ? record_of(whole, g, row) : whole;
+      const Index N = samples_of(part);
+      row += N;
+      if (N == 0) continue;
+      const std::size_t here = groups > 1 ? 1 : sources;
+      MatrixXd basis(N, eigen * static_cast<Index>(here) + part.inputs());
+      Index at = 0;
+      for (std::size_t s = 0; s < here; ++s) {
+        for (DecayFactor factor : factors) {
+          factor.has_products = false;
+          factor.scale.assign(here, {0, 0});
+          factor.scale[s] = {1, 0};
+          factor.reference = s;
+          basis.middleCols(at, factor.parameters()) = columns_of(factor, part, false).value;
+          at += factor.parameters();
+        }
       }
-    }
-    Index from = 0;
-    for (const VectorXd& time : part.time) {
-      basis.col(at++).segment(from, time.size()).setOnes();
-      from += time.size();
-    }
-    basis.rightCols(part.inputs()) = direct_columns(part);
-    const VectorXd norm = basis.colwise().norm().transpose().cwiseMax(1e-300);
-    basis *= norm.cwiseInverse().asDiagonal();
-    const MatrixXd all =
-        norm.cwiseInverse().asDiagonal() * basis.colPivHouseholderQr().solve(part.output);
-    for (std::size_t s = 0; s < sources; ++s) {
-      const Index first = static_cast<Index>(s) * eigen;
-      size.col(static_cast<Index>(s)) += norm.segment(first, eigen).cwiseAbs2();
-      for (std::size_t c = 0; c < part.channels.size(); ++c) {
-        amplitudes[s].col(part.channels[c]) =
-            all.col(static_cast<Index>(c)).segment(first, eigen) / noise[part.channels[c]];
+      basis.rightCols(part.inputs()) = direct_columns(part);
+      MatrixXd output = part.output;
+      take_constants(part, basis);
+      take_constants(part, output);
+      const VectorXd norm = basis.colwise().norm().transpose().cwiseMax(1e-300);
+      basis *= norm.cwiseInverse().asDiagonal();
+      const MatrixXd all =
+          norm.cwiseInverse().asDiagonal() * basis.colPivHouseholderQr().solve(output);
+      for (std::size_t s = 0; s < here; ++s) {
+        const Index first = static_cast<Index>(s) * eigen;
+        const std::size_t source = g + s;
+        size.col(static_cast<Index>(source)) += norm.segment(first, eigen).cwiseAbs2();
+        for (std::size_t c = 0; c < part.channels.size(); ++c) {
+          amplitudes[source].col(part.channels[c]) =
+              all.col(static_cast<Index>(c)).segment(first, eigen) / noise[part.channels[c]];
+        }
       }
     }
   }

@@ -9,6 +9,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace dashpot::analysis {
@@ -41,7 +42,12 @@ MeasuredMode to_mode(const ModelSearch& search, std::size_t k, Index at, const V
   const DecayFactor& factor = fit.factors[k];
   MeasuredMode mode;
   mode.eigenvalues = factor.eigenvalues();
-  const auto variance = [&fit](Index i) { return std::sqrt(std::max(0.0, fit.covariance(i, i))); };
+  const auto variance = [&](Index i) {
+    const double shown = i - at < 2 && k < search.scatter.size()
+                             ? search.scatter[k][static_cast<std::size_t>(i - at)]
+                             : 0;
+    return std::sqrt(std::max(0.0, fit.covariance(i, i)) + std::max(0.0, shown));
+  };
   if (factor.pair) {
     mode.natural_frequency = std::exp(factor.first);
     mode.natural_frequency_std = mode.natural_frequency * variance(at);
@@ -134,6 +140,26 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   }
   if (search.larger) doubt_order(search.fit, *search.larger, modes);
   result.order = static_cast<int>(at);
+  // Friction makes of one mode others near it, heavily damped ones, and weak ones.
+  constexpr double kLightly = 0.1, kShare = 0.1, kFarFromWhite = 2;
+  double most = 0;
+  for (const MeasuredMode& mode : modes) {
+    if (mode.damping_ratio < kLightly) most = std::max(most, mode.energy);
+  }
+  const bool doubted = search.differs && search.fit.whiteness > kFarFromWhite;
+  for (MeasuredMode& mode : modes) {
+    if (doubted && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {
+      mode.reason = "parts of the records differ: it may be friction, or what else is not linear";
+    }
+  }
+  for (const DecayFactor& factor : search.not_repeated) {
+    MeasuredMode& mode = modes.emplace_back();
+    mode.eigenvalues = factor.eigenvalues();
+    mode.natural_frequency = factor.pair ? std::exp(factor.first) : std::abs(factor.first);
+    mode.damping_ratio = factor.pair ? factor.second : 1;
+    mode.shape = VectorXcd::Zero(search.data.channels);
+    mode.reason = "parts of the records have another, or none: not linear, or noise";
+  }
   judge(std::move(modes), duration, step, result);
   return result;
 }
@@ -145,8 +171,7 @@ Identification identify_decays(const std::vector<MotionRecord>& records,
   check_records(records);
   check_order(options);
   const MovingChannels moving(records);
-  return moving.of_all(
-      describe(ModelSearch(moving.records, options.max_order, options.refine), moving.records));
+  return moving.of_all(describe(ModelSearch(moving.records, options), moving.records));
 }
 
 Identification identify_excited(const std::vector<MotionRecord>& records,
@@ -156,7 +181,24 @@ Identification identify_excited(const std::vector<MotionRecord>& records,
   require("identify", records.front().input.rows() > 0, "the records have no inputs");
   const MovingChannels moving(records);
   const ExcitedCells cells(moving.records);
-  return moving.of_all(describe(ModelSearch(cells, options.max_order), cells.records));
+  Index count = 0, shortest = std::numeric_limits<Index>::max();
+  for (const MotionRecord& record : cells.records) {
+    count += record.time.size();
+    shortest = std::min(shortest, record.time.size());
+  }
+  constexpr double kSearched = 3000, kLeast = 200;  // cells: the search is among the beginnings
+  const double share =
+      std::max(kSearched / static_cast<double>(count), kLeast / static_cast<double>(shortest));
+  if (share >= 1) return moving.of_all(describe(ModelSearch(cells, options), cells.records));
+  std::vector<MotionRecord> beginnings;
+  for (const MotionRecord& record : moving.records) {
+    const auto samples = static_cast<double>(record.time.size());
+    beginnings.push_back(part_of(record, 0, static_cast<Index>(share * samples)));
+  }
+  const ExcitedCells some(beginnings);
+  ModelSearch search(some, options);
+  search.refine(cells);
+  return moving.of_all(describe(search, cells.records));
 }
 
 }  // namespace dashpot::analysis

@@ -19,6 +19,7 @@ using Eigen::VectorXd;
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr Index kMostCells = 8000;  // of all records
+constexpr double kBin = 0.04;       // of the band of the inputs: bins that count together
 constexpr double kBridge = 3.5;     // steps, over which samples are interpolated
 
 /// Squares of the spectrum of a sequence's differences, from line 1: what begins and ends at
@@ -53,12 +54,12 @@ double input_band(const std::vector<DrivenGrid>& grids) {
 }
 
 /// rad/s up to which some channel's motion stands out from its noise.
-double output_band(const MatrixXd& grid, double step, const VectorXd& noise) {
+double output_band(const MatrixXd& grid, double step, const VectorXd& noise, double input) {
   double band = 0;
   const double width = 2 * kPi / (static_cast<double>(grid.cols() - 1) * step);
   for (Index c = 0; c < grid.rows(); ++c) {
     const VectorXd power = power_of(grid.row(c).transpose());
-    const Index bin = std::max<Index>(8, static_cast<Index>(2 * kPi / 2 / width));  // 0.5 Hz
+    const Index bin = std::max<Index>(8, static_cast<Index>(kBin * input / width));
     for (Index from = 0; from + bin <= power.size(); from += bin) {
       const double w = width * (static_cast<double>(from) + 0.5 * static_cast<double>(bin));
       const double floor =
@@ -146,14 +147,15 @@ ExcitedCells::ExcitedCells(const std::vector<MotionRecord>& all) {
   Index points = 0;
   for (std::size_t r = 0; r < all.size(); ++r) {
     put_on_grid(all[r], fine, grids[r], (*grids_driven)[r]);
-    MatrixXd whole = grids[r];
-    bridge(whole);
-    highest = std::max(highest, output_band(whole, fine, sample_noise));
     points += grids[r].cols();
     duration = std::max(duration, fine * static_cast<double>(grids[r].cols()));
   }
   const double band = input_band(*grids_driven);
   if (!(band > 0)) throw std::invalid_argument("identify: no input moves");
+  for (MatrixXd whole : grids) {
+    bridge(whole);
+    highest = std::max(highest, output_band(whole, fine, sample_noise, band));
+  }
   if (!(highest > 0)) throw std::invalid_argument("identify: nothing follows the inputs");
   highest = std::clamp(highest, band / 3, 3 * band);
   const auto most = static_cast<Index>(kPi / (1.5 * highest * fine));

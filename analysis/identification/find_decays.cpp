@@ -1,5 +1,7 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/identification.hpp>
 #include <dashpot/analysis/identification/decay_cells.hpp>
+#include <dashpot/analysis/identification/motion_kind.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -12,13 +14,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kMoves = 3;         // in units of the noise
-constexpr double kStrong = 10;       // worth a decay
-constexpr double kRise = 3;          // a new push
-constexpr double kStandstill = 0.3;  // s, standstill within a motion
-constexpr double kEnvelope = 0.25;   // s
-constexpr double kLag = 0.01;        // s, of differences
-constexpr Index kLeast = 60;         // samples of a decay
+constexpr double kMoves = 3;    // in units of the noise
+constexpr double kStrong = 10;  // worth a decay
+constexpr double kRise = 3;     // a new push
+// In periods of the motion's pace: what is slower by a few times still has one envelope.
+constexpr double kStandstill = 1;  // within a motion
+constexpr double kEnvelope = 1.5;  // window
+constexpr double kLag = 0.025;     // of differences
+constexpr Index kLeast = 20;       // samples of a decay
 
 /// How fast the channels move: root mean square of differences over kLag, in units of their noise.
 VectorXd speed_of(const MatrixXd& grid, const VectorXd& noise, Index lag) {
@@ -99,9 +102,10 @@ void add_events(const VectorXd& speed, Index begin, Index end, Index window,
   events.push_back({start, peak, end});
 }
 
-std::vector<Event> find_events(const VectorXd& speed, double step) {
-  const auto points = [step](double seconds) {
-    return std::max<Index>(1, static_cast<Index>(std::lround(seconds / step)));
+/// `period` in points of the grid.
+std::vector<Event> find_events(const VectorXd& speed, double period) {
+  const auto points = [period](double periods) {
+    return std::max<Index>(1, static_cast<Index>(std::lround(periods * period)));
   };
   std::vector<Event> events;
   const Index N = speed.size();
@@ -146,12 +150,6 @@ VectorXd motion_of(const MotionRecord& record) {
   return motion;
 }
 
-/// A place where a decay may begin.
-struct Start {
-  Index at;
-  double rest;  ///< mean logarithm of what a model leaves over
-};
-
 /// Where the decay of an event begins: the earliest of some points from which a sum of decays
 /// explains it.
 FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from, Index peak,
@@ -167,27 +165,33 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
   // Large motions are not linear, but what decays fast is seen in them only.
   constexpr double kEnough = 1e-3, kMore = 0.03, kSeen = 20;
   const VectorXd enough = kEnough * motion_of(part_of(record, from, to));
-  std::vector<Start> tried;
-  for (const Index start : starts) {
-    if (to - start < kLeast) continue;
+  // Mean logarithm of what a model leaves over from a start on; none where too little follows.
+  const auto rest = [&](Index start) {
+    if (to - start < kLeast) return kInfinity;
     try {
       const Identification found =
           identify_decays({part_of(record, start, to)}, {.max_order = 0, .refine = false});
-      tried.push_back({start, found.noise.cwiseMax(enough).array().log().mean()});
+      return found.noise.cwiseMax(enough).array().log().mean();
     } catch (const std::invalid_argument&) {
-      continue;  // not enough of it
+      return kInfinity;
     }
-  }
-  if (tried.empty()) {
+  };
+  double least = kInfinity;
+  while (!starts.empty() && !std::isfinite(least = rest(starts.back()))) starts.pop_back();
+  if (starts.empty()) {
     decay.reason = "too short";
     return decay;
   }
-  double least = tried.front().rest;
-  for (const Start& start : tried) least = std::min(least, start.rest);
-  const auto earliest = std::find_if(tried.begin(), tried.end(), [least](const Start& start) {
-    return start.rest <= least + kMore;
-  });
-  decay.from = earliest->at;
+  // What explains the motion from some start on explains it from later ones: by halving.
+  std::size_t good = starts.size() - 1, bad = 0;
+  if (rest(starts[0]) <= least + kMore) good = 0;
+  while (good > bad + 1) {
+    const std::size_t middle = (good + bad) / 2;
+    const double there = rest(starts[middle]);
+    least = std::min(least, there);
+    (there <= least + kMore ? good : bad) = middle;
+  }
+  decay.from = starts[good];
   const VectorXd motion = motion_of(part_of(record, decay.from, to));
   if (motion.cwiseQuotient(noise).maxCoeff() < kSeen) decay.reason = "lost in noise";
   return decay;
@@ -204,14 +208,17 @@ std::vector<FreeDecay> find_decays(const MotionRecord& record, const std::vector
   const VectorXd noise = first_noise({record});
   const double step = typical_step({record});
   const MatrixXd grid = on_grid(record, step);
-  const Index lag = std::max<Index>(1, static_cast<Index>(std::lround(kLag / step)));
+  const double pace = pace_of(grid, step, noise);
+  if (!(pace > 0)) return {};
+  const double period = 2 * kPi / (pace * step);
+  const Index lag = std::max<Index>(1, static_cast<Index>(std::lround(kLag * period)));
   std::vector<FreeDecay> decays;
   const auto sample_at = [&record, step](Index point) {
     const double t = record.time[0] + (static_cast<double>(point) - 0.5) * step;
     const auto* const first = record.time.data();
     return static_cast<Index>(std::lower_bound(first, first + record.time.size(), t) - first);
   };
-  for (const Event& event : find_events(speed_of(grid, noise, lag), step)) {
+  for (const Event& event : find_events(speed_of(grid, noise, lag), period)) {
     if (event.end - event.begin < 4 * lag) continue;
     const auto whole = grid.middleCols(event.begin, event.end - event.begin);
     const VectorXd size =

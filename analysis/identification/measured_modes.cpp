@@ -63,6 +63,8 @@ void pair_reals(std::vector<MeasuredMode>& modes) {
   }
 }
 
+constexpr double kHarmonic = 3;  // of friction and other forces that are odd; sums tell even ones
+
 /// Why a mode is not to be believed; empty if it is.
 std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all, double duration,
                   double step) {
@@ -90,7 +92,27 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
       return "like a larger mode next to it: its frequency changes with its size";
     }
   }
-  if (mode.damping_ratio < -2 * mode.damping_ratio_std) return "it grows";
+  for (const MeasuredMode& other : all) {
+    if (&other == &mode || other.energy < mode.energy || !other.reason.empty()) continue;
+    const double deviation = std::hypot(mode.natural_frequency_std, other.natural_frequency_std);
+    if (std::abs(other.natural_frequency - mode.natural_frequency) < 4 * deviation &&
+        std::abs(other.eigenvalues[0] - lambda[0]) < 0.2 * std::abs(lambda[0]) &&
+        likeness(other.shape, mode.shape) > 0.8) {
+      return "the same as a larger mode next to it";
+    }
+  }
+  if (mode.damping_ratio + 2 * mode.damping_ratio_std < 0) return "it grows";
+  if (mode.damping_ratio <= 0) return "it does not decay within its deviation";
+  for (const MeasuredMode& other : all) {
+    const double w = other.eigenvalues[0].imag(), multiple = kHarmonic * w;
+    const double within = std::max(
+        0.005 * multiple,
+        2 * std::hypot(mode.natural_frequency_std, kHarmonic * other.natural_frequency_std));
+    if (w > 0 && other.energy > 10 * mode.energy &&
+        std::abs(lambda[0].imag() - multiple) < within) {
+      return "three times the frequency of a larger mode: not a mode, but what is not linear";
+    }
+  }
   for (const MeasuredMode& a : all) {
     for (const MeasuredMode& b : all) {
       if (&a == &mode || &b == &mode || a.energy < 10 * mode.energy ||

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/base/require.hpp>
 #include <dashpot/analysis/identification/common_denominator.hpp>
 #include <dashpot/analysis/identification/decay_columns.hpp>
@@ -16,7 +17,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kFirstIterations = 12;  ///< of models of rising order
+constexpr int kRoughIterations = 4;   ///< of models of rising order: a first estimate
+constexpr int kDrivenIterations = 6;  ///< where least squares have found them already
+constexpr int kProductIterations = 12;
+/// Of -2 log likelihood: by more a model that is searched for will not become worse.
+constexpr double kDifference = 60;
+/// Of the record: a single decay that is slower is taken for drift, if one explains as much.
+constexpr double kDrifts = 3;
 
 /// Those that a record of this length (s) can tell from a constant, as factors.
 std::vector<DecayFactor> factors_of(const std::vector<RealizedPole>& poles, double duration) {
@@ -49,26 +56,6 @@ std::vector<std::vector<RealizedPole>> rest_poles(const std::vector<MatrixXd>& r
   return result;
 }
 
-double sample_count(const DecayData& data) {
-  double count = 0;
-  for (const DecayPart& part : data.parts) count += static_cast<double>(part.output.size());
-  return count;
-}
-
-/// Of a factor's motion, in units of the noise.
-double energy_of(const DecayData& data, const DecayFit& fit, std::size_t factor) {
-  double energy = 0;
-  const std::vector<MatrixXd> motion = factor_motion(data, fit, factor);
-  for (std::size_t i = 0; i < motion.size(); ++i) {
-    const auto& channels = data.parts[i].channels;
-    for (std::size_t c = 0; c < channels.size(); ++c) {
-      energy +=
-          motion[i].col(static_cast<Index>(c)).squaredNorm() / std::pow(fit.noise[channels[c]], 2);
-    }
-  }
-  return energy;
-}
-
 /// The same with the products of its strongest oscillations: an arm that moves far is not linear,
 /// and what it makes of them would be taken for modes.
 DecayFit with_products(const DecayData& data, const DecayFit& plain) {
@@ -83,17 +70,37 @@ DecayFit with_products(const DecayData& data, const DecayFit& plain) {
   for (std::size_t i = 0; i < std::min(kStrongest, strongest.size()); ++i) {
     factors[strongest[i].second].has_products = true;
   }
-  return fit_decays(data, factors, plain.noise, kFirstIterations);
+  return fit_decays(data, factors, plain.noise, kProductIterations);
+}
+
+/// The search is among the records that move most: more of them say no more of how many modes there
+/// are.
+std::vector<MotionRecord> strongest(const std::vector<MotionRecord>& records,
+                                    const VectorXd& noise) {
+  constexpr std::size_t kMost = 8;
+  if (records.size() <= kMost) return records;
+  std::vector<std::pair<double, std::size_t>> motion;
+  for (std::size_t r = 0; r < records.size(); ++r) {
+    const DecayData alone({records[r]});
+    motion.emplace_back(-alone.motion.cwiseQuotient(noise).squaredNorm(), r);
+  }
+  std::sort(motion.begin(), motion.end());
+  std::vector<MotionRecord> chosen;
+  for (std::size_t i = 0; i < kMost; ++i) chosen.push_back(records[motion[i].second]);
+  return chosen;
 }
 
 }  // namespace
 
-ModelSearch::ModelSearch(const std::vector<MotionRecord>& records, int max_order, bool refine)
-    : data(records) {
-  const VectorXd noise = first_noise(records);
+ModelSearch::ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOptions& options)
+    : data(all), stop_(options.stop) {
+  const int max_order = options.max_order;
+  const bool refine = options.refine;
+  const VectorXd noise = first_noise(all);
+  const std::vector<MotionRecord> records = strongest(all, noise);
   const DecayCells cells(records, noise);
   const Index channels = data.channels;
-  const Realization realization(cells.weighted(), cells.step, channels, 300);
+  const Realization realization(cells.weighted(), cells.step, channels, refine ? 300 : 120);
   const int wanted =
       max_order > 0 ? max_order : static_cast<int>(std::clamp<Index>(2 * channels, 12, 32));
   const int most = std::min(
@@ -112,26 +119,38 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& records, int max_order
     return rest_poles(rest, step, channels);
   };
   data = DecayData(cells_);
+  rough_ = !refine;
+  if (rough_) first_iterations_ = kRoughIterations;
   choose_order(cells.noise, false);
   if (!refine) return;
   improve();
   if (factor_width(fit.factors) > 2 * channels) try_products(cells.noise);
+  try_drift();
+  keep_repeated();
 
-  data = DecayData(records);
+  const bool drifts = data.drifts();
+  data = DecayData(all);
+  data.set_drifts(drifts);
+  if (all.size() > records.size()) {
+    for (DecayFactor& factor : fit.factors) factor.scale.clear();
+    larger.reset();
+  }
   fit = fit_decays(data, fit.factors, fit.noise / cells.noise_factor(), 30);
   if (larger) larger = fit_decays(data, larger->factors, fit.noise, 30);
   if (larger && larger->criterion < fit.criterion) fit = std::move(*larger), larger.reset();
   forget_useless_larger();
 }
 
-ModelSearch::ModelSearch(const ExcitedCells& cells, int max_order)
+ModelSearch::ModelSearch(const ExcitedCells& cells, const IdentifyOptions& options)
     : data(cells.records, cells.driven),
+      stop_(options.stop),
       cells_(cells.records),
       duration_(cells.duration),
       most_added_(3),
-      iterations_(15) {
-  const int most =
-      max_order > 0 ? max_order : static_cast<int>(std::min<Index>(2 * data.channels + 16, 32));
+      first_iterations_(kDrivenIterations) {
+  const int most = options.max_order > 0
+                       ? options.max_order
+                       : static_cast<int>(std::min<Index>(2 * data.channels + 16, 32));
   by_order = common_denominator_poles(cells.bridged, cells.step, most, cells.highest);
   for (std::vector<RealizedPole>& poles : by_order) {
     for (RealizedPole& pole : poles) {
@@ -150,6 +169,41 @@ ModelSearch::ModelSearch(const ExcitedCells& cells, int max_order)
     while (drop_one()) continue;
   }
   forget_useless_larger();
+  scatter.resize(fit.factors.size());
+}
+
+void ModelSearch::refine(const ExcitedCells& all) {
+  data = DecayData(all.records, all.driven);
+  fit = fit_decays(data, fit.factors, all.noise, iterations_);
+  larger.reset();
+}
+
+/// What more parameters have to be worth grows with what no model explains: its squares are fewer
+/// independent numbers than samples (quasi-likelihood; Lebreton et al. 1992).
+double ModelSearch::score(const DecayFit& some) const {
+  return some.criterion + (colour_ - 1) * parameter_penalty(some, data);
+}
+
+/// Each record with a slope of its own, as slow drift of the sensors, if that explains more.
+void ModelSearch::try_drift() {
+  const DecayFit before = fit;
+  const std::optional<DecayFit> larger_before = larger;
+  std::vector<DecayFactor> kept;
+  for (const DecayFactor& factor : fit.factors) {
+    const double slowest = factor.eigenvalues()[0].real() * duration_;
+    if (factor.pair || slowest < -kDrifts) kept.push_back(factor);
+  }
+  if (kept.empty()) kept = fit.factors;
+  data.set_drifts(true);
+  fit = fit_decays(data, kept, before.noise, iterations_);
+  if (score(fit) < score(before)) {
+    larger.reset();
+    while (drop_one()) continue;
+    return;
+  }
+  data.set_drifts(false);
+  fit = before;
+  larger = larger_before;
 }
 
 void ModelSearch::improve() {
@@ -166,7 +220,7 @@ void ModelSearch::try_products(const VectorXd& noise) {
   const int plain_order = order;
   choose_order(noise, true);
   improve();
-  if (fit.criterion < plain.criterion) return;
+  if (score(fit) < score(plain)) return;
   fit = std::move(plain);
   larger = std::move(plain_larger);
   order = plain_order;
@@ -182,36 +236,45 @@ void ModelSearch::forget_useless_larger() {
 }
 
 void ModelSearch::choose_order(const VectorXd& noise, bool products) {
-  std::optional<DecayFit> best;
+  std::vector<DecayFit> all(by_order.size());
+  double least = kInfinity;
   int worse = 0;
-  for (std::size_t n = 0; n < by_order.size() && worse < 6; ++n) {
+  const auto orders = static_cast<double>(by_order.size());
+  for (std::size_t n = 0; n < by_order.size() && worse < (rough_ ? 3 : 6); ++n) {
+    if (std::isfinite(least) && !goes_on(0.5 * static_cast<double>(n) / orders)) break;
     if (n == plain_by_order_.size()) {
       const std::vector<DecayFactor> factors = factors_of(by_order[n], duration_);
       plain_by_order_.push_back(
-          factors.empty() ? DecayFit{} : fit_decays(data, factors, noise, kFirstIterations));
+          factors.empty() ? DecayFit{} : fit_decays(data, factors, noise, first_iterations_));
     }
-    DecayFit there = plain_by_order_[n];
-    if (there.factors.empty()) continue;  // no decay
+    all[n] = plain_by_order_[n];
+    if (all[n].factors.empty()) continue;  // no decay
     if (products) {
-      DecayFit bent = with_products(data, there);
-      if (bent.criterion < there.criterion) there = std::move(bent);
+      DecayFit bent = with_products(data, all[n]);
+      if (bent.criterion < all[n].criterion) all[n] = std::move(bent);
     }
     ++worse;
-    if (best && there.criterion >= best->criterion) continue;
-    best = std::move(there);
-    order = static_cast<int>(n) + 1;
-    worse = 0;
+    if (all[n].criterion < least) least = all[n].criterion, worse = 0;
   }
-  require("identify", best.has_value(), "no decay is to be seen");
-  fit = std::move(*best);
+  colour_ = kInfinity;
+  for (const DecayFit& there : all) {
+    if (!there.factors.empty()) colour_ = std::min(colour_, there.whiteness);
+  }
+  require("identify", std::isfinite(colour_), "no decay is to be seen");
+  least = kInfinity;
+  for (std::size_t n = 0; n < all.size(); ++n) {
+    if (all[n].factors.empty() || score(all[n]) >= least) continue;
+    least = score(all[n]);
+    fit = all[n];
+    order = static_cast<int>(n) + 1;
+  }
 }
 
 bool ModelSearch::change(const std::vector<DecayFactor>& factors) {
-  // In units of its own noise the present model leaves over one for each sample.
-  const double samples = sample_count(data);
-  const double width = 40 * static_cast<double>(data.channels * fit.amplitudes.rows());
-  DecayFit there = fit_decays(data, factors, fit.noise, iterations_, samples + width);
-  if (there.criterion < fit.criterion) {
+  // A larger model that is not worth it may still say something, if it fits better.
+  const double before = fit.criterion - parameter_penalty(fit, data);
+  DecayFit there = fit_decays(data, factors, fit.noise, iterations_, before + kDifference);
+  if (score(there) < score(fit)) {
     fit = std::move(there);
     larger.reset();
     return true;
@@ -255,6 +318,7 @@ std::vector<DecayFactor> ModelSearch::candidates() const {
 
 bool ModelSearch::add_from_rest() {
   for (const DecayFactor& factor : candidates()) {
+    if (!goes_on(0.6)) return false;
     std::vector<DecayFactor> factors = fit.factors;
     factors.push_back(factor);
     if (change(factors)) return true;
@@ -265,6 +329,7 @@ bool ModelSearch::add_from_rest() {
 bool ModelSearch::drop_one() {
   Index at = 0;
   for (std::size_t k = 0; k < fit.factors.size() && fit.factors.size() > 1; ++k) {
+    if (!goes_on(0.8)) return false;
     const Index first = at;
     at += fit.factors[k].parameters();
     const double size = fit.factors[k].pair ? 1 : std::abs(fit.factors[k].first);
@@ -302,9 +367,9 @@ void ModelSearch::untangle() {
   if (kept.size() == fit.factors.size() || kept.empty()) return;
   auto before = std::pair(fit, larger);
   fit = fit_decays(data, kept, fit.noise, 40);
-  for (int k = 0; k < 8 && add_from_rest(); ++k) continue;
+  for (int k = 0; k < 4 && add_from_rest(); ++k) continue;
   while (drop_one()) continue;
-  if (!(fit.criterion < before.first.criterion)) std::tie(fit, larger) = std::move(before);
+  if (!(score(fit) < score(before.first))) std::tie(fit, larger) = std::move(before);
 }
 
 }  // namespace dashpot::analysis

@@ -1,3 +1,4 @@
+#include <dashpot/analysis/identification/motion_kind.hpp>
 #include <dashpot/analysis/identification/steady_lines.hpp>
 
 #include <Eigen/Cholesky>
@@ -26,17 +27,6 @@ constexpr int kMostLines = 20;
 
 ArrayXd taper_of(Index samples) {
   return 0.5 - 0.5 * ArrayXd::LinSpaced(samples, 0, 2 * std::numbers::pi).cos();
-}
-
-/// Samples of which a fast Fourier transform is fast, at most `samples`.
-Index smooth_count(Index samples) {
-  for (Index n = samples;; --n) {
-    Index rest = n;
-    for (const Index factor : {2, 3, 5}) {
-      while (rest % factor == 0) rest /= factor;
-    }
-    if (rest == 1 && n % 2 == 0) return n;
-  }
 }
 
 /// The power of all channels by frequency bins, each channel in units of its size.

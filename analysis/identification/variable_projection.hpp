@@ -38,11 +38,19 @@ class VariableProjection {
   struct Parameter {
     Eigen::Index shape, motion, rank;
   };
-  /// J of a part: what the amplitudes can do as well is left out.
+  /// J of a part. Motions come from the eigenvalues and inputs, in all records, first; then of each
+  /// record those that its scales make, in its rows alone.
   struct Jacobian {
     std::vector<Parameter> parameters;
-    Eigen::MatrixXd motions;  ///< samples x motions
-    Eigen::MatrixXd shapes;   ///< shapes x channels, those of a factor orthonormal
+    Eigen::MatrixXd everywhere;              ///< samples x motions
+    std::vector<Eigen::MatrixXd> of_record;  ///< samples of the record x motions
+    std::vector<Eigen::Index> first;         ///< row and motion of each record, and the end
+    std::vector<Eigen::Index> first_row;
+    Eigen::MatrixXd shapes;    ///< shapes x channels, those of a factor orthonormal
+    Eigen::MatrixXd basis;     ///< Q, samples x rank: what the amplitudes can do
+    Eigen::MatrixXd on_basis;  ///< Q' J, rank x motions
+
+    Eigen::Index motions() const { return first.back(); }
   };
   /// Of a part, weighted.
   struct Fitted {
@@ -55,6 +63,10 @@ class VariableProjection {
   Fitted fit(const DecayPart& part, const Eigen::VectorXd& noise,
              const Eigen::VectorXd& record_noise);
   Jacobian jacobian(const DecayPart& part, const Fitted& fitted) const;
+  /// motions x channels: sums over rows from `from` of a record, of J times what is left over.
+  static Eigen::MatrixXd sums(const Jacobian& jacobian, const Fitted& fitted, std::size_t record,
+                              Eigen::Index from, Eigen::Index count);
+  static Eigen::MatrixXd products(const Jacobian& jacobian);
   static Eigen::MatrixXd scores(const Jacobian& jacobian, const Eigen::MatrixXd& sums);
 
   const DecayData* data_;

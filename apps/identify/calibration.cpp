@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace dashpot::apps {
 namespace {
@@ -17,6 +18,10 @@ using controller::JointVector;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+/// A root mean square of differences, in deviations, up to which a model fits: theirs is one, and
+/// an arm is not quite linear.
+constexpr double kFits = 3;
 
 /// Parameters by their names, and what they do to a correction.
 class Parameters {
@@ -30,6 +35,14 @@ class Parameters {
       at = end + 1;
       if (name == "payload") {
         add(name, "kg", config.robot.options.payload.mass, 20, -1);
+      } else if (name == "payload_center" || name == "payload_inertia") {
+        const controller::Payload& payload = config.robot.options.payload;
+        const bool center = name == "payload_center";
+        for (int i = 0; i < 3; ++i) {
+          add(name + " " + std::string("xyz").substr(static_cast<std::size_t>(i), 1),
+              center ? "m" : "kg m^2", center ? payload.center[i] : payload.inertia(i, i),
+              center ? 0.2 : 0.1, i);
+        }
       } else if (name == "delay") {
         add(name, "ticks", config.settings.analysis.sampled.delay, 10, -1);
       } else if (name == "reflected_inertia" || name == "friction") {
@@ -43,8 +56,8 @@ class Parameters {
         }
       } else {
         throw InputError("--calibrate", "'" + name +
-                                            "' is none of payload, reflected_inertia, "
-                                            "friction, delay");
+                                            "' is none of payload, payload_center, "
+                                            "payload_inertia, reflected_inertia, friction, delay");
       }
       if (std::count(kinds_.begin(), kinds_.end(), name) > 0) {
         throw InputError("--calibrate", "'" + name + "' twice");
@@ -60,7 +73,11 @@ class Parameters {
     for (std::size_t k = 0; k < list.size(); ++k) {
       const double added = values[static_cast<Index>(k)] - list[k].before;
       const int joint = joints_[k];
-      if (joint >= 0) {
+      if (list[k].name.starts_with("payload_center")) {
+        result.center[joint] = added;
+      } else if (list[k].name.starts_with("payload_inertia")) {
+        result.inertia[joint] = added;
+      } else if (joint >= 0) {
         VectorXd& vector =
             list[k].name.starts_with("friction") ? result.friction : result.reflected_inertia;
         if (vector.size() == 0) vector = VectorXd::Zero(n);
@@ -68,6 +85,15 @@ class Parameters {
       } else {
         (list[k].name == "payload" ? result.payload : result.delay) = added;
       }
+    }
+    return result;
+  }
+
+  /// The least value of each: only a centre may be anywhere.
+  VectorXd least() const {
+    VectorXd result(size());
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      result[static_cast<Index>(k)] = list[k].name.starts_with("payload_center") ? -kInfinity : 0;
     }
     return result;
   }
@@ -83,7 +109,8 @@ class Parameters {
     prior[prior.size() - 1] = far;
   }
 
-  std::vector<int> joints_;  ///< -1: of none
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  std::vector<int> joints_;  ///< or axes; -1: of none
   std::vector<std::string> kinds_;
 };
 
@@ -143,13 +170,14 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
   };
   // First of all with large deviations, so that no match that is wrong at the start decides. In the
   // end nothing is better known than to this: no arm is linear, and at one posture, to less.
-  constexpr std::array<double, 7> kLeast = {0.05, 0.02, 0.01, 3e-3, 1e-3, 3e-4, 1e-4};
+  constexpr std::array<double, 5> kLeast = {0.05, 0.01, 2e-3, 5e-4, 1e-4};
   double least = kLeast.back();
   Calibration result;
   rematch(before);
   result.misfit_before = rms(differences(postures, predict(before), least));
 
   VectorXd x = before;
+  const VectorXd lowest = parameters.least();
   MatrixXd J;
   VectorXd r;
   const VectorXd weight = parameters.prior.cwiseInverse();
@@ -190,13 +218,13 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
       for (; !better && damping < 1e10; damping *= 10) {
         MatrixXd damped = A;
         damped.diagonal() *= 1 + damping;
-        const VectorXd next = (x - damped.ldlt().solve(g)).cwiseMax(0);
+        const VectorXd next = (x - damped.ldlt().solve(g)).cwiseMax(lowest);
         const VectorXd there = residual(next);
         gain = cost - there.squaredNorm() - weight.cwiseProduct(next - before).squaredNorm();
         if (there.size() == r.size() && gain >= 0) x = next, better = true;
       }
       damping = std::max(1e-9, damping / 100);
-      if (!better || gain < 1e-4 * (1 + cost)) break;
+      if (!better || gain < (stage == kLeast.back() ? 1e-4 : 1e-2) * (1 + cost)) break;
     }
   }
   rematch(x);
@@ -205,13 +233,15 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
   result.misfit = rms(differences(postures, predict(x), least));
   MatrixXd A = J.transpose() * J;
   A.diagonal() += weight.cwiseAbs2();
+  result.consistent = r.size() > p && result.misfit < kFits;
   const double excess = r.squaredNorm() / std::max(1.0, static_cast<double>(r.size() - p));
   const MatrixXd covariance = A.ldlt().solve(MatrixXd::Identity(p, p)) * std::max(1.0, excess);
   for (Index i = 0; i < p; ++i) {
     CalibratedParameter& one = parameters.list[static_cast<std::size_t>(i)];
     one.value = x[i];
     one.std = std::sqrt(covariance(i, i));
-    one.determined = one.std < 0.2 * parameters.prior[i];
+    // Of what does not fit, deviations say nothing.
+    one.determined = result.consistent && one.std < 0.2 * parameters.prior[i];
   }
   for (Index i = 0; i < p; ++i) {
     for (Index k = i + 1; k < p; ++k) {
@@ -223,6 +253,11 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
                                 std::to_string(correlation).substr(0, 5) +
                                 "): other postures, or fix one of them");
     }
+  }
+  if (!result.consistent) {
+    result.warnings.push_back(
+        "with these parameters the configuration does not explain the modes: something else "
+        "differs (payload_center, payload_inertia, friction, delay, the gains, the model)");
   }
   if (r.size() < p) {
     result.warnings.push_back("fewer numbers were measured (" + std::to_string(r.size()) +

@@ -7,6 +7,7 @@
 #include <dashpot/apps/identify/identify_plot.hpp>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -31,6 +32,15 @@ void add_identify(CLI::App& program) {
   command
       ->add_option("--channels", options->channels,
                    "Columns to use, by name; without it all positions, or else all velocities")
+      ->option_text("NAME,...");
+  command
+      ->add_option("--rate", options->hints.rate,
+                   "Samples in a second, of files without a column of time")
+      ->option_text("HZ")
+      ->check(CLI::Range(1e-9, 1e9));
+  command
+      ->add_option("--columns", options->hints.columns,
+                   "Names and units of all columns, of files without a line of them")
       ->option_text("NAME,...");
   CLI::Option* ambient =
       command->add_flag("--ambient", options->ambient,
@@ -64,8 +74,8 @@ void add_identify(CLI::App& program) {
   CLI::Option* calibrated =
       command
           ->add_option("--calibrate", options->calibrate,
-                       "Explain the differences by payload, reflected_inertia, friction, delay: "
-                       "those named")
+                       "Explain the differences by payload, payload_center, payload_inertia, "
+                       "reflected_inertia, friction, delay: those named")
           ->option_text("NAME,...")
           ->needs(against);
   command->add_option("--output", options->output, "The configuration with what --calibrate found")
@@ -83,7 +93,17 @@ void add_identify(CLI::App& program) {
     for (const std::string& file : options->files) inputs.push_back({"a record", file});
     check_outputs({{"--output", options->output}, {"--plot", options->plot}}, inputs);
     if (!options->plot.empty()) check_plot_name(options->plot);
+    const StopSignal signal;
+    const auto begin = std::chrono::steady_clock::now();
+    bool shown = false;
+    options->stop = [&](double done) {
+      constexpr auto kQuick = std::chrono::seconds(1);  // needs no sign of life
+      shown = shown || std::chrono::steady_clock::now() - begin > kQuick;
+      if (shown) show_progress(done);
+      return StopSignal::given();
+    };
     const IdentifyReport report = identify_files(*options);
+    if (shown) show_progress(1);
     if (!options->plot.empty()) draw_identification(options->plot, report);
     print(options->json ? json_text(identify_json(report)) : identify_table(report));
   });

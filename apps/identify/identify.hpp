@@ -19,12 +19,15 @@ struct LogExcitation {
 struct IdentifyCommand {
   std::vector<std::string> files;
   std::string channels, inputs, against, calibrate, output, plot;
+  FileHints hints = {};
   std::optional<double> from, to;
   int order = 0;
   bool ambient = false;
   bool excited = false;
   bool json = false;
   std::optional<LogExcitation> excitation = {};
+  /// Told the share that is done; true ends the search with what there is.
+  std::function<bool(double)> stop = {};
 };
 
 /// Throws controller::InputError.

@@ -8,21 +8,31 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <stdexcept>
 
 namespace dashpot::apps {
 namespace {
 
+using analysis::MotionKind;
 using analysis::MotionRecord;
 using controller::InputError;
 using Eigen::Index;
 
 /// Rest positions that are closer belong to one posture, rad or m.
 constexpr double kSamePosture = 0.02;
-/// Shorter parts of ambient motion are left out, s.
-constexpr double kShortest = 10;
-constexpr double kShortestExcited = 2;
-constexpr double kMoment = 0.1;  // s
+/// Motion over more than this is large, rad: the inertia that a joint sees changes by about as
+/// large a share with the posture. Of a linear motion, whose scale is free, the fit tells.
+constexpr double kLargeRange = 0.5;
+/// What a linear model has to explain of a large motion to be believed.
+constexpr double kExplains = 0.999;
+constexpr double kFades = 0.5;  // and some mode has to lose so much, as an exponent
+/// A cycle with a larger share at multiples of its frequency is a trajectory, if it is large.
+constexpr double kCycleHarmonics = 0.1;
+constexpr const char* kLargeAdvice =
+    "joints move so far that the arm's inertia changes: one posture, and pushes or excitation of "
+    "some hundredths of a radian, tell modes";
+constexpr Index kMoment = 100;  // samples
 /// The share of the samples at which the wrench of an excitation changes, from which on the motion
 /// is read as the wrench's, and not as the free decays that follow.
 constexpr double kMuchChanges = 0.2;
@@ -50,11 +60,47 @@ Eigen::VectorXd rest_of(const MotionRecord& record, Index last) {
   return rest;
 }
 
+/// Samples at a channel's end of range, where it stays for some and comes and goes at once, are
+/// those of a sensor that saturates: they become missing. Returns how many.
+int leave_out_clipped(Eigen::MatrixXd& values, Index channel) {
+  constexpr Index kRun = 3;     // samples
+  constexpr double kSteps = 3;  // times the least step of the channel: rounding stays as well
+  const Eigen::VectorXd y = values.row(channel);
+  double step = std::numeric_limits<double>::infinity(), least = step, most = -step;
+  for (Index i = 0; i < y.size(); ++i) {
+    if (!std::isfinite(y[i])) continue;
+    least = std::min(least, y[i]), most = std::max(most, y[i]);
+    const double change = i > 0 ? std::abs(y[i] - y[i - 1]) : 0;
+    if (change > 0) step = std::min(step, change);
+  }
+  int count = 0;
+  for (Index from = 1, to = 0; from < y.size(); from = to) {
+    to = from + 1;
+    if (y[from] != least && y[from] != most) continue;
+    while (to < y.size() && y[to] == y[from]) ++to;
+    if (to - from < kRun || to == y.size()) continue;
+    if (std::min(std::abs(y[from] - y[from - 1]), std::abs(y[to] - y[from])) > kSteps * step) {
+      values.row(channel)
+          .segment(from, to - from)
+          .setConstant(std::numeric_limits<double>::quiet_NaN());
+      count += static_cast<int>(to - from);
+    }
+  }
+  return count;
+}
+
 class Task {
  public:
   explicit Task(const IdentifyCommand& command) : command_(command) {}
 
   IdentifyReport run() {
+    for (const auto& [option, time] :
+         {std::pair("--from", command_.from), std::pair("--to", command_.to)}) {
+      if (time && !std::isfinite(*time)) throw InputError(option, "has to be a finite time, s");
+    }
+    if (command_.from && command_.to && *command_.from >= *command_.to) {
+      throw InputError("--from", "has to be before --to");
+    }
     for (const std::string& file : command_.files) {
       try {
         read(file);
@@ -69,7 +115,7 @@ class Task {
 
  private:
   void read(const std::string& path) {
-    const MotionFile file = read_motion_file(path);
+    const MotionFile file = read_motion_file(path, command_.hints);
     const std::string name = std::filesystem::path(path).filename();
     const std::vector<Index> driving = input_channels(file);
     const std::vector<Index> chosen = chosen_channels(
@@ -97,9 +143,11 @@ class Task {
                      Eigen::MatrixXd(static_cast<Index>(chosen.size()), file.time.size())};
     for (std::size_t c = 0; c < chosen.size(); ++c) {
       all.output.row(static_cast<Index>(c)) = file.values.row(chosen[c]);
+      note(leave_out_clipped(all.output, static_cast<Index>(c)),
+           " samples of " + channels[c].name + " left out, because they are clipped");
     }
-    set_kind(file, driving);
-    if (report_.kind == MotionKind::kExcited) all.input = inputs_of(file, driving);
+    const bool driven = is_driven(file, driving);
+    if (driven) all.input = inputs_of(file, driving);
     Index first = 0, last = all.time.size();
     while (command_.from && first < last && all.time[first] < *command_.from) ++first;
     while (command_.to && last > first && all.time[last - 1] > *command_.to) --last;
@@ -107,23 +155,84 @@ class Task {
       throw InputError(
           path, std::to_string(last - first) + " samples from --from to --to, need 20 or more");
     }
-    if (report_.kind != MotionKind::kDecays) {
-      add_stretches(all, first, last, report_.kind == MotionKind::kAmbient ? file.free : file.rests,
-                    name);
+    const MotionRecord chosen_part = part_of(all, first, last);
+    const MotionKind kind = kind_of(chosen_part, driven, file.free);
+    if (!parts_.empty() && kind != report_.kind) {
+      leave_out(chosen_part, name, std::string("is another kind of motion than the first"));
       return;
     }
-    if (command_.from || command_.to) {  // the user says what is free
-      add(part_of(all, first, last), name);
-      return;
-    }
-    for (const analysis::FreeDecay& found : analysis::find_decays(all, file.free)) {
-      const double from = all.time[found.from], to = all.time[std::max(found.from, found.to - 1)];
-      if (found.reason.empty()) {
-        add(part_of(all, found.from, found.to), name);
-      } else {
-        report_.parts.push_back({name, from, to, -1, found.reason});
+    report_.kind = kind;
+    if (kind == MotionKind::kLimitCycle || kind == MotionKind::kLargeMotion ||
+        kind == MotionKind::kNothing) {
+      leave_out(chosen_part, name, report_.advice);
+    } else if (kind != MotionKind::kDecays) {
+      add_stretches(all, first, last, kind == MotionKind::kAmbient ? file.free : file.rests, name);
+    } else if (command_.from || command_.to) {  // the user says what is free
+      add(chosen_part, name);
+    } else {
+      for (const analysis::FreeDecay& found : analysis::find_decays(all, file.free)) {
+        MotionRecord part = part_of(all, found.from, std::max(found.from + 1, found.to));
+        if (found.reason.empty()) {
+          add(std::move(part), name);
+        } else {
+          leave_out(part, name, found.reason);
+        }
       }
     }
+  }
+
+  void leave_out(const MotionRecord& record, const std::string& file, const std::string& reason) {
+    report_.parts.push_back(
+        {file, record.time[0], record.time[record.time.size() - 1], -1, reason});
+  }
+
+  /// Whether joints move so far that their inertias change.
+  bool is_large(const MotionRecord& record) const {
+    for (std::size_t c = 0; c < report_.channels.size(); ++c) {
+      if (report_.channels[c].unit != "rad") continue;
+      double least = 0, most = 0;
+      bool any = false;
+      for (const double y : record.output.row(static_cast<Index>(c))) {
+        if (!std::isfinite(y)) continue;
+        least = any ? std::min(least, y) : y, most = any ? std::max(most, y) : y;
+        any = true;
+      }
+      if (most - least > kLargeRange) return true;
+    }
+    return false;
+  }
+
+  /// What a record shows; where that has no modes, the report says why.
+  MotionKind kind_of(const MotionRecord& record, bool driven, const std::vector<bool>& free) {
+    const analysis::MotionVerdict verdict = analysis::judge_motion(record);
+    const bool large = is_large(record);
+    large_ = large_ || large;
+    MotionKind kind = verdict.kind;
+    if (kind == MotionKind::kNothing) {
+      report_.advice = "nothing moves beyond the noise; push harder, or name other --channels";
+      return kind;
+    }
+    if (driven || command_.ambient) {
+      kind = large ? MotionKind::kLargeMotion : driven ? MotionKind::kDriven : MotionKind::kAmbient;
+    }
+    if (!driven && verdict.kind == MotionKind::kLimitCycle) {
+      kind = large && verdict.harmonics > kCycleHarmonics ? MotionKind::kLargeMotion
+                                                          : MotionKind::kLimitCycle;
+    }
+    if (kind == MotionKind::kAmbient && !command_.ambient &&
+        std::find(free.begin(), free.end(), false) != free.end()) {
+      kind = MotionKind::kDecays;  // of a log whose reference moves
+    }
+    if (kind == MotionKind::kAmbient && large) kind = MotionKind::kLargeMotion;
+    if (kind == MotionKind::kLimitCycle) {
+      report_.advice =
+          "it repeats itself at " + format_number(verdict.frequency, 5) +
+          " rad/s with one amplitude, whatever it began with: less gain, or less delay, ends it; "
+          "then push";
+    } else if (kind == MotionKind::kLargeMotion) {
+      report_.advice = kLargeAdvice;
+    }
+    return kind;
   }
 
   /// The channels named by --inputs, or the tip's wrench.
@@ -139,8 +248,8 @@ class Task {
     return driving;
   }
 
-  /// Of the first file: the kind that the user wants, or what a wrench in it suggests.
-  void set_kind(const MotionFile& file, const std::vector<Index>& driving) {
+  /// Whether the user, or a wrench in the file, says that what moved the arm is known.
+  bool is_driven(const MotionFile& file, const std::vector<Index>& driving) const {
     const bool known = file.wrench || command_.excitation;
     if (command_.excited && command_.inputs.empty() && !known) {
       throw InputError("--excited",
@@ -149,7 +258,6 @@ class Task {
                            : "has springs at the tip, whose wrench is in the log together with "
                              "what was added; only the end of run or drive --excite knows it");
     }
-    if (!report_.parts.empty() || !parts_.empty()) return;
     bool much = command_.excitation && command_.excitation->chirp;
     if (file.wrench && !command_.ambient) {
       double changes = 0;
@@ -162,9 +270,7 @@ class Task {
       }
       much = much || changes > kMuchChanges * static_cast<double>(file.time.size());
     }
-    report_.kind = command_.ambient                                       ? MotionKind::kAmbient
-                   : command_.excited || !command_.inputs.empty() || much ? MotionKind::kExcited
-                                                                          : MotionKind::kDecays;
+    return !command_.ambient && (command_.excited || !command_.inputs.empty() || much);
   }
 
   /// inputs x samples; what is missing holds its last value.
@@ -192,12 +298,11 @@ class Task {
   /// does not end one.
   void add_stretches(const MotionRecord& all, Index first, Index last,
                      const std::vector<bool>& free, const std::string& file) {
-    const double shortest = report_.kind == MotionKind::kAmbient ? kShortest : kShortestExcited;
-    double too_short = 0;  // s
+    constexpr Index kShortest = 20;  // samples
+    double too_short = 0;            // s
     const auto take = [&](Index from, Index to) {
-      const double length = all.time[to - 1] - all.time[from];
-      if (length < shortest) {
-        too_short += length;
+      if (to - from < kShortest) {
+        too_short += all.time[to - 1] - all.time[from];
       } else {
         add(part_of(all, from, to), file);
       }
@@ -205,7 +310,7 @@ class Task {
     Index from = first, to = first;  // of the present stretch
     for (Index i = first; i < last; ++i) {
       if (!free.empty() && !free[static_cast<std::size_t>(i)]) continue;
-      if (to > from && all.time[i] - all.time[to - 1] > kMoment) {
+      if (to > from && i - to > kMoment) {
         take(from, to);
         to = from = i;
       }
@@ -215,8 +320,8 @@ class Task {
     if (to > from) take(from, to);
     if (too_short > 0) {
       report_.notes.push_back(file + ": " + format_number(too_short, 3) +
-                              " s left out, in stretches shorter than " +
-                              format_number(shortest, 2) + " s");
+                              " s left out, in stretches of less than " +
+                              std::to_string(kShortest) + " samples");
     }
   }
 
@@ -251,15 +356,31 @@ class Task {
   }
 
   void identify() {
-    if (parts_.empty()) {
-      report_.notes.emplace_back(
-          report_.kind != MotionKind::kDecays
-              ? "no part is long enough"
-              : "no free decay stands out of the noise: --from and --to say where one is");
+    if (parts_.empty() && report_.advice.empty()) {
+      report_.advice = report_.kind != MotionKind::kDecays
+                           ? "no part is long enough"
+                           : "no free decay stands out of the noise: push harder; or --from and "
+                             "--to say where one is";
+      report_.kind = MotionKind::kNothing;
+      if (large_) report_.kind = MotionKind::kLargeMotion, report_.advice = kLargeAdvice;
     }
     analysis::IdentifyOptions options;
     options.max_order = command_.order;
-    for (const std::vector<std::size_t>& group : by_posture()) {
+    const std::vector<std::vector<std::size_t>> groups = by_posture();
+    double done = 0;  // postures
+    if (command_.stop) {
+      options.stop = [&](double share) {
+        return command_.stop((done - 1 + share) / static_cast<double>(groups.size()));
+      };
+    }
+    for (const std::vector<std::size_t>& group : groups) {
+      if (done > 0 && options.stop && options.stop(0)) {
+        report_.notes.push_back(
+            "interrupted: " + std::to_string(groups.size() - static_cast<std::size_t>(done)) +
+            " postures were not looked at");
+        break;
+      }
+      ++done;
       PostureReport posture;
       std::vector<MotionRecord> records;
       posture.rest = Eigen::VectorXd::Zero(parts_.front().rest.size());
@@ -270,11 +391,26 @@ class Task {
       posture.parts = static_cast<int>(group.size());
       try {
         posture.found =
-            report_.kind == MotionKind::kAmbient   ? analysis::identify_ambient(records, options)
-            : report_.kind == MotionKind::kExcited ? analysis::identify_excited(records, options)
-                                                   : analysis::identify_decays(records, options);
+            report_.kind == MotionKind::kAmbient  ? analysis::identify_ambient(records, options)
+            : report_.kind == MotionKind::kDriven ? analysis::identify_excited(records, options)
+                                                  : analysis::identify_decays(records, options);
       } catch (const std::invalid_argument& error) {
         for (const std::size_t i : group) report_.parts[parts_[i].report].reason = error.what();
+        if (report_.advice.empty()) report_.advice = error.what();
+        continue;
+      }
+      // What is far from linear is not told by a linear model, however good it looks.
+      const bool large = std::any_of(group.begin(), group.end(),
+                                     [this](std::size_t i) { return is_large(parts_[i].record); });
+      const double length =
+          parts_[group.front()].record.time(Eigen::last) - parts_[group.front()].record.time[0];
+      const bool fades = std::any_of(
+          posture.found.modes.begin(), posture.found.modes.end(), [length](const auto& mode) {
+            return mode.damping_ratio * mode.natural_frequency * length > kFades;
+          });
+      if (large && !(posture.found.explained > kExplains && fades)) {
+        for (const std::size_t i : group) report_.parts[parts_[i].report].reason = kLargeAdvice;
+        report_.advice = kLargeAdvice;
         continue;
       }
       for (const std::size_t i : group) {
@@ -286,6 +422,13 @@ class Task {
                                 " never moves, and says nothing");
       }
       report_.postures.push_back(std::move(posture));
+    }
+    if (!report_.postures.empty()) {
+      report_.advice.clear();
+    } else if (report_.advice == kLargeAdvice) {
+      report_.kind = MotionKind::kLargeMotion;
+    } else if (report_.kind != MotionKind::kLimitCycle) {
+      report_.kind = MotionKind::kNothing;
     }
   }
 
@@ -304,6 +447,7 @@ class Task {
   const IdentifyCommand& command_;
   IdentifyReport report_;
   std::vector<Part> parts_;
+  bool large_ = false;  ///< some record's motion is
 };
 
 }  // namespace

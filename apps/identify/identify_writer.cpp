@@ -15,6 +15,7 @@ namespace {
 using Align = TextTable::Align;
 using Json = nlohmann::ordered_json;
 using analysis::MeasuredMode;
+using analysis::MotionKind;
 
 std::string count(std::size_t n, const std::string& what) {
   return (n == 0 ? "no" : std::to_string(n)) + " " + what + (n == 1 ? "" : "s");
@@ -58,10 +59,29 @@ std::string shape_text(const Eigen::VectorXcd& shape, const std::vector<MotionCh
   return text;
 }
 
+/// A part of the files, by what they show.
 std::string kind_text(MotionKind kind) {
-  return kind == MotionKind::kDecays    ? "free decay"
-         : kind == MotionKind::kExcited ? "excited record"
-                                        : "ambient record";
+  return kind == MotionKind::kDriven    ? "driven record"
+         : kind == MotionKind::kAmbient ? "ambient record"
+                                        : "free decay";
+}
+
+const char* verdict_text(MotionKind kind) {
+  switch (kind) {
+    case MotionKind::kDecays:
+      return "decay";
+    case MotionKind::kAmbient:
+      return "ambient";
+    case MotionKind::kDriven:
+      return "driven";
+    case MotionKind::kLimitCycle:
+      return "limit cycle";
+    case MotionKind::kLargeMotion:
+      return "large motion";
+    case MotionKind::kNothing:
+      break;
+  }
+  return "nothing";
 }
 
 std::string hertz(const MeasuredMode& mode) {
@@ -171,6 +191,7 @@ Json calibration_json(const Calibration& calibration) {
   }
   json["misfit_before"] = calibration.misfit_before;
   json["misfit"] = calibration.misfit;
+  json["consistent"] = calibration.consistent;
   json["numbers"] = calibration.numbers;
   json["warnings"] = calibration.warnings;
   return json;
@@ -242,6 +263,8 @@ Json posture_json(const PostureReport& posture, bool against) {
 std::string identify_table(const IdentifyReport& report) {
   std::string text;
   for (const std::string& note : report.notes) text += "Note: " + note + "\n";
+  text += std::string("Verdict: ") + verdict_text(report.kind) +
+          (report.advice.empty() ? "" : ": " + report.advice) + "\n";
   std::size_t useful = 0;
   for (const PartReport& part : report.parts) useful += part.posture >= 0;
   text += count(useful, kind_text(report.kind)) + " of " +
@@ -275,6 +298,8 @@ std::string identify_table(const IdentifyReport& report) {
 nlohmann::ordered_json identify_json(const IdentifyReport& report) {
   Json json = report.postures.empty() ? Json{{"modes", Json::array()}, {"rejected", Json::array()}}
                                       : posture_json(report.postures.front(), report.against);
+  json["verdict"] = verdict_text(report.kind);
+  json["advice"] = report.advice;
   json["channels"] = Json::array();
   for (const MotionChannel& channel : report.channels) {
     json["channels"].push_back({{"name", channel.name}, {"unit", channel.unit}});
@@ -302,7 +327,12 @@ nlohmann::ordered_json identify_json(const IdentifyReport& report) {
                                {"stable", pole.stable}});
     }
   }
-  if (report.calibration) json["calibration"] = calibration_json(*report.calibration);
+  if (report.calibration) {
+    json["calibration"] = calibration_json(*report.calibration);
+    for (const char* key : {"parameters", "misfit", "consistent"}) {
+      json[key] = json["calibration"][key];
+    }
+  }
   json["notes"] = report.notes;
   return json;
 }

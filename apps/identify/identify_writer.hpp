@@ -37,10 +37,12 @@ struct PostureReport {
 
 /// By how much an arm differs from its model.
 struct ModelCorrection {
-  double payload = 0;                 ///< mass added at the payload's centre, kg
-  Eigen::VectorXd reflected_inertia;  ///< added, n, kg m^2; empty: none
-  Eigen::VectorXd friction;           ///< viscous, added, n, N m s/rad; empty: none
-  double delay = 0;                   ///< added, ticks
+  double payload = 0;                                 ///< mass added to the payload, kg
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();   ///< by which its centre moves, m
+  Eigen::Vector3d inertia = Eigen::Vector3d::Zero();  ///< added about its centre, diagonal, kg m^2
+  Eigen::VectorXd reflected_inertia;                  ///< added, n, kg m^2; empty: none
+  Eigen::VectorXd friction;                           ///< viscous, added, n, N m s/rad; empty: none
+  double delay = 0;                                   ///< added, ticks
 };
 
 /// A parameter that was calibrated.
@@ -55,15 +57,15 @@ struct Calibration {
   ModelCorrection correction;
   double misfit_before = 0, misfit = 0;  ///< root mean square of the differences, in deviations
   int numbers = 0;                       ///< frequencies and ratios that were explained
+  bool consistent = false;               ///< the misfit is one that the deviations explain
   std::vector<std::string> warnings;     ///< what the records cannot tell apart
 };
 
-/// What the parts of the files are.
-enum class MotionKind { kDecays, kExcited, kAmbient };
-
 struct IdentifyReport {
   std::vector<MotionChannel> channels;  ///< those that are used
-  MotionKind kind = MotionKind::kDecays;
+  /// What the records show; those of another kind are left out.
+  analysis::MotionKind kind = analysis::MotionKind::kNothing;
+  std::string advice;  ///< where no modes can be told: why, and what would tell them
   std::vector<PartReport> parts;
   std::vector<PostureReport> postures;  ///< by falling number of parts
   std::vector<std::string> notes;

@@ -39,6 +39,8 @@ controller::RobotDescription corrected(const controller::Config& config,
   const Index n = config.model.dof();
   controller::ModelOptions& options = robot.options;
   options.payload.mass += correction.payload;
+  options.payload.center += correction.center;
+  options.payload.inertia.diagonal() += correction.inertia;
   options.reflected_inertia = sum_of(options.reflected_inertia, correction.reflected_inertia, n);
   options.viscous_friction = sum_of(joint_friction(config), correction.friction, n);
   return robot;
@@ -111,7 +113,7 @@ std::vector<PredictedMode> LoopPrediction::predict_with_delay(const JointVector&
   if (settings.feed_forward.gravity) {
     const MatrixXd gravity = controller::gravity_gradient(controller::DynamicsKernel(arm), q);
     sampled.gravity_gradient = gravity;
-    if (correction.payload != 0) {  // whose weight nobody holds
+    if (correction.payload != 0 || !correction.center.isZero(0)) {  // whose weight nobody holds
       const MatrixXd added =
           gravity - controller::gravity_gradient(controller::DynamicsKernel(config_.model), q);
       system.stiffness += (added + added.transpose()) / 2;
@@ -179,6 +181,12 @@ void LoopPrediction::write(const std::string& path, const ModelCorrection& corre
   }
   if (correction.friction.size() > 0) robot["viscous_friction"] = list(options.viscous_friction);
   if (correction.payload != 0) robot["payload"]["mass"] = options.payload.mass;
+  if (!correction.center.isZero(0)) robot["payload"]["center"] = list(options.payload.center);
+  if (!correction.inertia.isZero(0)) {
+    YAML::Node rows(YAML::NodeType::Sequence);
+    for (const auto& row : options.payload.inertia.rowwise()) rows.push_back(list(row.transpose()));
+    robot["payload"]["inertia"] = rows;
+  }
   if (correction.delay != 0) {
     const double delay = config_.settings.analysis.sampled.delay + correction.delay;
     document["analysis"]["sampled"]["delay"] = std::lround(std::max(0.0, delay));

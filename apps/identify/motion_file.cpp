@@ -30,7 +30,10 @@ bool is_desired(const std::string& name) {
                            "goal", "target", "setpoint"}) {
     if (last == word && last.size() < stem.size()) return true;
   }
-  return stem.starts_with("desired") || stem.starts_with("target") || stem.starts_with("command");
+  for (const char* word : {"desired", "target", "command", "cmd_", "ref_", "goal", "setpoint"}) {
+    if (stem.starts_with(word)) return true;
+  }
+  return false;
 }
 
 MotionFile read_log(const std::string& path) {
@@ -104,14 +107,14 @@ bool is_log(const std::string& text) {
 
 }  // namespace
 
-MotionFile read_motion_file(const std::string& path) try {
+MotionFile read_motion_file(const std::string& path, const FileHints& hints) try {
   std::string text;
   try {
     text = text::read_file(path, kMostBytes);
   } catch (const std::runtime_error& error) {
     throw InputError("", error.what());
   }
-  return is_log(text) ? read_log(path) : read_csv(text);
+  return is_log(text) ? read_log(path) : read_csv(text, hints);
 } catch (const InputError& error) {
   throw error.in_file(path);
 }
@@ -121,8 +124,14 @@ std::vector<Index> chosen_channels(const std::vector<MotionChannel>& channels,
                                    const std::string& option) {
   std::vector<Index> chosen;
   const auto number = [&](std::string_view name) {
-    for (std::size_t i = 0; i < channels.size(); ++i) {
-      if (channels[i].name == name) return static_cast<Index>(i);
+    const auto is_it = [name](const MotionChannel& channel) { return channel.name == name; };
+    const auto found = std::find_if(channels.begin(), channels.end(), is_it);
+    if (found != channels.end()) {
+      if (std::find_if(found + 1, channels.end(), is_it) != channels.end()) {
+        throw InputError(option, "two columns are called '" + std::string(name) +
+                                     "': --columns gives them names of their own");
+      }
+      return static_cast<Index>(found - channels.begin());
     }
     std::string known;
     for (const MotionChannel& channel : channels) {
@@ -142,12 +151,13 @@ std::vector<Index> chosen_channels(const std::vector<MotionChannel>& channels,
     chosen.push_back(i);
     rest.remove_prefix(std::min(end + 1, rest.size()));
   }
-  for (const char* unit : {"rad", "m", "rad/s", "m/s"}) {
+  for (const char* unit : {"rad", "m", "rad/s", "m/s", kUnnamed}) {
     if (!chosen.empty()) break;
     for (std::size_t i = 0; i < channels.size(); ++i) {
       const auto at = static_cast<Index>(i);
       if (channels[i].unit == unit && !is_desired(channels[i].name) &&
           std::find(others.begin(), others.end(), at) == others.end()) {
+        number(channels[i].name);
         chosen.push_back(at);
       }
     }

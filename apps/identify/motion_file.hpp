@@ -9,15 +9,18 @@ namespace dashpot::apps {
 /// ...), or a CSV file: a line of names with units ("q1 [rad]", "q1 (deg)", "q1_deg"; without a
 /// unit q is in rad, qd, dq and v in rad/s, tau and torque in N m, time in s, utime in us), then
 /// numbers between commas, semicolons (with decimal commas, too), tabs or spaces. The names may be
-/// in a comment, as numpy.savetxt writes them. An empty cell or nan is a sample that is missing;
-/// columns that begin with text are left out. One column is the time: t, time, timestamp, stamp or
-/// utime; where no unit is given and its steps are no seconds, it is in ms, us or ns. Throws
-/// InputError that names the file, the line and the column.
-MotionFile read_motion_file(const std::string& path);
+/// in a comment, as numpy.savetxt writes them, or in `hints`. An empty cell or nan is a sample that
+/// is missing; columns that begin with text are left out. One column is the time: t, time,
+/// timestamp, stamp, utime, duration or elapsed, in numbers or as 2026-01-31T12:00:00.5Z; where no
+/// unit is given and whole numbers are no seconds, it is in ms, us or ns. Of a file without names a
+/// first column that rises evenly is the time. Throws InputError that names the file, the line and
+/// the column.
+MotionFile read_motion_file(const std::string& path, const FileHints& hints = {});
 
 /// Numbers of the channels called `names`, "q1,q2"; of those that are positions, or else
 /// velocities, if that is empty, without those that are desired ("q_d_0", "pos_cmd") or in
-/// `others`. Throws InputError with `option` as key.
+/// `others`; of a file without names all. No two of one name. Throws InputError with `option` as
+/// key.
 std::vector<Eigen::Index> chosen_channels(const std::vector<MotionChannel>& channels,
                                           const std::string& names,
                                           const std::vector<Eigen::Index>& others = {},

@@ -7,6 +7,9 @@
 
 namespace dashpot::apps {
 
+/// The unit of the columns of a file that does not name them.
+inline constexpr const char* kUnnamed = "?";
+
 /// Without spaces, and quotation marks, around it.
 std::string_view trimmed(std::string_view text);
 std::string lower(std::string_view text);
@@ -44,6 +47,6 @@ class Rows {
 };
 
 /// See read_motion_file; `text` is all of a CSV file.
-MotionFile read_csv(std::string_view text);
+MotionFile read_csv(std::string_view text, const FileHints& hints = {});
 
 }  // namespace dashpot::apps

@@ -8,7 +8,13 @@ namespace dashpot::apps {
 /// One channel of a recorded motion.
 struct MotionChannel {
   std::string name;
-  std::string unit;  ///< SI: rad, m, rad/s, m/s, N m, N; empty if the file does not say
+  std::string unit;  ///< SI: rad, m, rad/s, m/s, N m, N; or the file's own; empty if it has none
+};
+
+/// What a file does not say of itself.
+struct FileHints {
+  double rate = 0;      ///< samples in a second, of files without a time; 0: they have one
+  std::string columns;  ///< "time [s],q1 [rad]": the names of files without a line of them
 };
 
 /// A recorded motion.
