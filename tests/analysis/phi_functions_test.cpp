@@ -1,4 +1,5 @@
 // phi_0, phi_1, phi_2 of blocks against 25-digit references, from |A t| = 1e-12 to 1e6.
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/phi_functions.hpp>
 #include <dashpot/tests/support/matrices.hpp>
 #include <dashpot/tests/support/random.hpp>
@@ -16,7 +17,6 @@ using Eigen::MatrixXd;
 using testing::near;
 using testing::reference_phi;
 
-constexpr double kEps = std::numeric_limits<double>::epsilon();
 const std::vector<double> kTimes = {1e-12, 1e-8, 1e-4, 0.01, 0.3, 0.7, 1,
                                     1.5,   4,    20,   300,  1e4, 1e6};
 
