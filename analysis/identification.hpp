@@ -28,6 +28,9 @@ struct MeasuredMode {
   double natural_frequency_std = std::numeric_limits<double>::infinity();  ///< rad/s
   double damping_ratio = 0;
   double damping_ratio_std = std::numeric_limits<double>::infinity();
+  /// What parts of the records differ by beyond their noise, (rad/s)^2 and 1, as variances: a share
+  /// of the squares of the two deviations.
+  double frequency_scatter = 0, ratio_scatter = 0;
   double covariance = 0;  ///< of natural frequency and damping ratio, rad/s
   Eigen::VectorXcd
       shape;             ///< of the first eigenvalue: channels, unit length, largest entry positive

@@ -19,10 +19,10 @@ namespace dashpot::analysis {
 /// t and the damping ratio falls by (1 - 2 zeta^2) omega t / 2, with t = (d + 1/2) T plus the lag
 /// of the filter.
 ///
-/// `spectrum` has to be the spectrum of `system`; with gears it is not read, and the modes are those
-/// of the system that SampledLoop::gears make of it. Each of its modes gets the z nearest to its
-/// eigenvalues, moved by the loop's delays to first order, nearest pairs first. That is meaningful
-/// while omega T stays well below 1.
+/// `spectrum` has to be the spectrum of `system`; with gears it is not read, and the modes are
+/// those of the system that SampledLoop::gears make of it. Each of its modes gets the z nearest to
+/// its eigenvalues, moved by the loop's delays to first order, nearest pairs first. That is
+/// meaningful while omega T stays well below 1.
 ///
 /// Call it at a lower rate than the tick's, because it allocates, and solves one dense eigenproblem
 /// of up to (4 + d) n + m rows; where all springs and dampers of the controller act in fewer than n

@@ -25,8 +25,9 @@ typedef struct dashpot_publisher dashpot_publisher;
 
 /* Publishes on the bus `url`, such as "udpm://239.255.76.67:7667?ttl=0" or
  * "file:///tmp/arm.lcm?mode=w"; NULL stands for the environment's LCM_DEFAULT_URL, or else the
- * first of these. Of several URLs, one a line, each gets everything. `controller` must live longer than the publisher. Returns NULL if the bus cannot
- * be opened; dashpot_publisher_error says why. Not real-time safe. */
+ * first of these. Of several URLs, one a line, each gets everything. `controller` must live longer
+ * than the publisher. Returns NULL if the bus cannot be opened; dashpot_publisher_error says why.
+ * Not real-time safe. */
 dashpot_publisher* dashpot_publisher_create(dashpot_controller* controller, const char* url);
 
 /* Publishes the last tick and destroys a publisher. Does nothing if `publisher` is NULL. */

@@ -42,11 +42,11 @@ MeasuredMode to_mode(const ModelSearch& search, std::size_t k, Index at, const V
   const DecayFactor& factor = fit.factors[k];
   MeasuredMode mode;
   mode.eigenvalues = factor.eigenvalues();
+  const std::array<double, 2> shown =
+      k < search.scatter.size() ? search.scatter[k] : std::array<double, 2>{};
   const auto variance = [&](Index i) {
-    const double shown = i - at < 2 && k < search.scatter.size()
-                             ? search.scatter[k][static_cast<std::size_t>(i - at)]
-                             : 0;
-    return std::sqrt(std::max(0.0, fit.covariance(i, i)) + std::max(0.0, shown));
+    const double more = i - at < 2 ? shown[static_cast<std::size_t>(i - at)] : 0;
+    return std::sqrt(std::max(0.0, fit.covariance(i, i)) + std::max(0.0, more));
   };
   if (factor.pair) {
     mode.natural_frequency = std::exp(factor.first);
@@ -54,6 +54,8 @@ MeasuredMode to_mode(const ModelSearch& search, std::size_t k, Index at, const V
     mode.damping_ratio = factor.second;
     mode.damping_ratio_std = variance(at + 1);
     mode.covariance = mode.natural_frequency * fit.covariance(at, at + 1);
+    mode.frequency_scatter = std::pow(mode.natural_frequency, 2) * std::max(0.0, shown[0]);
+    mode.ratio_scatter = std::max(0.0, shown[1]);
   } else {
     mode.natural_frequency = std::abs(factor.first);
     mode.natural_frequency_std = variance(at);

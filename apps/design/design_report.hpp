@@ -32,7 +32,7 @@ struct DesignReport {
   std::optional<Eigen::VectorXd> q;  ///< of an arm, rad or m
   std::string rotors;                ///< of an arm: "known" or "unknown"
   std::string drives;                ///< name of the published drives that it has; empty: none
-  bool gears = false;  ///< that bend, in `before` and `after`, but not in `design`
+  bool gears = false;                ///< that bend, in `before` and `after`, but not in `design`
 };
 
 /// What `dashpot design --region` says.

@@ -126,12 +126,15 @@ VectorXd differences(const std::vector<PostureReport>& postures,
       const MeasuredMode& mode = postures[k].found.modes[static_cast<std::size_t>(number)];
       const PredictedMode& there = predicted[k][i];
       const double w = mode.natural_frequency;
+      // By noise alone: what parts differ by is in the prediction as far as friction and amplitude
+      // are, and the misfit tells the rest.
+      const double frequency =
+          std::max(0.0, std::pow(mode.natural_frequency_std, 2) - mode.frequency_scatter);
+      const double ratio = std::max(0.0, std::pow(mode.damping_ratio_std, 2) - mode.ratio_scatter);
+      const double most = 0.99 * std::sqrt(frequency * ratio);
+      const double cross = std::clamp(mode.covariance, -most, most);
       Eigen::Matrix2d covariance;
-      const double cross =
-          std::clamp(mode.covariance, -0.99 * mode.natural_frequency_std * mode.damping_ratio_std,
-                     0.99 * mode.natural_frequency_std * mode.damping_ratio_std);
-      covariance << std::pow(mode.natural_frequency_std, 2) + std::pow(least * w, 2), cross, cross,
-          std::pow(mode.damping_ratio_std, 2) + least * least;
+      covariance << frequency + std::pow(least * w, 2), cross, cross, ratio + least * least;
       const Eigen::Vector2d difference(w - there.natural_frequency,
                                        mode.damping_ratio - there.damping_ratio);
       const Eigen::Vector2d scaled = covariance.llt().matrixL().solve(difference);

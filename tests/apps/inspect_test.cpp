@@ -1,6 +1,6 @@
 // What `dashpot inspect` prints, and what it says to bad input.
-#include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/model/urdf_tree.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/tests/apps/json_result.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/kdl_dynamics.hpp>
