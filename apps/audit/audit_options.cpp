@@ -82,7 +82,7 @@ Matrix factor_damping(const std::string& option, double factor, const Matrix& K)
 /// feeds energy in, and such a spring pushes away.
 Eigen::VectorXd gain_diagonal(const std::string& option, const std::string& text,
                               const controller::Units& units) {
-  const Eigen::VectorXd values = parse_quantities(option, text, units);
+  Eigen::VectorXd values = parse_quantities(option, text, units);
   if (values.minCoeff() < 0) throw InputError(option, "a number is negative");
   return values;
 }

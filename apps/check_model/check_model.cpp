@@ -102,7 +102,10 @@ CheckModelReport check_files(const CheckModelOptions& options, const Config& con
   std::vector<controller::TorqueRecord> records;
   for (const std::string& path : options.files) {
     TorqueFile file = read_torque_file(path, config.model, options.positions, options.torques);
-    for (std::string& note : file.notes) report.notes.push_back(path + ": " + note);
+    for (const std::string& note : file.notes) {
+      report.notes.push_back(path);
+      report.notes.back().append(": ").append(note);
+    }
     records.push_back(std::move(file.record));
     report.files.push_back(path);
   }

@@ -8,6 +8,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <sstream>
 #include <string_view>
 
 namespace dashpot::apps {
@@ -167,6 +168,7 @@ class Columns {
   }
   std::vector<std::string> names(const std::vector<Index>& columns) const {
     std::vector<std::string> result;
+    result.reserve(columns.size());
     for (const Index i : columns) {
       result.push_back(file_.channels[static_cast<std::size_t>(i)].name);
     }
@@ -249,18 +251,20 @@ void check_velocities(TorqueFile& file, const Columns& columns) {
     const double factor = rate_factor(file, velocity, j);
     const std::string& name = names[static_cast<std::size_t>(j)];
     const std::string& position = file.positions[static_cast<std::size_t>(j)];
+    std::ostringstream text;
     if (factor > kDegree / 1.3 && factor < kDegree * 1.3) {
-      throw InputError(name, short_text(factor) + " times the rate of " + position +
-                                 "; is one in degrees? Its heading needs the unit: " + name +
-                                 " [deg/s]");
+      text << short_text(factor) << " times the rate of " << position
+           << "; is one in degrees? Its heading needs the unit: " << name << " [deg/s]";
+      throw InputError(name, text.str());
     }
     if (factor > 1 / kDegree / 1.3 && factor < 1.3 / kDegree) {
-      throw InputError(position, short_text(1 / factor) + " times as fast as " + name +
-                                     " says; degrees need their unit in the heading: " + position +
-                                     " [deg]");
+      text << short_text(1 / factor) << " times as fast as " << name
+           << " says; degrees need their unit in the heading: " << position << " [deg]";
+      throw InputError(position, text.str());
     }
     if (factor < -0.5) {
-      file.notes.push_back(name + " has the opposite sign of the rate of " + position);
+      text << name << " has the opposite sign of the rate of " << position;
+      file.notes.push_back(text.str());
     }
   }
 }

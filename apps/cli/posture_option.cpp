@@ -19,8 +19,7 @@ void PostureOption::add(CLI::App& command) {
 
 JointVector PostureOption::read(const RobotModel& model) const {
   if (q.empty()) return controller::middle_posture(model);
-  const JointVector posture =
-      parse_quantities("--q", q, controller::joint_units(model, "rad", "m"));
+  JointVector posture = parse_quantities("--q", q, controller::joint_units(model, "rad", "m"));
   check("--q", model, posture);
   return posture;
 }

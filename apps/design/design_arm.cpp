@@ -89,8 +89,7 @@ RobotModel read_model(const ArmOptions& options) try {
   } catch (const controller::InvalidModel& error) {
     throw InputError("--payload", error.what());
   }
-  const RobotModel result =
-      RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
+  RobotModel result = RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
   warn_of(result);
   return result;
 } catch (const controller::InvalidModel& error) {

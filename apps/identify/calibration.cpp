@@ -258,7 +258,7 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
     }
   }
   if (!result.consistent) {
-    result.warnings.push_back(
+    result.warnings.emplace_back(
         "with these parameters the configuration does not explain the modes: something else "
         "differs (payload_center, payload_inertia, friction, delay, the gains, the model)");
   }

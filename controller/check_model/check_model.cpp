@@ -17,7 +17,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr Index kFewestWindows = 20;  // fewer leave no degrees of freedom for the deviations
-constexpr double kNone = std::numeric_limits<double>::infinity();
+constexpr double kUndetermined = std::numeric_limits<double>::infinity();
 /// About what a body held at the tip can have about the tip link's origin, kg m^2: ordinary motion
 /// says little of its inertia, and must not make the mass uncertain by it.
 constexpr double kPayloadInertia = 0.1;
@@ -52,7 +52,7 @@ std::string number_text(double value, const char* format = "%.2g") {
 /// The parameters and the rows of the fit.
 class Fitting {
  public:
-  Fitting(const RobotModel& model, const std::vector<SmoothRun>& runs, const Smoothing& how,
+  Fitting(const RobotModel& model, const std::vector<SmoothRun>& runs, const RecordFilter& how,
           const WeakForm& form)
       : model_(model), form_(form), n_(model.dof()), K_(form.count()), tau_(form.torque()) {
     own_ = form.torques(DynamicsKernel(model), n_);
@@ -79,7 +79,7 @@ class Fitting {
     fit_.joints = n_;
     fit_.used = VectorXd::Map(turning_.data(), turning_.size());
     fit_.A = MatrixXd::Zero(n_ * K_, 3 * n_);
-    fit_.prior = VectorXd::Constant(3 * n_, kNone);
+    fit_.prior = VectorXd::Constant(3 * n_, kUndetermined);
     const MatrixXd sign = form.sign(v0), velocity = form.velocity();
     for (Index k = 0; k < K_; ++k) {
       for (Index j = 0; j < n_; ++j) {
@@ -93,7 +93,8 @@ class Fitting {
       }
     }
     const std::vector<MatrixXd> body = body_columns(model, form, kPayloadColumns);
-    for (std::size_t i = 0; i < body.size(); ++i) add(body[i], i < 4 ? kNone : kPayloadInertia);
+    for (std::size_t i = 0; i < body.size(); ++i)
+      add(body[i], i < 4 ? kUndetermined : kPayloadInertia);
   }
 
   bool anything_moves() const {
@@ -132,7 +133,7 @@ class Fitting {
       const LinearModel before = fit_;
       const RobustFit result_before = result_;
       const Index first = fit_.A.cols();
-      for (const MatrixXd& column : best->columns) add(column, kNone);
+      for (const MatrixXd& column : best->columns) add(column, kUndetermined);
       result_ = robust_fit(fit_);
       const std::string reason = reason_for(*best, first, result_before);
       if (reason.empty()) {
@@ -176,7 +177,8 @@ class Fitting {
     MatrixXd normal = A.transpose() * A;
     normal.diagonal().array() += 1e-10;  // what is unseen stays where it is
     for (Index i = 0; i < fit_.prior.size(); ++i) {
-      if (fit_.prior[i] < kNone) normal(i, i) += std::pow(result_.scale[i] / fit_.prior[i], 2);
+      if (fit_.prior[i] < kUndetermined)
+        normal(i, i) += std::pow(result_.scale[i] / fit_.prior[i], 2);
     }
     const auto solver = normal.ldlt();
     const VectorXd r = root.cwiseProduct(result_.residual);
@@ -472,7 +474,7 @@ class Fitting {
 ModelCheck check_model(const RobotDescription& robot, const std::vector<TorqueRecord>& records) {
   const RobotModel model = robot.model();
   check_sizes(records, model.dof());
-  const Smoothing how = choose_smoothing(records);
+  const RecordFilter how = choose_smoothing(records);
   const std::vector<SmoothRun> runs = smooth(records, how);
   const WeakForm form(runs, how);
   if (form.count() < kFewestWindows) {

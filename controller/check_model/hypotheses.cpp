@@ -58,7 +58,7 @@ std::vector<MatrixXd> body_columns(const RobotModel& model, const WeakForm& form
       unit.inertia(row, col) = unit.inertia(col, row) = 1;
     }
     kernel.attach(unit);
-    columns.push_back(sum_of(form.torques(kernel, model.dof())) - bare);
+    columns.emplace_back(sum_of(form.torques(kernel, model.dof())) - bare);
   }
   return columns;
 }

@@ -61,7 +61,7 @@ double left_over(const VectorXd& y, const VectorXd& sign, const VectorXd& veloci
 
 class OrderSearch {
  public:
-  OrderSearch(const RobotModel& model, const std::vector<SmoothRun>& runs, const Smoothing& how)
+  OrderSearch(const RobotModel& model, const std::vector<SmoothRun>& runs, const RecordFilter& how)
       : kernel_(model), how_(how) {
     // Some windows are enough to see what is far better.
     constexpr std::size_t kMost = 80;
@@ -144,7 +144,7 @@ class OrderSearch {
 
  private:
   DynamicsKernel kernel_;
-  Smoothing how_;
+  RecordFilter how_;
   std::vector<SmoothRun> part_;
 };
 
@@ -214,7 +214,7 @@ std::vector<Index> JointOrder::joints() const {
 }
 
 JointOrder find_order(const RobotModel& model, const std::vector<SmoothRun>& runs,
-                      const Smoothing& how) {
+                      const RecordFilter& how) {
   const OrderSearch search(model, runs, how);
   Guess best = search.as_it_is(TorqueKind::kExternal);
   for (const TorqueKind kind : {TorqueKind::kWithoutGravity, TorqueKind::kWhole}) {

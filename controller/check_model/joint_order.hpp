@@ -31,6 +31,6 @@ struct JointOrder {
 /// should be is only doubted where something else leaves a seventh of the variance over, at one
 /// joint, or as little at several together.
 JointOrder find_order(const RobotModel& model, const std::vector<SmoothRun>& runs,
-                      const Smoothing& how);
+                      const RecordFilter& how);
 
 }  // namespace dashpot::controller

@@ -80,7 +80,7 @@ VectorXd sizes(const LinearModel& model, const VectorXd& residual) {
 
 /// Student's t for 95 % with `degrees` of freedom, over 1.96 (Cornish and Fisher).
 double student(double degrees) {
-  constexpr double z = 1.959964, z3 = z * z * z, z5 = z3 * z * z;
+  const double z = 1.959964, z3 = z * z * z, z5 = z3 * z * z;
   return 1 + ((z3 + z) / (4 * degrees) + (5 * z5 + 16 * z3 + 3 * z) / (96 * degrees * degrees)) / z;
 }
 

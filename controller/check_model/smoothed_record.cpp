@@ -163,7 +163,7 @@ double rate_gain(double h, double step) {
 
 }  // namespace
 
-Smoothing choose_smoothing(const std::vector<TorqueRecord>& records) {
+RecordFilter choose_smoothing(const std::vector<TorqueRecord>& records) {
   std::vector<double> steps;
   const Index n = records.front().position.rows();
   VectorXd noise = VectorXd::Zero(n), speed = VectorXd::Zero(n);
@@ -195,7 +195,7 @@ Smoothing choose_smoothing(const std::vector<TorqueRecord>& records) {
       speed[j] = std::max(speed[j], way / (samples.time.back() - samples.time.front()));
     }
   }
-  Smoothing how;
+  RecordFilter how;
   how.half_width = std::max(0.025, 4.5 * step);
   for (int widening = 0; widening < 3; ++widening) {
     how.rate_noise = noise * rate_gain(how.half_width, step);
@@ -212,7 +212,7 @@ Smoothing choose_smoothing(const std::vector<TorqueRecord>& records) {
   return how;
 }
 
-std::vector<SmoothRun> smooth(const std::vector<TorqueRecord>& records, const Smoothing& how) {
+std::vector<SmoothRun> smooth(const std::vector<TorqueRecord>& records, const RecordFilter& how) {
   std::vector<SmoothRun> runs;
   for (std::size_t number = 0; number < records.size(); ++number) {
     const TorqueRecord& record = records[number];

@@ -6,7 +6,7 @@
 namespace dashpot::controller {
 
 /// How records are smoothed: local cubic polynomials over `half_width` to either side.
-struct Smoothing {
+struct RecordFilter {
   double half_width = 0;       ///< h, s
   double step = 0;             ///< between two values, s
   Eigen::VectorXd rate_noise;  ///< n, standard deviation of the smoothed velocity, rad/s
@@ -21,10 +21,10 @@ struct SmoothRun {
 
 /// Chooses the narrowest smoothing that leaves velocities clear of the positions' noise and
 /// quantisation. Throws std::invalid_argument if there are too few samples.
-Smoothing choose_smoothing(const std::vector<TorqueRecord>& records);
+RecordFilter choose_smoothing(const std::vector<TorqueRecord>& records);
 
 /// Smooths the records: positions and torques with the same weights, so that what the filter
 /// takes from one side of the equations of motion it takes from the other.
-std::vector<SmoothRun> smooth(const std::vector<TorqueRecord>& records, const Smoothing& how);
+std::vector<SmoothRun> smooth(const std::vector<TorqueRecord>& records, const RecordFilter& how);
 
 }  // namespace dashpot::controller

@@ -45,7 +45,7 @@ class LagrangianTerms {
 
 }  // namespace
 
-WeakForm::WeakForm(const std::vector<SmoothRun>& runs, const Smoothing& how) : runs_(&runs) {
+WeakForm::WeakForm(const std::vector<SmoothRun>& runs, const RecordFilter& how) : runs_(&runs) {
   constexpr double kHalfWidth = 0.1;  // T, s, at least: passes 5 Hz at half its size
   m_ = std::max<Index>(12, static_cast<Index>(std::lround(kHalfWidth / how.step)));
   const double T = static_cast<double>(m_) * how.step;

@@ -14,7 +14,7 @@ struct WindowTorques {
 /// T, one every T, within each smoothed run.
 class WeakForm {
  public:
-  WeakForm(const std::vector<SmoothRun>& runs, const Smoothing& how);
+  WeakForm(const std::vector<SmoothRun>& runs, const RecordFilter& how);
 
   struct Window {
     std::size_t run;

@@ -57,7 +57,8 @@ def _column(values: list[Any]) -> npt.NDArray[Any] | None:
         return None
     depth = max(array.ndim for array in arrays)
     if all(array.shape == arrays[0].shape for array in arrays):
-        return np.stack(arrays)
+        stacked: npt.NDArray[Any] = np.stack(arrays)
+        return stacked
     if any(array.ndim != depth and array.size > 0 and array.ndim > 0 for array in arrays):
         return None
     shape = [max((array.shape[i] for array in arrays if array.ndim == depth), default=0)

@@ -309,6 +309,8 @@ def _sized(name: str, given: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
 def check_postures(robot: Robot, name: str, postures: Iterable[Array]) -> None:
     """Raises Error for the first of the postures (n, rad) outside the robot's position limits."""
     for i, q in enumerate(postures):
+        if len(q) != len(robot):
+            raise Error(f"{name}: has {len(q)} entries, the robot has {len(robot)} joints")
         complaint = robot._core.outside_limits(q)
         if complaint:
             raise Error(f"{name}{'' if name == 'q' else f'[{i}]'}: {complaint}")

@@ -13,7 +13,8 @@ GAINS = dict(task_stiffness=[200, 200, 200, 20, 20, 20], damping_factor=2.0)
 
 
 def test_a_posture_has_the_modes_of_the_closed_loop(panda):
-    found = dashpot.audit(panda, HOME, **GAINS, period=0.001, damping_ratio=0.7)
+    found = dashpot.audit(panda, HOME, **GAINS, period=0.001, damping_ratio=0.7,
+                          urdf_friction=True)
     loop = dashpot.closed_loop(panda, HOME, task_stiffness=GAINS["task_stiffness"],
                                task_damping=2 * np.sqrt(GAINS["task_stiffness"]))
     posture = found.posture
@@ -58,7 +59,7 @@ def test_a_kinematic_null_space_acts_through_the_pseudo_inverse(panda):
         swings = values[values.imag > 0]
         null_space = dict(null_stiffness=[10.0] * 7, null_damping=[6.0] * 7)
         found = dashpot.audit(panda, q, **GAINS, **null_space, null_projector="kinematic",
-                              postures=[q])
+                              postures=[q], urdf_friction=True)
         for fastest, ratio in ((found.posture.fastest_pole, found.posture.smallest_ratio),
                                (found.workspace.fastest_pole.worst,
                                 found.workspace.smallest_ratio.worst)):
@@ -106,6 +107,27 @@ def test_half_quaternions_halve_the_rotational_springs(panda):
     whole = dashpot.audit(panda, HOME, task_stiffness=[200] * 3 + [10] * 3,
                           task_damping=[30] * 6).posture
     np.testing.assert_allclose(half.modes.eigenvalues, whole.modes.eigenvalues, rtol=1e-12)
+
+
+def test_friction_of_the_urdf_counts_where_it_is_asked_for(panda):
+    plain, asked = (dashpot.audit(panda, HOME, **GAINS, urdf_friction=counts).posture.smallest_ratio
+                    for counts in (False, True))
+    assert plain < asked < 1.01 * plain  # 0.003 N m s/rad
+    urdf, base, tip, file, options = panda._arguments
+    stated = dashpot.Robot(urdf, base, tip, file=file,
+                           **{**options, "viscous_friction": np.full(7, 1.0)})
+    assert dashpot.audit(stated, HOME, **GAINS).posture.smallest_ratio > 1.05 * plain
+
+
+def test_postures_outside_the_limits_are_refused_unless_asked_for(panda):
+    degrees = [0, -45, 0, -135, 0, 90, 45]
+    with pytest.raises(dashpot.Error, match="q: joint 'panda_joint2' at -45 rad is outside.*degrees"):
+        dashpot.audit(panda, degrees, **GAINS)
+    with pytest.raises(dashpot.Error, match=r"postures\[1\]: joint 'panda_joint2'"):
+        dashpot.audit(panda, postures=[HOME, degrees], **GAINS)
+    assert dashpot.audit(panda, degrees, **GAINS, outside_limits=True).posture is not None
+    middle = dashpot.audit(panda, **GAINS).posture.q
+    np.testing.assert_allclose(middle, (panda.lower + panda.upper) / 2)
 
 
 @pytest.mark.parametrize("given, message", [
