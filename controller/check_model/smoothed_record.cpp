@@ -29,8 +29,7 @@ double median_of(std::vector<double> values) {
 /// reports; 1: not at all. Runs of equal rows are then all about as long, whereas those of an arm
 /// at rest, or of coarse encoders, are not.
 Index repeats_of(const std::vector<Index>& runs) {
-  std::vector<double> lengths;
-  for (const Index run : runs) lengths.push_back(static_cast<double>(run));
+  std::vector<double> lengths(runs.begin(), runs.end());
   const double median = median_of(lengths);
   if (median < 2) return 1;
   const auto alike = std::count_if(lengths.begin(), lengths.end(), [median](double length) {
