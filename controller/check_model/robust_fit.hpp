@@ -1,4 +1,6 @@
 #pragma once
+#include <dashpot/controller/robot_types.hpp>
+
 #include <Eigen/Core>
 #include <vector>
 
