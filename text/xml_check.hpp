@@ -10,7 +10,7 @@ namespace dashpot::text {
 /// Largest robot description that is read, bytes.
 inline constexpr std::size_t kLargestXml = 16u << 20;
 
-/// A start tag or an end tag; <a/> is both.
+/// A start tag or an end tag; one that ends with a slash is both.
 struct XmlTag {
   std::string_view name;
   /// Names with their values as they stand in the text, without the quotes.
