@@ -295,7 +295,8 @@ double spectral_radius(const Matrices& loop, const Matrices& gears_alone, const 
   A.block(2 * N, N, n, N) = -factor * (loop.C - gears_alone.C).bottomRows(n);
   A.block(2 * N, link ? 0 : n, n, n) += gravity;
   double largest = 0;
-  for (const analysis::Complex z : Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues().eval()) {
+  const Eigen::VectorXcd eigenvalues = Eigen::EigenSolver<MatrixXd>(A, false).eigenvalues();
+  for (const analysis::Complex z : eigenvalues) {
     if (std::abs(std::log(z)) / period >= kSlowestVibration) {
       largest = std::max(largest, std::abs(z));
     }
