@@ -23,6 +23,7 @@ RATIO = 0.7
 
 def dashpot(*arguments, text=None):
     done = subprocess.run([sys.argv[1], *arguments, "--json"], input=text, text=True, check=True,
+                          stderr=subprocess.PIPE,  # steps of a search are outside the limits
                           stdout=subprocess.PIPE)
     return json.loads(done.stdout)
 
