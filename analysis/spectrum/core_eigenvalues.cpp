@@ -74,7 +74,11 @@ bool CoreEigenvalues<N>::replace_slow(ComplexStateVector<N>& values, Work& work)
   B.bottomLeftCorner(m_, m_).diagonal() = inverse;
   ComplexStateVector<N> slow;
   if (!find_eigenvalues<N>(B, slow, work)) return false;
-  for (Complex& value : slow) value = 1.0 / value;
+  for (Complex& value : slow) {
+    value = 1.0 / value;
+    // The fast ones have drowned in B's rounding errors, and may come out as zero there.
+    if (!std::isfinite(value.real()) || !std::isfinite(value.imag())) value = kInfinity;
+  }
   sort<N>(slow);
   sort<N>(values);
   // Of the places to divide them at that are clear in both, the one with the least relative errors.
@@ -100,12 +104,15 @@ bool CoreEigenvalues<N>::find_items(Work& work) noexcept {
   if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(size));
   if (!find_eigenvalues<N>(A_, values, work) || !replace_slow(values, work)) return false;
   size_ = 0;
+  Eigen::Index columns = 0;
   for (Complex& value : values) {
     // Of equal rates of several zero modes rounding may have made a pair.
     if (coupled_zeros_ > 1 && std::abs(value.imag()) <= rounding()) value = value.real();
-    if (!(value.imag() < 0)) item(size_++) = {value};
+    if (value.imag() < 0) continue;
+    item(size_++) = {value};
+    columns += value.imag() == 0 ? 1 : 2;
   }
-  return true;
+  return columns == size;  // not so, if rounding has left one of a pair, or no number
 }
 
 /// Connected components of "near each other".

@@ -230,6 +230,40 @@ TEST(CoupledZeroModes, AreNotReportedForTaskDamping) {
 
 /// However strong the damping is: frequency and ratio are proved to as many digits, and with them
 /// both eigenvalues are.
+TEST(Spectrum, IsFoundBesideANearlyFreeJoint) {
+  // The inverse of so soft a spring leaves of the fast eigenvalues nothing, not even a number.
+  Eigen::Matrix<double, 6, 6> D;
+  D << 2.6673783631222578, 0.0039247755515330329, -0.0044359965291536074, -0.24768789092352697,
+      0.048614760619447389, -0.31541513231595331, 0, 12.692802831410525, -0.00054048298535055994,
+      0.0004553318312092991, 0.00097876106980247964, 0.00010648116408881747, 0, 0,
+      10.047796806641871, -0.0010673727184365434, -0.00088828274859576069, -0.00015092293995718625,
+      0, 0, 0, 0.92714257306110837, 0.063716308227788829, 0.095819573390221402, 0, 0, 0, 0,
+      0.053884194955044838, 0.017761043704931895, 0, 0, 0, 0, 0, 0.31138720849978174;
+  const MatrixXd damping = D.selfadjointView<Eigen::Upper>();
+  const Eigen::Vector<double, 6> K(769.15798484662241, 82.192712016661119, 51.501457059400394,
+                                   24.103526691503799, 0.044845060339901016, 3.055132673633263e-27);
+  const auto system = system_from(MatrixXd::Identity(6, 6), damping, K.asDiagonal());
+  Spectrum<> spectrum;
+  ASSERT_EQ(SpectrumSolver<>().solve(system, spectrum), Status::kOk);
+  EXPECT_EQ(spectrum.zero_modes.count, 0);
+  std::vector<LongComplex> truth = true_eigenvalues(system);
+  const auto nearest = [&](LongComplex value) {
+    return std::min_element(truth.begin(), truth.end(), [&](LongComplex a, LongComplex b) {
+      return std::abs(a - value) < std::abs(b - value);
+    });
+  };
+  *nearest(0.0L) = static_cast<long double>(-K[5] / D(5, 5));  // too slow for the truth's digits
+  for (const Mode<>& mode : spectrum.modes) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      const LongComplex value = mode.eigenvalues[k];
+      EXPECT_LE(std::abs(*nearest(value) - value),
+                static_cast<long double>(mode.eigenvalue_bounds[k]))
+          << value;
+      EXPECT_LE(mode.eigenvalue_bounds[k], 1e-12 * D.norm()) << value;
+    }
+  }
+}
+
 TEST(Spectrum, BoundsEachEigenvalueOfOverdampedModes) {
   Random random(4701);
   for (int trial = 0; trial < 120; ++trial) {
