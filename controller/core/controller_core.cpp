@@ -1,4 +1,5 @@
 #include <dashpot/controller/core/controller_core.hpp>
+#include <dashpot/controller/core/gears_stop.hpp>
 #include <dashpot/controller/core/thresholds.hpp>
 
 #include <algorithm>
@@ -17,7 +18,7 @@ ControllerCore::ControllerCore(const RobotModel& model, const Settings& settings
       guide_(model, settings),
       law_(model, settings.feed_forward),
       integral_(settings.integral, settings.period),
-      filter_(settings),
+      filter_(settings, gears_stopping_time(model, settings, Brake(settings).stopping_time())),
       analysis_(model, settings),
       viscous_friction_(model.joint_values(&Joint::viscous_friction)),
       friction_left_(friction_left(model, settings)),

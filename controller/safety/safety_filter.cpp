@@ -18,9 +18,9 @@ constexpr double kMoves = 0.05;       // of a velocity limit: torque that drives
 
 }  // namespace
 
-SafetyFilter::SafetyFilter(const Settings& settings) noexcept
+SafetyFilter::SafetyFilter(const Settings& settings, double gears) noexcept
     : n_(settings.limits.torque.size()),
-      brake_(settings),
+      brake_(settings, gears),
       per_tip_velocity_(1 / settings.limits.tip_velocity),
       power_(settings.limits.power),
       ramp_share_(settings.period / kRampTime),

@@ -35,7 +35,8 @@ class SafetyFilter {
     kFloat,    ///< nothing: the weight alone
   };
 
-  explicit SafetyFilter(const Settings& settings) noexcept;
+  /// `gears`: see Brake.
+  explicit SafetyFilter(const Settings& settings, double gears = 0) noexcept;
 
   /// Forgets the past. The next torque continues the last one.
   void restart() noexcept;

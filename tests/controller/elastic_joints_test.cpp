@@ -1,7 +1,10 @@
 // Gears that bend: in the modes of the tick, at a posture, and in the sampled loop.
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/core/gears_stop.hpp>
 #include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/posture_loop.hpp>
+#include <dashpot/controller/settings_check.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/count_allocations.hpp>
@@ -26,7 +29,7 @@ using Eigen::VectorXcd;
 using Eigen::VectorXd;
 using testing::LedArm;
 
-const double kRigid = std::numeric_limits<double>::infinity();
+const double kInfinite = std::numeric_limits<double>::infinity();
 
 /// The motors of an arm, and what is told of its gears.
 ModelOptions gears(int n, double stiffness, PositionSensor sensor, double damping_ratio = 0.01) {
@@ -38,6 +41,15 @@ ModelOptions gears(int n, double stiffness, PositionSensor sensor, double dampin
                          options.gear_stiffness.cwiseProduct(options.reflected_inertia).cwiseSqrt();
   options.position_sensor = sensor;
   return options;
+}
+
+/// Settings without limits, and with a brake that these gears bear.
+Settings settings_of(const RobotModel& model, Mode mode) {
+  Settings settings = testing::in_mode(testing::unlimited_settings(model), mode);
+  settings.limits.stopping_time = 1;
+  settings.limits.position_upper.setConstant(kInfinite);
+  settings.limits.position_lower.setConstant(-kInfinite);
+  return settings;
 }
 
 /// The textbook's matrices of an arm, all of whose joints are elastic: links first.
@@ -117,7 +129,7 @@ TEST(ElasticJoints, HaveTheModesOfTheTextbookAtEveryTick) {
                      (sensor == PositionSensor::kLink ? " link" : " motor") +
                      (mode == Mode::kJoint ? " joint" : " cartesian"));
         const RobotModel model = testing::arm_model(arm, gears(n, 1e4, sensor));
-        const Settings settings = testing::in_mode(testing::unlimited_settings(model), mode);
+        const Settings settings = settings_of(model, mode);
         LedArm led(model, settings, testing::kSmallSwing);
         led.settle();
         for (int k = 0; k < 500'000 && led.modes().count == 0; ++k) {
@@ -155,7 +167,7 @@ TEST(ElasticJoints, HaveTheModesOfTheTextbookAtEveryTick) {
 TEST(ElasticJoints, LeaveTheZeroModesOfTheArm) {
   for (const PositionSensor sensor : {PositionSensor::kMotor, PositionSensor::kLink}) {
     const RobotModel model = testing::arm_model(testing::arms()[0], gears(7, 1e4, sensor));
-    Settings settings = testing::in_mode(testing::unlimited_settings(model), Mode::kCartesian);
+    Settings settings = settings_of(model, Mode::kCartesian);
     settings.initial.gains.null_stiffness.setZero();
     LedArm led(model, settings, testing::kSmallSwing);
     led.settle();
@@ -223,10 +235,43 @@ TEST(ElasticJoints, AreTwoMassesOnASpring) {
   }
 }
 
+// With a brake d q' on the link, B J s^3 + (B + J) D s^2 + ((B + J) K + d D) s + d K = 0 has its
+// boundary, by Routh, at d B J K = (B + J) D ((B + J) K + d D).
+TEST(ElasticJoints, AreStoppedByABrakeThatTheyBear) {
+  const double J = 0.5, B = 0.3, K = 4000;
+  ModelOptions options = gears(1, K, PositionSensor::kLink);
+  options.viscous_friction.setZero();
+  options.reflected_inertia.setConstant(B);
+  options.gear_stiffness.setConstant(K);
+  for (const double D : {0.3, 1.0, 4.0}) {
+    options.gear_damping.setConstant(D);
+    const double d = (B + J) * (B + J) * D * K / (B * J * K - (B + J) * D * D);
+    const double T = 2 * (B + J) / d;  // with a margin of 2
+    options.position_sensor = PositionSensor::kLink;
+    const RobotModel link = one_joint(options);
+    options.position_sensor = PositionSensor::kMotor;
+    const RobotModel motor = one_joint(options);
+    Settings settings = default_settings(link);
+    settings.period = 1e-6;  // no delay to speak of
+    settings.limits.stopping_time = 10;
+    EXPECT_NEAR(gears_stopping_time(link, settings, 0.01), T, 1e-4 * T) << D;
+    EXPECT_DOUBLE_EQ(gears_stopping_time(link, settings, 100 * T), 100 * T / 3) << D;
+    EXPECT_DOUBLE_EQ(gears_stopping_time(motor, settings, 0.01), 0.01 / 3) << D;
+    settings.limits.stopping_time = 0.9 * T;
+    if (T > 0.5) {
+      EXPECT_THROW((void)gears_stopping_time(link, settings, 0.9 * T), InvalidSettings) << D;
+    } else {
+      EXPECT_NO_THROW((void)gears_stopping_time(link, settings, 0.9 * T)) << D;
+    }
+  }
+  const RobotModel rigid = testing::panda_model();
+  EXPECT_EQ(gears_stopping_time(rigid, default_settings(rigid), 0.05), 0);
+}
+
 TEST(ElasticJoints, ComeNearRigidOnesAsTheirStiffnessGrows) {
   const testing::Arm& arm = testing::arms()[0];
   ModelOptions rigid = gears(7, 1e4, PositionSensor::kMotor);
-  rigid.gear_stiffness = JointVector::Constant(7, kRigid);
+  rigid.gear_stiffness = JointVector::Constant(7, kInfinite);
   const RobotModel plain = testing::arm_model(arm, rigid);
   ASSERT_EQ(plain.elastic_joints(), 0);
   const auto truth = frequencies_of(joint_loop(plain, 300, 20));
@@ -263,7 +308,7 @@ TEST(ElasticJoints, SoftenTheArmByTheirCompliance) {
 
 TEST(ElasticJoints, MayBeSomeOfTheJoints) {
   ModelOptions options = gears(7, 1e4, PositionSensor::kMotor, 0);
-  for (const Index rigid : {1, 4, 5}) options.gear_stiffness[rigid] = kRigid;
+  for (const Index rigid : {1, 4, 5}) options.gear_stiffness[rigid] = kInfinite;
   const RobotModel some = testing::arm_model(testing::arms()[0], options);
   for (const Index rigid : {1, 4, 5}) options.gear_stiffness[rigid] = 1e9;
   const RobotModel all = testing::arm_model(testing::arms()[0], options);
@@ -348,7 +393,7 @@ TEST(ElasticJoints, AreTheSameAtAPostureAndInAController) {
   for (const PositionSensor sensor : {PositionSensor::kMotor, PositionSensor::kLink}) {
     for (const bool outside : {false, true}) {
       const RobotModel model = testing::arm_model(testing::arms()[0], gears(7, 1e4, sensor));
-      Settings settings = testing::in_mode(testing::unlimited_settings(model), Mode::kCartesian);
+      Settings settings = settings_of(model, Mode::kCartesian);
       if (outside) settings.environment.tip_stiffness.setConstant(300);
       if (outside) settings.environment.joint_damping.setConstant(7, 0.4);
       LedArm led(model, settings);

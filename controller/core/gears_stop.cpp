@@ -1,0 +1,69 @@
+#include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/controller/core/gears_stop.hpp>
+#include <dashpot/controller/elastic_joints.hpp>
+#include <dashpot/controller/model/posture_sequence.hpp>
+#include <dashpot/controller/safety/brake.hpp>
+#include <dashpot/controller/settings_check.hpp>
+#include <dashpot/controller/vibration/sampled_analysis.hpp>
+
+#include <algorithm>
+#include <iomanip>
+#include <sstream>
+
+namespace dashpot::controller {
+namespace {
+
+constexpr double kMargin = 2;  // of gain: a brake leaves a gear's mode half of its damping
+constexpr double kEdge = 6;    // likewise, of what acts at the edges of allowed velocities (Brake)
+constexpr double kLongest = 1e3;  // s: there is none
+constexpr int kPostures = 16;
+
+std::string number(double value) {
+  std::ostringstream text;
+  text << std::setprecision(3) << value;
+  return text.str();
+}
+
+/// Returns the margin of a loop in joint coordinates, at most 1; 0 if there is none.
+double margin_of(analysis::System<kMaxJoints> system, const analysis::SampledLoop& loop,
+                 const analysis::Gears& gears) {
+  gears.extend(system);
+  analysis::Spectrum<kMaxJoints> spectrum;
+  const analysis::Status solved = analysis::SpectrumSolver<kMaxJoints>().solve(system, spectrum);
+  if (solved != analysis::Status::kOk && solved != analysis::Status::kUncertified) return 0;
+  return std::min(1.0, analysis::gain_margin(system, spectrum, loop, 1, kSlowestVibration));
+}
+
+}  // namespace
+
+double gears_stopping_time(const RobotModel& model, const Settings& settings, double wanted) {
+  const analysis::Gears gears = elastic_joints(model);
+  if (!gears.any()) return 0;
+  analysis::SampledLoop loop = sampled_loop(model, settings);
+  const Eigen::MatrixXd friction = loop.friction;
+  loop.gears = gears;
+  loop = analysis::with_gears(loop);
+  const DynamicsKernel kernel(model);
+  const PostureSequence postures(settings.limits.position_lower, settings.limits.position_upper);
+  const JointVector rest = JointVector::Zero(model.dof());
+  DynamicsResult robot;
+  double T = kMargin / kEdge * wanted;
+  for (int k = 0; k < kPostures && T <= kLongest; ++k) {
+    kernel.evaluate(postures.at(k), rest, robot);
+    analysis::System<kMaxJoints> system(model.dof());
+    system.mass = robot.M;
+    system.damping = robot.M * (kMargin / T) + friction;
+    T /= margin_of(system, loop, gears);
+  }
+  if (!(T <= std::max({kLongStop, wanted, 1.01 * settings.limits.stopping_time}))) {
+    throw InvalidSettings(
+        "limits.stopping_time",
+        "is " + number(settings.limits.stopping_time) +
+            " s, but with gears that bend (robot.gear_stiffness, gear_damping, position_sensor) a "
+            "brake is stable from " +
+            number(T) + " s on: ask for that");
+  }
+  return T;
+}
+
+}  // namespace dashpot::controller
