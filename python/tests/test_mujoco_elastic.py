@@ -220,7 +220,7 @@ def test_predicted_modes_and_margin_are_those_of_mujocos_arm(root, name, sensor)
                       "gear_stiffness": stiffness.tolist(), "gear_damping": damping.tolist(),
                       "position_sensor": sensor},
             "control": {"period": PERIOD, "mode": "cartesian" if seed else "joint"},
-            "limits": {"torque": 1e4, "torque_rate": 1e6, "gain_margin": 1},
+            "limits": {"torque": 1e4, "torque_rate": 1e6, "gain_margin": 1, "stopping_time": 2},
             "watchdog": {"setpoint_hold": 0, "setpoint_damp": 0, "feedback": 0},
             "analysis": {"share": 1,
                          "sampled": {"interval": 0.05, "delay": delay, "cutoff": cutoff}},
