@@ -20,7 +20,7 @@ using Eigen::VectorXd;
 
 constexpr double kFewest = 0.8;        // share of the parts that must have a mode
 constexpr double kLeastRatio = 0.001;  // of what decays
-/// Of 20 parts: Student's 95 % quantile over that of the normal distribution.
+/// Student's 95 % quantile for 20 parts over that of the normal distribution.
 constexpr double kStudent = 2.09 / 1.96;
 
 /// The motion of each pole at all lags: rows are channels by lags, a pair has two columns.

@@ -54,7 +54,7 @@ class FakeDriver {
   JointVector torque_of_iiwa(bool counts) const;
   /// Through the Panda's low-pass and rate limit.
   JointVector filtered(const JointVector& torque);
-  /// Of what the driver does without commands: it holds, or damps.
+  /// Returns the torque of a driver without commands: it holds, or damps.
   JointVector resting_torque();
   bool has_springs() const noexcept;
 

@@ -34,7 +34,7 @@ struct InspectOptions {
   bool json = false;
 };
 
-/// Of joint space, in the units of revolute and prismatic joints; zeros if `text` is empty.
+/// Returns a number for each joint, in the units of its type; zeros if `text` is empty.
 JointVector joint_list(const std::string& option, const std::string& text, const RobotModel& model,
                        const char* revolute, const char* prismatic) {
   if (text.empty()) return JointVector::Zero(model.dof());

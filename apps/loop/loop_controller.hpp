@@ -24,11 +24,11 @@ class LoopController {
   virtual std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
                               const controller::Setpoint* setpoint,
                               JointVector& torque) noexcept = 0;
-  /// Of the last tick.
+  /// Returns the snapshot of the last tick.
   virtual const dashpot_snapshot& snapshot() noexcept = 0;
-  /// Those that are newer than what was returned last; null if there are none.
+  /// Returns modes that are newer than those returned last; null if there are none.
   virtual const dashpot_modes* new_modes() noexcept = 0;
-  /// Likewise of the sampled loop.
+  /// Does the same for the sampled loop.
   virtual const dashpot_sampled_modes* new_sampled_modes() noexcept { return nullptr; }
 
   /// Before the loop begins, with the robot at rest at q. Returns DASHPOT_OK, or the code of a

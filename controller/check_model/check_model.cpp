@@ -397,7 +397,7 @@ class Fitting {
     report_contacts(check);
   }
 
-  /// Of a joint that hardly moves: an offset alone, with which static friction may be mixed.
+  /// Reports a joint that hardly moves: an offset alone, which may contain static friction.
   void report_resting(Index j, JointCheck& joint) const {
     VectorXd rest(K_), explained(K_);
     const Index shared = fit_.A.cols() - 3 * n_;
