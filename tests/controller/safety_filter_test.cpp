@@ -56,7 +56,7 @@ class Filter : public ::testing::Test {
   SafetyFilter::Aim aim = SafetyFilter::Aim::kSprings;
 };
 
-/// Of a joint whose weight is about at its limit 5 % of the limit are left to say how much all
+/// A joint whose weight is about at its limit keeps 5 % of the limit, which say how much all
 /// joints shrink.
 TEST_F(Filter, ShrinksAllJointsAlikeBeyondTheWeight) {
   weight = {39, 0};

@@ -28,7 +28,7 @@
 
 namespace dashpot::testing {
 
-/// The same number in a longer type.
+/// Returns the number in a longer type.
 inline long double widened(double x) {
   return static_cast<long double>(x);
 }

@@ -239,7 +239,7 @@ TEST(WebMonitor, ShowsALogAtAnyTime) {
   EXPECT_NEAR(setup["duration"].get<double>(), 0.999, 1e-9);
   EXPECT_EQ(setup["arm"]["joints"].size(), 7U);
 
-  // The same as reading the log from its beginning.
+  // This gives the same as reading the log from its beginning.
   lcmtypes::MessageHandlers handlers;
   state_t state{};
   modes_t modes{};
