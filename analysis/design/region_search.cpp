@@ -242,7 +242,7 @@ RegionDesign design_of(const Lowered& found, const RegionVerdict& verdict, const
   return design;
 }
 
-/// What is asked last.
+/// Returns what is asked last.
 RegionQuestion last_question(const MatrixXd& damping, const RegionOptions& options) {
   return {damping, options.target, 0, 0, {}, options.loop ? kMostMargin : 0};
 }

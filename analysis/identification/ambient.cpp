@@ -51,7 +51,7 @@ MatrixXd amplitudes_of(const MatrixXd& columns, const Correlations& correlations
   return columns.colPivHouseholderQr().solve(right);
 }
 
-/// What a model of `order` of some correlations leaves of others.
+/// Returns what a model of `order` of some correlations leaves of others.
 double left_over(const Realization& model, int order, const Correlations& own,
                  const Correlations& other, double step) {
   const std::vector<RealizedPole> poles = model.poles(order);

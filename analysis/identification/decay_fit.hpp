@@ -39,7 +39,7 @@ struct DecayStep {
 DecayStep step_of(const DecayData& data, std::vector<DecayFactor> factors,
                   const Eigen::VectorXd& noise);
 
-/// What a fit's criterion counts for its parameters.
+/// Returns what a fit's criterion counts for its parameters.
 double parameter_penalty(const DecayFit& fit, const DecayData& data);
 
 /// The part of the model that belongs to a factor, and what the model leaves over: samples x

@@ -178,8 +178,9 @@ void ModelSearch::refine(const ExcitedCells& all) {
   larger.reset();
 }
 
-/// What more parameters have to be worth grows with what no model explains: its squares are fewer
-/// independent numbers than samples (quasi-likelihood; Lebreton et al. 1992).
+/// Returns the criterion with a price of parameters that grows with the motion that no model
+/// explains, because its squares are fewer independent numbers than samples (quasi-likelihood;
+/// Lebreton et al. 1992).
 double ModelSearch::score(const DecayFit& some) const {
   return some.criterion + (colour_ - 1) * parameter_penalty(some, data);
 }

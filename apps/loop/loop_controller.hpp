@@ -37,11 +37,11 @@ class LoopController {
   /// The springs and dampers from the next tick on. Returns as start(); with DASHPOT_OK `reason`
   /// says what to be warned of, or nothing.
   virtual std::int32_t set_gains(const controller::Gains& gains, std::string& reason) = 0;
-  /// What the arm carries from the next tick on, where T is in the tip link, and with which gains,
-  /// if there are new ones. Returns as set_gains().
+  /// Sets what the arm carries from the next tick on, where T is in the tip link, and the gains
+  /// for it, if there are new ones. Returns as set_gains().
   virtual std::int32_t set_payload(const controller::Payload& payload, const controller::Pose& tool,
                                    const controller::Gains* gains, std::string& reason) = 0;
-  /// How fast the tip may be from the next tick on. Returns as start().
+  /// Sets how fast the tip may be from the next tick on. Returns as start().
   virtual std::int32_t limit_tip_speed(const controller::TipSpeed& speed, std::string& reason) = 0;
   /// Whether the controller would go there, with these gains, from q; for one that is in no loop.
   /// Returns as start().

@@ -42,7 +42,7 @@ class ClosedLoop {
   std::int32_t control() noexcept;
   /// The robot's part: one period under that torque.
   sim::Status move() noexcept;
-  /// What the scenario, or a command in its place, wants.
+  /// Returns what the scenario, or a command in its place, wants.
   LoopGoal& goal() noexcept { return goal_; }
 
   // Another thread:

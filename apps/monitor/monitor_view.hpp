@@ -30,7 +30,7 @@ class MonitorView {
   std::string screen(bool bold) const;
   /// Returns the state on one line, ended by a newline.
   std::string line() const;
-  /// What all messages add up to, and the modes at the end; `malformed` were not shown.
+  /// Returns what all messages add up to, and the modes at the end; `malformed` were not shown.
   std::string summary(std::int64_t malformed) const;
 
  private:

@@ -207,7 +207,7 @@ class Fitting {
     return best;
   }
 
-  /// What is said of a hypothesis whose columns were added; "" if it is not significant.
+  /// Returns what is said of a hypothesis whose columns were added; "" if it is not significant.
   std::string reason_for(const Hypothesis& hypothesis, Index first, const RobustFit& before) const {
     const auto count = static_cast<Index>(hypothesis.columns.size());
     double largest = 0;

@@ -32,7 +32,7 @@ class Filter : public ::testing::Test {
     robot.coriolis = pair(0, 0);
   }
   SafetyFilter make() const { return SafetyFilter(settings); }
-  /// What the filter makes of `tau`.
+  /// Returns what the filter makes of `tau`.
   Status apply(SafetyFilter& filter, const Pair& tau) {
     out = tau;
     const JointVector position = q, velocity = qd, held = weight, damps = dampers;

@@ -42,7 +42,7 @@ class Connection {
   void say(const std::string& text) const {
     (void)::send(socket_, text.data(), text.size(), MSG_NOSIGNAL);
   }
-  /// What comes until the server ends, or `enough` is in it; ten seconds at most.
+  /// Returns what comes until the server ends, or `enough` is in it; ten seconds at most.
   std::string hear(const std::string& enough = "") const {
     std::string all;
     const auto end = Clock::now() + std::chrono::seconds(10);
