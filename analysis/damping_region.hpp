@@ -50,8 +50,8 @@ struct RegionDesign {
                           ///< (relative): rounding, unless even no damping would be too much,
                           ///< or a share below 1 misses lower bounds
   int worst_sample = -1;  ///< configuration with the smallest ratio
-  /// Of the matrix found for continuous loops, the largest share found with which every loop keeps
-  /// its margin; `damping` is this share of it.
+  /// Largest share found, of the matrix for continuous loops, with which every loop keeps its
+  /// margin; `damping` is this share of that matrix.
   double share = 1;
   /// Smallest over all configurations; infinite for continuous loops.
   double gain_margin = std::numeric_limits<double>::infinity();

@@ -5,7 +5,7 @@
 
 namespace dashpot::analysis {
 
-/// Stiffness and damping that the world adds to an arm's, n x n each.
+/// Stiffness and damping that the world adds to an arm, n x n each.
 struct PassivePart {
   Square<kMaxDof> stiffness, damping;
 };
@@ -23,7 +23,7 @@ struct PassivePart {
 /// which is not symmetric, and can be unstable; the dampers likewise.
 class Gears {
  public:
-  /// Of n joints; those with an infinite stiffness are rigid.
+  /// The gears of n joints. A joint with an infinite stiffness is rigid.
   struct Data {
     Eigen::VectorXd stiffness;  ///< K_J, n, N m/rad, positive
     Eigen::VectorXd damping;    ///< D_J, n, N m s/rad
@@ -54,8 +54,8 @@ class Gears {
     const Square<kMaxDof> none = Square<kMaxDof>::Zero(n_, n_);
     extend({none, none}, system);
   }
-  /// Does the same to a system of which only mass, damping and factor are given. So they are of the
-  /// result if the motors are measured. If the links are, it has a stiffness and no factor.
+  /// Does the same to a system of which only mass, damping and factor are given. The result has
+  /// only these as well if the motors are measured; if the links are, a stiffness and no factor.
   void extend_factored(System<kMaxDof>& system) const noexcept;
   /// Makes the mass with motors as bodies of their own, diag(M - B, B).
   template <typename Matrix>
@@ -70,22 +70,22 @@ class Gears {
     }
   }
 
-  /// A matrix A of forces by what the controller measures, in these coordinates: out += S_m' A S_s
-  /// with the motors' coordinates S_m x and those measured S_s x.
+  /// Adds a matrix A of forces by what the controller measures: out += S_m' A S_s, with the
+  /// motors' coordinates S_m x and the measured ones S_s x.
   template <typename Matrix>
   void add_of_controller(const Square<kMaxDof>& A, Matrix& out) const noexcept {
     for (Eigen::Index j = 0; j < n_; ++j) {
       for (Eigen::Index i = 0; i < n_; ++i) out(motor(i), measured(j)) += A(i, j);
     }
   }
-  /// The same of what acts on the links.
+  /// Adds a matrix A, n x n, of forces that act on the links by the links' coordinates.
   template <typename Matrix>
   void add_on_links(const Square<kMaxDof>& A, Matrix& out) const noexcept {
     for (Eigen::Index j = 0; j < n_; ++j) {
       for (Eigen::Index i = 0; i < n_; ++i) out(i, j) += A(i, j);
     }
   }
-  /// The same of the friction F.
+  /// Adds the friction F of the motors and of rigid joints.
   template <typename Matrix>
   void add_friction(Matrix& out) const noexcept {
     if (data_.friction.size() == 0) return;
@@ -93,7 +93,7 @@ class Gears {
       for (Eigen::Index i = 0; i < n_; ++i) out(motor(i), motor(j)) += data_.friction(i, j);
     }
   }
-  /// The same of springs or dampers of the gears, n.
+  /// Adds springs or dampers `gear`, n, between motors and links.
   template <typename Matrix>
   void add_gears(const Eigen::VectorXd& gear, Matrix& out) const noexcept {
     for (Eigen::Index k = 0; k < count(); ++k) {

@@ -11,8 +11,8 @@
 namespace dashpot::analysis {
 
 struct IdentifyOptions {
-  /// Of the models tried: eigenvalues. 0: of decays 2 for each channel, within 12 and 32, with
-  /// inputs 16 more, at most 32; of ambient motion 4 for each channel and 4 more, at most 40.
+  /// Eigenvalues of the largest model tried. 0: of decays 2 for each channel, within 12 and 32,
+  /// with inputs 16 more, at most 32; of ambient motion 4 for each channel and 4 more, at most 40.
   int max_order = 0;
   bool refine = true;  ///< of decays: on the samples as they are; false: a first estimate, fast
   /// Asked now and then in the search among models of decays and driven motion, with the share that

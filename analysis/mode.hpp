@@ -46,9 +46,9 @@ struct ModeNumbers {
   /// Proved bounds of |computed - true|; infinite if none could be proved. They are also infinite
   /// where frequencies leave 1e-60 .. 1e60 rad/s or masses 1e-120 .. 1e120, because underflow is
   /// not counted there.
-  /// Of either eigenvalue, 1/s (of the computed and the true one nearest each other):
+  /// Bound of either eigenvalue, 1/s (the distance of the computed from the nearest true one).
   double error_bound = std::numeric_limits<double>::infinity();
-  /// Of each of the two, 1/s: error_bound is the larger one.
+  /// Bound of each eigenvalue, 1/s; error_bound is the larger one.
   std::array<double, 2> eigenvalue_bounds = {std::numeric_limits<double>::infinity(),
                                              std::numeric_limits<double>::infinity()};
   double natural_frequency_bound = std::numeric_limits<double>::infinity();  ///< rad/s

@@ -123,7 +123,7 @@ class ModeTracker {
   bool kept_known_ = false;  ///< kept_ is the spectrum of last_
   SpectrumSolver<kMaxDof> solver_;
   Spectrum<kMaxDof> spectrum_;
-  // Of two-sided bases
+  // For two-sided bases:
   BasisExtrapolation left_extrapolation_;
   double still_floor_ = 0;  ///< frequency below which zero modes were told from others, rad/s
 };

@@ -9,8 +9,8 @@ namespace dashpot::analysis {
 /// G is n x n and gives the change by a small dA as  sum_ij G_ij dA_ij.  For a symmetric system G
 /// is symmetric, and an entry (i,j) that moves together with (j,i) counts with 2 G_ij.
 struct ModeGradient {
-  /// Of either eigenvalue. Near critical damping these gradients grow without bound (infinite or
-  /// NaN at critical damping), while the gradients of frequency and ratio stay smooth.
+  /// Gradient of each eigenvalue. Near critical damping these gradients grow without bound
+  /// (infinite or NaN at critical damping), while the gradients of frequency and ratio stay smooth.
   std::array<Eigen::MatrixXcd, 2> eigenvalues;
   Eigen::MatrixXd natural_frequency;
   Eigen::MatrixXd damping_ratio;

@@ -2,15 +2,15 @@
 # Counts instructions with callgrind:
 #     benchmarks/instruction_count.sh PROGRAMS FOLDER [TRIALS]
 # PROGRAMS is the folder of random_ticks, gain_ticks and sim_ticks; FOLDER takes callgrind's files.
-# Of control ticks: fails if the most expensive of 1000 takes more than 1.3 times the median, joint or
+# It counts control ticks, and fails if the most expensive of 1000 takes more than 1.3 times the median, joint or
 # Cartesian. With gains, frame and mode that change at every tick the ratio is printed as well: to the
 # median of the same ticks, and of settled ones. Then ticks that find the modes: followed, standing
 # still, and lost, where nothing can be followed: their most expensive tick may take 10 medians of
 # followed ones, and no more.
-# Of ticks with the worst of all gains that are accepted: a search of TRIALS gains comes first, then
+# It counts ticks with the worst of all gains that are accepted: a search of TRIALS gains comes first, then
 # ticks with the worst it found and with random ones are counted. Fails if the most expensive of these
 # takes more than 10 times the median of ticks whose modes are followed.
-# Of simulated periods: what each part of a scene costs. Fails unless a scene without the part takes
+# It counts simulated periods: what each part of a scene costs. It fails unless a scene without the part takes
 # fewer instructions than one with.
 set -euo pipefail
 programs=$1 folder=$2 trials=${3:-2000} status=0

@@ -62,7 +62,7 @@ class PinocchioChain {
     pinocchio::getFrameJacobian(model_, data_, tip_, pinocchio::LOCAL_WORLD_ALIGNED, J_);
   }
 
-  /// Of the last all().
+  /// Returns the result of the last all().
   controller::DynamicsResult result() const {
     controller::DynamicsResult result;
     const Eigen::MatrixXd upper = data_.M;

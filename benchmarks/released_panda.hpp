@@ -73,7 +73,7 @@ class ReleasedPanda : public sim::System {
   }
 
   const sim::Robot& robot() const noexcept { return robot_; }
-  /// Of y' so far.
+  /// Returns how often y' was evaluated so far.
   long evaluations() const noexcept { return evaluations_; }
 
   static const std::array<double, kJoints>& rest() noexcept {

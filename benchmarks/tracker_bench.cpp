@@ -101,7 +101,7 @@ std::vector<System<kMaxDof>> full_path(int n) {
   return path;
 }
 
-/// The same with a stiffness and a damping that are not symmetric: n joints turn the forces of
+/// A path whose stiffness and damping are not symmetric: n joints turn the forces of
 /// others by as much as a twentieth of their own.
 std::vector<System<kMaxDof>> nonsymmetric_path(int n) {
   std::vector<System<kMaxDof>> path = full_path(n);
@@ -163,7 +163,7 @@ double worst_backward_error(const System<kMaxDof>& system, const TrackedSpectrum
   return worst;
 }
 
-/// Of eigenvectors of the state matrix, in the columns of X.
+/// Returns the worst error of eigenvectors of the state matrix, in the columns of X.
 double worst_backward_error(const System<kMaxDof>& system, const MatrixXd& lift,
                             const Eigen::VectorXcd& values, const Eigen::MatrixXcd& X) {
   double worst = 0;

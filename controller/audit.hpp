@@ -37,8 +37,9 @@ struct AuditOptions {
   double cutoff = 0;                 ///< of a first-order low-pass on the torque, Hz; 0: none
   bool difference_velocity = false;  ///< the controller uses (q_k - q_k-1) / period as velocity
   double margin = 2;  ///< gain margin that is asked for, see PostureAudit::rotors; at least 1
-  /// Of the integral of the springs of task or joints, s: their pull adds up to a torque or wrench
-  /// that grows by pull / integral_time (see Integral::time). 0: none. Counts in the gain margin.
+  /// Time of the integral of the springs of task or joints, s: their pull adds up to a torque or
+  /// wrench that grows by pull / integral_time (see Integral::time). 0: none. Counts in the gain
+  /// margin.
   double integral_time = 0;
   /// True if the null space's springs and dampers act through the projector N = I - J^+ J of the
   /// pseudo-inverse, as many controllers have it. It ignores the inertia, so that they act on the

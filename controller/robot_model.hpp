@@ -29,8 +29,8 @@ struct Joint {
   double effort = 0;            ///< limit, N m, not negative; infinity if there is none
   double viscous_friction = 0;  ///< viscous friction, N m s/rad
   double coulomb_friction = 0;  ///< Coulomb friction, N m
-  /// Of rotor and gear, as seen by the joint, and as it appears to who commands torques; kg m^2
-  /// (kg). See ModelOptions::torque_loop_inertia_ratio.
+  /// Inertia of rotor and gear, as seen by the joint, and as it appears to who commands torques; kg
+  /// m^2 (kg). See ModelOptions::torque_loop_inertia_ratio.
   double reflected_inertia = 0;
   double gear_stiffness = std::numeric_limits<double>::infinity();  ///< N m/rad; infinity: rigid
   double gear_damping = 0;  ///< N m s/rad, beside gear_stiffness

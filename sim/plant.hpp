@@ -77,7 +77,7 @@ struct EnergyAudit {
 /// A mechanism with its drives and sensors, moved one control period at a time:
 ///     Plant plant(arm, options, q, qd);
 ///     while (...) plant.step(torque_for(plant.measured()));
-/// The same calls give the same bits. step() allocates nothing. The system must outlive the plant,
+/// Equal calls give equal bits. step() allocates nothing. The system must outlive the plant,
 /// and no two plants may share a system.
 class Plant {
  public:
@@ -136,7 +136,7 @@ class Plant {
   StoredEnergy initial_;
   Measurement measured_;
 
-  // Of the stages:
+  // States of the stages:
   JointVector torque_;  // on its way from the command, then as exerted
   JointVector filtered_;
   double filter_gain_ = 0;

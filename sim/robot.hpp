@@ -31,7 +31,7 @@ struct Joint {
   double reflected_inertia = 0;  ///< of the drive, kg m^2 or kg
   double viscous_friction = 0;   ///< coefficient, N m s/rad or N s/m
   double coulomb_friction = 0;   ///< torque or force, N m or N
-  /// Of the gear between drive and link, N m/rad or N/m; infinite: rigid.
+  /// Stiffness of the gear between drive and link, N m/rad or N/m; infinite: rigid.
   double gear_stiffness = std::numeric_limits<double>::infinity();
   double gear_damping = 0;  ///< of an elastic gear, N m s/rad or N s/m
 

@@ -15,8 +15,8 @@
 namespace dashpot::text {
 namespace {
 
-/// What makes a text a xacro that was not expanded: an element or an expression of it outside
-/// comments; "" if nothing does. (The name space alone may stay behind in an expanded one.)
+/// Returns what makes a text a xacro that was not expanded: an element or an expression of it
+/// outside comments; "" if nothing does. (The name space alone may stay behind in an expanded one.)
 std::string xacro_sign(std::string_view text) {
   std::size_t at = 0;
   while ((at = text.find_first_of("<$", at)) != std::string_view::npos) {

@@ -41,7 +41,7 @@ struct Factor {
   }
 };
 
-/// Of a positive semidefinite X of the structure.
+/// Returns a factor of a positive semidefinite X of the structure.
 Factor factor_of(const MatrixXd& X) {
   const Index k = X.rows();
   const double largest = X.diagonal().maxCoeff();

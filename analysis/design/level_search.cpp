@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kGridStep = 2. / 3;
 constexpr double kLowestLevel = 1e-3;
-/// Of a level, which is found from below.
+/// A level is found from below, this precisely.
 constexpr double kLevelPrecision = 1e-6;
 /// The peak of a margin below this part of the one wanted is found less precisely.
 constexpr double kReach = 0.8, kCoarse = 3e-3;

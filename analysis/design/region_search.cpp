@@ -33,7 +33,7 @@ std::vector<DampingSample> samples_of(const std::vector<TaskImpedance>& configur
   return samples;
 }
 
-/// Of options that are valid.
+/// Returns the largest ratio allowed. Throws for options that are not valid.
 double ceiling_of(const RegionOptions& options) {
   require("damping", options.gain_margin >= 1, "a gain margin below 1 is none");
   const double wanted = std::max(options.target.low_ratio, options.target.high_ratio);
@@ -242,7 +242,7 @@ RegionDesign design_of(const Lowered& found, const RegionVerdict& verdict, const
   return design;
 }
 
-/// What is asked last.
+/// Returns what is asked last.
 RegionQuestion last_question(const MatrixXd& damping, const RegionOptions& options) {
   return {damping, options.target, 0, 0, {}, options.loop ? kMostMargin : 0};
 }

@@ -20,7 +20,7 @@ using Eigen::VectorXd;
 
 constexpr double kFewest = 0.8;        // share of the parts that must have a mode
 constexpr double kLeastRatio = 0.001;  // of what decays
-/// Of 20 parts: Student's 95 % quantile over that of the normal distribution.
+/// Student's 95 % quantile for 20 parts over that of the normal distribution.
 constexpr double kStudent = 2.09 / 1.96;
 
 /// The motion of each pole at all lags: rows are channels by lags, a pair has two columns.
@@ -51,7 +51,7 @@ MatrixXd amplitudes_of(const MatrixXd& columns, const Correlations& correlations
   return columns.colPivHouseholderQr().solve(right);
 }
 
-/// What a model of `order` of some correlations leaves of others.
+/// Returns what a model of `order` of some correlations leaves of others.
 double left_over(const Realization& model, int order, const Correlations& own,
                  const Correlations& other, double step) {
   const std::vector<RealizedPole> poles = model.poles(order);

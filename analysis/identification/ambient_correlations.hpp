@@ -18,7 +18,7 @@ class AmbientCorrelations {
   /// Throws std::invalid_argument for records that are too short.
   explicit AmbientCorrelations(const std::vector<MotionRecord>& records);
 
-  /// Of those parts that `chosen` (of its number) wants.
+  /// Returns the mean over the parts for whose number `chosen` is true.
   template <typename Chosen>
   Correlations mean(const Chosen& chosen) const {
     Correlations sum(parts[0].size(),

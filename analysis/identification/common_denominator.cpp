@@ -17,8 +17,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-/// Of the records, one after the other: lines x channels, lines x inputs, z^-1 and the lines'
-/// records.
+/// Spectra of the records, one after the other: lines x channels, lines x inputs, z^-1, and the
+/// record of each line.
 struct Lines {
   MatrixXcd output, input;
   VectorXcd delay;

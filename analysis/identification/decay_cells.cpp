@@ -14,7 +14,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Of one record; of many records fewer each.
+/// Returns the most cells of a record; each of many records has fewer.
 Index most_cells(std::size_t records) {
   return std::clamp<Index>(600 / static_cast<Index>(records), 100, 300);
 }

@@ -60,7 +60,7 @@ struct DecayData {
   Eigen::Index channels = 0;
   std::size_t records = 0;
   std::size_t inputs = 0;
-  /// Of each channel, standard deviation: no noise is taken to be less than kLinear of it.
+  /// Standard deviation of each channel; no noise is taken to be less than kLinear of it.
   Eigen::VectorXd motion;
 
   /// To which share of itself the motion of an arm is linear, at best. What is smaller is not

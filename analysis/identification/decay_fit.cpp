@@ -17,7 +17,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Of one more parameter, in the criterion: between Akaike's 2, which takes noise for modes, and
+/// The criterion's cost of one more parameter: between Akaike's 2, which takes noise for modes, and
 /// Schwarz's logarithm of the number of samples, about 9, which lets weak modes spoil strong ones.
 constexpr double kPenalty = 4;
 

@@ -14,7 +14,7 @@ struct DecayFit {
   /// each input itself, and the products) x channels.
   Eigen::MatrixXd amplitudes;
   Eigen::VectorXd noise;  ///< of each channel, standard deviation of what is left over
-  /// Of each record, relative to `noise`: what is large is less linear, and counts less.
+  /// Noise of each record, relative to `noise`: a large motion is less linear, and counts less.
   Eigen::VectorXd record_noise;
   double criterion = 0;  ///< -2 log likelihood + 4 for each parameter; smaller is better
   double whiteness = 1;  ///< by how much the covariance grew because what is left over is no noise
@@ -39,7 +39,7 @@ struct DecayStep {
 DecayStep step_of(const DecayData& data, std::vector<DecayFactor> factors,
                   const Eigen::VectorXd& noise);
 
-/// What a fit's criterion counts for its parameters.
+/// Returns what a fit's criterion counts for its parameters.
 double parameter_penalty(const DecayFit& fit, const DecayData& data);
 
 /// The part of the model that belongs to a factor, and what the model leaves over: samples x

@@ -134,7 +134,7 @@ std::vector<Event> find_events(const VectorXd& speed, double period) {
   return events;
 }
 
-/// Of each channel, standard deviation.
+/// Returns the standard deviation of each channel.
 VectorXd motion_of(const MotionRecord& record) {
   VectorXd motion(record.output.rows());
   for (Index c = 0; c < motion.size(); ++c) {

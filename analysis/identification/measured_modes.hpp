@@ -9,7 +9,7 @@ namespace dashpot::analysis {
 /// |u' v|^2 / (|u|^2 |v|^2), the modal assurance criterion.
 double likeness(const Eigen::VectorXcd& u, const Eigen::VectorXcd& v);
 
-/// Of unit length, its largest entry real and positive.
+/// Returns the shape with unit length, its largest entry real and positive.
 Eigen::VectorXcd turned(const Eigen::VectorXcd& shape);
 
 /// The eigenvalues of models of rising order, from order 1, and whether each is stable.

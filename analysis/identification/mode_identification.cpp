@@ -108,7 +108,7 @@ LinearFit::LinearFit(const MotionStates& states, int stride, const Identificatio
   require("identify_modes", X0.cols() > X0.rows(),
           std::to_string(X0.cols()) + " pairs of samples are too few, need " +
               std::to_string(X0.rows() + 1) + " or more");
-  // Of the transpose: tall, so that a QR factorisation comes first.
+  // The transpose is tall, so that a QR factorisation comes first.
   const Eigen::JacobiSVD<MatrixXd> svd(X0.transpose(), Eigen::ComputeThinU | Eigen::ComputeThinV);
   const VectorXd& S = svd.singularValues();
   while (rank < S.size() && S[rank] > options.rank_tolerance * S[0]) ++rank;

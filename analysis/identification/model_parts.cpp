@@ -1,4 +1,4 @@
-// What parts of the records say of the model of the whole.
+// Compares parts of the records with the model of the whole.
 #include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/identification/model_search.hpp>
 
@@ -30,8 +30,8 @@ constexpr double kSame = 0.05, kSameRatio = 0.15;
 
 }  // namespace
 
-/// By how much the parts of the records would have a model's factors otherwise: their beginnings,
-/// their ends, and each of several records.
+/// By how much a model's factors differ in parts of the records: in their beginnings, their ends,
+/// and each of several records.
 std::vector<DecayStep> ModelSearch::steps_of_parts(const DecayFit& whole) const {
   std::vector<DecayStep> steps;
   const auto add = [&](const std::vector<MotionRecord>& records,
@@ -101,10 +101,10 @@ std::size_t ModelSearch::contradicted(const DecayFit& whole,
 }
 
 /// Prefers a model that all parts of the records have over a larger one that explains the whole
-/// better: what is not linear looks like many modes, and each part has others. If there is none,
-/// takes away what the parts contradict, one after the other.
+/// better: motion that is not linear looks like many modes, and each part has others. If there is
+/// none, removes the factors that the parts contradict, one after the other.
 void ModelSearch::keep_repeated() {
-  // What no model explains is not noise, and looks like a mode near another one.
+  // Motion that no model explains is not noise, and looks like a mode near another one.
   const bool copied =
       std::max(colour_, fit.whiteness) > kColoured && copy_in(fit) < fit.factors.size();
   if (contradicted(fit, scatter) == fit.factors.size() && !copied) return;
@@ -149,7 +149,8 @@ void ModelSearch::drop(std::size_t factor) {
   larger.reset();
 }
 
-/// The weaker of two factors that are one which is not linear: near each other, of like shapes.
+/// The weaker of two factors that are one motion which is not linear: near each other, with like
+/// shapes.
 /// None: the number of factors.
 std::size_t ModelSearch::copy_in(const DecayFit& whole) const {
   const auto shape = [&whole](Index first, const DecayFactor& factor) {

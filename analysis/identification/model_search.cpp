@@ -20,12 +20,12 @@ using Eigen::VectorXd;
 constexpr int kRoughIterations = 4;   ///< of models of rising order: a first estimate
 constexpr int kDrivenIterations = 6;  ///< where least squares have found them already
 constexpr int kProductIterations = 12;
-/// Of -2 log likelihood: by more a model that is searched for will not become worse.
+/// A change of the model is given up where -2 log likelihood will stay larger by this.
 constexpr double kDifference = 60;
-/// Of the record: a single decay that is slower is taken for drift, if one explains as much.
+/// In lengths of the record: a slower single decay is taken for drift, if one explains as much.
 constexpr double kDrifts = 3;
 
-/// Those that a record of this length (s) can tell from a constant, as factors.
+/// Returns as factors the poles that a record of this length (s) can tell from a constant.
 std::vector<DecayFactor> factors_of(const std::vector<RealizedPole>& poles, double duration) {
   std::vector<DecayFactor> factors;
   for (const RealizedPole& pole : poles) {
@@ -56,8 +56,8 @@ std::vector<std::vector<RealizedPole>> rest_poles(const std::vector<MatrixXd>& r
   return result;
 }
 
-/// The same with the products of its strongest oscillations: an arm that moves far is not linear,
-/// and what it makes of them would be taken for modes.
+/// Adds the products of the strongest oscillations to a fit: an arm that moves far is not linear,
+/// and these products would be taken for modes.
 DecayFit with_products(const DecayData& data, const DecayFit& plain) {
   constexpr std::size_t kStrongest = 2;
   std::vector<std::pair<double, std::size_t>> strongest;
@@ -178,8 +178,9 @@ void ModelSearch::refine(const ExcitedCells& all) {
   larger.reset();
 }
 
-/// What more parameters have to be worth grows with what no model explains: its squares are fewer
-/// independent numbers than samples (quasi-likelihood; Lebreton et al. 1992).
+/// Returns the criterion with a price of parameters that grows with the motion that no model
+/// explains, because its squares are fewer independent numbers than samples (quasi-likelihood;
+/// Lebreton et al. 1992).
 double ModelSearch::score(const DecayFit& some) const {
   return some.criterion + (colour_ - 1) * parameter_penalty(some, data);
 }
@@ -226,7 +227,7 @@ void ModelSearch::try_products(const VectorXd& noise) {
   order = plain_order;
 }
 
-/// Of a larger model that fits no better nothing is learnt.
+/// Forgets a larger model that fits no better: nothing is learnt from it.
 void ModelSearch::forget_useless_larger() {
   const double gained = larger ? larger->criterion - fit.criterion : 0;
   if (larger && (!larger->covariance.allFinite() ||

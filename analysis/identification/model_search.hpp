@@ -18,7 +18,7 @@ class ModelSearch {
  public:
   /// See IdentifyOptions.
   ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOptions& options);
-  /// Of records with inputs; the cells are fine enough to be all that is looked at.
+  /// Searches records with inputs; the cells are fine enough to stand for all samples.
   ModelSearch(const ExcitedCells& cells, const IdentifyOptions& options);
 
   /// Refines what was found in the beginnings of records on all of them.
@@ -29,8 +29,8 @@ class ModelSearch {
   int order = 0;                                    ///< of the realization chosen
   std::optional<DecayFit> larger;                   ///< the best that was not worth it
   DecayData data;
-  /// Of each factor: variance of its `first` and `second` that parts of the records show beyond
-  /// what each part's own deviations explain.
+  /// Variance of each factor's `first` and `second` that parts of the records show beyond what
+  /// each part's own deviations explain.
   std::vector<std::array<double, 2>> scatter;
   bool differs = false;  ///< parts of the records differ by more than their deviations
   std::vector<DecayFactor> not_repeated;  ///< found in the whole, but not in each part

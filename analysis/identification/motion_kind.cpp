@@ -19,7 +19,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-// Periods are those of the pace.
+// Periods are periods of the pace.
 constexpr double kMovesMore = 2;      // times its noise: a channel that moves
 constexpr Index kPaces = 8;           // of a record, each with a pace of its own,
 constexpr Index kShortStretch = 100;  // of more samples than this
@@ -32,8 +32,8 @@ constexpr double kOutburst = 100;  // times the median: what fades from there is
 // a push it falls for long, and rises at once.
 constexpr double kRisesOften = 0.33;  // share of the blocks
 constexpr double kKeepsSize = 10;     // most by which its energy changes from third to third
-// A cycle's amplitude stays, within this share, in the second half of a record; of a mode of as
-// many periods this is a damping ratio below 0.001.
+// A cycle's amplitude stays, within this share, in the second half of a record; a mode that did so
+// over as many periods would have a damping ratio below 0.001.
 constexpr double kSteadySize = 0.03;
 constexpr double kFewestPeriods = 4;  // in that half
 constexpr int kHarmonics = 7;
@@ -131,7 +131,8 @@ bool cycles(const MatrixXd& scaled, double step, MotionVerdict& verdict) {
   const MatrixXd late = scaled.rightCols(half).transpose();
   double w = strongest_line(late), bin = 2 * kPi / static_cast<double>(half);
   if (w * static_cast<double>(half) < kFewestPeriods * 2 * kPi || w > kPi / 2) return false;
-  // Of a part of the samples, so that many cost no more, the frequency that leaves least over.
+  // The frequency that leaves least over is searched in a part of the samples, so that many
+  // samples cost no more.
   const Index stride = std::max<Index>(1, static_cast<Index>(kPi / (2 * w * (kHarmonics + 1))));
   const MatrixXd few = late(Eigen::seqN(0, half / stride, stride), Eigen::all);
   const auto s = static_cast<double>(stride);

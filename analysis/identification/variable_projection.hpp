@@ -52,7 +52,7 @@ class VariableProjection {
 
     Eigen::Index motions() const { return first.back(); }
   };
-  /// Of a part, weighted.
+  /// The weighted fit of a part.
   struct Fitted {
     Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;  ///< of the model's columns
     Eigen::VectorXd weight;                          ///< of each sample, of its record

@@ -66,7 +66,7 @@ U separation(const MeasuredBlock<T>& A, const MeasuredBlock<U>& B) noexcept {
   return (magnitude(p00 * p11 - p01 * p10) - rounding * norm) / (norm * halves);
 }
 
-/// The same for a block of one entry x.
+/// Returns the separation of a block of one entry x from B.
 template <typename U>
 U separation(double x, const MeasuredBlock<U>& B) noexcept {
   constexpr double kRounding = 32 * kEps;

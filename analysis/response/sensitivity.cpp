@@ -100,7 +100,7 @@ class ModeReader {
     return result;
   }
 
-  /// Of frequency and ratio.
+  /// Returns the gradients of frequency and ratio.
   DampingGradient numbers(int power) const {
     const PairGradient by = pair(power);
     const double omega = mode_.natural_frequency, zeta = mode_.damping_ratio;

@@ -72,7 +72,7 @@ struct GearedLoop {
   Spectrum<> spectrum;
   SampledLoop loop;
 
-  /// Of a system in joint coordinates. Throws as analyze and sample_loop do.
+  /// Takes a system in joint coordinates. Throws as analyze and sample_loop do.
   template <int N>
   GearedLoop(const System<N>& rigid, const SampledLoop& given)
       : system(rigid.dof()), loop(with_gears(given)) {

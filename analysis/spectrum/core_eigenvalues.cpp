@@ -81,7 +81,7 @@ bool CoreEigenvalues<N>::replace_slow(ComplexStateVector<N>& values, Work& work)
   }
   sort<N>(slow);
   sort<N>(values);
-  // Of the places to divide them at that are clear in both, the one with the least relative errors.
+  // They are divided where it is clear in both, at the place with the least relative errors.
   double least = std::numeric_limits<double>::infinity();
   Eigen::Index division = 2 * m_;
   for (Eigen::Index k = 0; k < 2 * m_; ++k) {
@@ -106,7 +106,7 @@ bool CoreEigenvalues<N>::find_items(Work& work) noexcept {
   size_ = 0;
   Eigen::Index columns = 0;
   for (Complex& value : values) {
-    // Of equal rates of several zero modes rounding may have made a pair.
+    // Rounding may have made a pair of equal rates of several zero modes.
     if (coupled_zeros_ > 1 && std::abs(value.imag()) <= rounding()) value = value.real();
     if (value.imag() < 0) continue;
     item(size_++) = {value};
@@ -160,7 +160,7 @@ Square<N> CoreEigenvalues<N>::unsprung() const noexcept {
   return directions;
 }
 
-/// Of the real eigenvalues, marks those whose motion is mostly that of a coupled zero mode. Rates
+/// Marks the real eigenvalues whose motion is mostly that of a coupled zero mode. Rates
 /// that are zero to rounding become zero, so that they share a cluster, whose width is relative.
 ///
 /// A symmetric system's zero modes move with more kinetic than elastic energy. Without symmetry

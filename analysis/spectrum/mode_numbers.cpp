@@ -14,7 +14,7 @@ Invariants block_invariants(double l00, double l01, double l10, double l11, doub
   v.sum = l00 + l11;
   v.discriminant = half_difference * half_difference + l01 * l10;
   v.product = half_sum * half_sum - v.discriminant;
-  // Of a 2 x 2 matrix within rho of L: |tr| moves by sqrt(2) rho, det by |L| rho + rho^2 / 2,
+  // In a 2 x 2 matrix within rho of L |tr| moves by sqrt(2) rho, det by |L| rho + rho^2 / 2,
   // and the discriminant by |L0| rho + rho^2 / 2 with L0 the traceless part.
   const double cross = l01 * l01 + l10 * l10;
   const double size = std::sqrt(l00 * l00 + l11 * l11 + cross);

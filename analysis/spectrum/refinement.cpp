@@ -80,8 +80,9 @@ void dual_basis(const BasisResidual<N>& residual, ModalBasis<N>& basis) {
   basis.Gamma = basis.Lambda.transpose();
 }
 
-/// The same for a symmetric system whose blocks are not orthogonal to each other, because some have
-/// eigenvalues in common: Y = U G^-1 with the Gram matrix G, scaled before it is inverted.
+/// Makes the left basis of a symmetric system whose blocks are not orthogonal to each other,
+/// because some have eigenvalues in common: Y = U G^-1 with the Gram matrix G, scaled before it is
+/// inverted.
 template <int N>
 void orthogonalize_left(const State<N>& gram, ModalBasis<N>& basis) {
   StateVector<N> scale(gram.rows());

@@ -11,7 +11,7 @@ namespace {
 
 /// Two eigenvalues of one mode this close together (relative) count as nearly critical.
 constexpr double kCluster = 0.02;
-/// Of a subspace iteration.
+/// Steps of a subspace iteration.
 constexpr int kSteps = 8;
 
 template <int N>

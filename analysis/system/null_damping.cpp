@@ -13,7 +13,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Extended = long double;
-/// Of numbers that were double before.
+/// Rounding of numbers that were double before.
 constexpr Extended kRounding = static_cast<Extended>(std::numeric_limits<double>::epsilon());
 using ExtendedMatrix = Eigen::Matrix<Extended, Eigen::Dynamic, Eigen::Dynamic>;
 using ExtendedVector = Eigen::Matrix<Extended, Eigen::Dynamic, 1>;

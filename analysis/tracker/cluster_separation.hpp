@@ -5,7 +5,7 @@ namespace dashpot::analysis {
 
 /// Separates two blocks that Newton's method cannot tell apart, by dividing the space of their
 /// columns into two invariant planes again (a plane and a line with a zero mode, lines of two).
-/// Of the divisions that there are, each new block has most of the old one whose index it gets. In
+/// In the division that is chosen, each new block has most of the old one whose index it gets. In
 /// a basis of one side the blocks are orthonormal, and of real eigenvalues the two of opposite sign
 /// characteristic that are nearest each other share a block, because only such a pair can meet and
 /// turn complex. Zero modes of such a basis are separated all at once.

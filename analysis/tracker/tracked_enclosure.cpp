@@ -108,12 +108,12 @@ class ErrorSizes {
     return gamma_ * (a_[k] * (four(b_, j) + four(a_rate_, j)) + b_[k] * four(a_, j) +
                      m_[k] * (c_ * four(m_, j) + four(m_rate_, j)));
   }
-  /// Of block columns j to j + 3 of G.
+  /// Error of block columns j to j + 3 of G.
   Vec4d of_columns(int j) const {
     return gamma_ * (all_a_ * (four(b_, j) + four(a_rate_, j)) + all_b_ * four(a_, j) +
                      all_m_ * (c_ * four(m_, j) + four(m_rate_, j)));
   }
-  /// Of all of G, of block row i of N, and of all of N.
+  /// Errors of all of G, of block row i of N, and of all of N.
   double of_G() const {
     return gamma_ * (all_a_ * (2 * all_b_ + all_a_rate_) + all_m_ * (c_ * all_m_ + all_m_rate_));
   }

@@ -24,11 +24,11 @@ class TwoSidedErrors {
     const auto k = static_cast<std::size_t>(i);
     return gamma_ * (a_[k] * four(x_, j) + b_[k] * four(f_, j) + p_[k] * four(m_, j));
   }
-  /// Of block columns j to j + 3 of G.
+  /// Error of block columns j to j + 3 of G.
   Vec4d of_columns(int j) const {
     return gamma_ * (all_a_ * four(x_, j) + all_b_ * four(f_, j) + all_p_ * four(m_, j));
   }
-  /// Of all of G, of block row i of N, and of all of N.
+  /// Errors of all of G, of block row i of N, and of all of N.
   double of_G() const { return gamma_ * (all_a_ * all_x_ + all_b_ * all_f_ + all_p_ * all_m_); }
   double of_N(int i) const {
     const auto k = static_cast<std::size_t>(i);
@@ -43,7 +43,7 @@ class TwoSidedErrors {
   double gamma_;
   bool in_range_ = false;
   Blocks a_{}, b_{}, p_{};  ///< of rows
-  /// Of columns: x + z |Lambda|, f, and (|C| + |M| |Lambda|) e.
+  /// For each column: x + z |Lambda|, f, and (|C| + |M| |Lambda|) e.
   Blocks x_{}, f_{}, m_{};
   double all_a_ = 0, all_b_ = 0, all_p_ = 0, all_x_ = 0, all_f_ = 0, all_m_ = 0, all_z_ = 0,
          all_momenta_ = 0;  ///< of all rows or columns; the last one is of |M| e

@@ -20,8 +20,8 @@ std::string count(Eigen::Index n, const std::string& what) {
   return (n == 0 ? "no" : std::to_string(n)) + " " + what + (n == 1 ? "" : "s");
 }
 
-/// What follows the real part of the first eigenvalue: the imaginary part of a complex pair, or the
-/// second of two real ones.
+/// Returns what follows the real part of the first eigenvalue: the imaginary part of a complex
+/// pair, or the second of two real ones.
 std::string second_eigenvalue(const analysis::Mode<>& mode) {
   const analysis::Complex first = mode.eigenvalues[0];
   if (first.imag() == 0) return format_number(mode.eigenvalues[1].real(), 6);

@@ -57,7 +57,7 @@ std::string modes_table(const AuditTask& task, const controller::PostureAudit& p
   return table.text();
 }
 
-/// What is not known because the model has no rotors; empty if it has.
+/// Returns what is not known because the model has no rotors; empty if it has.
 std::string rotors_table(const AuditTask& task, const controller::PostureAudit& posture) {
   const controller::RobotModel& model = task.model;
   const std::string missing = controller::missing_rotors_text(model);
@@ -92,7 +92,7 @@ std::string rotors_table(const AuditTask& task, const controller::PostureAudit& 
          "\n";
 }
 
-/// What a gain margin means. A loop whose rotors are not told is not called unstable.
+/// Returns what a gain margin means. A loop whose rotors are not told is not called unstable.
 std::string margin_verdict(const AuditTask& task, double margin) {
   if (margin >= 1) return "stiffness and damping may grow by it together.\n";
   return controller::unknown_rotors(task.model).any()

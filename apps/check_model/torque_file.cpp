@@ -61,7 +61,7 @@ Quantity quantity_of(const MotionChannel& channel) {
   return Quantity::kOther;
 }
 
-/// What was measured comes before what was commanded, and that before what is estimated.
+/// Returns the rank of a column: measured torques come first, then commanded, then estimated ones.
 int rank_of(const std::string& name) {
   const std::vector<std::string> words = words_of(name);
   if (has_any(words, {"ext", "external"})) return 2;

@@ -45,7 +45,7 @@ nlohmann::ordered_json drives_json(const std::string& name);
 /// Refuses the name "".
 CLI::Validator not_empty();
 
-/// What is wrong with a model, with the options of the command line.
+/// Returns what is wrong with a model, with the options of the command line.
 controller::InputError model_error(const controller::InvalidModel& error);
 
 }  // namespace dashpot::apps

@@ -24,7 +24,7 @@ Eigen::VectorXd quantities_per_joint(const std::string& option, const std::strin
 CLI::Validator quantity(const std::string& unit, double least, double most,
                         const std::string& what);
 
-/// The same for any positive quantity.
+/// Accepts any positive quantity.
 CLI::Validator positive(const std::string& unit, const std::string& what);
 
 }  // namespace dashpot::apps

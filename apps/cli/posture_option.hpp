@@ -39,7 +39,7 @@ struct PosturesOption {
   bool any() const { return !file.empty() || !log.empty() || samples > 0; }
   /// Throws InputError for options that do not go together.
   void check() const;
-  /// Those of the file or of the log; none for samples. Throws InputError.
+  /// Returns the postures of the file or of the log; none for samples. Throws InputError.
   std::vector<controller::JointVector> listed(const PostureOption& one,
                                               const controller::RobotModel& model) const;
   /// The range of the samples around q: position limits, within the spread. Throws InputError.

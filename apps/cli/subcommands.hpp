@@ -39,7 +39,7 @@ void add_fake_driver(CLI::App& program);
 /// messages hold names that others chose). Throws std::runtime_error if that fails.
 void print(const std::string& text);
 
-/// The same with escape sequences of our own: nothing in `text` may come from elsewhere unless
+/// Prints text with escape sequences of our own: nothing in `text` may come from elsewhere unless
 /// text::printable() was applied to it.
 void print_styled(const std::string& text);
 

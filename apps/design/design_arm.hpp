@@ -34,7 +34,7 @@ struct ArmOptions {
 /// The arm with its payload, reflected inertia, and the friction that counts. Throws InputError.
 controller::RobotModel read_model(const ArmOptions& options);
 
-/// What counts of friction, or is left out, in a sentence; empty if there is none.
+/// Returns what counts of friction, or is left out, in a sentence; empty if there is none.
 std::string friction_note(const ArmOptions& options, const controller::RobotModel& model);
 
 /// The arm with its springs at q, as a file would give it: mass, jacobian (6 x n, base-aligned axes

@@ -11,7 +11,7 @@ namespace dashpot::apps {
 /// (`payload`, per kg) where it has six rows, and by each joint's inertia and friction.
 nlohmann::ordered_json sensitivity_json(const DesignReport& report);
 
-/// The same for people: percent by one percent of diagonal entries, by 1 kg of payload, and by
+/// Writes them for people: percent by one percent of diagonal entries, by 1 kg of payload, and by
 /// inertia and friction in the joints.
 std::string sensitivity_text(const DesignReport& report);
 

@@ -34,7 +34,7 @@ Json to_value(const DampingMiss& miss) {
           {"reason", analysis::to_text(miss.reason)}};
 }
 
-/// What is said of a loop and its margin, but for what follows from them.
+/// Returns what is said of a loop and its margin, but for what follows from them.
 Json limit_value(const analysis::LoopLimit& limit, double gain_margin) {
   return {
       {"period", limit.loop.period},        {"delay", limit.loop.delay},

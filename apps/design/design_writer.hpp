@@ -10,8 +10,8 @@ std::string design_json(const std::vector<DesignReport>& reports, bool as_list);
 std::string design_table(const std::vector<DesignReport>& reports, bool as_list);
 std::string region_json(const RegionReport& report);
 std::string region_table(const RegionReport& report);
-/// What the answer lacks of what was asked: less than a tenth of the ratio somewhere, or more than
-/// is allowed. Empty if neither.
+/// Returns what the answer lacks of what was asked: less than a tenth of the ratio somewhere, or
+/// more than is allowed. Empty if neither.
 std::string region_complaint(const RegionReport& report);
 /// The map of the worst mode, a line for each configuration after one of headings.
 std::string region_csv(const RegionReport& report);

@@ -38,7 +38,7 @@ sim::PlantOptions plant_options(const Scene& scene) {
   return options;
 }
 
-/// What both drivers have for a low-pass: y += gain (u - y) once a period.
+/// Returns the gain of the low-pass that both drivers have: y += gain (u - y) once a period.
 double low_pass_gain(double cutoff, double period) {
   return period / (period + 1 / (2 * std::numbers::pi * cutoff));
 }

@@ -39,7 +39,7 @@ class FakeDriver {
   void take(const void* data, std::size_t size, std::int64_t utime);
   /// Moves the robot by one period, with the time at its end.
   void step(std::int64_t utime);
-  /// What the driver reports now.
+  /// Returns what the driver reports now.
   lcmtypes::DriverStatus status(std::int64_t utime) const;
 
   double time() const noexcept { return plant_->time(); }
@@ -49,12 +49,13 @@ class FakeDriver {
   std::int64_t uncommanded() const noexcept { return uncommanded_; }
 
  private:
-  /// What acts in this period: a torque acts `delay` periods after the status that it answers.
+  /// Returns what acts in this period: a torque acts `delay` periods after the status that it
+  /// answers.
   JointVector torque(std::int64_t utime);
   JointVector torque_of_iiwa(bool counts) const;
   /// Through the Panda's low-pass and rate limit.
   JointVector filtered(const JointVector& torque);
-  /// Of what the driver does without commands: it holds, or damps.
+  /// Returns the torque of a driver without commands: it holds, or damps.
   JointVector resting_torque();
   bool has_springs() const noexcept;
 

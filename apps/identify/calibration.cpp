@@ -243,7 +243,7 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
     CalibratedParameter& one = parameters.list[static_cast<std::size_t>(i)];
     one.value = x[i];
     one.std = std::sqrt(covariance(i, i));
-    // Of what does not fit, deviations say nothing.
+    // Deviations say nothing of a parameter that does not fit.
     one.determined = result.consistent && one.std < 0.2 * parameters.prior[i];
   }
   for (Index i = 0; i < p; ++i) {

@@ -63,7 +63,7 @@ std::optional<Conversion> to_si(const std::string& unit) {
   return std::nullopt;
 }
 
-/// What a name without a unit is measured in, by the letters it begins with.
+/// Returns what a name without a unit is measured in, by the letters it begins with.
 std::string usual_unit(const std::string& name) {
   const std::string letters = name.substr(0, name.find_first_of("0123456789_.[( "));
   const auto is_any = [&letters](std::initializer_list<const char*> names) {

@@ -202,7 +202,7 @@ class Task {
     return false;
   }
 
-  /// What a record shows; where that has no modes, the report says why.
+  /// Returns what a record shows; where that has no modes, the report says why.
   MotionKind kind_of(const MotionRecord& record, bool driven, const std::vector<bool>& free) {
     const analysis::MotionVerdict verdict = analysis::judge_motion(record);
     const bool large = is_large(record);

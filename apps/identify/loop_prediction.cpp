@@ -28,7 +28,7 @@ JointVector sum_of(const JointVector& before, const VectorXd& added, Index n) {
   return sum;
 }
 
-/// What the robot's file and configuration say of its joints.
+/// Returns what the robot's file and configuration say of its joints.
 JointVector joint_friction(const controller::Config& config) {
   return config.model.joint_values(&controller::Joint::viscous_friction);
 }

@@ -26,8 +26,8 @@ struct MotionFile {
   /// for CSV files.
   std::vector<bool> free;
   std::vector<bool> rests;  ///< the same, whatever the wrench does
-  /// Of a log whose springs are at the joints throughout: the tip's wrench is that of an excitation
-  /// alone, and in channels wrench_x ... wrench_rz.
+  /// True of a log whose springs are at the joints throughout: the tip's wrench is then that of an
+  /// excitation alone, and in channels wrench_x ... wrench_rz.
   bool wrench = false;
   std::vector<std::string> notes;  ///< what was guessed or left out
   int duplicates = 0;              ///< samples left out because another has the same time

@@ -34,7 +34,7 @@ struct InspectOptions {
   bool json = false;
 };
 
-/// Of joint space, in the units of revolute and prismatic joints; zeros if `text` is empty.
+/// Returns a number for each joint, in the units of its type; zeros if `text` is empty.
 JointVector joint_list(const std::string& option, const std::string& text, const RobotModel& model,
                        const char* revolute, const char* prismatic) {
   if (text.empty()) return JointVector::Zero(model.dof());
@@ -78,7 +78,7 @@ const char* to_text(controller::JointType type) {
   return "";
 }
 
-/// What the file says of the joints; null where it sets no limit.
+/// Returns what the file says of the joints; null where it sets no limit.
 nlohmann::ordered_json json_joints(const RobotModel& model) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   const auto limit = [](double value) {
@@ -207,7 +207,7 @@ std::string tip_table(const DynamicsResult& dynamics) {
   return table.text();
 }
 
-/// What is known of the rotors, and from where.
+/// Returns what is known of the rotors, and from where.
 std::string rotors_text(const InspectOptions& options, const RobotModel& model) {
   std::string text;
   if (!options.drives.empty()) {

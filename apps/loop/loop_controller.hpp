@@ -24,11 +24,11 @@ class LoopController {
   virtual std::int32_t update(std::int64_t time, const JointVector& q, const JointVector& qd,
                               const controller::Setpoint* setpoint,
                               JointVector& torque) noexcept = 0;
-  /// Of the last tick.
+  /// Returns the snapshot of the last tick.
   virtual const dashpot_snapshot& snapshot() noexcept = 0;
-  /// Those that are newer than what was returned last; null if there are none.
+  /// Returns modes that are newer than those returned last; null if there are none.
   virtual const dashpot_modes* new_modes() noexcept = 0;
-  /// Likewise of the sampled loop.
+  /// Does the same for the sampled loop.
   virtual const dashpot_sampled_modes* new_sampled_modes() noexcept { return nullptr; }
 
   /// Before the loop begins, with the robot at rest at q. Returns DASHPOT_OK, or the code of a
@@ -37,11 +37,11 @@ class LoopController {
   /// The springs and dampers from the next tick on. Returns as start(); with DASHPOT_OK `reason`
   /// says what to be warned of, or nothing.
   virtual std::int32_t set_gains(const controller::Gains& gains, std::string& reason) = 0;
-  /// What the arm carries from the next tick on, where T is in the tip link, and with which gains,
-  /// if there are new ones. Returns as set_gains().
+  /// Sets what the arm carries from the next tick on, where T is in the tip link, and the gains
+  /// for it, if there are new ones. Returns as set_gains().
   virtual std::int32_t set_payload(const controller::Payload& payload, const controller::Pose& tool,
                                    const controller::Gains* gains, std::string& reason) = 0;
-  /// How fast the tip may be from the next tick on. Returns as start().
+  /// Sets how fast the tip may be from the next tick on. Returns as start().
   virtual std::int32_t limit_tip_speed(const controller::TipSpeed& speed, std::string& reason) = 0;
   /// Whether the controller would go there, with these gains, from q; for one that is in no loop.
   /// Returns as start().

@@ -19,7 +19,7 @@ struct Extremes {
 /// A scene in motion: a controller and the simulated mechanism, one period at a time:
 ///     ClosedLoop loop(scene, controller);
 ///     while (...) { loop.follow_scenario(); loop.control(); loop.move(); }
-/// The same calls give the same bits. Only the constructor throws.
+/// Equal calls give equal bits. Only the constructor throws.
 ///
 /// The constructor brings the robot to its start as a person would: a hand holds it at rest where
 /// the springs are fixed until the controller's torque has settled, guides it slowly to where it is
@@ -42,7 +42,7 @@ class ClosedLoop {
   std::int32_t control() noexcept;
   /// The robot's part: one period under that torque.
   sim::Status move() noexcept;
-  /// What the scenario, or a command in its place, wants.
+  /// Returns what the scenario, or a command in its place, wants.
   LoopGoal& goal() noexcept { return goal_; }
 
   // Another thread:
@@ -85,7 +85,7 @@ class ClosedLoop {
   // Between the threads:
   std::atomic<std::size_t> due_steps_{0};  ///< steps whose time has come
 
-  // Of the thread that follows the scenario's gains:
+  // For the thread that follows the scenario's gains:
   std::size_t followed_steps_ = 0;
   int refused_steps_ = 0;
   std::string refusal_;

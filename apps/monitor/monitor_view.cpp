@@ -94,7 +94,7 @@ std::string place(const double (&p)[3]) {
   return " at (" + fixed(p[0], 3) + ", " + fixed(p[1], 3) + ", " + fixed(p[2], 3) + ") m";
 }
 
-/// What the arm carries, where its tool is, and the damping ratios that are held.
+/// Returns what the arm carries, where its tool is, and the damping ratios that are held.
 std::string told(const state_t& state) {
   std::string text = "payload " + format_number(state.payload_mass, 4) + " kg";
   if (state.payload_mass != 0) text += place(state.payload_center);

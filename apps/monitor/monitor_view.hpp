@@ -28,9 +28,9 @@ class MonitorView {
 
   /// Everything, as a screen of text. `bold` marks headings for a terminal.
   std::string screen(bool bold) const;
-  /// The same on one line, ended by a newline.
+  /// Returns the state on one line, ended by a newline.
   std::string line() const;
-  /// What all messages add up to, and the modes at the end; `malformed` were not shown.
+  /// Returns what all messages add up to, and the modes at the end; `malformed` were not shown.
   std::string summary(std::int64_t malformed) const;
 
  private:

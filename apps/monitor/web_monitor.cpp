@@ -12,7 +12,7 @@
 namespace dashpot::apps {
 namespace {
 
-/// What `open` returns; a failure is bad input of the option.
+/// Returns what `open` returns; a failure is bad input of the option.
 template <class Open>
 auto from_option(const std::string& option, const Open& open) {
   try {

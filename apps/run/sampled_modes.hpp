@@ -12,7 +12,8 @@ struct SampledModes {
   double gain_margin = 0;  ///< of all gains together, see analysis::gain_margin
 };
 
-/// Of a scene with an arm; friction and gravity are those that the controller believes in.
+/// Finds the modes of a scene with an arm; friction and gravity are those that the controller
+/// believes in.
 SampledModes sampled_modes(const Scene& scene);
 
 }  // namespace dashpot::apps

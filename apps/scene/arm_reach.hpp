@@ -16,8 +16,8 @@ struct TipGoal {
   controller::Vector6 selected = controller::Vector6::Ones();
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
 
-  /// What is missing at `tip`, in the selected directions: m, and a rotation vector in rad; base
-  /// axes.
+  /// Returns what is missing at `tip`, in the selected directions: m, and a rotation vector in rad;
+  /// base axes.
   controller::Vector6 miss(const controller::DynamicsResult& tip) const {
     controller::Vector6 error;
     error << pose.position - tip.p_BT_B,

@@ -11,7 +11,7 @@ using controller::kPositive;
 using controller::Units;
 using controller::YamlMapping;
 
-/// What the sensors show wrongly. Whether anything.
+/// Reads what the sensors show wrongly. Returns whether anything.
 bool read_sensor_fault(const YamlMapping& keys, const Units& positions, sim::SensorFault& fault) {
   const auto n = static_cast<Eigen::Index>(positions.size());
   if (keys.has("position_offset")) {

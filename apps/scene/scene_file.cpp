@@ -15,7 +15,7 @@ using controller::Units;
 using controller::YamlMapping;
 using controller::YamlNode;
 
-/// What the controller believes of the robot, which is true unless `simulation.robot` says
+/// Returns what the controller believes of the robot, which is true unless `simulation.robot` says
 /// otherwise.
 sim::RobotParameters believed(const controller::Config& config) {
   const controller::ModelOptions& options = config.robot.options;

@@ -11,7 +11,7 @@
 namespace dashpot::controller {
 namespace {
 
-/// Those of the loop that is judged.
+/// Returns the settings of the loop that is judged.
 Settings judging(Settings settings) {
   settings.task_terms = {};
   settings.environment.tip_stiffness = settings.environment.tip_damping = Vector6::Zero();

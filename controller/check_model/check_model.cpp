@@ -207,7 +207,7 @@ class Fitting {
     return best;
   }
 
-  /// What is said of a hypothesis whose columns were added; "" if it is not significant.
+  /// Returns what is said of a hypothesis whose columns were added; "" if it is not significant.
   std::string reason_for(const Hypothesis& hypothesis, Index first, const RobustFit& before) const {
     const auto count = static_cast<Index>(hypothesis.columns.size());
     double largest = 0;
@@ -397,7 +397,7 @@ class Fitting {
     report_contacts(check);
   }
 
-  /// Of a joint that hardly moves: an offset alone, with which static friction may be mixed.
+  /// Reports a joint that hardly moves: an offset alone, which may contain static friction.
   void report_resting(Index j, JointCheck& joint) const {
     VectorXd rest(K_), explained(K_);
     const Index shared = fit_.A.cols() - 3 * n_;

@@ -21,8 +21,9 @@ struct Hypothesis {
 std::vector<Hypothesis> list_hypotheses(const RobotDescription& robot, const RobotModel& model,
                                         const WeakForm& form, const Eigen::MatrixXd& model_torque);
 
-/// What a unit of mass (1), first moment (3) and inertia about the origin (6: xx yy zz xy xz yz),
-/// fixed to the tip link of `model`, takes in torques, n x K each: the first `count` of them.
+/// Returns what a unit of mass (1), first moment (3) and inertia about the origin (6: xx yy zz xy
+/// xz yz), fixed to the tip link of `model`, takes in torques, n x K each: the first `count` of
+/// them.
 std::vector<Eigen::MatrixXd> body_columns(const RobotModel& model, const WeakForm& form,
                                           std::size_t count);
 

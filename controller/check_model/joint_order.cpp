@@ -39,7 +39,7 @@ struct Guess {
   double score;
 };
 
-/// What is left of y after an offset and friction that brakes, as a share of `whole`.
+/// Returns what is left of y after an offset and friction that brakes, as a share of `whole`.
 double left_over(const VectorXd& y, const VectorXd& sign, const VectorXd& velocity, double whole) {
   MatrixXd A(y.size(), 3);
   A << VectorXd::Ones(y.size()), sign, velocity;

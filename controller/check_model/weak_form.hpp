@@ -36,8 +36,8 @@ class WeakForm {
   /// -integral f' qd: what a unit of reflected inertia takes.
   Eigen::MatrixXd acceleration() const;
 
-  /// What friction does at a velocity that exceeds its noise: integral f s(qd) and integral f qd,
-  /// with s = -1, 0 or 1, straight between -v0 and v0.
+  /// Returns what friction does at a velocity that exceeds its noise: integral f s(qd) and integral
+  /// f qd, with s = -1, 0 or 1, straight between -v0 and v0.
   Eigen::MatrixXd sign(const Eigen::VectorXd& v0) const;
   Eigen::MatrixXd velocity() const;
 

@@ -13,7 +13,7 @@
 namespace dashpot::controller {
 namespace {
 
-/// What stands before the last dot of a key, and what stands behind it.
+/// Returns what stands before the last dot of a key, and what stands behind it.
 std::pair<std::string, std::string_view> split(std::string_view key) {
   const std::size_t dot = key.rfind('.');
   return {std::string(key.substr(0, dot)), key.substr(dot + 1)};

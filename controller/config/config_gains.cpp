@@ -20,7 +20,7 @@ void require_pair(const YamlMapping& keys) {
   }
 }
 
-/// Of `damping`, which was read already, and `damping_ratio`, the one given ends the other.
+/// Reads `damping_ratio`: it and `damping`, which was read before, end each other.
 void read_ratio(const YamlMapping& keys, double& ratio) {
   if (keys.has("damping")) ratio = 0;
   if (!keys.has("damping_ratio")) return;

@@ -29,7 +29,7 @@ double half_trace(const KDL::RigidBodyInertia& body) {
   return 0.5 * std::abs(I.data[0] + I.data[4] + I.data[8]);
 }
 
-/// Of those of one joint; null if there is none.
+/// Returns the heaviest link of these joints; null if there is none.
 const MovedLink* heaviest(const std::vector<MovedLink>& links, int first_joint, int last_joint) {
   const MovedLink* found = nullptr;
   for (const MovedLink& link : links) {

@@ -56,7 +56,7 @@ std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::
   } catch (const std::exception& error) {
     throw InvalidModel(one_line(name + ": " + error.what()));
   }
-  // Of a number that it cannot read, urdfdom just says so and goes on.
+  // If urdfdom cannot read a number, it only says so and goes on.
   if (!model || messages.any()) throw InvalidModel(one_line(name + ": " + messages.errors()));
   return model;
 }

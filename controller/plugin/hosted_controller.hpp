@@ -47,11 +47,11 @@ struct HostedController {
   Latest<Snapshot> snapshots;    ///< back
   Latest<Vibration> vibrations;  ///< likewise
 
-  // Of the other thread:
+  // For the other thread:
   Request request;
   const SampledVibration* sampled() noexcept { return controller_.sampled_vibration(); }
 
-  // Of the real-time thread:
+  // For the real-time thread:
   Status update(const dashpot_state* given, const dashpot_setpoint* wanted,
                 JointVector& torque) noexcept;
   /// Without entries: the last torque acts.

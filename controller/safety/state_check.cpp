@@ -9,7 +9,7 @@ namespace dashpot::controller {
 namespace {
 
 constexpr double kFarthest = 1e6;  // rad (m): no joint gets there, and turns cannot be told there
-// Of follows:
+// For follows():
 constexpr double kFaster = 2;         // times a velocity limit: a robot may exceed it a little
 constexpr double kResolution = 1e-3;  // rad (m): coarse encoders
 constexpr double kApart = 0.5;        // of the larger velocity: what a blow within a tick explains
@@ -17,11 +17,11 @@ constexpr double kJolt = 0.5;         // of a velocity limit, at once: noise, an
 constexpr double kJoltRate = 10;      // of a velocity limit in a second
 constexpr double kBlow = 3;           // a third of a change of velocity has to show in the position
 
-// Of wrong_rate: long enough for the jitter of a loop that is not in real time.
+// For wrong_rate(): long enough for the jitter of a loop that is not in real time.
 constexpr int kIntervals = 50;
 constexpr double kFastest = -1.0 / 3, kSlowest = 0.5;  // mean interval / period - 1
-// Of contradictory: in half a second a joint at a hundredth of its usual speed moves further than
-// the tolerance, and no filter of velocities lags behind for so long.
+// For contradictory(): in half a second a joint at a hundredth of its usual speed moves further
+// than the tolerance, and no filter of velocities lags behind for so long.
 constexpr double kUnexplained = 0.3;       // of what was travelled
 constexpr double kAngleTolerance = 0.02;   // rad
 constexpr double kSlideTolerance = 0.005;  // m

@@ -47,7 +47,7 @@ std::optional<JointVector> enough_reflected_inertia(
     const std::function<bool(const RobotModel&)>& keeps) {
   const UnknownRotors unknown = unknown_rotors(model);
   if (!unknown.any()) return std::nullopt;
-  // Of an arm with elastic joints the links come first: the joints without inertia are rigid.
+  // In an arm with elastic joints the links come first: the joints without inertia are rigid.
   const Eigen::VectorXd resists = loop.mass.inverse().diagonal().head(model.dof()).cwiseInverse();
   JointVector demand = JointVector::Zero(model.dof());
   double first = std::numeric_limits<double>::infinity(), largest = 0;

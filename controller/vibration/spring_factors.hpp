@@ -38,7 +38,7 @@ class SpringFactor {
 /// Stacked rows of n numbers, which can be reduced to n rows.
 class FactorRows {
  public:
-  /// Of the tip in two frames, null space and joints; a multiple of a line of the cache.
+  /// Rows for the tip in two frames, null space and joints; a multiple of a line of the cache.
   static constexpr int kMost = 2 * kMaxJoints + 16;
 
   int size() const noexcept { return size_; }

@@ -23,7 +23,7 @@ class VibrationThread;
 /// change.)
 class VibrationAnalysis {
  public:
-  /// Of systems with so many coordinates.
+  /// Analyses systems with so many coordinates.
   VibrationAnalysis(const Settings& settings, int coordinates);
   ~VibrationAnalysis();
   VibrationAnalysis(const VibrationAnalysis&) = delete;

@@ -84,7 +84,7 @@ class TreeBuilder : public YAML::EventHandler {
   }
 
  private:
-  /// Of a node with all that is in it.
+  /// The size of a node with all that is in it.
   struct Size {
     std::size_t values = 0;
     std::size_t text = 0;  ///< bytes

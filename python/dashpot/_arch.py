@@ -9,7 +9,7 @@ import platform
 import sys
 
 _FAST = "x86-64-v3"
-# Of the processor that x86-64-v3 means beyond x86-64-v2, as Linux calls them.
+# Features that x86-64-v3 means beyond x86-64-v2, as Linux calls them.
 _FEATURES = {"avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "abm", "movbe", "xsave"}
 
 

@@ -86,7 +86,7 @@ def test_libfranka():
 def test_mujoco():
     if not (ROOT / "build/release/libdashpot_mujoco.so").exists():
         pytest.skip("libdashpot_mujoco.so was not built (DASHPOT_MUJOCO)")
-    assert follow("mujoco.md", "An arm of somebody else's in five commands",
+    assert follow("mujoco.md", "An arm from MuJoCo Menagerie in five commands",
                   ["mujoco", "franky_sim"]) == 1
 
 

@@ -160,7 +160,7 @@ def excited(seed):
 
 
 RECORDS = {"decays": decay, "ambient": ambient, "excited": excited}
-# Of a mode that is found, relative, of its eigenvalue.
+# Largest relative error of the eigenvalue of a mode that counts as found.
 NEAR = {"decays": 0.1, "ambient": 0.2, "excited": 0.1}
 
 

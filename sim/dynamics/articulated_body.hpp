@@ -29,13 +29,13 @@ class ArticulatedBody {
   /// A wrench that the world exerts on the tip link: force (N) at the tip's origin and moment (N
   /// m), in the base's axes.
   void push_tip(const Vector6& wrench) noexcept;
-  /// The same for a force (N) at the tip's origin.
+  /// Adds a force (N) at the tip's origin.
   void push_tip(const Eigen::Vector3d& force) noexcept;
   /// qdd (rad/s^2). Not finite if a joint moves no inertia. Call it once after move_to.
   void accelerations(const double* tau, double* qdd) noexcept;
 
   // Results of move_to:
-  /// Of the tip in the base.
+  /// Returns the pose of the tip in the base.
   Pose tip_pose() const noexcept;
   /// p_BT_B, m
   Eigen::Vector3d tip_position() const noexcept;

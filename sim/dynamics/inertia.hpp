@@ -10,23 +10,23 @@ struct Inertia {
   Eigen::Matrix3d about_center = Eigen::Matrix3d::Zero();  ///< kg m^2
 };
 
-/// Of c in a, from that of b in a and of c in b.
+/// Returns the pose of c in a, from the pose of b in a and of c in b.
 inline Pose operator*(const Pose& a, const Pose& b) {
   return {a.position + a.rotation * b.position, a.rotation * b.rotation};
 }
 
-/// The same body, seen from the frame in which its own frame has this pose.
+/// Returns the inertia seen from the frame in which the body's frame has this pose.
 inline Inertia operator*(const Pose& pose, const Inertia& body) {
   return {body.mass, pose.position + pose.rotation * body.center,
           pose.rotation * body.about_center * pose.rotation.transpose()};
 }
 
-/// Of a mass about a point that is off it by r: m (r.r 1 - r r').
+/// Returns the inertia of a mass about a point that is off it by r: m (r.r 1 - r r').
 inline Eigen::Matrix3d parallel_axes(double mass, const Eigen::Vector3d& r) {
   return mass * (r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose());
 }
 
-/// Of two bodies joined rigidly.
+/// Returns the inertia of two bodies joined rigidly.
 inline Inertia operator+(const Inertia& a, const Inertia& b) {
   const double mass = a.mass + b.mass;
   if (mass == 0) return {0, Eigen::Vector3d::Zero(), a.about_center + b.about_center};

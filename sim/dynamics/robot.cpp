@@ -128,7 +128,8 @@ class Reader {
     return pose_of(joint.parent_to_joint_origin_transform, at(joint));
   }
 
-  /// Of the link and all that hangs on it, but for the joint `left_out`; in the link's axes.
+  /// Returns the inertia of the link and all that hangs on it, but for the joint `left_out`; in the
+  /// link's axes.
   Inertia lumped(const urdf::Link& link, const urdf::Joint* left_out) const {
     Inertia sum;
     std::vector<std::pair<const urdf::Link*, Pose>> open = {{&link, Pose()}};  // pose in `link`
@@ -237,7 +238,7 @@ Matrix3d frame_on(const Vector3d& axis) {
 /// The moving joints along the path; returns the pose of its last link in the last one's body.
 Pose read_chain(const Reader& reader, const std::vector<urdf::JointConstSharedPtr>& path,
                 std::vector<Joint>& joints) {
-  // Of the link reached so far in the last moving joint's body, or in the base.
+  // The pose of the link reached so far in the last moving joint's body, or in the base.
   Pose link_in_body;
   for (std::size_t i = 0; i < path.size(); ++i) {
     const urdf::Joint& read = *path[i];

@@ -26,7 +26,7 @@ SampledLoop random_loop(Random& random) {
   return loop;
 }
 
-/// Of y'' + d y' + omega^2 y = 0.
+/// Returns the gain margin of y'' + d y' + omega^2 y = 0.
 double margin_of(double omega, double d, const SampledLoop& loop) {
   System<> system(1);
   system.mass(0, 0) = 1;

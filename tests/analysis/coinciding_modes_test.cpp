@@ -65,7 +65,7 @@ TEST(CoincidingModes, ArePartedWhenTheyDiffer) {
   for (std::size_t i = 0; i < 6; ++i) EXPECT_GT(frequencies[i + 1], 1.01 * frequencies[i]);
 }
 
-/// Those of one ratio near 1 and different frequencies do not coincide, although steps are large.
+/// Modes of one ratio near 1 and different frequencies do not coincide, although steps are large.
 TEST(CoincidingModes, AreNotSeenInModesOfOneRatio) {
   Dice dice(5);
   const MatrixXd T = dice.congruence(7, 3), turn = dice.matrix(7, 7);

@@ -71,8 +71,8 @@ TEST(DampingDesign, GivesEveryModeOfRandomArmsItsRatio) {
   EXPECT_GT(redundant, kSystems / 4);
 }
 
-/// Of inertia and stiffness, in task space and in joint space; so it goes along with a change of
-/// task coordinates.
+/// The mean is of inertia and stiffness, in task space and in joint space; so it follows a change
+/// of task coordinates.
 TEST(DampingDesign, IsTheGeometricMeanOfInertiaAndStiffness) {
   Random random(7002);
   const DampingTarget target = DampingTarget::constant(0.7);

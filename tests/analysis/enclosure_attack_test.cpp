@@ -66,7 +66,7 @@ TEST(EnclosureAttack, ComplexPairsOfZeroModesAreListed) {
   for (const double rate : spectrum.zero_mode_rates) EXPECT_TRUE(std::isnan(rate));
 }
 
-// Of a fast pair of zero modes and a slow growing mode, the mode was the one left out.
+// Beside a fast pair of zero modes, a slow growing mode was left out.
 TEST(EnclosureAttack, ComplexPairsOfZeroModesHideNoMode) {
   MatrixXd damping = MatrixXd::Zero(3, 3), stiffness = MatrixXd::Zero(3, 3);
   damping(0, 1) = 100;

@@ -172,7 +172,7 @@ TEST(IdentifyDecays, TellsProductsOfStrongMotionsFromModes) {
   EXPECT_EQ(found.order, 4);
   EXPECT_TRUE(found.rejected.empty());
   EXPECT_LT(found.noise.maxCoeff(), 1.5e-6);
-  // Of unlike length, and with samples missing in one channel.
+  // The records differ in length, and samples are missing in one channel.
   records[1] = part_of(records[1], 0, 800);
   for (Index i = 0; i < records[0].time.size(); i += 7) {
     records[0].output(1, i) = std::numeric_limits<double>::quiet_NaN();
@@ -352,7 +352,7 @@ TEST(IdentifyDecays, DeviationsHoldWhatALargerModelThinks) {
   EXPECT_GE(compared, 2);
 }
 
-/// Of two arms whose search gets lost among factors that cancel each other.
+/// The search of two arms gets lost among factors that cancel each other.
 TEST(IdentifyDecays, FindsMostModesWhereASearchGotLost) {
   std::size_t found = 0;
   for (const int number : {56, 61}) {

@@ -163,7 +163,7 @@ TEST(SampledLoop, SaysWhatAlternates) {
   EXPECT_NEAR(slow.eigenvalues[1].real(), -196.9, 0.1);  // -194.9, faster by its square times T/2
 }
 
-/// Of two negative z the larger is the mode's.
+/// The larger of two negative z is the mode's.
 TEST(SampledLoop, AlternatesAtTheSlowerOfTwoNegativeEigenvalues) {
   SampledLoop loop;
   loop.period = 1;

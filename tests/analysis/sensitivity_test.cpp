@@ -132,7 +132,7 @@ System<> random_damped(Random& random, Index n, double damping) {
   return system;
 }
 
-/// Of light damping, of heavy damping, and of coefficients that are not symmetric.
+/// The systems have light damping, heavy damping, and coefficients that are not symmetric.
 TEST(Sensitivity, MatchesDifferencesInExtendedPrecision) {
   Random random(7201);
   for (int i = 0; i < 30; ++i) {
@@ -173,7 +173,7 @@ TEST(Sensitivity, OfFrequencyAndRatioIsSmoothThroughCriticalDamping) {
   }
 }
 
-// Of a single mass: omega = sqrt(k/m), zeta = c / (2 sqrt(k m)), at critical damping too.
+// A single mass has omega = sqrt(k/m), zeta = c / (2 sqrt(k m)), at critical damping too.
 TEST(Sensitivity, OfASingleMassIsTheTextbooks) {
   for (const double c : {0.5, 8.0, 30.0}) {  // critical: 8
     System<> system(1);

@@ -113,7 +113,7 @@ TEST_P(Decays, HaveTheCurvatureOfTheirCost) {
   }
 }
 
-/// Of nothing but white noise, each parameter has a square of one on average; the stretches are
+/// In white noise alone each parameter has a square of one on average; the stretches are
 /// single samples here.
 TEST_P(Decays, HaveScoresOfTheSizeOfTheNoise) {
   constexpr int kDraws = 40;

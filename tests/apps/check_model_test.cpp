@@ -111,7 +111,7 @@ TEST(CheckModelProgram, FindsColumnsByJointNamesAndUnits) {
   const Json found = check({file, "--config", config});
   EXPECT_NEAR(found["payload"]["mass"].get<double>(), 1.3, 0.02);
   EXPECT_THAT(found["order"].dump(), "[]");
-  // The same columns without names that tell.
+  // The columns come without names that tell.
   const std::function<std::string(int)> letters = [](int j) {
     return std::string(1, static_cast<char>('a' + j));
   };

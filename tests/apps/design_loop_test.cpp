@@ -70,8 +70,8 @@ TEST(DesignForALoop, TakesTheDampingThatIsThereForTheJointsOwn) {
 
 using Complex = std::complex<double>;
 
-/// What is zero at the eigenvalues z of the mass with its springs of 800 N/m and their integral,
-/// and with the damper c, all times s: of a torque held for T = 20 ms, one tick late.
+/// Returns what is zero at the eigenvalues z of the mass with its springs of 800 N/m and their
+/// integral, and with the damper c, all times s: of a torque held for T = 20 ms, one tick late.
 Complex characteristic(Complex z, double c, double integral_time, double s) {
   const double T = 0.02, m = 2, k = 800;
   const Complex force = T * T * (z + 1.0) / 2.0 * (k * (z - 1.0) + k * T / integral_time) +

@@ -380,8 +380,8 @@ TEST(Identify, RefusesInOneLineThatNamesFileLineAndColumn) {
   }
 }
 
-/// Of four releases the payload and the reflected inertias, of which the file that is written knows
-/// as well; and what a single one cannot tell apart.
+/// Four releases give the payload and the reflected inertias, which the file that is written has
+/// as well; a single release cannot tell them apart.
 TEST(Identify, ShowsMeasuredBesidePredictedModesAndCalibrates) {
   DASHPOT_SKIP_IF_QUICK();
   const Scratch scratch;

@@ -31,7 +31,7 @@ Outcome inspect_panda(const Words& more) {
 
 constexpr const char* kUnitInertia = "ixx='1' iyy='1' izz='1'";
 
-/// Of one joint about z, `pivot`, of this kind, that moves a link of this inertia.
+/// Inspects one joint about z, `pivot`, of this kind, that moves a link of this inertia.
 Outcome inspect_text(const Scratch& scratch, const std::string& kind, const std::string& inertia,
                      const Words& more = {}) {
   const std::string urdf = scratch.write(

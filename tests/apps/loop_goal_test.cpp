@@ -180,7 +180,7 @@ TEST_F(Goal, HoldsTheSamePlaceOnTheTipLinkWithANewTool) {
       setpoint.tip_pose.position + 0.2 * setpoint.tip_pose.rotation.col(2);
   EXPECT_LT((told->tip_pose.position - moved).norm(), 1e-15);
   EXPECT_EQ(goal.tool().position.z(), 0.3);
-  // Of a tool that is refused nothing is left, and of a rejected pose the one before, of this T.
+  // A refused tool leaves nothing behind, and a rejected pose the one before, of this T.
   notes.refused = "payload";
   notes.meanwhile = nullptr;
   ASSERT_NE(goal.change({{}, {}, tool_at(0.7), {}}, reason), DASHPOT_OK);

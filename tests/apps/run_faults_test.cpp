@@ -128,7 +128,7 @@ std::vector<std::string> safety_scenes() {
 class SafetyScene : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(SafetyScene, RunsToItsEndAndAccountsForItsEnergy) {
-  // Those that need long say on standard error how far they are.
+  // Scenes that need long say on standard error how far they are.
   const Outcome outcome = run_scene(scene("safety/" + GetParam()), {"--json"});
   const Json result = Json::parse(outcome.out);
   ASSERT_EQ(outcome.status, result["fault"].is_null() ? 0 : 1) << outcome.err;

@@ -86,7 +86,7 @@ inline std::string scene(const std::string& name) {
   return std::string(DASHPOT_SOURCE_DIR) + "/sim/scenes/" + name + ".yaml";
 }
 
-/// Of a bus of this process alone, so that tests may run side by side.
+/// Returns a bus of this process alone, so that tests may run side by side.
 inline std::string own_url() {
   return "udpm://239.255.76.67:" + std::to_string(20000 + getpid() % 30000) + "?ttl=0";
 }

@@ -49,7 +49,7 @@ int main() {
     std::printf("consumer: %.4f rad/s, damping ratio %.4f\n", mode.natural_frequency,
                 mode.damping_ratio);
   }
-  // The same in fixed storage, across the library's boundary.
+  // Fixed storage gives the same, across the library's boundary.
   System<kMaxDof> fixed(2);
   fixed.stiffness = system.stiffness;
   fixed.damping = system.damping;

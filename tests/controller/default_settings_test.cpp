@@ -19,7 +19,7 @@ struct Ratios {
   int count = 0, soft = 0;
 };
 
-/// Those of the modes that are not soft, over the workspace.
+/// Returns the ratios of the modes that are not soft, over the workspace.
 Ratios ratios(const RobotModel& model, const Settings& settings, Mode mode) {
   const PostureSequence postures(settings.limits.position_lower, settings.limits.position_upper);
   PostureLoop loop(model, settings);

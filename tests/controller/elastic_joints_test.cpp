@@ -57,7 +57,7 @@ struct Matrices {
   MatrixXd M, C, K;
 };
 
-/// Of what the controller feeds back, K_c and C_c, and friction on the motors' side.
+/// Makes the matrices from what the controller feeds back, K_c and C_c, and motor-side friction.
 Matrices textbook(const RobotModel& model, const JointVector& q, const MatrixXd& K_c,
                   const MatrixXd& C_c) {
   const Index n = q.size();

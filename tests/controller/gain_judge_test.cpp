@@ -127,7 +127,7 @@ TEST_F(Judge, JudgesDesignedDampingWithoutThePayload) {
     const bool enough = margin > GainJudge::kDropped;
     EXPECT_NEAR(found.margin, enough ? 3 : margin, 1e-3 * margin);
     EXPECT_EQ(found.dropped, !enough);
-    // The same damper, but given, is judged with what is carried; so is an arm that carries
+    // This damper, but given, is judged with what is carried; so is an arm that carries
     // nothing.
     gains.joint_damping_ratio = 0;
     gains.joint_damping(0, 0) = damper;

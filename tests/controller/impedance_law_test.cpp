@@ -207,7 +207,7 @@ TEST(CartesianImpedance, IsItsEquation) {
   }
 }
 
-// Of the springs and of the feed-forward each mode gives its share while one passes into the other.
+// Each mode gives its share of springs and feed-forward while one passes into the other.
 TEST(Law, SumsTheModesByTheirWeights) {
   Random random(323);
   for (int k = 0; k < 50; ++k) {

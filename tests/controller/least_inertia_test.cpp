@@ -24,7 +24,7 @@ JointVector both(double a, double b) {
 
 class LeastInertia : public ::testing::Test {
  protected:
-  /// Of the tip, with the elbow between these angles.
+  /// Returns the least inertia of the tip, with the elbow between these angles.
   double of_elbow(double lower, double upper) const {
     return least_tip_inertia(model, both(-1, lower), both(1, upper)).linear;
   }

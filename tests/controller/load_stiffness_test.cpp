@@ -64,7 +64,7 @@ struct HeldLoad {
     references.tip.start(robot.p_BT_B + e.head<3>(),
                          quaternion(Eigen::Vector3d(e.tail<3>())) * Quaterniond(robot.R_BT));
   }
-  /// Of springs, feed-forward and world.
+  /// Returns the torque of springs, feed-forward and world.
   JointVector torque(ImpedanceLaw& law, Load load, const JointVector& there,
                      const JointVector& qd) const {
     const DynamicsResult now = at(there);
@@ -157,7 +157,7 @@ TEST(LoadStiffness, IsTheDerivativeOfAllTorques) {
   }
 }
 
-/// The same where posture springs pull that were led elsewhere: N' and J# e change with q.
+/// It holds where posture springs pull that were led elsewhere: N' and J# e change with q.
 TEST(LoadStiffness, IsTheDerivativeOfPostureSpringsToo) {
   Random random(415);
   double most = 0;

@@ -149,7 +149,7 @@ TEST(LoopSystem, HasTheSpringsOfEitherModeAndOfTwoModesAndFramesAtOnce) {
     EXPECT_EQ(rows(blend(tool, joint, s)), 7);
     EXPECT_EQ(rows(blend(base, tool, s)), 7);
     EXPECT_EQ(rows(tool), 7);
-    // Of a direction in either frame, with dampers alone in the null space
+    // A direction in either frame has springs, with dampers alone in the null space.
     Setpoint one = tip_setpoint(random, 7, Frame::kBase, 1);
     one.gains.null_stiffness.setZero();
     const auto in_base = Impedance(one, 7);

@@ -17,7 +17,7 @@ namespace {
 using Eigen::MatrixXd;
 using testing::near;
 
-/// What a controller has at rest at q, once its gains are in force.
+/// Returns what a controller has at rest at q, once its gains are in force.
 analysis::System<kMaxJoints> by_controller(const RobotModel& model, Settings settings, Mode mode,
                                            const JointVector& q, const Vector6& wrench) {
   settings.motion.gain_time = settings.period;

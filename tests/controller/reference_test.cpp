@@ -365,7 +365,7 @@ TEST(ErrorClamp, ShortensOnlyWhereThereAreSprings) {
   e.head<2>() *= 2;
   e.tail<3>() *= 4;
   EXPECT_TRUE(near(clamp.clamped(e, base, none, I), expected, 1e-15));
-  // The same in the axes of a tool.
+  // It holds in the axes of a tool.
   const Eigen::Matrix3d R = quaternion(Vector3d(0.3, -0.5, 0.8)).toRotationMatrix();
   Vector6 e_B, expected_B;
   e_B << R * e.head<3>(), R * e.tail<3>();

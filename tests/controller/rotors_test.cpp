@@ -109,7 +109,7 @@ TEST(Rotors, ReplacedInAModelAreThoseThatItIsReadWith) {
   EXPECT_EQ(replaced.J, read.J);
 }
 
-/// Of an FR3 under the defaults of crisp the margin is far below 1 without rotors.
+/// The margin of an FR3 under the defaults of crisp is far below 1 without rotors.
 TEST(Rotors, WithWhatIsEnoughTheMarginIsThereAndNotWithLess) {
   const Audit audit(fr3(), crisp());
   const JointVector q = franka_home();

@@ -32,7 +32,7 @@ class Filter : public ::testing::Test {
     robot.coriolis = pair(0, 0);
   }
   SafetyFilter make() const { return SafetyFilter(settings); }
-  /// What the filter makes of `tau`.
+  /// Returns what the filter makes of `tau`.
   Status apply(SafetyFilter& filter, const Pair& tau) {
     out = tau;
     const JointVector position = q, velocity = qd, held = weight, damps = dampers;
@@ -56,7 +56,7 @@ class Filter : public ::testing::Test {
   SafetyFilter::Aim aim = SafetyFilter::Aim::kSprings;
 };
 
-/// Of a joint whose weight is about at its limit 5 % of the limit are left to say how much all
+/// A joint whose weight is about at its limit keeps 5 % of the limit, which say how much all
 /// joints shrink.
 TEST_F(Filter, ShrinksAllJointsAlikeBeyondTheWeight) {
   weight = {39, 0};

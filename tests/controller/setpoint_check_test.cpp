@@ -147,7 +147,7 @@ TEST(SetpointCheck, AsksForEverySizeAndLooksAtThePoseInItsModeAlone) {
   }
 }
 
-// Of a joint without limits the position is bounded all the same.
+// The position of a joint without limits is bounded all the same.
 TEST(SetpointCheck, BoundsThePositionOfAContinuousJoint) {
   Limits limits = limits_of_two_joints();
   limits.position_lower.setConstant(-std::numeric_limits<double>::infinity());

@@ -27,7 +27,7 @@ class Course : public testing::Safety {
     next();
   }
   double full() const { return settings.initial.gains.joint_stiffness(0, 0); }
-  /// Of the first joint, in force.
+  /// Returns the stiffness of the first joint that is in force.
   double stiffness() {
     const double before = snapshot().law_torque[0];
     arm->state.position[0] += 1e-3;

@@ -33,7 +33,7 @@ class Check : public ::testing::Test {
     state.time += std::llround(1e6 * milliseconds);
     return check->check(state);
   }
-  /// The same without a position.
+  /// Takes the state without a position.
   Status bad(double milliseconds = 1) {
     const JointVector position = state.position;
     state.position[0] = std::numeric_limits<double>::quiet_NaN();

@@ -62,7 +62,7 @@ TEST_P(Ramp, OneBadTickCostsLittleAndNothingStartsAfresh) {
   arm->setpoint.time = arm->state.time;
   spoil(arm->state);
   EXPECT_EQ(tick(), expected());
-  // Of a time stamp alone that is wrong, nothing is taken away.
+  // A wrong time stamp alone takes nothing away.
   const double left = expected() == Status::kTimeBackward ? 1 : 0.99;
   EXPECT_TRUE(near(arm->torque, left * before, 1e-9));
   arm->state = good;
@@ -154,7 +154,7 @@ TEST_F(Safety, AStateThatStaysElsewhereLatchesAndIsFollowedWithoutSprings) {
   }
 }
 
-/// Of several bad states while the arm moves each is compared with the last good one by its age.
+/// Several bad states while the arm moves are compared each with the last good one by its age.
 TEST_F(Safety, GoesOnAfterBadStatesWhileMoving) {
   run(1.0);
   const double v = 1.5;

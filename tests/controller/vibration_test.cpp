@@ -56,7 +56,7 @@ std::vector<LongComplex> textbook_eigenvalues(const RobotModel& model, const Set
   return eigenvalues_of(M, C, K);
 }
 
-/// Of the closed loop as the law's matrices give it.
+/// Returns the eigenvalues of the closed loop as the law's matrices give it.
 std::vector<LongComplex> eigenvalues_now(const Controller& controller) {
   analysis::System<kMaxJoints> system;
   controller.closed_loop(system);
@@ -201,7 +201,7 @@ TEST(VibrationInTheTick, KeepsTheNumbersOfModes) {
       ASSERT_EQ(static_cast<int>(now.size()), led.modes().count) << "a number twice";
       for (const auto& [label, mode] : last) {
         ASSERT_TRUE(now.count(label)) << "tick " << k << " lost mode " << label;
-        // Of the sum and product, which are smooth where two real eigenvalues meet.
+        // Sum and product are smooth where two real eigenvalues meet.
         const auto& [a, b] = mode.eigenvalues;
         const auto& [c, d] = now[label].eigenvalues;
         EXPECT_LT(std::abs(c + d - a - b), 0.05 * (std::abs(a) + std::abs(b))) << "tick " << k;

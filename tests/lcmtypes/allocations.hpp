@@ -10,10 +10,10 @@ struct Allocations {
   std::size_t largest = 0;  ///< bytes
 };
 
-/// Of this thread since it began.
+/// Returns the allocations of this thread since it began.
 Allocations& allocations() noexcept;
 
-/// Of this thread while `act` runs.
+/// Returns the allocations of this thread while `act` runs.
 template <class Act>
 Allocations allocations_of(const Act& act) {
   allocations() = {};

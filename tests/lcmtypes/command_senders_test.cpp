@@ -175,7 +175,7 @@ TEST_F(CommandSenders, AHugeSequenceLocksNobodyOut) {
   EXPECT_EQ(send_as(1), Verdict::kAccepted);
   pass(kMillisecond);
   EXPECT_EQ(send_as(1), Verdict::kAccepted);
-  // The same while the first is still remembered.
+  // It holds while the first is still remembered.
   far = command_of(1);
   far.sequence = std::numeric_limits<std::int64_t>::max();
   far.utime += 100 * kMillisecond;

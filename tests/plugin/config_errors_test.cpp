@@ -142,7 +142,7 @@ TEST(ConfigRefuses, WithTheLine) {
   }
 }
 
-/// What is wrong with the robot; `keys` follow urdf, base and tip.
+/// Returns what is wrong with the robot; `keys` follow urdf, base and tip.
 std::string complaint_about(const std::string& keys) {
   std::string text = panda();
   text.insert(text.size() - 2, keys);

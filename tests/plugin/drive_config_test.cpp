@@ -20,7 +20,7 @@ using controller::Config;
 using controller::JointVector;
 using controller::Mode;
 
-/// Of controller/examples, and the posture in which the scene of the same name begins, deg.
+/// A file of controller/examples, and the posture in which the scene of the same name begins, deg.
 struct DriveConfig {
   const char* name;
   double start[7];

@@ -72,7 +72,7 @@ const File* find_file(const std::string& path) {
   return found == files().end() ? nullptr : &*found;
 }
 
-/// What is wrong with a link of a document; empty if it leads somewhere.
+/// Returns what is wrong with a link of a document; empty if it leads somewhere.
 std::string offence(const File& from, const Link& link) {
   const fs::path path = link.path.empty()
                             ? fs::path(from.path)

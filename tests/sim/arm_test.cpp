@@ -91,7 +91,7 @@ class Bounce {
     return -depth(contact_) - rate(contact_) * after - kG / 2 * after * after;
   }
   double leaves_at() const { return fall_ + contact_; }
-  /// Of the damper, and of the spring that is left behind pressed, J.
+  /// Returns the heat of the damper, and of the spring that is left behind pressed, J.
   double heat() const {
     const double v = rate(contact_), d = depth(contact_);
     return kMass * kG * (height_ + d) - kMass / 2 * v * v;

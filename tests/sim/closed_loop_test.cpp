@@ -147,9 +147,9 @@ TEST_P(ClosedLoop, KeepsToTheTorqueLimits) {
 
 // ----------------------------------------------------------------------------------------- energy
 
-/// Of motion and springs, J: 1/2 qd' M qd + 1/2 e' K_C e. For stiffness that is the same in all
-/// directions of rotation, and apart from that of translation, the second is a potential of the
-/// law's springs however far they stretch.
+/// Returns the energy of motion and springs, J: 1/2 qd' M qd + 1/2 e' K_C e. For stiffness that is
+/// the same in all directions of rotation, and apart from that of translation, the second is a
+/// potential of the law's springs however far they stretch.
 double energy(const TwinModels& twin, const JointVector& q0, const Vector6& stiffness,
               const sim::Plant& plant) {
   const JointVector q = plant.position(), qd = plant.velocity();

@@ -229,7 +229,8 @@ struct TickMap {
     return parameters;
   }
 
-  /// Of the linear equations, with M and dg/dq of the controller's model at the links' q.
+  /// Returns the matrix of the linear equations, with M and dg/dq of the controller's model at the
+  /// links' q.
   MatrixXd expected(const controller::RobotModel& model, const JointVector& q, const MatrixXd& K_p,
                     const MatrixXd& K_d) const {
     const Eigen::Index n = q.size();

@@ -1,5 +1,5 @@
 #pragma once
-// The same chain in KDL, built straight from the URDF and without any code of the simulator.
+// A chain in KDL, built straight from the URDF and without any code of the simulator.
 
 #include <dashpot/tests/sim/chains.hpp>
 #include <dashpot/tests/support/kdl_solvers.hpp>

@@ -14,7 +14,8 @@ using testing::kOne;
 using testing::kZero;
 using testing::run;
 
-/// What a mass shows at tick 5 that moves with 2 m/s from 1 m on, with a fault from tick 3 to 8.
+/// Returns what a mass shows at tick 5 that moves with 2 m/s from 1 m on, with a fault from tick 3
+/// to 8.
 Measurement shown(SensorFault fault, int ticks, bool difference = false) {
   LinearSystem mass(kOne, kZero, kZero);
   PlantOptions options;

@@ -68,7 +68,7 @@ inline sim::Robot pendulum(
                                parameters);
 }
 
-/// What InvalidScene says of what `make` makes.
+/// Returns what InvalidScene says of what `make` makes.
 template <class Make>
 std::string refusal_of(const Make& make) {
   return refusal<sim::InvalidScene>(make);

@@ -109,7 +109,7 @@ struct Loop {
   sim::Plant plant;
 };
 
-/// What is left of the way of joint 1, rad, once the arm rests at 0.4 rad.
+/// Returns what is left of the way of joint 1, rad, once the arm rests at 0.4 rad.
 double miss(const RoughPanda& panda) {
   Loop loop(panda);
   loop.run(0.2);

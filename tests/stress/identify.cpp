@@ -187,7 +187,7 @@ bool identify(const Request& request) {
   print(tallies.heavy, "above");
   std::printf("%d modes that are none; %.2f s a case\n", tallies.false_modes,
               seconds / request.count);
-  // Of few cases, fewer may be inside by chance.
+  // In few cases, fewer may be inside by chance.
   const double least = request.count >= 20 ? 0.88 : 0.75;
   return ordinary.found > 0 && ordinary.frequency_inside >= least * ordinary.found &&
          ordinary.ratio_inside >= least * ordinary.found;

@@ -1,5 +1,5 @@
 #pragma once
-// The same number of steps on paths of every family of tests/support/tracker_paths.hpp.
+// An equal number of steps on paths of every family of tests/support/tracker_paths.hpp.
 
 #include <dashpot/tests/support/tracker_paths.hpp>
 

@@ -66,7 +66,7 @@ struct Attack {
     options_.config = cartesian_ ? "control: {mode: cartesian}\n" : "";
   }
 
-  /// What comes of it; null if the simulation could not follow.
+  /// Returns what the run measured; null if the simulation could not follow.
   std::optional<Measures> run(const PluginFile& plugin, const TestArm& arm) const try {
     Rig rig(plugin, arm, options_);
     const Eigen::Vector3d tip = rig.tip_at(rig.position()).position;

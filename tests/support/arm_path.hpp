@@ -42,8 +42,8 @@ inline controller::JointVector arm_way(const std::string& arm, double t) {
   return q;
 }
 
-/// Of an arm's default gains: what their damping is multiplied with, and the springs and dampers of
-/// the null space, which are not there for 0.
+/// Changes of an arm's default gains: what their damping is multiplied with, and the springs and
+/// dampers of the null space, which are not there for 0.
 struct GainScales {
   double damping = 1, null_space = 1;
 };

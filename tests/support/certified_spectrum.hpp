@@ -103,7 +103,7 @@ CertifiedEigenvalues certify_eigenvalues(const analysis::System<N>& system, int 
   return result;
 }
 
-/// The same with as many bits, 128 to 1024, as it takes to have no radius above `wanted`.
+/// Certifies with as many bits, 128 to 1024, as it takes to have no radius above `wanted`.
 template <int N>
 CertifiedEigenvalues certify_within(const analysis::System<N>& system, long double wanted) {
   constexpr int kMostBits = 1024;

@@ -30,7 +30,7 @@ inline controller::RobotModel chain_of(const std::vector<std::string>& types,
                                                 "link" + std::to_string(types.size()), options);
 }
 
-/// Of a link of a chain about its joint, kg m^2.
+/// Inertia of a link of a chain about its joint, kg m^2.
 inline constexpr double kLinkInertia = 0.02 + 0.25 * 0.25;
 
 /// One link on a joint without friction, in weightlessness unless told otherwise.

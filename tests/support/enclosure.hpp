@@ -30,7 +30,7 @@ Real distance(const Point<Real>& a, const Point<Real>& b) {
 template <typename Real>
 using MatrixOf = Eigen::Matrix<Real, Eigen::Dynamic, Eigen::Dynamic>;
 
-/// Of a quasi-triangular matrix.
+/// Returns the eigenvalues of a quasi-triangular matrix.
 template <typename Real>
 std::vector<Point<Real>> diagonal_eigenvalues(const MatrixOf<Real>& T) {
   using std::sqrt;
@@ -217,7 +217,7 @@ Verdict judge_against(const std::vector<Point<Real>>& truth,
   return verdict;
 }
 
-/// The same against eigenvalues computed in this precision.
+/// Judges against eigenvalues computed in this precision.
 template <typename Real>
 Verdict judge(const analysis::System<analysis::kMaxDof>& system,
               const analysis::TrackedSpectrum& spectrum, double accuracy) {

@@ -41,7 +41,7 @@ inline controller::Settings in_mode(controller::Settings settings, controller::M
   return settings;
 }
 
-/// Those where nothing acts but springs, and dampers that hold a ratio of 0.7.
+/// Settings where nothing acts but springs, and dampers that hold a ratio of 0.7.
 inline controller::Settings plain_settings(const controller::RobotModel& model,
                                            controller::Mode mode) {
   controller::Settings settings = in_mode(unlimited_settings(model), mode);

@@ -28,7 +28,7 @@
 
 namespace dashpot::testing {
 
-/// The same number in a longer type.
+/// Returns the number in a longer type.
 inline long double widened(double x) {
   return static_cast<long double>(x);
 }
@@ -202,7 +202,7 @@ inline Trajectory get_trajectory(const Json& object, int n) {
   return result;
 }
 
-/// What both kinds of cases begin with.
+/// Returns what both kinds of cases begin with.
 template <class Case>
 Case to_case(const Json& j) {
   Case c;

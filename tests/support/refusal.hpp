@@ -3,7 +3,7 @@
 
 namespace dashpot::testing {
 
-/// What an error of this kind says that `call` throws.
+/// Returns what an error of this kind says that `call` throws.
 template <class Error, class Call>
 std::string refusal(const Call& call) {
   try {

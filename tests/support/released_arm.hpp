@@ -79,7 +79,7 @@ inline controller::Settings release_settings(const TwinModels& twin, const contr
 class ReleasedArm {
  public:
   controller::Controller controller;
-  /// Of the controller at q0.
+  /// The modes that the controller finds at q0.
   controller::Vibration vibration;
   analysis::System<controller::kMaxJoints> closed_loop;
   controller::Status worst = controller::Status::kOk;  ///< of all ticks
@@ -175,7 +175,7 @@ struct Worst {
     ratio = std::max(ratio, ratio_off);
     ++modes;
   }
-  /// The same with a mode of a sampled loop.
+  /// Compares with a mode of a sampled loop.
   void add(const analysis::IdentifiedModes& fit, const analysis::SampledMode& mode,
            double most_frequency, double most_ratio) {
     add(fit, mode.eigenvalues[0], mode.natural_frequency, mode.damping_ratio, most_frequency,

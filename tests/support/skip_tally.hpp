@@ -11,7 +11,7 @@
 
 namespace dashpot::testing {
 
-/// Of one thing that is left out.
+/// The tally of one thing that is left out.
 struct SkipTally {
   std::string what;
   std::int64_t compared = 0, left_out = 0, outside = 0;
@@ -68,7 +68,7 @@ inline PlainModes plain_modes(const analysis::TrackedSpectrum& spectrum) {
   return {spectrum.modes.begin(), spectrum.modes.begin() + spectrum.mode_count};
 }
 
-/// The same places, the same bits.
+/// Fails unless the same places have the same bits.
 inline void compare_bits(const PlainModes& with, const PlainModes& without, SkipTally& tally) {
   if (with.size() != without.size()) return tally.fail();
   for (std::size_t i = 0; i < with.size(); ++i) {

@@ -49,7 +49,7 @@ inline std::string changed_configuration(
   return scratch.write("drive.yaml", text);
 }
 
-/// Of a log.
+/// Returns the states of a log.
 inline std::vector<state_t> states_of(const std::string& path) {
   std::vector<state_t> states;
   lcmtypes::LogFile log(path);

@@ -33,7 +33,7 @@ class PluginRelease : public ::testing::Test {
     gains.joint_stiffness = K.data();
     ASSERT_EQ(plugin().set_gains(arm(), &gains), DASHPOT_OK) << plugin().last_error();
   }
-  /// Of the stiffness in force: what a small deflection gives.
+  /// Returns the stiffness in force, from what a small deflection gives.
   double stiffness() {
     host.position[6] += 1e-3;
     host.tick();

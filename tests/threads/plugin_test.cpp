@@ -101,7 +101,7 @@ TEST(Plugin, HasATextForEverythingItReturns) {
   EXPECT_STREQ(plugin().kind_text(-1), "unknown kind");
 }
 
-/// The same torque, status, snapshot and modes as the C++ class on the same random ticks.
+/// It gives the torque, status, snapshot and modes of the C++ class on the same random ticks.
 TEST(Plugin, IsTheController) {
   testing::Random random(711);
   const std::string text = panda() + "analysis: {every: 3}\n";
@@ -337,7 +337,7 @@ TEST(Plugin, RefusesGainsThatTheSampledLoopDoesNotBear) {
   EXPECT_EQ(plugin().set_gains(host.controller.get(), &gains), DASHPOT_OK);
 }
 
-/// Of the ticks before a reset nothing is left to read.
+/// Nothing of the ticks before a reset is left to read.
 TEST(Plugin, HasNoModesAfterAReset) {
   for (const char* where : {"inline", "background"}) {
     Host host = panda_host("analysis: {where: " + std::string(where) + "}\n");

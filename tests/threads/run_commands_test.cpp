@@ -214,7 +214,7 @@ TEST(RunWithCommands, IsReleasedFromAFaultThatIsNamed) {
   for (std::size_t i = 0; i < where.size(); ++i) {
     EXPECT_NEAR(live.state.joint_position[i], where[i], 0.02) << i;
   }
-  // The same again finds nothing to release, and a set-point is followed.
+  // A second release finds nothing to release, and a set-point is followed.
   release(fault_tick, 3);
   ASSERT_TRUE(live.until([&] { return live.state.verdicts[state_t::NO_SUCH_FAULT] == 2; }));
   const command_t goal = joint_command(live.state, where[0] + 0.05, 4);

@@ -13,7 +13,7 @@
 namespace dashpot::tests {
 namespace {
 
-/// Of the closed loop that a configuration file has at q, rad/s, by falling frequency.
+/// Returns the frequencies of a configuration's closed loop at q, rad/s, by falling frequency.
 std::vector<double> frequencies(const std::string& path, const std::vector<double>& q) {
   const controller::Config config = controller::load_config(path);
   controller::PostureLoop loop(config.model, config.settings);

@@ -51,7 +51,7 @@ struct SharedTick {
     led = std::make_unique<LedArm>(model, settings, kSmallSwing);
     led->setpoint.mode = mode;
   }
-  /// Of an arm that moves.
+  /// Does a tick of an arm that moves.
   const Vibration& tick() {
     led->swing(1e-3 * ++k);
     led->tick();

@@ -42,7 +42,7 @@ class Connection {
   void say(const std::string& text) const {
     (void)::send(socket_, text.data(), text.size(), MSG_NOSIGNAL);
   }
-  /// What comes until the server ends, or `enough` is in it; ten seconds at most.
+  /// Returns what comes until the server ends, or `enough` is in it; ten seconds at most.
   std::string hear(const std::string& enough = "") const {
     std::string all;
     const auto end = Clock::now() + std::chrono::seconds(10);
@@ -239,7 +239,7 @@ TEST(WebMonitor, ShowsALogAtAnyTime) {
   EXPECT_NEAR(setup["duration"].get<double>(), 0.999, 1e-9);
   EXPECT_EQ(setup["arm"]["joints"].size(), 7U);
 
-  // The same as reading the log from its beginning.
+  // This gives the same as reading the log from its beginning.
   lcmtypes::MessageHandlers handlers;
   state_t state{};
   modes_t modes{};

@@ -351,7 +351,7 @@ function sampledNumbers(period) {
   }));
 }
 
-/// Of the loop: from the configuration, or from ticks and times.
+/// The period of the loop: from the configuration, or from ticks and times.
 let first = null;
 function period() {
   if (page.setup.period) return page.setup.period;
