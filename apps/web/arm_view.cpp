@@ -84,10 +84,7 @@ Eigen::RowVectorXd direction_of(const std::string& place, const controller::Jaco
 ArmView::ArmView(const std::string& config) : config_(controller::load_config(config)) {
   try {
     const Scene scene = load_scene(config);
-    if (scene.arm && scene.arm->options.wall) {
-      const sim::Wall& wall = *scene.arm->options.wall;
-      simulated_wall_ = {wall.point, wall.normal.normalized()};
-    }
+    if (scene.arm) simulated_wall_ = scene.arm->options.wall;
   } catch (const InputError&) {  // a configuration, which is no scene
   }
 }
@@ -111,16 +108,21 @@ ArmJson ArmView::chain() const {
   document["missing_rotors"] = controller::missing_rotors_text(config_.model);
   document["tip"] = frame_json(chain.getSegment(static_cast<unsigned>(joints.size())).pose(0));
   document["walls"] = ArmJson::array();
-  const auto add_wall = [&walls = document["walls"]](const std::string& name,
-                                                     const controller::Wall& wall) {
+  const auto add_wall = [&walls = document["walls"]](
+                            const std::string& name, const Eigen::Vector3d& p,
+                            const Eigen::Vector3d& normal, const ArmJson& stiffness) {
     walls.push_back({{"name", name},
-                     {"point", {wall.point.x(), wall.point.y(), wall.point.z()}},
-                     {"normal", {wall.normal.x(), wall.normal.y(), wall.normal.z()}}});
+                     {"point", {p.x(), p.y(), p.z()}},
+                     {"normal", {normal.x(), normal.y(), normal.z()}},
+                     {"stiffness", stiffness}});
   };
   for (const controller::Wall& wall : config_.settings.limits.walls) {
-    add_wall("wall " + std::to_string(document["walls"].size() + 1), wall);
+    add_wall("wall " + std::to_string(document["walls"].size() + 1), wall.point, wall.normal, {});
   }
-  if (simulated_wall_) add_wall("simulated wall", *simulated_wall_);
+  if (simulated_wall_) {
+    add_wall("simulated wall", simulated_wall_->point, simulated_wall_->normal.normalized(),
+             simulated_wall_->contact.stiffness);
+  }
   return document;
 }
 

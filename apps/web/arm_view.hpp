@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/controller/config.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/sim/arm.hpp>
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -21,11 +22,12 @@ class ArmView {
   double gain_margin() const { return config_.settings.limits.gain_margin; }
 
   /// Returns the chain for the page's kinematics: {"name", "joints": [{"name", "prismatic",
-  /// "lower", "upper", "origin", "axis", "frame"}], "tip", "walls": [{"name", "point", "normal"}]}.
-  /// With T_0 = I,
+  /// "lower", "upper", "origin", "axis", "frame"}], "tip", "walls": [{"name", "point", "normal",
+  /// "stiffness"}]}. With T_0 = I,
   ///     T_i = T_i-1 [Rot(axis, q_i), origin] frame      (prismatic: [I, origin + q_i axis] frame)
   /// is the frame of link i in B, and T_n tip that of the tip. Frames are rows of 4 x 4. A
-  /// wall's normal points to where the tip may be.
+  /// wall's normal points to where the tip may be; a simulated wall has a stiffness, N/m, others
+  /// null.
   nlohmann::ordered_json chain() const;
 
   /// Returns the damping ratio that the configuration asks for in a mode (JOINT, CARTESIAN), 0 if
@@ -43,7 +45,7 @@ class ArmView {
 
  private:
   controller::Config config_;
-  std::optional<controller::Wall> simulated_wall_;  ///< of a scene
+  std::optional<sim::Wall> simulated_wall_;  ///< of a scene
 };
 
 }  // namespace dashpot::apps
