@@ -1,6 +1,7 @@
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/apps/cli/matrix_json.hpp>
+#include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/apps/web/arm_view.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -80,6 +81,14 @@ Eigen::RowVectorXd direction_of(const std::string& place, const controller::Jaco
 
 }  // namespace
 
+ArmView::ArmView(const std::string& config) : config_(controller::load_config(config)) {
+  try {
+    const Scene scene = load_scene(config);
+    if (scene.arm) simulated_wall_ = scene.arm->options.wall;
+  } catch (const InputError&) {  // a configuration, which is no scene
+  }
+}
+
 ArmJson ArmView::chain() const {
   const KDL::Chain& chain = controller::kdl_chain(config_.model);
   ArmJson document{{"name", config_.model.name()}, {"joints", ArmJson::array()}};
@@ -98,6 +107,22 @@ ArmJson ArmView::chain() const {
   }
   document["missing_rotors"] = controller::missing_rotors_text(config_.model);
   document["tip"] = frame_json(chain.getSegment(static_cast<unsigned>(joints.size())).pose(0));
+  document["walls"] = ArmJson::array();
+  const auto add_wall = [&walls = document["walls"]](
+                            const std::string& name, const Eigen::Vector3d& p,
+                            const Eigen::Vector3d& normal, const ArmJson& stiffness) {
+    walls.push_back({{"name", name},
+                     {"point", {p.x(), p.y(), p.z()}},
+                     {"normal", {normal.x(), normal.y(), normal.z()}},
+                     {"stiffness", stiffness}});
+  };
+  for (const controller::Wall& wall : config_.settings.limits.walls) {
+    add_wall("wall " + std::to_string(document["walls"].size() + 1), wall.point, wall.normal, {});
+  }
+  if (simulated_wall_) {
+    add_wall("simulated wall", simulated_wall_->point, simulated_wall_->normal.normalized(),
+             simulated_wall_->contact.stiffness);
+  }
   return document;
 }
 

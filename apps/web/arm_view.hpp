@@ -1,8 +1,10 @@
 #pragma once
 #include <dashpot/controller/config.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/sim/arm.hpp>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,15 +13,21 @@ namespace dashpot::apps {
 /// What a page needs to know of the arm beyond the messages.
 class ArmView {
  public:
-  explicit ArmView(const std::string& config) : config_(controller::load_config(config)) {}
+  /// `config` is the path of a configuration or a scene.
+  explicit ArmView(const std::string& config);
 
   int dof() const { return config_.model.dof(); }
   double period() const { return config_.settings.period; }
+  /// The gain margin that gains have to leave, no unit.
+  double gain_margin() const { return config_.settings.limits.gain_margin; }
 
   /// Returns the chain for the page's kinematics: {"name", "joints": [{"name", "prismatic",
-  /// "lower", "upper", "origin", "axis", "frame"}], "tip"}. With T_0 = I,
+  /// "lower", "upper", "origin", "axis", "frame"}], "tip", "walls": [{"name", "point", "normal",
+  /// "stiffness"}]}. With T_0 = I,
   ///     T_i = T_i-1 [Rot(axis, q_i), origin] frame      (prismatic: [I, origin + q_i axis] frame)
-  /// is the frame of link i in B, and T_n tip that of the tip. Frames are rows of 4 x 4.
+  /// is the frame of link i in B, and T_n tip that of the tip. Frames are rows of 4 x 4. A
+  /// wall's normal points to where the tip may be; a simulated wall has a stiffness, N/m, others
+  /// null.
   nlohmann::ordered_json chain() const;
 
   /// Returns the damping ratio that the configuration asks for in a mode (JOINT, CARTESIAN), 0 if
@@ -37,6 +45,7 @@ class ArmView {
 
  private:
   controller::Config config_;
+  std::optional<sim::Wall> simulated_wall_;  ///< of a scene
 };
 
 }  // namespace dashpot::apps
