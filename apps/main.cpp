@@ -1,11 +1,14 @@
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <cstddef>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <new>
 #include <stdexcept>
@@ -16,6 +19,7 @@ namespace {
 
 constexpr int kFailure = 1;
 constexpr int kBadInput = 2;
+constexpr int kInterrupted = 130;
 
 /// Says what went wrong, and returns `status`.
 int report(const std::string& message, int status) {
@@ -81,6 +85,8 @@ int run(int argc, char** argv) {
     return report(name() + ": " + error.what() + " (" + name() + " --help)", kBadInput);
   } catch (const InputError& error) {
     return report(name() + ": " + error.what(), kBadInput);
+  } catch (const Interrupted& end) {
+    return report(name() + ": interrupted: " + end.what(), kInterrupted);
   } catch (const std::bad_alloc&) {
     return report(name() + ": out of memory", kFailure);
   } catch (const std::exception& error) {
@@ -95,12 +101,15 @@ void print(const std::string& text) {
 }
 
 void print_styled(const std::string& text) {
+  clear_progress();
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
-    throw std::runtime_error("cannot write to standard output");
+    throw std::runtime_error(std::string("cannot write to standard output: ") +
+                             std::strerror(errno));
   }
 }
 
 void print_error(const std::string& message) {
+  clear_progress();
   std::fprintf(stderr, "%s\n", controller::one_line(message).c_str());
 }
 

@@ -4,6 +4,7 @@
 #include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/printable.hpp>
 
@@ -264,10 +265,13 @@ std::string audit_table(const AuditTask& task, const AuditReport& report) {
   return text + suggestion_table(task, report);
 }
 
-std::string csv_heading(int n) {
+std::string csv_heading(const controller::RobotModel& model) {
   std::string text = "posture";
-  for (int i = 1; i <= n; ++i) text += ",q" + std::to_string(i);
-  return text + ",smallest_ratio,fastest_pole,gain_margin,zero_modes,singular\n";
+  const controller::Units units = controller::joint_units(model, "rad", "m");
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    text += ",q" + std::to_string(i + 1) + " [" + units[i] + "]";
+  }
+  return text + ",smallest_ratio,fastest_pole [1/s],gain_margin,zero_modes,singular\n";
 }
 
 std::string csv_line(std::int64_t i, const controller::JointVector& q,

@@ -4,6 +4,7 @@
 #include <dashpot/apps/check_model/torque_file.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/controller/config.hpp>
 
 #include <CLI/CLI.hpp>
@@ -89,11 +90,9 @@ void write_config(const CheckModelOptions& options, const Config& config,
   bool kept = true;
   const std::string text = changed_config(controller::read_regular_file(options.config),
                                           changes_for(options, config, check), kept);
-  OutputFile file = open_output("--write", options.write);
-  if (std::fwrite(text.data(), 1, text.size(), file.get()) != text.size() ||
-      std::fflush(file.get()) != 0) {
-    throw InputError("--write", options.write + ": cannot be written");
-  }
+  OutputFile file("--write", options.write);
+  file.write(text);
+  file.finish();
   if (!kept) report.notes.push_back("the comments of " + options.config + " were not kept");
 }
 
@@ -101,6 +100,9 @@ CheckModelReport check_files(const CheckModelOptions& options, const Config& con
   CheckModelReport report;
   std::vector<controller::TorqueRecord> records;
   for (const std::string& path : options.files) {
+    show_progress(
+        static_cast<double>(report.files.size()) / static_cast<double>(options.files.size() + 1),
+        "reading " + path);
     TorqueFile file = read_torque_file(path, config.model, options.positions, options.torques);
     for (const std::string& note : file.notes) {
       report.notes.push_back(path);
@@ -110,6 +112,9 @@ CheckModelReport check_files(const CheckModelOptions& options, const Config& con
     report.files.push_back(path);
   }
   for (const Joint& joint : config.model.joints()) report.joints.push_back(joint.name);
+  show_progress(
+      static_cast<double>(report.files.size()) / static_cast<double>(options.files.size() + 1),
+      "comparing torques");
   try {
     report.check = controller::check_model(config.robot, records);
   } catch (const controller::InvalidModel&) {

@@ -1,11 +1,11 @@
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/input_error.hpp>
 
-#include <cstdio>
 #include <limits>
 #include <sstream>
 
@@ -36,7 +36,7 @@ void take_accepted(const std::string& accepted, controller::ModelOptions& model)
 
 void warn_of(const controller::RobotModel& model) {
   for (const std::string& warning : model.warnings()) {
-    std::fprintf(stderr, "warning: %s\n", warning.c_str());
+    print_error("warning: " + warning);
   }
 }
 

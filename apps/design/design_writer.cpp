@@ -327,8 +327,9 @@ std::string region_complaint(const RegionReport& report) {
 std::string region_csv(const RegionReport& report) {
   std::ostringstream text;
   text.precision(17);
-  text << "configuration,worst_mode,natural_frequency,damping_ratio,largest_ratio,soft_modes"
-       << (report.limit ? ",gain_margin\n" : "\n");
+  text
+      << "configuration,worst_mode,natural_frequency [rad/s],damping_ratio,largest_ratio,soft_modes"
+      << (report.limit ? ",gain_margin\n" : "\n");
   for (std::size_t i = 0; i < report.design.samples.size(); ++i) {
     const analysis::RegionSample& sample = report.design.samples[i];
     text << i << ',' << sample.worst_mode << ',' << sample.natural_frequency << ','

@@ -2,33 +2,27 @@
 #include <dashpot/analysis/solver_status.hpp>
 #include <dashpot/apps/messages/message_json.hpp>
 #include <dashpot/controller/tick_status.hpp>
+#include <dashpot/lcmtypes/messages/message_fields.hpp>
 
 #include <string>
+#include <type_traits>
+#include <vector>
 
 namespace dashpot::apps {
 namespace {
 
 using MessageJson = nlohmann::ordered_json;
 
-template <std::size_t N>
-MessageJson fixed_list(const double (&values)[N]) {
-  return MessageJson(std::vector<double>(values, values + N));
+// The text beside a number, for the enumerations that have one.
+const char* status_text(const state_t& /*of*/, std::int8_t status) {
+  return controller::to_text(static_cast<controller::Status>(status));
 }
-
-std::string analysis_text(std::int8_t status) {
+const char* status_text(const auto& /*modes*/, std::int8_t status) {
   return analysis::to_text(static_cast<analysis::Status>(status));
 }
 
-std::string controller_text(std::int8_t status) {
-  return controller::to_text(static_cast<controller::Status>(status));
-}
-
-MessageJson kind_texts(const std::vector<std::int8_t>& kinds) {
-  MessageJson list = MessageJson::array();
-  for (const std::int8_t kind : kinds) {
-    list.push_back(analysis::to_text(static_cast<analysis::ModeKind>(kind)));
-  }
-  return list;
+const char* kind_text(std::int8_t kind) {
+  return analysis::to_text(static_cast<analysis::ModeKind>(kind));
 }
 
 MessageJson schema_of(const MessageJson& value) {
@@ -50,89 +44,26 @@ MessageJson schema_of(const MessageJson& value) {
 
 }  // namespace
 
-MessageJson message_json(const state_t& m) {
-  return {{"n", m.n},
-          {"utime", m.utime},
-          {"tick", m.tick},
-          {"restarts", m.restarts},
-          {"mode", m.mode},
-          {"status", m.status},
-          {"status_text", controller_text(m.status)},
-          {"fault", m.fault},
-          {"fault_text", controller_text(m.fault)},
-          {"fault_tick", m.fault_tick},
-          {"joint_position", m.joint_position},
-          {"joint_velocity", m.joint_velocity},
-          {"joint_torque", m.joint_torque},
-          {"law_torque", m.law_torque},
-          {"reference_joint_position", m.reference_joint_position},
-          {"tip_position", fixed_list(m.tip_position)},
-          {"tip_quaternion", fixed_list(m.tip_quaternion)},
-          {"reference_tip_position", fixed_list(m.reference_tip_position)},
-          {"reference_tip_quaternion", fixed_list(m.reference_tip_quaternion)},
-          {"tip_error", fixed_list(m.tip_error)},
-          {"tip_wrench", fixed_list(m.tip_wrench)},
-          {"joint_damping_ratio", m.joint_damping_ratio},
-          {"task_damping_ratio", m.task_damping_ratio},
-          {"damping_level", m.damping_level},
-          {"payload_mass", m.payload_mass},
-          {"payload_center", fixed_list(m.payload_center)},
-          {"tool_position", fixed_list(m.tool_position)},
-          {"tool_quaternion", fixed_list(m.tool_quaternion)},
-          {"tick_time", m.tick_time},
-          {"longest_tick_time", m.longest_tick_time},
-          {"overruns", m.overruns},
-          {"states_dropped", m.states_dropped},
-          {"commander", m.commander},
-          {"commands_accepted", m.commands_accepted},
-          {"commands_rejected", m.commands_rejected}};
+template <class Message>
+MessageJson message_json(const Message& message) {
+  MessageJson json;
+  lcmtypes::visit_fields<Message>([&](const std::string& name, auto field) {
+    const auto& value = message.*field;
+    json[name] = value;
+    using Value = std::remove_cvref_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, std::int8_t>) {
+      if (name == "status" || name == "fault") json[name + "_text"] = status_text(message, value);
+    } else if constexpr (std::is_same_v<Value, std::vector<std::int8_t>>) {
+      json[name + "_text"] = MessageJson::array();
+      for (const std::int8_t kind : value) json[name + "_text"].push_back(kind_text(kind));
+    }
+  });
+  return json;
 }
-
-MessageJson message_json(const modes_t& m) {
-  return {{"n", m.n},
-          {"num_modes", m.num_modes},
-          {"utime", m.utime},
-          {"tick", m.tick},
-          {"sequence", m.sequence},
-          {"origin", m.origin},
-          {"status", m.status},
-          {"status_text", analysis_text(m.status)},
-          {"joint_position", m.joint_position},
-          {"zero_modes", m.zero_modes},
-          {"label", m.label},
-          {"eigenvalue_real", m.eigenvalue_real},
-          {"eigenvalue_imag", m.eigenvalue_imag},
-          {"natural_frequency", m.natural_frequency},
-          {"damping_ratio", m.damping_ratio},
-          {"damped_frequency", m.damped_frequency},
-          {"kind", m.kind},
-          {"kind_text", kind_texts(m.kind)},
-          {"eigenvalue_bound", m.eigenvalue_bound},
-          {"natural_frequency_bound", m.natural_frequency_bound},
-          {"damping_ratio_bound", m.damping_ratio_bound},
-          {"shape_real", m.shape_real},
-          {"shape_imag", m.shape_imag}};
-}
-
-MessageJson message_json(const sampled_modes_t& m) {
-  return {{"n", m.n},
-          {"num_modes", m.num_modes},
-          {"utime", m.utime},
-          {"tick", m.tick},
-          {"sequence", m.sequence},
-          {"status", m.status},
-          {"status_text", analysis_text(m.status)},
-          {"joint_position", m.joint_position},
-          {"spectral_radius", m.spectral_radius},
-          {"gain_margin", m.gain_margin},
-          {"continuous_frequency", m.continuous_frequency},
-          {"continuous_ratio", m.continuous_ratio},
-          {"natural_frequency", m.natural_frequency},
-          {"damping_ratio", m.damping_ratio},
-          {"damped_frequency", m.damped_frequency},
-          {"kind", m.kind},
-          {"kind_text", kind_texts(m.kind)}};
-}
+template MessageJson message_json(const state_t& message);
+template MessageJson message_json(const contact_t& message);
+template MessageJson message_json(const modes_t& message);
+template MessageJson message_json(const sampled_modes_t& message);
 
 MessageJson json_schema(const MessageJson& example, const std::string& title) {
   MessageJson schema = schema_of(example);

@@ -1,6 +1,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/apps/analyze/json_writer.hpp>
 #include <dashpot/apps/cli/drives_option.hpp>
+#include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/shape_text.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_writer.hpp>
@@ -159,6 +160,13 @@ std::string extremes_text(const Extremes& extremes) {
          " % of its limit, of the tip " + format_number(extremes.tip_speed, 3) + " m/s, " + energy;
 }
 
+std::string contact_text(const RunReport& report) {
+  if (!report.contact_force) return "";
+  return "  Force of the wall on the tip: at most " +
+         format_number(report.extremes.contact_force, 3) + " N, at the end " +
+         format_number(report.contact_force->norm(), 3) + " N\n";
+}
+
 /// How the modes were found, in ticks after the first one of the run.
 std::string solved_text(const dashpot_modes& first, const dashpot_modes& last) {
   std::string out = "  Modes:";
@@ -255,6 +263,12 @@ Json solved_json(const dashpot_modes& first, const dashpot_modes& last) {
           {"missed", last.missed - first.missed}};
 }
 
+Json contact_json(const RunReport& report) {
+  if (!report.contact_force) return nullptr;
+  return {{"greatest_force", report.extremes.contact_force},
+          {"final_force", json_list(*report.contact_force)}};
+}
+
 Json energy_json(const sim::EnergyAudit& energy) {
   const auto stored = [](const sim::StoredEnergy& at) {
     return Json{{"kinetic", at.kinetic}, {"gravity", at.gravity}, {"springs", at.springs}};
@@ -294,8 +308,8 @@ std::string to_table(const RunReport& report) {
                     " ms, " + pace_text(report) + (report.interrupted ? "; interrupted" : "") +
                     "\n\n";
   out += timing_text(report) + statuses_text(loop) + extremes_text(report.extremes) +
-         error_text(loop) + energy_text(report.energy) + fault_text(loop) + messages_text(report) +
-         commands_text(report.commands, loop.commands_refused);
+         contact_text(report) + error_text(loop) + energy_text(report.energy) + fault_text(loop) +
+         messages_text(report) + commands_text(report.commands, loop.commands_refused);
   if (loop.first_modes.tick != 0) {
     out += solved_text(loop.first_modes, loop.last_modes);
     if (!report.friction_text.empty()) out += "\n  " + report.friction_text + "\n";
@@ -355,6 +369,7 @@ std::string to_json(const RunReport& report) {
        {{"joint_speed_share", report.extremes.speed_share},
         {"tip_speed", report.extremes.tip_speed},
         {"kinetic_energy", report.extremes.kinetic_energy}}},
+      {"contact", contact_json(report)},
       {"zero_modes", loop.last_modes.zero_modes},
       {"modes", {{"start", modes_json(loop.first_modes)}, {"end", modes_json(loop.last_modes)}}},
       {"solved", solved_json(loop.first_modes, loop.last_modes)},

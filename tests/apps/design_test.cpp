@@ -155,7 +155,8 @@ TEST(Design, WritesTheMapOfARegion) {
   std::ifstream file(path);
   std::string heading, line;
   std::getline(file, heading);
-  EXPECT_THAT(heading, StartsWith("configuration,worst_mode,natural_frequency,damping_ratio"));
+  EXPECT_THAT(heading,
+              StartsWith("configuration,worst_mode,natural_frequency [rad/s],damping_ratio"));
   for (const Json& sample : result["samples"]) {
     std::getline(file, line);
     std::istringstream fields(line);
