@@ -304,7 +304,7 @@ there already (joint friction, null-space damping). A task_damping is what `befo
 positive semidefinite; a mode that cannot have its ratio is named, with the reason. With --period it
 is one that the sampled loop bears with the margin: the ratio is lowered where it has to be, with
 --region the whole matrix, and where that will not do, the exit status is 1. It is 1 as well where
-a region's damping has less than half of the ratio wanted somewhere, or more than is allowed.
+a region's damping has less than a tenth of the ratio wanted somewhere, or more than is allowed.
 )";
 
 }  // namespace
