@@ -61,7 +61,7 @@ class Log(Dict[str, Dict[str, npt.NDArray[Any]]]):
                 for label in np.unique(labels[there])}
 
 
-_KINDS = np.array(_core.mode_kinds)
+_KINDS = np.array(_core.mode_kinds())
 
 
 def _logged_mode(fields: dict[str, npt.NDArray[Any]], rows: IntArray, columns: IntArray) -> LoggedMode:

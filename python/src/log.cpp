@@ -172,15 +172,20 @@ nb::tuple read_log(const std::string& path) {
   return nb::make_tuple(result, malformed, damage);
 }
 
+/// Returns the names of the numbers in modes_t::kind and sampled_modes_t::kind, in their order.
+nb::list mode_kinds() {
+  nb::list names;
+  for (int kind = modes_t::UNDERDAMPED; kind <= sampled_modes_t::ALTERNATING; ++kind) {
+    names.append(analysis::to_text(static_cast<analysis::ModeKind>(kind)));
+  }
+  return names;
+}
+
 }  // namespace
 
 void add_log(nb::module_& m) {
   m.def("read_log", &read_log, nb::arg("path"));
-  nb::list kinds;
-  for (int kind = modes_t::UNDERDAMPED; kind <= sampled_modes_t::ALTERNATING; ++kind) {
-    kinds.append(analysis::to_text(static_cast<analysis::ModeKind>(kind)));
-  }
-  m.attr("mode_kinds") = kinds;
+  m.def("mode_kinds", &mode_kinds);
 }
 
 }  // namespace dashpot::python
