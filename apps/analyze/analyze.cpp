@@ -1,10 +1,9 @@
-#include <dashpot/apps/analyze/json_writer.hpp>
-#include <dashpot/apps/analyze/report.hpp>
-#include <dashpot/apps/analyze/system_file.hpp>
-#include <dashpot/apps/analyze/table_writer.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/system_report.hpp>
 
 #include <unistd.h>
 #include <CLI/CLI.hpp>

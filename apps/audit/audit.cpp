@@ -1,9 +1,9 @@
 #include <dashpot/analysis/system.hpp>
-#include <dashpot/apps/audit/audit_writer.hpp>
+#include <dashpot/apps/audit/audit_report.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/dynamics.hpp>
 
 #include <CLI/CLI.hpp>

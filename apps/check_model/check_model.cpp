@@ -1,10 +1,10 @@
-#include <dashpot/apps/analyze/json_writer.hpp>
-#include <dashpot/apps/check_model/check_model_writer.hpp>
+#include <dashpot/apps/check_model/check_model_report.hpp>
 #include <dashpot/apps/check_model/config_change.hpp>
 #include <dashpot/apps/check_model/torque_file.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/controller/config.hpp>
 
 #include <CLI/CLI.hpp>

@@ -1,20 +1,19 @@
-#include <dashpot/analysis/mode.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/export/mcap_writer.hpp>
-#include <dashpot/apps/messages/message_json.hpp>
+#include <dashpot/apps/report/message_json.hpp>
+#include <dashpot/apps/report/modes.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
+#include <vector>
 
 namespace dashpot::apps {
 namespace {
@@ -56,28 +55,20 @@ class McapExport {
 class CsvExport {
  public:
   explicit CsvExport(const std::string& path) : file_("--csv", path) {
-    file_.write(
-        "time [s],tick,label,natural_frequency [rad/s],damping_ratio,real_1 [1/s],imag_1 [1/s],"
-        "real_2 [1/s],imag_2 [1/s],kind,natural_frequency_bound [rad/s],damping_ratio_bound\n");
+    file_.write(csv_of({}, fields_));
   }
-  void take(const modes_t& m) {
-    if (!first_) first_ = m.utime;
-    const double time = 1e-6 * (static_cast<double>(m.utime) - static_cast<double>(*first_));
-    for (std::size_t i = 0; i < m.label.size(); ++i) {
-      std::array<char, 400> line{};
-      std::snprintf(line.data(), line.size(),
-                    "%.6f,%lld,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%s,%.17g,%.17g\n", time,
-                    static_cast<long long>(m.tick), m.label[i], m.natural_frequency[i],
-                    m.damping_ratio[i], m.eigenvalue_real[i][0], m.eigenvalue_imag[i][0],
-                    m.eigenvalue_real[i][1], m.eigenvalue_imag[i][1],
-                    analysis::to_text(static_cast<analysis::ModeKind>(m.kind[i])),
-                    m.natural_frequency_bound[i], m.damping_ratio_bound[i]);
-      file_.write(line.data());
+  void take(const modes_t& message) {
+    if (!first_) first_ = message.utime;
+    std::vector<LoopMode> modes = loop_modes(message);
+    for (LoopMode& mode : modes) {
+      mode.time = 1e-6 * (static_cast<double>(message.utime) - static_cast<double>(*first_));
     }
+    file_.write(csv_of(modes, fields_, false));
   }
   void finish() { file_.finish(); }
 
  private:
+  const std::vector<Field<LoopMode>> fields_ = mode_fields();
   OutputFile file_;
   std::optional<std::int64_t> first_;
 };

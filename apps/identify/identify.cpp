@@ -1,10 +1,10 @@
-#include <dashpot/apps/analyze/json_writer.hpp>
 #include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/identify/identify.hpp>
 #include <dashpot/apps/identify/identify_plot.hpp>
+#include <dashpot/apps/report/json.hpp>
 
 #include <CLI/CLI.hpp>
 #include <chrono>

@@ -1,9 +1,9 @@
 #include <dashpot/apps/cli/drives_option.hpp>
-#include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -130,10 +130,9 @@ std::vector<std::string> numbers(const Eigen::VectorXd& values) {
 /// One row for each joint.
 std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics,
                          const JointVector& q, const JointVector& qd) {
-  TextTable table;
-  table.add_column(TextTable::Align::kRight, {"", "joint"});
-  table.add_column(TextTable::Align::kLeft, {"", "name"});
-  table.add_column(TextTable::Align::kLeft, {"", "type"});
+  TextTable table({{TextTable::Align::kRight, {"", "joint"}},
+                   {TextTable::Align::kLeft, {"", "name"}},
+                   {TextTable::Align::kLeft, {"", "type"}}});
   std::vector<std::vector<std::string>> columns;
   const auto add = [&](const std::string& above, const std::string& name,
                        const Eigen::VectorXd& values) {
@@ -172,8 +171,7 @@ std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics
 
 /// Rows under joint numbers.
 std::string matrix_table(const Eigen::MatrixXd& matrix, const std::vector<std::string>& names) {
-  TextTable table;
-  table.add_column(TextTable::Align::kLeft, {""});
+  TextTable table({{TextTable::Align::kLeft, {""}}});
   std::vector<std::vector<std::string>> columns;
   for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
     table.add_column(TextTable::Align::kPoint, {std::to_string(j + 1)});
@@ -188,9 +186,8 @@ std::string matrix_table(const Eigen::MatrixXd& matrix, const std::vector<std::s
 }
 
 std::string tip_table(const DynamicsResult& dynamics) {
-  TextTable table;
-  table.add_column(TextTable::Align::kLeft, {"", ""});
-  table.add_column(TextTable::Align::kPoint, {"", "position"});
+  TextTable table(
+      {{TextTable::Align::kLeft, {"", ""}}, {TextTable::Align::kPoint, {"", "position"}}});
   for (const char* axis : {"x axis", "y axis", "z axis"})
     table.add_column(TextTable::Align::kPoint, {"tip's", axis});
   table.add_column(TextTable::Align::kPoint, {"Jdot qd", "linear"});
@@ -216,8 +213,7 @@ std::string rotors_text(const InspectOptions& options, const RobotModel& model) 
             "\n  Source: " + std::string(drives.source) +
             ".\n  Doubt: " + std::string(drives.doubt) + ".\n";
     if (!drives.values(drives.viscous_friction).isZero(0)) {
-      TextTable table;
-      table.add_column(TextTable::Align::kLeft, {""});
+      TextTable table({{TextTable::Align::kLeft, {""}}});
       for (int i = 1; i <= drives.joints; ++i) {
         table.add_column(TextTable::Align::kPoint, {std::to_string(i)});
       }

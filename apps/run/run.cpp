@@ -3,8 +3,8 @@
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/identify/identify.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/apps/run/csv_sink.hpp>
 #include <dashpot/apps/run/run_report.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>

@@ -1,9 +1,8 @@
-#include <dashpot/apps/analyze/json_writer.hpp>
-#include <dashpot/apps/audit/audit_writer.hpp>
+#include <dashpot/apps/audit/audit_report.hpp>
 #include <dashpot/apps/cli/drives_option.hpp>
-#include <dashpot/apps/cli/matrix_json.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
-#include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/modes.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/printable.hpp>
@@ -15,7 +14,6 @@
 namespace dashpot::apps {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Align = TextTable::Align;
 
 Json to_json(const controller::Distribution& found) {
@@ -35,13 +33,12 @@ std::string modes_table(const AuditTask& task, const controller::PostureAudit& p
   const analysis::Spectrum<>& spectrum = posture.spectrum;
   const Eigen::VectorXd& with_rotors = posture.rotors.damping_ratios;
   const bool compares = with_rotors.size() == spectrum.modes.size();
-  TextTable table;
-  table.add_column(Align::kRight, {"", "mode"});
-  table.add_column(Align::kPoint, {"natural", "rad/s"});
-  table.add_column(Align::kPoint, {"damping", "ratio"});
-  table.add_column(Align::kPoint, {"", "meant"});
-  table.add_column(Align::kLeft, {"", "kind"});
-  table.add_column(Align::kPoint, {"fastest", "1/s"});
+  TextTable table({{Align::kRight, {"", "mode"}},
+                   {Align::kPoint, {"natural", "rad/s"}},
+                   {Align::kPoint, {"damping", "ratio"}},
+                   {Align::kPoint, {"", "meant"}},
+                   {Align::kLeft, {"", "kind"}},
+                   {Align::kPoint, {"fastest", "1/s"}}});
   if (compares) table.add_column(Align::kPoint, {"ratio with", "rotors"});
   for (int i = 0; i < spectrum.modes.size(); ++i) {
     const analysis::Mode<>& mode = spectrum.modes[i];
@@ -131,8 +128,7 @@ std::string posture_table(const AuditTask& task, const AuditReport& report) {
 
 std::string workspace_table(const AuditTask& task, const AuditReport& report) {
   const controller::WorkspaceAudit& found = *report.workspace;
-  TextTable table;
-  table.add_column(Align::kLeft, {""});
+  TextTable table({{Align::kLeft, {""}}});
   for (const char* name : {"median", "5 %", "95 %", "worst"}) {
     table.add_column(Align::kPoint, {name});
   }
