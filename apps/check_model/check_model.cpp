@@ -27,6 +27,7 @@ using controller::ModelCheck;
 struct CheckModelOptions {
   std::vector<std::string> files;
   std::string config, positions, torques, write;
+  FileHints hints;
   bool json = false;
 };
 
@@ -103,7 +104,8 @@ CheckModelReport check_files(const CheckModelOptions& options, const Config& con
     show_progress(
         static_cast<double>(report.files.size()) / static_cast<double>(options.files.size() + 1),
         "reading " + path);
-    TorqueFile file = read_torque_file(path, config.model, options.positions, options.torques);
+    TorqueFile file =
+        read_torque_file(path, config.model, options.positions, options.torques, options.hints);
     for (const std::string& note : file.notes) {
       report.notes.push_back(path);
       report.notes.back().append(": ").append(note);
@@ -142,6 +144,15 @@ void add_check_model(CLI::App& program) {
   command
       ->add_option("--torques", options->torques,
                    "Columns of the joints' torques, in the model's order")
+      ->option_text("NAME,...");
+  command
+      ->add_option("--rate", options->hints.rate,
+                   "Samples in a second, of files without a column of time")
+      ->option_text("HZ")
+      ->check(CLI::Range(1e-9, 1e9));
+  command
+      ->add_option("--columns", options->hints.columns,
+                   "Names and units of all columns, of files without a line of them")
       ->option_text("NAME,...");
   command
       ->add_option("--write", options->write,

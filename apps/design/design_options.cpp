@@ -109,7 +109,8 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
 
 void check(const DesignOptions& options) {
   if (options.file.empty() == options.arm.urdf.empty()) {
-    throw InputError("FILE", "give a file, or --urdf with --base and --tip");
+    throw InputError("FILE", options.file.empty() ? "give a file, or --urdf with --base and --tip"
+                                                  : "does not go with --urdf: give one of them");
   }
   const ArmOptions& arm = options.arm;
   if (!arm.urdf.empty() && (arm.base.empty() || arm.tip.empty())) {

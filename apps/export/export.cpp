@@ -75,7 +75,7 @@ class CsvExport {
 
 void export_log(const ExportOptions& options) {
   if (options.mcap.empty() && options.csv.empty()) {
-    throw CLI::ValidationError("export", "--mcap or --csv is needed");
+    throw InputError("--mcap, --csv", "one of them is needed");
   }
   check_outputs({{"--mcap", options.mcap}, {"--csv", options.csv}}, {{"the log", options.log}});
   lcmtypes::MessageHandlers handlers;
