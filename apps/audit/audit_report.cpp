@@ -7,9 +7,7 @@
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/printable.hpp>
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 namespace dashpot::apps {
 namespace {
@@ -162,27 +160,12 @@ std::string suggestion_table(const AuditTask& task, const AuditReport& report) {
   std::string text = "\nDamping for a ratio of " + ratio + " at q; smallest ratio with it " +
                      format_number(found.smallest_ratio, 4) + "\n";
   TextTable table;
-  std::vector<std::vector<std::string>> columns;
   for (Eigen::Index j = 0; j < found.damping.cols(); ++j) {
-    table.add_column(Align::kPoint, {});
     const Eigen::VectorXd column = found.damping.col(j);
-    columns.push_back(format_column({column.begin(), column.end()}, 6));
-  }
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    std::vector<std::string> row;
-    row.reserve(columns.size());
-    for (const auto& column : columns) row.push_back(column[i]);
-    table.add_row(row);
+    table.add_column(Align::kPoint, {}, format_column({column.begin(), column.end()}, 6));
   }
   return text + table.text() + "\n  Nearest diagonal: " + format_list(found.diagonal, 4) +
          "; smallest ratio with it " + format_number(found.diagonal_smallest_ratio, 4) + "\n";
-}
-
-std::string shortest(double value) {
-  if (!std::isfinite(value)) return std::isinf(value) ? (value > 0 ? "inf" : "-inf") : "";
-  std::array<char, 40> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.17g", value);
-  return buffer.data();
 }
 
 void rotors_json(const AuditTask& task, const controller::PostureAudit& posture, Json& result) {
@@ -273,9 +256,9 @@ std::string csv_heading(const controller::RobotModel& model) {
 std::string csv_line(std::int64_t i, const controller::JointVector& q,
                      const controller::PostureNumbers& numbers) {
   std::string text = std::to_string(i);
-  for (const double value : q) text += "," + shortest(value);
-  return text + "," + shortest(numbers.smallest_ratio) + "," + shortest(numbers.fastest_pole) +
-         "," + shortest(numbers.gain_margin) + "," + std::to_string(numbers.zero_modes) + "," +
+  for (const double value : q) text += "," + csv_text(value);
+  return text + "," + csv_text(numbers.smallest_ratio) + "," + csv_text(numbers.fastest_pole) +
+         "," + csv_text(numbers.gain_margin) + "," + std::to_string(numbers.zero_modes) + "," +
          (numbers.singular ? "1" : "0") + "\n";
 }
 

@@ -200,22 +200,15 @@ class Writer {
     for (const double time : response.times) times.push_back(format_time(time));
     const double negligible = 1e-13 * largest(response, part);
     for (Eigen::Index first = 0; first < n; first += kColumns) {
-      std::vector<std::vector<std::string>> columns = {times};
-      TextTable table({{Align::kPoint, {"t, s"}}});
+      TextTable table;
+      table.add_column(Align::kPoint, {"t, s"}, times);
       for (Eigen::Index i = first; i < std::min(first + kColumns, n); ++i) {
-        table.add_column(Align::kRight, {joint_name(i)});
         std::vector<double> values;
         for (const analysis::Motion& motion : response.motions) {
           const double value = (motion.*part)[i];
           values.push_back(std::abs(value) <= negligible ? 0 : value);
         }
-        columns.push_back(format_column(values, 5));
-      }
-      for (std::size_t k = 0; k < times.size(); ++k) {
-        std::vector<std::string> row(columns.size());
-        std::transform(columns.begin(), columns.end(), row.begin(),
-                       [k](const std::vector<std::string>& column) { return column[k]; });
-        table.add_row(std::move(row));
+        table.add_column(Align::kRight, {joint_name(i)}, format_column(values, 5));
       }
       if (first > 0) blank_line();
       out_ += table.text();

@@ -34,6 +34,13 @@ void TextTable::add_row(std::vector<std::string> cells) {
   rows_.push_back(std::move(cells));
 }
 
+void TextTable::add_column(Align align, std::vector<std::string> heading,
+                           const std::vector<std::string>& cells) {
+  add_column(align, std::move(heading));
+  if (rows_.empty()) rows_.resize(cells.size());
+  for (std::size_t i = 0; i < cells.size(); ++i) rows_[i].push_back(cells[i]);
+}
+
 std::string TextTable::text() const {
   std::vector<std::vector<std::string>> lines = rows_;
   for (std::size_t i = 0; i < aligns_.size(); ++i) {

@@ -24,6 +24,9 @@ class TextTable {
   /// `heading` has as many lines as that of every other column.
   void add_column(Align align, std::vector<std::string> heading);
   void add_row(std::vector<std::string> cells);
+  /// Adds a column to all rows. A table is filled by columns or by rows.
+  void add_column(Align align, std::vector<std::string> heading,
+                  const std::vector<std::string>& cells);
 
   /// Heading lines and rows, each indented by two spaces and ended by a newline.
   std::string text() const;
