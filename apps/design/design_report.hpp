@@ -48,8 +48,8 @@ std::string design_json(const std::vector<DesignReport>& reports, bool as_list);
 std::string design_table(const std::vector<DesignReport>& reports, bool as_list);
 std::string region_json(const RegionReport& report);
 std::string region_table(const RegionReport& report);
-/// What the answer lacks of what was asked: less than a tenth of the ratio somewhere, or more than
-/// is allowed. Empty if neither.
+/// Returns what the answer lacks of what was asked: less than a tenth of the ratio somewhere, or
+/// more than is allowed. Empty if neither.
 std::string region_complaint(const RegionReport& report);
 /// The map of the worst mode, a line for each configuration after one of headings.
 std::string region_csv(const RegionReport& report);
@@ -59,7 +59,7 @@ std::string region_csv(const RegionReport& report);
 /// (`payload`, per kg) where it has six rows, and by each joint's inertia and friction.
 Json sensitivity_json(const DesignReport& report);
 
-/// The same for people: percent by one percent of diagonal entries, by 1 kg of payload, and by
+/// Writes them for people: percent by one percent of diagonal entries, by 1 kg of payload, and by
 /// inertia and friction in the joints.
 std::string sensitivity_text(const DesignReport& report);
 

@@ -26,12 +26,12 @@ struct Field {
   std::function<std::string(const Record&)> text = {};  ///< of the table, if not that of the value
 };
 
-/// A number of a table as text.
+/// Returns a value as the text of a table.
 std::string cell_text(const Json& value, int digits);
-/// A number in CSV: empty if it is NaN.
+/// Returns a value as a cell in CSV; empty if it is NaN.
 std::string csv_text(const Json& value);
 
-/// A list of objects.
+/// Returns a list of objects.
 template <class Record>
 Json json_of(const std::vector<Record>& records, const std::vector<Field<Record>>& fields) {
   Json list = Json::array();
@@ -44,7 +44,7 @@ Json json_of(const std::vector<Record>& records, const std::vector<Field<Record>
   return list;
 }
 
-/// A line for each record, after one of headings if `headed`.
+/// Returns a line for each record, after one of headings if `headed`.
 template <class Record>
 std::string csv_of(const std::vector<Record>& records, const std::vector<Field<Record>>& fields,
                    bool headed = true) {
@@ -65,7 +65,7 @@ std::string csv_of(const std::vector<Record>& records, const std::vector<Field<R
   return text;
 }
 
-/// Aligned columns with headings.
+/// Returns aligned columns with headings.
 template <class Record>
 std::string table_of(const std::vector<Record>& records, const std::vector<Field<Record>>& fields) {
   TextTable table;

@@ -10,9 +10,9 @@ namespace dashpot::apps {
 /// Every number of a report can be read back exactly; what is NaN or infinite is null.
 using Json = nlohmann::ordered_json;
 
-/// [re, im].
+/// Returns [re, im].
 Json json_complex(const analysis::Complex& value);
-/// The entries of a vector.
+/// Returns the entries of a vector.
 template <class Derived>
 Json json_list(const Eigen::MatrixBase<Derived>& vector) {
   Json list = Json::array();
@@ -25,16 +25,17 @@ Json json_list(const Eigen::MatrixBase<Derived>& vector) {
   }
   return list;
 }
-/// A list for each row.
+/// Returns a list for each row.
 Json json_rows(const Eigen::MatrixXd& matrix);
 
-/// The modes of a spectrum. docs/command-line.md lists the keys.
+/// Returns the modes of a spectrum. docs/command-line.md lists the keys.
 Json modes_json(const analysis::Spectrum<>& spectrum);
 
-/// Figures, source and doubt of the published drives of this name.
+/// Returns figures, source and doubt of the published drives of this name.
 Json drives_json(const std::string& name);
 
-/// The text of a document: objects take a line for each item, numbers and matrices stay on one.
+/// Returns the text of a document: objects take a line for each item, numbers and matrices stay on
+/// one.
 std::string json_text(const Json& document);
 
 }  // namespace dashpot::apps

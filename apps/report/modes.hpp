@@ -32,10 +32,11 @@ struct ModesTable {
   std::size_t width = 40;
 };
 
-/// The fields of such modes in JSON, CSV and the table.
+/// Returns the fields of such modes in JSON, CSV and the table.
 std::vector<Field<LoopMode>> mode_fields(const ModesTable& table = {});
 
-/// A line that tells at which rates, 1/s, the slow modes decay that an integral of springs makes;
+/// Returns a line that tells at which rates, 1/s, the slow modes decay that an integral of springs
+/// makes;
 /// "" if there are none. `decays` by size.
 std::string integral_text(const std::vector<double>& decays);
 

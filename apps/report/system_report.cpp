@@ -85,8 +85,8 @@ using Align = TextTable::Align;
 constexpr std::size_t kWidth = 100;
 constexpr const char* kShapeHeading = "shape, relative to its largest entry (phase if over 10 deg)";
 
-/// What follows the real part of the first eigenvalue: the imaginary part of a complex pair, or the
-/// second of two real ones.
+/// Returns what follows the real part of the first eigenvalue: the imaginary part of a complex
+/// pair, or the second of two real ones.
 std::string second_eigenvalue(const analysis::Mode<>& mode) {
   const analysis::Complex first = mode.eigenvalues[0];
   if (first.imag() == 0) return format_number(mode.eigenvalues[1].real(), 6);

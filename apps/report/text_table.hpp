@@ -50,7 +50,7 @@ std::string format_bound(double bound);
 /// rounds to zero is "0".
 std::vector<std::string> format_column(const std::vector<double>& values, int digits);
 
-/// "1 mode", "3 modes"; `none` stands for 0.
+/// Returns "1 mode" or "3 modes"; `none` stands for 0.
 std::string count(std::int64_t n, const std::string& what, const char* none = "0");
 
 /// "q1" for the first coordinate, i = 0.
