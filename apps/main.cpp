@@ -1,21 +1,29 @@
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cctype>
+#include <cerrno>
 #include <cstddef>
 #include <cstdio>
+#include <cstring>
 #include <exception>
 #include <new>
+#include <numeric>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace dashpot::apps {
 namespace {
 
 constexpr int kFailure = 1;
 constexpr int kBadInput = 2;
+constexpr int kInterrupted = 130;
 
 /// Says what went wrong, and returns `status`.
 int report(const std::string& message, int status) {
@@ -23,22 +31,64 @@ int report(const std::string& message, int status) {
   return status;
 }
 
-/// Says which subcommand `word` may mean, the one with the longest common beginning, or names all
-/// of them; empty if it is one.
-std::string nearest_subcommand(const CLI::App& program, const std::string& word) {
-  std::string nearest, all;
-  std::size_t longest = 1;  // a single letter says nothing
-  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
-    const std::string name = command->get_name();
-    if (command->check_name(word)) return "";
-    all += (all.empty() ? "" : ", ") + name;
-    const auto end = std::mismatch(name.begin(), name.end(), word.begin(), word.end()).first;
-    const auto common = static_cast<std::size_t>(end - name.begin());
-    if (common <= longest) continue;
-    longest = common;
-    nearest = name;
+/// How many letters have to be changed, added or left out to make one word of the other.
+std::size_t distance(const std::string& one, const std::string& other) {
+  std::vector<std::size_t> row(other.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= one.size(); ++i) {
+    std::size_t diagonal = std::exchange(row[0], i);
+    for (std::size_t j = 1; j <= other.size(); ++j) {
+      const std::size_t replaced = diagonal + (std::tolower(one[i - 1]) != other[j - 1] ? 1 : 0);
+      diagonal = std::exchange(row[j], std::min({replaced, row[j] + 1, row[j - 1] + 1}));
+    }
   }
-  return nearest.empty() ? "there are " + all : "did you mean " + nearest + "?";
+  return row.back();
+}
+
+/// The name that `word` may have been meant to be: a beginning of it, or few letters away; or "".
+std::string nearest(const std::string& word, const std::vector<std::string>& names) {
+  std::string result;
+  std::size_t least = 1 + word.size() / 3;
+  for (const std::string& name : names) {
+    const std::size_t letters =
+        word.size() > 2 && name.starts_with(word) ? 0 : distance(word, name);
+    if (letters > least || (letters == least && !result.empty())) continue;
+    least = letters;
+    result = name;
+  }
+  return result;
+}
+
+/// Says which subcommand `word` may mean, or names all of them; empty if it is one.
+std::string meant_subcommand(const CLI::App& program, const std::string& word) {
+  std::vector<std::string> names;
+  std::string all;
+  for (const CLI::App* command : program.get_subcommands([](const CLI::App*) { return true; })) {
+    if (command->check_name(word)) return "";
+    all += (all.empty() ? "" : ", ") + command->get_name();
+    names.push_back(command->get_name());
+    for (const std::string& alias : command->get_aliases()) names.push_back(alias);
+  }
+  if (word == "help" || word == "version") return "dashpot --" + word + " is meant";
+  const std::string name = nearest(word, names);
+  return name.empty() ? "there are " + all : "did you mean " + name + "?";
+}
+
+/// "; did you mean --json?" for the first of the words that is an option nobody knows; or "".
+std::string meant_option(const CLI::App& command, int argc, char** argv) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  for (int i = 1; i < argc; ++i) {
+    std::string word = argv[i];
+    word.resize(std::min(word.size(), word.find('=')));
+    if (!word.starts_with("--") || word.size() < 4) continue;
+    if (std::find(names.begin(), names.end(), word) != names.end()) continue;
+    const std::string name = nearest(word, names);
+    return name.empty() ? "" : "; did you mean " + name + "?";
+  }
+  return "";
 }
 
 int run(int argc, char** argv) {
@@ -61,7 +111,7 @@ int run(int argc, char** argv) {
   add_fake_driver(program);
 
   if (argc > 1 && argv[1][0] != '-') {
-    const std::string meant = nearest_subcommand(program, argv[1]);
+    const std::string meant = meant_subcommand(program, argv[1]);
     if (!meant.empty()) {
       return report("dashpot: '" + std::string(argv[1]) + "' is no subcommand; " + meant +
                         " (dashpot --help)",
@@ -78,9 +128,15 @@ int run(int argc, char** argv) {
     return report("dashpot: a subcommand is needed (dashpot --help)", kBadInput);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return program.exit(error);  // --help, --version
-    return report(name() + ": " + error.what() + " (" + name() + " --help)", kBadInput);
+    const auto chosen = program.get_subcommands();
+    const bool unknown = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+    const std::string meant =
+        unknown ? meant_option(chosen.empty() ? program : *chosen.front(), argc, argv) : "";
+    return report(name() + ": " + error.what() + meant + " (" + name() + " --help)", kBadInput);
   } catch (const InputError& error) {
     return report(name() + ": " + error.what(), kBadInput);
+  } catch (const Interrupted& end) {
+    return report(name() + ": interrupted: " + end.what(), kInterrupted);
   } catch (const std::bad_alloc&) {
     return report(name() + ": out of memory", kFailure);
   } catch (const std::exception& error) {
@@ -95,12 +151,15 @@ void print(const std::string& text) {
 }
 
 void print_styled(const std::string& text) {
+  clear_progress();
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0) {
-    throw std::runtime_error("cannot write to standard output");
+    throw std::runtime_error(std::string("cannot write to standard output: ") +
+                             std::strerror(errno));
   }
 }
 
 void print_error(const std::string& message) {
+  clear_progress();
   std::fprintf(stderr, "%s\n", controller::one_line(message).c_str());
 }
 

@@ -11,6 +11,7 @@ namespace dashpot::lcmtypes {
 inline constexpr const char* kStateChannel = "DASHPOT_STATE";
 inline constexpr const char* kModesChannel = "DASHPOT_MODES";
 inline constexpr const char* kSampledModesChannel = "DASHPOT_SAMPLED_MODES";
+inline constexpr const char* kContactChannel = "DASHPOT_CONTACT";
 inline constexpr const char* kCommandChannel = "DASHPOT_COMMAND";
 
 /// Returns the environment's LCM_DEFAULT_URL, or else udpm://239.255.76.67:7667?ttl=0: multicast

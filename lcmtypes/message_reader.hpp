@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/lcmtypes/bus.hpp>
+#include <dashpot/lcmtypes/contact_t.hpp>
 #include <dashpot/lcmtypes/log_file.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
 #include <dashpot/lcmtypes/sampled_modes_t.hpp>
@@ -20,6 +21,7 @@ struct MessageHandlers {
   std::function<void(const state_t&)> on_state;
   std::function<void(const modes_t&)> on_modes;
   std::function<void(const sampled_modes_t&)> on_sampled_modes;
+  std::function<void(const contact_t&)> on_contact;
   std::int64_t malformed = 0;  ///< messages on our channels that were not handed on
 
   /// Decodes a message and hands it on. Ignores other channels.
@@ -55,6 +57,8 @@ class LogReader {
   bool read() { return file_.read(); }
   /// Returns the time of the event read last, us since 1970-01-01 UTC.
   std::int64_t utime() const { return file_.event().utime; }
+  /// Returns where the event read last begins, bytes.
+  std::uint64_t offset() const noexcept { return file_.offset(); }
   /// Hands on the event read last.
   void handle();
   /// Returns what was found wrong with the log so far; "" if nothing. See

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/controller/latest.hpp>
+#include <dashpot/lcmtypes/contact_t.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
 #include <dashpot/lcmtypes/publish/sample_queue.hpp>
 #include <dashpot/lcmtypes/sampled_modes_t.hpp>
@@ -100,6 +101,7 @@ class Publisher {
   ModesSample published_modes_;  ///< published last; without joints before the first
   std::uint64_t published_number_ = 0;
   state_t state_message_;
+  contact_t contact_message_;
   modes_t modes_message_;
   sampled_modes_t sampled_message_;
   std::vector<std::uint8_t> bytes_;

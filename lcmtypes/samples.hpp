@@ -4,7 +4,9 @@
 #include <dashpot/controller/snapshot.hpp>
 #include <dashpot/lcmtypes/command_verdict.hpp>
 
+#include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 
 namespace dashpot::lcmtypes {
 
@@ -22,6 +24,7 @@ struct StateSample {
   std::int64_t utime = 0;  ///< beginning of the tick, us since 1970-01-01 UTC
   controller::Snapshot snapshot;
   LoopHealth health;
+  std::optional<Eigen::Vector3d> contact_force;  ///< on the tip, base axes, N; where it is known
 };
 
 /// The modes at one configuration.

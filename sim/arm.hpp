@@ -57,6 +57,10 @@ class Arm : public System {
   /// Returns the linear and angular velocity of the tip, m/s and rad/s, in the base's axes.
   Vector6 tip_twist(const JointVector& q, const JointVector& qd) noexcept;
 
+  /// Returns the force of the wall on the tip in a state, N, in the base's axes; zero without a
+  /// wall.
+  Eigen::Vector3d wall_force(const StateVector& y) noexcept;
+
   /// Returns the highest natural frequency of the elastic gears at q with all drives free, rad/s;
   /// zero if all are rigid.
   double fastest_gear(const JointVector& q);

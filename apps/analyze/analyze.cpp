@@ -1,9 +1,9 @@
-#include <dashpot/apps/analyze/json_writer.hpp>
-#include <dashpot/apps/analyze/report.hpp>
-#include <dashpot/apps/analyze/system_file.hpp>
-#include <dashpot/apps/analyze/table_writer.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/system_file.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/system_report.hpp>
 
 #include <unistd.h>
 #include <CLI/CLI.hpp>
@@ -27,7 +27,9 @@ struct AnalyzeOptions {
   analysis::Pivot pivot = analysis::Pivot::kLargest;
 };
 
-std::vector<Report> make_reports(const SystemFile& file, const AnalyzeOptions& options) {
+/// `interrupted`: how many are done if Ctrl-C ended it early; otherwise "".
+std::vector<Report> make_reports(const SystemFile& file, const AnalyzeOptions& options,
+                                 std::string& interrupted) {
   std::vector<analysis::System<>> systems;
   for (const SystemEntry& entry : file.entries) {
     try {
@@ -40,25 +42,28 @@ std::vector<Report> make_reports(const SystemFile& file, const AnalyzeOptions& o
   spectrum.soft_frequency = options.soft_frequency;
   spectrum.residual = options.residual;
   std::vector<Report> reports;
-  for (std::size_t i = 0; i < systems.size(); ++i) {
+  const auto each = [&](const SystemEntry& entry) {
     try {
-      reports.push_back(make_report(file.entries[i], systems[i], spectrum, options.pivot));
+      reports.push_back(make_report(entry, systems[reports.size()], spectrum, options.pivot));
     } catch (const analysis::InvalidSystem& error) {
-      throw file.entries[i].error(error);
+      throw entry.error(error);
     }
-  }
+  };
+  interrupted = for_each_shown(file.entries, each, "systems");
   return reports;
 }
 
 void run_analyze(const AnalyzeOptions& options) try {
   const SystemFile file = read_systems(options.file);
-  const std::vector<Report> reports = make_reports(file, options);
+  std::string interrupted;
+  const std::vector<Report> reports = make_reports(file, options, interrupted);
   const bool bold = isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
   if (options.json) {
     print(to_json(reports, file.is_list));
   } else {  // a table of numbers: no text of the file is in it
     print_styled(to_table(reports, file.is_list, bold));
   }
+  if (!interrupted.empty()) throw Interrupted(interrupted);
 } catch (const InputError& error) {
   throw error.in_file(options.file);
 }

@@ -1,9 +1,9 @@
 #include <dashpot/analysis/system.hpp>
-#include <dashpot/apps/audit/audit_writer.hpp>
+#include <dashpot/apps/audit/audit_report.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/dynamics.hpp>
 
 #include <CLI/CLI.hpp>
@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -77,8 +76,6 @@ class Workers {
  private:
   /// `shows`: whether this thread shows the progress.
   void work(bool shows, std::exception_ptr& error) {
-    using Clock = std::chrono::steady_clock;
-    Clock::time_point shown = Clock::now();
     try {
       while (!stopped_ && !StopSignal::given()) {
         const std::int64_t first = next_.fetch_add(kPosturesAtATime);
@@ -86,8 +83,7 @@ class Workers {
         const std::int64_t size = std::min(kPosturesAtATime, postures_.count - first);
         const std::vector<PostureNumbers> found = postures_.numbers(first, size);
         std::copy(found.begin(), found.end(), numbers_.begin() + first);
-        if (!shows || Clock::now() - shown < std::chrono::milliseconds(100)) continue;
-        shown = Clock::now();
+        if (!shows) continue;
         show_progress(
             std::min(0.999, static_cast<double>(next_) / static_cast<double>(postures_.count)));
       }
@@ -104,20 +100,14 @@ class Workers {
   std::atomic<bool> stopped_{false};
 };
 
-void write_csv(OutputFile file, const std::string& path, const Postures& postures,
+void write_csv(OutputFile& file, const Postures& postures,
                const std::vector<PostureNumbers>& numbers) {
-  std::string text = csv_heading(postures.task.model.dof());
-  bool written = true;
+  file.write(csv_heading(postures.task.model));
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const auto index = static_cast<std::int64_t>(i);
-    text += csv_line(index, postures.at(index), numbers[i]);
-    if (text.size() < 100'000 && i + 1 < numbers.size()) continue;
-    written = written && std::fwrite(text.data(), 1, text.size(), file.get()) == text.size();
-    text.clear();
+    file.write(csv_line(index, postures.at(index), numbers[i]));
   }
-  if (std::fclose(file.release()) != 0 || !written) {
-    throw std::runtime_error("--csv: " + path + ": cannot write");
-  }
+  file.finish();
 }
 
 /// The directions of the task in which the arm hardly moves at q, each as its largest parts: "z",
@@ -165,8 +155,7 @@ void suggest(const Audit& audit, const AuditTask& task, AuditReport& report) {
 void run_audit(const AuditCommand& command) try {
   const AuditTask task = read_task(command);
   const Audit audit(task.model, task.options);
-  OutputFile csv(nullptr, std::fclose);
-  if (!command.csv.empty()) csv = open_output("--csv", command.csv);
+  OutputFile csv("--csv", command.csv);
   AuditReport report;
   report.posture = audit.audit(task.q);
   report.posture.rotors = audit.missing_rotors(report.posture);
@@ -179,10 +168,14 @@ void run_audit(const AuditCommand& command) try {
     report.interrupted = static_cast<std::int64_t>(numbers.size()) < postures.count;
     report.workspace = controller::summarize(
         audit, numbers, [&postures](std::int64_t i) { return postures.at(i); });
-    if (csv) write_csv(std::move(csv), command.csv, postures, numbers);
+    if (csv) write_csv(csv, postures, numbers);
     if (!command.plot.empty()) draw_audit(command.plot, task, numbers);
   }
   print(command.json ? audit_json(task, report) : audit_table(task, report));
+  if (report.interrupted) {
+    throw Interrupted(std::to_string(report.workspace->samples) + " of " +
+                      std::to_string(postures.count) + " postures were audited");
+  }
 } catch (const std::invalid_argument& error) {
   throw InputError("", error.what());
 }

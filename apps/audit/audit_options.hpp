@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/apps/design/design_options.hpp>
+#include <dashpot/apps/cli/arm_option.hpp>
 #include <dashpot/controller/audit.hpp>
 
 #include <CLI/App.hpp>

@@ -1,6 +1,6 @@
-#include <dashpot/apps/audit/audit_writer.hpp>
+#include <dashpot/apps/audit/audit_report.hpp>
 #include <dashpot/apps/cli/gnuplot.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/printable.hpp>
 

@@ -1,9 +1,10 @@
-#include <dashpot/apps/analyze/json_writer.hpp>
-#include <dashpot/apps/check_model/check_model_writer.hpp>
+#include <dashpot/apps/check_model/check_model_report.hpp>
 #include <dashpot/apps/check_model/config_change.hpp>
 #include <dashpot/apps/check_model/torque_file.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/terminal.hpp>
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/controller/config.hpp>
 
 #include <CLI/CLI.hpp>
@@ -26,6 +27,7 @@ using controller::ModelCheck;
 struct CheckModelOptions {
   std::vector<std::string> files;
   std::string config, positions, torques, write;
+  FileHints hints;
   bool json = false;
 };
 
@@ -89,11 +91,9 @@ void write_config(const CheckModelOptions& options, const Config& config,
   bool kept = true;
   const std::string text = changed_config(controller::read_regular_file(options.config),
                                           changes_for(options, config, check), kept);
-  OutputFile file = open_output("--write", options.write);
-  if (std::fwrite(text.data(), 1, text.size(), file.get()) != text.size() ||
-      std::fflush(file.get()) != 0) {
-    throw InputError("--write", options.write + ": cannot be written");
-  }
+  OutputFile file("--write", options.write);
+  file.write(text);
+  file.finish();
   if (!kept) report.notes.push_back("the comments of " + options.config + " were not kept");
 }
 
@@ -101,7 +101,11 @@ CheckModelReport check_files(const CheckModelOptions& options, const Config& con
   CheckModelReport report;
   std::vector<controller::TorqueRecord> records;
   for (const std::string& path : options.files) {
-    TorqueFile file = read_torque_file(path, config.model, options.positions, options.torques);
+    show_progress(
+        static_cast<double>(report.files.size()) / static_cast<double>(options.files.size() + 1),
+        "reading " + path);
+    TorqueFile file =
+        read_torque_file(path, config.model, options.positions, options.torques, options.hints);
     for (const std::string& note : file.notes) {
       report.notes.push_back(path);
       report.notes.back().append(": ").append(note);
@@ -110,6 +114,9 @@ CheckModelReport check_files(const CheckModelOptions& options, const Config& con
     report.files.push_back(path);
   }
   for (const Joint& joint : config.model.joints()) report.joints.push_back(joint.name);
+  show_progress(
+      static_cast<double>(report.files.size()) / static_cast<double>(options.files.size() + 1),
+      "comparing torques");
   try {
     report.check = controller::check_model(config.robot, records);
   } catch (const controller::InvalidModel&) {
@@ -137,6 +144,15 @@ void add_check_model(CLI::App& program) {
   command
       ->add_option("--torques", options->torques,
                    "Columns of the joints' torques, in the model's order")
+      ->option_text("NAME,...");
+  command
+      ->add_option("--rate", options->hints.rate,
+                   "Samples in a second, of files without a column of time")
+      ->option_text("HZ")
+      ->check(CLI::Range(1e-9, 1e9));
+  command
+      ->add_option("--columns", options->hints.columns,
+                   "Names and units of all columns, of files without a line of them")
       ->option_text("NAME,...");
   command
       ->add_option("--write", options->write,

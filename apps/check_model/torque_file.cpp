@@ -272,11 +272,12 @@ void check_velocities(TorqueFile& file, const Columns& columns) {
 }  // namespace
 
 TorqueFile read_torque_file(const std::string& path, const RobotModel& model,
-                            const std::string& positions, const std::string& torques) try {
-  const MotionFile file = [&path] {
+                            const std::string& positions, const std::string& torques,
+                            const FileHints& hints) try {
+  const MotionFile file = [&path, &hints] {
     try {
       if (std::optional<MotionFile> driver = read_driver_log(path)) return *std::move(driver);
-      return read_motion_file(path);
+      return read_motion_file(path, hints);
     } catch (const InputError& error) {
       // The file's name comes in front below.
       const std::string text = error.what();

@@ -1,11 +1,10 @@
 #include <dashpot/apps/cli/drives_option.hpp>
-#include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/input_error.hpp>
 
-#include <cstdio>
 #include <limits>
 #include <sstream>
 
@@ -36,7 +35,7 @@ void take_accepted(const std::string& accepted, controller::ModelOptions& model)
 
 void warn_of(const controller::RobotModel& model) {
   for (const std::string& warning : model.warnings()) {
-    std::fprintf(stderr, "warning: %s\n", warning.c_str());
+    print_error("warning: " + warning);
   }
 }
 
@@ -75,16 +74,6 @@ void take_gears(const GearOptions& options, const controller::RobotModel& plain,
   if (options.position_sensor == "link") {
     model.position_sensor = controller::PositionSensor::kLink;
   }
-}
-
-nlohmann::ordered_json drives_json(const std::string& name) {
-  const controller::Drives& drives = controller::find_drives(name);
-  return {{"name", drives.name},
-          {"reflected_inertia", json_list(drives.values(drives.reflected_inertia))},
-          {"viscous_friction", json_list(drives.values(drives.viscous_friction))},
-          {"coulomb_friction", json_list(drives.values(drives.coulomb_friction))},
-          {"source", drives.source},
-          {"doubt", drives.doubt}};
 }
 
 CLI::Validator not_empty() {

@@ -3,7 +3,6 @@
 #include <dashpot/controller/robot_model.hpp>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 #include <string>
 
 namespace dashpot::apps {
@@ -38,9 +37,6 @@ void add_gear_options(CLI::App& command, GearOptions& options);
 /// Has `model` take the gears of an arm with the joints of `plain`. Throws InputError.
 void take_gears(const GearOptions& options, const controller::RobotModel& plain,
                 controller::ModelOptions& model);
-
-/// Figures, source and doubt of the published drives of this name.
-nlohmann::ordered_json drives_json(const std::string& name);
 
 /// Refuses the name "".
 CLI::Validator not_empty();

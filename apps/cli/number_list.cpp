@@ -23,6 +23,19 @@ std::vector<std::string> split(const std::string& text) {
   return words;
 }
 
+/// Refuses a list of another length than `expected` says.
+[[noreturn]] void refuse_length(const std::string& option, const std::vector<std::string>& words,
+                                const std::string& expected) {
+  const std::string& only = words.front();
+  const std::size_t end = only.find_last_not_of(' ');
+  const bool spaces = words.size() == 1 && end != std::string::npos &&
+                      only.find_first_of("0123456789", only.find(' ')) < end + 1 &&
+                      only.find(' ') < end;
+  throw InputError(option, std::to_string(words.size()) +
+                               (words.size() == 1 ? " number" : " numbers") + ", expected " +
+                               expected + (spaces ? ", with commas between them" : ""));
+}
+
 double parse(const std::string& option, const std::string& word, const std::string& unit,
              double none = controller::kNoNone) {
   if (!std::isnan(none) && word == "none") return none;
@@ -39,8 +52,7 @@ Eigen::VectorXd parse_quantities(const std::string& option, const std::string& t
                                  const Units& units) {
   const std::vector<std::string> words = split(text);
   if (words.size() != units.size()) {
-    throw InputError(option, std::to_string(words.size()) + " numbers, expected " +
-                                 std::to_string(units.size()));
+    refuse_length(option, words, std::to_string(units.size()));
   }
   Eigen::VectorXd values(static_cast<Eigen::Index>(units.size()));
   for (std::size_t i = 0; i < words.size(); ++i) {
@@ -59,8 +71,7 @@ Eigen::VectorXd quantities_per_joint(const std::string& option, const std::strin
   const std::vector<std::string> words = split(text);
   const std::size_t given = words.size();
   if (given != 1 && given != units.size()) {
-    throw InputError(
-        option, std::to_string(given) + " numbers, expected 1 or " + std::to_string(units.size()));
+    refuse_length(option, words, "1 or " + std::to_string(units.size()));
   }
   Eigen::VectorXd values(static_cast<Eigen::Index>(units.size()));
   for (std::size_t i = 0; i < units.size(); ++i) {

@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <stdexcept>
 #include <system_error>
 
 namespace dashpot::apps {
@@ -34,10 +35,27 @@ bool same_file(const NamedFile& one, const NamedFile& other) {
 
 }  // namespace
 
-OutputFile open_output(const std::string& option, const std::string& path) {
-  OutputFile file(std::fopen(path.c_str(), "w"), std::fclose);
-  if (!file) throw InputError(option, path + ": cannot write: " + std::strerror(errno));
-  return file;
+OutputFile::OutputFile(const std::string& option, const std::string& path)
+    : name_(option + ": " + path) {
+  if (path.empty()) return;
+  file_.reset(std::fopen(path.c_str(), "w"));
+  if (!file_) throw InputError(option, path + ": cannot write: " + std::strerror(errno));
+}
+
+void OutputFile::write(std::string_view text) {
+  if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size()) fail();
+}
+
+void OutputFile::flush() {
+  if (std::fflush(file_.get()) != 0) fail();
+}
+
+void OutputFile::finish() {
+  if (file_ && std::fclose(file_.release()) != 0) fail();
+}
+
+void OutputFile::fail() const {
+  throw std::runtime_error(name_ + ": cannot write: " + std::strerror(errno));
 }
 
 void check_outputs(const std::vector<NamedFile>& outputs, const std::vector<NamedFile>& inputs) {

@@ -2,14 +2,33 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace dashpot::apps {
 
-using OutputFile = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
+/// A file to write, which the user has named with an option, or none.
+class OutputFile {
+ public:
+  OutputFile() = default;
+  /// Opens `path`, or none if it is empty. Throws InputError that names `option` and the path.
+  OutputFile(const std::string& option, const std::string& path);
 
-/// A file to write, which the user has named with `option`. Throws InputError.
-OutputFile open_output(const std::string& option, const std::string& path);
+  explicit operator bool() const noexcept { return file_ != nullptr; }
+  /// Writes text. Throws std::runtime_error that names option, path and reason, such as a full
+  /// disk.
+  void write(std::string_view text);
+  /// Has the system take all that was written. Throws likewise.
+  void flush();
+  /// Flushes and closes, if a file is open. Throws likewise.
+  void finish();
+
+ private:
+  [[noreturn]] void fail() const;
+
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file_{nullptr, std::fclose};
+  std::string name_;  ///< option and path
+};
 
 /// A file that the user has named.
 struct NamedFile {

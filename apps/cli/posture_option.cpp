@@ -47,7 +47,9 @@ void PosturesOption::add(CLI::App& command) {
   command.add_option("--samples", samples, "Postures spread over the position limits")
       ->check(CLI::Range(std::int64_t{1}, std::int64_t{10'000'000}))
       ->option_text("N");
-  command.add_option("--seed", seed, "Of the samples")->option_text("S (1)");
+  command.add_option("--seed", seed, "Of the samples")
+      ->check(CLI::Range(0.0, 1.8e19))
+      ->option_text("S (1)");
   command.add_option("--spread", spread, "Samples no further than this from --q")
       ->transform(positive("rad", "an angle in rad"))
       ->option_text("R");

@@ -12,9 +12,9 @@ namespace dashpot::apps {
 
 /// For the help text of the program and of each subcommand.
 inline constexpr const char* kExitStatusHelp =
-    "Exit status: 0 if all went well, 2 if the input or the command line is bad, 1 if anything "
-    "else\n"
-    "failed.";
+    "Exit status: 0 if all went well, 2 if the input or the command line is bad, 130 if Ctrl-C "
+    "ended\n"
+    "it early, 1 if anything else failed.";
 
 /// For that of subcommands that take physical quantities.
 inline constexpr const char* kUnitsHelp =

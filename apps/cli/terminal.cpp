@@ -3,13 +3,24 @@
 
 #include <sys/ioctl.h>
 #include <unistd.h>
+#include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <sstream>
 
 namespace dashpot::apps {
 namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// The task whose progress is shown.
+struct {
+  Clock::time_point begin, shown_at;
+  bool begun = false, shown = false;
+} task;
 
 std::atomic<bool> stop_given = false;  // other threads read it
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler writes it");
@@ -46,16 +57,26 @@ bool on_terminal() {
   return isatty(STDOUT_FILENO) != 0;
 }
 
-void show_progress(double done) {
+void show_progress(double done, const std::string& note) {
+  constexpr auto kQuick = std::chrono::seconds(1);  // a task that needs no sign of life
+  constexpr auto kRedraw = std::chrono::milliseconds(100);
   constexpr std::size_t kWidth = 40;
+  if (!(done < 1)) return clear_progress();
   if (isatty(STDERR_FILENO) == 0) return;
-  const auto filled = static_cast<std::size_t>(kWidth * done);
+  const auto now = Clock::now();
+  if (!task.begun) task = {now, now, true, false};
+  if (now - task.begin < kQuick || (task.shown && now - task.shown_at < kRedraw)) return;
+  task.shown_at = now;
+  task.shown = true;
+  const auto filled = static_cast<std::size_t>(kWidth * std::max(0.0, done));
   const std::string bar = std::string(filled, '#') + std::string(kWidth - filled, ' ');
-  if (done < 1) {
-    std::fprintf(stderr, "\r[%s] %3.0f %%", bar.c_str(), 100 * done);
-  } else {
-    std::fputs("\r\033[K", stderr);
-  }
+  std::fprintf(stderr, "\r\033[K[%s] %2.0f %%%s%s", bar.c_str(), std::floor(100 * done),
+               note.empty() ? "" : ", ", note.c_str());
+}
+
+void clear_progress() {
+  if (task.shown) std::fputs("\r\033[K", stderr);
+  task = {};
 }
 
 // Second screen, cursor hidden, long lines cut off instead of wrapped; and back.

@@ -1,4 +1,5 @@
 #pragma once
+#include <stdexcept>
 #include <string>
 
 namespace dashpot::apps {
@@ -11,12 +12,44 @@ class StopSignal {
   static bool given();
 };
 
+/// Ends the program with exit status 130, as shells tell of Ctrl-C, after what there is was
+/// printed. The message says how much was done.
+class Interrupted : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// Whether standard output is a terminal.
 bool on_terminal();
 
-/// Shows on the last line of a terminal how much is done, from 0 to 1, which clears the line again.
-/// Does nothing where standard error is no terminal.
-void show_progress(double done);
+/// Shows on the last line of a terminal how much of a task is done, from 0 to 1, and `note` behind
+/// it: now and then, once the task takes longer than a second. Does nothing where standard error is
+/// no terminal. One thread at a time.
+void show_progress(double done, const std::string& note = "");
+/// Clears that line; the next one belongs to another task. show_progress(1) and whatever is printed
+/// do so as well.
+void clear_progress();
+
+/// Calls `call` with each of `items`, showing how many are done, until Ctrl-C, which takes effect
+/// from the second one on. Returns "" if all are done, otherwise "3 of 9 WHAT are done".
+template <class Items, class Call>
+std::string for_each_shown(const Items& items, const Call& call, const std::string& what) {
+  if (items.size() < 2) {
+    for (const auto& item : items) call(item);
+    return "";
+  }
+  const StopSignal stop;
+  std::size_t done = 0;
+  for (const auto& item : items) {
+    if (done > 0 && StopSignal::given()) {
+      return std::to_string(done) + " of " + std::to_string(items.size()) + " " + what +
+             " are done";
+    }
+    show_progress(static_cast<double>(done++) / static_cast<double>(items.size()));
+    call(item);
+  }
+  return "";
+}
 
 /// The whole terminal for a text that is drawn again and again in its place; what was there before
 /// comes back at the end.

@@ -157,7 +157,22 @@ command_t make_command(const CommandOptions& options, const state_t& state) {
   return command;
 }
 
+/// Refuses what is wrong whatever the loop is. Throws InputError.
+void check(const CommandOptions& options) {
+  state_t any{};
+  any.fault_tick = 1;
+  any.n = 1;
+  for (const std::string* list :
+       {&options.joint_position, &options.joint_stiffness, &options.joint_damping,
+        &options.null_stiffness, &options.null_damping}) {
+    const auto commas = std::count(list->begin(), list->end(), ',');
+    any.n = std::max(any.n, 1 + static_cast<std::int32_t>(std::min<std::ptrdiff_t>(commas, 15)));
+  }
+  make_command(options, any);
+}
+
 void send(const CommandOptions& options) {
+  check(options);
   const std::string url = options.url.empty() ? lcmtypes::default_url() : options.url;
   std::shared_ptr<lcm::LCM> bus;
   try {

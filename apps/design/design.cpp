@@ -1,13 +1,12 @@
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/analysis/design/damping_fit.hpp>
-#include <dashpot/apps/analyze/system_file.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
+#include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/design/design_options.hpp>
 #include <dashpot/apps/design/design_report.hpp>
-#include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/model/posture_sequence.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
@@ -215,7 +214,14 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
   region.structure = options.damping_structure();
   region.ceiling = options.largest_ratio;
   region.threads = options.threads;
-  region.progress = show_progress;
+  const StopSignal stop;
+  region.progress = [](double done) {
+    if (StopSignal::given()) {
+      throw Interrupted("the search for the region was " + format_number(100 * done, 2) +
+                        " % done; it has no damping to show before its end");
+    }
+    show_progress(done);
+  };
   region.gain_margin = options.limit.gain_margin;
   if (options.period) {
     region.loop = [&](std::size_t i) { return limit_of(file.entries[i], options).loop; };
@@ -237,13 +243,6 @@ RegionReport report_on_region(const SystemFile& file, const DesignOptions& optio
   }
 }
 
-void write_csv(OutputFile file, const std::string& path, const std::string& text) {
-  const bool written = std::fwrite(text.data(), 1, text.size(), file.get()) == text.size();
-  if (std::fclose(file.release()) != 0 || !written) {
-    throw std::runtime_error("--csv: " + path + ": cannot write");
-  }
-}
-
 /// The postures that the options ask for; the one of --q if they list none.
 std::vector<JointVector> region_postures(const DesignOptions& options,
                                          const controller::RobotModel& model) {
@@ -258,8 +257,7 @@ std::vector<JointVector> region_postures(const DesignOptions& options,
   return postures;
 }
 
-/// `csv`: may be null.
-void run_design(const DesignOptions& options, OutputFile csv) try {
+void run_design(const DesignOptions& options, OutputFile& csv) try {
   SystemFile file;
   std::optional<controller::RobotModel> model;
   std::vector<JointVector> postures;
@@ -278,23 +276,21 @@ void run_design(const DesignOptions& options, OutputFile csv) try {
   if (options.region) {
     RegionReport report = report_on_region(file, options);
     report.postures = std::move(postures);
-    if (csv) write_csv(std::move(csv), options.csv, region_csv(report));
+    if (csv) csv.write(region_csv(report));
+    csv.finish();
     print(options.json ? region_json(report) : region_table(report));
     const std::string complaint = region_complaint(report);
     if (!complaint.empty()) throw std::runtime_error(complaint);
     return;
   }
   std::vector<DesignReport> reports;
-  for (const SystemEntry& entry : file.entries) {
-    const bool several = options.period && file.entries.size() > 1;
-    if (several) {
-      show_progress(static_cast<double>(reports.size()) / static_cast<double>(file.entries.size()));
-    }
+  const auto each = [&](const SystemEntry& entry) {
     reports.push_back(model ? report_on_arm(options, entry, *model, postures[0])
                             : report_on(entry, options));
-    if (several && reports.size() == file.entries.size()) show_progress(1);
-  }
+  };
+  const std::string interrupted = for_each_shown(file.entries, each, "systems");
   print(options.json ? design_json(reports, file.is_list) : design_table(reports, file.is_list));
+  if (!interrupted.empty()) throw Interrupted(interrupted);
 } catch (const InputError& error) {
   if (options.file.empty()) throw;
   throw error.in_file(options.file);
@@ -324,9 +320,8 @@ void add_design(CLI::App& program) {
                                               {"--urdf", options->arm.urdf},
                                               {"--postures", options->postures.file},
                                               {"--log", options->postures.log}});
-    OutputFile csv(nullptr, std::fclose);
-    if (!options->csv.empty()) csv = open_output("--csv", options->csv);
-    run_design(*options, std::move(csv));
+    OutputFile csv("--csv", options->csv);
+    run_design(*options, csv);
   });
 }
 

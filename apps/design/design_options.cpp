@@ -56,36 +56,6 @@ void add_loop(CLI::App& command, DesignOptions& options) {
 
 }  // namespace
 
-void add_model_options(CLI::App& command, ArmOptions& arm) {
-  const auto add = [&](const char* name, std::string& text, const char* help, const char* words) {
-    command.add_option(name, text, help)->option_text(words);
-  };
-  add("--viscous-friction", arm.viscous_friction, "In the joints, N m s/rad; urdf: the file's",
-      "a,b,...|x|urdf|drives (0)");
-  add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
-      "a,b,...|x (0)");
-  command.add_option("--drives", arm.drives, kDrivesHelp)->option_text("NAME")->check(not_empty());
-  add_gear_options(command, arm.gears);
-  add("--payload", arm.payload,
-      "Mass at the tip, its center in the tip's axes, its inertia about that; kg, m, kg m^2",
-      "m[,x,y,z[,xx,yy,zz[,xy,xz,yz]]] (0)");
-  add_accept_inertias(command, arm.accept_inertias);
-}
-
-void add_loop_options(CLI::App& command, analysis::SampledLoop& loop, double& integral_time) {
-  command.add_option("--delay", loop.delay, "Ticks from a command to its effect, beyond the hold")
-      ->check(CLI::Range(0, 100))
-      ->option_text("N (0)");
-  command.add_option("--cutoff", loop.torque_cutoff, "Of a low-pass on the torque; 0: none")
-      ->transform(quantity("Hz", 0, kLargest, "a frequency in Hz"))
-      ->option_text("HZ (0)");
-  command.add_flag("--difference-velocity", loop.difference_velocity,
-                   "The controller takes velocities from positions");
-  command.add_option("--integral-time", integral_time, "Of the integral of the springs; 0: none")
-      ->transform(quantity("s", 0, kLargest, "a time in s"))
-      ->option_text("S (0)");
-}
-
 DampingStructure DesignOptions::damping_structure() const {
   return structures().at(structure);
 }
@@ -139,7 +109,8 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
 
 void check(const DesignOptions& options) {
   if (options.file.empty() == options.arm.urdf.empty()) {
-    throw InputError("FILE", "give a file, or --urdf with --base and --tip");
+    throw InputError("FILE", options.file.empty() ? "give a file, or --urdf with --base and --tip"
+                                                  : "does not go with --urdf: give one of them");
   }
   const ArmOptions& arm = options.arm;
   if (!arm.urdf.empty() && (arm.base.empty() || arm.tip.empty())) {

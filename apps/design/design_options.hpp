@@ -1,6 +1,6 @@
 #pragma once
 #include <dashpot/analysis/damping_sampled.hpp>
-#include <dashpot/apps/design/design_arm.hpp>
+#include <dashpot/apps/cli/arm_option.hpp>
 
 #include <CLI/App.hpp>
 #include <optional>
@@ -30,13 +30,6 @@ struct DesignOptions {
   analysis::DampingStructure damping_structure() const;
   analysis::DampingTarget target() const;
 };
-
-/// Adds the options of the arm's inertia and friction: reflected inertia, payload and so on.
-void add_model_options(CLI::App& command, ArmOptions& arm);
-
-/// Adds those of the loop but for its period: delay, low-pass, differenced velocity, and the time
-/// of the integral of the springs, s.
-void add_loop_options(CLI::App& command, analysis::SampledLoop& loop, double& integral_time);
 
 /// Adds the options to the subcommand; they are written to `options`.
 void add_design_options(CLI::App& command, DesignOptions& options);

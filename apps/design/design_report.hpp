@@ -2,7 +2,7 @@
 #include <dashpot/analysis/damping_region.hpp>
 #include <dashpot/analysis/damping_sampled.hpp>
 #include <dashpot/analysis/sensitivity.hpp>
-#include <dashpot/apps/analyze/report.hpp>
+#include <dashpot/apps/report/system_report.hpp>
 
 #include <optional>
 #include <string>
@@ -43,5 +43,24 @@ struct RegionReport {
   std::vector<controller::JointVector> postures = {};  ///< of an arm, one for each sample
   std::optional<analysis::LoopLimit> limit = {};  ///< none if the loops are taken for continuous
 };
+
+std::string design_json(const std::vector<DesignReport>& reports, bool as_list);
+std::string design_table(const std::vector<DesignReport>& reports, bool as_list);
+std::string region_json(const RegionReport& report);
+std::string region_table(const RegionReport& report);
+/// Returns what the answer lacks of what was asked: less than a tenth of the ratio somewhere, or
+/// more than is allowed. Empty if neither.
+std::string region_complaint(const RegionReport& report);
+/// The map of the worst mode, a line for each configuration after one of headings.
+std::string region_csv(const RegionReport& report);
+
+/// How frequencies and ratios answer to the entries of the matrices, one object for each mode: the
+/// gradients by M, C, K, by C_C and K_C where there is a jacobian, by a point mass at its origin
+/// (`payload`, per kg) where it has six rows, and by each joint's inertia and friction.
+Json sensitivity_json(const DesignReport& report);
+
+/// Writes them for people: percent by one percent of diagonal entries, by 1 kg of payload, and by
+/// inertia and friction in the joints.
+std::string sensitivity_text(const DesignReport& report);
 
 }  // namespace dashpot::apps

@@ -1,6 +1,6 @@
-#include <dashpot/apps/cli/matrix_json.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
-#include <dashpot/apps/design/design_trends.hpp>
+#include <dashpot/apps/design/design_report.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 
 #include <cmath>
 #include <functional>
@@ -10,7 +10,6 @@
 namespace dashpot::apps {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Align = TextTable::Align;
 using analysis::ModeGradient;
 using analysis::ModeSensitivity;
@@ -49,8 +48,7 @@ using Row = std::function<VectorXd(const ModeSensitivity&, double value)>;
 
 std::string trend_table(const DesignReport& report, Number number, const char* column, Index count,
                         const Row& row) {
-  TextTable table;
-  table.add_column(Align::kRight, {"mode"});
+  TextTable table({{Align::kRight, {"mode"}}});
   for (Index i = 0; i < count; ++i) {
     table.add_column(Align::kPoint, {column + std::to_string(i + 1)});
   }
@@ -129,10 +127,8 @@ std::string sensitivity_text(const DesignReport& report) {
       trend_table(report, ratio, "q", n, by_joint(&ModeSensitivity::damping, ratio, 0.1));
   if (!task || report.impedance.jacobian->rows() != 6) return text;
   text += "\n  Percent by 0.1 kg more at the tip: of the ratio, of the frequency\n";
-  TextTable table;
-  table.add_column(Align::kRight, {"mode"});
-  table.add_column(Align::kPoint, {"ratio"});
-  table.add_column(Align::kPoint, {"frequency"});
+  TextTable table(
+      {{Align::kRight, {"mode"}}, {Align::kPoint, {"ratio"}}, {Align::kPoint, {"frequency"}}});
   for (std::size_t k = 0; k < report.sensitivities.size(); ++k) {
     const analysis::Mode<>& mode = report.after.spectrum.modes[static_cast<int>(k)];
     const ModeGradient& by = report.sensitivities[k].mass;

@@ -224,7 +224,8 @@ void drive(const DriveOptions& options) {
   print(options.json ? to_json(report) : to_table(report));
   if (failure) std::rethrow_exception(failure);
   if (report.messages.send_errors > 0 && !options.log.empty()) {
-    throw std::runtime_error(std::to_string(report.messages.send_errors) +
+    throw std::runtime_error("--log: " + options.log + ": " +
+                             std::to_string(report.messages.send_errors) +
                              " messages could not be sent or written");
   }
   refuse_latched_fault(report.loop);

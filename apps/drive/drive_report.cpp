@@ -1,4 +1,5 @@
 #include <dashpot/apps/drive/drive_report.hpp>
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/controller/tick_status.hpp>
 #include <dashpot/text/printable.hpp>
 
@@ -10,8 +11,6 @@
 
 namespace dashpot::apps {
 namespace {
-
-using DriveJson = nlohmann::ordered_json;
 
 /// The latency at and below which this share of the commands lies, us.
 double latency_at(const DriveRecord& drive, double share) {
@@ -82,7 +81,7 @@ std::string to_table(const DriveReport& report) {
 
 std::string to_json(const DriveReport& report) {
   const DriveRecord& drive = report.drive;
-  DriveJson json;
+  Json json;
   json["driver"] = lcmtypes::profile_of(report.driver).name;
   json["config"] = report.config;
   json["dry_run"] = report.dry_run;
@@ -101,7 +100,7 @@ std::string to_json(const DriveReport& report) {
   json["restarts"] = report.loop.restarts;
   json["faults"] = report.loop.faults;
   json["fault"] = fault_json(report.loop);
-  DriveJson statuses = DriveJson::object();
+  Json statuses = Json::object();
   for (std::size_t status = 0; status < report.loop.statuses.size(); ++status) {
     if (report.loop.statuses[status] > 0) {
       statuses[status_name(status)] = report.loop.statuses[status];
@@ -109,7 +108,7 @@ std::string to_json(const DriveReport& report) {
   }
   json["tick_statuses"] = statuses;
   json["external_torque"] = std::vector<double>(drive.external.begin(), drive.external.end());
-  json["modes"] = DriveJson::array();
+  json["modes"] = Json::array();
   for (std::uint32_t i = 0; i < report.loop.last_modes.count; ++i) {
     const dashpot_mode& mode = report.loop.last_modes.modes[i];
     json["modes"].push_back(
@@ -120,7 +119,7 @@ std::string to_json(const DriveReport& report) {
                       {"modes", report.messages.modes},
                       {"sampled_modes", report.messages.sampled_modes}};
   if (report.identified) json["identified"] = identify_json(*report.identified);
-  return json.dump(2, ' ', false, DriveJson::error_handler_t::replace) + "\n";
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace dashpot::apps

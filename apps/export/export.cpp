@@ -1,15 +1,19 @@
-#include <dashpot/analysis/mode.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/export/mcap_writer.hpp>
-#include <dashpot/apps/messages/message_json.hpp>
+#include <dashpot/apps/report/message_json.hpp>
+#include <dashpot/apps/report/modes.hpp>
+#include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
+#include <algorithm>
+#include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
+#include <vector>
 
 namespace dashpot::apps {
 namespace {
@@ -27,65 +31,51 @@ std::uint64_t nanoseconds(std::int64_t utime) {
 /// A channel for each kind of message, which appears with its first message.
 class McapExport {
  public:
-  explicit McapExport(const std::string& path) : file_(open_output("--mcap", path)) {
-    writer_.emplace(file_.get());
-  }
+  explicit McapExport(const std::string& path) : file_("--mcap", path), writer_(file_) {}
+
   template <class Message>
-  void take(const char* topic, const char* type, std::uint16_t& channel, const Message& message) {
+  void take(const char* topic, const std::string& type, const Message& message) {
     const nlohmann::ordered_json json = message_json(message);
-    if (channel == 0) {
-      channel = writer_->add_channel(topic, type, json_schema(json, type).dump());
-    }
-    writer_->add_message(channel, nanoseconds(message.utime), json.dump());
+    auto& channel = channels_[topic];
+    if (channel == 0) channel = writer_.add_channel(topic, type, json_schema(json, type).dump());
+    writer_.add_message(channel, nanoseconds(message.utime), json.dump());
   }
   void finish() {
-    writer_->finish();
-    if (std::fclose(file_.release()) != 0) throw std::runtime_error("--mcap: cannot write");
+    writer_.finish();
+    file_.finish();
   }
-
-  std::uint16_t state = 0, modes = 0, sampled = 0;
 
  private:
   OutputFile file_;
-  std::optional<McapWriter> writer_;
+  McapWriter writer_;
+  std::map<std::string, std::uint16_t> channels_;
 };
 
 /// A line for each mode of each message.
 class CsvExport {
  public:
-  explicit CsvExport(const std::string& path) : file_(open_output("--csv", path)) {
-    std::fputs(
-        "time,tick,label,natural_frequency,damping_ratio,real_1,imag_1,real_2,imag_2,kind,"
-        "natural_frequency_bound,damping_ratio_bound\n",
-        file_.get());
+  explicit CsvExport(const std::string& path) : file_("--csv", path) {
+    file_.write(csv_of({}, fields_));
   }
-  void take(const modes_t& m) {
-    if (!first_) first_ = m.utime;
-    const double time = 1e-6 * (static_cast<double>(m.utime) - static_cast<double>(*first_));
-    for (std::size_t i = 0; i < m.label.size(); ++i) {
-      std::fprintf(file_.get(), "%.6f,%lld,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%s,%.17g,%.17g\n",
-                   time, static_cast<long long>(m.tick), m.label[i], m.natural_frequency[i],
-                   m.damping_ratio[i], m.eigenvalue_real[i][0], m.eigenvalue_imag[i][0],
-                   m.eigenvalue_real[i][1], m.eigenvalue_imag[i][1],
-                   analysis::to_text(static_cast<analysis::ModeKind>(m.kind[i])),
-                   m.natural_frequency_bound[i], m.damping_ratio_bound[i]);
+  void take(const modes_t& message) {
+    if (!first_) first_ = message.utime;
+    std::vector<LoopMode> modes = loop_modes(message);
+    for (LoopMode& mode : modes) {
+      mode.time = 1e-6 * (static_cast<double>(message.utime) - static_cast<double>(*first_));
     }
+    file_.write(csv_of(modes, fields_, false));
   }
-  void finish() {
-    const bool failed = std::ferror(file_.get()) != 0;
-    if (std::fclose(file_.release()) != 0 || failed) {
-      throw std::runtime_error("--csv: cannot write");
-    }
-  }
+  void finish() { file_.finish(); }
 
  private:
+  const std::vector<Field<LoopMode>> fields_ = mode_fields();
   OutputFile file_;
   std::optional<std::int64_t> first_;
 };
 
 void export_log(const ExportOptions& options) {
   if (options.mcap.empty() && options.csv.empty()) {
-    throw CLI::ValidationError("export", "--mcap or --csv is needed");
+    throw InputError("--mcap, --csv", "one of them is needed");
   }
   check_outputs({{"--mcap", options.mcap}, {"--csv", options.csv}}, {{"the log", options.log}});
   lcmtypes::MessageHandlers handlers;
@@ -102,32 +92,36 @@ void export_log(const ExportOptions& options) {
   std::optional<CsvExport> csv;
   if (!options.mcap.empty()) mcap.emplace(options.mcap);
   if (!options.csv.empty()) csv.emplace(options.csv);
-  handlers.on_state = [&](const state_t& message) {
-    ++count;
-    if (mcap) mcap->take("DASHPOT_STATE", "dashpot.state_t", mcap->state, message);
+  const auto take = [&](const char* topic, const char* type) {
+    return [&, topic, type](const auto& message) {
+      ++count;
+      if (mcap) mcap->take(topic, type, message);
+    };
   };
-  handlers.on_modes = [&](const modes_t& message) {
-    ++count;
-    if (mcap) mcap->take("DASHPOT_MODES", "dashpot.modes_t", mcap->modes, message);
-    if (csv) csv->take(message);
-  };
-  handlers.on_sampled_modes = [&](const sampled_modes_t& message) {
-    ++count;
-    if (mcap) {
-      mcap->take("DASHPOT_SAMPLED_MODES", "dashpot.sampled_modes_t", mcap->sampled, message);
-    }
-  };
+  handlers.on_state = take(lcmtypes::kStateChannel, "dashpot.state_t");
+  handlers.on_contact = take(lcmtypes::kContactChannel, "dashpot.contact_t");
+  handlers.on_sampled_modes = take(lcmtypes::kSampledModesChannel, "dashpot.sampled_modes_t");
+  handlers.on_modes =
+      [&, take = take(lcmtypes::kModesChannel, "dashpot.modes_t")](const modes_t& message) {
+        take(message);
+        if (csv) csv->take(message);
+      };
+  std::error_code none;
+  const auto size = static_cast<double>(std::filesystem::file_size(options.log, none));
   const StopSignal stop;
-  do {
+  bool more = true;
+  while (more && !StopSignal::given()) {
     reader->handle();
-  } while (!StopSignal::given() && reader->read());
+    show_progress(none ? 0 : static_cast<double>(reader->offset()) / size);
+    more = reader->read();
+  }
   if (!reader->foreign().empty()) throw InputError(options.log, reader->foreign());
   if (mcap) mcap->finish();
   if (csv) csv->finish();
   const std::string damage = reader->damage();
-  print(std::string(StopSignal::given() ? "Interrupted. " : "") + std::to_string(count) +
-        " messages exported, " + std::to_string(handlers.malformed) + " malformed\n" +
-        (damage.empty() ? "" : "The log is " + damage + ".\n"));
+  print(std::to_string(count) + " messages exported, " + std::to_string(handlers.malformed) +
+        " malformed\n" + (damage.empty() ? "" : "The log is " + damage + ".\n"));
+  if (StopSignal::given()) throw Interrupted("the files hold what was exported until then");
 }
 
 }  // namespace

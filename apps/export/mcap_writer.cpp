@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <concepts>
-#include <stdexcept>
 
 namespace dashpot::apps {
 namespace {
@@ -57,15 +56,13 @@ class Fields {
 
 }  // namespace
 
-McapWriter::McapWriter(std::FILE* file) : file_(file) {
+McapWriter::McapWriter(OutputFile& file) : file_(file) {
   write(kMagic);
   write(Fields().text("").text("dashpot").record(kHeader));
 }
 
 void McapWriter::write(std::string_view bytes) {
-  if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) {
-    throw std::runtime_error("--mcap: cannot write");
-  }
+  file_.write(bytes);
   at_ += bytes.size();
 }
 

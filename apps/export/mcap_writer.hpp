@@ -1,7 +1,8 @@
 #pragma once
+#include <dashpot/apps/cli/output_file.hpp>
+
 #include <array>
 #include <cstdint>
-#include <cstdio>
 #include <map>
 #include <string>
 #include <string_view>
@@ -14,7 +15,7 @@ namespace dashpot::apps {
 class McapWriter {
  public:
   /// `file` must outlive the writer. All functions throw std::runtime_error if writing fails.
-  explicit McapWriter(std::FILE* file);
+  explicit McapWriter(OutputFile& file);
 
   /// Adds a channel with the JSON schema of its messages; returns its number.
   std::uint16_t add_channel(const std::string& topic, const std::string& schema_name,
@@ -36,7 +37,7 @@ class McapWriter {
   void write(std::string_view bytes);
   void end_chunk();
 
-  std::FILE* file_;
+  OutputFile& file_;
   std::uint64_t at_ = 0;  ///< bytes written
   std::string summary_;   ///< schemas and channels, as records
   std::string chunk_;     ///< records of the open chunk

@@ -1,10 +1,10 @@
-#include <dashpot/apps/analyze/json_writer.hpp>
 #include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/identify/identify.hpp>
 #include <dashpot/apps/identify/identify_plot.hpp>
+#include <dashpot/apps/report/json.hpp>
 
 #include <CLI/CLI.hpp>
 #include <chrono>
@@ -94,18 +94,14 @@ void add_identify(CLI::App& program) {
     check_outputs({{"--output", options->output}, {"--plot", options->plot}}, inputs);
     if (!options->plot.empty()) check_plot_name(options->plot);
     const StopSignal signal;
-    const auto begin = std::chrono::steady_clock::now();
-    bool shown = false;
-    options->stop = [&](double done) {
-      constexpr auto kQuick = std::chrono::seconds(1);  // needs no sign of life
-      shown = shown || std::chrono::steady_clock::now() - begin > kQuick;
-      if (shown) show_progress(done);
+    options->stop = [](double done) {
+      show_progress(done);
       return StopSignal::given();
     };
     const IdentifyReport report = identify_files(*options);
-    if (shown) show_progress(1);
     if (!options->plot.empty()) draw_identification(options->plot, report);
     print(options->json ? json_text(identify_json(report)) : identify_table(report));
+    if (StopSignal::given()) throw Interrupted("the modes above are those found until then");
   });
 }
 

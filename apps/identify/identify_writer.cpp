@@ -1,7 +1,6 @@
-#include <dashpot/apps/analyze/json_writer.hpp>
-#include <dashpot/apps/cli/matrix_json.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/identify/identify_writer.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 
 #include <algorithm>
 #include <array>

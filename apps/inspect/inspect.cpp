@@ -1,9 +1,9 @@
 #include <dashpot/apps/cli/drives_option.hpp>
-#include <dashpot/apps/cli/matrix_json.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
 #include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/drives.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -24,6 +24,7 @@ using controller::DynamicsResult;
 using controller::Joint;
 using controller::JointVector;
 using controller::RobotModel;
+using Align = TextTable::Align;
 
 struct InspectOptions {
   std::string urdf, base, tip;
@@ -130,26 +131,28 @@ std::vector<std::string> numbers(const Eigen::VectorXd& values) {
 /// One row for each joint.
 std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics,
                          const JointVector& q, const JointVector& qd) {
+  std::vector<std::string> number, name, type;
+  for (const Joint& joint : model.joints()) {
+    number.push_back(std::to_string(number.size() + 1));
+    name.push_back(text::printable(joint.name));
+    type.emplace_back(to_text(joint.type));
+  }
   TextTable table;
-  table.add_column(TextTable::Align::kRight, {"", "joint"});
-  table.add_column(TextTable::Align::kLeft, {"", "name"});
-  table.add_column(TextTable::Align::kLeft, {"", "type"});
-  std::vector<std::vector<std::string>> columns;
-  const auto add = [&](const std::string& above, const std::string& name,
-                       const Eigen::VectorXd& values) {
-    table.add_column(TextTable::Align::kPoint, {above, name});
-    columns.push_back(numbers(values));
+  table.add_column(Align::kRight, {"", "joint"}, number);
+  table.add_column(Align::kLeft, {"", "name"}, name);
+  table.add_column(Align::kLeft, {"", "type"}, type);
+  const auto add = [&](const char* above, const char* below, const Eigen::VectorXd& values) {
+    table.add_column(Align::kPoint, {above, below}, numbers(values));
   };
   add("lower", "limit", model.joint_values(&Joint::lower));
   add("upper", "limit", model.joint_values(&Joint::upper));
   add("velocity", "limit", model.joint_values(&Joint::velocity));
   add("effort", "limit", model.joint_values(&Joint::effort));
-  for (const auto& [name, limit] : {std::pair("acceler.", &Joint::acceleration),
-                                    {"deceler.", &Joint::deceleration},
-                                    {"jerk", &Joint::jerk}}) {
-    if (model.joint_values(limit).array().isFinite().any()) {
-      add(name, "limit", model.joint_values(limit));
-    }
+  for (const auto& [above, limit] : {std::pair("acceler.", &Joint::acceleration),
+                                     {"deceler.", &Joint::deceleration},
+                                     {"jerk", &Joint::jerk}}) {
+    const JointVector values = model.joint_values(limit);
+    if (values.array().isFinite().any()) add(above, "limit", values);
   }
   add("reflected", "inertia", model.joint_values(&Joint::reflected_inertia));
   if (model.elastic_joints() > 0) {
@@ -160,50 +163,31 @@ std::string joints_table(const RobotModel& model, const DynamicsResult& dynamics
   add("", "qd", qd);
   add("Coriolis", "torque", dynamics.coriolis);
   add("gravity", "torque", dynamics.gravity);
-  for (std::size_t i = 0; i < model.joints().size(); ++i) {
-    const Joint& joint = model.joints()[i];
-    std::vector<std::string> row = {std::to_string(i + 1), text::printable(joint.name),
-                                    to_text(joint.type)};
-    for (const auto& column : columns) row.push_back(column[i]);
-    table.add_row(row);
-  }
   return table.text();
 }
 
 /// Rows under joint numbers.
 std::string matrix_table(const Eigen::MatrixXd& matrix, const std::vector<std::string>& names) {
   TextTable table;
-  table.add_column(TextTable::Align::kLeft, {""});
-  std::vector<std::vector<std::string>> columns;
+  table.add_column(Align::kLeft, {""}, names);
   for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
-    table.add_column(TextTable::Align::kPoint, {std::to_string(j + 1)});
-    columns.push_back(numbers(matrix.col(j)));
-  }
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-    std::vector<std::string> row = {names[static_cast<std::size_t>(i)]};
-    for (const auto& column : columns) row.push_back(column[static_cast<std::size_t>(i)]);
-    table.add_row(row);
+    table.add_column(Align::kPoint, {std::to_string(j + 1)}, numbers(matrix.col(j)));
   }
   return table.text();
 }
 
 std::string tip_table(const DynamicsResult& dynamics) {
   TextTable table;
-  table.add_column(TextTable::Align::kLeft, {"", ""});
-  table.add_column(TextTable::Align::kPoint, {"", "position"});
-  for (const char* axis : {"x axis", "y axis", "z axis"})
-    table.add_column(TextTable::Align::kPoint, {"tip's", axis});
-  table.add_column(TextTable::Align::kPoint, {"Jdot qd", "linear"});
-  table.add_column(TextTable::Align::kPoint, {"Jdot qd", "angular"});
-  const std::vector<std::vector<std::string>> columns = {
-      numbers(dynamics.p_BT_B),          numbers(dynamics.R_BT.col(0)),
-      numbers(dynamics.R_BT.col(1)),     numbers(dynamics.R_BT.col(2)),
-      numbers(dynamics.Jdot_qd.head(3)), numbers(dynamics.Jdot_qd.tail(3))};
-  for (std::size_t i = 0; i < 3; ++i) {
-    std::vector<std::string> row = {std::string(1, "xyz"[i])};
-    for (const auto& column : columns) row.push_back(column[i]);
-    table.add_row(row);
-  }
+  table.add_column(Align::kLeft, {"", ""}, {"x", "y", "z"});
+  const auto add = [&](const char* above, const char* below, const Eigen::VectorXd& values) {
+    table.add_column(Align::kPoint, {above, below}, numbers(values));
+  };
+  add("", "position", dynamics.p_BT_B);
+  add("tip's", "x axis", dynamics.R_BT.col(0));
+  add("tip's", "y axis", dynamics.R_BT.col(1));
+  add("tip's", "z axis", dynamics.R_BT.col(2));
+  add("Jdot qd", "linear", dynamics.Jdot_qd.head(3));
+  add("Jdot qd", "angular", dynamics.Jdot_qd.tail(3));
   return table.text();
 }
 
@@ -216,10 +200,9 @@ std::string rotors_text(const InspectOptions& options, const RobotModel& model) 
             "\n  Source: " + std::string(drives.source) +
             ".\n  Doubt: " + std::string(drives.doubt) + ".\n";
     if (!drives.values(drives.viscous_friction).isZero(0)) {
-      TextTable table;
-      table.add_column(TextTable::Align::kLeft, {""});
+      TextTable table({{Align::kLeft, {""}}});
       for (int i = 1; i <= drives.joints; ++i) {
-        table.add_column(TextTable::Align::kPoint, {std::to_string(i)});
+        table.add_column(Align::kPoint, {std::to_string(i)});
       }
       const auto add = [&](const char* name, const auto& figures) {
         std::vector<std::string> row = {name};

@@ -1,4 +1,5 @@
 #include <dashpot/apps/loop/command_report.hpp>
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/controller/tick_status.hpp>
 
 #include <nlohmann/json.hpp>
@@ -10,7 +11,6 @@
 namespace dashpot::apps {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using lcmtypes::CommandVerdict;
 
 std::string latched_text(std::int32_t fault) {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace dashpot::apps {
@@ -50,6 +51,10 @@ class LoopJournal {
   void keep_times(std::int64_t ticks);
   /// Before a tick: takes commands.
   void begin_tick() noexcept;
+  /// The force of a contact on the tip at this tick, N, where it is known. Before note_tick().
+  void note_contact(const std::optional<Eigen::Vector3d>& force) noexcept {
+    state_.contact_force = force;
+  }
   /// After a tick at `utime`, us since 1970-01-01 UTC, that computed for `tick_time` ns, before it
   /// counts. `overran`: it ended after its period.
   void note_tick(std::int64_t utime, std::int32_t status, std::int32_t tick_time) noexcept;

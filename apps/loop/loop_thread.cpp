@@ -103,6 +103,7 @@ void LoopThread::tick(std::int64_t utime) noexcept {
     ++record.overruns;
     ++record.own_overruns;
   }
+  journal_.note_contact(loop_.contact_force());
   journal_.note_tick(utime, status, static_cast<std::int32_t>(time));
   record.simulation = loop_.move();
   journal_.end_tick();

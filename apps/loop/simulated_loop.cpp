@@ -117,6 +117,9 @@ sim::Status ClosedLoop::move() noexcept {
   const sim::Status status = plant_->step(torque_);
   extremes_.kinetic_energy = std::max(extremes_.kinetic_energy, plant_->audit().stored.kinetic);
   if (arm_ == nullptr) return status;
+  if (const auto force = contact_force()) {
+    extremes_.contact_force = std::max(extremes_.contact_force, force->norm());
+  }
   const JointVector velocity = plant_->velocity();
   const JointVector& limit = scene_.arm->config.settings.limits.velocity;
   extremes_.speed_share =
@@ -124,6 +127,11 @@ sim::Status ClosedLoop::move() noexcept {
   extremes_.tip_speed =
       std::max(extremes_.tip_speed, arm_->tip_twist(plant_->position(), velocity).head<3>().norm());
   return status;
+}
+
+std::optional<Eigen::Vector3d> ClosedLoop::contact_force() const noexcept {
+  if (arm_ == nullptr || !scene_.arm->options.wall) return std::nullopt;
+  return arm_->wall_force(plant_->state());
 }
 
 /// One period in the hand, which takes the robot at rest and leaves it at rest.

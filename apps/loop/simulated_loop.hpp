@@ -14,6 +14,7 @@ struct Extremes {
   double speed_share = 0;     ///< of a joint's speed over its limit; 0 for a system of matrices
   double tip_speed = 0;       ///< m/s; likewise
   double kinetic_energy = 0;  ///< J
+  double contact_force = 0;   ///< of the wall, N; 0 without one
 };
 
 /// A scene in motion: a controller and the simulated mechanism, one period at a time:
@@ -57,6 +58,8 @@ class ClosedLoop {
 
   LoopController& controller() noexcept { return controller_; }
   const sim::Plant& plant() const noexcept { return *plant_; }
+  /// Returns the force of the wall on the tip now, N, in the base's axes; nothing without a wall.
+  std::optional<Eigen::Vector3d> contact_force() const noexcept;
   const Extremes& extremes() const noexcept { return extremes_; }
 
  private:

@@ -1,11 +1,11 @@
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/apps/cli/shape_text.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/apps/loop/command_report.hpp>
 #include <dashpot/apps/monitor/monitor_view.hpp>
+#include <dashpot/apps/report/modes.hpp>
 #include <dashpot/controller/tick_status.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -15,10 +15,6 @@ namespace dashpot::apps {
 namespace {
 
 using Align = TextTable::Align;
-
-std::string count(std::int64_t n, const std::string& what) {
-  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-}
 
 std::string fixed(double value, int decimals) {
   std::array<char, 64> buffer{};
@@ -108,14 +104,6 @@ std::string told(const state_t& state) {
     text += "; lowered to " + format_number(state.damping_level, 3) + " of it";
   }
   return text;
-}
-
-Eigen::VectorXcd shape_of(const modes_t& modes, std::size_t i) {
-  Eigen::VectorXcd shape(modes.n);
-  for (std::size_t k = 0; k < static_cast<std::size_t>(modes.n); ++k) {
-    shape[static_cast<Eigen::Index>(k)] = {modes.shape_real[i][k], modes.shape_imag[i][k]};
-  }
-  return shape;
 }
 
 }  // namespace
@@ -219,12 +207,11 @@ std::string MonitorView::commands() const {
 
 std::string MonitorView::joints() const {
   const state_t& state = *state_;
-  TextTable table;
-  table.add_column(Align::kRight, {"joint", ""});
-  table.add_column(Align::kRight, {"position", "rad"});
-  table.add_column(Align::kRight, {"goal", "rad"});
-  table.add_column(Align::kRight, {"velocity", "rad/s"});
-  table.add_column(Align::kRight, {"torque", "N m"});
+  TextTable table({{Align::kRight, {"joint", ""}},
+                   {Align::kRight, {"position", "rad"}},
+                   {Align::kRight, {"goal", "rad"}},
+                   {Align::kRight, {"velocity", "rad/s"}},
+                   {Align::kRight, {"torque", "N m"}}});
   for (std::size_t i = 0; i < static_cast<std::size_t>(state.n); ++i) {
     table.add_row({joint_name(static_cast<Eigen::Index>(i)), fixed(state.joint_position[i], 4),
                    fixed(state.reference_joint_position[i], 4), fixed(state.joint_velocity[i], 4),
@@ -239,33 +226,17 @@ std::string MonitorView::modes_table() const {
                     count(modes.zero_modes, "zero mode") + " at tick " +
                     std::to_string(modes.tick) + ", " + solver_text(modes.origin) + ": " +
                     analysis::to_text(static_cast<analysis::Status>(modes.status)) + "\n\n";
-  TextTable table;
-  table.add_column(Align::kRight, {"mode", ""});
-  table.add_column(Align::kPoint, {"natural", "rad/s"});
-  table.add_column(Align::kPoint, {"frequency", "Hz"});
-  table.add_column(Align::kPoint, {"damping", "ratio"});
-  table.add_column(Align::kLeft, {"kind", ""});
-  table.add_column(Align::kRight, {"error <", "rad/s"});
-  table.add_column(Align::kLeft, {"shape", ""});
-  for (std::size_t i = 0; i < static_cast<std::size_t>(modes.num_modes); ++i) {
-    table.add_row({std::to_string(modes.label[i]), format_number(modes.natural_frequency[i], 6),
-                   format_number(modes.natural_frequency[i] / (2 * std::numbers::pi), 6),
-                   format_number(modes.damping_ratio[i], 6), kind_text(modes.kind[i]),
-                   format_bound(modes.natural_frequency_bound[i]),
-                   format_shape(shape_of(modes, i), 36)});
-  }
-  return out + table.text();
+  return out + table_of(loop_modes(modes), mode_fields({"mode", true, 36}));
 }
 
 std::string MonitorView::sampled_table() const {
   const sampled_modes_t& modes = *sampled_;
   std::string out = "  tick " + std::to_string(modes.tick) + ": " + verdict(modes) + "\n\n";
-  TextTable table;
-  table.add_column(Align::kPoint, {"continuous", "rad/s"});
-  table.add_column(Align::kPoint, {"", "ratio"});
-  table.add_column(Align::kPoint, {"sampled", "rad/s"});
-  table.add_column(Align::kPoint, {"", "ratio"});
-  table.add_column(Align::kLeft, {"kind", ""});
+  TextTable table({{Align::kPoint, {"continuous", "rad/s"}},
+                   {Align::kPoint, {"", "ratio"}},
+                   {Align::kPoint, {"sampled", "rad/s"}},
+                   {Align::kPoint, {"", "ratio"}},
+                   {Align::kLeft, {"kind", ""}}});
   for (std::size_t i = 0; i < static_cast<std::size_t>(modes.num_modes); ++i) {
     table.add_row({format_number(modes.continuous_frequency[i], 6),
                    format_number(modes.continuous_ratio[i], 6),

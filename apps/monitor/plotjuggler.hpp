@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/apps/messages/message_json.hpp>
+#include <dashpot/apps/report/message_json.hpp>
 
 #include <string>
 

@@ -22,7 +22,8 @@ def settled(times, distances, part):
 
 def measure(stem):
     with open(stem + ".csv", encoding="ascii") as file:
-        rows = list(csv.DictReader(file))
+        rows = [{name.split(" [")[0]: cell for name, cell in row.items()}
+                for row in csv.DictReader(file)]
     errors = [[float(row["error_" + axis]) for axis in "xyz"] for row in rows]
     times = [float(row["time"]) for row in rows]
     first = errors[0]

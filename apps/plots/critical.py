@@ -46,8 +46,8 @@ def release(program, path, posture, gains):
                    stdout=subprocess.DEVNULL)
     with open(table, encoding="ascii") as file:
         rows = list(csv.DictReader(file))
-    goal = float(rows[0]["x"]) - START
-    return [float(row["time"]) for row in rows], [1e3 * (float(row["x"]) - goal) for row in rows]
+    goal = float(rows[0]["x [m]"]) - START
+    return [float(row["time [s]"]) for row in rows], [1e3 * (float(row["x [m]"]) - goal) for row in rows]
 
 
 def overshoot(displacement):

@@ -31,7 +31,8 @@ def times(matrix, vector):
 
 def angles(path, rest):
     with open(path, encoding="ascii") as file:
-        return [[float(row["time"])] + [float(row[f"q{i + 1}"]) - q for i, q in enumerate(rest)]
+        return [[float(row["time [s]"])] +
+                [float(row[f"q{i + 1} [rad]"]) - q for i, q in enumerate(rest)]
                 for row in [*csv.DictReader(file)][::STEP]]
 
 

@@ -40,7 +40,8 @@ def main():
     arm = dashpot(program, "inspect", "--urdf", scene["urdf"], "--base", scene["base"], "--tip",
                   scene["tip"], "--q", ",".join(map(repr, rest)))
     with open(csv_path, encoding="ascii") as file:
-        rows = list(csv.DictReader(file))[::STEP]
+        rows = [{name.split(" [")[0]: cell for name, cell in row.items()}
+                for row in [*csv.DictReader(file)][::STEP]]
     start = [float(rows[0][f"q{i + 1}"]) - q for i, q in enumerate(rest)]
     times = [float(row["time"]) for row in rows]
     system = {"mass": arm["mass_matrix"], "jacobian": arm["jacobian"],

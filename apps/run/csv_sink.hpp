@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/controller/robot_model.hpp>
 #include <dashpot/lcmtypes/sink.hpp>
 
 #include <memory>
@@ -7,8 +8,11 @@
 namespace dashpot::apps {
 
 /// Writes a row for each state message: time since the first one (s), then joint positions,
-/// velocities and torques, tip position (m), tip error, and the status of the tick. The first line
-/// names the columns. Throws std::runtime_error that names the file and the reason.
-std::unique_ptr<lcmtypes::Sink> make_csv_sink(const std::string& path);
+/// velocities and torques, tip position (m), tip error, the status of the tick, and the force of a
+/// contact if contact messages come. The first line names the columns with their units; `model`
+/// tells those of the joints, and is null for a system of matrices, whose units nobody knows.
+/// Throws InputError that names the file and the reason.
+std::unique_ptr<lcmtypes::Sink> make_csv_sink(const std::string& path,
+                                              const controller::RobotModel* model);
 
 }  // namespace dashpot::apps

@@ -4,17 +4,17 @@
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/identify/identify.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/apps/run/csv_sink.hpp>
 #include <dashpot/apps/run/run_report.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 
-#include <unistd.h>
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <thread>
@@ -35,40 +35,11 @@ struct Options {
   bool json = false;
 };
 
-constexpr std::chrono::milliseconds kLook{5};      // how often the loop's progress is looked at
-constexpr std::chrono::milliseconds kRedraw{200};  // of the progress on a terminal
-constexpr std::chrono::seconds kLinePeriod{2};     // of the progress elsewhere
+constexpr std::chrono::milliseconds kLook{5};  // how often the loop's progress is looked at
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
-
-/// A line on standard error that says how far the run is: in place on a terminal.
-class Progress {
- public:
-  Progress(std::int64_t ticks, double period)
-      : ticks_(ticks), period_(period), in_place_(isatty(STDERR_FILENO) != 0) {}
-  ~Progress() {
-    if (in_place_) std::fputs("\r\033[K", stderr);
-  }
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
-
-  void show(std::int64_t done, std::int64_t overruns) {
-    const auto now = Clock::now();
-    if (now - shown_at_ < (in_place_ ? std::chrono::milliseconds(kRedraw) : kLinePeriod)) return;
-    shown_at_ = now;
-    const auto time = [this](std::int64_t ticks) { return static_cast<double>(ticks) * period_; };
-    std::fprintf(stderr, "%s%.1f of %.1f s, %lld overruns%s", in_place_ ? "\r\033[K" : "",
-                 time(done), time(ticks_), static_cast<long long>(overruns), in_place_ ? "" : "\n");
-  }
-
- private:
-  std::int64_t ticks_;
-  double period_;
-  bool in_place_;
-  Clock::time_point shown_at_ = Clock::now();
-};
 
 /// Opens what the user has named; a failure is bad input.
 template <class Open>
@@ -95,14 +66,16 @@ std::shared_ptr<lcm::LCM> open_bus(const Options& options) {
   }
 }
 
-std::vector<std::unique_ptr<lcmtypes::Sink>> make_sinks(const Options& options,
+std::vector<std::unique_ptr<lcmtypes::Sink>> make_sinks(const Options& options, const Scene& scene,
                                                         const std::shared_ptr<lcm::LCM>& bus) {
   std::vector<std::unique_ptr<lcmtypes::Sink>> sinks;
   if (bus) sinks.push_back(lcmtypes::make_bus_sink(bus));
   if (!options.log.empty()) {
     sinks.push_back(open_for("--log", [&] { return lcmtypes::make_log_sink(options.log); }));
   }
-  if (!options.csv.empty()) sinks.push_back(make_csv_sink(options.csv));
+  if (!options.csv.empty()) {
+    sinks.push_back(make_csv_sink(options.csv, scene.arm ? &scene.arm->config.model : nullptr));
+  }
   return sinks;
 }
 
@@ -128,30 +101,31 @@ RunReport run_loop(const Options& options, const Scene& scene, ClosedLoop& loop,
   report.pace = options.fast ? Pace::kFast : Pace::kRealTime;
   std::optional<CommandSource> commands;
   if (options.commands) commands.emplace(bus, scene.commands, loop.goal());
-  lcmtypes::Publisher publisher(make_sinks(options, bus));
+  lcmtypes::Publisher publisher(make_sinks(options, scene, bus));
   if (!options.fast) publisher.start();
   const double period = scene.plant.period;
   const std::int64_t ticks = std::max<std::int64_t>(1, std::llround(scene.duration / period));
   const Clock::time_point start = Clock::now();
   LoopThread thread(loop, publisher, commands ? &*commands : nullptr, {report.pace, period, ticks});
-  {
-    Progress progress(ticks, period);
-    thread.start();
-    while (!thread.done()) {
-      std::this_thread::sleep_for(kLook);
-      if (!options.fast) loop.follow_gains();
-      progress.show(thread.ticks(), thread.overruns());
-      if (StopSignal::given()) {
-        thread.stop();
-        report.interrupted = true;
-      }
+  thread.start();
+  while (!thread.done()) {
+    std::this_thread::sleep_for(kLook);
+    if (!options.fast) loop.follow_gains();
+    const auto done = static_cast<double>(thread.ticks());
+    show_progress(std::min(0.999, done / static_cast<double>(ticks)),
+                  format_number(done * period, 3) + " of " + format_number(scene.duration, 3) +
+                      " s, " + std::to_string(thread.overruns()) + " overruns");
+    if (StopSignal::given()) {
+      thread.stop();
+      report.interrupted = true;
     }
-    thread.join();
   }
+  thread.join();
+  clear_progress();
   report.wall_time = seconds_since(start);
   if (loop.refused_steps() > 0) {
-    std::fprintf(stderr, "gains of %d steps of the scenario were refused, the last: %s\n",
-                 loop.refused_steps(), loop.refusal().c_str());
+    print_error("gains of " + std::to_string(loop.refused_steps()) +
+                " steps of the scenario were refused, the last: " + loop.refusal());
   }
   publisher.stop();  // the counters below are final
   report.privileges = thread.privileges();
@@ -223,6 +197,7 @@ void run(const Options& options) {
   report.simulated_time = loop.plant().time();
   report.energy = loop.plant().audit();
   report.extremes = loop.extremes();
+  report.contact_force = loop.contact_force();
   if ((scene.ring_down || options.ring_down) && !report.interrupted) {
     report.ring_down = measure_ring_down(scene, make_controller, StopSignal::given);
     report.interrupted = !report.ring_down;
@@ -234,7 +209,9 @@ void run(const Options& options) {
   }
   print(options.json ? to_json(report) : to_table(report));
   if (report.messages.send_errors > 0 && !(options.log.empty() && options.csv.empty())) {
-    throw std::runtime_error(std::to_string(report.messages.send_errors) +
+    throw std::runtime_error((options.log.empty() ? "" : "--log: " + options.log + ": ") +
+                             (options.csv.empty() ? "" : "--csv: " + options.csv + ": ") +
+                             "cannot write: " + std::to_string(report.messages.send_errors) +
                              " messages could not be written");
   }
   if (report.loop.simulation != sim::Status::kOk) {

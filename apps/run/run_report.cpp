@@ -1,31 +1,19 @@
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/apps/analyze/json_writer.hpp>
 #include <dashpot/apps/cli/drives_option.hpp>
-#include <dashpot/apps/cli/shape_text.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
-#include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/modes.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/apps/run/run_report.hpp>
 #include <dashpot/controller/tick_status.hpp>
 #include <dashpot/text/printable.hpp>
 
-#include <nlohmann/json.hpp>
-
 #include <algorithm>
 #include <cmath>
-#include <numbers>
-#include <span>
 
 namespace dashpot::apps {
 namespace {
 
 using Align = TextTable::Align;
-using Json = nlohmann::ordered_json;
-
-constexpr std::size_t kShapeWidth = 40;
-
-std::string count(std::int64_t n, const std::string& what) {
-  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-}
 
 /// Tick times in us at and below which this share of the ticks lies.
 double percentile(const std::vector<std::int32_t>& sorted, double share) {
@@ -50,57 +38,26 @@ std::string status_text(std::size_t status) {
   return controller::to_text(static_cast<controller::Status>(status));
 }
 
-const char* kind_text(const dashpot_mode& mode) {
-  return analysis::to_text(static_cast<analysis::ModeKind>(mode.kind));
-}
-
-std::span<const dashpot_mode> list(const dashpot_modes& modes) {
-  return {modes.modes, modes.count};
-}
-
-Eigen::VectorXcd shape_of(const dashpot_modes& modes, const dashpot_mode& mode) {
-  Eigen::VectorXcd shape(modes.joints);
-  for (std::uint32_t j = 0; j < modes.joints; ++j) {
-    shape[j] = {mode.shape_real[j], mode.shape_imag[j]};
-  }
-  return shape;
-}
-
 std::string modes_table(const dashpot_modes& modes) {
-  TextTable table;
-  table.add_column(Align::kRight, {"", "label"});
-  table.add_column(Align::kPoint, {"natural", "rad/s"});
-  table.add_column(Align::kPoint, {"frequency", "Hz"});
-  table.add_column(Align::kPoint, {"damping", "ratio"});
-  table.add_column(Align::kLeft, {"", "kind"});
-  table.add_column(Align::kRight, {"error <", "rad/s"});
-  table.add_column(Align::kLeft, {"", "shape"});
-  for (const dashpot_mode& mode : list(modes)) {
-    table.add_row({std::to_string(mode.label), format_number(mode.natural_frequency, 6),
-                   format_number(mode.natural_frequency / (2 * std::numbers::pi), 6),
-                   format_number(mode.damping_ratio, 6), kind_text(mode),
-                   format_bound(mode.natural_frequency_bound),
-                   format_shape(shape_of(modes, mode), kShapeWidth)});
-  }
-  return table.text();
+  return table_of(loop_modes(modes), mode_fields());
 }
 
-std::string ring_down_table(const RingDown& ring_down) {
-  TextTable table;
-  table.add_column(Align::kRight, {"", "label"});
-  table.add_column(Align::kPoint, {"predicted", "rad/s"});
-  table.add_column(Align::kPoint, {"", "ratio"});
-  table.add_column(Align::kPoint, {"sampled", "rad/s"});
-  table.add_column(Align::kPoint, {"", "ratio"});
-  table.add_column(Align::kPoint, {"simulated", "rad/s"});
-  table.add_column(Align::kPoint, {"", "ratio"});
-  for (const RingDownMode& mode : ring_down.modes) {
-    table.add_row({std::to_string(mode.label), format_number(mode.predicted_frequency, 5),
-                   format_number(mode.predicted_ratio, 4), format_number(mode.sampled_frequency, 5),
-                   format_number(mode.sampled_ratio, 4), format_number(mode.measured_frequency, 5),
-                   format_number(mode.measured_ratio, 4)});
-  }
-  return table.text();
+std::vector<Field<RingDownMode>> ring_down_fields() {
+  const auto field = [](const char* key, const char* above, const char* name, int digits,
+                        double RingDownMode::*member) {
+    return Field<RingDownMode>{
+        key, "", {Align::kPoint, {above, name}, digits}, [member](const RingDownMode& m) {
+          return Json(m.*member);
+        }};
+  };
+  using M = RingDownMode;
+  return {{"label", "", {Align::kRight, {"", "label"}}, [](const M& m) { return Json(m.label); }},
+          field("predicted_frequency", "predicted", "rad/s", 5, &M::predicted_frequency),
+          field("predicted_ratio", "", "ratio", 4, &M::predicted_ratio),
+          field("sampled_frequency", "sampled", "rad/s", 5, &M::sampled_frequency),
+          field("sampled_ratio", "", "ratio", 4, &M::sampled_ratio),
+          field("measured_frequency", "simulated", "rad/s", 5, &M::measured_frequency),
+          field("measured_ratio", "", "ratio", 4, &M::measured_ratio)};
 }
 
 std::string stability_text(const RingDown& ring_down) {
@@ -157,6 +114,13 @@ std::string extremes_text(const Extremes& extremes) {
   if (extremes.tip_speed == 0) return "  Greatest " + energy;
   return "  Greatest speed of a joint " + format_number(100 * extremes.speed_share, 3) +
          " % of its limit, of the tip " + format_number(extremes.tip_speed, 3) + " m/s, " + energy;
+}
+
+std::string contact_text(const RunReport& report) {
+  if (!report.contact_force) return "";
+  return "  Force of the wall on the tip: at most " +
+         format_number(report.extremes.contact_force, 3) + " N, at the end " +
+         format_number(report.contact_force->norm(), 3) + " N\n";
 }
 
 /// How the modes were found, in ticks after the first one of the run.
@@ -224,25 +188,7 @@ std::string messages_text(const RunReport& report) {
 }
 
 Json modes_json(const dashpot_modes& modes) {
-  Json result = Json::array();
-  for (const dashpot_mode& mode : list(modes)) {
-    Json eigenvalues = Json::array(), shape = Json::array();
-    for (const auto& value : mode.eigenvalues) eigenvalues.push_back({value[0], value[1]});
-    for (std::uint32_t j = 0; j < modes.joints; ++j) {
-      shape.push_back({mode.shape_real[j], mode.shape_imag[j]});
-    }
-    result.push_back({{"label", mode.label},
-                      {"eigenvalues", eigenvalues},
-                      {"natural_frequency", mode.natural_frequency},
-                      {"damping_ratio", mode.damping_ratio},
-                      {"damped_frequency", mode.damped_frequency},
-                      {"kind", kind_text(mode)},
-                      {"shape", shape},
-                      {"error_bound", mode.eigenvalue_bound},
-                      {"natural_frequency_bound", mode.natural_frequency_bound},
-                      {"damping_ratio_bound", mode.damping_ratio_bound}});
-  }
-  return result;
+  return json_of(loop_modes(modes), mode_fields());
 }
 
 Json solved_json(const dashpot_modes& first, const dashpot_modes& last) {
@@ -253,6 +199,12 @@ Json solved_json(const dashpot_modes& first, const dashpot_modes& last) {
           {"no_springs", last.no_springs - first.no_springs},
           {"failed", last.failed - first.failed},
           {"missed", last.missed - first.missed}};
+}
+
+Json contact_json(const RunReport& report) {
+  if (!report.contact_force) return nullptr;
+  return {{"greatest_force", report.extremes.contact_force},
+          {"final_force", json_list(*report.contact_force)}};
 }
 
 Json energy_json(const sim::EnergyAudit& energy) {
@@ -267,22 +219,12 @@ Json energy_json(const sim::EnergyAudit& energy) {
 }
 
 Json ring_down_json(const RingDown& ring_down) {
-  Json modes = Json::array();
-  for (const RingDownMode& mode : ring_down.modes) {
-    modes.push_back({{"label", mode.label},
-                     {"predicted_frequency", mode.predicted_frequency},
-                     {"predicted_ratio", mode.predicted_ratio},
-                     {"sampled_frequency", mode.sampled_frequency},
-                     {"sampled_ratio", mode.sampled_ratio},
-                     {"measured_frequency", mode.measured_frequency},
-                     {"measured_ratio", mode.measured_ratio}});
-  }
   return {{"releases", ring_down.releases},
           {"residual", ring_down.residual},
           {"growth", ring_down.growth},
           {"gain_margin", ring_down.gain_margin},
           {"integral_decays", ring_down.integral_decays},
-          {"modes", modes}};
+          {"modes", json_of(ring_down.modes, ring_down_fields())}};
 }
 
 }  // namespace
@@ -294,8 +236,8 @@ std::string to_table(const RunReport& report) {
                     " ms, " + pace_text(report) + (report.interrupted ? "; interrupted" : "") +
                     "\n\n";
   out += timing_text(report) + statuses_text(loop) + extremes_text(report.extremes) +
-         error_text(loop) + energy_text(report.energy) + fault_text(loop) + messages_text(report) +
-         commands_text(report.commands, loop.commands_refused);
+         contact_text(report) + error_text(loop) + energy_text(report.energy) + fault_text(loop) +
+         messages_text(report) + commands_text(report.commands, loop.commands_refused);
   if (loop.first_modes.tick != 0) {
     out += solved_text(loop.first_modes, loop.last_modes);
     if (!report.friction_text.empty()) out += "\n  " + report.friction_text + "\n";
@@ -313,7 +255,7 @@ std::string to_table(const RunReport& report) {
   if (report.ring_down) {
     out += "\nRing-down after " + count(report.ring_down->releases, "small release") +
            " (sampled: predicted with the drives of the scene)\n" +
-           ring_down_table(*report.ring_down);
+           table_of(report.ring_down->modes, ring_down_fields());
     out += integral_text(report.ring_down->integral_decays) + stability_text(*report.ring_down);
   }
   if (report.identified) out += "\n" + identify_table(*report.identified);
@@ -355,6 +297,7 @@ std::string to_json(const RunReport& report) {
        {{"joint_speed_share", report.extremes.speed_share},
         {"tip_speed", report.extremes.tip_speed},
         {"kinetic_energy", report.extremes.kinetic_energy}}},
+      {"contact", contact_json(report)},
       {"zero_modes", loop.last_modes.zero_modes},
       {"modes", {{"start", modes_json(loop.first_modes)}, {"end", modes_json(loop.last_modes)}}},
       {"solved", solved_json(loop.first_modes, loop.last_modes)},

@@ -27,6 +27,7 @@ struct RunReport {
   double simulated_time = 0;  ///< s
   sim::EnergyAudit energy;
   Extremes extremes;
+  std::optional<Eigen::Vector3d> contact_force;  ///< of the wall at the end, N; none without one
   lcmtypes::PublisherCounters messages;
   std::optional<CommandReport> commands;     ///< if any were to be taken
   std::optional<IdentifyReport> identified;  ///< what followed an excitation

@@ -1,4 +1,4 @@
-#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/apps/scene/scene_parts.hpp>
 #include <dashpot/controller/config/config_robot.hpp>

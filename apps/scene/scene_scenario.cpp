@@ -1,4 +1,4 @@
-#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/apps/scene/arm_reach.hpp>
 #include <dashpot/apps/scene/scene_parts.hpp>
 #include <dashpot/controller/base/orientation.hpp>

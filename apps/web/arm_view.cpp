@@ -1,6 +1,6 @@
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/apps/cli/matrix_json.hpp>
+#include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/apps/web/arm_view.hpp>
 #include <dashpot/controller/controller.hpp>

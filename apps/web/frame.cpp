@@ -1,6 +1,6 @@
 #include <dashpot/analysis/mode.hpp>
 #include <dashpot/analysis/solver_status.hpp>
-#include <dashpot/apps/messages/message_json.hpp>
+#include <dashpot/apps/report/message_json.hpp>
 #include <dashpot/apps/web/frame.hpp>
 
 #include <algorithm>

@@ -49,6 +49,9 @@ std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::
   const std::lock_guard lock(one_at_a_time);
   const Messages messages;
   std::shared_ptr<urdf::ModelInterface> model;
+  if (text.find('<') == std::string::npos) {
+    throw InvalidModel(one_line(name + ": is no robot description: it has no XML in it"));
+  }
   try {
     text::PlainUrdf plain = text::plain_urdf(text, name);
     model = urdf::parseURDF(plain.text);

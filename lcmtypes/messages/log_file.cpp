@@ -28,6 +28,11 @@ std::optional<std::uint64_t> size_of(const std::string& path) {
 
 LogFile::LogFile(const std::string& path)
     : path_(path), file_(std::fopen(path.c_str(), "rb"), std::fclose) {
+  std::error_code unknown;
+  if (file_ && std::filesystem::is_directory(path, unknown)) {
+    file_.reset();
+    errno = EISDIR;
+  }
   if (!file_) throw std::runtime_error(path + ": cannot read the log: " + std::strerror(errno));
 }
 

@@ -67,6 +67,11 @@ bool decode(const void* data, std::size_t size, sampled_modes_t& message) noexce
   return decode_with_modes(data, size, message);
 }
 
+bool decode(const void* data, std::size_t size, contact_t& message) noexcept {
+  std::array<std::int32_t, 1> first{};  // no size: the message has one length
+  return read_sizes<contact_t>(data, size, first) && decode_exactly(data, size, message);
+}
+
 bool decode(const void* data, std::size_t size, command_t& message) noexcept {
   return decode_with_joints(data, size, message);
 }

@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/controller/robot_types.hpp>
 #include <dashpot/lcmtypes/command_t.hpp>
+#include <dashpot/lcmtypes/contact_t.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
 #include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
@@ -36,6 +37,7 @@ constexpr std::int32_t most_modes(std::int32_t n) {
 bool decode(const void* data, std::size_t size, state_t& message) noexcept;
 bool decode(const void* data, std::size_t size, modes_t& message) noexcept;
 bool decode(const void* data, std::size_t size, sampled_modes_t& message) noexcept;
+bool decode(const void* data, std::size_t size, contact_t& message) noexcept;
 bool decode(const void* data, std::size_t size, command_t& message) noexcept;
 
 /// Reads the sender of a command, and nothing else. Returns false if these are not the first bytes

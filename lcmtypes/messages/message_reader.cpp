@@ -25,6 +25,7 @@ void MessageHandlers::take(std::string_view channel, const void* data, std::size
   if (channel == kStateChannel) good = hand_on(data, size, on_state);
   if (channel == kModesChannel) good = hand_on(data, size, on_modes);
   if (channel == kSampledModesChannel) good = hand_on(data, size, on_sampled_modes);
+  if (channel == kContactChannel) good = hand_on(data, size, on_contact);
   if (!good) ++malformed;
 }
 
@@ -40,7 +41,8 @@ struct BusReader::Subscriptions {
 BusReader::BusReader(std::shared_ptr<lcm::LCM> bus, MessageHandlers& handlers)
     : bus_(std::move(bus)), subscriptions_(std::make_unique<Subscriptions>()) {
   subscriptions_->handlers = &handlers;
-  for (const char* channel : {kStateChannel, kModesChannel, kSampledModesChannel}) {
+  for (const char* channel :
+       {kStateChannel, kModesChannel, kSampledModesChannel, kContactChannel}) {
     lcm::Subscription* subscription =
         bus_->subscribe(channel, &Subscriptions::take, subscriptions_.get());
     if (subscription == nullptr) throw std::runtime_error("cannot subscribe to the LCM bus");

@@ -148,6 +148,12 @@ void fill(const StateSample& sample, state_t& message) {
   fill(sample.health.commands, message);
 }
 
+void fill(const StateSample& sample, contact_t& message) {
+  message.utime = sample.utime;
+  message.tick = static_cast<std::int64_t>(sample.snapshot.tick);
+  copy_to(*sample.contact_force, message.force);
+}
+
 void fill(const ModesSample& sample, modes_t& message) {
   const controller::Vibration& vibration = sample.vibration;
   const auto n = static_cast<std::size_t>(vibration.position.size());

@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/lcmtypes/contact_t.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
 #include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/samples.hpp>
@@ -16,6 +17,8 @@ void write_quaternion(const Eigen::Matrix3d& R, double (&quaternion)[4]);
 /// state_t::states_dropped, and `sequence` of the others. Joint vectors that are not as long as the
 /// joint position are cut, or filled up with zeros.
 void fill(const StateSample& sample, state_t& message);
+/// Copies the contact of a sample that has one.
+void fill(const StateSample& sample, contact_t& message);
 void fill(const ModesSample& sample, modes_t& message);
 void fill(const SampledModesSample& sample, sampled_modes_t& message);
 

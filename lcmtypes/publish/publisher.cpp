@@ -64,6 +64,9 @@ void Publisher::stop() {
     thread_.join();
   }
   publish_pending();
+  for (const auto& sink : sinks_) {
+    if (!sink->finish()) count(send_errors_);
+  }
 }
 
 void Publisher::offer(const StateSample& sample) noexcept {
@@ -103,8 +106,11 @@ void Publisher::publish_pending() {
     const StateSample* sample = states_.front();
     if (sample == nullptr) break;
     fill(*sample, state_message_);
+    const bool contact = sample->contact_force.has_value();
+    if (contact) fill(*sample, contact_message_);
     states_.pop();
     state_message_.states_dropped = states_.dropped();
+    if (contact) send(kContactChannel, contact_message_);
     send(kStateChannel, state_message_);
     count(states_sent_);
   }

@@ -51,6 +51,8 @@ class LogSink : public Sink {
     return good;
   }
 
+  bool finish() override { return std::fflush(file_.getFilePtr()) == 0; }
+
  private:
   lcm::LogFile file_;
   std::int64_t flushed_at_ = 0;

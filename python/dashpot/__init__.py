@@ -19,14 +19,15 @@ from ._controller import (Controller, Setpoint, Snapshot, Status, TrackedModes,
                           TrackedSampledModes)
 from ._core import Error
 from ._identification import Identification, MeasuredModes, identify
-from ._log import read_log
+from ._log import Log, LoggedMode, read_log
 from ._region import RegionDesign, design_region
 from ._results import Modes
 from ._robot import ClosedLoop, Robot, closed_loop, published_drives
 
 __version__ = _version("dashpot")
 __all__ = ["Audit", "ClosedLoop", "Controller", "DampingDesign", "DampingSuggestion",
-           "Distribution", "Error", "Gradients", "Identification", "MeasuredModes", "Miss", "Modes",
+           "Distribution", "Error", "Gradients", "Identification", "Log", "LoggedMode",
+           "MeasuredModes", "Miss", "Modes",
            "PostureAudit", "RegionDesign", "Response", "Robot", "SampledModes", "Sensitivities",
            "Setpoint", "Snapshot", "Status", "TrackedModes", "TrackedSampledModes",
            "WorkspaceAudit", "audit", "closed_loop", "design_damping", "design_region", "identify",

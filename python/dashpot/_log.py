@@ -2,21 +2,91 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import warnings
-from typing import Any, Sequence
+from typing import Any, Dict, Sequence
 
+import numpy as np
 import numpy.typing as npt
 
 from . import _core
 from ._bags import is_bag, read_bag
+from ._results import Array, ComplexArray, IntArray, Result, TextArray
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LoggedMode(Result):
+    """One mode of a loop along a log, a row for each of the k messages that have it."""
+
+    time: Array
+    """k, s since the first message of modes."""
+    tick: IntArray
+    """k, the tick that the mode belongs to."""
+    natural_frequency: Array
+    """k, rad/s."""
+    damping_ratio: Array
+    """k, no unit."""
+    damped_frequency: Array
+    """k, rad/s; zero where the eigenvalues are real."""
+    eigenvalues: ComplexArray
+    """k x 2, 1/s."""
+    kind: TextArray
+    """k of underdamped, critical, overdamped, undamped, unstable, soft."""
+    error_bound: Array
+    """k, proved bound of either eigenvalue, 1/s; infinite: none was proved."""
+    natural_frequency_bound: Array
+    """k, the same of the natural frequency, rad/s."""
+    damping_ratio_bound: Array
+    """k, the same of the damping ratio."""
+    joint_position: Array
+    """k x n, the configurations, rad (m)."""
+    shapes: ComplexArray
+    """k x n, eigenvector of the first eigenvalue."""
+
+
+class Log(Dict[str, Dict[str, npt.NDArray[Any]]]):
+    """The channels (topics) of a log, each a dict of field to array."""
+
+    @property
+    def modes(self) -> dict[int, LoggedMode]:
+        """Returns the modes on DASHPOT_MODES by label, which stays with a mode from message to
+        message; empty where the log has none."""
+        fields = self.get("DASHPOT_MODES")
+        if not fields or "label" not in fields:
+            return {}
+        there = np.arange(fields["label"].shape[1]) < fields["num_modes"][:, np.newaxis]
+        labels = np.where(there, fields["label"], -1)
+        return {int(label): _logged_mode(fields, *np.nonzero(labels == label))
+                for label in np.unique(labels[there])}
+
+
+_KINDS = np.array(_core.mode_kinds())
+
+
+def _logged_mode(fields: dict[str, npt.NDArray[Any]], rows: IntArray, columns: IntArray) -> LoggedMode:
+    """Returns the mode that stands in these columns of these messages."""
+    def numbers(name: str) -> Any:
+        return fields[name][rows, columns]
+
+    time = 1e-6 * (fields["utime"] - fields["utime"][0])
+    return LoggedMode(
+        time=time[rows], tick=fields["tick"][rows], natural_frequency=numbers("natural_frequency"),
+        damping_ratio=numbers("damping_ratio"), damped_frequency=numbers("damped_frequency"),
+        eigenvalues=numbers("eigenvalue_real") + 1j * numbers("eigenvalue_imag"),
+        kind=_KINDS[numbers("kind").astype(int)], error_bound=numbers("eigenvalue_bound"),
+        natural_frequency_bound=numbers("natural_frequency_bound"),
+        damping_ratio_bound=numbers("damping_ratio_bound"),
+        joint_position=fields["joint_position"][rows],
+        shapes=numbers("shape_real") + 1j * numbers("shape_imag"))
 
 
 def read_log(path: str | os.PathLike[str], *, topics: Sequence[str] | None = None,
-             types: Sequence[str] | None = None) -> dict[str, dict[str, npt.NDArray[Any]]]:
+             types: Sequence[str] | None = None) -> Log:
     """Returns an LCM log, a rosbag or an MCAP file as a dict of channel (topic) to its messages, a
-    dict of field to array. `topics` are names of those wanted; `types` are message types, such as
-    "sensor_msgs/msg/JointState" or "JointState", whose topics are wanted besides (not in LCM logs).
+    dict of field to array, and its `modes` by label. `topics` are names of those wanted; `types` are
+    message types, such as "sensor_msgs/msg/JointState" or "JointState", whose topics are wanted
+    besides (not in LCM logs).
 
     Fields have the names of the messages, parts of fields after a point (pose.position.x), and the
     first index of each array counts the messages. Where messages have different sizes, what is
@@ -34,12 +104,11 @@ def read_log(path: str | os.PathLike[str], *, topics: Sequence[str] | None = Non
     """
     file = os.fspath(path)
     if is_bag(file):
-        return read_bag(file, topics, types)
+        return Log(read_bag(file, topics, types))
     channels, malformed, damage = _core.read_log(file)
     if damage:
         warnings.warn(f"{file}: {damage}", stacklevel=2)
     for channel, count in malformed.items():
         warnings.warn(f"{file}: {channel}: {count} malformed messages", stacklevel=2)
-    if topics is not None:
-        return {name: fields for name, fields in channels.items() if name in topics}
-    return channels
+    return Log((name, fields) for name, fields in channels.items()
+               if topics is None or name in topics)

@@ -1,8 +1,10 @@
 // LCM logs as arrays.
 
+#include <dashpot/analysis/mode.hpp>
 #include <dashpot/lcmtypes/bus.hpp>
 #include <dashpot/lcmtypes/log_file.hpp>
 #include <dashpot/lcmtypes/messages/message_check.hpp>
+#include <dashpot/lcmtypes/messages/message_fields.hpp>
 #include <dashpot/python/src/convert.hpp>
 
 #include <nanobind/ndarray.h>
@@ -68,7 +70,7 @@ class Columns {
 
   /// Adds a field. Where sizes differ, what is missing is NaN, or -1 in arrays of integers.
   template <class Field>
-  Columns& operator()(const char* name, Field Message::*field) {
+  void operator()(const char* name, Field Message::*field) {
     constexpr bool kReal = std::is_floating_point_v<typename Numbers<Field>::Type>;
     using Number = std::conditional_t<kReal, double, std::int64_t>;
     std::array<std::size_t, 1 + Numbers<Field>::kDepth> shape{messages_.size()};
@@ -86,7 +88,6 @@ class Columns {
     });
     result_[name] =
         nb::cast(nb::ndarray<nb::numpy, Number>(data, shape.size(), shape.data(), owner));
-    return *this;
   }
 
   nb::dict result() const { return result_; }
@@ -96,68 +97,12 @@ class Columns {
   nb::dict result_;
 };
 
-nb::dict columns_of(const std::vector<state_t>& messages) {
-  using M = state_t;
-  return Columns(messages)("utime", &M::utime)("tick", &M::tick)("restarts", &M::restarts)(
-             "mode", &M::mode)("status", &M::status)("fault", &M::fault)(
-             "fault_tick", &M::fault_tick)("joint_position", &M::joint_position)(
-             "joint_velocity", &M::joint_velocity)("joint_torque", &M::joint_torque)(
-             "law_torque", &M::law_torque)("reference_joint_position",
-                                           &M::reference_joint_position)(
-             "tip_position", &M::tip_position)("tip_quaternion", &M::tip_quaternion)(
-             "reference_tip_position", &M::reference_tip_position)(
-             "reference_tip_quaternion", &M::reference_tip_quaternion)("tip_error", &M::tip_error)(
-             "tip_wrench", &M::tip_wrench)("joint_damping_ratio", &M::joint_damping_ratio)(
-             "task_damping_ratio", &M::task_damping_ratio)("damping_level", &M::damping_level)(
-             "payload_mass", &M::payload_mass)("payload_center", &M::payload_center)(
-             "tool_position", &M::tool_position)("tool_quaternion", &M::tool_quaternion)(
-             "tick_time", &M::tick_time)("longest_tick_time", &M::longest_tick_time)(
-             "overruns", &M::overruns)("states_dropped", &M::states_dropped)(
-             "verdicts", &M::verdicts)("last_refusal", &M::last_refusal)("last_refusal_utime",
-                                                                         &M::last_refusal_utime)(
-             "last_refused_sender", &M::last_refused_sender)("commander", &M::commander)(
-             "commands_accepted", &M::commands_accepted)("commands_rejected", &M::commands_rejected)
-      .result();
-}
-
-nb::dict columns_of(const std::vector<modes_t>& messages) {
-  using M = modes_t;
-  return Columns(messages)("num_modes", &M::num_modes)("utime", &M::utime)("tick", &M::tick)(
-             "sequence", &M::sequence)("origin", &M::origin)("status", &M::status)(
-             "joint_position", &M::joint_position)("zero_modes", &M::zero_modes)(
-             "label", &M::label)("eigenvalue_real", &M::eigenvalue_real)(
-             "eigenvalue_imag", &M::eigenvalue_imag)("natural_frequency", &M::natural_frequency)(
-             "damping_ratio", &M::damping_ratio)("damped_frequency", &M::damped_frequency)(
-             "kind", &M::kind)("eigenvalue_bound", &M::eigenvalue_bound)(
-             "natural_frequency_bound", &M::natural_frequency_bound)(
-             "damping_ratio_bound", &M::damping_ratio_bound)("shape_real", &M::shape_real)(
-             "shape_imag", &M::shape_imag)
-      .result();
-}
-
-nb::dict columns_of(const std::vector<sampled_modes_t>& messages) {
-  using M = sampled_modes_t;
-  return Columns(messages)("num_modes", &M::num_modes)("utime", &M::utime)("tick", &M::tick)(
-             "sequence", &M::sequence)("status", &M::status)("joint_position", &M::joint_position)(
-             "spectral_radius", &M::spectral_radius)("gain_margin", &M::gain_margin)(
-             "continuous_frequency", &M::continuous_frequency)(
-             "continuous_ratio", &M::continuous_ratio)("natural_frequency", &M::natural_frequency)(
-             "damping_ratio", &M::damping_ratio)("damped_frequency", &M::damped_frequency)("kind",
-                                                                                           &M::kind)
-      .result();
-}
-
-nb::dict columns_of(const std::vector<command_t>& messages) {
-  using M = command_t;
-  return Columns(messages)("sender", &M::sender)("utime", &M::utime)("sequence", &M::sequence)(
-             "parts", &M::parts)("mode", &M::mode)("joint_position", &M::joint_position)(
-             "tip_position", &M::tip_position)("tip_quaternion", &M::tip_quaternion)(
-             "wrench", &M::wrench)("joint_stiffness", &M::joint_stiffness)(
-             "joint_damping", &M::joint_damping)("frame", &M::frame)("directions", &M::directions)(
-             "task_stiffness", &M::task_stiffness)("task_damping", &M::task_damping)(
-             "null_stiffness", &M::null_stiffness)("null_damping", &M::null_damping)("fault_tick",
-                                                                                     &M::fault_tick)
-      .result();
+template <class Message>
+nb::dict columns_of(const std::vector<Message>& messages) {
+  Columns columns(messages);
+  lcmtypes::visit_fields<Message>(
+      [&columns](const char* name, auto field) { columns(name, field); });
+  return columns.result();
 }
 
 /// The events of one channel: decoded if they are Dashpot's.
@@ -167,6 +112,7 @@ struct Channel {
   std::vector<modes_t> modes;
   std::vector<sampled_modes_t> sampled_modes;
   std::vector<command_t> commands;
+  std::vector<contact_t> contacts;
   std::int64_t malformed = 0;
 };
 
@@ -187,6 +133,7 @@ void take(const LogFile::Event& event, Channel& channel) {
   if (event.channel == lcmtypes::kSampledModesChannel) {
     return take(event, channel, channel.sampled_modes);
   }
+  if (event.channel == lcmtypes::kContactChannel) return take(event, channel, channel.contacts);
   if (event.channel == lcmtypes::kCommandChannel) return take(event, channel, channel.commands);
   channel.utime.push_back(event.utime);  // of other programs
 }
@@ -196,6 +143,7 @@ nb::dict entries_of(const std::string& name, const Channel& channel) {
   if (name == lcmtypes::kStateChannel) result = columns_of(channel.states);
   if (name == lcmtypes::kModesChannel) result = columns_of(channel.modes);
   if (name == lcmtypes::kSampledModesChannel) result = columns_of(channel.sampled_modes);
+  if (name == lcmtypes::kContactChannel) result = columns_of(channel.contacts);
   if (name == lcmtypes::kCommandChannel) result = columns_of(channel.commands);
   using Times = Eigen::Matrix<std::int64_t, Eigen::Dynamic, 1>;
   result["log_utime"] = nb::cast(Times(Eigen::Map<const Times>(
@@ -224,10 +172,20 @@ nb::tuple read_log(const std::string& path) {
   return nb::make_tuple(result, malformed, damage);
 }
 
+/// Returns the names of the numbers in modes_t::kind and sampled_modes_t::kind, in their order.
+nb::list mode_kinds() {
+  nb::list names;
+  for (int kind = modes_t::UNDERDAMPED; kind <= sampled_modes_t::ALTERNATING; ++kind) {
+    names.append(analysis::to_text(static_cast<analysis::ModeKind>(kind)));
+  }
+  return names;
+}
+
 }  // namespace
 
 void add_log(nb::module_& m) {
   m.def("read_log", &read_log, nb::arg("path"));
+  m.def("mode_kinds", &mode_kinds);
 }
 
 }  // namespace dashpot::python

@@ -22,13 +22,13 @@ def released(program, tmp_path_factory):
 def test_a_log_says_what_the_program_measured(released):
     log = dashpot.read_log(released / "log.lcm")
     states = log["DASHPOT_STATE"]
-    rows = list(csv.DictReader(line for line in open(released / "log.csv") if line[0] != "#"))
+    rows = list(csv.DictReader(open(released / "log.csv")))
     assert states["tick"].shape == (len(rows),)
     assert states["joint_position"].shape == (len(rows), 7)
     assert states["verdicts"].shape == (len(rows), 16)
     assert np.all(np.diff(states["tick"]) == 1) and np.all(np.diff(states["log_utime"]) >= 0)
     for i in range(7):
-        name = next(key for key in rows[0] if key in (f"q{i + 1}", f"position_{i + 1}"))
+        name = f"q{i + 1} [rad]"
         np.testing.assert_allclose(states["joint_position"][:, i], [float(row[name]) for row in rows],
                                    rtol=1e-6, atol=1e-9)
 
@@ -43,6 +43,27 @@ def test_modes_in_a_log_are_those_of_the_posture(released, panda):
     np.testing.assert_allclose(modes["natural_frequency"][-1, :6],
                                found.modes.natural_frequency[:6], rtol=0.05)
     assert np.isnan(modes["natural_frequency"][-1, count:]).all()
+
+
+def test_modes_by_label_are_those_of_each_message(released):
+    log = dashpot.read_log(released / "log.lcm")
+    fields, modes = log["DASHPOT_MODES"], log.modes
+    assert list(modes) == sorted(set(fields["label"][fields["label"] >= 0].tolist()))
+    rows = 0
+    for label, mode in modes.items():
+        assert np.all(np.diff(mode.tick) > 0) and np.all(np.diff(mode.time) > 0)
+        assert mode.shapes.shape == mode.joint_position.shape == (len(mode.tick), 7)
+        for i in range(0, len(mode.tick), 37):
+            row = fields["tick"].tolist().index(mode.tick[i])
+            column = fields["label"][row].tolist().index(label)
+            assert mode.natural_frequency[i] == fields["natural_frequency"][row, column]
+            assert mode.eigenvalues[i, 1].imag == fields["eigenvalue_imag"][row, column, 1]
+            np.testing.assert_allclose(abs(mode.eigenvalues[i].prod()), mode.natural_frequency[i] ** 2)
+            assert mode.kind[i] == ("underdamped" if mode.damping_ratio[i] < 1 else "overdamped")
+            assert mode.shapes[i, 3].real == fields["shape_real"][row, column, 3]
+        rows += len(mode.tick)
+    assert rows == fields["num_modes"].sum()
+    assert dashpot.read_log(released / "log.lcm", topics=["DASHPOT_STATE"]).modes == {}
 
 
 def test_damage_is_left_out_and_said(released, tmp_path):

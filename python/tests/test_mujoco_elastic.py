@@ -98,7 +98,8 @@ def test_the_simulated_arm_moves_as_mujocos(root, program, tmp_path, name, senso
     subprocess.run([program, "run", tmp_path / "scene.yaml", "--fast", "--csv", table], check=True,
                    capture_output=True)
     with open(table) as file:
-        rows = list(csv.DictReader(file))
+        rows = [{name.split(" [")[0]: cell for name, cell in row.items()}
+                for row in csv.DictReader(file)]
     arm = Arm(root, name, stiffness, damping, rotors, friction)
     arm.rest(np.array(home, float), sensor)
     moved, off, off_rate = 0, 0, 0

@@ -277,6 +277,16 @@ void Arm::add_wall(Arm& arm, const Sums& sums) noexcept {
   sums.work[kContactHeat] += push.loss;
 }
 
+Eigen::Vector3d Arm::wall_force(const StateVector& y) noexcept {
+  if (!options_.wall) return Eigen::Vector3d::Zero();
+  bodies_.move_to(y.data(), y.data() + coordinates());
+  const Wall& wall = *options_.wall;
+  const double depth = wall_depth(), rate = wall_rate();
+  const ContactMode mode = contact_mode(wall.contact, depth, rate);
+  if (mode == ContactMode::kFree) return Eigen::Vector3d::Zero();
+  return contact_force(wall.contact, mode, depth, rate).force * wall.normal;
+}
+
 void Arm::add_wrench(Arm& arm, const Sums& sums) noexcept {
   arm.bodies_.push_tip(arm.wrench_);
   sums.work[kByWorld] = arm.wrench_.dot(arm.bodies_.tip_twist());

@@ -114,7 +114,8 @@ TEST(Program, FailsIfItCannotWrite) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
   const Outcome outcome = run_program({"analyze", example("chain3.yaml")}, "", "/dev/full");
   EXPECT_EQ(outcome.status, 1);
-  EXPECT_EQ(outcome.err, "dashpot analyze: cannot write to standard output\n");
+  EXPECT_EQ(outcome.err,
+            "dashpot analyze: cannot write to standard output: No space left on device\n");
 }
 
 /// The second number from the end of each line of an underdamped mode.

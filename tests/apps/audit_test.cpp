@@ -108,7 +108,8 @@ TEST(Audit, WritesALineForEachListedPosture) {
   EXPECT_EQ(found["workspace"]["samples"], 2);
   const std::string text = scratch.read("out.csv");
   EXPECT_EQ(count_lines(text), 3);
-  EXPECT_THAT(text, HasSubstr("posture,q1,q2,q3,q4,q5,q6,q7,smallest_ratio"));
+  EXPECT_THAT(text, HasSubstr("posture,q1 [rad],q2 [rad],q3 [rad],q4 [rad],q5 [rad],q6 [rad],"
+                              "q7 [rad],smallest_ratio,fastest_pole [1/s],"));
   EXPECT_THAT(text, HasSubstr("\n1,0,0,0,-2,0,2,0,0."));
 }
 

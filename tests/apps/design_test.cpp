@@ -155,7 +155,8 @@ TEST(Design, WritesTheMapOfARegion) {
   std::ifstream file(path);
   std::string heading, line;
   std::getline(file, heading);
-  EXPECT_THAT(heading, StartsWith("configuration,worst_mode,natural_frequency,damping_ratio"));
+  EXPECT_THAT(heading,
+              StartsWith("configuration,worst_mode,natural_frequency [rad/s],damping_ratio"));
   for (const Json& sample : result["samples"]) {
     std::getline(file, line);
     std::istringstream fields(line);
@@ -264,9 +265,9 @@ TEST(Design, RefusesInOneLine) {
   for (const auto& [options, reason] : std::vector<std::pair<Words, std::string>>{
            {{"--damping-ratio", "1"}, "--task-stiffness: or --joint-stiffness is needed"},
            {{"--damping-ratio", "1", "--task-stiffness", "1,2"}, "2 numbers, expected 6"},
-           {joined(arm, {"--q", "1"}), "1 numbers, expected 7"},
+           {joined(arm, {"--q", "1"}), "1 number, expected 7"},
            {joined(arm, {"--period", "1 kg"}), "--period: a time in s is wanted, not"},
-           {joined(arm, {"x.yaml"}), "give a file, or --urdf"},
+           {joined(arm, {"x.yaml"}), "FILE: does not go with --urdf"},
            {joined(arm, {"--viscous-friction", "1,2"}),
             "--viscous-friction: 2 numbers, expected 1 or 7"},
            {joined(arm, {"--reflected-inertia", "-1"}),

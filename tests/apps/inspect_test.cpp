@@ -246,7 +246,7 @@ TEST(Inspect, RefusesNumbersThatDoNotFit) {
            {"--q", "0,0,0,,0,0,0", "is not a number but ''"},
            {"--q", "0,0,0,0,0,0,1x", "is not a number but '1x': unknown unit 'x'"},
            {"--q", "0,0,0,0,0,0,1 m", "has a wrong unit: '1 m'; rad is wanted"},
-           {"--gravity", "9.81", "1 numbers, expected 3"},
+           {"--gravity", "9.81", "1 number, expected 3"},
            {"--reflected-inertia", "1,2", "2 numbers, expected 1 or 7"},
            {"--reflected-inertia", "1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1",
             "17 numbers, expected 1 or 7"},

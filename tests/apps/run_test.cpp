@@ -337,7 +337,8 @@ TEST(Run, SaysThatItCouldNotWrite) {
   for (const char* option : {"--csv", "--log"}) {
     const Outcome outcome = run_scene(scene("ur5"), {"--duration", "0.5", option, "/dev/full"});
     EXPECT_EQ(outcome.status, 1) << option;
-    EXPECT_THAT(outcome.err, HasSubstr("messages could not be written"));
+    EXPECT_THAT(outcome.err, HasSubstr(std::string(option) + ": /dev/full: "));
+    EXPECT_THAT(outcome.err, HasSubstr(" messages could not be written"));
   }
   EXPECT_EQ(run_scene(scene("ur5"), {"--csv", "/dev/null", "--log", "/dev/null"}).status, 2);
 }

@@ -53,7 +53,7 @@ inline std::string changed(const Scratch& scratch, const std::string& name, cons
   return changed(scratch, name, {{from, to}});
 }
 
-/// The columns of a CSV by name.
+/// The columns of a CSV by name, without their units.
 inline std::map<std::string, Numbers> table(const std::string& path) {
   std::istringstream lines(text_of(path));
   std::map<std::string, Numbers> columns;
@@ -64,7 +64,7 @@ inline std::map<std::string, Numbers> table(const std::string& path) {
     for (std::string cell; std::getline(cells, cell, ','); ++i) {
       if (columns.size() < names.size() + 1 && columns.find(cell) == columns.end() &&
           line.starts_with("time")) {
-        names.push_back(cell);
+        names.push_back(cell.substr(0, cell.find(" [")));
       } else {
         columns[names.at(i)].push_back(std::stod(cell));
       }

@@ -85,8 +85,8 @@ TEST(RobotModelErrors, AreOneLineThatNamesTheElement) {
     const char* start;   // after "arm.urdf: "
     const char* reason;  // a part of it
   } cases[] = {
-      {"", "", "Error document empty"},
-      {"mass: [[1]]", "", "Error document empty"},
+      {"", "", "is no robot description: it has no XML in it"},
+      {"mass: [[1]]", "", "is no robot description: it has no XML in it"},
       {"<robot name='r'><link name='a'", "", ""},
       {"<sdf/>", "is SDF, ", "give the URDF or xacro that it was made from"},
       {"<?xml version='1.0'?><mujoco model='a'/>", "is MJCF, ", "dashpot.Robot.from_mujoco"},

@@ -1,9 +1,7 @@
 // The input as a file of `dashpot analyze` and `dashpot design`.
 #include <dashpot/analysis/damping_design.hpp>
-#include <dashpot/apps/analyze/json_writer.hpp>
-#include <dashpot/apps/analyze/report.hpp>
-#include <dashpot/apps/analyze/system_file.hpp>
-#include <dashpot/apps/analyze/table_writer.hpp>
+#include <dashpot/apps/cli/system_file.hpp>
+#include <dashpot/apps/report/system_report.hpp>
 #include <dashpot/tests/fuzz/fuzz_input.hpp>
 
 #include <nlohmann/json.hpp>

@@ -31,6 +31,7 @@ TEST(Messages, KeepTheirFingerprints) {
   EXPECT_EQ(static_cast<std::uint64_t>(state_t::getHash()), 0x2735b759af8e3e26u);
   EXPECT_EQ(static_cast<std::uint64_t>(modes_t::getHash()), 0x962c40e533830108u);
   EXPECT_EQ(static_cast<std::uint64_t>(sampled_modes_t::getHash()), 0xd03418d8965d7894u);
+  EXPECT_EQ(static_cast<std::uint64_t>(contact_t::getHash()), 0xb3c0e8daa3efb052u);
   EXPECT_EQ(static_cast<std::uint64_t>(command_t::getHash()), 0xff62ad054d3fc8dau);
 }
 

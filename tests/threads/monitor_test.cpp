@@ -281,7 +281,7 @@ TEST(Monitor, NamesWhatIsWrongWithItsInput) {
   const Scratch scratch;
   const std::string text = scratch.write("a.txt", std::string(200, 'x'));
   expect_error({"monitor", "--log", text}, "a.txt: is no LCM log");
-  expect_error({"monitor", "--log", scratch.path("")}, "is no LCM log");
+  expect_error({"monitor", "--log", scratch.path("")}, "cannot read the log: Is a directory");
   expect_error({"monitor", "--log", ""}, "--log: names no file");
   expect_error({"monitor", "--log", text, "--speed", "nan"}, "--speed");
   expect_error({"monitor", "--lcm-url", "carrier-pigeon://x"}, "carrier-pigeon://x");

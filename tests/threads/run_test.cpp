@@ -112,10 +112,9 @@ TEST(RunInFastMotion, EndsItsRingDownOnCtrlC) {
   EXPECT_FALSE(result.contains("ring_down"));
 }
 
-TEST(RunInRealTime, ShowsHowFarItIs) {
+TEST(RunInRealTime, LastsAsLongAsItIsTold) {
   Running run({"run", scene("chain3"), "--duration", "2.5", "--lcm-url", own_url()});
   EXPECT_EQ(run.finish(), 0);
-  EXPECT_THAT(run.complaints(), HasSubstr(" of 2.5 s, "));
   EXPECT_THAT(run.output(), HasSubstr("2500 ticks of 1.00 ms, in real time; "));
 }
 

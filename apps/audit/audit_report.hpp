@@ -20,8 +20,8 @@ struct AuditReport {
 std::string audit_json(const AuditTask& task, const AuditReport& report);
 std::string audit_table(const AuditTask& task, const AuditReport& report);
 
-/// The numbers of posture i as a line of a table in CSV; the heading is for n joints.
-std::string csv_heading(int n);
+/// The numbers of posture i as a line of a table in CSV; the heading has its units.
+std::string csv_heading(const controller::RobotModel& model);
 std::string csv_line(std::int64_t i, const controller::JointVector& q,
                      const controller::PostureNumbers& numbers);
 

@@ -1,5 +1,6 @@
-#include <dashpot/apps/check_model/check_model_writer.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
+#include <dashpot/apps/check_model/check_model_report.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/text/printable.hpp>
 
 #include <algorithm>
@@ -16,7 +17,6 @@ using controller::JointCheck;
 using controller::ModelCheck;
 using controller::TorqueKind;
 using Align = TextTable::Align;
-using Json = nlohmann::ordered_json;
 
 /// "12.345 +- 0.012": two digits of the deviation, and as many of the value; "?" if the records do
 /// not narrow the value down.
@@ -57,14 +57,13 @@ std::string kind_sentence(TorqueKind kind) {
 }
 
 std::string joints_table(const CheckModelReport& report) {
-  TextTable table;
-  table.add_column(Align::kRight, {"", "joint"});
-  table.add_column(Align::kLeft, {"", "name"});
-  table.add_column(Align::kPoint, {"left over", "before"});
-  table.add_column(Align::kPoint, {"N m", "after"});
-  table.add_column(Align::kLeft, {"offset", "N m"});
-  table.add_column(Align::kLeft, {"Coulomb friction", "N m"});
-  table.add_column(Align::kLeft, {"viscous friction", "N m s/rad"});
+  TextTable table({{Align::kRight, {"", "joint"}},
+                   {Align::kLeft, {"", "name"}},
+                   {Align::kPoint, {"left over", "before"}},
+                   {Align::kPoint, {"N m", "after"}},
+                   {Align::kLeft, {"offset", "N m"}},
+                   {Align::kLeft, {"Coulomb friction", "N m"}},
+                   {Align::kLeft, {"viscous friction", "N m s/rad"}}});
   for (std::size_t i = 0; i < report.joints.size(); ++i) {
     const JointCheck& joint = report.check.joints[i];
     table.add_row({std::to_string(i + 1), text::printable(report.joints[i]),

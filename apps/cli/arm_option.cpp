@@ -1,6 +1,6 @@
+#include <dashpot/apps/cli/arm_option.hpp>
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
-#include <dashpot/apps/design/design_arm.hpp>
 #include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -156,6 +156,36 @@ SystemEntry read_arm(const ArmOptions& options, const RobotModel& model,
   }
   if (damping) entry.impedance.task_damping = Eigen::MatrixXd(damping->asDiagonal());
   return entry;
+}
+
+void add_model_options(CLI::App& command, ArmOptions& arm) {
+  const auto add = [&](const char* name, std::string& text, const char* help, const char* words) {
+    command.add_option(name, text, help)->option_text(words);
+  };
+  add("--viscous-friction", arm.viscous_friction, "In the joints, N m s/rad; urdf: the file's",
+      "a,b,...|x|urdf|drives (0)");
+  add("--reflected-inertia", arm.reflected_inertia, "Of rotors and gears at the joints, kg m^2",
+      "a,b,...|x (0)");
+  command.add_option("--drives", arm.drives, kDrivesHelp)->option_text("NAME")->check(not_empty());
+  add_gear_options(command, arm.gears);
+  add("--payload", arm.payload,
+      "Mass at the tip, its center in the tip's axes, its inertia about that; kg, m, kg m^2",
+      "m[,x,y,z[,xx,yy,zz[,xy,xz,yz]]] (0)");
+  add_accept_inertias(command, arm.accept_inertias);
+}
+
+void add_loop_options(CLI::App& command, analysis::SampledLoop& loop, double& integral_time) {
+  command.add_option("--delay", loop.delay, "Ticks from a command to its effect, beyond the hold")
+      ->check(CLI::Range(0, 100))
+      ->option_text("N (0)");
+  command.add_option("--cutoff", loop.torque_cutoff, "Of a low-pass on the torque; 0: none")
+      ->transform(quantity("Hz", 0, std::numeric_limits<double>::max(), "a frequency in Hz"))
+      ->option_text("HZ (0)");
+  command.add_flag("--difference-velocity", loop.difference_velocity,
+                   "The controller takes velocities from positions");
+  command.add_option("--integral-time", integral_time, "Of the integral of the springs; 0: none")
+      ->transform(quantity("s", 0, std::numeric_limits<double>::max(), "a time in s"))
+      ->option_text("S (0)");
 }
 
 }  // namespace dashpot::apps

@@ -1,5 +1,5 @@
 #include <dashpot/analysis/null_damping.hpp>
-#include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/controller/yaml/setting_reader.hpp>
 #include <dashpot/controller/yaml/yaml_document.hpp>
 #include <dashpot/controller/yaml/yaml_mapping.hpp>

@@ -2,7 +2,8 @@
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/rigid_body_elimination.hpp>
 #include <dashpot/analysis/spectrum.hpp>
-#include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/apps/cli/system_file.hpp>
+#include <dashpot/apps/report/json.hpp>
 
 #include <optional>
 #include <string>
@@ -28,5 +29,13 @@ struct Report {
 /// Analyses `system`, which is what `entry` gives in joint space.
 Report make_report(const SystemEntry& entry, const analysis::System<>& system,
                    const analysis::SpectrumOptions& options, analysis::Pivot pivot);
+
+/// One report as an object. docs/command-line.md lists the keys.
+Json report_json(const Report& report);
+/// An object for each report, in a list if `as_list`.
+std::string to_json(const std::vector<Report>& reports, bool as_list);
+/// The reports as text for people, at most 100 columns wide where the numbers allow it. Those of a
+/// list are headed by their index, counted from 0. `bold` marks headings for a terminal.
+std::string to_table(const std::vector<Report>& reports, bool as_list, bool bold);
 
 }  // namespace dashpot::apps

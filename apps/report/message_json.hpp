@@ -1,4 +1,5 @@
 #pragma once
+#include <dashpot/lcmtypes/contact_t.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
 #include <dashpot/lcmtypes/sampled_modes_t.hpp>
 #include <dashpot/lcmtypes/state_t.hpp>
@@ -10,9 +11,8 @@ namespace dashpot::apps {
 /// Returns a message as a JSON object with the fields of its .lcm file by their names, in their
 /// units. Enumerations have a text beside their number ("status_text"). What is NaN or infinite
 /// becomes null in the text.
-nlohmann::ordered_json message_json(const state_t& message);
-nlohmann::ordered_json message_json(const modes_t& message);
-nlohmann::ordered_json message_json(const sampled_modes_t& message);
+template <class Message>
+nlohmann::ordered_json message_json(const Message& message);
 
 /// Returns the JSON schema (draft 7) of an object that message_json returned: every key with its
 /// type. Readers of MCAP want one type for each key, so a number that is not finite, which is null,

@@ -1,15 +1,17 @@
 #pragma once
-#include <dashpot/apps/analyze/system_file.hpp>
+#include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/apps/cli/drives_option.hpp>
 #include <dashpot/apps/cli/posture_option.hpp>
+#include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/controller/robot_model.hpp>
 
+#include <CLI/App.hpp>
 #include <string>
 
 namespace dashpot::apps {
 
-/// An arm at one configuration, as the options of `dashpot design --urdf` give it; lists of
-/// quantities between commas.
+/// An arm at one configuration, as the options of `dashpot design --urdf` and `dashpot audit` give
+/// it; lists of quantities between commas.
 struct ArmOptions {
   std::string urdf, base, tip;
   PostureOption posture;
@@ -43,5 +45,12 @@ std::string friction_note(const ArmOptions& options, const controller::RobotMode
 /// Throws InputError.
 SystemEntry read_arm(const ArmOptions& options, const controller::RobotModel& model,
                      const controller::JointVector& q);
+
+/// Adds the options of the arm's inertia and friction: reflected inertia, payload and so on.
+void add_model_options(CLI::App& command, ArmOptions& arm);
+
+/// Adds those of the loop but for its period: delay, low-pass, differenced velocity, and the time
+/// of the integral of the springs, s.
+void add_loop_options(CLI::App& command, analysis::SampledLoop& loop, double& integral_time);
 
 }  // namespace dashpot::apps

@@ -1,21 +1,17 @@
-#include <dashpot/apps/analyze/json_writer.hpp>
 #include <dashpot/apps/cli/drives_option.hpp>
-#include <dashpot/apps/cli/matrix_json.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
-#include <dashpot/apps/design/design_trends.hpp>
-#include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/apps/design/design_report.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/modes.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
-#include <sstream>
 
 namespace dashpot::apps {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Align = TextTable::Align;
 using analysis::DampingMiss;
 using Eigen::Index;
@@ -98,13 +94,12 @@ std::string matrix_text(const MatrixXd& matrix) {
 std::string mode_table(const DesignReport& report) {
   const auto& before = report.before.spectrum.modes;
   const auto& after = report.after.spectrum.modes;
-  TextTable table;
-  table.add_column(Align::kRight, {"", "mode"});
-  table.add_column(Align::kPoint, {"before", "rad/s"});
-  table.add_column(Align::kPoint, {"", "ratio"});
-  table.add_column(Align::kPoint, {"after", "rad/s"});
-  table.add_column(Align::kPoint, {"", "ratio"});
-  table.add_column(Align::kLeft, {"", "kind"});
+  TextTable table({{Align::kRight, {"", "mode"}},
+                   {Align::kPoint, {"before", "rad/s"}},
+                   {Align::kPoint, {"", "ratio"}},
+                   {Align::kPoint, {"after", "rad/s"}},
+                   {Align::kPoint, {"", "ratio"}},
+                   {Align::kLeft, {"", "kind"}}});
   if (report.loop) {
     table.add_column(Align::kPoint, {"sampled", "rad/s"});
     table.add_column(Align::kPoint, {"", "ratio"});
@@ -198,6 +193,77 @@ std::string note_lines(const std::string& note) {
   return text + line + "\n";
 }
 
+/// The map of a region: what its damping does at one configuration.
+struct RegionRow {
+  std::size_t index;
+  const analysis::RegionSample* sample;
+};
+
+std::vector<RegionRow> rows_of(const RegionReport& report) {
+  std::vector<RegionRow> rows;
+  for (const analysis::RegionSample& sample : report.design.samples) {
+    rows.push_back({rows.size(), &sample});
+  }
+  return rows;
+}
+
+std::vector<Field<RegionRow>> region_fields(const RegionReport& report) {
+  using Sample = analysis::RegionSample;
+  const auto real = [](double Sample::*member) {
+    return [member](const RegionRow& row) { return Json(row.sample->*member); };
+  };
+  // Where all modes are soft, there is no worst one.
+  const auto if_any = [](double Sample::*member) {
+    return [member](const RegionRow& row) {
+      const Sample& sample = *row.sample;
+      return sample.worst_mode < 0 ? "-" : format_number(sample.*member, 6);
+    };
+  };
+  std::vector<Field<RegionRow>> fields = {
+      {"",
+       "configuration",
+       {Align::kRight, {"", "configuration"}},
+       [](const RegionRow& row) { return Json(row.index); },
+       [](const RegionRow& row) { return "[" + std::to_string(row.index) + "]"; }},
+      {"worst_mode",
+       "worst_mode",
+       {Align::kRight, {"worst", "mode"}},
+       [](const RegionRow& row) { return Json(row.sample->worst_mode); },
+       [](const RegionRow& row) {
+         return row.sample->worst_mode < 0 ? "-" : std::to_string(row.sample->worst_mode + 1);
+       }},
+      {"natural_frequency",
+       "natural_frequency [rad/s]",
+       {Align::kPoint, {"", "rad/s"}},
+       real(&Sample::natural_frequency),
+       if_any(&Sample::natural_frequency)},
+      {"damping_ratio",
+       "damping_ratio",
+       {Align::kPoint, {"smallest", "ratio"}},
+       real(&Sample::damping_ratio),
+       if_any(&Sample::damping_ratio)},
+      {"wanted", "", {}, real(&Sample::wanted)},
+      {"largest_ratio",
+       "largest_ratio",
+       {Align::kPoint, {"largest", "ratio"}},
+       real(&Sample::largest_ratio),
+       if_any(&Sample::largest_ratio)},
+      {"soft_modes", "soft_modes", {Align::kRight, {"soft", "modes"}}, [](const RegionRow& row) {
+         return Json(row.sample->soft_modes);
+       }}};
+  if (report.limit) {
+    fields.push_back({"gain_margin",
+                      "gain_margin",
+                      {Align::kPoint, {"gain", "margin"}, 3},
+                      real(&Sample::gain_margin)});
+  }
+  if (!report.postures.empty()) {
+    fields.push_back(
+        {"q", "", {}, [&](const RegionRow& row) { return json_list(report.postures[row.index]); }});
+  }
+  return fields;
+}
+
 }  // namespace
 
 std::string design_json(const std::vector<DesignReport>& reports, bool as_list) {
@@ -230,18 +296,6 @@ std::string design_table(const std::vector<DesignReport>& reports, bool as_list)
 
 std::string region_json(const RegionReport& report) {
   const analysis::RegionDesign& design = report.design;
-  Json samples = Json::array();
-  for (const analysis::RegionSample& sample : design.samples) {
-    const std::size_t index = samples.size();
-    samples.push_back({{"worst_mode", sample.worst_mode},
-                       {"natural_frequency", sample.natural_frequency},
-                       {"damping_ratio", sample.damping_ratio},
-                       {"wanted", sample.wanted},
-                       {"largest_ratio", sample.largest_ratio},
-                       {"soft_modes", sample.soft_modes}});
-    if (report.limit) samples.back()["gain_margin"] = sample.gain_margin;
-    if (!report.postures.empty()) samples.back()["q"] = json_list(report.postures[index]);
-  }
   Json result = {{report.key, json_rows(design.damping)},
                  {"smallest_eigenvalue", smallest_eigenvalue(design.damping)},
                  {"wanted", report.ratio},
@@ -253,7 +307,7 @@ std::string region_json(const RegionReport& report) {
     result["loop"]["share"] = design.share;
     result["loop"]["margin_sample"] = design.margin_sample;
   }
-  result["samples"] = samples;
+  result["samples"] = json_of(rows_of(report), region_fields(report));
   return json_text(result);
 }
 
@@ -281,27 +335,7 @@ std::string region_table(const RegionReport& report) {
   } else if (report.limit) {
     text += loop_margin_text(design.gain_margin);
   }
-  TextTable table;
-  table.add_column(Align::kRight, {"", "configuration"});
-  table.add_column(Align::kRight, {"worst", "mode"});
-  table.add_column(Align::kPoint, {"", "rad/s"});
-  table.add_column(Align::kPoint, {"smallest", "ratio"});
-  table.add_column(Align::kPoint, {"largest", "ratio"});
-  table.add_column(Align::kRight, {"soft", "modes"});
-  if (report.limit) table.add_column(Align::kPoint, {"gain", "margin"});
-  for (std::size_t i = 0; i < design.samples.size(); ++i) {
-    const analysis::RegionSample& sample = design.samples[i];
-    const bool any = sample.worst_mode >= 0;
-    std::vector<std::string> row = {"[" + std::to_string(i) + "]",
-                                    any ? std::to_string(sample.worst_mode + 1) : "-",
-                                    any ? format_number(sample.natural_frequency, 6) : "-",
-                                    any ? format_number(sample.damping_ratio, 6) : "-",
-                                    any ? format_number(sample.largest_ratio, 6) : "-",
-                                    std::to_string(sample.soft_modes)};
-    if (report.limit) row.push_back(format_number(sample.gain_margin, 3));
-    table.add_row(std::move(row));
-  }
-  return text + "\n" + table.text();
+  return text + "\n" + table_of(rows_of(report), region_fields(report));
 }
 
 std::string region_complaint(const RegionReport& report) {
@@ -325,28 +359,7 @@ std::string region_complaint(const RegionReport& report) {
 }
 
 std::string region_csv(const RegionReport& report) {
-  std::ostringstream text;
-  text.precision(17);
-  text << "configuration,worst_mode,natural_frequency,damping_ratio,largest_ratio,soft_modes"
-       << (report.limit ? ",gain_margin\n" : "\n");
-  for (std::size_t i = 0; i < report.design.samples.size(); ++i) {
-    const analysis::RegionSample& sample = report.design.samples[i];
-    text << i << ',' << sample.worst_mode << ',' << sample.natural_frequency << ','
-         << sample.damping_ratio << ',' << sample.largest_ratio << ',' << sample.soft_modes;
-    if (report.limit) text << ',' << sample.gain_margin;
-    text << '\n';
-  }
-  return text.str();
-}
-
-std::string integral_text(const std::vector<double>& decays) {
-  if (decays.empty()) return "";
-  const bool one = decays.size() == 1;
-  std::string text = "  The integral of the springs makes " + std::to_string(decays.size()) +
-                     (one ? " slow mode, which decays at " : " slow modes, which decay at ") +
-                     format_number(decays.front(), 3);
-  if (!one) text += " to " + format_number(decays.back(), 3);
-  return text + " 1/s.\n";
+  return csv_of(rows_of(report), region_fields(report));
 }
 
 }  // namespace dashpot::apps

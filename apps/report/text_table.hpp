@@ -1,5 +1,8 @@
 #pragma once
 #include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -10,9 +13,20 @@ class TextTable {
  public:
   enum class Align { kLeft, kRight, kPoint };  ///< kPoint: numbers, decimal points in line
 
+  struct Column {
+    Align align;
+    std::vector<std::string> heading;
+  };
+  TextTable(std::initializer_list<Column> columns = {}) {
+    for (const Column& column : columns) add_column(column.align, column.heading);
+  }
+
   /// `heading` has as many lines as that of every other column.
   void add_column(Align align, std::vector<std::string> heading);
   void add_row(std::vector<std::string> cells);
+  /// Adds a column to all rows. A table is filled by columns or by rows.
+  void add_column(Align align, std::vector<std::string> heading,
+                  const std::vector<std::string>& cells);
 
   /// Heading lines and rows, each indented by two spaces and ended by a newline.
   std::string text() const;
@@ -35,5 +49,16 @@ std::string format_bound(double bound);
 /// Numbers of one column with as many decimals as give the largest so many significant digits; what
 /// rounds to zero is "0".
 std::vector<std::string> format_column(const std::vector<double>& values, int digits);
+
+/// Returns "1 mode" or "3 modes"; `none` stands for 0.
+std::string count(std::int64_t n, const std::string& what, const char* none = "0");
+
+/// "q1" for the first coordinate, i = 0.
+std::string joint_name(Eigen::Index i);
+
+/// "q2 - 0.43 q5 + 0.21 q1 (95 deg)": entries relative to the largest, by falling size, without the
+/// small ones; with the phase where an entry is not in step with the largest. At most `width`
+/// characters, where the numbers allow it.
+std::string format_shape(const Eigen::VectorXcd& shape, std::size_t width);
 
 }  // namespace dashpot::apps

@@ -1,20 +1,17 @@
-#include <dashpot/apps/analyze/json_writer.hpp>
-#include <dashpot/apps/audit/audit_writer.hpp>
+#include <dashpot/apps/audit/audit_report.hpp>
 #include <dashpot/apps/cli/drives_option.hpp>
-#include <dashpot/apps/cli/matrix_json.hpp>
-#include <dashpot/apps/cli/text_table.hpp>
-#include <dashpot/apps/design/design_writer.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/report/modes.hpp>
+#include <dashpot/apps/report/text_table.hpp>
+#include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/rotors.hpp>
 #include <dashpot/text/printable.hpp>
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 namespace dashpot::apps {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Align = TextTable::Align;
 
 Json to_json(const controller::Distribution& found) {
@@ -34,13 +31,12 @@ std::string modes_table(const AuditTask& task, const controller::PostureAudit& p
   const analysis::Spectrum<>& spectrum = posture.spectrum;
   const Eigen::VectorXd& with_rotors = posture.rotors.damping_ratios;
   const bool compares = with_rotors.size() == spectrum.modes.size();
-  TextTable table;
-  table.add_column(Align::kRight, {"", "mode"});
-  table.add_column(Align::kPoint, {"natural", "rad/s"});
-  table.add_column(Align::kPoint, {"damping", "ratio"});
-  table.add_column(Align::kPoint, {"", "meant"});
-  table.add_column(Align::kLeft, {"", "kind"});
-  table.add_column(Align::kPoint, {"fastest", "1/s"});
+  TextTable table({{Align::kRight, {"", "mode"}},
+                   {Align::kPoint, {"natural", "rad/s"}},
+                   {Align::kPoint, {"damping", "ratio"}},
+                   {Align::kPoint, {"", "meant"}},
+                   {Align::kLeft, {"", "kind"}},
+                   {Align::kPoint, {"fastest", "1/s"}}});
   if (compares) table.add_column(Align::kPoint, {"ratio with", "rotors"});
   for (int i = 0; i < spectrum.modes.size(); ++i) {
     const analysis::Mode<>& mode = spectrum.modes[i];
@@ -130,8 +126,7 @@ std::string posture_table(const AuditTask& task, const AuditReport& report) {
 
 std::string workspace_table(const AuditTask& task, const AuditReport& report) {
   const controller::WorkspaceAudit& found = *report.workspace;
-  TextTable table;
-  table.add_column(Align::kLeft, {""});
+  TextTable table({{Align::kLeft, {""}}});
   for (const char* name : {"median", "5 %", "95 %", "worst"}) {
     table.add_column(Align::kPoint, {name});
   }
@@ -165,27 +160,12 @@ std::string suggestion_table(const AuditTask& task, const AuditReport& report) {
   std::string text = "\nDamping for a ratio of " + ratio + " at q; smallest ratio with it " +
                      format_number(found.smallest_ratio, 4) + "\n";
   TextTable table;
-  std::vector<std::vector<std::string>> columns;
   for (Eigen::Index j = 0; j < found.damping.cols(); ++j) {
-    table.add_column(Align::kPoint, {});
     const Eigen::VectorXd column = found.damping.col(j);
-    columns.push_back(format_column({column.begin(), column.end()}, 6));
-  }
-  for (std::size_t i = 0; i < columns.size(); ++i) {
-    std::vector<std::string> row;
-    row.reserve(columns.size());
-    for (const auto& column : columns) row.push_back(column[i]);
-    table.add_row(row);
+    table.add_column(Align::kPoint, {}, format_column({column.begin(), column.end()}, 6));
   }
   return text + table.text() + "\n  Nearest diagonal: " + format_list(found.diagonal, 4) +
          "; smallest ratio with it " + format_number(found.diagonal_smallest_ratio, 4) + "\n";
-}
-
-std::string shortest(double value) {
-  if (!std::isfinite(value)) return std::isinf(value) ? (value > 0 ? "inf" : "-inf") : "";
-  std::array<char, 40> buffer{};
-  std::snprintf(buffer.data(), buffer.size(), "%.17g", value);
-  return buffer.data();
 }
 
 void rotors_json(const AuditTask& task, const controller::PostureAudit& posture, Json& result) {
@@ -264,18 +244,21 @@ std::string audit_table(const AuditTask& task, const AuditReport& report) {
   return text + suggestion_table(task, report);
 }
 
-std::string csv_heading(int n) {
+std::string csv_heading(const controller::RobotModel& model) {
   std::string text = "posture";
-  for (int i = 1; i <= n; ++i) text += ",q" + std::to_string(i);
-  return text + ",smallest_ratio,fastest_pole,gain_margin,zero_modes,singular\n";
+  const controller::Units units = controller::joint_units(model, "rad", "m");
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    text += ",q" + std::to_string(i + 1) + " [" + units[i] + "]";
+  }
+  return text + ",smallest_ratio,fastest_pole [1/s],gain_margin,zero_modes,singular\n";
 }
 
 std::string csv_line(std::int64_t i, const controller::JointVector& q,
                      const controller::PostureNumbers& numbers) {
   std::string text = std::to_string(i);
-  for (const double value : q) text += "," + shortest(value);
-  return text + "," + shortest(numbers.smallest_ratio) + "," + shortest(numbers.fastest_pole) +
-         "," + shortest(numbers.gain_margin) + "," + std::to_string(numbers.zero_modes) + "," +
+  for (const double value : q) text += "," + csv_text(value);
+  return text + "," + csv_text(numbers.smallest_ratio) + "," + csv_text(numbers.fastest_pole) +
+         "," + csv_text(numbers.gain_margin) + "," + std::to_string(numbers.zero_modes) + "," +
          (numbers.singular ? "1" : "0") + "\n";
 }
 

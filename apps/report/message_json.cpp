@@ -1,0 +1,75 @@
+#include <dashpot/analysis/mode.hpp>
+#include <dashpot/analysis/solver_status.hpp>
+#include <dashpot/apps/report/message_json.hpp>
+#include <dashpot/controller/tick_status.hpp>
+#include <dashpot/lcmtypes/messages/message_fields.hpp>
+
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace dashpot::apps {
+namespace {
+
+using MessageJson = nlohmann::ordered_json;
+
+// The text beside a number, for the enumerations that have one.
+const char* status_text(const state_t& /*of*/, std::int8_t status) {
+  return controller::to_text(static_cast<controller::Status>(status));
+}
+const char* status_text(const auto& /*modes*/, std::int8_t status) {
+  return analysis::to_text(static_cast<analysis::Status>(status));
+}
+
+const char* kind_text(std::int8_t kind) {
+  return analysis::to_text(static_cast<analysis::ModeKind>(kind));
+}
+
+MessageJson schema_of(const MessageJson& value) {
+  if (value.is_object()) {
+    MessageJson schema{{"type", "object"}, {"properties", MessageJson::object()}};
+    for (const auto& [key, item] : value.items()) schema["properties"][key] = schema_of(item);
+    return schema;
+  }
+  if (value.is_array()) {
+    return {{"type", "array"},
+            {"items", value.empty() ? MessageJson{{"type", MessageJson({"number", "null"})}}
+                                    : schema_of(value.front())}};
+  }
+  if (value.is_string()) return {{"type", "string"}};
+  if (value.is_number_integer()) return {{"type", "integer"}};
+  // A plain "number": readers of MCAP take the first type of a list for all, and null for NaN.
+  return {{"type", "number"}};
+}
+
+}  // namespace
+
+template <class Message>
+MessageJson message_json(const Message& message) {
+  MessageJson json;
+  lcmtypes::visit_fields<Message>([&](const std::string& name, auto field) {
+    const auto& value = message.*field;
+    json[name] = value;
+    using Value = std::remove_cvref_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, std::int8_t>) {
+      if (name == "status" || name == "fault") json[name + "_text"] = status_text(message, value);
+    } else if constexpr (std::is_same_v<Value, std::vector<std::int8_t>>) {
+      json[name + "_text"] = MessageJson::array();
+      for (const std::int8_t kind : value) json[name + "_text"].push_back(kind_text(kind));
+    }
+  });
+  return json;
+}
+template MessageJson message_json(const state_t& message);
+template MessageJson message_json(const contact_t& message);
+template MessageJson message_json(const modes_t& message);
+template MessageJson message_json(const sampled_modes_t& message);
+
+MessageJson json_schema(const MessageJson& example, const std::string& title) {
+  MessageJson schema = schema_of(example);
+  schema["$schema"] = "http://json-schema.org/draft-07/schema#";
+  schema["title"] = title;
+  return schema;
+}
+
+}  // namespace dashpot::apps

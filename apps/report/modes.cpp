@@ -1,0 +1,129 @@
+#include <dashpot/apps/report/modes.hpp>
+
+#include <numbers>
+
+namespace dashpot::apps {
+namespace {
+
+using Align = TextTable::Align;
+
+const char* kind_name(int kind) {
+  return analysis::to_text(static_cast<analysis::ModeKind>(kind));
+}
+
+template <class Numbers>
+Eigen::VectorXcd complex_vector(const Numbers& real, const Numbers& imag, std::size_t n) {
+  Eigen::VectorXcd vector(static_cast<Eigen::Index>(n));
+  for (std::size_t k = 0; k < n; ++k) vector[static_cast<Eigen::Index>(k)] = {real[k], imag[k]};
+  return vector;
+}
+
+}  // namespace
+
+std::vector<LoopMode> loop_modes(const dashpot_modes& modes) {
+  std::vector<LoopMode> result;
+  for (std::uint32_t i = 0; i < modes.count; ++i) {
+    const dashpot_mode& mode = modes.modes[i];
+    const auto& [first, second] = mode.eigenvalues;
+    result.push_back({mode.label,
+                      mode.natural_frequency,
+                      mode.damping_ratio,
+                      mode.damped_frequency,
+                      {analysis::Complex(first[0], first[1]), {second[0], second[1]}},
+                      kind_name(mode.kind),
+                      complex_vector(mode.shape_real, mode.shape_imag, modes.joints),
+                      mode.eigenvalue_bound,
+                      mode.natural_frequency_bound,
+                      mode.damping_ratio_bound});
+  }
+  return result;
+}
+
+std::vector<LoopMode> loop_modes(const modes_t& modes) {
+  std::vector<LoopMode> result;
+  for (std::size_t i = 0; i < modes.label.size(); ++i) {
+    const auto &re = modes.eigenvalue_real[i], &im = modes.eigenvalue_imag[i];
+    result.push_back({modes.label[i],
+                      modes.natural_frequency[i],
+                      modes.damping_ratio[i],
+                      modes.damped_frequency[i],
+                      {analysis::Complex(re[0], im[0]), {re[1], im[1]}},
+                      kind_name(modes.kind[i]),
+                      complex_vector(modes.shape_real[i], modes.shape_imag[i],
+                                     static_cast<std::size_t>(modes.n)),
+                      modes.eigenvalue_bound[i],
+                      modes.natural_frequency_bound[i],
+                      modes.damping_ratio_bound[i],
+                      0,
+                      modes.tick});
+  }
+  return result;
+}
+
+std::vector<Field<LoopMode>> mode_fields(const ModesTable& table) {
+  const auto one = [&](const char* name) {
+    return table.above ? std::vector<std::string>{name, ""} : std::vector<std::string>{"", name};
+  };
+  const auto part = [](std::size_t i, bool real) {
+    return [=](const LoopMode& m) {
+      return Json(real ? m.eigenvalues[i].real() : m.eigenvalues[i].imag());
+    };
+  };
+  const auto of = [](auto LoopMode::*member) {
+    return [member](const LoopMode& m) { return Json(m.*member); };
+  };
+  return {{"", "time [s]", {}, of(&LoopMode::time)},
+          {"", "tick", {}, of(&LoopMode::tick)},
+          {"label", "label", {Align::kRight, one(table.label)}, of(&LoopMode::label)},
+          {"eigenvalues",
+           "",
+           {},
+           [](const LoopMode& m) {
+             return Json::array({json_complex(m.eigenvalues[0]), json_complex(m.eigenvalues[1])});
+           }},
+          {"natural_frequency",
+           "natural_frequency [rad/s]",
+           {Align::kPoint, {"natural", "rad/s"}},
+           of(&LoopMode::natural_frequency)},
+          {"",
+           "",
+           {Align::kPoint, {"frequency", "Hz"}},
+           [](const LoopMode& m) { return Json(m.natural_frequency / (2 * std::numbers::pi)); }},
+          {"damping_ratio",
+           "damping_ratio",
+           {Align::kPoint, {"damping", "ratio"}},
+           of(&LoopMode::damping_ratio)},
+          {"", "real_1 [1/s]", {}, part(0, true)},
+          {"", "imag_1 [1/s]", {}, part(0, false)},
+          {"", "real_2 [1/s]", {}, part(1, true)},
+          {"", "imag_2 [1/s]", {}, part(1, false)},
+          {"damped_frequency", "", {}, of(&LoopMode::damped_frequency)},
+          {"kind", "kind", {Align::kLeft, one("kind")}, of(&LoopMode::kind)},
+          {"",
+           "",
+           {Align::kRight, {"error <", "rad/s"}, kBound},
+           of(&LoopMode::natural_frequency_bound)},
+          {"shape",
+           "",
+           {Align::kLeft, one("shape")},
+           [](const LoopMode& m) { return json_list(m.shape); },
+           [width = table.width](const LoopMode& m) { return format_shape(m.shape, width); }},
+          {"error_bound", "", {}, of(&LoopMode::error_bound)},
+          {"natural_frequency_bound",
+           "natural_frequency_bound [rad/s]",
+           {},
+           of(&LoopMode::natural_frequency_bound)},
+          {"damping_ratio_bound", "damping_ratio_bound", {}, of(&LoopMode::damping_ratio_bound)}};
+}
+
+std::string integral_text(const std::vector<double>& decays) {
+  if (decays.empty()) return "";
+  const bool one = decays.size() == 1;
+  std::string text = "  The integral of the springs makes " + std::to_string(decays.size()) +
+                     (one ? " slow mode, which decays at " : " slow modes, which decay at ") +
+                     format_number(decays.front(), 3);
+  if (!one) text += " to " + format_number(decays.back(), 3);
+  return text + " 1/s.\n";
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,43 @@
+#pragma once
+#include <dashpot/controller/plugin.h>
+#include <dashpot/apps/report/fields.hpp>
+#include <dashpot/lcmtypes/modes_t.hpp>
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+namespace dashpot::apps {
+
+/// A mode of a loop as it runs, whoever tells of it.
+struct LoopMode {
+  int label = 0;
+  double natural_frequency = 0, damping_ratio = 0, damped_frequency = 0;  // rad/s, 1, rad/s
+  std::array<analysis::Complex, 2> eigenvalues;                           // 1/s
+  const char* kind = "";
+  Eigen::VectorXcd shape;
+  double error_bound = 0, natural_frequency_bound = 0, damping_ratio_bound = 0;
+  double time = 0;  // s, in a table in CSV
+  std::int64_t tick = 0;
+};
+
+std::vector<LoopMode> loop_modes(const dashpot_modes& modes);
+std::vector<LoopMode> loop_modes(const modes_t& modes);
+
+/// Where the words of the table stand: those of one line above or below, and the width of shapes.
+struct ModesTable {
+  const char* label = "label";
+  bool above = false;
+  std::size_t width = 40;
+};
+
+/// Returns the fields of such modes in JSON, CSV and the table.
+std::vector<Field<LoopMode>> mode_fields(const ModesTable& table = {});
+
+/// Returns a line that tells at which rates, 1/s, the slow modes decay that an integral of springs
+/// makes;
+/// "" if there are none. `decays` by size.
+std::string integral_text(const std::vector<double>& decays);
+
+}  // namespace dashpot::apps

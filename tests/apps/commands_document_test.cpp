@@ -1,0 +1,108 @@
+// docs/command-line.md lists what the program has: every subcommand, and every option of each.
+#include <dashpot/tests/apps/run_program.hpp>
+#include <dashpot/tests/apps/scene_run.hpp>
+
+#include <gmock/gmock.h>
+
+#include <map>
+#include <regex>
+#include <set>
+#include <sstream>
+
+namespace dashpot::tests {
+namespace {
+
+/// All that the groups of `pattern` find in `text`.
+std::vector<std::string> found_in(const std::string& text, const std::string& pattern) {
+  const std::regex regex(pattern);
+  std::vector<std::string> found;
+  for (std::sregex_iterator i(text.begin(), text.end(), regex), end; i != end; ++i) {
+    found.push_back((*i)[1]);
+  }
+  return found;
+}
+
+/// Lines that begin with `pattern`, whose group is what they are called by.
+std::vector<std::string> lines_in(const std::string& text, const std::string& pattern) {
+  std::vector<std::string> found;
+  std::istringstream lines(text);
+  const std::regex regex(pattern);
+  std::smatch match;
+  for (std::string line; std::getline(lines, line);) {
+    if (std::regex_search(line, match, regex, std::regex_constants::match_continuous)) {
+      found.push_back(match[1]);
+    }
+  }
+  return found;
+}
+
+/// The subcommands with all their names: "audit, modes".
+std::vector<std::string> subcommands() {
+  std::string help = run_program({"--help"}).out;
+  help.erase(0, help.find("Subcommands:"));
+  return lines_in(help, "  ([a-z][a-z-]*(, [a-z-]+)*)  ");
+}
+
+/// The options of a subcommand, each with all its names: "--damping,--task-damping".
+std::vector<std::string> options_of(const std::string& subcommand) {
+  return lines_in(run_program({subcommand, "--help"}).out, "  (--[a-z][a-z,-]*)");
+}
+
+/// The text of the sections by the subcommands in their headings.
+std::map<std::string, std::string> sections() {
+  std::map<std::string, std::string> result;
+  std::istringstream lines(text_of(DASHPOT_SOURCE_DIR "/docs/command-line.md"));
+  std::vector<std::string> names;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("## ")) names = found_in(line, "dashpot ([a-z-]+)");
+    for (const std::string& name : names) result[name] += line + "\n";
+  }
+  return result;
+}
+
+std::set<std::string> options_in(const std::string& text) {
+  const std::vector<std::string> found = found_in(text, "(--[a-z]+(-[a-z]+)*)");
+  return {found.begin(), found.end()};
+}
+
+TEST(CommandsDocument, ListsEverySubcommand) {
+  const std::string text = text_of(DASHPOT_SOURCE_DIR "/docs/command-line.md");
+  const std::vector<std::string> rows = lines_in(text, R"(\| \[`([a-z-]+)`\]\(#dashpot-)");
+  std::vector<std::string> first;
+  for (const std::string& names : subcommands()) {
+    first.push_back(names.substr(0, names.find(',')));
+    for (const std::string& name : found_in(names, "([a-z-]+)")) {
+      EXPECT_THAT(text, ::testing::HasSubstr("`" + name + "`"));
+    }
+  }
+  EXPECT_GT(first.size(), 10U);
+  EXPECT_THAT(rows, ::testing::UnorderedElementsAreArray(first));
+}
+
+TEST(CommandsDocument, HasEveryOptionOfEverySubcommand) {
+  const auto told = sections();
+  for (const std::string& names : subcommands()) {
+    const std::string subcommand = names.substr(0, names.find(','));
+    ASSERT_TRUE(told.contains(subcommand)) << subcommand;
+    const std::set<std::string> in_text = options_in(told.at(subcommand));
+    std::set<std::string> known;
+    for (const std::string& option : options_of(subcommand)) {
+      const std::set<std::string> all = options_in(option);
+      known.insert(all.begin(), all.end());
+      if (option == "--help") continue;
+      EXPECT_TRUE(std::any_of(all.begin(), all.end(),
+                              [&](const auto& name) { return in_text.contains(name); }))
+          << "dashpot " << subcommand << " " << option << " is not in docs/command-line.md";
+    }
+    EXPECT_GT(known.size(), 1U) << subcommand;
+    for (const std::string& row : lines_in(told.at(subcommand), R"(\| (`--.*?) \|)")) {
+      for (const std::string& name : options_in(row)) {
+        EXPECT_TRUE(known.contains(name))
+            << "docs/command-line.md: dashpot " << subcommand << " has no " << name;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::tests

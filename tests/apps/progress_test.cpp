@@ -1,0 +1,194 @@
+// What tasks that take long show meanwhile, and what Ctrl-C leaves of them.
+#include <dashpot/tests/apps/run_program.hpp>
+#include <dashpot/tests/apps/scene_run.hpp>
+
+#include <gmock/gmock.h>
+#include <poll.h>
+#include <sys/stat.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <functional>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+/// Runs `dashpot ARGUMENTS...` with a terminal as standard error, which is read into Outcome::err.
+/// Calls `on_text` after each piece of it with the process and all that was read.
+Outcome run_on_terminal(const Words& arguments,
+                        const std::function<void(pid_t, const std::string&)>& on_text) {
+  const Scratch scratch;
+  const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
+  if (terminal < 0 || grantpt(terminal) != 0 || unlockpt(terminal) != 0) {
+    throw std::runtime_error("no terminal");
+  }
+  const std::string name = ptsname(terminal), out = scratch.path("out");
+  Words words = joined({DASHPOT_PROGRAM}, arguments);
+  std::vector<char*> argv(words.size() + 1, nullptr);
+  std::transform(words.begin(), words.end(), argv.begin(),
+                 [](std::string& word) { return word.data(); });
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, out.c_str(), O_WRONLY | O_CREAT, 0600);
+  posix_spawn_file_actions_addopen(&files, STDERR_FILENO, name.c_str(), O_RDWR | O_NOCTTY, 0);
+  pid_t child = 0;
+  const int failure = posix_spawn(&child, argv[0], &files, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&files);
+  if (failure != 0) throw std::runtime_error("cannot start " + words[0]);
+  Outcome outcome;
+  int wait_status = 0;
+  bool ended = false;
+  const auto read_on = [&] {
+    pollfd ready{terminal, POLLIN, 0};
+    char text[1024];
+    while (poll(&ready, 1, 20) == 1 && (ready.revents & POLLIN) != 0) {
+      const ssize_t size = read(terminal, text, sizeof text);
+      if (size <= 0) break;
+      outcome.err.append(text, static_cast<std::size_t>(size));
+      if (!ended) on_text(child, outcome.err);
+    }
+  };
+  while (!ended) {
+    read_on();
+    ended = waitpid(child, &wait_status, WNOHANG) == child;
+  }
+  read_on();
+  close(terminal);
+  outcome.status = WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : 128 + WTERMSIG(wait_status);
+  outcome.out = scratch.read("out");
+  return outcome;
+}
+
+/// The same, ended by Ctrl-C once a bar is seen.
+Outcome interrupted(const Words& arguments) {
+  bool sent = false;
+  return run_on_terminal(arguments, [&](pid_t child, const std::string& text) {
+    if (!sent && text.find(" %") != std::string::npos) sent = kill(child, SIGINT) == 0;
+  });
+}
+
+const Words kTaskStiffness = {"--task-stiffness", "200,200,200,20,20,20"};
+
+TEST(Progress, OfAnAuditIsABarAndCtrlCLeavesWhatWasDone) {
+  const Outcome outcome = interrupted(
+      joined(of_panda("audit", kTaskStiffness), {"--damping-factor", "2", "--samples", "3000000"}));
+  EXPECT_EQ(outcome.status, 130);
+  EXPECT_THAT(outcome.err, HasSubstr("\r\033[K["));
+  EXPECT_THAT(outcome.err, HasSubstr(" of 3000000 postures were audited"));
+  EXPECT_THAT(outcome.out, HasSubstr("(interrupted: no more were done)"));
+}
+
+TEST(Progress, OfARegionSaysThatThereIsNothingYet) {
+  const Outcome outcome =
+      interrupted(joined(of_panda("design", kTaskStiffness),
+                         {"--damping-ratio", "0.7", "--region", "--samples", "20000"}));
+  EXPECT_EQ(outcome.status, 130);
+  EXPECT_THAT(outcome.err, HasSubstr("it has no damping to show before its end"));
+  EXPECT_EQ(outcome.out, "");
+}
+
+TEST(Progress, OfManySystemsIsABarAndCtrlCLeavesThoseDone) {
+  const Scratch scratch;
+  constexpr int kSize = 12;  // which takes some tenths of a millisecond
+  std::string mass, stiffness, text;
+  for (int i = 0; i < kSize; ++i) {
+    std::string row[2];
+    for (int j = 0; j < kSize; ++j) {
+      row[0] += (j > 0 ? "," : "") + std::string(i == j ? "2" : "0");
+      row[1] += (j > 0 ? "," : "") + std::string(i == j ? "30" : std::abs(i - j) == 1 ? "-1" : "0");
+    }
+    mass += (i > 0 ? ",[" : "[") + row[0] + "]";
+    stiffness += (i > 0 ? ",[" : "[") + row[1] + "]";
+  }
+  for (int i = 0; i < 10000; ++i) {
+    text += "- {mass: [" + mass + "], stiffness: [" + stiffness + "]}\n";
+  }
+  const Outcome outcome =
+      interrupted({"design", "--damping-ratio", "0.7", scratch.write("a.yaml", text)});
+  EXPECT_EQ(outcome.status, 130);
+  EXPECT_THAT(outcome.err, HasSubstr(" of 10000 systems are done"));
+  EXPECT_TRUE(outcome.out.starts_with("[0] damping\n")) << outcome.out.substr(0, 80);
+}
+
+TEST(Progress, OfARunTellsTimesAndOverruns) {
+  const Outcome outcome = run_on_terminal(
+      {"run", scene("chain3"), "--duration", "2.5", "--lcm-url", own_url()}, [](auto, auto&) {});
+  EXPECT_EQ(outcome.status, 0);
+  EXPECT_THAT(outcome.err, HasSubstr(" of 2.50 s, "));
+  EXPECT_THAT(outcome.err, HasSubstr(" overruns"));
+  EXPECT_TRUE(outcome.err.ends_with("\r\033[K")) << outcome.err;
+}
+
+TEST(Progress, IsNotWrittenToFiles) {
+  const Outcome outcome =
+      run_program({"run", scene("chain3"), "--duration", "1.5", "--lcm-url", own_url()});
+  EXPECT_EQ(outcome.err, "");
+}
+
+TEST(Progress, CtrlCEndsAnExportWithWholeFiles) {
+  const Scratch scratch;
+  const std::string log = scratch.path("a.lcm"), pipe = scratch.path("pipe");
+  const std::string csv = scratch.path("a.csv");
+  ASSERT_EQ(run_scene(scene("panda_release_c1"), {"--duration", "1", "--log", log}).status, 0);
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const std::string text = text_of(log);
+  const pid_t writer = fork();  // keeps the log open, as if it went on
+  if (writer == 0) {
+    const int end = open(pipe.c_str(), O_WRONLY);
+    const bool written = write(end, text.data(), text.size()) > 0;
+    for (;;) written ? pause() : (_exit(1), 0);
+  }
+  pid_t program = fork();
+  if (program == 0) {
+    const std::string err = scratch.path("err"), out = scratch.path("out");
+    dup2(open(err.c_str(), O_WRONLY | O_CREAT, 0600), STDERR_FILENO);
+    dup2(open(out.c_str(), O_WRONLY | O_CREAT, 0600), STDOUT_FILENO);
+    execl(DASHPOT_PROGRAM, "dashpot", "export", pipe.c_str(), "--csv", csv.c_str(), nullptr);
+    _exit(1);
+  }
+  while (text_of(csv).empty()) usleep(10'000);
+  kill(program, SIGINT);
+  int status = 0;
+  ASSERT_EQ(waitpid(program, &status, 0), program);
+  kill(writer, SIGKILL);
+  waitpid(writer, nullptr, 0);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_THAT(scratch.read("out"), HasSubstr(" messages exported, "));
+  EXPECT_THAT(scratch.read("err"), HasSubstr("interrupted: the files hold"));
+  EXPECT_EQ(text_of(csv).back(), '\n');
+}
+
+/// Where every write fails, each writer says so, with the name of the file.
+TEST(FullDisk, IsAnErrorOfEveryWriter) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  const Scratch scratch;
+  const std::string log = scratch.path("a.lcm"), full = "/dev/full";
+  const Words short_run = {"run", scene("panda_release_c1"), "--fast", "--duration"};
+  ASSERT_EQ(run_program(joined(short_run, {"3", "--log", log})).status, 0);
+  const Words region = {"--damping-ratio", "0.7", "--region", "--samples", "4"};
+  for (const auto& [words, option] :
+       {std::pair(joined(short_run, {"0.003", "--log", full}), "--log"),
+        {joined(short_run, {"0.003", "--csv", full}), "--csv"},
+        {joined(short_run, {"1", "--csv", full}), "--csv"},
+        {Words{"export", log, "--mcap", full}, "--mcap"},
+        {Words{"export", log, "--csv", full}, "--csv"},
+        {joined(joined(of_panda("design", kTaskStiffness), region), {"--csv", full}), "--csv"},
+        {joined(of_panda("audit", kTaskStiffness),
+                {"--damping-factor", "2", "--samples", "10", "--csv", full}),
+         "--csv"},
+        {Words{"check-model", log, "--config", scene("panda_release_c1"), "--write", full},
+         "--write"}}) {
+    const Outcome outcome = run_program(words);
+    EXPECT_NE(outcome.status, 0) << words[0] << " " << option;
+    EXPECT_THAT(outcome.err, HasSubstr(std::string(option) + ": /dev/full: "));
+    EXPECT_THAT(outcome.err, Not(HasSubstr("Success")));
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::tests
