@@ -80,10 +80,10 @@ Eigen::RowVectorXd direction_of(const std::string& place, const controller::Jaco
 
 }  // namespace
 
-ArmJson ArmView::chain() const {
-  const KDL::Chain& chain = controller::kdl_chain(config_.model);
-  ArmJson document{{"name", config_.model.name()}, {"joints", ArmJson::array()}};
-  const auto& joints = config_.model.joints();
+ArmJson chain_json(const controller::RobotModel& model) {
+  const KDL::Chain& chain = controller::kdl_chain(model);
+  ArmJson document{{"name", model.name()}, {"joints", ArmJson::array()}};
+  const auto& joints = model.joints();
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const KDL::Segment& segment = chain.getSegment(static_cast<unsigned>(i));
     const KDL::Joint& joint = segment.getJoint();
@@ -96,7 +96,7 @@ ArmJson ArmView::chain() const {
          {"axis", vector_json(joint.JointAxis())},
          {"frame", frame_json(joint.pose(0).Inverse() * segment.pose(0))}});
   }
-  document["missing_rotors"] = controller::missing_rotors_text(config_.model);
+  document["missing_rotors"] = controller::missing_rotors_text(model);
   document["tip"] = frame_json(chain.getSegment(static_cast<unsigned>(joints.size())).pose(0));
   return document;
 }

@@ -8,6 +8,12 @@
 
 namespace dashpot::apps {
 
+/// Returns the chain for the page's kinematics: {"name", "joints": [{"name", "prismatic",
+/// "lower", "upper", "origin", "axis", "frame"}], "tip"}. With T_0 = I,
+///     T_i = T_i-1 [Rot(axis, q_i), origin] frame      (prismatic: [I, origin + q_i axis] frame)
+/// is the frame of link i in B, and T_n tip that of the tip. Frames are rows of 4 x 4.
+nlohmann::ordered_json chain_json(const controller::RobotModel& model);
+
 /// What a page needs to know of the arm beyond the messages.
 class ArmView {
  public:
@@ -16,11 +22,7 @@ class ArmView {
   int dof() const { return config_.model.dof(); }
   double period() const { return config_.settings.period; }
 
-  /// Returns the chain for the page's kinematics: {"name", "joints": [{"name", "prismatic",
-  /// "lower", "upper", "origin", "axis", "frame"}], "tip"}. With T_0 = I,
-  ///     T_i = T_i-1 [Rot(axis, q_i), origin] frame      (prismatic: [I, origin + q_i axis] frame)
-  /// is the frame of link i in B, and T_n tip that of the tip. Frames are rows of 4 x 4.
-  nlohmann::ordered_json chain() const;
+  nlohmann::ordered_json chain() const { return chain_json(config_.model); }
 
   /// Returns the damping ratio that the configuration asks for in a mode (JOINT, CARTESIAN), 0 if
   /// it asks for none.

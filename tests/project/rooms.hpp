@@ -133,6 +133,7 @@ inline const std::vector<Room>& rooms() {
       {"apps/command", 3, {}, {""}},
       {"apps/web", 3, {}, {""}},
       {"apps/monitor", 4, {}, {""}},
+      {"apps/tune", 4, {}, {""}},
       {"apps", 5, {}, {""}},
 
       {"python", 0, {}, {""}},
