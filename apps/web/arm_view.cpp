@@ -1,6 +1,7 @@
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/apps/cli/matrix_json.hpp>
+#include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/apps/web/arm_view.hpp>
 #include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
@@ -98,6 +99,33 @@ ArmJson chain_json(const controller::RobotModel& model) {
   }
   document["missing_rotors"] = controller::missing_rotors_text(model);
   document["tip"] = frame_json(chain.getSegment(static_cast<unsigned>(joints.size())).pose(0));
+  return document;
+}
+
+ArmView::ArmView(const std::string& config) : config_(controller::load_config(config)) {
+  try {
+    const Scene scene = load_scene(config);
+    if (scene.arm && scene.arm->options.wall) {
+      const sim::Wall& wall = *scene.arm->options.wall;
+      simulated_wall_ = {wall.point, wall.normal.normalized()};
+    }
+  } catch (const InputError&) {  // a configuration, which is no scene
+  }
+}
+
+ArmJson ArmView::chain() const {
+  ArmJson document = chain_json(config_.model);
+  document["walls"] = ArmJson::array();
+  const auto add_wall = [&walls = document["walls"]](const std::string& name,
+                                                     const controller::Wall& wall) {
+    walls.push_back({{"name", name},
+                     {"point", {wall.point.x(), wall.point.y(), wall.point.z()}},
+                     {"normal", {wall.normal.x(), wall.normal.y(), wall.normal.z()}}});
+  };
+  for (const controller::Wall& wall : config_.settings.limits.walls) {
+    add_wall("wall " + std::to_string(document["walls"].size() + 1), wall);
+  }
+  if (simulated_wall_) add_wall("simulated wall", *simulated_wall_);
   return document;
 }
 

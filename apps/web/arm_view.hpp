@@ -3,6 +3,7 @@
 #include <dashpot/lcmtypes/modes_t.hpp>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,12 +18,17 @@ nlohmann::ordered_json chain_json(const controller::RobotModel& model);
 /// What a page needs to know of the arm beyond the messages.
 class ArmView {
  public:
-  explicit ArmView(const std::string& config) : config_(controller::load_config(config)) {}
+  /// `config` is the path of a configuration or a scene.
+  explicit ArmView(const std::string& config);
 
   int dof() const { return config_.model.dof(); }
   double period() const { return config_.settings.period; }
+  /// The gain margin that gains have to leave, no unit.
+  double gain_margin() const { return config_.settings.limits.gain_margin; }
 
-  nlohmann::ordered_json chain() const { return chain_json(config_.model); }
+  /// Returns the chain with {"walls": [{"name", "point", "normal"}]} besides; a wall's normal
+  /// points to where the tip may be.
+  nlohmann::ordered_json chain() const;
 
   /// Returns the damping ratio that the configuration asks for in a mode (JOINT, CARTESIAN), 0 if
   /// it asks for none.
@@ -39,6 +45,7 @@ class ArmView {
 
  private:
   controller::Config config_;
+  std::optional<controller::Wall> simulated_wall_;  ///< of a scene
 };
 
 }  // namespace dashpot::apps

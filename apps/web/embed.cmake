@@ -1,9 +1,11 @@
-# Writes the files of page/ into a source file, as the program serves them: cmake -P, with OUT, PAGE.
+# Writes the files of page/, and a document that it links to, into a source file, as the program
+# serves them: cmake -P, with OUT, PAGE.
 set(text "#include <dashpot/apps/web/web_site.hpp>\n\nnamespace dashpot::apps {\nnamespace {\n")
 set(table "")
 foreach(entry IN ITEMS "index.html:text/html" "style.css:text/css" "main.js:text/javascript"
     "draw.js:text/javascript" "arm.js:text/javascript" "poles.js:text/javascript"
-    "curves.js:text/javascript" "icon.svg:image/svg+xml")
+    "curves.js:text/javascript" "panels.js:text/javascript" "advice.js:text/javascript"
+    "icon.svg:image/svg+xml" "../../../docs/safety.md:text/plain")
   string(REPLACE ":" ";" entry ${entry})
   list(GET entry 0 name)
   list(GET entry 1 type)
@@ -14,7 +16,8 @@ foreach(entry IN ITEMS "index.html:text/html" "style.css:text/css" "main.js:text
   string(REGEX REPLACE "(................................................................................)" "\\1\"\n  \"" hex "${hex}")
   string(MAKE_C_IDENTIFIER ${name} id)
   string(APPEND text "constexpr char k_${id}[] =\n  \"${hex}\";\n")
-  set(path "/${name}")
+  get_filename_component(file ${name} NAME)
+  set(path "/${file}")
   if(name STREQUAL "index.html")
     set(path "/")
   endif()

@@ -50,7 +50,7 @@ void Alarms::take(const sampled_modes_t& message) {
 }
 
 FrameJson Frame::json() const {
-  FrameJson document{{"utime", utime}, {"messages", messages}};
+  FrameJson document{{"utime", utime}, {"messages", messages}, {"age", age}};
   document["state"] = state ? message_json(*state) : FrameJson();
   document["modes"] = modes ? message_json(*modes) : FrameJson();
   document["sampled"] = sampled ? message_json(*sampled) : FrameJson();

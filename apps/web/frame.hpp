@@ -36,13 +36,14 @@ struct Frame {
   Alarms alarms;
   std::int64_t messages = 0;
   std::int64_t utime = 0;  ///< of the last message, us
+  double age = 0;          ///< since the last message came, s
 
   void take(const state_t& message) { take_as(state, message); }
   void take(const modes_t& message) { take_as(modes, message); }
   void take(const sampled_modes_t& message) { take_as(sampled, message); }
 
-  /// Returns {"utime", "messages", "state", "modes", "sampled", "alarms"}; a message that has not
-  /// come is null.
+  /// Returns {"utime", "messages", "age", "state", "modes", "sampled", "alarms"}; a message that
+  /// has not come is null.
   nlohmann::ordered_json json() const;
 
  private:

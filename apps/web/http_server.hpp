@@ -48,7 +48,7 @@ class HttpServer {
   static constexpr std::size_t kMostStreams = 8;
   static constexpr std::size_t kMostBody = 65536;
   static constexpr std::chrono::seconds kRequestTime{5};
-  static constexpr std::chrono::milliseconds kEventPeriod{33};
+  static constexpr std::chrono::milliseconds kEventPeriod{100};
 
   /// Listens on `port`, 0 for any that is free. Throws std::runtime_error with port and reason.
   HttpServer(int port, HttpContent content);

@@ -128,12 +128,14 @@ Frame LogFrames::at(double time) {
   frame.utime = entry.frame_utime;
   lcmtypes::MessageHandlers handlers = frame_handlers(frame);
   file_.seek(entry.offset);
-  std::int64_t now = entry.time;
+  std::int64_t now = entry.time, last = now;
   while (file_.read()) {
     now = elapsed(file_.event().utime, first_, now);
     if (now > wanted) break;
+    last = now;
     hand_on(file_.event(), handlers);
   }
+  frame.age = 1e-6 * static_cast<double>(wanted - last);
   return frame;
 }
 

@@ -42,16 +42,23 @@ SiteJson WebSite::setup() const {
   document["damage"] = live() ? "" : log_->damage();
   document["arm"] = arm_ ? arm_->chain() : SiteJson();
   document["period"] = arm_ ? SiteJson(arm_->period()) : SiteJson();
+  document["gain_margin"] = arm_ ? SiteJson(arm_->gain_margin()) : SiteJson();
   document["wanted_ratio"] = {{"joint", arm_ ? arm_->wanted_ratio(state_t::JOINT) : 0},
                               {"cartesian", arm_ ? arm_->wanted_ratio(state_t::CARTESIAN) : 0}};
   document["identified"] = identified_;
   return document;
 }
 
+Frame WebSite::live_frame() const {
+  Frame frame = frame_;
+  frame.age = std::chrono::duration<double>(std::chrono::steady_clock::now() - came_at_).count();
+  return frame;
+}
+
 Frame WebSite::frame_at(const std::map<std::string, std::string>& query) {
   if (live()) {
     const std::lock_guard lock(mutex_);
-    return frame_;
+    return live_frame();
   }
   const std::string time = value_of(query, "t");
   char* end = nullptr;
@@ -94,7 +101,7 @@ std::shared_ptr<const std::string> WebSite::next_event() {
     const std::lock_guard lock(mutex_);
     if (frame_.messages == sent_ && now - sent_at_ < std::chrono::seconds(1)) return nullptr;
     sent_ = frame_.messages;
-    document = frame_.json();
+    document = live_frame().json();
   }
   sent_at_ = now;
   return std::make_shared<const std::string>("data: " + line_of(document) + "\n\n");

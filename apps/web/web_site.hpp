@@ -33,6 +33,7 @@ class WebSite {
   void take(const Message& message) {
     const std::lock_guard lock(mutex_);
     frame_.take(message);
+    came_at_ = std::chrono::steady_clock::now();
   }
   /// Whatever it does, it cannot change what the server shows. On the server's thread.
   HttpAnswer answer(const std::string& path, const std::map<std::string, std::string>& query);
@@ -42,6 +43,7 @@ class WebSite {
   bool live() const { return log_ == nullptr; }
 
  private:
+  Frame live_frame() const;  ///< mutex_ is held
   Frame frame_at(const std::map<std::string, std::string>& query);
   nlohmann::ordered_json setup() const;
   HttpAnswer response(const std::map<std::string, std::string>& query);
@@ -52,6 +54,7 @@ class WebSite {
   nlohmann::ordered_json identified_;
   std::mutex mutex_;
   Frame frame_;
+  std::chrono::steady_clock::time_point came_at_ = std::chrono::steady_clock::now();
   std::int64_t sent_ = -1;
   std::chrono::steady_clock::time_point sent_at_{};
 };

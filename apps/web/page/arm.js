@@ -1,5 +1,5 @@
 // The arm by its kinematics, turned by pointer or keys, with a mode's shape on top.
-import {begin, colour, line, modeColour, say} from '/draw.js';
+import {begin, colour, line, modeColour, number, say} from '/draw.js';
 
 const multiply = (A, B) => A.map((row) => [0, 1, 2, 3].map((j) =>
   row[0] * B[0][j] + row[1] * B[1][j] + row[2] * B[2][j] + row[3] * B[3][j]));
@@ -35,9 +35,13 @@ export function kinematics(arm, q) {
   return {points, joints, tip: T};
 }
 
+/// `changed` is called when the arm has to be drawn again because of pointer or keys.
 export class ArmView {
-  constructor(canvas) {
+  constructor(canvas, changed = () => {}) {
     this.canvas = canvas;
+    this.changed = changed;
+    canvas.tabIndex = 0;
+    canvas.setAttribute('role', 'img');
     this.turn = 0.75;
     this.tilt = 0.32;
     this.zoom = 1;
@@ -69,14 +73,21 @@ export class ArmView {
   orbit(turn, tilt) {
     this.turn -= turn;
     this.tilt = Math.min(1.5, Math.max(-0.2, this.tilt + tilt));
+    this.changed();
   }
-  scale(factor) { this.zoom = Math.min(6, Math.max(0.3, this.zoom * factor)); }
+  scale(factor) {
+    this.zoom = Math.min(6, Math.max(0.3, this.zoom * factor));
+    this.changed();
+  }
 
-  /// `shape` is {label, re, im, phase, amplitude} or null.
-  draw(arm, q, shape) {
+  /// `arm` is the chain of /setup, q a posture, `shape` {label, re, im, phase, amplitude} or null.
+  /// `scene` may have `walls` [{point, normal, name}], planes whose normal points to where the tip
+  /// may be; `force` at the tip, N; `note`, said in the middle instead of an arm. Returns the
+  /// tip's frame, or null.
+  draw(arm, q, shape, {walls = [], force = null, note = ''} = {}) {
     const {c, w, h} = begin(this.canvas);
-    if (!arm || !q || q.length !== arm.joints.length) {
-      say(c, w, h, !arm ? 'no arm: start with --config to see it' : 'waiting for a posture');
+    if (note || !arm || !q || q.length !== arm.joints.length) {
+      say(c, w, h, note || (!arm ? 'no arm: start with --config to see it' : 'waiting for a posture'));
       return null;
     }
     const rest = kinematics(arm, q);
@@ -84,6 +95,7 @@ export class ArmView {
     this.reach = Math.max(this.reach * 0.999, far, 0.1);
     const project = this.projection(w, h, rest.points);
     this.ground(c, project);
+    const behind = walls.map((wall) => this.wall(c, project, wall, column(rest.tip, 3)));
     let tip = rest.tip;
     if (shape) {
       const size = Math.max(...shape.re.map((x, i) => Math.hypot(x, shape.im[i])), 1e-30);
@@ -107,12 +119,66 @@ export class ArmView {
       this.body(c, project, rest, false);
     }
     this.triad(c, project, tip);
+    if (force) this.arrow(c, project, column(rest.tip, 3), force);
+    const there = behind.filter(Boolean);
+    this.canvas.setAttribute('aria-label', `The arm${shape ? `, swinging in ${typeof shape.label === 'number' ? `mode ${shape.label}` : shape.label}` : ''}` +
+      `${there.length ? `; ${there.join('; ')}` : ''}. Arrow keys turn it, plus and minus zoom.`);
     return rest.tip;
+  }
+
+  /// A part of a wall in front of the tip, if it is near; returns how far away it is, in words.
+  wall(c, project, {point, normal, name}, tip) {
+    const distance = normal.reduce((sum, n, k) => sum + n * (tip[k] - point[k]), 0);
+    if (!(Math.abs(distance) < this.reach)) return '';
+    const foot = tip.map((x, k) => x - distance * normal[k]), [x, y, z] = normal;
+    const other = Math.abs(z) < 0.9 ? [0, 0, 1] : [1, 0, 0];
+    let u = [y * other[2] - z * other[1], z * other[0] - x * other[2], x * other[1] - y * other[0]];
+    u = u.map((k) => k / Math.hypot(...u));
+    const v = [y * u[2] - z * u[1], z * u[0] - x * u[2], x * u[1] - y * u[0]], half = 0.35 * this.reach;
+    const corner = (a, b) => project(foot.map((f, k) => f + half * (a * u[k] + b * v[k])));
+    c.beginPath();
+    [[-1, -1], [1, -1], [1, 1], [-1, 1]].forEach(([a, b], i) => c[i ? 'lineTo' : 'moveTo'](...corner(a, b).slice(0, 2)));
+    c.closePath();
+    c.globalAlpha = 0.18;
+    c.fillStyle = colour(distance < 0 ? 'bad' : 'accent');
+    c.fill();
+    c.globalAlpha = 1;
+    c.strokeStyle = c.fillStyle = colour(distance < 0 ? 'bad' : 'accent');
+    c.lineWidth = 1.2;
+    c.stroke();
+    const p = project(tip), f = project(foot);
+    c.setLineDash([3, 3]);
+    line(c, p[0], p[1], f[0], f[1]);
+    c.setLineDash([]);
+    const text = `${name}${distance < 0 ? ` crossed by ${number(-1e3 * distance, 3)} mm` : ` ${number(1e3 * distance, 3)} mm away`}`;
+    c.textAlign = 'left';
+    const at = corner(-1, -1);
+    c.fillText(text, Math.min(Math.max(at[0], 4), this.canvas.clientWidth - c.measureText(text).width - 4), Math.min(Math.max(at[1] + 13, 14), this.canvas.clientHeight - 4));
+    return text;
+  }
+
+  /// A force at the tip as an arrow, whose length grows with its logarithm from 1 N on.
+  arrow(c, project, at, force) {
+    const size = Math.hypot(...force);
+    if (!(size >= 1)) return;
+    const length = 0.12 * this.reach * Math.log10(10 * size);
+    const a = project(at), b = project(at.map((x, k) => x + length * force[k] / size));
+    c.strokeStyle = c.fillStyle = colour('force');
+    c.lineWidth = 3;
+    line(c, a[0], a[1], b[0], b[1]);
+    const turn = Math.atan2(b[1] - a[1], b[0] - a[0]);
+    c.beginPath();
+    [[6, 0], [-6, 5], [-6, -5]].forEach(([x, y], i) => c[i ? 'lineTo' : 'moveTo'](
+      b[0] + x * Math.cos(turn) - y * Math.sin(turn), b[1] + x * Math.sin(turn) + y * Math.cos(turn)));
+    c.closePath();
+    c.fill();
+    c.textAlign = 'center';
+    c.fillText(`${number(size, 3)} N`, b[0] + 14 * Math.cos(turn), b[1] + 16 * Math.sin(turn) + 4);
   }
 
   projection(w, h, points) {
     const mean = [0, 1, 2].map((k) => (Math.min(...points.map((p) => p[k])) + Math.max(...points.map((p) => p[k]))) / 2);
-    const f = this.focus = this.focus ? this.focus.map((x, k) => x + 0.05 * (mean[k] - x)) : mean;
+    const f = this.focus = this.focus ? this.focus.map((x, k) => x + 0.1 * (mean[k] - x)) : mean;
     const ct = Math.cos(this.turn), st = Math.sin(this.turn), ck = Math.cos(this.tilt), sk = Math.sin(this.tilt);
     const distance = 4 * this.reach, size = 0.86 * Math.min(w, h) / this.reach * this.zoom;
     return (p) => {

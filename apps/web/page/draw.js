@@ -1,22 +1,88 @@
-// What all drawings share: canvases in device pixels, colours of the theme, ticks and numbers.
+// What all drawings share: canvases in device pixels, colours and marks, scales, numbers, hints.
 
-// Okabe and Ito's palette, which people with any kind of colour vision can tell apart, in an order
-// that suits the ground. Marks differ as well.
-const kPalette = {
-  light: ['#0072b2', '#d55e00', '#009e73', '#cc79a7', '#e69f00', '#56b4e9', '#000000'],
-  dark: ['#56b4e9', '#e69f00', '#009e73', '#cc79a7', '#f0e442', '#d55e00', '#ffffff'],
-};
+// Theme: style.css has the colours of both.
+let known = new Map();  // name -> colour, because asking the style sheet takes long
 export const theme = () => document.documentElement.dataset.theme;
-export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-
-const slots = new Map();  // label -> place in the palette, in order of appearance
-export function slotOf(label) {
-  if (!slots.has(label)) slots.set(label, slots.size);
-  return slots.get(label);
+export const colour = (name) => {
+  if (!known.has(name)) known.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  return known.get(name);
+};
+/// Sets the theme that the address or the browser asks for, and lets a button switch it.
+export function followTheme(button, changed) {
+  const dark = matchMedia('(prefers-color-scheme: dark)');
+  const set = (name) => {
+    document.documentElement.dataset.theme = name;
+    known = new Map();
+    changed();
+  };
+  const asked = new URLSearchParams(location.search).get('theme');
+  set(asked === 'dark' || asked === 'light' ? asked : dark.matches ? 'dark' : 'light');
+  dark.addEventListener('change', () => set(dark.matches ? 'dark' : 'light'));
+  button.addEventListener('click', () => set(theme() === 'dark' ? 'light' : 'dark'));
 }
-export const modeColour = (label) => typeof label === 'string' ? colour('ink') : kPalette[theme()][slotOf(label) % 7];
-const kDashes = [[], [7, 4], [2, 3], [9, 3, 2, 3]];
-export const modeDash = (label) => kDashes[Math.floor(slotOf(label) / 7) % 4];
+const still = matchMedia('(prefers-reduced-motion: reduce)');
+export const reducedMotion = () => still.matches;
+
+/// Returns a function that asks for `draw`, which then runs once, at most `rate` times a second.
+export function redrawer(draw, rate) {
+  let asked = false, last = -Infinity;
+  return () => {
+    if (asked) return;
+    asked = true;
+    setTimeout(() => requestAnimationFrame((now) => {
+      asked = false;
+      last = now;
+      draw(now);
+    }), Math.max(0, last + 1000 / rate - performance.now()));
+  };
+}
+
+// Modes: colour, mark and dash follow from the label alone. Seven colours, which people with any
+// kind of colour vision can tell apart (Okabe and Ito, and ink), and six marks: 42 labels in a row
+// look different. The program numbers modes on by 32 when it has to begin again, and then the first
+// one looks like the first one. A label that is text, such as a zero mode's, has the colour of ink.
+const kMarks = ['M1 0A1 1 0 1 1-1 0A1 1 0 1 1 1 0Z', 'M-.87-.87H.87V.87H-.87Z', 'M0-1.2L1.1.75H-1.1Z',
+  'M0-1.25L1.05 0 0 1.25-1.05 0Z', 'M0 1.2L-1.1-.75H1.1Z', 'M-.42-1.15H.42V-.42H1.15V.42H.42V1.15H-.42V.42H-1.15V-.42H-.42Z'];
+const kDashes = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
+const place = (label) => (typeof label === 'number' ? Math.max(0, label - 1) % 32 : 0);
+const colourName = (label) => (typeof label === 'number' ? `mode-${place(label) % 7}` : 'ink');
+const paths = kMarks.map((d) => new Path2D(d));
+export const modeColour = (label) => colour(colourName(label));
+export const modeDash = (label) => kDashes[place(label) % 4];
+
+/// Paints the mark of a mode in its colour; `open` leaves it empty.
+export function mark(c, label, x, y, r, open = false) {
+  const path = paths[place(label) % 6];
+  c.save();
+  c.translate(x, y);
+  c.scale(r, r);
+  c.setLineDash([]);
+  c.fillStyle = c.strokeStyle = modeColour(label);
+  c.lineWidth = 1.6 / r;
+  if (open) c.stroke(path);
+  else c.fill(path);
+  c.restore();
+}
+
+/// Returns the mark of a mode as an element of the page, with its dash if it is for curves.
+export function markElement(label, dashed = false) {
+  const xml = 'http://www.w3.org/2000/svg', svg = document.createElementNS(xml, 'svg');
+  svg.setAttribute('class', 'mark');
+  svg.setAttribute('aria-hidden', 'true');
+  svg.setAttribute('viewBox', dashed ? '-3 -1.4 6 2.8' : '-1.4 -1.4 2.8 2.8');
+  svg.style.color = `var(--${colourName(label)})`;
+  const add = (name, attributes) => {
+    const part = document.createElementNS(xml, name);
+    for (const [key, value] of Object.entries(attributes)) part.setAttribute(key, value);
+    svg.append(part);
+  };
+  if (dashed) {
+    svg.classList.add('wide');
+    add('path', {d: 'M-3 0H3', stroke: 'currentColor', 'stroke-width': .3, 'stroke-dasharray': modeDash(label).map((x) => x / 8).join(' ')});
+  }
+  add('path', {d: kMarks[place(label) % 6], fill: 'currentColor'});
+  return svg;
+}
 
 /// The context of a canvas, cleared, with its width and height in CSS pixels.
 export function begin(canvas) {
@@ -42,23 +108,14 @@ export function line(c, x0, y0, x1, y1) {
   c.stroke();
 }
 
-/// A mark that tells modes apart without colour.
-export function mark(c, slot, x, y, r) {
-  c.beginPath();
-  if (slot % 4 === 0) {
-    c.arc(x, y, r, 0, 2 * Math.PI);
-  } else if (slot % 4 === 1) {
-    c.rect(x - r * .85, y - r * .85, r * 1.7, r * 1.7);
-  } else {
-    const n = slot % 4 === 2 ? 3 : 4;
-    for (let i = 0; i < n; ++i) {
-      const a = -Math.PI / 2 + i * 2 * Math.PI / n;
-      c[i ? 'lineTo' : 'moveTo'](x + 1.25 * r * Math.cos(a), y + 1.25 * r * Math.sin(a));
-    }
-    c.closePath();
-  }
+/// Text in the middle of a drawing that has nothing to show.
+export function say(c, w, h, text) {
+  c.fillStyle = colour('soft');
+  c.textAlign = 'center';
+  text.split('\n').forEach((row, i, all) => c.fillText(row, w / 2, h / 2 + 16 * (i - (all.length - 1) / 2), w - 8));
 }
 
+// Numbers
 export function number(x, digits = 4) {
   if (x === null || x === undefined || Number.isNaN(x)) return '–';
   if (!Number.isFinite(x)) return x > 0 ? '∞' : '−∞';
@@ -77,11 +134,64 @@ export function ticks(a, b, count) {
   for (let i = Math.ceil(a / step - 1e-9); i * step <= b + 1e-9 * step; ++i) all.push(i * step);
   return all;
 }
-export const tickText = (x) => String(+x.toPrecision(3)).replace('-', '−');
+/// Ticks of a logarithmic axis from a to b, both positive: decades, or 1, 2 and 5 of each, or round
+/// numbers where less than that fits in between.
+export function logTicks(a, b, count) {
+  const all = [], decades = Math.log10(b / a);
+  if (!(decades > 0) || !Number.isFinite(decades)) return [a];
+  const factors = decades * 3 > count ? [1] : [1, 2, 5], every = Math.ceil(decades / Math.max(count, 1));
+  for (let e = Math.floor(Math.log10(a)); e <= Math.log10(b); ++e) {
+    if (e % every) continue;
+    for (const f of factors) if (f * 10 ** e >= a * .9999 && f * 10 ** e <= b * 1.0001) all.push(f * 10 ** e);
+  }
+  return all.length >= 3 || decades > 1.5 ? all : ticks(a, b, count);
+}
+const superscript = (n) => String(n).replace('-', '⁻').replace(/\d/g, (d) => '⁰¹²³⁴⁵⁶⁷⁸⁹'[d]);
+export const tickText = (x) => {
+  const size = Math.abs(x), e = Math.log10(size);
+  if (size > 0 && (size < 1e-3 || size >= 1e5)) {
+    return Math.abs(e - Math.round(e)) < 1e-9 ? `10${superscript(Math.round(e))}` : x.toExponential(0).replace('-', '−');
+  }
+  return String(+x.toPrecision(4)).replace('-', '−');
+};
 
-/// Text in the middle of a drawing that has nothing to show.
-export function say(c, w, h, text) {
-  c.fillStyle = colour('soft');
-  c.textAlign = 'center';
-  c.fillText(text, w / 2, h / 2);
+/// Returns a mode's shape as the terminal writes it, "q2 - 0.43 q5 + 0.21 q1 (95 deg)": entries
+/// relative to the largest, by falling size, with the phase where one is not in step with it.
+export function shapeText(re, im, terms = 4) {
+  const size = re.map((x, i) => Math.hypot(x, im[i]));
+  if (!size.every(Number.isFinite)) return '–';
+  const order = size.map((_, i) => i).sort((i, j) => Math.fround(size[j]) - Math.fround(size[i]) || i - j);
+  const [a, b] = [re[order[0]], im[order[0]]], square = a * a + b * b;
+  let text = `q${order[0] + 1}`;
+  for (const [k, i] of order.slice(1).entries()) {
+    const x = (re[i] * a + im[i] * b) / square, y = (im[i] * a - re[i] * b) / square, r = Math.hypot(x, y);
+    if (!(r >= 0.02)) break;
+    if (k + 1 === terms) return `${text} …`;
+    const inStep = Math.abs(y) <= 0.176 * Math.abs(x);
+    text += `${inStep && x < 0 ? ' − ' : ' + '}${r < 1 - 5e-3 ? `${r.toPrecision(2)} ` : ''}q${i + 1}`;
+    if (!inStep) text += ` (${Math.round(Math.atan2(y, x) * 180 / Math.PI)}°)`.replace('-', '−');
+  }
+  return text;
+}
+
+/// Shows rows {label, text, strong} beside a point of a canvas, or nothing.
+let hint = null;
+export function showHint(canvas, x, y, rows) {
+  if (!hint) {
+    hint = document.createElement('div');
+    hint.className = 'hint';
+    document.body.append(hint);
+  }
+  hint.hidden = !rows;
+  if (!rows) return;
+  hint.replaceChildren(...rows.map(({label, text}) => {
+    const row = document.createElement('div');
+    if (label !== undefined) row.append(markElement(label), ' ');
+    row.append(text);
+    return row;
+  }));
+  const box = canvas.getBoundingClientRect();
+  const left = box.left + x + 14, over = left + hint.offsetWidth > document.documentElement.clientWidth - 4;
+  hint.style.left = `${window.scrollX + (over ? Math.max(4, left - 28 - hint.offsetWidth) : left)}px`;
+  hint.style.top = `${window.scrollY + Math.max(4, Math.min(box.top + y - 10, window.innerHeight - hint.offsetHeight - 4))}px`;
 }

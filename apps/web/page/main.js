@@ -1,30 +1,50 @@
-// Takes frames from the program, keeps the last minute, and has everything drawn.
+// Takes frames from the program, keeps the last minute, and has drawn again what changed.
+import {faultAdvice, notice, silenceAdvice} from '/advice.js';
 import {ArmView} from '/arm.js';
-import {drawModes, drawResponse, drawTicks} from '/curves.js';
-import {modeColour, number} from '/draw.js';
+import {Plot, View, drawResponse} from '/curves.js';
+import {followTheme, number, redrawer, reducedMotion, tickText} from '/draw.js';
+import {alarms, chips, jointTable, legends, loopNumbers, modeTable, sampledNumbers, text, wantedRatio} from '/panels.js';
 import {PoleMap, drawCircle, sampledPoles} from '/poles.js';
 
 const $ = (id) => document.getElementById(id);
-const kMinute = 60;  // s of curves that a live page keeps
+const kMinute = 60;    // s of curves that a live page keeps
+const kSilent = 2;     // s without a message
+const kOldModes = 5;   // s that modes may lag behind the state
 const kSpeeds = [0.1, 0.25, 0.5, 1, 2, 5, 10, 30];
 
-const page = {setup: null, frame: null, chosen: null, connected: false, stale: 0, start: null,
-  poles: [], tip: null, frames: 0, response: null, responseNote: '', errors: []};
+const page = {setup: null, frame: null, chosen: null, connected: false, arrived: 0, start: null, paused: false,
+  poles: [], tip: null, frames: 0, response: null, responseNote: '', errors: [], draws: 0};
 window.dashpot = page;  // to look into, and for tests
 window.addEventListener('error', (e) => page.errors.push(e.message));
 window.addEventListener('unhandledrejection', (e) => page.errors.push(String(e.reason)));
 
-const arm = new ArmView($('arm')), map = new PoleMap($('poles'));
-const series = {time: [], tick: [], status: [], modes: new Map()};
-const replay = {time: 0, playing: true, speed: 3, at: null};
+// What has to be drawn again, and when it was drawn last
+const kParts = ['arm', 'poles', 'numbers', 'curves', 'response'];
+const kEvery = {arm: 0, poles: 150, numbers: 230, curves: 480, response: 0};  // ms, if only time goes on
+const dirty = new Map(), drawnAt = {};  // part -> 'soon' (at someone's wish) or 'later'
+const request = redrawer((now) => draw(now), 20);
+function soon(...parts) {
+  for (const part of parts.length ? parts : kParts) dirty.set(part, 'soon');
+  request();
+}
+function later(...parts) {
+  for (const part of parts) if (!dirty.has(part)) dirty.set(part, 'later');
+  request();
+}
 
-// Theme
-const dark = matchMedia('(prefers-color-scheme: dark)');
-function setTheme(name) { document.documentElement.dataset.theme = name; page.rows = null; }
-const asked = new URLSearchParams(location.search).get('theme');
-setTheme(asked === 'dark' || asked === 'light' ? asked : dark.matches ? 'dark' : 'light');
-dark.addEventListener('change', () => setTheme(dark.matches ? 'dark' : 'light'));
-$('theme').addEventListener('click', () => setTheme(document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark'));
+const arm = new ArmView($('arm'), () => soon('arm'));
+const map = new PoleMap($('poles'), () => soon('poles'), choose);
+const times = new View(), omegas = new View();
+const overTime = () => soon('curves'), overOmega = () => soon('response');
+const plots = {frequency: new Plot($('frequency'), overTime, times), ratio: new Plot($('ratio'), overTime, times),
+  ticks: new Plot($('ticks'), overTime, times), magnitude: new Plot($('magnitude'), overOmega, omegas),
+  phase: new Plot($('phase'), overOmega, omegas)};
+const empty = () => ({time: [], tick: [], status: [], modes: new Map()});
+let series = empty(), held = null;  // what came, and while the page is paused what it shows
+const replay = {time: 0, playing: true, speed: 3, at: null};
+followTheme($('theme'), () => soon());
+new ResizeObserver(() => soon()).observe(document.querySelector('main'));
+setInterval(() => page.frame && later('numbers'), 1000);  // ages grow by themselves
 
 // Messages
 async function get(path) {
@@ -34,39 +54,64 @@ async function get(path) {
   return body;
 }
 
-function link(good, text) {
+function link(good, said) {
   page.connected = good;
-  $('link').className = `badge ${good ? 'good' : 'bad'}`;
-  if ($('link').textContent !== text) $('link').textContent = text;
+  page.link = said;
+  if (page.frame) later('numbers');
+  else showLink('waiting');
+}
+function showLink(state) {
+  text('link', state === 'silent' ? `silent for ${ageText()}` : state === 'waiting' && page.connected ? `${page.link}; waiting for messages` : page.link);
+  $('link').className = `badge ${{running: 'good', log: page.setup && page.setup.damage ? 'bad' : ''}[state] ?? (state === 'waiting' && page.connected ? '' : 'bad')}`;
 }
 
 function forget() {
-  for (const list of [series.time, series.tick, series.status]) list.length = 0;
-  series.modes.clear();
+  series = empty();
   map.forget();
 }
 
 function take(frame) {
-  const before = page.frame;
-  const fresh = !before || before.messages !== frame.messages;
-  page.frame = frame;
+  const before = page.latest;
+  const fresh = !before || before.messages !== frame.messages || before.utime !== frame.utime;
+  page.latest = frame;
   ++page.frames;
-  if (!frame.messages) return;
-  if (page.start === null) page.start = frame.utime;
+  page.arrived = performance.now();
+  if (page.start === null && frame.messages) page.start = frame.utime;
   if (page.setup.live && before && frame.utime < before.utime - 1e6) {  // another loop, or its restart
     page.start = frame.utime;
     forget();
   }
-  if (fresh) page.stale = performance.now();
-  const t = time();
-  map.note(t, poles());
-  if (page.setup.live && fresh) append(t, frame);
+  if (page.setup.live && fresh && frame.messages) append(timeOf(frame), frame);
+  if (page.paused) return;
+  page.frame = frame;
+  const parts = ['numbers'];
+  if (fresh || !before) {
+    parts.push('arm', 'poles', 'curves');
+    if (frame.messages) map.note(time(), poles());
+  }
+  later(...parts);
 }
-const time = () => (page.setup.live ? (page.frame.utime - page.start) * 1e-6 : replay.time);
+const timeOf = (frame) => (page.setup.live ? (frame.utime - page.start) * 1e-6 : replay.time);
+const time = () => timeOf(page.frame);
 
+/// How the loop is: 'waiting' for a first message, 'running', 'silent', 'gone' with the server, 'log'.
+function state() {
+  if (!page.connected) return 'gone';
+  if (!page.frame.messages) return 'waiting';
+  if (!page.setup.live) return 'log';
+  return age() > kSilent && !page.paused ? 'silent' : 'running';
+}
+/// s since the last message: as the server says, and the time since then.
+const age = () => page.frame.age + (page.setup.live ? (performance.now() - page.arrived) * 1e-3 : 0);
+function ageText() {
+  const s = Math.floor(age());
+  return s < 120 ? `${s} s` : s < 7200 ? `${Math.floor(s / 60)} min` : `${Math.floor(s / 3600)} h`;
+}
+
+const kCurves = ['natural_frequency', 'damping_ratio'];
 function append(t, frame) {
   if (series.time.length && t <= series.time[series.time.length - 1]) return;
-  if (frame.utime && t - series.time[series.time.length - 1] > 1) append(t - 1e-3, {});  // a gap
+  if (frame.utime && t - series.time[series.time.length - 1] > kSilent) append(t - 1e-3, {});  // a gap
   series.time.push(t);
   series.tick.push(frame.state ? frame.state.tick_time * 1e-3 : null);
   series.status.push(frame.state ? frame.state.status : 0);
@@ -74,21 +119,21 @@ function append(t, frame) {
   (modes ? modes.label : []).forEach((label, i) => {
     if (!series.modes.has(label)) series.modes.set(label, {natural_frequency: [], damping_ratio: []});
     const curves = series.modes.get(label);
-    for (const key of ['natural_frequency', 'damping_ratio']) {
+    for (const key of kCurves) {
       while (curves[key].length < series.time.length - 1) curves[key].push(null);
       curves[key].push(modes[key][i]);
     }
   });
   for (const curves of series.modes.values()) {
-    for (const key of ['natural_frequency', 'damping_ratio']) while (curves[key].length < series.time.length) curves[key].push(null);
+    for (const key of kCurves) while (curves[key].length < series.time.length) curves[key].push(null);
   }
   let old = 0;
   while (series.time[old] < t - kMinute) ++old;
   if (!old) return;
   for (const list of [series.time, series.tick, series.status]) list.splice(0, old);
   for (const [label, curves] of series.modes) {
-    for (const key of ['natural_frequency', 'damping_ratio']) curves[key].splice(0, old);
-    if (curves.damping_ratio.every((v) => v === null) && curves.natural_frequency.every((v) => v === null)) series.modes.delete(label);
+    for (const key of kCurves) curves[key].splice(0, old);
+    if (kCurves.every((key) => curves[key].every((v) => v === null))) series.modes.delete(label);
   }
 }
 
@@ -120,18 +165,17 @@ async function connect() {
       await new Promise((done) => setTimeout(done, 1000));
     }
   }
-  $('source').textContent = page.setup.source;
+  text('source', page.setup.source);
   $('source').title = page.setup.source;
   fillPlaces();
+  $('pause').hidden = !page.setup.live;
   if (page.setup.live) return stream();
   $('replay').hidden = false;
   $('time').max = page.setup.duration;
   link(true, page.setup.damage ? `log: ${page.setup.damage}` : 'log');
   const history = await get('/history');
   forget();
-  series.time = history.time;
-  series.tick = history.tick_time;
-  series.status = history.status;
+  Object.assign(series, {time: history.time, tick: history.tick_time, status: history.status});
   for (const [label, curves] of Object.entries(history.mode)) series.modes.set(Number(label), curves);
   pump();
 }
@@ -140,7 +184,7 @@ function stream() {
   const events = new EventSource('/stream');
   events.onopen = () => link(true, 'connected');
   events.onmessage = (e) => {
-    link(true, 'connected');
+    if (!page.connected) link(true, 'connected');
     take(JSON.parse(e.data));
   };
   events.onerror = () => {
@@ -150,11 +194,22 @@ function stream() {
   };
 }
 
+/// While the page is paused, messages are kept for the curves, and what is shown stays.
+function setPaused(on) {
+  page.paused = on;
+  held = on ? structuredClone(series) : null;
+  text('pause', on ? 'Go on' : 'Pause');
+  $('pause').setAttribute('aria-pressed', String(on));
+  if (!on && page.latest) page.frame = page.latest;
+  soon();
+}
+$('pause').addEventListener('click', () => setPaused(!page.paused));
+
 // Replay: one request at a time, always for the time that it is then
 async function pump() {
   let then = performance.now();
   for (;;) {
-    await new Promise((done) => setTimeout(done, 33));
+    await new Promise((done) => setTimeout(done, 66));
     const now = performance.now();
     if (replay.playing) {
       replay.time = Math.min(replay.time + 1e-3 * (now - then) * kSpeeds[replay.speed], page.setup.duration);
@@ -170,17 +225,18 @@ async function pump() {
       continue;
     }
     replay.at = wanted;
-    link(true, page.setup.damage ? `log: ${page.setup.damage}` : 'log');
+    if (!page.connected) link(true, page.setup.damage ? `log: ${page.setup.damage}` : 'log');
     take(frame);
+    later('curves');  // the time itself moves
   }
 }
 function setPlaying(on) {
   replay.playing = on;
-  $('play').textContent = on ? 'Pause' : 'Play';
+  text('play', on ? 'Pause' : 'Play');
 }
 function setSpeed(step) {
   replay.speed = Math.min(kSpeeds.length - 1, Math.max(0, replay.speed + step));
-  $('speed').textContent = `${kSpeeds[replay.speed]} ×`;
+  text('speed', `${kSpeeds[replay.speed]} ×`);
 }
 $('play').addEventListener('click', () => {
   if (!replay.playing && replay.time >= page.setup.duration) replay.time = 0;
@@ -188,42 +244,50 @@ $('play').addEventListener('click', () => {
 });
 $('slower').addEventListener('click', () => setSpeed(-1));
 $('faster').addEventListener('click', () => setSpeed(1));
-$('time').addEventListener('input', () => {
-  replay.time = Math.min(Number($('time').value), page.setup.duration);
-  setPlaying(false);
-});
+$('time').addEventListener('input', () => page.seek(Number($('time').value)));
 setSpeed(0);
 page.seek = (t) => {
   replay.time = Math.min(t, page.setup.duration);
   setPlaying(false);
 };
 
-// Response, at most once a second, and only where an arm is known
+// Response, at most once a second, where an arm is known and moved
 function fillPlaces() {
   const select = $('place'), kept = select.value;
   const joints = page.setup.arm ? page.setup.arm.joints : [];
   const places = [...['x', 'y', 'z', 'about x', 'about y', 'about z'].map((d, i) => [`tip/${i}`, `tip, ${d}`]),
-    ...joints.map((joint, i) => [`joint/${i}`, `joint ${i + 1}: ${joint.name}`])];
-  select.replaceChildren(...places.map(([value, text]) => new Option(text, value)));
+    ...joints.map((joint, i) => [`joint/${i}`, `q${i + 1}: ${joint.name}`])];
+  select.replaceChildren(...places.map(([value, said]) => new Option(said, value)));
   if (kept && places.some(([value]) => value === kept)) select.value = kept;
   if (!select.value) select.value = 'tip/0';
 }
+/// Why the arm of the configuration cannot be drawn: said once, in the middle of its panel.
+function otherJoints() {
+  const {state: s, modes} = page.frame, n = s ? s.n : modes ? modes.n : 0, own = page.setup.arm ? page.setup.arm.joints.length : n;
+  return n && n !== own ? `other joints: the loop has ${n}, ${page.setup.arm.name} has ${own}.\nStart with the --config of this loop.` : '';
+}
+const posture = () => (page.frame.state || page.frame.modes || {}).joint_position;
 let askedFor = '';
 async function askResponse() {
   if (!page.setup || !page.frame || !page.frame.messages || !page.connected || document.hidden) return;
-  if (!page.setup.arm) {
-    page.responseNote = 'start with --config to see the response';
+  const other = otherJoints(), q = posture();
+  if (!page.setup.arm || other || !q) {
+    page.responseNote = other || !page.setup.arm ? '–' : 'waiting for a posture';
+    if (page.response) soon('response');
+    page.response = null;
     return;
   }
-  const key = `${$('place').value}/${page.frame.messages}/${page.start}`;
-  if (key === askedFor) return;
+  const key = [$('place').value, page.frame.state && page.frame.state.mode, page.start, ...q.map((x) => x.toFixed(3))].join();
+  if (key === askedFor || page.paused) return;
   askedFor = key;
   try {
     page.response = await get(`/response?at=${$('place').value}${page.setup.live ? '' : `&t=${replay.time.toFixed(6)}`}`);
   } catch (e) {
     page.response = null;
     page.responseNote = e.told ? e.message : 'no response';
+    if (!e.told) askedFor = '';
   }
+  soon('response', 'numbers');
 }
 setInterval(askResponse, 1000);
 $('place').addEventListener('change', askResponse);
@@ -233,95 +297,20 @@ function sameGains() {
   const modes = page.frame.modes, response = page.response;
   if (!modes || !response || modes.natural_frequency.length !== response.natural_frequency.length) return !modes;
   const sorted = (list) => list.filter((v) => v !== null).sort((a, b) => a - b);
-  return ['natural_frequency', 'damping_ratio'].every((key) => {
+  return kCurves.every((key) => {
     const a = sorted([...modes[key]]), b = sorted([...response[key]]);
     return a.length === b.length && a.every((v, i) => Math.abs(v - b[i]) <= 0.02 * Math.abs(b[i]));
   });
 }
 
-// Numbers
-function text(id, value) { if ($(id).textContent !== value) $(id).textContent = value; }
-
 function choose(label) {
   page.chosen = page.chosen === label ? null : label;
-  page.rows = null;
-}
-
-function chips() {
-  const modes = page.frame && page.frame.modes;
-  const zero = page.response ? page.response.zero_modes.length : 0;
-  const labels = [...(modes ? modes.label : []), ...Array.from({length: zero}, (_, i) => `zero ${i + 1}`)];
-  const key = `${labels}|${page.chosen}|${document.documentElement.dataset.theme}`;
-  if (page.rows === key) return;
-  page.rows = key;
-  const focused = document.activeElement && document.activeElement.dataset ? document.activeElement.dataset.label : undefined;
-  $('chips').replaceChildren(...labels.map((label) => {
-    const chip = document.createElement('button');
-    chip.type = 'button';
-    chip.textContent = typeof label === 'number' ? `mode ${label}` : label;
-    chip.style.borderColor = typeof label === 'number' ? modeColour(label) : '';
-    chip.setAttribute('aria-pressed', String(label === page.chosen));
-    chip.dataset.label = label;
-    chip.addEventListener('click', () => choose(label));
-    return chip;
-  }));
-  if (focused) [...$('chips').children].find((chip) => chip.dataset.label === focused)?.focus();
-}
-
-function table() {
-  const modes = page.frame && page.frame.modes, rows = $('rows');
-  const count = modes ? modes.label.length : 0;
-  text('modes_note', !modes ? 'none yet' : `${count}, and ${modes.zero_modes} zero; ` +
-    `${['tracked', 'reused', 'solved directly'][modes.origin] || ''}${modes.status ? `; ${modes.status_text}` : ''}`);
-  while (rows.rows.length > count) rows.deleteRow(-1);
-  while (rows.rows.length < count) {
-    const row = rows.insertRow();
-    for (let i = 0; i < 6; ++i) row.insertCell();
-    row.cells[0].append(document.createElement('i'), document.createTextNode(''));
-  }
-  for (let i = 0; i < count; ++i) {
-    const {cells} = rows.rows[i], f = modes.natural_frequency[i], bound = modes.natural_frequency_bound[i];
-    rows.rows[i].className = modes.label[i] === page.chosen ? 'chosen' : '';
-    cells[0].firstChild.style.background = modeColour(modes.label[i]);
-    cells[0].lastChild.data = modes.label[i];
-    const texts = [number(f), number(f === null ? null : f / (2 * Math.PI), 3), number(modes.damping_ratio[i], 3),
-      modes.kind_text[i], bound === null ? 'none' : number(bound, 2)];
-    texts.forEach((value, k) => { if (cells[k + 1].textContent !== value) cells[k + 1].textContent = value; });
-  }
-}
-
-function alarms() {
-  const {state, sampled, alarms: all} = page.frame, none = '–';
-  const cards = [
-    ['smallest ratio so far', number(all.smallest_ratio, 3), all.smallest_ratio === null ? 'none' : all.smallest_ratio < 0.1 ? 'bad' : ''],
-    ['smallest gain margin', all.smallest_margin === null ? (sampled ? '∞' : none) : `${number(all.smallest_margin, 3)} ×`,
-      all.smallest_margin === null ? 'none' : all.smallest_margin < 1 ? 'bad' : ''],
-    ['messages with a bound lost', String(all.bounds_lost), all.bounds_lost ? 'bad' : ''],
-    ['messages without modes', String(all.modes_lost), all.modes_lost ? 'bad' : ''],
-    ['latched fault', state && state.fault ? `${state.fault_text} (tick ${state.fault_tick})` : all.faults ? `${all.faults} before` : 'none', state && state.fault ? 'bad' : ''],
-    ['overruns', state ? String(state.overruns) : none, state && state.overruns ? 'bad' : ''],
-  ];
-  if ($('alarms').children.length !== cards.length) {
-    $('alarms').replaceChildren(...cards.map(() => {
-      const card = document.createElement('div');
-      card.append(document.createElement('b'), document.createElement('span'));
-      return card;
-    }));
-  }
-  cards.forEach(([name, value, kind], i) => {
-    const card = $('alarms').children[i];
-    if (card.className !== kind) card.className = kind;
-    if (card.firstChild.textContent !== value) card.firstChild.textContent = value;
-    if (card.lastChild.textContent !== name) card.lastChild.textContent = name;
-  });
-  const posture = all.worst_posture.map((q) => +q.toFixed(4)).join(',');
-  $('copy').disabled = !posture;
-  text('worst', posture ? `smallest ratio at --q ${posture}` : '');
+  soon();
 }
 $('copy').addEventListener('click', async () => {
-  const posture = page.frame.alarms.worst_posture.map((q) => +q.toFixed(6)).join(',');
+  const worst = page.frame.alarms.worst_posture.map((q) => +q.toFixed(6)).join(',');
   try {
-    await navigator.clipboard.writeText(posture);
+    await navigator.clipboard.writeText(worst);
     text('copied', 'copied, rad');
   } catch {
     const range = document.createRange();
@@ -331,40 +320,21 @@ $('copy').addEventListener('click', async () => {
     text('copied', 'selected: copy it with Ctrl-C');
   }
 });
+for (const id of ['amplitude', 'pace']) $(id).addEventListener('input', () => soon('arm', 'numbers'));
 
-function sampledNumbers(period) {
-  const {sampled} = page.frame;
-  const items = !sampled ? [['sampled loop', 'not analysed']] : [
-    ['gain margin', sampled.gain_margin === null ? '∞' : `${number(sampled.gain_margin, 3)} ×`],
-    ['largest |z|', sampled.spectral_radius === null ? '–' : sampled.spectral_radius.toFixed(6)],
-    ...(page.setup.arm && page.setup.arm.missing_rotors
-      ? [['rotors unknown', `${page.setup.arm.missing_rotors}: the margin is that of an arm without rotors`]] : []),
-    ['period', period ? `${number(1e3 * period, 3)} ms` : '–']];
-  const value = items.flat().join('|');
-  if ($('sampled').dataset.value === value) return;
-  $('sampled').dataset.value = value;
-  $('sampled').replaceChildren(...items.flatMap(([name, said]) => {
-    const dt = document.createElement('dt'), dd = document.createElement('dd');
-    dt.textContent = name;
-    dd.textContent = said;
-    return [dt, dd];
-  }));
-}
-
-/// Of the loop: from the configuration, or from ticks and times.
-let first = null;
+/// Period of the loop and ticks in a second: from the configuration, or from ticks and times.
+let first = null, rate = null;
 function period() {
-  if (page.setup.period) return page.setup.period;
-  const {state} = page.frame;
-  if (!state) return null;
-  if (!first || state.tick < first.tick) first = state;
-  return state.tick - first.tick > 200 ? 1e-6 * (state.utime - first.utime) / (state.tick - first.tick) : null;
+  const {state: s} = page.frame;
+  if (s && (!first || s.tick < first.tick || s.utime - first.utime > 1e7)) first = s;
+  if (s && s.utime - first.utime > 1e6) rate = 1e6 * (s.tick - first.tick) / (s.utime - first.utime);
+  return page.setup.period || (rate ? 1 / rate : null);
 }
 
 function shape() {
   if (page.chosen === null || !page.frame) return null;
   const pace = Number($('pace').value), amplitude = Number($('amplitude').value);
-  const phase = 2 * Math.PI * pace * performance.now() * 1e-3;
+  const phase = reducedMotion() ? 0 : 2 * Math.PI * pace * performance.now() * 1e-3;  // at rest: how far it goes
   if (typeof page.chosen === 'string') {
     const row = page.response && page.response.zero_modes[Number(page.chosen.slice(5)) - 1];
     return row ? {label: page.chosen, re: row, im: row.map(() => 0), phase, amplitude} : null;
@@ -375,51 +345,101 @@ function shape() {
     frequency: modes.natural_frequency[i]};
 }
 
-// Drawing: arm at each animation frame, the rest thirty times a second
-let drawn = 0;
-function draw(now) {
-  requestAnimationFrame(draw);
-  if (!page.setup || !page.frame) return;
-  const {frame} = page, moving = shape();
-  const q = frame.state ? frame.state.joint_position : frame.modes && frame.modes.joint_position;
-  page.tip = arm.draw(page.setup.arm, q, moving);
-  if (now - drawn < 32) return;
-  drawn = now;
-  if (page.setup.live && page.connected) {
-    link(true, performance.now() - page.stale > 2000 ? (frame.messages ? 'connected; the loop is silent' : 'connected; waiting for messages') : 'connected');
-    if (performance.now() - page.stale > 2000) $('link').className = 'badge bad';
-  }
-  const {state, modes} = frame;
-  const wanted = page.setup.wanted_ratio[state && state.mode === 0 ? 'joint' : 'cartesian'];
-  text('clock', frame.messages ? `${time().toFixed(2)} s` : '');
-  text('status', state ? (state.fault ? `fault: ${state.fault_text}` : `${['joint', 'Cartesian'][state.mode] || ''} mode, ${state.status_text}`) : '');
-  $('status').className = `badge ${!state ? '' : state.fault || state.status ? 'bad' : 'good'}`;
-  text('arm_note', page.setup.arm ? `${page.setup.arm.name}, ${page.setup.arm.joints.length} joint${page.setup.arm.joints.length === 1 ? '' : 's'}` +
-    (moving && moving.frequency ? `; slowed ${number(Math.max(moving.frequency / (2 * Math.PI) / Number($('pace').value), 0), 2)} times` : '') : '');
+// Drawing
+const kDraw = {
+  arm() {
+    const moving = shape(), {state: s} = page.frame;
+    const force = s && s.mode === 1 && s.tip_wrench.slice(0, 3).every((x) => x !== null) ? s.tip_wrench.slice(0, 3) : null;
+    page.tip = arm.draw(page.setup.arm, posture(), moving, {walls: page.setup.arm ? page.setup.arm.walls : [], force, note: otherJoints()});
+    if (moving && !reducedMotion() && ['running', 'log'].includes(state())) later('arm');
+  },
+  poles() {
+    const {frame} = page, T = period();
+    page.poles = map.draw(poles(), measured(), wantedRatio(page), page.chosen);
+    page.origin = map.origin;
+    drawCircle($('circle'), sampledPoles(frame.sampled, T));
+    sampledNumbers(page, T);
+  },
+  numbers,
+  curves,
+  response() {
+    drawResponse(plots.magnitude, plots.phase, page.response, page.responseNote ||
+      (page.setup.arm ? 'waiting for a posture' : 'start with --config to see the response'));
+  },
+};
+
+function numbers() {
+  const {frame, setup} = page, {state: s, modes} = frame, now = state(), quiet = now === 'silent' || now === 'gone';
+  showLink(now);
+  document.querySelector('main').classList.toggle('gone', quiet);
+  const lag = s && modes ? (s.utime - modes.utime) * 1e-6 : 0;
+  for (const id of ['pole_panel', 'mode_panel']) $(id).classList.toggle('gone', !quiet && lag > kOldModes);
+  notice($('silence'), ...(quiet ? [now === 'gone' ? 'No connection to the monitor' : `The loop is silent for ${ageText()}: what is shown is old`, silenceAdvice(now, setup.source)]
+    : now === 'log' && frame.age > kSilent ? [`No message for ${ageText()} before this time`, silenceAdvice(now)]
+      : lag > kOldModes ? [`Modes are ${Math.floor(lag)} s older than the state`, ['Is the analysis on (analysis.where), and does its status say why it stopped?']] : [null, []]));
+  notice($('fault'), ...(s && s.fault ? [`Fault: ${s.fault_text}`, [faultAdvice(s.fault_text), `It latched at tick ${s.fault_tick}. ` +
+    'The brake acts until dashpot_release, dashpot_reset, or dashpot command --release.'], {text: 'docs/safety.md: faults', href: '/safety.md'}] : [null, []]));
+  text('clock', frame.messages ? `${page.paused ? 'paused at ' : ''}${time().toFixed(2)} s` : '');
+  text('status', s ? (s.fault ? `fault: ${s.fault_text}` : `${['joint', 'Cartesian'][s.mode] || ''} mode, ${s.status_text}`) : '');
+  $('status').className = `badge ${!s || quiet ? '' : s.fault || s.status ? 'bad' : 'good'}`;
+  const moving = shape(), pace = Number($('pace').value);
+  text('arm_note', setup.arm ? `${setup.arm.name}, ${setup.arm.joints.length} joint${setup.arm.joints.length === 1 ? '' : 's'}` +
+    (moving && moving.frequency && !reducedMotion() ? `; slowed ${number(moving.frequency / (2 * Math.PI) / pace, 2)} times` : '') : '');
   text('amplitude_text', `${(Number($('amplitude').value) * 180 / Math.PI).toFixed(0)}°`);
-  text('pace_text', `${Number($('pace').value).toFixed(2)} Hz`);
-  if (page.setup.live === false) {
+  text('pace_text', `${pace.toFixed(2)} Hz`);
+  $('pace_label').hidden = reducedMotion();
+  if (!setup.live) {
     if (document.activeElement !== $('time') || replay.playing) $('time').value = replay.time;
     text('time_text', `${replay.time.toFixed(2)} s`);
   }
-  page.poles = map.draw(poles(), measured(), wanted, page.chosen);
-  page.origin = map.origin;
-  const T = period();
-  drawCircle($('circle'), sampledPoles(frame.sampled, T));
-  sampledNumbers(T);
-  chips();
-  table();
-  alarms();
-  const t = time(), span = page.setup.live ? [Math.max(t - kMinute, series.time[0] || 0), Math.max(t, 1)] : [0, page.setup.duration || 1];
-  const marks = (page.setup.identified || []);
-  drawModes($('frequency'), series, 'natural_frequency', 'natural frequency, rad/s', t,
-    marks.map((m, i) => ({level: m.natural_frequency, text: i ? '' : 'measured'})), span, page.chosen);
-  drawModes($('ratio'), series, 'damping_ratio', 'damping ratio', t, [
-    ...(wanted ? [{level: wanted, text: `wanted ${wanted}`}] : []),
-    ...marks.map((m, i) => ({level: m.damping_ratio, text: i ? '' : 'measured'}))], span, page.chosen);
-  drawTicks($('ticks'), series, t, span, T);
-  drawResponse($('magnitude'), $('phase'), page.response, page.responseNote || 'waiting for a posture');
   text('response_note', !page.response ? '' : sameGains() ? 'at this posture' : "of the configuration's gains; the loop's are others");
+  period();
+  chips(page, choose);
+  modeTable(page);
+  jointTable(page);
+  loopNumbers(page, rate);
+  alarms(page);
 }
-requestAnimationFrame(draw);
+
+function curves() {
+  const data = held || series, t = time(), live = page.setup.live, wanted = wantedRatio(page), T = period();
+  const x = {range: live ? [Math.max(t - kMinute, data.time[0] || 0), Math.max(t, 1)] : [0, page.setup.duration || 1], text: ' s', reach: live ? kSilent : Infinity};
+  const marks = page.setup.identified || [];
+  const levels = (key) => marks.map((m, i) => ({value: m[key], text: i ? '' : 'measured'}));
+  const of = (key) => [...data.modes].map(([label, all]) => ({x: data.time, y: all[key], label, name: `mode ${label}`, width: label === page.chosen ? 3 : 1.6}));
+  plots.frequency.draw({title: 'natural frequency, rad/s; time, s', x, y: {log: true}, curves: of('natural_frequency'), levels: levels('natural_frequency'), cursor: t,
+    empty: 'natural frequency: no modes'});
+  plots.ratio.draw({title: 'damping ratio; time, s', x, y: {log: 'auto'}, curves: of('damping_ratio'), cursor: t, empty: 'damping ratio: no modes',
+    levels: [...(wanted > 0 ? [{value: wanted, text: `wanted ${number(wanted, 3)}`}] : []), ...levels('damping_ratio')]});
+  const over = T && data.tick.some((v) => v > 0.5e6 * T) ? `, period ${tickText(1e6 * T)} µs` : '';
+  plots.ticks.draw({title: `tick, µs${over}; strip: status, orange if not ok; time, s`, x, y: {}, cursor: t, empty: 'no states',
+    curves: [{x: data.time, y: data.tick, colour: 'accent', name: 'tick', unit: ' µs', width: 1}],
+    strip: strip(data)});
+  legends(page, data, wanted);
+}
+/// Where the status changes to ok or from it.
+function strip({time: at, status}) {
+  const all = [];
+  status.forEach((s, i) => {
+    const name = s ? 'bad' : 'good';
+    if (!all.length || all[all.length - 1].colour !== name || i + 1 === status.length) all.push({x: at[i], colour: name});
+  });
+  return all;
+}
+
+function draw(now) {
+  if (!page.setup || !page.frame) return;
+  let waits = false;
+  for (const [part, how] of [...dirty]) {
+    if (how === 'later' && now - (drawnAt[part] || 0) < kEvery[part]) {
+      waits = true;
+      continue;
+    }
+    dirty.delete(part);
+    drawnAt[part] = now;
+    ++page.draws;
+    kDraw[part]();
+  }
+  if (waits) request();
+}
 connect();

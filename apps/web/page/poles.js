@@ -1,59 +1,125 @@
 // The map of eigenvalues with bounds, rays and trails; the sampled poles beside the unit circle.
-import {begin, colour, line, mark, modeColour, number, say, slotOf, tickText} from '/draw.js';
+import {begin, colour, line, mark, modeColour, number, say, showHint, tickText, ticks} from '/draw.js';
 
 const kTrail = 5;  // s
 
+/// Eigenvalues with an imaginary part of 0 or above, at logarithmic distances from 0, which leave
+/// the rays of equal ratio straight.
+///
+/// `changed` is called when the map has to be drawn again because of the pointer, `choose` with the
+/// label of a pole that is clicked. The wheel, + and - zoom, dragging moves; a double click or 0
+/// shows all again.
 export class PoleMap {
-  constructor(canvas) {
-    this.canvas = canvas;
-    this.trails = [];  // {t, poles}
-    this.span = [1, 10];
+  constructor(canvas, changed = () => {}, choose = () => {}) {
+    Object.assign(this, {canvas, changed, choose, trails: [], drawn: [], zoom: 1, shift: [0, 0], pointer: null});
+    canvas.tabIndex = 0;
+    canvas.setAttribute('role', 'img');
+    const place = (e) => {
+      const box = canvas.getBoundingClientRect();
+      return [e.clientX - box.left, e.clientY - box.top];
+    };
+    let drag = null, moved = 0;
+    canvas.addEventListener('pointerdown', (e) => {
+      drag = place(e);
+      moved = 0;
+    });
+    canvas.addEventListener('pointermove', (e) => {
+      const [x, y] = this.pointer = place(e);
+      if (drag && e.buttons & 1 && this.zoom > 1) {
+        moved += Math.hypot(x - drag[0], y - drag[1]);
+        this.shift = [this.shift[0] + x - drag[0], this.shift[1] + y - drag[1]];
+        drag = [x, y];
+      }
+      this.changed();
+    });
+    canvas.addEventListener('pointerup', (e) => {
+      drag = null;
+      const pole = moved < 4 && this.nearest(place(e));
+      if (pole && pole.label !== undefined) this.choose(pole.label);
+    });
+    canvas.addEventListener('pointerleave', () => {
+      this.pointer = drag = null;
+      showHint(canvas, 0, 0, null);
+      this.changed();
+    });
+    canvas.addEventListener('wheel', (e) => {
+      e.preventDefault();
+      this.enlarge(Math.exp(-e.deltaY * 0.002), place(e));
+    }, {passive: false});
+    canvas.addEventListener('dblclick', () => this.enlarge(0));
+    canvas.addEventListener('keydown', (e) => {
+      if (e.key === '+' || e.key === '=') this.enlarge(1.25);
+      else if (e.key === '-') this.enlarge(0.8);
+      else if (e.key === '0') this.enlarge(0);
+      else return;
+      e.preventDefault();
+    });
+  }
+  enlarge(factor, at = [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2]) {
+    const zoom = Math.min(30, Math.max(1, this.zoom * factor)), k = zoom / this.zoom;
+    const base = this.base || [0, 0];  // where 0 is without zoom and shift
+    this.shift = zoom === 1 ? [0, 0] : this.shift.map((s, i) => at[i] - base[i] - k * (at[i] - base[i] - s));
+    this.zoom = zoom;
+    this.changed();
+  }
+  nearest([x, y]) {
+    const near = (p) => Math.hypot(p.x - x, p.y - y);
+    const best = this.drawn.filter((p) => p.y <= this.origin[1] + 8).reduce((a, b) => (a && near(a) <= near(b) ? a : b), null);
+    return best && near(best) < 18 ? best : null;
   }
   forget() { this.trails = []; }
+  /// Keeps poles for the trail.
   note(t, poles) {
     const last = this.trails.length ? this.trails[this.trails.length - 1].t : -Infinity;
     if (t < last || t > last + kTrail) this.forget();  // a leap, or back in time
-    if (t !== last) this.trails.push({t, poles});
-    while (this.trails[0].t < t - kTrail) this.trails.shift();
+    if (t > last + 0.09 || t < last) this.trails.push({t, poles});
+    while (this.trails.length && this.trails[0].t < t - kTrail) this.trails.shift();
   }
 
-  /// Where the poles stand on the canvas: [{label, re, im, x, y}].
-  draw(poles, identified, wanted, chosen) {
+  /// `poles` are {label, which, re, im, bound}, `which` of a mode's two, `bound` null if nothing is
+  /// proved; `crosses` are {re, im}; `wanted` is a damping ratio or 0. Returns the poles with the
+  /// place x, y of each on the canvas.
+  draw(poles, crosses = [], wanted = 0, chosen = null) {
     const {c, w, h} = begin(this.canvas);
-    const sizes = [...poles, ...identified].map((p) => Math.hypot(p.re, p.im)).filter((r) => r > 1e-6 && Number.isFinite(r));
+    const sizes = [...poles, ...crosses].map((p) => Math.hypot(p.re, p.im)).filter((r) => r > 1e-6 && Number.isFinite(r));
+    this.drawn = [];
     if (!sizes.length) {
       say(c, w, h, 'no modes');
-      return [];
+      return this.drawn;
     }
     const most = 10 ** (Math.ceil(Math.log10(Math.max(...sizes)) * 4 + 0.4) / 4);
     const least = Math.min(10 ** Math.floor(Math.log10(Math.min(...sizes))), most / 10);
     const unstable = poles.some((p) => p.re > 0);
-    const x0 = unstable ? w * 0.6 : w - 34, y0 = h - 22;  // the lower half is the mirror image
-    this.origin = [x0, y0];
-    const R = Math.min(x0 - 30, y0 - 22);
+    const bx = unstable ? w * 0.6 : w - 40, by = h - 36;  // the lower half is the mirror image
+    this.base = [bx, by];
+    const [x0, y0] = this.origin = [bx + this.shift[0], by + this.shift[1]];
+    const R = Math.min(bx - 30, by - 22) * this.zoom;
     const from = Math.max(least / 2, most * 1e-6);
     const radius = (r) => R * Math.log1p(r / from) / Math.log1p(most / from);
     const place = (re, im) => {
       const r = Math.hypot(re, im), k = r > 0 ? radius(r) / r : 0;
       return [x0 + k * re, y0 - k * im];
     };
-    this.grid(c, w, h, x0, y0, R, radius, least, most, wanted);
     c.save();
+    c.beginPath();
+    c.rect(0, 0, w, h - 18);
+    c.clip();
+    this.grid(c, w, h, x0, y0, R, radius, least, most, wanted, unstable);
     c.beginPath();
     c.rect(0, 0, w, y0 + 8);
     c.clip();
     this.paths(c, place);
-    for (const p of identified) {
+    for (const p of crosses) {
       const [x, y] = place(p.re, p.im);
       c.strokeStyle = colour('ink');
       c.lineWidth = 1.5;
       line(c, x - 6, y - 6, x + 6, y + 6);
       line(c, x - 6, y + 6, x + 6, y - 6);
     }
-    const drawn = poles.map((p) => {
+    this.drawn = poles.map((p) => {
       const [x, y] = place(p.re, p.im);
       const r = Math.hypot(p.re, p.im);
-      c.strokeStyle = c.fillStyle = modeColour(p.label);
+      c.fillStyle = modeColour(p.label);
       if (p.bound !== null && r > 0) {
         c.globalAlpha = 0.25;  // the proved disc; mostly smaller than a pixel
         c.beginPath();
@@ -61,46 +127,61 @@ export class PoleMap {
         c.fill();
         c.globalAlpha = 1;
       }
-      mark(c, slotOf(p.label), x, y, p.label === chosen ? 6 : 4.5);
-      c.lineWidth = 1.5;
-      if (p.bound === null) c.stroke();  // open: nothing is proved
-      else c.fill();
+      mark(c, p.label, x, y, p.label === chosen ? 6.5 : 5, p.bound === null);  // open: nothing is proved
       if (p.label === chosen) {
         c.beginPath();
         c.arc(x, y, 10, 0, 2 * Math.PI);
         c.strokeStyle = colour('ink');
+        c.lineWidth = 1.5;
         c.stroke();
       }
       return {...p, x, y};
     });
     c.restore();
-    return drawn;
+    if (this.pointer) {
+      const pole = this.nearest(this.pointer);
+      showHint(this.canvas, ...this.pointer, pole && [{label: pole.label, text: `mode ${pole.label}`},
+        {text: `${number(pole.re)} ± ${number(Math.abs(pole.im))}i 1/s`},
+        {text: `${number(Math.hypot(pole.re, pole.im))} rad/s, cosine ${number(-pole.re / Math.hypot(pole.re, pole.im), 3)}`}]);
+    }
+    this.canvas.setAttribute('aria-label', `Eigenvalues in 1/s: ${poles.filter((p) => p.im >= 0).slice(0, 40)
+      .map((p) => `mode ${p.label} at ${number(p.re, 3)}${p.im ? ` plus or minus ${number(p.im, 3)} i` : ''}`).join(', ')}`);
+    return this.drawn;
   }
 
-  grid(c, w, h, x0, y0, R, radius, least, most, wanted) {
+  grid(c, w, h, x0, y0, R, radius, least, most, wanted, unstable) {
     c.fillStyle = colour('soft');
     c.strokeStyle = colour('grid');
+    const room = (r, last) => Math.abs(r - last) > 34 && r > 16;
+    let last = 0;
     for (let d = least; d <= most * 1.001; d *= 10) {
       for (const m of [1, 2, 5]) {
         if (m * d > most * 1.001) break;
+        const r = radius(m * d);
         c.beginPath();
-        c.arc(x0, y0, radius(m * d), Math.PI, 2 * Math.PI);
+        c.arc(x0, y0, r, Math.PI, 2 * Math.PI);
         c.stroke();
+        if (!room(r, last)) continue;
+        last = r;
         c.textAlign = 'left';
-        if (radius(m * d) > 16 && (m === 1 || R > 260)) c.fillText(tickText(m * d), x0 + 4, y0 - radius(m * d) + 4);
+        c.fillText(tickText(m * d), x0 + 4, y0 - r + 4);
+        c.textAlign = 'center';
+        c.fillText(`−${tickText(m * d)}`, x0 - r, y0 + 16);
+        if (unstable) c.fillText(tickText(m * d), x0 + r, y0 + 16);
       }
     }
-    for (const ratio of [0.1, 0.3, 0.5, 0.7, 0.9]) {
-      const a = Math.acos(ratio);
-      line(c, x0, y0, x0 - R * ratio, y0 - R * Math.sin(a));
+    const ray = (ratio, text) => {  // named at its end, or where it leaves the canvas
+      const s = Math.sqrt(1 - ratio * ratio);
+      const end = Math.min(R, ratio > 0 ? (x0 - 30) / ratio : R, s > 0 ? (y0 - 16) / s : R);
+      line(c, x0, y0, x0 - R * ratio, y0 - R * s);
       c.textAlign = 'right';
-      c.fillText(ratio, x0 - R * ratio - 4, y0 - R * Math.sin(a) - 2);
-    }
+      if (end > 20) c.fillText(text, x0 - end * ratio - 4, y0 - end * s - 2);
+    };
+    for (const ratio of [0.1, 0.3, 0.5, 0.7, 0.9]) ray(ratio, ratio);
     if (wanted > 0 && wanted <= 1) {
       c.strokeStyle = colour('accent');
       c.setLineDash([5, 4]);
-      const a = Math.acos(wanted);
-      line(c, x0, y0, x0 - R * wanted, y0 - R * Math.sin(a));
+      line(c, x0, y0, x0 - R * wanted, y0 - R * Math.sqrt(1 - wanted * wanted));
       c.setLineDash([]);
     }
     c.strokeStyle = colour('soft');
@@ -108,7 +189,7 @@ export class PoleMap {
     line(c, x0, 4, x0, y0 + 6);
     c.textAlign = 'left';
     c.fillText('Im', x0 + 4, 12);
-    c.fillText('Re', 4, y0 + 14);
+    c.fillText('Re', 4, y0 - 4);
   }
 
   paths(c, place) {
@@ -149,6 +230,7 @@ export function sampledPoles(sampled, period) {
   return all;
 }
 
+/// The z plane around z = 1, with the unit circle; `poles` are {re, im}.
 export function drawCircle(canvas, poles) {
   const {c, w, h} = begin(canvas);
   if (!poles.length) {
@@ -157,8 +239,14 @@ export function drawCircle(canvas, poles) {
   }
   const width = Math.max(...poles.map((z) => Math.abs(1 - z.re)), 1e-9);
   const height = Math.max(...poles.map((z) => Math.abs(z.im)), width * 0.1);
-  const k = Math.min((w - 60) / width, (h - 30) / 2 / height);
-  const x0 = w - 34, y0 = h / 2;
+  const bottom = h - 18;
+  const k = Math.min((w - 74) / width, (bottom - 24) / 2 / height);
+  const x0 = w - 20, y0 = bottom / 2;
+  const toX = (re) => x0 - k * (1 - re), toY = (im) => y0 - k * im;
+  c.save();
+  c.beginPath();
+  c.rect(38, 0, w, bottom);
+  c.clip();
   c.fillStyle = colour('grid');
   c.beginPath();  // the unit circle, however large it is at this scale
   for (let i = -64; i <= 64; ++i) {
@@ -168,27 +256,38 @@ export function drawCircle(canvas, poles) {
   c.lineTo(-4, -40);
   c.lineTo(-4, h + 40);
   c.closePath();
-  c.save();
   c.globalAlpha = 0.6;
   c.fill();
-  c.restore();
+  c.globalAlpha = 1;
   c.strokeStyle = colour('accent');
   c.lineWidth = 1.5;
   c.stroke();
   c.strokeStyle = colour('soft');
   c.lineWidth = 1;
   line(c, 4, y0, w - 4, y0);
+  c.restore();
+  c.strokeStyle = c.fillStyle = colour('soft');
+  line(c, 38, 0, 38, bottom);
+  line(c, 38, bottom, w, bottom);
+  c.textAlign = 'center';
+  // Numbers of the axis: how far left of z = 1, because what differs lies in its last digits.
+  for (const v of ticks(0, (x0 - 44) / k, (w - 40) / 70)) {
+    line(c, toX(1 - v), bottom, toX(1 - v), bottom + 3);
+    const text = v ? `1−${tickText(v)}` : '1';
+    c.fillText(text, Math.min(toX(1 - v), w - c.measureText(text).width / 2 - 1), h - 4);
+  }
+  c.textAlign = 'right';
+  for (const v of ticks(-(bottom / 2 - 6) / k, (bottom / 2 - 6) / k, bottom / 30)) {
+    line(c, 35, toY(v), 38, toY(v));
+    c.fillText(tickText(v), 33, toY(v) + 4, 32);
+  }
   for (const z of poles) {
     const out = Math.hypot(z.re, z.im) >= 1;
     c.strokeStyle = colour(out ? 'bad' : 'ink');
     c.lineWidth = 1.8;
-    const x = x0 - k * (1 - z.re), y = y0 - k * z.im;
+    const x = toX(z.re), y = toY(z.im);
     line(c, x - 4, y - 4, x + 4, y + 4);
     line(c, x - 4, y + 4, x + 4, y - 4);
   }
-  c.fillStyle = colour('soft');
-  c.textAlign = 'right';
-  c.fillText('z = 1', w - 2, y0 + 14);
-  c.textAlign = 'left';
-  c.fillText(`${number((w - 60) / k, 2)} wide`, 6, h - 6);
+  canvas.setAttribute('aria-label', `Sampled poles: ${poles.slice(0, 32).map((z) => `${z.re.toFixed(4)} ${z.im >= 0 ? 'plus' : 'minus'} ${Math.abs(z.im).toFixed(4)} i`).join(', ')}`);
 }
