@@ -11,6 +11,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace dashpot::apps {
 namespace {
@@ -20,6 +22,7 @@ constexpr int kTunePort = 8025;
 struct TuneOptions {
   std::string config, urdf, base, tip;
   PostureOption posture;
+  PosturesOption postures;  ///< a file or a log
   int port = kTunePort;
 };
 
@@ -33,6 +36,18 @@ std::string panda_path() {
     if (std::filesystem::exists(path, ignored)) return path.lexically_normal();
   }
   throw InputError("", std::string("there is no ") + kPanda + " here: give CONFIG or --urdf");
+}
+
+/// The postures of the file or log, evenly fewer where there are more than the page takes.
+std::vector<controller::JointVector> listed(const TuneOptions& options,
+                                            const controller::RobotModel& model) {
+  const std::vector<controller::JointVector> all = options.postures.listed(options.posture, model);
+  if (all.size() <= TuneSite::kMostListed) return all;
+  std::vector<controller::JointVector> some;
+  for (std::size_t i = 0; i < TuneSite::kMostListed; ++i) {
+    some.push_back(all[i * (all.size() - 1) / (TuneSite::kMostListed - 1)]);
+  }
+  return some;
 }
 
 /// The task of the paper's Discussion: its stiffness and its C_C1, see docs/tuning-page.md.
@@ -50,7 +65,11 @@ TuneSite make_site(const TuneOptions& options) try {
     auto other = design;
     const bool joint = design["mode"] == "joint";
     other[joint ? "joint_damping" : "damping"] = {{"ratio", 0.7}};
-    return {std::move(arm), {options.posture.read(config.model), {design, other}, options.config}};
+    TuneStart start{options.posture.read(config.model),
+                    {design, other},
+                    options.config,
+                    listed(options, config.model)};
+    return {std::move(arm), std::move(start)};
   }
   const bool own = !options.urdf.empty();
   controller::RobotDescription robot{options.urdf, options.base, options.tip, {}};
@@ -67,7 +86,8 @@ TuneSite make_site(const TuneOptions& options) try {
   PostureOption posture = options.posture;
   if (!own && posture.q.empty()) posture.q = "0.1,-0.7,0.2,-1.9,0.1,1.4,0.6";
   const controller::JointVector q = posture.read(arm.model());
-  return {std::move(arm), {q, {a, b}, ""}};
+  TuneStart start{q, {a, b}, "", listed(options, arm.model())};
+  return {std::move(arm), std::move(start)};
 } catch (const controller::InvalidModel& error) {
   throw InputError("--urdf", error.what());
 }
@@ -109,6 +129,14 @@ void add_tune(CLI::App& program) {
                          ->needs(urdf);
   urdf->needs(base)->needs(tip);
   options->posture.add(*command);
+  CLI::Option* file = command
+                          ->add_option("--postures", options->postures.file,
+                                       "Postures to choose from, YAML or JSON")
+                          ->option_text("FILE");
+  command
+      ->add_option("--log", options->postures.log, "Postures to choose from: those of an LCM log")
+      ->excludes(file)
+      ->option_text("FILE");
   command->add_option("--port", options->port, "Of 127.0.0.1; 0 is any free port")
       ->check(CLI::Range(0, 65535))
       ->option_text("N (" + std::to_string(kTunePort) + ")");

@@ -91,7 +91,10 @@ TunePage TuneSite::setup() const {
                        {"designs", start_.designs},
                        {"presets", presets_json(model.dof())},
                        {"rotors_unknown", rotors.any()},
+                       {"postures", TunePage::array()},
                        {"published", nullptr}};
+  for (const controller::JointVector& q : start_.postures)
+    document["postures"].push_back(json_list(q));
   for (const auto& [key, property] :
        {std::pair("reflected_inertia", &controller::Joint::reflected_inertia),
         {"viscous_friction", &controller::Joint::viscous_friction},

@@ -6,20 +6,23 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 namespace dashpot::apps {
 
 /// What the page begins with.
 struct TuneStart {
   controller::JointVector q;
-  nlohmann::ordered_json designs;  ///< two of them
-  std::string config;              ///< path; empty: there is none
+  nlohmann::ordered_json designs;                      ///< two of them
+  std::string config;                                  ///< path; empty: there is none
+  std::vector<controller::JointVector> postures = {};  ///< to choose from; at most kMostListed
 };
 
 /// Answers the page of `dashpot tune`: it computes, and keeps nothing but models of the arm.
 class TuneSite {
  public:
   static constexpr std::int64_t kMostPostures = 500;  ///< of one request
+  static constexpr std::size_t kMostListed = 2000;
 
   TuneSite(TunedArm arm, TuneStart start);
 

@@ -1,7 +1,7 @@
 // The page of `dashpot tune`: a state, what the server says of it, and drawings of both.
 import {ArmView} from '/arm.js';
-import {Plot, View, drawResponse} from '/curves.js';
-import {followTheme, markElement, number, redrawer, reducedMotion} from '/draw.js';
+import {Plot, View} from '/curves.js';
+import {followTheme, markElement, number, reducedMotion} from '/draw.js';
 import {PoleMap} from '/poles.js';
 import {dragTip} from '/tune_arm.js';
 import {plain, slider} from '/tune_form.js';
@@ -23,10 +23,10 @@ const design = () => store.design();
 const answer = (name = store.state.edited) => page.answers[name];
 
 // Drawings. What has changed is drawn: an arm that swings leaves the rest as it is.
-const frame = redrawer(paint, 120), stale = new Set();
+const stale = new Set();
 const redraw = (...parts) => {
+  if (!stale.size) requestAnimationFrame(paint);
   for (const part of parts) stale.add(part);
-  frame();
 };
 const draw = () => redraw('arm', 'poles', 'motion', 'workspace', 'texts');
 const arm = new ArmView($('arm'), () => redraw('arm'));
@@ -60,6 +60,13 @@ const posture = setup.arm.joints.map((joint, i) => {
   $('posture').append(field.element);
   return field;
 });
+if (setup.postures.length) {
+  const some = setup.postures, at = () => some.findIndex((q) => q.every((x, i) => x === store.state.q[i])) + 1;
+  const field = slider(edit, {label: 'of the list', key: 'q', unit: `of ${some.length}`, low: 1, high: Math.max(some.length, 2), get: () => at() || 1,
+    set: (k) => { store.state.q = [...some[Math.min(some.length, Math.max(1, Math.round(k))) - 1]]; }});
+  $('posture').prepend(field.element);
+  posture.push(field);
+}
 $('q').addEventListener('change', () => {
   const q = $('q').value.split(/[,\s]+/).filter(Boolean).map(Number);
   if (q.length === setup.q.length && q.every(Number.isFinite)) edit((state) => { state.q = q; }, true);
@@ -123,7 +130,9 @@ function paint(now) {
     texts: tell,
     workspace: drawWorkspace,
   };
-  for (const [name, paintPart] of Object.entries(parts)) if (stale.delete(name)) paintPart();
+  const asked = [...stale];
+  stale.clear();
+  for (const [name, paintPart] of Object.entries(parts)) if (asked.includes(name)) paintPart();
   const current = kDesigns.every((name) => page.asked[name] && JSON.stringify(page.asked[name].design) === JSON.stringify(store.design(name)) &&
     JSON.stringify(page.asked[name].q) === JSON.stringify(store.state.q));
   page.current = current;
@@ -135,15 +144,22 @@ function paint(now) {
 
 function drawMotion() {
   const shown = kDesigns.filter((name) => answer(name));
-  const step = store.state.motion === 'step', tip = store.state.place.startsWith('tip'), linear = store.state.place < 'tip/3' && tip;
+  const step = store.state.motion === 'step';
   const end = Math.max(...shown.map((name) => answer(name).release.time.at(-1)), 0.01);
   time.draw({title: `${step ? 'step' : 'release'}, of a distance of 1; time, s`, x: {range: [0, end], text: ' s'}, y: {around: true}, empty: 'no motion',
     levels: [{value: step ? 1.02 : 0.02, text: ''}, {value: step ? 0.98 : -0.02, text: '2 %'}],
     curves: shown.map((name) => ({x: answer(name).release.time, y: answer(name).release.value.map((r) => (step ? 1 - r : r)), colour: kColours[name], name: name.toUpperCase(),
       width: 2, dash: name === 'b' ? [7, 4] : []}))});
-  const {frequency} = answer() || {};
-  drawResponse(magnitude, phase, frequency, 'no response');
-  $('motion_note').textContent = `A whole line, B broken; below: the receptance of ${store.state.edited.toUpperCase()}${linear ? '' : ', in angles'}`;
+  const all = shown.map((name) => answer(name).frequency), unit = all.length ? all[0].unit : '';
+  const range = all.length ? [Math.min(...all.map((f) => f.omega[0])), Math.max(...all.map((f) => f.omega.at(-1)))] : [0, 1];
+  const over = (values, unitText) => shown.map((name, i) => ({x: all[i].omega, y: values(all[i]), colour: kColours[name], name: name.toUpperCase(), unit: unitText, width: 2,
+    dash: name === 'b' ? [7, 4] : []}));
+  const lines = all.length ? (answer() ? answer().frequency : all[0]).natural_frequency.filter((f) => f > range[0]).map((value) => ({value})) : [];
+  const degrees = (f) => f.phase.map((v) => v * 180 / Math.PI), x = {range, log: true, text: ' rad/s'};
+  magnitude.draw({title: `receptance, ${unit}`, x: {...x, bare: true}, y: {log: true}, lines, curves: over((f) => f.magnitude, ` ${unit}`), empty: 'no response'});
+  phase.draw({title: 'phase, °; frequency, rad/s', x, y: {degrees: true, range: [Math.min(-180, ...all.flatMap(degrees)), Math.max(5, ...all.flatMap(degrees))]}, lines,
+    curves: over(degrees, '°'), empty: ' '});
+  $('motion_note').textContent = 'A whole line, B broken';
 }
 
 /// How many postures, in %, have less: at most 200 points of it, both ends among them.
