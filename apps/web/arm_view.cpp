@@ -105,10 +105,7 @@ ArmJson chain_json(const controller::RobotModel& model) {
 ArmView::ArmView(const std::string& config) : config_(controller::load_config(config)) {
   try {
     const Scene scene = load_scene(config);
-    if (scene.arm && scene.arm->options.wall) {
-      const sim::Wall& wall = *scene.arm->options.wall;
-      simulated_wall_ = {wall.point, wall.normal.normalized()};
-    }
+    if (scene.arm) simulated_wall_ = scene.arm->options.wall;
   } catch (const InputError&) {  // a configuration, which is no scene
   }
 }
@@ -116,16 +113,21 @@ ArmView::ArmView(const std::string& config) : config_(controller::load_config(co
 ArmJson ArmView::chain() const {
   ArmJson document = chain_json(config_.model);
   document["walls"] = ArmJson::array();
-  const auto add_wall = [&walls = document["walls"]](const std::string& name,
-                                                     const controller::Wall& wall) {
+  const auto add_wall = [&walls = document["walls"]](
+                            const std::string& name, const Eigen::Vector3d& p,
+                            const Eigen::Vector3d& normal, const ArmJson& stiffness) {
     walls.push_back({{"name", name},
-                     {"point", {wall.point.x(), wall.point.y(), wall.point.z()}},
-                     {"normal", {wall.normal.x(), wall.normal.y(), wall.normal.z()}}});
+                     {"point", {p.x(), p.y(), p.z()}},
+                     {"normal", {normal.x(), normal.y(), normal.z()}},
+                     {"stiffness", stiffness}});
   };
   for (const controller::Wall& wall : config_.settings.limits.walls) {
-    add_wall("wall " + std::to_string(document["walls"].size() + 1), wall);
+    add_wall("wall " + std::to_string(document["walls"].size() + 1), wall.point, wall.normal, {});
   }
-  if (simulated_wall_) add_wall("simulated wall", *simulated_wall_);
+  if (simulated_wall_) {
+    add_wall("simulated wall", simulated_wall_->point, simulated_wall_->normal.normalized(),
+             simulated_wall_->contact.stiffness);
+  }
   return document;
 }
 

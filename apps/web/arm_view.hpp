@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/controller/config.hpp>
 #include <dashpot/lcmtypes/modes_t.hpp>
+#include <dashpot/sim/arm.hpp>
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -26,8 +27,8 @@ class ArmView {
   /// The gain margin that gains have to leave, no unit.
   double gain_margin() const { return config_.settings.limits.gain_margin; }
 
-  /// Returns the chain with {"walls": [{"name", "point", "normal"}]} besides; a wall's normal
-  /// points to where the tip may be.
+  /// Returns the chain with {"walls": [{"name", "point", "normal", "stiffness"}]} besides. A wall's
+  /// normal points to where the tip may be; a simulated wall has a stiffness, N/m, others null.
   nlohmann::ordered_json chain() const;
 
   /// Returns the damping ratio that the configuration asks for in a mode (JOINT, CARTESIAN), 0 if
@@ -45,7 +46,7 @@ class ArmView {
 
  private:
   controller::Config config_;
-  std::optional<controller::Wall> simulated_wall_;  ///< of a scene
+  std::optional<sim::Wall> simulated_wall_;  ///< of a scene
 };
 
 }  // namespace dashpot::apps

@@ -1,6 +1,7 @@
 """Measures what the page of `dashpot monitor --web` costs: PROGRAM SOURCE_DIRECTORY [ROUNDS [FRAMES]].
 
-Prints the tick times of a loop in real time, alone and with two browsers at the page, in turn; and
+Prints what share of a core Chromium needs for the page of a loop, at rest and while a mode's shape
+swings; the tick times of a loop in real time, alone and with two browsers at the page, in turn; and
 the memory of the server while it replays a log.
 """
 import http.client
@@ -9,6 +10,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 
 sys.dont_write_bytecode = True
 import browser
@@ -44,6 +46,39 @@ def with_browsers():
     server.wait()
 
 
+def computing_time(group):
+    """CPU time of all processes of a browser, s."""
+    ticks = 0
+    for process in filter(str.isdigit, os.listdir('/proc')):
+        try:
+            with open(f'/proc/{process}/stat') as stat:
+                words = stat.read().rsplit(')', 1)[1].split()
+        except OSError:  # it has ended
+            continue
+        if int(words[3]) == group:
+            ticks += int(words[11]) + int(words[12])
+    return ticks / os.sysconf('SC_CLK_TCK')
+
+
+def page_cost():
+    server, page = serve('--lcm-url', url)
+    running = subprocess.Popen([program, 'run', scene, '--duration', '120', '--lcm-url', url],
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    with browser.Browser() as one:
+        one.open(page)
+        one.until("document.querySelectorAll('#chips button').length > 5")
+        for name in ('a loop', 'a loop and a mode that swings'):
+            time.sleep(10)
+            before, then = computing_time(one.process.pid), time.monotonic()
+            time.sleep(20)
+            share = (computing_time(one.process.pid) - before) / (time.monotonic() - then)
+            print(f'the page of {name}: {100 * share:.1f} % of a core', flush=True)
+            one.value("document.querySelector('#chips button').click()")
+    for process in (running, server):
+        process.terminate()
+        process.wait()
+
+
 def memory():
     with tempfile.TemporaryDirectory() as folder:
         log = os.path.join(folder, 'a.lcm')
@@ -65,6 +100,7 @@ def memory():
         server.wait()
 
 
+page_cost()
 print('tick, us        median      p99    p99.9  longest  overruns by computing')
 for _ in range(rounds):
     loop('alone')

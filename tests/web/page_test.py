@@ -1,22 +1,12 @@
 """What a browser shows of `dashpot monitor --web`: PROGRAM SOURCE_DIRECTORY. Exit status 77: skipped."""
-import atexit
-import json
 import math
 import os
-import shutil
-import signal
 import subprocess
 import sys
-import tempfile
 import time
-import unittest
 
 sys.dont_write_bytecode = True
-import browser
-
-PROGRAM, SOURCE = sys.argv[1:3]
-FOLDER = tempfile.mkdtemp(prefix='dashpot-page-')
-atexit.register(shutil.rmtree, FOLDER, True)
+from page_site import FOLDER, PROGRAM, SOURCE, PageTest, Site, main, run, write
 
 # Two gains, one after the other, on one joint whose inertia is 0.5 kg m^2: a closed form.
 URDF = '''<robot name="flywheel"><link name="base"/><link name="wheel"><inertial><mass value="1"/>
@@ -40,66 +30,17 @@ def poles(stiffness, damping):
     return -decay, math.sqrt(stiffness / INERTIA - decay ** 2)
 
 
-def write(name, text):
-    path = os.path.join(FOLDER, name)
-    with open(path, 'w') as file:
-        file.write(text)
-    return path
-
-
-def run(*words):
-    done = subprocess.run([PROGRAM, *words], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-class Site:
-    """A server that can be restarted at its port."""
-
-    def __init__(self, *options, port=0):
-        self.options, self.port, self.process = options, port, None
-        self.start()
-        atexit.register(self.stop)
-
-    def start(self):
-        self.process = subprocess.Popen([PROGRAM, 'monitor', '--web', str(self.port), *self.options],
-                                        stdout=subprocess.PIPE, text=True)
-        self.url = self.process.stdout.readline().split()[0]
-        self.port = int(self.url.rstrip('/').split(':')[-1])
-
-    def stop(self):
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-        if self.process.wait() != 0:
-            raise RuntimeError(f'the monitor ended with status {self.process.returncode}')
-        self.process.stdout.close()
-
-
 FINITE_POLES = 'dashpot.poles.length && dashpot.poles'
 
 
-class Page(unittest.TestCase):
+class Page(PageTest):
     @classmethod
     def setUpClass(cls):
+        super().setUpClass()
         write('wheel.urdf', URDF)
         cls.scene = write('wheel.yaml', SCENE)
         cls.log = os.path.join(FOLDER, 'wheel.lcm')
         run('run', cls.scene, '--fast', '--duration', '6', '--log', cls.log)
-        cls.browser = browser.Browser()
-        cls.browser.__enter__()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.browser.__exit__()
-
-    def tearDown(self):
-        self.assertEqual(self.browser.errors(), [])
-        self.browser.open('about:blank')
-        self.browser.events.clear()
-
-    def open(self, site, query=''):
-        self.browser.open(site.url + query)
-        self.browser.until('window.dashpot && dashpot.frame && dashpot.frame.messages > 0')
 
     def expect_poles(self, found, re, im):
         found = sorted(found, key=lambda pole: pole['im'])
@@ -227,7 +168,4 @@ class Page(unittest.TestCase):
 
 
 if __name__ == '__main__':
-    if browser.find() is None:
-        print('skipped: no Chromium on this machine (apt-get install chromium)')
-        sys.exit(77)
-    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)
+    main()

@@ -3,6 +3,7 @@ import {begin, colour, line, modeColour, number, say} from '/draw.js';
 
 const multiply = (A, B) => A.map((row) => [0, 1, 2, 3].map((j) =>
   row[0] * B[0][j] + row[1] * B[1][j] + row[2] * B[2][j] + row[3] * B[3][j]));
+const kSides = 14;  // of a joint's cylinder
 const kIdentity = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]];
 
 function moved(joint, q) {
@@ -81,13 +82,15 @@ export class ArmView {
   }
 
   /// `arm` is the chain of /setup, q a posture, `shape` {label, re, im, phase, amplitude} or null.
-  /// `scene` may have `walls` [{point, normal, name}], planes whose normal points to where the tip
-  /// may be; `force` at the tip, N; `note`, said in the middle instead of an arm. Returns the
+  /// `scene` may have `walls` [{point, normal, name, stiffness}], planes whose normal points to
+  /// where the tip may be, which push back if they have a stiffness, N/m; `force` at the tip, N; `note`, said in the middle instead of an arm. Returns the
   /// tip's frame, or null.
   draw(arm, q, shape, {walls = [], force = null, note = ''} = {}) {
     const {c, w, h} = begin(this.canvas);
     if (note || !arm || !q || q.length !== arm.joints.length) {
-      say(c, w, h, note || (!arm ? 'no arm: start with --config to see it' : 'waiting for a posture'));
+      const said = note || (!arm ? 'no arm: start with --config to see it' : 'waiting for a posture');
+      say(c, w, h, said);
+      this.canvas.setAttribute('aria-label', said);
       return null;
     }
     const rest = kinematics(arm, q);
@@ -95,7 +98,7 @@ export class ArmView {
     this.reach = Math.max(this.reach * 0.999, far, 0.1);
     const project = this.projection(w, h, rest.points);
     this.ground(c, project);
-    const behind = walls.map((wall) => this.wall(c, project, wall, column(rest.tip, 3)));
+    const behind = walls.map((wall, i) => this.wall(c, project, wall, column(rest.tip, 3), 14 + 15 * i));
     let tip = rest.tip;
     if (shape) {
       const size = Math.max(...shape.re.map((x, i) => Math.hypot(x, shape.im[i])), 1e-30);
@@ -119,7 +122,7 @@ export class ArmView {
       this.body(c, project, rest, false);
     }
     this.triad(c, project, tip);
-    if (force) this.arrow(c, project, column(rest.tip, 3), force);
+    if (force) this.arrow(c, project, column(rest.tip, 3), force, 'springs');
     const there = behind.filter(Boolean);
     this.canvas.setAttribute('aria-label', `The arm${shape ? `, swinging in ${typeof shape.label === 'number' ? `mode ${shape.label}` : shape.label}` : ''}` +
       `${there.length ? `; ${there.join('; ')}` : ''}. Arrow keys turn it, plus and minus zoom.`);
@@ -127,7 +130,7 @@ export class ArmView {
   }
 
   /// A part of a wall in front of the tip, if it is near; returns how far away it is, in words.
-  wall(c, project, {point, normal, name}, tip) {
+  wall(c, project, {point, normal, name, stiffness}, tip, row) {
     const distance = normal.reduce((sum, n, k) => sum + n * (tip[k] - point[k]), 0);
     if (!(Math.abs(distance) < this.reach)) return '';
     const foot = tip.map((x, k) => x - distance * normal[k]), [x, y, z] = normal;
@@ -140,30 +143,33 @@ export class ArmView {
     [[-1, -1], [1, -1], [1, 1], [-1, 1]].forEach(([a, b], i) => c[i ? 'lineTo' : 'moveTo'](...corner(a, b).slice(0, 2)));
     c.closePath();
     c.globalAlpha = 0.18;
-    c.fillStyle = colour(distance < 0 ? 'bad' : 'accent');
+    const kind = distance < 0 && stiffness === null ? 'bad' : 'accent';
+    c.fillStyle = colour(kind);
     c.fill();
     c.globalAlpha = 1;
-    c.strokeStyle = c.fillStyle = colour(distance < 0 ? 'bad' : 'accent');
+    c.strokeStyle = c.fillStyle = colour(kind);
     c.lineWidth = 1.2;
     c.stroke();
     const p = project(tip), f = project(foot);
     c.setLineDash([3, 3]);
     line(c, p[0], p[1], f[0], f[1]);
     c.setLineDash([]);
-    const text = `${name}${distance < 0 ? ` crossed by ${number(-1e3 * distance, 3)} mm` : ` ${number(1e3 * distance, 3)} mm away`}`;
+    const depth = number(1e3 * Math.abs(distance), 3), push = Math.max(0, -distance) * stiffness;
+    const text = distance >= 0 ? `${name}: ${depth} mm away`
+      : stiffness === null ? `${name}: ${depth} mm beyond it` : `${name}: pressed in by ${depth} mm, contact ${number(push, 3)} N`;
     c.textAlign = 'left';
-    const at = corner(-1, -1);
-    c.fillText(text, Math.min(Math.max(at[0], 4), this.canvas.clientWidth - c.measureText(text).width - 4), Math.min(Math.max(at[1] + 13, 14), this.canvas.clientHeight - 4));
+    c.fillText(text, 4, row);
+    if (push) this.arrow(c, project, tip, normal.map((n) => n * push), 'contact', 'accent');
     return text;
   }
 
   /// A force at the tip as an arrow, whose length grows with its logarithm from 1 N on.
-  arrow(c, project, at, force) {
+  arrow(c, project, at, force, name, style = 'force') {
     const size = Math.hypot(...force);
     if (!(size >= 1)) return;
     const length = 0.12 * this.reach * Math.log10(10 * size);
     const a = project(at), b = project(at.map((x, k) => x + length * force[k] / size));
-    c.strokeStyle = c.fillStyle = colour('force');
+    c.strokeStyle = c.fillStyle = colour(style);
     c.lineWidth = 3;
     line(c, a[0], a[1], b[0], b[1]);
     const turn = Math.atan2(b[1] - a[1], b[0] - a[0]);
@@ -172,8 +178,8 @@ export class ArmView {
       b[0] + x * Math.cos(turn) - y * Math.sin(turn), b[1] + x * Math.sin(turn) + y * Math.cos(turn)));
     c.closePath();
     c.fill();
-    c.textAlign = 'center';
-    c.fillText(`${number(size, 3)} N`, b[0] + 14 * Math.cos(turn), b[1] + 16 * Math.sin(turn) + 4);
+    c.textAlign = Math.cos(turn) > 0.5 ? 'left' : Math.cos(turn) < -0.5 ? 'right' : 'center';
+    c.fillText(`${name} ${number(size, 3)} N`, b[0] + 10 * Math.cos(turn), b[1] + 16 * Math.sin(turn) + 4);
   }
 
   projection(w, h, points) {
@@ -233,8 +239,8 @@ export class ArmView {
     const length = Math.hypot(...u) || 1;
     u = u.map((k) => k / length);
     const v = [y * u[2] - z * u[1], z * u[0] - x * u[2], x * u[1] - y * u[0]];
-    const ring = (end) => Array.from({length: 20}, (_, i) => {
-      const a = i * Math.PI / 10;
+    const ring = (end) => Array.from({length: kSides}, (_, i) => {
+      const a = i * 2 * Math.PI / kSides;
       return project(end.map((k, m) => k + r * (Math.cos(a) * u[m] + Math.sin(a) * v[m])));
     });
     const rings = ends.map(ring).sort((a, b) => a[0][2] - b[0][2]);
@@ -246,8 +252,8 @@ export class ArmView {
     c.lineWidth = 1.2;
     c.strokeStyle = colour('edge');
     c.fillStyle = colour('steel');
-    for (let i = 0; i < 20; ++i) {  // the mantle
-      trace([rings[0][i], rings[0][(i + 1) % 20], rings[1][(i + 1) % 20], rings[1][i]]);
+    for (let i = 0; i < kSides; ++i) {  // the mantle
+      trace([rings[0][i], rings[0][(i + 1) % kSides], rings[1][(i + 1) % kSides], rings[1][i]]);
       c.fill();
     }
     trace(rings[0]);

@@ -193,7 +193,7 @@ export class Plot {
     c.fillStyle = colour('soft');
     c.strokeStyle = colour('grid');
     c.textAlign = 'right';
-    const rows = (h - bottom - kTop) / 34;
+    const rows = (h - bottom - kTop) / 28;
     const upright = y.degrees ? ticks(y.range[0] / 90, y.range[1] / 90, Math.max(1, rows)).filter(Number.isInteger).map((v) => 90 * v)
       : y.log ? logTicks(...y.range, rows) : ticks(...y.range, rows);
     for (const v of upright) {

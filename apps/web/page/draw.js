@@ -23,17 +23,21 @@ export function followTheme(button, changed) {
 const still = matchMedia('(prefers-reduced-motion: reduce)');
 export const reducedMotion = () => still.matches;
 
-/// Returns a function that asks for `draw`, which then runs once, at most `rate` times a second.
+/// Returns a function that asks for `draw` after so many ms, which then runs once, at most `rate`
+/// times a second.
 export function redrawer(draw, rate) {
-  let asked = false, last = -Infinity;
-  return () => {
-    if (asked) return;
-    asked = true;
-    setTimeout(() => requestAnimationFrame((now) => {
-      asked = false;
-      last = now;
-      draw(now);
-    }), Math.max(0, last + 1000 / rate - performance.now()));
+  let timer = 0, due = Infinity, last = -Infinity;
+  const run = () => requestAnimationFrame((now) => {
+    due = Infinity;
+    last = now;
+    draw(now);
+  });
+  return (wait = 0) => {
+    const now = performance.now(), at = Math.max(now + wait, last + 1000 / rate);
+    if (at >= due) return;
+    clearTimeout(timer);
+    due = at;
+    timer = setTimeout(run, at - now);
   };
 }
 
@@ -124,6 +128,11 @@ export function number(x, digits = 4) {
   if (size >= 10 ** digits) return String(Math.round(x)).replace('-', '−');
   return x.toPrecision(digits).replace('-', '−');
 }
+/// With so many decimals, and no sign before a zero.
+export function fixed(x, decimals) {
+  if (x === null || !Number.isFinite(x)) return number(x);
+  return (+x.toFixed(decimals) + 0).toFixed(decimals).replace('-', '−');
+}
 
 /// Round numbers from a to b, about `count`.
 export function ticks(a, b, count) {
@@ -135,23 +144,26 @@ export function ticks(a, b, count) {
   for (let i = Math.ceil(a / step - 1e-9); i * step <= b + 1e-9 * step; ++i) all.push(i * step);
   return all;
 }
-/// Ticks of a logarithmic axis from a to b, both positive: decades, or 1, 2 and 5 of each, or round
-/// numbers where less than that fits in between.
+/// Ticks of a logarithmic axis from a to b, both positive: decades, or 1 and 3, or 1, 2 and 5 of
+/// each; round numbers where less than that fits in between.
 export function logTicks(a, b, count) {
   const all = [], decades = Math.log10(b / a);
   if (!(decades > 0) || !Number.isFinite(decades)) return [a];
-  const factors = decades * 3 > count ? [1] : [1, 2, 5], every = Math.ceil(decades / Math.max(count, 1));
+  const factors = [[1, 2, 5], [1, 3], [1]].find((f) => decades * f.length <= 1.5 * count) || [1], every = Math.ceil(decades / Math.max(count, 1));
   for (let e = Math.floor(Math.log10(a)); e <= Math.log10(b); ++e) {
     if (e % every) continue;
     for (const f of factors) if (f * 10 ** e >= a * .9999 && f * 10 ** e <= b * 1.0001) all.push(f * 10 ** e);
   }
-  return all.length >= 3 || decades > 1.5 ? all : ticks(a, b, count);
+  if (all.length >= 3 || decades > 1.5) return all;
+  const even = ticks(a, b, count);
+  return even.length >= 3 ? even : ticks(a, b, 2 * count + 2);
 }
 const superscript = (n) => String(n).replace('-', '⁻').replace(/\d/g, (d) => '⁰¹²³⁴⁵⁶⁷⁸⁹'[d]);
 export const tickText = (x) => {
-  const size = Math.abs(x), e = Math.log10(size);
+  const size = Math.abs(x);
   if (size > 0 && (size < 1e-3 || size >= 1e5)) {
-    return Math.abs(e - Math.round(e)) < 1e-9 ? `10${superscript(Math.round(e))}` : x.toExponential(0).replace('-', '−');
+    const [digits, power] = x.toExponential(0).split('e');
+    return `${digits === '1' ? '' : `${digits}·`}10${superscript(Number(power))}`.replace('-', '−');
   }
   return String(+x.toPrecision(4)).replace('-', '−');
 };

@@ -13,28 +13,32 @@ const kOldModes = 5;   // s that modes may lag behind the state
 const kSpeeds = [0.1, 0.25, 0.5, 1, 2, 5, 10, 30];
 
 const page = {setup: null, frame: null, chosen: null, connected: false, arrived: 0, start: null, paused: false,
-  poles: [], tip: null, frames: 0, response: null, responseNote: '', errors: [], draws: 0};
+  poles: [], tip: null, frames: 0, response: null, responseNote: '', errors: []};
 window.dashpot = page;  // to look into, and for tests
 window.addEventListener('error', (e) => page.errors.push(e.message));
 window.addEventListener('unhandledrejection', (e) => page.errors.push(String(e.reason)));
 
 // What has to be drawn again, and when it was drawn last
 const kParts = ['arm', 'poles', 'numbers', 'curves', 'response'];
-const kEvery = {arm: 0, poles: 150, numbers: 230, curves: 480, response: 0};  // ms, if only time goes on
+const kEvery = {arm: 120, poles: 240, numbers: 330, curves: 950, response: 0};  // ms, if only time goes on
 const dirty = new Map(), drawnAt = {};  // part -> 'soon' (at someone's wish) or 'later'
-const request = redrawer((now) => draw(now), 20);
+const request = redrawer((now) => draw(now), 25);
 function soon(...parts) {
   for (const part of parts.length ? parts : kParts) dirty.set(part, 'soon');
   request();
 }
 function later(...parts) {
-  for (const part of parts) if (!dirty.has(part)) dirty.set(part, 'later');
-  request();
+  let wait = Infinity;
+  for (const part of parts) {
+    if (!dirty.has(part)) dirty.set(part, 'later');
+    wait = Math.min(wait, kEvery[part] - (performance.now() - (drawnAt[part] || 0)));
+  }
+  request(Math.max(0, wait));
 }
 
 const arm = new ArmView($('arm'), () => soon('arm'));
 const map = new PoleMap($('poles'), () => soon('poles'), choose);
-const times = new View(), omegas = new View();
+const times = page.times = new View(), omegas = new View();
 const overTime = () => soon('curves'), overOmega = () => soon('response');
 const plots = {frequency: new Plot($('frequency'), overTime, times), ratio: new Plot($('ratio'), overTime, times),
   ticks: new Plot($('ticks'), overTime, times), magnitude: new Plot($('magnitude'), overOmega, omegas),
@@ -44,7 +48,7 @@ let series = empty(), held = null;  // what came, and while the page is paused w
 const replay = {time: 0, playing: true, speed: 3, at: null};
 followTheme($('theme'), () => soon());
 new ResizeObserver(() => soon()).observe(document.querySelector('main'));
-setInterval(() => page.frame && later('numbers'), 1000);  // ages grow by themselves
+setInterval(() => page.setup && page.setup.live && page.frame && later('numbers', 'poles'), 2000);  // ages grow by themselves, trails end
 
 // Messages
 async function get(path) {
@@ -84,12 +88,23 @@ function take(frame) {
   if (page.setup.live && fresh && frame.messages) append(timeOf(frame), frame);
   if (page.paused) return;
   page.frame = frame;
-  const parts = ['numbers'];
-  if (fresh || !before) {
-    parts.push('arm', 'poles', 'curves');
-    if (frame.messages) map.note(time(), poles());
-  }
-  later(...parts);
+  later('numbers', ...(fresh || !before ? ['curves'] : []));
+  if (frame.messages && fresh) map.note(time(), poles());
+  if (differs('arm', frame.state, [posture(), force()], 4)) later('arm');
+  if (differs('poles', frame.modes, [frame.modes && frame.modes.eigenvalue_real, frame.modes && frame.modes.eigenvalue_imag, frame.sampled && frame.sampled.sequence], 3)) later('poles');
+}
+/// Whether numbers are others than the last time, as far as anyone would see.
+const seen = {};
+function differs(part, exists, numbers, digits) {
+  const key = exists ? numbers.flat(3).map((x) => (x ? x.toFixed(Math.max(0, digits - 1 - Math.floor(Math.log10(Math.abs(x) + .1)))) : x)).join() : 'none';
+  if (seen[part] === key) return false;
+  seen[part] = key;
+  return true;
+}
+/// The force of the Cartesian springs and dampers at the tip, N, or null.
+function force() {
+  const s = page.frame.state;
+  return s && s.mode === 1 && s.tip_wrench.slice(0, 3).every((x) => x !== null) ? s.tip_wrench.slice(0, 3) : null;
 }
 const timeOf = (frame) => (page.setup.live ? (frame.utime - page.start) * 1e-6 : replay.time);
 const time = () => timeOf(page.frame);
@@ -246,6 +261,9 @@ $('slower').addEventListener('click', () => setSpeed(-1));
 $('faster').addEventListener('click', () => setSpeed(1));
 $('time').addEventListener('input', () => page.seek(Number($('time').value)));
 setSpeed(0);
+$('zoom_in').addEventListener('click', () => plots.frequency.zoom(1 / 2));
+$('zoom_out').addEventListener('click', () => plots.frequency.zoom(2));
+$('zoom_all').addEventListener('click', () => plots.frequency.all());
 page.seek = (t) => {
   replay.time = Math.min(t, page.setup.duration);
   setPlaying(false);
@@ -272,8 +290,9 @@ async function askResponse() {
   if (!page.setup || !page.frame || !page.frame.messages || !page.connected || document.hidden) return;
   const other = otherJoints(), q = posture();
   if (!page.setup.arm || other || !q) {
-    page.responseNote = other || !page.setup.arm ? '–' : 'waiting for a posture';
-    if (page.response) soon('response');
+    const note = other ? '–' : page.setup.arm ? 'waiting for a posture' : 'start with --config to see the response';
+    if (page.response || note !== page.responseNote) soon('response');
+    page.responseNote = note;
     page.response = null;
     return;
   }
@@ -348,23 +367,22 @@ function shape() {
 // Drawing
 const kDraw = {
   arm() {
-    const moving = shape(), {state: s} = page.frame;
-    const force = s && s.mode === 1 && s.tip_wrench.slice(0, 3).every((x) => x !== null) ? s.tip_wrench.slice(0, 3) : null;
-    page.tip = arm.draw(page.setup.arm, posture(), moving, {walls: page.setup.arm ? page.setup.arm.walls : [], force, note: otherJoints()});
+    const moving = shape();
+    page.tip = arm.draw(page.setup.arm, posture(), moving, {walls: page.setup.arm ? page.setup.arm.walls : [], force: force(), note: otherJoints()});
     if (moving && !reducedMotion() && ['running', 'log'].includes(state())) later('arm');
   },
   poles() {
     const {frame} = page, T = period();
     page.poles = map.draw(poles(), measured(), wantedRatio(page), page.chosen);
     page.origin = map.origin;
-    drawCircle($('circle'), sampledPoles(frame.sampled, T));
+    $('circle').hidden = !frame.sampled;
+    if (frame.sampled) drawCircle($('circle'), sampledPoles(frame.sampled, T));
     sampledNumbers(page, T);
   },
   numbers,
   curves,
   response() {
-    drawResponse(plots.magnitude, plots.phase, page.response, page.responseNote ||
-      (page.setup.arm ? 'waiting for a posture' : 'start with --config to see the response'));
+    drawResponse(plots.magnitude, plots.phase, page.response, page.responseNote);
   },
 };
 
@@ -374,7 +392,7 @@ function numbers() {
   document.querySelector('main').classList.toggle('gone', quiet);
   const lag = s && modes ? (s.utime - modes.utime) * 1e-6 : 0;
   for (const id of ['pole_panel', 'mode_panel']) $(id).classList.toggle('gone', !quiet && lag > kOldModes);
-  notice($('silence'), ...(quiet ? [now === 'gone' ? 'No connection to the monitor' : `The loop is silent for ${ageText()}: what is shown is old`, silenceAdvice(now, setup.source)]
+  notice($('silence'), ...(quiet ? [now === 'gone' ? `No connection to the monitor: what is shown is ${ageText()} old` : `The loop is silent for ${ageText()}: what is shown is old`, silenceAdvice(now, setup.source)]
     : now === 'log' && frame.age > kSilent ? [`No message for ${ageText()} before this time`, silenceAdvice(now)]
       : lag > kOldModes ? [`Modes are ${Math.floor(lag)} s older than the state`, ['Is the analysis on (analysis.where), and does its status say why it stopped?']] : [null, []]));
   notice($('fault'), ...(s && s.fault ? [`Fault: ${s.fault_text}`, [faultAdvice(s.fault_text), `It latched at tick ${s.fault_tick}. ` +
@@ -429,17 +447,17 @@ function strip({time: at, status}) {
 
 function draw(now) {
   if (!page.setup || !page.frame) return;
-  let waits = false;
+  let wait = Infinity;
   for (const [part, how] of [...dirty]) {
-    if (how === 'later' && now - (drawnAt[part] || 0) < kEvery[part]) {
-      waits = true;
+    const rest = how === 'later' ? kEvery[part] - (now - (drawnAt[part] || 0)) : 0;
+    if (rest > 0) {
+      wait = Math.min(wait, rest);
       continue;
     }
     dirty.delete(part);
     drawnAt[part] = now;
-    ++page.draws;
     kDraw[part]();
   }
-  if (waits) request();
+  if (wait < Infinity) request(wait);
 }
 connect();

@@ -1,5 +1,5 @@
 // Tables, alarms and legends of the page: what is said in numbers and words.
-import {markElement, number, shapeText} from '/draw.js';
+import {fixed, markElement, number, shapeText} from '/draw.js';
 
 const $ = (id) => document.getElementById(id);
 export function text(id, value) { if ($(id).textContent !== value) $(id).textContent = value; }
@@ -69,8 +69,7 @@ export function jointTable({frame: {state}, setup}) {
   for (let i = 0; i < count; ++i) {
     const {cells} = rows.rows[i], joint = own ? setup.arm.joints[i] : null, q = state.joint_position[i];
     const texts = [`q${i + 1}`, own ? jointName(setup, i) : '–', ...[q, state.reference_joint_position[i],
-      state.joint_velocity[i]].map((v) => v === null ? '–' : v.toFixed(4).replace('-', '−')),
-      state.joint_torque[i] === null ? '–' : state.joint_torque[i].toFixed(3).replace('-', '−')];
+      state.joint_velocity[i]].map((v) => fixed(v, 4)), fixed(state.joint_torque[i], 3)];
     texts.forEach((value, k) => set(cells[k], 'textContent', value));
     set(cells[2], 'className', joint && (q < joint.lower || q > joint.upper) ? 'bad' : '');
     set(cells[2], 'title', joint ? `limits ${number(joint.lower)} and ${number(joint.upper)}` : '');
@@ -88,7 +87,7 @@ export function alarms(page) {
       all.smallest_margin === null ? (sampled ? 'good' : 'none') : all.smallest_margin < 0.999 * margin ? 'bad' : 'good'],
     ['messages with a bound lost', ...zero(all.bounds_lost)],
     ['messages without modes', ...zero(all.modes_lost)],
-    ['latched fault', state && state.fault ? `${state.fault_text} (tick ${state.fault_tick})` : all.faults ? `${all.faults} before` : 'none',
+    ['latched fault', state && state.fault ? state.fault_text.split(',')[0] : all.faults ? `${all.faults} before` : 'none',
       state && state.fault ? 'bad' : all.faults ? '' : 'good'],
     ['overruns', ...(state ? zero(state.overruns) : [none, 'none'])],
   ];
@@ -122,9 +121,9 @@ export function loopNumbers({frame: {state}}, rate) {
   pairs('loop', [
     ['tick', `${number(state.tick_time * 1e-3, 2)} µs, longest ${number(state.longest_tick_time * 1e-3, 3)} µs${rate ? `; ${Math.round(rate)} in a second` : ''}`],
     ['tip off by', `${(1e3 * Math.hypot(x, y, z)).toFixed(2)} mm, ${(Math.hypot(...turn) * 180 / Math.PI).toFixed(2)}°`],
-    ['force of springs', state.mode === 0 ? 'joint mode: none at the tip' : `${number(size, 3)} N at the tip`],
+    ['force of springs', state.mode === 0 ? 'joint mode: none at the tip' : `${fixed(size, 2)} N at the tip, before limits`],
     ['damping', ratio > 0 ? `designed for ratio ${number(ratio, 3)}${state.damping_level < 1 ? `, lowered to ${number(state.damping_level, 3)} of it` : ''}` : 'given as numbers'],
-    ['payload', `${number(state.payload_mass, 3)} kg`],
+    ['payload', `${fixed(state.payload_mass, 3)} kg`],
     ['commands', `${state.commands_accepted} accepted, ${state.commands_rejected} refused; ${state.commander ? `sender ${state.commander} commands` : 'nobody commands'}`]]);
 }
 
