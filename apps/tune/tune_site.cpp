@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <random>
 #include <stdexcept>
 #include <utility>
@@ -83,7 +84,7 @@ TunePage TuneSite::setup() const {
   TunePage document = {{"token", token_},
                        {"arm", chain_json(model)},
                        {"robot",
-                        {{"urdf", arm_.robot().urdf},
+                        {{"urdf", std::filesystem::absolute(arm_.robot().urdf).lexically_normal()},
                          {"base", arm_.robot().base},
                          {"tip", arm_.robot().tip},
                          {"config", start_.config}}},

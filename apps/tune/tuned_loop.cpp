@@ -252,6 +252,17 @@ void set_designed_damping(const analysis::System<>& system, const MatrixXd& fric
   parts.damping = system.damping - J.transpose() * *parts.task_damping * J;
 }
 
+/// Stiffness and damping that act at the tip or in the joints, without friction; without `known`
+/// the damping is no single matrix.
+LoopJson gains_json(const analysis::TaskImpedance& parts, const MatrixXd& friction, bool known) {
+  if (parts.jacobian) {
+    return {{"stiffness", json_rows(*parts.task_stiffness)},
+            {"damping", known ? json_rows(*parts.task_damping) : LoopJson()}};
+  }
+  return {{"stiffness", json_rows(*parts.stiffness)},
+          {"damping", known ? json_rows(*parts.damping - friction) : LoopJson()}};
+}
+
 /// The loop as `dashpot analyze` takes it: as its parts, or where gears bend as a whole.
 LoopJson system_json(const analysis::System<>& system, const analysis::TaskImpedance& parts,
                      bool rigid) {
@@ -386,10 +397,9 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
   const MatrixXd J = controller::evaluate(model, q, JointVector::Zero(n)).J;
   const Place moved = place_of(place, loop.parts.mass, J);
   const bool rigid = !gears_.any();
-  if (design_.designed() && rigid) {
-    const VectorXd friction = model.joint_values(&controller::Joint::viscous_friction);
-    set_designed_damping(loop.system, friction.asDiagonal(), loop.parts);
-  };
+  const MatrixXd friction = model.joint_values(&controller::Joint::viscous_friction).asDiagonal();
+  if (design_.designed() && rigid) set_designed_damping(loop.system, friction, loop.parts);
+  ;
   const PostureNumbers here = numbers(loop);
 
   const Eigen::Index size = loop.system.dof();
@@ -411,7 +421,8 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
                      {"release", release_json(response, loop.spectrum, motion, row)},
                      {"frequency", frequency_json(response, loop.spectrum, row, moved.unit)},
                      {"sensitivity", nullptr},
-                     {"system", system_json(loop.system, loop.parts, rigid)}};
+                     {"system", system_json(loop.system, loop.parts, rigid)},
+                     {"gains", gains_json(loop.parts, friction, !design_.designed() || rigid)}};
   if (design_.stated.period > 0) {
     result["limit"] =
         limit_json(loop.system, analysis::with_gears(loop.sampled), here.gain_margin, model);

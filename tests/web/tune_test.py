@@ -44,9 +44,10 @@ class Tune(unittest.TestCase):
         cls.process.stdout.close()
 
     def setUp(self):
-        self.browser.events.clear()
         self.refused = False  # whether the program refuses a request on purpose
         self.browser.open('about:blank')
+        self.value('0')  # what the last page has asked is over
+        self.browser.events.clear()
         self.browser.open(self.url + '?theme=light')
         self.browser.until(CURRENT)
 
@@ -128,7 +129,7 @@ class Tune(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, 'tuned.yaml')
             with open(path, 'w') as file:
-                file.write(self.text('configuration of Dashpot').replace('"sim/', f'"{SOURCE}/sim/'))
+                file.write(self.text('configuration of Dashpot'))
             other = subprocess.Popen([PROGRAM, 'tune', path, '--port', '0', '--q', '0.1,-0.7,0.2,-1.9,0.1,1.4,0.6'],
                                      stdout=subprocess.PIPE, text=True)
             try:
@@ -156,6 +157,24 @@ class Tune(unittest.TestCase):
         self.assertNotIn('differ', crisp)
         self.edit("state.a.damping = {ratio: 0.7}")
         self.assertIn('differ', self.text('crisp_controllers'))  # it has no full matrix
+
+    def test_every_kind_of_design_has_texts(self):
+        kinds = ["mode: 'joint'", "mode: 'joint', joint_damping: {ratio: 0.6}", "damping: {ratio: 0.7}, null_stiffness: Array(7).fill(5), null_damping: {ratio: 0.6}",
+                 "damping: {factor: 2}, frame: 'tool', rotation: 'half-quaternion', arm: {payload: {mass: 2, center: [0, 0, 0.1]}}",
+                 "damping: {factor: 2}, arm: {reflected_inertia: Array(7).fill(0.2), gear_stiffness: [8000, null, 8000, 8000, 8000, 8000, 8000]}",
+                 "damping: {ratio: 0.7}, gain_margin: 1, arm: {reflected_inertia: Array(7).fill(0.2), gear_stiffness: Array(7).fill(8000), position_sensor: 'link'}",
+                 "inertia_blocks: true, stiffness: [150, 150, 150, 250, 250, 250], damping: {factor: 2}",
+                 "damping: {factor: 2}, period: 0.004, delay: 2, cutoff: 100, difference_velocity: true, integral_time: 2"]
+        formats = self.value("[...document.getElementById('format').options].map((o) => o.text)")
+        for kind in kinds:
+            with self.subTest(kind):
+                self.edit(f"state.edited = 'a'; state.a = {{...dashpot.setup.designs[0], {kind}}}")
+                for name in formats:
+                    self.assertTrue(self.text(name))
+                modes = self.value('dashpot.answers.a.modes')
+                if 'link' not in kind:  # whose stiffness is not symmetric
+                    for a, b in zip(modes, self.analyze()):
+                        self.assertAlmostEqual(a['natural_frequency'], b['natural_frequency'], delta=1e-6 * a['natural_frequency'])
 
     def test_address_restores_the_state(self):
         self.edit("state.edited = 'b'; state.place = 'tip/4'; state.b.damping = {ratio: 0.55}; state.q[3] = -1.5")

@@ -77,8 +77,8 @@ function build() {
   if (key === built) return;
   built = key;
   const acting = () => {
-    const system = answer() && answer().system;
-    return system && (design().mode === 'joint' ? system.damping : system.task_damping);
+    const asked = page.asked[store.state.edited];  // the springs may have been others
+    return answer() && asked.design.mode === design().mode ? answer().gains.damping : null;
   };
   const groups = {gains: gainFields(edit, design, setup.arm, acting), loop: loopFields(edit, design), parts: partFields(edit, design, setup)};
   fields = Object.values(groups).flat();
@@ -286,7 +286,8 @@ function stepOf(matrix, stiffness, i, j) {
   return matrix === stiffness ? 0.1 * Math.max(mean(stiffness), 1) : 0.25 * Math.max(mean(matrix), Math.sqrt(mean(stiffness)));
 }
 function tellArrows() {
-  const mine = answer(), sensitivity = mine && mine.sensitivity, joint = design().mode === 'joint';
+  const mine = answer(), asked = page.asked[store.state.edited], joint = design().mode === 'joint';
+  const sensitivity = mine && (asked.design.mode === 'joint') === joint ? mine.sensitivity : null;
   const pick = $('arrow_mode'), names = mine ? mine.modes.map((_, i) => String(i + 1)) : [];
   if (pick.options.length !== names.length + 1) {
     pick.replaceChildren(...['smallest', ...names].map((name) => new Option(name === 'smallest' ? 'the smallest ratio' : `mode ${name}`, name)));
@@ -298,7 +299,7 @@ function tellArrows() {
   }
   const labels = joint ? setup.arm.joints.map((_, i) => String(i + 1)) : kAxes;
   for (const which of ['damping', 'stiffness']) {
-    const table = $(`arrows_${which}`), of = joint ? which : `task_${which}`, matrix = sensitivity && mine.system[of];
+    const table = $(`arrows_${which}`), matrix = sensitivity && mine.gains[which];
     if (!matrix || chosen < 0) {
       table.replaceChildren();
       continue;
@@ -313,7 +314,7 @@ function tellArrows() {
       const th = document.createElement('th');
       th.textContent = name;
       return row(th, ...labels.map((_, j) => {
-        const step = stepOf(matrix, mine.system[joint ? 'stiffness' : 'task_stiffness'], i, j), change = (k) => sensitivity[which][k][i][j] * step * (i === j ? 1 : 2);
+        const step = stepOf(matrix, mine.gains.stiffness, i, j), change = (k) => sensitivity[which][k][i][j] * step * (i === j ? 1 : 2);
         const now = change(chosen), box = cell(''), button = document.createElement('button');
         button.type = 'button';
         button.className = Math.abs(now) < 5e-4 ? 'none' : now > 0 ? 'up' : 'down';
@@ -348,7 +349,7 @@ function tellText() {
 }
 
 // Buttons, choices and keys
-$('source').textContent = setup.robot.config || `${setup.arm.name}, ${setup.robot.urdf}`;
+$('source').textContent = setup.robot.config || `${setup.arm.name}, ${setup.robot.urdf.split('/').pop()}`;
 $('source').title = `${setup.robot.urdf}, from ${setup.robot.base} to ${setup.robot.tip}`;
 $('preset').replaceChildren(new Option('your own', ''), ...setup.presets.map(({name}) => new Option(name, name)));
 $('preset').addEventListener('change', () => {

@@ -5,21 +5,12 @@ const round = (x) => Number(x.toPrecision(7));
 const diagonal = (matrix) => matrix.map((row, i) => row[i]);
 const asRows = (value) => (Array.isArray(value[0]) ? value : value.map((x, i) => value.map((_, j) => (i === j ? x : 0))));
 const isDiagonal = (value) => !Array.isArray(value[0]) || value.every((row, i) => row.every((x, j) => i === j || x === 0));
-const short = (value) => (isDiagonal(value) ? diagonal(asRows(value)) : value);
+const short = (value) => (!value ? null : isDiagonal(value) ? diagonal(asRows(value)) : value);
 const kAxes = ['x', 'y', 'z'];
 
 /// Stiffness and damping that act: half a quaternion's stiffness halved, a factor or ratio as the
 /// matrix that it makes; null where the damping is not one matrix.
-function acting({design, answer}) {
-  const joint = design.mode === 'joint';
-  const system = answer.system;
-  return joint ? {stiffness: system.stiffness, damping: design.joint_damping.ratio ? system.damping : damped(design.joint_damping, design.joint_stiffness)}
-    : {stiffness: system.task_stiffness, damping: system.task_damping};
-}
-function damped(damping, stiffness) {
-  if (damping.factor === undefined) return asRows(damping);
-  return asRows(stiffness).map((row) => row.map((k) => damping.factor * Math.sqrt(Math.max(k, 0))));
-}
+const acting = ({answer}) => answer.gains;
 function nullDamping(design) {
   if (Array.isArray(design.null_damping)) return design.null_damping;
   return design.null_stiffness.map((k) => (design.null_damping.factor || 0) * Math.sqrt(k));
@@ -29,7 +20,7 @@ const lossNote = (matrix) => matrix && !isDiagonal(matrix) && !matrix.every((row
   && 'This form has no entries beside the diagonal: the modes differ from those on the page.';
 
 function configuration({setup, q, design, answer}) {
-  const {stiffness, damping} = acting({design, answer});
+  const {stiffness, damping} = acting({answer});
   const gains = {}, robot = {urdf: setup.robot.urdf, base: setup.robot.base, tip: setup.robot.tip};
   const arm = design.arm || {};
   for (const key of ['reflected_inertia', 'viscous_friction', 'gear_damping', 'position_sensor', 'payload']) {
@@ -40,7 +31,7 @@ function configuration({setup, q, design, answer}) {
   if (design.mode === 'joint') {
     gains.joint = pair(design.joint_damping, asRows(design.joint_stiffness), damping);
   } else {
-    const K = stiffness || asRows(design.stiffness);
+    const K = stiffness;
     gains.task = {...pair(design.damping, K, damping), frame: design.frame || 'base'};
     gains.null_space = pair(design.null_damping, design.null_stiffness, nullDamping(design));
   }
@@ -141,7 +132,7 @@ function python(of) {
   if (arm.payload && arm.payload.mass) options.push(`payload_mass=${arm.payload.mass}`, `payload_center=${JSON.stringify(arm.payload.center || [0, 0, 0])}`);
   const from = [setup.robot.urdf, setup.robot.base, setup.robot.tip].map((word) => JSON.stringify(word)).concat(options).join(', ');
   const joint = design.mode === 'joint', prefix = joint ? 'joint' : 'task', told = joint ? design.joint_damping : design.damping;
-  const K = joint ? asRows(design.joint_stiffness) : stiffness || asRows(design.stiffness);
+  const K = joint ? asRows(design.joint_stiffness) : stiffness;
   const gains = [`${prefix}_stiffness=${JSON.stringify(short(K))}`, told.ratio ? `${prefix}_damping_ratio=${told.ratio}` : `${prefix}_damping=${JSON.stringify(short(damping))}`];
   if (!joint) {
     gains.push(`null_stiffness=${JSON.stringify(design.null_stiffness)}`,
