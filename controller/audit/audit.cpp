@@ -235,7 +235,14 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
 
 std::optional<PostureNumbers> Audit::numbers(const JointVector& q,
                                              const analysis::System<kMaxJoints>& loop) const {
-  return numbers(evaluate(q), loop);
+  analysis::System<kMaxJoints> system = loop;
+  Index rows = 0;  // without those of springs that are zero, such as a null space's
+  for (Index i = 0; i < loop.stiffness_factor.rows(); ++i) {
+    if (loop.stiffness_factor.row(i).isZero(0)) continue;
+    system.stiffness_factor.row(rows++) = loop.stiffness_factor.row(i);
+  }
+  system.stiffness_factor.conservativeResize(rows, Eigen::NoChange);
+  return numbers(evaluate(q), system);
 }
 
 std::optional<PostureNumbers> Audit::numbers(const DynamicsResult& robot,
