@@ -222,10 +222,10 @@ function tell() {
     line.classList.toggle('chosen', page.chosen === i + 1);
     return line;
   }));
-  const totals = [['smallest ratio', (x) => x.smallest_ratio, ''], ['fastest pole', (x) => x.fastest_pole, '1/s'], ['gain margin', (x) => x.gain_margin, ''],
-    ['overshoot', (x) => (x.release.overshoot === null ? null : x.release.overshoot * 100), '%'], ['settling to 2 %', (x) => x.release.settling_time, 's'], ['motions without spring', (x) => x.soft_or_zero, 'whole']];
-  $('totals').replaceChildren(...totals.map(([name, get, unit]) => {
-    const values = [a, b].map((x) => (x ? get(x) : null)), text = (v) => (v === 1e6 && name === 'gain margin' ? 'above 1e6' : v === null ? '–' : unit === 'whole' ? String(v) : `${number(v)}${unit && ` ${unit}`}`);
+  const totals = [['smallest ratio', (x) => x.smallest_ratio], ['fastest pole, 1/s', (x) => x.fastest_pole], ['gain margin', (x) => x.gain_margin],
+    ['overshoot, %', (x) => (x.release.overshoot === null ? null : x.release.overshoot * 100)], ['settling to 2 %, s', (x) => x.release.settling_time], ['free motions', (x) => x.soft_or_zero, true]];
+  $('totals').replaceChildren(...totals.map(([name, get, whole]) => {
+    const values = [a, b].map((x) => (x ? get(x) : null)), text = (v) => (v === 1e6 && name === 'gain margin' ? 'above 1e6' : v === null ? '–' : whole ? String(v) : number(v));
     return row(cell(name), ...values.map((v) => cell(text(v))), cell(difference(...values)));
   }));
   const limits = kDesigns.map((name, i) => [a, b][i] && [a, b][i].limit && `${name.toUpperCase()} is limited by a motion at ${number([a, b][i].limit.frequency, 3)} rad/s` +
