@@ -2,6 +2,7 @@
 #include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/text_table.hpp>
 #include <dashpot/controller/rotors.hpp>
+#include <dashpot/text/printable.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -44,6 +45,25 @@ std::string margins(const Numbers& numbers) {
   return lines.str();
 }
 
+/// A matrix of gains by its diagonal; says so where it has more.
+std::string gains_text(const std::string& name, const Eigen::MatrixXd& gains) {
+  const Eigen::VectorXd diagonal = gains.diagonal();
+  return name + " = diag(" + format_list(diagonal, 3) + ")" +
+         (gains.isDiagonal(0) ? "" : " and more");
+}
+
+/// The arm and its gains as a title of two lines, in gnuplot's words.
+std::string title(const AuditTask& task) {
+  const controller::Gains& gains = task.options.gains;
+  const bool joint = task.options.mode == controller::Mode::kJoint;
+  const std::string stiffness =
+      joint ? gains_text("K", gains.joint_stiffness) : gains_text("K_C", gains.task_stiffness);
+  const std::string damping =
+      joint ? gains_text("C", gains.joint_damping) : gains_text("C_C", gains.task_damping);
+  return quoted_for_gnuplot(text::printable(task.model.name()) + ", " + stiffness) + ".\"\\n\"." +
+         quoted_for_gnuplot(damping) + "\n";
+}
+
 std::string script(const std::string& path, const AuditTask& task, const Numbers& numbers) {
   constexpr int kClasses = 60;
   double most = std::isnan(task.intended_ratio) ? 0.1 : 1.1 * task.intended_ratio;
@@ -57,7 +77,8 @@ std::string script(const std::string& path, const AuditTask& task, const Numbers
       << "]\nset style fill solid 0.7\nset boxwidth " << most / kClasses
       << "\nset key top right\nset xlabel 'smallest damping ratio of a posture'\n"
       << "set ylabel '% of " << numbers.size() << " postures'\n";
-  if (!points.empty()) out << "set multiplot layout 2,1\n";
+  out << "set termoption noenhanced\n"
+      << (points.empty() ? "set title " : "set multiplot layout 2,1 title ") << title(task);
   if (!std::isnan(task.intended_ratio)) {
     out << "set arrow 1 from " << task.intended_ratio << ", graph 0 to " << task.intended_ratio
         << ", graph 1 nohead lw 2 lc rgb '#d62728'\nset label 1 ' meant: "

@@ -6,16 +6,12 @@
 #include <stdexcept>
 
 namespace dashpot::apps {
-namespace {
 
-/// Text between single quotes for gnuplot.
-std::string quoted(const std::string& text) {
+std::string quoted_for_gnuplot(const std::string& text) {
   std::string result = "'";
   for (const char c : text) result += c == '\'' ? "''" : std::string(1, c);
   return result + "'";
 }
-
-}  // namespace
 
 void check_plot_name(const std::string& path) {
   if (!path.ends_with(".svg") && !path.ends_with(".png")) {
@@ -25,8 +21,8 @@ void check_plot_name(const std::string& path) {
 
 std::string plot_heading(const std::string& path, int width, int height) {
   return "set terminal " + std::string(path.ends_with(".svg") ? "svg" : "png") + " size " +
-         std::to_string(width) + "," + std::to_string(height) + "\nset output " + quoted(path) +
-         "\n";
+         std::to_string(width) + "," + std::to_string(height) + "\nset output " +
+         quoted_for_gnuplot(path) + "\n";
 }
 
 void run_gnuplot(const std::string& path, const std::string& script) {

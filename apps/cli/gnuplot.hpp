@@ -3,6 +3,9 @@
 
 namespace dashpot::apps {
 
+/// Returns text between single quotes for gnuplot.
+std::string quoted_for_gnuplot(const std::string& text);
+
 /// Throws InputError unless the path that the user gave with `--plot` ends with .svg or .png.
 void check_plot_name(const std::string& path);
 

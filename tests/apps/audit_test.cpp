@@ -170,6 +170,8 @@ TEST(Audit, DrawsTheRatios) {
   EXPECT_THAT(drawn, HasSubstr("<svg"));
   EXPECT_THAT(drawn, HasSubstr("meant: 1.00"));
   EXPECT_THAT(drawn, HasSubstr("gain margin"));
+  EXPECT_THAT(drawn, HasSubstr("panda, K_C = diag(500, 500, 500, 30.0, 30.0, 30.0)"));
+  EXPECT_THAT(drawn, HasSubstr("C_C = diag("));
 }
 
 TEST(Audit, PrintsTables) {

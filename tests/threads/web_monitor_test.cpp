@@ -119,6 +119,27 @@ std::string short_log(const Scratch& scratch) {
   return path;
 }
 
+TEST(WebMonitor, TellsWallsAndTheAgeOfWhatItShows) {
+  const Scratch scratch;
+  const std::string log = scratch.path("table.lcm");
+  const std::string table = scene("safety/table");
+  ASSERT_EQ(run_program({"run", table, "--fast", "--duration", "1", "--log", log}).status, 0);
+  const Site replay({"--log", log, "--config", table});
+  const Json walls = body_of(replay.get("/setup"))["arm"]["walls"];
+  ASSERT_EQ(walls.size(), 1U);
+  EXPECT_EQ(walls[0]["stiffness"], 2e4);
+  EXPECT_EQ(walls[0]["point"], Json({0, 0, 0.4559}));
+  const Json frame = body_of(replay.get("/frame?t=0.7"));
+  EXPECT_GE(frame["age"], 0);
+  EXPECT_LT(frame["age"], 0.05);  // the log has a message more often
+  EXPECT_THAT(replay.get("/safety.md"), AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("## Faults")));
+  EXPECT_THAT(replay.get("/docs/safety.md"), StartsWith("HTTP/1.1 404"));
+  const Site live({"--lcm-url", own_url()});
+  const double age = body_of(live.get("/frame"))["age"];
+  EXPECT_GE(age, 0);
+  EXPECT_GT(body_of(live.get("/frame"))["age"], age);  // nothing comes
+}
+
 TEST(WebMonitor, AnswersGetsOfItsOwnPageAlone) {
   const Site site({"--lcm-url", own_url()});
   const std::string port = std::to_string(site.port);

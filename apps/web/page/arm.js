@@ -178,8 +178,10 @@ export class ArmView {
       b[0] + x * Math.cos(turn) - y * Math.sin(turn), b[1] + x * Math.sin(turn) + y * Math.cos(turn)));
     c.closePath();
     c.fill();
-    c.textAlign = Math.cos(turn) > 0.5 ? 'left' : Math.cos(turn) < -0.5 ? 'right' : 'center';
-    c.fillText(`${name} ${number(size, 3)} N`, b[0] + 10 * Math.cos(turn), b[1] + 16 * Math.sin(turn) + 4);
+    const text = `${name} ${number(size, 3)} N`, wide = c.measureText(text).width;  // kept on the canvas, below what walls say
+    const left = b[0] + 10 * Math.cos(turn) - wide * (1 - Math.cos(turn)) / 2;
+    c.textAlign = 'left';
+    c.fillText(text, Math.min(Math.max(left, 2), this.canvas.clientWidth - wide - 2), Math.max(b[1] + 16 * Math.sin(turn) + 4, 44));
   }
 
   projection(w, h, points) {

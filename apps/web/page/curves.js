@@ -17,8 +17,8 @@ const back = (log, v) => (log ? 10 ** v : v);
 
 /// One drawing. `changed` is called when it has to be drawn again because of pointer or keys.
 ///
-/// The wheel, + and - zoom, dragging and arrow keys move what is shown, a double click or 0 shows
-/// all again. With Shift the arrow keys move the line whose values are shown.
+/// The wheel, after a click or with Ctrl, + and - zoom, dragging and arrow keys move what is shown, a
+/// double click or 0 shows all again. With Shift the arrow keys move the line whose values are shown.
 export class Plot {
   constructor(canvas, changed, view = new View()) {
     Object.assign(this, {canvas, changed, view, drawn: null, pointer: null});
@@ -40,7 +40,7 @@ export class Plot {
     canvas.addEventListener('pointerleave', () => this.leave());
     canvas.addEventListener('blur', () => this.leave());
     canvas.addEventListener('wheel', (e) => {
-      if (!this.drawn) return;
+      if (!this.drawn || (document.activeElement !== canvas && !e.ctrlKey)) return;  // the page scrolls
       e.preventDefault();
       this.zoom(Math.exp(e.deltaY * 0.002), this.value(place(e)));
     }, {passive: false});
@@ -114,8 +114,10 @@ export class Plot {
     const range = shown && shown[0] < to && shown[1] > from ? shown : x.range;
     const y = this.vertical(picture, range);
     if (!y || !(range[1] > range[0])) {
+      const said = picture.empty || `${title}: nothing to show`;
       this.drawn = null;
-      return say(c, w, h, picture.empty || `${title}: nothing to show`);
+      this.canvas.setAttribute('aria-label', said);
+      return say(c, w, h, said);
     }
     this.drawn = {log: !!x.log, range, whole: x.range};
     const bottom = x.bare ? 6 : kBottom;
@@ -275,7 +277,7 @@ export function drawResponse(magnitude, phase, response, note) {
   const empty = {title: '', x: {range: [0, 1]}, y: {}, empty: note};
   if (!response) {
     magnitude.draw(empty);
-    return phase.draw({...empty, empty: ' '});
+    return phase.draw({...empty, empty: '–'});
   }
   const omega = response.omega, x = {range: [omega[0], omega[omega.length - 1]], log: true, text: ' rad/s'};
   const lines = response.natural_frequency.filter((f) => f > 0).map((value) => ({value}));

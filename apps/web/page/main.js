@@ -20,7 +20,7 @@ window.addEventListener('unhandledrejection', (e) => page.errors.push(String(e.r
 
 // What has to be drawn again, and when it was drawn last
 const kParts = ['arm', 'poles', 'numbers', 'curves', 'response'];
-const kEvery = {arm: 120, poles: 240, numbers: 330, curves: 950, response: 0};  // ms, if only time goes on
+const kEvery = {arm: 140, poles: 240, numbers: 330, curves: 950, response: 0};  // ms, if only time goes on
 const dirty = new Map(), drawnAt = {};  // part -> 'soon' (at someone's wish) or 'later'
 const request = redrawer((now) => draw(now), 25);
 function soon(...parts) {

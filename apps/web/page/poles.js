@@ -7,8 +7,8 @@ const kTrail = 5;  // s
 /// the rays of equal ratio straight.
 ///
 /// `changed` is called when the map has to be drawn again because of the pointer, `choose` with the
-/// label of a pole that is clicked. The wheel, + and - zoom, dragging moves; a double click or 0
-/// shows all again.
+/// label of a pole that is clicked. The wheel, after a click or with Ctrl, + and - zoom, dragging
+/// moves; a double click or 0 shows all again.
 export class PoleMap {
   constructor(canvas, changed = () => {}, choose = () => {}) {
     Object.assign(this, {canvas, changed, choose, trails: [], drawn: [], zoom: 1, shift: [0, 0], pointer: null});
@@ -43,6 +43,7 @@ export class PoleMap {
       this.changed();
     });
     canvas.addEventListener('wheel', (e) => {
+      if (document.activeElement !== canvas && !e.ctrlKey) return;  // the page scrolls
       e.preventDefault();
       this.enlarge(Math.exp(-e.deltaY * 0.002), place(e));
     }, {passive: false});
