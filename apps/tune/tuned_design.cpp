@@ -29,6 +29,8 @@ std::string text_of(const std::string& path) {
   return text.str();
 }
 
+constexpr double kMostDelay = 20;  ///< ticks, as for the controller; more takes seconds
+
 /// Refuses other keys than these.
 void check_keys(const std::string& of, const TuneJson& object,
                 std::initializer_list<std::string_view> keys) {
@@ -253,7 +255,7 @@ TunedDesign read_design(const TunedArm& arm, const TuneJson& design) {
                                           gains.null_stiffness.asDiagonal(), damping);
   gains.null_damping = damping.diagonal();
   stated.period = number_at(design, "period", 0, 1, arm.settings().period);
-  stated.delay = static_cast<int>(number_at(design, "delay", 0, 1000, 0));
+  stated.delay = static_cast<int>(number_at(design, "delay", 0, kMostDelay, 0));
   stated.cutoff = number_at(design, "cutoff", 0, 1e6, 0);
   stated.difference_velocity = flag_at(design, "difference_velocity");
   stated.integral_time = number_at(design, "integral_time", 0, 1e6, 0);

@@ -94,7 +94,7 @@ export async function post(token, path, body) {
 /// more than one part; a design that changes begins again.
 export class Workspace {
   constructor(token, changed) {
-    Object.assign(this, {token, changed, found: {}, asked: {}, busy: false});
+    Object.assign(this, {token, changed, found: {}, asked: {}, busy: false, part: 25});
   }
   look(designs) {
     for (const [name, design] of Object.entries(designs)) {
@@ -111,13 +111,16 @@ export class Workspace {
     const open = () => Object.keys(this.found).find((name) => this.found[name].postures < Workspace.kPostures && !this.found[name].error);
     for (let name = open(); name; name = open()) {
       const found = this.found[name];
-      const body = `{"design":${this.asked[name]},"seed":1,"first":${found.postures},"count":${Workspace.kPart}}`;
+      const count = Math.min(this.part, Workspace.kPostures - found.postures), began = performance.now();
+      const body = `{"design":${this.asked[name]},"seed":1,"first":${found.postures},"count":${count}}`;
       const part = await post(this.token, '/workspace', body);
+      // As many as take about 20 ms: a long delay of the loop makes each slower.
+      this.part = Math.round(Math.min(Workspace.kPart, Math.max(5, count * 20 / (performance.now() - began))));
       if (this.found[name] !== found) continue;  // of a design that has changed
       if (part.error) {
         found.error = part.error;
       } else {
-        found.postures += Workspace.kPart;
+        found.postures += count;
         for (const key of ['smallest_ratio', 'gain_margin']) {
           found[key].push(...part[key].filter((x) => x !== null));
           const worst = part.worst[key];
