@@ -106,6 +106,7 @@ int run(int argc, char** argv) {
   add_identify(program);
   add_check_model(program);
   add_run(program);
+  add_tune(program);
   add_command(program);
   add_drive(program);
   add_fake_driver(program);

@@ -147,6 +147,12 @@ class Audit {
   /// entries.
   PostureNumbers numbers(const JointVector& q) const;
 
+  /// Computes the numbers of another closed loop with the same springs at q, such as that of a
+  /// PostureLoop, from its mass, damping and stiffness factor. Returns none where numbers(q) would
+  /// leave it to audit().
+  std::optional<PostureNumbers> numbers(const JointVector& q,
+                                        const analysis::System<kMaxJoints>& loop) const;
+
   /// Computes modes and numbers at q with proved bounds. Throws like numbers(), and
   /// std::runtime_error if the eigenvalue iteration fails.
   PostureAudit audit(const JointVector& q) const;
@@ -164,6 +170,12 @@ class Audit {
   std::vector<PostureNumbers> sample(std::uint64_t seed, std::int64_t first,
                                      std::int64_t count) const;
 
+  /// Returns the springs and dampers at q as matrices, as if no gear gave way. Throws like
+  /// numbers().
+  analysis::TaskImpedance impedance(const JointVector& q) const {
+    return task_impedance(evaluate(q));
+  }
+
   /// Returns the system at q that damping is designed for: with the springs, the null space's
   /// dampers and the friction, without the dampers of task or joints, and as if no gear gave way.
   /// Throws like numbers().
@@ -180,6 +192,8 @@ class Audit {
 
  private:
   DynamicsResult evaluate(const JointVector& q) const;
+  std::optional<PostureNumbers> numbers(const DynamicsResult& robot,
+                                        const analysis::System<kMaxJoints>& system) const;
   bool kinematic() const noexcept { return options_.kinematic_null_space; }
   /// Returns the closed loop, with elastic joints where there are some.
   analysis::System<> system_of(const analysis::TaskImpedance& impedance) const;

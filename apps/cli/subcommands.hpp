@@ -31,6 +31,7 @@ void add_audit(CLI::App& program);
 void add_identify(CLI::App& program);
 void add_check_model(CLI::App& program);
 void add_run(CLI::App& program);
+void add_tune(CLI::App& program);
 void add_command(CLI::App& program);
 void add_drive(CLI::App& program);
 void add_fake_driver(CLI::App& program);

@@ -81,18 +81,10 @@ Eigen::RowVectorXd direction_of(const std::string& place, const controller::Jaco
 
 }  // namespace
 
-ArmView::ArmView(const std::string& config) : config_(controller::load_config(config)) {
-  try {
-    const Scene scene = load_scene(config);
-    if (scene.arm) simulated_wall_ = scene.arm->options.wall;
-  } catch (const InputError&) {  // a configuration, which is no scene
-  }
-}
-
-ArmJson ArmView::chain() const {
-  const KDL::Chain& chain = controller::kdl_chain(config_.model);
-  ArmJson document{{"name", config_.model.name()}, {"joints", ArmJson::array()}};
-  const auto& joints = config_.model.joints();
+ArmJson chain_json(const controller::RobotModel& model) {
+  const KDL::Chain& chain = controller::kdl_chain(model);
+  ArmJson document{{"name", model.name()}, {"joints", ArmJson::array()}};
+  const auto& joints = model.joints();
   for (std::size_t i = 0; i < joints.size(); ++i) {
     const KDL::Segment& segment = chain.getSegment(static_cast<unsigned>(i));
     const KDL::Joint& joint = segment.getJoint();
@@ -105,8 +97,21 @@ ArmJson ArmView::chain() const {
          {"axis", vector_json(joint.JointAxis())},
          {"frame", frame_json(joint.pose(0).Inverse() * segment.pose(0))}});
   }
-  document["missing_rotors"] = controller::missing_rotors_text(config_.model);
+  document["missing_rotors"] = controller::missing_rotors_text(model);
   document["tip"] = frame_json(chain.getSegment(static_cast<unsigned>(joints.size())).pose(0));
+  return document;
+}
+
+ArmView::ArmView(const std::string& config) : config_(controller::load_config(config)) {
+  try {
+    const Scene scene = load_scene(config);
+    if (scene.arm) simulated_wall_ = scene.arm->options.wall;
+  } catch (const InputError&) {  // a configuration, which is no scene
+  }
+}
+
+ArmJson ArmView::chain() const {
+  ArmJson document = chain_json(config_.model);
   document["walls"] = ArmJson::array();
   const auto add_wall = [&walls = document["walls"]](
                             const std::string& name, const Eigen::Vector3d& p,

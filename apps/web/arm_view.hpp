@@ -10,6 +10,12 @@
 
 namespace dashpot::apps {
 
+/// Returns the chain for the page's kinematics: {"name", "joints": [{"name", "prismatic",
+/// "lower", "upper", "origin", "axis", "frame"}], "tip"}. With T_0 = I,
+///     T_i = T_i-1 [Rot(axis, q_i), origin] frame      (prismatic: [I, origin + q_i axis] frame)
+/// is the frame of link i in B, and T_n tip that of the tip. Frames are rows of 4 x 4.
+nlohmann::ordered_json chain_json(const controller::RobotModel& model);
+
 /// What a page needs to know of the arm beyond the messages.
 class ArmView {
  public:
@@ -21,13 +27,8 @@ class ArmView {
   /// The gain margin that gains have to leave, no unit.
   double gain_margin() const { return config_.settings.limits.gain_margin; }
 
-  /// Returns the chain for the page's kinematics: {"name", "joints": [{"name", "prismatic",
-  /// "lower", "upper", "origin", "axis", "frame"}], "tip", "walls": [{"name", "point", "normal",
-  /// "stiffness"}]}. With T_0 = I,
-  ///     T_i = T_i-1 [Rot(axis, q_i), origin] frame      (prismatic: [I, origin + q_i axis] frame)
-  /// is the frame of link i in B, and T_n tip that of the tip. Frames are rows of 4 x 4. A
-  /// wall's normal points to where the tip may be; a simulated wall has a stiffness, N/m, others
-  /// null.
+  /// Returns the chain with {"walls": [{"name", "point", "normal", "stiffness"}]} besides. A wall's
+  /// normal points to where the tip may be; a simulated wall has a stiffness, N/m, others null.
   nlohmann::ordered_json chain() const;
 
   /// Returns the damping ratio that the configuration asks for in a mode (JOINT, CARTESIAN), 0 if

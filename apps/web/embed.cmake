@@ -4,7 +4,10 @@ set(text "#include <dashpot/apps/web/web_site.hpp>\n\nnamespace dashpot::apps {\
 set(table "")
 foreach(entry IN ITEMS "index.html:text/html" "style.css:text/css" "main.js:text/javascript"
     "draw.js:text/javascript" "arm.js:text/javascript" "poles.js:text/javascript"
-    "curves.js:text/javascript" "panels.js:text/javascript" "advice.js:text/javascript"
+    "curves.js:text/javascript" "tune.html:text/html" "tune.css:text/css"
+    "tune.js:text/javascript" "tune_arm.js:text/javascript" "tune_form.js:text/javascript"
+    "tune_gains.js:text/javascript" "tune_state.js:text/javascript" "tune_text.js:text/javascript"
+    "panels.js:text/javascript" "advice.js:text/javascript"
     "icon.svg:image/svg+xml" "../../../docs/safety.md:text/plain")
   string(REPLACE ":" ";" entry ${entry})
   list(GET entry 0 name)

@@ -76,6 +76,7 @@ struct HttpServer::Parts {
     int socket = -1;
     HttpClock::time_point since;  ///< when its request, or the wait for one, began
     bool stream = false;
+    std::string body;  ///< of a POST
   };
   /// A response that never ends.
   struct Stream {
@@ -98,6 +99,7 @@ struct HttpServer::Parts {
   bool closing = false;
 
   HttpAnswer judge(MHD_Connection* connection, std::string_view method) const;
+  HttpAnswer judge_post(MHD_Connection* connection) const;
   MHD_Result answer(MHD_Connection* connection, const std::string& path, std::string_view method);
   MHD_Result open_stream(MHD_Connection* connection);
   ssize_t feed(Stream& stream, char* buffer, std::size_t most);
@@ -147,6 +149,7 @@ HttpAnswer HttpServer::Parts::judge(MHD_Connection* connection, std::string_view
   if (!origin.empty() && !(origin.starts_with("http://") && is_ours(origin.substr(7)))) {
     return refusal(403, "wrong Origin");
   }
+  if (method == "POST" && content.post) return judge_post(connection);
   if (method != "GET") return refusal(405, "GET only: nothing can be changed here");
   if (!header(connection, "Content-Length").empty() ||
       !header(connection, "Transfer-Encoding").empty()) {
@@ -155,10 +158,26 @@ HttpAnswer HttpServer::Parts::judge(MHD_Connection* connection, std::string_view
   return {};
 }
 
+/// The same of a POST.
+HttpAnswer HttpServer::Parts::judge_post(MHD_Connection* connection) const {
+  if (header(connection, "X-Dashpot-Token") != content.token) return refusal(403, "wrong token");
+  if (header(connection, "Content-Type") != "application/json") {
+    return refusal(415, "JSON alone is taken");
+  }
+  const std::string length = header(connection, "Content-Length");
+  if (length.empty() || length.find_first_not_of("0123456789") != std::string::npos) {
+    return refusal(411, "the length of the body is missing");
+  }
+  if (length.size() > 6 || std::stoul(length) > kMostBody) return refusal(413, "too long a body");
+  return {};
+}
+
 MHD_Result HttpServer::Parts::answer(MHD_Connection* connection, const std::string& path,
                                      std::string_view method) {
   const HttpAnswer refused = judge(connection, method);
   if (refused.body) return queue_answer(connection, refused);
+  if (method == "POST")
+    return queue_answer(connection, content.post(path, client_of(connection).body));
   if (path == "/stream" && content.next_event) return open_stream(connection);
   std::map<std::string, std::string> query;
   MHD_get_connection_values(
@@ -265,11 +284,17 @@ HttpServer::HttpServer(int port, HttpContent content) : parts_(std::make_unique<
   parts.listener = listen_on_loopback(port);
   parts.port = port_of(parts.listener);
   const MHD_AccessHandlerCallback handle = [](void* of, MHD_Connection* connection, const char* url,
-                                              const char* method, const char*, const char*,
+                                              const char* method, const char*, const char* data,
                                               std::size_t* upload, void** seen) {
     Parts& self = *static_cast<Parts*>(of);
     if (*seen == nullptr && self.judge(connection, method).body == nullptr) {
-      *seen = of;  // the headers alone: libmicrohttpd calls again when the request is complete
+      *seen = of;  // the headers alone: libmicrohttpd calls again with the body, and at its end
+      self.client_of(connection).body.clear();
+      return MHD_YES;
+    }
+    if (*seen != nullptr && *upload != 0) {  // no more than the Content-Length that was judged
+      self.client_of(connection).body.append(data, *upload);
+      *upload = 0;
       return MHD_YES;
     }
     if (*upload != 0) *upload = 0;
@@ -283,7 +308,7 @@ HttpServer::HttpServer(int port, HttpContent content) : parts_(std::make_unique<
       const MHD_ConnectionInfo* info =
           MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
       *context =
-          &self.clients.emplace_back(Parts::Client{info->connect_fd, HttpClock::now(), false});
+          &self.clients.emplace_back(Parts::Client{info->connect_fd, HttpClock::now(), false, {}});
     } else {
       const void* gone = *context;
       self.clients.remove_if([gone](const Parts::Client& client) { return &client == gone; });

@@ -229,7 +229,25 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
   analysis::System<kMaxJoints> system;
   loop.form(robot, impedance, null_space, friction_, system);
   if (elastic_.any()) elastic_.extend_factored(system);
-  if (system.stiffness_factor.rows() == 0) return audit(q).numbers;
+  const std::optional<PostureNumbers> result = numbers(robot, system);
+  return result ? *result : audit(q).numbers;
+}
+
+std::optional<PostureNumbers> Audit::numbers(const JointVector& q,
+                                             const analysis::System<kMaxJoints>& loop) const {
+  analysis::System<kMaxJoints> system = loop;
+  Index rows = 0;  // without those of springs that are zero, such as a null space's
+  for (Index i = 0; i < loop.stiffness_factor.rows(); ++i) {
+    if (loop.stiffness_factor.row(i).isZero(0)) continue;
+    system.stiffness_factor.row(rows++) = loop.stiffness_factor.row(i);
+  }
+  system.stiffness_factor.conservativeResize(rows, Eigen::NoChange);
+  return numbers(evaluate(q), system);
+}
+
+std::optional<PostureNumbers> Audit::numbers(const DynamicsResult& robot,
+                                             const analysis::System<kMaxJoints>& system) const {
+  if (system.stiffness_factor.rows() == 0) return std::nullopt;
   analysis::ElasticForm<kMaxJoints> form;
   Eigen::Matrix<analysis::Complex, Eigen::Dynamic, 1, Eigen::ColMajor, 2 * kMaxJoints, 1> values;
   PostureNumbers result;
@@ -238,7 +256,7 @@ PostureNumbers Audit::numbers(const JointVector& q) const {
                      form.modes() == springs_ + elastic_.count() &&
                      analysis::elastic_eigenvalues(form, values) == analysis::Status::kOk &&
                      read_eigenvalues(values, options_.soft_frequency, result);
-  if (!clear) return audit(q).numbers;
+  if (!clear) return std::nullopt;
   result.zero_modes = model_.dof() - springs_;
   if (options_.period > 0) try {
       analysis::SampledLoop sampled = loop_at(robot, impedance_at(robot));

@@ -1,6 +1,8 @@
 // What gains do on an arm: against eigenvalues in long double, a sampled loop that is stepped tick
 // by tick, and closed forms.
 #include <dashpot/controller/audit.hpp>
+#include <dashpot/controller/default_settings.hpp>
+#include <dashpot/controller/posture_loop.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/chains.hpp>
 #include <dashpot/tests/support/simulated_arm.hpp>
@@ -95,6 +97,30 @@ TEST_F(AuditOfPanda, AgreesWithTheEigenvaluesOverTheWorkspace) {
                      loop_at(model, audit.posture(7, i), stiffness, options.gains.task_damping));
     }
   }
+}
+
+TEST_F(AuditOfPanda, TakesAnotherLoopAndTellsItsOwnMatrices) {
+  const RobotModel model = audited_panda(0.5);
+  const Audit audit(model, stated(kTranslationFirst, 2));
+  Settings settings = default_settings(model);
+  Gains& gains = settings.initial.gains;
+  gains.task_stiffness = kTranslationFirst.asDiagonal();
+  gains.task_damping_ratio = 0.7;
+  gains.null_damping_ratio = 0;
+  gains.null_stiffness.setZero(7);
+  gains.null_damping.setZero(7);
+  analysis::System<kMaxJoints> designed;
+  PostureLoop loop(model, settings);
+  ASSERT_EQ(loop.closed_loop(panda_ready(), gains, Mode::kCartesian, designed), Status::kOk);
+  const std::optional<PostureNumbers> numbers = audit.numbers(panda_ready(), designed);
+  ASSERT_TRUE(numbers);
+  expect_numbers(*numbers,
+                 testing::system_from(designed.mass, designed.damping, designed.stiffness));
+  designed.stiffness_factor.resize(0, 7);
+  EXPECT_FALSE(audit.numbers(panda_ready(), designed));
+
+  const TaskLoop own = analysis::to_joint_space(audit.impedance(panda_ready()));
+  expect_numbers(audit.numbers(panda_ready()), own);
 }
 
 TEST_F(AuditOfPanda, ProvesBoundsThatHold) {

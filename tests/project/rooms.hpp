@@ -133,6 +133,7 @@ inline const std::vector<Room>& rooms() {
       {"apps/drive", 4, {}, {""}},
       {"apps/fake_driver", 4, {}, {""}},
       {"apps/monitor", 4, {}, {""}},
+      {"apps/tune", 4, {}, {""}},
       {"apps", 5, {}, {""}},
 
       {"python", 0, {}, {""}},

@@ -125,7 +125,8 @@ export function number(x, digits = 4) {
   if (!Number.isFinite(x)) return x > 0 ? '∞' : '−∞';
   const size = Math.abs(x);
   if (size !== 0 && (size < 1e-3 || size >= 1e5)) return x.toExponential(1).replace('-', '−');
-  return x.toPrecision(digits).replace(/e.*/, '').replace('-', '−');
+  if (size >= 10 ** digits) return String(Math.round(x)).replace('-', '−');
+  return x.toPrecision(digits).replace('-', '−');
 }
 /// With so many decimals, and no sign before a zero.
 export function fixed(x, decimals) {

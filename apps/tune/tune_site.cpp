@@ -1,0 +1,162 @@
+#include <dashpot/apps/audit/presets.hpp>
+#include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/tune/tune_site.hpp>
+#include <dashpot/apps/tune/tuned_loop.hpp>
+#include <dashpot/apps/web/arm_view.hpp>
+#include <dashpot/apps/web/web_site.hpp>
+#include <dashpot/controller/rotors.hpp>
+
+#include <array>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <random>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace dashpot::apps {
+namespace {
+
+using TunePage = nlohmann::ordered_json;
+
+constexpr std::size_t kMostArms = 8;
+
+HttpAnswer answer_of(unsigned status, const TunePage& document) {
+  return {status, "application/json", std::make_shared<const std::string>(line_of(document))};
+}
+
+std::string random_token() {
+  std::random_device random;
+  std::string token;
+  for (int i = 0; i < 4; ++i) {
+    std::array<char, 9> word{};
+    std::snprintf(word.data(), word.size(), "%08x", random());
+    token += word.data();
+  }
+  return token;
+}
+
+/// The gains of public controllers as designs.
+TunePage presets_json(int n) {
+  TunePage list = TunePage::array();
+  for (const GainPreset& preset : kPresets) {
+    const double t = preset.translation, r = preset.rotation;
+    list.push_back(
+        {{"name", std::string(preset.name)},
+         {"design",
+          {{"mode", "cartesian"},
+           {"frame", "base"},
+           {"stiffness", {t, t, t, r, r, r}},
+           {"damping", {{"factor", kPresetFactor}}},
+           {"null_stiffness", std::vector<double>(static_cast<std::size_t>(n), preset.null_space)},
+           {"null_damping", {{"factor", kPresetFactor}}},
+           {"null_projector", "kinematic"},
+           {"rotation", preset.half_quaternion ? "half-quaternion" : "vector"},
+           {"inertia_blocks", preset.inertia_blocks}}}});
+  }
+  return list;
+}
+
+const TunePage& wanted(const TunePage& asked, const char* key) {
+  if (!asked.is_object() || !asked.contains(key)) throw InputError(key, "missing");
+  return asked[key];
+}
+
+std::int64_t whole_number(const TunePage& asked, const char* key, std::int64_t most) {
+  const TunePage& value = wanted(asked, key);
+  const bool whole = value.is_number_unsigned();
+  if (!whole || value.get<std::uint64_t>() > static_cast<std::uint64_t>(most)) {
+    throw InputError(key, "has to be a whole number from 0 to " + std::to_string(most));
+  }
+  return value.get<std::int64_t>();
+}
+
+}  // namespace
+
+TuneSite::TuneSite(TunedArm arm, TuneStart start)
+    : arm_(std::move(arm)), start_(std::move(start)), token_(random_token()) {}
+
+TunePage TuneSite::setup() const {
+  const controller::RobotModel& model = arm_.model();
+  const controller::UnknownRotors rotors = controller::unknown_rotors(model);
+  const controller::Drives* published = controller::drives_like(model);
+  TunePage document = {{"token", token_},
+                       {"arm", chain_json(model)},
+                       {"robot",
+                        {{"urdf", std::filesystem::absolute(arm_.robot().urdf).lexically_normal()},
+                         {"base", arm_.robot().base},
+                         {"tip", arm_.robot().tip},
+                         {"config", start_.config}}},
+                       {"q", json_list(start_.q)},
+                       {"designs", start_.designs},
+                       {"presets", presets_json(model.dof())},
+                       {"rotors_unknown", rotors.any()},
+                       {"postures", TunePage::array()},
+                       {"published", nullptr}};
+  for (const controller::JointVector& q : start_.postures)
+    document["postures"].push_back(json_list(q));
+  for (const auto& [key, property] :
+       {std::pair("reflected_inertia", &controller::Joint::reflected_inertia),
+        {"viscous_friction", &controller::Joint::viscous_friction},
+        {"gear_stiffness", &controller::Joint::gear_stiffness},
+        {"gear_damping", &controller::Joint::gear_damping}}) {
+    document["model"][key] = json_list(model.joint_values(property));
+  }
+  document["model"]["payload"] = model.attachment().mass;
+  if (published != nullptr) {
+    document["published"] = {
+        {"name", std::string(published->name)},
+        {"reflected_inertia", json_list(published->values(published->reflected_inertia))}};
+  }
+  return document;
+}
+
+HttpAnswer TuneSite::get(const std::string& path) const {
+  if (path == "/setup") return answer_of(200, setup());
+  const PageFile* file = find_page_file(path == "/" ? "/tune.html" : path);
+  if (file == nullptr) {
+    return {404, "text/plain", std::make_shared<const std::string>("not found\n")};
+  }
+  return {200, std::string(file->type), std::make_shared<const std::string>(file->text)};
+}
+
+const TunedArm& TuneSite::arm_of(const TunePage& design) {
+  if (!design.is_object() || !design.contains("arm") || design["arm"].empty()) return arm_;
+  const std::string parts = line_of(design["arm"]);
+  const auto found = arms_.find(parts);
+  if (found != arms_.end()) return found->second;
+  if (arms_.size() >= kMostArms) arms_.clear();
+  return arms_.emplace(parts, arm_.with(design["arm"])).first->second;
+}
+
+TunePage TuneSite::answer(const std::string& path, const TunePage& asked) {
+  const TunePage& told = wanted(asked, "design");
+  const TunedArm& arm = arm_of(told);
+  const TunedDesign design = read_design(arm, told);
+  if (path == "/workspace") {
+    const std::int64_t seed = whole_number(asked, "seed", 1 << 30);
+    const std::int64_t first = whole_number(asked, "first", 1 << 30);
+    const std::int64_t count = whole_number(asked, "count", kMostPostures);
+    return TunedLoop(arm, design).workspace(static_cast<std::uint64_t>(seed), first, count);
+  }
+  const TunePage& place = wanted(asked, "place");
+  if (!place.is_string()) throw InputError("place", "has to be a text");
+  const controller::JointVector q = read_numbers("q", wanted(asked, "q"), arm.model().dof());
+  TunePage result = TunedLoop(arm, design).at(q, place.get<std::string>());
+  result["refused"] = refusals(arm, design, q);
+  return result;
+}
+
+HttpAnswer TuneSite::post(const std::string& path, const std::string& body) {
+  if (path != "/design" && path != "/workspace") return answer_of(404, {{"error", "not found"}});
+  const TunePage asked = TunePage::parse(body, nullptr, false);
+  if (asked.is_discarded()) return answer_of(400, {{"error", "is no JSON"}});
+  try {
+    return answer_of(200, answer(path, asked));
+  } catch (const std::exception& error) {  // bad input, or a loop without a spectrum
+    return answer_of(400, {{"error", error.what()}});
+  }
+}
+
+}  // namespace dashpot::apps

@@ -1,0 +1,59 @@
+#pragma once
+#include <dashpot/controller/audit.hpp>
+#include <dashpot/controller/robot_description.hpp>
+#include <dashpot/controller/settings.hpp>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace dashpot::apps {
+
+/// The arm of `dashpot tune`, with what the page may tell of it besides.
+class TunedArm {
+ public:
+  /// The settings of a configuration, or null: default settings. Throws controller::InvalidModel.
+  TunedArm(const controller::RobotDescription& robot, const controller::Settings* settings);
+
+  const controller::RobotDescription& robot() const { return robot_; }
+  /// Returns the model and the settings as given.
+  const controller::RobotModel& model() const { return model_; }
+  const controller::Settings& settings() const { return settings_; }
+
+  /// Makes another arm of {"payload": {"mass", "center"}, "reflected_inertia",
+  /// "viscous_friction", "gear_stiffness", "gear_damping": n each, "position_sensor"}; a key that
+  /// is missing or null keeps what the model has, and in gear_stiffness null is rigid. Throws
+  /// InputError, and InvalidModel.
+  TunedArm with(const nlohmann::ordered_json& parts) const;
+
+ private:
+  controller::RobotDescription robot_;
+  std::string urdf_;  ///< text
+  controller::RobotModel model_;
+  controller::Settings settings_;
+  bool own_settings_;
+
+  TunedArm(controller::RobotDescription robot, std::string urdf,
+           const controller::Settings* settings);
+};
+
+/// Gains on an arm in a loop, as the page tells them.
+struct TunedDesign {
+  controller::AuditOptions stated;  ///< but for damping by a ratio, which is in `stated.gains`
+  controller::Settings settings;    ///< as the controller would have them
+
+  /// Whether a damping is designed at each posture, by the controller's own design.
+  bool designed() const;
+};
+
+/// Reads a design. Its keys are those of docs/tuning-page.md; a key that is missing has its
+/// default. Throws InputError for other keys, and for what is no gain at all: a wrong size or type.
+TunedDesign read_design(const TunedArm& arm, const nlohmann::ordered_json& design);
+
+/// Returns the gains of settings as the page tells them, the inverse of read_design.
+nlohmann::ordered_json design_json(const TunedArm& arm);
+
+/// Reads n finite numbers. Throws InputError.
+controller::JointVector read_numbers(const std::string& key, const nlohmann::ordered_json& list,
+                                     Eigen::Index n);
+
+}  // namespace dashpot::apps

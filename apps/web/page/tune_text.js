@@ -1,0 +1,154 @@
+// A design as text for other programs. `of` is {setup, q, design, answer}: what the server was
+// asked, and what it said.
+
+const round = (x) => Number(x.toPrecision(7));
+const diagonal = (matrix) => matrix.map((row, i) => row[i]);
+const asRows = (value) => (Array.isArray(value[0]) ? value : value.map((x, i) => value.map((_, j) => (i === j ? x : 0))));
+const isDiagonal = (value) => !Array.isArray(value[0]) || value.every((row, i) => row.every((x, j) => i === j || x === 0));
+const short = (value) => (!value ? null : isDiagonal(value) ? diagonal(asRows(value)) : value);
+const kAxes = ['x', 'y', 'z'];
+
+/// Stiffness and damping that act: half a quaternion's stiffness halved, a factor or ratio as the
+/// matrix that it makes; null where the damping is not one matrix.
+const acting = ({answer}) => answer.gains;
+function nullDamping(design) {
+  if (Array.isArray(design.null_damping)) return design.null_damping;
+  return design.null_stiffness.map((k) => (design.null_damping.factor || 0) * Math.sqrt(k));
+}
+const notes = (lines) => lines.filter(Boolean).map((line) => `# ${line}\n`).join('');
+const lossNote = (matrix) => matrix && !isDiagonal(matrix) && !matrix.every((row, i) => row.every((x, j) => i === j || Math.abs(x) < 1e-9 * Math.max(...diagonal(matrix).map(Math.abs))))
+  && 'This form has no entries beside the diagonal: the modes differ from those on the page.';
+
+function configuration({setup, q, design, answer}) {
+  const {stiffness, damping} = acting({answer});
+  const gains = {}, robot = {urdf: setup.robot.urdf, base: setup.robot.base, tip: setup.robot.tip};
+  const arm = design.arm || {};
+  for (const key of ['reflected_inertia', 'viscous_friction', 'gear_damping', 'position_sensor', 'payload']) {
+    if (arm[key]) robot[key] = arm[key];
+  }
+  if (arm.gear_stiffness) robot.gear_stiffness = arm.gear_stiffness.map((k) => k || 'none');
+  const pair = (told, K, C) => (told.ratio ? {stiffness: short(K), damping_ratio: told.ratio} : {stiffness: short(K), damping: short(C)});
+  if (design.mode === 'joint') {
+    gains.joint = pair(design.joint_damping, asRows(design.joint_stiffness), damping);
+  } else {
+    const K = stiffness;
+    gains.task = {...pair(design.damping, K, damping), frame: design.frame || 'base'};
+    gains.null_space = pair(design.null_damping, design.null_stiffness, nullDamping(design));
+  }
+  const sections = {robot, control: {period: design.period, mode: design.mode}, gains, limits: {gain_margin: design.gain_margin},
+    integral: {time: design.integral_time},
+    analysis: {sampled: {delay: design.delay, cutoff: design.cutoff, difference_velocity: design.difference_velocity}}};
+  const refused = answer.refused.map(({key, reason}) => `The controller refuses it: ${key}: ${reason}.`);
+  const lines = Object.entries(sections).map(([key, value]) => `${key}:\n` +
+    Object.entries(value).map(([name, inner]) => `  ${name}: ${JSON.stringify(inner)}\n`).join(''));
+  return notes([setup.robot.config && `These sections take the place of those of ${setup.robot.config}.`, `q: ${JSON.stringify(q)}`, ...refused]) + lines.join('');
+}
+
+/// Options of the programs that tell the arm.
+function armOptions({setup, design}) {
+  const arm = design.arm || {}, words = [`--urdf ${setup.robot.urdf} --base ${setup.robot.base} --tip ${setup.robot.tip}`];
+  const list = (name, values) => values && words.push(`--${name} ${values.join(',')}`);
+  list('reflected-inertia', arm.reflected_inertia || (setup.model.reflected_inertia.some(Boolean) && setup.model.reflected_inertia));
+  list('viscous-friction', arm.viscous_friction || setup.model.viscous_friction);
+  list('gear-stiffness', arm.gear_stiffness && arm.gear_stiffness.map((k) => k || 'none'));
+  list('gear-damping', arm.gear_stiffness && arm.gear_damping);
+  if (arm.position_sensor === 'link') words.push('--position-sensor link');
+  if (arm.payload && arm.payload.mass > 0) list('payload', [arm.payload.mass, ...(arm.payload.center || [0, 0, 0])]);
+  return words;
+}
+
+function command(of) {
+  const {setup, q, design} = of, words = armOptions(of);
+  if (setup.robot.config) words.unshift(`# the arm as ${setup.robot.config} has it, as far as options tell it\n`);
+  const joint = design.mode === 'joint', told = joint ? design.joint_damping : design.damping;
+  const stiffness = joint ? design.joint_stiffness : design.stiffness;
+  const loop = design.period > 0 ? [`--period ${design.period}`, design.delay && `--delay ${design.delay}`, design.cutoff && `--cutoff ${design.cutoff}`,
+    design.difference_velocity && '--difference-velocity', design.integral_time && `--integral-time ${design.integral_time}`].filter(Boolean) : [];
+  const at = `--q ${q.join(',')}`;
+  const plain = isDiagonal(stiffness) && (told.factor !== undefined || (Array.isArray(told) && isDiagonal(told)));
+  if (!plain || (design.null_damping || {}).ratio || design.inertia_blocks) {
+    return notes(['The damping is a matrix: save "matrices for dashpot analyze" as system.json.']) + 'dashpot analyze system.json\n';
+  }
+  const values = diagonal(asRows(stiffness)).join(',');
+  const gains = [joint ? `--joint-stiffness ${values}` : `--stiffness ${values}`,
+    told.factor !== undefined ? `--damping-factor ${told.factor}` : `--${joint ? 'joint-' : ''}damping ${diagonal(asRows(told)).join(',')}`];
+  if (!joint) {
+    if (design.null_stiffness.some(Boolean)) gains.push(`--null-stiffness ${design.null_stiffness.join(',')}`);
+    if (nullDamping(design).some(Boolean)) gains.push(`--null-damping ${nullDamping(design).join(',')}`);
+    if (design.null_projector === 'kinematic') gains.push('--null-projector kinematic');
+    if (design.rotation === 'half-quaternion') gains.push('--rotation half-quaternion');
+    if (design.frame === 'tool') gains.push('--frame tool');
+  }
+  return ['dashpot audit', ...words, at, ...gains, ...loop].join(' \\\n    ') + '\n';
+}
+
+/// Diagonals of the task's gains for controllers that have no more.
+function task(of, name) {
+  const {stiffness, damping} = acting(of);
+  if (of.design.mode === 'joint' || !stiffness || !damping) {
+    return {text: `# ${name} has Cartesian gains: there are none in this design, or the posture is singular.\n`};
+  }
+  return {k: diagonal(stiffness).map(round), d: diagonal(damping).map(round), note: lossNote(damping) || lossNote(stiffness)};
+}
+
+function crisp(of) {
+  const {text, k, d, note} = task(of, 'crisp');
+  if (text) return text;
+  const keys = (letter, values) => values.map((x, i) => `      task.${letter}_${i < 3 ? 'pos' : 'rot'}_${kAxes[i % 3]}: ${x.toString().includes('.') ? x : `${x}.0`}\n`).join('');
+  const own = of.design.null_stiffness[0] || 0;
+  return notes([note, d.some((x) => x <= 0) && 'A damping that is not positive becomes 2 sqrt(k) there.',
+    !of.design.null_stiffness.every((x) => x === own) && 'The null space has one stiffness there: that of the first joint is given.']) +
+    `cartesian_impedance_controller:\n    ros__parameters:\n${keys('k', k)}${keys('d', d)}      nullspace.stiffness: ${Number.isInteger(own) ? `${own}.0` : own}\n` +
+    `      nullspace.projector_type: ${of.design.null_projector === 'kinematic' ? 'kinematic' : 'dynamic'}\n`;
+}
+
+function cartesianImpedance(of) {
+  const {text, k, d, note} = task(of, 'Cartesian-Impedance-Controller');
+  if (text) return text;
+  const factors = d.map((x, i) => round(k[i] > 0 ? x / (2 * Math.sqrt(k[i])) : 0));
+  const wrench = (v) => `\n  force: {x: ${v[0]}, y: ${v[1]}, z: ${v[2]}}\n  torque: {x: ${v[3]}, y: ${v[4]}, z: ${v[5]}}\n`;
+  const own = of.design.null_stiffness[0] || 0, ownDamping = nullDamping(of.design)[0] || 0;
+  return notes([note, factors.some((f) => f > 1) && 'It takes damping factors from 0 to 1: those above are cut off there.',
+    'A message cartesian_impedance_controller/ControllerConfig for set_config.']) +
+    `cartesian_stiffness:${wrench(k)}cartesian_damping_factors:${wrench(factors)}nullspace_stiffness: ${own}\n` +
+    `nullspace_damping_factor: ${own > 0 ? round(ownDamping / (2 * Math.sqrt(own))) : 0}\nq_d_nullspace: [${of.q.join(', ')}]\n`;
+}
+
+function frankaRos(of) {
+  const {text, k, d} = task(of, 'franka_ros');
+  if (text) return text;
+  const stated = k.map((x, i) => (i < 3 ? x : 2 * x));  // it acts on half of the rotation vector
+  const mean = (from) => round((stated[from] + stated[from + 1] + stated[from + 2]) / 3);
+  const other = d.some((x, i) => Math.abs(x - 2 * Math.sqrt(mean(i < 3 ? 0 : 3))) > 1e-6 * x) || stated.some((x, i) => Math.abs(x - mean(i < 3 ? 0 : 3)) > 1e-6 * x);
+  return notes([other && 'It has one stiffness for translation and one for rotation, and damping is always 2 sqrt(stiffness): the modes differ from those on the page.']) +
+    `translational_stiffness: ${mean(0)}\nrotational_stiffness: ${mean(3)}\nnullspace_stiffness: ${of.design.null_stiffness[0] || 0}\n`;
+}
+
+function python(of) {
+  const {setup, q, design, answer} = of, {stiffness, damping} = acting(of), arm = design.arm || {};
+  const options = ['reflected_inertia', 'viscous_friction', 'gear_damping'].filter((key) => arm[key]).map((key) => `${key}=${JSON.stringify(arm[key])}`);
+  if (arm.gear_stiffness) options.push(`gear_stiffness=[${arm.gear_stiffness.map((k) => k || 'float("inf")').join(', ')}]`);
+  if (arm.position_sensor) options.push(`position_sensor="${arm.position_sensor}"`);
+  if (arm.payload && arm.payload.mass) options.push(`payload_mass=${arm.payload.mass}`, `payload_center=${JSON.stringify(arm.payload.center || [0, 0, 0])}`);
+  const from = [setup.robot.urdf, setup.robot.base, setup.robot.tip].map((word) => JSON.stringify(word)).concat(options).join(', ');
+  const joint = design.mode === 'joint', prefix = joint ? 'joint' : 'task', told = joint ? design.joint_damping : design.damping;
+  const K = joint ? asRows(design.joint_stiffness) : stiffness;
+  const gains = [`${prefix}_stiffness=${JSON.stringify(short(K))}`, told.ratio ? `${prefix}_damping_ratio=${told.ratio}` : `${prefix}_damping=${JSON.stringify(short(damping))}`];
+  if (!joint) {
+    gains.push(`null_stiffness=${JSON.stringify(design.null_stiffness)}`,
+      design.null_damping.ratio ? `null_damping_ratio=${design.null_damping.ratio}` : `null_damping=${JSON.stringify(nullDamping(design))}`, `frame="${design.frame || 'base'}"`);
+  }
+  return notes([design.null_projector === 'kinematic' && design.null_stiffness.some(Boolean) && 'Here the null space has the dynamically consistent projector.',
+    ...answer.refused.map(({key, reason}) => `refused: ${key}: ${reason}`)]) +
+    `import dashpot\n\nrobot = dashpot.Robot.from_urdf(${from})\nmodes = dashpot.closed_loop(robot, ${JSON.stringify(q)},\n    ${gains.join(',\n    ')}).modes\nprint(modes)\n`;
+}
+
+export const kFormats = [
+  {name: 'configuration of Dashpot', file: 'tuned.yaml', text: configuration},
+  {name: 'matrices for dashpot analyze', file: 'system.json', text: ({answer}) => JSON.stringify(answer.system, null, 1).replace(/\[\s+([^[\]]*?)\s+\]/g, (_, inner) => `[${inner.replace(/\s+/g, ' ')}]`) + '\n'},
+  {name: 'command', file: 'tuned.sh', text: command},
+  {name: 'crisp_controllers', file: 'crisp.yaml', text: crisp},
+  {name: 'Cartesian-Impedance-Controller', file: 'controller_config.yaml', text: cartesianImpedance},
+  {name: 'franka_ros', file: 'compliance.yaml', text: frankaRos},
+  {name: 'Python', file: 'tuned.py', text: python},
+];

@@ -1,0 +1,242 @@
+"""What the server of `dashpot tune` answers, beside the other programs: PROGRAM SOURCE_DIRECTORY."""
+import http.client
+import json
+import os
+import random
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+
+PROGRAM, SOURCE = sys.argv[1:3]
+PANDA = ['--urdf', os.path.join(SOURCE, 'sim/models/panda.urdf'), '--base', 'panda_link0', '--tip', 'panda_hand_tcp']
+
+
+def run(*words, text=None):
+    done = subprocess.run([PROGRAM, *words], input=text, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+class Server:
+    def __init__(self, *options):
+        self.process = subprocess.Popen([PROGRAM, 'tune', '--port', '0', *options], stdout=subprocess.PIPE, text=True,
+                                        cwd=SOURCE)
+        self.host = self.process.stdout.readline().split('/')[2]
+        self.setup = json.loads(self.ask('GET', '/setup')[1])
+
+    def ask(self, method, path, body=None, **headers):
+        connection = http.client.HTTPConnection(self.host, timeout=60)
+        connection.request(method, path, body, headers)
+        answer = connection.getresponse()
+        found = answer.status, answer.read()
+        connection.close()
+        return found
+
+    def post(self, path, document, **headers):
+        told = {'Content-Type': 'application/json', 'X-Dashpot-Token': self.setup['token']} | headers
+        status, body = self.ask('POST', path, document if isinstance(document, (str, bytes)) else json.dumps(document), **told)
+        try:
+            return status, json.loads(body)
+        except ValueError:
+            return status, body.decode()
+
+    def design(self, design, q=None, place='tip/0'):
+        status, answer = self.post('/design', {'q': q or self.setup['q'], 'place': place, 'design': design})
+        assert status == 200, answer
+        return answer
+
+    def stop(self):
+        self.process.send_signal(signal.SIGINT)
+        assert self.process.wait() == 0
+        self.process.stdout.close()
+
+
+class TuneServer(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.server = Server(*PANDA, '--q', '0,-0.785,0,-2.356,0,1.571,0.785')
+        cls.q = cls.server.setup['q']
+        cls.base = cls.server.setup['designs'][0] | {'damping': {'factor': 2}, 'stiffness': [200, 200, 200, 20, 20, 20]}
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.server.stop()
+
+    def same_modes(self, found, expected, digits=9):
+        self.assertEqual(len(found), len(expected))
+        for a, b in zip(found, expected):
+            for x, y in zip(sum(a['eigenvalues'], []), sum(b['eigenvalues'], [])):
+                self.assertAlmostEqual(x, y, delta=10 ** -digits * abs(complex(*b['eigenvalues'][0])) + 1e-12)
+
+    def audit(self, *options):
+        friction = ','.join(map(str, self.server.setup['model']['viscous_friction']))
+        return run('audit', *PANDA, '--q', ','.join(map(str, self.q)), '--viscous-friction', friction, '--json', *options)
+
+    def test_numbers_are_those_of_an_audit(self):
+        seed = random.randrange(1 << 30)
+        print('seed', seed)
+        rng = random.Random(seed)
+        for _ in range(3):
+            K = [round(rng.uniform(50, 900), 2) for _ in range(6)]
+            D = [round(rng.uniform(1, 60), 2) for _ in range(6)]
+            null = round(rng.uniform(0, 5), 2)
+            design = self.base | {'stiffness': K, 'damping': D, 'delay': 2, 'null_damping': [null] * 7}
+            found = self.server.design(design)
+            posture = self.audit('--stiffness', ','.join(map(str, K)), '--damping', ','.join(map(str, D)),
+                                 '--null-damping', str(null), '--period', '0.001', '--delay', '2')['posture']
+            self.same_modes(found['modes'], posture['modes'])
+            self.assertAlmostEqual(found['smallest_ratio'], posture['smallest_ratio'], places=9)
+            self.assertAlmostEqual(found['gain_margin'], posture['gain_margin'], delta=1e-5 * posture['gain_margin'])
+
+    def test_matrices_are_those_that_analyze_reads(self):
+        for damping in ({'factor': 2}, {'ratio': 0.7}, [30, 30, 30, 9, 9, 9]):
+            for frame in ('base', 'tool'):
+                found = self.server.design(self.base | {'damping': damping, 'frame': frame})
+                self.same_modes(found['modes'], run('analyze', '-', '--json', text=json.dumps(found['system']))['modes'], 7)
+
+    def test_motion_is_that_of_analyze(self):
+        found = self.server.design(self.base, place='joint/3')
+        times = found['release']['time'][::50]
+        start = [1 if i == 3 else 0 for i in range(7)]
+        system = found['system'] | {'initial_position': start, 'initial_velocity': [0] * 7, 'times': times}
+        told = run('analyze', '-', '--json', text=json.dumps(system))['response']
+        for value, position in zip(found['release']['value'][::50], told['position']):
+            self.assertAlmostEqual(value, position[3], places=7)
+        lowest = -min(found['release']['value'])
+        self.assertGreaterEqual(found['release']['overshoot'], lowest)
+        self.assertLess(found['release']['overshoot'], lowest + 1e-3)
+
+    def test_ratio_is_what_the_controller_makes_of_it(self):
+        friction = self.base | {'damping': {'ratio': 0.7}, 'gain_margin': 1, 'arm': {'viscous_friction': [0] * 7}}
+        for mode in self.server.design(friction)['modes']:
+            self.assertAlmostEqual(mode['damping_ratio'], 0.7, places=5)
+        hard = self.server.design(friction | {'gain_margin': 2, 'period': 0.01, 'delay': 3, 'stiffness': [3000] * 3 + [300] * 3})
+        self.assertLess(hard['smallest_ratio'], 0.65)  # lowered to what this loop bears
+
+    def test_sensitivities_tell_what_a_step_does(self):
+        D = [30, 30, 30, 9, 9, 9]
+        rows = [[D[i] if i == j else 0 for j in range(6)] for i in range(6)]
+        before = self.server.design(self.base | {'damping': rows})
+        step = 1e-3
+        for i, j in ((0, 0), (1, 4), (5, 5)):
+            changed = [list(row) for row in rows]
+            changed[i][j] += step
+            if i != j:
+                changed[j][i] += step
+            after = self.server.design(self.base | {'damping': changed})
+            for k, (a, b) in enumerate(zip(before['modes'], after['modes'])):
+                told = before['sensitivity']['damping'][k][i][j] * (1 if i == j else 2)
+                self.assertAlmostEqual((b['damping_ratio'] - a['damping_ratio']) / step, told, delta=1e-4 * max(1, abs(told)))
+
+    def test_arm_has_rotors_payload_gears(self):
+        parts = {'reflected_inertia': [0.1] * 7, 'payload': {'mass': 2, 'center': [0, 0, 0.1]}, 'gear_stiffness': [5000] * 7}
+        found = self.server.design(self.base | {'arm': parts})
+        posture = self.audit('--preset', 'cartesian_impedance_controller', '--reflected-inertia', '0.1', '--payload', '2,0,0,0.1',
+                             '--gear-stiffness', '5000', '--period', '0.001')['posture']
+        self.same_modes(found['modes'], posture['modes'], 7)
+        self.assertEqual(len(found['modes']), 13)
+
+    def test_presets_are_those_of_an_audit(self):
+        for preset in self.server.setup['presets']:
+            with self.subTest(preset['name']):
+                found = self.server.design(preset['design'])
+                posture = self.audit('--preset', preset['name'], '--period', '0.001')['posture']
+                self.same_modes(found['modes'], posture['modes'])
+
+    def test_says_what_the_controller_refuses(self):
+        def keys(design):
+            return [item['key'] for item in self.server.design(design)['refused']]
+        self.assertEqual(keys(self.base | {'gain_margin': 1}), [])
+        self.assertEqual(keys(self.base | {'damping': [-1, 1, 1, 1, 1, 1]}), ['task_damping'])
+        self.assertEqual(keys(self.base | {'damping': [400] * 3 + [300] * 3}), ['gain_margin'])
+        status, answer = self.server.post('/design', {'q': self.q, 'place': 'tip/0', 'design': self.base | {'stiffness': [-1] * 6}})
+        self.assertEqual((status, 'task_stiffness' in answer['error']), (400, True))
+
+    def test_workspace_is_that_of_an_audit(self):
+        found = {'smallest_ratio': [], 'gain_margin': []}
+        for first in (0, 30):
+            status, part = self.server.post('/workspace', {'design': self.base, 'seed': 5, 'first': first, 'count': 30})
+            self.assertEqual(status, 200)
+            for key in found:
+                found[key] += part[key]
+        told = self.audit('--stiffness', '200,200,200,20,20,20', '--damping-factor', '2', '--period', '0.001',
+                          '--samples', '60', '--seed', '5')['workspace']
+        for key, values in found.items():
+            self.assertAlmostEqual(min(values), told[key]['worst'], delta=1e-5 * abs(told[key]['worst']))
+        # A design by ratio has the ratio everywhere.
+        status, part = self.server.post('/workspace', {'design': self.base | {'damping': {'ratio': 0.7}, 'gain_margin': 1,
+            'arm': {'viscous_friction': [0] * 7}}, 'seed': 5, 'first': 0, 'count': 30})
+        self.assertEqual(status, 200)
+        self.assertAlmostEqual(min(part['smallest_ratio']), 0.7, places=3)
+        self.assertAlmostEqual(self.server.design(self.base, part['worst']['gain_margin']['q'])['smallest_ratio'] > 0, True)
+
+    def test_reads_a_configuration(self):
+        folder = tempfile.mkdtemp(prefix='dashpot-tune-')
+        self.addCleanup(shutil.rmtree, folder)
+        path = os.path.join(folder, 'a.yaml')
+        with open(path, 'w') as file:
+            file.write(f'robot: {{urdf: {PANDA[1]}, base: panda_link0, tip: panda_hand_tcp, reflected_inertia: 0.1}}\n'
+                       'control: {period: 2 ms, mode: cartesian}\n'
+                       'gains: {task: {stiffness: [300, 310, 320, 21, 22, 23], damping: [20, 21, 22, 3, 4, 5]},\n'
+                       '  null_space: {stiffness: 3, damping: 1}}\nanalysis: {sampled: {delay: 1}}\n')
+        server = Server(path, '--q', ','.join(map(str, self.q)))
+        self.addCleanup(server.stop)
+        first, second = server.setup['designs']
+        self.assertEqual(first['stiffness'], [300, 310, 320, 21, 22, 23])
+        self.assertEqual((first['period'], first['delay'], first['null_damping']), (0.002, 1, [1] * 7))
+        self.assertEqual(second['damping'], {'ratio': 0.7})
+        told = self.audit('--gains', path, '--reflected-inertia', '0.1', '--period', '0.002', '--delay', '1')['posture']
+        found = server.design(first)
+        self.same_modes(found['modes'], told['modes'])
+        self.assertAlmostEqual(found['gain_margin'], told['gain_margin'], delta=1e-5 * told['gain_margin'])
+
+    def test_begins_with_the_paper_and_the_panda(self):
+        server = Server()
+        self.addCleanup(server.stop)
+        first, second = server.setup['designs']
+        self.assertEqual(first['stiffness'], [3000] * 3 + [100] * 3)
+        self.assertEqual((first['damping'][2][4], first['damping'][0][0]), (10, 0.1))
+        self.assertLess(server.design(first)['smallest_ratio'], 0)
+        self.assertAlmostEqual(server.design(second)['smallest_ratio'], 0.7, places=3)
+
+    def test_refuses_hostile_requests(self):
+        post, token = self.server.post, self.server.setup['token']
+        good = {'q': self.q, 'place': 'tip/0', 'design': self.base}
+        self.assertEqual(post('/design', good)[0], 200)
+        self.assertEqual(post('/design', good, Host='evil.example')[0], 403)
+        self.assertEqual(post('/design', good, Origin='http://evil.example')[0], 403)
+        self.assertEqual(post('/design', good, Origin=f'http://{self.server.host}')[0], 200)
+        self.assertEqual(post('/design', good, **{'X-Dashpot-Token': ''})[0], 403)
+        self.assertEqual(post('/design', good, **{'X-Dashpot-Token': token[:-1] + 'g'})[0], 403)
+        self.assertEqual(post('/design', good, **{'Content-Type': 'text/plain'})[0], 415)
+        self.assertEqual(post('/nowhere', good)[0], 404)
+        self.assertEqual(post('/design', json.dumps(good) + ' ' * 65536)[0], 413)
+        self.assertEqual(self.server.ask('PUT', '/design', '{}')[0], 405)
+        for words in ('', '{', '[]', 'null', '7', '"a"', '{"design": 3}', '[' * 60000, '{"a":' * 9000, b'\xff\xfe'):
+            self.assertEqual(post('/design', words)[0], 400, words[:20])
+        for change in ({'q': self.q[:-1]}, {'q': ['a'] * 7}, {'q': [1e300] * 7}, {'q': None}, {'place': 'tip/6'}, {'place': 'joint/7'},
+                       {'place': 'tip/-1'}, {'place': 3}, {'design': {}} | {'q': 0}, {'design': self.base | {'evil': 1}},
+                       {'design': self.base | {'stiffness': [1] * 5}}, {'design': self.base | {'stiffness': [[1] * 6] * 5}},
+                       {'design': self.base | {'damping': {'ratio': 3}}}, {'design': self.base | {'damping': {'factor': 2, 'x': 1}}},
+                       {'design': self.base | {'delay': 21}}, {'design': self.base | {'period': -1}}, {'design': self.base | {'mode': 'x'}},
+                       {'design': self.base | {'arm': {'urdf': '/etc/passwd'}}}, {'design': self.base | {'arm': {'reflected_inertia': [-1] * 7}}},
+                       {'design': self.base | {'arm': {'payload': {'mass': 1e9}}}}, {'design': self.base | {'arm': 3}}):
+            status, answer = post('/design', good | change)
+            self.assertEqual(status, 400, change)
+            self.assertTrue(answer['error'])
+        for change in ({'count': 501}, {'count': -1}, {'count': 1.5}, {'first': '0'}, {'seed': 1 << 40}):
+            self.assertEqual(post('/workspace', {'design': self.base, 'seed': 1, 'first': 0, 'count': 1} | change)[0], 400, change)
+        # A body that is announced and does not come keeps nobody else waiting.
+        with socket.create_connection(self.server.host.split(':')) as slow:
+            slow.sendall((f'POST /design HTTP/1.1\r\nHost: {self.server.host}\r\nX-Dashpot-Token: {token}\r\n'
+                          'Content-Type: application/json\r\nContent-Length: 500\r\n\r\n{').encode())
+            self.assertEqual(post('/design', good)[0], 200)
+        self.assertEqual(post('/design', good)[0], 200)
+
+
+if __name__ == '__main__':
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)

@@ -1,0 +1,291 @@
+"""What a browser shows of `dashpot tune`: PROGRAM SOURCE_DIRECTORY. Exit status 77: skipped."""
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.dont_write_bytecode = True
+import browser
+import tune_walk
+
+PROGRAM, SOURCE = sys.argv[1:3]
+CURRENT = tune_walk.CURRENT
+
+
+def run(*words, text=None):
+    done = subprocess.run([PROGRAM, *words], input=text, capture_output=True, text=True, cwd=SOURCE)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def shown(x, digits=4):
+    """As the page writes a number."""
+    if abs(x) >= 10 ** digits:
+        return str(round(x))
+    text = f'{x:#.{digits}g}'
+    return text.rstrip('.').replace('-', '−')
+
+
+class Tune(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.process = subprocess.Popen([PROGRAM, 'tune', '--port', '0'], stdout=subprocess.PIPE, text=True, cwd=SOURCE)
+        cls.url = cls.process.stdout.readline().split()[0]
+        cls.browser = browser.Browser()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.__exit__()
+        cls.process.send_signal(signal.SIGINT)
+        assert cls.process.wait() == 0
+        cls.process.stdout.close()
+
+    def setUp(self):
+        self.refused = False  # whether the program refuses a request on purpose
+        self.browser.open('about:blank')
+        self.value('0')  # what the last page has asked is over
+        self.browser.events.clear()
+        self.browser.open(self.url + '?theme=light')
+        self.browser.until(CURRENT)
+
+    def tearDown(self):
+        self.assertEqual([error for error in self.browser.errors() if not self.refused or 'status of 400' not in error], [])
+
+    def value(self, expression):
+        return self.browser.value(expression)
+
+    def settle(self):
+        self.browser.until(CURRENT)
+
+    def edit(self, change):
+        self.value(f'dashpot.store.edit((state) => {{ {change} }}, true)')
+        self.settle()
+
+    def set(self, selector, value, event='change'):
+        self.value(f'''(() => {{ const e = document.querySelector({json.dumps(selector)}); e.value = {json.dumps(value)};
+            e.dispatchEvent(new Event('{event}', {{bubbles: true}})); }})()''')
+        self.settle()
+
+    def field(self, key, value, index=0):
+        """Writes a number into a field of the gains."""
+        self.value(f'''(() => {{ const e = document.querySelectorAll('#gains [data-key={key}] input:not([type=range])')[{index}];
+            e.value = '{value}'; e.dispatchEvent(new Event('change', {{bubbles: true}})); }})()''')
+        self.settle()
+
+    def key(self, key, code=0, modifiers=0):
+        for kind in ('keyDown', 'keyUp'):
+            self.browser.call('Input.dispatchKeyEvent', type=kind, key=key, modifiers=modifiers, windowsVirtualKeyCode=code)
+
+    def text(self, format):
+        number = self.value(f"[...document.getElementById('format').options].findIndex((o) => o.text == {json.dumps(format)})")
+        self.set('#format', str(number))
+        return self.value("document.getElementById('text').value")
+
+    def poles(self):
+        return [[p['re'], p['im']] for p in self.value('dashpot.poles')]
+
+    def analyze(self):
+        return json.loads(run('analyze', '-', '--json', text=self.text('matrices for dashpot analyze')))['modes']
+
+    def test_slider_moves_poles_to_where_analyze_puts_them(self):
+        before = self.poles()
+        self.value("""(() => { const e = document.querySelectorAll('#posture input[type=range]')[3];
+            e.focus(); e.value = Number(e.value) + 40; e.dispatchEvent(new Event('input', {bubbles: true}));
+            e.dispatchEvent(new Event('change', {bubbles: true})); })()""")
+        self.settle()
+        self.browser.until(f'JSON.stringify(dashpot.poles.map((p) => [p.re, p.im])) != {json.dumps(json.dumps(before, separators=(",", ":")))}')
+        expected = [z for mode in self.analyze() for z in mode['eigenvalues']]
+        found = self.poles()
+        self.assertEqual(len(found), len(expected))
+        for a, b in zip(found, expected):
+            self.assertAlmostEqual(abs(complex(*a) - complex(*b)), 0, delta=1e-8 * abs(complex(*b)))
+        self.assertGreater(max(abs(complex(*a) - complex(*b)) for a, b in zip(found, before)), 0.1)
+
+    def test_table_shows_the_numbers_of_analyze(self):
+        self.field('damping', '20', 3 * 6 + 3)  # of the full matrix, entry rx rx
+        told = self.analyze()
+        rows = self.value("[...document.querySelectorAll('#rows tr')].map((r) => [...r.children].map((c) => c.textContent.trim()))")
+        for row, mode in zip(rows, told):
+            self.assertEqual(row[1:3], [shown(mode['natural_frequency']), shown(mode['damping_ratio'])])
+        self.assertEqual(len(rows), len(told))
+
+    def test_exports_read_back_give_the_same_modes(self):
+        self.edit("state.edited = 'a'; state.a = {...state.a, stiffness: [400, 410, 420, 31, 32, 33], damping: [30, 31, 32, 4, 5, 6], null_damping: Array(7).fill(1.5),"
+                  "gain_margin: 1, delay: 1}")
+        modes = self.value('dashpot.answers.a.modes')
+
+        def same(other):
+            self.assertEqual(len(other), len(modes))
+            for a, b in zip(modes, other):
+                self.assertAlmostEqual(a['natural_frequency'], b['natural_frequency'], delta=1e-7 * a['natural_frequency'])
+                self.assertAlmostEqual(a['damping_ratio'], b['damping_ratio'], delta=1e-7)
+        same(self.analyze())
+        command = self.text('command').replace('\\\n', ' ').split()
+        self.assertEqual(command[:2], ['dashpot', 'audit'])
+        same(json.loads(run(*command[1:], '--json'))['posture']['modes'])
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, 'tuned.yaml')
+            with open(path, 'w') as file:
+                file.write(self.text('configuration of Dashpot'))
+            other = subprocess.Popen([PROGRAM, 'tune', path, '--port', '0', '--q', '0.1,-0.7,0.2,-1.9,0.1,1.4,0.6'],
+                                     stdout=subprocess.PIPE, text=True)
+            try:
+                page = other.stdout.readline().split()[0]
+                self.browser.open(page)
+                self.browser.until(CURRENT + " && location.port == '" + page.rstrip('/').split(':')[-1] + "'")
+                same(self.value('dashpot.answers.a.modes'))
+                self.assertEqual(self.value('dashpot.store.state.a.delay'), 1)
+            finally:
+                other.send_signal(signal.SIGINT)
+                other.wait()
+                other.stdout.close()
+
+    def test_exports_for_other_controllers(self):
+        self.edit("state.edited = 'a'; state.a = {...state.a, stiffness: [400, 400, 400, 36, 36, 36], damping: {factor: 2}, null_stiffness: Array(7).fill(4), null_damping: {factor: 1}}")
+        crisp = self.text('crisp_controllers')
+        self.assertIn('task.k_pos_x: 400.0', crisp)
+        self.assertIn('task.d_rot_z: 12.0', crisp)
+        self.assertIn('nullspace.stiffness: 4.0', crisp)
+        other = self.text('Cartesian-Impedance-Controller')
+        self.assertIn('cartesian_damping_factors:\n  force: {x: 1, y: 1, z: 1}', other)
+        self.assertIn('nullspace_damping_factor: 0.5', other)
+        self.assertIn('rotational_stiffness: 72', self.text('franka_ros'))  # acts on half of the rotation vector
+        self.assertIn('task_stiffness=[400,400,400,36,36,36]', self.text('Python'))
+        self.assertNotIn('differ', crisp)
+        self.edit("state.a.damping = {ratio: 0.7}")
+        self.assertIn('differ', self.text('crisp_controllers'))  # it has no full matrix
+
+    def test_every_kind_of_design_has_texts(self):
+        kinds = ["mode: 'joint'", "mode: 'joint', joint_damping: {ratio: 0.6}", "damping: {ratio: 0.7}, null_stiffness: Array(7).fill(5), null_damping: {ratio: 0.6}",
+                 "damping: {factor: 2}, frame: 'tool', rotation: 'half-quaternion', arm: {payload: {mass: 2, center: [0, 0, 0.1]}}",
+                 "damping: {factor: 2}, arm: {reflected_inertia: Array(7).fill(0.2), gear_stiffness: [8000, null, 8000, 8000, 8000, 8000, 8000]}",
+                 "damping: {ratio: 0.7}, gain_margin: 1, arm: {reflected_inertia: Array(7).fill(0.2), gear_stiffness: Array(7).fill(8000), position_sensor: 'link'}",
+                 "inertia_blocks: true, stiffness: [150, 150, 150, 250, 250, 250], damping: {factor: 2}",
+                 "damping: {factor: 2}, period: 0.004, delay: 2, cutoff: 100, difference_velocity: true, integral_time: 2"]
+        formats = self.value("[...document.getElementById('format').options].map((o) => o.text)")
+        for kind in kinds:
+            with self.subTest(kind):
+                self.edit(f"state.edited = 'a'; state.a = {{...dashpot.setup.designs[0], {kind}}}")
+                for name in formats:
+                    self.assertTrue(self.text(name))
+                modes = self.value('dashpot.answers.a.modes')
+                if 'link' not in kind:  # whose stiffness is not symmetric
+                    for a, b in zip(modes, self.analyze()):
+                        self.assertAlmostEqual(a['natural_frequency'], b['natural_frequency'], delta=1e-6 * a['natural_frequency'])
+
+    def test_address_restores_the_state(self):
+        self.edit("state.edited = 'b'; state.place = 'tip/4'; state.b.damping = {ratio: 0.55}; state.q[3] = -1.5")
+        modes, state = self.value('dashpot.answers.b.modes'), self.value('dashpot.store.state')
+        address = self.value('location.href')
+        self.assertIn('#', address)
+        self.browser.open('about:blank')
+        self.browser.open(address)
+        self.settle()
+        self.assertEqual(self.value('dashpot.store.state'), state)
+        self.assertEqual(self.value('dashpot.answers.b.modes'), modes)
+        self.browser.open('about:blank')
+        self.browser.open(self.url + '#%7B%22q%22%3A%5B1%2C2%5D%2C%22a%22%3A7%2C%22edited%22%3A%22x%22')  # nonsense is left aside
+        self.settle()
+        self.assertEqual(self.value('dashpot.store.state.q.length'), 7)
+
+    def test_undo_redo_and_keys(self):
+        first = self.value('JSON.stringify(dashpot.store.state)')
+        self.edit("state.a.stiffness[0] = 500")
+        self.key('b', 66)
+        self.assertEqual(self.value('dashpot.store.state.edited'), 'b')
+        self.key('z', 90, 2)
+        self.key('z', 90, 2)
+        self.assertEqual(self.value('JSON.stringify(dashpot.store.state)'), first)
+        self.key('y', 89, 2)
+        self.assertEqual(self.value('dashpot.store.state.a.stiffness[0]'), 500)
+        self.settle()
+        # Whatever can be clicked can be reached by keys, and has a name.
+        self.assertEqual(self.value("""[...document.querySelectorAll('button, input, select, textarea, canvas')].filter((e) => e.tabIndex < 0 ||
+            !(e.getAttribute('aria-label') || e.textContent.trim() || e.closest('label')?.textContent.trim())).map((e) => e.outerHTML)"""), [])
+        self.value("document.querySelectorAll('#posture input[type=range]')[0].focus()")
+        before = self.value('dashpot.store.state.q[0]')
+        self.key('ArrowRight', 39)
+        self.browser.until(f'dashpot.store.state.q[0] > {before}')
+
+    def test_marks_what_the_controller_refuses(self):
+        self.browser.until("document.getElementById('refused').textContent.includes('not positive semidefinite')")
+        self.assertTrue(self.value("document.querySelector('#gains [data-key=damping].matrix').classList.contains('bad')"))
+        self.edit("state.a.damping = {ratio: 0.7}")
+        self.browser.until("document.getElementById('refused').children.length == 0")
+        self.refused = True
+        self.value("dashpot.store.edit((state) => { state.a.stiffness[0] = -5; }, true)")
+        self.browser.until("document.getElementById('refused').textContent.includes('task_stiffness')")
+        self.assertFalse(self.value("document.querySelector('#gains [data-key=stiffness] input').disabled"))
+        self.edit("state.a.stiffness[0] = 300")
+
+    def test_postures_of_a_list(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, 'postures.yaml')
+            with open(path, 'w') as file:
+                file.write('[[0, -0.785, 0, -2.356, 0, 1.571, 0.785], [0, 0.6, 0, -1, 0, 1.6, 0]]')
+            other = subprocess.Popen([PROGRAM, 'tune', '--port', '0', '--postures', path], stdout=subprocess.PIPE, text=True, cwd=SOURCE)
+            try:
+                page = other.stdout.readline().split()[0]
+                self.browser.open(page)
+                self.browser.until(CURRENT + " && location.port == '" + page.rstrip('/').split(':')[-1] + "'")
+                self.set('#posture .field input[type=text]', '2')
+                self.assertEqual(self.value('dashpot.store.state.q'), [0, 0.6, 0, -1, 0, 1.6, 0])
+            finally:
+                other.send_signal(signal.SIGINT)
+                other.wait()
+                other.stdout.close()
+
+    def test_tip_is_dragged(self):
+        tip = 'dashpot.tipOnScreen()'
+        x, y = self.value(tip)
+        self.value("document.getElementById('arm').scrollIntoView()")
+        left, top = self.value("(() => { const b = document.getElementById('arm').getBoundingClientRect(); return [b.left, b.top]; })()")
+        for kind, dx in (('mousePressed', 0), ('mouseMoved', -15), ('mouseMoved', -30), ('mouseReleased', -30)):
+            self.browser.call('Input.dispatchMouseEvent', type=kind, x=left + x + dx, y=top + y, button='left', buttons=1, clickCount=1)
+        self.settle()
+        self.assertEqual(self.value('dashpot.store.past.length'), 1)
+        self.assertGreater(self.value('Math.max(...dashpot.store.state.q.map((x, i) => Math.abs(x - dashpot.setup.q[i])))'), 0.02)
+
+    def test_workspace_shows_the_worst_postures(self):
+        self.edit("state.a = {...state.a, stiffness: [200, 200, 200, 20, 20, 20], damping: {factor: 2}}")
+        self.browser.until('dashpot.workspace.found.a.postures >= 2000', 120)
+        worst = self.value('dashpot.workspace.found.a.worst.smallest_ratio.value')
+        self.browser.until("document.querySelector('#worst button').textContent.startsWith('A: worst ratio')")
+        self.value("document.querySelector('#worst button').click()")
+        self.settle()
+        self.assertAlmostEqual(self.value('dashpot.answers.a.smallest_ratio'), worst, places=5)
+
+    def test_nothing_waits_behind_a_slider_that_moves(self):
+        self.value("""(() => { const seen = window.seen = []; const real = fetch;
+            window.fetch = (path, options) => { if (path == '/design') seen.push(JSON.parse(options.body).q[1]); return real(path, options); };
+            for (let i = 0; i < 200; ++i) dashpot.store.edit((state) => { state.q[1] = -0.7 + 0.001 * i; }, false); })()""")
+        self.settle()
+        self.browser.until('Math.abs(seen.at(-1) - (-0.7 + 0.199)) < 1e-9')
+        self.assertLess(self.value('seen.length'), 20)
+
+    def test_discussion_of_the_paper_by_hand(self):
+        # From C_C0 = I to ratios above 0.6 for all six modes, by the arrows alone; a step takes a second by hand.
+        tune_walk.begin(self.browser)
+        self.assertLess(min(tune_walk.ratios(self.browser)), 0.1)
+        clicks = 0
+        while min(tune_walk.ratios(self.browser)) <= 0.6:
+            clicks += 1
+            self.assertLess(clicks, 60)
+            tune_walk.click(self.browser)
+        found = [mode['damping_ratio'] for mode in self.analyze()]
+        self.assertEqual((len(found), min(found) > 0.6), (6, True))
+
+    def test_fits_a_phone(self):
+        self.browser.size(390, 844, 2, True)
+        self.assertLessEqual(self.value('document.documentElement.scrollWidth'), 390)
+        self.browser.size(1400, 1000)
+
+
+if __name__ == '__main__':
+    if browser.find() is None:
+        print('skipped: no Chromium on this machine (apt-get install chromium)')
+        sys.exit(77)
+    unittest.main(argv=sys.argv[:1] + sys.argv[3:], verbosity=2)

@@ -1,0 +1,75 @@
+"""Walks through the task of the paper's Discussion on the page of `dashpot tune`: PROGRAM SOURCE_DIRECTORY FOLDER.
+
+Prints the ratios on the way, and writes the pictures tune.png, tune-1.png and so on of the documents to the folder.
+"""
+import base64
+import os
+import signal
+import subprocess
+import sys
+
+sys.dont_write_bytecode = True
+import browser
+
+CURRENT = 'window.dashpot && dashpot.ready && dashpot.current && !dashpot.problem.a && !dashpot.problem.b'
+
+
+def ratios(page):
+    return page.value('dashpot.answers.a.modes.map((mode) => mode.damping_ratio)')
+
+
+def begin(page):
+    """Gives design A the damping C_C0 = I."""
+    page.value('dashpot.store.edit((state) => { state.edited = "a"; state.a.damping = [1, 1, 1, 1, 1, 1]; }, true)')
+    page.until(CURRENT)
+
+
+def click(page):
+    """Clicks the arrow on the diagonal of the damping that raises the smallest ratio most."""
+    page.value("""(() => { const rows = [...document.querySelectorAll('#arrows_damping tr')].slice(1);
+        const all = rows.map((row, i) => row.querySelectorAll('button')[i]).filter((b) => b.className == 'up');
+        const size = (b) => Number(b.textContent.slice(1).replace('−', '-'));
+        all.reduce((a, b) => size(b) > size(a) ? b : a).click(); })()""")
+    page.until(CURRENT)
+
+
+def picture(page, path, first, last, scale):
+    """Writes what is between the upper left end of one element and the lower right end of another."""
+    box = page.value(f'''(() => {{ const [a, b] = ['{first}', '{last}'].map((id) => document.getElementById(id).getBoundingClientRect());
+        return {{x: a.left + scrollX, y: a.top + scrollY, width: b.right - a.left, height: b.bottom - a.top}}; }})()''')
+    data = page.call('Page.captureScreenshot', format='png', captureBeyondViewport=True, clip=box | {'scale': scale})['data']
+    with open(path, 'wb') as file:
+        file.write(base64.b64decode(data))
+
+
+def main(program, source, folder):
+    process = subprocess.Popen([program, 'tune', '--port', '0'], stdout=subprocess.PIPE, text=True, cwd=source)
+    try:
+        with browser.Browser(1400, 1000) as page:
+            page.open(process.stdout.readline().split()[0] + '?theme=light')
+            page.until(CURRENT)
+            begin(page)
+            clicks = 0
+            while True:
+                found = ratios(page)
+                if clicks in (0, 20) or min(found) > 0.6:
+                    print(f'{clicks:2d} clicks:', ' '.join(f'{ratio:.3f}' for ratio in found))
+                    name = f'tune-{1 if clicks == 0 else 2 if min(found) <= 0.6 else 3}.png'
+                    picture(page, os.path.join(folder, name), 'poles', 'poles', 0.6)
+                if min(found) > 0.6:
+                    break
+                click(page)
+                clicks += 1
+            page.until('dashpot.workspace.found.b.postures >= 2000', 120)
+            page.value('new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))')
+            picture(page, os.path.join(folder, 'tune.png'), 'arm_panel', 'table_panel', 0.55)
+            for row in page.value('dashpot.answers.a.system.task_damping'):
+                print('  ', ' '.join(f'{x:7.2f}' for x in row))
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait()
+        process.stdout.close()
+
+
+if __name__ == '__main__':
+    main(*sys.argv[1:4])
