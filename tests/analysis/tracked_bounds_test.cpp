@@ -1,10 +1,10 @@
 // Bounds that are proved for tracked bases, beside what rounding does; what becomes of the radii;
 // columns that are balanced and rotated.
 #include <dashpot/analysis/base/arithmetic.hpp>
+#include <dashpot/analysis/tracker/block_eigenbasis.hpp>
 #include <dashpot/analysis/tracker/residual_errors.hpp>
 #include <dashpot/analysis/tracker/tracked_enclosure.hpp>
 #include <dashpot/analysis/tracker/tracked_modes.hpp>
-#include <dashpot/analysis/tracker/two_sided_basis.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
