@@ -46,6 +46,34 @@ void resize(const SymmetricPencil& pencil, BlockEigenbasis& basis) {
   basis.Z.width = basis.Y.width = packed_width(basis.modes, basis.zeros);
 }
 
+/// Columns of a spectrum's basis by what they are.
+struct VelocityChoice {
+  std::array<int, kMaxDof> still_position{}, still_velocity{};
+  int positions = 0, velocities = 0;
+};
+
+/// Zero modes: positions, and what the modes left over. False if a block has several modes.
+bool choose(const Spectrum<kMaxDof>& spectrum, VelocityChoice& choice) {
+  std::array<bool, kMaxWidth> taken{};
+  for (const Mode<kMaxDof>& mode : spectrum.modes) {
+    for (const int column : mode.columns) taken[at(column)] = true;
+  }
+  for (const Block& block : spectrum.basis.blocks) {
+    if (block.size > 2) return false;
+    if (taken[at(block.first)]) continue;
+    if (block.zero_mode) {
+      if (choice.positions == kMaxDof) return false;
+      choice.still_position[at(choice.positions++)] = block.first;
+      if (block.size == 1) continue;
+    } else if (block.size != 1) {
+      return false;
+    }
+    if (choice.velocities == kMaxDof) return false;
+    choice.still_velocity[at(choice.velocities++)] = block.first + block.size - 1;
+  }
+  return choice.positions == choice.velocities;
+}
+
 /// Collects the columns of a basis of one side by what they are.
 class BasisFromSpectrum {
  public:
@@ -72,25 +100,21 @@ class BasisFromSpectrum {
   std::array<Plane, kMaxDof> planes_;
   std::array<Column, kMaxDof> zeros_;  ///< of unit length
   int plane_count_ = 0, zero_count_ = 0;
-  std::array<bool, kMaxWidth> taken_{};  ///< columns of the spectrum's basis
 };
 
 bool BasisFromSpectrum::take_modes() {
   for (const Mode<kMaxDof>& mode : spectrum_.modes) {
     const auto [i, j] = mode.columns;
     if (!make_plane(pencil_, column(i), column(j), planes_[at(plane_count_++)])) return false;
-    taken_[at(i)] = taken_[at(j)] = true;
   }
   return true;
 }
 
-/// Velocities of zero modes are what the modes left over.
 bool BasisFromSpectrum::take_zero_modes() {
-  for (const Block& block : spectrum_.basis.blocks) {
-    const int last = block.first + block.size - 1;
-    if (block.size > 2 || zero_count_ == kMaxDof) return false;
-    if (taken_[at(last)] || (block.zero_mode && block.size == 1)) continue;
-    const Column x = column(last);
+  VelocityChoice choice;
+  if (!choose(spectrum_, choice)) return false;
+  for (int k = 0; k < choice.velocities; ++k) {
+    const Column x = column(choice.still_velocity[at(k)]);
     const double size = -products(pencil_, x, x).indefinite();
     if (!(size > 0)) return false;
     zeros_[at(zero_count_++)] = x / std::sqrt(size);
@@ -127,34 +151,6 @@ void BasisFromSpectrum::write(BlockEigenbasis& basis) const {
     set_column(basis.second(i), planes_[at(i)].second, basis);
   }
   for (int k = 0; k < basis.zeros; ++k) set_column(2 * basis.modes + k, zeros_[at(k)], basis);
-}
-
-/// Columns of a spectrum's basis by what they are.
-struct VelocityChoice {
-  std::array<int, kMaxDof> still_position{}, still_velocity{};
-  int positions = 0, velocities = 0;
-};
-
-/// Zero modes: positions, and what the modes left over. False if a block has several modes.
-bool choose(const Spectrum<kMaxDof>& spectrum, VelocityChoice& choice) {
-  std::array<bool, kMaxWidth> taken{};
-  for (const Mode<kMaxDof>& mode : spectrum.modes) {
-    for (const int column : mode.columns) taken[at(column)] = true;
-  }
-  for (const Block& block : spectrum.basis.blocks) {
-    if (block.size > 2) return false;
-    if (taken[at(block.first)]) continue;
-    if (block.zero_mode) {
-      if (choice.positions == kMaxDof) return false;
-      choice.still_position[at(choice.positions++)] = block.first;
-      if (block.size == 1) continue;
-    } else if (block.size != 1) {
-      return false;
-    }
-    if (choice.velocities == kMaxDof) return false;
-    choice.still_velocity[at(choice.velocities++)] = block.first + block.size - 1;
-  }
-  return choice.positions == choice.velocities;
 }
 
 /// Columns k and l of the spectrum's basis, in block i.
