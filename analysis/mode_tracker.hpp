@@ -2,6 +2,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/analysis/tracked_spectrum.hpp>
 #include <dashpot/analysis/tracker/basis_extrapolation.hpp>
+#include <dashpot/analysis/tracker/mode_labels.hpp>
 #include <dashpot/analysis/tracker/tracked_enclosure.hpp>
 
 #include <cstdint>
@@ -67,9 +68,8 @@ class ModeTracker {
   /// Forgets everything but the counters: the next update is like the first.
   void forget() noexcept {
     forget_solution(State::kEmpty);
-    soft_ = {};
+    labels_ = {};
     enclosure_.roundoff_bound = 0;
-    epoch_ = 0;
   }
 
   /// True if the next update starts from the last one and need not be solved directly.
@@ -85,47 +85,42 @@ class ModeTracker {
     kCurrent,    ///< and it is the solution for last_, as E_ and enclosure_ are
   };
 
+  /// What becomes of a basis before its next step.
+  enum class Verdict { kImprove, kPublish, kGiveUp };
+
   bool follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
   bool refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
+  Verdict judge(const SymmetricPencil& pencil, double size, bool stalled,
+                TrackedSpectrum& out) noexcept;
   bool read(TrackedSpectrum& out) noexcept;
   void publish(const SymmetricPencil& pencil, SpectrumOrigin origin, TrackedSpectrum& out) noexcept;
   void solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil,
                       TrackedSpectrum& out, Work& work) noexcept;
-  bool restart(const SymmetricPencil& pencil, bool two_sided, TrackedSpectrum& out,
-               Work& work) noexcept;
+  bool restart(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;
   void publish_direct(const SymmetricPencil& pencil, TrackedSpectrum& out) noexcept;
-  std::array<int, kMaxDof> match(const SymmetricPencil& pencil,
-                                 const BlockEigenbasis& before) noexcept;
+  std::array<int, kMaxDof> match(const BlockEigenbasis& before) noexcept;
   void forget_solution(State state) noexcept {
     state_ = state;
     kept_known_ = false;
-  }
-  void forget_past() noexcept {
-    extrapolation_.forget();
-    left_extrapolation_.forget();
   }
 
   TrackerOptions options_;
   TrackerCounters counters_;
 
   State state_ = State::kEmpty;
-  std::uint64_t epoch_ = 0;
+  ModeLabels labels_;
   System<kMaxDof> last_;
   bool symmetric_ = false;  ///< the system is, or the last one was
   BlockEigenbasis basis_;
   PackedMatrix E_;  ///< the last step of basis_, which its blocks do not know of
   TrackedResidual residual_;
   TrackedEnclosure enclosure_;
-  std::array<bool, kMaxDof> soft_{};
   BasisExtrapolation extrapolation_;
   PackedMatrix momenta_;
   TrackedSpectrum kept_;
   bool kept_known_ = false;  ///< kept_ is the spectrum of last_
   SpectrumSolver<kMaxDof> solver_;
   Spectrum<kMaxDof> spectrum_;
-  // For two-sided bases:
-  BasisExtrapolation left_extrapolation_;
-  double still_floor_ = 0;  ///< frequency below which zero modes were told from others, rad/s
 };
 
 }  // namespace dashpot::analysis

@@ -47,6 +47,7 @@ class SpectrumSolver {
   Status solve(const System<N>& system, Spectrum<N>& out, Work& work) noexcept;
 
  private:
+  Status find_modes(const System<N>& system, Spectrum<N>& out, Work& work) noexcept;
   bool good(const Spectrum<N>& spectrum) const noexcept;
   /// Evaluates the basis, bounds its errors and reads the modes; improves the basis while that
   /// helps.

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/analysis/base/arithmetic.hpp>
+#include <dashpot/analysis/linalg/small_dense.hpp>
 #include <dashpot/analysis/matrix_types.hpp>
 #include <dashpot/analysis/work.hpp>
 
@@ -32,18 +33,10 @@ void reduce_to_hessenberg(Matrix& A) noexcept {
     y.setZero();
     for (Eigen::Index j = k + 1; j < n; ++j) {
       double* const column = &A(0, j);
-      double dot = 0;
-      for (Eigen::Index i = k + 1; i < n; ++i) dot += x[i] * column[i];
-      dot *= tau;
-      for (Eigen::Index i = k + 1; i < n; ++i) column[i] -= dot * x[i];
-      const double factor = tau * x[j];
-      for (Eigen::Index i = 0; i < n; ++i) y[i] += factor * column[i];
+      subtract_multiple(column, x, tau * dot(x, column, k + 1, n), k + 1, n);
+      subtract_multiple(y.data(), column, -tau * x[j], 0, n);
     }
-    for (Eigen::Index j = k + 1; j < n; ++j) {
-      double* const column = &A(0, j);
-      const double factor = x[j];
-      for (Eigen::Index i = 0; i < n; ++i) column[i] -= factor * y[i];
-    }
+    for (Eigen::Index j = k + 1; j < n; ++j) subtract_multiple(&A(0, j), y.data(), x[j], 0, n);
     x[k + 1] = alpha;
     for (Eigen::Index i = k + 2; i < n; ++i) x[i] = 0;
   }

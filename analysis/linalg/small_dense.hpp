@@ -36,11 +36,26 @@ inline Complex reciprocal(const Complex& a) noexcept {
   return {re * norm, -im * norm};
 }
 
-/// y[i] -= x[i] factor for begin <= i < end.
-template <typename Scalar>
-void subtract_multiple(Scalar* y, const Scalar* x, Scalar factor, Eigen::Index begin,
-                       Eigen::Index end) noexcept {
+/// y[i] -= x[i] factor for begin <= i < end, where x and y are apart.
+inline void subtract_multiple(Complex* __restrict y, const Complex* __restrict x, Complex factor,
+                              Eigen::Index begin, Eigen::Index end) noexcept {
   for (Eigen::Index i = begin; i < end; ++i) y[i] -= product(x[i], factor);
+}
+inline void subtract_multiple(double* y, const double* x, double factor, Eigen::Index begin,
+                              Eigen::Index end) noexcept {
+  Eigen::Index i = begin;
+  for (; i + 4 <= end; i += 4) store(y + i, load(y + i) - load(x + i) * factor);
+  for (; i < end; ++i) y[i] -= x[i] * factor;
+}
+
+/// Returns the sum of x[i] y[i] for begin <= i < end.
+inline double dot(const double* x, const double* y, Eigen::Index begin, Eigen::Index end) noexcept {
+  Vec4d fours{};
+  Eigen::Index i = begin;
+  for (; i + 4 <= end; i += 4) fours += load(x + i) * load(y + i);
+  double rest = sum(fours);
+  for (; i < end; ++i) rest += x[i] * y[i];
+  return rest;
 }
 
 /// True if no entry is infinite or not a number. (Eigen's allFinite looks at one after the other.)

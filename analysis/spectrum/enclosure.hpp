@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace dashpot::analysis {
 
@@ -24,7 +23,7 @@ struct BlockEnclosure {
 
   /// Makes each of `count` blocks a group of which nothing is proved.
   void reset(int count) {
-    radius.setConstant(count, std::numeric_limits<double>::infinity());
+    radius.setConstant(count, kInfinity);
     group.resize(count);
     for (int i = 0; i < count; ++i) group[i] = i;
   }
@@ -56,40 +55,42 @@ double graded_radius(const PerturbationBounds<Matrix, Vector>& bounds, const Gro
   constexpr int kTries = 4;
   constexpr double kLeast = 1e-290;  // of |F_ji|: all x_j are positive
   const auto count = static_cast<int>(groups.size());
-  StateVector<N> to = StateVector<N>::Zero(count), from = to, apart = to, x = to;
+  const auto inside = [&](int k) { return groups[k] == i; };
+  // For each block j outside: |F_ji|, |F_ij|, and the factor of x_j on the left.
+  StateVector<N> F_ji = StateVector<N>::Zero(count), F_ij = F_ji, gap = F_ji, x = F_ji;
   for (int j = 0; j < count; ++j) {
-    if (groups[j] == i) continue;
-    apart[j] = std::numeric_limits<double>::infinity();
+    if (inside(j)) continue;
+    double to2 = 0, from2 = 0, separation = kInfinity;
     for (int k = 0; k < count; ++k) {
-      if (groups[k] != i) continue;
-      to[j] += bounds.coupling2(j, k);
-      from[j] += bounds.coupling2(k, j);
-      const double separation = bounds.separation(k, j);
-      apart[j] = separation < apart[j] ? separation : separation >= apart[j] ? apart[j] : 0;
+      if (!inside(k)) continue;
+      to2 += bounds.coupling2(j, k);
+      from2 += bounds.coupling2(k, j);
+      const double apart = bounds.separation(k, j);
+      separation = apart < separation ? apart : apart >= separation ? separation : 0;  // 0 for NaN
     }
-    to[j] = std::sqrt(to[j]) + kLeast;
-    from[j] = std::sqrt(from[j]);
-    apart[j] -= (kSlack - 1) * apart[j] + kSlack * (inner + bounds.own.data()[j]);
-    if (!(apart[j] > 0)) return std::numeric_limits<double>::infinity();
-    x[j] = 2 * to[j] / apart[j];
+    F_ji[j] = std::sqrt(to2) + kLeast;
+    F_ij[j] = std::sqrt(from2);
+    gap[j] = (2 - kSlack) * separation - kSlack * (inner + bounds.own.data()[j]);
+    if (!(gap[j] > 0)) return kInfinity;
+    x[j] = 2 * F_ji[j] / gap[j];
   }
   for (int tries = 0; tries < kTries; ++tries) {
-    const double back = from.dot(x);
+    const double back = F_ij.dot(x);
     bool fits = true;
     StateVector<N> wider = x;
     for (int j = 0; j < count; ++j) {
-      if (groups[j] == i) continue;
-      double need = to[j] + 2 * x[j] * back;
+      if (inside(j)) continue;
+      double need = F_ji[j] + 2 * x[j] * back;
       for (int k = 0; k < count; ++k) {
-        if (k != j && groups[k] != i) need += std::sqrt(bounds.coupling2(j, k)) * x[k];
+        if (k != j && !inside(k)) need += std::sqrt(bounds.coupling2(j, k)) * x[k];
       }
-      fits &= kSlack * need <= apart[j] * x[j];
-      wider[j] = std::max(x[j], 2 * need / apart[j]);
+      fits &= kSlack * need <= gap[j] * x[j];
+      wider[j] = std::max(x[j], 2 * need / gap[j]);
     }
     if (fits) return kSlack * (inner + back);
     x = wider;
   }
-  return std::numeric_limits<double>::infinity();
+  return kInfinity;
 }
 
 /// Finds the radius of each block, in an enclosure that was reset.
@@ -119,7 +120,7 @@ void prove(const PerturbationBounds<Matrix, Vector>& bounds,
   for (int i = 0; i < count; ++i) {
     for (bool proved = enclosure.group[i] != i; !proved;) {
       double own = 0, inner2 = 0, right2 = 0, left2 = 0;
-      double separation = std::numeric_limits<double>::infinity();
+      double separation = kInfinity;
       int nearest = -1;
       for (int j = 0; j < count; ++j) {
         if (enclosure.group[j] != i) continue;
@@ -140,7 +141,7 @@ void prove(const PerturbationBounds<Matrix, Vector>& bounds,
       const double product = std::sqrt(right2) * std::sqrt(left2);
       const double delta = separation - inner - everything;
       const bool simple = nearest < 0 || (delta > 0 && 4 * product < delta * delta);
-      double radius = std::numeric_limits<double>::infinity();
+      double radius = kInfinity;
       if (simple) {
         radius = kSlack * (nearest < 0 ? inner : inner + 2 * product / delta);
       } else if (everything > 0.5 * separation) {  // F as a whole is too much for it

@@ -88,19 +88,26 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work&
   out.modes.resize(0);
   out.extended = false;
   out.status = check(system);
-  if (out.status != Status::kOk) return out.status;
-  if (!work.take(form_work(system.dof()))) return out.status = Status::kUnfinished;
+  if (out.status == Status::kOk) out.status = find_modes(system, out, work);
+  if (out.status != Status::kOk && out.status != Status::kUncertified) out.modes.resize(0);
+  return out.status;
+}
+
+template <int N>
+Status SpectrumSolver<N>::find_modes(const System<N>& system, Spectrum<N>& out,
+                                     Work& work) noexcept {
+  if (!work.take(form_work(system.dof()))) return Status::kUnfinished;
   const Eigen::LLT<Square<N>> cholesky(system.mass);
   if (system.dof() > 0 && cholesky.info() != Eigen::Success) {
-    return out.status = Status::kMassNotPositiveDefinite;
+    return Status::kMassNotPositiveDefinite;
   }
   const Square<N> L = system.dof() > 0 ? Square<N>(cholesky.matrixL()) : Square<N>(0, 0);
   out.zero_modes = find_zero_modes<N>(system, L);
   if (!std::isfinite(out.zero_modes.floor) || !is_finite(out.zero_modes.coordinates)) {
-    return out.status = Status::kOverflow;
+    return Status::kOverflow;
   }
   const EnergyForm<N> form = to_energy_form<N>(system, out.zero_modes);
-  if (!computable(form)) return out.status = Status::kOverflow;
+  if (!computable(form)) return Status::kOverflow;
   damped_ = !system.damping.isZero(0);
   out.symmetric = form.symmetric;
   out.proportional = form.proportional;
@@ -110,30 +117,21 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work&
   Quality best_quality{kInfinity, kInfinity};
   bool best_extended = false;
   for (const auto& [cluster, coinciding] : kAttempts) {
-    out.status =
+    const Status started =
         build_starting_basis<N>(form, out.zero_modes, cluster, coinciding, out.basis, work);
-    if (out.status != Status::kOk) {
-      out.modes.resize(0);
-      return out.status;
-    }
+    if (started != Status::kOk) return started;
     out.extended = options_.residual == SpectrumOptions::Residual::kExtended;
     refine(system, out, work);
     if (!work.over() && !good(out) && options_.residual == SpectrumOptions::Residual::kAutomatic) {
       out.extended = true;
       refine(system, out, work);
     }
-    if (work.over()) {
-      out.modes.resize(0);
-      return out.status = Status::kUnfinished;
-    }
+    if (work.over()) return Status::kUnfinished;
     const bool last = cluster == kAttempts.back().first;
     Quality quality = worst_quality(out);
     if (!is_finite(out.basis.Lambda) || !is_finite(out.basis.U)) {
       quality = {kInfinity, kInfinity};
-      if (last && best.blocks.size() == 0) {
-        out.modes.resize(0);
-        return out.status = Status::kOverflow;
-      }
+      if (last && best.blocks.size() == 0) return Status::kOverflow;
     } else if (std::isfinite(quality.bound) && quality.backward_error <= kAcceptableBackwardError) {
       break;
     }
@@ -143,15 +141,13 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work&
       out.basis = best;
       out.extended = best_extended;
       if (!read_basis(system, options_.soft_frequency, residual_, enclosure_, out, work)) {
-        out.modes.resize(0);
-        return out.status = Status::kUnfinished;
+        return Status::kUnfinished;
       }
     }
   }
   for (const Mode<N>& mode : out.modes) {
     if (!std::isfinite(modulus(mode.eigenvalues[0]) + modulus(mode.eigenvalues[1]))) {
-      out.modes.resize(0);
-      return out.status = Status::kNotConverged;
+      return Status::kNotConverged;
     }
   }
   // All 2n eigenvalues: r zeros, the rates that are numbers, and two a mode. Real eigenvalues of a
@@ -159,7 +155,7 @@ Status SpectrumSolver<N>::solve(const System<N>& system, Spectrum<N>& out, Work&
   const Eigen::Index unrated = (out.zero_mode_rates.array() != out.zero_mode_rates.array()).count();
   const bool complete = 2 * out.modes.size() == 2 * (system.dof() - out.zero_modes.count) + unrated;
   const bool proved = complete && std::isfinite(worst_quality(out).bound);
-  return out.status = proved ? Status::kOk : Status::kUncertified;
+  return proved ? Status::kOk : Status::kUncertified;
 }
 
 template <int N>

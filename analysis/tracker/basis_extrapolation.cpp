@@ -10,7 +10,7 @@ constexpr double kForeseen = 0.25;
 
 }  // namespace
 
-void BasisExtrapolation::apply(int rows, PackedMatrix& Z) noexcept {
+void BasisExtrapolation::Side::apply(int rows, PackedMatrix& Z) noexcept {
   if (!begun_) {
     for (PackedMatrix* known : {&step_, &change_, &curve_}) set_zero(Z.width, rows, *known);
     copy(Z, rows, last_);
@@ -45,6 +45,17 @@ void BasisExtrapolation::apply(int rows, PackedMatrix& Z) noexcept {
                                change * load(&change_.items[at(k)]) +
                                curve * load(&curve_.items[at(k)]));
   }
+}
+
+void BasisExtrapolation::apply(BlockEigenbasis& basis) noexcept {
+  right_.apply(basis.columns(), basis.Z);
+  if (basis.two_sided) left_.apply(basis.columns(), basis.Y);
+}
+
+void BasisExtrapolation::go_back(BlockEigenbasis& basis) noexcept {
+  copy(right_.last_, basis.columns(), basis.Z);
+  if (basis.two_sided) copy(left_.last_, basis.columns(), basis.Y);
+  forget();
 }
 
 }  // namespace dashpot::analysis

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/analysis/linalg/packed_matrix.hpp>
+#include <dashpot/analysis/tracker/block_eigenbasis.hpp>
 
 namespace dashpot::analysis {
 
@@ -7,16 +7,22 @@ namespace dashpot::analysis {
 /// the polynomials of degree 0 to 3 it uses the one that would have predicted the last basis best.
 class BasisExtrapolation {
  public:
-  /// Learns Z, which has this many rows, and replaces it by a prediction of the next one.
-  void apply(int rows, PackedMatrix& Z) noexcept;
-  /// Returns what was learnt last.
-  const PackedMatrix& last() const noexcept { return last_; }
+  /// Learns the basis, each side by itself, and replaces it by a prediction of the next one.
+  void apply(BlockEigenbasis& basis) noexcept;
+  /// Replaces the basis by what was learnt last, and forgets the past.
+  void go_back(BlockEigenbasis& basis) noexcept;
   /// Forgets the past, because the next basis will not continue it smoothly.
-  void forget() noexcept { begun_ = false; }
+  void forget() noexcept { right_.begun_ = left_.begun_ = false; }
 
  private:
-  bool begun_ = false;
-  PackedMatrix last_, step_, change_, curve_;  ///< the last basis, and its differences
+  struct Side {
+    void apply(int rows, PackedMatrix& Z) noexcept;
+
+    bool begun_ = false;
+    PackedMatrix last_, step_, change_, curve_;  ///< the last basis, and its differences
+  };
+
+  Side right_, left_;
 };
 
 }  // namespace dashpot::analysis

@@ -68,7 +68,7 @@ void take_diagonal(const BlockEigenbasis& basis, PackedMatrix& G,
 }
 
 /// R = Z' S Z (Sigma is not yet subtracted) and G = Z' B Z, with S Z = [Z_s or K Z_s; -M V] and
-/// B Z = [W V; W' Z_s + C V]. In a two-sided basis (two_sided_basis.hpp) Y is in the place of Z',
+/// B Z = [W V; W' Z_s + C V]. In a two-sided basis Y is in the place of Z',
 /// and without a factor S Z = [Z_q; -M V] and B Z = [V; K Z_q + C V].
 void multiply(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
               TrackedResidual& residual) {
@@ -95,23 +95,6 @@ void multiply(const SymmetricPencil& pencil, const BlockEigenbasis& basis,
       basis.two_sided ? Strided{basis.Y.row(0), width, 1} : Strided{basis.Z.row(0), 1, width};
   product(left, basis.columns(), states, residual.MV.row(0), nullptr, 1, residual.R.row(0));
   product(left, basis.columns(), states, residual.image.row(0), nullptr, 1, residual.G.row(0));
-}
-
-/// v' M v of the columns of block i, and between the two; elastic energies differ from
-/// these by Z' S Z = Sigma.
-struct Kinetic {
-  double first = 0, second = 0, mixed = 0;
-};
-
-Kinetic kinetic_energies(const BlockEigenbasis& basis, const TrackedResidual& residual, int i) {
-  const int m = basis.modes;
-  Kinetic sum;
-  for (int k = m; k < basis.columns(); ++k) {
-    sum.first -= basis.Z(k, i) * residual.MV(k, i);
-    sum.second -= basis.Z(k, m + i) * residual.MV(k, m + i);
-    sum.mixed -= basis.Z(k, i) * residual.MV(k, m + i);
-  }
-  return sum;
 }
 
 }  // namespace
@@ -145,29 +128,23 @@ int packed_width(int modes, int zeros) noexcept {
   return (std::max(2 * modes + zeros, lanes) + 3) / 4 * 4;
 }
 
-void take_step(const PackedMatrix& E, BlockEigenbasis& basis) noexcept {
-  const int width = basis.Z.width, columns = basis.columns();
-  double* const Z = basis.Z.row(0);
-  padded_multiply(width)({Z, width, 1}, columns, columns, E.row(0), Z, 1, Z, width);
-}
-
-bool rotate_hyperbolically(const TrackedResidual& residual, double tolerance,
-                           BlockEigenbasis& basis) noexcept {
-  bool any = false;
-  for (int i = 0; i < basis.modes; ++i) {
-    const Kinetic kinetic = kinetic_energies(basis, residual, i);
-    // In the energy metric: 2 first + 1, 2 second - 1, 2 mixed.
-    const double tangent = -2 * kinetic.mixed / (kinetic.first + kinetic.second);
-    if (!(std::abs(tangent) > tolerance) || !(std::abs(tangent) < 1)) continue;
-    any = true;
-    const double angle = 0.5 * std::atanh(tangent), c = std::cosh(angle), s = std::sinh(angle);
-    for (int row = 0; row < basis.columns(); ++row) {
-      const double x = basis.Z(row, i), y = basis.Z(row, basis.modes + i);
-      basis.Z(row, i) = c * x + s * y;
-      basis.Z(row, basis.modes + i) = s * x + c * y;
-    }
+void take_step(const PackedMatrix& E, TrackedResidual& residual, BlockEigenbasis& basis) noexcept {
+  const int m = basis.modes, size = basis.columns(), width = basis.Z.width;
+  const auto product = padded_multiply(width);
+  product({basis.Z.row(0), width, 1}, size, size, E.row(0), basis.Z.row(0), 1, basis.Z.row(0),
+          width);
+  if (!basis.two_sided) return;
+  PackedMatrix& step = residual.MV;
+  for (int i = 0; i < size; ++i) {
+    const double *const R = residual.R.row(i), *const e = E.row(i);
+    double* const out = step.row(i);
+    const double row_sign = i < m ? 1 : -1;
+    for (int j = 0; j < m; ++j) out[j] = -R[j] - row_sign * e[j];
+    for (int j = m; j < size; ++j) out[j] = R[j] + row_sign * e[j];
   }
-  return any;
+  product({step.row(0), width, 1}, size, size, basis.Y.row(0), basis.Y.row(0), 1,
+          residual.image.row(0), width);
+  copy(residual.image, size, basis.Y);
 }
 
 }  // namespace dashpot::analysis

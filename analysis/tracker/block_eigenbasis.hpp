@@ -15,7 +15,8 @@ namespace dashpot::analysis {
 /// states are (q, v), S = [K 0; 0 -M] and B = [0 K; K C], for a positive definite K.
 ///
 /// The matrices belong to the caller and are not copied. M, C and K are symmetric; where C or K is
-/// not, the basis is two-sided, and S and B are those of two_sided_basis.hpp.
+/// not, or K is singular and has no factor, the basis is two-sided. Without a factor S and B then
+/// are S = [I 0; 0 -M] and B = [0 I; K C].
 struct SymmetricPencil {
   int joints = 0;  ///< n
   int rank = 0;    ///< p
@@ -37,18 +38,28 @@ SymmetricPencil symmetric_pencil(const System<kMaxDof>& system) noexcept;
 /// in which the system is nearly block diagonal, with one real 2 x 2 block for each mode and one
 /// rate for each zero mode: S^-1 B Z = Z Lambda. A block has a complex pair or two real eigenvalues
 /// of opposite sign characteristic. It stays well conditioned where the two meet (critical
-/// damping). The left vectors are S Z, unless the basis is two-sided. S has as many negative
-/// squares as Sigma, so that with a factor a basis with a proved bound proves M positive definite.
+/// damping). The left vectors are S Z. S has as many negative squares as Sigma, so that with a
+/// factor a basis with a proved bound proves M positive definite.
+///
+/// Where the left vectors are no image of the right ones the basis has two sides, with the left
+/// vectors in the rows of Y:
+///
+///     Y S Z = Sigma nearly,     S^-1 B Z = Z Lambda,     Y B S^-1 = Sigma Lambda Sigma Y.
+///
+/// Sigma is no signature there: the sign of a left vector is free, and with these signs what
+/// follows from Y S Z and Y B Z is computed as for a symmetric system, where Y = Z'. The two
+/// eigenvalues of a block are any two. There are as many blocks as joints without a factor; zero
+/// modes are the last of them then, with an eigenvalue of zero to rounding.
 struct BlockEigenbasis {
   using Entries = std::array<double, 20>;  ///< of up to 16 modes, read in fours
   int modes = 0;                           ///< p
   int zeros = 0;                           ///< n - p
   PackedMatrix Z;  ///< n + p rows and columns: elastic coordinates, then velocities
-  /// The left basis is kept beside the right one, in the rows of Y: see two_sided_basis.hpp.
   bool two_sided = false;
   int still = 0;  ///< of `modes`: blocks that are zero modes all the same, the last ones; two-sided
                   ///< bases without a factor have them
-  PackedMatrix Y;  ///< of the size of Z, if two_sided
+  double still_floor = 0;  ///< frequency below which these were told from others, rad/s
+  PackedMatrix Y;          ///< of the size of Z, if two_sided
   /// Lambda of mode i is [l00 l01; l10 l11](i), 1/s.
   Entries l00{}, l01{}, l10{}, l11{};
   Entries rate{};  ///< of the zero modes, 1/s
@@ -104,15 +115,29 @@ struct CloseBlocks {
 CloseBlocks newton_step(const BlockEigenbasis& basis, const TrackedResidual& residual,
                         double roundoff_bound, PackedMatrix& E, double& size) noexcept;
 
-/// Computes Z <- Z (I + E).
-void take_step(const PackedMatrix& E, BlockEigenbasis& basis) noexcept;
+/// Computes Z <- Z (I + E). The other side becomes Y <- Sigma (I - Sigma R - E) Sigma Y: Y S Z =
+/// Sigma then holds to second order. That overwrites MV and image of the residual.
+void take_step(const PackedMatrix& E, TrackedResidual& residual, BlockEigenbasis& basis) noexcept;
 
-/// Rotates each block hyperbolically so that its two columns become orthogonal in the energy metric
-/// diag(I, M) as well, which keeps the basis as well conditioned as it can be. Blocks that are
-/// orthogonal to `tolerance` already are left alone. Returns true if any block was rotated. The
-/// residual belongs to this basis, at least nearly.
+/// Keeps the columns of each block well conditioned, before or after a step: rotates or balances
+/// blocks whose columns lean far towards each other, or differ much in length. The residual belongs
+/// to this basis, at least nearly.
+void recondition(const SymmetricPencil& pencil, const TrackedResidual& residual,
+                 BlockEigenbasis& basis) noexcept;
+
+/// Rotates each block of a basis of one side hyperbolically so that its two columns become
+/// orthogonal in the energy metric diag(I, M) as well, which keeps the basis as well conditioned as
+/// it can be. Blocks that are orthogonal to `tolerance` already are left alone. Returns true if any
+/// block was rotated.
 bool rotate_hyperbolically(const TrackedResidual& residual, double tolerance,
                            BlockEigenbasis& basis) noexcept;
+
+/// Makes the two columns of each block of a two-sided basis orthonormal in the energy
+/// diag(w^2 D, D), D the diagonal of M, w the natural frequency of the block, or diag(I, D) with a
+/// factor; and its rows of Y dual to them. Blocks whose columns have lengths within a factor of
+/// three of each other and do not lean towards each other are left alone, unless `all`. Returns
+/// true if any block was changed.
+bool balance(const SymmetricPencil& pencil, bool all, BlockEigenbasis& basis) noexcept;
 
 /// Returns the width of the rows of a basis: its columns, and room for entries that groups of four
 /// modes write beyond them.

@@ -42,25 +42,20 @@ bool pose(const TrackedResidual& residual, const CloseBlocks& close, const Block
           BlockPair& pair) {
   const int m = basis.modes;
   pair.two_sided = basis.two_sided;
+  Small Lambda = Small::Zero(4, 4);
   for (const int block : {close.first, close.second}) {
-    pair.split = pair.size;
+    const int first = pair.split = pair.size;
     pair.columns[at(pair.size++)] = basis.first(block);
-    if (block < m) pair.columns[at(pair.size++)] = basis.second(block);
-  }
-  Small Lambda = Small::Zero(pair.size, pair.size);
-  pair.N.resize(pair.size, pair.size);
-  pair.A.resize(pair.size, pair.size);
-  int first = 0;
-  for (const int block : {close.first, close.second}) {
     if (block < m) {
       const Block2<double> L = basis.block(block);
+      pair.columns[at(pair.size++)] = basis.second(block);
       Lambda.block(first, first, 2, 2) << L.a, L.b, L.c, L.d;
-      first += 2;
     } else {
       Lambda(first, first) = basis.rate[at(block - m)];
-      ++first;
     }
   }
+  pair.N.resize(pair.size, pair.size);
+  pair.A.resize(pair.size, pair.size);
   for (int i = 0; i < pair.size; ++i) {
     for (int j = 0; j < pair.size; ++j) {
       const int row = pair.columns[at(i)], column = pair.columns[at(j)];
@@ -70,7 +65,7 @@ bool pose(const TrackedResidual& residual, const CloseBlocks& close, const Block
   }
   Small N = pair.N;
   solve_in_place(N, pair.A, std::numeric_limits<double>::min());
-  pair.A += Lambda;
+  pair.A += Lambda.topLeftCorner(pair.size, pair.size);
   if (!pair.A.allFinite()) return false;
   Small H = pair.A;
   reduce_to_hessenberg(H);

@@ -4,7 +4,6 @@
 #include <dashpot/analysis/tracker/tracked_input.hpp>
 #include <dashpot/analysis/tracker/tracked_modes.hpp>
 #include <dashpot/analysis/tracker/tracked_start.hpp>
-#include <dashpot/analysis/tracker/two_sided_basis.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -25,8 +24,6 @@ constexpr double kStalledBound = 1e-6;
 /// Relative bound from which on the slow eigenvalue of a mode is buried by a fast one, and the
 /// ratio from which on the two are far apart.
 constexpr double kBuried = 1e-6, kFarApart = 1e-6;
-/// Blocks are balanced again when their columns lean this much towards each other.
-constexpr double kBalanced = 0.6;
 /// Units of Work of separating two blocks.
 constexpr std::int64_t kPartingWork = 60'000;
 
@@ -105,10 +102,7 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
   kept_known_ = false;
   const bool symmetric = is_symmetric(system.mass) && is_symmetric(system.damping) &&
                          (pencil.factored || is_symmetric(system.stiffness));
-  // A basis of one side is dearer to find than to follow: a symmetric system gets it back at once.
-  const bool fits = basis_.two_sided ? (!symmetric || symmetric_) && is_symmetric(system.mass) &&
-                                           is_positive_definite(pencil.M, pencil.joints)
-                                     : symmetric;
+  const bool fits = can_follow(basis_, system, pencil, symmetric, symmetric_);
   symmetric_ = symmetric;
   if (fits && exact && follows() && follow(pencil, out, work)) {
     last_.mass = system.mass;
@@ -134,20 +128,13 @@ Status ModeTracker::update(const System<kMaxDof>& system, TrackedSpectrum& out,
 /// Follows the modes from the last basis. Where that fails, the basis stays as it was.
 bool ModeTracker::follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept {
   state_ = State::kFollowing;
-  extrapolation_.apply(basis_.columns(), basis_.Z);
-  if (basis_.two_sided) left_extrapolation_.apply(basis_.columns(), basis_.Y);
-  if (basis_.two_sided) {
-    balance(pencil, false, basis_);
-  } else {
-    rotate_hyperbolically(residual_, kBalanced, basis_);
-  }
+  extrapolation_.apply(basis_);
+  recondition(pencil, residual_, basis_);
   if (refine(pencil, out, work)) {
     publish(pencil, SpectrumOrigin::kTracked, out);
     return true;
   }
-  copy(extrapolation_.last(), basis_.columns(), basis_.Z);
-  if (basis_.two_sided) copy(left_extrapolation_.last(), basis_.columns(), basis_.Y);
-  forget_past();
+  extrapolation_.go_back(basis_);
   return false;
 }
 
@@ -163,49 +150,52 @@ bool ModeTracker::refine(const SymmetricPencil& pencil, TrackedSpectrum& out, Wo
     if (!(size < 1)) return false;
     const bool stalled = size < kStalled && size > last_size / 2;
     last_size = size;
-    bool good = false;
+    Verdict verdict = Verdict::kImprove;
     if (!close && (size <= kLastStep || stalled) && work.take(publishing_work(pencil.joints))) {
-      enclose(pencil, basis_, residual_, enclosure_);
-      if (!read(out)) return false;
-      // Without a factor rounding errors are the greater part of a bound after such a step.
-      const bool last = basis_.two_sided && size <= kLastStep;
-      if (last && worst_bound(out) > kStalledBound) return false;
-      const bool converged =
-          last || size <= kConverged || (stalled && worst_bound(out) <= kStalledBound);
-      const bool buried =
-          std::any_of(out.modes.begin(), out.modes.begin() + out.mode_count,
-                      [this](const auto& m) { return is_buried(m, options_.soft_frequency); });
-      if (buried && converged) return false;
-      good = out.status == Status::kOk && !buried &&
-             (converged || worst_bound(out) <= options_.target_bound);
+      verdict = judge(pencil, size, stalled, out);
     }
-    take_step(E_, basis_);
-    if (basis_.two_sided) take_left_step(E_, residual_, basis_);
-    if (good) {
+    if (verdict == Verdict::kGiveUp) return false;
+    take_step(E_, residual_, basis_);
+    if (verdict == Verdict::kPublish) {
       state_ = State::kCurrent;
       return true;
     }
     if (!close) continue;
     if (!work.take(kPartingWork) || !separate_blocks(residual_, close, basis_)) return false;
-    forget_past();
+    extrapolation_.forget();
   }
   return false;
 }
 
+/// Bounds the errors of basis_ before a step of this size, and reads its numbers.
+ModeTracker::Verdict ModeTracker::judge(const SymmetricPencil& pencil, double size, bool stalled,
+                                        TrackedSpectrum& out) noexcept {
+  enclose(pencil, basis_, residual_, enclosure_);
+  if (!read(out)) return Verdict::kGiveUp;
+  const double worst = worst_bound(out);
+  // Without symmetry rounding errors are the greater part of a bound after the last step.
+  const bool last = size <= (basis_.two_sided ? kLastStep : kConverged);
+  if (basis_.two_sided && last && worst > kStalledBound) return Verdict::kGiveUp;
+  const bool converged = last || (stalled && worst <= kStalledBound);
+  const bool buried =
+      std::any_of(out.modes.begin(), out.modes.begin() + out.mode_count,
+                  [this](const auto& m) { return is_buried(m, options_.soft_frequency); });
+  if (buried) return converged ? Verdict::kGiveUp : Verdict::kImprove;
+  const bool good = out.status == Status::kOk && (converged || worst <= options_.target_bound);
+  return good ? Verdict::kPublish : Verdict::kImprove;
+}
+
 /// Reads the numbers of basis_; false if what is a zero mode is to be decided again.
 bool ModeTracker::read(TrackedSpectrum& out) noexcept {
-  read_numbers(basis_, enclosure_, options_.soft_frequency, soft_, out);
-  return !basis_.two_sided || part_zero_modes(basis_, still_floor_, out);
+  return read_numbers(basis_, enclosure_, options_.soft_frequency, labels_.soft, out);
 }
 
 /// Completes `out`, which has the numbers of basis_.
 void ModeTracker::publish(const SymmetricPencil& pencil, SpectrumOrigin origin,
                           TrackedSpectrum& out) noexcept {
-  out.epoch = epoch_;
+  out.epoch = labels_.epoch;
   out.origin = origin;
-  if (!options_.shapes) return;
-  read_shapes(pencil, basis_, E_, momenta_, out);
-  if (basis_.two_sided) read_slopes(pencil, symmetric_, out);
+  if (options_.shapes) read_shapes(pencil, symmetric_, basis_, E_, momenta_, out);
 }
 
 void ModeTracker::solve_directly(const System<kMaxDof>& system, const SymmetricPencil& pencil,
@@ -220,69 +210,45 @@ void ModeTracker::solve_directly(const System<kMaxDof>& system, const SymmetricP
   }
   out.status = solver_.solve(last_, spectrum_, work);
   if (!has_modes(out.status) || !work.take(restart_work(pencil.joints))) return;
-  // A symmetric K without a factor is the metric of a basis of one side, if it is definite.
-  const bool two_sided =
-      !symmetric_ ||
-      (!pencil.factored && !(spectrum_.zero_modes.stiffness_values.array() > 0).all());
-  if (has_errors(system) || pencil.joints == 0 || !restart(pencil, two_sided, out, work)) {
+  if (has_errors(system) || pencil.joints == 0 || !restart(pencil, out, work)) {
     publish_direct(pencil, out);
   }
 }
 
 /// Continues from the direct solution as if it had been followed; false if that is not possible.
-bool ModeTracker::restart(const SymmetricPencil& pencil, bool two_sided, TrackedSpectrum& out,
+bool ModeTracker::restart(const SymmetricPencil& pencil, TrackedSpectrum& out,
                           Work& work) noexcept {
   for (const auto& mode : spectrum_.modes) {
     if (is_buried(mode, options_.soft_frequency)) return false;
   }
   const BlockEigenbasis before = basis_;
-  if (two_sided ? !start_two_sided(pencil, spectrum_, basis_)
-                : !start_basis(pencil, spectrum_, basis_)) {
+  if (!start_basis(pencil, spectrum_, symmetric_, residual_, basis_)) {
     basis_ = before;
     return false;
   }
-  still_floor_ = spectrum_.zero_modes.floor;
-  evaluate(pencil, basis_, residual_);
-  if (!two_sided) rotate_hyperbolically(residual_, 0, basis_);
   enclose(pencil, basis_, residual_, enclosure_);  // for its roundoff_bound
-  match(pencil, before);
-  forget_past();
+  match(before);
+  extrapolation_.forget();
   if (!refine(pencil, out, work)) return false;
   publish(pencil, SpectrumOrigin::kDirect, out);
   return true;
 }
 
-/// Gives the modes of basis_ the indices of those of `before` that they resemble, or new ones.
-/// Returns the index that each mode gets.
-std::array<int, kMaxDof> ModeTracker::match(const SymmetricPencil& pencil,
-                                            const BlockEigenbasis& before) noexcept {
-  std::array<int, kMaxDof> index{};
-  if (state_ == State::kMatching && before.vibrations() == basis_.vibrations()) {
-    SymmetricPencil metric = pencil;
-    Square<kMaxDof> positions;
-    if (!pencil.factored && (basis_.two_sided || !symmetric_)) {  // K is none then
-      const double rate2 = last_.stiffness.cwiseAbs().maxCoeff() / last_.mass.cwiseAbs().maxCoeff();
-      positions = rate2 * last_.mass;
-      metric.W = positions.data();
-    }
-    index = match_modes(metric, before, basis_);
-  } else {
-    ++epoch_;
-    soft_ = {};
-    for (int i = 0; i < kMaxDof; ++i) index[at(i)] = i;
-  }
+/// Gives the modes of basis_ their indices; returns the index that each mode gets.
+std::array<int, kMaxDof> ModeTracker::match(const BlockEigenbasis& before) noexcept {
+  const bool any_before = state_ == State::kMatching;
   state_ = State::kMatching;
-  return index;
+  return labels_.match(last_, symmetric_, any_before, before, basis_);
 }
 
 /// Publishes the direct solution as it is.
 void ModeTracker::publish_direct(const SymmetricPencil& pencil, TrackedSpectrum& out) noexcept {
   const BlockEigenbasis before = basis_;
   set_planes(pencil, spectrum_, basis_);
-  const std::array<int, kMaxDof> index = match(pencil, before);
+  const std::array<int, kMaxDof> index = match(before);
   out.status = spectrum_.status;  // not that of an attempt to follow
   out.origin = SpectrumOrigin::kDirect;
-  out.epoch = epoch_;
+  out.epoch = labels_.epoch;
   out.mode_count = spectrum_.modes.size();
   for (int i = 0; i < out.mode_count; ++i) {
     const Mode<kMaxDof>& mode = spectrum_.modes[i];

@@ -1,8 +1,11 @@
 #pragma once
 // What a system is to the tracker, before it is followed.
 
+#include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/tracker/block_eigenbasis.hpp>
 
+#include <array>
+#include <cmath>
 #include <cstring>
 
 namespace dashpot::analysis {
@@ -17,6 +20,34 @@ inline bool is_symmetric(const Square<kMaxDof>& matrix) {
     differs |= !(0 * a[j + j * n] == 0);
   }
   return !differs;
+}
+
+/// Whether the symmetric matrix M (n x n) has a Cholesky factor.
+inline bool is_positive_definite(const double* M, int n) {
+  std::array<double, static_cast<std::size_t>(kMaxDof) * kMaxDof> L;  // by rows
+  for (int i = 0; i < n; ++i) {
+    double* const row = &L[at(i * kMaxDof)];
+    double diagonal = M[i + i * n];
+    for (int j = 0; j < i; ++j) {
+      const double* const other = &L[at(j * kMaxDof)];
+      double sum = M[i + j * n];
+      for (int k = 0; k < j; ++k) sum -= row[k] * other[k];
+      row[j] = sum * other[j];  // the inverses of the diagonal are kept
+      diagonal -= row[j] * row[j];
+    }
+    if (!(diagonal > 0)) return false;
+    row[i] = 1 / std::sqrt(diagonal);
+  }
+  return true;
+}
+
+/// Whether a basis can follow the system, which is symmetric or not, from one that was. A basis of
+/// one side is dearer to find than to follow: a symmetric system gets it back at once.
+inline bool can_follow(const BlockEigenbasis& basis, const System<kMaxDof>& system,
+                       const SymmetricPencil& pencil, bool symmetric, bool was_symmetric) {
+  if (!basis.two_sided) return symmetric;
+  return (!symmetric || was_symmetric) && is_symmetric(system.mass) &&
+         is_positive_definite(pencil.M, pencil.joints);
 }
 
 /// Whether two systems have the same states.

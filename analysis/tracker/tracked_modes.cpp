@@ -110,6 +110,26 @@ void write_shapes(const BlockEigenbasis& basis, const PackedMatrix& momenta, int
   }
 }
 
+/// Makes zero modes of the still blocks; false if these are to be told from others again.
+bool part_zero_modes(const BlockEigenbasis& basis, TrackedSpectrum& out) {
+  const double floor2 = basis.still_floor * basis.still_floor;
+  for (int i = 0; basis.zeros == 0 && i < basis.modes; ++i) {
+    const double rate2 = std::abs(basis.block(i).determinant());
+    if (i < basis.vibrations() ? !(rate2 > floor2) : !(rate2 <= kWellAbove * floor2)) return false;
+  }
+  if (basis.still == 0) return true;
+  out.mode_count = basis.vibrations();
+  out.zero_mode_count = basis.still;
+  for (int k = 0; k < basis.still; ++k) {
+    out.zero_mode_rates[at(k)] = basis.block(out.mode_count + k).trace();  // and zero
+  }
+  const bool proved =
+      std::all_of(out.modes.begin(), out.modes.begin() + out.mode_count,
+                  [](const ModeNumbers& mode) { return std::isfinite(mode.error_bound); });
+  out.status = proved ? Status::kOk : Status::kUncertified;
+  return true;
+}
+
 }  // namespace
 
 void sort_by_frequency(TrackedSpectrum& out) noexcept {
@@ -125,7 +145,7 @@ void sort_by_frequency(TrackedSpectrum& out) noexcept {
   }
 }
 
-void read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosure,
+bool read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosure,
                   double soft_frequency, std::array<bool, kMaxDof>& soft,
                   TrackedSpectrum& out) noexcept {
   Roots roots;
@@ -150,32 +170,13 @@ void read_numbers(const BlockEigenbasis& basis, const TrackedEnclosure& enclosur
   }
   out.zero_mode_count = basis.zeros;
   for (int k = 0; k < basis.zeros; ++k) out.zero_mode_rates[at(k)] = basis.rate[at(k)];
-  sort_by_frequency(out);
-}
-
-bool part_zero_modes(const BlockEigenbasis& basis, double floor, TrackedSpectrum& out) noexcept {
-  const double floor2 = floor * floor;
-  for (int i = 0; basis.zeros == 0 && i < basis.modes; ++i) {
-    const double rate2 = std::abs(basis.block(i).determinant());
-    if (i < basis.vibrations() ? !(rate2 > floor2) : !(rate2 <= kWellAbove * floor2)) return false;
-  }
-  if (basis.still == 0) return true;
-  out.mode_count = basis.vibrations();
-  out.zero_mode_count = basis.still;
-  for (int k = 0; k < basis.still; ++k) {
-    out.zero_mode_rates[at(k)] = basis.block(out.mode_count + k).trace();  // and zero
-  }
-  const bool proved =
-      std::all_of(out.modes.begin(), out.modes.begin() + out.mode_count,
-                  [](const ModeNumbers& mode) { return std::isfinite(mode.error_bound); });
-  out.status = proved ? Status::kOk : Status::kUncertified;
+  if (basis.two_sided && !part_zero_modes(basis, out)) return false;
   sort_by_frequency(out);
   return true;
 }
 
 void read_slopes(const SymmetricPencil& pencil, bool symmetric, TrackedSpectrum& out) noexcept {
-  using Coefficients = Eigen::Map<const Eigen::MatrixXd>;
-  const Coefficients M(pencil.M, pencil.joints, pencil.joints),
+  const Eigen::Map<const Eigen::MatrixXd> M(pencil.M, pencil.joints, pencil.joints),
       C(pencil.C, pencil.joints, pencil.joints);
   for (int i = 0; i < out.mode_count; ++i) {
     TrackedShapes& shapes = out.shapes[at(i)];
@@ -188,8 +189,8 @@ void read_slopes(const SymmetricPencil& pencil, bool symmetric, TrackedSpectrum&
   }
 }
 
-void read_shapes(const SymmetricPencil& pencil, const BlockEigenbasis& basis, const PackedMatrix& E,
-                 PackedMatrix& momenta, TrackedSpectrum& out) noexcept {
+void read_shapes(const SymmetricPencil& pencil, bool symmetric, const BlockEigenbasis& basis,
+                 const PackedMatrix& E, PackedMatrix& momenta, TrackedSpectrum& out) noexcept {
   momenta.width = basis.Z.width;
   padded_multiply(momenta.width)({pencil.M, 1, pencil.joints}, pencil.joints, pencil.joints,
                                  basis.Z.row(pencil.rank), nullptr, 1, momenta.row(0),
@@ -215,6 +216,7 @@ void read_shapes(const SymmetricPencil& pencil, const BlockEigenbasis& basis, co
       shapes.slope[1] = std::conj(shapes.slope[0]);
     }
   }
+  if (basis.two_sided) read_slopes(pencil, symmetric, out);
 }
 
 }  // namespace dashpot::analysis

@@ -1,8 +1,11 @@
 #include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/linalg/double_double.hpp>
+#include <dashpot/analysis/linalg/small_dense.hpp>
+#include <dashpot/analysis/tracker/state_column.hpp>
 #include <dashpot/analysis/tracker/tracked_start.hpp>
 
 #include <cmath>
+#include <limits>
 
 namespace dashpot::analysis {
 namespace {
@@ -10,51 +13,6 @@ namespace {
 /// Squared lengths in the metric below this, relative to those in the energy metric, belong to
 /// vectors of no sign type: a pair at critical damping that is not in one block.
 constexpr double kNeutral = 1e-6;
-
-/// p + n: elastic coordinates, then velocities.
-using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMaxWidth, 1>;
-using Coefficients = Eigen::Map<const Eigen::MatrixXd>;
-
-/// The energy metric times x.
-Column energy_image(const SymmetricPencil& pencil, const Column& x) {
-  const int n = pencil.joints, p = pencil.rank;
-  Column image = x;
-  image.tail(n) = Coefficients(pencil.M, n, n).lazyProduct(x.tail(n));
-  if (!pencil.factored) image.head(p) = Coefficients(pencil.W, p, p).lazyProduct(x.head(p));
-  return image;
-}
-
-/// The two inner products of states: elastic coordinates' plus or minus velocities'.
-struct Products {
-  double elastic = 0, velocities = 0;
-  double indefinite() const { return elastic - velocities; }
-  double energy() const { return elastic + velocities; }
-};
-
-Products products(const SymmetricPencil& pencil, const Column& x, const Column& y) {
-  const Column image = energy_image(pencil, y);
-  return {x.head(pencil.rank).dot(image.head(pencil.rank)),
-          x.tail(pencil.joints).dot(image.tail(pencil.joints))};
-}
-
-/// The state with position u and velocity v.
-template <typename Position, typename Velocity>
-Column state(const SymmetricPencil& pencil, const Position& u, const Velocity& v) {
-  const int n = pencil.joints, p = pencil.rank;
-  Column x(pencil.states());
-  x.tail(n) = v;
-  if (pencil.factored) {
-    x.head(p) = Coefficients(pencil.W, p, n).lazyProduct(u);
-  } else {
-    x.head(p) = u;
-  }
-  return x;
-}
-
-/// A mode's two columns.
-struct Plane {
-  Column first, second;
-};
 
 /// Orthonormal columns, of sign types + and -, of the plane that x and y span; false unless it has
 /// both sign types.
@@ -75,7 +33,48 @@ bool make_plane(const SymmetricPencil& pencil, const Column& x, const Column& y,
   return true;
 }
 
-/// Collects the columns of a basis by what they are.
+/// Column j of the spectrum's basis as a state.
+Column column(const SymmetricPencil& pencil, const ModalBasis<kMaxDof>& basis, int j) {
+  const Vector<kMaxDof> v = basis.U.lazyProduct(basis.Lambda.col(j));
+  return state(pencil, basis.U.col(j), v);
+}
+
+void resize(const SymmetricPencil& pencil, BlockEigenbasis& basis) {
+  basis = BlockEigenbasis{};
+  basis.modes = pencil.rank;
+  basis.zeros = pencil.zeros();
+  basis.Z.width = basis.Y.width = packed_width(basis.modes, basis.zeros);
+}
+
+/// Columns of a spectrum's basis by what they are.
+struct VelocityChoice {
+  std::array<int, kMaxDof> still_position{}, still_velocity{};
+  int positions = 0, velocities = 0;
+};
+
+/// Zero modes: positions, and what the modes left over. False if a block has several modes.
+bool choose(const Spectrum<kMaxDof>& spectrum, VelocityChoice& choice) {
+  std::array<bool, kMaxWidth> taken{};
+  for (const Mode<kMaxDof>& mode : spectrum.modes) {
+    for (const int column : mode.columns) taken[at(column)] = true;
+  }
+  for (const Block& block : spectrum.basis.blocks) {
+    if (block.size > 2) return false;
+    if (taken[at(block.first)]) continue;
+    if (block.zero_mode) {
+      if (choice.positions == kMaxDof) return false;
+      choice.still_position[at(choice.positions++)] = block.first;
+      if (block.size == 1) continue;
+    } else if (block.size != 1) {
+      return false;
+    }
+    if (choice.velocities == kMaxDof) return false;
+    choice.still_velocity[at(choice.velocities++)] = block.first + block.size - 1;
+  }
+  return choice.positions == choice.velocities;
+}
+
+/// Collects the columns of a basis of one side by what they are.
 class BasisFromSpectrum {
  public:
   BasisFromSpectrum(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum)
@@ -90,11 +89,7 @@ class BasisFromSpectrum {
   }
 
  private:
-  Column column(int j) const {
-    const ModalBasis<kMaxDof>& basis = spectrum_.basis;
-    const Vector<kMaxDof> v = basis.U.lazyProduct(basis.Lambda.col(j));
-    return state(pencil_, basis.U.col(j), v);
-  }
+  Column column(int j) const { return analysis::column(pencil_, spectrum_.basis, j); }
   bool take_modes();
   bool take_zero_modes();
   bool add_elastic_coordinates();
@@ -105,25 +100,21 @@ class BasisFromSpectrum {
   std::array<Plane, kMaxDof> planes_;
   std::array<Column, kMaxDof> zeros_;  ///< of unit length
   int plane_count_ = 0, zero_count_ = 0;
-  std::array<bool, kMaxWidth> taken_{};  ///< columns of the spectrum's basis
 };
 
 bool BasisFromSpectrum::take_modes() {
   for (const Mode<kMaxDof>& mode : spectrum_.modes) {
     const auto [i, j] = mode.columns;
     if (!make_plane(pencil_, column(i), column(j), planes_[at(plane_count_++)])) return false;
-    taken_[at(i)] = taken_[at(j)] = true;
   }
   return true;
 }
 
-/// Velocities of zero modes are what the modes left over.
 bool BasisFromSpectrum::take_zero_modes() {
-  for (const Block& block : spectrum_.basis.blocks) {
-    const int last = block.first + block.size - 1;
-    if (block.size > 2 || zero_count_ == kMaxDof) return false;
-    if (taken_[at(last)] || (block.zero_mode && block.size == 1)) continue;
-    const Column x = column(last);
+  VelocityChoice choice;
+  if (!choose(spectrum_, choice)) return false;
+  for (int k = 0; k < choice.velocities; ++k) {
+    const Column x = column(choice.still_velocity[at(k)]);
     const double size = -products(pencil_, x, x).indefinite();
     if (!(size > 0)) return false;
     zeros_[at(zero_count_++)] = x / std::sqrt(size);
@@ -153,19 +144,8 @@ bool BasisFromSpectrum::add_elastic_coordinates() {
   return true;
 }
 
-void resize(int modes, int zeros, BlockEigenbasis& basis) {
-  basis = BlockEigenbasis{};
-  basis.modes = modes;
-  basis.zeros = zeros;
-  basis.Z.width = packed_width(modes, zeros);
-}
-
-void set_column(int j, const Column& x, BlockEigenbasis& basis) {
-  for (int row = 0; row < x.size(); ++row) basis.Z(row, j) = x[row];
-}
-
 void BasisFromSpectrum::write(BlockEigenbasis& basis) const {
-  resize(plane_count_, zero_count_, basis);
+  resize(pencil_, basis);
   for (int i = 0; i < basis.modes; ++i) {
     set_column(basis.first(i), planes_[at(i)].first, basis);
     set_column(basis.second(i), planes_[at(i)].second, basis);
@@ -173,27 +153,63 @@ void BasisFromSpectrum::write(BlockEigenbasis& basis) const {
   for (int k = 0; k < basis.zeros; ++k) set_column(2 * basis.modes + k, zeros_[at(k)], basis);
 }
 
-/// The plane of mode i, orthonormal in the energy metric.
-Plane energy_plane(const SymmetricPencil& pencil, const BlockEigenbasis& basis, int i) {
-  Plane plane{Column(pencil.states()), Column(pencil.states())};
-  for (int row = 0; row < pencil.states(); ++row) {
-    plane.first[row] = basis.Z(row, basis.first(i));
-    plane.second[row] = basis.Z(row, basis.second(i));
-  }
-  plane.first /= std::sqrt(products(pencil, plane.first, plane.first).energy());
-  plane.second -= products(pencil, plane.first, plane.second).energy() * plane.first;
-  const double size = std::sqrt(products(pencil, plane.second, plane.second).energy());
-  plane.second *= size > 0 ? 1 / size : 0;
-  return plane;
+/// Columns k and l of the spectrum's basis, in block i.
+void set_block(const SymmetricPencil& pencil, const ModalBasis<kMaxDof>& from, int k, int l, int i,
+               BlockEigenbasis& basis) {
+  set_column(basis.first(i), column(pencil, from, k), basis);
+  set_column(basis.second(i), column(pencil, from, l), basis);
+  basis.l00[at(i)] = from.Lambda(k, k);
+  basis.l01[at(i)] = from.Lambda(k, l);
+  basis.l10[at(i)] = from.Lambda(l, k);
+  basis.l11[at(i)] = from.Lambda(l, l);
 }
 
-/// Returns the overlap of plane a with the energy metric times plane b.
-double overlap(const Plane& a, const Plane& image) {
-  double sum = 0;
-  for (const Column* x : {&a.first, &a.second}) {
-    for (const Column* y : {&image.first, &image.second}) sum += x->dot(*y) * x->dot(*y);
+using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxWidth, kMaxWidth>;
+
+/// Y = Sigma (S Z)^-1; false if that is not finite.
+bool set_left(const SymmetricPencil& pencil, BlockEigenbasis& basis) {
+  const int n = pencil.joints, states = pencil.states();
+  Columns SZ(states, states), inverse = Columns::Identity(states, states);
+  for (int row = 0; row < states; ++row) {
+    for (int j = 0; j < states; ++j) SZ(row, j) = basis.Z(row, j);
   }
-  return std::isfinite(sum) ? sum : 0;
+  const Square<kMaxDof> M = Coefficients(pencil.M, n, n);
+  SZ.bottomRows(n) = (-M.lazyProduct(SZ.bottomRows(n))).eval();
+  solve_in_place(SZ, inverse, std::numeric_limits<double>::min());
+  if (!is_finite(inverse)) return false;
+  for (int i = 0; i < states; ++i) {
+    for (int j = 0; j < states; ++j) {
+      basis.Y(i, j) = i < basis.modes ? inverse(i, j) : -inverse(i, j);
+    }
+  }
+  return true;
+}
+
+/// A basis of two sides, in the order of the modes.
+bool start_two_sided(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum,
+                     BlockEigenbasis& basis) {
+  const int n = pencil.joints, p = pencil.rank, vibrations = spectrum.modes.size();
+  VelocityChoice choice;
+  if (!choose(spectrum, choice)) return false;
+  if (vibrations + choice.velocities != n || (pencil.factored && vibrations != p)) return false;
+  resize(pencil, basis);
+  basis.two_sided = true;
+  basis.still = p - vibrations;
+  basis.still_floor = spectrum.zero_modes.floor;
+  for (int i = 0; i < vibrations; ++i) {
+    const auto [k, l] = spectrum.modes[i].columns;
+    set_block(pencil, spectrum.basis, k, l, i, basis);
+  }
+  for (int k = 0; k < basis.still; ++k) {
+    set_block(pencil, spectrum.basis, choice.still_position[at(k)], choice.still_velocity[at(k)],
+              vibrations + k, basis);
+  }
+  for (int k = 0; k < basis.zeros; ++k) {
+    const Column x = column(pencil, spectrum.basis, choice.still_velocity[at(k)]);
+    set_column(2 * p + k, x / x.norm(), basis);
+  }
+  balance(pencil, true, basis);
+  return set_left(pencil, basis);
 }
 
 }  // namespace
@@ -224,62 +240,17 @@ void form_stiffness(System<kMaxDof>& system) noexcept {
   system.has_low_words = true;
 }
 
-bool start_basis(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum,
-                 BlockEigenbasis& basis) noexcept {
-  return BasisFromSpectrum(pencil, spectrum).run(basis);
-}
-
-void set_planes(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum,
-                BlockEigenbasis& basis) noexcept {
-  // Nonsymmetric damping and rounding errors can make modes of zero modes: there are more of them
-  // than rows of W then, and no room for zero modes as well.
-  resize(spectrum.modes.size(), 0, basis);
-  for (int i = 0; i < basis.modes; ++i) {
-    const Mode<kMaxDof>& mode = spectrum.modes[i];
-    const ComplexVector<kMaxDof>& u = mode.shapes[0];
-    const ComplexVector<kMaxDof> v = mode.eigenvalues[0] * u;
-    const bool real = mode.eigenvalues[0].imag() == 0;
-    const Vector<kMaxDof> none = Vector<kMaxDof>::Zero(u.size()), re = u.real(), im = u.imag();
-    set_column(basis.first(i), state(pencil, re, real ? none : Vector<kMaxDof>(v.real())), basis);
-    set_column(basis.second(i),
-               real ? state(pencil, none, re) : state(pencil, im, Vector<kMaxDof>(v.imag())),
-               basis);
+bool start_basis(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum, bool symmetric,
+                 TrackedResidual& residual, BlockEigenbasis& basis) noexcept {
+  // A symmetric K without a factor is the metric of a basis of one side, if it is definite.
+  const bool definite = pencil.factored || (spectrum.zero_modes.stiffness_values.array() > 0).all();
+  if (symmetric && definite ? !BasisFromSpectrum(pencil, spectrum).run(basis)
+                            : !start_two_sided(pencil, spectrum, basis)) {
+    return false;
   }
-}
-
-std::array<int, kMaxDof> match_modes(const SymmetricPencil& pencil, const BlockEigenbasis& before,
-                                     BlockEigenbasis& basis) noexcept {
-  const int count = basis.vibrations();
-  std::array<std::array<double, kMaxDof>, kMaxDof> overlaps{};
-  std::array<Plane, kMaxDof> planes;
-  for (int i = 0; i < count; ++i) planes[at(i)] = energy_plane(pencil, basis, i);
-  for (int j = 0; j < count; ++j) {
-    const Plane old = energy_plane(pencil, before, j);
-    const Plane image{energy_image(pencil, old.first), energy_image(pencil, old.second)};
-    for (int i = 0; i < count; ++i) overlaps[at(i)][at(j)] = overlap(planes[at(i)], image);
-  }
-  std::array<int, kMaxDof> index{};
-  const PackedMatrix Z = basis.Z, Y = basis.Y;
-  for (int pair = 0; pair < count; ++pair) {
-    std::size_t mode = 0, place = 0;
-    double most = -1;
-    for (std::size_t i = 0; i < at(count); ++i) {
-      for (std::size_t j = 0; j < at(count); ++j) {
-        if (overlaps[i][j] > most) most = overlaps[i][j], mode = i, place = j;
-      }
-    }
-    for (std::size_t k = 0; k < at(count); ++k) overlaps[mode][k] = overlaps[k][place] = -1;
-    const auto from = static_cast<int>(mode), to = static_cast<int>(place);
-    index[mode] = to;
-    for (int row = 0; row < pencil.states(); ++row) {
-      basis.Z(row, basis.first(to)) = Z(row, basis.first(from));
-      basis.Z(row, basis.second(to)) = Z(row, basis.second(from));
-      if (!basis.two_sided) continue;
-      basis.Y(basis.first(to), row) = Y(basis.first(from), row);
-      basis.Y(basis.second(to), row) = Y(basis.second(from), row);
-    }
-  }
-  return index;
+  evaluate(pencil, basis, residual);
+  if (!basis.two_sided) rotate_hyperbolically(residual, 0, basis);
+  return true;
 }
 
 }  // namespace dashpot::analysis

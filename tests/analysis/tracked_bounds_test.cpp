@@ -1,10 +1,10 @@
 // Bounds that are proved for tracked bases, beside what rounding does; what becomes of the radii;
 // columns that are balanced and rotated.
 #include <dashpot/analysis/base/arithmetic.hpp>
+#include <dashpot/analysis/tracker/block_eigenbasis.hpp>
+#include <dashpot/analysis/tracker/residual_errors.hpp>
 #include <dashpot/analysis/tracker/tracked_enclosure.hpp>
 #include <dashpot/analysis/tracker/tracked_modes.hpp>
-#include <dashpot/analysis/tracker/two_sided_basis.hpp>
-#include <dashpot/analysis/tracker/two_sided_errors.hpp>
 #include <dashpot/tests/support/random.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
@@ -109,7 +109,7 @@ struct AnyBasis {
 
 /// N = Y S Z and G = Y B Z - N Lambda, of any basis of any grading, have rounding errors within
 /// their bounds; and these are not much wider than they have to be.
-TEST(TwoSidedErrors, CoverWhatRoundingDoes) {
+TEST(ResidualErrors, CoverWhatRoundingDoes) {
   Random random(8107);
   double share_of_G = 0, share_of_N = 0;
   const auto expect_below = [](double error, double bound, double& share) {
@@ -173,7 +173,7 @@ TEST(TwoSidedErrors, CoverWhatRoundingDoes) {
           Y_long * (any.B().cast<Long>() * Z_long) - exact_N * any.Lambda().cast<Long>();
       const MatrixXd of_N = any.norms((N.cast<Long>() - exact_N).cast<double>());
       const MatrixXd of_G = any.norms((G.cast<Long>() - exact_G).cast<double>());
-      const TwoSidedErrors errors(any.pencil(), any.basis);
+      const ResidualErrors errors(any.pencil(), any.basis);
       EXPECT_TRUE(errors.in_range());
       for (int i = 0; i < any.basis.blocks(); ++i) {
         expect_below(of_N.row(i).norm(), errors.of_N(i), share_of_N);
@@ -226,7 +226,7 @@ TEST(TrackedEnclosure, HoldsForEveryGramMatrix) {
 }
 
 /// Errors of N are gamma (a a' + m m'), those of G gamma (a b' + b a' + c m m') and those of
-/// N Lambda (tracked_enclosure.cpp). A single block has a radius of G / (1 - N).
+/// N Lambda (residual_errors.hpp). A single block has a radius of G / (1 - N).
 TEST(TrackedEnclosure, CountsRoundingErrorsOfTheResidual) {
   Random random(2501);
   int single = 0;
@@ -247,12 +247,18 @@ TEST(TrackedEnclosure, CountsRoundingErrorsOfTheResidual) {
     const MatrixXd V = Z.bottomRows(n).cwiseAbs().transpose();
     const VectorXd a = Z.topRows(p).colwise().norm(), m = std::sqrt(mass) * (V * s);
     const VectorXd b = V * system.stiffness_factor.colwise().norm().transpose();
-    VectorXd rate(made.size);
-    for (int i = 0; i < n; ++i) rate(made.columns(i)).setConstant(rates[i]);
-    const double a_rate = a.cwiseProduct(rate).norm(), m_rate = m.cwiseProduct(rate).norm();
+    // The two columns of a mode count together: their lengths, before anything is added.
+    const auto block = [&](const VectorXd& x) {
+      return VectorXd(VectorXd::NullaryExpr(made.basis.blocks(), [&](Eigen::Index i) {
+        return VectorXd(x(made.columns(static_cast<int>(i)))).norm();
+      }));
+    };
+    const VectorXd x = block(b) + block(a).cwiseProduct(rates),
+                   momenta = block(m).cwiseProduct(
+                       VectorXd(rates.array() + largest(system.damping) / mass));
     const double N = gamma * (a.squaredNorm() + m.squaredNorm());
-    const double G = gamma * (a.norm() * (2 * b.norm() + a_rate) +
-                              m.norm() * (largest(system.damping) / mass * m.norm() + m_rate));
+    const double G =
+        gamma * (a.norm() * x.norm() + b.norm() * a.norm() + m.norm() * momenta.norm());
     EXPECT_NEAR(made.enclosure.roundoff_bound / G, 1, 1e-8) << "trial " << trial;
     if (n > 1 || N > 0.09) continue;
     EXPECT_NEAR(made.enclosure.radius[0] * (1 - N) / G, 1, 1e-8);

@@ -1,4 +1,4 @@
-#include <dashpot/analysis/tracker/two_sided_basis.hpp>
+#include <dashpot/analysis/tracker/block_eigenbasis.hpp>
 
 #include <dashpot/analysis/base/arithmetic.hpp>
 
@@ -8,8 +8,8 @@
 namespace dashpot::analysis {
 namespace {
 
-/// Columns of a block are balanced again when they lean this much towards each other, or their
-/// squared lengths are so many times each other.
+/// Columns of a block are rotated or balanced again when they lean this much towards each other, or
+/// their squared lengths are so many times each other.
 constexpr double kLeaning = 0.6, kUneven = 9;
 /// Least rate that balances positions and velocities of a block, relative to the largest one: zero
 /// modes have no frequency of their own.
@@ -51,21 +51,29 @@ void orthonormalize_block(double first, double second, double mixed, int i,
 
 }  // namespace
 
-void take_left_step(const PackedMatrix& E, TrackedResidual& residual,
-                    BlockEigenbasis& basis) noexcept {
-  const int m = basis.modes, size = basis.columns(), width = basis.Y.width;
-  PackedMatrix& step = residual.MV;
-  step.width = residual.image.width = width;
-  for (int i = 0; i < size; ++i) {
-    const double *const R = residual.R.row(i), *const e = E.row(i);
-    double* const out = step.row(i);
-    const double row_sign = i < m ? 1 : -1;
-    for (int j = 0; j < m; ++j) out[j] = -R[j] - row_sign * e[j];
-    for (int j = m; j < size; ++j) out[j] = R[j] + row_sign * e[j];
+bool rotate_hyperbolically(const TrackedResidual& residual, double tolerance,
+                           BlockEigenbasis& basis) noexcept {
+  bool any = false;
+  for (int i = 0; i < basis.modes; ++i) {
+    // Kinetic energies v' M v of the columns; elastic ones differ by Z' S Z = Sigma. In the energy
+    // metric the products are 2 first + 1, 2 second - 1 and 2 mixed.
+    double first = 0, second = 0, mixed = 0;
+    for (int k = basis.modes; k < basis.columns(); ++k) {
+      first -= basis.Z(k, i) * residual.MV(k, i);
+      second -= basis.Z(k, basis.modes + i) * residual.MV(k, basis.modes + i);
+      mixed -= basis.Z(k, i) * residual.MV(k, basis.modes + i);
+    }
+    const double tangent = -2 * mixed / (first + second);
+    if (!(std::abs(tangent) > tolerance) || !(std::abs(tangent) < 1)) continue;
+    any = true;
+    const double angle = 0.5 * std::atanh(tangent), c = std::cosh(angle), s = std::sinh(angle);
+    for (int row = 0; row < basis.columns(); ++row) {
+      const double x = basis.Z(row, i), y = basis.Z(row, basis.modes + i);
+      basis.Z(row, i) = c * x + s * y;
+      basis.Z(row, basis.modes + i) = s * x + c * y;
+    }
   }
-  padded_multiply(width)({step.row(0), width, 1}, size, size, basis.Y.row(0), basis.Y.row(0), 1,
-                         residual.image.row(0), width);
-  copy(residual.image, size, basis.Y);
+  return any;
 }
 
 bool balance(const SymmetricPencil& pencil, bool all, BlockEigenbasis& basis) noexcept {
@@ -97,22 +105,13 @@ bool balance(const SymmetricPencil& pencil, bool all, BlockEigenbasis& basis) no
   return any;
 }
 
-bool is_positive_definite(const double* M, int n) noexcept {
-  std::array<double, static_cast<std::size_t>(kMaxDof) * kMaxDof> L;  // by rows
-  for (int i = 0; i < n; ++i) {
-    double* const row = &L[at(i * kMaxDof)];
-    double diagonal = M[i + i * n];
-    for (int j = 0; j < i; ++j) {
-      const double* const other = &L[at(j * kMaxDof)];
-      double sum = M[i + j * n];
-      for (int k = 0; k < j; ++k) sum -= row[k] * other[k];
-      row[j] = sum * other[j];  // the inverses of the diagonal are kept
-      diagonal -= row[j] * row[j];
-    }
-    if (!(diagonal > 0)) return false;
-    row[i] = 1 / std::sqrt(diagonal);
+void recondition(const SymmetricPencil& pencil, const TrackedResidual& residual,
+                 BlockEigenbasis& basis) noexcept {
+  if (basis.two_sided) {
+    balance(pencil, false, basis);
+  } else {
+    rotate_hyperbolically(residual, kLeaning, basis);
   }
-  return true;
 }
 
 }  // namespace dashpot::analysis

@@ -3,19 +3,27 @@
 
 namespace dashpot::analysis {
 
-/// Bounds of the rounding errors of the residual of a two-sided basis. With vectors of one entry
-/// for each row of Y or column of Z, and a factor gamma, entrywise
+/// Bounds of the rounding errors of the residual of a basis. With vectors of one entry for each row
+/// of Y or column of Z, and a factor gamma, entrywise
 ///
 ///     |N error| <= gamma (a z' + |M| p e'),
 ///     |T error| <= gamma (a x' + b f' + |C| p e').
 ///
-/// Without a factor, with s_k = sqrt(M_kk) and |M|, |C| and |K| the largest |M_ij| / (s_i s_j), and
-/// so on: of a row (y_q, y_v) a = max |y_q| / s and b = p = s' |y_v|, of a column (q, v) z = s'
-/// |q|, x = e = s' |v| and f = |K| z. With a factor, and t_k the sum of column k of |W|: a = max
-/// |y_s|, b = t' |y_v|; z = f = the sum of |s|, x = t' |v|. They are kept for each block.
-class TwoSidedErrors {
+/// Let s_k = sqrt(M_kk), |M|, |C| and |K| the largest |M_ij| / (s_i s_j), and so on, and t_k the
+/// size of column k of W. A column has z of its positions, e = s' |v| of its velocities, and x of
+/// their elastic rates.
+///
+/// One side, Y = Z': t_k is a length, a = z is the length of the elastic coordinates, or without a
+/// factor sqrt(|K|) s' |q|; b = x = t' |v|, or sqrt(|K|) e; f = a and p = e.
+///
+/// Two sides: t_k is a sum, a row (y_q, y_v) has p = s' |y_v|. Without a factor a = max |y_q| / s
+/// and b = p, z = s' |q|, x = e and f = |K| z. With one a = max |y_s| and b = t' |y_v|, and a
+/// column has the sum z = f of |s|, and x = t' |v|.
+///
+/// The vectors are kept for each block.
+class ResidualErrors {
  public:
-  TwoSidedErrors(const SymmetricPencil& pencil, const BlockEigenbasis& basis) noexcept;
+  ResidualErrors(const SymmetricPencil& pencil, const BlockEigenbasis& basis) noexcept;
 
   /// False if masses or rates are too large or too small for products not to leave the range.
   bool in_range() const { return in_range_; }
@@ -42,15 +50,11 @@ class TwoSidedErrors {
 
   double gamma_;
   bool in_range_ = false;
-  Blocks a_{}, b_{}, p_{};  ///< of rows
+  Blocks a_, b_, p_;  ///< of rows
   /// For each column: x + z |Lambda|, f, and (|C| + |M| |Lambda|) e.
-  Blocks x_{}, f_{}, m_{};
+  Blocks x_{}, f_, m_;
   double all_a_ = 0, all_b_ = 0, all_p_ = 0, all_x_ = 0, all_f_ = 0, all_m_ = 0, all_z_ = 0,
          all_momenta_ = 0;  ///< of all rows or columns; the last one is of |M| e
 };
-
-/// Returns a bound of the largest |A_ij| inverse_i inverse_j of a matrix (n x n), from its upper
-/// triangle if it is symmetric.
-double largest_entry(const double* A, int n, const double* inverse, bool symmetric) noexcept;
 
 }  // namespace dashpot::analysis
