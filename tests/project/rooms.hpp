@@ -127,7 +127,7 @@ inline const std::vector<Room>& rooms() {
       {"apps/command", 2, {}, {""}},
       {"apps/identify", 2, {}, {""}},
       {"apps/loop", 3, {}, {""}},
-      {"apps/web", 2, {}, {""}},
+      {"apps/web", 3, {}, {""}},
       {"apps/check_model", 3, {}, {""}},
       {"apps/run", 4, {}, {""}},
       {"apps/drive", 4, {}, {""}},

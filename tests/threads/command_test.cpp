@@ -21,8 +21,11 @@ Outcome command(const LiveRun& live, const Words& words) {
 TEST(CommandProgram, MovesAnArmAndSetsItsGains) {
   const Scratch scratch;
   // No fault, also where a busy machine makes the loop slow.
-  LiveRun live(changed(scratch, "panda", "control:",
-                       "watchdog: {feedback: 0, longest_gap: 1 s}\ncontrol:\n  period: 4 ms"));
+  LiveRun live(changed(
+      scratch, "panda",
+      {{"tip: panda_hand_tcp", "tip: panda_hand_tcp\n  drives: panda"},
+       {"    reflected_inertia: 0 kg m^2\n", ""},
+       {"control:", "watchdog: {feedback: 0, longest_gap: 1 s}\ncontrol:\n  period: 4 ms"}}));
   if (!live.heard(1)) GTEST_SKIP() << kNoMulticast;
   const Outcome moved = command(
       live, {"--mode", "joint", "--joint-position", "0,-45 deg,0,-135 deg,0,90 deg,40 deg"});

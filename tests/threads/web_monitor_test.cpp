@@ -324,7 +324,7 @@ TEST(Export, WritesALineForEachModeOfEachMessage) {
   std::istringstream table(scratch.read("modes.csv"));
   std::string line;
   std::getline(table, line);
-  EXPECT_THAT(line, StartsWith("time,tick,label,natural_frequency,damping_ratio,"));
+  EXPECT_THAT(line, StartsWith("time [s],tick,label,natural_frequency [rad/s],damping_ratio,"));
   lcmtypes::MessageHandlers handlers;
   int rows = 0;
   handlers.on_modes = [&](const modes_t& message) {
