@@ -64,6 +64,7 @@ void pair_reals(std::vector<MeasuredMode>& modes) {
 }
 
 constexpr double kHarmonic = 3;  // of friction and other forces that are odd; sums tell even ones
+constexpr double kLightlyDamped = 0.3;  // what lasts long enough to have harmonics
 
 /// Why a mode is not to be believed; empty if it is.
 std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all, double duration,
@@ -108,7 +109,7 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
     const double within = std::max(
         0.005 * multiple,
         2 * std::hypot(mode.natural_frequency_std, kHarmonic * other.natural_frequency_std));
-    if (w > 0 && other.energy > 10 * mode.energy &&
+    if (w > 0 && mode.damping_ratio < kLightlyDamped && other.energy > 10 * mode.energy &&
         std::abs(lambda[0].imag() - multiple) < within) {
       return "three times the frequency of a larger mode: not a mode, but what is not linear";
     }
