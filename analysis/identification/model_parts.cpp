@@ -19,7 +19,6 @@ using Eigen::VectorXd;
 constexpr std::array<std::pair<double, double>, 3> kWindows = {
     std::pair(0.0, 0.5), {0.1, 1.0}, {0.25, 1.0}};
 constexpr double kColoured = 2;    ///< whiteness above which copies of modes are doubted
-constexpr double kNoise = 1.5;     ///< whiteness below which a model leaves nothing but noise over
 constexpr double kWeak = 0.05;     ///< energy, of the strongest: its deviation says enough
 constexpr double kCopies = 0.15;   ///< of the logarithm of a frequency
 constexpr double kAlike = 0.8;     ///< modal assurance criterion
@@ -108,9 +107,7 @@ void ModelSearch::keep_repeated() {
   // What no model explains is not noise, and looks like a mode near another one.
   const bool copied =
       std::max(colour_, fit.whiteness) > kColoured && copy_in(fit) < fit.factors.size();
-  const bool contradiction = contradicted(fit, scatter) < fit.factors.size();
-  // Of a model that leaves noise over, parts say nothing else: their steps are of first order.
-  if (!copied && (!contradiction || std::max(colour_, fit.whiteness) < kNoise)) return;
+  if (contradicted(fit, scatter) == fit.factors.size() && !copied) return;
   differs = true;
   const DecayFit before = fit;
   larger.reset();
