@@ -146,7 +146,8 @@ ModelSearch::ModelSearch(const ExcitedCells& cells, const IdentifyOptions& optio
       stop_(options.stop),
       cells_(cells.records),
       duration_(cells.duration),
-      most_added_(3) {
+      most_added_(3),
+      iterations_(60) {
   const int most = options.max_order > 0
                        ? options.max_order
                        : static_cast<int>(std::min<Index>(2 * data.channels + 16, 32));

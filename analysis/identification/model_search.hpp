@@ -65,7 +65,7 @@ class ModelSearch {
   bool rough_ = false;                    ///< a first estimate is wanted
   int most_added_ = 6;                    ///< factors from what is left over
   /// A model of too small an order that has not settled loses to one of too large an order, whose
-  /// surplus modes cancel: with 6 to 15 iterations, chirps lose one mode of seven.
+  /// surplus modes cancel. Decays that have cancel further with more; chirps need 60.
   int iterations_ = 30;
   /// Poles of what is left over in the cells, in units of the noise.
   std::function<std::vector<std::vector<RealizedPole>>(const std::vector<Eigen::MatrixXd>&)>
