@@ -123,7 +123,7 @@ class Descent {
   }
 
  private:
-  static constexpr int kFew = 15;              // iterations of a search
+  static constexpr int kFew = 15;              // iterations of a first estimate
   static constexpr double kSearchGain = 0.02;  // of -2 log likelihood: nothing, beside a parameter
   static constexpr double kSmallGain = 1e-4;
 

@@ -64,6 +64,7 @@ void pair_reals(std::vector<MeasuredMode>& modes) {
 }
 
 constexpr double kHarmonic = 3;  // of friction and other forces that are odd; sums tell even ones
+constexpr double kLightlyDamped = 0.3;  // what lasts long enough to have harmonics
 
 /// Why a mode is not to be believed; empty if it is.
 std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all, double duration,
@@ -84,7 +85,9 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
       -lambda[0].real() * duration < 1) {
     return "too slow for the record";
   }
-  if (mode.stability == 0 && mode.energy < 1e-3) return "weak, and in no model of another order";
+  // Other orders miss heavily damped modes, but no lightly damped one that is there.
+  const double enough = mode.damping_ratio < 0.1 ? 1e-2 : 1e-3;
+  if (mode.stability == 0 && mode.energy < enough) return "weak, and in no model of another order";
   if (mode.energy < 1e-6) return "too weak to be told from what is not linear";
   for (const MeasuredMode& other : all) {
     if (other.energy > 2 * mode.energy && likeness(other.shape, mode.shape) > 0.8 &&
@@ -108,7 +111,7 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
     const double within = std::max(
         0.005 * multiple,
         2 * std::hypot(mode.natural_frequency_std, kHarmonic * other.natural_frequency_std));
-    if (w > 0 && other.energy > 10 * mode.energy &&
+    if (w > 0 && mode.damping_ratio < kLightlyDamped && other.energy > 10 * mode.energy &&
         std::abs(lambda[0].imag() - multiple) < within) {
       return "three times the frequency of a larger mode: not a mode, but what is not linear";
     }

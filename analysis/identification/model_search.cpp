@@ -17,11 +17,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kRoughIterations = 4;   ///< of models of rising order: a first estimate
-constexpr int kDrivenIterations = 6;  ///< where least squares have found them already
+constexpr int kRoughIterations = 4;  ///< of models of rising order: a first estimate
 constexpr int kProductIterations = 12;
-/// A change of the model is given up where -2 log likelihood will stay larger by this.
-constexpr double kDifference = 60;
+/// A change of the model is given up where -2 log likelihood will stay larger by this. With 60,
+/// searches among heavily damped modes give up models that become the best ones.
+constexpr double kDifference = 300;
 /// In lengths of the record: a slower single decay is taken for drift, if one explains as much.
 constexpr double kDrifts = 3;
 
@@ -120,7 +120,7 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOpt
   };
   data = DecayData(cells_);
   rough_ = !refine;
-  if (rough_) first_iterations_ = kRoughIterations;
+  if (rough_) iterations_ = kRoughIterations;
   choose_order(cells.noise, false);
   if (!refine) return;
   improve();
@@ -147,7 +147,7 @@ ModelSearch::ModelSearch(const ExcitedCells& cells, const IdentifyOptions& optio
       cells_(cells.records),
       duration_(cells.duration),
       most_added_(3),
-      first_iterations_(kDrivenIterations) {
+      iterations_(60) {
   const int most = options.max_order > 0
                        ? options.max_order
                        : static_cast<int>(std::min<Index>(2 * data.channels + 16, 32));
@@ -245,8 +245,8 @@ void ModelSearch::choose_order(const VectorXd& noise, bool products) {
     if (std::isfinite(least) && !goes_on(0.5 * static_cast<double>(n) / orders)) break;
     if (n == plain_by_order_.size()) {
       const std::vector<DecayFactor> factors = factors_of(by_order[n], duration_);
-      plain_by_order_.push_back(
-          factors.empty() ? DecayFit{} : fit_decays(data, factors, noise, first_iterations_));
+      plain_by_order_.push_back(factors.empty() ? DecayFit{}
+                                                : fit_decays(data, factors, noise, iterations_));
     }
     all[n] = plain_by_order_[n];
     if (all[n].factors.empty()) continue;  // no decay

@@ -64,8 +64,9 @@ class ModelSearch {
   double colour_ = 1;                     ///< least whiteness of the models of rising order
   bool rough_ = false;                    ///< a first estimate is wanted
   int most_added_ = 6;                    ///< factors from what is left over
-  int first_iterations_ = 12;             ///< of models of rising order
-  int iterations_ = 15;                   ///< of a changed model
+  /// A model of too small an order that has not settled loses to one of too large an order, whose
+  /// surplus modes cancel. Decays that have cancel further with more; chirps need 60.
+  int iterations_ = 30;
   /// Poles of what is left over in the cells, in units of the noise.
   std::function<std::vector<std::vector<RealizedPole>>(const std::vector<Eigen::MatrixXd>&)>
       poles_of_rest_;

@@ -90,6 +90,12 @@ TEST(MeasuredModes, AreRejectedBeyondEachLimit) {
   EXPECT_EQ(reason({good_mode(10, -0.019)}), "it does not decay within its deviation");
   expect_limit(1.1e-3, 0.9e-3, "weak, and in no model of another order",
                [](MeasuredMode& mode, double x) { mode.energy = x, mode.stability = 0; });
+  // Models of other orders have what is lightly damped, if it is there.
+  expect_limit(1.1e-2, 0.9e-2, "weak, and in no model of another order",
+               [](MeasuredMode& mode, double x) {
+                 mode = good_mode(10, 0.05);
+                 mode.energy = x, mode.stability = 0;
+               });
   MeasuredMode weak = good_mode();
   weak.energy = 0.9e-3;
   weak.stability = 0.1;
@@ -134,6 +140,23 @@ TEST(MeasuredModes, LikeALargerOneNextToThemAreItsOwnChange) {
   EXPECT_EQ(beside(10.6, 1.1, shape_of(1, 0.4)), "");
   EXPECT_EQ(beside(10.4, 0.9, shape_of(1, 0.4)), "the same as a larger mode next to it");
   EXPECT_EQ(beside(10.4, 1.1, shape_of(1, 0.6)), "");
+}
+
+/// What is over at once has no harmonics, so it may be at three times another frequency.
+TEST(MeasuredModes, AtThreeTimesTheFrequencyOfALargerOneAreNoneIfLightlyDamped) {
+  const auto at = [](double times, double ratio) {
+    MeasuredMode larger = good_mode(10, 0.05);
+    const double w = times * larger.eigenvalues[0].imag();
+    MeasuredMode mode = good_mode(w / std::sqrt(1 - ratio * ratio), ratio);
+    mode.natural_frequency_std = 1e-3 * w;
+    mode.shape = shape_of(0, 1);
+    mode.energy = 0.04;
+    return reason({mode, larger});
+  };
+  EXPECT_THAT(at(3, 0.05), StartsWith("three times the frequency"));
+  EXPECT_THAT(at(3, 0.29), StartsWith("three times the frequency"));
+  EXPECT_EQ(at(3, 0.31), "");
+  EXPECT_EQ(at(3.3, 0.05), "");
 }
 
 TEST(MeasuredModes, AtTheSumOfTwoMuchLargerOnesAreNone) {
