@@ -13,9 +13,10 @@
 namespace dashpot::controller {
 namespace {
 
-constexpr double kMargin = 2;  // of gain: a brake leaves a gear's mode half of its damping
-constexpr double kEdge = 6;    // likewise, of what acts at the edges of allowed velocities (Brake)
-constexpr double kLongest = 1e3;  // s: there is none
+constexpr double kMargin = 2;      // of gain: a brake leaves a gear's mode half of its damping
+constexpr double kEdge = 0.2;      // times the brake's T: as hard the edges of velocities may be
+constexpr double kLongest = 1e3;   // s: there is none
+constexpr double kSearched = 1e3;  // times: how far down a boundary is looked for
 constexpr int kPostures = 16;
 
 std::string number(double value) {
@@ -47,23 +48,25 @@ double gears_stopping_time(const RobotModel& model, const Settings& settings, do
   const PostureSequence postures(settings.limits.position_lower, settings.limits.position_upper);
   const JointVector rest = JointVector::Zero(model.dof());
   DynamicsResult robot;
-  double T = kMargin / kEdge * wanted;
+  double T = kEdge * wanted;
   for (int k = 0; k < kPostures && T <= kLongest; ++k) {
     kernel.evaluate(postures.at(k), rest, robot);
-    analysis::System<kMaxJoints> system(model.dof());
-    system.mass = robot.M;
-    system.damping = robot.M * (kMargin / T) + friction;
-    T /= margin_of(system, loop, gears);
+    for (double margin = 0; margin == 0 && T <= kLongest;) {
+      analysis::System<kMaxJoints> system(model.dof());
+      system.mass = robot.M;
+      system.damping = robot.M * (kMargin / T) + friction;
+      margin = margin_of(system, loop, gears);
+      T = margin > 0 ? T / margin : kSearched * T;
+    }
   }
-  if (!(T <= std::max({kLongStop, wanted, 1.01 * settings.limits.stopping_time}))) {
-    throw InvalidSettings(
-        "limits.stopping_time",
-        "is " + number(settings.limits.stopping_time) +
-            " s, but with gears that bend (robot.gear_stiffness, gear_damping, position_sensor) a "
-            "brake is stable from " +
-            number(T) + " s on: ask for that");
-  }
-  return T;
+  if (T <= 1.01 * wanted) return T;
+  const std::string gears_keys = "(robot.gear_stiffness, gear_damping, position_sensor)";
+  throw InvalidSettings(
+      "limits.stopping_time",
+      "is " + number(settings.limits.stopping_time) + " s, but with gears that bend " + gears_keys +
+          (T > kLongest
+               ? " no brake is stable: their damping is too small"
+               : " a brake keeps a gain margin of 2 from " + number(T) + " s on: ask for that"));
 }
 
 }  // namespace dashpot::controller

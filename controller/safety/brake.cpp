@@ -12,7 +12,6 @@ namespace {
 constexpr double kMargin = 10;         // of gain, that the sampled loop keeps
 constexpr double kNearMargin = 3;      // likewise at the edge of an interval
 constexpr double kNear = 0.2;          // t / T: short, so that the law keeps its say
-constexpr double kNearOfGears = 0.6;   // t / T, where gears set T with a margin of 2
 constexpr double kFullVelocity = 0.9;  // of a velocity limit: the rest is for what nobody expects
 constexpr double kSlowly = 0.5;  // of a velocity limit: what is slower may be pressing on something
 constexpr double kBraking = 0.5;       // of the torque that is left: the rest is for other joints
@@ -54,10 +53,9 @@ Brake::Brake(const Settings& settings, double gears) noexcept : n_(settings.limi
   const Limits& limits = settings.limits;
   const double lag = loop_lag(settings);
   const double least = kMargin * (lag - 0.5 * settings.period);
-  stopping_time_ = std::max({limits.stopping_time, least, gears});
+  stopping_time_ = std::max(limits.stopping_time, least);
   period_ = settings.period;
-  near_ =
-      std::max({kNear * limits.stopping_time, kNearMargin / kMargin * least, kNearOfGears * gears});
+  near_ = std::max({kNear * limits.stopping_time, kNearMargin / kMargin * least, gears});
   known_.q = JointVector::Constant(n_, std::numeric_limits<double>::infinity());
   for (Eigen::Index i = 0; i < n_; ++i) {
     Bounds& bounds = joints_[static_cast<std::size_t>(i)];

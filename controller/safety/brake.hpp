@@ -14,16 +14,13 @@ namespace dashpot::controller {
 /// of the drives' low-pass and of a differenced velocity.
 double loop_lag(const Settings& settings) noexcept;
 
-/// A brake that needs longer than this, s, ten times as long as by default, is to be asked for.
-inline constexpr double kLongStop = 0.5;
-
 /// Stops the arm, and keeps each joint within an interval of allowed velocity.
 ///
 /// With D = M / T every motion decays with the time constant T, whatever the posture and however
 /// light a joint, because M^-1 D = I / T. A sampled loop that acts d ticks late bears it as long as
 /// T > period / (2 sin(pi / (4 d + 2))), so its gain margin is about 2 T / (period (1 + 2 d)). T is
-/// Limits::stopping_time, or what leaves a margin of about kMargin, or what gears that bend need
-/// (see gears_stopping_time), if that is longer.
+/// Limits::stopping_time, or what leaves a margin of about kMargin, if that is longer. With gears
+/// that bend it is refused where they do not bear it (see gears_stopping_time).
 ///
 /// `stop` wants the velocity zero, or the return velocity v_r outside a position limit:
 ///     x = M (v_wanted - qd) / T.
@@ -45,7 +42,7 @@ inline constexpr double kLongStop = 0.5;
 /// that allow x' = 0, x' takes energy from the arm as far as qd is right: at least
 /// (T / 2) x'' M^-1 x'.
 ///
-/// With t = T / 5 (or what leaves a margin of 3; with gears that bend, six tenths of their T), the
+/// With t = T / 5 (or what leaves a margin of 3; with gears that bend, the T that they bear), the
 /// distance d_i to a position limit less a margin, the acceleration a_i = room_i / (2 M_ii) of half
 /// of the torque that the weight leaves, and the time r_i = max(4 t, t + lag + torque_i /
 /// torque_rate_i) until it is there,
@@ -64,7 +61,7 @@ class Brake {
                                     2 * kMaxJoints, 2 * kMaxJoints>;
 
  public:
-  /// `gears` is the T that gears that bend need, s; 0: no joint is elastic.
+  /// `gears` is the T that gears that bend bear, s; 0: no joint is elastic.
   explicit Brake(const Settings& settings, double gears = 0) noexcept;
 
   struct Motion {

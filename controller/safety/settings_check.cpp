@@ -10,6 +10,8 @@
 namespace dashpot::controller {
 namespace {
 
+constexpr double kLongStop = 0.5;  // s, ten times as long as by default
+
 std::string number(double value) {
   std::ostringstream text;
   text << value;

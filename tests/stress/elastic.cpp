@@ -280,7 +280,9 @@ bool stop_all(const Request& request) {
   for (const ElasticArm& arm : kElasticArms) {
     for (const controller::PositionSensor sensor : kSides) {
       const Gears gears(arm, sensor);
-      for (const double T : {0.05, 1.0}) {
+      // A brake on the links needs time.
+      const bool link = sensor == controller::PositionSensor::kLink;
+      for (const double T : {link ? 0.2 : 0.05, link ? 1.2 : 0.2}) {
         Stop stop;
         try {
           stop = stop_of(gears, T);
