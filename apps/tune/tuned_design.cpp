@@ -255,7 +255,9 @@ TunedDesign read_design(const TunedArm& arm, const TuneJson& design) {
                                           gains.null_stiffness.asDiagonal(), damping);
   gains.null_damping = damping.diagonal();
   stated.period = number_at(design, "period", 0, 1, arm.settings().period);
-  stated.delay = static_cast<int>(number_at(design, "delay", 0, kMostDelay, 0));
+  const double delay = number_at(design, "delay", 0, kMostDelay, 0);
+  stated.delay = static_cast<int>(delay);
+  if (stated.delay != delay) throw InputError("delay", "must be whole ticks");
   stated.cutoff = number_at(design, "cutoff", 0, 1e6, 0);
   stated.difference_velocity = flag_at(design, "difference_velocity");
   stated.integral_time = number_at(design, "integral_time", 0, 1e6, 0);

@@ -3,6 +3,7 @@
 #include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/tune/tuned_loop.hpp>
+#include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/elastic_joints.hpp>
 #include <dashpot/controller/gain_judge.hpp>
@@ -17,6 +18,7 @@
 #include <cmath>
 #include <complex>
 #include <exception>
+#include <mutex>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -351,7 +353,9 @@ nlohmann::ordered_json TunedLoop::workspace(std::uint64_t seed, std::int64_t fir
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<PostureNumbers> found(static_cast<std::size_t>(count));
   std::atomic<std::int64_t> next = 0;
-  const auto work = [&] {
+  std::exception_ptr failure;
+  std::once_flag failed;
+  const auto find = [&] {
     std::optional<controller::PostureLoop> loop;
     if (design_.designed()) loop.emplace(arm_.model(), design_.settings);
     for (std::int64_t i = next++; i < count; i = next++) {
@@ -363,10 +367,21 @@ nlohmann::ordered_json TunedLoop::workspace(std::uint64_t seed, std::int64_t fir
       }
     }
   };
-  std::vector<std::thread> threads(std::max(1U, std::thread::hardware_concurrency()) - 1);
-  for (std::thread& thread : threads) thread = std::thread(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
+  const auto work = [&]() noexcept {
+    try {
+      find();
+    } catch (...) {
+      next = count;
+      std::call_once(failed, [&] { failure = std::current_exception(); });
+    }
+  };
+  {
+    std::vector<std::jthread> threads;
+    threads.reserve(std::thread::hardware_concurrency());
+    for (unsigned k = 1; k < std::thread::hardware_concurrency(); ++k) threads.emplace_back(work);
+    work();
+  }
+  if (failure) std::rethrow_exception(failure);
   LoopJson result = {{"smallest_ratio", LoopJson::array()},
                      {"gain_margin", LoopJson::array()},
                      {"worst", LoopJson::object()}};
@@ -398,7 +413,6 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
   const bool rigid = !gears_.any();
   const MatrixXd friction = model.joint_values(&controller::Joint::viscous_friction).asDiagonal();
   if (design_.designed() && rigid) set_designed_damping(loop.system, friction, loop.parts);
-  ;
   const PostureNumbers here = numbers(loop);
 
   const Eigen::Index size = loop.system.dof();
@@ -454,7 +468,10 @@ nlohmann::ordered_json refusals(const TunedArm& arm, const TunedDesign& design,
   }
   if (!result.empty()) return result;
   try {
-    validate(design.settings, arm.model().dof());
+    controller::Settings settings = design.settings;
+    settings.analysis.where = controller::Analysis::Where::kOff;
+    settings.analysis.sampled.interval = 0;
+    (void)controller::Controller(arm.model(), settings);
   } catch (const controller::InvalidSettings& error) {
     result.push_back(refusal_json(error.key(), error.what()));
     return result;

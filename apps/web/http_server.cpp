@@ -13,6 +13,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <exception>
 #include <list>
 #include <stdexcept>
 #include <string_view>
@@ -100,6 +101,8 @@ struct HttpServer::Parts {
 
   HttpAnswer judge(MHD_Connection* connection, std::string_view method) const;
   HttpAnswer judge_post(MHD_Connection* connection) const;
+  MHD_Result take(MHD_Connection* connection, const std::string& path, std::string_view method,
+                  std::string_view data, std::size_t* upload, void** seen);
   MHD_Result answer(MHD_Connection* connection, const std::string& path, std::string_view method);
   MHD_Result open_stream(MHD_Connection* connection);
   ssize_t feed(Stream& stream, char* buffer, std::size_t most);
@@ -164,12 +167,35 @@ HttpAnswer HttpServer::Parts::judge_post(MHD_Connection* connection) const {
   if (header(connection, "Content-Type") != "application/json") {
     return refusal(415, "JSON alone is taken");
   }
+  if (!header(connection, "Transfer-Encoding").empty()) {  // of which the length would not hold
+    return refusal(411, "a body in chunks is not taken");
+  }
   const std::string length = header(connection, "Content-Length");
   if (length.empty() || length.find_first_not_of("0123456789") != std::string::npos) {
     return refusal(411, "the length of the body is missing");
   }
   if (length.size() > 6 || std::stoul(length) > kMostBody) return refusal(413, "too long a body");
   return {};
+}
+
+/// Takes one call of libmicrohttpd for a request: with the headers alone, then with parts of the
+/// body, and at its end.
+MHD_Result HttpServer::Parts::take(MHD_Connection* connection, const std::string& path,
+                                   std::string_view method, std::string_view data,
+                                   std::size_t* upload, void** seen) {
+  *upload = 0;
+  if (*seen == nullptr && !judge(connection, method).body) {
+    *seen = this;
+    client_of(connection).body.clear();
+    return MHD_YES;
+  }
+  if (*seen != nullptr && !data.empty()) {
+    std::string& body = client_of(connection).body;
+    if (body.size() + data.size() > kMostBody) return MHD_NO;
+    body.append(data);
+    return MHD_YES;
+  }
+  return answer(connection, path, method);
 }
 
 MHD_Result HttpServer::Parts::answer(MHD_Connection* connection, const std::string& path,
@@ -286,19 +312,11 @@ HttpServer::HttpServer(int port, HttpContent content) : parts_(std::make_unique<
   const MHD_AccessHandlerCallback handle = [](void* of, MHD_Connection* connection, const char* url,
                                               const char* method, const char*, const char* data,
                                               std::size_t* upload, void** seen) {
-    Parts& self = *static_cast<Parts*>(of);
-    if (*seen == nullptr && self.judge(connection, method).body == nullptr) {
-      *seen = of;  // the headers alone: libmicrohttpd calls again with the body, and at its end
-      self.client_of(connection).body.clear();
-      return MHD_YES;
+    try {  // the library in between is one of C
+      return static_cast<Parts*>(of)->take(connection, url, method, {data, *upload}, upload, seen);
+    } catch (const std::exception&) {
+      return MHD_NO;
     }
-    if (*seen != nullptr && *upload != 0) {  // no more than the Content-Length that was judged
-      self.client_of(connection).body.append(data, *upload);
-      *upload = 0;
-      return MHD_YES;
-    }
-    if (*upload != 0) *upload = 0;
-    return self.answer(connection, url, method);
   };
   const MHD_NotifyConnectionCallback notify = [](void* of, MHD_Connection* connection,
                                                  void** context,

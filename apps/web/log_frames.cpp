@@ -140,7 +140,6 @@ Frame LogFrames::at(double time) {
 }
 
 nlohmann::ordered_json LogFrames::history(std::size_t most) const {
-  using Json = nlohmann::ordered_json;
   const std::size_t stride = entries_.size() / std::max<std::size_t>(most, 1) + 1;
   std::map<int, std::array<std::vector<Json>, 2>> modes;
   std::vector<double> times, tick_times;

@@ -222,7 +222,7 @@ class TuneServer(unittest.TestCase):
                        {'place': 'tip/-1'}, {'place': 3}, {'design': {}} | {'q': 0}, {'design': self.base | {'evil': 1}},
                        {'design': self.base | {'stiffness': [1] * 5}}, {'design': self.base | {'stiffness': [[1] * 6] * 5}},
                        {'design': self.base | {'damping': {'ratio': 3}}}, {'design': self.base | {'damping': {'factor': 2, 'x': 1}}},
-                       {'design': self.base | {'delay': 21}}, {'design': self.base | {'period': -1}}, {'design': self.base | {'mode': 'x'}},
+                       {'design': self.base | {'delay': 21}}, {'design': self.base | {'delay': 1.5}}, {'design': self.base | {'period': -1}}, {'design': self.base | {'mode': 'x'}},
                        {'design': self.base | {'arm': {'urdf': '/etc/passwd'}}}, {'design': self.base | {'arm': {'reflected_inertia': [-1] * 7}}},
                        {'design': self.base | {'arm': {'payload': {'mass': 1e9}}}}, {'design': self.base | {'arm': 3}}):
             status, answer = post('/design', good | change)
@@ -230,6 +230,18 @@ class TuneServer(unittest.TestCase):
             self.assertTrue(answer['error'])
         for change in ({'count': 501}, {'count': -1}, {'count': 1.5}, {'first': '0'}, {'seed': 1 << 40}):
             self.assertEqual(post('/workspace', {'design': self.base, 'seed': 1, 'first': 0, 'count': 1} | change)[0], 400, change)
+        # Of a body in chunks no length is known before.
+        with socket.create_connection(self.server.host.split(':')) as chunks:
+            chunks.sendall((f'POST /design HTTP/1.1\r\nHost: {self.server.host}\r\nX-Dashpot-Token: {token}\r\n'
+                            'Content-Type: application/json\r\nContent-Length: 5\r\n'
+                            'Transfer-Encoding: chunked\r\n\r\n').encode())
+            self.assertIn(b' 411 ', chunks.recv(100))
+        # What only the making of a controller shows is refused as well.
+        bending = self.base | {'arm': {'reflected_inertia': [0.3] * 7, 'gear_stiffness': [1e4] * 7,
+                                       'gear_damping': [1] * 7, 'position_sensor': 'link'}, 'period': 1e-3}
+        status, answer = post('/design', good | {'design': bending})
+        self.assertEqual(status, 200, answer)
+        self.assertIn('limits.stopping_time', json.dumps(answer['refused']))
         # A body that is announced and does not come keeps nobody else waiting.
         with socket.create_connection(self.server.host.split(':')) as slow:
             slow.sendall((f'POST /design HTTP/1.1\r\nHost: {self.server.host}\r\nX-Dashpot-Token: {token}\r\n'
