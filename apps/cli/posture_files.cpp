@@ -5,6 +5,7 @@
 #include <dashpot/lcmtypes/message_reader.hpp>
 
 #include <array>
+#include <fstream>
 #include <string_view>
 
 namespace dashpot::apps {
@@ -54,6 +55,7 @@ std::vector<JointVector> read_log_postures(const std::string& path, int n, doubl
     if (!postures.empty() && !((q - postures.back()).cwiseAbs().maxCoeff() > step)) return;
     postures.push_back(q);
   };
+  if (!std::ifstream(path)) throw InputError("--log", path + ": cannot be read");
   lcmtypes::LogReader log(path, handlers);
   while (log.read()) log.handle();
   if (postures.empty()) throw InputError("--log", path + ": has no states of a controller");

@@ -99,8 +99,8 @@ inline const std::vector<Room>& rooms() {
 
       {"lcmtypes/messages",
        0,
-       {"state_t", "modes_t", "sampled_modes_t", "contact_t", "command_t", "samples", "command_verdict", "bus",
-        "log_file", "message_reader"},
+       {"state_t", "modes_t", "sampled_modes_t", "contact_t", "command_t", "samples",
+        "command_verdict", "bus", "log_file", "message_reader"},
        snapshots},
       {"lcmtypes/publish", 1, {"publisher", "sink"}, snapshots},
       {"lcmtypes/command",
