@@ -86,7 +86,7 @@ std::string doubt(const MeasuredMode& mode, const std::vector<MeasuredMode>& all
     return "too slow for the record";
   }
   // Other orders miss heavily damped modes, but no lightly damped one that is there.
-  const double enough = mode.damping_ratio < 0.1 ? 1e-2 : 1e-3;
+  const double enough = mode.damping_ratio < 0.1 ? 3e-3 : 1e-3;
   if (mode.stability == 0 && mode.energy < enough) return "weak, and in no model of another order";
   if (mode.energy < 1e-6) return "too weak to be told from what is not linear";
   for (const MeasuredMode& other : all) {
