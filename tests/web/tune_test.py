@@ -1,6 +1,8 @@
 """What a browser shows of `dashpot tune`: PROGRAM SOURCE_DIRECTORY. Exit status 77: skipped."""
 import json
 import os
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -87,6 +89,25 @@ class Tune(unittest.TestCase):
     def poles(self):
         return [[p['re'], p['im']] for p in self.value('dashpot.poles')]
 
+    def open_other(self, *options):
+        """Opens the page of another program."""
+        other = subprocess.Popen([PROGRAM, 'tune', '--port', '0', *options], stdout=subprocess.PIPE, text=True, cwd=SOURCE)
+
+        def end():
+            other.send_signal(signal.SIGINT)
+            other.wait()
+            other.stdout.close()
+        self.addCleanup(end)
+        page = other.stdout.readline().split()[0]
+        self.browser.open(page)
+        self.browser.until(CURRENT + " && location.port == '" + page.rstrip('/').split(':')[-1] + "'")
+
+    def same_modes(self, found, expected):
+        self.assertEqual(len(found), len(expected))
+        for a, b in zip(found, expected):
+            self.assertAlmostEqual(a['natural_frequency'], b['natural_frequency'], delta=1e-6 * b['natural_frequency'])
+            self.assertAlmostEqual(a['damping_ratio'], b['damping_ratio'], delta=1e-6)
+
     def analyze(self):
         return json.loads(run('analyze', '-', '--json', text=self.text('matrices for dashpot analyze')))['modes']
 
@@ -142,6 +163,59 @@ class Tune(unittest.TestCase):
                 other.send_signal(signal.SIGINT)
                 other.wait()
                 other.stdout.close()
+
+    def test_exports_keep_the_arm_of_a_configuration(self):
+        folder = tempfile.mkdtemp(prefix='dashpot-tune-')
+        self.addCleanup(shutil.rmtree, folder)
+        panda = os.path.abspath(os.path.join(SOURCE, 'sim/models/panda.urdf'))
+        gains = ('control: {period: 2 ms, mode: cartesian}\ngains: {task: {stiffness: [300, 310, 320, 21, 22, 23], damping: [20, 21, 22, 3, 4, 5]},\n'
+                 '  null_space: {stiffness: 3, damping: 1}}\n')
+        payload = 'payload: {mass: 1.5, center: [0, 0.01, 0.1], inertia: [[0.01, 0, 0.002], [0, 0.02, 0], [0.002, 0, 0.015]]}'
+        arms = {'rigid': f'drives: panda, drives_friction: true, {payload}', 'gears': 'reflected_inertia: 0.5, torque_loop_inertia_ratio: 0.5, '
+                f'viscous_friction: 0.7, gear_stiffness: [9000, none, 9000, 8000, 7000, 7000, 6000], gear_damping: 2, {payload}',
+                'tool': f'drives: fr3, tool: {{position: [0, 0.02, 0.1], rpy: [0.1, 0.2, 0.3]}}, {payload}'}
+        q = ['--q', '0,-0.785,0,-2.356,0,1.571,0.785']
+        for name, arm in arms.items():
+            for change in ('', 'state.a.arm = {reflected_inertia: Array(7).fill(0.3)}', 'state.a.arm = {payload: {mass: 0, center: [0, 0, 0]}}'):
+                with self.subTest(name, change=change):
+                    path = os.path.join(folder, f'{name}.yaml')
+                    with open(path, 'w') as file:
+                        file.write(f'robot: {{urdf: {panda}, base: panda_link0, tip: panda_hand_tcp, {arm}}}\n{gains}'
+                                   'limits: {gain_margin: 1.5, velocity: 2}\nanalysis: {sampled: {delay: 1}}\n')
+                    self.open_other(path, *q)
+                    self.edit(f"state.edited = 'a'; {change}")
+                    modes, text, command, python = (self.value('dashpot.answers.a.modes'), self.text('configuration of Dashpot'), self.text('command'),
+                                                    self.text('Python'))
+                    self.assertIn(f'These keys take the place of those of {path}', text)
+                    self.assertIn('gain_margin: 1.5', text)
+                    self.assertNotIn('integral', text)
+                    self.assertNotIn('cutoff', text)
+                    self.assertIn('reflected_inertia=[0.', python)
+                    self.assertIn('viscous_friction=[' if name != 'tool' else 'tool=[[', python)
+                    self.assertEqual('payload_mass=1.5' in python and 'payload_inertia=[[0.01,0,0.002]' in python, 'payload' not in change)
+                    lines = command.splitlines()
+                    self.assertEqual([line[0] == '#' for line in lines], [True] * (2 if name == 'tool' else 1) + [False] * (len(lines) - (2 if name == 'tool' else 1)))
+                    words = shlex.split('\n'.join(line for line in lines if line[0] != '#').replace('\\\n', ' '))
+                    if name != 'tool':
+                        self.same_modes(json.loads(run(*words[1:], '--json'))['posture']['modes'], modes)
+                    with open(os.path.join(folder, 'tuned.yaml'), 'w') as file:
+                        file.write(text)
+                    self.open_other(os.path.join(folder, 'tuned.yaml'), *q)
+                    self.same_modes(self.value('dashpot.answers.a.modes'), modes)
+                    self.assertEqual(self.value('[dashpot.store.state.a.delay, dashpot.store.state.a.gain_margin]'), [1, 1.5])
+
+    def test_exports_keep_drives_and_payload_of_options(self):
+        self.open_other('--drives', 'panda', '--payload', '500g,0,0,0.1')
+        self.edit("state.edited = 'a'; state.a.damping = {factor: 2}")
+        self.assertFalse(self.value('dashpot.setup.rotors_unknown'))
+        modes = self.value('dashpot.answers.a.modes')
+        words = shlex.split(self.text('command').replace('\\\n', ' '))
+        self.assertIn('0.5,0,0,0.1', words)
+        self.same_modes(json.loads(run(*words[1:], '--json'))['posture']['modes'], modes)
+        self.assertIn('payload: {"mass":0.5,"center":[0,0,0.1]}', self.text('configuration of Dashpot'))
+        for options in (['--drives', 'nobody'], ['--payload', '-1']):
+            done = subprocess.run([PROGRAM, 'tune', '--port', '0', *options], capture_output=True, text=True, cwd=SOURCE)
+            self.assertEqual((done.returncode, options[0] in done.stderr), (2, True), done.stderr)
 
     def test_exports_for_other_controllers(self):
         self.edit("state.edited = 'a'; state.a = {...state.a, stiffness: [400, 400, 400, 36, 36, 36], damping: {factor: 2}, null_stiffness: Array(7).fill(4), null_damping: {factor: 1}}")
