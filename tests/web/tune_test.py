@@ -229,6 +229,11 @@ class Tune(unittest.TestCase):
         self.assertIn('rotational_stiffness: 72', self.text('franka_ros'))  # acts on half of the rotation vector
         self.assertIn('task_stiffness=[400,400,400,36,36,36]', self.text('Python'))
         self.assertNotIn('differ', crisp)
+        self.assertNotIn('first joint', crisp + other)
+        self.edit("state.a.null_stiffness = [9, 4, 4, 4, 4, 4, 4]; state.a.null_damping = {ratio: 0.6}")
+        other = self.text('Cartesian-Impedance-Controller')
+        for words in ('nullspace_stiffness: 9', 'nullspace_damping_factor: 0.6', 'that of the first joint is given', 'has no counterpart there'):
+            self.assertIn(words, other)
         self.edit("state.a.damping = {ratio: 0.7}")
         self.assertIn('differ', self.text('crisp_controllers'))  # it has no full matrix
 

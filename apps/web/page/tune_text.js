@@ -112,13 +112,16 @@ function task(of, name) {
   return {k: diagonal(stiffness).map(round), d: diagonal(damping).map(round), note: lossNote(damping) || lossNote(stiffness)};
 }
 
+const firstJoint = ({null_stiffness: all, null_damping: damping}) => (!all.every((x) => x === all[0]) || (Array.isArray(damping) && !damping.every((x) => x === damping[0]))) &&
+  'The null space has one stiffness there: that of the first joint is given.';
+
 function crisp(of) {
   const {text, k, d, note} = task(of, 'crisp');
   if (text) return text;
   const keys = (letter, values) => values.map((x, i) => `      task.${letter}_${i < 3 ? 'pos' : 'rot'}_${kAxes[i % 3]}: ${x.toString().includes('.') ? x : `${x}.0`}\n`).join('');
   const own = of.design.null_stiffness[0] || 0;
   return notes([note, d.some((x) => x <= 0) && 'A damping that is not positive becomes 2 sqrt(k) there.',
-    !of.design.null_stiffness.every((x) => x === own) && 'The null space has one stiffness there: that of the first joint is given.']) +
+    firstJoint(of.design)]) +
     `cartesian_impedance_controller:\n    ros__parameters:\n${keys('k', k)}${keys('d', d)}      nullspace.stiffness: ${Number.isInteger(own) ? `${own}.0` : own}\n` +
     `      nullspace.projector_type: ${of.design.null_projector === 'kinematic' ? 'kinematic' : 'dynamic'}\n`;
 }
@@ -128,11 +131,13 @@ function cartesianImpedance(of) {
   if (text) return text;
   const factors = d.map((x, i) => round(k[i] > 0 ? x / (2 * Math.sqrt(k[i])) : 0));
   const wrench = (v) => `\n  force: {x: ${v[0]}, y: ${v[1]}, z: ${v[2]}}\n  torque: {x: ${v[3]}, y: ${v[4]}, z: ${v[5]}}\n`;
-  const own = of.design.null_stiffness[0] || 0, ownDamping = nullDamping(of.design)[0] || 0;
-  return notes([note, factors.some((f) => f > 1) && 'It takes damping factors from 0 to 1: those above are cut off there.',
+  const own = of.design.null_stiffness[0] || 0, ownDamping = nullDamping(of.design)[0] || 0, {ratio} = of.design.null_damping;
+  const factor = own > 0 ? round(ratio || ownDamping / (2 * Math.sqrt(own))) : 0;
+  return notes([note, [...factors, factor].some((f) => f > 1) && 'It takes damping factors from 0 to 1: those above are cut off there.',
+    firstJoint(of.design), ratio && own > 0 && 'A damping ratio of the null space has no counterpart there: the factor is that of an inertia of 1 kg m^2.',
     'A message cartesian_impedance_controller/ControllerConfig for set_config.']) +
     `cartesian_stiffness:${wrench(k)}cartesian_damping_factors:${wrench(factors)}nullspace_stiffness: ${own}\n` +
-    `nullspace_damping_factor: ${own > 0 ? round(ownDamping / (2 * Math.sqrt(own))) : 0}\nq_d_nullspace: [${of.q.join(', ')}]\n`;
+    `nullspace_damping_factor: ${factor}\nq_d_nullspace: [${of.q.join(', ')}]\n`;
 }
 
 function frankaRos(of) {
@@ -141,7 +146,7 @@ function frankaRos(of) {
   const stated = k.map((x, i) => (i < 3 ? x : 2 * x));  // it acts on half of the rotation vector
   const mean = (from) => round((stated[from] + stated[from + 1] + stated[from + 2]) / 3);
   const other = d.some((x, i) => Math.abs(x - 2 * Math.sqrt(mean(i < 3 ? 0 : 3))) > 1e-6 * x) || stated.some((x, i) => Math.abs(x - mean(i < 3 ? 0 : 3)) > 1e-6 * x);
-  return notes([other && 'It has one stiffness for translation and one for rotation, and damping is always 2 sqrt(stiffness): the modes differ from those on the page.']) +
+  return notes([firstJoint(of.design), other && 'It has one stiffness for translation and one for rotation, and damping is always 2 sqrt(stiffness): the modes differ from those on the page.']) +
     `translational_stiffness: ${mean(0)}\nrotational_stiffness: ${mean(3)}\nnullspace_stiffness: ${of.design.null_stiffness[0] || 0}\n`;
 }
 
