@@ -358,9 +358,15 @@ class Tune(unittest.TestCase):
         self.assertEqual((len(found), min(found) > 0.6), (6, True))
 
     def test_fits_a_phone(self):
-        self.browser.size(390, 844, 2, True)
-        self.assertLessEqual(self.value('document.documentElement.scrollWidth'), 390)
-        self.browser.size(1400, 1000)
+        self.addCleanup(self.browser.size, 1400, 1000)
+        self.edit("state.edited = 'a'; state.a.damping = {ratio: 0.7}; state.b.arm = {reflected_inertia: Array(7).fill(0.2)}; state.q[1] = -45")
+        self.value("document.querySelectorAll('details').forEach((e) => { e.open = true; })")
+        for width in (390, 320):
+            self.browser.size(width, 844, 2, True)
+            self.assertLessEqual(self.value('document.documentElement.scrollWidth'), width)
+        self.value("document.getElementById('poles').style.height = '40px'; window.dispatchEvent(new Event('resize'))")
+        self.settle()
+        self.browser.until("document.getElementById('poles').height < 100 && dashpot.poles.every((p) => Math.abs(p.y) < 1e3)")
 
 
 if __name__ == '__main__':
