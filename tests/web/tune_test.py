@@ -300,6 +300,41 @@ class Tune(unittest.TestCase):
         self.assertFalse(self.value("document.querySelector('#gains [data-key=stiffness] input').disabled"))
         self.edit("state.a.stiffness[0] = 300")
 
+    def test_texts_that_are_no_numbers_are_marked(self):
+        def shown(selector):
+            return self.value(f"""(() => {{ const e = document.querySelector({json.dumps(selector)}), field = e.closest('.field');
+                return [e.value, e.getAttribute('aria-invalid'), field.querySelector('.wanted').textContent]; }})()""")
+        before = self.value('dashpot.store.state.q')
+        for words in ('1, 2', '0, 0, 0, -1, 0, x, 0', '0 0 0 -1 0 1 2 kg'):
+            self.set('#q', words)
+            self.assertEqual(shown('#q'), [words, 'true', '7 numbers in rad; 45 deg is one'])
+            self.assertEqual(self.value('dashpot.store.state.q'), before)
+        self.set('#q', '[0, −45 deg, 0, -135°, 0, 1.571 rad, .785]')
+        self.assertEqual(self.value('dashpot.store.state.q'), [0, -0.7853981634, 0, -2.35619449, 0, 1.571, 0.785])
+        self.assertEqual(shown('#q')[1:], ['false', ''])
+        self.assertEqual(self.value("document.getElementById('refused').textContent.includes('outside')"), False)
+        self.set('#q', '0, -45, 0, -0.01, 0, 1.5, 0')
+        refused = self.value("[...document.querySelectorAll('#refused li')].map((e) => e.textContent)")
+        self.assertEqual([text for text in refused if 'outside' in text],
+                         ['panda_joint2 at −45.00 rad is outside its limits, −1.763 to 1.763. Degrees are written as -45 deg.',
+                          'panda_joint4 at −0.01000 rad is outside its limits, −3.072 to −0.06980.'])
+        for selector, wrong, good, told in (('#parts [data-key=reflected_inertia] input', '1, 2', '0.2', '7 numbers in kg m², or one for all'),
+                                            ('#parts [data-key=gear_stiffness] input', 'soft', 'none, 5e3, 1, 1, 1, 1, 1', '7 numbers in N m/rad, or one for all; none is one'),
+                                            ('#parts [data-key=payload] input[type=text]', 'heavy', '500 g', 'a number in kg')):
+            arm = self.value('JSON.stringify(dashpot.store.state.a.arm)')
+            self.set(selector, wrong)
+            self.assertEqual(shown(selector), [wrong, 'true', told])
+            self.edit("state.a.stiffness[0] = 310")  # an answer leaves the mark
+            self.assertEqual(shown(selector), [wrong, 'true', told])
+            self.assertEqual(self.value('JSON.stringify(dashpot.store.state.a.arm)'), arm)
+            self.set(selector, good)
+            self.assertEqual(shown(selector)[1:], ['false', ''])
+        self.assertEqual(self.value('dashpot.store.state.a.arm'), {'reflected_inertia': [0.2] * 7, 'gear_stiffness': [None, 5000, 1, 1, 1, 1, 1],
+                                                                 'payload': {'mass': 0.5, 'center': [0, 0, 0]}})
+        self.assertEqual(self.value("document.getElementById('arms').textContent"), 'A and B are on different arms: payload, rotors, gears.')
+        self.edit("state.b.arm = {...state.a.arm}")
+        self.assertEqual(self.value("document.getElementById('arms').textContent"), '')
+
     def test_postures_of_a_list(self):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, 'postures.yaml')
