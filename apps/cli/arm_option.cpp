@@ -33,7 +33,9 @@ std::optional<Eigen::VectorXd> per_joint(const std::string& option, const std::s
   return quantities_per_joint(option, text, controller::joint_units(model, revolute, prismatic));
 }
 
-controller::Payload read_payload(const std::string& text) {
+}  // namespace
+
+controller::Payload read_payload(const std::string& text) try {
   controller::Payload payload;
   if (text.empty()) return payload;
   const auto count = std::count(text.begin(), text.end(), ',') + 1;
@@ -59,10 +61,19 @@ controller::Payload read_payload(const std::string& text) {
     I(0, 2) = I(2, 0) = values[8];
     I(1, 2) = I(2, 1) = values[9];
   }
+  controller::Attachment(payload, {});
   return payload;
+} catch (const controller::InvalidModel& error) {
+  throw InputError("--payload", error.what());
 }
 
-}  // namespace
+void add_payload(CLI::App& command, std::string& payload) {
+  command
+      .add_option(
+          "--payload", payload,
+          "Mass at the tip, its center in the tip's axes, its inertia about that; kg, m, kg m^2")
+      ->option_text("m[,x,y,z[,xx,yy,zz[,xy,xz,yz]]] (0)");
+}
 
 RobotModel read_model(const ArmOptions& options) try {
   controller::ModelOptions model;
@@ -83,12 +94,7 @@ RobotModel read_model(const ArmOptions& options) try {
         per_joint("--viscous-friction", options.viscous_friction, plain, "N m s/rad", "N s/m")
             .value_or(Eigen::VectorXd::Zero(plain.dof()));
   }
-  try {
-    model.payload = read_payload(options.payload);
-    controller::Attachment(model.payload, model.tool);
-  } catch (const controller::InvalidModel& error) {
-    throw InputError("--payload", error.what());
-  }
+  model.payload = read_payload(options.payload);
   RobotModel result = RobotModel::from_urdf_file(options.urdf, options.base, options.tip, model);
   warn_of(result);
   return result;
@@ -168,9 +174,7 @@ void add_model_options(CLI::App& command, ArmOptions& arm) {
       "a,b,...|x (0)");
   command.add_option("--drives", arm.drives, kDrivesHelp)->option_text("NAME")->check(not_empty());
   add_gear_options(command, arm.gears);
-  add("--payload", arm.payload,
-      "Mass at the tip, its center in the tip's axes, its inertia about that; kg, m, kg m^2",
-      "m[,x,y,z[,xx,yy,zz[,xy,xz,yz]]] (0)");
+  add_payload(command, arm.payload);
   add_accept_inertias(command, arm.accept_inertias);
 }
 

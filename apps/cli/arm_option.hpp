@@ -33,6 +33,11 @@ struct ArmOptions {
   bool any() const;  ///< whether any option but `urdf` is there
 };
 
+/// Adds --payload to a command.
+void add_payload(CLI::App& command, std::string& payload);
+/// Reads what is said in it. Throws InputError.
+controller::Payload read_payload(const std::string& text);
+
 /// The arm with its payload, reflected inertia, and the friction that counts. Throws InputError.
 controller::RobotModel read_model(const ArmOptions& options);
 

@@ -1,3 +1,4 @@
+#include <dashpot/apps/cli/arm_option.hpp>
 #include <dashpot/apps/cli/posture_option.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
@@ -20,7 +21,7 @@ namespace {
 constexpr int kTunePort = 8025;
 
 struct TuneOptions {
-  std::string config, urdf, base, tip;
+  std::string config, urdf, base, tip, drives, payload;
   PostureOption posture;
   PosturesOption postures;  ///< a file or a log
   int port = kTunePort;
@@ -74,6 +75,8 @@ TuneSite make_site(const TuneOptions& options) try {
   const bool own = !options.urdf.empty();
   controller::RobotDescription robot{options.urdf, options.base, options.tip, {}};
   if (!own) robot = {panda_path(), "panda_link0", "panda_hand_tcp", {}};
+  take_drives(options.drives, robot.options);
+  robot.options.payload = read_payload(options.payload);
   TunedArm arm(robot, nullptr);
   auto a = design_json(arm);
   a["mode"] = "cartesian";
@@ -89,7 +92,8 @@ TuneSite make_site(const TuneOptions& options) try {
   TuneStart start{q, {a, b}, "", listed(options, arm.model())};
   return {std::move(arm), std::move(start)};
 } catch (const controller::InvalidModel& error) {
-  throw InputError("--urdf", error.what());
+  const std::string what = error.what();
+  throw what.starts_with("drives:") ? model_error(error) : InputError("--urdf", what);
 }
 
 void run_tune(const TuneOptions& options) {
@@ -128,6 +132,11 @@ void add_tune(CLI::App& program) {
                          ->option_text("LINK")
                          ->needs(urdf);
   urdf->needs(base)->needs(tip);
+  command->add_option("--drives", options->drives, kDrivesHelp)
+      ->option_text("NAME")
+      ->check(not_empty());
+  add_payload(*command, options->payload);
+  for (const char* name : {"--drives", "--payload"}) command->get_option(name)->excludes(config);
   options->posture.add(*command);
   CLI::Option* file = command
                           ->add_option("--postures", options->postures.file,

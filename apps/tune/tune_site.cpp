@@ -87,10 +87,12 @@ TunePage TuneSite::setup() const {
                         {{"urdf", std::filesystem::absolute(arm_.robot().urdf).lexically_normal()},
                          {"base", arm_.robot().base},
                          {"tip", arm_.robot().tip},
-                         {"config", start_.config}}},
+                         {"config", start_.config},
+                         {"keys", robot_keys(arm_.robot())}}},
                        {"q", json_list(start_.q)},
                        {"designs", start_.designs},
                        {"presets", presets_json(model.dof())},
+                       {"usual_margin", controller::Settings().limits.gain_margin},
                        {"rotors_unknown", rotors.any()},
                        {"postures", TunePage::array()},
                        {"published", nullptr}};

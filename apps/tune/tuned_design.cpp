@@ -148,6 +148,46 @@ controller::Settings settings_of(const TunedArm& arm, const controller::AuditOpt
 
 }  // namespace
 
+TuneJson robot_keys(const controller::RobotDescription& robot) {
+  const controller::ModelOptions plain, &options = robot.options;
+  TuneJson keys = TuneJson::object();
+  if (options.gravity != plain.gravity) keys["gravity"] = json_list(options.gravity);
+  if (!options.include_off_chain) keys["include_off_chain"] = false;
+  if (options.accept_inertias) keys["accept_inertias"] = true;
+  if (!options.accept_inertias_of.empty()) keys["accept_inertias"] = options.accept_inertias_of;
+  if (!options.drives.empty()) keys["drives"] = options.drives;
+  for (const auto& [key, values] :
+       {std::pair("reflected_inertia", &options.reflected_inertia),
+        {"torque_loop_inertia_ratio", &options.torque_loop_inertia_ratio},
+        {"viscous_friction", &options.viscous_friction},
+        {"coulomb_friction", &options.coulomb_friction},
+        {"gear_stiffness", &options.gear_stiffness},
+        {"gear_damping", &options.gear_damping}}) {
+    if (values->size() > 0) keys[key] = json_list(*values);
+  }
+  if (keys.contains("gear_stiffness")) {
+    for (TuneJson& one : keys["gear_stiffness"]) {
+      if (!one.is_number() || std::isinf(one.get<double>())) one = "none";
+    }
+  }
+  if (options.position_sensor == controller::PositionSensor::kLink) {
+    keys["position_sensor"] = "link";
+  }
+  const controller::Payload& payload = options.payload;
+  if (payload.mass > 0) {
+    keys["payload"] = {{"mass", payload.mass}, {"center", json_list(payload.center)}};
+    if (!payload.inertia.isZero(0)) keys["payload"]["inertia"] = json_rows(payload.inertia);
+  }
+  const Eigen::Matrix3d& R = options.tool.rotation;
+  if (!options.tool.position.isZero(0) || !R.isIdentity(0)) {
+    const Eigen::Vector3d rpy{std::atan2(R(2, 1), R(2, 2)),
+                              std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0))),
+                              std::atan2(R(1, 0), R(0, 0))};
+    keys["tool"] = {{"position", json_list(options.tool.position)}, {"rpy", json_list(rpy)}};
+  }
+  return keys;
+}
+
 JointVector read_numbers(const std::string& key, const TuneJson& list, Eigen::Index n) {
   if (!list.is_array() || static_cast<Eigen::Index>(list.size()) != n) {
     throw InputError(key, "has to be a list of " + std::to_string(n) + " numbers");
@@ -206,8 +246,10 @@ TunedArm TunedArm::with(const TuneJson& parts) const {
       if (one == 0) one = std::numeric_limits<double>::infinity();
     }
   }
-  if (second_at(parts, "position_sensor", "motor", "link")) {
-    options.position_sensor = controller::PositionSensor::kLink;
+  if (!value_at(parts, "position_sensor").is_null()) {
+    options.position_sensor = second_at(parts, "position_sensor", "motor", "link")
+                                  ? controller::PositionSensor::kLink
+                                  : controller::PositionSensor::kMotor;
   }
   return {robot, urdf_, own_settings_ ? &settings_ : nullptr};
 }

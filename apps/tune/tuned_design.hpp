@@ -52,6 +52,10 @@ TunedDesign read_design(const TunedArm& arm, const nlohmann::ordered_json& desig
 /// Returns the gains of settings as the page tells them, the inverse of read_design.
 nlohmann::ordered_json design_json(const TunedArm& arm);
 
+/// Returns what the description of the arm says besides its URDF, base and tip, under the keys that
+/// a configuration has in `robot`; a key that has its default is missing.
+nlohmann::ordered_json robot_keys(const controller::RobotDescription& robot);
+
 /// Reads n finite numbers. Throws InputError.
 controller::JointVector read_numbers(const std::string& key, const nlohmann::ordered_json& list,
                                      Eigen::Index n);

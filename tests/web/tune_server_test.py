@@ -194,6 +194,17 @@ class TuneServer(unittest.TestCase):
         self.same_modes(found['modes'], told['modes'])
         self.assertAlmostEqual(found['gain_margin'], told['gain_margin'], delta=1e-5 * told['gain_margin'])
 
+    def test_answers_the_request_of_the_document(self):
+        with open(os.path.join(SOURCE, 'docs/tuning-page.md')) as file:
+            script = file.read().split('```sh\n')[1].split('```')[0]
+        if not shutil.which('curl'):
+            self.skipTest('no curl on this machine')
+        done = subprocess.run(['bash', '-c', script.replace('127.0.0.1:8025', self.server.host)], capture_output=True, text=True)
+        answer = json.loads(done.stdout)
+        self.assertEqual(len(answer['modes']), 6, answer)
+        design = {'stiffness': [400] * 3 + [20] * 3, 'damping': {'ratio': 0.7}, 'arm': {'payload': {'mass': 1}}}
+        self.same_modes(answer['modes'], self.server.design(design, [0, -0.785, 0, -2.356, 0, 1.571, 0.785])['modes'])
+
     def test_begins_with_the_paper_and_the_panda(self):
         server = Server()
         self.addCleanup(server.stop)

@@ -1,6 +1,8 @@
 """What a browser shows of `dashpot tune`: PROGRAM SOURCE_DIRECTORY. Exit status 77: skipped."""
 import json
 import os
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -87,6 +89,25 @@ class Tune(unittest.TestCase):
     def poles(self):
         return [[p['re'], p['im']] for p in self.value('dashpot.poles')]
 
+    def open_other(self, *options):
+        """Opens the page of another program."""
+        other = subprocess.Popen([PROGRAM, 'tune', '--port', '0', *options], stdout=subprocess.PIPE, text=True, cwd=SOURCE)
+
+        def end():
+            other.send_signal(signal.SIGINT)
+            other.wait()
+            other.stdout.close()
+        self.addCleanup(end)
+        page = other.stdout.readline().split()[0]
+        self.browser.open(page)
+        self.browser.until(CURRENT + " && location.port == '" + page.rstrip('/').split(':')[-1] + "'")
+
+    def same_modes(self, found, expected):
+        self.assertEqual(len(found), len(expected))
+        for a, b in zip(found, expected):
+            self.assertAlmostEqual(a['natural_frequency'], b['natural_frequency'], delta=1e-6 * b['natural_frequency'])
+            self.assertAlmostEqual(a['damping_ratio'], b['damping_ratio'], delta=1e-6)
+
     def analyze(self):
         return json.loads(run('analyze', '-', '--json', text=self.text('matrices for dashpot analyze')))['modes']
 
@@ -143,6 +164,59 @@ class Tune(unittest.TestCase):
                 other.wait()
                 other.stdout.close()
 
+    def test_exports_keep_the_arm_of_a_configuration(self):
+        folder = tempfile.mkdtemp(prefix='dashpot-tune-')
+        self.addCleanup(shutil.rmtree, folder)
+        panda = os.path.abspath(os.path.join(SOURCE, 'sim/models/panda.urdf'))
+        gains = ('control: {period: 2 ms, mode: cartesian}\ngains: {task: {stiffness: [300, 310, 320, 21, 22, 23], damping: [20, 21, 22, 3, 4, 5]},\n'
+                 '  null_space: {stiffness: 3, damping: 1}}\n')
+        payload = 'payload: {mass: 1.5, center: [0, 0.01, 0.1], inertia: [[0.01, 0, 0.002], [0, 0.02, 0], [0.002, 0, 0.015]]}'
+        arms = {'rigid': f'drives: panda, drives_friction: true, {payload}', 'gears': 'reflected_inertia: 0.5, torque_loop_inertia_ratio: 0.5, '
+                f'viscous_friction: 0.7, gear_stiffness: [9000, none, 9000, 8000, 7000, 7000, 6000], gear_damping: 2, {payload}',
+                'tool': f'drives: fr3, tool: {{position: [0, 0.02, 0.1], rpy: [0.1, 0.2, 0.3]}}, {payload}'}
+        q = ['--q', '0,-0.785,0,-2.356,0,1.571,0.785']
+        for name, arm in arms.items():
+            for change in ('', 'state.a.arm = {reflected_inertia: Array(7).fill(0.3)}', 'state.a.arm = {payload: {mass: 0, center: [0, 0, 0]}}'):
+                with self.subTest(name, change=change):
+                    path = os.path.join(folder, f'{name}.yaml')
+                    with open(path, 'w') as file:
+                        file.write(f'robot: {{urdf: {panda}, base: panda_link0, tip: panda_hand_tcp, {arm}}}\n{gains}'
+                                   'limits: {gain_margin: 1.5, velocity: 2}\nanalysis: {sampled: {delay: 1}}\n')
+                    self.open_other(path, *q)
+                    self.edit(f"state.edited = 'a'; {change}")
+                    modes, text, command, python = (self.value('dashpot.answers.a.modes'), self.text('configuration of Dashpot'), self.text('command'),
+                                                    self.text('Python'))
+                    self.assertIn(f'These keys take the place of those of {path}', text)
+                    self.assertIn('gain_margin: 1.5', text)
+                    self.assertNotIn('integral', text)
+                    self.assertNotIn('cutoff', text)
+                    self.assertIn('reflected_inertia=[0.', python)
+                    self.assertIn('viscous_friction=[' if name != 'tool' else 'tool=[[', python)
+                    self.assertEqual('payload_mass=1.5' in python and 'payload_inertia=[[0.01,0,0.002]' in python, 'payload' not in change)
+                    lines = command.splitlines()
+                    self.assertEqual([line[0] == '#' for line in lines], [True] * (2 if name == 'tool' else 1) + [False] * (len(lines) - (2 if name == 'tool' else 1)))
+                    words = shlex.split('\n'.join(line for line in lines if line[0] != '#').replace('\\\n', ' '))
+                    if name != 'tool':
+                        self.same_modes(json.loads(run(*words[1:], '--json'))['posture']['modes'], modes)
+                    with open(os.path.join(folder, 'tuned.yaml'), 'w') as file:
+                        file.write(text)
+                    self.open_other(os.path.join(folder, 'tuned.yaml'), *q)
+                    self.same_modes(self.value('dashpot.answers.a.modes'), modes)
+                    self.assertEqual(self.value('[dashpot.store.state.a.delay, dashpot.store.state.a.gain_margin]'), [1, 1.5])
+
+    def test_exports_keep_drives_and_payload_of_options(self):
+        self.open_other('--drives', 'panda', '--payload', '500g,0,0,0.1')
+        self.edit("state.edited = 'a'; state.a.damping = {factor: 2}")
+        self.assertFalse(self.value('dashpot.setup.rotors_unknown'))
+        modes = self.value('dashpot.answers.a.modes')
+        words = shlex.split(self.text('command').replace('\\\n', ' '))
+        self.assertIn('0.5,0,0,0.1', words)
+        self.same_modes(json.loads(run(*words[1:], '--json'))['posture']['modes'], modes)
+        self.assertIn('payload: {"mass":0.5,"center":[0,0,0.1]}', self.text('configuration of Dashpot'))
+        for options in (['--drives', 'nobody'], ['--payload', '-1']):
+            done = subprocess.run([PROGRAM, 'tune', '--port', '0', *options], capture_output=True, text=True, cwd=SOURCE)
+            self.assertEqual((done.returncode, options[0] in done.stderr), (2, True), done.stderr)
+
     def test_exports_for_other_controllers(self):
         self.edit("state.edited = 'a'; state.a = {...state.a, stiffness: [400, 400, 400, 36, 36, 36], damping: {factor: 2}, null_stiffness: Array(7).fill(4), null_damping: {factor: 1}}")
         crisp = self.text('crisp_controllers')
@@ -155,6 +229,11 @@ class Tune(unittest.TestCase):
         self.assertIn('rotational_stiffness: 72', self.text('franka_ros'))  # acts on half of the rotation vector
         self.assertIn('task_stiffness=[400,400,400,36,36,36]', self.text('Python'))
         self.assertNotIn('differ', crisp)
+        self.assertNotIn('first joint', crisp + other)
+        self.edit("state.a.null_stiffness = [9, 4, 4, 4, 4, 4, 4]; state.a.null_damping = {ratio: 0.6}")
+        other = self.text('Cartesian-Impedance-Controller')
+        for words in ('nullspace_stiffness: 9', 'nullspace_damping_factor: 0.6', 'that of the first joint is given', 'has no counterpart there'):
+            self.assertIn(words, other)
         self.edit("state.a.damping = {ratio: 0.7}")
         self.assertIn('differ', self.text('crisp_controllers'))  # it has no full matrix
 
@@ -221,6 +300,41 @@ class Tune(unittest.TestCase):
         self.assertFalse(self.value("document.querySelector('#gains [data-key=stiffness] input').disabled"))
         self.edit("state.a.stiffness[0] = 300")
 
+    def test_texts_that_are_no_numbers_are_marked(self):
+        def shown(selector):
+            return self.value(f"""(() => {{ const e = document.querySelector({json.dumps(selector)}), field = e.closest('.field');
+                return [e.value, e.getAttribute('aria-invalid'), field.querySelector('.wanted').textContent]; }})()""")
+        before = self.value('dashpot.store.state.q')
+        for words in ('1, 2', '0, 0, 0, -1, 0, x, 0', '0 0 0 -1 0 1 2 kg'):
+            self.set('#q', words)
+            self.assertEqual(shown('#q'), [words, 'true', '7 numbers in rad; 45 deg is one'])
+            self.assertEqual(self.value('dashpot.store.state.q'), before)
+        self.set('#q', '[0, −45 deg, 0, -135°, 0, 1.571 rad, .785]')
+        self.assertEqual(self.value('dashpot.store.state.q'), [0, -0.7853981634, 0, -2.35619449, 0, 1.571, 0.785])
+        self.assertEqual(shown('#q')[1:], ['false', ''])
+        self.assertEqual(self.value("document.getElementById('refused').textContent.includes('outside')"), False)
+        self.set('#q', '0, -45, 0, -0.01, 0, 1.5, 0')
+        refused = self.value("[...document.querySelectorAll('#refused li')].map((e) => e.textContent)")
+        self.assertEqual([text for text in refused if 'outside' in text],
+                         ['panda_joint2 at −45.00 rad is outside its limits, −1.763 to 1.763. Degrees are written as -45 deg.',
+                          'panda_joint4 at −0.01000 rad is outside its limits, −3.072 to −0.06980.'])
+        for selector, wrong, good, told in (('#parts [data-key=reflected_inertia] input', '1, 2', '0.2', '7 numbers in kg m², or one for all'),
+                                            ('#parts [data-key=gear_stiffness] input', 'soft', 'none, 5e3, 1, 1, 1, 1, 1', '7 numbers in N m/rad, or one for all; none is one'),
+                                            ('#parts [data-key=payload] input[type=text]', 'heavy', '500 g', 'a number in kg')):
+            arm = self.value('JSON.stringify(dashpot.store.state.a.arm)')
+            self.set(selector, wrong)
+            self.assertEqual(shown(selector), [wrong, 'true', told])
+            self.edit("state.a.stiffness[0] = 310")  # an answer leaves the mark
+            self.assertEqual(shown(selector), [wrong, 'true', told])
+            self.assertEqual(self.value('JSON.stringify(dashpot.store.state.a.arm)'), arm)
+            self.set(selector, good)
+            self.assertEqual(shown(selector)[1:], ['false', ''])
+        self.assertEqual(self.value('dashpot.store.state.a.arm'), {'reflected_inertia': [0.2] * 7, 'gear_stiffness': [None, 5000, 1, 1, 1, 1, 1],
+                                                                 'payload': {'mass': 0.5, 'center': [0, 0, 0]}})
+        self.assertEqual(self.value("document.getElementById('arms').textContent"), 'A and B are on different arms: payload, rotors, gears.')
+        self.edit("state.b.arm = {...state.a.arm}")
+        self.assertEqual(self.value("document.getElementById('arms').textContent"), '')
+
     def test_postures_of_a_list(self):
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, 'postures.yaml')
@@ -279,9 +393,15 @@ class Tune(unittest.TestCase):
         self.assertEqual((len(found), min(found) > 0.6), (6, True))
 
     def test_fits_a_phone(self):
-        self.browser.size(390, 844, 2, True)
-        self.assertLessEqual(self.value('document.documentElement.scrollWidth'), 390)
-        self.browser.size(1400, 1000)
+        self.addCleanup(self.browser.size, 1400, 1000)
+        self.edit("state.edited = 'a'; state.a.damping = {ratio: 0.7}; state.b.arm = {reflected_inertia: Array(7).fill(0.2)}; state.q[1] = -45")
+        self.value("document.querySelectorAll('details').forEach((e) => { e.open = true; })")
+        for width in (390, 320):
+            self.browser.size(width, 844, 2, True)
+            self.assertLessEqual(self.value('document.documentElement.scrollWidth'), width)
+        self.value("document.getElementById('poles').style.height = '40px'; window.dispatchEvent(new Event('resize'))")
+        self.settle()
+        self.browser.until("document.getElementById('poles').height < 100 && dashpot.poles.every((p) => Math.abs(p.y) < 1e3)")
 
 
 if __name__ == '__main__':

@@ -94,7 +94,7 @@ export class PoleMap {
     const bx = unstable ? w * 0.6 : w - 40, by = h - 36;  // the lower half is the mirror image
     this.base = [bx, by];
     const [x0, y0] = this.origin = [bx + this.shift[0], by + this.shift[1]];
-    const R = Math.min(bx - 30, by - 22) * this.zoom;
+    const R = Math.max(1, Math.min(bx - 30, by - 22)) * this.zoom;
     const from = Math.max(least / 2, most * 1e-6);
     const radius = (r) => R * Math.log1p(r / from) / Math.log1p(most / from);
     const place = (re, im) => {

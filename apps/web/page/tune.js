@@ -4,7 +4,7 @@ import {Plot, View} from '/curves.js';
 import {followTheme, markElement, number, reducedMotion} from '/draw.js';
 import {PoleMap} from '/poles.js';
 import {dragTip} from '/tune_arm.js';
-import {plain, slider} from '/tune_form.js';
+import {attend, numbers, plain, slider} from '/tune_form.js';
 import {gainFields, loopFields, partFields, structure} from '/tune_gains.js';
 import {Newest, Store, Workspace, post} from '/tune_state.js';
 import {kFormats} from '/tune_text.js';
@@ -67,11 +67,14 @@ if (setup.postures.length) {
   $('posture').prepend(field.element);
   posture.push(field);
 }
-$('q').addEventListener('change', () => {
-  const q = $('q').value.split(/[,\s]+/).filter(Boolean).map(Number);
-  if (q.length === setup.q.length && q.every(Number.isFinite)) edit((state) => { state.q = q; }, true);
-  else refresh();
-});
+const unitOf = (i) => (setup.arm.joints[i] && setup.arm.joints[i].prismatic ? 'm' : 'rad');
+const all = attend($('q'), {wanted: `${setup.q.length} numbers in ${[...new Set(setup.q.map((_, i) => unitOf(i)))].join(' or ')}; 45 deg is one`, get: () => store.state.q, take: (words) => {
+  const q = numbers(words, unitOf);
+  if (!q || q.length !== setup.q.length) return false;
+  edit((state) => { state.q = q; }, true);
+  return true;
+}});
+$('q').parentElement.append(all.note);
 function build() {
   const key = `${store.state.edited} ${structure(design())}`;
   if (key === built) return;
@@ -86,7 +89,7 @@ function build() {
 }
 function refresh() {
   for (const field of [...posture, ...fields]) field.refresh();
-  if (document.activeElement !== $('q')) $('q').value = store.state.q.map(plain).join(', ');
+  if (!all.wrong() && document.activeElement !== $('q')) $('q').value = store.state.q.map(plain).join(', ');
   $('design_name').textContent = store.state.edited.toUpperCase();
   for (const button of $('which').children) button.setAttribute('aria-pressed', button.dataset.design === store.state.edited);
   $('undo').disabled = !store.past.length;
@@ -209,6 +212,19 @@ const row = (...cells) => {
   return element;
 };
 
+/// What the arms of the two designs do not share.
+function armDifference() {
+  const names = {payload: 'payload', reflected_inertia: 'rotors', viscous_friction: 'friction', gear_stiffness: 'gears', gear_damping: "gears' damping",
+    position_sensor: 'where joints are measured'};
+  const told = (name, key) => {
+    const value = (store.design(name).arm || {})[key] || setup.robot.keys[key] || setup.model[key] || null;
+    if (key === 'payload') return value && value.mass > 0 ? [value.mass, value.center || [0, 0, 0], value.inertia] : null;
+    if (key === 'position_sensor') return value || 'motor';
+    return value && value.map((x) => (x === 'none' ? null : x));
+  };
+  return Object.keys(names).filter((key) => JSON.stringify(told('a', key)) !== JSON.stringify(told('b', key))).map((key) => names[key]);
+}
+
 /// Tables, chips, arrows and texts: all but the drawings.
 function tell() {
   const [a, b] = kDesigns.map((name) => answer(name)), modes = (from, i) => (from && from.modes[i]) || null;
@@ -231,10 +247,22 @@ function tell() {
   const limits = kDesigns.map((name, i) => [a, b][i] && [a, b][i].limit && `${name.toUpperCase()} is limited by a motion at ${number([a, b][i].limit.frequency, 3)} rad/s` +
     `${[a, b][i].limit.joint ? `, most of it in ${[a, b][i].limit.joint}` : ''}`).filter(Boolean);
   $('limits').textContent = limits.map((text) => `${text}.`).join(' ');
+  const different = armDifference();
+  $('arms').textContent = different.length ? `A and B are on different arms: ${different.join(', ')}.` : '';
   tellRefused();
   tellChips();
   tellArrows();
   tellText();
+}
+
+/// What is to be said of joints outside their limits.
+function outside() {
+  return setup.arm.joints.flatMap(({name, lower, upper, prismatic}, i) => {
+    const x = store.state.q[i], bound = (limit) => (Number.isFinite(limit) ? limit : null), [low, high] = [bound(lower), bound(upper)];
+    if ((low === null || x >= low - 1e-9) && (high === null || x <= high + 1e-9)) return [];
+    const degrees = !prismatic && Math.abs(x) > 2 * Math.PI ? ` Degrees are written as ${plain(x)} deg.` : '';
+    return [{key: 'q', reason: `${name} at ${number(x)} ${unitOf(i)} is outside its limits, ${[low, high].map((limit) => (limit === null ? 'none' : number(limit))).join(' to ')}.${degrees}`}];
+  });
 }
 
 function tellRefused() {
@@ -245,7 +273,7 @@ function tellRefused() {
   } else {
     $('reads').textContent = '';
   }
-  $('refused').replaceChildren(...all.map(({reason}) => {
+  $('refused').replaceChildren(...all.concat(outside()).map(({reason}) => {
     const item = document.createElement('li');
     item.textContent = reason;
     return item;
@@ -256,7 +284,7 @@ function tellRefused() {
     field.classList.toggle('bad', !!hit);
     if (hit) field.title = hit.reason;
     else if (!field.classList.contains('matrix')) field.removeAttribute('title');
-    for (const input of field.querySelectorAll('input, select')) input.setAttribute('aria-invalid', !!hit);
+    for (const input of field.querySelectorAll('input, select')) input.setAttribute('aria-invalid', !!hit || input.classList.contains('wrong'));
   }
 }
 

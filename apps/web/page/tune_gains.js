@@ -88,7 +88,8 @@ export function partFields(edit, design, setup) {
     else arm()[key] = value;
   };
   const joints = (key, label, unit, none) => list(edit, {label, key, unit, count: n, none, get: () => arm()[key] || null, set: (x) => set(key, x)});
-  const payload = () => arm().payload || {mass: setup.model.payload, center: [0, 0, 0]};
+  const loaded = setup.robot.keys;
+  const payload = () => arm().payload || {mass: setup.model.payload, center: (loaded.payload || {center: [0, 0, 0]}).center};
   const fields = [slider(edit, {label: 'payload', key: 'payload', unit: 'kg', low: 0, high: 20, get: () => payload().mass, set: (x) => set('payload', {...payload(), mass: x})}),
     list(edit, {label: 'its centre', key: 'payload', unit: 'm', count: 3, get: () => payload().center, set: (x) => set('payload', {...payload(), center: x || [0, 0, 0]})}),
     joints('reflected_inertia', 'rotors', 'kg m²')];
@@ -97,5 +98,5 @@ export function partFields(edit, design, setup) {
   }
   return fields.concat([joints('viscous_friction', 'friction', 'N m s/rad'), joints('gear_stiffness', 'gears', 'N m/rad', 'none'), joints('gear_damping', 'their damping', 'N m s/rad'),
     choice(edit, {label: 'joints measured', key: 'position_sensor', options: [['motor', 'at the motors'], ['link', 'at the links']],
-      get: () => arm().position_sensor || 'motor', set: (x) => set('position_sensor', x === 'motor' ? null : x)})]);
+      get: () => arm().position_sensor || loaded.position_sensor || 'motor', set: (x) => set('position_sensor', x === (loaded.position_sensor || 'motor') ? null : x)})]);
 }

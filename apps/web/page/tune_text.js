@@ -19,14 +19,27 @@ const notes = (lines) => lines.filter(Boolean).map((line) => `# ${line}\n`).join
 const lossNote = (matrix) => matrix && !isDiagonal(matrix) && !matrix.every((row, i) => row.every((x, j) => i === j || Math.abs(x) < 1e-9 * Math.max(...diagonal(matrix).map(Math.abs))))
   && 'This form has no entries beside the diagonal: the modes differ from those on the page.';
 
+/// What the keys of a configuration's `robot` say of the arm: those that the program was started
+/// with, and what the page has in their place.
+function armKeys({setup, design}) {
+  const arm = design.arm || {}, keys = {...setup.robot.keys};
+  for (const [key, value] of Object.entries(arm)) {
+    if (value) keys[key] = key === 'gear_stiffness' ? value.map((k) => k || 'none') : value;
+  }
+  if (arm.reflected_inertia) delete keys.drives;
+  if (!keys.gear_stiffness) delete keys.gear_damping;
+  return keys;
+}
+/// The rotors' inertia that acts, or null where there is none.
+function rotors({setup, design}) {
+  const told = (design.arm || {}).reflected_inertia, left = setup.robot.keys.torque_loop_inertia_ratio;
+  const acts = told ? told.map((x, i) => (left ? round(x * left[i]) : x)) : setup.model.reflected_inertia;
+  return acts.some(Boolean) ? acts : null;
+}
+
 function configuration({setup, q, design, answer}) {
   const {stiffness, damping} = acting({answer});
-  const gains = {}, robot = {urdf: setup.robot.urdf, base: setup.robot.base, tip: setup.robot.tip};
-  const arm = design.arm || {};
-  for (const key of ['reflected_inertia', 'viscous_friction', 'gear_damping', 'position_sensor', 'payload']) {
-    if (arm[key]) robot[key] = arm[key];
-  }
-  if (arm.gear_stiffness) robot.gear_stiffness = arm.gear_stiffness.map((k) => k || 'none');
+  const gains = {}, robot = {urdf: setup.robot.urdf, base: setup.robot.base, tip: setup.robot.tip, ...armKeys({setup, design})};
   const pair = (told, K, C) => (told.ratio ? {stiffness: short(K), damping_ratio: told.ratio} : {stiffness: short(K), damping: short(C)});
   if (design.mode === 'joint') {
     gains.joint = pair(design.joint_damping, asRows(design.joint_stiffness), damping);
@@ -35,31 +48,38 @@ function configuration({setup, q, design, answer}) {
     gains.task = {...pair(design.damping, K, damping), frame: design.frame || 'base'};
     gains.null_space = pair(design.null_damping, design.null_stiffness, nullDamping(design));
   }
-  const sections = {robot, control: {period: design.period, mode: design.mode}, gains, limits: {gain_margin: design.gain_margin},
-    integral: {time: design.integral_time},
-    analysis: {sampled: {delay: design.delay, cutoff: design.cutoff, difference_velocity: design.difference_velocity}}};
+  const loaded = setup.robot.config ? setup.designs[0] : {};
+  const unusual = (key, usual, name = key) => (design[key] === usual && (loaded[key] === undefined || loaded[key] === usual) ? {} : {[name]: design[key]});
+  const sampled = {...unusual('delay', 0), ...unusual('cutoff', 0), ...unusual('difference_velocity', false)};
+  const sections = {robot, control: {period: design.period, mode: design.mode}, gains, limits: unusual('gain_margin', setup.usual_margin),
+    integral: unusual('integral_time', 0, 'time'), analysis: Object.keys(sampled).length ? {sampled} : {}};
   const refused = answer.refused.map(({key, reason}) => `The controller refuses it: ${key}: ${reason}.`);
-  const lines = Object.entries(sections).map(([key, value]) => `${key}:\n` +
+  const lines = Object.entries(sections).filter(([, value]) => Object.keys(value).length).map(([key, value]) => `${key}:\n` +
     Object.entries(value).map(([name, inner]) => `  ${name}: ${JSON.stringify(inner)}\n`).join(''));
-  return notes([setup.robot.config && `These sections take the place of those of ${setup.robot.config}.`, `q: ${JSON.stringify(q)}`, ...refused]) + lines.join('');
+  return notes([setup.robot.config && `These keys take the place of those of ${setup.robot.config}, which keeps its others.`, `q: ${JSON.stringify(q)}`, ...refused]) + lines.join('');
 }
+
+/// A word for a shell.
+const quoted = (word) => (/^[\w./:,=@%+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`);
 
 /// Options of the programs that tell the arm.
 function armOptions({setup, design}) {
-  const arm = design.arm || {}, words = [`--urdf ${setup.robot.urdf} --base ${setup.robot.base} --tip ${setup.robot.tip}`];
+  const keys = armKeys({setup, design}), words = [`--urdf ${quoted(setup.robot.urdf)} --base ${quoted(setup.robot.base)} --tip ${quoted(setup.robot.tip)}`];
   const list = (name, values) => values && words.push(`--${name} ${values.join(',')}`);
-  list('reflected-inertia', arm.reflected_inertia || (setup.model.reflected_inertia.some(Boolean) && setup.model.reflected_inertia));
-  list('viscous-friction', arm.viscous_friction || setup.model.viscous_friction);
-  list('gear-stiffness', arm.gear_stiffness && arm.gear_stiffness.map((k) => k || 'none'));
-  list('gear-damping', arm.gear_stiffness && arm.gear_damping);
-  if (arm.position_sensor === 'link') words.push('--position-sensor link');
-  if (arm.payload && arm.payload.mass > 0) list('payload', [arm.payload.mass, ...(arm.payload.center || [0, 0, 0])]);
+  list('reflected-inertia', rotors({setup, design}));
+  list('viscous-friction', keys.viscous_friction || setup.model.viscous_friction);
+  list('gear-stiffness', keys.gear_stiffness);
+  list('gear-damping', keys.gear_damping);
+  if (keys.gear_stiffness && keys.position_sensor === 'link') words.push('--position-sensor link');
+  const {mass, center, inertia: I} = keys.payload || {};
+  if (mass > 0) list('payload', [mass, ...(center || [0, 0, 0]), ...(I ? [...diagonal(I), I[0][1], I[0][2], I[1][2]] : [])]);
+  if (keys.accept_inertias) words.push(keys.accept_inertias === true ? '--accept-inertias' : quoted(`--accept-inertias=${keys.accept_inertias.join(',')}`));
   return words;
 }
 
 function command(of) {
   const {setup, q, design} = of, words = armOptions(of);
-  if (setup.robot.config) words.unshift(`# the arm as ${setup.robot.config} has it, as far as options tell it\n`);
+  const without = ['tool', 'include_off_chain'].filter((key) => setup.robot.keys[key] !== undefined);
   const joint = design.mode === 'joint', told = joint ? design.joint_damping : design.damping;
   const stiffness = joint ? design.joint_stiffness : design.stiffness;
   const loop = design.period > 0 ? [`--period ${design.period}`, design.delay && `--delay ${design.delay}`, design.cutoff && `--cutoff ${design.cutoff}`,
@@ -79,7 +99,8 @@ function command(of) {
     if (design.rotation === 'half-quaternion') gains.push('--rotation half-quaternion');
     if (design.frame === 'tool') gains.push('--frame tool');
   }
-  return ['dashpot audit', ...words, at, ...gains, ...loop].join(' \\\n    ') + '\n';
+  return notes([setup.robot.config && `The arm as ${setup.robot.config} has it.`,
+    without.length && `There is no option for its ${without.join(' and ')}: the modes differ from those on the page.`]) + ['dashpot audit', ...words, at, ...gains, ...loop].join(' \\\n    ') + '\n';
 }
 
 /// Diagonals of the task's gains for controllers that have no more.
@@ -91,13 +112,16 @@ function task(of, name) {
   return {k: diagonal(stiffness).map(round), d: diagonal(damping).map(round), note: lossNote(damping) || lossNote(stiffness)};
 }
 
+const firstJoint = ({null_stiffness: all, null_damping: damping}) => (!all.every((x) => x === all[0]) || (Array.isArray(damping) && !damping.every((x) => x === damping[0]))) &&
+  'The null space has one stiffness there: that of the first joint is given.';
+
 function crisp(of) {
   const {text, k, d, note} = task(of, 'crisp');
   if (text) return text;
   const keys = (letter, values) => values.map((x, i) => `      task.${letter}_${i < 3 ? 'pos' : 'rot'}_${kAxes[i % 3]}: ${x.toString().includes('.') ? x : `${x}.0`}\n`).join('');
   const own = of.design.null_stiffness[0] || 0;
   return notes([note, d.some((x) => x <= 0) && 'A damping that is not positive becomes 2 sqrt(k) there.',
-    !of.design.null_stiffness.every((x) => x === own) && 'The null space has one stiffness there: that of the first joint is given.']) +
+    firstJoint(of.design)]) +
     `cartesian_impedance_controller:\n    ros__parameters:\n${keys('k', k)}${keys('d', d)}      nullspace.stiffness: ${Number.isInteger(own) ? `${own}.0` : own}\n` +
     `      nullspace.projector_type: ${of.design.null_projector === 'kinematic' ? 'kinematic' : 'dynamic'}\n`;
 }
@@ -107,11 +131,13 @@ function cartesianImpedance(of) {
   if (text) return text;
   const factors = d.map((x, i) => round(k[i] > 0 ? x / (2 * Math.sqrt(k[i])) : 0));
   const wrench = (v) => `\n  force: {x: ${v[0]}, y: ${v[1]}, z: ${v[2]}}\n  torque: {x: ${v[3]}, y: ${v[4]}, z: ${v[5]}}\n`;
-  const own = of.design.null_stiffness[0] || 0, ownDamping = nullDamping(of.design)[0] || 0;
-  return notes([note, factors.some((f) => f > 1) && 'It takes damping factors from 0 to 1: those above are cut off there.',
+  const own = of.design.null_stiffness[0] || 0, ownDamping = nullDamping(of.design)[0] || 0, {ratio} = of.design.null_damping;
+  const factor = own > 0 ? round(ratio || ownDamping / (2 * Math.sqrt(own))) : 0;
+  return notes([note, [...factors, factor].some((f) => f > 1) && 'It takes damping factors from 0 to 1: those above are cut off there.',
+    firstJoint(of.design), ratio && own > 0 && 'A damping ratio of the null space has no counterpart there: the factor is that of an inertia of 1 kg m^2.',
     'A message cartesian_impedance_controller/ControllerConfig for set_config.']) +
     `cartesian_stiffness:${wrench(k)}cartesian_damping_factors:${wrench(factors)}nullspace_stiffness: ${own}\n` +
-    `nullspace_damping_factor: ${own > 0 ? round(ownDamping / (2 * Math.sqrt(own))) : 0}\nq_d_nullspace: [${of.q.join(', ')}]\n`;
+    `nullspace_damping_factor: ${factor}\nq_d_nullspace: [${of.q.join(', ')}]\n`;
 }
 
 function frankaRos(of) {
@@ -120,16 +146,27 @@ function frankaRos(of) {
   const stated = k.map((x, i) => (i < 3 ? x : 2 * x));  // it acts on half of the rotation vector
   const mean = (from) => round((stated[from] + stated[from + 1] + stated[from + 2]) / 3);
   const other = d.some((x, i) => Math.abs(x - 2 * Math.sqrt(mean(i < 3 ? 0 : 3))) > 1e-6 * x) || stated.some((x, i) => Math.abs(x - mean(i < 3 ? 0 : 3)) > 1e-6 * x);
-  return notes([other && 'It has one stiffness for translation and one for rotation, and damping is always 2 sqrt(stiffness): the modes differ from those on the page.']) +
+  return notes([firstJoint(of.design), other && 'It has one stiffness for translation and one for rotation, and damping is always 2 sqrt(stiffness): the modes differ from those on the page.']) +
     `translational_stiffness: ${mean(0)}\nrotational_stiffness: ${mean(3)}\nnullspace_stiffness: ${of.design.null_stiffness[0] || 0}\n`;
 }
 
+/// The 4 x 4 matrix of a frame.
+function poseRows({position: [x, y, z], rpy}) {
+  const [[cr, sr], [cp, sp], [cy, sy]] = rpy.map((angle) => [Math.cos(angle), Math.sin(angle)]);
+  return [[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, x], [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, y], [-sp, cp * sr, cp * cr, z], [0, 0, 0, 1]];
+}
+
 function python(of) {
-  const {setup, q, design, answer} = of, {stiffness, damping} = acting(of), arm = design.arm || {};
-  const options = ['reflected_inertia', 'viscous_friction', 'gear_damping'].filter((key) => arm[key]).map((key) => `${key}=${JSON.stringify(arm[key])}`);
-  if (arm.gear_stiffness) options.push(`gear_stiffness=[${arm.gear_stiffness.map((k) => k || 'float("inf")').join(', ')}]`);
-  if (arm.position_sensor) options.push(`position_sensor="${arm.position_sensor}"`);
-  if (arm.payload && arm.payload.mass) options.push(`payload_mass=${arm.payload.mass}`, `payload_center=${JSON.stringify(arm.payload.center || [0, 0, 0])}`);
+  const {setup, q, design, answer} = of, {stiffness, damping} = acting(of), keys = {...armKeys(of), reflected_inertia: rotors(of)}, {payload} = keys;
+  const options = ['gravity', 'accept_inertias', 'reflected_inertia', 'viscous_friction', 'coulomb_friction', 'gear_damping', 'position_sensor'].filter((key) => keys[key])
+    .map((key) => `${key}=${keys[key] === true ? 'True' : JSON.stringify(keys[key])}`);
+  if (keys.include_off_chain === false) options.push('include_off_chain=False');
+  if (keys.gear_stiffness) options.push(`gear_stiffness=[${keys.gear_stiffness.map((k) => (k === 'none' ? 'float("inf")' : k)).join(', ')}]`);
+  if (payload && payload.mass > 0) {
+    options.push(`payload_mass=${payload.mass}`, `payload_center=${JSON.stringify(payload.center || [0, 0, 0])}`);
+    if (payload.inertia) options.push(`payload_inertia=${JSON.stringify(payload.inertia)}`);
+  }
+  if (keys.tool) options.push(`tool=${JSON.stringify(poseRows(keys.tool))}`);
   const from = [setup.robot.urdf, setup.robot.base, setup.robot.tip].map((word) => JSON.stringify(word)).concat(options).join(', ');
   const joint = design.mode === 'joint', prefix = joint ? 'joint' : 'task', told = joint ? design.joint_damping : design.damping;
   const K = joint ? asRows(design.joint_stiffness) : stiffness;
