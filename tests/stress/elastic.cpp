@@ -141,6 +141,11 @@ Calm calm_of(const ElasticArm& arm, controller::PositionSensor sensor, long post
   sim::Arm body(gears.robot, gears.options);
   Calm calm;
   calm.refused_all = judge.judge_anywhere(gains).margin < settings.limits.gain_margin;
+  try {
+    (void)controller::Controller(gears.model, settings);
+  } catch (const controller::InvalidSettings&) {  // of a brake that the gears do not bear
+    calm.refused_all = true;
+  }
   while (calm.postures < postures && !calm.refused_all) {
     const JointVector q = posture(settings.limits, dice);
     const JointVector weight = gears.weight(q);

@@ -136,12 +136,11 @@ class DrawnElasticLoop {
     settings.limits.torque.setConstant(1e4);
     settings.limits.torque_rate.setConstant(1e6);
     settings.limits.gain_margin = 1;
-    if (link()) {  // whatever brake the gears bear, it has nothing to do
-      settings.limits.stopping_time = 100;
-      settings.limits.velocity.setConstant(1e6);
-      settings.limits.position_upper.setConstant(std::numeric_limits<double>::infinity());
-      settings.limits.position_lower = -settings.limits.position_upper;
-    }
+    // Whatever brake the gears bear, it has nothing to do.
+    settings.limits.stopping_time = 100;
+    settings.limits.velocity.setConstant(1e6);
+    settings.limits.position_upper.setConstant(std::numeric_limits<double>::infinity());
+    settings.limits.position_lower = -settings.limits.position_upper;
     controller::Gains& gains = settings.initial.gains;
     settings.initial.mode =
         dice_.integer(0, 1) == 1 ? controller::Mode::kCartesian : controller::Mode::kJoint;
