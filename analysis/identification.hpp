@@ -28,8 +28,8 @@ struct MeasuredMode {
   double natural_frequency_std = std::numeric_limits<double>::infinity();  ///< rad/s
   double damping_ratio = 0;
   double damping_ratio_std = std::numeric_limits<double>::infinity();
-  /// What parts of the records differ by beyond their noise, (rad/s)^2 and 1, as variances: a share
-  /// of the squares of the two deviations.
+  /// The differences of the records' parts beyond their noise, (rad/s)^2 and 1, as variances: a
+  /// share of the squares of the two deviations.
   double frequency_scatter = 0, ratio_scatter = 0;
   double covariance = 0;  ///< of natural frequency and damping ratio, rad/s
   Eigen::VectorXcd
@@ -124,7 +124,7 @@ Identification identify_excited(const std::vector<MotionRecord>& records,
 Identification identify_ambient(const std::vector<MotionRecord>& records,
                                 const IdentifyOptions& options = {});
 
-/// What a record shows, by which its modes are looked for, or why they cannot be.
+/// The kind of a record, by which its modes are looked for, or why they cannot be.
 enum class MotionKind { kDecays, kAmbient, kDriven, kLimitCycle, kLargeMotion, kNothing };
 
 struct MotionVerdict {

@@ -85,7 +85,7 @@ class ModeTracker {
     kCurrent,    ///< and it is the solution for last_, as E_ and enclosure_ are
   };
 
-  /// What becomes of a basis before its next step.
+  /// Says what becomes of a basis before its next step.
   enum class Verdict { kImprove, kPublish, kGiveUp };
 
   bool follow(const SymmetricPencil& pencil, TrackedSpectrum& out, Work& work) noexcept;

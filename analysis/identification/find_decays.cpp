@@ -182,7 +182,7 @@ FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from
     decay.reason = "too short";
     return decay;
   }
-  // What explains the motion from some start on explains it from later ones: by halving.
+  // A model of the motion from some start on explains it from later ones: by halving.
   std::size_t good = starts.size() - 1, bad = 0;
   if (rest(starts[0]) <= least + kMore) good = 0;
   while (good > bad + 1) {

@@ -21,7 +21,7 @@ Plane energy_plane(const SymmetricPencil& pencil, const BlockEigenbasis& basis, 
   return plane;
 }
 
-/// Of plane a, and of the energy metric times plane b.
+/// Products of plane a and of the energy metric times plane b.
 double overlap(const Plane& a, const Plane& image) {
   double sum = 0;
   for (const Column* x : {&a.first, &a.second}) {

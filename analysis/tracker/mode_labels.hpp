@@ -6,7 +6,7 @@
 
 namespace dashpot::analysis {
 
-/// What stays with a mode along a path: its index, and whether it was soft.
+/// Keeps what stays with a mode along a path: its index, and whether it was soft.
 struct ModeLabels {
   /// Grows when modes cannot be matched to earlier ones, and indices are new.
   std::uint64_t epoch = 0;

@@ -104,7 +104,7 @@ Column read_heading(std::string_view cell, std::size_t number) {
     column.guessed = column.time && name != "utime";
     unit = column.time ? (name == "utime" ? "us" : "s") : usual_unit(name);
   }
-  // What is no unit of a motion matters only to those who want the column, and stays as it is.
+  // Another unit than a motion's matters only to those who want the column, and stays as it is.
   const Conversion conversion = to_si(unit).value_or(Conversion{unit, 1});
   column.unit = conversion.unit;
   column.factor = conversion.factor;

@@ -24,7 +24,7 @@ constexpr double kSamePosture = 0.02;
 /// Motion over more than this is large, rad: the inertia that a joint sees changes by about as
 /// large a share with the posture. Of a linear motion, whose scale is free, the fit tells.
 constexpr double kLargeRange = 0.5;
-/// What a linear model has to explain of a large motion to be believed.
+/// A linear model has to explain this much of a large motion to be believed.
 constexpr double kExplains = 0.999;
 constexpr double kFades = 0.5;  // and some mode has to lose so much, as an exponent
 /// A cycle with a larger share at multiples of its frequency is a trajectory, if it is large.
