@@ -53,8 +53,8 @@ void BasisExtrapolation::apply(BlockEigenbasis& basis) noexcept {
 }
 
 void BasisExtrapolation::go_back(BlockEigenbasis& basis) noexcept {
-  copy(right_.last_, basis.columns(), basis.Z);
-  if (basis.two_sided) copy(left_.last_, basis.columns(), basis.Y);
+  copy(right_.last(), basis.columns(), basis.Z);
+  if (basis.two_sided) copy(left_.last(), basis.columns(), basis.Y);
   forget();
 }
 

@@ -12,12 +12,16 @@ class BasisExtrapolation {
   /// Replaces the basis by what was learnt last, and forgets the past.
   void go_back(BlockEigenbasis& basis) noexcept;
   /// Forgets the past, because the next basis will not continue it smoothly.
-  void forget() noexcept { right_.begun_ = left_.begun_ = false; }
+  void forget() noexcept { right_.forget(), left_.forget(); }
 
  private:
-  struct Side {
+  class Side {
+   public:
     void apply(int rows, PackedMatrix& Z) noexcept;
+    void forget() noexcept { begun_ = false; }
+    const PackedMatrix& last() const noexcept { return last_; }
 
+   private:
     bool begun_ = false;
     PackedMatrix last_, step_, change_, curve_;  ///< the last basis, and its differences
   };

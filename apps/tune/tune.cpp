@@ -42,7 +42,7 @@ std::string panda_path() {
 /// The postures of the file or log, evenly fewer where there are more than the page takes.
 std::vector<controller::JointVector> listed(const TuneOptions& options,
                                             const controller::RobotModel& model) {
-  const std::vector<controller::JointVector> all = options.postures.listed(options.posture, model);
+  std::vector<controller::JointVector> all = options.postures.listed(options.posture, model);
   if (all.size() <= TuneSite::kMostListed) return all;
   std::vector<controller::JointVector> some;
   for (std::size_t i = 0; i < TuneSite::kMostListed; ++i) {

@@ -37,7 +37,7 @@ void check_keys(const std::string& of, const TuneJson& object,
   if (!object.is_object()) throw InputError(of, "is no object");
   for (const auto& [key, value] : object.items()) {
     if (std::find(keys.begin(), keys.end(), key) == keys.end()) {
-      throw InputError(of + "." + key, "is no key");
+      throw InputError(std::string(of).append(".").append(key), "is no key");
     }
   }
 }

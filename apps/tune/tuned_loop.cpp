@@ -123,7 +123,7 @@ LoopJson release_json(const analysis::Response& response, const analysis::Spectr
       if (std::abs(values[k]) > kSettled) last = i;
     }
     if (grows || last > kPoints / 4) break;  // otherwise a slow mode that this place hardly sees
-    horizon = std::max(3 * times[static_cast<std::size_t>(last + 1)], 0.02);
+    horizon = std::max(3 * times[static_cast<std::size_t>(last) + 1], 0.02);
   }
   const auto lowest = std::min_element(values.begin(), values.end());
   double overshoot = std::max(0.0, -*lowest);
