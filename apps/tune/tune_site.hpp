@@ -10,7 +10,7 @@
 
 namespace dashpot::apps {
 
-/// What the page begins with.
+/// The arm, posture and designs that the page begins with.
 struct TuneStart {
   controller::JointVector q;
   nlohmann::ordered_json designs;                      ///< two of them
@@ -32,7 +32,7 @@ class TuneSite {
   /// /design {"q", "place", "design"}: TunedLoop::at, and "refused";
   /// /workspace {"design", "seed", "first", "count"}: TunedLoop::workspace.
   HttpAnswer post(const std::string& path, const std::string& body);
-  /// What a POST has to bring in its header kTokenHeader.
+  /// The secret that a POST has to bring in its header kTokenHeader.
   const std::string& token() const { return token_; }
 
  private:

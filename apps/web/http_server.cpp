@@ -161,7 +161,7 @@ HttpAnswer HttpServer::Parts::judge(MHD_Connection* connection, std::string_view
   return {};
 }
 
-/// The same of a POST.
+/// Judges the headers of a POST likewise.
 HttpAnswer HttpServer::Parts::judge_post(MHD_Connection* connection) const {
   if (header(connection, "X-Dashpot-Token") != content.token) return refusal(403, "wrong token");
   if (header(connection, "Content-Type") != "application/json") {

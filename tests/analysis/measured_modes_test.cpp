@@ -142,7 +142,7 @@ TEST(MeasuredModes, LikeALargerOneNextToThemAreItsOwnChange) {
   EXPECT_EQ(beside(10.4, 1.1, shape_of(1, 0.6)), "");
 }
 
-/// What is over at once has no harmonics, so it may be at three times another frequency.
+/// A motion that is over at once has no harmonics, so it may be at three times another frequency.
 TEST(MeasuredModes, AtThreeTimesTheFrequencyOfALargerOneAreNoneIfLightlyDamped) {
   const auto at = [](double times, double ratio) {
     MeasuredMode larger = good_mode(10, 0.05);

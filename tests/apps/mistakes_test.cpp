@@ -1,4 +1,4 @@
-// What a new user gets wrong is said in one line that says what to write.
+// Mistakes of a new user are answered in one line that says what to write.
 #include <dashpot/tests/apps/run_program.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 

@@ -1,4 +1,4 @@
-// What tasks that take long show meanwhile, and what Ctrl-C leaves of them.
+// Tasks that take long: what they show meanwhile, and what Ctrl-C leaves of them.
 #include <dashpot/tests/apps/run_program.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
 
