@@ -245,14 +245,14 @@ void add_command(CLI::App& program) {
   add("--damping,--task-damping", &CommandOptions::damping, "Diagonal, N s/m and N m s/rad",
       "x,y,z,rx,ry,rz");
   command->add_option("--damping-ratio", options->damping_ratio, "Of every mode of the task")
-      ->transform(positive("", "a positive ratio"))
+      ->transform(damping_ratio())
       ->option_text("Z");
   add("--joint-stiffness", &CommandOptions::joint_stiffness, "Of the joints, N m/rad", "a,b,...|x");
   add("--joint-damping", &CommandOptions::joint_damping, "Of the joints, N m s/rad", "a,b,...|x");
   command
       ->add_option("--joint-damping-ratio", options->joint_damping_ratio,
                    "Of every mode of the joints' springs")
-      ->transform(positive("", "a positive ratio"))
+      ->transform(damping_ratio())
       ->option_text("Z");
   add("--null-stiffness", &CommandOptions::null_stiffness,
       "Toward the posture, in the motions that the task leaves free", "a,b,...|x");
