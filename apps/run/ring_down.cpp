@@ -1,8 +1,8 @@
-#include <dashpot/analysis/mode_identification.hpp>
 #include <dashpot/apps/loop/simulated_loop.hpp>
 #include <dashpot/apps/run/ring_down.hpp>
 #include <dashpot/apps/run/sampled_modes.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
+#include <dashpot/identification/identification.hpp>
 
 #include <algorithm>
 #include <array>
@@ -14,8 +14,6 @@
 
 namespace dashpot::apps {
 namespace {
-
-using analysis::Recording;
 
 constexpr double kRelease = 1e-4;       // rad: what is not linear is that much smaller
 constexpr double kDuration = 2;         // s
@@ -40,8 +38,8 @@ Scene quiet_scene(const Scene& scene, const JointVector& start) {
 }
 
 struct RecordedMotion {
-  Recording recording;
-  dashpot_modes modes{};  ///< the first ones
+  identification::MotionRecord record;  ///< positions
+  dashpot_modes modes{};                ///< the first ones
 };
 
 /// Nothing if `stopped` says so first.
@@ -51,12 +49,12 @@ std::optional<RecordedMotion> record(const Scene& scene, const ControllerFactory
   ClosedLoop loop(scene, *controller);
   const auto samples = static_cast<Eigen::Index>(kDuration / (every * scene.plant.period));
   RecordedMotion motion;
-  motion.recording.position.resize(scene.dof(), samples);
-  motion.recording.velocity.resize(scene.dof(), samples);
+  motion.record.time = Eigen::VectorXd::LinSpaced(
+      samples, 0, static_cast<double>(samples - 1) * every * scene.plant.period);
+  motion.record.output.resize(scene.dof(), samples);
   for (Eigen::Index i = 0; i < samples; ++i) {
     if (stopped()) return std::nullopt;
-    motion.recording.position.col(i) = loop.plant().position();
-    motion.recording.velocity.col(i) = loop.plant().velocity();
+    motion.record.output.col(i) = loop.plant().position();
     for (int k = 0; k < every; ++k) {
       loop.follow_scenario();
       loop.control();
@@ -89,7 +87,7 @@ double distance(const Eigenvalues& wanted, const Eigenvalues& other) {
 /// Pairs modes whose eigenvalues are nearest to each other, the best pair first; a mode that has
 /// none within kFarthest of itself stays alone.
 std::vector<RingDownMode> match(const dashpot_modes& predicted,
-                                std::vector<analysis::IdentifiedMode> fitted) {
+                                std::vector<identification::MeasuredMode> fitted) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   std::vector<RingDownMode> result(predicted.count);
   for (std::uint32_t i = 0; i < predicted.count; ++i) {
@@ -145,23 +143,20 @@ std::optional<RingDown> measure_ring_down(const Scene& scene,
   const int every = std::max(1, static_cast<int>(std::lround(kSamplePeriod / scene.plant.period)));
   const auto rest = record(quiet_scene(scene, scene.rest), make_controller, every, stopped);
   if (!rest) return std::nullopt;
-  std::vector<Recording> recordings;
+  std::vector<identification::MotionRecord> records;
   for (int i = 0; i < scene.dof(); ++i) {
     const JointVector start = scene.rest + kRelease * JointVector::Unit(scene.dof(), i);
     auto motion = record(quiet_scene(scene, start), make_controller, every, stopped);
     if (!motion) return std::nullopt;
     // What happens without a release, such as sagging, is not of interest.
-    motion->recording.position -= rest->recording.position;
-    motion->recording.velocity -= rest->recording.velocity;
-    recordings.push_back(std::move(motion->recording));
+    motion->record.output -= rest->record.output;
+    records.push_back(std::move(motion->record));
   }
-  analysis::IdentificationOptions options;
-  options.period = every * scene.plant.period;
-  const analysis::IdentifiedModes fit = analysis::identify_modes(recordings, options);
+  const identification::Identification fit = identification::identify_decays(records);
   RingDown result;
   result.modes = match(rest->modes, fit.modes);
   result.releases = scene.dof();
-  result.residual = fit.residual;
+  result.residual = std::sqrt(1 - fit.explained);
   if (scene.arm) add_sampled(scene, result);
   return result;
 }
