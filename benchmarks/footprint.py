@@ -17,7 +17,7 @@ COUNTS = {"instructions": ("Ir",), "code_lines": ("I1mr",), "data_lines": ("D1mr
 def part_of(function):
     """Whose a function is, by the namespace in its mangled name. Eigen's are instances of its templates
     that were not made part of their callers."""
-    namespace = re.match(r"_Z+NK?(?:7dashpot\d+(analysis|controller)|5(Eigen))", function)
+    namespace = re.match(r"_Z+NK?(?:7dashpot\d+(analysis|identification|controller)|5(Eigen))", function)
     return next(filter(None, namespace.groups())) if namespace else "other"
 
 

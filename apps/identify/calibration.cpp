@@ -11,13 +11,13 @@
 namespace dashpot::apps {
 namespace {
 
-using analysis::MeasuredMode;
 using controller::InputError;
 using controller::Joint;
 using controller::JointVector;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using identification::MeasuredMode;
 
 /// A root mean square of differences, in deviations, up to which a model fits: theirs is one, and
 /// an arm is not quite linear.

@@ -14,14 +14,14 @@ void draw_identification(const std::string& path, const IdentifyReport& report) 
   constexpr double kHertz = 1 / (2 * std::numbers::pi);
   // What was measured fills the picture; what is predicted far from it is left out.
   double most = 0, largest_ratio = 1;
-  for (const analysis::MeasuredMode& mode : posture.found.modes) {
+  for (const identification::MeasuredMode& mode : posture.found.modes) {
     most = std::max(most, 2 * kHertz * mode.natural_frequency);
   }
   for (const PredictedMode& mode : posture.predicted) {
     if (posture.found.modes.empty()) most = std::max(most, 1.2 * kHertz * mode.natural_frequency);
   }
   if (most == 0) most = 10;
-  for (const analysis::MeasuredMode& mode : posture.found.modes) {
+  for (const identification::MeasuredMode& mode : posture.found.modes) {
     largest_ratio = std::max(largest_ratio, 1.1 * mode.damping_ratio);
   }
   for (const PredictedMode& mode : posture.predicted) {
@@ -33,14 +33,14 @@ void draw_identification(const std::string& path, const IdentifyReport& report) 
       << "]\nset style fill solid\n$all << EOD\n";
   for (const bool stable : {false, true}) {
     if (stable) out << "EOD\n$stable << EOD\n";
-    for (const analysis::ModelPole& pole : posture.found.poles) {
+    for (const identification::ModelPole& pole : posture.found.poles) {
       if (pole.stable != stable || pole.damping_ratio >= 1) continue;
       out << kHertz * pole.natural_frequency << ' ' << pole.order << '\n';
     }
     out << "nan nan\n";  // gnuplot wants a line
   }
   out << "EOD\n$measured << EOD\n";
-  for (const analysis::MeasuredMode& mode : posture.found.modes) {
+  for (const identification::MeasuredMode& mode : posture.found.modes) {
     out << kHertz * mode.natural_frequency << ' ' << mode.damping_ratio << ' '
         << 1.96 * kHertz * mode.natural_frequency_std << ' ' << 1.96 * mode.damping_ratio_std
         << '\n';
@@ -51,7 +51,7 @@ void draw_identification(const std::string& path, const IdentifyReport& report) 
   }
   out << "nan nan\nEOD\n";
   int number = 0;
-  for (const analysis::MeasuredMode& mode : posture.found.modes) {
+  for (const identification::MeasuredMode& mode : posture.found.modes) {
     const double f = kHertz * mode.natural_frequency;
     out << "set arrow " << ++number << " from " << f << ", graph 0 to " << f
         << ", graph 1 nohead lc rgb '#bbbbbb'\n";

@@ -14,10 +14,10 @@
 namespace dashpot::apps {
 namespace {
 
-using analysis::MotionKind;
-using analysis::MotionRecord;
 using controller::InputError;
 using Eigen::Index;
+using identification::MotionKind;
+using identification::MotionRecord;
 
 /// Rest positions that are closer belong to one posture, rad or m.
 constexpr double kSamePosture = 0.02;
@@ -170,7 +170,7 @@ class Task {
     } else if (command_.from || command_.to) {  // the user says what is free
       add(chosen_part, name);
     } else {
-      for (const analysis::FreeDecay& found : analysis::find_decays(all, file.free)) {
+      for (const identification::FreeDecay& found : identification::find_decays(all, file.free)) {
         MotionRecord part = part_of(all, found.from, std::max(found.from + 1, found.to));
         if (found.reason.empty()) {
           add(std::move(part), name);
@@ -204,7 +204,7 @@ class Task {
 
   /// Returns what a record shows; where that has no modes, the report says why.
   MotionKind kind_of(const MotionRecord& record, bool driven, const std::vector<bool>& free) {
-    const analysis::MotionVerdict verdict = analysis::judge_motion(record);
+    const identification::MotionVerdict verdict = identification::judge_motion(record);
     const bool large = is_large(record);
     large_ = large_ || large;
     MotionKind kind = verdict.kind;
@@ -364,7 +364,7 @@ class Task {
       report_.kind = MotionKind::kNothing;
       if (large_) report_.kind = MotionKind::kLargeMotion, report_.advice = kLargeAdvice;
     }
-    analysis::IdentifyOptions options;
+    identification::IdentifyOptions options;
     options.max_order = command_.order;
     const std::vector<std::vector<std::size_t>> groups = by_posture();
     double done = 0;  // postures
@@ -390,10 +390,11 @@ class Task {
       }
       posture.parts = static_cast<int>(group.size());
       try {
-        posture.found =
-            report_.kind == MotionKind::kAmbient  ? analysis::identify_ambient(records, options)
-            : report_.kind == MotionKind::kDriven ? analysis::identify_excited(records, options)
-                                                  : analysis::identify_decays(records, options);
+        posture.found = report_.kind == MotionKind::kAmbient
+                            ? identification::identify_ambient(records, options)
+                        : report_.kind == MotionKind::kDriven
+                            ? identification::identify_excited(records, options)
+                            : identification::identify_decays(records, options);
       } catch (const std::invalid_argument& error) {
         for (const std::size_t i : group) report_.parts[parts_[i].report].reason = error.what();
         if (report_.advice.empty()) report_.advice = error.what();

@@ -13,8 +13,8 @@ namespace {
 
 using Align = TextTable::Align;
 using Json = nlohmann::ordered_json;
-using analysis::MeasuredMode;
-using analysis::MotionKind;
+using identification::MeasuredMode;
+using identification::MotionKind;
 
 std::string count(std::size_t n, const std::string& what) {
   return (n == 0 ? "no" : std::to_string(n)) + " " + what + (n == 1 ? "" : "s");
@@ -319,7 +319,7 @@ nlohmann::ordered_json identify_json(const IdentifyReport& report) {
   }
   json["poles"] = Json::array();  // of the first posture, for stabilisation pictures
   if (!report.postures.empty()) {
-    for (const analysis::ModelPole& pole : report.postures.front().found.poles) {
+    for (const identification::ModelPole& pole : report.postures.front().found.poles) {
       json["poles"].push_back({{"order", pole.order},
                                {"natural_frequency", pole.natural_frequency},
                                {"damping_ratio", pole.damping_ratio},

@@ -1,6 +1,7 @@
 #pragma once
-#include <dashpot/analysis/identification.hpp>
 #include <dashpot/apps/identify/motion_file.hpp>
+#include <dashpot/identification/identification.hpp>
+#include <dashpot/identification/motion_verdict.hpp>
 
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -31,7 +32,7 @@ struct PartReport {
 struct PostureReport {
   Eigen::VectorXd rest;  ///< means of the channels where decays end, or of all ambient motion
   int parts = 0;
-  analysis::Identification found;
+  identification::Identification found;
   std::vector<PredictedMode> predicted;
 };
 
@@ -64,7 +65,7 @@ struct Calibration {
 struct IdentifyReport {
   std::vector<MotionChannel> channels;  ///< those that are used
   /// What the records show; those of another kind are left out.
-  analysis::MotionKind kind = analysis::MotionKind::kNothing;
+  identification::MotionKind kind = identification::MotionKind::kNothing;
   std::string advice;  ///< where no modes can be told: why, and what would tell them
   std::vector<PartReport> parts;
   std::vector<PostureReport> postures;  ///< by falling number of parts

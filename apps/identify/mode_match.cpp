@@ -10,7 +10,7 @@ namespace dashpot::apps {
 namespace {
 
 using analysis::Complex;
-using analysis::MeasuredMode;
+using identification::MeasuredMode;
 
 double likeness(const Eigen::VectorXcd& u, const Eigen::VectorXcd& v) {
   return std::norm(u.dot(v)) / std::max(1e-300, u.squaredNorm() * v.squaredNorm());

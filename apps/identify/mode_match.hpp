@@ -7,7 +7,7 @@ namespace dashpot::apps {
 
 /// Gives each prediction the measured mode that it is: the nearest in frequency, ratio and shape
 /// (nearest_pairs).
-void match(const std::vector<analysis::MeasuredMode>& measured,
+void match(const std::vector<identification::MeasuredMode>& measured,
            std::vector<PredictedMode>& predicted);
 
 /// Puts modes into the order of as many others that are alike in shape: their order by frequency

@@ -1,9 +1,9 @@
-#include <dashpot/analysis/mode_identification.hpp>
 #include <dashpot/apps/loop/simulated_loop.hpp>
 #include <dashpot/apps/report/mode_pairs.hpp>
 #include <dashpot/apps/run/ring_down.hpp>
 #include <dashpot/apps/run/sampled_modes.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
+#include <dashpot/identification/identification.hpp>
 
 #include <algorithm>
 #include <array>
@@ -15,8 +15,6 @@
 
 namespace dashpot::apps {
 namespace {
-
-using analysis::Recording;
 
 constexpr double kRelease = 1e-4;       // rad: what is not linear is that much smaller
 constexpr double kDuration = 2;         // s
@@ -41,8 +39,8 @@ Scene quiet_scene(const Scene& scene, const JointVector& start) {
 }
 
 struct RecordedMotion {
-  Recording recording;
-  dashpot_modes modes{};  ///< the first ones
+  identification::MotionRecord record;  ///< positions
+  dashpot_modes modes{};                ///< the first ones that are there
 };
 
 /// Nothing if `stopped` says so first.
@@ -52,17 +50,19 @@ std::optional<RecordedMotion> record(const Scene& scene, const ControllerFactory
   ClosedLoop loop(scene, *controller);
   const auto samples = static_cast<Eigen::Index>(kDuration / (every * scene.plant.period));
   RecordedMotion motion;
-  motion.recording.position.resize(scene.dof(), samples);
-  motion.recording.velocity.resize(scene.dof(), samples);
+  motion.record.time = Eigen::VectorXd::LinSpaced(
+      samples, 0, static_cast<double>(samples - 1) * every * scene.plant.period);
+  motion.record.output.resize(scene.dof(), samples);
   for (Eigen::Index i = 0; i < samples; ++i) {
     if (stopped()) return std::nullopt;
-    motion.recording.position.col(i) = loop.plant().position();
-    motion.recording.velocity.col(i) = loop.plant().velocity();
+    motion.record.output.col(i) = loop.plant().position();
     for (int k = 0; k < every; ++k) {
       loop.follow_scenario();
       loop.control();
       const dashpot_modes* modes = controller->new_modes();
-      if (modes != nullptr && modes->time >= 0 && motion.modes.tick == 0) motion.modes = *modes;
+      // The first tick may leave its modes to another thread, and there are none yet then.
+      const bool first = modes != nullptr && modes->time >= 0 && motion.modes.count == 0;
+      if (first) motion.modes = *modes;
       const sim::Status status = loop.move();
       if (status != sim::Status::kOk) {
         throw std::runtime_error(std::string("a small release does not ring down: ") +
@@ -129,7 +129,7 @@ void add_sampled(const Scene& scene, RingDown& ring_down, std::vector<Row>& rows
 
 /// Gives rows the modes of the motion whose eigenvalues are nearest: the motion is the sampled
 /// loop's, in which close modes may change places. One that has none within kFarthest stays alone.
-void add_measured(const std::vector<analysis::IdentifiedMode>& fitted, std::vector<Row>& rows) {
+void add_measured(const std::vector<identification::MeasuredMode>& fitted, std::vector<Row>& rows) {
   Eigen::MatrixXd apart(static_cast<Eigen::Index>(rows.size()),
                         static_cast<Eigen::Index>(fitted.size()));
   for (Eigen::Index i = 0; i < apart.rows(); ++i) {
@@ -141,7 +141,7 @@ void add_measured(const std::vector<analysis::IdentifiedMode>& fitted, std::vect
   const std::vector<int> pairs = nearest_pairs(apart, kFarthest);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (pairs[i] < 0) continue;
-    const analysis::IdentifiedMode& mode = fitted[static_cast<std::size_t>(pairs[i])];
+    const identification::MeasuredMode& mode = fitted[static_cast<std::size_t>(pairs[i])];
     rows[i].mode.measured_frequency = mode.natural_frequency;
     rows[i].mode.measured_ratio = mode.damping_ratio;
   }
@@ -155,22 +155,19 @@ std::optional<RingDown> measure_ring_down(const Scene& scene,
   const int every = std::max(1, static_cast<int>(std::lround(kSamplePeriod / scene.plant.period)));
   const auto rest = record(quiet_scene(scene, scene.rest), make_controller, every, stopped);
   if (!rest) return std::nullopt;
-  std::vector<Recording> recordings;
+  std::vector<identification::MotionRecord> records;
   for (int i = 0; i < scene.dof(); ++i) {
     const JointVector start = scene.rest + kRelease * JointVector::Unit(scene.dof(), i);
     auto motion = record(quiet_scene(scene, start), make_controller, every, stopped);
     if (!motion) return std::nullopt;
     // What happens without a release, such as sagging, is not of interest.
-    motion->recording.position -= rest->recording.position;
-    motion->recording.velocity -= rest->recording.velocity;
-    recordings.push_back(std::move(motion->recording));
+    motion->record.output -= rest->record.output;
+    records.push_back(std::move(motion->record));
   }
-  analysis::IdentificationOptions options;
-  options.period = every * scene.plant.period;
-  const analysis::IdentifiedModes fit = analysis::identify_modes(recordings, options);
+  const identification::Identification fit = identification::identify_decays(records);
   RingDown result;
   result.releases = scene.dof();
-  result.residual = fit.residual;
+  result.residual = std::sqrt(1 - fit.explained);
   std::vector<Row> rows = rows_of(rest->modes);
   if (scene.arm) add_sampled(scene, result, rows);
   add_measured(fit.modes, rows);

@@ -35,9 +35,10 @@ struct RingDown {
 
 using ControllerFactory = std::function<std::unique_ptr<LoopController>()>;
 
-/// Releases the robot near its start, once for each joint, records how it rings down, and fits
-/// modes to the motion (analysis/mode_identification.hpp). Nothing if `stopped` says so before all
-/// have rung down. Throws InputError, and std::runtime_error if the simulation fails.
+/// Releases the robot near its start, once for each joint, records how it rings down, and
+/// identifies the modes of the motion (identification/identification.hpp). Nothing if `stopped`
+/// says so before all have rung down. Throws InputError, and std::runtime_error if the simulation
+/// fails.
 std::optional<RingDown> measure_ring_down(const Scene& scene,
                                           const ControllerFactory& make_controller,
                                           const std::function<bool()>& stopped);

@@ -1,14 +1,14 @@
 // Modes from recorded motion.
 
-#include <dashpot/analysis/identification.hpp>
+#include <dashpot/identification/identification.hpp>
 #include <dashpot/python/src/convert.hpp>
 
 namespace dashpot::python {
 
-using analysis::FreeDecay;
-using analysis::Identification;
-using analysis::MeasuredMode;
-using analysis::MotionRecord;
+using identification::FreeDecay;
+using identification::Identification;
+using identification::MeasuredMode;
+using identification::MotionRecord;
 
 namespace {
 
@@ -43,7 +43,7 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
     const nb::gil_scoped_release release;
     for (std::size_t r = 0; r < times.size(); ++r) {
       const MotionRecord record{times[r], outputs[r], inputs[r]};
-      analysis::check_records({record});
+      identification::check_records({record});
       std::vector<FreeDecay> pieces{{0, record.time.size(), {}}};
       if (find && !ambient && !excited) pieces = find_decays(record);
       for (const FreeDecay& piece : pieces) {

@@ -16,7 +16,8 @@ SOURCE = WORK / "src"
 BUILD = SOURCE / "build/release"  # so that ccache knows what is as in the tree
 # The programs with tests that could notice what changes in a folder.
 SUITES = {
-    "analysis": ["analysis", "controller", "sim"],
+    "analysis": ["analysis", "identification", "controller", "sim"],
+    "identification": ["identification", "apps"],
     "controller": ["controller", "plugin", "sim", "threads"],
     "sim": ["sim", "threads", "apps"],
     "lcmtypes": ["lcmtypes", "plugin", "threads", "apps"],

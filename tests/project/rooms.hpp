@@ -30,7 +30,7 @@ struct Room {
 /// Headers of the standard library ("vector") are open to every room.
 inline const std::vector<Room>& rooms() {
   static constexpr std::string_view kAnalysis = "dashpot/analysis/", kText = "dashpot/text/";
-  static constexpr std::string_view kEigen = "Eigen/";
+  static constexpr std::string_view kEigen = "Eigen/", kFft = "unsupported/Eigen/FFT";
   static const std::vector<std::string_view> snapshots = {"dashpot/analysis/matrix_types.hpp",
                                                           "dashpot/controller/robot_types.hpp",
                                                           "dashpot/controller/snapshot.hpp",
@@ -52,15 +52,15 @@ inline const std::vector<Room>& rooms() {
       {"analysis/tracker", 4, {"tracked_spectrum", "mode_tracker"}, {kEigen}},
       {"analysis/response", 4, {"response", "sensitivity"}, {kEigen}},
       {"analysis/sampled", 4, {"sampled_loop"}, {kEigen}},
-      {"analysis/identification",
-       4,
-       {"identification", "motion_record", "mode_identification"},
-       {kEigen, "unsupported/Eigen/FFT"}},
       {"analysis/design",
        5,
        {"damping_target", "damping_design", "damping_region", "damping_sampled", "ratio_damping",
         "borne_damping"},
        {kEigen}},
+
+      {"identification/records", 0, {"motion_record", "motion_verdict"}, {kAnalysis, kFft, kEigen}},
+      {"identification/model", 1, {}, {kAnalysis, kFft, kEigen}},
+      {"identification/search", 2, {"identification"}, {kAnalysis, kEigen}},
 
       {"controller/base",
        0,

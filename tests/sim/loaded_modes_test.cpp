@@ -65,14 +65,14 @@ class LoadedArm {
   controller::Status worst = controller::Status::kOk;
 
   /// Lets go at q0 + dq. Deviations from q0.
-  analysis::Recording record(const JointVector& dq, int ticks) {
+  testing::Recording record(const JointVector& dq, int ticks) {
     sim::ArmOptions arm_options;
     arm_options.coulomb_friction = false;
     arm_options.wall = world_.wall;
     if (dead_wrench()) arm_options.wrenches = {{0, 1e9, world_.wrench}};
     sim::Arm arm(twin_.robot, arm_options);
     sim::Plant plant(arm, options_, q0_ + dq);
-    analysis::Recording recording{MatrixXd(q0_.size(), ticks), MatrixXd(q0_.size(), ticks)};
+    testing::Recording recording{MatrixXd(q0_.size(), ticks), MatrixXd(q0_.size(), ticks)};
     for (int k = -40; k < ticks; ++k) {
       if (k >= 0) {
         recording.position.col(k) = plant.position() - q0_;
@@ -246,7 +246,7 @@ TEST_P(LoadedModes, AreThoseOfTheSimulatedMotion) {
       settings.environment = world.environment;
     }
     LoadedArm arm(twin, settings, q0, world);
-    std::vector<analysis::Recording> recordings;
+    std::vector<testing::Recording> recordings;
     for (int k = 0; k < 3; ++k) recordings.push_back(arm.record(1e-7 * random.vector(n), 1600));
     ASSERT_EQ(arm.worst, controller::Status::kOk) << to_text(arm.worst);
     const auto fit = testing::fit_modes(recordings, settings.period, arm.system.mass);
@@ -328,7 +328,7 @@ TEST_P(LoadedPostures, HaveTheModesOfTheSimulatedMotion) {
     world.posture_wrench *= 0.4 / p.cwiseAbs().maxCoeff();
 
     LoadedArm arm(twin, settings, q0, world);
-    std::vector<analysis::Recording> recordings;
+    std::vector<testing::Recording> recordings;
     for (int k = 0; k < 3; ++k) recordings.push_back(arm.record(1e-7 * random.vector(n), 4000));
     ASSERT_EQ(arm.worst, controller::Status::kOk) << to_text(arm.worst);
     const auto fit = testing::fit_modes(recordings, settings.period, arm.system.mass);

@@ -41,7 +41,7 @@ std::vector<JointVector> straight_way(const TwinModels& twin, JointVector q, Vec
 std::vector<double> seen_ratios(const TwinModels& twin, const controller::Settings& settings,
                                 const JointVector& q0, double slowest) {
   Random random(1);
-  std::vector<analysis::Recording> recordings;
+  std::vector<testing::Recording> recordings;
   std::optional<ReleasedArm> arm;
   for (Eigen::Index i = 0; i < q0.size(); ++i) {
     const JointVector dq = 1e-6 * random.vector(q0.size());
@@ -50,7 +50,7 @@ std::vector<double> seen_ratios(const TwinModels& twin, const controller::Settin
   }
   const auto fit = testing::fit_modes(recordings, settings.period, arm->closed_loop.mass);
   std::vector<double> ratios;
-  for (const analysis::IdentifiedMode& mode : fit.modes) {
+  for (const testing::IdentifiedMode& mode : fit.modes) {
     if (mode.natural_frequency > slowest) ratios.push_back(mode.damping_ratio);
   }
   return ratios;

@@ -54,7 +54,7 @@ struct ReleasedTwin {
     options.delay = loop.delay;
     options.torque_cutoff = loop.torque_cutoff;
     options.difference_velocity = loop.difference_velocity;
-    std::vector<analysis::Recording> recordings;
+    std::vector<testing::Recording> recordings;
     std::optional<ReleasedArm> arm;
     for (int k = 0; k < 3; ++k) {
       const JointVector dq = 1e-7 * random.vector(q0.size());

@@ -2,7 +2,7 @@
 // with the true ones, and fails where frequencies or ratios miss their 95 % intervals too often.
 // A case is an arm at a random posture with springs of 8 to 40 rad/s and ratios of 0.05 to 0.9 in
 // its joints, with noise of 1e-5 rad and 2 % of the samples missing.
-#include <dashpot/analysis/identification.hpp>
+#include <dashpot/identification/identification.hpp>
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
 
@@ -15,9 +15,9 @@
 namespace {
 
 using namespace dashpot::testing;  // NOLINT(google-build-using-namespace)
-using dashpot::analysis::Identification;
-using dashpot::analysis::MeasuredMode;
-using dashpot::analysis::MotionRecord;
+using dashpot::identification::Identification;
+using dashpot::identification::MeasuredMode;
+using dashpot::identification::MotionRecord;
 using dashpot::stress::Request;
 
 struct Tally {
@@ -171,9 +171,10 @@ bool identify(const Request& request) {
                             : ambient ? shaken(arm, draw)
                                       : releases(arm, records, start, draw);
     try {
-      const Identification result = driven    ? dashpot::analysis::identify_excited(motions.records)
-                                    : ambient ? dashpot::analysis::identify_ambient(motions.records)
-                                              : dashpot::analysis::identify_decays(motions.records);
+      const Identification result =
+          driven    ? dashpot::identification::identify_excited(motions.records)
+          : ambient ? dashpot::identification::identify_ambient(motions.records)
+                    : dashpot::identification::identify_decays(motions.records);
       if (request.verbose) print(k, arm, result);
       tallies.compare(arm, motions.shares, result, ambient ? 0.2 : 0.1);
     } catch (const std::exception& error) {

@@ -2,7 +2,6 @@
 // The real controller and the simulator's arm, which share no code, in one loop; and what it takes
 // to displace the arm and let it go.
 
-#include <dashpot/analysis/mode_identification.hpp>
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/controller.hpp>
@@ -10,6 +9,7 @@
 #include <dashpot/sim/arm.hpp>
 #include <dashpot/sim/plant.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/state_fit.hpp>
 #include <dashpot/tests/support/twin_models.hpp>
 
 #include <gtest/gtest.h>
@@ -123,11 +123,11 @@ class ReleasedArm {
   }
 
   /// Every so many ticks of `ticks`, after `skipped` ticks; deviations from q0.
-  analysis::Recording record(const controller::JointVector& q0, int ticks, int every = 1,
-                             int skipped = 0) {
+  testing::Recording record(const controller::JointVector& q0, int ticks, int every = 1,
+                            int skipped = 0) {
     for (int k = 0; k < skipped; ++k) EXPECT_EQ(step(), sim::Status::kOk);
-    analysis::Recording recording{Eigen::MatrixXd(q0.size(), ticks / every),
-                                  Eigen::MatrixXd(q0.size(), ticks / every)};
+    testing::Recording recording{Eigen::MatrixXd(q0.size(), ticks / every),
+                                 Eigen::MatrixXd(q0.size(), ticks / every)};
     for (int k = 0; k < ticks; ++k) {
       if (k % every == 0) {
         recording.position.col(k / every) = plant_->position() - q0;
@@ -161,7 +161,7 @@ struct Worst {
 
   /// Compares the fitted mode next to `eigenvalue` with this frequency and ratio; both have to be
   /// within these differences.
-  void add(const analysis::IdentifiedModes& fit, analysis::Complex eigenvalue, double omega,
+  void add(const testing::IdentifiedModes& fit, analysis::Complex eigenvalue, double omega,
            double zeta, double most_frequency, double most_ratio) {
     const auto& seen =
         *std::min_element(fit.modes.begin(), fit.modes.end(), [&](const auto& a, const auto& b) {
@@ -176,16 +176,16 @@ struct Worst {
     ++modes;
   }
   /// Compares with a mode of a sampled loop.
-  void add(const analysis::IdentifiedModes& fit, const analysis::SampledMode& mode,
+  void add(const testing::IdentifiedModes& fit, const analysis::SampledMode& mode,
            double most_frequency, double most_ratio) {
     add(fit, mode.eigenvalues[0], mode.natural_frequency, mode.damping_ratio, most_frequency,
         most_ratio);
   }
 };
 
-inline analysis::IdentifiedModes fit_modes(const std::vector<analysis::Recording>& recordings,
-                                           double period, const Eigen::MatrixXd& mass) {
-  analysis::IdentificationOptions options;
+inline testing::IdentifiedModes fit_modes(const std::vector<testing::Recording>& recordings,
+                                          double period, const Eigen::MatrixXd& mass) {
+  testing::IdentificationOptions options;
   options.period = period;
   options.mass = mass;
   return identify_modes(recordings, options);

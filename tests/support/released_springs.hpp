@@ -1,9 +1,9 @@
 #pragma once
 // Free decays of arms on springs, with what sensors do to them, and their true modes.
 
-#include <dashpot/analysis/identification.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/dynamics.hpp>
+#include <dashpot/identification/identification.hpp>
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/dice.hpp>
 
@@ -142,10 +142,10 @@ struct Sensors {
   double jitter = 0;      ///< of the times, relative to the period
 };
 
-inline analysis::MotionRecord sensed(const Eigen::MatrixXd& motion, double period,
-                                     const Sensors& sensors, Dice& draw) {
+inline identification::MotionRecord sensed(const Eigen::MatrixXd& motion, double period,
+                                           const Sensors& sensors, Dice& draw) {
   const auto samples = static_cast<int>(motion.cols());
-  analysis::MotionRecord record{Eigen::VectorXd(samples), motion};
+  identification::MotionRecord record{Eigen::VectorXd(samples), motion};
   for (int i = 0; i < samples; ++i) {
     record.time[i] = i * period;
     const bool missing = draw.uniform(0, 1) < sensors.missing;
@@ -159,9 +159,9 @@ inline analysis::MotionRecord sensed(const Eigen::MatrixXd& motion, double perio
   return record;
 }
 
-inline analysis::MotionRecord sensed(const SprungArm& arm, const Eigen::VectorXd& position,
-                                     int samples, double period, const Sensors& sensors,
-                                     Dice& draw) {
+inline identification::MotionRecord sensed(const SprungArm& arm, const Eigen::VectorXd& position,
+                                           int samples, double period, const Sensors& sensors,
+                                           Dice& draw) {
   return sensed(arm.release(position, samples, period), period, sensors, draw);
 }
 

@@ -1,0 +1,88 @@
+#pragma once
+#include <dashpot/identification/motion_record.hpp>
+
+#include <array>
+#include <memory>
+#include <vector>
+
+namespace dashpot::identification {
+
+/// A factor of the characteristic polynomial of decays, s^2 + 2 zeta omega s + omega^2, underdamped
+/// or not, or s - lambda, and how strongly and in which phase each record has it.
+struct DecayFactor {
+  bool pair = true;
+  double first = 0;   ///< log(omega), omega in rad/s; or lambda, 1/s
+  double second = 0;  ///< zeta; not used by a single lambda
+  /// A factor moves in each record because of what was before, and, where there are inputs, because
+  /// of each input: these are its sources, the records first. Where the reference source makes the
+  /// motion x(t), source s makes scale[s][0] x + scale[s][1] x' / omega, or scale[s][0] x for a
+  /// single lambda: one shape for all. Empty: not known yet.
+  std::vector<std::array<double, 2>> scale = {};
+  std::size_t reference = 0;
+  /// Whether the model has the products of this pair's motion with itself and with those of other
+  /// pairs of which this is said: what an arm that is not quite linear makes of them, to second
+  /// order.
+  bool has_products = false;
+
+  int parameters() const { return pair ? 2 : 1; }
+  /// 1/s; the same one twice where there is one.
+  std::array<Complex, 2> eigenvalues() const;
+
+  static DecayFactor of_pair(Complex eigenvalue);  ///< and its conjugate
+  static DecayFactor of_single(double eigenvalue) { return {false, eigenvalue, 0}; }
+};
+
+/// What moved a record, on an even grid whose points are fitted in cells.
+struct DrivenGrid {
+  Eigen::MatrixXd input;  ///< inputs x points; each value holds until the next
+  double step = 0;        ///< s
+  Eigen::Index per_cell = 1;
+};
+
+/// What records say for channels that have samples at the same times.
+struct DecayPart {
+  std::vector<Eigen::VectorXd> time;   ///< of each record, s, from its beginning
+  Eigen::MatrixXd output;              ///< samples of all records, one after the other, x channels
+  std::vector<Eigen::Index> channels;  ///< which of the records' channels
+  bool drifts = false;                 ///< each record has a slope as well as a constant
+  /// With inputs: of each record the numbers of the cells that the samples are means of, and what
+  /// moved it.
+  std::vector<std::vector<Eigen::Index>> cells = {};
+  std::shared_ptr<const std::vector<DrivenGrid>> driven = {};
+
+  Eigen::Index inputs() const { return driven ? driven->front().input.rows() : 0; }
+};
+
+/// Decays in the form in which they are fitted, the missing samples left out.
+struct DecayData {
+  std::vector<DecayPart> parts;
+  Eigen::Index channels = 0;
+  std::size_t records = 0;
+  std::size_t inputs = 0;
+  /// Standard deviation of each channel; no noise is taken to be less than kLinear of it.
+  Eigen::VectorXd motion;
+
+  /// To which share of itself the motion of an arm is linear, at best. What is smaller is not
+  /// looked for in it.
+  static constexpr double kLinear = 1e-4;
+
+  double least_noise(Eigen::Index channel) const;
+
+  bool drifts() const { return parts.front().drifts; }
+  void set_drifts(bool drifts) {
+    for (DecayPart& part : parts) part.drifts = drifts;
+  }
+
+  std::size_t sources() const { return records + inputs; }
+
+  /// With `driven`, the samples are means of cells of its grids, and begin with them.
+  explicit DecayData(const std::vector<MotionRecord>& all,
+                     const std::shared_ptr<const std::vector<DrivenGrid>>& driven = {});
+};
+
+/// Samples of a part.
+inline Eigen::Index samples_of(const DecayPart& part) {
+  return part.output.rows();
+}
+
+}  // namespace dashpot::identification

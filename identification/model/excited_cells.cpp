@@ -1,0 +1,188 @@
+#include <dashpot/identification/model/excited_cells.hpp>
+#include <dashpot/identification/records/decay_cells.hpp>
+
+#include <unsupported/Eigen/FFT>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+namespace dashpot::identification {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXcd;
+using Eigen::VectorXd;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr Index kMostCells = 8000;  // of all records
+constexpr double kBin = 0.04;       // of the band of the inputs: bins that count together
+constexpr double kBridge = 3.5;     // steps, over which samples are interpolated
+
+/// Squares of the spectrum of a sequence's differences, from line 1: what begins and ends at
+/// different values leaks less.
+VectorXd power_of(const VectorXd& samples) {
+  const Index N = samples.size() - 1;
+  Eigen::FFT<double> fft;
+  VectorXcd lines;
+  const VectorXd differences = samples.tail(N) - samples.head(N);
+  fft.fwd(lines, differences);
+  return lines.segment(1, std::max<Index>(1, N / 2 - 1)).cwiseAbs2();
+}
+
+/// rad/s below which 99 % of what the inputs do is.
+double input_band(const std::vector<DrivenGrid>& grids) {
+  double band = 0;
+  for (const DrivenGrid& grid : grids) {
+    for (const auto& row : grid.input.rowwise()) {
+      VectorXd power = power_of(row.transpose());
+      const double width =
+          2 * std::numbers::pi / (static_cast<double>(grid.input.cols() - 1) * grid.step);
+      for (Index k = 0; k < power.size(); ++k) {
+        power[k] /= std::pow(2 * std::sin(width * static_cast<double>(k + 1) * grid.step / 2), 2);
+      }
+      const double all = power.sum();
+      double sum = 0;
+      Index k = 0;
+      while (k < power.size() && sum < 0.99 * all) sum += power[k++];
+      if (all > 0) band = std::max(band, width * static_cast<double>(k));
+    }
+  }
+  return band;
+}
+
+/// rad/s up to which some channel's motion stands out from its noise.
+double output_band(const MatrixXd& grid, double step, const VectorXd& noise, double input) {
+  double band = 0;
+  const double width = 2 * std::numbers::pi / (static_cast<double>(grid.cols() - 1) * step);
+  for (Index c = 0; c < grid.rows(); ++c) {
+    const VectorXd power = power_of(grid.row(c).transpose());
+    const Index bin = std::max<Index>(8, static_cast<Index>(kBin * input / width));
+    for (Index from = 0; from + bin <= power.size(); from += bin) {
+      const double w = width * (static_cast<double>(from) + 0.5 * static_cast<double>(bin));
+      const double floor =
+          static_cast<double>(grid.cols()) * std::pow(2 * std::sin(w * step / 2) * noise[c], 2);
+      if (power.segment(from, bin).mean() > 10 * floor) {
+        band = std::max(band, width * static_cast<double>(from + bin));
+      }
+    }
+  }
+  return band;
+}
+
+/// The value at `t` of a channel whose samples are around it: a cubic through four of them.
+double between(const VectorXd& time, const VectorXd& y, const std::vector<Index>& there,
+               std::size_t right, double t) {
+  const std::size_t first = std::min(right >= 2 ? right - 2 : 0, there.size() - 4);
+  double value = 0;
+  for (std::size_t i = first; i < first + 4; ++i) {
+    double weight = 1;
+    for (std::size_t j = first; j < first + 4; ++j) {
+      if (j != i) weight *= (t - time[there[j]]) / (time[there[i]] - time[there[j]]);
+    }
+    value += weight * y[there[i]];
+  }
+  return value;
+}
+
+/// A record's channels on an even grid, NaN in gaps, and its inputs, which hold their values.
+void put_on_grid(const MotionRecord& record, double step, MatrixXd& output, DrivenGrid& driven) {
+  const VectorXd& time = record.time;
+  const double length = time[time.size() - 1] - time[0];
+  const auto N = static_cast<Index>(std::floor(length / step * (1 + 1e-9))) + 1;
+  output.setConstant(record.output.rows(), N, kNaN);
+  driven.input.resize(record.input.rows(), N);
+  driven.step = step;
+  Index at = 0;
+  for (Index k = 0; k < N; ++k) {
+    const double t = time[0] + static_cast<double>(k) * step;
+    while (at + 1 < time.size() && time[at + 1] < t + 0.5 * step) ++at;
+    driven.input.col(k) = record.input.col(at);
+  }
+  for (Index c = 0; c < output.rows(); ++c) {
+    const VectorXd y = record.output.row(c);
+    std::vector<Index> there;
+    for (Index i = 0; i < y.size(); ++i) {
+      if (std::isfinite(y[i])) there.push_back(i);
+    }
+    std::size_t right = 0;
+    for (Index k = 0; k < N; ++k) {
+      const double t = time[0] + static_cast<double>(k) * step;
+      while (right + 1 < there.size() && time[there[right]] < t - 1e-6 * step) ++right;
+      if (std::abs(time[there[right]] - t) < 1e-3 * step) {
+        output(c, k) = y[there[right]];
+      } else if (right > 0 && time[there[right]] - time[there[right - 1]] < kBridge * step) {
+        output(c, k) = between(time, y, there, right, t);
+      }
+    }
+  }
+}
+
+/// Missing samples replaced by straight lines.
+void bridge(MatrixXd& values) {
+  for (auto row : values.rowwise()) {
+    Index last = -1;
+    for (Index k = 0; k < row.size(); ++k) {
+      if (!std::isfinite(row[k])) continue;
+      for (Index i = last + 1; i < k; ++i) {
+        const double share =
+            last < 0 ? 1 : static_cast<double>(i - last) / static_cast<double>(k - last);
+        row[i] = last < 0 ? row[k] : row[last] + share * (row[k] - row[last]);
+      }
+      last = k;
+    }
+    for (Index i = last + 1; i < row.size(); ++i) row[i] = last < 0 ? 0 : row[last];
+  }
+}
+
+}  // namespace
+
+ExcitedCells::ExcitedCells(const std::vector<MotionRecord>& all) {
+  const VectorXd sample_noise = first_noise(all);
+  const double fine = typical_step(all);
+  std::vector<MatrixXd> grids(all.size());
+  auto grids_driven = std::make_shared<std::vector<DrivenGrid>>(all.size());
+  Index points = 0;
+  for (std::size_t r = 0; r < all.size(); ++r) {
+    put_on_grid(all[r], fine, grids[r], (*grids_driven)[r]);
+    points += grids[r].cols();
+    duration = std::max(duration, fine * static_cast<double>(grids[r].cols()));
+  }
+  const double band = input_band(*grids_driven);
+  if (!(band > 0)) throw std::invalid_argument("identify: no input moves");
+  for (MatrixXd whole : grids) {
+    bridge(whole);
+    highest = std::max(highest, output_band(whole, fine, sample_noise, band));
+  }
+  if (!(highest > 0)) throw std::invalid_argument("identify: nothing follows the inputs");
+  highest = std::clamp(highest, band / 3, 3 * band);
+  const auto most = static_cast<Index>(std::numbers::pi / (1.5 * highest * fine));
+  const auto wanted = static_cast<Index>(std::numbers::pi / (2.2 * highest * fine));
+  const Index per_cell = std::max<Index>(1, std::min(most, std::max(wanted, points / kMostCells)));
+  step = fine * static_cast<double>(per_cell);
+  noise = sample_noise / std::sqrt(static_cast<double>(per_cell));
+  for (std::size_t r = 0; r < all.size(); ++r) {
+    (*grids_driven)[r].per_cell = per_cell;
+    const Index cells = grids[r].cols() / per_cell;
+    if (cells < 20) throw std::invalid_argument("identify: a record is too short");
+    MotionRecord record{VectorXd(cells), MatrixXd(grids[r].rows(), cells),
+                        MatrixXd((*grids_driven)[r].input.rows(), cells)};
+    for (Index k = 0; k < cells; ++k) {
+      record.time[k] = step * static_cast<double>(k);
+      record.output.col(k) = grids[r].middleCols(k * per_cell, per_cell).rowwise().mean();
+      record.input.col(k) =
+          (*grids_driven)[r].input.middleCols(k * per_cell, per_cell).rowwise().mean();
+    }
+    MotionRecord whole = record;
+    bridge(whole.output);
+    whole.output = noise.cwiseInverse().asDiagonal() * whole.output;
+    records.push_back(std::move(record));
+    bridged.push_back(std::move(whole));
+  }
+  driven = std::move(grids_driven);
+}
+
+}  // namespace dashpot::identification

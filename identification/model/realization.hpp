@@ -1,0 +1,43 @@
+#pragma once
+#include <dashpot/identification/motion_record.hpp>
+
+#include <vector>
+
+namespace dashpot::identification {
+
+/// An eigenvalue of a realization; of a pair the one with positive imaginary part only.
+struct RealizedPole {
+  Complex eigenvalue;      ///< 1/s
+  Eigen::VectorXcd shape;  ///< channels, unit length
+};
+
+/// Models x(k+1) = A x(k), y(k) = C x(k) of rising order for sequences that are sums of decays: the
+/// eigensystem realization algorithm (Juang and Pappa 1985), with A from the shift within the
+/// observability matrix that the left singular vectors of the block Hankel matrix are. Of
+/// correlations it is covariance-driven stochastic subspace identification (Peeters and De Roeck
+/// 1999).
+class Realization {
+ public:
+  /// `sequences`: rows x samples each, evenly spaced by `step` (s). The first `channels` rows give
+  /// the shapes. The Hankel matrix gets at most `max_rows` rows, and all samples.
+  Realization(const std::vector<Eigen::MatrixXd>& sequences, double step, Eigen::Index channels,
+              Eigen::Index max_rows);
+  /// The block of the Hankel matrix in row i and column j is the sample `delays[i] + delays[j]`, of
+  /// rising delays, of which some follow each other.
+  Realization(const std::vector<Eigen::MatrixXd>& sequences, double step,
+              const std::vector<Eigen::Index>& delays);
+
+  int max_order() const { return static_cast<int>(basis_.cols()); }
+  /// Without those that no sum of decays has: eigenvalues of A that are negative or zero.
+  std::vector<RealizedPole> poles(int order) const;
+
+ private:
+  void take_basis(Eigen::MatrixXd hankel);  // transposed
+
+  double step_;
+  Eigen::Index channels_, block_;
+  std::vector<Eigen::Index> delays_;  ///< of the blocks of rows
+  Eigen::MatrixXd basis_;  ///< singular vectors times roots of singular values, rows x orders
+};
+
+}  // namespace dashpot::identification

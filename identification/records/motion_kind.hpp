@@ -1,0 +1,14 @@
+#pragma once
+#include <dashpot/identification/motion_record.hpp>
+
+namespace dashpot::identification {
+
+/// rad/s: half of what the channels' velocities do beyond noise, by its squares, is slower. It is
+/// the unit of frequency of whatever is looked for in a record. 0 if nothing moves. `grid` is
+/// channels x samples, `step` (s) apart.
+double pace_of(const Eigen::MatrixXd& grid, double step, const Eigen::VectorXd& noise);
+
+/// Samples, at most `samples`, of which a fast Fourier transform is fast.
+Eigen::Index smooth_count(Eigen::Index samples);
+
+}  // namespace dashpot::identification

@@ -1,0 +1,145 @@
+#include <dashpot/identification/records/motion_kind.hpp>
+#include <dashpot/identification/records/steady_lines.hpp>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <unsupported/Eigen/FFT>
+
+namespace dashpot::identification {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using Eigen::VectorXcd;
+using Eigen::VectorXd;
+
+constexpr Index kNear = 30;          // bins of the spectrum to each side
+constexpr double kOutstanding = 20;  // times their median
+constexpr Index kSteadyParts = 8;
+constexpr double kSteady = 0.7;  // of irregular motion, two in ten thousand reach it
+constexpr int kMostLines = 20;
+
+ArrayXd taper_of(Index samples) {
+  return 0.5 - 0.5 * ArrayXd::LinSpaced(samples, 0, 2 * std::numbers::pi).cos();
+}
+
+/// The power of all channels by frequency bins, each channel in units of its size.
+ArrayXd power_of(const MatrixXd& scaled) {
+  const Index N = smooth_count(scaled.cols());
+  const ArrayXd taper = taper_of(N);
+  ArrayXd power = ArrayXd::Zero(N / 2);
+  Eigen::FFT<double> fft;
+  VectorXcd spectrum;
+  for (Index c = 0; c < scaled.rows(); ++c) {
+    const VectorXd shown = scaled.row(c).head(N).transpose().array() * taper;
+    fft.fwd(spectrum, shown);
+    power += spectrum.head(N / 2).array().abs2();
+  }
+  return power;
+}
+
+/// The bin that stands out most; -1 if none does.
+Index outstanding(const ArrayXd& power, const std::vector<bool>& tried) {
+  Index best = -1;
+  double most = kOutstanding;
+  std::vector<double> near;
+  for (Index k = 3; k + 3 < power.size(); ++k) {
+    if (tried[static_cast<std::size_t>(k)] || power[k] < power[k - 1] || power[k] < power[k + 1]) {
+      continue;
+    }
+    near.clear();
+    for (Index j = std::max<Index>(1, k - kNear); j < std::min(power.size(), k + kNear + 1); ++j) {
+      if (std::abs(j - k) > 3) near.push_back(power[j]);
+    }
+    const auto middle = near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2);
+    std::nth_element(near.begin(), middle, near.end());
+    if (power[k] > most * *middle) most = power[k] / *middle, best = k;
+  }
+  return best;
+}
+
+/// exp(-i w t) at the samples.
+VectorXcd turning(double w, double step, Index samples) {
+  VectorXcd result(samples);
+  for (Index i = 0; i < samples; ++i) {
+    result[i] = std::polar(1.0, -w * step * static_cast<double>(i));
+  }
+  return result;
+}
+
+/// The frequency within a bin to each side at which the tapered spectrum is largest, by golden
+/// sections.
+double refined(const MatrixXd& scaled, double w, double bin, double step) {
+  const Index N = scaled.cols();
+  const MatrixXd tapered = scaled * taper_of(N).matrix().asDiagonal();
+  const auto size = [&](double x) { return (tapered * turning(x, step, N)).squaredNorm(); };
+  constexpr double kGolden = 0.6180339887498949;
+  double a = w - bin, b = w + bin;
+  double x = b - kGolden * (b - a), y = a + kGolden * (b - a);
+  double at_x = size(x), at_y = size(y);
+  while (b - a > 1e-3 * bin) {
+    if (at_x > at_y) {
+      b = y, y = x, at_y = at_x;
+      at_x = size(x = b - kGolden * (b - a));
+    } else {
+      a = x, x = y, at_x = at_y;
+      at_y = size(y = a + kGolden * (b - a));
+    }
+  }
+  return (a + b) / 2;
+}
+
+/// Share of the motion at frequency `w` in parts of the record that has one phase, 0 to 1.
+double steadiness(const MatrixXd& scaled, double w, double step) {
+  const Index length = scaled.cols() / kSteadyParts;
+  const VectorXcd turns = turning(w, step, scaled.cols());
+  const ArrayXd taper = taper_of(length);
+  MatrixXcd amplitudes(scaled.rows(), kSteadyParts);
+  for (Index p = 0; p < kSteadyParts; ++p) {
+    amplitudes.col(p) = scaled.middleCols(p * length, length) *
+                        (turns.segment(p * length, length).array() * taper).matrix();
+  }
+  const double all = amplitudes.squaredNorm();
+  return all > 0 ? amplitudes.rowwise().sum().squaredNorm() / (kSteadyParts * all) : 0;
+}
+
+}  // namespace
+
+std::vector<SteadyLine> take_steady_lines(MatrixXd& grid, double step) {
+  std::vector<SteadyLine> lines;
+  if (grid.cols() < 16 * kNear) return lines;
+  const VectorXd mean = grid.rowwise().mean();
+  const VectorXd sizes =
+      ((grid.colwise() - mean).rowwise().norm()).cwiseMax(std::numeric_limits<double>::min());
+  MatrixXd scaled = sizes.cwiseInverse().asDiagonal() * (grid.colwise() - mean);
+  ArrayXd power = power_of(scaled);
+  std::vector<bool> tried(static_cast<std::size_t>(power.size()));
+  const double bin = std::numbers::pi / (static_cast<double>(power.size()) * step);
+  while (static_cast<int>(lines.size()) < kMostLines) {
+    const Index k = outstanding(power, tried);
+    if (k < 0) break;
+    tried[static_cast<std::size_t>(k)] = true;
+    const double w = refined(scaled, bin * static_cast<double>(k), bin, step);
+    if (steadiness(scaled, w, step) < kSteady) continue;
+    const VectorXcd turns = turning(w, step, grid.cols());
+    MatrixXd waves(grid.cols(), 2);
+    waves << turns.real(), turns.imag();
+    const MatrixXd shares =
+        (waves.transpose() * waves).ldlt().solve(waves.transpose() * scaled.transpose());
+    scaled -= (waves * shares).transpose();
+    lines.push_back({w, VectorXcd(grid.rows())});
+    lines.back().size.real() = sizes.cwiseProduct(shares.row(0).transpose());
+    lines.back().size.imag() = sizes.cwiseProduct(shares.row(1).transpose());
+    power = power_of(scaled);
+  }
+  if (!lines.empty()) grid = (sizes.asDiagonal() * scaled).colwise() + mean;
+  return lines;
+}
+
+}  // namespace dashpot::identification

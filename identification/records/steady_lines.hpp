@@ -1,0 +1,20 @@
+#pragma once
+#include <dashpot/identification/motion_record.hpp>
+
+#include <vector>
+
+namespace dashpot::identification {
+
+/// A sinusoid of one frequency and phase throughout a record: a hum, not a mode.
+struct SteadyLine {
+  double frequency = 0;   ///< rad/s
+  Eigen::VectorXcd size;  ///< of the channels: real part of size exp(i frequency t) is the motion
+};
+
+/// Takes the steady lines away from the samples in `grid`, channels x samples `step` s apart.
+///
+/// A line stands out from the spectrum near it, and its phase in eight parts of the record is that
+/// of one sinusoid; that of a mode under irregular forces wanders.
+std::vector<SteadyLine> take_steady_lines(Eigen::MatrixXd& grid, double step);
+
+}  // namespace dashpot::identification

@@ -1,0 +1,206 @@
+#include <dashpot/identification/identification.hpp>
+#include <dashpot/identification/model/decay_columns.hpp>
+#include <dashpot/identification/records/check_that.hpp>
+#include <dashpot/identification/search/measured_modes.hpp>
+#include <dashpot/identification/search/model_search.hpp>
+#include <dashpot/identification/search/moving_channels.hpp>
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+
+namespace dashpot::identification {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::MatrixXd;
+using Eigen::VectorXcd;
+using Eigen::VectorXd;
+
+/// The shape of a factor's first eigenvalue, from its amplitudes.
+VectorXcd shape_of(const DecayFactor& factor, const MatrixXd& amplitude) {
+  if (!factor.pair) return amplitude.row(0).transpose().cast<Complex>();
+  const auto lambda = factor.eigenvalues();
+  const double w = std::exp(factor.first);
+  const VectorXd c = amplitude.row(0), s = w * amplitude.row(1);
+  if (lambda[0].imag() != 0) {
+    return c.cast<Complex>() - Complex(0, 1) / lambda[0].imag() * s.cast<Complex>();
+  }
+  // e^{-a t / 2} (c cosh + s sinh / d), with d half of the difference of the eigenvalues.
+  const double d = (lambda[0].real() - lambda[1].real()) / 2;
+  const double safe = std::abs(d) > 1e-9 * w ? d : 1e-9 * w;
+  return ((c + s / safe) / 2).cast<Complex>();
+}
+
+MeasuredMode to_mode(const ModelSearch& search, std::size_t k, Index at, const VectorXd& scale,
+                     double all) {
+  const DecayFit& fit = search.fit;
+  const DecayFactor& factor = fit.factors[k];
+  MeasuredMode mode;
+  mode.eigenvalues = factor.eigenvalues();
+  const std::array<double, 2> shown =
+      k < search.scatter.size() ? search.scatter[k] : std::array<double, 2>{};
+  const auto variance = [&](Index i) {
+    const double more = i - at < 2 ? shown[static_cast<std::size_t>(i - at)] : 0;
+    return std::sqrt(std::max(0.0, fit.covariance(i, i)) + std::max(0.0, more));
+  };
+  if (factor.pair) {
+    mode.natural_frequency = std::exp(factor.first);
+    mode.natural_frequency_std = mode.natural_frequency * variance(at);
+    mode.damping_ratio = factor.second;
+    mode.damping_ratio_std = variance(at + 1);
+    mode.covariance = mode.natural_frequency * fit.covariance(at, at + 1);
+    mode.frequency_scatter = std::pow(mode.natural_frequency, 2) * std::max(0.0, shown[0]);
+    mode.ratio_scatter = std::max(0.0, shown[1]);
+  } else {
+    mode.natural_frequency = std::abs(factor.first);
+    mode.natural_frequency_std = variance(at);
+    mode.damping_ratio = factor.first < 0 ? 1 : -1;
+    mode.damping_ratio_std = std::numeric_limits<double>::infinity();
+  }
+  double energy = 0;
+  const std::vector<MatrixXd> motion = factor_motion(search.data, fit, k);
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    const auto& channels = search.data.parts[i].channels;
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      energy += motion[i].col(static_cast<Index>(c)).squaredNorm() / scale[channels[c]];
+    }
+  }
+  mode.energy = energy / all;
+  mode.shape = turned(shape_of(factor, fit.amplitudes.middleRows(at, factor.parameters())));
+  return mode;
+}
+
+/// Adds to the variances what the next larger model thinks otherwise: whether there is one mode
+/// more is not known for sure, either.
+void doubt_order(const DecayFit& fit, const DecayFit& larger, std::vector<MeasuredMode>& modes) {
+  for (std::size_t k = 0; k < modes.size(); ++k) {
+    if (!fit.factors[k].pair) continue;
+    const DecayFactor* nearest = nullptr;
+    double least = std::numeric_limits<double>::infinity();
+    for (const DecayFactor& factor : larger.factors) {
+      if (!factor.pair) continue;
+      const double distance =
+          std::abs(factor.eigenvalues()[0] - modes[k].eigenvalues[0]) / modes[k].natural_frequency;
+      if (distance < least) least = distance, nearest = &factor;
+    }
+    if (nearest == nullptr) continue;
+    MeasuredMode& mode = modes[k];
+    const double dw = std::exp(nearest->first) - mode.natural_frequency;
+    const double dz = nearest->second - mode.damping_ratio;
+    mode.natural_frequency_std = std::hypot(mode.natural_frequency_std, dw);
+    mode.damping_ratio_std = std::hypot(mode.damping_ratio_std, dz);
+    mode.covariance += dw * dz;
+  }
+}
+
+void check_order(const IdentifyOptions& options) {
+  check_that(options.max_order >= 0 && options.max_order <= 60,
+             "max_order has to be within 0 and 60");
+}
+
+Identification describe(const ModelSearch& search, const std::vector<MotionRecord>& records) {
+  Identification result;
+  result.noise = search.fit.noise;
+  result.whiteness = search.fit.whiteness;
+  result.poles = model_poles(search.by_order);
+
+  // The motion of each channel about its constant, and what is left of it.
+  VectorXd scale = VectorXd::Zero(search.data.channels), rest = scale;
+  const auto over = left_over(search.data, search.fit);
+  for (std::size_t k = 0; k < over.size(); ++k) {
+    for (std::size_t c = 0; c < search.data.parts[k].channels.size(); ++c) {
+      rest[search.data.parts[k].channels[c]] += over[k].col(static_cast<Index>(c)).squaredNorm();
+    }
+  }
+  double duration = 0, step = std::numeric_limits<double>::infinity();
+  const Index constants = factor_width(search.fit.factors);
+  for (std::size_t r = 0; r < records.size(); ++r) {
+    const MotionRecord& record = records[r];
+    const double length = record.time[record.time.size() - 1] - record.time[0];
+    duration = std::max(duration, length);
+    step = std::min(step, length / static_cast<double>(record.time.size() - 1));
+    const auto constant = search.fit.amplitudes.row(constants + static_cast<Index>(r));
+    for (Index c = 0; c < scale.size(); ++c) {
+      for (const double y : record.output.row(c)) {
+        if (std::isfinite(y)) scale[c] += (y - constant[c]) * (y - constant[c]);
+      }
+    }
+  }
+  scale = scale.cwiseMax(1e-300);
+  result.explained = 1 - rest.cwiseQuotient(scale).mean();
+  std::vector<MeasuredMode> modes;
+  Index at = 0;
+  for (std::size_t k = 0; k < search.fit.factors.size(); ++k) {
+    modes.push_back(to_mode(search, k, at, scale, static_cast<double>(scale.size())));
+    modes.back().stability = stability_of(modes.back(), search.by_order, search.order);
+    at += search.fit.factors[k].parameters();
+  }
+  if (search.larger) doubt_order(search.fit, *search.larger, modes);
+  result.order = static_cast<int>(at);
+  // Friction makes of one mode others near it, heavily damped ones, and weak ones.
+  constexpr double kLightly = 0.1, kShare = 0.1, kFarFromWhite = 2;
+  double most = 0;
+  for (const MeasuredMode& mode : modes) {
+    if (mode.damping_ratio < kLightly) most = std::max(most, mode.energy);
+  }
+  const bool doubted = search.differs && search.fit.whiteness > kFarFromWhite;
+  for (MeasuredMode& mode : modes) {
+    if (doubted && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {
+      mode.reason = "parts of the records differ: it may be friction, or what else is not linear";
+    }
+  }
+  for (const DecayFactor& factor : search.not_repeated) {
+    MeasuredMode& mode = modes.emplace_back();
+    mode.eigenvalues = factor.eigenvalues();
+    mode.natural_frequency = factor.pair ? std::exp(factor.first) : std::abs(factor.first);
+    mode.damping_ratio = factor.pair ? factor.second : 1;
+    mode.shape = VectorXcd::Zero(search.data.channels);
+    mode.reason = "parts of the records have another, or none: not linear, or noise";
+  }
+  judge(std::move(modes), duration, step, result);
+  return result;
+}
+
+}  // namespace
+
+Identification identify_decays(const std::vector<MotionRecord>& records,
+                               const IdentifyOptions& options) {
+  check_records(records);
+  check_order(options);
+  const MovingChannels moving(records);
+  return moving.of_all(describe(ModelSearch(moving.records, options), moving.records));
+}
+
+Identification identify_excited(const std::vector<MotionRecord>& records,
+                                const IdentifyOptions& options) {
+  check_records(records);
+  check_order(options);
+  check_that(records.front().input.rows() > 0, "the records have no inputs");
+  const MovingChannels moving(records);
+  const ExcitedCells cells(moving.records);
+  Index count = 0, shortest = std::numeric_limits<Index>::max();
+  for (const MotionRecord& record : cells.records) {
+    count += record.time.size();
+    shortest = std::min(shortest, record.time.size());
+  }
+  constexpr double kSearched = 3000, kLeast = 200;  // cells: the search is among the beginnings
+  const double share =
+      std::max(kSearched / static_cast<double>(count), kLeast / static_cast<double>(shortest));
+  if (share >= 1) return moving.of_all(describe(ModelSearch(cells, options), cells.records));
+  std::vector<MotionRecord> beginnings;
+  for (const MotionRecord& record : moving.records) {
+    const auto samples = static_cast<double>(record.time.size());
+    beginnings.push_back(part_of(record, 0, static_cast<Index>(share * samples)));
+  }
+  const ExcitedCells some(beginnings);
+  ModelSearch search(some, options);
+  search.refine(cells);
+  return moving.of_all(describe(search, cells.records));
+}
+
+}  // namespace dashpot::identification

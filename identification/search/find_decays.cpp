@@ -1,0 +1,250 @@
+#include <dashpot/identification/identification.hpp>
+#include <dashpot/identification/records/decay_cells.hpp>
+#include <dashpot/identification/records/motion_kind.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+
+namespace dashpot::identification {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kMoves = 3;    // in units of the noise
+constexpr double kStrong = 10;  // worth a decay
+constexpr double kRise = 3;     // a new push
+// In periods of the motion's pace: what is slower by a few times still has one envelope.
+constexpr double kStandstill = 1;  // within a motion
+constexpr double kEnvelope = 1.5;  // window
+constexpr double kLag = 0.025;     // of differences
+constexpr Index kLeast = 20;       // samples of a decay
+
+/// How fast the channels move: root mean square of differences over kLag, in units of their noise.
+VectorXd speed_of(const MatrixXd& grid, const VectorXd& noise, Index lag) {
+  const Index N = grid.cols();
+  VectorXd squares = VectorXd::Zero(N);
+  for (Index k = 0; k + lag < N; ++k) {
+    squares[k] = (grid.col(k + lag) - grid.col(k)).cwiseQuotient(noise).squaredNorm() / 2 /
+                 static_cast<double>(grid.rows());
+  }
+  VectorXd speed = VectorXd::Zero(N);
+  double sum = 0;  // over the last samples, as many as the lag
+  for (Index k = 0; k < N; ++k) {
+    sum += squares[k];
+    if (k >= lag) sum -= squares[k - lag];
+    speed[k] = std::sqrt(std::max(0.0, sum) / static_cast<double>(std::min(k + 1, lag)));
+  }
+  return speed;
+}
+
+/// The point from which an event may be free: the last at which its energy, or what stands for it,
+/// is at its top. The kinetic part is scaled so that both parts are equal on the whole.
+Index top_of_energy(const MatrixXd& grid, const VectorXd& size, Index from, Index to, Index lag) {
+  const Index quiet = std::max<Index>(1, (to - from) / 10);
+  const VectorXd rest = grid.middleCols(to - quiet, quiet).rowwise().mean();
+  const Index N = to - from - lag;
+  VectorXd potential(N), kinetic(N);
+  for (Index k = 0; k < N; ++k) {
+    const auto here = grid.col(from + k), there = grid.col(from + k + lag);
+    potential[k] = ((here + there) / 2 - rest).cwiseQuotient(size).squaredNorm();
+    kinetic[k] = (there - here).cwiseQuotient(size).squaredNorm();
+  }
+  const VectorXd energy = potential + kinetic * (potential.sum() / std::max(1e-300, kinetic.sum()));
+  const double top = 0.97 * energy.maxCoeff();
+  for (Index k = N; k-- > 0;) {
+    if (energy[k] >= top) return from + k;
+  }
+  return from;
+}
+
+/// A push and what follows, in points of the grid.
+struct Event {
+  Index begin, peak, end;
+};
+
+/// The pushes within a motion from `begin` to `end`: where the envelope of the speed rises again.
+void add_events(const VectorXd& speed, Index begin, Index end, Index window,
+                std::vector<Event>& events) {
+  Index peak = begin, low = begin;
+  double least = 0;
+  bool falling = false;
+  const auto envelope = [&](Index k) {
+    const Index from = std::max(begin, k - window / 2), to = std::min(end, k + window / 2 + 1);
+    return speed.segment(from, to - from).maxCoeff();
+  };
+  Index start = begin;
+  for (Index k = begin; k < end; k += std::max<Index>(1, window / 8)) {
+    const double now = envelope(k);
+    if (!falling) {
+      if (now >= speed[peak]) {
+        const Index from = std::max(begin, k - window / 2);
+        Index at = 0;
+        speed.segment(from, std::min(end, k + window / 2 + 1) - from).maxCoeff(&at);
+        peak = from + at;
+      }
+      if (now < speed[peak] / 2) falling = true, least = now, low = k;
+      continue;
+    }
+    if (now < least) least = now, low = k;
+    if (now > kRise * std::max(least, kMoves)) {
+      // Begins before the envelope says so, which looks ahead.
+      Index rise = std::min(end - 1, low + window / 2);
+      while (rise > low && speed[rise] > 1.5 * least) --rise;
+      events.push_back({start, peak, rise});
+      start = rise, peak = rise, falling = false;
+      k = rise;
+    }
+  }
+  events.push_back({start, peak, end});
+}
+
+/// `period` in points of the grid.
+std::vector<Event> find_events(const VectorXd& speed, double period) {
+  const auto points = [period](double periods) {
+    return std::max<Index>(1, static_cast<Index>(std::lround(periods * period)));
+  };
+  std::vector<Event> events;
+  const Index N = speed.size();
+  for (Index k = 0; k < N;) {
+    if (speed[k] <= kMoves) {
+      ++k;
+      continue;
+    }
+    Index last = k;
+    for (Index i = k; i < N && i - last <= points(kStandstill); ++i) {
+      if (speed[i] > kMoves) last = i;
+    }
+    const std::size_t before = events.size();
+    add_events(speed, k, last + 1, points(kEnvelope), events);
+    // What is at rest afterwards shows where the arm rests.
+    Index quiet = last + 1;
+    const Index most = last + 1 + (last + 1 - events.back().begin) / 3;
+    while (quiet < std::min(N, most) && speed[quiet] <= kMoves) ++quiet;
+    events.back().end = quiet;
+    events.erase(
+        std::remove_if(events.begin() + static_cast<std::ptrdiff_t>(before), events.end(),
+                       [&speed](const Event& event) { return speed[event.peak] < kStrong; }),
+        events.end());
+    k = last + 1;
+  }
+  return events;
+}
+
+/// Returns the standard deviation of each channel.
+VectorXd motion_of(const MotionRecord& record) {
+  VectorXd motion(record.output.rows());
+  for (Index c = 0; c < motion.size(); ++c) {
+    double sum = 0, squares = 0, count = 0;
+    for (const double y : record.output.row(c)) {
+      if (std::isfinite(y)) sum += y, ++count;
+    }
+    for (const double y : record.output.row(c)) {
+      if (std::isfinite(y)) squares += std::pow(y - sum / count, 2);
+    }
+    motion[c] = std::sqrt(squares / count);
+  }
+  return motion;
+}
+
+/// Where the decay of an event begins: the earliest of some points from which a sum of decays
+/// explains it.
+FreeDecay decay_of(const MotionRecord& record, const VectorXd& noise, Index from, Index peak,
+                   Index to) {
+  FreeDecay decay{peak, to, {}};
+  std::vector<Index> starts;
+  starts.reserve(12);
+  for (int k = 0; k < 6; ++k) starts.push_back(from + (peak - from) * k / 6);
+  for (const double share : {0.0, 0.02, 0.05, 0.1, 0.2, 0.3}) {
+    starts.push_back(peak + static_cast<Index>(share * static_cast<double>(to - peak)));
+  }
+  starts.erase(std::unique(starts.begin(), starts.end()), starts.end());
+  // Large motions are not linear, but what decays fast is seen in them only.
+  constexpr double kEnough = 1e-3, kMore = 0.03, kSeen = 20;
+  const VectorXd enough = kEnough * motion_of(part_of(record, from, to));
+  // Mean logarithm of what a model leaves over from a start on; none where too little follows.
+  const auto rest = [&](Index start) {
+    if (to - start < kLeast) return std::numeric_limits<double>::infinity();
+    try {
+      const Identification found =
+          identify_decays({part_of(record, start, to)}, {.max_order = 0, .refine = false});
+      return found.noise.cwiseMax(enough).array().log().mean();
+    } catch (const std::invalid_argument&) {
+      return std::numeric_limits<double>::infinity();
+    }
+  };
+  double least = std::numeric_limits<double>::infinity();
+  while (!starts.empty() && !std::isfinite(least = rest(starts.back()))) starts.pop_back();
+  if (starts.empty()) {
+    decay.reason = "too short";
+    return decay;
+  }
+  // A model of the motion from some start on explains it from later ones: by halving.
+  std::size_t good = starts.size() - 1, bad = 0;
+  if (rest(starts[0]) <= least + kMore) good = 0;
+  while (good > bad + 1) {
+    const std::size_t middle = (good + bad) / 2;
+    const double there = rest(starts[middle]);
+    least = std::min(least, there);
+    (there <= least + kMore ? good : bad) = middle;
+  }
+  decay.from = starts[good];
+  const VectorXd motion = motion_of(part_of(record, decay.from, to));
+  if (motion.cwiseQuotient(noise).maxCoeff() < kSeen) decay.reason = "lost in noise";
+  return decay;
+}
+
+}  // namespace
+
+std::vector<FreeDecay> find_decays(const MotionRecord& record, const std::vector<bool>& free) {
+  const Index N = record.time.size();
+  if (!free.empty() && free.size() != static_cast<std::size_t>(N)) {
+    throw std::invalid_argument("find_decays: free has to have an entry for each sample");
+  }
+  check_records({record});
+  const VectorXd noise = first_noise({record});
+  const double step = typical_step({record});
+  const MatrixXd grid = on_grid(record, step);
+  const double pace = pace_of(grid, step, noise);
+  if (!(pace > 0)) return {};
+  const double period = 2 * std::numbers::pi / (pace * step);
+  const Index lag = std::max<Index>(1, static_cast<Index>(std::lround(kLag * period)));
+  std::vector<FreeDecay> decays;
+  const auto sample_at = [&record, step](Index point) {
+    const double t = record.time[0] + (static_cast<double>(point) - 0.5) * step;
+    const auto* const first = record.time.data();
+    return static_cast<Index>(std::lower_bound(first, first + record.time.size(), t) - first);
+  };
+  for (const Event& event : find_events(speed_of(grid, noise, lag), period)) {
+    if (event.end - event.begin < 4 * lag) continue;
+    const auto whole = grid.middleCols(event.begin, event.end - event.begin);
+    const VectorXd size =
+        (whole.colwise() - VectorXd(whole.rowwise().mean())).rowwise().norm().cwiseMax(noise);
+    const Index top = top_of_energy(grid, size, event.begin, event.end, lag);
+    Index from = sample_at(top), to = sample_at(event.end);
+    Index peak = std::max(from, sample_at(event.peak));
+    if (!free.empty()) {
+      // The longest free stretch of it.
+      Index best_from = from, best_to = from;
+      for (Index k = from, begin = from; k <= to; ++k) {
+        if (k < to && free[static_cast<std::size_t>(k)]) continue;
+        if (k - begin > best_to - best_from) best_from = begin, best_to = k;
+        begin = k + 1;
+      }
+      from = best_from, to = best_to;
+      peak = std::clamp(peak, from, to);
+    }
+    if (to - from < kLeast) {
+      decays.push_back({from, to, "too short"});
+      continue;
+    }
+    decays.push_back(decay_of(record, noise, from, peak, to));
+  }
+  return decays;
+}
+
+}  // namespace dashpot::identification

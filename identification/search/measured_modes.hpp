@@ -1,0 +1,27 @@
+#pragma once
+#include <dashpot/identification/identification.hpp>
+#include <dashpot/identification/model/realization.hpp>
+
+#include <vector>
+
+namespace dashpot::identification {
+
+/// |u' v|^2 / (|u|^2 |v|^2), the modal assurance criterion.
+double likeness(const Eigen::VectorXcd& u, const Eigen::VectorXcd& v);
+
+/// Returns the shape with unit length, its largest entry real and positive.
+Eigen::VectorXcd turned(const Eigen::VectorXcd& shape);
+
+/// The eigenvalues of models of rising order, from order 1, and whether each is stable.
+std::vector<ModelPole> model_poles(const std::vector<std::vector<RealizedPole>>& by_order);
+
+/// The share of the models of `order` eigenvalues and more that have this mode.
+double stability_of(const MeasuredMode& mode,
+                    const std::vector<std::vector<RealizedPole>>& by_order, int order);
+
+/// Makes overdamped modes of single eigenvalues of like shapes, and sorts out what is not to be
+/// believed, with reasons; those with a reason have one already. `duration` and `step` are those of
+/// the records, s.
+void judge(std::vector<MeasuredMode> modes, double duration, double step, Identification& result);
+
+}  // namespace dashpot::identification

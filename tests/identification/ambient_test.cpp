@@ -1,0 +1,237 @@
+// Modes from motion under forces that nobody measured.
+#include <dashpot/identification/identification.hpp>
+#include <dashpot/tests/support/refusal.hpp>
+#include <dashpot/tests/support/released_springs.hpp>
+#include <dashpot/tests/support/sanitized.hpp>
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <vector>
+
+namespace dashpot::identification {
+namespace {
+
+using analysis::Mode;
+using Eigen::MatrixXd;
+using testing::Dice;
+using ::testing::HasSubstr;
+using testing::sensed;
+using testing::Sensors;
+using testing::SprungArm;
+
+constexpr double kPeriod = 0.002;  // s
+constexpr double kStrength = 60;   // rad/s^2: about 0.01 rad of motion
+constexpr int kTwoMinutes = 60000;
+
+Sensors noise_of(double noise, double missing = 0) {
+  Sensors sensors;
+  sensors.noise = noise;
+  sensors.missing = missing;
+  return sensors;
+}
+
+/// How the modes found compare with the true ones.
+struct Comparison {
+  int modes = 0, found = 0, frequencies_inside = 0, ratios_inside = 0, false_ones = 0;
+
+  void add(const std::vector<Mode<>>& truth, const Identification& result) {
+    std::vector<int> claims(truth.size());
+    for (const MeasuredMode& measured : result.modes) {
+      std::size_t best = 0;
+      for (std::size_t k = 0; k < truth.size(); ++k) {
+        if (distance(measured, truth[k]) < distance(measured, truth[best])) best = k;
+      }
+      const Mode<>& mode = truth[best];
+      if (distance(measured, mode) > 0.2 * mode.natural_frequency || ++claims[best] > 1) {
+        ++false_ones;
+        continue;
+      }
+      ++found;
+      const double dw = measured.natural_frequency - mode.natural_frequency;
+      const double dz = measured.damping_ratio - mode.damping_ratio;
+      frequencies_inside += std::abs(dw) < 1.96 * measured.natural_frequency_std ? 1 : 0;
+      ratios_inside += std::abs(dz) < 1.96 * measured.damping_ratio_std ? 1 : 0;
+      EXPECT_LT(std::abs(dw), 5 * measured.natural_frequency_std);
+      EXPECT_LT(std::abs(dz), 5 * measured.damping_ratio_std);
+    }
+    modes += static_cast<int>(truth.size());
+  }
+
+  static double distance(const MeasuredMode& measured, const Mode<>& mode) {
+    return std::abs(measured.eigenvalues[0] - mode.eigenvalues[0]);
+  }
+};
+
+/// One of the arms, with what it was shaken to for two minutes.
+struct ShakenArm {
+  explicit ShakenArm(std::uint64_t seed)
+      : draw(seed),
+        arm(seed, draw, 0.05, 0.4),
+        motion(arm.shake(kStrength, kTwoMinutes, kPeriod, draw)) {}
+
+  MotionRecord record(double noise, double missing = 0, int from = 0, int count = kTwoMinutes) {
+    return sensed(motion.middleCols(from, count), kPeriod, noise_of(noise, missing), draw);
+  }
+
+  Dice draw;
+  SprungArm arm;
+  MatrixXd motion;
+};
+
+/// How often intervals hold the truth is counted by `./run stress identify`.
+TEST(IdentifyAmbient, FindsTheModesOfShakenArmsWithinTheirDeviations) {
+  DASHPOT_SKIP_IF_QUICK();
+  Comparison all;
+  for (const std::uint64_t seed : {2U, 3U}) {
+    ShakenArm shaken(seed);
+    all.add(shaken.arm.modes, identify_ambient({shaken.record(1e-5, 0.002)}));
+  }
+  EXPECT_GE(all.found, 0.85 * all.modes);
+  EXPECT_GE(all.frequencies_inside, 0.85 * all.found);
+  EXPECT_GE(all.ratios_inside, 0.85 * all.found);
+  EXPECT_LT(all.frequencies_inside + all.ratios_inside, 2 * all.found);
+  EXPECT_LE(all.false_ones, 1);
+}
+
+/// Lag zero has the noise of the sensors, which no other lag has.
+TEST(IdentifyAmbient, DoesNotTakeTheSensorsNoiseForMotion) {
+  ShakenArm shaken(2);
+  Comparison noisy;
+  noisy.add(shaken.arm.modes, identify_ambient({shaken.record(2e-3)}));
+  EXPECT_GE(noisy.found, 4);
+  EXPECT_EQ(noisy.false_ones, 0);
+}
+
+/// In several records, each about a mean of its own; in short ones, of which each has less than a
+/// twentieth of all; with gaps; and in other units beside a joint that nothing moves.
+TEST(IdentifyAmbient, FindsTheSameInTheSameMotionHoweverItIsRecorded) {
+  DASHPOT_SKIP_IF_QUICK();
+  ShakenArm shaken(1);
+  const MotionRecord whole = shaken.record(1e-5);
+  const Identification one = identify_ambient({whole});
+  const auto expect_same = [&](const char* what, const std::vector<MotionRecord>& records,
+                               std::size_t fewer) {
+    const Identification found = identify_ambient(records);
+    EXPECT_GE(found.modes.size() + fewer, one.modes.size()) << what;
+    for (const MeasuredMode& mode : found.modes) {
+      const auto near = [&mode](const MeasuredMode& other) {
+        return std::abs(mode.natural_frequency - other.natural_frequency) <
+               2 * other.natural_frequency_std;
+      };
+      EXPECT_TRUE(std::any_of(one.modes.begin(), one.modes.end(), near))
+          << what << ' ' << mode.natural_frequency;
+    }
+    return found;
+  };
+
+  std::vector<MotionRecord> records = {part_of(whole, 0, 10000), part_of(whole, 10000, 40000),
+                                       part_of(whole, 40000, kTwoMinutes)};
+  records[1].output.array() += 0.3;
+  expect_same("three", records, 2);
+  records.clear();
+  for (int k = 0; k < 25; ++k) records.push_back(part_of(whole, 2400 * k, 2400 * (k + 1)));
+  expect_same("short", records, 2);
+
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  MotionRecord gaps = whole;
+  gaps.output.middleCols(10000, 8000).setConstant(kNan);
+  gaps.output.rightCols(42000).array() += 0.3;  // moved meanwhile
+  gaps.output.row(3).segment(40000, 3000).setConstant(kNan);
+  expect_same("gaps", {gaps}, 1);
+
+  MotionRecord mixed = whole;
+  const Eigen::Index n = mixed.output.rows();
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  mixed.output.row(2) *= kDegrees;
+  mixed.output.conservativeResize(n + 1, Eigen::NoChange);
+  mixed.output.bottomRows(1).setConstant(0.3);
+  const Identification found = expect_same("mixed", {mixed}, 0);
+  ASSERT_EQ(found.modes.size(), one.modes.size());
+  for (std::size_t k = 0; k < one.modes.size(); ++k) {
+    const auto &a = one.modes[k].shape, &b = found.modes[k].shape;
+    EXPECT_NEAR(std::abs(b[2] / b[0]), kDegrees * std::abs(a[2] / a[0]),
+                1e-6 * std::abs(b[2] / b[0]));
+    EXPECT_LT(std::abs(b[n]), 1e-6);
+  }
+  for (const MeasuredMode& mode : found.rejected) EXPECT_GT(mode.natural_frequency, 0.01);
+}
+
+/// It hides no modes, and is none itself.
+TEST(IdentifyAmbient, AHumIsTakenAway) {
+  ShakenArm shaken(3);
+  constexpr double kHum = 31;  // rad/s, where the arm moves
+  const auto with_hum = [&](double size) {
+    MotionRecord record = shaken.record(0);
+    for (Eigen::Index i = 0; i < record.time.size(); ++i) {
+      record.output.col(i).array() += size * std::sin(kHum * record.time[i]);
+    }
+    return identify_ambient({record});
+  };
+  const auto hums = [](const Identification& result) {
+    std::vector<double> frequencies;
+    for (const MeasuredMode& mode : result.rejected) {
+      if (mode.reason == "a steady hum, taken away") {
+        frequencies.push_back(mode.natural_frequency);
+      }
+    }
+    return frequencies;
+  };
+  const Identification calm = with_hum(0), humming = with_hum(0.1);  // rad, ten times the arm's
+  EXPECT_THAT(hums(calm), ::testing::IsEmpty());
+  EXPECT_THAT(hums(humming), ::testing::ElementsAre(::testing::DoubleNear(kHum, 0.01)));
+  ASSERT_EQ(humming.modes.size(), calm.modes.size());
+  for (std::size_t k = 0; k < calm.modes.size(); ++k) {
+    const MeasuredMode &with = humming.modes[k], &without = calm.modes[k];
+    EXPECT_LT(std::abs(with.natural_frequency - without.natural_frequency),
+              without.natural_frequency_std);
+    EXPECT_LT(std::abs(with.damping_ratio - without.damping_ratio), without.damping_ratio_std);
+  }
+}
+
+/// Its peaks are as sharp as a hum's, and wander.
+TEST(IdentifyAmbient, AnArmThatRingsIsNotTakenForAHum) {
+  Dice draw(5);
+  const SprungArm arm(2, draw, 0.003, 0.006);
+  const Identification result = identify_ambient(
+      {sensed(arm.shake(kStrength, kTwoMinutes, kPeriod, draw), kPeriod, noise_of(1e-5), draw)});
+  Comparison all;
+  all.add(arm.modes, result);
+  EXPECT_GE(all.found, all.modes - 1);
+  EXPECT_EQ(all.false_ones, 0);
+  for (const MeasuredMode& mode : result.rejected) {
+    EXPECT_THAT(mode.reason, ::testing::Not(HasSubstr("hum"))) << mode.natural_frequency;
+  }
+}
+
+TEST(IdentifyAmbient, WhatOnlyHumsOrIsNoiseHasNoModes) {
+  for (std::uint64_t seed = 0; seed <= 3; ++seed) {  // 0: a hum
+    Dice draw(seed);
+    MatrixXd motion(2, 20000);
+    for (Eigen::Index i = 0; i < motion.cols(); ++i) {
+      motion(0, i) = seed == 0 ? std::sin(0.05 * static_cast<double>(i)) : draw.normal();
+    }
+    motion.row(1).setConstant(0.3);
+    const MotionRecord record = sensed(motion, 0.01, noise_of(seed == 0 ? 1e-5 : 0), draw);
+    EXPECT_THAT(identify_ambient({record}).modes, ::testing::IsEmpty()) << "seed " << seed;
+  }
+}
+
+TEST(IdentifyAmbient, RefusesWhatIsTooShortOrRests) {
+  Dice draw(1);
+  MatrixXd motion(2, 400);
+  for (double& y : motion.reshaped()) y = draw.normal();
+  EXPECT_THAT(testing::refusal<std::invalid_argument>(
+                  [&] { identify_ambient({sensed(motion, kPeriod, noise_of(1e-5), draw)}); }),
+              HasSubstr("takes a longer record"));
+  EXPECT_THROW(identify_ambient({}), std::invalid_argument);
+  const MatrixXd rest = MatrixXd::Constant(2, 20000, 0.3);
+  EXPECT_THROW(identify_ambient({sensed(rest, 0.01, noise_of(0), draw)}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dashpot::identification
