@@ -1,6 +1,6 @@
 #include <dashpot/apps/check_model/driver_log.hpp>
 #include <dashpot/apps/check_model/torque_file.hpp>
-#include <dashpot/apps/identify/motion_file.hpp>
+#include <dashpot/apps/records/motion_file.hpp>
 #include <dashpot/controller/input_error.hpp>
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 #include <dashpot/apps/identify/calibration.hpp>
 #include <dashpot/apps/identify/identify.hpp>
 #include <dashpot/apps/identify/mode_match.hpp>
-#include <dashpot/apps/identify/motion_file.hpp>
+#include <dashpot/apps/records/motion_file.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/input_error.hpp>
 

@@ -1,4 +1,4 @@
-#include <dashpot/apps/identify/motion_rows.hpp>
+#include <dashpot/apps/records/motion_rows.hpp>
 #include <dashpot/controller/yaml/quantity.hpp>
 
 #include <algorithm>

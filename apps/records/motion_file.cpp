@@ -1,5 +1,5 @@
-#include <dashpot/apps/identify/motion_file.hpp>
-#include <dashpot/apps/identify/motion_rows.hpp>
+#include <dashpot/apps/records/motion_file.hpp>
+#include <dashpot/apps/records/motion_rows.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/text/read_file.hpp>
 

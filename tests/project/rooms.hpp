@@ -118,6 +118,7 @@ inline const std::vector<Room>& rooms() {
 
       {"apps/cli", 0, {}, {""}},
       {"apps/report", 1, {}, {""}},
+      {"apps/records", 1, {}, {""}},
       {"apps/scene", 2, {}, {""}},
       {"apps/analyze", 2, {}, {""}},
       {"apps/inspect", 2, {}, {""}},
@@ -126,9 +127,9 @@ inline const std::vector<Room>& rooms() {
       {"apps/export", 2, {}, {""}},
       {"apps/command", 2, {}, {""}},
       {"apps/identify", 2, {}, {""}},
+      {"apps/check_model", 2, {}, {""}},
       {"apps/loop", 3, {}, {""}},
       {"apps/web", 3, {}, {""}},
-      {"apps/check_model", 3, {}, {""}},
       {"apps/run", 4, {}, {""}},
       {"apps/drive", 4, {}, {""}},
       {"apps/fake_driver", 4, {}, {""}},
