@@ -11,7 +11,7 @@ import sys
 import tempfile
 import unittest
 
-PROGRAM, SOURCE = sys.argv[1:3]
+PROGRAM, SOURCE = map(os.path.abspath, sys.argv[1:3])
 PANDA = ['--urdf', os.path.join(SOURCE, 'sim/models/panda.urdf'), '--base', 'panda_link0', '--tip', 'panda_hand_tcp']
 
 
@@ -117,6 +117,35 @@ class TuneServer(unittest.TestCase):
         hard = self.server.design(friction | {'gain_margin': 2, 'period': 0.01, 'delay': 3, 'stiffness': [3000] * 3 + [300] * 3})
         self.assertLess(hard['smallest_ratio'], 0.65)  # lowered to what this loop bears
 
+    def test_level_of_a_ratio_is_that_of_a_run(self):
+        folder = tempfile.mkdtemp(prefix='dashpot-tune-')
+        self.addCleanup(shutil.rmtree, folder)
+        hard = self.base | {'damping': {'ratio': 0.7}, 'period': 0.004, 'delay': 2, 'cutoff': 100, 'difference_velocity': True, 'gain_margin': 1.2}
+        found = self.server.design(hard)
+        path = os.path.join(folder, 'scene.yaml')
+        with open(path, 'w') as file:
+            file.write(f'robot: {{urdf: {PANDA[1]}, base: panda_link0, tip: panda_hand_tcp}}\ncontrol: {{period: 4 ms, mode: cartesian}}\n'
+                       f'gains: {{task: {{stiffness: {self.base["stiffness"]}, damping_ratio: 0.7}}, null_space: {{stiffness: 0, damping: 0}}}}\n'
+                       'limits: {gain_margin: 1.2}\nanalysis: {sampled: {delay: 2, cutoff: 100, difference_velocity: true}}\n'
+                       f'scenario: {{duration: 40 ms, start: {{position: {self.q}}}}}\n')
+        told = run('run', path, '--fast', '--json')
+        self.same_modes(found['modes'], told['modes']['start'], 6)
+        self.assertAlmostEqual(found['damping_level']['share'], told['least_damping_level'], places=5)
+        self.assertLess(found['damping_level']['share'], 0.9)
+        # Springs that no damping saves are refused there, and said to be unstable here.
+        stiff = hard | {'stiffness': [3000] * 3 + [100] * 3}
+        with open(path) as file:
+            text = file.read().replace(str(self.base['stiffness']), str(stiff['stiffness']))
+        with open(path, 'w') as file:
+            file.write(text)
+        done = subprocess.run([PROGRAM, 'run', path, '--fast'], capture_output=True, text=True)
+        self.assertEqual((done.returncode, 'gain margin' in done.stderr), (2, True), done.stderr)
+        found = self.server.design(stiff)
+        self.assertLess(found['gain_margin'], 1)
+        self.assertFalse(found['damping_level']['kept'])
+        self.assertIn('unstable here', found['refused'][0]['reason'])
+        self.assertIsNone(self.server.design(stiff | {'damping': {'factor': 2}})['damping_level'])
+
     def test_sensitivities_tell_what_a_step_does(self):
         D = [30, 30, 30, 9, 9, 9]
         rows = [[D[i] if i == j else 0 for j in range(6)] for i in range(6)]
@@ -173,6 +202,23 @@ class TuneServer(unittest.TestCase):
         self.assertEqual(status, 200)
         self.assertAlmostEqual(min(part['smallest_ratio']), 0.7, places=3)
         self.assertAlmostEqual(self.server.design(self.base, part['worst']['gain_margin']['q'])['smallest_ratio'] > 0, True)
+
+    def test_workspace_gives_up_in_time(self):
+        # Each of these postures takes tenths of a second; all of them would keep Ctrl-C waiting for minutes.
+        slow = self.base | {'delay': 20, 'cutoff': 100, 'difference_velocity': True, 'arm': {'reflected_inertia': [0.3] * 7, 'gear_stiffness': [1e4] * 7}}
+        status, part = self.server.post('/workspace', {'design': slow, 'seed': 1, 'first': 0, 'count': 500})
+        self.assertEqual(status, 200)
+        self.assertLess(0, part['count'])
+        self.assertLess(part['count'], 500)
+        self.assertEqual((len(part['smallest_ratio']), len(part['gain_margin'])), (part['count'],) * 2)
+        status, whole = self.server.post('/workspace', {'design': self.base, 'seed': 1, 'first': 0, 'count': 10})
+        self.assertEqual((status, whole['count']), (200, 10))
+
+    def test_payload_has_inertia(self):
+        payload = {'mass': 2, 'center': [0, 0, 0.1], 'inertia': [[0.03, 0, 0.002], [0, 0.04, 0], [0.002, 0, 0.02]]}
+        found = self.server.design(self.base | {'arm': {'payload': payload}})
+        posture = self.audit('--preset', 'cartesian_impedance_controller', '--payload', '2,0,0,0.1,0.03,0.04,0.02,0,0.002,0')['posture']
+        self.same_modes(found['modes'], posture['modes'], 7)
 
     def test_reads_a_configuration(self):
         folder = tempfile.mkdtemp(prefix='dashpot-tune-')

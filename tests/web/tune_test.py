@@ -13,7 +13,7 @@ sys.dont_write_bytecode = True
 import browser
 import tune_walk
 
-PROGRAM, SOURCE = sys.argv[1:3]
+PROGRAM, SOURCE = map(os.path.abspath, sys.argv[1:3])
 CURRENT = tune_walk.CURRENT
 
 
@@ -203,6 +203,40 @@ class Tune(unittest.TestCase):
                     self.open_other(os.path.join(folder, 'tuned.yaml'), *q)
                     self.same_modes(self.value('dashpot.answers.a.modes'), modes)
                     self.assertEqual(self.value('[dashpot.store.state.a.delay, dashpot.store.state.a.gain_margin]'), [1, 1.5])
+
+    def test_mass_of_a_payload_takes_its_inertia_along(self):
+        folder = tempfile.mkdtemp(prefix='dashpot-tune-')
+        self.addCleanup(shutil.rmtree, folder)
+        path = os.path.join(folder, 'a.yaml')
+        panda = os.path.abspath(os.path.join(SOURCE, 'sim/models/panda.urdf'))
+        with open(path, 'w') as file:
+            file.write(f'robot: {{urdf: {panda}, base: panda_link0, tip: panda_hand_tcp, payload: {{mass: 2, center: [0, 0.01, 0.1], inertia: 0.02}}}}\n')
+        self.open_other(path)
+        self.assertEqual(self.value("document.querySelector('#parts [data-key=payload] span').textContent"), 'payload, its inertia grows with it')
+        self.value("document.querySelector('#parts').closest('details').open = true")
+        self.set('#parts [data-key=payload] input[type=text]', '500 g')
+        inertia = [[0.005 if i == j else 0 for j in range(3)] for i in range(3)]
+        self.assertEqual(self.value('dashpot.store.state.a.arm.payload'), {'mass': 0.5, 'center': [0, 0.01, 0.1], 'inertia': inertia})
+        self.edit("state.a = {...state.a, mode: 'cartesian', damping: {factor: 2}, null_damping: Array(7).fill(0)}")
+        words = shlex.split('\n'.join(line for line in self.text('command').splitlines() if line[0] != '#').replace('\\\n', ' '))
+        self.assertIn('0.5,0,0.01,0.1,0.005,0.005,0.005,0,0,0', words)
+        self.same_modes(json.loads(run(*words[1:], '--json'))['posture']['modes'], self.value('dashpot.answers.a.modes'))
+
+    def test_says_that_a_sampled_loop_is_unstable(self):
+        self.edit("state.edited = 'a'; state.a.damping = {ratio: 0.7}")
+        words = "document.getElementById('limits').textContent"
+        self.assertNotIn('unstable', self.value(words))
+        self.assertNotIn('lowered', self.value(words))
+        loop = "period: 0.004, delay: 2, cutoff: 100, difference_velocity: true"
+        self.edit(f"state.a = {{...state.a, {loop}}}")
+        for told in ('A is unstable in the sampled loop', 'No share of the ratio of A leaves the loop the margin asked for'):
+            self.assertIn(told, self.value(words))
+        self.assertEqual(self.value("document.querySelectorAll('#totals .bad').length"), 1)
+        self.assertIn('is unstable here', self.value("document.getElementById('refused').textContent"))
+        self.edit("state.a.stiffness = [200, 200, 200, 20, 20, 20]; state.a.gain_margin = 1.2")
+        level = self.value('dashpot.answers.a.damping_level')
+        self.assertIn(f"The ratio of A is lowered to {shown(100 * level['share'], 2)} % where the loop bears least", self.value(words))
+        self.assertNotIn('unstable', self.value(words))
 
     def test_exports_keep_drives_and_payload_of_options(self):
         self.open_other('--drives', 'panda', '--payload', '500g,0,0,0.1')

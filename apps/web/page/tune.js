@@ -242,17 +242,26 @@ function tell() {
     ['overshoot, %', (x) => (x.release.overshoot === null ? null : x.release.overshoot * 100)], ['settling to 2 %, s', (x) => x.release.settling_time], ['free motions', (x) => x.soft_or_zero, true]];
   $('totals').replaceChildren(...totals.map(([name, get, whole]) => {
     const values = [a, b].map((x) => (x ? get(x) : null)), text = (v) => (v === 1e6 && name === 'gain margin' ? 'above 1e6' : v === null ? '–' : whole ? String(v) : number(v));
-    return row(cell(name), ...values.map((v) => cell(text(v))), cell(difference(...values)));
+    const bad = (v) => (name === 'gain margin' && v !== null && v < 1 ? 'bad' : '');
+    return row(cell(name), ...values.map((v) => cell(text(v), bad(v))), cell(difference(...values)));
   }));
-  const limits = kDesigns.map((name, i) => [a, b][i] && [a, b][i].limit && `${name.toUpperCase()} is limited by a motion at ${number([a, b][i].limit.frequency, 3)} rad/s` +
-    `${[a, b][i].limit.joint ? `, most of it in ${[a, b][i].limit.joint}` : ''}`).filter(Boolean);
-  $('limits').textContent = limits.map((text) => `${text}.`).join(' ');
+  $('limits').textContent = kDesigns.flatMap((name) => loopWords(name.toUpperCase(), answer(name))).map((text) => `${text}.`).join(' ');
   const different = armDifference();
   $('arms').textContent = different.length ? `A and B are on different arms: ${different.join(', ')}.` : '';
   tellRefused();
   tellChips();
   tellArrows();
   tellText();
+}
+
+/// What is to be said of the sampled loop of a design, and of its ratio there.
+function loopWords(name, found) {
+  if (!found) return [];
+  const {limit, damping_level: level, gain_margin: margin} = found;
+  return [margin !== null && margin < 1 && `${name} is unstable in the sampled loop, so that its ratios and its motion are none that an arm would show`,
+    level && !level.kept && `No share of the ratio of ${name} leaves the loop the margin asked for: its springs are too stiff, or the ratio too small for them`,
+    level && level.share < 0.995 && `The ratio of ${name} is lowered to ${number(100 * level.share, 2)} % where the loop bears least`,
+    limit && `${name} is limited by a motion at ${number(limit.frequency, 3)} rad/s${limit.joint ? `, most of it in ${limit.joint}` : ''}`].filter(Boolean);
 }
 
 /// What is to be said of joints outside their limits.

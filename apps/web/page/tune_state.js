@@ -115,12 +115,12 @@ export class Workspace {
       const body = `{"design":${this.asked[name]},"seed":1,"first":${found.postures},"count":${count}}`;
       const part = await post(this.token, '/workspace', body);
       // As many as take about 20 ms: a long delay of the loop makes each slower.
-      this.part = Math.round(Math.min(Workspace.kPart, Math.max(5, count * 20 / (performance.now() - began))));
+      this.part = Math.round(Math.min(Workspace.kPart, Math.max(2, count * 20 / (performance.now() - began))));
       if (this.found[name] !== found) continue;  // of a design that has changed
       if (part.error) {
         found.error = part.error;
       } else {
-        found.postures += count;
+        found.postures += part.count;
         for (const key of ['smallest_ratio', 'gain_margin']) {
           found[key].push(...part[key].filter((x) => x !== null));
           const worst = part.worst[key];
