@@ -57,12 +57,25 @@ int largest_joint(const Eigen::VectorXcd& shape, int n) {
   return static_cast<int>(at);
 }
 
+/// The block of A, in the coordinates of the gears, by which the controller's torques follow what
+/// it measures, n x n.
+MatrixXd of_controller(const analysis::Gears& gears, const MatrixXd& A) {
+  const Eigen::Index n = gears.data().stiffness.size();
+  MatrixXd block(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) block(i, j) = A(gears.motor(i), gears.measured(j));
+  }
+  return block;
+}
+
 /// d ratio / d entry of the stiffness and damping that the controller has, a matrix a mode.
 LoopJson sensitivity_json(const analysis::System<>& system, const analysis::Spectrum<>& spectrum,
-                          const MatrixXd* J) {
+                          const analysis::Gears& gears, const MatrixXd* J) {
   LoopJson of_stiffness = LoopJson::array(), of_damping = LoopJson::array();
   for (const analysis::ModeSensitivity& mode : analysis::sensitivities(system, spectrum)) {
-    const auto rows = [J](const MatrixXd& G) {
+    const auto rows = [&](const MatrixXd& all) {
+      MatrixXd G = of_controller(gears, all);
+      G = (0.5 * (G + G.transpose())).eval();  // an entry moves together with its mirror image
       return json_rows(J != nullptr ? analysis::task_gradient(*J, G) : G);
     };
     of_stiffness.push_back(rows(mode.stiffness.damping_ratio));
@@ -117,28 +130,29 @@ LoopJson limit_json(const analysis::System<>& system, const analysis::SampledLoo
 }
 
 /// Sets C_C, or C_q, of the damping that the controller has designed: with J# of
-/// `consistent_inverse` the null space's dampers vanish in J#' (C - friction) J#.
-void set_designed_damping(const analysis::System<>& system, const MatrixXd& friction,
-                          analysis::TaskImpedance& parts) {
-  if (!parts.jacobian) {
-    parts.damping = system.damping;
-    return;
-  }
+/// `consistent_inverse` the null space's dampers vanish in J#' C J#.
+void set_designed_damping(const analysis::System<>& system, const analysis::Gears& gears,
+                          const MatrixXd& friction, analysis::TaskImpedance& parts) {
+  MatrixXd passive = MatrixXd::Zero(system.dof(), system.dof());
+  gears.add_friction(passive);
+  gears.add_gears(gears.data().damping, passive);
+  const MatrixXd C = of_controller(gears, system.damping - passive);
+  parts.damping = C + friction;
+  if (!parts.jacobian) return;
   const MatrixXd& J = *parts.jacobian;
   const MatrixXd inverse = consistent_inverse(parts.mass, J);
-  parts.task_damping = inverse.transpose() * (system.damping - friction) * inverse;
-  parts.damping = system.damping - J.transpose() * *parts.task_damping * J;
+  parts.task_damping = inverse.transpose() * C * inverse;
+  *parts.damping -= J.transpose() * *parts.task_damping * J;
 }
 
-/// Stiffness and damping that act at the tip or in the joints, without friction; without `known`
-/// the damping is no single matrix.
-LoopJson gains_json(const analysis::TaskImpedance& parts, const MatrixXd& friction, bool known) {
+/// Stiffness and damping that act at the tip or in the joints, without friction.
+LoopJson gains_json(const analysis::TaskImpedance& parts, const MatrixXd& friction) {
   if (parts.jacobian) {
     return {{"stiffness", json_rows(*parts.task_stiffness)},
-            {"damping", known ? json_rows(*parts.task_damping) : LoopJson()}};
+            {"damping", json_rows(*parts.task_damping)}};
   }
   return {{"stiffness", json_rows(*parts.stiffness)},
-          {"damping", known ? json_rows(*parts.damping - friction) : LoopJson()}};
+          {"damping", json_rows(*parts.damping - friction)}};
 }
 
 /// The loop as `dashpot analyze` takes it: as its parts, or where gears bend as a whole.
@@ -290,7 +304,7 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
   const Place moved = place_of(place, loop.parts.mass, J);
   const bool rigid = !gears_.any();
   const MatrixXd friction = model.joint_values(&controller::Joint::viscous_friction).asDiagonal();
-  if (design_.designed() && rigid) set_designed_damping(loop.system, friction, loop.parts);
+  if (design_.designed()) set_designed_damping(loop.system, gears_, friction, loop.parts);
   const PostureNumbers here = numbers(loop);
 
   const Eigen::Index size = loop.system.dof();
@@ -314,7 +328,7 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
                      {"frequency", frequency_json(response, loop.spectrum, row, moved.unit)},
                      {"sensitivity", nullptr},
                      {"system", system_json(loop.system, loop.parts, rigid)},
-                     {"gains", gains_json(loop.parts, friction, !design_.designed() || rigid)}};
+                     {"gains", gains_json(loop.parts, friction)}};
   if (loop.level) {
     result["damping_level"] = {{"share", loop.level->level}, {"kept", loop.level->kept}};
   }
@@ -323,9 +337,9 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
         limit_json(loop.system, analysis::with_gears(loop.sampled), here.gain_margin, model);
   }
   const bool task = design_.stated.mode == Mode::kCartesian;
-  if (rigid && !design_.stated.inertia_blocks) {
-    result["sensitivity"] =
-        sensitivity_json(loop.system, loop.spectrum, task ? &*loop.parts.jacobian : nullptr);
+  if (!design_.stated.inertia_blocks) {
+    result["sensitivity"] = sensitivity_json(loop.system, loop.spectrum, gears_,
+                                             task ? &*loop.parts.jacobian : nullptr);
   }
   return result;
 }

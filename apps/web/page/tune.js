@@ -100,7 +100,7 @@ function refresh() {
 
 function changed(ended) {
   page.current = false;
-  page.moved = performance.now();
+  page.moved = workspace.moved = performance.now();
   build();
   refresh();
   for (const name of kDesigns) questions[name].ask('/design', {q: store.state.q, place: store.state.place, design: store.design(name)});
@@ -329,7 +329,7 @@ function tellArrows() {
   if (pick.options.length !== names.length + 1) {
     pick.replaceChildren(...['smallest', ...names].map((name) => new Option(name === 'smallest' ? 'the smallest ratio' : `mode ${name}`, name)));
   }
-  $('arrow_note').textContent = sensitivity ? 'change by a step: a quarter of a damping, a tenth of a stiffness; click to take it, with Shift the other way' : 'not for gears that bend, and gains times inertia';
+  $('arrow_note').textContent = sensitivity ? 'change by a step: a quarter of a damping, a tenth of a stiffness; click to take it, with Shift the other way' : 'not for gains times inertia';
   let chosen = Number(pick.value) - 1;
   if (pick.value === 'smallest' && mine) {
     chosen = mine.modes.reduce((best, mode, i) => (mode.damping_ratio !== null && (best < 0 || mode.damping_ratio < mine.modes[best].damping_ratio) ? i : best), -1);

@@ -9,7 +9,7 @@ const short = (value) => (!value ? null : isDiagonal(value) ? diagonal(asRows(va
 const kAxes = ['x', 'y', 'z'];
 
 /// Stiffness and damping that act: half a quaternion's stiffness halved, a factor or ratio as the
-/// matrix that it makes; null where the damping is not one matrix.
+/// matrix that it makes.
 const acting = ({answer}) => answer.gains;
 function nullDamping(design) {
   if (Array.isArray(design.null_damping)) return design.null_damping;
