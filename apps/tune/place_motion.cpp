@@ -18,6 +18,17 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using MotionJson = nlohmann::ordered_json;
 
+/// The transition of (q, q') over a time.
+MatrixXd transition_over(const analysis::Response& response, Eigen::Index n, double time) {
+  MatrixXd result(2 * n, 2 * n);
+  for (Eigen::Index k = 0; k < 2 * n; ++k) {
+    const VectorXd unit = VectorXd::Unit(2 * n, k);
+    const analysis::Motion moved = response.free(unit.head(n), unit.tail(n), time);
+    result.col(k) << moved.position, moved.velocity;
+  }
+  return result;
+}
+
 }  // namespace
 
 MatrixXd consistent_inverse(const MatrixXd& M, const MatrixXd& J) {
@@ -62,10 +73,13 @@ MotionJson release_json(const analysis::Response& response, const analysis::Spec
   int last = 0;
   for (int round = 0; round < 2; ++round) {
     last = 0;
-    for (int i = 0; i < kPoints; ++i) {
+    const MatrixXd step = transition_over(response, motion.size(), horizon / (kPoints - 1));
+    VectorXd state(2 * motion.size());
+    state << motion, rest;
+    for (int i = 0; i < kPoints; ++i, state = step * state) {
       const auto k = static_cast<std::size_t>(i);
       times[k] = horizon * i / (kPoints - 1);
-      values[k] = value_at(times[k]);
+      values[k] = row.dot(state.head(motion.size()));
       if (std::abs(values[k]) > kSettled) last = i;
     }
     if (grows || last > kPoints / 4) break;  // otherwise a slow mode that this place hardly sees
@@ -76,9 +90,10 @@ MotionJson release_json(const analysis::Response& response, const analysis::Spec
   if (overshoot > 0) {  // between the points, by ternary search
     const auto at = static_cast<std::size_t>(lowest - values.begin());
     double a = times[at == 0 ? 0 : at - 1], b = times[std::min(at + 1, times.size() - 1)];
-    for (int i = 0; i < 40; ++i) {
+    for (int i = 0; i < 25; ++i) {
       const double c = a + (b - a) / 3, d = b - (b - a) / 3;
-      (value_at(c) < value_at(d) ? b : a) = value_at(c) < value_at(d) ? d : c;
+      const bool left = value_at(c) < value_at(d);
+      (left ? b : a) = left ? d : c;
     }
     overshoot = std::max(overshoot, -value_at(0.5 * (a + b)));
   }
