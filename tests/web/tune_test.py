@@ -1,4 +1,5 @@
 """What a browser shows of `dashpot tune`: PROGRAM SOURCE_DIRECTORY. Exit status 77: skipped."""
+import ast
 import json
 import os
 import shlex
@@ -7,6 +8,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 
 sys.dont_write_bytecode = True
@@ -29,6 +31,33 @@ def shown(x, digits=4):
         return str(round(x))
     text = f'{x:#.{digits}g}'
     return text.rstrip('.').replace('-', '−')
+
+
+def run_python(text):
+    """Runs the text of the export. Returns the modes, or None where the module is not installed: then it was run with a
+    stand-in that takes the names that the module's own calls have."""
+    told = text.replace('print(modes)', "import json\nprint(json.dumps([modes.natural_frequency.tolist(), modes.damping_ratio.tolist()]))")
+    done = subprocess.run([sys.executable, '-'], input=told, capture_output=True, text=True, cwd='/')
+    if done.returncode == 0:
+        return [{'natural_frequency': f, 'damping_ratio': r} for f, r in zip(*json.loads(done.stdout))]
+    assert "No module named 'dashpot'" in done.stderr, done.stderr
+    with open(os.path.join(SOURCE, 'python/dashpot/_robot.py')) as file:
+        calls = {node.name: node.args for node in ast.walk(ast.parse(file.read())) if isinstance(node, ast.FunctionDef)}
+
+    def taken(name, count):
+        arguments = calls[name]
+
+        def call(*values, **named):
+            assert len(values) == count and set(named) <= {one.arg for one in arguments.kwonlyargs}, (name, named)
+            return types.SimpleNamespace(modes=None)
+        return call
+    stand_in = types.SimpleNamespace(Robot=types.SimpleNamespace(from_urdf=taken('from_urdf', 3)), closed_loop=taken('closed_loop', 2))
+    sys.modules['dashpot'] = stand_in
+    try:
+        exec(compile(text.replace('print(modes)', ''), 'tuned.py', 'exec'), {})
+    finally:
+        del sys.modules['dashpot']
+    return None
 
 
 class Tune(unittest.TestCase):
@@ -186,6 +215,9 @@ class Tune(unittest.TestCase):
                     self.edit(f"state.edited = 'a'; {change}")
                     modes, text, command, python = (self.value('dashpot.answers.a.modes'), self.text('configuration of Dashpot'), self.text('command'),
                                                     self.text('Python'))
+                    told = run_python(python)
+                    if told is not None:
+                        self.same_modes(told, modes)
                     self.assertIn(f'These keys take the place of those of {path}', text)
                     self.assertIn('gain_margin: 1.5', text)
                     self.assertNotIn('integral', text)
@@ -285,6 +317,10 @@ class Tune(unittest.TestCase):
                 for name in formats:
                     self.assertTrue(self.text(name))
                 modes = self.value('dashpot.answers.a.modes')
+                python = self.text('Python')
+                told = run_python(python)
+                if told is not None and 'leaves less of the ratio' not in python:
+                    self.same_modes(told, modes)
                 if 'link' not in kind:  # whose stiffness is not symmetric
                     for a, b in zip(modes, self.analyze()):
                         self.assertAlmostEqual(a['natural_frequency'], b['natural_frequency'], delta=1e-6 * a['natural_frequency'])
