@@ -110,6 +110,38 @@ class TuneServer(unittest.TestCase):
         self.assertGreaterEqual(found['release']['overshoot'], lowest)
         self.assertLess(found['release']['overshoot'], lowest + 1e-3)
 
+    def test_receptance_is_that_of_the_matrices(self):
+        def solve(A, b):
+            rows, n = [list(row) + [x] for row, x in zip(A, b)], len(b)
+            for i in range(n):
+                k = max(range(i, n), key=lambda r: abs(rows[r][i]))
+                rows[i], rows[k] = rows[k], rows[i]
+                for j in range(i + 1, n):
+                    f = rows[j][i] / rows[i][i]
+                    rows[j] = [x - f * y for x, y in zip(rows[j], rows[i])]
+            x = [0] * n
+            for i in reversed(range(n)):
+                x[i] = (rows[i][n] - sum(a * y for a, y in zip(rows[i][i + 1:n], x[i + 1:]))) / rows[i][i]
+            return x
+        joints = {'mode': 'joint', 'joint_stiffness': [60, 50, 40, 40, 30, 20, 10], 'joint_damping': {'ratio': 0.6}}
+        bending = {'arm': {'reflected_inertia': [0.1] * 7, 'gear_stiffness': [5000, None] + [5000] * 5}}
+        J = self.server.design(self.base)['system']['jacobian']
+        rows = {f'tip/{i}': J[i] for i in range(6)} | {f'joint/{i}': [int(i == j) for j in range(7)] for i in range(7)}
+        for change in (joints, joints | bending, bending | {'damping': [30] * 6, 'null_stiffness': [5] * 7}):
+            for place, row in rows.items():
+                found = self.server.design(self.base | change, place=place)
+                self.assertAlmostEqual(found['release']['value'][0], 1, places=9)
+                system, f = found['system'], found['frequency']
+                n = len(system['mass'])
+                if 'jacobian' in system:
+                    continue
+                row = row + [0] * (n - 7)
+                for k in (0, 80, 160):
+                    s = 1j * f['omega'][k]
+                    A = [[s * s * system['mass'][i][j] + s * system['damping'][i][j] + system['stiffness'][i][j] for j in range(n)] for i in range(n)]
+                    told = abs(sum(a * x for a, x in zip(row, solve(A, row))))
+                    self.assertAlmostEqual(f['magnitude'][k], told, delta=1e-7 * told, msg=(place, k))
+
     def test_ratio_is_what_the_controller_makes_of_it(self):
         friction = self.base | {'damping': {'ratio': 0.7}, 'gain_margin': 1, 'arm': {'viscous_friction': [0] * 7}}
         for mode in self.server.design(friction)['modes']:

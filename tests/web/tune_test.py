@@ -406,21 +406,31 @@ class Tune(unittest.TestCase):
         self.assertEqual(self.value("document.getElementById('arms').textContent"), '')
 
     def test_postures_of_a_list(self):
-        with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, 'postures.yaml')
-            with open(path, 'w') as file:
-                file.write('[[0, -0.785, 0, -2.356, 0, 1.571, 0.785], [0, 0.6, 0, -1, 0, 1.6, 0]]')
-            other = subprocess.Popen([PROGRAM, 'tune', '--port', '0', '--postures', path], stdout=subprocess.PIPE, text=True, cwd=SOURCE)
-            try:
-                page = other.stdout.readline().split()[0]
-                self.browser.open(page)
-                self.browser.until(CURRENT + " && location.port == '" + page.rstrip('/').split(':')[-1] + "'")
-                self.set('#posture .field input[type=text]', '2')
-                self.assertEqual(self.value('dashpot.store.state.q'), [0, 0.6, 0, -1, 0, 1.6, 0])
-            finally:
-                other.send_signal(signal.SIGINT)
-                other.wait()
-                other.stdout.close()
+        folder = tempfile.mkdtemp(prefix='dashpot-tune-')
+        self.addCleanup(shutil.rmtree, folder)
+        path, log = os.path.join(folder, 'postures.yaml'), os.path.join(folder, 'panda.lcm')
+        with open(path, 'w') as file:
+            file.write('[[0, -0.785, 0, -2.356, 0, 1.571, 0.785], [0, 0.6, 0, -1, 0, 1.6, 0]]')
+        self.open_other('--postures', path)
+        self.set('#posture .field input[type=text]', '2')
+        self.assertEqual(self.value('dashpot.store.state.q'), [0, 0.6, 0, -1, 0, 1.6, 0])
+        run('run', 'sim/scenes/panda.yaml', '--fast', '--duration', '3', '--log', log)
+        self.open_other('--log', log)
+        postures = self.value('dashpot.setup.postures')
+        self.assertGreater(len(postures), 5)
+        self.set('#posture .field input[type=text]', '4')
+        self.assertEqual(self.value('dashpot.store.state.q'), postures[3])
+        self.assertEqual(self.value("document.querySelector('#posture .field input[type=text]').value"), '4')
+
+    def test_arrows_where_gears_bend(self):
+        gears = "{reflected_inertia: Array(7).fill(0.2), gear_stiffness: Array(7).fill(8000)}"
+        for damping in ('[40, 40, 40, 3, 3, 3]', '{ratio: 0.3}'):
+            self.edit(f"state.edited = 'a'; state.a = {{...state.a, stiffness: [400, 400, 400, 30, 30, 30], damping: {damping}, arm: {gears}}}")
+            last = self.value('dashpot.answers.a.modes.length')  # the slowest mode; those of the gears move too little to be shown
+            self.set('#arrow_mode', str(last))
+            before = self.value('dashpot.answers.a.modes.at(-1).damping_ratio')
+            tune_walk.click(self.browser)
+            self.assertGreater(self.value('dashpot.answers.a.modes.at(-1).damping_ratio'), before + 1e-3)
 
     def test_tip_is_dragged(self):
         tip = 'dashpot.tipOnScreen()'
