@@ -17,6 +17,26 @@ constexpr Eigen::Index kDenseRows = 100;
 /// From one factor to the next that is tried, and the least one.
 constexpr double kFactorStep = 1.25, kLeastMargin = 1e-3;
 
+/// A factor and the excess there, and the eigenvalues that count, where they are solved.
+struct Trial {
+  double factor, excess = 0;
+  Eigen::VectorXcd values = {};
+
+  /// Takes the excess of the eigenvalue nearest to `z`, and returns that: it changes smoothly with
+  /// the factor, where the largest of all has kinks. A trial that is not stable has the largest.
+  Complex follow(Complex z) {
+    if (values.size() == 0) return z;
+    Eigen::Index at = 0;
+    if (!(excess < 0)) {
+      values.cwiseAbs2().maxCoeff(&at);
+      return values[at];
+    }
+    (values.array() - z).abs2().minCoeff(&at);
+    excess = modulus(values[at]) - 1;
+    return values[at];
+  }
+};
+
 /// The loop with `factor` times its stiffness and its controller's damping.
 class ScaledLoop {
  public:
@@ -31,17 +51,23 @@ class ScaledLoop {
     gain_ = loop.on_other_motions(loop.transition(1)) - free_;
   }
 
-  /// The largest |z|, less 1, or something like it: the loop is stable if it is negative.
-  double excess(double factor) const {
-    if (counted_) return counted_->excess(factor);
+  /// The excess is the largest |z|, less 1, or something like it: the loop is stable if it is
+  /// negative.
+  Trial at(double factor) const {
+    if (counted_) return {factor, counted_->excess(factor)};
     MatrixXd A = free_ + factor * gain_;
-    double result = 0;
-    for (const Complex z : eigenvalues_of(A)) {
+    Trial trial{factor, 0, eigenvalues_of(A)};
+    Eigen::Index count = 0;
+    for (const Complex z : Eigen::VectorXcd(trial.values)) {
       if (slowest_ > 0 && z != 0.0 && modulus(std::log(z)) < slowest_) continue;
-      result = std::max(result, modulus(z));
+      trial.values[count++] = z;
+      trial.excess = std::max(trial.excess, modulus(z));
     }
-    return result - 1;
+    trial.values.conservativeResize(count);
+    trial.excess -= 1;
+    return trial;
   }
+  double excess(double factor) const { return at(factor).excess; }
 
  private:
   double slowest_;
@@ -49,15 +75,12 @@ class ScaledLoop {
   std::optional<CircleCount> counted_;
 };
 
-/// A factor and the excess there.
-struct Trial {
-  double factor, excess;
-};
-
 /// Where the excess changes its sign between two trials, to 1e-7 of the factor: inverse quadratic
 /// interpolation where it is safe, bisection elsewhere (Chandrupatla 1997).
 double boundary(const ScaledLoop& loop, Trial inside, Trial outside) {
   constexpr double kPrecision = 0.5e-7;
+  Complex z = outside.follow(0);
+  inside.follow(z);
   Trial a = outside, b = inside, c = inside;
   double share = 0.5;  // of the way from a to b
   const double secant = a.excess / (a.excess - b.excess);
@@ -66,8 +89,8 @@ double boundary(const ScaledLoop& loop, Trial inside, Trial outside) {
     const double least = kPrecision * outside.factor / std::abs(b.factor - a.factor);
     if (least > 0.5) return 0.5 * (a.factor + b.factor);
     share = std::clamp(share, least, 1 - least);
-    Trial next{a.factor + share * (b.factor - a.factor), 0};
-    next.excess = loop.excess(next.factor);
+    Trial next = loop.at(a.factor + share * (b.factor - a.factor));
+    z = next.follow(z);
     if ((next.excess < 0) == (a.excess < 0)) {
       c = a;
     } else {
@@ -100,19 +123,17 @@ bool keeps(const SampledDataModel& unit, double margin) {
 /// See gain_margin.
 double find_margin(const SampledDataModel& unit, double most, double slowest) {
   const ScaledLoop loop(unit, slowest);
-  Trial here{1, loop.excess(1)};
+  Trial here = loop.at(1);
   if (here.excess < 0) {
     for (Trial inside = here;; inside = here) {
       if (inside.factor >= most) return kInfinity;
-      here.factor = std::min(kFactorStep * inside.factor, most);
-      here.excess = loop.excess(here.factor);
+      here = loop.at(std::min(kFactorStep * inside.factor, most));
       if (!(here.excess < 0)) return boundary(loop, inside, here);
     }
   }
   for (Trial outside = here;; outside = here) {
     if (outside.factor < kLeastMargin) return 0;
-    here.factor = 0.8 * outside.factor;
-    here.excess = loop.excess(here.factor);
+    here = loop.at(0.8 * outside.factor);
     if (here.excess < 0) return boundary(loop, here, outside);
   }
 }
