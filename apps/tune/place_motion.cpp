@@ -3,6 +3,7 @@
 #include <dashpot/controller/settings.hpp>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -112,7 +113,7 @@ MotionJson release_json(const analysis::Response& response, const analysis::Spec
           {"settling_time", settling}};
 }
 
-MotionJson frequency_json(const analysis::Response& response, const analysis::Spectrum<>& spectrum,
+MotionJson frequency_json(const analysis::System<>& system, const analysis::Spectrum<>& spectrum,
                           const Eigen::RowVectorXd& row, const std::string& unit) {
   double slowest = 10, fastest = 10;
   MotionJson natural = MotionJson::array();
@@ -126,9 +127,12 @@ MotionJson frequency_json(const analysis::Response& response, const analysis::Sp
   constexpr int kPoints = 161;
   std::vector<double> omegas, magnitudes, phases;
   double phase = 0;
+  const Eigen::VectorXcd force = row.transpose();
   for (int i = 0; i < kPoints; ++i) {
     const double omega = 0.1 * slowest * std::pow(100 * fastest / slowest, i / (kPoints - 1.0));
-    const std::complex<double> h = (row * response.receptance(omega) * row.transpose())(0, 0);
+    const std::complex<double> s(0, omega);
+    const Eigen::MatrixXcd dynamic = s * s * system.mass + s * system.damping + system.stiffness;
+    const std::complex<double> h = row * dynamic.partialPivLu().solve(force);
     phase += std::remainder(std::arg(h) - phase, 2 * M_PI);
     omegas.push_back(omega);
     magnitudes.push_back(std::abs(h));

@@ -1,6 +1,7 @@
 #pragma once
 #include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/spectrum.hpp>
+#include <dashpot/analysis/system.hpp>
 
 #include <Eigen/Core>
 #include <nlohmann/json.hpp>
@@ -30,7 +31,7 @@ nlohmann::ordered_json release_json(const analysis::Response& response,
                                     const Eigen::VectorXd& motion, const Eigen::RowVectorXd& row);
 
 /// Returns the receptance of a place over the frequencies of the modes.
-nlohmann::ordered_json frequency_json(const analysis::Response& response,
+nlohmann::ordered_json frequency_json(const analysis::System<>& system,
                                       const analysis::Spectrum<>& spectrum,
                                       const Eigen::RowVectorXd& row, const std::string& unit);
 

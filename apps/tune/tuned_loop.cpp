@@ -325,7 +325,7 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
                      {"damping_level", nullptr},
                      {"limit", nullptr},
                      {"release", release_json(response, loop.spectrum, motion, row)},
-                     {"frequency", frequency_json(response, loop.spectrum, row, moved.unit)},
+                     {"frequency", frequency_json(loop.system, loop.spectrum, row, moved.unit)},
                      {"sensitivity", nullptr},
                      {"system", system_json(loop.system, loop.parts, rigid)},
                      {"gains", gains_json(loop.parts, friction)}};

@@ -39,14 +39,17 @@ followTheme($('theme'), draw);
 window.addEventListener('resize', draw);
 page.tipOnScreen = dragTip(arm, () => ({arm: setup.arm, q: store.state.q}), (q, ended) => edit((state) => { state.q = q.map((x) => Number(x.toPrecision(6))); }, ended));
 
-// Questions to the server
+// Questions to the server. The answers of both designs are drawn in one frame, unless one takes long.
+const kTogether = 15;  // ms
+let later = 0;
 const questions = Object.fromEntries(kDesigns.map((name) => [name, new Newest(setup.token, (heard, asked) => {
   page.problem[name] = heard.error || '';
   $('link').textContent = heard.gone ? heard.error : '';
   $('link').className = 'badge bad';
   if (!heard.error) page.answers[name] = heard;
   page.asked[name] = asked;
-  redraw('arm', 'poles', 'motion', 'texts');
+  clearTimeout(later);
+  later = setTimeout(() => redraw('arm', 'poles', 'motion', 'texts'), kDesigns.some((one) => one !== name && questions[one].busy) ? kTogether : 0);
   if (kDesigns.every((one) => !questions[one].busy || !questions[one].next)) workspace.look({a: store.state.a, b: store.state.b});
 })]));
 const workspace = page.workspace = new Workspace(setup.token, () => redraw('workspace'));
