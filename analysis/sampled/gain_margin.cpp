@@ -53,6 +53,7 @@ class ScaledLoop {
     gain_ = loop.on_other_motions(loop.transition(1)) - free_;
     if (loop.rows() > 2 * loop.n) return;
     const MatrixXd V = loop.on_other_motions(energy(loop)), W = V * gain_;
+    if (Eigen::LLT<MatrixXd>(V).info() != Eigen::Success) return;  // it is no energy
     lost_[0] = V - free_.transpose() * V * free_;
     lost_[0].diagonal().array() -= kRounding * V.trace();
     lost_[1] = free_.transpose() * W;
