@@ -459,6 +459,13 @@ class Tune(unittest.TestCase):
         self.settle()
         self.browser.until('Math.abs(seen.at(-1) - (-0.7 + 0.199)) < 1e-9')
         self.assertLess(self.value('seen.length'), 20)
+        # Nor behind parts of the workspace, which wait until nothing has moved for a while.
+        self.value("""(() => { const early = window.early = []; const real = fetch, rest = 140;
+            window.fetch = (path, options) => { if (path == '/workspace') early.push(performance.now() - dashpot.workspace.moved < rest); return real(path, options); }; })()""")
+        for i in range(3):
+            self.edit(f"state.b.stiffness[0] = {300 + i}")
+        self.browser.until('early.length > 2', 120)
+        self.assertEqual(self.value('early.filter(Boolean).length'), 0)
 
     def test_discussion_of_the_paper_by_hand(self):
         # From C_C0 = I to ratios above 0.6 for all six modes, by the arrows alone; a step takes a second by hand.
