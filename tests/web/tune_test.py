@@ -264,6 +264,7 @@ class Tune(unittest.TestCase):
         for told in ('A is unstable in the sampled loop', 'No share of the ratio of A leaves the loop the margin asked for'):
             self.assertIn(told, self.value(words))
         self.assertEqual(self.value("document.querySelectorAll('#totals .bad').length"), 1)
+        self.assertEqual(self.value("[...document.querySelectorAll('#rows tr')].filter((row) => row.children[2].className == 'good').length"), 0)
         self.assertIn('is unstable here', self.value("document.getElementById('refused').textContent"))
         self.edit("state.a.stiffness = [200, 200, 200, 20, 20, 20]; state.a.gain_margin = 1.2")
         level = self.value('dashpot.answers.a.damping_level')

@@ -232,12 +232,12 @@ function armDifference() {
 function tell() {
   const [a, b] = kDesigns.map((name) => answer(name)), modes = (from, i) => (from && from.modes[i]) || null;
   const count = Math.max(a ? a.modes.length : 0, b ? b.modes.length : 0);
-  const good = (mode) => (mode && mode.damping_ratio !== null ? (mode.damping_ratio >= 0.6 ? 'good' : 'bad') : '');
+  const good = (mode, from) => (mode && mode.damping_ratio !== null ? (mode.damping_ratio >= 0.6 && !unstable(from) ? 'good' : 'bad') : '');
   $('rows').replaceChildren(...Array.from({length: count}, (_, i) => {
     const ma = modes(a, i), mb = modes(b, i), first = cell('');
     first.append(markElement(i + 1), ` ${i + 1}`);
-    const line = row(first, cell(ma ? number(ma.natural_frequency) : '–'), cell(ma ? number(ma.damping_ratio) : '–', good(ma)),
-      cell(mb ? number(mb.natural_frequency) : '–'), cell(mb ? number(mb.damping_ratio) : '–', good(mb)), cell(difference(ma && ma.damping_ratio, mb && mb.damping_ratio)));
+    const line = row(first, cell(ma ? number(ma.natural_frequency) : '–'), cell(ma ? number(ma.damping_ratio) : '–', good(ma, a)),
+      cell(mb ? number(mb.natural_frequency) : '–'), cell(mb ? number(mb.damping_ratio) : '–', good(mb, b)), cell(difference(ma && ma.damping_ratio, mb && mb.damping_ratio)));
     line.classList.toggle('chosen', page.chosen === i + 1);
     return line;
   }));
@@ -257,11 +257,12 @@ function tell() {
   tellText();
 }
 
+const unstable = ({gain_margin: margin}) => margin !== null && margin < 1;
 /// What is to be said of the sampled loop of a design, and of its ratio there.
 function loopWords(name, found) {
   if (!found) return [];
-  const {limit, damping_level: level, gain_margin: margin} = found;
-  return [margin !== null && margin < 1 && `${name} is unstable in the sampled loop, so that its ratios and its motion are none that an arm would show`,
+  const {limit, damping_level: level} = found;
+  return [unstable(found) && `${name} is unstable in the sampled loop, so that its ratios and its motion are none that an arm would show`,
     level && !level.kept && `No share of the ratio of ${name} leaves the loop the margin asked for: its springs are too stiff, or the ratio too small for them`,
     level && level.share < 0.995 && `The ratio of ${name} is lowered to ${number(100 * level.share, 2)} % where the loop bears least`,
     limit && `${name} is limited by a motion at ${number(limit.frequency, 3)} rad/s${limit.joint ? `, most of it in ${limit.joint}` : ''}`].filter(Boolean);
