@@ -26,6 +26,8 @@ class PostureLoop {
   Status closed_loop(const JointVector& q, const Gains& gains, Mode mode,
                      analysis::System<kMaxJoints>& system,
                      const Vector6& external_wrench = Vector6::Zero());
+  /// Returns what the sampled loop leaves of the ratios of the last closed_loop.
+  const analysis::DampingLevel& level() const noexcept { return level_; }
 
  private:
   DynamicsKernel kernel_;
@@ -33,6 +35,7 @@ class PostureLoop {
   Settings settings_;
   JointVector friction_left_;
   DesignedDamping damping_;
+  analysis::DampingLevel level_;
 };
 
 }  // namespace dashpot::controller

@@ -27,6 +27,36 @@ MatrixXd checked(const MatrixXd& A, Index n, const char* name) {
   return A;
 }
 
+/// phi_0, phi_1 and phi_2 of a real matrix, see phi.
+struct RealPhi {
+  MatrixXd zero, one, two;
+};
+
+/// Taylor series of Z / 2^s, and doubling.
+RealPhi real_phi(const MatrixXd& Z) {
+  const auto identity = MatrixXd::Identity(Z.rows(), Z.cols());
+  double norm = Z.allFinite() ? Z.cwiseAbs().colwise().sum().maxCoeff() : 0;
+  const int doublings = norm < 1 ? 0 : std::ilogb(norm) + 1;
+  norm = std::ldexp(norm, -doublings);
+  int terms = 0;
+  for (double term = 0.5; term > 1e-17; term *= norm / (2 + ++terms)) {
+  }
+  const MatrixXd scaled = std::ldexp(1.0, -doublings) * Z;
+  RealPhi phi{{}, {}, identity};
+  for (int j = terms; j > 0; --j) {
+    phi.two = (identity + scaled.lazyProduct(phi.two) / (2.0 + j)).eval();
+  }
+  phi.two *= 0.5;
+  phi.one = identity + scaled.lazyProduct(phi.two);
+  phi.zero = identity + scaled.lazyProduct(phi.one);
+  for (int i = 0; i < doublings; ++i) {
+    phi.two = (0.25 * phi.one.lazyProduct(phi.one) + 0.5 * phi.two).eval();
+    phi.one = (0.5 * phi.zero.lazyProduct(phi.one) + 0.5 * phi.one).eval();
+    phi.zero = phi.zero.lazyProduct(phi.zero).eval();
+  }
+  return phi;
+}
+
 }  // namespace
 
 SampledLoop with_gears(const SampledLoop& loop) {
@@ -156,9 +186,9 @@ void SampledDataModel::integrate() {
   if (uncompensated.norm() > 1e-10 * (G.norm() + H.norm())) zero_modes.resize(n, 0);
   span_commands();
   motion = MatrixXd::Zero(2 * n, 3 * n);
-  if (D.isZero(0) && G.isZero(0)) {  // masses alone
-    const MatrixXd unit = MatrixXd::Identity(n, n);
-    motion << unit, unit, 0.5 * unit, MatrixXd::Zero(n, n), unit, unit;
+  if (G.isZero(0)) {  // masses and friction alone
+    const auto [zero, one, two] = real_phi(-D);
+    motion << MatrixXd::Identity(n, n), one, two, MatrixXd::Zero(n, n), zero, one;
     return;
   }
   // d/dt (y, y', f) = rate (y, y', f)

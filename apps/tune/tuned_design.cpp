@@ -219,11 +219,14 @@ TunedArm TunedArm::with(const TuneJson& parts) const {
   controller::ModelOptions& options = robot.options;
   const int n = model_.dof();
   if (const TuneJson& payload = value_at(parts, "payload"); !payload.is_null()) {
-    check_keys("payload", payload, {"mass", "center"});
+    check_keys("payload", payload, {"mass", "center", "inertia"});
     options.payload = {};
     options.payload.mass = number_at(payload, "mass", 0, 1e3, 0);
     if (payload.contains("center")) {
       options.payload.center = read_numbers("payload.center", payload["center"], 3);
+    }
+    if (payload.contains("inertia")) {
+      options.payload.inertia = read_gain_matrix("payload.inertia", payload["inertia"], 3);
     }
   }
   const auto take = [&](const char* key, JointVector& values) {

@@ -19,7 +19,7 @@ class TunedArm {
   const controller::RobotModel& model() const { return model_; }
   const controller::Settings& settings() const { return settings_; }
 
-  /// Makes another arm of {"payload": {"mass", "center"}, "reflected_inertia",
+  /// Makes another arm of {"payload": {"mass", "center", "inertia"}, "reflected_inertia",
   /// "viscous_friction", "gear_stiffness", "gear_damping": n each, "position_sensor"}; a key that
   /// is missing or null keeps what the model has, and in gear_stiffness null is rigid. Throws
   /// InputError, and InvalidModel.

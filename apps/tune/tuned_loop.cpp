@@ -1,26 +1,21 @@
-#include <dashpot/analysis/response.hpp>
 #include <dashpot/analysis/sensitivity.hpp>
 #include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/apps/report/json.hpp>
+#include <dashpot/apps/tune/place_motion.hpp>
 #include <dashpot/apps/tune/tuned_loop.hpp>
-#include <dashpot/controller/controller.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/elastic_joints.hpp>
-#include <dashpot/controller/gain_judge.hpp>
-#include <dashpot/controller/rotors.hpp>
-#include <dashpot/controller/setpoint_check.hpp>
 #include <dashpot/controller/settings_check.hpp>
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <complex>
 #include <exception>
+#include <limits>
 #include <mutex>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 #include <thread>
 
@@ -34,37 +29,6 @@ using controller::PostureNumbers;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using LoopJson = nlohmann::ordered_json;
-
-/// A place of the arm that moves: the row d of its motion, and the joint motion that moves it by
-/// one unit, n each.
-struct Place {
-  Eigen::RowVectorXd row;
-  VectorXd motion;
-  std::string unit;  ///< of its receptance
-  bool linear = false;
-};
-
-/// J# = M^-1 J' (J M^-1 J')^-1; next to a singularity that of the directions left.
-MatrixXd consistent_inverse(const MatrixXd& M, const MatrixXd& J) {
-  const Eigen::LLT<MatrixXd> mass(M);
-  const MatrixXd X = mass.matrixL().solve(J.transpose());  // J M^-1 J' = X'X
-  Eigen::CompleteOrthogonalDecomposition<MatrixXd> solve;
-  solve.setThreshold(1e-6);
-  solve.compute(X.transpose());
-  return mass.matrixU().solve(solve.pseudoInverse());
-}
-
-Place place_of(const std::string& place, const MatrixXd& M, const MatrixXd& J) {
-  const bool tip = place.starts_with("tip/"), joint = place.starts_with("joint/");
-  const std::string digits = place.substr(std::min(place.find('/') + 1, place.size()));
-  const bool number = !digits.empty() && digits.size() < 3 &&
-                      digits.find_first_not_of("0123456789") == std::string::npos;
-  const int i = number ? std::stoi(digits) : -1;
-  const Eigen::Index n = M.rows();
-  if (joint && i >= 0 && i < n) return {VectorXd::Unit(n, i), VectorXd::Unit(n, i), "rad/(N m)"};
-  if (!tip || i < 0 || i > 5) throw InputError("place", "there is no such place on this arm");
-  return {J.row(i), consistent_inverse(M, J).col(i), i < 3 ? "m/N" : "rad/(N m)", i < 3};
-}
 
 PostureNumbers numbers_of(const analysis::Spectrum<>& spectrum, double soft) {
   PostureNumbers result;
@@ -93,99 +57,25 @@ int largest_joint(const Eigen::VectorXcd& shape, int n) {
   return static_cast<int>(at);
 }
 
-/// How a motion that is let go one unit away comes to rest, and how that looks from the goal: the
-/// step to a goal one unit away is one minus it.
-LoopJson release_json(const analysis::Response& response, const analysis::Spectrum<>& spectrum,
-                      const VectorXd& motion, const Eigen::RowVectorXd& row) {
-  double decay = std::numeric_limits<double>::infinity();
-  for (const analysis::Mode<>& mode : spectrum.modes) {
-    for (const auto& value : mode.eigenvalues) {
-      if (std::abs(value) > controller::kSoftFrequency) decay = std::min(decay, -value.real());
-    }
+/// The block of A, in the coordinates of the gears, by which the controller's torques follow what
+/// it measures, n x n.
+MatrixXd of_controller(const analysis::Gears& gears, const MatrixXd& A) {
+  const Eigen::Index n = gears.data().stiffness.size();
+  MatrixXd block(n, n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) block(i, j) = A(gears.motor(i), gears.measured(j));
   }
-  constexpr int kPoints = 401;
-  constexpr double kSettled = 0.02;
-  const VectorXd rest = VectorXd::Zero(motion.size());
-  const auto value_at = [&](double t) { return row.dot(response.free(motion, rest, t).position); };
-  const bool grows = decay < 0;
-  double horizon = 20;
-  if (std::isfinite(decay) && decay != 0) {
-    horizon = std::clamp(grows ? -1.5 / decay : 5 / decay, 0.02, 20.0);
-  }
-  std::vector<double> times(kPoints), values(kPoints);
-  int last = 0;
-  for (int round = 0; round < 2; ++round) {
-    last = 0;
-    for (int i = 0; i < kPoints; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      times[k] = horizon * i / (kPoints - 1);
-      values[k] = value_at(times[k]);
-      if (std::abs(values[k]) > kSettled) last = i;
-    }
-    if (grows || last > kPoints / 4) break;  // otherwise a slow mode that this place hardly sees
-    horizon = std::max(3 * times[static_cast<std::size_t>(last) + 1], 0.02);
-  }
-  const auto lowest = std::min_element(values.begin(), values.end());
-  double overshoot = std::max(0.0, -*lowest);
-  if (overshoot > 0) {  // between the points, by ternary search
-    const auto at = static_cast<std::size_t>(lowest - values.begin());
-    double a = times[at == 0 ? 0 : at - 1], b = times[std::min(at + 1, times.size() - 1)];
-    for (int i = 0; i < 40; ++i) {
-      const double c = a + (b - a) / 3, d = b - (b - a) / 3;
-      (value_at(c) < value_at(d) ? b : a) = value_at(c) < value_at(d) ? d : c;
-    }
-    overshoot = std::max(overshoot, -value_at(0.5 * (a + b)));
-  }
-  LoopJson settling;
-  if (!grows && last + 1 < kPoints) {
-    double a = times[static_cast<std::size_t>(last)], b = times[static_cast<std::size_t>(last) + 1];
-    for (int i = 0; i < 40; ++i) {
-      const double c = 0.5 * (a + b);
-      (std::abs(value_at(c)) > kSettled ? a : b) = c;
-    }
-    settling = b;
-  }
-  return {{"time", times},
-          {"value", values},
-          {"overshoot", grows ? LoopJson() : LoopJson(overshoot)},
-          {"settling_time", settling}};
-}
-
-LoopJson frequency_json(const analysis::Response& response, const analysis::Spectrum<>& spectrum,
-                        const Eigen::RowVectorXd& row, const std::string& unit) {
-  double slowest = 10, fastest = 10;
-  LoopJson natural = LoopJson::array();
-  for (const analysis::Mode<>& mode : spectrum.modes) {
-    const double frequency = mode.natural_frequency;
-    natural.push_back(frequency);
-    if (!std::isfinite(frequency) || frequency < controller::kSoftFrequency) continue;
-    slowest = std::min(slowest, frequency);
-    fastest = std::max(fastest, frequency);
-  }
-  constexpr int kPoints = 161;
-  std::vector<double> omegas, magnitudes, phases;
-  double phase = 0;
-  for (int i = 0; i < kPoints; ++i) {
-    const double omega = 0.1 * slowest * std::pow(100 * fastest / slowest, i / (kPoints - 1.0));
-    const std::complex<double> h = (row * response.receptance(omega) * row.transpose())(0, 0);
-    phase += std::remainder(std::arg(h) - phase, 2 * M_PI);
-    omegas.push_back(omega);
-    magnitudes.push_back(std::abs(h));
-    phases.push_back(phase);
-  }
-  return {{"omega", omegas},
-          {"magnitude", magnitudes},
-          {"phase", phases},
-          {"unit", unit},
-          {"natural_frequency", natural}};
+  return block;
 }
 
 /// d ratio / d entry of the stiffness and damping that the controller has, a matrix a mode.
 LoopJson sensitivity_json(const analysis::System<>& system, const analysis::Spectrum<>& spectrum,
-                          const MatrixXd* J) {
+                          const analysis::Gears& gears, const MatrixXd* J) {
   LoopJson of_stiffness = LoopJson::array(), of_damping = LoopJson::array();
   for (const analysis::ModeSensitivity& mode : analysis::sensitivities(system, spectrum)) {
-    const auto rows = [J](const MatrixXd& G) {
+    const auto rows = [&](const MatrixXd& all) {
+      MatrixXd G = of_controller(gears, all);
+      G = (0.5 * (G + G.transpose())).eval();  // an entry moves together with its mirror image
       return json_rows(J != nullptr ? analysis::task_gradient(*J, G) : G);
     };
     of_stiffness.push_back(rows(mode.stiffness.damping_ratio));
@@ -240,28 +130,29 @@ LoopJson limit_json(const analysis::System<>& system, const analysis::SampledLoo
 }
 
 /// Sets C_C, or C_q, of the damping that the controller has designed: with J# of
-/// `consistent_inverse` the null space's dampers vanish in J#' (C - friction) J#.
-void set_designed_damping(const analysis::System<>& system, const MatrixXd& friction,
-                          analysis::TaskImpedance& parts) {
-  if (!parts.jacobian) {
-    parts.damping = system.damping;
-    return;
-  }
+/// `consistent_inverse` the null space's dampers vanish in J#' C J#.
+void set_designed_damping(const analysis::System<>& system, const analysis::Gears& gears,
+                          const MatrixXd& friction, analysis::TaskImpedance& parts) {
+  MatrixXd passive = MatrixXd::Zero(system.dof(), system.dof());
+  gears.add_friction(passive);
+  gears.add_gears(gears.data().damping, passive);
+  const MatrixXd C = of_controller(gears, system.damping - passive);
+  parts.damping = C + friction;
+  if (!parts.jacobian) return;
   const MatrixXd& J = *parts.jacobian;
   const MatrixXd inverse = consistent_inverse(parts.mass, J);
-  parts.task_damping = inverse.transpose() * (system.damping - friction) * inverse;
-  parts.damping = system.damping - J.transpose() * *parts.task_damping * J;
+  parts.task_damping = inverse.transpose() * C * inverse;
+  *parts.damping -= J.transpose() * *parts.task_damping * J;
 }
 
-/// Stiffness and damping that act at the tip or in the joints, without friction; without `known`
-/// the damping is no single matrix.
-LoopJson gains_json(const analysis::TaskImpedance& parts, const MatrixXd& friction, bool known) {
+/// Stiffness and damping that act at the tip or in the joints, without friction.
+LoopJson gains_json(const analysis::TaskImpedance& parts, const MatrixXd& friction) {
   if (parts.jacobian) {
     return {{"stiffness", json_rows(*parts.task_stiffness)},
-            {"damping", known ? json_rows(*parts.task_damping) : LoopJson()}};
+            {"damping", json_rows(*parts.task_damping)}};
   }
   return {{"stiffness", json_rows(*parts.stiffness)},
-          {"damping", known ? json_rows(*parts.damping - friction) : LoopJson()}};
+          {"damping", json_rows(*parts.damping - friction)}};
 }
 
 /// The loop as `dashpot analyze` takes it: as its parts, or where gears bend as a whole.
@@ -282,10 +173,6 @@ LoopJson system_json(const analysis::System<>& system, const analysis::TaskImped
   add("stiffness", parts.stiffness);
   add("damping", parts.damping);
   return result;
-}
-
-LoopJson refusal_json(const std::string& key, const std::string& reason) {
-  return {{"key", key}, {"reason", reason}};
 }
 
 }  // namespace
@@ -318,6 +205,7 @@ TunedLoop::There TunedLoop::there(const JointVector& q) const {
   if (design_.designed()) {
     controller::PostureLoop loop(arm_.model(), design_.settings);
     const analysis::System<controller::kMaxJoints> system = designed_system(q, loop);
+    result.level = loop.level();
     result.system = analysis::System<>(system.dof());
     result.system.mass = system.mass;
     result.system.damping = system.damping;
@@ -353,6 +241,7 @@ nlohmann::ordered_json TunedLoop::workspace(std::uint64_t seed, std::int64_t fir
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<PostureNumbers> found(static_cast<std::size_t>(count));
   std::atomic<std::int64_t> next = 0;
+  const auto end = std::chrono::steady_clock::now() + kLongest;
   std::exception_ptr failure;
   std::once_flag failed;
   const auto find = [&] {
@@ -365,6 +254,7 @@ nlohmann::ordered_json TunedLoop::workspace(std::uint64_t seed, std::int64_t fir
       } catch (const std::runtime_error&) {  // an eigenvalue iteration that fails has no numbers
         here = {};
       }
+      if (std::chrono::steady_clock::now() > end) return;
     }
   };
   const auto work = [&]() noexcept {
@@ -382,7 +272,9 @@ nlohmann::ordered_json TunedLoop::workspace(std::uint64_t seed, std::int64_t fir
     work();
   }
   if (failure) std::rethrow_exception(failure);
-  LoopJson result = {{"smallest_ratio", LoopJson::array()},
+  count = std::min(count, next.load());  // the threads end what they have begun
+  LoopJson result = {{"count", count},
+                     {"smallest_ratio", LoopJson::array()},
                      {"gain_margin", LoopJson::array()},
                      {"worst", LoopJson::object()}};
   const auto add = [&](const char* name, double PostureNumbers::*number) {
@@ -412,7 +304,7 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
   const Place moved = place_of(place, loop.parts.mass, J);
   const bool rigid = !gears_.any();
   const MatrixXd friction = model.joint_values(&controller::Joint::viscous_friction).asDiagonal();
-  if (design_.designed() && rigid) set_designed_damping(loop.system, friction, loop.parts);
+  if (design_.designed()) set_designed_damping(loop.system, gears_, friction, loop.parts);
   const PostureNumbers here = numbers(loop);
 
   const Eigen::Index size = loop.system.dof();
@@ -430,66 +322,24 @@ nlohmann::ordered_json TunedLoop::at(const JointVector& q, const std::string& pl
                      {"smallest_ratio", here.smallest_ratio},
                      {"fastest_pole", here.fastest_pole},
                      {"gain_margin", std::isinf(here.gain_margin) ? 1e6 : here.gain_margin},
+                     {"damping_level", nullptr},
                      {"limit", nullptr},
                      {"release", release_json(response, loop.spectrum, motion, row)},
-                     {"frequency", frequency_json(response, loop.spectrum, row, moved.unit)},
+                     {"frequency", frequency_json(loop.system, loop.spectrum, row, moved.unit)},
                      {"sensitivity", nullptr},
                      {"system", system_json(loop.system, loop.parts, rigid)},
-                     {"gains", gains_json(loop.parts, friction, !design_.designed() || rigid)}};
+                     {"gains", gains_json(loop.parts, friction)}};
+  if (loop.level) {
+    result["damping_level"] = {{"share", loop.level->level}, {"kept", loop.level->kept}};
+  }
   if (design_.stated.period > 0) {
     result["limit"] =
         limit_json(loop.system, analysis::with_gears(loop.sampled), here.gain_margin, model);
   }
   const bool task = design_.stated.mode == Mode::kCartesian;
-  if (rigid && !design_.stated.inertia_blocks) {
-    result["sensitivity"] =
-        sensitivity_json(loop.system, loop.spectrum, task ? &*loop.parts.jacobian : nullptr);
-  }
-  return result;
-}
-
-nlohmann::ordered_json refusals(const TunedArm& arm, const TunedDesign& design,
-                                const JointVector& q) {
-  LoopJson result = LoopJson::array();
-  const controller::Gains& gains = design.settings.initial.gains;
-  const bool null_space = !gains.null_stiffness.isZero(0) || !gains.null_damping.isZero(0);
-  if (design.stated.kinematic_null_space && null_space) {
-    result.push_back(refusal_json(
-        "null_projector", "Dashpot's controller has the dynamically consistent projector alone"));
-  }
-  if (design.stated.inertia_blocks) {
-    result.push_back(refusal_json(
-        "inertia_blocks", "Dashpot's controller does not multiply gains by the tip's inertia"));
-    return result;
-  }
-  for (const Mode mode : {Mode::kJoint, Mode::kCartesian}) {
-    const auto fault = controller::check_gains(gains, mode, arm.model().dof());
-    if (fault) result.push_back(refusal_json(fault.key, fault.reason));
-  }
-  if (!result.empty()) return result;
-  try {
-    controller::Settings settings = design.settings;
-    settings.analysis.where = controller::Analysis::Where::kOff;
-    settings.analysis.sampled.interval = 0;
-    (void)controller::Controller(arm.model(), settings);
-  } catch (const controller::InvalidSettings& error) {
-    result.push_back(refusal_json(error.key(), error.what()));
-    return result;
-  }
-  if (design.stated.period == 0) return result;
-  const controller::GainJudge::Verdict verdict =
-      controller::GainJudge(arm.model(), design.settings).judge(q, gains);
-  const double asked =
-      verdict.dropped ? controller::GainJudge::kDropped : design.settings.limits.gain_margin;
-  if (verdict.margin < std::min(asked, design.settings.limits.gain_margin)) {
-    std::ostringstream text;
-    text.precision(3);
-    text << "with the " << (verdict.mode == Mode::kJoint ? "joint" : "task")
-         << " gains the sampled loop has a gain margin of " << verdict.margin << " here"
-         << (verdict.dropped ? " once the payload is dropped, " : ", ") << asked << " is asked for";
-    const std::string missing = controller::missing_rotors_text(arm.model());
-    if (!missing.empty()) text << "; " << missing;
-    result.push_back(refusal_json("gain_margin", text.str()));
+  if (!design_.stated.inertia_blocks) {
+    result["sensitivity"] = sensitivity_json(loop.system, loop.spectrum, gears_,
+                                             task ? &*loop.parts.jacobian : nullptr);
   }
   return result;
 }

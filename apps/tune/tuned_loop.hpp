@@ -2,6 +2,7 @@
 #include <dashpot/apps/tune/tuned_design.hpp>
 #include <dashpot/controller/posture_loop.hpp>
 
+#include <chrono>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -21,9 +22,12 @@ class TunedLoop {
 
   /// Returns the numbers of postures of the sequence `seed`, by as many threads as there are
   /// processors, and those postures of which either number is the worst:
-  /// {"smallest_ratio", "gain_margin", "worst": {either: {"value", "q"}}}.
+  /// {"count", "smallest_ratio", "gain_margin", "worst": {either: {"value", "q"}}}. After kLongest
+  /// no posture is begun, so that there may be fewer than asked for.
   nlohmann::ordered_json workspace(std::uint64_t seed, std::int64_t first,
                                    std::int64_t count) const;
+
+  static constexpr std::chrono::seconds kLongest{1};
 
  private:
   /// The loop at a posture, in the coordinates of analysis::Gears, and what it is made of.
@@ -31,7 +35,8 @@ class TunedLoop {
     analysis::TaskImpedance parts;  ///< as if no gear gave way
     analysis::System<> system;
     analysis::Spectrum<> spectrum;
-    analysis::SampledLoop sampled;  ///< without gears, see analysis::with_gears
+    analysis::SampledLoop sampled;                ///< without gears, see analysis::with_gears
+    std::optional<analysis::DampingLevel> level;  ///< of a ratio
   };
   There there(const controller::JointVector& q) const;
   analysis::System<controller::kMaxJoints> designed_system(const controller::JointVector& q,

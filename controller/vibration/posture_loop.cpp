@@ -26,6 +26,7 @@ Status PostureLoop::closed_loop(const JointVector& q, const Gains& gains, Mode m
   const GainBlend given(1, Impedance(setpoint, n));
   damping_.reset();
   const Impedance& impedance = damping_.update(given, robot);
+  level_ = damping_.level(given.now());
   controller::closed_loop(robot, rest,
                           {impedance,
                            damping_.null_space(),

@@ -36,6 +36,43 @@ TEST(GainMargin, IsThatOfOneJoint) {
   }
 }
 
+/// The same with much friction, by the criterion of Jury for z^2 - t z + d.
+TEST(GainMargin, IsThatOfOneJointWithFriction) {
+  Random random(301);
+  int finite = 0;
+  for (int i = 0; i < 50; ++i) {
+    SampledLoop loop;
+    const double T = loop.period = random.log_uniform(1e-4, 1e-2), M = random.log_uniform(0.1, 10);
+    const double friction = random.uniform(0.2, 8), c = random.log_uniform(0.01, 3);
+    const double k = random.log_uniform(0.001, 1);
+    loop.friction = MatrixXd::Constant(1, 1, friction * M / T);
+    const double a = std::exp(-friction), one = (1 - a) / friction;
+    const double two = (friction - 1 + a) / (friction * friction);
+    const double by_alternation = (1 + a) * two * k + 2 * one * c - one * one * k;
+    const double by_oscillation = one * one * k - one * c - a * two * k;
+    double expected = std::numeric_limits<double>::infinity();
+    if (by_alternation > 0) expected = std::min(expected, 2 * (1 + a) / by_alternation);
+    if (by_oscillation > 0) expected = std::min(expected, (1 - a) / by_oscillation);
+    const System<> system = one_joint(M, (friction + c) * M / T, k * M / (T * T));
+    const double found = gain_margin(system, analyze(system), loop);
+    if (expected > 1e6) continue;
+    EXPECT_NEAR(found, expected, 1e-5 * expected);
+    ++finite;
+  }
+  EXPECT_GT(finite, 40);
+}
+
+/// A spring of the world that pushes away asks for more stiffness, which is no margin.
+TEST(GainMargin, IsZeroIfOnlyMoreHelps) {
+  const System<> system = one_joint(1, 300, -1000);
+  SampledLoop loop;
+  loop.passive_stiffness = MatrixXd::Constant(1, 1, -3000);
+  EXPECT_FALSE(testing::sample(system, loop).stable());
+  EXPECT_EQ(gain_margin(system, analyze(system), loop), 0);
+  const System<> stiffer = one_joint(1, 600, 1000);  // with twice the gains
+  EXPECT_TRUE(testing::sample(stiffer, loop).stable());
+}
+
 TEST(GainMargin, IsZeroIfNothingHelpsAndInfiniteIfNothingHarms) {
   const System<> undamped = one_joint(1, 0, 100);
   EXPECT_EQ(gain_margin(undamped, analyze(undamped), {}), 0);

@@ -11,7 +11,7 @@ import sys
 import tempfile
 import unittest
 
-PROGRAM, SOURCE = sys.argv[1:3]
+PROGRAM, SOURCE = map(os.path.abspath, sys.argv[1:3])
 PANDA = ['--urdf', os.path.join(SOURCE, 'sim/models/panda.urdf'), '--base', 'panda_link0', '--tip', 'panda_hand_tcp']
 
 
@@ -110,12 +110,73 @@ class TuneServer(unittest.TestCase):
         self.assertGreaterEqual(found['release']['overshoot'], lowest)
         self.assertLess(found['release']['overshoot'], lowest + 1e-3)
 
+    def test_receptance_is_that_of_the_matrices(self):
+        def solve(A, b):
+            rows, n = [list(row) + [x] for row, x in zip(A, b)], len(b)
+            for i in range(n):
+                k = max(range(i, n), key=lambda r: abs(rows[r][i]))
+                rows[i], rows[k] = rows[k], rows[i]
+                for j in range(i + 1, n):
+                    f = rows[j][i] / rows[i][i]
+                    rows[j] = [x - f * y for x, y in zip(rows[j], rows[i])]
+            x = [0] * n
+            for i in reversed(range(n)):
+                x[i] = (rows[i][n] - sum(a * y for a, y in zip(rows[i][i + 1:n], x[i + 1:]))) / rows[i][i]
+            return x
+        joints = {'mode': 'joint', 'joint_stiffness': [60, 50, 40, 40, 30, 20, 10], 'joint_damping': {'ratio': 0.6}}
+        bending = {'arm': {'reflected_inertia': [0.1] * 7, 'gear_stiffness': [5000, None] + [5000] * 5}}
+        J = self.server.design(self.base)['system']['jacobian']
+        rows = {f'tip/{i}': J[i] for i in range(6)} | {f'joint/{i}': [int(i == j) for j in range(7)] for i in range(7)}
+        for change in (joints, joints | bending, bending | {'damping': [30] * 6, 'null_stiffness': [5] * 7}):
+            for place, row in rows.items():
+                found = self.server.design(self.base | change, place=place)
+                self.assertAlmostEqual(found['release']['value'][0], 1, places=9)
+                system, f = found['system'], found['frequency']
+                n = len(system['mass'])
+                if 'jacobian' in system:
+                    continue
+                row = row + [0] * (n - 7)
+                for k in (0, 80, 160):
+                    s = 1j * f['omega'][k]
+                    A = [[s * s * system['mass'][i][j] + s * system['damping'][i][j] + system['stiffness'][i][j] for j in range(n)] for i in range(n)]
+                    told = abs(sum(a * x for a, x in zip(row, solve(A, row))))
+                    self.assertAlmostEqual(f['magnitude'][k], told, delta=1e-7 * told, msg=(place, k))
+
     def test_ratio_is_what_the_controller_makes_of_it(self):
         friction = self.base | {'damping': {'ratio': 0.7}, 'gain_margin': 1, 'arm': {'viscous_friction': [0] * 7}}
         for mode in self.server.design(friction)['modes']:
             self.assertAlmostEqual(mode['damping_ratio'], 0.7, places=5)
         hard = self.server.design(friction | {'gain_margin': 2, 'period': 0.01, 'delay': 3, 'stiffness': [3000] * 3 + [300] * 3})
         self.assertLess(hard['smallest_ratio'], 0.65)  # lowered to what this loop bears
+
+    def test_level_of_a_ratio_is_that_of_a_run(self):
+        folder = tempfile.mkdtemp(prefix='dashpot-tune-')
+        self.addCleanup(shutil.rmtree, folder)
+        hard = self.base | {'damping': {'ratio': 0.7}, 'period': 0.004, 'delay': 2, 'cutoff': 100, 'difference_velocity': True, 'gain_margin': 1.2}
+        found = self.server.design(hard)
+        path = os.path.join(folder, 'scene.yaml')
+        with open(path, 'w') as file:
+            file.write(f'robot: {{urdf: {PANDA[1]}, base: panda_link0, tip: panda_hand_tcp}}\ncontrol: {{period: 4 ms, mode: cartesian}}\n'
+                       f'gains: {{task: {{stiffness: {self.base["stiffness"]}, damping_ratio: 0.7}}, null_space: {{stiffness: 0, damping: 0}}}}\n'
+                       'limits: {gain_margin: 1.2}\nanalysis: {sampled: {delay: 2, cutoff: 100, difference_velocity: true}}\n'
+                       f'scenario: {{duration: 40 ms, start: {{position: {self.q}}}}}\n')
+        told = run('run', path, '--fast', '--json')
+        self.same_modes(found['modes'], told['modes']['start'], 6)
+        self.assertAlmostEqual(found['damping_level']['share'], told['least_damping_level'], places=5)
+        self.assertLess(found['damping_level']['share'], 0.9)
+        # Springs that no damping saves are refused there, and said to be unstable here.
+        stiff = hard | {'stiffness': [3000] * 3 + [100] * 3}
+        with open(path) as file:
+            text = file.read().replace(str(self.base['stiffness']), str(stiff['stiffness']))
+        with open(path, 'w') as file:
+            file.write(text)
+        done = subprocess.run([PROGRAM, 'run', path, '--fast'], capture_output=True, text=True)
+        self.assertEqual((done.returncode, 'gain margin' in done.stderr), (2, True), done.stderr)
+        found = self.server.design(stiff)
+        self.assertLess(found['gain_margin'], 1)
+        self.assertFalse(found['damping_level']['kept'])
+        self.assertIn('unstable here', found['refused'][0]['reason'])
+        self.assertIsNone(self.server.design(stiff | {'damping': {'factor': 2}})['damping_level'])
 
     def test_sensitivities_tell_what_a_step_does(self):
         D = [30, 30, 30, 9, 9, 9]
@@ -131,6 +192,36 @@ class TuneServer(unittest.TestCase):
             for k, (a, b) in enumerate(zip(before['modes'], after['modes'])):
                 told = before['sensitivity']['damping'][k][i][j] * (1 if i == j else 2)
                 self.assertAlmostEqual((b['damping_ratio'] - a['damping_ratio']) / step, told, delta=1e-4 * max(1, abs(told)))
+
+    def test_sensitivities_know_gears(self):
+        gears = {'reflected_inertia': [0.1] * 7, 'gear_stiffness': [5000, None] + [5000] * 5, 'gear_damping': [1] * 7}
+        for sensor in ('motor', 'link'):
+            for of_joints in (False, True):
+                names = ('joint_stiffness', 'joint_damping') if of_joints else ('stiffness', 'damping')
+                design = self.base | {'arm': gears | {'position_sensor': sensor}, 'gain_margin': 1}
+                if of_joints:
+                    design |= {'mode': 'joint', 'joint_stiffness': [60, 50, 40, 40, 30, 20, 10], 'joint_damping': {'ratio': 0.6}}
+                else:
+                    design |= {'damping': {'ratio': 0.6}}
+                # The matrix of a ratio gives the same modes.
+                designed = self.server.design(design)
+                design[names[1]] = designed['gains']['damping']
+                before = self.server.design(design)
+                self.same_modes(before['modes'], designed['modes'], 6)
+                for which, name in zip(('stiffness', 'damping'), names):
+                    rows = before['gains'][which]
+                    for i, j in ((0, 0), (1, 4), (5, 5)):
+                        step = 1e-5 * abs(rows[i][i] * rows[j][j]) ** 0.5
+                        changed = [list(row) for row in rows]
+                        changed[i][j] += step
+                        if i != j:
+                            changed[j][i] += step
+                        after = self.server.design(design | {name: changed})
+                        for k, (a, b) in enumerate(zip(before['modes'], after['modes'])):
+                            if a['damping_ratio'] is None or b['damping_ratio'] is None or a['natural_frequency'] > 300:
+                                continue
+                            told = before['sensitivity'][which][k][i][j] * (1 if i == j else 2) * step
+                            self.assertAlmostEqual(b['damping_ratio'] - a['damping_ratio'], told, delta=1e-3 * abs(told) + 1e-9, msg=(sensor, which, i, j, k))
 
     def test_arm_has_rotors_payload_gears(self):
         parts = {'reflected_inertia': [0.1] * 7, 'payload': {'mass': 2, 'center': [0, 0, 0.1]}, 'gear_stiffness': [5000] * 7}
@@ -173,6 +264,23 @@ class TuneServer(unittest.TestCase):
         self.assertEqual(status, 200)
         self.assertAlmostEqual(min(part['smallest_ratio']), 0.7, places=3)
         self.assertAlmostEqual(self.server.design(self.base, part['worst']['gain_margin']['q'])['smallest_ratio'] > 0, True)
+
+    def test_workspace_gives_up_in_time(self):
+        # Each of these postures takes tenths of a second; all of them would keep Ctrl-C waiting for minutes.
+        slow = self.base | {'delay': 20, 'cutoff': 100, 'difference_velocity': True, 'arm': {'reflected_inertia': [0.3] * 7, 'gear_stiffness': [1e4] * 7}}
+        status, part = self.server.post('/workspace', {'design': slow, 'seed': 1, 'first': 0, 'count': 500})
+        self.assertEqual(status, 200)
+        self.assertLess(0, part['count'])
+        self.assertLess(part['count'], 500)
+        self.assertEqual((len(part['smallest_ratio']), len(part['gain_margin'])), (part['count'],) * 2)
+        status, whole = self.server.post('/workspace', {'design': self.base, 'seed': 1, 'first': 0, 'count': 10})
+        self.assertEqual((status, whole['count']), (200, 10))
+
+    def test_payload_has_inertia(self):
+        payload = {'mass': 2, 'center': [0, 0, 0.1], 'inertia': [[0.03, 0, 0.002], [0, 0.04, 0], [0.002, 0, 0.02]]}
+        found = self.server.design(self.base | {'arm': {'payload': payload}})
+        posture = self.audit('--preset', 'cartesian_impedance_controller', '--payload', '2,0,0,0.1,0.03,0.04,0.02,0,0.002,0')['posture']
+        self.same_modes(found['modes'], posture['modes'], 7)
 
     def test_reads_a_configuration(self):
         folder = tempfile.mkdtemp(prefix='dashpot-tune-')

@@ -1,4 +1,5 @@
 """What a browser shows of `dashpot tune`: PROGRAM SOURCE_DIRECTORY. Exit status 77: skipped."""
+import ast
 import json
 import os
 import shlex
@@ -7,13 +8,14 @@ import signal
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
 
 sys.dont_write_bytecode = True
 import browser
 import tune_walk
 
-PROGRAM, SOURCE = sys.argv[1:3]
+PROGRAM, SOURCE = map(os.path.abspath, sys.argv[1:3])
 CURRENT = tune_walk.CURRENT
 
 
@@ -29,6 +31,33 @@ def shown(x, digits=4):
         return str(round(x))
     text = f'{x:#.{digits}g}'
     return text.rstrip('.').replace('-', '−')
+
+
+def run_python(text):
+    """Runs the text of the export. Returns the modes, or None where the module is not installed: then it was run with a
+    stand-in that takes the names that the module's own calls have."""
+    told = text.replace('print(modes)', "import json\nprint(json.dumps([modes.natural_frequency.tolist(), modes.damping_ratio.tolist()]))")
+    done = subprocess.run([sys.executable, '-'], input=told, capture_output=True, text=True, cwd='/')
+    if done.returncode == 0:
+        return [{'natural_frequency': f, 'damping_ratio': r} for f, r in zip(*json.loads(done.stdout))]
+    assert "No module named 'dashpot'" in done.stderr, done.stderr
+    with open(os.path.join(SOURCE, 'python/dashpot/_robot.py')) as file:
+        calls = {node.name: node.args for node in ast.walk(ast.parse(file.read())) if isinstance(node, ast.FunctionDef)}
+
+    def taken(name, count):
+        arguments = calls[name]
+
+        def call(*values, **named):
+            assert len(values) == count and set(named) <= {one.arg for one in arguments.kwonlyargs}, (name, named)
+            return types.SimpleNamespace(modes=None)
+        return call
+    stand_in = types.SimpleNamespace(Robot=types.SimpleNamespace(from_urdf=taken('from_urdf', 3)), closed_loop=taken('closed_loop', 2))
+    sys.modules['dashpot'] = stand_in
+    try:
+        exec(compile(text.replace('print(modes)', ''), 'tuned.py', 'exec'), {})
+    finally:
+        del sys.modules['dashpot']
+    return None
 
 
 class Tune(unittest.TestCase):
@@ -186,6 +215,9 @@ class Tune(unittest.TestCase):
                     self.edit(f"state.edited = 'a'; {change}")
                     modes, text, command, python = (self.value('dashpot.answers.a.modes'), self.text('configuration of Dashpot'), self.text('command'),
                                                     self.text('Python'))
+                    told = run_python(python)
+                    if told is not None:
+                        self.same_modes(told, modes)
                     self.assertIn(f'These keys take the place of those of {path}', text)
                     self.assertIn('gain_margin: 1.5', text)
                     self.assertNotIn('integral', text)
@@ -203,6 +235,41 @@ class Tune(unittest.TestCase):
                     self.open_other(os.path.join(folder, 'tuned.yaml'), *q)
                     self.same_modes(self.value('dashpot.answers.a.modes'), modes)
                     self.assertEqual(self.value('[dashpot.store.state.a.delay, dashpot.store.state.a.gain_margin]'), [1, 1.5])
+
+    def test_mass_of_a_payload_takes_its_inertia_along(self):
+        folder = tempfile.mkdtemp(prefix='dashpot-tune-')
+        self.addCleanup(shutil.rmtree, folder)
+        path = os.path.join(folder, 'a.yaml')
+        panda = os.path.abspath(os.path.join(SOURCE, 'sim/models/panda.urdf'))
+        with open(path, 'w') as file:
+            file.write(f'robot: {{urdf: {panda}, base: panda_link0, tip: panda_hand_tcp, payload: {{mass: 2, center: [0, 0.01, 0.1], inertia: 0.02}}}}\n')
+        self.open_other(path)
+        self.assertEqual(self.value("document.querySelector('#parts [data-key=payload] span').textContent"), 'payload, its inertia grows with it')
+        self.value("document.querySelector('#parts').closest('details').open = true")
+        self.set('#parts [data-key=payload] input[type=text]', '500 g')
+        inertia = [[0.005 if i == j else 0 for j in range(3)] for i in range(3)]
+        self.assertEqual(self.value('dashpot.store.state.a.arm.payload'), {'mass': 0.5, 'center': [0, 0.01, 0.1], 'inertia': inertia})
+        self.edit("state.a = {...state.a, mode: 'cartesian', damping: {factor: 2}, null_damping: Array(7).fill(0)}")
+        words = shlex.split('\n'.join(line for line in self.text('command').splitlines() if line[0] != '#').replace('\\\n', ' '))
+        self.assertIn('0.5,0,0.01,0.1,0.005,0.005,0.005,0,0,0', words)
+        self.same_modes(json.loads(run(*words[1:], '--json'))['posture']['modes'], self.value('dashpot.answers.a.modes'))
+
+    def test_says_that_a_sampled_loop_is_unstable(self):
+        self.edit("state.edited = 'a'; state.a.damping = {ratio: 0.7}")
+        words = "document.getElementById('limits').textContent"
+        self.assertNotIn('unstable', self.value(words))
+        self.assertNotIn('lowered', self.value(words))
+        loop = "period: 0.004, delay: 2, cutoff: 100, difference_velocity: true"
+        self.edit(f"state.a = {{...state.a, {loop}}}")
+        for told in ('A is unstable in the sampled loop', 'No share of the ratio of A leaves the loop the margin asked for'):
+            self.assertIn(told, self.value(words))
+        self.assertEqual(self.value("document.querySelectorAll('#totals .bad').length"), 1)
+        self.assertEqual(self.value("[...document.querySelectorAll('#rows tr')].filter((row) => row.children[2].className == 'good').length"), 0)
+        self.assertIn('is unstable here', self.value("document.getElementById('refused').textContent"))
+        self.edit("state.a.stiffness = [200, 200, 200, 20, 20, 20]; state.a.gain_margin = 1.2")
+        level = self.value('dashpot.answers.a.damping_level')
+        self.assertIn(f"The ratio of A is lowered to {shown(100 * level['share'], 2)} % where the loop bears least", self.value(words))
+        self.assertNotIn('unstable', self.value(words))
 
     def test_exports_keep_drives_and_payload_of_options(self):
         self.open_other('--drives', 'panda', '--payload', '500g,0,0,0.1')
@@ -251,6 +318,10 @@ class Tune(unittest.TestCase):
                 for name in formats:
                     self.assertTrue(self.text(name))
                 modes = self.value('dashpot.answers.a.modes')
+                python = self.text('Python')
+                told = run_python(python)
+                if told is not None and 'leaves less of the ratio' not in python:
+                    self.same_modes(told, modes)
                 if 'link' not in kind:  # whose stiffness is not symmetric
                     for a, b in zip(modes, self.analyze()):
                         self.assertAlmostEqual(a['natural_frequency'], b['natural_frequency'], delta=1e-6 * a['natural_frequency'])
@@ -336,21 +407,31 @@ class Tune(unittest.TestCase):
         self.assertEqual(self.value("document.getElementById('arms').textContent"), '')
 
     def test_postures_of_a_list(self):
-        with tempfile.TemporaryDirectory() as folder:
-            path = os.path.join(folder, 'postures.yaml')
-            with open(path, 'w') as file:
-                file.write('[[0, -0.785, 0, -2.356, 0, 1.571, 0.785], [0, 0.6, 0, -1, 0, 1.6, 0]]')
-            other = subprocess.Popen([PROGRAM, 'tune', '--port', '0', '--postures', path], stdout=subprocess.PIPE, text=True, cwd=SOURCE)
-            try:
-                page = other.stdout.readline().split()[0]
-                self.browser.open(page)
-                self.browser.until(CURRENT + " && location.port == '" + page.rstrip('/').split(':')[-1] + "'")
-                self.set('#posture .field input[type=text]', '2')
-                self.assertEqual(self.value('dashpot.store.state.q'), [0, 0.6, 0, -1, 0, 1.6, 0])
-            finally:
-                other.send_signal(signal.SIGINT)
-                other.wait()
-                other.stdout.close()
+        folder = tempfile.mkdtemp(prefix='dashpot-tune-')
+        self.addCleanup(shutil.rmtree, folder)
+        path, log = os.path.join(folder, 'postures.yaml'), os.path.join(folder, 'panda.lcm')
+        with open(path, 'w') as file:
+            file.write('[[0, -0.785, 0, -2.356, 0, 1.571, 0.785], [0, 0.6, 0, -1, 0, 1.6, 0]]')
+        self.open_other('--postures', path)
+        self.set('#posture .field input[type=text]', '2')
+        self.assertEqual(self.value('dashpot.store.state.q'), [0, 0.6, 0, -1, 0, 1.6, 0])
+        run('run', 'sim/scenes/panda.yaml', '--fast', '--duration', '3', '--log', log)
+        self.open_other('--log', log)
+        postures = self.value('dashpot.setup.postures')
+        self.assertGreater(len(postures), 5)
+        self.set('#posture .field input[type=text]', '4')
+        self.assertEqual(self.value('dashpot.store.state.q'), postures[3])
+        self.assertEqual(self.value("document.querySelector('#posture .field input[type=text]').value"), '4')
+
+    def test_arrows_where_gears_bend(self):
+        gears = "{reflected_inertia: Array(7).fill(0.2), gear_stiffness: Array(7).fill(8000)}"
+        for damping in ('[40, 40, 40, 3, 3, 3]', '{ratio: 0.3}'):
+            self.edit(f"state.edited = 'a'; state.a = {{...state.a, stiffness: [400, 400, 400, 30, 30, 30], damping: {damping}, arm: {gears}}}")
+            last = self.value('dashpot.answers.a.modes.length')  # the slowest mode; those of the gears move too little to be shown
+            self.set('#arrow_mode', str(last))
+            before = self.value('dashpot.answers.a.modes.at(-1).damping_ratio')
+            tune_walk.click(self.browser)
+            self.assertGreater(self.value('dashpot.answers.a.modes.at(-1).damping_ratio'), before + 1e-3)
 
     def test_tip_is_dragged(self):
         tip = 'dashpot.tipOnScreen()'
@@ -379,6 +460,13 @@ class Tune(unittest.TestCase):
         self.settle()
         self.browser.until('Math.abs(seen.at(-1) - (-0.7 + 0.199)) < 1e-9')
         self.assertLess(self.value('seen.length'), 20)
+        # Nor behind parts of the workspace, which wait until nothing has moved for a while.
+        self.value("""(() => { const early = window.early = []; const real = fetch, rest = 140;
+            window.fetch = (path, options) => { if (path == '/workspace') early.push(performance.now() - dashpot.workspace.moved < rest); return real(path, options); }; })()""")
+        for i in range(3):
+            self.edit(f"state.b.stiffness[0] = {300 + i}")
+        self.browser.until('early.length > 2', 120)
+        self.assertEqual(self.value('early.filter(Boolean).length'), 0)
 
     def test_discussion_of_the_paper_by_hand(self):
         # From C_C0 = I to ratios above 0.6 for all six modes, by the arrows alone; a step takes a second by hand.

@@ -39,14 +39,17 @@ followTheme($('theme'), draw);
 window.addEventListener('resize', draw);
 page.tipOnScreen = dragTip(arm, () => ({arm: setup.arm, q: store.state.q}), (q, ended) => edit((state) => { state.q = q.map((x) => Number(x.toPrecision(6))); }, ended));
 
-// Questions to the server
+// Questions to the server. The answers of both designs are drawn in one frame, unless one takes long.
+const kTogether = 15;  // ms
+let later = 0;
 const questions = Object.fromEntries(kDesigns.map((name) => [name, new Newest(setup.token, (heard, asked) => {
   page.problem[name] = heard.error || '';
   $('link').textContent = heard.gone ? heard.error : '';
   $('link').className = 'badge bad';
   if (!heard.error) page.answers[name] = heard;
   page.asked[name] = asked;
-  redraw('arm', 'poles', 'motion', 'texts');
+  clearTimeout(later);
+  later = setTimeout(() => redraw('arm', 'poles', 'motion', 'texts'), kDesigns.some((one) => one !== name && questions[one].busy) ? kTogether : 0);
   if (kDesigns.every((one) => !questions[one].busy || !questions[one].next)) workspace.look({a: store.state.a, b: store.state.b});
 })]));
 const workspace = page.workspace = new Workspace(setup.token, () => redraw('workspace'));
@@ -100,7 +103,7 @@ function refresh() {
 
 function changed(ended) {
   page.current = false;
-  page.moved = performance.now();
+  page.moved = workspace.moved = performance.now();
   build();
   refresh();
   for (const name of kDesigns) questions[name].ask('/design', {q: store.state.q, place: store.state.place, design: store.design(name)});
@@ -229,12 +232,12 @@ function armDifference() {
 function tell() {
   const [a, b] = kDesigns.map((name) => answer(name)), modes = (from, i) => (from && from.modes[i]) || null;
   const count = Math.max(a ? a.modes.length : 0, b ? b.modes.length : 0);
-  const good = (mode) => (mode && mode.damping_ratio !== null ? (mode.damping_ratio >= 0.6 ? 'good' : 'bad') : '');
+  const good = (mode, from) => (mode && mode.damping_ratio !== null ? (mode.damping_ratio >= 0.6 && !unstable(from) ? 'good' : 'bad') : '');
   $('rows').replaceChildren(...Array.from({length: count}, (_, i) => {
     const ma = modes(a, i), mb = modes(b, i), first = cell('');
     first.append(markElement(i + 1), ` ${i + 1}`);
-    const line = row(first, cell(ma ? number(ma.natural_frequency) : '–'), cell(ma ? number(ma.damping_ratio) : '–', good(ma)),
-      cell(mb ? number(mb.natural_frequency) : '–'), cell(mb ? number(mb.damping_ratio) : '–', good(mb)), cell(difference(ma && ma.damping_ratio, mb && mb.damping_ratio)));
+    const line = row(first, cell(ma ? number(ma.natural_frequency) : '–'), cell(ma ? number(ma.damping_ratio) : '–', good(ma, a)),
+      cell(mb ? number(mb.natural_frequency) : '–'), cell(mb ? number(mb.damping_ratio) : '–', good(mb, b)), cell(difference(ma && ma.damping_ratio, mb && mb.damping_ratio)));
     line.classList.toggle('chosen', page.chosen === i + 1);
     return line;
   }));
@@ -242,17 +245,27 @@ function tell() {
     ['overshoot, %', (x) => (x.release.overshoot === null ? null : x.release.overshoot * 100)], ['settling to 2 %, s', (x) => x.release.settling_time], ['free motions', (x) => x.soft_or_zero, true]];
   $('totals').replaceChildren(...totals.map(([name, get, whole]) => {
     const values = [a, b].map((x) => (x ? get(x) : null)), text = (v) => (v === 1e6 && name === 'gain margin' ? 'above 1e6' : v === null ? '–' : whole ? String(v) : number(v));
-    return row(cell(name), ...values.map((v) => cell(text(v))), cell(difference(...values)));
+    const bad = (v) => (name === 'gain margin' && v !== null && v < 1 ? 'bad' : '');
+    return row(cell(name), ...values.map((v) => cell(text(v), bad(v))), cell(difference(...values)));
   }));
-  const limits = kDesigns.map((name, i) => [a, b][i] && [a, b][i].limit && `${name.toUpperCase()} is limited by a motion at ${number([a, b][i].limit.frequency, 3)} rad/s` +
-    `${[a, b][i].limit.joint ? `, most of it in ${[a, b][i].limit.joint}` : ''}`).filter(Boolean);
-  $('limits').textContent = limits.map((text) => `${text}.`).join(' ');
+  $('limits').textContent = kDesigns.flatMap((name) => loopWords(name.toUpperCase(), answer(name))).map((text) => `${text}.`).join(' ');
   const different = armDifference();
   $('arms').textContent = different.length ? `A and B are on different arms: ${different.join(', ')}.` : '';
   tellRefused();
   tellChips();
   tellArrows();
   tellText();
+}
+
+const unstable = ({gain_margin: margin}) => margin !== null && margin < 1;
+/// What is to be said of the sampled loop of a design, and of its ratio there.
+function loopWords(name, found) {
+  if (!found) return [];
+  const {limit, damping_level: level} = found;
+  return [unstable(found) && `${name} is unstable in the sampled loop, so that its ratios and its motion are none that an arm would show`,
+    level && !level.kept && `No share of the ratio of ${name} leaves the loop the margin asked for: its springs are too stiff, or the ratio too small for them`,
+    level && level.share < 0.995 && `The ratio of ${name} is lowered to ${number(100 * level.share, 2)} % where the loop bears least`,
+    limit && `${name} is limited by a motion at ${number(limit.frequency, 3)} rad/s${limit.joint ? `, most of it in ${limit.joint}` : ''}`].filter(Boolean);
 }
 
 /// What is to be said of joints outside their limits.
@@ -320,7 +333,7 @@ function tellArrows() {
   if (pick.options.length !== names.length + 1) {
     pick.replaceChildren(...['smallest', ...names].map((name) => new Option(name === 'smallest' ? 'the smallest ratio' : `mode ${name}`, name)));
   }
-  $('arrow_note').textContent = sensitivity ? 'change by a step: a quarter of a damping, a tenth of a stiffness; click to take it, with Shift the other way' : 'not for gears that bend, and gains times inertia';
+  $('arrow_note').textContent = sensitivity ? 'change by a step: a quarter of a damping, a tenth of a stiffness; click to take it, with Shift the other way' : 'not for gains times inertia';
   let chosen = Number(pick.value) - 1;
   if (pick.value === 'smallest' && mine) {
     chosen = mine.modes.reduce((best, mode, i) => (mode.damping_ratio !== null && (best < 0 || mode.damping_ratio < mine.modes[best].damping_ratio) ? i : best), -1);

@@ -89,8 +89,11 @@ export function partFields(edit, design, setup) {
   };
   const joints = (key, label, unit, none) => list(edit, {label, key, unit, count: n, none, get: () => arm()[key] || null, set: (x) => set(key, x)});
   const loaded = setup.robot.keys;
-  const payload = () => arm().payload || {mass: setup.model.payload, center: (loaded.payload || {center: [0, 0, 0]}).center};
-  const fields = [slider(edit, {label: 'payload', key: 'payload', unit: 'kg', low: 0, high: 20, get: () => payload().mass, set: (x) => set('payload', {...payload(), mass: x})}),
+  const carried = {mass: setup.model.payload, center: [0, 0, 0], ...loaded.payload}, payload = () => arm().payload || carried;
+  /// Another mass with the same radii of gyration.
+  const massOf = (mass) => ({...payload(), mass, ...(carried.inertia && {inertia: carried.inertia.map((line) => line.map((x) => x * mass / carried.mass))})});
+  const fields = [slider(edit, {label: `payload${carried.inertia ? ', its inertia grows with it' : ''}`, key: 'payload', unit: 'kg', low: 0, high: 20,
+    get: () => payload().mass, set: (x) => set('payload', massOf(x))}),
     list(edit, {label: 'its centre', key: 'payload', unit: 'm', count: 3, get: () => payload().center, set: (x) => set('payload', {...payload(), center: x || [0, 0, 0]})}),
     joints('reflected_inertia', 'rotors', 'kg m²')];
   if (setup.published) {

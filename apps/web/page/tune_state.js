@@ -90,11 +90,11 @@ export async function post(token, path, body) {
   }
 }
 
-/// The numbers of many postures for the designs, a part at a time, so that a slider never waits for
-/// more than one part; a design that changes begins again.
+/// The numbers of many postures for the designs, a part at a time, and none while something moves: a
+/// slider waits for one part at most. A design that changes begins again.
 export class Workspace {
   constructor(token, changed) {
-    Object.assign(this, {token, changed, found: {}, asked: {}, busy: false, part: 25});
+    Object.assign(this, {token, changed, found: {}, asked: {}, busy: false, part: 25, moved: -Infinity});
   }
   look(designs) {
     for (const [name, design] of Object.entries(designs)) {
@@ -110,17 +110,18 @@ export class Workspace {
     this.busy = true;
     const open = () => Object.keys(this.found).find((name) => this.found[name].postures < Workspace.kPostures && !this.found[name].error);
     for (let name = open(); name; name = open()) {
+      for (let left; (left = this.moved + Workspace.kRest - performance.now()) > 0;) await new Promise((done) => setTimeout(done, left));
       const found = this.found[name];
       const count = Math.min(this.part, Workspace.kPostures - found.postures), began = performance.now();
       const body = `{"design":${this.asked[name]},"seed":1,"first":${found.postures},"count":${count}}`;
       const part = await post(this.token, '/workspace', body);
       // As many as take about 20 ms: a long delay of the loop makes each slower.
-      this.part = Math.round(Math.min(Workspace.kPart, Math.max(5, count * 20 / (performance.now() - began))));
+      this.part = Math.round(Math.min(Workspace.kPart, Math.max(2, count * 20 / (performance.now() - began))));
       if (this.found[name] !== found) continue;  // of a design that has changed
       if (part.error) {
         found.error = part.error;
       } else {
-        found.postures += count;
+        found.postures += part.count;
         for (const key of ['smallest_ratio', 'gain_margin']) {
           found[key].push(...part[key].filter((x) => x !== null));
           const worst = part.worst[key];
@@ -135,3 +136,4 @@ export class Workspace {
 }
 Workspace.kPostures = 2000;
 Workspace.kPart = 100;
+Workspace.kRest = 150;  // ms

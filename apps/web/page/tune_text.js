@@ -9,7 +9,7 @@ const short = (value) => (!value ? null : isDiagonal(value) ? diagonal(asRows(va
 const kAxes = ['x', 'y', 'z'];
 
 /// Stiffness and damping that act: half a quaternion's stiffness halved, a factor or ratio as the
-/// matrix that it makes; null where the damping is not one matrix.
+/// matrix that it makes.
 const acting = ({answer}) => answer.gains;
 function nullDamping(design) {
   if (Array.isArray(design.null_damping)) return design.null_damping;
@@ -175,7 +175,8 @@ function python(of) {
     gains.push(`null_stiffness=${JSON.stringify(design.null_stiffness)}`,
       design.null_damping.ratio ? `null_damping_ratio=${design.null_damping.ratio}` : `null_damping=${JSON.stringify(nullDamping(design))}`, `frame="${design.frame || 'base'}"`);
   }
-  return notes([design.null_projector === 'kinematic' && design.null_stiffness.some(Boolean) && 'Here the null space has the dynamically consistent projector.',
+  return notes([design.null_projector === 'kinematic' && design.null_stiffness.some(Boolean) && 'Here the null space has the dynamically consistent projector: the modes differ from those on the page.',
+    answer.damping_level && answer.damping_level.share < 1 && 'The sampled loop leaves less of the ratio, which this call does not count: the modes differ from those on the page.',
     ...answer.refused.map(({key, reason}) => `refused: ${key}: ${reason}`)]) +
     `import dashpot\n\nrobot = dashpot.Robot.from_urdf(${from})\nmodes = dashpot.closed_loop(robot, ${JSON.stringify(q)},\n    ${gains.join(',\n    ')}).modes\nprint(modes)\n`;
 }

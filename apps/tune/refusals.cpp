@@ -1,0 +1,67 @@
+#include <dashpot/apps/tune/tuned_loop.hpp>
+#include <dashpot/controller/controller.hpp>
+#include <dashpot/controller/gain_judge.hpp>
+#include <dashpot/controller/rotors.hpp>
+#include <dashpot/controller/setpoint_check.hpp>
+#include <dashpot/controller/settings_check.hpp>
+
+#include <algorithm>
+#include <sstream>
+
+namespace dashpot::apps {
+namespace {
+
+nlohmann::ordered_json refusal_json(const std::string& key, const std::string& reason) {
+  return {{"key", key}, {"reason", reason}};
+}
+
+}  // namespace
+
+nlohmann::ordered_json refusals(const TunedArm& arm, const TunedDesign& design,
+                                const controller::JointVector& q) {
+  nlohmann::ordered_json result = nlohmann::ordered_json::array();
+  const controller::Gains& gains = design.settings.initial.gains;
+  const bool null_space = !gains.null_stiffness.isZero(0) || !gains.null_damping.isZero(0);
+  if (design.stated.kinematic_null_space && null_space) {
+    result.push_back(refusal_json(
+        "null_projector", "Dashpot's controller has the dynamically consistent projector alone"));
+  }
+  if (design.stated.inertia_blocks) {
+    result.push_back(refusal_json(
+        "inertia_blocks", "Dashpot's controller does not multiply gains by the tip's inertia"));
+    return result;
+  }
+  for (const controller::Mode mode : {controller::Mode::kJoint, controller::Mode::kCartesian}) {
+    const auto fault = controller::check_gains(gains, mode, arm.model().dof());
+    if (fault) result.push_back(refusal_json(fault.key, fault.reason));
+  }
+  if (!result.empty()) return result;
+  try {
+    controller::Settings settings = design.settings;
+    settings.analysis.where = controller::Analysis::Where::kOff;
+    settings.analysis.sampled.interval = 0;
+    (void)controller::Controller(arm.model(), settings);
+  } catch (const controller::InvalidSettings& error) {
+    result.push_back(refusal_json(error.key(), error.what()));
+    return result;
+  }
+  if (design.stated.period == 0) return result;
+  const controller::GainJudge::Verdict verdict =
+      controller::GainJudge(arm.model(), design.settings).judge(q, gains);
+  const double asked =
+      verdict.dropped ? controller::GainJudge::kDropped : design.settings.limits.gain_margin;
+  if (verdict.margin < std::min(asked, design.settings.limits.gain_margin)) {
+    std::ostringstream text;
+    text.precision(3);
+    text << "with the " << (verdict.mode == controller::Mode::kJoint ? "joint" : "task")
+         << " gains the sampled loop " << (verdict.margin < 1 ? "is unstable here, with" : "has")
+         << " a gain margin of " << verdict.margin << (verdict.margin < 1 ? "" : " here")
+         << (verdict.dropped ? " once the payload is dropped, " : ", ") << asked << " is asked for";
+    const std::string missing = controller::missing_rotors_text(arm.model());
+    if (!missing.empty()) text << "; " << missing;
+    result.push_back(refusal_json("gain_margin", text.str()));
+  }
+  return result;
+}
+
+}  // namespace dashpot::apps
