@@ -115,6 +115,18 @@ struct CloseBlocks {
 CloseBlocks newton_step(const BlockEigenbasis& basis, const TrackedResidual& residual,
                         double roundoff_bound, PackedMatrix& E, double& size) noexcept;
 
+/// Separates two blocks that Newton's method cannot tell apart, by dividing the space of their
+/// columns into two invariant planes again (a plane and a line with a zero mode, lines of two).
+/// In the division that is chosen, each new block has most of the old one whose index it gets. In
+/// a basis of one side the blocks are orthonormal, and of real eigenvalues the two of opposite sign
+/// characteristic that are nearest each other share a block, because only such a pair can meet and
+/// turn complex. Zero modes of such a basis are separated all at once.
+///
+/// `residual` belongs to the basis, at least nearly. Returns false, and does not change the basis,
+/// where no well-conditioned columns separate the blocks: a defective eigenvalue of two modes.
+bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
+                     BlockEigenbasis& basis) noexcept;
+
 /// Computes Z <- Z (I + E). The other side becomes Y <- Sigma (I - Sigma R - E) Sigma Y: Y S Z =
 /// Sigma then holds to second order. That overwrites MV and image of the residual.
 void take_step(const PackedMatrix& E, TrackedResidual& residual, BlockEigenbasis& basis) noexcept;
