@@ -43,7 +43,7 @@ class BasisFromEigenvectors {
       const bool found = core_.find(cluster_, cluster_ <= kCluster, work_);
       if (work_.over()) return Status::kUnfinished;
       if (!found) return Status::kNotConverged;
-      for (int i = 0; i < core_.size() && !work_.over(); ++i) write_cluster_of(i);
+      for (int i = 0; i < core_.items().size() && !work_.over(); ++i) write_cluster_of(i);
       if (work_.over()) return Status::kUnfinished;
     }
     write_free_zeros();
@@ -170,15 +170,15 @@ void BasisFromEigenvectors<N>::write_leftover_zeros() {
 /// Writes the cluster whose first item this is.
 template <int N>
 void BasisFromEigenvectors<N>::write_cluster_of(int first) {
-  const int cluster = core_[first].cluster;
+  const int cluster = core_.items()[first].cluster;
   int members = 0;
   Eigen::Index size = 0;
   Complex mean = 0;
   bool near_axis = false;
-  for (int i = 0; i < core_.size(); ++i) {
-    if (core_[i].cluster != cluster) continue;
+  for (int i = 0; i < core_.items().size(); ++i) {
+    if (core_.items()[i].cluster != cluster) continue;
     if (i < first) return;  // written already
-    const Complex value = core_[i].value;
+    const Complex value = core_.items()[i].value;
     ++members;
     size += value.imag() == 0 ? 1 : 2;
     mean += value;
@@ -186,9 +186,10 @@ void BasisFromEigenvectors<N>::write_cluster_of(int first) {
   }
   mean /= static_cast<double>(members);
   bool equal_rates = true;
-  for (int i = 0; i < core_.size(); ++i) {
-    if (core_[i].cluster != cluster) continue;
-    equal_rates &= core_[i].zero_rate && modulus(core_[i].value - mean) <= core_.rounding();
+  for (int i = 0; i < core_.items().size(); ++i) {
+    if (core_.items()[i].cluster != cluster) continue;
+    equal_rates &=
+        core_.items()[i].zero_rate && modulus(core_.items()[i].value - mean) <= core_.rounding();
   }
   if (equal_rates) {
     write_zero_rates(mean.real(), size);
@@ -212,8 +213,8 @@ void BasisFromEigenvectors<N>::write_cluster(int cluster, int members, Eigen::In
                                       cubed(size, 60) + cubed(A.rows(), 4) + 5000;
   if (!work_.take(splitting_work)) return;
   ComplexStateVector<N> values(members);
-  for (int i = 0, next = 0; i < core_.size(); ++i) {
-    if (core_[i].cluster == cluster) values[next++] = core_[i].value;
+  for (int i = 0, next = 0; i < core_.items().size(); ++i) {
+    if (core_.items()[i].cluster == cluster) values[next++] = core_.items()[i].value;
   }
   const State<N> AS = A * S;
   const SplitCluster<N> split = split_cluster<N>(S.transpose() * AS, values, mean, coinciding_);
