@@ -11,10 +11,6 @@
 namespace dashpot::analysis {
 namespace {
 
-/// Steps this small leave eigenvectors right to their square once they are taken.
-constexpr double kLastStep = 1e-7;
-/// Below this, nothing but rounding errors is left to improve.
-constexpr double kConverged = 1e-9;
 /// Steps this small that do not get smaller are rounding errors: modes near each other can be told
 /// apart no better.
 constexpr double kStalled = 1e-3;
@@ -25,12 +21,6 @@ constexpr double kStalledBound = 1e-6;
 constexpr double kBuried = 1e-6, kFarApart = 1e-6;
 /// Units of Work of separating two blocks.
 constexpr std::int64_t kPartingWork = 60'000;
-
-/// Work of evaluating a basis, and of the step that follows.
-std::int64_t iteration_work(const BlockEigenbasis& basis) {
-  const std::int64_t left = basis.two_sided ? cubed(basis.columns(), 6) : 0;
-  return cubed(basis.columns(), 16) + squared(basis.columns(), 130) + left;
-}
 
 /// Work of the enclosure, the modes and their shapes, of n joints.
 std::int64_t publishing_work(int n) {
@@ -246,8 +236,7 @@ ModeTracker::Verdict ModeTracker::judge(const SymmetricPencil& pencil, double si
   enclose(pencil, basis_, residual_, enclosure_);
   if (!read(out)) return Verdict::kGiveUp;
   const double worst = worst_bound(out);
-  // Without symmetry rounding errors are the greater part of a bound after the last step.
-  const bool last = size <= (basis_.two_sided ? kLastStep : kConverged);
+  const bool last = size <= basis_.converged();
   if (basis_.two_sided && last && worst > kStalledBound) return Verdict::kGiveUp;
   const bool converged = last || (stalled && worst <= kStalledBound);
   const bool buried =
