@@ -281,7 +281,7 @@ ComplexVector<N> ModeExtractor<N>::left_shape(const Block& block, const Complex&
 /// Writes shapes[which] and left_shapes[which] of a mode: the eigenvectors to the eigenvalue mu
 /// (1/s) of a block of the basis. Its backward error and condition number become those of this
 /// pair, if they are larger.
-// Errors do not depend on lengths, and so the sums are those of vectors as they come.
+/// Errors do not depend on lengths, and so the sums are those of vectors as they come.
 template <int N>
 void ModeExtractor<N>::write_shape(const Block& block, const Complex& mu, std::size_t which,
                                    Mode<N>& mode) const {
