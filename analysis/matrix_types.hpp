@@ -11,8 +11,11 @@
 #endif
 
 #include <Eigen/Core>
+#include <array>
 #include <cmath>
 #include <complex>
+#include <type_traits>
+#include <vector>
 
 #ifdef __FAST_MATH__
 #error "the error bounds rest on IEEE arithmetic: compile without -ffast-math"
@@ -55,5 +58,34 @@ using State =
 /// k, k <= 2n
 template <int N>
 using StateVector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kTwice<N>, 1>;
+
+/// A list of at most `Capacity` items that allocates only when this is kDynamic.
+template <class T, int Capacity>
+class BoundedList {
+ public:
+  void clear() { size_ = 0; }
+  void resize(int size) {
+    size_ = size;
+    if constexpr (Capacity == kDynamic) items_.resize(static_cast<std::size_t>(size));
+  }
+  void push_back(const T& item) {
+    resize(size_ + 1);
+    (*this)[size_ - 1] = item;
+  }
+  int size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  const T& operator[](Eigen::Index i) const { return items_[static_cast<std::size_t>(i)]; }
+  T& operator[](Eigen::Index i) { return items_[static_cast<std::size_t>(i)]; }
+  const T* begin() const { return items_.data(); }
+  const T* end() const { return items_.data() + size_; }
+  T* begin() { return items_.data(); }
+  T* end() { return items_.data() + size_; }
+
+ private:
+  std::conditional_t<Capacity == kDynamic, std::vector<T>,
+                     std::array<T, static_cast<std::size_t>(Capacity == kDynamic ? 1 : Capacity)>>
+      items_;
+  int size_ = 0;
+};
 
 }  // namespace dashpot::analysis

@@ -3,8 +3,6 @@
 
 #include <array>
 #include <limits>
-#include <type_traits>
-#include <vector>
 
 namespace dashpot::analysis {
 
@@ -74,28 +72,7 @@ struct Mode : ModeNumbers {
   std::array<int, 2> columns{};
 };
 
-/// A list of at most N modes that allocates only when N is kDynamic.
 template <int N>
-class ModeList {
- public:
-  void resize(int size) {
-    size_ = size;
-    if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(size));
-  }
-  int size() const { return size_; }
-  bool empty() const { return size_ == 0; }
-  const Mode<N>& operator[](int i) const { return items_[static_cast<std::size_t>(i)]; }
-  Mode<N>& operator[](int i) { return items_[static_cast<std::size_t>(i)]; }
-  const Mode<N>* begin() const { return items_.data(); }
-  const Mode<N>* end() const { return items_.data() + size_; }
-  Mode<N>* begin() { return items_.data(); }
-  Mode<N>* end() { return items_.data() + size_; }
-
- private:
-  std::conditional_t<N == kDynamic, std::vector<Mode<N>>,
-                     std::array<Mode<N>, static_cast<std::size_t>(N == kDynamic ? 1 : N)>>
-      items_;
-  int size_ = 0;
-};
+using ModeList = BoundedList<Mode<N>, N>;
 
 }  // namespace dashpot::analysis

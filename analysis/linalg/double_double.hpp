@@ -86,10 +86,6 @@ constexpr DoubleDouble& operator+=(DoubleDouble& a, const DoubleDouble& b) {
 constexpr DoubleDouble& operator+=(DoubleDouble& a, double b) {
   return a = a + b;
 }
-constexpr DoubleDouble& operator-=(DoubleDouble& a, const DoubleDouble& b) {
-  return a = a - b;
-}
-
 /// A sum of products, each exact and added with about 32 digits:
 ///     DotAccumulator sum;  sum.add(a1, b1);  sum.add(a2, b2);  sum.value()
 class DotAccumulator {

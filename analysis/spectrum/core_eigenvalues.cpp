@@ -1,6 +1,6 @@
 #include <dashpot/analysis/base/arithmetic.hpp>
+#include <dashpot/analysis/linalg/cluster_separation.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
-#include <dashpot/analysis/spectrum/cluster_split.hpp>
 #include <dashpot/analysis/spectrum/core_eigenvalues.hpp>
 
 #include <algorithm>
@@ -101,15 +101,14 @@ template <int N>
 bool CoreEigenvalues<N>::find_items(Work& work) noexcept {
   const Eigen::Index size = A_.rows();
   ComplexStateVector<N> values(size);
-  if constexpr (N == kDynamic) items_.resize(static_cast<std::size_t>(size));
   if (!find_eigenvalues<N>(A_, values, work) || !replace_slow(values, work)) return false;
-  size_ = 0;
+  items_.clear();
   Eigen::Index columns = 0;
   for (Complex& value : values) {
     // Rounding may have made a pair of equal rates of several zero modes.
     if (coupled_zeros_ > 1 && std::abs(value.imag()) <= rounding()) value = value.real();
     if (value.imag() < 0) continue;
-    item(size_++) = {value};
+    items_.push_back({value});
     columns += value.imag() == 0 ? 1 : 2;
   }
   return columns == size;  // not so, if rounding has left one of a pair, or no number
@@ -119,18 +118,18 @@ bool CoreEigenvalues<N>::find_items(Work& work) noexcept {
 template <int N>
 void CoreEigenvalues<N>::find_clusters(double cluster, bool rates_apart) noexcept {
   constexpr double kApart = 1e6;  // rounding errors, which leave the vectors enough digits
-  for (int i = 0; i < size_; ++i) {
-    item(i).cluster = i;
+  for (int i = 0; i < items_.size(); ++i) {
+    items_[i].cluster = i;
     for (int j = 0; j < i; ++j) {
-      const double larger = std::max(modulus(item(i).value), modulus(item(j).value));
+      const double larger = std::max(modulus(items_[i].value), modulus(items_[j].value));
       double width = cluster * larger;
-      if (rates_apart && (item(i).zero_rate || item(j).zero_rate)) {
+      if (rates_apart && (items_[i].zero_rate || items_[j].zero_rate)) {
         width = std::min(width, kApart * rounding());
       }
-      if (modulus(item(i).value - item(j).value) > width) continue;
-      const int from = item(i).cluster, to = item(j).cluster;
+      if (modulus(items_[i].value - items_[j].value) > width) continue;
+      const int from = items_[i].cluster, to = items_[j].cluster;
       for (int k = 0; k <= i; ++k) {
-        if (item(k).cluster == from) item(k).cluster = to;
+        if (items_[k].cluster == from) items_[k].cluster = to;
       }
     }
   }
@@ -176,22 +175,22 @@ bool CoreEigenvalues<N>::mark_zero_rates(Work& work) noexcept {
   const Square<N> directions = unsprung();
   // Without symmetry rounding errors move an eigenvalue farther.
   const double still = form_.symmetric ? rounding() : 100 * rounding();
-  StateVector<N> score = StateVector<N>::Constant(size_, -1);  // -1: not eligible
-  for (int i = 0; i < size_; ++i) {
-    if (item(i).value.imag() != 0) continue;
-    const StateVector<N> z = vector(item(i).value.real(), work);
+  StateVector<N> score = StateVector<N>::Constant(items_.size(), -1);  // -1: not eligible
+  for (int i = 0; i < items_.size(); ++i) {
+    if (items_[i].value.imag() != 0) continue;
+    const StateVector<N> z = vector(items_[i].value.real(), work);
     const double kinetic = z.tail(c_).squaredNorm();  // of a total energy of 1
     const double share = (directions.transpose() * z.tail(c_)).squaredNorm();
     score[i] = form_.symmetric ? share / kinetic + (kinetic > 0.5 ? 1 : 0) : share;
     const bool alone = z.tail(c_ - m_).squaredNorm() > kAlone * kinetic;
-    if (alone && modulus(item(i).value) <= still) score[i] += 2;
+    if (alone && modulus(items_[i].value) <= still) score[i] += 2;
   }
   double least = 0;
   for (int wanted = coupled_zeros_; wanted > 0; --wanted) {
     Eigen::Index best = 0;
     least = score.maxCoeff(&best);
     if (least < 0) return false;
-    CoreEigenvalue& found = item(static_cast<int>(best));
+    CoreEigenvalue& found = items_[best];
     found.zero_rate = true;
     if (modulus(found.value) <= rounding()) found.value = 0;
     score[best] = -1;

@@ -3,9 +3,7 @@
 #include <dashpot/analysis/system/energy_form.hpp>
 #include <dashpot/analysis/work.hpp>
 
-#include <array>
 #include <type_traits>
-#include <vector>
 
 namespace dashpot::analysis {
 
@@ -52,8 +50,7 @@ class CoreEigenvalues {
   /// Returns false if the iteration fails or `work` does not grant it.
   bool find(double cluster, bool rates_apart, Work& work) noexcept;
 
-  int size() const { return size_; }
-  const CoreEigenvalue& operator[](int i) const { return items_[static_cast<std::size_t>(i)]; }
+  const BoundedList<CoreEigenvalue, kTwice<N>>& items() const { return items_; }
 
   const State<N>& matrix() const { return A_; }
   /// Rounding errors of eigenvalues (1/s): rates of zero modes that are no farther from each other
@@ -64,7 +61,6 @@ class CoreEigenvalues {
   StateVector<N> vector(double value, Work& work) const noexcept;
 
  private:
-  CoreEigenvalue& item(int i) { return items_[static_cast<std::size_t>(i)]; }
   bool find_items(Work& work) noexcept;
   bool replace_slow(ComplexStateVector<N>& values, Work& work) noexcept;
   void find_clusters(double cluster, bool rates_apart) noexcept;
@@ -76,11 +72,7 @@ class CoreEigenvalues {
   Eigen::Index m_, c_;
   State<N> A_;
   double A_norm_ = 0;
-  std::conditional_t<
-      N == kDynamic, std::vector<CoreEigenvalue>,
-      std::array<CoreEigenvalue, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
-      items_;
-  int size_ = 0;
+  BoundedList<CoreEigenvalue, kTwice<N>> items_;
 };
 
 }  // namespace dashpot::analysis

@@ -1,10 +1,6 @@
 #pragma once
 #include <dashpot/analysis/matrix_types.hpp>
 
-#include <array>
-#include <type_traits>
-#include <vector>
-
 namespace dashpot::analysis {
 
 /// One invariant subspace of the system: columns [first, first + size) of the basis.
@@ -20,30 +16,8 @@ struct Block {
   bool zero_mode = false;
 };
 
-/// A list of at most 2 N blocks that allocates only when N is kDynamic.
 template <int N>
-class BlockList {
- public:
-  void clear() { size_ = 0; }
-  void push_back(const Block& block) {
-    const auto next = static_cast<std::size_t>(size_++);
-    if constexpr (N == kDynamic) {
-      if (items_.size() <= next) items_.resize(next + 1);
-    }
-    items_[next] = block;
-  }
-  int size() const { return size_; }
-  const Block& operator[](int i) const { return items_[static_cast<std::size_t>(i)]; }
-  Block& operator[](int i) { return items_[static_cast<std::size_t>(i)]; }
-  const Block* begin() const { return items_.data(); }
-  const Block* end() const { return items_.data() + size_; }
-
- private:
-  std::conditional_t<N == kDynamic, std::vector<Block>,
-                     std::array<Block, static_cast<std::size_t>(N == kDynamic ? 1 : 2 * N)>>
-      items_;
-  int size_ = 0;
-};
+using BlockList = BoundedList<Block, kTwice<N>>;
 
 /// A real basis of the 2n-dimensional state space (q, q') in which the system is block diagonal
 /// with small blocks. With U (n x 2n) and the block-diagonal Lambda (2n x 2n),

@@ -13,12 +13,4 @@ void read_modes(const System<N>& system, const BasisResidual<N>& residual,
                 const BlockEnclosure<N>& enclosure, double soft_frequency,
                 Spectrum<N>& spectrum) noexcept;
 
-/// Quality of a spectrum, at its worst mode.
-struct Quality {
-  double bound = 0;  ///< error bound / (|lambda_1| + |lambda_2|); infinite if one is missing
-  double backward_error = 0;
-};
-template <int N>
-Quality worst_quality(const Spectrum<N>& spectrum) noexcept;
-
 }  // namespace dashpot::analysis

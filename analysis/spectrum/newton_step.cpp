@@ -140,8 +140,8 @@ template double block_separation<kDynamic>(const State<kDynamic>&, const Block&,
                                            const Block&) noexcept;
 template double block_separation<kMaxDof>(const State<kMaxDof>&, const Block&,
                                           const Block&) noexcept;
-template std::int64_t sylvester_work(const BlockList<kDynamic>&) noexcept;
-template std::int64_t sylvester_work(const BlockList<kMaxDof>&) noexcept;
+template std::int64_t sylvester_work<kDynamic>(const BlockList<kDynamic>&) noexcept;
+template std::int64_t sylvester_work<kMaxDof>(const BlockList<kMaxDof>&) noexcept;
 template void newton_step(const BasisResidual<kDynamic>&, ModalBasis<kDynamic>&) noexcept;
 template void newton_step(const BasisResidual<kMaxDof>&, ModalBasis<kMaxDof>&) noexcept;
 template double solve_sylvester<kDynamic>(const Eigen::Ref<const State<kDynamic>>&,

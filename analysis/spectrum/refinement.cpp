@@ -1,6 +1,6 @@
 #include <dashpot/analysis/base/arithmetic.hpp>
+#include <dashpot/analysis/linalg/double_double.hpp>
 #include <dashpot/analysis/linalg/small_dense.hpp>
-#include <dashpot/analysis/spectrum/extended_residual.hpp>
 #include <dashpot/analysis/spectrum/refinement.hpp>
 
 #include <limits>
@@ -175,6 +175,73 @@ void gram_defect(const System<N>& system, bool extended, const ModalBasis<N>& ba
   weigh<N>(basis.weight, basis.blocks, E);
   E.diagonal().array() -= 1;
   E = E.cwiseAbs() + error;
+}
+
+/// n x 2n
+template <int N>
+using WideDoubleDouble =
+    Eigen::Matrix<DoubleDouble, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, N, kTwice<N>>;
+
+/// X Lambda in double-double arithmetic, X(i, j) giving doubles or double-doubles.
+template <int N, typename Left>
+WideDoubleDouble<N> times_blocks_extended(const Left& X, const ModalBasis<N>& basis) {
+  const Eigen::Index n = basis.U.rows();
+  WideDoubleDouble<N> out(n, 2 * n);
+  for (const Block& b : basis.blocks) {
+    for (Eigen::Index j = b.first; j < b.first + b.size; ++j) {
+      for (Eigen::Index i = 0; i < n; ++i) {
+        DotAccumulator sum;
+        for (Eigen::Index k = b.first; k < b.first + b.size; ++k)
+          sum.add(X(i, k), basis.Lambda(k, j));
+        out(i, j) = sum.value();
+      }
+    }
+  }
+  return out;
+}
+
+/// Sets R = K U + C U Lambda + M U Lambda^2 (n x 2n) and the Gram matrix
+/// Y' (C U + M U Lambda) + (Y Gamma)' M U (2n x 2n) of a basis, in double-double arithmetic,
+/// rounded once at the end. `YG` is Y Gamma. R and gram have their sizes already.
+template <int N>
+void evaluate_extended(const System<N>& system, const ModalBasis<N>& basis, const Wide<N>& YG,
+                       Wide<N>& R, State<N>& gram) {
+  const Eigen::Index n = system.dof();
+  const WideDoubleDouble<N> V = times_blocks_extended<N>(basis.U, basis);
+  const WideDoubleDouble<N> A = times_blocks_extended<N>(V, basis);
+  WideDoubleDouble<N> momentum(n, 2 * n), tested(n, 2 * n);
+  for (Eigen::Index j = 0; j < 2 * n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) {
+      DotAccumulator row, p, t;
+      for (Eigen::Index k = 0; k < n; ++k) {
+        const double u = basis.U(k, j);
+        row.add(u, system.stiffness(i, k));
+        row.add(V(k, j), system.damping(i, k));
+        row.add(A(k, j), system.mass(i, k));
+        p.add(u, system.mass(i, k));
+        t.add(u, system.damping(i, k));
+        t.add(V(k, j), system.mass(i, k));
+        if (system.has_low_words) {
+          row.add(u, system.stiffness_low(i, k));
+          row.add(V(k, j), system.damping_low(i, k));
+          t.add(u, system.damping_low(i, k));
+        }
+      }
+      R(i, j) = row.value().high;
+      momentum(i, j) = p.value();
+      tested(i, j) = t.value();
+    }
+  }
+  for (Eigen::Index j = 0; j < 2 * n; ++j) {
+    for (Eigen::Index i = 0; i < 2 * n; ++i) {
+      DotAccumulator sum;
+      for (Eigen::Index k = 0; k < n; ++k) {
+        sum.add(tested(k, j), basis.Y(k, i));
+        sum.add(momentum(k, j), YG(k, i));
+      }
+      gram(i, j) = sum.value().high;
+    }
+  }
 }
 
 /// Gram matrix and residual for the left basis (Y, Gamma), the blocks' weights, and the bound E.

@@ -44,7 +44,7 @@ std::int64_t form_work(Eigen::Index n) {
 /// Work of enclose and read_modes; blocks of more than two columns have an iteration of their own.
 template <int N>
 std::int64_t reading_work(Eigen::Index n, const BlockList<N>& blocks) {
-  std::int64_t units = squared(n, 1500) + cubed(n, 20) + sylvester_work(blocks);
+  std::int64_t units = squared(n, 1500) + cubed(n, 20) + sylvester_work<N>(blocks);
   for (const Block& block : blocks) {
     if (block.size > 2) units += cubed(block.size, 60) + squared(block.size, 1500);
   }
@@ -63,7 +63,23 @@ bool computable(const EnergyForm<N>& form) {
 /// Work of a Newton step.
 template <int N>
 std::int64_t step_work(Eigen::Index n, const BlockList<N>& blocks) {
-  return cubed(n, 180) + 3 * sylvester_work(blocks);
+  return cubed(n, 180) + 3 * sylvester_work<N>(blocks);
+}
+
+/// Quality of a spectrum, at its worst mode.
+struct Quality {
+  double bound = 0;  ///< error bound / (|lambda_1| + |lambda_2|); infinite if one is missing
+  double backward_error = 0;
+};
+
+template <int N>
+Quality worst_quality(const Spectrum<N>& spectrum) {
+  Quality worst;
+  for (const Mode<N>& mode : spectrum.modes) {
+    worst.bound = std::max(worst.bound, relative_bound(mode));
+    worst.backward_error = std::max(worst.backward_error, mode.backward_error);
+  }
+  return worst;
 }
 
 bool is_better(const Quality& a, const Quality& b) {

@@ -43,7 +43,7 @@ class BasisFromEigenvectors {
       const bool found = core_.find(cluster_, cluster_ <= kCluster, work_);
       if (work_.over()) return Status::kUnfinished;
       if (!found) return Status::kNotConverged;
-      for (int i = 0; i < core_.size() && !work_.over(); ++i) write_cluster_of(i);
+      for (int i = 0; i < core_.items().size() && !work_.over(); ++i) write_cluster_of(i);
       if (work_.over()) return Status::kUnfinished;
     }
     write_free_zeros();
@@ -170,15 +170,15 @@ void BasisFromEigenvectors<N>::write_leftover_zeros() {
 /// Writes the cluster whose first item this is.
 template <int N>
 void BasisFromEigenvectors<N>::write_cluster_of(int first) {
-  const int cluster = core_[first].cluster;
+  const int cluster = core_.items()[first].cluster;
   int members = 0;
   Eigen::Index size = 0;
   Complex mean = 0;
   bool near_axis = false;
-  for (int i = 0; i < core_.size(); ++i) {
-    if (core_[i].cluster != cluster) continue;
+  for (int i = 0; i < core_.items().size(); ++i) {
+    if (core_.items()[i].cluster != cluster) continue;
     if (i < first) return;  // written already
-    const Complex value = core_[i].value;
+    const Complex value = core_.items()[i].value;
     ++members;
     size += value.imag() == 0 ? 1 : 2;
     mean += value;
@@ -186,9 +186,10 @@ void BasisFromEigenvectors<N>::write_cluster_of(int first) {
   }
   mean /= static_cast<double>(members);
   bool equal_rates = true;
-  for (int i = 0; i < core_.size(); ++i) {
-    if (core_[i].cluster != cluster) continue;
-    equal_rates &= core_[i].zero_rate && modulus(core_[i].value - mean) <= core_.rounding();
+  for (int i = 0; i < core_.items().size(); ++i) {
+    if (core_.items()[i].cluster != cluster) continue;
+    equal_rates &=
+        core_.items()[i].zero_rate && modulus(core_.items()[i].value - mean) <= core_.rounding();
   }
   if (equal_rates) {
     write_zero_rates(mean.real(), size);
@@ -204,16 +205,18 @@ template <int N>
 void BasisFromEigenvectors<N>::write_cluster(int cluster, int members, Eigen::Index size,
                                              Complex mean, bool near_axis) {
   const int steps = cluster_ > kCluster ? 40 : kSteps;  // wide clusters part slowly from the rest
-  const State<N> S = invariant_subspace<N>(core_.matrix(), mean, near_axis, size, steps, work_);
+  const State<N>& A = core_.matrix();
+  const Complex shift = near_axis ? mean.real() : mean;
+  const State<N> S = invariant_subspace<N>(A, shift, shift, size, steps, work_);
   // To split the cluster: inverse iterations for each member, and products.
   const std::int64_t splitting_work = members * (cubed(size, 24) + squared(size, 240) + 900) +
-                                      cubed(size, 60) + cubed(core_.matrix().rows(), 4) + 5000;
+                                      cubed(size, 60) + cubed(A.rows(), 4) + 5000;
   if (!work_.take(splitting_work)) return;
   ComplexStateVector<N> values(members);
-  for (int i = 0, next = 0; i < core_.size(); ++i) {
-    if (core_[i].cluster == cluster) values[next++] = core_[i].value;
+  for (int i = 0, next = 0; i < core_.items().size(); ++i) {
+    if (core_.items()[i].cluster == cluster) values[next++] = core_.items()[i].value;
   }
-  const State<N> AS = core_.matrix() * S;
+  const State<N> AS = A * S;
   const SplitCluster<N> split = split_cluster<N>(S.transpose() * AS, values, mean, coinciding_);
   for (const Block& b : split.blocks) {
     const State<N> Lambda = split.Lambda.block(b.first, b.first, b.size, b.size);
@@ -257,7 +260,7 @@ template <int N>
 void BasisFromEigenvectors<N>::write_zero_rates(double rate, Eigen::Index count) {
   const State<N> states =
       count == 1 ? State<N>(core_.vector(rate, work_))
-                 : invariant_subspace<N>(core_.matrix(), rate, true, count, kSteps, work_);
+                 : invariant_subspace<N>(core_.matrix(), rate, rate, count, kSteps, work_);
   for (Eigen::Index k = 0; k < count; ++k) {
     const auto z = states.col(k);
     const double size = z.tail(c_ - m_).norm();

@@ -123,6 +123,11 @@ void evaluate(const SymmetricPencil& pencil, BlockEigenbasis& basis,
   take_diagonal(basis, residual.G, residual.diagonal);
 }
 
+std::int64_t iteration_work(const BlockEigenbasis& basis) noexcept {
+  const std::int64_t left = basis.two_sided ? cubed(basis.columns(), 6) : 0;
+  return cubed(basis.columns(), 16) + squared(basis.columns(), 130) + left;
+}
+
 int packed_width(int modes, int zeros) noexcept {
   const int lanes = modes + (modes + zeros + 3) / 4 * 4;
   return (std::max(2 * modes + zeros, lanes) + 3) / 4 * 4;

@@ -2,6 +2,7 @@
 #include <dashpot/analysis/linalg/block_sylvester.hpp>
 #include <dashpot/analysis/linalg/packed_matrix.hpp>
 #include <dashpot/analysis/system.hpp>
+#include <dashpot/analysis/work.hpp>
 
 namespace dashpot::analysis {
 
@@ -29,6 +30,11 @@ struct SymmetricPencil {
   int zeros() const { return joints - rank; }  ///< zero modes, without those that soft modes become
 };
 SymmetricPencil symmetric_pencil(const System<kMaxDof>& system) noexcept;
+
+/// Steps this small leave eigenvectors right to their square once they are taken.
+inline constexpr double kLastStep = 1e-7;
+/// Below this, nothing but rounding errors is left to improve.
+inline constexpr double kConverged = 1e-9;
 
 /// A basis Z of the pencil's state space (all its columns), nearly orthonormal in the indefinite
 /// metric S,
@@ -66,6 +72,9 @@ struct BlockEigenbasis {
 
   int columns() const { return 2 * modes + zeros; }
   int blocks() const { return modes + zeros; }
+  /// A step this small leaves nothing but rounding errors to improve. Of two sides these are the
+  /// greater part of a bound before.
+  double converged() const { return two_sided ? kLastStep : kConverged; }
   int vibrations() const { return modes - still; }  ///< modes that are published as such
   /// Columns of block i: a mode's first and second, or the one column of a zero mode twice.
   int first(int i) const { return i < modes ? i : modes + i; }
@@ -115,6 +124,18 @@ struct CloseBlocks {
 CloseBlocks newton_step(const BlockEigenbasis& basis, const TrackedResidual& residual,
                         double roundoff_bound, PackedMatrix& E, double& size) noexcept;
 
+/// Separates two blocks that Newton's method cannot tell apart, by dividing the space of their
+/// columns into two invariant planes again (a plane and a line with a zero mode, lines of two).
+/// In the division that is chosen, each new block has most of the old one whose index it gets. In
+/// a basis of one side the blocks are orthonormal, and of real eigenvalues the two of opposite sign
+/// characteristic that are nearest each other share a block, because only such a pair can meet and
+/// turn complex. Zero modes of such a basis are separated all at once.
+///
+/// `residual` belongs to the basis, at least nearly. Returns false, and does not change the basis,
+/// where no well-conditioned columns separate the blocks: a defective eigenvalue of two modes.
+bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
+                     BlockEigenbasis& basis) noexcept;
+
 /// Computes Z <- Z (I + E). The other side becomes Y <- Sigma (I - Sigma R - E) Sigma Y: Y S Z =
 /// Sigma then holds to second order. That overwrites MV and image of the residual.
 void take_step(const PackedMatrix& E, TrackedResidual& residual, BlockEigenbasis& basis) noexcept;
@@ -138,6 +159,9 @@ bool rotate_hyperbolically(const TrackedResidual& residual, double tolerance,
 /// three of each other and do not lean towards each other are left alone, unless `all`. Returns
 /// true if any block was changed.
 bool balance(const SymmetricPencil& pencil, bool all, BlockEigenbasis& basis) noexcept;
+
+/// Returns the work of evaluating a basis, and of the step that follows.
+std::int64_t iteration_work(const BlockEigenbasis& basis) noexcept;
 
 /// Returns the width of the rows of a basis: its columns, and room for entries that groups of four
 /// modes write beyond them.

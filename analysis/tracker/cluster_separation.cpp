@@ -1,7 +1,7 @@
 #include <dashpot/analysis/base/arithmetic.hpp>
+#include <dashpot/analysis/linalg/cluster_separation.hpp>
 #include <dashpot/analysis/linalg/hessenberg_qr.hpp>
-#include <dashpot/analysis/linalg/small_dense.hpp>
-#include <dashpot/analysis/tracker/cluster_separation.hpp>
+#include <dashpot/analysis/tracker/block_eigenbasis.hpp>
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -18,9 +18,9 @@ constexpr double kIllConditioned = 1e5;
 /// Couplings that a division may leave, relative to the whole: Newton's method removes them.
 constexpr double kCoupled = 1e-2;
 
-/// k x l, k and l <= 4
-using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 4, 4>;
-using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;
+/// At most 4 x 4
+using Small = State<kMaxDof>;
+using SmallVector = StateVector<kMaxDof>;
 
 /// Two blocks: their columns with the products N, and how the system acts on them, A = N^-1 T.
 struct BlockPair {
@@ -72,35 +72,18 @@ bool pose(const TrackedResidual& residual, const CloseBlocks& close, const Block
   return hessenberg_eigenvalues(H, pair.values.data());
 }
 
-/// Orthonormal columns of X, the longest first.
-Small range(Small X, int count) {
-  Small Q(X.rows(), count);
-  for (int k = 0; k < count; ++k) {
-    Eigen::Index longest = 0;
-    X.colwise().squaredNorm().maxCoeff(&longest);
-    Q.col(k) = X.col(longest).normalized();
-    X -= Q.col(k) * (Q.col(k).transpose() * X).eval();
-    X -= Q.col(k) * (Q.col(k).transpose() * X).eval();
-  }
-  return Q;
-}
-
-/// The space of the eigenvalues in `set`: the range of the product of A - mu for all others, real
-/// because complex ones come in pairs.
-Small space(const BlockPair& pair, unsigned set, int dimension) {
-  Small product = Small::Identity(pair.size, pair.size);
+/// The invariant plane or line of the eigenvalues in `set`.
+Small space(const BlockPair& pair, unsigned set) {
+  constexpr int kSteps = 3;
+  std::array<Complex, 2> wanted;
+  int count = 0;
   for (int i = 0; i < pair.size; ++i) {
-    const Complex mu = pair.value(i);
-    if ((set >> i & 1) != 0 || mu.imag() < 0) continue;
-    const Small shifted = pair.A - mu.real() * Small::Identity(pair.size, pair.size);
-    Small factor = shifted;
-    if (mu.imag() > 0) {
-      factor = shifted * shifted;
-      factor.diagonal().array() += mu.imag() * mu.imag();
-    }
-    product = (product * factor).eval();
+    if ((set >> i & 1) != 0) wanted[at(count++)] = pair.value(i);
   }
-  return range(product, dimension);
+  const auto& [x, y] = wanted;
+  Work work;  // its caller has counted it
+  return invariant_subspace<kMaxDof>(pair.A, x, count == 1 || x.imag() != 0 ? x : y, count, kSteps,
+                                     work);
 }
 
 /// Whether conjugates go together.
@@ -120,7 +103,8 @@ Small krylov_plane(const BlockPair& pair, int column) {
   Small both(pair.size, 2);
   both.col(0) = SmallVector::Unit(pair.size, column);
   both.col(1) = pair.A.col(column);
-  return range(both, 2);
+  orthonormalize(both);
+  return both;
 }
 
 /// Distance of the two nearest real eigenvalues that share a block: of opposite sign
@@ -153,36 +137,34 @@ bool orthonormalize_in(const Small& N, Small& columns) {
   return true;
 }
 
-/// A division: columns X, and how good it is.
-struct Division {
-  Small X, inverse;
+/// A division into two blocks, and how good it is.
+struct Division : Separation<kMaxDof> {
   double gap = 0;     ///< of the pair of real eigenvalues that are to share a block; the least wins
   double share = -1;  ///< of the old blocks that the new ones have; then the most
 };
 
-/// Considers the invariant space `first`, with `second` or, on one side, what is orthogonal to it.
+/// Considers the invariant spaces `first` and `second`; on one side, what of `second` is orthogonal
+/// to `first`.
 void consider(const BlockPair& pair, Small first, Small second, double gap, Division& best) {
   const int size = pair.size, split = pair.split;
   if (!pair.two_sided) {
     if (!orthonormalize_in(pair.N, first)) return;
     Small signed_rows = first.transpose() * pair.N;
     signed_rows.row(split - 1) *= -1;
-    second = range(Small::Identity(size, size) - first * signed_rows, size - split);
+    second -= first * (signed_rows * second).eval();
     if (!orthonormalize_in(pair.N, second)) return;
   }
   Small X(size, size);
   X << first, second;
-  Small copy = X, inverse = Small::Identity(size, size);
-  solve_in_place(copy, inverse, std::numeric_limits<double>::min());
-  if (!(inverse.norm() < kIllConditioned)) return;
-  const Small divided = inverse * pair.A * X;
-  const double coupling = divided.topRightCorner(split, size - split).norm() +
-                          divided.bottomLeftCorner(size - split, split).norm();
+  const Separation<kMaxDof> separation(pair.A, X);
+  if (!(separation.inverse.norm() < kIllConditioned)) return;
+  const double coupling = separation.Lambda.topRightCorner(split, size - split).norm() +
+                          separation.Lambda.bottomLeftCorner(size - split, split).norm();
   if (!(coupling <= kCoupled * pair.A.norm())) return;
   const double share = first.topRows(split).squaredNorm() / first.squaredNorm() +
                        second.bottomRows(size - split).squaredNorm() / second.squaredNorm();
   if (best.share < 0 || gap < best.gap || (gap == best.gap && share > best.share)) {
-    best = {X, inverse, gap, share};
+    best = {separation, gap, share};
   }
 }
 
@@ -219,8 +201,7 @@ bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
   Division best;
   for (unsigned set = 0; set < 1U << size; ++set) {
     if (__builtin_popcount(set) != split || !is_closed(pair, set)) continue;
-    consider(pair, space(pair, set, split), space(pair, ~set, rest),
-             by_gap ? nearest_pair(pair, set) : 0, best);
+    consider(pair, space(pair, set), space(pair, ~set), by_gap ? nearest_pair(pair, set) : 0, best);
   }
   if (split == 2 && rest == 2 && (pair.two_sided || best.share < 0)) {
     consider(pair, krylov_plane(pair, 0), krylov_plane(pair, 2), 0, best);
@@ -233,7 +214,7 @@ bool separate_blocks(const TrackedResidual& residual, const CloseBlocks& close,
       z[j] = basis.Z(row, k);
       y[j] = !basis.two_sided ? 0 : k < basis.modes ? basis.Y(k, row) : -basis.Y(k, row);
     }
-    const SmallVector right = best.X.transpose() * z, left = best.inverse * y;
+    const SmallVector right = best.columns.transpose() * z, left = best.inverse * y;
     for (int j = 0; j < size; ++j) {
       const int k = pair.columns[at(j)];
       basis.Z(row, k) = right[j];

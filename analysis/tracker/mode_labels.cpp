@@ -9,11 +9,7 @@ namespace {
 
 /// The plane of mode i, orthonormal in the energy metric.
 Plane energy_plane(const SymmetricPencil& pencil, const BlockEigenbasis& basis, int i) {
-  Plane plane{Column(pencil.states()), Column(pencil.states())};
-  for (int row = 0; row < pencil.states(); ++row) {
-    plane.first[row] = basis.Z(row, basis.first(i));
-    plane.second[row] = basis.Z(row, basis.second(i));
-  }
+  Plane plane = plane_of(pencil, basis, i);
   plane.first /= std::sqrt(products(pencil, plane.first, plane.first).energy());
   plane.second -= products(pencil, plane.first, plane.second).energy() * plane.first;
   const double size = std::sqrt(products(pencil, plane.second, plane.second).energy());

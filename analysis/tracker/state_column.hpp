@@ -48,6 +48,16 @@ struct Plane {
   Column first, second;
 };
 
+/// Returns the columns of mode i.
+inline Plane plane_of(const SymmetricPencil& pencil, const BlockEigenbasis& basis, int i) {
+  Plane plane{Column(pencil.states()), Column(pencil.states())};
+  for (int row = 0; row < pencil.states(); ++row) {
+    plane.first[row] = basis.Z(row, basis.first(i));
+    plane.second[row] = basis.Z(row, basis.second(i));
+  }
+  return plane;
+}
+
 inline void set_column(int j, const Column& x, BlockEigenbasis& basis) {
   for (int row = 0; row < x.size(); ++row) basis.Z(row, j) = x[row];
 }

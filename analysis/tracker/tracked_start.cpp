@@ -74,83 +74,56 @@ bool choose(const Spectrum<kMaxDof>& spectrum, VelocityChoice& choice) {
   return choice.positions == choice.velocities;
 }
 
-/// Collects the columns of a basis of one side by what they are.
-class BasisFromSpectrum {
- public:
-  BasisFromSpectrum(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum)
-      : pencil_(pencil), spectrum_(spectrum) {}
-
-  bool run(BlockEigenbasis& basis) {
-    if (spectrum_.modes.size() > pencil_.rank) return false;
-    if (!take_modes() || !take_zero_modes() || !add_elastic_coordinates()) return false;
-    if (zero_count_ != pencil_.zeros()) return false;
-    write(basis);
-    return true;
-  }
-
- private:
-  Column column(int j) const { return analysis::column(pencil_, spectrum_.basis, j); }
-  bool take_modes();
-  bool take_zero_modes();
-  bool add_elastic_coordinates();
-  void write(BlockEigenbasis& basis) const;
-
-  const SymmetricPencil& pencil_;
-  const Spectrum<kMaxDof>& spectrum_;
-  std::array<Plane, kMaxDof> planes_;
-  std::array<Column, kMaxDof> zeros_;  ///< of unit length
-  int plane_count_ = 0, zero_count_ = 0;
-};
-
-bool BasisFromSpectrum::take_modes() {
-  for (const Mode<kMaxDof>& mode : spectrum_.modes) {
-    const auto [i, j] = mode.columns;
-    if (!make_plane(pencil_, column(i), column(j), planes_[at(plane_count_++)])) return false;
-  }
-  return true;
-}
-
-bool BasisFromSpectrum::take_zero_modes() {
-  VelocityChoice choice;
-  if (!choose(spectrum_, choice)) return false;
-  for (int k = 0; k < choice.velocities; ++k) {
-    const Column x = column(choice.still_velocity[at(k)]);
-    const double size = -products(pencil_, x, x).indefinite();
-    if (!(size > 0)) return false;
-    zeros_[at(zero_count_++)] = x / std::sqrt(size);
-  }
-  return true;
-}
-
-/// Elastic coordinates that no mode moves any more become modes again, of frequency zero.
-bool BasisFromSpectrum::add_elastic_coordinates() {
-  while (plane_count_ < pencil_.rank) {
-    if (!pencil_.factored || zero_count_ == 0) return false;
-    Column best;
-    double largest = 0;
-    for (int k = 0; k < pencil_.rank; ++k) {
-      Column x = Column::Unit(pencil_.states(), k);
-      for (int i = 0; i < plane_count_; ++i) {
-        const auto& [first, second] = planes_[at(i)];
-        x -= products(pencil_, first, x).indefinite() * first;
-        x += products(pencil_, second, x).indefinite() * second;
-      }
-      const double size = products(pencil_, x, x).indefinite();
-      if (size > largest) largest = size, best = x;
+/// The elastic coordinate that moves most beside the first `modes` modes, of unit length; false if
+/// none does.
+bool add_elastic_coordinate(const SymmetricPencil& pencil, int modes, BlockEigenbasis& basis) {
+  Column best;
+  double largest = 0;
+  for (int k = 0; k < pencil.rank; ++k) {
+    Column x = Column::Unit(pencil.states(), k);
+    for (int i = 0; i < modes; ++i) {
+      const Plane plane = plane_of(pencil, basis, i);
+      x -= products(pencil, plane.first, x).indefinite() * plane.first;
+      x += products(pencil, plane.second, x).indefinite() * plane.second;
     }
-    if (!(largest > kNeutral)) return false;
-    planes_[at(plane_count_++)] = {best / std::sqrt(largest), zeros_[at(--zero_count_)]};
+    const double size = products(pencil, x, x).indefinite();
+    if (size > largest) largest = size, best = x;
   }
+  if (!(largest > kNeutral)) return false;
+  set_column(basis.first(modes), best / std::sqrt(largest), basis);
   return true;
 }
 
-void BasisFromSpectrum::write(BlockEigenbasis& basis) const {
-  resize(pencil_, basis);
-  for (int i = 0; i < basis.modes; ++i) {
-    set_column(basis.first(i), planes_[at(i)].first, basis);
-    set_column(basis.second(i), planes_[at(i)].second, basis);
+/// A basis of one side, in the order of the modes. Elastic coordinates that no mode moves any more
+/// become modes again, of frequency zero, each with the velocity of a zero mode.
+bool start_one_sided(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectrum,
+                     BlockEigenbasis& basis) {
+  const int p = pencil.rank, vibrations = spectrum.modes.size();
+  VelocityChoice choice;
+  if (!choose(spectrum, choice) || vibrations + choice.velocities != pencil.joints) return false;
+  if (vibrations > p || (!pencil.factored && vibrations != p)) return false;
+  resize(pencil, basis);
+  for (int i = 0; i < vibrations; ++i) {
+    const auto [k, l] = spectrum.modes[i].columns;
+    Plane plane;
+    if (!make_plane(pencil, column(pencil, spectrum.basis, k), column(pencil, spectrum.basis, l),
+                    plane)) {
+      return false;
+    }
+    set_column(basis.first(i), plane.first, basis);
+    set_column(basis.second(i), plane.second, basis);
   }
-  for (int k = 0; k < basis.zeros; ++k) set_column(2 * basis.modes + k, zeros_[at(k)], basis);
+  for (int k = 0; k < choice.velocities; ++k) {
+    const Column x = column(pencil, spectrum.basis, choice.still_velocity[at(k)]);
+    const double size = -products(pencil, x, x).indefinite();
+    if (!(size > 0)) return false;
+    const int mode = pencil.joints - 1 - k;  // the last velocities go to modes
+    set_column(k < basis.zeros ? 2 * p + k : basis.second(mode), x / std::sqrt(size), basis);
+  }
+  for (int i = vibrations; i < p; ++i) {
+    if (!add_elastic_coordinate(pencil, i, basis)) return false;
+  }
+  return true;
 }
 
 /// Columns k and l of the spectrum's basis, in block i.
@@ -244,10 +217,8 @@ bool start_basis(const SymmetricPencil& pencil, const Spectrum<kMaxDof>& spectru
                  TrackedResidual& residual, BlockEigenbasis& basis) noexcept {
   // A symmetric K without a factor is the metric of a basis of one side, if it is definite.
   const bool definite = pencil.factored || (spectrum.zero_modes.stiffness_values.array() > 0).all();
-  if (symmetric && definite ? !BasisFromSpectrum(pencil, spectrum).run(basis)
-                            : !start_two_sided(pencil, spectrum, basis)) {
-    return false;
-  }
+  const auto start = symmetric && definite ? start_one_sided : start_two_sided;
+  if (!start(pencil, spectrum, basis)) return false;
   evaluate(pencil, basis, residual);
   if (!basis.two_sided) rotate_hyperbolically(residual, 0, basis);
   return true;

@@ -76,6 +76,8 @@ class Modes(Result):
     """m of underdamped, critical, overdamped, undamped, unstable, soft."""
     error_bound: Array
     """m, proved bound of |computed - true| of either eigenvalue, 1/s; infinite: none was proved."""
+    eigenvalue_bounds: Array
+    """m x 2, the same of each of `eigenvalues`, 1/s; error_bound is the larger one."""
     natural_frequency_bound: Array
     """m, the same of the natural frequency, rad/s."""
     damping_ratio_bound: Array

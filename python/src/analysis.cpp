@@ -29,6 +29,8 @@ nb::dict modes_of(const Spectrum<>& spectrum) {
   result["eigenvalues"] = to_pairs(modes, [](const Mode<>& mode) { return mode.eigenvalues; });
   result["kind"] = to_list(modes, [](const Mode<>& mode) { return to_text(mode.kind); });
   result["error_bound"] = column(&Mode<>::error_bound);
+  result["eigenvalue_bounds"] =
+      to_pairs(modes, [](const Mode<>& mode) { return mode.eigenvalue_bounds; });
   result["natural_frequency_bound"] = column(&Mode<>::natural_frequency_bound);
   result["damping_ratio_bound"] = column(&Mode<>::damping_ratio_bound);
   result["backward_error"] = column(&Mode<>::backward_error);

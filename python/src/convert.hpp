@@ -14,6 +14,7 @@
 
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -62,13 +63,15 @@ nb::list to_list(const List& list, Of of) {
 /// Returns an m x 2 array of pairs of complex numbers.
 template <class List, class Of>
 nb::object to_pairs(const List& list, Of of) {
-  Eigen::MatrixX2cd pairs(static_cast<Eigen::Index>(list.size()), 2);
+  using Number = std::decay_t<decltype(of(*list.begin())[0])>;
+  Eigen::Matrix<Number, Eigen::Dynamic, Eigen::Dynamic> pairs(
+      static_cast<Eigen::Index>(list.size()), 2);
   Eigen::Index i = 0;
   for (const auto& item : list) {
     pairs(i, 0) = of(item)[0];
     pairs(i++, 1) = of(item)[1];
   }
-  return nb::cast(Eigen::MatrixXcd(pairs));
+  return nb::cast(pairs);
 }
 
 }  // namespace dashpot::python

@@ -53,6 +53,15 @@ def test_eigenvalues_are_those_of_scipy(seed):
     assert np.all(found.error_bound < 1e-9)
 
 
+def test_each_eigenvalue_has_a_bound_of_its_own():
+    found = dashpot.modes(np.eye(2), np.array([[1e6, 1], [1, 2e6]]), np.diag([1.0, 4]))
+    assert set(found.kind) == {"overdamped"}
+    np.testing.assert_array_equal(found.eigenvalue_bounds.max(axis=1), found.error_bound)
+    slow = np.abs(found.eigenvalues[:, 0])
+    assert np.all(found.eigenvalue_bounds[:, 0] < 1e-6 * slow)
+    assert np.all(found.eigenvalue_bounds[:, 0] < 1e-3 * found.error_bound)
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_shapes_solve_the_equation(seed):
     M, C, K = random_system(seed)
@@ -87,6 +96,7 @@ def test_modes_are_those_of_the_program(program, tmp_path):
         for name in ("natural_frequency", "damping_ratio", "damped_frequency", "error_bound",
                      "natural_frequency_bound", "damping_ratio_bound", "backward_error"):
             assert mode[name] == pytest.approx(getattr(found, name)[i], rel=1e-9), name
+        np.testing.assert_allclose(mode["eigenvalue_bounds"], found.eigenvalue_bounds[i], rtol=1e-9)
         np.testing.assert_allclose([complex(*pair) for pair in mode["shape"]], found.shapes[i],
                                    rtol=1e-9, atol=1e-12)
 

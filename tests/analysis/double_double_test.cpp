@@ -65,7 +65,7 @@ TEST(DoubleDoubleSum, TakesNegativesAndDoubles) {
   DoubleDouble sum = a;
   sum += a;
   EXPECT_EQ(sum, a * 2.0);
-  sum -= a;
+  sum = sum - a;
   EXPECT_EQ(sum, a);
 }
 

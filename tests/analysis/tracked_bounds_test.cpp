@@ -2,7 +2,6 @@
 // columns that are balanced and rotated.
 #include <dashpot/analysis/base/arithmetic.hpp>
 #include <dashpot/analysis/tracker/block_eigenbasis.hpp>
-#include <dashpot/analysis/tracker/residual_errors.hpp>
 #include <dashpot/analysis/tracker/tracked_enclosure.hpp>
 #include <dashpot/analysis/tracker/tracked_modes.hpp>
 #include <dashpot/tests/support/random.hpp>
