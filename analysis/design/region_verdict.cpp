@@ -44,6 +44,16 @@ void keep_worst(RegionVerdict& verdict) {
   verdict.binding.resize(std::min(verdict.binding.size(), kJoining));
 }
 
+/// Takes the least value and its configuration: of several that are equal to rounding, as a search
+/// leaves them, the first.
+void take_less(double& least, std::int64_t& sample, double value, std::int64_t number) {
+  constexpr double kEqual = 1e-12;
+  if (number < 0 || !(value <= least * (1 + kEqual)) || value == kInfinity) return;
+  const bool equal = sample >= 0 && value >= least * (1 - kEqual);
+  if (!equal || number < sample) sample = number;
+  least = std::min(least, value);
+}
+
 }  // namespace
 
 RegionSample judge_sample(const DampingSample& sample, std::size_t number,
@@ -68,14 +78,9 @@ RegionVerdict verdict_of(const std::vector<RegionSample>& samples, std::size_t f
     const std::size_t number = first + i;
     verdict.largest_ratio = std::max(verdict.largest_ratio, sample.largest_ratio);
     const bool counts = sample.worst_mode >= 0 && sample.wanted > 0;
-    if (counts && level_of(sample) < verdict.level) {
-      verdict.level = level_of(sample);
-      verdict.worst_sample = static_cast<std::int64_t>(number);
-    }
-    if (sample.gain_margin < verdict.gain_margin) {
-      verdict.gain_margin = sample.gain_margin;
-      verdict.margin_sample = static_cast<std::int64_t>(number);
-    }
+    const auto here = static_cast<std::int64_t>(number);
+    if (counts) take_less(verdict.level, verdict.worst_sample, level_of(sample), here);
+    take_less(verdict.gain_margin, verdict.margin_sample, sample.gain_margin, here);
     const double missed = question.level - level_of(sample);
     const double over = sample.largest_ratio - question.ceiling;
     const bool margins = question.most_margin > 0;
@@ -91,11 +96,6 @@ RegionVerdict verdict_of(const std::vector<RegionSample>& samples, std::size_t f
 }
 
 void RegionVerdict::add(const RegionVerdict& other) {
-  const auto take_less = [](double& least, std::int64_t& sample, double value,
-                            std::int64_t number) {
-    const bool earlier = value == least && number >= 0 && (sample < 0 || number < sample);
-    if (value < least || earlier) least = value, sample = number;
-  };
   take_less(level, worst_sample, other.level, other.worst_sample);
   take_less(gain_margin, margin_sample, other.gain_margin, other.margin_sample);
   largest_ratio = std::max(largest_ratio, other.largest_ratio);
