@@ -241,6 +241,11 @@ class CsvReader {
     for (const std::string_view cell : cells) {
       columns_.push_back(read_heading(cell, columns_.size() + 1));
     }
+    const auto is_mode = [](const Column& column) { return column.name == "natural_frequency"; };
+    if (std::any_of(columns_.begin(), columns_.end(), is_mode)) {
+      throw InputError("",
+                       "has modes in place of motion: give the log that they were exported from");
+    }
     check_time();
   }
 

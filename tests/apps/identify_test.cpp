@@ -4,6 +4,7 @@
 #include <dashpot/tests/support/released_springs.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -38,6 +39,15 @@ std::string decay_csv(const std::string& heading, double angle, double time = 1)
 
 Json identify(const Words& arguments) {
   return parse(run_program(joined({"identify", "--json"}, arguments)));
+}
+
+/// The report on records that have no modes: the program says so in one line, and fails.
+Json no_modes(const Words& arguments) {
+  Outcome outcome = run_program(joined({"identify", "--json"}, arguments));
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("dashpot identify: no modes: "));
+  EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1);
+  return Json::parse(outcome.out);
 }
 
 void expect_known_modes(const Json& found) {
@@ -125,8 +135,9 @@ TEST(Identify, FindsModesOfAmbientMotion) {
   EXPECT_THAT(part.out, HasSubstr("shaken.csv: 30.0000 to 290.000 s"));
   EXPECT_THAT(part.out, HasSubstr("2 modes from 1 record"));
   const Outcome none = run_program({"identify", file, "--ambient", "--to", "1"});
-  EXPECT_EQ(none.status, 0);
+  EXPECT_EQ(none.status, 1);
   EXPECT_THAT(none.out, HasSubstr("takes a longer record"));
+  EXPECT_THAT(none.err, HasSubstr("no modes: "));
 }
 
 TEST(Identify, TakesFilesAsPeopleAndRecordersWriteThem) {
@@ -204,7 +215,7 @@ TEST(Identify, SaysFirstWhatARecordShows) {
                     size * motion(0.01 * i) + 1e-6 * draw.normal(), draw.normal());
       text += line.data();
     }
-    return identify(joined({scratch.write(name, text)}, more));
+    return no_modes(joined({scratch.write(name, text)}, more));
   };
   const auto sweep = [](double t) {
     return std::sin(t) + 0.5 * std::sin(2.7 * t) + std::cos(4 * t);
@@ -373,6 +384,7 @@ TEST(Identify, RefusesInOneLineThatNamesFileLineAndColumn) {
       {{file(good), file(decay_csv("time,q1,q3", 1))}, "its channels differ"},
       {{file(good), "--calibrate", "payload"}, "--against"},
       {{file(good), "--plot", "x.pdf"}, "--plot: x.pdf: has to end"},
+      {{file("time [s],label,natural_frequency [rad/s]\n0,1,2\n")}, "has modes in place of motion"},
       {{scratch.path("none.csv")}, "none.csv"},
       {{scratch.path("")}, "cannot be read"},
   };
@@ -451,6 +463,31 @@ TEST(Identify, DeterminesNothingOfAPayloadThatIsElsewhere) {
   EXPECT_FALSE(calibration["consistent"].get<bool>());
   EXPECT_FALSE(calibration["parameters"][0]["determined"].get<bool>());
   EXPECT_FALSE(calibration["warnings"].empty());
+}
+
+/// Its mass, where it is and its inertia, which is one of a body, each within three deviations.
+TEST(Identify, CalibratesAPayloadWithItsCenterAndInertia) {
+  DASHPOT_SKIP_IF_QUICK();
+  const Scratch scratch;
+  const HiddenArm arm(scratch, 2,
+                      "mass: 1.5, center: [0.05, -0.02, 0.08], inertia: [0.01, 0.012, 0.006]");
+  const std::string guess = scratch.write(
+      "guess.yaml", HiddenArm::config("0", "[0.13, 0.12, 0.11, 0.1, 0.09, 0.08, 0.05]") + "}");
+  std::vector<std::string> arguments = arm.logs;
+  arguments.insert(arguments.end(), {"--from", "1.51", "--against", guess, "--calibrate",
+                                     "payload,payload_center,payload_inertia"});
+  const Json calibration = identify(arguments)["calibration"];
+  const std::array<double, 7> truth{1.5, 0.05, -0.02, 0.08, 0.01, 0.012, 0.006};
+  const std::array<double, 7> most{0.05, 0.005, 0.005, 0.01, 0.005, 0.005, 0.002};
+  EXPECT_TRUE(calibration["consistent"].get<bool>()) << calibration["misfit"];
+  ASSERT_EQ(calibration["parameters"].size(), truth.size());
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const Json& one = calibration["parameters"][i];
+    const double value = one["value"], deviation = one["std"];
+    EXPECT_TRUE(one["determined"].get<bool>()) << one["name"];
+    EXPECT_LT(deviation, most[i]) << one["name"];
+    EXPECT_NEAR(value, truth[i], 3 * deviation) << one["name"];
+  }
 }
 
 }  // namespace
