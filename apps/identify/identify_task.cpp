@@ -1,7 +1,7 @@
 #include <dashpot/apps/identify/calibration.hpp>
 #include <dashpot/apps/identify/identify.hpp>
 #include <dashpot/apps/identify/mode_match.hpp>
-#include <dashpot/apps/identify/motion_file.hpp>
+#include <dashpot/apps/motion/motion_file.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/input_error.hpp>
 
@@ -123,6 +123,10 @@ class Task {
     std::vector<MotionChannel> channels;
     channels.reserve(chosen.size());
     for (const Index i : chosen) channels.push_back(file.channels[static_cast<std::size_t>(i)]);
+    if (!command_.inputs.empty()) {
+      for (const Index i : driving) check_numbers(path, file.channels[static_cast<std::size_t>(i)]);
+    }
+    for (const MotionChannel& channel : channels) check_numbers(path, channel);
     if (report_.channels.empty()) {
       report_.channels = channels;
     } else if (!std::equal(channels.begin(), channels.end(), report_.channels.begin(),
@@ -179,6 +183,10 @@ class Task {
         }
       }
     }
+  }
+
+  static void check_numbers(const std::string& path, const MotionChannel& channel) {
+    if (!channel.problem.empty()) throw InputError(path, channel.problem);
   }
 
   void leave_out(const MotionRecord& record, const std::string& file, const std::string& reason) {

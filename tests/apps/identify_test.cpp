@@ -204,6 +204,47 @@ TEST(Identify, TakesFilesThatDoNotSayWhatTheyAre) {
   expect_known_modes(identify({scratch.write("duration.csv", duration)}));
 }
 
+/// Each is what a recorder or a spreadsheet makes of it, and none of it changes the modes.
+TEST(Identify, TakesWhatRecordersAddAndLeaveOut) {
+  const Scratch scratch;
+  const std::string good = decay_csv("time,q1,q2", 1), rows = good.substr(good.find('\n') + 1);
+  const auto with = [&rows](const std::string& heading, const std::string& end = "") {
+    return heading + "\n" + rows + end;
+  };
+  const auto column = [&rows](const std::string& heading, const std::string& early,
+                              const std::string& late) {
+    std::string text = heading + "\n" + replaced(rows, "\n", "," + early + "\n");
+    const std::size_t half = text.size() / 2;
+    return text.substr(0, half) +
+           replaced(text.substr(half), "," + early + "\n", "," + late + "\n");
+  };
+  const std::vector<std::string> texts = {
+      with("Recorder 3.1\nArm: iiwa, at 500 Hz\n\ntime,q1,q2"),
+      with("# recorded on a Friday"),
+      with("time,q1,q2\ns,rad,rad"),
+      with("date,Angle1 [radians],Angle2 [radians]"),
+      with("__time,/joint_states/position[0],/joint_states/position[1]"),
+      with("% time,field.position0,field.position1"),
+      with("time,q1,q2", "\n\n  \n,,\n"),
+      with("time,q1,q2", "2.4001,0.00"),  // whose end was not written
+      replaced(good, "\n", "\r"),
+      column("time,q1,q2,note", "", "hit"),
+      column("time,q1,q2,q3 [A]", "NA", "null"),
+      replaced(column("time,q1,q2,q3 [A]", "5", ""), ",", "\t"),
+  };
+  for (const std::string& text : texts) {
+    SCOPED_TRACE(text.substr(0, 60));
+    expect_known_modes(identify({scratch.write("file.csv", text)}));
+  }
+  std::string degrees = decay_csv("Time (sec),q1 (\xC2\xB0),q2 (degrees)", 57.29577951308232);
+  const std::size_t comma = degrees.find(',', degrees.size() / 2);
+  degrees.replace(comma + 1, degrees.find(',', comma + 1) - comma - 1, "n/a");
+  expect_known_modes(identify({scratch.write("degrees.csv", degrees)}));
+  expect_refusal(run_program({"identify", scratch.write("note.csv", column("time,q1,q2", "", "x")),
+                              "--columns", "time,q1,q2,q3", "--channels", "q1,q3"}),
+                 "q3: 'x' is no number");
+}
+
 TEST(Identify, SaysFirstWhatARecordShows) {
   const Scratch scratch;
   const auto verdict = [&](const std::string& name, double size, auto motion, const Words& more) {
@@ -359,6 +400,12 @@ TEST(Identify, RefusesInOneLineThatNamesFileLineAndColumn) {
       {{file("time,time,q1\n1,2,3\n")}, "two columns of time"},
       {{file("a,b\n1,2\n")}, "line 1: no column of time"},
       {{file("0,1\n1,2\n1,3\n")}, "line 1: numbers, where a line of names"},
+      {{file("recorder\n\na,b\n1,2\n")}, "line 3: no column of time"},
+      {{file("time,q1\n12:00:00,2\n")}, "line 2, time: '12:00:00' is no time"},
+      {{file("\xFF\xFEt\n")}, "is text in UTF-16: save it as UTF-8"},
+      {{file("SQLite format 3 of a bag")}, "dashpot.read_log(FILE)"},
+      {{file(good), "--rate", "nan"}, "--rate: has to be a finite number"},
+      {{file(replaced(good, "\n1.", ",7\n1.")), "--columns", "t,q1,q2"}, "not 3 columns"},
       {{file("time\n1\n")}, "no column but the time"},
       {{file("time [kg],q1\n1,2\n")}, "in kg, a time is wanted"},
       {{file(replaced(good, "q1 [rad],q2 [rad]", "q [m/s^2],p [furlong]"))},
