@@ -247,7 +247,7 @@ TEST(Identify, TakesWhatRecordersAddAndLeaveOut) {
 
 TEST(Identify, SaysFirstWhatARecordShows) {
   const Scratch scratch;
-  const auto verdict = [&](const std::string& name, double size, auto motion, const Words& more) {
+  const auto record = [&](const std::string& name, double size, auto motion) {
     std::string text = "time [s],q1 [rad],force [N]\n";
     testing::Dice draw(5);
     for (int i = 0; i < 4000; ++i) {
@@ -256,7 +256,10 @@ TEST(Identify, SaysFirstWhatARecordShows) {
                     size * motion(0.01 * i) + 1e-6 * draw.normal(), draw.normal());
       text += line.data();
     }
-    return no_modes(joined({scratch.write(name, text)}, more));
+    return scratch.write(name, text);
+  };
+  const auto verdict = [&](const std::string& name, double size, auto motion, const Words& more) {
+    return no_modes(joined({record(name, size, motion)}, more));
   };
   const auto sweep = [](double t) {
     return std::sin(t) + 0.5 * std::sin(2.7 * t) + std::cos(4 * t);
@@ -264,6 +267,21 @@ TEST(Identify, SaysFirstWhatARecordShows) {
   const auto beat = [](double t) { return std::sin(5 * t) + 0.02 * std::sin(15 * t); };
   EXPECT_EQ(verdict("sweep.csv", 1, sweep, {})["verdict"], "large motion");
   EXPECT_EQ(verdict("sweep.csv", 1, sweep, {"--inputs", "force"})["verdict"], "large motion");
+  double angle = 1.2, speed = 0;
+  const auto pendulum = [&](double /*t*/) {
+    const double now = angle;
+    for (int part = 0; part < 100; ++part) {
+      speed += 1e-4 * (-25 * std::sin(angle) - 0.3 * speed);
+      angle += 1e-4 * speed;
+    }
+    return now;
+  };
+  EXPECT_EQ(verdict("pendulum.csv", 1, pendulum, {})["verdict"], "large motion");
+  const auto spring = [](double t) { return std::exp(-0.15 * t) * std::cos(5 * t); };
+  const Json linear = identify({record("spring.csv", 1.2, spring)});
+  EXPECT_EQ(linear["verdict"], "decay");
+  ASSERT_EQ(linear["modes"].size(), 1U);
+  EXPECT_NEAR(linear["modes"][0]["natural_frequency"].get<double>(), std::hypot(5, 0.15), 1e-4);
   const Json cycle = verdict("cycle.csv", 0.1, beat, {});
   EXPECT_EQ(cycle["verdict"], "limit cycle");
   EXPECT_THAT(cycle["advice"].dump(), HasSubstr("5.00"));
