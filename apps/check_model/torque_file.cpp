@@ -1,7 +1,7 @@
 #include <dashpot/apps/check_model/driver_log.hpp>
 #include <dashpot/apps/check_model/torque_file.hpp>
-#include <dashpot/apps/motion/csv_column.hpp>
-#include <dashpot/apps/motion/motion_file.hpp>
+#include <dashpot/apps/records/csv_column.hpp>
+#include <dashpot/apps/records/motion_file.hpp>
 #include <dashpot/controller/input_error.hpp>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/apps/motion/motion_file.hpp>
+#include <dashpot/apps/records/motion_file.hpp>
 #include <dashpot/identification/identification.hpp>
 #include <dashpot/identification/motion_verdict.hpp>
 

@@ -1,5 +1,5 @@
 #include <dashpot/apps/identify/recorded_parts.hpp>
-#include <dashpot/apps/motion/motion_file.hpp>
+#include <dashpot/apps/records/motion_file.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/identification/identification.hpp>

@@ -1,5 +1,5 @@
 #pragma once
-#include <dashpot/apps/motion/recorded_motion.hpp>
+#include <dashpot/apps/records/recorded_motion.hpp>
 
 #include <string>
 

@@ -1,6 +1,6 @@
-#include <dashpot/apps/motion/csv_column.hpp>
-#include <dashpot/apps/motion/motion_file.hpp>
-#include <dashpot/apps/motion/motion_rows.hpp>
+#include <dashpot/apps/records/csv_column.hpp>
+#include <dashpot/apps/records/motion_file.hpp>
+#include <dashpot/apps/records/motion_rows.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
 #include <dashpot/text/read_file.hpp>
 

@@ -1,4 +1,4 @@
-#include <dashpot/apps/motion/csv_column.hpp>
+#include <dashpot/apps/records/csv_column.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/yaml/quantity.hpp>
 
