@@ -1,9 +1,13 @@
+#include <dashpot/apps/analyze/analyze_plot.hpp>
+#include <dashpot/apps/cli/gnuplot.hpp>
 #include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/output_file.hpp>
 #include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/apps/cli/terminal.hpp>
 #include <dashpot/apps/report/json.hpp>
 #include <dashpot/apps/report/system_report.hpp>
+#include <dashpot/apps/report/text_table.hpp>
 
 #include <unistd.h>
 #include <CLI/CLI.hpp>
@@ -20,7 +24,7 @@ namespace {
 using Residual = analysis::SpectrumOptions::Residual;
 
 struct AnalyzeOptions {
-  std::string file;
+  std::string file, plot;
   bool json = false;
   double soft_frequency = analysis::SpectrumOptions().soft_frequency;  // rad/s
   Residual residual = Residual::kAutomatic;
@@ -53,10 +57,26 @@ std::vector<Report> make_reports(const SystemFile& file, const AnalyzeOptions& o
   return reports;
 }
 
+/// "3 coordinates: 2 vibration modes, 1 zero mode"
+std::string plot_title(const AnalyzeOptions& options, const Report& report) {
+  return options.file + ": " + count(report.dof, "coordinate") + ", " +
+         count(report.spectrum.modes.size(), "vibration mode") + ", " +
+         count(report.spectrum.zero_modes.count, "zero mode", "no");
+}
+
 void run_analyze(const AnalyzeOptions& options) try {
+  if (!options.plot.empty()) check_plot_name(options.plot);
+  check_outputs({{"--plot", options.plot}}, {{"FILE", options.file}});
   const SystemFile file = read_systems(options.file);
+  if (!options.plot.empty() && file.entries.size() != 1) {
+    throw InputError("--plot",
+                     "draws one system; there are " + std::to_string(file.entries.size()));
+  }
   std::string interrupted;
   const std::vector<Report> reports = make_reports(file, options, interrupted);
+  if (!options.plot.empty() && !reports.empty()) {
+    draw_modes(options.plot, plot_title(options, reports.front()), reports.front());
+  }
   const bool bold = isatty(STDOUT_FILENO) != 0 && std::getenv("NO_COLOR") == nullptr;
   if (options.json) {
     print(to_json(reports, file.is_list));
@@ -99,6 +119,10 @@ void add_analyze(CLI::App& program) {
                    "Call modes below this many rad/s soft")
       ->transform(quantity("rad/s", 0, std::numeric_limits<double>::max(), "a frequency in rad/s"))
       ->option_text("W (1e-06)");
+  command
+      ->add_option("--plot", options->plot,
+                   "Draw eigenvalues and mode shapes of one system there, with gnuplot")
+      ->option_text("FILE.svg|FILE.png");
   add_choice(*command, "--residual", "Precision of the residuals behind the error bounds",
              "automatic|working|extended (automatic)",
              {{"automatic", Residual::kAutomatic},

@@ -147,12 +147,16 @@ void check(const AuditCommand& command) {
                      "give one of --stiffness, --joint-stiffness, --gains and "
                      "--preset");
   }
-  if (!command.stiffness.empty() && command.damping.empty() == !command.damping_factor) {
-    throw InputError("--damping", "give --damping or --damping-factor");
-  }
-  if (joint && command.joint_damping.empty() == !command.damping_factor) {
-    throw InputError("--joint-damping", "give --joint-damping or --damping-factor");
-  }
+  const auto need_damping = [&](const std::string& option, const std::string& damping) {
+    if (damping.empty() && !command.damping_factor) {
+      throw InputError(option, "missing; give it, or --damping-factor");
+    }
+    if (!damping.empty() && command.damping_factor) {
+      throw InputError(option, "does not go with --damping-factor, which says the same");
+    }
+  };
+  if (!command.stiffness.empty()) need_damping("--damping", command.damping);
+  if (joint) need_damping("--joint-damping", command.joint_damping);
   if (!command.damping.empty() && command.stiffness.empty()) {
     throw InputError("--damping", "goes with --stiffness");
   }
@@ -239,7 +243,7 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
       ->check(CLI::IsMember({"dynamic", "kinematic"}));
   add_model_options(command, arm);
   command.add_option("--period", options.period, "Of the control loop: computes the gain margin")
-      ->transform(positive("s", "a time in s"))
+      ->transform(control_period())
       ->option_text("S");
   add_loop_options(command, options.loop, options.integral_time);
   command.add_option("--margin", options.margin, "Gain margin that is asked for")
@@ -249,7 +253,7 @@ void add_audit_options(CLI::App& command, AuditCommand& options) {
   arm.posture.add(command);
   options.postures.add(command);
   command.add_option("--damping-ratio", options.damping_ratio, "Wanted of the suggested damping")
-      ->transform(positive("", "a positive ratio"))
+      ->transform(damping_ratio())
       ->option_text("Z (F/2, or 0.7)");
   command.add_option("--jobs,--threads", options.jobs, "Threads; 0: one for each processor")
       ->check(CLI::Range(0, 1024))

@@ -98,6 +98,7 @@ void write_config(const CheckModelOptions& options, const Config& config,
 }
 
 CheckModelReport check_files(const CheckModelOptions& options, const Config& config) {
+  const EndOnSignal at_once("check-model");
   CheckModelReport report;
   std::vector<controller::TorqueRecord> records;
   for (const std::string& path : options.files) {

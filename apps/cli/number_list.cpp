@@ -1,4 +1,5 @@
 #include <dashpot/apps/cli/number_list.hpp>
+#include <dashpot/apps/cli/subcommands.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/yaml/quantity.hpp>
 
@@ -6,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <vector>
@@ -83,25 +85,58 @@ Eigen::VectorXd quantities_per_joint(const std::string& option, const std::strin
 
 CLI::Validator quantity(const std::string& unit, double least, double most,
                         const std::string& what) {
-  const auto convert = [=](std::string& text) -> std::string {
+  const auto value_of = [=](const std::string& text) {
     try {
       const double value = controller::parse_quantity(text, unit);
-      if (value >= least && value <= most) {
-        std::array<char, 40> number{};
-        std::snprintf(number.data(), number.size(), "%.17g", value);
-        text = number.data();
-        return "";
-      }
+      if (value >= least && value <= most) return std::optional(value);
     } catch (const std::invalid_argument&) {
     }  // said below, too
-    return what + " is wanted, not '" + text + "'";
+    return std::optional<double>();
+  };
+  const auto convert = [=](std::string& text) -> std::string {
+    if (const auto value = value_of(text)) {
+      std::array<char, 40> number{};
+      std::snprintf(number.data(), number.size(), "%.17g", *value);
+      text = number.data();
+      return "";
+    }
+    std::string meant;
+    for (const char* smaller : {"deg", "ms", "us"}) {
+      const std::string other = text + " " + smaller;
+      if (meant.empty() && value_of(other)) meant = "; is '" + other + "' meant?";
+    }
+    return what + " is wanted, not '" + text + "'" + meant;
   };
   return CLI::Validator(convert, "");
+}
+
+CLI::Validator damping_ratio() {
+  constexpr double kLargest = 1e9, kUnlikely = 5;  // of which a hundredth may be meant
+  CLI::Validator ratio =
+      quantity("", std::numeric_limits<double>::min(), kLargest, "a positive ratio up to 1e9");
+  return CLI::Validator(
+      [ratio](std::string& text) {
+        std::string refusal = ratio(text);
+        const double value = refusal.empty() ? std::stod(text) : 0;
+        if (value >= kUnlikely) {
+          std::ostringstream warning;
+          warning << "warning: a damping ratio of " << value
+                  << " is wanted; it is no percentage: " << value << " % would be " << value / 100;
+          print_error(warning.str());
+        }
+        return refusal;
+      },
+      "");
 }
 
 CLI::Validator positive(const std::string& unit, const std::string& what) {
   using Limits = std::numeric_limits<double>;
   return quantity(unit, Limits::min(), Limits::max(), what);
+}
+
+CLI::Validator control_period() {
+  constexpr double kLongest = 1;  // s, beyond what any arm is controlled with
+  return quantity("s", std::numeric_limits<double>::min(), kLongest, "a period up to 1 s");
 }
 
 }  // namespace dashpot::apps

@@ -20,11 +20,18 @@ Eigen::VectorXd quantities_per_joint(const std::string& option, const std::strin
                                      double none = controller::kNoNone);
 
 /// Checks that an option is a quantity from `least` to `most`, in the SI unit `unit`, and turns it
-/// into a number without unit, as CLI::Option::transform asks for; `what` says what is wanted.
+/// into a number without unit, as CLI::Option::transform asks for; `what` says what is wanted. A
+/// refusal names the smaller unit with which a number that has none would fit.
 CLI::Validator quantity(const std::string& unit, double least, double most,
                         const std::string& what);
 
+/// Accepts a damping ratio that is wanted, up to 1e9, with a warning where a percentage is likely.
+CLI::Validator damping_ratio();
+
 /// Accepts any positive quantity.
 CLI::Validator positive(const std::string& unit, const std::string& what);
+
+/// Accepts the period of a control loop, s.
+CLI::Validator control_period();
 
 }  // namespace dashpot::apps

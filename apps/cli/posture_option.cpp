@@ -5,6 +5,9 @@
 #include <dashpot/controller/config/config_robot.hpp>
 #include <dashpot/controller/posture.hpp>
 
+#include <limits>
+#include <numbers>
+
 namespace dashpot::apps {
 
 using controller::JointVector;
@@ -51,7 +54,8 @@ void PosturesOption::add(CLI::App& command) {
       ->check(CLI::Range(0.0, 1.8e19))
       ->option_text("S (1)");
   command.add_option("--spread", spread, "Samples no further than this from --q")
-      ->transform(positive("rad", "an angle in rad"))
+      ->transform(quantity("rad", std::numeric_limits<double>::min(), 2 * std::numbers::pi,
+                           "an angle up to a turn, in rad,"))
       ->option_text("R");
 }
 

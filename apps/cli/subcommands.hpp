@@ -14,7 +14,7 @@ namespace dashpot::apps {
 inline constexpr const char* kExitStatusHelp =
     "Exit status: 0 if all went well, 2 if the input or the command line is bad, 130 if Ctrl-C "
     "ended\n"
-    "it early, 1 if anything else failed.";
+    "it early, 1 if anything else failed, or a loop ended with a latched fault.";
 
 /// For that of subcommands that take physical quantities.
 inline constexpr const char* kUnitsHelp =

@@ -9,7 +9,6 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -238,9 +237,21 @@ InputError SystemEntry::error(const analysis::InvalidSystem& cause) const {
   return {prefix + cause.key(), reason, line == lines.end() ? 0 : line->second};
 }
 
+bool has_key(const YamlNode& document, std::string_view key) {
+  for (std::size_t i = 0; i + 1 < document.items.size(); i += 2) {
+    if (document.kind == YamlNode::Kind::kMap && document.items[i].text == key) return true;
+  }
+  return false;
+}
+
 SystemFile read_systems(const std::string& path) {
   const YamlNode root = controller::parse_yaml(controller::read_file(path));
   if (root.kind == YamlNode::Kind::kNull) throw InputError("", "is empty");
+  if (has_key(root, "robot") || has_key(root, "scenario")) {
+    throw InputError("",
+                     "is a configuration or scene, which dashpot run, drive, tune and check-model "
+                     "take, and no system of matrices; design and audit take its arm by --urdf");
+  }
   SystemFile file;
   file.is_list = root.kind == YamlNode::Kind::kSequence;
   if (!file.is_list) {

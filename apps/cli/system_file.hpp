@@ -2,11 +2,13 @@
 #include <dashpot/analysis/gears.hpp>
 #include <dashpot/analysis/task_space.hpp>
 #include <dashpot/controller/input_error.hpp>
+#include <dashpot/controller/yaml/yaml_document.hpp>
 
 #include <Eigen/Core>
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace dashpot::apps {
@@ -52,5 +54,8 @@ SystemFile read_systems(const std::string& path);
 
 /// The keys of a system and what they mean, for the help text.
 extern const char* const kSystemFileHelp;
+
+/// Whether a document is a mapping with this key.
+bool has_key(const controller::YamlNode& document, std::string_view key);
 
 }  // namespace dashpot::apps

@@ -29,6 +29,26 @@ void note_stop(int /*signal*/) {
   stop_given = true;
 }
 
+std::string last_words;  // of a program that ends at once; a signal handler reads it
+
+void end_now(int /*signal*/) {
+  const ssize_t written = write(STDERR_FILENO, last_words.data(), last_words.size());
+  _exit(written < 0 ? 1 : 130);
+}
+
+/// Has the signals that end a program from outside handled so.
+void handle_ends(void (*handler)(int)) {
+  struct sigaction action {};
+  action.sa_handler = handler;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // a second one ends the program
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  struct sigaction hangup {};  // the terminal is gone; under nohup that is ignored
+  if (sigaction(SIGHUP, nullptr, &hangup) == 0 && hangup.sa_handler != SIG_IGN) {
+    sigaction(SIGHUP, &action, nullptr);
+  }
+}
+
 /// Rows of the terminal.
 int height() {
   winsize size{};
@@ -38,15 +58,17 @@ int height() {
 }  // namespace
 
 StopSignal::StopSignal() {
-  struct sigaction action {};
-  action.sa_handler = note_stop;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);  // a second one ends the program
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-  struct sigaction hangup {};  // the terminal is gone; under nohup that is ignored
-  if (sigaction(SIGHUP, nullptr, &hangup) == 0 && hangup.sa_handler != SIG_IGN) {
-    sigaction(SIGHUP, &action, nullptr);
-  }
+  handle_ends(note_stop);
+}
+
+EndOnSignal::EndOnSignal(const std::string& what) {
+  last_words =
+      (isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "") + ("dashpot " + what) + ": interrupted\n";
+  handle_ends(end_now);
+}
+
+EndOnSignal::~EndOnSignal() {
+  handle_ends(SIG_DFL);
 }
 
 bool StopSignal::given() {

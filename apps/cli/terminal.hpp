@@ -12,6 +12,17 @@ class StopSignal {
   static bool given();
 };
 
+/// While it exists, the same signals end the program at once, with "dashpot WHAT: interrupted" on
+/// standard error and exit status 130: for a task that has nothing to show before its end. One at a
+/// time.
+class EndOnSignal {
+ public:
+  explicit EndOnSignal(const std::string& what);
+  ~EndOnSignal();
+  EndOnSignal(const EndOnSignal&) = delete;
+  EndOnSignal& operator=(const EndOnSignal&) = delete;
+};
+
 /// Ends the program with exit status 130, as shells tell of Ctrl-C, after what there is was
 /// printed. The message says how much was done.
 class Interrupted : public std::runtime_error {

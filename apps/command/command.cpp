@@ -153,7 +153,6 @@ command_t make_command(const CommandOptions& options, const state_t& state) {
     command.fault_tick = state.fault_tick;
   }
   if (command.parts == 0) throw InputError("", "says nothing; see dashpot command --help");
-  command.parts |= command_t::GIVE_UP;  // the next sender may be another call of this program
   return command;
 }
 
@@ -184,32 +183,42 @@ void send(const CommandOptions& options) {
   std::optional<state_t> state;
   handlers.on_state = [&](const state_t& message) { state = message; };
   lcmtypes::BusReader reader(bus, handlers);
-  const auto until = [&](const auto& done) {
-    const auto end =
-        std::chrono::steady_clock::now() + std::chrono::duration<double>(options.timeout);
+  const auto until = [&](double seconds, const auto& done) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
     while (!done() && std::chrono::steady_clock::now() < end) reader.wait(50);
     return done();
   };
-  if (!until([&] { return state.has_value(); })) {
+  if (!until(options.timeout, [&] { return state.has_value(); })) {
     throw std::runtime_error("no loop publishes states on " + url +
                              "; is one running, and with this --lcm-url?");
   }
   command_t command = make_command(options, *state);
   std::random_device random;
   command.sender = 1 + static_cast<std::int64_t>(random());
-  command.sequence = 1;
-  command.utime = std::chrono::duration_cast<std::chrono::microseconds>(
-                      std::chrono::system_clock::now().time_since_epoch())
-                      .count();
-  const std::int64_t before = state->commands_accepted;
-  bus->publish(lcmtypes::kCommandChannel, &command);
+  const auto publish = [&] {
+    ++command.sequence;
+    command.utime = std::chrono::duration_cast<std::chrono::microseconds>(
+                        std::chrono::system_clock::now().time_since_epoch())
+                        .count();
+    bus->publish(lcmtypes::kCommandChannel, &command);
+  };
+  publish();
+  // Only a sender whose command was accepted commands the arm: counters tell of others' commands.
+  const auto commands = [&] { return state->commander == command.sender; };
   const auto refused = [&] { return state->last_refused_sender == command.sender; };
-  if (!until([&] { return refused() || state->commands_accepted > before; })) {
+  if (!until(options.timeout, [&] { return refused() || commands(); })) {
     throw std::runtime_error("no answer; does the loop take commands (dashpot run --commands)?");
   }
-  if (refused()) {
+  if (!commands()) {
     throw std::runtime_error(std::string("refused: ") +
                              to_text(static_cast<lcmtypes::CommandVerdict>(state->last_refusal)));
+  }
+  // The next sender may be another call of this program. A message may be lost; the loop's silence
+  // ends the command of this sender then.
+  command.parts = command_t::GIVE_UP;
+  for (int i = 0; i < 10 && commands(); ++i) {
+    publish();
+    until(0.2, [&] { return !commands(); });
   }
   print("accepted\n");
 }
@@ -236,14 +245,14 @@ void add_command(CLI::App& program) {
   add("--damping,--task-damping", &CommandOptions::damping, "Diagonal, N s/m and N m s/rad",
       "x,y,z,rx,ry,rz");
   command->add_option("--damping-ratio", options->damping_ratio, "Of every mode of the task")
-      ->transform(positive("", "a positive ratio"))
+      ->transform(damping_ratio())
       ->option_text("Z");
   add("--joint-stiffness", &CommandOptions::joint_stiffness, "Of the joints, N m/rad", "a,b,...|x");
   add("--joint-damping", &CommandOptions::joint_damping, "Of the joints, N m s/rad", "a,b,...|x");
   command
       ->add_option("--joint-damping-ratio", options->joint_damping_ratio,
                    "Of every mode of the joints' springs")
-      ->transform(positive("", "a positive ratio"))
+      ->transform(damping_ratio())
       ->option_text("Z");
   add("--null-stiffness", &CommandOptions::null_stiffness,
       "Toward the posture, in the motions that the task leaves free", "a,b,...|x");

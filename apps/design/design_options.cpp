@@ -44,7 +44,7 @@ void add_loop(CLI::App& command, DesignOptions& options) {
   command
       .add_option("--period", options.period,
                   "Of the control loop: propose only what it bears sampled and held")
-      ->transform(positive("s", "a time in s"))
+      ->transform(control_period())
       ->option_text("S");
   add_loop_options(command, loop, options.integral_time);
   command
@@ -75,7 +75,7 @@ void add_design_options(CLI::App& command, DesignOptions& options) {
   options.postures.add(command);
   command.add_option("--damping-ratio", options.ratio, "The ratio wanted of every mode")
       ->required()
-      ->transform(a_ratio)
+      ->transform(damping_ratio())
       ->option_text("Z");
   command
       .add_option("--keep-structure", options.structure,

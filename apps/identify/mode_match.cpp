@@ -1,4 +1,5 @@
 #include <dashpot/apps/identify/mode_match.hpp>
+#include <dashpot/apps/report/mode_pairs.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -29,48 +30,40 @@ double unlikeness(const MeasuredMode& measured, const PredictedMode& predicted, 
   return distance + (1 - alike);
 }
 
-/// Pairs `count` things with some of `others` things, those of least distance(i, k) first. Returns
-/// each one's partner; -1 where only infinite distances are left.
-template <class Distance>
-std::vector<int> pairs(std::size_t count, std::size_t others, const Distance& distance) {
-  std::vector<int> partner(count, -1);
-  std::vector<bool> used(others);
-  for (;;) {
-    double least = std::numeric_limits<double>::infinity();
-    std::size_t from = 0, to = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      for (std::size_t k = 0; k < others && partner[i] < 0; ++k) {
-        const double there = used[k] ? least : distance(i, k);
-        if (there < least) least = there, from = i, to = k;
-      }
-    }
-    if (std::isinf(least)) return partner;
-    partner[from] = static_cast<int>(to);
-    used[to] = true;
-  }
-}
+constexpr double kFarthest = 0.9;  // above the largest unlikeness of two that can be one
 
 }  // namespace
 
 void match(const std::vector<MeasuredMode>& measured, std::vector<PredictedMode>& predicted) {
-  const auto alike = [&](std::size_t i, std::size_t k) {
-    return likeness(measured[k].shape, predicted[i].shape);
-  };
-  const std::vector<int> partner =
-      pairs(predicted.size(), measured.size(), [&](std::size_t i, std::size_t k) {
-        return unlikeness(measured[k], predicted[i], alike(i, k));
-      });
+  const auto rows = static_cast<Eigen::Index>(predicted.size());
+  Eigen::MatrixXd alike(rows, static_cast<Eigen::Index>(measured.size()));
+  Eigen::MatrixXd apart = alike;
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    for (Eigen::Index k = 0; k < alike.cols(); ++k) {
+      const MeasuredMode& mode = measured[static_cast<std::size_t>(k)];
+      const PredictedMode& other = predicted[static_cast<std::size_t>(i)];
+      alike(i, k) = likeness(mode.shape, other.shape);
+      apart(i, k) = unlikeness(mode, other, alike(i, k));
+    }
+  }
+  const std::vector<int> partner = nearest_pairs(apart, kFarthest);
   for (std::size_t i = 0; i < predicted.size(); ++i) {
     predicted[i].measured = partner[i];
-    if (partner[i] >= 0) predicted[i].likeness = alike(i, static_cast<std::size_t>(partner[i]));
+    if (partner[i] >= 0) predicted[i].likeness = alike(static_cast<Eigen::Index>(i), partner[i]);
   }
 }
 
 void put_in_order(const std::vector<PredictedMode>& others, std::vector<PredictedMode>& modes) {
   if (others.size() != modes.size()) return;
-  const std::vector<int> place = pairs(
-      modes.size(), others.size(),
-      [&](std::size_t i, std::size_t k) { return 1 - likeness(others[k].shape, modes[i].shape); });
+  const auto count = static_cast<Eigen::Index>(modes.size());
+  Eigen::MatrixXd apart(count, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    for (Eigen::Index k = 0; k < count; ++k) {
+      apart(i, k) = 1 - likeness(others[static_cast<std::size_t>(k)].shape,
+                                 modes[static_cast<std::size_t>(i)].shape);
+    }
+  }
+  const std::vector<int> place = nearest_pairs(apart, 2);
   if (std::find(place.begin(), place.end(), -1) != place.end()) return;  // shapes are no numbers
   std::vector<PredictedMode> ordered(modes.size());
   for (std::size_t i = 0; i < modes.size(); ++i) {

@@ -118,7 +118,11 @@ void MonitorView::note_order(std::int64_t tick) {
   const std::int64_t last = state_->tick;
   const bool returned =
       minus(tick, last) > 1 && tick > left_at_ && minus(tick, left_at_) <= kMostLost;
-  if (tick == last || (left_at_ > last && returned)) ++returns_;
+  // Two loops in step send every tick twice; one whose controller is not called repeats it on end.
+  const bool repeated = tick == last;
+  const bool in_step = repeated && !repeated_[0] && repeated_[1];
+  if (in_step || (left_at_ > last && returned)) ++returns_;
+  repeated_ = {repeated, repeated_[0]};
   if (tick < last) left_at_ = last;
 }
 

@@ -51,8 +51,10 @@ class MonitorView {
   std::int64_t rate_utime_ = 0;  // us
   std::int64_t rate_tick_ = 0;
   double rate_ = 0;  // 1/s
-  // Whether there is another loop: the tick from which they went back, and how often they returned
+  // Whether there is another loop: the tick from which they went back, how often they returned, and
+  // whether the last message, and the one before it, repeated a tick
   std::int64_t left_at_ = 0;
+  std::array<bool, 2> repeated_{};
   std::int64_t returns_ = 0;
   // Sums
   std::int64_t states_ = 0;

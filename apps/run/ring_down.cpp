@@ -1,4 +1,5 @@
 #include <dashpot/apps/loop/simulated_loop.hpp>
+#include <dashpot/apps/report/mode_pairs.hpp>
 #include <dashpot/apps/run/ring_down.hpp>
 #include <dashpot/apps/run/sampled_modes.hpp>
 #include <dashpot/controller/vibration/sampled_analysis.hpp>
@@ -39,7 +40,7 @@ Scene quiet_scene(const Scene& scene, const JointVector& start) {
 
 struct RecordedMotion {
   identification::MotionRecord record;  ///< positions
-  dashpot_modes modes{};                ///< the first ones
+  dashpot_modes modes{};                ///< the first ones that are there
 };
 
 /// Nothing if `stopped` says so first.
@@ -59,7 +60,9 @@ std::optional<RecordedMotion> record(const Scene& scene, const ControllerFactory
       loop.follow_scenario();
       loop.control();
       const dashpot_modes* modes = controller->new_modes();
-      if (modes != nullptr && modes->time >= 0 && motion.modes.tick == 0) motion.modes = *modes;
+      // The first tick may leave its modes to another thread, and there are none yet then.
+      const bool first = modes != nullptr && modes->time >= 0 && motion.modes.count == 0;
+      if (first) motion.modes = *modes;
       const sim::Status status = loop.move();
       if (status != sim::Status::kOk) {
         throw std::runtime_error(std::string("a small release does not ring down: ") +
@@ -84,44 +87,32 @@ double distance(const Eigenvalues& wanted, const Eigenvalues& other) {
   return std::sqrt(sum);
 }
 
-/// Pairs modes whose eigenvalues are nearest to each other, the best pair first; a mode that has
-/// none within kFarthest of itself stays alone.
-std::vector<RingDownMode> match(const dashpot_modes& predicted,
-                                std::vector<identification::MeasuredMode> fitted) {
+/// A row that nothing is known of yet but what was predicted, and where its eigenvalues are.
+struct Row {
+  RingDownMode mode;
+  Eigenvalues place;
+};
+
+std::vector<Row> rows_of(const dashpot_modes& predicted) {
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-  std::vector<RingDownMode> result(predicted.count);
+  std::vector<Row> rows;
   for (std::uint32_t i = 0; i < predicted.count; ++i) {
     const dashpot_mode& mode = predicted.modes[i];
-    result[i] = {mode.label, mode.natural_frequency, mode.damping_ratio, kNaN, kNaN, kNaN, kNaN};
+    rows.push_back(
+        {{mode.label, mode.natural_frequency, mode.damping_ratio, kNaN, kNaN, kNaN, kNaN},
+         eigenvalues(mode)});
   }
-  while (!fitted.empty()) {
-    double least = kFarthest;
-    std::pair<std::uint32_t, std::size_t> best{predicted.count, 0};
-    for (std::uint32_t i = 0; i < predicted.count; ++i) {
-      for (std::size_t k = 0; std::isnan(result[i].measured_frequency) && k < fitted.size(); ++k) {
-        const double apart = distance(eigenvalues(predicted.modes[i]), fitted[k].eigenvalues);
-        if (!(apart < least)) continue;
-        least = apart;
-        best = {i, k};
-      }
-    }
-    if (best.first == predicted.count) break;
-    RingDownMode& row = result[best.first];
-    row.measured_frequency = fitted[best.second].natural_frequency;
-    row.measured_ratio = fitted[best.second].damping_ratio;
-    fitted.erase(fitted.begin() + static_cast<std::ptrdiff_t>(best.second));
-  }
-  return result;
+  return rows;
 }
 
-/// What the modes become in the sampled loop; a mode that moves further than kFarthest has no
-/// counterpart there that could be told from others.
-void add_sampled(const Scene& scene, RingDown& ring_down) {
+/// What the modes become in the sampled loop, and where they are there; a mode that moves further
+/// than kFarthest has no counterpart there that could be told from others.
+void add_sampled(const Scene& scene, RingDown& ring_down, std::vector<Row>& rows) {
   const SampledModes modes = sampled_modes(scene);
   ring_down.gain_margin = modes.gain_margin;
   ring_down.growth = std::max(0.0, std::log(modes.sampled.spectral_radius) / scene.plant.period);
   ring_down.integral_decays = controller::integral_decays(modes.sampled, scene.plant.period);
-  for (RingDownMode& row : ring_down.modes) {
+  for (auto& [row, place] : rows) {
     for (int i = 0; i < modes.continuous.modes.size(); ++i) {
       const analysis::Mode<>& from = modes.continuous.modes[i];
       const analysis::SampledMode& to = modes.sampled.modes[static_cast<std::size_t>(i)];
@@ -131,7 +122,28 @@ void add_sampled(const Scene& scene, RingDown& ring_down) {
       if (!same || distance(from.eigenvalues, to.eigenvalues) > kFarthest) continue;
       row.sampled_frequency = to.natural_frequency;
       row.sampled_ratio = to.damping_ratio;
+      place = to.eigenvalues;
     }
+  }
+}
+
+/// Gives rows the modes of the motion whose eigenvalues are nearest: the motion is the sampled
+/// loop's, in which close modes may change places. One that has none within kFarthest stays alone.
+void add_measured(const std::vector<identification::MeasuredMode>& fitted, std::vector<Row>& rows) {
+  Eigen::MatrixXd apart(static_cast<Eigen::Index>(rows.size()),
+                        static_cast<Eigen::Index>(fitted.size()));
+  for (Eigen::Index i = 0; i < apart.rows(); ++i) {
+    for (Eigen::Index k = 0; k < apart.cols(); ++k) {
+      apart(i, k) = distance(rows[static_cast<std::size_t>(i)].place,
+                             fitted[static_cast<std::size_t>(k)].eigenvalues);
+    }
+  }
+  const std::vector<int> pairs = nearest_pairs(apart, kFarthest);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (pairs[i] < 0) continue;
+    const identification::MeasuredMode& mode = fitted[static_cast<std::size_t>(pairs[i])];
+    rows[i].mode.measured_frequency = mode.natural_frequency;
+    rows[i].mode.measured_ratio = mode.damping_ratio;
   }
 }
 
@@ -154,10 +166,12 @@ std::optional<RingDown> measure_ring_down(const Scene& scene,
   }
   const identification::Identification fit = identification::identify_decays(records);
   RingDown result;
-  result.modes = match(rest->modes, fit.modes);
   result.releases = scene.dof();
   result.residual = std::sqrt(1 - fit.explained);
-  if (scene.arm) add_sampled(scene, result);
+  std::vector<Row> rows = rows_of(rest->modes);
+  if (scene.arm) add_sampled(scene, result, rows);
+  add_measured(fit.modes, rows);
+  for (const Row& row : rows) result.modes.push_back(row.mode);
   return result;
 }
 

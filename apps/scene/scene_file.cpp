@@ -1,3 +1,4 @@
+#include <dashpot/apps/cli/system_file.hpp>
 #include <dashpot/apps/report/text_table.hpp>
 #include <dashpot/apps/scene/scene_file.hpp>
 #include <dashpot/apps/scene/scene_parts.hpp>
@@ -121,19 +122,17 @@ void check(const Scene& scene) try {
   throw InputError(scene.matrices ? "system" : "simulation", error.what());
 }
 
-bool has_key(const YamlNode& document, std::string_view key) {
-  for (std::size_t i = 0; i + 1 < document.items.size(); i += 2) {
-    if (document.kind == YamlNode::Kind::kMap && document.items[i].text == key) return true;
-  }
-  return false;
-}
-
 }  // namespace
 
 Scene load_scene(const std::string& path) try {
   Scene scene;
   scene.path = path;
   const YamlNode document = controller::parse_yaml(controller::read_regular_file(path));
+  if (has_key(document, "mass")) {
+    throw InputError("",
+                     "is a system of matrices, which dashpot analyze and design take; a scene has "
+                     "mass, damping and stiffness under the key system");
+  }
   if (has_key(document, "system")) {
     read_system(document, scene);
   } else {

@@ -24,6 +24,16 @@ bool has_modes(std::int8_t status) {
 }  // namespace
 
 void Alarms::take(const state_t& message) {
+  const double ratio =
+      message.mode == state_t::JOINT ? message.joint_damping_ratio : message.task_damping_ratio;
+  if (wanted_ratio && ratio != *wanted_ratio) {
+    smallest_ratio.reset();
+    worst_posture.clear();
+    worst_utime = 0;
+    ++changes_of_ratio;
+    changed_at_ = message.tick;
+  }
+  wanted_ratio = ratio;
   if (message.fault != 0 && message.fault_tick != fault_tick_) ++faults;
   fault_tick_ = message.fault != 0 ? message.fault_tick : 0;
 }
@@ -36,6 +46,7 @@ void Alarms::take(const modes_t& message) {
     const double ratio = message.damping_ratio[i];
     const auto kind = static_cast<analysis::ModeKind>(message.kind[i]);
     if (kind == analysis::ModeKind::kSoft || !std::isfinite(ratio)) continue;
+    if (message.tick < changed_at_) continue;  // what was wanted then was another ratio
     if (smallest_ratio && ratio >= *smallest_ratio) continue;
     smallest_ratio = ratio;
     worst_utime = message.utime;
@@ -55,6 +66,7 @@ FrameJson Frame::json() const {
   document["modes"] = modes ? message_json(*modes) : FrameJson();
   document["sampled"] = sampled ? message_json(*sampled) : FrameJson();
   document["alarms"] = {{"smallest_ratio", or_null(alarms.smallest_ratio)},
+                        {"changes_of_ratio", alarms.changes_of_ratio},
                         {"worst_utime", alarms.worst_utime},
                         {"worst_posture", alarms.worst_posture},
                         {"smallest_margin", or_null(alarms.smallest_margin)},

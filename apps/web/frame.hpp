@@ -12,9 +12,11 @@ namespace dashpot::apps {
 
 /// What was worst so far. Soft modes have no ratio that means anything, and do not count.
 struct Alarms {
-  std::optional<double> smallest_ratio;
-  std::int64_t worst_utime = 0;       ///< us
-  std::vector<double> worst_posture;  ///< joint positions of the smallest ratio, rad or m
+  std::optional<double> wanted_ratio;    ///< that the springs' damping is designed for; 0: none
+  std::int64_t changes_of_ratio = 0;     ///< how often another one was wanted
+  std::optional<double> smallest_ratio;  ///< since the last of these changes
+  std::int64_t worst_utime = 0;          ///< us
+  std::vector<double> worst_posture;     ///< joint positions of the smallest ratio, rad or m
   std::optional<double> smallest_margin;
   std::int64_t bounds_lost = 0;  ///< modes messages with a bound that is infinite
   std::int64_t modes_lost = 0;   ///< modes messages whose status is an error
@@ -26,6 +28,7 @@ struct Alarms {
 
  private:
   std::int64_t fault_tick_ = 0;
+  std::int64_t changed_at_ = 0;  ///< tick of the last change of the wanted ratio
 };
 
 /// What a page shows at one time: the last message of each kind, and the alarms.

@@ -121,7 +121,9 @@ MHD_Result queue_answer(MHD_Connection* connection, const HttpAnswer& answer) {
   if (response == nullptr) return MHD_NO;
   for (const auto& [name, value] : kHeaders) MHD_add_response_header(response, name, value);
   MHD_add_response_header(response, "Content-Type", answer.type.c_str());
-  if (answer.status == 405) MHD_add_response_header(response, "Allow", "GET");
+  if (!answer.allow.empty()) {
+    MHD_add_response_header(response, "Allow", answer.allow.c_str());
+  }
   if (answer.status != 200) MHD_add_response_header(response, "Connection", "close");
   const MHD_Result result = MHD_queue_response(connection, answer.status, response);
   MHD_destroy_response(response);
@@ -153,7 +155,12 @@ HttpAnswer HttpServer::Parts::judge(MHD_Connection* connection, std::string_view
     return refusal(403, "wrong Origin");
   }
   if (method == "POST" && content.post) return judge_post(connection);
-  if (method != "GET") return refusal(405, "GET only: nothing can be changed here");
+  if (method != "GET") {
+    HttpAnswer refused = content.post ? refusal(405, "GET and POST only")
+                                      : refusal(405, "GET only: nothing can be changed here");
+    refused.allow = content.post ? "GET, POST" : "GET";
+    return refused;
+  }
   if (!header(connection, "Content-Length").empty() ||
       !header(connection, "Transfer-Encoding").empty()) {
     return refusal(400, "no body is taken");

@@ -13,6 +13,7 @@ struct HttpAnswer {
   unsigned status = 200;
   std::string type;                         ///< "application/json"
   std::shared_ptr<const std::string> body;  ///< not null
+  std::string allow = {};                   ///< of status 405: methods that are taken
 };
 
 /// What the server serves, called on the thread of HttpServer::run.

@@ -31,7 +31,8 @@ std::int64_t elapsed(std::int64_t utime, std::int64_t first, std::int64_t before
 }
 
 bool same(const Alarms& a, const Alarms& b) {
-  return a.smallest_ratio == b.smallest_ratio && a.smallest_margin == b.smallest_margin &&
+  return a.wanted_ratio == b.wanted_ratio && a.changes_of_ratio == b.changes_of_ratio &&
+         a.smallest_ratio == b.smallest_ratio && a.smallest_margin == b.smallest_margin &&
          a.bounds_lost == b.bounds_lost && a.modes_lost == b.modes_lost && a.faults == b.faults;
 }
 

@@ -1,3 +1,4 @@
+#include <dashpot/controller/attachment.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
@@ -127,14 +128,18 @@ void doubt_weight(const RobotModel& model, const std::vector<MovedLink>& links,
   if (worst < 0) return;
   const Joint& joint = model.joints()[static_cast<std::size_t>(worst)];
   const MovedLink* link = heaviest(links, worst, model.dof() - 1);
-  if (!link) return;
+  const double payload = model.attachment().mass;
+  const bool carried = payload > (link ? link->body.body.getMass() : 0);
+  if (!link && !carried) return;
   const char* unit = joint.type == JointType::kPrismatic ? " N" : " N m";
   warnings.push_back(
-      one_line(quoted(link->body.link) + ": its mass, " + figure(link->body.body.getMass()) +
-               " kg, and the other links that joint '" + joint.name + "' moves take " +
-               figure(weight[worst]) + unit + " to hold, " + figure(weight[worst] / joint.effort) +
-               " times the effort limit, " + figure(joint.effort) + unit +
-               ": are masses in g, or is the limit not in" + unit + "?"));
+      one_line((carried ? "payload: its mass, " + figure(payload) + " kg, and the"
+                        : quoted(link->body.link) + ": its mass, " +
+                              figure(link->body.body.getMass()) + " kg, and the other") +
+               " links that joint '" + joint.name + "' moves take " + figure(weight[worst]) + unit +
+               " to hold, " + figure(weight[worst] / joint.effort) + " times the effort limit, " +
+               figure(joint.effort) + unit + (carried ? ": is it in g" : ": are masses in g") +
+               ", or is the limit not in" + unit + "?"));
 }
 
 }  // namespace

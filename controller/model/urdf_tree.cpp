@@ -50,7 +50,12 @@ std::shared_ptr<urdf::ModelInterface> parse(const std::string& text, const std::
   const Messages messages;
   std::shared_ptr<urdf::ModelInterface> model;
   if (text.find('<') == std::string::npos) {
-    throw InvalidModel(one_line(name + ": is no robot description: it has no XML in it"));
+    throw InvalidModel(
+        one_line(name + ": is no robot description: it has no XML in it" +
+                 (text.find("urdf:") == std::string::npos
+                      ? ""
+                      : "; a configuration or scene names one under robot.urdf, and is read by "
+                        "dashpot run, drive, tune and check-model")));
   }
   try {
     text::PlainUrdf plain = text::plain_urdf(text, name);

@@ -42,6 +42,13 @@ YamlMapping::YamlMapping(const YamlNode& node, std::string prefix,
                          std::span<const std::string_view> known_keys)
     : prefix_(std::move(prefix)) {
   const std::string place = prefix_.substr(0, prefix_.empty() ? 0 : prefix_.size() - 1);
+  if (node.kind == YamlNode::Kind::kScalar && node.text.starts_with('<')) {
+    throw InputError(
+        place,
+        "is XML, such as a robot description, where YAML is wanted: a description is "
+        "named by robot.urdf, or by --urdf for dashpot inspect, design, audit and tune",
+        node.line);
+  }
   if (node.kind != YamlNode::Kind::kMap) {
     throw InputError(place, "a mapping of keys to values is wanted, not " + describe(node),
                      node.line);

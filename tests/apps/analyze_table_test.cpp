@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cstdlib>
 #include <sstream>
 
 namespace dashpot::tests {
@@ -119,6 +120,35 @@ TEST(Program, FailsIfItCannotWrite) {
 }
 
 /// The second number from the end of each line of an underdamped mode.
+TEST(AnalyzePlot, DrawsEigenvaluesAndShapes) {
+  if (std::system("command -v gnuplot >/dev/null") != 0) GTEST_SKIP() << "there is no gnuplot";
+  const Scratch scratch;
+  const std::string file = scratch.path("a 'b'.svg");
+  const auto drawn = [&](const std::string& system, const std::string& text) {
+    const Outcome outcome = run_program({"analyze", "-", "--plot", file}, system);
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    return scratch.read("a 'b'.svg").find(">" + text + "<") != std::string::npos;
+  };
+  const std::string system =
+      "{mass: [[1, 0], [0, 1]], stiffness: [[900, 0], [0, 4]], damping: [[300, 0], [0, 0.8]]}";
+  for (const char* text : {"-: 2 coordinates, 2 vibration modes, no zero modes", "0.7",
+                           "1: 30.00 rad/s, 5.00", "2: 2.000 rad/s, 0.200", "&lt;- 1: -297"}) {
+    EXPECT_TRUE(drawn(system, text)) << text;
+  }
+  // The fast eigenvalue does not shrink the others, which fill the picture.
+  EXPECT_TRUE(drawn(system, "-2"));
+  EXPECT_FALSE(drawn(system, "-50"));
+  EXPECT_TRUE(drawn("{mass: [[1]], stiffness: [[900]], damping: [[300]]}", "-50"));
+  EXPECT_TRUE(drawn("{mass: [[1]], stiffness: [[-900]]}", "1: unstable"));
+  expect_refusal(run_program({"analyze", "-", "--plot", file}, "{mass: [[1]], stiffness: [[0]]}"),
+                 "--plot: there are no modes to draw");
+  const std::string two = "[{mass: [[1]], stiffness: [[1]]}, {mass: [[1]], stiffness: [[1]]}]";
+  expect_refusal(run_program({"analyze", "-", "--plot", file}, two),
+                 "--plot: draws one system; there are 2");
+  expect_refusal(run_program({"analyze", example("chain3.yaml"), "--plot", "x.pdf"}),
+                 "--plot: x.pdf: has to end with .svg or .png");
+}
+
 std::vector<double> column_of_bounds(const std::string& text) {
   std::vector<double> bounds;
   std::istringstream lines(text);

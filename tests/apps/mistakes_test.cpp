@@ -59,6 +59,56 @@ TEST(Mistakes, InWhatGoesTogetherAreNamed) {
                  "--seed");
 }
 
+TEST(Mistakes, InUnitsAreNamedWithTheLikelyOne) {
+  const Words audit = joined(of_panda("audit", kStiffness), {"--damping-factor", "2"});
+  const Words design = joined(of_panda("design", kStiffness), {"--damping-ratio"});
+  for (const Words& words : {audit, joined(design, {"1"})}) {
+    expect_refusal(run_program(joined(words, {"--period", "1000"})),
+                   "a period up to 1 s is wanted, not '1000'; is '1000 ms' meant?");
+    const Outcome spread = run_program(joined(words, {"--samples", "5", "--spread", "20"}));
+    expect_refusal(spread, "is wanted, not '20'; is '20 deg' meant?");
+  }
+  expect_refusal(run_program(joined(audit, {"--period", "2 s"})), "not '2 s' (dashpot");
+  const Outcome heavy = run_program(joined(audit, {"--payload", "800"}));
+  EXPECT_EQ(heavy.status, 0);
+  EXPECT_THAT(heavy.err, ::testing::HasSubstr("warning: payload: its mass, 800 kg, "));
+  EXPECT_THAT(heavy.err, ::testing::HasSubstr(": is it in g, or "));
+  EXPECT_EQ(run_program(joined(audit, {"--payload", "0.8"})).err, "");
+  const Outcome percent = run_program(joined(design, {"7"}));
+  EXPECT_EQ(percent.status, 0);
+  EXPECT_THAT(percent.err, ::testing::HasSubstr("no percentage: 7 % would be 0.07\n"));
+  EXPECT_EQ(run_program(joined(design, {"2"})).err, "");
+}
+
+TEST(Mistakes, OfTwoDampingsOrNoneAreTold) {
+  const Words audit = of_panda("audit", kStiffness);
+  expect_refusal(run_program(audit), "--damping: missing; give it, or --damping-factor");
+  expect_refusal(run_program(joined(audit, {"--damping", "1,1,1,1,1,1", "--damping-factor", "2"})),
+                 "--damping: does not go with --damping-factor");
+  expect_refusal(run_program(of_panda("audit", {"--joint-stiffness", "9", "--joint-damping", "1",
+                                                "--damping-factor", "2"})),
+                 "--joint-damping: does not go with --damping-factor");
+}
+
+TEST(Mistakes, OfOneFileForAnotherNameWhatTakesIt) {
+  const std::string arm = DASHPOT_SOURCE_DIR "/sim/models/panda.urdf";
+  for (const Words& words : {Words{"run", arm},
+                             {"analyze", arm},
+                             {"tune", arm},
+                             {"check-model", "a.csv", "--config", arm},
+                             joined(of_panda("audit", {}), {"--gains", arm})}) {
+    expect_refusal(run_program(words),
+                   ": is XML, such as a robot description, where YAML is wanted: ");
+  }
+  expect_refusal(
+      run_program({"inspect", "--urdf", scene("panda"), "--base", "a", "--tip", "b"}),
+      "it has no XML in it; a configuration or scene names one under robot.urdf, and is read by ");
+  expect_refusal(run_program({"analyze", scene("panda")}),
+                 ": is a configuration or scene, which dashpot run, ");
+  expect_refusal(run_program({"run", example("chain3.yaml")}),
+                 ": is a system of matrices, which dashpot analyze and design take");
+}
+
 TEST(Mistakes, InKindsOfFilesAreNamed) {
   const Scratch scratch;
   const std::string folder = scratch.path("folder");

@@ -163,6 +163,33 @@ TEST(Progress, CtrlCEndsAnExportWithWholeFiles) {
   EXPECT_EQ(text_of(csv).back(), '\n');
 }
 
+TEST(Progress, CtrlCEndsACheckOfAModelAtOnce) {
+  const Scratch scratch;
+  const std::string pipe = scratch.path("pipe.csv");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const pid_t program = fork();
+  if (program == 0) {
+    dup2(open(scratch.path("err").c_str(), O_WRONLY | O_CREAT, 0600), STDERR_FILENO);
+    execl(DASHPOT_PROGRAM, "dashpot", "check-model", pipe.c_str(), "--config",
+          scene("panda_release_c1").c_str(), nullptr);
+    _exit(1);
+  }
+  int status = 0, end = -1;
+  pid_t ended = 0;
+  while (end < 0 && ended == 0) {  // until it reads, and waits for more
+    end = open(pipe.c_str(), O_WRONLY | O_NONBLOCK);
+    usleep(10'000);
+    ended = waitpid(program, &status, WNOHANG);
+  }
+  ASSERT_EQ(ended, 0);
+  kill(program, SIGINT);
+  ASSERT_EQ(waitpid(program, &status, 0), program);
+  close(end);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_EQ(scratch.read("err"), "dashpot check-model: interrupted\n");
+}
+
 /// Where every write fails, each writer says so, with the name of the file.
 TEST(FullDisk, IsAnErrorOfEveryWriter) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";

@@ -127,6 +127,17 @@ TEST(Run, LowersARatioBeforeTheArmShakes) {
   EXPECT_GT(asked["faults"], 0);
 }
 
+// Modes 2 and 3 are closer to each other than the held torque moves them.
+TEST(Run, FindsCloseModesWhereTheSampledLoopHasThem) {
+  const Json result = run_json(scene("panda_pick_up"), {"--ring-down"});
+  const Json& modes = result["ring_down"]["modes"];
+  for (const std::size_t i : {1U, 2U}) {
+    const double sampled = modes[i]["sampled_frequency"];
+    ASSERT_TRUE(modes[i]["measured_frequency"].is_number());
+    EXPECT_NEAR(modes[i]["measured_frequency"].get<double>(), sampled, 1e-3 * sampled);
+  }
+}
+
 // Table 1 of the paper: 20.25, 10.98, 9.755 rad/s with 0.0255, 0.0316, 0.0294 (C1), 20.23, 10.95,
 // 11.17 with 0.2235, 0.2032, 0.2288 (C2). Its hand weighs a little more than that of the model.
 TEST(Run, ShowsTheReleasesOfThePaper) {

@@ -3,6 +3,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/controller/kdl_chain.hpp>
+#include <dashpot/identification/identification.hpp>
 
 #include <cmath>
 #include <cstdio>
@@ -34,12 +35,24 @@ bool model_works() {
          dashpot::controller::kdl_chain(model).getNrOfJoints() == 1;
 }
 
+/// The mode of a decay at 10 rad/s with ratio 0.1.
+bool identification_works() {
+  dashpot::identification::MotionRecord record{Eigen::VectorXd(500), Eigen::MatrixXd(1, 500)};
+  for (int i = 0; i < 500; ++i) {
+    record.time[i] = 0.01 * i;
+    record.output(0, i) = std::exp(-record.time[i]) * std::cos(std::sqrt(99.0) * record.time[i]);
+  }
+  const auto found = dashpot::identification::identify_decays({record});
+  return found.modes.size() == 1 && std::abs(found.modes[0].natural_frequency - 10) < 1e-9 &&
+         std::abs(found.modes[0].damping_ratio - 0.1) < 1e-10;
+}
+
 static_assert(EIGEN_DEFAULT_ALIGN_BYTES == 64, "alignment of what Eigen allocates");
 static_assert(EIGEN_MAX_STATIC_ALIGN_BYTES == 64, "alignment of Eigen members");
 static_assert(alignof(Square<8>) == 64);
 
 int main() {
-  if (!model_works()) return 1;
+  if (!model_works() || !identification_works()) return 1;
   // Two masses of 1 kg on springs of 100 N/m and 50 N/m, lightly damped.
   System<> system(2);
   system.stiffness << 150, -50, -50, 50;

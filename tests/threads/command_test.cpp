@@ -51,6 +51,33 @@ TEST(CommandProgram, MovesAnArmAndSetsItsGains) {
   live.end();
 }
 
+TEST(CommandProgram, TakesNoOtherCommandForItsOwn) {
+  const std::string url = own_url();
+  Listener loop(url);  // and, below, a loop that accepts commands, but of somebody else
+  state_t state{};
+  state.n = 1;
+  for (auto* list : {&state.joint_position, &state.joint_velocity, &state.joint_torque,
+                     &state.law_torque, &state.reference_joint_position}) {
+    list->assign(1, 0);
+  }
+  state.reference_tip_quaternion[0] = state.tip_quaternion[0] = state.tool_quaternion[0] = 1;
+  const auto publish = [&] {
+    state.utime = utime();
+    ++state.tick;
+    state.verdicts[state_t::ACCEPTED] = ++state.commands_accepted;
+    loop.bus().publish(lcmtypes::kStateChannel, &state);
+  };
+  publish();
+  if (!loop.until([&] { return loop.states > 0; })) GTEST_SKIP() << kNoMulticast;
+  Running program({"command", "--mode", "joint", "--lcm-url", url, "--timeout", "0.5 s"});
+  while (!program.ended()) {
+    publish();
+    usleep(10000);
+  }
+  EXPECT_EQ(program.finish(), 1) << program.output();
+  EXPECT_THAT(program.complaints(), HasSubstr("no answer"));
+}
+
 TEST(CommandProgram, SaysWhereNobodyListens) {
   const std::string url = own_url();
   const Outcome nobody =

@@ -215,6 +215,9 @@ TEST(Monitor, TakesALoopThatIsStartedAnewForOne) {
     for (int i = 1; i <= 100; i += i % 9 == 0 ? 3 : 1) ticks.push_back(i);  // some get lost
   }
   EXPECT_THAT(summary_of_ticks(ticks), Not(HasSubstr("more than one loop")));
+  ticks.clear();
+  for (int i = 1; i <= 50; ++i) ticks.insert(ticks.end(), i % 10 == 0 ? 20 : 1, i);  // it pauses
+  EXPECT_THAT(summary_of_ticks(ticks), Not(HasSubstr("more than one loop")));
 }
 
 TEST(Monitor, SaysWhereALogIsDamagedOrCutOff) {

@@ -297,6 +297,23 @@ TEST(WebMonitor, ShowsALogAtAnyTime) {
   EXPECT_EQ(site.monitor().finish(), 0);
 }
 
+TEST(WebMonitor, ShowsTheSmallestRatioOfTheTimeInWhichItIsWanted) {
+  const Scratch scratch;
+  const std::string log = scratch.path("panda.lcm");
+  const std::string steps = changed(
+      scratch, "panda_release_ratio_damping",
+      {{"damping_ratio: 0.7", "damping_ratio: 0.2"},
+       {"  start:", "  steps: [{at: 0.5 s, gains: {task: {damping_ratio: 0.7}}}]\n  start:"}});
+  ASSERT_EQ(run_program({"run", steps, "--fast", "--duration", "2", "--log", log}).status, 0);
+  Site site({"--log", log, "--config", steps});
+  const Json before = body_of(site.get("/frame?t=0.4"))["alarms"];
+  EXPECT_NEAR(before["smallest_ratio"].get<double>(), 0.2, 0.01);
+  EXPECT_EQ(before["changes_of_ratio"], 0);
+  const Json after = body_of(site.get("/frame?t=1.9"))["alarms"];
+  EXPECT_NEAR(after["smallest_ratio"].get<double>(), 0.7, 0.01);
+  EXPECT_GT(after["changes_of_ratio"], 0);
+}
+
 TEST(WebMonitor, ComputesTheResponseAtAPosture) {
   const Scratch scratch;
   const Site site({"--log", short_log(scratch), "--config", scene("panda_release_c2")});

@@ -226,7 +226,8 @@ class TuneServer(unittest.TestCase):
         self.assertEqual(post('/design', good, **{'Content-Type': 'text/plain'})[0], 415)
         self.assertEqual(post('/nowhere', good)[0], 404)
         self.assertEqual(post('/design', json.dumps(good) + ' ' * 65536)[0], 413)
-        self.assertEqual(self.server.ask('PUT', '/design', '{}')[0], 405)
+        refused = self.server.ask('PUT', '/design', '{}')
+        self.assertEqual((refused[0], refused[-1]), (405, b'GET and POST only\n'))
         for words in ('', '{', '[]', 'null', '7', '"a"', '{"design": 3}', '[' * 60000, '{"a":' * 9000, b'\xff\xfe'):
             self.assertEqual(post('/design', words)[0], 400, words[:20])
         for change in ({'q': self.q[:-1]}, {'q': ['a'] * 7}, {'q': [1e300] * 7}, {'q': None}, {'place': 'tip/6'}, {'place': 'joint/7'},

@@ -81,7 +81,7 @@ export function alarms(page) {
   const margin = setup.gain_margin || 1;
   const zero = (count) => [String(count), count ? 'bad' : 'good'];
   const cards = [
-    [`smallest ratio so far${wanted > 0 ? `; wanted ${number(wanted, 3)}` : ''}`, number(all.smallest_ratio, 3), judge(all.smallest_ratio, wanted)],
+    [`smallest ratio ${!all.changes_of_ratio ? 'so far' : wanted > 0 ? 'since it is wanted' : 'since none is wanted'}${wanted > 0 ? `; wanted ${number(wanted, 3)}` : ''}`, number(all.smallest_ratio, 3), judge(all.smallest_ratio, wanted)],
     [`smallest gain margin${setup.gain_margin ? `; wanted ${number(margin, 3)}` : ''}`,
       all.smallest_margin === null ? (sampled ? '∞' : none) : `${number(all.smallest_margin, 3)} ×`,
       all.smallest_margin === null ? (sampled ? 'good' : 'none') : all.smallest_margin < 0.999 * margin ? 'bad' : 'good'],
