@@ -3,6 +3,7 @@
 #include <dashpot/controller/input_error.hpp>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
