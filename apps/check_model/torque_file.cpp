@@ -1,5 +1,6 @@
 #include <dashpot/apps/check_model/driver_log.hpp>
 #include <dashpot/apps/check_model/torque_file.hpp>
+#include <dashpot/apps/records/csv_column.hpp>
 #include <dashpot/apps/records/motion_file.hpp>
 #include <dashpot/controller/input_error.hpp>
 
@@ -22,30 +23,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 enum class Quantity { kOther, kPosition, kVelocity, kTorque };
-
-/// The words of a name, in lower case: "tau_J_d[3]" has tau, j, d and 3.
-std::vector<std::string> words_of(const std::string& name) {
-  std::vector<std::string> words(1);
-  for (const char c : name) {
-    const bool digit = c >= '0' && c <= '9', upper = c >= 'A' && c <= 'Z';
-    const bool letter = upper || (c >= 'a' && c <= 'z');
-    const bool was_digit =
-        !words.back().empty() && words.back()[0] >= '0' && words.back()[0] <= '9';
-    if ((!digit && !letter) || (!words.back().empty() && digit != was_digit)) {
-      if (!words.back().empty()) words.emplace_back();
-    }
-    if (digit || letter) words.back() += upper ? static_cast<char>(c - 'A' + 'a') : c;
-  }
-  if (words.back().empty()) words.pop_back();
-  return words;
-}
-
-bool has_any(const std::vector<std::string>& words, std::initializer_list<const char*> wanted) {
-  return std::any_of(words.begin(), words.end(), [&wanted](const std::string& word) {
-    return std::any_of(wanted.begin(), wanted.end(),
-                       [&word](const char* one) { return word == one; });
-  });
-}
 
 Quantity quantity_of(const MotionChannel& channel) {
   const std::vector<std::string> words = words_of(channel.name);
@@ -162,6 +139,8 @@ class Columns {
   MatrixXd rows(const std::vector<Index>& columns) const {
     MatrixXd result(static_cast<Index>(columns.size()), file_.values.cols());
     for (std::size_t i = 0; i < columns.size(); ++i) {
+      const std::string& problem = file_.channels[static_cast<std::size_t>(columns[i])].problem;
+      if (!problem.empty()) throw InputError("", problem);
       result.row(static_cast<Index>(i)) = file_.values.row(columns[i]);
     }
     return result;

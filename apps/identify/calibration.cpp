@@ -3,6 +3,7 @@
 #include <dashpot/controller/input_error.hpp>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -22,8 +23,25 @@ using identification::MeasuredMode;
 /// A root mean square of differences, in deviations, up to which a model fits: theirs is one, and
 /// an arm is not quite linear.
 constexpr double kFits = 3;
+constexpr double kFar = 2.5;  ///< deviations, beyond which a difference counts by its size
 
-/// Parameters by their names, and what they do to a correction.
+/// Huber's weights: a difference that is far off counts less than by its square, because a mode
+/// that is none must not decide.
+VectorXd robust(const VectorXd& differences) {
+  return differences.unaryExpr([](double d) {
+    const double size = std::abs(d);
+    return size <= kFar ? d : std::copysign(std::sqrt(2 * kFar * size - kFar * kFar), d);
+  });
+}
+
+double root_mean_square(const VectorXd& r) {
+  return r.size() > 0 ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0;
+}
+
+/// Parameters by their names, and what they do to a correction. The search has coordinates of its
+/// own, none of which goes below `least()`: of a payload's inertia about x, y and z these are the
+/// sums over its mass of x^2, y^2 and z^2, because an inertia is one of a body just where they are
+/// not negative.
 class Parameters {
  public:
   Parameters(const LoopPrediction& loop, const std::string& names) {
@@ -54,21 +72,45 @@ class Parameters {
           add(name + " " + std::to_string(i + 1), inertia ? "kg m^2" : "N m s/rad", before[i],
               inertia ? 1 : 20, static_cast<int>(i));
         }
+      } else if (name == "gear_stiffness") {
+        if (config.model.elastic_joints() == 0) {
+          throw InputError("--calibrate",
+                           "'gear_stiffness' needs robot.gear_stiffness in the configuration, a "
+                           "first guess, N m/rad");
+        }
+        const JointVector before = config.model.joint_values(&Joint::gear_stiffness);
+        for (Index i = 0; i < n; ++i) {
+          if (!std::isfinite(before[i])) continue;
+          add(name + " " + std::to_string(i + 1), "N m/rad", before[i], before[i],
+              static_cast<int>(i));
+        }
       } else {
         throw InputError("--calibrate", "'" + name +
                                             "' is none of payload, payload_center, "
-                                            "payload_inertia, reflected_inertia, friction, delay");
+                                            "payload_inertia, reflected_inertia, friction, "
+                                            "gear_stiffness, delay");
       }
       if (std::count(kinds_.begin(), kinds_.end(), name) > 0) {
         throw InputError("--calibrate", "'" + name + "' twice");
       }
       kinds_.push_back(name);
     }
+    shown = MatrixXd::Identity(size(), size());
+    VectorXd values(size());
+    for (Index k = 0; k < size(); ++k) {
+      values[k] = list[static_cast<std::size_t>(k)].before;
+      if (!is_inertia(k)) continue;
+      const Index first = k - joints_[static_cast<std::size_t>(k)];
+      shown.row(k).segment<3>(first).setOnes();
+      shown(k, k) = 0;
+    }
+    start = shown.partialPivLu().solve(values).cwiseMax(least());
   }
 
   Index size() const { return static_cast<Index>(list.size()); }
 
-  ModelCorrection correction(const VectorXd& values, Index n) const {
+  ModelCorrection correction(const VectorXd& coordinates, Index n) const {
+    const VectorXd values = shown * coordinates;
     ModelCorrection result;
     for (std::size_t k = 0; k < list.size(); ++k) {
       const double added = values[static_cast<Index>(k)] - list[k].before;
@@ -78,8 +120,9 @@ class Parameters {
       } else if (list[k].name.starts_with("payload_inertia")) {
         result.inertia[joint] = added;
       } else if (joint >= 0) {
-        VectorXd& vector =
-            list[k].name.starts_with("friction") ? result.friction : result.reflected_inertia;
+        VectorXd& vector = list[k].name.starts_with("friction") ? result.friction
+                           : list[k].name.starts_with("gear")   ? result.gear_stiffness
+                                                                : result.reflected_inertia;
         if (vector.size() == 0) vector = VectorXd::Zero(n);
         vector[joint] = added;
       } else {
@@ -89,19 +132,29 @@ class Parameters {
     return result;
   }
 
-  /// The least value of each: only a centre may be anywhere.
+  /// The least value of each coordinate: a centre may be anywhere, and gears are never without
+  /// stiffness.
   VectorXd least() const {
+    constexpr double kSoftest = 0.05;  // of the stiffness that the configuration has
     VectorXd result(size());
     for (std::size_t k = 0; k < list.size(); ++k) {
-      result[static_cast<Index>(k)] = list[k].name.starts_with("payload_center") ? -kInfinity : 0;
+      result[static_cast<Index>(k)] = list[k].name.starts_with("payload_center") ? -kInfinity
+                                      : list[k].name.starts_with("gear") ? kSoftest * list[k].before
+                                                                         : 0;
     }
     return result;
   }
 
   std::vector<CalibratedParameter> list;
-  VectorXd prior;  ///< how far a parameter may be from what the configuration says
+  VectorXd prior;  ///< how far a coordinate may be from what the configuration says
+  VectorXd start;  ///< the coordinates of the configuration
+  MatrixXd shown;  ///< coordinates to values
 
  private:
+  bool is_inertia(Index k) const {
+    return list[static_cast<std::size_t>(k)].name.starts_with("payload_inertia");
+  }
+
   void add(const std::string& name, const std::string& unit, double before, double far, int joint) {
     list.push_back({name, unit, before, before, 0, false});
     joints_.push_back(joint);
@@ -150,8 +203,7 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
                       std::vector<PostureReport>& postures) {
   Parameters parameters(loop, names);
   const Index p = parameters.size(), n = loop.dof();
-  VectorXd before(p);
-  for (Index i = 0; i < p; ++i) before[i] = parameters.list[static_cast<std::size_t>(i)].before;
+  const VectorXd& before = parameters.start;
   const auto predict = [&](const VectorXd& values) {
     std::vector<std::vector<PredictedMode>> all;
     all.reserve(postures.size());
@@ -168,30 +220,19 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
       match(postures[k].found.modes, postures[k].predicted);
     }
   };
-  const auto rms = [](const VectorXd& r) {
-    return r.size() > 0 ? std::sqrt(r.squaredNorm() / static_cast<double>(r.size())) : 0;
-  };
   // First of all with large deviations, so that no match that is wrong at the start decides. In the
   // end nothing is better known than to this: no arm is linear, and at one posture, to less.
   constexpr std::array<double, 5> kLeast = {0.05, 0.01, 2e-3, 5e-4, 1e-4};
   double least = kLeast.back();
   Calibration result;
   rematch(before);
-  result.misfit_before = rms(differences(postures, predict(before), least));
+  result.misfit_before = root_mean_square(differences(postures, predict(before), least));
 
   VectorXd x = before;
   const VectorXd lowest = parameters.least();
   MatrixXd J;
   VectorXd r;
   const VectorXd weight = parameters.prior.cwiseInverse();
-  // Huber's weights: what is far off counts less than by its square.
-  const auto robust = [](const VectorXd& differences) {
-    constexpr double kFar = 2.5;
-    return VectorXd(differences.unaryExpr([](double d) {
-      const double size = std::abs(d);
-      return size <= kFar ? d : std::copysign(std::sqrt(2 * kFar * size - kFar * kFar), d);
-    }));
-  };
   const auto residual = [&](const VectorXd& values) {
     return robust(differences(postures, predict(values), least));
   };
@@ -233,18 +274,27 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
   rematch(x);
   linearize();
   result.numbers = static_cast<int>(r.size());
-  result.misfit = rms(differences(postures, predict(x), least));
+  const VectorXd left = differences(postures, predict(x), least);
+  result.misfit = root_mean_square(left);
   MatrixXd A = J.transpose() * J;
   A.diagonal() += weight.cwiseAbs2();
-  result.consistent = r.size() > p && result.misfit < kFits;
+  result.consistent = r.size() > p && root_mean_square(r) < kFits;
   const double excess = r.squaredNorm() / std::max(1.0, static_cast<double>(r.size() - p));
-  const MatrixXd covariance = A.ldlt().solve(MatrixXd::Identity(p, p)) * std::max(1.0, excess);
+  const MatrixXd covariance = parameters.shown * A.ldlt().solve(MatrixXd::Identity(p, p)) *
+                              parameters.shown.transpose() * std::max(1.0, excess);
+  const VectorXd values = parameters.shown * x;
   for (Index i = 0; i < p; ++i) {
     CalibratedParameter& one = parameters.list[static_cast<std::size_t>(i)];
-    one.value = x[i];
+    one.value = values[i];
     one.std = std::sqrt(covariance(i, i));
     // Deviations say nothing of a parameter that does not fit.
     one.determined = result.consistent && one.std < 0.2 * parameters.prior[i];
+  }
+  if (result.consistent && result.misfit >= kFits) {
+    result.warnings.push_back(
+        std::to_string((left.array().abs() > 2 * kFar).count()) + " of " +
+        std::to_string(left.size()) +
+        " numbers are further than 5 deviations from what is predicted, and count for less");
   }
   for (Index i = 0; i < p; ++i) {
     for (Index k = i + 1; k < p; ++k) {
@@ -260,7 +310,7 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
   if (!result.consistent) {
     result.warnings.emplace_back(
         "with these parameters the configuration does not explain the modes: something else "
-        "differs (payload_center, payload_inertia, friction, delay, the gains, the model)");
+        "differs (payload_center, payload_inertia, friction, delay, gears, the gains, the model)");
   }
   if (r.size() < p) {
     result.warnings.push_back("fewer numbers were measured (" + std::to_string(r.size()) +

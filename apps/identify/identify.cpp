@@ -7,12 +7,17 @@
 #include <dashpot/apps/report/json.hpp>
 
 #include <CLI/CLI.hpp>
-#include <chrono>
+#include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
 
 namespace dashpot::apps {
 namespace {
+
+constexpr const char* kNoneBelieved =
+    "none of those found is believed: more pushes, in other directions, or a longer record";
 
 constexpr const char* kHelp =
     R"(FILE is an LCM log of `dashpot run` or `dashpot drive`, or a CSV file with a line of names and
@@ -75,7 +80,7 @@ void add_identify(CLI::App& program) {
       command
           ->add_option("--calibrate", options->calibrate,
                        "Explain the differences by payload, payload_center, payload_inertia, "
-                       "reflected_inertia, friction, delay: those named")
+                       "reflected_inertia, friction, gear_stiffness, delay: those named")
           ->option_text("NAME,...")
           ->needs(against);
   command->add_option("--output", options->output, "The configuration with what --calibrate found")
@@ -102,6 +107,11 @@ void add_identify(CLI::App& program) {
     if (!options->plot.empty()) draw_identification(options->plot, report);
     print(options->json ? json_text(identify_json(report)) : identify_table(report));
     if (StopSignal::given()) throw Interrupted("the modes above are those found until then");
+    const bool any = std::any_of(report.postures.begin(), report.postures.end(),
+                                 [](const auto& posture) { return !posture.found.modes.empty(); });
+    if (any) return;
+    throw std::runtime_error("no modes: " +
+                             (report.advice.empty() ? std::string(kNoneBelieved) : report.advice));
   });
 }
 

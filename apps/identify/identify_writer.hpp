@@ -43,6 +43,7 @@ struct ModelCorrection {
   Eigen::Vector3d inertia = Eigen::Vector3d::Zero();  ///< added about its centre, diagonal, kg m^2
   Eigen::VectorXd reflected_inertia;                  ///< added, n, kg m^2; empty: none
   Eigen::VectorXd friction;                           ///< viscous, added, n, N m s/rad; empty: none
+  Eigen::VectorXd gear_stiffness;                     ///< added, n, N m/rad; empty: none
   double delay = 0;                                   ///< added, ticks
 };
 

@@ -43,6 +43,7 @@ controller::RobotDescription corrected(const controller::Config& config,
   options.payload.inertia.diagonal() += correction.inertia;
   options.reflected_inertia = sum_of(options.reflected_inertia, correction.reflected_inertia, n);
   options.viscous_friction = sum_of(joint_friction(config), correction.friction, n);
+  if (correction.gear_stiffness.size() > 0) options.gear_stiffness += correction.gear_stiffness;
   return robot;
 }
 
@@ -173,13 +174,20 @@ void LoopPrediction::write(const std::string& path, const ModelCorrection& corre
   const auto list = [](const JointVector& values) {
     YAML::Node node(YAML::NodeType::Sequence);
     node.SetStyle(YAML::EmitterStyle::Flow);
-    for (const double value : values) node.push_back(value);
+    for (const double value : values) {
+      if (std::isfinite(value)) {
+        node.push_back(value);
+      } else {
+        node.push_back("none");  // of gears that do not bend
+      }
+    }
     return node;
   };
   if (correction.reflected_inertia.size() > 0) {
     robot["reflected_inertia"] = list(options.reflected_inertia);
   }
   if (correction.friction.size() > 0) robot["viscous_friction"] = list(options.viscous_friction);
+  if (correction.gear_stiffness.size() > 0) robot["gear_stiffness"] = list(options.gear_stiffness);
   if (correction.payload != 0) robot["payload"]["mass"] = options.payload.mass;
   if (!correction.center.isZero(0)) robot["payload"]["center"] = list(options.payload.center);
   if (!correction.inertia.isZero(0)) {

@@ -1,280 +1,142 @@
+#include <dashpot/apps/records/csv_column.hpp>
 #include <dashpot/apps/records/motion_rows.hpp>
-#include <dashpot/controller/yaml/quantity.hpp>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <stdexcept>
 
 namespace dashpot::apps {
-
-std::string_view trimmed(std::string_view text) {
-  const auto begin = text.find_first_not_of(" \t\r");
-  if (begin == std::string_view::npos) return {};
-  text = text.substr(begin, text.find_last_not_of(" \t\r") - begin + 1);
-  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') {
-    return trimmed(text.substr(1, text.size() - 2));
-  }
-  return text;
-}
-
-std::string lower(std::string_view text) {
-  std::string result(text);
-  for (char& c : result) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return result;
-}
-
 namespace {
 
 using controller::InputError;
 
-constexpr std::size_t kMostColumns = 1000;
-constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-
-/// A column by its heading.
-struct Column {
-  std::string name, unit;
-  double factor = 1;  ///< to SI
-  bool time = false;
-  bool guessed = false;  ///< the time's unit
-  bool text = false;     ///< not numbers
-};
-
-struct Conversion {
-  std::string unit;
-  double factor;
-};
-
-/// The SI unit that `unit` converts to.
-std::optional<Conversion> to_si(const std::string& unit) {
-  if (unit == "ns") return Conversion{"s", 1e-9};
-  for (const char* si : {"s", "rad", "m", "rad/s", "m/s", "N m", "N"}) {
-    try {
-      return Conversion{si, controller::parse_quantity("1 " + unit, si)};
-    } catch (const std::invalid_argument&) {
-      continue;
-    }
-  }
-  return std::nullopt;
-}
-
-/// Returns what a name without a unit is measured in, by the letters it begins with.
-std::string usual_unit(const std::string& name) {
-  const std::string letters = name.substr(0, name.find_first_of("0123456789_.[( "));
-  const auto is_any = [&letters](std::initializer_list<const char*> names) {
-    return std::find(names.begin(), names.end(), letters) != names.end();
-  };
-  if (is_any({"q", "position", "pos", "angle"})) return "rad";
-  if (is_any({"qd", "dq", "v", "vel", "velocity"})) return "rad/s";
-  if (is_any({"tau", "torque", "effort"})) return "N m";
-  return "";
-}
-
-Column read_heading(std::string_view cell, std::size_t number) {
-  const std::string_view text = trimmed(cell);
-  Column column;
-  std::string unit;
-  const auto open = text.find_last_of("[(");
-  const bool index = open != std::string_view::npos && open + 1 < text.size() &&
-                     text.find_first_not_of("0123456789", open + 1) == text.size() - 1;
-  if (!index && open != std::string_view::npos && (text.back() == ']' || text.back() == ')')) {
-    column.name = trimmed(text.substr(0, open));
-    unit = trimmed(text.substr(open + 1, text.size() - open - 2));
-    if (unit == "1" || unit == "-") unit.clear();
-  } else {
-    column.name = text;
-    const auto bar = text.rfind('_');
-    if (bar != std::string_view::npos && to_si(std::string(text.substr(bar + 1)))) {
-      column.name = text.substr(0, bar);
-      unit = text.substr(bar + 1);
-    }
-  }
-  if (column.name.empty()) column.name = "column " + std::to_string(number);
-  const std::string name = lower(column.name);
-  for (const char* one : {"t", "time", "timestamp", "time_stamp", "stamp", "utime", "duration",
-                          "elapsed", "elapsed_time", "seconds", "datetime"}) {
-    column.time = column.time || name == one;
-  }
-  if (unit.empty()) {
-    column.guessed = column.time && name != "utime";
-    unit = column.time ? (name == "utime" ? "us" : "s") : usual_unit(name);
-  }
-  // Another unit than a motion's matters only to those who want the column, and stays as it is.
-  const Conversion conversion = to_si(unit).value_or(Conversion{unit, 1});
-  column.unit = conversion.unit;
-  column.factor = conversion.factor;
-  if (column.time && column.unit != "s") {
-    throw InputError("", "column " + std::to_string(number) + " (" + column.name + "): in " + unit +
-                             ", a time is wanted in s, ms, us or ns");
-  }
-  return column;
-}
-
-/// Seconds from 1970 of "2026-01-31T12:00:00.5Z" or with a space; none if it is something else. A
-/// zone makes no difference to what passes between two of them.
-std::optional<double> read_date(std::string_view text) {
-  std::array<int, 5> part{};
-  std::size_t at = 0;
-  constexpr std::string_view kBetween = "--T:";
-  for (std::size_t i = 0; i < part.size(); ++i) {
-    const auto [end, error] = std::from_chars(text.data() + at, text.data() + text.size(), part[i]);
-    if (error != std::errc{} || part[i] < 0) return std::nullopt;
-    at = static_cast<std::size_t>(end - text.data());
-    const char next = i < kBetween.size() ? kBetween[i] : ':';
-    if (at >= text.size() || (text[at] != next && !(next == 'T' && text[at] == ' '))) {
-      return std::nullopt;
-    }
-    ++at;
-  }
-  double second = 0;
-  const auto [end, error] = std::from_chars(text.data() + at, text.data() + text.size(), second);
-  if (error != std::errc{}) return std::nullopt;
-  const std::chrono::year_month_day day{std::chrono::year(part[0]),
-                                        std::chrono::month(static_cast<unsigned>(part[1])),
-                                        std::chrono::day(static_cast<unsigned>(part[2]))};
-  if (!day.ok()) return std::nullopt;
-  const auto days = std::chrono::sys_days(day).time_since_epoch().count();
-  return 86400.0 * static_cast<double>(days) + 3600 * part[3] + 60 * part[4] + second;
-}
-
-double read_cell(std::string_view cell, const Column& column, std::size_t line) {
-  std::string_view text = trimmed(cell);
-  if (text.empty()) return kMissing;
-  if (text.front() == '+') text.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc::result_out_of_range) value = kMissing;
-  if ((error != std::errc{} && error != std::errc::result_out_of_range) ||
-      end != text.data() + text.size()) {
-    throw InputError("", "line " + std::to_string(line) + ", " + column.name + ": '" +
-                             std::string(text.substr(0, 40)) + "' is no number");
-  }
-  return std::isfinite(value) ? value * column.factor : kMissing;
-}
-
-/// The cells of a line between `separator`s; between spaces, as many as there are.
-std::vector<std::string_view> cells_of(std::string_view row, char separator) {
-  std::vector<std::string_view> cells;
-  if (separator == ' ') row = trimmed(row);
-  while (cells.size() <= kMostColumns) {
-    const auto next = std::min(row.find(separator), row.size());
-    cells.push_back(row.substr(0, next));
-    if (next == row.size()) break;
-    row.remove_prefix(next + 1);
-    if (separator == ' ') row.remove_prefix(std::min(row.find_first_not_of(' '), row.size()));
-  }
-  return cells;
-}
-
-char separator_of(std::string_view row) {
-  for (const char candidate : {';', '\t', ','}) {
-    if (row.find(candidate) != std::string_view::npos) return candidate;
-  }
-  // "time [s]" is one name.
-  const bool words = row.find_first_of("[(\"") == std::string_view::npos;
-  return words && trimmed(row).find(' ') != std::string_view::npos ? ' ' : ',';
-}
-
-bool is_number(std::string_view cell) {
-  cell = trimmed(cell);
-  double value = 0;
-  return !cell.empty() &&
-         std::from_chars(cell.data(), cell.data() + cell.size(), value).ec == std::errc{};
-}
+/// What a file lacks that has no time.
+constexpr const char* kNoTime =
+    "no column of time (t, time, timestamp, stamp, date, utime, duration or elapsed): --rate HZ, "
+    "or --columns with a name for each column";
 
 class CsvReader {
  public:
   explicit CsvReader(const FileHints& hints) : hints_(hints) {}
 
-  MotionFile read(std::string_view rest) {
-    if (rest.substr(0, 3) == "\xEF\xBB\xBF") rest.remove_prefix(3);
-    for (line_ = 1; !rest.empty(); ++line_) {
-      const auto end = std::min(rest.find('\n'), rest.size());
-      const std::string_view row = rest.substr(0, end);
-      rest.remove_prefix(std::min(end + 1, rest.size()));
+  MotionFile read(std::string_view text) {
+    if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) {
+      throw InputError("", "is text in UTF-16: save it as UTF-8");
+    }
+    if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+    newline_ = text.find('\n') == std::string_view::npos ? '\r' : '\n';
+    whole_ = text.empty() || text.back() == newline_;
+    rest_ = text;
+    for (line_ = 1; !rest_.empty(); ++line_) {
+      const std::string_view row = next_line(rest_);
       const std::string_view words = trimmed(row);
       if (words.empty()) continue;
       const auto name = words.find_first_not_of("#%/ \t");
       if (name != 0) {
-        if (name != std::string_view::npos) comment_ = words.substr(name);
-        continue;
-      }
-      if (!columns_.empty()) {
-        read_row(row);
-        continue;
-      }
-      const bool names = !is_number(cells_of(row, separator_of(row)).front());
-      if (!hints_.columns.empty()) {
-        read_names(hints_.columns);
-        separator_ = separator_of(row);
-      } else if (names) {
-        read_names(row);
-      } else if (!comment_.empty()) {  // the names are in the comment before
-        read_names(comment_);
+        if (name != std::string_view::npos) keep_names(words.substr(name), true);
+      } else if (columns_.empty()) {
+        begin(row);
       } else {
-        number_columns(row, rest);
+        read_row(row);
       }
-      if (!names) read_row(row);
     }
-    if (columns_.empty() && !comment_.empty()) read_names(comment_);
+    if (columns_.empty() && names_line_ > 0) read_names(names_);
     if (columns_.empty()) throw InputError("", "is empty");
+    if (rows_.size() < Rows::kLeast) {  // the reason may be that they are no numbers
+      for (const MotionChannel& channel : file_.channels) {
+        if (!channel.problem.empty()) throw InputError("", channel.problem);
+      }
+    }
     rows_.finish();
     scale_time();
     return std::move(file_);
   }
 
  private:
-  [[noreturn]] void fail(const std::string& what) const {
-    throw InputError("", "line " + std::to_string(line_) + ": " + what);
+  [[noreturn]] static void fail(std::size_t line, const std::string& what) {
+    throw InputError("", "line " + std::to_string(line) + ": " + what);
+  }
+
+  std::string_view next_line(std::string_view& rest) const {
+    const auto end = std::min(rest.find(newline_), rest.size());
+    const std::string_view row = rest.substr(0, end);
+    rest.remove_prefix(std::min(end + 1, rest.size()));
+    return row;
+  }
+
+  /// A line that may have the names, if the next one has numbers.
+  void keep_names(std::string_view row, bool comment) {
+    names_ = row;
+    names_line_ = line_;
+    comment_ = comment;
+  }
+
+  /// A line before the first row of numbers, or that row.
+  void begin(std::string_view row) {
+    const std::vector<std::string_view> cells = cells_of(row, separator_of(row));
+    const bool numbers = is_number(cells.front());
+    if (!hints_.columns.empty()) {
+      if (numbers || cells.size() == cells_of(hints_.columns, ',').size()) {
+        read_names(hints_.columns);
+        separator_ = separator_of(row);
+      }
+    } else if (!numbers) {
+      keep_names(row, false);
+      // Rows may begin with text, where the names are clear; else more lines may come before them.
+      if (hints_.rate > 0 || has_time(cells)) read_names(row);
+      return;
+    } else if (names_line_ > 0 &&
+               (!comment_ || cells_of(names_, separator_of(names_)).size() == cells.size())) {
+      read_names(names_);
+    } else {
+      number_columns(row);
+    }
+    if (numbers) read_row(row);
+  }
+
+  static bool has_time(const std::vector<std::string_view>& cells) {
+    return std::any_of(cells.begin(), cells.end(),
+                       [](std::string_view cell) { return read_heading(cell, 1).time; });
   }
 
   void read_names(std::string_view row) {
     separator_ = separator_of(row);
-    std::vector<std::string_view> cells = cells_of(row, separator_);
-    if (cells.size() > kMostColumns) throw InputError("", "more than 1000 columns");
-    if (cells.size() > 1 && trimmed(cells.back()).empty()) cells.pop_back();
-    for (const std::string_view cell : cells) {
+    for (const std::string_view cell : cells_of(row, separator_)) {
       columns_.push_back(read_heading(cell, columns_.size() + 1));
+    }
+    const auto is_mode = [](const CsvColumn& column) { return column.name == "natural_frequency"; };
+    if (std::any_of(columns_.begin(), columns_.end(), is_mode)) {
+      throw InputError("",
+                       "has modes in place of motion: give the log that they were exported from");
     }
     check_time();
   }
 
-  void check_time() {
+  void check_time() const {
     const auto times = std::count_if(columns_.begin(), columns_.end(),
-                                     [](const Column& column) { return column.time; });
-    if (times == 0 && hints_.rate == 0) {
-      fail(
-          "no column of time (t, time, timestamp, stamp, utime, duration or elapsed): --rate HZ, "
-          "or "
-          "--columns with a name for each column");
-    }
-    if (times > 1) fail("two columns of time: --columns gives one of them another name");
+                                     [](const CsvColumn& column) { return column.time; });
+    const std::size_t line = names_line_ > 0 ? names_line_ : line_;
+    if (times == 0 && hints_.rate == 0) fail(line, kNoTime);
+    if (times > 1) fail(line, "two columns of time: --columns gives one of them another name");
     if (columns_.size() == static_cast<std::size_t>(times)) {
       throw InputError("", "no column but the time");
     }
   }
 
   /// Columns of a file without names: the first one is the time if it rises evenly.
-  void number_columns(std::string_view row, std::string_view rest) {
+  void number_columns(std::string_view row) {
     separator_ = separator_of(row);
     std::vector<double> first;
-    const auto take = [&](std::string_view line) {
+    for (std::string_view rest = rest_; first.size() < 20; row = next_line(rest)) {
+      const std::string_view cell = trimmed(cells_of(row, separator_).front());
       double value = 0;
-      const std::string_view cell = trimmed(cells_of(line, separator_).front());
       if (std::from_chars(cell.data(), cell.data() + cell.size(), value).ec == std::errc{}) {
         first.push_back(value);
       }
-    };
-    take(row);
-    while (!rest.empty() && first.size() < 20) {
-      const auto end = std::min(rest.find('\n'), rest.size());
-      take(rest.substr(0, end));
-      rest.remove_prefix(std::min(end + 1, rest.size()));
+      if (rest.empty()) break;
     }
     const double step = first.size() > 1 ? first[1] - first[0] : 0;
     bool rises = hints_.rate == 0 && step > 0;
@@ -289,45 +151,87 @@ class CsvReader {
       columns_[0] = {"c1", "s", 1, true, true};
       file_.notes.emplace_back("no line of names: the first column is taken for the time");
     } else if (hints_.rate == 0) {
-      fail(
-          "numbers, where a line of names with units is wanted first: --columns \"time [s],q1 "
-          "[rad],...\" says what they are, and --rate HZ stands for a time");
+      fail(line_,
+           "numbers, where a line of names with units is wanted first: --columns \"time [s],q1 "
+           "[rad],...\" says what they are, and --rate HZ stands for a time");
     }
     check_time();
   }
 
   void read_row(std::string_view row) {
-    std::vector<std::string_view> cells = cells_of(row, separator_);
-    if (cells.size() == columns_.size() + 1 && trimmed(cells.back()).empty()) cells.pop_back();
-    if (cells.size() != columns_.size()) {
-      fail("not " + std::to_string(columns_.size()) + " columns, as the names have, but " +
-           std::to_string(cells.size()));
+    const std::vector<std::string_view> cells = cells_of(row, separator_);
+    if (std::all_of(cells.begin(), cells.end(), [](auto cell) { return trimmed(cell).empty(); })) {
+      return;
     }
-    if (file_.channels.empty()) note_channels(cells);
+    // An empty last cell may be the end of the line, or a sample.
+    if (row.ends_with('\r')) row.remove_suffix(1);
+    const bool open = cells.size() + 1 == columns_.size() && row.ends_with(separator_);
+    if (cells.size() != columns_.size() && !open) {
+      if (rest_.empty() && !whole_ && cells.size() < columns_.size() && rows_.size() > 0) {
+        file_.notes.emplace_back("the last line ends early, and is left out");
+        return;
+      }
+      fail(line_, "not " + std::to_string(columns_.size()) + " columns, as the names have, but " +
+                      std::to_string(cells.size()));
+    }
+    if (file_.channels.empty()) {
+      if (take_units(cells)) return;
+      note_channels(cells);
+    }
     double at = hints_.rate > 0 ? static_cast<double>(samples_++) / hints_.rate : kMissing;
     values_.clear();
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      const Column& column = columns_[i];
-      if (column.text) continue;
-      std::string_view cell = cells[i];
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      if (columns_[i].text) continue;
+      std::string_view cell = i < cells.size() ? cells[i] : std::string_view();
       std::string point;
       if (separator_ != ',' && cell.find(',') != std::string_view::npos) {
         point = cell;
         point[point.find(',')] = '.';
         cell = point;
       }
-      if (!column.time) {
-        values_.push_back(read_cell(cell, column, line_));
+      if (!columns_[i].time) {
+        values_.push_back(read_value(cell, columns_[i]));
       } else if (hints_.rate == 0) {
         at = read_time(cell, columns_[i]);
       }
     }
-    if (std::isnan(at)) fail("no time");
+    if (std::isnan(at)) fail(line_, "no time");
     rows_.add(at, values_.data(), values_.size());
   }
 
+  /// A second line of the heading, with the units alone.
+  bool take_units(const std::vector<std::string_view>& cells) {
+    std::vector<CsvColumn> columns = columns_;
+    bool any = false;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      std::string unit(trimmed(cells[i]));
+      if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) {
+        unit = unit.substr(1, unit.size() - 2);
+      }
+      if (unit.empty() || unit == "-" || unit == "1") continue;
+      if (is_number(unit)) return false;
+      const bool motion = set_unit(unit, columns[i]);
+      if (columns[i].time && (!motion || columns[i].unit != "s")) return false;
+      columns[i].guessed = false;
+      any = any || motion;
+    }
+    if (any) columns_ = std::move(columns);
+    return any;
+  }
+
+  /// The sample of a channel. What is no number matters only to those who want the channel.
+  double read_value(std::string_view cell, const CsvColumn& column) {
+    if (const std::optional<double> value = read_number(cell)) return *value * column.factor;
+    MotionChannel& channel = file_.channels[values_.size()];
+    if (channel.problem.empty()) {
+      channel.problem = "line " + std::to_string(line_) + ", " + column.name + ": '" +
+                        std::string(trimmed(cell).substr(0, 40)) + "' is no number";
+    }
+    return kMissing;
+  }
+
   /// From the first one, so that large numbers lose no digits.
-  double read_time(std::string_view cell, Column& column) {
+  double read_time(std::string_view cell, CsvColumn& column) {
     const std::string_view text = trimmed(cell);
     if (const std::optional<double> date = read_date(text)) {
       column.guessed = false;
@@ -336,28 +240,32 @@ class CsvReader {
     }
     std::int64_t whole = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), whole);
-    const bool is_whole = error == std::errc{} && end == text.data() + text.size();
-    if (is_whole && !first_whole_) first_whole_ = whole;
-    const double value = is_whole ? static_cast<double>(whole - *first_whole_) * column.factor
-                                  : read_cell(cell, column, line_);
-    fractions_ = fractions_ ||
-                 std::abs(value / column.factor) != std::floor(std::abs(value / column.factor));
-    return value -
-           (is_whole || !first_whole_ ? 0 : static_cast<double>(*first_whole_) * column.factor);
+    if (error == std::errc{} && end == text.data() + text.size()) {
+      if (!first_whole_) first_whole_ = whole;
+      return static_cast<double>(whole - *first_whole_) * column.factor;
+    }
+    const std::optional<double> value = read_number(text);
+    if (!value) {
+      throw InputError("", "line " + std::to_string(line_) + ", " + column.name + ": '" +
+                               std::string(text.substr(0, 40)) +
+                               "' is no time, a number or 2026-01-31T12:00:00.5Z: --rate HZ stands "
+                               "for one");
+    }
+    fractions_ = fractions_ || std::abs(*value) != std::floor(std::abs(*value));
+    return (*value - static_cast<double>(first_whole_.value_or(0))) * column.factor;
   }
 
   /// The channels, without those whose first cell is text.
   void note_channels(const std::vector<std::string_view>& cells) {
     std::string left_out;
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      Column& column = columns_[i];
-      const std::string_view cell = trimmed(cells[i]);
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      CsvColumn& column = columns_[i];
+      const std::string_view cell = i < cells.size() ? trimmed(cells[i]) : std::string_view();
       const bool letters = !cell.empty() && ((cell[0] >= 'A' && cell[0] <= 'Z') ||
                                              (cell[0] >= 'a' && cell[0] <= 'z'));
-      const std::string word = lower(cell);
-      column.text = !column.time && letters && word != "nan" && word != "inf" && word != "infinity";
+      column.text = !column.time && letters && !read_number(cell);
       if (column.text) left_out += (left_out.empty() ? "" : ", ") + column.name;
-      if (!column.time && !column.text) file_.channels.push_back({column.name, column.unit});
+      if (!column.time && !column.text) file_.channels.push_back({column.name, column.unit, ""});
     }
     if (!left_out.empty()) file_.notes.push_back("left out, as they hold text: " + left_out);
     if (file_.channels.empty()) throw InputError("", "no column of numbers but the time");
@@ -365,8 +273,8 @@ class CsvReader {
 
   /// A time without a unit in whole numbers whose steps are no seconds is in ms, us or ns.
   void scale_time() {
-    const auto column =
-        std::find_if(columns_.begin(), columns_.end(), [](const Column& one) { return one.time; });
+    const auto column = std::find_if(columns_.begin(), columns_.end(),
+                                     [](const CsvColumn& one) { return one.time; });
     if (column == columns_.end() || !column->guessed || fractions_ || hints_.rate > 0) return;
     const double step =
         file_.time[file_.time.size() - 1] / static_cast<double>(file_.time.size() - 1);
@@ -380,12 +288,19 @@ class CsvReader {
                           ", by its steps: give its unit if it is not");
   }
 
+  static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
   FileHints hints_;
   MotionFile file_;
   Rows rows_{file_};
-  std::vector<Column> columns_;
+  std::vector<CsvColumn> columns_;
   std::vector<double> values_;
-  std::string_view comment_;  ///< the last one
+  std::string_view rest_;   ///< what was not read yet
+  std::string_view names_;  ///< the last line that may have the names
+  std::size_t names_line_ = 0;
+  bool comment_ = false;  ///< it is one
+  char newline_ = '\n';
+  bool whole_ = true;  ///< the last line has an end
   char separator_ = ',';
   std::size_t line_ = 1;
   std::size_t samples_ = 0;

@@ -1,3 +1,4 @@
+#include <dashpot/apps/records/csv_column.hpp>
 #include <dashpot/apps/records/motion_file.hpp>
 #include <dashpot/apps/records/motion_rows.hpp>
 #include <dashpot/lcmtypes/message_reader.hpp>
@@ -8,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <string_view>
 
 namespace dashpot::apps {
 namespace {
@@ -17,24 +19,6 @@ using Eigen::Index;
 
 constexpr std::size_t kMostBytes = std::size_t{1} << 30;
 constexpr double kNoSample = std::numeric_limits<double>::quiet_NaN();
-
-/// Whether a channel is what somebody wanted and not what was measured: "q_d_0", "pos_cmd[1]".
-bool is_desired(const std::string& name) {
-  std::string stem = lower(name);
-  while (!stem.empty() &&
-         std::string_view("0123456789_.[]() ").find(stem.back()) != std::string_view::npos) {
-    stem.pop_back();
-  }
-  const std::string last = stem.substr(stem.find_last_of("_. ") + 1);
-  for (const char* word : {"d", "des", "desired", "cmd", "command", "commanded", "ref", "reference",
-                           "goal", "target", "setpoint"}) {
-    if (last == word && last.size() < stem.size()) return true;
-  }
-  for (const char* word : {"desired", "target", "command", "cmd_", "ref_", "goal", "setpoint"}) {
-    if (stem.starts_with(word)) return true;
-  }
-  return false;
-}
 
 MotionFile read_log(const std::string& path) {
   MotionFile file;
@@ -105,6 +89,12 @@ bool is_log(const std::string& text) {
                     [](unsigned char a, char b) { return a == static_cast<unsigned char>(b); });
 }
 
+/// Whether a file is MCAP, or one of a rosbag's.
+bool is_bag(std::string_view text) {
+  return text.starts_with("\x89MCAP0\r\n") || text.starts_with("SQLite format 3") ||
+         text.starts_with("#ROSBAG");
+}
+
 }  // namespace
 
 MotionFile read_motion_file(const std::string& path, const FileHints& hints) try {
@@ -113,6 +103,12 @@ MotionFile read_motion_file(const std::string& path, const FileHints& hints) try
     text = text::read_file(path, kMostBytes);
   } catch (const std::runtime_error& error) {
     throw InputError("", error.what());
+  }
+  if (!std::isfinite(hints.rate)) throw InputError("--rate", "has to be a finite number, Hz");
+  if (is_bag(text)) {
+    throw InputError("",
+                     "is a bag or MCAP: in Python, dashpot.identify(dashpot.read_log(FILE)[TOPIC]) "
+                     "reads a topic of JointState");
   }
   return is_log(text) ? read_log(path) : read_csv(text, hints);
 } catch (const InputError& error) {

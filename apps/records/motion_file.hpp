@@ -10,8 +10,9 @@ namespace dashpot::apps {
 /// unit q is in rad, qd, dq and v in rad/s, tau and torque in N m, time in s, utime in us), then
 /// numbers between commas, semicolons (with decimal commas, too), tabs or spaces. The names may be
 /// in a comment, as numpy.savetxt writes them, or in `hints`. An empty cell or nan is a sample that
-/// is missing; columns that begin with text are left out. One column is the time: t, time,
-/// timestamp, stamp, utime, duration or elapsed, in numbers or as 2026-01-31T12:00:00.5Z; where no
+/// is missing, as is NA or null; columns that begin with text are left out, and text further down
+/// is a `problem` of its channel. One column is the time: t, time, timestamp, stamp, date, utime,
+/// duration or elapsed, in numbers or as 2026-01-31T12:00:00.5Z; where no
 /// unit is given and whole numbers are no seconds, it is in ms, us or ns. Of a file without names a
 /// first column that rises evenly is the time. Throws InputError that names the file, the line and
 /// the column.

@@ -7,16 +7,11 @@
 
 namespace dashpot::apps {
 
-/// The unit of the columns of a file that does not name them.
-inline constexpr const char* kUnnamed = "?";
-
-/// Without spaces, and quotation marks, around it.
-std::string_view trimmed(std::string_view text);
-std::string lower(std::string_view text);
-
 /// Rows as they come, in one order of time.
 class Rows {
  public:
+  static constexpr std::size_t kLeast = 20;
+
   explicit Rows(MotionFile& file) : file_(file) {}
 
   /// The sample at `time` (s): `count` values.
@@ -30,8 +25,9 @@ class Rows {
     return true;
   }
 
+  std::size_t size() const { return times_.size(); }
+
   void finish() {
-    constexpr std::size_t kLeast = 20;
     if (times_.size() < kLeast) {
       throw controller::InputError("", std::to_string(times_.size()) + " samples, need 20 or more");
     }

@@ -9,6 +9,7 @@ namespace dashpot::apps {
 struct MotionChannel {
   std::string name;
   std::string unit;  ///< SI: rad, m, rad/s, m/s, N m, N; or the file's own; empty if it has none
+  std::string problem = {};  ///< why it cannot be used; empty if it can
 };
 
 /// What a file does not say of itself.

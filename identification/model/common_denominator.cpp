@@ -1,4 +1,5 @@
 #include <dashpot/identification/model/common_denominator.hpp>
+#include <dashpot/identification/records/motion_kind.hpp>
 
 #include <unsupported/Eigen/FFT>
 
@@ -36,7 +37,7 @@ Lines lines_of(const std::vector<MotionRecord>& records, double step, double hig
   Lines lines;
   lines.first.push_back(0);
   for (const MotionRecord& record : records) {
-    const Index N = record.time.size();
+    const Index N = smooth_count(record.time.size());
     const double width = 2 * std::numbers::pi / (static_cast<double>(N) * step);
     const Index count = std::min(static_cast<Index>(highest / width), N / 2 - 1);
     lines.first.push_back(lines.first.back() + std::max<Index>(0, count));
@@ -47,16 +48,16 @@ Lines lines_of(const std::vector<MotionRecord>& records, double step, double hig
   lines.delay.resize(all);
   for (std::size_t r = 0; r < records.size(); ++r) {
     const Index from = lines.first[r], count = lines.first[r + 1] - from;
-    const Index N = records[r].time.size();
+    const Index N = smooth_count(records[r].time.size());
     const double size = 1 / std::sqrt(static_cast<double>(N));
     for (Index c = 0; c < lines.output.cols(); ++c) {
-      const VectorXd y = records[r].output.row(c);
+      const VectorXd y = records[r].output.row(c).head(N);
       lines.output.col(c).segment(from, count) =
           spectrum(y.array() - y.mean()).segment(1, count) * size;
     }
     for (Index i = 0; i < lines.input.cols(); ++i) {
       lines.input.col(i).segment(from, count) =
-          spectrum(records[r].input.row(i).transpose()).segment(1, count) * size;
+          spectrum(records[r].input.row(i).head(N).transpose()).segment(1, count) * size;
     }
     for (Index k = 0; k < count; ++k) {
       const double w =

@@ -1,5 +1,6 @@
 #include <dashpot/identification/model/excited_cells.hpp>
 #include <dashpot/identification/records/decay_cells.hpp>
+#include <dashpot/identification/records/motion_kind.hpp>
 
 #include <unsupported/Eigen/FFT>
 
@@ -22,13 +23,21 @@ constexpr Index kMostCells = 8000;  // of all records
 constexpr double kBin = 0.04;       // of the band of the inputs: bins that count together
 constexpr double kBridge = 3.5;     // steps, over which samples are interpolated
 
+/// As many numbers, or a few more, of which a Fourier transform is fast.
+Index transformed(Index samples) {
+  while (smooth_count(samples) != samples) ++samples;
+  return samples;
+}
+
 /// Squares of the spectrum of a sequence's differences, from line 1: what begins and ends at
 /// different values leaks less.
 VectorXd power_of(const VectorXd& samples) {
-  const Index N = samples.size() - 1;
+  const Index N = transformed(samples.size() - 1);
   Eigen::FFT<double> fft;
   VectorXcd lines;
-  const VectorXd differences = samples.tail(N) - samples.head(N);
+  VectorXd differences = VectorXd::Zero(N);
+  differences.head(samples.size() - 1) =
+      samples.tail(samples.size() - 1) - samples.head(samples.size() - 1);
   fft.fwd(lines, differences);
   return lines.segment(1, std::max<Index>(1, N / 2 - 1)).cwiseAbs2();
 }
@@ -39,8 +48,8 @@ double input_band(const std::vector<DrivenGrid>& grids) {
   for (const DrivenGrid& grid : grids) {
     for (const auto& row : grid.input.rowwise()) {
       VectorXd power = power_of(row.transpose());
-      const double width =
-          2 * std::numbers::pi / (static_cast<double>(grid.input.cols() - 1) * grid.step);
+      const double width = 2 * std::numbers::pi /
+                           (static_cast<double>(transformed(grid.input.cols() - 1)) * grid.step);
       for (Index k = 0; k < power.size(); ++k) {
         power[k] /= std::pow(2 * std::sin(width * static_cast<double>(k + 1) * grid.step / 2), 2);
       }
@@ -57,7 +66,8 @@ double input_band(const std::vector<DrivenGrid>& grids) {
 /// rad/s up to which some channel's motion stands out from its noise.
 double output_band(const MatrixXd& grid, double step, const VectorXd& noise, double input) {
   double band = 0;
-  const double width = 2 * std::numbers::pi / (static_cast<double>(grid.cols() - 1) * step);
+  const double width =
+      2 * std::numbers::pi / (static_cast<double>(transformed(grid.cols() - 1)) * step);
   for (Index c = 0; c < grid.rows(); ++c) {
     const VectorXd power = power_of(grid.row(c).transpose());
     const Index bin = std::max<Index>(8, static_cast<Index>(kBin * input / width));

@@ -58,6 +58,8 @@ class Identification(Result):
     """What was found and is not believed, with reasons."""
     parts: list[tuple[int, float, float]]
     """The parts that were used: number of the record, begin and end, s."""
+    verdict: str
+    """What the records show: "decay", "ambient" or "driven"."""
     noise: Array
     """Of each channel, standard deviation of what the model leaves over."""
     whiteness: float
@@ -111,21 +113,23 @@ def identify(t: npt.ArrayLike | Sequence[npt.ArrayLike] | Mapping[str, Any],
     were measured, or of ambient motion.
 
     `t` has the times (N, s, rising, not necessarily even) and `y` the channels (N x channels, or N
-    for one channel) of a record; NaN is a sample that is missing. Instead of both, `t` may be a topic
-    of JointState as read_log returns it, whose positions are the channels. Lists of such arrays are several
-    records at one posture. Free decays, after a push, a release or a step, are found in them;
-    with find=False each record is one. With `input` (N x inputs, or N for one input; nothing
-    missing; a list of such arrays for several records) the records are taken whole: what moved
-    the arm from each sample to the next, from outside, as a chirp or pulses (least squares in the
-    frequency domain with one denominator, Guillaume et al. 2003, refined to the maximum of the
-    likelihood); inputs that rest are left out. With ambient=True the records are those of an arm that
-    many small, irregular forces shake, which nobody measured, for a minute or more (covariance-
-    driven stochastic subspace identification, Peeters and De Roeck 1999). `max_order` bounds the
-    order of the models tried (0: 2 for each channel, at least 12; of ambient motion 4 for each
-    channel and 4 more, at most 40; with inputs 2 for each channel and 16 more, at most 32).
+    for one channel) of a record; NaN is a sample that is missing. Instead of both, `t` may be a
+    topic of JointState as read_log returns it, whose positions are the channels. Lists of such
+    arrays are several records at one posture. By its motion a record is one with free decays, after
+    a push, a release or a step, which are found, or ambient (below); records of another kind than
+    the first are left out. With find=False each record is one free decay. With `input` (N x inputs,
+    or N for one input; nothing missing; a list of such arrays for several records) the records are
+    taken whole: what moved the arm from each sample to the next, from outside, as a chirp or pulses
+    (least squares in the frequency domain with one denominator, Guillaume et al. 2003, refined to
+    the maximum of the likelihood); inputs that rest are left out. With ambient=True the records are
+    those of an arm that many small, irregular forces shake, which nobody measured, for a minute or
+    more (covariance- driven stochastic subspace identification, Peeters and De Roeck 1999).
+    `max_order` bounds the order of the models tried (0: 2 for each channel, at least 12; of ambient
+    motion 4 for each channel and 4 more, at most 40; with inputs 2 for each channel and 16 more, at
+    most 32).
 
     Raises Error for arrays of the wrong size, times that do not rise, fewer than 20 samples, where
-    nothing moves freely, inputs of which none moves, and for ambient motion that is too short.
+    nothing moves freely, limit cycles, inputs of which none moves, and for ambient motion that is too short.
     """
     if isinstance(t, Mapping):
         if y is not None:

@@ -1,6 +1,7 @@
 // Modes from recorded motion.
 
 #include <dashpot/identification/identification.hpp>
+#include <dashpot/identification/motion_verdict.hpp>
 #include <dashpot/python/src/convert.hpp>
 
 namespace dashpot::python {
@@ -8,6 +9,7 @@ namespace dashpot::python {
 using identification::FreeDecay;
 using identification::Identification;
 using identification::MeasuredMode;
+using identification::MotionKind;
 using identification::MotionRecord;
 
 namespace {
@@ -30,6 +32,20 @@ nb::dict modes_of(const std::vector<MeasuredMode>& modes) {
   return result;
 }
 
+/// The kind of a record by its motion alone, in which modes can be looked for.
+MotionKind kind_of(const MotionRecord& record) {
+  const identification::MotionVerdict verdict = judge_motion(record);
+  if (verdict.kind == MotionKind::kNothing) {
+    throw std::invalid_argument("identify: nothing moves beyond the noise");
+  }
+  if (verdict.kind == MotionKind::kLimitCycle) {
+    throw std::invalid_argument(
+        "identify: a limit cycle: it repeats itself at " + std::to_string(verdict.frequency) +
+        " rad/s with one amplitude; calm the loop, then push (find=False takes it as a decay)");
+  }
+  return verdict.kind;
+}
+
 /// `outputs`: channels x samples each. `inputs`: likewise, or no rows.
 nb::dict identify(const std::vector<Eigen::VectorXd>& times,
                   const std::vector<Eigen::MatrixXd>& outputs,
@@ -38,14 +54,23 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
   std::vector<MotionRecord> records;
   std::vector<std::array<double, 3>> parts;  // number of the record, begin and end
   const bool excited = !inputs.empty() && inputs.front().rows() > 0;
+  MotionKind kind = ambient   ? MotionKind::kAmbient
+                    : excited ? MotionKind::kDriven
+                              : MotionKind::kDecays;
+  const bool judged = find && kind == MotionKind::kDecays;
   Identification found;
   {
     const nb::gil_scoped_release release;
     for (std::size_t r = 0; r < times.size(); ++r) {
       const MotionRecord record{times[r], outputs[r], inputs[r]};
       identification::check_records({record});
+      if (judged) {
+        const MotionKind its = kind_of(record);
+        if (r > 0 && its != kind) continue;  // `parts` tells
+        kind = its;
+      }
       std::vector<FreeDecay> pieces{{0, record.time.size(), {}}};
-      if (find && !ambient && !excited) pieces = find_decays(record);
+      if (judged && kind == MotionKind::kDecays) pieces = find_decays(record);
       for (const FreeDecay& piece : pieces) {
         if (!piece.reason.empty()) continue;
         records.push_back(part_of(record, piece.from, piece.to));
@@ -54,9 +79,10 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
       }
     }
     if (records.empty()) throw std::invalid_argument("identify: no free decay was found");
-    found = ambient   ? identify_ambient(records, {.max_order = max_order})
-            : excited ? identify_excited(records, {.max_order = max_order})
-                      : identify_decays(records, {.max_order = max_order});
+    const identification::IdentifyOptions options{.max_order = max_order};
+    found = kind == MotionKind::kAmbient  ? identify_ambient(records, options)
+            : kind == MotionKind::kDriven ? identify_excited(records, options)
+                                          : identify_decays(records, options);
   }
   nb::dict result;
   result["modes"] = modes_of(found.modes);
@@ -64,6 +90,9 @@ nb::dict identify(const std::vector<Eigen::VectorXd>& times,
   result["parts"] = to_list(parts, [](const std::array<double, 3>& part) {
     return nb::make_tuple(static_cast<int>(part[0]), part[1], part[2]);
   });
+  result["verdict"] = kind == MotionKind::kAmbient  ? "ambient"
+                      : kind == MotionKind::kDriven ? "driven"
+                                                    : "decay";
   result["noise"] = to_array(found.noise);
   result["whiteness"] = found.whiteness;
   result["explained"] = found.explained;

@@ -54,6 +54,12 @@ def test_finds_decays_in_a_record():
     check(found)
     (record, begin, end), = found.parts
     assert record == 0 and 0.99 < begin < 1.3 and end > 2
+    assert found.verdict == "decay"
+    with pytest.raises(dashpot.Error, match="nothing moves beyond the noise"):
+        dashpot.identify(0.002 * np.arange(500), still)
+    t = 0.01 * np.arange(3000)
+    with pytest.raises(dashpot.Error, match="limit cycle: it repeats itself at [45]"):
+        dashpot.identify(t, np.sin(5 * t) + 0.02 * np.sin(15 * t) + 1e-5 * rng.standard_normal(3000))
 
 
 def shaken(rng, seconds):
@@ -76,7 +82,8 @@ def shaken(rng, seconds):
 def test_finds_the_modes_of_ambient_motion():
     rng = np.random.default_rng(4)
     t, y = shaken(rng, 300)
-    found = dashpot.identify(t, y, ambient=True)
+    found = dashpot.identify(t, y)
+    assert found.verdict == "ambient"
     modes = found.modes
     assert len(modes) == 2
     assert np.all(np.abs(modes.natural_frequency - [9, 14]) < 4 * modes.natural_frequency_std)
@@ -109,7 +116,7 @@ def test_finds_the_modes_of_motion_under_a_measured_input():
     t, y, u = ([record[i] for record in records] for i in range(3))
     for found in (dashpot.identify(t, y, input=u), dashpot.identify(t[0], y[0], input=u[0][:, 1])):
         modes = found.modes
-        assert len(modes) == 2
+        assert len(modes) == 2 and found.verdict == "driven"
         assert np.all(np.abs(modes.natural_frequency - [9, 24]) < 4 * modes.natural_frequency_std)
         assert np.all(np.abs(modes.damping_ratio - [0.12, 0.8]) < 4 * modes.damping_ratio_std)
         assert np.all(modes.natural_frequency_std < [0.02, 0.05])

@@ -16,10 +16,13 @@ import time
 import warnings
 from typing import Callable, Optional
 
-import numpy as np
-import pytest
+for library in ("OMP", "OPENBLAS"):  # one thread for all codes, whose time is compared
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
-import dashpot
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
+
+import dashpot  # noqa: E402
 
 os.environ.setdefault("TQDM_DISABLE", "1")  # progress bars
 
@@ -324,11 +327,12 @@ def errors(value, mode):
 
 
 def timed(code, *arguments, **settings):
-    begin = time.perf_counter()
+    """The result, and the processor's time in s, which others on the machine do not change."""
+    begin = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         values = code(*arguments, **settings)
-    return values, time.perf_counter() - begin
+    return values, time.process_time() - begin
 
 
 @functools.lru_cache(maxsize=None)
@@ -411,7 +415,7 @@ def test_finds_modes_of_these_records():
     decays, shaken, moved = (compare(kind, range(number)) for kind, number in
                              [("decays", 20), ("ambient", 20), ("excited", 6)])
     assert decays.found >= 0.95 * decays.modes and shaken.found >= 0.8 * shaken.modes
-    assert moved.found >= 0.9 * moved.modes
+    assert moved.found >= 0.95 * moved.modes
     assert np.all(np.median(moved.both[:, 2], axis=0) < 5e-4)
     assert np.all(np.median(decays.both[:, 2], axis=0) < 5e-4)
     assert np.all(np.median(shaken.both[:, 2], axis=0) < 0.025)

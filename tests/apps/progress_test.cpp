@@ -1,11 +1,13 @@
 // Tasks that take long: what they show meanwhile, and what Ctrl-C leaves of them.
 #include <dashpot/tests/apps/run_program.hpp>
 #include <dashpot/tests/apps/scene_run.hpp>
+#include <dashpot/tests/support/dice.hpp>
 
 #include <gmock/gmock.h>
 #include <poll.h>
 #include <sys/stat.h>
 
+#include <array>
 #include <csignal>
 #include <cstdlib>
 #include <functional>
@@ -89,6 +91,33 @@ TEST(Progress, OfARegionSaysThatThereIsNothingYet) {
   EXPECT_EQ(outcome.status, 130);
   EXPECT_THAT(outcome.err, HasSubstr("it has no damping to show before its end"));
   EXPECT_EQ(outcome.out, "");
+}
+
+/// Five oscillators in five channels, shaken for four minutes by a force that was measured. Of
+/// their 24002 samples there are 24001 differences, a prime number, which must not take a Fourier
+/// transform longer.
+TEST(Progress, OfAnIdentificationIsABarAndCtrlCLeavesTheModesFoundUntilThen) {
+  const Scratch scratch;
+  std::string text = "time [s],x1 [m],x2 [m],x3 [m],x4 [m],x5 [m],force [N]\n";
+  testing::Dice draw(11);
+  std::array<double, 5> x{}, v{};
+  for (int i = 0; i < 24002; ++i) {
+    const double force = draw.normal();
+    text += std::to_string(0.01 * i);
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      const double w = 3 + 7 * static_cast<double>(k);
+      text += "," + std::to_string(x[k] + 0.3 * x[(k + 1) % x.size()] + 1e-3 * draw.normal());
+      v[k] += 0.01 * (-w * w * x[k] - 0.1 * w * v[k] + 10 * force);
+      x[k] += 0.01 * v[k];
+    }
+    text += "," + std::to_string(force) + "\n";
+  }
+  const std::string file = scratch.write("shaken.csv", text);
+  const Outcome outcome = interrupted({"identify", file, file, file, file, "--inputs", "force"});
+  EXPECT_EQ(outcome.status, 130);
+  EXPECT_THAT(outcome.err, HasSubstr("\r\033[K["));
+  EXPECT_THAT(outcome.err, HasSubstr("the modes above are those found until then"));
+  EXPECT_THAT(outcome.out, HasSubstr("4 driven records of 5 channels at 1 posture"));
 }
 
 TEST(Progress, OfManySystemsIsABarAndCtrlCLeavesThoseDone) {

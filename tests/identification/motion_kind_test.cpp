@@ -46,8 +46,8 @@ MotionRecord push(Dice& draw, double step = 0.002, Index samples = 2000) {
   });
 }
 
-/// Oscillators under white forces.
-MotionRecord shaken(Dice& draw) {
+/// Oscillators under white forces, which are its input.
+MotionRecord forced(Dice& draw) {
   struct Oscillator {
     double w, z, x = 0, v = 0;
     void step(double t, double kick) {
@@ -59,11 +59,23 @@ MotionRecord shaken(Dice& draw) {
     }
   };
   Oscillator one{9, 0.05}, two{14, 0.1};
-  return record_of(8000, 0.01, draw, 1e-5, [&](Index) -> std::array<double, 2> {
-    one.step(0.01, 0.5 * draw.normal());
-    two.step(0.01, 0.5 * draw.normal());
-    return {one.x, two.x};
+  MatrixXd forces(2, 8000);
+  MotionRecord record = record_of(8000, 0.01, draw, 1e-5, [&](Index i) -> std::array<double, 2> {
+    const std::array<double, 2> motion{one.x, two.x};
+    forces.col(i) << draw.normal(), draw.normal();
+    one.step(0.01, 0.5 * forces(0, i));
+    two.step(0.01, 0.5 * forces(1, i));
+    return motion;
   });
+  record.input = forces;
+  return record;
+}
+
+/// The same, as far as somebody knows who did not measure them.
+MotionRecord shaken(Dice& draw) {
+  MotionRecord record = forced(draw);
+  record.input.resize(0, 0);
+  return record;
 }
 
 /// Van der Pol's oscillator from a small start, of which the other coordinate has a half.
@@ -178,6 +190,32 @@ TEST(MotionKind, DecaysGiveTheSameModesInAnyScale) {
       const double rounding = same ? 1e-6 : 1e-3;
       EXPECT_NEAR(frequency, plain[k].natural_frequency, rounding * w[k]);
       EXPECT_NEAR(mode.damping_ratio, plain[k].damping_ratio, rounding);
+    }
+  }
+}
+
+/// Motion under forces, known or not, in other units of time and length, about another mean.
+TEST(MotionKind, ForcedMotionGivesTheSameModesInAnyScale) {
+  const std::array<double, 2> w{9, 14}, z{0.05, 0.1};
+  for (const bool known : {true, false}) {
+    std::vector<MeasuredMode> plain;
+    for (const Change& change : kChanges) {
+      if (change.drift > 0 || change.digit > 0) continue;
+      SCOPED_TRACE(change.name + (known ? ", known" : ", unknown"));
+      Dice draw(79);
+      const MotionRecord record = change.of(known ? part_of(forced(draw), 0, 1500) : shaken(draw));
+      const Identification found = known ? identify_excited({record}) : identify_ambient({record});
+      ASSERT_EQ(found.modes.size(), 2U);
+      if (plain.empty()) plain = found.modes;
+      for (std::size_t k = 0; k < 2; ++k) {
+        const MeasuredMode& mode = found.modes[k];
+        const double frequency = mode.natural_frequency * change.time;
+        // The steps of the simulation are wrong by a part in a thousand.
+        EXPECT_NEAR(frequency, w[k], 1e-3 * w[k] + 4 * mode.natural_frequency_std * change.time);
+        EXPECT_NEAR(mode.damping_ratio, z[k], 1e-3 + 4 * mode.damping_ratio_std);
+        EXPECT_NEAR(frequency, plain[k].natural_frequency, 1e-6 * w[k]);
+        EXPECT_NEAR(mode.damping_ratio, plain[k].damping_ratio, 1e-6);
+      }
     }
   }
 }

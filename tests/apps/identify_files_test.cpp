@@ -1,0 +1,187 @@
+// Which files `dashpot identify` reads, and how it refuses others.
+#include <dashpot/tests/apps/identify_run.hpp>
+
+namespace dashpot::tests {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(IdentifyFiles, TakesFilesAsPeopleAndRecordersWriteThem) {
+  const Scratch scratch;
+  const double degree = 57.29577951308232;
+  std::string stamps = replaced(decay_csv("timestamp,q[0],q[1],q_d_0,tau_J_0,mode,", 1, 1e6), "\n",
+                                ",0.7,0,kMove,\n");
+  stamps.erase(stamps.find(",0.7,"), 13);  // of the line of names
+  const std::string european = replaced(decay_csv("Time,q1 (rad),q2 (rad)", 1), ",", ";");
+  const std::string dos =
+      "\xEF\xBB\xBF# a comment\r\n" + replaced(decay_csv("timestamp,q1,q2", 1), "\n", "\r\n");
+  const std::vector<std::string> texts = {
+      replaced(decay_csv("\"t_ms\",q1 (deg),\"q2_deg\"", degree, 1000), ",", ";"),
+      "# a recorder\n# " + replaced(decay_csv("time q_0 q_1", 1), ",", " "),
+      replaced(european, ".", ","), dos, stamps};
+  Json found;
+  std::string file;
+  for (const std::string& text : texts) {
+    SCOPED_TRACE(text.substr(0, 60));
+    file = scratch.write("file" + std::to_string(text.size()), text);
+    found = identify({file});
+    expect_known_modes(found);
+  }
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("timestamp is taken to be in us"));
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("as they hold text: mode"));
+  const Json both = identify({file, file});
+  EXPECT_EQ(both["records"].size(), 2U);
+  EXPECT_EQ(both["postures"].size(), 1U);
+}
+
+/// Without names, without a time, with others' units, with dates, and with names that are there
+/// twice but not wanted.
+TEST(IdentifyFiles, TakesFilesThatDoNotSayWhatTheyAre) {
+  const Scratch scratch;
+  const std::string plain = decay_csv("", 1).substr(1);
+  expect_known_modes(identify({scratch.write("plain.csv", plain)}));
+  expect_known_modes(
+      identify({scratch.write("named.csv", plain), "--columns", "t,q1 [rad],q2 [rad]"}));
+  std::string timeless, dated = "stamp,q1,q2,speed [m/s^2],speed\n", epoch = "timestamp,q1,q2\n";
+  std::size_t at = 0;
+  for (int i = 0; at < plain.size(); ++i) {
+    const std::size_t comma = plain.find(',', at), end = plain.find('\n', at);
+    const std::string values = plain.substr(comma + 1, end - comma - 1);
+    at = end + 1;
+    timeless += values + "\n";
+    std::array<char, 60> time{};
+    std::snprintf(time.data(), time.size(), "2026-01-31T23:59:%02d.%03dZ,", 58 + 2 * i / 1000,
+                  2 * i % 1000);
+    std::string stamp = time.data();
+    if (2 * i / 1000 > 1) {  // into the next day, month
+      std::snprintf(time.data(), time.size(), "2026-02-01T00:00:%02d.%03dZ,", 2 * i / 1000 - 2,
+                    2 * i % 1000);
+      stamp = time.data();
+    }
+    dated += stamp + values + ",1,2\n";
+    std::snprintf(time.data(), time.size(), "17%08d%09lld,", 12345678 + 2 * i / 1000,
+                  2'000'000LL * i % 1'000'000'000LL);
+    epoch += time.data() + values + "\n";
+  }
+  expect_known_modes(identify({scratch.write("timeless.csv", timeless), "--rate", "500"}));
+  expect_known_modes(identify({scratch.write("dated.csv", dated)}));
+  expect_known_modes(identify({scratch.write("epoch.csv", epoch)}));
+  const std::string duration = decay_csv("duration,q1,q2", 1);
+  expect_known_modes(identify({scratch.write("duration.csv", duration)}));
+}
+
+/// Each is what a recorder or a spreadsheet makes of it, and none of it changes the modes.
+TEST(IdentifyFiles, TakesWhatRecordersAddAndLeaveOut) {
+  const Scratch scratch;
+  const std::string good = decay_csv("time,q1,q2", 1), rows = good.substr(good.find('\n') + 1);
+  const auto with = [&rows](const std::string& heading, const std::string& end = "") {
+    return heading + "\n" + rows + end;
+  };
+  const auto column = [&rows](const std::string& heading, const std::string& early,
+                              const std::string& late) {
+    std::string text = heading + "\n" + replaced(rows, "\n", "," + early + "\n");
+    const std::size_t half = text.size() / 2;
+    return text.substr(0, half) +
+           replaced(text.substr(half), "," + early + "\n", "," + late + "\n");
+  };
+  const std::vector<std::string> texts = {
+      with("Recorder 3.1\nArm: iiwa, at 500 Hz\n\ntime,q1,q2"),
+      with("# recorded on a Friday"),
+      with("time,q1,q2\ns,rad,rad"),
+      with("date,Angle1 [radians],Angle2 [radians]"),
+      with("__time,/joint_states/position[0],/joint_states/position[1]"),
+      with("% time,field.position0,field.position1"),
+      with("time,q1,q2", "\n\n  \n,,\n"),
+      with("time,q1,q2", "2.4001,0.00"),  // whose end was not written
+      replaced(good, "\n", "\r"),
+      column("time,q1,q2,note", "", "hit"),
+      column("time,q1,q2,q3 [A]", "NA", "null"),
+      replaced(column("time,q1,q2,q3 [A]", "5", ""), ",", "\t"),
+  };
+  for (const std::string& text : texts) {
+    SCOPED_TRACE(text.substr(0, 60));
+    expect_known_modes(identify({scratch.write("file.csv", text)}));
+  }
+  std::string degrees = decay_csv("Time (sec),q1 (\xC2\xB0),q2 (degrees)", 57.29577951308232);
+  const std::size_t comma = degrees.find(',', degrees.size() / 2);
+  degrees.replace(comma + 1, degrees.find(',', comma + 1) - comma - 1, "n/a");
+  expect_known_modes(identify({scratch.write("degrees.csv", degrees)}));
+  expect_refusal(run_program({"identify", scratch.write("note.csv", column("time,q1,q2", "", "x")),
+                              "--columns", "time,q1,q2,q3", "--channels", "q1,q3"}),
+                 "q3: 'x' is no number");
+}
+
+TEST(IdentifyFiles, LeavesOutWhatIsMissingOrTwiceAndSaysSo) {
+  const Scratch scratch;
+  std::string text = decay_csv("time [s],q1 [rad],q2 [rad],note", 1), with_holes;
+  int line = 0;
+  for (std::size_t at = 0; at < text.size(); ++line) {
+    const auto end = text.find('\n', at);
+    std::string row = text.substr(at, end - at);
+    at = end + 1;
+    if (line > 0) row += ",";
+    if (line % 50 == 7) row = row.substr(0, row.find(',')) + ",,nan,";
+    with_holes += row + "\n";
+    if (line == 300) with_holes += row + "\n0.1,1,2,3\n";  // twice, and back in time
+  }
+  const Json found = identify({scratch.write("a.csv", with_holes), "--channels", "q1,q2"});
+  expect_known_modes(found);
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("1 samples left out, because another has the same"));
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("time runs backwards"));
+}
+
+TEST(IdentifyFiles, RefusesInOneLineThatNamesFileLineAndColumn) {
+  const Scratch scratch;
+  const std::string good = decay_csv("time [s],q1 [rad],q2 [rad]", 1);
+  int number = 0;
+  const auto file = [&](const std::string& text) {
+    return scratch.write("bad" + std::to_string(number++) + ".csv", text);
+  };
+  const std::vector<std::pair<std::vector<std::string>, std::string>> all = {
+      {{file("")}, "is empty"},
+      {{file("time,q1\n")}, "0 samples, need 20"},
+      {{file("time,time,q1\n1,2,3\n")}, "two columns of time"},
+      {{file("a,b\n1,2\n")}, "line 1: no column of time"},
+      {{file("0,1\n1,2\n1,3\n")}, "line 1: numbers, where a line of names"},
+      {{file("recorder\n\na,b\n1,2\n")}, "line 3: no column of time"},
+      {{file("time,q1\n12:00:00,2\n")}, "line 2, time: '12:00:00' is no time"},
+      {{file("\xFF\xFEt\n")}, "is text in UTF-16: save it as UTF-8"},
+      {{file("SQLite format 3 of a bag")}, "dashpot.read_log(FILE)"},
+      {{file(good), "--rate", "nan"}, "--rate: has to be a finite number"},
+      {{file(replaced(good, "\n1.", ",7\n1.")), "--columns", "t,q1,q2"}, "not 3 columns"},
+      {{file("time\n1\n")}, "no column but the time"},
+      {{file("time [kg],q1\n1,2\n")}, "in kg, a time is wanted"},
+      {{file(replaced(good, "q1 [rad],q2 [rad]", "q [m/s^2],p [furlong]"))},
+       "--channels: no column is known to be a position"},
+      {{file(replaced(good, "q2", "q1"))}, "two columns are called 'q1': --columns"},
+      {{file(good), "--from", "nan"}, "--from: has to be a finite time"},
+      {{file(good), "--from", "2", "--to", "1"}, "--from: has to be before --to"},
+      {{file("time,q1\n1,2\n2\n")}, "line 3: not 2 columns"},
+      {{file("time,q1\n1,2,3\n")}, "line 2: not 2 columns"},
+      {{file("time,q1\n1,2\n2,x\n")}, "line 3, q1: 'x' is no number"},
+      {{file("time,q1\nnan,2\n")}, "line 2: no time"},
+      {{file(std::string("\x7f"
+                         "ELF\0\0\1",
+                         7))},
+       "no column of time"},
+      {{file(good), "--inputs", "torque"}, "--inputs: no channel 'torque'; there are q1"},
+      {{file(good), "--inputs", "q1", "--channels", "q1,q2"}, "'q1' is among --inputs"},
+      {{file(good), "--excited"}, "--excited: needs --inputs"},
+      {{file(good), "--channels", "q9"}, "no channel 'q9'; there are q1, q2"},
+      {{file(good), "--channels", "q1,q1"}, "'q1' twice"},
+      {{file(good), "--from", "7"}, "0 samples from --from to --to"},
+      {{file("time,x\n" + good.substr(good.find('\n') + 1, 3000))}, "columns"},
+      {{file(good), file(decay_csv("time,q1,q3", 1))}, "its channels differ"},
+      {{file(good), "--calibrate", "payload"}, "--against"},
+      {{file(good), "--plot", "x.pdf"}, "--plot: x.pdf: has to end"},
+      {{file("time [s],label,natural_frequency [rad/s]\n0,1,2\n")}, "has modes in place of motion"},
+      {{scratch.path("none.csv")}, "none.csv"},
+      {{scratch.path("")}, "cannot be read"},
+  };
+  for (const auto& [arguments, words] : all) {
+    expect_refusal(run_program(joined({"identify"}, arguments)), words);
+  }
+}
+
+}  // namespace
+}  // namespace dashpot::tests
