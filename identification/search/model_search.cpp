@@ -99,7 +99,7 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOpt
   const bool refine = options.refine;
   const VectorXd noise = first_noise(all);
   const std::vector<MotionRecord> records = strongest(all, noise);
-  const DecayCells cells(records, noise);
+  const DecayCells cells(records, noise, noise.cwiseMax(DecayData::kLinear * data.motion));
   const Index channels = data.channels;
   const Realization realization(cells.weighted(), cells.step, channels, refine ? 300 : 120);
   const int wanted =
