@@ -24,6 +24,15 @@ DecayFactor DecayFactor::of_pair(Complex eigenvalue) {
   return {true, std::log(w), -eigenvalue.real() / w};
 }
 
+DecayFactor DecayFactor::one_of_pair(double eigenvalue) const {
+  DecayFactor one = of_single(eigenvalue);
+  one.reference = reference;
+  for (const auto& [same, rate] : scale) {
+    one.scale.push_back({same + rate * eigenvalue / std::exp(first), 0});
+  }
+  return one;
+}
+
 DecayData::DecayData(const std::vector<MotionRecord>& all,
                      const std::shared_ptr<const std::vector<DrivenGrid>>& driven)
     : channels(all.front().output.rows()),

@@ -30,6 +30,8 @@ struct DecayFactor {
 
   static DecayFactor of_pair(Complex eigenvalue);  ///< and its conjugate
   static DecayFactor of_single(double eigenvalue) { return {false, eigenvalue, 0}; }
+  /// One of a pair's eigenvalues, if real, in the phases that the pair has.
+  DecayFactor one_of_pair(double eigenvalue) const;
 };
 
 /// What moved a record, on an even grid whose points are fitted in cells.

@@ -20,6 +20,9 @@ using Eigen::VectorXd;
 /// The criterion's cost of one more parameter: between Akaike's 2, which takes noise for modes, and
 /// Schwarz's logarithm of the number of samples, about 9, which lets weak modes spoil strong ones.
 constexpr double kPenalty = 4;
+/// Akaike's is the cost of as many modes of decays as there are channels: an arm is expected to
+/// have them, and a model that lacks one shifts those near it. With inputs it only finds fewer.
+constexpr double kExpected = 2;
 
 std::vector<DecayFactor> moved(const std::vector<DecayFactor>& factors, const VectorXd& step) {
   std::vector<DecayFactor> result = factors;
@@ -240,8 +243,12 @@ DecayStep step_of(const DecayData& data, std::vector<DecayFactor> factors, const
 }
 
 double parameter_penalty(const DecayFit& fit, const DecayData& data) {
-  const auto nonlinear = factor_width(fit.factors) * static_cast<Index>(data.sources());
-  return kPenalty * (static_cast<double>(nonlinear) + static_cast<double>(fit.amplitudes.size()));
+  const Index width = factor_width(fit.factors),
+              expected = data.inputs > 0 ? 0 : std::min(width, 2 * data.channels);
+  const auto each = static_cast<double>(static_cast<Index>(data.sources()) + data.channels);
+  const auto others = static_cast<double>((fit.amplitudes.rows() - width) * data.channels);
+  return kExpected * each * static_cast<double>(expected) +
+         kPenalty * (each * static_cast<double>(width - expected) + others);
 }
 
 std::vector<MatrixXd> factor_motion(const DecayData& data, const DecayFit& fit,

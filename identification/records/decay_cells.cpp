@@ -138,7 +138,8 @@ VectorXd first_noise(const std::vector<MotionRecord>& records) {
   return noise;
 }
 
-DecayCells::DecayCells(const std::vector<MotionRecord>& motions, const VectorXd& sample_noise) {
+DecayCells::DecayCells(const std::vector<MotionRecord>& motions, const VectorXd& sample_noise,
+                       const VectorXd& lost) {
   const double fine = typical_step(motions);
   std::vector<MatrixXd> grids, gaps;
   std::vector<Index> lengths;
@@ -147,7 +148,7 @@ DecayCells::DecayCells(const std::vector<MotionRecord>& motions, const VectorXd&
     gaps.emplace_back();
     grids.push_back(on_grid(motion, fine, &gaps.back()));
     ends_.push_back(end_of(grids.back()));
-    const Index length = audible(grids.back(), sample_noise);
+    const Index length = audible(grids.back(), lost);
     lengths.push_back(std::max<Index>(2, length));
     longest = std::max(longest, lengths.back());
   }

@@ -19,8 +19,9 @@ Eigen::MatrixXd on_grid(const MotionRecord& record, double step, Eigen::MatrixXd
 /// decays stays one, with the same eigenvalues, and the noise falls.
 class DecayCells {
  public:
-  /// Up to where the motion is lost in `sample_noise`.
-  DecayCells(const std::vector<MotionRecord>& motions, const Eigen::VectorXd& sample_noise);
+  /// Up to where the motion of all channels is `lost`, at least their noise.
+  DecayCells(const std::vector<MotionRecord>& motions, const Eigen::VectorXd& sample_noise,
+             const Eigen::VectorXd& lost);
 
   std::vector<MotionRecord> records;  ///< in the channels' units; NaN in long gaps
   Eigen::VectorXd noise;              ///< of a cell

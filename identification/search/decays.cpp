@@ -98,6 +98,18 @@ void doubt_order(const DecayFit& fit, const DecayFit& larger, std::vector<Measur
   }
 }
 
+/// Of each channel the sum of squares about its mean.
+VectorXd squares_of_motion(const MotionRecord& record) {
+  VectorXd squares = VectorXd::Zero(record.output.rows());
+  for (Index c = 0; c < squares.size(); ++c) {
+    const auto there = record.output.row(c).array().isFinite();
+    const auto y = there.select(record.output.row(c).array(), 0);
+    const auto count = static_cast<double>(there.count());
+    squares[c] = there.select(y - y.sum() / std::max(1.0, count), 0).square().sum();
+  }
+  return squares;
+}
+
 void check_order(const IdentifyOptions& options) {
   check_that(options.max_order >= 0 && options.max_order <= 60,
              "max_order has to be within 0 and 60");
@@ -109,7 +121,8 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   result.whiteness = search.fit.whiteness;
   result.poles = model_poles(search.by_order);
 
-  // The motion of each channel about its constant, and what is left of it.
+  // The motion of each channel about its means, and what is left of it. Constants of the model
+  // are no rests where a slow decay cancels against them.
   VectorXd scale = VectorXd::Zero(search.data.channels), rest = scale;
   const auto over = left_over(search.data, search.fit);
   for (std::size_t k = 0; k < over.size(); ++k) {
@@ -118,18 +131,11 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
     }
   }
   double duration = 0, step = std::numeric_limits<double>::infinity();
-  const Index constants = factor_width(search.fit.factors);
-  for (std::size_t r = 0; r < records.size(); ++r) {
-    const MotionRecord& record = records[r];
+  for (const MotionRecord& record : records) {
     const double length = record.time[record.time.size() - 1] - record.time[0];
     duration = std::max(duration, length);
     step = std::min(step, length / static_cast<double>(record.time.size() - 1));
-    const auto constant = search.fit.amplitudes.row(constants + static_cast<Index>(r));
-    for (Index c = 0; c < scale.size(); ++c) {
-      for (const double y : record.output.row(c)) {
-        if (std::isfinite(y)) scale[c] += (y - constant[c]) * (y - constant[c]);
-      }
-    }
+    scale += squares_of_motion(record);
   }
   scale = scale.cwiseMax(1e-300);
   result.explained = 1 - rest.cwiseQuotient(scale).mean();
@@ -150,6 +156,9 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   }
   const bool doubted = search.differs && search.fit.whiteness > kFarFromWhite;
   for (MeasuredMode& mode : modes) {
+    if (mode.stability == 0 && mode.energy < 1 - result.explained) {
+      mode.reason = "weaker than what is left over, and in no model of another order";
+    }
     if (doubted && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {
       mode.reason = "parts of the records differ: it may be friction, or what else is not linear";
     }

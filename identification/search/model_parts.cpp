@@ -62,6 +62,8 @@ std::size_t ModelSearch::contradicted(const DecayFit& whole,
                                       std::vector<std::array<double, 2>>& shown) const {
   const std::vector<DecayStep> parts = steps_of_parts(whole);
   shown.assign(whole.factors.size(), {});
+  // Where what is left over is no noise, no difference comes by chance.
+  const double chance = whole.whiteness > kColoured ? 0 : kDeviations * kDeviations;
   std::size_t worst = whole.factors.size();
   double most = 1, strongest = 0;
   std::vector<double> energy;
@@ -85,7 +87,7 @@ std::size_t ModelSearch::contradicted(const DecayFit& whole,
         const double far = std::abs(d) / std::max(kDeviations * std::sqrt(own), same);
         if (counts && far > most) most = far, worst = k;
         if (p < kWindows.size()) {
-          variance = std::max(variance, (d * d - kDeviations * kDeviations * own) * size * size);
+          variance = std::max(variance, (d * d - chance * own) * size * size);
         } else if (own > 0) {
           chi += d * d / own, ++count;
           excess += d * d / own - 1, weights += 1 / own;

@@ -99,7 +99,7 @@ ModelSearch::ModelSearch(const std::vector<MotionRecord>& all, const IdentifyOpt
   const bool refine = options.refine;
   const VectorXd noise = first_noise(all);
   const std::vector<MotionRecord> records = strongest(all, noise);
-  const DecayCells cells(records, noise);
+  const DecayCells cells(records, noise, noise.cwiseMax(DecayData::kLinear * data.motion));
   const Index channels = data.channels;
   const Realization realization(cells.weighted(), cells.step, channels, refine ? 300 : 120);
   const int wanted =
@@ -165,6 +165,9 @@ ModelSearch::ModelSearch(const ExcitedCells& cells, const IdentifyOptions& optio
   };
   choose_order(cells.noise, false);
   improve();
+  while (factor_width(fit.factors) < 2 * data.channels - 1 && split_one()) {
+    while (drop_one()) continue;
+  }
   // A model that none larger was compared with is not known to be large enough.
   for (int k = 0; k < 4 && !larger && add_from_rest(); ++k) {
     while (drop_one()) continue;
@@ -328,6 +331,22 @@ bool ModelSearch::add_from_rest() {
   return false;
 }
 
+/// Two heavily damped modes near each other look like one, and what is left over does not show it.
+bool ModelSearch::split_one() {
+  constexpr double kApart = 0.15, kDamped = 0.3;
+  for (std::size_t k = 0; k < fit.factors.size(); ++k) {
+    if (!fit.factors[k].pair || fit.factors[k].second < kDamped) continue;
+    if (!goes_on(0.7)) return false;
+    std::vector<DecayFactor> factors = fit.factors;
+    factors[k].scale.clear();
+    factors.push_back(factors[k]);
+    factors[k].first -= kApart;
+    factors.back().first += kApart;
+    if (change(factors)) return true;
+  }
+  return false;
+}
+
 bool ModelSearch::drop_one() {
   Index at = 0;
   for (std::size_t k = 0; k < fit.factors.size() && fit.factors.size() > 1; ++k) {
@@ -345,7 +364,7 @@ bool ModelSearch::drop_one() {
     if (lambda[0].imag() != 0) continue;
     for (const Complex& one : lambda) {
       factors = fit.factors;
-      factors[k] = DecayFactor::of_single(one.real());
+      factors[k] = fit.factors[k].one_of_pair(one.real());
       if (change(factors)) return true;
     }
   }

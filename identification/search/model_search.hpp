@@ -50,6 +50,7 @@ class ModelSearch {
   double score(const DecayFit& some) const;
   std::vector<DecayFactor> candidates() const;
   bool add_from_rest();
+  bool split_one();
   bool drop_one();
   void untangle();
   bool change(const std::vector<DecayFactor>& factors);

@@ -1,0 +1,106 @@
+// Arms that rub, or whose springs change with their stretch: the deviations have to hold the modes
+// of the linear arm.
+#include <dashpot/identification/identification.hpp>
+#include <dashpot/tests/support/released_springs.hpp>
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+namespace dashpot::identification {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::Dice;
+using testing::sensed;
+using testing::SprungArm;
+
+constexpr double kReach = 0.02;  // rad
+
+/// What is not linear in each joint.
+struct Flaw {
+  double friction = 0;   ///< Coulomb's, as a share of the spring's force at kReach
+  double hardening = 0;  ///< share by which a spring is stiffer at kReach
+};
+
+/// How an arm moves from `position` at rest, n x samples 1 ms apart.
+MatrixXd released(const SprungArm& arm, const Flaw& flaw, const VectorXd& position, int samples) {
+  constexpr int kParts = 10;
+  constexpr double kStep = 1e-3 / kParts, kSticks = 1e-3;  // s, rad/s
+  const MatrixXd &C = arm.system.damping, &K = arm.system.stiffness;
+  const Eigen::LLT<MatrixXd> mass(arm.system.mass);
+  const VectorXd rubs = flaw.friction * kReach * K.diagonal();
+  VectorXd q = position, v = VectorXd::Zero(q.size());
+  MatrixXd motion(q.size(), samples);
+  for (int i = 0; i < samples; ++i) {
+    motion.col(i) = q;
+    for (int k = 0; k < kParts; ++k) {
+      const VectorXd stretched = q.array() * (1 + flaw.hardening * (q / kReach).array().square());
+      const VectorXd force =
+          K * stretched + C * v + rubs.cwiseProduct(VectorXd((v / kSticks).array().tanh()));
+      v -= kStep * mass.solve(force);
+      q += kStep * v;
+    }
+  }
+  return motion;
+}
+
+struct Tally {
+  int modes = 0, found = 0, frequency_inside = 0, ratio_inside = 0;
+};
+
+/// Compares what three releases of each of some arms show with the modes of the linear arms.
+Tally compare(const Flaw& flaw, int arms, unsigned long seed) {
+  Tally tally;
+  for (int k = 0; k < arms; ++k) {
+    Dice draw(seed + static_cast<unsigned long>(k));
+    const SprungArm arm(static_cast<std::size_t>(k), draw, 0.03, 0.3);
+    std::vector<MotionRecord> records;
+    for (int r = 0; r < 3; ++r) {
+      VectorXd start(arm.system.mass.rows());
+      for (double& q : start) q = kReach * draw.normal();
+      records.push_back(sensed(released(arm, flaw, start, 1500), 1e-3, {}, draw));
+    }
+    const Identification found = identify_decays(records);
+    tally.modes += static_cast<int>(arm.modes.size());
+    for (const MeasuredMode& mode : found.modes) {
+      const analysis::Mode<>* nearest = nullptr;
+      double least = 0.1;
+      for (const auto& other : arm.modes) {
+        const double far =
+            std::abs(mode.eigenvalues[0] - other.eigenvalues[0]) / other.natural_frequency;
+        if (far < least) least = far, nearest = &other;
+      }
+      if (nearest == nullptr) continue;
+      ++tally.found;
+      tally.frequency_inside += std::abs(mode.natural_frequency - nearest->natural_frequency) <
+                                1.96 * mode.natural_frequency_std;
+      tally.ratio_inside +=
+          std::abs(mode.damping_ratio - nearest->damping_ratio) < 1.96 * mode.damping_ratio_std;
+    }
+  }
+  std::printf("seed %lu: %d modes, %d found; inside 95 %%: frequency %d, ratio %d\n", seed,
+              tally.modes, tally.found, tally.frequency_inside, tally.ratio_inside);
+  return tally;
+}
+
+void expect_held(const Tally& tally, int least_found) {
+  EXPECT_GE(tally.found, least_found);
+  EXPECT_GE(tally.frequency_inside, 0.88 * tally.found);
+  EXPECT_GE(tally.ratio_inside, 0.88 * tally.found);
+}
+
+TEST(NonlinearArms, DeviationsHoldWhatFrictionDoes) {
+  expect_held(compare({.friction = 0.005, .hardening = 0}, 8, 4100), 8);
+}
+
+TEST(NonlinearArms, DeviationsHoldWhatSpringsDoThatStiffen) {
+  expect_held(compare({.friction = 0, .hardening = 0.02}, 8, 4200), 8);
+}
+
+}  // namespace
+}  // namespace dashpot::identification
