@@ -4,6 +4,7 @@
 #include <dashpot/analysis/spectrum.hpp>
 
 #include <algorithm>
+#include <cmath>
 
 namespace dashpot::analysis {
 namespace {
@@ -48,8 +49,8 @@ void keep_worst(RegionVerdict& verdict) {
 /// leaves them, the first.
 void take_less(double& least, std::int64_t& sample, double value, std::int64_t number) {
   constexpr double kEqual = 1e-12;
-  if (number < 0 || !(value <= least * (1 + kEqual)) || value == kInfinity) return;
-  const bool equal = sample >= 0 && value >= least * (1 - kEqual);
+  if (number < 0 || !(value <= least + kEqual * std::abs(least)) || value == kInfinity) return;
+  const bool equal = sample >= 0 && value >= least - kEqual * std::abs(least);
   if (!equal || number < sample) sample = number;
   least = std::min(least, value);
 }

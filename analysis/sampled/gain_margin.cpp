@@ -53,7 +53,7 @@ class ScaledLoop {
     gain_ = loop.on_other_motions(loop.transition(1)) - free_;
     if (loop.rows() > 2 * loop.n) return;
     const MatrixXd V = loop.on_other_motions(energy(loop)), W = V * gain_;
-    if (Eigen::LLT<MatrixXd>(V).info() != Eigen::Success) return;  // it is no energy
+    if (!is_positive(V)) return;  // it is no energy
     lost_[0] = V - free_.transpose() * V * free_;
     lost_[0].diagonal().array() -= kRounding * V.trace();
     lost_[1] = free_.transpose() * W;
@@ -66,7 +66,7 @@ class ScaledLoop {
   bool proves(double factor) const {
     if (lost_[0].size() == 0) return false;
     const MatrixXd lost = lost_[0] - factor * (lost_[1] + factor * lost_[2]);
-    return Eigen::LLT<MatrixXd>(lost).info() == Eigen::Success;
+    return is_positive(lost);
   }
 
   /// The excess is the largest |z|, less 1, or something like it: the loop is stable if it is
@@ -88,8 +88,14 @@ class ScaledLoop {
   double excess(double factor) const { return at(factor).excess; }
 
  private:
-  /// Returns V of an energy x'V x of the states (y, y') that falls over a wide range of factors. For
-  /// a mode with a ratio of 0.33 this is from 1 to 7, for one with 0.7 to 85, until ticks matter.
+  /// Cholesky's decomposition takes what is not a number for a success.
+  static bool is_positive(const MatrixXd& A) {
+    return A.allFinite() && Eigen::LLT<MatrixXd>(A).info() == Eigen::Success;
+  }
+
+  /// Returns V of an energy x'V x of the states (y, y') that falls over a wide range of factors.
+  /// For a mode with a ratio of 0.33 this is from 1 to 7, for one with 0.7 to 85, until ticks
+  /// matter.
   static MatrixXd energy(const SampledDataModel& loop) {
     constexpr double kCross = 0.7, kStiffness = 1.4;
     const Eigen::Index n = loop.n;

@@ -35,7 +35,8 @@ struct RealPhi {
 /// Taylor series of Z / 2^s, and doubling.
 RealPhi real_phi(const MatrixXd& Z) {
   const auto identity = MatrixXd::Identity(Z.rows(), Z.cols());
-  double norm = Z.allFinite() ? Z.cwiseAbs().colwise().sum().maxCoeff() : 0;
+  double norm = Z.cwiseAbs().colwise().sum().maxCoeff();
+  if (!std::isfinite(norm)) throw std::invalid_argument("sample_loop: the friction is too large");
   const int doublings = norm < 1 ? 0 : std::ilogb(norm) + 1;
   norm = std::ldexp(norm, -doublings);
   int terms = 0;

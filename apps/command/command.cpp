@@ -207,7 +207,11 @@ void send(const CommandOptions& options) {
   const auto commands = [&] { return state->commander == command.sender; };
   const auto refused = [&] { return state->last_refused_sender == command.sender; };
   if (!until(options.timeout, [&] { return refused() || commands(); })) {
-    throw std::runtime_error("no answer; does the loop take commands (dashpot run --commands)?");
+    command.parts = command_t::GIVE_UP;  // where the answer is late, nobody is to command the arm
+    publish();
+    throw std::runtime_error(
+        "no answer; does the loop take commands (dashpot run --commands)? If it does, "
+        "what it was told may still act");
   }
   if (!commands()) {
     throw std::runtime_error(std::string("refused: ") +

@@ -33,6 +33,7 @@ void Alarms::take(const state_t& message) {
     ++changes_of_ratio;
     changed_at_ = message.tick;
   }
+  if (message.tick < changed_at_) changed_at_ = 0;  // the loop began anew
   wanted_ratio = ratio;
   if (message.fault != 0 && message.fault_tick != fault_tick_) ++faults;
   fault_tick_ = message.fault != 0 ? message.fault_tick : 0;

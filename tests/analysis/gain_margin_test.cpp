@@ -3,6 +3,7 @@
 #include <dashpot/analysis/sampled_loop.hpp>
 #include <dashpot/analysis/spectrum.hpp>
 #include <dashpot/tests/support/random.hpp>
+#include <dashpot/tests/support/refusal.hpp>
 #include <dashpot/tests/support/sampled_loops.hpp>
 #include <dashpot/tests/support/systems.hpp>
 
@@ -34,6 +35,17 @@ TEST(GainMargin, IsThatOfOneJoint) {
     EXPECT_NEAR(gain_margin(system, analyze(system), loop), expected, 1e-5 * expected);
     EXPECT_EQ(testing::sample(system, loop).stable(), expected > 1);
   }
+}
+
+TEST(GainMargin, RefusesFrictionWhoseSumIsNoNumber) {
+  System<> system(2);
+  system.stiffness = system.damping = MatrixXd::Identity(2, 2);
+  SampledLoop loop;
+  loop.period = 1;
+  loop.friction = MatrixXd::Constant(2, 2, 1e308);
+  EXPECT_EQ(
+      testing::refusal<std::invalid_argument>([&] { gain_margin(system, analyze(system), loop); }),
+      "sample_loop: the friction is too large");
 }
 
 /// The same with much friction, by the criterion of Jury for z^2 - t z + d.

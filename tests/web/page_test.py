@@ -106,7 +106,7 @@ class Page(PageTest):
                 c.dispatchEvent(new PointerEvent('pointermove', {{clientX: box.left + 54 + (c.clientWidth - 66) * {t} / 6,
                 clientY: box.top + 50}})); }})()''')
             told = f'{math.sqrt(stiffness / INERTIA):.2f}'
-            self.browser.until(f"document.querySelector('.hint').innerText.includes('mode 1: {told}')")
+            self.browser.until(f"document.querySelector('.hint')?.innerText.includes('mode 1: {told}')")
         self.browser.value('dashpot.seek(1)')  # and back in time
         re, im = poles(50, 4)
         self.browser.until(f'dashpot.poles.length == 2 && Math.abs(Math.abs(dashpot.poles[0].im) - {im}) < 1e-6')
