@@ -82,8 +82,8 @@ class PartsReader {
     const MotionFile file = read_motion_file(path, command_.hints);
     const std::string name = std::filesystem::path(path).filename();
     const std::vector<Index> driving = input_channels(file);
-    const std::vector<Index> chosen = chosen_channels(
-        file.channels, command_.channels, command_.inputs.empty() ? std::vector<Index>{} : driving);
+    const std::vector<Index> others = command_.inputs.empty() ? std::vector<Index>{} : driving;
+    const std::vector<Index> chosen = chosen_channels(file.channels, command_.channels, others);
     std::vector<MotionChannel> channels;
     channels.reserve(chosen.size());
     for (const Index i : chosen) channels.push_back(file.channels[static_cast<std::size_t>(i)]);
@@ -99,8 +99,13 @@ class PartsReader {
                            })) {
       throw InputError(path, "its channels differ from those of " + command_.files.front());
     }
-    for (const std::string& note : file.notes)
-      report_.notes.push_back(std::string(name).append(": ").append(note));
+    const auto say = [this, &name](const std::vector<std::string>& notes) {
+      for (const std::string& note : notes) {
+        report_.notes.push_back(std::string(name).append(": ").append(note));
+      }
+    };
+    say(file.notes);
+    if (command_.channels.empty()) say(left_out_positions(file.channels, chosen, others));
     const auto note = [this, &path](int count, const std::string& what) {
       if (count > 0) report_.notes.push_back(path + ": " + std::to_string(count) + what);
     };

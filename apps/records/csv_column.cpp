@@ -30,8 +30,8 @@ struct Conversion {
   double factor;
 };
 
-/// The SI unit that `unit` converts to.
-std::optional<Conversion> to_si(std::string unit) {
+/// The SI unit that `unit` converts to, where it is written as usual.
+std::optional<Conversion> to_si_as_written(std::string unit) {
   for (const auto& [name, usual] :
        {std::pair("sec", "s"), std::pair("seconds", "s"), std::pair("msec", "ms"),
         std::pair("usec", "us"), std::pair("nsec", "ns"), std::pair("\xC2\xB0", "deg"),
@@ -48,6 +48,13 @@ std::optional<Conversion> to_si(std::string unit) {
     }
   }
   return std::nullopt;
+}
+
+/// The SI unit that `unit` converts to, in any case where that is clear: M is not m.
+std::optional<Conversion> to_si(const std::string& unit) {
+  std::optional<Conversion> found = to_si_as_written(unit);
+  if (found || unit.size() < 3 || unit.front() == 'M') return found;
+  return to_si_as_written(lower(unit));
 }
 
 /// Returns what a name without a unit is measured in, by its words.
@@ -98,6 +105,17 @@ bool has_any(const std::vector<std::string>& words, std::initializer_list<const 
     return std::any_of(wanted.begin(), wanted.end(),
                        [&word](const char* one) { return word == one; });
   });
+}
+
+bool is_position(const std::string& name) {
+  return usual_unit(name) == "rad";
+}
+
+bool is_of_tip(const std::string& name) {
+  const std::vector<std::string> words = words_of(name);
+  const bool axis = words.size() == 1 &&
+                    has_any(words, {"x", "y", "z", "rx", "ry", "rz", "roll", "pitch", "yaw"});
+  return axis || has_any(words, {"tip", "tcp", "ee", "pose", "cartesian", "error", "err"});
 }
 
 bool is_desired(const std::string& name) {

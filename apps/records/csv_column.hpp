@@ -17,6 +17,10 @@ std::vector<std::string> words_of(std::string_view name);
 bool has_any(const std::vector<std::string>& words, std::initializer_list<const char*> wanted);
 /// Whether a channel is what somebody wanted and not what was measured: "q_d_0", "pos_cmd[1]".
 bool is_desired(const std::string& name);
+/// Whether a name is usual for the position of a joint: "q1", "theta_2".
+bool is_position(const std::string& name);
+/// Whether a name is usual for where the tip is, or how far from its goal: "x", "error_rx".
+bool is_of_tip(const std::string& name);
 
 /// A column by its heading.
 struct CsvColumn {

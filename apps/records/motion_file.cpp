@@ -158,6 +158,13 @@ std::vector<Index> chosen_channels(const std::vector<MotionChannel>& channels,
       }
     }
   }
+  // What a file has of the tip follows from its joints, and adds nothing but its own curvature.
+  const auto of_tip = [&channels](Index i) {
+    return is_of_tip(channels[static_cast<std::size_t>(i)].name);
+  };
+  if (names.empty() && !std::all_of(chosen.begin(), chosen.end(), of_tip)) {
+    std::erase_if(chosen, of_tip);
+  }
   if (chosen.empty()) {
     std::string known;
     for (const MotionChannel& channel : channels) {
@@ -169,6 +176,36 @@ std::vector<Index> chosen_channels(const std::vector<MotionChannel>& channels,
                          known);
   }
   return chosen;
+}
+
+std::vector<std::string> left_out_positions(const std::vector<MotionChannel>& channels,
+                                            const std::vector<Index>& chosen,
+                                            const std::vector<Index>& others) {
+  constexpr std::size_t kMostText = 200;
+  std::string tip, unknown;
+  const auto add = [](std::string& list, const std::string& name) {
+    const bool full = list.size() >= kMostText;
+    if (!list.ends_with(", ...")) list.append(list.empty() ? "" : ", ").append(full ? "..." : name);
+  };
+  const auto among = [](const std::vector<Index>& list, std::size_t i) {
+    return std::find(list.begin(), list.end(), static_cast<Index>(i)) != list.end();
+  };
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    const auto& [name, unit, problem] = channels[i];
+    if (among(chosen, i) || among(others, i) || is_desired(name)) continue;
+    const auto is_unit = [&unit = unit](const char* one) { return unit == one; };
+    constexpr std::array<const char*, 6> kKnown = {"rad", "m", "rad/s", "m/s", "N m", "N"};
+    const bool known = std::any_of(kKnown.begin(), kKnown.end(), is_unit) || unit == kUnnamed;
+    if (unit == "rad" || unit == "m") add(tip, name);
+    if (!known && is_position(name))
+      add(unknown, std::string(name).append(" [").append(unit).append("]"));
+  }
+  std::vector<std::string> notes;
+  if (!tip.empty()) notes.push_back("left out beside the positions of joints: " + tip);
+  if (!unknown.empty()) {
+    notes.push_back("left out, as rad, mrad, deg, m, cm or mm is wanted: " + unknown);
+  }
+  return notes;
 }
 
 }  // namespace dashpot::apps

@@ -19,12 +19,17 @@ namespace dashpot::apps {
 MotionFile read_motion_file(const std::string& path, const FileHints& hints = {});
 
 /// Numbers of the channels called `names`, "q1,q2"; of those that are positions, or else
-/// velocities, if that is empty, without those that are desired ("q_d_0", "pos_cmd") or in
-/// `others`; of a file without names all. No two of one name. Throws InputError with `option` as
-/// key.
+/// velocities, if that is empty, without those that are desired ("q_d_0", "pos_cmd"), in `others`,
+/// or the tip's beside joints; of a file without names all. No two of one name. Throws InputError
+/// with `option` as key.
 std::vector<Eigen::Index> chosen_channels(const std::vector<MotionChannel>& channels,
                                           const std::string& names,
                                           const std::vector<Eigen::Index>& others = {},
                                           const std::string& option = "--channels");
+
+/// Says which positions chosen_channels left out by itself, and why.
+std::vector<std::string> left_out_positions(const std::vector<MotionChannel>& channels,
+                                            const std::vector<Eigen::Index>& chosen,
+                                            const std::vector<Eigen::Index>& others);
 
 }  // namespace dashpot::apps

@@ -111,6 +111,43 @@ TEST(IdentifyFiles, TakesWhatRecordersAddAndLeaveOut) {
                  "q3: 'x' is no number");
 }
 
+/// Rows with the same cells at the end of each.
+std::string with_columns(const std::string& heading, const std::string& cells) {
+  const std::string good = decay_csv("", 1).substr(1);
+  return heading + "\n" + replaced(good, "\n", cells + "\n");
+}
+
+/// `run --csv` has where the tip is, and its errors, beside the joints.
+TEST(IdentifyFiles, TakesTheJointsAloneWhereTheTipIsBesideThem) {
+  const Scratch scratch;
+  const std::string file = scratch.write(
+      "run.csv", with_columns("time [s],q1 [rad],q2 [rad],x [m],error_x [m],error_rx [rad]",
+                              ",0.5,0.1,0.001"));
+  const Json found = identify({file});
+  expect_known_modes(found);
+  EXPECT_THAT(found["notes"].dump(),
+              HasSubstr("left out beside the positions of joints: x, error_x, error_rx"));
+  // By itself the tip is a motion as any other.
+  const std::string tip = scratch.write("tip.csv", decay_csv("time [s],x [m],y [m]", 1));
+  const Json alone = identify({tip});
+  expect_known_modes(alone);
+  EXPECT_EQ(alone["notes"].size(), 0U) << alone["notes"];
+}
+
+TEST(IdentifyFiles, SaysWhichPositionsHaveAnUnknownUnit) {
+  const Scratch scratch;
+  const std::string file = scratch.write(
+      "units.csv", with_columns("time [s],q1 [rad],q2 [rad],q3 [furlong],i [A]", ",0.5,0.1"));
+  EXPECT_THAT(identify({file})["notes"].dump(),
+              HasSubstr("left out, as rad, mrad, deg, m, cm or mm is wanted: q3 [furlong]\""));
+  const double degree = 57.29577951308232;
+  const std::string degrees =
+      scratch.write("degrees.csv", decay_csv("Time [Sec],q1 [Deg],q2_DEG", degree));
+  const Json found = identify({degrees});
+  expect_known_modes(found);
+  EXPECT_EQ(found["notes"].size(), 0U) << found["notes"];
+}
+
 TEST(IdentifyFiles, LeavesOutWhatIsMissingOrTwiceAndSaysSo) {
   const Scratch scratch;
   std::string text = decay_csv("time [s],q1 [rad],q2 [rad],note", 1), with_holes;
