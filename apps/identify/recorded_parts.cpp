@@ -73,6 +73,26 @@ int leave_out_clipped(Eigen::MatrixXd& values, Index channel) {
   return count;
 }
 
+/// Says which columns of a file may be inputs that nobody named: forces, and torques that are fewer
+/// than the joints, because a torque of each joint is the controller's.
+std::vector<std::string> possible_inputs(const std::vector<MotionChannel>& channels,
+                                         const std::vector<Index>& chosen) {
+  const auto torques = std::count_if(channels.begin(), channels.end(),
+                                     [](const auto& channel) { return channel.unit == "N m"; });
+  const bool few = torques < static_cast<std::ptrdiff_t>(chosen.size());
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    const auto& [name, unit, problem] = channels[i];
+    if (unit != "N" && !(unit == "N m" && few)) continue;
+    if (std::find(chosen.begin(), chosen.end(), static_cast<Index>(i)) != chosen.end()) continue;
+    notes.push_back(std::string(name)
+                        .append(unit == "N" ? " [N] is a force" : " [N m] is a torque")
+                        .append(": if it was put in from outside, --inputs ")
+                        .append(name));
+  }
+  return notes;
+}
+
 class PartsReader {
  public:
   PartsReader(const IdentifyCommand& command, IdentifyReport& report, RecordedParts& parts)
@@ -106,6 +126,9 @@ class PartsReader {
     };
     say(file.notes);
     if (command_.channels.empty()) say(left_out_positions(file.channels, chosen, others));
+    if (file.rests.empty() && command_.inputs.empty() && !command_.ambient) {
+      say(possible_inputs(file.channels, chosen));
+    }
     const auto note = [this, &path](int count, const std::string& what) {
       if (count > 0) report_.notes.push_back(path + ": " + std::to_string(count) + what);
     };

@@ -148,6 +148,18 @@ TEST(IdentifyFiles, SaysWhichPositionsHaveAnUnknownUnit) {
   EXPECT_EQ(found["notes"].size(), 0U) << found["notes"];
 }
 
+TEST(IdentifyFiles, SaysThatAForceMayBeAnInput) {
+  const Scratch scratch;
+  const std::string file = scratch.write(
+      "force.csv", with_columns("time [s],q1 [rad],q2 [rad],f [N],tau [N m]", ",0,0"));
+  const std::string notes = identify({file})["notes"].dump();
+  EXPECT_THAT(notes, HasSubstr("f [N] is a force: if it was put in from outside, --inputs f"));
+  EXPECT_THAT(notes, HasSubstr("tau [N m] is a torque: if it was put in"));
+  const std::string joints = scratch.write(
+      "torques.csv", with_columns("time [s],q1 [rad],q2 [rad],tau1 [N m],tau2 [N m]", ",0,0"));
+  EXPECT_EQ(identify({joints})["notes"].size(), 0U);
+}
+
 TEST(IdentifyFiles, LeavesOutWhatIsMissingOrTwiceAndSaysSo) {
   const Scratch scratch;
   std::string text = decay_csv("time [s],q1 [rad],q2 [rad],note", 1), with_holes;
