@@ -126,11 +126,15 @@ class CsvReader {
     }
   }
 
-  /// Columns of a file without names: the first one is the time if it rises evenly.
+  /// Columns of a file without names: the first one is the time if it rises evenly, and, where
+  /// there is a rate, to the end of the file.
   void number_columns(std::string_view row) {
+    constexpr std::size_t kEven = 20;  // samples
     separator_ = separator_of(row);
+    const std::size_t count = cells_of(row, separator_).size();
+    const bool rated = hints_.rate > 0;
     std::vector<double> first;
-    for (std::string_view rest = rest_; first.size() < 20; row = next_line(rest)) {
+    for (std::string_view rest = rest_; rated || first.size() < kEven; row = next_line(rest)) {
       const std::string_view cell = trimmed(cells_of(row, separator_).front());
       double value = 0;
       if (std::from_chars(cell.data(), cell.data() + cell.size(), value).ec == std::errc{}) {
@@ -139,18 +143,20 @@ class CsvReader {
       if (rest.empty()) break;
     }
     const double step = first.size() > 1 ? first[1] - first[0] : 0;
-    bool rises = hints_.rate == 0 && step > 0;
+    bool rises = step > 0 && (!rated || count > 1);
     for (std::size_t i = 1; rises && i < first.size(); ++i) {
-      rises = std::abs(first[i] - first[i - 1] - step) < 0.2 * step;
+      const double next = first[i] - first[i - 1];
+      rises = i < kEven ? std::abs(next - step) < 0.2 * step : next > 0;
     }
-    const std::size_t count = cells_of(row, separator_).size();
     for (std::size_t i = 0; i < count; ++i) {
       columns_.push_back({"c" + std::to_string(i + 1), kUnnamed});
     }
     if (rises) {
       columns_[0] = {"c1", "s", 1, true, true};
-      file_.notes.emplace_back("no line of names: the first column is taken for the time");
-    } else if (hints_.rate == 0) {
+      file_.notes.push_back(
+          std::string("no line of names: the first column is taken for the time") +
+          (rated ? ", and --rate stands in its place" : ""));
+    } else if (!rated) {
       fail(line_,
            "numbers, where a line of names with units is wanted first: --columns \"time [s],q1 "
            "[rad],...\" says what they are, and --rate HZ stands for a time");

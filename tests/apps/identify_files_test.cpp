@@ -160,6 +160,15 @@ TEST(IdentifyFiles, SaysThatAForceMayBeAnInput) {
   EXPECT_EQ(identify({joints})["notes"].size(), 0U);
 }
 
+/// With --rate a first column that rises to the end is the time, which the rate replaces.
+TEST(IdentifyFiles, TakesNoTimeForAChannel) {
+  const Scratch scratch;
+  const std::string file = scratch.write("plain.csv", decay_csv("", 1).substr(1));
+  const Json found = identify({file, "--rate", "500"});
+  expect_known_modes(found);
+  EXPECT_THAT(found["notes"].dump(), HasSubstr("taken for the time, and --rate stands in its"));
+}
+
 TEST(IdentifyFiles, LeavesOutWhatIsMissingOrTwiceAndSaysSo) {
   const Scratch scratch;
   std::string text = decay_csv("time [s],q1 [rad],q2 [rad],note", 1), with_holes;
