@@ -307,14 +307,15 @@ Calibration calibrate(const LoopPrediction& loop, const std::string& names,
                                 "): other postures, or fix one of them");
     }
   }
-  if (!result.consistent) {
+  if (root_mean_square(r) >= kFits) {
     result.warnings.emplace_back(
         "with these parameters the configuration does not explain the modes: something else "
         "differs (payload_center, payload_inertia, friction, delay, gears, the gains, the model)");
   }
-  if (r.size() < p) {
-    result.warnings.push_back("fewer numbers were measured (" + std::to_string(r.size()) +
-                              ") than parameters are wanted (" + std::to_string(p) + ")");
+  if (r.size() <= p) {
+    result.warnings.push_back("no more numbers were measured (" + std::to_string(r.size()) +
+                              ") than parameters are wanted (" + std::to_string(p) +
+                              "): nothing is left to tell whether they explain the modes");
   }
   result.correction = parameters.correction(x, n);
   result.parameters = std::move(parameters.list);

@@ -109,6 +109,10 @@ void add_identify(CLI::App& program) {
     if (StopSignal::given()) throw Interrupted("the modes above are those found until then");
     const bool any = std::any_of(report.postures.begin(), report.postures.end(),
                                  [](const auto& posture) { return !posture.found.modes.empty(); });
+    if (any && !options->calibrate.empty() && !report.calibration) {
+      throw std::runtime_error(
+          "--calibrate: no mode that was measured is like one that is predicted");
+    }
     if (any) return;
     throw std::runtime_error("no modes: " +
                              (report.advice.empty() ? std::string(kNoneBelieved) : report.advice));

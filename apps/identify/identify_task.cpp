@@ -160,6 +160,10 @@ class Task {
     }
     if (command_.calibrate.empty()) return;
     report_.calibration = calibrate(loop, command_.calibrate, report_.postures);
+    if (report_.calibration->numbers == 0) {
+      report_.calibration.reset();
+      return;
+    }
     if (!command_.output.empty()) loop.write(command_.output, report_.calibration->correction);
   }
 

@@ -3,6 +3,8 @@
 #include <dashpot/tests/support/arms.hpp>
 #include <dashpot/tests/support/sanitized.hpp>
 
+#include <filesystem>
+
 namespace dashpot::tests {
 namespace {
 
@@ -208,6 +210,35 @@ TEST(Calibrate, FindsTheStiffnessOfGears) {
   }
   EXPECT_THAT(scratch.read("found.yaml"), HasSubstr("gear_stiffness: [59"));
   EXPECT_THAT(calibrated("", "none.yaml").err, HasSubstr("needs robot.gear_stiffness"));
+
+  // Few numbers are explained by many parameters, which shows nothing, and is no contradiction.
+  const std::string guess = scratch.write("guess.yaml", config(gears) + "}");
+  const auto calibrated_by = [&](const std::string& file, const Words& more) {
+    return run_program(
+        joined({"identify", file, "--against", guess, "--output", scratch.path("few.yaml")}, more));
+  };
+  const Outcome few = calibrated_by(
+      arguments[0],
+      {"--from", "1.51", "--calibrate", "payload,reflected_inertia,friction,gear_stiffness,delay"});
+  EXPECT_EQ(few.status, 0) << few.err;
+  EXPECT_THAT(few.out, HasSubstr("no more numbers were measured (8) than parameters are wanted"));
+  EXPECT_THAT(few.out, ::testing::Not(HasSubstr("does not explain the modes")));
+  std::filesystem::remove(scratch.path("few.yaml"));
+
+  // Nothing that was measured, or nothing like what is predicted, calibrates nothing.
+  const Outcome still =
+      calibrated_by(arguments[0], {"--to", "0.4", "--calibrate", "gear_stiffness"});
+  EXPECT_EQ(still.status, 1);
+  EXPECT_THAT(still.err, HasSubstr("no modes: "));
+  EXPECT_THAT(still.out, ::testing::Not(HasSubstr("of no numbers")));
+  const Outcome other =
+      calibrated_by(scratch.write("other.csv", decay_csv("time_ms,q1_rad,q2_rad", 1, 10)),
+                    {"--calibrate", "gear_stiffness"});
+  EXPECT_EQ(other.status, 1) << other.out;
+  EXPECT_EQ(other.err,
+            "dashpot identify: --calibrate: no mode that was measured is like one that is "
+            "predicted\n");
+  EXPECT_FALSE(std::filesystem::exists(scratch.path("few.yaml")));
 }
 
 }  // namespace
