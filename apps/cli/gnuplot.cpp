@@ -3,7 +3,9 @@
 
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <stdexcept>
+#include <system_error>
 
 namespace dashpot::apps {
 
@@ -16,6 +18,10 @@ std::string quoted_for_gnuplot(const std::string& text) {
 void check_plot_name(const std::string& path) {
   if (!path.ends_with(".svg") && !path.ends_with(".png")) {
     throw controller::InputError("--plot", path + ": has to end with .svg or .png");
+  }
+  const auto folder = std::filesystem::path(path).parent_path();
+  if (std::error_code none; !folder.empty() && !std::filesystem::is_directory(folder, none)) {
+    throw controller::InputError("--plot", path + ": there is no folder " + folder.string());
   }
 }
 

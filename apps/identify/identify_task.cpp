@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <string_view>
 
 namespace dashpot::apps {
 namespace {
@@ -21,6 +22,14 @@ constexpr double kSamePosture = 0.02;
 /// A linear model has to explain this much of a large motion to be believed.
 constexpr double kExplains = 0.999;
 constexpr double kFades = 0.5;  // and some mode has to lose so much, as an exponent
+
+/// Returns what was wrong, without the name of the call in front.
+std::string reason_of(const std::invalid_argument& error) {
+  constexpr std::string_view kCall = "identify: ";
+  std::string text = error.what();
+  if (text.starts_with(kCall)) text.erase(0, kCall.size());
+  return text;
+}
 
 class Task {
  public:
@@ -38,7 +47,7 @@ class Task {
       try {
         read_parts(file, command_, report_, parts_);
       } catch (const std::invalid_argument& error) {
-        throw InputError(file, error.what());
+        throw InputError(file, reason_of(error));
       }
     }
     identify();
@@ -112,8 +121,8 @@ class Task {
                             : identification::identify_decays(records, options);
       } catch (const std::invalid_argument& error) {
         for (const std::size_t i : group)
-          report_.parts[parts_.list[i].report].reason = error.what();
-        if (report_.advice.empty()) report_.advice = error.what();
+          report_.parts[parts_.list[i].report].reason = reason_of(error);
+        if (report_.advice.empty()) report_.advice = reason_of(error);
         continue;
       }
       // What is far from linear is not told by a linear model, however good it looks.

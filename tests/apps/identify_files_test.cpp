@@ -232,6 +232,7 @@ TEST(IdentifyFiles, RefusesInOneLineThatNamesFileLineAndColumn) {
       {{file(good), file(decay_csv("time,q1,q3", 1))}, "its channels differ"},
       {{file(good), "--calibrate", "payload"}, "--against"},
       {{file(good), "--plot", "x.pdf"}, "--plot: x.pdf: has to end"},
+      {{file(good), "--plot", scratch.path("none/x.svg")}, "x.svg: there is no folder"},
       {{file("time [s],label,natural_frequency [rad/s]\n0,1,2\n")}, "has modes in place of motion"},
       {{scratch.path("none.csv")}, "none.csv"},
       {{scratch.path("")}, "cannot be read"},
