@@ -149,18 +149,21 @@ Identification describe(const ModelSearch& search, const std::vector<MotionRecor
   if (search.larger) doubt_order(search.fit, *search.larger, modes);
   result.order = static_cast<int>(at);
   // Friction makes of one mode others near it, heavily damped ones, and weak ones.
-  constexpr double kLightly = 0.1, kShare = 0.1, kFarFromWhite = 2;
+  constexpr double kLightly = 0.1, kShare = 0.1, kFarFromWhite = 2, kMuch = 0.1;
   double most = 0;
   for (const MeasuredMode& mode : modes) {
     if (mode.damping_ratio < kLightly) most = std::max(most, mode.energy);
   }
-  const bool doubted = search.differs && search.fit.whiteness > kFarFromWhite;
+  const bool doubted =
+      (search.differs || 1 - result.explained > kMuch) && search.fit.whiteness > kFarFromWhite;
   for (MeasuredMode& mode : modes) {
     if (mode.stability == 0 && mode.energy < 1 - result.explained) {
       mode.reason = "weaker than what is left over, and in no model of another order";
     }
     if (doubted && (mode.damping_ratio > kLightly || mode.energy < kShare * most)) {
-      mode.reason = "parts of the records differ: it may be friction, or what else is not linear";
+      mode.reason =
+          std::string(search.differs ? "parts of the records differ" : "much is left over") +
+          ": it may be friction, or what else is not linear";
     }
   }
   for (const DecayFactor& factor : search.not_repeated) {
