@@ -125,7 +125,8 @@ class Task {
         if (report_.advice.empty()) report_.advice = reason_of(error);
         continue;
       }
-      // What is far from linear is not told by a linear model, however good it looks.
+      // What is far from linear is not told by a linear model, however good it looks; with more
+      // modes than joints it is none.
       const bool large = std::any_of(group.begin(), group.end(), [this](std::size_t i) {
         return is_large(parts_.list[i].record, report_.channels);
       });
@@ -135,7 +136,9 @@ class Task {
           posture.found.modes.begin(), posture.found.modes.end(), [length](const auto& mode) {
             return mode.damping_ratio * mode.natural_frequency * length > kFades;
           });
-      if (large && !(posture.found.explained > kExplains && fades)) {
+      const bool linear = posture.found.explained > kExplains &&
+                          posture.found.modes.size() <= report_.channels.size();
+      if (large && !(linear && fades)) {
         for (const std::size_t i : group)
           report_.parts[parts_.list[i].report].reason = kLargeAdvice;
         report_.advice = kLargeAdvice;

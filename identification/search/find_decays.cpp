@@ -15,9 +15,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kMoves = 3;    // in units of the noise
-constexpr double kStrong = 10;  // worth a decay
-constexpr double kRise = 3;     // a new push
+constexpr double kMoves = 3;   // in units of the noise
+constexpr double kStrong = 5;  // worth a decay
+constexpr double kRise = 3;    // a new push
 // In periods of the motion's pace: what is slower by a few times still has one envelope.
 constexpr double kStandstill = 1;  // within a motion
 constexpr double kEnvelope = 1.5;  // window

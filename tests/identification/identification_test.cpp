@@ -270,6 +270,30 @@ MotionRecord pushed(const KnownDecay& decay, Dice& draw) {
   return record;
 }
 
+/// Three pushes 100 times the noise, at any rate of sampling.
+TEST(FindDecays, FindsEachPushWhateverTheRate) {
+  for (const double rate : {125.0, 250.0, 500.0, 1000.0}) {
+    Dice draw(31);
+    const auto samples = static_cast<Index>(12 * rate);
+    MotionRecord record{VectorXd(samples), MatrixXd(2, samples)};
+    for (Index i = 0; i < samples; ++i) {
+      const double t = record.time[i] = static_cast<double>(i) / rate;
+      const double since = std::fmod(t + 3, 4) - 0.01;  // pushes at 1, 5 and 9 s
+      const double grown = t < 1 ? 0 : std::min(1.0, since / 0.05);
+      const double fast = std::exp(-1.5 * since) * std::sin(30 * since);
+      const double slow = std::exp(-1.2 * since) * std::sin(12 * since);
+      record.output(0, i) = 0.02 * grown * slow + 0.004 * grown * fast + 2e-4 * draw.normal();
+      record.output(1, i) = 0.01 * grown * slow - 0.01 * grown * fast + 2e-4 * draw.normal();
+    }
+    const std::vector<FreeDecay> found = find_decays(record);
+    ASSERT_EQ(found.size(), 3U) << rate;
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_EQ(found[k].reason, "");
+      EXPECT_NEAR(record.time[found[k].from], 1 + 4 * static_cast<double>(k), 0.2) << rate;
+    }
+  }
+}
+
 TEST(FindDecays, BeginsAfterThePushAndAtTheStep) {
   Dice draw(30);
   const KnownDecay decay;
