@@ -37,6 +37,20 @@ TEST(GainMargin, IsThatOfOneJoint) {
   }
 }
 
+/// The first margin of several, where squares of the damping are no numbers any more.
+TEST(GainMargin, IsTheFirstWhereAnEnergyIsNoNumber) {
+  const double d = 1e158, T = 1e10;
+  const MatrixXd unit = MatrixXd::Identity(2, 2);
+  System<> system(2);
+  system.damping = 1.001 * d / T * unit;
+  system.stiffness = -d / T / T * MatrixXd{{0, 1}, {0.1, 0}};
+  SampledLoop loop;
+  loop.period = T;
+  loop.friction = d / T * unit;
+  loop.compensation = d / T / T * (MatrixXd{{0, -1}, {-0.8, 0}} - unit);
+  EXPECT_NEAR(gain_margin(system, analyze(system), loop), 3.02, 0.01);
+}
+
 TEST(GainMargin, RefusesFrictionWhoseSumIsNoNumber) {
   System<> system(2);
   system.stiffness = system.damping = MatrixXd::Identity(2, 2);
