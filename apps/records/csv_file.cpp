@@ -13,7 +13,7 @@ namespace {
 
 using controller::InputError;
 
-/// What a file lacks that has no time.
+/// A file without a time lacks this.
 constexpr const char* kNoTime =
     "no column of time (t, time, timestamp, stamp, date, utime, duration or elapsed): --rate HZ, "
     "or --columns with a name for each column";

@@ -98,7 +98,7 @@ void doubt_order(const DecayFit& fit, const DecayFit& larger, std::vector<Measur
   }
 }
 
-/// Of each channel the sum of squares about its mean.
+/// Returns the sum of squares of each channel about its mean.
 VectorXd squares_of_motion(const MotionRecord& record) {
   VectorXd squares = VectorXd::Zero(record.output.rows());
   for (Index c = 0; c < squares.size(); ++c) {

@@ -62,7 +62,7 @@ TEST(GainMargin, RefusesFrictionWhoseSumIsNoNumber) {
       "sample_loop: the friction is too large");
 }
 
-/// The same with much friction, by the criterion of Jury for z^2 - t z + d.
+/// With much friction the margin follows from the criterion of Jury for z^2 - t z + d.
 TEST(GainMargin, IsThatOfOneJointWithFriction) {
   Random random(301);
   int finite = 0;

@@ -21,7 +21,7 @@ using testing::SprungArm;
 
 constexpr double kReach = 0.02;  // rad
 
-/// What is not linear in each joint.
+/// A joint differs from a linear one in this.
 struct Flaw {
   double friction = 0;   ///< Coulomb's, as a share of the spring's force at kReach
   double hardening = 0;  ///< share by which a spring is stiffer at kReach
