@@ -66,13 +66,13 @@ struct Identification {
 /// Models of rising order come from the eigensystem realization algorithm (Juang and Pappa 1985) on
 /// means of stretches of samples, all records side by side. Each is refined to the maximum of the
 /// likelihood, with one shape of each mode for all records and a noise of each channel in each
-/// record, and an information criterion (Akaike 1974, with 4 for each parameter) chooses among
-/// them. The model chosen is refined on the samples as they are, at the times at which they were
-/// taken; what it leaves over is searched for more. So neither gaps nor uneven time steps matter,
-/// and heavily damped modes are as good as the record allows. Where more decays are found than as
-/// many joints can have, a second search has the products of the two strongest oscillations in the
-/// model, e^((lambda_i + lambda_j) t): what an arm that is not quite linear makes of them, to
-/// second order.
+/// record, and an information criterion (Akaike 1974, with 4 for each parameter, and 2 for those of
+/// as many modes as there are channels) chooses among them. The model chosen is refined on the
+/// samples as they are, at the times at which they were taken; what it leaves over is searched for
+/// more. So neither gaps nor uneven time steps matter, and heavily damped modes are as good as the
+/// record allows. Where more decays are found than as many joints can have, a second search has the
+/// products of the two strongest oscillations in the model, e^((lambda_i + lambda_j) t): what an
+/// arm that is not quite linear makes of them, to second order.
 ///
 /// The standard deviations are those of maximum likelihood (inverse of Fisher's information, with
 /// the noise that the model leaves over), enlarged where the rest is not white, and by what the
@@ -94,8 +94,9 @@ Identification identify_decays(const std::vector<MotionRecord>& records,
 /// input make of it. Models of rising order come from least squares in the frequency domain with
 /// one denominator (LSCF, Guillaume et al. 2003). The likelihood is that of means of samples, as
 /// many as the band of the motion allows; samples that are missing are interpolated over three
-/// steps at most, and uneven times to even ones. The model has no products of motions. All else is
-/// as with identify_decays.
+/// steps at most, and uneven times to even ones. The model has no products of motions, each
+/// parameter costs 4, and while there are fewer modes than channels, heavily damped ones are tried
+/// as two. All else is as with identify_decays.
 ///
 /// An input that is itself made of the motion, as the torques of a controller are, shows the arm
 /// without the controller, and noise in it shifts the result: use what is put in from outside.

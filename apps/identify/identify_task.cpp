@@ -125,7 +125,7 @@ class Task {
         if (report_.advice.empty()) report_.advice = reason_of(error);
         continue;
       }
-      // What is far from linear is not told by a linear model, however good it looks; with more
+      // A linear model does not tell what is far from linear, however good it looks; with more
       // modes than joints it is none.
       const bool large = std::any_of(group.begin(), group.end(), [this](std::size_t i) {
         return is_large(parts_.list[i].record, report_.channels);

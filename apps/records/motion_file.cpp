@@ -158,7 +158,7 @@ std::vector<Index> chosen_channels(const std::vector<MotionChannel>& channels,
       }
     }
   }
-  // What a file has of the tip follows from its joints, and adds nothing but its own curvature.
+  // The tip follows from the joints, and its columns add nothing but their own curvature.
   const auto of_tip = [&channels](Index i) {
     return is_of_tip(channels[static_cast<std::size_t>(i)].name);
   };

@@ -105,8 +105,8 @@ std::vector<Row> rows_of(const dashpot_modes& predicted) {
   return rows;
 }
 
-/// What the modes become in the sampled loop, and where they are there; a mode that moves further
-/// than kFarthest has no counterpart there that could be told from others.
+/// Adds what the modes become in the sampled loop, and where they are there. A mode that moves
+/// further than kFarthest has no counterpart there that could be told from others.
 void add_sampled(const Scene& scene, RingDown& ring_down, std::vector<Row>& rows) {
   const SampledModes modes = sampled_modes(scene);
   ring_down.gain_margin = modes.gain_margin;
