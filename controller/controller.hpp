@@ -72,6 +72,10 @@ class Controller {
   /// there until there is another set-point. Does nothing if there is no fault.
   void release() noexcept;
 
+  /// Gives up the set-point, as a host that ends: from the next tick on it counts as lost
+  /// (kSetpointLost), until there is a new one or a reset.
+  void stop() noexcept;
+
   /// Changes what is attached to the tip link within Motion::gain_time: from the next tick on the
   /// weight, M and all that follows from them go evenly to their new values. If the tool's frame T
   /// changes, springs keep their extension: reference and goal stay where they are on the tip link.

@@ -16,16 +16,16 @@
  * row. Frames: B is the base link, T the tip or the tool's frame. Twists and wrenches have the
  * linear part first, are taken at T's origin, in B's axes.
  *
- * Threads. One thread, the real-time thread, calls dashpot_update and dashpot_reset. One other
- * thread at a time, "the other thread" below, calls dashpot_set_setpoint, dashpot_set_gains,
- * dashpot_set_payload, dashpot_limit_tip_speed and dashpot_release. One thread, always the same,
- * calls dashpot_read_snapshot, dashpot_read_modes and dashpot_read_sampled_modes; it may be the
- * real-time thread. None of these calls ever waits for
- * the real-time thread or makes it wait. dashpot_start is called before the loop begins. Any thread
- * may call the remaining functions, but dashpot_destroy only once no other call is under way.
- * Controllers are independent of each other. dashpot_update and dashpot_reset never change the text
- * of dashpot_last_error; of the other functions, the first call in a thread may allocate that
- * thread's text.
+ * Threads. One thread, the real-time thread, calls dashpot_update, dashpot_stop and dashpot_reset.
+ * One other thread at a time, "the other thread" below, calls dashpot_set_setpoint,
+ * dashpot_set_gains, dashpot_set_payload, dashpot_limit_tip_speed and dashpot_release. One thread,
+ * always the same, calls dashpot_read_snapshot, dashpot_read_modes and dashpot_read_sampled_modes;
+ * it may be the real-time thread. None of these calls ever waits for the real-time thread or makes
+ * it wait. dashpot_start is called before the loop begins. Any thread may call the remaining
+ * functions, but dashpot_destroy only once no other call is under way. Controllers are independent
+ * of each other. dashpot_update, dashpot_stop and dashpot_reset never change the text of
+ * dashpot_last_error; of the other functions, the first call in a thread may allocate that thread's
+ * text.
  *
  * Every struct begins with struct_size, which the caller sets to the sizeof of the struct; a
  * function refuses any other value. No exception leaves the library. */
@@ -39,7 +39,7 @@ extern "C" {
 
 /* Version of this interface. It increases whenever a function or struct changes. A library
  * serves the versions that it knows. */
-#define DASHPOT_PLUGIN_VERSION 11u
+#define DASHPOT_PLUGIN_VERSION 12u
 /* Largest n. */
 #define DASHPOT_MAX_JOINTS 16
 
@@ -415,6 +415,12 @@ int32_t dashpot_start(dashpot_controller* controller, const double* position, co
  * first tick, from the arm's weight. Returns DASHPOT_OK or a negative code. */
 int32_t dashpot_reset(dashpot_controller* controller, const double* torque);
 
+/* Stops the arm, as a host does before it ends: gives up the set-point. From the next tick on it
+ * counts as lost (DASHPOT_SETPOINT_LOST), until there is a new one, such as a set-point of
+ * dashpot_update with another time, or a reset. Called on the real-time thread. Returns DASHPOT_OK
+ * or a negative code. */
+int32_t dashpot_stop(dashpot_controller* controller);
+
 /* Releases a latched fault at the next tick, unless the cause of the fault is still present. Called
  * on the other thread. The robot then stays where it is until there is another set-point. Does
  * nothing if there is no fault. Returns DASHPOT_OK or a negative code. */
@@ -502,6 +508,11 @@ int32_t dashpot_read_snapshot(dashpot_controller* controller, dashpot_snapshot* 
 int32_t dashpot_read_modes(dashpot_controller* controller, dashpot_modes* modes);
 int32_t dashpot_read_sampled_modes(dashpot_controller* controller, dashpot_sampled_modes* modes);
 
+/* Returns 1 for a status with which the host has to end the motion at once and to engage the
+ * robot's own brakes, because no torque is known to be right: DASHPOT_STATE_FROZEN,
+ * DASHPOT_STATE_CONTRADICTORY and DASHPOT_BRAKE_DOUBTED. Returns 0 for any other. */
+int32_t dashpot_needs_brakes(int32_t status);
+
 /* Return a short English text for what a function returned ("torque limited"), and for the kind of
  * a mode ("underdamped"); never NULL. */
 const char* dashpot_status_text(int32_t status);
@@ -522,6 +533,7 @@ typedef struct dashpot_plugin {
                     dashpot_output*);
   int32_t (*start)(dashpot_controller*, const double*, const double*);
   int32_t (*reset)(dashpot_controller*, const double*);
+  int32_t (*stop)(dashpot_controller*);
   int32_t (*release)(dashpot_controller*);
   int32_t (*set_setpoint)(dashpot_controller*, const dashpot_setpoint*);
   int32_t (*set_gains)(dashpot_controller*, const dashpot_gains*);
@@ -535,6 +547,7 @@ typedef struct dashpot_plugin {
   int32_t (*read_modes)(dashpot_controller*, dashpot_modes*);
   int32_t (*read_sampled_modes)(dashpot_controller*, dashpot_sampled_modes*);
   const char* (*status_text)(int32_t);
+  int32_t (*needs_brakes)(int32_t);
   const char* (*kind_text)(int32_t);
 } dashpot_plugin;
 

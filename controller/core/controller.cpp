@@ -37,6 +37,9 @@ void Controller::reset(const JointVector& torque) noexcept {
 void Controller::release() noexcept {
   if (core_->snapshot().fault != Status::kOk) core_->release();
 }
+void Controller::stop() noexcept {
+  core_->stop();
+}
 void Controller::attach(const Attachment& attachment) noexcept {
   core_->attach(attachment);
 }

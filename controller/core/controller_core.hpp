@@ -20,6 +20,7 @@ class ControllerCore {
   Status update(const RobotState& state, const Setpoint* setpoint, JointVector& torque) noexcept;
   void reset(const JointVector& torque) noexcept;
   void release() noexcept;
+  void stop() noexcept { course_.give_up(); }
   void attach(const Attachment& attachment) noexcept { course_.attach(attachment); }
   void limit_tip_speed(const TipSpeed& speed) noexcept;
   void closed_loop(analysis::System<kMaxJoints>& system) const noexcept {

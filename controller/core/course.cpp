@@ -31,7 +31,8 @@ void Course::release() noexcept {
 Status Course::age_status() const noexcept {
   const double age = 1e-9 * age_;
   const Watchdog& limit = settings_.watchdog;
-  if (limit.setpoint_damp > 0 && age > limit.setpoint_damp) return Status::kSetpointLost;
+  const bool lost = limit.setpoint_damp > 0 ? age > limit.setpoint_damp : std::isinf(age);
+  if (lost) return Status::kSetpointLost;
   if (limit.setpoint_hold > 0 && age > limit.setpoint_hold) return Status::kSetpointStale;
   return Status::kOk;
 }

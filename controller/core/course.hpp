@@ -5,6 +5,7 @@
 #include <dashpot/controller/tick_status.hpp>
 
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace dashpot::controller {
@@ -21,6 +22,8 @@ class Course {
 
   /// The set-point gets older, whatever the clock does after it was accepted.
   void age(double dt) noexcept { age_ += nanoseconds(dt); }
+  /// It is lost at once.
+  void give_up() noexcept { age_ = std::numeric_limits<double>::infinity(); }
   /// Whether it is fresh: kOk, kSetpointStale or kSetpointLost.
   Status age_status() const noexcept;
 

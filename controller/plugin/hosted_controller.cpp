@@ -49,7 +49,8 @@ Status HostedController::update(const dashpot_state* given, const dashpot_setpoi
   const RobotState state = to_state(given, n, later(time_, period));
   time_ = state.time;
   const bool accepted = take_up(wanted, time_);
-  const bool any = has_setpoint_ || stay(time_);
+  stopped_ &= !has_setpoint_;
+  const bool any = has_setpoint_ || (!stopped_ && stay(time_));
   Status status =
       any ? controller_.update(state, setpoint_, torque) : controller_.update(state, torque);
   located_ |= status < Status::kStateNotFinite;
@@ -74,15 +75,21 @@ void HostedController::reset(const JointVector& torque) noexcept {
   take_up(nullptr, time_);  // the gains in it stay, and what is attached
   controller_.reset(torque);
   forget_setpoint();
-  forgotten_ = latched_ = false;
-  located_ = false;
+  forgotten_ = latched_ = stopped_ = located_ = false;
   published_modes_ = 0;
   vibrations.write(controller_.vibration());  // there is none
   snapshots.write(controller_.snapshot());    // likewise: that of tick 0
 }
 
+void HostedController::stop() noexcept {
+  take_up(nullptr, time_);
+  controller_.stop();
+  forget_setpoint();
+  stopped_ = true;
+}
+
 void HostedController::forget_setpoint() noexcept {
-  forgotten_ = has_setpoint_ && given_time_ != DASHPOT_ON_ARRIVAL;
+  forgotten_ = (has_setpoint_ || forgotten_) && given_time_ != DASHPOT_ON_ARRIVAL;
   const Gains gains = setpoint_.gains;
   setpoint_ = settings.initial;
   setpoint_.gains = gains;

@@ -56,6 +56,8 @@ struct HostedController {
                 JointVector& torque) noexcept;
   /// Without entries: the last torque acts.
   void reset(const JointVector& torque) noexcept;
+  /// Gives the set-point up, until there is a new one.
+  void stop() noexcept;
 
  private:
   void forget_setpoint() noexcept;
@@ -72,6 +74,7 @@ struct HostedController {
   Controller controller_;
   Setpoint setpoint_;            ///< in force
   bool has_setpoint_ = false;    ///< one was given
+  bool stopped_ = false;         ///< it was given up, and there is no other
   bool located_ = false;         ///< the controller knows where the robot is
   std::int64_t time_ = 0;        ///< of the last state, ns
   std::uint64_t setpoints_ = 0;  ///< of the other thread, taken up so far

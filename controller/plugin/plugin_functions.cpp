@@ -235,6 +235,12 @@ int32_t dashpot_reset(dashpot_controller* controller, const double* torque) {
   return DASHPOT_OK;
 }
 
+int32_t dashpot_stop(dashpot_controller* controller) {
+  if (controller == nullptr) return DASHPOT_NULL_ARGUMENT;
+  controller->stop();
+  return DASHPOT_OK;
+}
+
 int32_t dashpot_set_setpoint(dashpot_controller* controller, const dashpot_setpoint* setpoint) {
   if (controller == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
   Request& request = controller->request;
@@ -358,6 +364,13 @@ const char* dashpot_status_text(int32_t status) {
   return to_text(static_cast<Status>(status));
 }
 
+int32_t dashpot_needs_brakes(int32_t status) {
+  return status == DASHPOT_STATE_FROZEN || status == DASHPOT_STATE_CONTRADICTORY ||
+                 status == DASHPOT_BRAKE_DOUBTED
+             ? 1
+             : 0;
+}
+
 const char* dashpot_kind_text(int32_t kind) {
   if (kind < DASHPOT_UNDERDAMPED || kind > DASHPOT_SOFT) return "unknown kind";
   return to_text(static_cast<dashpot::analysis::ModeKind>(kind));
@@ -376,6 +389,7 @@ const dashpot_plugin* dashpot_plugin_interface(uint32_t version) {
                                            dashpot_update,
                                            dashpot_start,
                                            dashpot_reset,
+                                           dashpot_stop,
                                            dashpot_release,
                                            dashpot_set_setpoint,
                                            dashpot_set_gains,
@@ -388,6 +402,7 @@ const dashpot_plugin* dashpot_plugin_interface(uint32_t version) {
                                            dashpot_read_modes,
                                            dashpot_read_sampled_modes,
                                            dashpot_status_text,
+                                           dashpot_needs_brakes,
                                            dashpot_kind_text};
   return version == DASHPOT_PLUGIN_VERSION ? &functions : nullptr;
 }

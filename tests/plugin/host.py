@@ -127,6 +127,7 @@ class Plugin(c.Structure):
                                        c.POINTER(Output))),
                 ("start", c.CFUNCTYPE(c.c_int32, Handle, Doubles, Doubles)),
                 ("reset", c.CFUNCTYPE(c.c_int32, Handle, Doubles)),
+                ("stop", c.CFUNCTYPE(c.c_int32, Handle)),
                 ("release", c.CFUNCTYPE(c.c_int32, Handle)),
                 ("set_setpoint", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Setpoint))),
                 ("set_gains", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Gains))),
@@ -142,6 +143,7 @@ class Plugin(c.Structure):
                 ("read_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(Modes))),
                 ("read_sampled_modes", c.CFUNCTYPE(c.c_int32, Handle, c.POINTER(SampledModes))),
                 ("status_text", c.CFUNCTYPE(c.c_char_p, c.c_int32)),
+                ("needs_brakes", c.CFUNCTYPE(c.c_int32, c.c_int32)),
                 ("kind_text", c.CFUNCTYPE(c.c_char_p, c.c_int32))]
 
 
@@ -150,8 +152,8 @@ def load(path):
     library.dashpot_plugin_interface.restype = c.POINTER(Plugin)
     library.dashpot_plugin_interface.argtypes = [c.c_uint32]
     assert not library.dashpot_plugin_interface(999)
-    plugin = library.dashpot_plugin_interface(11).contents
-    assert plugin.version == 11 and plugin.struct_size == c.sizeof(Plugin)
+    plugin = library.dashpot_plugin_interface(12).contents
+    assert plugin.version == 12 and plugin.struct_size == c.sizeof(Plugin)
     return plugin
 
 

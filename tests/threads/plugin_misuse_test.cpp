@@ -22,6 +22,7 @@ TEST(PluginRefuses, NullPointers) {
   output.torque = nullptr;
   EXPECT_EQ(plugin().update(arm.get(), &state, nullptr, &output), DASHPOT_NULL_ARGUMENT);
   EXPECT_EQ(plugin().reset(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+  EXPECT_EQ(plugin().stop(nullptr), DASHPOT_NULL_ARGUMENT);
   EXPECT_EQ(plugin().set_setpoint(nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
   EXPECT_EQ(plugin().set_setpoint(arm.get(), nullptr), DASHPOT_NULL_ARGUMENT);
   dashpot_setpoint setpoint = host.joint_setpoint(panda_posture());

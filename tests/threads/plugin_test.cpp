@@ -38,15 +38,16 @@ TEST(Plugin, ShowsItsFunctionsAndNothingElse) {
     words >> address >> type >> name;
     names.insert(name);
   }
-  EXPECT_THAT(names,
-              ::testing::UnorderedElementsAre(
-                  "dashpot_create", "dashpot_create_from_text", "dashpot_evaluate",
-                  "dashpot_analyze", "dashpot_destroy", "dashpot_last_error", "dashpot_joints",
-                  "dashpot_joint_name", "dashpot_period", "dashpot_update", "dashpot_start",
-                  "dashpot_reset", "dashpot_release", "dashpot_judge_gains", "dashpot_set_setpoint",
-                  "dashpot_set_gains", "dashpot_read_snapshot", "dashpot_read_modes",
-                  "dashpot_read_sampled_modes", "dashpot_status_text", "dashpot_kind_text",
-                  "dashpot_plugin_interface", "dashpot_set_payload", "dashpot_limit_tip_speed"));
+  EXPECT_THAT(
+      names,
+      ::testing::UnorderedElementsAre(
+          "dashpot_create", "dashpot_create_from_text", "dashpot_evaluate", "dashpot_analyze",
+          "dashpot_destroy", "dashpot_last_error", "dashpot_joints", "dashpot_joint_name",
+          "dashpot_period", "dashpot_update", "dashpot_start", "dashpot_reset", "dashpot_stop",
+          "dashpot_needs_brakes", "dashpot_release", "dashpot_judge_gains", "dashpot_set_setpoint",
+          "dashpot_set_gains", "dashpot_read_snapshot", "dashpot_read_modes",
+          "dashpot_read_sampled_modes", "dashpot_status_text", "dashpot_kind_text",
+          "dashpot_plugin_interface", "dashpot_set_payload", "dashpot_limit_tip_speed"));
 }
 
 TEST(Plugin, KnowsItsVersionOnly) {
@@ -241,6 +242,38 @@ TEST(Plugin, WatchesTheAgeOfSetpoints) {
   ASSERT_EQ(plugin().set_setpoint(host.controller.get(), &setpoint), DASHPOT_OK);
   EXPECT_LT(host.tick(), DASHPOT_SETPOINT_STALE);
   EXPECT_EQ(host.snapshot().restarts, 2u);
+}
+
+/// Whoever gave the set-point, and whether or not there is one; a repeated one is not a new one.
+TEST(Plugin, StopsUntilThereIsANewSetpoint) {
+  for (const char* watchdog : {"", "watchdog: {setpoint_hold: 0, setpoint_damp: 0}\n"}) {
+    Host host = panda_host(watchdog);
+    dashpot_controller* const arm = host.controller.get();
+    dashpot_setpoint setpoint = host.joint_setpoint(panda_posture(), host.time + 1'000'000);
+    for (const dashpot_setpoint* given : {static_cast<const dashpot_setpoint*>(nullptr),
+                                          static_cast<const dashpot_setpoint*>(&setpoint)}) {
+      ASSERT_LT(host.tick(given), DASHPOT_SETPOINT_STALE);
+      ASSERT_EQ(plugin().stop(arm), DASHPOT_OK);
+      for (int tick = 0; tick < 100; ++tick) ASSERT_EQ(host.tick(given), DASHPOT_SETPOINT_LOST);
+      ASSERT_EQ(plugin().release(arm), DASHPOT_OK);  // there is no fault
+      ASSERT_EQ(plugin().set_gains(arm, std::array{panda_gains()}.data()), DASHPOT_OK);
+      ASSERT_EQ(host.tick(given), DASHPOT_SETPOINT_LOST);
+      setpoint.time = host.time;
+      ASSERT_LT(host.tick(&setpoint), DASHPOT_SETPOINT_STALE);
+    }
+    ASSERT_EQ(plugin().stop(arm), DASHPOT_OK);
+    ASSERT_EQ(plugin().reset(arm, nullptr), DASHPOT_OK);
+    ASSERT_LT(host.tick(), DASHPOT_SETPOINT_STALE);
+  }
+}
+
+TEST(Plugin, NamesTheStatusesThatNeedTheRobotsBrakes) {
+  std::set<std::int32_t> found;
+  for (std::int32_t status = -300; status < 300; ++status) {
+    if (plugin().needs_brakes(status) != 0) found.insert(status);
+  }
+  EXPECT_EQ(found, (std::set<std::int32_t>{DASHPOT_STATE_FROZEN, DASHPOT_STATE_CONTRADICTORY,
+                                           DASHPOT_BRAKE_DOUBTED}));
 }
 
 TEST(Plugin, IsResetToHoldWhereTheRobotIs) {
