@@ -4,6 +4,7 @@
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/stress/safety_contact.hpp>
 #include <dashpot/tests/stress/safety_doubt.hpp>
+#include <dashpot/tests/stress/safety_engine.hpp>
 #include <dashpot/tests/support/places.hpp>
 
 namespace {
@@ -14,6 +15,7 @@ std::vector<Scenario> scenarios() {
   using std::numbers::pi;
   const std::vector<std::string> lift = {"lift+gripper"};
   const std::vector<std::string> three = {"panda", "iiwa14", "ur5"};
+  const std::vector<std::string> six = {"panda", "fr3", "iiwa14", "ur10e", "xarm7", "gen3"};
   std::vector<std::string> all;
   for (const TestArm& arm : test_arms()) all.emplace_back(arm.name);
   return {
@@ -56,6 +58,21 @@ std::vector<Scenario> scenarios() {
       {"10", "reset(NULL) in motion", {}, reset_in_motion},
       {"10", "start without reset(weight)", {}, untold_weight},
       {"10", "torque limits below the weight", {}, too_weak},
+      {"M", "a gap at rest, then 9 s", six, on_variants(gap_at_rest)},
+      {"M", "set-points end", six, on_variants(setpoints_end)},
+      {"M", "state not finite for 0.5 s", six, on_variants(lost_state(false))},
+      {"M", "state without a joint for 0.5 s", six, on_variants(lost_state(true))},
+      {"M", "stops, torque_rate 1000", six, on_variants(stop_with(1000))},
+      {"M", "stops, torque_rate 5000", six, on_variants(stop_with(5000))},
+      {"M", "shoulder motor dead", six, on_variants(bad_motor(0))},
+      {"M", "shoulder motor at half", six, on_variants(bad_motor(0.5))},
+      {"M", "shoulder motor reversed", six, on_variants(bad_motor(-1))},
+      {"M", "150 N on the elbow after a gap", six, on_variants(lean_on_the_elbow)},
+      {"M", "velocity of the wrong sign", six, on_variants(wrong_velocity)},
+      {"M", "robot's brakes open late", six, on_variants(brakes_open_late)},
+      {"M", "slow starts, 18 bits", six, on_variants(slow_starts(18))},
+      {"M", "slow starts, 12 bits", six, on_variants(slow_starts(12))},
+      {"M", "pushes of 40 N", six, on_variants(pushes)},
   };
 }
 
@@ -74,7 +91,7 @@ void print(const Row& row, bool first) {
 }
 
 bool chosen(const Scenario& scenario, const TestArm& arm) {
-  if (scenario.arms.empty()) return !arm.stops_only;
+  if (scenario.arms.empty()) return !arm.named_only;
   return std::find(scenario.arms.begin(), scenario.arms.end(), arm.name) != scenario.arms.end();
 }
 

@@ -23,7 +23,7 @@ struct TestArm {
   int joint;                  ///< that is taken out of its limits, slips, ...
   int light;                  ///< the revolute one with the least inertia
   const char* limits;         ///< lines under `limits` for plugins whose defaults do not fit it
-  bool stops_only = false;    ///< it is there to be stopped
+  bool named_only = false;    ///< only in scenarios that name it
 };
 
 inline const std::vector<TestArm>& test_arms() {
@@ -84,6 +84,16 @@ inline const std::vector<TestArm>& test_arms() {
        0,
        3,
        ""},
+      {"ur10e",
+       "ur10e",
+       "base_link",
+       "tool0",
+       0,
+       {0, -1.222, 1.571, -1.920, -1.571, 0},
+       0,
+       5,
+       "",
+       true},
       {"gen3",
        "gen3",
        "base_link",
@@ -136,10 +146,11 @@ inline std::string robot_yaml(const TestArm& arm, double told_rotors) {
   return text;
 }
 
-inline sim::Robot simulated_robot(const TestArm& arm) {
-  sim::RobotParameters parameters;
-  parameters.reflected_inertia.setConstant(static_cast<Eigen::Index>(arm.start.size()),
-                                           arm.reflected_inertia);
+inline sim::Robot simulated_robot(const TestArm& arm, sim::RobotParameters parameters = {}) {
+  if (parameters.reflected_inertia.size() == 0) {
+    parameters.reflected_inertia.setConstant(static_cast<Eigen::Index>(arm.start.size()),
+                                             arm.reflected_inertia);
+  }
   return sim::Robot::from_file(std::string(DASHPOT_SOURCE_DIR "/sim/models/") + arm.file + ".urdf",
                                arm.base, arm.tip, parameters);
 }

@@ -19,13 +19,13 @@ inline void stop_all(const PluginFile& plugin, const TestArm& arm, RigOptions op
   Rig rig(plugin, arm, options);
   spoil(rig);
   rig.run(rig.period());
-  const double at_first = rig.plant().audit().stored.kinetic;
+  const double at_first = rig.kinetic();
   rig.skip_time(0.02);
   rig.run(3);
   row.finish(rig, bounds);
-  row.kept = rig.plant().audit().stored.kinetic / at_first;
-  row.note = "from " + number(at_first) + " J to " + number(rig.plant().audit().stored.kinetic) +
-             " J; at the end " + row.seen.last_status.substr(0, 30);
+  row.kept = rig.kinetic() / at_first;
+  row.note = "from " + number(at_first) + " J to " + number(rig.kinetic()) + " J; at the end " +
+             row.seen.last_status.substr(0, 30);
 }
 
 /// States are so many periods late.

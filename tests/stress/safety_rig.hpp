@@ -1,10 +1,11 @@
 #pragma once
-// A plugin file, driven through its C interface alone, in a loop with the simulator.
+// A plugin file, driven through its C interface alone, in a loop with the simulator or with MuJoCo.
 
 #include <dashpot/controller/dynamics.hpp>
 #include <dashpot/sim/plant.hpp>
 #include <dashpot/tests/stress/plugin_file.hpp>
 #include <dashpot/tests/stress/safety_arms.hpp>
+#include <dashpot/tests/support/mujoco_arm.hpp>
 
 #include <unistd.h>
 
@@ -24,13 +25,17 @@ namespace dashpot::stress {
 
 /// What a rig is made of; what is left out is the arm's own.
 struct RigOptions {
+  std::string robot;            ///< YAML lines under `robot`
   std::string config;           ///< YAML lines beside `robot`, `limits` and `analysis`
   std::string limits;           ///< lines under `limits`
   bool defaults_alone = false;  ///< not the arm's lines there
   JointVector start;            ///< rad or m
   JointVector velocity;         ///< rad/s or m/s
   sim::ArmOptions world;        ///< wall, pushes; stops are added
-  std::vector<sim::SensorFault> faults;
+  sim::PlantOptions plant;      ///< sensors, and their faults
+  double velocity_step = 0;     ///< of the velocities that are measured, rad/s or m/s
+  sim::RobotParameters truth;   ///< of the robot; without reflected inertias it has the arm's own
+  std::optional<testing::MujocoOptions> mujoco;  ///< which moves the robot then
   bool told_weight = true;  ///< dashpot_reset with the weight before the first tick
   double told_rotors = 0;   ///< kg m^2 (kg) each that the controller alone knows of
 };
@@ -82,12 +87,13 @@ class Rig {
       : plugin_(plugin),
         config_(controller::load_config(write_config(arm, options, options.limits))),
         controller_(make_controller(arm, options), plugin.destroy),
-        body_(simulated_robot(arm), with_stops(options.world)) {
+        velocity_step_(options.velocity_step),
+        body_(simulated_robot(arm, options.truth), with_stops(options.world)) {
     unlink(path_.c_str());
     if (!controller_) throw std::runtime_error(plugin.last_error());
     const JointVector start = options.start.size() > 0 ? options.start : start_of(arm);
     n_ = static_cast<std::uint32_t>(start.size());
-    sim::PlantOptions plant;
+    sim::PlantOptions plant = options.plant;
     plant.period = config_.settings.period;
     plant.integrator.max_step = plant.period;
     plant.integrator.method = sim::Method::kRosenbrock;  // light joints on hard stops
@@ -95,10 +101,13 @@ class Rig {
     plant.integrator.absolute_tolerance = 1e-6;
     plant.integrator.relative_tolerance = 1e-4;
     plant.initial_torque = weight(start);
-    plant.faults = options.faults;
     plant_.emplace(body_, plant, start, options.velocity);
-    torque_ = plant.initial_torque;
-    last_given_ = torque_;
+    if (options.mujoco) {
+      mujoco_ = testing::MujocoArm::make(body_.robot(), with_stops(options.world), *options.mujoco,
+                                         start, options.velocity);
+    }
+    torque_ = given_ = last_given_ = plant.initial_torque;
+    motors_ = JointVector::Ones(start.size());
     last_excess_ = JointVector::Zero(start.size());
     over_ = allowed_ = last_excess_;
     first_tip_ = body_.tip_pose(start).position;
@@ -109,8 +118,13 @@ class Rig {
   double period() const { return config_.settings.period; }
   const controller::Limits& limits() const { return config_.settings.limits; }
   const controller::RobotModel& model() const { return config_.model; }
-  sim::Plant& plant() { return *plant_; }
+  const sim::Plant& plant() const { return *plant_; }
+  testing::MujocoArm& mujoco() { return *mujoco_; }
   JointVector position() const { return plant_->position(); }
+  const JointVector& given() const { return given_; }  ///< torque that acts on the robot
+  double kinetic() const {
+    return mujoco_ ? mujoco_->kinetic_energy() : plant_->audit().stored.kinetic;
+  }
   sim::Pose tip_at(const JointVector& q) { return body_.tip_pose(q); }
   JointVector weight(const JointVector& q) const {
     return controller::evaluate(config_.model, q, JointVector::Zero(q.size())).gravity;
@@ -120,6 +134,7 @@ class Rig {
   double clock_rate = 1;     ///< of the time stamps from now on
   int late = 0;              ///< periods of the states
   double excess_factor = 1;  ///< of what exceeds the weight, between controller and robot
+  int missing = 0;           ///< joints that the states lack
   int every = 1;             ///< the controller is called every so many periods; 0: not at all
   bool faulted = false;      ///< a fault has ended the springs
   Measures seen;
@@ -155,6 +170,8 @@ class Rig {
     plugin_.reset(controller_.get(), torque != nullptr ? torque->data() : nullptr);
   }
 
+  /// From now on a motor gives so many times the torque that it is to give.
+  void spoil_motor(int joint, double factor) { motors_[joint] = factor; }
   /// The time stamps from now on are so much later, s.
   void skip_time(double seconds) { skipped_ += std::llround(1e9 * seconds); }
 
@@ -163,10 +180,7 @@ class Rig {
     for (std::int64_t i = std::llround(seconds / period()); i > 0; --i) {
       if (every > 0 && ticks_ % every == 0) control();
       ++ticks_;
-      if (plant_->step(exerted()) != sim::Status::kOk) {
-        throw std::runtime_error("the simulation failed at " + std::to_string(plant_->time()) +
-                                 " s");
-      }
+      move();
       watch();
     }
   }
@@ -182,6 +196,7 @@ class Rig {
       const double slope = 30 * s * s * (1 - s) * (1 - s) / (static_cast<double>(ticks) * period());
       plant_->carry(from + place * (to - from), slope * (to - from));
     }
+    if (mujoco_) mujoco_->place(plant_->position(), plant_->velocity());
   }
 
  private:
@@ -207,7 +222,8 @@ class Rig {
       close(file);
       path_ = name;
     }
-    std::ofstream(path_) << robot_yaml(arm, options.told_rotors) << "analysis: {where: off}\n"
+    std::ofstream(path_) << robot_yaml(arm, options.told_rotors) << options.robot
+                         << "analysis: {where: off}\n"
                          << options.config << (limits.empty() ? "" : "limits:\n") << limits;
     return path_;
   }
@@ -226,10 +242,19 @@ class Rig {
     if (plugin_.set_setpoint(controller_.get(), &setpoint) != DASHPOT_OK) ++seen.refused_goals;
   }
 
-  JointVector exerted() const {
-    if (excess_factor == 1) return torque_;
-    const JointVector g = weight(position());
-    return g + excess_factor * (torque_ - g);
+  void move() {
+    given_ = torque_;
+    if (excess_factor != 1) {
+      const JointVector g = weight(position());
+      given_ = g + excess_factor * (torque_ - g);
+    }
+    given_ = given_.cwiseProduct(motors_);
+    if (mujoco_) {
+      mujoco_->step(given_, period());
+      plant_->carry(mujoco_->position(), mujoco_->velocity());
+    } else if (plant_->step(given_) != sim::Status::kOk) {
+      throw std::runtime_error("the simulation failed at " + std::to_string(plant_->time()) + " s");
+    }
   }
 
   void control() {
@@ -242,12 +267,19 @@ class Rig {
     }
     measured_.push_back(plant_->measured());
     while (measured_.size() > static_cast<std::size_t>(late) + 1) measured_.pop_front();
-    const sim::Measurement measured = measured_.front();
+    sim::Measurement measured = measured_.front();
+    if (velocity_step_ > 0) {
+      for (double& v : measured.velocity) v = velocity_step_ * std::nearbyint(v / velocity_step_);
+    }
     stamp_ += clock_rate * static_cast<double>(measured.time - last_time_);
     last_time_ = measured.time;
     const std::int64_t time = skipped_ + std::llround(stamp_);
-    const dashpot_state state = {sizeof(dashpot_state),    n_,     time, measured.position.data(),
-                                 measured.velocity.data(), nullptr};
+    const dashpot_state state = {sizeof(dashpot_state),
+                                 n_ - static_cast<std::uint32_t>(missing),
+                                 time,
+                                 measured.position.data(),
+                                 measured.velocity.data(),
+                                 nullptr};
     dashpot_output output = {sizeof(dashpot_output), n_, torque_.data()};
     const JointVector before = torque_;
     const std::int32_t status = plugin_.update(controller_.get(), &state, nullptr, &output);
@@ -274,8 +306,10 @@ class Rig {
   std::string path_;
   controller::Config config_;
   std::unique_ptr<dashpot_controller, void (*)(dashpot_controller*)> controller_;
+  double velocity_step_;
   sim::Arm body_;
   std::optional<sim::Plant> plant_;
+  std::unique_ptr<testing::MujocoArm> mujoco_;
   std::uint32_t n_ = 0;
   std::int64_t ticks_ = 0;
   JointVector torque_;
@@ -285,7 +319,8 @@ class Rig {
   std::int32_t last_status_ = DASHPOT_OK;
   std::deque<double> change_times_;  ///< of the status, s
   Eigen::Vector3d first_tip_;
-  JointVector last_given_, last_excess_;
+  JointVector motors_;
+  JointVector given_, last_given_, last_excess_;
   JointVector over_;                  ///< for how long a joint has been too fast, s
   JointVector allowed_;               ///< for how long it may be driven on then, s
   std::deque<std::uint32_t> turned_;  ///< of the last second: which torques turned round, by bits
@@ -297,7 +332,7 @@ inline void Rig::watch() {
   const JointVector q = plant_->position(), qd = plant_->velocity();
   const controller::Limits& limit = limits();
   const JointVector g = weight(q);
-  const JointVector excess = plant_->torque() - g;
+  const JointVector excess = given_ - g;
   double fastest = 0;
   std::uint32_t turns = 0;
   for (int i = 0; i < n(); ++i) {
@@ -311,7 +346,7 @@ inline void Rig::watch() {
         allowed_[i] = 0.005 + last_excess_.cwiseAbs().cwiseQuotient(limit.torque_rate).maxCoeff();
       }
       over_[i] += period();
-      const double change = std::copysign(1, qd[i]) * (plant_->torque()[i] - last_given_[i]);
+      const double change = std::copysign(1, qd[i]) * (given_[i] - last_given_[i]);
       const bool ends = change < -0.999 * limit.torque_rate[i] * period();  // as fast as it may
       if (over_[i] > allowed_[i] && !ends && excess[i] * qd[i] > 0 &&
           std::abs(excess[i]) > 0.02 * limit.torque[i]) {
@@ -329,13 +364,13 @@ inline void Rig::watch() {
     }
   }
   last_excess_ = excess;
-  last_given_ = plant_->torque();
+  last_given_ = given_;
   seen.speed_share = std::max(seen.speed_share, fastest);
   seen.tip_speed = std::max(seen.tip_speed, body_.tip_twist(q, qd).head<3>().norm());
-  seen.kinetic_energy = std::max(seen.kinetic_energy, plant_->audit().stored.kinetic);
+  seen.kinetic_energy = std::max(seen.kinetic_energy, kinetic());
   seen.tip_moved = std::max(seen.tip_moved, (body_.tip_pose(q).position - first_tip_).norm());
   if (g.norm() > 1) {
-    seen.least_weight = std::min(seen.least_weight, plant_->torque().dot(g) / g.squaredNorm());
+    seen.least_weight = std::min(seen.least_weight, given_.dot(g) / g.squaredNorm());
   }
   const auto second = static_cast<std::size_t>(std::llround(1 / period()));
   turned_.push_back(turns);

@@ -3,6 +3,7 @@
 
 #include <dashpot/tests/stress/safety_row.hpp>
 
+#include <Eigen/Cholesky>
 #include <numbers>
 
 namespace dashpot::stress {
@@ -110,13 +111,13 @@ inline Act encoder_off(double by) {
     sim::SensorFault fault;
     fault.begin = 0.5;
     fault.position_offset = moved(JointVector::Zero(start_of(arm).size()), joint, by);
-    options.faults = {fault};
+    options.plant.faults = {fault};
     Rig rig(plugin, arm, options);
     rig.goal = Goal::joints(rig.position());
     rig.run(5);
     row.finish(rig, {1, true, false});
     const double moved_by = std::abs(rig.position()[joint] - start_of(arm)[joint]);
-    const double share = std::abs(rig.plant().torque()[joint] - rig.weight(rig.position())[joint]) /
+    const double share = std::abs(rig.given()[joint] - rig.weight(rig.position())[joint]) /
                          rig.limits().torque[joint];
     row.note = "joint moved " + number(moved_by) + " rad, pushes with " +
                number(100 * share, "%.0f") + " % of its torque";
@@ -180,7 +181,7 @@ inline Act bad_feedback(const std::function<void(sim::SensorFault&, Eigen::Index
     sim::SensorFault fault;
     fault.begin = 0.5;
     spoil(fault, start_of(arm).size());
-    options.faults = {fault};
+    options.plant.faults = {fault};
     Rig rig(plugin, arm, options);
     JointVector to = moved(rig.position(), arm.joint, slides(arm, arm.joint) ? 0.2 : 0.8);
     to[1] += 0.4;
@@ -276,7 +277,7 @@ inline void frozen_creep(const PluginFile& plugin, const TestArm& arm, Row& row)
   sim::SensorFault fault;
   fault.begin = 1.2;
   fault.frozen = true;
-  options.faults = {fault};
+  options.plant.faults = {fault};
   Rig rig(plugin, arm, options);
   rig.goal = Goal::at(rig.tip_at(rig.position()));
   rig.goal->tip.position.z() -= 0.1;
