@@ -38,6 +38,10 @@ inline std::string name_of(const Variant& variant) {
          ", " + number(variant.payload) + " kg";
 }
 
+inline int elbow_of(const TestArm& arm) {
+  return arm.start.size() == 7 ? 3 : 2;
+}
+
 inline JointVector limits_of(const TestArm& arm, double sim::Joint::*limit) {
   const sim::Robot robot = simulated_robot(arm);
   JointVector values(robot.dof());
@@ -165,12 +169,14 @@ inline Trial lost_state(bool wrong_size) {
   };
 }
 
-/// A stop from 0.9 of the velocity limit of joint 2, either way, and of all joints, with a payload
-/// that the controller knows of besides. The kinetic energy may fall only.
+/// A stop from 0.9 of the velocity limit of joint 2, either way, and of all joints, with the elbow
+/// half straight, and a payload that the controller knows of if there is none that it does not. The
+/// kinetic energy may fall only.
 inline Trial stop_with(double rate) {
   return [=](const PluginFile& plugin, const TestArm& arm, RigOptions options, Row& row) {
     const double mass = std::string(arm.name) == "ur10e" ? 10 : 2;
-    const double known = options.mujoco->payload.mass > 0 ? 0 : mass;  // not both
+    const double known = options.mujoco->payload.mass > 0 ? 0 : mass;
+    options.start[elbow_of(arm)] *= 0.4;
     const JointVector fastest = 0.9 * limits_of(arm, &sim::Joint::velocity);
     options.limits =
         "  torque_rate: " + yaml_list(JointVector::Constant(fastest.size(), rate)) + "\n";
@@ -242,7 +248,7 @@ inline double lean_on_the_elbow(const PluginFile& plugin, const TestArm& arm,
   rig.skip_time(0.02);
   rig.run(1);
   const JointVector from = rig.position();
-  const int elbow = rig.n() == 7 ? 3 : 2;
+  const int elbow = elbow_of(arm);
   rig.mujoco().push(elbow, Eigen::Vector3d::Zero(), {0, 150, 0});
   rig.run(2);
   const JointVector pushed = rig.position();
