@@ -258,7 +258,8 @@ inline double lean_on_the_elbow(const PluginFile& plugin, const TestArm& arm,
   const double degrees = 180 / std::numbers::pi;
   const double turned = degrees * (pushed - from).cwiseAbs().maxCoeff();
   const double after = degrees * (rig.position() - pushed).cwiseAbs().maxCoeff();
-  row.note = "a joint turns " + number(turned) + " deg, and " + number(after) + " afterwards";
+  row.note = "a joint turns " + number(turned, "%.0f") + " deg, and " + number(after, "%.0f") +
+             " afterwards";
   row.require(after < 10, "goes on when it is let go");
   return turned;
 }
