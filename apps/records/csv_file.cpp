@@ -236,29 +236,42 @@ class CsvReader {
     return kMissing;
   }
 
-  /// From the first one, so that large numbers lose no digits.
+  /// A time of which neither part loses digits.
+  struct Stamp {
+    std::int64_t whole = 0;
+    double fraction = 0;
+  };
+
+  /// From the digits of `text`; from `value` where it is a date or has an exponent.
+  static Stamp stamp_of(std::string_view text, double value) {
+    constexpr auto kFixed = std::chars_format::fixed;
+    Stamp stamp;
+    const char* const end = text.data() + text.size();
+    const char* at = std::from_chars(text.data(), end, stamp.whole).ptr;
+    if (at != end && *at == '.') at = std::from_chars(at, end, stamp.fraction, kFixed).ptr;
+    if (at != end) return {static_cast<std::int64_t>(std::floor(value)), value - std::floor(value)};
+    if (text.front() == '-') stamp.fraction = -stamp.fraction;
+    return stamp;
+  }
+
+  /// From the first stamp. Whole units and fractions are subtracted apart, so that large numbers
+  /// lose no digits.
   double read_time(std::string_view cell, CsvColumn& column) {
     const std::string_view text = trimmed(cell);
-    if (const std::optional<double> date = read_date(text)) {
-      column.guessed = false;
-      if (!first_date_) first_date_ = date;
-      return *date - *first_date_;
-    }
-    std::int64_t whole = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), whole);
-    if (error == std::errc{} && end == text.data() + text.size()) {
-      if (!first_whole_) first_whole_ = whole;
-      return static_cast<double>(whole - *first_whole_) * column.factor;
-    }
-    const std::optional<double> value = read_number(text);
+    const std::optional<double> date = read_date(text), value = date ? date : read_number(text);
     if (!value) {
       throw InputError("", "line " + std::to_string(line_) + ", " + column.name + ": '" +
                                std::string(text.substr(0, 40)) +
                                "' is no time, a number or 2026-01-31T12:00:00.5Z: --rate HZ stands "
                                "for one");
     }
-    fractions_ = fractions_ || std::abs(*value) != std::floor(std::abs(*value));
-    return (*value - static_cast<double>(first_whole_.value_or(0))) * column.factor;
+    if (date) column.guessed = false;
+    constexpr double kMost = 9e18;  // what an int64 holds
+    if (!(std::abs(*value) < kMost)) return kMissing;
+    const Stamp stamp = stamp_of(text, *value);
+    if (!first_) first_ = stamp;
+    return (static_cast<double>(stamp.whole - first_->whole) + stamp.fraction - first_->fraction) *
+           column.factor;
   }
 
   /// The channels, without those whose first cell is text.
@@ -277,16 +290,20 @@ class CsvReader {
     if (file_.channels.empty()) throw InputError("", "no column of numbers but the time");
   }
 
-  /// A time without a unit in whole numbers whose steps are no seconds is in ms, us or ns.
+  /// A time without a unit whose steps are no seconds is in ms, us or ns.
   void scale_time() {
     const auto column = std::find_if(columns_.begin(), columns_.end(),
                                      [](const CsvColumn& one) { return one.time; });
-    if (column == columns_.end() || !column->guessed || fractions_ || hints_.rate > 0) return;
-    const double step =
-        file_.time[file_.time.size() - 1] / static_cast<double>(file_.time.size() - 1);
-    if (step < 1) return;
+    if (column == columns_.end() || !column->guessed || hints_.rate > 0) return;
+    const Eigen::Index count = file_.time.size() - 1;
+    Eigen::VectorXd steps = file_.time.tail(count) - file_.time.head(count);
+    std::nth_element(steps.begin(), steps.begin() + count / 2, steps.end());
+    const double step = steps[count / 2];
+    constexpr double kSlow = 0.04, kSlowest = 0.5;  // s; as ms they are 25 kHz and 2 kHz
+    if (step < kSlow) return;
     constexpr double kMost = 500;  // times a unit: 0.5 s in ms, where us begin
-    const auto [unit, factor] = step < kMost          ? std::pair("ms", 1e-3)
+    const auto [unit, factor] = step < kSlowest       ? std::pair("s", 1.0)
+                                : step < kMost        ? std::pair("ms", 1e-3)
                                 : step < 1000 * kMost ? std::pair("us", 1e-6)
                                                       : std::pair("ns", 1e-9);
     file_.time *= factor;
@@ -310,9 +327,7 @@ class CsvReader {
   char separator_ = ',';
   std::size_t line_ = 1;
   std::size_t samples_ = 0;
-  std::optional<double> first_date_;
-  std::optional<std::int64_t> first_whole_;
-  bool fractions_ = false;  ///< the time has them
+  std::optional<Stamp> first_;
 };
 
 }  // namespace

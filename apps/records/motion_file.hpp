@@ -13,9 +13,9 @@ namespace dashpot::apps {
 /// is missing, as is NA or null; columns that begin with text are left out, and text further down
 /// is a `problem` of its channel. One column is the time: t, time, timestamp, stamp, date, utime,
 /// duration or elapsed, in numbers or as 2026-01-31T12:00:00.5Z; where no
-/// unit is given and whole numbers are no seconds, it is in ms, us or ns. Of a file without names a
-/// first column that rises evenly is the time. Throws InputError that names the file, the line and
-/// the column.
+/// unit is given and its steps exceed half a second, it is in ms, us or ns. Of a file without names
+/// a first column that rises evenly is the time. Throws InputError that names the file, the line
+/// and the column.
 MotionFile read_motion_file(const std::string& path, const FileHints& hints = {});
 
 /// Numbers of the channels called `names`, "q1,q2"; of those that are positions, or else

@@ -29,7 +29,12 @@ class Rows {
 
   void finish() {
     if (times_.size() < kLeast) {
-      throw controller::InputError("", std::to_string(times_.size()) + " samples, need 20 or more");
+      const std::string same = file_.duplicates == 0
+                                   ? ""
+                                   : "; " + std::to_string(file_.duplicates) +
+                                         " more have the time of another: it needs more digits";
+      throw controller::InputError(
+          "", std::to_string(times_.size()) + " samples, need 20 or more" + same);
     }
     const auto N = static_cast<Eigen::Index>(times_.size());
     file_.time = Eigen::Map<const Eigen::VectorXd>(times_.data(), N).array() - times_.front();

@@ -53,7 +53,7 @@ std::string csv(const std::function<std::string(int)>& position, double factor,
     text += cell.data();
   };
   for (Eigen::Index i = 0; i < record.time.size(); ++i) {
-    std::snprintf(cell.data(), cell.size(), "%.4f", record.time[i]);
+    std::snprintf(cell.data(), cell.size(), "%g", 0.5 + record.time[i]);  // whole: without a point
     text += cell.data();
     for (const int j : order) add(factor * record.position(j, i));
     for (const int j : order) add(record.torque(j, i));

@@ -1,6 +1,9 @@
 // Which files `dashpot identify` reads, and how it refuses others.
 #include <dashpot/tests/apps/identify_run.hpp>
 
+#include <functional>
+#include <sstream>
+
 namespace dashpot::tests {
 namespace {
 
@@ -34,40 +37,74 @@ TEST(IdentifyFiles, TakesFilesAsPeopleAndRecordersWriteThem) {
   EXPECT_EQ(both["postures"].size(), 1U);
 }
 
-/// Without names, without a time, with others' units, with dates, and with names that are there
-/// twice but not wanted.
+/// Without names, and without a time.
 TEST(IdentifyFiles, TakesFilesThatDoNotSayWhatTheyAre) {
   const Scratch scratch;
   const std::string plain = decay_csv("", 1).substr(1);
   expect_known_modes(identify({scratch.write("plain.csv", plain)}));
   expect_known_modes(
       identify({scratch.write("named.csv", plain), "--columns", "t,q1 [rad],q2 [rad]"}));
-  std::string timeless, dated = "stamp,q1,q2,speed [m/s^2],speed\n", epoch = "timestamp,q1,q2\n";
-  std::size_t at = 0;
-  for (int i = 0; at < plain.size(); ++i) {
-    const std::size_t comma = plain.find(',', at), end = plain.find('\n', at);
-    const std::string values = plain.substr(comma + 1, end - comma - 1);
-    at = end + 1;
-    timeless += values + "\n";
-    std::array<char, 60> time{};
-    std::snprintf(time.data(), time.size(), "2026-01-31T23:59:%02d.%03dZ,", 58 + 2 * i / 1000,
-                  2 * i % 1000);
-    std::string stamp = time.data();
-    if (2 * i / 1000 > 1) {  // into the next day, month
-      std::snprintf(time.data(), time.size(), "2026-02-01T00:00:%02d.%03dZ,", 2 * i / 1000 - 2,
-                    2 * i % 1000);
-      stamp = time.data();
-    }
-    dated += stamp + values + ",1,2\n";
-    std::snprintf(time.data(), time.size(), "17%08d%09lld,", 12345678 + 2 * i / 1000,
-                  2'000'000LL * i % 1'000'000'000LL);
-    epoch += time.data() + values + "\n";
+  std::string timeless;
+  for (std::string_view rest = plain; !rest.empty(); rest.remove_prefix(rest.find('\n') + 1)) {
+    timeless += rest.substr(rest.find(',') + 1, rest.find('\n') - rest.find(','));
   }
   expect_known_modes(identify({scratch.write("timeless.csv", timeless), "--rate", "500"}));
-  expect_known_modes(identify({scratch.write("dated.csv", dated)}));
-  expect_known_modes(identify({scratch.write("epoch.csv", epoch)}));
-  const std::string duration = decay_csv("duration,q1,q2", 1);
-  expect_known_modes(identify({scratch.write("duration.csv", duration)}));
+}
+
+/// The decay with a stamp of its own for the sample at `i` times 2 ms.
+std::string stamped(const std::string& heading, const std::function<std::string(int i)>& stamp) {
+  std::istringstream rows(decay_csv("", 1).substr(1));
+  std::string text = heading + "\n", row;
+  for (int i = 0; std::getline(rows, row); ++i) text += stamp(i) + row.substr(row.find(',')) + "\n";
+  return text;
+}
+
+std::string printed(const char* format, double value) {
+  std::array<char, 60> text{};
+  std::snprintf(text.data(), text.size(), format, value);
+  return text.data();
+}
+
+/// Whole seconds lose their point, small times get an exponent, large ones have many digits; no
+/// sample is lost in any of them.
+TEST(IdentifyFiles, TakesTimesAsTheyAreWritten) {
+  struct Stamps {
+    const char* heading;
+    std::function<std::string(int)> stamp;
+    const char* note = nullptr;
+  };
+  const auto date = [](int i) {  // into the next day, and month
+    const bool next = i >= 1000;
+    return std::string(next ? "2026-02-01T00:00" : "2026-01-31T23:59") +
+           printed(":%06.3fZ", next ? (i - 1000) * 0.002 : 58 + i * 0.002);
+  };
+  const auto jittered = [](int i) { return 2 * i + 0.05 * std::sin(40.0 * i); };  // ms
+  const std::vector<Stamps> all = {
+      {"stamp,speed [m/s^2],speed,q1,q2", [&](int i) { return date(i) + ",1,2"; }},
+      {"stamp,q1,q2", date},
+      {"time [s],q1,q2", [](int i) { return printed("%g", 0.5 + 0.002 * i); }},
+      {"time [s],q1,q2", [](int i) { return printed("%g", -0.5 + 0.002 * i); }},
+      {"time [s],q1,q2", [](int i) { return printed("%.3e", 0.002 * i); }},
+      {"time [s],q1,q2", [](int i) { return printed("%.15g", 1'700'000'000.5 + 0.002 * i); }},
+      {"time [s],q1,q2", [](int i) { return "170000000" + printed("%.9f", 0.25 + 0.002 * i); }},
+      {"timestamp,q1,q2",
+       [](int i) {
+         return printed("17000%05.0f", 12345.0 + i / 500) + printed("%09.0f", i % 500 * 2e6);
+       },
+       "timestamp is taken to be in ns"},
+      {"t,q1,q2", [&](int i) { return printed("%.4f", jittered(i)); }, "t is taken to be in ms"},
+      {"t,q1,q2", [&](int i) { return printed("%.0f", 1e3 * jittered(i)); }, "to be in us"},
+      {"duration,q1,q2", [](int i) { return printed("%g", 0.002 * i); }},
+  };
+  const Scratch scratch;
+  for (const Stamps& stamps : all) {
+    SCOPED_TRACE(stamps.heading + (": " + stamps.stamp(700)));
+    const Json found =
+        identify({scratch.write("stamps.csv", stamped(stamps.heading, stamps.stamp))});
+    expect_known_modes(found);
+    const std::string notes = found["notes"].dump();
+    EXPECT_THAT(notes, HasSubstr(stamps.note == nullptr ? "[]" : stamps.note));
+  }
 }
 
 /// Each is what a recorder or a spreadsheet makes of it, and none of it changes the modes.
@@ -198,6 +235,8 @@ TEST(IdentifyFiles, RefusesInOneLineThatNamesFileLineAndColumn) {
   const std::vector<std::pair<std::vector<std::string>, std::string>> all = {
       {{file("")}, "is empty"},
       {{file("time,q1\n")}, "0 samples, need 20"},
+      {{file(stamped("time,q1,q2", [](int i) { return printed("%.6g", 1.7e9 + i); }))},
+       "1 samples, need 20 or more; 1199 more have the time of another: it needs more digits"},
       {{file("time,time,q1\n1,2,3\n")}, "two columns of time"},
       {{file("a,b\n1,2\n")}, "line 1: no column of time"},
       {{file("0,1\n1,2\n1,3\n")}, "line 1: numbers, where a line of names"},
