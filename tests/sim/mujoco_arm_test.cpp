@@ -174,14 +174,5 @@ TEST_F(MujocoPlant, StopsAtItsLimits) {
   EXPECT_NEAR(rest(), 10, 1e-3);
 }
 
-TEST_F(MujocoPlant, RefusesElasticGears) {
-  sim::RobotParameters parameters;
-  parameters.gear_stiffness = JointVector::Constant(7, 1e4);
-  parameters.reflected_inertia = JointVector::Constant(7, 0.1);
-  const sim::Robot robot =
-      sim::Robot::from_file(arm_path("panda"), "panda_link0", "panda_hand_tcp", parameters);
-  EXPECT_THROW(MujocoArm::make(robot, {}, {}, JointVector::Zero(7)), sim::InvalidScene);
-}
-
 }  // namespace
 }  // namespace dashpot::testing

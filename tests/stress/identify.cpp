@@ -3,6 +3,7 @@
 // A case is an arm at a random posture with springs of 8 to 40 rad/s and ratios of 0.05 to 0.9 in
 // its joints, with noise of 1e-5 rad and 2 % of the samples missing.
 #include <dashpot/identification/identification.hpp>
+#include <dashpot/tests/stress/identify_arms.hpp>
 #include <dashpot/tests/stress/part.hpp>
 #include <dashpot/tests/support/released_springs.hpp>
 
@@ -157,6 +158,7 @@ void print(const Tally& tally, const char* what) {
 
 bool identify(const Request& request) {
   const std::string& kind = request.kind;
+  if (kind == "arms") return dashpot::stress::identify_arms(request);
   const bool ambient = kind == "shaken", driven = kind.starts_with("chirp");
   const int records = kind == "triples" ? 3 : kind == "chirp-pairs" ? 2 : 1;
   std::printf("%ld cases, seed %lu\n", request.whole(), request.seed);
@@ -203,6 +205,8 @@ const dashpot::stress::AddPart part(
       {50, 4, "triples", "three of them"},
       {50, 2, "shaken", "two minutes of random torques, about 0.01 rad, at 500 Hz"},
       {20, 4, "chirps", "a chirp of torques, 0.3 to 12 Hz in 10 s at 1 kHz, about 0.02 rad"},
+      {36, 1, "arms",
+       "arms in MuJoCo with what real ones have, and ERA beside: see docs/identify.md", false},
       {20, 2, "chirp-pairs", "two of them, with torques in two directions", false}},
      identify,
      {"SEED", "--verbose"}});

@@ -67,7 +67,6 @@ std::string mjcf(const sim::Robot& robot, const sim::ArmOptions& world,
       << " 1\" solimpfriction=\"" << kImpedance << ' ' << kImpedance << "\"/></default>"
       << "<worldbody>";
   for (const sim::Joint& joint : robot.joints()) {
-    if (joint.elastic()) throw sim::InvalidScene(joint.name, "has an elastic gear");
     sim::Inertia body = joint.inertia;
     body.mass *= options.link_factor;
     body.about_center *= options.link_factor;
@@ -76,6 +75,11 @@ std::string mjcf(const sim::Robot& robot, const sim::ArmOptions& world,
         << exact(joint.origin.rotation) << "\">";
     write(body, out);
     write(joint, world, out);
+    if (joint.elastic()) {  // the gear's deflection, between drive and link
+      out << "<joint axis=\"0 0 1\" type=\"" << (joint.prismatic ? "slide" : "hinge")
+          << "\" stiffness=\"" << joint.gear_stiffness << "\" damping=\"" << joint.gear_damping
+          << "\"/>";
+    }
   }
   for (int i = 0; i < robot.dof(); ++i) out << "</body>";
   out << "</worldbody></mujoco>";

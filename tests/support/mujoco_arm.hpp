@@ -24,13 +24,15 @@ class MujocoArm {
 
   /// Whether this build has MuJoCo.
   static bool available() noexcept;
-  /// Starts at q with the velocity qd, or at rest. Throws sim::InvalidScene for elastic gears and
-  /// `loads`, and std::runtime_error with MuJoCo's words, or in a build without it.
+  /// Starts at q with the velocity qd, or at rest. Throws sim::InvalidScene for `loads`, and
+  /// std::runtime_error with MuJoCo's words, or in a build without it.
   static std::unique_ptr<MujocoArm> make(const sim::Robot& robot, const sim::ArmOptions& world,
                                          const MujocoOptions& options, const JointVector& q,
                                          const JointVector& qd = {});
   virtual ~MujocoArm() = default;
 
+  /// Of coordinates. A joint with an elastic gear has two, one after the other: the drive, and the
+  /// link's deflection from it, whose torque is the gear's own.
   virtual int dof() const = 0;
   virtual double time() const = 0;  ///< since the start, s
   virtual JointVector position() const = 0;
