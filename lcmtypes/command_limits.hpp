@@ -27,8 +27,8 @@ struct CommandLimits {
   std::int64_t oldest = 500'000;     ///< largest age of a command when it arrives, us
   std::int64_t furthest = 100'000;   ///< its time may be this far ahead of the receiver's, us
   std::int64_t silence = 1'000'000;  ///< a sender silent for longer no longer commands, us
-  double most_per_second = 2000;     ///< commands a second whose gains may be judged, and
-                                     ///< that pass all other checks; more are refused
+  double most_per_second = 2000;     ///< commands a second with gains, a payload or a tool, which
+                                     ///< have to be judged; more are refused
   double burst = 50;                 ///< number of these that may come at once
 };
 

@@ -10,6 +10,16 @@ namespace dashpot::lcmtypes {
 
 using Verdict = CommandVerdict;
 
+namespace {
+
+/// What is judged before it is taken, which takes long. Goals are not: the newest of a burst
+/// counts.
+constexpr std::int32_t kJudged =
+    command_t::JOINT_GAINS | command_t::TASK_GAINS | command_t::NULL_GAINS | command_t::TASK_RATIO |
+    command_t::JOINT_RATIO | command_t::PAYLOAD | command_t::TOOL_FRAME;
+
+}  // namespace
+
 CommandFilter::CommandFilter(const CommandLimits& limits, CommandTaker take)
     : limits_(limits), take_(std::move(take)), tokens_(limits.burst) {
   const Eigen::Index n = limits.position_lower.size();
@@ -73,7 +83,7 @@ CommandVerdict CommandFilter::judge_message(const command_t& message, std::int64
   if (releases && (fault_tick_ == 0 || message.fault_tick != fault_tick_)) {
     return Verdict::kNoSuchFault;
   }
-  if (!take_token(steady)) return Verdict::kTooMany;
+  if ((message.parts & kJudged) != 0 && !take_token(steady)) return Verdict::kTooMany;
   if (take_ && !take_(next, reason_)) return Verdict::kUnstable;
   accept(message, next, steady, *last);
   return Verdict::kAccepted;

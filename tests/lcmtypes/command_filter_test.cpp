@@ -365,6 +365,15 @@ TEST(CommandFilter, LimitsTheRate) {
   }
   EXPECT_EQ(accepted + too_many, kMessages);
   EXPECT_NEAR(accepted, 510, 2);
+  // Goals are not judged: the newest of a burst counts.
+  message.parts = int{command_t::JOINT_POSITION} + int{command_t::TIP_SPEED};
+  for (int i = 0; i < 1000; ++i) {
+    ++message.utime;
+    ++message.sequence;
+    message.joint_position[0] = 1e-3 * i;
+    ASSERT_EQ(judge(filter, message, 500'000), Verdict::kAccepted) << i;
+  }
+  EXPECT_EQ(filter.command().setpoint.joint_position[0], 0.999);
 }
 
 TEST(CommandFilter, SurvivesRandomMutations) {
