@@ -274,6 +274,22 @@ std::vector<MovedLink> make_chain(const urdf::ModelInterface& tree,
   return moved;
 }
 
+/// Names the joints whose limits of position do not count, because they turn without end.
+void doubt_limits(const std::vector<urdf::JointConstSharedPtr>& path,
+                  std::vector<std::string>& warnings) {
+  for (const urdf::JointConstSharedPtr& joint : path) {
+    if (joint->type != urdf::Joint::CONTINUOUS || !joint->limits) continue;
+    const double lower = joint->limits->lower, upper = joint->limits->upper;
+    if (!(lower < upper)) continue;
+    std::ostringstream range;
+    range << lower << " to " << upper;
+    warnings.push_back(one_line("joint '" + joint->name + "': it is continuous, so its limits " +
+                                range.str() +
+                                " rad do not count; a revolute joint keeps them, and "
+                                "so does limits.position_lower, _upper"));
+  }
+}
+
 /// What is wrong with the inertias of links before the first moving joint, which nothing depends
 /// on.
 void doubt_base(const urdf::ModelInterface& tree, const std::string& base,
@@ -359,6 +375,7 @@ RobotModel RobotModel::from_urdf_text(const std::string& text, const std::string
   const std::vector<MovedLink> moved = make_chain(*tree, path, joints, options, *data);
   check_links(moved, options, data->chain, name, data->warnings);
   doubt_base(*tree, base, path, data->warnings);
+  doubt_limits(path, data->warnings);
   data->attach(attachment);
   data->joints = std::move(joints);
   data->position_sensor = options.position_sensor;

@@ -213,6 +213,13 @@ TEST(UrdfForms, AreDoubtedWhereUnitsCannotBeRight) {
       << "all of them in grams";
 }
 
+TEST(UrdfForms, SayWhichLimitsDoNotCount) {
+  const std::string joint = "<joint name=\"panda_joint1\" type=\"";
+  EXPECT_THAT(read_panda(panda_with(joint + "revolute", joint + "continuous")).warnings(),
+              ElementsAre(AllOf(StartsWith("joint 'panda_joint1': it is continuous"),
+                                HasSubstr("-2.8973 to 2.8973 rad do not count"))));
+}
+
 TEST(UrdfForms, OfSimModelsAreNotDoubted) {
   for (const testing::Arm& arm : testing::all_arms()) {
     EXPECT_THAT(testing::arm_model(arm).warnings(), IsEmpty()) << arm.file;
