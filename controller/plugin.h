@@ -403,7 +403,8 @@ int32_t dashpot_update(dashpot_controller* controller, const dashpot_state* stat
  * gains, those of dashpot_set_gains or else of the configuration, at `position` as
  * dashpot_set_gains does, and then resets as dashpot_reset does. `torque` (n, N m) is the torque
  * that the robot applies now; NULL stands for the arm's weight at `position` (zero where the robot
- * compensates it). Takes some milliseconds and allocates. Returns DASHPOT_OK or a negative code;
+ * compensates it). Refuses a position beyond the limits of the URDF, as that of degrees is, and a
+ * torque that contradicts the weight (`watchdog.start_torque`; none accepts it). Takes some milliseconds and allocates. Returns DASHPOT_OK or a negative code;
  * dashpot_last_error then says more. A loop without this call starts from the weight as well, but
  * with gains that were not judged at its posture. */
 int32_t dashpot_start(dashpot_controller* controller, const double* position, const double* torque);

@@ -1,5 +1,6 @@
 #pragma once
 #include <dashpot/controller/robot_model.hpp>
+#include <dashpot/controller/settings.hpp>
 
 #include <string>
 
@@ -12,5 +13,13 @@ JointVector middle_posture(const RobotModel& model);
 /// One line that names the first joint more than `tolerance` (rad or m) outside its position
 /// limits, and says so if degrees fit where q (n, rad) does not; empty if q is inside.
 std::string outside_limits(const RobotModel& model, const JointVector& q, double tolerance = 1e-3);
+
+/// One line that says why an arm cannot be at rest at q (n, rad): a joint is 0.1 rad (0.1 m) or
+/// more beyond the limits of the model, or, where that has none, a turn beyond those of the
+/// settings; or `torque` (n, N m, no entries if it is not known), which acts there, contradicts
+/// `weight`, which the controller is to compensate, by more than 5 % of a torque limit, the
+/// joint's Coulomb friction, and Watchdog::start_torque. Empty if the arm may be there.
+std::string start_fault(const RobotModel& model, const Settings& settings, const JointVector& q,
+                        const JointVector& torque, const JointVector& weight);
 
 }  // namespace dashpot::controller

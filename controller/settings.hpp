@@ -144,6 +144,9 @@ struct Watchdog {
   /// with velocities over about this time. Whether states change at all is checked over two fifths
   /// of it.
   double feedback = 0.5;
+  /// The torque that acts at the start may differ from the weight by this share of the weight's
+  /// largest entry, beside friction; infinity: by any amount. See start_fault.
+  double start_torque = 0.25;
   double release_after = 0;  ///< time at rest after which faults are released, s; 0: never
 };
 

@@ -88,6 +88,7 @@ void for_each_setting(Struct& settings, Visitor&& visit) {
   visit(Setting{"watchdog.setpoint_damp", "s", "", kNotNegative}, watchdog.setpoint_damp);
   visit(Setting{"watchdog.longest_gap", "s", "", kPositive}, watchdog.longest_gap);
   visit(Setting{"watchdog.feedback", "s", "", kNotNegative}, watchdog.feedback);
+  visit(Setting{"watchdog.start_torque", "", "", kPositive, kInfinity}, watchdog.start_torque);
   visit(Setting{"watchdog.release_after", "s", "", kNotNegative}, watchdog.release_after);
 
   auto& analysis = settings.analysis;

@@ -31,6 +31,15 @@ HostedController::HostedController(const Config& config)
   request.attachment = config.model.attachment();
 }
 
+JointVector weight_of(const HostedController& controller, const Attachment& attachment,
+                      const JointVector& q) noexcept {
+  DynamicsKernel kernel = controller.kernel;
+  kernel.attach(attachment);
+  DynamicsResult there;
+  kernel.evaluate(q, JointVector::Zero(q.size()), there);
+  return there.gravity;
+}
+
 Status HostedController::at_posture(const JointVector& q, const Gains& gains, Mode mode,
                                     VibrationTask& task, Vibration& found) const {
   PostureLoop loop(model, settings);

@@ -90,6 +90,10 @@ struct HostedController {
   analysis::Status published_status_ = analysis::Status::kOk;
 };
 
+/// Returns the gravity torque at q with something attached.
+JointVector weight_of(const HostedController& controller, const Attachment& attachment,
+                      const JointVector& q) noexcept;
+
 /// Sets what dashpot_last_error says; returns `code`.
 std::int32_t finish(std::int32_t code, const char* text) noexcept;
 std::int32_t finish(std::int32_t code) noexcept;

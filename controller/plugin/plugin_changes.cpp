@@ -27,23 +27,13 @@ Attachment read(const dashpot_payload& given, const Pose& tool_now) {
   return {payload, tool};
 }
 
-/// Returns the gravity torque at q with something attached.
-JointVector weight(const dashpot_controller& controller, const Attachment& attachment,
-                   const JointVector& q) noexcept {
-  DynamicsKernel kernel = controller.kernel;
-  kernel.attach(attachment);
-  DynamicsResult there;
-  kernel.evaluate(q, JointVector::Zero(q.size()), there);
-  return there.gravity;
-}
-
 /// Whether the torque limits hold the arm's weight at q, or what is too much is less than before.
 /// DASHPOT_OK or why not.
 std::int32_t check_weight(const dashpot_controller& controller, const Attachment& attachment,
                           const JointVector& q) noexcept {
   if (!controller.settings.feed_forward.gravity || q.size() == 0) return finish(DASHPOT_OK);
-  const JointVector then = weight(controller, attachment, q);
-  const JointVector now = weight(controller, controller.request.attachment, q);
+  const JointVector then = weight_of(controller, attachment, q);
+  const JointVector now = weight_of(controller, controller.request.attachment, q);
   const JointVector& limit = controller.settings.limits.torque;
   for (int i = 0; i < controller.n; ++i) {
     if (std::abs(then[i]) <= limit[i] || std::abs(then[i]) < std::abs(now[i])) continue;

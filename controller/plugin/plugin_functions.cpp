@@ -2,6 +2,7 @@
 #include <dashpot/controller/input_error.hpp>
 #include <dashpot/controller/plugin/hosted_controller.hpp>
 #include <dashpot/controller/plugin/plugin_data.hpp>
+#include <dashpot/controller/posture.hpp>
 #include <dashpot/controller/setpoint_check.hpp>
 
 #include <algorithm>
@@ -202,18 +203,23 @@ int32_t dashpot_start(dashpot_controller* controller, const double* position,
                       const double* torque) {
   if (controller == nullptr || position == nullptr) return finish(DASHPOT_NULL_ARGUMENT);
   const JointVector q = Eigen::Map<const Eigen::VectorXd>(position, controller->n);
-  if (!q.allFinite()) return finish(DASHPOT_WRONG_VALUE);
+  JointVector acting;
+  if (torque != nullptr) acting = Eigen::Map<const Eigen::VectorXd>(torque, controller->n);
+  if (!q.allFinite() || !acting.allFinite()) return finish(DASHPOT_WRONG_VALUE);
+  const bool holds = controller->settings.feed_forward.gravity;
+  const JointVector held = holds ? weight_of(*controller, controller->request.attachment, q)
+                                 : JointVector(JointVector::Zero(controller->n));
+  try {
+    const std::string fault = start_fault(controller->model, controller->settings, q,
+                                          holds ? acting : JointVector(), held);
+    if (!fault.empty()) return finish(DASHPOT_WRONG_VALUE, fault.c_str());
+  } catch (const std::exception& error) {
+    return finish(DASHPOT_WRONG_VALUE, error.what());
+  }
   const std::int32_t code = judge(*controller, controller->request.setpoint.gains, q, nullptr);
   if (code != DASHPOT_OK) return code;
   controller->judgement.locate(q);
-  if (torque != nullptr) return finish(dashpot_reset(controller, torque));
-  const bool holds = controller->settings.feed_forward.gravity;
-  const JointVector rest = JointVector::Zero(controller->n);
-  DynamicsKernel kernel = controller->kernel;
-  kernel.attach(controller->request.attachment);
-  DynamicsResult there;
-  kernel.evaluate(q, rest, there);
-  controller->reset(holds ? there.gravity : rest);
+  controller->reset(torque != nullptr ? acting : held);
   return DASHPOT_OK;
 }
 

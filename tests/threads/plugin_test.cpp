@@ -319,7 +319,7 @@ TEST(Plugin, StartsFromTheWeight) {
     EXPECT_EQ(host.tick(), DASHPOT_OK);
     EXPECT_TRUE(testing::near(joint_vector(host.torque), weight, 1e-9));
   }
-  Host host(create(panda()), panda_posture());
+  Host host(create(panda() + "watchdog: {start_torque: none}\n"), panda_posture());
   const std::vector<double> acting(7, 5.0);
   ASSERT_EQ(plugin().start(host.controller.get(), panda_posture().data(), acting.data()),
             DASHPOT_OK);
@@ -327,6 +327,39 @@ TEST(Plugin, StartsFromTheWeight) {
   EXPECT_LE((joint_vector(host.torque) - VectorXd::Constant(7, 5)).cwiseAbs().maxCoeff(), 1 + 1e-9);
   EXPECT_EQ(host.tick(), DASHPOT_TORQUE_LIMITED);
   EXPECT_EQ(plugin().start(host.controller.get(), nullptr, nullptr), DASHPOT_NULL_ARGUMENT);
+}
+
+/// Degrees, and a torque that holds another arm: a base tilted by 30 degrees, or 3 kg at the tip.
+TEST(Plugin, RefusesAStartThatCannotBe) {
+  const controller::RobotModel model = load(panda()).model;
+  const VectorXd q = joint_vector(panda_posture()), rest = VectorXd::Zero(7);
+  const auto there = controller::evaluate(model, q, rest);
+  controller::ModelOptions tilted;
+  tilted.gravity = {0, 4.905, -8.496};
+  const auto leaning = controller::RobotModel::from_urdf_file(urdf_path("panda.urdf"), model.base(),
+                                                              model.tip(), tilted);
+  const VectorXd loaded = there.gravity + 3 * 9.81 * there.J.row(2).transpose();
+  const VectorXd degrees = q * 180 / 3.14159265, beyond = VectorXd::Unit(7, 0) * 3.05;
+  const struct {
+    VectorXd position, torque;
+    const char* said;
+  } starts[] = {{degrees, {}, "if these are degrees"},
+                {beyond, {}, "joint 'panda_joint1' at 3.05 rad is outside its limits"},
+                {VectorXd::Unit(7, 0) * 2.95 + q, {}, ""},
+                {q, 1.1 * there.gravity, ""},
+                {q, controller::evaluate(leaning, q, rest).gravity, "is the base tilted"},
+                {q, loaded, "the payload another"}};
+  for (const char* given : {"0.25", "none"}) {
+    const Handle arm = create(panda() + "watchdog: {start_torque: " + given + "}\n");
+    ASSERT_NE(arm, nullptr) << plugin().last_error();
+    for (const auto& [position, torque, said] : starts) {
+      const bool any = torque.size() > 0, taken = *said == 0 || (any && given[0] == 'n');
+      EXPECT_EQ(plugin().start(arm.get(), position.data(), any ? torque.data() : nullptr),
+                taken ? DASHPOT_OK : DASHPOT_WRONG_VALUE)
+          << said;
+      EXPECT_THAT(plugin().last_error(), ::testing::HasSubstr(taken ? "" : said));
+    }
+  }
 }
 
 /// A wrist that weighs next to nothing bears less damping than a shoulder.
