@@ -18,7 +18,8 @@ using Eigen::Vector3d;
 constexpr double kRound = 33;   ///< s, after which other bodies and places follow
 constexpr double kTable = 0.2;  ///< m below where the tip starts
 // Seconds of a round:
-constexpr double kHeld = 5, kPutDown = 12, kTapped = 26;
+constexpr double kHeld = 5, kPutDown = 12, kTapped = 26, kPushed[] = {1, 30.5};
+constexpr double kPush = 40;  ///< N, for 0.7 s, by a hand that takes 0.1 s to press so hard
 
 /// What a round of work has of its own.
 struct Round {
@@ -27,6 +28,7 @@ struct Round {
   Vector3d guide;          ///< by the hand, m
   Vector3d shake;          ///< amplitude of the hand at 4 Hz, m
   Vector3d tap;            ///< for 10 ms, N
+  Vector3d push;           ///< for 0.7 s, N
   double mass, told_late;  ///< of the body as it is told, kg; s after it is held or put down
   double stiffer;          ///< than the default, a factor
   JointVector away;        ///< rad, a move of the joints
@@ -52,6 +54,7 @@ inline Round draw_round(std::mt19937_64& engine, int n) {
   round.stiffer = uniform(0.5, 1.2);
   round.away.resize(n);
   for (double& q : round.away) q = uniform(-0.4, 0.4);
+  round.push = kPush * vector(1, 1, 1).normalized();
   return round;
 }
 
@@ -93,6 +96,13 @@ inline sim::ArmOptions scene(const std::vector<Round>& rounds, const Vector3d& s
   for (const Round& round : rounds) {
     world.loads.push_back({begin + kHeld, begin + kPutDown, body_of(factor * round.mass)});
     world.wrenches.push_back({begin + kTapped, begin + kTapped + 0.01, force(round.tap)});
+    for (const double at : kPushed) {
+      for (int step = 0; step < 5; ++step) {
+        const double rise = 0.02 * step;
+        world.wrenches.push_back(
+            {begin + at + rise, begin + at + 0.7 - rise, force(0.2 * round.push)});
+      }
+    }
     begin += kRound;
   }
   return world;
