@@ -15,8 +15,10 @@ void Faults::reset() noexcept {
 
 Status Faults::watch(Status seen, const Sensed& now, bool still, Brake* brake) noexcept {
   restarts_ = std::max(0.0, restarts_ - now.dt);
-  Status found = worse(
-      seen, motion_watch_.check({now.dt, now.q, now.qd, now.robot, now.external_wrench, still}));
+  // A motion that nobody saw, or whose velocities are others now, has gained nothing.
+  const bool brakes = brake != nullptr && seen == Status::kOk;
+  Status found = worse(seen, motion_watch_.check({now.dt, now.q, now.qd, now.robot,
+                                                  now.external_wrench, still, brakes}));
   if (restarts_ > kMostRestarts) found = worse(found, Status::kTooManyRestarts);
   if (brake_fails(found, brake)) found = fault_ = Status::kBrakeDoubted;
   if (latches(found)) {
@@ -66,7 +68,7 @@ bool Faults::rested(const Sensed& now) noexcept {
 bool Faults::brake_fails(Status found, Brake* brake) noexcept {
   if (fault_ == Status::kBrakeDoubted) return true;
   if (brake == nullptr || motion_watch_.sees_frozen()) return false;
-  if (brake->feeds()) return true;
+  if (found == Status::kBrakeDoubted || brake->feeds()) return true;
   if (fault_ == Status::kOk || found != Status::kInstability) return false;
   motion_watch_.forget_swings();
   const bool softer = brake->soften();  // it shakes the arm: as soft as can be

@@ -5,6 +5,22 @@
 #include <cmath>
 
 namespace dashpot::controller {
+namespace {
+
+// For frozen(): friction turns round with the motion, so that torque may change by twice as much.
+constexpr double kStiction = 0.05;     // of the torque limit, beside
+constexpr double kPerCoulomb = 3;      // times the friction of the model: it sticks harder
+constexpr double kAnyStiction = 0.15;  // of the torque limit, where the model knows of none
+constexpr double kCounts = 1.5;        // of an encoder: so far it may be before the next one shows
+// For gains():
+constexpr double kUndone = 0.4;     // of what the torque is to do: masses and rotors that are wrong
+constexpr double kUnweighed = 0.3;  // of the weight
+constexpr double kHand = 35;        // N, at the tip: a push, or 3 kg that nobody knows of
+constexpr double kFast = 0.5;       // of velocity limits: slower is what somebody pushes
+constexpr double kFastLeast = 1;    // rad/s, or m/s: as fast as a hand pushes, be the limit low
+constexpr double kForgotten = 0.05;  // s
+
+}  // namespace
 
 MotionWatch::MotionWatch(const RobotModel& model, const Settings& settings) noexcept
     : n_(model.dof()),
@@ -20,7 +36,8 @@ MotionWatch::MotionWatch(const RobotModel& model, const Settings& settings) noex
                 limits.position_upper[i],
                 limits.velocity[i],
                 limits.torque[i],
-                coulomb[i],
+                coulomb[i] > 0 ? kStiction * limits.torque[i] + kPerCoulomb * coulomb[i]
+                               : kAnyStiction * limits.torque[i],
                 limits.external_torque[i]};
     estimates_ |= std::isfinite(limits.external_torque[i]);
   }
@@ -31,10 +48,11 @@ void MotionWatch::reset() noexcept {
   first_ = true;
   frozen_ = false;
   torques_ = 0;
-  tip_speed_ = same_ = 0;
+  tip_speed_ = same_ = strained_ = gained_ = 0;
+  energy_ = -1;
   for (Eigen::Index i = 0; i < n_; ++i) {
     const Record& r = joint(i);
-    joint(i) = {r.lower, r.upper, r.velocity_limit, r.torque_limit, r.coulomb, r.external_limit};
+    joint(i) = {r.lower, r.upper, r.velocity_limit, r.torque_limit, r.stiction, r.external_limit};
   }
 }
 
@@ -63,12 +81,21 @@ Status MotionWatch::check(const Tick& tick) noexcept {
     if (walls_[k].distance(tick.robot.p_BT_B) < 0) status = Status::kWall;
   }
   if (outside) status = Status::kPositionLimit;
-  if (frozen(tick)) status = Status::kStateFrozen;
+  const bool gained = gains(tick);
+  if (frozen(tick)) {
+    status = Status::kStateFrozen;
+    energy_ = -1;  // which the velocity does not tell
+  } else if (gained) {
+    status = Status::kBrakeDoubted;
+  }
   first_ = false;
   torques_ = 0;
   for (Eigen::Index i = 0; i < n_; ++i) {
-    joint(i).q = tick.q[i];
-    joint(i).qd = tick.qd[i];
+    Record& joint = this->joint(i);
+    const double moved = std::abs(tick.q[i] - joint.q);
+    if (moved > 0) joint.count = std::min(joint.count, moved);
+    joint.q = tick.q[i];
+    joint.qd = tick.qd[i];
   }
   return status;
 }
@@ -84,6 +111,7 @@ void MotionWatch::applied(const JointVector& torque, const JointVector& weight) 
     joint.reversals += ((reversed ? 1 : 0) - joint.reversals) / 64;
     joint.excess = excess;
     joint.torque = torques_ == 1 ? torque[i] : joint.torque + (torque[i] - joint.torque) / torques_;
+    joint.beside = torques_ == 1 ? excess : joint.beside + (excess - joint.beside) / torques_;
   }
 }
 
@@ -151,22 +179,47 @@ bool MotionWatch::frozen(const Tick& tick) noexcept {
     same = tick.q[i] == joint(i).q && tick.qd[i] == joint(i).qd;
   }
   if (!same) {
-    same_ = 0;
+    same_ = strained_ = 0;
     frozen_ = false;
     for (Eigen::Index i = 0; i < n_; ++i) joint(i).before = joint(i).excess;
     return false;
   }
   same_ += tick.dt;
   constexpr double kCreeps = 0.04;  // s
-  constexpr double kWay = 1e-4;     // rad (m): further than any encoder's count
+  constexpr double kWay = 1e-4;     // rad (m)
   for (Eigen::Index i = 0; i < n_ && same_ >= kCreeps; ++i) {
-    frozen_ |= std::abs(tick.qd[i]) * same_ > kWay;
+    frozen_ |= std::abs(tick.qd[i]) * same_ > std::max(kWay, kCounts * joint(i).count);
   }
-  for (Eigen::Index i = 0; i < n_ && same_ >= frozen_after_; ++i) {
-    const double change = std::abs(joint(i).excess - joint(i).before);
-    frozen_ |= change > 0.05 * joint(i).torque_limit + joint(i).coulomb;
+  bool strained = false;
+  for (Eigen::Index i = 0; i < n_ && !strained; ++i) {
+    strained = std::abs(joint(i).excess - joint(i).before) > joint(i).stiction;
   }
+  strained_ = strained ? strained_ + tick.dt : 0;
+  frozen_ |= strained_ >= frozen_after_;
   return frozen_;  // until the state changes, also where the torque is as before again
+}
+
+bool MotionWatch::gains(const Tick& tick) noexcept {
+  const double last = energy_;
+  energy_ = -1;
+  if (!tick.brakes || first_) gained_ = 0;
+  if (!tick.brakes) return false;
+  JointVector momentum = JointVector::Zero(n_);
+  add_product(tick.robot.M, tick.qd, momentum);
+  energy_ = 0.5 * product(momentum, tick.qd);
+  if (last < 0) return false;
+  double given = 0, unsure = kHand * tip_speed_, fast = 0;  // W, W, J
+  for (Eigen::Index i = 0; i < n_; ++i) {
+    const Record& joint = this->joint(i);
+    const double v = 0.5 * (tick.qd[i] + joint.qd), power = joint.beside * v;
+    given += power;
+    unsure += kUndone * std::abs(power) + kUnweighed * std::abs(tick.robot.gravity[i] * v);
+    const double most = std::max(kFast * joint.velocity_limit, kFastLeast);
+    fast += 0.5 * tick.robot.M(i, i) * most * most;
+  }
+  gained_ = std::max(0.0, gained_ + energy_ - last - (given + unsure) * tick.dt);
+  if (energy_ < fast) gained_ -= std::min(1.0, tick.dt / kForgotten) * gained_;
+  return gained_ > fast;
 }
 
 }  // namespace dashpot::controller

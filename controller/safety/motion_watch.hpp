@@ -20,10 +20,18 @@ namespace dashpot::controller {
 ///   at most 90 ms, whatever the springs do, which is faster than a person shakes; or the torque
 ///   beyond the weight reverses, at more than a twentieth of its limit, in every tick for 40 ticks,
 ///   or in every other tick for 180.
-/// - kStateFrozen: position and velocity stay the same to the last bit for 0.4 times
-///   Watchdog::feedback, while that torque changes by a twentieth of its limit more than Coulomb
-///   friction explains; or for 40 ms, in which the velocity would have moved a joint by 0.1 mrad
-///   (0.1 mm).
+/// - kStateFrozen: position and velocity stay the same to the last bit although that torque has
+///   changed, since a bit last did, by more than stiction explains, for 0.4 times
+///   Watchdog::feedback; or for 40 ms, in which the velocity would have moved a joint by 0.1 mrad
+///   (0.1 mm) and more than a count of its encoder. Stiction takes up a twentieth of the torque
+///   limit and three times the model's Coulomb friction, or 15 % of the limit where the model has
+///   none.
+/// - kBrakeDoubted: the arm gains energy that the torque does not give it. While no springs act,
+///       s <- max(0, s + dE - x' qd dt - (0.4 |x_i qd_i| + 0.3 |gravity_i qd_i| + 35 N v_tip) dt),
+///   E being the kinetic energy and x the torque beside the weight, exceeds the energy of joints
+///   with half of their velocity limits, each by itself. So motors that are weak, dead or reversed
+///   are found however much gravity explains, and what is wrong by less is not: masses, friction, a
+///   payload, a push by hand. Below that kinetic energy s decays with 50 ms.
 class MotionWatch {
  public:
   MotionWatch(const RobotModel& model, const Settings& settings) noexcept;
@@ -35,9 +43,10 @@ class MotionWatch {
     const JointVector& qd;
     const DynamicsResult& robot;
     const Vector6& external_wrench;
-    bool still;  ///< the springs stand still
+    bool still;   ///< the springs stand still
+    bool brakes;  ///< no springs have acted since the last tick
   };
-  /// Returns kOk, or the worst of the statuses kCollision to kStateFrozen that holds now.
+  /// Returns kOk, or the worst of the statuses kCollision to kBrakeDoubted that holds now.
   Status check(const Tick& tick) noexcept;
   /// Takes note of a torque that is applied beside a weight.
   void applied(const JointVector& torque, const JointVector& weight) noexcept;
@@ -55,17 +64,20 @@ class MotionWatch {
  private:
   bool collides(const Tick& tick) noexcept;
   bool frozen(const Tick& tick) noexcept;
+  /// True if the arm has gained more energy than the torque explains.
+  bool gains(const Tick& tick) noexcept;
 
   /// What is known of a joint.
   struct Record {
     double lower, upper;    ///< limits, rad
     double velocity_limit;  ///< rad/s
     double torque_limit;    ///< N m
-    double coulomb;         ///< friction, N m
+    double stiction;        ///< change of torque that it may take up, N m
     double external_limit;  ///< N m
 
+    double count = 2e-3;  ///< least change of q that was seen, as of a 12-bit encoder at first, rad
     double q = 0, qd = 0;            ///< of the last tick
-    double torque = 0;               ///< applied since, the mean
+    double torque = 0, beside = 0;   ///< applied since, the mean, and that beside the weight
     double excess = 0;               ///< of the torque over the weight, applied since
     double before = 0;               ///< excess when the state was last seen to change
     double external = 0;             ///< r
@@ -94,7 +106,10 @@ class MotionWatch {
   bool frozen_ = false;
   int torques_ = 0;  ///< how many were applied since the last tick
   double tip_speed_ = 0;
-  double same_ = 0;  ///< for how long the state has not changed, s
+  double same_ = 0;      ///< for how long the state has not changed, s
+  double strained_ = 0;  ///< for how long, meanwhile, the torque has exceeded stiction, s
+  double energy_ = -1;   ///< kinetic, J; negative: the last tick had springs
+  double gained_ = 0;    ///< s, J
   std::size_t wall_count_;
   std::array<Record, kMaxJoints> joints_;
   std::array<Wall, kMaxWalls> walls_;

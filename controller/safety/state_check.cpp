@@ -131,7 +131,9 @@ Status StateCheck::check(const RobotState& state) noexcept {
 Status StateCheck::compare(const JointVector& position, const JointVector& velocity,
                            double gap) noexcept {
   const bool contradicts = contradictory(position, velocity);
-  if (contradicts && !blind_) velocity_ = velocity;
+  // What is smoothed begins with how fast the position changes: it does not pass through zero where
+  // the velocity has the wrong sign.
+  if (contradicts && !blind_) velocity_ = (position - good_.position) / good_.age;
   blind_ |= contradicts;
   const bool wrong = !contradicts && wrong_rate(gap);
   if (blind_) velocity_ += ((position - good_.position) / good_.age - velocity_) / 3;

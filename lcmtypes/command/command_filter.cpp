@@ -14,9 +14,10 @@ namespace {
 
 /// What is judged before it is taken, which takes long. Goals are not: the newest of a burst
 /// counts.
-constexpr std::int32_t kJudged =
-    command_t::JOINT_GAINS | command_t::TASK_GAINS | command_t::NULL_GAINS | command_t::TASK_RATIO |
-    command_t::JOINT_RATIO | command_t::PAYLOAD | command_t::TOOL_FRAME;
+constexpr std::int32_t kJudged = int{command_t::JOINT_GAINS} | int{command_t::TASK_GAINS} |
+                                 int{command_t::NULL_GAINS} | int{command_t::TASK_RATIO} |
+                                 int{command_t::JOINT_RATIO} | int{command_t::PAYLOAD} |
+                                 int{command_t::TOOL_FRAME};
 
 }  // namespace
 

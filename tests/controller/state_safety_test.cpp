@@ -199,6 +199,7 @@ TEST_F(Safety, VelocitiesThatContradictThePositionsLatch) {
     }
     EXPECT_EQ(snapshot().fault, Status::kStateContradictory) << scale;
     EXPECT_LT(ticks, 100) << scale;
+    EXPECT_NEAR(snapshot().velocity[4], v, 1e-9) << scale;  // at once
     for (int k = 0; k < 300; ++k) {
       arm->state.position[4] += 1e-3 * v;
       next();
@@ -257,6 +258,10 @@ TEST_F(Safety, AStateThatFreezesInACreepingMotionLatches) {
     make();
     run(1.0);
     arm->state.velocity[4] = v;
+    for (int k = 0; k < 20; ++k) {
+      arm->state.position[4] += 1e-3 * v;
+      next();
+    }
     int ticks = 0;
     for (; snapshot().fault == Status::kOk && ticks < 300; ++ticks) next();
     EXPECT_EQ(snapshot().fault, Status::kStateFrozen) << v;
