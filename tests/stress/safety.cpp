@@ -64,14 +64,14 @@ std::vector<Scenario> scenarios() {
       {"M", "state without a joint for 0.5 s", six, on_variants(lost_state(true)), false},
       {"M", "stops, torque_rate 1000", six, on_variants(stop_with(1000)), false},
       {"M", "stops, torque_rate 5000", six, on_variants(stop_with(5000)), false},
-      {"M", "shoulder motor dead", six, on_variants(bad_motor(0)), false},
+      {"M", "shoulder motor dead", six, on_variants(bad_motor(0))},
       {"M", "shoulder motor at half", six, on_variants(bad_motor(0.5)), false},
-      {"M", "shoulder motor reversed", six, on_variants(bad_motor(-1)), false},
+      {"M", "shoulder motor reversed", six, on_variants(bad_motor(-1))},
       {"M", "150 N on the elbow after a gap", six, on_variants(lean_on_the_elbow), false},
       {"M", "velocity of the wrong sign", six, on_variants(wrong_velocity), false},
       {"M", "robot's brakes open late", six, on_variants(brakes_open_late), false},
-      {"M", "slow starts, 18 bits", six, on_variants(slow_starts(18)), false},
-      {"M", "slow starts, 12 bits", six, on_variants(slow_starts(12)), false},
+      {"M", "slow starts, 18 bits", six, on_variants(slow_starts(18))},
+      {"M", "slow starts, 12 bits", six, on_variants(slow_starts(12))},
       {"M", "pushes of 40 N", six, on_variants(pushes), false},
   };
 }
